@@ -1,0 +1,91 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Builds the Python package, and under colcon the messages of msg_defs/ with it."""
+import os
+import subprocess
+import sys
+from glob import glob
+from pathlib import Path
+
+from setuptools import find_packages, setup
+from setuptools.command.develop import develop
+from setuptools.command.install import install
+
+NAME = 'uav_task_alloc'
+MESSAGES = NAME + '_msgs'
+
+
+def add_messages(command):
+    """Build msg_defs/ too, unless it is being built as a package of its own.
+
+    colcon does not look for packages inside a package, so that a plain `colcon build` would
+    leave the messages out.
+    """
+    if not hasattr(sys, 'real_prefix'):     # not colcon's build
+        return
+    env, prefix = dict(os.environ), sys.prefix
+    found = [p for p in env.get('AMENT_PREFIX_PATH', '').split(':') if Path(
+        p, 'share/ament_index/resource_index/packages', MESSAGES).exists()]
+    if any(not os.path.exists(prefix) or not os.path.samefile(p, prefix) for p in found):
+        return
+    # colcon's stand-in for sys.prefix is not for the generators' Python
+    env['PYTHONPATH'] = ':'.join(
+        p for p in env.get('PYTHONPATH', '').split(':')
+        if not p.endswith(('prefix_override', 'colcon_distutils_commands')))
+    here = Path(__file__).resolve().parent
+    build = Path(command.get_finalized_command('build').build_base, MESSAGES).resolve()
+    for step in (
+        ['cmake', '-S', str(here / 'msg_defs'), '-B', str(build), '-DBUILD_TESTING=OFF',
+         f'-DCMAKE_INSTALL_PREFIX={prefix}'],
+        ['cmake', '--build', str(build)],
+        ['cmake', '--install', str(build)],
+    ):
+        subprocess.run(step, env=env, check=True)
+
+
+class Install(install):
+    """`install`, and the messages after it."""
+
+    def run(self):
+        """Install this package, then the messages."""
+        super().run()
+        add_messages(self)
+
+
+class Develop(develop):
+    """`develop` (colcon build --symlink-install), and the messages after it."""
+
+    def run(self):
+        """Link this package, then install the messages."""
+        super().run()
+        add_messages(self)
+
+
+setup(
+    name=NAME,
+    version='0.1.0',
+    cmdclass={'install': Install, 'develop': Develop},
+    packages=find_packages(include=[NAME, NAME + '.*']),
+    data_files=[
+        ('share/ament_index/resource_index/packages', ['resource/' + NAME]),
+        ('share/' + NAME, ['package.xml']),
+        ('share/' + NAME + '/launch', glob('launch/*.launch.py')),
+        ('share/' + NAME + '/config', glob('config/*.yaml')),
+        ('share/' + NAME + '/config/scenarios', glob('config/scenarios/*.yaml')),
+    ],
+    python_requires='>=3.10',
+    install_requires=['numpy', 'numba', 'pymap3d', 'pymavlink', 'pyyaml', 'scipy'],
+    extras_require={'plot': ['matplotlib'],
+                    'test': ['hypothesis', 'matplotlib', 'mypy', 'pytest', 'ruff']},
+    zip_safe=False,
+    maintainer='uav_task_alloc developers',
+    maintainer_email='uav_task_alloc@users.noreply.github.com',
+    description='Allocates tasks to several UAVs as they arrive, around no-fly zones.',
+    license='Apache-2.0',
+    entry_points={
+        'console_scripts': [
+            f'{node} = {NAME}.nodes.{node}:main'
+            for node in ('allocator', 'mavlink_bridge', 'fleet_sim', 'scenario_player',
+                         'live_view', 'demo')
+        ],
+    },
+)

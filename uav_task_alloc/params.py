@@ -1,0 +1,180 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Every parameter, declared once; ROS descriptors, YAML files and docs are made from it."""
+from __future__ import annotations
+
+import math
+from dataclasses import Field, dataclass, field, fields
+from typing import Any, TypeVar
+
+from uav_task_alloc.errors import InvalidValue
+
+
+def param(default: Any, text: str, *, low: float | None = None, high: float | None = None,
+          choices: tuple[str, ...] = (), unit: str = '', fixed: bool = False) -> Any:
+    """A field with its default, range [low, high] or choices, unit and one-line text.
+
+    fixed: read at the start only; a later change is refused.
+    """
+    what = {'text': text, 'low': low, 'high': high, 'choices': choices, 'unit': unit,
+            'fixed': fixed}
+    if isinstance(default, (list, tuple)):
+        return field(default=tuple(default), metadata=what)
+    return field(default=default, metadata=what)
+
+
+def ros_name(spec: Field[Any]) -> str:
+    """The name in ROS: `origin__latitude` is `origin.latitude`."""
+    return spec.name.replace('__', '.')
+
+
+def expectation(spec: Field[Any]) -> str:
+    """What a value must be, in words: `one of hold, home`, `[0, 1] m`, `text`."""
+    meta, kind = spec.metadata, type(spec.default).__name__
+    if meta['choices']:
+        return 'one of ' + ', '.join(meta['choices'])
+    if kind in ('int', 'float'):
+        low = -math.inf if meta['low'] is None else meta['low']
+        high = math.inf if meta['high'] is None else meta['high']
+        ends = ('(' if low == -math.inf else '[', ')' if high == math.inf else ']')
+        return f'{kind} in {ends[0]}{low:g}, {high:g}{ends[1]} {meta["unit"]}'.rstrip()
+    return {'bool': 'true or false', 'str': 'text', 'tuple': 'a list'}[kind]
+
+
+def check(spec: Field[Any], value: Any) -> Any:
+    """`value` as the declared type; raise InvalidValue where it is outside."""
+    meta, kind = spec.metadata, type(spec.default)
+    if kind is float and isinstance(value, int) and not isinstance(value, bool):
+        value = float(value)
+    if kind is tuple and not isinstance(value, str):
+        value = tuple(value)
+    wrong = (type(value) is not kind
+             or meta['choices'] and value not in meta['choices']
+             or kind is float and math.isnan(value)
+             or meta['low'] is not None and value < meta['low']
+             or meta['high'] is not None and value > meta['high'])
+    if wrong:
+        raise InvalidValue(ros_name(spec), value, expectation(spec))
+    return value
+
+
+class Checked:
+    """Base of the parameter classes: every field is checked when made."""
+
+    def __post_init__(self) -> None:
+        for spec in fields(self):  # type: ignore[arg-type]
+            object.__setattr__(self, spec.name, check(spec, getattr(self, spec.name)))
+
+
+P = TypeVar('P', bound=Checked)
+
+
+@dataclass(frozen=True)
+class AllocatorParams(Checked):
+    """allocator: hears UAVs, tasks and zones, publishes a task list for each UAV."""
+
+    origin__latitude: float = param(47.397742, 'Origin of the ENU frame.', low=-90.0, high=90.0,
+                                    unit='deg', fixed=True)
+    origin__longitude: float = param(8.545594, 'Origin of the ENU frame.', low=-180.0,
+                                     high=180.0, unit='deg', fixed=True)
+    origin__altitude_amsl: float = param(488.0, 'Origin of the ENU frame above mean sea level.',
+                                         low=-500.0, high=9000.0, unit='m', fixed=True)
+    solve_budget: float = param(0.1, 'Time a re-solve may take.', low=0.001, high=60.0, unit='s')
+    route_end: str = param('home', 'What a UAV does after its last task.',
+                           choices=('hold', 'home'))
+    uav_timeout: float = param(5.0, 'Silence after which the tasks of a UAV go to the others.',
+                               low=0.1, high=3600.0, unit='s')
+    default_range: float = param(20000.0, 'Range of a UAV that does not tell its own.', low=0.0,
+                                 high=1e7, unit='m')
+    default_cruise_speed: float = param(15.0, 'Speed of a UAV that does not tell its own.',
+                                        low=0.1, high=1000.0, unit='m/s')
+    state_dir: str = param('', 'Folder of the journal; empty: nothing is kept.', fixed=True)
+    seed: int = param(0, 'Seed of the bees.', low=0, high=2**31 - 1, fixed=True)
+
+
+@dataclass(frozen=True)
+class BridgeParams(Checked):
+    """mavlink_bridge: flies the task lists on ArduPilot and PX4 and reports progress."""
+
+    connections: tuple[str, ...] = param(
+        ('udpin:0.0.0.0:14550',), 'udpin:HOST:PORT, udpout:HOST:PORT, tcp:HOST:PORT or '
+        '/dev/tty...:BAUD each.', fixed=True)
+    origin__latitude: float = param(47.397742, 'Origin of the ENU frame.', low=-90.0, high=90.0,
+                                    unit='deg', fixed=True)
+    origin__longitude: float = param(8.545594, 'Origin of the ENU frame.', low=-180.0,
+                                     high=180.0, unit='deg', fixed=True)
+    origin__altitude_amsl: float = param(488.0, 'Origin of the ENU frame above mean sea level.',
+                                         low=-500.0, high=9000.0, unit='m', fixed=True)
+    system_ids: tuple[int, ...] = param((), 'Systems to bridge; empty: all that are heard.',
+                                        fixed=True)
+    uav_id_pattern: str = param('uav_{sysid}', 'The uav_id of a system.', fixed=True)
+    autopilot: str = param('auto', 'What flies; auto: as the heartbeat says.',
+                           choices=('auto', 'ardupilot', 'px4', 'generic'), fixed=True)
+    cruise_altitude: float = param(50.0, 'Height above home to take off to.', low=1.0,
+                                   high=5000.0, unit='m')
+    takeoff: bool = param(False, 'Arm and take off by itself.')
+    signing_key_file: str = param('', 'File with the signing key; empty: unsigned.', fixed=True)
+
+
+@dataclass(frozen=True)
+class FleetSimParams(Checked):
+    """fleet_sim: simulated ArduPilot and PX4 vehicles that speak MAVLink over UDP."""
+
+    scenario: str = param('', 'Scenario file with the origin and the UAVs.', fixed=True)
+    speedup: float = param(1.0, 'How many times faster than real time.', low=0.1, high=100.0,
+                           fixed=True)
+
+
+@dataclass(frozen=True)
+class PlayerParams(Checked):
+    """scenario_player: announces the tasks and zones of a scenario file at their times."""
+
+    scenario: str = param('', 'Scenario file to play.', fixed=True)
+    speedup: float = param(1.0, 'How many times faster than real time.', low=0.1, high=100.0,
+                           fixed=True)
+
+
+@dataclass(frozen=True)
+class LiveViewParams(Checked):
+    """live_view: shows the progress of a fleet in the terminal and records it."""
+
+    out_dir: str = param('', 'Folder to record into; empty: nothing is recorded.', fixed=True)
+
+
+NODES: dict[str, type[Checked]] = {
+    'allocator': AllocatorParams, 'mavlink_bridge': BridgeParams, 'fleet_sim': FleetSimParams,
+    'scenario_player': PlayerParams, 'live_view': LiveViewParams,
+}
+
+
+def _literal(value: Any) -> str:
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, tuple):
+        return '[' + ', '.join(map(_literal, value)) + ']'
+    return repr(value) if isinstance(value, (str, float)) else str(value)
+
+
+def yaml_text(node: str) -> str:
+    """The parameter file of one node with its defaults, a comment each."""
+    lines = [f'# Made by `python -m uav_task_alloc params --write`: the defaults of {node}.',
+             f'/**/{node}:', '  ros__parameters:']
+    for spec in fields(NODES[node]):  # type: ignore[arg-type]
+        lines.append(f'    # {spec.metadata["text"]} {expectation(spec)}')
+        # an empty list has no type in a ROS parameter file
+        mark = '# ' if spec.default == () else ''
+        lines.append(f'    {mark}{ros_name(spec)}: {_literal(spec.default)}')
+    return '\n'.join(lines) + '\n'
+
+
+def markdown_text() -> str:
+    """docs/parameters.md: one table a node."""
+    parts = ['# Parameters\n\nMade by `python -m uav_task_alloc params --write` from '
+             '`uav_task_alloc/params.py`. Those marked * are read at the start only.\n']
+    for node, kind in NODES.items():
+        parts.append(f'\n## {node}\n\n{(kind.__doc__ or "").split(":", 1)[1].strip()}\n\n'
+                     '| parameter | default | expected | what |\n|---|---|---|---|\n')
+        for spec in fields(kind):  # type: ignore[arg-type]
+            star = ' *' if spec.metadata['fixed'] else ''
+            parts.append(f'| `{ros_name(spec)}`{star} | `{_literal(spec.default)}` | '
+                         f'{expectation(spec)} | {spec.metadata["text"]} |\n')
+    return ''.join(parts)
