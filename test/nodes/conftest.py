@@ -1,0 +1,115 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Real nodes as processes, a domain of their own for each run, and a probe to talk to them."""
+import os
+import signal
+import subprocess
+import time
+
+import domain_coordinator
+import pytest
+import rclpy
+from ament_index_python.packages import get_package_prefix
+from rclpy.executors import SingleThreadedExecutor
+
+PACKAGE = 'uav_task_alloc'
+
+
+@pytest.fixture(scope='session', autouse=True)
+def domain():
+    """Keep this run apart from every other on the machine."""
+    with domain_coordinator.domain_id() as number:
+        os.environ['ROS_DOMAIN_ID'] = str(number)
+        os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
+        # a late process may else wait for up to 3 s to be seen
+        os.environ['FASTRTPS_DEFAULT_PROFILES_FILE'] = os.path.join(
+            os.path.dirname(__file__), 'quick_discovery.xml')
+        yield number
+
+
+class Process:
+    """An installed executable, started with ROS arguments; its output goes to a file."""
+
+    def __init__(self, log, executable, *ros_args, env=None):
+        path = os.path.join(get_package_prefix(PACKAGE), 'lib', PACKAGE, executable)
+        self.log = log
+        with open(log, 'w') as out:
+            self.popen = subprocess.Popen(
+                [path, '--ros-args', *ros_args], stdout=out, stderr=subprocess.STDOUT,
+                env={**os.environ, **(env or {})})
+
+    def output(self):
+        return self.log.read_text()
+
+    def stop(self, sig=signal.SIGINT, timeout=15):
+        if self.popen.poll() is None:
+            self.popen.send_signal(sig)
+        self.popen.wait(timeout)
+        return self.popen.returncode, self.output()
+
+
+@pytest.fixture
+def start(domain, tmp_path):
+    """start('allocator', '-p', 'seed:=1') -> Process; what is left at the end is killed."""
+    started = []
+
+    def start(executable, *ros_args, env=None):
+        log = tmp_path / f'{len(started)}_{executable}.log'
+        started.append(Process(log, executable, *ros_args, env=env))
+        return started[-1]
+
+    yield start
+    for process in started:
+        if process.popen.poll() is None:
+            process.popen.kill()
+        process.popen.wait()
+
+
+class Probe:
+    """A node of the test's own, in a context of its own."""
+
+    def __init__(self, name='probe', **kwargs):
+        self.context = rclpy.Context()
+        rclpy.init(context=self.context)
+        self.node = rclpy.create_node(name, context=self.context, **kwargs)
+        self.executor = SingleThreadedExecutor(context=self.context)
+        self.executor.add_node(self.node)
+
+    def until(self, condition, timeout=20.0):
+        """Spin until condition() is true; fail after `timeout` [s]."""
+        end = time.monotonic() + timeout
+        while not condition():
+            if time.monotonic() > end:
+                raise AssertionError('timed out')
+            self.executor.spin_once(timeout_sec=0.05)
+
+    def collect(self, kind, topic, qos):
+        """A list that fills with the messages of a topic."""
+        got = []
+        self.node.create_subscription(kind, topic, got.append, qos)
+        return got
+
+    def publisher(self, kind, topic, qos):
+        """A publisher that somebody already listens to."""
+        made = self.node.create_publisher(kind, topic, qos)
+        self.until(lambda: made.get_subscription_count() > 0)
+        return made
+
+    def call(self, kind, name, request, timeout=20.0):
+        client = self.node.create_client(kind, name)
+        self.until(client.service_is_ready, timeout)
+        future = client.call_async(request)
+        self.until(future.done, timeout)
+        self.node.destroy_client(client)
+        return future.result()
+
+    def close(self):
+        self.executor.shutdown()
+        self.node.destroy_node()
+        self.context.try_shutdown()
+
+
+@pytest.fixture
+def probe(domain):
+    probe = Probe()
+    yield probe
+    probe.close()
