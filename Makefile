@@ -1,0 +1,39 @@
+# SPDX-License-Identifier: Apache-2.0
+# make demo: four simulated UAVs fly what the allocator plans.   make test: every check.
+SHELL := /bin/bash
+.SHELLFLAGS := -euo pipefail -c
+.PHONY: demo test build docs clean
+
+ENV := . .ros/setup.sh && export PYTHONWARNINGS=
+RUN := . install/setup.bash && export PATH="$(CURDIR)/.ros/bin:$$PATH"
+
+demo: build
+	@echo '== demo: 4 UAVs, 32 tasks, 3 zones; results go to out/demo'
+	@$(RUN) && python3 -m uav_task_alloc.nodes.demo
+
+test: build
+	@echo '== ruff' && .ros/bin/ruff check .
+	@echo '== mypy' && .ros/bin/mypy
+	@echo '== pytest' && $(RUN) && REQUIRE_ROS=1 python3 -m pytest
+
+# After this `source install/setup.bash` is all a shell needs.
+build: install/.built
+
+.ros/.made: tools/ros_env/setup.sh tools/ros_env/requirements.txt tools/ros_env/python.txt
+	@echo '== ROS 2 Jazzy and Python packages into .ros/ (once, about a minute)'
+	@tools/ros_env/setup.sh .ros
+	@touch $@
+
+install/.built: .ros/.made setup.py setup.cfg package.xml colcon_defaults.yaml \
+		$(wildcard msg_defs/* msg_defs/*/* launch/* config/*.yaml config/scenarios/*)
+	@echo '== colcon build (about a minute when messages changed)'
+	@mkdir -p log && $(ENV) && python3 -m colcon build --symlink-install > log/make_build.txt 2>&1 \
+		|| { tail -n 40 log/make_build.txt; exit 1; }
+	@touch $@
+
+# The generated files: config/*.yaml, docs/parameters.md
+docs: build
+	@$(RUN) && python3 -m uav_task_alloc params --write
+
+clean:
+	rm -rf .ros build install log out

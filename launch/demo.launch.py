@@ -1,0 +1,30 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A scenario in the air: allocator, bridge, simulated fleet, player and live view."""
+from launch import LaunchDescription
+from launch.actions import DeclareLaunchArgument
+from launch.substitutions import LaunchConfiguration, PathJoinSubstitution
+from launch_ros.actions import Node
+from launch_ros.parameter_descriptions import ParameterValue
+from launch_ros.substitutions import FindPackageShare
+
+
+def generate_launch_description() -> LaunchDescription:
+    """Arguments: scenario (a YAML file), speedup."""
+    scenario = LaunchConfiguration('scenario')
+    played = {'scenario': scenario,
+              'speedup': ParameterValue(LaunchConfiguration('speedup'), value_type=float)}
+
+    def node(name: str, **parameters: object) -> Node:
+        return Node(package='uav_task_alloc', executable=name, output='screen',
+                    parameters=[parameters] if parameters else [])
+
+    return LaunchDescription([
+        DeclareLaunchArgument('scenario', default_value=PathJoinSubstitution(
+            [FindPackageShare('uav_task_alloc'), 'config', 'scenarios', 'demo.yaml'])),
+        DeclareLaunchArgument('speedup', default_value='8.0'),
+        node('allocator'),
+        node('mavlink_bridge', takeoff=True),
+        node('fleet_sim', **played),
+        node('scenario_player', **played),
+        node('live_view'),
+    ])
