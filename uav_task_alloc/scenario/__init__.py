@@ -1,0 +1,15 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Scenario files: read, checked, written and generated."""
+from uav_task_alloc.scenario.generate import generate
+from uav_task_alloc.scenario.read import load, parse
+from uav_task_alloc.scenario.values import (
+    Cancel,
+    Scenario,
+    ScenarioUav,
+    TimedTask,
+    TimedZone,
+)
+from uav_task_alloc.scenario.write import to_yaml
+
+__all__ = ['Cancel', 'Scenario', 'ScenarioUav', 'TimedTask', 'TimedZone', 'generate', 'load',
+           'parse', 'to_yaml']

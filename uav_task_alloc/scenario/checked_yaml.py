@@ -1,0 +1,197 @@
+# SPDX-License-Identifier: Apache-2.0
+"""YAML read against declared tables: a refusal names file, line, value and expectation."""
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from difflib import get_close_matches
+from typing import Any
+
+import yaml
+
+from uav_task_alloc.errors import ScenarioError
+
+REQUIRED: Any = object()
+INFINITE = {'.inf': math.inf, '+.inf': math.inf, '-.inf': -math.inf}  # YAML's spelling
+
+
+@dataclass(frozen=True, slots=True)
+class Kind:
+    """What a value may be: in words, for the docs and for refusals, and how it is read."""
+
+    words: str
+    read: Callable[[str, yaml.Node], Any]  # (place, node); raises ScenarioError
+
+
+@dataclass(frozen=True, slots=True)
+class Key:
+    """One key of a table; null, or leaving it out, means the default."""
+
+    kind: Kind
+    text: str
+    default: Any = REQUIRED
+
+
+Table = Mapping[str, Key]
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """What a mapping held, by key, and where in the file it stands."""
+
+    place: str
+    node: yaml.Node
+    nodes: dict[str, yaml.Node]
+    values: dict[str, Any]
+
+    def __getitem__(self, key: str) -> Any:
+        return self.values[key]
+
+    def refuse(self, key: str, expected: str) -> ScenarioError:
+        """The error for the value of `key`, or for its absence."""
+        node = self.nodes.get(key)
+        if node is None:
+            return refusal(self.node, f'{self.place}.{key} is missing: expected {expected}')
+        return refusal(node, f'{self.place}.{key} = {shown(node)}: expected {expected}')
+
+
+def refusal(node: yaml.Node, reason: str) -> ScenarioError:
+    """`file:line: reason` for a node of a composed document."""
+    return ScenarioError(f'{node.start_mark.name}:{node.start_mark.line + 1}: {reason}')
+
+
+def shown(node: yaml.Node) -> str:
+    """A value as a refusal names it, never longer than half a line."""
+    if isinstance(node, yaml.MappingNode):
+        return 'a mapping'
+    if isinstance(node, yaml.SequenceNode):
+        inner = ', '.join(shown(child) for child in node.value[:4])
+        return f'[{inner}{", ..." if len(node.value) > 4 else ""}]'[:45]
+    return repr(node.value[:40]) if node.style else str(node.value[:40]) or 'null'
+
+
+def compose(text: str, name: str) -> yaml.Node:
+    """The document as nodes that know their line; ScenarioError when it is no YAML."""
+    try:
+        loader = yaml.SafeLoader(text)
+        loader.name = name
+        node = loader.get_single_node()
+    except yaml.MarkedYAMLError as error:
+        mark = error.problem_mark or error.context_mark
+        line = mark.line + 1 if mark else 1
+        raise ScenarioError(f'{name}:{line}: {error.problem}: expected YAML') from None
+    except yaml.reader.ReaderError as error:
+        line = text.count('\n', 0, error.position) + 1
+        raise ScenarioError(f'{name}:{line}: character {text[error.position]!r}: '
+                            'expected printable text') from None
+    except RecursionError:
+        raise ScenarioError(f'{name}:1: nested too deep: expected a scenario') from None
+    if node is None:
+        raise ScenarioError(f'{name}:1: the file is empty: expected a scenario')
+    return node
+
+
+def read_row(table: Table, place: str, node: yaml.Node) -> Row:
+    """One mapping read key by key; unknown, repeated and missing keys are refused."""
+    if not isinstance(node, yaml.MappingNode):
+        raise refusal(node, f'{place} = {shown(node)}: expected a mapping with '
+                            f'{", ".join(table)}')
+    nodes: dict[str, yaml.Node] = {}
+    for name, child in node.value:
+        key = name.value if isinstance(name, yaml.ScalarNode) else shown(name)
+        if key not in table:
+            near = get_close_matches(key, table, 1, 0.0)[0]
+            raise refusal(name, f'{place}: unknown key {key!r}: expected one of '
+                                f'{", ".join(table)}; nearest is {near!r}')
+        if key in nodes:
+            raise refusal(name, f'{place}: key {key!r} is given twice: expected it once; '
+                                f'first in line {nodes[key].start_mark.line + 1}')
+        nodes[key] = child
+    row = Row(place, node, nodes, {})
+    for key, entry in table.items():
+        given = nodes.get(key)
+        if given is not None and not is_null(given):
+            row.values[key] = entry.kind.read(f'{place}.{key}', given)
+        elif entry.default is REQUIRED:
+            raise row.refuse(key, entry.kind.words)
+        else:
+            row.values[key] = entry.default
+    return row
+
+
+def is_null(node: yaml.Node) -> bool:
+    """Written as null, ~ or nothing."""
+    return bool(node.tag == 'tag:yaml.org,2002:null')
+
+
+def scalar(words: str, convert: Callable[[str], Any]) -> Kind:
+    """A single value; `convert` raises ValueError for what is not meant."""
+    def read(place: str, node: yaml.Node) -> Any:
+        try:
+            if not isinstance(node, yaml.ScalarNode):
+                raise ValueError
+            return convert(node.value)
+        except ValueError:
+            raise refusal(node, f'{place} = {shown(node)}: expected {words}') from None
+    return Kind(words, read)
+
+
+def number(low: float = -math.inf, high: float = math.inf, *, open_low: bool = False,
+           infinite: bool = False) -> Kind:
+    """A number in [low, high], or (low, high] where open_low; infinite only where it may."""
+    def convert(text: str) -> float:
+        value = INFINITE.get(text.lower())
+        value = float(text) if value is None else value
+        if not low <= value <= high or (open_low and value == low):
+            raise ValueError
+        if math.isinf(value) and not infinite:
+            raise ValueError
+        return value
+    if (low, high) == (-math.inf, math.inf):
+        return scalar('a number', convert)
+    left = '(' if open_low or math.isinf(low) else '['
+    right = ']' if infinite or math.isfinite(high) else ')'
+    return scalar(f'a number in {left}{low:g}, {high:g}{right}', convert)
+
+
+def whole(low: int, high: int) -> Kind:
+    """A whole number in [low, high]."""
+    def convert(text: str) -> int:
+        value = int(text)
+        if not low <= value <= high:
+            raise ValueError
+        return value
+    return scalar(f'a whole number in [{low}, {high}]', convert)
+
+
+def choice(*names: str) -> Kind:
+    """One of some words."""
+    def convert(text: str) -> str:
+        if text not in names:
+            raise ValueError
+        return text
+    return scalar(f'one of {", ".join(names)}', convert)
+
+
+def text(words: str, accepts: Callable[[str], object] = str.strip) -> Kind:
+    """A string that `accepts` takes."""
+    def convert(value: str) -> str:
+        if not accepts(value):
+            raise ValueError
+        return value
+    return scalar(words, convert)
+
+
+def many(kind: Kind, words: str, least: int = 0, most: float = math.inf) -> Kind:
+    """A list of values of one kind, read as a tuple."""
+    def read(place: str, node: yaml.Node) -> tuple[Any, ...]:
+        if not isinstance(node, yaml.SequenceNode) or not least <= len(node.value) <= most:
+            raise refusal(node, f'{place} = {shown(node)}: expected {words}')
+        return tuple(kind.read(f'{place}[{i}]', child) for i, child in enumerate(node.value))
+    return Kind(words, read)
+
+
+def mapping(table: Table, words: str) -> Kind:
+    """A nested mapping, read as a Row."""
+    return Kind(words, lambda place, node: read_row(table, place, node))

@@ -1,0 +1,184 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A scenario file to a Scenario: everything checked, each refusal with file, line and reason."""
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from difflib import get_close_matches
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+from uav_task_alloc.geometry.frames import Origin, to_enu
+
+from uav_task_alloc.errors import InvalidValue, ScenarioError
+from uav_task_alloc.model import Point, Shape, Task, ThreatZone
+from uav_task_alloc.scenario.checked_yaml import Row, compose, read_row, refusal
+from uav_task_alloc.scenario.generate import draw_points
+from uav_task_alloc.scenario.schema import SCENARIO
+from uav_task_alloc.scenario.values import (
+    DEFAULT_ORIGIN,
+    Cancel,
+    Scenario,
+    ScenarioUav,
+    TimedTask,
+    TimedZone,
+)
+
+Made = TypeVar('Made')
+
+
+def load(path: str | Path) -> Scenario:
+    """The scenario of a YAML file; ScenarioError `file:line: reason` when it is not one."""
+    try:
+        text = Path(path).read_text(encoding='utf-8')
+    except OSError as error:
+        raise ScenarioError(f'{path}: {error.strerror}: expected a scenario file') from None
+    except UnicodeDecodeError as error:
+        line = error.object.count(b'\n', 0, error.start) + 1
+        raise ScenarioError(f'{path}:{line}: byte {error.object[error.start]:#04x}: '
+                            'expected UTF-8 text') from None
+    return parse(text, str(path))
+
+
+def parse(text: str, name: str = 'scenario') -> Scenario:
+    """The scenario of a YAML text; `name` is what refusals call the file."""
+    root = read_row(SCENARIO, 'scenario', compose(text, name))
+    origin = _origin(root['origin'])
+    uavs = tuple(_uav(row, i + 1) for i, row in enumerate(root['uavs']))
+    if not uavs:
+        raise root.refuse('uavs', 'at least one UAV')
+    _unique(root['uavs'], 'id', [uav.id for uav in uavs])
+    _unique(root['uavs'], 'system_id', [uav.system_id for uav in uavs])
+    zones = tuple(_zone(row) for row in root['zones'])
+    _unique(root['zones'], 'id', [timed.zone.id for timed in zones])
+    tasks = [_task(row, origin, [uav.id for uav in uavs]) for row in root['tasks']]
+    _unique(root['tasks'], 'id', [timed.task.id for timed in tasks])
+    if root['arrivals'] is not None:
+        tasks += _arrivals(root['arrivals'], zones, tasks, root['seed'])
+    times = {timed.task.id: timed.at for timed in tasks}
+    cancels = [_cancel(row, times) for row in root['cancels']]
+    return Scenario(root['name'] or Path(name).stem, root['seed'], origin, uavs,
+                    tuple(sorted(tasks, key=lambda timed: timed.at)), zones,
+                    tuple(sorted(cancels, key=lambda cancel: cancel.at)))
+
+
+def _origin(row: Row | None) -> Origin:
+    if row is None:
+        return DEFAULT_ORIGIN
+    return Origin(row['latitude'], row['longitude'], row['altitude_amsl'])
+
+
+def _uav(row: Row, place: int) -> ScenarioUav:
+    uav = ScenarioUav(
+        row['id'], row['system_id'] or place, row['autopilot'], row['position'],
+        row['home'] or row['position'], row['cruise_speed'], row['range'],
+        frozenset(row['capabilities']), row['dies_at'])
+    if uav.system_id > 255:
+        raise row.refuse('system_id', 'a whole number in [1, 255], as there are more UAVs')
+    return uav
+
+
+def _task(row: Row, origin: Origin, uavs: list[str]) -> TimedTask:
+    allowed = row['allowed_uavs']
+    for name in allowed or ():
+        if name not in uavs:
+            raise row.refuse('allowed_uavs', _known('UAVs', name, uavs))
+    return TimedTask(row['at'], _valid(row, lambda: Task(
+        row['id'], _position(row, origin), row['value'], row['service_time'],
+        frozenset(row['required_capabilities']), None if allowed is None else frozenset(allowed),
+        row['acceptance_radius'])))
+
+
+def _position(row: Row, origin: Origin) -> Point:
+    geodetic = [row[key] for key in ('latitude', 'longitude', 'altitude')]
+    if (row['position'] is None) == all(value is None for value in geodetic):
+        raise row.refuse('position', 'either position, or latitude, longitude and altitude')
+    if row['position'] is not None:
+        x, y, z = row['position']
+        return x, y, z
+    for key in ('latitude', 'longitude', 'altitude'):
+        if row[key] is None:
+            raise row.refuse(key, 'all three of latitude, longitude, altitude')
+    latitude, longitude, altitude = geodetic
+    return to_enu(origin, latitude, longitude, origin.altitude_amsl + altitude)
+
+
+def _zone(row: Row) -> TimedZone:
+    shape = Shape[row['shape'].upper()]
+    for key in ('vertices',) if shape is Shape.POLYGON else ('center', 'radius'):
+        if row[key] is None:
+            raise row.refuse(key, f'it for a {row["shape"]}')
+    unused = {'hemisphere': ('vertices', 'z_min', 'z_max'), 'cylinder': ('vertices',),
+              'polygon': ('center', 'radius')}[row['shape']]
+    for key in unused:
+        if key in row.nodes:
+            raise row.refuse(key, f'no such key for a {row["shape"]}')
+    if not row['appears'] < row['vanishes']:
+        raise row.refuse('vanishes', f'a time after appears = {row["appears"]:g}')
+    return TimedZone(_valid(row, lambda: _volume(row, shape)), row['appears'], row['vanishes'])
+
+
+def _volume(row: Row, shape: Shape) -> ThreatZone:
+    if shape is Shape.POLYGON:
+        return ThreatZone.polygon(row['id'], row['vertices'], row['z_min'], row['z_max'],
+                                  row['margin'])
+    if shape is Shape.CYLINDER:
+        return ThreatZone.cylinder(row['id'], row['center'], row['radius'], row['z_min'],
+                                   row['z_max'], row['margin'])
+    if len(row['center']) < 3:
+        raise row.refuse('center', 'three numbers [x, y, z] for a hemisphere')
+    return ThreatZone.hemisphere(row['id'], row['center'], row['radius'], row['margin'])
+
+
+def _cancel(row: Row, times: dict[str, float]) -> Cancel:
+    if row['task'] not in times:
+        raise row.refuse('task', _known('tasks', row['task'], times))
+    if row['at'] < times[row['task']]:
+        raise row.refuse('at', f'not before it is announced at {times[row["task"]]:g}')
+    return Cancel(row['at'], row['task'])
+
+
+def _arrivals(row: Row, zones: Iterable[TimedZone], tasks: list[TimedTask],
+              seed: int) -> list[TimedTask]:
+    first, last = row['between']
+    low, high = row['area']
+    if not first <= last:
+        raise row.refuse('between', 'the first time not after the last')
+    if any(a > b for a, b in zip(low, high, strict=True)):
+        raise row.refuse('area', 'the lower corner first')
+    rng = np.random.default_rng(seed)
+    times = sorted(round(float(t), 1) for t in rng.uniform(first, last, row['count']))
+    points = draw_points(rng, row['count'], low, high, [timed.zone for timed in zones])
+    if len(points) < row['count']:
+        raise row.refuse('area', 'a box with room outside the zones')
+    ids = [f'{row["prefix"]}{i:02d}' for i in range(1, row['count'] + 1)]
+    taken = {timed.task.id for timed in tasks}.intersection(ids)
+    if taken:
+        raise row.refuse('prefix', f'one that makes no id again; {min(taken)!r} is a task')
+    return [TimedTask(at, Task(name, point, row['value'], row['service_time']))
+            for at, name, point in zip(times, ids, points, strict=True)]
+
+
+def _known(kind: str, name: str, known: Iterable[str]) -> str:
+    near = get_close_matches(name, list(known), 1, 0.0)
+    return f'one of the {kind} of this file' + (f'; nearest is {near[0]!r}' if near else '')
+
+
+def _unique(rows: Iterable[Row], key: str, values: Iterable[Any]) -> None:
+    seen: dict[Any, Row] = {}
+    for row, value in zip(rows, values, strict=True):
+        if value in seen:
+            line = seen[value].node.start_mark.line + 1
+            raise refusal(row.nodes.get(key, row.node),
+                          f'{row.place}.{key} = {value}: expected one not given before; '
+                          f'first in line {line}')
+        seen[value] = row
+
+
+def _valid(row: Row, make: Callable[[], Made]) -> Made:
+    """What `make` makes; its InvalidValue gets the line of the row."""
+    try:
+        return make()
+    except InvalidValue as error:
+        key = error.place.rpartition(' ')[2]
+        raise refusal(row.nodes.get(key, row.node), f'{row.place}: {error}') from None

@@ -1,0 +1,55 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A Scenario to the YAML text that reads back as the same scenario."""
+from __future__ import annotations
+
+import math
+from dataclasses import asdict
+from typing import Any
+
+import yaml
+
+from uav_task_alloc.model import Shape, Task, ThreatZone
+from uav_task_alloc.scenario.values import Scenario, ScenarioUav, TimedTask, TimedZone
+
+
+def to_yaml(scenario: Scenario) -> str:
+    """The file's text; arrivals are written as the tasks they became."""
+    document = {
+        'name': scenario.name,
+        'seed': scenario.seed,
+        'origin': asdict(scenario.origin),
+        'uavs': [_uav(uav) for uav in scenario.uavs],
+        'tasks': [_task(timed) for timed in scenario.tasks],
+        'zones': [_zone(timed) for timed in scenario.zones],
+        'cancels': [{'task': cancel.task, 'at': cancel.at} for cancel in scenario.cancels],
+    }
+    return str(yaml.safe_dump(document, sort_keys=False, default_flow_style=None, width=99))
+
+
+def _uav(uav: ScenarioUav) -> dict[str, Any]:
+    row = {'id': uav.id, 'system_id': uav.system_id, 'autopilot': uav.autopilot,
+           'position': list(uav.position), 'home': list(uav.home),
+           'cruise_speed': uav.cruise_speed, 'range': uav.range,
+           'capabilities': sorted(uav.capabilities), 'dies_at': uav.dies_at}
+    return row
+
+
+def _task(timed: TimedTask) -> dict[str, Any]:
+    task: Task = timed.task
+    return {'id': task.id, 'at': timed.at, 'position': list(task.position), 'value': task.value,
+            'service_time': task.service_time, 'acceptance_radius': task.acceptance_radius,
+            'required_capabilities': sorted(task.required_capabilities),
+            'allowed_uavs': None if task.allowed_uavs is None else sorted(task.allowed_uavs)}
+
+
+def _zone(timed: TimedZone) -> dict[str, Any]:
+    zone: ThreatZone = timed.zone
+    row: dict[str, Any] = {'id': zone.id, 'shape': zone.shape.name.lower()}
+    if zone.shape is Shape.POLYGON:
+        row['vertices'] = [list(corner) for corner in zone.vertices]
+    else:
+        row |= {'center': list(zone.center), 'radius': zone.radius}
+    if zone.shape is not Shape.HEMISPHERE:
+        row |= {'z_min': zone.z_min, 'z_max': zone.z_max}
+    row |= {'margin': zone.margin, 'appears': timed.appears}
+    return row if math.isinf(timed.vanishes) else row | {'vanishes': timed.vanishes}
