@@ -1,0 +1,89 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Messages become model values and back; a bad field is refused by its name."""
+import math
+
+import pytest
+from uav_task_alloc_msgs import msg as m
+
+from uav_task_alloc.errors import InvalidValue
+from uav_task_alloc.geometry.frames import Origin
+from uav_task_alloc.model import Leg, Task, ThreatZone
+from uav_task_alloc.nodes import messages
+
+ORIGIN = Origin(47.397742, 8.545594, 488.0)
+
+
+def task_message(**changed):
+    base = messages.from_task(Task('t1', (10.0, 20.0, 30.0), value=2.0, service_time=3.5))
+    for name, value in changed.items():
+        setattr(base, name, value)
+    return base
+
+
+def test_a_task_comes_back_as_it_went():
+    task = Task('t1', (10.0, 20.0, 30.0), 2.0, 3.5, frozenset({'camera'}), frozenset({'u1'}), 4.0)
+    assert messages.to_task(messages.from_task(task), ORIGIN) == task
+
+
+def test_nan_acceptance_radius_is_unknown():
+    assert messages.to_task(task_message(acceptance_radius=math.nan), ORIGIN
+                            ).acceptance_radius is None
+
+
+def test_a_wgs84_task_is_placed_by_the_origin():
+    there = task_message(frame=m.Task.FRAME_WGS84, latitude=47.397742, longitude=8.545594,
+                         altitude=50.0)
+    assert messages.to_task(there, ORIGIN).position == pytest.approx((0.0, 0.0, 50.0), abs=1e-6)
+    north = task_message(frame=m.Task.FRAME_WGS84, latitude=47.406742, longitude=8.545594,
+                         altitude=50.0)
+    x, y, _ = messages.to_task(north, ORIGIN).position
+    assert (x, y) == pytest.approx((0.0, 1000.8), abs=1.0)
+
+
+@pytest.mark.parametrize(('changed', 'text'), [
+    ({'task_id': 'a b'}, "task_id = 'a b': expected a ROS name"),
+    ({'task_id': ''}, "task_id = '': expected a ROS name"),
+    ({'task_id': '7up'}, "task_id = '7up': expected a ROS name"),
+    ({'value': -1.0}, 'task t1: value = -1.0'),
+    ({'frame': 9}, r'task t1: frame = 9: expected LOCAL \(0\) or WGS84 \(1\)'),
+    ({'frame': 1, 'latitude': math.nan}, 'task t1: latitude = nan'),
+    ({'frame': 1, 'longitude': 200.0}, 'task t1: longitude = 200.0'),
+    ({'acceptance_radius': -2.0}, 'task t1: acceptance_radius = -2.0'),
+    ({'service_time': messages.to_duration(-2.0)}, 'task t1: service_time = -2.0'),
+])
+def test_a_bad_task_is_refused_by_the_name_of_its_field(changed, text):
+    with pytest.raises(InvalidValue, match=text):
+        messages.to_task(task_message(**changed), ORIGIN)
+
+
+@pytest.mark.parametrize('zone', [
+    ThreatZone.hemisphere('z1', (1.0, 2.0, 3.0), 80.0, margin=5.0),
+    ThreatZone.cylinder('z1', (1.0, 2.0), 80.0, 0.0, 120.0),
+    ThreatZone.cylinder('z1', (1.0, 2.0), 80.0),
+    ThreatZone.polygon('z1', [(0.0, 0.0), (10.0, 0.0), (0.0, 10.0)], 0.0, 50.0, margin=2.0),
+])
+def test_a_zone_comes_back_as_it_went(zone):
+    assert messages.to_zone(messages.from_zone(zone)) == zone
+
+
+def test_a_bad_zone_is_refused_by_the_name_of_its_field():
+    bad = messages.from_zone(ThreatZone.hemisphere('z1', (0.0, 0.0, 0.0), 80.0))
+    bad.shape = 7
+    with pytest.raises(InvalidValue, match='zone z1: shape = 7'):
+        messages.to_zone(bad)
+    bad.shape, bad.radius = 0, math.nan
+    with pytest.raises(InvalidValue, match='zone z1: radius = nan'):
+        messages.to_zone(bad)
+
+
+@pytest.mark.parametrize('seconds', [0.0, 1.5, -1.5, 1_800_000_000.123456, 0.9999999999])
+def test_times_survive_the_way_through_a_message(seconds):
+    assert messages.from_stamp(messages.to_stamp(seconds)) == pytest.approx(seconds, abs=1e-6)
+    assert messages.from_stamp(messages.to_duration(min(seconds, 1e6))) == pytest.approx(
+        min(seconds, 1e6), abs=1e-6)
+
+
+def test_a_planned_task_carries_its_way():
+    msg = messages.planned_task(Task('t1', (1.0, 2.0, 3.0)), Leg(((0.5, 0.5, 0.5),), 4.0), 2.5)
+    assert (msg.leg_distance, msg.via[0].x, msg.eta.sec, msg.eta.nanosec) == (
+        4.0, 0.5, 2, 500_000_000)

@@ -1,0 +1,91 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The values of the model refuse what makes no sense, in words."""
+import math
+
+import pytest
+
+from uav_task_alloc.errors import InvalidValue
+from uav_task_alloc.model import Leg, Plan, Task, ThreatZone, Uav
+
+NAN = math.nan
+SQUARE = [(0, 0), (10, 0), (10, 10), (0, 10)]
+
+
+@pytest.mark.parametrize(('make', 'text'), [
+    (lambda: Task('t1', (NAN, 0, 0)),
+     'task t1: position = (nan, 0.0, 0.0): expected three finite coordinates [m]'),
+    (lambda: Task('t1', (0, 0)), 'task t1: position = (0, 0): expected three coordinates [m]'),
+    (lambda: Task('t1', (0, 0, 0), value=0.0),
+     'task t1: value = 0.0: expected a number in (0, inf]'),
+    (lambda: Task('t1', (0, 0, 0), value=math.inf),
+     'task t1: value = inf: expected a finite number'),
+    (lambda: Task('t1', (0, 0, 0), service_time=-1),
+     'task t1: service_time = -1.0: expected a number in [0, 1e+09]'),
+    (lambda: Task('t1', (0, 0, 0), required_capabilities='camera'),
+     "task t1: required_capabilities = 'camera': expected a set of strings"),
+    (lambda: Task('t1', (0, 0, 0), acceptance_radius=0.0),
+     'task t1: acceptance_radius = 0.0: expected a number in (0, 1e+06]'),
+    (lambda: Task('', (0, 0, 0)), "task id = '': expected a non-empty string"),
+    (lambda: Uav('u1', (0, 0, 0), range=-5),
+     'uav u1: range = -5.0: expected a number in [0, inf]'),
+    (lambda: Uav('u1', (0, 0, 0), range=NAN),
+     'uav u1: range = nan: expected a number in [0, inf]'),
+    (lambda: Uav('u1', (0, 0, 0), cruise_speed=0),
+     'uav u1: cruise_speed = 0.0: expected a number in (0, 10000]'),
+    (lambda: Uav('u1', (0, 0, 0), home=(0, 0, NAN)),
+     'uav u1: home = (0.0, 0.0, nan): expected three finite coordinates [m]'),
+    (lambda: ThreatZone.hemisphere('z1', (0, 0, 0), 0.0),
+     'zone z1: radius = 0.0: expected a number in (0, 1e+07]'),
+    (lambda: ThreatZone.hemisphere('z1', (0, 0, 0), 10.0, margin=-1.0),
+     'zone z1: margin = -1.0: expected a number in [0, 1e+06]'),
+    (lambda: ThreatZone.cylinder('z1', (0, 0), 10.0, 5.0, 5.0),
+     'zone z1: z_min, z_max = (5.0, 5.0): expected z_min < z_max'),
+    (lambda: ThreatZone.cylinder('z1', (0, 0), 10.0, NAN, 5.0),
+     'zone z1: z_min, z_max = (nan, 5.0): expected z_min < z_max'),
+    (lambda: ThreatZone.polygon('z1', [(0, 0), (1, 1)]),
+     'zone z1: vertices = ((0.0, 0.0), (1.0, 1.0)): expected at least 3 corners'),
+])
+def test_a_bad_value_is_refused_in_words(make, text):
+    with pytest.raises(InvalidValue) as refused:
+        make()
+    assert str(refused.value) == text
+
+
+@pytest.mark.parametrize('corners', [
+    [(0, 0), (10, 10), (10, 0), (0, 10)],          # crossing
+    [(0, 0), (10, 0), (5, 0)],                     # folded back
+    [(0, 0), (0, 0), (10, 0), (10, 10)],           # a corner twice
+    [(0, 0), (10, 0), (10, 10), (5, 0), (0, 10)],  # a corner on an edge
+    [(0, 0), (5, 5), (10, 10)],                    # no area
+    [(0, 0), (10, NAN), (10, 10)],
+])
+def test_a_polygon_that_is_none_is_refused(corners):
+    with pytest.raises(InvalidValue, match='zone z1: vertices'):
+        ThreatZone.polygon('z1', corners)
+
+
+@pytest.mark.parametrize('corners', [SQUARE, SQUARE[::-1], [*SQUARE, SQUARE[0]],
+                                     [(0, 0), (10, 0), (10, 10), (5, 2), (0, 10)]])
+def test_a_simple_polygon_is_taken_either_way_round(corners):
+    zone = ThreatZone.polygon('z1', corners, 0.0, 50.0)
+    assert len(zone.vertices) in (4, 5)
+    assert (0.0, 0.0) in zone.vertices
+
+
+def test_numbers_become_floats_and_sets_are_frozen():
+    task = Task('t1', [1, 2, 3], required_capabilities={'camera'}, allowed_uavs=['u1'])
+    assert task.position == (1.0, 2.0, 3.0)
+    assert task.required_capabilities == frozenset({'camera'})
+    assert task.allowed_uavs == frozenset({'u1'})
+    assert hash(task) == hash(Task('t1', (1.0, 2.0, 3.0), required_capabilities={'camera'},
+                                   allowed_uavs=['u1']))
+
+
+def test_a_plan_gives_the_route_of_a_uav():
+    legs = (Leg(((1.0, 0.0, 0.0),), 3.0), Leg((), 4.0))
+    plan = Plan({'u1': ('t1',), 'u2': ()}, legs={'u1': legs}, returns=True)
+    assert plan.route('u1').tasks == ('t1',)
+    assert plan.route('u1').distance == 7.0
+    assert plan.route('u2').distance == 0.0
+    with pytest.raises(KeyError):
+        plan.route('u3')

@@ -1,0 +1,51 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The package as a whole: public names, launch files, interface files."""
+import re
+from pathlib import Path
+
+import pytest
+
+import uav_task_alloc
+
+ROOT = Path(__file__).parent.parent
+
+
+def test_the_public_names_are_these():
+    assert sorted(uav_task_alloc.__all__) == [
+        'Plan', 'SOLVERS', 'Task', 'ThreatZone', 'Uav', 'detour', 'plan']
+    assert all(hasattr(uav_task_alloc, name) for name in uav_task_alloc.__all__)
+
+
+@pytest.mark.parametrize('path', sorted(ROOT.glob('launch/*.launch.py')), ids=lambda p: p.name)
+def test_a_launch_file_compiles_and_builds_where_launch_is_there(path):
+    scope = {}
+    code = compile(path.read_text(), str(path), 'exec')
+    try:
+        import launch  # noqa: F401
+        import launch_ros  # noqa: F401
+    except ImportError:
+        assert 'generate_launch_description' in code.co_names
+        return
+    exec(code, scope)
+    assert scope['generate_launch_description']().entities
+
+
+@pytest.mark.parametrize('path', sorted(ROOT.glob('msg_defs/*/*')), ids=lambda p: p.name)
+def test_every_field_of_a_message_carries_a_comment(path):
+    for line in path.read_text().splitlines():
+        if re.match(r'\w', line) and '=' not in line.split('#')[0]:
+            assert '#' in line, f'{path.name}: {line}'
+
+
+@pytest.mark.parametrize('path', sorted(ROOT.glob('msg_defs/*/*')), ids=lambda p: p.name)
+def test_every_interface_is_generated(path):
+    made = (ROOT / 'msg_defs/CMakeLists.txt').read_text()
+    assert f'"{path.parent.name}/{path.name}"' in made
+
+
+def test_the_version_is_the_same_everywhere():
+    places = {
+        re.search(r"version='([\d.]+)'", (ROOT / 'setup.py').read_text()).group(1),
+        *(re.search(r'<version>([\d.]+)', (ROOT / p).read_text()).group(1)
+          for p in ('package.xml', 'msg_defs/package.xml'))}
+    assert len(places) == 1

@@ -1,0 +1,59 @@
+# SPDX-License-Identifier: Apache-2.0
+"""One declaration a parameter: files made from it are fresh, values are checked."""
+from dataclasses import fields
+from pathlib import Path
+
+import pytest
+import yaml
+
+from uav_task_alloc import params
+from uav_task_alloc.errors import InvalidValue
+
+ROOT = Path(__file__).parent.parent
+
+
+@pytest.mark.parametrize('node', params.NODES)
+def test_the_yaml_file_of_a_node_is_fresh(node):
+    assert (ROOT / f'config/{node}.yaml').read_text() == params.yaml_text(node)
+
+
+def test_the_table_in_docs_is_fresh():
+    assert (ROOT / 'docs/parameters.md').read_text() == params.markdown_text()
+
+
+@pytest.mark.parametrize('node', params.NODES)
+def test_a_yaml_file_holds_the_defaults(node):
+    read = yaml.safe_load(params.yaml_text(node))[f'/**/{node}']['ros__parameters']
+    for spec in fields(params.NODES[node]):
+        if spec.default != ():
+            value = read[params.ros_name(spec)]
+            assert (tuple(value) if isinstance(value, list) else value) == spec.default
+
+
+def test_contract_names_are_declared():
+    names = {params.ros_name(spec) for spec in fields(params.AllocatorParams)}
+    assert {'origin.latitude', 'origin.longitude', 'origin.altitude_amsl', 'solve_budget',
+            'route_end', 'uav_timeout', 'default_range', 'default_cruise_speed', 'state_dir',
+            'seed'} <= names
+    names = {params.ros_name(spec) for spec in fields(params.BridgeParams)}
+    assert {'connections', 'origin.latitude', 'origin.longitude', 'origin.altitude_amsl',
+            'system_ids', 'uav_id_pattern', 'autopilot', 'cruise_altitude', 'takeoff',
+            'signing_key_file'} <= names
+
+
+@pytest.mark.parametrize(('given', 'text'), [
+    ({'solve_budget': -1.0}, 'solve_budget = -1.0: expected float in [0.001, 60] s'),
+    ({'solve_budget': float('nan')}, 'solve_budget = nan: expected float in [0.001, 60] s'),
+    ({'route_end': 'land'}, "route_end = 'land': expected one of hold, home"),
+    ({'seed': 1.5}, 'seed = 1.5: expected int in [0, 2.14748e+09]'),
+    ({'state_dir': 3}, 'state_dir = 3: expected text'),
+    ({'origin__latitude': 91.0}, 'origin.latitude = 91.0: expected float in [-90, 90] deg'),
+])
+def test_a_bad_value_is_refused_in_words(given, text):
+    with pytest.raises(InvalidValue) as refused:
+        params.AllocatorParams(**given)
+    assert str(refused.value) == text
+
+
+def test_an_integer_serves_as_a_float():
+    assert params.AllocatorParams(uav_timeout=3).uav_timeout == 3.0
