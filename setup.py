@@ -85,7 +85,7 @@ setup(
         'console_scripts': [
             f'{node} = {NAME}.nodes.{node}:main'
             for node in ('allocator', 'mavlink_bridge', 'fleet_sim', 'scenario_player',
-                         'live_view', 'demo')
+                         'live_view')
         ],
     },
 )

@@ -1,0 +1,102 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Every executable: found by the ament index, stops in good order, refuses bad parameters."""
+import os
+import signal
+import subprocess
+import sys
+from dataclasses import fields
+from pathlib import Path
+
+import pytest
+from ament_index_python.packages import get_package_prefix, get_package_share_directory
+from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
+from rcl_interfaces.srv import DescribeParameters, GetParameters, SetParameters
+
+from uav_task_alloc import params
+
+pytestmark = pytest.mark.ros
+SHARE = Path(get_package_share_directory('uav_task_alloc'))
+DEMO = SHARE / 'config/scenarios/demo.yaml'
+NEEDS = {'fleet_sim': ['-p', f'scenario:={DEMO}'], 'scenario_player': ['-p', f'scenario:={DEMO}'],
+         'mavlink_bridge': ['-p', "connections:=['udpin:127.0.0.1:0']"]}
+
+
+@pytest.mark.parametrize('name', params.NODES)
+def test_an_executable_is_where_ros2_run_looks(name):
+    path = Path(get_package_prefix('uav_task_alloc'), 'lib/uav_task_alloc', name)
+    assert os.access(path, os.X_OK)
+
+
+@pytest.mark.parametrize('name', params.NODES)
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM], ids=lambda n: n.name)
+def test_a_node_stops_in_good_order(start, probe, name, number):
+    process = start(name, *NEEDS.get(name, []))
+    probe.until(lambda: name in probe.node.get_node_names())
+    code, out = process.stop(number)
+    assert code == 0, out
+    assert 'Traceback' not in out
+
+
+@pytest.mark.parametrize(('name', 'given', 'text'), [
+    ('allocator', 'solve_budget:=-1.0', 'solve_budget = -1.0: expected float in [0.001, 60] s'),
+    ('allocator', 'route_end:=land', "route_end = 'land': expected one of hold, home"),
+    ('allocator', 'seed:=many', "seed = 'many': expected int in [0, 2.14748e+09]"),
+    ('mavlink_bridge', 'autopilot:=cleanflight', "autopilot = 'cleanflight': expected one of"),
+    ('fleet_sim', 'scenario:=/nowhere.yaml', '/nowhere.yaml'),
+    ('scenario_player', 'speedup:=0.0', 'speedup = 0.0: expected float in [0.1, 100]'),
+])
+def test_a_bad_start_parameter_ends_the_node_in_words(start, name, given, text):
+    process = start(name, *NEEDS.get(name, []), '-p', given)
+    process.popen.wait(20)
+    code, out = process.stop()
+    assert code == 1
+    assert text in out
+    assert 'Traceback' not in out
+
+
+@pytest.mark.parametrize('name', params.NODES)
+def test_the_parameter_file_of_a_node_is_installed_and_read(start, probe, name):
+    start(name, '--params-file', str(SHARE / f'config/{name}.yaml'), *NEEDS.get(name, []))
+    kind = params.NODES[name]
+    names = [params.ros_name(spec) for spec in fields(kind)]
+    values = probe.call(GetParameters, f'/{name}/get_parameters',
+                        GetParameters.Request(names=names)).values
+    assert len(values) == len(names)
+    described = probe.call(DescribeParameters, f'/{name}/describe_parameters',
+                           DescribeParameters.Request(names=names)).descriptors
+    for spec, shown in zip(fields(kind), described, strict=True):
+        assert spec.metadata['text'] in shown.description
+
+
+def put(probe, name, **value):
+    return probe.call(SetParameters, '/allocator/set_parameters', SetParameters.Request(
+        parameters=[Parameter(name=name, value=ParameterValue(**value))])).results[0]
+
+
+def test_a_parameter_is_checked_when_it_is_changed(start, probe):
+    start('allocator')
+    double, text = ParameterType.PARAMETER_DOUBLE, ParameterType.PARAMETER_STRING
+    assert put(probe, 'solve_budget', type=double, double_value=0.2).successful
+    assert not put(probe, 'solve_budget', type=double, double_value=-0.2).successful
+    answer = put(probe, 'route_end', type=text, string_value='land')
+    assert (answer.successful, answer.reason) == (
+        False, "route_end = 'land': expected one of hold, home")
+    answer = put(probe, 'state_dir', type=text, string_value='/tmp')
+    assert (answer.successful, answer.reason) == (False, 'state_dir is read at the start only')
+
+
+def test_a_namespace_moves_the_topics(start, probe):
+    start('allocator', '-r', '__ns:=/fleet')
+    probe.until(lambda: '/fleet/task_statuses' in dict(probe.node.get_topic_names_and_types()))
+
+
+def test_the_core_runs_where_no_ros_is_sourced(tmp_path):
+    env = {k: v for k, v in os.environ.items()
+           if not k.startswith(('AMENT', 'ROS', 'COLCON', 'PYTHONPATH', 'LD_LIBRARY'))}
+    env['PYTHONPATH'] = str(Path(__file__).parents[2])
+    code = ('import sys, uav_task_alloc as u; '
+            'print(u.plan([u.Uav("u1", (0, 0, 50))], [u.Task("t1", (9, 0, 50))]).routes); '
+            'print(sorted(m for m in ("rclpy", "pymavlink", "matplotlib") if m in sys.modules))')
+    done = subprocess.run([sys.executable, '-c', code], env=env, cwd=tmp_path,
+                          capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines() == ["{'u1': ('t1',)}", '[]']

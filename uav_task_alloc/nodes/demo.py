@@ -1,0 +1,146 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Flies a scenario from start to end in real nodes, watches them, and judges the result."""
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+from ament_index_python.packages import get_package_prefix, get_package_share_directory
+
+from uav_task_alloc import plots, report
+from uav_task_alloc.scenario import load
+
+PACKAGE = 'uav_task_alloc'
+FAULTS = ('tasks_lost', 'tasks_flown_twice', 'zone_violations')
+
+
+@dataclass
+class Child:
+    """One node as a process, its output in a file."""
+
+    name: str
+    process: subprocess.Popen[bytes]
+    log: Path
+
+    @classmethod
+    def start(cls, name: str, out: Path, show: bool = False, **parameters: object) -> Child:
+        """Start an installed executable; `show`: in this terminal, else into out/NAME.log."""
+        command = [f'{get_package_prefix(PACKAGE)}/lib/{PACKAGE}/{name}', '--ros-args']
+        for key, value in parameters.items():
+            command += ['-p', f'{key.replace("__", ".")}:={json.dumps(value)}']
+        log = out / f'{name}.log'
+        with open(log, 'wb') as file:
+            process = subprocess.Popen(command, stdout=None if show else file,
+                                       stderr=None if show else subprocess.STDOUT)
+        return cls(name, process, log)
+
+    def stop(self) -> int:
+        """Ask it to end, wait, end it for good after 10 s; its exit status."""
+        if self.process.poll() is None:
+            self.process.send_signal(signal.SIGINT)
+        try:
+            return self.process.wait(10)
+        except subprocess.TimeoutExpired:
+            self.process.kill()
+            return self.process.wait()
+
+
+def free_port() -> int:
+    """A UDP port on loopback that nobody uses."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        probe.bind(('127.0.0.1', 0))
+        return int(probe.getsockname()[1])
+
+
+def start_nodes(args: argparse.Namespace, out: Path) -> list[Child]:
+    """All nodes of the scenario; the last one is the live view, which ends when all is done."""
+    scenario, port = load(args.scenario), free_port()
+    origin = {'origin__latitude': scenario.origin.latitude,
+              'origin__longitude': scenario.origin.longitude,
+              'origin__altitude_amsl': scenario.origin.altitude_amsl}
+    played = {'scenario': str(args.scenario), 'speedup': args.speedup}
+    return [
+        Child.start('allocator', out, uav_timeout=2.0, seed=scenario.seed,
+                    state_dir=str(out / 'state'), **origin),
+        Child.start('mavlink_bridge', out, connections=[f'udpin:127.0.0.1:{port}'],
+                    takeoff=True, **origin),
+        Child.start('fleet_sim', out, target=f'127.0.0.1:{port}',
+                    log_file=str(out / 'flight.jsonl'), **played),
+        Child.start('scenario_player', out, **played),
+        Child.start('live_view', out, show=True, out_dir=str(out), **played),
+    ]
+
+
+def watch(children: list[Child], limit: float) -> list[str]:
+    """Wait for the live view to end; what went wrong meanwhile."""
+    *nodes, view = children
+    end = time.monotonic() + limit
+    while time.monotonic() < end:
+        try:
+            view.process.wait(0.2)
+            return []
+        except subprocess.TimeoutExpired:
+            dead = [n for n in nodes if n.process.poll() is not None
+                    and (n.name != 'scenario_player' or n.process.returncode)]
+        if dead:
+            return [f'{n.name} died with status {n.process.returncode}, see {n.log}'
+                    for n in dead]
+    return [f'not finished after {limit:g} s']
+
+
+def judge(summary: dict[str, object]) -> list[str]:
+    """The faults that a summary tells of."""
+    return [f'{name} = {summary[name]}' for name in FAULTS if summary[name]]
+
+
+def fly(args: argparse.Namespace) -> int:
+    """Run the scenario into args.out; 0 when no task was lost or flown twice, no zone entered."""
+    begin = time.monotonic()
+    out = args.out
+    shutil.rmtree(out, ignore_errors=True)
+    (out / 'state').mkdir(parents=True)
+    children = start_nodes(args, out)
+    try:
+        faults = watch(children, args.limit)
+    finally:
+        codes = {child.name: child.stop() for child in reversed(children)}
+    faults += [f'{name} ended with status {code}' for name, code in codes.items()
+               if code and not any(name in fault for fault in faults)]
+    summary = report.summarise(out)
+    summary['wall_s'] = round(time.monotonic() - begin, 1)
+    (out / 'summary.json').write_text(json.dumps(summary, indent=2) + '\n')
+    print(report.table(summary))
+    plots.draw_flight(out, out / 'map.png')
+    print(f'Details: {out}/summary.json   Map: {out}/map.png')
+    faults += judge(summary)
+    for fault in faults:
+        print(f'FAULT: {fault}', file=sys.stderr)
+    return 1 if faults else 0
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Command line of the demo; its exit status."""
+    share = Path(get_package_share_directory(PACKAGE))
+    parser = argparse.ArgumentParser(prog='demo', description=__doc__)
+    parser.add_argument('--scenario', type=Path, default=share / 'config/scenarios/demo.yaml')
+    parser.add_argument('--speedup', type=float, default=8.0)
+    parser.add_argument('--out', type=Path, default=Path('out/demo'))
+    parser.add_argument('--limit', type=float, default=80.0, help='[s] of wall time')
+    args = parser.parse_args(argv)
+    # fleets of several demos on one machine, or on the network, must not hear each other
+    os.environ.setdefault('ROS_DOMAIN_ID', str(1 + os.getpid() % 100))
+    os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
+    return fly(args)
+
+
+if __name__ == '__main__':
+    sys.exit(main())
