@@ -1,0 +1,57 @@
+# SPDX-License-Identifier: Apache-2.0
+"""WGS84 to ENU and back around one origin; up is not height above ground, as the earth curves."""
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pymap3d
+from numpy.typing import ArrayLike, NDArray
+
+from uav_task_alloc.model import Point, check_number
+
+
+@dataclass(frozen=True, slots=True)
+class Origin:
+    """Where ENU (0, 0, 0) is. Raises InvalidValue.
+
+    Altitudes are AMSL throughout. pymap3d takes them as ellipsoidal; as origin and points are
+    shifted by the same geoid height, which is near constant over a mission, ENU does not change.
+    """
+
+    latitude: float  # [deg]
+    longitude: float  # [deg]
+    altitude_amsl: float = 0.0  # [m]
+
+    def __post_init__(self) -> None:
+        put = object.__setattr__
+        put(self, 'latitude', check_number('origin latitude', self.latitude, -90.0, 90.0))
+        put(self, 'longitude', check_number('origin longitude', self.longitude, -180.0, 180.0))
+        put(self, 'altitude_amsl',
+            check_number('origin altitude_amsl', self.altitude_amsl, -1e4, 1e5))
+
+
+def to_enu(origin: Origin, latitude: float, longitude: float, altitude_amsl: float) -> Point:
+    """ENU [m] of a place in degrees and metres AMSL."""
+    x, y, z = to_enu_batch(origin, [(latitude, longitude, altitude_amsl)])[0]
+    return float(x), float(y), float(z)
+
+
+def to_geodetic(origin: Origin, point: Point) -> tuple[float, float, float]:
+    """Latitude [deg], longitude [deg] and altitude AMSL [m] of an ENU point."""
+    latitude, longitude, altitude = to_geodetic_batch(origin, [point])[0]
+    return float(latitude), float(longitude), float(altitude)
+
+
+def to_enu_batch(origin: Origin, places: ArrayLike) -> NDArray[np.float64]:
+    """ENU rows [m] of rows (latitude [deg], longitude [deg], altitude AMSL [m])."""
+    rows = np.asarray(places, dtype=np.float64).reshape(-1, 3)
+    return np.column_stack(pymap3d.geodetic2enu(
+        *rows.T, origin.latitude, origin.longitude, origin.altitude_amsl))
+
+
+def to_geodetic_batch(origin: Origin, points: ArrayLike) -> NDArray[np.float64]:
+    """Rows (latitude [deg], longitude [deg], altitude AMSL [m]) of ENU rows [m]."""
+    rows = np.asarray(points, dtype=np.float64).reshape(-1, 3)
+    return np.column_stack(pymap3d.enu2geodetic(
+        *rows.T, origin.latitude, origin.longitude, origin.altitude_amsl))

@@ -1,0 +1,78 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Zones asked one at a time: is a point inside, how far is it, is a segment clear?"""
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from itertools import pairwise
+
+import numpy as np
+
+from uav_task_alloc.geometry.obstacles import Obstacles, blocked, contains, pack
+from uav_task_alloc.model import Point, Shape, ThreatZone, check_point
+
+
+def inside(point: Iterable[float], zone: ThreatZone, clearance: float = 0.0) -> bool:
+    """Whether a point is inside the zone enlarged by its margin and `clearance` [m]."""
+    return bool(contains(pack((zone,), clearance), 0, *check_point('point', point), True))
+
+
+def zones_around(point: Iterable[float], zones: Sequence[ThreatZone],
+                 clearance: float = 0.0) -> tuple[ThreatZone, ...]:
+    """The enlarged zones a point is inside of."""
+    obstacles, place = pack(zones, clearance), check_point('point', point)
+    return tuple(zone for k, zone in enumerate(zones) if contains(obstacles, k, *place, True))
+
+
+def distance(point: Iterable[float], zone: ThreatZone) -> float:
+    """Metres from a point to the zone as it is, without margin; 0 inside."""
+    x, y, z = check_point('point', point)
+    if zone.shape is Shape.HEMISPHERE:
+        return _to_dome(x, y, z, zone)
+    above = max(zone.z_min - z, z - zone.z_max, 0.0)
+    if zone.shape is Shape.CYLINDER:
+        aside = max(0.0, math.hypot(x - zone.center[0], y - zone.center[1]) - zone.radius)
+    else:
+        aside = _to_polygon(x, y, zone)
+    return math.hypot(aside, above)
+
+
+def is_clear(a: Iterable[float], b: Iterable[float], zones: Sequence[ThreatZone],
+             clearance: float = 0.0) -> bool:
+    """Whether the segment ab stays outside every enlarged zone."""
+    return cut_by(a, b, zones, clearance) is None
+
+
+def cut_by(a: Iterable[float], b: Iterable[float], zones: Sequence[ThreatZone],
+           clearance: float = 0.0) -> ThreatZone | None:
+    """The first enlarged zone that the segment ab enters; None: it is clear."""
+    start, end = check_point('a', a), check_point('b', b)
+    obstacles: Obstacles = pack(zones, clearance)
+    for k, zone in enumerate(zones):
+        if blocked(obstacles, k, *start, *end, -np.inf, True):
+            return zone
+    return None
+
+
+def way_is_clear(points: Sequence[Point], zones: Sequence[ThreatZone],
+                 clearance: float = 0.0) -> bool:
+    """Whether the polyline through `points` stays outside every enlarged zone."""
+    return all(is_clear(a, b, zones, clearance) for a, b in pairwise(points))
+
+
+def _to_dome(x: float, y: float, z: float, zone: ThreatZone) -> float:
+    aside, up = math.hypot(x - zone.center[0], y - zone.center[1]), z - zone.center[2]
+    if up >= 0.0:
+        return max(0.0, math.hypot(aside, up) - zone.radius)
+    return math.hypot(max(0.0, aside - zone.radius), up)
+
+
+def _to_polygon(x: float, y: float, zone: ThreatZone) -> float:
+    flat = ThreatZone.polygon(zone.id, zone.vertices)
+    if contains(pack((flat,)), 0, x, y, 0.0, True):
+        return 0.0
+    corners = np.array(zone.vertices)
+    edges = np.roll(corners, -1, axis=0) - corners
+    offset = np.array((x, y)) - corners
+    along = np.clip((offset * edges).sum(1) / (edges * edges).sum(1), 0.0, 1.0)
+    return float(np.hypot(*(offset - along[:, None] * edges).T).min())
