@@ -1,0 +1,96 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The shortest safe way between two points, with the waypoints that fly it."""
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from uav_task_alloc.errors import InvalidValue
+from uav_task_alloc.geometry.exits import way_out
+from uav_task_alloc.geometry.obstacles import Floats, Obstacles, contains, pack
+from uav_task_alloc.geometry.taut import MAX_CORNERS
+from uav_task_alloc.geometry.ways import shortest
+from uav_task_alloc.model import Point, ThreatZone, check_point
+
+
+@dataclass(frozen=True, slots=True)
+class Detour:
+    """A way and what is special about it; `length` is inf and `points` empty where none exists."""
+
+    length: float  # [m] of the polyline, from end to end
+    points: tuple[Point, ...] = ()  # [m] ENU, without both ends
+    start_inside: tuple[str, ...] = ()  # zones to leave first; points[0] is then outside
+    goal_inside: tuple[str, ...] = ()  # zones that make the goal unreachable
+    closed_off: bool = False  # zones and altitude limits leave no way
+
+    @property
+    def reason(self) -> str:
+        """Why there is no way, or that it starts inside a zone; empty: nothing special."""
+        if self.goal_inside:
+            return f'the goal is inside zone {", ".join(self.goal_inside)}'
+        if self.closed_off:
+            return 'closed off by zones'
+        if self.start_inside:
+            return f'the start is inside zone {", ".join(self.start_inside)}, left first'
+        return ''
+
+
+def detour(a: Iterable[float], b: Iterable[float], zones: Sequence[ThreatZone] = (), *,
+           clearance: float = 0.0, altitude_min: float = -math.inf,
+           altitude_max: float = math.inf) -> tuple[float, tuple[Point, ...]]:
+    """Length [m] and waypoints (without a and b) of the shortest safe way; (inf, ()): none.
+
+    The polyline a, waypoints, b stays outside every zone enlarged by its margin and `clearance`
+    [m]; the altitude limits bind the waypoints [m], not the ends. Raises InvalidValue.
+    """
+    found = find_detour(a, b, zones, clearance=clearance, altitude_min=altitude_min,
+                        altitude_max=altitude_max)
+    return found.length, found.points
+
+
+def find_detour(a: Iterable[float], b: Iterable[float], zones: Sequence[ThreatZone] = (), *,
+                clearance: float = 0.0, altitude_min: float = -math.inf,
+                altitude_max: float = math.inf) -> Detour:
+    """As `detour`, and says what is special about the way. Raises InvalidValue."""
+    start, goal = check_point('a', a), check_point('b', b)
+    limits = check_limits(altitude_min, altitude_max)
+    obstacles = pack(zones, clearance)
+    start_inside = _around(obstacles, zones, start)
+    goal_inside = _around(obstacles, zones, goal)
+    if goal_inside:
+        return Detour(math.inf, (), start_inside, goal_inside)
+    length, points = way_between(obstacles, start, goal, limits, bool(start_inside))
+    return Detour(length, points, start_inside, (), math.isinf(length))
+
+
+def check_limits(altitude_min: float, altitude_max: float) -> Floats:
+    """The altitude limits [m] as kernels take them. Raises InvalidValue."""
+    if not altitude_min <= altitude_max:
+        raise InvalidValue('altitude_min, altitude_max', (altitude_min, altitude_max),
+                           'altitude_min <= altitude_max')
+    return np.array([altitude_min, altitude_max], dtype=np.float64)
+
+
+def way_between(obstacles: Obstacles, start: Point, goal: Point, limits: Floats,
+                caught: bool) -> tuple[float, tuple[Point, ...]]:
+    """Length [m] and waypoints from start to a goal outside all zones; caught: start inside."""
+    if caught:
+        out = way_out(obstacles, np.array(start), limits)
+        if math.isnan(out[0]):
+            return math.inf, ()
+        first: Point = (float(out[0]), float(out[1]), float(out[2]))
+        length, points = way_between(obstacles, first, goal, limits, False)
+        return math.dist(start, first) + length, (first, *points) if length < math.inf else ()
+    forwards = start <= goal  # one order, so that there and back are the same way
+    ends = np.array((start, goal) if forwards else (goal, start))
+    buffer = np.empty((MAX_CORNERS, 3))
+    n, length = shortest(obstacles, ends, limits, buffer)
+    points = [(float(x), float(y), float(z)) for x, y, z in buffer[1:max(1, n - 1)]]
+    return float(length), tuple(points if forwards else reversed(points))
+
+
+def _around(obstacles: Obstacles, zones: Sequence[ThreatZone], point: Point) -> tuple[str, ...]:
+    return tuple(zone.id for k, zone in enumerate(zones) if contains(obstacles, k, *point, True))

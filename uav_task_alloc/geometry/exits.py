@@ -1,0 +1,115 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The shortest way out of the zones that a point is caught in."""
+from __future__ import annotations
+
+import math
+
+import numba
+import numpy as np
+
+from uav_task_alloc.geometry.obstacles import (
+    CYLINDER,
+    DOME,
+    PRISM,
+    Floats,
+    Obstacles,
+    in_polygon,
+    off_segment,
+)
+
+AROUND = 24  # directions tried at first, level and rising
+
+
+@numba.njit(cache=True, nogil=True)
+def _depth(o: Obstacles, k: int, x: float, y: float, z: float) -> float:
+    """At least so far it is to the outside of zone k [m]; <= 0: outside. Not under a dome."""
+    skin = 1.5 * o.skin[k]
+    dx, dy, dz = x - o.centre[k, 0], y - o.centre[k, 1], z - o.centre[k, 2]
+    ends = min(o.high[k] + skin - z, z - o.low[k] + skin)
+    if o.kind[k] == DOME:
+        inner = o.radius[k] + skin - math.sqrt(dx * dx + dy * dy + dz * dz)
+        return inner if ends > 0.0 else ends
+    if o.kind[k] == CYLINDER:
+        return min(ends, o.radius[k] + skin - math.hypot(dx, dy))
+    edge, n, f = np.inf, o.count[k], o.first[k]
+    for i in range(n):
+        j = f + (i + 1) % n
+        edge = min(edge, off_segment(x, y, o.corners[f + i, 0], o.corners[f + i, 1],
+                                     o.corners[j, 0], o.corners[j, 1]))
+    edge = math.sqrt(edge) if in_polygon(o, k, x, y) else -math.sqrt(edge)
+    return min(ends, edge + o.grow[k] + skin)
+
+
+@numba.njit(cache=True, nogil=True)
+def _ray(o: Obstacles, p: Floats, az: float, up: float, best: float) -> float:
+    """How far along a direction the outside begins [m]; inf: not before `best`."""
+    c = math.cos(up)
+    dx, dy, dz = math.cos(az) * c, math.sin(az) * c, math.sin(up)
+    t = 0.0
+    for _ in range(400):
+        deepest, least = 0.0, 0.0
+        for k in range(o.kind.size):
+            d = _depth(o, k, p[0] + t * dx, p[1] + t * dy, p[2] + t * dz)
+            if d > deepest:
+                deepest, least = d, 0.25 * o.skin[k]
+        if deepest <= 0.0:
+            return t
+        t += max(deepest, least)
+        if t >= best:
+            break
+    return np.inf
+
+
+@numba.njit(cache=True, nogil=True)
+def _try(o: Obstacles, p: Floats, az: float, up: float, limits: Floats, best: Floats) -> bool:
+    """Take the direction (az, up) into best = (distance, az, up) where it is shorter."""
+    t = _ray(o, p, az, up, best[0])
+    z = p[2] + t * math.sin(up)
+    if t >= best[0] or not min(limits[0], p[2]) <= z <= max(limits[1], p[2]):
+        return False
+    best[0], best[1], best[2] = t, az, up
+    return True
+
+
+@numba.njit(cache=True, nogil=True)
+def _first_tries(o: Obstacles, p: Floats, limits: Floats, best: Floats) -> None:
+    """Straight outwards of each zone around p, up, down, and a fan about the first of them."""
+    base = np.nan
+    _try(o, p, 0.0, 0.5 * math.pi, limits, best)
+    _try(o, p, 0.0, -0.5 * math.pi, limits, best)
+    for k in range(o.kind.size):
+        if _depth(o, k, p[0], p[1], p[2]) <= 0.0:
+            continue
+        dx, dy, dz = p[0] - o.centre[k, 0], p[1] - o.centre[k, 1], p[2] - o.centre[k, 2]
+        az = math.atan2(dy, dx)
+        base = az if math.isnan(base) else base
+        _try(o, p, az, 0.0, limits, best)
+        if o.kind[k] == DOME:
+            _try(o, p, az, max(0.0, math.atan2(dz, math.hypot(dx, dy))), limits, best)
+        if o.kind[k] == PRISM:
+            f, n = o.first[k], o.count[k]
+            for i in range(n):
+                j = f + (i + 1) % n
+                _try(o, p, math.atan2(o.corners[f + i, 0] - o.corners[j, 0],
+                                      o.corners[j, 1] - o.corners[f + i, 1]), 0.0, limits, best)
+    for i in range(2 * AROUND):
+        _try(o, p, base + 2.0 * math.pi * i / AROUND, 0.25 * math.pi * (i // AROUND), limits,
+             best)
+
+
+@numba.njit(cache=True, nogil=True)
+def way_out(o: Obstacles, p: Floats, limits: Floats) -> Floats:
+    """The nearest point outside all zones that p, inside some, sees; NaN: there is none."""
+    best = np.array([np.inf, 0.0, 0.0])
+    _first_tries(o, p, limits, best)
+    if math.isinf(best[0]):
+        return np.full(3, np.nan)
+    step = math.pi / AROUND
+    for _ in range(24):
+        az, up = best[1], best[2]
+        if not (_try(o, p, az + step, up, limits, best) or _try(o, p, az - step, up, limits, best)
+                or _try(o, p, az, up + step, limits, best)
+                or _try(o, p, az, up - step, limits, best)):
+            step *= 0.5
+    t, c = best[0], math.cos(best[2])
+    return p + t * np.array([math.cos(best[1]) * c, math.sin(best[1]) * c, math.sin(best[2])])

@@ -1,0 +1,199 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The coarse way: A* over a visibility graph whose corners stand just outside the active zones."""
+from __future__ import annotations
+
+import math
+
+import numba
+import numpy as np
+
+from uav_task_alloc.geometry.obstacles import CYLINDER, DOME, PRISM, Floats, Ints, Obstacles, blocked
+
+
+@numba.njit(cache=True, nogil=True)
+def corner_bound(o: Obstacles, k: int, ring: int) -> int:
+    """At most so many corners come from zone k."""
+    return 4 * ring + 1 if o.kind[k] != PRISM else 9 * o.count[k]
+
+
+@numba.njit(cache=True, nogil=True)
+def _height(way: Floats, x: float, y: float) -> float:
+    """z of the straight way ab where (x, y) is nearest to it in plan."""
+    dx, dy = way[1, 0] - way[0, 0], way[1, 1] - way[0, 1]
+    span = dx * dx + dy * dy
+    t = 0.5
+    if span > 0.0:
+        t = min(1.0, max(0.0, ((x - way[0, 0]) * dx + (y - way[0, 1]) * dy) / span))
+    return float(way[0, 2] + t * (way[1, 2] - way[0, 2]))
+
+
+@numba.njit(cache=True, nogil=True)
+def _heading(o: Obstacles, k: int, way: Floats) -> tuple[float, float]:
+    """The way's direction in plan, so that what is built on it turns with the scene."""
+    dx, dy = way[1, 0] - way[0, 0], way[1, 1] - way[0, 1]
+    size = math.hypot(dx, dy)
+    if size <= 1e-9 * abs(way[1, 2] - way[0, 2]):
+        dx, dy = way[0, 0] - o.centre[k, 0], way[0, 1] - o.centre[k, 1]
+        size = math.hypot(dx, dy)
+    return (dx / size, dy / size) if size > 0.0 else (1.0, 0.0)
+
+
+@numba.njit(cache=True, nogil=True)
+def _ring(o: Obstacles, k: int, way: Floats, limits: Floats, radius: float, z: float, ring: int,
+          out: Floats, n: int) -> int:
+    """`ring` corners around the axis of zone k at height z (NaN: that of the way)."""
+    ux, uy = _heading(o, k, way)
+    low, high = limits[0], limits[1]
+    for j in range(ring):
+        c, s = math.cos(2 * math.pi * j / ring), math.sin(2 * math.pi * j / ring)
+        ex, ey = ux * c - uy * s, ux * s + uy * c
+        x, y, h = o.centre[k, 0] + radius * ex, o.centre[k, 1] + radius * ey, z
+        if math.isnan(z):
+            h = min(high, max(low, _height(way, x, y)))
+            if o.kind[k] == DOME:
+                up = max(0.0, h - o.centre[k, 2])
+                if up >= radius:
+                    continue
+                wide = math.sqrt(radius * radius - up * up)
+                x, y = o.centre[k, 0] + wide * ex, o.centre[k, 1] + wide * ey
+        out[n, 0], out[n, 1], out[n, 2] = x, y, h
+        n += 1
+    return n
+
+
+@numba.njit(cache=True, nogil=True)
+def _dome_corners(o: Obstacles, k: int, way: Floats, limits: Floats, floor: float, ring: int,
+                  out: Floats, n: int) -> int:
+    radius = (o.radius[k] + 1.5 * o.skin[k]) / math.cos(math.pi / ring)
+    n = _ring(o, k, way, limits, radius, np.nan, ring, out, n)
+    for step in range(1, 3):
+        up = min(radius * math.sin(math.pi / 6 * step), limits[1] - o.centre[k, 2])
+        if up > 0.0:
+            n = _ring(o, k, way, limits, math.sqrt(radius * radius - up * up),
+                      o.centre[k, 2] + up, ring, out, n)
+    if o.centre[k, 2] + radius <= limits[1]:
+        out[n, 0], out[n, 1], out[n, 2] = (o.centre[k, 0], o.centre[k, 1],
+                                           o.centre[k, 2] + radius)
+        n += 1
+    under = o.low[k] - 1.5 * o.skin[k]
+    if floor < o.low[k] and under >= limits[0]:
+        n = _ring(o, k, way, limits, radius, under, ring, out, n)
+    return n
+
+
+@numba.njit(cache=True, nogil=True)
+def _prism_corners(o: Obstacles, k: int, way: Floats, limits: Floats, z: float, out: Floats,
+                   n: int) -> int:
+    """Mitred corners at the convex corners of the enlarged polygon at height z (NaN: the way's)."""
+    reach = o.grow[k] + 1.5 * o.skin[k]
+    f, count = o.first[k], o.count[k]
+    for i in range(count):
+        c, p, q = o.corners[f + i], o.corners[f + i - 1 if i else f + count - 1], o.corners[
+            f + (i + 1) % count]
+        before = math.atan2(c[1] - p[1], c[0] - p[0])
+        turn = math.atan2(q[1] - c[1], q[0] - c[0]) - before
+        turn -= 2 * math.pi * math.floor((turn + math.pi) / (2 * math.pi))
+        if turn <= 0.0:
+            continue
+        parts = max(1, math.ceil(turn / (0.5 * math.pi) - 1e-9))
+        far = reach / math.cos(0.5 * turn / parts)
+        for j in range(parts):
+            angle = before - 0.5 * math.pi + (j + 0.5) * turn / parts
+            x, y = c[0] + far * math.cos(angle), c[1] + far * math.sin(angle)
+            out[n, 0], out[n, 1] = x, y
+            out[n, 2] = min(limits[1], max(limits[0], _height(way, x, y))) if math.isnan(
+                z) else z
+            n += 1
+    return n
+
+
+@numba.njit(cache=True, nogil=True)
+def add_corners(o: Obstacles, k: int, way: Floats, limits: Floats, floor: float, ring: int,
+                out: Floats, n: int) -> int:
+    """Write the corners of zone k for the way ab into out[n:]; returns the new n."""
+    if o.kind[k] == DOME:
+        return _dome_corners(o, k, way, limits, floor, ring, out, n)
+    radius = (o.radius[k] + 1.5 * o.skin[k]) / math.cos(math.pi / ring)
+    for level in range(3):
+        z = np.nan
+        if level == 1:
+            z = o.high[k] + 1.5 * o.skin[k]
+        elif level == 2:
+            z = o.low[k] - 1.5 * o.skin[k]
+        if z < limits[0] or z > limits[1] or math.isinf(z):
+            continue
+        if o.kind[k] == CYLINDER:
+            n = _ring(o, k, way, limits, radius, z, ring, out, n)
+        else:
+            n = _prism_corners(o, k, way, limits, z, out, n)
+    return n
+
+
+@numba.njit(cache=True, nogil=True)
+def _gap(x: Floats, i: int, j: int) -> float:
+    dx, dy, dz = x[i, 0] - x[j, 0], x[i, 1] - x[j, 1], x[i, 2] - x[j, 2]
+    return math.sqrt(dx * dx + dy * dy + dz * dz)
+
+
+@numba.njit(cache=True, nogil=True)
+def _sees(o: Obstacles, active: Ints, count: int, x: Floats, i: int, j: int, floor: float,
+          snug: bool) -> bool:
+    for m in range(count):
+        if blocked(o, active[m], x[i, 0], x[i, 1], x[i, 2], x[j, 0], x[j, 1], x[j, 2], floor,
+                   snug):
+            return False
+    return True
+
+
+@numba.njit(cache=True, nogil=True)
+def _next_parent(x: Floats, cost: Floats, closed: Ints, done: int, v: int,
+                 above: float) -> tuple[float, int]:
+    """The cheapest way to v over a closed corner that costs more than `above`."""
+    best, parent = np.inf, -1
+    for m in range(done):
+        u = closed[m]
+        c = cost[u] + _gap(x, u, v)
+        if above < c < best:
+            best, parent = c, u
+    return best, parent
+
+
+@numba.njit(cache=True, nogil=True)
+def astar(o: Obstacles, active: Ints, count: int, x: Floats, n: int, floor: float, snug: bool,
+          path: Ints) -> int:
+    """Shortest way 0 -> 1 over corners x[:n] past the active zones; returns its corners, 0: none.
+
+    Edges are tested when they are about to be used, not before: a failed one falls back on the
+    next best closed corner. O(n) a step.
+    """
+    cost, state = np.full(n, np.inf), np.zeros(n, np.int8)
+    parent, closed, ahead = np.full(n, -1), np.empty(n, np.int64), np.empty(n)
+    for v in range(n):
+        ahead[v] = _gap(x, v, 1)
+    cost[0], state[0], closed[0], done, u = 0.0, 1, 0, 1, 0
+    while True:
+        for v in range(n):
+            if state[v] == 0:
+                c = cost[u] + _gap(x, u, v)
+                if c < cost[v]:
+                    cost[v], parent[v] = c, u
+        while True:
+            v, best = -1, np.inf
+            for w in range(n):
+                if state[w] == 0 and cost[w] + ahead[w] < best:
+                    v, best = w, cost[w] + ahead[w]
+            if v < 0:
+                return 0
+            if _sees(o, active, count, x, parent[v], v, floor, snug):
+                break
+            cost[v], parent[v] = _next_parent(x, cost, closed, done, v, cost[v])
+        state[v], closed[done], u = 1, v, v
+        done += 1
+        if v == 1:
+            break
+    size = 0
+    while v >= 0:
+        path[size] = v
+        size, v = size + 1, parent[v]
+    path[:size] = path[:size][::-1].copy()
+    return size

@@ -1,0 +1,227 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A coarse way pulled taut: corners dropped, slid around zones and cut, never through a zone.
+
+A polyline is what an autopilot flies, so this works on polylines: where a way bends around a
+curved zone, the result circumscribes it, with as few corners as the tolerance allows.
+"""
+from __future__ import annotations
+
+import math
+
+import numba
+import numpy as np
+
+from uav_task_alloc.geometry.obstacles import Floats, Ints, Obstacles, blocked
+
+MAX_CORNERS = 96  # of a way while it is worked on
+CUT_GAIN = 1e-3  # a further corner must shorten the way by this share
+PULL_GAIN = 2e-4  # as must a further round of pulling
+
+
+@numba.njit(cache=True, nogil=True)
+def free(o: Obstacles, near: Ints, px: float, py: float, pz: float, qx: float, qy: float,
+         qz: float, floor: float, snug: bool) -> bool:
+    """Whether the segment pq is clear of the zones `near`."""
+    for m in range(near.size):
+        if blocked(o, near[m], px, py, pz, qx, qy, qz, floor, snug):
+            return False
+    return True
+
+
+@numba.njit(cache=True, nogil=True)
+def span(p: Floats, i: int, j: int) -> float:
+    """Distance between two points of a way."""
+    dx, dy, dz = p[i, 0] - p[j, 0], p[i, 1] - p[j, 1], p[i, 2] - p[j, 2]
+    return math.sqrt(dx * dx + dy * dy + dz * dz)
+
+
+@numba.njit(cache=True, nogil=True)
+def length_of(p: Floats, n: int) -> float:
+    """Length of the way p[:n]."""
+    total = 0.0
+    for i in range(1, n):
+        total += span(p, i - 1, i)
+    return total
+
+
+@numba.njit(cache=True, nogil=True)
+def drop_corners(o: Obstacles, near: Ints, p: Floats, n: int, floor: float, snug: bool) -> int:
+    """Leave out every corner whose neighbours see each other; returns the new n."""
+    i = 1
+    while i < n - 1:
+        if free(o, near, p[i - 1, 0], p[i - 1, 1], p[i - 1, 2], p[i + 1, 0], p[i + 1, 1],
+                p[i + 1, 2], floor, snug):
+            for j in range(i, n - 1):
+                p[j] = p[j + 1]
+            n -= 1
+            i = max(1, i - 1)
+        else:
+            i += 1
+    return n
+
+
+@numba.njit(cache=True, nogil=True)
+def _fits(o: Obstacles, near: Ints, p: Floats, i: int, q: Floats, limits: Floats, floor: float,
+          snug: bool) -> bool:
+    """Whether corner i may move to q."""
+    if q[2] < limits[0] or q[2] > limits[1]:
+        return False
+    return free(o, near, p[i - 1, 0], p[i - 1, 1], p[i - 1, 2], q[0], q[1], q[2], floor,
+                snug) and free(o, near, q[0], q[1], q[2], p[i + 1, 0], p[i + 1, 1], p[i + 1, 2],
+                               floor, snug)
+
+
+@numba.njit(cache=True, nogil=True)
+def _put(q: Floats, p: Floats, i: int, axes: Floats, t: float, turn: float, s: float) -> None:
+    """q = the point t along the chord of corner i's neighbours and s off it, turned by `turn`."""
+    c, d = math.cos(turn) * s, math.sin(turn) * s
+    for m in range(3):
+        q[m] = p[i - 1, m] + t * axes[0, m] + c * axes[1, m] + d * axes[2, m]
+
+
+@numba.njit(cache=True, nogil=True)
+def _axes(p: Floats, i: int, axes: Floats) -> tuple[float, float, float]:
+    """Chord direction, direction off it to corner i, third axis; chord, foot and offset [m]."""
+    chord = span(p, i - 1, i + 1)
+    if chord < 1e-9:
+        return 0.0, 0.0, 0.0
+    foot = 0.0
+    for m in range(3):
+        axes[0, m] = (p[i + 1, m] - p[i - 1, m]) / chord
+        foot += axes[0, m] * (p[i, m] - p[i - 1, m])
+    off = 0.0
+    for m in range(3):
+        axes[1, m] = p[i, m] - p[i - 1, m] - foot * axes[0, m]
+        off += axes[1, m] * axes[1, m]
+    off = math.sqrt(off)
+    if off > 0.0:
+        for m in range(3):
+            axes[1, m] /= off
+    for m in range(3):
+        a, b = (m + 1) % 3, (m + 2) % 3
+        axes[2, m] = axes[0, a] * axes[1, b] - axes[0, b] * axes[1, a]
+    return chord, foot, off
+
+
+@numba.njit(cache=True, nogil=True)
+def _on_ellipse(chord: float, foot: float, off: float, t: float) -> float:
+    """The offset at t that makes a way as long as (foot, off) does; negative: none."""
+    total = math.hypot(foot, off) + math.hypot(chord - foot, off)
+    across = 1.0 - ((2.0 * t - chord) / total) ** 2
+    wide = (total * total - chord * chord) * across
+    return 0.5 * math.sqrt(wide) if wide > 0.0 and across > 0.0 else -1.0
+
+
+@numba.njit(cache=True, nogil=True)
+def _press(o: Obstacles, near: Ints, p: Floats, i: int, axes: Floats, q: Floats, t: float,
+           turn: float, s: float, limits: Floats, floor: float, snug: bool) -> float:
+    """The least offset, from the good one s inwards, at which corner i fits."""
+    low, high = 0.0, s
+    for _ in range(10):
+        middle = 0.5 * (low + high)
+        _put(q, p, i, axes, t, turn, middle)
+        if _fits(o, near, p, i, q, limits, floor, snug):
+            high = middle
+        else:
+            low = middle
+    return high
+
+
+@numba.njit(cache=True, nogil=True)
+def pull(o: Obstacles, near: Ints, p: Floats, i: int, limits: Floats, floor: float, snug: bool,
+         rounds: int) -> None:
+    """Move corner i to where its two legs are shortest: inwards, along and around its chord."""
+    axes, q = np.empty((3, 3)), np.empty(3)
+    chord, t, s = _axes(p, i, axes)
+    if s < 1e-6:
+        return
+    s = _press(o, near, p, i, axes, q, t, 0.0, s, limits, floor, snug)
+    turn, step_t, step_turn = 0.0, 0.25 * min(chord, 4.0 * s), 0.4
+    for _ in range(rounds):
+        moved = False
+        for side in range(4):
+            sign = 1.0 if side % 2 else -1.0
+            u = t + sign * step_t if side < 2 else t
+            v = turn + sign * step_turn if side >= 2 else turn
+            r = 0.998 * _on_ellipse(chord, t, s, u)
+            if r <= 0.0:
+                continue
+            _put(q, p, i, axes, u, v, r)
+            if _fits(o, near, p, i, q, limits, floor, snug):
+                t, turn, moved = u, v, True
+                s = _press(o, near, p, i, axes, q, t, turn, r, limits, floor, snug)
+        if not moved:
+            step_t, step_turn = 0.4 * step_t, 0.4 * step_turn
+    _put(q, p, i, axes, t, turn, s)
+    p[i] = q
+
+
+@numba.njit(cache=True, nogil=True)
+def pull_all(o: Obstacles, near: Ints, p: Floats, n: int, limits: Floats, floor: float,
+             snug: bool) -> int:
+    """Drop and pull corners until a round gains next to nothing; returns the new n."""
+    before = np.inf
+    for rounds in range(6):
+        n = drop_corners(o, near, p, n, floor, snug)
+        total = length_of(p, n)
+        if n <= 2 or total > before * (1.0 - PULL_GAIN):
+            break
+        before = total
+        for i in range(1, n - 1):
+            pull(o, near, p, i, limits, floor, snug, 8 if rounds == 0 else 5)
+    return n
+
+
+@numba.njit(cache=True, nogil=True)
+def _cut(o: Obstacles, near: Ints, p: Floats, i: int, floor: float, snug: bool) -> float:
+    """How far from corner i, on both its legs, the corner can be cut off."""
+    before, after = span(p, i - 1, i), span(p, i, i + 1)
+    low, high = 0.0, 0.98 * min(before, after)
+    for _ in range(10):
+        d = 0.5 * (low + high)
+        f, g = d / before, d / after
+        if free(o, near, p[i, 0] + f * (p[i - 1, 0] - p[i, 0]),
+                p[i, 1] + f * (p[i - 1, 1] - p[i, 1]), p[i, 2] + f * (p[i - 1, 2] - p[i, 2]),
+                p[i, 0] + g * (p[i + 1, 0] - p[i, 0]), p[i, 1] + g * (p[i + 1, 1] - p[i, 1]),
+                p[i, 2] + g * (p[i + 1, 2] - p[i, 2]), floor, snug):
+            low = d
+        else:
+            high = d
+    return low
+
+
+@numba.njit(cache=True, nogil=True)
+def cut_corners(o: Obstacles, near: Ints, p: Floats, n: int, floor: float, snug: bool) -> int:
+    """Replace each corner by two where that shortens the way enough; returns the new n."""
+    least = CUT_GAIN * length_of(p, n)
+    i = 1
+    while i < n - 1 and n < MAX_CORNERS - 1:
+        before, after = span(p, i - 1, i), span(p, i, i + 1)
+        bend = before + after - span(p, i - 1, i + 1)
+        if bend < least:
+            i += 1
+            continue
+        d = _cut(o, near, p, i, floor, snug)
+        x = p[i] + (d / before) * (p[i - 1] - p[i])
+        y = p[i] + (d / after) * (p[i + 1] - p[i])
+        if 2.0 * d - math.sqrt(((x - y) ** 2).sum()) < least:
+            i += 1
+            continue
+        for j in range(n, i, -1):
+            p[j] = p[j - 1]
+        p[i], p[i + 1] = x, y
+        n, i = n + 1, i + 2
+    return n
+
+
+@numba.njit(cache=True, nogil=True)
+def tauten(o: Obstacles, near: Ints, p: Floats, n: int, limits: Floats, floor: float,
+           snug: bool) -> int:
+    """Shorten the clear way p[:n] in place, keeping it clear; returns the new n."""
+    n = pull_all(o, near, p, n, limits, floor, snug)
+    for _ in range(4):
+        more = cut_corners(o, near, p, n, floor, snug)
+        if more == n:
+            break
+        n = pull_all(o, near, p, more, limits, floor, snug)
+    return n

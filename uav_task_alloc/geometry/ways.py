@@ -1,0 +1,106 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The shortest safe way between two points, as a kernel: straight, or searched and pulled taut.
+
+Only zones that turn out to be in the way take part: the shortest way past some of the zones is
+never longer than that past all, so when it happens to be clear of all, it is the answer.
+"""
+from __future__ import annotations
+
+import math
+
+import numba
+import numpy as np
+
+from uav_task_alloc.geometry.obstacles import Floats, Ints, Obstacles, blocked, first_around
+from uav_task_alloc.geometry.search import add_corners, astar, corner_bound
+from uav_task_alloc.geometry.taut import MAX_CORNERS, span, tauten
+
+RINGS = (12, 24, 64)  # corners around a zone; finer ones only where no way was found
+
+
+@numba.njit(cache=True, nogil=True)
+def hit_by(o: Obstacles, p: Floats, i: int, j: int, floor: float, snug: bool, hit: Ints) -> int:
+    """Mark the zones that the segment p[i] p[j] enters in hit; returns how many are new."""
+    new = 0
+    for k in range(o.kind.size):
+        if not hit[k] and blocked(o, k, p[i, 0], p[i, 1], p[i, 2], p[j, 0], p[j, 1], p[j, 2],
+                                  floor, snug):
+            hit[k] = 1
+            new += 1
+    return new
+
+
+@numba.njit(cache=True, nogil=True)
+def _search(o: Obstacles, way: Floats, limits: Floats, floor: float, snug: bool, ring: int,
+            hit: Ints, out: Floats) -> int:
+    """A clear, coarse way into out; marks the zones it had to heed in hit. 0: none found."""
+    while True:
+        active = np.flatnonzero(hit)
+        bound = 2
+        for k in active:
+            bound += corner_bound(o, k, ring)
+        x, n, path = np.empty((bound, 3)), 2, np.empty(bound, np.int64)
+        x[:2] = way
+        for k in active:
+            n = add_corners(o, k, way, limits, floor, ring, x, n)
+        size = astar(o, active, active.size, x, n, floor, snug, path)
+        if size == 0 or size > MAX_CORNERS // 2:
+            return 0
+        new = 0
+        for i in range(size):
+            out[i] = x[path[i]]
+            if i:
+                new += hit_by(o, out, i - 1, i, floor, snug, hit)
+        if new == 0:
+            return size
+
+
+@numba.njit(cache=True, nogil=True)
+def _off_box(o: Obstacles, k: int, p: Floats, i: int) -> float:
+    total = 0.0
+    for m in range(3):
+        d = max(o.box[k, m] - p[i, m], p[i, m] - o.box[k, m + 3], 0.0)
+        total += d * d
+    return math.sqrt(total)
+
+
+@numba.njit(cache=True, nogil=True)
+def zones_near(o: Obstacles, way: Floats, length: float) -> Ints:
+    """The zones that a way of at most `length` between the ends could meet."""
+    near, n = np.empty(o.kind.size, np.int64), 0
+    for k in range(o.kind.size):
+        if _off_box(o, k, way, 0) + _off_box(o, k, way, 1) <= length:
+            near[n] = k
+            n += 1
+    return near[:n]
+
+
+@numba.njit(cache=True, nogil=True)
+def shortest(o: Obstacles, way: Floats, limits: Floats, out: Floats) -> tuple[int, float]:
+    """Points of the shortest safe way between the ends way[0] and way[1], both outside all zones.
+
+    Writes them to out (MAX_CORNERS rows), returns their number and the length [m]; 0, inf: none.
+    """
+    out[:2] = way
+    floor = min(way[0, 2], way[1, 2])
+    snug = first_around(o, way[0, 0], way[0, 1], way[0, 2], False) >= 0 or first_around(
+        o, way[1, 0], way[1, 1], way[1, 2], False) >= 0
+    hit = np.zeros(o.kind.size, np.int64)
+    if hit_by(o, way, 0, 1, floor, snug, hit) == 0:
+        return 2, span(way, 0, 1)
+    n = 0
+    for ring in RINGS:
+        n = _search(o, way, limits, floor, snug, ring, hit, out)
+        if n:
+            break
+    if n == 0:
+        return 0, np.inf
+    length = 0.0
+    for i in range(1, n):
+        length += span(out, i - 1, i)
+    near = zones_near(o, way, length)
+    n = tauten(o, near, out, n, limits, floor, snug)
+    length = 0.0
+    for i in range(1, n):
+        length += span(out, i - 1, i)
+    return n, length
