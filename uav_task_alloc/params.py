@@ -135,9 +135,14 @@ class PlayerParams(Checked):
 
 @dataclass(frozen=True)
 class LiveViewParams(Checked):
-    """live_view: shows the progress of a fleet in the terminal and records it."""
+    """live_view: shows the progress of a fleet in the terminal, records it, ends with it."""
 
+    scenario: str = param('', 'Scenario that is played; empty: unknown, and no end.', fixed=True)
+    speedup: float = param(1.0, 'How many times faster than real time.', low=0.1, high=100.0,
+                           fixed=True)
     out_dir: str = param('', 'Folder to record into; empty: nothing is recorded.', fixed=True)
+    settle: float = param(10.0, 'Quiet time of the scenario after which a fleet is done.',
+                          low=0.0, high=3600.0, unit='s', fixed=True)
 
 
 NODES: dict[str, type[Checked]] = {

@@ -2,6 +2,7 @@
 """Scenario files: read, checked, written and generated."""
 from uav_task_alloc.scenario.generate import generate
 from uav_task_alloc.scenario.read import load, parse
+from uav_task_alloc.scenario.timeline import Moment, timeline
 from uav_task_alloc.scenario.values import (
     Cancel,
     Scenario,
@@ -11,5 +12,5 @@ from uav_task_alloc.scenario.values import (
 )
 from uav_task_alloc.scenario.write import to_yaml
 
-__all__ = ['Cancel', 'Scenario', 'ScenarioUav', 'TimedTask', 'TimedZone', 'generate', 'load',
-           'parse', 'to_yaml']
+__all__ = ['Cancel', 'Moment', 'Scenario', 'ScenarioUav', 'TimedTask', 'TimedZone', 'generate',
+           'load', 'parse', 'timeline', 'to_yaml']

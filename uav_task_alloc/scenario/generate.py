@@ -6,8 +6,8 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from uav_task_alloc.geometry.zones import inside
 
+from uav_task_alloc.geometry.zones import zones_around
 from uav_task_alloc.model import Point, Task, ThreatZone
 from uav_task_alloc.scenario.values import (
     DEFAULT_ORIGIN,
@@ -29,7 +29,7 @@ def draw_points(rng: np.random.Generator, count: int, low: Point, high: Point,
         if len(points) == count:
             break
         x, y, z = (round(float(v), 1) for v in rng.uniform(low, high))
-        if not any(inside(zone, (x, y, z), KEEP_OFF) for zone in zones):
+        if not zones_around((x, y, z), zones, KEEP_OFF):
             points.append((x, y, z))
     return points
 

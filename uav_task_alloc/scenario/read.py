@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
-from uav_task_alloc.geometry.frames import Origin, to_enu
 
 from uav_task_alloc.errors import InvalidValue, ScenarioError
+from uav_task_alloc.geometry.frames import Origin, to_enu
 from uav_task_alloc.model import Point, Shape, Task, ThreatZone
 from uav_task_alloc.scenario.checked_yaml import Row, compose, read_row, refusal
 from uav_task_alloc.scenario.generate import draw_points

@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from uav_task_alloc.geometry.frames import Origin
-
 from uav_task_alloc.model import Point, Task, ThreatZone, Uav
 
 DEFAULT_ORIGIN = Origin(47.397742, 8.545594, 488.0)
@@ -78,7 +77,7 @@ class Scenario:
     @property
     def duration(self) -> float:
         """When the last event of the file has happened [s]; the flights take longer."""
-        times = [timed.at for timed in (*self.tasks, *self.cancels)]
+        times = [timed.at for timed in self.tasks] + [cancel.at for cancel in self.cancels]
         times += [uav.dies_at for uav in self.uavs if uav.dies_at is not None]
         times += [t for timed in self.zones for t in (timed.appears, timed.vanishes)
                   if math.isfinite(t)]

@@ -1,0 +1,35 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A scenario as a list of moments, each with all that happens in it."""
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from uav_task_alloc.model import Task, ThreatZone
+from uav_task_alloc.scenario.values import Scenario
+
+
+@dataclass(frozen=True, slots=True)
+class Moment:
+    """What happens at one time, in this order."""
+
+    at: float  # [s] of the scenario
+    zones: tuple[ThreatZone, ...] | None = None  # the whole picture; None: as before
+    tasks: tuple[Task, ...] = ()
+    cancels: tuple[Task, ...] = ()
+    deaths: tuple[str, ...] = ()  # ids of UAVs
+
+
+def timeline(scenario: Scenario) -> tuple[Moment, ...]:
+    """The moments in rising order; the first is at 0 and shows all zones of the start."""
+    changes = scenario.zone_changes()
+    deaths = {uav.id: uav.dies_at for uav in scenario.uavs if uav.dies_at is not None}
+    by_id = {timed.task.id: timed.task for timed in scenario.tasks}
+    times = {*changes, *deaths.values(), *(timed.at for timed in scenario.tasks),
+             *(cancel.at for cancel in scenario.cancels)}
+    return tuple(Moment(
+        at,
+        scenario.zones_at(at) if at in changes else None,
+        tuple(timed.task for timed in scenario.tasks if timed.at == at),
+        tuple(by_id[cancel.task] for cancel in scenario.cancels if cancel.at == at),
+        tuple(uav for uav, dies_at in deaths.items() if dies_at == at),
+    ) for at in sorted(times))
