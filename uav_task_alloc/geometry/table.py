@@ -1,0 +1,101 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A square of known lengths between places, that grows, and forgets what a zone change touches."""
+from __future__ import annotations
+
+import math
+
+import numba
+import numpy as np
+
+from uav_task_alloc.geometry.obstacles import Floats, Ints, Obstacles, blocked, contains
+
+SPARE = 64  # rows for places to come
+STRAIGHT = 1.0 + 1e-12  # a way is straight when at most so much longer than the distance
+
+
+class Table:
+    """Lengths [m] by slot; a place (x, y, z) keeps its slot for ever, so older users stay right."""
+
+    def __init__(self, places: int) -> None:
+        size = places + places // 4 + SPARE if places else 0
+        self.cells = np.full((size, size), np.nan)
+        self.places = np.zeros((size, 3))
+        self.used = 0
+        self._slots: dict[tuple[float, float, float], int] = {}
+
+    def slots(self, points: Floats) -> Ints:
+        """The slots of these places; new places get new ones, in a bigger square if need be."""
+        keys = list(map(tuple, points.tolist()))
+        fresh = [key for key in dict.fromkeys(keys) if key not in self._slots]
+        if self.used + len(fresh) > len(self.cells):
+            self._rebuild(keys)
+            fresh = [key for key in dict.fromkeys(keys) if key not in self._slots]
+        for key in fresh:
+            self.places[self.used], self._slots[key] = key, self.used
+            self.used += 1
+        return np.array([self._slots[key] for key in keys], np.int64)
+
+    def copy(self) -> Table:
+        """The same lengths in cells of its own."""
+        other = Table(0)
+        other.cells, other.places = self.cells.copy(), self.places.copy()
+        other.used, other._slots = self.used, dict(self._slots)
+        return other
+
+    def _rebuild(self, wanted: list[tuple[float, ...]]) -> None:
+        """A new square with the known places among the wanted; the old one is left as it is."""
+        keep = [key for key in dict.fromkeys(wanted) if key in self._slots]
+        old = np.array([self._slots[key] for key in keep], np.int64)  # type: ignore[index]
+        other = Table(len(dict.fromkeys(wanted)))
+        other.cells[:len(old), :len(old)] = self.cells[np.ix_(old, old)]
+        other.places[:len(old)], other.used = self.places[old], len(old)
+        self.cells, self.places, self.used = other.cells, other.places, other.used
+        self._slots = {key: s for s, key in enumerate(keep)}  # type: ignore[misc]
+
+
+@numba.njit(cache=True, nogil=True)
+def _reach(o: Obstacles, k: int, p: Floats) -> float:
+    """Distance from p to the box around zone k."""
+    total = 0.0
+    for m in range(3):
+        d = max(o.box[k, m] - p[m], p[m] - o.box[k, m + 3], 0.0)
+        total += d * d
+    return math.sqrt(total)
+
+
+@numba.njit(cache=True, nogil=True)
+def _touches(o: Obstacles, k: int, p: Floats, q: Floats, known: float, near_p: float,
+             near_q: float, came: bool) -> bool:
+    """Whether zone k, that came or went, may change the known length between p and q."""
+    if math.isinf(known):
+        return not came
+    if near_p + near_q > known:
+        return False
+    dx, dy, dz = p[0] - q[0], p[1] - q[1], p[2] - q[2]
+    if known > STRAIGHT * math.sqrt(dx * dx + dy * dy + dz * dz):
+        return True
+    return came and blocked(o, k, p[0], p[1], p[2], q[0], q[1], q[2], min(p[2], q[2]), False)
+
+
+@numba.njit(cache=True, nogil=True)
+def _forget_for(cells: Floats, places: Floats, used: int, o: Obstacles, k: int,
+                came: bool) -> None:
+    near, inside = np.empty(used), np.zeros(used, np.bool_)
+    for i in range(used):
+        near[i] = _reach(o, k, places[i])
+        inside[i] = contains(o, k, places[i, 0], places[i, 1], places[i, 2], True)
+    for i in range(used):
+        for j in range(used):
+            known = cells[i, j]
+            if known == known and (inside[i] or inside[j] or _touches(
+                    o, k, places[i], places[j], known, near[i], near[j], came)):
+                cells[i, j] = np.nan
+
+
+@numba.njit(cache=True, nogil=True)
+def forget(cells: Floats, places: Floats, used: int, gone: Obstacles, come: Obstacles) -> None:
+    """Make unknown every length that a zone that went or came may change. O(zones n^2)."""
+    for k in range(gone.kind.size):
+        _forget_for(cells, places, used, gone, k, False)
+    for k in range(come.kind.size):
+        _forget_for(cells, places, used, come, k, True)
