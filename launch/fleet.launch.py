@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """The allocator and the MAVLink bridge of a fleet, with one file of parameters for each."""
-from launch import LaunchDescription
 from launch.actions import DeclareLaunchArgument
 from launch.substitutions import LaunchConfiguration, PathJoinSubstitution
 from launch_ros.actions import Node
 from launch_ros.substitutions import FindPackageShare
+
+from launch import LaunchDescription
 
 
 def generate_launch_description() -> LaunchDescription:

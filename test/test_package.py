@@ -21,8 +21,9 @@ def test_a_launch_file_compiles_and_builds_where_launch_is_there(path):
     scope = {}
     code = compile(path.read_text(), str(path), 'exec')
     try:
-        import launch  # noqa: F401
         import launch_ros  # noqa: F401
+
+        import launch  # noqa: F401
     except ImportError:
         assert 'generate_launch_description' in code.co_names
         return

@@ -28,11 +28,11 @@ def check_number(place: str, value: float, low: float, high: float = math.inf,
                  open_low: bool = False) -> float:
     """A number in [low, high], or (low, high] where open_low; raise InvalidValue otherwise."""
     interval = f'{"(" if open_low else "["}{low:g}, {high:g}]'
-    if isinstance(value, bool) or not isinstance(value, (int, float)) and not hasattr(
-            value, '__float__'):
+    if isinstance(value, bool) or (not isinstance(value, (int, float)) and not hasattr(
+            value, '__float__')):
         raise InvalidValue(place, value, f'a number in {interval}')
     number = float(value)
-    if not low <= number <= high or open_low and number == low:
+    if not low <= number <= high or (open_low and number == low):
         raise InvalidValue(place, number, f'a number in {interval}')
     return number
 
@@ -211,8 +211,8 @@ def _edges_meet(a: tuple[float, float], b: tuple[float, float], c: tuple[float, 
     t1, t2, t3, t4 = turn(a, b, c), turn(a, b, d), turn(c, d, a), turn(c, d, b)
     if t1 * t2 < 0 and t3 * t4 < 0:
         return True
-    return (t1 == 0 and between(a, b, c) or t2 == 0 and between(a, b, d)
-            or t3 == 0 and between(c, d, a) or t4 == 0 and between(c, d, b))
+    return ((t1 == 0 and between(a, b, c)) or (t2 == 0 and between(a, b, d))
+            or (t3 == 0 and between(c, d, a)) or (t4 == 0 and between(c, d, b)))
 
 
 @dataclass(frozen=True, slots=True)

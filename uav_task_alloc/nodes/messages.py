@@ -12,6 +12,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from std_msgs.msg import Header
 from uav_task_alloc_msgs import msg as m
 
+from uav_task_alloc.allocator.records import Kind, TaskEvent, UavReport
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.geometry.frames import Origin, to_enu
 from uav_task_alloc.model import Leg, Point, Shape, Task, ThreatZone, check_number
@@ -104,6 +105,28 @@ def from_task(task: Task) -> m.Task:
         acceptance_radius=math.nan if task.acceptance_radius is None else task.acceptance_radius,
         required_capabilities=sorted(task.required_capabilities),
         allowed_uavs=sorted(task.allowed_uavs or ()))
+
+
+def to_report(msg: m.UavState) -> UavReport:
+    """Raise InvalidValue, naming the field, where the message tells nothing of a UAV."""
+    check_ros_name('uav_id', msg.uav_id)
+    home = from_point(msg.home)
+    return UavReport(
+        msg.uav_id, from_point(msg.position), home=None if any(map(math.isnan, home)) else home,
+        range=known(msg.range_remaining), cruise_speed=known(msg.cruise_speed) or None,
+        capabilities=frozenset(msg.capabilities),
+        available=msg.available and msg.mode != m.UavState.MODE_FAULT,
+        active_task=msg.active_task_id, list_revision=msg.list_revision)
+
+
+def to_event(msg: m.TaskEvent) -> TaskEvent:
+    """Raise InvalidValue, naming the field, where the message is no event."""
+    try:
+        kind = Kind(msg.event)
+    except ValueError:
+        raise InvalidValue(f'event of task {msg.task_id}: event', msg.event,
+                           'STARTED (0), COMPLETED (1) or FAILED (2)') from None
+    return TaskEvent(msg.task_id, msg.uav_id, msg.revision, kind, msg.reason)
 
 
 def to_zone(msg: m.ThreatZone) -> ThreatZone:

@@ -6,7 +6,10 @@ from dataclasses import fields, replace
 from typing import Any, TypeVar
 
 from rcl_interfaces.msg import (
-    FloatingPointRange, IntegerRange, ParameterDescriptor, SetParametersResult,
+    FloatingPointRange,
+    IntegerRange,
+    ParameterDescriptor,
+    SetParametersResult,
 )
 from rclpy.exceptions import InvalidParameterTypeException, InvalidParameterValueException
 from rclpy.node import Node
@@ -41,8 +44,8 @@ def descriptor(spec: Any) -> ParameterDescriptor:
             from_value=-_BIG if low is None else low, to_value=_BIG if high is None else high)]
     if type(spec.default) is int and (low is not None or high is not None):
         described.integer_range = [IntegerRange(
-            from_value=-2**63 if low is None else low, to_value=2**63 - 1 if high is None else high,
-            step=1)]
+            from_value=-2**63 if low is None else low,
+            to_value=2**63 - 1 if high is None else high, step=1)]
     return described
 
 
