@@ -48,10 +48,10 @@ def check(spec: Field[Any], value: Any) -> Any:
     if kind is tuple and not isinstance(value, str):
         value = tuple(value)
     wrong = (type(value) is not kind
-             or meta['choices'] and value not in meta['choices']
-             or kind is float and math.isnan(value)
-             or meta['low'] is not None and value < meta['low']
-             or meta['high'] is not None and value > meta['high'])
+             or (meta['choices'] and value not in meta['choices'])
+             or (kind is float and math.isnan(value))
+             or (meta['low'] is not None and value < meta['low'])
+             or (meta['high'] is not None and value > meta['high']))
     if wrong:
         raise InvalidValue(ros_name(spec), value, expectation(spec))
     return value
@@ -87,6 +87,22 @@ class AllocatorParams(Checked):
                                  high=1e7, unit='m')
     default_cruise_speed: float = param(15.0, 'Speed of a UAV that does not tell its own.',
                                         low=0.1, high=1000.0, unit='m/s')
+    clearance: float = param(10.0, 'Distance kept from zones beyond their margins.', low=0.0,
+                             high=10000.0, unit='m')
+    altitude_min: float = param(-1e5, 'Lowest detour, above the origin.', low=-1e5, high=1e5,
+                                unit='m')
+    altitude_max: float = param(1e5, 'Highest detour, above the origin.', low=-1e5, high=1e5,
+                                unit='m')
+    settle: float = param(0.05, 'Quiet time that ends a burst of events; one solve for each.',
+                          low=0.0, high=10.0, unit='s')
+    replan_margin: float = param(0.01, 'Share by which a plan must be shorter to replace the '
+                                 'one that is flown.', low=0.0, high=1.0)
+    background_budget: float = param(0.05, 'Time of one search between events; 0: none.',
+                                     low=0.0, high=10.0, unit='s')
+    background_period: float = param(0.5, 'Rest between two such searches.', low=0.05,
+                                     high=3600.0, unit='s')
+    max_attempts: int = param(3, 'UAVs that may fail at a task before it is FAILED.', low=1,
+                              high=1000)
     state_dir: str = param('', 'Folder of the journal; empty: nothing is kept.', fixed=True)
     seed: int = param(0, 'Seed of the bees.', low=0, high=2**31 - 1, fixed=True)
 

@@ -1,0 +1,137 @@
+# SPDX-License-Identifier: Apache-2.0
+"""An allocator over virtual time, with a greedy stand-in for the solver."""
+import math
+from itertools import pairwise
+
+from uav_task_alloc.allocator import Allocator, planning
+from uav_task_alloc.allocator.fleet import may_fly
+from uav_task_alloc.allocator.records import Action, Kind, TaskEvent, UavReport
+from uav_task_alloc.geometry.detour import detour
+from uav_task_alloc.model import Leg, Plan, Task
+from uav_task_alloc.params import AllocatorParams
+
+
+def greedy(uavs, tasks, zones=(), *, warm=None, locked=None, route_end='hold', **_):
+    """Locked first, then the warm routes as they were, then each task to the nearest end."""
+    place = {task.id: task for task in tasks}
+    routes = {uav.id: list((locked or {}).get(uav.id, ())) for uav in uavs}
+    given = {t for route in routes.values() for t in route}
+    by_id = {uav.id: uav for uav in uavs}
+
+    def can(uav, task):
+        return may_fly(task, (), UavReport(uav.id, uav.position, capabilities=uav.capabilities))
+
+    def end(uav_id):
+        route = routes[uav_id]
+        return place[route[-1]].position if route else by_id[uav_id].position
+
+    for uav_id, route in (warm.routes if warm else {}).items():
+        for task_id in route:
+            if uav_id in routes and task_id in place and task_id not in given and can(
+                    by_id[uav_id], place[task_id]):
+                routes[uav_id].append(task_id)
+                given.add(task_id)
+    unassigned = {}
+    for task in tasks:
+        if task.id in given:
+            continue
+        able = [u for u in uavs if can(u, task)
+                and math.isfinite(detour(end(u.id), task.position, zones)[0])]
+        if not able:
+            unassigned[task.id] = 'nobody can'
+            continue
+        best = min(able, key=lambda u: math.dist(end(u.id), task.position))
+        routes[best.id].append(task.id)
+    return as_plan(uavs, place, zones, routes, unassigned, route_end, warm)
+
+
+def as_plan(uavs, place, zones, routes, unassigned=None, route_end='hold', warm=None):
+    """A Plan of these routes with legs around the zones."""
+    legs = {}
+    for uav in uavs:
+        stops = [uav.position, *(place[t].position for t in routes[uav.id])]
+        if route_end == 'home' and len(stops) > 1:
+            stops.append(uav.home or uav.position)
+        ways = [detour(a, b, zones) for a, b in pairwise(stops)]
+        legs[uav.id] = tuple(Leg(tuple(via), length) for length, via in ways)
+    distance = sum(leg.length for way in legs.values() for leg in way)
+    value = sum(place[t].value for route in routes.values() for t in route)
+    return Plan({u: tuple(r) for u, r in routes.items()}, unassigned or {}, distance, value,
+                fit=distance, legs=legs, returns=route_end == 'home',
+                warm_started=warm is not None)
+
+
+class Desk:
+    """Drives an allocator: every method moves the virtual clock by itself."""
+
+    def __init__(self, saved=None, plan=greedy, **params):
+        params.setdefault('background_budget', 0.0)
+        params.setdefault('route_end', 'hold')
+        self.now, self.plan, self.solves = 1000.0, plan, []
+        self.core = Allocator(AllocatorParams(**params), self.now, saved)
+        self.core.wake()
+        self.world = self.core.world
+        self.lists, self.history, self.notes, self.allocations = {}, [], [], []
+
+    def uav(self, uav_id, *position, **more):
+        return self.world.hear(UavReport(uav_id, position, **more), self.now)
+
+    def add(self, *tasks, action=Action.ADD):
+        return self.world.announce(action, [task(t) for t in tasks], self.now, self.now)
+
+    def cancel(self, *ids):
+        return self.world.cancel(ids, self.now, self.now)
+
+    def event(self, kind, task_id, uav_id, revision=None, reason=''):
+        if revision is None:
+            revision = self.world.lists.get(uav_id).revision
+        return self.world.event(TaskEvent(task_id, uav_id, revision, Kind[kind], reason),
+                                self.now, self.now)
+
+    def begin(self):
+        """Let the burst settle; the problem that is due."""
+        self.now += 1.01 * self.world.params.settle
+        self.core.tick(self.now, self.now)
+        problem = self.core.due(self.now, self.now)
+        self.take()
+        return problem
+
+    def finish(self, problem):
+        """Solve it and adopt the answer."""
+        answer = planning.solve(self.plan, problem, self.world.params, lambda: False)
+        self.solves.append(problem.trigger)
+        self.now += problem.budget
+        self.core.adopt(answer, self.now, self.now)
+        self.take()
+
+    def settle(self, wait=0.0, hear=True):
+        """Solve until nothing is due; UAVs keep talking meanwhile."""
+        self.now += wait
+        if hear:
+            for record in list(self.world.fleet.records.values()):
+                self.world.hear(record.report, self.now)
+        self.core.tick(self.now, self.now)
+        while (problem := self.begin()) is not None:
+            self.finish(problem)
+
+    def take(self):
+        out = self.core.collect()
+        self.lists.update(out.lists)
+        self.history += out.lists.values()
+        self.notes += [note.text for note in out.notes]
+        if out.allocation:
+            self.allocations.append(out.allocation)
+
+    def route(self, uav_id):
+        return self.lists[uav_id].task_ids
+
+    def state(self, task_id):
+        return self.world.tasks.records[task_id].state.name
+
+    def reason(self, task_id):
+        return self.world.tasks.records[task_id].reason
+
+
+def task(what):
+    """A Task, or one of an (id, x, y) triple."""
+    return what if isinstance(what, Task) else Task(what[0], (*map(float, what[1:3]), 50.0))

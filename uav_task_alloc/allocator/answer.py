@@ -1,0 +1,84 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What of an answer is taken: only what is better by the margin, and still true by now."""
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Iterable, Mapping
+from dataclasses import replace
+
+from uav_task_alloc.allocator.records import Answer
+from uav_task_alloc.model import Plan
+
+Routes = dict[str, tuple[str, ...]]
+
+
+def steady(answer: Answer, margin: float) -> Plan:
+    """The repaired lists, with each change that shortens what it touches by the margin [share].
+
+    UAVs that exchange tasks change together. Between events the whole must gain by it, too.
+    """
+    base, fresh = answer.base, answer.fresh
+    if fresh.value > base.value or fresh.penalty < base.penalty:
+        return fresh
+    ranges = {uav.id: uav.range for uav in answer.problem.uavs}
+    taken, gained = [], 0.0
+    for group in exchanges(base.routes, fresh.routes):
+        before = sum(_cost(base, uav_id, ranges[uav_id]) for uav_id in group)
+        gain = before - sum(_cost(fresh, uav_id, ranges[uav_id]) for uav_id in group)
+        if gain > max(margin * before, 1e-6):
+            taken.append(group)
+            gained += gain
+    if not taken or answer.problem.background and gained <= margin * base.distance:
+        return base
+    return _mixed(base, fresh, {uav_id for group in taken for uav_id in group})
+
+
+def exchanges(before: Mapping[str, tuple[str, ...]],
+              after: Mapping[str, tuple[str, ...]]) -> list[frozenset[str]]:
+    """UAVs whose routes differ, together with those they exchange tasks with."""
+    owner = {task: uav_id for uav_id, tasks in before.items() for task in tasks}
+    groups: list[set[str]] = []
+    for uav_id, tasks in after.items():
+        if before.get(uav_id) == tasks:
+            continue
+        group = {uav_id, *(owner[task] for task in tasks if task in owner)}
+        for other in [g for g in groups if g & group]:
+            group |= other
+            groups.remove(other)
+        groups.append(group)
+    return [frozenset(group) for group in groups]
+
+
+def _cost(plan: Plan, uav_id: str, reach: float) -> float:
+    length = plan.route(uav_id).distance
+    return length + 100.0 * max(0.0, length - reach)  # the excess is dear in the soft case
+
+
+def _mixed(base: Plan, fresh: Plan, changed: Collection[str]) -> Plan:
+    """`fresh` for the changed UAVs, `base` for the others."""
+    if all(fresh.routes[uav_id] == tasks for uav_id, tasks in base.routes.items()
+           if uav_id not in changed):
+        return fresh
+    routes = {u: (fresh if u in changed else base).routes[u] for u in base.routes}
+    legs = {u: (fresh if u in changed else base).legs.get(u, ()) for u in base.routes}
+    mixed = replace(fresh, routes=routes, legs=legs)
+    distance = sum(mixed.route(u).distance for u in routes)
+    # the fit of eq 2.12 falls with the distance where value and penalty are the same
+    share = distance / fresh.distance if fresh.distance > 0.0 else 1.0
+    return replace(mixed, distance=distance, fit=fresh.fit * share)
+
+
+def repaired(routes: Mapping[str, Iterable[str]], locked: Mapping[str, tuple[str, ...]],
+             allowed: Callable[[str, str], bool]) -> Routes:
+    """Routes of an older world in the present one.
+
+    What is being flown comes first on its UAV; what may not be flown (`allowed(uav, task)` is
+    false: ended, forbidden, UAV gone) is out.
+    """
+    flown = {task for tasks in locked.values() for task in tasks}
+    found: Routes = {}
+    for uav_id, tasks in routes.items():
+        rest = (task for task in tasks if task not in flown and allowed(uav_id, task))
+        found[uav_id] = (*locked.get(uav_id, ()), *rest)
+    for uav_id, tasks in locked.items():
+        found.setdefault(uav_id, tasks)
+    return found

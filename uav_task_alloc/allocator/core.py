@@ -1,0 +1,134 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The allocator: a world that is solved when it changed, and the lists that follow from it.
+
+No clock, no thread, no I/O: `now` is [s] of a steady clock, `stamp` [s] of the published one.
+"""
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from uav_task_alloc.allocator import planning
+from uav_task_alloc.allocator.answer import steady
+from uav_task_alloc.allocator.records import Allocation, Answer, Outbox, Problem, UavList
+from uav_task_alloc.allocator.restore import (
+    Saved, list_row, off_row, revision_row, task_row, zones_row,
+)
+from uav_task_alloc.allocator.world import World
+from uav_task_alloc.journal import Row
+from uav_task_alloc.model import Plan
+from uav_task_alloc.params import AllocatorParams
+
+
+class Allocator:
+    """Tell `world` what happens, call `tick` often, solve what `due` returns, `adopt` the
+    answer, and publish what `collect` returns.
+    """
+
+    def __init__(self, params: AllocatorParams, now: float, saved: Saved | None = None) -> None:
+        saved = saved or Saved()
+        self.world = World(params, saved)
+        self._best = Plan({})
+        self._left: dict[str, str] = {}  # task id -> why it is left out
+        # UAVs of the journal get time to be heard before they lose anything
+        self._wait_for = {each.uav for each in saved.lists if each.stops}
+        self._wait_until = now + params.uav_timeout
+        self.world.outbox.again.update(each.uav for each in saved.lists)
+        if saved.tasks:
+            self.world.touch('restart', now)
+
+    def wake(self) -> None:
+        """The kernels are compiled: solving may begin."""
+        self.world.awake = True
+
+    def tick(self, now: float, stamp: float) -> None:
+        """Whatever time brings: UAVs fall silent, ended tasks leave the lists."""
+        world = self.world
+        world.look_for_silence(now)
+        for uav_id in list(world.lists.lists):
+            shorter = world.lists.without_flown(uav_id, self._ended, stamp)
+            if shorter is not None:
+                self._publish({uav_id: shorter}, stamp)
+        for uav_id in sorted(world.outbox.again):
+            self._publish({uav_id: world.lists.aged(uav_id, stamp)}, stamp, again=True)
+        world.outbox.again.clear()
+        if world.outbox.statuses:
+            planning.explain(world, self._left, stamp)
+
+    def _ended(self, task_id: str) -> bool:
+        record = self.world.tasks.records.get(task_id)
+        return record is None or not record.open
+
+    def due(self, now: float, stamp: float) -> Problem | None:
+        """The problem to solve now, if any; nothing while one is being solved."""
+        world, schedule, params = self.world, self.world.schedule, self.world.params
+        if not world.awake or schedule.busy or self._waiting(now):
+            return None
+        if schedule.settled(now, params.settle):
+            trigger = schedule.begin(now)
+            if any(world.fleet.usable(uav_id) for uav_id in world.fleet.records):
+                return planning.problem(world, self._best, trigger, background=False)
+            self._take(Plan({}), trigger, True, stamp)
+            schedule.end(now)
+        elif (params.background_budget > 0.0 and world.fleet.records and world.tasks.open()
+              and schedule.rested(now, params.background_period)
+              and any(world.fleet.usable(uav_id) for uav_id in world.fleet.records)):
+            schedule.begin(now)
+            return planning.problem(world, self._best, 'background', background=True)
+        return None
+
+    def _waiting(self, now: float) -> bool:
+        self._wait_for -= set(self.world.fleet.records)
+        return bool(self._wait_for) and now < self._wait_until
+
+    def hurry(self, now: float, background: bool) -> bool:
+        """Whether the running solve should answer now, as newer events wait for it."""
+        schedule, params = self.world.schedule, self.world.params
+        return schedule.settled(now, params.settle) and (
+            background or schedule.overdue(now, params.solve_budget))
+
+    def adopt(self, answer: Answer | None, now: float, stamp: float) -> None:
+        """Take over what is better by the margin and still true; None: the solve failed."""
+        self.world.schedule.end(now)
+        if answer is None:
+            return
+        self._best = answer.fresh
+        chosen = steady(answer, self.world.params.replan_margin)
+        self._take(chosen, answer.problem.trigger, not answer.problem.background, stamp)
+
+    def _take(self, chosen: Plan, trigger: str, always: bool, stamp: float) -> None:
+        world = self.world
+        lists, self._left = planning.lists_of(world, chosen)
+        changed = self._publish(lists, stamp)
+        planning.explain(world, self._left, stamp)
+        world.outbox.statuses = True
+        if changed or always:
+            world.revision += 1
+            world.dirty.add('revision')
+            world.outbox.allocation = Allocation(
+                world.revision, tuple(world.lists.lists.values()),
+                planning.held_plan(world, self._left, chosen), trigger, stamp)
+
+    def _publish(self, lists: Mapping[str, UavList], stamp: float, again: bool = False) -> bool:
+        made = [self.world.lists.publish(each, stamp, again) for each in lists.values()]
+        self.world.outbox.lists.update((each.uav, each) for each in made if each)
+        return any(made)
+
+    def collect(self) -> Outbox:
+        """What has to be told since the last call; the rows belong on disk before."""
+        out, self.world.outbox = self.world.outbox, Outbox()
+        return out
+
+    def rows(self) -> list[Row]:
+        """What changed and is not on disk yet; `written` says that it is."""
+        world = self.world
+        rows = [task_row(world.tasks.records[task_id]) for task_id in sorted(world.tasks.dirty)]
+        rows += [list_row(world.lists.lists[uav_id]) for uav_id in sorted(world.lists.dirty)]
+        made = {'zones': lambda: zones_row(world.zones.values()),
+                'off': lambda: off_row(world.fleet.off),
+                'revision': lambda: revision_row(world.revision)}
+        return rows + [made[name]() for name in sorted(world.dirty)]
+
+    def written(self) -> None:
+        """The rows are on disk."""
+        for dirty in (self.world.tasks.dirty, self.world.lists.dirty, self.world.dirty):
+            dirty.clear()

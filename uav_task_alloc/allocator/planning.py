@@ -1,0 +1,128 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The world as a problem, and an answer as lists: what `solver` is asked and what is taken."""
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+
+from uav_task_alloc.allocator.answer import Routes, repaired
+from uav_task_alloc.allocator.fleet import may_fly
+from uav_task_alloc.allocator.lists import lay, planned_legs
+from uav_task_alloc.allocator.records import (
+    Answer, Problem, TaskRecord, TaskState, UavList,
+)
+from uav_task_alloc.allocator.world import World
+from uav_task_alloc.model import Plan, Task, Uav
+from uav_task_alloc.params import AllocatorParams
+
+
+def problem(world: World, best: Plan, trigger: str, background: bool) -> Problem:
+    """What a worker is to solve; the lists that are out are the incumbent."""
+    params = world.params
+    uavs = tuple(_uav(world, uav_id) for uav_id in world.fleet.records
+                 if world.fleet.usable(uav_id))
+    ids = frozenset(uav.id for uav in uavs)
+    tasks = tuple(_restricted(record, ids) for record in world.tasks.open())
+    held = {uav.id: world.lists.get(uav.id).task_ids for uav in uavs}
+    return Problem(
+        world.version, trigger, background,
+        params.background_budget if background else params.solve_budget, uavs, tasks,
+        tuple(world.zones.values()), world.locked(), held=replace(best, routes=held, legs={}),
+        warm=best)
+
+
+def solve(plan: Callable[..., Plan], asked: Problem, params: AllocatorParams,
+          stop: Callable[[], bool]) -> Answer:
+    """The lists repaired by `plan`, at once; then the best plan within the budget."""
+    def call(warm: Plan, budget: float, max_iterations: int | None) -> Plan:
+        return plan(asked.uavs, asked.tasks, asked.zones, budget=budget, seed=params.seed,
+                    warm=warm, route_end=params.route_end, locked=asked.locked,
+                    clearance=params.clearance, altitude_min=params.altitude_min,
+                    altitude_max=params.altitude_max, stop=stop,
+                    max_iterations=max_iterations)
+
+    base = call(asked.held, asked.budget, 0)
+    return Answer(asked, base, call(asked.warm if asked.background else base, asked.budget,
+                                    None))
+
+
+def lists_of(world: World, chosen: Plan) -> tuple[dict[str, UavList], dict[str, str]]:
+    """The lists of a plan in the world as it is now, and why tasks are left out."""
+    routes = _routes_now(world, chosen)
+    legs, ways, returns = planned_legs(chosen), world.ways(), world.params.route_end == 'home'
+    lists, left = {}, dict(chosen.unassigned)
+    for uav_id, task_ids in routes.items():
+        tasks = [world.tasks.records[task_id].task for task_id in task_ids]
+        lists[uav_id], lost = lay(_uav(world, uav_id), tasks, returns, legs,
+                                  world.lists.get(uav_id), ways)
+        left.update((task_id, f'no safe way for {uav_id}') for task_id in lost)
+    for uav_id, held in world.lists.lists.items():
+        if uav_id not in lists:  # gone: what it does not have it cannot fly when it is back
+            lists[uav_id] = replace(held, stops=(), distance=0.0)
+    return lists, left
+
+
+def _routes_now(world: World, chosen: Plan) -> Routes:
+    reports = {uav_id: known.report for uav_id, known in world.fleet.records.items()
+               if world.fleet.usable(uav_id)}
+
+    def allowed(uav_id: str, task_id: str) -> bool:
+        record = world.tasks.records.get(task_id)
+        return (record is not None and record.open
+                and may_fly(record.task, record.failed_on, reports[uav_id]))
+
+    usable = {uav_id: tasks for uav_id, tasks in chosen.routes.items() if uav_id in reports}
+    return repaired(usable, world.locked(), allowed)
+
+
+def explain(world: World, left: Mapping[str, str], stamp: float) -> None:
+    """The state and the reason of every open task, from the lists and what is left out."""
+    owners = world.lists.owners()
+    for record in world.tasks.open():
+        uav_id = owners.get(record.task.id, '')
+        if uav_id:
+            known = world.fleet.records.get(uav_id)
+            active = known is not None and known.active == record.task.id
+            state = TaskState.ACTIVE if active else TaskState.ASSIGNED
+            world.tasks.change(record.task.id, stamp, state=state, uav=uav_id, reason='')
+        else:
+            state, reason = _why_left(world, record, left)
+            world.tasks.change(record.task.id, stamp, state=state, uav='', reason=reason)
+
+
+def _why_left(world: World, record: TaskRecord,
+              left: Mapping[str, str]) -> tuple[TaskState, str]:
+    heard, usable = world.fleet.records, [u for u in world.fleet.records if world.fleet.usable(u)]
+    allowed = record.task.allowed_uavs
+    if not heard:
+        return TaskState.PENDING, 'no UAV heard yet'
+    if allowed is not None and not any(uav_id in heard for uav_id in allowed):
+        return TaskState.UNASSIGNED, (f'allowed for {", ".join(sorted(allowed))} only: '
+                                      'not heard yet')
+    if not usable:
+        return TaskState.UNASSIGNED, 'no UAV available'
+    if record.task.id in left:
+        return TaskState.UNASSIGNED, left[record.task.id]
+    return TaskState.PENDING, record.reason or 'waits for the next plan'
+
+
+def _uav(world: World, uav_id: str) -> Uav:
+    return world.fleet.uav(uav_id, world.params.default_range, world.params.default_cruise_speed)
+
+
+def _restricted(record: TaskRecord, usable: frozenset[str]) -> Task:
+    """The task, kept from the UAVs that failed at it."""
+    if not record.failed_on:
+        return record.task
+    allowed = usable if record.task.allowed_uavs is None else record.task.allowed_uavs
+    return replace(record.task, allowed_uavs=allowed - frozenset(record.failed_on))
+
+
+def held_plan(world: World, left: Mapping[str, str], like: Plan) -> Plan:
+    """The lists in force as a plan, with the figures of the plan they come from."""
+    lists = world.lists.lists
+    routes = {uav_id: each.task_ids for uav_id, each in lists.items()}
+    served = sum(world.tasks.records[t].task.value for tasks in routes.values() for t in tasks)
+    return replace(like, routes=routes, unassigned=dict(left), value=served,
+                   distance=math.fsum(each.distance for each in lists.values()))

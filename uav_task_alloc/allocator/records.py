@@ -1,0 +1,197 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What the allocator knows of tasks, UAVs and lists: frozen values, SI units, ENU."""
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import Enum
+
+from uav_task_alloc.model import (
+    Leg, Plan, Point, Task, ThreatZone, Uav, check_id, check_names, check_number, check_point,
+)
+
+
+class TaskState(Enum):
+    """Where a task stands; the numbers are those of the TaskStatus message."""
+
+    PENDING = 0
+    ASSIGNED = 1
+    ACTIVE = 2
+    COMPLETED = 3
+    FAILED = 4
+    CANCELLED = 5
+    REJECTED = 6
+    UNASSIGNED = 7
+
+
+OPEN = frozenset({TaskState.PENDING, TaskState.ASSIGNED, TaskState.ACTIVE,
+                  TaskState.UNASSIGNED})
+
+
+class Action(Enum):
+    """What an announcement does; the numbers are those of the message."""
+
+    ADD = 0
+    UPDATE = 1
+    CANCEL = 2
+
+
+class Kind(Enum):
+    """What happened to a task; the numbers are those of the TaskEvent message."""
+
+    STARTED = 0
+    COMPLETED = 1
+    FAILED = 2
+
+
+@dataclass(frozen=True, slots=True)
+class TaskRecord:
+    """One accepted task and its fate."""
+
+    task: Task
+    announced: Task  # as first added: a replay of that announcement is known again
+    state: TaskState = TaskState.PENDING
+    uav: str = ''  # who has it, or had it when it ended
+    reason: str = ''
+    stamp: float = 0.0  # [s] of the last change of state
+    failed_on: tuple[str, ...] = ()  # UAVs that could not do it
+
+    @property
+    def open(self) -> bool:
+        """It is still to be done."""
+        return self.state in OPEN
+
+
+@dataclass(frozen=True, slots=True)
+class Verdict:
+    """The answer to one task of an announcement."""
+
+    task_id: str
+    accepted: bool
+    reason: str = ''  # why not; where accepted: that it changes nothing
+
+
+@dataclass(frozen=True, slots=True)
+class TaskEvent:
+    """A UAV says what became of a task."""
+
+    task_id: str
+    uav_id: str
+    revision: int  # of the list it was flown from; 0: not told
+    kind: Kind
+    reason: str = ''
+
+
+@dataclass(frozen=True, slots=True)
+class UavReport:
+    """What one UAV says of itself; None where it does not know. Raises InvalidValue."""
+
+    uav_id: str
+    position: Point  # [m] ENU
+    home: Point | None = None  # [m] ENU
+    range: float | None = None  # [m] it can still fly
+    cruise_speed: float | None = None  # [m/s]
+    capabilities: frozenset[str] = frozenset()
+    available: bool = True  # and not in FAULT
+    active_task: str = ''  # being flown
+    list_revision: int = 0  # last list verified on board
+
+    def __post_init__(self) -> None:
+        check_id('uav_id', self.uav_id)
+        place = f'uav {self.uav_id}: '
+        put = object.__setattr__
+        put(self, 'position', check_point(place + 'position', self.position))
+        if self.home is not None:
+            put(self, 'home', check_point(place + 'home', self.home))
+        if self.range is not None:
+            check_number(place + 'range_remaining', self.range, 0.0)
+        if self.cruise_speed is not None:
+            check_number(place + 'cruise_speed', self.cruise_speed, 0.0, 1e4)
+        put(self, 'capabilities', check_names(place + 'capabilities', self.capabilities))
+
+
+@dataclass(frozen=True, slots=True)
+class Stop:
+    """A task in a list, the way to it, and when the UAV is there."""
+
+    task: Task
+    leg: Leg
+    eta: float  # [s] from the stamp of the list to the arrival
+
+
+@dataclass(frozen=True, slots=True)
+class UavList:
+    """What one UAV has still to fly, in order."""
+
+    uav: str
+    revision: int  # strictly rising
+    stops: tuple[Stop, ...] = ()
+    returns: bool = False  # home after the last task
+    distance: float = 0.0  # [m] of all legs, with the way home where it returns
+    stamp: float = 0.0  # [s] when it was planned
+
+    @property
+    def task_ids(self) -> tuple[str, ...]:
+        """The ids in the order flown."""
+        return tuple(stop.task.id for stop in self.stops)
+
+    def flies_as(self, other: UavList) -> bool:
+        """The same tasks by the same ways to the same end: nothing to tell the UAV."""
+        return self.returns == other.returns and [
+            (stop.task, stop.leg.via) for stop in self.stops] == [
+            (stop.task, stop.leg.via) for stop in other.stops]
+
+
+@dataclass(frozen=True, slots=True)
+class Problem:
+    """The world as a worker solves it, apart from the world that goes on meanwhile."""
+
+    version: int
+    trigger: str
+    background: bool  # nothing happened: publish only what is better by the margin
+    budget: float  # [s]
+    uavs: tuple[Uav, ...]
+    tasks: tuple[Task, ...]
+    zones: tuple[ThreatZone, ...]
+    locked: Mapping[str, tuple[str, ...]]
+    held: Plan  # the lists as they are out
+    warm: Plan  # the best found so far, from which the search goes on
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """What a worker found: the held lists repaired, and the best plan."""
+
+    problem: Problem
+    base: Plan
+    fresh: Plan
+
+
+@dataclass(frozen=True, slots=True)
+class Allocation:
+    """The plan in force, as it is told to everybody."""
+
+    revision: int  # strictly rising
+    lists: tuple[UavList, ...]
+    plan: Plan
+    trigger: str
+    stamp: float  # [s]
+
+
+@dataclass(frozen=True, slots=True)
+class Note:
+    """A line for the log."""
+
+    warning: bool
+    text: str
+
+
+@dataclass(slots=True)
+class Outbox:
+    """What has to be told since it was last emptied."""
+
+    lists: dict[str, UavList] = field(default_factory=dict)
+    again: set[str] = field(default_factory=set)  # UAVs to be told once more
+    allocation: Allocation | None = None
+    statuses: bool = False
+    notes: list[Note] = field(default_factory=list)

@@ -1,0 +1,35 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A small world solved once, so that every kernel is compiled before a real one comes."""
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from uav_task_alloc.allocator import planning
+from uav_task_alloc.allocator.core import Allocator
+from uav_task_alloc.allocator.records import Action, UavReport
+from uav_task_alloc.model import Plan, Task, ThreatZone
+from uav_task_alloc.params import AllocatorParams
+
+ZONES = (
+    ThreatZone.hemisphere('dome', (100.0, 0.0, 0.0), 30.0),
+    ThreatZone.cylinder('column', (300.0, 0.0), 30.0, 0.0, 100.0),
+    ThreatZone.polygon('prism', ((180.0, -20.0), (220.0, -20.0), (200.0, 20.0)), 0.0, 100.0),
+)
+
+
+def rehearse(plan: Callable[..., Plan], params: AllocatorParams) -> int:
+    """Solve a world with each shape of zone; the number of lists that came out."""
+    allocator, budget = Allocator(params, now=0.0), 0.05
+    allocator.wake()
+    for zones in ((), ZONES):
+        allocator.world.set_zones(zones, (), now=0.0)
+        allocator.world.hear(UavReport('a', (0.0, 0.0, 20.0)), now=0.0)
+        allocator.world.hear(UavReport('b', (0.0, 90.0, 20.0)), now=0.0)
+        tasks = [Task(f't{len(zones)}_{k}', (400.0, 30.0 * k, 20.0)) for k in range(4)]
+        allocator.world.announce(Action.ADD, tasks, stamp=0.0, now=0.0)
+        asked = planning.problem(allocator.world, Plan({}), 'rehearsal', background=False)
+        began = allocator.world.schedule.begin(0.0)
+        assert began
+        answer = planning.solve(plan, asked, params, stop=lambda: False)
+        allocator.adopt(answer, now=budget, stamp=0.0)
+    return len(allocator.collect().lists)

@@ -1,0 +1,110 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The world as rows of the journal and back."""
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass, field, fields
+from enum import Enum
+from typing import Any
+
+from uav_task_alloc.allocator.records import Stop, TaskRecord, TaskState, UavList
+from uav_task_alloc.errors import JournalError
+from uav_task_alloc.journal import Row
+from uav_task_alloc.model import Leg, Shape, Task, ThreatZone
+
+
+@dataclass(slots=True)
+class Saved:
+    """What survives a restart."""
+
+    tasks: list[TaskRecord] = field(default_factory=list)
+    lists: list[UavList] = field(default_factory=list)
+    zones: list[ThreatZone] = field(default_factory=list)
+    off: list[str] = field(default_factory=list)  # UAVs an operator switched off
+    revision: int = 0  # of the allocation
+
+
+def task_row(record: TaskRecord) -> Row:
+    """A task and its fate."""
+    return Row('task', record.task.id, _plain(record))
+
+
+def list_row(uav_list: UavList) -> Row:
+    """What a UAV was told last."""
+    return Row('list', uav_list.uav, _plain(uav_list))
+
+
+def zones_row(zones: Iterable[ThreatZone]) -> Row:
+    """All zones, a whole picture."""
+    return Row('zones', '', [_plain(zone) for zone in zones])
+
+
+def off_row(off: Iterable[str]) -> Row:
+    """The UAVs that an operator switched off."""
+    return Row('off', '', sorted(off))
+
+
+def revision_row(revision: int) -> Row:
+    """The revision of the allocation."""
+    return Row('revision', '', revision)
+
+
+def saved(rows: Iterable[Row]) -> Saved:
+    """The world of these rows. Raises JournalError where a row is not as it was written."""
+    found = Saved()
+    for row in rows:
+        try:
+            _take(found, row)
+        except (KeyError, TypeError, ValueError) as error:
+            raise JournalError(f'journal row {row.kind} {row.id!r} cannot be read: '
+                               f'{error!r}') from error
+    return found
+
+
+def _take(found: Saved, row: Row) -> None:
+    if row.kind == 'task':
+        found.tasks.append(_task_record(row.body))
+    elif row.kind == 'list':
+        found.lists.append(_list(row.body))
+    elif row.kind == 'zones':
+        found.zones = [ThreatZone(**{**zone, 'shape': Shape(zone['shape'])})
+                       for zone in row.body]
+    elif row.kind == 'off':
+        found.off = [str(uav_id) for uav_id in row.body]
+    elif row.kind == 'revision':
+        found.revision = int(row.body)
+    else:
+        raise ValueError(f'unknown kind {row.kind!r}')
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, (list, tuple)):
+        return [_plain(v) for v in value]
+    if isinstance(value, dict):
+        return {k: _plain(v) for k, v in value.items()}
+    if isinstance(value, frozenset):
+        return sorted(value)
+    if isinstance(value, Enum):
+        return value.value
+    return _plain(asdict(value)) if hasattr(value, '__dataclass_fields__') else value
+
+
+def _task(body: dict[str, Any]) -> Task:
+    return Task(**{spec.name: body[spec.name] for spec in fields(Task)})
+
+
+def _task_record(body: dict[str, Any]) -> TaskRecord:
+    return TaskRecord(**{**body, 'task': _task(body['task']),
+                         'announced': _task(body['announced']),
+                         'state': TaskState(body['state']),
+                         'failed_on': tuple(body['failed_on'])})
+
+
+def _list(body: dict[str, Any]) -> UavList:
+    stops = tuple(Stop(_task(stop['task']), _leg(stop['leg']), stop['eta'])
+                  for stop in body['stops'])
+    return UavList(**{**body, 'stops': stops})
+
+
+def _leg(body: dict[str, Any]) -> Leg:
+    return Leg(tuple((x, y, z) for x, y, z in body['via']), body['length'])

@@ -1,0 +1,53 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What people ask: where each task stands, and how the allocator is."""
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass
+
+from uav_task_alloc.allocator.records import TaskState
+from uav_task_alloc.allocator.world import World
+
+
+@dataclass(frozen=True, slots=True)
+class Status:
+    """Where one task stands."""
+
+    task_id: str
+    state: TaskState
+    uav: str
+    reason: str
+    stamp: float  # [s] of the last change
+
+
+def statuses(world: World) -> list[Status]:
+    """One a task, accepted or refused."""
+    found = [Status(task_id, record.state, record.uav, record.reason, record.stamp)
+             for task_id, record in world.tasks.records.items()]
+    found += [Status(task_id, TaskState.REJECTED, '', reason, stamp)
+              for task_id, (reason, stamp) in world.tasks.rejected.items()]
+    return found
+
+
+def worries(world: World, journal_trouble: str) -> list[str]:
+    """What an operator should look at."""
+    fleet = world.fleet
+    silent = sorted(uav_id for uav_id, record in fleet.records.items() if record.silent)
+    left = [record for record in world.tasks.open() if record.state is TaskState.UNASSIGNED]
+    found = [f'journal: {journal_trouble}'] if journal_trouble else []
+    found += [f'silent: {", ".join(silent)}'] if silent else []
+    found += [f'{len(left)} tasks unassigned, {left[0].task.id}: {left[0].reason}'] if left else []
+    if world.tasks.open() and not any(fleet.usable(uav_id) for uav_id in fleet.records):
+        found.append('no UAV available')
+    return found
+
+
+def facts(world: World) -> dict[str, object]:
+    """Numbers of UAVs, tasks and zones, and the revision in force."""
+    states = Counter(record.state for record in world.tasks.records.values())
+    usable = [uav_id for uav_id in world.fleet.records if world.fleet.usable(uav_id)]
+    return {'UAVs heard': len(world.fleet.records), 'UAVs available': len(usable),
+            'zones': len(world.zones), 'revision': world.revision,
+            **{f'tasks {state.name}': states[state] for state in TaskState
+               if state is not TaskState.REJECTED},
+            'refusals': len(world.tasks.rejected), 'solving': world.schedule.busy}

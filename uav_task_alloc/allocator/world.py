@@ -1,0 +1,234 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The world as it is heard of: events in, refusals back, and what asks for a new plan noted.
+
+`now` is [s] of a steady clock, for silence and settling; `stamp` is [s] of the clock that
+people read, for what is published.
+"""
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Sequence
+
+from uav_task_alloc.allocator.fleet import Fleet, UavRecord, may_fly
+from uav_task_alloc.allocator.lists import Ways
+from uav_task_alloc.allocator.published import ListBook
+from uav_task_alloc.allocator.records import (
+    Action, Kind, Note, Outbox, TaskEvent, TaskState, UavReport, Verdict,
+)
+from uav_task_alloc.allocator.restore import Saved
+from uav_task_alloc.allocator.schedule import Schedule
+from uav_task_alloc.allocator.tasks import UNCHANGED, TaskBook
+from uav_task_alloc.geometry.zones import zones_around
+from uav_task_alloc.model import Task, ThreatZone
+from uav_task_alloc.params import AllocatorParams
+
+MOST_UAVS = 1000  # a flood of made-up ids ends here
+LOOK = 0.5  # [s] between two looks at the way ahead of a UAV
+
+
+class World:
+    """Tasks, UAVs, zones and published lists, and the schedule of what happened."""
+
+    def __init__(self, params: AllocatorParams, saved: Saved) -> None:
+        self.params = params
+        self.tasks = TaskBook(saved.tasks)
+        self.fleet = Fleet(saved.off)
+        self.lists = ListBook(saved.lists)
+        self.zones = {zone.id: zone for zone in saved.zones}
+        self.revision = saved.revision
+        self.dirty: set[str] = set()  # 'zones', 'off', 'revision': not yet on disk
+        self.schedule = Schedule()
+        self.version = 0
+        self.outbox = Outbox()
+        self.awake = False  # the kernels are compiled: looking at zones is quick
+        self._looked: dict[str, float] = {}
+
+    def announce(self, action: Action, tasks: Iterable[Task], stamp: float,
+                 now: float) -> list[Verdict]:
+        """ADD or UPDATE tasks."""
+        take = self.tasks.add if action is Action.ADD else self.tasks.update
+        return self._judged(action, [take(task, stamp) for task in tasks], now)
+
+    def cancel(self, task_ids: Iterable[str], stamp: float, now: float) -> list[Verdict]:
+        """Withdraw tasks."""
+        return self._judged(Action.CANCEL,
+                            [self.tasks.cancel(task_id, stamp) for task_id in task_ids], now)
+
+    def refuse(self, task_id: str, reason: str, stamp: float) -> Verdict:
+        """A task that is none: its status says so unless an accepted one has that id."""
+        verdict = self.tasks.reject(task_id, reason, stamp)
+        self.outbox.statuses = True
+        self.note(f'task {task_id!r} REJECTED: {reason}', warning=True)
+        return verdict
+
+    def _judged(self, action: Action, verdicts: list[Verdict], now: float) -> list[Verdict]:
+        repeated = [v.task_id for v in verdicts if v.reason == UNCHANGED]
+        if repeated:
+            self.note(f'{action.name} of {_some(repeated)} ignored: {UNCHANGED}')
+        for verdict in verdicts:
+            if not verdict.accepted:
+                self.note(f'{action.name} of task {verdict.task_id!r} REJECTED: '
+                          f'{verdict.reason}', warning=True)
+            elif verdict.reason != UNCHANGED:
+                self.touch(f'{action.name} {verdict.task_id}', now)
+        self.outbox.statuses = True
+        return verdicts
+
+    def hear(self, report: UavReport, now: float) -> str:
+        """A UAV says how it is; returns why that is refused, '' when it is not."""
+        uav_id = report.uav_id
+        if uav_id not in self.fleet.records and len(self.fleet.records) >= MOST_UAVS:
+            return f'uav_id = {uav_id!r}: expected one of the {MOST_UAVS} UAVs known already'
+        before = self.fleet.hear(report, now)
+        news = _news(before, report)
+        if news:
+            self.note(f'{uav_id} {news}')
+            self.touch(f'{uav_id} {news}', now)
+        if before is None or before.active != self.fleet.records[uav_id].active:
+            self.outbox.statuses = True
+        if self.lists.learn(uav_id, report.list_revision):
+            self.outbox.again.add(uav_id)
+        if self.awake and now - self._looked.get(uav_id, -LOOK) >= LOOK:
+            self._looked[uav_id] = now
+            self._look_ahead(uav_id, now)
+        return ''
+
+    def _look_ahead(self, uav_id: str, now: float) -> None:
+        """A way cut by a zone, or a UAV caught in one, asks for a new plan."""
+        record, ways = self.fleet.records[uav_id], self.ways()
+        position = record.report.position
+        caught = bool(self.zones) and bool(zones_around(position, ways.zones))
+        if caught != record.caught:
+            self.fleet.set_caught(uav_id, caught)
+            self.note(f'{uav_id} is {"inside" if caught else "out of"} a zone', warning=caught)
+            self.touch(f'{uav_id} {"caught in" if caught else "out of"} a zone', now)
+        stops = self.lists.get(uav_id).stops
+        if (stops and not caught
+                and ways.rest(position, stops[0].leg, stops[0].task.position) is None):
+            self.touch(f'way of {uav_id} cut', now)
+
+    def event(self, event: TaskEvent, stamp: float, now: float) -> str:
+        """What became of a task; returns why that is refused, '' when it is not."""
+        why = self._why_not(event)
+        if why:
+            return why
+        record, current = self.tasks.records[event.task_id], self._is_current(event)
+        if event.kind is Kind.COMPLETED:
+            # a fact, whoever the task was given to meanwhile: it must not be flown twice
+            self.tasks.change(event.task_id, stamp, state=TaskState.COMPLETED, uav=event.uav_id,
+                              reason='' if current else 'completed after it was moved')
+            if record.open and event.task_id not in self.lists.get(event.uav_id).task_ids[:1]:
+                self.touch(f'{event.task_id} COMPLETED out of turn', now)
+        elif event.kind is Kind.STARTED:
+            self.fleet.set_active(event.uav_id, event.task_id)
+        else:
+            self._failed(event, stamp)
+            self.touch(f'{event.task_id} FAILED', now)
+        self.outbox.statuses = True
+        return ''
+
+    def _why_not(self, event: TaskEvent) -> str:
+        place = f'event {event.kind.name} of task {event.task_id!r}'
+        record = self.tasks.records.get(event.task_id)
+        if record is None:
+            return f'{place}: unknown task'
+        if event.uav_id not in self.fleet.records and event.uav_id not in self.lists.lists:
+            return f'{place}: unknown UAV {event.uav_id!r}'
+        if record.state is TaskState.CANCELLED:
+            return f'{place}: it was cancelled'
+        if not self.lists.carried(event.uav_id, event.task_id, event.revision):
+            return (f'{place}: revision {event.revision} of the list of {event.uav_id} '
+                    'did not have it')
+        if record.state is TaskState.COMPLETED:
+            return f'{place}: it is COMPLETED already'
+        if event.kind is not Kind.COMPLETED and not self._is_current(event):
+            return f'{place}: {event.uav_id} does not have it any more'
+        return ''
+
+    def _is_current(self, event: TaskEvent) -> bool:
+        return event.task_id in self.lists.get(event.uav_id).task_ids
+
+    def _failed(self, event: TaskEvent, stamp: float) -> None:
+        """Another UAV may try, until nobody is left or it was tried often enough."""
+        self.tasks.fail(event.task_id, event.uav_id, event.reason, stamp)
+        record = self.tasks.records[event.task_id]
+        left = [uav_id for uav_id, known in self.fleet.records.items()
+                if may_fly(record.task, record.failed_on, known.report)]
+        if not left or len(record.failed_on) >= self.params.max_attempts:
+            self.tasks.change(event.task_id, stamp, state=TaskState.FAILED,
+                              reason=f'{record.reason}; '
+                                     f'{"tried often enough" if left else "no other UAV can"}')
+
+    def set_zones(self, zones: Sequence[ThreatZone], bad: Collection[str], now: float) -> None:
+        """The whole picture; a zone whose new form is bad stays as it was."""
+        new = {zone_id: zone for zone_id, zone in self.zones.items() if zone_id in bad}
+        new.update((zone.id, zone) for zone in zones)
+        if new == self.zones:
+            return
+        changed = [i for i in {**self.zones, **new} if self.zones.get(i) != new.get(i)]
+        self.zones = new
+        self.dirty.add('zones')
+        self._looked.clear()
+        self.note(f'zones changed: {_some(changed)}')
+        self.touch(f'zones {_some(changed)}', now)
+
+    def set_available(self, uav_id: str, available: bool, now: float) -> str:
+        """An operator's word, which stands until he takes it back; '' or why not."""
+        if uav_id not in self.fleet.records and uav_id not in self.lists.lists:
+            return f'uav_id = {uav_id!r}: expected a UAV that was heard'
+        if available == (uav_id not in self.fleet.off):
+            return ''
+        (self.fleet.off.discard if available else self.fleet.off.add)(uav_id)
+        self.dirty.add('off')
+        self.touch(f'{uav_id} {"available" if available else "not available"}', now)
+        return ''
+
+    def look_for_silence(self, now: float) -> None:
+        """Those not heard for `uav_timeout` lose their tasks to the others."""
+        for uav_id in self.fleet.fall_silent(now, self.params.uav_timeout):
+            self.note(f'{uav_id} silent for {self.params.uav_timeout:g} s: '
+                      'its tasks go to the others', warning=True)
+            self.touch(f'{uav_id} silent', now)
+
+    def touch(self, trigger: str, now: float) -> None:
+        """The plan is not for this world any more."""
+        self.version += 1
+        self.schedule.touch(trigger, now)
+
+    def note(self, text: str, warning: bool = False) -> None:
+        """A line for the log."""
+        self.outbox.notes.append(Note(warning, text))
+
+    def ways(self) -> Ways:
+        """The ways around the zones as they are now."""
+        return Ways(tuple(self.zones.values()), self.params.clearance, self.params.altitude_min,
+                    self.params.altitude_max, self.params.replan_margin)
+
+    def locked(self) -> dict[str, tuple[str, ...]]:
+        """What is being flown: it stays first on its UAV."""
+        owners, found, seen = self.lists.owners(), {}, set()
+        for uav_id, record in self.fleet.records.items():
+            task = self.tasks.records.get(record.active)
+            if (task is None or not task.open or not self.fleet.usable(uav_id)
+                    or record.active in seen or uav_id in task.failed_on
+                    or owners.get(record.active, uav_id) != uav_id):
+                continue
+            seen.add(record.active)
+            found[uav_id] = (record.active,)
+        return found
+
+
+def _news(before: UavRecord | None, report: UavReport) -> str:
+    """What in a report asks for a new plan."""
+    if before is None:
+        return 'heard' if report.available else ''
+    if before.silent:
+        return 'heard again'
+    if before.report.available != report.available:
+        return 'available' if report.available else 'not available'
+    if before.report.capabilities != report.capabilities:
+        return 'has other capabilities'
+    return ''
+
+
+def _some(names: Sequence[str]) -> str:
+    return ', '.join(names[:5]) + (f' and {len(names) - 5} more' if len(names) > 5 else '')

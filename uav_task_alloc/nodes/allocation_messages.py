@@ -1,0 +1,56 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What the allocator tells, as messages: lists, statuses, the allocation, its health."""
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from uav_task_alloc_msgs import msg as m
+
+from uav_task_alloc.allocator.records import Allocation, TaskState, UavList
+from uav_task_alloc.allocator.status import Status
+from uav_task_alloc.nodes.messages import header, planned_task, to_duration, to_stamp
+
+LEFT_OUT = (TaskState.PENDING, TaskState.UNASSIGNED)
+
+
+def from_list(uav_list: UavList) -> m.TaskList:
+    """The list of one UAV."""
+    return m.TaskList(
+        header=header(uav_list.stamp), uav_id=uav_list.uav, revision=uav_list.revision,
+        tasks=[planned_task(stop.task, stop.leg, stop.eta) for stop in uav_list.stops],
+        end=m.TaskList.RETURN_HOME if uav_list.returns else m.TaskList.HOLD,
+        distance=uav_list.distance)
+
+
+def from_statuses(statuses: Iterable[Status], now: float) -> m.TaskStatusArray:
+    """Where every task stands."""
+    return m.TaskStatusArray(header=header(now), statuses=[from_status(s) for s in statuses])
+
+
+def from_status(status: Status) -> m.TaskStatus:
+    """Where one task stands."""
+    return m.TaskStatus(task_id=status.task_id, state=status.state.value, uav_id=status.uav,
+                        reason=status.reason, stamp=to_stamp(status.stamp))
+
+
+def from_allocation(allocation: Allocation, statuses: Iterable[Status]) -> m.Allocation:
+    """The plan in force and what it leaves out."""
+    plan = allocation.plan
+    return m.Allocation(
+        header=header(allocation.stamp), revision=allocation.revision,
+        lists=[from_list(each) for each in allocation.lists],
+        unassigned=[from_status(s) for s in statuses if s.state in LEFT_OUT],
+        fit=plan.fit, distance=plan.distance, value=plan.value, penalty=plan.penalty,
+        solve_time=to_duration(plan.solve_time), iterations=plan.iterations,
+        warm_started=plan.warm_started, trigger=allocation.trigger)
+
+
+def from_health(name: str, worries: list[str], facts: dict[str, object],
+                now: float) -> DiagnosticArray:
+    """What an operator asks first."""
+    level = DiagnosticStatus.WARN if worries else DiagnosticStatus.OK
+    values = [KeyValue(key=key, value=str(value)) for key, value in facts.items()]
+    status = DiagnosticStatus(level=level, name=f'{name}: allocation', hardware_id='',
+                              message='; '.join(worries) or 'running', values=values)
+    return DiagnosticArray(header=header(now), status=[status])

@@ -1,0 +1,227 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The allocator as a node: hears UAVs, tasks and zones, publishes a list for each UAV."""
+from __future__ import annotations
+
+import time
+from collections import deque
+
+from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.node import Node
+from rclpy.publisher import Publisher
+from std_srvs.srv import Trigger
+from uav_task_alloc_msgs import msg as m
+from uav_task_alloc_msgs.srv import SetAvailability, SubmitTasks
+from visualization_msgs.msg import MarkerArray
+
+from uav_task_alloc.allocator import Allocator, planning
+from uav_task_alloc.allocator.keeper import Keeper
+from uav_task_alloc.allocator.records import Answer, Problem, Verdict
+from uav_task_alloc.allocator.rehearsal import rehearse
+from uav_task_alloc.allocator.status import facts, statuses, worries
+from uav_task_alloc.allocator.worker import Worker
+from uav_task_alloc.errors import InvalidValue
+from uav_task_alloc.geometry.frames import Origin
+from uav_task_alloc.nodes import allocation_messages as told, announcements
+from uav_task_alloc.nodes.markers import markers
+from uav_task_alloc.nodes.messages import (
+    ANNOUNCEMENTS,
+    EVENTS,
+    LATCHED,
+    STATES,
+    to_event,
+    to_report,
+    to_zone,
+)
+from uav_task_alloc.nodes.parameters import declare
+from uav_task_alloc.nodes.run import run
+from uav_task_alloc.params import AllocatorParams
+from uav_task_alloc.solver.solve import plan
+
+TICK = 0.025  # [s]
+MOST_COMPLAINTS = 1000  # kinds of bad messages that are remembered as logged
+
+
+class AllocatorNode(Node):
+    """Wires topics to the world, the world to the worker, answers to topics."""
+
+    def __init__(self) -> None:
+        super().__init__('allocator')
+        self.live = declare(self, AllocatorParams)
+        now = self.live.now
+        self.origin = Origin(now.origin__latitude, now.origin__longitude,
+                             now.origin__altitude_amsl)
+        self.keeper = Keeper(now.state_dir, self.get_logger().error)
+        self.core = Allocator(now, time.monotonic(), self.keeper.saved)
+        self.world = self.core.world
+        self.complained: set[tuple[str, str]] = set()
+        self.answers: deque[Answer | None] = deque()
+        self.background = False
+        self._listen()
+        self._talk()
+        self.arrived = self.create_guard_condition(self.on_answer)
+        self.worker = Worker(lambda: rehearse(plan, now), self.solve, self.deliver, self.failed)
+        self.worker.start()
+
+    def _listen(self) -> None:
+        for kind, topic, heard, qos in (
+                (m.UavState, 'uav_states', self.on_state, STATES),
+                (m.TaskAnnouncement, 'task_announcements', self.on_tasks, ANNOUNCEMENTS),
+                (m.ThreatZoneArray, 'threat_zones', self.on_zones, LATCHED),
+                (m.TaskEvent, 'task_events', self.on_event, EVENTS)):
+            self.create_subscription(kind, topic, heard, qos)
+        self.create_service(SubmitTasks, '~/submit_tasks', self.on_submit)
+        self.create_service(Trigger, '~/replan', self.on_replan)
+        self.create_service(SetAvailability, '~/set_availability', self.on_availability)
+        self.create_timer(TICK, self.on_tick)
+        self.create_timer(1.0, self.on_second)
+
+    def _talk(self) -> None:
+        self.lists: dict[str, Publisher] = {}
+        self.statuses = self.create_publisher(m.TaskStatusArray, 'task_statuses', LATCHED)
+        self.allocation = self.create_publisher(m.Allocation, 'allocation', LATCHED)
+        self.markers = self.create_publisher(MarkerArray, 'allocation_markers', LATCHED)
+        self.health = self.create_publisher(DiagnosticArray, '/diagnostics', 10)
+
+    def stamp(self) -> float:
+        """The published clock [s]."""
+        return self.get_clock().now().nanoseconds * 1e-9
+
+    # what is heard
+
+    def on_state(self, msg: m.UavState) -> None:
+        """A UAV says how it is."""
+        try:
+            refused = self.world.hear(to_report(msg), time.monotonic())
+        except InvalidValue as error:
+            refused = str(error)
+        if refused:
+            self.complain('uav_states', msg.uav_id, refused)
+
+    def on_tasks(self, msg: m.TaskAnnouncement) -> list[Verdict]:
+        """Tasks are added, changed or withdrawn."""
+        return announcements.take(self.world, msg, self.origin, self.stamp(), time.monotonic())
+
+    def on_zones(self, msg: m.ThreatZoneArray) -> None:
+        """The whole picture of the zones."""
+        zones, bad = announcements.sort_zones(msg, to_zone)
+        for zone_id, reason in bad.items():
+            self.complain('threat_zones', zone_id, reason)
+        self.world.set_zones(zones, bad, time.monotonic())
+
+    def on_event(self, msg: m.TaskEvent) -> None:
+        """A task was started, completed, or failed."""
+        try:
+            refused = self.world.event(to_event(msg), self.stamp(), time.monotonic())
+        except InvalidValue as error:
+            refused = str(error)
+        if refused:
+            self.get_logger().warning(f'task_events: {refused}: ignored')
+        self.keeper.save(self.core, time.monotonic())
+
+    def on_submit(self, request: SubmitTasks.Request,
+                  response: SubmitTasks.Response) -> SubmitTasks.Response:
+        """The same as an announcement, with an answer; it is on disk before that."""
+        verdicts = self.on_tasks(request.announcement)
+        self.keeper.save(self.core, time.monotonic())
+        return announcements.answer(verdicts, response)
+
+    def on_replan(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        """Somebody wants a new plan."""
+        self.world.touch('replan service', time.monotonic())
+        response.success, response.message = True, 'a new plan follows on `allocation`'
+        return response
+
+    def on_availability(self, request: SetAvailability.Request,
+                        response: SetAvailability.Response) -> SetAvailability.Response:
+        """An operator takes a UAV out, or puts it back."""
+        refused = self.world.set_available(request.uav_id, request.available, time.monotonic())
+        self.keeper.save(self.core, time.monotonic())
+        word = 'available' if request.available else 'not available'
+        response.success, response.message = not refused, refused or f'{request.uav_id} is {word}'
+        return response
+
+    def complain(self, topic: str, name: str, reason: str) -> None:
+        """Log a bad message, once for each topic and name."""
+        if (topic, name) not in self.complained and len(self.complained) < MOST_COMPLAINTS:
+            self.complained.add((topic, name))
+            self.get_logger().warning(f'{topic}: {reason}: ignored, and said only once')
+
+    # what is solved
+
+    def on_tick(self) -> None:
+        """What time brings, a solve where one is due, and what has to be told."""
+        now, stamp, self.world.params = time.monotonic(), self.stamp(), self.live.now
+        self.core.tick(now, stamp)
+        problem = self.core.due(now, stamp)
+        if problem is not None:
+            self.background = problem.background
+            self.worker.ask(problem)
+        elif self.core.hurry(now, self.background):
+            self.worker.hurry()
+        self.tell(stamp)
+
+    def solve(self, problem: Problem, stop) -> Answer:
+        """In the worker's thread."""
+        return planning.solve(plan, problem, self.live.now, stop)
+
+    def deliver(self, answer: Answer | None) -> None:
+        """In the worker's thread: wake the node's."""
+        self.answers.append(answer)
+        self.arrived.trigger()
+
+    def failed(self, error: Exception) -> None:
+        """In the worker's thread."""
+        self.get_logger().error(f'solver: {error!r}')
+
+    def on_answer(self) -> None:
+        """The worker has an answer, or is ready for the first problem."""
+        while self.answers:
+            if not self.world.awake:
+                self.core.wake()
+                self.answers.popleft()
+                self.get_logger().info('ready')
+                continue
+            self.core.adopt(self.answers.popleft(), time.monotonic(), self.stamp())
+        self.tell(self.stamp())
+
+    # what is told
+
+    def tell(self, stamp: float) -> None:
+        """On disk first, then published."""
+        self.keeper.save(self.core, time.monotonic())
+        out = self.core.collect()
+        for note in out.notes:
+            (self.get_logger().warning if note.warning else self.get_logger().info)(note.text)
+        for uav_id, uav_list in out.lists.items():
+            self.list_publisher(uav_id).publish(told.from_list(uav_list))
+        if out.statuses:
+            self.statuses.publish(told.from_statuses(statuses(self.world), stamp))
+        if out.allocation is not None:
+            self.allocation.publish(told.from_allocation(out.allocation, statuses(self.world)))
+            starts = {uav_id: known.report.position
+                      for uav_id, known in self.world.fleet.records.items()}
+            self.markers.publish(markers(out.allocation, starts, self.world.zones.values()))
+
+    def list_publisher(self, uav_id: str) -> Publisher:
+        """Of `<uav_id>/task_list`."""
+        if uav_id not in self.lists:
+            self.lists[uav_id] = self.create_publisher(m.TaskList, f'{uav_id}/task_list', LATCHED)
+        return self.lists[uav_id]
+
+    def on_second(self) -> None:
+        """Say how it goes."""
+        self.health.publish(told.from_health(
+            self.get_fully_qualified_name(), worries(self.world, self.keeper.trouble),
+            facts(self.world), self.stamp()))
+
+    def destroy_node(self) -> None:
+        """End the worker, let go of the journal."""
+        self.worker.close()
+        self.keeper.save(self.core, time.monotonic())
+        self.keeper.close()
+        super().destroy_node()
+
+
+def main(args: list[str] | None = None) -> None:
+    """Entry point of `ros2 run uav_task_alloc allocator`."""
+    run(AllocatorNode, args)
