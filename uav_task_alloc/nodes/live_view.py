@@ -1,0 +1,135 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Shows the progress of a fleet in the terminal, records it, and ends when a scenario is over."""
+from __future__ import annotations
+
+import json
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.node import Node
+from uav_task_alloc_msgs import msg as m
+
+from uav_task_alloc import scenario
+from uav_task_alloc.nodes import recorder
+from uav_task_alloc.nodes.messages import ANNOUNCEMENTS, LATCHED, STATES
+from uav_task_alloc.nodes.parameters import declare
+from uav_task_alloc.nodes.run import run
+from uav_task_alloc.params import LiveViewParams
+from uav_task_alloc.record.heard import FILE, Heard
+from uav_task_alloc.record.progress import fleet, headline, is_over
+
+REFRESH = 0.5  # [s] in a terminal
+PLAIN_EVERY = 4  # refreshes between two lines where the output is no terminal
+UP_AND_CLEAR = '\x1b[{}F\x1b[J'
+
+
+class LiveView(Node):
+    """Listens to everything; says nothing on any topic."""
+
+    def __init__(self) -> None:
+        super().__init__('live_view')
+        self.params = declare(self, LiveViewParams).now
+        self.played = scenario.load(self.params.scenario) if self.params.scenario else None
+        self.origin = self.played.origin if self.played else scenario.values.DEFAULT_ORIGIN
+        self.heard = Heard()
+        self.file = self._open()
+        self.finished = False
+        self.quiet_since: float | None = None  # [s] of the scenario
+        self.shown = 0  # lines to write over
+        self.refreshes = 0
+        self.listen()
+        self.create_timer(REFRESH, self.refresh)
+
+    def listen(self) -> None:
+        """Subscribe to what is recorded; lists follow as UAVs become known."""
+        for kind, topic, qos, read in (
+            (m.TaskAnnouncement, 'task_announcements', ANNOUNCEMENTS,
+             lambda msg: recorder.announced(msg, self.origin)),
+            (m.ThreatZoneArray, 'threat_zones', LATCHED, recorder.zones),
+            (m.TaskStatusArray, 'task_statuses', LATCHED, recorder.statuses),
+            (m.Allocation, 'allocation', ANNOUNCEMENTS, recorder.allocation),
+            (DiagnosticArray, '/diagnostics', 10, recorder.uploads),
+        ):
+            self.create_subscription(kind, topic, self.taking(read), qos)
+        self.create_subscription(m.UavState, 'uav_states', self.on_state, STATES)
+        for uav in self.played.uavs if self.played else ():
+            self.follow(uav.id)
+
+    def follow(self, uav: str) -> None:
+        """Listen to the task lists of one UAV."""
+        self.heard.lists[uav] = {'tasks': [], 'distance': 0.0}
+        self.create_subscription(m.TaskList, f'{uav}/task_list',
+                                 self.taking(recorder.task_list), LATCHED)
+
+    def on_state(self, msg: m.UavState) -> None:
+        """Record a state where something but the position is new, else twice a second."""
+        if msg.uav_id not in self.heard.lists:
+            self.follow(msg.uav_id)
+        line = {'wall': time.time(), **recorder.state(msg)}
+        old = self.heard.uavs.get(msg.uav_id)
+        what = ('mode', 'mission_state', 'active', 'list_revision', 'available')
+        if old is None or line['wall'] - old['wall'] >= REFRESH or any(
+                line[key] != old[key] for key in what):
+            self.take(line)
+
+    def taking(self, read: Callable[[Any], recorder.Body]) -> Callable[[Any], None]:
+        """A callback that records what `read` makes of a message."""
+        return lambda msg: self.take({'wall': time.time(), **read(msg)})
+
+    def take(self, line: recorder.Body) -> None:
+        """Fold a line into what is known, and write it down."""
+        self.heard.take(line)
+        if self.file:
+            self.file.write(json.dumps(line) + '\n')
+
+    def refresh(self) -> None:
+        """Show where things are; note when they have been over for long enough."""
+        clock = self.clock()
+        self.refreshes += 1
+        self.show(clock)
+        if self.file:
+            self.file.flush()
+        if self.played is None or not is_over(self.heard, self.played, clock):
+            self.quiet_since = None
+            return
+        self.quiet_since = clock if self.quiet_since is None else self.quiet_since
+        self.finished = clock - self.quiet_since >= self.params.settle
+
+    def clock(self) -> float:
+        """Scenario time [s]: since the first task was announced."""
+        first = min((task.wall for task in self.heard.tasks.values()), default=time.time())
+        return (time.time() - first) * self.params.speedup
+
+    def show(self, clock: float) -> None:
+        """Write over the lines of last time; in a file, one line now and then."""
+        lines = [headline(self.heard, clock)]
+        if sys.stdout.isatty():
+            lines += fleet(self.heard, time.time())
+            sys.stdout.write(UP_AND_CLEAR.format(self.shown) if self.shown else '')
+            self.shown = len(lines)
+        elif self.refreshes % PLAIN_EVERY:
+            return
+        print('\n'.join(lines), flush=True)
+
+    def _open(self) -> Any:
+        if not self.params.out_dir:
+            return None
+        folder = Path(self.params.out_dir)
+        folder.mkdir(parents=True, exist_ok=True)
+        return (folder / FILE).open('w', encoding='utf-8')
+
+    def destroy_node(self) -> None:
+        """Close the record first."""
+        if self.file:
+            self.file.close()
+            self.file = None
+        super().destroy_node()
+
+
+def main(args: list[str] | None = None) -> None:
+    """Run the node."""
+    run(LiveView, args)

@@ -1,0 +1,100 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Messages as the lines of a record: plain values that JSON can carry, unknown as null."""
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from typing import Any
+
+from diagnostic_msgs.msg import DiagnosticArray
+from uav_task_alloc_msgs import msg as m
+
+from uav_task_alloc.errors import InvalidValue
+from uav_task_alloc.geometry.frames import Origin
+from uav_task_alloc.nodes.messages import from_point, from_stamp, to_task, to_zone
+from uav_task_alloc.record.heard import zone_to_json
+
+Body = dict[str, Any]  # a line without its wall time
+
+
+def names(kind: type, prefix: str = '') -> dict[int, str]:
+    """The constants of a message by value, without their prefix."""
+    return {getattr(kind, name): name.removeprefix(prefix) for name in dir(kind)
+            if name.isupper() and name.startswith(prefix)
+            and isinstance(getattr(kind, name), int)}
+
+
+ACTIONS = names(m.TaskAnnouncement)
+STATES = names(m.TaskStatus)
+MODES = names(m.UavState, 'MODE_')
+MISSIONS = names(m.UavState, 'MISSION_')
+
+
+def announced(msg: m.TaskAnnouncement, origin: Origin) -> Body:
+    """The tasks that are good; the allocator says what is wrong with the others."""
+    tasks = []
+    for task in msg.tasks:
+        if msg.action == m.TaskAnnouncement.CANCEL:
+            tasks.append({'id': task.task_id})
+            continue
+        try:
+            tasks.append({'id': task.task_id, 'position': to_task(task, origin).position})
+        except InvalidValue:
+            continue
+    return {'kind': 'announcement', 'action': ACTIONS.get(msg.action, ''), 'tasks': tasks}
+
+
+def zones(msg: m.ThreatZoneArray) -> Body:
+    """The whole picture of zones."""
+    return {'kind': 'zones', 'zones': [zone_to_json(to_zone(zone)) for zone in msg.zones]}
+
+
+def statuses(msg: m.TaskStatusArray) -> Body:
+    """Where every task stands."""
+    return {'kind': 'statuses', 'statuses': [
+        {'task': row.task_id, 'state': STATES.get(row.state, ''), 'uav': row.uav_id,
+         'reason': row.reason} for row in msg.statuses]}
+
+
+def allocation(msg: m.Allocation) -> Body:
+    """A plan in figures."""
+    return {'kind': 'allocation', 'revision': msg.revision, 'trigger': msg.trigger,
+            'solve_ms': 1e3 * from_stamp(msg.solve_time), 'iterations': msg.iterations,
+            'warm_started': msg.warm_started, 'fit': finite(msg.fit),
+            'distance': finite(msg.distance), 'lists': [task_list(row) for row in msg.lists]}
+
+
+def task_list(msg: m.TaskList) -> Body:
+    """What a UAV has still to fly."""
+    return {'kind': 'list', 'uav': msg.uav_id, 'revision': msg.revision, 'end': msg.end,
+            'distance': finite(msg.distance), 'tasks': [
+                {'id': row.task.task_id, 'leg_distance': finite(row.leg_distance) or 0.0,
+                 'via': [from_point(point) for point in row.via]} for row in msg.tasks]}
+
+
+def state(msg: m.UavState) -> Body:
+    """What a UAV does."""
+    velocity = (msg.velocity.x, msg.velocity.y, msg.velocity.z)
+    return {'kind': 'state', 'uav': msg.uav_id, 'mode': MODES.get(msg.mode, ''),
+            'mission_state': MISSIONS.get(msg.mission_state, ''), 'active': msg.active_task_id,
+            'list_revision': msg.list_revision, 'battery': finite(msg.battery),
+            'position': [finite(v) for v in from_point(msg.position)],
+            'velocity': [finite(v) for v in velocity],
+            'range_remaining': finite(msg.range_remaining), 'available': msg.available}
+
+
+def finite(value: float) -> float | None:
+    """None for NaN and the infinities, which JSON does not know."""
+    return float(value) if math.isfinite(value) else None
+
+
+def uploads(msg: DiagnosticArray) -> Body:
+    """The upload counters a bridge puts into its diagnostics, by name of the status."""
+    return {'kind': 'uploads', 'uploads': dict(_uploads(msg))}
+
+
+def _uploads(msg: DiagnosticArray) -> Iterable[tuple[str, int]]:
+    for status in msg.status:
+        for pair in status.values:
+            if pair.key == 'uploads' and pair.value.isdigit():
+                yield status.name, int(pair.value)
