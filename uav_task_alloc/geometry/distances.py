@@ -1,84 +1,87 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Lengths of the safe ways between numbered points, as kernels want them: known, or found on demand.
+"""Lengths of the safe ways between numbered points, for kernels: known, or found when asked for.
 
-`length(pairs, i, j)` may be called in any kernel, also without the GIL. Up to DENSE_MAX places the
-lengths fill a square table (NaN: not asked for yet); beyond, a cache of the last answers.
+`length(pairs, i, j)` may be called in any kernel, also without the GIL. Up to DENSE_MAX points the
+lengths fill a square table (NaN: not asked for yet); beyond, there is a cache of the last answers.
 """
 from __future__ import annotations
 
-import functools
 import math
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numba
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.geometry.detour import check_limits, way_between
-from uav_task_alloc.geometry.exits import way_out
-from uav_task_alloc.geometry.obstacles import Floats, Ints, Obstacles, contains, first_around, pack
+from uav_task_alloc.geometry.memory import floats_at, ints_at
+from uav_task_alloc.geometry.obstacles import Ints, contains, pack
+from uav_task_alloc.geometry.scene import addresses, finder, make_scene
 from uav_task_alloc.geometry.table import Table, forget
-from uav_task_alloc.geometry.taut import MAX_CORNERS
-from uav_task_alloc.geometry.ways import shortest
 from uav_task_alloc.model import Leg, Point, ThreatZone
 
-DENSE_MAX = 2048  # places; the table takes 8 n^2 bytes
-CACHE_SIZE = 1 << 20  # answers kept beyond that
+DENSE_MAX = 2048  # points; the table takes 8 n^2 bytes
+CACHE_SIZE = 1 << 20  # answers kept beyond that; a power of two
 
 
-class Scene(NamedTuple):
-    """Points among zones, as the kernel that finds one way takes them."""
+class _Addresses(NamedTuple):
+    """Sizes and addresses; see geometry/memory.py for why."""
 
-    xyz: Floats  # (n, 3) [m]
-    caught: NDArray[np.bool_]  # inside a zone
-    out: Floats  # (n, 3) [m], where a caught point is outside first; NaN: nowhere
-    obstacles: Obstacles
-    limits: Floats  # altitude_min, altitude_max [m]
+    points: int
+    zones: int
+    xyz: int  # float64 (points, 3) [m]
+    row: int  # length of a row of the table; 0: no table
+    slot: int  # int64: row and column of each point in the table
+    table: int  # float64 [m], NaN: unknown
+    keys: int  # int64: i * points + j of each answer in the cache
+    answers: int  # float64 [m]
+    scene: int  # what `find` reads
+    find: Any  # (scene, i, j) -> length [m]
 
 
-class Pairs(NamedTuple):
+class Pairs(_Addresses):
     """What `length` needs inside a kernel; made by Distances, opaque to everybody else."""
 
-    scene: Scene
-    slot: Ints  # row and column of each point in the table
-    table: Floats  # [m], NaN: unknown; empty: no zones, or too many points
-    keys: Ints  # i * n + j of each cached answer
-    answers: Floats  # [m]
-    find: Any  # (scene, i, j) -> length [m], compiled apart so that callers compile fast
-
-
-@numba.njit(cache=True, nogil=True)
-def _straight(scene: Scene, i: int, j: int) -> float:
-    dx = scene.xyz[i, 0] - scene.xyz[j, 0]
-    dy = scene.xyz[i, 1] - scene.xyz[j, 1]
-    dz = scene.xyz[i, 2] - scene.xyz[j, 2]
-    return math.sqrt(dx * dx + dy * dy + dz * dz)
+    owner: object  # keeps alive what the addresses point to
 
 
 @numba.njit(cache=True, nogil=True)
 def length(pairs: Pairs, i: int, j: int) -> float:
     """Length [m] of the shortest safe way from point i to point j; inf: there is none."""
-    if pairs.table.shape[0] > 0:
-        known = pairs.table[pairs.slot[i], pairs.slot[j]]
-        return known if known == known else _look_up(pairs, i, j)
-    if pairs.scene.obstacles.kind.size == 0:
-        return _straight(pairs.scene, i, j)
-    key = i * pairs.slot.size + j
-    place = (key * 0x9E3779B1 >> 8) & (pairs.keys.size - 1)
-    if pairs.keys[place] != key:
-        pairs.answers[place], pairs.keys[place] = pairs.find(pairs.scene, i, j), key
-    return float(pairs.answers[place])
+    if pairs.row > 0:
+        slot = ints_at(pairs.slot)
+        known = floats_at(pairs.table)[slot[i] * pairs.row + slot[j]]
+        return known if known == known else _find_for_table(pairs, i, j)
+    if pairs.zones > 0:
+        return _find_for_cache(pairs, i, j)
+    xyz = floats_at(pairs.xyz)
+    dx, dy, dz = xyz[3 * i] - xyz[3 * j], xyz[3 * i + 1] - xyz[3 * j + 1], xyz[
+        3 * i + 2] - xyz[3 * j + 2]
+    return math.sqrt(dx * dx + dy * dy + dz * dz)
 
 
 @numba.njit(cache=True, nogil=True)
-def _look_up(pairs: Pairs, i: int, j: int) -> float:
+def _find_for_table(pairs: Pairs, i: int, j: int) -> float:
+    slot, table = ints_at(pairs.slot), floats_at(pairs.table)
     found = pairs.find(pairs.scene, i, j)
-    pairs.table[pairs.slot[i], pairs.slot[j]] = found
-    if not pairs.scene.caught[i] and not pairs.scene.caught[j]:
-        pairs.table[pairs.slot[j], pairs.slot[i]] = found
-    return float(found)
+    table[slot[i] * pairs.row + slot[j]] = found
+    caught = ints_at(ints_at(pairs.scene)[4])
+    if not caught[i] and not caught[j]:
+        table[slot[j] * pairs.row + slot[i]] = found
+    return found
+
+
+@numba.njit(cache=True, nogil=True)
+def _find_for_cache(pairs: Pairs, i: int, j: int) -> float:
+    keys, answers = ints_at(pairs.keys), floats_at(pairs.answers)
+    key = i * pairs.points + j
+    place = (key * 0x9E3779B1 >> 8) & (CACHE_SIZE - 1)
+    if keys[place] != key:
+        answers[place] = pairs.find(pairs.scene, i, j)
+        keys[place] = key
+    return answers[place]
 
 
 @numba.njit(cache=True, nogil=True)
@@ -87,51 +90,10 @@ def _ensure(pairs: Pairs, origins: Ints, goals: Ints) -> None:
         length(pairs, origins[m], goals[m])
 
 
-def _find(scene: Scene, i: int, j: int) -> float:
-    """Length [m] of the way from i to j, looked for anew."""
-    if i == j:
-        return 0.0
-    if scene.caught[j]:
-        return np.inf
-    ends, first = np.empty((2, 3)), 0.0
-    p, q = scene.xyz[i], scene.xyz[j]
-    if scene.caught[i]:
-        p = scene.out[i]
-        if math.isnan(p[0]):
-            return np.inf
-        first = math.sqrt(((p - scene.xyz[i]) ** 2).sum())
-    backwards = p[0] > q[0] or p[0] == q[0] and (p[1] > q[1] or p[1] == q[1] and p[2] > q[2])
-    ends[0], ends[1] = (q, p) if backwards else (p, q)
-    return first + shortest(scene.obstacles, ends, scene.limits, np.empty((MAX_CORNERS, 3)))[1]
-
-
-@functools.cache
-def _finder(zones: bool) -> Any:
-    """`_find` as a function pointer of fixed type; without zones a cheap stand-in."""
-    scene = numba.typeof(_scene(np.zeros((0, 3)), pack(()), check_limits(0.0, 0.0)))
-    signature = numba.float64(scene, numba.int64, numba.int64)
-    return numba.cfunc(signature, cache=True)(_find if zones else _straight.py_func)
-
-
-@numba.njit(cache=True, nogil=True)
-def _catch(o: Obstacles, xyz: Floats, limits: Floats, caught: NDArray[np.bool_],
-           out: Floats) -> None:
-    for i in range(xyz.shape[0]):
-        if first_around(o, xyz[i, 0], xyz[i, 1], xyz[i, 2], True) >= 0:
-            caught[i], out[i] = True, way_out(o, xyz[i], limits)
-
-
-def _scene(xyz: Floats, obstacles: Obstacles, limits: Floats) -> Scene:
-    caught, out = np.zeros(len(xyz), np.bool_), np.full((len(xyz), 3), np.nan)
-    if obstacles.kind.size:
-        _catch(obstacles, xyz, limits, caught, out)
-    return Scene(xyz, caught, out, obstacles, limits)
-
-
 class Distances:
     """Detour lengths between points 0..n-1; asymmetric only where a point lies inside a zone.
 
-    Immutable to its user: `updated` gives another one and takes over every length that still holds.
+    Immutable to its user: `updated` gives another one, which takes over all that still holds.
     """
 
     def __init__(self, points: ArrayLike, zones: Sequence[ThreatZone] = (), *,
@@ -142,20 +104,30 @@ class Distances:
             raise InvalidValue('points', self.points, 'finite coordinates [m]')
         self.zones, self.clearance = tuple(zones), clearance
         limits = check_limits(altitude_min, altitude_max)
-        scene = _scene(self.points, pack(self.zones, clearance), limits)
-        dense = bool(zones) and len(self.points) <= DENSE_MAX
-        cached = CACHE_SIZE if zones and not dense else 0
+        self._scene = make_scene(self.points, pack(self.zones, clearance), limits)
+        dense = bool(self.zones) and len(self.points) <= DENSE_MAX
         self._table = _table or Table(len(self.points) if dense else 0)
-        slot = self._table.slots(self.points) if dense else np.arange(len(self.points))
-        self.pairs = Pairs(scene, slot, self._table.cells, np.full(cached, -1, np.int64),
-                           np.empty(cached), _finder(bool(zones)))
+        self.pairs = self._pairs(dense)
+
+    def _pairs(self, dense: bool) -> Pairs:
+        slot = self._table.slots(self.points) if dense else np.zeros(0, np.int64)
+        cells = self._table.cells
+        cached = CACHE_SIZE if self.zones and not dense else 0
+        keys, answers = np.full(cached, -1, np.int64), np.empty(cached)
+        scene = addresses(self._scene)
+        pairs = Pairs(len(self.points), len(self.zones), self.points.ctypes.data,
+                      len(cells) if dense else 0, slot.ctypes.data, cells.ctypes.data,
+                      keys.ctypes.data, answers.ctypes.data, scene.ctypes.data,
+                      finder(bool(self.zones)))
+        pairs.owner = self._scene, slot, cells, keys, answers, scene
+        return pairs
 
     def updated(self, points: ArrayLike | None = None,
                 zones: Sequence[ThreatZone] | None = None) -> Distances:
         """For other points, in any order, or zones that came, moved or vanished."""
         new_points = self.points if points is None else np.asarray(points, dtype=np.float64)
         new_zones = self.zones if zones is None else tuple(zones)
-        low, high = self.pairs.scene.limits
+        low, high = self._scene.limits
         table = None
         if self.zones and new_zones and len(new_points) <= DENSE_MAX >= len(self.points):
             table = self._table
@@ -181,7 +153,7 @@ class Distances:
 
     def leg(self, i: int, j: int) -> Leg:
         """The way from i to j with its detour points."""
-        scene = self.pairs.scene
+        scene = self._scene
         if i == j:
             return Leg((), 0.0)
         if scene.caught[j]:
@@ -193,7 +165,7 @@ class Distances:
     def zones_around(self, i: int) -> tuple[str, ...]:
         """Ids of the enlarged zones that point i is inside of."""
         return tuple(zone.id for k, zone in enumerate(self.zones)
-                     if contains(self.pairs.scene.obstacles, k, *self.points[i], True))
+                     if contains(self._scene.obstacles, k, *self.points[i], True))
 
     def _point(self, i: int) -> Point:
         x, y, z = self.points[i]

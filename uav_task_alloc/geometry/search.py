@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The coarse way: A* over a visibility graph whose corners stand just outside the active zones."""
+"""The coarse way: A* over a visibility graph with its corners just outside the active zones."""
 from __future__ import annotations
 
 import math
@@ -7,7 +7,15 @@ import math
 import numba
 import numpy as np
 
-from uav_task_alloc.geometry.obstacles import CYLINDER, DOME, PRISM, Floats, Ints, Obstacles, blocked
+from uav_task_alloc.geometry.obstacles import (
+    CYLINDER,
+    DOME,
+    PRISM,
+    Floats,
+    Ints,
+    Obstacles,
+    blocked,
+)
 
 
 @numba.njit(cache=True, nogil=True)
@@ -84,7 +92,7 @@ def _dome_corners(o: Obstacles, k: int, way: Floats, limits: Floats, floor: floa
 @numba.njit(cache=True, nogil=True)
 def _prism_corners(o: Obstacles, k: int, way: Floats, limits: Floats, z: float, out: Floats,
                    n: int) -> int:
-    """Mitred corners at the convex corners of the enlarged polygon at height z (NaN: the way's)."""
+    """Mitred corners at the convex corners of the enlarged polygon, at z (NaN: the way's)."""
     reach = o.grow[k] + 1.5 * o.skin[k]
     f, count = o.first[k], o.count[k]
     for i in range(count):

@@ -14,7 +14,7 @@ STRAIGHT = 1.0 + 1e-12  # a way is straight when at most so much longer than the
 
 
 class Table:
-    """Lengths [m] by slot; a place (x, y, z) keeps its slot for ever, so older users stay right."""
+    """Lengths [m] by slot; a place keeps its slot for ever, so older users stay right."""
 
     def __init__(self, places: int) -> None:
         size = places + places // 4 + SPARE if places else 0

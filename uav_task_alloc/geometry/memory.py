@@ -1,0 +1,32 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Arrays behind plain addresses, for kernels where counting references would be most of the time.
+
+Numba counts a reference for each array of a tuple that a call passes on: 100 ns for a look-up that
+takes 3. Whoever makes an address keeps the array alive.
+"""
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from llvmlite import ir
+from numba import types
+from numba.core.typing.templates import Signature
+from numba.extending import intrinsic
+
+
+def _cast(context: Any, builder: Any, signature: Signature, args: Any) -> Any:
+    target: ir.Type = context.get_value_type(signature.return_type)
+    return builder.inttoptr(args[0], target)
+
+
+@intrinsic  # type: ignore[untyped-decorator]
+def floats_at(typing_context: Any, address: int) -> tuple[Signature, Callable[..., Any]]:
+    """The float64 values at an address."""
+    return types.CPointer(types.float64)(types.int64), _cast
+
+
+@intrinsic  # type: ignore[untyped-decorator]
+def ints_at(typing_context: Any, address: int) -> tuple[Signature, Callable[..., Any]]:
+    """The int64 values at an address."""
+    return types.CPointer(types.int64)(types.int64), _cast

@@ -1,0 +1,99 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Points among zones, and the kernel that finds the way from one to another."""
+from __future__ import annotations
+
+import functools
+import math
+from typing import Any, NamedTuple
+
+import numba
+import numpy as np
+
+from uav_task_alloc.geometry.exits import way_out
+from uav_task_alloc.geometry.memory import floats_at, ints_at
+from uav_task_alloc.geometry.obstacles import Floats, Ints, Obstacles, first_around
+from uav_task_alloc.geometry.taut import MAX_CORNERS
+from uav_task_alloc.geometry.ways import shortest
+
+
+class Scene(NamedTuple):
+    """Points among zones, as kernels take them."""
+
+    xyz: Floats  # (n, 3) [m]
+    caught: Ints  # 1: inside a zone
+    out: Floats  # (n, 3) [m], where a caught point is outside first; NaN: nowhere
+    limits: Floats  # altitude_min, altitude_max [m]
+    obstacles: Obstacles
+
+
+def make_scene(xyz: Floats, obstacles: Obstacles, limits: Floats) -> Scene:
+    """The scene, with the way out of every caught point."""
+    caught, out = np.zeros(len(xyz), np.int64), np.full((len(xyz), 3), np.nan)
+    if obstacles.kind.size:
+        _catch(obstacles, xyz, limits, caught, out)
+    return Scene(xyz, caught, out, limits, obstacles)
+
+
+@numba.njit(cache=True, nogil=True)
+def _catch(o: Obstacles, xyz: Floats, limits: Floats, caught: Ints, out: Floats) -> None:
+    for i in range(xyz.shape[0]):
+        if first_around(o, xyz[i, 0], xyz[i, 1], xyz[i, 2], True) >= 0:
+            caught[i], out[i] = 1, way_out(o, xyz[i], limits)
+
+
+def addresses(scene: Scene) -> Ints:
+    """Sizes and addresses of the scene's arrays, in the order that `_scene_at` reads."""
+    o = scene.obstacles
+    arrays = (*scene[:4], *o)
+    return np.array([len(scene.xyz), o.kind.size, len(o.corners),
+                     *(array.ctypes.data for array in arrays)], np.int64)
+
+
+@numba.njit(cache=True, nogil=True)
+def _scene_at(address: int) -> Scene:
+    at = ints_at(address)
+    n, k, m = at[0], at[1], at[2]
+    return Scene(
+        numba.carray(floats_at(at[3]), (n, 3)), numba.carray(ints_at(at[4]), n),
+        numba.carray(floats_at(at[5]), (n, 3)), numba.carray(floats_at(at[6]), 2),
+        Obstacles(
+            numba.carray(ints_at(at[7]), k), numba.carray(floats_at(at[8]), (k, 3)),
+            numba.carray(floats_at(at[9]), k), numba.carray(floats_at(at[10]), k),
+            numba.carray(floats_at(at[11]), k), numba.carray(floats_at(at[12]), k),
+            numba.carray(floats_at(at[13]), k), numba.carray(floats_at(at[14]), (k, 6)),
+            numba.carray(ints_at(at[15]), k), numba.carray(ints_at(at[16]), k),
+            numba.carray(floats_at(at[17]), (m, 2))))
+
+
+def _find(address: int, i: int, j: int) -> float:
+    """Length [m] of the way from point i to point j of the scene; inf: none."""
+    scene = _scene_at(address)
+    if i == j:
+        return 0.0
+    if scene.caught[j]:
+        return np.inf
+    p, q, first = scene.xyz[i], scene.xyz[j], 0.0
+    if scene.caught[i]:
+        p = scene.out[i]
+        if math.isnan(p[0]):
+            return np.inf
+        first = math.hypot(math.hypot(p[0] - scene.xyz[i, 0], p[1] - scene.xyz[i, 1]),
+                           p[2] - scene.xyz[i, 2])
+    ends = np.empty((2, 3))  # in one order, so that there and back are the same way
+    backwards = p[0] > q[0] or (p[0] == q[0] and (p[1] > q[1] or (p[1] == q[1] and p[2] > q[2])))
+    ends[0], ends[1] = (q, p) if backwards else (p, q)
+    return first + shortest(scene.obstacles, ends, scene.limits, np.empty((MAX_CORNERS, 3)))[1]
+
+
+def _nothing(address: int, i: int, j: int) -> float:
+    return np.nan
+
+
+@functools.cache
+def finder(zones: bool) -> Any:
+    """`_find` as a function pointer, compiled apart so that its callers compile fast.
+
+    Where there are no zones it is never called, and a stand-in of the same type will do.
+    """
+    signature = numba.float64(numba.int64, numba.int64, numba.int64)
+    return numba.cfunc(signature, cache=True)(_find if zones else _nothing)
