@@ -97,20 +97,9 @@ def read_row(table: Table, place: str, node: yaml.Node) -> Row:
     if not isinstance(node, yaml.MappingNode):
         raise refusal(node, f'{place} = {shown(node)}: expected a mapping with '
                             f'{", ".join(table)}')
-    nodes: dict[str, yaml.Node] = {}
-    for name, child in node.value:
-        key = name.value if isinstance(name, yaml.ScalarNode) else shown(name)
-        if key not in table:
-            near = get_close_matches(key, table, 1, 0.0)[0]
-            raise refusal(name, f'{place}: unknown key {key!r}: expected one of '
-                                f'{", ".join(table)}; nearest is {near!r}')
-        if key in nodes:
-            raise refusal(name, f'{place}: key {key!r} is given twice: expected it once; '
-                                f'first in line {nodes[key].start_mark.line + 1}')
-        nodes[key] = child
-    row = Row(place, node, nodes, {})
+    row = Row(place, node, _children(table, place, node), {})
     for key, entry in table.items():
-        given = nodes.get(key)
+        given = row.nodes.get(key)
         if given is not None and not is_null(given):
             row.values[key] = entry.kind.read(f'{place}.{key}', given)
         elif entry.default is REQUIRED:
@@ -118,6 +107,21 @@ def read_row(table: Table, place: str, node: yaml.Node) -> Row:
         else:
             row.values[key] = entry.default
     return row
+
+
+def _children(table: Table, place: str, node: yaml.MappingNode) -> dict[str, yaml.Node]:
+    lines: dict[str, int] = {}
+    for name, _ in node.value:
+        key = name.value if isinstance(name, yaml.ScalarNode) else shown(name)
+        if key not in table:
+            near = get_close_matches(key, table, 1, 0.0)[0]
+            raise refusal(name, f'{place}: unknown key {key!r}: expected one of '
+                                f'{", ".join(table)}; nearest is {near!r}')
+        if key in lines:
+            raise refusal(name, f'{place}: key {key!r} is given twice: expected it once; '
+                                f'first in line {lines[key]}')
+        lines[key] = name.start_mark.line + 1
+    return {name.value: child for name, child in node.value}
 
 
 def is_null(node: yaml.Node) -> bool:
