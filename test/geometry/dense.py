@@ -25,7 +25,7 @@ def _cuts(row, corners, p, q, digs):
     s, t = 0.0, 1.0
     d = q - p
     if kind == 0:
-        low = cz if not digs else low
+        low = cz - 1e-6 if not digs else low
         high = np.inf
     if d[2] == 0.0:
         if p[2] <= low or p[2] >= high:
@@ -181,8 +181,7 @@ class Dense:
     def _polygon(self, k):
         """Corners around the enlarged polygon and along its edges."""
         c = self.corners[self.first[k]:self.first[k] + self.count[k]]
-        if np.cross(np.roll(c, -1, 0) - c, np.roll(c, -2, 0) - c).sum() < 0 if False else (
-                np.sum(c[:, 0] * np.roll(c[:, 1], -1) - c[:, 1] * np.roll(c[:, 0], -1)) < 0):
+        if np.sum(c[:, 0] * np.roll(c[:, 1], -1) - c[:, 1] * np.roll(c[:, 0], -1)) < 0:
             c = c[::-1]
         reach, out = self.rows[k, 7] + OUT, []
         for i in range(len(c)):

@@ -21,7 +21,7 @@ from uav_task_alloc.geometry.obstacles import (
 @numba.njit(cache=True, nogil=True)
 def corner_bound(o: Obstacles, k: int, ring: int) -> int:
     """At most so many corners come from zone k."""
-    return 4 * ring + 1 if o.kind[k] != PRISM else 9 * o.count[k]
+    return 4 * ring + 1 if o.kind[k] != PRISM else 10 * o.count[k]
 
 
 @numba.njit(cache=True, nogil=True)
@@ -90,6 +90,34 @@ def _dome_corners(o: Obstacles, k: int, way: Floats, limits: Floats, floor: floa
 
 
 @numba.njit(cache=True, nogil=True)
+def _crossing(way: Floats, px: float, py: float, qx: float, qy: float) -> float:
+    """Where along pq, in 0..1, the straight way ab crosses it in plan; NaN: nowhere."""
+    dx, dy = way[1, 0] - way[0, 0], way[1, 1] - way[0, 1]
+    sp = dx * (py - way[0, 1]) - dy * (px - way[0, 0])
+    sq = dx * (qy - way[0, 1]) - dy * (qx - way[0, 0])
+    return sp / (sp - sq) if sp * sq < 0.0 else np.nan
+
+
+@numba.njit(cache=True, nogil=True)
+def _edge_corners(o: Obstacles, k: int, way: Floats, z: float, reach: float, out: Floats,
+                  n: int) -> int:
+    """Corners on a rim of the enlarged prism: each edge's middle and where the way crosses it."""
+    f, count = o.first[k], o.count[k]
+    for i in range(count):
+        j = f + (i + 1) % count
+        px, py = o.corners[f + i, 0], o.corners[f + i, 1]
+        dx, dy = o.corners[j, 0] - px, o.corners[j, 1] - py
+        size = math.hypot(dx, dy)
+        px, py = px + dy * reach / size, py - dx * reach / size
+        cross = _crossing(way, px, py, px + dx, py + dy)
+        for t in (0.5, cross):
+            if not math.isnan(t):
+                out[n, 0], out[n, 1], out[n, 2] = px + t * dx, py + t * dy, z
+                n += 1
+    return n
+
+
+@numba.njit(cache=True, nogil=True)
 def _prism_corners(o: Obstacles, k: int, way: Floats, limits: Floats, z: float, out: Floats,
                    n: int) -> int:
     """Mitred corners at the convex corners of the enlarged polygon, at z (NaN: the way's)."""
@@ -134,6 +162,8 @@ def add_corners(o: Obstacles, k: int, way: Floats, limits: Floats, floor: float,
             n = _ring(o, k, way, limits, radius, z, ring, out, n)
         else:
             n = _prism_corners(o, k, way, limits, z, out, n)
+            if not math.isnan(z):
+                n = _edge_corners(o, k, way, z, o.grow[k] + 1.5 * o.skin[k], out, n)
     return n
 
 
