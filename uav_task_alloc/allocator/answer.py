@@ -27,7 +27,7 @@ def steady(answer: Answer, margin: float) -> Plan:
         if gain > max(margin * before, 1e-6):
             taken.append(group)
             gained += gain
-    if not taken or answer.problem.background and gained <= margin * base.distance:
+    if not taken or (answer.problem.background and gained <= margin * base.distance):
         return base
     return _mixed(base, fresh, {uav_id for group in taken for uav_id in group})
 

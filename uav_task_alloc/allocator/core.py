@@ -11,7 +11,12 @@ from uav_task_alloc.allocator import planning
 from uav_task_alloc.allocator.answer import steady
 from uav_task_alloc.allocator.records import Allocation, Answer, Outbox, Problem, UavList
 from uav_task_alloc.allocator.restore import (
-    Saved, list_row, off_row, revision_row, task_row, zones_row,
+    Saved,
+    list_row,
+    off_row,
+    revision_row,
+    task_row,
+    zones_row,
 )
 from uav_task_alloc.allocator.world import World
 from uav_task_alloc.journal import Row

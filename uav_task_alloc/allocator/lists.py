@@ -28,9 +28,9 @@ class Ways:
 
     def leg(self, a: Point, b: Point) -> Leg | None:
         """The shortest safe way from a to b; None where there is none."""
-        length, via = detour(a, b, self.zones, clearance=self.clearance,
+        metres, via = detour(a, b, self.zones, clearance=self.clearance,
                              altitude_min=self.altitude_min, altitude_max=self.altitude_max)
-        return None if math.isinf(length) else Leg(tuple(via), length)
+        return None if math.isinf(metres) else Leg(tuple(via), metres)
 
     def clear(self, *points: Point) -> bool:
         """The polyline enters no zone; half the clearance is left to wind and GPS."""
@@ -38,11 +38,27 @@ class Ways:
 
     def rest(self, position: Point, leg: Leg, goal: Point) -> float | None:
         """Metres still to fly on a leg under way, by the via points ahead; None: it is cut."""
-        for passed in range(len(leg.via), -1, -1):
-            points = (position, *leg.via[passed:], goal)
+        ahead = len(leg.via) - _passed(position, leg.via, goal)
+        for left in (ahead, *range(ahead - 1, -1, -1), *range(ahead + 1, len(leg.via) + 1)):
+            points = (position, *leg.via[len(leg.via) - left:], goal)
             if self.clear(*points):
-                return math.fsum(math.dist(a, b) for a, b in pairwise(points))
+                return length(points)
         return None
+
+
+def length(points: Sequence[Point]) -> float:
+    """Metres along a polyline."""
+    return math.fsum(math.dist(a, b) for a, b in pairwise(points))
+
+
+def _passed(position: Point, via: Sequence[Point], goal: Point) -> int:
+    """How many via points lie behind: the way on from there leads past the UAV."""
+    stops = (*via, goal)
+    for k in range(len(via), 0, -1):
+        here, onward = stops[k - 1], stops[k]
+        if sum((p - h) * (o - h) for p, h, o in zip(position, here, onward, strict=True)) > 0.0:
+            return k
+    return 0
 
 
 def planned_legs(plan: Plan) -> dict[tuple[str, str, str], Leg]:
@@ -86,10 +102,8 @@ def _key(uav_id: str, before: str, after: str) -> tuple[str, str, str]:
 def _planned(legs: Mapping[tuple[str, str, str], Leg], key: tuple[str, str, str], a: Point,
              b: Point, ways: Ways) -> Leg | None:
     leg = legs.get(key)
-    if leg is not None:
-        length = math.fsum(math.dist(p, q) for p, q in pairwise((a, *leg.via, b)))
-        if ways.clear(a, *leg.via, b):
-            return Leg(leg.via, length)
+    if leg is not None and ways.clear(a, *leg.via, b):
+        return Leg(leg.via, length((a, *leg.via, b)))
     return ways.leg(a, b)
 
 
@@ -100,13 +114,14 @@ def _steady(held: UavList, before: str, task: Task, place: Point, ways: Ways,
     if published is None:
         return fresh
     if before == START:
-        length = ways.rest(place, published, task.position)
+        metres = ways.rest(place, published, task.position)
     else:
-        length = published.length if ways.clear(place, *published.via, task.position) else None
-    if length is None or fresh is not None and (
-            fresh.length + WORTH < length * (1.0 - ways.margin)):
+        metres = published.length if ways.clear(place, *published.via, task.position) else None
+    if metres is None:
         return fresh
-    return Leg(published.via, length)
+    if fresh is not None and fresh.length + WORTH < metres * (1.0 - ways.margin):
+        return fresh
+    return Leg(published.via, metres)
 
 
 def _published(held: UavList, before: str, task: Task) -> Leg | None:

@@ -10,7 +10,11 @@ from uav_task_alloc.allocator.answer import Routes, repaired
 from uav_task_alloc.allocator.fleet import may_fly
 from uav_task_alloc.allocator.lists import lay, planned_legs
 from uav_task_alloc.allocator.records import (
-    Answer, Problem, TaskRecord, TaskState, UavList,
+    Answer,
+    Problem,
+    TaskRecord,
+    TaskState,
+    UavList,
 )
 from uav_task_alloc.allocator.world import World
 from uav_task_alloc.model import Plan, Task, Uav

@@ -7,7 +7,16 @@ from dataclasses import dataclass, field
 from enum import Enum
 
 from uav_task_alloc.model import (
-    Leg, Plan, Point, Task, ThreatZone, Uav, check_id, check_names, check_number, check_point,
+    Leg,
+    Plan,
+    Point,
+    Task,
+    ThreatZone,
+    Uav,
+    check_id,
+    check_names,
+    check_number,
+    check_point,
 )
 
 

@@ -67,8 +67,7 @@ def _take(found: Saved, row: Row) -> None:
     elif row.kind == 'list':
         found.lists.append(_list(row.body))
     elif row.kind == 'zones':
-        found.zones = [ThreatZone(**{**zone, 'shape': Shape(zone['shape'])})
-                       for zone in row.body]
+        found.zones = [_zone(body) for body in row.body]
     elif row.kind == 'off':
         found.off = [str(uav_id) for uav_id in row.body]
     elif row.kind == 'revision':
@@ -91,6 +90,11 @@ def _plain(value: Any) -> Any:
 
 def _task(body: dict[str, Any]) -> Task:
     return Task(**{spec.name: body[spec.name] for spec in fields(Task)})
+
+
+def _zone(body: dict[str, Any]) -> ThreatZone:
+    return ThreatZone(**{**body, 'shape': Shape(body['shape']),
+                         'vertices': tuple((x, y) for x, y in body['vertices'])})
 
 
 def _task_record(body: dict[str, Any]) -> TaskRecord:

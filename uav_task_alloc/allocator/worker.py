@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable
+from functools import partial
 from queue import SimpleQueue
 
 from uav_task_alloc.allocator.records import Answer, Problem
@@ -49,7 +50,7 @@ class Worker:
         self._guarded(prepare)
         self._deliver(None)
         while (problem := self._asked.get()) is not None:
-            answer = self._guarded(lambda p=problem: self._solve(p, self._stop.is_set))
+            answer = self._guarded(partial(self._solve, problem, self._stop.is_set))
             self._deliver(answer if isinstance(answer, Answer) else None)
 
     def _guarded(self, work: Callable[[], object]) -> object:

@@ -12,7 +12,14 @@ from uav_task_alloc.allocator.fleet import Fleet, UavRecord, may_fly
 from uav_task_alloc.allocator.lists import Ways
 from uav_task_alloc.allocator.published import ListBook
 from uav_task_alloc.allocator.records import (
-    Action, Kind, Note, Outbox, TaskEvent, TaskState, UavReport, Verdict,
+    Action,
+    Kind,
+    Note,
+    Outbox,
+    TaskEvent,
+    TaskState,
+    UavReport,
+    Verdict,
 )
 from uav_task_alloc.allocator.restore import Saved
 from uav_task_alloc.allocator.schedule import Schedule
@@ -205,7 +212,9 @@ class World:
 
     def locked(self) -> dict[str, tuple[str, ...]]:
         """What is being flown: it stays first on its UAV."""
-        owners, found, seen = self.lists.owners(), {}, set()
+        owners = self.lists.owners()
+        found: dict[str, tuple[str, ...]] = {}
+        seen: set[str] = set()
         for uav_id, record in self.fleet.records.items():
             task = self.tasks.records.get(record.active)
             if (task is None or not task.open or not self.fleet.usable(uav_id)
