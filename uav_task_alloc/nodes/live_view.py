@@ -89,15 +89,14 @@ class LiveView(Node):
     def refresh(self) -> None:
         """Show where things are; note when they have been over for long enough."""
         clock = self.clock()
-        self.refreshes += 1
+        if self.played is None or not is_over(self.heard, self.played, clock):
+            self.quiet_since = None
+        else:
+            self.quiet_since = clock if self.quiet_since is None else self.quiet_since
+            self.finished = clock - self.quiet_since >= self.params.settle
         self.show(clock)
         if self.file:
             self.file.flush()
-        if self.played is None or not is_over(self.heard, self.played, clock):
-            self.quiet_since = None
-            return
-        self.quiet_since = clock if self.quiet_since is None else self.quiet_since
-        self.finished = clock - self.quiet_since >= self.params.settle
 
     def clock(self) -> float:
         """Scenario time [s]: since the first task was announced."""
@@ -106,12 +105,13 @@ class LiveView(Node):
 
     def show(self, clock: float) -> None:
         """Write over the lines of last time; in a file, one line now and then."""
+        self.refreshes += 1
         lines = [headline(self.heard, clock)]
         if sys.stdout.isatty():
             lines += fleet(self.heard, time.time())
             sys.stdout.write(UP_AND_CLEAR.format(self.shown) if self.shown else '')
             self.shown = len(lines)
-        elif self.refreshes % PLAIN_EVERY:
+        elif self.refreshes % PLAIN_EVERY and not self.finished:
             return
         print('\n'.join(lines), flush=True)
 

@@ -13,10 +13,11 @@ SILENT = 2.0  # [s] wall time after which a UAV is shown as silent
 
 def headline(heard: Heard, clock: float) -> str:
     """One line: tasks by state, re-plans, zones; `clock` [s] of the scenario."""
-    counts = ', '.join(f'{heard.count(state)} {state.lower()}' for state in (
-        'COMPLETED', 'ACTIVE', 'ASSIGNED', 'PENDING', 'UNASSIGNED', 'FAILED', 'CANCELLED')
-        if heard.count(state) or state in ('COMPLETED', 'ACTIVE'))
-    text = f'{clock:5.0f} s  {len(heard.tasks)} tasks: {counts}; {len(heard.zones_now())} zones'
+    counts = ''.join(f', {heard.count(state)} {state.lower()}' for state in (
+        'ACTIVE', 'ASSIGNED', 'PENDING', 'UNASSIGNED', 'REJECTED', 'FAILED', 'CANCELLED')
+        if heard.count(state))
+    text = (f'{clock:5.0f} s  {heard.count("COMPLETED")} of {len(heard.tasks)} tasks completed'
+            f'{counts}; {len(heard.zones_now())} zones')
     if heard.solves:
         last = heard.solves[-1]
         text += (f'; {len(heard.solves) - 1} re-plans, last {last.milliseconds:.0f} ms'

@@ -1,0 +1,117 @@
+# SPDX-License-Identifier: Apache-2.0
+"""live_view as a process: it shows, records, and ends when the scenario is over."""
+import json
+import math
+
+import pytest
+from builtin_interfaces.msg import Duration
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from geometry_msgs.msg import Point
+from uav_task_alloc_msgs import msg as m
+
+from uav_task_alloc.geometry.frames import Origin
+from uav_task_alloc.model import Task, ThreatZone
+from uav_task_alloc.nodes import recorder
+from uav_task_alloc.nodes.messages import (
+    ANNOUNCEMENTS,
+    LATCHED,
+    STATES,
+    announcement,
+    from_zones,
+)
+from uav_task_alloc.record import heard
+
+TEXT = """uavs:
+  - {id: uav_1, position: [0, 0, 0]}
+tasks:
+  - {id: t1, position: [10, 20, 30]}
+"""
+ORIGIN = Origin(47.0, 8.0, 400.0)
+ADD = announcement(m.TaskAnnouncement.ADD, [Task('t1', (10.0, 20.0, 30.0))], 5.0)
+
+
+def state(mode=m.UavState.MODE_STANDBY, speed=0.0):
+    return m.UavState(uav_id='uav_1', mode=mode, mission_state=m.UavState.MISSION_VERIFIED,
+                      list_revision=3, battery=math.nan, available=True, velocity=_vector(speed))
+
+
+def _vector(x):
+    made = m.UavState().velocity
+    made.x = x
+    return made
+
+
+def statuses(value):
+    return m.TaskStatusArray(statuses=[m.TaskStatus(task_id='t1', state=value, uav_id='uav_1')])
+
+
+def test_it_shows_records_and_ends_when_all_is_settled(start, probe, tmp_path):
+    path = tmp_path / 'play.yaml'
+    path.write_text(TEXT)
+    view = start('live_view', '-p', f'scenario:={path}', '-p', f'out_dir:={tmp_path}/out',
+                 '-p', 'speedup:=10.0', '-p', 'settle:=5.0')
+    tasks = probe.publisher(m.TaskAnnouncement, 'task_announcements', ANNOUNCEMENTS)
+    told = probe.publisher(m.TaskStatusArray, 'task_statuses', LATCHED)
+    states = probe.publisher(m.UavState, 'uav_states', STATES)
+    plans = probe.publisher(m.Allocation, 'allocation', LATCHED)
+    tasks.publish(ADD)
+    plans.publish(m.Allocation(revision=1, trigger='1 new task',
+                               solve_time=Duration(nanosec=100_000_000)))
+    told.publish(statuses(m.TaskStatus.ACTIVE))
+    states.publish(state(m.UavState.MODE_ON_MISSION, 15.0))
+    probe.until(lambda: '1 active' in view.output())
+    assert view.popen.poll() is None
+    told.publish(statuses(m.TaskStatus.COMPLETED))
+
+    def over():
+        states.publish(state())
+        return view.popen.poll() is not None
+    probe.until(over)
+    assert view.popen.returncode == 0
+    assert '1 of 1 tasks completed; 0 zones' in view.output()
+    said = heard.read(tmp_path / 'out')
+    assert said.tasks['t1'].position == (10.0, 20.0, 30.0)
+    assert said.statuses['t1'] == heard.Status('COMPLETED', 'uav_1', '')
+    assert [(solve.milliseconds, solve.trigger) for solve in said.solves] == [
+        (pytest.approx(100.0), '1 new task')]
+    assert said.uavs['uav_1']['mode'] == 'STANDBY'
+    assert said.uploads == 1
+
+
+def test_without_a_scenario_it_goes_on_until_it_is_stopped(start, probe):
+    view = start('live_view')
+    states = probe.publisher(m.UavState, 'uav_states', STATES)
+
+    def shown():
+        states.publish(state())
+        return '0 of 0 tasks' in view.output()
+    probe.until(shown)
+    assert view.stop()[0] == 0
+
+
+def test_what_a_message_does_not_know_is_null_in_json():
+    line = recorder.state(state(speed=math.nan))
+    assert (line['battery'], line['velocity']) == (None, [None, 0.0, 0.0])
+    json.dumps(line, allow_nan=False)
+
+
+def test_zones_come_back_from_the_record_as_they_were():
+    zones = [ThreatZone.hemisphere('a', (1.0, 2.0, 3.0), 4.0, 5.0),
+             ThreatZone.cylinder('b', (1.0, 2.0), 3.0),
+             ThreatZone.polygon('c', [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)], 0.0, 9.0)]
+    text = json.dumps(recorder.zones(from_zones(zones, 0.0)), allow_nan=False)
+    assert [heard.zone_from_json(row) for row in json.loads(text)['zones']] == zones
+
+
+def test_a_bad_task_of_an_announcement_is_left_out():
+    bad = announcement(m.TaskAnnouncement.ADD, [Task('t2', (1.0, 2.0, 3.0))], 0.0)
+    bad.tasks[0].position = Point(x=math.nan)
+    bad.tasks += ADD.tasks
+    assert [task['id'] for task in recorder.announced(bad, ORIGIN)['tasks']] == ['t1']
+
+
+def test_only_the_uploads_are_taken_from_the_diagnostics():
+    status = DiagnosticStatus(name='mavlink_bridge: uav_1', values=[
+        KeyValue(key='uploads', value='4'), KeyValue(key='rate', value='10')])
+    assert recorder.uploads(DiagnosticArray(status=[status])) == {
+        'kind': 'uploads', 'uploads': {'mavlink_bridge: uav_1': 4}}

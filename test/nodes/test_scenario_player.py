@@ -1,0 +1,92 @@
+# SPDX-License-Identifier: Apache-2.0
+"""scenario_player as a process: what it announces, when, and what it does before and after."""
+import pytest
+from uav_task_alloc_msgs import msg as m
+from uav_task_alloc_msgs.srv import SetAvailability
+
+from uav_task_alloc import scenario
+from uav_task_alloc.model import Shape
+from uav_task_alloc.nodes.messages import ANNOUNCEMENTS, LATCHED, from_stamp
+
+TEXT = """uavs:
+  - {id: uav_1, position: [0, 0, 0], dies_at: 4}
+tasks:
+  - {id: t1, position: [10, 20, 30], value: 2.5, service_time: 1.5}
+  - {id: t2, position: [40, 50, 60], at: 6}
+zones:
+  - {id: z1, shape: hemisphere, center: [500, 0, 0], radius: 80, margin: 5}
+  - {id: z2, shape: polygon, vertices: [[0, 300], [9, 300], [9, 309]], appears: 2, vanishes: 5}
+cancels:
+  - {task: t1, at: 8}
+"""
+
+
+@pytest.fixture
+def file(tmp_path):
+    path = tmp_path / 'play.yaml'
+    path.write_text(TEXT)
+    return path
+
+
+def test_everything_is_announced_in_order_at_its_time(start, probe, file):
+    tasks = probe.collect(m.TaskAnnouncement, 'task_announcements', ANNOUNCEMENTS)
+    zones = probe.collect(m.ThreatZoneArray, 'threat_zones', LATCHED)
+    deaths = []
+
+    def set_alive(request, response):
+        deaths.append((request.uav_id, request.available))
+        response.success = True
+        return response
+
+    probe.node.create_service(SetAvailability, 'fleet_sim/set_alive', set_alive)
+    start('scenario_player', '-p', f'scenario:={file}', '-p', 'speedup:=8.0')
+    probe.until(lambda: len(tasks) == 3 and len(zones) == 3 and deaths)
+
+    add, cancel = m.TaskAnnouncement.ADD, m.TaskAnnouncement.CANCEL
+    assert [(msg.action, [task.task_id for task in msg.tasks]) for msg in tasks] == [
+        (add, ['t1']), (add, ['t2']), (cancel, ['t1'])]
+    first, second, third = (from_stamp(msg.header.stamp) for msg in tasks)
+    assert second - first >= 6.0 / 8.0 - 0.1
+    assert third - second >= 2.0 / 8.0 - 0.1
+    task = tasks[0].tasks[0]
+    assert (task.position.x, task.value, from_stamp(task.service_time)) == (10.0, 2.5, 1.5)
+    assert [[zone.zone_id for zone in msg.zones] for msg in zones] == [
+        ['z1'], ['z1', 'z2'], ['z1']]
+    assert zones[0].zones[0].shape == Shape.HEMISPHERE.value
+    assert deaths == [('uav_1', False)]
+
+
+def test_the_clock_waits_for_an_allocator(start, probe, file):
+    player = start('scenario_player', '-p', f'scenario:={file}', '-p', 'speedup:=50.0')
+    probe.until(lambda: 'waiting for an allocator' in player.output())
+    zones = probe.collect(m.ThreatZoneArray, 'threat_zones', LATCHED)
+    tasks = probe.collect(m.TaskAnnouncement, 'task_announcements', ANNOUNCEMENTS)
+    probe.until(lambda: len(tasks) == 3)
+    assert [zone.zone_id for zone in zones[0].zones] == ['z1']
+    probe.until(lambda: 'everything is announced' in player.output())
+    assert player.stop()[0] == 0
+
+
+def test_one_that_comes_late_still_hears_all_tasks_and_the_zones_as_they_are(start, probe, file):
+    probe.collect(m.ThreatZoneArray, 'threat_zones', LATCHED)
+    tasks = probe.collect(m.TaskAnnouncement, 'task_announcements', ANNOUNCEMENTS)
+    start('scenario_player', '-p', f'scenario:={file}', '-p', 'speedup:=100.0')
+    probe.until(lambda: len(tasks) == 3)
+    late_tasks = probe.collect(m.TaskAnnouncement, 'task_announcements', ANNOUNCEMENTS)
+    late_zones = probe.collect(m.ThreatZoneArray, 'threat_zones', LATCHED)
+    probe.until(lambda: len(late_tasks) == 3 and late_zones)
+    assert [zone.zone_id for zone in late_zones[0].zones] == ['z1']
+
+
+def test_a_bad_file_ends_it_with_one_line_and_status_1(start, probe, tmp_path):
+    path = tmp_path / 'bad.yaml'
+    path.write_text(TEXT.replace('radius: 80', 'radius: -80'))
+    player = start('scenario_player', '-p', f'scenario:={path}')
+    probe.until(lambda: player.popen.poll() is not None)
+    assert player.popen.returncode == 1
+    assert player.output().strip() == (
+        f'{path}:7: scenario.zones[0].radius = -80: expected a number in (0, inf)')
+
+
+def test_the_text_of_the_tests_is_a_scenario():
+    assert scenario.parse(TEXT).duration == 8.0
