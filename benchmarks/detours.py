@@ -123,6 +123,46 @@ def quality(pairs: int = 2000, ring: int = 36) -> None:
         compare(count, apart, math.ceil(pairs / 7), ring, seed)
 
 
+def speed(shapes: str = 'hcp', apart: bool = True, seed: int = 1) -> None:
+    """1000 tasks, 50 zones on 10 x 10 km: CPU time, one thread, compiled; median of five."""
+    rng = np.random.default_rng(seed)
+    zones = random_zones(rng, 51, apart, 10_000.0, 400.0, shapes)
+    points = np.array([random_point(rng, zones, 10_000.0) for _ in range(1001)])
+    near = np.argsort(((points[:, None] - points[None]) ** 2).sum(2), axis=1)[:, 1:25]
+    goals, origins = near[:1000].ravel(), np.repeat(np.arange(1000), 24)
+    goals = np.where(goals == 1000, 0, goals)
+    figures: dict[str, list[float]] = {}
+
+    def timed(name: str, start: float) -> None:
+        figures.setdefault(name, []).append(1e3 * (time.thread_time() - start))
+
+    for _ in range(6):
+        distances = Distances(points[:1000], zones[:50], clearance=CLEARANCE)
+        start = time.thread_time()
+        distances.ensure(origins, goals)
+        timed('candidate pairs', start)
+        start = time.thread_time()
+        more = distances.updated(points=points)
+        more.ensure(np.full(24, 1000), near[1000])
+        timed('one new task', start)
+        start = time.thread_time()
+        more = distances.updated(zones=zones)
+        more.ensure(origins, goals)
+        timed('one new zone', start)
+        start = time.thread_time()
+        more = distances.updated(zones=zones[1:50])
+        more.ensure(origins, goals)
+        timed('one zone less', start)
+    straight = np.linalg.norm(points[origins] - points[goals], axis=1)
+    bent = np.mean([distances.length(i, j) > s * (1 + 1e-9)
+                    for i, j, s in zip(origins, goals, straight, strict=True)])
+    print(f'{shapes:3s} {"disjoint   " if apart else "overlapping"}: {100 * bent:.0f} % bent, '
+          + ', '.join(f'{name} {np.median(times[1:]):.2f} ms' for name, times in figures.items()))
+
+
 if __name__ == '__main__':
     if sys.argv[1:2] == ['quality']:
         quality(*map(int, sys.argv[2:]))
+    elif sys.argv[1:2] == ['speed']:
+        for shapes, apart in (('h', True), ('hcp', True), ('h', False), ('hcp', False)):
+            speed(shapes, apart)

@@ -18,7 +18,7 @@ from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.geometry.detour import check_limits, way_between
 from uav_task_alloc.geometry.memory import floats_at, ints_at
 from uav_task_alloc.geometry.obstacles import Ints, contains, pack
-from uav_task_alloc.geometry.scene import addresses, finder, make_scene
+from uav_task_alloc.geometry.scene import CAUGHT, addresses, finder, make_scene
 from uav_task_alloc.geometry.table import Table, forget
 from uav_task_alloc.model import Leg, Point, ThreatZone
 
@@ -67,7 +67,7 @@ def _find_for_table(pairs: Pairs, i: int, j: int) -> float:
     slot, table = ints_at(pairs.slot), floats_at(pairs.table)
     found = pairs.find(pairs.scene, i, j)
     table[slot[i] * pairs.row + slot[j]] = found
-    caught = ints_at(ints_at(pairs.scene)[4])
+    caught = ints_at(ints_at(pairs.scene)[CAUGHT])
     if not caught[i] and not caught[j]:
         table[slot[j] * pairs.row + slot[i]] = found
     return found

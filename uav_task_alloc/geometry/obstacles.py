@@ -22,6 +22,8 @@ DOME, CYLINDER, PRISM = Shape.HEMISPHERE.value, Shape.CYLINDER.value, Shape.POLY
 TOUCH = 1e-7  # [m] so near a surface counts as on it, not inside
 SKIN = 0.02  # [m] ways keep this much more distance, so that rounding never puts them inside
 
+RIM = 24  # corners of the outline of a cylinder
+
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
@@ -40,6 +42,9 @@ class Obstacles(NamedTuple):
     first: Ints  # PRISM: its corners are corners[first:first + count], counter-clockwise
     count: Ints
     corners: Floats  # (m, 2)
+    first_rim: Ints  # CYLINDER and convex PRISM: the enlarged outline is rim[first:first + rims]
+    rims: Ints
+    rim: Floats  # (m, 2) [m], circumscribed, counter-clockwise, with 1.5 skins
 
 
 def pack(zones: Sequence[ThreatZone], clearance: float = 0.0) -> Obstacles:
@@ -50,6 +55,7 @@ def pack(zones: Sequence[ThreatZone], clearance: float = 0.0) -> Obstacles:
     centre, box = np.zeros((k, 3)), np.zeros((k, 6))
     first, count = np.zeros(k, np.int64), np.zeros(k, np.int64)
     corners: list[tuple[float, float]] = []
+    rims: list[list[tuple[float, float]]] = []
     for i, zone in enumerate(zones):
         grow = zone.margin + clearance
         (centre[i], size, low, high), mine = _extent(zone), _counter_clockwise(zone.vertices)
@@ -57,12 +63,16 @@ def pack(zones: Sequence[ThreatZone], clearance: float = 0.0) -> Obstacles:
         floats[:, i] = zone.radius + grow, low - grow, high + grow, grow, skin
         first[i], count[i] = len(corners), len(mine)
         corners += mine
+        rims.append(_rim(zone, mine, grow + 1.5 * skin))
         reach = np.array([_half_width(mine, 0, size), _half_width(mine, 1, size)]) + grow + skin
         bottom = -math.inf if zone.shape is Shape.HEMISPHERE else low - grow - skin
         box[i] = *(centre[i, :2] - reach), bottom, *(centre[i, :2] + reach), high + grow + skin
     kind = np.array([zone.shape.value for zone in zones], np.int64)
+    sizes = np.array([len(rim) for rim in rims], np.int64)
     return Obstacles(kind, centre, *floats, box, first, count,
-                     np.array(corners, dtype=np.float64).reshape(-1, 2))
+                     np.array(corners, dtype=np.float64).reshape(-1, 2),
+                     np.cumsum(sizes) - sizes, sizes,
+                     np.array([c for rim in rims for c in rim], np.float64).reshape(-1, 2))
 
 
 def _extent(zone: ThreatZone) -> tuple[tuple[float, float, float], float, float, float]:
@@ -74,6 +84,34 @@ def _extent(zone: ThreatZone) -> tuple[tuple[float, float, float], float, float,
     xs, ys = zip(*zone.vertices, strict=True)
     middle = (min(xs) + max(xs)) / 2, (min(ys) + max(ys)) / 2, 0.0
     return middle, math.hypot(max(xs) - min(xs), max(ys) - min(ys)) / 2, zone.z_min, zone.z_max
+
+
+def _rim(zone: ThreatZone, corners: Sequence[tuple[float, float]],
+         grow: float) -> list[tuple[float, float]]:
+    """A convex outline just outside the enlarged zone; none for a dome or a dented polygon."""
+    if zone.shape is Shape.HEMISPHERE:
+        return []
+    if zone.shape is Shape.CYLINDER:
+        return _fan(zone.center, zone.radius + grow, 0.0, 2 * math.pi, RIM)
+    rim: list[tuple[float, float]] = []
+    for i, corner in enumerate(corners):
+        before, after = corners[i - 1], corners[(i + 1) % len(corners)]
+        start = math.atan2(corner[1] - before[1], corner[0] - before[0])
+        turn = math.remainder(math.atan2(after[1] - corner[1], after[0] - corner[0]) - start,
+                              2 * math.pi)
+        if turn < 0.0:
+            return []
+        rim += _fan(corner, grow, start - math.pi / 2, turn, math.ceil(4 * turn / math.pi - 1e-9))
+    return rim
+
+
+def _fan(centre: Sequence[float], radius: float, start: float, turn: float,
+         parts: int) -> list[tuple[float, float]]:
+    """Corners of the polyline that circumscribes an arc."""
+    step = turn / max(1, parts)
+    far = radius / math.cos(step / 2)
+    return [(centre[0] + far * math.cos(start + (i + 0.5) * step),
+             centre[1] + far * math.sin(start + (i + 0.5) * step)) for i in range(parts)]
 
 
 def _half_width(corners: Sequence[tuple[float, float]], axis: int, otherwise: float) -> float:

@@ -16,6 +16,9 @@ from uav_task_alloc.geometry.taut import MAX_CORNERS
 from uav_task_alloc.geometry.ways import shortest
 
 
+CAUGHT = 5  # where `addresses` has that of Scene.caught
+
+
 class Scene(NamedTuple):
     """Points among zones, as kernels take them."""
 
@@ -45,24 +48,25 @@ def addresses(scene: Scene) -> Ints:
     """Sizes and addresses of the scene's arrays, in the order that `_scene_at` reads."""
     o = scene.obstacles
     arrays = (*scene[:4], *o)
-    return np.array([len(scene.xyz), o.kind.size, len(o.corners),
+    return np.array([len(scene.xyz), o.kind.size, len(o.corners), len(o.rim),
                      *(array.ctypes.data for array in arrays)], np.int64)
 
 
 @numba.njit(cache=True, nogil=True)
 def _scene_at(address: int) -> Scene:
     at = ints_at(address)
-    n, k, m = at[0], at[1], at[2]
+    n, k, m, r = at[0], at[1], at[2], at[3]
     return Scene(
-        numba.carray(floats_at(at[3]), (n, 3)), numba.carray(ints_at(at[4]), n),
-        numba.carray(floats_at(at[5]), (n, 3)), numba.carray(floats_at(at[6]), 2),
+        numba.carray(floats_at(at[4]), (n, 3)), numba.carray(ints_at(at[5]), n),
+        numba.carray(floats_at(at[6]), (n, 3)), numba.carray(floats_at(at[7]), 2),
         Obstacles(
-            numba.carray(ints_at(at[7]), k), numba.carray(floats_at(at[8]), (k, 3)),
-            numba.carray(floats_at(at[9]), k), numba.carray(floats_at(at[10]), k),
-            numba.carray(floats_at(at[11]), k), numba.carray(floats_at(at[12]), k),
-            numba.carray(floats_at(at[13]), k), numba.carray(floats_at(at[14]), (k, 6)),
-            numba.carray(ints_at(at[15]), k), numba.carray(ints_at(at[16]), k),
-            numba.carray(floats_at(at[17]), (m, 2))))
+            numba.carray(ints_at(at[8]), k), numba.carray(floats_at(at[9]), (k, 3)),
+            numba.carray(floats_at(at[10]), k), numba.carray(floats_at(at[11]), k),
+            numba.carray(floats_at(at[12]), k), numba.carray(floats_at(at[13]), k),
+            numba.carray(floats_at(at[14]), k), numba.carray(floats_at(at[15]), (k, 6)),
+            numba.carray(ints_at(at[16]), k), numba.carray(ints_at(at[17]), k),
+            numba.carray(floats_at(at[18]), (m, 2)), numba.carray(ints_at(at[19]), k),
+            numba.carray(ints_at(at[20]), k), numba.carray(floats_at(at[21]), (r, 2))))
 
 
 def _find(address: int, i: int, j: int) -> float:

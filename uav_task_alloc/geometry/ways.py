@@ -13,7 +13,8 @@ import numpy as np
 
 from uav_task_alloc.geometry.obstacles import Floats, Ints, Obstacles, blocked, first_around
 from uav_task_alloc.geometry.search import add_corners, astar, corner_bound
-from uav_task_alloc.geometry.taut import MAX_CORNERS, span, tauten
+from uav_task_alloc.geometry.single import past_one
+from uav_task_alloc.geometry.taut import MAX_CORNERS, length_of, span, tauten
 
 RINGS = (12, 24, 64)  # corners around a zone; finer ones only where no way was found
 
@@ -76,6 +77,25 @@ def zones_near(o: Obstacles, way: Floats, length: float) -> Ints:
 
 
 @numba.njit(cache=True, nogil=True)
+def _is_clear(o: Obstacles, p: Floats, n: int, floor: float) -> bool:
+    """Whether the way p[:n] is clear of all zones."""
+    x, y, z = p[0, 0], p[0, 1], p[0, 2]
+    u, v, w = x, y, z
+    for i in range(1, n):
+        x, y, z = min(x, p[i, 0]), min(y, p[i, 1]), min(z, p[i, 2])
+        u, v, w = max(u, p[i, 0]), max(v, p[i, 1]), max(w, p[i, 2])
+    for k in range(o.kind.size):
+        box = o.box[k]
+        if (x > box[3] or u < box[0] or y > box[4] or v < box[1] or z > box[5] or w < box[2]):
+            continue
+        for i in range(1, n):
+            if blocked(o, k, p[i - 1, 0], p[i - 1, 1], p[i - 1, 2], p[i, 0], p[i, 1], p[i, 2],
+                       floor, False):
+                return False
+    return True
+
+
+@numba.njit(cache=True, nogil=True)
 def shortest(o: Obstacles, way: Floats, limits: Floats, out: Floats) -> tuple[int, float]:
     """Points of the shortest safe way between the ends way[0] and way[1], both outside all zones.
 
@@ -86,8 +106,13 @@ def shortest(o: Obstacles, way: Floats, limits: Floats, out: Floats) -> tuple[in
     snug = first_around(o, way[0, 0], way[0, 1], way[0, 2], False) >= 0 or first_around(
         o, way[1, 0], way[1, 1], way[1, 2], False) >= 0
     hit = np.zeros(o.kind.size, np.int64)
-    if hit_by(o, way, 0, 1, floor, snug, hit) == 0:
+    hits = hit_by(o, way, 0, 1, floor, snug, hit)
+    if hits == 0:
         return 2, span(way, 0, 1)
+    if hits == 1 and not snug:
+        n = past_one(o, np.argmax(hit), way, limits, floor, out)
+        if n > 0 and _is_clear(o, out, n, floor):
+            return n, length_of(out, n)
     n = 0
     for ring in RINGS:
         n = _search(o, way, limits, floor, snug, ring, hit, out)
@@ -95,12 +120,6 @@ def shortest(o: Obstacles, way: Floats, limits: Floats, out: Floats) -> tuple[in
             break
     if n == 0:
         return 0, np.inf
-    length = 0.0
-    for i in range(1, n):
-        length += span(out, i - 1, i)
-    near = zones_near(o, way, length)
+    near = zones_near(o, way, length_of(out, n))
     n = tauten(o, near, out, n, limits, floor, snug)
-    length = 0.0
-    for i in range(1, n):
-        length += span(out, i - 1, i)
-    return n, length
+    return n, length_of(out, n)
