@@ -55,16 +55,9 @@ def _cost(plan: Plan, uav_id: str, reach: float) -> float:
 
 def _mixed(base: Plan, fresh: Plan, changed: Collection[str]) -> Plan:
     """`fresh` for the changed UAVs, `base` for the others."""
-    if all(fresh.routes[uav_id] == tasks for uav_id, tasks in base.routes.items()
-           if uav_id not in changed):
-        return fresh
     routes = {u: (fresh if u in changed else base).routes[u] for u in base.routes}
     legs = {u: (fresh if u in changed else base).legs.get(u, ()) for u in base.routes}
-    mixed = replace(fresh, routes=routes, legs=legs)
-    distance = sum(mixed.route(u).distance for u in routes)
-    # the fit of eq 2.12 falls with the distance where value and penalty are the same
-    share = distance / fresh.distance if fresh.distance > 0.0 else 1.0
-    return replace(mixed, distance=distance, fit=fresh.fit * share)
+    return replace(fresh, routes=routes, legs=legs)
 
 
 def repaired(routes: Mapping[str, Iterable[str]], locked: Mapping[str, tuple[str, ...]],

@@ -18,6 +18,7 @@ from uav_task_alloc.allocator.records import (
 )
 from uav_task_alloc.allocator.world import World
 from uav_task_alloc.model import Plan, Task, Uav
+from uav_task_alloc.objective import fit
 from uav_task_alloc.params import AllocatorParams
 
 
@@ -124,9 +125,11 @@ def _restricted(record: TaskRecord, usable: frozenset[str]) -> Task:
 
 
 def held_plan(world: World, left: Mapping[str, str], like: Plan) -> Plan:
-    """The lists in force as a plan, with the figures of the plan they come from."""
+    """The lists in force as a plan, found as `like` was; its figures are those of the lists."""
     lists = world.lists.lists
     routes = {uav_id: each.task_ids for uav_id, each in lists.items()}
-    served = sum(world.tasks.records[t].task.value for tasks in routes.values() for t in tasks)
-    return replace(like, routes=routes, unassigned=dict(left), value=served,
-                   distance=math.fsum(each.distance for each in lists.values()))
+    value = math.fsum(world.tasks.records[task_id].task.value
+                      for task_ids in routes.values() for task_id in task_ids)
+    distance = math.fsum(each.distance for each in lists.values())
+    return replace(like, routes=routes, unassigned=dict(left), value=value, distance=distance,
+                   fit=fit(distance, value, like.penalty))

@@ -20,7 +20,7 @@ def from_list(uav_list: UavList) -> m.TaskList:
         header=header(uav_list.stamp), uav_id=uav_list.uav, revision=uav_list.revision,
         tasks=[planned_task(stop.task, stop.leg, stop.eta) for stop in uav_list.stops],
         end=m.TaskList.RETURN_HOME if uav_list.returns else m.TaskList.HOLD,
-        distance=uav_list.distance)
+        distance=float(uav_list.distance))
 
 
 def from_statuses(statuses: Iterable[Status], now: float) -> m.TaskStatusArray:
@@ -41,8 +41,9 @@ def from_allocation(allocation: Allocation, statuses: Iterable[Status]) -> m.All
         header=header(allocation.stamp), revision=allocation.revision,
         lists=[from_list(each) for each in allocation.lists],
         unassigned=[from_status(s) for s in statuses if s.state in LEFT_OUT],
-        fit=plan.fit, distance=plan.distance, value=plan.value, penalty=plan.penalty,
-        solve_time=to_duration(plan.solve_time), iterations=plan.iterations,
+        fit=float(plan.fit), distance=float(plan.distance), value=float(plan.value),
+        penalty=float(plan.penalty),
+        solve_time=to_duration(plan.solve_time), iterations=int(plan.iterations),
         warm_started=plan.warm_started, trigger=allocation.trigger)
 
 

@@ -171,7 +171,10 @@ class AllocatorNode(Node):
 
     def failed(self, error: Exception) -> None:
         """In the worker's thread."""
-        self.get_logger().error(f'solver: {error!r}')
+        text = f'{type(error).__name__}: {error}'[:500]
+        if ('solver', text) not in self.complained:
+            self.complained.add(('solver', text))
+            self.get_logger().error(f'solver: {text}')
 
     def on_answer(self) -> None:
         """The worker has an answer, or is ready for the first problem."""

@@ -1,0 +1,262 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The allocator as other programs meet it: topics, services, restarts."""
+import math
+import signal
+
+import pytest
+from builtin_interfaces.msg import Duration
+from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import Point
+from std_srvs.srv import Trigger
+from uav_task_alloc_msgs import msg as m
+from uav_task_alloc_msgs.srv import SetAvailability, SubmitTasks
+from visualization_msgs.msg import MarkerArray
+
+from uav_task_alloc.nodes.messages import ANNOUNCEMENTS, EVENTS, LATCHED, STATES
+
+pytestmark = pytest.mark.ros
+S = m.TaskStatus
+
+
+def task(task_id, x=0.0, y=0.0, **more):
+    more.setdefault('value', 1.0)
+    return m.Task(task_id=task_id, position=Point(x=float(x), y=float(y), z=50.0), **more)
+
+
+def add(*tasks, action=m.TaskAnnouncement.ADD):
+    return m.TaskAnnouncement(action=action, tasks=list(tasks))
+
+
+class Fleet:
+    """UAVs that say all the time where they are, and what the allocator tells them."""
+
+    def __init__(self, probe):
+        self.probe, self.states = probe, {}
+        self.lists, self.revisions = {}, {}
+        self.tasks = probe.node.create_publisher(m.TaskAnnouncement, 'task_announcements',
+                                                 ANNOUNCEMENTS)
+        self.zones = probe.node.create_publisher(m.ThreatZoneArray, 'threat_zones', LATCHED)
+        self.events = probe.node.create_publisher(m.TaskEvent, 'task_events', EVENTS)
+        self.state = probe.node.create_publisher(m.UavState, 'uav_states', STATES)
+        self.allocations = probe.collect(m.Allocation, 'allocation', LATCHED)
+        self.seen = probe.collect(m.TaskStatusArray, 'task_statuses', LATCHED)
+        probe.node.create_timer(0.1, self.speak)
+
+    def uav(self, uav_id, x, y=0.0, **more):
+        more = {'range_remaining': math.nan, 'cruise_speed': math.nan,
+                'home': Point(x=math.nan), 'available': True, **more}
+        if uav_id not in self.lists:
+            self.lists[uav_id], self.revisions[uav_id] = None, []
+            self.probe.node.create_subscription(m.TaskList, f'{uav_id}/task_list', self.told,
+                                                LATCHED)
+        self.states[uav_id] = m.UavState(uav_id=uav_id, position=Point(x=x, y=y, z=50.0), **more)
+
+    def speak(self):
+        for state in self.states.values():
+            self.state.publish(state)
+
+    def told(self, msg):
+        self.lists[msg.uav_id] = msg
+        self.revisions[msg.uav_id].append(msg.revision)
+
+    def event(self, kind, task_id, uav_id, **more):
+        more.setdefault('revision', self.lists[uav_id].revision if self.lists.get(uav_id) else 0)
+        self.events.publish(m.TaskEvent(event=kind, task_id=task_id, uav_id=uav_id, **more))
+
+    def route(self, uav_id):
+        told = self.lists.get(uav_id)
+        return None if told is None else [planned.task.task_id for planned in told.tasks]
+
+    def status(self, task_id):
+        latest = self.seen[-1].statuses if self.seen else ()
+        found = [status for status in latest if status.task_id == task_id]
+        return found[0] if found else S(state=255)
+
+    def until_state(self, task_id, state):
+        self.probe.until(lambda: self.status(task_id).state == state)
+        return self.status(task_id)
+
+    def connected(self):
+        self.probe.until(lambda: self.tasks.get_subscription_count()
+                         and self.state.get_subscription_count()
+                         and self.events.get_subscription_count())
+
+
+@pytest.fixture
+def fleet(probe):
+    return Fleet(probe)
+
+
+def begin(start, fleet, *more):
+    process = start('allocator', '-p', 'uav_timeout:=1.5', '-p', 'route_end:=hold', *more)
+    fleet.connected()
+    return process
+
+
+def test_a_burst_is_answered_by_one_plan_and_only_changed_lists_follow(start, probe, fleet):
+    node = begin(start, fleet)
+    markers = probe.collect(MarkerArray, 'allocation_markers', LATCHED)
+    health = probe.collect(DiagnosticArray, '/diagnostics', 10)
+    fleet.tasks.publish(add(task('t0', 100)))
+    assert fleet.until_state('t0', S.PENDING).reason == 'no UAV heard yet'
+    fleet.uav('a', 0.0)
+    fleet.uav('b', 1000.0, cruise_speed=20.0)
+    probe.until(lambda: fleet.route('a') == ['t0'])
+    before = len(fleet.allocations)
+    for k in range(20):
+        fleet.tasks.publish(add(task(f't{k + 1}', 1010 + k, service_time=Duration(sec=2))))
+    probe.until(lambda: len(fleet.route('b') or ()) == 20)
+    late = probe.collect(m.TaskList, 'b/task_list', LATCHED)
+    probe.until(lambda: late)  # time enough for a second plan, if there were one
+    assert late[-1] == fleet.lists['b']
+    assert len(fleet.allocations) - before == 1
+    first, second = fleet.lists['b'].tasks[:2]
+    assert first.leg_distance == pytest.approx(10.0)
+    assert first.eta == Duration(nanosec=500_000_000)
+    assert second.eta.sec == 2
+    assert fleet.revisions['a'] == [1]
+    told = fleet.allocations[-1]
+    assert [each.uav_id for each in told.lists] == ['a', 'b']
+    assert told.distance == pytest.approx(129.0)
+    assert told.value == pytest.approx(21.0)
+    assert 'ADD t1' in told.trigger
+    probe.until(lambda: markers and health)
+    assert any('UAVs heard' == pair.key for pair in health[-1].status[0].values)
+    code, out = node.stop()
+    assert code == 0
+    assert 'Traceback' not in out
+
+
+def test_progress_silence_and_a_zone_change_the_lists(start, probe, fleet):
+    begin(start, fleet)
+    fleet.uav('a', 0.0)
+    fleet.uav('b', 0.0, 3000.0)
+    fleet.tasks.publish(add(task('t1', 1000), task('t2', 1100), task('t3', 1000, 3000)))
+    probe.until(lambda: fleet.route('a') == ['t1', 't2'] and fleet.route('b') == ['t3'])
+    fleet.event(m.TaskEvent.STARTED, 't1', 'a')
+    fleet.until_state('t1', S.ACTIVE)
+    fleet.zones.publish(m.ThreatZoneArray(zones=[
+        m.ThreatZone(zone_id='z1', shape=m.ThreatZone.CYLINDER, center=Point(x=500.0),
+                     radius=100.0, z_min=0.0, z_max=500.0),
+        m.ThreatZone(zone_id='bad', radius=-1.0)]))
+    probe.until(lambda: fleet.lists['a'].tasks[0].via)
+    assert fleet.lists['a'].tasks[0].leg_distance > 1010.0
+    fleet.event(m.TaskEvent.COMPLETED, 't1', 'a')
+    fleet.until_state('t1', S.COMPLETED)
+    probe.until(lambda: fleet.route('a') == ['t2'])
+    del fleet.states['a']
+    probe.until(lambda: fleet.route('a') == [])
+    probe.until(lambda: fleet.route('b') == ['t3', 't2'])
+    assert fleet.revisions['a'] == sorted(set(fleet.revisions['a']))
+    fleet.uav('a', 1000.0)
+    fleet.tasks.publish(add(task('t4', 1000, 5)))
+    probe.until(lambda: fleet.route('a') and fleet.route('a')[0] == 't4')
+
+
+BAD = [
+    (task('nan', math.nan), 'position'),
+    (task('negative', value=-1.0), 'value'),
+    (task('naught', value=0.0), 'value'),
+    (task('impatient', service_time=Duration(sec=-1)), 'service_time'),
+    (task('no name!'), 'ROS name'),
+    (task('9lives'), 'ROS name'),
+    (task('nowhere', frame=7), 'frame'),
+    (task('pole', frame=1, latitude=91.0), 'latitude'),
+]
+
+
+def test_bad_messages_are_refused_in_words_and_change_nothing_else(start, probe, fleet):
+    node = begin(start, fleet)
+    fleet.uav('a', 0.0)
+    fleet.tasks.publish(add(task('t1', 100)))
+    probe.until(lambda: fleet.route('a') == ['t1'])
+    fleet.tasks.publish(add(*(bad for bad, _ in BAD)))
+    fleet.tasks.publish(add(task('t1', 999)))
+    fleet.tasks.publish(add(task('ghost'), action=m.TaskAnnouncement.UPDATE))
+    fleet.tasks.publish(add(task('spirit'), action=m.TaskAnnouncement.CANCEL))
+    fleet.tasks.publish(add(task('odd'), action=9))
+    for bad, why in [*BAD, (task('ghost'), 'unknown task'), (task('spirit'), 'unknown task'),
+                     (task('odd'), 'action = 9')]:
+        assert why in fleet.until_state(bad.task_id, S.REJECTED).reason
+    fleet.uav('b', math.nan)
+    fleet.uav('c', 0.0, range_remaining=-5.0)
+    fleet.event(m.TaskEvent.COMPLETED, 't9', 'a')
+    fleet.event(m.TaskEvent.COMPLETED, 't1', 'z')
+    fleet.event(m.TaskEvent.COMPLETED, 't1', 'a', revision=77)
+    fleet.event(9, 't1', 'a')
+    fleet.state.publish(m.UavState(uav_id='no name!'))
+    for words in ("'t1' REJECTED: duplicate id", 'uav b: position', 'uav c: range_remaining',
+                  "'t9': unknown task", "unknown UAV 'z'", 'revision 77', 'event = 9',
+                  "uav_id = 'no name!'"):
+        probe.until(lambda words=words: words in node.output())
+    assert node.output().count('uav b: position') == 1
+    assert fleet.route('a') == ['t1']
+    assert fleet.lists['a'].tasks[0].task.position.x == 100.0
+    assert fleet.status('t1').state == S.ASSIGNED
+    assert fleet.revisions['a'] == [1]
+
+
+def test_services_answer(start, probe, fleet):
+    begin(start, fleet)
+    fleet.uav('a', 0.0)
+    fleet.uav('b', 50.0)
+
+    def submit(*tasks):
+        return probe.call(SubmitTasks, 'allocator/submit_tasks',
+                          SubmitTasks.Request(announcement=add(*tasks)))
+
+    north = task('t2', frame=m.Task.FRAME_WGS84, latitude=47.398742, longitude=8.545594,
+                 altitude=50.0)
+    answer = submit(task('t1', 100), north, task('bad', math.nan))
+    assert (answer.accepted, answer.rejected) == (['t1', 't2'], ['bad'])
+    assert 'three finite coordinates' in answer.reasons[0]
+    assert submit(task('t1', 100)).reasons == ['duplicate: announced before, unchanged']
+    probe.until(lambda: 't2' in (fleet.route('b') or []))
+    planned = next(p for p in fleet.lists['b'].tasks if p.task.task_id == 't2')
+    assert planned.task.position.y == pytest.approx(111.2, abs=0.2)
+
+    def available(uav_id, value):
+        return probe.call(SetAvailability, 'allocator/set_availability',
+                          SetAvailability.Request(uav_id=uav_id, available=value))
+
+    assert not available('z', False).success
+    assert available('b', False).success
+    probe.until(lambda: fleet.route('b') == [] and len(fleet.route('a')) == 2)
+    before = len(fleet.allocations)
+    assert probe.call(Trigger, 'allocator/replan', Trigger.Request()).success
+    probe.until(lambda: len(fleet.allocations) > before)
+    assert fleet.allocations[-1].trigger == 'replan service'
+
+
+def test_a_killed_allocator_comes_back_with_its_world(start, probe, fleet, tmp_path):
+    state = ('-p', f'state_dir:={tmp_path}/state')
+    node = begin(start, fleet, *state)
+    fleet.uav('a', 0.0)
+    fleet.tasks.publish(add(task('t1', 100), task('t2', 200), task('t3', 300)))
+    probe.until(lambda: fleet.route('a') == ['t1', 't2', 't3'])
+    fleet.event(m.TaskEvent.COMPLETED, 't1', 'a')
+    fleet.event(m.TaskEvent.STARTED, 't2', 'a')
+    fleet.until_state('t1', S.COMPLETED)
+    probe.until(lambda: fleet.route('a') == ['t2', 't3'])
+    probe.call(SubmitTasks, 'allocator/submit_tasks',
+               SubmitTasks.Request(announcement=add(task('t4', 400))))
+    node.stop(signal.SIGKILL)
+    revision, plans = fleet.lists['a'].revision, fleet.allocations[-1].revision
+    fleet.uav('a', 150.0, active_task_id='t2', list_revision=revision)
+    fleet.seen.clear()
+    begin(start, fleet, *state)
+    probe.until(lambda: fleet.allocations[-1].revision > plans)
+    probe.until(lambda: fleet.route('a') == ['t2', 't3', 't4'])
+    assert fleet.status('t1').state == S.COMPLETED
+    assert fleet.revisions['a'] == sorted(set(fleet.revisions['a']))
+
+
+def test_an_allocator_without_its_disk_runs_on_and_says_so(start, probe, fleet, tmp_path):
+    (tmp_path / 'file').touch()
+    health = probe.collect(DiagnosticArray, '/diagnostics', 10)
+    node = begin(start, fleet, '-p', f'state_dir:={tmp_path}/file/state')
+    fleet.uav('a', 0.0)
+    fleet.tasks.publish(add(task('t1', 100)))
+    probe.until(lambda: fleet.route('a') == ['t1'])
+    assert 'cannot be opened' in node.output()
+    probe.until(lambda: health and 'cannot be opened' in health[-1].status[0].message)
