@@ -1,0 +1,40 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The one definition of good: distance, value, penalty and the fit of eq 2.12."""
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from uav_task_alloc.model import Uav, check_number
+
+
+@dataclass(frozen=True, slots=True)
+class Weights:
+    """The coefficients of eq 2.12, by default as the paper has them. Raises InvalidValue."""
+
+    distance: float = 0.01  # [1/m]
+    value: float = 100.0
+    penalty: float = 1.0  # [1/m]
+
+    def __post_init__(self) -> None:
+        for name in ('distance', 'value', 'penalty'):
+            number = check_number(f'{name} weight', getattr(self, name), 0.0, 1e9)
+            object.__setattr__(self, name, number)
+
+
+def fit(distance: float, value: float, penalty: float, weights: Weights | None = None) -> float:
+    """Eq 2.12, smaller is better; infinite where nothing is served (R = 0).
+
+    `distance` [m] is D of eq 2.1, `value` is R, `penalty` [m] is P of eq 2.2.
+    """
+    w = weights or Weights()
+    if value <= 0.0:
+        return math.inf
+    return w.distance * distance + w.value / value + w.penalty * penalty  # eq 2.12
+
+
+def excess(uavs: Iterable[Uav], lengths: Iterable[float]) -> float:
+    """Metres that routes of these lengths [m] fly beyond the ranges: P of eq 2.2."""
+    return math.fsum(max(0.0, length - uav.range)
+                     for uav, length in zip(uavs, lengths, strict=True))

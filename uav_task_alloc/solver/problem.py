@@ -1,0 +1,163 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A problem once as objects and once as the arrays that kernels take; nothing is solved here."""
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from uav_task_alloc.geometry.distances import Distances
+from uav_task_alloc.model import Task, ThreatZone, Uav
+from uav_task_alloc.objective import Weights
+from uav_task_alloc.solver.chance import chance
+from uav_task_alloc.solver.near import near_starts, near_tasks, nearest
+from uav_task_alloc.solver.routes import Arrays, Floats
+
+NEIGHBOURS = 24  # tasks a bee looks at around a task
+STARTS = 8  # UAVs it looks at
+PRICE = 20.0  # leaving an average task out costs so many mean legs
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """Where UAVs may fly."""
+
+    zones: tuple[ThreatZone, ...] = ()
+    clearance: float = 0.0  # [m] beyond the zones' margins
+    altitude_min: float = -math.inf  # [m]
+    altitude_max: float = math.inf  # [m]
+
+    def same_but_zones(self, other: Limits) -> bool:
+        """Whether only the zones may differ."""
+        return replace(self, zones=()) == replace(other, zones=())
+
+
+@dataclass(frozen=True, slots=True)
+class Rules:
+    """How a plan is judged."""
+
+    returns: bool = False  # routes end at home
+    hard: bool = True  # no range is ever exceeded
+    weights: Weights = field(default_factory=Weights)
+
+
+@dataclass(frozen=True, slots=True)
+class Problem:
+    """Who may serve what and how far things are apart.
+
+    A UAV starts behind the tasks that are locked to it; those are no longer among `tasks`.
+    Places of `distances`: effective starts, tasks, homes, then starts and locked tasks of UAVs
+    with locks.
+    """
+
+    uavs: tuple[Uav, ...]
+    tasks: tuple[Task, ...]  # those to be shared out
+    locked: Mapping[str, tuple[Task, ...]]
+    limits: Limits
+    rules: Rules
+    distances: Distances
+    arrays: Arrays
+    scale: float  # [m] mean way to the nearest neighbour
+    index: Mapping[str, int]  # task id -> place in tasks
+
+    def locked_places(self, u: int) -> list[int]:
+        """Places of UAV u's start and its locked tasks in `distances`."""
+        place = 2 * len(self.uavs) + len(self.tasks)
+        for uav in self.uavs[:u]:
+            held = self.locked.get(uav.id, ())
+            place += len(held) + 1 if held else 0
+        held = self.locked.get(self.uavs[u].id, ())
+        return list(range(place, place + len(held) + 1)) if held else [u]
+
+
+def make_problem(uavs: Sequence[Uav], tasks: Sequence[Task],
+                 locked: Mapping[str, tuple[Task, ...]], limits: Limits, rules: Rules,
+                 known: Problem | None = None) -> Problem:
+    """The arrays of a problem; lengths that an earlier one knows are taken over."""
+    held = {t.id for each in locked.values() for t in each}
+    free = tuple(task for task in tasks if task.id not in held) if held else tuple(tasks)
+    distances = _distances(uavs, free, locked, limits, known)
+    arrays = _blank(uavs, free, rules, distances)
+    problem = Problem(tuple(uavs), free, locked, limits, rules, distances, arrays,
+                      1.0, {task.id: i for i, task in enumerate(free)})
+    _apply_locks(problem)
+    scale = _fill(problem)
+    return Problem(problem.uavs, free, locked, limits, rules, distances, arrays, scale,
+                   problem.index)
+
+
+def _distances(uavs: Sequence[Uav], tasks: Sequence[Task],
+               locked: Mapping[str, tuple[Task, ...]], limits: Limits,
+               known: Problem | None) -> Distances:
+    starts = [locked[u.id][-1].position if locked.get(u.id) else u.position for u in uavs]
+    homes = [u.home or u.position for u in uavs]
+    extra = [point for u in uavs if locked.get(u.id)
+             for point in (u.position, *(t.position for t in locked[u.id]))]
+    points = np.array([*starts, *(t.position for t in tasks), *homes, *extra], dtype=np.float64)
+    points = points.reshape(-1, 3)
+    if known is not None and limits.same_but_zones(known.limits):
+        return known.distances.updated(points, limits.zones)
+    return Distances(points, limits.zones, clearance=limits.clearance,
+                     altitude_min=limits.altitude_min, altitude_max=limits.altitude_max)
+
+
+def _may(uavs: Sequence[Uav], tasks: Sequence[Task]) -> NDArray[np.bool_]:
+    """Who may serve what, by capabilities and allowed UAVs."""
+    may = np.ones((len(uavs), len(tasks)), np.bool_)
+    for i, task in enumerate(tasks):
+        if task.required_capabilities or task.allowed_uavs is not None:
+            may[:, i] = [task.required_capabilities <= uav.capabilities
+                         and (task.allowed_uavs is None or uav.id in task.allowed_uavs)
+                         for uav in uavs]
+    return may
+
+
+def _blank(uavs: Sequence[Uav], tasks: Sequence[Task], rules: Rules,
+           distances: Distances) -> Arrays:
+    m, n = len(uavs), len(tasks)
+    k, s = min(NEIGHBOURS, max(0, n - 1)), min(STARTS, m)
+    may = _may(uavs, tasks)
+    w = rules.weights
+    return Arrays(
+        m, m + n, rules.returns, rules.hard,
+        min(w.penalty / w.distance, 1e6) if w.distance > 0.0 else 1e6,
+        distances.pairs, np.array([u.range for u in uavs], dtype=np.float64), np.zeros(m), may,
+        np.any(~may, axis=0, keepdims=True)[0],
+        np.array([t.value for t in tasks], dtype=np.float64), np.ones(n),
+        np.empty((n, k), np.int64), np.empty((n, k)), np.empty((n, s), np.int64),
+        np.empty((n, s)))
+
+
+def _apply_locks(problem: Problem) -> None:
+    """Locked tasks use up range; a UAV that flies them returns even when it gets no more."""
+    a = problem.arrays
+    for u, uav in enumerate(problem.uavs):
+        if problem.locked.get(uav.id):
+            places = problem.locked_places(u)
+            a.reach[u] -= sum(problem.distances.length(i, j)
+                              for i, j in pairwise(places))
+            if problem.rules.returns:
+                a.idle[u] = problem.distances.length(u, a.ends + u)
+
+
+def _fill(problem: Problem) -> float:
+    """Neighbours and prices; returns the mean way [m] to the nearest neighbour."""
+    a, n = problem.arrays, len(problem.tasks)
+    xyz: Floats = problem.distances.points
+    if n == 0:
+        return 1.0
+    near_tasks(a, nearest(xyz[a.uavs:a.ends], a.near.shape[1]))
+    near_starts(a, xyz, chance(0))
+    if a.uavs == 0:
+        return 1.0
+    first = a.near_length[:, 0] if a.near.shape[1] else a.start_length[:, 0]
+    finite = first[np.isfinite(first)]
+    scale = max(float(finite.mean()) if finite.size else 1.0, 1e-6)
+    finite = a.start_length[:, 0][np.isfinite(a.start_length[:, 0])]
+    far = float(finite.mean()) if finite.size else 0.0
+    a.price[:] = a.value / a.value.mean() * max(PRICE * scale, 2.0 * far)
+    return scale

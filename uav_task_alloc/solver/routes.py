@@ -1,0 +1,175 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Routes as linked lists in arrays, and the kernels that change them: O(1) a change.
+
+Nodes: UAV starts 0..m-1, tasks m..m+n-1, route ends m+n..2m+n-1. Sums are float64.
+"""
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+from uav_task_alloc.geometry.distances import Pairs, length
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+DISTANCE, EXCESS, LEFT_OUT, VALUE = 0, 1, 2, 3  # what Routes.sums holds
+TINY = 1e-7  # [m] what rounding may add up to
+
+
+class Arrays(NamedTuple):
+    """A problem as kernels take it."""
+
+    uavs: int
+    ends: int  # first end node
+    returns: bool  # routes end at home
+    hard: bool  # no range is ever exceeded
+    excess_cost: float  # [m/m] of a metre beyond range, where not hard
+    pairs: Pairs  # lengths by node
+    reach: Floats  # (m) [m] range
+    idle: Floats  # (m) [m] length of the route without tasks
+    may: NDArray[np.bool_]  # (m, n) who may serve what
+    picky: NDArray[np.bool_]  # (n) not everybody may
+    value: Floats  # (n)
+    price: Floats  # (n) [m] of leaving a task out
+    near: Ints  # (n, k) task nodes, nearest first
+    near_length: Floats  # (n, k) [m]
+    starts: Ints  # (n, s) starts, nearest first
+    start_length: Floats  # (n, s) [m]
+
+
+class Routes(NamedTuple):
+    """Who flies what in which order; on[node] = -1: left out."""
+
+    next: Ints
+    prev: Ints
+    on: Ints
+    leg: Floats  # [m] length of the leg that leaves the node
+    length: Floats  # (m) [m]
+    tasks: Ints  # (m) tasks
+    sums: Floats  # DISTANCE, EXCESS [m], LEFT_OUT [m], VALUE
+
+
+@numba.njit(cache=True, nogil=True)
+def step(a: Arrays, i: int, j: int) -> float:
+    """Length [m] of the leg from node i to node j."""
+    if j >= a.ends:
+        if i < a.uavs:
+            return float(a.idle[i])
+        if not a.returns:
+            return 0.0
+    return float(length(a.pairs, i, j))
+
+
+@numba.njit(cache=True, nogil=True)
+def clear(a: Arrays, r: Routes) -> None:
+    """Leave everything out."""
+    r.on[:] = -1
+    for u in range(a.uavs):
+        end = a.ends + u
+        r.next[u], r.prev[u], r.next[end], r.prev[end] = end, u, u, u
+        r.on[u] = r.on[end] = u
+        r.leg[u] = r.length[u] = a.idle[u]
+        r.tasks[u] = 0
+    r.sums[LEFT_OUT], r.sums[VALUE] = a.price.sum(), 0.0
+    total(a, r)
+
+
+@numba.njit(cache=True, nogil=True)
+def total(a: Arrays, r: Routes) -> None:
+    """Sum up the lengths anew."""
+    r.sums[DISTANCE], r.sums[EXCESS] = r.length.sum(), 0.0
+    for u in range(a.uavs):
+        r.sums[EXCESS] += max(0.0, r.length[u] - a.reach[u])
+
+
+def empty_routes(a: Arrays) -> Routes:
+    """Routes without tasks."""
+    nodes = a.ends + a.uavs
+    routes = Routes(np.empty(nodes, np.int64), np.empty(nodes, np.int64),
+                    np.empty(nodes, np.int64), np.zeros(nodes), np.empty(a.uavs),
+                    np.empty(a.uavs, np.int64), np.empty(4))
+    clear(a, routes)
+    return routes
+
+
+@numba.njit(cache=True, nogil=True)
+def copy(a: Any, b: Any) -> None:
+    """Routes b become what routes a are."""
+    b.next[:], b.prev[:], b.on[:], b.leg[:] = a.next, a.prev, a.on, a.leg
+    b.length[:], b.tasks[:], b.sums[:] = a.length, a.tasks, a.sums
+
+
+def twin(a: Routes) -> Routes:
+    """The same routes in arrays of their own."""
+    return Routes(*[part.copy() for part in a])  # type: ignore[arg-type]
+
+
+@numba.njit(cache=True, nogil=True)
+def cost(a: Arrays, r: Routes) -> float:
+    """What the search makes small [m]."""
+    return float(r.sums[DISTANCE] + r.sums[LEFT_OUT] + a.excess_cost * r.sums[EXCESS])
+
+
+@numba.njit(cache=True, nogil=True)
+def better(r: Routes, s: Routes, excess_cost: float) -> bool:
+    """Whether r is better than s: more value; as much, then shorter."""
+    gain = r.sums[VALUE] - s.sums[VALUE]
+    slack = 1e-9 * (abs(s.sums[VALUE]) + 1.0)
+    if gain > slack:
+        return True
+    shorter = (s.sums[DISTANCE] + excess_cost * s.sums[EXCESS]
+               - r.sums[DISTANCE] - excess_cost * r.sums[EXCESS])
+    return bool(gain >= -slack and shorter > TINY + 1e-12 * s.sums[DISTANCE])
+
+
+@numba.njit(cache=True, nogil=True)
+def lengthened(a: Arrays, r: Routes, u: int, delta: float) -> float:
+    """Cost [m] of making UAV u's route longer by delta [m]; inf where it may not."""
+    over = r.length[u] + delta - a.reach[u]
+    if over <= TINY:
+        return float(delta - a.excess_cost * max(0.0, r.length[u] - a.reach[u]))
+    if a.hard:
+        return np.inf
+    return float(delta + a.excess_cost * (over - max(0.0, r.length[u] - a.reach[u])))
+
+
+@numba.njit(cache=True, nogil=True)
+def stretch(a: Arrays, r: Routes, u: int, delta: float) -> None:
+    """Make UAV u's route longer by delta [m]."""
+    before = r.length[u]
+    r.length[u] = before + delta
+    r.sums[DISTANCE] += delta
+    r.sums[EXCESS] += max(0.0, before + delta - a.reach[u]) - max(0.0, before - a.reach[u])
+
+
+@numba.njit(cache=True, nogil=True)
+def insert(a: Arrays, r: Routes, t: int, after: int) -> None:
+    """Put the left out task node t behind node `after`."""
+    u, then = r.on[after], r.next[after]
+    first, second = step(a, after, t), step(a, t, then)
+    delta = first + second - r.leg[after]
+    r.next[after], r.prev[t], r.next[t], r.prev[then] = t, after, then, t
+    r.leg[after], r.leg[t] = first, second
+    r.on[t] = u
+    r.tasks[u] += 1
+    stretch(a, r, u, delta)
+    r.sums[LEFT_OUT] -= a.price[t - a.uavs]
+    r.sums[VALUE] += a.value[t - a.uavs]
+
+
+@numba.njit(cache=True, nogil=True)
+def remove(a: Arrays, r: Routes, t: int) -> None:
+    """Take the task node t out of its route."""
+    u, before, then = r.on[t], r.prev[t], r.next[t]
+    direct = step(a, before, then)
+    delta = direct - r.leg[before] - r.leg[t]
+    r.next[before], r.prev[then] = then, before
+    r.leg[before] = direct
+    r.on[t] = -1
+    r.tasks[u] -= 1
+    stretch(a, r, u, delta)
+    r.sums[LEFT_OUT] += a.price[t - a.uavs]
+    r.sums[VALUE] -= a.value[t - a.uavs]

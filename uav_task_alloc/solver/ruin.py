@@ -1,0 +1,149 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a searching bee takes out and puts back in: strings of routes, undone by a log.
+
+After Christiaens and Vanden Berghe, Slack Induction by String Removals (2020).
+"""
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numba
+import numpy as np
+
+from uav_task_alloc.solver.chance import Chance, below, uniform
+from uav_task_alloc.solver.insertion import any_place, near_place
+from uav_task_alloc.solver.routes import Arrays, Floats, Ints, Routes, insert, remove
+
+STRING = 10  # tasks in a string at most
+SPLIT = 0.5  # share of strings with a part that stays
+REACH = 12  # neighbours looked at for a place
+BLINKS = 0.01  # share of places overlooked
+
+
+class Log(NamedTuple):
+    """What was done since the last mark, and who is out."""
+
+    node: Ints
+    after: Ints  # where it was before it was removed; -1: it was inserted
+    out: Ints  # task nodes to put back
+    key: Floats  # they go in by this, smallest first
+    size: Ints  # entries of (node and after, out)
+    hit: Ints  # (m) round in which a route was last ruined
+
+
+def empty_log(a: Arrays) -> Log:
+    """A log with room for the longest round."""
+    room = 2 * (a.ends - a.uavs) + 2
+    return Log(np.empty(2 * room, np.int64), np.empty(2 * room, np.int64),
+               np.empty(room, np.int64), np.empty(room), np.zeros(2, np.int64),
+               np.zeros(a.uavs, np.int64))
+
+
+@numba.njit(cache=True, nogil=True)
+def _take(a: Arrays, r: Routes, log: Log, t: int) -> None:
+    log.node[log.size[0]], log.after[log.size[0]] = t, r.prev[t]
+    log.out[log.size[1]] = t
+    log.size[0] += 1
+    log.size[1] += 1
+    remove(a, r, t)
+
+
+@numba.njit(cache=True, nogil=True)
+def undo(a: Arrays, r: Routes, log: Log) -> None:
+    """Back to how it was."""
+    while log.size[0] > 0:
+        log.size[0] -= 1
+        node, after = log.node[log.size[0]], log.after[log.size[0]]
+        if after < 0:
+            remove(a, r, node)
+        else:
+            insert(a, r, node, after)
+
+
+@numba.njit(cache=True, nogil=True)
+def _string(a: Arrays, r: Routes, log: Log, c: int, size: int, rng: Chance) -> None:
+    """Remove `size` tasks around c, sometimes leaving a few within the string."""
+    count, stay = r.tasks[r.on[c]], 0
+    if size > 1 and size < count and uniform(rng) < SPLIT:
+        stay = 1
+        while size + stay < count and uniform(rng) > 0.5:
+            stay += 1
+    t, back = c, below(rng, size + stay)
+    while back > 0 and r.prev[t] >= a.uavs:
+        t, back = r.prev[t], back - 1
+    keep_from = 1 + below(rng, size - 1) if stay else size
+    for i in range(size + stay):
+        if t >= a.ends:
+            break
+        then = r.next[t]
+        if i < keep_from or i >= keep_from + stay:
+            _take(a, r, log, t)
+        t = then
+
+
+@numba.njit(cache=True, nogil=True)
+def ruin(a: Arrays, r: Routes, log: Log, mean: float, round_id: int, rng: Chance) -> None:
+    """Remove about `mean` tasks in strings of routes around a random one. O(mean)."""
+    log.size[0] = log.size[1] = 0
+    tasks = a.ends - a.uavs
+    seed = a.uavs + below(rng, tasks)
+    served = max(1, tasks // max(1, a.uavs))
+    longest = min(float(STRING), max(1.0, float(served)))
+    strings = int(1.0 + uniform(rng) * (4.0 * mean / (1.0 + longest) - 1.0))
+    left_out = 0
+    for m in range(-1, a.near.shape[1]):
+        c = seed if m < 0 else a.near[seed - a.uavs, m]
+        u = r.on[c]
+        if u < 0:
+            if left_out < 10 and not _is_out(log, c):
+                log.out[log.size[1]] = c
+                log.size[1] += 1
+                left_out += 1
+        elif log.hit[u] != round_id and strings > 0:
+            log.hit[u] = round_id
+            strings -= 1
+            size = 1 + below(rng, int(min(longest, float(r.tasks[u]))))
+            _string(a, r, log, c, size, rng)
+
+
+@numba.njit(cache=True, nogil=True)
+def _is_out(log: Log, t: int) -> bool:
+    for i in range(log.size[1]):  # noqa: SIM110 - numba knows no any()
+        if log.out[i] == t:
+            return True
+    return False
+
+
+@numba.njit(cache=True, nogil=True)
+def _order(a: Arrays, log: Log, rng: Chance) -> None:
+    """Sort who is out: at random, furthest first, nearest first or dearest first."""
+    kind = below(rng, 8)
+    for i in range(log.size[1]):
+        t = log.out[i]
+        key = uniform(rng)
+        if kind >= 4 and kind < 6:
+            key = -a.start_length[t - a.uavs, 0]
+        elif kind == 6:
+            key = a.start_length[t - a.uavs, 0]
+        elif kind == 7:
+            key = -a.price[t - a.uavs]
+        place = i
+        while place > 0 and log.key[place - 1] > key:
+            log.key[place], log.out[place] = log.key[place - 1], log.out[place - 1]
+            place -= 1
+        log.key[place], log.out[place] = key, t
+
+
+@numba.njit(cache=True, nogil=True)
+def recreate(a: Arrays, r: Routes, log: Log, rng: Chance) -> None:
+    """Put back in who is out, each where it costs least and less than leaving it out."""
+    _order(a, log, rng)
+    for i in range(log.size[1]):
+        t = log.out[i]
+        place, delta = near_place(a, r, t, REACH, BLINKS, rng)
+        if place < 0 and (a.picky[t - a.uavs] or not a.hard):
+            place, delta = any_place(a, r, t)
+        if place >= 0 and (not a.hard or delta < a.price[t - a.uavs]):
+            insert(a, r, t, place)
+            log.node[log.size[0]], log.after[log.size[0]] = t, -1
+            log.size[0] += 1

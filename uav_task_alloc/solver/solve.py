@@ -1,0 +1,77 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The recipe: check, make arrays, repair or construct, let a solver improve it, answer."""
+from __future__ import annotations
+
+import functools
+import math
+import time
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from itertools import pairwise
+
+from uav_task_alloc.errors import UnknownName
+from uav_task_alloc.model import Plan, Task, ThreatZone, Uav
+from uav_task_alloc.objective import Weights
+from uav_task_alloc.solver.answer import to_plan
+from uav_task_alloc.solver.check import check_locked, check_options, check_unique
+from uav_task_alloc.solver.problem import Limits, Problem, Rules, make_problem
+from uav_task_alloc.solver.recorder import Recorder
+from uav_task_alloc.solver.registry import SOLVERS
+from uav_task_alloc.solver.warm import State, repaired
+
+
+def plan(uavs: Iterable[Uav], tasks: Iterable[Task], zones: Iterable[ThreatZone] = (), *,
+         budget: float = 0.1, seed: int = 0, solver: str = 'chain_q', warm: Plan | None = None,
+         route_end: str = 'hold', hard_range: bool = True,
+         locked: Mapping[str, Sequence[str]] | None = None, weights: Weights | None = None,
+         clearance: float = 0.0, altitude_min: float = -math.inf,
+         altitude_max: float = math.inf, threads: int = 1,
+         stop: Callable[[], bool] | None = None, max_iterations: int | None = None,
+         clock: Callable[[], float] = time.perf_counter) -> Plan:
+    """Who does what in which order: the best found within `budget` [s].
+
+    Every task that can be served is served; where ranges do not suffice the most value is, then
+    on the shortest way. hard_range=False: ranges may be exceeded at the price of eq 2.12.
+    `warm` is an earlier plan to go on from, never worsened; `locked` lists the first tasks of
+    UAVs that stay as they are. `stop` is asked between rounds. The same seed and
+    `max_iterations` on one thread give the same plan. The first call in a process loads or
+    compiles the kernels before its budget begins. Raises InvalidValue, UnknownName.
+    """
+    if solver not in SOLVERS:
+        raise UnknownName('solver', solver, list(SOLVERS))
+    check_options(budget, route_end, threads, warm, max_iterations)
+    fleet, work = check_unique('uav', uavs, Uav), check_unique('task', tasks, Task)
+    limits = Limits(check_unique('zone', zones, ThreatZone), clearance, altitude_min,
+                    altitude_max)
+    rules = Rules(route_end == 'home', hard_range, weights or Weights())
+    warm_up()
+    began = clock()
+    problem = make_problem(fleet, work, check_locked(locked, fleet, work, limits), limits, rules,
+                           State.of(warm).problem)
+    recorder = Recorder(problem, clock, began, budget, max_iterations, stop, threads,
+                        _held(problem))
+    recorder.offer(repaired(problem, warm))
+    learnt = SOLVERS[solver](recorder, seed, State.of(warm).learnt)
+    return to_plan(problem, recorder, State(problem, learnt), solver, warm is not None)
+
+
+def _held(problem: Problem) -> tuple[float, float]:
+    """Length [m] and value of what is locked."""
+    length, value = 0.0, 0.0
+    for u, uav in enumerate(problem.uavs):
+        places = problem.locked_places(u)
+        length += sum(problem.distances.length(i, j) for i, j in pairwise(places))
+        value += sum(task.value for task in problem.locked.get(uav.id, ()))
+    return length, value
+
+
+@functools.cache
+def warm_up() -> None:
+    """Load the kernels, compile those that are not on disk yet; does nothing a second time."""
+    uavs = (Uav('u', (0.0, 0.0, 0.0)), Uav('v', (9.0, 0.0, 0.0), 30.0))
+    tasks = tuple(Task(f't{i}', (float(i), 1.0, 0.0)) for i in range(5))
+    problem = make_problem(uavs, tasks, {}, Limits(), Rules())
+    for solve in SOLVERS.values():
+        recorder = Recorder(problem, lambda: 0.0, 0.0, 1.0, max_iterations=64)
+        recorder.offer(repaired(problem, None))
+        solve(recorder, 0, None)
+        to_plan(problem, recorder, None, '', False)

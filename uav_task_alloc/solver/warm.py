@@ -1,0 +1,59 @@
+# SPDX-License-Identifier: Apache-2.0
+"""An earlier plan brought into the world as it is: what still holds stays, new tasks go in."""
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numba
+import numpy as np
+
+from uav_task_alloc.model import Plan
+from uav_task_alloc.solver import routes as of
+from uav_task_alloc.solver.chance import chance
+from uav_task_alloc.solver.insertion import cheapest_first
+from uav_task_alloc.solver.problem import Problem
+from uav_task_alloc.solver.routes import Arrays, Ints, Routes, insert, lengthened, step
+
+
+@dataclass(frozen=True, slots=True)
+class State:
+    """What a plan carries for the next warm start."""
+
+    problem: Problem | None = None  # lengths that are known
+    learnt: Any = None  # what the solver wants back
+
+    @classmethod
+    def of(cls, plan: Plan | None) -> State:
+        """The state of a plan; an empty one where there is none."""
+        found = None if plan is None else plan.state
+        return found if isinstance(found, State) else cls()
+
+
+def repaired(problem: Problem, warm: Plan | None) -> Routes:
+    """The routes of `warm` without what is gone, forbidden or too far, and all else put in."""
+    a, routes = problem.arrays, of.empty_routes(problem.arrays)
+    nodes: list[int] = []
+    bounds = [0]
+    index, before = problem.index, warm.routes if warm else {}
+    for uav in problem.uavs:
+        nodes += [a.uavs + index[t] for t in before.get(uav.id, ()) if t in index]
+        bounds.append(len(nodes))
+    replay(a, routes, np.array(nodes, np.int64), np.array(bounds, np.int64))
+    cheapest_first(a, routes, chance(0))
+    return routes
+
+
+@numba.njit(cache=True, nogil=True)
+def replay(a: Arrays, r: Routes, nodes: Ints, bounds: Ints) -> None:
+    """Give UAV u the task nodes bounds[u]..bounds[u + 1] in order, if it may. O(n)"""
+    for u in range(a.uavs):
+        last = r.prev[a.ends + u]
+        for i in range(bounds[u], bounds[u + 1]):
+            t, end = nodes[i], a.ends + u
+            if r.on[t] >= 0 or not a.may[u, t - a.uavs]:
+                continue
+            delta = step(a, last, t) + step(a, t, end) - r.leg[last]
+            if lengthened(a, r, u, delta) < np.inf:
+                insert(a, r, t, last)
+                last = t
