@@ -27,7 +27,8 @@ def plan_command(argv: Sequence[str]) -> int:
     zones = [timed.zone for timed in read.zones]
     from uav_task_alloc.solver.solve import plan  # compiles: only where something is solved
     made = plan(uavs, tasks, zones, budget=args.budget, solver=args.solver,
-                route_end=args.route_end, seed=read.seed if args.seed is None else args.seed)
+                seed=read.seed if args.seed is None else args.seed,
+                route_end=args.route_end or read.route_end)
     print(plan_text(made))
     if args.json:
         args.json.write_text(json.dumps(plan_json(made), indent=2) + '\n')
@@ -46,8 +47,8 @@ def plan_parser() -> argparse.ArgumentParser:
     parser.add_argument('--solver', default='chain_q', help='one of SOLVERS (%(default)s)')
     parser.add_argument('--budget', type=float, default=1.0, help='[s] of solving (%(default)s)')
     parser.add_argument('--seed', type=int, help="of the solver (the scenario's)")
-    parser.add_argument('--route-end', default='hold', choices=('hold', 'home'),
-                        help='what a UAV does after its last task (%(default)s)')
+    parser.add_argument('--route-end', choices=('hold', 'home'),
+                        help="what a UAV does after its last task (the scenario's)")
     parser.add_argument('--json', type=Path, metavar='OUT', help='write the plan as JSON')
     parser.add_argument('--plot', type=Path, metavar='OUT.png', help='draw the plan')
     return parser

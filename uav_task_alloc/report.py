@@ -130,8 +130,8 @@ def main(argv: Sequence[str]) -> int:
     try:
         summary = summarise(out) if place.is_dir() else json.loads(place.read_text())
         print(table(summary))
-        from uav_task_alloc import plots  # matplotlib is wanted here only
-        plots.draw_flight(out, out / 'map.png')
+        from uav_task_alloc.plots import draw_flight  # matplotlib is wanted here only
+        draw_flight(out, out / 'map.png')
     except OSError as error:
         raise SystemExit(f'{error.filename}: {error.strerror}: expected a recorded run') from None
     print(f'Map: {out / "map.png"}')

@@ -70,6 +70,7 @@ def start_nodes(args: argparse.Namespace, out: Path) -> list[Child]:
     played = {'scenario': str(args.scenario), 'speedup': args.speedup}
     return [
         Child.start('allocator', out, uav_timeout=2.0, seed=scenario.seed,
+                    route_end=scenario.route_end,
                     state_dir=str(out / 'state'), **origin),
         Child.start('mavlink_bridge', out, connections=[f'udpin:127.0.0.1:{port}'],
                     takeoff=True, **origin),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 import sys
 import time
 from collections.abc import Callable
@@ -109,6 +110,8 @@ class LiveView(Node):
         lines = [headline(self.heard, clock)]
         if sys.stdout.isatty():
             lines += fleet(self.heard, time.time())
+            width = shutil.get_terminal_size().columns - 1  # a line that wraps cannot be undone
+            lines = [line[:width] for line in lines]
             sys.stdout.write(UP_AND_CLEAR.format(self.shown) if self.shown else '')
             self.shown = len(lines)
         elif self.refreshes % PLAIN_EVERY and not self.finished:

@@ -94,6 +94,7 @@ SCENARIO: Table = {
     'seed': Key(whole(0, 2**32 - 1), 'of all that is random in it', 0),
     'origin': Key(mapping(ORIGIN, 'a mapping with latitude, longitude, altitude_amsl'),
                   'where ENU (0, 0, 0) is; default: 47.397742, 8.545594, 488.0', None),
+    'route_end': Key(choice('hold', 'home'), 'what a UAV does after its last task', 'hold'),
     'uavs': Key(many(mapping(UAV, 'a UAV'), 'a list of UAVs'), 'the fleet'),
     'tasks': Key(many(mapping(TASK, 'a task'), 'a list of tasks'), 'tasks with their times',
                  ()),

@@ -73,6 +73,7 @@ class Scenario:
     tasks: tuple[TimedTask, ...]  # by `at`
     zones: tuple[TimedZone, ...] = ()
     cancels: tuple[Cancel, ...] = ()  # by `at`
+    route_end: str = 'hold'  # hold | home
 
     @property
     def duration(self) -> float:
