@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import struct
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 Message = Any  # a dialect.MAVLink_message; the dialect has no usable types
-Signing = dialect.MAVLinkSigning  # one for all parsers of a link, else a replay finds a new one
+Signing = Any  # a dialect.MAVLinkSigning; all parsers share one, else a replay finds a new one
 
 # The dialect lacks the mission id that PX4 appends (opaque_id, mission_id): where it begins.
 _PLAN_ID_AT = {
@@ -24,8 +24,11 @@ class _Parser(dialect.MAVLink):  # type: ignore[misc]
     """The dialect's parser, which skips unwanted messages and survives forged signatures."""
 
     wanted: Collection[int] | None = None
+    tap: Callable[[bytes], None] | None = None
 
     def decode(self, msgbuf: bytearray) -> Message:
+        if self.tap is not None:
+            self.tap(bytes(msgbuf))
         if self.wanted is not None:
             number = (msgbuf[7] | msgbuf[8] << 8 | msgbuf[9] << 16 if msgbuf[0] == 253
                       else msgbuf[5])
@@ -45,15 +48,16 @@ class _Parser(dialect.MAVLink):  # type: ignore[misc]
 class Codec:
     """What one station says (`pack`) and hears (`parse`); one for each peer: parsers hold state.
 
-    `wanted` names the message ids worth decoding, None all of them. Bad bytes are counted in
-    `errors`, never raised.
+    `wanted` names the message ids worth decoding, None all of them; `tap` sees every whole frame.
+    Bad bytes are counted in `errors`, never raised.
     """
 
     def __init__(self, system_id: int, component_id: int, *,
-                 wanted: Collection[int] | None = None, signing: Signing | None = None) -> None:
+                 wanted: Collection[int] | None = None, signing: Signing | None = None,
+                 tap: Callable[[bytes], None] | None = None) -> None:
         self._mav = _Parser(None, system_id, component_id)
         self._mav.robust_parsing = True
-        self._mav.wanted = wanted
+        self._mav.wanted, self._mav.tap = wanted, tap
         if signing is not None:
             self._mav.signing = signing
 
@@ -85,7 +89,7 @@ class Codec:
 
 def make_signing(key: bytes, timestamp: int, link_id: int = 0) -> Signing:
     """Sign what goes out and refuse what is not signed by `key` (32 bytes); time in 10 us."""
-    signing = Signing()
+    signing = dialect.MAVLinkSigning()
     signing.secret_key = key
     signing.timestamp = timestamp
     signing.link_id = link_id

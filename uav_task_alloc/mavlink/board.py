@@ -1,0 +1,258 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What one vehicle has on board against what it should have: the list, the mission, its state."""
+from __future__ import annotations
+
+import random
+from collections import deque
+from dataclasses import dataclass, replace
+from enum import Enum
+
+from uav_task_alloc.errors import MissionError
+from uav_task_alloc.geometry.frames import Origin
+from uav_task_alloc.mavlink.change import Change, Kind, change
+from uav_task_alloc.mavlink.codec import Message, plan_id
+from uav_task_alloc.mavlink.peer import NO_SPACE, Peer
+from uav_task_alloc.mavlink.profiles import Profile
+from uav_task_alloc.mavlink.progress import ProgressTable
+from uav_task_alloc.mavlink.telemetry import Telemetry
+from uav_task_alloc.mavlink.upload import Accepted, Failed, Held, Mission, Upload, Verified
+from uav_task_alloc.mission import (
+    Item,
+    TaskList,
+    all_alike,
+    home_item,
+    mission_items,
+)
+
+
+class MissionState(Enum):
+    """What is known of the mission on board; numbers as in UavState."""
+
+    UNKNOWN = 0
+    UPLOADING = 1
+    VERIFIED = 2
+    MIXED = 3
+    FOREIGN = 4
+
+
+@dataclass(frozen=True, slots=True)
+class Note:
+    """Something a human should read."""
+
+    level: str  # 'info', 'warning', 'error'
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class TaskFailed:
+    """A task that this vehicle does not take."""
+
+    task: str
+    reason: str
+
+
+class Board:
+    """The mission of one vehicle; seq counts without home, which ArduPilot keeps at 0."""
+
+    def __init__(self, peer: Peer, profile: Profile, origin: Origin, telemetry: Telemetry,
+                 rng: random.Random) -> None:
+        self.upload = Upload(peer, idle_after=profile.idle_after, rng=rng)
+        self.progress = ProgressTable()
+        self.own = int(profile.rules.home_first)
+        self.tasks: TaskList | None = None
+        self.held: tuple[Item, ...] | None = None  # None: to be read
+        self.revision = 0  # of the last list verified on board
+        self.failed: deque[TaskFailed] = deque()
+        self.notes: deque[Note] = deque()
+        self.trouble = False  # the last transfer failed; somebody decides when to try again
+        self.verified_at = 0.0  # [s]
+        self.read_once = False  # since the vehicle was first heard or restarted
+        self.must_jump: int | None = None  # the item to fly now, where the upload did not say it
+        self._profile, self._origin, self._telemetry = profile, origin, telemetry
+        self._refused: set[str] = set()
+        self._horizon: int | None = None  # stops; None: all
+        self._state = MissionState.UNKNOWN
+        self._uploading: tuple[Change, int] | None = None  # and the revision it is for
+        self._begun = False  # the epoch of this upload
+        self.plan_id = self._heard_plan = 0  # PX4's id of the mission verified, last heard
+        self._wanted: tuple[object, tuple[Item, ...]] | None = None
+
+    @property
+    def state(self) -> MissionState:
+        return MissionState.UPLOADING if self._uploading is not None else self._state
+
+    @property
+    def open(self) -> bool:
+        """A transfer runs, and the vehicle has not taken all of it."""
+        return self._uploading is not None and not self._begun
+
+    @property
+    def outdated(self) -> bool:
+        """The transfer is for an older list."""
+        return (self._uploading is not None and self.tasks is not None
+                and self._uploading[1] != self.tasks.revision)
+
+    def assign(self, tasks: TaskList) -> None:
+        """The latest list; older ones that come late are ignored."""
+        self.tasks = tasks
+        self._horizon = None
+
+    def remaining(self) -> TaskList:
+        """The list less what is flown or refused, up to the horizon."""
+        assert self.tasks is not None
+        tasks = self.tasks.without({*self.progress.completed, *self._refused})
+        return tasks if self._horizon is None else tasks.first(self._horizon)
+
+    def wanted(self) -> tuple[Item, ...]:
+        """The items to fly from here; a task that cannot be one is refused."""
+        key = (self.tasks, len(self.progress.completed), len(self._refused), self._horizon)
+        if self._wanted is not None and self._wanted[0] == key:
+            return self._wanted[1]
+        try:
+            items = mission_items(self.remaining(), self._profile.rules, self._origin)
+        except MissionError as error:
+            bad = next(s.task.id for s in self.remaining().stops if s.task.id in str(error))
+            self._refuse(bad, str(error))
+            return self.wanted()
+        self._wanted = key, items
+        return items
+
+    def change(self) -> Change:
+        """What has to change on board."""
+        assert self.held is not None
+        wanted, current = self.wanted(), self.progress.current
+        found = change(self.held, current, wanted)
+        if self._horizon is not None and found.kind is not Kind.KEEP and self._enough():
+            return Change(Kind.KEEP, self.held, current or 0)
+        room = self._profile.rules.capacity - self.own
+        if found.kind is Kind.APPEND and (self._profile.atomic or len(found.items) > room):
+            return change(self.held, current, wanted, append=False)
+        return found
+
+    def adopt(self, found: Change, now: float) -> None:
+        """The list is on board already."""
+        assert self.tasks is not None
+        if self.revision != self.tasks.revision or self._state is not MissionState.VERIFIED:
+            self._verify(found.items, self.tasks.revision, now)
+            self.progress.retag(found.items)
+
+    def begin_upload(self, found: Change, now: float) -> list[Message]:
+        """Bring it on board."""
+        assert self.tasks is not None
+        self._uploading, self._begun, self.trouble = (found, self.tasks.revision), False, False
+        home = () if not self.own else (home_item(
+            self._telemetry.home, self._origin, self._profile.rules),)
+        return self.upload.replace(Mission(
+            home + found.items, found.start + self.own, self._profile.atomic, self.own), now)
+
+    def receive(self, message: Message, now: float) -> list[Message]:
+        """Take a message of the mission service."""
+        if message.get_type() in ('MISSION_ACK', 'MISSION_COUNT'):
+            self._heard_plan = plan_id(message)
+        out = self.upload.receive(message, now)
+        self._settle(now)
+        return out
+
+    def step(self, now: float) -> list[Message]:
+        out = self.upload.step(now)
+        self._settle(now)
+        return out
+
+    def restarted(self) -> None:
+        """The vehicle forgot its transfer, and perhaps its mission."""
+        self.upload.reset()
+        self.progress.invalidate()
+        self.held, self._uploading, self._state = None, None, MissionState.UNKNOWN
+        self.read_once = False
+
+    def foreign(self) -> None:
+        """Somebody else's mission is on board."""
+        self._state = MissionState.FOREIGN
+
+    def doubt(self) -> None:
+        """Read what is on board before anything else."""
+        self.held = None
+
+    def _settle(self, now: float) -> None:
+        while self.upload.events:
+            event = self.upload.events.popleft()
+            if isinstance(event, Held):
+                self._was_read(event, now)
+            elif self._uploading is not None:
+                found, revision = self._uploading
+                if isinstance(event, Accepted):
+                    self._begin(found, now)
+                elif isinstance(event, Verified):
+                    self._begin(found, now)
+                    self._uploading = None
+                    self._verify(found.items, revision, now)
+                else:
+                    self._uploading = None
+                    self._was_refused(event, found, now)
+
+    def _begin(self, found: Change, now: float) -> None:
+        if self._begun:
+            return
+        self._begun = True
+        if found.kind is Kind.APPEND:
+            self.progress.extend(found.items)
+            return
+        self.progress.begin(found.items, found.start, now)
+        if not self._profile.atomic:
+            self.must_jump = found.start
+
+    def _verify(self, items: tuple[Item, ...], revision: int, now: float) -> None:
+        self.held, self.revision, self.verified_at = items, revision, now
+        self._state, self.read_once = MissionState.VERIFIED, True
+        self.plan_id = self._heard_plan
+
+    def _was_read(self, event: Held, now: float) -> None:
+        if event.items is None:
+            self.trouble = True
+            return
+        held, known = event.items[self.own:], self.progress.items
+        if known and all_alike(known, held):
+            self.held, self.verified_at = known, now
+            if self._state is not MissionState.MIXED:
+                self._state = MissionState.VERIFIED
+            return
+        self.held, self.verified_at = held, now
+        if self._state is MissionState.VERIFIED or (self.tasks is None and held):
+            self._state = MissionState.FOREIGN
+        current = self._telemetry.current
+        self.progress.begin(held, None if current is None or not held
+                            else max(0, current - self.own), now)
+
+    def _was_refused(self, event: Failed, found: Change, now: float) -> None:
+        self.notes.append(Note('error', f'mission upload failed: {event.reason}'))
+        self.held, self.trouble = None, True
+        self._state = MissionState.UNKNOWN if self._profile.atomic else MissionState.MIXED
+        stops = [item.task for item in found.items if item.completes]
+        if event.result == NO_SPACE and len(stops) > 1:
+            self._horizon = len(stops) // 2
+            self.trouble = False
+            self.notes.append(Note('warning', 'no space on board: flying the first '
+                                   f'{self._horizon} tasks of {len(stops)}, the others follow'))
+        elif event.result is not None:
+            seq = min(max((event.seq or 0) - self.own, 0), len(found.items) - 1)
+            task = next((i.task for i in found.items[seq:] if i.task), stops[0] if stops else '')
+            self._refuse(task, event.reason)
+            self.trouble = False
+        elif 'infeasible' in event.reason:
+            for task in stops:
+                self._refuse(task, event.reason)
+
+    def _refuse(self, task: str, reason: str) -> None:
+        self._refused.add(task)
+        self.failed.append(TaskFailed(task, reason))
+
+    def _enough(self) -> bool:
+        """While half a horizon of the latest list is still on board, nothing is uploaded."""
+        assert self.tasks is not None
+        assert self.held is not None
+        everything = replace(self.tasks.without({*self.progress.completed, *self._refused}),
+                             returns=False, end_via=())
+        wanted = mission_items(everything, self._profile.rules, self._origin)
+        rest = self.held[self.progress.current or 0:]
+        stops = sum(item.completes for item in rest)
+        return stops >= max(1, (self._horizon or 0) // 2) and all_alike(wanted[:len(rest)], rest)

@@ -1,0 +1,67 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What has to change on board for a new list: nothing, the current item, the tail, or all."""
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+
+from uav_task_alloc.mission import Item, all_alike
+
+
+class Kind(Enum):
+    """Ways to a new list, the cheapest first."""
+
+    KEEP = 'keep'
+    JUMP = 'jump'  # set the current item
+    APPEND = 'append'  # nothing changes but the end
+    SWAP = 'swap'
+
+
+@dataclass(frozen=True, slots=True)
+class Change:
+    """The whole mission to have on board, and the item to fly now."""
+
+    kind: Kind
+    items: tuple[Item, ...]
+    start: int
+
+
+def change(held: tuple[Item, ...], current: int | None, wanted: tuple[Item, ...], *,
+           append: bool = True) -> Change:
+    """From the items on board, of which `current` is flown (None: none), to the wanted ones.
+
+    `wanted` begins with the way to its first task. Detour points of it that have been flown are
+    not flown again; those that have not are, even where the vehicle is beyond: a zone is there.
+    """
+    if not wanted:
+        raise ValueError('wanted items = (): expected at least one')
+    if current is not None:
+        passed = _passed(held, current, wanted)
+        rest = held[current:]
+        if passed is not None and rest and all_alike(wanted[passed:], rest):
+            return Change(Kind.KEEP, _retag(held, current, wanted[passed:]), current)
+    start = len(held) - len(wanted)
+    if start >= 0 and all_alike(wanted, held[start:]):
+        return Change(Kind.JUMP, _retag(held, start, wanted), start)
+    if current is not None and rest and passed is not None:
+        ahead = wanted[passed:]
+        if append and len(ahead) > len(rest) and all_alike(ahead[:len(rest)], rest):
+            return Change(Kind.APPEND, held[:current] + ahead, current)
+        return Change(Kind.SWAP, wanted, passed)
+    return Change(Kind.SWAP, wanted, 0)
+
+
+def _passed(held: tuple[Item, ...], current: int, wanted: tuple[Item, ...]) -> int | None:
+    """How many detour points of the first leg lie behind; None where another leg is flown."""
+    leg = next((n for n, item in enumerate(wanted) if item.completes or not item.task),
+               len(wanted) - 1)
+    for count in range(min(leg, current), -1, -1):
+        if all_alike(wanted[:count + 1], held[current - count:current + 1]):
+            return count
+    return None
+
+
+def _retag(held: tuple[Item, ...], start: int, wanted: tuple[Item, ...]) -> tuple[Item, ...]:
+    """What was read back knows no tasks: take them from the list."""
+    return held[:start] + wanted
+

@@ -1,0 +1,99 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The ground station for many vehicles on many links, without I/O: finds them, and keeps apart."""
+from __future__ import annotations
+
+import random
+from collections.abc import Collection, Hashable, Iterable
+from dataclasses import dataclass, field
+
+from pymavlink.dialects.v20 import ardupilotmega as d
+
+from uav_task_alloc.errors import UnknownName
+from uav_task_alloc.geometry.frames import Origin
+from uav_task_alloc.mavlink.codec import Message
+from uav_task_alloc.mavlink.peer import Peer
+from uav_task_alloc.mavlink.pilot import Pilot, Policy
+from uav_task_alloc.mavlink.profiles import profile_of
+from uav_task_alloc.mission import TaskList
+
+Address = Hashable  # a link and the far end on it
+Outgoing = list[tuple[Address, Message]]
+
+
+@dataclass(frozen=True, slots=True)
+class Station:
+    """Who we are and whom we serve."""
+
+    system: int = 245
+    component: int = 190
+    system_ids: Collection[int] = ()  # empty: all that are heard
+    uav_id_pattern: str = 'uav_{sysid}'
+    autopilot: str = 'auto'
+    origin: Origin = field(default_factory=lambda: Origin(0.0, 0.0))
+    policy: Policy = field(default_factory=Policy)
+
+
+@dataclass(slots=True)
+class Served:
+    """One vehicle and where it was last heard."""
+
+    uav_id: str
+    address: Address
+    pilot: Pilot
+    strays: int = 0  # frames with its system id from elsewhere
+
+
+class Ground:
+    """Routes each message to the pilot of its vehicle, and the answers back the same way."""
+
+    def __init__(self, station: Station, rng: random.Random) -> None:
+        self._station, self._rng = station, rng
+        self.served: dict[int, Served] = {}  # by system id
+
+    def receive(self, address: Address, message: Message, now: float) -> Outgoing:
+        """Take a message that came in at `address`."""
+        system = message.get_srcSystem()
+        if message.get_srcComponent() != d.MAV_COMP_ID_AUTOPILOT1:
+            return []
+        served = self.served.get(system) or self._discover(address, message, now)
+        if served is None:
+            return []
+        if served.address != address:
+            # the same id twice would bring one plane's mission to the other
+            if not served.pilot.telemetry.stale(now):
+                served.strays += 1
+                return []
+            served.address = address
+        return self._sent(served, served.pilot.receive(message, now))
+
+    def step(self, now: float) -> Outgoing:
+        """Let time pass for all."""
+        out: Outgoing = []
+        for served in self.served.values():
+            out += self._sent(served, served.pilot.step(now))
+        return out
+
+    def assign(self, uav_id: str, tasks: TaskList, now: float) -> Outgoing:
+        """A list for one UAV; raise UnknownName where it was not heard."""
+        for served in self.served.values():
+            if served.uav_id == uav_id:
+                return self._sent(served, served.pilot.assign(tasks, now))
+        raise UnknownName('uav', uav_id, [s.uav_id for s in self.served.values()])
+
+    def _discover(self, address: Address, message: Message, now: float) -> Served | None:
+        station, system = self._station, message.get_srcSystem()
+        if (message.get_type() != 'HEARTBEAT' or system in (0, station.system)
+                or message.autopilot == d.MAV_AUTOPILOT_INVALID
+                or message.type == d.MAV_TYPE_GCS
+                or (station.system_ids and system not in station.system_ids)):
+            return None
+        peer = Peer(system, message.get_srcComponent(), station.system, station.component)
+        pilot = Pilot(peer, profile_of(message, station.autopilot), station.origin,
+                      station.policy, random.Random(self._rng.random()), now)
+        served = Served(station.uav_id_pattern.format(sysid=system), address, pilot)
+        self.served[system] = served
+        return served
+
+    @staticmethod
+    def _sent(served: Served, messages: Iterable[Message]) -> Outgoing:
+        return [(served.address, message) for message in messages]

@@ -1,0 +1,161 @@
+# SPDX-License-Identifier: Apache-2.0
+"""All links as one: a parser for each far end, one voice, signing, a recording, a heartbeat."""
+from __future__ import annotations
+
+import hashlib
+import selectors
+import struct
+import threading
+from collections.abc import Callable, Hashable, Iterable
+from pathlib import Path
+from typing import BinaryIO
+
+from pymavlink.dialects.v20 import ardupilotmega as d
+
+from uav_task_alloc.errors import InvalidValue
+from uav_task_alloc.mavlink.codec import Codec, Message, Signing, make_signing
+from uav_task_alloc.mavlink.link import Link
+from uav_task_alloc.mavlink.telemetry import WANTED
+
+SIGNING_EPOCH = 1420070400  # [s] 2015-01-01, from which signatures count 10 us
+STAMP_PERIOD = 5.0  # [s] between writes of the timestamp, which runs ahead by that much
+MAX_ENDS = 256  # far ends with a parser; a flood of forged senders gets no further
+
+Address = tuple[int, Hashable]  # number of the link, far end on it
+
+
+class Radio:
+    """Bytes on links to messages and back; thread safe to send, one thread may receive."""
+
+    def __init__(self, links: Iterable[Link], system: int, component: int, *,
+                 wall: Callable[[], float], signing_key_file: str = '',
+                 tlog: str = '') -> None:
+        self.links = list(links)
+        self._ids, self._wall = (system, component), wall
+        self._record: BinaryIO | None = open(tlog, 'ab') if tlog else None  # noqa: SIM115
+        self._stamp_file = Path(signing_key_file + '.timestamp') if signing_key_file else None
+        self._stamp_at = 0.0
+        self._signing = self._load_signing(signing_key_file)
+        self._voice = Codec(system, component, signing=self._signing)
+        self._parsers: dict[Address, Codec] = {}
+        self._lock = threading.Lock()  # held for the time of a pack and a non-blocking write
+        self._selector = selectors.DefaultSelector()
+        self._watched: dict[int, int] = {}  # link -> its file
+
+    def _load_signing(self, key_file: str) -> Signing | None:
+        if not key_file:
+            return None
+        stamp = int((self._wall() - SIGNING_EPOCH) * 1e5)
+        if self._stamp_file and self._stamp_file.exists():
+            stamp = max(stamp, int(self._stamp_file.read_text() or 0))
+        return make_signing(read_key(key_file), stamp)
+
+    def receive(self, timeout: float) -> list[tuple[Address, Message]]:
+        """What comes within `timeout` [s]; returns as soon as there is something."""
+        self._watch()
+        got: list[tuple[Address, Message]] = []
+        for key, _ in self._selector.select(timeout):
+            number = key.data
+            for end, data in self.links[number].read():
+                got += self._parse((number, end), data)
+        return got
+
+    def send(self, messages: Iterable[tuple[Hashable, Message]]) -> None:
+        """Each message to its address."""
+        with self._lock:
+            for address, message in messages:
+                number, end = address  # type: ignore[misc]
+                frame = self._voice.pack(message)
+                self._write_record(frame)
+                self.links[number].write(end, frame)
+
+    def send_to_all(self, message: Message) -> None:
+        """To every far end that is known."""
+        self.send(((number, end), message) for number, link in enumerate(self.links)
+                  for end in link.ends())
+
+    def step(self, now: float) -> None:
+        """Let time pass: reconnect, and keep the signing timestamp on disk."""
+        for link in self.links:
+            link.step(now)
+        if self._signing is None or self._stamp_file is None or now < self._stamp_at:
+            return
+        self._stamp_at = now + STAMP_PERIOD
+        stamp = int((self._wall() - SIGNING_EPOCH) * 1e5)
+        self._signing.timestamp = max(self._signing.timestamp, stamp)
+        # ahead, so that what is signed until the next write is not used again after a crash
+        self._stamp_file.write_text(str(self._signing.timestamp + int(2e5 * STAMP_PERIOD)))
+
+    def errors(self) -> int:
+        """Frames refused so far, on all links."""
+        return sum(parser.errors for parser in self._parsers.values())
+
+    def close(self) -> None:
+        for link in self.links:
+            link.close()
+        self._selector.close()
+        if self._record:
+            self._record.close()
+
+    def _watch(self) -> None:
+        for number, link in enumerate(self.links):
+            file, old = link.fileno(), self._watched.get(number, -1)
+            if file != old:
+                if old >= 0:
+                    self._selector.unregister(old)
+                if file >= 0:
+                    self._selector.register(file, selectors.EVENT_READ, number)
+                self._watched[number] = file
+
+    def _parse(self, address: Address, data: bytes) -> list[tuple[Address, Message]]:
+        parser = self._parsers.get(address)
+        if parser is None:
+            if len(self._parsers) >= MAX_ENDS:
+                self._parsers.pop(next(iter(self._parsers)))
+            parser = self._parsers[address] = Codec(
+                *self._ids, wanted=WANTED, signing=self._signing,
+                tap=self._write_record if self._record else None)
+        messages = parser.parse(data)
+        if self.links[address[0]].datagrams:
+            parser.drop()
+        return [(address, message) for message in messages]
+
+    def _write_record(self, frame: bytes) -> None:
+        if self._record:
+            self._record.write(struct.pack('>Q', int(self._wall() * 1e6)) + frame)
+
+
+def read_key(path: str) -> bytes:
+    """The 32 bytes of a signing key file: raw, 64 hex digits, or a pass phrase."""
+    try:
+        text = Path(path).read_bytes()
+    except OSError as error:
+        raise InvalidValue('signing_key_file', path, f'a readable file ({error})') from None
+    if len(text) == 32:
+        return text
+    text = text.strip()
+    if not text:
+        raise InvalidValue('signing_key_file', path, 'a file that is not empty')
+    try:
+        if len(text) == 64:
+            return bytes.fromhex(text.decode())
+    except ValueError:
+        pass
+    return hashlib.sha256(text).digest()
+
+
+class Heartbeat(threading.Thread):
+    """Says once a second that we are here, whatever else the process does."""
+
+    def __init__(self, send: Callable[[Message], None], period: float = 1.0) -> None:
+        super().__init__(name='heartbeat', daemon=True)
+        self._send, self._period, self._stop_now = send, period, threading.Event()
+
+    def run(self) -> None:
+        while not self._stop_now.wait(self._period):
+            self._send(d.MAVLink_heartbeat_message(
+                d.MAV_TYPE_GCS, d.MAV_AUTOPILOT_INVALID, 0, 0, d.MAV_STATE_ACTIVE, 3))
+
+    def close(self) -> None:
+        self._stop_now.set()
+        self.join(2.0 * self._period + 1.0)

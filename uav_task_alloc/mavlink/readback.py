@@ -1,0 +1,68 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Reading a mission back as a state machine: messages and time in, messages and items out."""
+from __future__ import annotations
+
+from enum import Enum
+
+from uav_task_alloc.mavlink.codec import Message
+from uav_task_alloc.mavlink.peer import ACCEPTED, Peer, received_item
+from uav_task_alloc.mission import Item
+
+PERIOD = 1.0  # [s] until a request is repeated
+TRIES = 8  # of one request
+
+
+class ReadState(Enum):
+    """Where a readback stands."""
+
+    LISTING = 'listing'
+    GETTING = 'getting'
+    DONE = 'done'
+    FAILED = 'failed'
+
+
+class Readback:
+    """One reading of the whole mission, started when made; `first` is its first message."""
+
+    def __init__(self, peer: Peer, now: float) -> None:
+        self._peer = peer
+        self.state = ReadState.LISTING
+        self.items: list[Item] = []
+        self._count = 0
+        self._tries, self._due = 1, now + PERIOD
+
+    @property
+    def first(self) -> Message:
+        return self._peer.request_list()
+
+    def receive(self, message: Message, now: float) -> list[Message]:
+        """Take a COUNT or an item; anything else is not for us."""
+        kind = message.get_type()
+        if kind == 'MISSION_COUNT' and self.state is ReadState.LISTING:
+            self._count = message.count
+            self.state = ReadState.GETTING
+            return self._next(now)
+        if (kind in ('MISSION_ITEM_INT', 'MISSION_ITEM') and self.state is ReadState.GETTING
+                and message.seq == len(self.items)):
+            self.items.append(received_item(message))
+            return self._next(now)
+        return []
+
+    def step(self, now: float) -> list[Message]:
+        """Repeat the request that is due, or give up."""
+        if self.state not in (ReadState.LISTING, ReadState.GETTING) or now < self._due:
+            return []
+        if self._tries >= TRIES:
+            self.state = ReadState.FAILED
+            return []
+        self._tries += 1
+        self._due = now + PERIOD
+        return [self.first if self.state is ReadState.LISTING
+                else self._peer.request(len(self.items))]
+
+    def _next(self, now: float) -> list[Message]:
+        if len(self.items) == self._count:
+            self.state = ReadState.DONE
+            return [self._peer.ack(ACCEPTED)]
+        self._tries, self._due = 1, now + PERIOD
+        return [self._peer.request(len(self.items))]

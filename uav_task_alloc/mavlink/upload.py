@@ -1,0 +1,317 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Mission upload as a state machine: messages and time in, messages and events out; no socket.
+
+One object for each (link, system, mission type). Every upload ends with a readback, which decides.
+"""
+from __future__ import annotations
+
+import random
+from collections import deque
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import Enum
+
+from uav_task_alloc.errors import MissionError
+from uav_task_alloc.mavlink import peer as wire
+from uav_task_alloc.mavlink.codec import Message
+from uav_task_alloc.mavlink.peer import Peer
+from uav_task_alloc.mavlink.readback import Readback, ReadState
+from uav_task_alloc.mission import Item, all_alike
+
+COUNT_PERIOD, COUNT_TRIES = 1.0, 5  # [s], only until the first request
+INACTIVITY = 10.0  # [s] without a request; the whole transfer has no limit
+CONFIRM = 1.5  # [s] for the final ACK, which a radio may lose
+GRACE = 2.0  # [s] after an ERROR, in which requests may go on
+ERROR_BACKOFF = (5.0, 8.0)  # [s] drawn between
+DENIED_BACKOFF = (8.0, 12.0)  # [s] the other ground station has to end first
+TRIES = 3  # uploads of one mission until it is given up
+
+
+class State(Enum):
+    """Where an upload stands."""
+
+    IDLE = 'idle'
+    COUNTING = 'counting'
+    SENDING = 'sending'
+    CONFIRMING = 'confirming'
+    GRACE = 'grace'
+    BACKOFF = 'backoff'
+    DRAINING = 'draining'
+    READING = 'reading'
+
+
+class Event(Enum):
+    """What moves an upload."""
+
+    START = 'start'
+    REQUEST = 'request'  # of any item but the last
+    LAST = 'request of the last item'
+    STALE = 'request beyond the end'
+    ACCEPTED = 'ACK accepted, all sent'
+    EARLY = 'ACK accepted too early'
+    ERROR = 'ACK error'
+    DENIED = 'ACK denied'
+    CANCELLED = 'ACK cancelled'
+    REFUSED = 'ACK refused for good'
+    TIMEOUT = 'time is up'
+    EXHAUSTED = 'no tries left'
+    MATCH = 'readback alike'
+    MISMATCH = 'readback differs'
+    UNREAD = 'no readback'
+
+
+S, E = State, Event
+_WHILE_OPEN = {E.REQUEST: S.SENDING, E.LAST: S.CONFIRMING, E.STALE: S.DRAINING,
+               E.ACCEPTED: S.READING, E.EARLY: S.CONFIRMING, E.ERROR: S.GRACE,
+               E.DENIED: S.BACKOFF, E.CANCELLED: S.COUNTING, E.REFUSED: S.IDLE,
+               E.EXHAUSTED: S.IDLE}
+# An event that a state does not list is ignored there.
+TRANSITIONS: dict[State, dict[Event, State]] = {
+    S.IDLE: {E.START: S.COUNTING},
+    S.COUNTING: {**_WHILE_OPEN, E.TIMEOUT: S.COUNTING},
+    S.SENDING: {**_WHILE_OPEN, E.TIMEOUT: S.READING},
+    S.CONFIRMING: {**_WHILE_OPEN, E.TIMEOUT: S.READING},
+    S.GRACE: {**_WHILE_OPEN, E.ERROR: S.GRACE, E.TIMEOUT: S.BACKOFF},
+    S.BACKOFF: {E.START: S.BACKOFF, E.REQUEST: S.SENDING, E.LAST: S.CONFIRMING,
+                E.ACCEPTED: S.READING, E.TIMEOUT: S.COUNTING, E.EXHAUSTED: S.IDLE},
+    S.DRAINING: {E.START: S.DRAINING, E.CANCELLED: S.COUNTING, E.TIMEOUT: S.COUNTING,
+                 E.EXHAUSTED: S.IDLE},
+    S.READING: {E.REQUEST: S.SENDING, E.LAST: S.CONFIRMING, E.MATCH: S.IDLE,
+                E.MISMATCH: S.COUNTING, E.UNREAD: S.IDLE, E.EXHAUSTED: S.IDLE},
+}
+# What an ACK means; all others are permanent: the mission is never sent again unchanged.
+ACKS = {wire.ACCEPTED: E.ACCEPTED, wire.ERROR: E.ERROR, wire.INVALID_SEQUENCE: None,
+        wire.DENIED: E.DENIED, wire.CANCELLED: E.CANCELLED}
+
+
+@dataclass(frozen=True, slots=True)
+class Mission:
+    """Items as they go on board, and the one to fly now."""
+
+    items: tuple[Item, ...]
+    start: int = 0  # seq
+    flag_start: bool = False  # say it with current=1, which PX4 jumps to
+    own: int = 0  # items at the front that are the vehicle's own: home
+
+    def __post_init__(self) -> None:
+        if not self.items:
+            raise MissionError('mission items = (): expected at least one; a UAV with an empty '
+                               'list is held instead')
+
+
+@dataclass(frozen=True, slots=True)
+class Verified:
+    """The readback is alike: this is on board."""
+
+    mission: Mission
+
+
+@dataclass(frozen=True, slots=True)
+class Failed:
+    """This upload has ended without success; what is on board is known from a readback only."""
+
+    mission: Mission
+    reason: str
+    result: int | None = None  # MAV_MISSION_RESULT
+    seq: int | None = None  # the item last asked for, where the vehicle refused
+
+
+@dataclass(frozen=True, slots=True)
+class Accepted:
+    """The vehicle has taken all items: REACHED speaks of them from now on."""
+
+    mission: Mission
+
+
+@dataclass(frozen=True, slots=True)
+class Held:
+    """What the vehicle holds, read without an upload; None where it did not answer."""
+
+    items: tuple[Item, ...] | None
+
+
+Outcome = Verified | Failed | Accepted | Held
+
+
+class Upload:
+    """Brings the latest mission on board, one transfer at a time."""
+
+    def __init__(self, peer: Peer, *, idle_after: float, rng: random.Random) -> None:
+        self._peer, self._idle_after, self._rng = peer, idle_after, rng
+        self.state = State.IDLE
+        self.events: deque[Outcome] = deque()
+        self.uploads = 0  # begun so far
+        self._out: list[Message] = []
+        self._pending: Mission | None = None
+        self._wants_read = False
+        self._mission: Mission | None = None  # None while only reading
+        self._readback: Readback | None = None
+        self._tries = self._counts = 0
+        self._due = 0.0
+        self._asked: int | None = None
+        self._sent_last = self._accepted = False
+
+    @property
+    def busy(self) -> bool:
+        return self.state is not State.IDLE
+
+    def replace(self, mission: Mission, now: float) -> list[Message]:
+        """Upload this; a transfer that runs ends first, and of many only the latest follows."""
+        self._pending = mission
+        return self._begin(now)
+
+    def read(self, now: float) -> list[Message]:
+        """Read what is on board, after whatever runs."""
+        self._wants_read = True
+        return self._begin(now)
+
+    def reset(self) -> None:
+        """Forget a transfer that the vehicle forgot as well: it was restarted."""
+        self.state, self._mission, self._pending, self._readback = State.IDLE, None, None, None
+        self._wants_read = False
+
+    def receive(self, message: Message, now: float) -> list[Message]:
+        """Take a message of the vehicle; those for others are ignored."""
+        if self._peer.says(message):
+            kind = message.get_type()
+            if kind in ('MISSION_REQUEST', 'MISSION_REQUEST_INT'):
+                self._request(message.seq, now)
+            elif kind == 'MISSION_ACK':
+                self._ack(message.type, now)
+            elif self.state is State.READING and self._readback:
+                self._out += self._readback.receive(message, now)
+                self._judge(now)
+        return self._flush()
+
+    def step(self, now: float) -> list[Message]:
+        """Let time pass."""
+        if self.state is State.READING and self._readback:
+            self._out += self._readback.step(now)
+            self._judge(now)
+        elif self.busy and now >= self._due:
+            self._go(Event.TIMEOUT, now)
+        return self._flush()
+
+    def _flush(self) -> list[Message]:
+        out, self._out = self._out, []
+        return out
+
+    def _begin(self, now: float) -> list[Message]:
+        if self.state in (State.BACKOFF, State.DRAINING) and self._pending:
+            self._mission, self._pending = self._pending, None  # nothing runs: nothing to abort
+            self._tries = 0
+        elif self.state is State.IDLE and self._pending:
+            self._mission, self._pending = self._pending, None
+            self._tries = 0
+            self._go(Event.START, now)
+        elif self.state is State.IDLE and self._wants_read:
+            self._mission, self._wants_read = None, False
+            self._enter(State.READING, now)
+        return self._flush()
+
+    def _request(self, seq: int, now: float) -> None:
+        mission = self._mission
+        if mission is None or self.state in (State.IDLE, State.DRAINING) or (
+                self.state is State.READING and self._accepted):
+            return
+        if seq >= len(mission.items):
+            self._go(Event.STALE, now)
+            return
+        last = seq == len(mission.items) - 1
+        self._asked = seq
+        self._sent_last = self._sent_last or last
+        self._out.append(self._peer.item(
+            seq, mission.items[seq], mission.flag_start and seq == mission.start))
+        self._go(Event.LAST if last else Event.REQUEST, now)
+
+    def _ack(self, result: int, now: float) -> None:
+        event = ACKS.get(result, Event.REFUSED)
+        if self._mission is None or event is None:
+            return
+        if event is Event.ACCEPTED and not self._sent_last:
+            event = Event.EARLY
+        if event is Event.REFUSED and event in TRANSITIONS[self.state]:
+            self._fail(f'refused with MAV_MISSION_RESULT {result}', result, self._asked)
+        if event is Event.ACCEPTED and event in TRANSITIONS[self.state]:
+            self._accepted = True
+            self.events.append(Accepted(self._mission))
+        self._go(event, now)
+
+    def _go(self, event: Event, now: float) -> None:
+        new = TRANSITIONS[self.state].get(event)
+        if new is None:
+            return
+        again = new is State.COUNTING and event is not Event.TIMEOUT
+        if self.state in (State.BACKOFF, State.DRAINING) and new is State.COUNTING:
+            again = True
+        if again and self._tries >= TRIES:
+            self._fail(f'given up after {TRIES} tries, at last: {event.value}')
+            new = State.IDLE
+        elif again:
+            self._tries += 1
+            self._counts = 0
+        self._enter(new, now, event)
+
+    def _enter(self, new: State, now: float, event: Event = Event.START) -> None:
+        self.state = new
+        if new is State.COUNTING:
+            self._count(now)
+        elif new is State.READING:
+            self._readback = Readback(self._peer, now)
+            self._out.append(self._readback.first)
+        elif new is State.DRAINING and event is Event.STALE:
+            self._out.append(self._peer.ack(wire.CANCELLED))
+        elif new is State.IDLE:
+            self._out += self._begin(now)
+        self._due = now + self._limit(new, event)
+
+    def _limit(self, state: State, event: Event) -> float:
+        if state is State.BACKOFF:
+            span = DENIED_BACKOFF if event is Event.DENIED else ERROR_BACKOFF
+            return self._rng.uniform(*span)
+        return {State.COUNTING: COUNT_PERIOD, State.SENDING: INACTIVITY, State.GRACE: GRACE,
+                State.CONFIRMING: CONFIRM, State.DRAINING: self._idle_after}.get(state, 0.0)
+
+    def _count(self, now: float) -> None:
+        assert self._mission is not None
+        if self._counts >= COUNT_TRIES:
+            self._fail(f'no answer to {COUNT_TRIES} MISSION_COUNT')
+            self._go(Event.EXHAUSTED, now)
+            return
+        if self._counts == 0:
+            self.uploads += 1
+            self._sent_last = self._accepted = False
+            self._asked = None
+        self._counts += 1
+        self._out.append(self._peer.count(len(self._mission.items)))
+
+    def _judge(self, now: float) -> None:
+        assert self._readback is not None
+        state, held = self._readback.state, tuple(self._readback.items)
+        if state not in (ReadState.DONE, ReadState.FAILED):
+            return
+        done = state is ReadState.DONE
+        self._readback = None
+        if self._mission is None:
+            self.events.append(Held(held if done else None))
+            self._enter(State.IDLE, now)
+        elif done and self._alike(held, self._mission):
+            self.events.append(Verified(self._mission))
+            self._go(Event.MATCH, now)
+        elif done and self._accepted and len(held) <= self._mission.own:
+            self._fail('accepted, and then no mission is on board: infeasible')
+            self._go(Event.UNREAD, now)
+        elif done:
+            self._go(Event.MISMATCH, now)
+        else:
+            self._fail('the mission could not be read back')
+            self._go(Event.UNREAD, now)
+
+    @staticmethod
+    def _alike(held: Sequence[Item], mission: Mission) -> bool:
+        return (len(held) == len(mission.items)
+                and all_alike(mission.items[mission.own:], held[mission.own:]))
+
+    def _fail(self, reason: str, result: int | None = None, seq: int | None = None) -> None:
+        assert self._mission is not None
+        self.events.append(Failed(self._mission, reason, result, seq))
