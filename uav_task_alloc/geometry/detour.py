@@ -78,7 +78,7 @@ def way_between(obstacles: Obstacles, start: Point, goal: Point, limits: Floats,
                 caught: bool) -> tuple[float, tuple[Point, ...]]:
     """Length [m] and waypoints from start to a goal outside all zones; caught: start inside."""
     if caught:
-        out = way_out(obstacles, np.array(start), limits)
+        out = way_out(obstacles.rows, np.array(start), limits)
         if math.isnan(out[0]):
             return math.inf, ()
         first: Point = (float(out[0]), float(out[1]), float(out[2]))
@@ -87,10 +87,11 @@ def way_between(obstacles: Obstacles, start: Point, goal: Point, limits: Floats,
     forwards = start <= goal  # one order, so that there and back are the same way
     ends = np.array((start, goal) if forwards else (goal, start))
     buffer = np.empty((MAX_CORNERS, 3))
-    n, length = shortest(obstacles, ends, limits, buffer)
+    n, length = shortest(obstacles.rows, ends, limits, buffer)
     points = [(float(x), float(y), float(z)) for x, y, z in buffer[1:max(1, n - 1)]]
     return float(length), tuple(points if forwards else reversed(points))
 
 
 def _around(obstacles: Obstacles, zones: Sequence[ThreatZone], point: Point) -> tuple[str, ...]:
-    return tuple(zone.id for k, zone in enumerate(zones) if contains(obstacles, k, *point, True))
+    return tuple(zone.id for zone, row in zip(zones, obstacles.rows, strict=True)
+                 if contains(row, *point, True))

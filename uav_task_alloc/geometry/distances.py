@@ -103,8 +103,9 @@ class Distances:
         if not np.isfinite(self.points).all():
             raise InvalidValue('points', self.points, 'finite coordinates [m]')
         self.zones, self.clearance = tuple(zones), clearance
+        self._obstacles = pack(self.zones, clearance)
         limits = check_limits(altitude_min, altitude_max)
-        self._scene = make_scene(self.points, pack(self.zones, clearance), limits)
+        self._scene = make_scene(self.points, self._obstacles.rows, limits)
         dense = bool(self.zones) and len(self.points) <= DENSE_MAX
         self._table = _table or Table(len(self.points) if dense else 0)
         self.pairs = self._pairs(dense)
@@ -119,7 +120,7 @@ class Distances:
                       len(cells) if dense else 0, slot.ctypes.data, cells.ctypes.data,
                       keys.ctypes.data, answers.ctypes.data, scene.ctypes.data,
                       finder(bool(self.zones)))
-        pairs.owner = self._scene, slot, cells, keys, answers, scene
+        pairs.owner = self._obstacles, self._scene, slot, cells, keys, answers, scene
         return pairs
 
     def updated(self, points: ArrayLike | None = None,
@@ -140,7 +141,7 @@ class Distances:
     def _forget(self, table: Table, zones: tuple[ThreatZone, ...]) -> None:
         gone = pack([z for z in self.zones if z not in zones], self.clearance)
         come = pack([z for z in zones if z not in self.zones], self.clearance)
-        forget(table.cells, table.places, table.used, gone, come)
+        forget(table.cells, table.places, table.used, gone.rows, come.rows)
 
     def ensure(self, origins: ArrayLike, goals: ArrayLike) -> None:
         """Find the lengths of these pairs now; all others are found when asked for."""
@@ -158,14 +159,14 @@ class Distances:
             return Leg((), 0.0)
         if scene.caught[j]:
             return Leg((), math.inf)
-        metres, points = way_between(scene.obstacles, self._point(i), self._point(j),
+        metres, points = way_between(self._obstacles, self._point(i), self._point(j),
                                      scene.limits, bool(scene.caught[i]))
         return Leg(points, metres)
 
     def zones_around(self, i: int) -> tuple[str, ...]:
         """Ids of the enlarged zones that point i is inside of."""
         return tuple(zone.id for k, zone in enumerate(self.zones)
-                     if contains(self._scene.obstacles, k, *self.points[i], True))
+                     if contains(self._scene.zones[k], *self.points[i], True))
 
     def _point(self, i: int) -> Point:
         x, y, z = self.points[i]

@@ -7,12 +7,14 @@ import math
 import numba
 import numpy as np
 
+from uav_task_alloc.geometry.memory import floats_at
 from uav_task_alloc.geometry.obstacles import (
     CYLINDER,
     DOME,
     PRISM,
     Floats,
-    Obstacles,
+    Zone,
+    Zones,
     in_polygon,
     off_segment,
 )
@@ -21,37 +23,37 @@ AROUND = 24  # directions tried at first, level and rising
 
 
 @numba.njit(cache=True, nogil=True)
-def _depth(o: Obstacles, k: int, x: float, y: float, z: float) -> float:
+def _depth(zone: Zone, x: float, y: float, z: float) -> float:
     """At least so far it is to the outside of zone k [m]; <= 0: outside. Not under a dome."""
-    skin = 1.5 * o.skin[k]
-    dx, dy, dz = x - o.centre[k, 0], y - o.centre[k, 1], z - o.centre[k, 2]
-    ends = min(o.high[k] + skin - z, z - o.low[k] + skin)
-    if o.kind[k] == DOME:
-        inner = o.radius[k] + skin - math.sqrt(dx * dx + dy * dy + dz * dz)
+    skin = 1.5 * zone.skin
+    dx, dy, dz = x - zone.x, y - zone.y, z - zone.z
+    ends = min(zone.high + skin - z, z - zone.low + skin)
+    if zone.kind == DOME:
+        inner = zone.radius + skin - math.sqrt(dx * dx + dy * dy + dz * dz)
         return inner if ends > 0.0 else ends
-    if o.kind[k] == CYLINDER:
-        return min(ends, o.radius[k] + skin - math.hypot(dx, dy))
-    edge, n, f = np.inf, o.count[k], o.first[k]
+    if zone.kind == CYLINDER:
+        return min(ends, zone.radius + skin - math.hypot(dx, dy))
+    edge, n, c = np.inf, zone.count, floats_at(zone.corners)
     for i in range(n):
-        j = f + (i + 1) % n
-        edge = min(edge, off_segment(x, y, o.corners[f + i, 0], o.corners[f + i, 1],
-                                     o.corners[j, 0], o.corners[j, 1]))
-    edge = math.sqrt(edge) if in_polygon(o, k, x, y) else -math.sqrt(edge)
-    return min(ends, edge + o.grow[k] + skin)
+        j = (i + 1) % n
+        edge = min(edge, off_segment(x, y, c[2 * i], c[2 * i + 1], c[2 * j], c[2 * j + 1]))
+    edge = math.sqrt(edge) if in_polygon(zone, x, y) else -math.sqrt(edge)
+    return min(ends, edge + zone.grow + skin)
 
 
 @numba.njit(cache=True, nogil=True)
-def _ray(o: Obstacles, p: Floats, az: float, up: float, best: float) -> float:
+def _ray(o: Zones, p: Floats, az: float, up: float, best: float) -> float:
     """How far along a direction the outside begins [m]; inf: not before `best`."""
     c = math.cos(up)
     dx, dy, dz = math.cos(az) * c, math.sin(az) * c, math.sin(up)
     t = 0.0
     for _ in range(400):
         deepest, least = 0.0, 0.0
-        for k in range(o.kind.size):
-            d = _depth(o, k, p[0] + t * dx, p[1] + t * dy, p[2] + t * dz)
+        for k in range(o.size):
+            zone = o[k]
+            d = _depth(zone, p[0] + t * dx, p[1] + t * dy, p[2] + t * dz)
             if d > deepest:
-                deepest, least = d, 0.25 * o.skin[k]
+                deepest, least = d, 0.25 * zone.skin
         if deepest <= 0.0:
             return t
         t += max(deepest, least)
@@ -61,7 +63,7 @@ def _ray(o: Obstacles, p: Floats, az: float, up: float, best: float) -> float:
 
 
 @numba.njit(cache=True, nogil=True)
-def _try(o: Obstacles, p: Floats, az: float, up: float, limits: Floats, best: Floats) -> bool:
+def _try(o: Zones, p: Floats, az: float, up: float, limits: Floats, best: Floats) -> bool:
     """Take the direction (az, up) into best = (distance, az, up) where it is shorter."""
     t = _ray(o, p, az, up, best[0])
     z = p[2] + t * math.sin(up)
@@ -72,33 +74,34 @@ def _try(o: Obstacles, p: Floats, az: float, up: float, limits: Floats, best: Fl
 
 
 @numba.njit(cache=True, nogil=True)
-def _first_tries(o: Obstacles, p: Floats, limits: Floats, best: Floats) -> None:
+def _first_tries(o: Zones, p: Floats, limits: Floats, best: Floats) -> None:
     """Straight outwards of each zone around p, up, down, and a fan about the first of them."""
     base = np.nan
     _try(o, p, 0.0, 0.5 * math.pi, limits, best)
     _try(o, p, 0.0, -0.5 * math.pi, limits, best)
-    for k in range(o.kind.size):
-        if _depth(o, k, p[0], p[1], p[2]) <= 0.0:
+    for k in range(o.size):
+        zone = o[k]
+        if _depth(zone, p[0], p[1], p[2]) <= 0.0:
             continue
-        dx, dy, dz = p[0] - o.centre[k, 0], p[1] - o.centre[k, 1], p[2] - o.centre[k, 2]
+        dx, dy, dz = p[0] - zone.x, p[1] - zone.y, p[2] - zone.z
         az = math.atan2(dy, dx)
         base = az if math.isnan(base) else base
         _try(o, p, az, 0.0, limits, best)
-        if o.kind[k] == DOME:
+        if zone.kind == DOME:
             _try(o, p, az, max(0.0, math.atan2(dz, math.hypot(dx, dy))), limits, best)
-        if o.kind[k] == PRISM:
-            f, n = o.first[k], o.count[k]
+        if zone.kind == PRISM:
+            n, c = zone.count, floats_at(zone.corners)
             for i in range(n):
-                j = f + (i + 1) % n
-                _try(o, p, math.atan2(o.corners[f + i, 0] - o.corners[j, 0],
-                                      o.corners[j, 1] - o.corners[f + i, 1]), 0.0, limits, best)
+                j = (i + 1) % n
+                _try(o, p, math.atan2(c[2 * i] - c[2 * j], c[2 * j + 1] - c[2 * i + 1]), 0.0,
+                     limits, best)
     for i in range(2 * AROUND):
         _try(o, p, base + 2.0 * math.pi * i / AROUND, 0.25 * math.pi * (i // AROUND), limits,
              best)
 
 
 @numba.njit(cache=True, nogil=True)
-def way_out(o: Obstacles, p: Floats, limits: Floats) -> Floats:
+def way_out(o: Zones, p: Floats, limits: Floats) -> Floats:
     """The nearest point outside all zones that p, inside some, sees; NaN: there is none."""
     best = np.array([np.inf, 0.0, 0.0])
     _first_tries(o, p, limits, best)

@@ -15,7 +15,8 @@ from numba.core.typing.templates import Signature
 from numba.extending import intrinsic
 
 
-def _cast(context: Any, builder: Any, signature: Signature, args: Any) -> Any:
+def cast(context: Any, builder: Any, signature: Signature, args: Any) -> Any:
+    """Code for a pointer from an integer, for intrinsics that name the type."""
     target: ir.Type = context.get_value_type(signature.return_type)
     return builder.inttoptr(args[0], target)
 
@@ -23,10 +24,10 @@ def _cast(context: Any, builder: Any, signature: Signature, args: Any) -> Any:
 @intrinsic  # type: ignore[untyped-decorator]
 def floats_at(typing_context: Any, address: int) -> tuple[Signature, Callable[..., Any]]:
     """The float64 values at an address."""
-    return types.CPointer(types.float64)(types.int64), _cast
+    return types.CPointer(types.float64)(types.int64), cast
 
 
 @intrinsic  # type: ignore[untyped-decorator]
 def ints_at(typing_context: Any, address: int) -> tuple[Signature, Callable[..., Any]]:
     """The int64 values at an address."""
-    return types.CPointer(types.int64)(types.int64), _cast
+    return types.CPointer(types.int64)(types.int64), cast

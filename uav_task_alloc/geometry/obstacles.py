@@ -10,12 +10,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import NamedTuple
+from dataclasses import dataclass
+from typing import Any
 
 import numba
 import numpy as np
+from numba import types
+from numba.extending import intrinsic
 from numpy.typing import NDArray
 
+from uav_task_alloc.geometry.memory import cast, floats_at
 from uav_task_alloc.model import Shape, ThreatZone, check_number
 
 DOME, CYLINDER, PRISM = Shape.HEMISPHERE.value, Shape.CYLINDER.value, Shape.POLYGON.value
@@ -26,53 +30,56 @@ RIM = 24  # corners of the outline of a cylinder
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
+Zones = NDArray[np.void]  # of dtype ZONE
+Zone = Any  # one row of it, in a kernel
 
 
-class Obstacles(NamedTuple):
-    """Enlarged zones, one row each; all lengths [m]."""
+#: One enlarged zone, all lengths [m]. Corners are x, y, x, y, ..., counter-clockwise.
+ZONE = np.dtype([
+    ('kind', np.int64),
+    ('x', np.float64), ('y', np.float64), ('z', np.float64),  # centre; z is a dome's base
+    ('radius', np.float64), ('low', np.float64), ('high', np.float64),  # enlarged
+    ('grow', np.float64), ('skin', np.float64),  # margin + clearance
+    ('x0', np.float64), ('y0', np.float64), ('z0', np.float64),  # box around it, with the skin
+    ('x1', np.float64), ('y1', np.float64), ('z1', np.float64),
+    ('corners', np.int64), ('count', np.int64),  # PRISM: address and number, not enlarged
+    ('rim', np.int64), ('rims', np.int64),  # a convex outline 1.5 skins off, where there is one
+])
 
-    kind: Ints
-    centre: Floats  # (k, 3)
-    radius: Floats  # enlarged
-    low: Floats  # enlarged; a dome's base
-    high: Floats  # enlarged
-    grow: Floats  # margin + clearance
-    skin: Floats
-    box: Floats  # (k, 6): x, y, z low, x, y, z high, with the skin
-    first: Ints  # PRISM: its corners are corners[first:first + count], counter-clockwise
-    count: Ints
-    corners: Floats  # (m, 2)
-    first_rim: Ints  # CYLINDER and convex PRISM: the enlarged outline is rim[first:first + rims]
-    rims: Ints
-    rim: Floats  # (m, 2) [m], circumscribed, counter-clockwise, with 1.5 skins
+
+@intrinsic  # type: ignore[untyped-decorator]
+def zones_at(typing_context: Any, address: int) -> Any:
+    """The rows of dtype ZONE at an address."""
+    return types.CPointer(numba.from_dtype(ZONE))(types.int64), cast
+
+
+@dataclass(frozen=True, eq=False)
+class Obstacles:
+    """Enlarged zones as kernels take them: `rows` of dtype ZONE, and what their addresses mean."""
+
+    rows: Zones
+    outlines: tuple[Floats, ...]
 
 
 def pack(zones: Sequence[ThreatZone], clearance: float = 0.0) -> Obstacles:
     """The zones enlarged by margin + clearance [m]. Raises InvalidValue."""
     clearance = check_number('clearance', clearance, 0.0, 1e6)
-    k = len(zones)
-    floats = np.zeros((5, k))
-    centre, box = np.zeros((k, 3)), np.zeros((k, 6))
-    first, count = np.zeros(k, np.int64), np.zeros(k, np.int64)
-    corners: list[tuple[float, float]] = []
-    rims: list[list[tuple[float, float]]] = []
+    rows, outlines = np.zeros(len(zones), ZONE), []
     for i, zone in enumerate(zones):
         grow = zone.margin + clearance
-        (centre[i], size, low, high), mine = _extent(zone), _counter_clockwise(zone.vertices)
+        (x, y, z), size, low, high = _extent(zone)
         skin = min(SKIN, 1e-4 * (size + grow))
-        floats[:, i] = zone.radius + grow, low - grow, high + grow, grow, skin
-        first[i], count[i] = len(corners), len(mine)
-        corners += mine
-        rims.append(_rim(zone, mine, grow + 1.5 * skin))
-        reach = np.array([_half_width(mine, 0, size), _half_width(mine, 1, size)]) + grow + skin
+        corners = np.array(_counter_clockwise(zone.vertices), np.float64).reshape(-1, 2)
+        rim = np.array(_rim(zone, corners.tolist(), grow + 1.5 * skin)).reshape(-1, 2)
+        half = np.ptp(corners, axis=0) / 2 if len(corners) else np.array([size, size])
+        reach = half + grow + skin
         bottom = -math.inf if zone.shape is Shape.HEMISPHERE else low - grow - skin
-        box[i] = *(centre[i, :2] - reach), bottom, *(centre[i, :2] + reach), high + grow + skin
-    kind = np.array([zone.shape.value for zone in zones], np.int64)
-    sizes = np.array([len(rim) for rim in rims], np.int64)
-    return Obstacles(kind, centre, *floats, box, first, count,
-                     np.array(corners, dtype=np.float64).reshape(-1, 2),
-                     np.cumsum(sizes) - sizes, sizes,
-                     np.array([c for rim in rims for c in rim], np.float64).reshape(-1, 2))
+        rows[i] = (
+            zone.shape.value, x, y, z, zone.radius + grow, low - grow, high + grow, grow, skin,
+            x - reach[0], y - reach[1], bottom, x + reach[0], y + reach[1], high + grow + skin,
+            corners.ctypes.data, len(corners), rim.ctypes.data, len(rim))
+        outlines += [corners, rim]
+    return Obstacles(rows, tuple(outlines))
 
 
 def _extent(zone: ThreatZone) -> tuple[tuple[float, float, float], float, float, float]:
@@ -114,11 +121,6 @@ def _fan(centre: Sequence[float], radius: float, start: float, turn: float,
              centre[1] + far * math.sin(start + (i + 0.5) * step)) for i in range(parts)]
 
 
-def _half_width(corners: Sequence[tuple[float, float]], axis: int, otherwise: float) -> float:
-    values = [corner[axis] for corner in corners]
-    return (max(values) - min(values)) / 2 if values else otherwise
-
-
 def _counter_clockwise(vertices: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
     area = sum(a[0] * b[1] - b[0] * a[1] for a, b in zip(
         vertices, [*vertices[1:], *vertices[:1]], strict=True))
@@ -138,14 +140,13 @@ def off_segment(px: float, py: float, ax: float, ay: float, bx: float, by: float
 
 
 @numba.njit(cache=True, nogil=True)
-def in_polygon(o: Obstacles, k: int, x: float, y: float) -> bool:
+def in_polygon(zone: Zone, x: float, y: float) -> bool:
     """Whether (x, y) lies in the polygon as it is (even-odd rule)."""
     odd = False
-    n, f = o.count[k], o.first[k]
+    c, n = floats_at(zone.corners), zone.count
     j = n - 1
     for i in range(n):
-        xi, yi = o.corners[f + i, 0], o.corners[f + i, 1]
-        xj, yj = o.corners[f + j, 0], o.corners[f + j, 1]
+        xi, yi, xj, yj = c[2 * i], c[2 * i + 1], c[2 * j], c[2 * j + 1]
         if (yi > y) != (yj > y) and x < (xj - xi) * (y - yi) / (yj - yi) + xi:
             odd = not odd
         j = i
@@ -153,14 +154,14 @@ def in_polygon(o: Obstacles, k: int, x: float, y: float) -> bool:
 
 
 @numba.njit(cache=True, nogil=True)
-def _meets_polygon(o: Obstacles, k: int, ax: float, ay: float, bx: float, by: float,
+def _meets_polygon(zone: Zone, ax: float, ay: float, bx: float, by: float,
                    reach: float) -> bool:
     """Whether the plan segment ab comes nearer to the polygon than `reach`. O(corners)."""
     limit = reach * reach
-    n, f = o.count[k], o.first[k]
-    cx, cy = o.corners[f + n - 1, 0], o.corners[f + n - 1, 1]
+    c, n = floats_at(zone.corners), zone.count
+    cx, cy = c[2 * n - 2], c[2 * n - 1]
     for i in range(n):
-        dx, dy = o.corners[f + i, 0], o.corners[f + i, 1]
+        dx, dy = c[2 * i], c[2 * i + 1]
         sa = (dx - cx) * (ay - cy) - (dy - cy) * (ax - cx)
         sb = (dx - cx) * (by - cy) - (dy - cy) * (bx - cx)
         sc = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
@@ -173,7 +174,7 @@ def _meets_polygon(o: Obstacles, k: int, ax: float, ay: float, bx: float, by: fl
                             or off_segment(dx, dy, ax, ay, bx, by) < limit):
             return True
         cx, cy = dx, dy
-    return in_polygon(o, k, ax, ay) or in_polygon(o, k, (ax + bx) / 2, (ay + by) / 2)
+    return in_polygon(zone, ax, ay) or in_polygon(zone, (ax + bx) / 2, (ay + by) / 2)
 
 
 @numba.njit(cache=True, nogil=True)
@@ -188,10 +189,10 @@ def _clip(pz: float, qz: float, low: float, high: float) -> tuple[float, float]:
 
 
 @numba.njit(cache=True, nogil=True)
-def _near_centre(o: Obstacles, k: int, px: float, py: float, pz: float, dx: float, dy: float,
+def _near_centre(zone: Zone, px: float, py: float, pz: float, dx: float, dy: float,
                  dz: float, s: float, t: float) -> float:
     """Squared distance from the centre to the part [s, t] of p + d."""
-    fx, fy, fz = px - o.centre[k, 0], py - o.centre[k, 1], pz - o.centre[k, 2]
+    fx, fy, fz = px - zone.x, py - zone.y, pz - zone.z
     span = dx * dx + dy * dy + dz * dz
     u = s
     if span > 0.0:
@@ -201,56 +202,56 @@ def _near_centre(o: Obstacles, k: int, px: float, py: float, pz: float, dx: floa
 
 
 @numba.njit(cache=True, nogil=True)
-def _meets_dome(o: Obstacles, k: int, px: float, py: float, pz: float, qx: float, qy: float,
+def _meets_dome(zone: Zone, px: float, py: float, pz: float, qx: float, qy: float,
                 qz: float, floor: float, skin: float) -> bool:
-    reach = o.radius[k] + skin
-    grounded = floor >= o.low[k]
-    base = o.centre[k, 2] if grounded else o.low[k] - skin
+    reach = zone.radius + skin
+    grounded = floor >= zone.low
+    base = zone.z if grounded else zone.low - skin
     s, t = _clip(pz, qz, base, np.inf)
-    if s < t and _near_centre(o, k, px, py, pz, qx - px, qy - py, qz - pz, s, t) < reach * reach:
+    if s < t and _near_centre(zone, px, py, pz, qx - px, qy - py, qz - pz, s, t) < reach * reach:
         return True
     if not grounded:
         return False
     s, t = _clip(pz, qz, -np.inf, base)
     if pz == base and qz == base:
         s, t = 0.0, 1.0
-    return s < t and _near_centre(o, k, px, py, o.centre[k, 2], qx - px, qy - py, 0.0, s,
+    return s < t and _near_centre(zone, px, py, zone.z, qx - px, qy - py, 0.0, s,
                                   t) < reach * reach
 
 
 @numba.njit(cache=True, nogil=True)
-def blocked(o: Obstacles, k: int, px: float, py: float, pz: float, qx: float, qy: float,
+def blocked(zone: Zone, px: float, py: float, pz: float, qx: float, qy: float,
             qz: float, floor: float, snug: bool) -> bool:
-    """Whether the segment pq enters zone k. `snug`: up to the surface, without the skin."""
-    if (min(px, qx) > o.box[k, 3] or max(px, qx) < o.box[k, 0]
-            or min(py, qy) > o.box[k, 4] or max(py, qy) < o.box[k, 1]
-            or min(pz, qz) > o.box[k, 5] or max(pz, qz) < o.box[k, 2]):
+    """Whether the segment pq enters a zone. `snug`: up to the surface, without the skin."""
+    if (min(px, qx) > zone.x1 or max(px, qx) < zone.x0
+            or min(py, qy) > zone.y1 or max(py, qy) < zone.y0
+            or min(pz, qz) > zone.z1 or max(pz, qz) < zone.z0):
         return False
-    skin = -TOUCH if snug else o.skin[k]
-    if o.kind[k] == DOME:
-        return _meets_dome(o, k, px, py, pz, qx, qy, qz, floor, skin)
-    s, t = _clip(pz, qz, o.low[k] - skin, o.high[k] + skin)
+    skin = -TOUCH if snug else zone.skin
+    if zone.kind == DOME:
+        return _meets_dome(zone, px, py, pz, qx, qy, qz, floor, skin)
+    s, t = _clip(pz, qz, zone.low - skin, zone.high + skin)
     if s >= t:
         return False
-    if o.kind[k] == CYLINDER:
-        reach = o.radius[k] + skin
-        return _near_centre(o, k, px, py, o.centre[k, 2], qx - px, qy - py, 0.0, s,
+    if zone.kind == CYLINDER:
+        reach = zone.radius + skin
+        return _near_centre(zone, px, py, zone.z, qx - px, qy - py, 0.0, s,
                             t) < reach * reach
     dx, dy = qx - px, qy - py
-    return _meets_polygon(o, k, px + s * dx, py + s * dy, px + t * dx, py + t * dy,
-                          o.grow[k] + skin)
+    return _meets_polygon(zone, px + s * dx, py + s * dy, px + t * dx, py + t * dy,
+                          zone.grow + skin)
 
 
 @numba.njit(cache=True, nogil=True)
-def contains(o: Obstacles, k: int, x: float, y: float, z: float, snug: bool) -> bool:
-    """Whether a point is inside zone k; the space beneath a dome is not."""
-    return blocked(o, k, x, y, z, x, y, z, -np.inf, snug)
+def contains(zone: Zone, x: float, y: float, z: float, snug: bool) -> bool:
+    """Whether a point is inside a zone; the space beneath a dome is not."""
+    return blocked(zone, x, y, z, x, y, z, -np.inf, snug)
 
 
 @numba.njit(cache=True, nogil=True)
-def first_around(o: Obstacles, x: float, y: float, z: float, snug: bool) -> int:
+def first_around(o: Zones, x: float, y: float, z: float, snug: bool) -> int:
     """The first zone that contains a point; -1: none. O(zones)."""
-    for k in range(o.kind.size):
-        if contains(o, k, x, y, z, snug):
+    for k in range(o.size):
+        if contains(o[k], x, y, z, snug):
             return k
     return -1

@@ -11,12 +11,11 @@ import numpy as np
 
 from uav_task_alloc.geometry.exits import way_out
 from uav_task_alloc.geometry.memory import floats_at, ints_at
-from uav_task_alloc.geometry.obstacles import Floats, Ints, Obstacles, first_around
+from uav_task_alloc.geometry.obstacles import Floats, Ints, Zones, first_around, zones_at
 from uav_task_alloc.geometry.taut import MAX_CORNERS
 from uav_task_alloc.geometry.ways import shortest
 
-
-CAUGHT = 5  # where `addresses` has that of Scene.caught
+CAUGHT = 3  # where `addresses` has that of Scene.caught
 
 
 class Scene(NamedTuple):
@@ -26,19 +25,19 @@ class Scene(NamedTuple):
     caught: Ints  # 1: inside a zone
     out: Floats  # (n, 3) [m], where a caught point is outside first; NaN: nowhere
     limits: Floats  # altitude_min, altitude_max [m]
-    obstacles: Obstacles
+    zones: Zones
 
 
-def make_scene(xyz: Floats, obstacles: Obstacles, limits: Floats) -> Scene:
+def make_scene(xyz: Floats, zones: Zones, limits: Floats) -> Scene:
     """The scene, with the way out of every caught point."""
     caught, out = np.zeros(len(xyz), np.int64), np.full((len(xyz), 3), np.nan)
-    if obstacles.kind.size:
-        _catch(obstacles, xyz, limits, caught, out)
-    return Scene(xyz, caught, out, limits, obstacles)
+    if zones.size:
+        _catch(zones, xyz, limits, caught, out)
+    return Scene(xyz, caught, out, limits, zones)
 
 
 @numba.njit(cache=True, nogil=True)
-def _catch(o: Obstacles, xyz: Floats, limits: Floats, caught: Ints, out: Floats) -> None:
+def _catch(o: Zones, xyz: Floats, limits: Floats, caught: Ints, out: Floats) -> None:
     for i in range(xyz.shape[0]):
         if first_around(o, xyz[i, 0], xyz[i, 1], xyz[i, 2], True) >= 0:
             caught[i], out[i] = 1, way_out(o, xyz[i], limits)
@@ -46,27 +45,18 @@ def _catch(o: Obstacles, xyz: Floats, limits: Floats, caught: Ints, out: Floats)
 
 def addresses(scene: Scene) -> Ints:
     """Sizes and addresses of the scene's arrays, in the order that `_scene_at` reads."""
-    o = scene.obstacles
-    arrays = (*scene[:4], *o)
-    return np.array([len(scene.xyz), o.kind.size, len(o.corners), len(o.rim),
-                     *(array.ctypes.data for array in arrays)], np.int64)
+    return np.array([len(scene.xyz), len(scene.zones),
+                     *(array.ctypes.data for array in scene)], np.int64)
 
 
 @numba.njit(cache=True, nogil=True)
 def _scene_at(address: int) -> Scene:
     at = ints_at(address)
-    n, k, m, r = at[0], at[1], at[2], at[3]
+    n, k = at[0], at[1]
     return Scene(
-        numba.carray(floats_at(at[4]), (n, 3)), numba.carray(ints_at(at[5]), n),
-        numba.carray(floats_at(at[6]), (n, 3)), numba.carray(floats_at(at[7]), 2),
-        Obstacles(
-            numba.carray(ints_at(at[8]), k), numba.carray(floats_at(at[9]), (k, 3)),
-            numba.carray(floats_at(at[10]), k), numba.carray(floats_at(at[11]), k),
-            numba.carray(floats_at(at[12]), k), numba.carray(floats_at(at[13]), k),
-            numba.carray(floats_at(at[14]), k), numba.carray(floats_at(at[15]), (k, 6)),
-            numba.carray(ints_at(at[16]), k), numba.carray(ints_at(at[17]), k),
-            numba.carray(floats_at(at[18]), (m, 2)), numba.carray(ints_at(at[19]), k),
-            numba.carray(ints_at(at[20]), k), numba.carray(floats_at(at[21]), (r, 2))))
+        numba.carray(floats_at(at[2]), (n, 3)), numba.carray(ints_at(at[3]), n),
+        numba.carray(floats_at(at[4]), (n, 3)), numba.carray(floats_at(at[5]), 2),
+        numba.carray(zones_at(at[6]), k))
 
 
 def _find(address: int, i: int, j: int) -> float:
@@ -86,7 +76,7 @@ def _find(address: int, i: int, j: int) -> float:
     ends = np.empty((2, 3))  # in one order, so that there and back are the same way
     backwards = p[0] > q[0] or (p[0] == q[0] and (p[1] > q[1] or (p[1] == q[1] and p[2] > q[2])))
     ends[0], ends[1] = (q, p) if backwards else (p, q)
-    return first + shortest(scene.obstacles, ends, scene.limits, np.empty((MAX_CORNERS, 3)))[1]
+    return first + shortest(scene.zones, ends, scene.limits, np.empty((MAX_CORNERS, 3)))[1]
 
 
 def _nothing(address: int, i: int, j: int) -> float:

@@ -7,21 +7,23 @@ import math
 import numba
 import numpy as np
 
+from uav_task_alloc.geometry.memory import floats_at
 from uav_task_alloc.geometry.obstacles import (
     CYLINDER,
     DOME,
     PRISM,
     Floats,
     Ints,
-    Obstacles,
+    Zone,
+    Zones,
     blocked,
 )
 
 
 @numba.njit(cache=True, nogil=True)
-def corner_bound(o: Obstacles, k: int, ring: int) -> int:
+def corner_bound(zone: Zone, ring: int) -> int:
     """At most so many corners come from zone k."""
-    return 4 * ring + 1 if o.kind[k] != PRISM else 10 * o.count[k]
+    return 4 * ring + 1 if zone.kind != PRISM else 10 * zone.count
 
 
 @numba.njit(cache=True, nogil=True)
@@ -36,56 +38,56 @@ def _height(way: Floats, x: float, y: float) -> float:
 
 
 @numba.njit(cache=True, nogil=True)
-def _heading(o: Obstacles, k: int, way: Floats) -> tuple[float, float]:
+def _heading(zone: Zone, way: Floats) -> tuple[float, float]:
     """The way's direction in plan, so that what is built on it turns with the scene."""
     dx, dy = way[1, 0] - way[0, 0], way[1, 1] - way[0, 1]
     size = math.hypot(dx, dy)
     if size <= 1e-9 * abs(way[1, 2] - way[0, 2]):
-        dx, dy = way[0, 0] - o.centre[k, 0], way[0, 1] - o.centre[k, 1]
+        dx, dy = way[0, 0] - zone.x, way[0, 1] - zone.y
         size = math.hypot(dx, dy)
     return (dx / size, dy / size) if size > 0.0 else (1.0, 0.0)
 
 
 @numba.njit(cache=True, nogil=True)
-def _ring(o: Obstacles, k: int, way: Floats, limits: Floats, radius: float, z: float, ring: int,
+def _ring(zone: Zone, way: Floats, limits: Floats, radius: float, z: float, ring: int,
           out: Floats, n: int) -> int:
     """`ring` corners around the axis of zone k at height z (NaN: that of the way)."""
-    ux, uy = _heading(o, k, way)
+    ux, uy = _heading(zone, way)
     low, high = limits[0], limits[1]
     for j in range(ring):
         c, s = math.cos(2 * math.pi * j / ring), math.sin(2 * math.pi * j / ring)
         ex, ey = ux * c - uy * s, ux * s + uy * c
-        x, y, h = o.centre[k, 0] + radius * ex, o.centre[k, 1] + radius * ey, z
+        x, y, h = zone.x + radius * ex, zone.y + radius * ey, z
         if math.isnan(z):
             h = min(high, max(low, _height(way, x, y)))
-            if o.kind[k] == DOME:
-                up = max(0.0, h - o.centre[k, 2])
+            if zone.kind == DOME:
+                up = max(0.0, h - zone.z)
                 if up >= radius:
                     continue
                 wide = math.sqrt(radius * radius - up * up)
-                x, y = o.centre[k, 0] + wide * ex, o.centre[k, 1] + wide * ey
+                x, y = zone.x + wide * ex, zone.y + wide * ey
         out[n, 0], out[n, 1], out[n, 2] = x, y, h
         n += 1
     return n
 
 
 @numba.njit(cache=True, nogil=True)
-def _dome_corners(o: Obstacles, k: int, way: Floats, limits: Floats, floor: float, ring: int,
+def _dome_corners(zone: Zone, way: Floats, limits: Floats, floor: float, ring: int,
                   out: Floats, n: int) -> int:
-    radius = (o.radius[k] + 1.5 * o.skin[k]) / math.cos(math.pi / ring)
-    n = _ring(o, k, way, limits, radius, np.nan, ring, out, n)
+    radius = (zone.radius + 1.5 * zone.skin) / math.cos(math.pi / ring)
+    n = _ring(zone, way, limits, radius, np.nan, ring, out, n)
     for step in range(1, 3):
-        up = min(radius * math.sin(math.pi / 6 * step), limits[1] - o.centre[k, 2])
+        up = min(radius * math.sin(math.pi / 6 * step), limits[1] - zone.z)
         if up > 0.0:
-            n = _ring(o, k, way, limits, math.sqrt(radius * radius - up * up),
-                      o.centre[k, 2] + up, ring, out, n)
-    if o.centre[k, 2] + radius <= limits[1]:
-        out[n, 0], out[n, 1], out[n, 2] = (o.centre[k, 0], o.centre[k, 1],
-                                           o.centre[k, 2] + radius)
+            n = _ring(zone, way, limits, math.sqrt(radius * radius - up * up),
+                      zone.z + up, ring, out, n)
+    if zone.z + radius <= limits[1]:
+        out[n, 0], out[n, 1], out[n, 2] = (zone.x, zone.y,
+                                           zone.z + radius)
         n += 1
-    under = o.low[k] - 1.5 * o.skin[k]
-    if floor < o.low[k] and under >= limits[0]:
-        n = _ring(o, k, way, limits, radius, under, ring, out, n)
+    under = zone.low - 1.5 * zone.skin
+    if floor < zone.low and under >= limits[0]:
+        n = _ring(zone, way, limits, radius, under, ring, out, n)
     return n
 
 
@@ -99,14 +101,14 @@ def _crossing(way: Floats, px: float, py: float, qx: float, qy: float) -> float:
 
 
 @numba.njit(cache=True, nogil=True)
-def _edge_corners(o: Obstacles, k: int, way: Floats, z: float, reach: float, out: Floats,
+def _edge_corners(zone: Zone, way: Floats, z: float, reach: float, out: Floats,
                   n: int) -> int:
     """Corners on a rim of the enlarged prism: each edge's middle and where the way crosses it."""
-    f, count = o.first[k], o.count[k]
+    c, count = floats_at(zone.corners), zone.count
     for i in range(count):
-        j = f + (i + 1) % count
-        px, py = o.corners[f + i, 0], o.corners[f + i, 1]
-        dx, dy = o.corners[j, 0] - px, o.corners[j, 1] - py
+        j = (i + 1) % count
+        px, py = c[2 * i], c[2 * i + 1]
+        dx, dy = c[2 * j] - px, c[2 * j + 1] - py
         size = math.hypot(dx, dy)
         px, py = px + dy * reach / size, py - dx * reach / size
         cross = _crossing(way, px, py, px + dx, py + dy)
@@ -118,16 +120,16 @@ def _edge_corners(o: Obstacles, k: int, way: Floats, z: float, reach: float, out
 
 
 @numba.njit(cache=True, nogil=True)
-def _prism_corners(o: Obstacles, k: int, way: Floats, limits: Floats, z: float, out: Floats,
+def _prism_corners(zone: Zone, way: Floats, limits: Floats, z: float, out: Floats,
                    n: int) -> int:
     """Mitred corners at the convex corners of the enlarged polygon, at z (NaN: the way's)."""
-    reach = o.grow[k] + 1.5 * o.skin[k]
-    f, count = o.first[k], o.count[k]
+    reach = zone.grow + 1.5 * zone.skin
+    corners, count = floats_at(zone.corners), zone.count
     for i in range(count):
-        c, p, q = o.corners[f + i], o.corners[f + i - 1 if i else f + count - 1], o.corners[
-            f + (i + 1) % count]
-        before = math.atan2(c[1] - p[1], c[0] - p[0])
-        turn = math.atan2(q[1] - c[1], q[0] - c[0]) - before
+        h, j = (i - 1) % count, (i + 1) % count
+        cx, cy = corners[2 * i], corners[2 * i + 1]
+        before = math.atan2(cy - corners[2 * h + 1], cx - corners[2 * h])
+        turn = math.atan2(corners[2 * j + 1] - cy, corners[2 * j] - cx) - before
         turn -= 2 * math.pi * math.floor((turn + math.pi) / (2 * math.pi))
         if turn <= 0.0:
             continue
@@ -135,7 +137,7 @@ def _prism_corners(o: Obstacles, k: int, way: Floats, limits: Floats, z: float, 
         far = reach / math.cos(0.5 * turn / parts)
         for j in range(parts):
             angle = before - 0.5 * math.pi + (j + 0.5) * turn / parts
-            x, y = c[0] + far * math.cos(angle), c[1] + far * math.sin(angle)
+            x, y = cx + far * math.cos(angle), cy + far * math.sin(angle)
             out[n, 0], out[n, 1] = x, y
             out[n, 2] = min(limits[1], max(limits[0], _height(way, x, y))) if math.isnan(
                 z) else z
@@ -144,26 +146,26 @@ def _prism_corners(o: Obstacles, k: int, way: Floats, limits: Floats, z: float, 
 
 
 @numba.njit(cache=True, nogil=True)
-def add_corners(o: Obstacles, k: int, way: Floats, limits: Floats, floor: float, ring: int,
+def add_corners(zone: Zone, way: Floats, limits: Floats, floor: float, ring: int,
                 out: Floats, n: int) -> int:
     """Write the corners of zone k for the way ab into out[n:]; returns the new n."""
-    if o.kind[k] == DOME:
-        return _dome_corners(o, k, way, limits, floor, ring, out, n)
-    radius = (o.radius[k] + 1.5 * o.skin[k]) / math.cos(math.pi / ring)
+    if zone.kind == DOME:
+        return _dome_corners(zone, way, limits, floor, ring, out, n)
+    radius = (zone.radius + 1.5 * zone.skin) / math.cos(math.pi / ring)
     for level in range(3):
         z = np.nan
         if level == 1:
-            z = o.high[k] + 1.5 * o.skin[k]
+            z = zone.high + 1.5 * zone.skin
         elif level == 2:
-            z = o.low[k] - 1.5 * o.skin[k]
+            z = zone.low - 1.5 * zone.skin
         if z < limits[0] or z > limits[1] or math.isinf(z):
             continue
-        if o.kind[k] == CYLINDER:
-            n = _ring(o, k, way, limits, radius, z, ring, out, n)
+        if zone.kind == CYLINDER:
+            n = _ring(zone, way, limits, radius, z, ring, out, n)
         else:
-            n = _prism_corners(o, k, way, limits, z, out, n)
+            n = _prism_corners(zone, way, limits, z, out, n)
             if not math.isnan(z):
-                n = _edge_corners(o, k, way, z, o.grow[k] + 1.5 * o.skin[k], out, n)
+                n = _edge_corners(zone, way, z, zone.grow + 1.5 * zone.skin, out, n)
     return n
 
 
@@ -174,10 +176,10 @@ def _gap(x: Floats, i: int, j: int) -> float:
 
 
 @numba.njit(cache=True, nogil=True)
-def _sees(o: Obstacles, active: Ints, count: int, x: Floats, i: int, j: int, floor: float,
+def _sees(o: Zones, active: Ints, count: int, x: Floats, i: int, j: int, floor: float,
           snug: bool) -> bool:
     for m in range(count):
-        if blocked(o, active[m], x[i, 0], x[i, 1], x[i, 2], x[j, 0], x[j, 1], x[j, 2], floor,
+        if blocked(o[active[m]], x[i, 0], x[i, 1], x[i, 2], x[j, 0], x[j, 1], x[j, 2], floor,
                    snug):
             return False
     return True
@@ -197,7 +199,7 @@ def _next_parent(x: Floats, cost: Floats, closed: Ints, done: int, v: int,
 
 
 @numba.njit(cache=True, nogil=True)
-def astar(o: Obstacles, active: Ints, count: int, x: Floats, n: int, floor: float, snug: bool,
+def astar(o: Zones, active: Ints, count: int, x: Floats, n: int, floor: float, snug: bool,
           path: Ints) -> int:
     """Shortest way 0 -> 1 over corners x[:n] past the active zones; returns its corners, 0: none.
 

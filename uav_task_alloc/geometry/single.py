@@ -12,7 +12,8 @@ import math
 import numba
 import numpy as np
 
-from uav_task_alloc.geometry.obstacles import CYLINDER, DOME, Floats, Obstacles
+from uav_task_alloc.geometry.memory import floats_at
+from uav_task_alloc.geometry.obstacles import CYLINDER, DOME, Floats, Zone
 from uav_task_alloc.geometry.taut import length_of
 
 ARC_GAIN = 1.5e-3  # an arc's polyline may be longer by this share of the way
@@ -48,13 +49,12 @@ def _bend(centre: Floats, radius: float, way: Floats, flat: bool, out: Floats) -
         u[m] /= du
         v[m] -= along * u[m]
     off = math.sqrt(_dot(v, v))
+    first = math.acos(radius / du)
+    arc = math.atan2(off, along) - first - math.acos(radius / dv)
     if off < 1e-9 * dv:
         if not flat:
             return 0
         v[0], v[1], off = -u[1], u[0], 1.0
-    first = math.acos(radius / du)
-    arc = math.atan2(off if off != 1.0 or not flat else 0.0, along) - first - math.acos(
-        radius / dv)
     if arc <= 0.0:
         return 0
     straight = math.sqrt(du * du - radius * radius) + math.sqrt(dv * dv - radius * radius)
@@ -187,26 +187,26 @@ def _keep_best(trial: Floats, n: int, out: Floats, best: int) -> int:
 
 
 @numba.njit(cache=True, nogil=True)
-def past_one(o: Obstacles, k: int, way: Floats, limits: Floats, floor: float,
+def past_one(zone: Zone, way: Floats, limits: Floats, floor: float,
              out: Floats) -> int:
-    """The shortest way past zone k alone into out; returns its points, 0: no closed form."""
-    skin = 1.5 * o.skin[k]
-    if o.kind[k] == DOME:
-        n = _bend(o.centre[k], o.radius[k] + skin, way, False, out) if floor >= o.low[k] else 0
+    """The shortest way past a zone alone into out; returns its points, 0: no closed form."""
+    skin, centre = 1.5 * zone.skin, np.array([zone.x, zone.y, zone.z])
+    if zone.kind == DOME:
+        n = _bend(centre, zone.radius + skin, way, False, out) if floor >= zone.low else 0
         for i in range(1, n - 1):
             if not limits[0] <= out[i, 2] <= limits[1]:
                 return 0
         return n
-    if o.rims[k] == 0 or floor < limits[0] or max(way[0, 2], way[1, 2]) > limits[1]:
+    if zone.rims == 0 or floor < limits[0] or max(way[0, 2], way[1, 2]) > limits[1]:
         return 0
-    rim = o.rim[o.first_rim[k]:o.first_rim[k] + o.rims[k]]
+    rim = numba.carray(floats_at(zone.rim), (zone.rims, 2))
     trial, best = np.empty((rim.shape[0] + 3, 3)), 0
     for side in (-1.0, 1.0):
-        z = o.high[k] + skin if side > 0.0 else o.low[k] - skin
+        z = zone.high + skin if side > 0.0 else zone.low - skin
         if limits[0] <= z <= limits[1] and not math.isinf(z):
             best = _keep_best(trial, _over(rim, z, side, way, trial), out, best)
-        if o.kind[k] == CYLINDER:
-            n = _bend(o.centre[k], o.radius[k] + skin, way, True, trial) if side > 0.0 else 0
+        if zone.kind == CYLINDER:
+            n = _bend(centre, zone.radius + skin, way, True, trial) if side > 0.0 else 0
         else:
             n = _wrap(rim, way, side, trial)
         _rise(trial, n)

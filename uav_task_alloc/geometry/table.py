@@ -7,7 +7,7 @@ import math
 import numba
 import numpy as np
 
-from uav_task_alloc.geometry.obstacles import Floats, Ints, Obstacles, blocked, contains
+from uav_task_alloc.geometry.obstacles import Floats, Ints, Zone, Zones, blocked, contains
 
 SPARE = 64  # rows for places to come
 STRAIGHT = 1.0 + 1e-12  # a way is straight when at most so much longer than the distance
@@ -54,17 +54,16 @@ class Table:
 
 
 @numba.njit(cache=True, nogil=True)
-def _reach(o: Obstacles, k: int, p: Floats) -> float:
-    """Distance from p to the box around zone k."""
-    total = 0.0
-    for m in range(3):
-        d = max(o.box[k, m] - p[m], p[m] - o.box[k, m + 3], 0.0)
-        total += d * d
-    return math.sqrt(total)
+def _reach(zone: Zone, p: Floats) -> float:
+    """Distance from p to the box around a zone."""
+    dx = max(zone.x0 - p[0], p[0] - zone.x1, 0.0)
+    dy = max(zone.y0 - p[1], p[1] - zone.y1, 0.0)
+    dz = max(zone.z0 - p[2], p[2] - zone.z1, 0.0)
+    return math.sqrt(dx * dx + dy * dy + dz * dz)
 
 
 @numba.njit(cache=True, nogil=True)
-def _touches(o: Obstacles, k: int, p: Floats, q: Floats, known: float, near_p: float,
+def _touches(zone: Zone, p: Floats, q: Floats, known: float, near_p: float,
              near_q: float, came: bool) -> bool:
     """Whether zone k, that came or went, may change the known length between p and q."""
     if math.isinf(known):
@@ -74,28 +73,28 @@ def _touches(o: Obstacles, k: int, p: Floats, q: Floats, known: float, near_p: f
     dx, dy, dz = p[0] - q[0], p[1] - q[1], p[2] - q[2]
     if known > STRAIGHT * math.sqrt(dx * dx + dy * dy + dz * dz):
         return True
-    return came and blocked(o, k, p[0], p[1], p[2], q[0], q[1], q[2], min(p[2], q[2]), False)
+    return came and blocked(zone, p[0], p[1], p[2], q[0], q[1], q[2], min(p[2], q[2]), False)
 
 
 @numba.njit(cache=True, nogil=True)
-def _forget_for(cells: Floats, places: Floats, used: int, o: Obstacles, k: int,
+def _forget_for(cells: Floats, places: Floats, used: int, zone: Zone,
                 came: bool) -> None:
     near, inside = np.empty(used), np.zeros(used, np.bool_)
     for i in range(used):
-        near[i] = _reach(o, k, places[i])
-        inside[i] = contains(o, k, places[i, 0], places[i, 1], places[i, 2], True)
+        near[i] = _reach(zone, places[i])
+        inside[i] = contains(zone, places[i, 0], places[i, 1], places[i, 2], True)
     for i in range(used):
         for j in range(used):
             known = cells[i, j]
             if known == known and (inside[i] or inside[j] or _touches(
-                    o, k, places[i], places[j], known, near[i], near[j], came)):
+                    zone, places[i], places[j], known, near[i], near[j], came)):
                 cells[i, j] = np.nan
 
 
 @numba.njit(cache=True, nogil=True)
-def forget(cells: Floats, places: Floats, used: int, gone: Obstacles, come: Obstacles) -> None:
+def forget(cells: Floats, places: Floats, used: int, gone: Zones, come: Zones) -> None:
     """Make unknown every length that a zone that went or came may change. O(zones n^2)."""
-    for k in range(gone.kind.size):
-        _forget_for(cells, places, used, gone, k, False)
-    for k in range(come.kind.size):
-        _forget_for(cells, places, used, come, k, True)
+    for k in range(gone.size):
+        _forget_for(cells, places, used, gone[k], False)
+    for k in range(come.size):
+        _forget_for(cells, places, used, come[k], True)

@@ -11,7 +11,7 @@ import math
 import numba
 import numpy as np
 
-from uav_task_alloc.geometry.obstacles import Floats, Ints, Obstacles, blocked
+from uav_task_alloc.geometry.obstacles import Floats, Ints, Zones, blocked
 
 MAX_CORNERS = 96  # of a way while it is worked on
 CUT_GAIN = 1e-3  # a further corner must shorten the way by this share
@@ -19,11 +19,11 @@ PULL_GAIN = 2e-4  # as must a further round of pulling
 
 
 @numba.njit(cache=True, nogil=True)
-def free(o: Obstacles, near: Ints, px: float, py: float, pz: float, qx: float, qy: float,
+def free(o: Zones, near: Ints, px: float, py: float, pz: float, qx: float, qy: float,
          qz: float, floor: float, snug: bool) -> bool:
     """Whether the segment pq is clear of the zones `near`."""
     for m in range(near.size):
-        if blocked(o, near[m], px, py, pz, qx, qy, qz, floor, snug):
+        if blocked(o[near[m]], px, py, pz, qx, qy, qz, floor, snug):
             return False
     return True
 
@@ -45,7 +45,7 @@ def length_of(p: Floats, n: int) -> float:
 
 
 @numba.njit(cache=True, nogil=True)
-def drop_corners(o: Obstacles, near: Ints, p: Floats, n: int, floor: float, snug: bool) -> int:
+def drop_corners(o: Zones, near: Ints, p: Floats, n: int, floor: float, snug: bool) -> int:
     """Leave out every corner whose neighbours see each other; returns the new n."""
     i = 1
     while i < n - 1:
@@ -61,7 +61,7 @@ def drop_corners(o: Obstacles, near: Ints, p: Floats, n: int, floor: float, snug
 
 
 @numba.njit(cache=True, nogil=True)
-def _fits(o: Obstacles, near: Ints, p: Floats, i: int, q: Floats, limits: Floats, floor: float,
+def _fits(o: Zones, near: Ints, p: Floats, i: int, q: Floats, limits: Floats, floor: float,
           snug: bool) -> bool:
     """Whether corner i may move to q."""
     if q[2] < limits[0] or q[2] > limits[1]:
@@ -113,7 +113,7 @@ def _on_ellipse(chord: float, foot: float, off: float, t: float) -> float:
 
 
 @numba.njit(cache=True, nogil=True)
-def _press(o: Obstacles, near: Ints, p: Floats, i: int, axes: Floats, q: Floats, t: float,
+def _press(o: Zones, near: Ints, p: Floats, i: int, axes: Floats, q: Floats, t: float,
            turn: float, s: float, limits: Floats, floor: float, snug: bool) -> float:
     """The least offset, from the good one s inwards, at which corner i fits."""
     low, high = 0.0, s
@@ -128,7 +128,7 @@ def _press(o: Obstacles, near: Ints, p: Floats, i: int, axes: Floats, q: Floats,
 
 
 @numba.njit(cache=True, nogil=True)
-def pull(o: Obstacles, near: Ints, p: Floats, i: int, limits: Floats, floor: float, snug: bool,
+def pull(o: Zones, near: Ints, p: Floats, i: int, limits: Floats, floor: float, snug: bool,
          rounds: int) -> None:
     """Move corner i to where its two legs are shortest: inwards, along and around its chord."""
     axes, q = np.empty((3, 3)), np.empty(3)
@@ -157,7 +157,7 @@ def pull(o: Obstacles, near: Ints, p: Floats, i: int, limits: Floats, floor: flo
 
 
 @numba.njit(cache=True, nogil=True)
-def pull_all(o: Obstacles, near: Ints, p: Floats, n: int, limits: Floats, floor: float,
+def pull_all(o: Zones, near: Ints, p: Floats, n: int, limits: Floats, floor: float,
              snug: bool) -> int:
     """Drop and pull corners until a round gains next to nothing; returns the new n."""
     before = np.inf
@@ -173,7 +173,7 @@ def pull_all(o: Obstacles, near: Ints, p: Floats, n: int, limits: Floats, floor:
 
 
 @numba.njit(cache=True, nogil=True)
-def _cut(o: Obstacles, near: Ints, p: Floats, i: int, floor: float, snug: bool) -> float:
+def _cut(o: Zones, near: Ints, p: Floats, i: int, floor: float, snug: bool) -> float:
     """How far from corner i, on both its legs, the corner can be cut off."""
     before, after = span(p, i - 1, i), span(p, i, i + 1)
     low, high = 0.0, 0.98 * min(before, after)
@@ -191,7 +191,7 @@ def _cut(o: Obstacles, near: Ints, p: Floats, i: int, floor: float, snug: bool) 
 
 
 @numba.njit(cache=True, nogil=True)
-def cut_corners(o: Obstacles, near: Ints, p: Floats, n: int, floor: float, snug: bool) -> int:
+def cut_corners(o: Zones, near: Ints, p: Floats, n: int, floor: float, snug: bool) -> int:
     """Replace each corner by two where that shortens the way enough; returns the new n."""
     least = CUT_GAIN * length_of(p, n)
     i = 1
@@ -215,7 +215,7 @@ def cut_corners(o: Obstacles, near: Ints, p: Floats, n: int, floor: float, snug:
 
 
 @numba.njit(cache=True, nogil=True)
-def tauten(o: Obstacles, near: Ints, p: Floats, n: int, limits: Floats, floor: float,
+def tauten(o: Zones, near: Ints, p: Floats, n: int, limits: Floats, floor: float,
            snug: bool) -> int:
     """Shorten the clear way p[:n] in place, keeping it clear; returns the new n."""
     n = pull_all(o, near, p, n, limits, floor, snug)

@@ -11,7 +11,7 @@ import math
 import numba
 import numpy as np
 
-from uav_task_alloc.geometry.obstacles import Floats, Ints, Obstacles, blocked, first_around
+from uav_task_alloc.geometry.obstacles import Floats, Ints, Zone, Zones, blocked, first_around
 from uav_task_alloc.geometry.search import add_corners, astar, corner_bound
 from uav_task_alloc.geometry.single import past_one
 from uav_task_alloc.geometry.taut import MAX_CORNERS, length_of, span, tauten
@@ -20,11 +20,11 @@ RINGS = (12, 24, 64)  # corners around a zone; finer ones only where no way was 
 
 
 @numba.njit(cache=True, nogil=True)
-def hit_by(o: Obstacles, p: Floats, i: int, j: int, floor: float, snug: bool, hit: Ints) -> int:
+def hit_by(o: Zones, p: Floats, i: int, j: int, floor: float, snug: bool, hit: Ints) -> int:
     """Mark the zones that the segment p[i] p[j] enters in hit; returns how many are new."""
     new = 0
-    for k in range(o.kind.size):
-        if not hit[k] and blocked(o, k, p[i, 0], p[i, 1], p[i, 2], p[j, 0], p[j, 1], p[j, 2],
+    for k in range(o.size):
+        if not hit[k] and blocked(o[k], p[i, 0], p[i, 1], p[i, 2], p[j, 0], p[j, 1], p[j, 2],
                                   floor, snug):
             hit[k] = 1
             new += 1
@@ -32,18 +32,18 @@ def hit_by(o: Obstacles, p: Floats, i: int, j: int, floor: float, snug: bool, hi
 
 
 @numba.njit(cache=True, nogil=True)
-def _search(o: Obstacles, way: Floats, limits: Floats, floor: float, snug: bool, ring: int,
+def _search(o: Zones, way: Floats, limits: Floats, floor: float, snug: bool, ring: int,
             hit: Ints, out: Floats) -> int:
     """A clear, coarse way into out; marks the zones it had to heed in hit. 0: none found."""
     while True:
         active = np.flatnonzero(hit)
         bound = 2
         for k in active:
-            bound += corner_bound(o, k, ring)
+            bound += corner_bound(o[k], ring)
         x, n, path = np.empty((bound, 3)), 2, np.empty(bound, np.int64)
         x[:2] = way
         for k in active:
-            n = add_corners(o, k, way, limits, floor, ring, x, n)
+            n = add_corners(o[k], way, limits, floor, ring, x, n)
         size = astar(o, active, active.size, x, n, floor, snug, path)
         if size == 0 or size > MAX_CORNERS // 2:
             return 0
@@ -57,46 +57,46 @@ def _search(o: Obstacles, way: Floats, limits: Floats, floor: float, snug: bool,
 
 
 @numba.njit(cache=True, nogil=True)
-def _off_box(o: Obstacles, k: int, p: Floats, i: int) -> float:
-    total = 0.0
-    for m in range(3):
-        d = max(o.box[k, m] - p[i, m], p[i, m] - o.box[k, m + 3], 0.0)
-        total += d * d
-    return math.sqrt(total)
+def _off_box(zone: Zone, p: Floats, i: int) -> float:
+    dx = max(zone.x0 - p[i, 0], p[i, 0] - zone.x1, 0.0)
+    dy = max(zone.y0 - p[i, 1], p[i, 1] - zone.y1, 0.0)
+    dz = max(zone.z0 - p[i, 2], p[i, 2] - zone.z1, 0.0)
+    return math.sqrt(dx * dx + dy * dy + dz * dz)
 
 
 @numba.njit(cache=True, nogil=True)
-def zones_near(o: Obstacles, way: Floats, length: float) -> Ints:
+def zones_near(o: Zones, way: Floats, length: float) -> Ints:
     """The zones that a way of at most `length` between the ends could meet."""
-    near, n = np.empty(o.kind.size, np.int64), 0
-    for k in range(o.kind.size):
-        if _off_box(o, k, way, 0) + _off_box(o, k, way, 1) <= length:
+    near, n = np.empty(o.size, np.int64), 0
+    for k in range(o.size):
+        if _off_box(o[k], way, 0) + _off_box(o[k], way, 1) <= length:
             near[n] = k
             n += 1
     return near[:n]
 
 
 @numba.njit(cache=True, nogil=True)
-def _is_clear(o: Obstacles, p: Floats, n: int, floor: float) -> bool:
+def _is_clear(o: Zones, p: Floats, n: int, floor: float) -> bool:
     """Whether the way p[:n] is clear of all zones."""
     x, y, z = p[0, 0], p[0, 1], p[0, 2]
     u, v, w = x, y, z
     for i in range(1, n):
         x, y, z = min(x, p[i, 0]), min(y, p[i, 1]), min(z, p[i, 2])
         u, v, w = max(u, p[i, 0]), max(v, p[i, 1]), max(w, p[i, 2])
-    for k in range(o.kind.size):
-        box = o.box[k]
-        if (x > box[3] or u < box[0] or y > box[4] or v < box[1] or z > box[5] or w < box[2]):
+    for k in range(o.size):
+        zone = o[k]
+        if (x > zone.x1 or u < zone.x0 or y > zone.y1 or v < zone.y0 or z > zone.z1
+                or w < zone.z0):
             continue
         for i in range(1, n):
-            if blocked(o, k, p[i - 1, 0], p[i - 1, 1], p[i - 1, 2], p[i, 0], p[i, 1], p[i, 2],
+            if blocked(zone, p[i - 1, 0], p[i - 1, 1], p[i - 1, 2], p[i, 0], p[i, 1], p[i, 2],
                        floor, False):
                 return False
     return True
 
 
 @numba.njit(cache=True, nogil=True)
-def shortest(o: Obstacles, way: Floats, limits: Floats, out: Floats) -> tuple[int, float]:
+def shortest(o: Zones, way: Floats, limits: Floats, out: Floats) -> tuple[int, float]:
     """Points of the shortest safe way between the ends way[0] and way[1], both outside all zones.
 
     Writes them to out (MAX_CORNERS rows), returns their number and the length [m]; 0, inf: none.
@@ -105,12 +105,12 @@ def shortest(o: Obstacles, way: Floats, limits: Floats, out: Floats) -> tuple[in
     floor = min(way[0, 2], way[1, 2])
     snug = first_around(o, way[0, 0], way[0, 1], way[0, 2], False) >= 0 or first_around(
         o, way[1, 0], way[1, 1], way[1, 2], False) >= 0
-    hit = np.zeros(o.kind.size, np.int64)
+    hit = np.zeros(o.size, np.int64)
     hits = hit_by(o, way, 0, 1, floor, snug, hit)
     if hits == 0:
         return 2, span(way, 0, 1)
     if hits == 1 and not snug:
-        n = past_one(o, np.argmax(hit), way, limits, floor, out)
+        n = past_one(o[np.argmax(hit)], way, limits, floor, out)
         if n > 0 and _is_clear(o, out, n, floor):
             return n, length_of(out, n)
     n = 0

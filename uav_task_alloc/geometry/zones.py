@@ -8,20 +8,20 @@ from itertools import pairwise
 
 import numpy as np
 
-from uav_task_alloc.geometry.obstacles import Obstacles, blocked, contains, pack
+from uav_task_alloc.geometry.obstacles import blocked, contains, pack
 from uav_task_alloc.model import Point, Shape, ThreatZone, check_point
 
 
 def inside(point: Iterable[float], zone: ThreatZone, clearance: float = 0.0) -> bool:
     """Whether a point is inside the zone enlarged by its margin and `clearance` [m]."""
-    return bool(contains(pack((zone,), clearance), 0, *check_point('point', point), True))
+    return bool(contains(pack((zone,), clearance).rows[0], *check_point('point', point), True))
 
 
 def zones_around(point: Iterable[float], zones: Sequence[ThreatZone],
                  clearance: float = 0.0) -> tuple[ThreatZone, ...]:
     """The enlarged zones a point is inside of."""
     obstacles, place = pack(zones, clearance), check_point('point', point)
-    return tuple(zone for k, zone in enumerate(zones) if contains(obstacles, k, *place, True))
+    return tuple(zone for k, zone in enumerate(zones) if contains(obstacles.rows[k], *place, True))
 
 
 def distance(point: Iterable[float], zone: ThreatZone) -> float:
@@ -47,9 +47,9 @@ def cut_by(a: Iterable[float], b: Iterable[float], zones: Sequence[ThreatZone],
            clearance: float = 0.0) -> ThreatZone | None:
     """The first enlarged zone that the segment ab enters; None: it is clear."""
     start, end = check_point('a', a), check_point('b', b)
-    obstacles: Obstacles = pack(zones, clearance)
+    obstacles = pack(zones, clearance)
     for k, zone in enumerate(zones):
-        if blocked(obstacles, k, *start, *end, -np.inf, True):
+        if blocked(obstacles.rows[k], *start, *end, -np.inf, True):
             return zone
     return None
 
@@ -69,7 +69,7 @@ def _to_dome(x: float, y: float, z: float, zone: ThreatZone) -> float:
 
 def _to_polygon(x: float, y: float, zone: ThreatZone) -> float:
     flat = ThreatZone.polygon(zone.id, zone.vertices)
-    if contains(pack((flat,)), 0, x, y, 0.0, True):
+    if contains(pack((flat,)).rows[0], x, y, 0.0, True):
         return 0.0
     corners = np.array(zone.vertices)
     edges = np.roll(corners, -1, axis=0) - corners
