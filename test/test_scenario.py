@@ -171,6 +171,11 @@ def test_a_file_that_is_not_there_is_refused(tmp_path):
         scenario.load(tmp_path / 'none.yaml')
 
 
+def test_no_file_at_all_is_refused():
+    with pytest.raises(ScenarioError, match=r"^'': Is a directory: expected a scenario file"):
+        scenario.load('')
+
+
 def test_bytes_that_are_no_text_are_refused_with_their_line(tmp_path):
     (tmp_path / 'bad.yaml').write_bytes(b'name: x\nseed: \xff\n')
     with pytest.raises(ScenarioError, match=r'bad.yaml:2: byte 0xff: expected UTF-8 text'):

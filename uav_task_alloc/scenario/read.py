@@ -32,7 +32,8 @@ def load(path: str | Path) -> Scenario:
     try:
         text = Path(path).read_text(encoding='utf-8')
     except OSError as error:
-        raise ScenarioError(f'{path}: {error.strerror}: expected a scenario file') from None
+        raise ScenarioError(f'{str(path) or repr(path)}: {error.strerror}: '
+                            'expected a scenario file') from None
     except UnicodeDecodeError as error:
         line = error.object.count(b'\n', 0, error.start) + 1
         raise ScenarioError(f'{path}:{line}: byte {error.object[error.start]:#04x}: '
