@@ -89,7 +89,7 @@ class AllocatorParams(Checked):
                                         low=0.1, high=1000.0, unit='m/s')
     clearance: float = param(10.0, 'Distance kept from zones beyond their margins.', low=0.0,
                              high=10000.0, unit='m')
-    altitude_min: float = param(-1e5, 'Lowest detour, above the origin.', low=-1e5, high=1e5,
+    altitude_min: float = param(0.0, 'Lowest detour, above the origin.', low=-1e5, high=1e5,
                                 unit='m')
     altitude_max: float = param(1e5, 'Highest detour, above the origin.', low=-1e5, high=1e5,
                                 unit='m')
@@ -105,6 +105,12 @@ class AllocatorParams(Checked):
                               high=1000)
     state_dir: str = param('', 'Folder of the journal; empty: nothing is kept.', fixed=True)
     seed: int = param(0, 'Seed of the bees.', low=0, high=2**31 - 1, fixed=True)
+
+    def __post_init__(self) -> None:
+        Checked.__post_init__(self)
+        if self.altitude_min >= self.altitude_max:
+            raise InvalidValue('altitude_min', self.altitude_min,
+                               f'less than altitude_max = {self.altitude_max:g}')
 
 
 @dataclass(frozen=True)
@@ -129,6 +135,22 @@ class BridgeParams(Checked):
                                    high=5000.0, unit='m')
     takeoff: bool = param(False, 'Arm and take off by itself.')
     signing_key_file: str = param('', 'File with the signing key; empty: unsigned.', fixed=True)
+    system_id: int = param(245, 'MAVLink system id of the bridge; not that of the ground '
+                           'station of a human.', low=1, high=255, fixed=True)
+    component_id: int = param(190, 'MAVLink component id of the bridge.', low=1, high=255,
+                              fixed=True)
+    when_empty: str = param('hold', 'What a UAV in flight does with an empty list.',
+                            choices=('hold', 'return'))
+    when_foreign: str = param('yield', 'What to do about a mission that somebody else put on '
+                              'board: leave it, or put ours back.',
+                              choices=('yield', 'reassert'))
+    capabilities: tuple[str, ...] = param(
+        (), 'What UAVs can do, `uav_1:camera,thermal` each.', fixed=True)
+    full_range: float = param(0.0, 'Range of a full battery; 0: unknown, range_remaining is NaN.',
+                              low=0.0, high=1e7, unit='m')
+    state_rate: float = param(10.0, 'States of one UAV published at most.', low=0.5, high=100.0,
+                              unit='Hz')
+    tlog: str = param('', 'File to record all frames into, as .tlog; empty: none.', fixed=True)
 
 
 @dataclass(frozen=True)

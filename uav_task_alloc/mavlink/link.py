@@ -7,6 +7,7 @@ import socket
 import termios
 import tty
 from collections.abc import Hashable
+from contextlib import suppress
 from typing import Protocol
 
 from uav_task_alloc.errors import InvalidValue
@@ -80,10 +81,8 @@ class Udp:
         return got
 
     def write(self, end: Hashable, data: bytes) -> None:
-        try:
-            self._socket.sendto(data, end)  # type: ignore[arg-type]
-        except OSError:
-            pass  # a lost datagram: the protocols above expect that
+        with suppress(OSError):  # a lost datagram: the protocols above expect that
+            self._socket.sendto(data, end)  # type: ignore[call-overload]
 
     def step(self, now: float) -> None:
         """Nothing to do."""

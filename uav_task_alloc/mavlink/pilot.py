@@ -72,7 +72,7 @@ class Pilot:
         self._then: Callable[[float], None] | None = None  # once the command is done
         self._commanded: Flight | None = None  # by us, last
         self._must_start = False  # held for a swap
-        self._paused = self._yielding = self._climbing = self._was_stale = False
+        self._paused = self.yielding = self.climbing = self._was_stale = False
         self._climb_until = self._serving_until = math.inf
         self._restarts, self._said = 0, ''
         self._retry_at, self._retries = -math.inf, 0
@@ -168,7 +168,7 @@ class Pilot:
             self._paused = not last and self.telemetry.airborne
             progress.stopped()
         if airborne and not self.telemetry.airborne:
-            self._paused = self._yielding = self._climbing = False
+            self._paused = self.yielding = self.climbing = False
             progress.stopped()
 
     def _restarted(self, now: float) -> None:
@@ -176,7 +176,7 @@ class Pilot:
         self.notes.append(Note('warning', 'was restarted'))
         self.board.restarted()
         self._command = None
-        self._climbing = self._must_start = self._paused = False
+        self.climbing = self._must_start = self._paused = False
         self._rate_at, self._rates_asked = now, 0
 
     def _rates(self, now: float) -> list[Message]:
@@ -243,15 +243,15 @@ class Pilot:
 
     def _yield(self, now: float) -> Step:
         board = self.board
-        if board.state is MissionState.FOREIGN and board.read_once and not self._yielding:
+        if board.state is MissionState.FOREIGN and board.read_once and not self.yielding:
             board.read_once = False
-            self._yielding = self.policy.when_foreign == 'yield'
+            self.yielding = self.policy.when_foreign == 'yield'
             self.notes.append(Note('warning', 'somebody else changed the mission: '
                                    + self.policy.when_foreign))
-        if self._yielding and board.state is MissionState.FOREIGN:
+        if self.yielding and board.state is MissionState.FOREIGN:
             self.waits_for = 'the foreign mission to end'
             return []
-        self._yielding = False
+        self.yielding = False
         return None
 
     def _empty(self, now: float) -> Step:
@@ -339,14 +339,14 @@ class Pilot:
     def _rise(self, now: float) -> Step:
         """Off the ground, where that is ours to do."""
         telemetry, policy = self.telemetry, self.policy
-        if telemetry.airborne and not self._climbing:
+        if telemetry.airborne and not self.climbing:
             return None
-        if not policy.takeoff and not self._climbing:
+        if not policy.takeoff and not self.climbing:
             self._wait('a pilot to arm and take off (takeoff is false)')
             return []
         if now < self._retry_at:
             return []
-        if self._climbing:
+        if self.climbing:
             return self._climb(now)
         if telemetry.flight is not Flight.HOLD and Flight.HOLD in self.profile.set_mode and (
                 not self.profile.atomic):
@@ -364,16 +364,16 @@ class Pilot:
         self.telemetry.armed = True
 
     def _took_off(self, now: float) -> None:
-        self._climbing, self._climb_until = True, now + CLIMB
+        self.climbing, self._climb_until = True, now + CLIMB
         self._commanded = Flight.TAKEOFF
 
     def _climb(self, now: float) -> Step:
         if self.telemetry.height >= 0.9 * self.policy.cruise_altitude:
-            self._climbing, self._must_start = False, True
+            self.climbing, self._must_start = False, True
             return None
         self.waits_for = 'its height'
         if now > self._climb_until or not self.telemetry.armed:
-            self._climbing = False
+            self.climbing = False
             self._fail(now)
         return []
 

@@ -8,7 +8,7 @@ import struct
 import threading
 from collections.abc import Callable, Hashable, Iterable
 from pathlib import Path
-from typing import BinaryIO
+from typing import Any, BinaryIO
 
 from pymavlink.dialects.v20 import ardupilotmega as d
 
@@ -60,11 +60,10 @@ class Radio:
                 got += self._parse((number, end), data)
         return got
 
-    def send(self, messages: Iterable[tuple[Hashable, Message]]) -> None:
+    def send(self, messages: Iterable[tuple[Any, Message]]) -> None:
         """Each message to its address."""
         with self._lock:
-            for address, message in messages:
-                number, end = address  # type: ignore[misc]
+            for (number, end), message in messages:
                 frame = self._voice.pack(message)
                 self._write_record(frame)
                 self.links[number].write(end, frame)

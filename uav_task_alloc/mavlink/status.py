@@ -1,0 +1,113 @@
+# SPDX-License-Identifier: Apache-2.0
+"""How a vehicle stands, for programs (`state_of`) and for people (`facts_of`)."""
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from enum import Enum
+
+from pymavlink.dialects.v20 import ardupilotmega as d
+
+from uav_task_alloc.mavlink.board import MissionState
+from uav_task_alloc.mavlink.ground import Served
+from uav_task_alloc.mavlink.pilot import Pilot
+from uav_task_alloc.mavlink.profiles import Flight
+from uav_task_alloc.mission import RETURN
+from uav_task_alloc.model import Point
+
+
+class Mode(Enum):
+    """What a vehicle does; numbers as in UavState."""
+
+    UNKNOWN = 0
+    STANDBY = 1
+    TAKEOFF = 2
+    ON_MISSION = 3
+    HOLD = 4
+    RETURNING = 5
+    LANDING = 6
+    FAULT = 7
+
+
+_BY_FLIGHT = {Flight.HOLD: Mode.HOLD, Flight.RETURN: Mode.RETURNING, Flight.LAND: Mode.LANDING,
+              Flight.TAKEOFF: Mode.TAKEOFF}
+_BY_LANDED = {d.MAV_LANDED_STATE_TAKEOFF: Mode.TAKEOFF, d.MAV_LANDED_STATE_LANDING: Mode.LANDING}
+
+
+@dataclass(frozen=True, slots=True)
+class UavStatus:
+    """What UavState carries; NaN where unknown."""
+
+    uav_id: str
+    position: Point  # [m] ENU
+    velocity: Point  # [m/s] ENU
+    home: Point | None  # [m] ENU
+    battery: float  # 0..1
+    range_remaining: float  # [m]
+    available: bool
+    mode: Mode
+    mission_state: MissionState
+    active_task: str
+    list_revision: int
+
+    @property
+    def news(self) -> tuple[object, ...]:
+        """What is told at once when it changes, not at the next position."""
+        return (self.available, self.mode, self.mission_state, self.active_task,
+                self.list_revision)
+
+
+def mode_of(pilot: Pilot) -> Mode:
+    """The mode that people and the allocator understand."""
+    telemetry, progress = pilot.telemetry, pilot.board.progress
+    if telemetry.faulty:
+        return Mode.FAULT
+    if not telemetry.airborne and not pilot.climbing:
+        return Mode.STANDBY
+    if pilot.climbing:
+        return Mode.TAKEOFF
+    if telemetry.flight is Flight.MISSION:
+        item = progress.active
+        if item is not None and item.command == RETURN:
+            return Mode.RETURNING
+        return Mode.HOLD if progress.finished else Mode.ON_MISSION
+    return _BY_FLIGHT.get(telemetry.flight, _BY_LANDED.get(telemetry.landed, Mode.UNKNOWN))
+
+
+def state_of(served: Served, now: float, full_range: float = 0.0) -> UavStatus:
+    """All of it at one moment; `full_range` [m] of a full battery, 0: unknown."""
+    pilot = served.pilot
+    telemetry, board, mode = pilot.telemetry, pilot.board, mode_of(pilot)
+    active = board.progress.active
+    flying = mode in (Mode.ON_MISSION, Mode.HOLD, Mode.TAKEOFF) and board.tasks is not None
+    return UavStatus(
+        served.uav_id, telemetry.position, telemetry.velocity, telemetry.home,
+        telemetry.battery, full_range * telemetry.battery if full_range > 0.0 else math.nan,
+        not telemetry.stale(now) and mode is not Mode.FAULT and not pilot.yielding, mode,
+        board.state, active.task if flying and active else '', board.revision)
+
+
+def facts_of(served: Served, now: float) -> tuple[int, str, dict[str, str]]:
+    """Level (0 ok, 1 warning, 2 error, 3 stale), one line, and details."""
+    pilot = served.pilot
+    telemetry, board = pilot.telemetry, pilot.board
+    state = board.state
+    if telemetry.lost(now):
+        level, line = 3, 'link lost'
+    elif telemetry.stale(now):
+        level, line = 1, 'link stale'
+    elif mode_of(pilot) is Mode.FAULT or state is MissionState.MIXED:
+        level, line = 2, f'mission {state.name}' if state is MissionState.MIXED else 'fault'
+    elif state is MissionState.FOREIGN:
+        level, line = 1, 'mission FOREIGN'
+    else:
+        level, line = 0, f'mission {state.name}'
+    if pilot.waits_for and level < 3:
+        line += f', waits for {pilot.waits_for}'
+    return level, line, {
+        'autopilot': pilot.profile.name, 'address': str(served.address),
+        'mode': mode_of(pilot).name, 'mission': state.name,
+        'list_revision': str(board.revision), 'epoch': str(board.progress.epoch),
+        'item': f'{board.progress.current} of {len(board.progress.items)}',
+        'uploads': str(board.upload.uploads), 'restarts': str(telemetry.restarts),
+        'silent_for': f'{now - telemetry.heard_at:.1f} s', 'strays': str(served.strays)}

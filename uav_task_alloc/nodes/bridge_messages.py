@@ -1,0 +1,75 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Messages of the bridge to its core and back."""
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from geometry_msgs.msg import Vector3
+from uav_task_alloc_msgs import msg as m
+
+from uav_task_alloc.errors import InvalidValue
+from uav_task_alloc.geometry.frames import Origin
+from uav_task_alloc.mavlink.pilot import TaskProgress
+from uav_task_alloc.mavlink.status import UavStatus
+from uav_task_alloc.mission import Stop, TaskList
+from uav_task_alloc.model import check_point
+from uav_task_alloc.nodes.messages import from_point, header, to_point, to_task
+
+NOWHERE = (math.nan, math.nan, math.nan)
+EVENT = {'STARTED': m.TaskEvent.STARTED, 'COMPLETED': m.TaskEvent.COMPLETED,
+         'FAILED': m.TaskEvent.FAILED}
+
+
+def to_list(msg: m.TaskList, origin: Origin) -> TaskList:
+    """Raise InvalidValue, naming the field, where the message is no good list."""
+    stops = tuple(Stop(to_task(planned.task, origin), tuple(
+        check_point(f'task {planned.task.task_id}: via', from_point(p)) for p in planned.via))
+        for planned in msg.tasks)
+    names = [stop.task.id for stop in stops]
+    if len(set(names)) != len(names):
+        raise InvalidValue(f'task_list of {msg.uav_id}: task ids', names, 'each once')
+    if msg.end not in (m.TaskList.HOLD, m.TaskList.RETURN_HOME):
+        raise InvalidValue(f'task_list of {msg.uav_id}: end', msg.end,
+                           'HOLD (0) or RETURN_HOME (1)')
+    return TaskList(msg.revision, stops, msg.end == m.TaskList.RETURN_HOME)
+
+
+def from_status(status: UavStatus, capabilities: Iterable[str], now: float) -> m.UavState:
+    """The message of one UAV."""
+    return m.UavState(
+        header=header(now), uav_id=status.uav_id, position=to_point(status.position),
+        velocity=Vector3(x=status.velocity[0], y=status.velocity[1], z=status.velocity[2]),
+        home=to_point(status.home or NOWHERE), battery=status.battery,
+        range_remaining=status.range_remaining, cruise_speed=math.nan,
+        capabilities=list(capabilities), available=status.available, mode=status.mode.value,
+        mission_state=status.mission_state.value, active_task_id=status.active_task,
+        list_revision=status.list_revision)
+
+
+def from_progress(uav_id: str, made: TaskProgress, now: float) -> m.TaskEvent:
+    """The message of a task begun, completed or failed."""
+    return m.TaskEvent(header=header(now), task_id=made.task, uav_id=uav_id,
+                       revision=made.revision, event=EVENT[made.event], reason=made.reason)
+
+
+def diagnostics(facts: Iterable[tuple[str, int, str, dict[str, str]]],
+                now: float) -> DiagnosticArray:
+    """One status for each (name, level, line, details)."""
+    return DiagnosticArray(header=header(now), status=[
+        DiagnosticStatus(level=bytes([level]), name=f'mavlink_bridge: {name}', message=line,
+                         hardware_id=name,
+                         values=[KeyValue(key=k, value=v) for k, v in details.items()])
+        for name, level, line, details in facts])
+
+
+def to_capabilities(entries: Iterable[str]) -> dict[str, tuple[str, ...]]:
+    """`uav_1:camera,thermal` each; raise InvalidValue otherwise."""
+    found = {}
+    for entry in entries:
+        uav_id, colon, words = entry.partition(':')
+        if not colon or not uav_id:
+            raise InvalidValue('capabilities', entry, '`UAV_ID:WORD,WORD`')
+        found[uav_id] = tuple(w.strip() for w in words.split(',') if w.strip())
+    return found

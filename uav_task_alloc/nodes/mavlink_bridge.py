@@ -1,0 +1,168 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The bridge as a node: flies task lists on the vehicles of its links, tells how they do."""
+from __future__ import annotations
+
+import random
+import threading
+import time
+
+from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.node import Node
+from uav_task_alloc_msgs import msg as m
+
+from uav_task_alloc.errors import InvalidValue
+from uav_task_alloc.geometry.frames import Origin
+from uav_task_alloc.mavlink.ground import Ground, Served, Station
+from uav_task_alloc.mavlink.link import open_link
+from uav_task_alloc.mavlink.pilot import Policy
+from uav_task_alloc.mavlink.radio import Heartbeat, Radio
+from uav_task_alloc.mavlink.status import UavStatus, facts_of, state_of
+from uav_task_alloc.nodes import bridge_messages as convert
+from uav_task_alloc.nodes.messages import EVENTS, LATCHED, STATES, check_ros_name
+from uav_task_alloc.nodes.parameters import declare
+from uav_task_alloc.nodes.run import run
+from uav_task_alloc.params import BridgeParams
+
+TICK = 0.02  # [s] between steps of the machines; messages are acted on as they come
+
+
+def policy_of(params: BridgeParams) -> Policy:
+    """What the operator wants, as of now."""
+    return Policy(params.takeoff, params.cruise_altitude, params.when_empty, params.when_foreign)
+
+
+def station_of(params: BridgeParams) -> Station:
+    """Who we are; raise InvalidValue for a pattern that makes no ROS name."""
+    try:
+        names = {params.uav_id_pattern.format(sysid=number) for number in (1, 2)}
+    except (KeyError, IndexError, ValueError):
+        names = set()
+    if len(names) != 2:
+        raise InvalidValue('uav_id_pattern', params.uav_id_pattern, 'a text with {sysid}')
+    check_ros_name('uav_id_pattern', names.pop())
+    origin = Origin(params.origin__latitude, params.origin__longitude,
+                    params.origin__altitude_amsl)
+    return Station(params.system_id, params.component_id, params.system_ids,
+                   params.uav_id_pattern, params.autopilot, origin, policy_of(params))
+
+
+class MavlinkBridge(Node):
+    """Wires topics to the ground station, and that to the links."""
+
+    def __init__(self) -> None:
+        super().__init__('mavlink_bridge')
+        self.live = declare(self, BridgeParams)
+        params = self.live.now
+        self.station = station_of(params)
+        self.capabilities = convert.to_capabilities(params.capabilities)
+        self.ground = Ground(self.station, random.Random(time.time_ns()))
+        self.radio = Radio(
+            map(open_link, params.connections), params.system_id, params.component_id,
+            wall=time.time, signing_key_file=params.signing_key_file, tlog=params.tlog)
+        self.lock = threading.Lock()  # of the ground station
+        logger = self.get_logger()
+        self.log = {'info': lambda text: logger.info(text),  # rclpy wants a line each
+                    'warning': lambda text: logger.warning(text),
+                    'error': lambda text: logger.error(text)}
+        self.told: dict[str, tuple[tuple[object, ...], float]] = {}  # news and when, by UAV
+        self.lists: dict[str, object] = {}
+        self.states = self.create_publisher(m.UavState, 'uav_states', STATES)
+        self.task_events = self.create_publisher(m.TaskEvent, 'task_events', EVENTS)
+        self.health = self.create_publisher(DiagnosticArray, '/diagnostics', 10)
+        self.create_timer(0.05, self.on_tick)
+        self.create_timer(1.0, self.on_second)
+        self.closing = False
+        self.heartbeat = Heartbeat(self.radio.send_to_all)
+        self.receiver = threading.Thread(target=self.receive, name='receive', daemon=True)
+        self.heartbeat.start()
+        self.receiver.start()
+
+    def receive(self) -> None:
+        """Messages to the machines as they come, and time in between."""
+        step_at = 0.0
+        while not self.closing:
+            got, now, out = self.radio.receive(TICK), time.monotonic(), []
+            with self.lock:
+                for address, message in got:
+                    out += self.ground.receive(address, message, now)
+                if now >= step_at:
+                    out += self.ground.step(now)
+                    self.radio.step(now)
+                    step_at = now + TICK
+            self.radio.send(out)
+            self.tell(now)
+
+    def tell(self, now: float) -> None:
+        """Publish what is new."""
+        for served in list(self.ground.served.values()):
+            with self.lock:
+                status = state_of(served, now, self.live.now.full_range)
+            self.tell_events(served)
+            if self.is_news(status, served.pilot.telemetry.position_at):
+                self.states.publish(convert.from_status(
+                    status, self.capabilities.get(served.uav_id, ()), self.stamp()))
+
+    def tell_events(self, served: Served) -> None:
+        """Publish progress, log notes."""
+        pilot = served.pilot
+        while pilot.events:
+            self.task_events.publish(convert.from_progress(
+                served.uav_id, pilot.events.popleft(), self.stamp()))
+        while pilot.notes:
+            note = pilot.notes.popleft()
+            self.log[note.level](f'{served.uav_id}: {note.text}')
+
+    def is_news(self, status: UavStatus, position_at: float) -> bool:
+        """A new position, not too soon after the last, or something that cannot wait."""
+        news, when = self.told.get(status.uav_id, ((), 0.0))
+        if position_at < 0.0 or (status.news == news and
+                                 position_at < when + 1.0 / self.live.now.state_rate):
+            return False
+        self.told[status.uav_id] = status.news, position_at
+        return True
+
+    def on_tick(self) -> None:
+        """Listen for the lists of UAVs that were found; pass parameters on."""
+        policy = policy_of(self.live.now)
+        for served in list(self.ground.served.values()):
+            served.pilot.policy = policy
+            if served.uav_id not in self.lists:
+                self.get_logger().info(f'found {served.uav_id}: {served.pilot.profile.name}')
+                self.lists[served.uav_id] = self.create_subscription(
+                    m.TaskList, f'{served.uav_id}/task_list',
+                    lambda msg, uav_id=served.uav_id: self.on_list(uav_id, msg), LATCHED)
+
+    def on_list(self, uav_id: str, msg: m.TaskList) -> None:
+        """A new list for a UAV."""
+        try:
+            tasks = convert.to_list(msg, self.station.origin)
+        except InvalidValue as error:
+            self.get_logger().warning(f'{uav_id}/task_list: {error}: ignored')
+            return
+        with self.lock:
+            out = self.ground.assign(uav_id, tasks, time.monotonic())
+        self.radio.send(out)
+
+    def on_second(self) -> None:
+        """How all are, for people."""
+        now = time.monotonic()
+        with self.lock:
+            facts = [(s.uav_id, *facts_of(s, now)) for s in self.ground.served.values()]
+        self.health.publish(convert.diagnostics(facts, self.stamp()))
+
+    def stamp(self) -> float:
+        """The published clock [s]."""
+        return self.get_clock().now().nanoseconds * 1e-9
+
+    def destroy_node(self) -> None:
+        """Stop both threads before what they use is gone."""
+        self.closing = True
+        self.heartbeat.close()
+        self.receiver.join(5.0)
+        self.radio.close()
+        super().destroy_node()
+
+
+def main() -> None:
+    """Entry point."""
+    run(MavlinkBridge)
