@@ -16,7 +16,7 @@ from visualization_msgs.msg import MarkerArray
 
 from uav_task_alloc.allocator import Allocator, planning
 from uav_task_alloc.allocator.keeper import Keeper
-from uav_task_alloc.allocator.records import Answer, Problem, Verdict
+from uav_task_alloc.allocator.records import Answer, Note, Problem, Verdict
 from uav_task_alloc.allocator.rehearsal import rehearse
 from uav_task_alloc.allocator.status import facts, statuses, worries
 from uav_task_alloc.allocator.worker import Worker
@@ -194,7 +194,7 @@ class AllocatorNode(Node):
         self.keeper.save(self.core, time.monotonic())
         out = self.core.collect()
         for note in out.notes:
-            (self.get_logger().warning if note.warning else self.get_logger().info)(note.text)
+            self.log(note)
         for uav_id, uav_list in out.lists.items():
             self.list_publisher(uav_id).publish(told.from_list(uav_list))
         if out.statuses:
@@ -204,6 +204,13 @@ class AllocatorNode(Node):
             starts = {uav_id: known.report.position
                       for uav_id, known in self.world.fleet.records.items()}
             self.markers.publish(markers(out.allocation, starts, self.world.zones.values()))
+
+    def log(self, note: Note) -> None:
+        """One line; rclpy wants one place in the source for each severity."""
+        if note.warning:
+            self.get_logger().warning(note.text)
+        else:
+            self.get_logger().info(note.text)
 
     def list_publisher(self, uav_id: str) -> Publisher:
         """Of `<uav_id>/task_list`."""
