@@ -122,7 +122,7 @@ def test_a_burst_is_answered_by_one_plan_and_only_changed_lists_follow(start, pr
     assert told.value == pytest.approx(21.0)
     assert 'ADD t1' in told.trigger
     probe.until(lambda: markers and health)
-    assert any('UAVs heard' == pair.key for pair in health[-1].status[0].values)
+    assert any(pair.key == 'UAVs heard' for pair in health[-1].status[0].values)
     code, out = node.stop()
     assert code == 0
     assert 'Traceback' not in out

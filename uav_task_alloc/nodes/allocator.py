@@ -9,7 +9,6 @@ from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 from std_srvs.srv import Trigger
-from uav_task_alloc.solver.solve import plan
 from uav_task_alloc_msgs import msg as m
 from uav_task_alloc_msgs.srv import SetAvailability, SubmitTasks
 from visualization_msgs.msg import MarkerArray
@@ -36,6 +35,7 @@ from uav_task_alloc.nodes.messages import (
 from uav_task_alloc.nodes.parameters import declare
 from uav_task_alloc.nodes.run import run
 from uav_task_alloc.params import AllocatorParams
+from uav_task_alloc.solver.solve import plan
 
 TICK = 0.025  # [s]
 MOST_COMPLAINTS = 1000  # kinds of bad messages that are remembered as logged
