@@ -1,0 +1,163 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Joins our machines to simulated vehicles by bytes over virtual time, on a line that may fail."""
+import heapq
+import itertools
+import random
+
+from uav_task_alloc.geometry.frames import Origin
+from uav_task_alloc.mavlink.codec import Codec
+from uav_task_alloc.mavlink.peer import Peer
+from uav_task_alloc.mavlink.profiles import ARDUPILOT, PX4
+from uav_task_alloc.mavlink.upload import Mission, Upload
+from uav_task_alloc.mavlink.vehicle_item import StoredItem
+from uav_task_alloc.mavlink.vehicle_mission_ardupilot import ArduPilotMission
+from uav_task_alloc.mavlink.vehicle_mission_px4 import Px4Mission
+from uav_task_alloc.mission import Stop, TaskList, home_item, mission_items
+from uav_task_alloc.model import Task
+
+ORIGIN = Origin(47.397742, 8.545594, 488.0)
+OURS, TICK = (245, 190), 0.05  # [s]
+PROFILES = {'ardupilot': ARDUPILOT, 'px4': PX4}
+HOME = StoredItem(0, 16, 0.0, 0.0, 0.0, 0.0, 473977420, 85455940, 488.0)
+
+
+def square(n, side=100.0, z=50.0):
+    """n places, far enough from each other not to be taken for one another."""
+    return [(side * (k % 5), side * (1 + k // 5), z) for k in range(n)]
+
+
+def task_list(names, revision=1, *, side=100.0, service=0.0, returns=False, via=None, shift=0):
+    """A list of tasks named by letters or words, each at the place of its name."""
+    names = list(names)
+    places = dict(zip('ABCDEFGHIJKLMNOPQRSTUVWXYZ', square(26, side), strict=True))
+    stops = []
+    for n, name in enumerate(names):
+        place = places.get(name) or square(n + shift + 1, side)[-1]
+        stops.append(Stop(Task(name, place, service_time=service),
+                          tuple((via or {}).get(name, ()))))
+    return TaskList(revision, tuple(stops), returns)
+
+
+class Line:
+    """Carries frames both ways with loss and delay; `tampers` see each message first.
+
+    A tamper takes (direction 'up' or 'down', message, now) and returns None to let it pass, or a
+    list of (delay, message) to carry in its place.
+    """
+
+    def __init__(self, seed=0, loss=0.0, delay=(0.0, 0.0)):
+        self.rng = random.Random(seed)
+        self.loss, self.delay = loss, delay
+        self.cut = False
+        self.tampers = []
+        self.log = []  # (now, direction, message)
+        self._flying, self._number = [], itertools.count()
+
+    def send(self, direction, key, codec, message, now):
+        self.log.append((now, direction, message))
+        carried = [(self.rng.uniform(*self.delay), message)]
+        for tamper in self.tampers:
+            other = tamper(direction, message, now)
+            if other is not None:
+                carried = other
+                break
+        for delay, m in carried:
+            if not self.cut and self.rng.random() >= self.loss:
+                frame = codec.pack(m) if not isinstance(m, bytes) else m
+                heapq.heappush(self._flying, (now + delay, next(self._number), direction, key,
+                                              frame))
+
+    def due(self, now):
+        while self._flying and self._flying[0][0] <= now + 1e-9:
+            yield heapq.heappop(self._flying)[2:]
+
+    def sent(self, kind, direction='up'):
+        """Messages of a type that were given to the line."""
+        return [m for _, d, m in self.log if d == direction and m.get_type() == kind]
+
+
+class UploadBench:
+    """One upload machine and the mission service of one simulated autopilot."""
+
+    def __init__(self, kind, *, seed=0, loss=0.0, delay=(0.0, 0.0), capacity=500):
+        self.profile = PROFILES[kind]
+        self.changes, self.now, self.line = [], 0.0, Line(seed, loss, delay)
+        changed = lambda change, seq: self.changes.append((change, seq))  # noqa: E731
+        self.vehicle = (Px4Mission(1, capacity, changed) if kind == 'px4' else
+                        ArduPilotMission(1, capacity, changed, lambda: HOME))
+        if kind == 'ardupilot':
+            self.vehicle.items.append(HOME)
+        self.peer = Peer(1)
+        self.upload = Upload(self.peer, idle_after=self.profile.idle_after,
+                             rng=random.Random(seed))
+        self.codecs = {'up': Codec(*OURS), 'down': Codec(1, 1)}
+        self.ears = {'up': Codec(1, 1), 'down': Codec(*OURS)}
+        self.events = []
+
+    def mission(self, names='ABC', **kwargs):
+        rules = self.profile.rules
+        own = int(rules.home_first)
+        items = mission_items(task_list(names, **kwargs), rules, ORIGIN)
+        return Mission((home_item(None, ORIGIN, rules),) * own + items, own,
+                       self.profile.atomic, own)
+
+    def replace(self, mission):
+        self._up(self.upload.replace(mission, self.now))
+        return mission
+
+    def says(self, message, system=1, component=1):
+        """Something a vehicle says that its service did not."""
+        codec = Codec(system, component)
+        for m in self.ears['down'].parse(codec.pack(message)):
+            self._up(self.upload.receive(m, self.now))
+
+    def run(self, until=lambda: False, limit=120.0):
+        """Let time pass until the condition holds; True where it did."""
+        end = self.now + limit
+        while self.now < end:
+            self._move()
+            if until():
+                return True
+            self.now += TICK
+        return until()
+
+    def settle(self, limit=300.0):
+        """Until the upload has ended one way or the other."""
+        assert self.run(lambda: not self.upload.busy, limit)
+        return self.events[-1]
+
+    def _move(self):
+        self.vehicle.step(self.now)
+        self._down()
+        self._up(self.upload.step(self.now))
+        busy = True
+        while busy:
+            busy = False
+            for direction, _, frame in self.line.due(self.now):
+                busy = True
+                for m in self.ears[direction].parse(frame):
+                    if direction == 'up':
+                        self.vehicle.handle(m, self.now)
+                        self._down()
+                    else:
+                        self._up(self.upload.receive(m, self.now))
+        while self.upload.events:
+            self.events.append(self.upload.events.popleft())
+
+    def _up(self, messages):
+        for m in messages:
+            self.line.send('up', None, self.codecs['up'], m, self.now)
+
+    def _down(self):
+        out, self.vehicle.out[:] = list(self.vehicle.out), []
+        for m in out:
+            self.line.send('down', None, self.codecs['down'], m, self.now)
+
+    def holds(self, mission):
+        """Whether the vehicle's own memory has exactly this mission."""
+        held = [(i.command, i.x, i.y, round(i.z, 2)) for i in self.vehicle.items]
+        sent = [(i.command, i.x, i.y, round(i.z, 2)) for i in mission.items]
+        own = mission.own
+        return len(held) == len(sent) and all(
+            a[:3] == b[:3] and abs(a[3] - b[3]) < 0.02 for a, b in zip(
+                held[own:], sent[own:], strict=True))
