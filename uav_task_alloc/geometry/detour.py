@@ -10,7 +10,7 @@ import numpy as np
 
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.geometry.exits import way_out
-from uav_task_alloc.geometry.obstacles import Floats, Obstacles, contains, pack
+from uav_task_alloc.geometry.obstacles import Floats, Obstacles, contains, first_around, pack
 from uav_task_alloc.geometry.taut import MAX_CORNERS
 from uav_task_alloc.geometry.ways import shortest
 from uav_task_alloc.model import Point, ThreatZone, check_point
@@ -87,7 +87,8 @@ def way_between(obstacles: Obstacles, start: Point, goal: Point, limits: Floats,
     forwards = start <= goal  # one order, so that there and back are the same way
     ends = np.array((start, goal) if forwards else (goal, start))
     buffer = np.empty((MAX_CORNERS, 3))
-    n, length = shortest(obstacles.rows, ends, limits, buffer)
+    snug = any(first_around(obstacles.rows, *end, False) >= 0 for end in (start, goal))
+    n, length = shortest(obstacles.rows, ends, limits, snug, buffer)
     points = [(float(x), float(y), float(z)) for x, y, z in buffer[1:max(1, n - 1)]]
     return float(length), tuple(points if forwards else reversed(points))
 

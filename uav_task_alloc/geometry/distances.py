@@ -18,7 +18,7 @@ from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.geometry.detour import check_limits, way_between
 from uav_task_alloc.geometry.memory import floats_at, ints_at
 from uav_task_alloc.geometry.obstacles import Ints, contains, pack
-from uav_task_alloc.geometry.scene import CAUGHT, addresses, finder, make_scene
+from uav_task_alloc.geometry.scene import CAUGHT, INSIDE, addresses, finder, make_scene
 from uav_task_alloc.geometry.table import Table, forget
 from uav_task_alloc.model import Leg, Point, ThreatZone
 
@@ -68,7 +68,7 @@ def _find_for_table(pairs: Pairs, i: int, j: int) -> float:
     found = pairs.find(pairs.scene, i, j)
     table[slot[i] * pairs.row + slot[j]] = found
     caught = ints_at(ints_at(pairs.scene)[CAUGHT])
-    if not caught[i] and not caught[j]:
+    if caught[i] != INSIDE and caught[j] != INSIDE:
         table[slot[j] * pairs.row + slot[i]] = found
     return found
 
@@ -157,10 +157,10 @@ class Distances:
         scene = self._scene
         if i == j:
             return Leg((), 0.0)
-        if scene.caught[j]:
+        if scene.caught[j] == INSIDE:
             return Leg((), math.inf)
         metres, points = way_between(self._obstacles, self._point(i), self._point(j),
-                                     scene.limits, bool(scene.caught[i]))
+                                     scene.limits, bool(scene.caught[i] == INSIDE))
         return Leg(points, metres)
 
     def zones_around(self, i: int) -> tuple[str, ...]:

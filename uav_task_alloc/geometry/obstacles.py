@@ -43,7 +43,8 @@ ZONE = np.dtype([
     ('x0', np.float64), ('y0', np.float64), ('z0', np.float64),  # box around it, with the skin
     ('x1', np.float64), ('y1', np.float64), ('z1', np.float64),
     ('corners', np.int64), ('count', np.int64),  # PRISM: address and number, not enlarged
-    ('rim', np.int64), ('rims', np.int64),  # a convex outline 1.5 skins off, where there is one
+    ('rim', np.int64), ('rims', np.int64),  # a convex outline 1.5 skins off; none for a dome
+    ('dented', np.int64),  # 1: the rim is but the hull
 ])
 
 
@@ -69,16 +70,17 @@ def pack(zones: Sequence[ThreatZone], clearance: float = 0.0) -> Obstacles:
         grow = zone.margin + clearance
         (x, y, z), size, low, high = _extent(zone)
         skin = min(SKIN, 1e-4 * (size + grow))
-        corners = np.array(_counter_clockwise(zone.vertices), np.float64).reshape(-1, 2)
-        rim = np.array(_rim(zone, corners.tolist(), grow + 1.5 * skin)).reshape(-1, 2)
-        half = np.ptp(corners, axis=0) / 2 if len(corners) else np.array([size, size])
+        corners = _counter_clockwise(zone.vertices)
+        outline = np.array(corners, np.float64).reshape(-1, 2)
+        rim = np.array(_rim(zone, corners, grow + 1.5 * skin)).reshape(-1, 2)
+        half = np.ptp(outline, axis=0) / 2 if len(corners) else np.array([size, size])
         reach = half + grow + skin
         bottom = -math.inf if zone.shape is Shape.HEMISPHERE else low - grow - skin
         rows[i] = (
             zone.shape.value, x, y, z, zone.radius + grow, low - grow, high + grow, grow, skin,
             x - reach[0], y - reach[1], bottom, x + reach[0], y + reach[1], high + grow + skin,
-            corners.ctypes.data, len(corners), rim.ctypes.data, len(rim))
-        outlines += [corners, rim]
+            outline.ctypes.data, len(corners), rim.ctypes.data, len(rim), len(_hull(corners)) < len(corners))
+        outlines += [outline, rim]
     return Obstacles(rows, tuple(outlines))
 
 
@@ -95,21 +97,37 @@ def _extent(zone: ThreatZone) -> tuple[tuple[float, float, float], float, float,
 
 def _rim(zone: ThreatZone, corners: Sequence[tuple[float, float]],
          grow: float) -> list[tuple[float, float]]:
-    """A convex outline just outside the enlarged zone; none for a dome or a dented polygon."""
+    """A convex outline just outside the enlarged zone, or its hull; none for a dome."""
     if zone.shape is Shape.HEMISPHERE:
         return []
     if zone.shape is Shape.CYLINDER:
         return _fan(zone.center, zone.radius + grow, 0.0, 2 * math.pi, RIM)
     rim: list[tuple[float, float]] = []
+    corners = _hull(corners)
     for i, corner in enumerate(corners):
         before, after = corners[i - 1], corners[(i + 1) % len(corners)]
         start = math.atan2(corner[1] - before[1], corner[0] - before[0])
         turn = math.remainder(math.atan2(after[1] - corner[1], after[0] - corner[0]) - start,
                               2 * math.pi)
-        if turn < 0.0:
-            return []
         rim += _fan(corner, grow, start - math.pi / 2, turn, math.ceil(4 * turn / math.pi - 1e-9))
     return rim
+
+
+def _hull(corners: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
+    """The convex hull, counter-clockwise, without corners on its edges."""
+    hull: list[tuple[float, float]] = []
+    for half in (sorted(corners), sorted(corners, reverse=True)):
+        chain: list[tuple[float, float]] = []
+        for p in half:
+            while len(chain) > 1 and _turn(chain[-2], chain[-1], p) <= 0.0:
+                chain.pop()
+            chain.append(p)
+        hull += chain[:-1]
+    return hull
+
+
+def _turn(p: tuple[float, float], q: tuple[float, float], r: tuple[float, float]) -> float:
+    return (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0])
 
 
 def _fan(centre: Sequence[float], radius: float, start: float, turn: float,

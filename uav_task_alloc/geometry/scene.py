@@ -15,6 +15,7 @@ from uav_task_alloc.geometry.obstacles import Floats, Ints, Zones, first_around,
 from uav_task_alloc.geometry.taut import MAX_CORNERS
 from uav_task_alloc.geometry.ways import shortest
 
+OUTSIDE, SNUG, INSIDE = 0, 1, 2
 CAUGHT = 3  # where `addresses` has that of Scene.caught
 
 
@@ -22,7 +23,7 @@ class Scene(NamedTuple):
     """Points among zones, as kernels take them."""
 
     xyz: Floats  # (n, 3) [m]
-    caught: Ints  # 1: inside a zone
+    caught: Ints  # OUTSIDE, SNUG (less than the skin away) or INSIDE
     out: Floats  # (n, 3) [m], where a caught point is outside first; NaN: nowhere
     limits: Floats  # altitude_min, altitude_max [m]
     zones: Zones
@@ -37,10 +38,19 @@ def make_scene(xyz: Floats, zones: Zones, limits: Floats) -> Scene:
 
 
 @numba.njit(cache=True, nogil=True)
+def how_caught(o: Zones, p: Floats) -> int:
+    """Whether p is INSIDE a zone, SNUG at one or OUTSIDE all."""
+    if first_around(o, p[0], p[1], p[2], False) < 0:
+        return OUTSIDE
+    return INSIDE if first_around(o, p[0], p[1], p[2], True) >= 0 else SNUG
+
+
+@numba.njit(cache=True, nogil=True)
 def _catch(o: Zones, xyz: Floats, limits: Floats, caught: Ints, out: Floats) -> None:
     for i in range(xyz.shape[0]):
-        if first_around(o, xyz[i, 0], xyz[i, 1], xyz[i, 2], True) >= 0:
-            caught[i], out[i] = 1, way_out(o, xyz[i], limits)
+        caught[i] = how_caught(o, xyz[i])
+        if caught[i] == INSIDE:
+            out[i] = way_out(o, xyz[i], limits)
 
 
 def addresses(scene: Scene) -> Ints:
@@ -64,10 +74,10 @@ def _find(address: int, i: int, j: int) -> float:
     scene = _scene_at(address)
     if i == j:
         return 0.0
-    if scene.caught[j]:
+    if scene.caught[j] == INSIDE:
         return np.inf
     p, q, first = scene.xyz[i], scene.xyz[j], 0.0
-    if scene.caught[i]:
+    if scene.caught[i] == INSIDE:
         p = scene.out[i]
         if math.isnan(p[0]):
             return np.inf
@@ -76,7 +86,9 @@ def _find(address: int, i: int, j: int) -> float:
     ends = np.empty((2, 3))  # in one order, so that there and back are the same way
     backwards = p[0] > q[0] or (p[0] == q[0] and (p[1] > q[1] or (p[1] == q[1] and p[2] > q[2])))
     ends[0], ends[1] = (q, p) if backwards else (p, q)
-    return first + shortest(scene.zones, ends, scene.limits, np.empty((MAX_CORNERS, 3)))[1]
+    snug = scene.caught[i] == SNUG or scene.caught[j] == SNUG
+    return first + shortest(scene.zones, ends, scene.limits, snug,
+                            np.empty((MAX_CORNERS, 3)))[1]
 
 
 def _nothing(address: int, i: int, j: int) -> float:

@@ -176,6 +176,13 @@ def _over(rim: Floats, z: float, side: float, way: Floats, out: Floats) -> int:
 
 
 @numba.njit(cache=True, nogil=True)
+def _level_bound(way: Floats, z: float, side: float) -> float:
+    """No way that touches height z from above (side 1) or from below (-1) is shorter [m]."""
+    up = max(0.0, side * (z - way[0, 2])) + max(0.0, side * (z - way[1, 2]))
+    return math.hypot(math.hypot(way[1, 0] - way[0, 0], way[1, 1] - way[0, 1]), up)
+
+
+@numba.njit(cache=True, nogil=True)
 def _keep_best(trial: Floats, n: int, out: Floats, best: int) -> int:
     """Copy the trial way to out where it is shorter; returns the number of points there."""
     if n == 0 or (best > 0 and length_of(trial, n) >= length_of(out, best)):
@@ -197,18 +204,21 @@ def past_one(zone: Zone, way: Floats, limits: Floats, floor: float,
             if not limits[0] <= out[i, 2] <= limits[1]:
                 return 0
         return n
-    if zone.rims == 0 or floor < limits[0] or max(way[0, 2], way[1, 2]) > limits[1]:
+    if floor < limits[0] or max(way[0, 2], way[1, 2]) > limits[1]:
         return 0
     rim = numba.carray(floats_at(zone.rim), (zone.rims, 2))
-    trial, best = np.empty((rim.shape[0] + 3, 3)), 0
+    trial, best, bound = np.empty((rim.shape[0] + 3, 3)), 0, np.inf
     for side in (-1.0, 1.0):
         z = zone.high + skin if side > 0.0 else zone.low - skin
         if limits[0] <= z <= limits[1] and not math.isinf(z):
-            best = _keep_best(trial, _over(rim, z, side, way, trial), out, best)
+            if zone.dented:
+                bound = min(bound, _level_bound(way, z, side))
+            else:
+                best = _keep_best(trial, _over(rim, z, side, way, trial), out, best)
         if zone.kind == CYLINDER:
             n = _bend(centre, zone.radius + skin, way, True, trial) if side > 0.0 else 0
         else:
             n = _wrap(rim, way, side, trial)
         _rise(trial, n)
         best = _keep_best(trial, n, out, best)
-    return best
+    return best if bound == np.inf or length_of(out, best) <= bound else 0

@@ -11,7 +11,7 @@ import math
 import numba
 import numpy as np
 
-from uav_task_alloc.geometry.obstacles import Floats, Ints, Zone, Zones, blocked, first_around
+from uav_task_alloc.geometry.obstacles import Floats, Ints, Zone, Zones, blocked
 from uav_task_alloc.geometry.search import add_corners, astar, corner_bound
 from uav_task_alloc.geometry.single import past_one
 from uav_task_alloc.geometry.taut import MAX_CORNERS, length_of, span, tauten
@@ -20,14 +20,27 @@ RINGS = (12, 24, 64)  # corners around a zone; finer ones only where no way was 
 
 
 @numba.njit(cache=True, nogil=True)
+def next_hit(o: Zones, k: int, p: Floats, i: int, j: int, floor: float, snug: bool) -> int:
+    """The first zone from k on that the segment p[i] p[j] enters; o.size: none. O(zones)."""
+    x0, x1 = min(p[i, 0], p[j, 0]), max(p[i, 0], p[j, 0])
+    y0, y1 = min(p[i, 1], p[j, 1]), max(p[i, 1], p[j, 1])
+    while k < o.size:
+        zone = o[k]
+        if (x0 <= zone.x1 and x1 >= zone.x0 and y0 <= zone.y1 and y1 >= zone.y0 and blocked(
+                zone, p[i, 0], p[i, 1], p[i, 2], p[j, 0], p[j, 1], p[j, 2], floor, snug)):
+            break
+        k += 1
+    return k
+
+
+@numba.njit(cache=True, nogil=True)
 def hit_by(o: Zones, p: Floats, i: int, j: int, floor: float, snug: bool, hit: Ints) -> int:
     """Mark the zones that the segment p[i] p[j] enters in hit; returns how many are new."""
-    new = 0
-    for k in range(o.size):
-        if not hit[k] and blocked(o[k], p[i, 0], p[i, 1], p[i, 2], p[j, 0], p[j, 1], p[j, 2],
-                                  floor, snug):
-            hit[k] = 1
-            new += 1
+    new, k = 0, next_hit(o, 0, p, i, j, floor, snug)
+    while k < o.size:
+        new += 1 - hit[k]
+        hit[k] = 1
+        k = next_hit(o, k + 1, p, i, j, floor, snug)
     return new
 
 
@@ -96,24 +109,24 @@ def _is_clear(o: Zones, p: Floats, n: int, floor: float) -> bool:
 
 
 @numba.njit(cache=True, nogil=True)
-def shortest(o: Zones, way: Floats, limits: Floats, out: Floats) -> tuple[int, float]:
+def shortest(o: Zones, way: Floats, limits: Floats, snug: bool,
+             out: Floats) -> tuple[int, float]:
     """Points of the shortest safe way between the ends way[0] and way[1], both outside all zones.
 
     Writes them to out (MAX_CORNERS rows), returns their number and the length [m]; 0, inf: none.
+    `snug`: an end is so near to a zone that the way cannot keep the skin's distance.
     """
     out[:2] = way
     floor = min(way[0, 2], way[1, 2])
-    snug = first_around(o, way[0, 0], way[0, 1], way[0, 2], False) >= 0 or first_around(
-        o, way[1, 0], way[1, 1], way[1, 2], False) >= 0
-    hit = np.zeros(o.size, np.int64)
-    hits = hit_by(o, way, 0, 1, floor, snug, hit)
-    if hits == 0:
+    first = next_hit(o, 0, way, 0, 1, floor, snug)
+    if first == o.size:
         return 2, span(way, 0, 1)
-    if hits == 1 and not snug:
-        n = past_one(o[np.argmax(hit)], way, limits, floor, out)
+    if not snug and next_hit(o, first + 1, way, 0, 1, floor, snug) == o.size:
+        n = past_one(o[first], way, limits, floor, out)
         if n > 0 and _is_clear(o, out, n, floor):
             return n, length_of(out, n)
-    n = 0
+    hit, n = np.zeros(o.size, np.int64), 0
+    hit_by(o, way, 0, 1, floor, snug, hit)
     for ring in RINGS:
         n = _search(o, way, limits, floor, snug, ring, hit, out)
         if n:
