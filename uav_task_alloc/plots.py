@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from itertools import pairwise
 from pathlib import Path
+from statistics import median
 from typing import Any
 
 from matplotlib.axes import Axes
@@ -33,24 +34,11 @@ def draw_plan(uavs: Sequence[Uav], tasks: Sequence[Task], zones: Sequence[Threat
               plan: Plan, png: str | Path) -> None:
     """A plan: routes with their detours, tasks in order, zones, what is unassigned."""
     figure, axes = _map()
-    for zone in zones:
-        _zone(axes, zone, zone.id)
     places = {task.id: task.position for task in tasks}
-    handles = []
-    for i, uav in enumerate(uavs):
-        names = plan.routes.get(uav.id, ())
-        way = [uav.position]
-        for name, leg in zip(names, plan.legs.get(uav.id, ()), strict=False):
-            way += [*leg.via, places[name]]
-        if plan.returns and names:
-            way += [*plan.legs[uav.id][-1].via, uav.home or uav.position]
-        _way(axes, way, colour(i))
-        _home(axes, uav.position, uav.id, colour(i))
-        for order, name in enumerate(names, 1):
-            _task(axes, places[name], 'o', colour(i), f'{name} ({order})')
-        metres = sum(leg.length for leg in plan.legs.get(uav.id, ()))
-        handles.append(Line2D([], [], color=colour(i), lw=2,
-                              label=f'{uav.id}: {len(names)} tasks, {metres:.0f} m'))
+    height = _height(places.values())
+    for zone in zones:
+        _zone(axes, zone, zone.id, height)
+    handles = [_route(axes, uav, plan, places, colour(i)) for i, uav in enumerate(uavs)]
     for name in plan.unassigned:
         _task(axes, places[name], 'o', 'white', name, RED)
     if plan.unassigned:
@@ -58,7 +46,22 @@ def draw_plan(uavs: Sequence[Uav], tasks: Sequence[Task], zones: Sequence[Threat
     planned = sum(len(names) for names in plan.routes.values())
     axes.set_title(f'{planned} of {len(tasks)} tasks planned, {plan.distance:.0f} m',
                    loc='left', fontsize=12, fontweight='bold')
-    _finish(figure, axes, handles + _zone_handle(zones), png)
+    _finish(figure, axes, handles + _zone_handle(zones, height), png)
+
+
+def _route(axes: Axes, uav: Uav, plan: Plan, places: Mapping[str, Point], line: str) -> Line2D:
+    """One route with its tasks; its line of the legend."""
+    names, legs = plan.routes.get(uav.id, ()), plan.legs.get(uav.id, ())
+    stops = [*(places[name] for name in names), uav.home or uav.position]
+    way = [uav.position]
+    for leg, stop in zip(legs, stops, strict=False):  # a leg home only where the plan returns
+        way += [*leg.via, stop]
+    _way(axes, way, line)
+    _home(axes, uav.position, uav.id, line)
+    for order, name in enumerate(names, 1):
+        _task(axes, places[name], 'o', line, f'{name} ({order})')
+    metres = sum(leg.length for leg in legs)
+    return Line2D([], [], color=line, lw=2, label=f'{uav.id}: {len(names)} tasks, {metres:.0f} m')
 
 
 def draw_flight(out_dir: str | Path, png: str | Path) -> None:
@@ -68,15 +71,17 @@ def draw_flight(out_dir: str | Path, png: str | Path) -> None:
     first = min((task.wall for task in said.tasks.values()), default=said.first)
     start = flown.clock(first)
     figure, axes = _map()
+    height = _height(task.position for task in said.tasks.values())
     for seen in said.zones:
         late = seen.since > first + AT_START
         when = f'\nfrom {flown.clock(seen.since) - start:.0f} s' if late else ''
-        _zone(axes, seen.zone, seen.zone.id + when, late)
+        _zone(axes, seen.zone, seen.zone.id + when, height, late)
     colours = {uav: colour(i) for i, uav in enumerate(sorted(flown.tracks))}
     handles = _tracks(axes, said, flown, colours, start)
     handles += _tasks(axes, said, flown, colours, first)
     axes.set_title(_title(said, flown), loc='left', fontsize=12, fontweight='bold')
-    _finish(figure, axes, handles + _zone_handle([seen.zone for seen in said.zones]), png)
+    zones = [seen.zone for seen in said.zones]
+    _finish(figure, axes, handles + _zone_handle(zones, height), png)
 
 
 def _tracks(axes: Axes, said: Heard, flown: Truth, colours: Mapping[str, str],
@@ -133,7 +138,12 @@ def _map() -> tuple[Figure, Axes]:
     return figure, axes
 
 
-def _zone(axes: Axes, zone: ThreatZone, label: str, late: bool = False) -> None:
+def _height(points: Iterable[Point]) -> float:
+    """The height [m] most is flown at, where a dome is narrower than on the ground."""
+    return median([point[2] for point in points] or [0.0])
+
+
+def _zone(axes: Axes, zone: ThreatZone, label: str, height: float, late: bool = False) -> None:
     """The footprint with its margin; dashed where the zone came late."""
     if zone.shape is Shape.POLYGON:
         shape: Any = Polygon(zone.vertices)
@@ -144,6 +154,10 @@ def _zone(axes: Axes, zone: ThreatZone, label: str, late: bool = False) -> None:
         shape, south = Circle((x, y), zone.radius), y - zone.radius
         axes.add_patch(Circle((x, y), zone.radius + zone.margin, fill=False, ec=RED, lw=0.6,
                               ls=':', zorder=2))
+        above = height - zone.center[2]
+        if zone.shape is Shape.HEMISPHERE and abs(above) < zone.radius:
+            axes.add_patch(Circle((x, y), math.sqrt(zone.radius ** 2 - above ** 2),
+                                  fc=(0.78, 0.16, 0.16, 0.15), ec=RED, lw=0.8, zorder=2))
     shape.set(fc=(0.78, 0.16, 0.16, 0.2), ec=RED, lw=1.6, ls='--' if late else '-', zorder=2)
     axes.add_patch(shape)
     axes.annotate(label, (x, 0.55 * south + 0.45 * y), ha='center', va='center', fontsize=9,
@@ -176,8 +190,10 @@ def _mark(marker: str, fill: str, edge: str, label: str) -> Line2D:
                   mew=2.2 if edge == RED else 0.9, label=label)
 
 
-def _zone_handle(zones: Iterable[ThreatZone]) -> list[Any]:
-    return [Patch(fc='#f1c4c4', ec=RED, lw=1.6, label='zone')] if list(zones) else []
+def _zone_handle(zones: Sequence[ThreatZone], height: float) -> list[Any]:
+    dome = any(zone.shape is Shape.HEMISPHERE for zone in zones)
+    label = 'zone' + f' (dome: inner ring at {height:.0f} m)' * dome
+    return [Patch(fc='#f1c4c4', ec=RED, lw=1.6, label=label)] if zones else []
 
 
 def _finish(figure: Figure, axes: Axes, handles: Sequence[Any], png: str | Path) -> None:
