@@ -89,10 +89,19 @@ def lay(uav: Uav, tasks: Sequence[Task], returns: bool, legs: Mapping[tuple[str,
         clock += task.service_time
         before, place = task.id, task.position
     distance = math.fsum(stop.leg.length for stop in stops)
-    if returns and stops:
-        home = _planned(legs, _key(uav.id, before, HOME), place, uav.home or uav.position, ways)
-        distance += home.length if home else 0.0
-    return replace(held, stops=tuple(stops), returns=returns, distance=distance), lost
+    home = _way_home(uav, before, place, legs, held, ways) if returns else None
+    return replace(held, stops=tuple(stops), returns=returns, end_via=home.via if home else (),
+                   distance=distance + (home.length if home and stops else 0.0)), lost
+
+
+def _way_home(uav: Uav, before: str, place: Point, legs: Mapping[tuple[str, str, str], Leg],
+              held: UavList, ways: Ways) -> Leg | None:
+    goal = uav.home or uav.position
+    if before == START and held.returns and not held.stops:  # perhaps on this way already
+        metres = ways.rest(place, Leg(held.end_via, 0.0), goal)
+        if metres is not None:
+            return Leg(held.end_via, metres)
+    return _planned(legs, _key(uav.id, before, HOME), place, goal, ways)
 
 
 def _key(uav_id: str, before: str, after: str) -> tuple[str, str, str]:

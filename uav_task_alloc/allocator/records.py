@@ -136,6 +136,7 @@ class UavList:
     revision: int  # strictly rising
     stops: tuple[Stop, ...] = ()
     returns: bool = False  # home after the last task
+    end_via: tuple[Point, ...] = ()  # [m] ENU, flown before the return home
     distance: float = 0.0  # [m] of all legs, with the way home where it returns
     stamp: float = 0.0  # [s] when it was planned
 
@@ -146,7 +147,7 @@ class UavList:
 
     def flies_as(self, other: UavList) -> bool:
         """The same tasks by the same ways to the same end: nothing to tell the UAV."""
-        return self.returns == other.returns and [
+        return (self.returns, self.end_via) == (other.returns, other.end_via) and [
             (stop.task, stop.leg.via) for stop in self.stops] == [
             (stop.task, stop.leg.via) for stop in other.stops]
 

@@ -107,7 +107,7 @@ def _task_record(body: dict[str, Any]) -> TaskRecord:
 def _list(body: dict[str, Any]) -> UavList:
     stops = tuple(Stop(_task(stop['task']), _leg(stop['leg']), stop['eta'])
                   for stop in body['stops'])
-    return UavList(**{**body, 'stops': stops})
+    return UavList(**{**body, 'stops': stops, 'end_via': tuple(map(tuple, body['end_via']))})
 
 
 def _leg(body: dict[str, Any]) -> Leg:

@@ -9,7 +9,7 @@ from uav_task_alloc_msgs import msg as m
 
 from uav_task_alloc.allocator.records import Allocation, TaskState, UavList
 from uav_task_alloc.allocator.status import Status
-from uav_task_alloc.nodes.messages import header, planned_task, to_duration, to_stamp
+from uav_task_alloc.nodes.messages import header, planned_task, to_duration, to_point, to_stamp
 
 LEFT_OUT = (TaskState.PENDING, TaskState.UNASSIGNED)
 
@@ -20,6 +20,7 @@ def from_list(uav_list: UavList) -> m.TaskList:
         header=header(uav_list.stamp), uav_id=uav_list.uav, revision=uav_list.revision,
         tasks=[planned_task(stop.task, stop.leg, stop.eta) for stop in uav_list.stops],
         end=m.TaskList.RETURN_HOME if uav_list.returns else m.TaskList.HOLD,
+        end_via=[to_point(point) for point in uav_list.end_via],
         distance=float(uav_list.distance))
 
 

@@ -33,7 +33,9 @@ def to_list(msg: m.TaskList, origin: Origin) -> TaskList:
     if msg.end not in (m.TaskList.HOLD, m.TaskList.RETURN_HOME):
         raise InvalidValue(f'task_list of {msg.uav_id}: end', msg.end,
                            'HOLD (0) or RETURN_HOME (1)')
-    return TaskList(msg.revision, stops, msg.end == m.TaskList.RETURN_HOME)
+    end_via = tuple(check_point(f'task_list of {msg.uav_id}: end_via', from_point(p))
+                    for p in msg.end_via)
+    return TaskList(msg.revision, stops, msg.end == m.TaskList.RETURN_HOME, end_via)
 
 
 def from_status(status: UavStatus, capabilities: Iterable[str], now: float) -> m.UavState:
