@@ -161,3 +161,46 @@ def test_what_is_better_by_the_margin_is_published():
     desk.finish(desk.begin())
     assert desk.route('a') == ('t2', 't1')
     assert desk.allocations[-1].trigger == 'background'
+
+
+@pytest.fixture
+def returning():
+    desk = Desk(route_end='home', clearance=10.0)
+    desk.uav('a', 0.0, 0.0, 50.0)
+    desk.world.set_zones([DOME], (), desk.now)
+    desk.add(('t1', 1000, 0))
+    desk.settle()
+    return desk
+
+
+def home_bound(desk):
+    """The way home from the last task."""
+    return [(1000.0, 0.0, 50.0), *desk.lists['a'].end_via, (0.0, 0.0, 50.0)]
+
+
+def test_the_way_home_leads_around_a_zone_too(returning):
+    told = returning.lists['a']
+    assert told.returns
+    assert told.end_via
+    assert way_is_clear(home_bound(returning), [DOME])
+
+
+def test_the_way_home_stays_as_told_once_all_is_flown(returning):
+    told = returning.lists['a'].end_via
+    returning.event('COMPLETED', 't1', 'a')
+    returning.settle()
+    assert (returning.lists['a'].stops, returning.lists['a'].end_via) == ((), told)
+    returning.uav('a', *told[0])
+    returning.world.touch('test', returning.now)
+    returning.settle()
+    assert returning.lists['a'].end_via == told
+
+
+def test_a_new_zone_on_the_way_home_changes_it(returning):
+    returning.event('COMPLETED', 't1', 'a')
+    returning.settle()
+    returning.uav('a', 1000.0, 0.0, 50.0)
+    wall = ThreatZone.cylinder('wall', (750.0, 0.0), 100.0)
+    returning.world.set_zones([DOME, wall], (), returning.now)
+    returning.settle()
+    assert way_is_clear(home_bound(returning), [DOME, wall])
