@@ -74,7 +74,7 @@ class Desk:
         self.lists, self.history, self.notes, self.allocations = {}, [], [], []
 
     def uav(self, uav_id, *position, **more):
-        return self.world.hear(UavReport(uav_id, position, **more), self.now)
+        return self.world.hear(UavReport(uav_id, position, **more), self.now, self.now)
 
     def add(self, *tasks, action=Action.ADD):
         return self.world.announce(action, [task(t) for t in tasks], self.now, self.now)
@@ -109,7 +109,7 @@ class Desk:
         self.now += wait
         if hear:
             for record in list(self.world.fleet.records.values()):
-                self.world.hear(record.report, self.now)
+                self.world.hear(record.report, self.now, self.now)
         self.core.tick(self.now, self.now)
         while (problem := self.begin()) is not None:
             self.finish(problem)

@@ -83,6 +83,17 @@ def test_what_was_flown_while_nobody_listened_counts_when_it_is_told(rows):
     desk.core.tick(desk.now, desk.now)
 
 
+def test_a_uav_that_is_past_a_task_flew_it_while_nobody_listened(rows):
+    before, = (each for each in saved(rows).lists if each.uav == 'a')
+    first, second = before.task_ids
+    for revision, state in ((before.revision - 1, 'ASSIGNED'), (before.revision, 'COMPLETED')):
+        desk = Desk(saved(rows))
+        desk.uav('a', 0.0, 0.0, 50.0, active_task=second, list_revision=revision)
+        assert desk.state(first) == state
+    desk.settle()
+    assert desk.route('a') == (second,)
+
+
 def test_a_row_that_nobody_wrote_is_refused():
     with pytest.raises(JournalError, match="journal row task 't1' cannot be read: KeyError"):
         saved([Row('task', 't1', {'id': 't1'})])

@@ -23,8 +23,8 @@ def rehearse(plan: Callable[..., Plan], params: AllocatorParams) -> int:
     allocator.wake()
     for zones in ((), ZONES):
         allocator.world.set_zones(zones, (), now=0.0)
-        allocator.world.hear(UavReport('a', (0.0, 0.0, 20.0)), now=0.0)
-        allocator.world.hear(UavReport('b', (0.0, 90.0, 20.0)), now=0.0)
+        allocator.world.hear(UavReport('a', (0.0, 0.0, 20.0)), now=0.0, stamp=0.0)
+        allocator.world.hear(UavReport('b', (0.0, 90.0, 20.0)), now=0.0, stamp=0.0)
         tasks = [Task(f't{len(zones)}_{k}', (400.0 * (k % 2), 30.0 * k, 20.0))
                  for k in range(4)]
         allocator.world.announce(Action.ADD, tasks, stamp=0.0, now=0.0)

@@ -48,6 +48,7 @@ class World:
         self.outbox = Outbox()
         self.awake = False  # the kernels are compiled: looking at zones is quick
         self._looked: dict[str, float] = {}
+        self._old = {each.uav: each for each in saved.lists if each.stops}
 
     def announce(self, action: Action, tasks: Iterable[Task], stamp: float,
                  now: float) -> list[Verdict]:
@@ -80,12 +81,13 @@ class World:
         self.outbox.statuses = True
         return verdicts
 
-    def hear(self, report: UavReport, now: float) -> str:
+    def hear(self, report: UavReport, now: float, stamp: float) -> str:
         """A UAV says how it is; returns why that is refused, '' when it is not."""
         uav_id = report.uav_id
         if uav_id not in self.fleet.records and len(self.fleet.records) >= MOST_UAVS:
             return f'uav_id = {uav_id!r}: expected one of the {MOST_UAVS} UAVs known already'
         before = self.fleet.hear(report, now)
+        self._catch_up(report, stamp)
         news = _news(before, report)
         if news:
             self.note(f'{uav_id} {news}')
@@ -98,6 +100,19 @@ class World:
             self._looked[uav_id] = now
             self._look_ahead(uav_id, now)
         return ''
+
+    def _catch_up(self, report: UavReport, stamp: float) -> None:
+        """After a restart: what comes before the task it flies was flown while nobody heard."""
+        old = self._old.pop(report.uav_id, None)
+        if (old is None or report.list_revision != old.revision
+                or report.active_task not in old.task_ids):
+            return
+        for task_id in old.task_ids[:old.task_ids.index(report.active_task)]:
+            if self.tasks.records[task_id].open:
+                self.tasks.change(task_id, stamp, state=TaskState.COMPLETED, uav=report.uav_id,
+                                  reason=f'{report.uav_id} has passed it')
+                self.note(f'{task_id} COMPLETED while nobody listened: {report.uav_id} flies '
+                          f'{report.active_task}')
 
     def _look_ahead(self, uav_id: str, now: float) -> None:
         """A way cut by a zone, or a UAV caught in one, asks for a new plan."""

@@ -91,7 +91,7 @@ class AllocatorNode(Node):
     def on_state(self, msg: m.UavState) -> None:
         """A UAV says how it is."""
         try:
-            refused = self.world.hear(to_report(msg), time.monotonic())
+            refused = self.world.hear(to_report(msg), time.monotonic(), self.stamp())
         except InvalidValue as error:
             refused = str(error)
         if refused:
