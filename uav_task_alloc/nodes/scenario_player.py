@@ -41,7 +41,7 @@ class ScenarioPlayer(Node):
     def tick(self) -> None:
         """Carry out every moment that is due."""
         if self.started is None:
-            if not (self.tasks.get_subscription_count() and self.zones.get_subscription_count()):
+            if not (self.listened('task_announcements') and self.listened('threat_zones')):
                 return
             self.started = time.monotonic()
         now = (time.monotonic() - self.started) * self.speedup
@@ -51,6 +51,11 @@ class ScenarioPlayer(Node):
                 self.get_logger().info('everything is announced')
         if self.doomed and self.set_alive.service_is_ready():
             self.kill(self.doomed.pop(0))
+
+    def listened(self, topic: str) -> bool:
+        """Whether anybody who is not just watching has subscribed."""
+        return any(other.node_name != 'live_view'
+                   for other in self.get_subscriptions_info_by_topic(topic))
 
     def play(self, moment: scenario.Moment) -> None:
         """Publish what happens in one moment."""
