@@ -1,0 +1,118 @@
+# SPDX-License-Identifier: Apache-2.0
+"""COMMAND_LONG and COMMAND_INT as a simulated autopilot carries them out, with their result."""
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+
+from uav_task_alloc.mavlink.codec import Message
+from uav_task_alloc.mavlink.vehicle_config import Mode
+from uav_task_alloc.mavlink.vehicle_flight import Flight
+from uav_task_alloc.mavlink.vehicle_streams import Streams
+
+Params = tuple[float, float, float, float, float, float, float]
+_ACCEPTED = int(dialect.MAV_RESULT_ACCEPTED)
+_DENIED = int(dialect.MAV_RESULT_DENIED)
+_FAILED = int(dialect.MAV_RESULT_FAILED)
+_UNSUPPORTED = int(dialect.MAV_RESULT_UNSUPPORTED)
+_REJECTED = int(dialect.MAV_RESULT_TEMPORARILY_REJECTED)
+_FORCE = 21196  # param2 of ARM_DISARM
+
+
+class Commands:
+    """One handler a command; `refused` is what this autopilot answers where it may not."""
+
+    refused = _FAILED
+
+    def __init__(self, flight: Flight, streams: Streams) -> None:
+        self.flight = flight
+        self.streams = streams
+        self.out: list[Message] = []  # what REQUEST_MESSAGE asks for
+        self.handlers: dict[int, Callable[[Params], int]] = {
+            dialect.MAV_CMD_COMPONENT_ARM_DISARM: self._arm_disarm,
+            dialect.MAV_CMD_NAV_TAKEOFF: self._takeoff,
+            dialect.MAV_CMD_DO_SET_MODE: self._set_mode,
+            dialect.MAV_CMD_MISSION_START: lambda p: self._result(self.flight.start_mission()),
+            dialect.MAV_CMD_SET_MESSAGE_INTERVAL: self._set_message_interval,
+            dialect.MAV_CMD_REQUEST_MESSAGE: self._request_message,
+            dialect.MAV_CMD_NAV_RETURN_TO_LAUNCH: lambda p: self._mode(Mode.RETURN),
+            dialect.MAV_CMD_NAV_LAND: lambda p: self._mode(Mode.LAND),
+            dialect.MAV_CMD_NAV_LOITER_UNLIM: lambda p: self._mode(Mode.HOLD),
+            dialect.MAV_CMD_DO_CHANGE_SPEED: self._change_speed,
+        }
+
+    def run(self, command: int, params: Params) -> int:
+        """The MAV_RESULT of a command."""
+        handler = self.handlers.get(command)
+        return _UNSUPPORTED if handler is None else handler(params)
+
+    def mode_of(self, custom_mode: int) -> Mode | None:
+        """The mode of a custom_mode; None where this vehicle has no such."""
+        modes = self.flight.custom_modes.items()
+        return next((mode for mode, number in modes if number == custom_mode), None)
+
+    def _result(self, done: bool) -> int:
+        return _ACCEPTED if done else self.refused
+
+    def _mode(self, mode: Mode | None) -> int:
+        return self._result(mode is not None and self.flight.set_mode(mode))
+
+    def _arm_disarm(self, p: Params) -> int:
+        if p[0] == 1.0:
+            return self._result(self.flight.arm())
+        return self._result(p[0] == 0.0 and self.flight.disarm(p[1] == _FORCE))
+
+    def _takeoff(self, p: Params) -> int:
+        raise NotImplementedError
+
+    def _set_mode(self, p: Params) -> int:
+        raise NotImplementedError
+
+    def _set_message_interval(self, p: Params) -> int:
+        known = self.streams.set_interval(int(p[0]), p[1], self.flight.now)
+        return _ACCEPTED if known else _FAILED
+
+    def _request_message(self, p: Params) -> int:
+        message = self.streams.make(int(p[0]))
+        if message is None:
+            return _FAILED
+        self.out.append(message)
+        return _ACCEPTED
+
+    def _change_speed(self, p: Params) -> int:
+        if not p[1] > 0.0:
+            return _DENIED
+        self.flight.speed = p[1]
+        return _ACCEPTED
+
+
+class ArduPilotCommands(Commands):
+    """Refuses with FAILED; takes 224; take-off height is above home."""
+
+    def __init__(self, flight: Flight, streams: Streams) -> None:
+        super().__init__(flight, streams)
+        self.handlers[dialect.MAV_CMD_DO_SET_MISSION_CURRENT] = (
+            lambda p: self._result(self.flight.set_current(int(p[0]))))
+
+    def _set_mode(self, p: Params) -> int:
+        return self._mode(self.mode_of(int(p[1])))
+
+    def _takeoff(self, p: Params) -> int:
+        return self._result(self.flight.takeoff(self.flight.home[2] + p[6]))
+
+
+class Px4Commands(Commands):
+    """Refuses with TEMPORARILY_REJECTED; 224 is unsupported; take-off height is AMSL."""
+
+    refused = _REJECTED
+
+    def _set_mode(self, p: Params) -> int:
+        return self._mode(self.mode_of(int(p[1]) << 16 | int(p[2]) << 24))
+
+    def _takeoff(self, p: Params) -> int:
+        flight = self.flight
+        low = flight.body.position[2] + flight.takeoff_height
+        height = p[6] - flight.home_amsl + flight.home[2]
+        return self._result(flight.takeoff(low if math.isnan(height) else max(low, height)))

@@ -1,0 +1,62 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a simulated vehicle is given, and the flight modes both autopilots have in common."""
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from enum import Enum
+
+from uav_task_alloc.geometry.frames import Origin
+from uav_task_alloc.model import Point
+
+
+@dataclass(frozen=True, slots=True)
+class VehicleConfig:
+    """One airframe; None means: as the real autopilot has it."""
+
+    uav: str
+    system_id: int  # 1..255
+    origin: Origin
+    position: Point  # [m] ENU on the ground, at the start
+    home: Point | None = None  # [m] ENU; None: the position
+    cruise_speed: float = 15.0  # [m/s]
+    climb_rate: float = 4.0  # [m/s] up and down
+    acceleration: float = 3.0  # [m/s2]
+    range: float = math.inf  # [m] at cruise speed with a full battery
+    acceptance_radius: float = 2.0  # [m] WPNAV_RADIUS, NAV_ACC_RAD
+    arming_delay: float | None = None  # [s] from boot to a position estimate
+    capacity: int | None = None  # items of the mission storage
+    floods: bool = True  # PX4 streams its onboard set unasked
+
+
+class Mode(Enum):
+    """What the vehicle does by itself; `ArduPilot` and `Px4` give each a custom_mode."""
+
+    MANUAL = 'manual'
+    MISSION = 'mission'
+    GUIDED = 'guided'
+    HOLD = 'hold'
+    BRAKE = 'brake'
+    TAKEOFF = 'takeoff'
+    RETURN = 'return'
+    LAND = 'land'
+
+
+class Change(Enum):
+    """What happened to the stored mission, for the flight that may be using it."""
+
+    BEGUN = 'begun'  # nothing yet: an upload has been accepted
+    TRUNCATED = 'truncated'
+    WRITTEN = 'written'
+    SWAPPED = 'swapped'
+    CLEARED = 'cleared'
+
+
+@dataclass(frozen=True, slots=True)
+class Event:
+    """Something that happened on board, for the ground-truth log."""
+
+    t: float  # [s] vehicle time
+    name: str  # armed, disarmed, takeoff, item_reached, mission_end, died
+    point: Point  # [m] ENU: of the item's target as stored, else of the vehicle
+    seq: int | None = None  # mission item, item_reached only

@@ -1,0 +1,143 @@
+# SPDX-License-Identifier: Apache-2.0
+"""ArduCopter in flight: a mission that stops, resumes and completes, and stays in AUTO."""
+from __future__ import annotations
+
+from enum import Enum
+from typing import ClassVar
+
+from uav_task_alloc.mavlink import vehicle_item as item_
+from uav_task_alloc.mavlink.vehicle_body import Track
+from uav_task_alloc.mavlink.vehicle_config import Change, Mode
+from uav_task_alloc.mavlink.vehicle_flight import CRITICAL, WARNING, Flight
+from uav_task_alloc.mavlink.vehicle_item import StoredItem
+
+_ARMABLE = {Mode.MANUAL, Mode.GUIDED, Mode.HOLD}
+
+
+class Run(Enum):
+    """State of the mission; the values are those of MISSION_CURRENT.mission_state."""
+
+    NOT_STARTED = 2
+    ACTIVE = 3
+    STOPPED = 4
+    COMPLETE = 5
+
+
+class ArduPilotFlight(Flight):
+    """Flies from seq 1 on; what it flies now is a copy that a changed storage restarts."""
+
+    custom_modes: ClassVar[dict[Mode, int]] = {
+        Mode.MANUAL: 0, Mode.MISSION: 3, Mode.GUIDED: 4, Mode.HOLD: 5, Mode.RETURN: 6,
+        Mode.LAND: 9, Mode.BRAKE: 17,
+    }
+    arming_delay = 41.0
+    return_height = 15.0
+    takeoff_height = 10.0
+
+    def reboot(self, now: float) -> None:
+        super().reboot(now)
+        self.mode = Mode.MANUAL
+        self.run = Run.NOT_STARTED
+        self._upcoming = 1  # seq where the search for the next flown item begins
+
+    def arming_refusal(self) -> str:
+        if self.mode not in _ARMABLE:
+            return f'Arm: {self.mode.name} mode not armable'
+        return super().arming_refusal()
+
+    def takeoff(self, height: float) -> bool:
+        if self.mode is not Mode.GUIDED or not self.armed or not self.landed:
+            return False
+        x, y, z = self.body.position
+        if height <= z:
+            return False
+        self.track = Track(((x, y, height),), 0.3)
+        return True
+
+    def can_fly_mission(self) -> bool:
+        if len(self.items) < 2:
+            self.texts.append((WARNING, 'Mode change to AUTO failed: no mission'))
+            return False
+        if self.armed and self.landed and self._first_flown() != item_.TAKEOFF:
+            self.texts.append((CRITICAL, 'Auto: Missing Takeoff Cmd'))
+            return False
+        return True
+
+    def _first_flown(self) -> int | None:
+        return next((i.command for i in self.items[1:] if i.command != item_.CHANGE_SPEED), None)
+
+    def leave(self, mode: Mode) -> None:
+        if mode is Mode.MISSION and self.run is Run.ACTIVE:
+            self.run = Run.STOPPED
+
+    def enter(self, mode: Mode) -> None:
+        super().enter(mode)
+        if mode is Mode.MISSION:
+            self._resume()
+
+    def start_mission(self) -> bool:
+        if not self.set_mode(Mode.MISSION):
+            return False
+        if self.run is not Run.ACTIVE:
+            self._resume()
+        return True
+
+    def _resume(self) -> None:
+        if self.run in (Run.COMPLETE, Run.NOT_STARTED):
+            self._upcoming = 1  # a completed mission begins anew
+        self.run = Run.ACTIVE
+
+    def set_current(self, seq: int) -> bool:
+        if len(self.items) < 2 or seq >= len(self.items):
+            return False
+        upcoming = max(seq, 1)
+        flown = self._flown_from(upcoming)
+        if flown is None:
+            return False
+        self.seq, self._upcoming, self.track = flown, upcoming, None
+        if self.run is not Run.ACTIVE:
+            self.run = Run.STOPPED
+        return True
+
+    def _flown_from(self, seq: int) -> int | None:
+        return next((i for i in range(seq, len(self.items))
+                     if self.items[i].command != item_.CHANGE_SPEED), None)
+
+    def changed(self, change: Change, flagged: int | None) -> None:
+        if change is Change.CLEARED:
+            self.seq, self._upcoming, self.run = 0, 1, Run.NOT_STARTED
+        if change is Change.WRITTEN and self.mode is Mode.MISSION and self.track is not None:
+            self._restart()
+
+    def _restart(self) -> None:
+        if self.seq < len(self.items):
+            self.begin(self.seq)
+            self.texts.append((CRITICAL, 'Auto mission changed, restarted command'))
+        else:  # it flies on to where the old item was
+            self.texts.append((CRITICAL, 'Auto mission changed but failed to restart command'))
+
+    def next_item(self) -> None:
+        if self.run is not Run.ACTIVE:
+            return
+        flown = self._flown_from(self._upcoming)
+        for seq in range(self._upcoming, len(self.items) if flown is None else flown):
+            self.do(self.items[seq])
+            self.tell_reached(seq, self.body.position)
+        if flown is None:
+            self.run = Run.COMPLETE
+            self.note('mission_end')
+            return
+        self._upcoming = flown + 1
+        self.begin(flown)
+
+    def begin(self, seq: int) -> None:
+        self._landing = self.items[seq].command == item_.LAND
+        super().begin(seq)
+
+    def item_done(self) -> None:
+        if not self._landing:  # it disarms before it could tell
+            self.tell_reached(self.seq, self.target)
+        self._upcoming = self.seq + 1
+
+    def radius(self, item: StoredItem) -> float:
+        return self.config.acceptance_radius  # WPNAV_RADIUS, whatever param2 said

@@ -1,0 +1,150 @@
+# SPDX-License-Identifier: Apache-2.0
+"""PX4 in flight: a mission that is checked as a whole, swapped as a whole, and ends in Hold."""
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import ClassVar
+
+from uav_task_alloc.mavlink import vehicle_item as item_
+from uav_task_alloc.mavlink.vehicle_body import Track, distance
+from uav_task_alloc.mavlink.vehicle_config import Change, Mode
+from uav_task_alloc.mavlink.vehicle_flight import CRITICAL, Flight
+from uav_task_alloc.mavlink.vehicle_item import StoredItem
+from uav_task_alloc.model import Point
+
+_FARTHEST = 10_000.0  # [m] MIS_DIST_1WP and MIS_DIST_WPS
+_REPEATS = 10  # times REACHED is sent again
+_REPEAT_PERIOD = 1.0  # [s]
+
+
+def _auto(sub: int) -> int:
+    return sub << 24 | 4 << 16
+
+
+class Px4Flight(Flight):
+    """Flies the item at `seq`; a swap goes to the flagged one at once."""
+
+    custom_modes: ClassVar[dict[Mode, int]] = {
+        Mode.MANUAL: 3 << 16, Mode.TAKEOFF: _auto(2), Mode.HOLD: _auto(3),
+        Mode.MISSION: _auto(4), Mode.RETURN: _auto(5), Mode.LAND: _auto(6),
+    }
+    arming_delay = 20.0
+    return_height = 60.0
+    takeoff_height = 2.5
+
+    def reboot(self, now: float) -> None:
+        super().reboot(now)
+        self._finished = False
+        self._last_reached: int | None = None
+        self._repeats = 0
+        self._repeat_at = now
+
+    def takeoff(self, height: float) -> bool:
+        if not self.positioned or not self.landed:
+            return False
+        self.set_mode(Mode.TAKEOFF)
+        x, y, _ = self.body.position
+        self.track = Track(((x, y, height),), 0.3)
+        return True
+
+    def can_fly_mission(self) -> bool:
+        reason = self._infeasible()
+        if reason:
+            self.texts.append((CRITICAL, reason))
+        return not reason
+
+    def _infeasible(self) -> str:
+        if not self.items:
+            return 'Mission rejected: no valid mission'
+        points = [self.home, *(self.point(i) for i in self.items
+                               if i.command in item_.POSITIONAL)]
+        for number, (a, b) in enumerate(pairwise(points)):
+            gap = distance(a, b)
+            if gap > _FARTHEST:
+                what = 'First waypoint' if number == 0 else 'Distance between waypoints'
+                return f'{what} too far: {gap:.0f} m, {_FARTHEST:.0f} max'
+        return ''
+
+    def enter(self, mode: Mode) -> None:
+        super().enter(mode)
+        if mode is Mode.MISSION and self._finished:
+            self.seq, self._finished = 0, False
+
+    def start_mission(self) -> bool:
+        return self.set_mode(Mode.MISSION) and self.arm()
+
+    def set_current(self, seq: int) -> bool:
+        if seq >= len(self.items):
+            self.texts.append((CRITICAL, 'New mission waypoint sequence out of bounds'))
+            return False
+        self.seq, self._finished = seq, False
+        if self.mode is Mode.MISSION:
+            self.track = None
+        return True
+
+    def changed(self, change: Change, flagged: int | None) -> None:
+        if change is Change.BEGUN:
+            self._last_reached = None
+        if change not in (Change.SWAPPED, Change.CLEARED):
+            return
+        last = max(0, len(self.items) - 1)
+        self.seq = min(self.seq, last) if flagged is None else flagged
+        self._finished = False
+        reason = self._infeasible() if self.items else ''
+        if reason:
+            self.texts.append((CRITICAL, reason))
+        if self.mode is Mode.MISSION:
+            self.track = None
+            if reason or not self.items:
+                self.set_mode(Mode.HOLD)
+
+    def next_item(self) -> None:
+        item = self.items[self.seq]
+        if item.command in (item_.CHANGE_SPEED,):
+            self.do(item)
+            self._advance(self.body.position)
+        elif item.command == item_.RETURN:
+            self.set_mode(Mode.RETURN)  # which is never told as reached
+        else:
+            self.begin(self.seq)
+
+    def item_done(self) -> None:
+        self._advance(self.target)
+
+    def _advance(self, point: Point) -> None:
+        self.tell_reached(self.seq, point)
+        if self.seq + 1 < len(self.items):
+            self.seq += 1
+            return
+        self._finished = True
+        self.note('mission_end')
+        self.set_mode(Mode.HOLD)
+
+    def tell_reached(self, seq: int, point: Point) -> None:
+        super().tell_reached(seq, point)
+        self._last_reached, self._repeats = seq, 0
+        self._repeat_at = self.now + _REPEAT_PERIOD
+
+    def step(self, now: float) -> None:
+        super().step(now)
+        while (self._last_reached is not None and self._repeats < _REPEATS
+               and self._repeat_at <= now):
+            self.reached.append(self._last_reached)
+            self._repeats += 1
+            self._repeat_at += _REPEAT_PERIOD
+
+    def make_track(self, item: StoredItem) -> Track:
+        track = super().make_track(item)
+        if not self.landed or not track.points or track.lands:
+            return track
+        x, y, z = self.body.position
+        top = max(track.points[0][2], z + self.takeoff_height)
+        return Track(((x, y, top), *track.points), track.radius, track.hold)
+
+    def climb(self, target: Point) -> Track:
+        return Track((target,), self.config.acceptance_radius)  # in the air: a waypoint
+
+    def radius(self, item: StoredItem) -> float:
+        if item.command == item_.WAYPOINT and item.p2 > 0.0:
+            return item.p2
+        return self.config.acceptance_radius

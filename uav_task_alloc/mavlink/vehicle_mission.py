@@ -1,0 +1,98 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The mission service of a simulated autopilot: what both kinds share, without their quirks."""
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+
+from uav_task_alloc.mavlink.codec import Message
+from uav_task_alloc.mavlink.vehicle_config import Change
+from uav_task_alloc.mavlink.vehicle_flight import Flight
+from uav_task_alloc.mavlink.vehicle_item import StoredItem
+
+Peer = tuple[int, int]  # system, component
+MISSION = dialect.MAV_MISSION_TYPE_MISSION
+COMPONENT = dialect.MAV_COMP_ID_AUTOPILOT1
+
+
+class MissionService:
+    """Items in storage and the transfer that may be under way; replies go to `out`."""
+
+    flight: Flight
+
+    def __init__(self, system_id: int, capacity: int) -> None:
+        self.items: list[StoredItem] = []
+        self.out: list[Message] = []
+        self._system_id = system_id
+        self._capacity = capacity
+        self._handlers: dict[str, Callable[[Message, Peer, float], None]] = {
+            'MISSION_COUNT': self._count,
+            'MISSION_ITEM_INT': self._item,
+            'MISSION_REQUEST_LIST': self._request_list,
+            'MISSION_REQUEST': self._request,
+            'MISSION_REQUEST_INT': self._request,
+            'MISSION_CLEAR_ALL': self._clear,
+            'MISSION_ACK': self._ack,
+        }
+
+    def serve(self, flight: Flight) -> None:
+        """Tell this flight, which flies from `items`, about every change."""
+        self.flight = flight
+
+    def progress(self) -> tuple[int, int, int]:
+        """total, mission_state and mission_mode of MISSION_CURRENT."""
+        raise NotImplementedError
+
+    def _changed(self, change: Change, flagged: int | None = None) -> None:
+        self.flight.changed(change, flagged)
+
+    def handle(self, message: Message, now: float) -> bool:
+        """Take a message of the mission protocol; False where it is none or for another."""
+        handler = self._handlers.get(message.get_type())
+        if handler is None or not self._for_us(message):
+            return False
+        handler(message, (message.get_srcSystem(), message.get_srcComponent()), now)
+        return True
+
+    def step(self, now: float) -> None:
+        """Repeat requests and give up, as the autopilot does."""
+        raise NotImplementedError
+
+    def reboot(self) -> None:
+        """Forget the transfer; the items stay."""
+        raise NotImplementedError
+
+    @property
+    def mission_id(self) -> int | None:
+        """The autopilot's own id of what is stored; None where it has none."""
+        return None
+
+    def read(self, seq: int) -> StoredItem:
+        """An item as a ground station reads it back."""
+        return self.items[seq]
+
+    def _for_us(self, message: Message) -> bool:
+        return (message.target_system == self._system_id
+                and message.target_component in (COMPONENT, 0))
+
+    def _send_ack(self, peer: Peer, result: int, mission_type: int = MISSION) -> None:
+        self.out.append(dialect.MAVLink_mission_ack_message(*peer, result, mission_type))
+
+    def _count(self, message: Message, peer: Peer, now: float) -> None:
+        raise NotImplementedError
+
+    def _item(self, message: Message, peer: Peer, now: float) -> None:
+        raise NotImplementedError
+
+    def _request_list(self, message: Message, peer: Peer, now: float) -> None:
+        raise NotImplementedError
+
+    def _request(self, message: Message, peer: Peer, now: float) -> None:
+        raise NotImplementedError
+
+    def _clear(self, message: Message, peer: Peer, now: float) -> None:
+        raise NotImplementedError
+
+    def _ack(self, message: Message, peer: Peer, now: float) -> None:
+        raise NotImplementedError

@@ -1,0 +1,147 @@
+# SPDX-License-Identifier: Apache-2.0
+"""ArduCopter's mission service: each item overwrites the storage at once; nothing is atomic."""
+from __future__ import annotations
+
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+
+from uav_task_alloc.mavlink.codec import Message
+from uav_task_alloc.mavlink.vehicle_config import Change, Mode
+from uav_task_alloc.mavlink.vehicle_flight_ardupilot import ArduPilotFlight, Run
+from uav_task_alloc.mavlink.vehicle_item import (
+    Refusal,
+    StoredItem,
+    from_message,
+    stored_by_ardupilot,
+    to_float_message,
+    to_message,
+)
+from uav_task_alloc.mavlink.vehicle_mission import MISSION, MissionService, Peer
+
+RETRY = 1.0  # [s] between requests for the same item
+GIVE_UP = 8.0  # [s] without an item
+_ALL = dialect.MAV_MISSION_TYPE_ALL
+
+
+class ArduPilotMission(MissionService):
+    """Storage truncated at COUNT and overwritten item by item; seq 0 is home."""
+
+    flight: ArduPilotFlight
+
+    def __init__(self, system_id: int, capacity: int) -> None:
+        super().__init__(system_id, capacity)
+        self._peer: Peer | None = None  # who is uploading
+        self._wanted = 0
+        self._expected = 0
+        self._heard = 0.0  # [s]
+        self._asked = 0.0  # [s]
+
+    def reboot(self) -> None:
+        self._peer = None
+
+    def read(self, seq: int) -> StoredItem:
+        return self.flight.home_item() if seq == 0 else self.items[seq]
+
+    def progress(self) -> tuple[int, int, int]:
+        if len(self.items) < 2:
+            return 0, 1, 2  # MISSION_STATE_NO_MISSION
+        return (len(self.items) - 1, self.flight.run.value,
+                1 if self.flight.mode is Mode.MISSION else 2)
+
+    def step(self, now: float) -> None:
+        if self._peer is None:
+            return
+        if now - self._heard > GIVE_UP:
+            self._send_ack(self._peer, dialect.MAV_MISSION_OPERATION_CANCELLED)
+            self._peer = None
+        elif now - self._asked > RETRY:
+            self._ask(now)
+
+    def _ask(self, now: float) -> None:
+        assert self._peer is not None
+        self._asked = now
+        self.out.append(dialect.MAVLink_mission_request_message(
+            *self._peer, self._wanted, MISSION))
+
+    def _count(self, message: Message, peer: Peer, now: float) -> None:
+        if message.mission_type != MISSION:
+            self._send_ack(peer, dialect.MAV_MISSION_UNSUPPORTED, message.mission_type)
+            return
+        if self._peer not in (None, peer):
+            self._send_ack(peer, dialect.MAV_MISSION_DENIED)
+            return
+        self._peer = None
+        if message.count > self._capacity:
+            self._send_ack(peer, dialect.MAV_MISSION_NO_SPACE)
+            return
+        if message.count < len(self.items):
+            del self.items[message.count:]
+            self._changed(Change.TRUNCATED)
+        if message.count == 0:
+            self._send_ack(peer, dialect.MAV_MISSION_ACCEPTED)
+            return
+        self._peer, self._wanted, self._expected = peer, 0, message.count
+        self._heard = now
+        self._ask(now)
+
+    def _item(self, message: Message, peer: Peer, now: float) -> None:
+        if message.mission_type != MISSION:
+            self._send_ack(peer, dialect.MAV_MISSION_UNSUPPORTED, message.mission_type)
+        elif self._peer is None:
+            self._send_ack(peer, dialect.MAV_MISSION_ERROR)
+        elif message.seq != self._wanted:
+            self._send_ack(peer, dialect.MAV_MISSION_INVALID_SEQUENCE)
+        elif peer != self._peer:
+            self._send_ack(peer, dialect.MAV_MISSION_DENIED)
+        else:
+            self._write(message, peer, now)
+
+    def _write(self, message: Message, peer: Peer, now: float) -> None:
+        stored = (stored_by_ardupilot(from_message(message)) if message.seq
+                  else self.flight.home_item())
+        if isinstance(stored, Refusal):  # what came before stays overwritten
+            self._send_ack(peer, stored.result)
+            self._peer = None
+            return
+        self.items[message.seq:message.seq + 1] = [stored]
+        self._changed(Change.WRITTEN)
+        self._heard = now
+        self._wanted += 1
+        if self._wanted == self._expected:
+            self._peer = None
+            self._send_ack(peer, dialect.MAV_MISSION_ACCEPTED)
+        else:
+            self._ask(now)
+
+    def _request_list(self, message: Message, peer: Peer, now: float) -> None:
+        if self._peer is not None:
+            self._send_ack(peer, dialect.MAV_MISSION_DENIED, message.mission_type)
+            return
+        count = len(self.items) if message.mission_type == MISSION else 0
+        self.out.append(dialect.MAVLink_mission_count_message(*peer, count, message.mission_type))
+
+    def _request(self, message: Message, peer: Peer, now: float) -> None:
+        if self._peer is not None:
+            self._send_ack(peer, dialect.MAV_MISSION_DENIED, message.mission_type)
+        elif message.mission_type != MISSION:
+            self._send_ack(peer, dialect.MAV_MISSION_ERROR, message.mission_type)
+        elif message.seq != 0 and message.seq >= len(self.items):
+            self._request_list(message, peer, now)  # it tells the station how many there are
+            self._send_ack(peer, dialect.MAV_MISSION_ERROR)
+        else:
+            make = to_message if message.get_type().endswith('_INT') else to_float_message
+            self.out.append(make(self.read(message.seq), message.seq,
+                                 message.seq == self.flight.seq, peer))
+
+    def _clear(self, message: Message, peer: Peer, now: float) -> None:
+        if self._peer is not None:
+            self._send_ack(peer, dialect.MAV_MISSION_DENIED, message.mission_type)
+        elif message.mission_type in (MISSION, _ALL) and self.flight.run is Run.ACTIVE:
+            self._send_ack(peer, dialect.MAV_MISSION_ERROR, message.mission_type)
+        else:
+            if message.mission_type in (MISSION, _ALL):
+                self.items.clear()
+                self._changed(Change.CLEARED)
+            self._send_ack(peer, dialect.MAV_MISSION_ACCEPTED, message.mission_type)
+
+    def _ack(self, message: Message, peer: Peer, now: float) -> None:
+        """Ignored whatever it says: a cancel too."""
