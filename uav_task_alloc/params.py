@@ -160,6 +160,12 @@ class FleetSimParams(Checked):
     scenario: str = param('', 'Scenario file with the origin and the UAVs.', fixed=True)
     speedup: float = param(1.0, 'How many times faster than real time.', low=0.1, high=100.0,
                            fixed=True)
+    target: str = param('127.0.0.1:14550', 'HOST:PORT of the bridge, UDP.', fixed=True)
+    log_file: str = param('', 'File for the ground truth, a JSON object a line; empty: none.',
+                          fixed=True)
+    arming_delay: float = param(-1.0, 'Time from boot to a position estimate; negative: as the '
+                                'real autopilots have it.', low=-1.0, high=3600.0, unit='s',
+                                fixed=True)
 
 
 @dataclass(frozen=True)
