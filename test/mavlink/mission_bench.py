@@ -6,19 +6,20 @@ import random
 
 from uav_task_alloc.geometry.frames import Origin
 from uav_task_alloc.mavlink.codec import Codec
+from uav_task_alloc.mavlink.ground import Ground, Station
 from uav_task_alloc.mavlink.peer import Peer
+from uav_task_alloc.mavlink.pilot import Policy
 from uav_task_alloc.mavlink.profiles import ARDUPILOT, PX4
+from uav_task_alloc.mavlink.status import state_of
 from uav_task_alloc.mavlink.upload import Mission, Upload
-from uav_task_alloc.mavlink.vehicle_item import StoredItem
-from uav_task_alloc.mavlink.vehicle_mission_ardupilot import ArduPilotMission
-from uav_task_alloc.mavlink.vehicle_mission_px4 import Px4Mission
+from uav_task_alloc.mavlink.vehicle import AUTOPILOTS, Vehicle
+from uav_task_alloc.mavlink.vehicle_config import VehicleConfig
 from uav_task_alloc.mission import Stop, TaskList, home_item, mission_items
 from uav_task_alloc.model import Task
 
 ORIGIN = Origin(47.397742, 8.545594, 488.0)
 OURS, TICK = (245, 190), 0.05  # [s]
 PROFILES = {'ardupilot': ARDUPILOT, 'px4': PX4}
-HOME = StoredItem(0, 16, 0.0, 0.0, 0.0, 0.0, 473977420, 85455940, 488.0)
 
 
 def square(n, side=100.0, z=50.0):
@@ -36,6 +37,13 @@ def task_list(names, revision=1, *, side=100.0, service=0.0, returns=False, via=
         stops.append(Stop(Task(name, place, service_time=service),
                           tuple((via or {}).get(name, ()))))
     return TaskList(revision, tuple(stops), returns)
+
+
+def make_vehicle(kind, system, **config):
+    """A simulated vehicle that is ready to arm at once and does not flood."""
+    config = {'arming_delay': 0.0, 'floods': False, 'position': (0.0, 10.0 * system, 0.0),
+              **config}
+    return Vehicle(VehicleConfig(f'uav_{system}', system, ORIGIN, **config), AUTOPILOTS[kind])
 
 
 class Line:
@@ -81,12 +89,8 @@ class UploadBench:
 
     def __init__(self, kind, *, seed=0, loss=0.0, delay=(0.0, 0.0), capacity=500):
         self.profile = PROFILES[kind]
-        self.changes, self.now, self.line = [], 0.0, Line(seed, loss, delay)
-        changed = lambda change, seq: self.changes.append((change, seq))  # noqa: E731
-        self.vehicle = (Px4Mission(1, capacity, changed) if kind == 'px4' else
-                        ArduPilotMission(1, capacity, changed, lambda: HOME))
-        if kind == 'ardupilot':
-            self.vehicle.items.append(HOME)
+        self.now, self.line = 0.0, Line(seed, loss, delay)
+        self.vehicle = make_vehicle(kind, 1, capacity=capacity)
         self.peer = Peer(1)
         self.upload = Upload(self.peer, idle_after=self.profile.idle_after,
                              rng=random.Random(seed))
@@ -127,8 +131,7 @@ class UploadBench:
         return self.events[-1]
 
     def _move(self):
-        self.vehicle.step(self.now)
-        self._down()
+        self._down(self.vehicle.step(self.now))
         self._up(self.upload.step(self.now))
         busy = True
         while busy:
@@ -137,8 +140,7 @@ class UploadBench:
                 busy = True
                 for m in self.ears[direction].parse(frame):
                     if direction == 'up':
-                        self.vehicle.handle(m, self.now)
-                        self._down()
+                        self._down(self.vehicle.receive(m, self.now))
                     else:
                         self._up(self.upload.receive(m, self.now))
         while self.upload.events:
@@ -148,16 +150,127 @@ class UploadBench:
         for m in messages:
             self.line.send('up', None, self.codecs['up'], m, self.now)
 
-    def _down(self):
-        out, self.vehicle.out[:] = list(self.vehicle.out), []
-        for m in out:
+    def _down(self, messages):
+        for m in messages:
             self.line.send('down', None, self.codecs['down'], m, self.now)
 
     def holds(self, mission):
         """Whether the vehicle's own memory has exactly this mission."""
-        held = [(i.command, i.x, i.y, round(i.z, 2)) for i in self.vehicle.items]
+        held = [(i.command, i.x, i.y, round(i.z, 2)) for i in self.vehicle.mission.items]
         sent = [(i.command, i.x, i.y, round(i.z, 2)) for i in mission.items]
         own = mission.own
         return len(held) == len(sent) and all(
             a[:3] == b[:3] and abs(a[3] - b[3]) < 0.02 for a, b in zip(
                 held[own:], sent[own:], strict=True))
+
+
+class FlightBench:
+    """A ground station with simulated vehicles, each on a line of its own to it."""
+
+    def __init__(self, *kinds, seed=0, loss=0.0, delay=(0.0, 0.0), takeoff=True, configs=None,
+                 tick=0.1, **policy):
+        self.now, self.tick = 0.0, tick
+        self.seed, self.policy = seed, Policy(takeoff=takeoff, **policy)
+        self.vehicles = {n: make_vehicle(kind, n, **(configs or {}).get(n, {}))
+                         for n, kind in enumerate(kinds, 1)}
+        self.line = Line(seed, loss, delay)
+        self.codecs = {('down', n): Codec(n, 1) for n in self.vehicles}
+        self.ears = {('up', n): Codec(*OURS) for n in self.vehicles}
+        self.truth = {n: [] for n in self.vehicles}  # events on board
+        self.start()
+
+    def start(self):
+        """A new bridge, as after kill -9: it knows nothing."""
+        self.ground = Ground(Station(origin=ORIGIN, policy=self.policy),
+                             random.Random(self.seed))
+        for n in self.vehicles:
+            self.codecs['up', n] = Codec(*OURS)
+            self.ears['down', n] = Codec(*OURS)
+        for n in self.vehicles:
+            self.ears['up', n] = Codec(n, 1)
+        self.events, self.notes = [], []
+
+    def pilot(self, n=1):
+        return self.ground.served[n].pilot
+
+    def board(self, n=1):
+        return self.pilot(n).board
+
+    def assign(self, tasks, n=1):
+        self._up(self.ground.assign(f'uav_{n}', tasks, self.now))
+
+    def says(self, message, n=1):
+        """Something that comes from a vehicle without it."""
+        self._up(self.ground.receive(n, self.ears['down', n].parse(
+            self.codecs['down', n].pack(message))[0], self.now))
+        self._collect()
+
+    def tells(self, message, n=1, system=255):
+        """Something another ground station sends to a vehicle."""
+        for m in self.ears['up', n].parse(Codec(system, 190).pack(message)):
+            self._down(n, self.vehicles[n].receive(m, self.now))
+
+    def run(self, until=lambda: False, limit=300.0):
+        """Let time pass until the condition holds; True where it did."""
+        end = self.now + limit
+        while self.now < end:
+            self._move()
+            if until():
+                return True
+            self.now += self.tick
+        return bool(until())
+
+    def found(self):
+        """Until all vehicles are known."""
+        assert self.run(lambda: len(self.ground.served) == len(self.vehicles), 30.0)
+        return self
+
+    def completed(self, n=1):
+        return [e.task for u, e in self.events if u == f'uav_{n}' and e.event == 'COMPLETED']
+
+    def started(self, n=1):
+        return [e.task for u, e in self.events if u == f'uav_{n}' and e.event == 'STARTED']
+
+    def failed(self, n=1):
+        return [e.task for u, e in self.events if u == f'uav_{n}' and e.event == 'FAILED']
+
+    def state(self, n=1):
+        return state_of(self.ground.served[n], self.now)
+
+    def flown(self, n=1, radius=3.0):
+        """Places [m] where the vehicle really reached an item, in order."""
+        return [tuple(round(c) for c in e.point) for e in self.truth[n]
+                if e.name == 'item_reached']
+
+    def _move(self):
+        for n, vehicle in self.vehicles.items():
+            self._down(n, vehicle.step(self.now))
+        self._up(self.ground.step(self.now))
+        busy = True
+        while busy:
+            busy = False
+            for direction, n, frame in self.line.due(self.now):
+                busy = True
+                for m in self.ears[direction, n].parse(frame):
+                    if direction == 'up':
+                        self._down(n, self.vehicles[n].receive(m, self.now))
+                    else:
+                        self._up(self.ground.receive(n, m, self.now))
+        self._collect()
+
+    def _collect(self):
+        for served in self.ground.served.values():
+            while served.pilot.events:
+                self.events.append((served.uav_id, served.pilot.events.popleft()))
+            while served.pilot.notes:
+                self.notes.append(served.pilot.notes.popleft().text)
+        for n, vehicle in self.vehicles.items():
+            self.truth[n] += vehicle.take_events()
+
+    def _up(self, outgoing):
+        for n, m in outgoing:
+            self.line.send('up', n, self.codecs['up', n], m, self.now)
+
+    def _down(self, n, messages):
+        for m in messages:
+            self.line.send('down', n, self.codecs['down', n], m, self.now)

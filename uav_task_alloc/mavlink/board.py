@@ -11,6 +11,7 @@ from uav_task_alloc.errors import MissionError
 from uav_task_alloc.geometry.frames import Origin
 from uav_task_alloc.mavlink.change import Change, Kind, change
 from uav_task_alloc.mavlink.codec import Message, plan_id
+from uav_task_alloc.mavlink.helm import Note
 from uav_task_alloc.mavlink.peer import NO_SPACE, Peer
 from uav_task_alloc.mavlink.profiles import Profile
 from uav_task_alloc.mavlink.progress import ProgressTable
@@ -33,14 +34,6 @@ class MissionState(Enum):
     VERIFIED = 2
     MIXED = 3
     FOREIGN = 4
-
-
-@dataclass(frozen=True, slots=True)
-class Note:
-    """Something a human should read."""
-
-    level: str  # 'info', 'warning', 'error'
-    text: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -172,6 +165,11 @@ class Board:
     def doubt(self) -> None:
         """Read what is on board before anything else."""
         self.held = None
+
+    def infeasible(self, reason: str) -> None:
+        """The vehicle stores the mission, and will not fly it."""
+        for task in {item.task: None for item in self.wanted() if item.completes}:
+            self._refuse(task, f'infeasible: {reason}')
 
     def _settle(self, now: float) -> None:
         while self.upload.events:

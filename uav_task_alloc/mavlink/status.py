@@ -62,9 +62,9 @@ def mode_of(pilot: Pilot) -> Mode:
     telemetry, progress = pilot.telemetry, pilot.board.progress
     if telemetry.faulty:
         return Mode.FAULT
-    if not telemetry.airborne and not pilot.climbing:
+    if not telemetry.airborne and not pilot.helm.climbing:
         return Mode.STANDBY
-    if pilot.climbing:
+    if pilot.helm.climbing:
         return Mode.TAKEOFF
     if telemetry.flight is Flight.MISSION:
         item = progress.active
@@ -102,8 +102,8 @@ def facts_of(served: Served, now: float) -> tuple[int, str, dict[str, str]]:
         level, line = 1, 'mission FOREIGN'
     else:
         level, line = 0, f'mission {state.name}'
-    if pilot.waits_for and level < 3:
-        line += f', waits for {pilot.waits_for}'
+    if pilot.helm.waits_for and level < 3:
+        line += f', waits for {pilot.helm.waits_for}'
     return level, line, {
         'autopilot': pilot.profile.name, 'address': str(served.address),
         'mode': mode_of(pilot).name, 'mission': state.name,

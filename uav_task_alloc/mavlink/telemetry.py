@@ -14,6 +14,7 @@ from uav_task_alloc.model import Point
 
 STALE, LOST = 3.0, 10.0  # [s] of silence
 BACKWARDS = 2000  # [ms] by which time_boot_ms goes back at a restart, not by a late packet
+OFF_GROUND = 2.0  # [m] above home: it flies, whatever landed_state said a second ago
 # message -> rate asked for [Hz]
 RATES = {
     d.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: 5.0, d.MAVLINK_MSG_ID_MISSION_CURRENT: 2.0,
@@ -60,9 +61,8 @@ class Telemetry:
     @property
     def airborne(self) -> bool:
         """Armed and off the ground, as far as it tells."""
-        if not self.armed or self.landed == d.MAV_LANDED_STATE_ON_GROUND:
-            return False
-        return self.landed != d.MAV_LANDED_STATE_UNDEFINED or not self.height < 1.0
+        return self.armed and (self.height > OFF_GROUND or self.landed in (
+            d.MAV_LANDED_STATE_IN_AIR, d.MAV_LANDED_STATE_TAKEOFF, d.MAV_LANDED_STATE_LANDING))
 
     @property
     def faulty(self) -> bool:

@@ -1,0 +1,38 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Asks a vehicle for the messages the bridge lives on, until they come or it is no use."""
+from __future__ import annotations
+
+from pymavlink.dialects.v20 import ardupilotmega as d
+
+from uav_task_alloc.mavlink.codec import Message
+from uav_task_alloc.mavlink.peer import Peer
+from uav_task_alloc.mavlink.telemetry import RATES, Telemetry
+
+PERIOD, TRIES = 2.0, 5  # [s] between requests
+
+
+class Rates:
+    """SET_MESSAGE_INTERVAL for each of RATES, again for those that stay away."""
+
+    def __init__(self, peer: Peer, telemetry: Telemetry, now: float) -> None:
+        self._peer, self._telemetry = peer, telemetry
+        self.again(now)
+
+    def again(self, now: float) -> None:
+        """A restart forgets what was asked."""
+        self._due, self._asked = now, 0
+
+    def step(self, now: float) -> list[Message]:
+        """What is to be asked now."""
+        missing = [number for number in RATES if number not in self._telemetry.heard]
+        if now < self._due or self._asked >= TRIES or (self._asked and not missing):
+            return []
+        self._asked += 1
+        self._due = now + PERIOD
+        # all of them at first: a stream may be there, and too slow
+        out = [self._peer.command(d.MAV_CMD_SET_MESSAGE_INTERVAL, number, 1e6 / RATES[number])
+               for number in (RATES if self._asked == 1 else missing)]
+        if self._telemetry.home is None:
+            out.append(self._peer.command(d.MAV_CMD_REQUEST_MESSAGE,
+                                          d.MAVLINK_MSG_ID_HOME_POSITION))
+        return out
