@@ -2,9 +2,10 @@
 """Random numbers for kernels: xorshift64 whose whole state is an array that the caller owns."""
 from __future__ import annotations
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
+
+from uav_task_alloc.solver.kernel import part
 
 Chance = NDArray[np.uint64]  # one number, never 0
 
@@ -14,7 +15,7 @@ def chance(seed: int) -> Chance:
     return np.random.SeedSequence(seed % 2 ** 64).generate_state(1, np.uint64) | np.uint64(1)
 
 
-@numba.njit(cache=True, nogil=True)
+@part
 def uniform(state: Chance) -> float:
     """In [0, 1)."""
     x = state[0]
@@ -25,7 +26,7 @@ def uniform(state: Chance) -> float:
     return np.float64(x >> np.uint64(11)) * (1.0 / 9007199254740992.0)
 
 
-@numba.njit(cache=True, nogil=True)
+@part
 def below(state: Chance, n: int) -> int:
     """0..n-1, each as likely."""
     return int(uniform(state) * n)

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 
-import numba
 import numpy as np
 
 from uav_task_alloc.solver.chance import Chance, uniform
+from uav_task_alloc.solver.kernel import kernel, maker
 from uav_task_alloc.solver.routes import Arrays, Floats, Ints, step
 
 
-@numba.njit(cache=True, nogil=True)
+@maker
 def _cells(xyz: Floats, per_cell: float) -> tuple[Ints, Ints, Ints, Floats]:
     """Points sorted into square cells: cell of each, first of each cell, order, (x0, y0, side)."""
     n = len(xyz)
@@ -32,7 +32,7 @@ def _cells(xyz: Floats, per_cell: float) -> tuple[Ints, Ints, Ints, Floats]:
     return cell, first, order, np.array((x0, y0, side))
 
 
-@numba.njit(cache=True, nogil=True)
+@kernel
 def _keep(ids: Ints, squares: Floats, kept: int, j: int, square: float) -> int:
     """Insert j into the sorted front of `ids`, nearest first; returns how many are kept."""
     k = ids.size
@@ -46,7 +46,7 @@ def _keep(ids: Ints, squares: Floats, kept: int, j: int, square: float) -> int:
     return min(kept + 1, k)
 
 
-@numba.njit(cache=True, nogil=True)
+@maker
 def nearest(xyz: Floats, k: int) -> Ints:
     """The k nearest others of each point as the crow flies, nearest first. O(n k) about."""
     n = len(xyz)
@@ -77,7 +77,7 @@ def nearest(xyz: Floats, k: int) -> Ints:
     return near
 
 
-@numba.njit(cache=True, nogil=True)
+@kernel
 def near_tasks(a: Arrays, found: Ints) -> None:
     """Fill a.near with the found neighbours in order of the way to fly. O(n k^2)."""
     n, k = a.near.shape
@@ -92,7 +92,7 @@ def near_tasks(a: Arrays, found: Ints) -> None:
             a.near[i, place], a.near_length[i, place] = j, d
 
 
-@numba.njit(cache=True, nogil=True)
+@maker
 def near_starts(a: Arrays, xyz: Floats, rng: Chance) -> None:
     """Fill a.starts with the starts nearest to each task, equally near ones shuffled. O(n m)."""
     n, s = a.starts.shape

@@ -5,13 +5,14 @@ Nodes: UAV starts 0..m-1, tasks m..m+n-1, route ends m+n..2m+n-1. Sums are float
 """
 from __future__ import annotations
 
+import math
 from typing import Any, NamedTuple
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
 from uav_task_alloc.geometry.distances import Pairs, length
+from uav_task_alloc.solver.kernel import kernel, part
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -28,6 +29,8 @@ class Arrays(NamedTuple):
     hard: bool  # no range is ever exceeded
     excess_cost: float  # [m/m] of a metre beyond range, where not hard
     pairs: Pairs  # lengths by node
+    straight: bool  # no zones: lengths are distances of xyz
+    xyz: Floats  # (2m + n, 3) [m]
     reach: Floats  # (m) [m] range
     idle: Floats  # (m) [m] length of the route without tasks
     may: NDArray[np.bool_]  # (m, n) who may serve what
@@ -52,7 +55,7 @@ class Routes(NamedTuple):
     sums: Floats  # DISTANCE, EXCESS [m], LEFT_OUT [m], VALUE
 
 
-@numba.njit(cache=True, nogil=True)
+@part
 def step(a: Arrays, i: int, j: int) -> float:
     """Length [m] of the leg from node i to node j."""
     if j >= a.ends:
@@ -60,28 +63,34 @@ def step(a: Arrays, i: int, j: int) -> float:
             return float(a.idle[i])
         if not a.returns:
             return 0.0
+    if a.straight:
+        x, y, z = a.xyz[i, 0] - a.xyz[j, 0], a.xyz[i, 1] - a.xyz[j, 1], a.xyz[i, 2] - a.xyz[j, 2]
+        return math.sqrt(x * x + y * y + z * z)
     return float(length(a.pairs, i, j))
 
 
-@numba.njit(cache=True, nogil=True)
+@kernel
 def clear(a: Arrays, r: Routes) -> None:
     """Leave everything out."""
     r.on[:] = -1
+    r.sums[:] = 0.0
+    for t in range(a.price.size):
+        r.sums[LEFT_OUT] += a.price[t]
     for u in range(a.uavs):
         end = a.ends + u
         r.next[u], r.prev[u], r.next[end], r.prev[end] = end, u, u, u
         r.on[u] = r.on[end] = u
         r.leg[u] = r.length[u] = a.idle[u]
         r.tasks[u] = 0
-    r.sums[LEFT_OUT], r.sums[VALUE] = a.price.sum(), 0.0
     total(a, r)
 
 
-@numba.njit(cache=True, nogil=True)
+@kernel
 def total(a: Arrays, r: Routes) -> None:
     """Sum up the lengths anew."""
-    r.sums[DISTANCE], r.sums[EXCESS] = r.length.sum(), 0.0
+    r.sums[DISTANCE], r.sums[EXCESS] = 0.0, 0.0
     for u in range(a.uavs):
+        r.sums[DISTANCE] += r.length[u]
         r.sums[EXCESS] += max(0.0, r.length[u] - a.reach[u])
 
 
@@ -95,11 +104,15 @@ def empty_routes(a: Arrays) -> Routes:
     return routes
 
 
-@numba.njit(cache=True, nogil=True)
+@kernel
 def copy(a: Any, b: Any) -> None:
     """Routes b become what routes a are."""
-    b.next[:], b.prev[:], b.on[:], b.leg[:] = a.next, a.prev, a.on, a.leg
-    b.length[:], b.tasks[:], b.sums[:] = a.length, a.tasks, a.sums
+    for i in range(a.next.size):
+        b.next[i], b.prev[i], b.on[i], b.leg[i] = a.next[i], a.prev[i], a.on[i], a.leg[i]
+    for u in range(a.length.size):
+        b.length[u], b.tasks[u] = a.length[u], a.tasks[u]
+    for i in range(a.sums.size):
+        b.sums[i] = a.sums[i]
 
 
 def twin(a: Routes) -> Routes:
@@ -107,13 +120,13 @@ def twin(a: Routes) -> Routes:
     return Routes(*[part.copy() for part in a])  # type: ignore[arg-type]
 
 
-@numba.njit(cache=True, nogil=True)
+@part
 def cost(a: Arrays, r: Routes) -> float:
     """What the search makes small [m]."""
     return float(r.sums[DISTANCE] + r.sums[LEFT_OUT] + a.excess_cost * r.sums[EXCESS])
 
 
-@numba.njit(cache=True, nogil=True)
+@part
 def better(r: Routes, s: Routes, excess_cost: float) -> bool:
     """Whether r is better than s: more value; as much, then shorter."""
     gain = r.sums[VALUE] - s.sums[VALUE]
@@ -125,7 +138,7 @@ def better(r: Routes, s: Routes, excess_cost: float) -> bool:
     return bool(gain >= -slack and shorter > TINY + 1e-12 * s.sums[DISTANCE])
 
 
-@numba.njit(cache=True, nogil=True)
+@part
 def lengthened(a: Arrays, r: Routes, u: int, delta: float) -> float:
     """Cost [m] of making UAV u's route longer by delta [m]; inf where it may not."""
     over = r.length[u] + delta - a.reach[u]
@@ -136,7 +149,7 @@ def lengthened(a: Arrays, r: Routes, u: int, delta: float) -> float:
     return float(delta + a.excess_cost * (over - max(0.0, r.length[u] - a.reach[u])))
 
 
-@numba.njit(cache=True, nogil=True)
+@part
 def stretch(a: Arrays, r: Routes, u: int, delta: float) -> None:
     """Make UAV u's route longer by delta [m]."""
     before = r.length[u]
@@ -145,7 +158,7 @@ def stretch(a: Arrays, r: Routes, u: int, delta: float) -> None:
     r.sums[EXCESS] += max(0.0, before + delta - a.reach[u]) - max(0.0, before - a.reach[u])
 
 
-@numba.njit(cache=True, nogil=True)
+@part
 def insert(a: Arrays, r: Routes, t: int, after: int) -> None:
     """Put the left out task node t behind node `after`."""
     u, then = r.on[after], r.next[after]
@@ -160,7 +173,7 @@ def insert(a: Arrays, r: Routes, t: int, after: int) -> None:
     r.sums[VALUE] += a.value[t - a.uavs]
 
 
-@numba.njit(cache=True, nogil=True)
+@part
 def remove(a: Arrays, r: Routes, t: int) -> None:
     """Take the task node t out of its route."""
     u, before, then = r.on[t], r.prev[t], r.next[t]

@@ -7,11 +7,11 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import numba
 import numpy as np
 
 from uav_task_alloc.solver.chance import Chance, below, uniform
 from uav_task_alloc.solver.insertion import any_place, near_place
+from uav_task_alloc.solver.kernel import kernel, part
 from uav_task_alloc.solver.routes import Arrays, Floats, Ints, Routes, insert, remove
 
 STRING = 10  # tasks in a string at most
@@ -39,7 +39,7 @@ def empty_log(a: Arrays) -> Log:
                np.zeros(a.uavs, np.int64))
 
 
-@numba.njit(cache=True, nogil=True)
+@part
 def _take(a: Arrays, r: Routes, log: Log, t: int) -> None:
     log.node[log.size[0]], log.after[log.size[0]] = t, r.prev[t]
     log.out[log.size[1]] = t
@@ -48,7 +48,7 @@ def _take(a: Arrays, r: Routes, log: Log, t: int) -> None:
     remove(a, r, t)
 
 
-@numba.njit(cache=True, nogil=True)
+@kernel
 def undo(a: Arrays, r: Routes, log: Log) -> None:
     """Back to how it was."""
     while log.size[0] > 0:
@@ -60,7 +60,7 @@ def undo(a: Arrays, r: Routes, log: Log) -> None:
             insert(a, r, node, after)
 
 
-@numba.njit(cache=True, nogil=True)
+@kernel
 def _string(a: Arrays, r: Routes, log: Log, c: int, size: int, rng: Chance) -> None:
     """Remove `size` tasks around c, sometimes leaving a few within the string."""
     count, stay = r.tasks[r.on[c]], 0
@@ -81,7 +81,7 @@ def _string(a: Arrays, r: Routes, log: Log, c: int, size: int, rng: Chance) -> N
         t = then
 
 
-@numba.njit(cache=True, nogil=True)
+@kernel
 def ruin(a: Arrays, r: Routes, log: Log, mean: float, round_id: int, rng: Chance) -> None:
     """Remove about `mean` tasks in strings of routes around a random one. O(mean)."""
     log.size[0] = log.size[1] = 0
@@ -106,7 +106,7 @@ def ruin(a: Arrays, r: Routes, log: Log, mean: float, round_id: int, rng: Chance
             _string(a, r, log, c, size, rng)
 
 
-@numba.njit(cache=True, nogil=True)
+@part
 def _is_out(log: Log, t: int) -> bool:
     for i in range(log.size[1]):  # noqa: SIM110 - numba knows no any()
         if log.out[i] == t:
@@ -114,7 +114,7 @@ def _is_out(log: Log, t: int) -> bool:
     return False
 
 
-@numba.njit(cache=True, nogil=True)
+@kernel
 def _order(a: Arrays, log: Log, rng: Chance) -> None:
     """Sort who is out: at random, furthest first, nearest first or dearest first."""
     kind = below(rng, 8)
@@ -134,7 +134,7 @@ def _order(a: Arrays, log: Log, rng: Chance) -> None:
         log.key[place], log.out[place] = key, t
 
 
-@numba.njit(cache=True, nogil=True)
+@kernel
 def recreate(a: Arrays, r: Routes, log: Log, rng: Chance) -> None:
     """Put back in who is out, each where it costs least and less than leaving it out."""
     _order(a, log, rng)

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import math
 
-import numba
-
 from uav_task_alloc.solver.chance import Chance, uniform
+from uav_task_alloc.solver.kernel import kernel
 from uav_task_alloc.solver.routes import Arrays, Routes, better, copy, cost, total
 from uav_task_alloc.solver.ruin import Log, recreate, ruin, undo
 
 
-@numba.njit(cache=True, nogil=True)
+@kernel
 def search(a: Arrays, r: Routes, best: Routes, log: Log, mean: float, hot: float, cold: float,
            rounds: int, rng: Chance) -> int:
     """Anneal r from temperature `hot` to `cold` [m]; returns how often `best` got better.

@@ -5,13 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-import numba
 import numpy as np
 
 from uav_task_alloc.model import Plan
 from uav_task_alloc.solver import routes as of
 from uav_task_alloc.solver.chance import chance
 from uav_task_alloc.solver.insertion import cheapest_first
+from uav_task_alloc.solver.kernel import kernel
 from uav_task_alloc.solver.problem import Problem
 from uav_task_alloc.solver.routes import Arrays, Ints, Routes, insert, lengthened, step
 
@@ -44,7 +44,7 @@ def repaired(problem: Problem, warm: Plan | None) -> Routes:
     return routes
 
 
-@numba.njit(cache=True, nogil=True)
+@kernel
 def replay(a: Arrays, r: Routes, nodes: Ints, bounds: Ints) -> None:
     """Give UAV u the task nodes bounds[u]..bounds[u + 1] in order, if it may. O(n)"""
     for u in range(a.uavs):
