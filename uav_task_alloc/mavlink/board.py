@@ -125,6 +125,8 @@ class Board:
     def adopt(self, found: Change, now: float) -> None:
         """The list is on board already."""
         assert self.tasks is not None
+        if not self.read_once and not self._profile.atomic and self.must_jump is None:
+            self.must_jump = found.start  # a swap may have ended before it was said
         if self.revision != self.tasks.revision or self._state is not MissionState.VERIFIED:
             self._verify(found.items, self.tasks.revision, now)
             self.progress.retag(found.items)
@@ -211,10 +213,10 @@ class Board:
         held, known = event.items[self.own:], self.progress.items
         if known and all_alike(known, held):
             self.held, self.verified_at = known, now
-            if self._state is not MissionState.MIXED:
+            if self._state is MissionState.UNKNOWN:
                 self._state = MissionState.VERIFIED
             return
-        self.held, self.verified_at = held, now
+        self.held, self.verified_at, self.plan_id = held, now, self._heard_plan
         if self._state is MissionState.VERIFIED or (self.tasks is None and held):
             self._state = MissionState.FOREIGN
         current = self._telemetry.current

@@ -135,7 +135,7 @@ class Helm:
         telemetry, asked = self._telemetry, now
 
         def seen() -> bool:
-            return telemetry.current == seq and telemetry.current_at > asked
+            return telemetry.current == seq and telemetry.current_at >= asked
 
         old_way = Command('set current', self._peer.set_current(seq), seen)
         new_way = Command('set current', self._peer.command(

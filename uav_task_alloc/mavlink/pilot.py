@@ -300,6 +300,7 @@ class Pilot:
             self.board.must_jump = None
             self.board.adopt(found, t)
 
+        self.board.progress.asked(found.start)
         return self.helm.jump(found.start + self.board.own, now, done)
 
     def _rise(self, now: float) -> Step:

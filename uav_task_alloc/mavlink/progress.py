@@ -36,6 +36,7 @@ class ProgressTable:
         self._reached: tuple[int, float] | None = None  # last seq, when
         self._echo: tuple[int, float] | None = None  # seq of the epoch before, until when
         self._jump: tuple[int, float] | None = None  # set by us at a time, not seen yet
+        self._asked: int | None = None  # we are setting this
         self._place: tuple[Point, float] | None = None
 
     @property
@@ -56,6 +57,7 @@ class ProgressTable:
             self._echo = self._reached[0], now + ECHO
         self.items, self.current, self._reached = items, start, None
         self._jump = None if start is None else (start, now)
+        self._asked = None
 
     def extend(self, items: tuple[Item, ...]) -> None:
         """A new epoch whose first items are those of the last: the vehicle goes on."""
@@ -75,9 +77,13 @@ class ProgressTable:
         """Where the vehicle is [m] ENU."""
         self._place = position, now
 
+    def asked(self, seq: int) -> None:
+        """We are about to set the current item, and may see it before we know that it is done."""
+        self._asked = seq
+
     def jumped(self, seq: int, now: float) -> None:
         """We have set the current item: what lies between was not flown."""
-        self.current, self._jump = seq, (seq, now)
+        self.current, self._jump, self._asked = seq, (seq, now), None
 
     def started(self) -> None:
         """The vehicle flies its mission: the task of the current item has begun."""
@@ -100,6 +106,8 @@ class ProgressTable:
 
     def moved(self, seq: int, now: float) -> None:
         """MISSION_CURRENT: items before it were reached, even where REACHED was lost."""
+        if seq == self._asked:
+            return
         if self._jump is not None:
             start, when = self._jump
             if seq != start and (seq < start or now - when < SETTLE):

@@ -9,6 +9,7 @@ from uav_task_alloc.mavlink.peer import Peer
 from uav_task_alloc.mavlink.telemetry import RATES, Telemetry
 
 PERIOD, TRIES = 2.0, 5  # [s] between requests
+QUIET = 3.0  # [s] without a position: perhaps restarted, which only new rates will show
 
 
 class Rates:
@@ -20,10 +21,15 @@ class Rates:
 
     def again(self, now: float) -> None:
         """A restart forgets what was asked."""
-        self._due, self._asked = now, 0
+        self._due, self._asked, self._came = now, 0, False
 
     def step(self, now: float) -> list[Message]:
         """What is to be asked now."""
+        quiet = now - self._telemetry.position_at > QUIET
+        if self._came and quiet and not self._telemetry.stale(now):
+            self._telemetry.heard.clear()
+            self.again(now)
+        self._came = self._came or not quiet
         missing = [number for number in RATES if number not in self._telemetry.heard]
         if now < self._due or self._asked >= TRIES or (self._asked and not missing):
             return []

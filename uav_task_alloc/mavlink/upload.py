@@ -158,12 +158,14 @@ class Upload:
     def replace(self, mission: Mission, now: float) -> list[Message]:
         """Upload this; a transfer that runs ends first, and of many only the latest follows."""
         self._pending = mission
-        return self._begin(now)
+        self._begin(now)
+        return self._flush()
 
     def read(self, now: float) -> list[Message]:
         """Read what is on board, after whatever runs."""
         self._wants_read = True
-        return self._begin(now)
+        self._begin(now)
+        return self._flush()
 
     def reset(self) -> None:
         """Forget a transfer that the vehicle forgot as well: it was restarted."""
@@ -196,7 +198,7 @@ class Upload:
         out, self._out = self._out, []
         return out
 
-    def _begin(self, now: float) -> list[Message]:
+    def _begin(self, now: float) -> None:
         if self.state in (State.BACKOFF, State.DRAINING) and self._pending:
             self._mission, self._pending = self._pending, None  # nothing runs: nothing to abort
             self._tries = 0
@@ -207,7 +209,6 @@ class Upload:
         elif self.state is State.IDLE and self._wants_read:
             self._mission, self._wants_read = None, False
             self._enter(State.READING, now)
-        return self._flush()
 
     def _request(self, seq: int, now: float) -> None:
         mission = self._mission
@@ -262,7 +263,8 @@ class Upload:
         elif new is State.DRAINING and event is Event.STALE:
             self._out.append(self._peer.ack(wire.CANCELLED))
         elif new is State.IDLE:
-            self._out += self._begin(now)
+            self._begin(now)
+            return
         self._due = now + self._limit(new, event)
 
     def _limit(self, state: State, event: Event) -> float:
