@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.geometry.detour import check_limits, way_between
 from uav_task_alloc.geometry.memory import floats_at, ints_at
-from uav_task_alloc.geometry.obstacles import Ints, contains, pack
+from uav_task_alloc.geometry.obstacles import Ints, Obstacles, contains, pack
 from uav_task_alloc.geometry.scene import CAUGHT, INSIDE, addresses, finder, make_scene
 from uav_task_alloc.geometry.table import Table, forget
 from uav_task_alloc.model import Leg, Point, ThreatZone
@@ -98,12 +98,13 @@ class Distances:
 
     def __init__(self, points: ArrayLike, zones: Sequence[ThreatZone] = (), *,
                  clearance: float = 0.0, altitude_min: float = -np.inf,
-                 altitude_max: float = np.inf, _table: Table | None = None) -> None:
+                 altitude_max: float = np.inf, _table: Table | None = None,
+                 _obstacles: Obstacles | None = None) -> None:
         self.points = np.ascontiguousarray(points, dtype=np.float64).reshape(-1, 3)
         if not np.isfinite(self.points).all():
             raise InvalidValue('points', self.points, 'finite coordinates [m]')
         self.zones, self.clearance = tuple(zones), clearance
-        self._obstacles = pack(self.zones, clearance)
+        self._obstacles = _obstacles or pack(self.zones, clearance)
         limits = check_limits(altitude_min, altitude_max)
         self._scene = make_scene(self.points, self._obstacles.rows, limits)
         dense = bool(self.zones) and len(self.points) <= DENSE_MAX
@@ -136,7 +137,8 @@ class Distances:
                 table = table.copy()
                 self._forget(table, new_zones)
         return Distances(new_points, new_zones, clearance=self.clearance, altitude_min=low,
-                         altitude_max=high, _table=table)
+                         altitude_max=high, _table=table,
+                         _obstacles=self._obstacles if new_zones == self.zones else None)
 
     def _forget(self, table: Table, zones: tuple[ThreatZone, ...]) -> None:
         gone = pack([z for z in self.zones if z not in zones], self.clearance)

@@ -43,8 +43,9 @@ ZONE = np.dtype([
     ('x0', np.float64), ('y0', np.float64), ('z0', np.float64),  # box around it, with the skin
     ('x1', np.float64), ('y1', np.float64), ('z1', np.float64),
     ('corners', np.int64), ('count', np.int64),  # PRISM: address and number, not enlarged
-    ('rim', np.int64), ('rims', np.int64),  # a convex outline 1.5 skins off; none for a dome
-    ('dented', np.int64),  # 1: the rim is but the hull
+    ('rim', np.int64), ('rims', np.int64),  # its outline, 1.5 skins off; none for a dome
+    ('hull', np.int64), ('hulls', np.int64),  # the rim's convex hull
+    ('dented', np.int64),  # 1: they are not the same
 ])
 
 
@@ -72,15 +73,17 @@ def pack(zones: Sequence[ThreatZone], clearance: float = 0.0) -> Obstacles:
         skin = min(SKIN, 1e-4 * (size + grow))
         corners = _counter_clockwise(zone.vertices)
         outline = np.array(corners, np.float64).reshape(-1, 2)
-        rim = np.array(_rim(zone, corners, grow + 1.5 * skin)).reshape(-1, 2)
+        rim = _rim(zone, corners, grow + 1.5 * skin)
+        hull = _rim(zone, _hull(corners), grow + 1.5 * skin)
         half = np.ptp(outline, axis=0) / 2 if len(corners) else np.array([size, size])
         reach = half + grow + skin
         bottom = -math.inf if zone.shape is Shape.HEMISPHERE else low - grow - skin
         rows[i] = (
             zone.shape.value, x, y, z, zone.radius + grow, low - grow, high + grow, grow, skin,
             x - reach[0], y - reach[1], bottom, x + reach[0], y + reach[1], high + grow + skin,
-            outline.ctypes.data, len(corners), rim.ctypes.data, len(rim), len(_hull(corners)) < len(corners))
-        outlines += [outline, rim]
+            outline.ctypes.data, len(corners), rim.ctypes.data, len(rim),
+            hull.ctypes.data, len(hull), len(_hull(corners)) < len(corners))
+        outlines += [outline, rim, hull]
     return Obstacles(rows, tuple(outlines))
 
 
@@ -96,21 +99,19 @@ def _extent(zone: ThreatZone) -> tuple[tuple[float, float, float], float, float,
 
 
 def _rim(zone: ThreatZone, corners: Sequence[tuple[float, float]],
-         grow: float) -> list[tuple[float, float]]:
-    """A convex outline just outside the enlarged zone, or its hull; none for a dome."""
-    if zone.shape is Shape.HEMISPHERE:
-        return []
-    if zone.shape is Shape.CYLINDER:
-        return _fan(zone.center, zone.radius + grow, 0.0, 2 * math.pi, RIM)
+         grow: float) -> Floats:
+    """The outline `grow` off the zone, circumscribing its round corners; none for a dome."""
     rim: list[tuple[float, float]] = []
-    corners = _hull(corners)
+    if zone.shape is Shape.CYLINDER:
+        rim = _fan(zone.center, zone.radius + grow, 0.0, 2 * math.pi, RIM)
     for i, corner in enumerate(corners):
         before, after = corners[i - 1], corners[(i + 1) % len(corners)]
         start = math.atan2(corner[1] - before[1], corner[0] - before[0])
         turn = math.remainder(math.atan2(after[1] - corner[1], after[0] - corner[0]) - start,
                               2 * math.pi)
-        rim += _fan(corner, grow, start - math.pi / 2, turn, math.ceil(4 * turn / math.pi - 1e-9))
-    return rim
+        rim += _fan(corner, grow, start - math.pi / 2, turn,
+                    max(1, math.ceil(4 * turn / math.pi - 1e-9)))
+    return np.array(rim, np.float64).reshape(-1, 2)
 
 
 def _hull(corners: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
@@ -133,7 +134,7 @@ def _turn(p: tuple[float, float], q: tuple[float, float], r: tuple[float, float]
 def _fan(centre: Sequence[float], radius: float, start: float, turn: float,
          parts: int) -> list[tuple[float, float]]:
     """Corners of the polyline that circumscribes an arc."""
-    step = turn / max(1, parts)
+    step = turn / parts
     far = radius / math.cos(step / 2)
     return [(centre[0] + far * math.cos(start + (i + 0.5) * step),
              centre[1] + far * math.sin(start + (i + 0.5) * step)) for i in range(parts)]

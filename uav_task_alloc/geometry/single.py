@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The shortest way past one zone in closed form, for domes, cylinders and convex prisms.
+"""The shortest way past one zone in closed form, for domes, cylinders and prisms.
 
 Past a dome: tangent, arc, tangent in the plane through both ends and the centre. Past the others
 the shortest of: around, on either side, with z rising evenly; over the top; beneath. Arcs become
@@ -101,26 +101,36 @@ def _wrap(rim: Floats, way: Floats, side: float, out: Floats) -> int:
 
 
 @numba.njit(cache=True, nogil=True)
+def _in_hull(hull: Floats, p: Floats) -> bool:
+    for i in range(hull.shape[0]):
+        j = i + 1 if i + 1 < hull.shape[0] else 0
+        if (hull[j, 0] - hull[i, 0]) * (p[1] - hull[i, 1]) < (hull[j, 1] - hull[i, 1]) * (
+                p[0] - hull[i, 0]):
+            return False
+    return True
+
+
+@numba.njit(cache=True, nogil=True)
 def _crossed(rim: Floats, way: Floats) -> tuple[int, int, float, float]:
-    """Edges of a convex rim by which the straight way enters and leaves it in plan, and where."""
-    enter, leave, s, t = -1, -1, -np.inf, np.inf
+    """The first and last edge of a rim that the line ab crosses in plan, and where; -1: none."""
+    enter, leave, s, t = -1, -1, np.inf, -np.inf
     dx, dy = way[1, 0] - way[0, 0], way[1, 1] - way[0, 1]
     n = rim.shape[0]
-    for i in range(n):
-        j = i + 1 if i + 1 < n else 0
-        ex, ey = rim[j, 0] - rim[i, 0], rim[j, 1] - rim[i, 1]
-        depth = ex * (way[0, 1] - rim[i, 1]) - ey * (way[0, 0] - rim[i, 0])
-        slope = ex * dy - ey * dx
-        if slope == 0.0:
-            if depth < 0.0:
-                return -1, -1, s, t
-            continue
-        u = -depth / slope
-        if slope > 0.0 and u > s:
-            enter, s = i, u
-        elif slope < 0.0 and u < t:
-            leave, t = i, u
-    return (enter, leave, s, t) if s < t else (-1, -1, s, t)
+    i = n - 1
+    si = dx * (rim[i, 1] - way[0, 1]) - dy * (rim[i, 0] - way[0, 0])
+    for j in range(n):
+        sj = dx * (rim[j, 1] - way[0, 1]) - dy * (rim[j, 0] - way[0, 0])
+        if (si > 0.0) != (sj > 0.0):
+            f = si / (si - sj)
+            x = rim[i, 0] + f * (rim[j, 0] - rim[i, 0]) - way[0, 0]
+            y = rim[i, 1] + f * (rim[j, 1] - rim[i, 1]) - way[0, 1]
+            u = (x * dx + y * dy) / (dx * dx + dy * dy)
+            if u < s:
+                enter, s = i, u
+            if u > t:
+                leave, t = i, u
+        i, si = j, sj
+    return enter, leave, s, t
 
 
 @numba.njit(cache=True, nogil=True)
@@ -176,13 +186,6 @@ def _over(rim: Floats, z: float, side: float, way: Floats, out: Floats) -> int:
 
 
 @numba.njit(cache=True, nogil=True)
-def _level_bound(way: Floats, z: float, side: float) -> float:
-    """No way that touches height z from above (side 1) or from below (-1) is shorter [m]."""
-    up = max(0.0, side * (z - way[0, 2])) + max(0.0, side * (z - way[1, 2]))
-    return math.hypot(math.hypot(way[1, 0] - way[0, 0], way[1, 1] - way[0, 1]), up)
-
-
-@numba.njit(cache=True, nogil=True)
 def _keep_best(trial: Floats, n: int, out: Floats, best: int) -> int:
     """Copy the trial way to out where it is shorter; returns the number of points there."""
     if n == 0 or (best > 0 and length_of(trial, n) >= length_of(out, best)):
@@ -207,18 +210,18 @@ def past_one(zone: Zone, way: Floats, limits: Floats, floor: float,
     if floor < limits[0] or max(way[0, 2], way[1, 2]) > limits[1]:
         return 0
     rim = numba.carray(floats_at(zone.rim), (zone.rims, 2))
-    trial, best, bound = np.empty((rim.shape[0] + 3, 3)), 0, np.inf
+    hull = numba.carray(floats_at(zone.hull), (zone.hulls, 2))
+    if zone.dented and (_in_hull(hull, way[0]) or _in_hull(hull, way[1])):
+        return 0
+    trial, best = np.empty((zone.hulls + 3, 3)), 0
     for side in (-1.0, 1.0):
         z = zone.high + skin if side > 0.0 else zone.low - skin
         if limits[0] <= z <= limits[1] and not math.isinf(z):
-            if zone.dented:
-                bound = min(bound, _level_bound(way, z, side))
-            else:
-                best = _keep_best(trial, _over(rim, z, side, way, trial), out, best)
+            best = _keep_best(trial, _over(rim, z, side, way, trial), out, best)
         if zone.kind == CYLINDER:
             n = _bend(centre, zone.radius + skin, way, True, trial) if side > 0.0 else 0
         else:
-            n = _wrap(rim, way, side, trial)
+            n = _wrap(hull, way, side, trial)
         _rise(trial, n)
         best = _keep_best(trial, n, out, best)
-    return best if bound == np.inf or length_of(out, best) <= bound else 0
+    return best
