@@ -125,8 +125,6 @@ class Board:
     def adopt(self, found: Change, now: float) -> None:
         """The list is on board already."""
         assert self.tasks is not None
-        if not self.read_once and not self._profile.atomic and self.must_jump is None:
-            self.must_jump = found.start  # a swap may have ended before it was said
         if self.revision != self.tasks.revision or self._state is not MissionState.VERIFIED:
             self._verify(found.items, self.tasks.revision, now)
             self.progress.retag(found.items)

@@ -64,7 +64,7 @@ class Pilot:
         self.notes: deque[Note] = deque()
         self.yielding = False  # to somebody else's mission
         self._rates = Rates(peer, self.telemetry, now)
-        self._was_stale = False
+        self._was_stale = self._aimed = False
         self._serving_until = math.inf
         self._restarts = 0
         self._said = ''  # by the vehicle, last
@@ -297,7 +297,7 @@ class Pilot:
         def done(t: float) -> None:
             self.board.progress.retag(found.items)
             self.board.progress.jumped(found.start, t)
-            self.board.must_jump = None
+            self.board.must_jump, self._aimed = None, True
             self.board.adopt(found, t)
 
         self.board.progress.asked(found.start)
@@ -310,6 +310,7 @@ class Pilot:
         """In mission mode, at the right item."""
         helm, board = self.helm, self.board
         flying = self.telemetry.flight is Flight.MISSION and not helm.must_start
+        self._aimed = self._aimed and not flying
         if flying and board.must_jump is None:
             board.progress.started()
             return helm.content()
@@ -321,6 +322,8 @@ class Pilot:
             return []
         if helm.paused or not (flying or self._may_start()):
             return helm.wait('the pilot to give it back')
+        if not (flying or self._aimed or self.profile.atomic) and board.must_jump is None:
+            board.must_jump = board.progress.current  # ArduPilot resumes after what it flew last
         if board.must_jump is not None:
             return self._jump(Change(Kind.JUMP, board.progress.items, board.must_jump), now)
         return helm.set_mode(Flight.MISSION, now)

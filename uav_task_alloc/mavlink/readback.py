@@ -9,7 +9,7 @@ from uav_task_alloc.mavlink.peer import ACCEPTED, Peer, received_item
 from uav_task_alloc.mission import Item
 
 PERIOD = 1.0  # [s] until a request is repeated
-TRIES = 8  # of one request
+TRIES = 12  # of one request; ArduPilot denies a list for 8 s after a broken upload
 
 
 class ReadState(Enum):
