@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The pilot on both simulated autopilots: lists replaced, progress, faults in flight."""
+import dataclasses
+
 import pytest
 from mission_bench import ORIGIN, FlightBench, task_list
 from pymavlink.dialects.v20 import ardupilotmega as d
@@ -359,6 +361,17 @@ def test_a_list_that_returns_ends_at_home_and_a_new_one_flies_again(kind):
     assert bench.board().upload.uploads == 1
     bench.assign(task_list('B', 3, returns=True))
     assert bench.run(lambda: bench.completed() == ['A', 'B'])
+
+
+@BOTH
+def test_a_way_home_around_a_zone_is_flown_where_the_tasks_are_withdrawn(kind):
+    bench = flying(kind, 'ABC')
+    way = ((-80.0, 60.0, 50.0), (-40.0, 20.0, 50.0))
+    bench.assign(dataclasses.replace(task_list('', 2, returns=True), end_via=way))
+    assert bench.run(lambda: bench.state().mode is Mode.RETURNING, 10.0)
+    assert bench.run(lambda: bench.state().mode is Mode.STANDBY)
+    assert bench.flown()[:2] == [(-80, 60, 50), (-40, 20, 50)]
+    assert bench.completed() == []
 
 
 @BOTH

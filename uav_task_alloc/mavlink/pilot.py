@@ -63,6 +63,7 @@ class Pilot:
         self.events: deque[TaskProgress] = deque()
         self.notes: deque[Note] = deque()
         self.yielding = False  # to somebody else's mission
+        self.going_home = False  # by a list without tasks
         self._rates = Rates(peer, self.telemetry, now)
         self._was_stale = self._aimed = False
         self._serving_until = math.inf
@@ -134,9 +135,10 @@ class Pilot:
                 progress.ended()
             self._watch(message, now)
         elif kind == 'STATUSTEXT':
-            self._said = str(message.text)
             level = 'error' if message.severity < d.MAV_SEVERITY_WARNING else 'info'
-            self.notes.append(Note(level, self._said))
+            if str(message.text) != self._said:  # a refusal comes with every try
+                self.notes.append(Note(level, str(message.text)))
+            self._said = str(message.text)
 
     def _watch(self, message: Message, now: float) -> None:
         """Has somebody else changed the mission? What the vehicle says is doubt, not proof."""
@@ -218,6 +220,7 @@ class Pilot:
     def _empty(self, now: float) -> Step:
         """Nothing to fly: hold or return, and keep what is on board."""
         board, tasks, telemetry = self.board, self.board.remaining(), self.telemetry
+        self.going_home = False
         if tasks.stops:
             return None
         rest = (board.held or ())[board.progress.current or 0:]
@@ -225,10 +228,15 @@ class Pilot:
         board.revision = tasks.revision
         flying = telemetry.flight is Flight.MISSION and not board.progress.finished
         if flying and end and rest and all_alike(end[-len(rest):], rest):
-            return self.helm.content()  # on its way home already
+            self.going_home = True
+            return self.helm.content()
+        if not telemetry.airborne or self.helm.paused or self.helm.resting(now):
+            return []
         returns = tasks.returns or self.policy.when_empty == 'return'
-        if (telemetry.airborne and not self.helm.paused and not self.helm.resting(now)
-                and (flying or (returns and telemetry.flight is Flight.HOLD))):
+        if tasks.end_via and tasks.returns and telemetry.flight is not Flight.RETURN:
+            self.going_home = True
+            return None  # the plain way home leads through a zone: fly the list of it
+        if flying or (returns and telemetry.flight is Flight.HOLD):
             return self.helm.set_mode(Flight.RETURN if returns else Flight.HOLD, now)
         return []
 

@@ -68,7 +68,7 @@ def mode_of(pilot: Pilot) -> Mode:
         return Mode.TAKEOFF
     if telemetry.flight is Flight.MISSION:
         item = progress.active
-        if item is not None and item.command == RETURN:
+        if (item is not None and item.command == RETURN) or pilot.going_home:
             return Mode.RETURNING
         return Mode.HOLD if progress.finished else Mode.ON_MISSION
     return _BY_FLIGHT.get(telemetry.flight, _BY_LANDED.get(telemetry.landed, Mode.UNKNOWN))
