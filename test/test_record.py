@@ -62,6 +62,11 @@ def test_a_task_keeps_the_time_of_its_first_announcement():
     assert run.cancelled == {'a'}
 
 
+def test_the_clock_of_a_scenario_starts_with_its_first_task():
+    run = said(('run', {'speedup': 8.0}), zones(), announced('ADD', 'a'), announced('ADD', 'b'))
+    assert (run.start(), run.clock(3.0)) == (2.0, 8.0)
+
+
 def test_a_zone_lasts_from_the_first_picture_with_it_to_the_first_without():
     run = said(zones(DOME), zones(DOME, HUT), zones(HUT), zones(DOME, HUT))
     assert run.zones == [SeenZone(DOME, 0.0, 2.0), SeenZone(HUT, 1.0), SeenZone(DOME, 3.0)]
@@ -130,7 +135,6 @@ def test_a_dead_vehicle_flies_no_further():
               'alive': False})
     assert run.metres() == 50.0
     assert run.died['u1'].point == (30, 40, 0)
-    assert run.clock(1.2) == 1.0
 
 
 TWO = scenario.parse("""uavs:

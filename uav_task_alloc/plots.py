@@ -68,24 +68,21 @@ def draw_flight(out_dir: str | Path, png: str | Path) -> None:
     """The map of the run recorded in a folder; OSError when there is none."""
     out = Path(out_dir)
     said, flown = heard.read(out), truth.read(out)
-    first = min((task.wall for task in said.tasks.values()), default=said.first)
-    start = flown.clock(first)
     figure, axes = _map()
     height = _height(task.position for task in said.tasks.values())
     for seen in said.zones:
-        late = seen.since > first + AT_START
-        when = f'\nfrom {flown.clock(seen.since) - start:.0f} s' if late else ''
+        late = seen.since > said.start() + AT_START
+        when = f'\nfrom {said.clock(seen.since):.0f} s' if late else ''
         _zone(axes, seen.zone, seen.zone.id + when, height, late)
     colours = {uav: colour(i) for i, uav in enumerate(sorted(flown.tracks))}
-    handles = _tracks(axes, said, flown, colours, start)
-    handles += _tasks(axes, said, flown, colours, first)
+    handles = _tracks(axes, said, flown, colours)
+    handles += _tasks(axes, said, flown, colours)
     axes.set_title(_title(said, flown), loc='left', fontsize=12, fontweight='bold')
     zones = [seen.zone for seen in said.zones]
     _finish(figure, axes, handles + _zone_handle(zones, height), png)
 
 
-def _tracks(axes: Axes, said: Heard, flown: Truth, colours: Mapping[str, str],
-            start: float) -> list[Any]:
+def _tracks(axes: Axes, said: Heard, flown: Truth, colours: Mapping[str, str]) -> list[Any]:
     handles = []
     for uav, track in sorted(flown.tracks.items()):
         points = [sample.point for sample in track]
@@ -99,17 +96,16 @@ def _tracks(axes: Axes, said: Heard, flown: Truth, colours: Mapping[str, str],
     for uav, sample in flown.died.items():
         x, y, _ = sample.point
         axes.plot(x, y, 'X', ms=15, color='black', mec='white', mew=1.2, zorder=9)
-        axes.annotate(f'{uav} lost at {sample.clock - start:.0f} s', (x, y), (12, -4),
+        axes.annotate(f'{uav} lost at {said.clock(sample.wall):.0f} s', (x, y), (12, -4),
                       textcoords='offset points', fontsize=10, fontweight='bold', zorder=9,
                       bbox={'boxstyle': 'round,pad=0.2', 'fc': 'white', 'ec': 'black', 'lw': 0.8})
     return handles
 
 
-def _tasks(axes: Axes, said: Heard, flown: Truth, colours: Mapping[str, str],
-           first: float) -> list[Any]:
+def _tasks(axes: Axes, said: Heard, flown: Truth, colours: Mapping[str, str]) -> list[Any]:
     visits = truth.visits(flown, {name: task.position for name, task in said.tasks.items()})
     for name, task in said.tasks.items():
-        marker = 'o' if task.wall <= first + AT_START else 'D'
+        marker = 'o' if task.wall <= said.start() + AT_START else 'D'
         if visits[name]:
             _task(axes, task.position, marker, colours[visits[name][0].uav], name)
         else:

@@ -32,7 +32,7 @@ def figures(said: Heard, flown: Truth) -> Summary:
              for kind in ('completed', 'unassigned', 'cancelled', 'lost')}
     twice = sorted(name for name, reached in visits.items() if len(reached) > 1)
     entries = truth.entries(flown, said.zones)
-    times = [solve.milliseconds for solve in said.solves]
+    times = [solve.milliseconds for solve in said.solves[1:]]  # the first is no re-solve
     return {
         'tasks_announced': len(said.tasks),
         'tasks_completed': len(names['completed']),
@@ -41,7 +41,7 @@ def figures(said: Heard, flown: Truth) -> Summary:
         'tasks_lost': len(names['lost']),
         'tasks_flown_twice': len(twice),
         'zone_violations': len(entries),
-        'replans': max(0, len(said.solves) - 1),
+        'replans': len(times),
         'resolve_ms_median': percentile(times, 50.0),
         'resolve_ms_p99': percentile(times, 99.0),
         'uploads': said.uploads,

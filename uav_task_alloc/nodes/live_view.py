@@ -42,6 +42,7 @@ class LiveView(Node):
         self.quiet_since: float | None = None  # [s] of the scenario
         self.shown = 0  # lines to write over
         self.refreshes = 0
+        self.take({'wall': time.time(), 'kind': 'run', 'speedup': self.params.speedup})
         self.listen()
         self.create_timer(REFRESH, self.refresh)
 
@@ -101,8 +102,7 @@ class LiveView(Node):
 
     def clock(self) -> float:
         """Scenario time [s]: since the first task was announced."""
-        first = min((task.wall for task in self.heard.tasks.values()), default=time.time())
-        return (time.time() - first) * self.params.speedup
+        return self.heard.clock(time.time()) if self.heard.tasks else 0.0
 
     def show(self, clock: float) -> None:
         """Write over the lines of last time; in a file, one line now and then."""

@@ -65,6 +65,7 @@ class Heard:
     uavs: dict[str, Line] = field(default_factory=dict)  # the newest state of each
     verified: dict[str, set[int]] = field(default_factory=dict)  # revisions seen on board
     counted: dict[str, int] = field(default_factory=dict)  # uploads as a bridge counts them
+    speedup: float = 1.0  # scenario seconds in one of the wall
     first: float = math.inf  # [unix s]
     last: float = -math.inf  # [unix s]
 
@@ -72,6 +73,10 @@ class Heard:
         """Fold in one line."""
         self.first, self.last = min(self.first, line['wall']), max(self.last, line['wall'])
         getattr(self, 'on_' + line['kind'])(line)
+
+    def on_run(self, line: Line) -> None:
+        """How the run was started."""
+        self.speedup = line['speedup']
 
     def on_announcement(self, line: Line) -> None:
         """ADD, UPDATE or CANCEL of tasks."""
@@ -129,6 +134,14 @@ class Heard:
     def count(self, *states: str) -> int:
         """How many tasks are in one of these states."""
         return sum(status.state in states for status in self.statuses.values())
+
+    def start(self) -> float:
+        """When the first task was announced [unix s]; the first line of all where none was."""
+        return min((task.wall for task in self.tasks.values()), default=self.first)
+
+    def clock(self, wall: float) -> float:
+        """Scenario time [s] at a wall time."""
+        return (wall - self.start()) * self.speedup
 
     def zones_now(self) -> list[ThreatZone]:
         """The zones that are there after the last line."""

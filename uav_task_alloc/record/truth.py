@@ -22,7 +22,6 @@ class Sample:
     """A vehicle at one moment."""
 
     wall: float  # [unix s]
-    clock: float  # [s] of the vehicle
     point: Point  # [m]
 
 
@@ -59,24 +58,16 @@ class Truth:
         event = line.get('event')
         if event is None and line.get('alive', True):
             self.tracks.setdefault(uav, []).append(
-                Sample(wall, line['t'], (line['x'], line['y'], line['z'])))
+                Sample(wall, (line['x'], line['y'], line['z'])))
         elif event == 'item_reached':
             self.reached.append(Reached(uav, wall, (line['x'], line['y'], line['z'])))
         elif event == 'died' and self.tracks.get(uav):
-            self.died[uav] = Sample(wall, line['t'], self.tracks[uav][-1].point)
+            self.died[uav] = Sample(wall, self.tracks[uav][-1].point)
 
     def metres(self) -> float:
         """Length of all tracks [m]."""
         return math.fsum(math.dist(a.point, b.point) for track in self.tracks.values()
                          for a, b in pairwise(track))
-
-    def clock(self, wall: float) -> float:
-        """Vehicle time [s] at a wall time, from the samples nearest to it."""
-        samples = [sample for track in self.tracks.values() for sample in track]
-        if not samples:
-            return math.nan
-        near = min(samples, key=lambda sample: abs(sample.wall - wall))
-        return near.clock
 
 
 def read(out_dir: Path) -> Truth:
