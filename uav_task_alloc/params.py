@@ -175,6 +175,8 @@ class PlayerParams(Checked):
     scenario: str = param('', 'Scenario file to play.', fixed=True)
     speedup: float = param(1.0, 'How many times faster than real time.', low=0.1, high=100.0,
                            fixed=True)
+    wait_for_plan: bool = param(False, 'Begin only when an allocator has made a first plan: it is '
+                                'compiled, and UAVs are there.', fixed=True)
 
 
 @dataclass(frozen=True)

@@ -70,6 +70,18 @@ def test_the_clock_waits_for_an_allocator(start, probe, file):
     assert player.stop()[0] == 0
 
 
+def test_the_clock_waits_for_a_first_plan_where_that_is_asked(start, probe, file):
+    tasks = probe.collect(m.TaskAnnouncement, 'task_announcements', ANNOUNCEMENTS)
+    zones = probe.collect(m.ThreatZoneArray, 'threat_zones', LATCHED)
+    start('scenario_player', '-p', f'scenario:={file}', '-p', 'speedup:=50.0',
+          '-p', 'wait_for_plan:=true')
+    plans = probe.publisher(m.Allocation, 'allocation', LATCHED)
+    probe.until(lambda: probe.node.count_publishers('threat_zones') == 1)
+    assert not tasks + zones
+    plans.publish(m.Allocation(revision=1))
+    probe.until(lambda: len(tasks) == 3)
+
+
 def test_one_that_comes_late_still_hears_all_tasks_and_the_zones_as_they_are(start, probe, file):
     probe.collect(m.ThreatZoneArray, 'threat_zones', LATCHED)
     tasks = probe.collect(m.TaskAnnouncement, 'task_announcements', ANNOUNCEMENTS)

@@ -76,7 +76,7 @@ def start_nodes(args: argparse.Namespace, out: Path) -> list[Child]:
                     takeoff=True, **origin),
         Child.start('fleet_sim', out, target=f'127.0.0.1:{port}',
                     log_file=str(out / 'flight.jsonl'), **played),
-        Child.start('scenario_player', out, **played),
+        Child.start('scenario_player', out, wait_for_plan=True, **played),
         Child.start('live_view', out, show=True, out_dir=str(out), **played),
     ]
 

@@ -26,6 +26,9 @@ class ScenarioPlayer(Node):
         params = declare(self, PlayerParams).now
         played = scenario.load(params.scenario)
         self.speedup = params.speedup
+        self.planned = not params.wait_for_plan
+        if params.wait_for_plan:
+            self.create_subscription(m.Allocation, 'allocation', self.on_allocation, LATCHED)
         self.moments = list(scenario.timeline(played))
         self.started: float | None = None  # [s] steady
         self.tasks = self.create_publisher(m.TaskAnnouncement, 'task_announcements',
@@ -41,7 +44,8 @@ class ScenarioPlayer(Node):
     def tick(self) -> None:
         """Carry out every moment that is due."""
         if self.started is None:
-            if not (self.listened('task_announcements') and self.listened('threat_zones')):
+            if not (self.planned and self.listened('task_announcements')
+                    and self.listened('threat_zones')):
                 return
             self.started = time.monotonic()
         now = (time.monotonic() - self.started) * self.speedup
@@ -51,6 +55,10 @@ class ScenarioPlayer(Node):
                 self.get_logger().info('everything is announced')
         if self.doomed and self.set_alive.service_is_ready():
             self.kill(self.doomed.pop(0))
+
+    def on_allocation(self, _: m.Allocation) -> None:
+        """There is a first plan."""
+        self.planned = True
 
     def listened(self, topic: str) -> bool:
         """Whether anybody who is not just watching has subscribed."""
