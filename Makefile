@@ -17,7 +17,7 @@ test: build
 	@echo '== pytest' && $(RUN) && REQUIRE_ROS=1 python3 -m pytest
 
 # After this `source install/setup.bash` is all a shell needs.
-build: install/.built
+build: install/.built install/.compiled
 
 .ros/.made: tools/ros_env/setup.sh tools/ros_env/requirements.txt tools/ros_env/python.txt
 	@echo '== ROS 2 Jazzy and Python packages into .ros/ (once, about a minute)'
@@ -29,6 +29,11 @@ install/.built: .ros/.made setup.py setup.cfg package.xml colcon_defaults.yaml \
 	@echo '== colcon build (about a minute when messages changed)'
 	@mkdir -p log && $(ENV) && python3 -m colcon build --symlink-install > log/make_build.txt 2>&1 \
 		|| { tail -n 40 log/make_build.txt; exit 1; }
+	@touch $@
+
+install/.compiled: install/.built $(wildcard uav_task_alloc/*.py uav_task_alloc/*/*.py)
+	@echo '== compiling kernels (about half a minute when they changed)'
+	@$(RUN) && python3 -m uav_task_alloc compile
 	@touch $@
 
 # The generated files: config/*.yaml, docs/parameters.md

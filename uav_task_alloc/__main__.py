@@ -121,9 +121,19 @@ def params_command(argv: Sequence[str]) -> int:
     return 0
 
 
+def compile_command(argv: Sequence[str]) -> int:
+    """compile the kernels ahead; they are kept on disk"""
+    if argv:
+        raise SystemExit('usage: python -m uav_task_alloc compile')
+    from uav_task_alloc.allocator.rehearsal import rehearse
+    from uav_task_alloc.solver.solve import plan
+    rehearse(plan, params.AllocatorParams())
+    return 0
+
+
 COMMANDS: dict[str, Callable[[Sequence[str]], int]] = {
     'plan': plan_command, 'study': study_command, 'bench': bench_command,
-    'report': report_command, 'params': params_command,
+    'report': report_command, 'params': params_command, 'compile': compile_command,
 }
 
 

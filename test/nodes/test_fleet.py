@@ -2,6 +2,7 @@
 """All nodes together: tasks in, flown missions out, judged by where the vehicles really were."""
 import json
 import socket
+from dataclasses import replace
 
 import pytest
 from uav_task_alloc_msgs import msg as m
@@ -27,6 +28,9 @@ uavs:
   - {id: uav_2, system_id: 2, autopilot: px4, position: [400, 0, 0], range: 20000}
 """
 NEAR = [Task(f't{i}', (100.0 * i, 150.0, 50.0)) for i in range(5)]
+# the shortest plan has one UAV fly all of it, so one task each is for one only
+BOTH = [replace(NEAR[0], allowed_uavs={'uav_1'}), *NEAR[1:4],
+        replace(NEAR[4], allowed_uavs={'uav_2'})]
 LATE = [Task('late_1', (50.0, 300.0, 50.0)), Task('late_2', (350.0, 300.0, 50.0))]
 
 
@@ -82,7 +86,7 @@ def fleet(start, probe, tmp_path):
 
 
 def test_tasks_that_arrive_in_flight_are_flown_once_each_by_both_autopilots(fleet):
-    fleet.add(NEAR)
+    fleet.add(BOTH)
     fleet.probe.until(lambda: any(e.event == m.TaskEvent.COMPLETED for e in fleet.events), 60.0)
     fleet.add(LATE)
     fleet.wait_for(NEAR + LATE)
