@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 # make demo: four simulated UAVs fly what the allocator plans.   make test: every check.
 SHELL := /bin/bash
-.SHELLFLAGS := -euo pipefail -c
+.SHELLFLAGS := -eo pipefail -c
 .PHONY: demo test build docs clean
 
-ENV := . .ros/setup.sh && export PYTHONWARNINGS=
+ENV := . .ros/setup.sh
 RUN := . install/setup.bash && export PATH="$(CURDIR)/.ros/bin:$$PATH"
 
 demo: build

@@ -8,7 +8,10 @@
 set -euo pipefail
 here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
 ros=$(realpath -m "${1:-.ros}")
-pip() { "$ros/bin/python" -m pip install -q --disable-pip-version-check "$@"; }
+pip() {
+  "$ros/bin/python" -m pip install --disable-pip-version-check "$@" > "$ros/pip.log" 2>&1 ||
+    { tail -n 20 "$ros/pip.log" >&2; return 1; }
+}
 
 on_system() {
   "${PYTHON:-python3}" -m venv --system-site-packages "$ros"
