@@ -1,37 +1,64 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The product: bees that ruin and recreate the recorder's best until the budget ends."""
+"""The product, chain_q: colonies of bees, one a thread, improve the recorder's best in time."""
 from __future__ import annotations
 
-from typing import Any
+import threading
+from dataclasses import replace
 
-from uav_task_alloc.solver.chance import chance
+from uav_task_alloc.solver.colony import Colony, Habits
 from uav_task_alloc.solver.recorder import Recorder
-from uav_task_alloc.solver.ruin import empty_log
-from uav_task_alloc.solver.search import search
+from uav_task_alloc.solver.tables import Learnt, keep
+from uav_task_alloc.solver.warm import repaired
 
-MEAN = 10.0
-HOT, COLD = 10.0, 0.1
-WARM_HOT, WARM_COLD = 0.3, 0.02
+COLD_START, WARM_START = Habits(), Habits(hot=0.3, cold=0.02)
+ROUND, LONGEST = 1 / 25, 0.005  # share of the budget, [s]: between looks at the clock
+FIXED = 100  # rounds a flight where iterations are limited
+EXCHANGES = 20  # times that colonies look at each other's best
 
 
-def solve(recorder: Recorder, seed: int, warm: Any = None) -> Any:
-    """Anneal from the recorder's best."""
-    problem, a = recorder.problem, recorder.problem.arrays
-    if not problem.tasks or a.uavs == 0:
+def solve(recorder: Recorder, seed: int, learnt: object = None,
+          habits: Habits | None = None) -> Learnt | None:
+    """Fly until the budget ends; returns the tables for the next warm start."""
+    problem = recorder.problem
+    if not recorder.history:
+        recorder.offer(repaired(problem, None))
+    if not problem.tasks or not problem.uavs:
         return None
-    rng, log, routes, rounds = chance(seed), empty_log(a), recorder.start(), 16
-    hot = (WARM_HOT if warm is not None else HOT) * problem.scale
-    cold = (WARM_COLD if warm is not None else COLD) * problem.scale
-    before, since = recorder.spent(), recorder.elapsed()
-    first = before
+    habits = habits or (COLD_START if learnt is None else WARM_START)
+    colonies = [Colony(problem, recorder.best, seed + 7919 * i, habits, learnt)
+                for i in range(recorder.threads)]
+    others = [threading.Thread(target=_live, args=(each, recorder), daemon=True)
+              for each in colonies[1:]]
+    for thread in others:
+        thread.start()
+    _live(colonies[0], recorder)
+    for thread in others:
+        thread.join()
+    return keep(problem, colonies[0].scouts.tables)
+
+
+def _live(colony: Colony, recorder: Recorder) -> None:
+    """Rounds of bees, each about as long as the clock may stay unseen."""
+    aim = min(LONGEST, ROUND * recorder.budget)
+    fixed = recorder.max_iterations is not None  # then nothing may depend on the clock
+    rounds, first, since = FIXED if fixed else 16, recorder.spent(), recorder.elapsed()
+    spent, step, met = first, 0.0, first
     while not recorder.over():
-        done = (before - first) / (1.0 - first)
-        t = hot * (cold / hot) ** done
-        if search(a, routes, recorder.best, log, MEAN, t, t * 0.97, rounds, rng):
-            recorder.note()
-        recorder.iterations += rounds
-        before, now = recorder.spent(), recorder.elapsed()
-        aim = min(0.005, recorder.budget / 25)
-        rounds = max(4, min(100_000, int(rounds * min(2.0, aim / max(1e-6, now - since)))))
+        share = (spent - first) / (1.0 - first)
+        flown = colony.fly(share, min(1.0, share + step), rounds)
+        recorder.iterations += max(1, flown)
+        recorder.offer(colony.best)
+        if recorder.threads > 1 and spent - met > 1.0 / EXCHANGES:
+            met = spent
+            recorder.teach(colony.best)
+        before, spent = spent, recorder.spent()
+        now = recorder.elapsed()
+        step = spent - before
+        if flown and not fixed:
+            rounds = max(4, min(100_000, int(rounds * min(2.0, aim / max(1e-6, now - since)))))
         since = now
-    return None
+
+
+def frozen(recorder: Recorder, seed: int, learnt: object = None) -> Learnt | None:
+    """The same without learning, for the ablation."""
+    return solve(recorder, seed, learnt, replace(COLD_START, learning=False))

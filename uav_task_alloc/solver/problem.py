@@ -85,9 +85,8 @@ def make_problem(uavs: Sequence[Uav], tasks: Sequence[Task],
     problem = Problem(tuple(uavs), free, locked, limits, rules, distances, arrays,
                       1.0, {task.id: i for i, task in enumerate(free)})
     _apply_locks(problem)
-    scale = _fill(problem)
-    return Problem(problem.uavs, free, locked, limits, rules, distances, arrays, scale,
-                   problem.index)
+    floor = float(np.maximum(0.0, arrays.idle - arrays.reach).sum())
+    return replace(problem, arrays=arrays._replace(excess_floor=floor), scale=_fill(problem))
 
 
 def _distances(uavs: Sequence[Uav], tasks: Sequence[Task],
@@ -121,16 +120,21 @@ def _blank(uavs: Sequence[Uav], tasks: Sequence[Task], rules: Rules,
     m, n = len(uavs), len(tasks)
     k, s = min(NEIGHBOURS, max(0, n - 1)), min(STARTS, m)
     may = _may(uavs, tasks)
-    w = rules.weights
     return Arrays(
         m, m + n, rules.returns, rules.hard,
-        min(w.penalty / w.distance, 1e6) if w.distance > 0.0 else 1e6,
+        0.0, np.array([math.inf if rules.hard else excess_cost(rules.weights)]),
         distances.pairs, not distances.zones, distances.points,
         np.array([u.range for u in uavs], dtype=np.float64), np.zeros(m), may,
         np.any(~may, axis=0, keepdims=True)[0],
         np.array([t.value for t in tasks], dtype=np.float64), np.ones(n),
         np.empty((n, k), np.int64), np.empty((n, k)), np.empty((n, s), np.int64),
         np.empty((n, s)))
+
+
+def excess_cost(weights: Weights) -> float:
+    """Metres of way that a metre beyond range weighs as much as."""
+    most = 1e6
+    return min(weights.penalty / weights.distance, most) if weights.distance > 0.0 else most
 
 
 def _apply_locks(problem: Problem) -> None:

@@ -2,6 +2,7 @@
 """The recorder: the best routes so far, when they were found, and when to stop looking."""
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
@@ -26,6 +27,7 @@ class Recorder:
     iterations: int = 0
     history: list[tuple[float, float]] = field(default_factory=list)
     best: Routes = field(init=False)
+    _lock: threading.Lock = field(default_factory=threading.Lock)
 
     def __post_init__(self) -> None:
         self.best = of.empty_routes(self.problem.arrays)
@@ -48,20 +50,23 @@ class Recorder:
 
     def offer(self, routes: Routes) -> bool:
         """Keep routes that are better than the best; whether they are."""
-        if self.history and not of.better(routes, self.best, self.problem.arrays.excess_cost):
-            return False
-        of.copy(routes, self.best)
-        self.note()
+        with self._lock:
+            if self.history and not of.better(self.problem.arrays, routes, self.best):
+                return False
+            of.copy(routes, self.best)
+            self._note()
         return True
 
-    def note(self) -> None:
+    def teach(self, routes: Routes) -> None:
+        """Make routes the recorder's best, if that is better."""
+        with self._lock:
+            if of.better(self.problem.arrays, self.best, routes):
+                of.copy(self.best, routes)
+
+    def _note(self) -> None:
         """Write down that the best has changed."""
         sums = self.best.sums
         value = float(sums[VALUE]) + self.held[1]
         self.history.append((self.elapsed(), fit(
             float(sums[DISTANCE]) + self.held[0], value, float(sums[EXCESS]),
             self.problem.rules.weights)))
-
-    def start(self) -> Routes:
-        """A copy of the best to work on."""
-        return of.twin(self.best)

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Any
 
 from uav_task_alloc.solver import chain_q
+from uav_task_alloc.solver.baselines import auction, chain_q_paper, greedy, insertion
 from uav_task_alloc.solver.recorder import Recorder
 
-Solver = Callable[[Recorder, int, Any], Any]  # (recorder, seed, state of the warm plan) -> state
+Solver = Callable[[Recorder, int, object], object]  # (recorder, seed, learnt) -> learnt
 
 SOLVERS: Mapping[str, Solver] = {
     'chain_q': chain_q.solve,
+    'chain_q_paper': chain_q_paper.solve,
+    'greedy': greedy.solve,
+    'auction': auction.solve,
+    'insertion': insertion.solve,
 }

@@ -27,7 +27,8 @@ class Arrays(NamedTuple):
     ends: int  # first end node
     returns: bool  # routes end at home
     hard: bool  # no range is ever exceeded
-    excess_cost: float  # [m/m] of a metre beyond range, where not hard
+    excess_floor: float  # [m] beyond range that no plan can avoid
+    strain: Floats  # (1) [m/m] what a metre beyond range costs now; inf: none is allowed
     pairs: Pairs  # lengths by node
     straight: bool  # no zones: lengths are distances of xyz
     xyz: Floats  # (2m + n, 3) [m]
@@ -73,9 +74,6 @@ def step(a: Arrays, i: int, j: int) -> float:
 def clear(a: Arrays, r: Routes) -> None:
     """Leave everything out."""
     r.on[:] = -1
-    r.sums[:] = 0.0
-    for t in range(a.price.size):
-        r.sums[LEFT_OUT] += a.price[t]
     for u in range(a.uavs):
         end = a.ends + u
         r.next[u], r.prev[u], r.next[end], r.prev[end] = end, u, u, u
@@ -87,11 +85,16 @@ def clear(a: Arrays, r: Routes) -> None:
 
 @kernel
 def total(a: Arrays, r: Routes) -> None:
-    """Sum up the lengths anew."""
-    r.sums[DISTANCE], r.sums[EXCESS] = 0.0, 0.0
+    """Sum up anew what changes only change. O(n)."""
+    r.sums[:] = 0.0
     for u in range(a.uavs):
         r.sums[DISTANCE] += r.length[u]
         r.sums[EXCESS] += max(0.0, r.length[u] - a.reach[u])
+    for i in range(a.price.size):
+        if r.on[a.uavs + i] < 0:
+            r.sums[LEFT_OUT] += a.price[i]
+        else:
+            r.sums[VALUE] += a.value[i]
 
 
 def empty_routes(a: Arrays) -> Routes:
@@ -123,30 +126,33 @@ def twin(a: Routes) -> Routes:
 @part
 def cost(a: Arrays, r: Routes) -> float:
     """What the search makes small [m]."""
-    return float(r.sums[DISTANCE] + r.sums[LEFT_OUT] + a.excess_cost * r.sums[EXCESS])
+    return float(r.sums[DISTANCE] + r.sums[LEFT_OUT] + (
+        a.strain[0] * r.sums[EXCESS] if r.sums[EXCESS] > 0.0 else 0.0))
 
 
 @part
-def better(r: Routes, s: Routes, excess_cost: float) -> bool:
-    """Whether r is better than s: more value; as much, then shorter."""
+def better(a: Arrays, r: Routes, s: Routes) -> bool:
+    """Whether r is better than s: more value; as much, then shorter; hard: within range."""
+    if a.hard and r.sums[EXCESS] > a.excess_floor + TINY:
+        return False
     gain = r.sums[VALUE] - s.sums[VALUE]
     slack = 1e-9 * (abs(s.sums[VALUE]) + 1.0)
     if gain > slack:
         return True
-    shorter = (s.sums[DISTANCE] + excess_cost * s.sums[EXCESS]
-               - r.sums[DISTANCE] - excess_cost * r.sums[EXCESS])
+    shorter = s.sums[DISTANCE] - r.sums[DISTANCE]
+    if not a.hard:
+        shorter += a.strain[0] * (s.sums[EXCESS] - r.sums[EXCESS])
     return bool(gain >= -slack and shorter > TINY + 1e-12 * s.sums[DISTANCE])
 
 
 @part
 def lengthened(a: Arrays, r: Routes, u: int, delta: float) -> float:
     """Cost [m] of making UAV u's route longer by delta [m]; inf where it may not."""
-    over = r.length[u] + delta - a.reach[u]
-    if over <= TINY:
-        return float(delta - a.excess_cost * max(0.0, r.length[u] - a.reach[u]))
-    if a.hard:
-        return np.inf
-    return float(delta + a.excess_cost * (over - max(0.0, r.length[u] - a.reach[u])))
+    before = r.length[u] - a.reach[u]
+    after = before + delta
+    if after <= TINY and before <= TINY:
+        return delta
+    return float(delta + a.strain[0] * (max(0.0, after) - max(0.0, before)))
 
 
 @part

@@ -17,6 +17,8 @@ from uav_task_alloc.solver.routes import Arrays, Floats, Ints, Routes, insert, r
 STRING = 10  # tasks in a string at most
 SPLIT = 0.5  # share of strings with a part that stays
 REACH = 12  # neighbours looked at for a place
+PITY = 0.5  # share of rounds around a task that is left out, if there is one
+FEW, DEARER = 0.05, 1.1
 BLINKS = 0.01  # share of places overlooked
 
 
@@ -27,16 +29,17 @@ class Log(NamedTuple):
     after: Ints  # where it was before it was removed; -1: it was inserted
     out: Ints  # task nodes to put back
     key: Floats  # they go in by this, smallest first
-    size: Ints  # entries of (node and after, out)
+    size: Ints  # entries of (node and after, out, left)
     hit: Ints  # (m) round in which a route was last ruined
+    left: Ints  # task nodes that were left out lately
 
 
 def empty_log(a: Arrays) -> Log:
     """A log with room for the longest round."""
     room = 2 * (a.ends - a.uavs) + 2
     return Log(np.empty(2 * room, np.int64), np.empty(2 * room, np.int64),
-               np.empty(room, np.int64), np.empty(room), np.zeros(2, np.int64),
-               np.zeros(a.uavs, np.int64))
+               np.empty(room, np.int64), np.empty(room), np.zeros(3, np.int64),
+               np.zeros(a.uavs, np.int64), np.empty(room, np.int64))
 
 
 @part
@@ -82,11 +85,32 @@ def _string(a: Arrays, r: Routes, log: Log, c: int, size: int, rng: Chance) -> N
 
 
 @kernel
+def look_for_left(a: Arrays, r: Routes, log: Log) -> None:
+    """Note who is left out now; where those are few, leaving them out gets dearer. O(n)."""
+    log.size[2] = 0
+    for t in range(a.uavs, a.ends):
+        if r.on[t] < 0:
+            log.left[log.size[2]] = t
+            log.size[2] += 1
+    if log.size[2] < FEW * (a.ends - a.uavs):
+        for i in range(log.size[2]):
+            a.price[log.left[i] - a.uavs] *= DEARER
+
+
+@part
+def _seed(a: Arrays, log: Log, rng: Chance) -> int:
+    """Around whom to ruin: anybody, and often somebody who was left out."""
+    if log.size[2] > 0 and uniform(rng) < PITY:
+        return int(log.left[below(rng, log.size[2])])
+    return a.uavs + below(rng, a.ends - a.uavs)
+
+
+@kernel
 def ruin(a: Arrays, r: Routes, log: Log, mean: float, round_id: int, rng: Chance) -> None:
     """Remove about `mean` tasks in strings of routes around a random one. O(mean)."""
     log.size[0] = log.size[1] = 0
     tasks = a.ends - a.uavs
-    seed = a.uavs + below(rng, tasks)
+    seed = _seed(a, log, rng)
     served = max(1, tasks // max(1, a.uavs))
     longest = min(float(STRING), max(1.0, float(served)))
     strings = int(1.0 + uniform(rng) * (4.0 * mean / (1.0 + longest) - 1.0))

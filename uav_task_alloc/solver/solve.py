@@ -49,7 +49,8 @@ def plan(uavs: Iterable[Uav], tasks: Iterable[Task], zones: Iterable[ThreatZone]
                            State.of(warm).problem)
     recorder = Recorder(problem, clock, began, budget, max_iterations, stop, threads,
                         _held(problem))
-    recorder.offer(repaired(problem, warm))
+    if warm is not None:
+        recorder.offer(repaired(problem, warm))
     learnt = SOLVERS[solver](recorder, seed, State.of(warm).learnt)
     return to_plan(problem, recorder, State(problem, learnt), solver, warm is not None)
 
@@ -72,6 +73,5 @@ def warm_up() -> None:
     problem = make_problem(uavs, tasks, {}, Limits(), Rules())
     for solve in SOLVERS.values():
         recorder = Recorder(problem, lambda: 0.0, 0.0, 1.0, max_iterations=64)
-        recorder.offer(repaired(problem, None))
         solve(recorder, 0, None)
         to_plan(problem, recorder, None, '', False)

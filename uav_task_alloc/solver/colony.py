@@ -1,0 +1,83 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A colony of bees on one thread: scouts construct, employed and onlooker bees search."""
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from uav_task_alloc.solver import routes as of
+from uav_task_alloc.solver.bidding import Bidding
+from uav_task_alloc.solver.chance import chance
+from uav_task_alloc.solver.problem import Problem
+from uav_task_alloc.solver.routes import EXCESS, TINY, Routes
+from uav_task_alloc.solver.ruin import empty_log
+from uav_task_alloc.solver.scouts import Scouts
+from uav_task_alloc.solver.search import search
+
+
+@dataclass(frozen=True, slots=True)
+class Habits:
+    """How bees behave; temperatures in mean ways to the nearest neighbour."""
+
+    hot: float = 3.0
+    cold: float = 0.1
+    some: float = 10.0  # tasks that an employed bee takes out in a round
+    many: float = 20.0  # an onlooker
+    employed: float = 0.5  # least shares of the work
+    onlookers: float = 0.2
+    scouts: float = 0.01
+    strain: float = 10.0  # [m/m] what a metre beyond range costs at first
+    learning: bool = True
+
+
+class Colony:
+    """Bees around routes of their own; `best` is what they found."""
+
+    def __init__(self, problem: Problem, start: Routes, seed: int, habits: Habits,
+                 learnt: object = None) -> None:
+        arrays = problem.arrays
+        self.arrays = arrays._replace(strain=arrays.strain.copy(), price=arrays.price.copy())
+        self.habits, self.best, self.routes = habits, of.twin(start), of.twin(start)
+        self._rng, self._log = chance(seed), empty_log(arrays)
+        self.scouts = Scouts(problem, self.arrays, self._rng, learnt, habits.learning)
+        self._scale = problem.scale
+        floors = {'employed': habits.employed, 'onlooker': habits.onlookers,
+                  'scout': habits.scouts}
+        self._bids = Bidding({kind: floor for kind, floor in floors.items() if floor > 0.0})
+        if arrays.hard:
+            self.arrays.strain[0] = habits.strain
+
+    def temperature(self, spent: float) -> float:
+        """[m] after this share of the budget."""
+        h = self.habits
+        return float(self._scale * h.hot * (h.cold / h.hot) ** spent)
+
+    def fly(self, spent: float, until: float, rounds: int) -> int:
+        """Let the kind that bid most fly while the budget goes from `spent` to `until`.
+
+        Returns the rounds of search that took place.
+        """
+        h = self.habits
+        costs = {'employed': rounds * h.some, 'onlooker': rounds * h.many,
+                 'scout': self.scouts.work / 5.0}
+        kind = self._bids.next({each: costs[each] for each in self._bids.shares()})
+        before = of.cost(self.arrays, self.best)
+        hot, cold = self.temperature(spent), self.temperature(until)
+        if kind == 'scout':
+            self.scouts.fly(self.best)
+        elif kind == 'employed':
+            self._search(self.routes, h.some, hot, cold, rounds)
+        else:
+            self._search(self.routes, h.many, hot, cold, rounds)
+        gain = before - of.cost(self.arrays, self.best)
+        self._bids.pay(kind, costs[kind], max(0.0, gain))
+        return 0 if kind == 'scout' else rounds
+
+    def _search(self, routes: Routes, mean: float, hot: float, cold: float, rounds: int) -> int:
+        a = self.arrays
+        found = int(search(a, routes, self.best, self._log, mean, hot, cold, rounds, self._rng))
+        if a.hard:  # dear enough that routes come back into range, cheap enough to pass through
+            over = routes.sums[EXCESS] > a.excess_floor + TINY
+            a.strain[0] = np.clip(a.strain[0] * (1.2 if over else 0.9), 0.5, 1000.0)
+        return found
