@@ -150,7 +150,7 @@ def test_a_run_is_over_when_all_is_settled_and_the_living_are_at_rest():
 
 
 @pytest.mark.parametrize('more', [
-    state(mode='RETURNING'), state(active='a'), state(speed=3.0),
+    state(mode='RETURNING'), state(speed=3.0),
     status(('a', 'COMPLETED'), ('b', 'ACTIVE')), status(('a', 'COMPLETED'))])
 def test_a_run_is_not_over_while_something_is_under_way(more):
     assert not is_over(said(*DONE, more), TWO, clock=9.0)

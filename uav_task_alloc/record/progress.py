@@ -51,7 +51,7 @@ def is_over(heard: Heard, scenario: Scenario, clock: float) -> bool:
 
 
 def _at_rest(state: Line | None) -> bool:
-    if state is None or state['active']:
+    if state is None:
         return False
     speed = math.hypot(*(v or 0.0 for v in state['velocity']))
     return speed < AT_REST and state['mode'] in ('STANDBY', 'HOLD', 'FAULT')
