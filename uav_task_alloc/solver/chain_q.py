@@ -7,7 +7,6 @@ from dataclasses import replace
 
 from uav_task_alloc.solver.colony import Colony, Habits
 from uav_task_alloc.solver.recorder import Recorder
-from uav_task_alloc.solver.tables import Learnt, keep
 from uav_task_alloc.solver.warm import repaired
 
 COLD_START, WARM_START = Habits(), Habits(hot=0.3, cold=0.02)
@@ -17,14 +16,14 @@ EXCHANGES = 20  # times that colonies look at each other's best
 
 
 def solve(recorder: Recorder, seed: int, learnt: object = None,
-          habits: Habits | None = None) -> Learnt | None:
+          habits: Habits | None = None) -> object:
     """Fly until the budget ends; returns the tables for the next warm start."""
     problem = recorder.problem
     if not recorder.history:
         recorder.offer(repaired(problem, None))
-    if not problem.tasks or not problem.uavs:
-        return None
-    habits = habits or (COLD_START if learnt is None else WARM_START)
+    if not problem.tasks or not problem.uavs or recorder.over():
+        return learnt
+    habits = habits or (WARM_START if recorder.warm else COLD_START)
     colonies = [Colony(problem, recorder.best, seed + 7919 * i, habits, learnt)
                 for i in range(recorder.threads)]
     others = [threading.Thread(target=_live, args=(each, recorder), daemon=True)
@@ -34,7 +33,7 @@ def solve(recorder: Recorder, seed: int, learnt: object = None,
     _live(colonies[0], recorder)
     for thread in others:
         thread.join()
-    return keep(problem, colonies[0].scouts.tables)
+    return colonies[0].scouts.learnt()
 
 
 def _live(colony: Colony, recorder: Recorder) -> None:
@@ -59,6 +58,6 @@ def _live(colony: Colony, recorder: Recorder) -> None:
         since = now
 
 
-def frozen(recorder: Recorder, seed: int, learnt: object = None) -> Learnt | None:
+def frozen(recorder: Recorder, seed: int, learnt: object = None) -> object:
     """The same without learning, for the ablation."""
     return solve(recorder, seed, learnt, replace(COLD_START, learning=False))

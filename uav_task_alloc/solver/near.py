@@ -104,8 +104,9 @@ def near_starts(a: Arrays, xyz: Floats, rng: Chance) -> None:
                 continue
             square = ((xyz[u, 0] - xyz[t, 0]) ** 2 + (xyz[u, 1] - xyz[t, 1]) ** 2
                       + (xyz[u, 2] - xyz[t, 2]) ** 2)
-            kept = _keep(a.starts[i], squares, kept, u,
-                         square * (1.0 + 1e-6 * uniform(rng)) + 1e-6 * uniform(rng))
+            if kept < s or square <= squares[s - 1]:
+                square += 1e-6 * (square + 1.0) * uniform(rng)
+                kept = _keep(a.starts[i], squares, kept, u, square)
         for m in range(s):
             if m < kept:
                 a.start_length[i, m] = step(a, a.starts[i, m], t)

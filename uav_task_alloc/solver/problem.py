@@ -66,6 +66,8 @@ class Problem:
 
     def locked_places(self, u: int) -> list[int]:
         """Places of UAV u's start and its locked tasks in `distances`."""
+        if not self.locked:
+            return [u]
         place = 2 * len(self.uavs) + len(self.tasks)
         for uav in self.uavs[:u]:
             held = self.locked.get(uav.id, ())
@@ -141,7 +143,7 @@ def _apply_locks(problem: Problem) -> None:
     """Locked tasks use up range; a UAV that flies them returns even when it gets no more."""
     a = problem.arrays
     for u, uav in enumerate(problem.uavs):
-        if problem.locked.get(uav.id):
+        if uav.id in problem.locked:
             places = problem.locked_places(u)
             a.reach[u] -= sum(problem.distances.length(i, j)
                               for i, j in pairwise(places))

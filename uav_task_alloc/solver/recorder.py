@@ -23,6 +23,7 @@ class Recorder:
     max_iterations: int | None = None
     stop: Callable[[], bool] | None = None
     threads: int = 1
+    warm: bool = False  # its best is an earlier plan, repaired
     held: tuple[float, float] = (0.0, 0.0)  # length [m] and value of the locked tasks
     iterations: int = 0
     history: list[tuple[float, float]] = field(default_factory=list)

@@ -2,6 +2,8 @@
 """Constructing bees: they grow routes by chained Q and learn from each other's rank."""
 from __future__ import annotations
 
+import functools
+
 import numpy as np
 
 from uav_task_alloc.solver import routes as of
@@ -9,7 +11,7 @@ from uav_task_alloc.solver.chance import Chance
 from uav_task_alloc.solver.insertion import place_all
 from uav_task_alloc.solver.problem import Problem
 from uav_task_alloc.solver.routes import Arrays, Routes
-from uav_task_alloc.solver.tables import DECAY, Tables, construct, fresh_tables, reinforce
+from uav_task_alloc.solver.tables import DECAY, Tables, construct, fresh_tables, keep, reinforce
 
 BEES = 8  # that fly before the tables are changed
 
@@ -20,16 +22,28 @@ class Scouts:
     def __init__(self, problem: Problem, arrays: Arrays, rng: Chance, learnt: object = None,
                  learning: bool = True) -> None:
         self.arrays, self.rng, self.learning = arrays, rng, learning
-        self.tables: Tables = fresh_tables(problem, learnt)
-        self._bees = [of.empty_routes(arrays) for _ in range(BEES)]
+        self._problem, self._learnt = problem, learnt
+        self._bees: list[Routes] = []
         self._sums = np.zeros(arrays.uavs)
-        a = arrays
-        self.work = float(BEES * (a.ends - a.uavs) * (a.uavs + 1) * max(1, a.near.shape[1]))
+        n = arrays.ends - arrays.uavs
+        self.work = float(BEES * n * (arrays.uavs + 1) * max(1, arrays.near.shape[1]))
+
+    @functools.cached_property
+    def tables(self) -> Tables:
+        """Made when the first bee flies: a short solve has no time for them."""
+        return fresh_tables(self._problem, self._learnt)
+
+    def learnt(self) -> object:
+        """What the next warm start wants."""
+        return keep(self._problem, self.tables) if self._bees else self._learnt
 
     def fly(self, best: Routes) -> bool:
         """One flight of all; `best` is improved if a bee brings better, and learnt from."""
         a, found = self.arrays, False
-        a.strain[0], strain = (np.inf if a.hard else a.strain[0]), a.strain[0]
+        if not self._bees:
+            self._bees = [of.empty_routes(a) for _ in range(BEES)]
+        strain = a.strain[0]
+        a.strain[0] = np.inf if a.hard else strain
         for bee in self._bees:
             construct(a, bee, self.tables, self._sums, self.rng)
             left = np.flatnonzero(bee.on[a.uavs:a.ends] < 0) + a.uavs

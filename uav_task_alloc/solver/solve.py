@@ -48,7 +48,7 @@ def plan(uavs: Iterable[Uav], tasks: Iterable[Task], zones: Iterable[ThreatZone]
     problem = make_problem(fleet, work, check_locked(locked, fleet, work, limits), limits, rules,
                            State.of(warm).problem)
     recorder = Recorder(problem, clock, began, budget, max_iterations, stop, threads,
-                        _held(problem))
+                        warm is not None, _held(problem))
     if warm is not None:
         recorder.offer(repaired(problem, warm))
     learnt = SOLVERS[solver](recorder, seed, State.of(warm).learnt)
