@@ -1,12 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """The dense reference: Dijkstra over a visibility graph of many corners around every zone met.
 
-Each zone is stood around by rings of `ring` corners on its circumscribed polygons, at many heights,
-and prisms also along their edges. A way around a zone of radius R is thus too long by at most
-1 / cos(pi / ring) - 1 of its arc (0.4 % for 36), and never too short, but for what is gained by
-heights in between. Only zones that are met take part, as a way past fewer zones is never longer.
+Each zone has rings of `ring` corners around it, on circumscribed polygons, at many heights; prisms
+also along their edges. A way around a zone of radius R is thus too long by at most
+1 / cos(pi / ring) - 1 of its arc (0.4 % for 36), besides what heights in between would gain; it is
+never too short. Only zones that are met take part, as a way past fewer zones is never longer.
 """
 import math
+from itertools import pairwise
 
 import numba
 import numpy as np
@@ -125,7 +126,7 @@ class Dense:
             if not math.isfinite(total):
                 return total
             known = met.sum()
-            for p, q in zip(path, path[1:], strict=False):
+            for p, q in pairwise(path):
                 met = self._met(p, q, met, a, b)
             if met.sum() == known:
                 return total

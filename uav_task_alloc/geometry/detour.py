@@ -89,8 +89,8 @@ def way_between(obstacles: Obstacles, start: Point, goal: Point, limits: Floats,
     buffer = np.empty((MAX_CORNERS, 3))
     snug = any(first_around(obstacles.rows, *end, False) >= 0 for end in (start, goal))
     n, length = shortest(obstacles.rows, ends, limits, snug, buffer)
-    points = [(float(x), float(y), float(z)) for x, y, z in buffer[1:max(1, n - 1)]]
-    return float(length), tuple(points if forwards else reversed(points))
+    via = tuple((float(x), float(y), float(z)) for x, y, z in buffer[1:max(1, n - 1)])
+    return float(length), via if forwards else via[::-1]
 
 
 def _around(obstacles: Obstacles, zones: Sequence[ThreatZone], point: Point) -> tuple[str, ...]:

@@ -21,13 +21,17 @@ def cast(context: Any, builder: Any, signature: Signature, args: Any) -> Any:
     return builder.inttoptr(args[0], target)
 
 
-@intrinsic  # type: ignore[untyped-decorator]
-def floats_at(typing_context: Any, address: int) -> tuple[Signature, Callable[..., Any]]:
+@intrinsic
+def _floats_at(typing_context: Any, address: int) -> tuple[Signature, Callable[..., Any]]:
     """The float64 values at an address."""
     return types.CPointer(types.float64)(types.int64), cast
 
 
-@intrinsic  # type: ignore[untyped-decorator]
-def ints_at(typing_context: Any, address: int) -> tuple[Signature, Callable[..., Any]]:
+@intrinsic
+def _ints_at(typing_context: Any, address: int) -> tuple[Signature, Callable[..., Any]]:
     """The int64 values at an address."""
     return types.CPointer(types.int64)(types.int64), cast
+
+
+floats_at: Callable[[int], Any] = _floats_at  # type: ignore[assignment]
+ints_at: Callable[[int], Any] = _ints_at  # type: ignore[assignment]

@@ -9,7 +9,7 @@ lower one is `floor`), the space beneath it is closed too, so that nobody digs u
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -49,10 +49,13 @@ ZONE = np.dtype([
 ])
 
 
-@intrinsic  # type: ignore[untyped-decorator]
-def zones_at(typing_context: Any, address: int) -> Any:
+@intrinsic
+def _zones_at(typing_context: Any, address: int) -> Any:
     """The rows of dtype ZONE at an address."""
     return types.CPointer(numba.from_dtype(ZONE))(types.int64), cast
+
+
+zones_at: Callable[[int], Any] = _zones_at  # type: ignore[assignment]
 
 
 @dataclass(frozen=True, eq=False)

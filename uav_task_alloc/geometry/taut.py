@@ -15,7 +15,7 @@ from uav_task_alloc.geometry.obstacles import Floats, Ints, Zones, blocked
 
 MAX_CORNERS = 96  # of a way while it is worked on
 CUT_GAIN = 1e-3  # a further corner must shorten the way by this share
-PULL_GAIN = 2e-4  # as must a further round of pulling
+PULL_GAIN = 5e-4  # as must a further round of pulling
 
 
 @numba.njit(cache=True, nogil=True)
@@ -117,7 +117,7 @@ def _press(o: Zones, near: Ints, p: Floats, i: int, axes: Floats, q: Floats, t: 
            turn: float, s: float, limits: Floats, floor: float, snug: bool) -> float:
     """The least offset, from the good one s inwards, at which corner i fits."""
     low, high = 0.0, s
-    for _ in range(10):
+    for _ in range(8):
         middle = 0.5 * (low + high)
         _put(q, p, i, axes, t, turn, middle)
         if _fits(o, near, p, i, q, limits, floor, snug):
@@ -158,17 +158,17 @@ def pull(o: Zones, near: Ints, p: Floats, i: int, limits: Floats, floor: float, 
 
 @numba.njit(cache=True, nogil=True)
 def pull_all(o: Zones, near: Ints, p: Floats, n: int, limits: Floats, floor: float,
-             snug: bool) -> int:
+             snug: bool, rounds: int) -> int:
     """Drop and pull corners until a round gains next to nothing; returns the new n."""
     before = np.inf
-    for rounds in range(6):
+    for _ in range(rounds):
         n = drop_corners(o, near, p, n, floor, snug)
         total = length_of(p, n)
         if n <= 2 or total > before * (1.0 - PULL_GAIN):
             break
         before = total
         for i in range(1, n - 1):
-            pull(o, near, p, i, limits, floor, snug, 8 if rounds == 0 else 5)
+            pull(o, near, p, i, limits, floor, snug, 2 + rounds)
     return n
 
 
@@ -177,7 +177,7 @@ def _cut(o: Zones, near: Ints, p: Floats, i: int, floor: float, snug: bool) -> f
     """How far from corner i, on both its legs, the corner can be cut off."""
     before, after = span(p, i - 1, i), span(p, i, i + 1)
     low, high = 0.0, 0.98 * min(before, after)
-    for _ in range(10):
+    for _ in range(7):
         d = 0.5 * (low + high)
         f, g = d / before, d / after
         if free(o, near, p[i, 0] + f * (p[i - 1, 0] - p[i, 0]),
@@ -218,10 +218,10 @@ def cut_corners(o: Zones, near: Ints, p: Floats, n: int, floor: float, snug: boo
 def tauten(o: Zones, near: Ints, p: Floats, n: int, limits: Floats, floor: float,
            snug: bool) -> int:
     """Shorten the clear way p[:n] in place, keeping it clear; returns the new n."""
-    n = pull_all(o, near, p, n, limits, floor, snug)
+    n = pull_all(o, near, p, n, limits, floor, snug, 5)
     for _ in range(4):
         more = cut_corners(o, near, p, n, floor, snug)
         if more == n:
             break
-        n = pull_all(o, near, p, more, limits, floor, snug)
+        n = pull_all(o, near, p, more, limits, floor, snug, 2)
     return n

@@ -1,0 +1,92 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What must hold for any ways among any zones: symmetry, triangle, more zones, scale, rotation."""
+import math
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from hypothesis import given, settings, strategies as st
+from scenes import CLEARANCE, random_point, random_zones, violations
+
+from uav_task_alloc.geometry.detour import detour
+from uav_task_alloc.model import Shape, ThreatZone
+
+RUNS = settings(derandomize=True, deadline=None, max_examples=40)
+TOLERANCE = 0.02  # ways are that near to the shortest; the sweep in benchmarks/ has the figures
+
+
+@st.composite
+def scenes(draw, points=2):
+    """A few zones of all shapes, apart or not, and points outside them."""
+    rng = np.random.default_rng(draw(st.integers(0, 10_000)))
+    zones = random_zones(rng, draw(st.integers(1, 5)), draw(st.booleans()), 900.0, 200.0)
+    return zones, [random_point(rng, zones, 900.0) for _ in range(points)]
+
+
+def way(a, b, zones, **more):
+    return detour(a, b, zones, clearance=CLEARANCE, **more)
+
+
+@RUNS
+@given(scenes())
+def test_there_and_back_is_the_same_way(scene):
+    zones, (a, b) = scene
+    there, back = way(a, b, zones), way(b, a, zones)
+    assert there == (back[0], tuple(reversed(back[1])))
+
+
+@RUNS
+@given(scenes())
+def test_a_way_is_never_inside_an_enlarged_zone_and_its_length_is_that_of_the_polyline(scene):
+    zones, (a, b) = scene
+    length, points = way(a, b, zones)
+    if math.isinf(length):
+        return
+    assert violations([a, *points, b], zones) == 0
+    line = np.array([a, *points, b])
+    assert length == pytest.approx(np.linalg.norm(np.diff(line, axis=0), axis=1).sum())
+
+
+@RUNS
+@given(scenes(points=3))
+def test_a_stop_on_the_way_never_makes_it_shorter(scene):
+    zones, (a, b, c) = scene
+    straight, first, second = (way(*ends, zones)[0] for ends in ((a, c), (a, b), (b, c)))
+    assert straight <= (first + second) * (1 + TOLERANCE)
+
+
+@RUNS
+@given(scenes())
+def test_more_zones_never_make_it_shorter(scene):
+    zones, (a, b) = scene
+    lengths = [way(a, b, zones[:count])[0] for count in range(len(zones) + 1)]
+    for fewer, more in pairwise(lengths):
+        assert more >= fewer * (1 - TOLERANCE)
+
+
+def changed(zone, scale=1.0, turn=0.0):
+    """The zone scaled and turned about the z axis."""
+    def move(x, y):
+        return (scale * (x * math.cos(turn) - y * math.sin(turn)),
+                scale * (x * math.sin(turn) + y * math.cos(turn)))
+    x, y, z = zone.center
+    if zone.shape is Shape.HEMISPHERE:
+        return ThreatZone.hemisphere(zone.id, (*move(x, y), scale * z), scale * zone.radius,
+                                     scale * zone.margin)
+    rest = scale * zone.z_min, scale * zone.z_max, scale * zone.margin
+    if zone.shape is Shape.CYLINDER:
+        return ThreatZone.cylinder(zone.id, move(x, y), scale * zone.radius, *rest)
+    return ThreatZone.polygon(zone.id, [move(*v) for v in zone.vertices], *rest)
+
+
+@RUNS
+@given(scenes(), st.floats(0.1, 10.0), st.floats(-3.0, 3.0))
+def test_scale_and_rotation_change_nothing_but_the_measure(scene, scale, turn):
+    zones, ends = scene
+    here = way(*ends, zones)[0]
+    moved = [changed(ThreatZone.hemisphere('p', p, 1.0), scale, turn).center for p in ends]
+    there = detour(*moved, [changed(zone, scale, turn) for zone in zones],
+                   clearance=scale * CLEARANCE)[0]
+    assert math.isinf(here) == math.isinf(there)
+    if math.isfinite(here):
+        assert there == pytest.approx(scale * here, rel=TOLERANCE)

@@ -1,0 +1,131 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Lengths on demand, from kernels, and after points and zones came, moved or vanished."""
+import math
+
+import numba
+import numpy as np
+import pytest
+from scenes import CLEARANCE, random_point, random_zones
+
+from uav_task_alloc.errors import InvalidValue
+from uav_task_alloc.geometry import distances
+from uav_task_alloc.geometry.detour import detour
+from uav_task_alloc.geometry.distances import Distances, length
+from uav_task_alloc.model import ThreatZone
+
+
+@numba.njit(nogil=True)
+def square(pairs, n):
+    out = np.empty((n, n))
+    for i in range(n):
+        for j in range(n):
+            out[i, j] = length(pairs, i, j)
+    return out
+
+
+@pytest.fixture(scope='module')
+def scene():
+    rng = np.random.default_rng(3)
+    zones = random_zones(rng, 6, False, 1500.0)
+    return zones, np.array([random_point(rng, zones, 1500.0) for _ in range(30)])
+
+
+def around(points, zones):
+    return Distances(points, zones, clearance=CLEARANCE)
+
+
+def test_without_zones_lengths_are_straight(scene):
+    points = scene[1]
+    expected = np.linalg.norm(points[:, None] - points[None], axis=2)
+    found = Distances(points)
+    assert square(found.pairs, 30) == pytest.approx(expected)
+    assert found.leg(0, 1).via == ()
+
+
+def test_a_kernel_gets_what_detour_gives(scene):
+    zones, points = scene
+    found = square(around(points, zones).pairs, 30)
+    for i, j in ((0, 1), (4, 7), (9, 2), (20, 21)):
+        assert found[i, j] == detour(points[i], points[j], zones, clearance=CLEARANCE)[0]
+    assert np.array_equal(found, found.T)
+    assert np.all(np.diag(found) == 0)
+
+
+def test_a_leg_has_the_length_that_the_kernel_knows(scene):
+    zones, points = scene
+    found = around(points, zones)
+    for i in range(10):
+        leg = found.leg(i, 29 - i)
+        assert leg.length == found.length(i, 29 - i)
+        line = np.array([points[i], *leg.via, points[29 - i]])
+        assert np.linalg.norm(np.diff(line, axis=0), axis=1).sum() == pytest.approx(leg.length)
+
+
+def test_a_point_inside_a_zone_can_be_left_but_not_reached():
+    zone = ThreatZone.cylinder('z', (0, 0), 50)
+    found = Distances([(10, 0, 5), (300, 0, 5)], [zone])
+    assert found.length(0, 1) == pytest.approx(290, abs=0.5)
+    assert found.length(1, 0) == math.inf
+    assert found.leg(0, 1).via[0][0] == pytest.approx(50, abs=0.1)
+    assert found.leg(1, 0) == distances.Leg((), math.inf)
+    assert (found.zones_around(0), found.zones_around(1)) == (('z',), ())
+
+
+def test_new_moved_and_vanished_zones_touch_only_the_ways_they_cut(scene):
+    zones, points = scene
+    before = around(points, zones)
+    square(before.pairs, 30)
+    other = random_zones(np.random.default_rng(8), 2, False, 1500.0)
+    for change in ([*zones, other[0]], zones[1:], [other[1], *zones[2:]]):
+        after = before.updated(zones=change)
+        kept = np.isfinite(after._table.cells).sum()
+        assert 0 < kept < 900
+        assert square(after.pairs, 30) == pytest.approx(
+            square(around(points, change).pairs, 30), rel=1e-9)
+    assert square(before.pairs, 30) == pytest.approx(
+        square(around(points, zones).pairs, 30))
+
+
+def test_new_points_in_any_order_keep_what_is_known(scene):
+    zones, points = scene
+    before = around(points, zones)
+    known = square(before.pairs, 30)
+    rng = np.random.default_rng(5)
+    fresh = np.array([random_point(rng, zones, 1500.0) for _ in range(200)])
+    for more in (fresh[:1], fresh):
+        after = before.updated(points=np.vstack([points[20:], more, points[:10]]))
+        tail = len(after.points) - 10
+        assert after.length(0, tail) == known[20, 0]
+        assert after.length(10, 0) == around(np.vstack([more, points[20:21]]), zones).length(
+            0, len(more))
+    assert np.array_equal(square(before.pairs, 30), known)
+
+
+def test_zones_may_come_to_none_and_go_to_none(scene):
+    zones, points = scene
+    empty = Distances(points, clearance=CLEARANCE)
+    assert np.array_equal(square(empty.updated(zones=zones).pairs, 30),
+                          square(around(points, zones).pairs, 30))
+    assert np.array_equal(square(around(points, zones).updated(zones=()).pairs, 30),
+                          square(empty.pairs, 30))
+
+
+def test_beyond_the_table_a_cache_answers_the_same(scene, monkeypatch):
+    zones, points = scene
+    dense = square(around(points, zones).pairs, 30)
+    monkeypatch.setattr(distances, 'DENSE_MAX', 10)
+    cached = around(points, zones)
+    assert np.array_equal(square(cached.pairs, 30), dense)
+    assert np.array_equal(square(cached.pairs, 30), dense)
+
+
+def test_ensured_pairs_are_known_at_once(scene):
+    zones, points = scene
+    found = around(points, zones)
+    found.ensure([0, 1], [5, 6])
+    assert np.isfinite(found._table.cells).sum() == 4
+
+
+def test_a_point_that_is_no_number_is_refused():
+    with pytest.raises(InvalidValue, match=r'points = .*expected finite coordinates'):
+        Distances([(0, 0, math.nan)])
