@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import threading
-from dataclasses import replace
 
 from uav_task_alloc.solver.colony import Colony, Habits
 from uav_task_alloc.solver.recorder import Recorder
@@ -56,8 +55,3 @@ def _live(colony: Colony, recorder: Recorder) -> None:
         if flown and not fixed:
             rounds = max(4, min(100_000, int(rounds * min(2.0, aim / max(1e-6, now - since)))))
         since = now
-
-
-def frozen(recorder: Recorder, seed: int, learnt: object = None) -> object:
-    """The same without learning, for the ablation."""
-    return solve(recorder, seed, learnt, replace(COLD_START, learning=False))

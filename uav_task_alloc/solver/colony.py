@@ -28,7 +28,8 @@ class Habits:
     onlookers: float = 0.2
     scouts: float = 0.01
     strain: float = 10.0  # [m/m] what a metre beyond range costs at first
-    learning: bool = True
+    learning: bool = True  # False: Q stays as it is
+    bids: bool = True  # False: kinds keep their first shares
 
 
 class Colony:
@@ -71,7 +72,7 @@ class Colony:
         else:
             self._search(self.routes, h.many, hot, cold, rounds)
         gain = before - of.cost(self.arrays, self.best)
-        self._bids.pay(kind, costs[kind], max(0.0, gain))
+        self._bids.pay(kind, costs[kind], max(0.0, gain) if h.bids else 0.0)
         return 0 if kind == 'scout' else rounds
 
     def _search(self, routes: Routes, mean: float, hot: float, cold: float, rounds: int) -> int:

@@ -2,8 +2,10 @@
 """The same problem for PyVRP and OR-Tools: open routes from many starts, a range each."""
 from __future__ import annotations
 
+import importlib.util
 import time
 from collections.abc import Sequence
+from importlib import import_module
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +23,8 @@ def matrix(instance: Instance) -> NDArray[np.int64]:
                        *(t.position for t in instance.tasks)])
     ways = np.sqrt(((points[:, None] - points[None]) ** 2).sum(axis=2))
     ways[:, m] = ways[m, :] = 0.0
-    return np.ceil(UNIT * ways).astype(np.int64)
+    counted: NDArray[np.int64] = np.ceil(UNIT * ways).astype(np.int64)
+    return counted
 
 
 class CpuTime:
@@ -39,9 +42,9 @@ class CpuTime:
         return spent >= self.seconds
 
 
-def pyvrp(instance: Instance, seconds: float, seed: int = 0) -> Found:
+def pyvrp(instance: Instance, seconds: float) -> Found:
     """What PyVRP finds within `seconds` of CPU time, which begins with the model at hand."""
-    import pyvrp as rival
+    rival = import_module('pyvrp')
     ways, m = matrix(instance), len(instance.uavs)
     places = [*(u.position for u in instance.uavs), (0.0, 0.0, 0.0),
               *(t.position for t in instance.tasks)]
@@ -53,16 +56,17 @@ def pyvrp(instance: Instance, seconds: float, seed: int = 0) -> Found:
          for u, uav in enumerate(instance.uavs)],
         [ways], [np.zeros_like(ways)])
     stop = CpuTime(seconds)
-    rival.solve(data, stop=stop, seed=seed, collect_stats=False, display=False)
+    rival.solve(data, stop=stop, seed=0, collect_stats=False, display=False)
     return stop.found
 
 
 def ortools(instance: Instance, seconds: float) -> Found:
     """What OR-Tools' guided local search finds within `seconds`."""
-    from ortools.constraint_solver import pywrapcp, routing_enums_pb2 as enums
+    solver = import_module('ortools.constraint_solver.pywrapcp')
+    enums = import_module('ortools.constraint_solver.routing_enums_pb2')
     ways, m = matrix(instance), len(instance.uavs)
-    index = pywrapcp.RoutingIndexManager(len(ways), m, list(range(m)), [m] * m)
-    routing = pywrapcp.RoutingModel(index)
+    index = solver.RoutingIndexManager(len(ways), m, list(range(m)), [m] * m)
+    routing = solver.RoutingModel(index)
     transit = routing.RegisterTransitMatrix(ways.tolist())
     routing.SetArcCostEvaluatorOfAllVehicles(transit)
     routing.AddDimensionWithVehicleCapacity(
@@ -76,12 +80,22 @@ def ortools(instance: Instance, seconds: float) -> Found:
             found.append((time.process_time() - began, length))
 
     routing.AddAtSolutionCallback(note)
-    options = pywrapcp.DefaultRoutingSearchParameters()
+    options = solver.DefaultRoutingSearchParameters()
     options.first_solution_strategy = enums.FirstSolutionStrategy.PARALLEL_CHEAPEST_INSERTION
     options.local_search_metaheuristic = enums.LocalSearchMetaheuristic.GUIDED_LOCAL_SEARCH
     options.time_limit.FromMilliseconds(int(1000 * seconds))
     routing.SolveWithParameters(options)
     return found
+
+
+def installed() -> list[str]:
+    """The rivals that are here to be compared with."""
+    return [name for name in ('pyvrp', 'ortools') if importlib.util.find_spec(name)]
+
+
+def run(name: str, instance: Instance, seconds: float) -> Found:
+    """What the named rival finds."""
+    return {'pyvrp': pyvrp, 'ortools': ortools}[name](instance, seconds)
 
 
 def at(found: Sequence[tuple[float, float]], seconds: float) -> float:
