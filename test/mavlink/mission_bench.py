@@ -8,10 +8,11 @@ from uav_task_alloc.geometry.frames import Origin
 from uav_task_alloc.mavlink.codec import Codec
 from uav_task_alloc.mavlink.ground import Ground, Station
 from uav_task_alloc.mavlink.peer import Peer
-from uav_task_alloc.mavlink.pilot import Policy
+from uav_task_alloc.mavlink.policy import Policy
 from uav_task_alloc.mavlink.profiles import ARDUPILOT, PX4
 from uav_task_alloc.mavlink.status import state_of
-from uav_task_alloc.mavlink.upload import Mission, Upload
+from uav_task_alloc.mavlink.transfer import Mission
+from uav_task_alloc.mavlink.upload import Upload
 from uav_task_alloc.mavlink.vehicle import AUTOPILOTS, Vehicle
 from uav_task_alloc.mavlink.vehicle_config import VehicleConfig
 from uav_task_alloc.mission import Stop, TaskList, home_item, mission_items

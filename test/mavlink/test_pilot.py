@@ -212,16 +212,20 @@ def test_fault_21_what_we_jump_over_is_not_completed(kind):
     assert bench.run(lambda: bench.completed())
     assert bench.completed() == ['C']
     assert places(bench) == ['C']
-    assert bench.board().upload.uploads == 1
 
 
-def test_fault_22_the_same_items_from_another_one_on_need_set_current_only():
-    bench = flying('px4', 'ABC')
-    bench.assign(task_list('BC', 2))
-    assert bench.run(lambda: bench.board().revision == 2)
-    assert bench.line.sent('MISSION_SET_CURRENT')[0].seq == 1
+@BOTH
+def test_fault_22_the_same_list_from_another_item_on_needs_set_current_only(kind):
+    bench = FlightBench(kind, takeoff=False).found()
+    bench.assign(task_list('ABC'))
+    assert bench.run(lambda: bench.board().revision == 1, 10.0)
+    bench.tells(d.MAVLink_mission_set_current_message(1, 1, bench.board().own + 2))
+    bench.run(limit=5.0)
+    bench.pilot().policy = dataclasses.replace(bench.pilot().policy, takeoff=True)
+    bench.assign(task_list('ABC', 2))
+    assert bench.run(lambda: bench.completed() == ['A', 'B', 'C'])
     assert bench.board().upload.uploads == 1
-    assert bench.run(lambda: bench.completed() == ['B', 'C'])
+    assert places(bench) == ['A', 'B', 'C']
 
 
 @BOTH
@@ -304,13 +308,20 @@ def test_after_an_empty_list_a_new_one_is_flown(kind):
 
 
 @BOTH
-def test_fault_28_an_unanswered_set_current_command_falls_back(kind):
-    bench = flying(kind, 'ABC')
-    bench.line.tampers.append(lambda way, m, now: [] if (
-        m.get_type() == 'COMMAND_LONG' and m.command == 224) else None)
-    bench.assign(task_list('C', 2))
-    assert bench.run(lambda: bench.completed() == ['C'])
-    assert bench.line.sent('MISSION_SET_CURRENT')
+@pytest.mark.parametrize('answer', ['none', 'unsupported'])
+def test_fault_28_set_current_falls_back_to_the_old_way(kind, answer):
+    bench = FlightBench(kind).found()
+
+    def refuse(way, m, now):
+        if m.get_type() != 'COMMAND_LONG' or m.command != d.MAV_CMD_DO_SET_MISSION_CURRENT:
+            return None
+        if answer == 'unsupported':
+            bench.says(d.MAVLink_command_ack_message(m.command, 3))
+        return []
+    bench.line.tampers.append(refuse)
+    bench.assign(task_list('ABC'))
+    assert bench.run(lambda: bench.completed() == ['A', 'B', 'C'])
+    assert bool(bench.line.sent('MISSION_SET_CURRENT')) == (kind == 'ardupilot')
 
 
 @BOTH
@@ -413,7 +424,22 @@ def test_a_killed_bridge_finds_what_each_vehicle_holds_and_flies_no_task_twice(k
     bench.assign(task_list(rest, 5))
     assert bench.run(lambda: len(bench.completed()) == len(rest))
     assert before + bench.completed() == list('ABCDE') == places(bench)
-    assert len([m for m in bench.line.sent('MISSION_COUNT')]) == counts  # nothing differed
+    assert len(bench.line.sent('MISSION_COUNT')) == counts  # nothing differed
+
+
+@BOTH
+def test_a_task_flown_while_the_bridge_was_dead_is_completed_under_a_new_list(kind):
+    bench = flying(kind, 'ABCDE')
+    assert bench.run(lambda: bench.completed() == ['A'])
+    bench.line.cut = True
+    bench.run(lambda: len(bench.flown()) == 3)
+    bench.line.cut = False
+    bench.start()
+    bench.found()
+    bench.assign(task_list('EDCB', 2))
+    assert bench.run(lambda: len(bench.completed()) == 4)
+    assert bench.completed() == ['C', 'B', 'E', 'D']
+    assert places(bench) == list('ABCED')
 
 
 @BOTH

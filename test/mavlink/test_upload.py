@@ -6,7 +6,8 @@ from pymavlink.dialects.v20 import ardupilotmega as d
 
 from uav_task_alloc.errors import MissionError
 from uav_task_alloc.mavlink import upload as machine
-from uav_task_alloc.mavlink.upload import Failed, Mission, State, Verified
+from uav_task_alloc.mavlink.transfer import Failed, Mission, Verified
+from uav_task_alloc.mavlink.upload import State
 
 BOTH = pytest.mark.parametrize('kind', ['ardupilot', 'px4'])
 

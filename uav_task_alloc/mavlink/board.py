@@ -2,10 +2,13 @@
 """What one vehicle has on board against what it should have: the list, the mission, its state."""
 from __future__ import annotations
 
+import math
 import random
 from collections import deque
 from dataclasses import dataclass, replace
 from enum import Enum
+
+from pymavlink.dialects.v20 import ardupilotmega as d
 
 from uav_task_alloc.errors import MissionError
 from uav_task_alloc.geometry.frames import Origin
@@ -13,17 +16,21 @@ from uav_task_alloc.mavlink.change import Change, Kind, change
 from uav_task_alloc.mavlink.codec import Message, plan_id
 from uav_task_alloc.mavlink.helm import Note
 from uav_task_alloc.mavlink.peer import NO_SPACE, Peer
-from uav_task_alloc.mavlink.profiles import Profile
+from uav_task_alloc.mavlink.profiles import Flight, Profile
 from uav_task_alloc.mavlink.progress import ProgressTable
 from uav_task_alloc.mavlink.telemetry import Telemetry
-from uav_task_alloc.mavlink.upload import Accepted, Failed, Held, Mission, Upload, Verified
+from uav_task_alloc.mavlink.transfer import Accepted, Failed, Held, Mission, Verified
+from uav_task_alloc.mavlink.upload import Upload
 from uav_task_alloc.mission import (
     Item,
     TaskList,
+    alike,
     all_alike,
     home_item,
     mission_items,
 )
+
+NEAR = 15.0  # [m] from a point, beyond its radius: there
 
 
 class MissionState(Enum):
@@ -60,6 +67,7 @@ class Board:
         self.trouble = False  # the last transfer failed; somebody decides when to try again
         self.verified_at = 0.0  # [s]
         self.read_once = False  # since the vehicle was first heard or restarted
+        self.caught_up = False  # with what was flown before
         self.must_jump: int | None = None  # the item to fly now, where the upload did not say it
         self._profile, self._origin, self._telemetry = profile, origin, telemetry
         self._refused: set[str] = set()
@@ -156,15 +164,37 @@ class Board:
         self.upload.reset()
         self.progress.invalidate()
         self.held, self._uploading, self._state = None, None, MissionState.UNKNOWN
-        self.read_once = False
-
-    def foreign(self) -> None:
-        """Somebody else's mission is on board."""
-        self._state = MissionState.FOREIGN
+        self.read_once = self.caught_up = False
 
     def doubt(self) -> None:
         """Read what is on board before anything else."""
         self.held = None
+
+    def catch_up(self, now: float) -> None:
+        """Complete, once, what the vehicle has flown before anybody listened."""
+        held, telemetry = self.held, self._telemetry
+        if self.caught_up or not held or telemetry.current is None:
+            self.caught_up = self.caught_up or not held
+            return
+        self.caught_up = True
+        if not self._profile.atomic and telemetry.flight is not Flight.MISSION:
+            self.progress.begin(held, None, now)  # held for a swap: current is of the old items
+            return
+        wanted = self.wanted()
+        current = min(max(0, telemetry.current - self.own), len(held))
+        flown = held if self._ended(held, wanted, current) else held[:current]
+        self.progress.begin(held, len(flown), now)
+        self.progress.caught_up(item.task for item in wanted if item.completes and any(
+            alike(item, other) for other in flown))
+
+    def _ended(self, held: tuple[Item, ...], wanted: tuple[Item, ...], current: int) -> bool:
+        telemetry = self._telemetry
+        if telemetry.mission_state == d.MISSION_STATE_COMPLETE:
+            return True
+        last = next((item for item in wanted if alike(item, held[-1])), None)
+        return (self._profile.atomic and telemetry.airborne and telemetry.flight is Flight.HOLD
+                and current == len(held) - 1 and last is not None and last.position is not None
+                and math.dist(telemetry.position, last.position) < last.radius + NEAR)
 
     def infeasible(self, reason: str) -> None:
         """The vehicle stores the mission, and will not fly it."""

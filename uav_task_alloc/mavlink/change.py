@@ -32,6 +32,7 @@ def change(held: tuple[Item, ...], current: int | None, wanted: tuple[Item, ...]
 
     `wanted` begins with the way to its first task. Detour points of it that have been flown are
     not flown again; those that have not are, even where the vehicle is beyond: a zone is there.
+    No jump leaves out a task: after a restart of the bridge, what lies behind has been flown.
     """
     if not wanted:
         raise ValueError('wanted items = (): expected at least one')
@@ -41,7 +42,8 @@ def change(held: tuple[Item, ...], current: int | None, wanted: tuple[Item, ...]
         if passed is not None and rest and all_alike(wanted[passed:], rest):
             return Change(Kind.KEEP, _retag(held, current, wanted[passed:]), current)
     start = len(held) - len(wanted)
-    if start >= 0 and all_alike(wanted, held[start:]):
+    if start >= 0 and all_alike(wanted, held[start:]) and not any(
+            item.completes for item in held[current or 0:start]):
         return Change(Kind.JUMP, _retag(held, start, wanted), start)
     if current is not None and rest and passed is not None:
         ahead = wanted[passed:]

@@ -12,7 +12,8 @@ from uav_task_alloc.errors import UnknownName
 from uav_task_alloc.geometry.frames import Origin
 from uav_task_alloc.mavlink.codec import Message
 from uav_task_alloc.mavlink.peer import Peer
-from uav_task_alloc.mavlink.pilot import Pilot, Policy
+from uav_task_alloc.mavlink.pilot import Pilot
+from uav_task_alloc.mavlink.policy import Policy
 from uav_task_alloc.mavlink.profiles import profile_of
 from uav_task_alloc.mission import TaskList
 

@@ -23,6 +23,7 @@ class Link(Protocol):
 
     name: str
     datagrams: bool  # each read is whole
+    opened: int  # how often; a new file may have the number of the old one
 
     def fileno(self) -> int: ...
 
@@ -44,7 +45,7 @@ class Link(Protocol):
 class Udp:
     """udpin learns its far ends by hearing them, udpout has one from the start."""
 
-    datagrams = True
+    datagrams, opened = True, 1
 
     def __init__(self, name: str, host: str, port: int, bind: bool) -> None:
         self.name = name
@@ -100,7 +101,7 @@ class Stream:
     datagrams = False
 
     def __init__(self, name: str) -> None:
-        self.name = name
+        self.name, self.opened = name, 0
         self._file = -1
         self._waiting = bytearray()
         self._try_at = float('-inf')
@@ -133,6 +134,7 @@ class Stream:
             self._try_at = now + RECONNECT
             try:
                 self._file = self._open()
+                self.opened += 1
             except OSError:
                 self._file = -1
         elif self._waiting:

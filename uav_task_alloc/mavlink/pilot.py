@@ -9,16 +9,16 @@ from __future__ import annotations
 import math
 import random
 from collections import deque
-from dataclasses import dataclass
 
 from pymavlink.dialects.v20 import ardupilotmega as d
 
 from uav_task_alloc.geometry.frames import Origin
-from uav_task_alloc.mavlink.board import Board, MissionState
+from uav_task_alloc.mavlink.board import NEAR, Board, MissionState
 from uav_task_alloc.mavlink.change import Change, Kind
 from uav_task_alloc.mavlink.codec import Message, plan_id
 from uav_task_alloc.mavlink.helm import Helm, Note, Step
 from uav_task_alloc.mavlink.peer import Peer
+from uav_task_alloc.mavlink.policy import Policy, TaskProgress
 from uav_task_alloc.mavlink.profiles import Flight, Profile
 from uav_task_alloc.mavlink.rates import Rates
 from uav_task_alloc.mavlink.telemetry import Telemetry
@@ -28,27 +28,6 @@ from uav_task_alloc.mission import RETURN, TaskList, all_alike
 SETTLE = 3.0  # [s] in which messages sent before the last change may still come
 CHECK = 60.0  # [s] between readbacks of a mission that nobody should have changed
 SERVICE = 10.0  # [s] beyond its hold that a service is waited for
-NEAR = 15.0  # [m] from a point, beyond its radius: there
-
-
-@dataclass(frozen=True, slots=True)
-class Policy:
-    """What the operator wants of the bridge."""
-
-    takeoff: bool = False  # arm and take off
-    cruise_altitude: float = 50.0  # [m] above home, to take off to
-    when_empty: str = 'hold'  # or 'return': an empty list in flight
-    when_foreign: str = 'yield'  # or 'reassert': a mission that somebody else put there
-
-
-@dataclass(frozen=True, slots=True)
-class TaskProgress:
-    """STARTED, COMPLETED or FAILED, of a task on this UAV."""
-
-    task: str
-    event: str
-    revision: int
-    reason: str = ''
 
 
 class Pilot:
@@ -70,7 +49,8 @@ class Pilot:
         self._restarts = 0
         self._said = ''  # by the vehicle, last
         self._rules = (self._linked, self.helm.finish, self._upload, self._read, self._has_list,
-                       self._yield, self._empty, self._bring, self._rise, self._fly)
+                       self._yield, self._catch_up, self._empty, self._bring, self._rise,
+                       self._fly)
 
     def assign(self, tasks: TaskList, now: float) -> list[Message]:
         """The latest list for this UAV; an older one that comes late is ignored."""
@@ -217,6 +197,15 @@ class Pilot:
         self.yielding = False
         return None
 
+    def _catch_up(self, now: float) -> Step:
+        """After a restart of the bridge: what was flown meanwhile is completed, not repeated."""
+        board, telemetry = self.board, self.telemetry
+        if not board.caught_up and board.held and telemetry.airborne and (
+                telemetry.current is None):
+            return []  # what it flies is not known yet
+        board.catch_up(now)
+        return None
+
     def _empty(self, now: float) -> Step:
         """Nothing to fly: hold or return, and keep what is on board."""
         board, tasks, telemetry = self.board, self.board.remaining(), self.telemetry
@@ -243,11 +232,7 @@ class Pilot:
     def _bring(self, now: float) -> Step:
         """The list on board, by the cheapest way."""
         board, telemetry = self.board, self.telemetry
-        if telemetry.airborne and board.progress.current is None and board.held:
-            if telemetry.current is None:
-                return []  # what it flies is not known yet
-            board.progress.begin(board.held, max(0, telemetry.current - board.own), now)
-        found = self._caught_up(board.change(), now)
+        found = board.change()
         if found.kind is Kind.KEEP:
             board.adopt(found, now)
             return None
@@ -263,31 +248,6 @@ class Pilot:
             self.helm.must_start = True
             return self.helm.set_mode(Flight.HOLD, now)
         return board.begin_upload(found, now)
-
-    def _caught_up(self, found: Change, now: float) -> Change:
-        """After a restart of the bridge: what was flown meanwhile is completed, not repeated."""
-        board, current = self.board, self.board.progress.current
-        if board.read_once or found.kind not in (Kind.JUMP, Kind.KEEP) or current is None:
-            return found
-        start = len(found.items) - len(board.wanted())
-        flown = len(found.items) if self._ended(found) else current
-        if flown <= start:
-            return found
-        board.progress.begin(found.items, start, now)
-        board.progress.caught_up(flown)
-        board.held = found.items
-        if board.remaining().stops:
-            return board.change()
-        return Change(Kind.KEEP, found.items, len(found.items))
-
-    def _ended(self, found: Change) -> bool:
-        telemetry, last = self.telemetry, found.items[-1]
-        if telemetry.mission_state == d.MISSION_STATE_COMPLETE:
-            return True
-        return (self.profile.atomic and telemetry.airborne and telemetry.flight is Flight.HOLD
-                and self.board.progress.current == len(found.items) - 1
-                and last.position is not None
-                and math.dist(telemetry.position, last.position) < last.radius + NEAR)
 
     def _serving(self, now: float) -> bool:
         """An upload would start the hold of the task anew."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 from uav_task_alloc.mission import Item
@@ -113,13 +114,15 @@ class ProgressTable:
             if seq != start and (seq < start or now - when < SETTLE):
                 return  # sent before we set it
             self._jump = None
-        if self.current is not None and self.current < seq <= len(self.items):
+        if self._started is None and seq < len(self.items):
+            self.current = seq  # somebody sets it; nothing is flown
+        elif self.current is not None and self.current < seq <= len(self.items):
             self._pass(seq)
 
-    def caught_up(self, seq: int) -> None:
-        """What was flown while nobody listened: items before seq."""
-        self._jump = None
-        self._pass(seq)
+    def caught_up(self, tasks: Iterable[str]) -> None:
+        """These were flown while nobody listened."""
+        for task in tasks:
+            self._complete(task)
 
     def ended(self) -> None:
         """The vehicle says that the whole mission is flown."""
@@ -129,10 +132,14 @@ class ProgressTable:
     def _pass(self, seq: int) -> None:
         assert self.current is not None or seq > 0
         for item in self.items[self.current if self.current is not None else seq - 1:seq]:
-            if item.completes and item.task not in self.completed:
-                self.completed[item.task] = None
-                self.events.append(Progress(item.task, completed=True))
+            if item.completes:
+                self._complete(item.task)
         self.current = seq
+
+    def _complete(self, task: str) -> None:
+        if task not in self.completed:
+            self.completed[task] = None
+            self.events.append(Progress(task, completed=True))
 
     def _is_echo(self, seq: int, now: float) -> bool:
         """A repetition from the epoch before, unless the new item is being reached as well."""

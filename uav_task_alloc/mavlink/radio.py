@@ -40,7 +40,7 @@ class Radio:
         self._parsers: dict[Address, Codec] = {}
         self._lock = threading.Lock()  # held for the time of a pack and a non-blocking write
         self._selector = selectors.DefaultSelector()
-        self._watched: dict[int, int] = {}  # link -> its file
+        self._watched: dict[int, tuple[int, int]] = {}  # link -> its file, how often opened
 
     def _load_signing(self, key_file: str) -> Signing | None:
         if not key_file:
@@ -98,13 +98,15 @@ class Radio:
 
     def _watch(self) -> None:
         for number, link in enumerate(self.links):
-            file, old = link.fileno(), self._watched.get(number, -1)
-            if file != old:
-                if old >= 0:
-                    self._selector.unregister(old)
-                if file >= 0:
-                    self._selector.register(file, selectors.EVENT_READ, number)
-                self._watched[number] = file
+            file, opened = link.fileno(), link.opened
+            old, was_opened = self._watched.get(number, (-1, 0))
+            if (file, opened) == (old, was_opened):
+                continue
+            if old >= 0:
+                self._selector.unregister(old)
+            if file >= 0:
+                self._selector.register(file, selectors.EVENT_READ, number)
+            self._watched[number] = file, opened
 
     def _parse(self, address: Address, data: bytes) -> list[tuple[Address, Message]]:
         parser = self._parsers.get(address)

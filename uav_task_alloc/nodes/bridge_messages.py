@@ -11,7 +11,7 @@ from uav_task_alloc_msgs import msg as m
 
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.geometry.frames import Origin
-from uav_task_alloc.mavlink.pilot import TaskProgress
+from uav_task_alloc.mavlink.policy import TaskProgress
 from uav_task_alloc.mavlink.status import UavStatus
 from uav_task_alloc.mission import Stop, TaskList
 from uav_task_alloc.model import check_point

@@ -14,7 +14,7 @@ from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.geometry.frames import Origin
 from uav_task_alloc.mavlink.ground import Ground, Served, Station
 from uav_task_alloc.mavlink.link import open_link
-from uav_task_alloc.mavlink.pilot import Policy
+from uav_task_alloc.mavlink.policy import Policy
 from uav_task_alloc.mavlink.radio import Heartbeat, Radio
 from uav_task_alloc.mavlink.status import UavStatus, facts_of, state_of
 from uav_task_alloc.nodes import bridge_messages as convert

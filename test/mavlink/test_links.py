@@ -1,0 +1,293 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Links and the radio on real sockets: who hears what, signing, recording, the heartbeat."""
+import os
+import socket
+import struct
+import threading
+
+import pytest
+from mission_bench import ORIGIN
+from pymavlink.dialects.v20 import ardupilotmega as d
+
+from uav_task_alloc.errors import InvalidValue
+from uav_task_alloc.mavlink.codec import Codec, make_signing
+from uav_task_alloc.mavlink.ground import Ground, Station
+from uav_task_alloc.mavlink.link import Serial, open_link
+from uav_task_alloc.mavlink.radio import Heartbeat, Radio, read_key
+
+WALL = 1.8e9  # [s]
+KEY = bytes(range(32))
+
+
+def heartbeat(autopilot=d.MAV_AUTOPILOT_PX4):
+    return d.MAVLink_heartbeat_message(d.MAV_TYPE_QUADROTOR, autopilot, 0, 0, 4, 3)
+
+
+class End:
+    """A far end on UDP."""
+
+    def __init__(self, radio, system=1, signing=None):
+        self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self.socket.bind(('127.0.0.1', 0))
+        self.socket.settimeout(5.0)
+        self.codec = Codec(system, 1, signing=signing)
+        self.to = ('127.0.0.1', radio.links[0].port)
+
+    def say(self, message):
+        frame = self.codec.pack(message)
+        self.socket.sendto(frame, self.to)
+        return frame
+
+    def hear(self):
+        return self.codec.parse(self.socket.recv(65536))
+
+
+@pytest.fixture
+def radio():
+    made = []
+
+    def make(*names, **kwargs):
+        made.append(Radio([open_link(n) for n in names or ['udpin:127.0.0.1:0']], 245, 190,
+                          wall=lambda: WALL, **kwargs))
+        return made[-1]
+    yield make
+    for one in made:
+        one.close()
+
+
+@pytest.fixture
+def far():
+    """far(radio, system) -> End; closed at the end."""
+    made = []
+
+    def make(*args):
+        made.append(End(*args))
+        return made[-1]
+    yield make
+    for one in made:
+        one.socket.close()
+
+
+def receive(radio, count=1):
+    got = []
+    for _ in range(100):
+        got += radio.receive(0.1)
+        if len(got) >= count:
+            break
+    return got
+
+
+def nothing(radio):
+    return radio.receive(0.05) == []
+
+
+def test_an_answer_goes_only_where_the_system_was_heard(radio, far):
+    radio = radio()
+    one, two = far(radio, 1), far(radio, 2)
+    for end in (one, two):
+        end.say(heartbeat())
+    by_system = {m.get_srcSystem(): a for a, m in receive(radio, 2)}
+    radio.send([(by_system[2], d.MAVLink_mission_request_list_message(2, 1, 0))])
+    assert two.hear()[0].target_system == 2
+    one.socket.setblocking(False)
+    with pytest.raises(BlockingIOError):
+        one.hear()
+
+
+def test_a_damaged_datagram_does_not_spoil_the_next(radio, far):
+    radio = radio()
+    end = far(radio)
+    frame = end.codec.pack(heartbeat())
+    end.socket.sendto(frame[:7], end.to)
+    end.say(heartbeat())
+    assert [m.get_type() for _, m in receive(radio)] == ['HEARTBEAT']
+
+
+def test_two_bridges_cannot_bind_the_same_port(radio):
+    first = radio()
+    with pytest.raises(InvalidValue, match='expected a free port'):
+        open_link(f'udpin:127.0.0.1:{first.links[0].port}')
+
+
+@pytest.mark.parametrize('name', ['', 'udpin', 'udpin:host', 'udp:127.0.0.1:1', 'udpin:h:port',
+                                  'tcp:127.0.0.1:70000', '/dev/ttyUSB0', '/dev/ttyUSB0:12345'])
+def test_a_link_that_is_none_is_refused_in_words(name):
+    with pytest.raises(InvalidValue, match='connections = '):
+        open_link(name)
+
+
+def test_udpout_speaks_first(radio):
+    far = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    far.bind(('127.0.0.1', 0))
+    far.settimeout(5.0)
+    out = radio(f'udpout:127.0.0.1:{far.getsockname()[1]}')
+    out.send_to_all(heartbeat())
+    data, address = far.recvfrom(1000)
+    assert Codec(1, 1).parse(data)[0].get_srcSystem() == 245
+    far.sendto(Codec(1, 1).pack(heartbeat()), address)
+    assert receive(out)[0][1].get_srcSystem() == 1
+    far.close()
+
+
+def test_tcp_connects_again_after_the_line_broke(radio):
+    server = socket.create_server(('127.0.0.1', 0))
+    server.settimeout(5.0)
+    line = radio(f'tcp:127.0.0.1:{server.getsockname()[1]}')
+    for now in (0.0, 10.0):
+        line.step(now)
+        far, _ = server.accept()
+        frame = Codec(1, 1).pack(heartbeat())
+        far.sendall(frame[:5])
+        assert nothing(line)
+        far.sendall(frame[5:])
+        assert len(receive(line)) == 1
+        line.send_to_all(heartbeat())
+        far.settimeout(5.0)
+        assert Codec(1, 1).parse(far.recv(1000))
+        far.close()
+        assert nothing(line)
+        assert line.links[0].fileno() == -1
+    server.close()
+
+
+def test_a_refused_tcp_connection_is_tried_again_and_harms_nothing(radio):
+    line = radio('tcp:127.0.0.1:1')
+    for now in range(3):
+        line.step(float(now))
+        assert nothing(line)
+
+
+def test_a_serial_line_carries_frames(radio):
+    master, slave = os.openpty()
+    line = radio(f'{os.ttyname(slave)}:57600')
+    line.step(0.0)
+    os.write(master, Codec(1, 1).pack(heartbeat()))
+    assert len(receive(line)) == 1
+    line.send_to_all(heartbeat())
+    assert Codec(1, 1).parse(os.read(master, 1000))[0].get_srcSystem() == 245
+    os.close(master)
+    os.close(slave)
+
+
+def test_a_full_line_drops_instead_of_blocking():
+    line = Serial('x', '/nowhere', 57600)
+    read, write = os.pipe()
+    os.set_blocking(write, False)
+    line._file = write
+    for _ in range(1000):
+        line.write('x', bytes(1000))
+    assert len(line._waiting) <= 65536
+    os.close(read)
+    line.close()
+
+
+@pytest.fixture
+def key_file(tmp_path):
+    path = tmp_path / 'key'
+    path.write_bytes(KEY)
+    return str(path)
+
+
+def test_fault_30_only_frames_signed_with_the_key_are_heard(radio, key_file, far):
+    radio = radio(signing_key_file=key_file)
+    stamp = int((WALL - 1420070400) * 1e5)
+    good = far(radio, 1, make_signing(KEY, stamp + 10))
+    frame = good.say(heartbeat())
+    assert len(receive(radio)) == 1
+    good.socket.sendto(frame, good.to)  # replayed, by the same sender
+    assert nothing(radio)
+    far(radio, 2).socket.sendto(frame, good.to)  # and by another
+    assert nothing(radio)
+    far(radio, 1).say(heartbeat())  # unsigned
+    assert nothing(radio)
+    far(radio, 1, make_signing(bytes(32), stamp + 10**6)).say(heartbeat())  # another key
+    assert nothing(radio)
+    good.say(heartbeat())  # the forger has not locked it out
+    assert len(receive(radio)) == 1
+    assert radio.errors() == 4
+
+
+def test_fault_30_the_timestamp_survives_a_restart(radio, key_file, tmp_path, far):
+    first = radio(signing_key_file=key_file)
+    end = far(first, 1, make_signing(KEY, 10**14))
+    end.say(heartbeat())
+    receive(first)
+    first.step(0.0)
+    kept = int((tmp_path / 'key.timestamp').read_text())
+    assert kept > 10**14
+    second = radio(signing_key_file=key_file)
+    assert second._signing.timestamp == kept
+
+
+@pytest.mark.parametrize(('content', 'key'), [
+    (KEY, KEY), (KEY.hex().encode() + b'\n', KEY),
+    (b'open sesame\n', b'\xa8\xf8'), ])
+def test_a_key_file_is_raw_hex_or_a_pass_phrase(tmp_path, content, key):
+    path = tmp_path / 'key'
+    path.write_bytes(content)
+    found = read_key(str(path))
+    assert len(found) == 32
+    assert found == key or content.startswith(b'open')
+
+
+def test_an_empty_key_file_is_refused(tmp_path):
+    (tmp_path / 'key').write_bytes(b'')
+    with pytest.raises(InvalidValue, match='not empty'):
+        read_key(str(tmp_path / 'key'))
+
+
+def test_a_tlog_holds_every_frame_both_ways_with_its_time(radio, tmp_path, far):
+    radio = radio(tlog=str(tmp_path / 'x.tlog'))
+    end = far(radio)
+    frames = [end.say(heartbeat()), end.say(d.MAVLink_attitude_message(1, 0, 0, 0, 0, 0, 0))]
+    receive(radio, 1)
+    receive(radio, 1)
+    radio.send_to_all(heartbeat())
+    frames.append(end.socket.recv(1000))
+    radio.close()
+    data = (tmp_path / 'x.tlog').read_bytes()
+    stamp = struct.pack('>Q', int(WALL * 1e6))
+    assert data == b''.join(stamp + f for f in frames)
+
+
+def test_fault_31_the_heart_beats_while_the_node_is_busy(radio, far):
+    radio = radio()
+    end = far(radio)
+    end.say(heartbeat())
+    receive(radio)
+    busy = threading.Lock()  # that of the node, held all the time
+    heart = Heartbeat(radio.send_to_all, period=0.02)
+    with busy:
+        heart.start()
+        beats = [end.hear()[0] for _ in range(10)]
+    heart.close()
+    assert {m.get_type() for m in beats} == {'HEARTBEAT'}
+    assert {m.get_srcSystem() for m in beats} == {245}
+
+
+def ground():
+    import random
+    return Ground(Station(origin=ORIGIN), random.Random(0))
+
+
+def heard(message, system=1, component=1):
+    return Codec(245, 190).parse(Codec(system, component).pack(message))[0]
+
+
+@pytest.mark.parametrize(('message', 'system', 'component'), [
+    (d.MAVLink_heartbeat_message(d.MAV_TYPE_GCS, 8, 0, 0, 4, 3), 255, 190),
+    (heartbeat(), 1, 154), (heartbeat(), 245, 1),
+    (d.MAVLink_heartbeat_message(d.MAV_TYPE_GIMBAL, 8, 0, 0, 4, 3), 1, 1)])
+def test_ground_stations_and_gimbals_are_no_uavs(message, system, component):
+    station = ground()
+    station.receive('a', heard(message, system, component), 0.0)
+    assert station.served == {}
+
+
+def test_the_same_system_from_another_address_is_a_stray_until_the_first_is_silent():
+    station = ground()
+    station.receive('a', heard(heartbeat()), 0.0)
+    station.receive('b', heard(heartbeat()), 1.0)
+    assert (station.served[1].address, station.served[1].strays) == ('a', 1)
+    station.receive('b', heard(heartbeat()), 5.0)
+    assert station.served[1].address == 'b'

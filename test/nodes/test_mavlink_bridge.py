@@ -1,0 +1,182 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The bridge as a process, between ROS topics and simulated vehicles on UDP."""
+import signal
+import socket
+import threading
+
+import pytest
+from diagnostic_msgs.msg import DiagnosticArray
+from uav_task_alloc_msgs import msg as m
+
+from uav_task_alloc.geometry.frames import Origin
+from uav_task_alloc.mavlink.fleet import Fleet
+from uav_task_alloc.mavlink.vehicle_config import VehicleConfig
+from uav_task_alloc.model import Leg, Task
+from uav_task_alloc.nodes.messages import EVENTS, LATCHED, STATES, header, planned_task
+
+pytestmark = pytest.mark.ros
+ORIGIN = Origin(47.397742, 8.545594, 488.0)
+KINDS = {1: 'ardupilot', 2: 'px4'}
+
+
+class Sky:
+    """Two fast vehicles, a bridge, and what it publishes."""
+
+    def __init__(self, start, probe, *args):
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
+            free.bind(('127.0.0.1', 0))
+            self.port = free.getsockname()[1]
+        self.probe, self._start, self._args = probe, start, args
+        self.fleet = Fleet([(VehicleConfig(f'uav_{n}', n, ORIGIN, (20.0 * n, 0.0, 0.0),
+                                           arming_delay=0.0, floods=False), kind)
+                            for n, kind in KINDS.items()], ('127.0.0.1', self.port), 10.0)
+        self.states, self.events = {}, []
+        probe.node.create_subscription(m.UavState, 'uav_states', self.on_state, STATES)
+        probe.node.create_subscription(m.TaskEvent, 'task_events', self.events.append, EVENTS)
+        self.lists = {n: probe.node.create_publisher(m.TaskList, f'uav_{n}/task_list', LATCHED)
+                      for n in KINDS}
+        self.thread = threading.Thread(target=self.fleet.spin)
+        self.thread.start()
+        self.bridge = self.again()
+
+    def again(self):
+        """A bridge, the first or the next."""
+        self.states.clear()
+        self.bridge = self._start(
+            'mavlink_bridge', '-p', f"connections:=['udpin:127.0.0.1:{self.port}']", '-p',
+            'takeoff:=true', *self._args)
+        self.probe.until(lambda: len(self.states) == len(KINDS))
+        return self.bridge
+
+    def on_state(self, msg):
+        self.states[msg.uav_id] = msg
+
+    def send(self, n, revision, names, **fields):
+        """Tasks 60 m from each other, each at the place of its name."""
+        tasks = [planned_task(Task(f'u{n}_{k}', (60.0 * k, 40.0 + 40.0 * n, 50.0)), Leg((), 60.0),
+                              0.0) for k in names]
+        self.lists[n].publish(m.TaskList(header=header(0.0), uav_id=f'uav_{n}',
+                                         revision=revision, tasks=tasks, **fields))
+
+    def completed(self, n):
+        return [e.task_id for e in self.events
+                if e.uav_id == f'uav_{n}' and e.event == m.TaskEvent.COMPLETED]
+
+    def flown(self, n):
+        """Tasks by the places the vehicle really reached, in order."""
+        return [f'u{n}_{round(e.point[0] / 60.0)}' for e in self.truth[n]
+                if e.name == 'item_reached']
+
+    def land(self):
+        """Stop the vehicles; what really happened is in `truth` then."""
+        self.fleet.stop()
+        self.thread.join()
+        self.truth = {n: self.fleet.vehicles[f'uav_{n}'].take_events() for n in KINDS}
+        self.fleet.close()
+
+
+@pytest.fixture
+def sky(start, probe):
+    made = []
+
+    def make(*args):
+        made.append(Sky(start, probe, *args))
+        return made[-1]
+    yield make
+    for one in made:
+        if one.thread.is_alive():
+            one.land()
+
+
+def test_lists_are_flown_and_replaced_in_flight_and_every_task_is_told_once(sky, probe):
+    world = sky()
+    for n in KINDS:
+        world.send(n, 1, [0, 1, 2, 3])
+    probe.until(lambda: all(world.completed(n) for n in KINDS))
+    for n in KINDS:
+        world.send(n, 2, [3, 5, 2])
+    probe.until(lambda: all(f'u{n}_2' in world.completed(n) for n in KINDS))
+    world.land()
+    for n in KINDS:
+        assert world.completed(n) == world.flown(n)
+        assert len(set(world.completed(n))) == len(world.completed(n))
+        assert world.completed(n)[-1] == f'u{n}_2'
+        state = world.states[f'uav_{n}']
+        assert state.list_revision == 2
+        assert state.mission_state == m.UavState.MISSION_VERIFIED
+
+
+@pytest.mark.parametrize('moment', ['upload', 'flight'])
+def test_a_bridge_killed_and_started_again_flies_no_task_twice(sky, probe, moment):
+    world = sky()
+    for n in KINDS:
+        world.send(n, 1, [0, 1, 2, 3, 4])
+    probe.until(lambda: all(f'u{n}_1' in world.completed(n) for n in KINDS))
+    if moment == 'upload':
+        for n in KINDS:
+            world.send(n, 2, [4, 3, 2])
+        probe.until(lambda: any(s.mission_state == m.UavState.MISSION_UPLOADING
+                                or s.list_revision == 2 for s in world.states.values()))
+    world.bridge.stop(signal.SIGKILL)
+    world.again()
+    probe.until(lambda: all({f'u{n}_{k}' for k in range(5)} <= set(world.completed(n))
+                            for n in KINDS), 60.0)
+    world.land()
+    for n in KINDS:
+        assert sorted(world.flown(n)) == [f'u{n}_{k}' for k in range(5)]
+        told = [t for t in world.completed(n) if world.completed(n).count(t) == 1]
+        assert set(told) >= {f'u{n}_{k}' for k in range(2, 5)}
+
+
+def test_states_carry_what_the_allocator_plans_with(sky, probe):
+    world = sky('-p', 'full_range:=20000.0', '-p', "capabilities:=['uav_1:camera,thermal']")
+    probe.until(lambda: world.states['uav_1'].home.x == pytest.approx(20.0, abs=0.1)
+                and world.states['uav_1'].battery > 0.9)
+    one, two = world.states['uav_1'], world.states['uav_2']
+    assert one.position.x == pytest.approx(20.0, abs=0.1)
+    assert one.range_remaining == pytest.approx(20000.0 * one.battery, rel=1e-3)
+    assert (list(one.capabilities), list(two.capabilities)) == (['camera', 'thermal'], [])
+    assert one.available
+    assert one.mode == m.UavState.MODE_STANDBY
+    assert one.cruise_speed != one.cruise_speed
+
+
+def test_a_bad_list_is_refused_in_words_and_changes_nothing(sky, probe):
+    world = sky()
+    world.send(1, 1, [0, 1])
+    probe.until(lambda: world.states['uav_1'].list_revision == 1)
+    bad = planned_task(Task('far', (0.0, 0.0, 50.0)), Leg((), 1.0), 0.0)
+    bad.task.position.x = float('nan')
+    world.lists[1].publish(m.TaskList(uav_id='uav_1', revision=2, tasks=[bad]))
+    probe.until(lambda: 'three finite coordinates' in world.bridge.output())
+    probe.until(lambda: world.completed(1) == ['u1_0', 'u1_1'])
+    assert world.states['uav_1'].list_revision == 1
+
+
+def test_diagnostics_name_each_uav_and_its_mission(sky, probe):
+    heard = probe.collect(DiagnosticArray, '/diagnostics', 10)
+    world = sky()
+    world.send(2, 1, [0, 1])
+    probe.until(lambda: any(s.hardware_id == 'uav_2' and 'VERIFIED' in s.message
+                            for array in heard for s in array.status))
+    details = {v.key: v.value for s in heard[-1].status if s.hardware_id == 'uav_2'
+               for v in s.values}
+    assert details['autopilot'] == 'px4'
+    assert details['mission'] == 'VERIFIED'
+
+
+@pytest.mark.parametrize(('given', 'text'), [
+    ("connections:=['udp:1']", "connections = 'udp:1': expected udpin:HOST:PORT"),
+    ("connections:=['udpin:127.0.0.1:x']", "'udpin:127.0.0.1:x': expected udpin:HOST:PORT"),
+    ('uav_id_pattern:=one', "uav_id_pattern = 'one': expected a text with {sysid}"),
+    ('uav_id_pattern:="{sysid}"', 'expected a ROS name'),
+    ('signing_key_file:=/nowhere', "signing_key_file = '/nowhere': expected a readable file"),
+    ("capabilities:=['camera']", "capabilities = 'camera': expected `UAV_ID:WORD,WORD`"),
+])
+def test_a_bad_parameter_is_refused_in_words(start, given, text):
+    process = start('mavlink_bridge', '-p', "connections:=['udpin:127.0.0.1:0']", '-p', given)
+    process.popen.wait(20)
+    code, out = process.stop()
+    assert code == 1, out
+    assert text in out
+    assert 'Traceback' not in out
