@@ -70,7 +70,7 @@ def _find_for_table(pairs: Pairs, i: int, j: int) -> float:
     caught = ints_at(ints_at(pairs.scene)[CAUGHT])
     if caught[i] != INSIDE and caught[j] != INSIDE:
         table[slot[j] * pairs.row + slot[i]] = found
-    return found
+    return float(found)
 
 
 @numba.njit(cache=True, nogil=True)
@@ -81,7 +81,7 @@ def _find_for_cache(pairs: Pairs, i: int, j: int) -> float:
     if keys[place] != key:
         answers[place] = pairs.find(pairs.scene, i, j)
         keys[place] = key
-    return answers[place]
+    return float(answers[place])
 
 
 @numba.njit(cache=True, nogil=True)
@@ -167,8 +167,9 @@ class Distances:
 
     def zones_around(self, i: int) -> tuple[str, ...]:
         """Ids of the enlarged zones that point i is inside of."""
-        return tuple(zone.id for k, zone in enumerate(self.zones)
-                     if contains(self._scene.zones[k], *self.points[i], True))
+        x, y, z = self._point(i)
+        return tuple(zone.id for zone, row in zip(self.zones, self._obstacles.rows, strict=True)
+                     if contains(row, x, y, z, True))
 
     def _point(self, i: int) -> Point:
         x, y, z = self.points[i]

@@ -30,15 +30,15 @@ def _depth(zone: Zone, x: float, y: float, z: float) -> float:
     ends = min(zone.high + skin - z, z - zone.low + skin)
     if zone.kind == DOME:
         inner = zone.radius + skin - math.sqrt(dx * dx + dy * dy + dz * dz)
-        return inner if ends > 0.0 else ends
+        return float(inner if ends > 0.0 else ends)
     if zone.kind == CYLINDER:
-        return min(ends, zone.radius + skin - math.hypot(dx, dy))
+        return float(min(ends, zone.radius + skin - math.hypot(dx, dy)))
     edge, n, c = np.inf, zone.count, floats_at(zone.corners)
     for i in range(n):
         j = (i + 1) % n
         edge = min(edge, off_segment(x, y, c[2 * i], c[2 * i + 1], c[2 * j], c[2 * j + 1]))
     edge = math.sqrt(edge) if in_polygon(zone, x, y) else -math.sqrt(edge)
-    return min(ends, edge + zone.grow + skin)
+    return float(min(ends, edge + zone.grow + skin))
 
 
 @numba.njit(cache=True, nogil=True)
@@ -115,4 +115,7 @@ def way_out(o: Zones, p: Floats, limits: Floats) -> Floats:
                 or _try(o, p, az, up - step, limits, best)):
             step *= 0.5
     t, c = best[0], math.cos(best[2])
-    return p + t * np.array([math.cos(best[1]) * c, math.sin(best[1]) * c, math.sin(best[2])])
+    out = np.array([math.cos(best[1]) * c, math.sin(best[1]) * c, math.sin(best[2])])
+    out *= t
+    out += p
+    return out

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from llvmlite import ir
+from llvmlite import ir  # type: ignore[import-untyped]
 from numba import types
 from numba.core.typing.templates import Signature
 from numba.extending import intrinsic
@@ -24,13 +24,13 @@ def cast(context: Any, builder: Any, signature: Signature, args: Any) -> Any:
 @intrinsic
 def _floats_at(typing_context: Any, address: int) -> tuple[Signature, Callable[..., Any]]:
     """The float64 values at an address."""
-    return types.CPointer(types.float64)(types.int64), cast
+    return types.CPointer(types.float64)(types.int64), cast  # type: ignore[no-untyped-call]
 
 
 @intrinsic
 def _ints_at(typing_context: Any, address: int) -> tuple[Signature, Callable[..., Any]]:
     """The int64 values at an address."""
-    return types.CPointer(types.int64)(types.int64), cast
+    return types.CPointer(types.int64)(types.int64), cast  # type: ignore[no-untyped-call]
 
 
 floats_at: Callable[[int], Any] = _floats_at  # type: ignore[assignment]

@@ -52,7 +52,8 @@ ZONE = np.dtype([
 @intrinsic
 def _zones_at(typing_context: Any, address: int) -> Any:
     """The rows of dtype ZONE at an address."""
-    return types.CPointer(numba.from_dtype(ZONE))(types.int64), cast
+    row = types.CPointer(numba.from_dtype(ZONE))  # type: ignore[no-untyped-call]
+    return row(types.int64), cast
 
 
 zones_at: Callable[[int], Any] = _zones_at  # type: ignore[assignment]
@@ -220,7 +221,7 @@ def _near_centre(zone: Zone, px: float, py: float, pz: float, dx: float, dy: flo
     if span > 0.0:
         u = min(t, max(s, -(fx * dx + fy * dy + fz * dz) / span))
     fx, fy, fz = fx + u * dx, fy + u * dy, fz + u * dz
-    return fx * fx + fy * fy + fz * fz
+    return float(fx * fx + fy * fy + fz * fz)
 
 
 @numba.njit(cache=True, nogil=True)
@@ -257,8 +258,8 @@ def blocked(zone: Zone, px: float, py: float, pz: float, qx: float, qy: float,
         return False
     if zone.kind == CYLINDER:
         reach = zone.radius + skin
-        return _near_centre(zone, px, py, zone.z, qx - px, qy - py, 0.0, s,
-                            t) < reach * reach
+        return bool(_near_centre(zone, px, py, zone.z, qx - px, qy - py, 0.0, s,
+                                 t) < reach * reach)
     dx, dy = qx - px, qy - py
     return _meets_polygon(zone, px + s * dx, py + s * dy, px + t * dx, py + t * dy,
                           zone.grow + skin)

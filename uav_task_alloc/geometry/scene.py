@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 
 import numba
 import numpy as np
+from numba import carray  # type: ignore[attr-defined]
 
 from uav_task_alloc.geometry.exits import way_out
 from uav_task_alloc.geometry.memory import floats_at, ints_at
@@ -64,9 +65,9 @@ def _scene_at(address: int) -> Scene:
     at = ints_at(address)
     n, k = at[0], at[1]
     return Scene(
-        numba.carray(floats_at(at[2]), (n, 3)), numba.carray(ints_at(at[3]), n),
-        numba.carray(floats_at(at[4]), (n, 3)), numba.carray(floats_at(at[5]), 2),
-        numba.carray(zones_at(at[6]), k))
+        carray(floats_at(at[2]), (n, 3)), carray(ints_at(at[3]), n),
+        carray(floats_at(at[4]), (n, 3)), carray(floats_at(at[5]), 2),
+        carray(zones_at(at[6]), k))
 
 
 def _find(address: int, i: int, j: int) -> float:

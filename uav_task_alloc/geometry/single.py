@@ -11,6 +11,7 @@ import math
 
 import numba
 import numpy as np
+from numba import carray  # type: ignore[attr-defined]
 
 from uav_task_alloc.geometry.memory import floats_at
 from uav_task_alloc.geometry.obstacles import CYLINDER, DOME, Floats, Zone
@@ -30,7 +31,7 @@ def _parts(radius: float, arc: float, straight: float) -> int:
 
 @numba.njit(cache=True, nogil=True)
 def _dot(u: Floats, v: Floats) -> float:
-    return u[0] * v[0] + u[1] * v[1] + u[2] * v[2]
+    return float(u[0] * v[0] + u[1] * v[1] + u[2] * v[2])
 
 
 @numba.njit(cache=True, nogil=True)
@@ -209,8 +210,8 @@ def past_one(zone: Zone, way: Floats, limits: Floats, floor: float,
         return n
     if floor < limits[0] or max(way[0, 2], way[1, 2]) > limits[1]:
         return 0
-    rim = numba.carray(floats_at(zone.rim), (zone.rims, 2))
-    hull = numba.carray(floats_at(zone.hull), (zone.hulls, 2))
+    rim = carray(floats_at(zone.rim), (zone.rims, 2))
+    hull = carray(floats_at(zone.hull), (zone.hulls, 2))
     if zone.dented and (_in_hull(hull, way[0]) or _in_hull(hull, way[1])):
         return 0
     trial, best = np.empty((zone.hulls + 3, 3)), 0

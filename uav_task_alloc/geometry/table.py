@@ -45,12 +45,12 @@ class Table:
     def _rebuild(self, wanted: list[tuple[float, ...]]) -> None:
         """A new square with the known places among the wanted; the old one is left as it is."""
         keep = [key for key in dict.fromkeys(wanted) if key in self._slots]
-        old = np.array([self._slots[key] for key in keep], np.int64)  # type: ignore[index]
+        old = np.array([self._slots[key] for key in keep], np.int64)
         other = Table(len(dict.fromkeys(wanted)))
         other.cells[:len(old), :len(old)] = self.cells[np.ix_(old, old)]
         other.places[:len(old)], other.used = self.places[old], len(old)
         self.cells, self.places, self.used = other.cells, other.places, other.used
-        self._slots = {key: s for s, key in enumerate(keep)}  # type: ignore[misc]
+        self._slots = {key: s for s, key in enumerate(keep)}
 
 
 @numba.njit(cache=True, nogil=True)
