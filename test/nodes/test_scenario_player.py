@@ -57,7 +57,7 @@ def test_everything_is_announced_in_order_at_its_time(start, probe, file):
 
 
 def test_the_clock_waits_for_an_allocator(start, probe, file):
-    player = start('scenario_player', '-p', f'scenario:={file}', '-p', 'speedup:=50.0')
+    player = start('scenario_player', '-p', f'scenario:={file}', '-p', 'speedup:=10.0')
     start('live_view')
     probe.until(lambda: 'waiting for an allocator' in player.output())
     probe.until(lambda: probe.node.count_subscribers('threat_zones') == 1)

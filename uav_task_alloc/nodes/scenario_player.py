@@ -16,6 +16,8 @@ from uav_task_alloc.nodes.run import run
 from uav_task_alloc.params import PlayerParams
 
 TICK = 0.02  # [s]
+# the second is what a node is called while its name is still on the way
+NO_ALLOCATOR = ('live_view', '_NODE_NAME_UNKNOWN_')
 
 
 class ScenarioPlayer(Node):
@@ -62,7 +64,7 @@ class ScenarioPlayer(Node):
 
     def listened(self, topic: str) -> bool:
         """Whether anybody who is not just watching has subscribed."""
-        return any(other.node_name != 'live_view'
+        return any(other.node_name not in NO_ALLOCATOR
                    for other in self.get_subscriptions_info_by_topic(topic))
 
     def play(self, moment: scenario.Moment) -> None:
