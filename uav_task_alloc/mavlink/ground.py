@@ -65,6 +65,7 @@ class Ground:
                 served.strays += 1
                 return []
             served.address = address
+            served.pilot.telemetry.restart()  # or another vehicle with the same id
         return self._sent(served, served.pilot.receive(message, now))
 
     def step(self, now: float) -> Outgoing:

@@ -51,7 +51,8 @@ class Telemetry:
         self.plan_id = 0  # PX4's id of the mission on board
         self.heard: set[int] = set()  # message ids since the start
         self.restarts = 0
-        self._boot = self._boot_doubt = 0
+        self.boot_ms = self._boot_doubt = 0  # [ms] its clock
+        self._boot_at = now
         self._takes: dict[str, Callable[[Message, float], None]] = {
             'HEARTBEAT': self._heartbeat, 'GLOBAL_POSITION_INT': self._global_position,
             'HOME_POSITION': self._home, 'BATTERY_STATUS': self._battery,
@@ -80,23 +81,30 @@ class Telemetry:
         self.heard.add(message.get_msgId())
         boot = getattr(message, 'time_boot_ms', None)
         if boot is not None:
-            self._clock(boot)
+            self._clock(boot, now)
         take = self._takes.get(message.get_type())
         if take:
             take(message, now)
 
-    def _clock(self, boot: int) -> None:
+    def restart(self, boot_ms: int = 0) -> None:
+        """It begins anew, or it is another one: nothing that was heard holds any more."""
+        self.boot_ms, self._boot_doubt = boot_ms, 0
+        self.restarts += 1
+        self.heard = set()
+        self.current, self.total, self.plan_id, self.mission_state = None, None, 0, 0
+        self.home, self.height = None, math.nan
+
+    def _clock(self, boot_ms: int, now: float) -> None:
         """One message with an older clock may be late; two in a row are a restart."""
-        if boot >= self._boot - BACKWARDS:
-            self._boot, self._boot_doubt = max(boot, self._boot), 0
+        silence = now - self._boot_at  # in which a running clock goes on
+        if boot_ms >= self.boot_ms - BACKWARDS + 500.0 * silence:
+            self.boot_ms, self._boot_doubt = max(boot_ms, self.boot_ms), 0
+            self._boot_at = now
             return
         self._boot_doubt += 1
         if self._boot_doubt == 2:
-            self._boot, self._boot_doubt = boot, 0
-            self.restarts += 1
-            self.heard = set()
-            self.current, self.total, self.plan_id, self.mission_state = None, None, 0, 0
-            self.home, self.height = None, math.nan
+            self._boot_at = now
+            self.restart(boot_ms)
 
     def _heartbeat(self, message: Message, now: float) -> None:
         self.armed = bool(message.base_mode & d.MAV_MODE_FLAG_SAFETY_ARMED)

@@ -1,0 +1,239 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The bridge against autopilots that nobody here wrote: MAVSDK, in a process of its own."""
+import importlib.util
+import json
+import random
+import select
+import socket
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from mission_bench import ORIGIN, task_list
+
+from uav_task_alloc.geometry.frames import to_geodetic
+from uav_task_alloc.mavlink.board import MissionState
+from uav_task_alloc.mavlink.ground import Ground, Station
+from uav_task_alloc.mavlink.link import open_link
+from uav_task_alloc.mavlink.profiles import PX4
+from uav_task_alloc.mavlink.radio import Radio
+from uav_task_alloc.mavlink.status import Mode, state_of
+from uav_task_alloc.mission import mission_items
+
+SCRIPT = Path(__file__).with_name('mavsdk_autopilot.py')
+pytestmark = pytest.mark.skipif(importlib.util.find_spec('mavsdk') is None,
+                                reason='mavsdk is not installed')
+
+
+class Proxy:
+    """A UDP proxy that loses a share of the datagrams, both ways."""
+
+    def __init__(self, port, loss):
+        self.loss, self.rng, self.to = loss, random.Random(1), ('127.0.0.1', port)
+        self.front = self.socket()
+        self.back, self.ends = {}, {}  # a socket towards the bridge for each far end
+        self.lost = 0
+
+    @staticmethod
+    def socket():
+        one = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        one.bind(('127.0.0.1', 0))
+        one.setblocking(False)
+        return one
+
+    def step(self):
+        for one in select.select([self.front, *self.ends], [], [], 0.0)[0]:
+            data, address = one.recvfrom(65536)
+            if one is self.front and address not in self.back:
+                self.back[address] = self.socket()
+                self.ends[self.back[address]] = address
+            if self.rng.random() < self.loss:
+                self.lost += 1
+            elif one is self.front:
+                self.back[address].sendto(data, self.to)
+            else:
+                self.front.sendto(data, self.ends[one])
+
+    def close(self):
+        for one in (self.front, *self.ends):
+            one.close()
+
+
+class Peers:
+    """A ground station on a real socket, and MAVSDK at the other end of it."""
+
+    def __init__(self, *systems, loss=0.0):
+        self.radio = Radio([open_link('udpin:127.0.0.1:0')], 245, 190, wall=time.time)
+        port = self.radio.links[0].port
+        self.proxy = Proxy(port, loss) if loss else None
+        self.ground = Ground(Station(origin=ORIGIN, autopilot='px4'), random.Random(1))
+        self.events, self.told, self._half = [], [], ''
+        self.process = subprocess.Popen(
+            [sys.executable, str(SCRIPT), str(
+                self.proxy.front.getsockname()[1] if self.proxy else port), *map(str, systems)],
+            stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL)
+        self.until(lambda: set(self.ground.served) == set(systems))
+
+    def until(self, condition, limit=30.0):
+        """Serve until the condition holds; fail after `limit` [s]."""
+        end = time.monotonic() + limit
+        while not condition():
+            assert time.monotonic() < end, 'timed out'
+            assert self.process.poll() is None, 'MAVSDK has died'
+            self.serve()
+
+    def serve(self):
+        out = []
+        if self.proxy:
+            self.proxy.step()
+        for address, message in self.radio.receive(0.005 if self.proxy else 0.02):
+            out += self.ground.receive(address, message, time.monotonic())
+        out += self.ground.step(time.monotonic())
+        self.radio.send(out)
+        for served in self.ground.served.values():
+            while served.pilot.events:
+                self.events.append((served.uav_id, served.pilot.events.popleft()))
+        self.listen()
+
+    def listen(self):
+        while select.select([self.process.stdout], [], [], 0.0)[0]:
+            *lines, self._half = (self._half + self.process.stdout.read1(65536).decode()
+                                  ).split('\n')
+            self.told += [json.loads(line) for line in lines if line.startswith('{')]
+            if self.process.poll() is not None:
+                break
+
+    def tell(self, *words):
+        self.process.stdin.write((' '.join(map(str, words)) + '\n').encode())
+        self.process.stdin.flush()
+
+    def assign(self, system, tasks):
+        self.radio.send(self.ground.assign(f'uav_{system}', tasks, time.monotonic()))
+
+    def board(self, system):
+        return self.ground.served[system].pilot.board
+
+    def state(self, system):
+        return state_of(self.ground.served[system], time.monotonic())
+
+    def missions(self, system):
+        """Item lists as MAVSDK stored them."""
+        return [t['items'] for t in self.told if t['what'] == 'mission' and t['system'] == system]
+
+    def completed(self, system):
+        return [e.task for u, e in self.events
+                if u == f'uav_{system}' and e.event == 'COMPLETED']
+
+    def fly(self, system, place):
+        """Move there, and have the current item reached once the bridge has seen it."""
+        self.tell('move', system, *to_geodetic(ORIGIN, place))
+        self.until(lambda: max(abs(a - b) for a, b in zip(
+            self.state(system).position, place, strict=True)) < 1.0)
+        self.tell('reach', system)
+
+    def close(self):
+        if self.process.poll() is None:
+            self.tell('quit')
+            try:
+                self.process.wait(10)
+            except subprocess.TimeoutExpired:
+                self.process.kill()
+        self.process.wait()
+        self.process.stdin.close()
+        self.process.stdout.close()
+        self.radio.close()
+        if self.proxy:
+            self.proxy.close()
+
+
+@pytest.fixture
+def mavsdk():
+    made = []
+
+    def make(*systems, **kwargs):
+        made.append(Peers(*systems, **kwargs))
+        return made[-1]
+    yield make
+    for one in made:
+        one.close()
+
+
+def items(tasks):
+    """What PX4 is to be sent for a list."""
+    return [(i.command, i.frame, i.x, i.y, i.params[0], i.params[1])
+            for i in mission_items(tasks, PX4.rules, ORIGIN)]
+
+
+def stored(mission):
+    return [(c, f, x, y, p1, p2) for c, f, x, y, _, p1, p2, _ in mission]
+
+
+def flying(peers, system, revision=1):
+    peers.until(lambda: peers.board(system).revision == revision
+                and peers.state(system).mode is Mode.ON_MISSION)
+
+
+def test_mavsdk_two_systems_on_one_port_hold_exactly_their_lists(mavsdk):
+    peers = mavsdk(1, 2)
+    lists = {1: task_list('ABCDE', service=2.5), 2: task_list('FGH')}
+    for system, tasks in lists.items():
+        peers.assign(system, tasks)
+    for system, tasks in lists.items():
+        flying(peers, system)
+        peers.until(lambda system=system: peers.missions(system))
+        assert stored(peers.missions(system)[-1]) == items(tasks)
+        assert peers.board(system).state is MissionState.VERIFIED
+
+
+def test_mavsdk_a_list_is_replaced_while_flying(mavsdk):
+    peers = mavsdk(1)
+    peers.assign(1, task_list('ABC'))
+    flying(peers, 1)
+    replaced = task_list('CDA', 2)
+    peers.assign(1, replaced)
+    flying(peers, 1, 2)
+    peers.until(lambda: len(peers.missions(1)) == 2)
+    assert stored(peers.missions(1)[-1]) == items(replaced)
+    assert [i[-1] for i in peers.missions(1)[-1]] == [1, 0, 0]
+    modes = [t['mode'] for t in peers.told if t['what'] == 'mode']
+    assert modes == [3, 4]  # it was never held
+
+
+def test_mavsdk_progress_and_telemetry_are_right(mavsdk):
+    peers = mavsdk(1)
+    tasks = task_list('AB')
+    peers.assign(1, tasks)
+    flying(peers, 1)
+    for done, stop in enumerate(tasks.stops, 1):
+        peers.fly(1, stop.task.position)
+        peers.until(lambda done=done: len(peers.completed(1)) == done)
+    assert peers.completed(1) == ['A', 'B']
+    state = peers.state(1)
+    assert state.position == pytest.approx((100.0, 100.0, 50.0), abs=0.05)
+    assert state.velocity == pytest.approx((4.0, 3.0, 1.0))
+    assert state.battery == pytest.approx(0.75, abs=0.02)
+    assert [(e.task, e.event) for _, e in peers.events] == [
+        ('A', 'STARTED'), ('A', 'COMPLETED'), ('B', 'STARTED'), ('B', 'COMPLETED')]
+
+
+def test_mavsdk_a_proxy_that_loses_a_fifth_delays_and_changes_nothing(mavsdk):
+    peers = mavsdk(1, loss=0.2)
+    for revision, names in enumerate(['ABCDE', 'EDCBA'], 1):
+        peers.assign(1, task_list(names, revision))
+        peers.until(lambda revision=revision: peers.board(1).revision == revision, 90.0)
+        peers.until(lambda: peers.missions(1))
+        assert stored(peers.missions(1)[-1]) == items(task_list(names))
+    assert peers.proxy.lost > 20
+
+
+def test_mavsdk_a_reboot_gets_its_mission_again(mavsdk):
+    peers = mavsdk(1)
+    peers.assign(1, task_list('AB'))
+    flying(peers, 1)
+    peers.tell('reboot', 1)
+    peers.until(lambda: peers.ground.served[1].pilot.telemetry.restarts == 1)
+    peers.until(lambda: len(peers.missions(1)) == 2)
+    flying(peers, 1)
+    assert stored(peers.missions(1)[-1]) == items(task_list('AB'))
