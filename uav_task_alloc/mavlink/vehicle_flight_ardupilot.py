@@ -69,6 +69,8 @@ class ArduPilotFlight(Flight):
     def leave(self, mode: Mode) -> None:
         if mode is Mode.MISSION and self.run is Run.ACTIVE:
             self.run = Run.STOPPED
+            if self.track is not None:
+                self._upcoming = self.seq  # what was interrupted is flown again
 
     def enter(self, mode: Mode) -> None:
         super().enter(mode)
@@ -138,6 +140,7 @@ class ArduPilotFlight(Flight):
         if not self._landing:  # it disarms before it could tell
             self.tell_reached(self.seq, self.target)
         self._upcoming = self.seq + 1
+        self.next_item()
 
     def radius(self, item: StoredItem) -> float:
         return self.config.acceptance_radius  # WPNAV_RADIUS, whatever param2 said
