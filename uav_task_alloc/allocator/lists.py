@@ -4,61 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import pairwise
 
 from uav_task_alloc.allocator.records import Stop, UavList
-from uav_task_alloc.geometry.detour import detour
-from uav_task_alloc.geometry.zones import way_is_clear
-from uav_task_alloc.model import Leg, Plan, Point, Task, ThreatZone, Uav
+from uav_task_alloc.allocator.ways import Ways, length
+from uav_task_alloc.model import Leg, Plan, Point, Task, Uav
 
 START, HOME = '', '~'  # neither is a task id
 WORTH = 1.0  # [m] a way at least so much shorter replaces a published one
-
-
-@dataclass(frozen=True, slots=True)
-class Ways:
-    """The zones as they are now, and how far to stay away from them."""
-
-    zones: tuple[ThreatZone, ...] = ()
-    clearance: float = 0.0  # [m] beyond the margins
-    altitude_min: float = -math.inf  # [m]
-    altitude_max: float = math.inf  # [m]
-    margin: float = 0.0  # share by which a new way must be shorter than a published one
-
-    def leg(self, a: Point, b: Point) -> Leg | None:
-        """The shortest safe way from a to b; None where there is none."""
-        metres, via = detour(a, b, self.zones, clearance=self.clearance,
-                             altitude_min=self.altitude_min, altitude_max=self.altitude_max)
-        return None if math.isinf(metres) else Leg(tuple(via), metres)
-
-    def clear(self, *points: Point) -> bool:
-        """The polyline enters no zone; half the clearance is left to wind and GPS."""
-        return not self.zones or way_is_clear(points, self.zones, 0.5 * self.clearance)
-
-    def rest(self, position: Point, leg: Leg, goal: Point) -> float | None:
-        """Metres still to fly on a leg under way, by the via points ahead; None: it is cut."""
-        ahead = len(leg.via) - _passed(position, leg.via, goal)
-        for left in (ahead, *range(ahead - 1, -1, -1), *range(ahead + 1, len(leg.via) + 1)):
-            points = (position, *leg.via[len(leg.via) - left:], goal)
-            if self.clear(*points):
-                return length(points)
-        return None
-
-
-def length(points: Sequence[Point]) -> float:
-    """Metres along a polyline."""
-    return math.fsum(math.dist(a, b) for a, b in pairwise(points))
-
-
-def _passed(position: Point, via: Sequence[Point], goal: Point) -> int:
-    """How many via points lie behind: the way on from there leads past the UAV."""
-    stops = (*via, goal)
-    for k in range(len(via), 0, -1):
-        here, onward = stops[k - 1], stops[k]
-        if sum((p - h) * (o - h) for p, h, o in zip(position, here, onward, strict=True)) > 0.0:
-            return k
-    return 0
 
 
 def planned_legs(plan: Plan) -> dict[tuple[str, str, str], Leg]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import asdict, dataclass, field, fields
+from dataclasses import dataclass, field, fields
 from enum import Enum
 from typing import Any
 
@@ -77,15 +77,15 @@ def _take(found: Saved, row: Row) -> None:
 
 
 def _plain(value: Any) -> Any:
+    if isinstance(value, (str, int, float)) or value is None:
+        return value
     if isinstance(value, (list, tuple)):
         return [_plain(v) for v in value]
-    if isinstance(value, dict):
-        return {k: _plain(v) for k, v in value.items()}
     if isinstance(value, frozenset):
         return sorted(value)
     if isinstance(value, Enum):
         return value.value
-    return _plain(asdict(value)) if hasattr(value, '__dataclass_fields__') else value
+    return {name: _plain(getattr(value, name)) for name in value.__dataclass_fields__}
 
 
 def _task(body: dict[str, Any]) -> Task:

@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable, Sequence
 
 from uav_task_alloc.allocator.fleet import Fleet, UavRecord, may_fly
-from uav_task_alloc.allocator.lists import Ways
 from uav_task_alloc.allocator.published import ListBook
 from uav_task_alloc.allocator.records import (
     Action,
@@ -24,7 +23,7 @@ from uav_task_alloc.allocator.records import (
 from uav_task_alloc.allocator.restore import Saved
 from uav_task_alloc.allocator.schedule import Schedule
 from uav_task_alloc.allocator.tasks import UNCHANGED, TaskBook
-from uav_task_alloc.geometry.zones import zones_around
+from uav_task_alloc.allocator.ways import Ways
 from uav_task_alloc.model import Task, ThreatZone
 from uav_task_alloc.params import AllocatorParams
 
@@ -47,6 +46,7 @@ class World:
         self.version = 0
         self.outbox = Outbox()
         self.awake = False  # the kernels are compiled: looking at zones is quick
+        self._ways: Ways | None = None
         self._looked: dict[str, float] = {}
         self._old = {each.uav: each for each in saved.lists if each.stops}
 
@@ -118,7 +118,7 @@ class World:
         """A way cut by a zone, or a UAV caught in one, asks for a new plan."""
         record, ways = self.fleet.records[uav_id], self.ways()
         position = record.report.position
-        caught = bool(self.zones) and bool(zones_around(position, ways.zones))
+        caught = ways.inside(position)
         if caught != record.caught:
             self.fleet.set_caught(uav_id, caught)
             self.note(f'{uav_id} is {"inside" if caught else "out of"} a zone', warning=caught)
@@ -187,7 +187,7 @@ class World:
         if new == self.zones:
             return
         changed = [i for i in {**self.zones, **new} if self.zones.get(i) != new.get(i)]
-        self.zones = new
+        self.zones, self._ways = new, None
         self.dirty.add('zones')
         self._looked.clear()
         self.note(f'zones changed: {_some(changed)}')
@@ -222,8 +222,9 @@ class World:
 
     def ways(self) -> Ways:
         """The ways around the zones as they are now."""
-        return Ways(tuple(self.zones.values()), self.params.clearance, self.params.altitude_min,
-                    self.params.altitude_max, self.params.replan_margin)
+        if self._ways is None or self._ways.params is not self.params:
+            self._ways = Ways(tuple(self.zones.values()), self.params)
+        return self._ways
 
     def locked(self) -> dict[str, tuple[str, ...]]:
         """What is being flown: it stays first on its UAV."""

@@ -1,0 +1,71 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The zones as they are now, packed once, and asked often: is this way clear, how long is it?"""
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from itertools import pairwise
+
+import numpy as np
+
+from uav_task_alloc.geometry.detour import detour
+from uav_task_alloc.geometry.obstacles import blocked, contains, pack
+from uav_task_alloc.model import Leg, Point, ThreatZone
+from uav_task_alloc.params import AllocatorParams
+
+
+class Ways:
+    """Ways around `zones`; half the clearance is left to wind and GPS once a way is flown."""
+
+    def __init__(self, zones: Sequence[ThreatZone], params: AllocatorParams) -> None:
+        self.zones, self.params = tuple(zones), params
+        self.margin = params.replan_margin  # share that a way must be shorter to replace one
+        self._bare = pack(self.zones)
+        self._wide = pack(self.zones, 0.5 * params.clearance)
+        rows = self._wide.rows
+        self._low = np.stack([rows['x0'], rows['y0'], rows['z0']], axis=1)
+        self._high = np.stack([rows['x1'], rows['y1'], rows['z1']], axis=1)
+
+    def leg(self, a: Point, b: Point) -> Leg | None:
+        """The shortest safe way from a to b; None where there is none."""
+        params = self.params
+        metres, via = detour(a, b, self.zones, clearance=params.clearance,
+                             altitude_min=params.altitude_min, altitude_max=params.altitude_max)
+        return None if math.isinf(metres) else Leg(tuple(via), metres)
+
+    def inside(self, point: Point) -> bool:
+        """The point is in a zone or its margin."""
+        return any(contains(row, *point, True) for row in self._bare.rows)
+
+    def clear(self, *points: Point) -> bool:
+        """The polyline enters no zone. O(zones) a segment, most of them by their boxes"""
+        return not self.zones or not any(self._cut(a, b) for a, b in pairwise(points))
+
+    def _cut(self, a: Point, b: Point) -> bool:
+        near = ((np.maximum(a, b) >= self._low) & (np.minimum(a, b) <= self._high)).all(axis=1)
+        rows = self._wide.rows
+        return any(blocked(rows[k], *a, *b, -np.inf, True) for k in np.flatnonzero(near))
+
+    def rest(self, position: Point, leg: Leg, goal: Point) -> float | None:
+        """Metres still to fly on a leg under way, by the via points ahead; None: it is cut."""
+        ahead = len(leg.via) - _passed(position, leg.via, goal)
+        for left in (ahead, *range(ahead - 1, -1, -1), *range(ahead + 1, len(leg.via) + 1)):
+            points = (position, *leg.via[len(leg.via) - left:], goal)
+            if self.clear(*points):
+                return length(points)
+        return None
+
+
+def length(points: Sequence[Point]) -> float:
+    """Metres along a polyline."""
+    return math.fsum(math.dist(a, b) for a, b in pairwise(points))
+
+
+def _passed(position: Point, via: Sequence[Point], goal: Point) -> int:
+    """How many via points lie behind: the way on from there leads past the UAV."""
+    stops = (*via, goal)
+    for k in range(len(via), 0, -1):
+        here, onward = stops[k - 1], stops[k]
+        if sum((p - h) * (o - h) for p, h, o in zip(position, here, onward, strict=True)) > 0.0:
+            return k
+    return 0
