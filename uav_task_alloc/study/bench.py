@@ -21,8 +21,9 @@ Runs = dict[str, dict[str, float]]  # instance -> 'solver@budget' -> [m], inf: n
 def main(argv: Sequence[str]) -> int:
     """`python -m uav_task_alloc bench`: print the table; returns the exit status."""
     asked = _parser().parse_args(argv)
-    missing = sorted({'pyvrp', 'ortools'} - set(rivals.installed()))
-    if asked.rivals > 0.0 and missing:
+    wanted = asked.against.split(',') if asked.rivals > 0.0 else []
+    missing = sorted(set(wanted) - set(rivals.installed()))
+    if missing:
         print(f'not installed, so left out: {", ".join(missing)} '
               '(pip install -r benchmarks/requirements.txt)')
     runs: Runs = json.loads(asked.json.read_text()) if asked.json and asked.json.exists() else {}
@@ -30,7 +31,7 @@ def main(argv: Sequence[str]) -> int:
         row = runs.setdefault(instance.name, {})
         for solver, budget in product(asked.solvers.split(','), _numbers(asked.budgets)):
             row[f'{solver}@{budget:g}'] = _length(instance, solver, budget)
-        for name in rivals.installed() if asked.rivals > 0.0 else ():
+        for name in [each for each in wanted if each not in missing]:
             found = rivals.run(name, instance, asked.rivals)
             for budget in _numbers(asked.budgets):
                 if budget <= asked.rivals:
@@ -51,6 +52,7 @@ def _parser() -> argparse.ArgumentParser:
     add('--budgets', default='0.1,1', help='[s] of CPU time, ...')
     add('--solvers', default='chain_q', help=f'of {", ".join(SOLVERS)}')
     add('--rivals', type=float, default=0.0, help='[s] for PyVRP and OR-Tools each; 0: not asked')
+    add('--against', default='pyvrp,ortools', help='which of them')
     add('--json', type=Path, help='file that keeps all lengths, and adds to those it has')
     return parser
 

@@ -1,0 +1,75 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The kernels: sums stay true, undo undoes, neighbours are the nearest."""
+import numpy as np
+import pytest
+from hypothesis import given, settings, strategies as st
+from plan_checks import make
+
+from uav_task_alloc.solver import routes as of
+from uav_task_alloc.solver.chance import below, chance, uniform
+from uav_task_alloc.solver.insertion import cheapest_first
+from uav_task_alloc.solver.near import nearest
+from uav_task_alloc.solver.problem import Limits, Rules, make_problem
+from uav_task_alloc.solver.ruin import empty_log, recreate, ruin, undo
+
+
+def problem(uavs, tasks, seed=1, reach=1e9, **rules):
+    return make_problem(*make(uavs, tasks, seed, reach), {}, Limits(), Rules(**rules))
+
+
+def lengths(made, routes):
+    """Route lengths summed anew from the points."""
+    a, found = made.arrays, []
+    for u in range(a.uavs):
+        node, length = u, 0.0
+        while node < a.ends:
+            length += of.step(a, node, routes.next[node])
+            node = routes.next[node]
+        found.append(length)
+    return found
+
+
+@settings(max_examples=25, deadline=None)
+@given(seed=st.integers(0, 2 ** 32), tasks=st.integers(1, 40), returns=st.booleans())
+def test_sums_stay_true_and_undo_undoes(seed, tasks, returns):
+    made = problem(3, tasks, seed, returns=returns)
+    routes, rng, log = of.empty_routes(made.arrays), chance(seed), empty_log(made.arrays)
+    cheapest_first(made.arrays, routes, rng)
+    for i in range(20):
+        before = of.twin(routes)
+        log.hit[:] = -1
+        ruin(made.arrays, routes, log, 10.0, i, rng)
+        recreate(made.arrays, routes, log, rng)
+        assert routes.length == pytest.approx(lengths(made, routes))
+        assert routes.sums[of.DISTANCE] == pytest.approx(sum(lengths(made, routes)))
+        assert routes.tasks.sum() == (routes.on[made.arrays.uavs:made.arrays.ends] >= 0).sum()
+        if i % 2:
+            undo(made.arrays, routes, log)
+            assert (routes.next == before.next).all()
+            assert routes.length == pytest.approx(before.length)
+
+
+@pytest.mark.parametrize('n', [1, 2, 7, 200])
+def test_neighbours_are_the_nearest(n):
+    xyz = np.random.default_rng(n).uniform(0.0, 100.0, (n, 3))
+    k = min(10, n - 1)
+    ways = np.linalg.norm(xyz[:, None] - xyz[None], axis=2) + np.diag(np.full(n, np.inf))
+    found = nearest(xyz, k)
+    for i in range(n):
+        assert ways[i, found[i]] == pytest.approx(np.sort(ways[i])[:k])
+
+
+def test_neighbours_of_coincident_points_are_found():
+    assert {tuple(sorted(row)) for row in nearest(np.zeros((3, 3)), 2).tolist()} == {
+        (0, 1), (0, 2), (1, 2)}
+
+
+def test_chance_is_even_and_the_same_again():
+    state = chance(5)
+    drawn = [uniform(state) for _ in range(4000)]
+    assert 0.48 < np.mean(drawn) < 0.52
+    assert min(drawn) >= 0.0
+    assert max(drawn) < 1.0
+    again = chance(5)
+    assert drawn[0] == uniform(again)
+    assert {below(again, 3) for _ in range(100)} == {0, 1, 2}

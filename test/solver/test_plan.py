@@ -1,0 +1,193 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`plan` as its callers see it."""
+import math
+
+import pytest
+from plan_checks import check, make
+
+from uav_task_alloc import SOLVERS, Task, ThreatZone, Uav, plan
+from uav_task_alloc.errors import InvalidValue, UnknownName
+
+ONE = Uav('u1', (0.0, 0.0, 0.0))
+
+
+def quick(uavs, tasks, zones=(), **options):
+    return plan(uavs, tasks, zones, **{'budget': 5.0, 'max_iterations': 300, **options})
+
+
+@pytest.mark.parametrize('solver', SOLVERS)
+@pytest.mark.parametrize('route_end', ['hold', 'home'])
+@pytest.mark.parametrize('hard', [True, False])
+def test_every_solver_gives_a_right_plan(solver, route_end, hard):
+    uavs, tasks = make(3, 15, reach=1500.0)
+    made = quick(uavs, tasks, solver=solver, route_end=route_end, hard_range=hard,
+                 max_iterations=20)
+    check(made, uavs, tasks, hard)
+    assert made.solver == solver
+    assert hard or not made.unassigned
+
+
+def test_four_corners_are_flown_in_order():
+    tasks = [Task(name, place) for name, place in (
+        ('c', (100.0, 100.0, 0.0)), ('a', (100.0, 0.0, 0.0)), ('d', (0.0, 110.0, 0.0)))]
+    made = quick([ONE], tasks)
+    assert made.routes == {'u1': ('a', 'c', 'd')}
+    assert made.distance == pytest.approx(200.0 + math.hypot(100.0, 10.0))
+    assert [leg.via for leg in made.legs['u1']] == [(), (), ()]
+
+
+def test_a_route_home_counts_the_way_to_a_home_elsewhere():
+    uav = Uav('u1', (0.0, 0.0, 0.0), home=(0.0, 50.0, 0.0))
+    made = quick([uav], [Task('t', (100.0, 50.0, 0.0))], route_end='home')
+    assert made.distance == pytest.approx(math.hypot(100.0, 50.0) + 100.0)
+    assert made.returns
+
+
+def test_a_uav_without_tasks_flies_nowhere():
+    uavs = [ONE, Uav('far', (9e3, 0.0, 0.0), home=(0.0, 9e3, 0.0))]
+    made = quick(uavs, [Task('t', (1.0, 0.0, 0.0))], route_end='home')
+    assert made.routes['far'] == ()
+    assert made.legs['far'] == ()
+
+
+def test_without_tasks_or_uavs_the_plan_is_empty():
+    assert quick([], []).routes == {}
+    assert quick([ONE], []).routes == {'u1': ()}
+    assert quick([ONE], []).fit == math.inf
+    assert quick([], [Task('t', (0.0, 0.0, 0.0))]).unassigned == {'t': 'there are no UAVs'}
+
+
+def test_coincident_points_and_range_0_are_served():
+    tasks = [Task(f't{i}', (0.0, 0.0, 0.0)) for i in range(4)]
+    made = quick([Uav('u1', (0.0, 0.0, 0.0), range=0.0)], tasks)
+    assert not made.unassigned
+    assert made.distance == 0.0
+
+
+def test_a_range_that_just_suffices_suffices():
+    made = quick([Uav('u1', (0.0, 0.0, 0.0), range=100.0)], [Task('t', (100.0, 0.0, 0.0))])
+    assert made.routes == {'u1': ('t',)}
+    assert made.penalty == 0.0
+
+
+@pytest.mark.parametrize(('task', 'reason'), [
+    (Task('t', (500.0, 0.0, 0.0)),
+     'beyond the range of every UAV: u1 needs 500 m and has 300 m left'),
+    (Task('t', (1.0, 0.0, 0.0), required_capabilities=frozenset({'lidar', 'camera'})),
+     'no UAV has the capabilities lidar'),
+    (Task('t', (1.0, 0.0, 0.0), allowed_uavs=frozenset({'u9'})),
+     'not allowed: only u9 may serve it'),
+    (Task('t', (100.0, 100.0, 10.0)), 'inside zone z'),
+])
+def test_a_task_that_nobody_can_serve_is_left_out_with_the_reason(task, reason):
+    uav = Uav('u1', (0.0, 0.0, 0.0), 300.0, capabilities=frozenset({'camera'}))
+    zone = ThreatZone.hemisphere('z', (100.0, 100.0, 0.0), 50.0)
+    made = quick([uav], [task, Task('near', (2.0, 0.0, 0.0))], [zone])
+    assert made.unassigned == {'t': reason}
+    assert made.routes == {'u1': ('near',)}
+
+
+def test_where_ranges_do_not_suffice_the_most_value_is_served():
+    tasks = [Task('poor', (-90.0, 0.0, 0.0)), Task('rich', (90.0, 0.0, 0.0), value=5.0),
+             Task('on the way', (50.0, 0.0, 0.0))]
+    made = quick([Uav('u1', (0.0, 0.0, 0.0), range=100.0)], tasks)
+    assert made.routes == {'u1': ('on the way', 'rich')}
+    assert made.unassigned == {'poor': 'left out: the ranges do not suffice for all tasks'}
+
+
+def test_with_soft_range_every_task_is_served_at_a_penalty():
+    made = quick([Uav('u1', (0.0, 0.0, 0.0), 30.0)], [Task('t', (100.0, 0.0, 0.0))],
+                 hard_range=False)
+    assert made.routes == {'u1': ('t',)}
+    assert made.penalty == 70.0
+
+
+def test_a_restricted_task_is_served_wherever_its_uav_is():
+    uavs, tasks = make(4, 40)
+    tasks += [Task(f'only{i}', (10.0, 10.0, 0.0), allowed_uavs=frozenset({f'u{i}'}))
+              for i in range(4)]
+    made = quick(uavs, tasks)
+    check(made, uavs, tasks)
+    assert not made.unassigned
+
+
+def test_legs_lead_around_zones():
+    zone = ThreatZone.cylinder('z', (50.0, 0.0), 20.0)
+    made = quick([ONE], [Task('t', (100.0, 0.0, 0.0))], [zone])
+    leg, = made.legs['u1']
+    assert leg.via
+    assert leg.length == made.distance > 100.0
+
+
+def test_locked_tasks_come_first_in_their_order():
+    uavs, tasks = make(3, 12)
+    made = quick(uavs, tasks, locked={'u1': ['t7', 't2'], 'gone': ['t1'], 'u2': ['gone']})
+    check(made, uavs, tasks)
+    assert made.routes['u1'][:2] == ('t7', 't2')
+
+
+def test_a_locked_uav_flies_home_behind_its_task():
+    made = quick([ONE], [Task('t', (100.0, 0.0, 0.0))], locked={'u1': ['t']}, route_end='home')
+    assert made.distance == 200.0
+    assert [leg.length for leg in made.legs['u1']] == [100.0, 100.0]
+
+
+def test_a_locked_task_that_a_zone_swallows_is_left_out():
+    zone = ThreatZone.hemisphere('z', (100.0, 0.0, 0.0), 50.0)
+    made = quick([ONE], [Task('t', (100.0, 0.0, 10.0))], [zone], locked={'u1': ['t']})
+    assert made.unassigned == {'t': 'inside zone z'}
+
+
+def test_the_history_falls_and_ends_with_the_fit():
+    uavs, tasks = make(3, 30)
+    made = quick(uavs, tasks)
+    fits = [fit for _, fit in made.history]
+    assert fits == sorted(fits, reverse=True)
+    assert fits[-1] == pytest.approx(made.fit)
+
+
+def test_the_budget_is_kept_on_the_given_clock():
+    now = iter(i * 0.01 for i in range(10_000))
+    uavs, tasks = make(3, 30)
+    made = plan(uavs, tasks, budget=1.0, clock=lambda: next(now))
+    assert 0.9 <= made.solve_time <= 1.3
+
+
+def test_stop_ends_the_search_with_the_answer_so_far():
+    uavs, tasks = make(3, 30)
+    made = plan(uavs, tasks, budget=60.0, stop=lambda: True)
+    check(made, uavs, tasks)
+    assert made.iterations == 0
+
+
+@pytest.mark.parametrize(('options', 'text'), [
+    ({'budget': -1.0}, r'budget = -1\.0: expected a number in \[0, 86400\]'),
+    ({'route_end': 'moon'}, "route_end = 'moon': expected one of hold, home"),
+    ({'threads': 0}, r'threads = 0: expected an integer in \[1, 64\]'),
+    ({'warm': {}}, 'warm = {}: expected a Plan or None'),
+    ({'max_iterations': -1}, 'max_iterations = -1: expected an integer'),
+    ({'locked': {'u1': 't'}}, r"locked\[u1\] = 't': expected a sequence of task ids"),
+])
+def test_a_wrong_option_is_refused(options, text):
+    with pytest.raises(InvalidValue, match=text):
+        plan([ONE], [Task('t', (0.0, 0.0, 0.0))], **options)
+
+
+def test_ids_are_used_once():
+    with pytest.raises(InvalidValue, match="uav id = 'u1': expected an id used once"):
+        plan([ONE, ONE], [])
+    with pytest.raises(InvalidValue, match="task id = 't': expected an id used once"):
+        plan([ONE], [Task('t', (0.0, 0.0, 0.0))] * 2)
+    with pytest.raises(InvalidValue, match='expected a Uav'):
+        plan(['u1'], [])
+
+
+def test_two_uavs_cannot_hold_one_task():
+    with pytest.raises(InvalidValue, match='not locked to u1, too'):
+        plan([ONE, Uav('u2', (0.0, 0.0, 0.0))], [Task('t', (0.0, 0.0, 0.0))],
+             locked={'u1': ['t'], 'u2': ['t']})
+
+
+def test_an_unknown_solver_is_named_with_the_known_ones():
+    with pytest.raises(UnknownName, match=r"solver 'magic': expected one of chain_q, "):
+        plan([ONE], [], solver='magic')
