@@ -191,3 +191,14 @@ def test_two_uavs_cannot_hold_one_task():
 def test_an_unknown_solver_is_named_with_the_known_ones():
     with pytest.raises(UnknownName, match=r"solver 'magic': expected one of chain_q, "):
         plan([ONE], [], solver='magic')
+
+
+@pytest.mark.parametrize('solver', SOLVERS)
+@pytest.mark.parametrize('route_end', ['hold', 'home'])
+def test_a_task_inside_a_zone_is_left_out_however_long_bees_fly(solver, route_end):
+    uavs, tasks = make(3, 12, seed=4, reach=4000.0)
+    over = tasks[5].position
+    dome = ThreatZone.hemisphere('dome', (over[0] + 5.0, over[1], 0.0), 60.0)
+    made = quick(uavs, tasks, [dome], solver=solver, route_end=route_end, max_iterations=6000)
+    check(made, uavs, tasks)
+    assert made.unassigned == {'t5': 'inside zone dome'}

@@ -76,6 +76,9 @@ def _find_for_table(pairs: Pairs, i: int, j: int) -> float:
 @numba.njit(cache=True, nogil=True)
 def _find_for_cache(pairs: Pairs, i: int, j: int) -> float:
     keys, answers = ints_at(pairs.keys), floats_at(pairs.answers)
+    caught = ints_at(ints_at(pairs.scene)[CAUGHT])
+    if j < i and caught[i] != INSIDE and caught[j] != INSIDE:
+        i, j = j, i
     key = i * pairs.points + j
     place = (key * 0x9E3779B1 >> 8) & (CACHE_SIZE - 1)
     if keys[place] != key:

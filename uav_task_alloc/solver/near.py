@@ -83,8 +83,8 @@ def near_tasks(a: Arrays, found: Ints) -> None:
     n, k = a.near.shape
     for i in range(n):
         for m in range(k):
-            j = a.uavs + found[i, m]
-            d, place = step(a, j, a.uavs + i), m
+            j, t, place = a.uavs + found[i, m], a.uavs + i, m
+            d = max(step(a, j, t), step(a, t, j))  # one way is inf: t or j lies inside a zone
             while place > 0 and a.near_length[i, place - 1] > d:
                 a.near[i, place] = a.near[i, place - 1]
                 a.near_length[i, place] = a.near_length[i, place - 1]

@@ -133,7 +133,7 @@ def cost(a: Arrays, r: Routes) -> float:
 @part
 def better(a: Arrays, r: Routes, s: Routes) -> bool:
     """Whether r is better than s: more value; as much, then shorter; hard: within range."""
-    if a.hard and r.sums[EXCESS] > a.excess_floor + TINY:
+    if a.hard and not r.sums[EXCESS] <= a.excess_floor + TINY:
         return False
     gain = r.sums[VALUE] - s.sums[VALUE]
     slack = 1e-9 * (abs(s.sums[VALUE]) + 1.0)
