@@ -51,7 +51,8 @@ def _catch(o: Zones, xyz: Floats, limits: Floats, caught: Ints, out: Floats) -> 
     for i in range(xyz.shape[0]):
         caught[i] = how_caught(o, xyz[i])
         if caught[i] == INSIDE:
-            out[i] = way_out(o, xyz[i], limits)
+            free = way_out(o, xyz[i], limits)
+            out[i, 0], out[i, 1], out[i, 2] = free[0], free[1], free[2]
 
 
 def addresses(scene: Scene) -> Ints:
@@ -86,7 +87,8 @@ def _find(address: int, i: int, j: int) -> float:
                            p[2] - scene.xyz[i, 2])
     ends = np.empty((2, 3))  # in one order, so that there and back are the same way
     backwards = p[0] > q[0] or (p[0] == q[0] and (p[1] > q[1] or (p[1] == q[1] and p[2] > q[2])))
-    ends[0], ends[1] = (q, p) if backwards else (p, q)
+    for m in range(3):
+        ends[0, m], ends[1, m] = (q[m], p[m]) if backwards else (p[m], q[m])
     snug = scene.caught[i] == SNUG or scene.caught[j] == SNUG
     return first + shortest(scene.zones, ends, scene.limits, snug,
                             np.empty((MAX_CORNERS, 3)))[1]

@@ -187,14 +187,15 @@ def _sees(o: Zones, active: Ints, count: int, x: Floats, i: int, j: int, floor: 
 
 @numba.njit(cache=True, nogil=True)
 def _next_parent(x: Floats, cost: Floats, closed: Ints, done: int, v: int,
-                 above: float) -> tuple[float, int]:
-    """The cheapest way to v over a closed corner that costs more than `above`."""
-    best, parent = np.inf, -1
+                 failed: int) -> tuple[float, int]:
+    """The next best way to v over a closed corner, after the one that failed; ties in turn."""
+    best, parent, above, passed = np.inf, -1, cost[v], False
     for m in range(done):
         u = closed[m]
         c = cost[u] + _gap(x, u, v)
-        if above < c < best:
+        if c < best and (c > above or (c == above and passed)):
             best, parent = c, u
+        passed = passed or u == failed
     return best, parent
 
 
@@ -203,14 +204,14 @@ def astar(o: Zones, active: Ints, count: int, x: Floats, n: int, floor: float, s
           path: Ints) -> int:
     """Shortest way 0 -> 1 over corners x[:n] past the active zones; returns its corners, 0: none.
 
-    Edges are tested when they are about to be used, not before: a failed one falls back on the
-    next best closed corner. O(n) a step.
+    It is sought from 1, so that parents lead the right way. Edges are tested when they are about
+    to be used, not before: a failed one falls back on the next best closed corner. O(n) a step.
     """
     cost, state = np.full(n, np.inf), np.zeros(n, np.int8)
     parent, closed, ahead = np.full(n, -1), np.empty(n, np.int64), np.empty(n)
     for v in range(n):
-        ahead[v] = _gap(x, v, 1)
-    cost[0], state[0], closed[0], done, u = 0.0, 1, 0, 1, 0
+        ahead[v] = _gap(x, v, 0)
+    cost[1], state[1], closed[0], done, u = 0.0, 1, 1, 1, 1
     while True:
         for v in range(n):
             if state[v] == 0:
@@ -226,14 +227,13 @@ def astar(o: Zones, active: Ints, count: int, x: Floats, n: int, floor: float, s
                 return 0
             if _sees(o, active, count, x, parent[v], v, floor, snug):
                 break
-            cost[v], parent[v] = _next_parent(x, cost, closed, done, v, cost[v])
+            cost[v], parent[v] = _next_parent(x, cost, closed, done, v, parent[v])
         state[v], closed[done], u = 1, v, v
         done += 1
-        if v == 1:
+        if v == 0:
             break
     size = 0
     while v >= 0:
         path[size] = v
         size, v = size + 1, parent[v]
-    path[:size] = path[:size][::-1].copy()
     return size

@@ -15,7 +15,7 @@ from numba import carray  # type: ignore[attr-defined]
 
 from uav_task_alloc.geometry.memory import floats_at
 from uav_task_alloc.geometry.obstacles import CYLINDER, DOME, Floats, Zone
-from uav_task_alloc.geometry.taut import length_of
+from uav_task_alloc.geometry.taut import copy_point, length_of
 
 ARC_GAIN = 1.5e-3  # an arc's polyline may be longer by this share of the way
 MAX_PARTS = 12  # corners of one arc
@@ -66,7 +66,8 @@ def _bend(centre: Floats, radius: float, way: Floats, flat: bool, out: Floats) -
         c, s = far * math.cos(angle), far * math.sin(angle) / off
         for m in range(3):
             out[j + 1, m] = centre[m] + c * u[m] + s * v[m]
-    out[0], out[k + 1] = way[0], way[1]
+    copy_point(way, 0, out, 0)
+    copy_point(way, 1, out, k + 1)
     return k + 2
 
 
@@ -85,7 +86,8 @@ def _rise(p: Floats, n: int) -> None:
 @numba.njit(cache=True, nogil=True)
 def _wrap(rim: Floats, way: Floats, side: float, out: Floats) -> int:
     """From a to b around one side (1: left) of a convex rim in plan, by gift wrapping."""
-    out[0], n = way[0], 1
+    copy_point(way, 0, out, 0)
+    n = 1
     while n <= rim.shape[0] + 1:
         x, y = out[n - 1, 0], out[n - 1, 1]
         bx, by, last = way[1, 0], way[1, 1], True
@@ -94,7 +96,7 @@ def _wrap(rim: Floats, way: Floats, side: float, out: Floats) -> int:
             if side * cross > 0.0 and (rim[i, 0] != x or rim[i, 1] != y):
                 bx, by, last = rim[i, 0], rim[i, 1], False
         if last:
-            out[n] = way[1]
+            copy_point(way, 1, out, n)
             return n + 1
         out[n, 0], out[n, 1] = bx, by
         n += 1
@@ -175,14 +177,15 @@ def _over(rim: Floats, z: float, side: float, way: Floats, out: Floats) -> int:
             enter = _slide(rim, enter, z, way[0], q, p)
         if sinks:
             leave = _slide(rim, leave, z, p, way[1], q)
-    out[0], n = way[0], 1
+    copy_point(way, 0, out, 0)
+    n = 1
     if climbs:
-        out[n] = p
+        out[n, 0], out[n, 1], out[n, 2] = p[0], p[1], p[2]
         n += 1
     if sinks:
-        out[n] = q
+        out[n, 0], out[n, 1], out[n, 2] = q[0], q[1], q[2]
         n += 1
-    out[n] = way[1]
+    copy_point(way, 1, out, n)
     return n + 1
 
 
@@ -192,8 +195,7 @@ def _keep_best(trial: Floats, n: int, out: Floats, best: int) -> int:
     if n == 0 or (best > 0 and length_of(trial, n) >= length_of(out, best)):
         return best
     for i in range(n):
-        for m in range(3):
-            out[i, m] = trial[i, m]
+        copy_point(trial, i, out, i)
     return n
 
 

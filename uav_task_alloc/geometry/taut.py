@@ -19,6 +19,12 @@ PULL_GAIN = 5e-4  # as must a further round of pulling
 
 
 @numba.njit(cache=True, nogil=True)
+def copy_point(source: Floats, i: int, to: Floats, j: int) -> None:
+    """to[j] = source[i]; slices would do, but take a second each to compile."""
+    to[j, 0], to[j, 1], to[j, 2] = source[i, 0], source[i, 1], source[i, 2]
+
+
+@numba.njit(cache=True, nogil=True)
 def free(o: Zones, near: Ints, px: float, py: float, pz: float, qx: float, qy: float,
          qz: float, floor: float, snug: bool) -> bool:
     """Whether the segment pq is clear of the zones `near`."""
@@ -52,7 +58,7 @@ def drop_corners(o: Zones, near: Ints, p: Floats, n: int, floor: float, snug: bo
         if free(o, near, p[i - 1, 0], p[i - 1, 1], p[i - 1, 2], p[i + 1, 0], p[i + 1, 1],
                 p[i + 1, 2], floor, snug):
             for j in range(i, n - 1):
-                p[j] = p[j + 1]
+                copy_point(p, j + 1, p, j)
             n -= 1
             i = max(1, i - 1)
         else:
@@ -153,7 +159,7 @@ def pull(o: Zones, near: Ints, p: Floats, i: int, limits: Floats, floor: float, 
         if not moved:
             step_t, step_turn = 0.4 * step_t, 0.4 * step_turn
     _put(q, p, i, axes, t, turn, s)
-    p[i] = q
+    p[i, 0], p[i, 1], p[i, 2] = q[0], q[1], q[2]
 
 
 @numba.njit(cache=True, nogil=True)
@@ -191,6 +197,16 @@ def _cut(o: Zones, near: Ints, p: Floats, i: int, floor: float, snug: bool) -> f
 
 
 @numba.njit(cache=True, nogil=True)
+def _chord(p: Floats, i: int, before: float, after: float) -> float:
+    """Distance of the points one metre before and after corner i, on legs of these lengths."""
+    total = 0.0
+    for m in range(3):
+        d = (p[i - 1, m] - p[i, m]) / before - (p[i + 1, m] - p[i, m]) / after
+        total += d * d
+    return math.sqrt(total)
+
+
+@numba.njit(cache=True, nogil=True)
 def cut_corners(o: Zones, near: Ints, p: Floats, n: int, floor: float, snug: bool) -> int:
     """Replace each corner by two where that shortens the way enough; returns the new n."""
     least = CUT_GAIN * length_of(p, n)
@@ -202,14 +218,15 @@ def cut_corners(o: Zones, near: Ints, p: Floats, n: int, floor: float, snug: boo
             i += 1
             continue
         d = _cut(o, near, p, i, floor, snug)
-        x = p[i] + (d / before) * (p[i - 1] - p[i])
-        y = p[i] + (d / after) * (p[i + 1] - p[i])
-        if 2.0 * d - math.sqrt(((x - y) ** 2).sum()) < least:
+        if d * (2.0 - _chord(p, i, before, after)) < least:
             i += 1
             continue
         for j in range(n, i, -1):
-            p[j] = p[j - 1]
-        p[i], p[i + 1] = x, y
+            copy_point(p, j - 1, p, j)
+        for m in range(3):
+            x = p[i, m]
+            p[i, m] += d / before * (p[i - 1, m] - x)
+            p[i + 1, m] += d / after * (p[i + 2, m] - x)
         n, i = n + 1, i + 2
     return n
 

@@ -14,7 +14,7 @@ import numpy as np
 from uav_task_alloc.geometry.obstacles import Floats, Ints, Zone, Zones, blocked
 from uav_task_alloc.geometry.search import add_corners, astar, corner_bound
 from uav_task_alloc.geometry.single import past_one
-from uav_task_alloc.geometry.taut import MAX_CORNERS, length_of, span, tauten
+from uav_task_alloc.geometry.taut import MAX_CORNERS, copy_point, length_of, span, tauten
 
 RINGS = (12, 24, 64)  # corners around a zone; finer ones only where no way was found
 
@@ -49,20 +49,22 @@ def _search(o: Zones, way: Floats, limits: Floats, floor: float, snug: bool, rin
             hit: Ints, out: Floats) -> int:
     """A clear, coarse way into out; marks the zones it had to heed in hit. 0: none found."""
     while True:
-        active = np.flatnonzero(hit)
-        bound = 2
-        for k in active:
-            bound += corner_bound(o[k], ring)
+        active, count, bound = np.empty(o.size, np.int64), 0, 2
+        for k in range(o.size):
+            if hit[k]:
+                active[count], count = k, count + 1
+                bound += corner_bound(o[k], ring)
         x, n, path = np.empty((bound, 3)), 2, np.empty(bound, np.int64)
-        x[:2] = way
-        for k in active:
-            n = add_corners(o[k], way, limits, floor, ring, x, n)
-        size = astar(o, active, active.size, x, n, floor, snug, path)
+        copy_point(way, 0, x, 0)
+        copy_point(way, 1, x, 1)
+        for m in range(count):
+            n = add_corners(o[active[m]], way, limits, floor, ring, x, n)
+        size = astar(o, active, count, x, n, floor, snug, path)
         if size == 0 or size > MAX_CORNERS // 2:
             return 0
         new = 0
         for i in range(size):
-            out[i] = x[path[i]]
+            copy_point(x, path[i], out, i)
             if i:
                 new += hit_by(o, out, i - 1, i, floor, snug, hit)
         if new == 0:
@@ -116,7 +118,8 @@ def shortest(o: Zones, way: Floats, limits: Floats, snug: bool,
     Writes them to out (MAX_CORNERS rows), returns their number and the length [m]; 0, inf: none.
     `snug`: an end is so near to a zone that the way cannot keep the skin's distance.
     """
-    out[:2] = way
+    copy_point(way, 0, out, 0)
+    copy_point(way, 1, out, 1)
     floor = min(way[0, 2], way[1, 2])
     first = next_hit(o, 0, way, 0, 1, floor, snug)
     if first == o.size:
