@@ -89,3 +89,8 @@ def test_a_plan_gives_the_route_of_a_uav():
     assert plan.route('u2').distance == 0.0
     with pytest.raises(KeyError):
         plan.route('u3')
+
+
+def test_a_shape_is_one_of_shape():
+    with pytest.raises(InvalidValue, match=r"zone z: shape = 'hemisphere': expected one of"):
+        ThreatZone('z', 'hemisphere', radius=5.0)

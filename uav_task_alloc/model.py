@@ -135,6 +135,8 @@ class ThreatZone:
         check_id('zone id', self.id)
         place = f'zone {self.id}: '
         put = object.__setattr__
+        if not isinstance(self.shape, Shape):
+            raise InvalidValue(place + 'shape', self.shape, 'one of ' + ', '.join(map(str, Shape)))
         put(self, 'center', check_point(place + 'center', self.center))
         put(self, 'margin', check_number(place + 'margin', self.margin, 0.0, 1e6))
         if self.shape is not Shape.POLYGON:

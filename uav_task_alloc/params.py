@@ -49,7 +49,7 @@ def check(spec: Field[Any], value: Any) -> Any:
         value = tuple(value)
     wrong = (type(value) is not kind
              or (meta['choices'] and value not in meta['choices'])
-             or (kind is float and math.isnan(value))
+             or (kind is float and value != value)
              or (meta['low'] is not None and value < meta['low'])
              or (meta['high'] is not None and value > meta['high']))
     if wrong:
