@@ -6,6 +6,7 @@ No clock, no thread, no I/O: `now` is [s] of a steady clock, `stamp` [s] of the 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 from uav_task_alloc.allocator import planning
 from uav_task_alloc.allocator.answer import steady
@@ -97,7 +98,10 @@ class Allocator:
         if answer is None:
             return
         self._best = answer.fresh
-        chosen = steady(answer, self.world.params.replan_margin)
+        chosen = replace(steady(answer, self.world.params.replan_margin),
+                         iterations=answer.fresh.iterations,
+                         solve_time=answer.base.solve_time + answer.fresh.solve_time,
+                         warm_started=any(answer.problem.held.routes.values()))
         self._take(chosen, answer.problem.trigger, not answer.problem.background, stamp)
 
     def _take(self, chosen: Plan, trigger: str, always: bool, stamp: float) -> None:
