@@ -44,8 +44,8 @@ def fly() -> None:
 
 def task_list(n: int) -> m.TaskList:
     """ITEMS tasks for one UAV."""
-    tasks = [planned_task(Task(f'u{n}_{k}', (20.0 * n, 100.0 + 40.0 * k, 50.0)), Leg((), 40.0), 0.0)
-             for k in range(ITEMS)]
+    tasks = [planned_task(Task(f'u{n}_{k}', (20.0 * n, 100.0 + 40.0 * k, 50.0)), Leg((), 40.0),
+                          0.0) for k in range(ITEMS)]
     return m.TaskList(header=header(0.0), uav_id=f'uav_{n}', revision=1, tasks=tasks)
 
 

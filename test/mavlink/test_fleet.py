@@ -124,5 +124,5 @@ def test_a_target_is_a_host_and_a_port(text, address):
 
 @pytest.mark.parametrize('text', ['', 'host', 'host:', ':1', 'host:x', 'host:70000'])
 def test_a_bad_target_is_refused(text):
-    with pytest.raises(InvalidValue, match='target = .*: expected HOST:PORT'):
+    with pytest.raises(InvalidValue, match=r'target = .*: expected HOST:PORT'):
         to_address(text)
