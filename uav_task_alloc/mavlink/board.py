@@ -122,7 +122,7 @@ class Board:
         """What has to change on board."""
         assert self.held is not None
         wanted, current = self.wanted(), self.progress.current
-        found = change(self.held, current, wanted)
+        found = change(self.held, current, wanted, done=self.progress.completed)
         if self._horizon is not None and found.kind is not Kind.KEEP and self._enough():
             return Change(Kind.KEEP, self.held, current or 0)
         room = self._profile.rules.capacity - self.own

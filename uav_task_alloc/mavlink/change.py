@@ -2,6 +2,7 @@
 """What has to change on board for a new list: nothing, the current item, the tail, or all."""
 from __future__ import annotations
 
+from collections.abc import Container
 from dataclasses import dataclass
 from enum import Enum
 
@@ -27,12 +28,13 @@ class Change:
 
 
 def change(held: tuple[Item, ...], current: int | None, wanted: tuple[Item, ...], *,
-           append: bool = True) -> Change:
+           done: Container[str] = (), append: bool = True) -> Change:
     """From the items on board, of which `current` is flown (None: none), to the wanted ones.
 
     `wanted` begins with the way to its first task. Detour points of it that have been flown are
     not flown again; those that have not are, even where the vehicle is beyond: a zone is there.
-    No jump leaves out a task: after a restart of the bridge, what lies behind has been flown.
+    No jump leaves out a task that is not `done`: after a restart of the bridge, what lies behind
+    has been flown.
     """
     if not wanted:
         raise ValueError('wanted items = (): expected at least one')
@@ -43,7 +45,7 @@ def change(held: tuple[Item, ...], current: int | None, wanted: tuple[Item, ...]
             return Change(Kind.KEEP, _retag(held, current, wanted[passed:]), current)
     start = len(held) - len(wanted)
     if start >= 0 and all_alike(wanted, held[start:]) and not any(
-            item.completes for item in held[current or 0:start]):
+            item.completes and item.task not in done for item in held[current or 0:start]):
         return Change(Kind.JUMP, _retag(held, start, wanted), start)
     if current is not None and rest and passed is not None:
         ahead = wanted[passed:]

@@ -27,6 +27,7 @@ from uav_task_alloc.mission import RETURN, TaskList, all_alike
 
 SETTLE = 3.0  # [s] in which messages sent before the last change may still come
 CHECK = 60.0  # [s] between readbacks of a mission that nobody should have changed
+LAST_WORD = 5.0  # [s] for a late REACHED, where the mission seems to end before its last item
 SERVICE = 10.0  # [s] beyond its hold that a service is waited for
 
 
@@ -45,7 +46,7 @@ class Pilot:
         self.going_home = False  # by a list without tasks
         self._rates = Rates(peer, self.telemetry, now)
         self._was_stale = self._aimed = False
-        self._serving_until = math.inf
+        self._serving_until, self._wait_until = math.inf, -math.inf
         self._restarts = 0
         self._said = ''  # by the vehicle, last
         self._rules = (self._linked, self.helm.finish, self._upload, self._read, self._has_list,
@@ -138,6 +139,8 @@ class Pilot:
         fresh = board.open or now - board.verified_at < SETTLE
         if self.helm.changed(before, was_airborne, excused=last or fresh):
             progress.stopped()
+            if self.telemetry.airborne and not progress.finished:
+                self._wait_until = now + LAST_WORD
         if was_airborne and not self.telemetry.airborne:
             self.yielding = False
 
@@ -286,7 +289,7 @@ class Pilot:
             board.infeasible(self._said or helm.refused)
             helm.refused = ''
             return []
-        if helm.resting(now):
+        if helm.resting(now) or now < self._wait_until:
             return []
         if helm.paused or not (flying or self._may_start()):
             return helm.wait('the pilot to give it back')
