@@ -44,6 +44,20 @@ def test_a_uav_that_is_back_is_considered_again(desk):
     assert desk.lists['a'].revision == 3
 
 
+def test_a_word_that_a_silent_uav_is_not_available_changes_nothing(desk):
+    desk.settle(wait=6.0, hear=False)
+    desk.uav('b', 1000.0, 0.0, 50.0)
+    desk.settle(hear=False)
+    solves = len(desk.solves)
+    desk.uav('a', 0.0, 0.0, 50.0, available=False)
+    desk.settle(hear=False)
+    desk.now += 6.0
+    desk.uav('b', 1000.0, 0.0, 50.0)
+    desk.core.tick(desk.now, desk.now)
+    assert desk.begin() is None
+    assert len(desk.solves) == solves
+
+
 def test_when_all_are_silent_every_task_says_why_it_waits(desk):
     desk.settle(wait=6.0, hear=False)
     assert desk.route('a') == desk.route('b') == ()

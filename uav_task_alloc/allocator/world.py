@@ -207,9 +207,10 @@ class World:
     def look_for_silence(self, now: float) -> None:
         """Those not heard for `uav_timeout` lose their tasks to the others."""
         for uav_id in self.fleet.fall_silent(now, self.params.uav_timeout):
-            self.note(f'{uav_id} silent for {self.params.uav_timeout:g} s: '
-                      'its tasks go to the others', warning=True)
-            self.touch(f'{uav_id} silent', now)
+            if self.fleet.records[uav_id].report.available:
+                self.note(f'{uav_id} silent for {self.params.uav_timeout:g} s: '
+                          'its tasks go to the others', warning=True)
+                self.touch(f'{uav_id} silent', now)
 
     def touch(self, trigger: str, now: float) -> None:
         """The plan is not for this world any more."""
@@ -244,10 +245,8 @@ class World:
 
 def _news(before: UavRecord | None, report: UavReport) -> str:
     """What in a report asks for a new plan."""
-    if before is None:
-        return 'heard' if report.available else ''
-    if before.silent:
-        return 'heard again'
+    if before is None or before.silent:
+        return ('heard again' if before else 'heard') if report.available else ''
     if before.report.available != report.available:
         return 'available' if report.available else 'not available'
     if before.report.capabilities != report.capabilities:
