@@ -115,6 +115,7 @@ def test_an_allocator_killed_in_flight_comes_back_and_loses_nothing(fleet, tmp_p
     fleet.allocator.popen.wait()
     fleet.start('allocator', '-p', 'route_end:=hold', '-p', f'state_dir:={tmp_path / "state"}')
     fleet.wait_for(NEAR)
+    fleet.probe.until(lambda: all(fleet.visits(task) >= 1 for task in NEAR))
     assert [fleet.visits(task) for task in NEAR] == [1] * len(NEAR)
 
 
@@ -126,6 +127,7 @@ def test_the_tasks_of_a_uav_that_falls_silent_go_to_the_other(fleet):
                               SetAvailability.Request(uav_id='uav_2', available=False))
     assert answer.success, answer.message
     fleet.wait_for(NEAR)
+    fleet.probe.until(lambda: all(fleet.visits(task) >= 1 for task in NEAR))
     assert [fleet.visits(task) for task in NEAR] == [1] * len(NEAR)
 
 

@@ -28,6 +28,7 @@ from uav_task_alloc.mission import RETURN, TaskList, all_alike
 SETTLE = 3.0  # [s] in which messages sent before the last change may still come
 CHECK = 60.0  # [s] between readbacks of a mission that nobody should have changed
 LAST_WORD = 5.0  # [s] for a late REACHED, where the mission seems to end before its last item
+REMIND = 2.0  # [s] that a list may ask for what is completed before that is told again
 SERVICE = 10.0  # [s] beyond its hold that a service is waited for
 
 
@@ -47,6 +48,8 @@ class Pilot:
         self._rates = Rates(peer, self.telemetry, now)
         self._was_stale = self._aimed = False
         self._serving_until, self._wait_until = math.inf, -math.inf
+        self._asked_again: tuple[str, ...] = ()  # completed tasks that the list still has
+        self._remind_at = math.inf
         self._restarts = 0
         self._said = ''  # by the vehicle, last
         self._rules = (self._linked, self.helm.finish, self._upload, self._read, self._has_list,
@@ -58,6 +61,8 @@ class Pilot:
         if self.board.tasks is not None and tasks.revision < self.board.tasks.revision:
             return []
         self.board.assign(tasks)
+        self._remind_at, self._asked_again = now + REMIND, tuple(
+            stop.task.id for stop in tasks.stops if stop.task.id in self.board.progress.completed)
         self.helm.encourage(now)
         return self._act(now)
 
@@ -76,7 +81,15 @@ class Pilot:
 
     def step(self, now: float) -> list[Message]:
         """Let time pass."""
+        self._remind(now)
         return self.board.step(now) + self._rates.step(now) + self._act(now)
+
+    def _remind(self, now: float) -> None:
+        """Tell once more what a new list still asks for: the allocator may have been restarted."""
+        if self.board.tasks is not None and now >= self._remind_at:
+            self._remind_at = math.inf
+            self.events += (TaskProgress(task, 'COMPLETED', self.board.tasks.revision)
+                            for task in self._asked_again)
 
     def _act(self, now: float) -> list[Message]:
         out: list[Message] = []
