@@ -11,7 +11,7 @@ import numpy as np
 from uav_task_alloc.model import Leg, Plan
 from uav_task_alloc.objective import excess, fit
 from uav_task_alloc.solver.problem import Problem
-from uav_task_alloc.solver.reasons import reason
+from uav_task_alloc.solver.reasons import reasons
 from uav_task_alloc.solver.recorder import Recorder
 from uav_task_alloc.solver.routes import Routes
 
@@ -36,7 +36,7 @@ def to_plan(problem: Problem, recorder: Recorder, state: Any, solver: str, warm:
     penalty = penalty if penalty > ROUNDING else 0.0
     left = np.flatnonzero(recorder.best.on[len(problem.uavs):problem.arrays.ends] < 0)
     return Plan(
-        routes, {problem.tasks[i].id: reason(problem, int(i)) for i in left}, distance, value,
+        routes, reasons(problem, left), distance, value,
         penalty, fit(distance, value, penalty, problem.rules.weights),
         tuple(recorder.history), state, legs, problem.rules.returns, solver,
         recorder.elapsed(), recorder.iterations, warm)

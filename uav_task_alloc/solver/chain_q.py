@@ -9,7 +9,7 @@ from uav_task_alloc.solver.recorder import Recorder
 from uav_task_alloc.solver.warm import repaired
 
 COLD_START, WARM_START = Habits(), Habits(hot=0.3, cold=0.02)
-ROUND, LONGEST = 1 / 25, 0.005  # share of the budget, [s]: between looks at the clock
+LONGEST = 0.005  # [s] between looks at the clock
 FIXED = 100  # rounds a flight where iterations are limited
 EXCHANGES = 20  # times that colonies look at each other's best
 
@@ -37,9 +37,8 @@ def solve(recorder: Recorder, seed: int, learnt: object = None,
 
 def _live(colony: Colony, recorder: Recorder) -> None:
     """Rounds of bees, each about as long as the clock may stay unseen."""
-    aim = min(LONGEST, ROUND * recorder.budget)
     fixed = recorder.max_iterations is not None  # then nothing may depend on the clock
-    rounds, first, since = FIXED if fixed else 16, recorder.spent(), recorder.elapsed()
+    rounds, first, since = FIXED if fixed else 64, recorder.spent(), recorder.elapsed()
     spent, step, met = first, 0.0, first
     while not recorder.over():
         share = (spent - first) / (1.0 - first)
@@ -53,5 +52,6 @@ def _live(colony: Colony, recorder: Recorder) -> None:
         now = recorder.elapsed()
         step = spent - before
         if flown and not fixed:
-            rounds = max(4, min(100_000, int(rounds * min(2.0, aim / max(1e-6, now - since)))))
+            aim = min(LONGEST, recorder.budget - now)
+            rounds = max(16, min(100_000, int(rounds * min(4.0, aim / max(1e-6, now - since)))))
         since = now

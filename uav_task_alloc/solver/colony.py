@@ -63,7 +63,7 @@ class Colony:
         costs = {'employed': rounds * h.some, 'onlooker': rounds * h.many,
                  'scout': self.scouts.work / 5.0}
         kind = self._bids.next({each: costs[each] for each in self._bids.shares()})
-        before = of.cost(self.arrays, self.best)
+        before = of.cost_now(self.arrays, self.best)
         hot, cold = self.temperature(spent), self.temperature(until)
         if kind == 'scout':
             self.scouts.fly(self.best)
@@ -71,7 +71,7 @@ class Colony:
             self._search(self.routes, h.some, hot, cold, rounds)
         else:
             self._search(self.routes, h.many, hot, cold, rounds)
-        gain = before - of.cost(self.arrays, self.best)
+        gain = before - of.cost_now(self.arrays, self.best)
         self._bids.pay(kind, costs[kind], max(0.0, gain) if h.bids else 0.0)
         return 0 if kind == 'scout' else rounds
 

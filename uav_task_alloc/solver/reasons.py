@@ -3,12 +3,37 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
+
+import numpy as np
 
 from uav_task_alloc.model import Task
 from uav_task_alloc.solver.problem import Problem
+from uav_task_alloc.solver.routes import Floats, Ints
 
 
-def reason(problem: Problem, i: int) -> str:
+def reasons(problem: Problem, left: Ints) -> dict[str, str]:
+    """Why each of these tasks is in no route, by id."""
+    short = _short_at_least(problem, left)
+    return {problem.tasks[i].id: _reason(problem, i, short[row])
+            for row, i in enumerate(left.tolist())}
+
+
+def _short_at_least(problem: Problem, left: Ints) -> Floats:
+    """Metres that (task, UAV) lack as the crow flies; inf where the UAV may not serve it."""
+    a, xyz = problem.arrays, problem.distances.points
+
+    def ways(places: Floats) -> Floats:
+        found = [np.sqrt(((places - xyz[a.uavs + i]) ** 2).sum(axis=1)) for i in left]
+        return np.array(found).reshape(len(left), a.uavs)
+
+    need = ways(xyz[:a.uavs])
+    if problem.rules.returns:
+        need += ways(xyz[a.ends:a.ends + a.uavs])
+    return np.where(a.may[:, left].T, need - a.reach, math.inf)
+
+
+def _reason(problem: Problem, i: int, short: Floats) -> str:
     """Why the i-th task is in no route."""
     task, a = problem.tasks[i], problem.arrays
     if not problem.uavs:
@@ -16,19 +41,28 @@ def reason(problem: Problem, i: int) -> str:
     around = problem.distances.zones_around(a.uavs + i)
     if around:
         return f'inside zone {", ".join(around)}'
-    able = [u for u in range(a.uavs) if a.may[u, i]]
-    if not able:
+    if not a.may[:, i].any():
         return _unable(problem, task)
-    needs = {u: _need(problem, u, a.uavs + i) for u in able}
-    reached = [u for u in able if needs[u] < math.inf]
-    if not reached:
+    need, nearest = _nearest(problem, i, short, np.argsort(short, kind='stable').tolist())
+    if need == math.inf:
         return 'unreachable: no safe way past the zones' + (
-            ' for the UAVs that may serve it' if len(able) < a.uavs else '')
-    nearest = min(reached, key=lambda u: needs[u] - a.reach[u])
-    if needs[nearest] > a.reach[nearest]:
+            '' if a.may[:, i].all() else ' for the UAVs that may serve it')
+    if need > a.reach[nearest]:
         return (f'beyond the range of every UAV: {problem.uavs[nearest].id} needs '
-                f'{needs[nearest]:.0f} m and has {max(0.0, a.reach[nearest]):.0f} m left')
+                f'{need:.0f} m and has {max(0.0, a.reach[nearest]):.0f} m left')
     return 'left out: the ranges do not suffice for all tasks'
+
+
+def _nearest(problem: Problem, i: int, short: Floats, order: Iterable[int]) -> tuple[float, int]:
+    """Metres needed by the UAV that lacks least for the i-th task alone, and that UAV."""
+    a, least, found = problem.arrays, math.inf, (math.inf, -1)
+    for u in order:
+        if short[u] >= least or not a.may[u, i]:
+            break  # the rest lack more, or may not
+        need = _need(problem, u, a.uavs + i)
+        if need < math.inf and (found[1] < 0 or need - a.reach[u] < least):
+            least, found = need - a.reach[u], (need, u)
+    return found
 
 
 def _unable(problem: Problem, task: Task) -> str:

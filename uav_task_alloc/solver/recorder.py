@@ -52,7 +52,7 @@ class Recorder:
     def offer(self, routes: Routes) -> bool:
         """Keep routes that are better than the best; whether they are."""
         with self._lock:
-            if self.history and not of.better(self.problem.arrays, routes, self.best):
+            if self.history and not of.better_now(self.problem.arrays, routes, self.best):
                 return False
             of.copy(routes, self.best)
             self._note()
@@ -61,7 +61,7 @@ class Recorder:
     def teach(self, routes: Routes) -> None:
         """Make routes the recorder's best, if that is better."""
         with self._lock:
-            if of.better(self.problem.arrays, self.best, routes):
+            if of.better_now(self.problem.arrays, self.best, routes):
                 of.copy(self.best, routes)
 
     def _note(self) -> None:

@@ -123,15 +123,13 @@ def twin(a: Routes) -> Routes:
     return Routes(*[part.copy() for part in a])  # type: ignore[arg-type]
 
 
-@part
-def cost(a: Arrays, r: Routes) -> float:
+def cost_now(a: Arrays, r: Routes) -> float:
     """What the search makes small [m]."""
     return float(r.sums[DISTANCE] + r.sums[LEFT_OUT] + (
         a.strain[0] * r.sums[EXCESS] if r.sums[EXCESS] > 0.0 else 0.0))
 
 
-@part
-def better(a: Arrays, r: Routes, s: Routes) -> bool:
+def better_now(a: Arrays, r: Routes, s: Routes) -> bool:
     """Whether r is better than s: more value; as much, then shorter; hard: within range."""
     if a.hard and not r.sums[EXCESS] <= a.excess_floor + TINY:
         return False
@@ -143,6 +141,9 @@ def better(a: Arrays, r: Routes, s: Routes) -> bool:
     if not a.hard:
         shorter += a.strain[0] * (s.sums[EXCESS] - r.sums[EXCESS])
     return bool(gain >= -slack and shorter > TINY + 1e-12 * s.sums[DISTANCE])
+
+
+cost, better = part(cost_now), part(better_now)  # handing arrays to a kernel takes 0.1 ms
 
 
 @part

@@ -49,7 +49,7 @@ class Scouts:
             left = np.flatnonzero(bee.on[a.uavs:a.ends] < 0) + a.uavs
             if left.size:
                 place_all(a, bee, left)
-            if of.better(a, bee, best):
+            if of.better_now(a, bee, best):
                 of.copy(bee, best)
                 found = True
         if self.learning:
@@ -60,10 +60,10 @@ class Scouts:
     def _learn(self, best: Routes) -> None:
         """The recorder's best first, then the bees by rank (eq 2.14), each by k / fit."""
         a = self.arrays
-        ranked = sorted(self._bees, key=lambda bee: of.cost(a, bee))
-        goal = max(of.cost(a, best), 1e-9)
+        ranked = sorted(self._bees, key=lambda bee: of.cost_now(a, bee))
+        goal = max(of.cost_now(a, best), 1e-9)
         for rank, bee in enumerate([best, *ranked[:4]]):
             share = (1.0 - DECAY) * DECAY ** rank
-            reinforce(a, bee, self.tables, share, min(1.0, goal / max(of.cost(a, bee), 1e-9)))
+            reinforce(a, bee, self.tables, share, min(1.0, goal / max(of.cost_now(a, bee), 1e-9)))
 
 

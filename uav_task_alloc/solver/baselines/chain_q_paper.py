@@ -119,7 +119,7 @@ def solve(recorder: Recorder, seed: int, learnt: object = None) -> None:
     shares = 0.5 ** np.arange(RANKED)
     while True:
         steps = [fly(a, r, of_uav, of_task, weight, u, t, rng) for r, u, t in bees]
-        costs = [of.cost(a, r) for r, _, _ in bees]
+        costs = [of.cost_now(a, r) for r, _, _ in bees]
         for rank, b in enumerate(np.argsort(costs, kind='stable')[:RANKED]):  # eq 2.14
             recorder.offer(bees[b][0])
             reward = K * min(costs) / max(costs[b], 1e-9)  # eq 2.8 with 1/fit
