@@ -69,8 +69,8 @@ P = TypeVar('P', bound=Checked)
 
 
 @dataclass(frozen=True)
-class AllocatorParams(Checked):
-    """allocator: hears UAVs, tasks and zones, publishes a task list for each UAV."""
+class Framed(Checked):
+    """Where the ENU frame is; the same for all nodes of a fleet."""
 
     origin__latitude: float = param(47.397742, 'Origin of the ENU frame.', low=-90.0, high=90.0,
                                     unit='deg', fixed=True)
@@ -78,6 +78,12 @@ class AllocatorParams(Checked):
                                      high=180.0, unit='deg', fixed=True)
     origin__altitude_amsl: float = param(488.0, 'Origin of the ENU frame above mean sea level.',
                                          low=-500.0, high=9000.0, unit='m', fixed=True)
+
+
+@dataclass(frozen=True)
+class AllocatorParams(Framed):
+    """allocator: hears UAVs, tasks and zones, publishes a task list for each UAV."""
+
     solve_budget: float = param(0.1, 'Time a re-solve may take.', low=0.001, high=60.0, unit='s')
     route_end: str = param('home', 'What a UAV does after its last task.',
                            choices=('hold', 'home'))
@@ -107,25 +113,19 @@ class AllocatorParams(Checked):
     seed: int = param(0, 'Seed of the bees.', low=0, high=2**31 - 1, fixed=True)
 
     def __post_init__(self) -> None:
-        Checked.__post_init__(self)
+        Framed.__post_init__(self)
         if self.altitude_min >= self.altitude_max:
             raise InvalidValue('altitude_min', self.altitude_min,
                                f'less than altitude_max = {self.altitude_max:g}')
 
 
 @dataclass(frozen=True)
-class BridgeParams(Checked):
+class BridgeParams(Framed):
     """mavlink_bridge: flies the task lists on ArduPilot and PX4 and reports progress."""
 
     connections: tuple[str, ...] = param(
         ('udpin:0.0.0.0:14550',), 'udpin:HOST:PORT, udpout:HOST:PORT, tcp:HOST:PORT or '
         '/dev/tty...:BAUD each.', fixed=True)
-    origin__latitude: float = param(47.397742, 'Origin of the ENU frame.', low=-90.0, high=90.0,
-                                    unit='deg', fixed=True)
-    origin__longitude: float = param(8.545594, 'Origin of the ENU frame.', low=-180.0,
-                                     high=180.0, unit='deg', fixed=True)
-    origin__altitude_amsl: float = param(488.0, 'Origin of the ENU frame above mean sea level.',
-                                         low=-500.0, high=9000.0, unit='m', fixed=True)
     system_ids: tuple[int, ...] = param((), 'Systems to bridge; empty: all that are heard.',
                                         fixed=True)
     uav_id_pattern: str = param('uav_{sysid}', 'The uav_id of a system.', fixed=True)
