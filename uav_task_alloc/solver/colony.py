@@ -4,13 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-
 from uav_task_alloc.solver import routes as of
 from uav_task_alloc.solver.bidding import Bidding
 from uav_task_alloc.solver.chance import chance
 from uav_task_alloc.solver.problem import Problem
-from uav_task_alloc.solver.routes import EXCESS, TINY, Routes
+from uav_task_alloc.solver.routes import Routes
 from uav_task_alloc.solver.ruin import empty_log
 from uav_task_alloc.solver.scouts import Scouts
 from uav_task_alloc.solver.search import search
@@ -27,7 +25,7 @@ class Habits:
     employed: float = 0.5  # least shares of the work
     onlookers: float = 0.2
     scouts: float = 0.01
-    strain: float = 10.0  # [m/m] what a metre beyond range costs at first
+    strain: float = 3.0  # [m/m] what a metre beyond range costs at first
     learning: bool = True  # False: Q stays as it is
     bids: bool = True  # False: kinds keep their first shares
 
@@ -78,7 +76,4 @@ class Colony:
     def _search(self, routes: Routes, mean: float, hot: float, cold: float, rounds: int) -> int:
         a = self.arrays
         found = int(search(a, routes, self.best, self._log, mean, hot, cold, rounds, self._rng))
-        if a.hard:  # dear enough that routes come back into range, cheap enough to pass through
-            over = routes.sums[EXCESS] > a.excess_floor + TINY
-            a.strain[0] = np.clip(a.strain[0] * (1.2 if over else 0.9), 0.5, 1000.0)
         return found

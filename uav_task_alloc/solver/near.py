@@ -8,7 +8,7 @@ import numpy as np
 
 from uav_task_alloc.solver.chance import Chance, uniform
 from uav_task_alloc.solver.kernel import kernel, maker
-from uav_task_alloc.solver.routes import Arrays, Floats, Ints, step
+from uav_task_alloc.solver.routes import TINY, Arrays, Floats, Ints, step
 
 
 @maker
@@ -94,19 +94,25 @@ def near_tasks(a: Arrays, found: Ints) -> None:
 
 @maker
 def near_starts(a: Arrays, xyz: Floats, rng: Chance) -> None:
-    """Fill a.starts with the starts nearest to each task, equally near ones shuffled. O(n m)."""
+    """Fill a.starts with the starts nearest to each task, equally near ones shuffled. O(n m).
+
+    The price of tasks that nobody has the range for becomes 0.
+    """
     n, s = a.starts.shape
     squares = np.empty(s)
     for i in range(n):
-        kept, t = 0, a.uavs + i
+        kept, t, spare = 0, a.uavs + i, -np.inf
         for u in range(a.uavs):
             if not a.may[u, i]:
                 continue
             square = ((xyz[u, 0] - xyz[t, 0]) ** 2 + (xyz[u, 1] - xyz[t, 1]) ** 2
                       + (xyz[u, 2] - xyz[t, 2]) ** 2)
+            spare = max(spare, a.reach[u] - math.sqrt(square))
             if kept < s or square <= squares[s - 1]:
                 square += 1e-6 * (square + 1.0) * uniform(rng)
                 kept = _keep(a.starts[i], squares, kept, u, square)
+        if a.hard and spare < -TINY:
+            a.price[i] = 0.0
         for m in range(s):
             if m < kept:
                 a.start_length[i, m] = step(a, a.starts[i, m], t)

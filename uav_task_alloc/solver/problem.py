@@ -20,6 +20,7 @@ from uav_task_alloc.solver.routes import Arrays, Floats
 NEIGHBOURS = 24  # tasks a bee looks at around a task
 STARTS = 8  # UAVs it looks at
 PRICE = 20.0  # leaving an average task out costs so many mean legs
+DEAREST = 300.0  # and at most so many times that after it was in vain for long
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,7 +129,7 @@ def _blank(uavs: Sequence[Uav], tasks: Sequence[Task], rules: Rules,
         distances.pairs, not distances.zones, distances.points,
         np.array([u.range for u in uavs], dtype=np.float64), np.zeros(m), may,
         np.any(~may, axis=0, keepdims=True)[0],
-        np.array([t.value for t in tasks], dtype=np.float64), np.ones(n),
+        np.array([t.value for t in tasks], dtype=np.float64), np.ones(n), np.empty(n),
         np.empty((n, k), np.int64), np.empty((n, k)), np.empty((n, s), np.int64),
         np.empty((n, s)))
 
@@ -158,13 +159,16 @@ def _fill(problem: Problem) -> float:
     if n == 0:
         return 1.0
     near_tasks(a, nearest(xyz[a.uavs:a.ends], a.near.shape[1]))
-    near_starts(a, xyz, chance(0))
     if a.uavs == 0:
         return 1.0
+    near_starts(a, xyz, chance(0))
+    lost = np.flatnonzero(a.start_length[:, 0] == math.inf)  # all tasks that zones swallowed
+    a.price[[i for i in lost if problem.distances.zones_around(a.uavs + int(i))]] = 0.0
     first = a.near_length[:, 0] if a.near.shape[1] else a.start_length[:, 0]
     finite = first[np.isfinite(first)]
     scale = max(float(finite.mean()) if finite.size else 1.0, 1e-6)
     finite = a.start_length[:, 0][np.isfinite(a.start_length[:, 0])]
     far = float(finite.mean()) if finite.size else 0.0
-    a.price[:] = a.value / a.value.mean() * max(PRICE * scale, 2.0 * far)
+    a.price[:] *= a.value / a.value.mean() * max(PRICE * scale, 2.0 * far)
+    a.dearest[:] = DEAREST * a.price
     return scale

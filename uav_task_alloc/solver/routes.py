@@ -37,7 +37,8 @@ class Arrays(NamedTuple):
     may: NDArray[np.bool_]  # (m, n) who may serve what
     picky: NDArray[np.bool_]  # (n) not everybody may
     value: Floats  # (n)
-    price: Floats  # (n) [m] of leaving a task out
+    price: Floats  # (n) [m] of leaving a task out now; 0: nobody can serve it
+    dearest: Floats  # (n) [m] what that may rise to
     near: Ints  # (n, k) task nodes, nearest first
     near_length: Floats  # (n, k) [m]
     starts: Ints  # (n, s) starts, nearest first

@@ -12,13 +12,14 @@ import numpy as np
 from uav_task_alloc.solver.chance import Chance, below, uniform
 from uav_task_alloc.solver.insertion import any_place, near_place
 from uav_task_alloc.solver.kernel import kernel, part
-from uav_task_alloc.solver.routes import Arrays, Floats, Ints, Routes, insert, remove
+from uav_task_alloc.solver.routes import TINY, Arrays, Floats, Ints, Routes, insert, remove
 
 STRING = 10  # tasks in a string at most
 SPLIT = 0.5  # share of strings with a part that stays
 REACH = 12  # neighbours looked at for a place
 PITY = 0.5  # share of rounds around a task that is left out, if there is one
-FEW, DEARER = 0.05, 1.1
+RELIEF = 0.2  # share around a route beyond range, if there is one
+FEW, DEARER = 0.05, 1.3  # what few who are left out are worth rises so much a look
 BLINKS = 0.01  # share of places overlooked
 
 
@@ -29,17 +30,19 @@ class Log(NamedTuple):
     after: Ints  # where it was before it was removed; -1: it was inserted
     out: Ints  # task nodes to put back
     key: Floats  # they go in by this, smallest first
-    size: Ints  # entries of (node and after, out, left)
+    size: Ints  # entries of (node and after, out, left, over), rounds until the next look
     hit: Ints  # (m) round in which a route was last ruined
     left: Ints  # task nodes that were left out lately
+    over: Ints  # UAVs whose routes were beyond range lately
 
 
 def empty_log(a: Arrays) -> Log:
     """A log with room for the longest round."""
     room = 2 * (a.ends - a.uavs) + 2
     return Log(np.empty(2 * room, np.int64), np.empty(2 * room, np.int64),
-               np.empty(room, np.int64), np.empty(room), np.zeros(3, np.int64),
-               np.zeros(a.uavs, np.int64), np.empty(room, np.int64))
+               np.empty(room, np.int64), np.empty(room), np.zeros(5, np.int64),
+               np.zeros(a.uavs, np.int64), np.empty(room, np.int64),
+               np.empty(a.uavs, np.int64))
 
 
 @part
@@ -85,23 +88,37 @@ def _string(a: Arrays, r: Routes, log: Log, c: int, size: int, rng: Chance) -> N
 
 
 @kernel
-def look_for_left(a: Arrays, r: Routes, log: Log) -> None:
-    """Note who is left out now; where those are few, leaving them out gets dearer. O(n)."""
-    log.size[2] = 0
+def look_for_trouble(a: Arrays, r: Routes, log: Log) -> None:
+    """Note who is left out or flies too far now; leaving few out gets dearer. O(n)."""
+    log.size[2] = log.size[3] = 0
+    for u in range(a.uavs):
+        if r.length[u] > a.reach[u] + TINY and r.tasks[u] > 0:
+            log.over[log.size[3]] = u
+            log.size[3] += 1
     for t in range(a.uavs, a.ends):
-        if r.on[t] < 0:
+        if r.on[t] < 0 and a.price[t - a.uavs] > 0.0:
             log.left[log.size[2]] = t
             log.size[2] += 1
     if log.size[2] < FEW * (a.ends - a.uavs):
         for i in range(log.size[2]):
-            a.price[log.left[i] - a.uavs] *= DEARER
+            t = log.left[i] - a.uavs
+            a.price[t] = min(DEARER * a.price[t], a.dearest[t])
 
 
 @part
-def _seed(a: Arrays, log: Log, rng: Chance) -> int:
-    """Around whom to ruin: anybody, and often somebody who was left out."""
+def _seed(a: Arrays, r: Routes, log: Log, rng: Chance) -> int:
+    """Around whom to ruin: anybody, and often somebody left out or on a route beyond range."""
     if log.size[2] > 0 and uniform(rng) < PITY:
-        return int(log.left[below(rng, log.size[2])])
+        t = log.left[below(rng, log.size[2])]
+        if r.on[t] < 0:
+            return int(t)
+    if log.size[3] > 0 and uniform(rng) < RELIEF:
+        u = log.over[below(rng, log.size[3])]
+        if r.length[u] > a.reach[u] + TINY and r.tasks[u] > 0:
+            t = r.next[u]
+            for _ in range(below(rng, r.tasks[u])):
+                t = r.next[t]
+            return int(t)
     return a.uavs + below(rng, a.ends - a.uavs)
 
 
@@ -110,7 +127,7 @@ def ruin(a: Arrays, r: Routes, log: Log, mean: float, round_id: int, rng: Chance
     """Remove about `mean` tasks in strings of routes around a random one. O(mean)."""
     log.size[0] = log.size[1] = 0
     tasks = a.ends - a.uavs
-    seed = _seed(a, log, rng)
+    seed = _seed(a, r, log, rng)
     served = max(1, tasks // max(1, a.uavs))
     longest = min(float(STRING), max(1.0, float(served)))
     strings = int(1.0 + uniform(rng) * (4.0 * mean / (1.0 + longest) - 1.0))

@@ -13,7 +13,7 @@ from pathlib import Path
 from uav_task_alloc.solver.registry import SOLVERS
 from uav_task_alloc.solver.solve import plan
 from uav_task_alloc.study import rivals
-from uav_task_alloc.study.instances import Instance, make_instance
+from uav_task_alloc.study.instances import SLACK, Instance, make_instance
 
 Runs = dict[str, dict[str, float]]  # instance -> 'solver@budget' -> [m], inf: not all served
 
@@ -49,6 +49,7 @@ def _parser() -> argparse.ArgumentParser:
     add('--sizes', default='4x20,8x50,8x100,20x200', help='UAVs x tasks, ...')
     add('--kinds', default='spread,base', help='spread: starts anywhere; base: one start')
     add('--seeds', type=int, default=5, help='instances a size')
+    add('--slack', type=float, default=SLACK, help='ranges over a fair share of a good tour')
     add('--budgets', default='0.1,1', help='[s] of CPU time, ...')
     add('--solvers', default='chain_q', help=f'of {", ".join(SOLVERS)}')
     add('--rivals', type=float, default=0.0, help='[s] for PyVRP and OR-Tools each; 0: not asked')
@@ -65,7 +66,7 @@ def _instances(asked: argparse.Namespace) -> Iterable[Instance]:
     for kind, size, seed in product(asked.kinds.split(','), asked.sizes.split(','),
                                     range(1, asked.seeds + 1)):
         uavs, tasks = (int(each) for each in size.split('x'))
-        yield make_instance(uavs, tasks, seed, one_base=kind == 'base')
+        yield make_instance(uavs, tasks, seed, kind == 'base', asked.slack)
 
 
 def _length(instance: Instance, solver: str, budget: float) -> float:

@@ -10,7 +10,7 @@ import numpy as np
 from uav_task_alloc.model import Task, Uav
 
 SIDE = 10_000.0  # [m]
-SLACK = 1.25  # range over what a fair share of a good tour takes
+SLACK = 1.25  # range over what a fair share of a good tour takes: OR-Tools finds no plan at all
 TOUR = 0.7124  # a shortest tour of n random points in a square is TOUR sqrt(n) sides long
 
 
@@ -24,20 +24,20 @@ class Instance:
 
 
 def make_instance(uavs: int, tasks: int, seed: int, one_base: bool = False,
-                  tight: bool = True) -> Instance:
+                  slack: float = SLACK) -> Instance:
     """Tasks and starts uniform in the square; one_base: all UAVs start at its middle.
 
-    Tight ranges: SLACK times the mean way to a first task, where all start at one base, and a
-    fair share of a tour; no task is out of reach.
+    Ranges: `slack` times the mean way to a first task, where all start at one base, and a fair
+    share of a tour; no task is out of reach.
     """
     rng = np.random.default_rng((seed, uavs, tasks, one_base))
     places = rng.uniform(0.0, SIDE, (tasks, 2))
     starts = np.full((uavs, 2), 0.5 * SIDE) if one_base else rng.uniform(0.0, SIDE, (uavs, 2))
     ways = np.hypot(*(places[:, None] - starts[None]).T)  # (uavs, tasks)
     share = TOUR * math.sqrt(tasks) * SIDE / uavs
-    reach = SLACK * (share + (float(ways.mean()) if one_base else 0.0))
-    reach = max(reach, 1.05 * float(ways.min(axis=0).max())) if tight else math.inf
-    kind = 'base' if one_base else 'spread'
+    reach = slack * (share + (float(ways.mean()) if one_base else 0.0))
+    reach = max(reach, 1.05 * float(ways.min(axis=0).max()))
+    kind = ('base' if one_base else 'spread') + (f'*{slack:g}' if slack != SLACK else '')
     return Instance(
         f'{kind}-{uavs}-{tasks}-{seed}',
         tuple(Uav(f'u{i}', (x, y, 0.0), reach) for i, (x, y) in enumerate(starts)),
