@@ -14,6 +14,8 @@ SQUARE = [(0, 0), (10, 0), (10, 10), (0, 10)]
 @pytest.mark.parametrize(('make', 'text'), [
     (lambda: Task('t1', (NAN, 0, 0)),
      'task t1: position = (nan, 0.0, 0.0): expected three finite coordinates [m]'),
+    (lambda: Task('t1', (0, -1e200, 0)),
+     'task t1: position = (0.0, -1e+200, 0.0): expected three coordinates in [-1e+08, 1e+08] m'),
     (lambda: Task('t1', (0, 0)), 'task t1: position = (0, 0): expected three coordinates [m]'),
     (lambda: Task('t1', (0, 0, 0), value=0.0),
      'task t1: value = 0.0: expected a number in (0, inf]'),

@@ -11,16 +11,19 @@ from typing import Any
 from uav_task_alloc.errors import InvalidValue
 
 Point = tuple[float, float, float]  # [m] ENU
+FAR = 1e8  # [m] no coordinate is beyond
 
 
 def check_point(place: str, value: Iterable[float]) -> Point:
-    """Three finite coordinates [m] as floats; raise InvalidValue otherwise."""
+    """Three coordinates [m] as floats, none beyond FAR; raise InvalidValue otherwise."""
     try:
         x, y, z = (float(v) for v in value)
     except (TypeError, ValueError):
         raise InvalidValue(place, value, 'three coordinates [m]') from None
     if not (math.isfinite(x) and math.isfinite(y) and math.isfinite(z)):
         raise InvalidValue(place, (x, y, z), 'three finite coordinates [m]')
+    if max(abs(x), abs(y), abs(z)) > FAR:
+        raise InvalidValue(place, (x, y, z), f'three coordinates in [{-FAR:g}, {FAR:g}] m')
     return x, y, z
 
 
