@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """The dense reference: Dijkstra over a visibility graph of many corners around every zone met.
 
-Each zone has rings of `ring` corners around it, on circumscribed polygons, at many heights; prisms
-also along their edges. A way around a zone of radius R is thus too long by at most
-1 / cos(pi / ring) - 1 of its arc (0.4 % for 36), besides what heights in between would gain; it is
-never too short. Only zones that are met take part, as a way past fewer zones is never longer.
+Each zone has rings of `ring` corners around it, on circumscribed polygons, at many heights, the
+other zones' tops and bottoms among them; prisms also along their edges. What it finds is a way, so
+never too short. Around a zone it is too long by at most 1 / cos(pi / ring) - 1 of the arc (0.4 %
+for 36), besides what heights in between would gain; a test sees that a denser graph gains less
+than that. Only zones that are met take part, as a way past fewer zones is never longer.
 """
 import math
 from itertools import pairwise
@@ -47,7 +48,8 @@ def _cuts(row, corners, p, q, digs):
             if (c[1] > a[1]) != (g[1] > a[1]) and a[0] < c[0] + (g[0] - c[0]) * (a[1] - c[1]) / (
                     g[1] - c[1]):
                 odd = not odd
-            if _between(a[0], a[1], a[0] + e[0], a[1] + e[1], c[0], c[1], g[0], g[1]) < grow:
+            if _between(a[0], a[1], a[0] + e[0], a[1] + e[1], c[0], c[1], g[0], g[1]) < max(
+                    grow, 1e-9):
                 return True
         return odd
     fx, fy, fz = cx - a[0], cy - a[1], cz - a[2]
@@ -81,13 +83,21 @@ def _between(ax, ay, bx, by, cx, cy, dx, dy):
 
 
 @numba.njit(cache=True, nogil=True)
-def _edges(x, rows, corners, first, count, digs):
+def _aside(box, p, q):
+    """Whether the segment pq passes a box in plan (x0, y0, x1, y1)."""
+    return ((p[0] < box[0] and q[0] < box[0]) or (p[0] > box[2] and q[0] > box[2])
+            or (p[1] < box[1] and q[1] < box[1]) or (p[1] > box[3] and q[1] > box[3]))
+
+
+@numba.njit(cache=True, nogil=True)
+def _edges(x, rows, corners, first, count, digs, boxes):
     n = len(x)
     i_of, j_of, metres = [0], [0], [0.0]
     for i in range(n):
         for j in range(i + 1, n):
             for k in range(len(rows)):
-                if _cuts(rows[k], corners[first[k]:first[k] + count[k]], x[i], x[j], digs[k]):
+                if not _aside(boxes[k], x[i], x[j]) and _cuts(
+                        rows[k], corners[first[k]:first[k] + count[k]], x[i], x[j], digs[k]):
                     break
             else:
                 i_of.append(i)
@@ -115,13 +125,15 @@ class Dense:
         self.first = np.cumsum(self.count) - self.count
         self.corners = np.array([c for v in flat for c in v], float).reshape(-1, 2)
         self.low, self.high, self.ring, self.tiers = low, high, ring, tiers
+        self.boxes = np.array([self._box(k) for k in range(len(zones))]).reshape(-1, 4)
 
     def length(self, a, b):
         """Length [m] of the shortest way over the corners; inf: none."""
         a, b = np.asarray(a, float), np.asarray(b, float)
         met = self._met(a, b, np.zeros(len(self.rows), bool), a, b)
         while True:
-            x = np.vstack([a, b, *(self._around(k, a, b) for k in np.flatnonzero(met))])
+            levels = self._levels(met, a, b)
+            x = np.vstack([a, b, *(self._around(k, levels) for k in np.flatnonzero(met))])
             total, path = self._dijkstra(x, met, a, b)
             if not math.isfinite(total):
                 return total
@@ -143,7 +155,7 @@ class Dense:
     def _dijkstra(self, x, met, a, b):
         keep = np.flatnonzero(met)
         i, j, metres = _edges(x, self.rows[keep], self.corners, self.first[keep],
-                              self.count[keep], self._digs(a, b)[keep])
+                              self.count[keep], self._digs(a, b)[keep], self.boxes[keep])
         graph = csr_array((metres, (i, j)), shape=(len(x), len(x)))
         cost, parent = dijkstra(graph, directed=False, indices=0, return_predecessors=True)
         path = [1]
@@ -151,33 +163,36 @@ class Dense:
             path.append(parent[path[-1]])
         return cost[1], x[path]
 
-    def _heights(self, k, a, b):
-        low, high = self.rows[k, 5], self.rows[k, 6]
-        between = np.linspace(a[2], b[2], 4)
-        z = np.concatenate([between, [low - OUT, high + OUT, self.low, self.high]])
-        z = z[np.isfinite(z) & (z >= low - OUT) & (z <= high + OUT)]
-        return np.unique(z[(z >= self.low) & (z <= self.high)])
+    def _box(self, k):
+        flat = self.corners[self.first[k]:self.first[k] + self.count[k]]
+        reach = self.rows[k, 7] if len(flat) else self.rows[k, 4]
+        flat = flat if len(flat) else self.rows[k:k + 1, 1:3]
+        return [*(flat.min(0) - reach), *(flat.max(0) + reach)]
 
-    def _around(self, k, a, b):
-        kind, cx, cy, cz, radius = self.rows[k, :5]
+    def _levels(self, met, a, b):
+        """Heights that count: of both ends, in between, of the limits and of the zones met."""
+        ends = self.rows[met, 5] - OUT, self.rows[met, 6] + OUT
+        z = np.unique(np.concatenate([np.linspace(a[2], b[2], 4), [self.low, self.high], *ends]))
+        return z[np.isfinite(z) & (z >= self.low) & (z <= self.high)]
+
+    def _around(self, k, levels):
+        kind, cx, cy, cz, radius, low, high = self.rows[k, :7]
         angle = np.arange(self.ring) * 2 * np.pi / self.ring
-        if kind == 2:
-            plan = self._polygon(k)
+        wide = (radius + OUT) / math.cos(math.pi / self.ring)
+        circle = np.column_stack([np.cos(angle), np.sin(angle)])
+        if kind == 0:
+            tiers = cz + wide * np.sin(np.linspace(0, np.pi / 2, self.tiers))
+            z = np.unique(np.concatenate([tiers, levels[(levels > cz) & (levels < cz + wide)]]))
+            z = z[(z >= self.low) & (z <= self.high)]
+            share = np.sqrt(np.maximum(0.0, wide * wide - (z - cz) ** 2))
+            plans = [circle * s + np.array([cx, cy]) for s in share]
         else:
-            wide = (radius + OUT) / math.cos(math.pi / self.ring)
-            plan = np.column_stack([np.cos(angle), np.sin(angle)]) * wide
-        if kind != 0:
-            return np.vstack([np.empty((0, 3)), *(
-                np.column_stack([plan + (kind == 1) * np.array([cx, cy]), np.full(len(plan), z)])
-                for z in self._heights(k, a, b))])
-        up = np.unique(np.concatenate([
-            wide * np.sin(np.linspace(0, np.pi / 2, self.tiers)),
-            np.clip(np.array([a[2], b[2], self.high]) - cz, 0.0, wide)]))
-        up = up[(up + cz <= self.high) & (up + cz >= self.low)]
-        share = np.sqrt(np.maximum(0.0, 1 - (up / wide) ** 2))
-        return np.vstack([np.empty((0, 3)), *(
-            np.column_stack([plan * s + np.array([cx, cy]), np.full(len(plan), cz + u)])
-            for u, s in zip(up, share, strict=True))])
+            z = levels[(levels >= low - OUT) & (levels <= high + OUT)]
+            plan = self._polygon(k) if kind == 2 else circle * wide + np.array([cx, cy])
+            plans = [plan] * len(z)
+        rings = [np.column_stack([plan, np.full(len(plan), h)])
+                 for plan, h in zip(plans, z, strict=True)]
+        return np.vstack([np.empty((0, 3)), *rings])
 
     def _polygon(self, k):
         """Corners around the enlarged polygon and along its edges."""

@@ -5,23 +5,23 @@ from itertools import pairwise
 
 import numpy as np
 
-from uav_task_alloc.geometry.zones import distance, inside
-from uav_task_alloc.model import ThreatZone
+from uav_task_alloc.geometry.zones import inside
+from uav_task_alloc.model import Shape, ThreatZone
 
 CLEARANCE = 5.0  # [m] in all comparisons
 
 
 def random_zone(rng: np.random.Generator, name: str, side: float, size: float,
                 shapes: str = 'hcp') -> ThreatZone:
-    """A zone of about `size` [m] within a square of `side` [m]."""
+    """A zone of about `size` [m] within a square of `side` [m]; shape e: a dome above ground."""
     x, y = rng.uniform(0, side, 2)
     radius = size * rng.uniform(0.4, 1.0)
     margin = float(rng.choice([0.0, 5.0]))
     shape = rng.choice(list(shapes))
     low = float(rng.choice([-math.inf, 0.0, 40.0]))
     high = float(rng.choice([80.0, 150.0, math.inf]))
-    if shape == 'h':
-        return ThreatZone.hemisphere(name, (x, y, 0.0), radius, margin)
+    if shape in 'he':
+        return ThreatZone.hemisphere(name, (x, y, 40.0 * (shape == 'e')), radius, margin)
     if shape == 'c':
         return ThreatZone.cylinder(name, (x, y), radius, low, high, margin)
     count = int(rng.integers(3, 8))
@@ -62,12 +62,40 @@ def random_point(rng: np.random.Generator, zones: list[ThreatZone],
 def violations(points: list[tuple[float, float, float]], zones: list[ThreatZone],
                clearance: float = CLEARANCE) -> int:
     """Samples, one a metre, that are nearer to a zone than margin + clearance."""
-    count = 0
-    for a, b in pairwise(points):
-        steps = max(1, math.ceil(math.dist(a, b)))
-        for t in np.linspace(0.0, 1.0, steps + 1):
-            sample = tuple(p + t * (q - p) for p, q in zip(a, b, strict=True))
-            for zone in zones:
-                near = distance(sample, zone)
-                count += near < zone.margin + clearance - 1e-6 or near == 0.0
+    line, count = [], 0
+    for a, b in pairwise(np.asarray(points, float)):
+        steps = max(1, math.ceil(np.linalg.norm(b - a)))
+        line.append(a + np.linspace(0.0, 1.0, steps + 1)[:, None] * (b - a))
+    samples = np.vstack(line)
+    for zone in zones:
+        aside, above = apart(samples, zone)
+        near = np.hypot(np.maximum(0.0, aside), np.maximum(0.0, above))
+        inside_it = (aside < -1e-6) & (above < -1e-6)
+        count += int(np.sum(inside_it | (near < zone.margin + clearance - 1e-6)))
     return count
+
+
+def apart(samples: np.ndarray, zone: ThreatZone) -> tuple[np.ndarray, np.ndarray]:
+    """How far samples are from a zone, sideways and upwards [m]; both negative: inside."""
+    x, y, z = samples.T
+    if zone.shape is Shape.POLYGON:
+        return -_in_polygon(x, y, zone), np.maximum(zone.z_min - z, z - zone.z_max)
+    aside = np.hypot(x - zone.center[0], y - zone.center[1])
+    if zone.shape is Shape.CYLINDER:
+        return aside - zone.radius, np.maximum(zone.z_min - z, z - zone.z_max)
+    up = z - zone.center[2]
+    return (np.where(up >= 0, np.hypot(aside, up), aside) - zone.radius,
+            np.where(up > 0, np.minimum(-up, 0.0), -up))
+
+
+def _in_polygon(x: np.ndarray, y: np.ndarray, zone: ThreatZone) -> np.ndarray:
+    """Distance in plan to the polygon's edges [m], negative outside; by winding number."""
+    corners = np.array(zone.vertices)
+    edges = np.roll(corners, -1, axis=0) - corners
+    to = np.column_stack([x, y])[:, None] - corners
+    along = np.clip((to * edges).sum(2) / (edges * edges).sum(1), 0.0, 1.0)
+    edge = np.linalg.norm(to - along[..., None] * edges, axis=2).min(1)
+    next_to = np.roll(to, -1, axis=1)
+    turns = np.arctan2(to[..., 0] * next_to[..., 1] - to[..., 1] * next_to[..., 0],
+                       (to * next_to).sum(2)).sum(1)
+    return np.where(np.abs(turns) > np.pi, edge, -edge)

@@ -105,6 +105,37 @@ def test_a_dome_under_a_low_ceiling_is_passed_at_the_ceiling():
     assert violations([(-300, 10, 60), *points, (300, 10, 60)], [zone], 0.0) == 0
 
 
+def test_from_just_beside_a_hanging_cylinder_the_way_beneath_is_found():
+    zone = ThreatZone.cylinder('z', (0, 0), 230, 40.0, margin=5.0)
+    a, b = (235.5, 0.0, 45.0), (-400.0, 50.0, 45.0)
+    length, points = detour(a, b, [zone])
+    assert max(z for _, _, z in points) < 35
+    assert length == pytest.approx(10 + math.hypot(470, 37) + math.hypot(165, 15), rel=1e-2)
+    assert violations([a, *points, b], [zone], 0.0) == 0
+
+
+def test_beneath_a_lower_zone_the_way_keeps_low_around_the_next():
+    walls = [ThreatZone.cylinder('wall', (300, 0), 100),
+             ThreatZone.cylinder('left', (300, 400), 380, 40.0),
+             ThreatZone.cylinder('right', (300, -400), 380, 40.0)]
+    a, b = (0.0, 0.0, 60.0), (700.0, 0.0, 60.0)
+    length, points = detour(a, b, walls, altitude_min=0.0, altitude_max=100.0)
+    reference = Dense(walls, low=0.0, high=100.0).length(a, b)
+    assert length == pytest.approx(reference, rel=1e-2)
+    assert violations([a, *points, b], walls, 0.0) == 0
+
+
+@pytest.mark.parametrize(('start', 'low', 'high'), [
+    ((15.0, 160.0, 80.0), 0.0, 70.0), ((0.0, 160.0, 2.0), 5.0, 70.0)])
+def test_waypoints_keep_the_altitude_limits_though_an_end_is_beyond_them(start, low, high):
+    zones = [ThreatZone.hemisphere('dome', (44, 195, 80), 39, 5.0),
+             ThreatZone.cylinder('tower', (100, 100), 60),
+             ThreatZone.hemisphere('sunk', (200, 60, -30), 60)]
+    length, points = detour(start, (333, 2, 31), zones, altitude_min=low, altitude_max=high)
+    assert length < math.inf
+    assert all(low <= z <= high for _, _, z in points)
+
+
 def test_margin_and_clearance_are_kept():
     zone = ThreatZone.cylinder('z', (0, 0), 80, margin=10.0)
     a, b = (-250.0, 0.0, 50.0), (250.0, 0.0, 50.0)

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from uav_task_alloc.allocator import planning
 from uav_task_alloc.allocator.core import Allocator
 from uav_task_alloc.allocator.records import Action, UavReport
+from uav_task_alloc.geometry.distances import Distances
 from uav_task_alloc.model import Plan, Task, ThreatZone
 from uav_task_alloc.params import AllocatorParams
 
@@ -34,4 +35,5 @@ def rehearse(plan: Callable[..., Plan], params: AllocatorParams) -> int:
         answer = planning.solve(plan, asked, params, stop=lambda: False)
         allocator.adopt(answer, now=budget, stamp=0.0)
         before = answer.fresh
+    Distances([(0.0, 0.0, 0.0), (1.0, 0.0, 0.0)], ZONES).ensure([0], [1])
     return len(allocator.collect().lists)

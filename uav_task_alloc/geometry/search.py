@@ -21,9 +21,11 @@ from uav_task_alloc.geometry.obstacles import (
 
 
 @numba.njit(cache=True, nogil=True)
-def corner_bound(zone: Zone, ring: int) -> int:
-    """At most so many corners come from zone k."""
-    return 4 * ring + 1 if zone.kind != PRISM else 10 * zone.count
+def corner_bound(zone: Zone, ring: int, levels: int) -> int:
+    """At most so many corners come from a zone, with those at further levels."""
+    if zone.kind == PRISM:
+        return int((10 + 2 * levels) * zone.count)
+    return (4 + levels) * ring + 1
 
 
 @numba.njit(cache=True, nogil=True)
@@ -78,15 +80,14 @@ def _dome_corners(zone: Zone, way: Floats, limits: Floats, floor: float, ring: i
     n = _ring(zone, way, limits, radius, np.nan, ring, out, n)
     for step in range(1, 3):
         up = min(radius * math.sin(math.pi / 6 * step), limits[1] - zone.z)
-        if up > 0.0:
+        if up > 0.0 and zone.z + up >= limits[0]:
             n = _ring(zone, way, limits, math.sqrt(radius * radius - up * up),
                       zone.z + up, ring, out, n)
-    if zone.z + radius <= limits[1]:
-        out[n, 0], out[n, 1], out[n, 2] = (zone.x, zone.y,
-                                           zone.z + radius)
+    if limits[0] <= zone.z + radius <= limits[1]:
+        out[n, 0], out[n, 1], out[n, 2] = zone.x, zone.y, zone.z + radius
         n += 1
     under = zone.low - 1.5 * zone.skin
-    if floor < zone.low and under >= limits[0]:
+    if floor < zone.low and limits[0] <= under <= limits[1]:
         n = _ring(zone, way, limits, radius, under, ring, out, n)
     return n
 
@@ -167,6 +168,21 @@ def add_corners(zone: Zone, way: Floats, limits: Floats, floor: float, ring: int
             if not math.isnan(z):
                 n = _edge_corners(zone, way, z, zone.grow + 1.5 * zone.skin, out, n)
     return n
+
+
+@numba.njit(cache=True, nogil=True)
+def add_level(zone: Zone, way: Floats, limits: Floats, z: float, ring: int, out: Floats,
+              n: int) -> int:
+    """Write corners around a zone at a height where another zone ends; returns the new n."""
+    low = zone.z if zone.kind == DOME else zone.low
+    if not (max(low, limits[0]) < z < min(zone.high, limits[1])):
+        return n
+    if zone.kind == PRISM:
+        return _prism_corners(zone, way, limits, z, out, n)
+    radius = (zone.radius + 1.5 * zone.skin) / math.cos(math.pi / ring)
+    if zone.kind == DOME:
+        radius = math.sqrt(radius * radius - (z - zone.z) ** 2)
+    return _ring(zone, way, limits, radius, z, ring, out, n)
 
 
 @numba.njit(cache=True, nogil=True)

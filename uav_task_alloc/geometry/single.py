@@ -161,16 +161,24 @@ def _slide(rim: Floats, edge: int, z: float, p: Floats, q: Floats, x: Floats) ->
 
 
 @numba.njit(cache=True, nogil=True)
-def _over(rim: Floats, z: float, side: float, way: Floats, out: Floats) -> int:
+def _beside(zone: Zone, p: Floats) -> bool:
+    """Whether p is outside a cylinder in plan; it may be within its rim, that circumscribes it."""
+    return bool(zone.kind == CYLINDER
+                and math.hypot(p[0] - zone.x, p[1] - zone.y) > zone.radius + zone.skin)
+
+
+@numba.njit(cache=True, nogil=True)
+def _over(zone: Zone, rim: Floats, z: float, side: float, way: Floats, out: Floats) -> int:
     """Over the rim at height z (side 1), or beneath it (-1); 0: no such way."""
     enter, leave, s, t = _crossed(rim, way)
     climbs, sinks = side * (z - way[0, 2]) > 0.0, side * (z - way[1, 2]) > 0.0
-    if enter < 0 or leave < 0 or (climbs and s <= 0.0) or (sinks and t >= 1.0):
+    if (enter < 0 or leave < 0 or (climbs and s <= 0.0 and not _beside(zone, way[0]))
+            or (sinks and t >= 1.0 and not _beside(zone, way[1]))):
         return 0
     p, q = np.empty(3), np.empty(3)
     for m in range(2):
-        p[m] = way[0, m] + (s if climbs else 0.0) * (way[1, m] - way[0, m])
-        q[m] = way[0, m] + (t if sinks else 1.0) * (way[1, m] - way[0, m])
+        p[m] = way[0, m] + (max(0.0, s) if climbs else 0.0) * (way[1, m] - way[0, m])
+        q[m] = way[0, m] + (min(1.0, t) if sinks else 1.0) * (way[1, m] - way[0, m])
     p[2], q[2] = z if climbs else way[0, 2], z if sinks else way[1, 2]
     for _ in range(SLIDES if climbs and sinks else 4):
         if climbs:
@@ -187,6 +195,14 @@ def _over(rim: Floats, z: float, side: float, way: Floats, out: Floats) -> int:
         n += 1
     copy_point(way, 1, out, n)
     return n + 1
+
+
+@numba.njit(cache=True, nogil=True)
+def _over_bound(z: float, side: float, way: Floats) -> float:
+    """Over (or beneath) height z the way is at least so long [m]."""
+    up = max(0.0, side * (z - way[0, 2])) + max(0.0, side * (z - way[1, 2]))
+    return math.hypot(math.hypot(way[1, 0] - way[0, 0], way[1, 1] - way[0, 1]),
+                      max(up, abs(way[1, 2] - way[0, 2])))
 
 
 @numba.njit(cache=True, nogil=True)
@@ -218,13 +234,15 @@ def past_one(zone: Zone, way: Floats, limits: Floats, floor: float,
         return 0
     trial, best = np.empty((zone.hulls + 3, 3)), 0
     for side in (-1.0, 1.0):
-        z = zone.high + skin if side > 0.0 else zone.low - skin
-        if limits[0] <= z <= limits[1] and not math.isinf(z):
-            best = _keep_best(trial, _over(rim, z, side, way, trial), out, best)
         if zone.kind == CYLINDER:
             n = _bend(centre, zone.radius + skin, way, True, trial) if side > 0.0 else 0
         else:
             n = _wrap(hull, way, side, trial)
         _rise(trial, n)
         best = _keep_best(trial, n, out, best)
+    for side in (-1.0, 1.0):
+        z = zone.high + skin if side > 0.0 else zone.low - skin
+        if limits[0] <= z <= limits[1] and not math.isinf(z) and (
+                best == 0 or _over_bound(z, side, way) < length_of(out, best)):
+            best = _keep_best(trial, _over(zone, rim, z, side, way, trial), out, best)
     return best

@@ -11,7 +11,7 @@ import math
 import numba
 import numpy as np
 
-from uav_task_alloc.geometry.obstacles import Floats, Ints, Zones, blocked
+from uav_task_alloc.geometry.obstacles import Floats, Ints, Zone, Zones, blocked
 
 MAX_CORNERS = 96  # of a way while it is worked on
 CUT_GAIN = 1e-3  # a further corner must shorten the way by this share
@@ -51,6 +51,25 @@ def length_of(p: Floats, n: int) -> float:
 
 
 @numba.njit(cache=True, nogil=True)
+def _off_box(zone: Zone, p: Floats, i: int) -> float:
+    dx = max(zone.x0 - p[i, 0], p[i, 0] - zone.x1, 0.0)
+    dy = max(zone.y0 - p[i, 1], p[i, 1] - zone.y1, 0.0)
+    dz = max(zone.z0 - p[i, 2], p[i, 2] - zone.z1, 0.0)
+    return math.sqrt(dx * dx + dy * dy + dz * dz)
+
+
+@numba.njit(cache=True, nogil=True)
+def zones_near(o: Zones, among: Ints, p: Floats, i: int, j: int, length: float) -> Ints:
+    """Those `among` the zones that a way of at most `length` from p[i] to p[j] could meet."""
+    near, n = np.empty(among.size, np.int64), 0
+    for m in range(among.size):
+        if _off_box(o[among[m]], p, i) + _off_box(o[among[m]], p, j) <= length:
+            near[n] = among[m]
+            n += 1
+    return near[:n]
+
+
+@numba.njit(cache=True, nogil=True)
 def drop_corners(o: Zones, near: Ints, p: Floats, n: int, floor: float, snug: bool) -> int:
     """Leave out every corner whose neighbours see each other; returns the new n."""
     i = 1
@@ -72,9 +91,13 @@ def _fits(o: Zones, near: Ints, p: Floats, i: int, q: Floats, limits: Floats, fl
     """Whether corner i may move to q."""
     if q[2] < limits[0] or q[2] > limits[1]:
         return False
-    return free(o, near, p[i - 1, 0], p[i - 1, 1], p[i - 1, 2], q[0], q[1], q[2], floor,
-                snug) and free(o, near, q[0], q[1], q[2], p[i + 1, 0], p[i + 1, 1], p[i + 1, 2],
-                               floor, snug)
+    x, y, z = q[0], q[1], q[2]
+    for m in range(near.size):
+        zone = o[near[m]]
+        if (blocked(zone, p[i - 1, 0], p[i - 1, 1], p[i - 1, 2], x, y, z, floor, snug)
+                or blocked(zone, x, y, z, p[i + 1, 0], p[i + 1, 1], p[i + 1, 2], floor, snug)):
+            return False
+    return True
 
 
 @numba.njit(cache=True, nogil=True)
@@ -123,7 +146,7 @@ def _press(o: Zones, near: Ints, p: Floats, i: int, axes: Floats, q: Floats, t: 
            turn: float, s: float, limits: Floats, floor: float, snug: bool) -> float:
     """The least offset, from the good one s inwards, at which corner i fits."""
     low, high = 0.0, s
-    for _ in range(8):
+    for _ in range(6):
         middle = 0.5 * (low + high)
         _put(q, p, i, axes, t, turn, middle)
         if _fits(o, near, p, i, q, limits, floor, snug):
@@ -141,6 +164,7 @@ def pull(o: Zones, near: Ints, p: Floats, i: int, limits: Floats, floor: float, 
     chord, t, s = _axes(p, i, axes)
     if s < 1e-6:
         return
+    near = zones_near(o, near, p, i - 1, i + 1, span(p, i - 1, i) + span(p, i, i + 1))
     s = _press(o, near, p, i, axes, q, t, 0.0, s, limits, floor, snug)
     turn, step_t, step_turn = 0.0, 0.25 * min(chord, 4.0 * s), 0.4
     for _ in range(rounds):
@@ -174,15 +198,20 @@ def pull_all(o: Zones, near: Ints, p: Floats, n: int, limits: Floats, floor: flo
             break
         before = total
         for i in range(1, n - 1):
-            pull(o, near, p, i, limits, floor, snug, 2 + rounds)
+            pull(o, near, p, i, limits, floor, snug, 1 + rounds)
     return n
 
 
 @numba.njit(cache=True, nogil=True)
-def _cut(o: Zones, near: Ints, p: Floats, i: int, floor: float, snug: bool) -> float:
+def _cut(o: Zones, near: Ints, p: Floats, i: int, limits: Floats, floor: float,
+         snug: bool) -> float:
     """How far from corner i, on both its legs, the corner can be cut off."""
     before, after = span(p, i - 1, i), span(p, i, i + 1)
     low, high = 0.0, 0.98 * min(before, after)
+    for j, leg in ((i - 1, before), (i + 1, after)):  # an end may lie beyond the limits
+        if not limits[0] <= p[j, 2] <= limits[1]:
+            edge = limits[0] if p[j, 2] < limits[0] else limits[1]
+            high = min(high, leg * (edge - p[i, 2]) / (p[j, 2] - p[i, 2]))
     for _ in range(7):
         d = 0.5 * (low + high)
         f, g = d / before, d / after
@@ -207,7 +236,8 @@ def _chord(p: Floats, i: int, before: float, after: float) -> float:
 
 
 @numba.njit(cache=True, nogil=True)
-def cut_corners(o: Zones, near: Ints, p: Floats, n: int, floor: float, snug: bool) -> int:
+def cut_corners(o: Zones, near: Ints, p: Floats, n: int, limits: Floats, floor: float,
+                snug: bool) -> int:
     """Replace each corner by two where that shortens the way enough; returns the new n."""
     least = CUT_GAIN * length_of(p, n)
     i = 1
@@ -217,7 +247,7 @@ def cut_corners(o: Zones, near: Ints, p: Floats, n: int, floor: float, snug: boo
         if bend < least:
             i += 1
             continue
-        d = _cut(o, near, p, i, floor, snug)
+        d = _cut(o, near, p, i, limits, floor, snug)
         if d * (2.0 - _chord(p, i, before, after)) < least:
             i += 1
             continue
@@ -235,9 +265,9 @@ def cut_corners(o: Zones, near: Ints, p: Floats, n: int, floor: float, snug: boo
 def tauten(o: Zones, near: Ints, p: Floats, n: int, limits: Floats, floor: float,
            snug: bool) -> int:
     """Shorten the clear way p[:n] in place, keeping it clear; returns the new n."""
-    n = pull_all(o, near, p, n, limits, floor, snug, 5)
+    n = pull_all(o, near, p, n, limits, floor, snug, 3)
     for _ in range(4):
-        more = cut_corners(o, near, p, n, floor, snug)
+        more = cut_corners(o, near, p, n, limits, floor, snug)
         if more == n:
             break
         n = pull_all(o, near, p, more, limits, floor, snug, 2)

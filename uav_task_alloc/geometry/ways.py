@@ -6,17 +6,23 @@ never longer than that past all, so when it happens to be clear of all, it is th
 """
 from __future__ import annotations
 
-import math
-
 import numba
 import numpy as np
 
-from uav_task_alloc.geometry.obstacles import Floats, Ints, Zone, Zones, blocked
-from uav_task_alloc.geometry.search import add_corners, astar, corner_bound
+from uav_task_alloc.geometry.obstacles import Floats, Ints, Zones, blocked
+from uav_task_alloc.geometry.search import add_corners, add_level, astar, corner_bound
 from uav_task_alloc.geometry.single import past_one
-from uav_task_alloc.geometry.taut import MAX_CORNERS, copy_point, length_of, span, tauten
+from uav_task_alloc.geometry.taut import (
+    MAX_CORNERS,
+    copy_point,
+    length_of,
+    span,
+    tauten,
+    zones_near,
+)
 
-RINGS = (12, 24, 64)  # corners around a zone; finer ones only where no way was found
+RINGS = (12, 24, 64)  # corners around a zone; finer ones where no way was found
+COARSE = 2  # zones at most in the way for which the first ring is fine enough
 
 
 @numba.njit(cache=True, nogil=True)
@@ -45,20 +51,34 @@ def hit_by(o: Zones, p: Floats, i: int, j: int, floor: float, snug: bool, hit: I
 
 
 @numba.njit(cache=True, nogil=True)
+def _corners(o: Zones, active: Ints, count: int, way: Floats, limits: Floats, floor: float,
+             ring: int, x: Floats) -> int:
+    """Both ends and the corners of the active zones into x; returns their number."""
+    copy_point(way, 0, x, 0)
+    copy_point(way, 1, x, 1)
+    n = 2
+    for m in range(count):
+        zone = o[active[m]]
+        n = add_corners(zone, way, limits, floor, ring, x, n)
+        if ring > RINGS[0]:
+            for k in range(count):
+                other = o[active[k]]
+                n = add_level(zone, way, limits, other.low - 1.5 * other.skin, RINGS[0], x, n)
+                n = add_level(zone, way, limits, other.high + 1.5 * other.skin, RINGS[0], x, n)
+    return n
+
+
+@numba.njit(cache=True, nogil=True)
 def _search(o: Zones, way: Floats, limits: Floats, floor: float, snug: bool, ring: int,
             hit: Ints, out: Floats) -> int:
     """A clear, coarse way into out; marks the zones it had to heed in hit. 0: none found."""
     while True:
-        active, count, bound = np.empty(o.size, np.int64), 0, 2
-        for k in range(o.size):
-            if hit[k]:
-                active[count], count = k, count + 1
-                bound += corner_bound(o[k], ring)
-        x, n, path = np.empty((bound, 3)), 2, np.empty(bound, np.int64)
-        copy_point(way, 0, x, 0)
-        copy_point(way, 1, x, 1)
+        active, bound = np.flatnonzero(hit), 2
+        count = active.size
         for m in range(count):
-            n = add_corners(o[active[m]], way, limits, floor, ring, x, n)
+            bound += corner_bound(o[active[m]], ring, 2 * count)
+        x, path = np.empty((bound, 3)), np.empty(bound, np.int64)
+        n = _corners(o, active, count, way, limits, floor, ring, x)
         size = astar(o, active, count, x, n, floor, snug, path)
         if size == 0 or size > MAX_CORNERS // 2:
             return 0
@@ -69,25 +89,6 @@ def _search(o: Zones, way: Floats, limits: Floats, floor: float, snug: bool, rin
                 new += hit_by(o, out, i - 1, i, floor, snug, hit)
         if new == 0:
             return size
-
-
-@numba.njit(cache=True, nogil=True)
-def _off_box(zone: Zone, p: Floats, i: int) -> float:
-    dx = max(zone.x0 - p[i, 0], p[i, 0] - zone.x1, 0.0)
-    dy = max(zone.y0 - p[i, 1], p[i, 1] - zone.y1, 0.0)
-    dz = max(zone.z0 - p[i, 2], p[i, 2] - zone.z1, 0.0)
-    return math.sqrt(dx * dx + dy * dy + dz * dz)
-
-
-@numba.njit(cache=True, nogil=True)
-def zones_near(o: Zones, way: Floats, length: float) -> Ints:
-    """The zones that a way of at most `length` between the ends could meet."""
-    near, n = np.empty(o.size, np.int64), 0
-    for k in range(o.size):
-        if _off_box(o[k], way, 0) + _off_box(o[k], way, 1) <= length:
-            near[n] = k
-            n += 1
-    return near[:n]
 
 
 @numba.njit(cache=True, nogil=True)
@@ -132,10 +133,10 @@ def shortest(o: Zones, way: Floats, limits: Floats, snug: bool,
     hit_by(o, way, 0, 1, floor, snug, hit)
     for ring in RINGS:
         n = _search(o, way, limits, floor, snug, ring, hit, out)
-        if n:
+        if n and (ring > RINGS[0] or hit.sum() <= COARSE):
             break
     if n == 0:
         return 0, np.inf
-    near = zones_near(o, way, length_of(out, n))
+    near = zones_near(o, np.arange(o.size), way, 0, 1, length_of(out, n))
     n = tauten(o, near, out, n, limits, floor, snug)
     return n, length_of(out, n)
