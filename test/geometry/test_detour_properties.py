@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings, strategies as st
 from scenes import CLEARANCE, random_point, random_zones, violations
 
-from uav_task_alloc.geometry.detour import detour
+from uav_task_alloc.geometry.detour import detour, find_detour
 from uav_task_alloc.model import Shape, ThreatZone
 
 RUNS = settings(derandomize=True, deadline=None, max_examples=40)
@@ -62,6 +62,48 @@ def test_more_zones_never_make_it_shorter(scene):
     lengths = [way(a, b, zones[:count])[0] for count in range(len(zones) + 1)]
     for fewer, more in pairwise(lengths):
         assert more >= fewer * (1 - TOLERANCE)
+
+
+@st.composite
+def odd_scenes(draw):
+    """Zones that touch, nest, hang and are tiny, also far away; ends anywhere, also inside."""
+    rng = np.random.default_rng(draw(st.integers(0, 10_000)))
+    east, north = draw(st.sampled_from([(0.0, 0.0), (1e5, -7e4)]))
+    low, high = draw(st.sampled_from([(-math.inf, math.inf), (5.0, 90.0)]))
+    zones = []
+    for k in range(draw(st.integers(1, 3))):
+        x, y = rng.uniform(0, 500, 2) + (east, north)
+        r, margin = float(rng.choice([0.1, 40.0, 120.0])), float(rng.choice([0.0, 5.0]))
+        zones += [
+            ThreatZone.cylinder(f'c{k}', (x, y), r, 30.0, 60.0, margin),
+            ThreatZone.cylinder(f'touching{k}', (x + 2 * r + 2 * margin, y), r, margin=margin),
+            ThreatZone.hemisphere(f'nested{k}', (x, y, 20.0), 0.5 * r, margin),
+            ThreatZone.polygon(f'dented{k}', [(x, y), (x + r, y - r), (x + r, y + r),
+                                              (x + 0.8 * r, y)], -math.inf, 50.0, margin)]
+    ends = [(float(rng.uniform(-50, 550) + east), float(rng.uniform(-50, 550) + north),
+             float(rng.uniform(5, 90))) for _ in range(2)]
+    return zones, ends, low, high
+
+
+@RUNS
+@given(odd_scenes())
+def test_whatever_the_scene_a_way_is_clear_once_it_is_outside_and_keeps_the_limits(scene):
+    zones, (a, b), low, high = scene
+    found = find_detour(a, b, zones, altitude_min=low, altitude_max=high)
+    if math.isinf(found.length):
+        assert found.goal_inside or found.closed_off
+        return
+    line = [*found.points, b] if found.start_inside else [a, *found.points, b]
+    assert violations(line, zones, 0.0) == 0
+    assert all(low <= z <= high for _, _, z in found.points)
+    assert found.length >= math.dist(a, b) * (1 - 1e-9)
+
+
+@RUNS
+@given(scenes())
+def test_the_same_place_twice_is_no_way_at_all(scene):
+    zones, (a, _) = scene
+    assert way(a, a, zones) == (0.0, ())
 
 
 def changed(zone, scale=1.0, turn=0.0):

@@ -42,3 +42,15 @@ def test_the_reference_knows_the_circle():
     zone = ThreatZone.cylinder('z', (0, 0), 80)
     exact = 2 * math.sqrt(250 ** 2 - 80 ** 2) + 160 * math.asin(80 / 250)
     assert Dense([zone]).length((-250, 0, 5), (250, 0, 5)) == pytest.approx(exact, rel=4e-3)
+
+
+def test_a_denser_reference_gains_less_than_its_bound():
+    rng = np.random.default_rng(4)
+    gains = []
+    for _ in range(4):
+        zones = random_zones(rng, 3, False, 700.0, shapes='hcpe')
+        a, b = random_point(rng, zones, 700.0), random_point(rng, zones, 700.0)
+        coarse, fine = (Dense(zones, CLEARANCE, low=0.0, ring=ring, tiers=tiers).length(a, b)
+                        for ring, tiers in ((24, 5), (48, 9)))
+        gains.append(coarse / fine - 1)
+    assert max(gains) <= 1 / math.cos(math.pi / 24) - 1
