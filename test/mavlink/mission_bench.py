@@ -1,16 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Joins our machines to simulated vehicles by bytes over virtual time, on a line that may fail."""
+"""Joins an upload to a simulated autopilot by bytes over virtual time, on a line that may fail."""
 import heapq
 import itertools
 import random
 
 from uav_task_alloc.geometry.frames import Origin
 from uav_task_alloc.mavlink.codec import Codec
-from uav_task_alloc.mavlink.ground import Ground, Station
 from uav_task_alloc.mavlink.peer import Peer
-from uav_task_alloc.mavlink.policy import Policy
 from uav_task_alloc.mavlink.profiles import ARDUPILOT, PX4
-from uav_task_alloc.mavlink.status import state_of
 from uav_task_alloc.mavlink.transfer import Mission
 from uav_task_alloc.mavlink.upload import Upload
 from uav_task_alloc.mavlink.vehicle import AUTOPILOTS, Vehicle
@@ -163,115 +160,3 @@ class UploadBench:
         return len(held) == len(sent) and all(
             a[:3] == b[:3] and abs(a[3] - b[3]) < 0.02 for a, b in zip(
                 held[own:], sent[own:], strict=True))
-
-
-class FlightBench:
-    """A ground station with simulated vehicles, each on a line of its own to it."""
-
-    def __init__(self, *kinds, seed=0, loss=0.0, delay=(0.0, 0.0), takeoff=True, configs=None,
-                 tick=0.1, **policy):
-        self.now, self.tick = 0.0, tick
-        self.seed, self.policy = seed, Policy(takeoff=takeoff, **policy)
-        self.vehicles = {n: make_vehicle(kind, n, **(configs or {}).get(n, {}))
-                         for n, kind in enumerate(kinds, 1)}
-        self.line = Line(seed, loss, delay)
-        self.codecs = {('down', n): Codec(n, 1) for n in self.vehicles}
-        self.ears = {('up', n): Codec(*OURS) for n in self.vehicles}
-        self.truth = {n: [] for n in self.vehicles}  # events on board
-        self.start()
-
-    def start(self):
-        """A new bridge, as after kill -9: it knows nothing."""
-        self.ground = Ground(Station(origin=ORIGIN, policy=self.policy),
-                             random.Random(self.seed))
-        for n in self.vehicles:
-            self.codecs['up', n] = Codec(*OURS)
-            self.ears['down', n] = Codec(*OURS)
-        for n in self.vehicles:
-            self.ears['up', n] = Codec(n, 1)
-        self.events, self.notes = [], []
-
-    def pilot(self, n=1):
-        return self.ground.served[n].pilot
-
-    def board(self, n=1):
-        return self.pilot(n).board
-
-    def assign(self, tasks, n=1):
-        self._up(self.ground.assign(f'uav_{n}', tasks, self.now))
-
-    def says(self, message, n=1):
-        """Something that comes from a vehicle without it."""
-        self._up(self.ground.receive(n, self.ears['down', n].parse(
-            self.codecs['down', n].pack(message))[0], self.now))
-        self._collect()
-
-    def tells(self, message, n=1, system=255):
-        """Something another ground station sends to a vehicle."""
-        for m in self.ears['up', n].parse(Codec(system, 190).pack(message)):
-            self._down(n, self.vehicles[n].receive(m, self.now))
-
-    def run(self, until=lambda: False, limit=300.0):
-        """Let time pass until the condition holds; True where it did."""
-        end = self.now + limit
-        while self.now < end:
-            self._move()
-            if until():
-                return True
-            self.now += self.tick
-        return bool(until())
-
-    def found(self):
-        """Until all vehicles are known."""
-        assert self.run(lambda: len(self.ground.served) == len(self.vehicles), 30.0)
-        return self
-
-    def completed(self, n=1):
-        return [e.task for u, e in self.events if u == f'uav_{n}' and e.event == 'COMPLETED']
-
-    def started(self, n=1):
-        return [e.task for u, e in self.events if u == f'uav_{n}' and e.event == 'STARTED']
-
-    def failed(self, n=1):
-        return [e.task for u, e in self.events if u == f'uav_{n}' and e.event == 'FAILED']
-
-    def state(self, n=1):
-        return state_of(self.ground.served[n], self.now)
-
-    def flown(self, n=1, radius=3.0):
-        """Places [m] where the vehicle really reached an item, in order."""
-        return [tuple(round(c) for c in e.point) for e in self.truth[n]
-                if e.name == 'item_reached']
-
-    def _move(self):
-        for n, vehicle in self.vehicles.items():
-            self._down(n, vehicle.step(self.now))
-        self._up(self.ground.step(self.now))
-        busy = True
-        while busy:
-            busy = False
-            for direction, n, frame in self.line.due(self.now):
-                busy = True
-                for m in self.ears[direction, n].parse(frame):
-                    if direction == 'up':
-                        self._down(n, self.vehicles[n].receive(m, self.now))
-                    else:
-                        self._up(self.ground.receive(n, m, self.now))
-        self._collect()
-
-    def _collect(self):
-        for served in self.ground.served.values():
-            while served.pilot.events:
-                self.events.append((served.uav_id, served.pilot.events.popleft()))
-            while served.pilot.notes:
-                self.notes.append(served.pilot.notes.popleft().text)
-        for n, vehicle in self.vehicles.items():
-            self.truth[n] += vehicle.take_events()
-
-    def _up(self, outgoing):
-        for n, m in outgoing:
-            self.line.send('up', n, self.codecs['up', n], m, self.now)
-
-    def _down(self, n, messages):
-        for m in messages:
-            self.line.send('down', n, self.codecs['down', n], m, self.now)

@@ -3,7 +3,8 @@
 import random
 
 import pytest
-from mission_bench import FlightBench, UploadBench, task_list
+from flight_bench import FlightBench
+from mission_bench import UploadBench, task_list
 from pymavlink.dialects.v20 import ardupilotmega as d
 
 from uav_task_alloc.mavlink.board import MissionState

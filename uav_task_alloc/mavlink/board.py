@@ -2,13 +2,10 @@
 """What one vehicle has on board against what it should have: the list, the mission, its state."""
 from __future__ import annotations
 
-import math
 import random
 from collections import deque
 from dataclasses import dataclass, replace
 from enum import Enum
-
-from pymavlink.dialects.v20 import ardupilotmega as d
 
 from uav_task_alloc.errors import MissionError
 from uav_task_alloc.geometry.frames import Origin
@@ -16,19 +13,20 @@ from uav_task_alloc.mavlink.change import Change, Kind, change
 from uav_task_alloc.mavlink.codec import Message, plan_id
 from uav_task_alloc.mavlink.helm import Note
 from uav_task_alloc.mavlink.peer import NO_SPACE, Peer
-from uav_task_alloc.mavlink.profiles import Flight, Profile
+from uav_task_alloc.mavlink.profiles import Profile
 from uav_task_alloc.mavlink.progress import ProgressTable
+from uav_task_alloc.mavlink.recall import Recall
 from uav_task_alloc.mavlink.telemetry import Telemetry
 from uav_task_alloc.mavlink.transfer import Accepted, Failed, Held, Mission, Verified
 from uav_task_alloc.mavlink.upload import Upload
 from uav_task_alloc.mission import (
     Item,
     TaskList,
-    alike,
     all_alike,
     home_item,
     mission_items,
 )
+from uav_task_alloc.model import Task
 
 NEAR = 15.0  # [m] from a point, beyond its radius: there
 
@@ -58,6 +56,7 @@ class Board:
                  rng: random.Random) -> None:
         self.upload = Upload(peer, idle_after=profile.idle_after, rng=rng)
         self.progress = ProgressTable()
+        self.recall = Recall(profile, origin, telemetry, self.progress)
         self.own = int(profile.rules.home_first)
         self.tasks: TaskList | None = None
         self.held: tuple[Item, ...] | None = None  # None: to be read
@@ -67,7 +66,6 @@ class Board:
         self.trouble = False  # the last transfer failed; somebody decides when to try again
         self.verified_at = 0.0  # [s]
         self.read_once = False  # since the vehicle was first heard or restarted
-        self.caught_up = False  # with what was flown before
         self.must_jump: int | None = None  # the item to fly now, where the upload did not say it
         self._profile, self._origin, self._telemetry = profile, origin, telemetry
         self._refused: set[str] = set()
@@ -76,6 +74,7 @@ class Board:
         self._uploading: tuple[Change, int] | None = None  # and the revision it is for
         self._begun = False  # the epoch of this upload
         self.plan_id = self._heard_plan = 0  # PX4's id of the mission verified, last heard
+        self._recalled: tuple[TaskList, int] | None = None
         self._wanted: tuple[object, tuple[Item, ...]] | None = None
 
     @property
@@ -164,37 +163,23 @@ class Board:
         self.upload.reset()
         self.progress.invalidate()
         self.held, self._uploading, self._state = None, None, MissionState.UNKNOWN
-        self.read_once = self.caught_up = False
+        self.read_once = False
+        self.recall.reset()
 
     def doubt(self) -> None:
         """Read what is on board before anything else."""
         self.held = None
 
     def catch_up(self, now: float) -> None:
-        """Complete, once, what the vehicle has flown before anybody listened."""
-        held, telemetry = self.held, self._telemetry
-        if self.caught_up or not held or telemetry.current is None:
-            self.caught_up = self.caught_up or not held
-            return
-        self.caught_up = True
-        if not self._profile.atomic and telemetry.flight is not Flight.MISSION:
-            self.progress.begin(held, None, now)  # held for a swap: current is of the old items
-            return
-        wanted = self.wanted()
-        current = min(max(0, telemetry.current - self.own), len(held))
-        flown = held if self._ended(held, wanted, current) else held[:current]
-        self.progress.begin(held, len(flown), now)
-        self.progress.caught_up(item.task for item in wanted if item.completes and any(
-            alike(item, other) for other in flown))
+        """Complete what the vehicle has flown before anybody listened."""
+        memory = self.recall.memory(now)
+        if memory and self.tasks and (self.tasks, len(memory)) != self._recalled:
+            self._recalled = self.tasks, len(memory)
+            self.progress.caught_up(self.recall.flown(self.open_tasks(), now))
 
-    def _ended(self, held: tuple[Item, ...], wanted: tuple[Item, ...], current: int) -> bool:
-        telemetry = self._telemetry
-        if telemetry.mission_state == d.MISSION_STATE_COMPLETE:
-            return True
-        last = next((item for item in wanted if alike(item, held[-1])), None)
-        return (self._profile.atomic and telemetry.airborne and telemetry.flight is Flight.HOLD
-                and current == len(held) - 1 and last is not None and last.position is not None
-                and math.dist(telemetry.position, last.position) < last.radius + NEAR)
+    def open_tasks(self) -> tuple[Task, ...]:
+        """Those of the list that are still to be flown, and can be."""
+        return tuple(stop.task for stop in self.remaining().stops) if self.wanted() else ()
 
     def infeasible(self, reason: str) -> None:
         """The vehicle stores the mission, and will not fly it."""
@@ -225,6 +210,7 @@ class Board:
         if found.kind is Kind.APPEND:
             self.progress.extend(found.items)
             return
+        self.recall.stash()
         self.progress.begin(found.items, found.start, now)
         if not self._profile.atomic:
             self.must_jump = found.start
@@ -247,6 +233,7 @@ class Board:
         self.held, self.verified_at, self.plan_id = held, now, self._heard_plan
         if self._state is MissionState.VERIFIED or (self.tasks is None and held):
             self._state = MissionState.FOREIGN
+        self.recall.stash()
         current = self._telemetry.current
         self.progress.begin(held, None if current is None or not held
                             else max(0, current - self.own), now)

@@ -33,8 +33,8 @@ def change(held: tuple[Item, ...], current: int | None, wanted: tuple[Item, ...]
 
     `wanted` begins with the way to its first task. Detour points of it that have been flown are
     not flown again; those that have not are, even where the vehicle is beyond: a zone is there.
-    No jump leaves out a task that is not `done`: after a restart of the bridge, what lies behind
-    has been flown.
+    No jump leaves out a task that is not `done`, nor an item that may be one: after a restart of
+    the bridge, what lies behind has been flown.
     """
     if not wanted:
         raise ValueError('wanted items = (): expected at least one')
@@ -45,7 +45,7 @@ def change(held: tuple[Item, ...], current: int | None, wanted: tuple[Item, ...]
             return Change(Kind.KEEP, _retag(held, current, wanted[passed:]), current)
     start = len(held) - len(wanted)
     if start >= 0 and all_alike(wanted, held[start:]) and not any(
-            item.completes and item.task not in done for item in held[current or 0:start]):
+            _may_be_open(item, done) for item in held[current or 0:start]):
         return Change(Kind.JUMP, _retag(held, start, wanted), start)
     if current is not None and rest and passed is not None:
         ahead = wanted[passed:]
@@ -53,6 +53,10 @@ def change(held: tuple[Item, ...], current: int | None, wanted: tuple[Item, ...]
             return Change(Kind.APPEND, held[:current] + ahead, current)
         return Change(Kind.SWAP, wanted, passed)
     return Change(Kind.SWAP, wanted, 0)
+
+
+def _may_be_open(item: Item, done: Container[str]) -> bool:
+    return item.task not in done if item.completes else item.position is None
 
 
 def _passed(held: tuple[Item, ...], current: int, wanted: tuple[Item, ...]) -> int | None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import random
 from collections.abc import Collection, Hashable, Iterable
 from dataclasses import dataclass, field
+from itertools import permutations
 
 from pymavlink.dialects.v20 import ardupilotmega as d
 
@@ -50,6 +51,7 @@ class Ground:
     def __init__(self, station: Station, rng: random.Random) -> None:
         self._station, self._rng = station, rng
         self.served: dict[int, Served] = {}  # by system id
+        self._shared: list[tuple[TaskList | None, int]] = []  # lists and memories seen
 
     def receive(self, address: Address, message: Message, now: float) -> Outgoing:
         """Take a message that came in at `address`."""
@@ -71,6 +73,7 @@ class Ground:
     def step(self, now: float) -> Outgoing:
         """Let time pass for all."""
         out: Outgoing = []
+        self._share(now)
         for served in self.served.values():
             out += self._sent(served, served.pilot.step(now))
         return out
@@ -81,6 +84,18 @@ class Ground:
             if served.uav_id == uav_id:
                 return self._sent(served, served.pilot.assign(tasks, now))
         raise UnknownName('uav', uav_id, [s.uav_id for s in self.served.values()])
+
+    def _share(self, now: float) -> None:
+        """What one has flown before we listened is not flown by another who has it now."""
+        pilots = [(s.uav_id, s.pilot) for s in self.served.values()]
+        known: list[tuple[TaskList | None, int]] = [
+            (p.board.tasks, len(p.board.recall.memory(now))) for _, p in pilots]
+        if known == self._shared or not any(flown for _, flown in known):
+            return
+        self._shared = known
+        for (_, has), (other, did) in permutations(pilots, 2):
+            if has.board.tasks is not None:
+                has.relieve(did.board.recall.flown(has.board.open_tasks(), now), other)
 
     def _discover(self, address: Address, message: Message, now: float) -> Served | None:
         station, system = self._station, message.get_srcSystem()

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 import random
 from collections import deque
+from collections.abc import Sequence
 
 from pymavlink.dialects.v20 import ardupilotmega as d
 
@@ -21,14 +22,15 @@ from uav_task_alloc.mavlink.peer import Peer
 from uav_task_alloc.mavlink.policy import Policy, TaskProgress
 from uav_task_alloc.mavlink.profiles import Flight, Profile
 from uav_task_alloc.mavlink.rates import Rates
-from uav_task_alloc.mavlink.telemetry import Telemetry
+from uav_task_alloc.mavlink.telemetry import UNKNOWN, Telemetry
 from uav_task_alloc.mavlink.upload import State
-from uav_task_alloc.mission import RETURN, TaskList, all_alike
+from uav_task_alloc.mission import RETURN, Item, TaskList, alike, all_alike
 
 SETTLE = 3.0  # [s] in which messages sent before the last change may still come
 CHECK = 60.0  # [s] between readbacks of a mission that nobody should have changed
 LAST_WORD = 5.0  # [s] for a late REACHED, where the mission seems to end before its last item
 REMIND = 2.0  # [s] that a list may ask for what is completed before that is told again
+ARRIVAL = 2.0  # [s] before a task is reached, in which no swap is begun
 SERVICE = 10.0  # [s] beyond its hold that a service is waited for
 
 
@@ -53,7 +55,7 @@ class Pilot:
         self._restarts = 0
         self._said = ''  # by the vehicle, last
         self._rules = (self._linked, self.helm.finish, self._upload, self._read, self._has_list,
-                       self._yield, self._catch_up, self._empty, self._bring, self._rise,
+                       self._yield, self._place, self._empty, self._bring, self._rise,
                        self._fly)
 
     def assign(self, tasks: TaskList, now: float) -> list[Message]:
@@ -65,6 +67,12 @@ class Pilot:
             stop.task.id for stop in tasks.stops if stop.task.id in self.board.progress.completed)
         self.helm.encourage(now)
         return self._act(now)
+
+    def relieve(self, tasks: Sequence[str], other: str) -> None:
+        """Tasks of the list that another UAV has flown before we listened."""
+        for task in tasks:
+            self.notes.append(Note('info', f'{task} was flown by {other}, unheard'))
+        self.board.progress.caught_up(tasks)
 
     def receive(self, message: Message, now: float) -> list[Message]:
         """Take any message of this vehicle."""
@@ -93,6 +101,7 @@ class Pilot:
 
     def _act(self, now: float) -> list[Message]:
         out: list[Message] = []
+        self.board.catch_up(now)
         for rule in self._rules:
             step = rule(now)
             if step is not None:
@@ -123,7 +132,8 @@ class Pilot:
         elif kind == 'MISSION_ITEM_REACHED':
             progress.reached(message.seq - own, now)
         elif kind == 'MISSION_CURRENT' and not self.board.open:
-            progress.moved(max(0, message.seq - own), now)
+            if self.board.must_jump is None:  # else it is left from the mission before
+                progress.moved(max(0, message.seq - own), now)
             if (message.mission_state == d.MISSION_STATE_COMPLETE
                     and self.telemetry.flight is Flight.MISSION):
                 progress.ended()
@@ -213,12 +223,14 @@ class Pilot:
         self.yielding = False
         return None
 
-    def _catch_up(self, now: float) -> Step:
-        """After a restart of the bridge: what was flown meanwhile is completed, not repeated."""
+    def _place(self, now: float) -> Step:
+        """After a restart of the bridge: what was flown meanwhile is not repeated."""
         board, telemetry = self.board, self.telemetry
-        if not board.caught_up and board.held and telemetry.airborne and (
+        assert board.tasks is not None
+        if not board.recall.placed and board.held and telemetry.airborne and (
                 telemetry.current is None):
             return []  # what it flies is not known yet
+        board.recall.place(board.held or (), board.tasks, now)
         board.catch_up(now)
         return None
 
@@ -266,16 +278,24 @@ class Pilot:
         return board.begin_upload(found, now)
 
     def _serving(self, now: float) -> bool:
-        """An upload would start the hold of the task anew."""
-        item, wanted = self.board.progress.active, self.board.wanted()
-        if (item is None or not item.completes or item.position is None or item.params[0] <= 0.0
-                or self.telemetry.flight is not Flight.MISSION or wanted[0].task != item.task
-                or not math.dist(self.telemetry.position, item.position) < item.radius + NEAR):
+        """An upload would start the hold of the task anew, or have it reached once more."""
+        item, first = self.board.progress.active, self.board.wanted()[0]
+        if item is None or self.telemetry.flight is not Flight.MISSION or not (
+                first.completes and self._is_near(item, first)):
             self._serving_until = math.inf
             return False
         if math.isinf(self._serving_until):
             self._serving_until = now + item.params[0] + SERVICE
         return now < self._serving_until
+
+    def _is_near(self, item: Item, first: Item) -> bool:
+        """The first task is served, or flown to and reached before an upload would end."""
+        distance = math.dist(self.telemetry.position, first.position or UNKNOWN) - first.radius
+        if alike(first, item) and self.profile.atomic and (
+                distance < NEAR + ARRIVAL * self.telemetry.pace):
+            return True
+        served = alike(first, item) or (item.completes and item.task == first.task)
+        return served and item.params[0] > 0.0 and distance < NEAR
 
     def _jump(self, found: Change, now: float) -> list[Message]:
         def done(t: float) -> None:

@@ -114,8 +114,9 @@ class ProgressTable:
             if seq != start and (seq < start or now - when < SETTLE):
                 return  # sent before we set it
             self._jump = None
-        if self._started is None and seq < len(self.items):
-            self.current = seq  # somebody sets it; nothing is flown
+        if self._started is None:
+            if seq < len(self.items) and not (self.finished and seq == len(self.items) - 1):
+                self.current = seq  # somebody sets it; nothing is flown
         elif self.current is not None and self.current < seq <= len(self.items):
             self._pass(seq)
 

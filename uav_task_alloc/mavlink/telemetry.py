@@ -14,6 +14,7 @@ from uav_task_alloc.model import Point
 
 STALE, LOST = 3.0, 10.0  # [s] of silence
 BACKWARDS = 2000  # [ms] by which time_boot_ms goes back at a restart, not by a late packet
+PACE_OVER = 0.3  # [s] over which a pace is measured
 OFF_GROUND = 2.0  # [m] above home: it flies, whatever landed_state said a second ago
 # message -> rate asked for [Hz]
 RATES = {
@@ -37,6 +38,8 @@ class Telemetry:
         self.position, self.velocity = UNKNOWN, UNKNOWN  # ENU [m], [m/s]
         self.home: Point | None = None  # ENU [m]
         self.position_at = -math.inf  # [s]
+        self.pace = 0.0  # [m/s] between positions as they come: a simulator may run faster
+        self._paced: tuple[Point, float] = UNKNOWN, now
         self.height = math.nan  # [m] above home
         self.altitude = math.nan  # [m] AMSL
         self.battery = math.nan  # 0..1
@@ -46,6 +49,7 @@ class Telemetry:
         self.status = 0  # MAV_STATE
         self.current: int | None = None  # seq as on the wire
         self.current_at = -math.inf  # [s]
+        self.reached: int | None = None  # seq, as last told
         self.total: int | None = None  # items as the vehicle counts them
         self.mission_state = 0  # MISSION_STATE
         self.plan_id = 0  # PX4's id of the mission on board
@@ -57,7 +61,7 @@ class Telemetry:
             'HEARTBEAT': self._heartbeat, 'GLOBAL_POSITION_INT': self._global_position,
             'HOME_POSITION': self._home, 'BATTERY_STATUS': self._battery,
             'SYS_STATUS': self._battery, 'EXTENDED_SYS_STATE': self._extended,
-            'MISSION_CURRENT': self._current}
+            'MISSION_CURRENT': self._current, 'MISSION_ITEM_REACHED': self._reached}
 
     @property
     def airborne(self) -> bool:
@@ -92,7 +96,7 @@ class Telemetry:
         self.restarts += 1
         self.heard = set()
         self.current, self.total, self.plan_id, self.mission_state = None, None, 0, 0
-        self.home, self.height = None, math.nan
+        self.home, self.height, self.reached = None, math.nan, None
 
     def _clock(self, boot_ms: int, now: float) -> None:
         """One message with an older clock may be late; two in a row are a restart."""
@@ -116,6 +120,11 @@ class Telemetry:
         self.position = to_enu(self._origin, message.lat * 1e-7, message.lon * 1e-7,
                                self.altitude)
         self.position_at = now
+        since, when = self._paced
+        if now - when >= PACE_OVER:
+            moved = math.dist(self.position, since)
+            self.pace = 0.0 if math.isnan(moved) else moved / (now - when)
+            self._paced = self.position, now
         self.height = message.relative_alt * 1e-3
         # north, east, down [cm/s]; local axes turn by less than 0.1 degrees in 5 km
         self.velocity = (message.vy * 0.01, message.vx * 0.01, -message.vz * 0.01)
@@ -136,3 +145,6 @@ class Telemetry:
         self.total = message.total if 0 < message.total < 65535 else None
         self.mission_state = message.mission_state
         self.plan_id = plan_id(message)
+
+    def _reached(self, message: Message, now: float) -> None:
+        self.reached = message.seq

@@ -1,0 +1,88 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a vehicle has flown before this bridge listened: items known by their places only.
+
+No jump of ours leaves out a task that is not flown (see `change`), so what lies behind the
+current item of a vehicle has been flown, whoever asked for it.
+"""
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+
+from pymavlink.dialects.v20 import ardupilotmega as d
+
+from uav_task_alloc.geometry.frames import Origin, to_enu
+from uav_task_alloc.mavlink.profiles import Flight, Profile
+from uav_task_alloc.mavlink.progress import ProgressTable
+from uav_task_alloc.mavlink.telemetry import Telemetry
+from uav_task_alloc.mission import Item, Stop, TaskList, alike, mission_items
+from uav_task_alloc.model import Task
+
+NEAR = 15.0  # [m] from the last item: there
+MEMORY = 60.0  # [s] after the restart; a task at the same place later on is another one
+
+
+class Recall:
+    """Finds the place of a vehicle in its mission once, and the tasks behind it."""
+
+    def __init__(self, profile: Profile, origin: Origin, telemetry: Telemetry,
+                 progress: ProgressTable) -> None:
+        self._profile, self._origin = profile, origin
+        self._telemetry, self._progress = telemetry, progress
+        self.reset()
+
+    def reset(self) -> None:
+        """The vehicle was restarted: its place is to be found again."""
+        self.placed = False
+        self._until = -math.inf  # [s]
+        self._flown: tuple[Item, ...] = ()  # under missions that are not on board any more
+
+    def place(self, held: tuple[Item, ...], tasks: TaskList, now: float) -> None:
+        """Find, once, where in its mission the vehicle is."""
+        telemetry = self._telemetry
+        if self.placed or not held or telemetry.current is None:
+            self.placed = self.placed or not held
+            return
+        self.placed = True
+        if not self._profile.atomic and telemetry.flight is not Flight.MISSION:
+            self._progress.begin(held, None, now)  # held for a swap: current is of the old items
+            return
+        reached = -1 if telemetry.reached is None else telemetry.reached
+        current = min(max(0, max(telemetry.current, reached + 1)
+                          - self._profile.rules.home_first), len(held))
+        flown = len(held) if self._ended(held, current) else current
+        self._progress.begin(held, flown, now)
+        # on the ground, and the first list ever: what is on board is of an earlier mission
+        if telemetry.airborne or tasks.revision > 1:
+            self._until = now + MEMORY
+
+    def stash(self) -> None:
+        """Another mission goes on board: keep what was flown of this one."""
+        self._flown += self._behind()
+
+    def memory(self, now: float) -> tuple[Item, ...]:
+        """Items flown that nobody has told of."""
+        return (*self._flown, *self._behind()) if now < self._until else ()
+
+    def flown(self, tasks: Iterable[Task], now: float) -> tuple[str, ...]:
+        """Those of the tasks that are flown already."""
+        memory = self.memory(now)
+        if not memory:
+            return ()
+        stops = tuple(Stop(task) for task in tasks)
+        items = mission_items(TaskList(0, stops), self._profile.rules, self._origin)
+        return tuple(item.task for item in items if any(alike(item, m) for m in memory))
+
+    def _behind(self) -> tuple[Item, ...]:
+        progress = self._progress
+        return tuple(item for item in progress.items[:progress.current or 0]
+                     if not item.task and item.position is None)
+
+    def _ended(self, held: tuple[Item, ...], current: int) -> bool:
+        telemetry, last = self._telemetry, held[-1]
+        if telemetry.mission_state == d.MISSION_STATE_COMPLETE:
+            return True
+        place = to_enu(self._origin, last.x * 1e-7, last.y * 1e-7, last.z)
+        return (self._profile.atomic and telemetry.airborne and telemetry.flight is Flight.HOLD
+                and current == len(held) - 1
+                and math.dist(telemetry.position, place) < last.params[1] + NEAR)
