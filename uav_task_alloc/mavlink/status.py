@@ -12,6 +12,7 @@ from uav_task_alloc.mavlink.board import MissionState
 from uav_task_alloc.mavlink.ground import Served
 from uav_task_alloc.mavlink.pilot import Pilot
 from uav_task_alloc.mavlink.profiles import Flight
+from uav_task_alloc.mavlink.telemetry import STALE
 from uav_task_alloc.mission import RETURN
 from uav_task_alloc.model import Point
 
@@ -74,17 +75,51 @@ def mode_of(pilot: Pilot) -> Mode:
     return _BY_FLIGHT.get(telemetry.flight, _BY_LANDED.get(telemetry.landed, Mode.UNKNOWN))
 
 
+def active_task(pilot: Pilot) -> str:
+    """The task whose leg or hold is being flown; one that waits must be on the list as well."""
+    board, mode = pilot.board, mode_of(pilot)
+    item = board.progress.active
+    if board.tasks is None or item is None or item.task in board.progress.completed:
+        return ''
+    waits = mode in (Mode.HOLD, Mode.TAKEOFF) and any(
+        stop.task.id == item.task for stop in board.tasks.stops)
+    return item.task if waits or mode is Mode.ON_MISSION else ''
+
+
 def state_of(served: Served, now: float, full_range: float = 0.0) -> UavStatus:
     """All of it at one moment; `full_range` [m] of a full battery, 0: unknown."""
     pilot = served.pilot
     telemetry, board, mode = pilot.telemetry, pilot.board, mode_of(pilot)
-    active = board.progress.active
-    flying = mode in (Mode.ON_MISSION, Mode.HOLD, Mode.TAKEOFF) and board.tasks is not None
     return UavStatus(
         served.uav_id, telemetry.position, telemetry.velocity, telemetry.home,
         telemetry.battery, full_range * telemetry.battery if full_range > 0.0 else math.nan,
         not telemetry.stale(now) and mode is not Mode.FAULT and not pilot.yielding, mode,
-        board.state, active.task if flying and active else '', board.revision)
+        board.state, active_task(pilot), board.revision)
+
+
+class Told:
+    """What was told of each UAV last, and what is worth telling now."""
+
+    def __init__(self) -> None:
+        self._told: dict[str, tuple[UavStatus, float]] = {}  # and the time of its position [s]
+
+    def is_news(self, status: UavStatus, position_at: float, now: float, rate: float) -> bool:
+        """A new position, at most `rate` [Hz], or something that cannot wait; then it is told.
+
+        A UAV that is silent is told of once, as no longer available: whatever else happens to
+        it here would look like a sign of life.
+        """
+        if position_at < 0.0:
+            return False
+        before, when = self._told.get(status.uav_id, (None, -math.inf))
+        quiet = now - position_at > STALE
+        if quiet and (before is None or not before.available or status.available):
+            return False
+        urgent = before is None or before.news != status.news
+        if not urgent and position_at < when + 1.0 / rate:
+            return False
+        self._told[status.uav_id] = status, position_at
+        return True
 
 
 def facts_of(served: Served, now: float) -> tuple[int, str, dict[str, str]]:

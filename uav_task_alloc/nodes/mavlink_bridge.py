@@ -16,9 +16,10 @@ from uav_task_alloc.mavlink.ground import Ground, Served, Station
 from uav_task_alloc.mavlink.link import open_link
 from uav_task_alloc.mavlink.policy import Policy
 from uav_task_alloc.mavlink.radio import Heartbeat, Radio
-from uav_task_alloc.mavlink.status import UavStatus, facts_of, state_of
+from uav_task_alloc.mavlink.status import Told, facts_of, state_of
+from uav_task_alloc.model import check_ros_name
 from uav_task_alloc.nodes import bridge_messages as convert
-from uav_task_alloc.nodes.messages import EVENTS, LATCHED, STATES, check_ros_name
+from uav_task_alloc.nodes.messages import EVENTS, LATCHED, STATES
 from uav_task_alloc.nodes.parameters import declare
 from uav_task_alloc.nodes.run import run
 from uav_task_alloc.params import BridgeParams
@@ -64,7 +65,7 @@ class MavlinkBridge(Node):
         self.log = {'info': lambda text: logger.info(text),  # rclpy wants a line each
                     'warning': lambda text: logger.warning(text),
                     'error': lambda text: logger.error(text)}
-        self.told: dict[str, tuple[tuple[object, ...], float]] = {}  # news and when, by UAV
+        self.told = Told()
         self.lists: dict[str, object] = {}
         self.states = self.create_publisher(m.UavState, 'uav_states', STATES)
         self.task_events = self.create_publisher(m.TaskEvent, 'task_events', EVENTS)
@@ -98,9 +99,10 @@ class MavlinkBridge(Node):
             with self.lock:
                 status = state_of(served, now, self.live.now.full_range)
             self.tell_events(served)
-            if self.is_news(status, served.pilot.telemetry.position_at):
+            seen = served.pilot.telemetry.position_at
+            if self.told.is_news(status, seen, now, self.live.now.state_rate):
                 self.states.publish(convert.from_status(
-                    status, self.capabilities.get(served.uav_id, ()), self.stamp()))
+                    status, self.capabilities.get(served.uav_id, ()), self.stamp() - now + seen))
 
     def tell_events(self, served: Served) -> None:
         """Publish progress, log notes."""
@@ -111,15 +113,6 @@ class MavlinkBridge(Node):
         while pilot.notes:
             note = pilot.notes.popleft()
             self.log[note.level](f'{served.uav_id}: {note.text}')
-
-    def is_news(self, status: UavStatus, position_at: float) -> bool:
-        """A new position, not too soon after the last, or something that cannot wait."""
-        news, when = self.told.get(status.uav_id, ((), 0.0))
-        if position_at < 0.0 or (status.news == news and
-                                 position_at < when + 1.0 / self.live.now.state_rate):
-            return False
-        self.told[status.uav_id] = status.news, position_at
-        return True
 
     def on_tick(self) -> None:
         """Listen for the lists of UAVs that were found; pass parameters on."""
@@ -135,7 +128,7 @@ class MavlinkBridge(Node):
     def on_list(self, uav_id: str, msg: m.TaskList) -> None:
         """A new list for a UAV."""
         try:
-            tasks = convert.to_list(msg, self.station.origin)
+            tasks = convert.to_list(msg, uav_id, self.station.origin)
         except InvalidValue as error:
             self.get_logger().warning(f'{uav_id}/task_list: {error}: ignored')
             return
