@@ -8,10 +8,10 @@ from uav_task_alloc.solver import routes as of
 from uav_task_alloc.solver.bidding import Bidding
 from uav_task_alloc.solver.chance import chance
 from uav_task_alloc.solver.problem import Problem
-from uav_task_alloc.solver.routes import Routes
+from uav_task_alloc.solver.routes import EXCESS, TINY, VALUE, Routes
 from uav_task_alloc.solver.ruin import empty_log
 from uav_task_alloc.solver.scouts import Scouts
-from uav_task_alloc.solver.search import search
+from uav_task_alloc.solver.search import relieve, search
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,7 +25,7 @@ class Habits:
     employed: float = 0.5  # least shares of the work
     onlookers: float = 0.2
     scouts: float = 0.01
-    strain: float = 3.0  # [m/m] what a metre beyond range costs at first
+    strain: float = 5.0  # [m/m] what a metre beyond range costs at first
     learning: bool = True  # False: Q stays as it is
     bids: bool = True  # False: kinds keep their first shares
 
@@ -38,6 +38,7 @@ class Colony:
         arrays = problem.arrays
         self.arrays = arrays._replace(strain=arrays.strain.copy(), price=arrays.price.copy())
         self.habits, self.best, self.routes = habits, of.twin(start), of.twin(start)
+        self._spare = of.twin(start)
         self._rng, self._log = chance(seed), empty_log(arrays)
         self.scouts = Scouts(problem, self.arrays, self._rng, learnt, habits.learning)
         self._scale = problem.scale
@@ -45,7 +46,7 @@ class Colony:
                   'scout': habits.scouts}
         self._bids = Bidding({kind: floor for kind, floor in floors.items() if floor > 0.0})
         if arrays.hard:
-            self.arrays.strain[0] = habits.strain
+            self.arrays.strain[:] = habits.strain
 
     def temperature(self, spent: float) -> float:
         """[m] after this share of the budget."""
@@ -69,9 +70,20 @@ class Colony:
             self._search(self.routes, h.some, hot, cold, rounds)
         else:
             self._search(self.routes, h.many, hot, cold, rounds)
+        self._salvage()
         gain = before - of.cost_now(self.arrays, self.best)
         self._bids.pay(kind, costs[kind], max(0.0, gain) if h.bids else 0.0)
         return 0 if kind == 'scout' else rounds
+
+    def _salvage(self) -> None:
+        """Where the best leaves tasks out, see what the routes are worth within ranges."""
+        a = self.arrays
+        if a.hard and self.best.sums[VALUE] < self.routes.sums[VALUE] and (
+                self.routes.sums[EXCESS] > a.excess_floor + TINY):
+            of.copy(self.routes, self._spare)
+            relieve(a, self._spare)
+            if of.better_now(a, self._spare, self.best):
+                of.copy(self._spare, self.best)
 
     def _search(self, routes: Routes, mean: float, hot: float, cold: float, rounds: int) -> int:
         a = self.arrays

@@ -125,7 +125,7 @@ def _blank(uavs: Sequence[Uav], tasks: Sequence[Task], rules: Rules,
     may = _may(uavs, tasks)
     return Arrays(
         m, m + n, rules.returns, rules.hard,
-        0.0, np.array([math.inf if rules.hard else excess_cost(rules.weights)]),
+        0.0, np.full(m, math.inf if rules.hard else excess_cost(rules.weights)),
         distances.pairs, not distances.zones, distances.points,
         np.array([u.range for u in uavs], dtype=np.float64), np.zeros(m), may,
         np.any(~may, axis=0, keepdims=True)[0],
@@ -149,7 +149,8 @@ def _apply_locks(problem: Problem) -> None:
             a.reach[u] -= sum(problem.distances.length(i, j)
                               for i, j in pairwise(places))
             if problem.rules.returns:
-                a.idle[u] = problem.distances.length(u, a.ends + u)
+                way = problem.distances.length(u, a.ends + u)
+                a.idle[u] = way if way < math.inf else 0.0  # it stays behind its last task
 
 
 def _fill(problem: Problem) -> float:

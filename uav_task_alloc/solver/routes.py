@@ -16,8 +16,9 @@ from uav_task_alloc.solver.kernel import kernel, part
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
-DISTANCE, EXCESS, LEFT_OUT, VALUE = 0, 1, 2, 3  # what Routes.sums holds
+DISTANCE, EXCESS, LEFT_OUT, VALUE, STRAIN = range(5)  # what Routes.sums holds
 TINY = 1e-7  # [m] what rounding may add up to
+STRICT = 1e9  # [m/m] at most this in sums, where inf would make NaN
 
 
 class Arrays(NamedTuple):
@@ -28,7 +29,7 @@ class Arrays(NamedTuple):
     returns: bool  # routes end at home
     hard: bool  # no range is ever exceeded
     excess_floor: float  # [m] beyond range that no plan can avoid
-    strain: Floats  # (1) [m/m] what a metre beyond range costs now; inf: none is allowed
+    strain: Floats  # (m) [m/m] what a metre beyond range costs now; inf: none is allowed
     pairs: Pairs  # lengths by node
     straight: bool  # no zones: lengths are distances of xyz
     xyz: Floats  # (2m + n, 3) [m]
@@ -54,7 +55,7 @@ class Routes(NamedTuple):
     leg: Floats  # [m] length of the leg that leaves the node
     length: Floats  # (m) [m]
     tasks: Ints  # (m) tasks
-    sums: Floats  # DISTANCE, EXCESS [m], LEFT_OUT [m], VALUE
+    sums: Floats  # DISTANCE, EXCESS [m], LEFT_OUT [m], VALUE, STRAIN [m]
 
 
 @part
@@ -90,7 +91,9 @@ def total(a: Arrays, r: Routes) -> None:
     r.sums[:] = 0.0
     for u in range(a.uavs):
         r.sums[DISTANCE] += r.length[u]
-        r.sums[EXCESS] += max(0.0, r.length[u] - a.reach[u])
+        over = max(0.0, r.length[u] - a.reach[u])
+        r.sums[EXCESS] += over
+        r.sums[STRAIN] += min(a.strain[u], STRICT) * over
     for i in range(a.price.size):
         if r.on[a.uavs + i] < 0:
             r.sums[LEFT_OUT] += a.price[i]
@@ -103,7 +106,7 @@ def empty_routes(a: Arrays) -> Routes:
     nodes = a.ends + a.uavs
     routes = Routes(np.empty(nodes, np.int64), np.empty(nodes, np.int64),
                     np.empty(nodes, np.int64), np.zeros(nodes), np.empty(a.uavs),
-                    np.empty(a.uavs, np.int64), np.empty(4))
+                    np.empty(a.uavs, np.int64), np.empty(5))
     clear(a, routes)
     return routes
 
@@ -126,8 +129,7 @@ def twin(a: Routes) -> Routes:
 
 def cost_now(a: Arrays, r: Routes) -> float:
     """What the search makes small [m]."""
-    return float(r.sums[DISTANCE] + r.sums[LEFT_OUT] + (
-        a.strain[0] * r.sums[EXCESS] if r.sums[EXCESS] > 0.0 else 0.0))
+    return float(r.sums[DISTANCE] + r.sums[LEFT_OUT] + r.sums[STRAIN])
 
 
 def better_now(a: Arrays, r: Routes, s: Routes) -> bool:
@@ -140,7 +142,7 @@ def better_now(a: Arrays, r: Routes, s: Routes) -> bool:
         return True
     shorter = s.sums[DISTANCE] - r.sums[DISTANCE]
     if not a.hard:
-        shorter += a.strain[0] * (s.sums[EXCESS] - r.sums[EXCESS])
+        shorter += s.sums[STRAIN] - r.sums[STRAIN]
     return bool(gain >= -slack and shorter > TINY + 1e-12 * s.sums[DISTANCE])
 
 
@@ -154,7 +156,7 @@ def lengthened(a: Arrays, r: Routes, u: int, delta: float) -> float:
     after = before + delta
     if after <= TINY and before <= TINY:
         return delta
-    return float(delta + a.strain[0] * (max(0.0, after) - max(0.0, before)))
+    return float(delta + a.strain[u] * (max(0.0, after) - max(0.0, before)))
 
 
 @part
@@ -163,7 +165,9 @@ def stretch(a: Arrays, r: Routes, u: int, delta: float) -> None:
     before = r.length[u]
     r.length[u] = before + delta
     r.sums[DISTANCE] += delta
-    r.sums[EXCESS] += max(0.0, before + delta - a.reach[u]) - max(0.0, before - a.reach[u])
+    over = max(0.0, before + delta - a.reach[u]) - max(0.0, before - a.reach[u])
+    r.sums[EXCESS] += over
+    r.sums[STRAIN] += min(a.strain[u], STRICT) * over
 
 
 @part

@@ -42,8 +42,9 @@ class Scouts:
         a, found = self.arrays, False
         if not self._bees:
             self._bees = [of.empty_routes(a) for _ in range(BEES)]
-        strain = a.strain[0]
-        a.strain[0] = np.inf if a.hard else strain
+        strain = a.strain.copy()
+        if a.hard:
+            a.strain[:] = np.inf
         for bee in self._bees:
             construct(a, bee, self.tables, self._sums, self.rng)
             left = np.flatnonzero(bee.on[a.uavs:a.ends] < 0) + a.uavs
@@ -54,7 +55,7 @@ class Scouts:
                 found = True
         if self.learning:
             self._learn(best)
-        a.strain[0] = strain
+        a.strain[:] = strain
         return found
 
     def _learn(self, best: Routes) -> None:

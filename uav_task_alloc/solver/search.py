@@ -6,7 +6,18 @@ import math
 
 from uav_task_alloc.solver.chance import Chance, uniform
 from uav_task_alloc.solver.kernel import kernel
-from uav_task_alloc.solver.routes import EXCESS, TINY, Arrays, Routes, better, copy, cost, total
+from uav_task_alloc.solver.routes import (
+    EXCESS,
+    TINY,
+    Arrays,
+    Routes,
+    better,
+    copy,
+    cost,
+    remove,
+    step,
+    total,
+)
 from uav_task_alloc.solver.ruin import Log, look_for_trouble, recreate, ruin, undo
 
 LEAST, MOST = 0.1, 1000.0  # [m/m] cost of metres beyond range
@@ -17,12 +28,30 @@ LOOKS = 8  # of them in as many rounds as there are tasks
 @kernel
 def _look(a: Arrays, r: Routes, log: Log) -> int:
     """Price left out tasks and metres beyond range anew; returns rounds until the next time."""
+    if a.hard:  # dear enough that routes come back into range, cheap enough to pass through
+        fine = r.sums[EXCESS] <= a.excess_floor + TINY
+        for u in range(a.uavs):
+            if fine:
+                a.strain[u] = max(LEAST, a.strain[u] * CHEAPER)
+            elif r.length[u] > a.reach[u] + TINY:
+                a.strain[u] = min(MOST, a.strain[u] * DEARER)
     look_for_trouble(a, r, log)
     total(a, r)
-    if a.hard:  # dear enough that routes come back into range, cheap enough to pass through
-        over = r.sums[EXCESS] > a.excess_floor + TINY
-        a.strain[0] = min(MOST, max(LEAST, a.strain[0] * (DEARER if over else CHEAPER)))
     return max(20, a.price.size // LOOKS)
+
+
+@kernel
+def relieve(a: Arrays, r: Routes) -> None:
+    """Leave out tasks of routes beyond range, always the one whose leg saves most. O(n)."""
+    for u in range(a.uavs):
+        while r.length[u] > a.reach[u] + TINY and r.tasks[u] > 0:
+            t, out, most = r.next[u], r.next[u], -1.0
+            while t < a.ends:
+                saved = r.leg[r.prev[t]] + r.leg[t] - step(a, r.prev[t], r.next[t])
+                if saved > most:
+                    out, most = t, saved
+                t = r.next[t]
+            remove(a, r, out)
 
 
 @kernel

@@ -81,7 +81,8 @@ def _may_end(a: Arrays, r: Routes, u: int, t: int, d: float) -> bool:
     """The range mask: whether UAV u may fly on to t and end there."""
     last = r.prev[a.ends + u]
     more = d + step(a, t, a.ends + u) - r.leg[last]
-    return a.may[u, t - a.uavs] and (not a.hard or r.length[u] + more <= a.reach[u])
+    return a.may[u, t - a.uavs] and more < math.inf and (
+        not a.hard or r.length[u] + more <= a.reach[u])
 
 
 @part
