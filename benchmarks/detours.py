@@ -62,7 +62,7 @@ def quality(pairs: int = 2100, ring: int = 36) -> None:
 
 
 def speed(shapes: str = 'hcp', apart: bool = True, seed: int = 1) -> None:
-    """1000 tasks, 50 zones on 10 x 10 km: CPU time, one thread, compiled; median of five."""
+    """1000 tasks, 50 zones on 10 x 10 km: CPU time, one thread, compiled; best of nine."""
     rng = np.random.default_rng(seed)
     zones = random_zones(rng, 51, apart, 10_000.0, 400.0, shapes)
     points = np.array([random_point(rng, zones, 10_000.0) for _ in range(1001)])
@@ -74,7 +74,7 @@ def speed(shapes: str = 'hcp', apart: bool = True, seed: int = 1) -> None:
     def timed(name: str, start: float) -> None:
         figures.setdefault(name, []).append(1e3 * (time.thread_time() - start))
 
-    for _ in range(6):
+    for _ in range(9):  # what else the machine does only adds, so the best tells most
         distances = Distances(points[:1000], zones[:50], clearance=CLEARANCE)
         start = time.thread_time()
         distances.ensure(origins, goals)
@@ -95,7 +95,7 @@ def speed(shapes: str = 'hcp', apart: bool = True, seed: int = 1) -> None:
     bent = np.mean([distances.length(i, j) > s * (1 + 1e-9)
                     for i, j, s in zip(origins, goals, straight, strict=True)])
     print(f'{shapes:3s} {"disjoint   " if apart else "overlapping"}: {100 * bent:.0f} % bent, '
-          + ', '.join(f'{name} {np.median(times[1:]):.2f} ms' for name, times in figures.items()))
+          + ', '.join(f'{name} {min(times):.2f} ms' for name, times in figures.items()))
 
 
 if __name__ == '__main__':

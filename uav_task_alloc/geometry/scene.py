@@ -13,8 +13,8 @@ from numba import carray  # type: ignore[attr-defined]
 from uav_task_alloc.geometry.exits import way_out
 from uav_task_alloc.geometry.memory import floats_at, ints_at
 from uav_task_alloc.geometry.obstacles import Floats, Ints, Zones, first_around, zones_at
-from uav_task_alloc.geometry.taut import MAX_CORNERS
-from uav_task_alloc.geometry.ways import shortest
+from uav_task_alloc.geometry.taut import MAX_CORNERS, span
+from uav_task_alloc.geometry.ways import next_hit, shortest
 
 OUTSIDE, SNUG, INSIDE = 0, 1, 2
 CAUGHT = 3  # where `addresses` has that of Scene.caught
@@ -90,6 +90,8 @@ def _find(address: int, i: int, j: int) -> float:
     for m in range(3):
         ends[0, m], ends[1, m] = (q[m], p[m]) if backwards else (p[m], q[m])
     snug = scene.caught[i] == SNUG or scene.caught[j] == SNUG
+    if next_hit(scene.zones, 0, ends, 0, 1, min(p[2], q[2]), snug) == scene.zones.size:
+        return first + span(ends, 0, 1)
     return first + shortest(scene.zones, ends, scene.limits, snug,
                             np.empty((MAX_CORNERS, 3)))[1]
 

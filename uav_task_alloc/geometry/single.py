@@ -206,7 +206,7 @@ def _over_bound(z: float, side: float, way: Floats) -> float:
 
 
 @numba.njit(cache=True, nogil=True)
-def _keep_best(trial: Floats, n: int, out: Floats, best: int) -> int:
+def keep_best(trial: Floats, n: int, out: Floats, best: int) -> int:
     """Copy the trial way to out where it is shorter; returns the number of points there."""
     if n == 0 or (best > 0 and length_of(trial, n) >= length_of(out, best)):
         return best
@@ -239,10 +239,10 @@ def past_one(zone: Zone, way: Floats, limits: Floats, floor: float,
         else:
             n = _wrap(hull, way, side, trial)
         _rise(trial, n)
-        best = _keep_best(trial, n, out, best)
+        best = keep_best(trial, n, out, best)
     for side in (-1.0, 1.0):
         z = zone.high + skin if side > 0.0 else zone.low - skin
         if limits[0] <= z <= limits[1] and not math.isinf(z) and (
                 best == 0 or _over_bound(z, side, way) < length_of(out, best)):
-            best = _keep_best(trial, _over(zone, rim, z, side, way, trial), out, best)
+            best = keep_best(trial, _over(zone, rim, z, side, way, trial), out, best)
     return best

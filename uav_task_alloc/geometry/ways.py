@@ -11,7 +11,7 @@ import numpy as np
 
 from uav_task_alloc.geometry.obstacles import Floats, Ints, Zones, blocked
 from uav_task_alloc.geometry.search import add_corners, add_level, astar, corner_bound
-from uav_task_alloc.geometry.single import past_one
+from uav_task_alloc.geometry.single import keep_best, past_one
 from uav_task_alloc.geometry.taut import (
     MAX_CORNERS,
     copy_point,
@@ -69,16 +69,30 @@ def _corners(o: Zones, active: Ints, count: int, way: Floats, limits: Floats, fl
 
 
 @numba.njit(cache=True, nogil=True)
+def _within(x: Floats, n: int, length: float) -> int:
+    """Keep the corners that a way of at most `length` can touch; returns their number."""
+    kept = 2
+    for m in range(2, n):
+        if span(x, 0, m) + span(x, m, 1) <= length:
+            copy_point(x, m, x, kept)
+            kept += 1
+    return kept
+
+
+@numba.njit(cache=True, nogil=True)
 def _search(o: Zones, way: Floats, limits: Floats, floor: float, snug: bool, ring: int,
-            hit: Ints, out: Floats) -> int:
-    """A clear, coarse way into out; marks the zones it had to heed in hit. 0: none found."""
+            known: float, hit: Ints, out: Floats) -> int:
+    """A clear, coarse way into out, at most as long as one `known`; marks the zones heeded in hit.
+
+    0: none found.
+    """
     while True:
         active, bound = np.flatnonzero(hit), 2
         count = active.size
         for m in range(count):
             bound += corner_bound(o[active[m]], ring, 2 * count)
         x, path = np.empty((bound, 3)), np.empty(bound, np.int64)
-        n = _corners(o, active, count, way, limits, floor, ring, x)
+        n = _within(x, _corners(o, active, count, way, limits, floor, ring, x), known)
         size = astar(o, active, count, x, n, floor, snug, path)
         if size == 0 or size > MAX_CORNERS // 2:
             return 0
@@ -129,10 +143,11 @@ def shortest(o: Zones, way: Floats, limits: Floats, snug: bool,
         n = past_one(o[first], way, limits, floor, out)
         if n > 0 and _is_clear(o, out, n, floor):
             return n, length_of(out, n)
-    hit, n = np.zeros(o.size, np.int64), 0
+    hit, n, trial = np.zeros(o.size, np.int64), 0, np.empty((MAX_CORNERS, 3))
     hit_by(o, way, 0, 1, floor, snug, hit)
     for ring in RINGS:
-        n = _search(o, way, limits, floor, snug, ring, hit, out)
+        known = length_of(out, n) if n else np.inf
+        n = keep_best(trial, _search(o, way, limits, floor, snug, ring, known, hit, trial), out, n)
         if n and (ring > RINGS[0] or hit.sum() <= COARSE):
             break
     if n == 0:
