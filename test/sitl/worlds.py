@@ -1,0 +1,128 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Four vehicles in the air: fleet_sim's own, or SITL binaries that environment variables name."""
+import os
+import subprocess
+
+from uav_task_alloc.geometry.frames import Origin, to_geodetic
+from uav_task_alloc.mavlink.fleet import Fleet
+from uav_task_alloc.mavlink.link import open_link
+from uav_task_alloc.mavlink.vehicle_config import VehicleConfig
+
+ORIGIN = Origin(47.397742, 8.545594, 488.0)
+SYSTEMS = (1, 2, 3, 4)
+HOMES = {n: (400.0 * n, 0.0, 0.0) for n in SYSTEMS}  # [m] ENU
+# What a bare binary lacks to arm without a radio control and a human: ArduCopter 4.5 and later.
+COPTER_DEFAULTS = """
+FRAME_CLASS 1
+FRAME_TYPE 0
+FS_THR_ENABLE 0
+FS_GCS_ENABLE 0
+DISARM_DELAY 0
+ARMING_CHECK 0
+INS_ACCOFFS_X 0.001
+INS_ACCOFFS_Y 0.001
+INS_ACCOFFS_Z 0.001
+INS_ACC2OFFS_X 0.001
+INS_ACC2OFFS_Y 0.001
+INS_ACC2OFFS_Z 0.001
+COMPASS_OFS_X 5
+COMPASS_OFS_Y 13
+COMPASS_OFS_Z -18
+COMPASS_OFS2_X 5
+COMPASS_OFS2_Y 13
+COMPASS_OFS2_Z -18
+"""
+
+
+class FleetSim:
+    """The simulated vehicles of this package, on one port."""
+
+    speedup = 20.0
+
+    def __init__(self, kind):
+        self.links = [open_link('udpin:127.0.0.1:0')]
+        self.fleet = Fleet([(VehicleConfig(f'uav_{n}', n, ORIGIN, HOMES[n], arming_delay=0.0,
+                                           floods=False), kind) for n in SYSTEMS],
+                           ('127.0.0.1', self.links[0].port), self.speedup)
+        self.thread = self.fleet.start()
+
+    def close(self):
+        self.fleet.stop()
+        self.thread.join()
+        self.fleet.close()
+
+    def reached(self, system):
+        """Places [m] ENU at which it really reached an item; after `close`."""
+        return [event.point for event in self.fleet.vehicles[f'uav_{system}'].take_events()
+                if event.name == 'item_reached']
+
+
+class Sitl:
+    """Real autopilots, a process and a link each."""
+
+    speedup = 10.0
+
+    def __init__(self, binary, folder):
+        self.binary, self.folder = os.path.abspath(binary), folder
+        self.processes = [self._start(n) for n in SYSTEMS]
+        self.links = [open_link(self.address(n)) for n in SYSTEMS]
+
+    def _start(self, system):
+        place = self.folder / f'sitl_{system}'
+        place.mkdir()
+        with open(place / 'log', 'w') as log:
+            return subprocess.Popen(
+                self.command(system, place), cwd=place, stdin=subprocess.DEVNULL, stdout=log,
+                stderr=subprocess.STDOUT, env={**os.environ, **self.environment(system)})
+
+    def close(self):
+        for process in self.processes:
+            process.terminate()
+        for process in self.processes:
+            try:
+                process.wait(10)
+            except subprocess.TimeoutExpired:
+                process.kill()
+                process.wait()
+
+    def reached(self, system):
+        """Unknown: only what it tells."""
+        return None
+
+    def environment(self, system):
+        return {}
+
+
+class ArduCopter(Sitl):
+    """ARDUCOPTER_SITL: build/sitl/bin/arducopter; ARDUCOPTER_DEFAULTS: a parameter file."""
+
+    def address(self, system):
+        return f'tcp:127.0.0.1:{5760 + 10 * (system - 1)}'
+
+    def command(self, system, place):
+        defaults = os.environ.get('ARDUCOPTER_DEFAULTS', '')
+        if not defaults:
+            defaults = place / 'defaults.parm'
+            defaults.write_text(COPTER_DEFAULTS)
+        latitude, longitude, altitude = to_geodetic(ORIGIN, HOMES[system])
+        return [self.binary, '--model', '+', '--speedup', str(self.speedup), '--wipe',
+                f'-I{system - 1}', '--sysid', str(system), '--defaults', str(defaults),
+                '--home', f'{latitude:.7f},{longitude:.7f},{altitude:.2f},0']
+
+
+class Px4(Sitl):
+    """PX4_SITL: build/px4_sitl_default/bin/px4, flown by its own simulation in hardware (SIH)."""
+
+    def address(self, system):
+        return f'udpin:127.0.0.1:{14540 + system - 1}'
+
+    def command(self, system, place):
+        etc = os.path.join(os.path.dirname(os.path.dirname(self.binary)), 'etc')
+        return [self.binary, '-i', str(system - 1), '-d', etc]
+
+    def environment(self, system):
+        latitude, longitude, altitude = to_geodetic(ORIGIN, HOMES[system])
+        return {'PX4_SIM_MODEL': 'sihsim_quadx', 'PX4_SIM_SPEED_FACTOR': str(self.speedup),
+                'PX4_HOME_LAT': f'{latitude:.7f}', 'PX4_HOME_LON': f'{longitude:.7f}',
+                'PX4_HOME_ALT': f'{altitude:.2f}', 'PX4_PARAM_COM_RC_IN_MODE': '4',
+                'PX4_PARAM_NAV_DLL_ACT': '0'}
