@@ -4,11 +4,13 @@ import heapq
 import itertools
 import random
 
+from pymavlink.dialects.v20 import ardupilotmega as d
+
 from uav_task_alloc.geometry.frames import Origin
 from uav_task_alloc.mavlink.codec import Codec
 from uav_task_alloc.mavlink.peer import Peer
 from uav_task_alloc.mavlink.profiles import ARDUPILOT, PX4
-from uav_task_alloc.mavlink.transfer import Mission
+from uav_task_alloc.mavlink.transfer import Mission, Verified
 from uav_task_alloc.mavlink.upload import Upload
 from uav_task_alloc.mavlink.vehicle import AUTOPILOTS, Vehicle
 from uav_task_alloc.mavlink.vehicle_config import VehicleConfig
@@ -160,3 +162,30 @@ class UploadBench:
         return len(held) == len(sent) and all(
             a[:3] == b[:3] and abs(a[3] - b[3]) < 0.02 for a, b in zip(
                 held[own:], sent[own:], strict=True))
+
+
+def drop(kinds, times, direction=None):
+    """A tamper that swallows the first `times` messages of some types."""
+    left = [times]
+
+    def tamper(way, message, now):
+        if message.get_type() in kinds and direction in (None, way) and left[0]:
+            left[0] -= 1
+            return []
+        return None
+    return tamper
+
+
+def ack(result, system=245, component=190, mission_type=0):
+    return d.MAVLink_mission_ack_message(system, component, result, mission_type)
+
+
+def request(seq, system=245, component=190, mission_type=0):
+    return d.MAVLink_mission_request_int_message(system, component, seq, mission_type)
+
+
+def verified(bench, mission):
+    last = bench.settle()
+    assert isinstance(last, Verified), last
+    assert last.mission is mission
+    assert bench.holds(mission)
