@@ -30,8 +30,8 @@ ORIGIN = Origin(47.0, 8.0, 400.0)
 ADD = announcement(m.TaskAnnouncement.ADD, [Task('t1', (10.0, 20.0, 30.0))], 5.0)
 
 
-def state(mode=m.UavState.MODE_STANDBY, speed=0.0):
-    return m.UavState(uav_id='uav_1', mode=mode, mission_state=m.UavState.MISSION_VERIFIED,
+def state(mode=m.UavState.STANDBY, speed=0.0):
+    return m.UavState(uav_id='uav_1', mode=mode, mission_state=m.UavState.VERIFIED,
                       list_revision=3, battery=math.nan, available=True, velocity=_vector(speed))
 
 
@@ -58,7 +58,7 @@ def test_it_shows_records_and_ends_when_all_is_settled(start, probe, tmp_path):
     plans.publish(m.Allocation(revision=1, trigger='1 new task',
                                solve_time=Duration(nanosec=100_000_000)))
     told.publish(statuses(m.TaskStatus.ACTIVE))
-    states.publish(state(m.UavState.MODE_ON_MISSION, 15.0))
+    states.publish(state(m.UavState.ON_MISSION, 15.0))
     probe.until(lambda: '1 active' in view.output())
     assert view.popen.poll() is None
     told.publish(statuses(m.TaskStatus.COMPLETED))

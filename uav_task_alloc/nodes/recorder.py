@@ -17,17 +17,16 @@ from uav_task_alloc.record.heard import zone_to_json
 Body = dict[str, Any]  # a line without its wall time
 
 
-def names(kind: type, prefix: str = '') -> dict[int, str]:
-    """The constants of a message by value, without their prefix."""
-    return {getattr(kind, name): name.removeprefix(prefix) for name in dir(kind)
-            if name.isupper() and name.startswith(prefix)
-            and isinstance(getattr(kind, name), int)}
+def names(kind: type, constants: str) -> dict[int, str]:
+    """Constants of a message by value."""
+    return {getattr(kind, name): name for name in constants.split()}
 
 
-ACTIONS = names(m.TaskAnnouncement)
-STATES = names(m.TaskStatus)
-MODES = names(m.UavState, 'MODE_')
-MISSIONS = names(m.UavState, 'MISSION_')
+ACTIONS = names(m.TaskAnnouncement, 'ADD UPDATE CANCEL')
+STATES = names(m.TaskStatus, 'PENDING ASSIGNED ACTIVE COMPLETED FAILED CANCELLED REJECTED '
+                             'UNASSIGNED')
+MODES = names(m.UavState, 'UNKNOWN STANDBY TAKEOFF ON_MISSION HOLD RETURNING LANDING FAULT')
+MISSIONS = names(m.UavState, 'UNKNOWN UPLOADING VERIFIED MIXED FOREIGN')
 
 
 def announced(msg: m.TaskAnnouncement, origin: Origin) -> Body:
