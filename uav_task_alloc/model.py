@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from enum import Enum
@@ -12,6 +13,7 @@ from uav_task_alloc.errors import InvalidValue
 
 Point = tuple[float, float, float]  # [m] ENU
 FAR = 1e8  # [m] no coordinate is beyond
+_ROS_NAME = re.compile(r'[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*')
 
 
 def check_point(place: str, value: Iterable[float]) -> Point:
@@ -47,10 +49,23 @@ def check_id(place: str, value: object) -> str:
     return value
 
 
+def check_ros_name(place: str, value: str) -> str:
+    """A string that can be part of a topic's name; raise InvalidValue otherwise."""
+    if not is_ros_name(value):
+        raise InvalidValue(place, value, 'a ROS name (letters, digits, _ and /; no digit first)')
+    return value
+
+
+def is_ros_name(value: str) -> bool:
+    """Tokens of letters, digits and single _ that begin with no digit, joined by /."""
+    return len(value) <= 200 and '__' not in value and _ROS_NAME.fullmatch(value) is not None
+
+
 def check_names(place: str, value: Iterable[str]) -> frozenset[str]:
     """A set of strings; a bare string is refused, as it would fall into letters."""
-    if isinstance(value, str) or not all(isinstance(v, str) for v in value):
-        raise InvalidValue(place, value, 'a set of strings')
+    if isinstance(value, str) or not isinstance(value, Iterable) or not all(
+            isinstance(v, str) and v.strip() for v in value):
+        raise InvalidValue(place, value, 'a set of non-empty strings')
     return frozenset(value)
 
 

@@ -31,10 +31,10 @@ def test_nan_acceptance_radius_is_unknown():
 
 
 def test_a_wgs84_task_is_placed_by_the_origin():
-    there = task_message(frame=m.Task.FRAME_WGS84, latitude=47.397742, longitude=8.545594,
+    there = task_message(frame=m.Task.WGS84, latitude=47.397742, longitude=8.545594,
                          altitude=50.0)
     assert messages.to_task(there, ORIGIN).position == pytest.approx((0.0, 0.0, 50.0), abs=1e-6)
-    north = task_message(frame=m.Task.FRAME_WGS84, latitude=47.406742, longitude=8.545594,
+    north = task_message(frame=m.Task.WGS84, latitude=47.406742, longitude=8.545594,
                          altitude=50.0)
     x, y, _ = messages.to_task(north, ORIGIN).position
     assert (x, y) == pytest.approx((0.0, 1000.8), abs=1.0)
@@ -44,6 +44,9 @@ def test_a_wgs84_task_is_placed_by_the_origin():
     ({'task_id': 'a b'}, "task_id = 'a b': expected a ROS name"),
     ({'task_id': ''}, "task_id = '': expected a ROS name"),
     ({'task_id': '7up'}, "task_id = '7up': expected a ROS name"),
+    ({'task_id': 'a__b'}, "task_id = 'a__b': expected a ROS name"),
+    ({'allowed_uavs': ['no body']}, "task t1: allowed_uavs = 'no body': expected a ROS name"),
+    ({'required_capabilities': ['']}, 'task t1: required_capabilities'),
     ({'value': -1.0}, 'task t1: value = -1.0'),
     ({'frame': 9}, r'task t1: frame = 9: expected LOCAL \(0\) or WGS84 \(1\)'),
     ({'frame': 1, 'latitude': math.nan}, 'task t1: latitude = nan'),
@@ -54,6 +57,25 @@ def test_a_wgs84_task_is_placed_by_the_origin():
 def test_a_bad_task_is_refused_by_the_name_of_its_field(changed, text):
     with pytest.raises(InvalidValue, match=text):
         messages.to_task(task_message(**changed), ORIGIN)
+
+
+@pytest.mark.parametrize(('changed', 'text'), [
+    ({'uav_id': 'a b'}, "uav_id = 'a b': expected a ROS name"),
+    ({'battery': -1.0}, 'uav u1: battery = -1.0'),
+    ({'mode': 99}, 'uav u1: mode = 99'),
+    ({'mission_state': 77}, 'uav u1: mission_state = 77'),
+    ({'range_remaining': -5.0}, 'uav u1: range'),
+    ({'cruise_speed': -5.0}, 'uav u1: cruise_speed'),
+    ({'list_revision': 2**32 - 1}, 'uav u1: list_revision = 4294967295'),
+])
+def test_a_bad_state_is_refused_by_the_name_of_its_field(changed, text):
+    state = m.UavState(uav_id='u1', battery=math.nan, range_remaining=math.nan,
+                       cruise_speed=math.nan, available=True)
+    assert messages.to_report(state).range is None
+    for name, value in changed.items():
+        setattr(state, name, value)
+    with pytest.raises(InvalidValue, match=text):
+        messages.to_report(state)
 
 
 @pytest.mark.parametrize('zone', [

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Iterable
 
 from builtin_interfaces.msg import Duration, Time
@@ -15,10 +14,18 @@ from uav_task_alloc_msgs import msg as m
 from uav_task_alloc.allocator.records import Kind, TaskEvent, UavReport
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.geometry.frames import Origin, to_enu
-from uav_task_alloc.model import Leg, Point, Shape, Task, ThreatZone, check_number
+from uav_task_alloc.model import (
+    Leg,
+    Point,
+    Shape,
+    Task,
+    ThreatZone,
+    check_number,
+    check_ros_name,
+)
 
 FRAME_ID = 'map'  # REP-105, ENU
-_NAME = re.compile(r'[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*')
+MOST_REVISIONS = 2**31  # half of what a message can count to
 
 LATCHED = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE,
                      durability=DurabilityPolicy.TRANSIENT_LOCAL)
@@ -26,13 +33,6 @@ ANNOUNCEMENTS = QoSProfile(depth=1000, reliability=ReliabilityPolicy.RELIABLE,
                            durability=DurabilityPolicy.TRANSIENT_LOCAL)
 EVENTS = QoSProfile(depth=100, reliability=ReliabilityPolicy.RELIABLE)
 STATES = QoSProfile(depth=50, reliability=ReliabilityPolicy.BEST_EFFORT)
-
-
-def check_ros_name(place: str, value: str) -> str:
-    """Letters, digits and _, tokens joined by /; raise InvalidValue otherwise."""
-    if not _NAME.fullmatch(value):
-        raise InvalidValue(place, value, 'a ROS name (letters, digits, _; no digit first)')
-    return value
 
 
 def to_stamp(seconds: float) -> Time:
@@ -76,6 +76,8 @@ def known(value: float) -> float | None:
 def to_task(msg: m.Task, origin: Origin) -> Task:
     """Raise InvalidValue, naming the field, where the message is no good task."""
     check_ros_name('task_id', msg.task_id)
+    for uav_id in msg.allowed_uavs:
+        check_ros_name(f'task {msg.task_id}: allowed_uavs', uav_id)
     radius = known(msg.acceptance_radius)
     return Task(
         msg.task_id, _task_position(msg, origin), value=msg.value,
@@ -87,9 +89,9 @@ def to_task(msg: m.Task, origin: Origin) -> Task:
 
 def _task_position(msg: m.Task, origin: Origin) -> Point:
     place = f'task {msg.task_id}: '
-    if msg.frame == m.Task.FRAME_LOCAL:
+    if msg.frame == m.Task.LOCAL:
         return from_point(msg.position)
-    if msg.frame != m.Task.FRAME_WGS84:
+    if msg.frame != m.Task.WGS84:
         raise InvalidValue(place + 'frame', msg.frame, 'LOCAL (0) or WGS84 (1)')
     check_number(place + 'latitude', msg.latitude, -90.0, 90.0)
     check_number(place + 'longitude', msg.longitude, -180.0, 180.0)
@@ -100,7 +102,7 @@ def _task_position(msg: m.Task, origin: Origin) -> Point:
 def from_task(task: Task) -> m.Task:
     """The LOCAL message of a task."""
     return m.Task(
-        task_id=task.id, frame=m.Task.FRAME_LOCAL, position=to_point(task.position),
+        task_id=task.id, frame=m.Task.LOCAL, position=to_point(task.position),
         value=task.value, service_time=to_duration(task.service_time),
         acceptance_radius=math.nan if task.acceptance_radius is None else task.acceptance_radius,
         required_capabilities=sorted(task.required_capabilities),
@@ -110,12 +112,19 @@ def from_task(task: Task) -> m.Task:
 def to_report(msg: m.UavState) -> UavReport:
     """Raise InvalidValue, naming the field, where the message tells nothing of a UAV."""
     check_ros_name('uav_id', msg.uav_id)
+    place = f'uav {msg.uav_id}: '
+    if not math.isnan(msg.battery):
+        check_number(place + 'battery', msg.battery, 0.0, 1.0)
+    check_number(place + 'mode', msg.mode, m.UavState.UNKNOWN, m.UavState.FAULT)
+    check_number(place + 'mission_state', msg.mission_state, m.UavState.UNKNOWN,
+                 m.UavState.FOREIGN)
+    check_number(place + 'list_revision', msg.list_revision, 0, MOST_REVISIONS)
     home = from_point(msg.home)
     return UavReport(
         msg.uav_id, from_point(msg.position), home=None if any(map(math.isnan, home)) else home,
         range=known(msg.range_remaining), cruise_speed=known(msg.cruise_speed) or None,
         capabilities=frozenset(msg.capabilities),
-        available=msg.available and msg.mode != m.UavState.MODE_FAULT,
+        available=msg.available and msg.mode != m.UavState.FAULT,
         active_task=msg.active_task_id, list_revision=msg.list_revision)
 
 

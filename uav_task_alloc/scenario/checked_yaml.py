@@ -89,7 +89,19 @@ def compose(text: str, name: str) -> yaml.Node:
         raise ScenarioError(f'{name}:1: nested too deep: expected a scenario') from None
     if node is None:
         raise ScenarioError(f'{name}:1: the file is empty: expected a scenario')
+    _refuse_circles(node, (), set())
     return node
+
+
+def _refuse_circles(node: yaml.Node, above: tuple[int, ...], done: set[int]) -> None:
+    if id(node) in above:
+        raise refusal(node, 'a value contains itself: expected a scenario')
+    if isinstance(node, yaml.ScalarNode) or id(node) in done:
+        return
+    for child in node.value:
+        for each in child if isinstance(child, tuple) else (child,):
+            _refuse_circles(each, (*above, id(node)), done)
+    done.add(id(node))
 
 
 def read_row(table: Table, place: str, node: yaml.Node) -> Row:

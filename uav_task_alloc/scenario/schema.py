@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 
+from uav_task_alloc.model import is_ros_name
 from uav_task_alloc.scenario.checked_yaml import (
     Key,
     Table,
@@ -20,10 +21,11 @@ TIME = number(0.0)
 POSITIVE = number(0.0, open_low=True)
 POINT = many(number(), 'three numbers [x, y, z]', 3, 3)
 CORNER = many(number(), 'two numbers [x, y]', 2, 2)
-ID = text('a non-empty string')
+NAME = text('a non-empty string')
+ID = text('letters, digits, _ and / after a letter or _', is_ros_name)
 ROS_NAME = text('letters, digits and _ after a letter, as it names topics',
                 re.compile(r'[A-Za-z][A-Za-z0-9_]*').fullmatch)
-NAMES = many(ID, 'a list of names')
+NAMES = many(NAME, 'a list of names')
 
 ORIGIN: Table = {
     'latitude': Key(number(-90.0, 90.0), '[deg] WGS84'),
@@ -90,7 +92,7 @@ CANCEL: Table = {
 }
 
 SCENARIO: Table = {
-    'name': Key(ID, 'what it is called; default: the name of the file', None),
+    'name': Key(NAME, 'what it is called; default: the name of the file', None),
     'seed': Key(whole(0, 2**32 - 1), 'of all that is random in it', 0),
     'origin': Key(mapping(ORIGIN, 'a mapping with latitude, longitude, altitude_amsl'),
                   'where ENU (0, 0, 0) is; default: 47.397742, 8.545594, 488.0', None),
