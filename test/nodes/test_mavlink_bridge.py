@@ -103,7 +103,7 @@ def test_lists_are_flown_and_replaced_in_flight_and_every_task_is_told_once(sky,
         assert world.completed(n)[-1] == f'u{n}_2'
         state = world.states[f'uav_{n}']
         assert state.list_revision == 2
-        assert state.mission_state == m.UavState.MISSION_VERIFIED
+        assert state.mission_state == m.UavState.VERIFIED
 
 
 @pytest.mark.parametrize('moment', ['upload', 'flight'])
@@ -115,7 +115,7 @@ def test_a_bridge_killed_and_started_again_flies_no_task_twice(sky, probe, momen
     if moment == 'upload':
         for n in KINDS:
             world.send(n, 2, [4, 3, 2])
-        probe.until(lambda: any(s.mission_state == m.UavState.MISSION_UPLOADING
+        probe.until(lambda: any(s.mission_state == m.UavState.UPLOADING
                                 or s.list_revision == 2 for s in world.states.values()))
     world.bridge.stop(signal.SIGKILL)
     world.again()
@@ -137,7 +137,7 @@ def test_states_carry_what_the_allocator_plans_with(sky, probe):
     assert one.range_remaining == pytest.approx(20000.0 * one.battery, rel=1e-3)
     assert (list(one.capabilities), list(two.capabilities)) == (['camera', 'thermal'], [])
     assert one.available
-    assert one.mode == m.UavState.MODE_STANDBY
+    assert one.mode == m.UavState.STANDBY
     assert one.cruise_speed != one.cruise_speed
 
 
@@ -149,6 +149,8 @@ def test_a_bad_list_is_refused_in_words_and_changes_nothing(sky, probe):
     bad.task.position.x = float('nan')
     world.lists[1].publish(m.TaskList(uav_id='uav_1', revision=2, tasks=[bad]))
     probe.until(lambda: 'three finite coordinates' in world.bridge.output())
+    world.lists[1].publish(m.TaskList(uav_id='uav_2', revision=2))
+    probe.until(lambda: "uav_id = 'uav_2': expected uav_1" in world.bridge.output())
     probe.until(lambda: world.completed(1) == ['u1_0', 'u1_1'])
     assert world.states['uav_1'].list_revision == 1
 

@@ -22,8 +22,10 @@ EVENT = {'STARTED': m.TaskEvent.STARTED, 'COMPLETED': m.TaskEvent.COMPLETED,
          'FAILED': m.TaskEvent.FAILED}
 
 
-def to_list(msg: m.TaskList, origin: Origin) -> TaskList:
-    """Raise InvalidValue, naming the field, where the message is no good list."""
+def to_list(msg: m.TaskList, uav_id: str, origin: Origin) -> TaskList:
+    """Raise InvalidValue, naming the field, where the message is no good list of that UAV."""
+    if msg.uav_id not in ('', uav_id):
+        raise InvalidValue('uav_id', msg.uav_id, uav_id)
     stops = tuple(Stop(to_task(planned.task, origin), tuple(
         check_point(f'task {planned.task.task_id}: via', from_point(p)) for p in planned.via))
         for planned in msg.tasks)
