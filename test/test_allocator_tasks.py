@@ -213,6 +213,14 @@ def test_a_task_that_failed_is_tried_by_another_uav_and_fails_when_nobody_is_lef
     assert desk.state('t1') == 'ASSIGNED'  # changed, it gets another chance
 
 
+def test_a_task_that_failed_on_all_who_are_there_waits_and_says_on_whom(desk):
+    desk.uav('b', 1000.0, 0.0, 50.0, available=False)
+    desk.event('FAILED', 't1', 'a', reason='refused by the autopilot')
+    desk.settle()
+    assert desk.state('t1') == 'UNASSIGNED'
+    assert desk.reason('t1') == 'failed on a; no other UAV that may fly it is available'
+
+
 def test_a_task_is_not_tried_for_ever():
     desk = Desk(max_attempts=2)
     for k in range(4):

@@ -7,6 +7,8 @@ import pytest
 from builtin_interfaces.msg import Duration
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import Point
+from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
+from rcl_interfaces.srv import SetParameters
 from std_srvs.srv import Trigger
 from uav_task_alloc_msgs import msg as m
 from uav_task_alloc_msgs.srv import SetAvailability, SubmitTasks
@@ -197,6 +199,30 @@ def test_bad_messages_are_refused_in_words_and_change_nothing_else(start, probe,
     assert fleet.revisions['a'] == [1]
 
 
+def test_every_new_fault_of_a_zone_is_told_and_the_last_good_form_stays(start, probe, fleet):
+    node = begin(start, fleet)
+    for radius, words in ((50.0, 'zones changed: z'), (-1.0, 'zone z: radius = -1.0'),
+                          (math.nan, 'zone z: radius = nan'), (60.0, 'zones changed: z'),
+                          (-1.0, 'zone z: radius = -1.0')):
+        said = node.output().count(words)
+        fleet.zones.publish(m.ThreatZoneArray(zones=[m.ThreatZone(zone_id='z', radius=radius)]))
+        probe.until(lambda words=words, said=said: node.output().count(words) > said)
+    assert node.output().count('zones changed') == 2
+
+
+def test_the_end_of_routes_is_told_anew_when_the_parameter_changes(start, probe, fleet):
+    begin(start, fleet, '-p', 'route_end:=hold')
+    fleet.uav('a', 0.0)
+    fleet.tasks.publish(add(task('t1', 100)))
+    probe.until(lambda: fleet.route('a') == ['t1'])
+    fleet.event(m.TaskEvent.COMPLETED, 't1', 'a')
+    probe.until(lambda: fleet.route('a') == [] and fleet.lists['a'].end == m.TaskList.HOLD)
+    home = ParameterValue(type=ParameterType.PARAMETER_STRING, string_value='home')
+    probe.call(SetParameters, '/allocator/set_parameters', SetParameters.Request(
+        parameters=[Parameter(name='route_end', value=home)]))
+    probe.until(lambda: fleet.lists['a'].end == m.TaskList.RETURN_HOME)
+
+
 def test_services_answer(start, probe, fleet):
     begin(start, fleet)
     fleet.uav('a', 0.0)
@@ -206,7 +232,7 @@ def test_services_answer(start, probe, fleet):
         return probe.call(SubmitTasks, 'allocator/submit_tasks',
                           SubmitTasks.Request(announcement=add(*tasks)))
 
-    north = task('t2', frame=m.Task.FRAME_WGS84, latitude=47.398742, longitude=8.545594,
+    north = task('t2', frame=m.Task.WGS84, latitude=47.398742, longitude=8.545594,
                  altitude=50.0)
     answer = submit(task('t1', 100), north, task('bad', math.nan))
     assert (answer.accepted, answer.rejected) == (['t1', 't2'], ['bad'])

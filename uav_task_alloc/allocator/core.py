@@ -109,7 +109,7 @@ class Allocator:
         lists, self._left = planning.lists_of(world, chosen)
         changed = self._publish(lists, stamp)
         planning.explain(world, self._left, stamp)
-        world.outbox.statuses = True
+        world.outbox.statuses |= changed or always or bool(world.tasks.dirty)
         if changed or always:
             world.revision += 1
             world.dirty.add('revision')

@@ -107,6 +107,10 @@ def _why_left(world: World, record: TaskRecord,
                                       'not heard yet')
     if not usable:
         return TaskState.UNASSIGNED, 'no UAV available'
+    others = _restricted(record, frozenset(usable)).allowed_uavs
+    if record.failed_on and others is not None and others.isdisjoint(usable):
+        return TaskState.UNASSIGNED, (f'failed on {", ".join(record.failed_on)}; no other UAV '
+                                      'that may fly it is available')
     if record.task.id in left:
         return TaskState.UNASSIGNED, left[record.task.id]
     return TaskState.PENDING, record.reason or 'waits for the next plan'

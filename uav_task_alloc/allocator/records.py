@@ -79,6 +79,11 @@ class Verdict:
     accepted: bool
     reason: str = ''  # why not; where accepted: that it changes nothing
 
+    @property
+    def unchanged(self) -> bool:
+        """It was accepted before."""
+        return self.accepted and bool(self.reason)
+
 
 @dataclass(frozen=True, slots=True)
 class TaskEvent:

@@ -50,4 +50,4 @@ def facts(world: World) -> dict[str, object]:
             'zones': len(world.zones), 'revision': world.revision,
             **{f'tasks {state.name}': states[state] for state in TaskState
                if state is not TaskState.REJECTED},
-            'refusals': len(world.tasks.rejected), 'solving': world.schedule.busy}
+            'tasks REJECTED': len(world.tasks.rejected), 'solving': world.schedule.busy}

@@ -32,9 +32,11 @@ class TaskBook:
             self.rejected.pop(task.id, None)
             self._put(TaskRecord(task, task, stamp=stamp, reason='waits for the next plan'))
             return Verdict(task.id, True)
+        ended = '' if known.open else f': it is {known.state.name}'
         if task in (known.task, known.announced):
-            return Verdict(task.id, True, UNCHANGED)
-        return Verdict(task.id, False, 'duplicate id: another task was announced under it')
+            return Verdict(task.id, True, UNCHANGED + ended)
+        return Verdict(task.id, False,
+                       f'duplicate id: another task was announced under it{ended}')
 
     def update(self, task: Task, stamp: float) -> Verdict:
         """New content for an open task; a failed one gets another chance."""

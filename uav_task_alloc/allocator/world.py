@@ -69,14 +69,14 @@ class World:
         return verdict
 
     def _judged(self, action: Action, verdicts: list[Verdict], now: float) -> list[Verdict]:
-        repeated = [v.task_id for v in verdicts if v.reason == UNCHANGED]
+        repeated = [v.task_id for v in verdicts if v.unchanged]
         if repeated:
             self.note(f'{action.name} of {_some(repeated)} ignored: {UNCHANGED}')
         for verdict in verdicts:
             if not verdict.accepted:
                 self.note(f'{action.name} of task {verdict.task_id!r} REJECTED: '
                           f'{verdict.reason}', warning=True)
-            elif verdict.reason != UNCHANGED:
+            elif not verdict.unchanged:
                 self.touch(f'{action.name} {verdict.task_id}', now)
         self.outbox.statuses = True
         return verdicts

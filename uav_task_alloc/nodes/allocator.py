@@ -38,7 +38,7 @@ from uav_task_alloc.params import AllocatorParams
 from uav_task_alloc.solver.solve import plan
 
 TICK = 0.025  # [s]
-MOST_COMPLAINTS = 1000  # kinds of bad messages that are remembered as logged
+MOST_COMPLAINTS, MOST_REASONS = 1000, 20  # names, and reasons for each, remembered as logged
 
 
 class AllocatorNode(Node):
@@ -53,7 +53,7 @@ class AllocatorNode(Node):
         self.keeper = Keeper(now.state_dir, self.get_logger().error)
         self.core = Allocator(now, time.monotonic(), self.keeper.saved)
         self.world = self.core.world
-        self.complained: set[tuple[str, str]] = set()
+        self.complained: dict[tuple[str, str], set[str]] = {}  # (topic, name): reasons
         self.answers: deque[Answer | None] = deque()
         self.background = False
         self._listen()
@@ -94,8 +94,7 @@ class AllocatorNode(Node):
             refused = self.world.hear(to_report(msg), time.monotonic(), self.stamp())
         except InvalidValue as error:
             refused = str(error)
-        if refused:
-            self.complain('uav_states', msg.uav_id, refused)
+        self.complain('uav_states', msg.uav_id, refused)
 
     def on_tasks(self, msg: m.TaskAnnouncement) -> list[Verdict]:
         """Tasks are added, changed or withdrawn."""
@@ -104,8 +103,8 @@ class AllocatorNode(Node):
     def on_zones(self, msg: m.ThreatZoneArray) -> None:
         """The whole picture of the zones."""
         zones, bad = announcements.sort_zones(msg, to_zone)
-        for zone_id, reason in bad.items():
-            self.complain('threat_zones', zone_id, reason)
+        for zone in msg.zones:
+            self.complain('threat_zones', zone.zone_id, bad.get(zone.zone_id, ''))
         self.world.set_zones(zones, bad, time.monotonic())
 
     def on_event(self, msg: m.TaskEvent) -> None:
@@ -141,16 +140,25 @@ class AllocatorNode(Node):
         return response
 
     def complain(self, topic: str, name: str, reason: str) -> None:
-        """Log a bad message, once for each topic and name."""
-        if (topic, name) not in self.complained and len(self.complained) < MOST_COMPLAINTS:
-            self.complained.add((topic, name))
-            self.get_logger().warning(f'{topic}: {reason}: ignored, and said only once')
+        """Log what is wrong with a message, once until `name` sends a good one."""
+        if not reason:
+            self.complained.pop((topic, name), None)
+            return
+        said = self.complained.setdefault((topic, name), set())
+        if reason not in said and len(said) < MOST_REASONS:
+            said.add(reason)
+            self.get_logger().warning(f'{topic}: {reason}: ignored; said once')
+        while len(self.complained) > MOST_COMPLAINTS:
+            del self.complained[next(iter(self.complained))]
 
     # what is solved
 
     def on_tick(self) -> None:
         """What time brings, a solve where one is due, and what has to be told."""
-        now, stamp, self.world.params = time.monotonic(), self.stamp(), self.live.now
+        now, stamp = time.monotonic(), self.stamp()
+        if self.world.params is not self.live.now:
+            self.world.params = self.live.now
+            self.world.touch('parameters changed', now)
         self.core.tick(now, stamp)
         problem = self.core.due(now, stamp)
         if problem is not None:
@@ -172,9 +180,7 @@ class AllocatorNode(Node):
     def failed(self, error: Exception) -> None:
         """In the worker's thread."""
         text = f'{type(error).__name__}: {error}'[:500]
-        if ('solver', text) not in self.complained:
-            self.complained.add(('solver', text))
-            self.get_logger().error(f'solver: {text}')
+        self.get_logger().error(f'solver: {text}', throttle_duration_sec=10.0)
 
     def on_answer(self) -> None:
         """The worker has an answer, or is ready for the first problem."""

@@ -8,7 +8,6 @@ from uav_task_alloc_msgs import msg as m
 from uav_task_alloc_msgs.srv import SubmitTasks
 
 from uav_task_alloc.allocator.records import Action, Verdict
-from uav_task_alloc.allocator.tasks import UNCHANGED
 from uav_task_alloc.allocator.world import World
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.geometry.frames import Origin
@@ -38,7 +37,7 @@ def take(world: World, msg: m.TaskAnnouncement, origin: Origin, stamp: float,
 def answer(verdicts: list[Verdict], response: SubmitTasks.Response) -> SubmitTasks.Response:
     """Verdicts as a service tells them. A caller who repeats himself is told so."""
     for verdict in verdicts:
-        if verdict.accepted and verdict.reason != UNCHANGED:
+        if verdict.accepted and not verdict.unchanged:
             response.accepted.append(verdict.task_id)
         else:
             response.rejected.append(verdict.task_id)
