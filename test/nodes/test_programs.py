@@ -54,6 +54,25 @@ def test_a_bad_start_parameter_ends_the_node_in_words(start, name, given, text):
     assert 'Traceback' not in out
 
 
+def test_help_and_strange_arguments_are_answered_without_starting():
+    def ask(*arguments):
+        path = Path(get_package_prefix('uav_task_alloc'), 'lib/uav_task_alloc/allocator')
+        done = subprocess.run([path, *arguments], capture_output=True, text=True, timeout=30)
+        return done.returncode, done.stdout + done.stderr
+
+    code, out = ask('--help', '--ros-args', '-p', 'seed:=1')
+    assert (code, 'docs/parameters.md' in out) == (0, True)
+    assert ask('--bogus') == (2, "'--bogus': expected --ros-args and what belongs to it\n")
+
+
+def test_a_whole_number_will_do_for_a_real_one_and_an_unknown_parameter_is_named(start, probe):
+    process = start('allocator', '-p', 'solve_budget:=1', '-p', 'solve_buget:=1.0')
+    got = probe.call(GetParameters, '/allocator/get_parameters',
+                     GetParameters.Request(names=['solve_budget'])).values[0]
+    assert got.double_value == 1.0
+    assert 'parameter solve_buget is unknown: ignored' in process.output()
+
+
 @pytest.mark.parametrize('name', params.NODES)
 def test_the_parameter_file_of_a_node_is_installed_and_read(start, probe, name):
     start(name, '--params-file', str(SHARE / f'config/{name}.yaml'), *NEEDS.get(name, []))

@@ -55,15 +55,27 @@ def declare(node: Node, kind: type[P]) -> Live:
     for spec in fields(kind):
         name = params.ros_name(spec)
         default = list(spec.default) if isinstance(spec.default, tuple) else spec.default
+        _accept_whole(node, spec)
         try:
             value = node.declare_parameter(name, default, descriptor(spec)).value
         except (InvalidParameterTypeException, InvalidParameterValueException):
             given = node._parameter_overrides[name].value
             raise InvalidValue(name, given, params.expectation(spec)) from None
         values[spec.name] = () if value is None else value
+    for name in sorted({*node._parameter_overrides} - {*map(params.ros_name, fields(kind))}):
+        if not node.has_parameter(name) and not name.startswith('qos_overrides.'):
+            node.get_logger().warning(f'parameter {name} is unknown: ignored')
     live = Live(kind(**values))
     node.add_on_set_parameters_callback(lambda changed: _change(live, changed))
     return live
+
+
+def _accept_whole(node: Node, spec: Any) -> None:
+    """`-p solve_budget:=1` means 1.0."""
+    name = params.ros_name(spec)
+    given = node._parameter_overrides.get(name)
+    if type(spec.default) is float and given is not None and type(given.value) is int:
+        node._parameter_overrides[name] = Parameter(name, value=float(given.value))
 
 
 def _change(live: Live, changed: list[Parameter]) -> SetParametersResult:

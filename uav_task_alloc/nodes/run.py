@@ -10,12 +10,14 @@ import rclpy
 from rclpy.executors import MultiThreadedExecutor, SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
+from rclpy.utilities import remove_ros_args
 
 from uav_task_alloc.errors import AllocError
 
 
 def run(make_node: Callable[[], Node], args: list[str] | None = None, threads: int = 1) -> None:
     """Spin `make_node()`; a bad parameter ends it with status 1 and one clear line."""
+    _check_arguments(remove_ros_args(args or sys.argv)[1:], make_node.__doc__)
     # rclpy's own handlers invalidate the context from another thread: a callback under way then
     # raises RCLError. Here the context lives until the node is gone.
     stop: list[int] = []
@@ -34,3 +36,14 @@ def run(make_node: Callable[[], Node], args: list[str] | None = None, threads: i
         sys.exit(str(error))
     finally:
         rclpy.try_shutdown()
+
+
+def _check_arguments(rest: list[str], text: str | None) -> None:
+    """What is left when ROS has taken its own."""
+    if '-h' in rest or '--help' in rest:
+        print(f'{text}\n\nParameters: --ros-args -p NAME:=VALUE, see docs/parameters.md, or '
+              '`ros2 param describe` while it runs.')
+        sys.exit(0)
+    if rest:
+        print(f'{rest[0]!r}: expected --ros-args and what belongs to it', file=sys.stderr)
+        sys.exit(2)
