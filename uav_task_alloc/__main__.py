@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import math
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import asdict
@@ -11,15 +12,17 @@ from pathlib import Path
 from typing import Any
 
 from uav_task_alloc import params, scenario
-from uav_task_alloc.errors import AllocError
+from uav_task_alloc.errors import AllocError, InvalidValue
 from uav_task_alloc.model import Plan
 from uav_task_alloc.scenario.document import markdown_text
+
+PICTURES = ('.png', '.pdf', '.svg')
 
 
 def plan_command(argv: Sequence[str]) -> int:
     """plan the tasks of a scenario file"""
     args = plan_parser().parse_args(argv)
-    draw = plotter() if args.plot else None
+    draw = plotter(args.plot) if args.plot else None
     read = scenario.load(args.scenario)
     cancelled = {cancel.task for cancel in read.cancels}
     tasks = [timed.task for timed in read.tasks if timed.task.id not in cancelled]
@@ -31,7 +34,7 @@ def plan_command(argv: Sequence[str]) -> int:
                 route_end=args.route_end or read.route_end)
     print(plan_text(made))
     if args.json:
-        args.json.write_text(json.dumps(plan_json(made), indent=2) + '\n')
+        args.json.write_text(json.dumps(plan_json(made), indent=2, allow_nan=False) + '\n')
     if draw:
         draw(uavs, tasks, zones, made, args.plot)
     return 0
@@ -73,13 +76,21 @@ def plan_json(made: Plan) -> dict[str, Any]:
         'unassigned': made.unassigned,
         'legs': {uav: [asdict(leg) for leg in legs] for uav, legs in made.legs.items()},
         'distance': made.distance, 'value': made.value, 'penalty': made.penalty,
-        'fit': made.fit, 'history': [list(step) for step in made.history],
+        'fit': finite(made.fit),
+        'history': [[seconds, finite(fit)] for seconds, fit in made.history],
         'solver': made.solver, 'solve_time': made.solve_time, 'iterations': made.iterations,
     }
 
 
-def plotter() -> Callable[..., None]:
+def finite(value: float) -> float | None:
+    """JSON knows no infinity."""
+    return value if math.isfinite(value) else None
+
+
+def plotter(path: Path) -> Callable[..., None]:
     """The function that draws a plan; asked for before any time goes into solving."""
+    if path.suffix.lower() not in PICTURES:
+        raise InvalidValue('--plot', str(path), f'a name that ends with {" or ".join(PICTURES)}')
     try:
         from uav_task_alloc.plots import draw_plan
     except ModuleNotFoundError as error:

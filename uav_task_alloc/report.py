@@ -2,6 +2,7 @@
 """The figures of a recorded run: what was said is held against where the vehicles really were."""
 from __future__ import annotations
 
+import argparse
 import json
 import math
 from collections.abc import Mapping, Sequence
@@ -123,9 +124,11 @@ def _named(reasons: Mapping[str, str]) -> str:
 
 def main(argv: Sequence[str]) -> int:
     """`report OUT_DIR | SUMMARY.json`: the table again, and the map drawn again."""
-    if len(argv) != 1:
-        raise SystemExit('usage: python -m uav_task_alloc report OUT_DIR | SUMMARY.json')
-    place = Path(argv[0])
+    parser = argparse.ArgumentParser(
+        prog='python -m uav_task_alloc report',
+        description='Print the table of a recorded run again, and draw its map again.')
+    parser.add_argument('place', type=Path, metavar='OUT_DIR | SUMMARY.json')
+    place = parser.parse_args(argv).place
     out = place if place.is_dir() else place.parent
     try:
         summary = summarise(out) if place.is_dir() else json.loads(place.read_text())
