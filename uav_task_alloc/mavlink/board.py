@@ -7,6 +7,8 @@ from collections import deque
 from dataclasses import dataclass, replace
 from enum import Enum
 
+from pymavlink.dialects.v20 import ardupilotmega as d
+
 from uav_task_alloc.errors import MissionError
 from uav_task_alloc.geometry.frames import Origin
 from uav_task_alloc.mavlink.change import Change, Kind, change
@@ -28,7 +30,8 @@ from uav_task_alloc.mission import (
 )
 from uav_task_alloc.model import Task
 
-NEAR = 15.0  # [m] from a point, beyond its radius: there
+SETTLE = 3.0  # [s] in which messages sent before the last change may still come
+CHECK = 60.0  # [s] between readbacks of a mission that nobody should have changed
 
 
 class MissionState(Enum):
@@ -166,9 +169,16 @@ class Board:
         self.read_once = False
         self.recall.reset()
 
-    def doubt(self) -> None:
-        """Read what is on board before anything else."""
-        self.held = None
+    def watch(self, message: Message, now: float) -> None:
+        """Has somebody else changed the mission? What MISSION_CURRENT says is doubt, not proof."""
+        if self.held is None or now - self.verified_at < SETTLE:
+            return
+        ours, plan = self.plan_id, plan_id(message)
+        changed = (plan != ours if plan and ours else message.total not in (
+            0, 65535, len(self.held), len(self.held) + self.own))
+        gone = message.mission_state == d.MISSION_STATE_NO_MISSION and self.held
+        if changed or gone or now - self.verified_at > CHECK:
+            self.held = None  # read what is on board before anything else
 
     def catch_up(self, now: float) -> None:
         """Complete what the vehicle has flown before anybody listened."""

@@ -14,24 +14,21 @@ from collections.abc import Sequence
 from pymavlink.dialects.v20 import ardupilotmega as d
 
 from uav_task_alloc.geometry.frames import Origin
-from uav_task_alloc.mavlink.board import NEAR, Board, MissionState
+from uav_task_alloc.mavlink.board import SETTLE, Board, MissionState
 from uav_task_alloc.mavlink.change import Change, Kind
-from uav_task_alloc.mavlink.codec import Message, plan_id
+from uav_task_alloc.mavlink.codec import Message
 from uav_task_alloc.mavlink.helm import Helm, Note, Step
 from uav_task_alloc.mavlink.peer import Peer
 from uav_task_alloc.mavlink.policy import Policy, TaskProgress
 from uav_task_alloc.mavlink.profiles import Flight, Profile
 from uav_task_alloc.mavlink.rates import Rates
-from uav_task_alloc.mavlink.telemetry import UNKNOWN, Telemetry
+from uav_task_alloc.mavlink.service import Service
+from uav_task_alloc.mavlink.telemetry import Telemetry
 from uav_task_alloc.mavlink.upload import State
-from uav_task_alloc.mission import RETURN, Item, TaskList, alike, all_alike
+from uav_task_alloc.mission import RETURN, TaskList, all_alike
 
-SETTLE = 3.0  # [s] in which messages sent before the last change may still come
-CHECK = 60.0  # [s] between readbacks of a mission that nobody should have changed
 LAST_WORD = 5.0  # [s] for a late REACHED, where the mission seems to end before its last item
 REMIND = 2.0  # [s] that a list may ask for what is completed before that is told again
-ARRIVAL = 2.0  # [s] before a task is reached, in which no swap is begun
-SERVICE = 10.0  # [s] beyond its hold that a service is waited for
 
 
 class Pilot:
@@ -49,7 +46,8 @@ class Pilot:
         self.going_home = False  # by a list without tasks
         self._rates = Rates(peer, self.telemetry, now)
         self._was_stale = self._aimed = False
-        self._serving_until, self._wait_until = math.inf, -math.inf
+        self._service = Service(self.board, self.telemetry, profile)
+        self._wait_until = -math.inf
         self._asked_again: tuple[str, ...] = ()  # completed tasks that the list still has
         self._remind_at = math.inf
         self._restarts = 0
@@ -137,24 +135,13 @@ class Pilot:
             if (message.mission_state == d.MISSION_STATE_COMPLETE
                     and self.telemetry.flight is Flight.MISSION):
                 progress.ended()
-            self._watch(message, now)
+            if not self.helm.busy:
+                self.board.watch(message, now)
         elif kind == 'STATUSTEXT':
             level = 'error' if message.severity < d.MAV_SEVERITY_WARNING else 'info'
             if str(message.text) != self._said:  # a refusal comes with every try
                 self.notes.append(Note(level, str(message.text)))
             self._said = str(message.text)
-
-    def _watch(self, message: Message, now: float) -> None:
-        """Has somebody else changed the mission? What the vehicle says is doubt, not proof."""
-        board = self.board
-        if board.held is None or now - board.verified_at < SETTLE or self.helm.busy:
-            return
-        ours, plan = board.plan_id, plan_id(message)
-        changed = (plan != ours if plan and ours else message.total not in (
-            0, 65535, len(board.held), len(board.held) + board.own))
-        gone = message.mission_state == d.MISSION_STATE_NO_MISSION and board.held
-        if changed or gone or now - board.verified_at > CHECK:
-            board.doubt()
 
     def _mode(self, before: Flight, was_airborne: bool, now: float) -> None:
         board, progress = self.board, self.board.progress
@@ -268,7 +255,7 @@ class Pilot:
             return []
         if found.kind is Kind.JUMP:
             return self._jump(found, now)
-        if self._serving(now):
+        if self._service.lasts(now):
             self.helm.waits_for = 'the end of the service'
             return []
         if (found.kind is Kind.SWAP and not self.profile.atomic and telemetry.airborne
@@ -276,26 +263,6 @@ class Pilot:
             self.helm.must_start = True
             return self.helm.set_mode(Flight.HOLD, now)
         return board.begin_upload(found, now)
-
-    def _serving(self, now: float) -> bool:
-        """An upload would start the hold of the task anew, or have it reached once more."""
-        item, first = self.board.progress.active, self.board.wanted()[0]
-        if item is None or self.telemetry.flight is not Flight.MISSION or not (
-                first.completes and self._is_near(item, first)):
-            self._serving_until = math.inf
-            return False
-        if math.isinf(self._serving_until):
-            self._serving_until = now + item.params[0] + SERVICE
-        return now < self._serving_until
-
-    def _is_near(self, item: Item, first: Item) -> bool:
-        """The first task is served, or flown to and reached before an upload would end."""
-        distance = math.dist(self.telemetry.position, first.position or UNKNOWN) - first.radius
-        if alike(first, item) and self.profile.atomic and (
-                distance < NEAR + ARRIVAL * self.telemetry.pace):
-            return True
-        served = alike(first, item) or (item.completes and item.task == first.task)
-        return served and item.params[0] > 0.0 and distance < NEAR
 
     def _jump(self, found: Change, now: float) -> list[Message]:
         def done(t: float) -> None:
