@@ -164,7 +164,9 @@ def test_stop_ends_the_search_with_the_answer_so_far():
     ({'budget': -1.0}, r'budget = -1\.0: expected a number in \[0, 86400\]'),
     ({'route_end': 'moon'}, "route_end = 'moon': expected one of hold, home"),
     ({'threads': 0}, r'threads = 0: expected an integer in \[1, 64\]'),
-    ({'warm': {}}, 'warm = {}: expected a Plan or None'),
+    ({'warm': {}}, "warm = 'dict': expected a Plan, its state or None"),
+    ({'seed': 1.5}, r'seed = 1\.5: expected an integer'),
+    ({'zones': None}, 'zones = None: expected an iterable of ThreatZone'),
     ({'max_iterations': -1}, 'max_iterations = -1: expected an integer'),
     ({'locked': {'u1': 't'}}, r"locked\[u1\] = 't': expected a sequence of task ids"),
 ])
@@ -202,3 +204,23 @@ def test_a_task_inside_a_zone_is_left_out_however_long_bees_fly(solver, route_en
     made = quick(uavs, tasks, [dome], solver=solver, route_end=route_end, max_iterations=6000)
     check(made, uavs, tasks)
     assert made.unassigned == {'t5': 'inside zone dome'}
+
+
+@pytest.mark.parametrize('reach', [math.inf, 9e4])
+@pytest.mark.parametrize('zone', [ThreatZone.cylinder('z', (0.0, 0.0), 50.0),
+                                  ThreatZone.hemisphere('z', (0.0, 0.0, -1.0), 50.0)])
+def test_a_home_inside_a_zone_is_the_reason_why_nothing_is_flown(reach, zone):
+    uav = Uav('u1', (300.0, 0.0, 30.0), reach, home=(0.0, 0.0, 0.0))
+    made = quick([uav], [Task('t', (350.0, 0.0, 30.0))], [zone], route_end='home')
+    assert made.routes == {'u1': ()}
+    assert made.unassigned == {'t': 'no safe way home; home of u1 lies inside zone z'}
+    assert quick([uav], [Task('t', (350.0, 0.0, 30.0))], [zone]).routes == {'u1': ('t',)}
+
+
+def test_a_plan_or_its_state_is_a_warm_start():
+    uavs, tasks = make(3, 30)
+    cold = quick(uavs, tasks)
+    for warm in (cold, cold.state):
+        again = quick(uavs, tasks, warm=warm, max_iterations=0)
+        assert again.warm_started
+        assert again.routes == cold.routes

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 
@@ -19,8 +18,8 @@ ROUNDING = 1e-6  # [m] beyond range that is no excess
 STRAIGHT = 1.0 + 1e-12  # a way at most so much longer than the distance has no detour points
 
 
-def to_plan(problem: Problem, recorder: Recorder, state: Any, solver: str, warm: bool) -> Plan:
-    """What `plan` answers."""
+def to_plan(problem: Problem, recorder: Recorder, solver: str, warm: bool) -> Plan:
+    """What `plan` answers, but for its state."""
     order = nodes_of(recorder.best, len(problem.uavs))
     routes, legs = {}, {}
     for u, uav in enumerate(problem.uavs):
@@ -38,7 +37,7 @@ def to_plan(problem: Problem, recorder: Recorder, state: Any, solver: str, warm:
     return Plan(
         routes, reasons(problem, left), distance, value,
         penalty, fit(distance, value, penalty, problem.rules.weights),
-        tuple(recorder.history), state, legs, problem.rules.returns, solver,
+        tuple(recorder.history), None, legs, problem.rules.returns, solver,
         recorder.elapsed(), recorder.iterations, warm)
 
 

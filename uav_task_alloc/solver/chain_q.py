@@ -19,7 +19,7 @@ def solve(recorder: Recorder, seed: int, learnt: object = None,
     """Fly until the budget ends; returns the tables for the next warm start."""
     problem = recorder.problem
     if not recorder.history:
-        recorder.offer(repaired(problem, None))
+        recorder.offer(repaired(problem, {}))
     if not problem.tasks or not problem.uavs or recorder.over():
         return learnt
     habits = habits or (WARM_START if recorder.warm else COLD_START)

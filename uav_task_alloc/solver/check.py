@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from numbers import Integral
 from typing import TypeVar
 
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.geometry.detour import detour
-from uav_task_alloc.model import Plan, Task, ThreatZone, Uav, check_number
+from uav_task_alloc.model import Task, ThreatZone, Uav, check_number
 from uav_task_alloc.solver.problem import Limits
 
 Named = TypeVar('Named', Task, Uav, ThreatZone)
@@ -17,6 +18,8 @@ LONGEST = 86_400.0  # [s]
 
 def check_unique(kind: str, given: Iterable[Named], wanted: type[Named]) -> tuple[Named, ...]:
     """All of the wanted type, no id twice. Raises InvalidValue."""
+    if not isinstance(given, Iterable):
+        raise InvalidValue(f'{kind}s', given, f'an iterable of {wanted.__name__}')
     found = tuple(given)
     seen: set[str] = set()
     for each in found:
@@ -28,16 +31,16 @@ def check_unique(kind: str, given: Iterable[Named], wanted: type[Named]) -> tupl
     return found
 
 
-def check_options(budget: float, route_end: str, threads: int, warm: Plan | None,
+def check_options(budget: float, seed: int, route_end: str, threads: int,
                   max_iterations: int | None) -> None:
     """The options of `plan` that are no objects of the world. Raises InvalidValue."""
     check_number('budget', budget, 0.0, LONGEST)
+    if not isinstance(seed, Integral):
+        raise InvalidValue('seed', seed, 'an integer')
     if route_end not in ROUTE_ENDS:
         raise InvalidValue('route_end', route_end, f'one of {", ".join(ROUTE_ENDS)}')
     if not isinstance(threads, int) or not 1 <= threads <= 64:
         raise InvalidValue('threads', threads, 'an integer in [1, 64]')
-    if warm is not None and not isinstance(warm, Plan):
-        raise InvalidValue('warm', warm, 'a Plan or None')
     if max_iterations is not None and (not isinstance(max_iterations, int)
                                        or max_iterations < 0):
         raise InvalidValue('max_iterations', max_iterations, 'an integer in [0, inf) or None')

@@ -45,7 +45,7 @@ def _reason(problem: Problem, i: int, short: Floats) -> str:
         return _unable(problem, task)
     need, nearest = _nearest(problem, i, short, np.argsort(short, kind='stable').tolist())
     if need == math.inf:
-        return 'unreachable: no safe way past the zones' + (
+        return _no_way_home(problem, i) or 'unreachable: no safe way past the zones' + (
             '' if a.may[:, i].all() else ' for the UAVs that may serve it')
     if need > a.reach[nearest]:
         return (f'beyond the range of every UAV: {problem.uavs[nearest].id} needs '
@@ -63,6 +63,19 @@ def _nearest(problem: Problem, i: int, short: Floats, order: Iterable[int]) -> t
         if need < math.inf and (found[1] < 0 or need - a.reach[u] < least):
             least, found = need - a.reach[u], (need, u)
     return found
+
+
+def _no_way_home(problem: Problem, i: int) -> str:
+    """The reason of the i-th task where some UAV gets there, but none back; else empty."""
+    a, uavs = problem.arrays, problem.uavs
+    able = [u for u in np.flatnonzero(a.may[:, i])
+            if problem.distances.length(int(u), a.uavs + i) < math.inf]
+    if not problem.rules.returns or not able:
+        return ''
+    around = {uavs[u].id: problem.distances.zones_around(a.ends + int(u)) for u in able}
+    inside = [f'home of {uav_id} lies inside zone {", ".join(zones)}'
+              for uav_id, zones in around.items() if zones]
+    return '; '.join(['no safe way home', *inside])
 
 
 def _unable(problem: Problem, task: Task) -> str:

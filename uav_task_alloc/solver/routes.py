@@ -152,6 +152,8 @@ cost, better = part(cost_now), part(better_now)  # handing arrays to a kernel ta
 @part
 def lengthened(a: Arrays, r: Routes, u: int, delta: float) -> float:
     """Cost [m] of making UAV u's route longer by delta [m]; inf where it may not."""
+    if not delta < math.inf:
+        return math.inf
     before = r.length[u] - a.reach[u]
     after = before + delta
     if after <= TINY and before <= TINY:

@@ -6,9 +6,10 @@ import functools
 import math
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
 from itertools import pairwise
 
-from uav_task_alloc.errors import UnknownName
+from uav_task_alloc.errors import InvalidValue, UnknownName
 from uav_task_alloc.model import Plan, Task, ThreatZone, Uav
 from uav_task_alloc.objective import Weights
 from uav_task_alloc.solver.answer import to_plan
@@ -20,8 +21,8 @@ from uav_task_alloc.solver.warm import State, repaired
 
 
 def plan(uavs: Iterable[Uav], tasks: Iterable[Task], zones: Iterable[ThreatZone] = (), *,
-         budget: float = 0.1, seed: int = 0, solver: str = 'chain_q', warm: Plan | None = None,
-         route_end: str = 'hold', hard_range: bool = True,
+         budget: float = 0.1, seed: int = 0, solver: str = 'chain_q',
+         warm: Plan | State | None = None, route_end: str = 'hold', hard_range: bool = True,
          locked: Mapping[str, Sequence[str]] | None = None, weights: Weights | None = None,
          clearance: float = 0.0, altitude_min: float = -math.inf,
          altitude_max: float = math.inf, threads: int = 1,
@@ -31,28 +32,31 @@ def plan(uavs: Iterable[Uav], tasks: Iterable[Task], zones: Iterable[ThreatZone]
 
     Every task that can be served is served; where ranges do not suffice the most value is, then
     on the shortest way. hard_range=False: ranges may be exceeded at the price of eq 2.12.
-    `warm` is an earlier plan to go on from, never worsened; `locked` lists the first tasks of
-    UAVs that stay as they are. `stop` is asked between rounds. The same seed and
+    `warm` is an earlier plan, or its state, to go on from, never worsened; `locked` lists the
+    first tasks of UAVs that stay as they are. `stop` is asked between rounds. The same seed and
     `max_iterations` on one thread give the same plan. The first call in a process loads or
     compiles the kernels before its budget begins. Raises InvalidValue, UnknownName.
     """
-    if solver not in SOLVERS:
+    if not isinstance(solver, str) or solver not in SOLVERS:
         raise UnknownName('solver', solver, list(SOLVERS))
-    check_options(budget, route_end, threads, warm, max_iterations)
+    check_options(budget, seed, route_end, threads, max_iterations)
+    if not isinstance(warm, (Plan, State, type(None))):
+        raise InvalidValue('warm', type(warm).__name__, 'a Plan, its state or None')
     fleet, work = check_unique('uav', uavs, Uav), check_unique('task', tasks, Task)
     limits = Limits(check_unique('zone', zones, ThreatZone), clearance, altitude_min,
                     altitude_max)
     rules = Rules(route_end == 'home', hard_range, weights or Weights())
     warm_up()
-    began = clock()
+    began, before = clock(), State.of(warm)
     problem = make_problem(fleet, work, check_locked(locked, fleet, work, limits), limits, rules,
-                           State.of(warm).problem)
+                           before.problem)
     recorder = Recorder(problem, clock, began, budget, max_iterations, stop, threads,
                         warm is not None, _held(problem))
     if warm is not None:
-        recorder.offer(repaired(problem, warm))
-    learnt = SOLVERS[solver](recorder, seed, State.of(warm).learnt)
-    return to_plan(problem, recorder, State(problem, learnt), solver, warm is not None)
+        recorder.offer(repaired(problem, before.routes))
+    learnt = SOLVERS[solver](recorder, seed, before.learnt)
+    made = to_plan(problem, recorder, solver, warm is not None)
+    return replace(made, state=State(problem, learnt, made.routes))
 
 
 def _held(problem: Problem) -> tuple[float, float]:
@@ -74,4 +78,4 @@ def warm_up() -> None:
     for solve in SOLVERS.values():
         recorder = Recorder(problem, lambda: 0.0, 0.0, 1.0, max_iterations=64)
         solve(recorder, 0, None)
-        to_plan(problem, recorder, None, '', False)
+        to_plan(problem, recorder, '', False)

@@ -2,7 +2,8 @@
 """An earlier plan brought into the world as it is: what still holds stays, new tasks go in."""
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -22,20 +23,23 @@ class State:
 
     problem: Problem | None = None  # lengths that are known
     learnt: Any = None  # what the solver wants back
+    routes: Mapping[str, tuple[str, ...]] = field(default_factory=dict)  # by UAV
 
     @classmethod
-    def of(cls, plan: Plan | None) -> State:
-        """The state of a plan; an empty one where there is none."""
-        found = None if plan is None else plan.state
-        return found if isinstance(found, State) else cls()
+    def of(cls, warm: Plan | State | None) -> State:
+        """The state of a plan, with the plan's routes; an empty one where there is none."""
+        if not isinstance(warm, Plan):
+            return warm or cls()
+        found = warm.state if isinstance(warm.state, State) else cls()
+        return replace(found, routes=warm.routes)
 
 
-def repaired(problem: Problem, warm: Plan | None) -> Routes:
-    """The routes of `warm` without what is gone, forbidden or too far, and all else put in."""
+def repaired(problem: Problem, before: Mapping[str, tuple[str, ...]]) -> Routes:
+    """Earlier routes without what is gone, forbidden or too far, and all else put in."""
     a, routes = problem.arrays, of.empty_routes(problem.arrays)
     nodes: list[int] = []
     bounds = [0]
-    index, before = problem.index, warm.routes if warm else {}
+    index = problem.index
     for uav in problem.uavs:
         nodes += [a.uavs + index[t] for t in before.get(uav.id, ()) if t in index]
         bounds.append(len(nodes))
