@@ -23,12 +23,13 @@ def test_an_instance_is_the_same_again_and_within_reach():
 def test_the_bench_prints_gaps_and_keeps_lengths(tmp_path, capsys, monkeypatch):
     monkeypatch.setattr(rivals, 'installed', lambda: [])
     out = tmp_path / 'runs.json'
-    assert bench.main(['--sizes', '2x6', '--seeds', '2', '--budgets', '0.01', '--solvers',
-                       'chain_q,greedy', '--rivals', '1', '--json', str(out)]) == 0
+    assert bench.main(['--sizes', '2x6', '--seeds', '2', '--first', '3', '--budgets', '0.01',
+                       '--solvers', 'chain_q,greedy', '--rivals', '1', '--json', str(out)]) == 0
     said = capsys.readouterr().out
     assert 'not installed, so left out: ortools, pyvrp' in said
     assert '| instances | chain_q@0.01 | greedy@0.01 |' in said
-    assert len(json.loads(out.read_text())) == 4
+    assert list(json.loads(out.read_text())) == ['spread-2-6-3', 'spread-2-6-4', 'base-2-6-3',
+                                                 'base-2-6-4']
 
 
 def test_a_plan_that_leaves_tasks_out_is_counted_apart():

@@ -49,6 +49,7 @@ def _parser() -> argparse.ArgumentParser:
     add('--sizes', default='4x20,8x50,8x100,20x200', help='UAVs x tasks, ...')
     add('--kinds', default='spread,base', help='spread: starts anywhere; base: one start')
     add('--seeds', type=int, default=5, help='instances a size')
+    add('--first', type=int, default=1, help='seed of the first instance')
     add('--slack', type=float, default=SLACK, help='ranges over a fair share of a good tour')
     add('--budgets', default='0.1,1', help='[s] of CPU time, ...')
     add('--solvers', default='chain_q', help=f'of {", ".join(SOLVERS)}')
@@ -64,7 +65,7 @@ def _numbers(text: str) -> list[float]:
 
 def _instances(asked: argparse.Namespace) -> Iterable[Instance]:
     for kind, size, seed in product(asked.kinds.split(','), asked.sizes.split(','),
-                                    range(1, asked.seeds + 1)):
+                                    range(asked.first, asked.first + asked.seeds)):
         uavs, tasks = (int(each) for each in size.split('x'))
         yield make_instance(uavs, tasks, seed, kind == 'base', asked.slack)
 

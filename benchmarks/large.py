@@ -1,0 +1,58 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Large fleets: tasks left out, length, time to the first answer and memory, a line a plan.
+
+    python benchmarks/large.py [--size 200x5000] [--budgets 1,10] [--seeds 1] [--rival 60]
+
+`--rival 60` gives PyVRP so many seconds of CPU time on each instance as well.
+"""
+from __future__ import annotations
+
+import argparse
+import resource
+import time
+
+from uav_task_alloc import plan
+from uav_task_alloc.solver.solve import warm_up
+from uav_task_alloc.study import rivals
+from uav_task_alloc.study.instances import SLACK, Instance, make_instance
+
+
+def ours(instance: Instance, budget: float) -> None:
+    """Print what `plan` makes of it within `budget` [s] of CPU time."""
+    made = plan(instance.uavs, instance.tasks, budget=budget, clock=time.process_time)
+    memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+    print(f'{instance.name}: {budget:g} s: {len(made.unassigned)} left out, '
+          f'{made.distance / 1000:.1f} km, first answer after {1000 * made.history[0][0]:.0f} ms, '
+          f'{memory:.0f} MB resident', flush=True)
+
+
+def rival(instance: Instance, seconds: float) -> None:
+    """Print when PyVRP first served all, and its best."""
+    found = rivals.pyvrp(instance, seconds)
+    text = (f'{found[-1][1] / 1000:.1f} km, the first plan after {found[0][0]:.1f} s'
+            if found else 'no plan')
+    print(f'{instance.name}: PyVRP, {seconds:g} s: {text}', flush=True)
+
+
+def main() -> None:
+    """Spread and one base; memory first, as PyVRP's matrix counts in the same process."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument('--size', default='200x5000', help='UAVs x tasks')
+    parser.add_argument('--budgets', default='1,10', help='[s] of CPU time, ...')
+    parser.add_argument('--seeds', type=int, default=1, help='instances of each kind')
+    parser.add_argument('--slack', type=float, default=SLACK, help='ranges over a fair share')
+    parser.add_argument('--rival', type=float, default=0.0, help='[s] for PyVRP; 0: not asked')
+    asked = parser.parse_args()
+    uavs, tasks = (int(each) for each in asked.size.split('x'))
+    instances = [make_instance(uavs, tasks, 11 + seed, one_base, asked.slack)
+                 for seed in range(asked.seeds) for one_base in (False, True)]
+    warm_up()
+    for instance in instances:
+        for budget in asked.budgets.split(','):
+            ours(instance, float(budget))
+    for instance in instances if asked.rival > 0.0 else []:
+        rival(instance, asked.rival)
+
+
+if __name__ == '__main__':
+    main()
