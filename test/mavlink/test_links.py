@@ -155,6 +155,14 @@ def test_a_refused_tcp_connection_is_tried_again_and_harms_nothing(radio):
     for now in range(3):
         line.step(float(now))
         assert nothing(line)
+    assert line.links[0].trouble == 'Connection refused'
+
+
+def test_a_serial_line_that_is_not_there_says_so(radio):
+    line = radio('/dev/ttyNOPE:57600')
+    assert line.links[0].trouble == ''
+    line.step(0.0)
+    assert line.links[0].trouble == 'No such file or directory'
 
 
 def test_a_serial_line_carries_frames(radio):

@@ -24,6 +24,7 @@ class Link(Protocol):
     name: str
     datagrams: bool  # each read is whole
     opened: int  # how often; a new file may have the number of the old one
+    trouble: str  # why nothing comes; empty: no reason is known
 
     def fileno(self) -> int: ...
 
@@ -45,7 +46,7 @@ class Link(Protocol):
 class Udp:
     """udpin learns its far ends by hearing them, udpout has one from the start."""
 
-    datagrams, opened = True, 1
+    datagrams, opened, trouble = True, 1, ''
 
     def __init__(self, name: str, host: str, port: int, bind: bool) -> None:
         self.name = name
@@ -101,7 +102,7 @@ class Stream:
     datagrams = False
 
     def __init__(self, name: str) -> None:
-        self.name, self.opened = name, 0
+        self.name, self.opened, self.trouble = name, 0, ''
         self._file = -1
         self._waiting = bytearray()
         self._try_at = float('-inf')
@@ -117,12 +118,17 @@ class Stream:
             data = os.read(self._file, CHUNK)
         except BlockingIOError:
             return []
-        except OSError:
-            data = b''
+        except OSError as error:
+            return self._broken(error.strerror)
         if not data:
-            self.close()
-            return []
+            return self._broken('closed by the far end')
+        self.trouble = ''
         return [(self.name, data)]
+
+    def _broken(self, why: str | None) -> list[tuple[Hashable, bytes]]:
+        self.trouble = why or 'broken'
+        self.close()
+        return []
 
     def write(self, end: Hashable, data: bytes) -> None:
         if self._file >= 0 and len(self._waiting) + len(data) <= BACKLOG:
@@ -135,8 +141,8 @@ class Stream:
             try:
                 self._file = self._open()
                 self.opened += 1
-            except OSError:
-                self._file = -1
+            except OSError as error:
+                self._file, self.trouble = -1, error.strerror or str(error)
         elif self._waiting:
             self._flush()
 
@@ -145,8 +151,8 @@ class Stream:
             del self._waiting[:os.write(self._file, self._waiting)]
         except BlockingIOError:
             pass
-        except OSError:
-            self.close()
+        except OSError as error:
+            self._broken(error.strerror)
 
     def ends(self) -> list[Hashable]:
         return [self.name]

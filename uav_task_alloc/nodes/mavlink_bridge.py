@@ -17,7 +17,7 @@ from uav_task_alloc.mavlink.link import open_link
 from uav_task_alloc.mavlink.policy import Policy
 from uav_task_alloc.mavlink.radio import Heartbeat, Radio
 from uav_task_alloc.mavlink.status import Told, facts_of, state_of
-from uav_task_alloc.model import check_ros_name
+from uav_task_alloc.model import check_number, check_ros_name
 from uav_task_alloc.nodes import bridge_messages as convert
 from uav_task_alloc.nodes.messages import EVENTS, LATCHED, STATES
 from uav_task_alloc.nodes.parameters import declare
@@ -41,6 +41,10 @@ def station_of(params: BridgeParams) -> Station:
     if len(names) != 2:
         raise InvalidValue('uav_id_pattern', params.uav_id_pattern, 'a text with {sysid}')
     check_ros_name('uav_id_pattern', names.pop())
+    if not params.connections:
+        raise InvalidValue('connections', [], 'at least one')
+    for number in params.system_ids:
+        check_number('system_ids', number, 1, 255)
     origin = Origin(params.origin__latitude, params.origin__longitude,
                     params.origin__altitude_amsl)
     return Station(params.system_id, params.component_id, params.system_ids,
@@ -67,6 +71,7 @@ class MavlinkBridge(Node):
                     'error': lambda text: logger.error(text)}
         self.told = Told()
         self.lists: dict[str, object] = {}
+        self.troubles: dict[str, str] = {}  # told, by link
         self.states = self.create_publisher(m.UavState, 'uav_states', STATES)
         self.task_events = self.create_publisher(m.TaskEvent, 'task_events', EVENTS)
         self.health = self.create_publisher(DiagnosticArray, '/diagnostics', 10)
@@ -141,7 +146,16 @@ class MavlinkBridge(Node):
         now = time.monotonic()
         with self.lock:
             facts = [(s.uav_id, *facts_of(s, now)) for s in self.ground.served.values()]
+        for link in self.radio.links:
+            self.tell_trouble(link.name, link.trouble)
+            facts.append((link.name, 2 if link.trouble else 0, link.trouble or 'open', {}))
         self.health.publish(convert.diagnostics(facts, self.stamp()))
+
+    def tell_trouble(self, name: str, trouble: str) -> None:
+        """Log what is wrong with a link, once, and that it is over."""
+        if trouble != self.troubles.get(name, ''):
+            self.log['error' if trouble else 'info'](f'{name}: {trouble or "works"}')
+            self.troubles[name] = trouble
 
     def stamp(self) -> float:
         """The published clock [s]."""
