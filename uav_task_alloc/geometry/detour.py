@@ -38,7 +38,7 @@ class Detour:
         return ''
 
 
-def detour(a: Iterable[float], b: Iterable[float], zones: Sequence[ThreatZone] = (), *,
+def detour(a: Iterable[float], b: Iterable[float], zones: Iterable[ThreatZone] = (), *,
            clearance: float = 0.0, altitude_min: float = -math.inf,
            altitude_max: float = math.inf) -> tuple[float, tuple[Point, ...]]:
     """Length [m] and waypoints (without a and b) of the shortest safe way; (inf, ()): none.
@@ -51,11 +51,11 @@ def detour(a: Iterable[float], b: Iterable[float], zones: Sequence[ThreatZone] =
     return found.length, found.points
 
 
-def find_detour(a: Iterable[float], b: Iterable[float], zones: Sequence[ThreatZone] = (), *,
+def find_detour(a: Iterable[float], b: Iterable[float], zones: Iterable[ThreatZone] = (), *,
                 clearance: float = 0.0, altitude_min: float = -math.inf,
                 altitude_max: float = math.inf) -> Detour:
     """As `detour`, and says what is special about the way. Raises InvalidValue."""
-    start, goal = check_point('a', a), check_point('b', b)
+    start, goal, zones = check_point('a', a), check_point('b', b), tuple(zones)
     limits = check_limits(altitude_min, altitude_max)
     obstacles = pack(zones, clearance)
     start_inside = _around(obstacles, zones, start)
