@@ -8,7 +8,7 @@ from uav_task_alloc_msgs import msg as m
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.geometry.frames import Origin
 from uav_task_alloc.model import Leg, Task, ThreatZone
-from uav_task_alloc.nodes import messages
+from uav_task_alloc.nodes import bridge_messages, messages
 
 ORIGIN = Origin(47.397742, 8.545594, 488.0)
 
@@ -109,3 +109,12 @@ def test_a_planned_task_carries_its_way():
     msg = messages.planned_task(Task('t1', (1.0, 2.0, 3.0)), Leg(((0.5, 0.5, 0.5),), 4.0), 2.5)
     assert (msg.leg_distance, msg.via[0].x, msg.eta.sec, msg.eta.nanosec) == (
         4.0, 0.5, 2, 500_000_000)
+
+
+def test_a_task_without_a_radius_gets_that_of_the_parameter():
+    own = Task('t1', (1.0, 2.0, 3.0), acceptance_radius=7.0)
+    tasks = [messages.planned_task(t, Leg((), 1.0), 0.0)
+             for t in (own, Task('t2', (1.0, 2.0, 3.0)))]
+    for default, expected in ((0.0, [7.0, None]), (4.0, [7.0, 4.0])):
+        made = bridge_messages.to_list(m.TaskList(uav_id='u1', tasks=tasks), 'u1', ORIGIN, default)
+        assert [stop.task.acceptance_radius for stop in made.stops] == expected

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
+from dataclasses import replace
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from geometry_msgs.msg import Vector3
@@ -14,7 +15,7 @@ from uav_task_alloc.geometry.frames import Origin
 from uav_task_alloc.mavlink.policy import TaskProgress
 from uav_task_alloc.mavlink.status import UavStatus
 from uav_task_alloc.mission import Stop, TaskList
-from uav_task_alloc.model import check_point
+from uav_task_alloc.model import Task, check_point
 from uav_task_alloc.nodes.messages import from_point, header, to_point, to_task
 
 NOWHERE = (math.nan, math.nan, math.nan)
@@ -22,11 +23,14 @@ EVENT = {'STARTED': m.TaskEvent.STARTED, 'COMPLETED': m.TaskEvent.COMPLETED,
          'FAILED': m.TaskEvent.FAILED}
 
 
-def to_list(msg: m.TaskList, uav_id: str, origin: Origin) -> TaskList:
-    """Raise InvalidValue, naming the field, where the message is no good list of that UAV."""
+def to_list(msg: m.TaskList, uav_id: str, origin: Origin, radius: float) -> TaskList:
+    """Tasks that tell no acceptance radius get `radius` [m]; 0: the autopilot's own.
+
+    Raise InvalidValue, naming the field, where the message is no good list of that UAV.
+    """
     if msg.uav_id not in ('', uav_id):
         raise InvalidValue('uav_id', msg.uav_id, uav_id)
-    stops = tuple(Stop(to_task(planned.task, origin), tuple(
+    stops = tuple(Stop(_accepted(to_task(planned.task, origin), radius), tuple(
         check_point(f'task {planned.task.task_id}: via', from_point(p)) for p in planned.via))
         for planned in msg.tasks)
     names = [stop.task.id for stop in stops]
@@ -38,6 +42,10 @@ def to_list(msg: m.TaskList, uav_id: str, origin: Origin) -> TaskList:
     end_via = tuple(check_point(f'task_list of {msg.uav_id}: end_via', from_point(p))
                     for p in msg.end_via)
     return TaskList(msg.revision, stops, msg.end == m.TaskList.RETURN_HOME, end_via)
+
+
+def _accepted(task: Task, radius: float) -> Task:
+    return replace(task, acceptance_radius=task.acceptance_radius or radius or None)
 
 
 def from_status(status: UavStatus, capabilities: Iterable[str], now: float) -> m.UavState:

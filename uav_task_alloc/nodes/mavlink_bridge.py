@@ -133,7 +133,8 @@ class MavlinkBridge(Node):
     def on_list(self, uav_id: str, msg: m.TaskList) -> None:
         """A new list for a UAV."""
         try:
-            tasks = convert.to_list(msg, uav_id, self.station.origin)
+            tasks = convert.to_list(msg, uav_id, self.station.origin,
+                                    self.live.now.acceptance_radius)
         except InvalidValue as error:
             self.get_logger().warning(f'{uav_id}/task_list: {error}: ignored')
             return
