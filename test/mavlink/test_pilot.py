@@ -149,6 +149,17 @@ def test_a_pilot_who_takes_over_is_not_fought(kind):
 
 
 @BOTH
+def test_a_vehicle_that_holds_after_its_last_task_returns_when_told(kind):
+    bench = flying(kind, 'AB')
+    assert bench.run(lambda: bench.completed() == ['A', 'B'])
+    bench.assign(task_list('', 2))
+    bench.run(limit=10.0)
+    assert (bench.state().mode, bench.state().active_task) == (Mode.HOLD, '')
+    bench.assign(task_list('', 3, returns=True))
+    assert bench.run(lambda: not bench.vehicles[1].flight.armed)
+
+
+@BOTH
 def test_a_list_that_returns_ends_at_home_and_a_new_one_flies_again(kind):
     bench = FlightBench(kind).found()
     bench.assign(task_list('A', returns=True))

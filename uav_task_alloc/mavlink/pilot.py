@@ -59,6 +59,8 @@ class Pilot:
     def assign(self, tasks: TaskList, now: float) -> list[Message]:
         """The latest list for this UAV; an older one that comes late is ignored."""
         if self.board.tasks is not None and tasks.revision < self.board.tasks.revision:
+            self.notes.append(Note('warning', f'task_list: revision = {tasks.revision}: expected '
+                                   f'at least {self.board.tasks.revision}: ignored'))
             return []
         self.board.assign(tasks)
         self._remind_at, self._asked_again = now + REMIND, tuple(
@@ -240,7 +242,7 @@ class Pilot:
         if tasks.end_via and tasks.returns and telemetry.flight is not Flight.RETURN:
             self.going_home = True
             return None  # the plain way home leads through a zone: fly the list of it
-        if flying or (returns and telemetry.flight is Flight.HOLD):
+        if flying or (returns and telemetry.flight in (Flight.HOLD, Flight.MISSION)):
             return self.helm.set_mode(Flight.RETURN if returns else Flight.HOLD, now)
         return []
 
