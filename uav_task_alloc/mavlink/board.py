@@ -76,6 +76,8 @@ class Board:
         self._state = MissionState.UNKNOWN
         self._uploading: tuple[Change, int] | None = None  # and the revision it is for
         self._begun = False  # the epoch of this upload
+        self.item_time = 0.0  # [s] that an item took in the uploads so far, roughly
+        self._began_at = 0.0  # [s]
         self.plan_id = self._heard_plan = 0  # PX4's id of the mission verified, last heard
         self._recalled: tuple[TaskList, int] | None = None
         self._wanted: tuple[object, tuple[Item, ...]] | None = None
@@ -143,6 +145,7 @@ class Board:
         """Bring it on board."""
         assert self.tasks is not None
         self._uploading, self._begun, self.trouble = (found, self.tasks.revision), False, False
+        self._began_at = now
         home = () if not self.own else (home_item(
             self._telemetry.home, self._origin, self._profile.rules),)
         return self.upload.replace(Mission(
@@ -217,6 +220,7 @@ class Board:
         if self._begun:
             return
         self._begun = True
+        self.item_time = (self.item_time + (now - self._began_at) / len(found.items)) / 2.0
         if found.kind is Kind.APPEND:
             self.progress.extend(found.items)
             return

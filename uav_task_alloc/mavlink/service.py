@@ -10,7 +10,7 @@ from uav_task_alloc.mavlink.telemetry import UNKNOWN, Telemetry
 from uav_task_alloc.mission import Item, alike
 
 NEAR = 15.0  # [m] from a point, beyond its radius: there
-ARRIVAL = 2.0  # [s] before a task is reached, in which no swap is begun
+ARRIVAL = 2.0  # [s] before a task is reached, and the time of an upload: no swap is begun
 PATIENCE = 10.0  # [s] beyond its hold that a service is waited for
 
 
@@ -34,8 +34,9 @@ class Service:
 
     def _is_near(self, item: Item, first: Item) -> bool:
         distance = math.dist(self._telemetry.position, first.position or UNKNOWN) - first.radius
-        same = alike(first, item)
-        if same and self._profile.atomic and distance < NEAR + ARRIVAL * self._telemetry.pace:
+        same, board = alike(first, item), self._board
+        span = ARRIVAL + board.item_time * len(board.wanted())
+        if same and self._profile.atomic and distance < NEAR + span * self._telemetry.pace:
             return True
         served = same or (item.completes and item.task == first.task)
         return served and item.params[0] > 0.0 and distance < NEAR
