@@ -7,6 +7,7 @@ import selectors
 import struct
 import threading
 from collections.abc import Callable, Hashable, Iterable
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -32,7 +33,7 @@ class Radio:
                  tlog: str = '') -> None:
         self.links = list(links)
         self._ids, self._wall = (system, component), wall
-        self._record: BinaryIO | None = open(tlog, 'ab') if tlog else None  # noqa: SIM115
+        self._record = open_record(tlog) if tlog else None
         self._stamp_file = Path(signing_key_file + '.timestamp') if signing_key_file else None
         self._stamp_at = 0.0
         self._signing = self._load_signing(signing_key_file)
@@ -94,7 +95,8 @@ class Radio:
             link.close()
         self._selector.close()
         if self._record:
-            self._record.close()
+            with suppress(OSError):
+                self._record.close()
 
     def _watch(self) -> None:
         for number, link in enumerate(self.links):
@@ -122,8 +124,22 @@ class Radio:
         return [(address, message) for message in messages]
 
     def _write_record(self, frame: bytes) -> None:
-        if self._record:
+        if self._record is None:
+            return
+        try:
             self._record.write(struct.pack('>Q', int(self._wall() * 1e6)) + frame)
+        except OSError:  # the disk is full: the flight goes on, and so does the heartbeat
+            with suppress(OSError):
+                self._record.close()
+            self._record = None
+
+
+def open_record(path: str) -> BinaryIO:
+    """A recording to add to; raise InvalidValue where that cannot be."""
+    try:
+        return open(path, 'ab')
+    except OSError as error:
+        raise InvalidValue('tlog', path, f'a file that can be written ({error})') from None
 
 
 def read_key(path: str) -> bytes:

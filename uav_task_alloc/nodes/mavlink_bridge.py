@@ -121,6 +121,8 @@ class MavlinkBridge(Node):
 
     def on_tick(self) -> None:
         """Listen for the lists of UAVs that were found; pass parameters on."""
+        if not self.receiver.is_alive():
+            raise RuntimeError('the receiver has died: better no bridge than a deaf one')
         policy = policy_of(self.live.now)
         for served in list(self.ground.served.values()):
             served.pilot.policy = policy

@@ -1,0 +1,45 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A radio and far ends on real sockets."""
+import socket
+
+from pymavlink.dialects.v20 import ardupilotmega as d
+
+from uav_task_alloc.mavlink.codec import Codec
+
+WALL = 1.8e9  # [s]
+
+
+def heartbeat(autopilot=d.MAV_AUTOPILOT_PX4):
+    return d.MAVLink_heartbeat_message(d.MAV_TYPE_QUADROTOR, autopilot, 0, 0, 4, 3)
+
+
+class End:
+    """A far end on UDP."""
+
+    def __init__(self, radio, system=1, signing=None):
+        self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self.socket.bind(('127.0.0.1', 0))
+        self.socket.settimeout(5.0)
+        self.codec = Codec(system, 1, signing=signing)
+        self.to = ('127.0.0.1', radio.links[0].port)
+
+    def say(self, message):
+        frame = self.codec.pack(message)
+        self.socket.sendto(frame, self.to)
+        return frame
+
+    def hear(self):
+        return self.codec.parse(self.socket.recv(65536))
+
+
+def receive(radio, count=1):
+    got = []
+    for _ in range(100):
+        got += radio.receive(0.1)
+        if len(got) >= count:
+            break
+    return got
+
+
+def nothing(radio):
+    return radio.receive(0.05) == []
