@@ -110,6 +110,7 @@ class AllocatorParams(Framed):
     max_attempts: int = param(3, 'UAVs that may fail at a task before it is FAILED.', low=1,
                               high=1000)
     state_dir: str = param('', 'Folder of the journal; empty: nothing is kept.', fixed=True)
+    threads: int = param(1, 'Colonies of bees, each on a core of its own.', low=1, high=64)
     seed: int = param(0, 'Seed of the bees.', low=0, high=2**31 - 1, fixed=True)
 
     def __post_init__(self) -> None:

@@ -44,7 +44,7 @@ def solve(plan: Callable[..., Plan], asked: Problem, params: AllocatorParams,
         return plan(asked.uavs, asked.tasks, asked.zones, budget=budget, seed=params.seed,
                     warm=warm, route_end=params.route_end, locked=asked.locked,
                     clearance=params.clearance, altitude_min=params.altitude_min,
-                    altitude_max=params.altitude_max, stop=stop,
+                    altitude_max=params.altitude_max, threads=params.threads, stop=stop,
                     max_iterations=max_iterations)
 
     base = call(asked.held, asked.budget, 0)
