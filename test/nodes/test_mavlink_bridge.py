@@ -201,6 +201,7 @@ def test_diagnostics_name_each_uav_and_its_mission(sky, probe):
 @pytest.mark.parametrize(('given', 'text'), [
     ("connections:=['udp:1']", "connections = 'udp:1': expected udpin:HOST:PORT"),
     ("connections:=['udpin:127.0.0.1:x']", "'udpin:127.0.0.1:x': expected udpin:HOST:PORT"),
+    ('system_ids:=[300]', 'system_ids = 300.0: expected a number in [1, 255]'),
     ('uav_id_pattern:=one', "uav_id_pattern = 'one': expected a text with {sysid}"),
     ('uav_id_pattern:="{sysid}"', 'expected a ROS name'),
     ('signing_key_file:=/nowhere', "signing_key_file = '/nowhere': expected a readable file"),
@@ -213,3 +214,13 @@ def test_a_bad_parameter_is_refused_in_words(start, given, text):
     assert code == 1, out
     assert text in out
     assert 'Traceback' not in out
+
+
+def test_a_link_that_cannot_be_opened_is_told_once_and_in_diagnostics(start, probe):
+    health = probe.collect(DiagnosticArray, '/diagnostics', 10)
+    bridge = start('mavlink_bridge', '-p', "connections:=['/dev/ttyNOPE:57600']")
+    words = '/dev/ttyNOPE:57600: No such file or directory'
+    probe.until(lambda: words in bridge.output())
+    probe.until(lambda: len(health) > 2)
+    assert health[-1].status[0].message == 'No such file or directory'
+    assert bridge.output().count(words) == 1
