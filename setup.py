@@ -75,6 +75,8 @@ setup(
     python_requires='>=3.10',
     install_requires=['numpy', 'numba', 'pymap3d', 'pymavlink', 'pyyaml', 'scipy'],
     extras_require={'plot': ['matplotlib'],
+                    'study': ['distributed', 'ortools', 'pyvrp'],
+                    'view': ['aiohttp', 'mcap', 'mcap-ros2-support', 'plotly'],
                     'test': ['hypothesis', 'matplotlib', 'mypy', 'pytest', 'ruff']},
     zip_safe=False,
     maintainer='uav_task_alloc developers',
