@@ -153,6 +153,17 @@ def test_the_budget_is_kept_on_the_given_clock():
     assert 0.9 <= made.solve_time <= 1.3
 
 
+def test_every_iteration_is_told_with_the_best_fit_so_far():
+    uavs, tasks = make(3, 30)
+    told = []
+    made = quick(uavs, tasks, on_iteration=lambda *each: told.append(each))
+    counts, fits = zip(*told, strict=True)
+    assert sorted(set(counts)) == list(counts)
+    assert counts[-1] == made.iterations >= 300
+    assert sorted(fits, reverse=True) == list(fits)
+    assert fits[-1] == pytest.approx(made.fit)
+
+
 def test_stop_ends_the_search_with_the_answer_so_far():
     uavs, tasks = make(3, 30)
     made = plan(uavs, tasks, budget=60.0, stop=lambda: True)

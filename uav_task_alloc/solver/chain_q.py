@@ -43,8 +43,8 @@ def _live(colony: Colony, recorder: Recorder) -> None:
     while not recorder.over():
         share = (spent - first) / (1.0 - first)
         flown = colony.fly(share, min(1.0, share + step), rounds)
-        recorder.iterations += max(1, flown)
         recorder.offer(colony.best)
+        recorder.count(max(1, flown))
         if recorder.threads > 1 and spent - met > 1.0 / EXCHANGES:
             met = spent
             recorder.teach(colony.best)

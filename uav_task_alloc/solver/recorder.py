@@ -2,6 +2,7 @@
 """The recorder: the best routes so far, when they were found, and when to stop looking."""
 from __future__ import annotations
 
+import math
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -25,6 +26,7 @@ class Recorder:
     threads: int = 1
     warm: bool = False  # its best is an earlier plan, repaired
     held: tuple[float, float] = (0.0, 0.0)  # length [m] and value of the locked tasks
+    on_iteration: Callable[[int, float], None] | None = None  # (iterations so far, best fit)
     iterations: int = 0
     history: list[tuple[float, float]] = field(default_factory=list)
     best: Routes = field(init=False)
@@ -48,6 +50,14 @@ class Recorder:
         if self.stop is not None and self.stop():
             return True
         return self.spent() >= 1.0 or self.elapsed() >= self.budget
+
+    def count(self, iterations: int = 1) -> None:
+        """So many rounds of the solver's own loop were made and their finds offered."""
+        with self._lock:
+            self.iterations += iterations
+            if self.on_iteration is not None:
+                self.on_iteration(self.iterations, self.history[-1][1] if self.history
+                                  else math.inf)
 
     def offer(self, routes: Routes) -> bool:
         """Keep routes that are better than the best; whether they are."""

@@ -27,6 +27,7 @@ def plan(uavs: Iterable[Uav], tasks: Iterable[Task], zones: Iterable[ThreatZone]
          clearance: float = 0.0, altitude_min: float = -math.inf,
          altitude_max: float = math.inf, threads: int = 1,
          stop: Callable[[], bool] | None = None, max_iterations: int | None = None,
+         on_iteration: Callable[[int, float], None] | None = None,
          clock: Callable[[], float] = time.perf_counter) -> Plan:
     """Who does what in which order: the best found within `budget` [s].
 
@@ -34,8 +35,10 @@ def plan(uavs: Iterable[Uav], tasks: Iterable[Task], zones: Iterable[ThreatZone]
     on the shortest way. hard_range=False: ranges may be exceeded at the price of eq 2.12.
     `warm` is an earlier plan, or its state, to go on from, never worsened; `locked` lists the
     first tasks of UAVs that stay as they are. `stop` is asked between rounds. The same seed and
-    `max_iterations` on one thread give the same plan. The first call in a process loads or
-    compiles the kernels before its budget begins. Raises InvalidValue, UnknownName.
+    `max_iterations` on one thread give the same plan; what an iteration is each solver says.
+    `on_iteration(iterations so far, best fit)` is called behind each, or behind a few. The first
+    call in a process loads or compiles the solver's kernels before its budget begins.
+    Raises InvalidValue, UnknownName.
     """
     if not isinstance(solver, str) or solver not in SOLVERS:
         raise UnknownName('solver', solver, list(SOLVERS))
@@ -46,12 +49,12 @@ def plan(uavs: Iterable[Uav], tasks: Iterable[Task], zones: Iterable[ThreatZone]
     limits = Limits(check_unique('zone', zones, ThreatZone), clearance, altitude_min,
                     altitude_max)
     rules = Rules(route_end == 'home', hard_range, weights or Weights())
-    warm_up()
+    warm_up(solver)
     began, before = clock(), State.of(warm)
     problem = make_problem(fleet, work, check_locked(locked, fleet, work, limits), limits, rules,
                            before.problem)
     recorder = Recorder(problem, clock, began, budget, max_iterations, stop, threads,
-                        warm is not None, _held(problem))
+                        warm is not None, _held(problem), on_iteration)
     if warm is not None:
         recorder.offer(repaired(problem, before.routes))
     learnt = SOLVERS[solver](recorder, seed, before.learnt)
@@ -70,12 +73,11 @@ def _held(problem: Problem) -> tuple[float, float]:
 
 
 @functools.cache
-def warm_up() -> None:
-    """Load the kernels, compile those that are not on disk yet; does nothing a second time."""
+def warm_up(solver: str = 'chain_q') -> None:
+    """Load a solver's kernels, compile those not on disk yet; does nothing a second time."""
     uavs = (Uav('u', (0.0, 0.0, 0.0)), Uav('v', (9.0, 0.0, 0.0), 30.0))
     tasks = tuple(Task(f't{i}', (float(i), 1.0, 0.0)) for i in range(5))
     problem = make_problem(uavs, tasks, {}, Limits(), Rules())
-    for solve in SOLVERS.values():
-        recorder = Recorder(problem, lambda: 0.0, 0.0, 1.0, max_iterations=64)
-        solve(recorder, 0, None)
-        to_plan(problem, recorder, '', False)
+    recorder = Recorder(problem, lambda: 0.0, 0.0, 1.0, max_iterations=64)
+    SOLVERS[solver](recorder, 0, None)
+    to_plan(problem, recorder, '', False)

@@ -125,6 +125,6 @@ def solve(recorder: Recorder, seed: int, learnt: object = None) -> None:
             reward = K * min(costs) / max(costs[b], 1e-9)  # eq 2.8 with 1/fit
             learn(of_uav, of_task, bees[b][1], bees[b][2], steps[b], reward,
                   float(shares[rank] / shares.sum()), np.ones(n, np.int64))
-        recorder.iterations += BEES
+        recorder.count(BEES)
         if recorder.over():
             return
