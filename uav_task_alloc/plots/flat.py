@@ -1,0 +1,136 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A map that is being drawn: zones, ways and marks go on at once, names when all is there."""
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from itertools import pairwise
+from pathlib import Path
+from statistics import median
+from typing import Any
+
+from matplotlib.figure import Figure
+from matplotlib.patches import Circle, Polygon
+
+from uav_task_alloc.model import Point, Shape, ThreatZone
+from uav_task_alloc.plots import style
+from uav_task_alloc.plots.labels import Label, place
+from uav_task_alloc.plots.style import RED, ROUTE, SMALL
+
+
+class Map:
+    """East to the right, north up, in metres."""
+
+    def __init__(self, points: Iterable[Point], tasks: int) -> None:
+        """`points` [m] are those that most is flown at; `tasks` how many there will be."""
+        self.figure = Figure(figsize=style.SIZE, dpi=style.DPI, layout='constrained')
+        self.axes = self.figure.add_subplot()
+        self.height = median([point[2] for point in points] or [0.0])
+        self.names = tasks <= style.CROWD
+        self._labels: list[Label] = []
+        self._ways: list[list[tuple[float, float]]] = []
+        self._domes = 0
+        self._zones = 0
+        axes = self.axes
+        axes.set_aspect('equal', adjustable='datalim')
+        axes.grid(color='#e4e4e4', lw=0.8, zorder=0)
+        axes.set_axisbelow(True)
+        axes.set_xlabel('east [m]', fontsize=style.PLAIN)
+        axes.set_ylabel('north [m]', fontsize=style.PLAIN)
+        axes.tick_params(labelsize=style.PLAIN)
+        for side in ('top', 'right'):
+            axes.spines[side].set_visible(False)
+
+    def zone(self, zone: ThreatZone, note: str = '', late: bool = False) -> None:
+        """The footprint with its margin (dotted); a dashed edge where the zone came late."""
+        self._zones += 1
+        text = ', '.join(filter(None, (style.heights(zone), note)))
+        if zone.shape is Shape.POLYGON:
+            shape: Any = Polygon(zone.vertices)
+            x, y = (sum(values) / len(values) for values in zip(*zone.vertices, strict=True))
+        else:
+            x, y, _ = zone.center
+            shape = Circle((x, y), zone.radius)
+            if zone.margin > 0.0:
+                self.axes.add_patch(Circle((x, y), zone.radius + zone.margin, fill=False, ec=RED,
+                                           lw=1.0, ls=':', zorder=2))
+            self._ring(zone)
+        shape.set(fc=style.ZONE, ec=RED, lw=2.0, ls='--' if late else '-', zorder=2)
+        self.axes.add_patch(shape)
+        hatch = type(shape)(*((shape.get_xy(),) if zone.shape is Shape.POLYGON
+                              else ((x, y), zone.radius)), fill=False, lw=0.0, hatch='///',
+                            ec=(*style.ZONE[:3], 0.3), zorder=1.9)
+        self.axes.add_patch(hatch)
+        self._labels.append(Label(zone.id + (f'\n{text}' if text else ''), x, y, SMALL, 12.0,
+                                  style.DARK_RED, bold=True, within=True))
+
+    def _ring(self, zone: ThreatZone) -> None:
+        """Where a dome is at the height that most is flown at."""
+        above = self.height - zone.center[2]
+        if zone.shape is Shape.HEMISPHERE and 0.0 < above < zone.radius:
+            self._domes += 1
+            self.axes.add_patch(Circle(zone.center[:2], math.sqrt(zone.radius ** 2 - above ** 2),
+                                       fc=style.ZONE, ec=RED, lw=1.0, zorder=2))
+
+    def way(self, points: Sequence[Point], index: int, arrows: bool = False) -> None:
+        """What a UAV flies; arrows show where to."""
+        flat = [(point[0], point[1]) for point in points]
+        self._ways.append(flat)
+        width = ROUTE if self.names else 0.6 * ROUTE
+        xs, ys = zip(*flat, strict=True)
+        self.axes.plot(xs, ys, color='white', lw=width + 2.0, zorder=4, solid_capstyle='round')
+        self.axes.plot(xs, ys, color=style.colour(index), ls=style.line(index), lw=width,
+                       zorder=4.1, solid_capstyle='round')
+        for (x0, y0), (x1, y1) in pairwise(flat) if arrows else ():
+            self.axes.annotate('', (0.4 * x0 + 0.6 * x1, 0.4 * y0 + 0.6 * y1),
+                               (0.45 * x0 + 0.55 * x1, 0.45 * y0 + 0.55 * y1), zorder=4.2,
+                               arrowprops={'arrowstyle': '-|>', 'mutation_scale': 24.0, 'lw': 0.0,
+                                           'color': style.colour(index)})
+
+    def home(self, point: Point, name: str, index: int) -> None:
+        """Where a UAV starts."""
+        self.axes.plot(point[0], point[1], 's', ms=14, color=style.colour(index), mec='black',
+                       mew=1.4, zorder=7)
+        self._labels.append(Label(name, point[0], point[1], style.PLAIN, 11.0, bold=True))
+
+    def task(self, point: Point, fill: str, name: str, marker: str = 'o', edge: str = 'black',
+             number: int | None = None) -> None:
+        """A task, with its number in the order where it has one."""
+        missed = edge == RED
+        size = (17.0 if number is not None else 12.0) if self.names else 5.0
+        self.axes.plot(point[0], point[1], marker, ms=size, color=fill, mec=edge,
+                       mew=2.6 if missed else 1.0, zorder=6)
+        if not self.names:
+            return
+        if number is not None:
+            self.axes.annotate(str(number), point[:2], ha='center', va='center_baseline',
+                               fontsize=SMALL, fontweight='bold', color=style.ink(fill), zorder=8)
+        self._labels.append(Label(name, point[0], point[1], SMALL, size / 2.0 + 3.0,
+                                  RED if missed else 'black'))
+
+    def lost(self, point: Point, text: str) -> None:
+        """Where a UAV fell silent."""
+        self.axes.plot(point[0], point[1], 'X', ms=18, color='black', mec='white', mew=1.4,
+                       zorder=9)
+        self._labels.append(Label(text, point[0], point[1], style.PLAIN, 13.0, bold=True))
+
+    def finish(self, title: str, handles: Sequence[Any], png: str | Path) -> None:
+        """Title, legend, names, scale bar, file."""
+        zone = 'no-fly zone' + f'\n(inner ring: at {self.height:.0f} m)' * bool(self._domes)
+        self.axes.set_title(title, loc='left', fontsize=style.LARGE, fontweight='bold', pad=12)
+        style.legend(self.figure, [*handles, *[style.zone_handle(zone)] * bool(self._zones)])
+        self.axes.margins(0.07)
+        self.figure.draw_without_rendering()  # only now the limits are what they will be
+        low, high = self.axes.get_xlim()
+        place(self.axes, self._labels, self._ways)
+        self._scale_bar(high - low)
+        self.figure.savefig(png)
+
+    def _scale_bar(self, width: float) -> None:
+        metres = max(factor * 10.0 ** power for power in range(-3, 9) for factor in (1, 2, 5)
+                     if factor * 10.0 ** power <= width / 6.0)
+        share, height = metres / width, 1.03
+        self.axes.plot([1.0 - share, 1.0], [height, height], color='black', lw=5, clip_on=False,
+                       transform=self.axes.transAxes, solid_capstyle='butt')
+        self.axes.annotate(f'{metres:g} m', (1.0 - share - 0.01, height), ha='right', va='center',
+                           xycoords='axes fraction', fontsize=style.PLAIN, annotation_clip=False)
