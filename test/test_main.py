@@ -14,9 +14,9 @@ FILE = str(ROOT / 'config/scenarios/plan_only.yaml')
 
 
 def test_plan_prints_writes_and_draws_a_plan(tmp_path, capsys):
-    out, png = tmp_path / 'plan.json', tmp_path / 'plan.png'
-    assert cli.main(['plan', FILE, '--budget', '0.05', '--seed', '3', '--json', str(out),
-                     '--plot', str(png)]) == 0
+    out, png, deep = (tmp_path / name for name in ('plan.json', 'plan.png', 'deep.png'))
+    assert cli.main(['plan', FILE, '--budget', '0.05', '--seed', '3', '--json', str(out), '--plot',
+                     str(png), '--plot-3d', str(deep), '--missions', str(tmp_path / 'm')]) == 0
     made = json.loads(out.read_text())
     assert set(made['routes']) == {'scout', 'lifter', 'relay'}
     assert sorted(name for route in made['routes'].values() for name in route) == [
@@ -24,10 +24,13 @@ def test_plan_prints_writes_and_draws_a_plan(tmp_path, capsys):
     assert 'fenced' in made['unassigned']
     assert made['distance'] == pytest.approx(sum(
         leg['length'] for legs in made['legs'].values() for leg in legs))
-    assert png.read_bytes().startswith(b'\x89PNG')
+    assert all(path.read_bytes().startswith(b'\x89PNG') for path in (png, deep))
+    assert {path.name for path in (tmp_path / 'm').iterdir()} == {
+        f'{uav}.{kind}' for uav in made['routes'] for kind in ('plan', 'waypoints')}
     printed = capsys.readouterr().out
     assert '5 tasks planned, 1 unassigned' in printed
     assert 'unassigned fenced: ' in printed
+    assert 'relay.plan, .waypoints: ' in printed
 
 
 def test_a_cancelled_task_is_not_planned(tmp_path):
@@ -45,12 +48,23 @@ def test_a_cancelled_task_is_not_planned(tmp_path):
     (['plan', FILE, '--solver', 'bee'], "'bee': expected one of "),
     (['plan', FILE, '--budget', '-1'], 'budget'),
     (['plan', FILE, '--budget', '0.01', '--json', '/none/plan.json'], '/none/plan.json'),
+    (['plan', FILE, '--plot-3d', 'plan.txt'],
+     "--plot-3d = 'plan.txt': expected a name that ends with .png or .pdf or .svg"),
+    (['plan', FILE, '--budget', '0.01', '--missions', FILE + '/m'], 'plan_only.yaml'),
 ])
 def test_what_cannot_be_done_ends_with_one_line_and_status_1(arguments, text, capsys):
     assert cli.main(arguments) == 1
     refusal = capsys.readouterr().err
     assert text in refusal
     assert refusal.count('\n') == 1
+
+
+def test_ctrl_c_before_the_solving_ends_without_a_word(monkeypatch, capsys):
+    def interrupted(argv):
+        raise KeyboardInterrupt
+    monkeypatch.setitem(cli.COMMANDS, 'plan', interrupted)
+    assert cli.main(['plan', FILE]) == 130
+    assert capsys.readouterr() == ('', '')
 
 
 def test_a_bad_scenario_is_refused_with_file_and_line(tmp_path, capsys):
