@@ -82,4 +82,4 @@ def test_who_brings_more_flies_more_and_nobody_is_grounded():
 def test_the_paper_solver_refuses_what_its_tables_cannot_hold():
     uavs, tasks = make(2, 201)
     with pytest.raises(InvalidValue, match='tasks = 201: expected at most 200'):
-        plan(uavs, tasks, solver='chain_q_paper')
+        plan(uavs, tasks, solver='paper_chain_q')

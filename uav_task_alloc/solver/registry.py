@@ -5,15 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 
 from uav_task_alloc.solver import chain_q
-from uav_task_alloc.solver.baselines import auction, chain_q_paper, greedy, insertion
+from uav_task_alloc.solver.baselines import auction, nearest, paper_chain_q
 from uav_task_alloc.solver.recorder import Recorder
 
 Solver = Callable[[Recorder, int, object], object]  # (recorder, seed, learnt) -> learnt
 
 SOLVERS: Mapping[str, Solver] = {
     'chain_q': chain_q.solve,
-    'chain_q_paper': chain_q_paper.solve,
-    'greedy': greedy.solve,
+    'paper_chain_q': paper_chain_q.solve,
+    'nearest': nearest.solve,
     'auction': auction.solve,
-    'insertion': insertion.solve,
 }

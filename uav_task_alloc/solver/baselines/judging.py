@@ -1,0 +1,14 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What the learning baselines make small: the fit of eq 2.12, tasks left out at their price."""
+from __future__ import annotations
+
+from uav_task_alloc.objective import fit
+from uav_task_alloc.solver.problem import Problem
+from uav_task_alloc.solver.routes import DISTANCE, EXCESS, LEFT_OUT, VALUE, Routes
+
+
+def judged(problem: Problem, routes: Routes) -> float:
+    """Eq 2.12 of routes; what is left out counts as way [m] at its price, else it would pay."""
+    sums = routes.sums
+    return fit(float(sums[DISTANCE] + sums[LEFT_OUT]), float(sums[VALUE]), float(sums[EXCESS]),
+               problem.rules.weights)

@@ -1,0 +1,202 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The published method as literally as it can be read: two Q chains over all steps, a bee colony.
+
+Chain X1 says which UAV makes step i, chain X2 which task it serves: step i draws a UAV from
+Q_1^(i)[UAV of step i-1] and a task from Q_2^(i)[task of step i-1], and the UAV flies on to the
+task. A table belongs to a position in the chains, not to a UAV's route. How gaps and slips of the
+paper are settled:
+- 2.1 counts only target-to-target legs: the leg from the start is included.
+- 2.4: the maximum is over the next action a'.
+- 2.6 bootstraps from Q^(i+1), as 2.13 does; behind the last step there is nothing.
+- 2.7 is greedy if q < eps, so eps is the exploitation rate: `greedy_rate`.
+- 2.9, 2.10: Q is floored above 0, so that they are probabilities.
+- No repeat rule is given: visited tasks are masked, the rest renormalised, and the maximum is over
+  unvisited tasks only. Where ranges are hard, tasks beyond the UAV's are masked, too.
+- 2.11: only the stepwise choice is kept, no A*.
+- 2.14 does not say where the ranking coefficients enter: they scale alpha.
+- The reward is k / fit at every step; as k has no scale, it is in units of the best fit so far.
+- fit is eq 2.12; where ranges do not suffice, what is left out counts as way at its price.
+- The paper prints no parameters: those of `Settings` are this file's own.
+An iteration is a generation: every bee flies once.
+"""
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from uav_task_alloc.errors import InvalidValue
+from uav_task_alloc.solver import routes as of
+from uav_task_alloc.solver.baselines.judging import judged
+from uav_task_alloc.solver.chance import Chance, chance, uniform
+from uav_task_alloc.solver.kernel import kernel, part
+from uav_task_alloc.solver.recorder import Recorder
+from uav_task_alloc.solver.routes import Arrays, Floats, Ints, Routes, insert, lengthened, step
+
+MOST_TASKS = 200  # the tables take 8 n^3 bytes
+FIRST = 1.0  # Q before anything is learnt
+
+
+@dataclass(frozen=True, slots=True)
+class Settings:
+    """What the paper does not print."""
+
+    bees: int = 20
+    ranked: int = 5  # bees that are learnt from
+    decay: float = 0.5  # ranking coefficient over that of the rank before
+    k: float = 1.0  # reward coefficient
+    alpha: float = 0.2  # learning rate
+    gamma: float = 0.5  # discount
+    greedy_rate: float = 0.1  # eps
+    floor: float = 0.01  # least Q
+
+
+class Chains(NamedTuple):
+    """Positional tables: first index the step, second the choice before, third the choice."""
+
+    uav: Floats  # (n, m, m) of X1
+    task: Floats  # (n, n, n) of X2
+
+
+class Bee(NamedTuple):
+    """What a bee flew; the first steps of X1 and X2 that it could make."""
+
+    routes: Routes
+    uavs: Ints  # (n) X1
+    tasks: Ints  # (n) X2
+
+
+class Scratch(NamedTuple):
+    """What flights need room for."""
+
+    may_fly: NDArray[np.bool_]  # (m)
+    open: NDArray[np.bool_]  # (n)
+    p_uav: Floats  # (m)
+    p_task: Floats  # (n)
+
+
+def rank_coefficients(bees: int, decay: float) -> Floats:
+    """Weights of the best, second, ... bee in eq 2.14; they fall by `decay` and sum to 1."""
+    falling = decay ** np.arange(bees, dtype=np.float64)
+    weights: Floats = falling / falling.sum()
+    return weights
+
+
+@kernel
+def probabilities(q: Floats, open_: NDArray[np.bool_], p: Floats) -> bool:
+    """Write to p the share of each open choice in their Q (eq 2.9, 2.10); whether one is open."""
+    total = 0.0
+    for i in range(q.size):
+        p[i] = q[i] if open_[i] else 0.0
+        total += p[i]
+    if total > 0.0:
+        for i in range(q.size):
+            p[i] /= total
+    return total > 0.0
+
+
+@part
+def _draw(p: Floats, greedy_rate: float, rng: Chance) -> int:
+    """The likeliest choice if q < eps, else one by its probability (eq 2.7)."""
+    best = 0
+    for i in range(p.size):
+        if p[i] > p[best]:
+            best = i
+    if uniform(rng) < greedy_rate:
+        return best
+    left = uniform(rng)
+    for i in range(p.size):
+        left -= p[i]
+        if p[i] > 0.0 and left < 0.0:
+            return i
+    return best
+
+
+@kernel
+def _open_tasks(a: Arrays, r: Routes, u: int, open_: NDArray[np.bool_]) -> None:
+    """Which tasks UAV u may fly on to: unvisited, allowed and, if ranges are hard, in range."""
+    last = r.prev[a.ends + u]
+    for t in range(open_.size):
+        open_[t] = False
+        if r.on[a.uavs + t] < 0 and a.may[u, t]:
+            more = step(a, last, a.uavs + t) + step(a, a.uavs + t, a.ends + u) - r.leg[last]
+            open_[t] = lengthened(a, r, u, more) < np.inf
+
+
+@kernel
+def fly(a: Arrays, bee: Bee, q: Chains, greedy_rate: float, scratch: Scratch, rng: Chance) -> int:
+    """One bee makes its chains; returns how many steps it made. O(n (n + m))."""
+    of.clear(a, bee.routes)
+    u, t = 0, 0  # there is no choice before the first: its tables have one row that counts
+    for i in range(a.price.size):
+        scratch.may_fly[:] = True
+        while True:
+            if not probabilities(q.uav[i, u], scratch.may_fly, scratch.p_uav):
+                return i
+            v = _draw(scratch.p_uav, greedy_rate, rng)
+            _open_tasks(a, bee.routes, v, scratch.open)
+            if probabilities(q.task[i, t], scratch.open, scratch.p_task):
+                break
+            scratch.may_fly[v] = False
+        u, t = v, _draw(scratch.p_task, greedy_rate, rng)
+        insert(a, bee.routes, a.uavs + t, bee.routes.prev[a.ends + u])
+        bee.uavs[i], bee.tasks[i] = u, t
+    return a.price.size
+
+
+@kernel
+def learn(q: Chains, bee: Bee, steps: int, reward: float, rate: float, gamma: float,
+          floor: float, unvisited: NDArray[np.bool_]) -> None:
+    """Eq 2.6 and 2.13 along both chains of one bee; `rate` is alpha times its rank's (eq 2.14).
+
+    O(n (n + m)); `unvisited` is scratch, (n).
+    """
+    unvisited[:] = True
+    u, t = 0, 0
+    for i in range(steps):
+        v, s = bee.uavs[i], bee.tasks[i]
+        unvisited[s] = False
+        next_u, next_t = 0.0, 0.0
+        if i + 1 < steps:
+            for w in range(q.uav.shape[2]):
+                next_u = max(next_u, q.uav[i + 1, v, w])
+            for w in range(q.task.shape[2]):
+                if unvisited[w]:
+                    next_t = max(next_t, q.task[i + 1, s, w])
+        old = q.uav[i, u, v]
+        q.uav[i, u, v] = max(floor, old + rate * (reward + gamma * next_u - old))  # X1
+        old = q.task[i, t, s]
+        q.task[i, t, s] = max(floor, old + rate * (reward + gamma * next_t - old))  # X2
+        u, t = v, s
+
+
+def solve(recorder: Recorder, seed: int, learnt: object = None,
+          settings: Settings | None = None) -> None:
+    """Generations of bees until the budget ends. Raises InvalidValue beyond MOST_TASKS."""
+    a, n, m = recorder.problem.arrays, len(recorder.problem.tasks), len(recorder.problem.uavs)
+    if n > MOST_TASKS:
+        raise InvalidValue('tasks', n, f'at most {MOST_TASKS} for paper_chain_q')
+    if not n or not m:
+        return
+    known, rng = settings or Settings(), chance(seed)
+    q = Chains(np.full((n, m, m), FIRST), np.full((n, n, n), FIRST))
+    scratch = Scratch(np.empty(m, np.bool_), np.empty(n, np.bool_), np.empty(m), np.empty(n))
+    bees = [Bee(of.empty_routes(a), np.zeros(n, np.int64), np.zeros(n, np.int64))
+            for _ in range(known.bees)]
+    coefficients = rank_coefficients(min(known.ranked, known.bees), known.decay)
+    best = np.inf
+    while True:
+        steps = [fly(a, bee, q, known.greedy_rate, scratch, rng) for bee in bees]
+        fits = [judged(recorder.problem, bee.routes) for bee in bees]
+        best = min(best, *fits)
+        ranking = np.argsort(fits, kind='stable')  # the bidding: the better, the higher the rank
+        for coefficient, b in zip(coefficients, ranking, strict=False):  # eq 2.14
+            recorder.offer(bees[b].routes)
+            reward = known.k * best / fits[b] if fits[b] < np.inf else 0.0
+            learn(q, bees[b], steps[b], reward, known.alpha * float(coefficient), known.gamma,
+                  known.floor, scratch.open)
+        recorder.count()
+        if recorder.over():
+            return
