@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 
 from uav_task_alloc.solver import chain_q
-from uav_task_alloc.solver.baselines import auction, nearest, paper_chain_q
+from uav_task_alloc.solver.baselines import auction, cbba, nearest, paper_chain_q
 from uav_task_alloc.solver.recorder import Recorder
 
 Solver = Callable[[Recorder, int, object], object]  # (recorder, seed, learnt) -> learnt
@@ -15,4 +15,5 @@ SOLVERS: Mapping[str, Solver] = {
     'paper_chain_q': paper_chain_q.solve,
     'nearest': nearest.solve,
     'auction': auction.solve,
+    'cbba': cbba.solve,
 }
