@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 
 from uav_task_alloc.solver import chain_q
-from uav_task_alloc.solver.baselines import auction, cbba, nearest, paper_chain_q
+from uav_task_alloc.solver.baselines import auction, cbba, nearest, paper_chain_q, q_learning
 from uav_task_alloc.solver.recorder import Recorder
 
 Solver = Callable[[Recorder, int, object], object]  # (recorder, seed, learnt) -> learnt
@@ -13,6 +13,7 @@ Solver = Callable[[Recorder, int, object], object]  # (recorder, seed, learnt) -
 SOLVERS: Mapping[str, Solver] = {
     'chain_q': chain_q.solve,
     'paper_chain_q': paper_chain_q.solve,
+    'q_learning': q_learning.solve,
     'nearest': nearest.solve,
     'auction': auction.solve,
     'cbba': cbba.solve,

@@ -1,0 +1,89 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Q-learning by a single agent that flies all UAVs: one table of legs, one plan an episode.
+
+The state is where the routes end now; an action is a leg from one of these ends to an unvisited
+task, and Q[end -> task] its value, so that one table serves any number of UAVs. The reward of a
+leg is minus what it costs: metres added (with metres beyond range at their price) in mean ways to
+the nearest neighbour. A leg never flown is worth minus its length: without learning this is
+nearest first. Actions are chosen as eq 2.7 says, eps being the exploitation rate. An iteration is
+an episode.
+"""
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from uav_task_alloc.solver import routes as of
+from uav_task_alloc.solver.baselines.ways import all_ways
+from uav_task_alloc.solver.chance import Chance, chance, uniform
+from uav_task_alloc.solver.insertion import place_all
+from uav_task_alloc.solver.kernel import kernel
+from uav_task_alloc.solver.recorder import Recorder
+from uav_task_alloc.solver.routes import Arrays, Floats, Routes, insert, lengthened, step
+
+
+@dataclass(frozen=True, slots=True)
+class Settings:
+    """How the agent learns."""
+
+    alpha: float = 0.1  # learning rate
+    gamma: float = 0.8  # discount
+    greedy_rate: float = 0.98  # eps of eq 2.7
+
+
+@kernel
+def episode(a: Arrays, r: Routes, q: Floats, unit: float, alpha: float, gamma: float,
+            greedy_rate: float, rng: Chance) -> None:
+    """Fly one plan and learn from each leg; q is (m + n, n), `unit` [m]. O(n^2 m)."""
+    of.clear(a, r)
+    before, then, reward = -1, -1, 0.0  # the leg flown last
+    while True:
+        explores, legs = uniform(rng) >= greedy_rate, 0
+        best, best_t, best_u, any_t, any_u = -np.inf, -1, -1, -1, -1
+        for u in range(a.uavs):
+            last = r.prev[a.ends + u]
+            for i in range(q.shape[1]):
+                t = a.uavs + i
+                if r.on[t] >= 0 or not a.may[u, i] or (q[last, i] <= best and not explores):
+                    continue
+                delta = step(a, last, t) + step(a, t, a.ends + u) - r.leg[last]
+                if not lengthened(a, r, u, delta) < np.inf:
+                    continue
+                if q[last, i] > best:
+                    best, best_t, best_u = q[last, i], t, u
+                if explores:
+                    legs += 1
+                    if uniform(rng) * legs < 1.0:
+                        any_t, any_u = t, u
+        if before >= 0:
+            ahead = best if best_t >= 0 else 0.0
+            q[before, then] += alpha * (reward + gamma * ahead - q[before, then])  # eq 2.5
+        if best_t < 0:
+            return
+        t, u = (any_t, any_u) if explores else (best_t, best_u)  # eq 2.7
+        last = r.prev[a.ends + u]
+        delta = step(a, last, t) + step(a, t, a.ends + u) - r.leg[last]
+        reward = -lengthened(a, r, u, delta) / unit
+        before, then = last, t - a.uavs
+        insert(a, r, t, last)
+
+
+def solve(recorder: Recorder, seed: int, learnt: object = None,
+          settings: Settings | None = None) -> None:
+    """Episodes until the budget ends. Raises InvalidValue where there are too many tasks."""
+    problem, known, rng = recorder.problem, settings or Settings(), chance(seed)
+    a = problem.arrays
+    if not problem.uavs or not problem.tasks:
+        return
+    q = -all_ways(problem).onward / problem.scale
+    routes = of.empty_routes(a)
+    while True:
+        episode(a, routes, q, problem.scale, known.alpha, known.gamma, known.greedy_rate, rng)
+        left = np.flatnonzero(routes.on[a.uavs:a.ends] < 0) + a.uavs
+        if left.size:
+            place_all(a, routes, left)
+        recorder.offer(routes)
+        recorder.count()
+        if recorder.over():
+            return
