@@ -5,7 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 
 from uav_task_alloc.solver import chain_q
-from uav_task_alloc.solver.baselines import auction, cbba, nearest, paper_chain_q, q_learning
+from uav_task_alloc.solver.baselines import (
+    auction,
+    bee_colony,
+    cbba,
+    nearest,
+    paper_chain_q,
+    q_learning,
+)
 from uav_task_alloc.solver.recorder import Recorder
 
 Solver = Callable[[Recorder, int, object], object]  # (recorder, seed, learnt) -> learnt
@@ -14,6 +21,7 @@ SOLVERS: Mapping[str, Solver] = {
     'chain_q': chain_q.solve,
     'paper_chain_q': paper_chain_q.solve,
     'q_learning': q_learning.solve,
+    'abc': bee_colony.solve,
     'nearest': nearest.solve,
     'auction': auction.solve,
     'cbba': cbba.solve,

@@ -1,0 +1,104 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The artificial bee colony (ABC) of Karaboga (2005) on numbers that stand for a plan.
+
+A food source is a number in [0, 1) for each task: which of its UAVs serves it (by the interval
+that the number lies in), and when (UAVs serve by rising numbers). Employed and onlooker bees move
+one number of a source towards or away from that of another source and keep what is better; a
+source that did not improve for `limit` trials is left for a random one by a scout, one a
+generation. Eq 2.8 wants larger-is-better: 1/fit. An iteration is a generation.
+"""
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from uav_task_alloc.solver.baselines.population import Coding
+from uav_task_alloc.solver.recorder import Recorder
+from uav_task_alloc.solver.routes import Floats, Ints
+
+
+@dataclass(frozen=True, slots=True)
+class Settings:
+    """Karaboga's control parameters."""
+
+    sources: int = 50  # food sources; as many employed bees and as many onlookers
+    limit: int | None = None  # trials; None: sources times tasks, as Karaboga has it
+
+
+def probabilities(fits: Floats) -> Floats:
+    """Chance of each source to be chosen by an onlooker: its share of all 1/fit (eq 2.8)."""
+    worth = 1.0 / np.maximum(fits, 1e-300)
+    total = worth.sum()
+    shares: Floats = worth / total if total > 0.0 else np.full(len(fits), 1.0 / len(fits))
+    return shares
+
+
+class Colony:
+    """Food sources and the bees that work on them."""
+
+    def __init__(self, coding: Coding, settings: Settings, rng: np.random.Generator) -> None:
+        self._coding, self._rng = coding, rng
+        n = len(coding.work)
+        self._limit = settings.limit if settings.limit is not None else settings.sources * n
+        self.sources = rng.random((settings.sources, n))
+        self.fits = self._judge(self.sources)
+        self._trials = np.zeros(settings.sources, np.int64)
+
+    def decoded(self, sources: Floats) -> tuple[Ints, Ints]:
+        """Tasks by UAV in order, and UAVs by task."""
+        tasks = np.broadcast_to(np.arange(sources.shape[1]), sources.shape)
+        who = self._coding.uav(tasks, sources)
+        return self._coding.rows(np.argsort(sources, axis=1, kind='stable'), who), who
+
+    def _judge(self, sources: Floats) -> Floats:
+        return self._coding.fits(*self.decoded(sources))
+
+    def fly(self) -> None:
+        """A generation: employed bees, onlookers, a scout."""
+        count = len(self.sources)
+        self._visit(np.arange(count))
+        self._visit(self._rng.choice(count, count, p=probabilities(self.fits)))  # eq 2.8
+        tired = int(np.argmax(self._trials))
+        if self._trials[tired] > self._limit:
+            self.sources[tired] = self._rng.random(self.sources.shape[1])
+            self.fits[tired] = self._judge(self.sources[tired:tired + 1])[0]
+            self._trials[tired] = 0
+
+    def _visit(self, chosen: Ints) -> None:
+        """Each bee tries v = x + phi (x - x_k) in one number of its source, keeps the better."""
+        count, n = self.sources.shape
+        bees, number = np.arange(len(chosen)), self._rng.integers(n, size=len(chosen))
+        other = (chosen + self._rng.integers(1, max(2, count), size=len(chosen))) % count
+        phi = self._rng.uniform(-1.0, 1.0, len(chosen))
+        tried = self.sources[chosen].copy()
+        x = tried[bees, number]
+        tried[bees, number] = np.clip(x + phi * (x - self.sources[other, number]), 0.0, 1.0)
+        fits = self._judge(tried)
+        for bee, source in enumerate(chosen):
+            if fits[bee] < self.fits[source]:
+                self.sources[source], self.fits[source] = tried[bee], fits[bee]
+                self._trials[source] = 0
+            else:
+                self._trials[source] += 1
+
+
+def solve(recorder: Recorder, seed: int, learnt: object = None,
+          settings: Settings | None = None) -> None:
+    """Generations until the budget ends. Raises InvalidValue where there are too many tasks."""
+    if not recorder.problem.uavs or not recorder.problem.tasks:
+        return
+    coding = Coding(recorder.problem)
+    if not len(coding.work):
+        return
+    colony, offered = Colony(coding, settings or Settings(), np.random.default_rng(seed)), np.inf
+    while True:
+        best = int(np.argmin(colony.fits))
+        if colony.fits[best] < offered:
+            offered = colony.fits[best]
+            row, who = colony.decoded(colony.sources[best:best + 1])
+            recorder.offer(coding.routes(row[0], who[0]))
+        recorder.count()
+        if recorder.over():
+            return
+        colony.fly()
