@@ -17,7 +17,8 @@ ROOMS = {
     'numba': ('geometry/', 'solver/'),
 }
 ROS = {'rclpy', 'rcl_interfaces', 'builtin_interfaces', 'geometry_msgs', 'std_msgs', 'std_srvs',
-       'diagnostic_msgs', 'visualization_msgs', 'uav_task_alloc_msgs', 'ament_index_python'}
+       'diagnostic_msgs', 'nav_msgs', 'visualization_msgs', 'uav_task_alloc_msgs',
+       'ament_index_python'}
 # a room knows those of a lower number only, and itself
 LEVELS = {
     'errors': 0, 'model': 1, 'params': 1, 'geometry': 2, 'objective': 2, 'solver': 3,

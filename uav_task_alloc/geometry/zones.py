@@ -24,6 +24,12 @@ def zones_around(point: Iterable[float], zones: Sequence[ThreatZone],
     return tuple(zone for k, zone in enumerate(zones) if contains(obstacles.rows[k], *place, True))
 
 
+def outline(zone: ThreatZone, clearance: float = 0.0) -> list[tuple[float, float]]:
+    """The rim (x, y) [m] of an enlarged cylinder or prism, counter-clockwise; none of a dome."""
+    _, rim, _ = pack((zone,), clearance).outlines
+    return [(float(x), float(y)) for x, y in rim]
+
+
 def distance(point: Iterable[float], zone: ThreatZone) -> float:
     """Metres from a point to the zone as it is, without margin; 0 inside."""
     x, y, z = check_point('point', point)

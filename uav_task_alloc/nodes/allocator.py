@@ -11,7 +11,6 @@ from rclpy.publisher import Publisher
 from std_srvs.srv import Trigger
 from uav_task_alloc_msgs import msg as m
 from uav_task_alloc_msgs.srv import SetAvailability, SubmitTasks
-from visualization_msgs.msg import MarkerArray
 
 from uav_task_alloc.allocator import Allocator, planning
 from uav_task_alloc.allocator.keeper import Keeper
@@ -22,7 +21,6 @@ from uav_task_alloc.allocator.worker import Worker
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.geometry.frames import Origin
 from uav_task_alloc.nodes import allocation_messages as told, announcements
-from uav_task_alloc.nodes.markers import markers
 from uav_task_alloc.nodes.messages import (
     ANNOUNCEMENTS,
     EVENTS,
@@ -32,6 +30,7 @@ from uav_task_alloc.nodes.messages import (
     to_report,
     to_zone,
 )
+from uav_task_alloc.nodes.painter import Painter
 from uav_task_alloc.nodes.parameters import declare
 from uav_task_alloc.nodes.run import run
 from uav_task_alloc.params import AllocatorParams
@@ -79,7 +78,7 @@ class AllocatorNode(Node):
         self.lists: dict[str, Publisher] = {}
         self.statuses = self.create_publisher(m.TaskStatusArray, 'task_statuses', LATCHED)
         self.allocation = self.create_publisher(m.Allocation, 'allocation', LATCHED)
-        self.markers = self.create_publisher(MarkerArray, 'allocation_markers', LATCHED)
+        self.painter = Painter(self, self.world)
         self.health = self.create_publisher(DiagnosticArray, '/diagnostics', 10)
 
     def stamp(self) -> float:
@@ -207,9 +206,7 @@ class AllocatorNode(Node):
             self.statuses.publish(told.from_statuses(statuses(self.world), stamp))
         if out.allocation is not None:
             self.allocation.publish(told.from_allocation(out.allocation, statuses(self.world)))
-            starts = {uav_id: known.report.position
-                      for uav_id, known in self.world.fleet.records.items()}
-            self.markers.publish(markers(out.allocation, starts, self.world.zones.values()))
+        self.painter.note(out)
 
     def log(self, note: Note) -> None:
         """One line; rclpy wants one place in the source for each severity."""
