@@ -69,7 +69,7 @@ setup(
         ('share/ament_index/resource_index/packages', ['resource/' + NAME]),
         ('share/' + NAME, ['package.xml']),
         ('share/' + NAME + '/launch', glob('launch/*.launch.py')),
-        ('share/' + NAME + '/config', glob('config/*.yaml')),
+        ('share/' + NAME + '/config', glob('config/*.yaml') + glob('config/*.rviz')),
         ('share/' + NAME + '/config/scenarios', glob('config/scenarios/*.yaml')),
     ],
     python_requires='>=3.10',

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """A scenario in the air: allocator, bridge, simulated fleet, player and live view."""
-from launch.actions import DeclareLaunchArgument
+from launch.actions import DeclareLaunchArgument, IncludeLaunchDescription
+from launch.conditions import IfCondition
+from launch.launch_description_sources import PythonLaunchDescriptionSource
 from launch.substitutions import LaunchConfiguration, PathJoinSubstitution
 from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
@@ -10,7 +12,8 @@ from launch import LaunchDescription
 
 
 def generate_launch_description() -> LaunchDescription:
-    """Arguments: scenario (a YAML file), speedup."""
+    """Arguments: scenario (a YAML file), speedup, rviz (true: show it there too)."""
+    share = FindPackageShare('uav_task_alloc')
     scenario = LaunchConfiguration('scenario')
     played = {'scenario': scenario,
               'speedup': ParameterValue(LaunchConfiguration('speedup'), value_type=float)}
@@ -21,11 +24,16 @@ def generate_launch_description() -> LaunchDescription:
 
     return LaunchDescription([
         DeclareLaunchArgument('scenario', default_value=PathJoinSubstitution(
-            [FindPackageShare('uav_task_alloc'), 'config', 'scenarios', 'demo.yaml'])),
+            [share, 'config', 'scenarios', 'demo.yaml'])),
         DeclareLaunchArgument('speedup', default_value='8.0'),
+        DeclareLaunchArgument('rviz', default_value='false'),
         node('allocator'),
         node('mavlink_bridge', takeoff=True),
         node('fleet_sim', **played),
         node('scenario_player', **played),
         node('live_view'),
+        IncludeLaunchDescription(
+            PythonLaunchDescriptionSource(
+                PathJoinSubstitution([share, 'launch', 'rviz.launch.py'])),
+            condition=IfCondition(LaunchConfiguration('rviz'))),
     ])

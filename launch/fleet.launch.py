@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The allocator and the MAVLink bridge of a fleet, with one file of parameters for each."""
-from launch.actions import DeclareLaunchArgument
+from launch.actions import DeclareLaunchArgument, IncludeLaunchDescription
+from launch.conditions import IfCondition
+from launch.launch_description_sources import PythonLaunchDescriptionSource
 from launch.substitutions import LaunchConfiguration, PathJoinSubstitution
 from launch_ros.actions import Node
 from launch_ros.substitutions import FindPackageShare
@@ -9,8 +11,9 @@ from launch import LaunchDescription
 
 
 def generate_launch_description() -> LaunchDescription:
-    """Arguments: namespace, allocator_params, bridge_params."""
-    config = [FindPackageShare('uav_task_alloc'), 'config']
+    """Arguments: namespace, allocator_params, bridge_params, rviz (true: show it there too)."""
+    share = FindPackageShare('uav_task_alloc')
+    config = [share, 'config']
     namespace = LaunchConfiguration('namespace')
     return LaunchDescription([
         DeclareLaunchArgument('namespace', default_value=''),
@@ -18,8 +21,14 @@ def generate_launch_description() -> LaunchDescription:
                               default_value=PathJoinSubstitution([*config, 'allocator.yaml'])),
         DeclareLaunchArgument('bridge_params', default_value=PathJoinSubstitution(
             [*config, 'mavlink_bridge.yaml'])),
+        DeclareLaunchArgument('rviz', default_value='false'),
         Node(package='uav_task_alloc', executable='allocator', namespace=namespace,
              output='screen', parameters=[LaunchConfiguration('allocator_params')]),
         Node(package='uav_task_alloc', executable='mavlink_bridge', namespace=namespace,
              output='screen', parameters=[LaunchConfiguration('bridge_params')]),
+        IncludeLaunchDescription(
+            PythonLaunchDescriptionSource(
+                PathJoinSubstitution([share, 'launch', 'rviz.launch.py'])),
+            launch_arguments={'namespace': namespace}.items(),
+            condition=IfCondition(LaunchConfiguration('rviz'))),
     ])

@@ -4,6 +4,7 @@ import re
 from pathlib import Path
 
 import pytest
+import yaml
 
 import uav_task_alloc
 
@@ -29,6 +30,21 @@ def test_a_launch_file_compiles_and_builds_where_launch_is_there(path):
         return
     exec(code, scope)
     assert scope['generate_launch_description']().entities
+
+
+def test_rviz_shows_the_topics_of_the_allocator_in_their_frame():
+    config = yaml.safe_load((ROOT / 'config/allocation.rviz').read_text())['Visualization Manager']
+    assert config['Global Options']['Fixed Frame'] == 'map'
+    topics = {each['Class'].split('/')[1]: [] for each in config['Displays']}
+    for each in config['Displays']:
+        assert each['Enabled']
+        if 'Topic' in each:
+            topics[each['Class'].split('/')[1]].append(each['Topic']['Value'])
+            assert each['Topic']['Durability Policy'] == 'Transient Local'
+    assert topics == {'Grid': [], 'MarkerArray': ['/allocation_markers'],
+                      'Path': [f'/uav_{k}/path' for k in range(1, 5)]}
+    assert all(topic.split('/')[-1] in (ROOT / 'launch/rviz.launch.py').read_text()
+               for topic in [*topics['MarkerArray'], *topics['Path']])
 
 
 @pytest.mark.parametrize('path', sorted(ROOT.glob('msg_defs/*/*')), ids=lambda p: p.name)
