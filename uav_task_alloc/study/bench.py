@@ -1,99 +1,154 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The bench: solvers and rivals on the same instances, as gaps to the best that any found."""
+"""The bench: solvers and rivals on the same instances in equal CPU time, one judge for all."""
 from __future__ import annotations
 
 import argparse
 import json
 import math
+import sys
+import tempfile
 import time
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import product
 from pathlib import Path
+from typing import Any
 
+from uav_task_alloc.errors import InvalidValue, UnknownName
 from uav_task_alloc.solver.registry import SOLVERS
 from uav_task_alloc.solver.solve import plan
-from uav_task_alloc.study import rivals
+from uav_task_alloc.study import campaign, executors, public, rivals
+from uav_task_alloc.study.campaign import Job
+from uav_task_alloc.study.evaluator import Routes, judge
+from uav_task_alloc.study.gaps import Run, table
 from uav_task_alloc.study.instances import SLACK, Instance, make_instance
-
-Runs = dict[str, dict[str, float]]  # instance -> 'solver@budget' -> [m], inf: not all served
 
 
 def main(argv: Sequence[str]) -> int:
-    """`python -m uav_task_alloc bench`: print the table; returns the exit status."""
+    """`python -m uav_task_alloc bench`: table, JSON, plot; returns the exit status."""
     asked = _parser().parse_args(argv)
-    wanted = asked.against.split(',') if asked.rivals > 0.0 else []
-    missing = sorted(set(wanted) - set(rivals.installed()))
-    if missing:
-        print(f'not installed, so left out: {", ".join(missing)} '
-              '(pip install -r benchmarks/requirements.txt)')
-    runs: Runs = json.loads(asked.json.read_text()) if asked.json and asked.json.exists() else {}
-    for instance in _instances(asked):
-        row = runs.setdefault(instance.name, {})
-        for solver, budget in product(asked.solvers.split(','), _numbers(asked.budgets)):
-            row[f'{solver}@{budget:g}'] = _length(instance, solver, budget)
-        for name in [each for each in wanted if each not in missing]:
-            found = rivals.run(name, instance, asked.rivals)
-            for budget in _numbers(asked.budgets):
-                if budget <= asked.rivals:
-                    row[f'{name}@{budget:g}'] = rivals.at(found, budget)
-            row[f'{name}@{asked.rivals:g}'] = rivals.at(found, math.inf)
-        if asked.json:
-            asked.json.write_text(json.dumps(runs, indent=1))
+    names = _names(asked)
+    jobs = {(key, name): Job(f'{key}-{name}', measure, {
+        'source': source, 'name': name, 'budgets': asked.budgets},
+        sum(asked.budgets) if name in SOLVERS else max(asked.budgets))
+        for (key, source), name in product(_sources(asked), names)}
+    with tempfile.TemporaryDirectory() as scratch:
+        outcome = campaign.run(list(jobs.values()), asked.keep or Path(scratch),
+                               executors.chosen(asked), _say, time.monotonic)
+    runs: dict[str, Run] = {}
+    for (key, name), job in jobs.items():
+        if job.name in outcome.results:
+            result = outcome.results[job.name]
+            run = runs.setdefault(key, Run(result['group'], result['collects'], result['known']))
+            run.found[name] = result['found']
+            for each in result['found']:
+                for fault in each['faults']:
+                    _say(f'{key}, {name} in {each["budget"]:g} s, not counted: {fault}')
     print(table(runs))
-    return 0
+    if asked.json:
+        asked.json.write_text(json.dumps({key: run.plain() for key, run in runs.items()},
+                                         indent=1, allow_nan=False) + '\n')
+    if asked.plot:
+        from uav_task_alloc.study.gap_plot import draw  # needs matplotlib
+        draw(runs, asked.plot)
+    return int(bool(outcome.failed))
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog='bench', description=__doc__)
+    parser = argparse.ArgumentParser(prog='python -m uav_task_alloc bench', description=__doc__)
     add = parser.add_argument
-    add('--sizes', default='4x20,8x50,8x100,20x200', help='UAVs x tasks, ...')
+    add('--sizes', default='4x20,8x50,8x100,20x200', help='UAVs x tasks, ... (%(default)s)')
     add('--kinds', default='spread,base', help='spread: starts anywhere; base: one start')
-    add('--seeds', type=int, default=5, help='instances a size')
-    add('--first', type=int, default=1, help='seed of the first instance')
+    add('--seeds', type=int, default=5, help='instances a size (%(default)s)')
+    add('--first', type=int, default=1, help='seed of the first instance (%(default)s)')
     add('--slack', type=float, default=SLACK, help='ranges over a fair share of a good tour')
-    add('--budgets', default='0.1,1', help='[s] of CPU time, ...')
+    add('--folder', type=Path, metavar='DIR', help='public instances instead: team orienteering '
+        f'(Chao, MSTOP), MDVRP (Cordeau); best values, if any, in {public.TABLE}')
+    add('--match', default='*', metavar='GLOB', help='which files of the folder')
+    add('--budgets', type=_numbers, default=(0.1, 1.0), help='[s] of CPU time, ... (0.1,1)')
     add('--solvers', default='chain_q', help=f'of {", ".join(SOLVERS)}')
-    add('--rivals', type=float, default=0.0, help='[s] for PyVRP and OR-Tools each; 0: not asked')
-    add('--against', default='pyvrp,ortools', help='which of them')
-    add('--json', type=Path, help='file that keeps all lengths, and adds to those it has')
+    add('--against', default=','.join(rivals.RIVALS), help='rivals (%(default)s), or none')
+    add('--keep', type=Path, metavar='DIR', help='keep results; what it holds is not run again')
+    add('--json', type=Path, metavar='OUT.json', help='all lengths, values and gaps')
+    add('--plot', type=Path, metavar='OUT.png', help='gap over time (.png, .svg)')
+    executors.add_arguments(parser, jobs=1)
     return parser
 
 
-def _numbers(text: str) -> list[float]:
-    return [float(each) for each in text.split(',')]
+def _numbers(text: str) -> tuple[float, ...]:
+    return tuple(sorted(float(each) for each in text.split(',')))
 
 
-def _instances(asked: argparse.Namespace) -> Iterable[Instance]:
-    for kind, size, seed in product(asked.kinds.split(','), asked.sizes.split(','),
-                                    range(asked.first, asked.first + asked.seeds)):
-        uavs, tasks = (int(each) for each in size.split('x'))
-        yield make_instance(uavs, tasks, seed, kind == 'base', asked.slack)
+def _names(asked: argparse.Namespace) -> list[str]:
+    """Solvers and the rivals that are here. Raises UnknownName."""
+    ours, wanted = asked.solvers.split(','), asked.against.split(',')
+    wanted = [] if wanted == ['none'] else wanted
+    for kind, names, known in (('solver', ours, SOLVERS), ('rival', wanted, rivals.RIVALS)):
+        for name in names:
+            if name not in known:
+                raise UnknownName(kind, name, list(known))
+    missing = sorted(set(wanted) - set(rivals.installed()))
+    if missing:
+        _say(f'not installed, so left out: {", ".join(missing)} '
+             '(pip install -r benchmarks/requirements.txt)')
+    return [*ours, *(name for name in wanted if name not in missing)]
 
 
-def _length(instance: Instance, solver: str, budget: float) -> float:
+def _sources(asked: argparse.Namespace) -> Iterator[tuple[str, dict[str, Any]]]:
+    """Name of each instance, and what a worker makes it from. Raises InvalidValue."""
+    if not asked.folder:
+        for kind, size, seed in product(asked.kinds.split(','), asked.sizes.split(','),
+                                        range(asked.first, asked.first + asked.seeds)):
+            uavs, tasks = (int(each) for each in size.split('x'))
+            made = {'uavs': uavs, 'tasks': tasks, 'seed': seed, 'one_base': kind == 'base',
+                    'slack': asked.slack}
+            yield make_instance(**made).name, made
+        return
+    texts, left = public.read_folder(asked.folder, asked.match)
+    for name, why in left.items():
+        _say(f'{name} left out: {why}')
+    if not texts:
+        raise InvalidValue('--folder', str(asked.folder), f'instances named {asked.match}')
+    known = public.best_known(asked.folder)
+    for name, text in texts.items():
+        best = {'known': known[name]} if name in known else {}
+        yield name, {'name': name, 'text': text, **best}
+
+
+def measure(source: Mapping[str, Any], name: str, budgets: Sequence[float]) -> dict[str, Any]:
+    """One solver or rival on one instance: what it has after each budget [s] of CPU time.
+
+    Ours plan anew for each budget; a rival is asked once, for the longest.
+    """
+    instance = public.parse(**source) if 'text' in source else make_instance(**source)
+    group = source['name'].split('.')[0].split('_')[0] if 'text' in source else (
+        instance.name.rpartition('-')[0])
+    if name in SOLVERS:
+        answers: list[Routes | None] = [_ours(instance, name, budget) for budget in budgets]
+    else:
+        found = rivals.RIVALS[name](instance, max(budgets))
+        answers = [rivals.at(found, budget) for budget in budgets]
+    return {'group': group, 'collects': instance.collects,
+            'known': instance.known if math.isfinite(instance.known) else None,
+            'found': [{'budget': budget} | _judged(instance, routes)
+                      for budget, routes in zip(budgets, answers, strict=True)]}
+
+
+def _ours(instance: Instance, solver: str, budget: float) -> Routes:
     made = plan(instance.uavs, instance.tasks, solver=solver, budget=budget,
-                clock=time.process_time)
-    return math.inf if made.unassigned else made.distance
+                route_end=instance.route_end, clock=time.thread_time)
+    return made.routes
 
 
-def table(runs: Runs) -> str:
-    """Mean gap [%] to the best of each instance by size, and how many plans served all."""
-    columns = list(dict.fromkeys(name for row in runs.values() for name in row))
-    sizes = list(dict.fromkeys(name.rpartition('-')[0] for name in runs))
-    lines = ['| instances | ' + ' | '.join(columns) + ' |', '|---' * (len(columns) + 1) + '|']
-    for size in sizes:
-        rows = [row for name, row in runs.items() if name.rpartition('-')[0] == size]
-        cells = (_cell([100.0 * (row[c] / min(row.values()) - 1.0) for row in rows if c in row])
-                 for c in columns)
-        lines.append(f'| {size} | ' + ' | '.join(cells) + ' |')
-    return '\n'.join(lines)
+def _judged(instance: Instance, routes: Routes | None) -> dict[str, Any]:
+    """`score`: value where that counts, else length [m]; None where there is no answer."""
+    if routes is None:
+        return {'score': None, 'missing': len(instance.tasks), 'faults': []}
+    found = judge(instance, routes)
+    score = found.value if instance.collects else found.length
+    return {'score': score if found.counts(instance.collects) else None,
+            'length': found.length, 'value': found.value, 'missing': found.missing,
+            'faults': list(found.faults)}
 
 
-def _cell(gaps: Sequence[float]) -> str:
-    served = [gap for gap in gaps if math.isfinite(gap)]
-    if not gaps:
-        return ''
-    if not served:
-        return 'none'
-    whole = f'{sum(served) / len(served):.2f}'
-    return whole if len(served) == len(gaps) else f'{whole} ({len(served)}/{len(gaps)})'
+def _say(text: str) -> None:
+    print(text, file=sys.stderr, flush=True)

@@ -1,0 +1,99 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The bench tells gaps to the best known, as a table, as JSON and as a picture."""
+import json
+
+import pytest
+
+from uav_task_alloc.errors import InvalidValue, UnknownName
+from uav_task_alloc.study import bench, rivals
+from uav_task_alloc.study.gap_plot import draw
+from uav_task_alloc.study.gaps import Run, table
+
+SMALL = ['--sizes', '2x6', '--seeds', '2', '--first', '3', '--budgets', '0.02,0.01']
+CHAO = 'n 4\nm 1\ntmax 9\n0\t0\t0\n1\t1\t10\n90\t1\t20\n4\t4\t0\n'
+
+
+def run(scores, collects=False, known=None, group='s-2-6'):
+    made = Run(group, collects, known)
+    for name, score in scores.items():
+        made.found[name] = [{'budget': 1.0, 'score': score}]
+    return made
+
+
+def test_gaps_of_ours_are_printed_and_kept_as_json(tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr(rivals, 'installed', lambda: [])
+    out = tmp_path / 'runs.json'
+    assert bench.main([*SMALL, '--solvers', 'chain_q,nearest', '--json', str(out)]) == 0
+    said = capsys.readouterr()
+    assert 'not installed, so left out: ortools, pyvrp' in said.err
+    columns = 'chain_q@0.01 | chain_q@0.02 | nearest@0.01 | nearest@0.02'
+    assert said.out.startswith(f'| instances | {columns} |\n')
+    stored = json.loads(out.read_text())
+    assert list(stored) == ['spread-2-6-3', 'spread-2-6-4', 'base-2-6-3', 'base-2-6-4']
+    assert stored['base-2-6-3']['gap_percent']['chain_q@0.02'] == 0.0
+
+
+def test_a_rival_is_asked_once_for_the_longest_budget(monkeypatch):
+    asked = []
+
+    def slow(instance, seconds):
+        asked.append((instance.name, seconds))
+        names = [task.id for task in instance.tasks]
+        uav = instance.uavs[0].id
+        return [(0.015, {uav: names}), (0.5, {uav: []})]
+
+    monkeypatch.setitem(rivals.RIVALS, 'pyvrp', slow)
+    source = {'uavs': 1, 'tasks': 3, 'seed': 1, 'slack': 9.0}
+    found = bench.measure(source, 'pyvrp', (0.01, 0.02, 1.0))['found']
+    assert asked == [('spread*9-1-3-1', 1.0)]
+    assert [each['score'] is None for each in found] == [True, False, True]
+    assert [each['missing'] for each in found] == [3, 0, 3]
+
+
+def test_public_instances_are_told_apart_by_their_table(tmp_path, capsys):
+    (tmp_path / 'p1.2.a.txt').write_text(CHAO)
+    (tmp_path / 'best_known.txt').write_text('p1.2.a.txt 20\n')
+    (tmp_path / 'notes.md').write_text('words')
+    picture = tmp_path / 'gap.png'
+    assert bench.main(['--folder', str(tmp_path), '--budgets', '0.01', '--against', 'none',
+                       '--plot', str(picture)]) == 0
+    said = capsys.readouterr()
+    assert "notes.md left out: notes.md = 'words': expected an instance" in said.err
+    assert said.out.splitlines()[-1] == '| p1 | 50.00 |'
+    assert picture.read_bytes().startswith(b'\x89PNG')
+
+
+def test_kept_results_are_not_run_again(tmp_path, capsys):
+    given = [*SMALL, '--against', 'none', '--keep', str(tmp_path / 'kept')]
+    assert bench.main(given) == 0
+    first = capsys.readouterr()
+    assert bench.main(given) == 0
+    second = capsys.readouterr()
+    assert (second.err, second.out) == ('4 of 4 results were there\n', first.out)
+
+
+@pytest.mark.parametrize(('given', 'error', 'text'), [
+    (['--solvers', 'best'], UnknownName, "solver 'best': expected one of chain_q"),
+    (['--against', 'gurobi'], UnknownName, "rival 'gurobi': expected one of pyvrp, ortools"),
+    (['--folder', '.', '--match', 'no*'], InvalidValue, 'expected instances named no*'),
+])
+def test_what_cannot_be_run_is_refused(given, error, text):
+    with pytest.raises(error) as caught:
+        bench.main(given)
+    assert text in str(caught.value)
+
+
+def test_a_plan_that_leaves_tasks_out_is_counted_apart():
+    text = table({'1': run({'a': 100.0, 'b': None}), '2': run({'a': 103.0, 'b': 100.0})})
+    assert text.splitlines()[2] == '| s-2-6 | 1.50 | 0.00 (1/2) |'
+
+
+def test_a_value_falls_short_of_the_published_one_a_length_exceeds_it():
+    assert run({'a': 90.0}, collects=True, known=100.0).gaps()['a@1'] == pytest.approx(10.0)
+    assert run({'a': 110.0}, known=100.0).gaps()['a@1'] == pytest.approx(10.0)
+    assert run({'a': 0.0}, collects=True, known=0.0).gaps()['a@1'] == 0.0
+
+
+def test_a_picture_of_nobody_answering_is_drawn(tmp_path):
+    draw({'1': run({'a': None})}, tmp_path / 'gap.svg')
+    assert '<svg' in (tmp_path / 'gap.svg').read_text()
