@@ -25,14 +25,18 @@ FLATTEST = 0.3  # height of the picture's box against its longer side
 HIGHEST = 1.5  # times the rest, that a zone may reach and is not cut
 VIEW = {'elev': 32.0, 'azim': -62.0}  # [deg]
 PLACE, ZOOM = (0.0, -0.22, 0.78, 1.4), 0.95  # its square reaches beyond the figure, left empty
+RIGHT = 0.79  # of the picture, where there is room below the legend
 FACETS = 48  # of a round body
 
 Name = tuple[str, Point, bool, str]  # text, where, bold, colour
 
 
 def draw_plan_3d(uavs: Sequence[Uav], tasks: Sequence[Task], zones: Sequence[ThreatZone],
-                 plan: Plan, png: str | Path) -> None:
-    """The plan seen from south-east and above; zones without an end are cut. Raises OSError."""
+                 plan: Plan, png: str | Path, note: str = '') -> None:
+    """The plan seen from south-east and above; zones without an end are cut. Raises OSError.
+
+    `note` stands below the legend: how the plan was made, say.
+    """
     places = {task.id: task.position for task in tasks}
     ways = [way_of(uav, plan, places) for uav in uavs]
     low, high = limits([*places.values(), *(point for way in ways for point in way)], zones)
@@ -52,9 +56,10 @@ def draw_plan_3d(uavs: Sequence[Uav], tasks: Sequence[Task], zones: Sequence[Thr
                   for name, place in places.items()]
     _frame(axes, low, high)
     figure.text(0.03, 0.94, title_of(plan, len(tasks)), fontsize=style.LARGE, fontweight='bold')
-    note = 'no-fly zone, no margin' + '\n(dashed: higher than drawn)' * any(
+    figure.text(RIGHT, 0.03, note, fontsize=SMALL)
+    cut = 'no-fly zone, no margin' + '\n(dashed: higher than drawn)' * any(
         zone.shape is not Shape.HEMISPHERE and zone.z_max > high[2] for zone in zones)
-    style.legend(figure, [*handles_of(uavs, plan), *[style.zone_handle(note)] * bool(zones)])
+    style.legend(figure, [*handles_of(uavs, plan), *[style.zone_handle(cut)] * bool(zones)])
     _write(axes, names, ways)
     figure.savefig(png)
 

@@ -4,18 +4,22 @@ from __future__ import annotations
 
 import time
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
 from uav_task_alloc.model import Plan, Task, Uav
+from uav_task_alloc.solver.check import LONGEST
 from uav_task_alloc.solver.solve import plan, warm_up
-from uav_task_alloc.study.instances import SIDE, make_instance
+from uav_task_alloc.study.instances import SIDE, Instance, make_instance
 
 ARRIVALS, STEP = 5, 300.0  # tasks, [m] flown between events
 ROOM = 1.5  # ranges, as multiples of those of the instance
 SEED = 11  # of the instance and the arrivals; nothing was tuned on it
-REFERENCE = 20.0  # times the budget that the plan to compare with gets
-BACKGROUND = 0.2  # [s] of search between events, as the allocator does
+REFERENCE = 20  # times the budget that the plan to compare with gets
+BETWEEN = 5  # times the iterations of an event that are searched until the next
+BACKGROUND = 10.0  # times the budget that is searched between events, as the allocator does
+BEFORE = 100.0  # times the budget of the first plan
 
 
 def events(budget: float = 0.02, runs: int = 50, size: str = '20x200') -> None:
@@ -36,7 +40,7 @@ def _chain(uavs: int, tasks: int, one_base: bool, budget: float,
     # more tasks arrive than the ranges are made for
     fleet = tuple(replace(uav, range=ROOM * uav.range) for uav in instance.uavs)
     work = instance.tasks
-    known = plan(fleet, work, budget=2.0, clock=time.process_time)
+    known = plan(fleet, work, budget=BEFORE * budget, clock=time.process_time)
     gaps: list[float] = []
     first: list[float] = []
     for event in range(runs):
@@ -44,12 +48,46 @@ def _chain(uavs: int, tasks: int, one_base: bool, budget: float,
         work += tuple(Task(f'e{event}-{i}', (*rng.uniform(0.0, SIDE, 2), 0.0))
                       for i in range(ARRIVALS))
         fresh = plan(fleet, work, budget=budget, warm=known, clock=time.process_time)
-        known = plan(fleet, work, budget=BACKGROUND, warm=fresh, clock=time.process_time)
+        known = plan(fleet, work, budget=BACKGROUND * budget, warm=fresh, clock=time.process_time)
         best = plan(fleet, work, budget=REFERENCE * budget, warm=known, clock=time.process_time)
-        short = 100.0 * (best.value - fresh.value)  # a task that is left out counts as 100 %
-        gaps.append(short + 100.0 * (fresh.distance / best.distance - 1.0))
+        gaps.append(_gap(fresh, best))
         first.append(fresh.history[0][0])
     return gaps, first
+
+
+def compare(instance: Instance, seed: int, iterations: int, count: int) -> list[
+        dict[str, float]]:
+    """Random arrivals in a row: gap [%] of a warm and a cold plan each, and their CPU seconds.
+
+    An event brings Poisson(a twentieth of the first tasks) new ones. Both plans get as many
+    iterations; the gap is to REFERENCE times as many from the better of both.
+    """
+    rng = np.random.default_rng((seed, count))
+    fleet = tuple(replace(uav, range=ROOM * uav.range) for uav in instance.uavs)
+    work, rows = instance.tasks, list[dict[str, float]]()
+    solved = partial(plan, budget=LONGEST, seed=seed, clock=time.thread_time)
+    known = solved(fleet, work, max_iterations=REFERENCE * iterations)
+    for event in range(count):
+        fleet, work = _flown(fleet, work, known)
+        arrived = int(rng.poisson(len(instance.tasks) / 20.0))
+        work += tuple(Task(f'e{event}-{i}', (*rng.uniform(0.0, SIDE, 2), 0.0))
+                      for i in range(arrived))
+        warm = solved(fleet, work, warm=known, max_iterations=iterations)
+        cold = solved(fleet, work, max_iterations=iterations)
+        better = min(warm, cold, key=lambda made: (-made.value, made.distance))
+        best = solved(fleet, work, warm=better, max_iterations=REFERENCE * iterations)
+        rows.append({'arrived': arrived, 'tasks': len(work),
+                     'warm_gap': _gap(warm, best), 'cold_gap': _gap(cold, best),
+                     'warm_first_s': warm.history[0][0], 'cold_first_s': cold.history[0][0],
+                     'warm_s': warm.solve_time, 'cold_s': cold.solve_time})
+        known = solved(fleet, work, warm=warm, max_iterations=BETWEEN * iterations)
+    return rows
+
+
+def _gap(made: Plan, best: Plan) -> float:
+    """Percent longer than the best plan; a task that is left out counts as 100 %."""
+    return (100.0 * (best.value - made.value)
+            + 100.0 * (made.distance / best.distance - 1.0))
 
 
 def _flown(fleet: tuple[Uav, ...], work: tuple[Task, ...],
