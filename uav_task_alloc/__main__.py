@@ -19,8 +19,8 @@ def plan_command(argv: Sequence[str]) -> int:
 
 
 def study_command(argv: Sequence[str]) -> int:
-    """run an experiment of the study"""
-    from uav_task_alloc.study import main as run
+    """make the paper's figures and tables anew, or run an experiment"""
+    from uav_task_alloc.study.command import main as run
     return run(list(argv))
 
 

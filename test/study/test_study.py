@@ -1,13 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The studies and the bench run without rivals and say so."""
-import json
+"""The experiments run and print their figures; their instances are the same each time."""
 import math
 
 import pytest
 
-from uav_task_alloc import study
-from uav_task_alloc.study import bench, rivals
-from uav_task_alloc.study.instances import make_instance
+from uav_task_alloc.study.command import main
+from uav_task_alloc.study.instances import CLEAR, make_instance, make_scene
 from uav_task_alloc.study.learning import confidence
 
 
@@ -20,27 +18,16 @@ def test_an_instance_is_the_same_again_and_within_reach():
                for task in base.tasks)
 
 
-def test_the_bench_prints_gaps_and_keeps_lengths(tmp_path, capsys, monkeypatch):
-    monkeypatch.setattr(rivals, 'installed', lambda: [])
-    out = tmp_path / 'runs.json'
-    assert bench.main(['--sizes', '2x6', '--seeds', '2', '--first', '3', '--budgets', '0.01',
-                       '--solvers', 'chain_q,greedy', '--rivals', '1', '--json', str(out)]) == 0
-    said = capsys.readouterr().out
-    assert 'not installed, so left out: ortools, pyvrp' in said
-    assert '| instances | chain_q@0.01 | greedy@0.01 |' in said
-    assert list(json.loads(out.read_text())) == ['spread-2-6-3', 'spread-2-6-4', 'base-2-6-3',
-                                                 'base-2-6-4']
-
-
-def test_a_plan_that_leaves_tasks_out_is_counted_apart():
-    text = bench.table({'s-2-6-1': {'a': 100.0, 'b': math.inf},
-                        's-2-6-2': {'a': 103.0, 'b': 100.0}})
-    assert text.splitlines()[2] == '| s-2-6 | 1.50 | 0.00 (1/2) |'
+def test_a_scene_is_the_same_again_and_its_domes_hold_nothing():
+    scene = make_scene(3, 40, 8, 2)
+    assert scene == make_scene(3, 40, 8, 2) != make_scene(3, 40, 8, 3)
+    assert all(math.dist(each.position, zone.center) > zone.radius + CLEAR
+               for each in (*scene.uavs, *scene.tasks) for zone in scene.zones)
 
 
 @pytest.mark.parametrize('name', ['scouts', 'whole', 'warm'])
-def test_a_study_prints_its_figures(name, capsys):
-    assert study.main([name, '--budget', '0.01', '--runs', '2', '--size', '3x12']) == 0
+def test_an_experiment_prints_its_figures(name, capsys):
+    assert main([name, '--budget', '0.002', '--runs', '2', '--size', '3x12']) == 0
     assert '%' in capsys.readouterr().out
 
 
