@@ -1,0 +1,126 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Commands of the docs looked over: are the program, its parameters and its options there?"""
+import contextlib
+import importlib.util
+import io
+import re
+import shlex
+from dataclasses import fields
+from functools import cache
+from itertools import pairwise
+from pathlib import Path
+
+import yaml
+
+from uav_task_alloc import __main__ as cli, params
+
+ROOT = Path(__file__).parent.parent
+# those of others, which a page may name where it says what it needs
+FOREIGN = {'.', 'cd', 'source', 'export', 'git', 'pip', 'rosdep', 'colcon', 'mkdir', 'ls', 'cat',
+           'sim_vehicle.py', 'px4', 'arducopter', 'rviz2', 'xdg-open', 'pytest', 'dask', 'sudo'}
+
+
+def commands(text):
+    """The commands of a block as lists of words; settings before them are left out."""
+    for line in text.replace('\\\n', ' ').splitlines():
+        words = shlex.split(line, comments=True)
+        for part in _parts(words):
+            while part and re.match(r'[A-Za-z_]\w*=', part[0]):
+                part = part[1:]
+            if part:
+                yield part
+
+
+def _parts(words):
+    part = []
+    for word in [*words, '&&']:
+        if word in ('&&', '||', '|', ';', '&'):
+            yield part
+            part = []
+        else:
+            part.append(word)
+
+
+def complaint(words):
+    """What is wrong with a command; '' where nothing is."""
+    name, *rest = words
+    if name == 'make':
+        return _make(rest)
+    if name in ('python', 'python3'):
+        return _python(rest)
+    if name == 'ros2':
+        return _ros2(rest)
+    return '' if Path(name).name in FOREIGN else f'{name}: expected a program that is known'
+
+
+def _make(rest):
+    goals = re.findall(r'^([\w./]+):', (ROOT / 'Makefile').read_text(), re.MULTILINE)
+    missing = [word for word in rest if word not in goals and '=' not in word]
+    return f'make {missing[0]}: expected one of {goals}' if missing else ''
+
+
+def _python(rest):
+    if rest[:2] == ['-m', 'uav_task_alloc']:
+        return _command(rest[2:])
+    if rest[:1] == ['-m']:
+        return '' if importlib.util.find_spec(rest[1]) else f'python -m {rest[1]}: no such module'
+    if (ROOT / rest[0]).suffix == '.py' and '/' in rest[0] and not (ROOT / rest[0]).exists():
+        return f'{rest[0]}: no such file'
+    return ''
+
+
+def _command(rest):
+    if not rest or rest[0] not in cli.COMMANDS:
+        return f'{rest}: expected one of {list(cli.COMMANDS)}'
+    place = next((i for i, word in enumerate(rest) if word.startswith('-')), len(rest))
+    text = help_of(*rest[:place])
+    options = [word.split('=')[0] for word in rest if re.match(r'--?[a-z]', word)]
+    missing = [word for word in options if not re.search(rf'{re.escape(word)}\b', text)]
+    return f'{rest[0]}: no option {missing[0]}' if missing else ''
+
+
+@cache
+def help_of(*words):
+    """What `-h` behind these words prints."""
+    out = io.StringIO()
+    if words[0] in ('params', 'compile'):
+        return '--write'
+    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(out), contextlib.suppress(
+            SystemExit):
+        cli.main([*words, '-h'])
+    return out.getvalue()
+
+
+def _ros2(rest):
+    if rest[:2] == ['run', 'uav_task_alloc']:
+        return _run(rest[2], rest[3:])
+    if rest[:2] == ['launch', 'uav_task_alloc']:
+        return _launch(rest[2], rest[3:])
+    known = ('run', 'launch', 'topic', 'service', 'param', 'node', 'bag', 'doctor', 'interface')
+    return '' if rest[0] in known else f'ros2 {rest[0]}: expected one of {known}'
+
+
+def _run(name, rest):
+    if not (ROOT / 'uav_task_alloc/nodes' / f'{name}.py').exists():
+        return f'ros2 run uav_task_alloc {name}: no such executable'
+    known = {params.ros_name(spec): spec for spec in fields(params.NODES[name])} if (
+        name in params.NODES) else {}
+    for flag, word in pairwise(rest):
+        if flag != '-p':
+            continue
+        key, _, value = word.partition(':=')
+        if key not in known:
+            return f'{name}: no parameter {key}'
+        params.check(known[key], yaml.safe_load(value))
+    return ''
+
+
+def _launch(name, rest):
+    path = ROOT / 'launch' / name
+    if not path.exists():
+        return f'{path.name}: no such launch file'
+    text = path.read_text()
+    missing = [word.partition(':=')[0] for word in rest
+               if f"DeclareLaunchArgument('{word.partition(':=')[0]}'" not in text
+               and not word.startswith('-')]
+    return f'{name}: no argument {missing[0]}' if missing else ''

@@ -1,0 +1,237 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Every command, snippet, link and quoted error of the docs is tried; docs_pages.py says how."""
+import ast
+import importlib.util
+import json
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from contextlib import ExitStack
+
+import docs_commands
+import pytest
+import yaml
+from docs_pages import LANGUAGES, MARKS, PAGES, ROOT, blocks, prose
+
+from uav_task_alloc import scenario
+
+BLOCKS = [block for page in PAGES for block in blocks(page)]
+NO_ROS = importlib.util.find_spec('rclpy') is None
+PATIENCE = 60.0  # [s] for one block, which takes one or two
+
+
+def by_name(page):
+    return page.relative_to(ROOT).as_posix()
+
+
+def needs_ros(text):
+    return 'ros2 ' in text or 'rclpy' in text
+
+
+class Place:
+    """A folder like the repository in which what a page says is done; it is thrown away."""
+
+    def __init__(self, folder, stack):
+        self.folder, self.stack = folder, stack
+        self.env = {**os.environ, 'PYTHONPATH': f'{ROOT}:{os.environ.get("PYTHONPATH", "")}',
+                    'PATH': f'{folder / ".bin"}:{os.environ["PATH"]}', 'PYTHONUNBUFFERED': '1'}
+        for path in ROOT.iterdir():
+            if path.name not in ('out', 'log', '.git'):
+                (folder / path.name).symlink_to(path)
+        (folder / '.bin').mkdir()
+        self._stand_in('python', f'exec {sys.executable} "$@"')
+        if shutil.which('ros2') is None:
+            self._stand_in('ros2', f'exec {sys.executable} {ROOT}/test/ros2_stand_in.py "$@"')
+        if not NO_ROS:
+            self._own_domain()
+
+    def _stand_in(self, name, line):
+        path = self.folder / '.bin' / name
+        path.write_text(f'#!/bin/sh\n{line}\n')
+        path.chmod(0o755)
+
+    def _own_domain(self):
+        import domain_coordinator
+        number = self.stack.enter_context(domain_coordinator.domain_id())
+        quick = ROOT / 'test/nodes/quick_discovery.xml'
+        self.env |= {'ROS_DOMAIN_ID': str(number), 'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST',
+                     'FASTRTPS_DEFAULT_PROFILES_FILE': str(quick)}
+
+    def do(self, block):
+        """What the mark and the language of a block ask for."""
+        if block.mark == 'file':
+            path = self.folder / block.what
+            assert not path.exists(), f'{block}: {block.what} is there already'
+            path.write_text(block.text)
+        if block.mark in ('needs', 'says', 'file') or (NO_ROS and needs_ros(block.text)):
+            return
+        if block.language == 'python':
+            (self.folder / '.snippet.py').write_text(block.text)
+            self.run(block, [sys.executable, '.snippet.py'])
+        elif block.language == 'bash':
+            words = ['bash', '-euo', 'pipefail', '-c', block.text]
+            (self.start if block.mark == 'until' else self.run)(block, words)
+
+    def run(self, block, words):
+        """To the end, which must be good unless it is said to fail."""
+        done = subprocess.run(words, cwd=self.folder, env=self.env, stdout=subprocess.PIPE,
+                              stderr=subprocess.STDOUT, text=True, timeout=PATIENCE, check=False)
+        if block.mark == 'fails':
+            assert done.returncode != 0, f'{block}: expected it to fail\n{done.stdout}'
+            assert block.what in done.stdout, f'{block}:\n{done.stdout}'
+        else:
+            assert done.returncode == 0, f'{block}: status {done.returncode}\n{done.stdout}'
+
+    def start(self, block, words):
+        """In the background, until the page is done; it must print what is said."""
+        log = self.folder / f'.log_{block.line}'
+        with open(log, 'w') as file:
+            process = subprocess.Popen(words, cwd=self.folder, env=self.env, stdout=file,
+                                       stderr=subprocess.STDOUT, start_new_session=True)
+        self.stack.callback(self.stop, block, process, log)
+        end = time.monotonic() + PATIENCE
+        while block.what not in log.read_text():
+            assert process.poll() is None, f'{block}: has ended\n{log.read_text()}'
+            assert time.monotonic() < end, f'{block}: timed out\n{log.read_text()}'
+            time.sleep(0.05)  # between two looks at a file that somebody else writes
+
+    def stop(self, block, process, log):
+        """Ctrl-C, as a reader would; the group is the process's own."""
+        if process.poll() is None:
+            os.killpg(process.pid, signal.SIGINT)
+        try:
+            process.wait(20)
+        except subprocess.TimeoutExpired:
+            os.killpg(process.pid, signal.SIGKILL)
+            process.wait()
+            pytest.fail(f'{block}: does not end on Ctrl-C\n{log.read_text()}')
+        assert 'Traceback' not in log.read_text(), f'{block}:\n{log.read_text()}'
+
+
+@pytest.mark.parametrize('page', PAGES, ids=by_name)
+def test_what_a_page_tells_to_do_works(page, tmp_path):
+    with ExitStack() as stack:
+        place = Place(tmp_path, stack)
+        for block in blocks(page):
+            place.do(block)
+
+
+@pytest.mark.parametrize('block', [b for b in BLOCKS if b.language == 'bash'], ids=str)
+def test_the_programs_and_options_of_a_command_are_there(block):
+    if block.mark == 'fails':
+        return
+    for words in docs_commands.commands(block.text):
+        assert docs_commands.complaint(words) == '', ' '.join(words)
+
+
+@pytest.mark.parametrize('block', [b for b in BLOCKS if b.language == 'python'], ids=str)
+def test_a_snippet_is_python(block):
+    ast.parse(block.text)
+
+
+@pytest.mark.parametrize('block', [b for b in BLOCKS if b.language in ('yaml', 'json')], ids=str)
+def test_a_file_that_is_shown_can_be_read(block, tmp_path):
+    read = yaml.safe_load(block.text) if block.language == 'yaml' else json.loads(block.text)
+    if 'uavs' in read and block.mark != 'says':
+        (tmp_path / 'shown.yaml').write_text(block.text)
+        scenario.load(tmp_path / 'shown.yaml')
+
+
+@pytest.mark.parametrize('block', BLOCKS, ids=str)
+def test_a_block_says_its_language(block):
+    assert block.language in LANGUAGES, f'{block}: expected one of {LANGUAGES} behind ```'
+
+
+@pytest.mark.parametrize('page', PAGES, ids=by_name)
+def test_no_command_hides_outside_a_block(page):
+    hidden = re.compile(r'( {4,}|\t)(make|python3?|pip|ros2|colcon|git|sudo|sim_vehicle\.py) ')
+    assert [f'{number}: {line}' for number, line in prose(page) if hidden.match(line)] == []
+    marks = re.compile(rf'<!-- (?!({"|".join(MARKS)}): )')
+    assert [f'{number}: {line}' for number, line in prose(page) if marks.match(line)] == []
+
+
+@pytest.mark.parametrize('page', PAGES, ids=by_name)
+def test_links_lead_somewhere(page):
+    for number, line in prose(page):
+        for target in re.findall(r'\]\(([^)]+)\)', line):
+            if not re.match(r'https?:|#', target):
+                path = page.parent / target.partition('#')[0]
+                assert path.exists(), f'{page.name}:{number}: {target}'
+
+
+def words_of_the_sources():
+    """All texts of the package; what is put into them at run time is a gap."""
+    found = []
+    for path in sorted((ROOT / 'uav_task_alloc').rglob('*.py')):
+        for node in ast.walk(ast.parse(path.read_text())):
+            if isinstance(node, ast.JoinedStr):
+                found.append('\0'.join(part.value for part in node.values
+                                       if isinstance(part, ast.Constant)))
+            elif isinstance(node, ast.Constant) and isinstance(node.value, str):
+                found.append(node.value)
+    return '\n'.join(found)
+
+
+def quoted_errors():
+    """The headings of the faq that quote an error: pieces between what varies."""
+    for line in (ROOT / 'docs/faq.md').read_text().splitlines():
+        match = re.fullmatch(r'### `(.+)`', line)
+        if match:
+            yield match[1]
+
+
+def test_every_error_that_the_faq_quotes_is_one_of_ours():
+    ours, errors = words_of_the_sources(), list(quoted_errors())
+    assert len(errors) >= 15
+    for error in errors:
+        pieces = [piece for piece in re.split(r'\.\.\.|: expected | = ', error) if piece.strip()]
+        assert any(len(piece) > 8 for piece in pieces), f'{error}: nothing to look for'
+        for piece in pieces:
+            assert piece in ours, f'{error}: {piece!r} is said nowhere'
+
+
+def test_the_readme_counts_what_the_demo_has():
+    demo = scenario.load(ROOT / 'config/scenarios/demo.yaml')
+    text = (ROOT / 'README.md').read_text()
+    late = sum(timed.at > 0.0 for timed in demo.tasks)
+    assert (len(demo.uavs), len(demo.zones)) == (4, 3)
+    assert f'{len(demo.tasks)} tasks' in text
+    assert f'{late} arrive in flight' in text
+
+
+def test_a_mark_or_a_fence_gone_wrong_is_seen(tmp_path, monkeypatch):
+    page = tmp_path / 'page.md'
+    page.write_text('<!-- until: ready -->\n```bash\nmake demo\n```\ntext\n```\nopen\n')
+    with pytest.raises(AssertionError, match='expected a closing fence'):
+        blocks(page)
+    page.write_text('<!-- until: ready -->\n\n```bash\nmake demo\n```\n```text\nx\n```\n')
+    first, second = blocks(page)
+    assert (first.mark, first.what, first.text, second.mark) == ('until', 'ready', 'make demo\n',
+                                                                 '')
+
+
+@pytest.mark.parametrize(('line', 'told'), [
+    ('make demmo', 'demmo'),
+    ('python -m uav_task_alloc plan x.yaml --plott x.png', 'no option --plott'),
+    ('python -m uav_task_alloc plann', 'plann'),
+    ('ros2 run uav_task_alloc allocater', 'no such executable'),
+    ('ros2 run uav_task_alloc allocator --ros-args -p buget:=1.0', 'no parameter buget'),
+    ('ros2 launch uav_task_alloc fleet.launch.py names:=x', 'no argument names'),
+    ('cd x && flyto moon', 'flyto'),
+    ('python benchmarks/none.py', 'no such file'),
+])
+def test_a_wrong_command_is_seen(line, told):
+    assert any(told in docs_commands.complaint(words) for words in docs_commands.commands(line))
+
+
+@pytest.mark.parametrize('line', [
+    'python -m uav_task_alloc plan x.yaml --plot x.png --budget 3', 'make demo',
+    'X=1 ros2 run uav_task_alloc allocator --ros-args -p solve_budget:=0.2',
+    "ros2 run uav_task_alloc mavlink_bridge --ros-args -p connections:=\"['tcp:127.0.0.1:5760']\"",
+])
+def test_a_right_command_is_let_pass(line):
+    assert all(docs_commands.complaint(words) == '' for words in docs_commands.commands(line))
