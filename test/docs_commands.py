@@ -10,6 +10,7 @@ from functools import cache
 from itertools import pairwise
 from pathlib import Path
 
+import launch_stand_in
 import yaml
 
 from uav_task_alloc import __main__ as cli, params
@@ -119,8 +120,9 @@ def _launch(name, rest):
     path = ROOT / 'launch' / name
     if not path.exists():
         return f'{path.name}: no such launch file'
-    text = path.read_text()
-    missing = [word.partition(':=')[0] for word in rest
-               if f"DeclareLaunchArgument('{word.partition(':=')[0]}'" not in text
-               and not word.startswith('-')]
-    return f'{name}: no argument {missing[0]}' if missing else ''
+    try:
+        nodes = launch_stand_in.commands(path, dict(word.split(':=', 1) for word in rest))
+    except KeyError as error:
+        return str(error.args[0])
+    found = [_run(node[1], node[2:]) for node in nodes if node[0] == 'uav_task_alloc']
+    return next(filter(None, found), '')

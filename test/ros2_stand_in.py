@@ -12,18 +12,16 @@ import signal
 import subprocess
 import sys
 import time
-import types
 from pathlib import Path
 
 import yaml
-
-SHARE = {'uav_task_alloc': str(Path(__file__).resolve().parent.parent)}
+from launch_stand_in import SHARE, commands
 
 
 def program(package, name):
-    """The words that start an executable of this package; None for those of others."""
+    """The words that start an executable of this package; those of others are not here."""
     if package not in SHARE:
-        return None
+        sys.exit(f'Package {package!r} not found')
     return [sys.executable, '-c', f'from uav_task_alloc.nodes.{name} import main; main()']
 
 
@@ -33,130 +31,17 @@ def run(words):
     os.execv(started[0], [*started, *words[2:]])
 
 
-# What launch files are made of. `text(given)` is a value once the arguments are known.
-
-class Value:
-    """A substitution."""
-
-    def __init__(self, *parts, **_):
-        self.parts = parts
-
-
-class Configuration(Value):
-    def text(self, given):
-        return given[self.parts[0]]
-
-
-class Share(Value):
-    def text(self, given):
-        return SHARE[self.parts[0]]
-
-
-class Joined(Value):
-    def text(self, given):
-        return '/'.join(text(part, given) for part in self.parts[0])
-
-
-class Typed:
-    def __init__(self, value, value_type=str):
-        self.value, self.type = value, value_type
-
-    def text(self, given):
-        return str(self.type(text(self.value, given)))
-
-
-class Declared:
-    def __init__(self, name, default_value=None, **_):
-        self.name, self.default = name, default_value
-
-
-class Condition(Value):
-    def holds(self, given):
-        return text(self.parts[0], given).lower() in ('true', '1')
-
-
-class NotCondition(Condition):
-    def holds(self, given):
-        return not super().holds(given)
-
-
-class Node:
-    """launch_ros.actions.Node."""
-
-    def __init__(self, package, executable, namespace='', name='', parameters=(), arguments=(),
-                 condition=None, **_):
-        self.package, self.executable, self.condition = package, executable, condition
-        self.namespace, self.name = namespace, name
-        self.parameters, self.arguments = parameters, arguments
-
-    def command(self, given):
-        """What starts it; None where it is not to be, or not here."""
-        if self.condition is not None and not self.condition.holds(given):
-            return None
-        started = program(self.package, self.executable)
-        if started is None:
-            print(f'{self.package} is not here: left out', flush=True)
-            return None
-        words = [*started, *(text(word, given) for word in self.arguments), '--ros-args']
-        namespace = text(self.namespace, given).strip('/')
-        words += ['-r', f'__ns:=/{namespace}'] if namespace else []
-        words += ['-r', f'__node:={self.name}'] if self.name else []
-        for each in self.parameters:
-            if isinstance(each, dict):
-                for key, value in each.items():
-                    words += ['-p', f'{key}:={text(value, given)}']
-            else:
-                words += ['--params-file', text(each, given)]
-        return words
-
-
-def text(value, given):
-    if hasattr(value, 'text'):
-        return value.text(given)
-    if isinstance(value, (list, tuple)):
-        return ''.join(text(part, given) for part in value)
-    return str(value)
-
-
-def pretend():
-    """Put modules under the names that launch files import."""
-    names = {
-        'launch': {'LaunchDescription': list},
-        'launch.actions': {'DeclareLaunchArgument': Declared},
-        'launch.conditions': {'IfCondition': Condition, 'UnlessCondition': NotCondition},
-        'launch.substitutions': {'LaunchConfiguration': Configuration,
-                                 'PathJoinSubstitution': Joined},
-        'launch_ros': {}, 'launch_ros.actions': {'Node': Node},
-        'launch_ros.parameter_descriptions': {'ParameterValue': Typed},
-        'launch_ros.substitutions': {'FindPackageShare': Share},
-    }
-    for name, members in names.items():
-        module = types.ModuleType(name)
-        module.__dict__.update(members)
-        sys.modules[name] = module
-
-
 def launch(words):
     """ros2 launch PACKAGE FILE NAME:=VALUE ...: all nodes until Ctrl-C, which each is told of."""
-    pretend()
     path = Path(SHARE[words[0]], 'launch', words[1])
-    scope = {}
-    exec(compile(path.read_text(), str(path), 'exec'), scope)
-    parts = scope['generate_launch_description']()
-    given = dict(word.split(':=', 1) for word in words[2:])
-    declared = [part for part in parts if isinstance(part, Declared)]
-    unknown = set(given) - {part.name for part in declared}
-    if unknown:
-        sys.exit(f'{path.name}: no argument {min(unknown)}')
-    for part in declared:
-        given.setdefault(part.name, text(part.default, given))
-    nodes = [part.command(given) for part in parts if isinstance(part, Node)]
-    children = [subprocess.Popen(words) for words in nodes if words]
+    nodes = commands(path, dict(word.split(':=', 1) for word in words[2:]))
+    started = [program(*node[:2]) + node[2:] for node in nodes]
+    children = [subprocess.Popen(node) for node in started]
     stop = []
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: stop.append(1))
     while not stop and any(child.poll() is None for child in children):
-        time.sleep(0.05)
+        time.sleep(0.05)  # a signal ends it at once
     for child in children:
         child.send_signal(signal.SIGINT)
     return max(abs(child.wait(20)) for child in children)

@@ -13,6 +13,7 @@ import time
 from contextlib import ExitStack
 
 import docs_commands
+import launch_stand_in
 import pytest
 import yaml
 from docs_pages import LANGUAGES, MARKS, PAGES, ROOT, blocks, prose
@@ -136,7 +137,7 @@ def test_a_snippet_is_python(block):
 @pytest.mark.parametrize('block', [b for b in BLOCKS if b.language in ('yaml', 'json')], ids=str)
 def test_a_file_that_is_shown_can_be_read(block, tmp_path):
     read = yaml.safe_load(block.text) if block.language == 'yaml' else json.loads(block.text)
-    if 'uavs' in read and block.mark != 'says':
+    if 'uavs' in read and not block.mark:
         (tmp_path / 'shown.yaml').write_text(block.text)
         scenario.load(tmp_path / 'shown.yaml')
 
@@ -188,10 +189,10 @@ def test_every_error_that_the_faq_quotes_is_one_of_ours():
     ours, errors = words_of_the_sources(), list(quoted_errors())
     assert len(errors) >= 15
     for error in errors:
-        pieces = [piece for piece in re.split(r'\.\.\.|: expected | = ', error) if piece.strip()]
+        pieces = re.split(r'\.\.\.|: expected|expected |waits for | = ', error)
         assert any(len(piece) > 8 for piece in pieces), f'{error}: nothing to look for'
         for piece in pieces:
-            assert piece in ours, f'{error}: {piece!r} is said nowhere'
+            assert piece.strip() in ours, f'{error}: {piece!r} is said nowhere'
 
 
 def test_the_readme_counts_what_the_demo_has():
@@ -212,6 +213,20 @@ def test_a_mark_or_a_fence_gone_wrong_is_seen(tmp_path, monkeypatch):
     first, second = blocks(page)
     assert (first.mark, first.what, first.text, second.mark) == ('until', 'ready', 'make demo\n',
                                                                  '')
+
+
+@pytest.mark.parametrize('path', sorted(ROOT.glob('launch/*.py')), ids=lambda path: path.name)
+def test_a_launch_file_starts_what_is_there(path):
+    assert docs_commands.complaint(['ros2', 'launch', 'uav_task_alloc', path.name]) == ''
+    assert launch_stand_in.commands(path, {})
+
+
+def test_rviz_comes_with_a_fleet_when_it_is_asked_for():
+    path = ROOT / 'launch/fleet.launch.py'
+    plain, shown = (launch_stand_in.commands(path, {'rviz': rviz, 'namespace': 'fleet'})
+                    for rviz in ('false', 'true'))
+    assert shown[:len(plain)] == plain
+    assert [node[0] for node in shown[len(plain):]] == ['rviz2', 'tf2_ros']
 
 
 @pytest.mark.parametrize(('line', 'told'), [

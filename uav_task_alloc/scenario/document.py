@@ -31,7 +31,7 @@ zones:
 `config/scenarios/` holds more, `demo.yaml` among them. A bad file is refused with one line that
 names file, line, value and what was expected:
 
-```
+```text
 demo.yaml:11: scenario.uavs[0].range = -4: expected a number in [0, inf]
 demo.yaml:14: scenario.tasks[0]: unknown key 'positon': expected one of ...; nearest is 'position'
 ```

@@ -2,7 +2,7 @@
 """The solvers by name: each improves on the recorder's best, returns a state to go on from."""
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 
 from uav_task_alloc.solver import chain_q
 from uav_task_alloc.solver.baselines import (
@@ -18,7 +18,7 @@ from uav_task_alloc.solver.recorder import Recorder
 
 Solver = Callable[[Recorder, int, object], object]  # (recorder, seed, learnt) -> learnt
 
-SOLVERS: Mapping[str, Solver] = {
+SOLVERS: dict[str, Solver] = {  # yours as well: SOLVERS['mine'] = solve
     'chain_q': chain_q.solve,
     'paper_chain_q': paper_chain_q.solve,
     'q_learning': q_learning.solve,
