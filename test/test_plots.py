@@ -9,7 +9,7 @@ import pytest
 
 from uav_task_alloc import plots
 from uav_task_alloc.model import Leg, Plan, Task, ThreatZone, Uav
-from uav_task_alloc.plots import labels, space, style
+from uav_task_alloc.plots import labels, plan as plan_map, space, style
 from uav_task_alloc.plots.flat import Map
 from uav_task_alloc.record import heard, truth
 from uav_task_alloc.record.heard import zone_to_json
@@ -42,8 +42,12 @@ def test_a_plan_of_nothing_is_drawn(tmp_path, draw):
 
 @DRAW
 def test_a_crowd_is_drawn_without_names(tmp_path, draw, monkeypatch):
-    written = []
-    monkeypatch.setattr(labels.Axes, 'annotate', lambda axes, text, *_, **__: written.append(text))
+    written, annotate = [], labels.Axes.annotate
+
+    def listen(axes, text, *args, **kwargs):
+        written.append(text)
+        return annotate(axes, text, *args, **kwargs)
+    monkeypatch.setattr(labels.Axes, 'annotate', listen)
     tasks = [Task(f't{i}', (10.0 * i, 0.0, 40.0)) for i in range(style.CROWD + 1)]
     draw([], tasks, [], Plan({}, {task.id: 'no UAV' for task in tasks}), tmp_path / 'plan.png')
     assert not [text for text in written if text.startswith('t')]
@@ -61,6 +65,14 @@ def test_the_axes_tell_their_units():
     assert (flat.get_xlabel(), flat.get_ylabel()) == ('east [m]', 'north [m]')
     assert (deep.get_xlabel(), deep.get_ylabel(), deep.get_zlabel()) == (
         'east [m]', 'north [m]', 'up [m], drawn 3 times')
+
+
+def test_the_legend_of_a_large_fleet_has_an_end():
+    uavs = [Uav(f'u{i}', (float(i), 0.0, 0.0)) for i in range(40)]
+    made = Plan({uav.id: ('t',) * (i < 30) for i, uav in enumerate(uavs)})
+    texts = [handle.get_label() for handle in plan_map.handles_of(uavs, made)]
+    assert texts[0] == 'u0: 1 task, 0 m'
+    assert texts[style.ROWS:] == [f'{30 - style.ROWS} more UAVs with tasks', '10 without tasks']
 
 
 def test_in_space_a_zone_is_drawn_as_high_as_it_is_and_cut_where_it_towers():

@@ -44,7 +44,7 @@ class Map:
     def zone(self, zone: ThreatZone, note: str = '', late: bool = False) -> None:
         """The footprint with its margin (dotted); a dashed edge where the zone came late."""
         self._zones += 1
-        text = ', '.join(filter(None, (style.heights(zone), note)))
+        text = '\n'.join(filter(None, (zone.id, style.heights(zone), note)))
         if zone.shape is Shape.POLYGON:
             shape: Any = Polygon(zone.vertices)
             x, y = (sum(values) / len(values) for values in zip(*zone.vertices, strict=True))
@@ -61,8 +61,7 @@ class Map:
                               else ((x, y), zone.radius)), fill=False, lw=0.0, hatch='///',
                             ec=(*style.ZONE[:3], 0.3), zorder=1.9)
         self.axes.add_patch(hatch)
-        self._labels.append(Label(zone.id + (f'\n{text}' if text else ''), x, y, SMALL, 12.0,
-                                  style.DARK_RED, bold=True, within=True))
+        self._labels.append(Label(text, x, y, SMALL, 12.0, style.DARK_RED, bold=True, within=True))
 
     def _ring(self, zone: ThreatZone) -> None:
         """Where a dome is at the height that most is flown at."""
@@ -123,14 +122,19 @@ class Map:
         self.figure.draw_without_rendering()  # only now the limits are what they will be
         low, high = self.axes.get_xlim()
         place(self.axes, self._labels, self._ways)
-        self._scale_bar(high - low)
+        if handles:
+            self._scale_bar(high - low)
         self.figure.savefig(png)
 
     def _scale_bar(self, width: float) -> None:
+        """Beneath the legend, where nothing else is; `width` [m] of the map."""
         metres = max(factor * 10.0 ** power for power in range(-3, 9) for factor in (1, 2, 5)
                      if factor * 10.0 ** power <= width / 6.0)
-        share, height = metres / width, 1.03
-        self.axes.plot([1.0 - share, 1.0], [height, height], color='black', lw=5, clip_on=False,
-                       transform=self.axes.transAxes, solid_capstyle='butt')
-        self.axes.annotate(f'{metres:g} m', (1.0 - share - 0.01, height), ha='right', va='center',
-                           xycoords='axes fraction', fontsize=style.PLAIN, annotation_clip=False)
+        left, share = 1.03, metres / width
+        bar, = self.axes.plot([left, left + share], [0.0, 0.0], color='black', lw=5, clip_on=False,
+                              transform=self.axes.transAxes, solid_capstyle='butt')
+        text = self.axes.annotate(
+            f'{metres:g} m', (left + share / 2.0, 0.015), ha='center', va='bottom',
+            xycoords='axes fraction', fontsize=style.PLAIN, annotation_clip=False)
+        for each in (bar, text):
+            each.set_in_layout(False)  # it stands where there is room

@@ -46,13 +46,18 @@ def title_of(plan: Plan, tasks: int) -> str:
     return f'{planned} of {tasks} tasks planned, {plan.distance / 1e3:.1f} km'
 
 
-def handles_of(uavs: Sequence[Uav], plan: Plan) -> list[Line2D]:
-    """The legend: a line for each UAV, and one for what is unassigned."""
+def handles_of(uavs: Sequence[Uav], plan: Plan, rows: int = style.ROWS) -> list[Line2D]:
+    """The legend: a line for each UAV with tasks, as many as `rows`, and what else there is."""
+    busy = [(index, uav.id) for index, uav in enumerate(uavs) if plan.routes.get(uav.id)]
     handles = []
-    for index, uav in enumerate(uavs):
-        count = len(plan.routes.get(uav.id, ()))
-        metres = sum(leg.length for leg in plan.legs.get(uav.id, ()))
-        handles.append(style.route(index, f'{uav.id}: {style.count(count)}, {metres:.0f} m'))
+    for index, name in busy[:rows]:
+        metres = sum(leg.length for leg in plan.legs.get(name, ()))
+        handles.append(style.route(
+            index, f'{name}: {style.count(len(plan.routes[name]))}, {metres:.0f} m'))
+    for many, text in ((len(busy) - rows, 'more UAVs with tasks'),
+                       (len(uavs) - len(busy), 'without tasks')):
+        if many > 0:
+            handles.append(Line2D([], [], ls='', label=f'{many} {text}'))
     if plan.unassigned:
         handles.append(style.mark('o', 'white', RED, f'unassigned: {len(plan.unassigned)}'))
     return handles

@@ -24,8 +24,9 @@ STRETCH = (1, 2, 3, 5, 10, 20, 50, 100)  # of heights, as routes are much longer
 FLATTEST = 0.3  # height of the picture's box against its longer side
 HIGHEST = 1.5  # times the rest, that a zone may reach and is not cut
 VIEW = {'elev': 32.0, 'azim': -62.0}  # [deg]
-PLACE, ZOOM = (0.0, -0.22, 0.78, 1.4), 0.95  # its square reaches beyond the figure, left empty
-RIGHT = 0.79  # of the picture, where there is room below the legend
+PLACE, ZOOM = (0.0, -0.22, 0.78, 1.4), 0.94  # its square reaches beyond the figure
+ROWS = 6  # UAVs in the legend, which has but a corner
+RIGHT = 0.79  # of the picture, where there is room above the legend
 FACETS = 48  # of a round body
 
 Name = tuple[str, Point, bool, str]  # text, where, bold, colour
@@ -35,7 +36,7 @@ def draw_plan_3d(uavs: Sequence[Uav], tasks: Sequence[Task], zones: Sequence[Thr
                  plan: Plan, png: str | Path, note: str = '') -> None:
     """The plan seen from south-east and above; zones without an end are cut. Raises OSError.
 
-    `note` stands below the legend: how the plan was made, say.
+    `note` stands above the legend: how the plan was made, say.
     """
     places = {task.id: task.position for task in tasks}
     ways = [way_of(uav, plan, places) for uav in uavs]
@@ -43,23 +44,26 @@ def draw_plan_3d(uavs: Sequence[Uav], tasks: Sequence[Task], zones: Sequence[Thr
     figure = Figure(figsize=style.SIZE, dpi=style.DPI)
     axes = figure.add_axes(PLACE, projection='3d', computed_zorder=False)
     names = [_body(axes, zone, low[2], high[2]) for zone in zones]
+    few = len(tasks) <= style.CROWD
+    size = 10.0 if few else 5.0
     for index, (uav, way) in enumerate(zip(uavs, ways, strict=True)):
-        _way(axes, way, index, low[2])
+        _way(axes, way, index, low[2], ROUTE if few else 0.6 * ROUTE)
         _mark(axes, way[0], low[2], 's', 12.0, style.colour(index), 'black')
         names.append((uav.id, way[0], True, 'black'))
         for name in plan.routes.get(uav.id, ()):
-            _mark(axes, places[name], low[2], 'o', 10.0, style.colour(index), 'black')
+            _mark(axes, places[name], low[2], 'o', size, style.colour(index), 'black')
     for name in plan.unassigned:
-        _mark(axes, places[name], low[2], 'o', 10.0, 'white', RED)
-    if len(tasks) <= style.CROWD:
+        _mark(axes, places[name], low[2], 'o', size, 'white', RED)
+    if few:
         names += [(name, place, False, RED if name in plan.unassigned else 'black')
                   for name, place in places.items()]
     _frame(axes, low, high)
     figure.text(0.03, 0.94, title_of(plan, len(tasks)), fontsize=style.LARGE, fontweight='bold')
-    figure.text(RIGHT, 0.03, note, fontsize=SMALL)
+    figure.text(RIGHT, 0.97, note, fontsize=SMALL, va='top')
     cut = 'no-fly zone, no margin' + '\n(dashed: higher than drawn)' * any(
         zone.shape is not Shape.HEMISPHERE and zone.z_max > high[2] for zone in zones)
-    style.legend(figure, [*handles_of(uavs, plan), *[style.zone_handle(cut)] * bool(zones)])
+    style.legend(figure, [*handles_of(uavs, plan, ROWS),
+                          *[style.zone_handle(cut)] * bool(zones)], 'lower right')
     _write(axes, names, ways)
     figure.savefig(png)
 
@@ -136,11 +140,11 @@ def _ring(axes: Any, corners: NDArray[np.float64], height: float, ls: str = '-')
     axes.plot(*corners.T, height, color=RED, lw=1.6, ls=ls, zorder=2.1)
 
 
-def _way(axes: Any, way: Sequence[Point], index: int, ground: float) -> None:
+def _way(axes: Any, way: Sequence[Point], index: int, ground: float, width: float) -> None:
     """A route, and its shadow, without which nobody sees where it is."""
     xs, ys, zs = zip(*way, strict=True)
     axes.plot(xs, ys, ground, color='#9e9e9e', lw=1.4, zorder=1)
-    axes.plot(xs, ys, zs, color=style.colour(index), ls=style.line(index), lw=ROUTE, zorder=4)
+    axes.plot(xs, ys, zs, color=style.colour(index), ls=style.line(index), lw=width, zorder=4)
 
 
 def _mark(axes: Any, place: Point, ground: float, marker: str, size: float, fill: str,

@@ -23,7 +23,7 @@ DPI = 150  # full HD
 SMALL, PLAIN, LARGE = 11.0, 13.0, 17.0  # [pt]
 ROUTE = 2.8  # [pt]
 CROWD = 60  # tasks; more are dots without names
-ROWS = 16  # of the legend
+ROWS = 14  # UAVs in the legend
 
 
 def colour(index: int) -> str:
@@ -78,8 +78,6 @@ def mark(marker: str, fill: str, edge: str, text: str) -> Line2D:
                   mew=2.4 if edge == RED else 1.0, label=text)
 
 
-def legend(figure: Figure, handles: list[Any]) -> None:
-    """Right of the picture, in as many columns as it takes."""
-    columns = max(1, math.ceil(len(handles) / ROWS))
-    figure.legend(handles=handles, loc='outside right upper', ncols=columns, frameon=False,
-                  fontsize=PLAIN if columns == 1 else SMALL, handlelength=1.8)
+def legend(figure: Figure, handles: list[Any], place: Any = 'outside right upper') -> None:
+    """What is what."""
+    figure.legend(handles=handles, loc=place, frameon=False, fontsize=PLAIN, handlelength=1.8)
