@@ -1,0 +1,55 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
+# Prints the path of a Chromium for the tests of the live page; installs Debian's or Ubuntu's where
+# there is none: `tools/browser.sh [FOLDER]`. With root into the system, else into
+# FOLDER/browser (default .ros). `tools/browser.sh --find [FOLDER]` only looks. Nothing printed:
+# there is none, and the browser tests are skipped; status 0 all the same, 1 where
+# REQUIRE_BROWSER=1.
+set -euo pipefail
+find_only=; [ "${1-}" != --find ] || { find_only=1; shift; }
+home=$(realpath -m "${1:-$(dirname "${BASH_SOURCE[0]}")/../.ros}")/browser
+
+find_browser() {
+  for name in "${CHROMIUM-}" chromium chromium-browser google-chrome "$home/chromium"; do
+    path=$(command -v "$name" 2> /dev/null) || continue
+    # Ubuntu's chromium-browser may be a stub that asks for a snap
+    if "$path" --version > /dev/null 2>&1; then echo "$path"; return; fi
+  done
+  return 1
+}
+
+install_for_all() {
+  apt-get update && apt-get install -y --no-install-recommends chromium
+}
+
+unpack_for_us() {
+  mkdir -p "$home"/{lists,cache,debs,root}
+  local apt=(apt-get -o "Dir::State::Lists=$home/lists" -o "Dir::Cache=$home/cache")
+  "${apt[@]}" update
+  local names
+  names=$("${apt[@]}" -s install --no-install-recommends chromium | awk '/^Inst/ {print $2}')
+  # word splitting is wanted: one package a word
+  # shellcheck disable=SC2086
+  (cd "$home/debs" && "${apt[@]}" download $names)
+  for deb in "$home"/debs/*.deb; do dpkg -x "$deb" "$home/root"; done
+  rm -r "$home/debs" "$home/cache" "$home/lists"
+  local lib="$home/root/usr/lib"
+  printf '#!/bin/sh\nexport LD_LIBRARY_PATH="%s"\nexec "%s" "$@"\n' \
+    "$(find "$lib" -name '*.so*' -printf '%h\n' | sort -u | paste -sd:)" \
+    "$lib/chromium/chromium" > "$home/chromium"
+  chmod +x "$home/chromium"
+}
+
+if find_browser; then exit; fi
+if [ -z "$find_only" ]; then
+  how=unpack_for_us; [ "$(id -u)" != 0 ] || how=install_for_all
+  log=$(mktemp)
+  echo '== Chromium for the browser tests (once, about 15 seconds)' >&2
+  # not as a condition: bash would go on after a failed step
+  (set -e; "$how") > "$log" 2>&1 & wait $! && found=$(find_browser) && {
+    rm "$log"; echo "$found"; exit; }
+  echo "no Chromium: the browser tests will be skipped; what was tried ended with:" >&2
+  tail -n 5 "$log" >&2
+  rm "$log"
+fi
+[ -z "${REQUIRE_BROWSER-}" ]
