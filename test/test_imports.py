@@ -13,6 +13,7 @@ ROOMS = {
     'pymavlink': ('mavlink/',),
     'matplotlib': ('plots', 'report', 'study/'),
     'mavsdk': (),
+    'aiohttp': ('live/',),
     'pymap3d': ('geometry/',),
     'numba': ('geometry/', 'solver/'),
 }
@@ -23,7 +24,8 @@ ROS = {'rclpy', 'rcl_interfaces', 'builtin_interfaces', 'geometry_msgs', 'std_ms
 LEVELS = {
     'errors': 0, 'model': 1, 'params': 1, 'geometry': 2, 'objective': 2, 'solver': 3,
     'scenario': 3, 'record': 4, 'allocator': 4, 'journal': 4, 'mission': 4, 'mavlink': 5,
-    'plots': 5, 'progress': 5, 'planning': 6, 'study': 6, 'report': 6, '__main__': 7, 'nodes': 8,
+    'live': 5, 'plots': 5, 'progress': 5, 'planning': 6, 'study': 6, 'report': 6, '__main__': 7,
+    'nodes': 8,
 }
 
 

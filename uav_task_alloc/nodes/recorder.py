@@ -11,6 +11,7 @@ from uav_task_alloc_msgs import msg as m
 
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.geometry.frames import Origin
+from uav_task_alloc.nodes.announcements import sort_zones
 from uav_task_alloc.nodes.messages import from_point, from_stamp, to_task, to_zone
 from uav_task_alloc.record.heard import zone_to_json
 
@@ -44,8 +45,9 @@ def announced(msg: m.TaskAnnouncement, origin: Origin) -> Body:
 
 
 def zones(msg: m.ThreatZoneArray) -> Body:
-    """The whole picture of zones."""
-    return {'kind': 'zones', 'zones': [zone_to_json(to_zone(zone)) for zone in msg.zones]}
+    """The zones that are good; the allocator says what is wrong with the others."""
+    good, _ = sort_zones(msg, to_zone)
+    return {'kind': 'zones', 'zones': [zone_to_json(zone) for zone in good]}
 
 
 def statuses(msg: m.TaskStatusArray) -> Body:
@@ -64,10 +66,12 @@ def allocation(msg: m.Allocation) -> Body:
 
 
 def task_list(msg: m.TaskList) -> Body:
-    """What a UAV has still to fly."""
+    """What a UAV has still to fly; `eta` [s] from `stamp` [unix s]."""
     return {'kind': 'list', 'uav': msg.uav_id, 'revision': msg.revision, 'end': msg.end,
+            'stamp': from_stamp(msg.header.stamp),
             'distance': finite(msg.distance), 'tasks': [
                 {'id': row.task.task_id, 'leg_distance': finite(row.leg_distance) or 0.0,
+                 'eta': from_stamp(row.eta),
                  'via': [from_point(point) for point in row.via]} for row in msg.tasks]}
 
 
@@ -88,8 +92,13 @@ def finite(value: float) -> float | None:
 
 
 def uploads(msg: DiagnosticArray) -> Body:
-    """The upload counters a bridge puts into its diagnostics, by name of the status."""
-    return {'kind': 'uploads', 'uploads': dict(_uploads(msg))}
+    """The upload counters a bridge puts into its diagnostics, by name of the status.
+
+    `health`: [level, sentence] by what it is about, a UAV where the bridge speaks.
+    """
+    return {'kind': 'uploads', 'uploads': dict(_uploads(msg)), 'health': {
+        status.hardware_id or status.name: [ord(status.level), status.message]
+        for status in msg.status}}
 
 
 def _uploads(msg: DiagnosticArray) -> Iterable[tuple[str, int]]:

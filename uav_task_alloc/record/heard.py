@@ -65,6 +65,7 @@ class Heard:
     uavs: dict[str, Line] = field(default_factory=dict)  # the newest state of each
     verified: dict[str, set[int]] = field(default_factory=dict)  # revisions seen on board
     counted: dict[str, int] = field(default_factory=dict)  # uploads as a bridge counts them
+    health: dict[str, tuple[int, str]] = field(default_factory=dict)  # level, text of each UAV
     speedup: float = 1.0  # scenario seconds in one of the wall
     first: float = math.inf  # [unix s]
     last: float = -math.inf  # [unix s]
@@ -121,8 +122,10 @@ class Heard:
             self.verified.setdefault(line['uav'], set()).add(line['list_revision'])
 
     def on_uploads(self, line: Line) -> None:
-        """Counters of the bridge."""
+        """Counters of the bridge, and how its UAVs are."""
         self.counted.update(line['uploads'])
+        self.health.update((uav, (level, text))
+                           for uav, (level, text) in line.get('health', {}).items())
 
     @property
     def uploads(self) -> int:

@@ -1,0 +1,83 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A small run as lines of a record: two UAVs, five tasks, one zone, two plans."""
+from uav_task_alloc.live.board import Board
+from uav_task_alloc.live.scene import Scene
+from uav_task_alloc.record.heard import Heard
+
+BEGIN = 1_800_000_000.0  # [unix s]
+TASKS = {'t1': (100.0, 300.0), 't2': (100.0, 500.0), 't3': (500.0, 300.0), 't4': (500.0, 500.0),
+         't5': (300.0, 420.0)}
+
+
+def announced(wall, ids, action='ADD'):
+    return {'kind': 'announcement', 'wall': wall, 'action': action, 'tasks': [
+        {'id': task, 'position': [*TASKS.get(task, (300.0, 300.0)), 40.0]} for task in ids]}
+
+
+def statuses(wall, **states):
+    """statuses(0.0, t1='ACTIVE u1', t5='UNASSIGNED  inside zone z1')."""
+    rows = [(task, *(text.split(' ', 2) + ['', ''])[:3]) for task, text in states.items()]
+    return {'kind': 'statuses', 'wall': wall, 'statuses': [
+        {'task': task, 'state': state, 'uav': uav, 'reason': reason}
+        for task, state, uav, reason in rows]}
+
+
+def listed(wall, uav, revision, ids):
+    """A task list; the k-th task is reached 10 k seconds after `wall`."""
+    return {'kind': 'list', 'wall': wall, 'stamp': wall, 'uav': uav, 'revision': revision,
+            'distance': 0.0, 'tasks': [{'id': task, 'leg_distance': 1.0, 'via': [],
+                                        'eta': 10.0 * (k + 1)} for k, task in enumerate(ids)]}
+
+
+def planned(wall, revision, trigger, **lists):
+    return {'kind': 'allocation', 'wall': wall, 'revision': revision, 'trigger': trigger,
+            'solve_ms': 20.0 + revision, 'fit': 50.0 - revision,
+            'lists': [listed(wall, uav, revision, ids) for uav, ids in lists.items()]}
+
+
+def state(wall, uav, position, **more):
+    return {'kind': 'state', 'wall': wall, 'uav': uav, 'mode': 'ON_MISSION',
+            'mission_state': 'VERIFIED', 'active': '', 'list_revision': 1, 'battery': 0.75,
+            'position': [*position, 40.0], 'velocity': [0.0, 0.0, 0.0], 'range_remaining': 900.0,
+            'available': True, **more}
+
+
+def zones(wall, *rows):
+    return {'kind': 'zones', 'wall': wall, 'zones': [
+        {'id': zone, 'shape': 'HEMISPHERE', 'center': [x, y, 0.0], 'radius': radius,
+         'vertices': [], 'z_min': None, 'z_max': None, 'margin': 5.0}
+        for zone, x, y, radius in rows]}
+
+
+def uavs(wall):
+    return [state(wall, 'u1', (100.0, 100.0)), state(wall, 'u2', (500.0, 100.0))]
+
+
+FIRST = [  # what is heard in the first second
+    announced(BEGIN, ['t1', 't2', 't3']), *uavs(BEGIN),
+    listed(BEGIN, 'u1', 1, ['t1', 't2']), listed(BEGIN, 'u2', 1, ['t3']),
+    planned(BEGIN, 1, 'ADD t1, ADD t2, ADD t3', u1=['t1', 't2'], u2=['t3']),
+    statuses(BEGIN, t1='ACTIVE u1', t2='ASSIGNED u1', t3='ACTIVE u2')]
+LATER = [  # twenty seconds on: t1 is done, two tasks come, a zone lies on one of them
+    *uavs(BEGIN + 20), zones(BEGIN + 20, ('z1', 300.0, 420.0, 60.0)),
+    announced(BEGIN + 20, ['t4', 't5']),
+    listed(BEGIN + 20, 'u1', 2, []), listed(BEGIN + 20, 'u2', 2, ['t3', 't4', 't2']),
+    planned(BEGIN + 20, 2, 'ADD t4', u1=[], u2=['t3', 't4', 't2']),
+    statuses(BEGIN + 20, t1='COMPLETED u1', t2='ASSIGNED u2', t3='ACTIVE u2', t4='ASSIGNED u2',
+             t5='UNASSIGNED  inside zone z1')]
+
+
+class Run:
+    """A scene and its board, fed by hand."""
+
+    def __init__(self):
+        self.scene, self.board = Scene(Heard()), Board()
+
+    def hear(self, *lines):
+        """Take lines of one moment, and put what is new on the board."""
+        for line in lines:
+            self.scene.take(line)
+        wall, heard = lines[-1]['wall'], self.scene.heard
+        self.board.put(wall, {'start': heard.start(), 'speedup': 1.0, 'live': True},
+                       *self.scene.news(wall))
+        return self
