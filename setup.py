@@ -65,6 +65,7 @@ setup(
     version='0.1.0',
     cmdclass={'install': Install, 'develop': Develop},
     packages=find_packages(include=[NAME, NAME + '.*']),
+    package_data={NAME + '.live': ['page/*']},
     data_files=[
         ('share/ament_index/resource_index/packages', ['resource/' + NAME]),
         ('share/' + NAME, ['package.xml']),

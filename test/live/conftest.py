@@ -1,0 +1,91 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A page served from a small run, and a real browser to look at it."""
+import os
+import subprocess
+from pathlib import Path
+
+import pytest
+from small_run import FIRST, LATER, Run
+
+from uav_task_alloc.live.server import Server
+
+FINDER = Path(__file__).parents[2] / 'tools/browser.sh'
+WAIT = 15_000  # [ms]
+ARGS = [
+    '--headless', '--no-sandbox', '--disable-gpu', '--disable-quic', '--no-first-run',
+    '--disable-background-networking', '--disable-component-update', '--disable-sync']
+
+
+@pytest.fixture
+def run():
+    return Run().hear(*FIRST).hear(*LATER)
+
+
+@pytest.fixture
+def serve():
+    """serve(board, port=0) -> a Server that has started; stopped at the end."""
+    def serve(board, port=0, host='127.0.0.1'):
+        serve.servers.append(Server(board, host, port))
+        serve.servers[-1].start()
+        return serve.servers[-1]
+
+    serve.servers = []
+    yield serve
+    for server in serve.servers:
+        server.stop()
+
+
+@pytest.fixture(scope='session')
+def browser():
+    """A headless Chromium; skipped where there is none, unless REQUIRE_BROWSER=1."""
+    found = subprocess.run([FINDER, '--find'], capture_output=True, text=True)
+    path = found.stdout.strip()
+    if not path:
+        assert os.environ.get('REQUIRE_BROWSER') != '1', 'REQUIRE_BROWSER=1, and no Chromium'
+        pytest.skip('no Chromium found: `tools/browser.sh` installs one')
+    sync_api = pytest.importorskip('playwright.sync_api')
+    with sync_api.sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=path, headless=True, args=ARGS)
+        yield browser
+        browser.close()
+
+
+@pytest.fixture(scope='module')
+def window(browser):
+    """(tab, server) for one page after another: a tab has to read plotly.js only once."""
+    server = Server(Run().board, '127.0.0.1', 0)
+    server.start()
+    context = browser.new_context()
+    yield context.new_page(), server
+    context.close()
+    server.stop()
+
+
+@pytest.fixture
+def view(window):
+    """view(board) -> a page of it, drawn; fails on any error that the page reports."""
+    page, server = window
+    errors = []
+
+    def on_error(error):
+        errors.append(str(error))
+
+    def on_console(said):
+        if said.type == 'error' and 'ERR_' not in said.text:  # net::ERR_...: a lost server
+            errors.append(said.text)
+
+    def view(board, scheme='light'):
+        server.board = board
+        page.set_viewport_size({'width': 1600, 'height': 900})
+        page.emulate_media(color_scheme=scheme)
+        page.goto(server.address)
+        page.wait_for_selector('#map .main-svg', timeout=WAIT)
+        return page
+
+    page.on('pageerror', on_error)
+    page.on('console', on_console)
+    view.server = server
+    yield view
+    page.remove_listener('pageerror', on_error)
+    page.remove_listener('console', on_console)
+    assert errors == []

@@ -1,0 +1,51 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Shows a recorded run on the live page: `python -m uav_task_alloc.live out/demo`."""
+from __future__ import annotations
+
+import argparse
+import math
+from pathlib import Path
+
+from uav_task_alloc.live.board import Board
+from uav_task_alloc.live.scene import Scene
+from uav_task_alloc.live.server import TICK, Server
+from uav_task_alloc.record import heard
+
+
+def play(out_dir: Path, until: float = math.inf) -> Board:
+    """The board as it stood at the end of a record, or `until` [s] after its first task."""
+    board, scene, put = Board(), Scene(heard.Heard()), -math.inf
+
+    def post(wall: float) -> None:
+        board.put(wall, {'start': scene.heard.start(), 'speedup': scene.heard.speedup,
+                         'live': False}, *scene.news(wall))
+
+    for line in heard.read_lines(out_dir / heard.FILE):
+        if scene.heard.tasks and scene.heard.clock(line['wall']) > until:
+            break
+        scene.take(line)
+        if line['wall'] >= put + TICK:
+            put = line['wall']
+            post(put)
+    post(scene.heard.last)
+    return board
+
+
+def main(argv: list[str] | None = None) -> None:
+    """Serve until Ctrl-C."""
+    parser = argparse.ArgumentParser(prog='uav_task_alloc.live', description=__doc__)
+    parser.add_argument('out_dir', type=Path, help='a folder with record.jsonl')
+    parser.add_argument('--host', default='127.0.0.1')
+    parser.add_argument('--port', type=int, default=0, help='0: any free one')
+    args = parser.parse_args(argv)
+    server = Server(play(args.out_dir), args.host, args.port)
+    server.start()
+    print(f'Page of {args.out_dir}: {server.address}   (Ctrl-C ends it)', flush=True)
+    try:
+        server.thread.join()
+    except KeyboardInterrupt:
+        server.stop()
+
+
+if __name__ == '__main__':
+    main()

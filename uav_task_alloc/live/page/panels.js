@@ -1,0 +1,197 @@
+// SPDX-License-Identifier: Apache-2.0
+// The panels of words: answer, re-plans, what is left out, UAVs, events. Whatever the fleet says
+// goes through textContent, never into HTML.
+import {colour} from './map.js';
+import {answer, kindOf, live, ofDay, some, span, stamp, stateOf, until} from './picture.js';
+
+const MOST = 100;  // rows of one list
+const KINDS = {fault: 'bad', zone: 'bad', good: 'good'};
+const ON_BOARD = {VERIFIED: 'on board', UPLOADING: 'uploading', MIXED: 'MIXED on board',
+  FOREIGN: 'FOREIGN mission on board'};
+
+export const $ = id => document.getElementById(id);
+
+export function put(node, text, kind) {
+  if (node.textContent !== text) node.textContent = text;
+  if (kind !== undefined && node.className !== kind) node.className = kind;
+  return node;
+}
+
+export function make(tag, text = '', kind = '') {
+  return put(document.createElement(tag), text, kind);
+}
+
+// Replace what is in a node only when it is made from something else than last time.
+export function fill(node, key, nodes) {
+  if (node.dataset.key === key) return;
+  node.dataset.key = key;
+  node.replaceChildren(...nodes());
+}
+
+export function pick(id) {
+  $('find').value = id;
+  $('find').dispatchEvent(new Event('input'));
+}
+
+function taskButton(id) {
+  const button = make('button', id, 'task');
+  button.type = 'button';
+  button.onclick = () => pick(id);
+  return button;
+}
+
+export function showHead(seen, past) {
+  const done = seen.ids.filter(id => stateOf(id, seen)[0] === 'COMPLETED').length;
+  const silent = seen.uavs.filter(uav => uav.silent).length, {clock} = live;
+  put($('clock'), `${stamp(seen.wall)} (${ofDay(seen.wall)})`);
+  $('progress').max = seen.ids.length || 1;
+  $('progress').value = done;
+  put($('counts'), `${done} of ${seen.ids.length} tasks done, ${seen.turns.size} to fly; `
+    + `${seen.uavs.length} UAVs${silent ? `, ${silent} silent` : ''}; ${seen.zones.length} zones; `
+    + `${seen.plans.length} plans`);
+  Object.assign($('scrub'), {min: clock.begin, max: clock.wall});
+  if (!past) $('scrub').value = clock.wall;
+  put($('moment'), past ? `${stamp(past.wall)}, ${span(until(clock.wall, seen))} ago`
+    : clock.live ? 'now' : 'end of the record');
+  put($('live'), (past ? '↦ To ' : '● ') + (clock.live ? 'live' : 'the end'));
+  $('live').setAttribute('aria-pressed', String(!past));
+  document.body.classList.toggle('past', !!past);
+}
+
+// Returns the id of the task that is looked for, '' where there is none.
+export function showAnswer(seen) {
+  const typed = $('find').value.trim();
+  const say = (text, bad) => put($('answer'), text, bad ? 'bad' : '');
+  if (!typed) return say('Type the name of a task, or click one on the map or in a list.'), '';
+  const known = seen.where.has(typed) || seen.statuses.has(typed);
+  const near = known ? [typed]
+    : seen.ids.filter(id => id.toLowerCase().includes(typed.toLowerCase()));
+  if (near.length !== 1) {
+    say(near.length ? `Which one: ${some(near, 8)}?` : `There is no task ${typed}.`);
+    return '';
+  }
+  const {text, bad} = answer(near[0], seen);
+  say(text, bad);
+  return near[0];
+}
+
+// re-plans
+
+function changeNode(row, seen) {
+  const told = (task, sign, kind, words) => {
+    const part = make('span', `${sign} `, kind);
+    part.append(taskButton(task), ` (${words})`);
+    return part;
+  };
+  const parts = [
+    ...row.added.slice(0, MOST).map(([task, from]) =>
+      told(task, '+', 'good', from ? `from ${from}` : 'new in the plan')),
+    ...row.removed.slice(0, MOST).map(([task, to]) =>
+      told(task, '−', 'bad', to ? `now ${to}` : stateOf(task, seen)[0].toLowerCase())),
+    ...(row.reordered ? [make('span', '↻ order changed')] : [])];
+  const item = make('li');
+  item.append(make('b', row.uav), ...parts.flatMap((part, k) => [k ? ', ' : ': ', part]));
+  return item;
+}
+
+function planNodes(plan, seen) {
+  const head = make('p', `Plan ${plan.revision}, ${stamp(plan.wall)}, `
+    + `solved in ${Math.round(plan.ms)} ms. `);
+  head.append(make('b', 'Because: '), `${plan.trigger}.`);
+  const rows = make('ul', '', 'changes');
+  if (plan.first) {
+    rows.append(make('li', 'The first plan heard here; nothing to compare it with.', 'faint'));
+  } else if (!plan.changes.length) {
+    rows.append(make('li', 'Nothing changed for any UAV.', 'faint'));
+  } else {
+    rows.append(...plan.changes.map(row => changeNode(row, seen)));
+  }
+  return [head, rows];
+}
+
+export function showPlans(seen) {
+  const last = seen.plans.at(-1);
+  if (!last) return fill($('replan'), 'none', () => [make('p', 'No plan yet.', 'none')]);
+  const changed = seen.plans.findLast(plan => plan.changes.length && !plan.first);
+  fill($('replan'), `${last.revision} ${last.wall}`, () => [...planNodes(last, seen),
+    ...(changed && changed !== last
+      ? [make('h3', 'The last that changed something'), ...planNodes(changed, seen)] : [])]);
+  fill($('replans'), `${seen.plans.length} ${last.wall}`, () =>
+    seen.plans.slice(-21, -1).reverse().map(plan => {
+      const item = make('li'), uavs = plan.changes.map(row => row.uav);
+      item.append(make('time', stamp(plan.wall)), ` plan ${plan.revision}: ${plan.trigger}: `
+        + (uavs.length ? `changed ${some(uavs, 4)}` : 'nothing changed'));
+      return item;
+    }));
+}
+
+// lists
+
+export function showLeft(seen) {
+  const groups = new Map();
+  for (const id of seen.ids) {
+    if (!['left', 'wait'].includes(kindOf(id, seen))) continue;
+    const [state, , reason] = stateOf(id, seen);
+    const why = reason || (state === 'PENDING' ? 'waits for the next plan' : state.toLowerCase());
+    groups.set(why, [...(groups.get(why) || []), id]);
+  }
+  put($('left-count'), String([...groups.values()].reduce((sum, ids) => sum + ids.length, 0)));
+  fill($('left'), JSON.stringify([...groups]), () => groups.size
+    ? [...groups].map(([why, ids]) => {
+      const item = make('li');
+      item.append(...ids.slice(0, 12).flatMap((id, k) => [k ? ', ' : '', taskButton(id)]),
+        ids.length > 12 ? ` and ${ids.length - 12} more: ` : ': ', make('span', why, 'bad'));
+      return item;
+    }) : [make('li', 'Every task has a UAV.', 'none')]);
+}
+
+function uavNode(uav, open) {
+  const node = make('details'), summary = make('summary'), name = make('b', uav.id);
+  name.style.borderColor = colour(uav.index);
+  summary.append(name, ...Array.from({length: 4}, () => make('span')));
+  node.append(summary, make('ol'));
+  node.open = open;
+  node.addEventListener('toggle', () => node.dispatchEvent(new Event('input', {bubbles: true})));
+  return node;
+}
+
+function showUav(node, uav, done, seen) {
+  const list = seen.lists.get(uav.id), board = list.length && ON_BOARD[uav.mission];
+  const [, words, link, battery, count] = node.firstChild.children, rows = node.lastChild;
+  put(words, uav.words);
+  put(link, uav.link, uav.silent || uav.health ? 'bad' : 'good');
+  put(battery, uav.battery == null ? '' : `battery ${Math.round(100 * uav.battery)} %`);
+  put(count, `${done} done, ${list.length} to fly${board ? `, ${board}` : ''}`);
+  if (!node.open) return;
+  fill(rows, JSON.stringify(list.map(task => task.id)), () => list.slice(0, MOST).map(task => {
+    const item = make('li');
+    item.append(taskButton(task.id), ' ', make('span'));
+    return item;
+  }));
+  [...rows.children].forEach((item, k) => {
+    const left = list[k].at === null ? null : until(list[k].at, seen);
+    put(item.lastChild, left === null ? '' : left <= 0 ? 'due' : `in ${span(left)}`);
+  });
+}
+
+export function showUavs(seen) {
+  if (!seen.uavs.length) return;
+  const done = new Map(), few = seen.uavs.length <= 8;
+  for (const [state, uav] of seen.statuses.values()) {
+    if (state === 'COMPLETED') done.set(uav, (done.get(uav) || 0) + 1);
+  }
+  fill($('uavs'), JSON.stringify(seen.uavs.map(uav => uav.id)),
+    () => seen.uavs.map(uav => uavNode(uav, few)));
+  seen.uavs.forEach((uav, k) => showUav($('uavs').children[k], uav, done.get(uav.id) || 0, seen));
+}
+
+export function showEvents(seen) {
+  const last = seen.events.at(-1);
+  fill($('events'), last ? `${seen.events.length} ${last.wall}` : '', () =>
+    seen.events.slice(-MOST).reverse().map(event => {
+      const item = make('li');
+      item.append(make('time', stamp(event.wall)),
+        make('span', event.text, KINDS[event.kind] || ''));
+      return item;
+    }));
+}
