@@ -184,7 +184,7 @@ class PlayerParams(Checked):
 
 @dataclass(frozen=True)
 class LiveViewParams(Checked):
-    """live_view: shows the progress of a fleet in the terminal, records it, ends with it."""
+    """live_view: shows a fleet in the terminal and the browser, records it, ends with it."""
 
     scenario: str = param('', 'Scenario that is played; empty: unknown, and no end.', fixed=True)
     speedup: float = param(1.0, 'How many times faster than real time.', low=0.1, high=100.0,
@@ -192,6 +192,11 @@ class LiveViewParams(Checked):
     out_dir: str = param('', 'Folder to record into; empty: nothing is recorded.', fixed=True)
     settle: float = param(10.0, 'Quiet time of the scenario after which a fleet is done.',
                           low=0.0, high=3600.0, unit='s', fixed=True)
+    page: bool = param(True, 'Whether there is a page in the browser.', fixed=True)
+    host: str = param('127.0.0.1', 'Address the page is served on; 0.0.0.0: to the whole network, '
+                      'without password.', fixed=True)
+    port: int = param(8088, 'Port of the page; 0: any free one, told at the start.', low=0,
+                      high=65535, fixed=True)
 
 
 NODES: dict[str, type[Checked]] = {

@@ -2,6 +2,9 @@
 """live_view as a process: it shows, records, and ends when the scenario is over."""
 import json
 import math
+import re
+import socket
+import urllib.request
 
 import pytest
 from builtin_interfaces.msg import Duration
@@ -49,7 +52,7 @@ def test_it_shows_records_and_ends_when_all_is_settled(start, probe, tmp_path):
     path = tmp_path / 'play.yaml'
     path.write_text(TEXT)
     view = start('live_view', '-p', f'scenario:={path}', '-p', f'out_dir:={tmp_path}/out',
-                 '-p', 'speedup:=10.0', '-p', 'settle:=5.0')
+                 '-p', 'speedup:=10.0', '-p', 'settle:=5.0', '-p', 'port:=0')
     tasks = probe.publisher(m.TaskAnnouncement, 'task_announcements', ANNOUNCEMENTS)
     told = probe.publisher(m.TaskStatusArray, 'task_statuses', LATCHED)
     states = probe.publisher(m.UavState, 'uav_states', STATES)
@@ -78,14 +81,52 @@ def test_it_shows_records_and_ends_when_all_is_settled(start, probe, tmp_path):
     assert said.uploads == 1
 
 
+def test_the_page_shows_what_the_node_hears(start, probe):
+    view = start('live_view', '-p', 'port:=0')
+    tasks = probe.publisher(m.TaskAnnouncement, 'task_announcements', ANNOUNCEMENTS)
+    states = probe.publisher(m.UavState, 'uav_states', STATES)
+    told = probe.publisher(m.ThreatZoneArray, 'threat_zones', LATCHED)
+    bad = m.ThreatZoneArray(zones=[m.ThreatZone(zone_id='no zone')])
+    bad.zones += from_zones([ThreatZone.hemisphere('z1', (1.0, 2.0, 3.0), 4.0)], 0.0).zones
+    tasks.publish(ADD)
+    told.publish(bad)
+    address = re.search(r'Live page: (http://127\.0\.0\.1:\d+/)', view.output()).group(1)
+    def parts():
+        states.publish(state())
+        states.publish(m.UavState(uav_id='no topic can be named so'))
+        with urllib.request.urlopen(f'{address}at?wall=9e9', timeout=10) as answer:
+            return json.load(answer)['parts']
+
+    probe.until(lambda: {'tasks', 'uavs', 'zones'} <= parts().keys())
+    probe.publisher(m.TaskList, 'uav_1/task_list', LATCHED).publish(m.TaskList(
+        uav_id='uav_1', revision=7, tasks=[m.PlannedTask(task=ADD.tasks[0])]))
+    probe.until(lambda: 'list uav_1' in parts())
+    got = parts()
+    assert got['tasks'] == {'t1': [10.0, 20.0, 30.0]}
+    assert [zone['id'] for zone in got['zones']] == ['z1']
+    assert list(got['uavs']) == ['uav_1']
+    assert [task['id'] for task in got['list uav_1']['tasks']] == ['t1']
+    assert view.stop()[0] == 0
+
+
+def test_a_port_in_use_is_told_and_the_node_goes_on(start, probe):
+    with socket.create_server(('127.0.0.1', 0)) as taken:
+        port = taken.getsockname()[1]
+        view = start('live_view', '-p', f'port:={port}')
+        probe.until(lambda: '0 of 0 tasks' in view.output())
+    assert f'no live page: host = 127.0.0.1, port = {port}: ' in view.output()
+    assert view.stop()[0] == 0
+
+
 def test_without_a_scenario_it_goes_on_until_it_is_stopped(start, probe):
-    view = start('live_view')
+    view = start('live_view', '-p', 'page:=false')
     states = probe.publisher(m.UavState, 'uav_states', STATES)
 
     def shown():
         states.publish(state())
         return '0 of 0 tasks' in view.output()
     probe.until(shown)
+    assert 'page' not in view.output()
     assert view.stop()[0] == 0
 
 
@@ -110,8 +151,10 @@ def test_a_bad_task_of_an_announcement_is_left_out():
     assert [task['id'] for task in recorder.announced(bad, ORIGIN)['tasks']] == ['t1']
 
 
-def test_only_the_uploads_are_taken_from_the_diagnostics():
-    status = DiagnosticStatus(name='mavlink_bridge: uav_1', values=[
-        KeyValue(key='uploads', value='4'), KeyValue(key='rate', value='10')])
+def test_uploads_and_health_are_taken_from_the_diagnostics():
+    status = DiagnosticStatus(
+        level=b'\1', name='mavlink_bridge: uav_1', message='link stale', hardware_id='uav_1',
+        values=[KeyValue(key='uploads', value='4'), KeyValue(key='rate', value='10')])
     assert recorder.uploads(DiagnosticArray(status=[status])) == {
-        'kind': 'uploads', 'uploads': {'mavlink_bridge: uav_1': 4}}
+        'kind': 'uploads', 'uploads': {'mavlink_bridge: uav_1': 4},
+        'health': {'uav_1': [1, 'link stale']}}

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Shows the progress of a fleet in the terminal, records it, and ends when a scenario is over."""
+"""Shows a fleet in the terminal and in the browser, records it, ends when a scenario is over."""
 from __future__ import annotations
 
 import json
@@ -15,6 +15,9 @@ from rclpy.node import Node
 from uav_task_alloc_msgs import msg as m
 
 from uav_task_alloc import scenario
+from uav_task_alloc.live.board import Board
+from uav_task_alloc.live.scene import Scene
+from uav_task_alloc.model import is_ros_name
 from uav_task_alloc.nodes import recorder
 from uav_task_alloc.nodes.messages import ANNOUNCEMENTS, LATCHED, STATES
 from uav_task_alloc.nodes.parameters import declare
@@ -37,12 +40,14 @@ class LiveView(Node):
         self.played = scenario.load(self.params.scenario) if self.params.scenario else None
         self.origin = self.played.origin if self.played else scenario.values.DEFAULT_ORIGIN
         self.heard = Heard()
+        self.scene, self.board = Scene(self.heard), Board()
         self.file = self._open()
         self.finished = False
         self.quiet_since: float | None = None  # [s] of the scenario
         self.shown = 0  # lines to write over
         self.refreshes = 0
         self.take({'wall': time.time(), 'kind': 'run', 'speedup': self.params.speedup})
+        self.server = self._serve()
         self.listen()
         self.create_timer(REFRESH, self.refresh)
 
@@ -69,6 +74,8 @@ class LiveView(Node):
 
     def on_state(self, msg: m.UavState) -> None:
         """Record a state where something but the position is new, else twice a second."""
+        if not is_ros_name(msg.uav_id):
+            return  # has no topic of lists; the allocator says what is wrong with it
         if msg.uav_id not in self.heard.lists:
             self.follow(msg.uav_id)
         line = {'wall': time.time(), **recorder.state(msg)}
@@ -84,7 +91,7 @@ class LiveView(Node):
 
     def take(self, line: recorder.Body) -> None:
         """Fold a line into what is known, and write it down."""
-        self.heard.take(line)
+        self.scene.take(line)
         if self.file:
             self.file.write(json.dumps(line) + '\n')
 
@@ -97,8 +104,15 @@ class LiveView(Node):
             self.quiet_since = clock if self.quiet_since is None else self.quiet_since
             self.finished = clock - self.quiet_since >= self.params.settle
         self.show(clock)
+        self.post()
         if self.file:
             self.file.flush()
+
+    def post(self) -> None:
+        """Put what is new on the page."""
+        wall = time.time()
+        times = {'start': self.heard.start(), 'speedup': self.heard.speedup, 'live': True}
+        self.board.put(wall, times, *self.scene.news(wall))
 
     def clock(self) -> float:
         """Scenario time [s]: since the first task was announced."""
@@ -125,8 +139,25 @@ class LiveView(Node):
         folder.mkdir(parents=True, exist_ok=True)
         return (folder / FILE).open('w', encoding='utf-8')
 
+    def _serve(self) -> Any:
+        """The page in the browser; None, and a word why, where there can be none."""
+        if not self.params.page:
+            return None
+        try:
+            from uav_task_alloc.live.server import Server
+            server = Server(self.board, self.params.host, self.params.port)
+        except (OSError, ImportError) as error:
+            self.get_logger().warning(
+                f'no live page: host = {self.params.host}, port = {self.params.port}: {error}')
+            return None
+        server.start()
+        print(f'Live page: {server.address}', flush=True)
+        return server
+
     def destroy_node(self) -> None:
-        """Close the record first."""
+        """End the page, close the record."""
+        if self.server:
+            self.server.stop()
         if self.file:
             self.file.close()
             self.file = None
