@@ -90,3 +90,29 @@ def test_a_link_is_stale_after_three_seconds_lost_after_ten_and_back(kind):
     bench.run(look, 3.0)
     assert levels == [(0, 'mission VERIFIED'), (1, 'link stale'), (3, 'link lost'),
                       (0, 'mission VERIFIED')]
+
+
+@BOTH
+def test_an_upload_tells_how_far_it_is_and_about_when_it_ends(kind):
+    bench = FlightBench(kind, takeoff=False, delay=(0.1, 0.1), tick=0.05).found()
+    assert bench.run(lambda: bench.board().held is not None)
+    bench.assign(task_list('ABCDEFGHIJKLMNOPQRST'))
+    seen = []
+
+    def look():
+        _, line, facts = facts_of(bench.ground.served[1], bench.now)
+        assert facts['upload'] == 'none' or facts['upload'] in line
+        if not seen or seen[-1][1] != facts['upload']:
+            seen.append((bench.now, facts['upload']))
+        return bench.state().mission_state is MissionState.VERIFIED
+    assert bench.run(look)
+    count = 20 + bench.board().own
+    steps = [text.partition(',')[0] for _, text in seen]
+    assert steps[-1] == 'none'
+    parts = [f'sent {n} of {count} items' for n in range(1, count + 1)]
+    parts += [f'read back {n} of {count} items' for n in range(1, count)]
+    assert [part for part in parts if part not in steps] == []
+    guesses = [(now, float(text.split('about ')[1].split()[0])) for now, text in seen
+               if text.startswith(f'sent {count // 2} of') and 'about' in text]
+    now, left = guesses[0]
+    assert abs(left - (bench.now - now)) < 0.3 * (bench.now - now) + 1.0

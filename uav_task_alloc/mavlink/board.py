@@ -86,6 +86,18 @@ class Board:
     def state(self) -> MissionState:
         return MissionState.UPLOADING if self._uploading is not None else self._state
 
+    def upload_progress(self, now: float) -> str:
+        """How far the upload is and how long it still takes, in words; '' where there is none."""
+        sent, read, count = self.upload.progress
+        if count == 0:
+            return ''
+        text = f'read back {read}' if read else f'sent {sent}'
+        text += f' of {count} items'
+        done, passed = sent + read, now - self._began_at
+        if done == 0 or passed <= 0.0:
+            return text
+        return f'{text}, about {passed * (2 * count - done) / done:.0f} s left'
+
     @property
     def open(self) -> bool:
         """A transfer runs, and the vehicle has not taken all of it."""

@@ -137,6 +137,9 @@ def facts_of(served: Served, now: float) -> tuple[int, str, dict[str, str]]:
         level, line = 1, 'mission FOREIGN'
     else:
         level, line = 0, f'mission {state.name}'
+    progress = board.upload_progress(now)
+    if progress and level < 3:
+        line += f', {progress}'
     if pilot.helm.waits_for and level < 3:
         line += f', waits for {pilot.helm.waits_for}'
     return level, line, {
@@ -144,5 +147,6 @@ def facts_of(served: Served, now: float) -> tuple[int, str, dict[str, str]]:
         'mode': mode_of(pilot).name, 'mission': state.name,
         'list_revision': str(board.revision), 'epoch': str(board.progress.epoch),
         'item': f'{board.progress.current} of {len(board.progress.items)}',
-        'uploads': str(board.upload.uploads), 'restarts': str(telemetry.restarts),
+        'upload': progress or 'none', 'uploads': str(board.upload.uploads),
+        'restarts': str(telemetry.restarts),
         'silent_for': f'{now - telemetry.heard_at:.1f} s', 'strays': str(served.strays)}

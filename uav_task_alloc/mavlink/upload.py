@@ -105,6 +105,16 @@ class Upload:
     def busy(self) -> bool:
         return self.state is not State.IDLE
 
+    @property
+    def progress(self) -> tuple[int, int, int]:
+        """Items sent, items read back, and items of the mission; all 0 where none is uploaded."""
+        if self._mission is None or not self.busy:
+            return 0, 0, 0
+        count = len(self._mission.items)
+        if self.state is State.READING and self._readback is not None:
+            return count, min(count, len(self._readback.items)), count
+        return 0 if self._asked is None else self._asked + 1, 0, count
+
     def replace(self, mission: Mission, now: float) -> list[Message]:
         """Upload this; a transfer that runs ends first, and of many only the latest follows."""
         self._pending = mission
