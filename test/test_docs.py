@@ -7,6 +7,7 @@ import os
 import re
 import shutil
 import signal
+import socket
 import subprocess
 import sys
 import time
@@ -33,11 +34,20 @@ def needs_ros(text):
     return 'ros2 ' in text or 'rclpy' in text
 
 
+def free_port(kind):
+    with socket.socket(socket.AF_INET, kind) as probe:
+        probe.bind(('127.0.0.1', 0))
+        return probe.getsockname()[1]
+
+
 class Place:
-    """A folder like the repository in which what a page says is done; it is thrown away."""
+    """A folder like the repository in which what a page says is done; it is thrown away.
+
+    Ports that a page names are replaced by free ones, so that two runs do not meet.
+    """
 
     def __init__(self, folder, stack):
-        self.folder, self.stack = folder, stack
+        self.folder, self.stack, self.ports = folder, stack, {}
         self.env = {**os.environ, 'PYTHONPATH': f'{ROOT}:{os.environ.get("PYTHONPATH", "")}',
                     'PATH': f'{folder / ".bin"}:{os.environ["PATH"]}', 'PYTHONUNBUFFERED': '1'}
         for path in ROOT.iterdir():
@@ -62,6 +72,10 @@ class Place:
         self.env |= {'ROS_DOMAIN_ID': str(number), 'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST',
                      'FASTRTPS_DEFAULT_PROFILES_FILE': str(quick)}
 
+    def _own_port(self, match):
+        kind = socket.SOCK_STREAM if match[1] == 'port:=' else socket.SOCK_DGRAM
+        return match[1] + str(self.ports.setdefault(match[2], free_port(kind)))
+
     def do(self, block):
         """What the mark and the language of a block ask for."""
         if block.mark == 'file':
@@ -74,7 +88,8 @@ class Place:
             (self.folder / '.snippet.py').write_text(block.text)
             self.run(block, [sys.executable, '.snippet.py'])
         elif block.language == 'bash':
-            words = ['bash', '-euo', 'pipefail', '-c', block.text]
+            text = re.sub(r'(port:=|127\.0\.0\.1:)(\d+)', self._own_port, block.text)
+            words = ['bash', '-euo', 'pipefail', '-c', text]
             (self.start if block.mark == 'until' else self.run)(block, words)
 
     def run(self, block, words):
