@@ -12,7 +12,9 @@ from launch import LaunchDescription
 
 
 def generate_launch_description() -> LaunchDescription:
-    """Arguments: scenario (a YAML file), speedup, rviz (true: show it there too)."""
+    """Arguments: scenario (a YAML file), speedup, rviz (true: show it there too), record
+    (an MCAP file for all topics).
+    """
     share = FindPackageShare('uav_task_alloc')
     scenario = LaunchConfiguration('scenario')
     played = {'scenario': scenario,
@@ -27,11 +29,12 @@ def generate_launch_description() -> LaunchDescription:
             [share, 'config', 'scenarios', 'demo.yaml'])),
         DeclareLaunchArgument('speedup', default_value='8.0'),
         DeclareLaunchArgument('rviz', default_value='false'),
+        DeclareLaunchArgument('record', default_value=''),
         node('allocator'),
         node('mavlink_bridge', takeoff=True),
         node('fleet_sim', **played),
         node('scenario_player', **played),
-        node('live_view'),
+        node('live_view', record=ParameterValue(LaunchConfiguration('record'), value_type=str)),
         IncludeLaunchDescription(
             PythonLaunchDescriptionSource(
                 PathJoinSubstitution([share, 'launch', 'rviz.launch.py'])),

@@ -3,18 +3,21 @@
 from launch.actions import DeclareLaunchArgument, IncludeLaunchDescription
 from launch.conditions import IfCondition
 from launch.launch_description_sources import PythonLaunchDescriptionSource
-from launch.substitutions import LaunchConfiguration, PathJoinSubstitution
+from launch.substitutions import LaunchConfiguration, NotEqualsSubstitution, PathJoinSubstitution
 from launch_ros.actions import Node
+from launch_ros.parameter_descriptions import ParameterValue
 from launch_ros.substitutions import FindPackageShare
 
 from launch import LaunchDescription
 
 
 def generate_launch_description() -> LaunchDescription:
-    """Arguments: namespace, allocator_params, bridge_params, rviz (true: show it there too)."""
+    """Arguments: namespace, allocator_params, bridge_params, rviz (true: show it there too),
+    record (an MCAP file for all topics; a live view records it).
+    """
     share = FindPackageShare('uav_task_alloc')
     config = [share, 'config']
-    namespace = LaunchConfiguration('namespace')
+    namespace, record = LaunchConfiguration('namespace'), LaunchConfiguration('record')
     return LaunchDescription([
         DeclareLaunchArgument('namespace', default_value=''),
         DeclareLaunchArgument('allocator_params',
@@ -22,10 +25,14 @@ def generate_launch_description() -> LaunchDescription:
         DeclareLaunchArgument('bridge_params', default_value=PathJoinSubstitution(
             [*config, 'mavlink_bridge.yaml'])),
         DeclareLaunchArgument('rviz', default_value='false'),
+        DeclareLaunchArgument('record', default_value=''),
         Node(package='uav_task_alloc', executable='allocator', namespace=namespace,
              output='screen', parameters=[LaunchConfiguration('allocator_params')]),
         Node(package='uav_task_alloc', executable='mavlink_bridge', namespace=namespace,
              output='screen', parameters=[LaunchConfiguration('bridge_params')]),
+        Node(package='uav_task_alloc', executable='live_view', namespace=namespace,
+             output='screen', parameters=[{'record': ParameterValue(record, value_type=str)}],
+             condition=IfCondition(NotEqualsSubstitution(record, ''))),
         IncludeLaunchDescription(
             PythonLaunchDescriptionSource(
                 PathJoinSubstitution([share, 'launch', 'rviz.launch.py'])),

@@ -13,6 +13,8 @@ ROOMS = {
     'pymavlink': ('mavlink/',),
     'matplotlib': ('plots', 'report', 'study/'),
     'mavsdk': (),
+    'mcap': ('record/',),
+    'mcap_ros2': ('record/',),
     'aiohttp': ('live/',),
     'pymap3d': ('geometry/',),
     'numba': ('geometry/', 'solver/'),

@@ -190,6 +190,8 @@ class LiveViewParams(Checked):
     speedup: float = param(1.0, 'How many times faster than real time.', low=0.1, high=100.0,
                            fixed=True)
     out_dir: str = param('', 'Folder to record into; empty: nothing is recorded.', fixed=True)
+    record: str = param('', 'MCAP file for every topic of the fleet, also as `--record FILE`; '
+                        'empty: none.', fixed=True)
     settle: float = param(10.0, 'Quiet time of the scenario after which a fleet is done.',
                           low=0.0, high=3600.0, unit='s', fixed=True)
     page: bool = param(True, 'Whether there is a page in the browser.', fixed=True)

@@ -64,6 +64,7 @@ def free_port() -> int:
 def start_nodes(args: argparse.Namespace, out: Path) -> list[Child]:
     """All nodes of the scenario; the last one is the live view, which ends when all is done."""
     scenario, port = load(args.scenario), free_port()
+    record = str(args.record or '')
     origin = {'origin__latitude': scenario.origin.latitude,
               'origin__longitude': scenario.origin.longitude,
               'origin__altitude_amsl': scenario.origin.altitude_amsl}
@@ -77,7 +78,7 @@ def start_nodes(args: argparse.Namespace, out: Path) -> list[Child]:
         Child.start('fleet_sim', out, target=f'127.0.0.1:{port}',
                     log_file=str(out / 'flight.jsonl'), **played),
         Child.start('scenario_player', out, wait_for_plan=True, **played),
-        Child.start('live_view', out, show=True, out_dir=str(out), **played),
+        Child.start('live_view', out, show=True, out_dir=str(out), record=record, **played),
     ]
 
 
@@ -136,6 +137,8 @@ def main(argv: list[str] | None = None) -> int:
     parser.add_argument('--speedup', type=float, default=8.0)
     parser.add_argument('--out', type=Path, default=Path('out/demo'))
     parser.add_argument('--limit', type=float, default=80.0, help='[s] of wall time')
+    parser.add_argument('--record', type=Path, metavar='FILE',
+                        help='MCAP file for all topics; `report FILE` draws the mission from it')
     args = parser.parse_args(argv)
     # fleets of several demos on one machine, or on the network, must not hear each other
     os.environ.setdefault('ROS_DOMAIN_ID', str(1 + os.getpid() % 100))

@@ -7,6 +7,7 @@ import shutil
 import sys
 import time
 from collections.abc import Callable
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -15,13 +16,14 @@ from rclpy.node import Node
 from uav_task_alloc_msgs import msg as m
 
 from uav_task_alloc import scenario
+from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.live.board import Board
 from uav_task_alloc.live.scene import Scene
 from uav_task_alloc.model import is_ros_name
 from uav_task_alloc.nodes import recorder
 from uav_task_alloc.nodes.messages import ANNOUNCEMENTS, LATCHED, STATES
 from uav_task_alloc.nodes.parameters import declare
-from uav_task_alloc.nodes.run import run
+from uav_task_alloc.nodes.run import run, with_flags
 from uav_task_alloc.params import LiveViewParams
 from uav_task_alloc.record.heard import FILE, Heard
 from uav_task_alloc.record.progress import fleet, headline, is_over
@@ -42,6 +44,7 @@ class LiveView(Node):
         self.heard = Heard()
         self.scene, self.board = Scene(self.heard), Board()
         self.file = self._open()
+        self.recorder = self._record()
         self.finished = False
         self.quiet_since: float | None = None  # [s] of the scenario
         self.shown = 0  # lines to write over
@@ -154,10 +157,27 @@ class LiveView(Node):
         print(f'Live page: {server.address}', flush=True)
         return server
 
+    def _record(self) -> Any:
+        """Everything into an MCAP file, where one is named."""
+        if not self.params.record:
+            return None
+        try:
+            from uav_task_alloc.nodes.bag_recorder import BagRecorder
+            recorder = BagRecorder(Path(self.params.record), self.get_namespace(), {
+                'speedup': str(self.params.speedup),
+                **{f'origin.{name}': str(value) for name, value in asdict(self.origin).items()}})
+        except (OSError, ImportError) as error:
+            raise InvalidValue('record', self.params.record,
+                               f'a file that can be written ({error})') from None
+        recorder.start()
+        return recorder
+
     def destroy_node(self) -> None:
-        """End the page, close the record."""
+        """End the page, close the records."""
         if self.server:
             self.server.stop()
+        if self.recorder:
+            self.recorder.stop()
         if self.file:
             self.file.close()
             self.file = None
@@ -166,4 +186,4 @@ class LiveView(Node):
 
 def main(args: list[str] | None = None) -> None:
     """Run the node."""
-    run(LiveView, args)
+    run(LiveView, with_flags(args or sys.argv, 'record'))

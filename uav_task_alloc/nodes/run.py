@@ -2,6 +2,7 @@
 """Runs a node until SIGINT or SIGTERM, and stops it in good order with status 0."""
 from __future__ import annotations
 
+import json
 import signal
 import sys
 from collections.abc import Callable
@@ -13,6 +14,17 @@ from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import remove_ros_args
 
 from uav_task_alloc.errors import AllocError
+
+
+def with_flags(argv: list[str], *names: str) -> list[str]:
+    """`--record FILE` as `--ros-args -p record:=FILE`; for parameters that are text."""
+    head, given = list(argv), []
+    for name in names:
+        while f'--{name}' in head[:-1]:
+            k = head.index(f'--{name}')
+            given += ['-p', f'{name}:={json.dumps(head[k + 1])}']
+            del head[k:k + 2]
+    return [*head, '--ros-args', *given, '--'] if given else head
 
 
 def run(make_node: Callable[[], Node], args: list[str] | None = None, threads: int = 1) -> None:

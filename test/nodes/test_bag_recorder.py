@@ -1,0 +1,127 @@
+# SPDX-License-Identifier: Apache-2.0
+"""live_view --record: what was on the topics is in the file, for readers that are not ours."""
+import signal
+
+import pytest
+from mcap.exceptions import EndOfFile
+from mcap.reader import NonSeekingReader, make_reader
+from mcap_ros2.decoder import DecoderFactory
+from nav_msgs.msg import Path as PathMsg
+from uav_task_alloc_msgs import msg as m
+
+from uav_task_alloc.model import Task
+from uav_task_alloc.nodes import definitions
+from uav_task_alloc.nodes.messages import (
+    ANNOUNCEMENTS,
+    EVENTS,
+    LATCHED,
+    STATES,
+    announcement,
+    header,
+)
+from uav_task_alloc.nodes.run import with_flags
+
+pytestmark = pytest.mark.ros
+ADD = announcement(m.TaskAnnouncement.ADD, [Task('t1', (10.0, 20.0, 30.0), value=4.0)], 5.0)
+LIST = m.TaskList(header=header(7.0), uav_id='uav_1', revision=3)
+
+
+def fleet(probe):
+    """Latched topics before the recorder is there, and others; publishes as long as asked."""
+    latched = [(probe.node.create_publisher(m.TaskAnnouncement, 'task_announcements',
+                                            ANNOUNCEMENTS), ADD),
+               (probe.node.create_publisher(m.TaskList, 'uav_1/task_list', LATCHED), LIST),
+               (probe.node.create_publisher(PathMsg, 'uav_1/path', LATCHED),
+                PathMsg(header=header(7.0)))]
+    for publisher, message in latched:
+        publisher.publish(message)
+    return probe.node.create_publisher(m.UavState, 'uav_states', STATES)
+
+
+def test_every_topic_is_recorded_with_its_type_and_times(start, probe, tmp_path):
+    states, path = fleet(probe), tmp_path / 'run.mcap'
+    view = start('live_view', '-p', f'record:={path}', '-p', 'speedup:=4.0')
+    events = probe.publisher(m.TaskEvent, 'task_events', EVENTS)
+    events.publish(m.TaskEvent(header=header(8.0), task_id='t1', uav_id='uav_1', revision=3))
+    probe.until(lambda: len(probe.node.get_subscriptions_info_by_topic('/uav_1/path')) == 1)
+    size = path.stat().st_size
+
+    def on_disk():
+        states.publish(m.UavState(header=header(11.0), uav_id='uav_1', battery=0.5))
+        return path.stat().st_size > size
+    probe.until(on_disk)
+    view.stop()
+    with open(path, 'rb') as file:
+        reader = make_reader(file, decoder_factories=[DecoderFactory()], validate_crcs=True)
+        summary = reader.get_summary()
+        assert reader.get_header().profile == 'ros2'
+        assert next(reader.iter_metadata()).metadata['speedup'] == '4.0'
+        rows = list(reader.iter_decoded_messages())
+    assert summary.statistics.message_count == len(rows) > 5
+    assert summary.chunk_indexes
+    for row in rows:
+        assert 0 < row.message.publish_time <= row.message.log_time
+        assert row.message.log_time < row.message.publish_time + 60e9
+        assert row.channel.message_encoding == 'cdr'
+    said = {row.channel.topic: row.decoded_message for row in rows}
+    assert {'/task_announcements', '/uav_1/task_list', '/uav_1/path', '/task_events',
+            '/uav_states'} <= said.keys()
+    task, = said['/task_announcements'].tasks
+    assert (task.task_id, task.position.y, task.value) == ('t1', 20.0, 4.0)
+    assert said['/uav_1/task_list'].revision == 3
+    assert said['/uav_states'].header.stamp.sec == 11
+    assert said['/task_events'].uav_id == 'uav_1'
+
+
+def test_what_a_killed_recorder_had_on_disk_can_be_read(start, probe, tmp_path):
+    fleet(probe)
+    path = tmp_path / 'run.mcap'
+    view = start('live_view', '-p', f'record:={path}')
+    probe.until(lambda: path.exists() and path.stat().st_size > 3000)  # a first chunk
+    view.stop(signal.SIGKILL)
+    found = set()
+
+    def read():
+        with open(path, 'rb') as file:
+            for _, channel, _ in NonSeekingReader(file).iter_messages(log_time_order=False):
+                found.add(channel.topic)
+    with pytest.raises(EndOfFile):
+        read()
+    assert '/task_announcements' in found
+
+
+def test_a_file_that_is_there_or_cannot_be_is_refused_in_words(start, tmp_path):
+    (tmp_path / 'old.mcap').write_text('flight of yesterday')
+    for name, text in (('old.mcap', 'a file that is not there yet'),
+                       ('old.mcap/x', 'a file that can be written (')):
+        view = start('live_view', '-p', f'record:={tmp_path}/{name}')
+        view.popen.wait(20)
+        code, out = view.stop()
+        assert (code, text in out, 'Traceback' in out) == (1, True, False), out
+    assert (tmp_path / 'old.mcap').read_text() == 'flight of yesterday'
+
+
+def test_a_definition_holds_all_a_message_is_made_of():
+    text = definitions.definition('uav_task_alloc_msgs/msg/TaskList')
+    parts = text.split(definitions.RULE + '\nMSG: ')
+    assert [part.split()[0] for part in parts[1:]] == [
+        'std_msgs/Header', 'uav_task_alloc_msgs/PlannedTask', 'geometry_msgs/Point',
+        'builtin_interfaces/Time', 'uav_task_alloc_msgs/Task', 'builtin_interfaces/Duration']
+
+
+@pytest.mark.parametrize(('line', 'types'), [
+    ('Task[] tasks  # all', ['p/msg/Task']), ('string<=9 name', []), ('uint8 ADD=0', []),
+    ('# Task task', []), ('geometry_msgs/Point[3] p', ['geometry_msgs/msg/Point']),
+    ('float64[<=3] x', []), ('Task task', ['p/msg/Task']), ('', [])])
+def test_the_types_of_fields_are_found(line, types):
+    assert definitions.used(line, 'p') == types
+
+
+@pytest.mark.parametrize(('argv', 'ros'), [
+    (['x'], ['x']),
+    (['x', '--record', 'a b'], ['x', '--ros-args', '-p', 'record:="a b"', '--']),
+    (['x', '--record', 'f', '--ros-args', '-p', 'a:=1'],
+     ['x', '--ros-args', '-p', 'a:=1', '--ros-args', '-p', 'record:="f"', '--']),
+    (['x', '--record'], ['x', '--record'])])
+def test_a_flag_becomes_a_parameter(argv, ros):
+    assert with_flags(argv, 'record') == ros
