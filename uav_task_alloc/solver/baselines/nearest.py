@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from uav_task_alloc.solver import routes as of
-from uav_task_alloc.solver.insertion import place_all
+from uav_task_alloc.solver.baselines.ways import place_rest
 from uav_task_alloc.solver.kernel import kernel
 from uav_task_alloc.solver.recorder import Recorder
 from uav_task_alloc.solver.routes import Arrays, Routes, insert, lengthened, step
@@ -43,8 +43,6 @@ def solve(recorder: Recorder, seed: int, learnt: object = None) -> None:
     routes = of.empty_routes(a)
     while give_nearest(a, routes) and not recorder.over():
         pass
-    left = np.flatnonzero(routes.on[a.uavs:a.ends] < 0) + a.uavs
-    if left.size:
-        place_all(a, routes, left)
+    place_rest(a, routes)
     recorder.offer(routes)
     recorder.count()

@@ -16,11 +16,14 @@ paper are settled:
 - 2.14 does not say where the ranking coefficients enter: they scale alpha.
 - The reward is k / fit at every step; as k has no scale, it is in units of the best fit so far.
 - fit is eq 2.12; where ranges do not suffice, what is left out counts as way at its price.
+- A plan that is recorded gets the tasks that its bee could not reach where they fit, as all plans
+  of this package serve what can be served; the bee is judged, and learnt from, without.
 - The paper prints no parameters: those of `Settings` are this file's own.
 An iteration is a generation: every bee flies once.
 """
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -30,6 +33,7 @@ from numpy.typing import NDArray
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.solver import routes as of
 from uav_task_alloc.solver.baselines.judging import judged
+from uav_task_alloc.solver.baselines.ways import place_rest
 from uav_task_alloc.solver.chance import Chance, chance, uniform
 from uav_task_alloc.solver.kernel import kernel, part
 from uav_task_alloc.solver.recorder import Recorder
@@ -60,12 +64,13 @@ class Chains(NamedTuple):
     task: Floats  # (n, n, n) of X2
 
 
-class Bee(NamedTuple):
-    """What a bee flew; the first steps of X1 and X2 that it could make."""
+class Swarm(NamedTuple):
+    """What each bee flew, and what its routes came to."""
 
-    routes: Routes
-    uavs: Ints  # (n) X1
-    tasks: Ints  # (n) X2
+    uavs: Ints  # (bees, n) X1
+    tasks: Ints  # (bees, n) X2
+    steps: Ints  # (bees) how many of them it could make
+    sums: Floats  # (bees, 5) as in Routes
 
 
 class Scratch(NamedTuple):
@@ -126,9 +131,10 @@ def _open_tasks(a: Arrays, r: Routes, u: int, open_: NDArray[np.bool_]) -> None:
 
 
 @kernel
-def fly(a: Arrays, bee: Bee, q: Chains, greedy_rate: float, scratch: Scratch, rng: Chance) -> int:
+def fly(a: Arrays, r: Routes, uavs: Ints, tasks: Ints, q: Chains, greedy_rate: float,
+        scratch: Scratch, rng: Chance) -> int:
     """One bee makes its chains; returns how many steps it made. O(n (n + m))."""
-    of.clear(a, bee.routes)
+    of.clear(a, r)
     u, t = 0, 0  # there is no choice before the first: its tables have one row that counts
     for i in range(a.price.size):
         scratch.may_fly[:] = True
@@ -136,19 +142,37 @@ def fly(a: Arrays, bee: Bee, q: Chains, greedy_rate: float, scratch: Scratch, rn
             if not probabilities(q.uav[i, u], scratch.may_fly, scratch.p_uav):
                 return i
             v = _draw(scratch.p_uav, greedy_rate, rng)
-            _open_tasks(a, bee.routes, v, scratch.open)
+            _open_tasks(a, r, v, scratch.open)
             if probabilities(q.task[i, t], scratch.open, scratch.p_task):
                 break
             scratch.may_fly[v] = False
         u, t = v, _draw(scratch.p_task, greedy_rate, rng)
-        insert(a, bee.routes, a.uavs + t, bee.routes.prev[a.ends + u])
-        bee.uavs[i], bee.tasks[i] = u, t
+        insert(a, r, a.uavs + t, r.prev[a.ends + u])
+        uavs[i], tasks[i] = u, t
     return a.price.size
 
 
 @kernel
-def learn(q: Chains, bee: Bee, steps: int, reward: float, rate: float, gamma: float,
-          floor: float, unvisited: NDArray[np.bool_]) -> None:
+def fly_all(a: Arrays, r: Routes, swarm: Swarm, q: Chains, greedy_rate: float, scratch: Scratch,
+            rng: Chance) -> None:
+    """A generation; r is scratch."""
+    for b in range(swarm.steps.size):
+        swarm.steps[b] = fly(a, r, swarm.uavs[b], swarm.tasks[b], q, greedy_rate, scratch, rng)
+        for i in range(r.sums.size):
+            swarm.sums[b, i] = r.sums[i]
+
+
+@kernel
+def trace(a: Arrays, r: Routes, uavs: Ints, tasks: Ints, steps: int) -> None:
+    """Routes r become those that the chains say."""
+    of.clear(a, r)
+    for i in range(steps):
+        insert(a, r, a.uavs + tasks[i], r.prev[a.ends + uavs[i]])
+
+
+@kernel
+def learn(q: Chains, uavs: Ints, tasks: Ints, steps: int, reward: float, rate: float,
+          gamma: float, floor: float, unvisited: NDArray[np.bool_]) -> None:
     """Eq 2.6 and 2.13 along both chains of one bee; `rate` is alpha times its rank's (eq 2.14).
 
     O(n (n + m)); `unvisited` is scratch, (n).
@@ -156,7 +180,7 @@ def learn(q: Chains, bee: Bee, steps: int, reward: float, rate: float, gamma: fl
     unvisited[:] = True
     u, t = 0, 0
     for i in range(steps):
-        v, s = bee.uavs[i], bee.tasks[i]
+        v, s = uavs[i], tasks[i]
         unvisited[s] = False
         next_u, next_t = 0.0, 0.0
         if i + 1 < steps:
@@ -175,28 +199,32 @@ def learn(q: Chains, bee: Bee, steps: int, reward: float, rate: float, gamma: fl
 def solve(recorder: Recorder, seed: int, learnt: object = None,
           settings: Settings | None = None) -> None:
     """Generations of bees until the budget ends. Raises InvalidValue beyond MOST_TASKS."""
-    a, n, m = recorder.problem.arrays, len(recorder.problem.tasks), len(recorder.problem.uavs)
+    problem, known, rng = recorder.problem, settings or Settings(), chance(seed)
+    a, n, m = problem.arrays, len(problem.tasks), len(problem.uavs)
     if n > MOST_TASKS:
         raise InvalidValue('tasks', n, f'at most {MOST_TASKS} for paper_chain_q')
     if not n or not m:
         return
-    known, rng = settings or Settings(), chance(seed)
     q = Chains(np.full((n, m, m), FIRST), np.full((n, n, n), FIRST))
     scratch = Scratch(np.empty(m, np.bool_), np.empty(n, np.bool_), np.empty(m), np.empty(n))
-    bees = [Bee(of.empty_routes(a), np.zeros(n, np.int64), np.zeros(n, np.int64))
-            for _ in range(known.bees)]
-    coefficients = rank_coefficients(min(known.ranked, known.bees), known.decay)
-    best = np.inf
+    swarm = Swarm(np.zeros((known.bees, n), np.int64), np.zeros((known.bees, n), np.int64),
+                  np.zeros(known.bees, np.int64), np.empty((known.bees, 5)))
+    routes, best = of.empty_routes(a), math.inf
+    coefficients = rank_coefficients(min(known.ranked, known.bees), known.decay).tolist()
     while True:
-        steps = [fly(a, bee, q, known.greedy_rate, scratch, rng) for bee in bees]
-        fits = [judged(recorder.problem, bee.routes) for bee in bees]
-        best = min(best, *fits)
-        ranking = np.argsort(fits, kind='stable')  # the bidding: the better, the higher the rank
-        for coefficient, b in zip(coefficients, ranking, strict=False):  # eq 2.14
-            recorder.offer(bees[b].routes)
-            reward = known.k * best / fits[b] if fits[b] < np.inf else 0.0
-            learn(q, bees[b], steps[b], reward, known.alpha * float(coefficient), known.gamma,
-                  known.floor, scratch.open)
+        fly_all(a, routes, swarm, q, known.greedy_rate, scratch, rng)
+        fits = [judged(problem, sums) for sums in swarm.sums]
+        ranking = sorted(range(known.bees), key=fits.__getitem__)  # the bidding of the bees
+        if not recorder.history or fits[ranking[0]] < best:
+            best = fits[ranking[0]]
+            trace(a, routes, swarm.uavs[ranking[0]], swarm.tasks[ranking[0]],
+                  swarm.steps[ranking[0]])
+            place_rest(a, routes)
+            recorder.offer(routes)
+        for b, coefficient in zip(ranking, coefficients, strict=False):
+            reward = known.k * best / fits[b] if fits[b] < math.inf else 0.0
+            learn(q, swarm.uavs[b], swarm.tasks[b], swarm.steps[b], reward,
+                  known.alpha * coefficient, known.gamma, known.floor, scratch.open)  # eq 2.14
         recorder.count()
         if recorder.over():
             return

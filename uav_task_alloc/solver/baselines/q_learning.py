@@ -15,9 +15,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from uav_task_alloc.solver import routes as of
-from uav_task_alloc.solver.baselines.ways import all_ways
+from uav_task_alloc.solver.baselines.ways import all_ways, place_rest
 from uav_task_alloc.solver.chance import Chance, chance, uniform
-from uav_task_alloc.solver.insertion import place_all
 from uav_task_alloc.solver.kernel import kernel
 from uav_task_alloc.solver.recorder import Recorder
 from uav_task_alloc.solver.routes import Arrays, Floats, Routes, insert, lengthened, step
@@ -80,9 +79,7 @@ def solve(recorder: Recorder, seed: int, learnt: object = None,
     routes = of.empty_routes(a)
     while True:
         episode(a, routes, q, problem.scale, known.alpha, known.gamma, known.greedy_rate, rng)
-        left = np.flatnonzero(routes.on[a.uavs:a.ends] < 0) + a.uavs
-        if left.size:
-            place_all(a, routes, left)
+        place_rest(a, routes)
         recorder.offer(routes)
         recorder.count()
         if recorder.over():

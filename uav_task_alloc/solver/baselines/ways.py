@@ -55,7 +55,12 @@ def routes_of(problem: Problem, rows: Sequence[Sequence[int]]) -> Routes:
     bounds = np.cumsum([0, *(len(row) for row in rows)])
     nodes = np.array([a.uavs + t for row in rows for t in row], np.int64)
     replay(a, routes, nodes, bounds)
+    place_rest(a, routes)
+    return routes
+
+
+def place_rest(a: Arrays, routes: Routes) -> None:
+    """Put what is left out wherever it costs least, if it fits anywhere."""
     left = np.flatnonzero(routes.on[a.uavs:a.ends] < 0) + a.uavs
     if left.size:
         place_all(a, routes, left)
-    return routes
