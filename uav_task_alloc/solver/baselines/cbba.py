@@ -55,6 +55,7 @@ def solve(recorder: Recorder, seed: int, learnt: object = None,
         now += 1
         recorder.count()
     recorder.offer(routes_of(problem, agreed(agents)))
+    recorder.count()  # the round in which nobody had anything to tell
 
 
 def make_agents(problem: Problem, settings: Settings) -> list[Agent]:

@@ -6,7 +6,8 @@ Transactions on Robotics 25 (2009): phase 1 is their algorithm 3, phase 2 their 
 knows its own score and what its neighbours tell it. Two things are added, as their authors do in
 later work: equal bids are settled by the lower agent, and a bid is never above the one before it
 in the bundle (Johnson, Choi and How, 2012), so that scores need not have diminishing marginal
-gains.
+gains. What is agreed is stable, but not always what a central greedy would choose: an agent that a
+bid deterred does not build its bundle anew when that bid is withdrawn.
 """
 from __future__ import annotations
 
