@@ -90,8 +90,11 @@ class Population:
         """Move the task at i to place j, onto the UAV of the task there if that may serve it."""
         task, there = row[i], who[row[j]]
         if i != j and self._coding.able[there, task]:
-            row[:] = np.insert(np.delete(row, i), j, task)
-            who[task] = there
+            if i < j:
+                row[i:j] = row[i + 1:j + 1].copy()
+            else:
+                row[j + 1:i + 1] = row[j:i].copy()
+            row[j], who[task] = task, there
 
 
 def solve(recorder: Recorder, seed: int, learnt: object = None,
