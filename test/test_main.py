@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from uav_task_alloc import __main__ as cli, params
+from uav_task_alloc import SOLVERS, __main__ as cli, params
 
 ROOT = Path(__file__).parent.parent
 FILE = str(ROOT / 'config/scenarios/plan_only.yaml')
@@ -110,7 +110,9 @@ def test_the_help_lists_every_command(capsys):
 def test_a_command_has_help_of_its_own(capsys):
     with pytest.raises(SystemExit):
         cli.main(['plan', '-h'])
-    assert '--budget' in capsys.readouterr().out
+    printed = capsys.readouterr().out
+    assert '--budget' in printed
+    assert all(name in printed for name in SOLVERS)
 
 
 def test_the_module_is_the_command():

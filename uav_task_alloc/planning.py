@@ -53,7 +53,9 @@ def make_parser() -> argparse.ArgumentParser:
                     'the solving early: the best plan so far is told and written all the same, '
                     f'with exit status {INTERRUPTED}.')
     parser.add_argument('scenario', type=Path, metavar='SCENARIO.yaml')
-    parser.add_argument('--solver', default='chain_q', help='one of SOLVERS (%(default)s)')
+    parser.add_argument('--solver', default='chain_q',
+                        help='%(default)s, or one to compare with: paper_chain_q, q_learning, '
+                             'abc, ga, nearest, auction, cbba')
     parser.add_argument('--budget', type=float, default=1.0, help='[s] of solving (%(default)s)')
     parser.add_argument('--seed', type=int, help="of the solver (the scenario's)")
     parser.add_argument('--route-end', choices=('hold', 'home'),
