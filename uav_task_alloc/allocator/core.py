@@ -5,7 +5,7 @@ No clock, no thread, no I/O: `now` is [s] of a steady clock, `stamp` [s] of the 
 """
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 
 from uav_task_alloc.allocator import planning
@@ -127,17 +127,24 @@ class Allocator:
         out, self.world.outbox = self.world.outbox, Outbox()
         return out
 
-    def rows(self) -> list[Row]:
-        """What changed and is not on disk yet; `written` says that it is."""
+    def rows(self, most: int | None = None) -> list[Row]:
+        """What changed and is not on disk yet, `most` tasks of it; `written` says that it is."""
         world = self.world
-        rows = [task_row(world.tasks.records[task_id]) for task_id in sorted(world.tasks.dirty)]
+        rows = [task_row(world.tasks.records[task_id])
+                for task_id in sorted(world.tasks.dirty)[:most]]
         rows += [list_row(world.lists.lists[uav_id]) for uav_id in sorted(world.lists.dirty)]
         made = {'zones': lambda: zones_row(world.zones.values()),
                 'off': lambda: off_row(world.fleet.off),
                 'revision': lambda: revision_row(world.revision)}
         return rows + [made[name]() for name in sorted(world.dirty)]
 
-    def written(self) -> None:
-        """The rows are on disk."""
-        for dirty in (self.world.tasks.dirty, self.world.lists.dirty, self.world.dirty):
-            dirty.clear()
+    def written(self, rows: Iterable[Row] | None = None) -> bool:
+        """These are on disk, None: need not be; returns whether nothing is left to save."""
+        world = self.world
+        books = {'task': world.tasks.dirty, 'list': world.lists.dirty}
+        for row in rows or ():
+            books.get(row.kind, world.dirty).discard(row.id or row.kind)
+        for book in (*books.values(), world.dirty):
+            if rows is None:
+                book.clear()
+        return not (world.tasks.dirty or world.lists.dirty or world.dirty)

@@ -30,22 +30,23 @@ class Keeper:
             self.close()
             self._say(f'{error}; nothing is kept until a restart with a good one')
 
-    def save(self, allocator: Allocator, now: float) -> None:
-        """Everything new is on disk when this returns, or `trouble` says why it is not."""
+    def save(self, allocator: Allocator, now: float, most: int | None = None) -> bool:
+        """Everything new, or `most` tasks of it, is on disk when this returns, or `trouble`
+        says why not; False: there is more to save before anything is told.
+        """
         if self._journal is None:
-            allocator.written()
-            return
-        rows = allocator.rows()
+            return allocator.written()
+        rows = allocator.rows(most)
         if not rows or (self.trouble and now < self._retry):
-            return
+            return True
         try:
             self._journal.put(rows)
         except JournalError as error:
             self._retry = now + RETRY
             self._say(f'{error}; tried again every {RETRY:g} s')
-            return
-        allocator.written()
+            return True
         self.trouble = ''
+        return allocator.written(rows)
 
     def close(self) -> None:
         """Let go of the file."""

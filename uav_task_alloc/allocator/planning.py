@@ -59,9 +59,13 @@ def lists_of(world: World, chosen: Plan) -> tuple[dict[str, UavList], dict[str, 
     lists, left = {}, dict(chosen.unassigned)
     for uav_id, task_ids in routes.items():
         tasks = [world.tasks.records[task_id].task for task_id in task_ids]
+        if world.stands(uav_id, tasks):
+            lists[uav_id] = world.lists.get(uav_id)
+            continue
         lists[uav_id], lost = lay(_uav(world, uav_id), tasks, returns, legs,
                                   world.lists.get(uav_id), ways)
         left.update((task_id, f'no safe way for {uav_id}') for task_id in lost)
+        world.laid[uav_id] = ways
     for uav_id, held in world.lists.lists.items():
         if uav_id not in lists:  # gone: what it does not have it cannot fly when it is back
             lists[uav_id] = replace(held, stops=(), distance=0.0)
@@ -84,6 +88,7 @@ def _routes_now(world: World, chosen: Plan) -> Routes:
 def explain(world: World, left: Mapping[str, str], stamp: float) -> None:
     """The state and the reason of every open task, from the lists and what is left out."""
     owners = world.lists.owners()
+    usable = frozenset(u for u in world.fleet.records if world.fleet.usable(u))
     for record in world.tasks.open():
         uav_id = owners.get(record.task.id, '')
         if uav_id:
@@ -92,14 +97,13 @@ def explain(world: World, left: Mapping[str, str], stamp: float) -> None:
             state = TaskState.ACTIVE if active else TaskState.ASSIGNED
             world.tasks.change(record.task.id, stamp, state=state, uav=uav_id, reason='')
         else:
-            state, reason = _why_left(world, record, left)
+            state, reason = _why_left(world, record, usable, left)
             world.tasks.change(record.task.id, stamp, state=state, uav='', reason=reason)
 
 
-def _why_left(world: World, record: TaskRecord,
+def _why_left(world: World, record: TaskRecord, usable: frozenset[str],
               left: Mapping[str, str]) -> tuple[TaskState, str]:
-    heard, usable = world.fleet.records, [u for u in world.fleet.records if world.fleet.usable(u)]
-    allowed = record.task.allowed_uavs
+    heard, allowed = world.fleet.records, record.task.allowed_uavs
     if not heard:
         return TaskState.PENDING, 'no UAV heard yet'
     if allowed is not None and not any(uav_id in heard for uav_id in allowed):
@@ -107,7 +111,7 @@ def _why_left(world: World, record: TaskRecord,
                                       'not heard yet')
     if not usable:
         return TaskState.UNASSIGNED, 'no UAV available'
-    others = _restricted(record, frozenset(usable)).allowed_uavs
+    others = _restricted(record, usable).allowed_uavs
     if record.failed_on and others is not None and others.isdisjoint(usable):
         return TaskState.UNASSIGNED, (f'failed on {", ".join(record.failed_on)}; no other UAV '
                                       'that may fly it is available')

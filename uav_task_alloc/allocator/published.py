@@ -24,7 +24,7 @@ class ListBook:
     def publish(self, new: UavList, stamp: float, again: bool = False) -> UavList | None:
         """Put a list in force under the next revision; None: it says nothing new."""
         held = self.get(new.uav)
-        if new.flies_as(held) and not again:
+        if not again and (new is held or new.flies_as(held)):
             return None
         if not new.stops and held.revision == 0 and not again:
             return None

@@ -26,7 +26,9 @@ class Saved:
 
 def task_row(record: TaskRecord) -> Row:
     """A task and its fate."""
-    return Row('task', record.task.id, _plain(record))
+    body = {spec.name: _plain(getattr(record, spec.name)) for spec in fields(record)
+            if spec.name != 'announced' or record.announced is not record.task}
+    return Row('task', record.task.id, body)
 
 
 def list_row(uav_list: UavList) -> Row:
@@ -99,7 +101,7 @@ def _zone(body: dict[str, Any]) -> ThreatZone:
 
 def _task_record(body: dict[str, Any]) -> TaskRecord:
     return TaskRecord(**{**body, 'task': _task(body['task']),
-                         'announced': _task(body['announced']),
+                         'announced': _task(body.get('announced', body['task'])),
                          'state': TaskState(body['state']),
                          'failed_on': tuple(body['failed_on'])})
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from dataclasses import dataclass
 
-from uav_task_alloc.allocator.records import TaskState
+from uav_task_alloc.allocator.records import TaskRecord, TaskState
 from uav_task_alloc.allocator.world import World
 
 
@@ -20,13 +20,12 @@ class Status:
     stamp: float  # [s] of the last change
 
 
-def statuses(world: World) -> list[Status]:
-    """One a task, accepted or refused."""
-    found = [Status(task_id, record.state, record.uav, record.reason, record.stamp)
-             for task_id, record in world.tasks.records.items()]
-    found += [Status(task_id, TaskState.REJECTED, '', reason, stamp)
-              for task_id, (reason, stamp) in world.tasks.rejected.items()]
-    return found
+def status_of(task_id: str, known: TaskRecord | tuple[str, float]) -> Status:
+    """Of an accepted task, or of one that was refused for a reason at a time [s]."""
+    if isinstance(known, TaskRecord):
+        return Status(task_id, known.state, known.uav, known.reason, known.stamp)
+    reason, stamp = known
+    return Status(task_id, TaskState.REJECTED, '', reason, stamp)
 
 
 def worries(world: World, journal_trouble: str) -> list[str]:

@@ -48,6 +48,7 @@ class World:
         self.awake = False  # the kernels are compiled: looking at zones is quick
         self._ways: Ways | None = None
         self._looked: dict[str, float] = {}
+        self.laid: dict[str, Ways] = {}  # the zones as they were when a UAV's list was laid
         self._old = {each.uav: each for each in saved.lists if each.stops}
 
     def announce(self, action: Action, tasks: Iterable[Task], stamp: float,
@@ -226,6 +227,15 @@ class World:
         if self._ways is None or self._ways.params is not self.params:
             self._ways = Ways(tuple(self.zones.values()), self.params)
         return self._ways
+
+    def stands(self, uav_id: str, tasks: Sequence[Task]) -> bool:
+        """The list in force is this route, and its ways are as good as when they were laid."""
+        stops, ways = self.lists.get(uav_id).stops, self.ways()
+        record = self.fleet.records[uav_id]
+        return (bool(stops) and self.laid.get(uav_id) is ways and not record.caught
+                and [stop.task for stop in stops] == tasks
+                and ways.rest(record.report.position, stops[0].leg,
+                              stops[0].task.position) is not None)
 
     def locked(self) -> dict[str, tuple[str, ...]]:
         """What is being flown: it stays first on its UAV."""

@@ -7,11 +7,11 @@ from collections.abc import Iterable
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from uav_task_alloc_msgs import msg as m
 
-from uav_task_alloc.allocator.records import Allocation, TaskState, UavList
+from uav_task_alloc.allocator.records import Allocation, UavList
 from uav_task_alloc.allocator.status import Status
 from uav_task_alloc.nodes.messages import header, planned_task, to_duration, to_point, to_stamp
 
-LEFT_OUT = (TaskState.PENDING, TaskState.UNASSIGNED)
+LEFT_OUT = (m.TaskStatus.PENDING, m.TaskStatus.UNASSIGNED)
 
 
 def from_list(uav_list: UavList) -> m.TaskList:
@@ -24,9 +24,9 @@ def from_list(uav_list: UavList) -> m.TaskList:
         distance=float(uav_list.distance))
 
 
-def from_statuses(statuses: Iterable[Status], now: float) -> m.TaskStatusArray:
+def from_statuses(statuses: list[m.TaskStatus], now: float) -> m.TaskStatusArray:
     """Where every task stands."""
-    return m.TaskStatusArray(header=header(now), statuses=[from_status(s) for s in statuses])
+    return m.TaskStatusArray(header=header(now), statuses=statuses)
 
 
 def from_status(status: Status) -> m.TaskStatus:
@@ -35,13 +35,13 @@ def from_status(status: Status) -> m.TaskStatus:
                         reason=status.reason, stamp=to_stamp(status.stamp))
 
 
-def from_allocation(allocation: Allocation, statuses: Iterable[Status]) -> m.Allocation:
+def from_allocation(allocation: Allocation, lists: list[m.TaskList],
+                    statuses: Iterable[m.TaskStatus]) -> m.Allocation:
     """The plan in force and what it leaves out."""
     plan = allocation.plan
     return m.Allocation(
         header=header(allocation.stamp), revision=allocation.revision,
-        lists=[from_list(each) for each in allocation.lists],
-        unassigned=[from_status(s) for s in statuses if s.state in LEFT_OUT],
+        lists=lists, unassigned=[s for s in statuses if s.state in LEFT_OUT],
         fit=float(plan.fit), distance=float(plan.distance), value=float(plan.value),
         penalty=float(plan.penalty),
         solve_time=to_duration(plan.solve_time), iterations=int(plan.iterations),

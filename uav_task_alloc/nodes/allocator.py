@@ -2,12 +2,12 @@
 """The allocator as a node: hears UAVs, tasks and zones, publishes a list for each UAV."""
 from __future__ import annotations
 
+import gc
 import time
 from collections import deque
 
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.node import Node
-from rclpy.publisher import Publisher
 from std_srvs.srv import Trigger
 from uav_task_alloc_msgs import msg as m
 from uav_task_alloc_msgs.srv import SetAvailability, SubmitTasks
@@ -16,16 +16,17 @@ from uav_task_alloc.allocator import Allocator, planning
 from uav_task_alloc.allocator.keeper import Keeper
 from uav_task_alloc.allocator.records import Answer, Note, Problem, Verdict
 from uav_task_alloc.allocator.rehearsal import rehearse
-from uav_task_alloc.allocator.status import facts, statuses, worries
+from uav_task_alloc.allocator.status import facts, worries
 from uav_task_alloc.allocator.worker import Worker
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.geometry.frames import Origin
 from uav_task_alloc.nodes import allocation_messages as told, announcements
+from uav_task_alloc.nodes.intake import hear
 from uav_task_alloc.nodes.messages import (
-    ANNOUNCEMENTS,
-    EVENTS,
+    HEARD_ANNOUNCEMENTS,
+    HEARD_EVENTS,
+    HEARD_STATES,
     LATCHED,
-    STATES,
     to_event,
     to_report,
     to_zone,
@@ -33,11 +34,14 @@ from uav_task_alloc.nodes.messages import (
 from uav_task_alloc.nodes.painter import Painter
 from uav_task_alloc.nodes.parameters import declare
 from uav_task_alloc.nodes.run import run
+from uav_task_alloc.nodes.teller import Teller
 from uav_task_alloc.params import AllocatorParams
 from uav_task_alloc.solver.solve import plan
 
 TICK = 0.025  # [s]
+REST, MOST_REST = 3.0, 0.2  # times as long as a tick took the next one waits, at most [s]
 MOST_COMPLAINTS, MOST_REASONS = 1000, 20  # names, and reasons for each, remembered as logged
+MOST_LINES, MOST_ROWS = 200, 500  # logged, and saved, at once
 
 
 class AllocatorNode(Node):
@@ -55,6 +59,8 @@ class AllocatorNode(Node):
         self.complained: dict[tuple[str, str], set[str]] = {}  # (topic, name): reasons
         self.answers: deque[Answer | None] = deque()
         self.background = False
+        self.rested = 0.0  # [s] steady clock
+        self.behind = False  # there is more to tell than was told
         self._listen()
         self._talk()
         self.arrived = self.create_guard_condition(self.on_answer)
@@ -63,11 +69,12 @@ class AllocatorNode(Node):
 
     def _listen(self) -> None:
         for kind, topic, heard, qos in (
-                (m.UavState, 'uav_states', self.on_state, STATES),
-                (m.TaskAnnouncement, 'task_announcements', self.on_tasks, ANNOUNCEMENTS),
+                (m.UavState, 'uav_states', self.on_state, HEARD_STATES),
+                (m.TaskAnnouncement, 'task_announcements', self.on_tasks,
+                 HEARD_ANNOUNCEMENTS),
                 (m.ThreatZoneArray, 'threat_zones', self.on_zones, LATCHED),
-                (m.TaskEvent, 'task_events', self.on_event, EVENTS)):
-            self.create_subscription(kind, topic, heard, qos)
+                (m.TaskEvent, 'task_events', self.on_event, HEARD_EVENTS)):
+            hear(self, kind, topic, heard, qos)
         self.create_service(SubmitTasks, '~/submit_tasks', self.on_submit)
         self.create_service(Trigger, '~/replan', self.on_replan)
         self.create_service(SetAvailability, '~/set_availability', self.on_availability)
@@ -75,9 +82,7 @@ class AllocatorNode(Node):
         self.create_timer(1.0, self.on_second)
 
     def _talk(self) -> None:
-        self.lists: dict[str, Publisher] = {}
-        self.statuses = self.create_publisher(m.TaskStatusArray, 'task_statuses', LATCHED)
-        self.allocation = self.create_publisher(m.Allocation, 'allocation', LATCHED)
+        self.teller = Teller(self, self.world)
         self.painter = Painter(self, self.world)
         self.health = self.create_publisher(DiagnosticArray, '/diagnostics', 10)
 
@@ -155,17 +160,26 @@ class AllocatorNode(Node):
     def on_tick(self) -> None:
         """What time brings, a solve where one is due, and what has to be told."""
         now, stamp = time.monotonic(), self.stamp()
+        if now < self.rested:
+            return
         if self.world.params is not self.live.now:
             self.world.params = self.live.now
             self.world.touch('parameters changed', now)
         self.core.tick(now, stamp)
-        problem = self.core.due(now, stamp)
+        # nothing is solved while the last answer is not told: telling would never come to an end
+        problem = None if self.behind else self.core.due(now, stamp)
         if problem is not None:
             self.background = problem.background
             self.worker.ask(problem)
         elif self.core.hurry(now, self.background):
             self.worker.hurry()
         self.tell(stamp)
+        self.rest(now)
+
+    def rest(self, began: float) -> None:
+        """What is heard has its turn between two pieces of work, however full the world."""
+        now = time.monotonic()
+        self.rested = now + min(REST * (now - began), MOST_REST)
 
     def solve(self, problem: Problem, stop) -> Answer:
         """In the worker's thread."""
@@ -183,43 +197,40 @@ class AllocatorNode(Node):
 
     def on_answer(self) -> None:
         """The worker has an answer, or is ready for the first problem."""
+        began = time.monotonic()
         while self.answers:
             if not self.world.awake:
                 self.core.wake()
                 self.answers.popleft()
+                gc.freeze()  # a collection need not look through the compiler each time
                 self.get_logger().info('ready')
                 continue
             self.core.adopt(self.answers.popleft(), time.monotonic(), self.stamp())
         self.tell(self.stamp())
+        self.rest(began)
 
     # what is told
 
     def tell(self, stamp: float) -> None:
         """On disk first, then published."""
-        self.keeper.save(self.core, time.monotonic())
+        self.behind = not self.keeper.save(self.core, time.monotonic(), MOST_ROWS)
+        if self.behind:
+            return
         out = self.core.collect()
-        for note in out.notes:
-            self.log(note)
-        for uav_id, uav_list in out.lists.items():
-            self.list_publisher(uav_id).publish(told.from_list(uav_list))
-        if out.statuses:
-            self.statuses.publish(told.from_statuses(statuses(self.world), stamp))
-        if out.allocation is not None:
-            self.allocation.publish(told.from_allocation(out.allocation, statuses(self.world)))
+        self.log(out.notes)
+        self.teller.take(out)
+        self.behind = self.teller.tell(stamp)
         self.painter.note(out)
 
-    def log(self, note: Note) -> None:
-        """One line; rclpy wants one place in the source for each severity."""
-        if note.warning:
-            self.get_logger().warning(note.text)
-        else:
-            self.get_logger().info(note.text)
-
-    def list_publisher(self, uav_id: str) -> Publisher:
-        """Of `<uav_id>/task_list`."""
-        if uav_id not in self.lists:
-            self.lists[uav_id] = self.create_publisher(m.TaskList, f'{uav_id}/task_list', LATCHED)
-        return self.lists[uav_id]
+    def log(self, notes: list[Note]) -> None:
+        """A line each, of a flood the first; rclpy wants one place in the source a severity."""
+        for note in notes[:MOST_LINES]:
+            if note.warning:
+                self.get_logger().warning(note.text)
+            else:
+                self.get_logger().info(note.text)
+        if len(notes) > MOST_LINES:
+            self.get_logger().warning(f'and {len(notes) - MOST_LINES} lines more')
 
     def on_second(self) -> None:
         """Say how it goes."""

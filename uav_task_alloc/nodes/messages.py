@@ -33,6 +33,11 @@ ANNOUNCEMENTS = QoSProfile(depth=1000, reliability=ReliabilityPolicy.RELIABLE,
                            durability=DurabilityPolicy.TRANSIENT_LOCAL)
 EVENTS = QoSProfile(depth=100, reliability=ReliabilityPolicy.RELIABLE)
 STATES = QoSProfile(depth=50, reliability=ReliabilityPolicy.BEST_EFFORT)
+# what a flood may pile up in front of the allocator; beyond that the oldest is lost, and counted
+HEARD_ANNOUNCEMENTS = QoSProfile(depth=20_000, reliability=ReliabilityPolicy.RELIABLE,
+                                 durability=DurabilityPolicy.TRANSIENT_LOCAL)
+HEARD_EVENTS = QoSProfile(depth=10_000, reliability=ReliabilityPolicy.RELIABLE)
+HEARD_STATES = QoSProfile(depth=1000, reliability=ReliabilityPolicy.BEST_EFFORT)
 
 
 def to_stamp(seconds: float) -> Time:
