@@ -41,7 +41,7 @@ def _parser() -> argparse.ArgumentParser:
     add = parser.add_argument
     add('--out', type=Path, required=True, metavar='DIR',
         help='figures and tables; what it holds already is not run again')
-    add('--quick', action='store_true', help='minutes instead of an hour')
+    add('--quick', action='store_true', help='minutes instead of half an hour')
     add('--seed', type=int, default=1, help='of all instances and solvers (%(default)s)')
     executors.add_arguments(parser, jobs=os.cpu_count() or 1)
     return parser

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+SAME = 1e-4  # [%] from the best that is but rounding
 Means = dict[str, tuple[float | None, int, int]]  # 'solver@budget' -> mean gap [%], of, asked
 
 
@@ -63,13 +64,22 @@ def groups(runs: Mapping[str, Run]) -> list[str]:
 
 
 def table(runs: Mapping[str, Run]) -> str:
-    """Mean gap [%] to the best of each instance by group, and how many were answered."""
+    """Mean gap [%] to the best of each instance by group, and how many were answered.
+
+    The last row: on how many instances the best was reached.
+    """
     rows = {group: means(runs, group) for group in groups(runs)}
     columns = list(dict.fromkeys(name for row in rows.values() for name in row))
     lines = [['instances', *columns], ['---'] * (len(columns) + 1)]
     lines += [[group, *(_cell(row.get(column)) for column in columns)]
               for group, row in rows.items()]
+    lines.append(['best reached', *(_reached(runs, column) for column in columns)])
     return '\n'.join(f'| {" | ".join(line)} |' for line in lines)
+
+
+def _reached(runs: Mapping[str, Run], column: str) -> str:
+    gaps = [run.gaps()[column] for run in runs.values() if column in run.gaps()]
+    return f'{sum(gap is not None and gap < SAME for gap in gaps)}/{len(gaps)}'
 
 
 def _cell(mean: Sequence[Any] | None) -> str:

@@ -29,11 +29,11 @@ class Program:
     scene: tuple[int, int, int] = (4, 30, 6)  # UAVs, tasks, domes of all figures
     runs: int = 10  # behind a mean curve
     coefficients: tuple[float, ...] = (0.1, 0.3, 1.0, 3.0, 10.0, 30.0)  # k of figure 1
-    effort: float = 5.0  # [s] about, a run behind a figure
+    effort: float = 3.0  # [s] about, a run behind a figure
     sizes: tuple[tuple[int, int], ...] = (
         (4, 20), (8, 50), (8, 100), (20, 200), (50, 500), (100, 1000))
     instances: int = 5  # a size
-    table_effort: float = 3.0  # [s] about, a run behind a table
+    table_effort: float = 1.5  # [s] about, a run behind a table
     events: int = 25
     event_rounds: int = 2000  # of chain_q, some 10 ms
 
@@ -44,7 +44,7 @@ class Program:
 
 
 def quick(seed: int) -> Program:
-    """A few minutes instead of an hour; the same figures and tables."""
+    """Minutes instead of half an hour; the same figures and tables."""
     return Program(seed, runs=10, coefficients=(0.1, 1.0, 10.0), effort=0.6,
                    sizes=((4, 20), (8, 50), (20, 200), (100, 1000)), instances=2,
                    table_effort=0.5, events=5)
