@@ -1,19 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """A page served from a small run, and a real browser to look at it."""
 import os
-import subprocess
-from pathlib import Path
 
+import chromium
 import pytest
 from small_run import FIRST, LATER, Run
 
 from uav_task_alloc.live.server import Server
-
-FINDER = Path(__file__).parents[2] / 'tools/browser.sh'
-WAIT = 15_000  # [ms]
-ARGS = [
-    '--headless', '--no-sandbox', '--disable-gpu', '--disable-quic', '--no-first-run',
-    '--disable-background-networking', '--disable-component-update', '--disable-sync']
 
 
 @pytest.fixture
@@ -38,16 +31,13 @@ def serve():
 @pytest.fixture(scope='session')
 def browser():
     """A headless Chromium; skipped where there is none, unless REQUIRE_BROWSER=1."""
-    found = subprocess.run([FINDER, '--find'], capture_output=True, text=True)
-    path = found.stdout.strip()
+    path = chromium.find()
     if not path:
         assert os.environ.get('REQUIRE_BROWSER') != '1', 'REQUIRE_BROWSER=1, and no Chromium'
         pytest.skip('no Chromium found: `tools/browser.sh` installs one')
-    sync_api = pytest.importorskip('playwright.sync_api')
-    with sync_api.sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=path, headless=True, args=ARGS)
+    pytest.importorskip('playwright')
+    with chromium.started(path) as browser:
         yield browser
-        browser.close()
 
 
 @pytest.fixture(scope='module')
@@ -78,8 +68,7 @@ def view(window):
         server.board = board
         page.set_viewport_size({'width': 1600, 'height': 900})
         page.emulate_media(color_scheme=scheme)
-        page.goto(server.address)
-        page.wait_for_selector('#map .main-svg', timeout=WAIT)
+        chromium.open_page(page, server.address)
         return page
 
     page.on('pageerror', on_error)

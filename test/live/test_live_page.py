@@ -5,9 +5,9 @@ import re
 
 import matplotlib.image
 import numpy as np
+from chromium import WAIT, wait
 from small_run import BEGIN, FIRST, Run, announced, listed, planned, statuses, uavs
 
-WAIT = 15_000  # [ms]
 HOSTILE = '<img src=x onerror="window.hacked=1">'
 
 
@@ -19,13 +19,6 @@ def find(page, task, expected):
     page.fill('#find', task)
     wait(page, '#answer', expected)
     return text(page, '#answer')
-
-
-def wait(page, where, expected):
-    """Until a node's text holds `expected`."""
-    page.wait_for_function(
-        '([where, text]) => document.querySelector(where).innerText.includes(text)',
-        arg=[where, expected], timeout=WAIT)
 
 
 def pixels(page, where):

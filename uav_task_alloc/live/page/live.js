@@ -24,7 +24,7 @@ function showMap(seen, picked) {
       task => [...task.via, at(task.id)])].filter(point => point && point[0] !== null)}));
   drawMap($('map'), {zones: seen.zones, routes, tasks, uavs: seen.uavs,
     changed: given.filter(id => at(id) && seen.turns.has(id)).map(at),
-    picked: at(picked) ? [at(picked)] : []}, pick);
+    pickedIndex: seen.turns.get(picked)?.index, picked: at(picked) ? [at(picked)] : []}, pick);
 }
 
 function showChart(seen) {
@@ -108,5 +108,6 @@ $('live').onclick = goLive;
 $('find').oninput = draw;
 $('uavs').oninput = draw;
 $('theme').onclick = () => theme(theme() === 'dark' ? 'light' : 'dark');
+addEventListener('resize', draw);
 theme(matchMedia('(prefers-color-scheme: dark)').matches ? 'dark' : 'light');
 connect();

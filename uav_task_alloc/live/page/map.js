@@ -68,9 +68,12 @@ function routeTraces(view) {
     }
   });
   const traces = [...groups.values()].map(({lines, route}) => ({
-    ...joined(lines), mode: 'lines', showlegend: false, hoverinfo: 'skip',
+    ...joined(lines), mode: 'lines', showlegend: false, hoverinfo: 'skip', opacity: many ? .4 : 1,
     line: {color: colour(route.index), width: many ? 1 : 2.5,
       dash: many ? 'solid' : DASHES[Math.floor(route.index / COLOURS) % DASHES.length]}}));
+  const picked = view.routes.filter(route => route.index === view.pickedIndex);
+  traces.push({...joined(picked.map(route => route.points)), mode: 'lines', showlegend: false,
+    hoverinfo: 'skip', line: {color: css('--ink'), width: 4}, opacity: many ? 1 : .35});
   traces.push({x: heads.x, y: heads.y, mode: 'markers', hoverinfo: 'skip', showlegend: false,
     marker: {symbol: 'triangle-up', size: 9, angle: heads.angle, color: heads.color}});
   return traces;
@@ -124,20 +127,22 @@ function uavTrace(view) {
 
 function axis(title, more) {
   return {title: {text: title, standoff: 6}, color: css('--ink'), gridcolor: css('--line'),
-    zeroline: false, automargin: true, ...more};
+    zeroline: false, ...more};
 }
 
 const frame = right => ({paper_bgcolor: 'rgba(0,0,0,0)', plot_bgcolor: 'rgba(0,0,0,0)',
-  font: {color: css('--ink'), size: 13}, margin: {l: 10, r: right, t: 8, b: 10}});
+  font: {color: css('--ink'), size: 13}, margin: {l: 58, r: right, t: 8, b: 42}});
 
 // pick(id) is called when a task is clicked.
 export function drawMap(node, view, pick) {
-  const traces = [...zoneTraces(view.zones), ...routeTraces(view),
+  const traces = [...routeTraces(view), ...zoneTraces(view.zones),
     rings(view.changed, 'just given', css('--mark'), 20), ...taskTraces(view),
     uavTrace(view), rings(view.picked, 'looked for', css('--ink'), 28)];
-  const layout = {...frame(60), uirevision: 'same', dragmode: 'pan', hovermode: 'closest',
-    legend: {orientation: 'h', y: 1.01, yanchor: 'bottom', x: 0, itemclick: false,
-      itemdoubleclick: false},
+  const narrow = node.clientWidth < 500;
+  const layout = {...frame(narrow ? 36 : 60), uirevision: 'same', dragmode: 'pan',
+    hovermode: 'closest', legend: {orientation: 'h', y: 1.01, yanchor: 'bottom',
+      x: narrow ? -.18 : 0, font: {size: narrow ? 11 : 13}, entrywidthmode: 'fraction',
+      entrywidth: narrow ? .4 : .22, itemclick: false, itemdoubleclick: false},
     xaxis: axis('east [m]'), yaxis: axis('north [m]', {scaleanchor: 'x', scaleratio: 1})};
   const first = !node.on;
   Plotly.react(node, traces, layout, CONFIG);

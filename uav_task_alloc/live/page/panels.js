@@ -2,7 +2,7 @@
 // The panels of words: answer, re-plans, what is left out, UAVs, events. Whatever the fleet says
 // goes through textContent, never into HTML.
 import {colour} from './map.js';
-import {answer, kindOf, live, ofDay, some, span, stamp, stateOf, until} from './picture.js';
+import {LEFT, answer, live, ofDay, some, span, stamp, stateOf, until} from './picture.js';
 
 const MOST = 100;  // rows of one list
 const KINDS = {fault: 'bad', zone: 'bad', good: 'good'};
@@ -43,7 +43,7 @@ function taskButton(id) {
 export function showHead(seen, past) {
   const done = seen.ids.filter(id => stateOf(id, seen)[0] === 'COMPLETED').length;
   const silent = seen.uavs.filter(uav => uav.silent).length, {clock} = live;
-  put($('clock'), `${stamp(seen.wall)} (${ofDay(seen.wall)})`);
+  put($('clock'), `${seen.ids.length ? stamp(seen.wall) : '–'} (${ofDay(seen.wall)})`);
   $('progress').max = seen.ids.length || 1;
   $('progress').value = done;
   put($('counts'), `${done} of ${seen.ids.length} tasks done, ${seen.turns.size} to fly; `
@@ -130,19 +130,19 @@ export function showPlans(seen) {
 export function showLeft(seen) {
   const groups = new Map();
   for (const id of seen.ids) {
-    if (!['left', 'wait'].includes(kindOf(id, seen))) continue;
-    const [state, , reason] = stateOf(id, seen);
-    const why = reason || (state === 'PENDING' ? 'waits for the next plan' : state.toLowerCase());
+    const [state, , reason] = stateOf(id, seen), waits = state === 'PENDING';
+    if (seen.turns.has(id) || !(waits || LEFT.includes(state))) continue;
+    const why = reason || (waits ? 'waits for the next plan' : state.toLowerCase());
     groups.set(why, [...(groups.get(why) || []), id]);
   }
   put($('left-count'), String([...groups.values()].reduce((sum, ids) => sum + ids.length, 0)));
-  fill($('left'), JSON.stringify([...groups]), () => groups.size
+  fill($('left'), JSON.stringify([seen.ids.length > 0, ...groups]), () => groups.size
     ? [...groups].map(([why, ids]) => {
       const item = make('li');
       item.append(...ids.slice(0, 12).flatMap((id, k) => [k ? ', ' : '', taskButton(id)]),
         ids.length > 12 ? ` and ${ids.length - 12} more: ` : ': ', make('span', why, 'bad'));
       return item;
-    }) : [make('li', 'Every task has a UAV.', 'none')]);
+    }) : [make('li', seen.ids.length ? 'Every task has a UAV.' : 'No task yet.', 'none')]);
 }
 
 function uavNode(uav, open) {
@@ -159,7 +159,8 @@ function showUav(node, uav, done, seen) {
   const list = seen.lists.get(uav.id), board = list.length && ON_BOARD[uav.mission];
   const [, words, link, battery, count] = node.firstChild.children, rows = node.lastChild;
   put(words, uav.words);
-  put(link, uav.link, uav.silent || uav.health ? 'bad' : 'good');
+  node.classList.toggle('trouble', Boolean(uav.silent || uav.health));  // comes first
+  put(link, uav.link, node.classList.contains('trouble') ? 'bad' : 'good');
   put(battery, uav.battery == null ? '' : `battery ${Math.round(100 * uav.battery)} %`);
   put(count, `${done} done, ${list.length} to fly${board ? `, ${board}` : ''}`);
   if (!node.open) return;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // What the page knows, made ready to be shown: no DOM, no network.
 const SILENT = 2;  // [s] without a word from a UAV
-const LEFT = ['UNASSIGNED', 'REJECTED', 'FAILED'];
+export const LEFT = ['UNASSIGNED', 'REJECTED', 'FAILED'];
 
 export const live = {clock: {}, parts: {}, events: [], plans: []};  // the newest
 
@@ -88,5 +88,5 @@ function inTurn(id, {uav, place, at}, seen) {
     : `; it gets there in about ${span(10 * Math.ceil(left / 10))} min`;  // calm for the ear
   if (place === 1) return `${uav} flies ${id} next${when}.`;
   const ahead = seen.lists.get(uav).slice(0, place - 1).map(task => task.id);
-  return `${uav} flies ${id} as number ${place} of its list, after ${some(ahead, 5)}${when}.`;
+  return `${uav} flies ${id} as number ${place} of its list, after ${some(ahead, 8)}${when}.`;
 }

@@ -1,0 +1,40 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The browser of the tests: where it is, how it is started, how long it is waited for."""
+import subprocess
+from contextlib import contextmanager
+from pathlib import Path
+
+FINDER = Path(__file__).parents[2] / 'tools/browser.sh'
+WAIT = 15_000  # [ms]
+ARGS = [
+    '--headless', '--no-sandbox', '--disable-gpu', '--disable-quic', '--no-first-run',
+    '--disable-background-networking', '--disable-component-update', '--disable-sync']
+
+
+def find():
+    """Its path; '' where there is none."""
+    found = subprocess.run([FINDER, '--find'], capture_output=True, text=True)
+    return found.stdout.strip()
+
+
+@contextmanager
+def started(path):
+    """A browser while it is needed; ImportError without playwright."""
+    from playwright.sync_api import sync_playwright
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=path, headless=True, args=ARGS)
+        yield browser
+        browser.close()
+
+
+def open_page(page, address):
+    """Go there and wait until it is drawn."""
+    page.goto(address)
+    page.wait_for_selector('#map .main-svg', timeout=WAIT)
+
+
+def wait(page, where, expected):
+    """Until the text of a node holds `expected`."""
+    page.wait_for_function(
+        '([where, text]) => document.querySelector(where).innerText.includes(text)',
+        arg=[where, expected], timeout=WAIT)
