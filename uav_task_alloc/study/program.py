@@ -13,7 +13,8 @@ from uav_task_alloc.study import trials
 from uav_task_alloc.study.campaign import Job
 
 LEARNERS = 'paper_chain_q', 'q_learning', 'abc', 'ga', 'chain_q'  # of figure 2
-FINITE = 'nearest', 'auction', 'cbba'  # end by themselves
+FINITE = 'nearest', 'auction', 'cbba'  # end by themselves,
+BRIEF = 0.2  # [s] in about that
 # iterations in a CPU second at 50 tasks, and the power of the tasks with which they fall: about
 # equal time for all, and yet the same plans on every machine
 SPEED: Mapping[str, tuple[float, float]] = MappingProxyType({
@@ -108,7 +109,8 @@ def size_jobs(program: Program) -> dict[tuple[int, int, int, str], Job]:
             f'size-{uavs}-{tasks}-{nth}-{solver or "reference"}', trials.converge, {
                 'scene': {'uavs': uavs, 'tasks': tasks, 'seed': program.seed + nth},
                 'solver': solver or 'chain_q', 'seed': nth if solver else 1000 + nth,
-                'iterations': iterations(solver or 'chain_q', tasks, effort)}, effort)
+                'iterations': iterations(solver or 'chain_q', tasks, effort)},
+            BRIEF if solver in FINITE else effort)
     return made
 
 
