@@ -15,6 +15,7 @@ ROOMS = {
     'mavsdk': (),
     'mcap': ('record/',),
     'mcap_ros2': ('record/',),
+    'plotly': ('flight_report/', 'live/'),
     'aiohttp': ('live/',),
     'pymap3d': ('geometry/',),
     'numba': ('geometry/', 'solver/'),
@@ -26,7 +27,8 @@ ROS = {'rclpy', 'rcl_interfaces', 'builtin_interfaces', 'geometry_msgs', 'std_ms
 LEVELS = {
     'errors': 0, 'model': 1, 'params': 1, 'geometry': 2, 'objective': 2, 'solver': 3,
     'scenario': 3, 'record': 4, 'allocator': 4, 'journal': 4, 'mission': 4, 'mavlink': 5,
-    'live': 5, 'plots': 5, 'progress': 5, 'planning': 6, 'study': 6, 'report': 6, '__main__': 7,
+    'live': 5, 'plots': 5, 'progress': 5, 'planning': 6, 'study': 6,
+    'flight_report': 6, 'report': 6, '__main__': 7,
     'nodes': 8,
 }
 

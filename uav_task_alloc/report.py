@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 import math
+import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -122,13 +123,37 @@ def _named(reasons: Mapping[str, str]) -> str:
     return '; '.join(f'{name}: {reason}' for name, reason in reasons.items())
 
 
+def flight_page(bag: Path, html: Path) -> int:
+    """Write the page of a flight and say so."""
+    try:
+        from uav_task_alloc.flight_report import page  # plotly and mcap are wanted here only
+    except ModuleNotFoundError as error:
+        raise SystemExit(f'report: {error}: expected plotly, mcap and mcap-ros2-support') from None
+    try:
+        story, trouble = page.write(bag, html)
+    except OSError as error:
+        raise SystemExit(f'{error.filename}: {error.strerror}: expected a recorded run') from None
+    for name, value in page.key_figures(story):
+        print(f'{name:<45}{"" if value is None else value!s:>12}')
+    for text in trouble:
+        print(f'Warning: {text}', file=sys.stderr)
+    print(f'Report: {html}')
+    return 0
+
+
 def main(argv: Sequence[str]) -> int:
-    """`report OUT_DIR | SUMMARY.json`: the table again, and the map drawn again."""
+    """`report FILE.mcap`: a page of the flight. `report OUT_DIR | SUMMARY.json`: table and map."""
     parser = argparse.ArgumentParser(
         prog='python -m uav_task_alloc report',
-        description='Print the table of a recorded run again, and draw its map again.')
-    parser.add_argument('place', type=Path, metavar='OUT_DIR | SUMMARY.json')
-    place = parser.parse_args(argv).place
+        description='Draw a flight recorded as MCAP as one HTML file; or print the table of the '
+                    'folder of a demo again, and draw its map again.')
+    parser.add_argument('place', type=Path, metavar='FILE.mcap | OUT_DIR | SUMMARY.json')
+    parser.add_argument('--html', type=Path, metavar='OUT.html',
+                        help='where the page goes (beside FILE.mcap)')
+    args = parser.parse_args(argv)
+    place = args.place
+    if not place.is_dir() and place.suffix != '.json':
+        return flight_page(place, args.html or place.with_suffix('.html'))
     out = place if place.is_dir() else place.parent
     try:
         summary = summarise(out) if place.is_dir() else json.loads(place.read_text())

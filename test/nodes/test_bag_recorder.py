@@ -1,14 +1,18 @@
 # SPDX-License-Identifier: Apache-2.0
 """live_view --record: what was on the topics is in the file, for readers that are not ours."""
+import math
 import signal
+from html import escape
 
 import pytest
+from geometry_msgs.msg import Point
 from mcap.exceptions import EndOfFile
 from mcap.reader import NonSeekingReader, make_reader
 from mcap_ros2.decoder import DecoderFactory
 from nav_msgs.msg import Path as PathMsg
 from uav_task_alloc_msgs import msg as m
 
+from uav_task_alloc import report
 from uav_task_alloc.model import Task
 from uav_task_alloc.nodes import definitions
 from uav_task_alloc.nodes.messages import (
@@ -88,6 +92,36 @@ def test_what_a_killed_recorder_had_on_disk_can_be_read(start, probe, tmp_path):
     with pytest.raises(EndOfFile):
         read()
     assert '/task_announcements' in found
+
+
+def test_the_report_of_a_run_is_drawn_from_its_recording_alone(start, probe, tmp_path):
+    path = tmp_path / 'run.mcap'
+    allocator = start('allocator', '-p', 'route_end:=hold')
+    view = start('live_view', '-p', f'record:={path}', '-p', 'port:=0')
+    told = probe.collect(m.TaskStatusArray, 'task_statuses', LATCHED)
+    states = probe.publisher(m.UavState, 'uav_states', STATES)
+    tasks = probe.publisher(m.TaskAnnouncement, 'task_announcements', ANNOUNCEMENTS)
+    tasks.publish(announcement(m.TaskAnnouncement.ADD, [
+        Task('t1', (100.0, 0.0, 50.0)), Task('t2', (1e6, 0.0, 50.0))], 0.0))
+
+    def settled():
+        states.publish(m.UavState(
+            header=header(1.0), uav_id='uav_1', available=True, battery=0.5,
+            home=Point(x=math.nan), range_remaining=5000.0, cruise_speed=math.nan))
+        return told and [row.state for row in told[-1].statuses] == [
+            m.TaskStatus.ASSIGNED, m.TaskStatus.UNASSIGNED]
+    probe.until(settled)
+    reason = told[-1].statuses[1].reason
+    size = path.stat().st_size
+    probe.until(lambda: path.stat().st_size > size)
+    view.stop()
+    allocator.stop()
+    assert report.main([str(path), '--html', str(tmp_path / 'alone.html')]) == 0
+    text = (tmp_path / 'alone.html').read_text()
+    assert '<td>t1</td><td>assigned</td><td>uav_1</td>' in text
+    assert f'<td>{escape(reason)}</td>' in text
+    assert '"uav_1 not flown yet"' in text
+    assert 'new task t1' in text
 
 
 def test_a_file_that_is_there_or_cannot_be_is_refused_in_words(start, tmp_path):

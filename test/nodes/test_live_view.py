@@ -14,7 +14,6 @@ from uav_task_alloc_msgs import msg as m
 
 from uav_task_alloc.geometry.frames import Origin
 from uav_task_alloc.model import Task, ThreatZone
-from uav_task_alloc.nodes import recorder
 from uav_task_alloc.nodes.messages import (
     ANNOUNCEMENTS,
     LATCHED,
@@ -22,7 +21,7 @@ from uav_task_alloc.nodes.messages import (
     announcement,
     from_zones,
 )
-from uav_task_alloc.record import heard
+from uav_task_alloc.record import heard, lines
 
 TEXT = """uavs:
   - {id: uav_1, position: [0, 0, 0]}
@@ -131,7 +130,7 @@ def test_without_a_scenario_it_goes_on_until_it_is_stopped(start, probe):
 
 
 def test_what_a_message_does_not_know_is_null_in_json():
-    line = recorder.state(state(speed=math.nan))
+    line = lines.state(state(speed=math.nan))
     assert (line['battery'], line['velocity']) == (None, [None, 0.0, 0.0])
     json.dumps(line, allow_nan=False)
 
@@ -140,7 +139,7 @@ def test_zones_come_back_from_the_record_as_they_were():
     zones = [ThreatZone.hemisphere('a', (1.0, 2.0, 3.0), 4.0, 5.0),
              ThreatZone.cylinder('b', (1.0, 2.0), 3.0),
              ThreatZone.polygon('c', [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)], 0.0, 9.0)]
-    text = json.dumps(recorder.zones(from_zones(zones, 0.0)), allow_nan=False)
+    text = json.dumps(lines.zones(from_zones(zones, 0.0)), allow_nan=False)
     assert [heard.zone_from_json(row) for row in json.loads(text)['zones']] == zones
 
 
@@ -148,13 +147,13 @@ def test_a_bad_task_of_an_announcement_is_left_out():
     bad = announcement(m.TaskAnnouncement.ADD, [Task('t2', (1.0, 2.0, 3.0))], 0.0)
     bad.tasks[0].position = Point(x=math.nan)
     bad.tasks += ADD.tasks
-    assert [task['id'] for task in recorder.announced(bad, ORIGIN)['tasks']] == ['t1']
+    assert [task['id'] for task in lines.announced(bad, ORIGIN)['tasks']] == ['t1']
 
 
 def test_uploads_and_health_are_taken_from_the_diagnostics():
     status = DiagnosticStatus(
         level=b'\1', name='mavlink_bridge: uav_1', message='link stale', hardware_id='uav_1',
         values=[KeyValue(key='uploads', value='4'), KeyValue(key='rate', value='10')])
-    assert recorder.uploads(DiagnosticArray(status=[status])) == {
+    assert lines.uploads(DiagnosticArray(status=[status])) == {
         'kind': 'uploads', 'uploads': {'mavlink_bridge: uav_1': 4},
         'health': {'uav_1': [1, 'link stale']}}

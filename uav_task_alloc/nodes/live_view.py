@@ -20,11 +20,11 @@ from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.live.board import Board
 from uav_task_alloc.live.scene import Scene
 from uav_task_alloc.model import is_ros_name
-from uav_task_alloc.nodes import recorder
 from uav_task_alloc.nodes.messages import ANNOUNCEMENTS, LATCHED, STATES
 from uav_task_alloc.nodes.parameters import declare
 from uav_task_alloc.nodes.run import run, with_flags
 from uav_task_alloc.params import LiveViewParams
+from uav_task_alloc.record import lines
 from uav_task_alloc.record.heard import FILE, Heard
 from uav_task_alloc.record.progress import fleet, headline, is_over
 
@@ -58,11 +58,11 @@ class LiveView(Node):
         """Subscribe to what is recorded; lists follow as UAVs become known."""
         for kind, topic, qos, read in (
             (m.TaskAnnouncement, 'task_announcements', ANNOUNCEMENTS,
-             lambda msg: recorder.announced(msg, self.origin)),
-            (m.ThreatZoneArray, 'threat_zones', LATCHED, recorder.zones),
-            (m.TaskStatusArray, 'task_statuses', LATCHED, recorder.statuses),
-            (m.Allocation, 'allocation', ANNOUNCEMENTS, recorder.allocation),
-            (DiagnosticArray, '/diagnostics', 10, recorder.uploads),
+             lambda msg: lines.announced(msg, self.origin)),
+            (m.ThreatZoneArray, 'threat_zones', LATCHED, lines.zones),
+            (m.TaskStatusArray, 'task_statuses', LATCHED, lines.statuses),
+            (m.Allocation, 'allocation', ANNOUNCEMENTS, lines.allocation),
+            (DiagnosticArray, '/diagnostics', 10, lines.uploads),
         ):
             self.create_subscription(kind, topic, self.taking(read), qos)
         self.create_subscription(m.UavState, 'uav_states', self.on_state, STATES)
@@ -73,7 +73,7 @@ class LiveView(Node):
         """Listen to the task lists of one UAV."""
         self.heard.lists[uav] = {'tasks': [], 'distance': 0.0}
         self.create_subscription(m.TaskList, f'{uav}/task_list',
-                                 self.taking(recorder.task_list), LATCHED)
+                                 self.taking(lines.task_list), LATCHED)
 
     def on_state(self, msg: m.UavState) -> None:
         """Record a state where something but the position is new, else twice a second."""
@@ -81,18 +81,18 @@ class LiveView(Node):
             return  # has no topic of lists; the allocator says what is wrong with it
         if msg.uav_id not in self.heard.lists:
             self.follow(msg.uav_id)
-        line = {'wall': time.time(), **recorder.state(msg)}
+        line = {'wall': time.time(), **lines.state(msg)}
         old = self.heard.uavs.get(msg.uav_id)
         what = ('mode', 'mission_state', 'active', 'list_revision', 'available')
         if old is None or line['wall'] - old['wall'] >= REFRESH or any(
                 line[key] != old[key] for key in what):
             self.take(line)
 
-    def taking(self, read: Callable[[Any], recorder.Body]) -> Callable[[Any], None]:
+    def taking(self, read: Callable[[Any], lines.Body]) -> Callable[[Any], None]:
         """A callback that records what `read` makes of a message."""
         return lambda msg: self.take({'wall': time.time(), **read(msg)})
 
-    def take(self, line: recorder.Body) -> None:
+    def take(self, line: lines.Body) -> None:
         """Fold a line into what is known, and write it down."""
         self.scene.take(line)
         if self.file:
@@ -165,7 +165,8 @@ class LiveView(Node):
             from uav_task_alloc.nodes.bag_recorder import BagRecorder
             recorder = BagRecorder(Path(self.params.record), self.get_namespace(), {
                 'speedup': str(self.params.speedup),
-                **{f'origin.{name}': str(value) for name, value in asdict(self.origin).items()}})
+                **({f'origin.{name}': str(value) for name, value in asdict(
+                    self.played.origin).items()} if self.played else {})})
         except (OSError, ImportError) as error:
             raise InvalidValue('record', self.params.record,
                                f'a file that can be written ({error})') from None

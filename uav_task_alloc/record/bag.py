@@ -30,6 +30,7 @@ class Bag:
         self.writer = Writer(self.file, chunk_size=CHUNK)
         self.writer.start(profile=Profile.ROS2, library='uav_task_alloc')
         self.writer.add_metadata(ABOUT, dict(about))
+        self.flush()
         self.schemas: dict[str, int] = {}
         self.channels: dict[str, tuple[int, int]] = {}  # topic: channel, messages so far
 

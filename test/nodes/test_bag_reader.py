@@ -1,0 +1,158 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A bag read back as lines: whole, cut short anywhere, damaged, of WGS84, and what is no bag."""
+import math
+
+import pytest
+from geometry_msgs.msg import Point
+from hypothesis import HealthCheck, given, settings, strategies as st
+from mcap.writer import Writer
+from rclpy.serialization import serialize_message
+from uav_task_alloc_msgs import msg as m
+
+from uav_task_alloc import report
+from uav_task_alloc.errors import InvalidValue
+from uav_task_alloc.model import Task, ThreatZone
+from uav_task_alloc.nodes.definitions import definition
+from uav_task_alloc.nodes.messages import announcement, from_zones, header
+from uav_task_alloc.record.bag import Bag
+from uav_task_alloc.record.bag_reader import BagReader
+
+OURS = 'uav_task_alloc_msgs/msg/'
+ZONES = [ThreatZone.hemisphere('a', (1.0, 2.0, 3.0), 4.0, 5.0),
+         ThreatZone.cylinder('b', (1.0, 2.0), 3.0),
+         ThreatZone.polygon('c', [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)], 0.0, 9.0)]
+WGS = m.TaskAnnouncement(tasks=[m.Task(task_id='w', frame=1, latitude=47.01, longitude=8.0,
+                                       altitude=20.0, value=1.0)])
+
+
+def state(k):
+    return m.UavState(header=header(float(k)), uav_id='u1', position=Point(x=10.0 * k, z=50.0),
+                      battery=math.nan, mode=m.UavState.ON_MISSION)
+
+
+MESSAGES = [
+    ('/task_announcements', announcement(m.TaskAnnouncement.ADD,
+                                         [Task('t1', (10.0, 20.0, 30.0), value=4.0)], 0.0)),
+    ('/threat_zones', from_zones(ZONES, 0.0)),
+    ('/task_statuses', m.TaskStatusArray(statuses=[m.TaskStatus(
+        task_id='t1', state=m.TaskStatus.UNASSIGNED, reason='inside zone a')])),
+    ('/allocation', m.Allocation(revision=1, trigger='ADD t1')),
+    *(('/fleet/uav_states', state(k)) for k in range(5))]
+
+
+def write(path, messages, about=None, flush_every=2):
+    """A bag with a chunk for each two messages, 1 s apart."""
+    with Bag(path, about or {'speedup': '2.0'}) as bag:
+        for k, (topic, message) in enumerate(messages):
+            name = f'{OURS}{type(message).__name__}'
+            if topic not in bag.channels:
+                bag.open(topic, name, definition(name))
+            when = 1_700_000_000_000_000_000 + k * 1_000_000_000
+            bag.add(topic, serialize_message(message), when, when - 5)
+            if k % flush_every:
+                bag.flush()
+    return path
+
+
+@pytest.fixture(scope='module')
+def whole(tmp_path_factory):
+    return write(tmp_path_factory.mktemp('bag') / 'whole.mcap', MESSAGES)
+
+
+def test_a_bag_comes_back_as_lines_whatever_the_namespace(whole):
+    reader = BagReader(whole)
+    run, tasks, zones, statuses, plan, *states = reader
+    assert run == {'kind': 'run', 'speedup': 2.0}
+    assert tasks == {'kind': 'announcement', 'wall': 1.7e9, 'action': 'ADD', 'tasks': [
+        {'id': 't1', 'position': (10.0, 20.0, 30.0), 'value': 4.0}]}
+    assert [row['id'] for row in zones['zones']] == ['a', 'b', 'c']
+    assert statuses['statuses'] == [{'task': 't1', 'state': 'UNASSIGNED', 'uav': '',
+                                     'reason': 'inside zone a'}]
+    assert (plan['trigger'], len(states)) == ('ADD t1', 5)
+    assert states[4]['position'] == [40.0, 0.0, 50.0]
+    assert states[4]['battery'] is None
+    assert (reader.trouble, reader.unread) == ('', {})
+
+
+@pytest.mark.parametrize(('about', 'count'), [
+    ({}, 0), ({'origin.latitude': '47.0', 'origin.longitude': '8.0',
+               'origin.altitude_amsl': '400.0'}, 1)])
+def test_a_task_in_degrees_has_a_place_where_the_bag_tells_the_origin(tmp_path, about, count):
+    *_, tasks = BagReader(write(tmp_path / 'w.mcap', [('/task_announcements', WGS)], about))
+    assert len(tasks['tasks']) == count
+    for task in tasks['tasks']:
+        assert task['position'] == pytest.approx((0.0, 1111.8, 19.9), abs=0.3)
+
+
+def test_the_report_says_where_it_is_and_what_it_found(whole, tmp_path, capsys):
+    html = tmp_path / 'flight.html'
+    assert report.main([str(whole), '--html', str(html)]) == 0
+    out, err = capsys.readouterr()
+    assert f'Report: {html}' in out
+    assert 'tasks unassigned' in out
+    assert err == ''
+    text = html.read_text()
+    for words in ('<td>t1</td><td>unassigned</td>', 'inside zone a', '"u1 flown"'):
+        assert words in text
+
+
+def test_of_a_bag_cut_short_anywhere_all_whole_chunks_are_read(whole, tmp_path):
+    data, most = whole.read_bytes(), 0
+    for length in range(8, len(data), 97):
+        (tmp_path / 'cut.mcap').write_bytes(data[:length])
+        reader = BagReader(tmp_path / 'cut.mcap')
+        count = len(list(reader))
+        assert reader.trouble
+        assert count >= most
+        most = count
+    assert most == len(MESSAGES) + 1
+
+
+def test_the_report_of_a_cut_bag_says_that_it_is_cut(whole, tmp_path, capsys):
+    data = whole.read_bytes()
+    (tmp_path / 'cut.mcap').write_bytes(data[:len(data) * 3 // 4])
+    assert report.main([str(tmp_path / 'cut.mcap')]) == 0
+    assert 'Warning: cut.mcap: it was not closed' in capsys.readouterr().err
+    assert 'it was not closed' in (tmp_path / 'cut.html').read_text()
+
+
+@given(st.data())
+@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.data_too_large,
+          HealthCheck.function_scoped_fixture])
+def test_a_damaged_bag_is_read_as_far_as_it_goes_or_refused_in_words(whole, tmp_path, data):
+    damaged = bytearray(whole.read_bytes())
+    for _ in range(data.draw(st.integers(1, 4))):
+        damaged[data.draw(st.integers(0, len(damaged) - 1))] = data.draw(st.integers(0, 255))
+    (tmp_path / 'bad.mcap').write_bytes(damaged)
+    try:
+        lines = list(BagReader(tmp_path / 'bad.mcap'))
+    except InvalidValue:
+        lines = []
+    assert len(lines) <= len(MESSAGES) + 1
+
+
+def test_a_message_that_is_not_of_its_type_is_counted_and_left_out(tmp_path):
+    with Bag(tmp_path / 'x.mcap', {}) as bag:
+        bag.open('/task_statuses', OURS + 'TaskStatusArray', definition(OURS + 'TaskStatusArray'))
+        bag.open('/uav_states', OURS + 'UavState', 'Nonsense[ x')
+        for topic in ('/task_statuses', '/uav_states'):
+            bag.add(topic, b'\0\1\0\0\xff\xff', 1, 1)
+    reader = BagReader(tmp_path / 'x.mcap')
+    assert [line['kind'] for line in reader] == ['run']
+    assert reader.unread == {'/task_statuses': 1, '/uav_states': 1}
+
+
+def test_what_is_no_record_of_a_flight_is_refused_in_words(tmp_path):
+    for name, data, text in (('empty.mcap', b'', 'expected an MCAP file'),
+                             ('text.mcap', b'hello, this is no bag', 'expected an MCAP file')):
+        (tmp_path / name).write_bytes(data)
+        with pytest.raises(InvalidValue, match=text):
+            report.main([str(tmp_path / name)])
+    with open(tmp_path / 'other.mcap', 'wb') as file:
+        writer = Writer(file)
+        writer.start()
+        writer.finish()
+    with pytest.raises(InvalidValue, match='messages of a fleet in it, found 0'):
+        report.main([str(tmp_path / 'other.mcap')])
+    with pytest.raises(SystemExit, match=r'none\.mcap: No such file'):
+        report.main([str(tmp_path / 'none.mcap')])
