@@ -1,16 +1,16 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
-# Prints the path of a Chromium for the tests of the live page; installs Debian's or Ubuntu's where
-# there is none: `tools/browser.sh [FOLDER]`. With root into the system, else into
-# FOLDER/browser (default .ros). `tools/browser.sh --find [FOLDER]` only looks. Nothing printed:
-# there is none, and the browser tests are skipped; status 0 all the same, 1 where
-# REQUIRE_BROWSER=1.
+# Prints the path of a Chromium for the tests of the live page; installs Debian's where there is
+# none: `tools/browser.sh [FOLDER]`. With root into the system, else into FOLDER/browser (default
+# .ros). `tools/browser.sh --find [FOLDER]` only looks. Nothing printed: there is none, and the
+# browser tests are skipped; the status is 0 all the same, 1 where REQUIRE_BROWSER is set.
 set -euo pipefail
 find_only=; [ "${1-}" != --find ] || { find_only=1; shift; }
 home=$(realpath -m "${1:-$(dirname "${BASH_SOURCE[0]}")/../.ros}")/browser
 
 find_browser() {
-  for name in "${CHROMIUM-}" chromium chromium-browser google-chrome "$home/chromium"; do
+  for name in "${CHROMIUM-}" chromium chromium-browser google-chrome "$home/chromium" \
+      "${HOME-}"/.cache/ms-playwright/chromium-*/chrome-linux*/chrome; do
     path=$(command -v "$name" 2> /dev/null) || continue
     # Ubuntu's chromium-browser may be a stub that asks for a snap
     if "$path" --version > /dev/null 2>&1; then echo "$path"; return; fi
@@ -18,19 +18,21 @@ find_browser() {
   return 1
 }
 
+apt() { apt-get -o Acquire::Retries=1 -o Acquire::http::Timeout=20 "$@"; }
+
 install_for_all() {
-  apt-get update && apt-get install -y --no-install-recommends chromium
+  apt update && apt install -y --no-install-recommends chromium
 }
 
 unpack_for_us() {
   mkdir -p "$home"/{lists,cache,debs,root}
-  local apt=(apt-get -o "Dir::State::Lists=$home/lists" -o "Dir::Cache=$home/cache")
-  "${apt[@]}" update
+  local ours=(-o "Dir::State::Lists=$home/lists" -o "Dir::Cache=$home/cache")
+  apt "${ours[@]}" update
   local names
-  names=$("${apt[@]}" -s install --no-install-recommends chromium | awk '/^Inst/ {print $2}')
+  names=$(apt "${ours[@]}" -s install --no-install-recommends chromium | awk '/^Inst/ {print $2}')
   # word splitting is wanted: one package a word
   # shellcheck disable=SC2086
-  (cd "$home/debs" && "${apt[@]}" download $names)
+  (cd "$home/debs" && apt "${ours[@]}" download $names)
   for deb in "$home"/debs/*.deb; do dpkg -x "$deb" "$home/root"; done
   rm -r "$home/debs" "$home/cache" "$home/lists"
   local lib="$home/root/usr/lib"
@@ -50,6 +52,7 @@ if [ -z "$find_only" ]; then
     rm "$log"; echo "$found"; exit; }
   echo "no Chromium: the browser tests will be skipped; what was tried ended with:" >&2
   tail -n 5 "$log" >&2
+  echo "(name one in CHROMIUM, or: python3 -m playwright install --with-deps chromium)" >&2
   rm "$log"
 fi
 [ -z "${REQUIRE_BROWSER-}" ]

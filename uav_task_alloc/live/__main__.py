@@ -14,20 +14,22 @@ from uav_task_alloc.record import heard
 
 def play(out_dir: Path, until: float = math.inf) -> Board:
     """The board as it stood at the end of a record, or `until` [s] after its first task."""
-    board, scene, put = Board(), Scene(heard.Heard()), -math.inf
+    board, said = Board(), heard.Heard()
+    scene, put = Scene(said), -math.inf
 
-    def post(wall: float) -> None:
-        board.put(wall, {'start': scene.heard.start(), 'speedup': scene.heard.speedup,
-                         'live': False}, *scene.news(wall))
+    def post() -> None:
+        board.put(said.last, {'start': said.start(), 'speedup': said.speedup, 'live': False},
+                  *scene.news(said.last))
 
     for line in heard.read_lines(out_dir / heard.FILE):
-        if scene.heard.tasks and scene.heard.clock(line['wall']) > until:
+        if said.tasks and said.clock(line['wall']) > until:
             break
-        scene.take(line)
         if line['wall'] >= put + TICK:
             put = line['wall']
-            post(put)
-    post(scene.heard.last)
+            if said.last > -math.inf:
+                post()
+        scene.take(line)
+    post()
     return board
 
 

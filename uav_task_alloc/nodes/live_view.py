@@ -114,8 +114,10 @@ class LiveView(Node):
     def post(self) -> None:
         """Put what is new on the page."""
         wall = time.time()
-        times = {'start': self.heard.start(), 'speedup': self.heard.speedup, 'live': True}
-        self.board.put(wall, times, *self.scene.news(wall))
+        news = self.scene.news(wall)
+        if self.server:
+            self.board.put(wall, {'start': self.heard.start(), 'live': True,
+                                  'speedup': self.heard.speedup}, *news)
 
     def clock(self) -> float:
         """Scenario time [s]: since the first task was announced."""

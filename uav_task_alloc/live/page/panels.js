@@ -161,7 +161,8 @@ function showUav(node, uav, done, seen) {
   put(words, uav.words);
   node.classList.toggle('trouble', Boolean(uav.silent || uav.health));  // comes first
   put(link, uav.link, node.classList.contains('trouble') ? 'bad' : 'good');
-  put(battery, uav.battery == null ? '' : `battery ${Math.round(100 * uav.battery)} %`);
+  put(battery, [uav.battery == null ? '' : `battery ${Math.round(100 * uav.battery)} %`,
+    uav.range == null ? '' : `range ${uav.range} m`].filter(Boolean).join(', '));
   put(count, `${done} done, ${list.length} to fly${board ? `, ${board}` : ''}`);
   if (!node.open) return;
   fill(rows, JSON.stringify(list.map(task => task.id)), () => list.slice(0, MOST).map(task => {
