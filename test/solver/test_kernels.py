@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The kernels: sums stay true, undo undoes, neighbours are the nearest."""
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
@@ -73,3 +76,32 @@ def test_chance_is_even_and_the_same_again():
     again = chance(5)
     assert drawn[0] == uniform(again)
     assert {below(again, 3) for _ in range(100)} == {0, 1, 2}
+
+
+LOADED = """
+import sys
+from numba.core.dispatcher import Dispatcher
+from uav_task_alloc import Task, ThreatZone, Uav
+from uav_task_alloc.solver import solve
+
+def loaded():
+    return {(name, each): len(kernel.signatures) for name, module in sys.modules.items()
+            if name.startswith('uav_task_alloc.') for each, kernel in vars(module).items()
+            if isinstance(kernel, Dispatcher)}
+
+zones = [ThreatZone.hemisphere('dome', (30.0, 5.0, 0.0), 9.0),
+         ThreatZone.polygon('prism', [(60.0, -9.0), (70.0, -9.0), (65.0, 30.0)], z_max=90.0)]
+for given in ([], zones):
+    solve.warm_up('chain_q', bool(given))
+    before = loaded()
+    solve.plan([Uav('u', (0.0, 0.0, 0.0), 900.0), Uav('v', (50.0, 0.0, 0.0), 900.0)],
+               [Task(f't{i}', (10.0 * i, 9.0 * (i % 2), 4.0)) for i in range(12)], given,
+               budget=0.05, route_end='home')
+    print([name for name, count in loaded().items() if count > before.get(name, 0)])
+"""
+
+
+def test_no_kernel_is_left_to_be_loaded_within_a_budget():
+    done = subprocess.run([sys.executable, '-c', LOADED], capture_output=True, text=True,
+                          check=True)
+    assert done.stdout.splitlines() == ['[]', '[]'], done.stdout

@@ -49,7 +49,7 @@ def plan(uavs: Iterable[Uav], tasks: Iterable[Task], zones: Iterable[ThreatZone]
     limits = Limits(check_unique('zone', zones, ThreatZone), clearance, altitude_min,
                     altitude_max)
     rules = Rules(route_end == 'home', hard_range, weights or Weights())
-    warm_up(solver)
+    warm_up(solver, bool(limits.zones))
     began, before = clock(), State.of(warm)
     problem = make_problem(fleet, work, check_locked(locked, fleet, work, limits), limits, rules,
                            before.problem)
@@ -73,11 +73,16 @@ def _held(problem: Problem) -> tuple[float, float]:
 
 
 @functools.cache
-def warm_up(solver: str = 'chain_q') -> None:
-    """Load a solver's kernels, compile those not on disk yet; does nothing a second time."""
+def warm_up(solver: str = 'chain_q', zones: bool = False) -> None:
+    """Load a solver's kernels, compile those not on disk yet; does nothing a second time.
+
+    zones: those that find ways around zones as well.
+    """
     uavs = (Uav('u', (0.0, 0.0, 0.0)), Uav('v', (9.0, 0.0, 0.0), 30.0))
     tasks = tuple(Task(f't{i}', (float(i), 1.0, 0.0)) for i in range(5))
-    problem = make_problem(uavs, tasks, {}, Limits(), Rules())
-    recorder = Recorder(problem, lambda: 0.0, 0.0, 1.0, max_iterations=64)
+    between = tuple(ThreatZone.cylinder(f'z{x}', (x, 1.0), 0.3) for x in (1.5, 2.5, 4.0) if zones)
+    problem = make_problem(uavs, tasks, {}, Limits(between), Rules(returns=True))
+    rounds = 500 if solver == 'chain_q' else 64  # until each kind of bee has flown
+    recorder = Recorder(problem, lambda: 0.0, 0.0, 1.0, max_iterations=rounds)
     SOLVERS[solver](recorder, 0, None)
     to_plan(problem, recorder, '', False)
