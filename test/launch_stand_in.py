@@ -42,6 +42,23 @@ class Joined(Value):
         return '/'.join(text(part, given) for part in self.what)
 
 
+class Equal(Value):
+    """Whether two values are the same, as `true` or `false`."""
+
+    same = True
+
+    def __init__(self, what, other):
+        super().__init__(what)
+        self.other = other
+
+    def text(self, given):
+        return str((text(self.what, given) == text(self.other, given)) is self.same).lower()
+
+
+class NotEqual(Equal):
+    same = False
+
+
 class Source(Value):
     def text(self, given):
         return text(self.what, given)
@@ -53,7 +70,8 @@ class Typed(Value):
         self.type = value_type
 
     def text(self, given):
-        return str(self.type(text(self.what, given)))
+        value = self.type(text(self.what, given))
+        return f"'{value}'" if self.type is str else str(value)  # as YAML, where '' is no value
 
 
 class Condition(Value):
@@ -120,8 +138,8 @@ MODULES = {
     'launch.actions': {'DeclareLaunchArgument': Declared, 'IncludeLaunchDescription': Include},
     'launch.conditions': {'IfCondition': Condition, 'UnlessCondition': NotCondition},
     'launch.launch_description_sources': {'PythonLaunchDescriptionSource': Source},
-    'launch.substitutions': {'LaunchConfiguration': Configuration,
-                             'PathJoinSubstitution': Joined},
+    'launch.substitutions': {'LaunchConfiguration': Configuration, 'PathJoinSubstitution': Joined,
+                             'EqualsSubstitution': Equal, 'NotEqualsSubstitution': NotEqual},
     'launch_ros': {}, 'launch_ros.actions': {'Node': Node},
     'launch_ros.parameter_descriptions': {'ParameterValue': Typed},
     'launch_ros.substitutions': {'FindPackageShare': Share},
