@@ -1,13 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """Restart: the world comes back from the journal, revisions rise, nothing is taken too early."""
+import numpy as np
 import pytest
 from allocation import Desk
 
-from uav_task_alloc.allocator.keeper import Keeper
+from uav_task_alloc import plan
+from uav_task_alloc.allocator.learner import learner, learner_row
 from uav_task_alloc.allocator.restore import saved
-from uav_task_alloc.errors import JournalError
-from uav_task_alloc.journal import FILE_NAME, Row
+from uav_task_alloc.journal import Row
 from uav_task_alloc.model import Task, ThreatZone
+from uav_task_alloc.solver.tables import Learnt, Tables
 
 ZONES = (ThreatZone.hemisphere('z1', (500.0, 5.0, 0.0), 100.0),
          ThreatZone.cylinder('z2', (0.0, 900.0), 10.0, 0.0),
@@ -63,7 +65,8 @@ def test_nothing_is_withdrawn_before_the_uavs_had_time_to_be_heard(rows):
     desk.settle()
     assert desk.route('a')[0] == 't2'
     assert 't9' in desk.route('a')
-    assert desk.allocations[-1].revision == saved(rows).revision + 1
+    assert [each.revision for each in desk.allocations] == [
+        saved(rows).revision + 1, saved(rows).revision + 2]
 
 
 def test_a_uav_that_is_not_heard_after_a_restart_loses_its_tasks(rows):
@@ -94,46 +97,92 @@ def test_a_uav_that_is_past_a_task_flew_it_while_nobody_listened(rows):
     assert desk.route('a') == (second,)
 
 
-def test_a_row_that_nobody_wrote_is_refused():
-    with pytest.raises(JournalError, match="journal row task 't1' cannot be read: KeyError"):
-        saved([Row('task', 't1', {'id': 't1'})])
-    with pytest.raises(JournalError, match="unknown kind 'mood'"):
-        saved([Row('mood', '', 'good')])
+def test_a_row_that_nobody_wrote_is_left_out_and_told(rows):
+    found = saved([*rows, Row('task', 't9', {'id': 't9'}), Row('mood', '', 'good'),
+                   Row('learner', '', {'uavs': ['a'], 'tasks': [], 'near': '!', 'task': '',
+                                       'start': ''})])
+    assert found.tasks == saved(rows).tasks
+    assert len(found.bad) == 3
+    assert found.bad[0].startswith("journal row task 't9' cannot be read: KeyError")
+    assert "unknown kind 'mood'" in found.bad[1]
 
 
-def test_a_keeper_brings_back_what_it_saved(tmp_path):
-    desk, keeper = Desk(), Keeper(str(tmp_path), print)
-    desk.add(('t1', 100, 0))
-    keeper.save(desk.core, desk.now)
-    assert desk.core.rows() == []
-    keeper.close()
-    assert saved([]) != Keeper(str(tmp_path), print).saved
-    assert Keeper('', print).saved == saved([])
+def test_a_list_forgets_a_task_whose_row_is_gone(rows):
+    found = saved([row for row in rows if row.id != 't2'])
+    assert all('t2' not in each.task_ids for each in found.lists)
 
 
-def test_a_full_disk_is_told_once_and_made_up_for_when_there_is_room(tmp_path):
-    said = []
-    desk, keeper = Desk(), Keeper(str(tmp_path), said.append)
-    database = keeper._journal._db
-    database.execute('PRAGMA max_page_count = 3')
-    for k in range(300):
-        desk.add((f't{k}', 100, 0))
-        keeper.save(desk.core, desk.now + k)
-    assert len(said) == 1
-    assert keeper.trouble.endswith('database or disk is full; tried again every 1 s')
-    database.execute('PRAGMA max_page_count = 1000000')
-    keeper.save(desk.core, desk.now + 1000.0)
-    assert keeper.trouble == ''
-    keeper.close()
-    assert len(Keeper(str(tmp_path), print).saved.tasks) == 300
+def test_the_plan_of_the_last_life_is_told_before_any_other(rows):
+    desk = Desk(saved(rows))
+    desk.core.tick(desk.now, desk.now)
+    desk.take()
+    told, = desk.allocations
+    assert (told.trigger, told.revision) == ('restart', saved(rows).revision + 1)
+    assert told.plan.routes == {each.uav: each.task_ids for each in saved(rows).lists}
+    assert told.plan.distance == pytest.approx(sum(each.distance for each in told.lists))
 
 
-def test_without_a_good_journal_the_allocator_runs_on_and_says_so(tmp_path):
-    said = []
-    (tmp_path / FILE_NAME).write_bytes(b'no database at all ' * 50)
-    keeper = Keeper(str(tmp_path), said.append)
-    desk = Desk(keeper.saved)
-    desk.add(('t1', 100, 0))
-    keeper.save(desk.core, desk.now)
-    assert said == [keeper.trouble]
-    assert 'file is not a database; nothing is kept' in keeper.trouble
+def test_what_was_being_flown_is_known_before_its_uav_is_heard():
+    desk = Desk()
+    desk.uav('a', 0.0, 0.0, 50.0)
+    desk.add(('t1', 100, 0), ('t2', 200, 0))
+    desk.settle()
+    desk.event('STARTED', 't2', 'a')
+    after = Desk(saved(desk.core.rows()))
+    assert after.state('t2') == 'ACTIVE'
+    assert after.event('STARTED', 't1', 'a', revision=1) == ''
+    after.event('STARTED', 't2', 'a', revision=1)
+    after.uav('a', 0.0, 0.0, 50.0)
+    assert after.begin().locked == {'a': ('t2',)}
+    assert after.route('a') == ('t1', 't2')
+
+
+def test_no_list_is_told_again_with_what_was_completed_out_of_turn():
+    desk = Desk()
+    desk.uav('a', 0.0, 0.0, 50.0)
+    desk.add(('t1', 100, 0), ('t2', 200, 0), ('t3', 300, 0))
+    desk.settle()
+    desk.event('COMPLETED', 't2', 'a')
+    after = Desk(saved(desk.core.rows()))
+    after.core.tick(after.now, after.now)
+    after.take()
+    assert after.history == []
+    after.uav('a', 0.0, 0.0, 50.0)
+    after.settle()
+    assert after.route('a') == ('t1', 't3')
+
+
+def test_what_the_bees_learnt_survives():
+    desk = Desk(plan=plan, solve_budget=0.02)
+    desk.uav('a', 0.0, 0.0, 50.0)
+    desk.uav('b', 900.0, 0.0, 50.0)
+    for k in range(3):
+        desk.add(*((f't{k}_{i}', 37 * i % 400, 91 * i % 300) for i in range(10)))
+        desk.settle(wait=6.0)
+    before = desk.core._best.state.learnt
+    after = Desk(saved(desk.core.rows()), plan=plan)
+    kept = after.core._best.state.learnt
+    assert (kept.uavs, kept.tasks) == (before.uavs, before.tasks)
+    assert np.allclose(kept.tables.task, before.tables.task)
+    assert np.allclose(kept.tables.start, before.tables.start)
+    assert (kept.near == before.near).all()
+    for uav_id in 'ab':
+        after.uav(uav_id, 0.0, 0.0, 50.0)
+    after.settle()
+    assert sum(len(each.stops) for each in after.lists.values()) == 30
+
+
+def test_what_was_learnt_is_bounded(monkeypatch):
+    tables = Tables(np.full((40, 4), 0.25), np.full((3, 40), 0.75))
+    near = np.tile(np.arange(3, 7), (40, 1))
+    learnt = Learnt(tables, near, {'a': 0, 'b': 1, 'c': 2}, {f't{k}': k for k in range(40)})
+    assert learner(learner_row(learnt).body).uavs == learnt.uavs
+    monkeypatch.setattr('uav_task_alloc.allocator.learner.MOST', 119)
+    assert learner_row(learnt).body is None
+    monkeypatch.setattr('uav_task_alloc.allocator.learner.MOST', 160)
+    wide = learnt._replace(tables=tables._replace(start=np.full((5, 40), 0.5)), near=near + 2,
+                           uavs={f'u{k}': k for k in range(5)})
+    kept = learner(learner_row(wide).body)  # the starts are 200: left out
+    assert (kept.uavs, kept.tables.start.shape) == ({}, (0, 40))
+    assert (kept.near == np.arange(4)).all()
+    assert (kept.tables.task == 0.25).all()

@@ -8,6 +8,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from uav_task_alloc import params
+from uav_task_alloc.allocator import life
 from uav_task_alloc.errors import AllocError
 from uav_task_alloc.scenario.document import markdown_text
 
@@ -41,7 +42,8 @@ def params_command(argv: Sequence[str]) -> int:
     if list(argv) not in ([], ['--write']):
         raise SystemExit('usage: python -m uav_task_alloc params [--write]')
     files = {Path('docs/parameters.md'): params.markdown_text(),
-             Path('docs/scenarios.md'): markdown_text()}
+             Path('docs/scenarios.md'): markdown_text(),
+             Path('docs/task_states.md'): life.markdown_text()}
     if not argv:
         print('\n'.join(files.values()))
         return 0

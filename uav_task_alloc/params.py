@@ -107,6 +107,14 @@ class AllocatorParams(Framed):
                                      low=0.0, high=10.0, unit='s')
     background_period: float = param(0.5, 'Rest between two such searches.', low=0.05,
                                      high=3600.0, unit='s')
+    list_interval: float = param(0.25, 'Least time between two lists for one UAV, unless it '
+                                 'cannot fly the first.', low=0.0, high=3600.0, unit='s')
+    locked_tasks: int = param(1, 'Tasks of a list that stay with a UAV in flight: the one being '
+                              'flown, and those after it.', low=0, high=1000)
+    battery_reserve: float = param(0.2, 'Battery below which a UAV goes home and its tasks go to '
+                                   'the others.', low=0.0, high=0.9)
+    position_jump: float = param(200.0, 'Between two reports: farther is told and planned for.',
+                                 low=1.0, high=1e7, unit='m')
     max_attempts: int = param(3, 'UAVs that may fail at a task before it is FAILED.', low=1,
                               high=1000)
     state_dir: str = param('', 'Folder of the journal; empty: nothing is kept.', fixed=True)

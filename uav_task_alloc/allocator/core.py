@@ -7,9 +7,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
+from functools import partial
 
 from uav_task_alloc.allocator import planning
 from uav_task_alloc.allocator.answer import steady
+from uav_task_alloc.allocator.learner import learner_row
+from uav_task_alloc.allocator.pace import Pace
 from uav_task_alloc.allocator.records import Allocation, Answer, Outbox, Problem, UavList
 from uav_task_alloc.allocator.restore import (
     Saved,
@@ -23,6 +26,9 @@ from uav_task_alloc.allocator.world import World
 from uav_task_alloc.journal import Row
 from uav_task_alloc.model import Plan
 from uav_task_alloc.params import AllocatorParams
+from uav_task_alloc.solver.warm import State
+
+LEARNER = 5.0  # [s] between two rows of what the bees learnt
 
 
 class Allocator:
@@ -33,13 +39,18 @@ class Allocator:
     def __init__(self, params: AllocatorParams, now: float, saved: Saved | None = None) -> None:
         saved = saved or Saved()
         self.world = World(params, saved)
-        self._best = Plan({})
+        self._best = Plan({each.uav: each.task_ids for each in saved.lists},
+                          state=State(learnt=saved.learnt))
+        self._learnt_at = now
+        self._pace = Pace()
         self._left: dict[str, str] = {}  # task id -> why it is left out
         # UAVs of the journal get time to be heard before they lose anything
         self._wait_for = {each.uav for each in saved.lists if each.stops}
         self._wait_until = now + params.uav_timeout
-        self.world.outbox.again.update(each.uav for each in saved.lists)
+        self._restarted = bool(saved.lists)
+        self.world.again.update(each.uav for each in saved.lists)
         if saved.tasks:
+            self.world.outbox.statuses = True
             self.world.touch('restart', now)
 
     def wake(self) -> None:
@@ -54,9 +65,15 @@ class Allocator:
             shorter = world.lists.without_flown(uav_id, self._ended, stamp)
             if shorter is not None:
                 self._publish({uav_id: shorter}, stamp)
-        for uav_id in sorted(world.outbox.again):
-            self._publish({uav_id: world.lists.aged(uav_id, stamp)}, stamp, again=True)
-        world.outbox.again.clear()
+        # one with an ended task further back waits for the plan: its legs are not true any more
+        for uav_id in sorted(world.again):
+            if not any(map(self._ended, world.lists.get(uav_id).task_ids)):
+                self._publish({uav_id: world.lists.aged(uav_id, stamp)}, stamp, again=True)
+        if self._restarted:  # the plan of the last life is in force, and told before any other
+            self._restarted = False
+            self._tell(Plan({}), 'restart', stamp)
+        if self._pace.due(now):
+            world.touch('lists held back', now)
         if world.outbox.statuses:
             planning.explain(world, self._left, stamp)
 
@@ -73,7 +90,7 @@ class Allocator:
             trigger = schedule.begin(now)
             if any(world.fleet.usable(uav_id) for uav_id in world.fleet.records):
                 return planning.problem(world, self._best, trigger, background=False)
-            self._take(Plan({}), trigger, True, stamp)
+            self._take(Plan({}), trigger, True, now, stamp)
             schedule.end(now)
         elif (params.background_budget > 0.0 and world.fleet.records and world.tasks.open()
               and schedule.rested(now, params.background_period)
@@ -98,29 +115,45 @@ class Allocator:
         if answer is None:
             return
         self._best = answer.fresh
+        if now - self._learnt_at >= LEARNER:
+            self._learnt_at = now
+            self.world.dirty.add('learner')
         chosen = replace(steady(answer, self.world.params.replan_margin),
                          iterations=answer.fresh.iterations,
                          solve_time=answer.base.solve_time + answer.fresh.solve_time,
                          warm_started=any(answer.problem.held.routes.values()))
-        self._take(chosen, answer.problem.trigger, not answer.problem.background, stamp)
+        self._take(chosen, answer.problem.trigger, not answer.problem.background, now, stamp)
 
-    def _take(self, chosen: Plan, trigger: str, always: bool, stamp: float) -> None:
+    def _take(self, chosen: Plan, trigger: str, always: bool, now: float, stamp: float) -> None:
         world = self.world
         lists, self._left = planning.lists_of(world, chosen)
-        changed = self._publish(lists, stamp)
+        lists = self._pace.ripe(world.lists.lists, lists, partial(planning.must_change, world),
+                                now, world.params.list_interval)
+        told = self._publish(lists, stamp)
+        self._pace.told(told, now)
+        changed = bool(told)
         planning.explain(world, self._left, stamp)
         world.outbox.statuses |= changed or always or bool(world.tasks.dirty)
         if changed or always:
-            world.revision += 1
-            world.dirty.add('revision')
-            world.outbox.allocation = Allocation(
-                world.revision, tuple(world.lists.lists.values()),
-                planning.held_plan(world, self._left, chosen), trigger, stamp)
+            self._tell(chosen, trigger, stamp)
 
-    def _publish(self, lists: Mapping[str, UavList], stamp: float, again: bool = False) -> bool:
+    def _tell(self, found: Plan, trigger: str, stamp: float) -> None:
+        """The lists in force as an allocation."""
+        world = self.world
+        world.revision += 1
+        world.dirty.add('revision')
+        world.outbox.allocation = Allocation(
+            world.revision, tuple(world.lists.lists.values()),
+            planning.held_plan(world, self._left, found), trigger, stamp)
+
+    def _publish(self, lists: Mapping[str, UavList], stamp: float,
+                 again: bool = False) -> list[str]:
+        """Put lists in force; returns for whom that is news."""
         made = [self.world.lists.publish(each, stamp, again) for each in lists.values()]
-        self.world.outbox.lists.update((each.uav, each) for each in made if each)
-        return any(made)
+        told = {each.uav: each for each in made if each}
+        self.world.outbox.lists.update(told)
+        self.world.again -= set(told)
+        return list(told)
 
     def collect(self) -> Outbox:
         """What has to be told since the last call; the rows belong on disk before."""
@@ -135,8 +168,16 @@ class Allocator:
         rows += [list_row(world.lists.lists[uav_id]) for uav_id in sorted(world.lists.dirty)]
         made = {'zones': lambda: zones_row(world.zones.values()),
                 'off': lambda: off_row(world.fleet.off),
-                'revision': lambda: revision_row(world.revision)}
+                'revision': lambda: revision_row(world.revision),
+                'learner': lambda: learner_row(getattr(self._best.state, 'learnt', None))}
         return rows + [made[name]() for name in sorted(world.dirty)]
+
+    def nothing_written(self) -> None:
+        """The disk has nothing of this world: all of it is to be written."""
+        world = self.world
+        world.tasks.dirty.update(world.tasks.records)
+        world.lists.dirty.update(world.lists.lists)
+        world.dirty.update(('zones', 'off', 'revision', 'learner'))
 
     def written(self, rows: Iterable[Row] | None = None) -> bool:
         """These are on disk, None: need not be; returns whether nothing is left to save."""

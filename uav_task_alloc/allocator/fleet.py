@@ -2,11 +2,14 @@
 """The book of UAVs: what each said last, who is silent, who may be given tasks."""
 from __future__ import annotations
 
-from collections.abc import Iterable
+import math
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 
 from uav_task_alloc.allocator.records import UavReport
 from uav_task_alloc.model import Point, Task, Uav
+
+RECHARGED = 0.1  # above the reserve: a battery that was low is good again
 
 
 @dataclass(frozen=True, slots=True)
@@ -17,29 +20,35 @@ class UavRecord:
     heard: float  # [s] steady clock
     home: Point  # [m] ENU: as reported, else where it was first heard
     silent: bool = False
-    active: str = ''  # the task it is known to be flying
     caught: bool = False  # inside a zone
+    battery: float | None = None  # [0..1] last told
+    low: bool = False  # the battery was below the reserve and is not recharged
+    jumped: float = -math.inf  # [s] steady clock: the position last jumped
 
     @property
     def usable(self) -> bool:
-        """It speaks and says that it may be given tasks."""
-        return self.report.available and not self.silent
+        """It speaks, has battery, and says that it may be given tasks."""
+        return self.report.available and not self.silent and not self.low
 
 
 class Fleet:
     """UAVs by id; what an operator switched off stays off until he switches it on."""
 
-    def __init__(self, off: Iterable[str] = ()) -> None:
+    def __init__(self, off: Iterable[str] = (), active: Mapping[str, str] | None = None) -> None:
         self.records: dict[str, UavRecord] = {}
         self.off = set(off)
+        self.active = dict(active or {})  # UAV -> the task it is known to be flying
 
-    def hear(self, report: UavReport, now: float) -> UavRecord | None:
-        """Take a report in; returns what was known before."""
-        before = self.records.get(report.uav_id)
-        home = report.home or (before.home if before else report.position)
-        active = report.active_task or (before.active if before else '')
-        self.records[report.uav_id] = UavRecord(
-            report, now, home, active=active, caught=before.caught if before else False)
+    def hear(self, report: UavReport, now: float, reserve: float = 0.0) -> UavRecord | None:
+        """Take a report in; returns what was known before. reserve: of the battery [0..1]."""
+        uav_id, before = report.uav_id, self.records.get(report.uav_id)
+        battery, low = _battery(before, report.battery, reserve)
+        if report.active_task:
+            self.active[uav_id] = report.active_task
+        self.records[uav_id] = UavRecord(
+            report, now, report.home or (before.home if before else report.position),
+            caught=before.caught if before else False, battery=battery, low=low,
+            jumped=before.jumped if before else -math.inf)
         return before
 
     def fall_silent(self, now: float, timeout: float) -> list[str]:
@@ -47,12 +56,13 @@ class Fleet:
         lost = [uav_id for uav_id, record in self.records.items()
                 if not record.silent and now - record.heard > timeout]
         for uav_id in lost:
-            self.records[uav_id] = replace(self.records[uav_id], silent=True, active='')
+            self.records[uav_id] = replace(self.records[uav_id], silent=True)
+            self.active.pop(uav_id, None)
         return lost
 
-    def set_active(self, uav_id: str, task_id: str) -> None:
-        """It is known to fly this task now; '' where to none."""
-        self.records[uav_id] = replace(self.records[uav_id], active=task_id)
+    def set_jumped(self, uav_id: str, now: float) -> None:
+        """Its position jumped."""
+        self.records[uav_id] = replace(self.records[uav_id], jumped=now)
 
     def set_caught(self, uav_id: str, caught: bool) -> None:
         """It is inside a zone, or out again."""
@@ -71,6 +81,15 @@ class Fleet:
                    range=default_range if report.range is None else report.range,
                    cruise_speed=report.cruise_speed or default_cruise_speed,
                    capabilities=report.capabilities, home=record.home)
+
+
+def _battery(before: UavRecord | None, told: float | None,
+             reserve: float) -> tuple[float | None, bool]:
+    """What is left, and whether that is too little; a UAV that tells nothing stays as it was."""
+    known, was_low = (before.battery, before.low) if before else (None, False)
+    if told is None or (told == 0.0 and known is None):  # 0: a field that nobody has set
+        return known, was_low
+    return told, told < reserve + (RECHARGED if was_low else 0.0)
 
 
 def may_fly(task: Task, failed_on: Iterable[str], uav: UavReport) -> bool:

@@ -8,12 +8,12 @@ from dataclasses import replace
 
 from uav_task_alloc.allocator.answer import Routes, repaired
 from uav_task_alloc.allocator.fleet import may_fly
+from uav_task_alloc.allocator.life import Event
 from uav_task_alloc.allocator.lists import lay, planned_legs
 from uav_task_alloc.allocator.records import (
     Answer,
     Problem,
     TaskRecord,
-    TaskState,
     UavList,
 )
 from uav_task_alloc.allocator.world import World
@@ -68,8 +68,33 @@ def lists_of(world: World, chosen: Plan) -> tuple[dict[str, UavList], dict[str, 
         world.laid[uav_id] = ways
     for uav_id, held in world.lists.lists.items():
         if uav_id not in lists:  # gone: what it does not have it cannot fly when it is back
-            lists[uav_id] = replace(held, stops=(), distance=0.0)
+            lists[uav_id] = _without(world, uav_id, held)
     return lists, left
+
+
+def _without(world: World, uav_id: str, held: UavList) -> UavList:
+    """The empty list; one whose battery is low is sent home, the others stay as they were."""
+    record = world.fleet.records.get(uav_id)
+    if record is None or not record.low:
+        return replace(held, stops=(), distance=0.0)
+    return lay(_uav(world, uav_id), (), True, {}, held, world.ways())[0]
+
+
+def must_change(world: World, uav_id: str) -> bool:
+    """What the UAV was told last it cannot or may not fly, or it has nothing to do."""
+    held, record = world.lists.get(uav_id), world.fleet.records.get(uav_id)
+    if not held.stops or record is None or not world.fleet.usable(uav_id):
+        return True
+    for stop in held.stops:
+        known = world.tasks.records.get(stop.task.id)
+        if (known is None or not known.open or known.task != stop.task
+                or not may_fly(known.task, known.failed_on, record.report)):
+            return True
+    ways, places = world.ways(), [stop.task.position for stop in held.stops]
+    return (held.returns != (world.params.route_end == 'home')
+            or ways.rest(record.report.position, held.stops[0].leg, places[0]) is None
+            or not all(ways.clear(place, *stop.leg.via, stop.task.position)
+                       for place, stop in zip(places, held.stops[1:], strict=False)))
 
 
 def _routes_now(world: World, chosen: Plan) -> Routes:
@@ -92,32 +117,30 @@ def explain(world: World, left: Mapping[str, str], stamp: float) -> None:
     for record in world.tasks.open():
         uav_id = owners.get(record.task.id, '')
         if uav_id:
-            known = world.fleet.records.get(uav_id)
-            active = known is not None and known.active == record.task.id
-            state = TaskState.ACTIVE if active else TaskState.ASSIGNED
-            world.tasks.change(record.task.id, stamp, state=state, uav=uav_id, reason='')
+            active = world.fleet.active.get(uav_id) == record.task.id
+            world.tasks.step(record.task.id, Event.START if active else Event.LIST, stamp, uav_id)
         else:
-            state, reason = _why_left(world, record, usable, left)
-            world.tasks.change(record.task.id, stamp, state=state, uav='', reason=reason)
+            event, why = _why_left(world, record, usable, left)
+            world.tasks.step(record.task.id, event, stamp, why=why)
 
 
 def _why_left(world: World, record: TaskRecord, usable: frozenset[str],
-              left: Mapping[str, str]) -> tuple[TaskState, str]:
+              left: Mapping[str, str]) -> tuple[Event, str]:
     heard, allowed = world.fleet.records, record.task.allowed_uavs
     if not heard:
-        return TaskState.PENDING, 'no UAV heard yet'
+        return Event.WAIT, 'no UAV heard yet'
     if allowed is not None and not any(uav_id in heard for uav_id in allowed):
-        return TaskState.UNASSIGNED, (f'allowed for {", ".join(sorted(allowed))} only: '
+        return Event.LEAVE, (f'allowed for {", ".join(sorted(allowed))} only: '
                                       'not heard yet')
     if not usable:
-        return TaskState.UNASSIGNED, 'no UAV available'
+        return Event.LEAVE, 'no UAV available'
     others = _restricted(record, usable).allowed_uavs
     if record.failed_on and others is not None and others.isdisjoint(usable):
-        return TaskState.UNASSIGNED, (f'failed on {", ".join(record.failed_on)}; no other UAV '
+        return Event.LEAVE, (f'failed on {", ".join(record.failed_on)}; no other UAV '
                                       'that may fly it is available')
     if record.task.id in left:
-        return TaskState.UNASSIGNED, left[record.task.id]
-    return TaskState.PENDING, record.reason or 'waits for the next plan'
+        return Event.LEAVE, left[record.task.id]
+    return Event.WAIT, record.reason or 'waits for the next plan'
 
 
 def _uav(world: World, uav_id: str) -> Uav:

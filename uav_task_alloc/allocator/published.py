@@ -67,7 +67,10 @@ class ListBook:
 
     def without_flown(self, uav_id: str, done: Callable[[str], bool],
                       stamp: float) -> UavList | None:
-        """The list without the ended tasks at its front; None: there are none."""
+        """The list without the ended tasks at its front; None: there are none, or others too.
+
+        An ended task further back changes legs: that list is the next plan's business.
+        """
         stops = self.get(uav_id).stops
         if not stops or not done(stops[0].task.id):
             return None
@@ -75,5 +78,7 @@ class ListBook:
         stops = held.stops
         while stops and done(stops[0].task.id):
             stops = stops[1:]
+        if any(done(stop.task.id) for stop in stops):
+            return None
         flown = sum(stop.leg.length for stop in held.stops[:len(held.stops) - len(stops)])
         return replace(held, stops=stops, distance=held.distance - flown if stops else 0.0)

@@ -35,6 +35,7 @@ class TaskState(Enum):
 
 OPEN = frozenset({TaskState.PENDING, TaskState.ASSIGNED, TaskState.ACTIVE,
                   TaskState.UNASSIGNED})
+ENDED = frozenset({TaskState.COMPLETED, TaskState.FAILED, TaskState.CANCELLED})
 
 
 class Action(Enum):
@@ -106,6 +107,7 @@ class UavReport:
     range: float | None = None  # [m] it can still fly
     cruise_speed: float | None = None  # [m/s]
     capabilities: frozenset[str] = frozenset()
+    battery: float | None = None  # [0..1]
     available: bool = True  # and not in FAULT
     active_task: str = ''  # being flown
     list_revision: int = 0  # last list verified on board
@@ -121,6 +123,8 @@ class UavReport:
             check_number(place + 'range_remaining', self.range, 0.0)
         if self.cruise_speed is not None:
             check_number(place + 'cruise_speed', self.cruise_speed, 0.0, 1e4)
+        if self.battery is not None:
+            check_number(place + 'battery', self.battery, 0.0, 1.0)
         put(self, 'capabilities', check_names(place + 'capabilities', self.capabilities))
 
 
@@ -206,7 +210,6 @@ class Outbox:
     """What has to be told since it was last emptied."""
 
     lists: dict[str, UavList] = field(default_factory=dict)
-    again: set[str] = field(default_factory=set)  # UAVs to be told once more
     allocation: Allocation | None = None
     statuses: bool = False
     notes: list[Note] = field(default_factory=list)

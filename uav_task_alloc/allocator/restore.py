@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from enum import Enum
 from typing import Any
 
+from uav_task_alloc.allocator.learner import learner
 from uav_task_alloc.allocator.records import Stop, TaskRecord, TaskState, UavList
-from uav_task_alloc.errors import JournalError
 from uav_task_alloc.journal import Row
 from uav_task_alloc.model import Leg, Shape, Task, ThreatZone
 
@@ -22,6 +22,8 @@ class Saved:
     zones: list[ThreatZone] = field(default_factory=list)
     off: list[str] = field(default_factory=list)  # UAVs an operator switched off
     revision: int = 0  # of the allocation
+    learnt: object = None  # by the bees: what the next warm start wants
+    bad: list[str] = field(default_factory=list)  # rows that are left out, and why
 
 
 def task_row(record: TaskRecord) -> Row:
@@ -52,14 +54,16 @@ def revision_row(revision: int) -> Row:
 
 
 def saved(rows: Iterable[Row]) -> Saved:
-    """The world of these rows. Raises JournalError where a row is not as it was written."""
+    """The world of these rows; one that is not as it was written is left out, and told."""
     found = Saved()
     for row in rows:
         try:
             _take(found, row)
-        except (KeyError, TypeError, ValueError) as error:
-            raise JournalError(f'journal row {row.kind} {row.id!r} cannot be read: '
-                               f'{error!r}') from error
+        except (KeyError, TypeError, ValueError, AttributeError) as error:
+            found.bad.append(f'journal row {row.kind} {row.id!r} cannot be read: {error!r}')
+    known = {record.task.id for record in found.tasks}
+    found.lists = [replace(each, stops=tuple(s for s in each.stops if s.task.id in known))
+                   for each in found.lists]
     return found
 
 
@@ -74,6 +78,8 @@ def _take(found: Saved, row: Row) -> None:
         found.off = [str(uav_id) for uav_id in row.body]
     elif row.kind == 'revision':
         found.revision = int(row.body)
+    elif row.kind == 'learner':
+        found.learnt = learner(row.body)
     else:
         raise ValueError(f'unknown kind {row.kind!r}')
 

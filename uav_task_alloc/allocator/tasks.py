@@ -6,11 +6,13 @@ from collections.abc import Iterable
 from dataclasses import replace
 from typing import Any
 
+from uav_task_alloc.allocator.life import Event, after
 from uav_task_alloc.allocator.records import TaskRecord, TaskState, Verdict
 from uav_task_alloc.model import Task
 
 MOST_REJECTED = 1000  # refusals remembered, the newest
 UNCHANGED = 'duplicate: announced before, unchanged'
+OWNED = frozenset({TaskState.ASSIGNED, TaskState.ACTIVE, TaskState.COMPLETED, TaskState.FAILED})
 
 
 class TaskBook:
@@ -29,8 +31,9 @@ class TaskBook:
         """A new task. A replay of what is known changes nothing; a known id is no new task."""
         known = self.records.get(task.id)
         if known is None:
+            rule = after(TaskState.REJECTED, Event.ADD)
             self.rejected.pop(task.id, None)
-            self._put(TaskRecord(task, task, stamp=stamp, reason='waits for the next plan'))
+            self._put(TaskRecord(task, task, stamp=stamp, reason=rule.reason))
             return Verdict(task.id, True)
         ended = '' if known.open else f': it is {known.state.name}'
         if task in (known.task, known.announced):
@@ -41,27 +44,37 @@ class TaskBook:
     def update(self, task: Task, stamp: float) -> Verdict:
         """New content for an open task; a failed one gets another chance."""
         known = self.records.get(task.id)
-        if known is None:
-            return self.reject(task.id, 'unknown task: nothing to update', stamp)
-        if known.state in (TaskState.COMPLETED, TaskState.CANCELLED):
-            return Verdict(task.id, False, f'is {known.state.name}: nothing to update')
-        if task == known.task and known.open:
+        if known is not None and task == known.task and known.open:
             return Verdict(task.id, True, UNCHANGED)
-        state = known.state if known.open else TaskState.PENDING
-        self._put(replace(known, task=task, state=state, stamp=stamp, failed_on=()))
-        return Verdict(task.id, True)
+        why = self.step(task.id, Event.UPDATE, stamp, known.uav if known else '',
+                        known.reason if known else '', task=task, failed_on=())
+        return self._verdict(task.id, why, stamp)
 
     def cancel(self, task_id: str, stamp: float) -> Verdict:
         """Withdraw an open task; once more is harmless."""
         known = self.records.get(task_id)
-        if known is None:
-            return self.reject(task_id, 'unknown task: nothing to cancel', stamp)
-        if known.state is TaskState.COMPLETED:
-            return Verdict(task_id, False, 'is COMPLETED: nothing to cancel')
-        if known.state is TaskState.CANCELLED:
+        if known is not None and known.state is TaskState.CANCELLED:
             return Verdict(task_id, True, UNCHANGED)
-        self.change(task_id, stamp, state=TaskState.CANCELLED, uav='', reason='cancelled')
-        return Verdict(task_id, True)
+        return self._verdict(task_id, self.step(task_id, Event.CANCEL, stamp), stamp)
+
+    def _verdict(self, task_id: str, why: str, stamp: float) -> Verdict:
+        return self.reject(task_id, why, stamp) if why else Verdict(task_id, True)
+
+    def step(self, task_id: str, event: Event, stamp: float, uav: str = '', why: str = '',
+             **changes: Any) -> str:
+        """What the event makes of a task, by the table; returns why nothing, '' if it counts.
+
+        `changes` are more fields of its record. The stamp moves only where something is new.
+        """
+        known = self.records.get(task_id)
+        rule = after(known.state if known else TaskState.REJECTED, event, uav, why)
+        if rule.state is None or known is None:
+            return rule.reason
+        changed = replace(known, state=rule.state, reason=rule.reason,
+                          uav=uav if rule.state in OWNED else '', **changes)
+        if changed != known:
+            self._put(replace(changed, stamp=stamp))
+        return ''
 
     def reject(self, task_id: str, reason: str, stamp: float) -> Verdict:
         """Refuse; the status says so unless an accepted task has that id."""
@@ -71,22 +84,6 @@ class TaskBook:
             while len(self.rejected) > MOST_REJECTED:
                 del self.rejected[next(iter(self.rejected))]
         return Verdict(task_id, False, reason)
-
-    def change(self, task_id: str, stamp: float, **changes: Any) -> bool:
-        """Change fields of a record; the stamp moves only where something is different."""
-        known = self.records[task_id]
-        changed = replace(known, **changes)
-        if changed == known:
-            return False
-        self._put(replace(changed, stamp=stamp))
-        return True
-
-    def fail(self, task_id: str, uav_id: str, reason: str, stamp: float) -> None:
-        """A UAV could not do it: it waits for another one."""
-        known = self.records[task_id]
-        failed_on = known.failed_on + ((uav_id,) if uav_id not in known.failed_on else ())
-        self.change(task_id, stamp, state=TaskState.PENDING, uav='', failed_on=failed_on,
-                    reason=f'failed on {uav_id}: {reason or "no reason given"}')
 
     def _put(self, record: TaskRecord) -> None:
         self.records[record.task.id] = record

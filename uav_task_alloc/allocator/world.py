@@ -6,9 +6,11 @@ people read, for what is published.
 """
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Iterable, Sequence
 
 from uav_task_alloc.allocator.fleet import Fleet, UavRecord, may_fly
+from uav_task_alloc.allocator.life import Event as Life
 from uav_task_alloc.allocator.published import ListBook
 from uav_task_alloc.allocator.records import (
     Action,
@@ -28,6 +30,7 @@ from uav_task_alloc.model import Task, ThreatZone
 from uav_task_alloc.params import AllocatorParams
 
 MOST_UAVS = 1000  # a flood of made-up ids ends here
+FASTEST = 10.0  # times the cruise speed: nobody flies so fast, not even in faster simulations
 LOOK = 0.5  # [s] between two looks at the way ahead of a UAV
 
 
@@ -37,14 +40,17 @@ class World:
     def __init__(self, params: AllocatorParams, saved: Saved) -> None:
         self.params = params
         self.tasks = TaskBook(saved.tasks)
-        self.fleet = Fleet(saved.off)
+        self.fleet = Fleet(saved.off, {
+            record.uav: record.task.id for record in saved.tasks
+            if record.state is TaskState.ACTIVE})
         self.lists = ListBook(saved.lists)
         self.zones = {zone.id: zone for zone in saved.zones}
         self.revision = saved.revision
-        self.dirty: set[str] = set()  # 'zones', 'off', 'revision': not yet on disk
+        self.dirty: set[str] = set()  # rows that are not yet on disk: 'zones', 'off', ...
         self.schedule = Schedule()
         self.version = 0
         self.outbox = Outbox()
+        self.again: set[str] = set()  # UAVs to be told their lists once more
         self.awake = False  # the kernels are compiled: looking at zones is quick
         self._ways: Ways | None = None
         self._looked: dict[str, float] = {}
@@ -87,20 +93,34 @@ class World:
         uav_id = report.uav_id
         if uav_id not in self.fleet.records and len(self.fleet.records) >= MOST_UAVS:
             return f'uav_id = {uav_id!r}: expected one of the {MOST_UAVS} UAVs known already'
-        before = self.fleet.hear(report, now)
+        active = self.fleet.active.get(uav_id)
+        before = self.fleet.hear(report, now, self.params.battery_reserve)
         self._catch_up(report, stamp)
-        news = _news(before, report)
-        if news:
+        for news in _news(before, self.fleet.records[uav_id]):
             self.note(f'{uav_id} {news}')
             self.touch(f'{uav_id} {news}', now)
-        if before is None or before.active != self.fleet.records[uav_id].active:
+        self._look_for_jumps(before, report, now)
+        if before is None or active != self.fleet.active.get(uav_id):
             self.outbox.statuses = True
         if self.lists.learn(uav_id, report.list_revision):
-            self.outbox.again.add(uav_id)
+            self.again.add(uav_id)
         if self.awake and now - self._looked.get(uav_id, -LOOK) >= LOOK:
             self._looked[uav_id] = now
             self._look_ahead(uav_id, now)
         return ''
+
+    def _look_for_jumps(self, before: UavRecord | None, report: UavReport, now: float) -> None:
+        """A position that cannot have been flown to is believed, told once, and planned for."""
+        if before is None or before.silent:
+            return
+        speed = report.cruise_speed or self.params.default_cruise_speed
+        metres = math.dist(before.report.position, report.position)
+        if metres <= self.params.position_jump + FASTEST * speed * (now - before.heard):
+            return
+        if now - before.jumped > self.params.uav_timeout:
+            self.note(f'{report.uav_id} jumped by {metres:.0f} m', warning=True)
+        self.fleet.set_jumped(report.uav_id, now)
+        self.touch(f'{report.uav_id} jumped', now)
 
     def _catch_up(self, report: UavReport, stamp: float) -> None:
         """After a restart: what comes before the task it flies was flown while nobody heard."""
@@ -110,8 +130,8 @@ class World:
             return
         for task_id in old.task_ids[:old.task_ids.index(report.active_task)]:
             if self.tasks.records[task_id].open:
-                self.tasks.change(task_id, stamp, state=TaskState.COMPLETED, uav=report.uav_id,
-                                  reason=f'{report.uav_id} has passed it')
+                self.tasks.step(task_id, Life.COMPLETE, stamp, report.uav_id,
+                                'passed while nobody listened')
                 self.note(f'{task_id} COMPLETED while nobody listened: {report.uav_id} flies '
                           f'{report.active_task}')
 
@@ -131,55 +151,50 @@ class World:
 
     def event(self, event: TaskEvent, stamp: float, now: float) -> str:
         """What became of a task; returns why that is refused, '' when it is not."""
-        why = self._why_not(event)
+        place = f'event {event.kind.name} of task {event.task_id!r}'
+        why = self._why_not(event) or self._take_event(event, stamp)
         if why:
-            return why
-        record, current = self.tasks.records[event.task_id], self._is_current(event)
-        if event.kind is Kind.COMPLETED:
-            # a fact, whoever the task was given to meanwhile: it must not be flown twice
-            self.tasks.change(event.task_id, stamp, state=TaskState.COMPLETED, uav=event.uav_id,
-                              reason='' if current else 'completed after it was moved')
-            if record.open and event.task_id not in self.lists.get(event.uav_id).task_ids[:1]:
-                self.touch(f'{event.task_id} COMPLETED out of turn', now)
-        elif event.kind is Kind.STARTED:
-            self.fleet.set_active(event.uav_id, event.task_id)
-        else:
-            self._failed(event, stamp)
+            return f'{place}: {why}'
+        if event.kind is Kind.STARTED:
+            self.fleet.active[event.uav_id] = event.task_id
+        elif event.task_id not in self.lists.get(event.uav_id).task_ids[:1]:
+            self.touch(f'{event.task_id} {event.kind.name} out of turn', now)
+        elif event.kind is Kind.FAILED:
             self.touch(f'{event.task_id} FAILED', now)
         self.outbox.statuses = True
         return ''
 
     def _why_not(self, event: TaskEvent) -> str:
-        place = f'event {event.kind.name} of task {event.task_id!r}'
-        record = self.tasks.records.get(event.task_id)
-        if record is None:
-            return f'{place}: unknown task'
+        if event.task_id not in self.tasks.records:
+            return 'unknown task'
         if event.uav_id not in self.fleet.records and event.uav_id not in self.lists.lists:
-            return f'{place}: unknown UAV {event.uav_id!r}'
-        if record.state is TaskState.CANCELLED:
-            return f'{place}: it was cancelled'
+            return f'unknown UAV {event.uav_id!r}'
         if not self.lists.carried(event.uav_id, event.task_id, event.revision):
-            return (f'{place}: revision {event.revision} of the list of {event.uav_id} '
-                    'did not have it')
-        if record.state is TaskState.COMPLETED:
-            return f'{place}: it is COMPLETED already'
-        if event.kind is not Kind.COMPLETED and not self._is_current(event):
-            return f'{place}: {event.uav_id} does not have it any more'
+            return f'revision {event.revision} of the list of {event.uav_id} did not have it'
         return ''
 
-    def _is_current(self, event: TaskEvent) -> bool:
-        return event.task_id in self.lists.get(event.uav_id).task_ids
+    def _take_event(self, event: TaskEvent, stamp: float) -> str:
+        """By the table of `life`."""
+        has_it = event.task_id in self.lists.get(event.uav_id).task_ids
+        if event.kind is Kind.FAILED and has_it:
+            return self._failed(event, stamp)
+        life = {Kind.STARTED: (Life.START_MOVED, Life.START), Kind.FAILED: (Life.FAIL_MOVED,),
+                Kind.COMPLETED: (Life.COMPLETE_MOVED, Life.COMPLETE)}[event.kind][has_it]
+        return self.tasks.step(event.task_id, life, stamp, event.uav_id)
 
-    def _failed(self, event: TaskEvent, stamp: float) -> None:
+    def _failed(self, event: TaskEvent, stamp: float) -> str:
         """Another UAV may try, until nobody is left or it was tried often enough."""
-        self.tasks.fail(event.task_id, event.uav_id, event.reason, stamp)
-        record = self.tasks.records[event.task_id]
-        left = [uav_id for uav_id, known in self.fleet.records.items()
-                if may_fly(record.task, record.failed_on, known.report)]
-        if not left or len(record.failed_on) >= self.params.max_attempts:
-            self.tasks.change(event.task_id, stamp, state=TaskState.FAILED,
-                              reason=f'{record.reason}; '
-                                     f'{"tried often enough" if left else "no other UAV can"}')
+        record, why = self.tasks.records[event.task_id], event.reason or 'no reason given'
+        failed_on = tuple(dict.fromkeys((*record.failed_on, event.uav_id)))
+        if not any(may_fly(record.task, failed_on, known.report)
+                   for known in self.fleet.records.values()):
+            life, why = Life.FAIL_LAST, f'{why}; no other UAV can'
+        elif len(failed_on) >= self.params.max_attempts:
+            life, why = Life.FAIL_LAST, f'{why}; tried often enough'
+        else:
+            life = Life.FAIL
+        return self.tasks.step(event.task_id, life, stamp, event.uav_id, why,
+                               failed_on=failed_on)
 
     def set_zones(self, zones: Sequence[ThreatZone], bad: Collection[str], now: float) -> None:
         """The whole picture; a zone whose new form is bad stays as it was."""
@@ -238,30 +253,45 @@ class World:
                               stops[0].task.position) is not None)
 
     def locked(self) -> dict[str, tuple[str, ...]]:
-        """What is being flown: it stays first on its UAV."""
+        """What is being flown, and what comes next as far as committed: it stays as it is."""
         owners = self.lists.owners()
         found: dict[str, tuple[str, ...]] = {}
         seen: set[str] = set()
-        for uav_id, record in self.fleet.records.items():
-            task = self.tasks.records.get(record.active)
-            if (task is None or not task.open or not self.fleet.usable(uav_id)
-                    or record.active in seen or uav_id in task.failed_on
-                    or owners.get(record.active, uav_id) != uav_id):
-                continue
-            seen.add(record.active)
-            found[uav_id] = (record.active,)
+        for uav_id, task_id in self.fleet.active.items():
+            if (self.params.locked_tasks > 0 and task_id not in seen
+                    and self.fleet.usable(uav_id) and owners.get(task_id, uav_id) == uav_id
+                    and self._can(uav_id, task_id)):
+                seen.add(task_id)
+                found[uav_id] = (task_id, *self._next(uav_id, task_id))
         return found
 
+    def _can(self, uav_id: str, task_id: str) -> bool:
+        record = self.tasks.records.get(task_id)
+        return record is not None and record.open and uav_id not in record.failed_on
 
-def _news(before: UavRecord | None, report: UavReport) -> str:
+    def _next(self, uav_id: str, task_id: str) -> tuple[str, ...]:
+        """The committed tasks after the one being flown, those that can still be flown."""
+        ids, report = self.lists.get(uav_id).task_ids, self.fleet.records[uav_id].report
+        if task_id not in ids:
+            return ()
+        after = ids[ids.index(task_id) + 1:][:self.params.locked_tasks - 1]
+        return tuple(t for t in after if self._can(uav_id, t) and may_fly(
+            self.tasks.records[t].task, (), report))
+
+
+def _news(before: UavRecord | None, after: UavRecord) -> list[str]:
     """What in a report asks for a new plan."""
+    report, found = after.report, []
     if before is None or before.silent:
-        return ('heard again' if before else 'heard') if report.available else ''
-    if before.report.available != report.available:
-        return 'available' if report.available else 'not available'
-    if before.report.capabilities != report.capabilities:
-        return 'has other capabilities'
-    return ''
+        found += ['heard again' if before else 'heard'] if report.available else []
+    elif before.report.available != report.available:
+        found += ['available' if report.available else 'not available']
+    elif before.report.capabilities != report.capabilities:
+        found += ['has other capabilities']
+    if after.low != (before is not None and before.low):
+        found += [f'battery {100.0 * (after.battery or 0.0):.0f} %: ' + (
+            'below the reserve, it goes home' if after.low else 'above the reserve again')]
+    return found
 
 
 def _some(names: Sequence[str]) -> str:

@@ -118,8 +118,6 @@ def to_report(msg: m.UavState) -> UavReport:
     """Raise InvalidValue, naming the field, where the message tells nothing of a UAV."""
     check_ros_name('uav_id', msg.uav_id)
     place = f'uav {msg.uav_id}: '
-    if not math.isnan(msg.battery):
-        check_number(place + 'battery', msg.battery, 0.0, 1.0)
     check_number(place + 'mode', msg.mode, m.UavState.UNKNOWN, m.UavState.FAULT)
     check_number(place + 'mission_state', msg.mission_state, m.UavState.UNKNOWN,
                  m.UavState.FOREIGN)
@@ -128,7 +126,7 @@ def to_report(msg: m.UavState) -> UavReport:
     return UavReport(
         msg.uav_id, from_point(msg.position), home=None if any(map(math.isnan, home)) else home,
         range=known(msg.range_remaining), cruise_speed=known(msg.cruise_speed) or None,
-        capabilities=frozenset(msg.capabilities),
+        capabilities=frozenset(msg.capabilities), battery=known(msg.battery),
         available=msg.available and msg.mode != m.UavState.FAULT,
         active_task=msg.active_task_id, list_revision=msg.list_revision)
 
