@@ -33,5 +33,13 @@ class JournalError(AllocError):
     """The journal on disk could not be written or read."""
 
 
+class JournalCorrupt(JournalError):
+    """The file of the journal is damaged, or is none."""
+
+
+class JournalForeign(JournalError):
+    """The journal is not ours to touch: a newer version wrote it, or another process has it."""
+
+
 class MissionError(AllocError, ValueError):
     """A route cannot be expressed as mission items for a profile."""
