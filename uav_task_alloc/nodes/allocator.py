@@ -7,6 +7,7 @@ import time
 from collections import deque
 
 from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from std_srvs.srv import Trigger
 from uav_task_alloc_msgs import msg as m
@@ -64,6 +65,7 @@ class AllocatorNode(Node):
         self._listen()
         self._talk()
         self.arrived = self.create_guard_condition(self.on_answer)
+        self.on_tick()  # the plan of the last life is told before the kernels are loaded
         self.worker = Worker(lambda: rehearse(plan, now), self.solve, self.deliver, self.failed)
         self.worker.start()
 
@@ -78,8 +80,9 @@ class AllocatorNode(Node):
         self.create_service(SubmitTasks, '~/submit_tasks', self.on_submit)
         self.create_service(Trigger, '~/replan', self.on_replan)
         self.create_service(SetAvailability, '~/set_availability', self.on_availability)
-        self.create_timer(TICK, self.on_tick)
-        self.create_timer(1.0, self.on_second)
+        steady = Clock(clock_type=ClockType.STEADY_TIME)  # simulated time may stand still
+        self.create_timer(TICK, self.on_tick, clock=steady)
+        self.create_timer(1.0, self.on_second, clock=steady)
 
     def _talk(self) -> None:
         self.teller = Teller(self, self.world)

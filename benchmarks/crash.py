@@ -1,0 +1,376 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Crashes: the allocator is killed at random moments of a busy run; nothing may be lost.
+
+    python benchmarks/crash.py [--kills 200] [--seed 1] [--json]
+
+Run after `colcon build`, in a sourced shell. A made-up fleet here flies the lists, submits tasks
+by service and by topic, withdraws some, switches UAVs off; kill -9 ends the allocator, one kill
+in eight while it still starts. After each restart all that was acknowledged must be there.
+--json: the last line is one object, with `kills`, `tasks_lost`, `tasks_done_twice` and
+`recovery_s_p99`, from the start of the process to its first list or allocation. Ends with 1
+where something was lost or p99 is 2 s or more.
+"""
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import os
+import random
+import subprocess
+import sys
+import tempfile
+import time
+from collections import Counter
+from pathlib import Path
+
+import domain_coordinator
+import rclpy
+from ament_index_python.packages import get_package_prefix
+from geometry_msgs.msg import Point
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from uav_task_alloc_msgs import msg as m
+from uav_task_alloc_msgs.srv import SetAvailability, SubmitTasks
+
+from uav_task_alloc.nodes.messages import EVENTS, LATCHED, STATES, from_stamp
+
+UAVS, SIDE, HEIGHT = 5, 400.0, 50.0  # number, [m], [m]
+MOST_OPEN = 30  # tasks at once
+FLOWN_IN = (0.1, 0.5)  # [s] a task takes
+FAILS, REMIND = 0.03, 0.5  # share of tasks; [s] until COMPLETED is told again, as the bridge does
+STARTING = 1.0 / 8.0  # share of kills before the allocator is up
+WITHDRAWN = 3.0  # [s] at most, until the list of a UAV that was switched off is empty
+LIMIT = 20.0  # [s] for a restart
+# else a process that is known already answers a new one once, often before that listens, and
+# again only after 3 s
+QUICK_DISCOVERY = """<dds xmlns="http://www.eprosima.com/XMLSchemas/fastRTPS_Profiles"><profiles>
+<participant profile_name="quick" is_default_profile="true"><rtps><builtin><discovery_config>
+<leaseAnnouncement><sec>0</sec><nanosec>100000000</nanosec></leaseAnnouncement>
+</discovery_config></builtin></rtps></participant></profiles></dds>"""
+# nothing is replayed to a new allocator but the last message: it must have the rest on disk
+LAST_ONLY = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE,
+                       durability=DurabilityPolicy.TRANSIENT_LOCAL)
+S, E, A = m.TaskStatus, m.TaskEvent, m.TaskAnnouncement
+ENDED = (S.COMPLETED, S.CANCELLED, S.FAILED)
+
+
+class Ledger:
+    """What was acknowledged, and what contradicts it since."""
+
+    def __init__(self) -> None:
+        self.accepted: set[str] = set()  # by the service, or in a status
+        self.ended: dict[str, tuple[int, float]] = {}  # state, stamp [s], as published
+        self.off: dict[str, float] = {}  # UAVs, and when [s] the service had answered
+        self.flown: Counter[str] = Counter()
+        self.revisions: dict[str, int] = {}
+        self.faults: dict[str, list[str]] = {
+            'lost': [], 'listed_again': [], 'reopened': [], 'revisions': [], 'off': []}
+        self._must: tuple[set[str], dict[str, tuple[int, float]]] = (set(), {})
+
+    def killed(self) -> None:
+        """What is acknowledged by now has to be there from now on."""
+        self._must = set(self.accepted), dict(self.ended)
+
+    def statuses(self, msg: m.TaskStatusArray) -> None:
+        """Take the acknowledgements in, look for those of before the kill."""
+        found = {s.task_id: s for s in msg.statuses if s.state != S.REJECTED}
+        accepted, ended = self._must
+        self.faults['lost'] += sorted(accepted - set(found))
+        self.faults['reopened'] += [
+            task_id for task_id, (state, _) in ended.items()
+            if task_id in found and found[task_id].state != state]
+        self.accepted |= set(found)
+        self.ended.update((s.task_id, (s.state, from_stamp(s.stamp)))
+                          for s in found.values() if s.state in ENDED)
+
+    def rises(self, name: str, revision: int) -> None:
+        """Revisions are never used twice."""
+        if revision <= self.revisions.get(name, 0):
+            self.faults['revisions'].append(f'{name}: {self.revisions[name]}, {revision}')
+        self.revisions[name] = max(revision, self.revisions.get(name, 0))
+
+    def listed(self, msg: m.TaskList) -> None:
+        """No list has what ended before it was made, nor anything for a UAV switched off."""
+        self.rises(msg.uav_id, msg.revision)
+        made = from_stamp(msg.header.stamp)
+        ids = [planned.task.task_id for planned in msg.tasks]
+        self.faults['listed_again'] += [
+            t for t in ids if t in self.ended and self.ended[t][1] < made]
+        if ids and made > self.off.get(msg.uav_id, math.inf) + WITHDRAWN:
+            self.faults['off'].append(msg.uav_id)
+
+    def done_twice(self) -> list[str]:
+        """Flown twice, or asked for again after the end was published."""
+        return sorted({t for t, n in self.flown.items() if n > 1}
+                      | {*self.faults['listed_again'], *self.faults['reopened']})
+
+
+class Flyer:
+    """One UAV that flies its list, and tells; as the bridge, it remembers what it has flown."""
+
+    def __init__(self, uav_id: str, place: tuple[float, float], tell, ledger: Ledger,
+                 rng: random.Random) -> None:
+        self.uav_id, self.place, self.tell, self.ledger, self.rng = (
+            uav_id, place, tell, ledger, rng)
+        self.list = m.TaskList(uav_id=uav_id)
+        self.flown: set[str] = set()
+        self.active, self._until, self._remind = '', 0.0, math.inf
+
+    def told(self, msg: m.TaskList, now: float) -> None:
+        self.list, self._remind = msg, now + REMIND
+        if self.active not in [planned.task.task_id for planned in msg.tasks]:
+            self.active = ''
+
+    def step(self, now: float) -> None:
+        tasks = [p.task for p in self.list.tasks]
+        if now >= self._remind:
+            self._remind = now + REMIND
+            for task in tasks:
+                if task.task_id in self.flown:
+                    self.event(E.COMPLETED, task.task_id)
+        left = [task for task in tasks if task.task_id not in self.flown]
+        if not self.active and left:
+            self.active, self._until = left[0].task_id, now + self.rng.uniform(*FLOWN_IN)
+            self.event(E.STARTED, self.active)
+        elif self.active and now >= self._until:
+            self._arrive(next(task for task in left if task.task_id == self.active))
+
+    def _arrive(self, task: m.Task) -> None:
+        self.place, self.active = (task.position.x, task.position.y), ''
+        if self.rng.random() < FAILS:
+            self.event(E.FAILED, task.task_id, 'made up')
+            self.list = m.TaskList(uav_id=self.uav_id, revision=self.list.revision)
+            return
+        self.flown.add(task.task_id)
+        self.ledger.flown[task.task_id] += 1
+        self.event(E.COMPLETED, task.task_id)
+
+    def event(self, kind: int, task_id: str, reason: str = '') -> None:
+        self.tell(E(event=kind, task_id=task_id, uav_id=self.uav_id, reason=reason,
+                    revision=self.list.revision))
+
+    def state(self) -> m.UavState:
+        return m.UavState(
+            uav_id=self.uav_id, position=Point(x=self.place[0], y=self.place[1], z=HEIGHT),
+            home=Point(x=math.nan), battery=0.9, range_remaining=math.nan, cruise_speed=15.0,
+            available=True, active_task_id=self.active, list_revision=self.list.revision)
+
+
+class World:
+    """The node around the fleet and the ledger: topics, services, and random demands."""
+
+    def __init__(self, rng: random.Random) -> None:
+        self.rng, self.ledger, self.heard, self.whole = rng, Ledger(), 0.0, False
+        self.node = rclpy.create_node('crash')
+        self.executor = SingleThreadedExecutor()
+        self.executor.add_node(self.node)
+        make = self.node.create_publisher
+        self.states, self.events = make(m.UavState, 'uav_states', STATES), make(
+            m.TaskEvent, 'task_events', EVENTS)
+        self.tasks = make(A, 'task_announcements', LAST_ONLY)
+        self.zones = make(m.ThreatZoneArray, 'threat_zones', LATCHED)
+        hear = self.node.create_subscription
+        hear(m.TaskStatusArray, 'task_statuses', self.on_statuses, LATCHED)
+        hear(m.Allocation, 'allocation', self.on_allocation, LATCHED)
+        self.submit = self.node.create_client(SubmitTasks, 'allocator/submit_tasks')
+        self.switch = self.node.create_client(SetAvailability, 'allocator/set_availability')
+        self.flyers = {f'u{k}': Flyer(f'u{k}', (SIDE / UAVS * k, 0.0), self.events.publish,
+                                      self.ledger, rng) for k in range(UAVS)}
+        for uav_id in self.flyers:
+            hear(m.TaskList, f'{uav_id}/task_list', self.on_list, LATCHED)
+        self.made, self._next, self.demanding = 0, dict.fromkeys('sda', 0.0), True
+
+    def on_statuses(self, msg: m.TaskStatusArray) -> None:
+        self.whole = True
+        self.ledger.statuses(msg)
+
+    def on_allocation(self, msg: m.Allocation) -> None:
+        self.heard = self.heard or time.monotonic()
+        self.ledger.rises('allocation', msg.revision)
+
+    def on_list(self, msg: m.TaskList) -> None:
+        self.heard = self.heard or time.monotonic()
+        self.ledger.listed(msg)
+        self.flyers[msg.uav_id].told(msg, time.monotonic())
+
+    def due(self, what: str, period: float, now: float) -> bool:
+        if now < self._next[what]:
+            return False
+        self._next[what] = now + period
+        return True
+
+    def spin(self) -> None:
+        """A moment of the run."""
+        self.executor.spin_once(timeout_sec=0.01)
+        now = time.monotonic()
+        for flyer in self.flyers.values():
+            flyer.step(now)
+        if self.due('s', 0.1, now):
+            for flyer in self.flyers.values():
+                self.states.publish(flyer.state())
+        if self.demanding and self.due('d', 0.2, now):
+            self.demand()
+        if self.due('a', 1.0, now):
+            self.set_available(self.rng.choice(sorted(self.flyers)),
+                               not self.demanding or self.rng.random() < 0.7)
+
+    def demand(self) -> None:
+        """One random wish."""
+        waiting = sorted(self.ledger.accepted - set(self.ledger.ended))
+        wish = self.rng.random()
+        if wish < 0.1 and waiting:
+            self.ask(A(action=A.CANCEL, tasks=[m.Task(task_id=self.rng.choice(waiting))]))
+        elif wish < 0.15:
+            self.zones.publish(m.ThreatZoneArray(zones=[m.ThreatZone(
+                zone_id='z', center=Point(x=self.rng.uniform(0.0, SIDE), y=0.5 * SIDE),
+                radius=60.0)]))
+        elif len(waiting) < MOST_OPEN:
+            self.ask(A(action=A.ADD, tasks=[self.task() for _ in range(self.rng.randint(1, 3))]))
+
+    def task(self) -> m.Task:
+        self.made += 1
+        x, y = self.rng.uniform(0.0, SIDE), self.rng.uniform(0.0, SIDE)
+        return m.Task(task_id=f't{self.made}', value=1.0, acceptance_radius=math.nan,
+                      position=Point(x=x, y=y, z=HEIGHT + 100.0))
+
+    def ask(self, announcement: A) -> None:
+        """By topic or by service."""
+        if self.rng.random() < 0.5 or not self.submit.service_is_ready():
+            self.tasks.publish(announcement)
+            return
+        def answered(future) -> None:
+            if announcement.action == A.ADD:
+                self.ledger.accepted.update(future.result().accepted)
+            else:
+                self.ledger.ended.update(
+                    (t, (S.CANCELLED, time.time())) for t in future.result().accepted)
+        self.submit.call_async(SubmitTasks.Request(announcement=announcement)).add_done_callback(
+            answered)
+
+    def set_available(self, uav_id: str, available: bool) -> None:
+        """An operator's word; while it is not answered nothing is known."""
+        if not self.switch.service_is_ready():
+            return
+        self.ledger.off.pop(uav_id, None)
+        def answered(future) -> None:
+            if future.result().success and not available:
+                self.ledger.off[uav_id] = time.time()
+        self.switch.call_async(SetAvailability.Request(
+            uav_id=uav_id, available=available)).add_done_callback(answered)
+
+    def until(self, condition, limit: float) -> bool:
+        end = time.monotonic() + limit
+        while not condition() and time.monotonic() < end:
+            self.spin()
+        return bool(condition())
+
+
+class Process:
+    """The allocator; it dies and comes back."""
+
+    def __init__(self, folder: str) -> None:
+        path = Path(get_package_prefix('uav_task_alloc'), 'lib/uav_task_alloc/allocator')
+        self._command = [str(path), '--ros-args']
+        for name, value in (('state_dir', folder), ('uav_timeout', 3.0), ('solve_budget', 0.05)):
+            self._command += ['-p', f'{name}:={value}']
+        self.log = Path(folder, 'allocator.log')
+        self._popen: subprocess.Popen[bytes] | None = None
+
+    def start(self) -> float:
+        """Returns when [s]."""
+        began = time.monotonic()
+        with self.log.open('a') as out:
+            self._popen = subprocess.Popen(self._command, stdout=out, stderr=subprocess.STDOUT)
+        return began
+
+    def kill(self) -> None:
+        if self._popen is not None:
+            self._popen.kill()
+            self._popen.wait()
+
+
+def life(world: World, process: Process, rng: random.Random, last: bool) -> float | None:
+    """Start, be busy, be killed; [s] until the first list, None where it was killed before."""
+    world.heard, world.whole = 0.0, False
+    began = process.start()
+    if not last and rng.random() < STARTING:
+        world.until(lambda: False, rng.uniform(0.0, 1.0))
+    else:
+        if not world.until(lambda: world.heard and world.whole, LIMIT):
+            sys.exit(f'no sign of life in {LIMIT:g} s:\n{process.log.read_text()[-2000:]}')
+        world.until(lambda: False, 0.0 if last else rng.uniform(0.02, 2.5))
+    if not last:
+        world.ledger.killed()
+        process.kill()
+    return world.heard - began if world.heard else None
+
+
+def crash(kills: int, seed: int, process: Process) -> dict[str, object]:
+    """All lives and the figures."""
+    rng, recoveries = random.Random(seed), []
+    world, began = World(rng), time.monotonic()
+    for k in range(kills):
+        took = life(world, process, rng, last=False)
+        recoveries += [] if took is None or k == 0 else [took]
+        spent = time.monotonic() - began
+        print(f'\r{k + 1}/{kills} kills, {len(world.ledger.accepted)} tasks, '
+              f'{spent * (kills - k - 1) / (k + 1):.0f} s to go  ', end='', file=sys.stderr)
+    recoveries.append(life(world, process, rng, last=True))
+    world.demanding = False
+    over = world.until(lambda: world.ledger.accepted <= set(world.ledger.ended), 60.0)
+    print(file=sys.stderr)
+    return figures(world, kills, sorted(recoveries), seed, over)
+
+
+def figures(world: World, kills: int, recoveries: list[float], seed: int,
+            over: bool) -> dict[str, object]:
+    """The last line."""
+    ledger = world.ledger
+    states = Counter(state for state, _ in ledger.ended.values())
+    return {
+        'kills': kills, 'tasks_lost': len(set(ledger.faults['lost'])),
+        'tasks_done_twice': len(ledger.done_twice()),
+        'recovery_s_p99': round(recoveries[math.ceil(0.99 * len(recoveries)) - 1], 3),
+        'recovery_s_median': round(recoveries[len(recoveries) // 2], 3),
+        'recovery_s_most': round(recoveries[-1], 3), 'recoveries': len(recoveries),
+        'revisions_fallen': len(ledger.faults['revisions']),
+        'availability_lost': len(ledger.faults['off']),
+        'tasks_acknowledged': len(ledger.accepted),
+        'tasks_never_acknowledged': world.made - len(ledger.accepted),
+        'tasks_completed': states[S.COMPLETED], 'tasks_cancelled': states[S.CANCELLED],
+        'tasks_failed': states[S.FAILED], 'all_ended': over, 'seed': seed,
+        'faults': {name: sorted(set(found))[:5] for name, found in ledger.faults.items() if found},
+    }
+
+
+def main() -> int:
+    """Measure, print, judge."""
+    parser = argparse.ArgumentParser(description=(__doc__ or '').partition('\n')[0])
+    parser.add_argument('--kills', type=int, default=200)
+    parser.add_argument('--seed', type=int, default=1)
+    parser.add_argument('--json', action='store_true')
+    given = parser.parse_args()
+    os.environ.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
+    with domain_coordinator.domain_id() as domain, tempfile.TemporaryDirectory() as folder:
+        os.environ['ROS_DOMAIN_ID'] = str(domain)
+        profile = Path(folder, 'quick_discovery.xml')
+        profile.write_text(QUICK_DISCOVERY)
+        os.environ.setdefault('FASTRTPS_DEFAULT_PROFILES_FILE', str(profile))
+        rclpy.init()
+        process = Process(folder)
+        try:
+            found = crash(given.kills, given.seed, process)
+        finally:
+            process.kill()
+            rclpy.shutdown()
+    for name, value in found.items():
+        print(f'{name:26} {value}', file=sys.stderr if given.json else sys.stdout)
+    if given.json:
+        print(json.dumps(found))
+    wrong = ('tasks_lost', 'tasks_done_twice', 'revisions_fallen', 'availability_lost')
+    return int(any(found[name] for name in wrong) or found['recovery_s_p99'] >= 2.0)
+
+
+if __name__ == '__main__':
+    sys.exit(main())
