@@ -22,6 +22,10 @@ def test_a_report_draws_its_figures_without_any_network_and_runs_nothing_foreign
         tab.wait_for_selector(f'#{name} .main-svg', timeout=15_000)
     assert tab.evaluate("document.querySelectorAll('#timeline .ytick').length") == 6
     assert tab.evaluate("document.querySelectorAll('#map .scatterlayer .trace').length") >= 6
+    buttons = tab.evaluate(
+        "[...document.querySelectorAll('.modebar-btn')].map(b => b.dataset.title)")
+    assert 'Pan' in buttons
+    assert 'Share chart...' not in buttons  # it sends the flight to plotly's servers
     assert EVIL in tab.inner_text('#tasks')
     assert tab.title().startswith('Flight of 2027-01-15')
     assert (errors, [url for url in asked if not url.startswith(('file:', 'blob:', 'data:'))]

@@ -26,7 +26,8 @@ th, td { border-bottom: 1px solid #ddd; padding: 3px 10px; text-align: left; ver
 th { background: #f4f6f8 } td.n { text-align: right; font-variant-numeric: tabular-nums }
 .trouble { background: #fff3cd; border-left: 5px solid #e69f00; padding: 0.6em 1em }
 details { margin: 1em 0 } summary { cursor: pointer; font-size: 1.3em; font-weight: bold }"""
-CONFIG = {'displaylogo': False, 'responsive': True}
+CONFIG = {'displaylogo': False, 'responsive': True,
+          'showSendToCloud': False}  # plotly's bar has a button for that otherwise
 Cell = str | float | int | None
 
 
