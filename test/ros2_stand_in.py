@@ -44,7 +44,7 @@ def launch(words):
         time.sleep(0.05)  # a signal ends it at once
     for child in children:
         child.send_signal(signal.SIGINT)
-    return max(abs(child.wait(20)) for child in children)
+    return max(abs(child.wait(60)) for child in children)
 
 
 # What is said and heard.

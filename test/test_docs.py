@@ -23,7 +23,7 @@ from uav_task_alloc import scenario
 
 BLOCKS = [block for page in PAGES for block in blocks(page)]
 NO_ROS = importlib.util.find_spec('rclpy') is None
-PATIENCE = 60.0  # [s] for one block, which takes one or two
+PATIENCE = 120.0  # [s] for one block, which takes one or two on a machine at rest
 
 
 def by_name(page):
@@ -120,7 +120,7 @@ class Place:
         if process.poll() is None:
             os.killpg(process.pid, signal.SIGINT)
         try:
-            process.wait(20)
+            process.wait(PATIENCE)
         except subprocess.TimeoutExpired:
             os.killpg(process.pid, signal.SIGKILL)
             process.wait()
