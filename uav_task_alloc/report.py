@@ -149,11 +149,12 @@ def main(argv: Sequence[str]) -> int:
                     'folder of a demo again, and draw its map again.')
     parser.add_argument('place', type=Path, metavar='FILE.mcap | OUT_DIR | SUMMARY.json')
     parser.add_argument('--html', type=Path, metavar='OUT.html',
-                        help='where the page goes (beside FILE.mcap)')
+                        help='where the page goes (FILE.html)')
     args = parser.parse_args(argv)
     place = args.place
     if not place.is_dir() and place.suffix != '.json':
-        return flight_page(place, args.html or place.with_suffix('.html'))
+        return flight_page(place, args.html or Path(
+            f'{str(place).removesuffix(".mcap")}.html'))
     out = place if place.is_dir() else place.parent
     try:
         summary = summarise(out) if place.is_dir() else json.loads(place.read_text())

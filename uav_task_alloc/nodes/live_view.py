@@ -34,7 +34,7 @@ UP_AND_CLEAR = '\x1b[{}F\x1b[J'
 
 
 class LiveView(Node):
-    """Listens to everything; says nothing on any topic."""
+    """Listens to everything, says nothing on any topic. `--record FILE`: all of it as MCAP."""
 
     def __init__(self) -> None:
         super().__init__('live_view')

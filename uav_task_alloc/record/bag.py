@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Writes messages as they come into an MCAP file, which Foxglove and `ros2 bag` open."""
+"""Writes messages as they come into an MCAP file, with the definitions of their types."""
 from __future__ import annotations
 
 from collections.abc import Mapping
