@@ -3,6 +3,7 @@
 import math
 
 import pytest
+from allocation import Desk
 from geometry_msgs.msg import Point
 from hypothesis import given, settings, strategies as st
 from nav_msgs.msg import Path
@@ -11,10 +12,17 @@ from uav_task_alloc_msgs import msg as m
 from visualization_msgs.msg import Marker, MarkerArray
 
 from uav_task_alloc.allocator.fleet import UavRecord
-from uav_task_alloc.allocator.records import Stop, TaskRecord, TaskState, UavList, UavReport
+from uav_task_alloc.allocator.records import (
+    Outbox,
+    Stop,
+    TaskRecord,
+    TaskState,
+    UavList,
+    UavReport,
+)
 from uav_task_alloc.geometry.zones import inside
 from uav_task_alloc.model import Leg, Task, ThreatZone
-from uav_task_alloc.nodes import zone_bodies
+from uav_task_alloc.nodes import painter, zone_bodies
 from uav_task_alloc.nodes.markers import MOST_STOPS, MOST_TEXTS, Picture, markers
 from uav_task_alloc.nodes.messages import ANNOUNCEMENTS, LATCHED, STATES, announcement, from_zones
 from uav_task_alloc.nodes.ways import ahead, path
@@ -155,6 +163,37 @@ def test_detour_points_already_passed_are_not_flown_again():
     assert list(ahead((15.0, 5.0, 0.0), way)) == way[1:]
     assert list(ahead((29.0, 0.0, 0.0), way)) == way[2:]
     assert list(ahead((40.0, 0.0, 0.0), way)) == way[2:]
+
+
+@pytest.mark.ros
+def test_nothing_is_drawn_while_nobody_looks_or_nothing_is_new(probe, monkeypatch):
+    drawn = []
+    monkeypatch.setattr(painter, 'markers', lambda picture: drawn.append(picture) or markers(
+        picture))
+    monkeypatch.setattr(painter, 'REST', 0.0)
+    desk = Desk()
+    artist = painter.Painter(probe.node, desk.world)
+    desk.uav('u1', 0.0, 0.0, 50.0)
+    desk.add(('t1', 100.0, 0.0))
+    artist.note(Outbox(statuses=True))
+    artist.on_look()
+    assert drawn == []
+    probe.collect(MarkerArray, 'allocation_markers', LATCHED)
+    probe.until(lambda: artist.publisher.get_subscription_count())
+    artist.on_look()
+    artist.on_look()
+    assert [len(picture.tasks) for picture in drawn] == [1]
+    desk.uav('u1', 9.0, 0.0, 50.0)
+    artist.on_look()
+    assert len(drawn) == 1  # it moved, but the picture is not a second old
+    artist.drawn -= painter.MOVED
+    artist.on_look()
+    artist.drawn -= painter.MOVED
+    artist.on_look()
+    assert len(drawn) == 2  # and then it did not move
+    desk.world.set_zones([NOTCHED], {}, desk.now)
+    artist.on_look()
+    assert [len(picture.zones) for picture in drawn] == [0, 0, 1]
 
 
 @pytest.mark.ros

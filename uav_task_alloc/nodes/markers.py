@@ -196,6 +196,6 @@ def _unit(picture: Picture) -> float:
     places += [zone_bodies.middle(zone) for zone in picture.zones]
     extent = max((max(values) - min(values) for values in zip(
         *(place[:2] for place in places), strict=True)), default=0.0)
-    goal = min(max(extent / 150.0, 0.2), 1e6)
+    goal = min(max(extent / 100.0, 0.2), 1e6)
     power = 10.0 ** math.floor(math.log10(goal))
     return max(factor * power for factor in (1.0, 2.0, 5.0) if factor * power <= goal * 1.000001)

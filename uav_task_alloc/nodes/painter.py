@@ -30,8 +30,8 @@ class Painter:
         self.publisher = node.create_publisher(MarkerArray, 'allocation_markers', LATCHED)
         self.paths: dict[str, Publisher] = {}
         self.untold: set[str] = set()  # UAVs whose path nobody has seen yet
-        self.lists: tuple[UavList, ...] = ()  # of the last plan, to compare the next with
-        self.changed: frozenset[str] = frozenset()
+        self.before: tuple[UavList, ...] = ()  # of the plan before the last
+        self.after: tuple[UavList, ...] = ()  # of the last plan
         self.trigger = ''
         self.new = True  # more than positions
         self.zones: list[object] = []
@@ -46,8 +46,8 @@ class Painter:
                 self.paths[uav_id] = self.node.create_publisher(Path, f'{uav_id}/path', LATCHED)
         self.untold.update(out.lists)
         if out.allocation is not None:
-            self.changed = changed_tasks(self.lists, out.allocation.lists)
-            self.lists, self.trigger = out.allocation.lists, out.allocation.trigger
+            self.before, self.after = self.after, out.allocation.lists
+            self.trigger = out.allocation.trigger
         self.new |= bool(out.lists or out.statuses or out.allocation)
 
     def on_look(self) -> None:
@@ -86,4 +86,4 @@ class Painter:
         self.publisher.publish(markers(Picture(
             self.node.get_clock().now().nanoseconds * 1e-9, list(world.lists.lists.values()),
             list(world.tasks.records.values()), world.fleet.records, list(world.zones.values()),
-            self.changed, self.trigger)))
+            changed_tasks(self.before, self.after), self.trigger)))
