@@ -17,7 +17,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).parent.parent
 PAGES = [ROOT / 'README.md', *sorted((ROOT / 'docs').glob('*.md'))]
-LANGUAGES = ('bash', 'python', 'yaml', 'json', 'text')
+LANGUAGES = ('bash', 'python', 'yaml', 'json', 'mermaid', 'text')
 MARKS = ('file', 'until', 'fails', 'needs', 'says')
 _MARK = re.compile(rf'<!-- ({"|".join(MARKS)}): (.+?) -->')
 _FENCE = re.compile(r'```(\w*)$')
