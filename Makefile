@@ -14,7 +14,7 @@ demo: build
 test: build
 	@echo '== ruff' && .ros/bin/ruff check .
 	@echo '== mypy' && .ros/bin/mypy
-	@tools/browser.sh .ros
+	@tools/browser.sh .ros > /dev/null
 	@echo '== pytest' && $(RUN) && REQUIRE_ROS=1 python3 -m pytest
 
 # After this `source install/setup.bash` is all a shell needs.
