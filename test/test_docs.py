@@ -47,7 +47,7 @@ class Place:
     """
 
     def __init__(self, folder, stack):
-        self.folder, self.stack, self.ports = folder, stack, {}
+        self.folder, self.stack, self.ports, self.ros_files = folder, stack, {}, []
         self.env = {**os.environ, 'PYTHONPATH': f'{ROOT}:{os.environ.get("PYTHONPATH", "")}',
                     'PATH': f'{folder / ".bin"}:{os.environ["PATH"]}', 'PYTHONUNBUFFERED': '1'}
         for path in ROOT.iterdir():
@@ -82,7 +82,9 @@ class Place:
             path = self.folder / block.what
             assert not path.exists(), f'{block}: {block.what} is there already'
             path.write_text(block.text)
-        if block.mark in ('needs', 'says', 'file') or (NO_ROS and needs_ros(block.text)):
+            self.ros_files += [block.what] * needs_ros(block.text)
+        with_ros = needs_ros(block.text) or any(name in block.text for name in self.ros_files)
+        if block.mark in ('needs', 'says', 'file') or (NO_ROS and with_ros):
             return
         if block.language == 'python':
             (self.folder / '.snippet.py').write_text(block.text)
