@@ -71,6 +71,7 @@ setup(
         ('share/' + NAME, ['package.xml']),
         ('share/' + NAME + '/launch', glob('launch/*.launch.py')),
         ('share/' + NAME + '/config', glob('config/*.yaml') + glob('config/*.rviz')),
+        ('share/' + NAME + '/config/sros2', glob('config/sros2/*.xml')),
         ('share/' + NAME + '/config/scenarios', glob('config/scenarios/*.yaml')),
     ],
     python_requires='>=3.10',

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The errors a caller may handle; what can be expected is returned, not raised."""
 
+LONGEST = 200  # characters of a value that are shown
+
 
 class AllocError(Exception):
     """Any error of this package."""
@@ -10,8 +12,14 @@ class InvalidValue(AllocError, ValueError):
     """A value is outside what it may be; the text names value, expectation and place."""
 
     def __init__(self, place: str, value: object, expected: str) -> None:
-        super().__init__(f'{place} = {value!r}: expected {expected}')
+        super().__init__(f'{place} = {shown(value)}: expected {expected}')
         self.place, self.value, self.expected = place, value, expected
+
+
+def shown(value: object) -> str:
+    """A value as a line of text, cut where it is long: whoever sent it may be hostile."""
+    text = repr(value)
+    return text if len(text) <= LONGEST else f'{text[:LONGEST]}... ({len(text)} characters)'
 
 
 class UnknownName(AllocError, KeyError):

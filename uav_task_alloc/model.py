@@ -195,6 +195,8 @@ def check_polygon(place: str, vertices: Iterable[Iterable[float]]) -> tuple[
         x, y = (float(v) for v in tuple(corner)[:2])
         if not (math.isfinite(x) and math.isfinite(y)):
             raise InvalidValue(place, (x, y), 'finite coordinates [m]')
+        if max(abs(x), abs(y)) > FAR:
+            raise InvalidValue(place, (x, y), f'coordinates in [{-FAR:g}, {FAR:g}] m')
         corners.append((x, y))
     if len(corners) > 1 and corners[0] == corners[-1]:
         corners.pop()

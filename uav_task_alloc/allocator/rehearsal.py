@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 from uav_task_alloc.allocator import planning
 from uav_task_alloc.allocator.core import Allocator
@@ -11,6 +12,7 @@ from uav_task_alloc.geometry.distances import Distances
 from uav_task_alloc.model import Plan, Task, ThreatZone
 from uav_task_alloc.params import AllocatorParams
 
+BUDGET = 0.05  # [s] of each solve
 ZONES = (
     ThreatZone.hemisphere('dome', (100.0, 0.0, 0.0), 30.0),
     ThreatZone.cylinder('column', (300.0, 0.0), 30.0, 0.0, 100.0),
@@ -20,7 +22,8 @@ ZONES = (
 
 def rehearse(plan: Callable[..., Plan], params: AllocatorParams) -> int:
     """Solve a world into which zones of each shape come; the number of lists that came out."""
-    allocator, budget, before = Allocator(params, now=0.0), 0.05, Plan({})
+    params, before = replace(params, solve_budget=BUDGET), Plan({})
+    allocator = Allocator(params, now=0.0)
     allocator.wake()
     for zones in ((), ZONES[:1], ZONES):
         allocator.world.set_zones(zones, (), now=0.0)
@@ -33,7 +36,7 @@ def rehearse(plan: Callable[..., Plan], params: AllocatorParams) -> int:
         began = allocator.world.schedule.begin(0.0)
         assert began
         answer = planning.solve(plan, asked, params, stop=lambda: False)
-        allocator.adopt(answer, now=budget, stamp=0.0)
+        allocator.adopt(answer, now=BUDGET, stamp=0.0)
         before = answer.fresh
     Distances([(0.0, 0.0, 0.0), (1.0, 0.0, 0.0)], ZONES).ensure([0], [1])
     return len(allocator.collect().lists)

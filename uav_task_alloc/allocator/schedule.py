@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 BURST = 5.0  # a burst waits at most so many settle times
+MOST_TRIGGERS = 1000  # of a burst are remembered
 SHARE = 0.5  # of the budget: what a solve gets before newer events cut it short
 
 
@@ -20,7 +21,8 @@ class Schedule:
         if not self.triggers:
             self._first = now
         self._last = now
-        self.triggers.append(trigger)
+        if len(self.triggers) < MOST_TRIGGERS:
+            self.triggers.append(trigger)
 
     def settled(self, now: float, settle: float) -> bool:
         """Something happened, and the burst of it is over or has lasted long enough."""

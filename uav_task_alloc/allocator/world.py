@@ -26,11 +26,13 @@ from uav_task_alloc.allocator.restore import Saved
 from uav_task_alloc.allocator.schedule import Schedule
 from uav_task_alloc.allocator.tasks import UNCHANGED, TaskBook
 from uav_task_alloc.allocator.ways import Ways
+from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.model import Task, ThreatZone
 from uav_task_alloc.params import AllocatorParams
 
 MOST_UAVS = 1000  # a flood of made-up ids ends here
 FASTEST = 10.0  # times the cruise speed: nobody flies so fast, not even in faster simulations
+MOST_NOTES = 10_000  # lines that wait for the log
 LOOK = 0.5  # [s] between two looks at the way ahead of a UAV
 
 
@@ -212,7 +214,7 @@ class World:
     def set_available(self, uav_id: str, available: bool, now: float) -> str:
         """An operator's word, which stands until he takes it back; '' or why not."""
         if uav_id not in self.fleet.records and uav_id not in self.lists.lists:
-            return f'uav_id = {uav_id!r}: expected a UAV that was heard'
+            return str(InvalidValue('uav_id', uav_id, 'a UAV that was heard'))
         if available == (uav_id not in self.fleet.off):
             return ''
         (self.fleet.off.discard if available else self.fleet.off.add)(uav_id)
@@ -235,6 +237,8 @@ class World:
 
     def note(self, text: str, warning: bool = False) -> None:
         """A line for the log."""
+        if len(self.outbox.notes) >= MOST_NOTES:
+            return
         self.outbox.notes.append(Note(warning, text))
 
     def ways(self) -> Ways:

@@ -22,6 +22,7 @@ from uav_task_alloc.allocator.worker import Worker
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.geometry.frames import Origin
 from uav_task_alloc.nodes import allocation_messages as told, announcements
+from uav_task_alloc.nodes.bounds import cut
 from uav_task_alloc.nodes.intake import hear
 from uav_task_alloc.nodes.messages import (
     HEARD_ANNOUNCEMENTS,
@@ -109,6 +110,11 @@ class AllocatorNode(Node):
 
     def on_zones(self, msg: m.ThreatZoneArray) -> None:
         """The whole picture of the zones."""
+        try:
+            announcements.check_picture(msg)
+        except InvalidValue as error:
+            return self.complain('threat_zones', '', str(error))
+        self.complain('threat_zones', '', '')
         zones, bad = announcements.sort_zones(msg, to_zone)
         for zone in msg.zones:
             self.complain('threat_zones', zone.zone_id, bad.get(zone.zone_id, ''))
@@ -148,6 +154,7 @@ class AllocatorNode(Node):
 
     def complain(self, topic: str, name: str, reason: str) -> None:
         """Log what is wrong with a message, once until `name` sends a good one."""
+        name = cut(name)
         if not reason:
             self.complained.pop((topic, name), None)
             return

@@ -11,7 +11,8 @@ from uav_task_alloc.allocator.records import Action, Verdict
 from uav_task_alloc.allocator.world import World
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.geometry.frames import Origin
-from uav_task_alloc.model import ThreatZone
+from uav_task_alloc.model import ThreatZone, check_ros_name
+from uav_task_alloc.nodes.bounds import MOST_CORNERS, MOST_TASKS, MOST_ZONES, check_count, cut
 from uav_task_alloc.nodes.messages import to_task
 
 
@@ -20,18 +21,27 @@ def take(world: World, msg: m.TaskAnnouncement, origin: Origin, stamp: float,
     """Tell the world of every task; a verdict for each."""
     try:
         action = Action(msg.action)
+        check_count('tasks', msg.tasks, MOST_TASKS)
+    except InvalidValue as error:
+        return _refuse_all(world, msg, str(error), stamp)
     except ValueError:
         reason = f'action = {msg.action}: expected ADD (0), UPDATE (1) or CANCEL (2)'
-        return [world.refuse(task.task_id, reason, stamp) for task in msg.tasks]
-    if action is Action.CANCEL:
-        return world.cancel([task.task_id for task in msg.tasks], stamp, now)
+        return _refuse_all(world, msg, reason, stamp)
     good, verdicts = [], []
     for task in msg.tasks:
         try:
-            good.append(to_task(task, origin))
+            good.append(check_ros_name('task_id', task.task_id) if action is Action.CANCEL
+                        else to_task(task, origin))
         except InvalidValue as error:
-            verdicts.append(world.refuse(task.task_id, str(error), stamp))
+            verdicts.append(world.refuse(cut(task.task_id), str(error), stamp))
+    if action is Action.CANCEL:
+        return world.cancel(good, stamp, now) + verdicts
     return world.announce(action, good, stamp, now) + verdicts
+
+
+def _refuse_all(world: World, msg: m.TaskAnnouncement, reason: str,
+                stamp: float) -> list[Verdict]:
+    return [world.refuse(cut(task.task_id), reason, stamp) for task in msg.tasks[:MOST_TASKS]]
 
 
 def answer(verdicts: list[Verdict], response: SubmitTasks.Response) -> SubmitTasks.Response:
@@ -43,6 +53,13 @@ def answer(verdicts: list[Verdict], response: SubmitTasks.Response) -> SubmitTas
             response.rejected.append(verdict.task_id)
             response.reasons.append(verdict.reason)
     return response
+
+
+def check_picture(msg: m.ThreatZoneArray) -> None:
+    """Raise InvalidValue where there is too much of it to be judged zone by zone."""
+    check_count('zones', msg.zones, MOST_ZONES)
+    check_count('vertices of all zones', range(sum(len(zone.vertices) for zone in msg.zones)),
+                MOST_CORNERS)
 
 
 def sort_zones(msg: m.ThreatZoneArray, to_zone: Callable[[m.ThreatZone], ThreatZone],

@@ -23,6 +23,14 @@ from uav_task_alloc.model import (
     check_number,
     check_ros_name,
 )
+from uav_task_alloc.nodes.bounds import (
+    MOST_VALUE,
+    MOST_VERTICES,
+    check_count,
+    check_ros_names,
+    check_words,
+    cut,
+)
 
 FRAME_ID = 'map'  # REP-105, ENU
 MOST_REVISIONS = 2**31  # half of what a message can count to
@@ -33,7 +41,7 @@ ANNOUNCEMENTS = QoSProfile(depth=1000, reliability=ReliabilityPolicy.RELIABLE,
                            durability=DurabilityPolicy.TRANSIENT_LOCAL)
 EVENTS = QoSProfile(depth=100, reliability=ReliabilityPolicy.RELIABLE)
 STATES = QoSProfile(depth=50, reliability=ReliabilityPolicy.BEST_EFFORT)
-# what a flood may pile up in front of the allocator; beyond that the oldest is lost, and counted
+# what a flood may pile up in front of the allocator; beyond that the oldest is lost
 HEARD_ANNOUNCEMENTS = QoSProfile(depth=20_000, reliability=ReliabilityPolicy.RELIABLE,
                                  durability=DurabilityPolicy.TRANSIENT_LOCAL)
 HEARD_EVENTS = QoSProfile(depth=10_000, reliability=ReliabilityPolicy.RELIABLE)
@@ -81,14 +89,14 @@ def known(value: float) -> float | None:
 def to_task(msg: m.Task, origin: Origin) -> Task:
     """Raise InvalidValue, naming the field, where the message is no good task."""
     check_ros_name('task_id', msg.task_id)
-    for uav_id in msg.allowed_uavs:
-        check_ros_name(f'task {msg.task_id}: allowed_uavs', uav_id)
-    radius = known(msg.acceptance_radius)
+    place, radius = f'task {msg.task_id}: ', known(msg.acceptance_radius)
+    check_number(place + 'value', msg.value, 0.0, MOST_VALUE, open_low=True)
     return Task(
         msg.task_id, _task_position(msg, origin), value=msg.value,
         service_time=from_stamp(msg.service_time),
-        required_capabilities=frozenset(msg.required_capabilities),
-        allowed_uavs=frozenset(msg.allowed_uavs) or None,
+        required_capabilities=check_words(place + 'required_capabilities',
+                                          msg.required_capabilities),
+        allowed_uavs=check_ros_names(place + 'allowed_uavs', msg.allowed_uavs) or None,
         acceptance_radius=radius or None)
 
 
@@ -121,24 +129,29 @@ def to_report(msg: m.UavState) -> UavReport:
     check_number(place + 'mode', msg.mode, m.UavState.UNKNOWN, m.UavState.FAULT)
     check_number(place + 'mission_state', msg.mission_state, m.UavState.UNKNOWN,
                  m.UavState.FOREIGN)
+    if msg.active_task_id:
+        check_ros_name(place + 'active_task_id', msg.active_task_id)
     check_number(place + 'list_revision', msg.list_revision, 0, MOST_REVISIONS)
     home = from_point(msg.home)
     return UavReport(
         msg.uav_id, from_point(msg.position), home=None if any(map(math.isnan, home)) else home,
         range=known(msg.range_remaining), cruise_speed=known(msg.cruise_speed) or None,
-        capabilities=frozenset(msg.capabilities), battery=known(msg.battery),
+        capabilities=check_words(place + 'capabilities', msg.capabilities),
+        battery=known(msg.battery),
         available=msg.available and msg.mode != m.UavState.FAULT,
         active_task=msg.active_task_id, list_revision=msg.list_revision)
 
 
 def to_event(msg: m.TaskEvent) -> TaskEvent:
     """Raise InvalidValue, naming the field, where the message is no event."""
+    check_ros_name('task_id', msg.task_id)
+    check_ros_name(f'event of task {msg.task_id}: uav_id', msg.uav_id)
     try:
         kind = Kind(msg.event)
     except ValueError:
         raise InvalidValue(f'event of task {msg.task_id}: event', msg.event,
                            'STARTED (0), COMPLETED (1) or FAILED (2)') from None
-    return TaskEvent(msg.task_id, msg.uav_id, msg.revision, kind, msg.reason)
+    return TaskEvent(msg.task_id, msg.uav_id, msg.revision, kind, cut(msg.reason))
 
 
 def to_zone(msg: m.ThreatZone) -> ThreatZone:
@@ -149,6 +162,7 @@ def to_zone(msg: m.ThreatZone) -> ThreatZone:
     except ValueError:
         raise InvalidValue(f'zone {msg.zone_id}: shape', msg.shape,
                            'HEMISPHERE (0), CYLINDER (1) or POLYGON (2)') from None
+    check_count(f'zone {msg.zone_id}: vertices', msg.vertices, MOST_VERTICES)
     return ThreatZone(
         msg.zone_id, shape, from_point(msg.center), msg.radius,
         -math.inf if math.isnan(msg.z_min) else msg.z_min,
