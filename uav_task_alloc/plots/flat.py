@@ -42,25 +42,19 @@ class Map:
             axes.spines[side].set_visible(False)
 
     def zone(self, zone: ThreatZone, note: str = '', late: bool = False) -> None:
-        """The footprint with its margin (dotted); a dashed edge where the zone came late."""
+        """The footprint, dashed where it came late; round ones with their margin (dotted)."""
         self._zones += 1
-        text = '\n'.join(filter(None, (zone.id, style.heights(zone), note)))
+        for look in ({'fill': False, 'lw': 0.0, 'hatch': '///', 'ec': (*style.ZONE[:3], 0.3)},
+                     {'fc': style.ZONE, 'ec': RED, 'lw': 2.0, 'ls': '--' if late else '-'}):
+            self.axes.add_patch(_footprint(zone, **look))
         if zone.shape is Shape.POLYGON:
-            shape: Any = Polygon(zone.vertices)
             x, y = (sum(values) / len(values) for values in zip(*zone.vertices, strict=True))
         else:
             x, y, _ = zone.center
-            shape = Circle((x, y), zone.radius)
-            if zone.margin > 0.0:
-                self.axes.add_patch(Circle((x, y), zone.radius + zone.margin, fill=False, ec=RED,
-                                           lw=1.0, ls=':', zorder=2))
+            self.axes.add_patch(Circle((x, y), zone.radius + zone.margin, fill=False, ec=RED,
+                                       lw=1.0, ls=':', zorder=2))
             self._ring(zone)
-        shape.set(fc=style.ZONE, ec=RED, lw=2.0, ls='--' if late else '-', zorder=2)
-        self.axes.add_patch(shape)
-        hatch = type(shape)(*((shape.get_xy(),) if zone.shape is Shape.POLYGON
-                              else ((x, y), zone.radius)), fill=False, lw=0.0, hatch='///',
-                            ec=(*style.ZONE[:3], 0.3), zorder=1.9)
-        self.axes.add_patch(hatch)
+        text = '\n'.join(filter(None, (zone.id, style.heights(zone), note)))
         self._labels.append(Label(text, x, y, SMALL, 12.0, style.DARK_RED, bold=True, within=True))
 
     def _ring(self, zone: ThreatZone) -> None:
@@ -138,3 +132,9 @@ class Map:
             xycoords='axes fraction', fontsize=style.PLAIN, annotation_clip=False)
         for each in (bar, text):
             each.set_in_layout(False)  # it stands where there is room
+
+
+def _footprint(zone: ThreatZone, **look: Any) -> Polygon | Circle:
+    if zone.shape is Shape.POLYGON:
+        return Polygon(zone.vertices, zorder=2, **look)
+    return Circle(zone.center[:2], zone.radius, zorder=2, **look)

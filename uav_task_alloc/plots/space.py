@@ -60,12 +60,17 @@ def draw_plan_3d(uavs: Sequence[Uav], tasks: Sequence[Task], zones: Sequence[Thr
     _frame(axes, low, high)
     figure.text(0.03, 0.94, title_of(plan, len(tasks)), fontsize=style.LARGE, fontweight='bold')
     figure.text(RIGHT, 0.97, note, fontsize=SMALL, va='top')
-    cut = 'no-fly zone, no margin' + '\n(dashed: higher than drawn)' * any(
-        zone.shape is not Shape.HEMISPHERE and zone.z_max > high[2] for zone in zones)
-    style.legend(figure, [*handles_of(uavs, plan, ROWS),
-                          *[style.zone_handle(cut)] * bool(zones)], 'lower right')
+    style.legend(figure, [*handles_of(uavs, plan, ROWS), *_zone_handle(zones, high[2])],
+                 'lower right')
     _write(axes, names, ways)
     figure.savefig(png)
+
+
+def _zone_handle(zones: Sequence[ThreatZone], top: float) -> list[Any]:
+    """The line of the legend for zones, where there are any."""
+    cut = any(zone.shape is not Shape.HEMISPHERE and zone.z_max > top for zone in zones)
+    text = 'no-fly zone, no margin' + '\n(dashed: higher than drawn)' * cut
+    return [style.zone_handle(text)] if zones else []
 
 
 def limits(points: Iterable[Point], zones: Sequence[ThreatZone]) -> tuple[
