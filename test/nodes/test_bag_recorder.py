@@ -2,6 +2,7 @@
 """live_view --record: what was on the topics is in the file, for readers that are not ours."""
 import math
 import signal
+from contextlib import suppress
 from html import escape
 
 import pytest
@@ -15,6 +16,7 @@ from uav_task_alloc_msgs import msg as m
 from uav_task_alloc import report
 from uav_task_alloc.model import Task
 from uav_task_alloc.nodes import definitions
+from uav_task_alloc.nodes.bag_recorder import BagRecorder
 from uav_task_alloc.nodes.messages import (
     ANNOUNCEMENTS,
     EVENTS,
@@ -24,6 +26,7 @@ from uav_task_alloc.nodes.messages import (
     header,
 )
 from uav_task_alloc.nodes.run import with_flags
+from uav_task_alloc.record.bag_reader import BagReader
 
 pytestmark = pytest.mark.ros
 ADD = announcement(m.TaskAnnouncement.ADD, [Task('t1', (10.0, 20.0, 30.0), value=4.0)], 5.0)
@@ -42,18 +45,26 @@ def fleet(probe):
     return probe.node.create_publisher(m.UavState, 'uav_states', STATES)
 
 
+def on_disk(path):
+    """The topics that another reader finds in a file which has no end."""
+    found = set()
+    with suppress(EndOfFile, FileNotFoundError), open(path, 'rb') as file:
+        for _, channel, _ in NonSeekingReader(file).iter_messages(log_time_order=False):
+            found.add(channel.topic)
+    return found
+
+
 def test_every_topic_is_recorded_with_its_type_and_times(start, probe, tmp_path):
     states, path = fleet(probe), tmp_path / 'run.mcap'
     view = start('live_view', '-p', f'record:={path}', '-p', 'speedup:=4.0')
     events = probe.publisher(m.TaskEvent, 'task_events', EVENTS)
     events.publish(m.TaskEvent(header=header(8.0), task_id='t1', uav_id='uav_1', revision=3))
     probe.until(lambda: len(probe.node.get_subscriptions_info_by_topic('/uav_1/path')) == 1)
-    size = path.stat().st_size
 
-    def on_disk():
+    def recorded():
         states.publish(m.UavState(header=header(11.0), uav_id='uav_1', battery=0.5))
-        return path.stat().st_size > size
-    probe.until(on_disk)
+        return {'/uav_states', '/task_events'} <= on_disk(path)
+    probe.until(recorded)
     view.stop()
     with open(path, 'rb') as file:
         reader = make_reader(file, decoder_factories=[DecoderFactory()], validate_crcs=True)
@@ -81,17 +92,9 @@ def test_what_a_killed_recorder_had_on_disk_can_be_read(start, probe, tmp_path):
     fleet(probe)
     path = tmp_path / 'run.mcap'
     view = start('live_view', '-p', f'record:={path}')
-    probe.until(lambda: path.exists() and path.stat().st_size > 3000)  # a first chunk
+    probe.until(lambda: '/task_announcements' in on_disk(path))
     view.stop(signal.SIGKILL)
-    found = set()
-
-    def read():
-        with open(path, 'rb') as file:
-            for _, channel, _ in NonSeekingReader(file).iter_messages(log_time_order=False):
-                found.add(channel.topic)
-    with pytest.raises(EndOfFile):
-        read()
-    assert '/task_announcements' in found
+    assert '/task_announcements' in on_disk(path)
 
 
 def test_the_report_of_a_run_is_drawn_from_its_recording_alone(start, probe, tmp_path):
@@ -133,6 +136,21 @@ def test_a_file_that_is_there_or_cannot_be_is_refused_in_words(start, tmp_path):
         code, out = view.stop()
         assert (code, text in out, 'Traceback' in out) == (1, True, False), out
     assert (tmp_path / 'old.mcap').read_text() == 'flight of yesterday'
+
+
+def test_a_disk_that_fails_ends_the_recording_and_nothing_else(probe, tmp_path, monkeypatch):
+    recorder = BagRecorder(tmp_path / 'run.mcap', context=probe.context)
+
+    def full():
+        raise OSError(28, 'No space left on device')
+
+    monkeypatch.setattr(recorder.bag, 'flush', full)
+    recorder.start()
+    probe.until(lambda: recorder.bag is None)
+    fleet(probe)
+    assert recorder.thread.is_alive()
+    recorder.stop()
+    assert [line['kind'] for line in BagReader(tmp_path / 'run.mcap')] == ['run']
 
 
 def test_a_definition_holds_all_a_message_is_made_of():

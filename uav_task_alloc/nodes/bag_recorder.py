@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from importlib import import_module
 from pathlib import Path
 from threading import Event, Thread
@@ -11,6 +12,7 @@ from typing import Any
 
 import rclpy
 from ament_index_python.packages import PackageNotFoundError
+from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
@@ -19,7 +21,9 @@ from uav_task_alloc.nodes.definitions import definition
 from uav_task_alloc.nodes.messages import ANNOUNCEMENTS, EVENTS, LATCHED, STATES
 from uav_task_alloc.record.bag import Bag
 
-LOOK = 1.0  # [s] between two looks for new topics, and between two chunks on disk
+LOOK = 1.0  # [s] between two looks for new topics, and at first between two chunks on disk
+RARER = 1.0 / 3600.0  # of its age a recording waits for a chunk, as their index is in memory
+RAREST = 10.0  # [s] between two chunks, however old it is
 DEPTH = 1000  # messages that wait for the disk, a topic
 OURS = 'uav_task_alloc_msgs/msg/'
 # those whose first message must not be missed; all others as they turn up
@@ -39,15 +43,18 @@ class BagRecorder:
     """
 
     def __init__(self, path: Path, namespace: str = '/',
-                 about: Mapping[str, str] | None = None) -> None:
+                 about: Mapping[str, str] | None = None,
+                 context: Context | None = None) -> None:
         self.bag: Bag | None = Bag(path, about or {})
         self.path = path
-        self.node = Node('recorder', namespace=namespace, use_global_arguments=False)
+        self.node = Node('recorder', namespace=namespace, use_global_arguments=False,
+                         context=context)
         self.within = namespace.rstrip('/') + '/'
         self.known: set[str] = set()  # topics that are recorded, or cannot be
         for name, (type_name, qos) in KNOWN.items():
             self.record(self.within + name, type_name, qos)
         self.node.create_timer(LOOK, self.on_look)
+        self.began = self.flushed = time.monotonic()
         self.ending = Event()
         self.thread = Thread(target=self.run, name='recorder', daemon=True)
 
@@ -77,7 +84,10 @@ class BagRecorder:
             if (topic not in self.known and self.is_ours(topic)
                     and self.node.count_publishers(topic)):
                 self.record(topic, types[0], self.offered(topic))
-        self.guard(lambda bag: bag.flush())
+        now = time.monotonic()
+        if now - self.flushed >= min(RAREST, RARER * (now - self.began)):
+            self.flushed = now
+            self.guard(lambda bag: bag.flush())
 
     def is_ours(self, topic: str) -> bool:
         """Of the fleet, or of all: `/diagnostics`, `/rosout`."""
@@ -122,4 +132,6 @@ class BagRecorder:
             write(self.bag)
         except OSError as error:
             self.node.get_logger().error(f'recording into {self.path} ends: {error}')
+            with suppress(OSError):  # it tries to write once more
+                self.bag.file.close()
             self.bag = None

@@ -18,8 +18,9 @@ CHUNK = 512 * 1024  # [bytes] held in memory at most, before compression
 class Bag:
     """An MCAP file of ROS 2 messages. What was there at the last `flush` outlives the process.
 
-    In memory are one chunk and about 1 kB of index for each chunk written. Raises InvalidValue
-    where the file holds something already, OSError where it cannot be written.
+    In memory are one chunk and, for each chunk written, its index: 0.6 kB with messages of three
+    topics, 2.4 kB with those of thirty. Raises InvalidValue where the file holds something
+    already, OSError where it cannot be written.
     """
 
     def __init__(self, path: Path, about: Mapping[str, str]) -> None:
