@@ -117,6 +117,8 @@ class AllocatorParams(Framed):
                                  low=1.0, high=1e7, unit='m')
     max_attempts: int = param(3, 'UAVs that may fail at a task before it is FAILED.', low=1,
                               high=1000)
+    keep_ended: int = param(10_000, 'Ended tasks that are remembered, the newest: who announces '
+                            'an older one again announces a new task.', low=0, high=1_000_000)
     state_dir: str = param('', 'Folder of the journal; empty: nothing is kept.', fixed=True)
     threads: int = param(1, 'Colonies of bees, each on a core of its own.', low=1, high=64)
     seed: int = param(0, 'Seed of the bees.', low=0, high=2**31 - 1, fixed=True)

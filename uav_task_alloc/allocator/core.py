@@ -74,6 +74,8 @@ class Allocator:
             self._tell(Plan({}), 'restart', stamp)
         if self._pace.due(now):
             world.touch('lists held back', now)
+        if len(world.tasks.ended) > world.params.keep_ended:
+            world.lists.forget(world.tasks.forget(world.params.keep_ended, world.lists.owners()))
         if world.outbox.statuses:
             planning.explain(world, self._left, stamp)
 
@@ -163,7 +165,8 @@ class Allocator:
     def rows(self, most: int | None = None) -> list[Row]:
         """What changed and is not on disk yet, `most` tasks of it; `written` says that it is."""
         world = self.world
-        rows = [task_row(world.tasks.records[task_id])
+        tasks = world.tasks.records
+        rows = [task_row(tasks[task_id]) if task_id in tasks else Row('task', task_id, None)
                 for task_id in sorted(world.tasks.dirty)[:most]]
         rows += [list_row(world.lists.lists[uav_id]) for uav_id in sorted(world.lists.dirty)]
         made = {'zones': lambda: zones_row(world.zones.values()),

@@ -2,7 +2,7 @@
 """The book of lists: what each UAV was told last, and which task was in which revision."""
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Collection, Iterable
 from dataclasses import replace
 
 from uav_task_alloc.allocator.records import UavList
@@ -82,3 +82,8 @@ class ListBook:
             return None
         flown = sum(stop.leg.length for stop in held.stops[:len(held.stops) - len(stops)])
         return replace(held, stops=stops, distance=held.distance - flown if stops else 0.0)
+
+    def forget(self, task_ids: Collection[str]) -> None:
+        """These tasks are of the past; nobody will ask which revision had them."""
+        self._carried = {key: span for key, span in self._carried.items()
+                         if key[1] not in task_ids}

@@ -2,7 +2,7 @@
 """The book of tasks: what is accepted, what is refused and why, and how each task ended."""
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from dataclasses import replace
 from typing import Any
 
@@ -10,6 +10,7 @@ from uav_task_alloc.allocator.life import Event, after
 from uav_task_alloc.allocator.records import TaskRecord, TaskState, Verdict
 from uav_task_alloc.model import Task
 
+MOST_OPEN = 20_000  # tasks still to be done; more are refused
 MOST_REJECTED = 1000  # refusals remembered, the newest
 UNCHANGED = 'duplicate: announced before, unchanged'
 OWNED = frozenset({TaskState.ASSIGNED, TaskState.ACTIVE, TaskState.COMPLETED, TaskState.FAILED})
@@ -22,6 +23,9 @@ class TaskBook:
         self.records = {record.task.id: record for record in records}
         self.rejected: dict[str, tuple[str, float]] = {}  # id -> reason, stamp [s]
         self.dirty: set[str] = set()  # not yet on disk
+        # in the order in which they ended, as far as a journal tells
+        self.ended = {record.task.id: None for record in sorted(
+            self.records.values(), key=lambda record: record.stamp) if not record.open}
 
     def open(self) -> list[TaskRecord]:
         """Those still to be done."""
@@ -30,6 +34,8 @@ class TaskBook:
     def add(self, task: Task, stamp: float) -> Verdict:
         """A new task. A replay of what is known changes nothing; a known id is no new task."""
         known = self.records.get(task.id)
+        if known is None and len(self.records) - len(self.ended) >= MOST_OPEN:
+            return self.reject(task.id, f'open tasks = {MOST_OPEN}: expected fewer', stamp)
         if known is None:
             rule = after(TaskState.REJECTED, Event.ADD)
             self.rejected.pop(task.id, None)
@@ -88,3 +94,14 @@ class TaskBook:
     def _put(self, record: TaskRecord) -> None:
         self.records[record.task.id] = record
         self.dirty.add(record.task.id)
+        self.ended.pop(record.task.id, None)
+        if not record.open:
+            self.ended[record.task.id] = None
+
+    def forget(self, keep: int, listed: Collection[str]) -> set[str]:
+        """Of the ended tasks only the newest `keep` stay, and those that are in a list still."""
+        old = set(list(self.ended)[:max(0, len(self.ended) - keep)]) - set(listed)
+        for task_id in old:
+            del self.records[task_id], self.ended[task_id]
+        self.dirty |= old
+        return old

@@ -131,7 +131,8 @@ class World:
                 or report.active_task not in old.task_ids):
             return
         for task_id in old.task_ids[:old.task_ids.index(report.active_task)]:
-            if self.tasks.records[task_id].open:
+            record = self.tasks.records.get(task_id)
+            if record is not None and record.open:
                 self.tasks.step(task_id, Life.COMPLETE, stamp, report.uav_id,
                                 'passed while nobody listened')
                 self.note(f'{task_id} COMPLETED while nobody listened: {report.uav_id} flies '
