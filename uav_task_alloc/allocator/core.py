@@ -11,7 +11,7 @@ from functools import partial
 
 from uav_task_alloc.allocator import planning
 from uav_task_alloc.allocator.answer import steady
-from uav_task_alloc.allocator.learner import learner_row
+from uav_task_alloc.allocator.learner import learner, learner_row
 from uav_task_alloc.allocator.pace import Pace
 from uav_task_alloc.allocator.records import Allocation, Answer, Outbox, Problem, UavList
 from uav_task_alloc.allocator.restore import (
@@ -26,8 +26,10 @@ from uav_task_alloc.allocator.world import World
 from uav_task_alloc.journal import Row
 from uav_task_alloc.model import Plan
 from uav_task_alloc.params import AllocatorParams
-from uav_task_alloc.solver.warm import State
 
+# [s] after a restart in which no task changes hands: what was flown while nobody listened is told
+# again meanwhile, by the bridge after 2 s
+CAUTIOUS = 3.0
 LEARNER = 5.0  # [s] between two rows of what the bees learnt
 
 
@@ -39,8 +41,8 @@ class Allocator:
     def __init__(self, params: AllocatorParams, now: float, saved: Saved | None = None) -> None:
         saved = saved or Saved()
         self.world = World(params, saved)
-        self._best = Plan({each.uav: each.task_ids for each in saved.lists},
-                          state=State(learnt=saved.learnt))
+        self._best = Plan({each.uav: each.task_ids for each in saved.lists})
+        self._learnt = saved.learnt
         self._learnt_at = now
         self._pace = Pace()
         self._left: dict[str, str] = {}  # task id -> why it is left out
@@ -48,6 +50,8 @@ class Allocator:
         self._wait_for = {each.uav for each in saved.lists if each.stops}
         self._wait_until = now + params.uav_timeout
         self._restarted = bool(saved.lists)
+        self._cautious_until = now + CAUTIOUS
+        self.world.cautious = any(each.stops for each in saved.lists)
         self.world.again.update(each.uav for each in saved.lists)
         if saved.tasks:
             self.world.outbox.statuses = True
@@ -56,6 +60,7 @@ class Allocator:
     def wake(self) -> None:
         """The kernels are compiled: solving may begin."""
         self.world.awake = True
+        self._best = replace(self._best, state=learner(self._learnt))
 
     def tick(self, now: float, stamp: float) -> None:
         """Whatever time brings: UAVs fall silent, ended tasks leave the lists."""
@@ -72,6 +77,9 @@ class Allocator:
         if self._restarted:  # the plan of the last life is in force, and told before any other
             self._restarted = False
             self._tell(Plan({}), 'restart', stamp)
+        if world.cautious and now >= self._cautious_until:
+            world.cautious = False
+            world.touch('some time after a restart', now)
         if self._pace.due(now):
             world.touch('lists held back', now)
         if len(world.tasks.ended) > world.params.keep_ended:
@@ -172,7 +180,7 @@ class Allocator:
         made = {'zones': lambda: zones_row(world.zones.values()),
                 'off': lambda: off_row(world.fleet.off),
                 'revision': lambda: revision_row(world.revision),
-                'learner': lambda: learner_row(getattr(self._best.state, 'learnt', None))}
+                'learner': lambda: learner_row(self._best.state)}
         return rows + [made[name]() for name in sorted(world.dirty)]
 
     def nothing_written(self) -> None:

@@ -4,18 +4,24 @@ from __future__ import annotations
 
 import base64
 import zlib
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from uav_task_alloc.journal import Row
-from uav_task_alloc.solver.tables import Learnt, Tables
+
+if TYPE_CHECKING:  # it brings the compiler along, which a start must not wait for
+    from uav_task_alloc.solver.warm import State
 
 MOST = 200_000  # entries kept of a table; 5000 tasks with 24 neighbours are 120 000
 
 
-def learner_row(learnt: object) -> Row:
-    """Tables up to MOST entries each; without a row for the starts of UAVs where they are more."""
+def learner_row(state: object) -> Row:
+    """The tables of a plan's state, up to MOST entries each; the starts of UAVs are left out
+    where they are more.
+    """
+    from uav_task_alloc.solver.tables import Learnt
+    learnt = getattr(state, 'learnt', None)
     if not isinstance(learnt, Learnt) or learnt.near.size > MOST:
         return Row('learner', '', None)
     starts, near = learnt.tables.start, learnt.near - len(learnt.uavs)  # places of tasks from 0
@@ -26,8 +32,17 @@ def learner_row(learnt: object) -> Row:
         'start': _packed(starts[:len(uavs)], '<f4')})
 
 
-def learner(body: dict[str, Any]) -> Learnt:
-    """The tables of a row. Raises KeyError, TypeError or ValueError where it is none."""
+def learner(body: Any) -> State:
+    """The state of a row; an empty one where it is none: then the bees learn anew."""
+    from uav_task_alloc.solver.warm import State
+    try:
+        return State(learnt=_tables(body))
+    except (KeyError, TypeError, ValueError):
+        return State()
+
+
+def _tables(body: Any) -> object:
+    from uav_task_alloc.solver.tables import Learnt, Tables
     uavs, tasks = body['uavs'], body['tasks']
     n, m = len(tasks), len(uavs)
     near = _unpacked(body['near'], '<i4').reshape(n, -1).astype(np.int64)

@@ -6,13 +6,21 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
+from typing import TYPE_CHECKING
 
 from uav_task_alloc.allocator.records import Stop, UavList
-from uav_task_alloc.allocator.ways import Ways, length
 from uav_task_alloc.model import Leg, Plan, Point, Task, Uav
+
+if TYPE_CHECKING:  # it brings the compiler along, which a start must not wait for
+    from uav_task_alloc.allocator.ways import Ways
 
 START, HOME = '', '~'  # neither is a task id
 WORTH = 1.0  # [m] a way at least so much shorter replaces a published one
+
+
+def length(points: Sequence[Point]) -> float:
+    """Metres along a polyline."""
+    return math.fsum(math.dist(a, b) for a, b in pairwise(points))
 
 
 def planned_legs(plan: Plan) -> dict[tuple[str, str, str], Leg]:

@@ -7,7 +7,6 @@ from dataclasses import dataclass, field, fields, replace
 from enum import Enum
 from typing import Any
 
-from uav_task_alloc.allocator.learner import learner
 from uav_task_alloc.allocator.records import Stop, TaskRecord, TaskState, UavList
 from uav_task_alloc.journal import Row
 from uav_task_alloc.model import Leg, Shape, Task, ThreatZone
@@ -22,7 +21,7 @@ class Saved:
     zones: list[ThreatZone] = field(default_factory=list)
     off: list[str] = field(default_factory=list)  # UAVs an operator switched off
     revision: int = 0  # of the allocation
-    learnt: object = None  # by the bees: what the next warm start wants
+    learnt: Any = None  # by the bees: the body of their row
     bad: list[str] = field(default_factory=list)  # rows that are left out, and why
 
 
@@ -79,7 +78,7 @@ def _take(found: Saved, row: Row) -> None:
     elif row.kind == 'revision':
         found.revision = int(row.body)
     elif row.kind == 'learner':
-        found.learnt = learner(row.body)
+        found.learnt = row.body
     else:
         raise ValueError(f'unknown kind {row.kind!r}')
 

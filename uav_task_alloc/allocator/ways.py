@@ -8,6 +8,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from uav_task_alloc.allocator.lists import length
 from uav_task_alloc.geometry.detour import detour
 from uav_task_alloc.geometry.obstacles import blocked, contains, pack
 from uav_task_alloc.model import Leg, Point, ThreatZone
@@ -54,11 +55,6 @@ class Ways:
             if self.clear(*points):
                 return length(points)
         return None
-
-
-def length(points: Sequence[Point]) -> float:
-    """Metres along a polyline."""
-    return math.fsum(math.dist(a, b) for a, b in pairwise(points))
 
 
 def _passed(position: Point, via: Sequence[Point], goal: Point) -> int:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Iterable, Sequence
+from typing import TYPE_CHECKING
 
 from uav_task_alloc.allocator.fleet import Fleet, UavRecord, may_fly
 from uav_task_alloc.allocator.life import Event as Life
@@ -25,10 +26,12 @@ from uav_task_alloc.allocator.records import (
 from uav_task_alloc.allocator.restore import Saved
 from uav_task_alloc.allocator.schedule import Schedule
 from uav_task_alloc.allocator.tasks import UNCHANGED, TaskBook
-from uav_task_alloc.allocator.ways import Ways
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.model import Task, ThreatZone
 from uav_task_alloc.params import AllocatorParams
+
+if TYPE_CHECKING:  # it brings the compiler along, which a start must not wait for
+    from uav_task_alloc.allocator.ways import Ways
 
 MOST_UAVS = 1000  # a flood of made-up ids ends here
 FASTEST = 10.0  # times the cruise speed: nobody flies so fast, not even in faster simulations
@@ -53,6 +56,7 @@ class World:
         self.version = 0
         self.outbox = Outbox()
         self.again: set[str] = set()  # UAVs to be told their lists once more
+        self.cautious = False  # shortly after a restart: tasks stay where they are
         self.awake = False  # the kernels are compiled: looking at zones is quick
         self._ways: Ways | None = None
         self._looked: dict[str, float] = {}
@@ -244,6 +248,7 @@ class World:
 
     def ways(self) -> Ways:
         """The ways around the zones as they are now."""
+        from uav_task_alloc.allocator.ways import Ways
         if self._ways is None or self._ways.params is not self.params:
             self._ways = Ways(tuple(self.zones.values()), self.params)
         return self._ways
@@ -260,28 +265,26 @@ class World:
     def locked(self) -> dict[str, tuple[str, ...]]:
         """What is being flown, and what comes next as far as committed: it stays as it is."""
         owners = self.lists.owners()
+        most = len(owners) + 1 if self.cautious else self.params.locked_tasks
         found: dict[str, tuple[str, ...]] = {}
         seen: set[str] = set()
-        for uav_id, task_id in self.fleet.active.items():
-            if (self.params.locked_tasks > 0 and task_id not in seen
-                    and self.fleet.usable(uav_id) and owners.get(task_id, uav_id) == uav_id
-                    and self._can(uav_id, task_id)):
-                seen.add(task_id)
-                found[uav_id] = (task_id, *self._next(uav_id, task_id))
-        return found
+        for uav_id in filter(self.fleet.usable, self.fleet.records):
+            held, first = self.lists.get(uav_id).task_ids, self.fleet.active.get(uav_id, '')
+            if first in seen or owners.get(first, uav_id) != uav_id or not self._can(
+                    uav_id, first):
+                first = ''
+            if first or self.cautious:
+                rest = held[held.index(first) + 1:] if first in held else (
+                    held if self.cautious else ())
+                kept = (*filter(None, (first,)), *(t for t in rest if self._can(uav_id, t)))
+                found[uav_id] = kept[:most]
+                seen.update(kept[:most])
+        return {uav_id: kept for uav_id, kept in found.items() if kept}
 
     def _can(self, uav_id: str, task_id: str) -> bool:
         record = self.tasks.records.get(task_id)
-        return record is not None and record.open and uav_id not in record.failed_on
-
-    def _next(self, uav_id: str, task_id: str) -> tuple[str, ...]:
-        """The committed tasks after the one being flown, those that can still be flown."""
-        ids, report = self.lists.get(uav_id).task_ids, self.fleet.records[uav_id].report
-        if task_id not in ids:
-            return ()
-        after = ids[ids.index(task_id) + 1:][:self.params.locked_tasks - 1]
-        return tuple(t for t in after if self._can(uav_id, t) and may_fly(
-            self.tasks.records[t].task, (), report))
+        return record is not None and record.open and may_fly(
+            record.task, record.failed_on, self.fleet.records[uav_id].report)
 
 
 def _news(before: UavRecord | None, after: UavRecord) -> list[str]:

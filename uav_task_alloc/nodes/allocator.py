@@ -16,7 +16,6 @@ from uav_task_alloc_msgs.srv import SetAvailability, SubmitTasks
 from uav_task_alloc.allocator import Allocator, planning
 from uav_task_alloc.allocator.keeper import Keeper
 from uav_task_alloc.allocator.records import Answer, Note, Problem, Verdict
-from uav_task_alloc.allocator.rehearsal import rehearse
 from uav_task_alloc.allocator.status import facts, worries
 from uav_task_alloc.allocator.worker import Worker
 from uav_task_alloc.errors import InvalidValue
@@ -38,7 +37,6 @@ from uav_task_alloc.nodes.parameters import declare
 from uav_task_alloc.nodes.run import run
 from uav_task_alloc.nodes.teller import Teller
 from uav_task_alloc.params import AllocatorParams
-from uav_task_alloc.solver.solve import plan
 
 TICK = 0.025  # [s]
 REST, MOST_REST = 3.0, 0.2  # times as long as a tick took the next one waits, at most [s]
@@ -67,7 +65,7 @@ class AllocatorNode(Node):
         self._talk()
         self.arrived = self.create_guard_condition(self.on_answer)
         self.on_tick()  # the plan of the last life is told before the kernels are loaded
-        self.worker = Worker(lambda: rehearse(plan, now), self.solve, self.deliver, self.failed)
+        self.worker = Worker(self.prepare, self.solve, self.deliver, self.failed)
         self.worker.start()
 
     def _listen(self) -> None:
@@ -191,8 +189,15 @@ class AllocatorNode(Node):
         now = time.monotonic()
         self.rested = now + min(REST * (now - began), MOST_REST)
 
+    def prepare(self) -> None:
+        """In the worker's thread: load the compiler and all it has compiled."""
+        from uav_task_alloc.allocator.rehearsal import rehearse
+        from uav_task_alloc.solver.solve import plan
+        rehearse(plan, self.live.now)
+
     def solve(self, problem: Problem, stop) -> Answer:
         """In the worker's thread."""
+        from uav_task_alloc.solver.solve import plan
         return planning.solve(plan, problem, self.live.now, stop)
 
     def deliver(self, answer: Answer | None) -> None:

@@ -9,7 +9,6 @@ from itertools import pairwise
 from geometry_msgs.msg import Point as PointMsg
 from visualization_msgs.msg import Marker
 
-from uav_task_alloc.geometry.zones import outline
 from uav_task_alloc.model import FAR, Shape, ThreatZone
 
 ENDLESS = 1000.0  # [m] as high as an unbounded zone is drawn
@@ -53,6 +52,7 @@ def shape(marker: Marker, zone: ThreatZone) -> Marker:
         _place(marker, zone.center, (width, width, width))
         marker.points = DOME
     else:  # around its own middle: a GPU counts in 32 bits
+        from uav_task_alloc.geometry.zones import outline  # brings the compiler along
         _place(marker, (x, y, low), (1.0, 1.0, 1.0))
         marker.points = prism([(px - x, py - y) for px, py in outline(zone)], high - low)
     return marker
