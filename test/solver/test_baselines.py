@@ -9,13 +9,14 @@ from plan_checks import check, make
 
 from uav_task_alloc import SOLVERS, Task, ThreatZone, Uav, plan
 from uav_task_alloc.errors import InvalidValue
+from uav_task_alloc.objective import Weights
 
 OPEN, HOME = {'route_end': 'hold', 'reach': math.inf}, {'route_end': 'home', 'reach': 900.0}
 SEEDS = range(1, 7)
 # iterations; mean gap [%] to the optimum at most: open routes, routes home beyond ranges
 GAPS = {'chain_q': (3000, 0.5, 1.0), 'abc': (300, 2.5, 1.0), 'ga': (100, 5.0, 3.0),
         'q_learning': (300, 4.0, 16.0), 'auction': (1, 8.0, 30.0), 'cbba': (50, 5.0, 25.0),
-        'nearest': (1, 30.0, 150.0), 'paper_chain_q': (100, 25.0, 55.0)}
+        'nearest': (1, 30.0, 150.0), 'paper_chain_q': (400, 40.0, 90.0)}
 
 
 @pytest.mark.parametrize('world', [OPEN, HOME], ids=['open', 'home'])
@@ -94,3 +95,12 @@ def test_tables_that_would_not_fit_are_refused():
     for solver, most in (('paper_chain_q', 200), ('abc', 2000), ('auction', 2000)):
         with pytest.raises(InvalidValue, match=f'tasks = 2001: expected at most {most}'):
             plan(uavs, tasks, solver=solver)
+
+
+@pytest.mark.parametrize('solver', SOLVERS)
+@pytest.mark.parametrize('weights', [Weights(value=0.0), Weights(0.0, 0.0, 0.0)])
+def test_a_fit_of_nothing_is_no_trouble(solver, weights):
+    uavs = [Uav(f'u{i}', (0.0, 0.0, 0.0)) for i in range(2)]
+    tasks = [Task(f't{i}', (0.0, 0.0, 0.0)) for i in range(4)]
+    made = plan(uavs, tasks, solver=solver, budget=60.0, max_iterations=5, weights=weights)
+    assert (made.fit, made.unassigned) == (0.0, {})

@@ -40,21 +40,21 @@ from uav_task_alloc.solver.recorder import Recorder
 from uav_task_alloc.solver.routes import Arrays, Floats, Ints, Routes, insert, lengthened, step
 
 MOST_TASKS = 200  # the tables take 8 n^3 bytes
-FIRST = 1.0  # Q before anything is learnt
 
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """What the paper does not print."""
+    """What the paper does not print: the best of 48 sets tried, ranking kept (docs/solver.md)."""
 
     bees: int = 20
     ranked: int = 5  # bees that are learnt from
     decay: float = 0.5  # ranking coefficient over that of the rank before
     k: float = 1.0  # reward coefficient
-    alpha: float = 0.2  # learning rate
+    alpha: float = 0.5  # learning rate
     gamma: float = 0.5  # discount
-    greedy_rate: float = 0.1  # eps
+    greedy_rate: float = 0.9  # eps
     floor: float = 0.01  # least Q
+    first: float = 0.01  # Q before anything is learnt
 
 
 class Chains(NamedTuple):
@@ -196,6 +196,13 @@ def learn(q: Chains, uavs: Ints, tasks: Ints, steps: int, reward: float, rate: f
         u, t = v, s
 
 
+def _share(best: float, fit: float) -> float:
+    """best / fit in [0, 1], also where the best fit is 0 or nothing is served."""
+    if fit <= best:
+        return 1.0
+    return best / fit
+
+
 def solve(recorder: Recorder, seed: int, learnt: object = None,
           settings: Settings | None = None) -> None:
     """Generations of bees until the budget ends. Raises InvalidValue beyond MOST_TASKS."""
@@ -205,7 +212,7 @@ def solve(recorder: Recorder, seed: int, learnt: object = None,
         raise InvalidValue('tasks', n, f'at most {MOST_TASKS} for paper_chain_q')
     if not n or not m:
         return
-    q = Chains(np.full((n, m, m), FIRST), np.full((n, n, n), FIRST))
+    q = Chains(np.full((n, m, m), known.first), np.full((n, n, n), known.first))
     scratch = Scratch(np.empty(m, np.bool_), np.empty(n, np.bool_), np.empty(m), np.empty(n))
     swarm = Swarm(np.zeros((known.bees, n), np.int64), np.zeros((known.bees, n), np.int64),
                   np.zeros(known.bees, np.int64), np.empty((known.bees, 5)))
@@ -222,7 +229,7 @@ def solve(recorder: Recorder, seed: int, learnt: object = None,
             place_rest(a, routes)
             recorder.offer(routes)
         for b, coefficient in zip(ranking, coefficients, strict=False):
-            reward = known.k * best / fits[b] if fits[b] < math.inf else 0.0
+            reward = known.k * _share(best, fits[b])
             learn(q, swarm.uavs[b], swarm.tasks[b], swarm.steps[b], reward,
                   known.alpha * coefficient, known.gamma, known.floor, scratch.open)  # eq 2.14
         recorder.count()
