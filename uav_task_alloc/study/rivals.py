@@ -125,15 +125,7 @@ def ortools(instance: Instance, seconds: float) -> Found:
     solver = import_module('ortools.constraint_solver.pywrapcp')
     m = model(instance)
     fleet = [(c, uav) for c, crew in enumerate(m.crews) for uav in crew]
-    index = solver.RoutingIndexManager(len(m.ways), len(fleet), [c for c, _ in fleet],
-                                       [m.ends[c] for c, _ in fleet])
-    routing = solver.RoutingModel(index)
-    transit = routing.RegisterTransitMatrix(m.ways.tolist())
-    routing.SetArcCostEvaluatorOfAllVehicles(transit)
-    routing.AddDimensionWithVehicleCapacity(transit, 0, [m.reach(c) for c, _ in fleet], True,
-                                            'distance')
-    for i, prize in enumerate(m.prizes):
-        routing.AddDisjunction([index.NodeToIndex(m.tasks + i)], prize)
+    index, routing = _routing(solver, m, [c for c, _ in fleet])
     found: Found = []
     costs: list[int] = []
     began = time.thread_time()
@@ -151,6 +143,20 @@ def ortools(instance: Instance, seconds: float) -> Found:
     routing.AddAtSolutionCallback(note)
     routing.SolveWithParameters(_guided(solver, WAITING * seconds))
     return found
+
+
+def _routing(solver: Any, m: Model, crews: Sequence[int]) -> tuple[Any, Any]:
+    """Its index and model; `crews` has the crew of each vehicle."""
+    index = solver.RoutingIndexManager(len(m.ways), len(crews), list(crews),
+                                       [m.ends[crew] for crew in crews])
+    routing = solver.RoutingModel(index)
+    transit = routing.RegisterTransitMatrix(m.ways.tolist())
+    routing.SetArcCostEvaluatorOfAllVehicles(transit)
+    routing.AddDimensionWithVehicleCapacity(transit, 0, [m.reach(crew) for crew in crews], True,
+                                            'distance')
+    for i, prize in enumerate(m.prizes):
+        routing.AddDisjunction([index.NodeToIndex(m.tasks + i)], prize)
+    return index, routing
 
 
 def _ortools_route(routing: Any, index: Any, vehicle: int) -> list[int]:
