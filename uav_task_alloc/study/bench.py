@@ -34,15 +34,7 @@ def main(argv: Sequence[str]) -> int:
     with tempfile.TemporaryDirectory() as scratch:
         outcome = campaign.run(list(jobs.values()), asked.keep or Path(scratch),
                                executors.chosen(asked), _say, time.monotonic)
-    runs: dict[str, Run] = {}
-    for (key, name), job in jobs.items():
-        if job.name in outcome.results:
-            result = outcome.results[job.name]
-            run = runs.setdefault(key, Run(result['group'], result['collects'], result['known']))
-            run.found[name] = result['found']
-            for each in result['found']:
-                for fault in each['faults']:
-                    _say(f'{key}, {name} in {each["budget"]:g} s, not counted: {fault}')
+    runs = _gathered(jobs, outcome.results)
     print(table(runs))
     if asked.json:
         asked.json.write_text(json.dumps({key: run.plain() for key, run in runs.items()},
@@ -51,6 +43,22 @@ def main(argv: Sequence[str]) -> int:
         from uav_task_alloc.study.gap_plot import draw  # needs matplotlib
         draw(runs, asked.plot)
     return int(bool(outcome.failed))
+
+
+def _gathered(jobs: Mapping[tuple[str, str], Job],
+              results: Mapping[str, Any]) -> dict[str, Run]:
+    """Results by instance; faults that the judge found are told of."""
+    runs: dict[str, Run] = {}
+    for (key, name), job in jobs.items():
+        result = results.get(job.name)
+        if result is None:
+            continue
+        run = runs.setdefault(key, Run(result['group'], result['collects'], result['known']))
+        run.found[name] = result['found']
+        for each in result['found']:
+            for fault in each['faults']:
+                _say(f'{key}, {name} in {each["budget"]:g} s, not counted: {fault}')
+    return runs
 
 
 def _parser() -> argparse.ArgumentParser:
