@@ -59,7 +59,7 @@ def draw_plan_3d(uavs: Sequence[Uav], tasks: Sequence[Task], zones: Sequence[Thr
                   for name, place in places.items()]
     _frame(axes, low, high)
     figure.text(0.03, 0.94, title_of(plan, len(tasks)), fontsize=style.LARGE, fontweight='bold')
-    figure.text(RIGHT, 0.97, note, fontsize=SMALL, va='top')
+    figure.text(RIGHT, 0.97, note, fontsize=SMALL - 2.0, va='top')
     style.legend(figure, [*handles_of(uavs, plan, ROWS), *_zone_handle(zones, high[2])],
                  'lower right')
     _write(axes, names, ways)

@@ -81,10 +81,18 @@ def write(made: Program, outcome: Outcome, out: Path) -> int:
 
 
 TITLES = {'sizes': 'Solvers by size', 'dynamic': 'Random arrivals, warm against cold'}
-SAME = ('# The study: tables\n\nBudgets are iterations, so the same seed gives the same tables '
-        'on every machine; what\ntook how long is in timing.md. Settings: settings.json.\n')
-TIMED = ('# The study: CPU seconds\n\nMeasured, so they differ from run to run; the same runs '
-         'as in tables.md.\n')
+SAME = """# The study: tables
+
+Budgets are iterations, so the same seed gives the same tables however fast the machine is; what
+took how long is in timing.md. Settings: settings.json. Solvers by size: ranges are soft (eq 2.12),
+so every task is assigned, and a metre beyond range costs as much as 100 m of way; gaps are in fit
+to the best that any run found. `paper_chain_q` holds no more than 200 tasks. Random arrivals:
+ranges are hard, a gap is in length, a task left out counts as 100 %.
+"""
+TIMED = """# The study: CPU seconds
+
+Measured, so they differ from run to run; the same runs as in tables.md.
+"""
 
 
 def _experiment(name: str, argv: Sequence[str]) -> int:

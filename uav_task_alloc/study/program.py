@@ -13,10 +13,10 @@ from uav_task_alloc.study import trials
 from uav_task_alloc.study.campaign import Job
 
 LEARNERS = 'paper_chain_q', 'q_learning', 'abc', 'ga', 'chain_q'  # of figure 2
-FINITE = 'nearest', 'auction', 'cbba'  # end by themselves,
-BRIEF = 0.2  # [s] in about that
+FINITE = 'nearest', 'auction', 'cbba'  # end by themselves
+BRIEF = 0.2  # [s] about what they take
 # iterations in a CPU second at 50 tasks, and the power of the tasks with which they fall: about
-# equal time for all, and yet the same plans on every machine
+# equal time for all, and yet the same plans however fast the machine is
 SPEED: Mapping[str, tuple[float, float]] = MappingProxyType({
     'chain_q': (220_000.0, 0.0), 'paper_chain_q': (1100.0, 1.4), 'q_learning': (5700.0, 1.7),
     'abc': (1600.0, 1.0), 'ga': (700.0, 0.45)})
