@@ -20,7 +20,7 @@ from uav_task_alloc.study.instances import Instance
 
 COUNTS = 1e6  # both count in integers: the longest leg is so many
 UNLIMITED = 2 ** 40
-WAITING = 4.0  # times the CPU seconds that OR-Tools may take by the wall
+WAITING = 20.0  # times the CPU seconds that OR-Tools may take by the wall
 Found = list[tuple[float, Routes]]  # CPU [s] and routes, whenever better ones were found
 
 
