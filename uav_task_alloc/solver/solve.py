@@ -17,6 +17,7 @@ from uav_task_alloc.solver.check import check_locked, check_options, check_uniqu
 from uav_task_alloc.solver.problem import Limits, Problem, Rules, make_problem
 from uav_task_alloc.solver.recorder import Recorder
 from uav_task_alloc.solver.registry import SOLVERS
+from uav_task_alloc.solver.search import relieve
 from uav_task_alloc.solver.warm import State, repaired
 
 
@@ -78,11 +79,12 @@ def warm_up(solver: str = 'chain_q', zones: bool = False) -> None:
 
     zones: those that find ways around zones as well.
     """
-    uavs = (Uav('u', (0.0, 0.0, 0.0)), Uav('v', (9.0, 0.0, 0.0), 30.0))
-    tasks = tuple(Task(f't{i}', (float(i), 1.0, 0.0)) for i in range(5))
+    uavs = (Uav('u', (0.0, 0.0, 0.0), 6.0), Uav('v', (9.0, 0.0, 0.0), 6.0))
+    tasks = tuple(Task(f't{i}', (float(i), 1.0, 0.0)) for i in range(9))  # too many for them
     between = tuple(ThreatZone.cylinder(f'z{x}', (x, 1.0), 0.3) for x in (1.5, 2.5, 4.0) if zones)
     problem = make_problem(uavs, tasks, {}, Limits(between), Rules(returns=True))
     rounds = 500 if solver == 'chain_q' else 64  # until each kind of bee has flown
     recorder = Recorder(problem, lambda: 0.0, 0.0, 1.0, max_iterations=rounds)
     SOLVERS[solver](recorder, 0, None)
     to_plan(problem, recorder, '', False)
+    relieve(problem.arrays, recorder.best)  # flies only when a route is beyond range

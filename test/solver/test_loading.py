@@ -1,0 +1,39 @@
+# SPDX-License-Identifier: Apache-2.0
+"""No plan waits for the compiler: all kernels are loaded before its budget begins."""
+import subprocess
+import sys
+
+LOOK = """
+import sys
+
+from numba.core.registry import CPUDispatcher
+
+from uav_task_alloc import Task, ThreatZone, Uav, plan
+from uav_task_alloc.solver.solve import warm_up
+
+
+def loaded():
+    return {f'{name}.{key}{each}' for name, module in list(sys.modules.items())
+            if name.startswith('uav_task_alloc') for key, kernel in vars(module).items()
+            if isinstance(kernel, CPUDispatcher) for each in kernel.signatures}
+
+
+warm_up()
+before = loaded()
+uavs = [Uav(f'u{i}', (100.0 * i, 0.0, 0.0), 150.0) for i in range(4)]
+tasks = [Task(f't{i}', (10.0 * i, 40.0 + 7.0 * (i % 5), 0.0), value=1.0 + i % 3,
+              allowed_uavs=frozenset({'u1'}) if i % 9 == 0 else None) for i in range(40)]
+dome = ThreatZone.hemisphere('dome', (150.0, 40.0, 0.0), 20.0)
+warm_up(zones=True)
+before |= loaded()
+for zones, end, hard in (((), 'hold', True), ((dome,), 'home', True), ((), 'home', False)):
+    known = plan(uavs, tasks[:-5], zones, route_end=end, hard_range=hard, max_iterations=2000)
+    plan(uavs, tasks[5:], zones, route_end=end, hard_range=hard, max_iterations=2000, warm=known)
+plan(uavs, tasks, locked={'u0': ['t1']}, max_iterations=2000)
+print('late:', *sorted(loaded() - before))
+"""
+
+
+def test_a_tight_world_with_zones_finds_all_kernels_loaded():
+    seen = subprocess.run([sys.executable, '-c', LOOK], capture_output=True, text=True, check=True)
+    assert seen.stdout == 'late:\n'
