@@ -54,7 +54,7 @@ def _take(a: Arrays, r: Routes, log: Log, t: int) -> None:
     remove(a, r, t)
 
 
-@kernel
+@part
 def undo(a: Arrays, r: Routes, log: Log) -> None:
     """Back to how it was."""
     while log.size[0] > 0:
@@ -66,7 +66,7 @@ def undo(a: Arrays, r: Routes, log: Log) -> None:
             insert(a, r, node, after)
 
 
-@kernel
+@part
 def _string(a: Arrays, r: Routes, log: Log, c: int, size: int, rng: Chance) -> None:
     """Remove `size` tasks around c, sometimes leaving a few within the string."""
     count, stay = r.tasks[r.on[c]], 0
@@ -122,7 +122,7 @@ def _seed(a: Arrays, r: Routes, log: Log, rng: Chance) -> int:
     return a.uavs + below(rng, a.ends - a.uavs)
 
 
-@kernel
+@part
 def ruin(a: Arrays, r: Routes, log: Log, mean: float, round_id: int, rng: Chance) -> None:
     """Remove about `mean` tasks in strings of routes around a random one. O(mean)."""
     log.size[0] = log.size[1] = 0
@@ -155,7 +155,7 @@ def _is_out(log: Log, t: int) -> bool:
     return False
 
 
-@kernel
+@part
 def _order(a: Arrays, log: Log, rng: Chance) -> None:
     """Sort who is out: at random, furthest first, nearest first or dearest first."""
     kind = below(rng, 8)
@@ -175,7 +175,7 @@ def _order(a: Arrays, log: Log, rng: Chance) -> None:
         log.key[place], log.out[place] = key, t
 
 
-@kernel
+@part
 def recreate(a: Arrays, r: Routes, log: Log, rng: Chance) -> None:
     """Put back in who is out, each where it costs least and less than leaving it out."""
     _order(a, log, rng)
