@@ -76,10 +76,10 @@ class TaskBook:
         rule = after(known.state if known else TaskState.REJECTED, event, uav, why)
         if rule.state is None or known is None:
             return rule.reason
-        changed = replace(known, state=rule.state, reason=rule.reason,
-                          uav=uav if rule.state in OWNED else '', **changes)
-        if changed != known:
-            self._put(replace(changed, stamp=stamp))
+        changes |= {'state': rule.state, 'reason': rule.reason,
+                    'uav': uav if rule.state in OWNED else ''}
+        if any(getattr(known, name) != value for name, value in changes.items()):
+            self._put(replace(known, stamp=stamp, **changes))
         return ''
 
     def reject(self, task_id: str, reason: str, stamp: float) -> Verdict:

@@ -45,7 +45,7 @@ STATES = QoSProfile(depth=50, reliability=ReliabilityPolicy.BEST_EFFORT)
 HEARD_ANNOUNCEMENTS = QoSProfile(depth=20_000, reliability=ReliabilityPolicy.RELIABLE,
                                  durability=DurabilityPolicy.TRANSIENT_LOCAL)
 HEARD_EVENTS = QoSProfile(depth=10_000, reliability=ReliabilityPolicy.RELIABLE)
-HEARD_STATES = QoSProfile(depth=1000, reliability=ReliabilityPolicy.BEST_EFFORT)
+HEARD_STATES = QoSProfile(depth=400, reliability=ReliabilityPolicy.BEST_EFFORT)
 
 
 def to_stamp(seconds: float) -> Time:
