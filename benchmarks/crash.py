@@ -40,7 +40,6 @@ MOST_OPEN = 30  # tasks at once
 FLOWN_IN = (0.1, 0.5)  # [s] a task takes
 FAILS, REMIND = 0.03, 0.5  # share of tasks; [s] until COMPLETED is told again, as the bridge does
 STARTING = 1.0 / 8.0  # share of kills before the allocator is up
-WITHDRAWN = 3.0  # [s] at most, until the list of a UAV that was switched off is empty
 LIMIT = 20.0  # [s] for a restart
 # else a process that is known already answers a new one once, often before that listens, and
 # again only after 3 s
@@ -61,7 +60,8 @@ class Ledger:
     def __init__(self) -> None:
         self.accepted: set[str] = set()  # by the service, or in a status
         self.ended: dict[str, tuple[int, float]] = {}  # state, stamp [s], as published
-        self.off: dict[str, float] = {}  # UAVs, and when [s] the service had answered
+        # UAVs switched off: when [s] the service had answered, and what they had
+        self.off: dict[str, tuple[float, set[str]]] = {}
         self.flown: Counter[str] = Counter()
         self.revisions: dict[str, int] = {}
         self.faults: dict[str, list[str]] = {
@@ -91,13 +91,16 @@ class Ledger:
         self.revisions[name] = max(revision, self.revisions.get(name, 0))
 
     def listed(self, msg: m.TaskList) -> None:
-        """No list has what ended before it was made, nor anything for a UAV switched off."""
+        """No list has what ended before it was made, nor more for a UAV that was switched off."""
         self.rises(msg.uav_id, msg.revision)
         made = from_stamp(msg.header.stamp)
         ids = [planned.task.task_id for planned in msg.tasks]
         self.faults['listed_again'] += [
             t for t in ids if t in self.ended and self.ended[t][1] < made]
-        if ids and made > self.off.get(msg.uav_id, math.inf) + WITHDRAWN:
+        when, had = self.off.get(msg.uav_id, (math.inf, set()))
+        if made <= when:
+            had.update(ids)
+        elif not had.issuperset(ids):
             self.faults['off'].append(msg.uav_id)
 
     def done_twice(self) -> list[str]:
@@ -255,7 +258,8 @@ class World:
         self.ledger.off.pop(uav_id, None)
         def answered(future) -> None:
             if future.result().success and not available:
-                self.ledger.off[uav_id] = time.time()
+                had = {planned.task.task_id for planned in self.flyers[uav_id].list.tasks}
+                self.ledger.off[uav_id] = time.time(), had
         self.switch.call_async(SetAvailability.Request(
             uav_id=uav_id, available=available)).add_done_callback(answered)
 

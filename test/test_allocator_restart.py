@@ -135,8 +135,42 @@ def test_what_was_being_flown_is_known_before_its_uav_is_heard():
     assert after.event('STARTED', 't1', 'a', revision=1) == ''
     after.event('STARTED', 't2', 'a', revision=1)
     after.uav('a', 0.0, 0.0, 50.0)
-    assert after.begin().locked == {'a': ('t2',)}
+    assert after.begin().locked == {'a': ('t2', 't1')}
     assert after.route('a') == ('t1', 't2')
+
+
+@pytest.mark.parametrize('seconds', [0.5, 3.5])
+def test_shortly_after_a_restart_no_task_changes_hands(seconds):
+    desk = Desk()
+    desk.uav('a', 0.0, 0.0, 50.0)
+    desk.add(('t1', 100, 0), ('t2', 200, 0))
+    desk.settle()
+    after = Desk(saved(desk.core.rows()))
+    after.uav('a', 0.0, 0.0, 50.0)
+    after.uav('b', 150.0, 0.0, 50.0)
+    after.settle(wait=seconds)
+    after.world.set_available('a', False, after.now)  # it may have flown t1 while nobody listened
+    after.settle()
+    later = seconds > 3.0
+    assert after.route('a') == (() if later else ('t1', 't2'))
+    assert ('b' in after.lists) == later
+    after.event('COMPLETED', 't1', 'a', revision=1)
+    after.settle(wait=3.0)
+    assert after.route('b') == ('t2',)
+
+
+def test_a_list_told_again_is_known_to_be_flown_in_its_order():
+    desk = Desk()
+    desk.uav('a', 0.0, 0.0, 50.0)
+    desk.add(('t1', 100, 0), ('t2', 200, 0))
+    desk.settle()
+    after = Desk(saved(desk.core.rows()))
+    after.core.tick(after.now, after.now)
+    after.take()
+    assert after.lists['a'].revision == 2
+    after.uav('a', 150.0, 0.0, 50.0, active_task='t2', list_revision=2)
+    assert (after.state('t1'), after.reason('t1')) == (
+        'COMPLETED', 'passed while nobody listened')
 
 
 def test_no_list_is_told_again_with_what_was_completed_out_of_turn():

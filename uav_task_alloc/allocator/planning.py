@@ -28,13 +28,26 @@ def problem(world: World, best: Plan, trigger: str, background: bool) -> Problem
     uavs = tuple(_uav(world, uav_id) for uav_id in world.fleet.records
                  if world.fleet.usable(uav_id))
     ids = frozenset(uav.id for uav in uavs)
-    tasks = tuple(_restricted(record, ids) for record in world.tasks.open())
+    kept = _kept(world)
+    tasks = tuple(_restricted(record, ids) for record in world.tasks.open()
+                  if record.task.id not in kept)
     held = {uav.id: world.lists.get(uav.id).task_ids for uav in uavs}
     return Problem(
         world.version, trigger, background,
         params.background_budget if background else params.solve_budget, uavs, tasks,
         tuple(world.zones.values()), world.locked(), held=replace(best, routes=held, legs={}),
         warm=best)
+
+
+def _kept(world: World) -> frozenset[str]:
+    """Tasks that nobody gets: shortly after a restart those of UAVs that get no more tasks.
+
+    They may have been flown while nobody listened, which is told again where they are listed.
+    """
+    if not world.cautious:
+        return frozenset()
+    return frozenset(task_id for uav_id, each in world.lists.lists.items()
+                     if not world.fleet.usable(uav_id) for task_id in each.task_ids)
 
 
 def solve(plan: Callable[..., Plan], asked: Problem, params: AllocatorParams,
@@ -67,7 +80,8 @@ def lists_of(world: World, chosen: Plan) -> tuple[dict[str, UavList], dict[str, 
         left.update((task_id, f'no safe way for {uav_id}') for task_id in lost)
         world.laid[uav_id] = ways
     for uav_id, held in world.lists.lists.items():
-        if uav_id not in lists:  # gone: what it does not have it cannot fly when it is back
+        # gone: what it does not have it cannot fly when it is back
+        if uav_id not in lists and not world.cautious:
             lists[uav_id] = _without(world, uav_id, held)
     return lists, left
 

@@ -131,7 +131,8 @@ class World:
     def _catch_up(self, report: UavReport, stamp: float) -> None:
         """After a restart: what comes before the task it flies was flown while nobody heard."""
         old = self._old.pop(report.uav_id, None)
-        if (old is None or report.list_revision != old.revision
+        # told again it has the next revision, which the UAV may know already
+        if (old is None or report.list_revision - old.revision not in (0, 1)
                 or report.active_task not in old.task_ids):
             return
         for task_id in old.task_ids[:old.task_ids.index(report.active_task)]:
@@ -264,22 +265,26 @@ class World:
 
     def locked(self) -> dict[str, tuple[str, ...]]:
         """What is being flown, and what comes next as far as committed: it stays as it is."""
-        owners = self.lists.owners()
-        most = len(owners) + 1 if self.cautious else self.params.locked_tasks
-        found: dict[str, tuple[str, ...]] = {}
+        owners, found = self.lists.owners(), dict[str, tuple[str, ...]]()
         seen: set[str] = set()
         for uav_id in filter(self.fleet.usable, self.fleet.records):
-            held, first = self.lists.get(uav_id).task_ids, self.fleet.active.get(uav_id, '')
-            if first in seen or owners.get(first, uav_id) != uav_id or not self._can(
-                    uav_id, first):
-                first = ''
-            if first or self.cautious:
-                rest = held[held.index(first) + 1:] if first in held else (
-                    held if self.cautious else ())
-                kept = (*filter(None, (first,)), *(t for t in rest if self._can(uav_id, t)))
-                found[uav_id] = kept[:most]
-                seen.update(kept[:most])
+            first = self.fleet.active.get(uav_id, '')
+            if first in seen or owners.get(first, uav_id) != uav_id:
+                first = ''  # another one has it
+            kept = tuple(t for t in self._committed(uav_id, first) if self._can(uav_id, t))
+            seen.update(kept)
+            found[uav_id] = kept
         return {uav_id: kept for uav_id, kept in found.items() if kept}
+
+    def _committed(self, uav_id: str, first: str) -> tuple[str, ...]:
+        """The tasks that stay with a UAV, the one it flies first; all shortly after a restart."""
+        held = self.lists.get(uav_id).task_ids
+        if self.cautious:
+            return (*filter(None, (first,)), *(t for t in held if t != first))
+        if not first or not self._can(uav_id, first):
+            return ()
+        after = held[held.index(first) + 1:] if first in held else ()
+        return (first, *(t for t in after if self._can(uav_id, t)))[:self.params.locked_tasks]
 
     def _can(self, uav_id: str, task_id: str) -> bool:
         record = self.tasks.records.get(task_id)
