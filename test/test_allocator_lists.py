@@ -1,11 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
 """Lists: told only where they changed, by ways that stay as told while they are safe."""
-import pytest
-from allocation import Desk, as_plan, greedy
+from dataclasses import replace
 
-from uav_task_alloc.allocator.answer import exchanges
+import numpy as np
+import pytest
+from allocation import Desk, as_plan, greedy, task
+
+from uav_task_alloc import plan
+from uav_task_alloc.allocator.answer import exchanges, steady
+from uav_task_alloc.allocator.pace import Pace
+from uav_task_alloc.allocator.records import Action, Answer, Stop, UavList
 from uav_task_alloc.geometry.zones import way_is_clear
-from uav_task_alloc.model import ThreatZone
+from uav_task_alloc.model import Leg, ThreatZone
 
 DOME = ThreatZone.hemisphere('dome', (500.0, 5.0, 0.0), 100.0)
 
@@ -204,3 +210,123 @@ def test_a_new_zone_on_the_way_home_changes_it(returning):
     returning.world.set_zones([DOME, wall], (), returning.now)
     returning.settle()
     assert way_is_clear(home_bound(returning), [DOME, wall])
+
+
+def test_a_task_served_more_changes_only_the_lists_that_it_takes():
+    desk = Desk(replan_margin=0.5)
+    desk.uav('a', 0.0, 0.0, 50.0)
+    desk.uav('b', 0.0, 5000.0, 50.0)
+    desk.add(('t1', -100, 0), ('t2', 95, 0))
+    desk.settle()
+    desk.add(('t3', 100, 5000))
+    problem = desk.begin()
+    base = greedy(problem.uavs, [t for t in problem.tasks if t.id != 't3'], warm=problem.held)
+    base = replace(base, unassigned={'t3': 'no range'})
+    place = {task.id: task for task in problem.tasks}
+    fresh = as_plan(problem.uavs, place, (), {'a': ('t2', 't1'), 'b': ('t3',)})
+    chosen = steady(Answer(problem, base, fresh), 0.5)
+    assert chosen.routes == {'a': ('t1', 't2'), 'b': ('t3',)}
+    assert chosen.unassigned == {}
+
+
+def test_what_would_serve_less_is_not_taken():
+    desk = Desk()
+    desk.uav('a', 0.0, 0.0, 50.0)
+    desk.add(('t1', -100, 0), ('t2', 95, 0))
+    problem = desk.begin()
+    place = {task.id: task for task in problem.tasks}
+    base = as_plan(problem.uavs, place, (), {'a': ('t1', 't2')})
+    fresh = as_plan(problem.uavs, place, (), {'a': ('t2',)}, {'t1': 'too far'})
+    assert steady(Answer(problem, base, fresh), 0.01) == base
+
+
+@pytest.mark.parametrize('margin', [0.01, 0.05])
+def test_in_a_quiet_world_no_list_changes_for_less_than_the_margin(margin):
+    desk = Desk(plan=plan, solve_budget=0.003, background_budget=0.01, route_end='home',
+                background_period=0.5, replan_margin=margin, list_interval=0.25,
+                uav_timeout=3600.0)
+    rng = np.random.default_rng(7)
+    for k in range(4):
+        desk.uav(f'u{k}', 300.0 * k, 0.0, 50.0)
+    desk.add(*((f't{k}', *rng.uniform(-1000.0, 1000.0, 2)) for k in range(40)))
+    desk.settle()
+    weak, changes, searches = [], 0, 0
+    for _ in range(60):
+        desk.now += 0.6
+        before = sum(each.distance for each in desk.world.lists.lists.values())
+        told = len(desk.history)
+        problem = desk.begin()
+        if problem is None:
+            continue
+        searches += 1
+        desk.finish(problem)
+        now = sum(each.distance for each in desk.world.lists.lists.values())
+        changes += len(desk.history) > told
+        if len(desk.history) > told and before - now <= margin * before * (1.0 - 1e-9):
+            weak.append((before, now))
+    assert (weak, searches) == ([], 60)
+    assert changes < 12
+
+
+def stops(*ids):
+    return tuple(Stop(task((task_id, 1, 1)), Leg((), 1.0), 0.0) for task_id in ids)
+
+
+@pytest.fixture
+def paced():
+    desk = Desk(list_interval=1.0)
+    desk.uav('a', 0.0, 0.0, 50.0)
+    desk.uav('b', 0.0, 9000.0, 50.0)
+    desk.add(('t1', 100, 0))
+    desk.settle()
+    return desk
+
+
+def test_a_uav_gets_no_second_list_within_the_interval(paced):
+    paced.add(('t2', 200, 0))
+    paced.settle()
+    assert paced.route('a') == ('t1',)
+    assert (paced.state('t2'), paced.reason('t2')) == ('PENDING', 'waits for the next plan')
+    paced.add(('t3', 300, 0))
+    paced.settle(wait=1.0)
+    paced.settle()
+    assert paced.route('a') == ('t1', 't2', 't3')
+    assert paced.lists['a'].revision == 2
+
+
+def test_a_list_that_was_held_back_follows_by_itself(paced):
+    paced.add(('t2', 200, 0))
+    paced.settle()
+    paced.settle(wait=1.0)
+    assert paced.route('a') == ('t1', 't2')
+    assert paced.solves[-1] == 'lists held back'
+
+
+@pytest.mark.parametrize('what', ['withdrawn', 'moved', 'not available', 'zone', 'idle'])
+def test_what_cannot_be_flown_any_more_is_replaced_at_once(paced, what):
+    if what == 'withdrawn':
+        paced.cancel('t1')
+    elif what == 'moved':
+        paced.add(('t1', 150, 0), action=Action.UPDATE)
+    elif what == 'not available':
+        paced.uav('a', 0.0, 0.0, 50.0, available=False)
+    elif what == 'zone':
+        paced.world.set_zones([ThreatZone.cylinder('z', (50.0, 0.0), 20.0)], (), paced.now)
+    else:
+        paced.add(('t9', 0, 9100))
+    paced.settle()
+    assert len(paced.history) > 1
+
+
+def test_uavs_that_exchange_a_task_are_told_together_or_not_at_all():
+    held = {'a': UavList('a', 1, stops('t1', 't2')), 'b': UavList('b', 1, stops('t3'))}
+    new = {'a': UavList('a', 1, stops('t1')), 'b': UavList('b', 1, stops('t3', 't2'))}
+    pace = Pace()
+    pace.told(['b'], 10.0)
+    never = set().__contains__
+    assert pace.ripe(held, new, never, 10.4, 1.0) == {}
+    assert not pace.due(10.9)
+    assert pace.due(11.0)
+    assert not pace.due(12.0)
+    assert pace.ripe(held, new, never, 11.0, 1.0) == new
+    assert pace.ripe(held, new, {'a'}.__contains__, 10.4, 1.0) == new

@@ -2,6 +2,7 @@
 """What of an answer is taken: only what is better by the margin, and still true by now."""
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import replace
 
@@ -12,24 +13,37 @@ Routes = dict[str, tuple[str, ...]]
 
 
 def steady(answer: Answer, margin: float) -> Plan:
-    """The repaired lists, with each change that shortens what it touches by the margin [share].
+    """The repaired lists, with each change that serves more, or shortens what it touches by the
+    margin [share].
 
     UAVs that exchange tasks change together. Between events the whole must gain by it, too.
     """
     base, fresh = answer.base, answer.fresh
-    if fresh.value > base.value or fresh.penalty < base.penalty:
+    if fresh.penalty < base.penalty:
         return fresh
-    ranges = {uav.id: uav.range for uav in answer.problem.uavs}
-    taken, gained = [], 0.0
+    taken, gained, more = set[str](), 0.0, False
     for group in exchanges(base.routes, fresh.routes):
-        before = sum(_cost(base, uav_id, ranges[uav_id]) for uav_id in group)
-        gain = before - sum(_cost(fresh, uav_id, ranges[uav_id]) for uav_id in group)
-        if gain > max(margin * before, 1e-6):
-            taken.append(group)
-            gained += gain
-    if not taken or (answer.problem.background and gained <= margin * base.distance):
+        value, before, gain = _compared(answer, group)
+        if value > 0.0 or (value == 0.0 and gain > max(margin * before, 1e-6)):
+            taken |= group
+            gained, more = gained + gain, more or value > 0.0
+    if not taken or (answer.problem.background and not more
+                     and gained <= margin * base.distance):
         return base
-    return _mixed(base, fresh, {uav_id for group in taken for uav_id in group})
+    return _mixed(base, fresh, taken)
+
+
+def _compared(answer: Answer, group: Collection[str]) -> tuple[float, float, float]:
+    """What these UAVs serve more, how far [m] they flew before, and by how much they gain."""
+    value = {task.id: task.value for task in answer.problem.tasks}
+    reach = {uav.id: uav.range for uav in answer.problem.uavs}
+    base, fresh = answer.base, answer.fresh
+    # fsum: the same tasks have the same sum in any order
+    served = [math.fsum(value[task] for uav_id in group for task in plan.routes[uav_id])
+              for plan in (base, fresh)]
+    before, after = (sum(_cost(plan, uav_id, reach[uav_id]) for uav_id in group)
+                     for plan in (base, fresh))
+    return served[1] - served[0], before, before - after
 
 
 def exchanges(before: Mapping[str, tuple[str, ...]],
@@ -57,7 +71,10 @@ def _mixed(base: Plan, fresh: Plan, changed: Collection[str]) -> Plan:
     """`fresh` for the changed UAVs, `base` for the others."""
     routes = {u: (fresh if u in changed else base).routes[u] for u in base.routes}
     legs = {u: (fresh if u in changed else base).legs.get(u, ()) for u in base.routes}
-    return replace(fresh, routes=routes, legs=legs)
+    served = {task for tasks in routes.values() for task in tasks}
+    left = {task: why for task, why in {**base.unassigned, **fresh.unassigned}.items()
+            if task not in served}
+    return replace(fresh, routes=routes, legs=legs, unassigned=left)
 
 
 def repaired(routes: Mapping[str, Iterable[str]], locked: Mapping[str, tuple[str, ...]],
