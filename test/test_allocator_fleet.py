@@ -6,7 +6,10 @@ import pytest
 from allocation import Desk
 
 from uav_task_alloc.allocator.records import UavReport
+from uav_task_alloc.allocator.status import worries
 from uav_task_alloc.errors import InvalidValue
+from uav_task_alloc.geometry.zones import way_is_clear
+from uav_task_alloc.model import ThreatZone
 
 
 @pytest.fixture
@@ -162,3 +165,121 @@ def test_a_uav_that_holds_a_list_of_an_earlier_life_gets_a_higher_revision():
     desk.settle()
     assert desk.lists['a'].revision == 43
     assert desk.event('COMPLETED', 't1', 'a', revision=40) == ''  # who knows; it was flown
+
+
+def test_a_low_battery_sends_a_uav_home_and_its_tasks_to_the_others():
+    desk = Desk(battery_reserve=0.2)
+    desk.uav('a', 0.0, 0.0, 50.0, home=(0.0, -500.0, 0.0), battery=0.9)
+    desk.uav('b', 1000.0, 0.0, 50.0, battery=0.9)
+    desk.add(('t1', 100, 0), ('t2', 900, 0))
+    desk.settle()
+    desk.uav('a', 50.0, 0.0, 50.0, home=(0.0, -500.0, 0.0), battery=0.19, active_task='t1')
+    desk.settle()
+    assert (desk.route('a'), desk.lists['a'].returns) == ((), True)
+    assert set(desk.route('b')) == {'t1', 't2'}
+    assert 'a battery 19 %: below the reserve, it goes home' in desk.solves[-1]
+    assert worries(desk.world, '')[0] == 'battery low: a'
+
+
+def test_a_way_home_on_a_low_battery_leads_around_a_zone():
+    desk = Desk()
+    dome = ThreatZone.hemisphere('dome', (500.0, 5.0, 0.0), 100.0)
+    desk.world.set_zones([dome], (), desk.now)
+    desk.uav('a', 0.0, 0.0, 50.0, battery=0.9)
+    desk.add(('t1', 1000, 0))
+    desk.settle()
+    desk.uav('a', 1000.0, 0.0, 50.0, battery=0.1)
+    desk.settle()
+    home = [(1000.0, 0.0, 50.0), *desk.lists['a'].end_via, (0.0, 0.0, 50.0)]
+    assert len(home) > 2
+    assert way_is_clear(home, [dome])
+
+
+def test_a_battery_is_good_again_when_it_is_well_above_the_reserve():
+    desk = Desk(battery_reserve=0.2)
+    low = []
+    for battery in (0.5, 0.19, 0.21, None, 0.0, 0.29, 0.31, 0.25):
+        desk.uav('a', 0.0, 0.0, 50.0, battery=battery)
+        low.append(desk.world.fleet.records['a'].low)
+    assert low == [False, True, True, True, True, True, False, False]
+
+
+@pytest.mark.parametrize('battery', [None, 0.0])
+def test_a_battery_that_was_never_told_is_not_low(battery):
+    desk = Desk()
+    desk.uav('a', 0.0, 0.0, 50.0, battery=battery)
+    desk.add(('t1', 100, 0))
+    desk.settle()
+    assert desk.route('a') == ('t1',)
+
+
+def test_a_position_that_jumps_is_told_once_and_planned_for():
+    desk = Desk(position_jump=200.0, uav_timeout=5.0)
+    desk.uav('a', 0.0, 0.0, 50.0)
+    desk.add(('t1', 100, 0))
+    desk.settle()
+    for k in range(6):  # between two places, ten times a second
+        desk.now += 0.1
+        desk.uav('a', 5000.0 * (k % 2 == 0), 0.0, 50.0)
+    desk.settle()
+    assert sum('a jumped by 5000 m' in note for note in desk.notes) == 1
+    assert desk.solves[-1] == 'a jumped'
+    assert [stop.leg.length for stop in desk.world.lists.get('a').stops] == [100.0]
+
+
+def test_who_flies_or_was_not_heard_for_a_while_does_not_jump():
+    desk = Desk(position_jump=200.0)
+    desk.uav('a', 0.0, 0.0, 50.0, cruise_speed=20.0)
+    for seconds, x in ((0.1, 150.0), (3.0, 900.0), (60.0, 9000.0)):
+        desk.now += seconds
+        desk.core.tick(desk.now, desk.now)
+        desk.uav('a', x, 0.0, 50.0, cruise_speed=20.0)
+    desk.take()
+    assert not any('jumped' in note for note in desk.notes)
+
+
+def test_a_uav_that_comes_back_under_another_id_leaves_its_tasks_to_itself(desk):
+    for _ in range(3):
+        desk.now += 2.0
+        desk.uav('c', 10.0, 0.0, 50.0)
+        desk.uav('b', 1000.0, 0.0, 50.0)
+        desk.settle(hear=False)
+    assert desk.route('a') == ()
+    assert set(desk.route('c')) >= {'t1', 't2'}
+    assert worries(desk.world, '')[0] == 'silent: a'
+
+
+def test_published_clocks_that_jump_change_no_list(desk):
+    told = len(desk.history)
+    for stamp in (0.0, 1e9, 5.0, 2e9):
+        desk.now += 1.0
+        for uav_id, x in (('a', 0.0), ('b', 1000.0)):
+            report = UavReport(uav_id, (x, 0.0, 50.0))
+            desk.world.hear(report, desk.now, stamp)
+        desk.core.tick(desk.now, stamp)
+        assert desk.core.due(desk.now, stamp) is None
+        desk.take()
+    assert len(desk.history) == told
+    assert not any(record.silent for record in desk.world.fleet.records.values())
+
+
+def test_tasks_after_the_one_being_flown_stay_as_far_as_committed():
+    desk = Desk(locked_tasks=3)
+    desk.uav('a', 0.0, 0.0, 50.0)
+    desk.add(*((f't{k}', 100 * k, 0) for k in range(1, 6)))
+    desk.settle()
+    desk.add(('t9', 1, 1))
+    assert desk.begin().locked == {}  # it does not fly yet
+    desk.event('STARTED', 't1', 'a')
+    assert desk.world.locked() == {'a': ('t1', 't2', 't3')}
+    desk.cancel('t2')
+    assert desk.world.locked() == {'a': ('t1', 't3', 't4')}
+
+
+def test_nothing_is_committed_where_nothing_shall_be():
+    desk = Desk(locked_tasks=0)
+    desk.uav('a', 0.0, 0.0, 50.0)
+    desk.add(('t1', 100, 0))
+    desk.settle()
+    desk.event('STARTED', 't1', 'a')
+    assert desk.world.locked() == {}

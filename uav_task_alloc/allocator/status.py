@@ -35,6 +35,8 @@ def worries(world: World, journal_trouble: str) -> list[str]:
     left = [record for record in world.tasks.open() if record.state is TaskState.UNASSIGNED]
     found = [f'journal: {journal_trouble}'] if journal_trouble else []
     found += [f'silent: {", ".join(silent)}'] if silent else []
+    low = sorted(uav_id for uav_id, record in fleet.records.items() if record.low)
+    found += [f'battery low: {", ".join(low)}'] if low else []
     found += [f'{len(left)} tasks unassigned, {left[0].task.id}: {left[0].reason}'] if left else []
     if world.tasks.open() and not any(fleet.usable(uav_id) for uav_id in fleet.records):
         found.append('no UAV available')
