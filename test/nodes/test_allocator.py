@@ -4,11 +4,12 @@ import math
 import signal
 
 import pytest
-from builtin_interfaces.msg import Duration
-from diagnostic_msgs.msg import DiagnosticArray
+from builtin_interfaces.msg import Duration, Time
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from geometry_msgs.msg import Point
 from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
 from rcl_interfaces.srv import SetParameters
+from rosgraph_msgs.msg import Clock
 from std_srvs.srv import Trigger
 from uav_task_alloc_msgs import msg as m
 from uav_task_alloc_msgs.srv import SetAvailability, SubmitTasks
@@ -286,3 +287,34 @@ def test_an_allocator_without_its_disk_runs_on_and_says_so(start, probe, fleet, 
     probe.until(lambda: fleet.route('a') == ['t1'])
     assert 'cannot be opened' in node.output()
     probe.until(lambda: health and 'cannot be opened' in health[-1].status[0].message)
+
+
+def test_simulated_time_is_in_the_stamps_and_stops_nothing(start, probe, fleet):
+    begin(start, fleet, '-p', 'use_sim_time:=true')
+    fleet.uav('a', 0.0)
+    fleet.tasks.publish(add(task('t1', 100)))
+    probe.until(lambda: fleet.route('a') == ['t1'])  # before there is any clock
+    assert fleet.lists['a'].header.stamp.sec == 0
+    clock = probe.publisher(Clock, 'clock', LATCHED)
+    clock.publish(Clock(clock=Time(sec=5000)))
+    fleet.tasks.publish(add(task('t2', 200)))
+    probe.until(lambda: fleet.route('a') == ['t1', 't2'])
+    clock.publish(Clock(clock=Time(sec=70)))  # the simulation begins anew
+    probe.until(lambda: fleet.seen[-1].header.stamp.sec in (70, 5000))
+    fleet.event(m.TaskEvent.COMPLETED, 't1', 'a')
+    probe.until(lambda: fleet.route('a') == ['t2'])
+    probe.until(lambda: fleet.status('t1').stamp.sec == 70)
+    del fleet.states['a']  # silence is counted in real seconds
+    fleet.uav('b', 0.0)
+    probe.until(lambda: fleet.route('b') == ['t2'])
+
+
+def test_a_damaged_journal_is_set_aside_and_told_of(start, probe, fleet, tmp_path):
+    (tmp_path / 'journal.sqlite3').write_bytes(b'no database at all ' * 50)
+    health = probe.collect(DiagnosticArray, '/diagnostics', 10)
+    begin(start, fleet, '-p', f'state_dir:={tmp_path}')
+    fleet.uav('a', 0.0)
+    fleet.tasks.publish(add(task('t1', 100)))
+    probe.until(lambda: fleet.route('a') == ['t1'])
+    probe.until(lambda: health and 'set aside as' in health[-1].status[0].message)
+    assert health[-1].status[0].level == DiagnosticStatus.WARN
