@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The whole study, tiny: all figures and tables, the same ones again, also in pieces."""
+import importlib.util
 import json
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
@@ -74,6 +75,13 @@ def test_an_interrupted_study_writes_what_it_has(first, flat, tmp_path, capsys):
     assert (tmp_path / 'figure1_coefficient.svg').exists()
     assert not (tmp_path / 'figure2_convergence.svg').exists()
     assert 'no results yet' in (tmp_path / 'tables.md').read_text()
+
+
+def test_a_study_that_could_not_be_drawn_does_not_begin(tmp_path, monkeypatch):
+    monkeypatch.setattr(importlib.util, 'find_spec', lambda name: None)
+    with pytest.raises(SystemExit, match='no matplotlib'):
+        command.main(['--out', str(tmp_path / 'out')])
+    assert not (tmp_path / 'out').exists()
 
 
 def test_a_quick_study_has_every_figure_and_the_whole_span_of_sizes():

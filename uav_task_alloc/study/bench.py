@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import importlib.util
 import json
 import math
 import sys
@@ -26,6 +27,8 @@ from uav_task_alloc.study.instances import SLACK, Instance, make_instance
 def main(argv: Sequence[str]) -> int:
     """`python -m uav_task_alloc bench`: table, JSON, plot; returns the exit status."""
     asked = _parser().parse_args(argv)
+    if asked.plot and importlib.util.find_spec('matplotlib') is None:
+        raise SystemExit("--plot: no matplotlib: expected pip install '.[plot]'")
     names = _names(asked)
     jobs = {(key, name): Job(f'{key}-{name}', measure, {
         'source': source, 'name': name, 'budgets': asked.budgets},

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import importlib.util
 import json
 import os
 import sys
@@ -28,6 +29,8 @@ def main(argv: Sequence[str]) -> int:
     if argv and argv[0] in EXPERIMENTS:
         return _experiment(argv[0], argv[1:])
     asked = _parser().parse_args(argv)
+    if importlib.util.find_spec('matplotlib') is None:  # better now than when all was run
+        raise SystemExit("study: no matplotlib: expected pip install '.[study,plot]'")
     made = program.quick(asked.seed) if asked.quick else Program(asked.seed)
     return regenerate(made, asked.out, executors.chosen(asked))
 
