@@ -152,6 +152,14 @@ def test_gains_that_grow_do_not_keep_agents_from_agreeing():
             check_free_of_conflict(agents)
 
 
+def test_time_ends_the_talk_between_two_agents():
+    scores, asked = make_scores(4, 6, 1), []
+    agents = [Agent(i, 4, 6, score, 6) for i, score in enumerate(scores)]
+    assert not one_round(agents, make_graph('ring', 4), 1, lambda: asked.append(1) or len(
+        asked) > 2)
+    assert [bool(agent.bundle) for agent in agents] == [True, True, False, False]
+
+
 def test_graphs_reach_everybody_in_so_many_hops():
     assert make_graph('ring', 5) == [[1, 4], [0, 2], [1, 3], [2, 4], [0, 3]]
     assert [diameter(make_graph(kind, 6)) for kind in ('full', 'ring', 'line')] == [1, 3, 5]

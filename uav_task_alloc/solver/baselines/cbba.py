@@ -7,6 +7,7 @@ of all agents.
 """
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -32,7 +33,7 @@ class Settings:
     """Who hears whom and how much one bids for."""
 
     graph: str = 'ring'  # one of GRAPHS
-    bundle: int | None = None  # L: tasks in a bundle at most; None: no limit
+    shares: float = 4.0  # L, tasks in a bundle at most, in fair shares (tasks over UAVs)
 
 
 def make_graph(kind: str, agents: int) -> Graph:
@@ -51,7 +52,8 @@ def solve(recorder: Recorder, seed: int, learnt: object = None,
     agents, now = make_agents(problem, known), 0
     graph = make_graph(known.graph, len(agents))
     bound = len(problem.tasks) * diameter(graph)  # rounds until they agree, as is proven
-    while now <= bound and not recorder.over() and one_round(agents, graph, now + 1):
+    while now <= bound and not recorder.over() and one_round(
+            agents, graph, now + 1, recorder.over):
         now += 1
         recorder.count()
     recorder.offer(routes_of(problem, agreed(agents)))
@@ -60,10 +62,9 @@ def solve(recorder: Recorder, seed: int, learnt: object = None,
 
 def make_agents(problem: Problem, settings: Settings) -> list[Agent]:
     """An agent for each UAV."""
-    ways, n = all_ways(problem), len(problem.tasks)
-    return [Agent(u, len(problem.uavs), n, _score(problem, Bidder(problem, u, ways)),
-                  n if settings.bundle is None else settings.bundle)
-            for u in range(len(problem.uavs))]
+    ways, n, m = all_ways(problem), len(problem.tasks), len(problem.uavs)
+    most = math.ceil(settings.shares * n / m)
+    return [Agent(u, m, n, _score(problem, Bidder(problem, u, ways)), most) for u in range(m)]
 
 
 def _score(problem: Problem, bidder: Bidder) -> Score:

@@ -152,9 +152,12 @@ class Agent:
         del self.bundle[kept:]
 
 
-def one_round(agents: Sequence[Agent], graph: Graph, now: int) -> bool:
-    """Both phases for all agents at once; False where nobody had anything to tell."""
+def one_round(agents: Sequence[Agent], graph: Graph, now: int,
+              over: Callable[[], bool] = lambda: False) -> bool:
+    """Both phases for all agents at once; False if nobody had anything to tell or time is over."""
     for agent in agents:
+        if over():
+            return False
         agent.build()
     first = agents[0]
     if all((agent.winner == first.winner).all() and (agent.bid == first.bid).all()
