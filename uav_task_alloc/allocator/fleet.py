@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from uav_task_alloc.allocator.records import UavReport
 from uav_task_alloc.model import Point, Task, Uav
 
+FASTEST = 10.0  # times the cruise speed: nobody flies so fast, not even in faster simulations
 RECHARGED = 0.1  # above the reserve: a battery that was low is good again
 
 
@@ -96,3 +97,27 @@ def may_fly(task: Task, failed_on: Iterable[str], uav: UavReport) -> bool:
     """The UAV is allowed to, able to, and has not failed at it before."""
     return ((task.allowed_uavs is None or uav.uav_id in task.allowed_uavs)
             and task.required_capabilities <= uav.capabilities and uav.uav_id not in failed_on)
+
+
+def news_of(before: UavRecord | None, after: UavRecord) -> list[str]:
+    """What in a report asks for a new plan."""
+    report, found = after.report, []
+    if before is None or before.silent:
+        found += ['heard again' if before else 'heard'] if report.available else []
+    elif before.report.available != report.available:
+        found += ['available' if report.available else 'not available']
+    elif before.report.capabilities != report.capabilities:
+        found += ['has other capabilities']
+    if after.low != (before is not None and before.low):
+        found += [f'battery {100.0 * (after.battery or 0.0):.0f} %: ' + (
+            'below the reserve, it goes home' if after.low else 'above the reserve again')]
+    return found
+
+
+def jump(before: UavRecord | None, report: UavReport, now: float, speed: float,
+         most: float) -> float:
+    """Metres since the last report, where they are `most` more than it can have flown; else 0."""
+    if before is None or before.silent:
+        return 0.0
+    metres = math.dist(before.report.position, report.position)
+    return metres if metres > most + FASTEST * speed * (now - before.heard) else 0.0

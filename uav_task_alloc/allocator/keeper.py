@@ -67,8 +67,10 @@ class Keeper:
         """
         if self._given_up:
             return allocator.written()
+        if self._now_wrong and now < self._retry:
+            return True
         rows = allocator.rows(most)
-        if not rows or (self._now_wrong and now < self._retry):
+        if not rows:
             return True
         try:
             rows = self._write(rows, allocator)

@@ -6,11 +6,10 @@ people read, for what is published.
 """
 from __future__ import annotations
 
-import math
 from collections.abc import Collection, Iterable, Sequence
 from typing import TYPE_CHECKING
 
-from uav_task_alloc.allocator.fleet import Fleet, UavRecord, may_fly
+from uav_task_alloc.allocator.fleet import Fleet, UavRecord, jump, may_fly, news_of
 from uav_task_alloc.allocator.life import Event as Life
 from uav_task_alloc.allocator.published import ListBook
 from uav_task_alloc.allocator.records import (
@@ -34,7 +33,6 @@ if TYPE_CHECKING:  # it brings the compiler along, which a start must not wait f
     from uav_task_alloc.allocator.ways import Ways
 
 MOST_UAVS = 1000  # a flood of made-up ids ends here
-FASTEST = 10.0  # times the cruise speed: nobody flies so fast, not even in faster simulations
 MOST_NOTES = 10_000  # lines that wait for the log
 LOOK = 0.5  # [s] between two looks at the way ahead of a UAV
 
@@ -102,7 +100,7 @@ class World:
         active = self.fleet.active.get(uav_id)
         before = self.fleet.hear(report, now, self.params.battery_reserve)
         self._catch_up(report, stamp)
-        for news in _news(before, self.fleet.records[uav_id]):
+        for news in news_of(before, self.fleet.records[uav_id]):
             self.note(f'{uav_id} {news}')
             self.touch(f'{uav_id} {news}', now)
         self._look_for_jumps(before, report, now)
@@ -117,11 +115,9 @@ class World:
 
     def _look_for_jumps(self, before: UavRecord | None, report: UavReport, now: float) -> None:
         """A position that cannot have been flown to is believed, told once, and planned for."""
-        if before is None or before.silent:
-            return
         speed = report.cruise_speed or self.params.default_cruise_speed
-        metres = math.dist(before.report.position, report.position)
-        if metres <= self.params.position_jump + FASTEST * speed * (now - before.heard):
+        metres = jump(before, report, now, speed, self.params.position_jump)
+        if before is None or not metres:
             return
         if now - before.jumped > self.params.uav_timeout:
             self.note(f'{report.uav_id} jumped by {metres:.0f} m', warning=True)
@@ -290,21 +286,6 @@ class World:
         record = self.tasks.records.get(task_id)
         return record is not None and record.open and may_fly(
             record.task, record.failed_on, self.fleet.records[uav_id].report)
-
-
-def _news(before: UavRecord | None, after: UavRecord) -> list[str]:
-    """What in a report asks for a new plan."""
-    report, found = after.report, []
-    if before is None or before.silent:
-        found += ['heard again' if before else 'heard'] if report.available else []
-    elif before.report.available != report.available:
-        found += ['available' if report.available else 'not available']
-    elif before.report.capabilities != report.capabilities:
-        found += ['has other capabilities']
-    if after.low != (before is not None and before.low):
-        found += [f'battery {100.0 * (after.battery or 0.0):.0f} %: ' + (
-            'below the reserve, it goes home' if after.low else 'above the reserve again')]
-    return found
 
 
 def _some(names: Sequence[str]) -> str:
