@@ -9,11 +9,14 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
 
+import numpy as np
+
 from uav_task_alloc.errors import InvalidValue, UnknownName
 from uav_task_alloc.model import Plan, Task, ThreatZone, Uav
 from uav_task_alloc.objective import Weights
 from uav_task_alloc.solver.answer import to_plan
 from uav_task_alloc.solver.check import check_locked, check_options, check_unique
+from uav_task_alloc.solver.insertion import place_all
 from uav_task_alloc.solver.problem import Limits, Problem, Rules, make_problem
 from uav_task_alloc.solver.recorder import Recorder
 from uav_task_alloc.solver.registry import SOLVERS
@@ -79,12 +82,13 @@ def warm_up(solver: str = 'chain_q', zones: bool = False) -> None:
 
     zones: those that find ways around zones as well.
     """
-    uavs = (Uav('u', (0.0, 0.0, 0.0), 6.0), Uav('v', (9.0, 0.0, 0.0), 6.0))
-    tasks = tuple(Task(f't{i}', (float(i), 1.0, 0.0)) for i in range(9))  # too many for them
+    uavs = (Uav('u', (0.0, 0.0, 0.0)), Uav('v', (9.0, 0.0, 0.0), 30.0))
+    tasks = tuple(Task(f't{i}', (float(i), 1.0, 0.0)) for i in range(5))
     between = tuple(ThreatZone.cylinder(f'z{x}', (x, 1.0), 0.3) for x in (1.5, 2.5, 4.0) if zones)
     problem = make_problem(uavs, tasks, {}, Limits(between), Rules(returns=True))
     rounds = 500 if solver == 'chain_q' else 64  # until each kind of bee has flown
     recorder = Recorder(problem, lambda: 0.0, 0.0, 1.0, max_iterations=rounds)
     SOLVERS[solver](recorder, 0, None)
     to_plan(problem, recorder, '', False)
-    relieve(problem.arrays, recorder.best)  # flies only when a route is beyond range
+    place_all(problem.arrays, recorder.best, np.empty(0, np.int64))  # these two only have work
+    relieve(problem.arrays, recorder.best)  # where ranges do not suffice
