@@ -188,15 +188,21 @@ def test_no_list_is_told_again_with_what_was_completed_out_of_turn():
     assert after.route('a') == ('t1', 't3')
 
 
+def patient(*world, max_iterations, **more):
+    """`plan` with as many bees on any machine."""
+    rounds = 3000 if max_iterations is None else max_iterations
+    return plan(*world, **{**more, 'budget': 60.0, 'max_iterations': rounds})
+
+
 def test_what_the_bees_learnt_survives():
-    desk = Desk(plan=plan, solve_budget=0.02)
+    desk = Desk(plan=patient)
     desk.uav('a', 0.0, 0.0, 50.0)
     desk.uav('b', 900.0, 0.0, 50.0)
     for k in range(3):
         desk.add(*((f't{k}_{i}', 37 * i % 400, 91 * i % 300) for i in range(10)))
         desk.settle(wait=6.0)
     before = desk.core._best.state.learnt
-    after = Desk(saved(desk.core.rows()), plan=plan)
+    after = Desk(saved(desk.core.rows()), plan=patient)
     kept = after.core._best.state.learnt
     assert (kept.uavs, kept.tasks) == (before.uavs, before.tasks)
     assert np.allclose(kept.tables.task, before.tables.task)
