@@ -27,18 +27,17 @@ from pathlib import Path
 import domain_coordinator
 import rclpy
 from ament_index_python.packages import get_package_prefix
+from crash_fleet import HEIGHT, Flyer, Ledger
 from geometry_msgs.msg import Point
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from uav_task_alloc_msgs import msg as m
 from uav_task_alloc_msgs.srv import SetAvailability, SubmitTasks
 
-from uav_task_alloc.nodes.messages import EVENTS, LATCHED, STATES, from_stamp
+from uav_task_alloc.nodes.messages import EVENTS, LATCHED, STATES
 
-UAVS, SIDE, HEIGHT = 5, 400.0, 50.0  # number, [m], [m]
+UAVS, SIDE = 5, 400.0  # number, [m]
 MOST_OPEN = 30  # tasks at once
-FLOWN_IN = (0.1, 0.5)  # [s] a task takes
-FAILS, REMIND = 0.03, 0.5  # share of tasks; [s] until COMPLETED is told again, as the bridge does
 STARTING = 1.0 / 8.0  # share of kills before the allocator is up
 LIMIT = 20.0  # [s] for a restart
 # else a process that is known already answers a new one once, often before that listens, and
@@ -50,114 +49,7 @@ QUICK_DISCOVERY = """<dds xmlns="http://www.eprosima.com/XMLSchemas/fastRTPS_Pro
 # nothing is replayed to a new allocator but the last message: it must have the rest on disk
 LAST_ONLY = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE,
                        durability=DurabilityPolicy.TRANSIENT_LOCAL)
-S, E, A = m.TaskStatus, m.TaskEvent, m.TaskAnnouncement
-ENDED = (S.COMPLETED, S.CANCELLED, S.FAILED)
-
-
-class Ledger:
-    """What was acknowledged, and what contradicts it since."""
-
-    def __init__(self) -> None:
-        self.accepted: set[str] = set()  # by the service, or in a status
-        self.ended: dict[str, tuple[int, float]] = {}  # state, stamp [s], as published
-        # UAVs switched off: when [s] the service had answered, and what they had
-        self.off: dict[str, tuple[float, set[str]]] = {}
-        self.flown: Counter[str] = Counter()
-        self.revisions: dict[str, int] = {}
-        self.faults: dict[str, list[str]] = {
-            'lost': [], 'listed_again': [], 'reopened': [], 'revisions': [], 'off': []}
-        self._must: tuple[set[str], dict[str, tuple[int, float]]] = (set(), {})
-
-    def killed(self) -> None:
-        """What is acknowledged by now has to be there from now on."""
-        self._must = set(self.accepted), dict(self.ended)
-
-    def statuses(self, msg: m.TaskStatusArray) -> None:
-        """Take the acknowledgements in, look for those of before the kill."""
-        found = {s.task_id: s for s in msg.statuses if s.state != S.REJECTED}
-        accepted, ended = self._must
-        self.faults['lost'] += sorted(accepted - set(found))
-        self.faults['reopened'] += [
-            task_id for task_id, (state, _) in ended.items()
-            if task_id in found and found[task_id].state != state]
-        self.accepted |= set(found)
-        self.ended.update((s.task_id, (s.state, from_stamp(s.stamp)))
-                          for s in found.values() if s.state in ENDED)
-
-    def rises(self, name: str, revision: int) -> None:
-        """Revisions are never used twice."""
-        if revision <= self.revisions.get(name, 0):
-            self.faults['revisions'].append(f'{name}: {self.revisions[name]}, {revision}')
-        self.revisions[name] = max(revision, self.revisions.get(name, 0))
-
-    def listed(self, msg: m.TaskList) -> None:
-        """No list has what ended before it was made, nor more for a UAV that was switched off."""
-        self.rises(msg.uav_id, msg.revision)
-        made = from_stamp(msg.header.stamp)
-        ids = [planned.task.task_id for planned in msg.tasks]
-        self.faults['listed_again'] += [
-            t for t in ids if t in self.ended and self.ended[t][1] < made]
-        when, had = self.off.get(msg.uav_id, (math.inf, set()))
-        if made <= when:
-            had.update(ids)
-        elif not had.issuperset(ids):
-            self.faults['off'].append(msg.uav_id)
-
-    def done_twice(self) -> list[str]:
-        """Flown twice, or asked for again after the end was published."""
-        return sorted({t for t, n in self.flown.items() if n > 1}
-                      | {*self.faults['listed_again'], *self.faults['reopened']})
-
-
-class Flyer:
-    """One UAV that flies its list, and tells; as the bridge, it remembers what it has flown."""
-
-    def __init__(self, uav_id: str, place: tuple[float, float], tell, ledger: Ledger,
-                 rng: random.Random) -> None:
-        self.uav_id, self.place, self.tell, self.ledger, self.rng = (
-            uav_id, place, tell, ledger, rng)
-        self.list = m.TaskList(uav_id=uav_id)
-        self.flown: set[str] = set()
-        self.active, self._until, self._remind = '', 0.0, math.inf
-
-    def told(self, msg: m.TaskList, now: float) -> None:
-        self.list, self._remind = msg, now + REMIND
-        if self.active not in [planned.task.task_id for planned in msg.tasks]:
-            self.active = ''
-
-    def step(self, now: float) -> None:
-        tasks = [p.task for p in self.list.tasks]
-        if now >= self._remind:
-            self._remind = now + REMIND
-            for task in tasks:
-                if task.task_id in self.flown:
-                    self.event(E.COMPLETED, task.task_id)
-        left = [task for task in tasks if task.task_id not in self.flown]
-        if not self.active and left:
-            self.active, self._until = left[0].task_id, now + self.rng.uniform(*FLOWN_IN)
-            self.event(E.STARTED, self.active)
-        elif self.active and now >= self._until:
-            self._arrive(next(task for task in left if task.task_id == self.active))
-
-    def _arrive(self, task: m.Task) -> None:
-        self.place, self.active = (task.position.x, task.position.y), ''
-        if self.rng.random() < FAILS:
-            self.event(E.FAILED, task.task_id, 'made up')
-            self.list = m.TaskList(uav_id=self.uav_id, revision=self.list.revision)
-            return
-        self.flown.add(task.task_id)
-        self.ledger.flown[task.task_id] += 1
-        self.event(E.COMPLETED, task.task_id)
-
-    def event(self, kind: int, task_id: str, reason: str = '') -> None:
-        self.tell(E(event=kind, task_id=task_id, uav_id=self.uav_id, reason=reason,
-                    revision=self.list.revision))
-
-    def state(self) -> m.UavState:
-        return m.UavState(
-            uav_id=self.uav_id, position=Point(x=self.place[0], y=self.place[1], z=HEIGHT),
-            home=Point(x=math.nan), battery=0.9, range_remaining=math.nan, cruise_speed=15.0,
-            available=True, active_task_id=self.active, list_revision=self.list.revision)
+S, A = m.TaskStatus, m.TaskAnnouncement
 
 
 class World:
