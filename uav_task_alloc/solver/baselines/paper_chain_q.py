@@ -44,7 +44,7 @@ MOST_TASKS = 200  # the tables take 8 n^3 bytes
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """What the paper does not print: the best of 48 sets tried, ranking kept (docs/solver.md)."""
+    """What the paper does not print: the best of 48 sets at 8 x 50 (docs/solver.md)."""
 
     bees: int = 20
     ranked: int = 5  # bees that are learnt from
