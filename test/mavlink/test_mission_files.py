@@ -164,7 +164,8 @@ for path, autopilot in zip(sys.argv[1::2], map(int, sys.argv[2::2])):
     mavsdk = Mavsdk(Configuration.create_with_component_type(ComponentType.GROUND_STATION))
     mavsdk.add_any_connection('raw://')  # no socket: bytes are handed over
     heartbeat = d.MAVLink_heartbeat_message(d.MAV_TYPE_QUADROTOR, autopilot, 0, 0, 4, 3)
-    while not mavsdk.get_systems():
+    # a system is there a moment before it is known what it is
+    while not any(system.autopilot_type() for system in mavsdk.get_systems()):
         mavsdk.pass_received_raw_bytes(bytes(heartbeat.pack(d.MAVLink(None, 1, 1))))
     mission = MissionRaw(mavsdk.get_systems()[0])
     made = mission.import_qgroundcontrol_mission(path)
