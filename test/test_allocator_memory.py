@@ -2,7 +2,7 @@
 """What an allocator remembers is bounded: ended tasks go, open ones stay, a flood is refused."""
 from allocation import Desk
 
-from uav_task_alloc.allocator import tasks
+from uav_task_alloc.allocator import tasks, world
 from uav_task_alloc.allocator.restore import saved
 
 
@@ -58,3 +58,19 @@ def test_more_open_tasks_than_can_be_held_are_refused(monkeypatch):
     assert verdicts[2].reason == 'open tasks = 2: expected fewer'
     desk.cancel('t0')
     assert desk.add(('t2', 0.0, 0.0))[0].accepted
+
+
+def test_made_up_uavs_do_not_keep_a_real_one_out(monkeypatch):
+    monkeypatch.setattr(world, 'MOST_UAVS', 2)
+    desk = Desk()
+    desk.uav('a', 0.0, 0.0, 50.0)
+    desk.add(('t0', 100.0, 0.0))
+    desk.settle()
+    desk.uav('ghost', 0.0, 0.0, 50.0)
+    assert 'expected one of the 2 UAVs' in desk.uav('b', 0.0, 0.0, 50.0)
+    for _ in range(4):  # the ghost falls silent
+        desk.now += 2.0
+        desk.uav('a', 0.0, 0.0, 50.0)
+        desk.settle(hear=False)
+    assert desk.uav('b', 0.0, 0.0, 50.0) == ''
+    assert sorted(desk.world.fleet.records) == ['a', 'b']

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, replace
 
 from uav_task_alloc.allocator.records import UavReport
@@ -51,6 +51,17 @@ class Fleet:
             caught=before.caught if before else False, battery=battery, low=low,
             jumped=before.jumped if before else -math.inf)
         return before
+
+    def make_room(self, most: int, busy: Collection[str]) -> bool:
+        """Whether one more UAV can be known: of `most` the longest silent without work goes."""
+        if len(self.records) < most:
+            return True
+        idle = [uav_id for uav_id, record in self.records.items()
+                if record.silent and uav_id not in busy]
+        if not idle:
+            return False
+        del self.records[min(idle, key=lambda uav_id: self.records[uav_id].heard)]
+        return True
 
     def fall_silent(self, now: float, timeout: float) -> list[str]:
         """Mark those not heard for `timeout` [s]; returns the newly silent."""

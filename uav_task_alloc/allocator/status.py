@@ -28,13 +28,14 @@ def status_of(task_id: str, known: TaskRecord | tuple[str, float]) -> Status:
     return Status(task_id, TaskState.REJECTED, '', reason, stamp)
 
 
-def worries(world: World, journal_trouble: str) -> list[str]:
+def worries(world: World, journal_trouble: str, solver_trouble: str = '') -> list[str]:
     """What an operator should look at."""
     fleet = world.fleet
     silent = sorted(uav_id for uav_id, record in fleet.records.items() if record.silent)
     left = [record for record in world.tasks.open() if record.state is TaskState.UNASSIGNED]
     found = [f'journal: {journal_trouble}'] if journal_trouble else []
-    found += [f'silent: {", ".join(silent)}'] if silent else []
+    found += [f'solver: {solver_trouble}'] if solver_trouble else []
+    found += [f'silent: {", ".join(silent[:20])}'] if silent else []
     low = sorted(uav_id for uav_id, record in fleet.records.items() if record.low)
     found += [f'battery low: {", ".join(low)}'] if low else []
     found += [f'{len(left)} tasks unassigned, {left[0].task.id}: {left[0].reason}'] if left else []

@@ -95,7 +95,8 @@ class World:
     def hear(self, report: UavReport, now: float, stamp: float) -> str:
         """A UAV says how it is; returns why that is refused, '' when it is not."""
         uav_id = report.uav_id
-        if uav_id not in self.fleet.records and len(self.fleet.records) >= MOST_UAVS:
+        if uav_id not in self.fleet.records and not self.fleet.make_room(
+                MOST_UAVS, self.lists.owners().values()):
             return f'uav_id = {uav_id!r}: expected one of the {MOST_UAVS} UAVs known already'
         active = self.fleet.active.get(uav_id)
         before = self.fleet.hear(report, now, self.params.battery_reserve)

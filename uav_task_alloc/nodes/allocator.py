@@ -60,6 +60,7 @@ class AllocatorNode(Node):
         self.answers: deque[Answer | None] = deque()
         self.background = False
         self.rested = 0.0  # [s] steady clock
+        self.fault = ''  # why the last solve failed
         self.behind = False  # there is more to tell than was told
         self._listen()
         self._talk()
@@ -207,8 +208,8 @@ class AllocatorNode(Node):
 
     def failed(self, error: Exception) -> None:
         """In the worker's thread."""
-        text = f'{type(error).__name__}: {error}'[:500]
-        self.get_logger().error(f'solver: {text}', throttle_duration_sec=10.0)
+        self.fault = f'{type(error).__name__}: {error}'[:500]
+        self.get_logger().error(f'solver: {self.fault}', throttle_duration_sec=10.0)
 
     def on_answer(self) -> None:
         """The worker has an answer, or is ready for the first problem."""
@@ -220,7 +221,9 @@ class AllocatorNode(Node):
                 gc.freeze()  # a collection need not look through the compiler each time
                 self.get_logger().info('ready')
                 continue
-            self.core.adopt(self.answers.popleft(), time.monotonic(), self.stamp())
+            answer = self.answers.popleft()
+            self.fault = self.fault if answer is None else ''
+            self.core.adopt(answer, time.monotonic(), self.stamp())
         self.tell(self.stamp())
         self.rest(began)
 
@@ -250,7 +253,7 @@ class AllocatorNode(Node):
     def on_second(self) -> None:
         """Say how it goes."""
         self.health.publish(told.from_health(
-            self.get_fully_qualified_name(), worries(self.world, self.keeper.trouble),
+            self.get_fully_qualified_name(), worries(self.world, self.keeper.trouble, self.fault),
             facts(self.world), self.stamp()))
 
     def destroy_node(self) -> None:

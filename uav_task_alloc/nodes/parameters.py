@@ -35,6 +35,7 @@ def descriptor(spec: Any) -> ParameterDescriptor:
     """The ROS descriptor of a declared field."""
     meta, described = spec.metadata, ParameterDescriptor()
     described.description = f'{meta["text"]} Expected: {params.expectation(spec)}.'
+    described.description += ' Read at the start only.' if meta['fixed'] else ''
     described.additional_constraints = ', '.join(meta['choices'])
     if isinstance(spec.default, tuple):
         described.dynamic_typing = True  # an empty list has no type of its own
