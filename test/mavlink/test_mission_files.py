@@ -154,6 +154,7 @@ def test_a_zone_is_a_fence_unless_the_way_passes_over_it(folder, world):
 
 MAVSDK = """
 import json, sys
+from mavsdk.autopilot import Autopilot
 from mavsdk.component_type import ComponentType
 from mavsdk.mavsdk import Configuration, Mavsdk
 from mavsdk.plugins.mission_raw.mission_raw import MissionRaw
@@ -164,8 +165,9 @@ for path, autopilot in zip(sys.argv[1::2], map(int, sys.argv[2::2])):
     mavsdk = Mavsdk(Configuration.create_with_component_type(ComponentType.GROUND_STATION))
     mavsdk.add_any_connection('raw://')  # no socket: bytes are handed over
     heartbeat = d.MAVLink_heartbeat_message(d.MAV_TYPE_QUADROTOR, autopilot, 0, 0, 4, 3)
-    # a system is there a moment before it is known what it is
-    while not any(system.autopilot_type() for system in mavsdk.get_systems()):
+    # a system is there, as a generic one, a moment before its heartbeat was read
+    while not any(system.is_connected() and system.autopilot_type() != Autopilot.GENERIC
+                  for system in mavsdk.get_systems()):
         mavsdk.pass_received_raw_bytes(bytes(heartbeat.pack(d.MAVLink(None, 1, 1))))
     mission = MissionRaw(mavsdk.get_systems()[0])
     made = mission.import_qgroundcontrol_mission(path)
