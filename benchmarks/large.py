@@ -14,6 +14,7 @@ import time
 from uav_task_alloc import plan
 from uav_task_alloc.solver.solve import warm_up
 from uav_task_alloc.study import rivals
+from uav_task_alloc.study.evaluator import judge
 from uav_task_alloc.study.instances import SLACK, Instance, make_instance
 
 
@@ -28,9 +29,10 @@ def ours(instance: Instance, budget: float) -> None:
 
 def rival(instance: Instance, seconds: float) -> None:
     """Print when PyVRP first served all, and its best."""
-    found = rivals.pyvrp(instance, seconds)
-    text = (f'{found[-1][1] / 1000:.1f} km, the first plan after {found[0][0]:.1f} s'
-            if found else 'no plan')
+    judged = [(when, judge(instance, routes)) for when, routes in rivals.pyvrp(instance, seconds)]
+    served = [(when, each.length) for when, each in judged if each.counts(collects=False)]
+    text = (f'{served[-1][1] / 1000:.1f} km, the first plan after {served[0][0]:.1f} s'
+            if served else 'no plan')
     print(f'{instance.name}: PyVRP, {seconds:g} s: {text}', flush=True)
 
 
