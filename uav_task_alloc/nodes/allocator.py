@@ -39,6 +39,7 @@ from uav_task_alloc.nodes.teller import Teller
 from uav_task_alloc.params import AllocatorParams
 
 TICK = 0.025  # [s]
+PATIENCE = 1.0  # [s] that the lists of the last life wait for somebody to hear them
 REST, MOST_REST = 3.0, 0.2  # times as long as a tick took the next one waits, at most [s]
 MOST_COMPLAINTS, MOST_REASONS = 1000, 20  # names, and reasons for each, remembered as logged
 MOST_LINES, MOST_ROWS = 200, 500  # logged, and saved, at once
@@ -65,7 +66,8 @@ class AllocatorNode(Node):
         self._listen()
         self._talk()
         self.arrived = self.create_guard_condition(self.on_answer)
-        self.on_tick()  # the plan of the last life is told before the kernels are loaded
+        self.patient_until = time.monotonic() + PATIENCE
+        self.teller.prepare(self.world.lists.lists)
         self.worker = Worker(self.prepare, self.solve, self.deliver, self.failed)
         self.worker.start()
 
@@ -169,7 +171,7 @@ class AllocatorNode(Node):
     def on_tick(self) -> None:
         """What time brings, a solve where one is due, and what has to be told."""
         now, stamp = time.monotonic(), self.stamp()
-        if now < self.rested:
+        if now < self.rested or self.waits_for_listeners(now):
             return
         if self.world.params is not self.live.now:
             self.world.params = self.live.now
@@ -184,6 +186,13 @@ class AllocatorNode(Node):
             self.worker.hurry()
         self.tell(stamp)
         self.rest(now)
+
+    def waits_for_listeners(self, now: float) -> bool:
+        """After a restart: what is told before it is heard may take DDS 3 s to be told again."""
+        if now < self.patient_until and not self.teller.is_heard():
+            return True
+        self.patient_until = now
+        return False
 
     def rest(self, began: float) -> None:
         """What is heard has its turn between two pieces of work, however full the world."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Iterable
 
 from rclpy.node import Node
 from rclpy.publisher import Publisher
@@ -33,6 +34,15 @@ class Teller:
         # messages as made last, and what they were made from: most are as they were
         self._lists: dict[str, tuple[UavList, m.TaskList]] = {}
         self._statuses: dict[str, tuple[object, m.TaskStatus]] = {}
+
+    def prepare(self, uav_ids: Iterable[str]) -> None:
+        """Lists of these UAVs follow: whoever wants to hear them may come."""
+        for uav_id in uav_ids:
+            self._publisher(uav_id)
+
+    def is_heard(self) -> bool:
+        """Nobody is missing who might want to hear the lists that follow."""
+        return all(made.get_subscription_count() for made in self.publishers.values())
 
     def take(self, out: Outbox) -> None:
         """All of this is to be told."""
