@@ -16,8 +16,8 @@ from uav_task_alloc.solver.routes import Arrays, Ints, Routes, insert, lengthene
 def between(a: Arrays, r: Routes, t: int, before: int, first: float, least: float) -> float:
     """Cost [m] of t behind node `before`, `first` [m] away; some number >= least if no less."""
     u, then = r.on[before], r.next[before]
-    if not a.may[u, t - a.uavs]:
-        return math.inf
+    if not a.may[u, t - a.uavs] or first >= least + r.leg[before]:
+        return math.inf  # ways out of a zone, which nobody gets into, take long to find
     delta = first + step(a, t, then) - r.leg[before]
     return lengthened(a, r, u, delta)
 

@@ -84,7 +84,9 @@ def near_tasks(a: Arrays, found: Ints) -> None:
     for i in range(n):
         for m in range(k):
             j, t, place = a.uavs + found[i, m], a.uavs + i, m
-            d = max(step(a, j, t), step(a, t, j))  # one way is inf: t or j lies inside a zone
+            d = step(a, j, t)  # inf: t lies inside a zone
+            if d < np.inf:
+                d = max(d, step(a, t, j))  # inf: j does
             while place > 0 and a.near_length[i, place - 1] > d:
                 a.near[i, place] = a.near[i, place - 1]
                 a.near_length[i, place] = a.near_length[i, place - 1]
