@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given, settings, strategies as st
 from plan_checks import make
 
+from uav_task_alloc.model import ThreatZone
 from uav_task_alloc.solver import routes as of
 from uav_task_alloc.solver.chance import below, chance, uniform
 from uav_task_alloc.solver.insertion import cheapest_first
@@ -65,6 +66,18 @@ def test_neighbours_are_the_nearest(n):
 def test_neighbours_of_coincident_points_are_found():
     assert {tuple(sorted(row)) for row in nearest(np.zeros((3, 3)), 2).tolist()} == {
         (0, 1), (0, 2), (1, 2)}
+
+
+def test_few_ways_are_sought_out_of_a_zone_that_none_leads_into():
+    uavs, tasks = make(2, 200, 3, 1e9)
+    around = ThreatZone.cylinder('around', tasks[7].position[:2], 5.0)
+    made = make_problem(uavs, tasks, {}, Limits((around,)), Rules())
+    routes = of.empty_routes(made.arrays)
+    cheapest_first(made.arrays, routes, chance(1))
+    slots = made.distances._table.slots(np.array([task.position for task in tasks]))
+    known = ~np.isnan(made.distances._table.cells[slots[7]])
+    assert known.sum() < 60  # from neighbours
+    assert routes.tasks.sum() == len(tasks) - 1
 
 
 def test_chance_is_even_and_the_same_again():
