@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import random
+import time
 from collections import Counter
 from collections.abc import Callable
 
@@ -15,6 +16,7 @@ from uav_task_alloc.nodes.messages import from_stamp
 HEIGHT = 50.0  # [m]
 FLOWN_IN = (0.1, 0.5)  # [s] a task takes
 FAILS, REMIND = 0.03, 0.5  # share of tasks; [s] until COMPLETED is told again, as the bridge does
+HEARD = 1.0  # [s] in which a list that is under way is heard
 S, E = m.TaskStatus, m.TaskEvent
 ENDED = (S.COMPLETED, S.CANCELLED, S.FAILED)
 
@@ -30,7 +32,8 @@ class Ledger:
         self.flown: Counter[str] = Counter()
         self.revisions: dict[str, int] = {}
         self.faults: dict[str, list[str]] = {
-            'lost': [], 'listed_again': [], 'reopened': [], 'revisions': [], 'off': []}
+            'lost': [], 'listed_again': [], 'reopened': [], 'begun_again': [],
+            'revisions': [], 'off': []}
         self._must: tuple[set[str], dict[str, tuple[int, float]]] = (set(), {})
 
     def killed(self) -> None:
@@ -68,10 +71,19 @@ class Ledger:
         elif not had.issuperset(ids):
             self.faults['off'].append(msg.uav_id)
 
-    def done_twice(self) -> list[str]:
-        """Flown twice, or asked for again after the end was published."""
-        return sorted({t for t, n in self.flown.items() if n > 1}
-                      | {*self.faults['listed_again'], *self.faults['reopened']})
+    def done_twice(self) -> set[str]:
+        """Asked for or begun again after the end was published."""
+        return {*self.faults['listed_again'], *self.faults['reopened'],
+                *self.faults['begun_again']}
+
+    def flown_twice_unheard(self) -> set[str]:
+        """Flown by two UAVs, as COMPLETED of the first was lost or late: nobody was told of it."""
+        return {t for t, n in self.flown.items() if n > 1} - self.done_twice()
+
+    def begins(self, task_id: str) -> None:
+        """A UAV begins to fly it."""
+        if task_id in self.ended and self.ended[task_id][1] < time.time() - HEARD:
+            self.faults['begun_again'].append(task_id)
 
 
 class Flyer:
@@ -100,6 +112,7 @@ class Flyer:
         left = [task for task in tasks if task.task_id not in self.flown]
         if not self.active and left:
             self.active, self._until = left[0].task_id, now + self.rng.uniform(*FLOWN_IN)
+            self.ledger.begins(self.active)
             self.event(E.STARTED, self.active)
         elif self.active and now >= self._until:
             self._arrive(next(task for task in left if task.task_id == self.active))
