@@ -81,8 +81,9 @@ class Ledger:
         return {t for t, n in self.flown.items() if n > 1} - self.done_twice()
 
     def begins(self, task_id: str) -> None:
-        """A UAV begins to fly it."""
-        if task_id in self.ended and self.ended[task_id][1] < time.time() - HEARD:
+        """A UAV begins to fly it; that it was withdrawn in a crash it cannot know."""
+        state, when = self.ended.get(task_id, (S.CANCELLED, math.inf))
+        if state == S.COMPLETED and when < time.time() - HEARD:
             self.faults['begun_again'].append(task_id)
 
 
