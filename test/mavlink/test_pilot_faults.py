@@ -8,7 +8,10 @@ from mission_bench import task_list
 from pymavlink.dialects.v20 import ardupilotmega as d
 
 from uav_task_alloc.mavlink.board import MissionState
+from uav_task_alloc.mavlink.policy import TaskProgress
 from uav_task_alloc.mavlink.profiles import Flight
+from uav_task_alloc.mission import Stop, TaskList
+from uav_task_alloc.model import Task
 
 BOTH = pytest.mark.parametrize('kind', ['ardupilot', 'px4'])
 
@@ -126,13 +129,58 @@ def test_fault_23_accepted_and_then_no_mission_is_infeasible(kind):
     assert bench.board().upload.uploads == 1
 
 
-def test_fault_23_a_mission_that_px4_will_not_fly_fails_with_its_own_words():
+@pytest.fixture
+def refused():
+    """A PX4 that has just refused a task as too far away."""
     bench = FlightBench('px4').found()
-    tasks = task_list('A')
-    far = tasks.stops[0].task.__class__('far', (0.0, 12000.0, 50.0))
-    bench.assign(tasks.__class__(1, (tasks.stops[0].__class__(far),)))
+    bench.assign(single('far', FAR))
     assert bench.run(lambda: bench.failed() == ['far'], 120.0)
-    assert bench.events[-1][1].reason.startswith('infeasible: First waypoint too far')
+    return bench
+
+
+FAR = (0.0, 12000.0, 50.0)
+
+
+def single(name, place, revision=1):
+    return TaskList(revision, (Stop(Task(name, place)),))
+
+
+def test_fault_23_a_mission_that_px4_will_not_fly_fails_with_its_own_words(refused):
+    assert refused.events[-1][1].reason.startswith('infeasible: First waypoint too far')
+
+
+def test_a_list_that_still_has_what_was_refused_is_told_so_again(refused):
+    first = refused.events[-1][1]
+    refused.assign(single('far', FAR, 7))
+    assert refused.run(lambda: refused.failed() == ['far', 'far'], 10.0)
+    assert refused.events[-1][1] == dataclasses.replace(first, revision=7)
+    assert refused.board().upload.uploads == 1
+
+
+def test_what_was_refused_is_tried_again_where_it_has_changed(refused):
+    refused.assign(single('far', (0.0, 300.0, 50.0), 2))
+    assert refused.run(lambda: refused.completed() == ['far'])
+    assert refused.failed() == ['far']
+
+
+@BOTH
+def test_a_task_that_comes_back_at_another_place_is_flown_there(kind):
+    bench = flying(kind, 'A')
+    assert bench.run(lambda: bench.completed() == ['A'])
+    bench.assign(single('A', (150.0, 100.0, 50.0), 2))
+    assert bench.run(lambda: bench.completed() == ['A', 'A'])
+    assert ('uav_1', TaskProgress('A', 'STARTED', 2)) in bench.events
+    assert bench.flown()[-1] == (150, 100, 50)
+
+
+@BOTH
+def test_a_task_that_comes_back_as_it_was_is_told_and_not_flown(kind):
+    bench = flying(kind, 'A')
+    assert bench.run(lambda: bench.completed() == ['A'])
+    bench.assign(task_list('A', 2))
+    bench.run(limit=20.0)
+    assert bench.completed() == ['A', 'A']
+    assert places(bench) == ['A']
 
 
 def upload_by_another(bench, n=1):

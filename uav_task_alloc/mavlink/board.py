@@ -15,6 +15,7 @@ from uav_task_alloc.mavlink.change import Change, Kind, change
 from uav_task_alloc.mavlink.codec import Message, plan_id
 from uav_task_alloc.mavlink.helm import Note
 from uav_task_alloc.mavlink.peer import NO_SPACE, Peer
+from uav_task_alloc.mavlink.policy import TaskProgress
 from uav_task_alloc.mavlink.profiles import Profile
 from uav_task_alloc.mavlink.progress import ProgressTable
 from uav_task_alloc.mavlink.recall import Recall
@@ -71,7 +72,7 @@ class Board:
         self.read_once = False  # since the vehicle was first heard or restarted
         self.must_jump: int | None = None  # the item to fly now, where the upload did not say it
         self._profile, self._origin, self._telemetry = profile, origin, telemetry
-        self._refused: set[str] = set()
+        self._refused: dict[str, tuple[Task | None, str]] = {}  # as it was, and why
         self._horizon: int | None = None  # stops; None: all
         self._state = MissionState.UNKNOWN
         self._uploading: tuple[Change, int] | None = None  # and the revision it is for
@@ -110,9 +111,23 @@ class Board:
                 and self._uploading[1] != self.tasks.revision)
 
     def assign(self, tasks: TaskList) -> None:
-        """The latest list; older ones that come late are ignored."""
+        """The latest list; a task that was refused is tried again where it has changed."""
         self.tasks = tasks
         self._horizon = None
+        asked = [stop.task for stop in tasks.stops]
+        self.progress.asked_for(asked)
+        for task in asked:
+            if self._refused.get(task.id, (task, ''))[0] != task:
+                del self._refused[task.id]
+
+    def told_before(self) -> list[TaskProgress]:
+        """How those tasks of the list ended that it should not have any more."""
+        assert self.tasks is not None
+        ids, revision = [stop.task.id for stop in self.tasks.stops], self.tasks.revision
+        return [TaskProgress(i, 'COMPLETED', revision)
+                for i in ids if i in self.progress.completed] + [
+            TaskProgress(i, 'FAILED', revision, self._refused[i][1])
+            for i in ids if i in self._refused]
 
     def remaining(self) -> TaskList:
         """The list less what is flown or refused, up to the horizon."""
@@ -284,7 +299,8 @@ class Board:
                 self._refuse(task, event.reason)
 
     def _refuse(self, task: str, reason: str) -> None:
-        self._refused.add(task)
+        stops = self.tasks.stops if self.tasks else ()
+        self._refused[task] = next((s.task for s in stops if s.task.id == task), None), reason
         self.failed.append(TaskFailed(task, reason))
 
     def _enough(self) -> bool:

@@ -28,7 +28,7 @@ from uav_task_alloc.mavlink.upload import State
 from uav_task_alloc.mission import RETURN, TaskList, all_alike
 
 LAST_WORD = 5.0  # [s] for a late REACHED, where the mission seems to end before its last item
-REMIND = 2.0  # [s] that a list may ask for what is completed before that is told again
+REMIND = 2.0  # [s] that a list may ask for what has ended before that is told again
 
 
 class Pilot:
@@ -48,7 +48,7 @@ class Pilot:
         self._was_stale = self._aimed = False
         self._service = Service(self.board, self.telemetry, profile)
         self._wait_until = -math.inf
-        self._asked_again: tuple[str, ...] = ()  # completed tasks that the list still has
+        self._told_before: list[TaskProgress] = []  # of tasks that the list still has
         self._remind_at = math.inf
         self._restarts = 0
         self._said = ''  # by the vehicle, last
@@ -63,8 +63,7 @@ class Pilot:
                                    f'at least {self.board.tasks.revision}: ignored'))
             return []
         self.board.assign(tasks)
-        self._remind_at, self._asked_again = now + REMIND, tuple(
-            stop.task.id for stop in tasks.stops if stop.task.id in self.board.progress.completed)
+        self._remind_at, self._told_before = now + REMIND, self.board.told_before()
         self.helm.encourage(now)
         return self._act(now)
 
@@ -94,10 +93,9 @@ class Pilot:
 
     def _remind(self, now: float) -> None:
         """Tell once more what a new list still asks for: the allocator may have been restarted."""
-        if self.board.tasks is not None and now >= self._remind_at:
+        if now >= self._remind_at:
             self._remind_at = math.inf
-            self.events += (TaskProgress(task, 'COMPLETED', self.board.tasks.revision)
-                            for task in self._asked_again)
+            self.events += self._told_before
 
     def _act(self, now: float) -> list[Message]:
         out: list[Message] = []

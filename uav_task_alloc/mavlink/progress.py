@@ -8,7 +8,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from uav_task_alloc.mission import Item
-from uav_task_alloc.model import Point
+from uav_task_alloc.model import Point, Task
 
 ECHO = 15.0  # [s] in which PX4 may repeat the last REACHED of the epoch before
 REACH = 60.0  # [m] beyond its radius from which an item can be reached between two positions
@@ -31,7 +31,7 @@ class ProgressTable:
         self.epoch = 0
         self.items: tuple[Item, ...] = ()
         self.current: int | None = None  # len(items): flown to the end
-        self.completed: dict[str, None] = {}  # in order, of all epochs
+        self.completed: dict[str, Point | None] = {}  # in order, of all epochs; where
         self.events: deque[Progress] = deque()
         self._started: str | None = None
         self._reached: tuple[int, float] | None = None  # last seq, when
@@ -123,7 +123,14 @@ class ProgressTable:
     def caught_up(self, tasks: Iterable[str]) -> None:
         """These were flown while nobody listened."""
         for task in tasks:
-            self._complete(task)
+            self._complete(task, None)
+
+    def asked_for(self, tasks: Iterable[Task]) -> None:
+        """One that was flown at another place is another task, and still to be flown."""
+        for task in tasks:
+            if self.completed.get(task.id) not in (None, task.position):
+                del self.completed[task.id]
+                self._started = None if self._started == task.id else self._started
 
     def ended(self) -> None:
         """The vehicle says that the whole mission is flown."""
@@ -134,12 +141,12 @@ class ProgressTable:
         assert self.current is not None or seq > 0
         for item in self.items[self.current if self.current is not None else seq - 1:seq]:
             if item.completes:
-                self._complete(item.task)
+                self._complete(item.task, item.position)
         self.current = seq
 
-    def _complete(self, task: str) -> None:
+    def _complete(self, task: str, place: Point | None) -> None:
         if task not in self.completed:
-            self.completed[task] = None
+            self.completed[task] = place
             self.events.append(Progress(task, completed=True))
 
     def _is_echo(self, seq: int, now: float) -> bool:
