@@ -150,8 +150,7 @@ class World:
         self.ledger.off.pop(uav_id, None)
         def answered(future) -> None:
             if future.result().success and not available:
-                had = {planned.task.task_id for planned in self.flyers[uav_id].list.tasks}
-                self.ledger.off[uav_id] = time.time(), had
+                self.ledger.switched_off(uav_id)
         self.switch.call_async(SetAvailability.Request(
             uav_id=uav_id, available=available)).add_done_callback(answered)
 

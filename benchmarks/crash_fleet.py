@@ -27,8 +27,9 @@ class Ledger:
     def __init__(self) -> None:
         self.accepted: set[str] = set()  # by the service, or in a status
         self.ended: dict[str, tuple[int, float]] = {}  # state, stamp [s], as published
-        # UAVs switched off: when [s] the service had answered, and what they had
+        # UAVs switched off: when [s] the service had answered, and what they had been told to fly
         self.off: dict[str, tuple[float, set[str]]] = {}
+        self._told: dict[str, set[str]] = {}
         self.flown: Counter[str] = Counter()
         self.revisions: dict[str, int] = {}
         self.faults: dict[str, list[str]] = {
@@ -65,11 +66,16 @@ class Ledger:
         ids = [planned.task.task_id for planned in msg.tasks]
         self.faults['listed_again'] += [
             t for t in ids if t in self.ended and self.ended[t][1] < made]
+        self._told[msg.uav_id] = set(ids)
         when, had = self.off.get(msg.uav_id, (math.inf, set()))
         if made <= when:
             had.update(ids)
         elif not had.issuperset(ids):
             self.faults['off'].append(msg.uav_id)
+
+    def switched_off(self, uav_id: str) -> None:
+        """The service has answered."""
+        self.off[uav_id] = time.time(), set(self._told.get(uav_id, ()))
 
     def done_twice(self) -> set[str]:
         """Asked for or begun again after the end was published."""

@@ -139,13 +139,15 @@ def test_what_was_being_flown_is_known_before_its_uav_is_heard():
     assert after.route('a') == ('t1', 't2')
 
 
+@pytest.mark.parametrize('heard', [0.0, 4.0])  # [s] after the restart
 @pytest.mark.parametrize('seconds', [0.5, 3.5])
-def test_shortly_after_a_restart_no_task_changes_hands(seconds):
+def test_shortly_after_a_restart_no_task_changes_hands(seconds, heard):
     desk = Desk()
     desk.uav('a', 0.0, 0.0, 50.0)
     desk.add(('t1', 100, 0), ('t2', 200, 0))
     desk.settle()
     after = Desk(saved(desk.core.rows()))
+    after.settle(wait=heard)
     after.uav('a', 0.0, 0.0, 50.0)
     after.uav('b', 150.0, 0.0, 50.0)
     after.settle(wait=seconds)

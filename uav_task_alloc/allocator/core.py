@@ -27,8 +27,8 @@ from uav_task_alloc.journal import Row
 from uav_task_alloc.model import Plan
 from uav_task_alloc.params import AllocatorParams
 
-# [s] after a restart in which no task changes hands: what was flown while nobody listened is told
-# again meanwhile, by the bridge after 2 s
+# [s] after a restart, from the UAV heard last on, in which no task changes hands: what was flown
+# while nobody listened is told again meanwhile, by the bridge after 2 s
 CAUTIOUS = 3.0
 LEARNER = 5.0  # [s] between two rows of what the bees learnt
 
@@ -77,7 +77,9 @@ class Allocator:
         if self._restarted:  # the plan of the last life is in force, and told before any other
             self._restarted = False
             self._tell(Plan({}), 'restart', stamp)
-        if world.cautious and now >= self._cautious_until:
+        if world.cautious and self._waiting(now):
+            self._cautious_until = now + CAUTIOUS
+        elif world.cautious and now >= self._cautious_until:
             world.cautious = False
             world.touch('some time after a restart', now)
         if self._pace.due(now):
