@@ -75,6 +75,7 @@ class World:
         for uav_id in self.flyers:
             hear(m.TaskList, f'{uav_id}/task_list', self.on_list, LATCHED)
         self.made, self._next, self.demanding = 0, dict.fromkeys('sda', 0.0), True
+        self.asked: Counter[str] = Counter()  # times that a UAV was switched
 
     def on_statuses(self, msg: m.TaskStatusArray) -> None:
         self.whole = True
@@ -144,12 +145,14 @@ class World:
             answered)
 
     def set_available(self, uav_id: str, available: bool) -> None:
-        """An operator's word; while it is not answered nothing is known."""
+        """An operator's word; while the last one is not answered nothing is known."""
         if not self.switch.service_is_ready():
             return
         self.ledger.off.pop(uav_id, None)
+        self.asked[uav_id] += 1
+        asked = self.asked[uav_id]
         def answered(future) -> None:
-            if future.result().success and not available:
+            if future.result().success and not available and asked == self.asked[uav_id]:
                 self.ledger.switched_off(uav_id)
         self.switch.call_async(SetAvailability.Request(
             uav_id=uav_id, available=available)).add_done_callback(answered)
