@@ -105,7 +105,7 @@ class Flyer:
         self.active, self._until, self._remind = '', 0.0, math.inf
 
     def told(self, msg: m.TaskList, now: float) -> None:
-        self.list, self._remind = msg, now + REMIND
+        self.list, self._remind = msg, min(self._remind, now + REMIND)
         if self.active not in [planned.task.task_id for planned in msg.tasks]:
             self.active = ''
 

@@ -152,7 +152,7 @@ def test_fault_23_a_mission_that_px4_will_not_fly_fails_with_its_own_words(refus
 def test_a_list_that_still_has_what_was_refused_is_told_so_again(refused):
     first = refused.events[-1][1]
     refused.assign(single('far', FAR, 7))
-    assert refused.run(lambda: refused.failed() == ['far', 'far'], 10.0)
+    assert refused.run(lambda: refused.failed() == ['far', 'far'], 3.0)
     assert refused.events[-1][1] == dataclasses.replace(first, revision=7)
     assert refused.board().upload.uploads == 1
 
@@ -179,8 +179,21 @@ def test_a_task_that_comes_back_as_it_was_is_told_and_not_flown(kind):
     assert bench.run(lambda: bench.completed() == ['A'])
     bench.assign(task_list('A', 2))
     bench.run(limit=20.0)
+    assert bench.completed() == ['A'] * 4  # after 2, 6, 14 seconds
+    bench.assign(task_list('B', 3))
+    bench.run(limit=40.0)
+    assert bench.completed() == [*'AAAA', 'B']
+    assert places(bench) == ['A', 'B']
+
+
+@BOTH
+def test_lists_that_change_all_the_time_put_nothing_off(kind):
+    bench = flying(kind, 'AZ')
+    assert bench.run(lambda: bench.completed() == ['A'])
+    for revision in range(2, 12):
+        bench.assign(task_list('AZY' if revision % 2 else 'AYZ', revision))
+        bench.run(limit=0.5)
     assert bench.completed() == ['A', 'A']
-    assert places(bench) == ['A']
 
 
 def upload_by_another(bench, n=1):

@@ -22,13 +22,13 @@ from uav_task_alloc.mavlink.peer import Peer
 from uav_task_alloc.mavlink.policy import Policy, TaskProgress
 from uav_task_alloc.mavlink.profiles import Flight, Profile
 from uav_task_alloc.mavlink.rates import Rates
+from uav_task_alloc.mavlink.reminder import Reminder
 from uav_task_alloc.mavlink.service import Service
 from uav_task_alloc.mavlink.telemetry import Telemetry
 from uav_task_alloc.mavlink.upload import State
 from uav_task_alloc.mission import RETURN, TaskList, all_alike
 
 LAST_WORD = 5.0  # [s] for a late REACHED, where the mission seems to end before its last item
-REMIND = 2.0  # [s] that a list may ask for what has ended before that is told again
 
 
 class Pilot:
@@ -48,8 +48,7 @@ class Pilot:
         self._was_stale = self._aimed = False
         self._service = Service(self.board, self.telemetry, profile)
         self._wait_until = -math.inf
-        self._told_before: list[TaskProgress] = []  # of tasks that the list still has
-        self._remind_at = math.inf
+        self._reminder = Reminder()
         self._restarts = 0
         self._said = ''  # by the vehicle, last
         self._rules = (self._linked, self.helm.finish, self._upload, self._read, self._has_list,
@@ -63,7 +62,7 @@ class Pilot:
                                    f'at least {self.board.tasks.revision}: ignored'))
             return []
         self.board.assign(tasks)
-        self._remind_at, self._told_before = now + REMIND, self.board.told_before()
+        self._reminder.listed(self.board.told_before(), now)
         self.helm.encourage(now)
         return self._act(now)
 
@@ -88,14 +87,8 @@ class Pilot:
 
     def step(self, now: float) -> list[Message]:
         """Let time pass."""
-        self._remind(now)
+        self.events += self._reminder.step(now)
         return self.board.step(now) + self._rates.step(now) + self._act(now)
-
-    def _remind(self, now: float) -> None:
-        """Tell once more what a new list still asks for: the allocator may have been restarted."""
-        if now >= self._remind_at:
-            self._remind_at = math.inf
-            self.events += self._told_before
 
     def _act(self, now: float) -> list[Message]:
         out: list[Message] = []
