@@ -2,19 +2,22 @@
 """The kernels: sums stay true, undo undoes, neighbours are the nearest."""
 import subprocess
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 from plan_checks import make
 
-from uav_task_alloc.model import ThreatZone
+from uav_task_alloc.model import Task, ThreatZone
 from uav_task_alloc.solver import routes as of
 from uav_task_alloc.solver.chance import below, chance, uniform
 from uav_task_alloc.solver.insertion import cheapest_first
 from uav_task_alloc.solver.near import nearest
 from uav_task_alloc.solver.problem import Limits, Rules, make_problem
 from uav_task_alloc.solver.ruin import empty_log, recreate, ruin, undo
+
+NOBODY = np.empty(0, np.int64)
 
 
 def problem(uavs, tasks, seed=1, reach=1e9, **rules):
@@ -58,14 +61,35 @@ def test_neighbours_are_the_nearest(n):
     xyz = np.random.default_rng(n).uniform(0.0, 100.0, (n, 3))
     k = min(10, n - 1)
     ways = np.linalg.norm(xyz[:, None] - xyz[None], axis=2) + np.diag(np.full(n, np.inf))
-    found = nearest(xyz, k)
+    found = np.full((n, k), -1)
+    squares = nearest(xyz, found, NOBODY)
     for i in range(n):
         assert ways[i, found[i]] == pytest.approx(np.sort(ways[i])[:k])
+        assert squares[i] == pytest.approx(np.sort(ways[i])[:k] ** 2)
 
 
 def test_neighbours_of_coincident_points_are_found():
-    assert {tuple(sorted(row)) for row in nearest(np.zeros((3, 3)), 2).tolist()} == {
-        (0, 1), (0, 2), (1, 2)}
+    found = np.full((3, 2), -1)
+    nearest(np.zeros((3, 3)), found, NOBODY)
+    assert {tuple(sorted(row)) for row in found.tolist()} == {(0, 1), (0, 2), (1, 2)}
+
+
+@pytest.mark.parametrize('zones', [(), (ThreatZone.cylinder('z', (500.0, 500.0), 200.0),)])
+def test_neighbours_are_the_same_with_and_without_those_of_an_earlier_problem(zones):
+    rng, limits = np.random.default_rng(3), Limits(zones)
+    uavs, tasks = make(3, 60)
+    known = None
+    for event in range(12):
+        tasks = [task for task in tasks if rng.uniform() > 0.05]  # ended
+        tasks += [Task(f'e{event}-{i}', (*rng.uniform(0.0, 1000.0, 2), 0.0)) for i in range(4)]
+        tasks[7] = replace(tasks[7], position=(*rng.uniform(0.0, 1000.0, 2), 0.0))
+        rng.shuffle(tasks)
+        known = make_problem(uavs, tasks, {}, limits, Rules(), known)
+        anew = make_problem(uavs, tasks, {}, limits, Rules())
+        assert known.arrays.near_length == pytest.approx(anew.arrays.near_length)
+        assert {*map(frozenset, known.arrays.near.tolist())} == {
+            *map(frozenset, anew.arrays.near.tolist())}
+        assert known.arrays.starts.tolist() == anew.arrays.starts.tolist()
 
 
 def test_few_ways_are_sought_out_of_a_zone_that_none_leads_into():

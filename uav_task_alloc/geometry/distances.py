@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numba
 import numpy as np
@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.geometry.detour import check_limits, way_between
-from uav_task_alloc.geometry.memory import floats_at, ints_at
+from uav_task_alloc.geometry.memory import float_of, floats_at, ints_at
 from uav_task_alloc.geometry.obstacles import Ints, Obstacles, contains, pack
 from uav_task_alloc.geometry.scene import CAUGHT, INSIDE, addresses, finder, make_scene
 from uav_task_alloc.geometry.table import Table, forget
@@ -38,7 +38,7 @@ class _Addresses(NamedTuple):
     keys: int  # int64: i * points + j of each answer in the cache
     answers: int  # float64 [m]
     scene: int  # what `find` reads
-    find: Any  # (scene, i, j) -> length [m]
+    find: int  # C function (scene, i, j) -> length [m]; 0 where there are no zones
 
 
 class Pairs(_Addresses):
@@ -65,7 +65,7 @@ def length(pairs: Pairs, i: int, j: int) -> float:
 @numba.njit(cache=True, nogil=True)
 def _find_for_table(pairs: Pairs, i: int, j: int) -> float:
     slot, table = ints_at(pairs.slot), floats_at(pairs.table)
-    found = pairs.find(pairs.scene, i, j)
+    found = float_of(pairs.find, pairs.scene, i, j)
     table[slot[i] * pairs.row + slot[j]] = found
     caught = ints_at(ints_at(pairs.scene)[CAUGHT])
     if caught[i] != INSIDE and caught[j] != INSIDE:
@@ -82,7 +82,7 @@ def _find_for_cache(pairs: Pairs, i: int, j: int) -> float:
     key = i * pairs.points + j
     place = (key * 0x9E3779B1 >> 8) & (CACHE_SIZE - 1)
     if keys[place] != key:
-        answers[place] = pairs.find(pairs.scene, i, j)
+        answers[place] = float_of(pairs.find, pairs.scene, i, j)
         keys[place] = key
     return float(answers[place])
 

@@ -96,15 +96,12 @@ def _find(address: int, i: int, j: int) -> float:
                             np.empty((MAX_CORNERS, 3)))[1]
 
 
-def _nothing(address: int, i: int, j: int) -> float:
-    return np.nan
-
-
 @functools.cache
-def finder(zones: bool) -> Any:
-    """`_find` as a function pointer, compiled apart so that its callers compile fast.
-
-    Where there are no zones it is never called, and a stand-in of the same type will do.
-    """
+def _compiled() -> Any:
     signature = numba.float64(numba.int64, numba.int64, numba.int64)
-    return numba.cfunc(signature, cache=True)(_find if zones else _nothing)
+    return numba.cfunc(signature, cache=True)(_find)
+
+
+def finder(zones: bool) -> int:
+    """Address of `_find`, compiled apart so that its callers compile fast; 0 without zones."""
+    return int(_compiled().address) if zones else 0

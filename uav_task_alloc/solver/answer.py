@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from itertools import pairwise
+from collections.abc import Iterator
+from itertools import chain, pairwise
 
 import numpy as np
 
@@ -21,12 +22,12 @@ STRAIGHT = 1.0 + 1e-12  # a way at most so much longer than the distance has no 
 def to_plan(problem: Problem, recorder: Recorder, solver: str, warm: bool) -> Plan:
     """What `plan` answers, but for its state."""
     order = nodes_of(recorder.best, len(problem.uavs))
-    routes, legs = {}, {}
-    for u, uav in enumerate(problem.uavs):
+    ids, routes = [task.id for task in problem.tasks], {}
+    for uav, nodes in zip(problem.uavs, order, strict=True):
         held = problem.locked.get(uav.id, ())
-        routes[uav.id] = (*(task.id for task in held), *(
-            problem.tasks[node - len(problem.uavs)].id for node in order[u]))
-        legs[uav.id] = _legs(problem, u, order[u])
+        routes[uav.id] = (*(task.id for task in held),
+                          *[ids[node - len(problem.uavs)] for node in nodes])
+    legs = dict(zip(routes, _all_legs(problem, order), strict=True))
     lengths = [math.fsum(leg.length for leg in each) for each in legs.values()]
     values = {task.id: task.value for held in (*problem.locked.values(), problem.tasks)
               for task in held}
@@ -54,15 +55,27 @@ def nodes_of(routes: Routes, uavs: int) -> list[list[int]]:
     return found
 
 
-def _legs(problem: Problem, u: int, nodes: list[int]) -> tuple[Leg, ...]:
-    """A leg before each task, the locked ones too, and one home where routes return."""
+def _all_legs(problem: Problem, order: list[list[int]]) -> Iterator[tuple[Leg, ...]]:
+    """Of each UAV a leg before each task, locked ones too, and one home where routes return."""
+    rows = [_places(problem, u, nodes) for u, nodes in enumerate(order)]
+    points = problem.distances.points[list(chain.from_iterable(rows))]
+    steps, last = np.sqrt((np.diff(points, axis=0) ** 2).sum(axis=1)).tolist(), 0
+    for places in rows:
+        first, last = last, last + len(places)
+        yield _legs(problem, places, steps[first:last - 1])
+
+
+def _places(problem: Problem, u: int, nodes: list[int]) -> list[int]:
+    """Where UAV u comes by, from its start to its home where routes return and it can."""
     places, home = [*problem.locked_places(u), *nodes], problem.arrays.ends + u
-    distances = problem.distances
-    if problem.rules.returns and len(places) > 1 and distances.length(
-            places[-1], home) < math.inf:
+    if problem.rules.returns and len(places) > 1 and (
+            problem.distances.length(places[-1], home) < math.inf):
         places.append(home)
-    points = distances.points[places]
-    steps = np.sqrt((np.diff(points, axis=0) ** 2).sum(axis=1)).tolist()
+    return places
+
+
+def _legs(problem: Problem, places: list[int], steps: list[float]) -> tuple[Leg, ...]:
+    distances = problem.distances
     if not distances.zones:
         return tuple([Leg((), metres) for metres in steps])
     return tuple(Leg((), metres) if distances.length(i, j) <= metres * STRAIGHT

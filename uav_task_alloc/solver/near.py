@@ -6,9 +6,11 @@ import math
 
 import numpy as np
 
-from uav_task_alloc.solver.chance import Chance, uniform
-from uav_task_alloc.solver.kernel import kernel, maker
+from uav_task_alloc.solver.chance import Chance, below, uniform
+from uav_task_alloc.solver.kernel import kernel, maker, part
 from uav_task_alloc.solver.routes import TINY, Arrays, Floats, Ints, step
+
+NOISE = 4096  # random numbers drawn once, to begin at any of them
 
 
 @maker
@@ -46,20 +48,36 @@ def _keep(ids: Ints, squares: Floats, kept: int, j: int, square: float) -> int:
     return min(kept + 1, k)
 
 
+@part
+def _square(xyz: Floats, i: int, j: int) -> float:
+    x, y, z = xyz[i, 0] - xyz[j, 0], xyz[i, 1] - xyz[j, 1], xyz[i, 2] - xyz[j, 2]
+    return float(x * x + y * y + z * z)
+
+
 @maker
-def nearest(xyz: Floats, k: int) -> Ints:
-    """The k nearest others of each point as the crow flies, nearest first. O(n k) about."""
-    n = len(xyz)
-    near = np.empty((n, k), np.int64)
+def nearest(xyz: Floats, near: Ints, fresh: Ints) -> Floats:
+    """Fill near (n, k) with the k nearest others of each point, nearest first. O(n k) about.
+
+    Returns their squared distances as the crow flies. A row that begins with -1 is searched for;
+    in another stand those that were nearest before the points `fresh` came.
+    """
+    n, k = near.shape
+    squares = np.empty((n, k))
     if k == 0:
-        return near
+        return squares
     cell, first, order, frame = _cells(xyz, 3.0)
     side, across = frame[2], int(math.sqrt(first.size - 1) + 0.5)
-    squares = np.empty(k)
+    held = np.empty(k, np.int64)
     for i in range(n):
+        if near[i, 0] >= 0:
+            held[:], kept = near[i], 0
+            for some in (held, fresh):
+                for m in range(some.size):
+                    kept = _keep(near[i], squares[i], kept, some[m], _square(xyz, i, some[m]))
+            continue
         row, column, kept, ring = cell[i] // across, cell[i] % across, 0, 0
         while ring < across:
-            if kept == k and squares[k - 1] <= ((ring - 1) * side) ** 2:
+            if kept == k and squares[i, k - 1] <= ((ring - 1) * side) ** 2:
                 break
             for y in range(max(0, row - ring), min(across, row + ring + 1)):
                 edge = abs(y - row) == ring
@@ -70,20 +88,21 @@ def nearest(xyz: Floats, k: int) -> Ints:
                     for m in range(first[y * across + x], first[y * across + x + 1]):
                         j = order[m]
                         if j != i:
-                            square = ((xyz[i, 0] - xyz[j, 0]) ** 2 + (xyz[i, 1] - xyz[j, 1]) ** 2
-                                      + (xyz[i, 2] - xyz[j, 2]) ** 2)
-                            kept = _keep(near[i], squares, kept, j, square)
+                            kept = _keep(near[i], squares[i], kept, j, _square(xyz, i, j))
             ring += 1
-    return near
+    return squares
 
 
 @kernel
-def near_tasks(a: Arrays, found: Ints) -> None:
+def near_tasks(a: Arrays, found: Ints, squares: Floats) -> None:
     """Fill a.near with the found neighbours in order of the way to fly. O(n k^2)."""
     n, k = a.near.shape
     for i in range(n):
         for m in range(k):
             j, t, place = a.uavs + found[i, m], a.uavs + i, m
+            if a.straight:
+                a.near[i, m], a.near_length[i, m] = j, math.sqrt(squares[i, m])
+                continue
             d = step(a, j, t)  # inf: t lies inside a zone
             if d < np.inf:
                 d = max(d, step(a, t, j))  # inf: j does
@@ -101,18 +120,26 @@ def near_starts(a: Arrays, xyz: Floats, rng: Chance) -> None:
     The price of tasks that nobody has the range for becomes 0.
     """
     n, s = a.starts.shape
-    squares = np.empty(s)
+    squares, every, shuffled = np.empty(s), np.empty(a.uavs), np.empty(a.uavs)
+    xs, ys, zs = xyz[:a.uavs, 0].copy(), xyz[:a.uavs, 1].copy(), xyz[:a.uavs, 2].copy()
+    noise = np.empty(NOISE + a.uavs)
+    for m in range(noise.size):
+        noise[m] = 1e-6 * uniform(rng)
     for i in range(n):
-        kept, t, spare = 0, a.uavs + i, -np.inf
+        kept, t, spare, row = 0, a.uavs + i, -np.inf, a.starts[i]
+        x, y, z = xyz[t, 0], xyz[t, 1], xyz[t, 2]
+        some = noise[below(rng, NOISE):]
+        for u in range(a.uavs):  # nothing else in this loop: many at once
+            every[u] = (xs[u] - x) ** 2 + (ys[u] - y) ** 2 + (zs[u] - z) ** 2
+            shuffled[u] = every[u] + some[u] * (every[u] + 1.0)
         for u in range(a.uavs):
-            if not a.may[u, i]:
+            if a.picky[i] and not a.may[u, i]:
                 continue
-            square = ((xyz[u, 0] - xyz[t, 0]) ** 2 + (xyz[u, 1] - xyz[t, 1]) ** 2
-                      + (xyz[u, 2] - xyz[t, 2]) ** 2)
-            spare = max(spare, a.reach[u] - math.sqrt(square))
-            if kept < s or square <= squares[s - 1]:
-                square += 1e-6 * (square + 1.0) * uniform(rng)
-                kept = _keep(a.starts[i], squares, kept, u, square)
+            more = a.reach[u] - spare
+            if more > 0.0 and every[u] < more * more:
+                spare = a.reach[u] - math.sqrt(every[u])
+            if kept < s or shuffled[u] < squares[s - 1]:
+                kept = _keep(row, squares, kept, u, shuffled[u])
         if a.hard and spare < -TINY:
             a.price[i] = 0.0
         for m in range(s):

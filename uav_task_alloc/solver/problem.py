@@ -15,7 +15,7 @@ from uav_task_alloc.model import Task, ThreatZone, Uav
 from uav_task_alloc.objective import Weights
 from uav_task_alloc.solver.chance import chance
 from uav_task_alloc.solver.near import near_starts, near_tasks, nearest
-from uav_task_alloc.solver.routes import Arrays, Floats
+from uav_task_alloc.solver.routes import Arrays, Floats, Ints
 
 NEIGHBOURS = 24  # tasks a bee looks at around a task
 STARTS = 8  # UAVs it looks at
@@ -89,7 +89,8 @@ def make_problem(uavs: Sequence[Uav], tasks: Sequence[Task],
                       1.0, {task.id: i for i, task in enumerate(free)})
     _apply_locks(problem)
     floor = float(np.maximum(0.0, arrays.idle - arrays.reach).sum())
-    return replace(problem, arrays=arrays._replace(excess_floor=floor), scale=_fill(problem))
+    return replace(problem, arrays=arrays._replace(excess_floor=floor),
+                   scale=_fill(problem, known))
 
 
 def _distances(uavs: Sequence[Uav], tasks: Sequence[Task],
@@ -153,13 +154,32 @@ def _apply_locks(problem: Problem) -> None:
                 a.idle[u] = way if way < math.inf else 0.0  # it stays behind its last task
 
 
-def _fill(problem: Problem) -> float:
+def _neighbours(problem: Problem, known: Problem | None) -> tuple[Ints, Ints]:
+    """Near tasks as an earlier problem knows them, -1 where it does not; those new to it."""
+    n, k = problem.arrays.near.shape
+    near = np.full((n, k), -1, np.int64)
+    if known is None or known.arrays.near.shape[1] != k or k == 0:
+        return near, np.empty(0, np.int64)
+    then = np.array([known.index.get(task.id, -1) for task in problem.tasks])
+    a, b = problem.arrays, known.arrays
+    stay = np.flatnonzero(then >= 0)
+    stay = stay[(a.xyz[a.uavs + stay] == b.xyz[b.uavs + then[stay]]).all(axis=1)]
+    now = np.full(len(known.tasks), -1, np.int64)
+    now[then[stay]] = stay
+    rows = now[b.near[then[stay]] - b.uavs]
+    whole = (rows >= 0).all(axis=1)
+    near[stay[whole]] = rows[whole]
+    return near, np.setdiff1d(np.arange(n), stay, assume_unique=True)
+
+
+def _fill(problem: Problem, known: Problem | None) -> float:
     """Neighbours and prices; returns the mean way [m] to the nearest neighbour."""
     a, n = problem.arrays, len(problem.tasks)
     xyz: Floats = problem.distances.points
     if n == 0:
         return 1.0
-    near_tasks(a, nearest(xyz[a.uavs:a.ends], a.near.shape[1]))
+    found, fresh = _neighbours(problem, known)
+    near_tasks(a, found, nearest(xyz[a.uavs:a.ends], found, fresh))
     if a.uavs == 0:
         return 1.0
     near_starts(a, xyz, chance(0))
