@@ -13,6 +13,7 @@ from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
 from rcl_interfaces.srv import DescribeParameters, GetParameters, SetParameters
 
 from uav_task_alloc import params
+from uav_task_alloc.nodes import run as nodes_run
 
 pytestmark = pytest.mark.ros
 SHARE = Path(get_package_share_directory('uav_task_alloc'))
@@ -63,6 +64,21 @@ def test_help_and_strange_arguments_are_answered_without_starting():
     code, out = ask('--help', '--ros-args', '-p', 'seed:=1')
     assert (code, 'docs/parameters.md' in out) == (0, True)
     assert ask('--bogus') == (2, "'--bogus': expected --ros-args and what belongs to it\n")
+
+
+@pytest.mark.parametrize(('chosen', 'used'), [(None, 'UDPv4'), ('SHM', 'SHM')])
+def test_what_a_killed_node_left_in_shared_memory_is_not_in_the_way(monkeypatch, chosen, used):
+    def init(**_):
+        raise SystemExit(os.environ['FASTDDS_BUILTIN_TRANSPORTS'])
+    monkeypatch.setattr(nodes_run.rclpy, 'init', init)
+    monkeypatch.setattr(sys, 'argv', ['allocator'])
+    monkeypatch.setattr(signal, 'signal', lambda *_: None)
+    monkeypatch.setenv('FASTDDS_BUILTIN_TRANSPORTS', chosen or '')
+    if chosen is None:
+        monkeypatch.delenv('FASTDDS_BUILTIN_TRANSPORTS')
+    with pytest.raises(SystemExit) as raised:
+        nodes_run.run(object)
+    assert raised.value.code == used
 
 
 def test_a_whole_number_will_do_for_a_real_one_and_an_unknown_parameter_is_named(start, probe):
