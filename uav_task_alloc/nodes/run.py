@@ -36,7 +36,7 @@ def run(make_node: Callable[[], Node], args: list[str] | None = None, threads: i
     stop: list[int] = []
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: stop.append(1))
-    # what is sent through shared memory to a node that was killed and started again is lost for 3 s
+    # through shared memory a node that was killed and started again hears nothing for 3 s
     os.environ.setdefault('FASTDDS_BUILTIN_TRANSPORTS', 'UDPv4')
     rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
     try:
