@@ -6,10 +6,12 @@ from plan_checks import check, make
 
 from uav_task_alloc import plan
 from uav_task_alloc.errors import InvalidValue
-from uav_task_alloc.solver import routes as of
+from uav_task_alloc.solver import chain_q, routes as of
 from uav_task_alloc.solver.bidding import Bidding
 from uav_task_alloc.solver.chance import chance
+from uav_task_alloc.solver.colony import Colony
 from uav_task_alloc.solver.problem import Limits, Rules, make_problem
+from uav_task_alloc.solver.recorder import Recorder
 from uav_task_alloc.solver.scouts import Scouts
 from uav_task_alloc.solver.tables import FIRST, fresh_tables, keep
 
@@ -37,6 +39,27 @@ def test_the_search_improves_on_the_construction():
     uavs, tasks = make(5, 60)
     built = plan(uavs, tasks, budget=60.0, max_iterations=0)
     assert plan(uavs, tasks, budget=60.0, max_iterations=5000).distance < 0.97 * built.distance
+
+
+@pytest.mark.parametrize(('habits', 'shares', 'temperatures'), [
+    (chain_q.COLD_START, (0.0, 0.5, 1.0), (3.0, 0.3 ** 0.5, 0.1)),
+    (chain_q.PATIENT, (0.0, 0.25, 0.499999, 0.5, 0.75, 1.0),
+     (3.0, 0.3 ** 0.5, 0.1, 1.0, 0.1 ** 0.5, 0.1))])
+def test_it_cools_once_or_where_there_is_time_twice(habits, shares, temperatures):
+    problem = problem_of(*make(2, 9))
+    colony = Colony(problem, of.empty_routes(problem.arrays), 1, habits)
+    assert [colony.temperature(share) / problem.scale for share in shares] == pytest.approx(
+        temperatures, rel=1e-4)
+
+
+@pytest.mark.parametrize(('limits', 'habits'), [
+    ({'budget': 0.04}, chain_q.COLD_START), ({'budget': 0.05}, chain_q.PATIENT),
+    ({'budget': 60.0, 'max_iterations': 17_999}, chain_q.COLD_START),
+    ({'budget': 60.0, 'max_iterations': 18_000}, chain_q.PATIENT),
+    ({'budget': 60.0, 'warm': True}, chain_q.WARM_START)])
+def test_how_patient_bees_are_depends_on_time_or_rounds_for_each_task(limits, habits):
+    recorder = Recorder(problem_of(*make(2, 10)), lambda: 0.0, 0.0, **limits)
+    assert chain_q.habits_for(recorder) is habits
 
 
 def test_scouts_that_learn_beat_scouts_that_do_not():

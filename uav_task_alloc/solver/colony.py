@@ -20,6 +20,7 @@ class Habits:
 
     hot: float = 3.0
     cold: float = 0.1
+    again: float = 0.0  # the second half of the budget begins at this temperature; 0: it goes on
     some: float = 10.0  # tasks that an employed bee takes out in a round
     many: float = 20.0  # an onlooker
     employed: float = 0.5  # least shares of the work
@@ -50,8 +51,10 @@ class Colony:
 
     def temperature(self, spent: float) -> float:
         """[m] after this share of the budget."""
-        h = self.habits
-        return float(self._scale * h.hot * (h.cold / h.hot) ** spent)
+        h, hot = self.habits, self.habits.hot
+        if h.again > 0.0:
+            hot, spent = (hot, 2.0 * spent) if spent < 0.5 else (h.again, 2.0 * spent - 1.0)
+        return float(self._scale * hot * (h.cold / hot) ** spent)
 
     def fly(self, spent: float, until: float, rounds: int) -> int:
         """Let the kind that bid most fly while the budget goes from `spent` to `until`.
