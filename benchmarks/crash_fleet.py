@@ -11,11 +11,13 @@ from collections.abc import Callable
 from geometry_msgs.msg import Point
 from uav_task_alloc_msgs import msg as m
 
+from uav_task_alloc.mavlink.policy import TaskProgress
+from uav_task_alloc.mavlink.reminder import Reminder
 from uav_task_alloc.nodes.messages import from_stamp
 
 HEIGHT = 50.0  # [m]
 FLOWN_IN = (0.1, 0.5)  # [s] a task takes
-FAILS, REMIND = 0.03, 0.5  # share of tasks; [s] until COMPLETED is told again, as the bridge does
+FAILS = 0.03  # share of tasks
 HEARD = 1.0  # [s] in which a list that is under way is heard
 S, E = m.TaskStatus, m.TaskEvent
 ENDED = (S.COMPLETED, S.CANCELLED, S.FAILED)
@@ -102,20 +104,19 @@ class Flyer:
             uav_id, place, tell, ledger, rng)
         self.list = m.TaskList(uav_id=uav_id)
         self.flown: set[str] = set()
-        self.active, self._until, self._remind = '', 0.0, math.inf
+        self.active, self._until, self._reminder = '', 0.0, Reminder()
 
     def told(self, msg: m.TaskList, now: float) -> None:
-        self.list, self._remind = msg, min(self._remind, now + REMIND)
-        if self.active not in [planned.task.task_id for planned in msg.tasks]:
+        self.list, ids = msg, [planned.task.task_id for planned in msg.tasks]
+        self._reminder.listed([TaskProgress(task_id, 'COMPLETED', msg.revision)
+                               for task_id in ids if task_id in self.flown], now)
+        if self.active not in ids:
             self.active = ''
 
     def step(self, now: float) -> None:
         tasks = [p.task for p in self.list.tasks]
-        if now >= self._remind:
-            self._remind = now + REMIND
-            for task in tasks:
-                if task.task_id in self.flown:
-                    self.event(E.COMPLETED, task.task_id)
+        for again in self._reminder.step(now):
+            self.event(E.COMPLETED, again.task)
         left = [task for task in tasks if task.task_id not in self.flown]
         if not self.active and left:
             self.active, self._until = left[0].task_id, now + self.rng.uniform(*FLOWN_IN)

@@ -50,4 +50,8 @@ class JournalForeign(JournalError):
 
 
 class MissionError(AllocError, ValueError):
-    """A route cannot be expressed as mission items for a profile."""
+    """A route cannot be expressed as mission items for a profile; `task` is the one at fault."""
+
+    def __init__(self, text: str, task: str = '') -> None:
+        super().__init__(text)
+        self.task = task

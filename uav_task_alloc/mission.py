@@ -40,6 +40,10 @@ class TaskList:
         gone = set(tasks)
         return replace(self, stops=tuple(s for s in self.stops if s.task.id not in gone))
 
+    def find(self, task_id: str) -> Task | None:
+        """The task of that id, if the list has it."""
+        return next((s.task for s in self.stops if s.task.id == task_id), None)
+
     def first(self, count: int) -> TaskList:
         """A rolling horizon: the first stops only, and no return before the others."""
         if count >= len(self.stops):
@@ -110,7 +114,8 @@ def _task_item(point: Point, place: Sequence[float], rules: ItemRules, task: Tas
     hold = math.ceil(task.service_time) if rules.whole_seconds else task.service_time
     if not 0.0 <= hold <= _LONGEST_HOLD:
         raise MissionError(f'task {task.id}: service_time = {task.service_time:g}: expected at '
-                           f'most {_LONGEST_HOLD:g} s, which is what a mission item holds')
+                           f'most {_LONGEST_HOLD:g} s, which is what a mission item holds',
+                           task.id)
     radius = task.acceptance_radius or 0.0
     item = replace(_waypoint(point, place, rules, task.id), completes=True, radius=radius)
     if rules.loiters and hold > 0.0:  # NaN is refused here

@@ -4,13 +4,14 @@ import dataclasses
 
 import pytest
 from flight_bench import FlightBench, flying, places
-from mission_bench import task_list
+from mission_bench import ORIGIN, PROFILES, task_list
 from pymavlink.dialects.v20 import ardupilotmega as d
 
 from uav_task_alloc.mavlink.board import MissionState
 from uav_task_alloc.mavlink.policy import TaskProgress
 from uav_task_alloc.mavlink.profiles import Flight
-from uav_task_alloc.mission import Stop, TaskList
+from uav_task_alloc.mavlink.reminder import Reminder
+from uav_task_alloc.mission import Stop, TaskList, mission_items
 from uav_task_alloc.model import Task
 
 BOTH = pytest.mark.parametrize('kind', ['ardupilot', 'px4'])
@@ -149,6 +150,63 @@ def test_fault_23_a_mission_that_px4_will_not_fly_fails_with_its_own_words(refus
     assert refused.events[-1][1].reason.startswith('infeasible: First waypoint too far')
 
 
+@BOTH
+def test_what_no_item_can_hold_fails_alone_and_by_its_own_name(kind):
+    bench = FlightBench(kind).found()
+    long = Task('B1', (0.0, 200.0, 50.0), service_time=70000.0)
+    bench.assign(TaskList(1, (Stop(long),)))
+    bench.run(limit=5.0)
+    assert bench.failed() == ['B1']
+    tasks = task_list('BC', 2)
+    bench.assign(TaskList(2, (tasks.stops[0], Stop(dataclasses.replace(long, id='B12')),
+                              *tasks.stops[1:])))
+    assert bench.run(lambda: bench.completed() == ['B', 'C'])
+    assert [(e.task, e.revision) for _, e in bench.events if e.event == 'FAILED'] == [
+        ('B1', 1), ('B12', 2)]
+
+
+def refusing(name, before):
+    """A PX4 that has flown a list and refuses the item of a task, whatever happens before."""
+    bench = FlightBench('px4', delay=(0.2, 0.2)).found()
+    bench.assign(task_list('Z'))
+    assert bench.run(lambda: bench.completed() == ['Z'])
+
+    def refuse(way, message, now):
+        bad = way == 'up' and message.get_type() == 'MISSION_ITEM_INT' and message.x == item.x
+        if bad:
+            before(bench)
+            bench.says(d.MAVLink_mission_ack_message(245, 190, d.MAV_MISSION_INVALID_PARAM5_X, 0))
+        return [] if bad else None
+    item = mission_items(task_list(name), PROFILES['px4'].rules, ORIGIN)[0]
+    bench.line.tampers.append(refuse)
+    bench.assign(task_list(name, 2))
+    return bench
+
+
+def test_a_refusal_counts_for_the_list_that_was_refused_and_not_for_a_changed_task():
+    bench = refusing('A', lambda bench: bench.assign(single('A', (300.0, 300.0, 50.0), 3)))
+    assert bench.run(lambda: 'A' in bench.completed())
+    assert bench.failed() == []
+    assert bench.flown()[-1] == (300, 300, 50)
+
+
+def test_a_refusal_is_told_under_the_revision_that_asked_for_the_task():
+    bench = refusing('A', lambda bench: None)
+    assert bench.run(bench.failed, 60.0)
+    assert bench.events[-1][1].revision == 2
+
+
+def test_a_later_list_asks_as_soon_as_the_first():
+    reminder = Reminder()
+    told = [TaskProgress('A', 'COMPLETED', 2)]
+    reminder.listed(told, 0.0)
+    assert [t for t in range(40) if reminder.step(float(t))] == [2, 6, 14, 30]
+    reminder.listed(told, 40.0)
+    assert [t for t in range(40, 50) if reminder.step(float(t))] == [42, 46]
+    reminder.listed([], 50.0)
+    assert not any(reminder.step(float(t)) for t in range(50, 99))
+
+
 def test_a_list_that_still_has_what_was_refused_is_told_so_again(refused):
     first = refused.events[-1][1]
     refused.assign(single('far', FAR, 7))
@@ -193,7 +251,7 @@ def test_lists_that_change_all_the_time_put_nothing_off(kind):
     for revision in range(2, 12):
         bench.assign(task_list('AZY' if revision % 2 else 'AYZ', revision))
         bench.run(limit=0.5)
-    assert bench.completed() == ['A', 'A']
+    assert bench.completed() == ['A'] * 3
 
 
 def upload_by_another(bench, n=1):

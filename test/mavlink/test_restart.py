@@ -2,12 +2,14 @@
 """A bridge killed and started again: what was flown is found, and not flown twice."""
 
 import random
+from dataclasses import replace
 
 import pytest
 from flight_bench import FlightBench, flying, places
 from mission_bench import task_list
 
 from uav_task_alloc.mavlink.status import Mode
+from uav_task_alloc.mission import Stop, TaskList
 
 BOTH = pytest.mark.parametrize('kind', ['ardupilot', 'px4'])
 
@@ -113,6 +115,22 @@ def test_what_was_withdrawn_unflown_is_flown_when_it_comes_back_to_another(kind)
     assert bench.run(lambda: bench.completed() == ['C'] and len(bench.completed(2)) == 3)
     assert places(bench) == ['C']
     assert sorted(places(bench, 2)) == list('ABX')
+
+
+@BOTH
+def test_what_was_flown_unheard_is_flown_again_where_its_place_has_changed(kind):
+    bench = flying(kind, 'ABC')
+    assert bench.run(lambda: bench.completed() == ['A'])
+    bench.start()
+    bench.found()
+    bench.assign(task_list('ABC', 2))
+    assert bench.run(lambda: 'A' in bench.completed())
+    assert next(e.revision for _, e in bench.events if e.event == 'COMPLETED') == 2
+    tasks = task_list('AC', 3)
+    moved = Stop(replace(tasks.stops[0].task, position=(350.0, 350.0, 50.0)))
+    bench.assign(TaskList(3, (moved, tasks.stops[1])))
+    assert bench.run(lambda: bench.completed().count('A') == 2)
+    assert (350, 350, 50) in bench.flown()
 
 
 @BOTH

@@ -46,6 +46,9 @@ class Pairs(_Addresses):
 
     owner: object  # keeps alive what the addresses point to
 
+    def __reduce__(self) -> str:
+        raise TypeError('Pairs hold addresses of this process: make Distances anew elsewhere')
+
 
 @numba.njit(cache=True, nogil=True)
 def length(pairs: Pairs, i: int, j: int) -> float:

@@ -51,6 +51,7 @@ class TaskFailed:
 
     task: str
     reason: str
+    revision: int  # of the list that it was asked for in
 
 
 class Board:
@@ -72,10 +73,10 @@ class Board:
         self.read_once = False  # since the vehicle was first heard or restarted
         self.must_jump: int | None = None  # the item to fly now, where the upload did not say it
         self._profile, self._origin, self._telemetry = profile, origin, telemetry
-        self._refused: dict[str, tuple[Task | None, str]] = {}  # as it was, and why
+        self._refused: dict[str, tuple[Task, str]] = {}  # as it was, and why
         self._horizon: int | None = None  # stops; None: all
         self._state = MissionState.UNKNOWN
-        self._uploading: tuple[Change, int] | None = None  # and the revision it is for
+        self._uploading: tuple[Change, TaskList] | None = None  # and the list it is for
         self._begun = False  # the epoch of this upload
         self.item_time = 0.0  # [s] that an item took in the uploads so far, roughly
         self._began_at = 0.0  # [s]
@@ -108,7 +109,7 @@ class Board:
     def outdated(self) -> bool:
         """The transfer is for an older list."""
         return (self._uploading is not None and self.tasks is not None
-                and self._uploading[1] != self.tasks.revision)
+                and self._uploading[1].revision != self.tasks.revision)
 
     def assign(self, tasks: TaskList) -> None:
         """The latest list; a task that was refused is tried again where it has changed."""
@@ -127,7 +128,7 @@ class Board:
         return [TaskProgress(i, 'COMPLETED', revision)
                 for i in ids if i in self.progress.completed] + [
             TaskProgress(i, 'FAILED', revision, self._refused[i][1])
-            for i in ids if i in self._refused]
+            for i in ids if i in self._refused and i not in self.progress.completed]
 
     def remaining(self) -> TaskList:
         """The list less what is flown or refused, up to the horizon."""
@@ -140,11 +141,11 @@ class Board:
         key = (self.tasks, len(self.progress.completed), len(self._refused), self._horizon)
         if self._wanted is not None and self._wanted[0] == key:
             return self._wanted[1]
+        remaining = self.remaining()
         try:
-            items = mission_items(self.remaining(), self._profile.rules, self._origin)
+            items = mission_items(remaining, self._profile.rules, self._origin)
         except MissionError as error:
-            bad = next(s.task.id for s in self.remaining().stops if s.task.id in str(error))
-            self._refuse(bad, str(error))
+            self._refuse(error.task, str(error), remaining)
             return self.wanted()
         self._wanted = key, items
         return items
@@ -171,7 +172,7 @@ class Board:
     def begin_upload(self, found: Change, now: float) -> list[Message]:
         """Bring it on board."""
         assert self.tasks is not None
-        self._uploading, self._begun, self.trouble = (found, self.tasks.revision), False, False
+        self._uploading, self._begun, self.trouble = (found, self.tasks), False, False
         self._began_at = now
         home = () if not self.own else (home_item(
             self._telemetry.home, self._origin, self._profile.rules),)
@@ -223,8 +224,9 @@ class Board:
 
     def infeasible(self, reason: str) -> None:
         """The vehicle stores the mission, and will not fly it."""
+        assert self.tasks is not None
         for task in {item.task: None for item in self.wanted() if item.completes}:
-            self._refuse(task, f'infeasible: {reason}')
+            self._refuse(task, f'infeasible: {reason}', self.tasks)
 
     def _settle(self, now: float) -> None:
         while self.upload.events:
@@ -232,16 +234,16 @@ class Board:
             if isinstance(event, Held):
                 self._was_read(event, now)
             elif self._uploading is not None:
-                found, revision = self._uploading
+                found, tasks = self._uploading
                 if isinstance(event, Accepted):
                     self._begin(found, now)
                 elif isinstance(event, Verified):
                     self._begin(found, now)
                     self._uploading = None
-                    self._verify(found.items, revision, now)
+                    self._verify(found.items, tasks.revision, now)
                 else:
                     self._uploading = None
-                    self._was_refused(event, found, now)
+                    self._was_refused(event, found, tasks)
 
     def _begin(self, found: Change, now: float) -> None:
         if self._begun:
@@ -279,7 +281,7 @@ class Board:
         self.progress.begin(held, None if current is None or not held
                             else max(0, current - self.own), now)
 
-    def _was_refused(self, event: Failed, found: Change, now: float) -> None:
+    def _was_refused(self, event: Failed, found: Change, tasks: TaskList) -> None:
         self.notes.append(Note('error', f'mission upload failed: {event.reason}'))
         self.held, self.trouble = None, True
         self._state = MissionState.UNKNOWN if self._profile.atomic else MissionState.MIXED
@@ -292,16 +294,18 @@ class Board:
         elif event.result is not None:
             seq = min(max((event.seq or 0) - self.own, 0), len(found.items) - 1)
             task = next((i.task for i in found.items[seq:] if i.task), stops[0] if stops else '')
-            self._refuse(task, event.reason)
-            self.trouble = False
+            self._refuse(task, event.reason, tasks)
+            self.trouble = not task
         elif 'infeasible' in event.reason:
             for task in stops:
-                self._refuse(task, event.reason)
+                self._refuse(task, event.reason, tasks)
 
-    def _refuse(self, task: str, reason: str) -> None:
-        stops = self.tasks.stops if self.tasks else ()
-        self._refused[task] = next((s.task for s in stops if s.task.id == task), None), reason
-        self.failed.append(TaskFailed(task, reason))
+    def _refuse(self, task: str, reason: str, tasks: TaskList) -> None:
+        """Not to be flown as it is in that list; what has changed since is yet to be tried."""
+        asked, latest = tasks.find(task), self.tasks.find(task) if self.tasks else None
+        if asked is not None and latest in (None, asked):
+            self._refused[task] = asked, reason
+            self.failed.append(TaskFailed(task, reason, tasks.revision))
 
     def _enough(self) -> bool:
         """While half a horizon of the latest list is still on board, nothing is uploaded."""

@@ -27,6 +27,7 @@ from uav_task_alloc.mavlink.service import Service
 from uav_task_alloc.mavlink.telemetry import Telemetry
 from uav_task_alloc.mavlink.upload import State
 from uav_task_alloc.mission import RETURN, TaskList, all_alike
+from uav_task_alloc.model import Task
 
 LAST_WORD = 5.0  # [s] for a late REACHED, where the mission seems to end before its last item
 
@@ -66,10 +67,10 @@ class Pilot:
         self.helm.encourage(now)
         return self._act(now)
 
-    def relieve(self, tasks: Sequence[str], other: str) -> None:
+    def relieve(self, tasks: Sequence[Task], other: str) -> None:
         """Tasks of the list that another UAV has flown before we listened."""
         for task in tasks:
-            self.notes.append(Note('info', f'{task} was flown by {other}, unheard'))
+            self.notes.append(Note('info', f'{task.id} was flown by {other}, unheard'))
         self.board.progress.caught_up(tasks)
 
     def receive(self, message: Message, now: float) -> list[Message]:
@@ -106,10 +107,12 @@ class Pilot:
         while board.progress.events:
             made = board.progress.events.popleft()
             event = 'COMPLETED' if made.completed else 'STARTED'
-            self.events.append(TaskProgress(made.task, event, revision))
+            latest = board.tasks.revision if made.unheard and board.tasks else revision
+            self.events.append(TaskProgress(made.task, event, latest))
         while board.failed:
             failed = board.failed.popleft()
-            self.events.append(TaskProgress(failed.task, 'FAILED', revision, failed.reason))
+            self.events.append(TaskProgress(failed.task, 'FAILED', failed.revision,
+                                            failed.reason))
         for notes in (board.notes, self.helm.notes):
             while notes:
                 self.notes.append(notes.popleft())
@@ -216,12 +219,12 @@ class Pilot:
 
     def _empty(self, now: float) -> Step:
         """Nothing to fly: hold or return, and keep what is on board."""
-        board, tasks, telemetry = self.board, self.board.remaining(), self.telemetry
+        board, telemetry = self.board, self.telemetry
+        end, tasks = board.wanted(), board.remaining()  # less what cannot be an item
         self.going_home = False
         if tasks.stops:
             return None
         rest = (board.held or ())[board.progress.current or 0:]
-        end = board.wanted()
         board.revision = tasks.revision
         flying = telemetry.flight is Flight.MISSION and not board.progress.finished
         if flying and end and rest and all_alike(end[-len(rest):], rest):

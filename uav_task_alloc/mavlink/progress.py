@@ -22,6 +22,7 @@ class Progress:
 
     task: str
     completed: bool
+    unheard: bool = False  # it was flown while nobody listened
 
 
 class ProgressTable:
@@ -120,10 +121,10 @@ class ProgressTable:
         elif self.current is not None and self.current < seq <= len(self.items):
             self._pass(seq)
 
-    def caught_up(self, tasks: Iterable[str]) -> None:
+    def caught_up(self, tasks: Iterable[Task]) -> None:
         """These were flown while nobody listened."""
         for task in tasks:
-            self._complete(task, None)
+            self._complete(task.id, task.position, unheard=True)
 
     def asked_for(self, tasks: Iterable[Task]) -> None:
         """One that was flown at another place is another task, and still to be flown."""
@@ -144,10 +145,10 @@ class ProgressTable:
                 self._complete(item.task, item.position)
         self.current = seq
 
-    def _complete(self, task: str, place: Point | None) -> None:
+    def _complete(self, task: str, place: Point | None, unheard: bool = False) -> None:
         if task not in self.completed:
             self.completed[task] = place
-            self.events.append(Progress(task, completed=True))
+            self.events.append(Progress(task, completed=True, unheard=unheard))
 
     def _is_echo(self, seq: int, now: float) -> bool:
         """A repetition from the epoch before, unless the new item is being reached as well."""

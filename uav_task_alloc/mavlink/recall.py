@@ -64,14 +64,15 @@ class Recall:
         """Items flown that nobody has told of."""
         return (*self._flown, *self._behind()) if now < self._until else ()
 
-    def flown(self, tasks: Iterable[Task], now: float) -> tuple[str, ...]:
+    def flown(self, tasks: Iterable[Task], now: float) -> tuple[Task, ...]:
         """Those of the tasks that are flown already."""
         memory = self.memory(now)
         if not memory:
             return ()
         stops = tuple(Stop(task) for task in tasks)
         items = mission_items(TaskList(0, stops), self._profile.rules, self._origin)
-        return tuple(item.task for item in items if any(alike(item, m) for m in memory))
+        return tuple(stop.task for stop, item in zip(stops, items, strict=True)
+                     if any(alike(item, m) for m in memory))
 
     def _behind(self) -> tuple[Item, ...]:
         progress = self._progress

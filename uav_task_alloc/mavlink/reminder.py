@@ -10,7 +10,7 @@ REMIND = 2.0  # [s] that lists may ask for a task that has ended; then twice as 
 
 
 class Reminder:
-    """Holds no task longer than the lists have it; that they change puts nothing off."""
+    """Holds no task longer than the lists have it; a new list asks anew, and puts nothing off."""
 
     def __init__(self) -> None:
         self._ended: dict[str, TaskProgress] = {}
@@ -19,7 +19,8 @@ class Reminder:
     def listed(self, ended: Iterable[TaskProgress], now: float) -> None:
         """These tasks of a new list had ended before it came."""
         self._ended = {each.task: each for each in ended}
-        self._due = {task: self._due.get(task, (now + REMIND, 2.0 * REMIND))
+        soon = now + REMIND
+        self._due = {task: (min(soon, self._due.get(task, (soon, 0.0))[0]), 2.0 * REMIND)
                      for task in self._ended}
 
     def step(self, now: float) -> list[TaskProgress]:
