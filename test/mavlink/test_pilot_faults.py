@@ -10,7 +10,6 @@ from pymavlink.dialects.v20 import ardupilotmega as d
 from uav_task_alloc.mavlink.board import MissionState
 from uav_task_alloc.mavlink.policy import TaskProgress
 from uav_task_alloc.mavlink.profiles import Flight
-from uav_task_alloc.mavlink.reminder import Reminder
 from uav_task_alloc.mission import Stop, TaskList, mission_items
 from uav_task_alloc.model import Task
 
@@ -194,17 +193,6 @@ def test_a_refusal_is_told_under_the_revision_that_asked_for_the_task():
     bench = refusing('A', lambda bench: None)
     assert bench.run(bench.failed, 60.0)
     assert bench.events[-1][1].revision == 2
-
-
-def test_a_later_list_asks_as_soon_as_the_first():
-    reminder = Reminder()
-    told = [TaskProgress('A', 'COMPLETED', 2)]
-    reminder.listed(told, 0.0)
-    assert [t for t in range(40) if reminder.step(float(t))] == [2, 6, 14, 30]
-    reminder.listed(told, 40.0)
-    assert [t for t in range(40, 50) if reminder.step(float(t))] == [42, 46]
-    reminder.listed([], 50.0)
-    assert not any(reminder.step(float(t)) for t in range(50, 99))
 
 
 def test_a_list_that_still_has_what_was_refused_is_told_so_again(refused):

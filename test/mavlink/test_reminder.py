@@ -1,0 +1,15 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a list still asks for though it has ended is told again, later and later."""
+from uav_task_alloc.mavlink.policy import TaskProgress
+from uav_task_alloc.mavlink.reminder import Reminder
+
+
+def test_a_later_list_asks_as_soon_as_the_first():
+    reminder = Reminder()
+    told = [TaskProgress('A', 'COMPLETED', 2)]
+    reminder.listed(told, 0.0)
+    assert [t for t in range(40) if reminder.step(float(t))] == [2, 6, 14, 30]
+    reminder.listed(told, 40.0)
+    assert [t for t in range(40, 50) if reminder.step(float(t))] == [42, 46]
+    reminder.listed([], 50.0)
+    assert not any(reminder.step(float(t)) for t in range(50, 99))
