@@ -49,7 +49,7 @@ class Process:
 
 @pytest.fixture
 def start(domain, tmp_path):
-    """start('allocator', '-p', 'seed:=1') -> Process; what is left at the end is killed."""
+    """start('allocator', '-p', 'seed:=1') -> Process; what is left at the end is ended."""
     started = []
 
     def start(executable, *ros_args, env=None):
@@ -58,10 +58,15 @@ def start(domain, tmp_path):
         return started[-1]
 
     yield start
-    for process in started:
+    for process in started:  # what is killed leaves shared memory in the way of the next
         if process.popen.poll() is None:
+            process.popen.terminate()
+    for process in started:
+        try:
+            process.popen.wait(5.0)
+        except subprocess.TimeoutExpired:
             process.popen.kill()
-        process.popen.wait()
+            process.popen.wait()
 
 
 class Probe:
