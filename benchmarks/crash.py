@@ -252,7 +252,6 @@ def figures(world: World, kills: int, recoveries: list[tuple[float, float]], see
     return {
         'kills': kills, 'tasks_lost': len(set(ledger.faults['lost'])),
         'tasks_done_twice': len(ledger.done_twice()),
-        'tasks_flown_twice_unheard': len(ledger.flown_twice_unheard()),
         'recovery_s_p99': share(0.99, 0), 'recovery_s_median': share(0.5, 0),
         'recovery_cpu_s_p99': share(0.99, 1), 'recovery_cpu_s_median': share(0.5, 1),
         'recoveries': len(recoveries),

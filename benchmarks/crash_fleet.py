@@ -80,13 +80,9 @@ class Ledger:
         self.off[uav_id] = time.time(), set(self._told.get(uav_id, ()))
 
     def done_twice(self) -> set[str]:
-        """Asked for or begun again after the end was published."""
-        return {*self.faults['listed_again'], *self.faults['reopened'],
-                *self.faults['begun_again']}
-
-    def flown_twice_unheard(self) -> set[str]:
-        """Flown by two UAVs, as COMPLETED of the first was lost or late: nobody was told of it."""
-        return {t for t, n in self.flown.items() if n > 1} - self.done_twice()
+        """Flown twice, heard of or not; asked for or begun again after the end was published."""
+        return {t for t, n in self.flown.items() if n > 1} | {
+            *self.faults['listed_again'], *self.faults['reopened'], *self.faults['begun_again']}
 
     def begins(self, task_id: str) -> None:
         """A UAV begins to fly it; that it was withdrawn in a crash it cannot know."""
