@@ -92,7 +92,7 @@ def _gap(made: Plan, best: Plan) -> float:
 
 def _flown(fleet: tuple[Uav, ...], work: tuple[Task, ...],
            known: Plan) -> tuple[tuple[Uav, ...], tuple[Task, ...]]:
-    """Everybody STEP metres further along its route, batteries swapped; tasks passed are done."""
+    """Everybody STEP metres further along its route; tasks passed are done, ranges shrink."""
     place, done, moved = {task.id: task.position for task in work}, set[str](), []
     for uav in fleet:
         here, left = np.array(uav.position), STEP
@@ -105,5 +105,5 @@ def _flown(fleet: tuple[Uav, ...], work: tuple[Task, ...],
                 break
             here, left = np.array(place[task_id]), left - length
             done.add(task_id)
-        moved.append(replace(uav, position=tuple(here)))
+        moved.append(replace(uav, position=tuple(here), range=uav.range - (STEP - left)))
     return tuple(moved), tuple(task for task in work if task.id not in done)
