@@ -117,11 +117,16 @@ def near_tasks(a: Arrays, found: Ints, squares: Floats) -> None:
 def near_starts(a: Arrays, xyz: Floats, rng: Chance) -> None:
     """Fill a.starts with the starts nearest to each task, equally near ones shuffled. O(n m).
 
-    The price of tasks that nobody has the range for becomes 0.
+    Where no range is exceeded, UAVs that cannot get there are no neighbours, and the price of
+    tasks that nobody can get to becomes 0.
     """
     n, s = a.starts.shape
     squares, every, shuffled = np.empty(s), np.empty(a.uavs), np.empty(a.uavs)
     xs, ys, zs = xyz[:a.uavs, 0].copy(), xyz[:a.uavs, 1].copy(), xyz[:a.uavs, 2].copy()
+    most = np.full(a.uavs, np.inf)  # square of how far it gets
+    if a.hard:
+        for u in range(a.uavs):
+            most[u] = (a.reach[u] + TINY) ** 2 if a.reach[u] >= 0.0 else -1.0
     noise = np.empty(NOISE + a.uavs)
     for m in range(noise.size):
         noise[m] = 1e-6 * uniform(rng)
@@ -138,7 +143,7 @@ def near_starts(a: Arrays, xyz: Floats, rng: Chance) -> None:
             more = a.reach[u] - spare
             if more > 0.0 and every[u] < more * more:
                 spare = a.reach[u] - math.sqrt(every[u])
-            if kept < s or shuffled[u] < squares[s - 1]:
+            if every[u] <= most[u] and (kept < s or shuffled[u] < squares[s - 1]):
                 kept = _keep(row, squares, kept, u, shuffled[u])
         if a.hard and spare < -TINY:
             a.price[i] = 0.0
