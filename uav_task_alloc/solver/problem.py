@@ -15,7 +15,7 @@ from uav_task_alloc.model import Task, ThreatZone, Uav
 from uav_task_alloc.objective import Weights
 from uav_task_alloc.solver.chance import chance
 from uav_task_alloc.solver.near import near_starts, near_tasks, nearest
-from uav_task_alloc.solver.routes import Arrays, Floats, Ints
+from uav_task_alloc.solver.routes import NODE, Arrays, Floats, Ints
 
 NEIGHBOURS = 24  # tasks a bee looks at around a task
 STARTS = 8  # UAVs it looks at
@@ -131,7 +131,7 @@ def _blank(uavs: Sequence[Uav], tasks: Sequence[Task], rules: Rules,
         np.array([u.range for u in uavs], dtype=np.float64), np.zeros(m), may,
         np.any(~may, axis=0, keepdims=True)[0],
         np.array([t.value for t in tasks], dtype=np.float64), np.ones(n), np.empty(n),
-        np.empty((n, k), np.int64), np.empty((n, k)), np.empty((n, s), np.int64),
+        np.empty((n, k), NODE), np.empty((n, k)), np.empty((n, s), NODE),
         np.empty((n, s)))
 
 

@@ -16,6 +16,8 @@ from uav_task_alloc.solver.kernel import kernel, part
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
+Nodes = NDArray[np.uint32]  # unsigned: numba need not ask whether an index counts from the end
+NODE = np.uint32
 DISTANCE, EXCESS, LEFT_OUT, VALUE, STRAIN = range(5)  # what Routes.sums holds
 TINY = 1e-7  # [m] what rounding may add up to
 STRICT = 1e9  # [m/m] at most this in sums, where inf would make NaN
@@ -40,17 +42,17 @@ class Arrays(NamedTuple):
     value: Floats  # (n)
     price: Floats  # (n) [m] of leaving a task out now; 0: nobody can serve it
     dearest: Floats  # (n) [m] what that may rise to
-    near: Ints  # (n, k) task nodes, nearest first
+    near: Nodes  # (n, k) task nodes, nearest first
     near_length: Floats  # (n, k) [m]
-    starts: Ints  # (n, s) starts, nearest first
+    starts: Nodes  # (n, s) starts, nearest first
     start_length: Floats  # (n, s) [m]
 
 
 class Routes(NamedTuple):
     """Who flies what in which order; on[node] = -1: left out."""
 
-    next: Ints
-    prev: Ints
+    next: Nodes
+    prev: Nodes
     on: Ints
     leg: Floats  # [m] length of the leg that leaves the node
     length: Floats  # (m) [m]
@@ -69,7 +71,7 @@ def step(a: Arrays, i: int, j: int) -> float:
     if a.straight:
         x, y, z = a.xyz[i, 0] - a.xyz[j, 0], a.xyz[i, 1] - a.xyz[j, 1], a.xyz[i, 2] - a.xyz[j, 2]
         return math.sqrt(x * x + y * y + z * z)
-    return float(length(a.pairs, i, j))
+    return float(length(a.pairs, np.int64(i), np.int64(j)))
 
 
 @kernel
@@ -104,7 +106,7 @@ def total(a: Arrays, r: Routes) -> None:
 def empty_routes(a: Arrays) -> Routes:
     """Routes without tasks."""
     nodes = a.ends + a.uavs
-    routes = Routes(np.empty(nodes, np.int64), np.empty(nodes, np.int64),
+    routes = Routes(np.empty(nodes, NODE), np.empty(nodes, NODE),
                     np.empty(nodes, np.int64), np.zeros(nodes), np.empty(a.uavs),
                     np.empty(a.uavs, np.int64), np.empty(5))
     clear(a, routes)

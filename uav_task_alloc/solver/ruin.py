@@ -12,7 +12,17 @@ import numpy as np
 from uav_task_alloc.solver.chance import Chance, below, uniform
 from uav_task_alloc.solver.insertion import any_place, near_place
 from uav_task_alloc.solver.kernel import kernel, part
-from uav_task_alloc.solver.routes import TINY, Arrays, Floats, Ints, Routes, insert, remove
+from uav_task_alloc.solver.routes import (
+    NODE,
+    TINY,
+    Arrays,
+    Floats,
+    Ints,
+    Nodes,
+    Routes,
+    insert,
+    remove,
+)
 
 STRING = 10  # tasks in a string at most
 SPLIT = 0.5  # share of strings with a part that stays
@@ -26,9 +36,9 @@ BLINKS = 0.01  # share of places overlooked
 class Log(NamedTuple):
     """What was done since the last mark, and who is out."""
 
-    node: Ints
+    node: Nodes
     after: Ints  # where it was before it was removed; -1: it was inserted
-    out: Ints  # task nodes to put back
+    out: Nodes  # task nodes to put back
     key: Floats  # they go in by this, smallest first
     size: Ints  # entries of (node and after, out, left, over), rounds until the next look
     hit: Ints  # (m) round in which a route was last ruined
@@ -39,8 +49,8 @@ class Log(NamedTuple):
 def empty_log(a: Arrays) -> Log:
     """A log with room for the longest round."""
     room = 2 * (a.ends - a.uavs) + 2
-    return Log(np.empty(2 * room, np.int64), np.empty(2 * room, np.int64),
-               np.empty(room, np.int64), np.empty(room), np.zeros(5, np.int64),
+    return Log(np.empty(2 * room, NODE), np.empty(2 * room, np.int64),
+               np.empty(room, NODE), np.empty(room), np.zeros(5, np.int64),
                np.zeros(a.uavs, np.int64), np.empty(room, np.int64),
                np.empty(a.uavs, np.int64))
 
@@ -63,7 +73,7 @@ def undo(a: Arrays, r: Routes, log: Log) -> None:
         if after < 0:
             remove(a, r, node)
         else:
-            insert(a, r, node, after)
+            insert(a, r, node, NODE(after))
 
 
 @part
@@ -111,15 +121,15 @@ def _seed(a: Arrays, r: Routes, log: Log, rng: Chance) -> int:
     if log.size[2] > 0 and uniform(rng) < PITY:
         t = log.left[below(rng, log.size[2])]
         if r.on[t] < 0:
-            return int(t)
+            return t
     if log.size[3] > 0 and uniform(rng) < RELIEF:
         u = log.over[below(rng, log.size[3])]
         if r.length[u] > a.reach[u] + TINY and r.tasks[u] > 0:
             t = r.next[u]
             for _ in range(below(rng, r.tasks[u])):
                 t = r.next[t]
-            return int(t)
-    return a.uavs + below(rng, a.ends - a.uavs)
+            return t
+    return NODE(a.uavs + below(rng, a.ends - a.uavs))
 
 
 @part
@@ -185,6 +195,6 @@ def recreate(a: Arrays, r: Routes, log: Log, rng: Chance) -> None:
         if place < 0 and (a.picky[t - a.uavs] or not a.hard):
             place, delta = any_place(a, r, t)
         if place >= 0 and (not a.hard or delta < a.price[t - a.uavs]):
-            insert(a, r, t, place)
+            insert(a, r, t, NODE(place))
             log.node[log.size[0]], log.after[log.size[0]] = t, -1
             log.size[0] += 1
