@@ -9,15 +9,18 @@ from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.solver import chain_q, routes as of
 from uav_task_alloc.solver.bidding import Bidding
 from uav_task_alloc.solver.chance import chance
-from uav_task_alloc.solver.colony import Colony
+from uav_task_alloc.solver.colony import Colony, Habits
 from uav_task_alloc.solver.problem import Limits, Rules, make_problem
-from uav_task_alloc.solver.recorder import Recorder
 from uav_task_alloc.solver.scouts import Scouts
 from uav_task_alloc.solver.tables import FIRST, fresh_tables, keep
+from uav_task_alloc.solver.warm import repaired
 
 
 def problem_of(uavs, tasks):
     return make_problem(uavs, tasks, {}, Limits(), Rules())
+
+
+PROBLEM = problem_of(*make(2, 9))
 
 
 def test_a_seed_and_a_number_of_iterations_give_the_same_plan():
@@ -41,25 +44,23 @@ def test_the_search_improves_on_the_construction():
     assert plan(uavs, tasks, budget=60.0, max_iterations=5000).distance < 0.97 * built.distance
 
 
-@pytest.mark.parametrize(('habits', 'shares', 'temperatures'), [
-    (chain_q.COLD_START, (0.0, 0.5, 1.0), (3.0, 0.3 ** 0.5, 0.1)),
-    (chain_q.PATIENT, (0.0, 0.25, 0.499999, 0.5, 0.75, 1.0),
-     (3.0, 0.3 ** 0.5, 0.1, 1.0, 0.1 ** 0.5, 0.1))])
-def test_it_cools_once_or_where_there_is_time_twice(habits, shares, temperatures):
-    problem = problem_of(*make(2, 9))
-    colony = Colony(problem, of.empty_routes(problem.arrays), 1, habits)
-    assert [colony.temperature(share) / problem.scale for share in shares] == pytest.approx(
-        temperatures, rel=1e-4)
+def test_they_cool_by_the_same_factor_in_each_part_of_the_budget():
+    colony = Colony(PROBLEM, of.empty_routes(PROBLEM.arrays), 1, chain_q.COLD_START)
+    assert [colony.temperature(share) / PROBLEM.scale for share in (0.0, 0.5, 1.0)] == (
+        pytest.approx((3.0, 0.3 ** 0.5, 0.1)))
 
 
-@pytest.mark.parametrize(('limits', 'habits'), [
-    ({'budget': 0.04}, chain_q.COLD_START), ({'budget': 0.05}, chain_q.PATIENT),
-    ({'budget': 60.0, 'max_iterations': 17_999}, chain_q.COLD_START),
-    ({'budget': 60.0, 'max_iterations': 18_000}, chain_q.PATIENT),
-    ({'budget': 60.0, 'warm': True}, chain_q.WARM_START)])
-def test_how_patient_bees_are_depends_on_time_or_rounds_for_each_task(limits, habits):
-    recorder = Recorder(problem_of(*make(2, 10)), lambda: 0.0, 0.0, **limits)
-    assert chain_q.habits_for(recorder) is habits
+@pytest.mark.parametrize(('until', 'home'), [(0.9, False), (0.95, True)])
+def test_bees_go_on_from_the_best_when_little_of_the_budget_is_left(until, home):
+    start = repaired(PROBLEM, {})
+    colony = Colony(PROBLEM, start, 1, Habits(scouts=0.0))
+    of.clear(colony.arrays, colony.routes)  # as if they had flown off
+    colony.fly(0.8, until, 0)
+    assert (colony.routes.next == start.next).all() == home
+    assert colony.routes.sums[of.DISTANCE] == (start.sums[of.DISTANCE] if home else 0.0)
+    of.clear(colony.arrays, colony.routes)
+    colony.fly(0.95, 1.0, 0)
+    assert colony.routes.sums[of.DISTANCE] == (0.0 if home else start.sums[of.DISTANCE])  # once
 
 
 def test_scouts_that_learn_beat_scouts_that_do_not():

@@ -9,8 +9,6 @@ from uav_task_alloc.solver.recorder import Recorder
 from uav_task_alloc.solver.warm import repaired
 
 COLD_START, WARM_START = Habits(), Habits(hot=0.3, cold=0.02)
-PATIENT = Habits(again=1.0)  # where there is plenty of time
-PLENTY, ROUNDS = 0.005, 1800  # [s], rounds a task
 LONGEST = 0.005  # [s] between looks at the clock
 FIXED = 100  # rounds a flight where iterations are limited
 EXCHANGES = 20  # times that colonies look at each other's best
@@ -24,7 +22,7 @@ def solve(recorder: Recorder, seed: int, learnt: object = None,
         recorder.offer(repaired(problem, {}))
     if not problem.tasks or not problem.uavs or recorder.over():
         return learnt
-    habits = habits or habits_for(recorder)
+    habits = habits or (WARM_START if recorder.warm else COLD_START)
     colonies = [Colony(problem, recorder.best, seed + 7919 * i, habits, learnt)
                 for i in range(recorder.threads)]
     others = [threading.Thread(target=_live, args=(each, recorder), daemon=True)
@@ -35,15 +33,6 @@ def solve(recorder: Recorder, seed: int, learnt: object = None,
     for thread in others:
         thread.join()
     return colonies[0].scouts.learnt()
-
-
-def habits_for(recorder: Recorder) -> Habits:
-    """How bees behave in the time or rounds there are for each task."""
-    if recorder.warm:
-        return WARM_START
-    tasks, most = len(recorder.problem.tasks), recorder.max_iterations
-    plenty = recorder.budget >= PLENTY * tasks if most is None else most >= ROUNDS * tasks
-    return PATIENT if plenty else COLD_START
 
 
 def _live(colony: Colony, recorder: Recorder) -> None:

@@ -20,7 +20,7 @@ class Habits:
 
     hot: float = 3.0
     cold: float = 0.1
-    again: float = 0.0  # the second half of the budget begins at this temperature; 0: it goes on
+    homing: float = 0.9  # share of the budget after which searching bees go on from the best
     some: float = 10.0  # tasks that an employed bee takes out in a round
     many: float = 20.0  # an onlooker
     employed: float = 0.5  # least shares of the work
@@ -39,7 +39,7 @@ class Colony:
         arrays = problem.arrays
         self.arrays = arrays._replace(strain=arrays.strain.copy(), price=arrays.price.copy())
         self.habits, self.best, self.routes = habits, of.twin(start), of.twin(start)
-        self._spare = of.twin(start)
+        self._spare, self._home = of.twin(start), False
         self._rng, self._log = chance(seed), empty_log(arrays)
         self.scouts = Scouts(problem, self.arrays, self._rng, learnt, habits.learning)
         self._scale = problem.scale
@@ -51,10 +51,8 @@ class Colony:
 
     def temperature(self, spent: float) -> float:
         """[m] after this share of the budget."""
-        h, hot = self.habits, self.habits.hot
-        if h.again > 0.0:
-            hot, spent = (hot, 2.0 * spent) if spent < 0.5 else (h.again, 2.0 * spent - 1.0)
-        return float(self._scale * hot * (h.cold / hot) ** spent)
+        h = self.habits
+        return float(self._scale * h.hot * (h.cold / h.hot) ** spent)
 
     def fly(self, spent: float, until: float, rounds: int) -> int:
         """Let the kind that bid most fly while the budget goes from `spent` to `until`.
@@ -62,6 +60,10 @@ class Colony:
         Returns the rounds of search that took place.
         """
         h = self.habits
+        if until > h.homing and not self._home:
+            self._home = True
+            of.copy(self.best, self.routes)
+            of.total(self.arrays, self.routes)  # strain and prices have changed since
         costs = {'employed': rounds * h.some, 'onlooker': rounds * h.many,
                  'scout': self.scouts.work / 5.0}
         kind = self._bids.next({each: costs[each] for each in self._bids.shares()})

@@ -26,6 +26,7 @@ from uav_task_alloc.solver.routes import (
 
 STRING = 10  # tasks in a string at most
 SPLIT = 0.5  # share of strings with a part that stays
+STAY = 0.98  # chance that one more does, so often only ends of a route come out
 REACH = 12  # neighbours looked at for a place
 PITY = 0.5  # share of rounds around a task that is left out, if there is one
 RELIEF = 0.2  # share around a route beyond range, if there is one
@@ -82,7 +83,7 @@ def _string(a: Arrays, r: Routes, log: Log, c: int, size: int, rng: Chance) -> N
     count, stay = r.tasks[r.on[c]], 0
     if size > 1 and size < count and uniform(rng) < SPLIT:
         stay = 1
-        while size + stay < count and uniform(rng) > 0.5:
+        while size + stay < count and uniform(rng) < STAY:
             stay += 1
     t, back = c, below(rng, size + stay)
     while back > 0 and r.prev[t] >= a.uavs:

@@ -16,7 +16,7 @@ from matplotlib.figure import Figure
 
 from uav_task_alloc.plots import COLOURS, draw_plan_3d
 from uav_task_alloc.plots.plan import way_of
-from uav_task_alloc.solver.chain_q import PATIENT
+from uav_task_alloc.solver.chain_q import COLD_START
 from uav_task_alloc.solver.registry import SOLVERS
 from uav_task_alloc.study import program, tables, trials
 from uav_task_alloc.study.campaign import Job
@@ -137,7 +137,7 @@ def scene_text(asked: Program) -> str:
 
 def settings_text(solver: str, *but: str) -> str:
     """A solver's settings as a line."""
-    made = PATIENT if solver == 'chain_q' else import_module(
+    made = COLD_START if solver == 'chain_q' else import_module(
         SOLVERS[solver].__module__).Settings()
     return f'{solver}: ' + ', '.join(f'{name} {value}' for name, value in asdict(made).items()
                                      if name not in but)
