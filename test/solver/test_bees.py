@@ -1,15 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
 """The bees: repeatable, bidding for flights, learning by id."""
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from plan_checks import check, make
 
 from uav_task_alloc import plan
 from uav_task_alloc.errors import InvalidValue
-from uav_task_alloc.solver import chain_q, routes as of
+from uav_task_alloc.solver import routes as of
 from uav_task_alloc.solver.bidding import Bidding
 from uav_task_alloc.solver.chance import chance
-from uav_task_alloc.solver.colony import Colony, Habits
+from uav_task_alloc.solver.colony import PHASES, Colony, Habits
 from uav_task_alloc.solver.problem import Limits, Rules, make_problem
 from uav_task_alloc.solver.scouts import Scouts
 from uav_task_alloc.solver.tables import FIRST, fresh_tables, keep
@@ -24,7 +26,7 @@ PROBLEM = problem_of(*make(2, 9))
 
 
 def test_a_seed_and_a_number_of_iterations_give_the_same_plan():
-    uavs, tasks = make(5, 60)
+    uavs, tasks = make(5, 200)
     first, second, other = (plan(uavs, tasks, budget=60.0, max_iterations=3000, seed=seed)
                             for seed in (4, 4, 5))
     assert first.routes == second.routes
@@ -44,23 +46,27 @@ def test_the_search_improves_on_the_construction():
     assert plan(uavs, tasks, budget=60.0, max_iterations=5000).distance < 0.97 * built.distance
 
 
-def test_they_cool_by_the_same_factor_in_each_part_of_the_budget():
-    colony = Colony(PROBLEM, of.empty_routes(PROBLEM.arrays), 1, chain_q.COLD_START)
-    assert [colony.temperature(share) / PROBLEM.scale for share in (0.0, 0.5, 1.0)] == (
-        pytest.approx((3.0, 0.3 ** 0.5, 0.1)))
+def test_bees_cool_twice_and_then_stay_cold(monkeypatch):
+    colony = Colony(PROBLEM, repaired(PROBLEM, {}), 1, Habits(scouts=0.0))
+    home, seen = [], []
+    monkeypatch.setattr(colony, '_go_home', home.append)
+    for begin, end in pairwise(PHASES):
+        colony.fly(max(begin, 1e-6), 0.5 * (begin + end), 10)
+        seen += [colony.temperature(share) / PROBLEM.scale
+                 for share in (begin, 0.5 * (begin + end), end)]
+        colony.fly(0.5 * (begin + end), end, 10)
+    assert seen == pytest.approx([3.0, 0.3 ** 0.5, 0.1, 1.0, 0.1 ** 0.5, 0.1, 0.1, 0.1, 0.1])
+    assert len(home) == 2  # once where each phase but the first begins
 
 
-@pytest.mark.parametrize(('until', 'home'), [(0.9, False), (0.95, True)])
-def test_bees_go_on_from_the_best_when_little_of_the_budget_is_left(until, home):
+def test_at_home_bees_go_on_from_the_best():
     start = repaired(PROBLEM, {})
-    colony = Colony(PROBLEM, start, 1, Habits(scouts=0.0))
+    colony = Colony(PROBLEM, start, 1, Habits())
     of.clear(colony.arrays, colony.routes)  # as if they had flown off
-    colony.fly(0.8, until, 0)
-    assert (colony.routes.next == start.next).all() == home
-    assert colony.routes.sums[of.DISTANCE] == (start.sums[of.DISTANCE] if home else 0.0)
-    of.clear(colony.arrays, colony.routes)
-    colony.fly(0.95, 1.0, 0)
-    assert colony.routes.sums[of.DISTANCE] == (0.0 if home else start.sums[of.DISTANCE])  # once
+    colony.arrays.price[:] *= 2.0
+    colony._go_home(1e6)
+    assert (colony.routes.next == start.next).all()
+    assert colony.routes.sums == pytest.approx(start.sums)
 
 
 def test_scouts_that_learn_beat_scouts_that_do_not():

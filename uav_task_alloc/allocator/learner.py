@@ -42,6 +42,7 @@ def learner(body: Any) -> State:
 
 
 def _tables(body: Any) -> object:
+    from uav_task_alloc.solver.routes import NODE
     from uav_task_alloc.solver.tables import Learnt, Tables
     uavs, tasks = body['uavs'], body['tasks']
     n, m = len(tasks), len(uavs)
@@ -50,7 +51,7 @@ def _tables(body: Any) -> object:
         raise ValueError(f'learner: near up to {near.max()}: expected places of {n} tasks')
     tables = Tables(_unpacked(body['task'], '<f4').reshape(near.shape).astype(float),
                     _unpacked(body['start'], '<f4').reshape(m, n).astype(float))
-    return Learnt(tables, near + m, {uav_id: i for i, uav_id in enumerate(uavs)},
+    return Learnt(tables, (near + m).astype(NODE), {uav_id: i for i, uav_id in enumerate(uavs)},
                   {task_id: i for i, task_id in enumerate(tasks)})
 
 

@@ -8,7 +8,7 @@ from uav_task_alloc.solver.colony import Colony, Habits
 from uav_task_alloc.solver.recorder import Recorder
 from uav_task_alloc.solver.warm import repaired
 
-COLD_START, WARM_START = Habits(), Habits(hot=0.3, cold=0.02)
+COLD_START, WARM_START = Habits(), Habits(hot=0.3, cold=0.02, again=3.0)
 LONGEST = 0.005  # [s] between looks at the clock
 FIXED = 100  # rounds a flight where iterations are limited
 EXCHANGES = 20  # times that colonies look at each other's best

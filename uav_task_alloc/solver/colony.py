@@ -7,11 +7,15 @@ from dataclasses import dataclass
 from uav_task_alloc.solver import routes as of
 from uav_task_alloc.solver.bidding import Bidding
 from uav_task_alloc.solver.chance import chance
+from uav_task_alloc.solver.combine import combine, empty_memory
 from uav_task_alloc.solver.problem import Problem
 from uav_task_alloc.solver.routes import EXCESS, TINY, VALUE, Routes
 from uav_task_alloc.solver.ruin import empty_log
 from uav_task_alloc.solver.scouts import Scouts
 from uav_task_alloc.solver.search import relieve, search
+
+PHASES = (0.0, 0.45, 0.92, 1.0)  # shares of the budget at which bees cool, cool again, stay cold
+WORK = 150.0  # looks at stops of remembered routes for each round of the whole search
 
 
 @dataclass(frozen=True, slots=True)
@@ -20,7 +24,7 @@ class Habits:
 
     hot: float = 3.0
     cold: float = 0.1
-    homing: float = 0.9  # share of the budget after which searching bees go on from the best
+    again: float = 1.0  # the second time they begin to cool here
     some: float = 10.0  # tasks that an employed bee takes out in a round
     many: float = 20.0  # an onlooker
     employed: float = 0.5  # least shares of the work
@@ -39,7 +43,8 @@ class Colony:
         arrays = problem.arrays
         self.arrays = arrays._replace(strain=arrays.strain.copy(), price=arrays.price.copy())
         self.habits, self.best, self.routes = habits, of.twin(start), of.twin(start)
-        self._spare, self._home = of.twin(start), False
+        self._spare, self._phase = of.twin(start), 0
+        self._known = empty_memory(arrays)
         self._rng, self._log = chance(seed), empty_log(arrays)
         self.scouts = Scouts(problem, self.arrays, self._rng, learnt, habits.learning)
         self._scale = problem.scale
@@ -51,8 +56,10 @@ class Colony:
 
     def temperature(self, spent: float) -> float:
         """[m] after this share of the budget."""
-        h = self.habits
-        return float(self._scale * h.hot * (h.cold / h.hot) ** spent)
+        h, begin, end = self.habits, PHASES[self._phase], PHASES[self._phase + 1]
+        hot = (h.hot, h.again, h.cold)[self._phase]
+        share = min(1.0, max(0.0, (spent - begin) / (end - begin)))
+        return float(self._scale * hot * (h.cold / hot) ** share)
 
     def fly(self, spent: float, until: float, rounds: int) -> int:
         """Let the kind that bid most fly while the budget goes from `spent` to `until`.
@@ -60,10 +67,9 @@ class Colony:
         Returns the rounds of search that took place.
         """
         h = self.habits
-        if until > h.homing and not self._home:
-            self._home = True
-            of.copy(self.best, self.routes)
-            of.total(self.arrays, self.routes)  # strain and prices have changed since
+        if until > PHASES[self._phase + 1] and spent > 0.0:
+            self._phase += 1
+            self._go_home(WORK * rounds / (until - spent))
         costs = {'employed': rounds * h.some, 'onlooker': rounds * h.many,
                  'scout': self.scouts.work / 5.0}
         kind = self._bids.next({each: costs[each] for each in self._bids.shares()})
@@ -80,6 +86,15 @@ class Colony:
         self._bids.pay(kind, costs[kind], max(0.0, gain) if h.bids else 0.0)
         return 0 if kind == 'scout' else rounds
 
+    def _go_home(self, work: float) -> None:
+        """Go on from the best, after putting it together anew from all routes seen."""
+        a = self.arrays
+        if combine(a, self.best, self._known, work, self._spare) and (
+                of.better_now(a, self._spare, self.best)):
+            of.copy(self._spare, self.best)
+        of.copy(self.best, self.routes)
+        of.total(a, self.routes)  # strain and prices have changed since
+
     def _salvage(self) -> None:
         """Where the best leaves tasks out, see what the routes are worth within ranges."""
         a = self.arrays
@@ -92,5 +107,6 @@ class Colony:
 
     def _search(self, routes: Routes, mean: float, hot: float, cold: float, rounds: int) -> int:
         a = self.arrays
-        found = int(search(a, routes, self.best, self._log, mean, hot, cold, rounds, self._rng))
+        found = int(search(a, routes, self.best, self._log, self._known, mean, hot, cold,
+                           rounds, self._rng))
         return found

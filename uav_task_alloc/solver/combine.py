@@ -12,12 +12,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from uav_task_alloc.solver.kernel import kernel, maker
+from uav_task_alloc.solver.kernel import kernel, maker, part
 from uav_task_alloc.solver.routes import (
-    EXCESS,
-    LEFT_OUT,
     NODE,
     TINY,
+    WHOLE,
     Arrays,
     Floats,
     Ints,
@@ -29,10 +28,12 @@ from uav_task_alloc.solver.routes import (
 )
 
 ROUTES, STOPS = 1 << 14, 1 << 18  # room; who runs out of it begins anew
-WORK = 3_000_000  # stops looked at for a bound
-FEWEST, MOST = 30, 300  # steps of it
+FEWEST, MOST = 30, 1000  # steps towards a bound
 PATIENCE, SHORTER = 8, 0.7  # after so many steps in vain they get so much shorter
-DEEPEST = 30_000  # routes tried in the search in depth
+GROUP = 10  # UAVs that exchange their tasks
+AROUND = 6  # neighbours of a task by which routes are near each other
+PASSES = 2
+DEEPEST = 20_000  # routes tried in a search in depth
 
 
 class Memory(NamedTuple):
@@ -76,7 +77,8 @@ def remember(a: Arrays, r: Routes, known: Memory) -> None:
         while known.place[at] >= 0 and known.key[known.place[at]] != word:
             at = (at + 1) % known.place.size
         e = known.place[at]
-        if e >= 0 and known.cost[e] <= cost + TINY:
+        if e >= 0 and (known.cost[e] <= cost + TINY
+                       or known.first[e + 1] - known.first[e] != r.tasks[u]):
             continue
         if e < 0:
             e = known.size[0]
@@ -116,9 +118,10 @@ def _reduce(a: Arrays, known: Memory, price: Floats, reduced: Floats, least: Flo
 
 
 @maker
-def _price(a: Arrays, best: Routes, known: Memory, worth: float) -> tuple[Floats, float]:
+def _price(a: Arrays, best: Routes, known: Memory, worth: float,
+           work: float) -> tuple[Floats, float]:
     """Prices of tasks by node for which the bound is high, and that bound [m]."""
-    price = np.zeros(a.ends)
+    price = np.zeros(a.ends)  # never more than leaving the task out costs
     for u in range(a.uavs):  # at first the best's routes cost what their tasks are priced
         cost, t = best.leg[u] - a.idle[u], best.next[u]
         while t < a.ends:
@@ -126,7 +129,7 @@ def _price(a: Arrays, best: Routes, known: Memory, worth: float) -> tuple[Floats
             t = best.next[t]
         t = best.next[u]
         while t < a.ends:
-            price[t] = cost / best.tasks[u]
+            price[t] = min(cost / best.tasks[u], a.price[t - a.uavs])
             t = best.next[t]
     for t in range(a.uavs, a.ends):
         if best.on[t] < 0:
@@ -134,7 +137,8 @@ def _price(a: Arrays, best: Routes, known: Memory, worth: float) -> tuple[Floats
     kept, highest, length, vain = price.copy(), -np.inf, 1.0, 0
     reduced, least = np.empty(known.size[0]), np.empty(a.uavs)
     chosen, served = np.empty(a.uavs, np.int64), np.empty(a.ends, np.int64)
-    for _ in range(min(MOST, max(FEWEST, WORK // max(1, known.first[known.size[0]])))):
+    steps = work / max(1, known.first[known.size[0]])
+    for _ in range(int(min(MOST, max(FEWEST, steps)))):
         bound = _reduce(a, known, price, reduced, least, chosen)
         if bound > highest:
             if bound > highest + 1e-4 * abs(worth - bound):
@@ -161,50 +165,165 @@ def _price(a: Arrays, best: Routes, known: Memory, worth: float) -> tuple[Floats
     return kept, highest
 
 
+@part
+def _find(a: Arrays, r: Routes, known: Memory, u: int) -> int:
+    """The entry of UAV u's route, -1 if it has none."""
+    word, t = known.word[u], r.next[u]
+    if t >= a.ends:
+        return -1
+    while t < a.ends:
+        word ^= known.word[t]
+        t = r.next[t]
+    at = np.int64(word & np.uint64(known.place.size - 1))
+    while known.place[at] >= 0 and known.key[known.place[at]] != word:
+        at = (at + 1) % known.place.size
+    return int(known.place[at])
+
+
 @maker
-def combine(a: Arrays, best: Routes, known: Memory, into: Routes) -> bool:
-    """Put together what costs less than the best, if there is such a thing; whether there is."""
+def combine(a: Arrays, best: Routes, known: Memory, work: float, into: Routes) -> bool:
+    """Put routes together that cost less than the best, if there are any; whether there are.
+
+    Groups of UAVs whose routes are near each other exchange their tasks, all others stay.
+    """
     remember(a, best, known)
-    if known.size[0] == 0 or best.sums[EXCESS] > a.excess_floor + TINY and a.hard:
-        return False
-    worth = best.sums[LEFT_OUT]
+    flown = np.empty(a.uavs, np.int64)
     for u in range(a.uavs):
-        t, cost = best.next[u], best.leg[u] - a.idle[u]
-        while t < a.ends:
-            cost += best.leg[t]
-            t = best.next[t]
-        if not a.hard:
-            cost += a.strain[u] * max(0.0, best.length[u] - a.reach[u])
-        worth += cost
-    price, bound = _price(a, best, known, worth)
-    spare = worth - bound - 1e-6
-    if spare <= 0.0:
+        flown[u] = _find(a, best, known, u)
+        if flown[u] < 0 and best.tasks[u] > 0:
+            return False
+    worth = 0.0
+    for t in range(a.uavs, a.ends):
+        worth += a.price[t - a.uavs] if best.on[t] < 0 else 0.0
+    for u in range(a.uavs):
+        worth += known.cost[flown[u]] if flown[u] >= 0 else 0.0
+    price, bound = _price(a, best, known, worth, work)
+    if worth - bound < TINY:
         return False
     reduced, least = np.empty(known.size[0]), np.empty(a.uavs)
-    chosen = np.empty(a.uavs, np.int64)
-    _reduce(a, known, price, reduced, least, chosen)
-    for e in range(reduced.size):
-        reduced[e] -= least[known.uav[e]]
-    some = np.flatnonzero(reduced < spare)
-    some = some[np.argsort(reduced[some])]
-    # routes by task, those that cost least first
+    _reduce(a, known, price, reduced, least, np.empty(a.uavs, np.int64))
+    on = np.full(a.ends, -1, np.int64)
+    on[a.uavs:] = best.on[a.uavs:a.ends]
+    found = False
+    for _ in range(PASSES):
+        again = False
+        for u in range(a.uavs):
+            group = _group(a, known, on, flown, u)
+            tasks = _tasks_of(a, known, on, flown, group)
+            if _exchange(a, known, price, reduced, least, group, tasks, flown, on):
+                found = again = True
+        if not again:
+            break
+    if found:
+        clear(a, into)
+        for u in range(a.uavs):
+            if flown[u] >= 0:
+                after = NODE(u)
+                for i in range(known.first[flown[u]], known.first[flown[u] + 1]):
+                    insert(a, into, known.stops[i], after)
+                    after = known.stops[i]
+        total(a, into)
+    return found
+
+
+@maker
+def _group(a: Arrays, known: Memory, on: Ints, flown: Ints, seed: int) -> NDArray[np.bool_]:
+    """Whose routes are nearest to that of one UAV, it among them."""
+    inside, beside = np.zeros(a.uavs, np.bool_), np.zeros(a.uavs, np.int64)
+    inside[seed] = True
+    newest = seed
+    for _ in range(min(GROUP, a.uavs) - 1):
+        e = flown[newest]
+        for i in range(known.first[e] if e >= 0 else 0, known.first[e + 1] if e >= 0 else 0):
+            t = known.stops[i] - a.uavs
+            for k in range(min(AROUND, a.near.shape[1])):
+                other = on[a.near[t, k]]
+                if other >= 0:
+                    beside[other] += 1
+            for k in range(a.starts.shape[1]):
+                beside[a.starts[t, k]] += 1
+        newest, most = -1, -1
+        for u in range(a.uavs):
+            if not inside[u] and beside[u] > most:
+                newest, most = u, beside[u]
+        inside[newest] = True
+    return inside
+
+
+@maker
+def _tasks_of(a: Arrays, known: Memory, on: Ints, flown: Ints,
+              group: NDArray[np.bool_]) -> Ints:
+    """Tasks that a group of UAVs serves, and those that nobody does next to them."""
+    tasks = [int(t) for t in range(0)]
+    for u in range(a.uavs):
+        if group[u] and flown[u] >= 0:
+            for i in range(known.first[flown[u]], known.first[flown[u] + 1]):
+                tasks.append(WHOLE(known.stops[i]))
+    for t in range(a.uavs, a.ends):
+        if on[t] >= 0:
+            continue
+        near = a.uavs <= GROUP
+        for k in range(min(AROUND, a.near.shape[1])):
+            other = on[a.near[t - a.uavs, k]]
+            near |= other >= 0 and group[other]
+        if near:
+            tasks.append(t)
+    return np.array(tasks)
+
+
+@maker
+def _exchange(a: Arrays, known: Memory, price: Floats, reduced: Floats, least: Floats,
+              group: NDArray[np.bool_], tasks: Ints, flown: Ints, on: Ints) -> bool:
+    """Give a group of UAVs the remembered routes through their tasks that cost least."""
+    spare, inside = -TINY, np.zeros(a.ends, np.bool_)
+    if tasks.size == 0:
+        return False
+    for t in tasks:
+        inside[t] = True
+        if on[t] < 0:
+            spare += a.price[t - a.uavs] - price[t]
+    for u in range(a.uavs):
+        if group[u]:
+            spare -= least[u]
+            spare += reduced[flown[u]] if flown[u] >= 0 else 0.0
+    if spare <= 0.0:
+        return False
+    some = np.empty(known.size[0], np.int64)
+    count = 0
     begin = np.zeros(a.ends + 1, np.int64)
-    for e in some:
+    for e in range(known.size[0]):
+        u = known.uav[e]
+        if not group[u] or reduced[e] - least[u] >= spare:
+            continue
+        fits = True
         for i in range(known.first[e], known.first[e + 1]):
-            begin[known.stops[i] + 1] += 1
-    order = np.argsort(begin[a.uavs + 1:]) + a.uavs  # tasks, those with fewest routes first
+            if not inside[known.stops[i]]:
+                fits = False
+                break
+        if fits:
+            some[count] = e
+            count += 1
+            for i in range(known.first[e], known.first[e + 1]):
+                begin[known.stops[i] + 1] += 1
+    some = some[:count]
+    left = np.empty(count)
+    for i in range(count):
+        left[i] = reduced[some[i]] - least[known.uav[some[i]]]
+    some = some[np.argsort(left)]
+    order = tasks[np.argsort(begin[tasks + 1])]  # those with fewest routes first
     begin[:] = np.cumsum(begin)
     by, fill = np.empty(begin[a.ends], np.int64), begin.copy()
-    for e in some:
+    for e in some:  # routes by task, those that cost least first
         for i in range(known.first[e], known.first[e + 1]):
             by[fill[known.stops[i]]] = e
             fill[known.stops[i]] += 1
-    return _deepen(a, known, price, reduced, least, begin, by, order, spare, into)
+    return _deepen(a, known, price, reduced, least, begin, by, order, group, spare, flown, on)
 
 
 @maker
 def _deepen(a: Arrays, known: Memory, price: Floats, reduced: Floats, least: Floats,
-            begin: Ints, by: Ints, order: Ints, spare: float, into: Routes) -> bool:
+            begin: Ints, by: Ints, order: Ints, group: NDArray[np.bool_], spare: float,
+            flown: Ints, on: Ints) -> bool:
     """Search in depth for routes that serve all within `spare` [m] of reduced cost."""
     room = order.size + 1
     task, at, took = np.empty(room, np.int64), np.empty(room, np.int64), np.empty(room, np.int64)
@@ -230,7 +349,8 @@ def _deepen(a: Arrays, known: Memory, price: Floats, reduced: Floats, least: Flo
             e = by[at[depth]]
             at[depth] += 1
             tried += 1
-            if spent[depth] + reduced[e] >= spare:
+            cost = spent[depth] + reduced[e] - least[known.uav[e]]
+            if cost >= spare:
                 at[depth] = begin[t + 1]
                 break
             if flies[known.uav[e]]:
@@ -241,7 +361,7 @@ def _deepen(a: Arrays, known: Memory, price: Floats, reduced: Floats, least: Flo
                     fits = False
                     break
             if fits:
-                took[depth], more = e, spent[depth] + reduced[e]
+                took[depth], more = e, cost
         if took[depth] >= 0:
             flies[known.uav[took[depth]]] = True
             for i in range(known.first[took[depth]], known.first[took[depth] + 1]):
@@ -261,16 +381,19 @@ def _deepen(a: Arrays, known: Memory, price: Floats, reduced: Floats, least: Flo
             spent[depth], task[depth], at[depth], took[depth] = more, i, begin[order[i]], -2
             continue
         for u in range(a.uavs):
-            if not flies[u]:
+            if group[u] and not flies[u]:
                 more -= least[u]
         if more < spare:
-            spare, found = more - 1e-6, True
-            clear(a, into)
+            spare, found = more - TINY, True
+            for u in range(a.uavs):
+                if group[u]:
+                    flown[u] = -1
+            for t in order:
+                on[t] = -1
             for d in range(depth + 1):
                 if took[d] >= 0:
-                    after = NODE(known.uav[took[d]])
+                    u = known.uav[took[d]]
+                    flown[u] = took[d]
                     for i in range(known.first[took[d]], known.first[took[d] + 1]):
-                        insert(a, into, known.stops[i], after)
-                        after = known.stops[i]
-            total(a, into)
+                        on[known.stops[i]] = u
     return found

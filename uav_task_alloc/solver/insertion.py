@@ -9,7 +9,7 @@ import numpy as np
 
 from uav_task_alloc.solver.chance import Chance, uniform
 from uav_task_alloc.solver.kernel import kernel, maker, part
-from uav_task_alloc.solver.routes import Arrays, Ints, Routes, insert, lengthened, step
+from uav_task_alloc.solver.routes import WHOLE, Arrays, Ints, Routes, insert, lengthened, step
 
 
 @part
@@ -138,7 +138,7 @@ def _bid_again(a: Arrays, r: Routes, t: int, heap: list[tuple[float, int]]) -> N
         if r.on[c] < 0:
             place, bid = beside(a, r, c, t, a.near_length[t - a.uavs, m], np.inf)
             if place >= 0:
-                heapq.heappush(heap, (bid, np.int64(c)))
+                heapq.heappush(heap, (bid, WHOLE(c)))
 
 
 def cheapest_first(a: Arrays, r: Routes, rng: Chance, noise: float = 0.0) -> None:

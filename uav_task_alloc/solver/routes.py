@@ -17,7 +17,8 @@ from uav_task_alloc.solver.kernel import kernel, part
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Nodes = NDArray[np.uint32]  # unsigned: numba need not ask whether an index counts from the end
-NODE = np.uint32
+NODE: Any = np.uint32
+WHOLE: Any = np.int64  # in kernels int() of an unsigned number is unsigned
 DISTANCE, EXCESS, LEFT_OUT, VALUE, STRAIN = range(5)  # what Routes.sums holds
 TINY = 1e-7  # [m] what rounding may add up to
 STRICT = 1e9  # [m/m] at most this in sums, where inf would make NaN
@@ -71,7 +72,7 @@ def step(a: Arrays, i: int, j: int) -> float:
     if a.straight:
         x, y, z = a.xyz[i, 0] - a.xyz[j, 0], a.xyz[i, 1] - a.xyz[j, 1], a.xyz[i, 2] - a.xyz[j, 2]
         return math.sqrt(x * x + y * y + z * z)
-    return float(length(a.pairs, np.int64(i), np.int64(j)))
+    return float(length(a.pairs, WHOLE(i), WHOLE(j)))
 
 
 @kernel

@@ -5,7 +5,7 @@ After Christiaens and Vanden Berghe, Slack Induction by String Removals (2020).
 """
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -117,7 +117,7 @@ def look_for_trouble(a: Arrays, r: Routes, log: Log) -> None:
 
 
 @part
-def _seed(a: Arrays, r: Routes, log: Log, rng: Chance) -> int:
+def _seed(a: Arrays, r: Routes, log: Log, rng: Chance) -> Any:
     """Around whom to ruin: anybody, and often somebody left out or on a route beyond range."""
     if log.size[2] > 0 and uniform(rng) < PITY:
         t = log.left[below(rng, log.size[2])]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from uav_task_alloc.solver.chance import Chance, uniform
+from uav_task_alloc.solver.combine import Memory, remember
 from uav_task_alloc.solver.kernel import kernel
 from uav_task_alloc.solver.routes import (
     EXCESS,
@@ -26,7 +27,7 @@ LOOKS = 8  # of them in as many rounds as there are tasks
 
 
 @kernel
-def _look(a: Arrays, r: Routes, log: Log) -> int:
+def _look(a: Arrays, r: Routes, log: Log, known: Memory) -> int:
     """Price left out tasks and metres beyond range anew; returns rounds until the next time."""
     if a.hard:  # dear enough that routes come back into range, cheap enough to pass through
         fine = r.sums[EXCESS] <= a.excess_floor + TINY
@@ -36,6 +37,7 @@ def _look(a: Arrays, r: Routes, log: Log) -> int:
             elif r.length[u] > a.reach[u] + TINY:
                 a.strain[u] = min(MOST, a.strain[u] * DEARER)
     look_for_trouble(a, r, log)
+    remember(a, r, known)
     total(a, r)
     return max(20, a.price.size // LOOKS)
 
@@ -55,8 +57,8 @@ def relieve(a: Arrays, r: Routes) -> None:
 
 
 @kernel
-def search(a: Arrays, r: Routes, best: Routes, log: Log, mean: float, hot: float, cold: float,
-           rounds: int, rng: Chance) -> int:
+def search(a: Arrays, r: Routes, best: Routes, log: Log, known: Memory, mean: float,
+           hot: float, cold: float, rounds: int, rng: Chance) -> int:
     """Anneal r from temperature `hot` to `cold` [m]; returns how often `best` got better.
 
     A round takes out about `mean` tasks and costs O(mean k).
@@ -67,7 +69,7 @@ def search(a: Arrays, r: Routes, best: Routes, log: Log, mean: float, hot: float
     for i in range(rounds):
         log.size[4] -= 1
         if log.size[4] < 0:
-            log.size[4] = _look(a, r, log)
+            log.size[4] = _look(a, r, log, known)
         before = cost(a, r)
         ruin(a, r, log, mean, i, rng)
         recreate(a, r, log, rng)

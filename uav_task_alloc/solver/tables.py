@@ -11,7 +11,7 @@ import numpy as np
 from uav_task_alloc.solver.chance import Chance, uniform
 from uav_task_alloc.solver.kernel import kernel, part
 from uav_task_alloc.solver.problem import Problem
-from uav_task_alloc.solver.routes import Arrays, Floats, Ints, Routes, clear, insert, step
+from uav_task_alloc.solver.routes import Arrays, Floats, Ints, Nodes, Routes, clear, insert, step
 
 FIRST, FLOOR = 0.5, 0.01  # Q of a leg never flown; the least Q, so that nothing is ruled out
 LEARNING, DISCOUNT = 0.2, 0.1  # alpha and gamma of eq 2.6
@@ -29,7 +29,7 @@ class Learnt(NamedTuple):
     """Tables that outlive their problem: rows are found again by id."""
 
     tables: Tables
-    near: Ints
+    near: Nodes
     uavs: Mapping[str, int]
     tasks: Mapping[str, int]
 
@@ -57,7 +57,7 @@ def keep(problem: Problem, tables: Tables) -> Learnt:
 
 
 @kernel
-def _take_over(a: Arrays, q: Floats, was: Ints, old: Floats, old_near: Ints,
+def _take_over(a: Arrays, q: Floats, was: Ints, old: Floats, old_near: Nodes,
                old_uavs: int) -> None:
     """Rows and entries of tasks that were known. O(n k^2)."""
     for i in range(q.shape[0]):
