@@ -34,6 +34,7 @@ GROUP = 10  # UAVs that exchange their tasks
 AROUND = 6  # neighbours of a task by which routes are near each other
 PASSES = 2
 DEEPEST = 20_000  # routes tried in a search in depth
+TRY = 4.0  # such a try costs as much as so many looks at a stop
 
 
 class Memory(NamedTuple):
@@ -118,22 +119,16 @@ def _reduce(a: Arrays, known: Memory, price: Floats, reduced: Floats, least: Flo
 
 
 @maker
-def _price(a: Arrays, best: Routes, known: Memory, worth: float,
+def _price(a: Arrays, known: Memory, flown: Ints, worth: float,
            work: float) -> tuple[Floats, float]:
     """Prices of tasks by node for which the bound is high, and that bound [m]."""
-    price = np.zeros(a.ends)  # never more than leaving the task out costs
-    for u in range(a.uavs):  # at first the best's routes cost what their tasks are priced
-        cost, t = best.leg[u] - a.idle[u], best.next[u]
-        while t < a.ends:
-            cost += best.leg[t]
-            t = best.next[t]
-        t = best.next[u]
-        while t < a.ends:
-            price[t] = min(cost / best.tasks[u], a.price[t - a.uavs])
-            t = best.next[t]
-    for t in range(a.uavs, a.ends):
-        if best.on[t] < 0:
-            price[t] = a.price[t - a.uavs]
+    price = np.zeros(a.ends)
+    price[a.uavs:] = a.price  # never more than leaving the task out costs
+    for e in flown[flown >= 0]:  # at first the best's routes cost what their tasks are priced
+        begin, end = known.first[e], known.first[e + 1]
+        for i in range(begin, end):
+            t = known.stops[i]
+            price[t] = min(price[t], known.cost[e] / (end - begin))
     kept, highest, length, vain = price.copy(), -np.inf, 1.0, 0
     reduced, least = np.empty(known.size[0]), np.empty(a.uavs)
     chosen, served = np.empty(a.uavs, np.int64), np.empty(a.ends, np.int64)
@@ -195,25 +190,28 @@ def combine(a: Arrays, best: Routes, known: Memory, work: float, into: Routes) -
     worth = 0.0
     for t in range(a.uavs, a.ends):
         worth += a.price[t - a.uavs] if best.on[t] < 0 else 0.0
-    for u in range(a.uavs):
-        worth += known.cost[flown[u]] if flown[u] >= 0 else 0.0
-    price, bound = _price(a, best, known, worth, work)
+    for e in flown[flown >= 0]:
+        worth += known.cost[e]
+    price, bound = _price(a, known, flown, worth, work)
     if worth - bound < TINY:
         return False
     reduced, least = np.empty(known.size[0]), np.empty(a.uavs)
     _reduce(a, known, price, reduced, least, np.empty(a.uavs, np.int64))
     on = np.full(a.ends, -1, np.int64)
     on[a.uavs:] = best.on[a.uavs:a.ends]
-    found = False
-    for _ in range(PASSES):
-        again = False
-        for u in range(a.uavs):
-            group = _group(a, known, on, flown, u)
-            tasks = _tasks_of(a, known, on, flown, group)
-            if _exchange(a, known, price, reduced, least, group, tasks, flown, on):
-                found = again = True
-        if not again:
-            break
+    found, again, tries, u = False, True, int(work / TRY), 0
+    while tries > 0 and u < PASSES * a.uavs:
+        if u % a.uavs == 0:
+            if not again:
+                break
+            again = False
+        group = _group(a, known, on, flown, u % a.uavs)
+        tasks = _tasks_of(a, known, on, flown, group)
+        better, tried = _exchange(a, known, price, reduced, least, group, tasks,
+                                  min(DEEPEST, tries), flown, on)
+        if better:
+            found = again = True
+        tries, u = tries - tried, u + 1
     if found:
         clear(a, into)
         for u in range(a.uavs):
@@ -273,11 +271,15 @@ def _tasks_of(a: Arrays, known: Memory, on: Ints, flown: Ints,
 
 @maker
 def _exchange(a: Arrays, known: Memory, price: Floats, reduced: Floats, least: Floats,
-              group: NDArray[np.bool_], tasks: Ints, flown: Ints, on: Ints) -> bool:
-    """Give a group of UAVs the remembered routes through their tasks that cost least."""
+              group: NDArray[np.bool_], tasks: Ints, limit: int, flown: Ints,
+              on: Ints) -> tuple[bool, int]:
+    """Give a group of UAVs the remembered routes through their tasks that cost least.
+
+    Returns whether they cost less than before and how many were tried.
+    """
     spare, inside = -TINY, np.zeros(a.ends, np.bool_)
     if tasks.size == 0:
-        return False
+        return False, 1
     for t in tasks:
         inside[t] = True
         if on[t] < 0:
@@ -287,7 +289,7 @@ def _exchange(a: Arrays, known: Memory, price: Floats, reduced: Floats, least: F
             spare -= least[u]
             spare += reduced[flown[u]] if flown[u] >= 0 else 0.0
     if spare <= 0.0:
-        return False
+        return False, 1
     some = np.empty(known.size[0], np.int64)
     count = 0
     begin = np.zeros(a.ends + 1, np.int64)
@@ -317,13 +319,14 @@ def _exchange(a: Arrays, known: Memory, price: Floats, reduced: Floats, least: F
         for i in range(known.first[e], known.first[e + 1]):
             by[fill[known.stops[i]]] = e
             fill[known.stops[i]] += 1
-    return _deepen(a, known, price, reduced, least, begin, by, order, group, spare, flown, on)
+    return _deepen(a, known, price, reduced, least, begin, by, order, group, spare, limit, flown,
+                   on)
 
 
 @maker
 def _deepen(a: Arrays, known: Memory, price: Floats, reduced: Floats, least: Floats,
             begin: Ints, by: Ints, order: Ints, group: NDArray[np.bool_], spare: float,
-            flown: Ints, on: Ints) -> bool:
+            limit: int, flown: Ints, on: Ints) -> tuple[bool, int]:
     """Search in depth for routes that serve all within `spare` [m] of reduced cost."""
     room = order.size + 1
     task, at, took = np.empty(room, np.int64), np.empty(room, np.int64), np.empty(room, np.int64)
@@ -332,8 +335,9 @@ def _deepen(a: Arrays, known: Memory, price: Floats, reduced: Floats, least: Flo
     depth, tried, found = 0, 0, False
     task[0], at[0] = 0, begin[order[0]]
     took[0] = -2
-    while depth >= 0 and tried < DEEPEST:
+    while depth >= 0 and tried < limit:
         t = order[task[depth]]
+        tried += 1
         if took[depth] >= 0:  # back from there
             e = took[depth]
             flies[known.uav[e]] = False
@@ -396,4 +400,4 @@ def _deepen(a: Arrays, known: Memory, price: Floats, reduced: Floats, least: Flo
                     flown[u] = took[d]
                     for i in range(known.first[took[d]], known.first[took[d] + 1]):
                         on[known.stops[i]] = u
-    return found
+    return found, tried
