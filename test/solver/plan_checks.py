@@ -7,6 +7,8 @@ import pytest
 
 from uav_task_alloc import Task, Uav
 from uav_task_alloc.objective import Weights, excess, fit
+from uav_task_alloc.solver import routes as of
+from uav_task_alloc.solver.problem import Limits, Rules, make_problem
 
 
 def make(uavs, tasks, seed=1, reach=math.inf):
@@ -15,6 +17,20 @@ def make(uavs, tasks, seed=1, reach=math.inf):
     place = lambda z: (*rng.uniform(0.0, 1000.0, 2), z)  # noqa: E731
     return ([Uav(f'u{i}', place(0.0), reach) for i in range(uavs)],
             [Task(f't{i}', place(30.0), value=1.0 + i % 3) for i in range(tasks)])
+
+
+def problem(uavs, tasks, seed=1, reach=1e9, **rules):
+    """The same as the kernels take it."""
+    return make_problem(*make(uavs, tasks, seed, reach), {}, Limits(), Rules(**rules))
+
+
+def some_routes(made, rng, leave=0):
+    """Tasks at random on UAVs at random, all but a few."""
+    a, routes = made.arrays, of.empty_routes(made.arrays)
+    for t in rng.permutation(np.arange(a.uavs, a.ends))[leave:]:
+        of.insert(a, routes, of.NODE(t), routes.prev[a.ends + rng.integers(a.uavs)])
+    of.total(a, routes)
+    return routes
 
 
 def check(made, uavs, tasks, hard=True):

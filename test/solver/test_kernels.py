@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
-from plan_checks import make
+from plan_checks import make, problem
 
 from uav_task_alloc.model import Task, ThreatZone
 from uav_task_alloc.solver import routes as of
@@ -18,10 +18,6 @@ from uav_task_alloc.solver.problem import Limits, Rules, make_problem
 from uav_task_alloc.solver.ruin import empty_log, recreate, ruin, undo
 
 NOBODY = np.empty(0, np.int64)
-
-
-def problem(uavs, tasks, seed=1, reach=1e9, **rules):
-    return make_problem(*make(uavs, tasks, seed, reach), {}, Limits(), Rules(**rules))
 
 
 def lengths(made, routes):
@@ -90,6 +86,20 @@ def test_neighbours_are_the_same_with_and_without_those_of_an_earlier_problem(zo
         assert {*map(frozenset, known.arrays.near.tolist())} == {
             *map(frozenset, anew.arrays.near.tolist())}
         assert known.arrays.starts.tolist() == anew.arrays.starts.tolist()
+
+
+@pytest.mark.parametrize('hard', [True, False])
+def test_starts_whose_range_does_not_get_there_are_no_neighbours_where_ranges_are_hard(hard):
+    uavs, tasks = make(12, 30)
+    uavs = [replace(uav, range=400.0 if i % 2 else 0.0) for i, uav in enumerate(uavs)]
+    a = make_problem(uavs, tasks, {}, Limits(), Rules(hard=hard)).arrays
+    for i in range(len(tasks)):
+        ways = np.array([of.step(a, u, a.uavs + i) for u in range(a.uavs)])
+        near = np.argsort(ways)
+        near = [u for u in near if not hard or ways[u] <= a.reach[u]][:a.starts.shape[1]]
+        got = a.start_length[i] < np.inf
+        assert a.starts[i][got].tolist() == near
+        assert a.start_length[i][got] == pytest.approx(ways[near])
 
 
 def test_few_ways_are_sought_out_of_a_zone_that_none_leads_into():

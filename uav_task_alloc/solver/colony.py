@@ -7,15 +7,16 @@ from dataclasses import dataclass
 from uav_task_alloc.solver import routes as of
 from uav_task_alloc.solver.bidding import Bidding
 from uav_task_alloc.solver.chance import chance
-from uav_task_alloc.solver.combine import combine, empty_memory
+from uav_task_alloc.solver.pool import empty_pool
 from uav_task_alloc.solver.problem import Problem
+from uav_task_alloc.solver.recombine import recombine
 from uav_task_alloc.solver.routes import EXCESS, TINY, VALUE, Routes
 from uav_task_alloc.solver.ruin import empty_log
 from uav_task_alloc.solver.scouts import Scouts
 from uav_task_alloc.solver.search import relieve, search
 
 PHASES = (0.0, 0.45, 0.92, 1.0)  # shares of the budget at which bees cool, cool again, stay cold
-WORK = 150.0  # looks at stops of remembered routes for each round of the whole search
+WORK = 150.0  # looks at stops of the pool for each round of the whole search
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,7 +45,7 @@ class Colony:
         self.arrays = arrays._replace(strain=arrays.strain.copy(), price=arrays.price.copy())
         self.habits, self.best, self.routes = habits, of.twin(start), of.twin(start)
         self._spare, self._phase = of.twin(start), 0
-        self._known = empty_memory(arrays)
+        self._pool = empty_pool(arrays)
         self._rng, self._log = chance(seed), empty_log(arrays)
         self.scouts = Scouts(problem, self.arrays, self._rng, learnt, habits.learning)
         self._scale = problem.scale
@@ -69,7 +70,7 @@ class Colony:
         h = self.habits
         if until > PHASES[self._phase + 1] and spent > 0.0:
             self._phase += 1
-            self._go_home(WORK * rounds / (until - spent))
+            self._go_home(WORK * rounds / max(1e-6, until - spent))
         costs = {'employed': rounds * h.some, 'onlooker': rounds * h.many,
                  'scout': self.scouts.work / 5.0}
         kind = self._bids.next({each: costs[each] for each in self._bids.shares()})
@@ -87,9 +88,9 @@ class Colony:
         return 0 if kind == 'scout' else rounds
 
     def _go_home(self, work: float) -> None:
-        """Go on from the best, after putting it together anew from all routes seen."""
+        """Go on from the best, after a look for something shorter in the pool."""
         a = self.arrays
-        if combine(a, self.best, self._known, work, self._spare) and (
+        if recombine(a, self.best, self._pool, work, self._spare) and (
                 of.better_now(a, self._spare, self.best)):
             of.copy(self._spare, self.best)
         of.copy(self.best, self.routes)
@@ -107,6 +108,6 @@ class Colony:
 
     def _search(self, routes: Routes, mean: float, hot: float, cold: float, rounds: int) -> int:
         a = self.arrays
-        found = int(search(a, routes, self.best, self._log, self._known, mean, hot, cold,
+        found = int(search(a, routes, self.best, self._log, self._pool, mean, hot, cold,
                            rounds, self._rng))
         return found

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 
 from uav_task_alloc.solver.chance import Chance, uniform
-from uav_task_alloc.solver.combine import Memory, remember
 from uav_task_alloc.solver.kernel import kernel
+from uav_task_alloc.solver.pool import Pool, collect
 from uav_task_alloc.solver.routes import (
     EXCESS,
     TINY,
@@ -27,7 +27,7 @@ LOOKS = 8  # of them in as many rounds as there are tasks
 
 
 @kernel
-def _look(a: Arrays, r: Routes, log: Log, known: Memory) -> int:
+def _look(a: Arrays, r: Routes, log: Log, pool: Pool) -> int:
     """Price left out tasks and metres beyond range anew; returns rounds until the next time."""
     if a.hard:  # dear enough that routes come back into range, cheap enough to pass through
         fine = r.sums[EXCESS] <= a.excess_floor + TINY
@@ -37,7 +37,7 @@ def _look(a: Arrays, r: Routes, log: Log, known: Memory) -> int:
             elif r.length[u] > a.reach[u] + TINY:
                 a.strain[u] = min(MOST, a.strain[u] * DEARER)
     look_for_trouble(a, r, log)
-    remember(a, r, known)
+    collect(a, r, pool)
     total(a, r)
     return max(20, a.price.size // LOOKS)
 
@@ -57,7 +57,7 @@ def relieve(a: Arrays, r: Routes) -> None:
 
 
 @kernel
-def search(a: Arrays, r: Routes, best: Routes, log: Log, known: Memory, mean: float,
+def search(a: Arrays, r: Routes, best: Routes, log: Log, pool: Pool, mean: float,
            hot: float, cold: float, rounds: int, rng: Chance) -> int:
     """Anneal r from temperature `hot` to `cold` [m]; returns how often `best` got better.
 
@@ -69,7 +69,7 @@ def search(a: Arrays, r: Routes, best: Routes, log: Log, known: Memory, mean: fl
     for i in range(rounds):
         log.size[4] -= 1
         if log.size[4] < 0:
-            log.size[4] = _look(a, r, log, known)
+            log.size[4] = _look(a, r, log, pool)
         before = cost(a, r)
         ruin(a, r, log, mean, i, rng)
         recreate(a, r, log, rng)
