@@ -41,8 +41,8 @@ def task_list(names, revision=1, *, side=100.0, service=0.0, returns=False, via=
 
 def make_vehicle(kind, system, **config):
     """A simulated vehicle that is ready to arm at once and does not flood."""
-    config = {'arming_delay': 0.0, 'floods': False, 'position': (0.0, 10.0 * system, 0.0),
-              **config}
+    config = {'arming_delay': 0.0, 'boot_delay': 0.0, 'settling_time': 0.0, 'floods': False,
+              'position': (0.0, 10.0 * system, 0.0), **config}
     return Vehicle(VehicleConfig(f'uav_{system}', system, ORIGIN, **config), AUTOPILOTS[kind])
 
 

@@ -187,5 +187,5 @@ def test_a_reboot_keeps_the_mission_and_forgets_the_transfer(bench):
     before = [content(i) for i in bench.download()]
     bench.count(3)
     bench.vehicle.reboot(bench.now)
-    assert not of(bench.pass_time(3.0), 'MISSION_REQUEST')
+    assert not of(bench.pass_time(9.0), 'MISSION_REQUEST')
     assert [content(i) for i in bench.download()] == before

@@ -96,18 +96,27 @@ def test_reached_is_repeated_ten_times_at_1_hz(bench):
     assert reached(bench.heard) == [0] * 11
 
 
-def test_a_count_ends_the_repetition(bench):
+def test_the_repetition_goes_on_across_a_new_upload(bench):
     bench.fly(waypoint(A))
     bench.reach(0)
-    bench.load(waypoint(B))
-    assert not reached(bench.pass_time(3.0))
+    bench.pass_time(2.5)
+    bench.load(waypoint(B), waypoint(C))
+    bench.pass_time(20.0)
+    assert reached(bench.heard) == [0] * 11
+
+
+def test_the_next_item_reached_ends_the_repetition_of_the_one_before(bench):
+    near = (105.0, 0.0, 30.0)
+    bench.fly(waypoint(A), waypoint(near))
+    bench.reach(1)
+    bench.heard.clear()
+    assert set(reached(bench.pass_time(20.0))) == {1}
 
 
 def test_reached_is_not_told_for_a_return_item(bench):
     bench.fly(waypoint(A), item(d.MAV_CMD_NAV_RETURN_TO_LAUNCH, frame=2))
     bench.until(lambda: not bench.flight.armed)
     assert set(reached(bench.heard)) == {0}
-    assert bench.flight.mode is Mode.RETURN
 
 
 def test_at_the_end_it_goes_to_hold_and_mission_state_is_always_0(bench):

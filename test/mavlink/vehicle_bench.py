@@ -17,7 +17,7 @@ NAN = math.nan
 class Bench:
     """Sends and hears for as many stations as speak; `heard` keeps all since `clear`."""
 
-    def __init__(self, autopilot, **config):
+    def __init__(self, autopilot, ready=READY, **config):
         config = {'position': (0.0, 0.0, 0.0), 'floods': False, **config}
         self.vehicle = Vehicle(VehicleConfig('uav_1', 1, ORIGIN, **config), AUTOPILOTS[autopilot])
         self.flight = self.vehicle.flight
@@ -27,7 +27,8 @@ class Bench:
         self._vehicle_codec = Codec(1, 1)
         self._parser = Codec(255, 190)
         self._stations = {}
-        self.pass_time(READY, step=READY)
+        if ready:
+            self.pass_time(ready, step=ready)
         self.heard.clear()
 
     def send(self, message, station=(255, 190)):
@@ -92,14 +93,29 @@ class Bench:
         self.send(d.MAVLink_mission_ack_message(1, 1, 0, 0), **kw)
         return items
 
-    def command(self, number, *params):
+    def command(self, number, *params, **kw):
         """The result of a COMMAND_LONG."""
         padded = (*params, *[0.0] * (7 - len(params)))
-        answers = self.send(d.MAVLink_command_long_message(1, 1, number, 0, *padded))
+        answers = self.send(d.MAVLink_command_long_message(1, 1, number, 0, *padded), **kw)
         return of(answers, 'COMMAND_ACK')[0].result
 
+    def request(self, kind):
+        """The messages of a type, such as 'SYS_STATUS', as REQUEST_MESSAGE brings them."""
+        number = getattr(d, f'MAVLINK_MSG_ID_{kind}')
+        padded = (number, *[0.0] * 6)
+        return of(self.send(d.MAVLink_command_long_message(
+            1, 1, d.MAV_CMD_REQUEST_MESSAGE, 0, *padded)), kind)
+
+    def texts(self):
+        """All STATUSTEXTs since `clear`."""
+        return [m.text for m in of(self.heard, 'STATUSTEXT')]
+
+    def arm(self):
+        return self.command(d.MAV_CMD_COMPONENT_ARM_DISARM, 1)
+
     def set_mode(self, mode):
-        number = self.flight.custom_modes[mode]
+        """DO_SET_MODE with a Mode or a custom_mode."""
+        number = self.flight.custom_modes[mode] if isinstance(mode, Mode) else mode
         if number > 0xffff:
             return self.command(d.MAV_CMD_DO_SET_MODE, 1, number >> 16 & 0xff, number >> 24)
         return self.command(d.MAV_CMD_DO_SET_MODE, 1, number)

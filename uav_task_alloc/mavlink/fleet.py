@@ -168,9 +168,12 @@ class _Log:
         """What happened since the last time."""
         for event in vehicle.take_events():
             x, y, z = event.point
-            line = {'t': round(event.t, 3), 'wall': round(time.time(), 3), 'uav': uav,
-                    'event': event.name, 'x': round(x, 3), 'y': round(y, 3), 'z': round(z, 3)}
-            self._write(line if event.seq is None else {**line, 'seq': event.seq})
+            line: dict[str, Any] = {
+                't': round(event.t, 3), 'wall': round(time.time(), 3), 'uav': uav,
+                'event': event.name, 'x': round(x, 3), 'y': round(y, 3), 'z': round(z, 3)}
+            more = {'seq': event.seq, 'mode': event.mode, 'cause': event.cause or None,
+                    'command': event.command or None}
+            self._write(line | {key: value for key, value in more.items() if value is not None})
 
     def _write(self, line: dict[str, Any]) -> None:
         self._file.write(json.dumps(line) + '\n')

@@ -10,13 +10,16 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 from uav_task_alloc.mavlink.codec import Message, with_plan_id
 from uav_task_alloc.mavlink.vehicle_commands import ArduPilotCommands, Commands, Px4Commands
 from uav_task_alloc.mavlink.vehicle_config import Event, Mode, VehicleConfig
+from uav_task_alloc.mavlink.vehicle_estimate import Estimate
+from uav_task_alloc.mavlink.vehicle_failsafe import Interventions
 from uav_task_alloc.mavlink.vehicle_flight import Flight
 from uav_task_alloc.mavlink.vehicle_flight_ardupilot import ArduPilotFlight
 from uav_task_alloc.mavlink.vehicle_flight_px4 import Px4Flight
 from uav_task_alloc.mavlink.vehicle_mission import COMPONENT, MissionService
 from uav_task_alloc.mavlink.vehicle_mission_ardupilot import ArduPilotMission
 from uav_task_alloc.mavlink.vehicle_mission_px4 import Px4Mission
-from uav_task_alloc.mavlink.vehicle_streams import Streams, Telemetry
+from uav_task_alloc.mavlink.vehicle_streams import Streams
+from uav_task_alloc.mavlink.vehicle_telemetry import Telemetry
 
 _CURRENT = dialect.MAVLINK_MSG_ID_MISSION_CURRENT
 
@@ -47,13 +50,15 @@ PX4 = Autopilot(
         dialect.MAVLINK_MSG_ID_VFR_HUD: 10.0,
         dialect.MAVLINK_MSG_ID_SYS_STATUS: 5.0,
         dialect.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: 5.0,
+        dialect.MAVLINK_MSG_ID_GPS_RAW_INT: 1.0,
+        dialect.MAVLINK_MSG_ID_ESTIMATOR_STATUS: 1.0,
         dialect.MAVLINK_MSG_ID_BATTERY_STATUS: 0.5,
         dialect.MAVLINK_MSG_ID_HOME_POSITION: 0.5,
     }, asks_current=False)
 AUTOPILOTS = {row.name: row for row in (ARDUPILOT, PX4)}
 
 
-class Vehicle:
+class Vehicle(Interventions):
     """Flight, mission service, commands and telemetry of one system; time is vehicle seconds."""
 
     def __init__(self, config: VehicleConfig, autopilot: Autopilot, now: float = 0.0) -> None:
@@ -63,13 +68,15 @@ class Vehicle:
         self.mission = autopilot.mission(config.system_id, capacity)
         self.flight = autopilot.flight(config, self.mission.items)
         self.mission.serve(self.flight)
-        self._telemetry = Telemetry(self.flight, autopilot.number, config.system_id)
+        self.estimate = Estimate(self.flight)
+        self._telemetry = Telemetry(self.flight, self.estimate, autopilot.number,
+                                    config.system_id)
         makers = self._telemetry.makers
         rates = autopilot.rates
         if not config.floods:
             rates = {number: min(rate, 2.0) for number, rate in rates.items()}
         if autopilot.asks_current:
-            makers = {**makers, _CURRENT: self._mission_current}
+            makers = {**makers, _CURRENT: lambda: [self._mission_current()]}
         self._streams = Streams(makers, rates)
         self._commands = autopilot.commands(self.flight, self._streams)
         self._handlers: dict[str, Callable[[Message], list[Message]]] = {
@@ -77,10 +84,15 @@ class Vehicle:
             'SET_MODE': self._set_mode, 'MISSION_SET_CURRENT': self._set_current,
         }
         self.reboot(now)
+        self.flight.events.clear()
 
     def reboot(self, now: float) -> None:
-        """Power off and on: boot time, rates and transfers are lost, the stored mission is not."""
+        """Power off and on: boot time, rates and transfers are lost, the stored mission is not.
+
+        In the air it falls.
+        """
         self.flight.reboot(now)
+        self.estimate.reboot()
         self.mission.reboot()
         self._streams.reboot(now)
         self._told: tuple[int, int] = (self.flight.seq, 0)
@@ -93,8 +105,9 @@ class Vehicle:
             self.flight.note('died')
 
     def revive(self, now: float) -> None:
-        """Boot again where it fell."""
+        """Boot again on the ground below where it died."""
         self.alive = True
+        self.flight.lie_down()
         self.reboot(now)
 
     @property
@@ -118,7 +131,9 @@ class Vehicle:
             return self._drain()
         if message.target_system not in (self.config.system_id, 0):
             return []
-        return handler(message) + self._drain()
+        with self.flight.caused_by(_station(message)):
+            answers = handler(message)
+        return answers + self._drain()
 
     def step(self, now: float) -> list[Message]:
         """Fly and stream until now [s]."""
@@ -164,6 +179,7 @@ class Vehicle:
     def _command(self, m: Message, params: tuple[float, ...]) -> list[Message]:
         if m.target_component not in (COMPONENT, 0):
             return []
+        self._commands.note(m.command, params, _station(m))  # type: ignore[arg-type]
         result = self._commands.run(m.command, params)  # type: ignore[arg-type]
         ack = dialect.MAVLink_command_ack_message(
             m.command, result, 0, 0, m.get_srcSystem(), m.get_srcComponent())
@@ -173,12 +189,16 @@ class Vehicle:
         return [ack, *asked]
 
     def _set_mode(self, m: Message) -> list[Message]:
-        mode = self._commands.mode_of(m.custom_mode)
-        if mode is not None:
-            self.flight.set_mode(mode)
+        self.flight.note('command', command='mode', mode=m.custom_mode, cause=_station(m))
+        self.flight.set_custom_mode(m.custom_mode)
         return []
 
     def _set_current(self, m: Message) -> list[Message]:
-        if m.target_component not in (COMPONENT, 0) or not self.flight.set_current(m.seq):
+        if m.target_component not in (COMPONENT, 0):
             return []
-        return [self._mission_current()]
+        self.flight.note('command', command='set current', seq=m.seq, cause=_station(m))
+        return [self._mission_current()] if self.flight.set_current(m.seq) else []
+
+
+def _station(m: Message) -> str:
+    return f'station {m.get_srcSystem()}/{m.get_srcComponent()}'

@@ -30,8 +30,12 @@ class Body:
 
     def step(self, dt: float, target: Point | None, speed: float, exit_speed: float) -> None:
         """Fly `dt` [s] towards the target, to pass it at `exit_speed`; None: stop."""
-        wish = (0.0, 0.0, 0.0) if target is None else self._wish(dt, target, speed, exit_speed)
-        change = _minus(wish, self.velocity)
+        self.steer(dt, (0.0, 0.0, 0.0) if target is None
+                   else self._wish(dt, target, speed, exit_speed))
+
+    def steer(self, dt: float, velocity: Point) -> None:
+        """Fly `dt` [s] towards a velocity [m/s], within the acceleration."""
+        change = _minus(velocity, self.velocity)
         most = self._config.acceleration * dt
         share = min(1.0, most / max(_norm(change), 1e-9))
         self.velocity = vx, vy, _ = _plus(self.velocity, change, share)
@@ -42,6 +46,11 @@ class Body:
         self.flown += moved * dt
         drain = max(moved, _HOVER * self._config.cruise_speed) * dt / self._config.range
         self.battery = max(0.0, self.battery - drain)
+
+    def fall(self, dt: float, speed: float) -> None:
+        """Fall straight down for `dt` [s], without motors."""
+        self.velocity = (0.0, 0.0, -speed)
+        self.position = _plus(self.position, self.velocity, dt)
 
     def _wish(self, dt: float, target: Point, speed: float, exit_speed: float) -> Point:
         gap = _minus(target, self.position)
@@ -65,9 +74,9 @@ class Body:
         self.position = (self.position[0], self.position[1], height)
         self.velocity = (0.0, 0.0, 0.0)
 
-    def geodetic(self) -> tuple[float, float, float]:
-        """Latitude [deg], longitude [deg], altitude AMSL [m] of the position."""
-        return self._near.place(self.position)
+    def geodetic(self, offset: Point = (0.0, 0.0, 0.0)) -> tuple[float, float, float]:
+        """Latitude [deg], longitude [deg], altitude AMSL [m] of the position, `offset` [m] off."""
+        return self._near.place(_plus(self.position, offset, 1.0))
 
 
 class _NearGeodetic:

@@ -24,13 +24,20 @@ class VehicleConfig:
     acceleration: float = 3.0  # [m/s2]
     range: float = math.inf  # [m] at cruise speed with a full battery
     acceptance_radius: float = 2.0  # [m] WPNAV_RADIUS, NAV_ACC_RAD
-    arming_delay: float | None = None  # [s] from boot to a position estimate
+    arming_delay: float | None = None  # [s] from power-up to a position estimate
+    boot_delay: float | None = None  # [s] from power-up to the end of the boot
+    settling_time: float | None = None  # [s] for which the first position estimate jumps
+    batteries: int = 1  # 1 or 2
+    second_battery: float = 0.7  # what remains in it, as a share of what remains in the first
     capacity: int | None = None  # items of the mission storage
     floods: bool = True  # PX4 streams its onboard set unasked
 
 
 class Mode(Enum):
-    """What the vehicle does by itself; `ArduPilot` and `Px4` give each a custom_mode."""
+    """What the vehicle does; `vehicle_modes` has the custom modes of each autopilot.
+
+    MANUAL is flown by the pilot's stick, and so is HOLD on ArduCopter (LOITER).
+    """
 
     MANUAL = 'manual'
     MISSION = 'mission'
@@ -40,12 +47,12 @@ class Mode(Enum):
     TAKEOFF = 'takeoff'
     RETURN = 'return'
     LAND = 'land'
+    OTHER = 'other'  # any that stops and stays, as CIRCLE or OFFBOARD do here
 
 
 class Change(Enum):
     """What happened to the stored mission, for the flight that may be using it."""
 
-    BEGUN = 'begun'  # nothing yet: an upload has been accepted
     TRUNCATED = 'truncated'
     WRITTEN = 'written'
     SWAPPED = 'swapped'
@@ -54,9 +61,17 @@ class Change(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Event:
-    """Something that happened on board, for the ground-truth log."""
+    """Something that happened on board, for the ground-truth log.
+
+    Names: armed, disarmed, takeoff, item_reached, mission_end, died, mode, command, crashed,
+    reboot, failsafe, failsafe_over, kill_switch, kill_switch_off, glitch. Causes: `station
+    SYSTEM/COMPONENT`, pilot, failsafe, self; of a failsafe its kind.
+    """
 
     t: float  # [s] vehicle time
-    name: str  # armed, disarmed, takeoff, item_reached, mission_end, died
+    name: str
     point: Point  # [m] ENU: of the item's target as stored, else of the vehicle
-    seq: int | None = None  # mission item, item_reached only
+    seq: int | None = None  # mission item: item_reached, and a command to set the current one
+    mode: int | None = None  # custom_mode: mode, and a command to change it
+    cause: str = ''  # of mode, armed, disarmed, crashed, command, failsafe
+    command: str = ''  # arm, disarm, forced arm, forced disarm, mode, takeoff, ...

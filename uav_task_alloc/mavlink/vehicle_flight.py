@@ -2,95 +2,154 @@
 """How a simulated autopilot flies: modes, arming, and the mission as it stands in storage."""
 from __future__ import annotations
 
-import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from typing import ClassVar
 
-from uav_task_alloc.geometry.frames import to_enu, to_geodetic
-from uav_task_alloc.mavlink import vehicle_item as item_
-from uav_task_alloc.mavlink.vehicle_body import Body, Track
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+
+from uav_task_alloc.mavlink.vehicle_body import Track
+from uav_task_alloc.mavlink.vehicle_boot import Boot, BootTimes
 from uav_task_alloc.mavlink.vehicle_config import Change, Event, Mode, VehicleConfig
 from uav_task_alloc.mavlink.vehicle_item import StoredItem
+from uav_task_alloc.mavlink.vehicle_modes import CustomMode
+from uav_task_alloc.mavlink.vehicle_navigation import Navigation
 from uav_task_alloc.model import Point
 
 _STEP = 0.1  # [s] longest step of the body
 _STRIDE = 1.0  # [m] longest step of the body: well inside the acceptance radius
 _GROUND_IDLE = 10.0  # [s] armed on the ground until it disarms itself
-_NEAR = 0.3  # [m] end of a climb, of a landing
+_FALL = 1.5  # [s] from any height to the ground without motors
 CRITICAL, WARNING, INFO = 2, 4, 6  # MAV_SEVERITY
 
 
-class Flight:
+class Flight(Navigation):
     """What both autopilots share; subclasses decide what a mission change or its end means.
 
     `reached` and `texts` fill for the owner to send and empty; `events` are the ground truth.
     """
 
-    custom_modes: ClassVar[dict[Mode, int]]
-    arming_delay: float  # [s]
-    return_height: float  # [m] above home
+    modes: ClassVar[dict[int, CustomMode]]  # by custom_mode
+    custom_modes: ClassVar[dict[Mode, int]]  # the custom_mode that `set_mode` enters
+    boot_states: ClassVar[tuple[int, int]]  # MAV_STATE in the two halves of the boot
+    boot_times: ClassVar[BootTimes]
+    start_mode: ClassVar[Mode]
     takeoff_height: float  # [m] above the ground where no height is given
 
     def __init__(self, config: VehicleConfig, items: Sequence[StoredItem]) -> None:
-        self.config = config
-        self.items = items
-        self.body = Body(config)
-        self.home: Point = config.position if config.home is None else config.home
-        self.home_amsl = to_geodetic(config.origin, self.home)[2]  # [m]
-        self.seq = 0  # current item, as MISSION_CURRENT says
+        super().__init__(config, items)
+        self.boot = Boot(config, self.boot_times)
         self.reached: list[int] = []
         self.texts: list[tuple[int, str]] = []
         self.events: list[Event] = []
+        self.refuses = ''  # why it refuses to arm; '': no reason of this kind
+        self.terminated = False  # the kill switch is on
+        self.stick: Point | None = None  # [m/s] ENU that the pilot asks for
         self.now = 0.0  # [s]
+        self.custom_mode = self.custom_modes[self.start_mode]
+        self.armed, self.landed = False, True
+        self._cause = 'self'
         self.reboot(0.0)
 
     def reboot(self, now: float) -> None:
-        """As after power-up: on the ground, disarmed, at the start of the mission."""
+        """As after power-up: disarmed, at the start of the mission; in the air it falls."""
         self.now = self.booted = now
-        self.mode = Mode.HOLD
-        self.armed = False
-        self.landed = True
+        self.boot.elapsed = 0.0
+        self.note('reboot')
+        self._set_number(self.custom_modes[self.start_mode])
+        self.failsafes: dict[str, None] = {}  # the kinds that are active, oldest first
         self.seq = 0
         self.speed = self.config.cruise_speed  # [m/s]
-        self.body.land_at(self.body.position[2])
-        self.track: Track | None = None
-        self.target: Point = self.body.position  # [m] of the item being flown
-        self._then: Point | None = None  # where the next item is
+        self.track, self.then = None, None
+        self.target = self.body.position
         self._idle_since = now
+        self._fall_speed = 0.0  # [m/s]
+        if self.landed:
+            self.body.land_at(self.body.position[2])
+        self._stop_motors()
+
+    @property
+    def mode(self) -> Mode:
+        """What the custom mode makes it do."""
+        return self.modes[self.custom_mode].mode
 
     @property
     def positioned(self) -> bool:
         """Whether there is a position estimate, without which it does not arm."""
-        delay = self.config.arming_delay
-        return self.now - self.booted >= (self.arming_delay if delay is None else delay)
+        return self.boot.positioned
+
+    @property
+    def system_status(self) -> int:
+        """MAV_STATE."""
+        if self.boot.active:
+            return self.boot_states[0 if self.boot.initialising else 1]
+        if self.terminated:
+            return int(dialect.MAV_STATE_FLIGHT_TERMINATION)
+        if self.failsafes:
+            return int(dialect.MAV_STATE_CRITICAL)
+        return int(dialect.MAV_STATE_STANDBY if self.landed else dialect.MAV_STATE_ACTIVE)
+
+    @contextmanager
+    def caused_by(self, cause: str) -> Iterator[None]:
+        """Events within are noted as caused by somebody else than the autopilot."""
+        before, self._cause = self._cause, cause
+        try:
+            yield
+        finally:
+            self._cause = before
 
     # commands
 
-    def arm(self) -> bool:
-        """False, and a text that says why, where it may not."""
-        refusal = self.arming_refusal()
+    def arm(self, force: bool = False) -> bool:
+        """False, and what the autopilot says about it, where it may not."""
+        refusal = self._never_arms() if force else self.arming_refusal()
         if refusal:
-            self.texts.append((CRITICAL, refusal))
+            self.report_refusal(refusal)
             return False
         if not self.armed:
             self.armed, self._idle_since = True, self.now
-            self.note('armed')
+            self.note('armed', cause=self._cause)
         return True
+
+    def _never_arms(self) -> str:
+        """Why it does not arm even when forced."""
+        if self.boot.active:
+            return 'System not initialised'
+        if self.terminated:
+            return 'Motors Emergency Stopped'
+        return 'Leaning' if self._fall_speed > 0.0 else ''
+
+    def prearm_refusal(self) -> str:
+        """Why it does not arm in any mode; empty where it does."""
+        reason = self._never_arms() or self.refuses
+        if reason:
+            return reason
+        if not self.positioned:
+            return 'Need Position Estimate'
+        return 'Battery low' if self.body.battery < 0.05 else ''
 
     def arming_refusal(self) -> str:
-        """Why it does not arm; empty where it does."""
-        if not self.positioned:
-            return 'Arm: Need Position Estimate'
-        return 'Arm: Battery low' if self.body.battery < 0.05 else ''
+        """Why it does not arm now; empty where it does."""
+        return self.prearm_refusal()
+
+    def report_refusal(self, reason: str) -> None:
+        """Tell the stations why it does not arm."""
 
     def disarm(self, force: bool = False) -> bool:
-        """Motors off; refused in the air."""
+        """Motors off; refused in the air unless forced: then it falls."""
         if not self.landed and not force:
             return False
+        self._stop_motors()
+        return True
+
+    def _stop_motors(self) -> None:
         if self.armed:
             self.armed = False
-            self.note('disarmed')
-        return True
+            self.note('disarmed', cause=self._cause)
+        if not self.landed and self._fall_speed == 0.0:
+            self.track = None
+            self._fall_speed = max(1.0, (self.body.position[2] - self.home[2]) / _FALL)
+            self._fall_cause = self._cause
 
     def takeoff(self, height: float) -> bool:
         """Climb to `height` [m] ENU from the ground."""
@@ -98,14 +157,27 @@ class Flight:
 
     def set_mode(self, mode: Mode) -> bool:
         """Change the mode; False where it is unknown or not possible now."""
-        if mode not in self.custom_modes or (mode is Mode.MISSION and not self.can_fly_mission()):
+        return mode in self.custom_modes and self.set_custom_mode(self.custom_modes[mode])
+
+    def set_custom_mode(self, number: int) -> bool:
+        """Change the mode; False where it is unknown or not possible now."""
+        if number not in self.modes:
             return False
-        if mode is not self.mode:
+        mode = self.modes[number].mode
+        if mode is Mode.MISSION and not self.can_fly_mission():
+            return False
+        if number != self.custom_mode:
             self.leave(self.mode)
-            self.mode, self.track, self._then = mode, None, None
+            self._set_number(number)
+            self.track, self.then = None, None
             self.speed = self.config.cruise_speed
             self.enter(mode)
         return True
+
+    def _set_number(self, number: int) -> None:
+        if number != self.custom_mode:
+            self.custom_mode = number
+            self.note('mode', mode=number, cause=self._cause)
 
     def can_fly_mission(self) -> bool:
         """Whether the mission mode is open now; a text says why not."""
@@ -128,7 +200,7 @@ class Flight:
 
     def enter(self, mode: Mode) -> None:
         """Entered a mode."""
-        if mode in (Mode.RETURN, Mode.LAND) and self.armed and self.landed:
+        if mode in (Mode.RETURN, Mode.LAND) and self.landed:
             self.disarm()
         elif mode is Mode.RETURN:
             self.track = self.way_home()
@@ -139,35 +211,68 @@ class Flight:
 
     def step(self, now: float) -> None:
         """Fly until `now` [s], in steps short enough to pass no point unseen."""
-        if not self.armed:
-            self.now = now
-            return
-        while self.now < now - 1e-9:
+        while self.now < now - 1e-9 and (self.armed or not self.landed):
             dt = min(_STEP, _STRIDE / self.speed, now - self.now)
-            self.now += dt
-            self._move(dt)
+            self._set_time(self.now + dt)
+            if self.armed:
+                self._move(dt)
+            else:
+                self._fall(dt)
+        self._set_time(max(self.now, now))
+
+    def _set_time(self, now: float) -> None:
+        self.now = now
+        self.boot.elapsed = now - self.booted
+
+    def _fall(self, dt: float) -> None:
+        self.body.fall(dt, self._fall_speed)
+        if self.body.position[2] <= self.home[2]:
+            self._touch_down()
+            self.note('crashed', cause=self._fall_cause)
+
+    def lie_down(self) -> None:
+        """On the ground below, whatever it did."""
+        if not self.landed:
+            self._touch_down()
+
+    def _touch_down(self) -> None:
+        self.body.land_at(self.home[2])
+        self.landed, self._idle_since, self._fall_speed = True, self.now, 0.0
 
     def _move(self, dt: float) -> None:
         if self.mode is Mode.MISSION and self.track is None:
             self.next_item()
-        track = self.track
+        stick = self.stick if self.modes[self.custom_mode].stick else None
         if self.landed:
-            if track is None or track.target is None:
+            climbs = stick is not None and stick[2] > 0.0
+            if not climbs and (self.track is None or self.track.target is None):
                 self._stay()
                 return
             self.landed = False
             self.note('takeoff')
-        target, exit_speed = None, 0.0
+        if stick is None:
+            self._follow(dt)
+        else:
+            self._steer(dt, stick)
+        if self.body.battery <= 0.0 and self.mode is not Mode.LAND and not self.landed:
+            self.texts.append((CRITICAL, 'Battery empty: landing'))
+            with self.caused_by('failsafe'):
+                self.set_mode(Mode.LAND)
+
+    def _steer(self, dt: float, velocity: Point) -> None:
+        self.body.steer(dt, velocity)
+        if self.body.position[2] <= self.home[2] and velocity[2] <= 0.0:
+            self._touch_down()
+
+    def _follow(self, dt: float) -> None:
+        track, target, exit_speed = self.track, None, 0.0
         if track is not None:
             target = track.target
             exit_speed = min(self.speed, track.exit_speed(
-                self.body.position, self._then, self.config.acceleration))
+                self.body.position, self.then, self.config.acceleration))
         self.body.step(dt, target, self.speed, exit_speed)
         if track is not None and track.done(self.body.position, self.now):
             self._end_of(track)
-        if self.body.battery <= 0.0 and self.mode is not Mode.LAND and not self.landed:
-            self.texts.append((CRITICAL, 'Battery empty: landing'))
-            self.set_mode(Mode.LAND)
 
     def _stay(self) -> None:
         if self.now - self._idle_since > _GROUND_IDLE:
@@ -176,8 +281,7 @@ class Flight:
     def _end_of(self, track: Track) -> None:
         self.track = None
         if track.lands:
-            self.body.land_at(self.home[2])
-            self.landed, self._idle_since = True, self.now
+            self._touch_down()
         if self.mode is Mode.MISSION:
             self.item_done()
         elif self.mode is Mode.TAKEOFF:
@@ -195,75 +299,12 @@ class Flight:
         """The item at `seq` has been flown."""
         raise NotImplementedError
 
-    def begin(self, seq: int) -> None:
-        """Copy an item out of the storage and fly it, whatever happens to the storage."""
-        self.seq = seq
-        item = self.items[seq]
-        self.track = self.make_track(item)
-        self.target = self.track.points[-1] if self.track.points else self.body.position
-        after = (i for i in self.items[seq + 1:] if i.command in item_.POSITIONAL)
-        following = next(after, None)
-        self._then = None if following is None else self.point(following)
-
-    def make_track(self, item: StoredItem) -> Track:
-        """How an item is flown from here."""
-        if item.command == item_.RETURN:
-            return self.way_home()
-        if item.command == item_.DELAY:
-            return Track((), self.config.acceptance_radius, item.p1)
-        target = self.point(item)
-        if item.command == item_.LAND:
-            x, y, z = target[0], target[1], self.body.position[2]
-            return Track(((x, y, z), (x, y, self.home[2])), _NEAR, lands=True)
-        if item.command == item_.TAKEOFF:
-            return self.climb(target)
-        hold = math.inf if item.command == item_.LOITER_UNLIMITED else item.p1
-        return Track((target,), self.radius(item), hold)
-
-    def climb(self, target: Point) -> Track:
-        """How NAV_TAKEOFF is flown: straight up."""
-        x, y, z = self.body.position
-        return Track(((x, y, max(z, target[2])),), _NEAR)
-
-    def radius(self, item: StoredItem) -> float:
-        """[m] at which an item counts as reached."""
-        return self.config.acceptance_radius
-
-    def point(self, item: StoredItem) -> Point:
-        """ENU of an item's place; without one it is here."""
-        base = self.home_amsl if item.frame in item_.RELATIVE_FRAMES else 0.0
-        if item.x == 0 and item.y == 0:
-            x, y, _ = self.body.position
-            return x, y, base + item.z - self.home_amsl + self.home[2]
-        return to_enu(self.config.origin, item.x * 1e-7, item.y * 1e-7, base + item.z)
-
-    def home_item(self) -> StoredItem:
-        """Home as an item: what HOME_POSITION says, and ArduPilot's seq 0."""
-        latitude, longitude, altitude = to_geodetic(self.config.origin, self.home)
-        return StoredItem(0, item_.WAYPOINT, 0.0, 0.0, 0.0, 0.0, round(latitude * 1e7),
-                          round(longitude * 1e7), round(altitude, 2))
-
-    def do(self, item: StoredItem) -> None:
-        """Carry out an item that is not flown."""
-        if item.command == item_.CHANGE_SPEED and item.p2 > 0.0:
-            self.speed = item.p2
-
     def tell_reached(self, seq: int, point: Point) -> None:
         """MISSION_ITEM_REACHED, and the ground truth of it."""
         self.reached.append(seq)
         self.events.append(Event(self.now, 'item_reached', point, seq))
 
-    def note(self, name: str) -> None:
+    def note(self, name: str, *, seq: int | None = None, mode: int | None = None,
+             cause: str = '', command: str = '') -> None:
         """An event for the ground truth, where the vehicle is now."""
-        self.events.append(Event(self.now, name, self.body.position))
-
-    def way_home(self) -> Track:
-        """Up, over home, down."""
-        x, y, z = self.body.position
-        top = max(z, self.home[2] + self.return_height)
-        hx, hy, hz = self.home
-        return Track(((x, y, top), (hx, hy, top), (hx, hy, hz)), _NEAR, lands=True)
-
-    def descent(self, point: Point) -> Track:
-        """Straight down."""
-        return Track(((point[0], point[1], self.home[2]),), _NEAR, lands=True)
+        self.events.append(Event(self.now, name, self.body.position, seq, mode, cause, command))

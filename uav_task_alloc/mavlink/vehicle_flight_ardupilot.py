@@ -5,13 +5,18 @@ from __future__ import annotations
 from enum import Enum
 from typing import ClassVar
 
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+
 from uav_task_alloc.mavlink import vehicle_item as item_
 from uav_task_alloc.mavlink.vehicle_body import Track
+from uav_task_alloc.mavlink.vehicle_boot import BootTimes
 from uav_task_alloc.mavlink.vehicle_config import Change, Mode
 from uav_task_alloc.mavlink.vehicle_flight import CRITICAL, WARNING, Flight
 from uav_task_alloc.mavlink.vehicle_item import StoredItem
+from uav_task_alloc.mavlink.vehicle_modes import COPTER_MODES, COPTER_NOT_ARMABLE
 
-_ARMABLE = {Mode.MANUAL, Mode.GUIDED, Mode.HOLD}
+_GUIDED = {4, 20}  # GUIDED, GUIDED_NOGPS
+_FIRST_PREARM, _PREARM_PERIOD = 15.0, 30.0  # [s] after power-up; between texts
 
 
 class Run(Enum):
@@ -26,24 +31,39 @@ class Run(Enum):
 class ArduPilotFlight(Flight):
     """Flies from seq 1 on; what it flies now is a copy that a changed storage restarts."""
 
+    modes = COPTER_MODES
     custom_modes: ClassVar[dict[Mode, int]] = {
         Mode.MANUAL: 0, Mode.MISSION: 3, Mode.GUIDED: 4, Mode.HOLD: 5, Mode.RETURN: 6,
         Mode.LAND: 9, Mode.BRAKE: 17,
     }
-    arming_delay = 41.0
+    boot_states = (dialect.MAV_STATE_BOOT, dialect.MAV_STATE_CALIBRATING)
+    boot_times = BootTimes(boot=8.0, position=41.0, settling=0.0)
+    start_mode = Mode.MANUAL
     return_height = 15.0
     takeoff_height = 10.0
 
     def reboot(self, now: float) -> None:
         super().reboot(now)
-        self.mode = Mode.MANUAL
         self.run = Run.NOT_STARTED
         self._upcoming = 1  # seq where the search for the next flown item begins
+        self._prearm_at = now + _FIRST_PREARM
 
     def arming_refusal(self) -> str:
-        if self.mode not in _ARMABLE:
-            return f'Arm: {self.mode.name} mode not armable'
-        return super().arming_refusal()
+        mode, number = self.modes[self.custom_mode], self.custom_mode
+        armable = number in _GUIDED or (mode.stick and number not in COPTER_NOT_ARMABLE)
+        return super().arming_refusal() if armable else f'{mode.name} mode not armable'
+
+    def report_refusal(self, reason: str) -> None:
+        self.texts.append((CRITICAL, f'Arm: {reason}'))
+
+    def step(self, now: float) -> None:
+        super().step(now)
+        if now < self._prearm_at:
+            return
+        self._prearm_at = now + _PREARM_PERIOD
+        reason = '' if self.armed else self.prearm_refusal()
+        if reason:
+            self.texts.append((CRITICAL, f'PreArm: {reason}'))
 
     def takeoff(self, height: float) -> bool:
         if self.mode is not Mode.GUIDED or not self.armed or not self.landed:

@@ -5,11 +5,15 @@ from __future__ import annotations
 from itertools import pairwise
 from typing import ClassVar
 
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+
 from uav_task_alloc.mavlink import vehicle_item as item_
 from uav_task_alloc.mavlink.vehicle_body import Track, distance
+from uav_task_alloc.mavlink.vehicle_boot import BootTimes
 from uav_task_alloc.mavlink.vehicle_config import Change, Mode
 from uav_task_alloc.mavlink.vehicle_flight import CRITICAL, Flight
 from uav_task_alloc.mavlink.vehicle_item import StoredItem
+from uav_task_alloc.mavlink.vehicle_modes import PX4_MODES, px4_mode
 from uav_task_alloc.model import Point
 
 _FARTHEST = 10_000.0  # [m] MIS_DIST_1WP and MIS_DIST_WPS
@@ -17,18 +21,17 @@ _REPEATS = 10  # times REACHED is sent again
 _REPEAT_PERIOD = 1.0  # [s]
 
 
-def _auto(sub: int) -> int:
-    return sub << 24 | 4 << 16
-
-
 class Px4Flight(Flight):
     """Flies the item at `seq`; a swap goes to the flagged one at once."""
 
+    modes = PX4_MODES
     custom_modes: ClassVar[dict[Mode, int]] = {
-        Mode.MANUAL: 3 << 16, Mode.TAKEOFF: _auto(2), Mode.HOLD: _auto(3),
-        Mode.MISSION: _auto(4), Mode.RETURN: _auto(5), Mode.LAND: _auto(6),
+        Mode.MANUAL: px4_mode(3), Mode.TAKEOFF: px4_mode(4, 2), Mode.HOLD: px4_mode(4, 3),
+        Mode.MISSION: px4_mode(4, 4), Mode.RETURN: px4_mode(4, 5), Mode.LAND: px4_mode(4, 6),
     }
-    arming_delay = 20.0
+    boot_states = (dialect.MAV_STATE_UNINIT, dialect.MAV_STATE_BOOT)
+    boot_times = BootTimes(boot=4.0, position=20.0, settling=5.0)
+    start_mode = Mode.HOLD
     return_height = 60.0
     takeoff_height = 2.5
 
@@ -43,9 +46,18 @@ class Px4Flight(Flight):
         if not self.positioned or not self.landed:
             return False
         self.set_mode(Mode.TAKEOFF)
-        x, y, _ = self.body.position
-        self.track = Track(((x, y, height),), 0.3)
+        self.track = self._rise_to(height)
         return True
+
+    def _rise_to(self, height: float) -> Track:
+        x, y, _ = self.body.position
+        return Track(((x, y, height),), 0.3)
+
+    def disarm(self, force: bool = False) -> bool:
+        was_armed, done = self.armed, super().disarm(force)
+        if was_armed and self.landed and self.mode in (Mode.RETURN, Mode.LAND):
+            self.set_mode(Mode.HOLD)
+        return done
 
     def can_fly_mission(self) -> bool:
         reason = self._infeasible()
@@ -67,6 +79,9 @@ class Px4Flight(Flight):
 
     def enter(self, mode: Mode) -> None:
         super().enter(mode)
+        if mode is Mode.TAKEOFF:
+            self.track = self._rise_to(max(self.body.position[2],
+                                           self.home[2] + self.takeoff_height))
         if mode is Mode.MISSION and self._finished:
             self.seq, self._finished = 0, False
 
@@ -83,8 +98,6 @@ class Px4Flight(Flight):
         return True
 
     def changed(self, change: Change, flagged: int | None) -> None:
-        if change is Change.BEGUN:
-            self._last_reached = None
         if change not in (Change.SWAPPED, Change.CLEARED):
             return
         last = max(0, len(self.items) - 1)

@@ -49,6 +49,7 @@ class MissionService:
 
     def handle(self, message: Message, now: float) -> bool:
         """Take a message of the mission protocol; False where it is none or for another."""
+        self.load()
         handler = self._handlers.get(message.get_type())
         if handler is None or not self._for_us(message):
             return False
@@ -62,6 +63,9 @@ class MissionService:
     def reboot(self) -> None:
         """Forget the transfer; the items stay."""
         raise NotImplementedError
+
+    def load(self) -> None:
+        """Bring the items back once the boot is over."""
 
     @property
     def mission_id(self) -> int | None:
@@ -78,6 +82,9 @@ class MissionService:
 
     def _send_ack(self, peer: Peer, result: int, mission_type: int = MISSION) -> None:
         self.out.append(dialect.MAVLink_mission_ack_message(*peer, result, mission_type))
+
+    def _send_text(self, severity: int, text: str) -> None:
+        self.out.append(dialect.MAVLink_statustext_message(severity, text.encode()))
 
     def _count(self, message: Message, peer: Peer, now: float) -> None:
         raise NotImplementedError

@@ -6,6 +6,7 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from uav_task_alloc.mavlink.codec import Message
 from uav_task_alloc.mavlink.vehicle_config import Change, Mode
+from uav_task_alloc.mavlink.vehicle_flight import WARNING
 from uav_task_alloc.mavlink.vehicle_flight_ardupilot import ArduPilotFlight, Run
 from uav_task_alloc.mavlink.vehicle_item import (
     Refusal,
@@ -34,9 +35,23 @@ class ArduPilotMission(MissionService):
         self._expected = 0
         self._heard = 0.0  # [s]
         self._asked = 0.0  # [s]
+        self._unloaded: list[StoredItem] | None = None  # the storage, not read yet
 
     def reboot(self) -> None:
         self._peer = None
+        if self.flight.boot.active:
+            self._unloaded = [*(self._unloaded or ()), *self.items]
+            self.items.clear()
+        self.load()
+
+    def load(self) -> None:
+        if self._unloaded is not None and not self.flight.boot.active:
+            self.items[:], self._unloaded = self._unloaded, None
+
+    @property
+    def _space(self) -> int:
+        """Items that can be stored now."""
+        return 0 if self.flight.boot.active else self._capacity
 
     def read(self, seq: int) -> StoredItem:
         return self.flight.home_item() if seq == 0 else self.items[seq]
@@ -48,6 +63,7 @@ class ArduPilotMission(MissionService):
                 1 if self.flight.mode is Mode.MISSION else 2)
 
     def step(self, now: float) -> None:
+        self.load()
         if self._peer is None:
             return
         if now - self._heard > GIVE_UP:
@@ -70,9 +86,12 @@ class ArduPilotMission(MissionService):
             self._send_ack(peer, dialect.MAV_MISSION_DENIED)
             return
         self._peer = None
-        if message.count > self._capacity:
+        if message.count > self._space:
             self._send_ack(peer, dialect.MAV_MISSION_NO_SPACE)
+            self._send_text(WARNING, f'Only {self._space} items are supported')
             return
+        if self._unloaded is not None:
+            self._unloaded.clear()
         if message.count < len(self.items):
             del self.items[message.count:]
             self._changed(Change.TRUNCATED)
@@ -140,6 +159,8 @@ class ArduPilotMission(MissionService):
         else:
             if message.mission_type in (MISSION, _ALL):
                 self.items.clear()
+                if self._unloaded is not None:
+                    self._unloaded.clear()
                 self._changed(Change.CLEARED)
             self._send_ack(peer, dialect.MAV_MISSION_ACCEPTED, message.mission_type)
 

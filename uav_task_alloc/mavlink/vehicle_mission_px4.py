@@ -88,7 +88,6 @@ class Px4Mission(MissionService):
         if message.count > self._capacity:
             self._send_ack(peer, dialect.MAV_MISSION_NO_SPACE)
             return
-        self._changed(Change.BEGUN)
         self._incoming, self._flagged = [], None
         self._seq, self._expected = 0, message.count
         if message.count == 0:
