@@ -157,6 +157,11 @@ class BridgeParams(Framed):
     when_foreign: str = param('yield', 'What to do about a mission that somebody else put on '
                               'board: leave it, or put ours back.',
                               choices=('yield', 'reassert'))
+    relaunch: str = param('operator', 'Who starts a UAV again after a landing at the end of its '
+                          'list or on a low battery: the operator by `~/hand_over`, or the bridge '
+                          'by itself.', choices=('operator', 'automatic'))
+    state_dir: str = param('', 'Folder that keeps over a restart who has each aircraft; empty: '
+                           'nothing is kept.', fixed=True)
     capabilities: tuple[str, ...] = param(
         (), 'What UAVs can do, `uav_1:camera,thermal` each.', fixed=True)
     full_range: float = param(0.0, 'Range of a full battery; 0: unknown, range_remaining is NaN.',
