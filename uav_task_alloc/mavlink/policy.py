@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the operator wants of the bridge, and what the bridge reports of tasks."""
+"""What the operator wants of the bridge, and what the bridge reports to people and of tasks."""
 from __future__ import annotations
 
 from dataclasses import dataclass
+
+from uav_task_alloc.model import ThreatZone
 
 
 @dataclass(frozen=True, slots=True)
@@ -13,6 +15,16 @@ class Policy:
     cruise_altitude: float = 50.0  # [m] above home, to take off to
     when_empty: str = 'hold'  # or 'return': an empty list in flight
     when_foreign: str = 'yield'  # or 'reassert': a mission that somebody else put there
+    relaunch: str = 'operator'  # or 'automatic': whether it starts again after a landing of ours
+    zones: tuple[ThreatZone, ...] = ()  # which RTL does not know
+
+
+@dataclass(frozen=True, slots=True)
+class Note:
+    """Something a human should read."""
+
+    level: str  # 'info', 'warning', 'error'
+    text: str
 
 
 @dataclass(frozen=True, slots=True)

@@ -36,11 +36,25 @@ class Profile:
     idle_after: float  # [s] until a stale transfer is forgotten
     modes: Mapping[int, Flight]  # by custom_mode
     set_mode: Mapping[Flight, int]  # custom_mode
+    family: str = ''  # whose mode numbers these are, see `modes`; '': unknown
     jump_command: bool = True  # knows DO_SET_MISSION_CURRENT
     amsl_takeoff: bool = False  # NAV_TAKEOFF takes AMSL; else height above home
 
     def flight(self, custom_mode: int) -> Flight:
         return self.modes.get(custom_mode, Flight.PILOT if self.modes else Flight.UNKNOWN)
+
+    @property
+    def takeoff_mode(self) -> int | None:
+        """The custom_mode that a take-off command brings; None: it changes no mode."""
+        return next((number for number, flight in self.modes.items()
+                     if flight is Flight.TAKEOFF), None) if self.amsl_takeoff else None
+
+    def commanded_mode(self, message: Message) -> int | None:
+        """The custom_mode that a DO_SET_MODE asks for; None for other messages."""
+        if message.get_type() != 'COMMAND_LONG' or message.command != d.MAV_CMD_DO_SET_MODE:
+            return None
+        main, sub = int(message.param2), int(message.param3)
+        return _px4(main, sub) if self.family == 'px4' else main
 
     def mode_command(self, peer: Peer, flight: Flight) -> Message:
         """The command that brings it there."""
@@ -64,8 +78,8 @@ def _px4(main: int, sub: int = 0) -> int:
     return main << 16 | sub << 24
 
 
-_COPTER = {3: Flight.MISSION, 4: Flight.HOLD, 17: Flight.HOLD, 6: Flight.RETURN,
-           21: Flight.RETURN, 27: Flight.RETURN, 9: Flight.LAND}
+_COPTER = {3: Flight.MISSION, 4: Flight.HOLD, 6: Flight.RETURN, 21: Flight.RETURN,
+           27: Flight.RETURN, 9: Flight.LAND}
 _PLANE = {10: Flight.MISSION, 15: Flight.HOLD, 11: Flight.RETURN, 21: Flight.RETURN,
           13: Flight.TAKEOFF, 20: Flight.LAND}
 _PX4 = {_px4(4, 2): Flight.TAKEOFF, _px4(4, 3): Flight.HOLD, _px4(4, 4): Flight.MISSION,
@@ -74,13 +88,14 @@ _PX4 = {_px4(4, 2): Flight.TAKEOFF, _px4(4, 3): Flight.HOLD, _px4(4, 4): Flight.
 ARDUPILOT = Profile(
     'ardupilot', ItemRules(home_first=True, whole_seconds=True, keeps_radius=False, yaw=0.0,
                            command_frame=3, capacity=650),
-    atomic=False, idle_after=9.0, modes=_COPTER,
+    atomic=False, idle_after=9.0, modes=_COPTER, family='copter',
     set_mode={Flight.MISSION: 3, Flight.HOLD: 4, Flight.RETURN: 6})
 ARDUPLANE = replace(
     ARDUPILOT, rules=replace(ARDUPILOT.rules, loiters=True), modes=_PLANE,
+    family='plane',
     set_mode={Flight.MISSION: 10, Flight.HOLD: 15, Flight.RETURN: 11})
 PX4 = Profile(
-    'px4', ItemRules(), atomic=True, idle_after=6.0, modes=_PX4, jump_command=False,
+    'px4', ItemRules(), atomic=True, idle_after=6.0, modes=_PX4, family='px4', jump_command=False,
     amsl_takeoff=True,
     set_mode={Flight.MISSION: _px4(4, 4), Flight.HOLD: _px4(4, 3), Flight.RETURN: _px4(4, 5)})
 PX4_PLANE = replace(PX4, rules=replace(PX4.rules, loiters=True))
