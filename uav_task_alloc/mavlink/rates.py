@@ -6,7 +6,7 @@ from pymavlink.dialects.v20 import ardupilotmega as d
 
 from uav_task_alloc.mavlink.codec import Message
 from uav_task_alloc.mavlink.peer import Peer
-from uav_task_alloc.mavlink.telemetry import RATES, Telemetry
+from uav_task_alloc.mavlink.telemetry import ESTIMATE, RATES, Telemetry
 
 PERIOD, TRIES = 2.0, 5  # [s] between requests
 QUIET = 3.0  # [s] without a position: perhaps restarted, which only new rates will show
@@ -25,19 +25,21 @@ class Rates:
 
     def step(self, now: float) -> list[Message]:
         """What is to be asked now."""
-        quiet = now - self._telemetry.position_at > QUIET
+        quiet = now - self._telemetry.positions_at > QUIET
         if self._came and quiet and not self._telemetry.stale(now):
             self._telemetry.heard.clear()
             self.again(now)
         self._came = self._came or not quiet
-        missing = [number for number in RATES if number not in self._telemetry.heard]
+        estimate = ESTIMATE.get(self._telemetry.autopilot)
+        rates = {**RATES, estimate: 1.0} if estimate is not None else RATES
+        missing = [number for number in rates if number not in self._telemetry.heard]
         if now < self._due or self._asked >= TRIES or (self._asked and not missing):
             return []
         self._asked += 1
         self._due = now + PERIOD
         # all of them at first: a stream may be there, and too slow
-        out = [self._peer.command(d.MAV_CMD_SET_MESSAGE_INTERVAL, number, 1e6 / RATES[number])
-               for number in (RATES if self._asked == 1 else missing)]
+        out = [self._peer.command(d.MAV_CMD_SET_MESSAGE_INTERVAL, number, 1e6 / rates[number])
+               for number in (rates if self._asked == 1 else missing)]
         if self._telemetry.home is None:
             out.append(self._peer.command(d.MAV_CMD_REQUEST_MESSAGE,
                                           d.MAVLINK_MSG_ID_HOME_POSITION))
