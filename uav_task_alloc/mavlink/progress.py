@@ -1,5 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Which task an item stands for: one table for each epoch, an epoch being one verified upload."""
+"""Which task an item stands for: one table for each epoch, an epoch being one verified upload.
+
+REACHED completes the item it names, and no other. That the current item has moved on is a claim:
+it completes what it passes only where the vehicle was, by its own positions.
+"""
 from __future__ import annotations
 
 import math
@@ -7,13 +11,15 @@ from collections import deque
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from uav_task_alloc.mission import Item
+from uav_task_alloc.mavlink.flown_path import FlownPath, Sample, Verdict
+from uav_task_alloc.mission import RETURN, Item
 from uav_task_alloc.model import Point, Task
 
 ECHO = 15.0  # [s] in which PX4 may repeat the last REACHED of the epoch before
 REACH = 60.0  # [m] beyond its radius from which an item can be reached between two positions
 FRESH = 3.0  # [s] a position tells where the vehicle is
 SETTLE = 3.0  # [s] in which a CURRENT sent before the last change may still come
+LATE = 6.0  # [s] in which REACHED and positions that were sent before may still come
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,6 +31,17 @@ class Progress:
     unheard: bool = False  # it was flown while nobody listened
 
 
+@dataclass(frozen=True, slots=True)
+class _Claim:
+    """Items that the vehicle has passed, as MISSION_CURRENT says, without a REACHED."""
+
+    items: tuple[Item, ...]
+    then: Point | None  # [m] ENU where it flies next
+    since: float  # [s] of the vehicle's clock
+    deadline: float  # [s] after which nothing more is expected
+    epoch: int
+
+
 class ProgressTable:
     """The items on board, the one being flown, and what was completed; seq counts without home."""
 
@@ -34,12 +51,18 @@ class ProgressTable:
         self.current: int | None = None  # len(items): flown to the end
         self.completed: dict[str, Point | None] = {}  # in order, of all epochs; where
         self.events: deque[Progress] = deque()
+        self.skipped: deque[str] = deque()  # tasks that somebody else has left out
+        self.chosen: int | None = None  # the current item, where somebody else has set it
+        self.path = FlownPath()
         self._started: str | None = None
         self._reached: tuple[int, float] | None = None  # last seq, when
         self._echo: tuple[int, float] | None = None  # seq of the epoch before, until when
         self._jump: tuple[int, float] | None = None  # set by us at a time, not seen yet
         self._asked: int | None = None  # we are setting this
         self._place: tuple[Point, float] | None = None
+        self._claims: list[_Claim] = []
+        self._since = -math.inf  # [s] of the vehicle's clock: the current item is flown
+        self._end_at = -math.inf  # [s] REACHED of the last item came
 
     @property
     def active(self) -> Item | None:
@@ -52,6 +75,24 @@ class ProgressTable:
     def finished(self) -> bool:
         return bool(self.items) and self.current == len(self.items)
 
+    @property
+    def pending(self) -> frozenset[str]:
+        """Tasks that may be flown: what shows it may still come."""
+        return frozenset(item.task for claim in self._claims for item in claim.items)
+
+    @property
+    def last_flown(self) -> int:
+        """The index of the last item with a place."""
+        return len(self.items) - 1 - int(self.returns)
+
+    @property
+    def returns(self) -> bool:
+        return bool(self.items) and self.items[-1].command == RETURN
+
+    def ended_lately(self, now: float, within: float) -> bool:
+        """REACHED of the last item has come, of this epoch or of the one before."""
+        return now - self._end_at <= within
+
     def begin(self, items: tuple[Item, ...], start: int | None, now: float) -> None:
         """A new epoch: what REACHED and CURRENT mean from now on."""
         self.epoch += 1
@@ -59,7 +100,8 @@ class ProgressTable:
             self._echo = self._reached[0], now + ECHO
         self.items, self.current, self._reached = items, start, None
         self._jump = None if start is None else (start, now)
-        self._asked = None
+        self._asked = self.chosen = None
+        self._since = self.path.newest
 
     def extend(self, items: tuple[Item, ...]) -> None:
         """A new epoch whose first items are those of the last: the vehicle goes on."""
@@ -69,15 +111,20 @@ class ProgressTable:
     def invalidate(self) -> None:
         """Nothing is known of what is on board."""
         self.items, self.current, self._reached, self._echo = (), None, None, None
-        self._started = self._jump = None
+        self._started = self._jump = self.chosen = None
+        self._claims.clear()
+        self.path.clear()
+        self._since = -math.inf
 
     def retag(self, items: tuple[Item, ...]) -> None:
         """The same items, now known by their tasks."""
         self.items = items
 
-    def at(self, position: Point, now: float) -> None:
-        """Where the vehicle is [m] ENU."""
-        self._place = position, now
+    def at(self, sample: Sample, newest: bool, now: float) -> None:
+        """A position of the vehicle, the newest or one that comes late."""
+        self.path.add(sample)
+        if newest:
+            self._place = sample.position, now
 
     def asked(self, seq: int) -> None:
         """We are about to set the current item, and may see it before we know that it is done."""
@@ -86,6 +133,7 @@ class ProgressTable:
     def jumped(self, seq: int, now: float) -> None:
         """We have set the current item: what lies between was not flown."""
         self.current, self._jump, self._asked = seq, (seq, now), None
+        self.chosen, self._since = None, self.path.newest
 
     def started(self) -> None:
         """The vehicle flies its mission: the task of the current item has begun."""
@@ -102,12 +150,24 @@ class ProgressTable:
         """MISSION_ITEM_REACHED, once or many times."""
         if not 0 <= seq < len(self.items) or self._is_echo(seq, now) or not self._near(seq, now):
             return
+        if seq == self.last_flown and (self._reached is None or self._reached[0] != seq):
+            self._end_at = now
         self._reached = seq, now
         if self.current is None or seq >= self.current:
-            self._pass(seq + 1)
+            if self.current is not None and self.current < seq:
+                self._claim(self.current, seq, now)
+            self._turn(seq)
+        item = self.items[seq]
+        if item.completes:
+            self._complete(item.task, item.position)
 
-    def moved(self, seq: int, now: float) -> None:
-        """MISSION_CURRENT: items before it were reached, even where REACHED was lost."""
+    def note_end(self, seq: int, now: float) -> None:
+        """REACHED that may be of this epoch or of the next: perhaps its mission has ended."""
+        if seq == self.last_flown:
+            self._end_at = now
+
+    def moved(self, seq: int, now: float, flying: bool) -> None:
+        """MISSION_CURRENT: where it is flying, items before it were passed."""
         if seq == self._asked:
             return
         if self._jump is not None:
@@ -115,11 +175,50 @@ class ProgressTable:
             if seq != start and (seq < start or now - when < SETTLE):
                 return  # sent before we set it
             self._jump = None
-        if self._started is None:
+        if self._started is None or not flying:
             if seq < len(self.items) and not (self.finished and seq == len(self.items) - 1):
                 self.current = seq  # somebody sets it; nothing is flown
         elif self.current is not None and self.current < seq <= len(self.items):
-            self._pass(seq)
+            self._claim(self.current, seq, now)
+            self.current, self._since = seq, self._recent()
+
+    def ended(self, seq: int, now: float) -> None:
+        """The vehicle says that the mission is flown, at its item `seq`."""
+        last = len(self.items) - 1
+        if (self.current is not None and self._jump is None and self._started is not None
+                and seq >= last and self.current <= last):
+            self._claim(self.current, last + 1, now)
+            self.current = last + 1
+
+    def step(self, now: float) -> None:
+        """Judge what was passed without a REACHED."""
+        for claim in list(self._claims):
+            left = tuple(i for i in claim.items if i.task not in self.completed)
+            verdicts = {item.task: self._verdict(item, claim) for item in left}
+            for item in left:
+                if verdicts[item.task] is Verdict.YES:
+                    self._complete(item.task, item.position)
+            left = tuple(i for i in left if verdicts[i.task] is not Verdict.YES)
+            if left and now < claim.deadline:
+                continue
+            self._claims.remove(claim)
+            if left:
+                self._settle(left, verdicts, claim)
+
+    def _settle(self, left: tuple[Item, ...], verdicts: dict[str, Verdict],
+                claim: _Claim) -> None:
+        """Nothing more will come: what it can have flown unseen it has flown, else it was left."""
+        blind = [i for i in left if verdicts[i.task] is Verdict.BLIND and i.position is not None]
+        chain = [i.position for i in blind if i.position is not None]
+        flown = bool(chain) and self.path.could_have(
+            chain, claim.then, math.fsum(i.params[0] for i in blind), claim.since)
+        for item in left:
+            if flown and item in blind:
+                self._complete(item.task, item.position)
+            else:
+                self.skipped.append(item.task)
+                if claim.epoch == self.epoch:
+                    self.chosen = self.current
 
     def caught_up(self, tasks: Iterable[Task]) -> None:
         """These were flown while nobody listened."""
@@ -133,17 +232,36 @@ class ProgressTable:
                 del self.completed[task.id]
                 self._started = None if self._started == task.id else self._started
 
-    def ended(self) -> None:
-        """The vehicle says that the whole mission is flown."""
-        if self.current is not None and self._jump is None and self._started is not None:
-            self._pass(len(self.items))
+    def was_at(self, item: Item, since: float | None = None) -> bool:
+        """Whether the vehicle's own positions show that it has reached an item."""
+        return item.position is not None and self.path.judge(
+            item.position, item.radius, item.params[0],
+            self._since if since is None else since) is Verdict.YES
 
-    def _pass(self, seq: int) -> None:
-        assert self.current is not None or seq > 0
-        for item in self.items[self.current if self.current is not None else seq - 1:seq]:
-            if item.completes:
-                self._complete(item.task, item.position)
-        self.current = seq
+    def _verdict(self, item: Item, claim: _Claim) -> Verdict:
+        if item.position is None:
+            return Verdict.NO
+        return self.path.judge(item.position, item.radius, item.params[0], claim.since)
+
+    def _claim(self, begin: int, end: int, now: float) -> None:
+        items = tuple(item for item in self.items[begin:end]
+                      if item.completes and item.task not in self.completed)
+        if items:
+            following = next((i.position for i in self.items[end:] if i.position is not None),
+                             None)
+            self._claims.append(_Claim(items, following, self._since, now + LATE, self.epoch))
+
+    def _turn(self, seq: int) -> None:
+        """The item after `seq` is flown from when that one was reached."""
+        item = self.items[seq]
+        at = None if item.position is None else self.path.visited_at(
+            item.position, item.radius, self._recent())
+        self.current, self.chosen = seq + 1, None
+        self._since = self._recent() if at is None else at
+
+    def _recent(self) -> float:
+        """[s] of the vehicle's clock: positions since then may be newer than the last message."""
+        return max(self._since, self.path.newest - LATE)
 
     def _complete(self, task: str, place: Point | None, unheard: bool = False) -> None:
         if task not in self.completed:
@@ -151,10 +269,10 @@ class ProgressTable:
             self.events.append(Progress(task, completed=True, unheard=unheard))
 
     def _is_echo(self, seq: int, now: float) -> bool:
-        """A repetition from the epoch before, unless the new item is being reached as well."""
+        """A repetition from the epoch before, unless the vehicle is seen at the new item."""
         if self._echo is None or now > self._echo[1] or seq != self._echo[0]:
             return False
-        return self._distance(seq) > self.items[seq].radius + 10.0 or seq != self.current
+        return not self.was_at(self.items[seq])
 
     def _near(self, seq: int, now: float) -> bool:
         if self._place is None or now - self._place[1] > FRESH:
