@@ -14,7 +14,8 @@ class FlightBench:
     """A ground station with simulated vehicles, each on a line of its own to it."""
 
     def __init__(self, *kinds, seed=0, loss=0.0, delay=(0.0, 0.0), takeoff=True, configs=None,
-                 tick=0.1, **policy):
+                 tick=0.1, store=None, **policy):
+        self.store = store or Store()
         self.now, self.tick = 0.0, tick
         self.seed, self.policy = seed, Policy(takeoff=takeoff, **policy)
         self.vehicles = {n: make_vehicle(kind, n, **(configs or {}).get(n, {}))
@@ -26,9 +27,9 @@ class FlightBench:
         self.start()
 
     def start(self):
-        """A new bridge, as after kill -9: it knows nothing."""
+        """A new bridge, as after kill -9: it knows what its `store` kept, nothing without one."""
         self.ground = Ground(Station(origin=ORIGIN, policy=self.policy),
-                             random.Random(self.seed))
+                             random.Random(self.seed), self.store)
         for n in self.vehicles:
             self.codecs['up', n] = Codec(*OURS)
             self.ears['down', n] = Codec(*OURS)
@@ -79,6 +80,13 @@ class FlightBench:
 
     def failed(self, n=1):
         return [e.task for u, e in self.events if u == f'uav_{n}' and e.event == 'FAILED']
+
+    def hand_over(self, n=1):
+        """An operator does; returns why it is refused."""
+        return self.ground.hand_over(f'uav_{n}', 'test', self.now)
+
+    def authority(self, n=1):
+        return self.pilot(n).authority.state
 
     def state(self, n=1):
         return state_of(self.ground.served[n], self.now)
@@ -138,3 +146,17 @@ def places(bench, n=1):
 
 def to_letter(p):
     return 'ABCDEFGHIJKLMNOPQRSTUVWXYZ'[round(p[0] / 100.0) + 5 * (round(p[1] / 100.0) - 1)]
+
+
+class Store:
+    """What a bridge keeps on disk, in memory."""
+
+    def __init__(self):
+        self.records, self.saved = {}, 0
+
+    def load(self, uav_id):
+        return self.records.get(uav_id)
+
+    def save(self, uav_id, record):
+        self.records[uav_id] = record
+        self.saved += 1

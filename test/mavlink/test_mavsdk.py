@@ -14,6 +14,7 @@ import pytest
 from mission_bench import ORIGIN, task_list
 
 from uav_task_alloc.geometry.frames import to_geodetic
+from uav_task_alloc.mavlink.authority import State
 from uav_task_alloc.mavlink.board import MissionState
 from uav_task_alloc.mavlink.ground import Ground, Station
 from uav_task_alloc.mavlink.link import open_link
@@ -84,6 +85,7 @@ class Peers:
                 self.proxy.front.getsockname()[1] if self.proxy else port), *map(str, systems)],
             stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL)
         self.until(lambda: set(self.ground.served) == set(systems))
+        self.hand_over()
 
     def until(self, condition, limit=30.0):
         """Serve until the condition holds; fail after `limit` [s]."""
@@ -92,6 +94,13 @@ class Peers:
             assert time.monotonic() < end, 'timed out'
             assert self.process.poll() is None, 'MAVSDK has died'
             self.serve()
+
+    def hand_over(self):
+        """They are in the air, in Hold, when the bridge starts: they are somebody else's."""
+        for served in self.ground.served.values():
+            self.until(lambda served=served: served.pilot.telemetry.airborne)
+            assert served.pilot.authority.state is not State.HELD
+            assert self.ground.hand_over(served.uav_id, 'test', time.monotonic()) == ''
 
     def serve(self):
         out = []

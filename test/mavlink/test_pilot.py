@@ -161,7 +161,7 @@ def test_a_vehicle_that_holds_after_its_last_task_returns_when_told(kind):
 
 @BOTH
 def test_a_list_that_returns_ends_at_home_and_a_new_one_flies_again(kind):
-    bench = FlightBench(kind).found()
+    bench = FlightBench(kind, relaunch='automatic').found()
     bench.assign(task_list('A', returns=True))
     assert bench.run(lambda: bench.completed() == ['A'])
     bench.assign(task_list('', 2, returns=True))

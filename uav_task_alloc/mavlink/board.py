@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+import re
 from collections import deque
 from dataclasses import dataclass, replace
 from enum import Enum
@@ -13,9 +14,8 @@ from uav_task_alloc.errors import MissionError
 from uav_task_alloc.geometry.frames import Origin
 from uav_task_alloc.mavlink.change import Change, Kind, change
 from uav_task_alloc.mavlink.codec import Message, plan_id
-from uav_task_alloc.mavlink.helm import Note
 from uav_task_alloc.mavlink.peer import NO_SPACE, Peer
-from uav_task_alloc.mavlink.policy import TaskProgress
+from uav_task_alloc.mavlink.policy import Note, TaskProgress
 from uav_task_alloc.mavlink.profiles import Profile
 from uav_task_alloc.mavlink.progress import ProgressTable
 from uav_task_alloc.mavlink.recall import Recall
@@ -25,6 +25,7 @@ from uav_task_alloc.mavlink.upload import Upload
 from uav_task_alloc.mission import (
     Item,
     TaskList,
+    alike,
     all_alike,
     home_item,
     mission_items,
@@ -32,6 +33,9 @@ from uav_task_alloc.mission import (
 from uav_task_alloc.model import Task
 
 SETTLE = 3.0  # [s] in which messages sent before the last change may still come
+LATE = 6.0  # [s] around the end of a mission in which its last REACHED comes
+AMBIGUOUS = 32  # REACHED between the last item sent and the answer
+SPACE = re.compile(r'Only (\d+) items are supported')
 CHECK = 60.0  # [s] between readbacks of a mission that nobody should have changed
 
 
@@ -72,9 +76,13 @@ class Board:
         self.verified_at = 0.0  # [s]
         self.read_once = False  # since the vehicle was first heard or restarted
         self.must_jump: int | None = None  # the item to fly now, where the upload did not say it
+        self.is_foreign = False  # somebody else has changed what we had verified
         self._profile, self._origin, self._telemetry = profile, origin, telemetry
         self._refused: dict[str, tuple[Task, str]] = {}  # as it was, and why
         self._horizon: int | None = None  # stops; None: all
+        self._fits = False  # the horizon is on board: there may be space for more
+        self._space: int | None = None  # items that the vehicle says it has space for
+        self._ambiguous: list[tuple[int, float]] = []  # REACHED of this epoch, or of the next
         self._state = MissionState.UNKNOWN
         self._uploading: tuple[Change, TaskList] | None = None  # and the list it is for
         self._begun = False  # the epoch of this upload
@@ -133,12 +141,14 @@ class Board:
     def remaining(self) -> TaskList:
         """The list less what is flown or refused, up to the horizon."""
         assert self.tasks is not None
-        tasks = self.tasks.without({*self.progress.completed, *self._refused})
+        tasks = self.tasks.without({
+            *self.progress.completed, *self.progress.pending, *self._refused})
         return tasks if self._horizon is None else tasks.first(self._horizon)
 
     def wanted(self) -> tuple[Item, ...]:
         """The items to fly from here; a task that cannot be one is refused."""
-        key = (self.tasks, len(self.progress.completed), len(self._refused), self._horizon)
+        key = (self.tasks, len(self.progress.completed), self.progress.pending,
+               len(self._refused), self._horizon)
         if self._wanted is not None and self._wanted[0] == key:
             return self._wanted[1]
         remaining = self.remaining()
@@ -154,17 +164,24 @@ class Board:
         """What has to change on board."""
         assert self.held is not None
         wanted, current = self.wanted(), self.progress.current
-        found = change(self.held, current, wanted, done=self.progress.completed)
-        if self._horizon is not None and found.kind is not Kind.KEEP and self._enough():
-            return Change(Kind.KEEP, self.held, current or 0)
+        done = {*self.progress.completed, *self.progress.pending}
+        found = change(self.held, current, wanted, done=done)
+        if self._horizon is not None and found.kind is not Kind.KEEP:
+            if self._enough():
+                return Change(Kind.KEEP, self.held, current or 0)
+            if self._fits:
+                self._fits, self._horizon = False, 2 * self._horizon
+                return self.change()
         room = self._profile.rules.capacity - self.own
         if found.kind is Kind.APPEND and (self._profile.atomic or len(found.items) > room):
             return change(self.held, current, wanted, append=False)
         return found
 
-    def adopt(self, found: Change, now: float) -> None:
-        """The list is on board already."""
+    def adopt(self, found: Change, now: float, tasks: TaskList | None = None) -> None:
+        """The list is on board already; not where `tasks` was meant, and another came since."""
         assert self.tasks is not None
+        if tasks is not None and tasks != self.tasks:
+            return
         if self.revision != self.tasks.revision or self._state is not MissionState.VERIFIED:
             self._verify(found.items, self.tasks.revision, now)
             self.progress.retag(found.items)
@@ -173,7 +190,7 @@ class Board:
         """Bring it on board."""
         assert self.tasks is not None
         self._uploading, self._begun, self.trouble = (found, self.tasks), False, False
-        self._began_at = now
+        self._began_at, self._space = now, None
         home = () if not self.own else (home_item(
             self._telemetry.home, self._origin, self._profile.rules),)
         return self.upload.replace(Mission(
@@ -192,9 +209,76 @@ class Board:
         self._settle(now)
         return out
 
+    def reached(self, seq: int, now: float) -> None:
+        """MISSION_ITEM_REACHED; once all items are sent it may be of either mission."""
+        if self.open and self.upload.sent_all:
+            if len(self._ambiguous) < AMBIGUOUS:
+                self._ambiguous.append((seq, now))
+            self.progress.note_end(seq, now)
+        else:
+            self.progress.reached(seq, now)
+
+    def note_space(self, text: str) -> None:
+        """STATUSTEXT: for how many items the vehicle has space."""
+        found = SPACE.search(text)
+        if found:
+            self._space = int(found[1])
+
+    def abort(self) -> list[Message]:
+        """Somebody else has the vehicle: the transfer ends where it is."""
+        if self.upload.busy:
+            self.upload.reset()
+        if self._uploading is not None:
+            self._uploading, self.held = None, None
+            self._state = MissionState.UNKNOWN if self._profile.atomic else MissionState.MIXED
+        self._forget_ambiguous()
+        return []
+
+    def verified(self) -> bool:
+        """The list is on board, and nothing is to be changed."""
+        return (self.state is MissionState.VERIFIED and self.held is not None
+                and self.tasks is not None and bool(self.wanted())
+                and self.change().kind is Kind.KEEP)
+
+    def ours(self) -> bool:
+        """What was read back holds a task of the list: nobody else has put it there."""
+        if not self.held or self.tasks is None or not self.tasks.stops:
+            return False
+        items = [item for item in self.wanted() if item.completes]
+        return any(alike(item, held) for item in items for held in self.held)
+
+    def foreign(self) -> bool:
+        """Somebody else has changed what was verified."""
+        return self.is_foreign
+
+    def ended(self, now: float) -> bool:
+        """REACHED of the last item has just come."""
+        return self.progress.ended_lately(now, LATE)
+
+    def rejected(self, now: float) -> bool:
+        """The vehicle says that it has no valid mission, just after it took ours (PX4)."""
+        telemetry = self._telemetry
+        return (telemetry.mission_state == d.MISSION_STATE_NO_MISSION
+                and now - telemetry.current_at < LATE
+                and (self._begun or now - self.verified_at < LATE))
+
+    def returning(self) -> bool:
+        """The RETURN item is next, or is being flown."""
+        progress = self.progress
+        return progress.returns and progress.current is not None and (
+            progress.current > progress.last_flown)
+
+    def may_end(self) -> bool:
+        """The last item with a place is being flown, or is passed."""
+        progress = self.progress
+        return bool(progress.items) and progress.current is not None and (
+            progress.current >= progress.last_flown)
+
     def restarted(self) -> None:
         """The vehicle forgot its transfer, and perhaps its mission."""
         self.upload.reset()
+        self.is_foreign = False
+        self._ambiguous.clear()
         self.progress.invalidate()
         self.held, self._uploading, self._state = None, None, MissionState.UNKNOWN
         self.read_once = False
@@ -249,18 +333,45 @@ class Board:
         if self._begun:
             return
         self._begun = True
+        of_new = self._sort_reached(found)
         self.item_time = (self.item_time + (now - self._began_at) / len(found.items)) / 2.0
         if found.kind is Kind.APPEND:
             self.progress.extend(found.items)
-            return
-        self.recall.stash()
-        self.progress.begin(found.items, found.start, now)
-        if not self._profile.atomic:
-            self.must_jump = found.start
+        else:
+            self.recall.stash()
+            self.progress.begin(found.items, found.start, now)
+            if not self._profile.atomic:
+                self.must_jump = found.start
+        for seq, when in of_new:
+            self.progress.reached(seq, when)
+
+    def _sort_reached(self, found: Change) -> list[tuple[int, float]]:
+        """Credit what was reached to the mission at whose item the vehicle was seen."""
+        of_new, old = [], self.progress.items
+        for seq, when in self._ambiguous:
+            before = old[seq] if 0 <= seq < len(old) else None
+            after = found.items[seq] if 0 <= seq < len(found.items) else None
+            at_new = after is not None and self.progress.was_at(after)
+            if before is not None and (self.progress.was_at(before) or (
+                    after is not None and alike(before, after))):
+                self.progress.reached(seq, when)
+            elif at_new:
+                of_new.append((seq, when))
+        self._ambiguous.clear()
+        return of_new
+
+    def _forget_ambiguous(self) -> None:
+        """The transfer has failed: what was reached while it ran was of the old mission."""
+        ambiguous, self._ambiguous = self._ambiguous, []
+        for seq, when in ambiguous:
+            if 0 <= seq < len(self.progress.items) and self.progress.was_at(
+                    self.progress.items[seq]):
+                self.progress.reached(seq, when)
 
     def _verify(self, items: tuple[Item, ...], revision: int, now: float) -> None:
         self.held, self.revision, self.verified_at = items, revision, now
         self._state, self.read_once = MissionState.VERIFIED, True
+        self.is_foreign, self._fits = False, self._horizon is not None
         self.plan_id = self._heard_plan
 
     def _was_read(self, event: Held, now: float) -> None:
@@ -276,6 +387,11 @@ class Board:
         self.held, self.verified_at, self.plan_id = held, now, self._heard_plan
         if self._state is MissionState.VERIFIED or (self.tasks is None and held):
             self._state = MissionState.FOREIGN
+            self.is_foreign = self.is_foreign or self.read_once
+            self.read_once = False
+        elif self.is_foreign and self.tasks is not None and self.wanted() and change(
+                held, None, self.wanted(), done=self.progress.completed).kind is not Kind.SWAP:
+            self.is_foreign, self._state = False, MissionState.UNKNOWN
         self.recall.stash()
         current = self._telemetry.current
         self.progress.begin(held, None if current is None or not held
@@ -285,12 +401,10 @@ class Board:
         self.notes.append(Note('error', f'mission upload failed: {event.reason}'))
         self.held, self.trouble = None, True
         self._state = MissionState.UNKNOWN if self._profile.atomic else MissionState.MIXED
+        self._forget_ambiguous()
         stops = [item.task for item in found.items if item.completes]
-        if event.result == NO_SPACE and len(stops) > 1:
-            self._horizon = len(stops) // 2
-            self.trouble = False
-            self.notes.append(Note('warning', 'no space on board: flying the first '
-                                   f'{self._horizon} tasks of {len(stops)}, the others follow'))
+        if event.result == NO_SPACE:
+            self._shrink(len(stops))
         elif event.result is not None:
             seq = min(max((event.seq or 0) - self.own, 0), len(found.items) - 1)
             task = next((i.task for i in found.items[seq:] if i.task), stops[0] if stops else '')
@@ -299,6 +413,17 @@ class Board:
         elif 'infeasible' in event.reason:
             for task in stops:
                 self._refuse(task, event.reason, tasks)
+
+    def _shrink(self, stops: int) -> None:
+        """Fly fewer tasks at a time; where not even one fits the store is not open yet."""
+        if stops <= 1 or self._space == 0:
+            self._horizon = None
+            self.notes.append(Note('warning', 'no space on board for any task yet: '
+                                   'trying again'))
+            return
+        self._horizon, self._fits, self.trouble = stops // 2, False, False
+        self.notes.append(Note('warning', 'no space on board: flying the first '
+                               f'{self._horizon} tasks of {stops}, the others follow'))
 
     def _refuse(self, task: str, reason: str, tasks: TaskList) -> None:
         """Not to be flown as it is in that list; what has changed since is yet to be tried."""

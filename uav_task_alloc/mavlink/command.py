@@ -14,12 +14,17 @@ PERIOD = 1.0  # [s] until a command is repeated
 TRIES = 5
 
 
+def _always() -> bool:
+    return True
+
+
 class Answer(Enum):
     """What has become of a command."""
 
     OPEN = 'open'
     DONE = 'done'
     FAILED = 'failed'
+    DROPPED = 'dropped'  # no longer wanted
 
 
 @dataclass(slots=True)
@@ -32,9 +37,11 @@ class Command:
     ack_suffices: bool = True
     tries: int = TRIES
     patient: bool = False  # a refusal may pass: go on trying
+    wanted: Callable[[], bool] = _always  # no longer: it is dropped between two tries
     fallback: Command | None = None
     answer: Answer = Answer.OPEN
     reason: str = ''
+    began: float | None = None  # [s] of the first try
     _due: float = float('-inf')
     _sent: int = 0
 
@@ -42,11 +49,15 @@ class Command:
         """Send what is due."""
         if self.answer is not Answer.OPEN:
             return []
+        if not self.wanted():
+            self.answer = Answer.DROPPED
+            return []
         if self._sent and self.seen():
             self.answer = Answer.DONE
         elif now >= self._due:
             if self._sent < self.tries:
                 self._sent += 1
+                self.began = now if self.began is None else self.began
                 self._due = now + PERIOD
                 return [self.message]
             self._end(self.reason or f'no answer to {self.tries} tries')
@@ -54,7 +65,7 @@ class Command:
         return []
 
     def receive(self, message: Message) -> None:
-        """Take a COMMAND_ACK."""
+        """Take a COMMAND_ACK that is addressed to us."""
         if (self.answer is not Answer.OPEN or message.get_type() != 'COMMAND_ACK'
                 or message.command != getattr(self.message, 'command', None) or not self._sent):
             return

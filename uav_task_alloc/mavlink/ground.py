@@ -6,11 +6,13 @@ import random
 from collections.abc import Collection, Hashable, Iterable
 from dataclasses import dataclass, field
 from itertools import permutations
+from typing import Protocol
 
 from pymavlink.dialects.v20 import ardupilotmega as d
 
 from uav_task_alloc.errors import UnknownName
 from uav_task_alloc.geometry.frames import Origin
+from uav_task_alloc.mavlink.authority import Record
 from uav_task_alloc.mavlink.codec import Message
 from uav_task_alloc.mavlink.peer import Peer
 from uav_task_alloc.mavlink.pilot import Pilot
@@ -20,6 +22,16 @@ from uav_task_alloc.mission import TaskList
 
 Address = Hashable  # a link and the far end on it
 Outgoing = list[tuple[Address, Message]]
+
+
+class AuthorityStore(Protocol):
+    """Keeps who has each aircraft over a restart of the bridge."""
+
+    def load(self, uav_id: str) -> Record | None:
+        """What was saved last; None where nothing was."""
+
+    def save(self, uav_id: str, record: Record) -> None:
+        """On disk when this returns."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,8 +60,9 @@ class Served:
 class Ground:
     """Routes each message to the pilot of its vehicle, and the answers back the same way."""
 
-    def __init__(self, station: Station, rng: random.Random) -> None:
-        self._station, self._rng = station, rng
+    def __init__(self, station: Station, rng: random.Random,
+                 store: AuthorityStore | None = None) -> None:
+        self._station, self._rng, self._store = station, rng, store
         self.served: dict[int, Served] = {}  # by system id
         self._shared: list[tuple[TaskList | None, int]] = []  # lists and memories seen
 
@@ -67,7 +80,7 @@ class Ground:
                 served.strays += 1
                 return []
             served.address = address
-            served.pilot.telemetry.restart()  # or another vehicle with the same id
+            served.pilot.moved_address(now)
         return self._sent(served, served.pilot.receive(message, now))
 
     def step(self, now: float) -> Outgoing:
@@ -83,6 +96,20 @@ class Ground:
         for served in self.served.values():
             if served.uav_id == uav_id:
                 return self._sent(served, served.pilot.assign(tasks, now))
+        raise UnknownName('uav', uav_id, [s.uav_id for s in self.served.values()])
+
+    def hand_over(self, uav_id: str, operator: str, now: float) -> str:
+        """An operator gives a UAV to the bridge.
+
+        Returns:
+            Why it is refused; '' where the bridge has it now.
+
+        Raises:
+            UnknownName: no such UAV was heard.
+        """
+        for served in self.served.values():
+            if served.uav_id == uav_id:
+                return served.pilot.hand_over(operator, now)
         raise UnknownName('uav', uav_id, [s.uav_id for s in self.served.values()])
 
     def _share(self, now: float) -> None:
@@ -105,9 +132,16 @@ class Ground:
                 or (station.system_ids and system not in station.system_ids)):
             return None
         peer = Peer(system, message.get_srcComponent(), station.system, station.component)
+        uav_id, store = station.uav_id_pattern.format(sysid=system), self._store
+        record = None if store is None else store.load(uav_id)
+
+        def save(changed: Record) -> None:
+            if store is not None:
+                store.save(uav_id, changed)
+
         pilot = Pilot(peer, profile_of(message, station.autopilot), station.origin,
-                      station.policy, random.Random(self._rng.random()), now)
-        served = Served(station.uav_id_pattern.format(sysid=system), address, pilot)
+                      station.policy, random.Random(self._rng.random()), now, record, save)
+        served = Served(uav_id, address, pilot)
         self.served[system] = served
         return served
 

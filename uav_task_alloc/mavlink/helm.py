@@ -1,39 +1,37 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Commands to one vehicle, one after the other: modes, arming, take-off, the current item."""
+"""Commands to one vehicle, one after the other: modes, arming, take-off, the current item.
+
+Whether one may be sent is not decided here: `authority` is asked at every send.
+"""
 from __future__ import annotations
 
 import math
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass
 
 from pymavlink.dialects.v20 import ardupilotmega as d
 
 from uav_task_alloc.mavlink.codec import Message
 from uav_task_alloc.mavlink.command import Answer, Command
 from uav_task_alloc.mavlink.peer import Peer
+from uav_task_alloc.mavlink.policy import Note
 from uav_task_alloc.mavlink.profiles import Flight, Profile
 from uav_task_alloc.mavlink.telemetry import Telemetry
 
+ARM = 'arm'
 ARM_TRIES = 120  # one a second: a position estimate may take that long
 CLIMB = 120.0  # [s] for a take-off
 ENOUGH = 0.9  # of the height asked for
-RETRY, RETRIES = 10.0, 5  # [s] after a failure that may pass, until a new list or a new link
+RETRY, RETRIES = 10.0, 5  # [s] after a failure that may pass
+SLOW_RETRY = 60.0  # [s] after more of them, without end
+REFUSAL = 5.0  # [s] that an arming is tried before its refusal is told: the reason may follow
 
 Then = Callable[[float], None]
 Step = list[Message] | None  # None: satisfied
 
 
-@dataclass(frozen=True, slots=True)
-class Note:
-    """Something a human should read."""
-
-    level: str  # 'info', 'warning', 'error'
-    text: str
-
-
 class Helm:
-    """One command at a time until it is done; what was commanded, and what a pilot did instead."""
+    """One command at a time until it is done; what was commanded last."""
 
     def __init__(self, peer: Peer, profile: Profile, telemetry: Telemetry) -> None:
         self._peer, self._profile, self._telemetry = peer, profile, telemetry
@@ -41,23 +39,35 @@ class Helm:
         self.waits_for = ''  # why nothing is done, for a human
         self.commanded: Flight | None = None  # by us, last
         self.must_start = False  # in the air and held by us
+        self.armed_here = False  # by us, on the ground: it takes off next, or is disarmed
         self.climbing = False  # by our take-off
-        self.paused = False  # a pilot took it out of its mission
         self.refused = ''  # why the mission mode was refused, at the last try
+        self.refusal = ''  # why it does not arm, in the vehicle's words
         self._command: Command | None = None
         self._then: Then | None = None
         self._climb_until = math.inf
         self._said = ''
+        self._told: dict[str, str] = {}  # why a command failed, as told last
         self._retry_at, self._retries = -math.inf, 0
 
     @property
     def busy(self) -> bool:
         return self._command is not None
 
+    @property
+    def failing(self) -> bool:
+        """It was tried often enough to say that it does not work."""
+        return self._retries > RETRIES
+
+    def drop(self) -> None:
+        """Somebody else has the vehicle: nothing that is under way is repeated."""
+        self._command = None
+        self.climbing = self.must_start = self.armed_here = False
+        self.commanded, self.refused = None, ''
+
     def reset(self, now: float) -> None:
         """The vehicle was restarted."""
-        self._command = None
-        self.climbing = self.must_start = self.paused = False
+        self.drop()
         self.encourage(now)
 
     def encourage(self, now: float) -> None:
@@ -65,9 +75,9 @@ class Helm:
         self._retry_at, self._retries = now, 0
 
     def fail(self, now: float) -> None:
-        """Wait before the next try, of which there are not many."""
+        """Wait before the next try, longer where many have failed."""
         self._retries += 1
-        self._retry_at = now + RETRY if self._retries <= RETRIES else math.inf
+        self._retry_at = now + (RETRY if self._retries <= RETRIES else SLOW_RETRY)
 
     def resting(self, now: float) -> bool:
         """After a failure, before the next try."""
@@ -82,15 +92,27 @@ class Helm:
         self.waits_for = self._said = what
         return []
 
+    def wait_for(self, what: str) -> list[Message]:
+        """Do nothing; why is said in diagnostics, or was told by who decided it."""
+        self.waits_for = what
+        return []
+
     def content(self) -> list[Message]:
         """All is as it should be."""
         self.waits_for = self._said = ''
+        self._retries = 0
         return []
 
     def receive(self, message: Message) -> None:
-        """Take a COMMAND_ACK."""
-        if self._command:
+        """Take a COMMAND_ACK; one to another station says nothing of our command."""
+        if self._command and self._peer.says(message):
             self._command.receive(message)
+
+    def note_refusal(self, text: str) -> None:
+        """STATUSTEXT: why the vehicle does not arm, where that is what is tried."""
+        prefix, _, reason = text.partition(': ')
+        if prefix in ('Arm', 'PreArm') and reason:
+            self.refusal = reason
 
     def finish(self, now: float) -> Step:
         """The command under way."""
@@ -99,17 +121,32 @@ class Helm:
             return None
         out = command.step(now)
         if command.answer is Answer.OPEN:
-            self.waits_for = command.name
+            self.waits_for = command.name + self._tell_arming(command, now)
             return out
         self._command, then = None, self._then
         if command.answer is Answer.DONE and then:
+            self._told.pop(command.name, None)
             then(now)
         elif command.answer is Answer.FAILED:
-            self.notes.append(Note('error', f'{command.name}: {command.reason}'))
+            if self._told.get(command.name) != command.reason:
+                self.notes.append(Note('error', f'{command.name}: {command.reason}'))
+            self._told[command.name] = command.reason
             if command.name == _mode_name(Flight.MISSION) and 'refused' in command.reason:
                 self.refused = command.reason
             self.fail(now)
         return None
+
+    def _tell_arming(self, command: Command, now: float) -> str:
+        """Why it does not arm, once until the reason changes, and for how long it was tried."""
+        tried = now - (now if command.began is None else command.began)
+        if command.name != ARM or not command.reason or tried < REFUSAL:
+            return ''
+        why = self.refusal or self._telemetry.unhealthy or command.reason
+        text = f': refused for {tried:.0f} s: {why}'
+        if self._told.get(ARM) != why:
+            self._told[ARM] = why
+            self.notes.append(Note('warning', ARM + text))
+        return text
 
     def do(self, command: Command, now: float, then: Then) -> list[Message]:
         """Begin a command; `then` is called once it is done."""
@@ -142,51 +179,46 @@ class Helm:
             d.MAV_CMD_DO_SET_MISSION_CURRENT, seq), seen, tries=2, fallback=old_way)
         return self.do(new_way if self._profile.jump_command else old_way, now, then)
 
-    def rise(self, height: float, allowed: bool, now: float) -> Step:
-        """Off the ground to `height` [m], where that is ours to do."""
+    def rise(self, height: float, wanted: Callable[[], bool], now: float) -> Step:
+        """Off the ground to `height` [m]; each try asks whether that is still wanted."""
         telemetry = self._telemetry
         if telemetry.airborne and not self.climbing:
             return None
-        if not allowed and not self.climbing:
-            return self.wait('a pilot to arm and take off (takeoff is false)')
         if self.resting(now):
             return []
         if self.climbing:
             return self._climb(height, now)
+        if not telemetry.grounded or not telemetry.has_position:
+            self.waits_for = 'a position' if telemetry.grounded else 'its landed state'
+            return []
         if telemetry.flight is not Flight.HOLD and not self._profile.amsl_takeoff and (
                 Flight.HOLD in self._profile.set_mode):
             return self.set_mode(Flight.HOLD, now)  # ArduPilot arms and climbs in GUIDED
         if not telemetry.armed:
+            self.armed_here = False
             arm = self._peer.command(d.MAV_CMD_COMPONENT_ARM_DISARM, 1.0)
-            return self.do(Command('arm', arm, lambda: telemetry.armed, tries=ARM_TRIES,
-                                   patient=True), now, self._armed)
+            self.refusal = ''
+            return self.do(Command(ARM, arm, lambda: telemetry.armed, tries=ARM_TRIES,
+                                   patient=True, wanted=wanted), now, self._armed)
         ground = telemetry.altitude - (
             0.0 if math.isnan(telemetry.height) else telemetry.height)
         up = self._profile.takeoff_command(self._peer, height, ground)
-        return self.do(Command('take off', up, lambda: telemetry.flight is Flight.TAKEOFF), now,
-                       self._took_off)
+        return self.do(Command('take off', up, lambda: telemetry.flight is Flight.TAKEOFF,
+                               wanted=wanted), now, self._took_off)
 
-    def changed(self, before: Flight, was_airborne: bool, excused: bool) -> bool:
-        """A heartbeat tells another mode; True where the mission has stopped or the UAV landed.
-
-        excused: it may have left the mission mode by itself, at the end or after an upload.
-        """
-        telemetry, stopped = self._telemetry, False
-        if telemetry.flight is Flight.MISSION:
-            self.paused = False
-        elif before is Flight.MISSION and telemetry.flight is not self.commanded:
-            self.paused = telemetry.airborne and not excused
-            stopped = True
-        if was_airborne and not telemetry.airborne:
-            self.paused = self.climbing = False
-            return True
-        return stopped
+    def disarm(self, now: float) -> list[Message]:
+        """On the ground, where we armed it and nothing is to be flown any more."""
+        self.armed_here = False
+        off = self._peer.command(d.MAV_CMD_COMPONENT_ARM_DISARM, 0.0)
+        return self.do(Command('disarm', off, lambda: not self._telemetry.armed), now,
+                       lambda t: None)
 
     def _armed(self, now: float) -> None:
-        self._telemetry.armed = True
+        self._telemetry.armed = self.armed_here = True
 
     def _took_off(self, now: float) -> None:
         self.climbing, self._climb_until = True, now + CLIMB
+        self.armed_here = False
         self.commanded = Flight.TAKEOFF
 
     def _climb(self, height: float, now: float) -> Step:

@@ -8,53 +8,66 @@ from __future__ import annotations
 
 import math
 import random
+import re
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from pymavlink.dialects.v20 import ardupilotmega as d
 
 from uav_task_alloc.geometry.frames import Origin
-from uav_task_alloc.mavlink.board import SETTLE, Board, MissionState
+from uav_task_alloc.mavlink import authority as who
+from uav_task_alloc.mavlink.authority import Action, Hold, Record
+from uav_task_alloc.mavlink.authority_watch import AuthorityWatch
+from uav_task_alloc.mavlink.board import Board, MissionState
 from uav_task_alloc.mavlink.change import Change, Kind
 from uav_task_alloc.mavlink.codec import Message
-from uav_task_alloc.mavlink.helm import Helm, Note, Step
+from uav_task_alloc.mavlink.flown_path import Sample
+from uav_task_alloc.mavlink.helm import Helm, Step
 from uav_task_alloc.mavlink.peer import Peer
-from uav_task_alloc.mavlink.policy import Policy, TaskProgress
+from uav_task_alloc.mavlink.policy import Note, Policy, TaskProgress
 from uav_task_alloc.mavlink.profiles import Flight, Profile
 from uav_task_alloc.mavlink.rates import Rates
 from uav_task_alloc.mavlink.reminder import Reminder
+from uav_task_alloc.mavlink.send_gate import allowed
 from uav_task_alloc.mavlink.service import Service
 from uav_task_alloc.mavlink.telemetry import Telemetry
 from uav_task_alloc.mavlink.upload import State
-from uav_task_alloc.mission import RETURN, TaskList, all_alike
+from uav_task_alloc.mavlink.way_home import zone_in_the_way
+from uav_task_alloc.mission import TaskList, all_alike
 from uav_task_alloc.model import Task
 
-LAST_WORD = 5.0  # [s] for a late REACHED, where the mission seems to end before its last item
+SWAP_HOLD = 30.0  # [s] that a vehicle is held for an upload, at most
+TEXT_AGAIN = 60.0  # [s] in which the same words of a vehicle are told once
+SAYS_NOTHING = re.compile(r'Auto mission changed, restarted command')  # once for each item
 
 
 class Pilot:
     """One vehicle as the bridge flies it."""
 
     def __init__(self, peer: Peer, profile: Profile, origin: Origin, policy: Policy,
-                 rng: random.Random, now: float) -> None:
+                 rng: random.Random, now: float, record: Record | None = None,
+                 save: Callable[[Record], None] = lambda record: None) -> None:
         self.profile, self.policy = profile, policy
         self.telemetry = Telemetry(profile, origin, now)
         self.board = Board(peer, profile, origin, self.telemetry, rng)
         self.helm = Helm(peer, profile, self.telemetry)
+        self.watch = AuthorityWatch(profile, self.telemetry, self.board, lambda: self.policy,
+                                    now, record, save)
+        self.authority = self.watch.authority
         self.events: deque[TaskProgress] = deque()
         self.notes: deque[Note] = deque()
-        self.yielding = False  # to somebody else's mission
         self.going_home = False  # by a list without tasks
+        self.alarm = ''  # what a human has to see to
         self._rates = Rates(peer, self.telemetry, now)
         self._was_stale = self._aimed = False
         self._service = Service(self.board, self.telemetry, profile)
-        self._wait_until = -math.inf
         self._reminder = Reminder()
         self._restarts = 0
+        self._texts: dict[str, float] = {}  # of the vehicle, when told [s]
         self._said = ''  # by the vehicle, last
-        self._rules = (self._linked, self.helm.finish, self._upload, self._read, self._has_list,
-                       self._yield, self._place, self._empty, self._bring, self._rise,
-                       self._fly)
+        self._rules = (self._linked, self._authority, self.helm.finish, self._lift, self._upload,
+                       self._read, self._has_list, self._place, self._may_act, self._hold_first,
+                       self._held_too_long, self._empty, self._bring, self._rise, self._fly)
 
     def assign(self, tasks: TaskList, now: float) -> list[Message]:
         """The latest list for this UAV; an older one that comes late is ignored."""
@@ -65,7 +78,7 @@ class Pilot:
         self.board.assign(tasks)
         self._reminder.listed(self.board.told_before(), now)
         self.helm.encourage(now)
-        return self._act(now)
+        return self._gate(self._act(now), now)
 
     def relieve(self, tasks: Sequence[Task], other: str) -> None:
         """Tasks of the list that another UAV has flown before we listened."""
@@ -73,26 +86,53 @@ class Pilot:
             self.notes.append(Note('info', f'{task.id} was flown by {other}, unheard'))
         self.board.progress.caught_up(tasks)
 
+    def hand_over(self, operator: str, now: float) -> str:
+        """An operator gives the aircraft to the bridge; returns why not, '' where it has it."""
+        refusal = self.watch.hand_over(operator, now)
+        if not refusal:
+            self.helm.encourage(now)
+        self._report()
+        return refusal
+
+    def moved_address(self, now: float) -> None:
+        """It speaks from a new address: it, or another vehicle with the same id."""
+        self.watch.new_address(now)
+        self.telemetry.restart()
+        self._restarts = self.telemetry.restarts
+        self._begin_anew(now)
+
     def receive(self, message: Message, now: float) -> list[Message]:
         """Take any message of this vehicle."""
-        flight, airborne = self.telemetry.flight, self.telemetry.airborne
-        self.telemetry.receive(message, now)
+        flight = self.telemetry.flight
+        newest = self.telemetry.receive(message, now)
         if self.telemetry.restarts != self._restarts:
-            self._restarted(now)
-        if message.get_type() == 'HEARTBEAT':
-            self._mode(flight, airborne, now)
+            self._restarts = self.telemetry.restarts
+            self.notes.append(Note('warning', 'was restarted'))
+            self.watch.rebooted(now)
+            self._begin_anew(now)
+        if message.get_type() == 'HEARTBEAT' and newest:
+            self.watch.heartbeat(message, now)
+            if flight is Flight.MISSION and self.telemetry.flight is not Flight.MISSION:
+                self.board.progress.stopped()
         out = self.board.receive(message, now)
         self.helm.receive(message)
-        self._progress(message, now)
-        return out + self._act(now)
+        self._progress(message, newest, now)
+        return self._gate(out + self._act(now), now)
 
     def step(self, now: float) -> list[Message]:
         """Let time pass."""
         self.events += self._reminder.step(now)
-        return self.board.step(now) + self._rates.step(now) + self._act(now)
+        self.board.progress.step(now)
+        out = self.board.step(now) + self._rates.step(now)
+        return self._gate(out + self._act(now), now)
+
+    def _gate(self, messages: list[Message], now: float) -> list[Message]:
+        """The one way out: what authority does not allow is not sent, retries included."""
+        return allowed(messages, self.watch, now)
 
     def _act(self, now: float) -> list[Message]:
         out: list[Message] = []
+        self.watch.step(now)
         self.board.catch_up(now)
         for rule in self._rules:
             step = rule(now)
@@ -113,46 +153,53 @@ class Pilot:
             failed = board.failed.popleft()
             self.events.append(TaskProgress(failed.task, 'FAILED', failed.revision,
                                             failed.reason))
-        for notes in (board.notes, self.helm.notes):
+        while board.progress.skipped:
+            task = board.progress.skipped.popleft()
+            self.notes.append(Note('warning', f'{task} was passed over, not by the bridge: '
+                                   'it is still to be flown'))
+        for notes in (self.watch.notes, board.notes, self.helm.notes):
             while notes:
                 self.notes.append(notes.popleft())
 
     # What is heard
 
-    def _progress(self, message: Message, now: float) -> None:
+    def _progress(self, message: Message, newest: bool, now: float) -> None:
         kind, progress, own = message.get_type(), self.board.progress, self.board.own
+        flying = self.telemetry.flight is Flight.MISSION
         if kind == 'GLOBAL_POSITION_INT':
-            progress.at(self.telemetry.position, now)
+            self._position(message, newest, now)
         elif kind == 'MISSION_ITEM_REACHED':
-            progress.reached(message.seq - own, now)
-        elif kind == 'MISSION_CURRENT' and not self.board.open:
+            self.board.reached(message.seq - own, now)
+        elif kind == 'MISSION_CURRENT' and newest and not self.board.open:
+            seq = max(0, message.seq - own)
             if self.board.must_jump is None:  # else it is left from the mission before
-                progress.moved(max(0, message.seq - own), now)
-            if (message.mission_state == d.MISSION_STATE_COMPLETE
-                    and self.telemetry.flight is Flight.MISSION):
-                progress.ended()
+                progress.moved(seq, now, flying)
+            if message.mission_state == d.MISSION_STATE_COMPLETE and flying:
+                progress.ended(seq, now)
             if not self.helm.busy:
                 self.board.watch(message, now)
         elif kind == 'STATUSTEXT':
-            level = 'error' if message.severity < d.MAV_SEVERITY_WARNING else 'info'
-            if str(message.text) != self._said:  # a refusal comes with every try
-                self.notes.append(Note(level, str(message.text)))
-            self._said = str(message.text)
+            self._text(message, now)
 
-    def _mode(self, before: Flight, was_airborne: bool, now: float) -> None:
-        board, progress = self.board, self.board.progress
-        last = progress.current is None or progress.current >= len(progress.items) - 1
-        fresh = board.open or now - board.verified_at < SETTLE
-        if self.helm.changed(before, was_airborne, excused=last or fresh):
-            progress.stopped()
-            if self.telemetry.airborne and not progress.finished:
-                self._wait_until = now + LAST_WORD
-        if was_airborne and not self.telemetry.airborne:
-            self.yielding = False
+    def _position(self, message: Message, newest: bool, now: float) -> None:
+        if self.telemetry.has_position:
+            place, velocity = self.telemetry.place_of(message)
+            self.board.progress.at(
+                Sample(message.time_boot_ms * 1e-3, place, velocity), newest, now)
 
-    def _restarted(self, now: float) -> None:
-        self._restarts = self.telemetry.restarts
-        self.notes.append(Note('warning', 'was restarted'))
+    def _text(self, message: Message, now: float) -> None:
+        text = str(message.text)
+        self.watch.text(message, now)
+        self.helm.note_refusal(text)
+        self.board.note_space(text)
+        if now - self._texts.get(text, -math.inf) >= TEXT_AGAIN:
+            serious = message.severity < d.MAV_SEVERITY_WARNING and not SAYS_NOTHING.search(text)
+            self.notes.append(Note('error' if serious else 'info', text))
+            self._texts = {old: at for old, at in self._texts.items() if now - at < TEXT_AGAIN}
+            self._texts[text] = now
+        self._said = text
+
+    def _begin_anew(self, now: float) -> None:
         self.board.restarted()
         self.helm.reset(now)
         self._rates.again(now)
@@ -162,11 +209,31 @@ class Pilot:
     def _linked(self, now: float) -> Step:
         if self.telemetry.stale(now):
             self._was_stale, self.helm.waits_for = True, 'its link'
+            self.helm.drop()
             return []
         if self._was_stale:
             self._was_stale = False
             self.helm.encourage(now)
         return None
+
+    def _authority(self, now: float) -> Step:
+        """Whoever has it, nothing that was begun for us goes on."""
+        if self.authority.held:
+            return None
+        if not self.authority.allows(Action.COMMAND):
+            self.helm.drop()
+        if not self.authority.allows(Action.READ):
+            return self.helm.wait_for(f'authority: {self.authority.why}')
+        if not self.authority.allows(Action.UPLOAD) and self.board.state is (
+                MissionState.UPLOADING):
+            self.board.abort()
+        return None
+
+    def _lift(self, now: float) -> Step:
+        """Armed by us: it takes off before anything else, or is disarmed."""
+        if not self.helm.armed_here or self.telemetry.airborne or not self.authority.held:
+            return None
+        return self._rise(now) if self._wants_to_fly() else self.helm.disarm(now)
 
     def _upload(self, now: float) -> Step:
         board = self.board
@@ -179,32 +246,21 @@ class Pilot:
         if board.upload.state in (State.BACKOFF, State.DRAINING) and board.outdated and (
                 board.held is not None and board.wanted()):
             return board.begin_upload(board.change(), now)
-        return []
+        return self._held_too_long(now) or []
 
     def _read(self, now: float) -> Step:
         if self.board.held is not None:
             return None
+        if not self.telemetry.past_boot:
+            return self.helm.wait_for('the autopilot to start')
         if self.helm.resting(now):
-            return []
+            return self._held_too_long(now) or []
         self.helm.waits_for = 'a readback'
         return self.board.upload.read(now)
 
     def _has_list(self, now: float) -> Step:
         self.helm.waits_for = 'a list' if self.board.tasks is None else ''
         return [] if self.board.tasks is None else None
-
-    def _yield(self, now: float) -> Step:
-        board = self.board
-        if board.state is MissionState.FOREIGN and board.read_once and not self.yielding:
-            board.read_once = False
-            self.yielding = self.policy.when_foreign == 'yield'
-            self.notes.append(Note('warning', 'somebody else changed the mission: '
-                                   + self.policy.when_foreign))
-        if self.yielding and board.state is MissionState.FOREIGN:
-            self.helm.waits_for = 'the foreign mission to end'
-            return []
-        self.yielding = False
-        return None
 
     def _place(self, now: float) -> Step:
         """After a restart of the bridge: what was flown meanwhile is not repeated."""
@@ -217,6 +273,56 @@ class Pilot:
         board.catch_up(now)
         return None
 
+    def _may_act(self, now: float) -> Step:
+        if self.authority.state is who.State.LOST:
+            return self.helm.wait('the pilot to give it back')
+        if not self.authority.allows(Action.UPLOAD):
+            return self.helm.wait_for(f'authority: {self.authority.why}')
+        if self.authority.held or not self.telemetry.airborne:
+            return None
+        # a pilot flies what is on board: it is not changed under him
+        return self.helm.wait_for('the pilot to hand it over')
+
+    def _hold_first(self, now: float) -> Step:
+        """After a hand-over in flight nothing else is done before it holds."""
+        authority, flight = self.authority, self.telemetry.flight
+        if authority.hold is Hold.NO or not self.telemetry.airborne:
+            authority.hold = Hold.NO
+            return None
+        if flight is Flight.HOLD or (authority.hold is Hold.UNLESS_VERIFIED
+                                     and flight is Flight.MISSION and self.board.verified()):
+            self.helm.must_start = flight is Flight.HOLD
+            authority.hold = Hold.NO
+            return None
+        if self.helm.resting(now) or Flight.HOLD not in self.profile.set_mode:
+            authority.hold = Hold.NO if Flight.HOLD not in self.profile.set_mode else (
+                authority.hold)
+            return []
+        return self.helm.set_mode(Flight.HOLD, now)
+
+    def _held_too_long(self, now: float) -> Step:
+        """A swap that does not come to its end: home where the way is clear, else stay."""
+        since = self.watch.swap_at
+        if since is None or now - since <= SWAP_HOLD or not self.authority.held:
+            return None
+        self.watch.swap_at = None
+        blocked = self._blocked_home()
+        if blocked:
+            self.alarm = f'held for an upload that does not end, and {blocked}: stays'
+            self.notes.append(Note('error', self.alarm))
+            return None
+        self.notes.append(Note('error', f'held for {SWAP_HOLD:g} s for an upload that does not '
+                               'end: returns'))
+        return self.helm.set_mode(Flight.RETURN, now)
+
+    def _blocked_home(self) -> str:
+        """Why it must not fly straight home, in words; '' where it may."""
+        home, zones = self.telemetry.home, self.policy.zones
+        if home is None or not self.telemetry.has_position:
+            return 'its way home is not known' if zones else ''
+        zone = zone_in_the_way(self.telemetry.position, home, zones)
+        return f'zone {zone.id} is on its way home' if zone else ''
+
     def _empty(self, now: float) -> Step:
         """Nothing to fly: hold or return, and keep what is on board."""
         board, telemetry = self.board, self.telemetry
@@ -225,17 +331,23 @@ class Pilot:
         if tasks.stops:
             return None
         rest = (board.held or ())[board.progress.current or 0:]
-        board.revision = tasks.revision
+        if not board.progress.pending:
+            board.revision = tasks.revision
         flying = telemetry.flight is Flight.MISSION and not board.progress.finished
         if flying and end and rest and all_alike(end[-len(rest):], rest):
             self.going_home = True
             return self.helm.content()
-        if not telemetry.airborne or self.helm.paused or self.helm.resting(now):
+        if board.progress.pending or not telemetry.airborne or self.helm.resting(now) or (
+                not self.authority.held):
             return []
         returns = tasks.returns or self.policy.when_empty == 'return'
         if tasks.end_via and tasks.returns and telemetry.flight is not Flight.RETURN:
             self.going_home = True
             return None  # the plain way home leads through a zone: fly the list of it
+        blocked = self._blocked_home() if returns else ''
+        if blocked and telemetry.flight is not Flight.RETURN:
+            returns = False
+            self.helm.wait(f'a way home: {blocked}')
         if flying or (returns and telemetry.flight in (Flight.HOLD, Flight.MISSION)):
             return self.helm.set_mode(Flight.RETURN if returns else Flight.HOLD, now)
         return []
@@ -249,55 +361,94 @@ class Pilot:
             return None
         if self.helm.resting(now):
             return []
+        if not telemetry.past_boot:
+            return self.helm.wait_for('the autopilot to start')
+        if self._chosen_by_another():
+            return self.helm.wait_for('the item that another station has chosen')
         if found.kind is Kind.JUMP:
             return self._jump(found, now)
         if self._service.lasts(now):
             self.helm.waits_for = 'the end of the service'
             return []
+        if found.kind is Kind.SWAP and telemetry.airborne and not telemetry.good_link(now):
+            return self.helm.wait_for('a link without gaps for 10 s')
         if (found.kind is Kind.SWAP and not self.profile.atomic and telemetry.airborne
                 and telemetry.flight is Flight.MISSION):
-            self.helm.must_start = True
+            self.helm.must_start, self.watch.swap_at = True, now
             return self.helm.set_mode(Flight.HOLD, now)
         return board.begin_upload(found, now)
 
+    def _chosen_by_another(self) -> bool:
+        """Somebody has set the current item: it is flown, and what was left out later."""
+        progress, item = self.board.progress, self.board.progress.active
+        return (progress.chosen is not None and progress.chosen == progress.current
+                and self.telemetry.flight is Flight.MISSION and item is not None
+                and any(item.task == stop.task.id for stop in self.board.remaining().stops))
+
     def _jump(self, found: Change, now: float) -> list[Message]:
+        if not self.authority.held:
+            return self.helm.wait_for('authority to set the current item')
+        tasks = self.board.tasks
+
         def done(t: float) -> None:
             self.board.progress.retag(found.items)
             self.board.progress.jumped(found.start, t)
             self.board.must_jump, self._aimed = None, True
-            self.board.adopt(found, t)
+            self.board.adopt(found, t, tasks)
 
         self.board.progress.asked(found.start)
         return self.helm.jump(found.start + self.board.own, now, done)
 
     def _rise(self, now: float) -> Step:
-        return self.helm.rise(self.policy.cruise_altitude, self.policy.takeoff, now)
+        if self.telemetry.airborne and not self.helm.climbing:
+            return None
+        if not self.authority.held:
+            return self.helm.wait('~/hand_over: it has landed' if self.authority.landed else
+                                  'a pilot to arm and take off (takeoff is false)')
+        home = self.telemetry.home or self.telemetry.position
+        zone = zone_in_the_way(home, home, self.policy.zones)
+        if zone is not None and not self.helm.climbing:
+            return self.helm.wait(f'zone {zone.id} to leave its home')
+
+        return self.helm.rise(self.policy.cruise_altitude, self._wants_to_fly, now)
+
+    def _wants_to_fly(self) -> bool:
+        return self.authority.held and self.board.tasks is not None and bool(
+            self.board.remaining().stops)
 
     def _fly(self, now: float) -> Step:
         """In mission mode, at the right item."""
         helm, board = self.helm, self.board
-        flying = self.telemetry.flight is Flight.MISSION and not helm.must_start
+        in_mission = self.telemetry.flight is Flight.MISSION
+        flying = in_mission and not helm.must_start
         self._aimed = self._aimed and not flying
+        if flying and self._stands():
+            board.must_jump = board.progress.current
+            helm.must_start = True
+            return helm.set_mode(Flight.HOLD, now)  # it would begin at the first item again
         if flying and board.must_jump is None:
             board.progress.started()
+            self.watch.swap_at, self.alarm = None, ''
             return helm.content()
-        if helm.refused and self.telemetry.flight is not Flight.MISSION:
+        if helm.refused and not in_mission:
             board.infeasible(self._said or helm.refused)
             helm.refused = ''
             return []
-        if helm.resting(now) or now < self._wait_until:
+        if helm.resting(now):
             return []
-        if helm.paused or not (flying or self._may_start()):
-            return helm.wait('the pilot to give it back')
+        if self.telemetry.flight is Flight.TAKEOFF:
+            return helm.wait_for('the end of the take-off')
         if not (flying or self._aimed or self.profile.atomic) and board.must_jump is None:
             board.must_jump = board.progress.current  # ArduPilot resumes after what it flew last
         if board.must_jump is not None:
             return self._jump(Change(Kind.JUMP, board.progress.items, board.must_jump), now)
         return helm.set_mode(Flight.MISSION, now)
 
-    def _may_start(self) -> bool:
-        flight, commanded = self.telemetry.flight, self.helm.commanded
-        ours = flight is Flight.RETURN and (commanded is Flight.RETURN or any(
-            item.command == RETURN for item in self.board.progress.items))
-        return ours or flight in (Flight.HOLD, Flight.MISSION, Flight.UNKNOWN) or (
-            flight is Flight.TAKEOFF and commanded is Flight.TAKEOFF)
+    def _stands(self) -> bool:
+        """ArduPilot has ended the mission that it had, and does not begin what was appended."""
+        telemetry, progress = self.telemetry, self.board.progress
+        return (not self.profile.atomic and telemetry.current is not None
+                and telemetry.mission_state == d.MISSION_STATE_COMPLETE
+                and not progress.finished and progress.active is not None
+                and telemetry.current_at > self.board.verified_at
+                and telemetry.current - self.board.own < len(progress.items) - 1)

@@ -8,6 +8,7 @@ from enum import Enum
 
 from pymavlink.dialects.v20 import ardupilotmega as d
 
+from uav_task_alloc.mavlink.authority import State, Suspension
 from uav_task_alloc.mavlink.board import MissionState
 from uav_task_alloc.mavlink.ground import Served
 from uav_task_alloc.mavlink.pilot import Pilot
@@ -50,12 +51,14 @@ class UavStatus:
     mission_state: MissionState
     active_task: str
     list_revision: int
+    authority: State
+    reason: str  # why it is not available; '': it is
 
     @property
     def news(self) -> tuple[object, ...]:
         """What is told at once when it changes, not at the next position."""
         return (self.available, self.mode, self.mission_state, self.active_task,
-                self.list_revision)
+                self.list_revision, self.authority, self.reason)
 
 
 def mode_of(pilot: Pilot) -> Mode:
@@ -86,15 +89,39 @@ def active_task(pilot: Pilot) -> str:
     return item.task if waits or mode is Mode.ON_MISSION else ''
 
 
+def why_not_available(pilot: Pilot, now: float) -> str:
+    """Why a UAV may not be given tasks, and what would change that; '' where it may."""
+    telemetry, authority = pilot.telemetry, pilot.authority
+    if telemetry.stale(now):
+        return 'its link is stale'
+    if authority.undecided:
+        return 'not known yet who has it'
+    if authority.state in (State.LOST, State.SUSPENDED) or authority.landed:
+        return (f'authority {authority.state.name}: {authority.why}; given back by '
+                f'{authority.gives_back}')
+    if mode_of(pilot) is Mode.FAULT:
+        return 'it says that it is in a critical state'
+    if not telemetry.past_boot:
+        return 'the autopilot is starting'
+    if not telemetry.has_position:
+        return 'no position yet'
+    if pilot.alarm:
+        return pilot.alarm
+    if pilot.helm.failing:
+        return f'what is tried fails again and again: mission {pilot.board.state.name}'
+    return ''
+
+
 def state_of(served: Served, now: float, full_range: float = 0.0) -> UavStatus:
     """All of it at one moment; `full_range` [m] of a full battery, 0: unknown."""
     pilot = served.pilot
     telemetry, board, mode = pilot.telemetry, pilot.board, mode_of(pilot)
+    reason = why_not_available(pilot, now)
+    authority = State.UNKNOWN if pilot.authority.undecided else pilot.authority.state
     return UavStatus(
         served.uav_id, telemetry.position, telemetry.velocity, telemetry.home,
         telemetry.battery, full_range * telemetry.battery if full_range > 0.0 else math.nan,
-        not telemetry.stale(now) and mode is not Mode.FAULT and not pilot.yielding, mode,
-        board.state, active_task(pilot), board.revision)
+        not reason, mode, board.state, active_task(pilot), board.revision, authority, reason)
 
 
 class Told:
@@ -127,12 +154,17 @@ def facts_of(served: Served, now: float) -> tuple[int, str, dict[str, str]]:
     pilot = served.pilot
     telemetry, board = pilot.telemetry, pilot.board
     state = board.state
-    if telemetry.lost(now):
+    link = pilot.authority.suspended_by(Suspension.LINK)
+    if telemetry.lost(now) or (link and pilot.watch.was_lost):
         level, line = 3, 'link lost'
-    elif telemetry.stale(now):
+    elif telemetry.stale(now) or link:
         level, line = 1, 'link stale'
     elif mode_of(pilot) is Mode.FAULT or state is MissionState.MIXED:
         level, line = 2, f'mission {state.name}' if state is MissionState.MIXED else 'fault'
+    elif pilot.alarm:
+        level, line = 2, pilot.alarm
+    elif pilot.authority.state in (State.LOST, State.SUSPENDED):
+        level, line = 1, f'authority {pilot.authority.state.name}: {pilot.authority.why}'
     elif state is MissionState.FOREIGN:
         level, line = 1, 'mission FOREIGN'
     else:
@@ -142,7 +174,12 @@ def facts_of(served: Served, now: float) -> tuple[int, str, dict[str, str]]:
         line += f', {progress}'
     if pilot.helm.waits_for and level < 3:
         line += f', waits for {pilot.helm.waits_for}'
+    authority, reason = pilot.authority, why_not_available(pilot, now)
     return level, line, {
+        'authority': State.UNKNOWN.name if authority.undecided else authority.state.name,
+        'authority_why': authority.why, 'authority_for': f'{now - authority.since:.0f} s',
+        'given_back_by': authority.gives_back or 'nothing is needed',
+        'not_available': reason or 'it is available',
         'autopilot': pilot.profile.name, 'address': str(served.address),
         'mode': mode_of(pilot).name, 'mission': state.name,
         'list_revision': str(board.revision), 'epoch': str(board.progress.epoch),

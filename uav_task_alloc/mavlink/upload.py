@@ -106,6 +106,11 @@ class Upload:
         return self.state is not State.IDLE
 
     @property
+    def sent_all(self) -> bool:
+        """The last item was sent: the vehicle may have taken the mission."""
+        return self._mission is not None and self.busy and self._sent_last
+
+    @property
     def progress(self) -> tuple[int, int, int]:
         """Items sent, items read back, and items of the mission; all 0 where none is uploaded."""
         if self._mission is None or not self.busy:
