@@ -15,8 +15,9 @@ from uav_task_alloc.geometry.frames import Origin
 from uav_task_alloc.mavlink.policy import TaskProgress
 from uav_task_alloc.mavlink.status import UavStatus
 from uav_task_alloc.mission import Stop, TaskList
-from uav_task_alloc.model import Task, check_point
-from uav_task_alloc.nodes.messages import from_point, header, to_point, to_task
+from uav_task_alloc.model import Task, ThreatZone, check_point
+from uav_task_alloc.nodes.announcements import check_picture, sort_zones
+from uav_task_alloc.nodes.messages import from_point, header, to_point, to_task, to_zone
 
 NOWHERE = (math.nan, math.nan, math.nan)
 EVENT = {'STARTED': m.TaskEvent.STARTED, 'COMPLETED': m.TaskEvent.COMPLETED,
@@ -44,6 +45,19 @@ def to_list(msg: m.TaskList, uav_id: str, origin: Origin, radius: float) -> Task
     return TaskList(msg.revision, stops, msg.end == m.TaskList.RETURN_HOME, end_via)
 
 
+def to_zones(msg: m.ThreatZoneArray, before: Iterable[ThreatZone],
+             ) -> tuple[tuple[ThreatZone, ...], str]:
+    """The picture, and what is bad in it, '' where nothing is; a bad zone stays as `before`.
+
+    Raise InvalidValue where there is too much of it to be judged zone by zone.
+    """
+    check_picture(msg)
+    zones, bad = sort_zones(msg, to_zone)
+    found = {zone.id: zone for zone in before if zone.id in bad}
+    found.update((zone.id, zone) for zone in zones)
+    return tuple(found.values()), next(iter(bad.values()), '')
+
+
 def _accepted(task: Task, radius: float) -> Task:
     return replace(task, acceptance_radius=task.acceptance_radius or radius or None)
 
@@ -57,7 +71,8 @@ def from_status(status: UavStatus, capabilities: Iterable[str], now: float) -> m
         range_remaining=status.range_remaining, cruise_speed=math.nan,
         capabilities=list(capabilities), available=status.available, mode=status.mode.value,
         mission_state=status.mission_state.value, active_task_id=status.active_task,
-        list_revision=status.list_revision)
+        list_revision=status.list_revision, authority=status.authority.value,
+        reason=status.reason)
 
 
 def from_progress(uav_id: str, made: TaskProgress, now: float) -> m.TaskEvent:

@@ -9,16 +9,19 @@ import time
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.node import Node
 from uav_task_alloc_msgs import msg as m
+from uav_task_alloc_msgs.srv import HandOver
 
-from uav_task_alloc.errors import InvalidValue
+from uav_task_alloc.errors import InvalidValue, UnknownName
 from uav_task_alloc.geometry.frames import Origin
+from uav_task_alloc.mavlink.authority_store import FileStore, boot_id
 from uav_task_alloc.mavlink.ground import Ground, Served, Station
 from uav_task_alloc.mavlink.link import open_link
 from uav_task_alloc.mavlink.policy import Policy
 from uav_task_alloc.mavlink.radio import Heartbeat, Radio
 from uav_task_alloc.mavlink.status import Told, facts_of, state_of
-from uav_task_alloc.model import check_number, check_ros_name
+from uav_task_alloc.model import ThreatZone, check_number, check_ros_name
 from uav_task_alloc.nodes import bridge_messages as convert
+from uav_task_alloc.nodes.bounds import cut
 from uav_task_alloc.nodes.messages import EVENTS, LATCHED, STATES
 from uav_task_alloc.nodes.parameters import declare
 from uav_task_alloc.nodes.run import run
@@ -27,9 +30,10 @@ from uav_task_alloc.params import BridgeParams
 TICK = 0.02  # [s] between steps of the machines; messages are acted on as they come
 
 
-def policy_of(params: BridgeParams) -> Policy:
+def policy_of(params: BridgeParams, zones: tuple[ThreatZone, ...] = ()) -> Policy:
     """What the operator wants, as of now."""
-    return Policy(params.takeoff, params.cruise_altitude, params.when_empty, params.when_foreign)
+    return Policy(params.takeoff, params.cruise_altitude, params.when_empty, params.when_foreign,
+                  params.relaunch, zones)
 
 
 def station_of(params: BridgeParams) -> Station:
@@ -60,21 +64,26 @@ class MavlinkBridge(Node):
         params = self.live.now
         self.station = station_of(params)
         self.capabilities = convert.to_capabilities(params.capabilities)
-        self.ground = Ground(self.station, random.Random(time.time_ns()))
-        self.radio = Radio(
-            map(open_link, params.connections), params.system_id, params.component_id,
-            wall=time.time, signing_key_file=params.signing_key_file, tlog=params.tlog)
-        self.lock = threading.Lock()  # of the ground station
         logger = self.get_logger()
         self.log = {'info': lambda text: logger.info(text),  # rclpy wants a line each
                     'warning': lambda text: logger.warning(text),
                     'error': lambda text: logger.error(text)}
+        self.store = FileStore(params.state_dir, self.log['error'],
+                               boot_id()) if params.state_dir else None
+        self.ground = Ground(self.station, random.Random(time.time_ns()), self.store)
+        self.zones: tuple[ThreatZone, ...] = ()
+        self.radio = Radio(
+            map(open_link, params.connections), params.system_id, params.component_id,
+            wall=time.time, signing_key_file=params.signing_key_file, tlog=params.tlog)
+        self.lock = threading.Lock()  # of the ground station
         self.told = Told()
         self.lists: dict[str, object] = {}
-        self.troubles: dict[str, str] = {}  # told, by link
+        self.troubles: dict[str, str] = {}  # logged, by link or topic
         self.states = self.create_publisher(m.UavState, 'uav_states', STATES)
         self.task_events = self.create_publisher(m.TaskEvent, 'task_events', EVENTS)
         self.health = self.create_publisher(DiagnosticArray, '/diagnostics', 10)
+        self.create_subscription(m.ThreatZoneArray, 'threat_zones', self.on_zones, LATCHED)
+        self.create_service(HandOver, '~/hand_over', self.on_hand_over)
         self.create_timer(0.05, self.on_tick)
         self.create_timer(1.0, self.on_second)
         self.closing = False
@@ -123,7 +132,7 @@ class MavlinkBridge(Node):
         """Listen for the lists of UAVs that were found; pass parameters on."""
         if not self.receiver.is_alive():
             raise RuntimeError('the receiver has died: better no bridge than a deaf one')
-        policy = policy_of(self.live.now)
+        policy = policy_of(self.live.now, self.zones)
         for served in list(self.ground.served.values()):
             served.pilot.policy = policy
             if served.uav_id not in self.lists:
@@ -144,10 +153,37 @@ class MavlinkBridge(Node):
             out = self.ground.assign(uav_id, tasks, time.monotonic())
         self.radio.send(out)
 
+    def on_zones(self, msg: m.ThreatZoneArray) -> None:
+        """The whole picture of the zones; one whose new form is bad stays as it was."""
+        try:
+            self.zones, trouble = convert.to_zones(msg, self.zones)
+        except InvalidValue as error:
+            trouble = str(error)
+        if trouble and trouble != self.troubles.get('threat_zones'):
+            self.log['warning'](f'threat_zones: {trouble}: ignored')
+        self.troubles['threat_zones'] = trouble
+
+    def on_hand_over(self, request: HandOver.Request,
+                     response: HandOver.Response) -> HandOver.Response:
+        """An operator gives a UAV to the bridge."""
+        uav_id, operator = cut(request.uav_id), cut(request.operator_name) or 'unnamed'
+        try:
+            with self.lock:
+                refused = self.ground.hand_over(uav_id, operator, time.monotonic())
+        except UnknownName as error:
+            refused = str(error)
+        response.success = not refused
+        response.message = f'refused: {refused}' if refused else f'the bridge has {uav_id} now'
+        self.log['warning' if refused else 'info'](
+            f'hand_over of {uav_id} by {operator}: {response.message}')
+        return response
+
     def on_second(self) -> None:
         """How all are, for people."""
         now = time.monotonic()
         with self.lock:
+            if self.store is not None:
+                self.store.retry()
             facts = [(s.uav_id, *facts_of(s, now)) for s in self.ground.served.values()]
         for link in self.radio.links:
             self.tell_trouble(link.name, link.trouble)
