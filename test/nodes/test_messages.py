@@ -118,3 +118,22 @@ def test_a_task_without_a_radius_gets_that_of_the_parameter():
     for default, expected in ((0.0, [7.0, None]), (4.0, [7.0, 4.0])):
         made = bridge_messages.to_list(m.TaskList(uav_id='u1', tasks=tasks), 'u1', ORIGIN, default)
         assert [stop.task.acceptance_radius for stop in made.stops] == expected
+
+
+def test_a_bad_zone_of_a_picture_stays_as_it_was_and_the_others_are_taken():
+    a, b = (ThreatZone.cylinder(name, (0.0, 0.0), 10.0) for name in 'ab')
+    first, trouble = bridge_messages.to_zones(messages.from_zones([a], 0.0), ())
+    assert (first, trouble) == ((a,), '')
+    picture = messages.from_zones([a, b], 0.0)
+    picture.zones[0].radius = -1.0
+    found, trouble = bridge_messages.to_zones(picture, first)
+    assert set(found) == {a, b}
+    assert 'zone a: radius = -1.0' in trouble
+    assert bridge_messages.to_zones(messages.from_zones([], 0.0), found) == ((), '')
+    with pytest.raises(InvalidValue, match='zones: number'):
+        bridge_messages.to_zones(m.ThreatZoneArray(zones=[m.ThreatZone()] * 1001), found)
+
+
+def test_a_uav_in_standby_stands_on_the_ground():
+    assert [messages.to_report(m.UavState(uav_id='a', mode=mode)).standby for mode in
+            (m.UavState.STANDBY, m.UavState.UNKNOWN, m.UavState.HOLD)] == [True, False, False]

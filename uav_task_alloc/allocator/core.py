@@ -23,6 +23,7 @@ from uav_task_alloc.allocator.restore import (
     zones_row,
 )
 from uav_task_alloc.allocator.world import World
+from uav_task_alloc.allocator.zone_watch import look_at_all
 from uav_task_alloc.journal import Row
 from uav_task_alloc.model import Plan
 from uav_task_alloc.params import AllocatorParams
@@ -66,6 +67,7 @@ class Allocator:
         """Whatever time brings: UAVs fall silent, ended tasks leave the lists."""
         world = self.world
         world.look_for_silence(now)
+        look_at_all(world, now)
         for uav_id in list(world.lists.lists):
             shorter = world.lists.without_flown(uav_id, self._ended, stamp)
             if shorter is not None:

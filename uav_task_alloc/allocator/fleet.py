@@ -21,15 +21,27 @@ class UavRecord:
     heard: float  # [s] steady clock
     home: Point  # [m] ENU: as reported, else where it was first heard
     silent: bool = False
-    caught: bool = False  # inside a zone
+    zone: str = ''  # that it is inside
+    home_zone: str = ''  # that its home is inside
+    standing: str = ''  # why it gets no tasks on the ground: who stands inside which zone
     battery: float | None = None  # [0..1] last told
     low: bool = False  # the battery was below the reserve and is not recharged
     jumped: float = -math.inf  # [s] steady clock: the position last jumped
 
     @property
-    def usable(self) -> bool:
+    def caught(self) -> bool:
+        """It is inside a zone."""
+        return bool(self.zone)
+
+    @property
+    def ready(self) -> bool:
         """It speaks, has battery, and says that it may be given tasks."""
         return self.report.available and not self.silent and not self.low
+
+    @property
+    def usable(self) -> bool:
+        """It is ready, and does not stand inside a zone."""
+        return self.ready and not self.standing
 
 
 class Fleet:
@@ -48,8 +60,11 @@ class Fleet:
             self.active[uav_id] = report.active_task
         self.records[uav_id] = UavRecord(
             report, now, report.home or (before.home if before else report.position),
-            caught=before.caught if before else False, battery=battery, low=low,
-            jumped=before.jumped if before else -math.inf)
+            battery=battery, low=low)
+        if before:
+            self.records[uav_id] = replace(
+                self.records[uav_id], zone=before.zone, home_zone=before.home_zone,
+                standing=before.standing, jumped=before.jumped)
         return before
 
     def make_room(self, most: int, busy: Collection[str]) -> bool:
@@ -76,14 +91,20 @@ class Fleet:
         """Its position jumped."""
         self.records[uav_id] = replace(self.records[uav_id], jumped=now)
 
-    def set_caught(self, uav_id: str, caught: bool) -> None:
-        """It is inside a zone, or out again."""
-        self.records[uav_id] = replace(self.records[uav_id], caught=caught)
+    def set_zone(self, uav_id: str, zone: str, home_zone: str, standing: str) -> None:
+        """The zones that it and its home are inside, and why it gets no tasks for that."""
+        self.records[uav_id] = replace(self.records[uav_id], zone=zone, home_zone=home_zone,
+                                       standing=standing)
 
     def usable(self, uav_id: str) -> bool:
-        """It is heard, available, and not switched off."""
+        """It is heard, available, does not stand inside a zone, and is not switched off."""
         record = self.records.get(uav_id)
         return record is not None and record.usable and uav_id not in self.off
+
+    def standing(self) -> list[UavRecord]:
+        """Those that would be usable, if they did not stand inside a zone."""
+        return [record for uav_id, record in self.records.items()
+                if record.standing and record.ready and uav_id not in self.off]
 
     def uav(self, uav_id: str, default_range: float, default_cruise_speed: float) -> Uav:
         """As the solver sees it; an unknown range [m] or speed [m/s] is the default."""

@@ -36,7 +36,10 @@ def planned_legs(plan: Plan) -> dict[tuple[str, str, str], Leg]:
 
 def lay(uav: Uav, tasks: Sequence[Task], returns: bool, legs: Mapping[tuple[str, str, str], Leg],
         held: UavList, ways: Ways) -> tuple[UavList, list[str]]:
-    """The list of a route in the world as it is now, and the ids that cannot be reached."""
+    """The list of a route in the world as it is now, and the ids that cannot be reached.
+
+    It ends with HOLD where it shall not return, and where there is no safe way home.
+    """
     stops: list[Stop] = []
     lost: list[str] = []
     before, place, clock = START, uav.position, 0.0
@@ -52,7 +55,8 @@ def lay(uav: Uav, tasks: Sequence[Task], returns: bool, legs: Mapping[tuple[str,
         before, place = task.id, task.position
     distance = math.fsum(stop.leg.length for stop in stops)
     home = _way_home(uav, before, place, legs, held, ways) if returns else None
-    return replace(held, stops=tuple(stops), returns=returns, end_via=home.via if home else (),
+    return replace(held, stops=tuple(stops), returns=home is not None,
+                   end_via=home.via if home else (),
                    distance=distance + (home.length if home and stops else 0.0)), lost
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 from uav_task_alloc.allocator.answer import Routes, repaired
@@ -17,7 +17,8 @@ from uav_task_alloc.allocator.records import (
     UavList,
 )
 from uav_task_alloc.allocator.world import World
-from uav_task_alloc.model import Plan, Task, Uav
+from uav_task_alloc.allocator.zone_watch import note_way_home, standing
+from uav_task_alloc.model import Leg, Plan, Task, Uav
 from uav_task_alloc.objective import fit
 from uav_task_alloc.params import AllocatorParams
 
@@ -75,10 +76,9 @@ def lists_of(world: World, chosen: Plan) -> tuple[dict[str, UavList], dict[str, 
         if world.stands(uav_id, tasks):
             lists[uav_id] = world.lists.get(uav_id)
             continue
-        lists[uav_id], lost = lay(_uav(world, uav_id), tasks, returns, legs,
-                                  world.lists.get(uav_id), ways)
+        lists[uav_id], lost = _lay(world, uav_id, tasks, returns, legs)
         left.update((task_id, f'no safe way for {uav_id}') for task_id in lost)
-        world.laid[uav_id] = ways
+        world.laid[uav_id] = ways, world.fleet.records[uav_id].home
     for uav_id, held in world.lists.lists.items():
         # gone: what it does not have it cannot fly when it is back
         if uav_id not in lists and not world.cautious:
@@ -86,12 +86,33 @@ def lists_of(world: World, chosen: Plan) -> tuple[dict[str, UavList], dict[str, 
     return lists, left
 
 
+def _lay(world: World, uav_id: str, tasks: Sequence[Task], returns: bool,
+         legs: Mapping[tuple[str, str, str], Leg]) -> tuple[UavList, list[str]]:
+    """As `lay`; a way home that is not safe is noted."""
+    made, lost = lay(_uav(world, uav_id), tasks, returns, legs, world.lists.get(uav_id),
+                     world.ways())
+    place = made.stops[-1].task.position if made.stops else (
+        world.fleet.records[uav_id].report.position)
+    note_way_home(world, uav_id, made.returns or not returns, place)
+    return made, lost
+
+
 def _without(world: World, uav_id: str, held: UavList) -> UavList:
-    """The empty list; one whose battery is low is sent home, the others stay as they were."""
-    record = world.fleet.records.get(uav_id)
-    if record is None or not record.low:
-        return replace(held, stops=(), distance=0.0)
-    return lay(_uav(world, uav_id), (), True, {}, held, world.ways())[0]
+    """The empty list; one whose battery is low is sent home, the others stay as they were.
+
+    Nobody is sent home where there is no safe way.
+    """
+    record, empty = world.fleet.records.get(uav_id), replace(held, stops=(), distance=0.0)
+    if record is None:
+        return empty
+    if record.low:
+        return _lay(world, uav_id, (), True, {})[0]
+    position = record.report.position
+    if not held.returns or world.ways().leg(position, record.home) is not None:
+        return empty
+    if not record.standing:
+        note_way_home(world, uav_id, False, position)
+    return replace(empty, returns=False, end_via=())
 
 
 def must_change(world: World, uav_id: str) -> bool:
@@ -105,7 +126,8 @@ def must_change(world: World, uav_id: str) -> bool:
                 or not may_fly(known.task, known.failed_on, record.report)):
             return True
     ways, places = world.ways(), [stop.task.position for stop in held.stops]
-    return (held.returns != (world.params.route_end == 'home')
+    returns = world.params.route_end == 'home' and uav_id not in world.stranded
+    return (held.returns != returns
             or ways.rest(record.report.position, held.stops[0].leg, places[0]) is None
             or not all(ways.clear(place, *stop.leg.via, stop.task.position)
                        for place, stop in zip(places, held.stops[1:], strict=False)))
@@ -146,14 +168,16 @@ def _why_left(world: World, record: TaskRecord, usable: frozenset[str],
     if allowed is not None and not any(uav_id in heard for uav_id in allowed):
         return Event.LEAVE, (f'allowed for {", ".join(sorted(allowed))} only: '
                                       'not heard yet')
+    stands = standing(known for known in world.fleet.standing()
+                      if may_fly(record.task, record.failed_on, known.report))
     if not usable:
-        return Event.LEAVE, 'no UAV available'
+        return Event.LEAVE, stands or 'no UAV available'
     others = _restricted(record, usable).allowed_uavs
     if record.failed_on and others is not None and others.isdisjoint(usable):
-        return Event.LEAVE, (f'failed on {", ".join(record.failed_on)}; no other UAV '
-                                      'that may fly it is available')
+        why = f'failed on {", ".join(record.failed_on)}; no other UAV that may fly it is available'
+        return Event.LEAVE, '; '.join(filter(None, (why, stands)))
     if record.task.id in left:
-        return Event.LEAVE, left[record.task.id]
+        return Event.LEAVE, '; '.join(filter(None, (left[record.task.id], stands)))
     return Event.WAIT, record.reason or 'waits for the next plan'
 
 

@@ -111,6 +111,7 @@ class UavReport:
     available: bool = True  # and not in FAULT
     active_task: str = ''  # being flown
     list_revision: int = 0  # last list verified on board
+    standby: bool = False  # on the ground
 
     def __post_init__(self) -> None:
         check_id('uav_id', self.uav_id)

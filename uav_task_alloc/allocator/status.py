@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from uav_task_alloc.allocator.records import TaskRecord, TaskState
 from uav_task_alloc.allocator.world import World
+from uav_task_alloc.allocator.zone_watch import NAMED, standing
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,12 +33,17 @@ def worries(world: World, journal_trouble: str, solver_trouble: str = '') -> lis
     """What an operator should look at."""
     fleet = world.fleet
     silent = sorted(uav_id for uav_id, record in fleet.records.items() if record.silent)
+    stands = standing(fleet.standing())
     left = [record for record in world.tasks.open() if record.state is TaskState.UNASSIGNED]
     found = [f'journal: {journal_trouble}'] if journal_trouble else []
     found += [f'solver: {solver_trouble}'] if solver_trouble else []
     found += [f'silent: {", ".join(silent[:20])}'] if silent else []
     low = sorted(uav_id for uav_id, record in fleet.records.items() if record.low)
     found += [f'battery low: {", ".join(low)}'] if low else []
+    found += [f'{stands}: no tasks'] if stands else []
+    found += [f'{uav_id} has no safe way home: {why}'
+              for uav_id, why in sorted(world.stranded.items())
+              if uav_id in fleet.records and uav_id not in silent][:NAMED]
     found += [f'{len(left)} tasks unassigned, {left[0].task.id}: {left[0].reason}'] if left else []
     if world.tasks.open() and not any(fleet.usable(uav_id) for uav_id in fleet.records):
         found.append('no UAV available')

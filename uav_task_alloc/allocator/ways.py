@@ -9,8 +9,8 @@ from itertools import pairwise
 import numpy as np
 
 from uav_task_alloc.allocator.lists import length
-from uav_task_alloc.geometry.detour import detour
-from uav_task_alloc.geometry.obstacles import blocked, contains, pack
+from uav_task_alloc.geometry.detour import detour, find_detour
+from uav_task_alloc.geometry.obstacles import blocked, pack
 from uav_task_alloc.model import Leg, Point, ThreatZone
 from uav_task_alloc.params import AllocatorParams
 
@@ -34,9 +34,30 @@ class Ways:
                              altitude_min=params.altitude_min, altitude_max=params.altitude_max)
         return None if math.isinf(metres) else Leg(tuple(via), metres)
 
-    def inside(self, point: Point) -> bool:
-        """The point is in a zone or its margin."""
-        return any(contains(row, *point, True) for row in self._bare.rows)
+    def why_none(self, a: Point, b: Point) -> str:
+        """Why there is no safe way from a to the home b, in words."""
+        params = self.params
+        found = find_detour(a, b, self.zones, clearance=params.clearance,
+                            altitude_min=params.altitude_min, altitude_max=params.altitude_max)
+        if found.goal_inside:
+            return f'its home is inside zone {", ".join(found.goal_inside)}'
+        return 'zones close it off'
+
+    def around(self, point: Point, up: float = 0.0, wide: bool = False) -> str:
+        """The first zone that the point, or a point less than `up` [m] above it, is in.
+
+        Args:
+            point: [m] ENU.
+            up: [m].
+            wide: with half the clearance, not the margin alone.
+
+        Returns:
+            Its id, '' where there is none.
+        """
+        rows, top = (self._wide if wide else self._bare).rows, (*point[:2], point[2] + up)
+        near = ((top >= self._low) & (point <= self._high)).all(axis=1)
+        return next((self.zones[k].id for k in np.flatnonzero(near)
+                     if blocked(rows[k], *point, *top, -np.inf, True)), '')
 
     def clear(self, *points: Point) -> bool:
         """The polyline enters no zone. O(zones) a segment, most of them by their boxes"""

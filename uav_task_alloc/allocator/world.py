@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable, Sequence
 from typing import TYPE_CHECKING
 
+from uav_task_alloc.allocator import zone_watch
 from uav_task_alloc.allocator.fleet import Fleet, UavRecord, jump, may_fly, news_of
 from uav_task_alloc.allocator.life import Event as Life
 from uav_task_alloc.allocator.published import ListBook
@@ -26,7 +27,7 @@ from uav_task_alloc.allocator.restore import Saved
 from uav_task_alloc.allocator.schedule import Schedule
 from uav_task_alloc.allocator.tasks import UNCHANGED, TaskBook
 from uav_task_alloc.errors import InvalidValue
-from uav_task_alloc.model import Task, ThreatZone
+from uav_task_alloc.model import Point, Task, ThreatZone
 from uav_task_alloc.params import AllocatorParams
 
 if TYPE_CHECKING:  # it brings the compiler along, which a start must not wait for
@@ -58,7 +59,10 @@ class World:
         self.awake = False  # the kernels are compiled: looking at zones is quick
         self._ways: Ways | None = None
         self._looked: dict[str, float] = {}
-        self.laid: dict[str, Ways] = {}  # the zones as they were when a UAV's list was laid
+        # the zones and the home as they were when a UAV's list was laid
+        self.laid: dict[str, tuple[Ways, Point]] = {}
+        self.looked_at_all = True  # no zone is new
+        self.stranded: dict[str, str] = {}  # why a UAV has no safe way home
         self._old = {each.uav: each for each in saved.lists if each.stops}
 
     def announce(self, action: Action, tasks: Iterable[Task], stamp: float,
@@ -111,7 +115,7 @@ class World:
             self.again.add(uav_id)
         if self.awake and now - self._looked.get(uav_id, -LOOK) >= LOOK:
             self._looked[uav_id] = now
-            self._look_ahead(uav_id, now)
+            zone_watch.look_ahead(self, uav_id, now)
         return ''
 
     def _look_for_jumps(self, before: UavRecord | None, report: UavReport, now: float) -> None:
@@ -139,20 +143,6 @@ class World:
                                 'passed while nobody listened')
                 self.note(f'{task_id} COMPLETED while nobody listened: {report.uav_id} flies '
                           f'{report.active_task}')
-
-    def _look_ahead(self, uav_id: str, now: float) -> None:
-        """A way cut by a zone, or a UAV caught in one, asks for a new plan."""
-        record, ways = self.fleet.records[uav_id], self.ways()
-        position = record.report.position
-        caught = ways.inside(position)
-        if caught != record.caught:
-            self.fleet.set_caught(uav_id, caught)
-            self.note(f'{uav_id} is {"inside" if caught else "out of"} a zone', warning=caught)
-            self.touch(f'{uav_id} {"caught in" if caught else "out of"} a zone', now)
-        stops = self.lists.get(uav_id).stops
-        if (stops and not caught
-                and ways.rest(position, stops[0].leg, stops[0].task.position) is None):
-            self.touch(f'way of {uav_id} cut', now)
 
     def event(self, event: TaskEvent, stamp: float, now: float) -> str:
         """What became of a task; returns why that is refused, '' when it is not."""
@@ -210,7 +200,7 @@ class World:
         changed = [i for i in {**self.zones, **new} if self.zones.get(i) != new.get(i)]
         self.zones, self._ways = new, None
         self.dirty.add('zones')
-        self._looked.clear()
+        self.looked_at_all = False
         self.note(f'zones changed: {_some(changed)}')
         self.touch(f'zones {_some(changed)}', now)
 
@@ -255,7 +245,8 @@ class World:
         """The list in force is this route, and its ways are as good as when they were laid."""
         stops, ways = self.lists.get(uav_id).stops, self.ways()
         record = self.fleet.records[uav_id]
-        return (bool(stops) and self.laid.get(uav_id) is ways and not record.caught
+        return (bool(stops) and self.laid.get(uav_id) == (ways, record.home)
+                and not record.caught
                 and [stop.task for stop in stops] == tasks
                 and ways.rest(record.report.position, stops[0].leg,
                               stops[0].task.position) is not None)

@@ -139,7 +139,8 @@ def to_report(msg: m.UavState) -> UavReport:
         capabilities=check_words(place + 'capabilities', msg.capabilities),
         battery=known(msg.battery),
         available=msg.available and msg.mode != m.UavState.FAULT,
-        active_task=msg.active_task_id, list_revision=msg.list_revision)
+        active_task=msg.active_task_id, list_revision=msg.list_revision,
+        standby=msg.mode == m.UavState.STANDBY)
 
 
 def to_event(msg: m.TaskEvent) -> TaskEvent:
