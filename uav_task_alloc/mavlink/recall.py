@@ -47,9 +47,8 @@ class Recall:
         if not self._profile.atomic and telemetry.flight is not Flight.MISSION:
             self._progress.begin(held, None, now)  # held for a swap: current is of the old items
             return
-        reached = -1 if telemetry.reached is None else telemetry.reached
-        current = min(max(0, max(telemetry.current, reached + 1)
-                          - self._profile.rules.home_first), len(held))
+        # not by REACHED: PX4 repeats that of the mission before for some seconds
+        current = min(max(0, telemetry.current - self._profile.rules.home_first), len(held))
         flown = len(held) if self._ended(held, current) else current
         self._progress.begin(held, flown, now)
         # on the ground, and the first list ever: what is on board is of an earlier mission

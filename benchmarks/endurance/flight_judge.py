@@ -1,0 +1,156 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Judges a flight by what the simulator and the link recorded, never by what the bridge says."""
+from __future__ import annotations
+
+import math
+from collections import Counter
+
+from flight_world import BRIDGE, World
+from pymavlink.dialects.v20 import ardupilotmega as d
+
+from uav_task_alloc.mavlink.codec import Message
+from uav_task_alloc.mavlink.modes import ModeClass, mode_class
+from uav_task_alloc.mavlink.vehicle_config import Event
+
+OURS = f'station {BRIDGE[0]}/{BRIDGE[1]}'
+ACTS = {d.MAV_CMD_DO_SET_MODE, d.MAV_CMD_COMPONENT_ARM_DISARM, d.MAV_CMD_NAV_TAKEOFF,
+        d.MAV_CMD_DO_SET_MISSION_CURRENT, d.MAV_CMD_MISSION_START, d.MAV_CMD_DO_PAUSE_CONTINUE,
+        d.MAV_CMD_NAV_RETURN_TO_LAUNCH, d.MAV_CMD_NAV_LAND, d.MAV_CMD_NAV_LOITER_UNLIM}
+SAME = 12.0  # [s] a mode that the bridge itself had asked for looks alike, whoever set it
+NEAR = 2.0  # [m] from a task's place: its item
+STUCK = 60.0  # [s]
+
+
+def acts(message: Message) -> bool:
+    """Whether a message makes a vehicle do something."""
+    kind = message.get_type()
+    return kind in ('SET_MODE', 'MISSION_SET_CURRENT') or (
+        kind in ('COMMAND_LONG', 'COMMAND_INT') and message.command in ACTS)
+
+
+class Judge:
+    """Follows one flight tick by tick."""
+
+    def __init__(self, world: World, kind: str, places: dict[str, tuple[float, float, float]],
+                 ) -> None:
+        self.world, self.places = world, places
+        self.family = 'copter' if kind == 'ardupilot' else kind
+        self.taken_at: float | None = None  # [s] somebody else has the aircraft
+        self.told_at: float | None = None  # [s] news of it has reached the bridge
+        self.failing = False
+        self.stubborn = False  # the operator's last hand-over was by the sticks
+        self.faults: list[str] = []
+        self.counts: Counter[str] = Counter()
+        self.reached: Counter[str] = Counter()
+        self.completed: set[str] = set()
+        self._mode = world.vehicle.flight.custom_mode
+        self._asked: dict[int, float] = {}  # modes that the bridge asked for, when [s]
+        self._events = 0
+        self._stuck_since = self._moved_at = 0.0
+
+    def handed_back(self) -> None:
+        """By the service, or by a pilot."""
+        self.taken_at = self.told_at = None
+        self.stubborn = False
+        self.counts['handed_back'] += 1
+
+    def rebooted(self) -> None:
+        """The vehicle: whoever had it, it is on the ground, and disarmed."""
+        self.failing = False
+
+    def forgotten(self) -> None:
+        """The bridge was restarted without a file: on the ground it knows of nobody."""
+        if self.world.vehicle.flight.landed:
+            self.taken_at = self.told_at = None
+
+    def step(self) -> None:
+        """After each tick of the world."""
+        for event in self.world.truth:
+            self._truth(event)
+        for sent in self.world.arrivals:
+            if self.told_at is None and self.taken_at is not None and sent >= self.taken_at:
+                self.told_at = self.world.now
+        for now, message in self.world.sent:
+            self._sent(now, message)
+        self._tasks()
+        self._progress()
+
+    def _class(self, mode: int) -> ModeClass | None:
+        return mode_class(self.family, mode)
+
+    def _truth(self, event: Event) -> None:
+        if event.name == 'item_reached':
+            for name, place in self.places.items():
+                if math.dist(place, event.point) < NEAR:
+                    self.reached[name] += 1
+                    if self.reached[name] == 2:
+                        self._fault('flown_twice', f'{name} reached again')
+        elif event.name == 'mode' and event.mode is not None:
+            before, self._mode = self._mode, event.mode
+            if event.cause not in (OURS, 'self'):
+                self._mode_set(before, event)
+        elif event.name == 'kill_switch' or (
+                event.name in ('armed', 'disarmed') and event.cause not in (OURS, 'self')):
+            self._take(event.t)
+        elif event.name == 'failsafe':
+            self.failing = True
+        elif event.name == 'failsafe_over':
+            self.failing = False
+
+    def _mode_set(self, before: int, event: Event) -> None:
+        assert event.mode is not None
+        was, new = self._class(before), self._class(event.mode)
+        airborne = not self.world.vehicle.flight.landed
+        if new is ModeClass.MISSION:
+            if airborne and self.taken_at is not None and not self.failing:
+                self.handed_back()
+        elif new is ModeClass.HOLD and was is ModeClass.STICK:
+            if airborne and self.taken_at is not None and not self.failing:
+                self.handed_back()  # the bridge has to wait before it believes that
+        elif (new is not ModeClass.HOLD or was is ModeClass.MISSION) and (
+                event.t - self._asked.get(event.mode, -math.inf) > SAME):
+            self._take(event.t)
+
+    def _take(self, when: float) -> None:
+        if self.taken_at is None:
+            self.taken_at, self.told_at = when, None
+
+    def _sent(self, now: float, message: Message) -> None:
+        if not acts(message):
+            return
+        if self.told_at is not None and now > self.told_at:
+            self._fault('overridden', f'{message} sent {now - self.told_at:.1f} s after the news')
+        if message.get_type() == 'COMMAND_LONG' and message.command == d.MAV_CMD_DO_SET_MODE:
+            main, sub = int(message.param2), int(message.param3)
+            self._asked[main << 16 | sub << 24 if self.family == 'px4' else main] = now
+
+    def _tasks(self) -> None:
+        events = self.world.events
+        while self._events < len(events):
+            event = events[self._events]
+            self._events += 1
+            if event.event == 'COMPLETED' and event.task not in self.completed:
+                self.completed.add(event.task)
+                if not self.reached[event.task]:
+                    self._fault('false_completed', f'{event.task} was never reached')
+
+    def _progress(self) -> None:
+        """Stuck: the bridge says that it has the aircraft, the link is good, nothing happens."""
+        world, state = self.world, self.world.state
+        flight = world.vehicle.flight
+        if math.hypot(*flight.body.velocity) > 0.3 or (
+                flight.track is not None and flight.track.hold > 0.0):
+            self._moved_at = world.now
+        wants = world.tasks is not None and any(
+            stop.task.id not in self.completed for stop in world.tasks.stops)
+        ready = (state is not None and state.authority.name == 'HELD' and wants
+                 and world.now >= world.link.cut_until and not self.failing)
+        if not ready:
+            self._stuck_since = world.now
+        if world.now - max(self._stuck_since, self._moved_at) > STUCK:
+            self._fault('held_forever', f'{flight.mode.name}, {state}')
+            self._moved_at = math.inf  # once a flight
+
+    def _fault(self, kind: str, text: str) -> None:
+        self.counts[kind] += 1
+        self.faults.append(f'{self.world.now:.1f} {kind}: {text}')

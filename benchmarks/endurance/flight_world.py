@@ -1,0 +1,150 @@
+# SPDX-License-Identifier: Apache-2.0
+"""One simulated vehicle, a link that may fail, a bridge that may be killed; virtual time."""
+from __future__ import annotations
+
+import heapq
+import itertools
+import random
+from collections.abc import Iterator
+
+from uav_task_alloc.geometry.frames import Origin
+from uav_task_alloc.mavlink.authority import Record
+from uav_task_alloc.mavlink.codec import Codec, Message
+from uav_task_alloc.mavlink.ground import Ground, Station
+from uav_task_alloc.mavlink.policy import Policy, TaskProgress
+from uav_task_alloc.mavlink.status import UavStatus, state_of
+from uav_task_alloc.mavlink.vehicle import AUTOPILOTS, Vehicle
+from uav_task_alloc.mavlink.vehicle_config import Event, VehicleConfig
+from uav_task_alloc.mission import TaskList
+
+ORIGIN = Origin(47.397742, 8.545594, 488.0)
+BRIDGE, OTHER = (245, 190), (255, 190)  # system, component
+TICK = 0.1  # [s]
+LATE = 0.05  # share of frames that a lossy link delays by up to 5 s
+LATEST = 5.0  # [s]
+
+
+class Link:
+    """Carries frames both ways: in order, or with loss, delay and reordering."""
+
+    def __init__(self, rng: random.Random, lossy: bool) -> None:
+        self._rng = rng
+        self.loss = rng.uniform(0.0, 0.2) if lossy else 0.0
+        self.delay = rng.uniform(0.0, 0.3) if lossy else rng.uniform(0.0, 0.1)
+        self._lossy, self.cut_until = lossy, 0.0  # [s]
+        self._frames: list[tuple[float, int, str, float, bytes]] = []
+        self._number = itertools.count()
+
+    def send(self, way: str, frame: bytes, now: float) -> None:
+        """Take a frame; an ordered link keeps the order, a lossy one does not."""
+        if now < self.cut_until or self._rng.random() < self.loss:
+            return
+        delay = self.delay
+        if self._lossy:
+            delay *= self._rng.random()
+            if self._rng.random() < LATE:
+                delay = self._rng.uniform(0.0, LATEST)
+        heapq.heappush(self._frames, (now + delay, next(self._number), way, now, frame))
+
+    def due(self, now: float) -> Iterator[tuple[str, float, bytes]]:
+        """Way, time of sending [s] and frame of what arrives by now."""
+        while self._frames and self._frames[0][0] <= now + 1e-9:
+            _, _, way, sent, frame = heapq.heappop(self._frames)
+            yield way, sent, frame
+
+
+class Store:
+    """The bridge's state_dir."""
+
+    def __init__(self) -> None:
+        self.records: dict[str, Record] = {}
+
+    def load(self, uav_id: str) -> Record | None:
+        return self.records.get(uav_id)
+
+    def save(self, uav_id: str, record: Record) -> None:
+        self.records[uav_id] = record
+
+
+class World:
+    """Moves everything by a tick; `arrivals` and `sent` are what the judge looks at."""
+
+    def __init__(self, kind: str, rng: random.Random, lossy: bool, policy: Policy,
+                 **config: object) -> None:
+        self.rng, self.now, self.policy = rng, 0.0, policy
+        self.vehicle = Vehicle(VehicleConfig('uav_1', 1, ORIGIN, (0.0, 0.0, 0.0), floods=False,
+                                             **config), AUTOPILOTS[kind])  # type: ignore[arg-type]
+        self.link, self.store = Link(rng, lossy), Store()
+        self._down = Codec(1, 1)
+        self.events: list[TaskProgress] = []
+        self.truth: list[Event] = []  # of the last tick
+        self.arrivals: list[float] = []  # when heartbeats of the last tick were sent [s]
+        self.sent: list[tuple[float, Message]] = []  # by the bridge, in the last tick
+        self.notes: list[str] = []
+        self.started_at = 0.0  # [s] the bridge
+        self.tasks: TaskList | None = None
+        self.start()
+
+    def start(self, keep: bool = True) -> None:
+        """A new bridge, after a kill -9; `keep`: it has a state_dir."""
+        if not keep:
+            self.store = Store()
+        self.ground = Ground(Station(origin=ORIGIN, policy=self.policy),
+                             random.Random(self.rng.random()), self.store)
+        self._up, self._ear, self._vehicle_ear = Codec(*BRIDGE), Codec(*BRIDGE), Codec(1, 1)
+        self.started_at, self._assigned = self.now, False
+
+    @property
+    def state(self) -> UavStatus | None:
+        """What the bridge tells of the UAV; None where it has not found it."""
+        served = self.ground.served.get(1)
+        return None if served is None else state_of(served, self.now)
+
+    def assign(self, tasks: TaskList) -> None:
+        """A list for the UAV, again after a restart of the bridge."""
+        self.tasks, self._assigned = tasks, False
+
+    def hand_over(self) -> str:
+        """An operator calls the service; returns why it is refused."""
+        if 1 not in self.ground.served:
+            return 'not found'
+        return self.ground.hand_over('uav_1', 'operator', self.now)
+
+    def station(self, message: Message) -> None:
+        """Another ground station, on a link of its own."""
+        for m in Codec(1, 1).parse(Codec(*OTHER).pack(message)):
+            self._send_down(self.vehicle.receive(m, self.now))
+
+    def step(self) -> None:
+        """Let a tick pass."""
+        self.now += TICK
+        self.arrivals, self.sent = [], []
+        self._send_down(self.vehicle.step(self.now))
+        self._send_up(self.ground.step(self.now))
+        if self.tasks is not None and not self._assigned and 1 in self.ground.served:
+            self._assigned = True
+            self._send_up(self.ground.assign('uav_1', self.tasks, self.now))
+        for way, sent, frame in self.link.due(self.now):
+            if way == 'up':
+                for m in self._vehicle_ear.parse(frame):
+                    self._send_down(self.vehicle.receive(m, self.now))
+            else:
+                for m in self._ear.parse(frame):
+                    if m.get_type() == 'HEARTBEAT':
+                        self.arrivals.append(sent)
+                    self._send_up(self.ground.receive('link', m, self.now))
+        self.truth = self.vehicle.take_events()
+        for served in self.ground.served.values():
+            while served.pilot.events:
+                self.events.append(served.pilot.events.popleft())
+            while served.pilot.notes:
+                self.notes.append(f'{self.now:.1f} {served.pilot.notes.popleft().text}')
+
+    def _send_down(self, messages: list[Message]) -> None:
+        for m in messages:
+            self.link.send('down', self._down.pack(m), self.now)
+
+    def _send_up(self, outgoing: list[tuple[object, Message]]) -> None:
+        for _, m in outgoing:
+            self.sent.append((self.now, m))
+            self.link.send('up', self._up.pack(m), self.now)

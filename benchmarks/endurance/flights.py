@@ -1,0 +1,304 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Flights with pilots, failsafes, reboots, second stations, restarts and new lists at random.
+
+    python benchmarks/endurance/flights.py --flights 2000 --seed 1 [--lossy] [--json]
+
+Each flight is one simulated ArduCopter or PX4 and one bridge over a link in virtual time; --lossy
+loses up to 20 % of the frames and delays some by up to 5 s, out of order. Judged by what the
+simulator and the link recorded. `flyable` counts the tasks of flights in which the aircraft is the
+bridge's in the end, `completed` those of them that it reported. --without-authority switches the
+table off, to show that the check can fail. --json: the last line is one object. Ends with 1 where
+something is wrong.
+"""
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import multiprocessing
+import os
+import random
+import sys
+from collections import Counter
+from collections.abc import Callable
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
+
+from flight_judge import Judge
+from flight_world import World
+from pymavlink.dialects.v20 import ardupilotmega as d
+
+from uav_task_alloc.mavlink.authority import Authority, State
+from uav_task_alloc.mavlink.policy import Policy
+from uav_task_alloc.mavlink.vehicle_modes import px4_mode
+from uav_task_alloc.mission import Stop, TaskList
+from uav_task_alloc.model import Task
+
+LIMIT = 600.0  # [s] of a flight
+QUIET = 150.0  # [s] nothing is thrown at it from then on
+SIDE = 70.0  # [m] of the grid of tasks
+GIVEN_BACK = 0.85  # share of flights in which an operator gives the aircraft back
+WRONG = ('false_completed', 'flown_twice', 'overridden', 'held_forever')
+HOLD = {'ardupilot': 4, 'px4': px4_mode(4, 3)}
+MISSION = {'ardupilot': 3, 'px4': px4_mode(4, 4)}
+RETURN = {'ardupilot': 6, 'px4': px4_mode(4, 5)}
+LAND = {'ardupilot': 9, 'px4': px4_mode(4, 6)}
+STICK = {'ardupilot': (0, 2, 5, 16), 'px4': (px4_mode(2), px4_mode(3))}
+OWN = {'ardupilot': (6, 7, 9, 17, 21, 23), 'px4': (px4_mode(4, 5), px4_mode(4, 6), px4_mode(4, 8))}
+
+
+class Flight:
+    """One flight: what is thrown at it, and the operator who gives it back."""
+
+    def __init__(self, seed: int, number: int, lossy: bool) -> None:
+        self.rng = rng = random.Random(f'{seed}/{number}/{lossy}')
+        self.kind = rng.choice(['ardupilot', 'px4'])
+        boots = rng.random() < 0.3
+        self.world = World(
+            self.kind, rng, lossy,
+            Policy(takeoff=True, cruise_altitude=30.0,
+                   relaunch=rng.choice(['operator', 'automatic'])),
+            arming_delay=rng.uniform(0.0, 5.0) + 10.0 * boots,
+            boot_delay=None if boots else 0.0, settling_time=None if boots else 0.0,
+            batteries=rng.choice([1, 2]))
+        self.places = {f't{k}': (SIDE * (k % 5) + rng.uniform(-9.0, 9.0),
+                                 SIDE * (1 + k // 5) + rng.uniform(-9.0, 9.0),
+                                 rng.uniform(25.0, 45.0)) for k in range(20)}
+        self.judge = Judge(self.world, self.kind, self.places)
+        self.fresh = list(self.places)
+        self.listed: list[str] = []
+        self.revision = 0
+        self.service = rng.choice([0.0, 0.0, 2.0])
+        self.gives_back = rng.random() < GIVEN_BACK
+        self.back_at = math.inf  # [s] the operator acts
+        self.counts: Counter[str] = Counter()
+        self.later: list[tuple[float, Callable[[], object]]] = []
+        self._schedule()
+
+    def _schedule(self) -> None:
+        rng = self.rng
+        kinds: list[Callable[[], None]] = []
+        for share, make in ((0.30, self.pilot), (0.25, self.station), (0.40, self.failsafe),
+                            (0.40, self.reboot), (0.45, self.restart), (0.15, self.skip),
+                            (0.25, self.cut), (0.04, self.kill), (0.06, self.avoid)):
+            kinds += [make] * (rng.random() < share)
+        self.later += [(rng.uniform(2.0, QUIET), make) for make in kinds]
+        self.later += [(rng.uniform(5.0, QUIET), self.new_list)
+                       for _ in range(rng.randint(1, 5))]
+        self.later.sort(key=lambda each: each[0])
+
+    @property
+    def vehicle(self):
+        return self.world.vehicle
+
+    @property
+    def airborne(self) -> bool:
+        return not self.vehicle.flight.landed
+
+    # what is thrown at it
+
+    def _back_later(self) -> None:
+        self.back_at = self.world.now + self.rng.uniform(5.0, 30.0)
+
+    def pilot(self) -> None:
+        """Takes it over by radio control."""
+        self.counts['takeovers'] += 1
+        if not self.airborne and self.rng.random() < 0.3:
+            self.vehicle.rc_arm(not self.vehicle.flight.armed)
+        else:
+            modes = STICK[self.kind] + OWN[self.kind]
+            self.vehicle.rc_mode(self.rng.choice(modes))
+        self._back_later()
+
+    def station(self) -> None:
+        """Another ground station commands a mode."""
+        self.counts['takeovers'] += 1
+        modes = [RETURN[self.kind], LAND[self.kind]]
+        in_mission = self.vehicle.flight.custom_mode == MISSION[self.kind]
+        modes.append(HOLD['px4'] if self.kind == 'px4' and in_mission else STICK[self.kind][-1])
+        self._command(self.rng.choice(modes))
+        self._back_later()
+
+    def _command(self, mode: int) -> None:
+        main, sub = (mode >> 16 & 0xff, mode >> 24) if self.kind == 'px4' else (mode, 0)
+        self.world.station(d.MAVLink_command_long_message(
+            1, 1, d.MAV_CMD_DO_SET_MODE, 0, 1, main, sub, 0, 0, 0, 0))
+
+    def skip(self) -> None:
+        """Another ground station sets the current item ahead."""
+        self.counts['skips'] += 1
+        ahead = self.vehicle.flight.seq + self.rng.randint(1, 3)
+        self.world.station(d.MAVLink_mission_set_current_message(1, 1, ahead))
+
+    def failsafe(self) -> None:
+        self.counts['failsafes'] += 1
+        mode = self.rng.choice([None, RETURN[self.kind], LAND[self.kind]])
+        self.vehicle.failsafe(self.rng.choice(['radio', 'gcs', 'battery', 'ekf', 'fence']), mode)
+        over = self.world.now + self.rng.uniform(3.0, 20.0)
+        self._at(over, self.vehicle.failsafe_over)
+        self.back_at = over + self.rng.uniform(2.0, 10.0)
+
+    def kill(self) -> None:
+        self.counts['kills'] += 1
+        self.vehicle.kill_switch()
+        over = self.world.now + self.rng.uniform(3.0, 10.0)
+        self._at(over, self.vehicle.kill_switch_off)
+        self.back_at = over + 5.0
+
+    def avoid(self) -> None:
+        if self.airborne and self.vehicle.flight.custom_mode == MISSION[self.kind]:
+            self.counts['avoidances'] += 1
+            self.vehicle.avoid(True)
+            self._at(self.world.now + self.rng.uniform(3.0, 10.0),
+                     lambda: self.vehicle.avoid(False))
+
+    def reboot(self) -> None:
+        """Of the vehicle; in the air only now and then."""
+        if self.airborne and self.world.now < QUIET and self.rng.random() < 0.9:
+            self._at(self.world.now + 5.0, self.reboot)
+            return
+        self.counts['reboots'] += 1
+        self.vehicle.reboot(self.world.now)
+        self.judge.rebooted()
+        self._back_later()
+
+    def restart(self) -> None:
+        """Of the bridge, most often with its state_dir."""
+        self.counts['restarts'] += 1
+        keep = self.rng.random() < 0.8
+        self.world.start(keep)
+        if not keep:
+            self.judge.forgotten()
+            self._back_later()
+
+    def cut(self) -> None:
+        self.counts['cuts'] += 1
+        self.world.link.cut_until = self.world.now + self.rng.uniform(1.0, 15.0)
+        self._back_later()
+
+    def _at(self, when: float, action: Callable[[], object]) -> None:
+        self.later.append((when, action))
+        self.later.sort(key=lambda each: each[0])
+
+    # the allocator and the operator
+
+    def new_list(self) -> None:
+        """The tasks left in another order, less one that is not next, and with new ones."""
+        left = [name for name in self.listed if name not in self.judge.completed]
+        if len(left) > 3 and self.rng.random() < 0.4:
+            left.remove(self.rng.choice(left[2:]))
+        count = 3 if not self.listed else self.rng.randint(0, 2)
+        left += [self.fresh.pop() for _ in range(min(count, len(self.fresh)))]
+        self.rng.shuffle(left)
+        self._assign(left)
+
+    def _assign(self, names: list[str]) -> None:
+        self.listed, self.revision = names, self.revision + 1
+        self.world.assign(TaskList(self.revision, tuple(
+            Stop(Task(name, self.places[name], service_time=self.service)) for name in names)))
+
+    def operate(self) -> None:
+        """Give the aircraft back where the bridge says that it has not got it."""
+        world, state = self.world, self.world.state
+        if not self.gives_back or state is None or world.now < min(self.back_at, QUIET + 20.0):
+            return
+        self.back_at = world.now + 3.0
+        if state.authority is State.HELD or state.authority is State.UNKNOWN or state.available:
+            return
+        flight, way = self.vehicle.flight, self.rng.random()
+        if not self.airborne or way < 0.6 or flight.failsafes or self.judge.stubborn:
+            if world.hand_over() == '':
+                self.judge.handed_back()
+        elif way < 0.8:
+            self.vehicle.rc_mode(MISSION[self.kind])
+            self.judge.stubborn = True  # the next try is by the service
+        else:
+            self.vehicle.rc_mode(STICK[self.kind][-1])
+            self._at(world.now + 4.0, lambda: self.vehicle.rc_mode(HOLD[self.kind]))
+            self.back_at = world.now + 20.0
+            self.judge.stubborn = True
+
+    def fly(self) -> None:
+        """To its end: all is flown, or time is up."""
+        world = self.world
+        self.new_list()
+        while world.now < LIMIT:
+            world.step()
+            self.judge.step()
+            while self.later and self.later[0][0] <= world.now:
+                self.later.pop(0)[1]()
+            self.operate()
+            if world.now > QUIET and not self.later and (
+                    set(self.listed) <= self.judge.completed or not self.gives_back):
+                break
+
+    def result(self) -> tuple[Counter[str], list[str]]:
+        counts = self.counts + self.judge.counts
+        counts['flights'] = 1
+        counts[self.kind] = 1
+        if self.gives_back:
+            counts['flyable'] = len(set(self.listed) | self.judge.completed)
+            counts['completed'] = len(self.judge.completed)
+        return counts, self.judge.faults
+
+
+def switch_authority_off() -> None:
+    """What the bridge would do without the table."""
+    Authority.allows = lambda self, action: True  # type: ignore[method-assign]
+    Authority.held = property(lambda self: True)  # type: ignore[assignment, method-assign]
+
+
+def fly(job: tuple[int, int, bool, bool]) -> tuple[int, Counter[str], list[str], list[str]]:
+    """One flight in a process of its own."""
+    seed, number, lossy, without = job
+    if without:
+        switch_authority_off()
+    flight = Flight(seed, number, lossy)
+    flight.fly()
+    counts, faults = flight.result()
+    unfinished = flight.gives_back and not set(flight.listed) <= flight.judge.completed
+    if unfinished:
+        counts['unfinished_flights'] = 1
+    return number, counts, faults, flight.world.notes if faults or unfinished else []
+
+
+def main() -> int:
+    """Fly all, print, judge."""
+    parser = argparse.ArgumentParser(description=(__doc__ or '').partition('\n')[0])
+    parser.add_argument('--flights', type=int, default=2000)
+    parser.add_argument('--first', type=int, default=0, help='number of the first flight')
+    parser.add_argument('--seed', type=int, default=1)
+    parser.add_argument('--lossy', action='store_true')
+    parser.add_argument('--without-authority', action='store_true')
+    parser.add_argument('--processes', type=int, default=os.cpu_count() or 1)
+    parser.add_argument('--verbose', action='store_true', help='notes of flights with faults')
+    parser.add_argument('--json', action='store_true')
+    given = parser.parse_args()
+    jobs = [(given.seed, number, given.lossy, given.without_authority)
+            for number in range(given.first, given.first + given.flights)]
+    total: Counter[str] = Counter()
+    with multiprocessing.Pool(given.processes) as pool:
+        for done, (number, counts, faults, notes) in enumerate(
+                pool.imap_unordered(fly, jobs, chunksize=4), 1):
+            total += counts
+            for fault in faults:
+                print(f'\nflight {number} of seed {given.seed}: {fault}', file=sys.stderr)
+            if given.verbose and notes:
+                print(f'\nflight {number}:\n  ' + '\n  '.join(notes), file=sys.stderr)
+            print(f'\r{done}/{given.flights} flights ', end='', file=sys.stderr)
+    print(file=sys.stderr)
+    names = ('flights', 'takeovers', 'failsafes', 'reboots', 'restarts', 'handed_back',
+             'completed', 'flyable', *WRONG)
+    found = {name: total[name] for name in (*names, *sorted(set(total) - set(names)))}
+    found |= {'seed': given.seed, 'lossy': given.lossy}
+    for name, value in found.items():
+        print(f'{name:20} {value}', file=sys.stderr if given.json else sys.stdout)
+    if given.json:
+        print(json.dumps(found))
+    return int(any(total[name] for name in WRONG)
+               or total['completed'] < 0.95 * total['flyable'])
+
+
+if __name__ == '__main__':
+    sys.exit(main())
