@@ -49,6 +49,12 @@ def zones(wall, *rows):
         for zone, x, y, radius in rows]}
 
 
+def held(wall, uav, state, why, seconds, back=''):
+    """What the diagnostics of a bridge say of who has a UAV."""
+    return {'kind': 'uploads', 'wall': wall, 'uploads': {}, 'health': {}, 'authority': {
+        uav: {'state': state, 'why': why, 'for': seconds, 'back': back}}}
+
+
 def uavs(wall):
     return [state(wall, 'u1', (100.0, 100.0)), state(wall, 'u2', (500.0, 100.0))]
 

@@ -6,7 +6,7 @@ import re
 import matplotlib.image
 import numpy as np
 from chromium import WAIT, wait
-from small_run import BEGIN, FIRST, Run, announced, listed, planned, statuses, uavs
+from small_run import BEGIN, FIRST, Run, announced, held, listed, planned, state, statuses, uavs
 
 HOSTILE = '<img src=x onerror="window.hacked=1">'
 
@@ -44,6 +44,24 @@ def test_which_uav_serves_a_task_next(view, run):
         't3 in 0:10 t4 in 0:20 t2 in 0:30')
     page.click('#uavs button.task >> nth=0')
     wait(page, '#answer', 'u2 flies t3 next')
+
+
+def test_who_has_a_uav_since_when_why_and_what_gives_it_back(view):
+    why = f'AUTO -> LOITER {HOSTILE}'
+    run = Run().hear(
+        state(BEGIN, 'u1', (0.0, 0.0), authority='LOST', available=False,
+              reason=f'authority LOST: {why}; given back by ~/hand_over'),
+        state(BEGIN, 'u2', (0.0, 0.0), authority='HELD', available=False, reason='no position'),
+        held(BEGIN, 'u1', 'LOST', why, 65.0, '~/hand_over'),
+        held(BEGIN, 'u2', 'HELD', 'takeoff is true', 5.0))
+    page = view(run.board)
+    wait(page, '#uavs', 'Authority LOST since')
+    said = text(page, '#uavs details:nth-child(1) .holder')
+    assert said.endswith(f'(1:05): {why}. Given back by ~/hand_over.')
+    assert text(page, '#uavs details:nth-child(2) .holder').endswith(
+        '(0:05): takeoff is true. Not available: no position.')
+    assert page.locator('img').count() == 0
+    assert page.evaluate('window.hacked') is None
 
 
 def test_why_a_task_is_unassigned(view, run):

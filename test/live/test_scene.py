@@ -1,11 +1,24 @@
 # SPDX-License-Identifier: Apache-2.0
 import json
 
-from small_run import BEGIN, FIRST, LATER, Run, announced, planned, state, statuses, uavs, zones
+from small_run import (
+    BEGIN,
+    FIRST,
+    LATER,
+    Run,
+    announced,
+    held,
+    planned,
+    state,
+    statuses,
+    uavs,
+    zones,
+)
 
 from uav_task_alloc.live.events import some
 from uav_task_alloc.live.scene import Scene
 from uav_task_alloc.record.heard import Heard
+from uav_task_alloc.record.progress import fleet
 
 
 def told(*moments):
@@ -67,6 +80,45 @@ def test_a_uav_tells_what_is_new_of_it():
     assert sentences(FIRST, [later]) == [
         'u1: fault', 'u1: not available', 'u1: the mission on board is mixed',
         'u1 has list 2 on board, read back']
+
+
+def test_who_has_a_uav_is_told_with_the_reason():
+    was = state(BEGIN, 'u1', (0.0, 0.0), authority='HELD', reason='')
+    lost = state(BEGIN + 1, 'u1', (0.0, 0.0), authority='LOST', available=False,
+                 reason='authority LOST: AUTO -> LOITER; given back by ~/hand_over')
+    none = state(BEGIN + 1, 'u1', (0.0, 0.0), authority='NONE', reason='')
+    assert sentences([was], [lost]) == [
+        'u1: not available: authority LOST: AUTO -> LOITER; given back by ~/hand_over']
+    assert sentences([was], [none]) == ['u1: authority NONE']
+
+
+def test_a_uav_says_who_has_it_since_when_and_what_gives_it_back():
+    lost = state(BEGIN + 9, 'u1', (0.0, 0.0), authority='LOST', reason='why', available=False)
+    seen = {'state': 'LOST', 'why': 'AUTO -> LOITER', 'since': round(BEGIN + 6), 'back': 'x',
+            'reason': 'why'}
+    first = [held(BEGIN + 10, 'u1', 'LOST', 'AUTO -> LOITER', 4.0, 'x')]
+    assert told([lost], first)[0]['authority'] == {'u1': seen}
+    # a second later the same, but for rounding: not sent again
+    assert 'authority' not in told([lost], first, [
+        held(BEGIN + 11, 'u1', 'LOST', 'AUTO -> LOITER', 4.0, 'x')])[0]
+    assert told([lost, held(BEGIN + 10, 'u1', 'HELD', 'older', 4.0)])[0]['authority'] == {
+        'u1': {'state': 'LOST', 'why': '', 'since': None, 'back': '', 'reason': 'why'}}
+    assert 'authority' not in told(FIRST)[0]  # a record of a former version
+
+
+def test_the_terminal_says_who_has_a_uav():
+    heard = Heard()
+    for line in (state(BEGIN, 'u1', (0.0, 0.0), authority='LOST', reason='lost: why'),
+                 state(BEGIN, 'u2', (0.0, 0.0), authority='HELD', reason='no position yet'),
+                 state(BEGIN, 'u3', (0.0, 0.0)), held(BEGIN, 'u1', 'LOST', 'why', 5.0, '~/x'),
+                 held(BEGIN, 'u2', 'HELD', 'takeoff is true', None)):
+        heard.take(line)
+    one, two, three = fleet(heard, BEGIN + 1.0)
+    assert one.endswith('authority lost for 6 s: why; given back by ~/x')
+    assert two.endswith('authority held: takeoff is true; not available: no position yet')
+    assert three.endswith('battery  75 %  ')
+    heard.take(state(BEGIN, 'u1', (0.0, 0.0), authority='NONE', reason='words'))
+    assert fleet(heard, BEGIN)[0].endswith('authority none: words')
 
 
 def test_silence_is_told_once_and_its_end_too():

@@ -153,7 +153,26 @@ def test_a_bad_task_of_an_announcement_is_left_out():
 def test_uploads_and_health_are_taken_from_the_diagnostics():
     status = DiagnosticStatus(
         level=b'\1', name='mavlink_bridge: uav_1', message='link stale', hardware_id='uav_1',
-        values=[KeyValue(key='uploads', value='4'), KeyValue(key='rate', value='10')])
+        values=[KeyValue(key=key, value=value) for key, value in (
+            ('uploads', '4'), ('rate', '10'), ('authority', 'LOST'), ('authority_why', 'why'),
+            ('authority_for', '12 s'), ('given_back_by', '~/hand_over'))])
     assert lines.uploads(DiagnosticArray(status=[status])) == {
         'kind': 'uploads', 'uploads': {'mavlink_bridge: uav_1': 4},
-        'health': {'uav_1': [1, 'link stale']}}
+        'health': {'uav_1': [1, 'link stale']},
+        'authority': {'uav_1': {'state': 'LOST', 'why': 'why', 'for': 12.0,
+                                'back': '~/hand_over'}}}
+
+
+@pytest.mark.parametrize(('given', 'seconds'), [('0 s', 0.0), ('nan s', None), ('', None),
+                                                ('long', None)])
+def test_for_how_long_is_a_number_or_unknown(given, seconds):
+    status = DiagnosticStatus(hardware_id='u', values=[
+        KeyValue(key='authority', value='HELD'), KeyValue(key='authority_for', value=given),
+        KeyValue(key='given_back_by', value='nothing is needed')])
+    said = lines.uploads(DiagnosticArray(status=[status]))['authority']['u']
+    assert (said['for'], said['back']) == (seconds, '')
+
+
+def test_a_state_carries_who_has_the_uav():
+    line = lines.state(m.UavState(authority=m.UavState.LOST, reason='why'))
+    assert (line['authority'], line['reason']) == ('LOST', 'why')

@@ -70,8 +70,12 @@ def flown(heard: Heard, line: Line) -> Iterator[Event]:
     if line['mode'] != old['mode']:
         kind = 'fault' if line['mode'] == 'FAULT' else 'uav'
         yield kind, f'{uav}: {line["mode"].lower().replace("_", " ")}'
+    reason, authority = line.get('reason', ''), line.get('authority', '')
     if line['available'] != old['available']:
-        yield 'fault', f'{uav}: {"available" if line["available"] else "not available"}'
+        word = 'available' if line['available'] else 'not available'
+        yield 'fault', ': '.join(filter(None, (uav, word, reason)))
+    if authority != old.get('authority', authority) and 'authority' not in reason:
+        yield 'uav', f'{uav}: authority {authority}'
     if line['mission_state'] != old['mission_state'] and line['mission_state'] in (
             'MIXED', 'FOREIGN'):
         yield 'fault', f'{uav}: the mission on board is {line["mission_state"].lower()}'

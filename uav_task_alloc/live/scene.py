@@ -25,6 +25,7 @@ class Scene:
         self.solved: list[Line] = []  # plans not told yet
         self.routes: replans.Routes | None = None  # of the last plan told
         self.silent: set[str] = set()
+        self.told_authority: Entry = {}
 
     def take(self, line: Line) -> None:
         """Note what a line changes, then fold it into `heard`."""
@@ -48,6 +49,9 @@ class Scene:
         plans = [self.plan(line) for line in self.solved]
         self.notice_silence(now)
         parts = {name: self.part(name) for name in self.dirty}
+        authority = self.part('authority')  # apart, as it seldom changes
+        if authority != self.told_authority:
+            self.told_authority = parts['authority'] = authority
         told = sorted(self.events, key=lambda entry: entry['wall'])
         self.dirty, self.solved, self.events = set(), [], []
         return parts, told, plans
@@ -89,6 +93,9 @@ class Scene:
             return [zone_to_json(zone) for zone in heard.zones_now()]
         if name == 'uavs':
             return {uav: self.uav(uav, state) for uav, state in sorted(heard.uavs.items())}
+        if name == 'authority':
+            return {uav: self.authority(uav, state) for uav, state in sorted(heard.uavs.items())
+                    if state.get('authority') or state.get('reason')}
         return self.list(name.removeprefix('list '))
 
     def uav(self, uav: str, state: Line) -> Entry:
@@ -101,6 +108,18 @@ class Scene:
                 'battery': None if battery is None else round(battery, 3),
                 'range': state['range_remaining'] and round(state['range_remaining']),
                 'available': state['available'], 'health': text if level else ''}
+
+    def authority(self, uav: str, state: Line) -> Entry:
+        """Who has a UAV, `since` [unix s] when, `why`, and what gives it `back`.
+
+        `reason`: why it is not available.
+        """
+        name, said = state.get('authority', ''), self.heard.authority.get(uav)
+        known = {'state': name, 'reason': state.get('reason', '')}
+        if said is None or said.state != name:  # the bridge says why a moment later
+            return {**known, 'why': '', 'since': None, 'back': ''}
+        return {**known, 'why': said.why, 'back': said.back,
+                'since': None if said.since is None else round(said.since)}
 
     def list(self, uav: str) -> Entry:
         """What a UAV has still to fly; `at` of a task: when it gets there [unix s]."""

@@ -83,7 +83,8 @@ class LiveView(Node):
             self.follow(msg.uav_id)
         line = {'wall': time.time(), **lines.state(msg)}
         old = self.heard.uavs.get(msg.uav_id)
-        what = ('mode', 'mission_state', 'active', 'list_revision', 'available')
+        what = ('mode', 'mission_state', 'active', 'list_revision', 'available', 'authority',
+                'reason')
         if old is None or line['wall'] - old['wall'] >= REFRESH or any(
                 line[key] != old[key] for key in what):
             self.take(line)

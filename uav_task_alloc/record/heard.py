@@ -13,6 +13,7 @@ from uav_task_alloc.model import Point, Shape, ThreatZone
 
 FILE = 'record.jsonl'
 FINAL = ('COMPLETED', 'FAILED', 'CANCELLED', 'REJECTED', 'UNASSIGNED')
+ROUNDED = 3.0  # [s] by which a time since then may differ: whole seconds, and the way here
 Line = Mapping[str, Any]  # wall [unix s], kind, and what Heard.on_<kind> reads
 
 
@@ -51,6 +52,16 @@ class SeenZone:
     until: float = math.inf  # [unix s]
 
 
+@dataclass(frozen=True, slots=True)
+class Authority:
+    """Who has a UAV, as its bridge says."""
+
+    state: str
+    why: str
+    since: float | None  # [unix s]
+    back: str  # what gives it back to the bridge; '': the bridge has it
+
+
 @dataclass
 class Heard:
     """The state of a run; `take` folds one more line into it."""
@@ -66,6 +77,7 @@ class Heard:
     verified: dict[str, set[int]] = field(default_factory=dict)  # revisions seen on board
     counted: dict[str, int] = field(default_factory=dict)  # uploads as a bridge counts them
     health: dict[str, tuple[int, str]] = field(default_factory=dict)  # level, text of each UAV
+    authority: dict[str, Authority] = field(default_factory=dict)  # by UAV
     speedup: float = 1.0  # scenario seconds in one of the wall
     first: float = math.inf  # [unix s]
     last: float = -math.inf  # [unix s]
@@ -126,6 +138,13 @@ class Heard:
         self.counted.update(line['uploads'])
         self.health.update((uav, (level, text))
                            for uav, (level, text) in line.get('health', {}).items())
+        for uav, said in line.get('authority', {}).items():
+            since = None if said['for'] is None else line['wall'] - said['for']
+            old = self.authority.get(uav)
+            if (old and since is not None and old.since is not None and old.state == said['state']
+                    and abs(since - old.since) < ROUNDED):
+                since = old.since
+            self.authority[uav] = Authority(said['state'], said['why'], since, said['back'])
 
     @property
     def uploads(self) -> int:

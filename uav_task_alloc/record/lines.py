@@ -23,6 +23,8 @@ STATES = ('PENDING', 'ASSIGNED', 'ACTIVE', 'COMPLETED', 'FAILED', 'CANCELLED', '
           'UNASSIGNED')
 MODES = ('UNKNOWN', 'STANDBY', 'TAKEOFF', 'ON_MISSION', 'HOLD', 'RETURNING', 'LANDING', 'FAULT')
 MISSIONS = ('UNKNOWN', 'UPLOADING', 'VERIFIED', 'MIXED', 'FOREIGN')
+AUTHORITIES = ('UNKNOWN', 'NONE', 'HELD', 'SUSPENDED', 'LOST')
+NOTHING = 'nothing is needed'  # gives back what the bridge has
 LOCAL = 0  # frame of a task
 
 
@@ -116,15 +118,20 @@ def state(msg: Message) -> Body:
             'list_revision': msg.list_revision, 'battery': finite(msg.battery),
             'position': [finite(v) for v in _xyz(msg.position)],
             'velocity': [finite(v) for v in _xyz(msg.velocity)],
-            'range_remaining': finite(msg.range_remaining), 'available': msg.available}
+            'range_remaining': finite(msg.range_remaining), 'available': msg.available,
+            # recordings of earlier versions have neither
+            'authority': word(AUTHORITIES, getattr(msg, 'authority', 0)),
+            'reason': getattr(msg, 'reason', '')}
 
 
 def uploads(msg: Message) -> Body:
     """The upload counters a bridge puts into its diagnostics, by name of the status.
 
-    `health`: [level, sentence] by what it is about, a UAV where the bridge speaks.
+    `health`: [level, sentence] by what it is about, a UAV where the bridge speaks; `authority`:
+    who has each UAV.
     """
-    return {'kind': 'uploads', 'uploads': dict(_uploads(msg)), 'health': {
+    return {'kind': 'uploads', 'uploads': dict(_uploads(msg)), 'authority': dict(
+        _authority(msg)), 'health': {
         status.hardware_id or status.name: [
             status.level if isinstance(status.level, int) else ord(status.level), status.message]
         for status in msg.status}}
@@ -135,6 +142,26 @@ def _uploads(msg: Message) -> Iterable[tuple[str, int]]:
         for pair in status.values:
             if pair.key == 'uploads' and pair.value.isdigit():
                 yield status.name, int(pair.value)
+
+
+def _authority(msg: Message) -> Iterable[tuple[str, Body]]:
+    """By UAV: the state, why, for how long [s; None: unknown], and what gives it back."""
+    for status in msg.status:
+        said = {pair.key: pair.value for pair in status.values}
+        if 'authority' in said:
+            back = said.get('given_back_by', '')
+            yield status.hardware_id, {
+                'state': said['authority'], 'why': said.get('authority_why', ''),
+                'for': _number(said.get('authority_for', '')),
+                'back': '' if back == NOTHING else back}
+
+
+def _number(text: str) -> float | None:
+    """Of `12 s`; None where it is none."""
+    try:
+        return finite(float(text.removesuffix(' s')))
+    except ValueError:
+        return None
 
 
 def finite(value: float) -> float | None:

@@ -35,8 +35,22 @@ def fleet(heard: Heard, now: float) -> list[str]:
         lines.append(
             f'  {uav:8} {doing:10} {state["active"] or "-":8} {len(todo):3} to fly  '
             f'mission {state["mission_state"].lower():9} '
-            + ('' if battery is None else f'battery {100.0 * battery:3.0f} %'))
+            + ('' if battery is None else f'battery {100.0 * battery:3.0f} %  ')
+            + authority(heard, uav, now))
     return lines
+
+
+def authority(heard: Heard, uav: str, now: float) -> str:
+    """Who has a UAV, since when, why, and what gives it back; why it is not available."""
+    state, said = heard.uavs[uav], heard.authority.get(uav)
+    name, reason = state.get('authority', ''), state.get('reason', '')
+    if said is None or said.state != name:
+        known = f'authority {name.lower()}' if name not in ('', 'UNKNOWN') else ''
+        return ': '.join(filter(None, (known, reason)))
+    age = '' if said.since is None else f' for {max(0.0, now - said.since):.0f} s'
+    text = f'authority {name.lower()}{age}: {said.why}'
+    text += f'; given back by {said.back}' if said.back else ''
+    return text if not reason or said.why in reason else f'{text}; not available: {reason}'
 
 
 def is_over(heard: Heard, scenario: Scenario, clock: float) -> bool:

@@ -149,7 +149,7 @@ function uavNode(uav, open) {
   const node = make('details'), summary = make('summary'), name = make('b', uav.id);
   name.style.borderColor = colour(uav.index);
   summary.append(name, ...Array.from({length: 4}, () => make('span')));
-  node.append(summary, make('ol'));
+  node.append(summary, make('p', '', 'holder'), make('ol'));
   node.open = open;
   node.addEventListener('toggle', () => node.dispatchEvent(new Event('input', {bubbles: true})));
   return node;
@@ -165,6 +165,7 @@ function showUav(node, uav, done, seen) {
     uav.range == null ? '' : `range ${uav.range} m`].filter(Boolean).join(', '));
   put(count, `${done} done, ${list.length} to fly${board ? `, ${board}` : ''}`);
   if (!node.open) return;
+  put(node.children[1], uav.holder);
   fill(rows, JSON.stringify(list.map(task => task.id)), () => list.slice(0, MOST).map(task => {
     const item = make('li');
     item.append(taskButton(task.id), ' ', make('span'));

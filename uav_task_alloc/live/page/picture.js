@@ -29,7 +29,8 @@ export function picture(past) {
   const map = name => new Map(Object.entries(parts[name] || {}));
   const seen = {wall, where: map('tasks'), statuses: map('statuses'), zones: parts.zones || [],
     lists: new Map(), turns: new Map()};
-  const states = map('uavs'), lists = Object.keys(parts).filter(name => name.startsWith('list '));
+  const states = map('uavs'), holders = map('authority');
+  const lists = Object.keys(parts).filter(name => name.startsWith('list '));
   const names = [...new Set([...states.keys(), ...lists.map(name => name.slice(5))])]
     .sort((a, b) => a.localeCompare(b, 'en', {numeric: true}));
   names.forEach((uav, index) => {
@@ -38,7 +39,8 @@ export function picture(past) {
     tasks.forEach(({id, at}, k) => seen.turns.set(id, {uav, index, place: k + 1, at}));
   });
   seen.ids = [...new Set([...seen.where.keys(), ...seen.statuses.keys()])];
-  seen.uavs = names.map((id, index) => ({id, index, ...inWords(states.get(id), wall)}));
+  seen.uavs = names.map((id, index) => ({id, index, ...inWords(states.get(id), wall),
+    holder: holder(holders.get(id), wall)}));
   seen.plans = live.plans.filter(plan => plan.wall <= wall);
   seen.events = live.events.filter(event => event.wall <= wall);
   return seen;
@@ -51,6 +53,18 @@ function inWords(state, wall) {
   return {...state, silent,
     words: (silent ? `last seen ${mode}` : mode) + (state.available ? '' : ', not available'),
     link: silent ? `silent for ${span(age)}` : state.health || 'link good'};
+}
+
+// Who has a UAV, since when, why, and what gives it back; why it is not available.
+function holder(authority, wall) {
+  const {state, why, since, back, reason} = authority || {}, said = [];
+  if (state && state !== 'UNKNOWN') {
+    said.push(`Authority ${state}`
+      + (since == null ? '' : ` since ${ofDay(since)} (${span(wall - since)})`)
+      + (why ? `: ${why}` : '') + '.' + (back ? ` Given back by ${back}.` : ''));
+  }
+  if (reason && !(why && reason.includes(why))) said.push(`Not available: ${reason}.`);
+  return said.join(' ');
 }
 
 // [state, UAV, reason] of a task
