@@ -13,15 +13,16 @@ from launch import LaunchDescription
 
 def generate_launch_description() -> LaunchDescription:
     """Arguments: scenario (a YAML file), speedup, rviz (true: show it there too), record
-    (an MCAP file for all topics).
+    (an MCAP file for all topics), bridge_state_dir (a folder that keeps over a restart who has
+    each aircraft; empty: nothing is kept).
     """
     share = FindPackageShare('uav_task_alloc')
     scenario = LaunchConfiguration('scenario')
     played = {'scenario': scenario,
               'speedup': ParameterValue(LaunchConfiguration('speedup'), value_type=float)}
 
-    def node(name: str, **parameters: object) -> Node:
-        return Node(package='uav_task_alloc', executable=name, output='screen',
+    def node(name: str, respawn: bool = False, **parameters: object) -> Node:
+        return Node(package='uav_task_alloc', executable=name, output='screen', respawn=respawn,
                     parameters=[parameters] if parameters else [])
 
     return LaunchDescription([
@@ -31,7 +32,9 @@ def generate_launch_description() -> LaunchDescription:
         DeclareLaunchArgument('rviz', default_value='false'),
         DeclareLaunchArgument('record', default_value=''),
         node('allocator'),
-        node('mavlink_bridge', takeoff=True),
+        DeclareLaunchArgument('bridge_state_dir', default_value=''),
+        node('mavlink_bridge', respawn=True, takeoff=True, relaunch='automatic',
+             state_dir=ParameterValue(LaunchConfiguration('bridge_state_dir'), value_type=str)),
         node('fleet_sim', **played),
         node('scenario_player', **played),
         node('live_view', record=ParameterValue(LaunchConfiguration('record'), value_type=str)),

@@ -110,10 +110,11 @@ class Include:
 
 class Node:
     def __init__(self, *, package, executable, namespace='', name='', parameters=(), arguments=(),
-                 remappings=(), output='', condition=None):
+                 remappings=(), output='', condition=None, respawn=False):
         self.package, self.executable, self.condition = package, executable, condition
         self.namespace, self.name, self.remappings = namespace, name, remappings
         self.parameters, self.arguments = parameters, arguments
+        self.respawn = respawn
 
     def starts(self, given):
         if self.condition and not self.condition.holds(given):
@@ -130,7 +131,15 @@ class Node:
                           for word in ('-p', f'{key}:={text(value, given)}')]
             else:
                 words += ['--params-file', text(each, given)]
-        return [words]
+        return [Words(words, self.respawn)]
+
+
+class Words(list):
+    """Of a command; `respawn`: it is started again whenever it ends."""
+
+    def __init__(self, words, respawn):
+        super().__init__(words)
+        self.respawn = respawn
 
 
 MODULES = {

@@ -74,7 +74,7 @@ def start_nodes(args: argparse.Namespace, out: Path) -> list[Child]:
                     route_end=scenario.route_end,
                     state_dir=str(out / 'state'), **origin),
         Child.start('mavlink_bridge', out, connections=[f'udpin:127.0.0.1:{port}'],
-                    takeoff=True, **origin),
+                    takeoff=True, relaunch='automatic', state_dir=str(out / 'state'), **origin),
         Child.start('fleet_sim', out, target=f'127.0.0.1:{port}',
                     log_file=str(out / 'flight.jsonl'), **played),
         Child.start('scenario_player', out, wait_for_plan=True, **played),
