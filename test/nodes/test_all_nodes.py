@@ -46,6 +46,7 @@ class Fleet:
     def __init__(self, start, probe, folder):
         (folder / 'pair.yaml').write_text(SCENARIO)
         self.start, self.probe, self.port = start, probe, free_port()
+        self.folder = folder
         self.flight = folder / 'flight.jsonl'
         self.states = probe.collect(m.UavState, 'uav_states', STATES)
         self.events = probe.collect(m.TaskEvent, 'task_events', EVENTS)
@@ -59,7 +60,8 @@ class Fleet:
         self.announce = probe.publisher(m.TaskAnnouncement, 'task_announcements', ANNOUNCEMENTS)
 
     def start_bridge(self):
-        return self.start('mavlink_bridge', '-p', 'takeoff:=true', '-p',
+        return self.start('mavlink_bridge', '-p', 'takeoff:=true', '-p', 'relaunch:=automatic',
+                          '-p', f'state_dir:={self.folder / "state"}', '-p',
                           f"connections:=['udpin:127.0.0.1:{self.port}']")
 
     def add(self, tasks):

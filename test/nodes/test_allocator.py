@@ -255,6 +255,39 @@ def test_services_answer(start, probe, fleet):
     probe.until(lambda: fleet.allocations[-1].trigger == 'replan service')
 
 
+def test_the_tasks_of_a_uav_that_its_pilot_took_go_to_the_others_at_once(start, probe, fleet):
+    begin(start, fleet, '-p', 'list_interval:=60.0', '-p', 'uav_timeout:=60.0')
+    fleet.uav('a', 0.0, authority=m.UavState.HELD)
+    fleet.uav('b', 5000.0, authority=m.UavState.HELD)
+    fleet.tasks.publish(add(task('t1', 100), task('t2', 200)))
+    probe.until(lambda: fleet.route('a') == ['t1', 't2'])
+    fleet.uav('a', 0.0, authority=m.UavState.LOST, available=False, active_task_id='t1',
+              reason='authority LOST: AUTO -> LOITER')
+    probe.until(lambda: fleet.route('a') == [], 5.0)
+    probe.until(lambda: sorted(fleet.route('b') or ()) == ['t1', 't2'], 5.0)
+
+
+def test_finding_19_the_operator_reads_who_has_no_safe_way_home(start, probe, fleet):
+    health = probe.collect(DiagnosticArray, '/diagnostics', 10)
+    node = start('allocator', '-p', 'route_end:=home')
+    fleet.connected()
+    fleet.uav('a', 500.0, home=Point())
+    fleet.uav('b', 900.0, home=Point(x=900.0))
+    fleet.tasks.publish(add(task('t1', 600, allowed_uavs=['a'])))
+    probe.until(lambda: fleet.route('a') == ['t1'] and fleet.lists['a'].end == m.TaskList.
+                RETURN_HOME)
+    fleet.zones.publish(m.ThreatZoneArray(zones=[m.ThreatZone(
+        zone_id='base', shape=m.ThreatZone.CYLINDER, radius=100.0, z_max=80.0)]))
+    probe.until(lambda: fleet.lists['a'].end == m.TaskList.HOLD)
+    words = 'a has no safe way home (its home is inside zone base): its list ends with HOLD'
+    probe.until(lambda: words in node.output())
+    probe.until(lambda: any('a has no safe way home: its home is inside zone base' in each.message
+                            for array in health for each in array.status))
+    fleet.uav('b', 900.0, home=Point(), mode=m.UavState.STANDBY)
+    probe.until(lambda: 'the home of b is inside zone base: it gets no tasks' in node.output())
+    assert node.output().count(words) == 1
+
+
 def test_a_killed_allocator_comes_back_with_its_world(start, probe, fleet, tmp_path):
     state = ('-p', f'state_dir:={tmp_path}/state')
     node = begin(start, fleet, *state)

@@ -15,9 +15,11 @@ from uav_task_alloc.mavlink.fleet import Fleet
 from uav_task_alloc.mavlink.vehicle_config import VehicleConfig
 from uav_task_alloc.model import Leg, Task, ThreatZone
 from uav_task_alloc.nodes.messages import (
+    ANNOUNCEMENTS,
     EVENTS,
     LATCHED,
     STATES,
+    announcement,
     from_zones,
     header,
     planned_task,
@@ -200,6 +202,23 @@ def test_a_hand_over_that_is_refused_says_why(sky, probe):
     success, message = hand_over(probe, 'uav_2', 'two\nlines')
     assert (success, message) == (False, 'refused: on the ground, and takeoff is false')
     assert f'hand_over of uav_2 by two?lines: {message}' in world.bridge.output()
+
+
+def test_a_pilot_takes_a_uav_and_the_other_gets_its_tasks(sky, probe, start):
+    world = sky()
+    start('allocator', '-p', 'route_end:=hold')
+    announce = probe.publisher(m.TaskAnnouncement, 'task_announcements', ANNOUNCEMENTS)
+    work = [Task(f't{k}', (20.0, 300.0 + 100.0 * k, 50.0)) for k in range(4)]
+    work.append(Task('only', (20.0, 250.0, 50.0), allowed_uavs=frozenset({'uav_1'})))
+    announce.publish(announcement(m.TaskAnnouncement.ADD, work, 1.0))
+    probe.until(lambda: world.states['uav_1'].active_task_id == 'only', 60.0)
+    with world.fleet._lock:
+        assert world.fleet.vehicles['uav_1'].rc_mode(5)  # LOITER, by the switch
+    probe.until(lambda: world.states['uav_1'].authority == m.UavState.LOST)
+    assert not world.states['uav_1'].available
+    assert 'LOITER' in world.states['uav_1'].reason
+    probe.until(lambda: set(world.completed(2)) == {f't{k}' for k in range(4)}, 90.0)
+    assert '-> LOITER' in world.bridge.output()
 
 
 def test_who_has_each_uav_is_kept_over_a_restart_of_the_bridge(sky, probe, tmp_path):
