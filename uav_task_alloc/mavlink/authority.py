@@ -122,7 +122,7 @@ TABLE: dict[Event, Row] = {
     E.LINK_CHANGED: Row(_L, _L, None, None),
     E.NEW_ADDRESS: Row(_S, None, None, None),
     E.REBOOTED: Row(_H, None, None, None),
-    E.REBOOTED_FLOWN: Row(_L, None, None, None),
+    E.REBOOTED_FLOWN: Row(_L, _L, None, None),
     E.RESTART_AGREES: Row(_H, _H, None, None, 'SUSPENDED as the link'),
     E.RESTART_DIFFERS: Row(_L, _L, None, None),
     E.RESTART_OURS: Row(_H, None, _H, _H),
@@ -259,13 +259,14 @@ class Authority:
             self.killed = False
         if event is E.WITHDRAWN_IN_AIR:
             self.until_landing = True
-        elif target is not State.SUSPENDED and target is not before:
+        elif not {before, target} <= {State.HELD, State.SUSPENDED}:
             self.until_landing = False
         self.landed = target is State.NONE and (event is E.OWN_LANDING or self.landed)
         self.state = target
         if target is before and target in (State.HELD, State.LOST, State.NONE):
             return False
-        self.why, self.since = why, now if target is not before else self.since
+        self.why = '; '.join(self.suspensions.values()) or why
+        self.since = now if target is not before else self.since
         return True
 
     @property
@@ -279,8 +280,7 @@ class Authority:
         if self.state is State.NONE:
             return '~/hand_over' if self.landed else (
                 'takeoff: true on the ground, MISSION mode set in flight, or ~/hand_over')
-        cause = next(iter(self.suspensions), None)
-        return '' if cause is None else _GIVES_BACK[cause]
+        return ' and '.join(_GIVES_BACK[cause] for cause in self.suspensions)
 
 
 def table_text() -> str:

@@ -16,7 +16,7 @@ from uav_task_alloc.mavlink.codec import Message
 from uav_task_alloc.mavlink.modes import ModeClass, avoids_traffic, mode_class, mode_name
 from uav_task_alloc.mavlink.policy import Note, Policy
 from uav_task_alloc.mavlink.profiles import Flight, Profile
-from uav_task_alloc.mavlink.telemetry import STALE, Telemetry
+from uav_task_alloc.mavlink.telemetry import OFF_GROUND, STALE, Telemetry
 from uav_task_alloc.model import Point
 
 IN_FLIGHT = 12.0  # [s] in which a command sent may still take effect, and be seen
@@ -488,10 +488,15 @@ class AuthorityWatch:
             self._landed(now, 'landed')
         elif now <= self._sent.disarm_until:
             self._apply(Event.OWN, now, 'disarmed by the bridge')
-        elif self._was_airborne and self._telemetry.high:
+        elif self._was_airborne and self._falls():
             self._apply(Event.KILLED, now, 'disarmed in the air')
         else:
             self._apply(Event.ARMED_BY_OTHER, now, 'disarmed, not by the bridge')
+
+    def _falls(self) -> bool:
+        """Off the ground by both: landed_state is told once a second, and a home may be low."""
+        return (self._telemetry.height > OFF_GROUND
+                and self._telemetry.landed != d.MAV_LANDED_STATE_ON_GROUND)
 
     def _descends(self) -> bool:
         """We sent it home, by mode or by the last item."""

@@ -1,0 +1,220 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A flight bench that checks who has the aircraft whenever a message leaves the bridge."""
+from types import SimpleNamespace
+
+import pytest
+from flight_bench import FlightBench, Store
+from mission_bench import task_list
+from pymavlink.dialects.v20 import ardupilotmega as d
+
+from uav_task_alloc.mavlink.authority import State, Suspension
+from uav_task_alloc.mavlink.board import MissionState
+from uav_task_alloc.mavlink.vehicle_modes import px4_mode
+
+N, H, S, L = State.NONE, State.HELD, State.SUSPENDED, State.LOST
+BOTH = pytest.mark.parametrize('kind', ['ardupilot', 'px4'])
+ARDUPILOT = pytest.mark.parametrize('kind', ['ardupilot'])
+PX4 = pytest.mark.parametrize('kind', ['px4'])
+MODES = {
+    'ardupilot': SimpleNamespace(mission=3, hold=4, stick=5, rtl=6, land=9, own=17,
+                                 names={3: 'AUTO', 4: 'GUIDED', 5: 'LOITER', 6: 'RTL'}),
+    'px4': SimpleNamespace(
+        mission=px4_mode(4, 4), hold=px4_mode(4, 3), stick=px4_mode(3), rtl=px4_mode(4, 5),
+        land=px4_mode(4, 6), own=px4_mode(6),
+        names={px4_mode(4, 4): 'Mission', px4_mode(4, 3): 'Hold', px4_mode(3): 'Position',
+               px4_mode(4, 5): 'Return'})}
+LONG = 'ABCDEFGHIJKLMNOPQRSTUVWXY'  # more than two minutes
+_READS = {'MISSION_REQUEST_LIST', 'MISSION_REQUEST_INT', 'MISSION_REQUEST'}
+_UPLOADS = {'MISSION_COUNT', 'MISSION_ITEM_INT'}
+_ASKS = {d.MAV_CMD_SET_MESSAGE_INTERVAL, d.MAV_CMD_REQUEST_MESSAGE}
+
+
+class AuthorityBench(FlightBench):
+    """Fails when a message leaves the bridge that the state of the moment forbids."""
+
+    def __init__(self, *args, **kwargs):
+        self.sent = []  # (now, what it does, message)
+        self.moved = {}  # new address -> vehicle
+        super().__init__(*args, **kwargs)
+
+    def _up(self, outgoing):
+        for address, m in outgoing:
+            n = self.moved.get(address, address)
+            self.sent.append((self.now, does(m), m))
+            assert does(m) in may(self.pilot(n).authority), (self.now, self.authority(n), m)
+            super()._up([(n, m)])
+
+    def commands(self, since=0):
+        """Messages that have a vehicle do something, from the `since`-th message on."""
+        return [m for _, what, m in self.sent[since:] if what == 'command']
+
+    def modes(self, since=0):
+        """Custom modes that were commanded."""
+        profile = self.pilot().profile
+        return [profile.commanded_mode(m) for m in self.commands(since)
+                if profile.commanded_mode(m) is not None]
+
+    def why(self, n=1):
+        return self.pilot(n).authority.why
+
+    def becomes(self, state, limit=15.0, n=1):
+        """Whether it comes to a state."""
+        return self.run(lambda: self.authority(n) is state, limit)
+
+    def move_address(self, n=1, address='new'):
+        """What the vehicle sends comes from elsewhere from now on."""
+        take, self.moved[address] = self.ground.receive, n
+        self.ground.receive = lambda _, m, now: take(address, m, now)
+
+
+def does(m):
+    """What a message does to a vehicle, judged without the code under test."""
+    kind = m.get_type()
+    if kind in _READS or (kind == 'MISSION_ACK' and m.type == 0) or (
+            kind == 'COMMAND_LONG' and m.command in _ASKS):
+        return 'read'
+    return 'upload' if kind in _UPLOADS or kind == 'MISSION_ACK' else 'command'
+
+
+def may(authority):
+    if authority.undecided or set(authority.suspensions) == {Suspension.FOREIGN}:
+        return {'read'}
+    return {H: {'read', 'upload', 'command'}, N: {'read', 'upload'}, L: {'read'}, S: set()}[
+        authority.state]
+
+
+def flying(kind, names=LONG, **kwargs):
+    """HELD, on its way to the first task, and seen in the mission mode."""
+    bench = AuthorityBench(kind, **kwargs).found()
+    bench.assign(task_list(names))
+    assert bench.run(lambda: bench.started() == [names[0]])
+    bench.run(limit=2.0)
+    assert bench.authority() is H
+    return bench
+
+
+def risen_by_pilot(kind, names=LONG, **kwargs):
+    """NONE, hovering by its pilot's sticks, with the list on board."""
+    bench = AuthorityBench(kind, takeoff=False, **kwargs)
+    vehicle = bench.vehicles[1]
+    vehicle.rc_mode(MODES[kind].stick)
+    bench.found()
+    bench.assign(task_list(names))
+    assert bench.run(lambda: bench.board().state is MissionState.VERIFIED, 20.0)
+    assert vehicle.rc_arm(True)
+    vehicle.rc_stick((0.0, 0.0, 3.0))
+    bench.run(limit=12.0)
+    vehicle.rc_stick(None)
+    bench.run(limit=4.0)
+    assert bench.pilot().telemetry.airborne
+    assert bench.authority() is N
+    return bench
+
+
+def upload_by_another(bench, n=1, items=1):
+    """Another station puts a mission on board."""
+    own = bench.board(n).own
+    bench.tells(d.MAVLink_mission_count_message(n, 1, items + own, 0), n)
+    for seq in range(items + own):
+        x, y = 473990000 + 9000 * seq, 85460000
+        bench.tells(d.MAVLink_mission_item_int_message(
+            n, 1, seq, 5, 16, 0, 1, 0, 0, 0, 0, x, y, 540.0, 0), n)
+
+
+def suspended(kind, cause=Suspension.FAILSAFE, **kwargs):
+    """SUSPENDED in flight, in the mission mode."""
+    bench = flying(kind, **kwargs)
+    if cause is Suspension.FAILSAFE:
+        bench.vehicles[1].failsafe('battery', None)
+    elif cause is Suspension.LINK:
+        bench.line.cut = True
+    elif cause is Suspension.AVOID:
+        bench.vehicles[1].avoid(True)
+    elif cause is Suspension.FOREIGN:
+        bench.run(limit=3.0)
+        upload_by_another(bench, items=20)
+    assert bench.run(lambda: bench.authority() is S, 20.0)
+    assert bench.pilot().authority.suspended_by(cause)
+    bench.run(limit=6.5)  # what a vehicle said of its failsafe is old
+    assert bench.authority() is S
+    return bench
+
+
+def lost(kind, **kwargs):
+    """LOST in flight: the pilot holds it by his sticks."""
+    bench = flying(kind, **kwargs)
+    bench.vehicles[1].rc_mode(MODES[kind].stick)
+    assert bench.becomes(L)
+    bench.run(limit=12.0)  # what we sent before has taken effect, or never will
+    return bench
+
+
+def in_flight(kind, state, **kwargs):
+    return {H: flying, S: suspended, L: lost, N: risen_by_pilot}[state](kind, **kwargs)
+
+
+def on_ground(kind, state, **kwargs):
+    """On the ground, disarmed, past boot, with a list on board, nothing else going on."""
+    takeoff = kwargs.pop('takeoff', state is not N)
+    bench = AuthorityBench(kind, takeoff=takeoff, **kwargs).found()
+    vehicle = bench.vehicles[1]
+    assert bench.run(lambda: bench.authority() is (H if takeoff else N), 20.0)
+    if state is S:
+        vehicle.failsafe('battery', None)
+        assert bench.becomes(S)
+    elif state is L:
+        vehicle.rc_arm(True)
+        assert bench.becomes(L)
+        vehicle.rc_arm(False)
+    bench.run(limit=7.0)
+    assert bench.authority() is state
+    return bench
+
+
+def set_mode(number, kind, n=1):
+    """DO_SET_MODE as any station sends it."""
+    main, sub = (number >> 16 & 0xff, number >> 24) if kind == 'px4' else (number, 0)
+    return d.MAVLink_command_long_message(n, 1, d.MAV_CMD_DO_SET_MODE, 0, 1, main, sub,
+                                          0, 0, 0, 0)
+
+
+def shows(bench, state, *words, n=1):
+    """UavState and the notes say who has it, why, and what gives it back."""
+    status, authority = bench.state(n), bench.pilot(n).authority
+    assert bench.authority(n) is state
+    assert status.authority is state
+    for word in words:
+        assert word in authority.why, authority.why
+    available = state is H or (state is N and not authority.landed)
+    assert status.available is available, status.reason
+    if available:
+        assert status.reason == ''
+    elif not status.reason.startswith('its link'):
+        assert status.reason == (f'authority {state.name}: {authority.why}; given back by '
+                                 f'{authority.gives_back}')
+        assert authority.gives_back
+    said = [note for note in bench.notes if note.startswith('authority ')]
+    if said:
+        assert said[-1].startswith(f'authority {state.name}: '), said
+        assert any(each in said[-1] for each in authority.why.split('; ')), said[-1]
+        if authority.gives_back:
+            assert said[-1].endswith(f'; given back by {authority.gives_back}')
+    return True
+
+
+def keeps_quiet(bench, seconds=60.0, names='XYZ', n=1):
+    """No command leaves while new lists come, and the state stays."""
+    start, state = len(bench.sent), bench.authority(n)
+    tasks = bench.board(n).tasks
+    revision = tasks.revision if tasks else 0
+    for more in range(4):
+        bench.assign(task_list(names[more % 2:] if more < 3 else '', revision + 1 + more), n)
+        bench.run(limit=seconds / 4.0)
+        assert bench.authority(n) is state
+    assert bench.commands(start) == []
+    return True
+
+
+__all__ = ['ARDUPILOT', 'BOTH', 'LONG', 'MODES', 'PX4', 'AuthorityBench', 'H', 'L', 'N', 'S',
+           'Store', 'flying', 'in_flight', 'keeps_quiet', 'lost', 'on_ground', 'risen_by_pilot',
+           'set_mode', 'shows', 'suspended', 'upload_by_another']
