@@ -89,6 +89,8 @@ class Judge:
             before, self._mode = self._mode, event.mode
             if event.cause not in (OURS, 'self'):
                 self._mode_set(before, event)
+            elif event.cause == OURS and self.told_at is None:
+                self.taken_at = None  # what was sent before the news has come after it
         elif event.name == 'kill_switch' or (
                 event.name in ('armed', 'disarmed') and event.cause not in (OURS, 'self')):
             self._take(event.t)
@@ -108,7 +110,8 @@ class Judge:
             if airborne and self.taken_at is not None and not self.failing:
                 self.handed_back()  # the bridge has to wait before it believes that
         elif (new is not ModeClass.HOLD or was is ModeClass.MISSION) and (
-                event.t - self._asked.get(event.mode, -math.inf) > SAME):
+                event.t - self._asked.get(event.mode, -math.inf) > SAME) and (
+                event.cause != 'failsafe' or airborne or self.world.vehicle.flight.armed):
             self._take(event.t)
 
     def _take(self, when: float) -> None:

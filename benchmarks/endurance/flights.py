@@ -72,6 +72,7 @@ class Flight:
         self.service = rng.choice([0.0, 0.0, 2.0])
         self.gives_back = rng.random() < GIVEN_BACK
         self.back_at = math.inf  # [s] the operator acts
+        self.shorten_at = 0.0  # [s]
         self.counts: Counter[str] = Counter()
         self.later: list[tuple[float, Callable[[], object]]] = []
         self._schedule()
@@ -198,6 +199,13 @@ class Flight:
         self.world.assign(TaskList(self.revision, tuple(
             Stop(Task(name, self.places[name], service_time=self.service)) for name in names)))
 
+    def shorten(self) -> None:
+        """What is completed is taken off the list, as an allocator does."""
+        left = [name for name in self.listed if name not in self.judge.completed]
+        if len(left) < len(self.listed) and self.world.now >= self.shorten_at:
+            self.shorten_at = self.world.now + 1.0
+            self._assign(left)
+
     def operate(self) -> None:
         """Give the aircraft back where the bridge says that it has not got it."""
         world, state = self.world, self.world.state
@@ -229,6 +237,7 @@ class Flight:
             while self.later and self.later[0][0] <= world.now:
                 self.later.pop(0)[1]()
             self.operate()
+            self.shorten()
             if world.now > QUIET and not self.later and (
                     set(self.listed) <= self.judge.completed or not self.gives_back):
                 break

@@ -70,8 +70,8 @@ class Line:
                 carried = other
                 break
         for delay, m in carried:
+            frame = codec.pack(m) if not isinstance(m, bytes) else m  # lost frames count as well
             if not self.cut and self.rng.random() >= self.loss:
-                frame = codec.pack(m) if not isinstance(m, bytes) else m
                 heapq.heappush(self._flying, (now + delay, next(self._number), direction, key,
                                               frame))
 

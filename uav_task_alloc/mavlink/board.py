@@ -64,7 +64,7 @@ class Board:
     def __init__(self, peer: Peer, profile: Profile, origin: Origin, telemetry: Telemetry,
                  rng: random.Random) -> None:
         self.upload = Upload(peer, idle_after=profile.idle_after, rng=rng)
-        self.progress = ProgressTable()
+        self.progress = ProgressTable(telemetry.frames)
         self.recall = Recall(profile, origin, telemetry, self.progress)
         self.own = int(profile.rules.home_first)
         self.tasks: TaskList | None = None
@@ -270,9 +270,7 @@ class Board:
 
     def may_end(self) -> bool:
         """The last item with a place is being flown, or is passed."""
-        progress = self.progress
-        return bool(progress.items) and progress.current is not None and (
-            progress.current >= progress.last_flown)
+        return self.progress.may_end(self._telemetry.heard_at)
 
     def restarted(self) -> None:
         """The vehicle forgot its transfer, and perhaps its mission."""

@@ -8,6 +8,7 @@ from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
+MOST_PASSED = 512  # frames that nobody wants, remembered until one comes that somebody does
 Message = Any  # a dialect.MAVLink_message; the dialect has no usable types
 Signing = Any  # a dialect.MAVLinkSigning; all parsers share one, else a replay finds a new one
 
@@ -24,6 +25,7 @@ class _Parser(dialect.MAVLink):  # type: ignore[misc]
     """The dialect's parser, which skips unwanted messages and survives forged signatures."""
 
     wanted: Collection[int] | None = None
+    passed: list[tuple[int, int]]  # system and sequence number of frames that nobody wants
     tap: Callable[[bytes], None] | None = None
 
     def decode(self, msgbuf: bytearray) -> Message:
@@ -33,6 +35,8 @@ class _Parser(dialect.MAVLink):  # type: ignore[misc]
             number = (msgbuf[7] | msgbuf[8] << 8 | msgbuf[9] << 16 if msgbuf[0] == 253
                       else msgbuf[5])
             if number not in self.wanted:
+                at = 4 if msgbuf[0] == 253 else 2  # sequence number, and the system after it
+                self.passed.append((msgbuf[at + 1], msgbuf[at]))
                 return dialect.MAVLink_unknown(number, msgbuf)
         return super().decode(msgbuf)
 
@@ -57,7 +61,7 @@ class Codec:
                  tap: Callable[[bytes], None] | None = None) -> None:
         self._mav = _Parser(None, system_id, component_id)
         self._mav.robust_parsing = True
-        self._mav.wanted, self._mav.tap = wanted, tap
+        self._mav.wanted, self._mav.tap, self._mav.passed = wanted, tap, []
         if signing is not None:
             self._mav.signing = signing
 
@@ -80,7 +84,12 @@ class Codec:
 
     def parse(self, data: bytes) -> list[Message]:
         """The whole messages in the stream so far; half a frame waits for the rest."""
-        return [m for m in self._mav.parse_buffer(data) or () if m.get_msgId() >= 0]
+        messages = [m for m in self._mav.parse_buffer(data) or () if m.get_msgId() >= 0]
+        if messages and self._mav.passed:
+            messages[0].passed = tuple(self._mav.passed)
+            self._mav.passed.clear()
+        del self._mav.passed[:-MOST_PASSED]
+        return messages
 
     def drop(self) -> None:
         """Forget half a frame: a datagram is whole, or damaged."""

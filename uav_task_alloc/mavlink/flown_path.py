@@ -14,11 +14,12 @@ from uav_task_alloc.model import Point
 KEPT = 900  # samples: three minutes at 5 Hz
 GAP = 2.5  # [s] between two positions: beyond, nobody knows where it was
 ACCEPTED = 2.0  # [m] at which autopilots count a waypoint as reached, where the task says nothing
-CLOSE = 1.5  # [m] beyond that
+CLOSE = 0.5  # [m] beyond that
+SLOW = 0.4  # [m/s] it stays, and does not leave again
 CURVE = 0.4  # [m/s2] by which the way between two positions may differ from its interpolation
 PIECES = 8  # points looked at between two positions
 ASIDE = 8.0  # [m] beside a leg: it is flown
-HOLD_SLACK = 1.5  # [s] by which a hold may look shorter than it was
+HOLD_SLACK = 0.1  # [s] by which a hold may look shorter than it was
 
 
 class Verdict(Enum):
@@ -72,7 +73,7 @@ class FlownPath:
             hold: [s] it has to stay there.
             since: [s] of the vehicle's clock.
         """
-        first, last = self._stay(place, radius, since)
+        first, last = self._stay(place, radius, since, hold > 0.0)
         if last - first >= max(0.0, hold - HOLD_SLACK):
             return Verdict.YES
         samples = self._since(since)
@@ -108,9 +109,13 @@ class FlownPath:
         at = bisect_left(self._samples, since, key=lambda one: one.t)
         return self._samples[max(0, at - 1):]
 
-    def _stay(self, place: Point, radius: float, since: float) -> tuple[float, float]:
-        """When it came and when it was there last; (inf, -inf) where it never was."""
-        near = (radius or ACCEPTED) + CLOSE
+    def _stay(self, place: Point, radius: float, since: float,
+              slow: bool = False) -> tuple[float, float]:
+        """When it came and when it was there last (`slow`: and did not leave yet).
+
+        (inf, -inf) where it never was.
+        """
+        near = (radius or ACCEPTED) + (0.0 if slow else CLOSE)
         first, last = math.inf, -math.inf
         samples = self._since(since)
         if len(samples) == 1 and math.dist(samples[0].position, place) <= near:
@@ -123,9 +128,12 @@ class FlownPath:
                 continue
             reach = near + CURVE * gap * gap
             for k in range(PIECES + 1):
-                t = a.t + gap * k / PIECES
-                if t >= since and math.dist(_between(a, b, k / PIECES), place) <= reach:
-                    first, last = min(first, t), max(last, t)
+                t, share = a.t + gap * k / PIECES, k / PIECES
+                if t >= since and math.dist(_between(a, b, share), place) <= reach:
+                    first = min(first, t)
+                    if not slow or math.dist(a.velocity, (0, 0, 0)) * (1 - share) + share * (
+                            math.dist(b.velocity, (0, 0, 0))) < SLOW:
+                        last = max(last, t)
         return first, last
 
 

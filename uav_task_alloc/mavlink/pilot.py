@@ -173,9 +173,9 @@ class Pilot:
         elif kind == 'MISSION_CURRENT' and newest and not self.board.open:
             seq = max(0, message.seq - own)
             if self.board.must_jump is None:  # else it is left from the mission before
-                progress.moved(seq, now, flying)
+                progress.moved(seq, now, flying, self.telemetry.frame)
             if message.mission_state == d.MISSION_STATE_COMPLETE and flying:
-                progress.ended(seq, now)
+                progress.ended(seq, now, self.telemetry.frame)
             if not self.helm.busy:
                 self.board.watch(message, now)
         elif kind == 'STATUSTEXT':

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Which task an item stands for: one table for each epoch, an epoch being one verified upload.
 
-REACHED completes the item it names, and no other. That the current item has moved on is a claim:
-it completes what it passes only where the vehicle was, by its own positions.
+REACHED completes the item it names, and no other; while one of the epoch before may still come,
+only where the vehicle was. That the current item has moved on is a claim: it completes what it
+passes only where the vehicle was, by its own positions.
 """
 from __future__ import annotations
 
@@ -12,14 +13,17 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from uav_task_alloc.mavlink.flown_path import FlownPath, Sample, Verdict
+from uav_task_alloc.mavlink.frame_log import FrameLog
 from uav_task_alloc.mission import RETURN, Item
 from uav_task_alloc.model import Point, Task
 
-ECHO = 15.0  # [s] in which PX4 may repeat the last REACHED of the epoch before
+ECHO = 15.0  # [s] in which a REACHED of the epoch before may come; PX4 repeats it for 10 s
 REACH = 60.0  # [m] beyond its radius from which an item can be reached between two positions
 FRESH = 3.0  # [s] a position tells where the vehicle is
 SETTLE = 3.0  # [s] in which a CURRENT sent before the last change may still come
+FRAMES_AFTER = 10  # beyond the MISSION_CURRENT that moved on: REACHED may come after it
 LATE = 6.0  # [s] in which REACHED and positions that were sent before may still come
+ROUGH = 10.0  # [m] from which an autopilot may count an item as reached, and turn to the next
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,12 +44,26 @@ class _Claim:
     since: float  # [s] of the vehicle's clock
     deadline: float  # [s] after which nothing more is expected
     epoch: int
+    frames: tuple[int, int] | None  # in which a REACHED would have come; None: not known
+    sure: bool  # it was flying, so what was not seen may have been flown
+
+
+@dataclass(frozen=True, slots=True)
+class _Before:
+    """The epoch before: until when a REACHED may be of it."""
+
+    items: tuple[Item, ...]
+    since: float  # [s] of the vehicle's clock: its current item was flown
+    may_end: bool  # at its last item
+    until: float  # [s]
 
 
 class ProgressTable:
     """The items on board, the one being flown, and what was completed; seq counts without home."""
 
-    def __init__(self) -> None:
+    def __init__(self, frames: FrameLog | None = None) -> None:
+        self._frames = frames or FrameLog()
+        self._last_frame: int | None = None  # that told the current item
         self.epoch = 0
         self.items: tuple[Item, ...] = ()
         self.current: int | None = None  # len(items): flown to the end
@@ -56,7 +74,8 @@ class ProgressTable:
         self.path = FlownPath()
         self._started: str | None = None
         self._reached: tuple[int, float] | None = None  # last seq, when
-        self._echo: tuple[int, float] | None = None  # seq of the epoch before, until when
+        self._before = _Before((), -math.inf, False, -math.inf)
+        self._unproven: dict[int, float] = {}  # REACHED of this epoch or the one before; until [s]
         self._jump: tuple[int, float] | None = None  # set by us at a time, not seen yet
         self._asked: int | None = None  # we are setting this
         self._place: tuple[Point, float] | None = None
@@ -89,6 +108,12 @@ class ProgressTable:
     def returns(self) -> bool:
         return bool(self.items) and self.items[-1].command == RETURN
 
+    def may_end(self, now: float) -> bool:
+        """The last item with a place is flown, or passed; or was, where a swap has just come."""
+        if self.items and self.current is not None and self.current >= self.last_flown:
+            return True
+        return self._before.may_end and now < self._before.until - ECHO + LATE
+
     def ended_lately(self, now: float, within: float) -> bool:
         """REACHED of the last item has come, of this epoch or of the one before."""
         return now - self._end_at <= within
@@ -96,8 +121,8 @@ class ProgressTable:
     def begin(self, items: tuple[Item, ...], start: int | None, now: float) -> None:
         """A new epoch: what REACHED and CURRENT mean from now on."""
         self.epoch += 1
-        if self._reached is not None and now - self._reached[1] < ECHO:
-            self._echo = self._reached[0], now + ECHO
+        self._before = _Before(self.items, self._since, self.may_end(now), now + ECHO)
+        self._unproven.clear()
         self.items, self.current, self._reached = items, start, None
         self._jump = None if start is None else (start, now)
         self._asked = self.chosen = None
@@ -110,8 +135,10 @@ class ProgressTable:
 
     def invalidate(self) -> None:
         """Nothing is known of what is on board."""
-        self.items, self.current, self._reached, self._echo = (), None, None, None
-        self._started = self._jump = self.chosen = None
+        self.items, self.current, self._reached = (), None, None
+        self._before = _Before((), -math.inf, False, -math.inf)
+        self._unproven.clear()
+        self._started = self._jump = self.chosen = self._last_frame = None
         self._claims.clear()
         self.path.clear()
         self._since = -math.inf
@@ -148,8 +175,30 @@ class ProgressTable:
 
     def reached(self, seq: int, now: float) -> None:
         """MISSION_ITEM_REACHED, once or many times."""
-        if not 0 <= seq < len(self.items) or self._is_echo(seq, now) or not self._near(seq, now):
-            return
+        if now >= self._before.until:
+            if 0 <= seq < len(self.items) and self._near(seq, now):
+                self._accept(seq, now)
+        elif not self._prove(seq, now):
+            self._unproven[seq] = now + LATE  # a position on its way may tell
+
+    def _prove(self, seq: int, now: float) -> bool:
+        """Credit REACHED to the epoch at whose item the vehicle was; False: not known yet."""
+        before = self._before
+        passed = self.current is not None and seq < self.current
+        if 0 <= seq < len(self.items) and self.was_at(
+                self.items[seq], radius=ROUGH if passed else 0.0):
+            self._accept(seq, now)
+            return True
+        if not 0 <= seq < len(before.items) or not self.was_at(before.items[seq], before.since):
+            return False
+        item = before.items[seq]
+        if before.may_end and item.position == _last_place(before.items):
+            self._end_at = now
+        if item.completes:
+            self._complete(item.task, item.position)
+        return True
+
+    def _accept(self, seq: int, now: float) -> None:
         if seq == self.last_flown and (self._reached is None or self._reached[0] != seq):
             self._end_at = now
         self._reached = seq, now
@@ -166,8 +215,12 @@ class ProgressTable:
         if seq == self.last_flown:
             self._end_at = now
 
-    def moved(self, seq: int, now: float, flying: bool) -> None:
-        """MISSION_CURRENT: where it is flying, items before it were passed."""
+    def moved(self, seq: int, now: float, flying: bool, frame: int | None = None) -> None:
+        """MISSION_CURRENT in a frame: where it is flying, items before it were passed."""
+        self._move(seq, now, flying, frame)
+        self._last_frame = frame
+
+    def _move(self, seq: int, now: float, flying: bool, frame: int | None) -> None:
         if seq == self._asked:
             return
         if self._jump is not None:
@@ -177,23 +230,32 @@ class ProgressTable:
             self._jump = None
         if self._started is None or not flying:
             if seq < len(self.items) and not (self.finished and seq == len(self.items) - 1):
+                if self.current is not None and self.current < seq:
+                    self._claim(self.current, seq, now, frame, sure=False)
                 self.current = seq  # somebody sets it; nothing is flown
         elif self.current is not None and self.current < seq <= len(self.items):
-            self._claim(self.current, seq, now)
+            self._claim(self.current, seq, now, frame)
             self.current, self._since = seq, self._recent()
 
-    def ended(self, seq: int, now: float) -> None:
-        """The vehicle says that the mission is flown, at its item `seq`."""
-        last = len(self.items) - 1
+    def ended(self, seq: int, now: float, frame: int | None = None) -> None:
+        """The vehicle says that the mission is flown to its item `seq`; more may be appended."""
+        end = min(seq + 1, len(self.items))
         if (self.current is not None and self._jump is None and self._started is not None
-                and seq >= last and self.current <= last):
-            self._claim(self.current, last + 1, now)
-            self.current = last + 1
+                and self.current < end):
+            self._claim(self.current, end, now, frame)
+            self.current, self._since = end, self._recent()
 
     def step(self, now: float) -> None:
-        """Judge what was passed without a REACHED."""
+        """Judge what was passed without a REACHED, and REACHED that nothing has shown."""
+        for seq, until in list(self._unproven.items()):
+            if now >= until or self._prove(seq, now):
+                self._unproven.pop(seq, None)
         for claim in list(self._claims):
             left = tuple(i for i in claim.items if i.task not in self.completed)
+            if self._silent(claim):
+                self._claims.remove(claim)
+                self._leave(left, claim)
+                continue
             verdicts = {item.task: self._verdict(item, claim) for item in left}
             for item in left:
                 if verdicts[item.task] is Verdict.YES:
@@ -213,12 +275,25 @@ class ProgressTable:
         flown = bool(chain) and self.path.could_have(
             chain, claim.then, math.fsum(i.params[0] for i in blind), claim.since)
         for item in left:
-            if flown and item in blind:
+            if flown and item in blind and claim.sure:
                 self._complete(item.task, item.position)
             else:
-                self.skipped.append(item.task)
-                if claim.epoch == self.epoch:
-                    self.chosen = self.current
+                self._leave((item,), claim)
+
+    def _silent(self, claim: _Claim) -> bool:
+        """Every frame has come in which the vehicle would have told REACHED, and it did not."""
+        if claim.frames is None:
+            return False
+        first, last = claim.frames[0], claim.frames[1] + FRAMES_AFTER
+        return self._frames.newest >= last and self._frames.whole(first, last)
+
+    def _leave(self, items: tuple[Item, ...], claim: _Claim) -> None:
+        """They were passed over."""
+        if not claim.sure:
+            return
+        self.skipped.extend(item.task for item in items)
+        if items and claim.epoch == self.epoch:
+            self.chosen = self.current
 
     def caught_up(self, tasks: Iterable[Task]) -> None:
         """These were flown while nobody listened."""
@@ -232,10 +307,10 @@ class ProgressTable:
                 del self.completed[task.id]
                 self._started = None if self._started == task.id else self._started
 
-    def was_at(self, item: Item, since: float | None = None) -> bool:
+    def was_at(self, item: Item, since: float | None = None, radius: float = 0.0) -> bool:
         """Whether the vehicle's own positions show that it has reached an item."""
         return item.position is not None and self.path.judge(
-            item.position, item.radius, item.params[0],
+            item.position, max(radius, item.radius), item.params[0],
             self._since if since is None else since) is Verdict.YES
 
     def _verdict(self, item: Item, claim: _Claim) -> Verdict:
@@ -243,13 +318,20 @@ class ProgressTable:
             return Verdict.NO
         return self.path.judge(item.position, item.radius, item.params[0], claim.since)
 
-    def _claim(self, begin: int, end: int, now: float) -> None:
+    def _claim(self, begin: int, end: int, now: float, frame: int | None = None,
+               sure: bool = True) -> None:
         items = tuple(item for item in self.items[begin:end]
                       if item.completes and item.task not in self.completed)
         if items:
             following = next((i.position for i in self.items[end:] if i.position is not None),
                              None)
-            self._claims.append(_Claim(items, following, self._since, now + LATE, self.epoch))
+            # PX4 tells no REACHED of the item before RETURN
+            told = not (self.items[end:] and self.items[end].command == RETURN)
+            frames = (self._last_frame, frame) if told and frame is not None and (
+                self._last_frame is not None) else None
+            self._claims.append(_Claim(
+                items, following, self._since, now + LATE, self.epoch,
+                frames, sure))
 
     def _turn(self, seq: int) -> None:
         """The item after `seq` is flown from when that one was reached."""
@@ -268,12 +350,6 @@ class ProgressTable:
             self.completed[task] = place
             self.events.append(Progress(task, completed=True, unheard=unheard))
 
-    def _is_echo(self, seq: int, now: float) -> bool:
-        """A repetition from the epoch before, unless the vehicle is seen at the new item."""
-        if self._echo is None or now > self._echo[1] or seq != self._echo[0]:
-            return False
-        return not self.was_at(self.items[seq])
-
     def _near(self, seq: int, now: float) -> bool:
         if self._place is None or now - self._place[1] > FRESH:
             return True
@@ -285,3 +361,7 @@ class ProgressTable:
         if position is None or self._place is None:
             return math.inf
         return math.dist(position, self._place[0])
+
+
+def _last_place(items: tuple[Item, ...]) -> Point | None:
+    return next((item.position for item in reversed(items) if item.position is not None), None)

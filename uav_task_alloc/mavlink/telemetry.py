@@ -9,6 +9,7 @@ from pymavlink.dialects.v20 import ardupilotmega as d
 
 from uav_task_alloc.geometry.frames import Origin, to_enu
 from uav_task_alloc.mavlink.codec import Message, plan_id
+from uav_task_alloc.mavlink.frame_log import FrameLog
 from uav_task_alloc.mavlink.profiles import Flight, Profile
 from uav_task_alloc.model import Point
 
@@ -75,6 +76,8 @@ class Telemetry:
         self.boot_ms = self._boot_doubt = 0  # [ms] its clock
         self._boot_at = now
         self._gap_at = -math.inf  # [s] the last silence of more than QUIET ended
+        self.frames = FrameLog()
+        self.frame = 0  # the number of the last frame
         self._newest: dict[str, tuple[int, float]] = {}  # sequence number, when [s], by type
         self._first_at: float | None = None  # [s] the first position that is one
         self._fix = self._estimates = False
@@ -139,6 +142,9 @@ class Telemetry:
         if now - self.heard_at > QUIET:
             self._gap_at = now
         self.heard_at = now
+        self.frames.note_all((seq for system, seq in getattr(message, 'passed', ())
+                              if system == message.get_srcSystem()), now)
+        self.frame = self.frames.note(message.get_seq(), now)
         self.heard.add(message.get_msgId())
         boot = getattr(message, 'time_boot_ms', None)
         if boot is not None:
@@ -161,6 +167,7 @@ class Telemetry:
         self.has_position = self._fix = self._estimates = False
         self._first_at, self._started = None, False
         self._newest.clear()
+        self.frames.clear()
         self._batteries.clear()
 
     def _is_newest(self, message: Message, now: float) -> bool:
