@@ -1,0 +1,118 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What the tests of the findings share: pilots, second stations, lost messages, the truth."""
+import math
+
+import pytest
+from flight_bench import FlightBench, places
+from mission_bench import task_list
+from pymavlink.dialects.v20 import ardupilotmega as d
+
+from uav_task_alloc.mavlink.vehicle_modes import px4_mode
+from uav_task_alloc.mission import Stop, TaskList
+from uav_task_alloc.model import Task
+
+BOTH = pytest.mark.parametrize('kind', ['ardupilot', 'px4'])
+KINDS = ('ardupilot', 'px4')
+US = 'station 245/190'
+# custom_mode by autopilot; PAUSE is how a station holds it, LOITER how a pilot does
+MODES = {
+    'ardupilot': {'RTL': 6, 'LAND': 9, 'PAUSE': 4, 'LOITER': 5, 'BRAKE': 17, 'AUTO': 3},
+    'px4': {'RTL': px4_mode(4, 5), 'LAND': px4_mode(4, 6), 'PAUSE': px4_mode(4, 3),
+            'LOITER': px4_mode(3), 'BRAKE': px4_mode(4, 3), 'AUTO': px4_mode(4, 4)}}
+
+
+class FindingsBench(FlightBench):
+    """A bench that keeps how serious each note is."""
+
+    def __init__(self, *kinds, **kwargs):
+        self.levels = []  # (level, text)
+        super().__init__(*kinds, **kwargs)
+        self.kind = kinds[0]
+
+    def _collect(self):
+        for served in self.ground.served.values():
+            self.levels += [(note.level, note.text) for note in served.pilot.notes]
+        super()._collect()
+
+    def noted(self, *words):
+        """Notes with all of these words."""
+        return [note for note in self.notes if all(word in note for word in words)]
+
+
+def flying(kind, names='ABC', **kwargs):
+    """A vehicle on its way to the first of some tasks."""
+    lists = {key: kwargs.pop(key) for key in ('service', 'side', 'returns') if key in kwargs}
+    bench = FindingsBench(kind, **kwargs).found()
+    bench.assign(task_list(names, **lists))
+    assert bench.run(lambda: bench.started() == [names[0]])
+    return bench
+
+
+def listed(revision, **stops):
+    """A list of tasks by name, each at a place (x, y) [m], 50 m high."""
+    return TaskList(revision, tuple(Stop(Task(name, (*place, 50.0)))
+                                    for name, place in stops.items()))
+
+
+def take(bench, mode, who='station', n=1):
+    """Somebody else changes the mode: a second station, a pilot or a failsafe."""
+    number, vehicle = MODES[bench.kind][mode], bench.vehicles[n]
+    if who == 'pilot':
+        vehicle.rc_mode(number)
+    elif who == 'failsafe':
+        vehicle.failsafe('radio', number)
+    else:
+        main, sub = (number >> 16 & 0xff, number >> 24) if number > 0xffff else (number, 0)
+        bench.tells(d.MAVLink_command_long_message(
+            n, 1, d.MAV_CMD_DO_SET_MODE, 0, 1, main, sub, 0, 0, 0, 0), n)
+    assert vehicle.flight.custom_mode == number
+
+
+def commanded(bench, n=1):
+    """Modes, arming, take-offs, current items that came from the bridge, by the truth."""
+    return [e.command for e in bench.truth[n] if e.name == 'command' and e.cause == US]
+
+
+def left_alone(bench, seconds=40.0, n=1):
+    """The bridge has seen what happened, and commands nothing for a while."""
+    before = len(commanded(bench, n))
+    bench.run(limit=seconds)
+    assert commanded(bench, n)[before:] == []
+
+
+def arms(bench):
+    """Tries to arm that were sent."""
+    return [m for m in bench.line.sent('COMMAND_LONG')
+            if m.command == d.MAV_CMD_COMPONENT_ARM_DISARM and m.param1 == 1.0]
+
+
+def truthful(bench, until, limit=300.0):
+    """Run; at no moment a task is COMPLETED that the vehicle has not reached."""
+    def checked():
+        assert set(bench.completed()) <= set(places(bench)), (bench.completed(), places(bench))
+        return until()
+    return bench.run(checked, limit)
+
+
+def flown_once_each(bench, names, limit=400.0):
+    """All tasks are flown and told, each once, none before it was."""
+    assert truthful(bench, lambda: len(bench.completed()) >= len(names), limit), (
+        bench.completed(), places(bench))
+    bench.run(limit=20.0)
+    assert sorted(bench.completed()) == sorted(places(bench)) == sorted(names)
+
+
+def swallow(bench, way, kind, when):
+    """The line loses messages of a type while `when(message)` holds."""
+    bench.line.tampers.append(lambda direction, m, now: [] if (
+        direction == way and m.get_type() == kind and when(m)) else None)
+
+
+def distance(bench, place, n=1):
+    """[m] of the real vehicle from a place."""
+    return math.dist(bench.vehicles[n].flight.body.position, place)
+
+
+def happened(bench, name, n=1):
+    """Whether the truth has an event of that name."""
+    return any(e.name == name for e in bench.truth[n])
