@@ -3,6 +3,7 @@
 import os
 import struct
 import threading
+import time
 
 import pytest
 from link_bench import WALL, heartbeat, nothing, receive
@@ -10,7 +11,7 @@ from pymavlink.dialects.v20 import ardupilotmega as d
 
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.mavlink.codec import make_signing
-from uav_task_alloc.mavlink.radio import Heartbeat, open_record, read_key
+from uav_task_alloc.mavlink.radio import Heartbeat, Radio, open_record, read_key
 
 KEY = bytes(range(32))
 
@@ -113,3 +114,47 @@ def test_fault_31_the_heart_beats_while_the_node_is_busy(radio, far):
     heart.close()
     assert {m.get_type() for m in beats} == {'HEARTBEAT'}
     assert {m.get_srcSystem() for m in beats} == {245}
+
+
+class OneAtATime:
+    """A link that notices when two threads are in it."""
+
+    name, datagrams, opened, trouble = 'x', True, 1, ''
+
+    def __init__(self):
+        self.inside, self.collisions = threading.Lock(), 0
+        self._read, self._write = os.pipe()
+        os.write(self._write, b'x')  # always something to read
+
+    def use(self, *_):
+        if not self.inside.acquire(blocking=False):
+            self.collisions += 1
+            return []
+        time.sleep(0.002)
+        self.inside.release()
+        return []
+
+    read = write = step = use
+
+    def fileno(self):
+        return self._read
+
+    def ends(self):
+        return ['y']
+
+    def close(self):
+        os.close(self._read)
+        os.close(self._write)
+
+
+def test_a_beat_never_writes_to_a_line_that_is_read_or_opened_again():
+    link = OneAtATime()
+    radio = Radio([link], 245, 190, wall=lambda: WALL)
+    heart = Heartbeat(radio.send_to_all, period=0.001)
+    heart.start()
+    for now in range(50):
+        radio.step(float(now))
+        radio.receive(0.0)
+    heart.close()
+    radio.close()
+    assert link.collisions == 0

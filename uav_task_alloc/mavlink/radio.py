@@ -39,7 +39,7 @@ class Radio:
         self._signing = self._load_signing(signing_key_file)
         self._voice = Codec(system, component, signing=self._signing)
         self._parsers: dict[Address, Codec] = {}
-        self._lock = threading.Lock()  # held for the time of a pack and a non-blocking write
+        self._lock = threading.Lock()  # held for a pack, a write or a read: none of them blocks
         self._selector = selectors.DefaultSelector()
         self._watched: dict[int, tuple[int, int]] = {}  # link -> its file, how often opened
 
@@ -57,7 +57,9 @@ class Radio:
         got: list[tuple[Address, Message]] = []
         for key, _ in self._selector.select(timeout):
             number = key.data
-            for end, data in self.links[number].read():
+            with self._lock:  # a line that breaks drops what a sender may be writing
+                read = self.links[number].read()
+            for end, data in read:
                 got += self._parse((number, end), data)
         return got
 
@@ -76,8 +78,9 @@ class Radio:
 
     def step(self, now: float) -> None:
         """Let time pass: reconnect, and keep the signing timestamp on disk."""
-        for link in self.links:
-            link.step(now)
+        with self._lock:
+            for link in self.links:
+                link.step(now)
         if self._signing is None or self._stamp_file is None or now < self._stamp_at:
             return
         self._stamp_at = now + STAMP_PERIOD
