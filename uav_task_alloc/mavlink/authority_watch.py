@@ -29,7 +29,8 @@ LOW_BATTERY = 0.2  # [0..1] below which nothing is handed over
 _FAILSAFE = re.compile(r'failsafe|fence breach|breached|battery \d+ is (low|critical)|'
                        r'(low|critical|dangerous).{0,12}battery|data link lost|'
                        r'(rc|manual control|gcs).{0,20}lost', re.IGNORECASE)
-_KILL = re.compile(r'emergency stop|kill.?switch|flight terminat|terminating', re.IGNORECASE)
+_KILL = re.compile(r'emergency stop|flight terminat|terminating', re.IGNORECASE)
+_KILL_SWITCH = re.compile(r'motorestop high|kill(.?switch)? engaged', re.IGNORECASE)
 _FINISHED = re.compile(r'mission finished', re.IGNORECASE)  # PX4, at the end of its mission
 _INFEASIBLE = re.compile(r'(mission|waypoint).*(reject|infeasible|invalid|not valid|too far|'
                          r'too close|failed)|too far', re.IGNORECASE)
@@ -158,14 +159,13 @@ class AuthorityWatch:
         words = str(message.text)
         if _FINISHED.search(words):
             self._finished_at = now
-        if message.severity > d.MAV_SEVERITY_NOTICE:
-            return
-        if _FAILSAFE.search(words):
-            self._failsafe_at = now
-        if _INFEASIBLE.search(words):
-            self._infeasible_at = now
-        if _KILL.search(words):
+        urgent = message.severity <= d.MAV_SEVERITY_NOTICE
+        if _KILL_SWITCH.search(words) or (urgent and _KILL.search(words)):
             self._apply(Event.KILLED, now, f'the vehicle says: {words}')
+        if urgent and _FAILSAFE.search(words):
+            self._failsafe_at = now
+        if urgent and _INFEASIBLE.search(words):
+            self._infeasible_at = now
         self._keep()
 
     def step(self, now: float) -> None:
@@ -440,7 +440,8 @@ class AuthorityWatch:
         elif was is ModeClass.STICK:
             if self._telemetry.airborne:
                 self._rest = now, self._telemetry.position
-        elif self._telemetry.airborne and (was is ModeClass.MISSION or self.authority.held):
+        elif self._telemetry.airborne and (was is ModeClass.MISSION or self.authority.held
+                                           or avoids_traffic(self._profile.family, before)):
             self._take(why, now)
 
     def _explained(self, mode: int, now: float) -> bool:
