@@ -3,6 +3,7 @@
 import pytest
 from findings_bench import (
     BOTH,
+    FindingsBench,
     distance,
     flown_once_each,
     flying,
@@ -46,7 +47,7 @@ def test_finding_04_also_where_the_last_reached_is_lost():
 
 
 @pytest.mark.parametrize('delay', [0.1, 0.3, 0.6])
-@pytest.mark.parametrize('before', [5.0, 10.0, 20.0, 35.0])
+@pytest.mark.parametrize('before', [5.0, 20.0])
 def test_an_append_near_the_end_of_the_mission_is_flown(delay, before):
     bench = flying('ardupilot', 'ABC', delay=(delay, delay))
     assert truthful(bench, lambda: bench.completed() == ['A', 'B'])
@@ -115,9 +116,8 @@ def swapped_beside(second, lost):
     return bench
 
 
-@pytest.mark.parametrize('lost', [0.0, 1.5, 3.5])
-@pytest.mark.parametrize('second', [(0.0, 116.0), (20.0, 115.0), (0.0, 130.0), (40.0, 130.0),
-                                    (0.0, 60.0)])
+@pytest.mark.parametrize('lost', [0.0, 2.5])
+@pytest.mark.parametrize('second', [(20.0, 115.0), (40.0, 130.0), (0.0, 60.0)])
 def test_finding_06_a_reached_of_the_list_before_completes_nothing_of_the_new(lost, second):
     bench = swapped_beside(second, lost)
     there = (*map(round, second), 50)
@@ -167,21 +167,20 @@ def test_finding_07_reached_of_the_old_list_is_not_credited_to_the_new_one():
     assert bench.flown() == [(0, 200, 50), (20, 220, 50), (0, 400, 50)]
 
 
-def test_finding_07_what_is_appended_and_reached_before_the_answer_is_completed_once():
+def test_what_is_appended_and_reached_before_the_answer_is_completed_once():
     bench = flying('ardupilot', 'AB')
-    assert truthful(bench, lambda: distance(bench, (0.0, 100.0, 50.0)) < 25.0)
+    assert truthful(bench, lambda: distance(bench, (100.0, 100.0, 50.0)) < 25.0)
     lost = [True]
     for message in ('MISSION_ACK', 'MISSION_COUNT'):
         swallow(bench, 'down', message, lambda m: lost[0])
-    bench.assign(task_list('ABCD', 2))
-    assert truthful(bench, lambda: len(places(bench)) == 3)
+    bench.assign(task_list('BCD', 2))
+    assert truthful(bench, lambda: places(bench) == ['A', 'B', 'C'])
     lost[0] = False
     flown_once_each(bench, 'ABCD')
 
 
-@pytest.mark.parametrize('unheard', [False, True])
-@pytest.mark.parametrize('slow', [0.0, 3.0])
-def test_finding_08_the_end_of_the_old_mission_during_a_swap_is_no_pilot(unheard, slow):
+@pytest.mark.parametrize(('slow', 'unheard'), [(3.0, False), (0.0, True), (3.0, True)])
+def test_finding_08_the_end_of_the_old_mission_during_a_swap_is_no_pilot(slow, unheard):
     bench = flying('px4', 'C', tick=0.05)
     assert bench.run(lambda: distance(bench, C) < 30.0)
     ended = []
@@ -205,25 +204,25 @@ def test_finding_08_the_end_of_the_old_mission_during_a_swap_is_no_pilot(unheard
 
 @BOTH
 def test_finding_16_verified_is_not_told_of_a_list_that_came_during_set_current(kind):
-    bench = flying(kind, 'ABC')
-    bench.run(limit=2.0)
-    jumping = [True]
-    swallow(bench, 'up', 'COMMAND_LONG', lambda m: (
-        m.command == d.MAV_CMD_DO_SET_MISSION_CURRENT and jumping[0]))
-    swallow(bench, 'up', 'MISSION_SET_CURRENT', lambda m: jumping[0])
-    bench.assign(task_list('BC', 2))
-    bench.run(limit=0.5)
-    bench.assign(task_list('XYZ', 3))
-    jumping[0] = False
+    bench = FindingsBench(kind, delay=(0.2, 0.2)).found()
+    bench.assign(task_list('AB', via={'A': ((-150.0, 50.0, 50.0),)}))
+    assert bench.run(lambda: bench.started() == ['A'])
+    bench.run(limit=3.0)
+    bench.assign(task_list('AB', 2))  # without the detour: it is on board, from an item on
+    bench.run(limit=0.1)
+    bench.assign(task_list('XY', 3))
+    own, seen = bench.board().own, set()
 
     def told():
-        state = bench.state()
-        if state.mission_state is MissionState.VERIFIED and state.list_revision == 3:
-            assert len(bench.vehicles[1].mission.items) == 3 + bench.board().own
-            assert bench.board().upload.uploads == 2
-        return len(bench.completed()) == 3
+        state, held = bench.state(), bench.vehicles[1].mission.items[own:]
+        if state.mission_state is MissionState.VERIFIED:
+            seen.add(state.list_revision)
+        if state.list_revision == 3:
+            assert len(held) == 2
+        return bench.completed() == ['X', 'Y']
     assert bench.run(told)
-    assert bench.completed() == places(bench) == ['X', 'Y', 'Z']
+    assert 3 in seen
+    assert places(bench) == ['X', 'Y']
 
 
 @pytest.mark.parametrize('index', [1, 2])
@@ -245,7 +244,7 @@ def test_finding_17_a_late_current_completes_nothing_while_it_is_held(index):
 
 
 @BOTH
-def test_finding_17_a_late_current_after_a_jump_completes_nothing_in_flight(kind):
+def test_a_late_current_after_a_swap_completes_nothing_in_flight(kind):
     bench = flying(kind, 'ABCDE')
     late = []
 
