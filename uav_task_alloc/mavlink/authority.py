@@ -120,7 +120,7 @@ TABLE: dict[Event, Row] = {
     E.LINK_STALE: Row(_S, _S, None, None),
     E.LINK_BACK: Row(_H, _H, None, None),
     E.LINK_CHANGED: Row(_L, _L, None, None),
-    E.NEW_ADDRESS: Row(_S, None, None, None),
+    E.NEW_ADDRESS: Row(_S, _S, None, None),
     E.REBOOTED: Row(_H, None, None, None),
     E.REBOOTED_FLOWN: Row(_L, _L, None, None),
     E.RESTART_AGREES: Row(_H, _H, None, None, 'SUSPENDED as the link'),
@@ -225,7 +225,7 @@ class Authority:
             return False
         why = why or event.value
         if event in _SUSPENDS:
-            self.suspensions.setdefault(_SUSPENDS[event], why)
+            self.suspensions[_SUSPENDS[event]] = why
         elif self.state is State.SUSPENDED and target is State.HELD:
             target = self._resumes(event)
         if event is E.KILLED and not self.killed:

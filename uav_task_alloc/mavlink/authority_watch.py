@@ -350,8 +350,9 @@ class AuthorityWatch:
             self._adopt = False
             return
         modes, armed = self._compare
-        if self.mode in modes and self.armed in armed:
-            self._adopt = False
+        if (self.mode in modes and self.armed in armed) or (
+                self._boots() and not (self._flown or self.armed)):
+            self._adopt, self._doubt = False, None
             self._apply(Event.LINK_BACK, now, f'heard again, in {self._name(self.mode)}')
             return
         names = ' or '.join(sorted(map(self._name, modes)))
@@ -402,7 +403,11 @@ class AuthorityWatch:
 
     def _restarted_since(self) -> Callable[[float], bool]:
         restarts = self._telemetry.restarts
-        return lambda now: self._telemetry.restarts != restarts
+        return lambda now: self._telemetry.restarts != restarts or self._boots()
+
+    def _boots(self) -> bool:
+        """A heartbeat says so: while SUSPENDED nothing asks for a message with its clock."""
+        return self._status in (d.MAV_STATE_BOOT, d.MAV_STATE_CALIBRATING)
 
     def _mission_set(self, before: int, mode: int, now: float, why: str) -> None:
         """MISSION, not expected: by a human, unless a command of ours came late."""
