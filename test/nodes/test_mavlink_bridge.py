@@ -188,6 +188,8 @@ def test_a_uav_that_landed_is_flown_again_after_a_hand_over(sky, probe):
     assert not world.states['uav_1'].available
     assert '~/hand_over' in world.states['uav_1'].reason
     assert world.states['uav_2'].authority == m.UavState.HELD
+    for _ in range(2):  # at least a second later, when its heartbeat says that it is disarmed
+        assert world.fact(1, 'authority') == 'NONE'
     probe.until(lambda: hand_over(probe, 'uav_1')[0])
     assert 'hand_over of uav_1 by anna: the bridge has uav_1 now' in world.bridge.output()
     probe.until(lambda: world.states['uav_1'].available)
