@@ -63,6 +63,16 @@ class AuthorityBench(FlightBench):
         """Whether it comes to a state."""
         return self.run(lambda: self.authority(n) is state, limit)
 
+    def dead_for(self, seconds=0.0, store=True):
+        """kill -9, and a new bridge after a while; without a store it knows nothing."""
+        self.ground = SimpleNamespace(served={}, step=lambda now: [],
+                                      receive=lambda address, m, now: [])
+        self.run(limit=seconds)
+        if not store:
+            self.store = Store()
+        self.start()
+        self.found()
+
     def move_address(self, n=1, address='new'):
         """What the vehicle sends comes from elsewhere from now on."""
         take, self.moved[address] = self.ground.receive, n

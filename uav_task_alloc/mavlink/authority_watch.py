@@ -117,7 +117,9 @@ class AuthorityWatch:
         self._policy, self._save, self._saved = policy, save, record
         self._record = record  # of the bridge before, until it is judged
         self._flown = record.flown if record else False
-        self._sent = _Sent(climb=record.climb if record else None)
+        self._sent = _Sent() if record is None else _Sent(
+            [(mode, now + IN_FLIGHT) for mode in record.commanded],
+            dict.fromkeys(record.commanded, now), climb=record.climb)
         self._status = 0
         self._adopt = False  # the next heartbeat tells the mode, and is no change
         # modes and armed states that are no news when the link is back
@@ -328,6 +330,8 @@ class AuthorityWatch:
             self.swap_at = record.swap_at if agrees else None
         self._record = None
         self._descending = self._profile.flight(self.mode or 0) is Flight.RETURN
+        if agrees and self.mode is not None:
+            self._sent.expects(self.mode, now)
         self._apply(Event.RESTART_AGREES if agrees else Event.RESTART_DIFFERS, now, why)
 
     def _decide(self, now: float) -> None:

@@ -1,0 +1,164 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A bridge started again without its file, and what is written to it before which message."""
+from dataclasses import replace
+
+import pytest
+from authority_bench import (
+    ARDUPILOT,
+    BOTH,
+    MODES,
+    AuthorityBench,
+    H,
+    L,
+    N,
+    Store,
+    flying,
+    keeps_quiet,
+    on_ground,
+    shows,
+    upload_by_another,
+)
+from mission_bench import task_list
+
+# without a file
+
+@BOTH
+def test_without_a_file_on_the_ground_it_is_granted_as_at_first(kind):
+    bench = on_ground(kind, L)
+    bench.dead_for(1.0, store=False)
+    bench.run(limit=2.0)
+    assert shows(bench, H, 'takeoff is true')
+
+
+@BOTH
+def test_without_a_file_in_the_air_with_our_mission_it_is_ours(kind):
+    bench = flying(kind)
+    bench.dead_for(1.0, store=False)
+    assert not bench.state().available
+    bench.run(limit=3.0)
+    assert shows(bench, L, 'in the air in ')
+    bench.assign(task_list('ABCDEFGHIJKLMNOPQRSTUVWXY', 2))
+    assert bench.becomes(H, 5.0)
+    assert shows(bench, H, 'flies our mission')
+    start = len(bench.sent)
+    bench.run(limit=15.0)
+    assert bench.modes(start) == []
+
+
+@BOTH
+@pytest.mark.parametrize('mission', ['other list', 'foreign'])
+def test_without_a_file_in_the_air_with_another_mission_it_is_not_ours(kind, mission):
+    bench = flying(kind)
+    if mission == 'foreign':
+        upload_by_another(bench, items=20)
+    bench.dead_for(1.0, store=False)
+    bench.run(limit=3.0)
+    assert keeps_quiet(bench, names='ZZZ' if mission == 'other list' else 'ABC')
+    assert shows(bench, L, 'in the air in ')
+
+
+@BOTH
+@pytest.mark.parametrize('mode', ['hold', 'stick', 'rtl'])
+def test_without_a_file_in_the_air_in_another_mode_it_is_not_ours(kind, mode):
+    bench = flying(kind)
+    bench.vehicles[1].rc_mode(getattr(MODES[kind], mode))
+    bench.dead_for(1.0, store=False)
+    bench.run(limit=3.0)
+    assert shows(bench, L, 'in the air in ')
+    assert keeps_quiet(bench, names='ABC')
+
+
+@BOTH
+def test_without_a_file_it_is_not_known_who_has_it_before_it_tells_where_it_is(kind):
+    bench = flying(kind)
+    bench.line.tampers.append(lambda way, m, now: [] if way == 'down' and m.get_type() not in (
+        'HEARTBEAT', 'MISSION_COUNT', 'MISSION_ITEM_INT') else None)
+    bench.dead_for(1.0, store=False)
+    start = len(bench.sent)
+    bench.assign(task_list('ABC', 2))
+    bench.run(limit=20.0)
+    status = bench.state()
+    assert status.authority.name == 'UNKNOWN'
+    assert status.reason == 'not known yet who has it'
+    assert {what for _, what, _ in bench.sent[start:]} <= {'read'}
+
+
+@BOTH
+def test_without_a_file_armed_on_the_ground_nothing_is_granted(kind):
+    bench = on_ground(kind, H)
+    bench.vehicles[1].rc_arm(True)
+    bench.dead_for(0.0, store=False)
+    bench.run(limit=5.0)
+    assert shows(bench, N)
+    assert keeps_quiet(bench, 4.0)
+
+
+# what is written down, and when
+
+class Log(Store):
+    """Notes how many messages had left when a record was saved."""
+
+    def __init__(self):
+        super().__init__()
+        self.all, self.line = [], None
+
+    def save(self, uav_id, record):
+        super().save(uav_id, record)
+        self.all.append((len(self.line.log) if self.line else 0, record))
+
+
+@BOTH
+def test_each_command_is_written_down_before_it_is_sent(kind):
+    store = Log()
+    bench = AuthorityBench(kind, store=store, relaunch='automatic')
+    store.line = bench.line
+    bench.found()
+    bench.assign(task_list('ABC'))
+    assert bench.run(lambda: bench.started() == ['A'])
+    bench.run(limit=3.0)
+    bench.assign(task_list('CA', 2))
+    assert bench.run(lambda: bench.completed() == ['C', 'A'])
+    bench.assign(task_list('', 3, returns=True))
+    assert bench.run(lambda: not bench.vehicles[1].flight.armed, 100.0)
+    seen, profile = set(), bench.pilot().profile
+    for at, (_, way, m) in enumerate(bench.line.log):
+        before = [record for size, record in store.all if size <= at]
+        if way != 'up' or m.get_type() != 'COMMAND_LONG':
+            continue
+        mode = profile.commanded_mode(m)
+        if mode is not None:
+            assert mode in before[-1].commanded
+            seen.add('mode')
+        elif m.command == 400 and m.param1 == 1.0:
+            assert before[-1].arming
+            seen.add('arm')
+        elif m.command == 22:
+            assert before[-1].climb == 50.0 or kind == 'ardupilot'
+            seen.add('climb')
+    assert seen == {'mode', 'arm', 'climb'}
+    assert {record.state for _, record in store.all} == {H, N}
+
+
+@ARDUPILOT
+def test_a_swap_is_written_down_before_the_hold_is_sent(kind):
+    store = Log()
+    bench = flying(kind, store=store)
+    store.line = bench.line
+    start = len(bench.line.log)
+    bench.assign(task_list('ZYX', 2))
+    bench.run(limit=5.0)
+    at = next(n for n, (_, way, m) in enumerate(bench.line.log) if n >= start
+              and way == 'up' and m.get_type() == 'COMMAND_LONG' and m.command == 176)
+    before = [record for size, record in store.all if size <= at][-1]
+    assert (before.swap_at, before.commanded) == (bench.line.log[at][0], (4,))
+
+
+@BOTH
+def test_a_loss_is_written_down_in_the_moment_it_is_known(kind):
+    bench = flying(kind)
+    bench.vehicles[1].rc_mode(MODES[kind].stick)
+    assert bench.run(lambda: bench.authority() is L, 3.0)
+    record = bench.store.load('uav_1')
+    assert (record.state, record.mode, record.why) == (
+        L, MODES[kind].stick, bench.pilot().authority.why)
+    assert record == replace(record, commanded=(), arming=False, swap_at=None)
