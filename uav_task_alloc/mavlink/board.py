@@ -64,7 +64,7 @@ class Board:
     def __init__(self, peer: Peer, profile: Profile, origin: Origin, telemetry: Telemetry,
                  rng: random.Random) -> None:
         self.upload = Upload(peer, idle_after=profile.idle_after, rng=rng)
-        self.progress = ProgressTable(telemetry.frames)
+        self.progress = ProgressTable(telemetry.frames, repeats=profile.atomic)
         self.recall = Recall(profile, origin, telemetry, self.progress)
         self.own = int(profile.rules.home_first)
         self.tasks: TaskList | None = None
@@ -82,6 +82,7 @@ class Board:
         self._horizon: int | None = None  # stops; None: all
         self._fits = False  # the horizon is on board: there may be space for more
         self._space: int | None = None  # items that the vehicle says it has space for
+        self._infeasible: tuple[float, list[str], str, TaskList] | None = None  # to be told at [s]
         self._ambiguous: list[tuple[int, float]] = []  # REACHED of this epoch, or of the next
         self._state = MissionState.UNKNOWN
         self._uploading: tuple[Change, TaskList] | None = None  # and the list it is for
@@ -95,6 +96,11 @@ class Board:
     @property
     def state(self) -> MissionState:
         return MissionState.UPLOADING if self._uploading is not None else self._state
+
+    @property
+    def stored(self) -> MissionState:
+        """What is known of what is on board, whether or not a transfer runs."""
+        return self._state
 
     def upload_progress(self, now: float) -> str:
         """How far the upload is and how long it still takes, in words; '' where there is none."""
@@ -229,9 +235,9 @@ class Board:
         if self.upload.busy:
             self.upload.reset()
         if self._uploading is not None:
+            self._credit(self._uploading[0])
             self._uploading, self.held = None, None
             self._state = MissionState.UNKNOWN if self._profile.atomic else MissionState.MIXED
-        self._forget_ambiguous()
         return []
 
     def verified(self) -> bool:
@@ -275,7 +281,7 @@ class Board:
     def restarted(self) -> None:
         """The vehicle forgot its transfer, and perhaps its mission."""
         self.upload.reset()
-        self.is_foreign = False
+        self.is_foreign, self._infeasible = False, None
         self._ambiguous.clear()
         self.progress.invalidate()
         self.held, self._uploading, self._state = None, None, MissionState.UNKNOWN
@@ -311,6 +317,11 @@ class Board:
             self._refuse(task, f'infeasible: {reason}', self.tasks)
 
     def _settle(self, now: float) -> None:
+        if self._infeasible is not None and now >= self._infeasible[0]:
+            _, stops, reason, asked = self._infeasible
+            self._infeasible = None
+            for task in stops:
+                self._refuse(task, reason, asked)
         while self.upload.events:
             event = self.upload.events.popleft()
             if isinstance(event, Held):
@@ -325,7 +336,7 @@ class Board:
                     self._verify(found.items, tasks.revision, now)
                 else:
                     self._uploading = None
-                    self._was_refused(event, found, tasks)
+                    self._was_refused(event, found, tasks, now)
 
     def _begin(self, found: Change, now: float) -> None:
         if self._begun:
@@ -341,7 +352,7 @@ class Board:
             if not self._profile.atomic:
                 self.must_jump = found.start
         for seq, when in of_new:
-            self.progress.reached(seq, when)
+            self.progress.reached(seq, when, proven=True)
 
     def _sort_reached(self, found: Change) -> list[tuple[int, float]]:
         """Credit what was reached to the mission at whose item the vehicle was seen."""
@@ -358,13 +369,10 @@ class Board:
         self._ambiguous.clear()
         return of_new
 
-    def _forget_ambiguous(self) -> None:
-        """The transfer has failed: what was reached while it ran was of the old mission."""
-        ambiguous, self._ambiguous = self._ambiguous, []
-        for seq, when in ambiguous:
-            if 0 <= seq < len(self.progress.items) and self.progress.was_at(
-                    self.progress.items[seq]):
-                self.progress.reached(seq, when)
+    def _credit(self, found: Change) -> None:
+        """The transfer has failed, and nobody knows which mission was flown: ask where it was."""
+        for seq, _ in self._sort_reached(found):
+            self.progress.credit(found.items[seq])
 
     def _verify(self, items: tuple[Item, ...], revision: int, now: float) -> None:
         self.held, self.revision, self.verified_at = items, revision, now
@@ -395,11 +403,11 @@ class Board:
         self.progress.begin(held, None if current is None or not held
                             else max(0, current - self.own), now)
 
-    def _was_refused(self, event: Failed, found: Change, tasks: TaskList) -> None:
+    def _was_refused(self, event: Failed, found: Change, tasks: TaskList, now: float) -> None:
         self.notes.append(Note('error', f'mission upload failed: {event.reason}'))
         self.held, self.trouble = None, True
         self._state = MissionState.UNKNOWN if self._profile.atomic else MissionState.MIXED
-        self._forget_ambiguous()
+        self._credit(found)
         stops = [item.task for item in found.items if item.completes]
         if event.result == NO_SPACE:
             self._shrink(len(stops))
@@ -408,9 +416,8 @@ class Board:
             task = next((i.task for i in found.items[seq:] if i.task), stops[0] if stops else '')
             self._refuse(task, event.reason, tasks)
             self.trouble = not task
-        elif 'infeasible' in event.reason:
-            for task in stops:
-                self._refuse(task, event.reason, tasks)
+        elif 'infeasible' in event.reason:  # or it was just restarted, as its clock will tell
+            self._infeasible = now + LATE, stops, event.reason, tasks
 
     def _shrink(self, stops: int) -> None:
         """Fly fewer tasks at a time; where not even one fits the store is not open yet."""

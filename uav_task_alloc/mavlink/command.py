@@ -41,7 +41,6 @@ class Command:
     fallback: Command | None = None
     answer: Answer = Answer.OPEN
     reason: str = ''
-    began: float | None = None  # [s] of the first try
     _due: float = float('-inf')
     _sent: int = 0
 
@@ -57,7 +56,6 @@ class Command:
         elif now >= self._due:
             if self._sent < self.tries:
                 self._sent += 1
-                self.began = now if self.began is None else self.began
                 self._due = now + PERIOD
                 return [self.message]
             self._end(self.reason or f'no answer to {self.tries} tries')

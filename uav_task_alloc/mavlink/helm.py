@@ -48,6 +48,7 @@ class Helm:
         self._climb_until = math.inf
         self._said = ''
         self._told: dict[str, str] = {}  # why a command failed, as told last
+        self._arming_since: float | None = None  # [s] it is tried, without success
         self._retry_at, self._retries = -math.inf, 0
 
     @property
@@ -61,7 +62,7 @@ class Helm:
 
     def drop(self) -> None:
         """Somebody else has the vehicle: nothing that is under way is repeated."""
-        self._command = None
+        self._command = self._arming_since = None
         self.climbing = self.must_start = self.armed_here = False
         self.commanded, self.refused = None, ''
 
@@ -124,21 +125,29 @@ class Helm:
             self.waits_for = command.name + self._tell_arming(command, now)
             return out
         self._command, then = None, self._then
+        if command.name == ARM and command.answer is not Answer.FAILED:
+            self._arming_since = None
         if command.answer is Answer.DONE and then:
             self._told.pop(command.name, None)
             then(now)
         elif command.answer is Answer.FAILED:
-            if self._told.get(command.name) != command.reason:
-                self.notes.append(Note('error', f'{command.name}: {command.reason}'))
-            self._told[command.name] = command.reason
+            self._tell_failed(command)
             if command.name == _mode_name(Flight.MISSION) and 'refused' in command.reason:
                 self.refused = command.reason
             self.fail(now)
         return None
 
+    def _tell_failed(self, command: Command) -> None:
+        """Once until the reason changes; why it does not arm was told before."""
+        if command.name == ARM and ARM in self._told:
+            return
+        if self._told.get(command.name) != command.reason:
+            self.notes.append(Note('error', f'{command.name}: {command.reason}'))
+        self._told[command.name] = command.reason
+
     def _tell_arming(self, command: Command, now: float) -> str:
         """Why it does not arm, once until the reason changes, and for how long it was tried."""
-        tried = now - (now if command.began is None else command.began)
+        tried = now - (now if self._arming_since is None else self._arming_since)
         if command.name != ARM or not command.reason or tried < REFUSAL:
             return ''
         why = self.refusal or self._telemetry.unhealthy or command.reason
@@ -197,7 +206,8 @@ class Helm:
         if not telemetry.armed:
             self.armed_here = False
             arm = self._peer.command(d.MAV_CMD_COMPONENT_ARM_DISARM, 1.0)
-            self.refusal = ''
+            if self._arming_since is None:
+                self._arming_since, self.refusal = now, ''
             return self.do(Command(ARM, arm, lambda: telemetry.armed, tries=ARM_TRIES,
                                    patient=True, wanted=wanted), now, self._armed)
         ground = telemetry.altitude - (

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 from uav_task_alloc.mavlink.flown_path import FlownPath, Sample, Verdict
 from uav_task_alloc.mavlink.frame_log import FrameLog
-from uav_task_alloc.mission import RETURN, Item
+from uav_task_alloc.mission import RETURN, Item, all_alike
 from uav_task_alloc.model import Point, Task
 
 ECHO = 15.0  # [s] in which a REACHED of the epoch before may come; PX4 repeats it for 10 s
@@ -61,8 +61,9 @@ class _Before:
 class ProgressTable:
     """The items on board, the one being flown, and what was completed; seq counts without home."""
 
-    def __init__(self, frames: FrameLog | None = None) -> None:
-        self._frames = frames or FrameLog()
+    def __init__(self, frames: FrameLog | None = None, repeats: bool = False) -> None:
+        self._frames, self._repeats = frames or FrameLog(), repeats  # REACHED, many times (PX4)
+        self._told: int | None = None  # the current item, as the vehicle said last
         self._last_frame: int | None = None  # that told the current item
         self.epoch = 0
         self.items: tuple[Item, ...] = ()
@@ -121,8 +122,10 @@ class ProgressTable:
     def begin(self, items: tuple[Item, ...], start: int | None, now: float) -> None:
         """A new epoch: what REACHED and CURRENT mean from now on."""
         self.epoch += 1
-        self._before = _Before(self.items, self._since, self.may_end(now), now + ECHO)
-        self._unproven.clear()
+        if not all_alike(self.items, items):
+            self._before = _Before(self.items, self._since, self.may_end(now), now + ECHO)
+            if self.items:
+                self._unproven.clear()
         self.items, self.current, self._reached = items, start, None
         self._jump = None if start is None else (start, now)
         self._asked = self.chosen = None
@@ -138,7 +141,7 @@ class ProgressTable:
         self.items, self.current, self._reached = (), None, None
         self._before = _Before((), -math.inf, False, -math.inf)
         self._unproven.clear()
-        self._started = self._jump = self.chosen = self._last_frame = None
+        self._started = self._jump = self.chosen = self._last_frame = self._told = None
         self._claims.clear()
         self.path.clear()
         self._since = -math.inf
@@ -173,9 +176,9 @@ class ProgressTable:
         """The vehicle does not fly this list any more: what goes on later starts anew."""
         self._started = None
 
-    def reached(self, seq: int, now: float) -> None:
-        """MISSION_ITEM_REACHED, once or many times."""
-        if now >= self._before.until:
+    def reached(self, seq: int, now: float, proven: bool = False) -> None:
+        """MISSION_ITEM_REACHED, once or many times; `proven`: it is of this epoch."""
+        if (proven or now >= self._before.until) and self.items:
             if 0 <= seq < len(self.items) and self._near(seq, now):
                 self._accept(seq, now)
         elif not self._prove(seq, now):
@@ -184,19 +187,35 @@ class ProgressTable:
     def _prove(self, seq: int, now: float) -> bool:
         """Credit REACHED to the epoch at whose item the vehicle was; False: not known yet."""
         before = self._before
+        if not before.items and 0 <= seq < len(self.items) and self._near(seq, now) and (
+                not self._repeats or (self._told is not None and self._told > seq)):
+            self._accept(seq, now)  # the first mission that this bridge knows of
+            return True
         passed = self.current is not None and seq < self.current
         if 0 <= seq < len(self.items) and self.was_at(
                 self.items[seq], radius=ROUGH if passed else 0.0):
             self._accept(seq, now)
             return True
-        if not 0 <= seq < len(before.items) or not self.was_at(before.items[seq], before.since):
+        if 0 <= seq < len(self.items) and self._distance(seq) <= ROUGH + self.items[seq].radius:
+            if not self._repeats:
+                self._accept(seq, now)  # it is told once, where the vehicle is
+            return not self._repeats  # of this epoch, if its hold is seen to end
+        if not 0 <= seq < len(before.items) or not self.was_at(
+                before.items[seq], max(before.since, self.path.newest - ECHO)):
             return False
         item = before.items[seq]
         if before.may_end and item.position == _last_place(before.items):
             self._end_at = now
-        if item.completes:
-            self._complete(item.task, item.position)
+        self.credit(item)
         return True
+
+    def _passed_unseen(self, seq: int) -> bool:
+        """It flies beyond the item, and was not seen for a while."""
+        if not (0 <= seq < len(self.items) and self.current is not None and seq < self.current):
+            return False
+        item = self.items[seq]
+        return item.position is not None and self.path.judge(
+            item.position, item.radius, item.params[0], self._since) is Verdict.BLIND
 
     def _accept(self, seq: int, now: float) -> None:
         if seq == self.last_flown and (self._reached is None or self._reached[0] != seq):
@@ -218,7 +237,7 @@ class ProgressTable:
     def moved(self, seq: int, now: float, flying: bool, frame: int | None = None) -> None:
         """MISSION_CURRENT in a frame: where it is flying, items before it were passed."""
         self._move(seq, now, flying, frame)
-        self._last_frame = frame
+        self._last_frame, self._told = frame, seq
 
     def _move(self, seq: int, now: float, flying: bool, frame: int | None) -> None:
         if seq == self._asked:
@@ -248,8 +267,12 @@ class ProgressTable:
     def step(self, now: float) -> None:
         """Judge what was passed without a REACHED, and REACHED that nothing has shown."""
         for seq, until in list(self._unproven.items()):
-            if now >= until or self._prove(seq, now):
+            if self._prove(seq, now):
                 self._unproven.pop(seq, None)
+            elif now >= until:
+                del self._unproven[seq]
+                if self._passed_unseen(seq):
+                    self._accept(seq, now)
         for claim in list(self._claims):
             left = tuple(i for i in claim.items if i.task not in self.completed)
             if self._silent(claim):
@@ -299,6 +322,11 @@ class ProgressTable:
         """These were flown while nobody listened."""
         for task in tasks:
             self._complete(task.id, task.position, unheard=True)
+
+    def credit(self, item: Item) -> None:
+        """It was reached, whichever mission it was of."""
+        if item.completes:
+            self._complete(item.task, item.position)
 
     def asked_for(self, tasks: Iterable[Task]) -> None:
         """One that was flown at another place is another task, and still to be flown."""

@@ -108,7 +108,7 @@ def why_not_available(pilot: Pilot, now: float) -> str:
     if pilot.alarm:
         return pilot.alarm
     if pilot.helm.failing:
-        return f'what is tried fails again and again: mission {pilot.board.state.name}'
+        return f'what is tried fails again and again: mission {pilot.board.stored.name}'
     return ''
 
 
