@@ -11,7 +11,14 @@ from typing import Protocol
 
 from pymavlink.dialects.v20 import ardupilotmega as d
 
-from uav_task_alloc.mavlink.authority import Authority, Event, Record, State, Suspension
+from uav_task_alloc.mavlink.authority import (
+    Authority,
+    Event,
+    Hold,
+    Record,
+    State,
+    Suspension,
+)
 from uav_task_alloc.mavlink.codec import Message
 from uav_task_alloc.mavlink.modes import ModeClass, avoids_traffic, mode_class, mode_name
 from uav_task_alloc.mavlink.policy import Note, Policy
@@ -127,6 +134,7 @@ class AuthorityWatch:
         self._doubt: _Doubt | None = None
         self._rest: tuple[float, Point] | None = None  # since when, where: STICK -> HOLD
         self._to_mission = False  # set on the ground, by another
+        self._hold_due = False  # first, where it turns out to be in the air after a restart
         self._maybe_ours = False  # in MISSION when the bridge started
         self._descending = False  # by our RETURN
         self._was_airborne = False
@@ -331,6 +339,10 @@ class AuthorityWatch:
         self._record = None
         self._descending = self._profile.flight(self.mode or 0) is Flight.RETURN
         if agrees and self.mode is not None:
+            # a hold that was sent, or was to be sent, and was not seen
+            self._hold_due = self._class(self.mode) is ModeClass.STICK or (
+                self._class(self.mode) is not ModeClass.HOLD
+                and ModeClass.HOLD in map(self._class, record.commanded))
             self._sent.expects(self.mode, now)
         self._apply(Event.RESTART_AGREES if agrees else Event.RESTART_DIFFERS, now, why)
 
@@ -523,6 +535,10 @@ class AuthorityWatch:
 
     def _check_ground(self, now: float) -> None:
         """Landing, and take-off with a mission that somebody started on the ground."""
+        if self._hold_due and (self._telemetry.airborne or self._telemetry.grounded):
+            self._hold_due = False
+            if self._telemetry.airborne and self.authority.held:
+                self.authority.hold = Hold.FIRST
         if self._telemetry.airborne:
             if self._to_mission:
                 self._to_mission = False
@@ -562,13 +578,15 @@ class AuthorityWatch:
 
     def _check_takeoff(self, now: float) -> None:
         takeoff, telemetry = self._policy().takeoff, self._telemetry
-        if self._takeoff and not takeoff:
+        idle = self.mode is not None and not self.armed and self.authority.held
+        if not takeoff and (self._takeoff or idle):
             air = telemetry.airborne
             self._apply(Event.WITHDRAWN_IN_AIR if air else Event.WITHDRAWN, now,
                         'takeoff is false' + (': until the landing' if air else ''))
         elif takeoff and not self._takeoff:
             self.authority.until_landing = False
-        self._takeoff = takeoff
+        if self.authority.state is not State.SUSPENDED or takeoff:
+            self._takeoff = takeoff  # else it becomes false when that is over
         if (takeoff and self.authority.state is State.NONE and not self.authority.landed
                 and not self.authority.undecided and self.mode is not None and not self.armed
                 and telemetry.grounded and telemetry.past_boot and not telemetry.stale(now)):
