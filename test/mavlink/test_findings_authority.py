@@ -22,7 +22,7 @@ from pymavlink.dialects.v20 import ardupilotmega as d
 from uav_task_alloc.model import Shape, ThreatZone
 
 AROUND_HOME = ThreatZone('Z', Shape.CYLINDER, (0.0, 10.0, 0.0), 30.0)
-MOMENTS = ['upload', 'verified', 'readback', 'last task', 'way home']
+MOMENTS = ['start', 'upload', 'verified', 'readback', 'last task', 'way home']
 WHILE = {'ardupilot': ['RTL', 'LOITER', 'BRAKE', 'PAUSE'], 'px4': ['RTL', 'LOITER', 'PAUSE']}
 
 
@@ -54,7 +54,9 @@ def test_finding_01_who_was_landed_by_another_stays_on_the_ground(kind, moment, 
 
 def at(moment, kind):
     """A vehicle in flight at a moment at which its mode was set again."""
-    if moment == 'upload':
+    if moment == 'start':
+        bench = flying(kind)  # no heartbeat has shown the mission mode
+    elif moment == 'upload':
         bench = flying(kind, delay=(0.3, 0.3))
         bench.run(limit=1.5)  # a heartbeat has shown the mission mode
         bench.assign(task_list('DEFGHIJKLMNO', 2))
@@ -88,6 +90,25 @@ def test_finding_02_a_mode_that_another_has_set_stays(kind, moment, mode):
     take(bench, mode)
     left_alone(bench)
     assert not bench.state().available
+
+
+@BOTH
+def test_a_heartbeat_with_the_mode_before_a_change_of_ours_is_no_pilot(kind):
+    bench = FindingsBench(kind).found()
+    late = []
+
+    def tamper(way, m, now):
+        if way == 'down' and m.get_type() == 'HEARTBEAT' and (
+                bench.started() and m.custom_mode == MODES[kind]['AUTO'] and not late):
+            late.append(now)  # PX4 answers a moment before it tells its new mode
+            m.custom_mode = MODES[kind]['PAUSE']
+        return None
+    bench.line.tampers.append(tamper)
+    bench.assign(task_list('AB'))
+    assert bench.run(lambda: bench.completed() == ['A', 'B'])
+    assert late
+    assert bench.noted('authority SUSPENDED')
+    assert not bench.noted('authority LOST')
 
 
 class Rerouted:

@@ -20,6 +20,7 @@ from uav_task_alloc.mavlink.authority import (
     Suspension,
 )
 from uav_task_alloc.mavlink.codec import Message
+from uav_task_alloc.mavlink.mode_acks import ModeAcks
 from uav_task_alloc.mavlink.modes import ModeClass, avoids_traffic, mode_class, mode_name
 from uav_task_alloc.mavlink.policy import Note, Policy
 from uav_task_alloc.mavlink.profiles import Flight, Profile
@@ -28,6 +29,7 @@ from uav_task_alloc.model import Point
 
 IN_FLIGHT = 12.0  # [s] in which a command sent may still take effect, and be seen
 CLIMBED = 0.9  # of the height asked for: the take-off has ended by itself
+CONTRADICTED = 2.5  # [s] in which a heartbeat may still show a mode that was acknowledged
 DOUBT = 5.0  # [s] in which a message under way may explain a change of mode
 SAID = 6.0  # [s] around a change of mode in which a text speaks of it
 REST, REST_MOVED, REST_TIME = 1.0, 3.0, 6.0  # [m/s], [m], [s]: at rest, for a hand-over
@@ -75,6 +77,7 @@ class _Doubt:
     until: float  # [s]
     explained: Callable[[float], bool]
     why: str  # it is lost otherwise
+    ours: int | None = None  # custom_mode of ours that explains it
 
 
 @dataclass(slots=True)
@@ -128,6 +131,7 @@ class AuthorityWatch:
             [(mode, now + IN_FLIGHT) for mode in record.commanded],
             dict.fromkeys(record.commanded, now), climb=record.climb)
         self._status = 0
+        self._acks = ModeAcks()
         self._adopt = False  # the next heartbeat tells the mode, and is no change
         # modes and armed states that are no news when the link is back
         self._compare: tuple[frozenset[int | None], frozenset[bool]] = frozenset(), frozenset()
@@ -157,12 +161,42 @@ class AuthorityWatch:
         elif self._adopt:
             self._confirm(now)
         else:
+            before = self._entered(before, now)
             if self.mode != before and self._class(before) is not None:
                 self._mode_changed(before, self.mode, now)
             if self.armed != was_armed:
                 self._armed_changed(descends, now)
         self._check_status(now)
         self._keep()
+
+    def answered(self, message: Message, frame: int) -> None:
+        """Take a COMMAND_ACK that is addressed to us, and the number of its frame."""
+        if message.command == d.MAV_CMD_DO_SET_MODE:
+            self._acks.answered(message.result, frame)
+
+    def _entered(self, before: int, now: float) -> int:
+        """The mode before this heartbeat, also one that no heartbeat has shown.
+
+        A mode that was acknowledged and is not there is doubted until the next heartbeat: PX4
+        may answer a moment before it tells its new mode.
+        """
+        if self._doubt is not None and self._doubt.ours is not None and (
+                self._doubt.ours == self.mode):
+            self._resolve(now)
+            return self.mode
+        mode = self._acks.known_by(self._telemetry.frame)
+        if mode is None:
+            return before
+        self._acks.clear()
+        if self.mode in (mode, *self._sent.under_way(now), before):
+            self._sent.modes = [each for each in self._sent.modes
+                                if each[0] == mode == self.mode != before][-1:]
+            if mode != self.mode and self.authority.held and self._doubt is None:
+                why = f'{self._name(mode)} -> {self._name(self.mode)}'
+                self._doubt = _Doubt(now + CONTRADICTED, lambda t: self.mode == mode, why, mode)
+                self._apply(Event.UNEXPLAINED, now, why)
+                before = self.mode if self.mode is not None else before
+        return before
 
     def text(self, message: Message, now: float) -> None:
         """Take a STATUSTEXT: it may say why the mode changes."""
@@ -202,6 +236,7 @@ class AuthorityWatch:
     def _lose_sight(self, now: float) -> None:
         """The next heartbeat is compared with what is known, and what we have just asked for."""
         self._adopt = True
+        self._acks.clear()
         armed = {self.armed} | ({True} if now <= self._sent.arm_until + STALE else set())
         self._compare = frozenset({self.mode, *self._sent.under_way(now - STALE)}), frozenset(
             armed)
@@ -228,6 +263,7 @@ class AuthorityWatch:
         mode = self._profile.commanded_mode(message)
         if mode is not None:
             self._sent.climb = None
+            self._acks.sent(mode, now)
             self._sent.modes.append((mode, now + IN_FLIGHT))
             self._sent.last[mode] = now
             self._descending = self._profile.flight(mode) is Flight.RETURN

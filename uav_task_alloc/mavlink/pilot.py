@@ -47,7 +47,7 @@ class Pilot:
     def __init__(self, peer: Peer, profile: Profile, origin: Origin, policy: Policy,
                  rng: random.Random, now: float, record: Record | None = None,
                  save: Callable[[Record], None] = lambda record: None) -> None:
-        self.profile, self.policy = profile, policy
+        self.profile, self.policy, self._peer = profile, policy, peer
         self.telemetry = Telemetry(profile, origin, now)
         self.board = Board(peer, profile, origin, self.telemetry, rng)
         self.helm = Helm(peer, profile, self.telemetry)
@@ -116,6 +116,8 @@ class Pilot:
                 self.board.progress.stopped()
         out = self.board.receive(message, now)
         self.helm.receive(message)
+        if message.get_type() == 'COMMAND_ACK' and self._peer.says(message):
+            self.watch.answered(message, self.telemetry.frame)
         self._progress(message, newest, now)
         return self._gate(out + self._act(now), now)
 
