@@ -183,6 +183,17 @@ def on_ground(kind, state, **kwargs):
     return bench
 
 
+def armed_by_us(bench):
+    """Waiting on the ground while its take-off command is lost."""
+    bench.line.tampers.append(lambda way, m, now: [] if way == 'up' and (
+        m.get_type() == 'COMMAND_LONG' and m.command == d.MAV_CMD_NAV_TAKEOFF) else None)
+    bench.assign(task_list('AB', 2))
+    assert bench.run(lambda: bench.vehicles[1].flight.armed, 10.0)
+    bench.run(limit=2.5)
+    assert bench.authority() is H
+    return bench
+
+
 def set_mode(number, kind, n=1):
     """DO_SET_MODE as any station sends it."""
     main, sub = (number >> 16 & 0xff, number >> 24) if kind == 'px4' else (number, 0)
@@ -228,5 +239,5 @@ def keeps_quiet(bench, seconds=60.0, names='XYZ', n=1):
 
 
 __all__ = ['ARDUPILOT', 'BOTH', 'LONG', 'MODES', 'PX4', 'AuthorityBench', 'H', 'L', 'N', 'S',
-           'Store', 'flying', 'in_flight', 'keeps_quiet', 'lost', 'on_ground', 'risen_by_pilot',
-           'set_mode', 'shows', 'suspended', 'upload_by_another']
+           'Store', 'armed_by_us', 'flying', 'in_flight', 'keeps_quiet', 'lost', 'on_ground',
+           'risen_by_pilot', 'set_mode', 'shows', 'suspended', 'upload_by_another']

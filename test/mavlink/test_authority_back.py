@@ -120,6 +120,42 @@ def test_held_by_us_the_mission_mode_set_by_a_pilot_changes_nothing_but_holds_fi
 
 
 @BOTH
+def test_the_mission_mode_soon_after_our_own_command_may_be_that_command_and_gives_nothing(kind):
+    bench = flying(kind)
+    assert bench.now - max(t for t, what, _ in bench.sent if what == 'command') < 5.0
+    bench.vehicles[1].rc_mode(MODES[kind].stick)
+    assert bench.becomes(L, 3.0)
+    bench.vehicles[1].rc_mode(MODES[kind].mission)
+    bench.run(limit=20.0)
+    assert shows(bench, L)
+    assert keeps_quiet(bench, 20.0)
+
+
+@PX4
+@pytest.mark.parametrize('names', ['AB', 'XY'])
+def test_a_take_off_in_the_mission_mode_is_a_hand_over_where_our_list_is_verified(kind, names):
+    bench = on_ground(kind, N)
+    bench.assign(task_list('AB'))
+    assert bench.run(lambda: bench.board().state is MissionState.VERIFIED, 20.0)
+    bench.tells(set_mode(MODES[kind].mission, kind))
+    bench.run(limit=2.0)
+    assert bench.authority() is N
+    bench.vehicles[1].rc_arm(True)
+    if names == 'XY':
+        bench.line.tampers.append(lambda way, m, now: [] if way == 'up' and (
+            m.get_type() == 'MISSION_COUNT') else None)
+        bench.assign(task_list('XY', 2))
+    assert bench.run(lambda: bench.pilot().telemetry.airborne, 10.0)
+    bench.run(limit=1.0)
+    if names == 'XY':
+        assert keeps_quiet(bench, 12.0)
+        assert shows(bench, N)
+    else:
+        assert shows(bench, H, 'took off with our mission')
+        assert bench.run(lambda: bench.completed() == ['A', 'B'], 60.0)
+
+
+@BOTH
 def test_beside_a_foreign_mission_the_mission_mode_changes_nothing(kind):
     bench = suspended(kind, Suspension.FOREIGN)
     bench.vehicles[1].rc_mode(MODES[kind].mission)
