@@ -33,10 +33,10 @@ _ASKS = {d.MAV_CMD_SET_MESSAGE_INTERVAL, d.MAV_CMD_REQUEST_MESSAGE}
 class AuthorityBench(FlightBench):
     """Fails when a message leaves the bridge that the state of the moment forbids."""
 
-    def __init__(self, *args, **kwargs):
+    def __init__(self, *args, tick=0.2, **kwargs):
         self.sent = []  # (now, what it does, message)
         self.moved = {}  # new address -> vehicle
-        super().__init__(*args, **kwargs)
+        super().__init__(*args, tick=tick, **kwargs)
 
     def _up(self, outgoing):
         for address, m in outgoing:

@@ -26,7 +26,7 @@ MOMENTS = pytest.mark.parametrize('moment', ['holding', 'counting', 'sending', '
 
 def swapping(kind, moment, **kwargs):
     """In flight, a new list on its way, at some moment of that."""
-    bench = flying(kind, delay=(0.1, 0.1), **kwargs)
+    bench = flying(kind, delay=(0.1, 0.1), tick=0.1, **kwargs)
     start = len(bench.sent)
     bench.assign(task_list(NEW, 2))
 
