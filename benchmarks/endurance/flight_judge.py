@@ -45,6 +45,7 @@ class Judge:
         self.completed: set[str] = set()
         self._mode = world.vehicle.flight.custom_mode
         self._asked: dict[int, float] = {}  # modes that the bridge asked for, when [s]
+        self._asked_arm, self._taken_by_arm = -math.inf, False
         self._events = 0
         self._stuck_since = self._moved_at = 0.0
 
@@ -68,7 +69,7 @@ class Judge:
         for event in self.world.truth:
             self._truth(event)
         for sent in self.world.arrivals:
-            if self.told_at is None and self.taken_at is not None and sent >= self.taken_at:
+            if self.told_at is None and self.taken_at is not None and sent > self.taken_at + 1e-6:
                 self.told_at = self.world.now
         for now, message in self.world.sent:
             self._sent(now, message)
@@ -93,7 +94,9 @@ class Judge:
                 self.taken_at = None  # what was sent before the news has come after it
         elif event.name == 'kill_switch' or (
                 event.name in ('armed', 'disarmed') and event.cause not in (OURS, 'self')):
-            self._take(event.t)
+            if event.name != 'armed' or event.t - self._asked_arm > SAME:
+                self._take(event.t)
+                self._taken_by_arm = event.name == 'armed'
         elif event.name == 'failsafe':
             self.failing = True
         elif event.name == 'failsafe_over':
@@ -115,6 +118,8 @@ class Judge:
             self._take(event.t)
 
     def _take(self, when: float) -> None:
+        if self.world.vehicle.flight.system_status < d.MAV_STATE_STANDBY:
+            return  # it starts: a mode is not news, nobody has it yet
         if self.taken_at is None:
             self.taken_at, self.told_at = when, None
 
@@ -123,6 +128,11 @@ class Judge:
             return
         if self.told_at is not None and now > self.told_at:
             self._fault('overridden', f'{message} sent {now - self.told_at:.1f} s after the news')
+        if message.get_type() == 'COMMAND_LONG' and (
+                message.command == d.MAV_CMD_COMPONENT_ARM_DISARM):
+            self._asked_arm = now
+            if self._taken_by_arm and self.told_at is None:
+                self.taken_at = None  # both have armed it: who was first cannot be seen
         if message.get_type() == 'COMMAND_LONG' and message.command == d.MAV_CMD_DO_SET_MODE:
             main, sub = int(message.param2), int(message.param3)
             self._asked[main << 16 | sub << 24 if self.family == 'px4' else main] = now

@@ -156,7 +156,9 @@ class Flight:
 
     def reboot(self) -> None:
         """Of the vehicle; in the air only now and then."""
-        if self.airborne and self.world.now < QUIET and self.rng.random() < 0.9:
+        cut = self.world.link.cut_until > self.world.now - 8.0
+        if cut or (self.airborne and self.world.now < QUIET and self.rng.random() < 0.9):
+            # never right after a cut: nobody can know what it flew then
             self._at(self.world.now + 5.0, self.reboot)
             return
         self.counts['reboots'] += 1
@@ -167,7 +169,8 @@ class Flight:
     def restart(self) -> None:
         """Of the bridge, most often with its state_dir."""
         self.counts['restarts'] += 1
-        keep = self.rng.random() < 0.8
+        # without a file nobody can know what another station has passed over
+        keep = self.rng.random() < 0.8 or self.counts['skips'] > 0
         self.world.start(keep)
         if not keep:
             self.judge.forgotten()
@@ -209,7 +212,8 @@ class Flight:
     def operate(self) -> None:
         """Give the aircraft back where the bridge says that it has not got it."""
         world, state = self.world, self.world.state
-        if not self.gives_back or state is None or world.now < min(self.back_at, QUIET + 20.0):
+        if not self.gives_back or state is None or world.now < max(
+                min(self.back_at, QUIET + 20.0), world.link.cut_until + 4.0):
             return
         self.back_at = world.now + 3.0
         if state.authority is State.HELD or state.authority is State.UNKNOWN or state.available:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import Enum
+from typing import NamedTuple
 
 
 class State(Enum):
@@ -162,6 +163,17 @@ class Hold(Enum):
     FIRST = 'first'
 
 
+class TaskMark(NamedTuple):
+    """What a restarted bridge cannot see of a task: that it was flown, or passed over."""
+
+    task: str
+    x: float  # [m] ENU of the task
+    y: float
+    z: float
+    at: float  # steady time [s]
+    flown: bool  # False: somebody has set the current item beyond it
+
+
 @dataclass(frozen=True, slots=True)
 class Record:
     """What a restarted bridge has to know; times are steady [s]."""
@@ -179,6 +191,7 @@ class Record:
     arming: bool = False
     swap_at: float | None = None  # since when it is held for an upload
     climb: float | None = None  # [m] above home, of a take-off under way
+    marks: tuple[TaskMark, ...] = ()  # of the last tasks
 
 
 class Authority:

@@ -13,7 +13,7 @@ from typing import Any, get_type_hints
 from urllib.parse import quote
 
 from uav_task_alloc.errors import InvalidValue
-from uav_task_alloc.mavlink.authority import Record, State
+from uav_task_alloc.mavlink.authority import Record, State, TaskMark
 
 FORMAT = 1  # of the file; one of a newer format is refused
 LONGEST_NAME = 150  # characters; file systems take 255 bytes
@@ -88,7 +88,7 @@ class FileStore:
                          f'{uav_id} is left to its pilot, unless it flies our mission')
             return None
         if body['boot'] != self._boot:
-            record = replace(record, since=0.0,
+            record = replace(record, since=0.0, marks=(),
                              swap_at=None if record.swap_at is None else LONG_AGO)
         return record
 
@@ -206,6 +206,12 @@ def _same(value: Any) -> Any:
     return value
 
 
+def _are_marks(value: Any) -> bool:
+    return isinstance(value, list) and all(
+        isinstance(mark, list) and len(mark) == 6 and _is_text(mark[0])
+        and all(map(_is_time, mark[1:5])) and isinstance(mark[5], bool) for mark in value)
+
+
 # whether a JSON value is of that type, and the value
 _TYPES: dict[Any, tuple[Callable[[Any], bool], Callable[[Any], Any]]] = {
     State: (_is_state, State.__getitem__),
@@ -216,5 +222,6 @@ _TYPES: dict[Any, tuple[Callable[[Any], bool], Callable[[Any], Any]]] = {
     int | None: (_or_none(_is_whole), _same),
     tuple[int, ...]: (lambda value: isinstance(value, list) and all(map(_is_whole, value)),
                       tuple),
+    tuple[TaskMark, ...]: (_are_marks, lambda value: tuple(TaskMark(*mark) for mark in value)),
 }
 _CHECKS = {name: _TYPES[hint] for name, hint in get_type_hints(Record).items()}

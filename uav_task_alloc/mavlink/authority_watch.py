@@ -18,6 +18,7 @@ from uav_task_alloc.mavlink.authority import (
     Record,
     State,
     Suspension,
+    TaskMark,
 )
 from uav_task_alloc.mavlink.codec import Message
 from uav_task_alloc.mavlink.mode_acks import ModeAcks
@@ -34,6 +35,7 @@ DOUBT = 5.0  # [s] in which a message under way may explain a change of mode
 SAID = 6.0  # [s] around a change of mode in which a text speaks of it
 REST, REST_MOVED, REST_TIME = 1.0, 3.0, 6.0  # [m/s], [m], [s]: at rest, for a hand-over
 SWAP_KEPT = 60.0  # [s] that a swap may be under way when the bridge is restarted
+MARKS, REMEMBERED = 50, 600.0  # tasks, [s]
 LOW_BATTERY = 0.2  # [0..1] below which nothing is handed over
 _FAILSAFE = re.compile(r'failsafe|fence breach|breached|battery \d+ is (low|critical)|'
                        r'(low|critical|dangerous).{0,12}battery|data link lost|'
@@ -122,6 +124,7 @@ class AuthorityWatch:
         self.mode: int | None = None  # custom_mode of the newest heartbeat
         self.armed = False
         self.swap_at: float | None = None  # [s] since when we hold it for an upload
+        self.marks: dict[str, TaskMark] = {m.task: m for m in record.marks} if record else {}
         self.was_lost = False  # the link, and the mode is not confirmed yet
         self._profile, self._telemetry, self._evidence = profile, telemetry, evidence
         self._policy, self._save, self._saved = policy, save, record
@@ -142,6 +145,7 @@ class AuthorityWatch:
         self._maybe_ours = False  # in MISSION when the bridge started
         self._descending = False  # by our RETURN
         self._was_airborne = False
+        self._landed_at = -math.inf  # [s] by our descent
         self._takeoff = policy().takeoff
         # [s] when a text said so
         self._failsafe_at = self._infeasible_at = self._finished_at = -math.inf
@@ -253,6 +257,15 @@ class AuthorityWatch:
         self._sent.drop()
         self._descending = self._was_airborne = self._to_mission = False
         self._keep()
+
+    def mark(self, task: str, place: Point | None, flown: bool, now: float) -> None:
+        """A task was flown, or passed over: a restarted bridge could not see which."""
+        if place is None:
+            return
+        self.marks.pop(task, None)
+        self.marks = {old: mark for old, mark in list(self.marks.items())[-MARKS:]
+                      if now - mark.at < REMEMBERED}
+        self.marks[task] = TaskMark(task, *place, round(now, 3), flown)
 
     # what we do
 
@@ -544,8 +557,8 @@ class AuthorityWatch:
                 self._apply(Event.ARMED_BY_OTHER, now, 'armed, not by the bridge')
         elif descends:
             self._landed(now, 'landed')
-        elif now <= self._sent.disarm_until:
-            self._apply(Event.OWN, now, 'disarmed by the bridge')
+        elif now <= max(self._sent.disarm_until, self._landed_at + IN_FLIGHT):
+            self._apply(Event.OWN, now, 'disarmed by the bridge, or after its landing')
         elif self._was_airborne and self._falls():
             self._apply(Event.KILLED, now, 'disarmed in the air')
         else:
@@ -567,6 +580,7 @@ class AuthorityWatch:
         again = (policy.relaunch == 'automatic' and policy.takeoff
                  and not self.authority.until_landing)
         self._sent.drop()
+        self._landed_at = now
         self._apply(Event.OWN if again else Event.OWN_LANDING, now, why)
 
     def _check_ground(self, now: float) -> None:
@@ -646,7 +660,7 @@ class AuthorityWatch:
             authority.until_landing, self._flown, self.mode, self.armed,
             tuple(dict.fromkeys(mode for mode, _ in self._sent.modes)),
             self._sent.arm_until > -math.inf and not self.armed and authority.held,
-            self.swap_at, self._sent.climb)
+            self.swap_at, self._sent.climb, tuple(self.marks.values()))
         if record != self._saved:
             self._saved = record
             self._save(record)

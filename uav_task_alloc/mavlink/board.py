@@ -360,7 +360,8 @@ class Board:
         for seq, when in self._ambiguous:
             before = old[seq] if 0 <= seq < len(old) else None
             after = found.items[seq] if 0 <= seq < len(found.items) else None
-            at_new = after is not None and self.progress.was_at(after)
+            at_new = not self._profile.atomic and after is not None and (
+                self.progress.was_at(after))  # PX4 will repeat it
             if before is not None and (self.progress.was_at(before) or (
                     after is not None and alike(before, after))):
                 self.progress.reached(seq, when)

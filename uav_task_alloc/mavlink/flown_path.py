@@ -64,19 +64,20 @@ class FlownPath:
         """Its clock has begun anew."""
         self._samples.clear()
 
-    def judge(self, place: Point, radius: float, hold: float, since: float) -> Verdict:
+    def judge(self, place: Point, radius: float, hold: float, since: float,
+              until: float = math.inf) -> Verdict:
         """Whether it was at a place.
 
         Args:
             place: [m] ENU.
             radius: [m] at which it counts as reached; 0: the autopilot's own.
             hold: [s] it has to stay there.
-            since: [s] of the vehicle's clock.
+            since, until: [s] of the vehicle's clock.
         """
-        first, last = self._stay(place, radius, since, hold > 0.0)
+        first, last = self._stay(place, radius, since, hold > 0.0, until)
         if last - first >= max(0.0, hold - HOLD_SLACK):
             return Verdict.YES
-        samples = self._since(since)
+        samples = self._since(since, until)
         blind = len(samples) < 2 or any(b.t - a.t > GAP for a, b in pairwise(samples))
         return Verdict.BLIND if blind else Verdict.NO
 
@@ -105,19 +106,20 @@ class FlownPath:
             return False
         return _to_segment(b.position, chain[-1], then or chain[-1]) <= ASIDE
 
-    def _since(self, since: float) -> list[Sample]:
+    def _since(self, since: float, until: float = math.inf) -> list[Sample]:
         at = bisect_left(self._samples, since, key=lambda one: one.t)
-        return self._samples[max(0, at - 1):]
+        end = bisect_left(self._samples, until, key=lambda one: one.t)
+        return self._samples[max(0, at - 1):end + 1]
 
     def _stay(self, place: Point, radius: float, since: float,
-              slow: bool = False) -> tuple[float, float]:
+              slow: bool = False, until: float = math.inf) -> tuple[float, float]:
         """When it came and when it was there last (`slow`: and did not leave yet).
 
         (inf, -inf) where it never was.
         """
         near = (radius or ACCEPTED) + (0.0 if slow else CLOSE)
         first, last = math.inf, -math.inf
-        samples = self._since(since)
+        samples = self._since(since, until)
         if len(samples) == 1 and math.dist(samples[0].position, place) <= near:
             return samples[0].t, samples[0].t
         for a, b in pairwise(samples):
@@ -129,7 +131,7 @@ class FlownPath:
             reach = near + CURVE * gap * gap
             for k in range(PIECES + 1):
                 t, share = a.t + gap * k / PIECES, k / PIECES
-                if t >= since and math.dist(_between(a, b, share), place) <= reach:
+                if since <= t <= until and math.dist(_between(a, b, share), place) <= reach:
                     first = min(first, t)
                     if not slow or math.dist(a.velocity, (0, 0, 0)) * (1 - share) + share * (
                             math.dist(b.velocity, (0, 0, 0))) < SLOW:

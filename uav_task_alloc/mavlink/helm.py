@@ -210,6 +210,8 @@ class Helm:
                 self._arming_since, self.refusal = now, ''
             return self.do(Command(ARM, arm, lambda: telemetry.armed, tries=ARM_TRIES,
                                    patient=True, wanted=wanted), now, self._armed)
+        if not self.armed_here:
+            return self.wait_for('it to disarm: it was armed by another, or has just landed')
         ground = telemetry.altitude - (
             0.0 if math.isnan(telemetry.height) else telemetry.height)
         up = self._profile.takeoff_command(self._peer, height, ground)

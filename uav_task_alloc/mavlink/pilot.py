@@ -27,6 +27,7 @@ from uav_task_alloc.mavlink.peer import Peer
 from uav_task_alloc.mavlink.policy import Note, Policy, TaskProgress
 from uav_task_alloc.mavlink.profiles import Flight, Profile
 from uav_task_alloc.mavlink.rates import Rates
+from uav_task_alloc.mavlink.recall import MEMORY
 from uav_task_alloc.mavlink.reminder import Reminder
 from uav_task_alloc.mavlink.send_gate import allowed
 from uav_task_alloc.mavlink.service import Service
@@ -65,6 +66,11 @@ class Pilot:
         self._restarts = 0
         self._texts: dict[str, float] = {}  # of the vehicle, when told [s]
         self._said = ''  # by the vehicle, last
+        for mark in self.watch.marks.values():
+            if mark.flown and now - mark.at < MEMORY:
+                self.board.progress.completed[mark.task] = mark[1:4]
+            elif not mark.flown:
+                self.board.recall.unflown[mark.task] = mark[1:4]
         self._rules = (self._linked, self._authority, self.helm.finish, self._lift, self._upload,
                        self._read, self._has_list, self._place, self._may_act, self._hold_first,
                        self._held_too_long, self._empty, self._bring, self._rise, self._fly)
@@ -91,7 +97,7 @@ class Pilot:
         refusal = self.watch.hand_over(operator, now)
         if not refusal:
             self.helm.encourage(now)
-        self._report()
+        self._report(now)
         return refusal
 
     def moved_address(self, now: float) -> None:
@@ -141,20 +147,26 @@ class Pilot:
             if step is not None:
                 out = step
                 break
-        self._report()
+        self._report(now)
         return out
 
-    def _report(self) -> None:
+    def _report(self, now: float) -> None:
         board, revision = self.board, self.board.revision
         while board.progress.events:
             made = board.progress.events.popleft()
             event = 'COMPLETED' if made.completed else 'STARTED'
             latest = board.tasks.revision if made.unheard and board.tasks else revision
+            if made.completed:
+                self.watch.mark(made.task, board.progress.completed.get(made.task), True, now)
             self.events.append(TaskProgress(made.task, event, latest))
         while board.failed:
             failed = board.failed.popleft()
             self.events.append(TaskProgress(failed.task, 'FAILED', failed.revision,
                                             failed.reason))
+        while board.progress.claimed:
+            item = board.progress.claimed.popleft()
+            if item.task not in board.progress.completed:
+                self.watch.mark(item.task, item.position, False, now)
         while board.progress.skipped:
             task = board.progress.skipped.popleft()
             self.notes.append(Note('warning', f'{task} was passed over, not by the bridge: '
@@ -176,7 +188,8 @@ class Pilot:
             seq = max(0, message.seq - own)
             if self.board.must_jump is None:  # else it is left from the mission before
                 progress.moved(seq, now, flying, self.telemetry.frame)
-            if message.mission_state == d.MISSION_STATE_COMPLETE and flying:
+            if (message.mission_state == d.MISSION_STATE_COMPLETE and flying
+                    and not self.profile.atomic):  # PX4 says so after a take-off too
                 progress.ended(seq, now, self.telemetry.frame)
             if not self.helm.busy:
                 self.board.watch(message, now)
@@ -384,6 +397,7 @@ class Pilot:
         """Somebody has set the current item: it is flown, and what was left out later."""
         progress, item = self.board.progress, self.board.progress.active
         return (progress.chosen is not None and progress.chosen == progress.current
+                and self.telemetry.airborne
                 and self.telemetry.flight is Flight.MISSION and item is not None
                 and any(item.task == stop.task.id for stop in self.board.remaining().stops))
 

@@ -42,6 +42,7 @@ class _Claim:
     items: tuple[Item, ...]
     then: Point | None  # [m] ENU where it flies next
     since: float  # [s] of the vehicle's clock
+    until: float  # the same: then it was past them
     deadline: float  # [s] after which nothing more is expected
     epoch: int
     frames: tuple[int, int] | None  # in which a REACHED would have come; None: not known
@@ -65,12 +66,15 @@ class ProgressTable:
         self._frames, self._repeats = frames or FrameLog(), repeats  # REACHED, many times (PX4)
         self._told: int | None = None  # the current item, as the vehicle said last
         self._last_frame: int | None = None  # that told the current item
+        self._prior_frame: int | None = None  # the one before that
+        self._back: tuple[int, float] | None = None  # it flies an item before ours since [s]
         self.epoch = 0
         self.items: tuple[Item, ...] = ()
         self.current: int | None = None  # len(items): flown to the end
         self.completed: dict[str, Point | None] = {}  # in order, of all epochs; where
         self.events: deque[Progress] = deque()
         self.skipped: deque[str] = deque()  # tasks that somebody else has left out
+        self.claimed: deque[Item] = deque()  # passed without a REACHED
         self.chosen: int | None = None  # the current item, where somebody else has set it
         self.path = FlownPath()
         self._started: str | None = None
@@ -82,6 +86,8 @@ class ProgressTable:
         self._place: tuple[Point, float] | None = None
         self._claims: list[_Claim] = []
         self._since = -math.inf  # [s] of the vehicle's clock: the current item is flown
+        self._clock = -math.inf  # [s] of the vehicle less ours, by the fastest message
+        self._since_begin = -math.inf  # [s] of the vehicle's clock: this epoch
         self._end_at = -math.inf  # [s] REACHED of the last item came
 
     @property
@@ -128,8 +134,8 @@ class ProgressTable:
                 self._unproven.clear()
         self.items, self.current, self._reached = items, start, None
         self._jump = None if start is None else (start, now)
-        self._asked = self.chosen = None
-        self._since = self.path.newest
+        self._asked = self.chosen = self._told = None
+        self._since = self._since_begin = self.path.newest
 
     def extend(self, items: tuple[Item, ...]) -> None:
         """A new epoch whose first items are those of the last: the vehicle goes on."""
@@ -144,6 +150,7 @@ class ProgressTable:
         self._started = self._jump = self.chosen = self._last_frame = self._told = None
         self._claims.clear()
         self.path.clear()
+        self._clock = -math.inf
         self._since = -math.inf
 
     def retag(self, items: tuple[Item, ...]) -> None:
@@ -153,6 +160,7 @@ class ProgressTable:
     def at(self, sample: Sample, newest: bool, now: float) -> None:
         """A position of the vehicle, the newest or one that comes late."""
         self.path.add(sample)
+        self._clock = max(self._clock, sample.t - now)
         if newest:
             self._place = sample.position, now
 
@@ -174,7 +182,7 @@ class ProgressTable:
 
     def stopped(self) -> None:
         """The vehicle does not fly this list any more: what goes on later starts anew."""
-        self._started = None
+        self._started = self.chosen = None
 
     def reached(self, seq: int, now: float, proven: bool = False) -> None:
         """MISSION_ITEM_REACHED, once or many times; `proven`: it is of this epoch."""
@@ -186,20 +194,13 @@ class ProgressTable:
 
     def _prove(self, seq: int, now: float) -> bool:
         """Credit REACHED to the epoch at whose item the vehicle was; False: not known yet."""
+        if 0 <= seq < len(self.items):
+            if self._is_of_now(seq, now):
+                self._accept(seq, now)
+                return True
+            if self._distance(seq) <= ROUGH + self.items[seq].radius:
+                return False  # of this epoch, if what comes shows it
         before = self._before
-        if not before.items and 0 <= seq < len(self.items) and self._near(seq, now) and (
-                not self._repeats or (self._told is not None and self._told > seq)):
-            self._accept(seq, now)  # the first mission that this bridge knows of
-            return True
-        passed = self.current is not None and seq < self.current
-        if 0 <= seq < len(self.items) and self.was_at(
-                self.items[seq], radius=ROUGH if passed else 0.0):
-            self._accept(seq, now)
-            return True
-        if 0 <= seq < len(self.items) and self._distance(seq) <= ROUGH + self.items[seq].radius:
-            if not self._repeats:
-                self._accept(seq, now)  # it is told once, where the vehicle is
-            return not self._repeats  # of this epoch, if its hold is seen to end
         if not 0 <= seq < len(before.items) or not self.was_at(
                 before.items[seq], max(before.since, self.path.newest - ECHO)):
             return False
@@ -208,6 +209,20 @@ class ProgressTable:
             self._end_at = now
         self.credit(item)
         return True
+
+    def _is_of_now(self, seq: int, now: float) -> bool:
+        """Whether a REACHED that may be of the epoch before is of this one."""
+        item, before = self.items[seq], self._before
+        if not self._repeats:  # told once, where the vehicle is
+            near = self._near(seq, now) if not before.items else (
+                self._distance(seq) <= ROUGH + item.radius)
+            return near or self.was_at(item)
+        # a repetition goes on while the current item stays what it was
+        if self._told is not None and self._told > seq:
+            return self._near(seq, now) if not before.items else (
+                item.position is not None and self.path.visited_at(
+                    item.position, item.radius + ROUGH, self._since_begin) is not None)
+        return seq == len(self.items) - 1 and self._told == seq and self.was_at(item)
 
     def _passed_unseen(self, seq: int) -> bool:
         """It flies beyond the item, and was not seen for a while."""
@@ -236,8 +251,21 @@ class ProgressTable:
 
     def moved(self, seq: int, now: float, flying: bool, frame: int | None = None) -> None:
         """MISSION_CURRENT in a frame: where it is flying, items before it were passed."""
+        self._prior_frame = self._last_frame
         self._move(seq, now, flying, frame)
         self._last_frame, self._told = frame, seq
+        self._go_back(seq, now, flying)
+
+    def _go_back(self, seq: int, now: float, flying: bool) -> None:
+        """Somebody has set the current item back: that is what it flies."""
+        last = len(self.items) - 1
+        if not flying or self.current is None or seq >= min(self.current, last) or (
+                self._jump is not None or seq == self._asked):
+            self._back = None
+        elif self._back is None or self._back[0] != seq:
+            self._back = seq, now
+        elif now - self._back[1] >= LATE:
+            self.current, self._since, self._back = seq, self._recent(), None
 
     def _move(self, seq: int, now: float, flying: bool, frame: int | None) -> None:
         if seq == self._asked:
@@ -279,6 +307,8 @@ class ProgressTable:
                 self._claims.remove(claim)
                 self._leave(left, claim)
                 continue
+            if left and claim.frames is not None and now < claim.deadline:
+                continue  # REACHED may still come, or all that came without it
             verdicts = {item.task: self._verdict(item, claim) for item in left}
             for item in left:
                 if verdicts[item.task] is Verdict.YES:
@@ -344,7 +374,8 @@ class ProgressTable:
     def _verdict(self, item: Item, claim: _Claim) -> Verdict:
         if item.position is None:
             return Verdict.NO
-        return self.path.judge(item.position, item.radius, item.params[0], claim.since)
+        return self.path.judge(item.position, item.radius, item.params[0], claim.since,
+                               claim.until)
 
     def _claim(self, begin: int, end: int, now: float, frame: int | None = None,
                sure: bool = True) -> None:
@@ -355,10 +386,11 @@ class ProgressTable:
                              None)
             # PX4 tells no REACHED of the item before RETURN
             told = not (self.items[end:] and self.items[end].command == RETURN)
-            frames = (self._last_frame, frame) if told and frame is not None and (
-                self._last_frame is not None) else None
+            frames = (self._prior_frame, frame) if told and frame is not None and (
+                self._prior_frame is not None) else None
+            self.claimed.extend(items)
             self._claims.append(_Claim(
-                items, following, self._since, now + LATE, self.epoch,
+                items, following, self._since, now + self._clock, now + LATE, self.epoch,
                 frames, sure))
 
     def _turn(self, seq: int) -> None:

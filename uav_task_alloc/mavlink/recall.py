@@ -16,7 +16,7 @@ from uav_task_alloc.mavlink.profiles import Flight, Profile
 from uav_task_alloc.mavlink.progress import ProgressTable
 from uav_task_alloc.mavlink.telemetry import Telemetry
 from uav_task_alloc.mission import Item, Stop, TaskList, alike, mission_items
-from uav_task_alloc.model import Task
+from uav_task_alloc.model import Point, Task
 
 NEAR = 15.0  # [m] from the last item: there
 MEMORY = 60.0  # [s] after the restart; a task at the same place later on is another one
@@ -29,6 +29,7 @@ class Recall:
                  progress: ProgressTable) -> None:
         self._profile, self._origin = profile, origin
         self._telemetry, self._progress = telemetry, progress
+        self.unflown: dict[str, Point] = {}  # passed over, not by a bridge
         self.reset()
 
     def reset(self) -> None:
@@ -49,6 +50,8 @@ class Recall:
             return
         # not by REACHED: PX4 repeats that of the mission before for some seconds
         current = min(max(0, telemetry.current - self._profile.rules.home_first), len(held))
+        if not self._profile.atomic and self._progress.items:  # REACHED came before CURRENT
+            current = max(current, self._progress.current or 0)
         flown = len(held) if self._ended(held, current) else current
         self._progress.begin(held, flown, now)
         # on the ground, and the first list ever: what is on board is of an earlier mission
@@ -71,7 +74,8 @@ class Recall:
         stops = tuple(Stop(task) for task in tasks)
         items = mission_items(TaskList(0, stops), self._profile.rules, self._origin)
         return tuple(stop.task for stop, item in zip(stops, items, strict=True)
-                     if any(alike(item, m) for m in memory))
+                     if any(alike(item, m) for m in memory)
+                     and self.unflown.get(stop.task.id) != stop.task.position)
 
     def _behind(self) -> tuple[Item, ...]:
         progress = self._progress
@@ -80,8 +84,8 @@ class Recall:
 
     def _ended(self, held: tuple[Item, ...], current: int) -> bool:
         telemetry, last = self._telemetry, held[-1]
-        if telemetry.mission_state == d.MISSION_STATE_COMPLETE:
-            return True
+        if telemetry.mission_state == d.MISSION_STATE_COMPLETE and not self._profile.atomic:
+            return True  # PX4 says so after a take-off and a landing too
         place = to_enu(self._origin, last.x * 1e-7, last.y * 1e-7, last.z)
         return (self._profile.atomic and telemetry.airborne and telemetry.flight is Flight.HOLD
                 and current == len(held) - 1
