@@ -11,8 +11,13 @@ from uav_task_alloc.mavlink.vehicle_config import VehicleConfig
 ORIGIN = Origin(47.397742, 8.545594, 488.0)
 SYSTEMS = (1, 2, 3, 4)
 HOMES = {n: (400.0 * n, 0.0, 0.0) for n in SYSTEMS}  # [m] ENU
+SPEED = float(os.environ.get('SITL_SPEED', '2'))  # of SITL, times real time
+LIMIT = float(os.environ.get('SITL_LIMIT', '900'))  # [s] wall, for each phase of a SITL flight
+FIRST = int(os.environ.get('SITL_FIRST_INSTANCE', '0'))
 # What a bare binary lacks to arm without a radio control and a human: ArduCopter 4.5 and later.
 COPTER_DEFAULTS = """
+BATT_CAPACITY 1000000
+SIM_BATT_CAP_AH 0
 FRAME_CLASS 1
 FRAME_TYPE 0
 FS_THR_ENABLE 0
@@ -37,9 +42,10 @@ COMPASS_OFS2_Z -18
 class FleetSim:
     """The simulated vehicles of this package, on one port."""
 
-    speedup = 20.0
+    speedup, limit = 20.0, 240.0
 
     def __init__(self, kind):
+        self.kind = kind
         self.links = [open_link('udpin:127.0.0.1:0')]
         self.fleet = Fleet([(VehicleConfig(f'uav_{n}', n, ORIGIN, HOMES[n], arming_delay=0.0,
                                            floods=False), kind) for n in SYSTEMS],
@@ -51,6 +57,10 @@ class FleetSim:
         self.thread.join()
         self.fleet.close()
 
+    def second_links(self):
+        """Links of another ground station, in the order of SYSTEMS."""
+        return [open_link(f'udpout:127.0.0.1:{self.fleet.ports[f"uav_{n}"]}') for n in SYSTEMS]
+
     def reached(self, system):
         """Places [m] ENU at which it really reached an item; after `close`."""
         return [event.point for event in self.fleet.vehicles[f'uav_{system}'].take_events()
@@ -58,21 +68,29 @@ class FleetSim:
 
 
 class Sitl:
-    """Real autopilots, a process and a link each."""
+    """Real autopilots from power-on, a process and a link each."""
 
-    speedup = 10.0
+    kind: str
+    first_port: int
+    speedup, limit = SPEED, LIMIT
 
     def __init__(self, binary, folder):
         self.binary, self.folder = os.path.abspath(binary), folder
+        self.port = int(os.environ.get('SITL_PORT', self.first_port))
         self.processes = [self._start(n) for n in SYSTEMS]
-        self.links = [open_link(self.address(n)) for n in SYSTEMS]
+        self.links = [open_link(name) for name in
+                      dict.fromkeys(self.address(self.instance(n)) for n in SYSTEMS)]
+
+    @staticmethod
+    def instance(system):
+        return FIRST + system - 1
 
     def _start(self, system):
         place = self.folder / f'sitl_{system}'
         place.mkdir()
-        with open(place / 'log', 'w') as log:
+        with open(place / 'output.txt', 'w') as output:  # PX4 makes a folder of the name `log`
             return subprocess.Popen(
-                self.command(system, place), cwd=place, stdin=subprocess.DEVNULL, stdout=log,
+                self.command(system, place), cwd=place, stdin=subprocess.DEVNULL, stdout=output,
                 stderr=subprocess.STDOUT, env={**os.environ, **self.environment(system)})
 
     def close(self):
@@ -85,6 +103,10 @@ class Sitl:
                 process.kill()
                 process.wait()
 
+    def second_links(self):
+        """Links of another ground station, in the order of SYSTEMS."""
+        return [open_link(self.second_address(self.instance(n))) for n in SYSTEMS]
+
     def reached(self, system):
         """Unknown: only what it tells."""
         return None
@@ -96,33 +118,43 @@ class Sitl:
 class ArduCopter(Sitl):
     """ARDUCOPTER_SITL: build/sitl/bin/arducopter; ARDUCOPTER_DEFAULTS: a parameter file."""
 
-    def address(self, system):
-        return f'tcp:127.0.0.1:{5760 + 10 * (system - 1)}'
+    kind, first_port = 'ardupilot', 5760
+
+    def address(self, instance):
+        return f'tcp:127.0.0.1:{self.port + 10 * instance}'
+
+    def second_address(self, instance):
+        return f'tcp:127.0.0.1:{self.port + 10 * instance + 2}'
 
     def command(self, system, place):
-        defaults = os.environ.get('ARDUCOPTER_DEFAULTS', '')
-        if not defaults:
-            defaults = place / 'defaults.parm'
-            defaults.write_text(COPTER_DEFAULTS)
+        own, given = place / 'defaults.parm', os.environ.get('ARDUCOPTER_DEFAULTS', '')
+        own.write_text(COPTER_DEFAULTS)
         latitude, longitude, altitude = to_geodetic(ORIGIN, HOMES[system])
         return [self.binary, '--model', '+', '--speedup', str(self.speedup), '--wipe',
-                f'-I{system - 1}', '--sysid', str(system), '--defaults', str(defaults),
+                '--base-port', str(self.port), f'-I{self.instance(system)}',
+                '--sysid', str(system),
+                '--defaults', f'{given},{own}' if given else str(own),
                 '--home', f'{latitude:.7f},{longitude:.7f},{altitude:.2f},0']
 
 
 class Px4(Sitl):
     """PX4_SITL: build/px4_sitl_default/bin/px4, flown by its own simulation in hardware (SIH)."""
 
-    def address(self, system):
-        return f'udpin:127.0.0.1:{14540 + system - 1}'
+    kind, first_port = 'px4', 14540
+
+    def address(self, instance):
+        return f'udpin:127.0.0.1:{self.port + min(instance, 9)}'
+
+    def second_address(self, instance):
+        return f'udpout:127.0.0.1:{18570 + instance}'
 
     def command(self, system, place):
         etc = os.path.join(os.path.dirname(os.path.dirname(self.binary)), 'etc')
-        return [self.binary, '-i', str(system - 1), '-d', etc]
+        return [self.binary, '-i', str(self.instance(system)), '-d', etc]
 
     def environment(self, system):
         latitude, longitude, altitude = to_geodetic(ORIGIN, HOMES[system])
         return {'PX4_SIM_MODEL': 'sihsim_quadx', 'PX4_SIM_SPEED_FACTOR': str(self.speedup),
                 'PX4_HOME_LAT': f'{latitude:.7f}', 'PX4_HOME_LON': f'{longitude:.7f}',
-                'PX4_HOME_ALT': f'{altitude:.2f}', 'PX4_PARAM_COM_RC_IN_MODE': '4',
-                'PX4_PARAM_NAV_DLL_ACT': '0'}
+                'PX4_HOME_ALT': f'{altitude:.2f}', 'PX4_PARAM_MAV_SYS_ID': str(system),
+                'PX4_PARAM_COM_RC_IN_MODE': '4', 'PX4_PARAM_NAV_DLL_ACT': '0'}

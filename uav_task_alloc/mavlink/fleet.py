@@ -50,6 +50,12 @@ class Fleet:
         """By uav id. Touch them only while nobody spins."""
         return {name: station.vehicle for name, station in self._stations.items()}
 
+    @property
+    def ports(self) -> dict[str, int]:
+        """On which each hears any station, by uav id."""
+        return {name: int(station.socket.getsockname()[1])
+                for name, station in self._stations.items()}
+
     def now(self) -> float:
         """Vehicle time [s]."""
         return (time.monotonic() - self._began) * self.speedup

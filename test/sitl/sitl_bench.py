@@ -1,0 +1,143 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The bridge's core on the links of a world, a second ground station, and what both see."""
+import math
+import random
+import time
+
+from pymavlink.dialects.v20 import ardupilotmega as d
+from worlds import ORIGIN, SYSTEMS
+
+from uav_task_alloc.mavlink.ground import Ground, Station
+from uav_task_alloc.mavlink.policy import Policy
+from uav_task_alloc.mavlink.radio import Heartbeat, Radio
+
+READS = {d.MAV_CMD_SET_MESSAGE_INTERVAL, d.MAV_CMD_REQUEST_MESSAGE}
+COMMANDS = {'COMMAND_LONG', 'COMMAND_INT', 'SET_MODE', 'MISSION_SET_CURRENT'}
+CHANGES = {'MISSION_COUNT', 'MISSION_ITEM', 'MISSION_ITEM_INT', 'MISSION_CLEAR_ALL'}
+
+
+class Visits:
+    """Where a vehicle came to rest, by its own positions: what a service looks like from afar."""
+
+    def __init__(self, places):
+        self.places, self.made, self._at = places, [], None
+
+    def see(self, position, velocity):
+        if self._at is not None and math.dist(position, self.places[self._at]) > 10.0:
+            self._at = None
+        if math.hypot(*velocity) > 1.0:
+            return
+        for name, place in self.places.items():
+            if name != self._at and math.dist(position, place) < 5.0:
+                self.made.append(name)
+                self._at = name
+
+
+class Bridge:
+    """Serves the vehicles of a world; a course has `visits` and the tasks `done`, in order."""
+
+    def __init__(self, world, courses):
+        self.limit, self.courses = world.limit, courses
+        self.radio = Radio(world.links, 245, 190, wall=time.time)
+        self.heartbeat = Heartbeat(self.radio.send_to_all)
+        self.ground = Ground(Station(origin=ORIGIN, system_ids=SYSTEMS, policy=Policy(
+            takeoff=True, cruise_altitude=30.0)), random.Random(1))
+        self.events, self.notes = [], []
+        self.began = self.now()
+        self.heartbeat.start()
+
+    @staticmethod
+    def now():
+        return time.monotonic()
+
+    def hear(self, message, now):
+        """Before the bridge takes a message of a vehicle."""
+
+    def send(self, out):
+        self.radio.send(out)
+
+    def serve(self):
+        """Take what comes, and let time pass."""
+        now = self.now()
+        for address, message in self.radio.receive(0.01):
+            self.hear(message, now)
+            self.send(self.ground.receive(address, message, now))
+            if message.get_type() == 'GLOBAL_POSITION_INT':
+                self.see(message.get_srcSystem())
+        self.send(self.ground.step(now))
+        self.radio.step(now)
+        for system, served in self.ground.served.items():
+            self.note(system, served)
+
+    def see(self, system):
+        served = self.ground.served.get(system)
+        if served and served.pilot.telemetry.airborne:
+            telemetry = served.pilot.telemetry
+            self.courses[system].visits.see(telemetry.position, telemetry.velocity)
+
+    def note(self, system, served):
+        while served.pilot.events:
+            event = served.pilot.events.popleft()
+            self.events.append((system, event))
+            if event.event == 'COMPLETED':
+                self.courses[system].done.append(event.task)
+        while served.pilot.notes:
+            note = served.pilot.notes.popleft()
+            self.notes.append(f'{self.now() - self.began:6.1f} {served.uav_id}: '
+                              f'{note.level}: {note.text}')
+
+    def until(self, condition, what):
+        """Serve until `condition()`; fail where that takes longer than the limit."""
+        end = self.now() + self.limit
+        while not condition():
+            assert self.now() < end, '\n'.join(
+                [f'timed out: {what}', *self.notes, *(
+                    f'{system}: done {course.done}' for system, course in self.courses.items())])
+            self.serve()
+
+    def close(self):
+        self.heartbeat.close()
+        self.radio.close()
+
+
+class SecondStation:
+    """Another ground station, with links of its own to the vehicles; it sets modes."""
+
+    def __init__(self, world):
+        self.radio = Radio(world.second_links(), 255, 190, wall=time.time)
+        self.heartbeat = Heartbeat(self.radio.send_to_all)
+        self.sticks_of = set()  # systems whose sticks it holds in the middle
+        self._at = 0.0
+        self.heartbeat.start()
+
+    def serve(self):
+        """Drop what comes; a radio control that stops is a failsafe, so it goes on."""
+        now = time.monotonic()
+        self.radio.receive(0.0)
+        self.radio.step(now)
+        if now < self._at:
+            return
+        self._at = now + 0.1
+        for system in self.sticks_of:
+            self._send(system, d.MAVLink_rc_channels_override_message(
+                system, 1, 1500, 1500, 1500, 1500, *[0xffff] * 4))
+
+    def set_mode(self, system, main, sub=0):
+        self._send(system, d.MAVLink_command_long_message(
+            system, 1, d.MAV_CMD_DO_SET_MODE, 0, d.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED,
+            main, sub, 0, 0, 0, 0))
+
+    def _send(self, system, message):
+        number = SYSTEMS.index(system)
+        self.radio.send(((number, end), message) for end in self.radio.links[number].ends())
+
+    def close(self):
+        self.heartbeat.close()
+        self.radio.close()
+
+
+def interferes(message):
+    """Whether a message does more to a vehicle than read from it."""
+    kind = message.get_type()
+    return kind in CHANGES or (
+        kind in COMMANDS and getattr(message, 'command', None) not in READS)

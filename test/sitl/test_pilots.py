@@ -1,0 +1,168 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A second station commands LAND, RTL and LOITER or Hold: each stands until it is handed over."""
+import math
+from collections import Counter
+from dataclasses import replace
+
+import pytest
+from sitl_bench import Bridge, SecondStation, Visits, interferes
+from worlds import HOMES, SYSTEMS
+
+from uav_task_alloc.mavlink.authority import State
+from uav_task_alloc.mavlink.profiles import Flight
+from uav_task_alloc.mission import Stop, TaskList
+from uav_task_alloc.model import Task
+
+TASKS = 8  # of each vehicle
+STANDS = 15.0  # [s] wall in which nothing happens to a vehicle that has been taken
+# (main mode, sub mode) by kind of autopilot; in LOITER the sticks of the pilot are in the middle
+MODES = {'ardupilot': {'land': (9, 0), 'return': (6, 0), 'hold': (5, 0)},
+         'px4': {'land': (4, 6), 'return': (4, 5), 'hold': (4, 3)}}
+LANDED, RETURNED, HELD, LEFT_ALONE = SYSTEMS
+
+
+class Course:
+    """A row of tasks."""
+
+    def __init__(self, system):
+        x, y, _ = HOMES[system]
+        self.places = {f'u{system}_{k}': (x, y + 60.0 * (k + 1), 40.0) for k in range(TASKS)}
+        self.visits, self.done = Visits(self.places), []
+        self.list = TaskList(1, tuple(
+            Stop(Task(name, place, service_time=2.0)) for name, place in self.places.items()))
+
+    @property
+    def ended(self):
+        return set(self.done) == set(self.places)
+
+
+class Watched(Bridge):
+    """Keeps what was sent to a vehicle after another's change of mode had been heard."""
+
+    def __init__(self, world):
+        super().__init__(world, {n: Course(n) for n in SYSTEMS})
+        self.modes = {}  # system -> custom_mode heard last
+        self.awaited = {}  # system -> custom_mode that the other station sets
+        self.taken = {}  # system -> messages sent since that was heard
+
+    def hear(self, message, now):
+        system = message.get_srcSystem()
+        if message.get_type() != 'HEARTBEAT' or system not in SYSTEMS:
+            return
+        self.modes[system] = message.custom_mode
+        if self.awaited.get(system) == message.custom_mode:
+            del self.awaited[system]
+            self.taken[system] = []
+
+    def send(self, out):
+        super().send(out)
+        for _, message in out:
+            if interferes(message) and message.target_system in self.taken:
+                self.taken[message.target_system].append(str(message))
+
+    def note(self, system, served):
+        super().note(system, served)
+        if not self.courses[system].done and served.pilot.board.tasks is None:
+            self.send(self.ground.assign(served.uav_id, self.courses[system].list, self.now()))
+
+    def hand_over(self, system):
+        return self.ground.hand_over(self.ground.served[system].uav_id, 'pilot', self.now())
+
+    def pilot(self, system):
+        return self.ground.served[system].pilot
+
+    def telemetry(self, system):
+        return self.pilot(system).telemetry
+
+    def in_mid_mission(self, system):
+        """On its way between two tasks."""
+        course = self.courses[system]
+        if len(course.done) < 2 or self.telemetry(system).flight is not Flight.MISSION:
+            return False
+        at = self.telemetry(system).position
+        return min(math.dist(at, place) for place in course.places.values()) > 12.0
+
+
+class Pilots:
+    """The second station takes three of the vehicles."""
+
+    def __init__(self, world):
+        self.kind, self.bridge, self.station = world.kind, Watched(world), SecondStation(world)
+
+    def until(self, condition, what):
+        def both():
+            self.station.serve()
+            return condition()
+        self.bridge.until(both, what)
+
+    def take(self, system, name):
+        """Set a mode, as a pilot would, until the vehicle says that it is in it."""
+        bridge, (main, sub) = self.bridge, MODES[self.kind][name]
+        self.until(lambda: bridge.in_mid_mission(system), f'{system} in mid-mission')
+        if name == 'hold' and self.kind == 'ardupilot':
+            self.station.sticks_of.add(system)
+        bridge.awaited[system] = main if self.kind == 'ardupilot' else main << 16 | sub << 24
+        due = 0.0
+
+        def taken():
+            nonlocal due
+            if bridge.now() >= due:
+                due = bridge.now() + 1.0
+                self.station.set_mode(system, main, sub)
+            return system in bridge.taken
+        self.until(taken, f'{system} in {name}')
+
+    def wait(self, seconds):
+        end = self.bridge.now() + seconds
+        self.until(lambda: self.bridge.now() >= end, f'{seconds} s')
+
+    def close(self):
+        self.station.close()
+        self.bridge.close()
+
+
+@pytest.fixture
+def pilots(world):
+    made = Pilots(world)
+    yield made
+    made.close()
+
+
+def test_what_a_second_station_commands_stands_until_it_is_handed_over(pilots):
+    bridge = pilots.bridge
+    pilots.until(lambda: len(bridge.ground.served) == len(SYSTEMS), 'all vehicles heard')
+    for system, name in ((LANDED, 'land'), (RETURNED, 'return'), (HELD, 'hold')):
+        pilots.take(system, name)
+    held = bridge.telemetry(HELD)
+    pilots.wait(3.0)
+    at = held.position
+
+    pilots.until(lambda: not bridge.telemetry(LANDED).armed, 'landed')
+    pilots.until(lambda: not bridge.telemetry(RETURNED).armed, 'at home')
+    assert math.dist(bridge.telemetry(RETURNED).position, HOMES[RETURNED]) < 5.0
+    assert math.dist(bridge.telemetry(LANDED).position, HOMES[LANDED]) > 60.0
+    pilots.wait(STANDS)
+    for system in (LANDED, RETURNED):
+        assert not bridge.telemetry(system).armed
+        assert bridge.telemetry(system).height < 2.0
+    assert held.airborne
+    assert math.dist(held.position, at) < 10.0
+    assert bridge.taken == {LANDED: [], RETURNED: [], HELD: []}, '\n'.join(bridge.notes)
+    assert {n: bridge.pilot(n).authority.state for n in SYSTEMS} == {
+        LANDED: State.LOST, RETURNED: State.LOST, HELD: State.LOST, LEFT_ALONE: State.HELD}
+    pilots.until(lambda: bridge.courses[LEFT_ALONE].ended, 'the fourth has flown its list')
+
+    for system in (LANDED, RETURNED):  # on the ground it takes the operator's leave to start
+        pilot = bridge.pilot(system)
+        pilot.policy = replace(pilot.policy, takeoff=False)
+        assert 'takeoff is false' in bridge.hand_over(system)
+        pilot.policy = replace(pilot.policy, takeoff=True)
+    pilots.wait(3.0)
+    assert bridge.taken == {LANDED: [], RETURNED: [], HELD: []}, '\n'.join(bridge.notes)
+    pilots.station.sticks_of.clear()
+    for system in (LANDED, RETURNED, HELD):
+        assert bridge.hand_over(system) == ''
+    pilots.until(lambda: all(course.ended for course in bridge.courses.values()), 'all flown')
+    for system, course in bridge.courses.items():
+        assert Counter(course.done) == Counter(list(course.places)), f'{system}: told twice'
+        assert course.visits.made == course.done, f'{system}: told is not flown'
