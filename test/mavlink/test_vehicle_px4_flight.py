@@ -119,12 +119,29 @@ def test_reached_is_not_told_for_a_return_item(bench):
     assert set(reached(bench.heard)) == {0}
 
 
-def test_at_the_end_it_goes_to_hold_and_mission_state_is_always_0(bench):
+def test_at_the_end_it_goes_to_hold_with_mission_state_5(bench):
     bench.fly(waypoint(A))
-    assert current(bench).mission_state == 0
+    assert current(bench).mission_state == d.MISSION_STATE_ACTIVE
     bench.reach(0)
     assert bench.flight.mode is Mode.HOLD
-    assert current(bench).mission_state == 0
+    assert current(bench).mission_state == d.MISSION_STATE_COMPLETE
+
+
+def test_after_a_take_off_it_says_that_its_mission_is_complete(bench):
+    bench.load(waypoint(A), waypoint(B))
+    assert current(bench).mission_state == d.MISSION_STATE_NOT_STARTED
+    bench.rise()
+    bench.until(lambda: bench.flight.mode is Mode.HOLD)
+    assert current(bench).mission_state == d.MISSION_STATE_COMPLETE
+    bench.set_mode(Mode.MISSION)
+    assert current(bench).mission_state == d.MISSION_STATE_ACTIVE
+
+
+def test_without_param2_a_waypoint_is_reached_10_m_before_it():
+    bench = Bench('px4', acceptance_radius=None)
+    bench.fly(waypoint(A), waypoint(FAR))
+    bench.reach(0)
+    assert 5.0 < distance(bench.flight.body.position, A) < 10.0
 
 
 def test_param2_is_the_acceptance_radius(bench):

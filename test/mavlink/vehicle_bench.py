@@ -18,7 +18,8 @@ class Bench:
     """Sends and hears for as many stations as speak; `heard` keeps all since `clear`."""
 
     def __init__(self, autopilot, ready=READY, **config):
-        config = {'position': (0.0, 0.0, 0.0), 'floods': False, **config}
+        config = {'position': (0.0, 0.0, 0.0), 'floods': False,
+                  'acceptance_radius': 2.0, **config}
         self.vehicle = Vehicle(VehicleConfig('uav_1', 1, ORIGIN, **config), AUTOPILOTS[autopilot])
         self.flight = self.vehicle.flight
         self.own = 1 if autopilot == 'ardupilot' else 0  # items before the first one flown

@@ -23,7 +23,7 @@ class VehicleConfig:
     climb_rate: float = 4.0  # [m/s] up and down
     acceleration: float = 3.0  # [m/s2]
     range: float = math.inf  # [m] at cruise speed with a full battery
-    acceptance_radius: float = 2.0  # [m] WPNAV_RADIUS, NAV_ACC_RAD
+    acceptance_radius: float | None = None  # [m] WPNAV_RADIUS, NAV_ACC_RAD
     arming_delay: float | None = None  # [s] from power-up to a position estimate
     boot_delay: float | None = None  # [s] from power-up to the end of the boot
     settling_time: float | None = None  # [s] for which the first position estimate jumps

@@ -40,6 +40,7 @@ class ArduPilotFlight(Flight):
     boot_times = BootTimes(boot=8.0, position=41.0, settling=0.0)
     start_mode = Mode.MANUAL
     return_height = 15.0
+    real_radius = 2.0
     takeoff_height = 10.0
 
     def reboot(self, now: float) -> None:
@@ -163,4 +164,4 @@ class ArduPilotFlight(Flight):
         self.next_item()
 
     def radius(self, item: StoredItem) -> float:
-        return self.config.acceptance_radius  # WPNAV_RADIUS, whatever param2 said
+        return self.acceptance_radius  # WPNAV_RADIUS, whatever param2 said

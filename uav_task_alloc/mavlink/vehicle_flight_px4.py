@@ -2,6 +2,7 @@
 """PX4 in flight: a mission that is checked as a whole, swapped as a whole, and ends in Hold."""
 from __future__ import annotations
 
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import ClassVar
 
@@ -21,6 +22,14 @@ _REPEATS = 10  # times REACHED is sent again
 _REPEAT_PERIOD = 1.0  # [s]
 
 
+@dataclass(slots=True)
+class Result:
+    """What the navigator says of its last mission, take-off or landing."""
+
+    finished: bool = False
+    reached: bool = False  # an item of the mission on board
+
+
 class Px4Flight(Flight):
     """Flies the item at `seq`; a swap goes to the flagged one at once."""
 
@@ -33,11 +42,14 @@ class Px4Flight(Flight):
     boot_times = BootTimes(boot=4.0, position=20.0, settling=5.0)
     start_mode = Mode.HOLD
     return_height = 60.0
+    real_radius = 10.0
     takeoff_height = 2.5
 
     def reboot(self, now: float) -> None:
         super().reboot(now)
         self._finished = False
+        self.result = Result()
+        self.feasible = not self._infeasible()  # the mission on board
         self._last_reached: int | None = None
         self._repeats = 0
         self._repeat_at = now
@@ -79,6 +91,8 @@ class Px4Flight(Flight):
 
     def enter(self, mode: Mode) -> None:
         super().enter(mode)
+        if mode in (Mode.TAKEOFF, Mode.LAND, Mode.MISSION):
+            self.result.finished = False
         if mode is Mode.TAKEOFF:
             self.track = self._rise_to(max(self.body.position[2],
                                            self.home[2] + self.takeoff_height))
@@ -92,7 +106,7 @@ class Px4Flight(Flight):
         if seq >= len(self.items):
             self.texts.append((CRITICAL, 'New mission waypoint sequence out of bounds'))
             return False
-        self.seq, self._finished = seq, False
+        self.seq, self._finished, self.result.finished = seq, False, False
         if self.mode is Mode.MISSION:
             self.track = None
         return True
@@ -102,8 +116,9 @@ class Px4Flight(Flight):
             return
         last = max(0, len(self.items) - 1)
         self.seq = min(self.seq, last) if flagged is None else flagged
-        self._finished = False
+        self._finished, self.result = False, Result()
         reason = self._infeasible() if self.items else ''
+        self.feasible = bool(self.items) and not reason
         if reason:
             self.texts.append((CRITICAL, reason))
         if self.mode is Mode.MISSION:
@@ -129,12 +144,18 @@ class Px4Flight(Flight):
         if self.seq + 1 < len(self.items):
             self.seq += 1
             return
-        self._finished = True
+        self._finished = self.result.finished = True
         self.note('mission_end')
         self.set_mode(Mode.HOLD)
 
+    def _end_of(self, track: Track) -> None:
+        if self.mode in (Mode.TAKEOFF, Mode.LAND):
+            self.result.finished = True
+        super()._end_of(track)
+
     def tell_reached(self, seq: int, point: Point) -> None:
         super().tell_reached(seq, point)
+        self.result.reached = True
         self._last_reached, self._repeats = seq, 0
         self._repeat_at = self.now + _REPEAT_PERIOD
 
@@ -152,12 +173,12 @@ class Px4Flight(Flight):
             return track
         x, y, z = self.body.position
         top = max(track.points[0][2], z + self.takeoff_height)
-        return Track(((x, y, top), *track.points), track.radius, track.hold)
+        return Track(((x, y, top), *track.points), min(track.radius, 2.0), track.hold)
 
     def climb(self, target: Point) -> Track:
-        return Track((target,), self.config.acceptance_radius)  # in the air: a waypoint
+        return Track((target,), self.acceptance_radius)  # in the air: a waypoint
 
     def radius(self, item: StoredItem) -> float:
         if item.command == item_.WAYPOINT and item.p2 > 0.0:
             return item.p2
-        return self.config.acceptance_radius
+        return self.acceptance_radius

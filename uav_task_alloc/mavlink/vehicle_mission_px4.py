@@ -8,7 +8,8 @@ from enum import Enum
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from uav_task_alloc.mavlink.codec import Message, with_plan_id
-from uav_task_alloc.mavlink.vehicle_config import Change
+from uav_task_alloc.mavlink.vehicle_config import Change, Mode
+from uav_task_alloc.mavlink.vehicle_flight_px4 import Px4Flight
 from uav_task_alloc.mavlink.vehicle_item import (
     Refusal,
     StoredItem,
@@ -34,9 +35,12 @@ class _State(Enum):
 class Px4Mission(MissionService):
     """Atomic: a transfer that fails leaves the old mission; a CRC names the new one."""
 
+    flight: Px4Flight
+
     def __init__(self, system_id: int, capacity: int) -> None:
         super().__init__(system_id, capacity)
         self._id = 0
+        self._told = 0  # mission_state; stays where no rule has another
         self.reboot()
 
     def reboot(self) -> None:
@@ -55,7 +59,23 @@ class Px4Mission(MissionService):
         return self._id
 
     def progress(self) -> tuple[int, int, int]:
-        return len(self.items) or 65535, 0, 0
+        runs = self.flight.mode in (Mode.MISSION, Mode.TAKEOFF, Mode.LAND)
+        return len(self.items) or 65535, self._state_of_mission(runs), 1 if runs else 2
+
+    def _state_of_mission(self, runs: bool) -> int:
+        """As PX4 has it: a take-off and a landing end as a mission does."""
+        result = self.flight.result
+        if not self.items or not self.flight.feasible:
+            self._told = dialect.MISSION_STATE_NO_MISSION
+        elif result.finished:
+            self._told = dialect.MISSION_STATE_COMPLETE
+        elif runs:
+            self._told = dialect.MISSION_STATE_ACTIVE
+        elif result.reached:
+            self._told = dialect.MISSION_STATE_PAUSED
+        elif self.flight.seq < 1:
+            self._told = dialect.MISSION_STATE_NOT_STARTED
+        return self._told
 
     def step(self, now: float) -> None:
         if self._state is _State.IDLE:

@@ -19,10 +19,13 @@ class Navigation:
     """The body, its home and the stored items; subclasses override how an item is flown."""
 
     return_height: float  # [m] above home
+    real_radius: float  # [m] WPNAV_RADIUS or NAV_ACC_RAD, unless configured
 
     def __init__(self, config: VehicleConfig, items: Sequence[StoredItem]) -> None:
         self.config = config
         self.items = items
+        given = config.acceptance_radius
+        self.acceptance_radius = self.real_radius if given is None else given  # [m]
         self.body = Body(config)
         self.home: Point = config.position if config.home is None else config.home
         self.home_amsl = to_geodetic(config.origin, self.home)[2]  # [m]
@@ -52,7 +55,7 @@ class Navigation:
         if item.command == item_.RETURN:
             return self.way_home()
         if item.command == item_.DELAY:
-            return Track((), self.config.acceptance_radius, item.p1)
+            return Track((), self.acceptance_radius, item.p1)
         target = self.point(item)
         if item.command == item_.LAND:
             x, y, z = target[0], target[1], self.body.position[2]
@@ -69,7 +72,7 @@ class Navigation:
 
     def radius(self, item: StoredItem) -> float:
         """[m] at which an item counts as reached."""
-        return self.config.acceptance_radius
+        return self.acceptance_radius
 
     def point(self, item: StoredItem) -> Point:
         """ENU of an item's place; without one it is here."""
