@@ -58,6 +58,7 @@ class ItemRules:
     home_first: bool = False  # seq 0 is home, not an item
     whole_seconds: bool = False  # a hold is cut to whole seconds: round up
     keeps_radius: bool = True  # p2 of a waypoint is its acceptance radius
+    radius: float = 0.0  # [m] accepted around a point that says none; 0: the autopilot's own
     yaw: float = math.nan  # p4 of a waypoint where the yaw is left to the autopilot
     command_frame: int = MISSION  # of items without a position
     loiters: bool = False  # fixed wing: it cannot hold, it loiters
@@ -107,7 +108,7 @@ def _waypoint(point: Point, place: Sequence[float], rules: ItemRules, task: str)
     latitude, longitude, altitude = place
     # round, as cutting the seventh digit off moves a point by a centimetre, always south-west
     return Item(WAYPOINT, GLOBAL, round(latitude * 1e7), round(longitude * 1e7), altitude,
-                (0.0, 0.0, 0.0, rules.yaw), task, position=point)
+                (0.0, rules.radius, 0.0, rules.yaw), task, position=point, radius=rules.radius)
 
 
 def _task_item(point: Point, place: Sequence[float], rules: ItemRules, task: Task) -> Item:
@@ -116,7 +117,7 @@ def _task_item(point: Point, place: Sequence[float], rules: ItemRules, task: Tas
         raise MissionError(f'task {task.id}: service_time = {task.service_time:g}: expected at '
                            f'most {_LONGEST_HOLD:g} s, which is what a mission item holds',
                            task.id)
-    radius = task.acceptance_radius or 0.0
+    radius = task.acceptance_radius or rules.radius
     item = replace(_waypoint(point, place, rules, task.id), completes=True, radius=radius)
     if rules.loiters and hold > 0.0:  # NaN is refused here
         return replace(item, command=LOITER_TIME, params=(float(hold), 0.0, 0.0, 0.0))

@@ -69,3 +69,12 @@ def test_every_profile_can_fly_its_mission_hold_and_return(profile, flight):
     if flight in profile.set_mode:
         assert message.command == d.MAV_CMD_DO_SET_MODE
         assert profile.flight(profile.set_mode[flight]) is flight
+
+
+def test_a_px4_copter_is_told_how_near_is_there_where_the_task_does_not_say():
+    for profile, radius in ((profiles.PX4, 2.0), (profiles.PX4_PLANE, 0.0),
+                            (profiles.ARDUPILOT, 0.0)):
+        tasks = task_list('A', via={'A': [(50.0, 50.0, 50.0)]})
+        made = mission_items(tasks, profile.rules, ORIGIN)
+        assert [item.params[1] for item in made] == [radius, radius]
+        assert [item.radius for item in made] == [radius, radius]

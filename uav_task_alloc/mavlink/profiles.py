@@ -95,10 +95,11 @@ ARDUPLANE = replace(
     family='plane',
     set_mode={Flight.MISSION: 10, Flight.HOLD: 15, Flight.RETURN: 11})
 PX4 = Profile(
-    'px4', ItemRules(), atomic=True, idle_after=6.0, modes=_PX4, family='px4', jump_command=False,
-    amsl_takeoff=True,
+    # NAV_ACC_RAD is 10 m since 2026: it would fly past a task at 2 m/s and call it reached
+    'px4', ItemRules(radius=2.0), atomic=True, idle_after=6.0, modes=_PX4, family='px4',
+    jump_command=False, amsl_takeoff=True,
     set_mode={Flight.MISSION: _px4(4, 4), Flight.HOLD: _px4(4, 3), Flight.RETURN: _px4(4, 5)})
-PX4_PLANE = replace(PX4, rules=replace(PX4.rules, loiters=True))
+PX4_PLANE = replace(PX4, rules=replace(PX4.rules, loiters=True, radius=0.0))
 GENERIC = Profile('generic', ItemRules(yaw=0.0), atomic=False, idle_after=9.0, modes={},
                   set_mode={})
 
