@@ -145,7 +145,8 @@ class BridgeParams(Framed):
     cruise_altitude: float = param(50.0, 'Height above home to take off to.', low=1.0,
                                    high=5000.0, unit='m')
     acceptance_radius: float = param(0.0, 'Of a task that does not tell its own; 0: 2 m on '
-                                     'PX4 copters, else the autopilot decides.', low=0.0, high=1000.0, unit='m')
+                                     'PX4 copters, else the autopilot decides.',
+                                     low=0.0, high=1000.0, unit='m')
     takeoff: bool = param(False, 'Arm and take off by itself.')
     signing_key_file: str = param('', 'File with the signing key; empty: unsigned.', fixed=True)
     system_id: int = param(245, 'MAVLink system id of the bridge; not that of the ground '
