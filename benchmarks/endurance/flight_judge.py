@@ -18,6 +18,7 @@ ACTS = {d.MAV_CMD_DO_SET_MODE, d.MAV_CMD_COMPONENT_ARM_DISARM, d.MAV_CMD_NAV_TAK
         d.MAV_CMD_NAV_RETURN_TO_LAUNCH, d.MAV_CMD_NAV_LAND, d.MAV_CMD_NAV_LOITER_UNLIM}
 SAME = 12.0  # [s] a mode that the bridge itself had asked for looks alike, whoever set it
 NEAR = 2.0  # [m] from a task's place: its item
+LEFT = 15.0  # [m] from a task: it has left
 STUCK = 60.0  # [s]
 
 
@@ -47,6 +48,7 @@ class Judge:
         self._asked: dict[int, float] = {}  # modes that the bridge asked for, when [s]
         self._asked_arm, self._taken_by_arm = -math.inf, False
         self._events = 0
+        self._at = ''  # the task that it has reached, until it leaves: one visit
         self._stuck_since = self._moved_at = 0.0
 
     def handed_back(self) -> None:
@@ -66,6 +68,9 @@ class Judge:
 
     def step(self) -> None:
         """After each tick of the world."""
+        if self._at and math.dist(self.places[self._at],
+                                  self.world.vehicle.flight.body.position) > LEFT:
+            self._at = ''
         for event in self.world.truth:
             self._truth(event)
         for sent in self.world.arrivals:
@@ -82,8 +87,9 @@ class Judge:
     def _truth(self, event: Event) -> None:
         if event.name == 'item_reached':
             for name, place in self.places.items():
-                if math.dist(place, event.point) < NEAR:
+                if math.dist(place, event.point) < NEAR and name != self._at:
                     self.reached[name] += 1
+                    self._at = name
                     if self.reached[name] == 2:
                         self._fault('flown_twice', f'{name} reached again')
         elif event.name == 'mode' and event.mode is not None:

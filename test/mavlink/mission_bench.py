@@ -69,6 +69,8 @@ class Line:
             if other is not None:
                 carried = other
                 break
+        if not carried:
+            codec.pack(message)
         for delay, m in carried:
             frame = codec.pack(m) if not isinstance(m, bytes) else m  # lost frames count as well
             if not self.cut and self.rng.random() >= self.loss:

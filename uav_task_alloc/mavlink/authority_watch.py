@@ -90,6 +90,7 @@ class _Sent:
     last: dict[int, float] = field(default_factory=dict)  # when [s], by mode
     arm_until: float = -math.inf  # [s]
     disarm_until: float = -math.inf  # [s]
+    arming: bool = False  # what was asked last: to arm
     climb: float | None = None  # [m] above home, of our take-off
 
     def expects(self, mode: int, now: float) -> bool:
@@ -135,6 +136,7 @@ class AuthorityWatch:
             dict.fromkeys(record.commanded, now), climb=record.climb)
         self._status = 0
         self._acks = ModeAcks()
+        self._armed_frame: int | None = None  # in which it said that it had armed
         self._adopt = False  # the next heartbeat tells the mode, and is no change
         # modes and armed states that are no news when the link is back
         self._compare: tuple[frozenset[int | None], frozenset[bool]] = frozenset(), frozenset()
@@ -157,6 +159,9 @@ class AuthorityWatch:
     def heartbeat(self, message: Message, now: float) -> None:
         """Take the newest HEARTBEAT of the autopilot."""
         before, was_armed, descends = self.mode, self.armed, self._descends()
+        if self._armed_frame is not None and self._telemetry.frame > self._armed_frame:
+            # it said that it had armed: that it is not armed now is news
+            was_armed, self._flown, self._armed_frame = True, True, None
         self.mode = message.custom_mode
         self.armed = bool(message.base_mode & d.MAV_MODE_FLAG_SAFETY_ARMED)
         self._status = message.system_status
@@ -177,6 +182,9 @@ class AuthorityWatch:
         """Take a COMMAND_ACK that is addressed to us, and the number of its frame."""
         if message.command == d.MAV_CMD_DO_SET_MODE:
             self._acks.answered(message.result, frame)
+        elif (message.command == d.MAV_CMD_COMPONENT_ARM_DISARM and self._sent.arming
+                and message.result == d.MAV_RESULT_ACCEPTED):
+            self._armed_frame = frame
 
     def _entered(self, before: int, now: float) -> int:
         """The mode before this heartbeat, also one that no heartbeat has shown.
@@ -281,7 +289,8 @@ class AuthorityWatch:
             self._sent.last[mode] = now
             self._descending = self._profile.flight(mode) is Flight.RETURN
         elif message.command == d.MAV_CMD_COMPONENT_ARM_DISARM:
-            if message.param1 == 1.0:
+            self._sent.arming = message.param1 == 1.0
+            if self._sent.arming:
                 self._sent.arm_until = now + IN_FLIGHT
             else:
                 self._sent.disarm_until = now + IN_FLIGHT

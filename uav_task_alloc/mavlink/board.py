@@ -21,7 +21,7 @@ from uav_task_alloc.mavlink.progress import ProgressTable
 from uav_task_alloc.mavlink.recall import Recall
 from uav_task_alloc.mavlink.telemetry import Telemetry
 from uav_task_alloc.mavlink.transfer import Accepted, Failed, Held, Mission, Verified
-from uav_task_alloc.mavlink.upload import Upload
+from uav_task_alloc.mavlink.upload import OVERTAKEN, Upload
 from uav_task_alloc.mission import (
     Item,
     TaskList,
@@ -64,6 +64,7 @@ class Board:
     def __init__(self, peer: Peer, profile: Profile, origin: Origin, telemetry: Telemetry,
                  rng: random.Random) -> None:
         self.upload = Upload(peer, idle_after=profile.idle_after, rng=rng)
+        self.upload.overtaken = self._overtaken
         self.progress = ProgressTable(telemetry.frames, repeats=profile.atomic)
         self.recall = Recall(profile, origin, telemetry, self.progress)
         self.own = int(profile.rules.home_first)
@@ -80,6 +81,7 @@ class Board:
         self._profile, self._origin, self._telemetry = profile, origin, telemetry
         self._refused: dict[str, tuple[Task, str]] = {}  # as it was, and why
         self._horizon: int | None = None  # stops; None: all
+        self._done_then: frozenset[str] = frozenset()  # as the upload began
         self._fits = False  # the horizon is on board: there may be space for more
         self._space: int | None = None  # items that the vehicle says it has space for
         self._infeasible: tuple[float, list[str], str, TaskList] | None = None  # to be told at [s]
@@ -87,6 +89,8 @@ class Board:
         self._state = MissionState.UNKNOWN
         self._uploading: tuple[Change, TaskList] | None = None  # and the list it is for
         self._begun = False  # the epoch of this upload
+        # [s] of the vehicle's clock: all items were sent, which it may fly since
+        self._sent_since: float | None = None
         self.item_time = 0.0  # [s] that an item took in the uploads so far, roughly
         self._began_at = 0.0  # [s]
         self.plan_id = self._heard_plan = 0  # PX4's id of the mission verified, last heard
@@ -196,17 +200,29 @@ class Board:
         """Bring it on board."""
         assert self.tasks is not None
         self._uploading, self._begun, self.trouble = (found, self.tasks), False, False
-        self._began_at, self._space = now, None
+        self._began_at, self._space, self._sent_since = now, None, None
+        self._done_then = self._done()
         home = () if not self.own else (home_item(
             self._telemetry.home, self._origin, self._profile.rules),)
         return self.upload.replace(Mission(
             home + found.items, found.start + self.own, self._profile.atomic, self.own), now)
+
+    def _done(self) -> frozenset[str]:
+        return self.progress.pending.union(self.progress.completed)
+
+    def _overtaken(self) -> bool:
+        """Before another try: what is uploaded has been flown in part, or is of an old list."""
+        return bool(self._ambiguous) or self.outdated or self._done() != self._done_then
 
     def receive(self, message: Message, now: float) -> list[Message]:
         """Take a message of the mission service."""
         if message.get_type() in ('MISSION_ACK', 'MISSION_COUNT'):
             self._heard_plan = plan_id(message)
         out = self.upload.receive(message, now)
+        if not self.upload.sent_all:
+            self._sent_since = None if self.upload.busy else self._sent_since
+        elif self._sent_since is None:
+            self._sent_since = self.progress.path.newest
         self._settle(now)
         return out
 
@@ -223,6 +239,10 @@ class Board:
             self.progress.note_end(seq, now)
         else:
             self.progress.reached(seq, now)
+
+    def tells(self, message: Message) -> bool:
+        """A MISSION_CURRENT is of the mission that is known, not of one that is sent now."""
+        return not self.open or (self.plan_id != 0 and plan_id(message) == self.plan_id)
 
     def note_space(self, text: str) -> None:
         """STATUSTEXT: for how many items the vehicle has space."""
@@ -344,11 +364,11 @@ class Board:
         self._begun = True
         of_new = self._sort_reached(found)
         self.item_time = (self.item_time + (now - self._began_at) / len(found.items)) / 2.0
+        self.recall.stash()
         if found.kind is Kind.APPEND:
             self.progress.extend(found.items)
         else:
-            self.recall.stash()
-            self.progress.begin(found.items, found.start, now)
+            self.progress.begin(found.items, found.start, now, since=self._sent_since)
             if not self._profile.atomic:
                 self.must_jump = found.start
         for seq, when in of_new:
@@ -360,8 +380,7 @@ class Board:
         for seq, when in self._ambiguous:
             before = old[seq] if 0 <= seq < len(old) else None
             after = found.items[seq] if 0 <= seq < len(found.items) else None
-            at_new = not self._profile.atomic and after is not None and (
-                self.progress.was_at(after))  # PX4 will repeat it
+            at_new = after is not None and self.progress.was_at(after)
             if before is not None and (self.progress.was_at(before) or (
                     after is not None and alike(before, after))):
                 self.progress.reached(seq, when)
@@ -402,13 +421,15 @@ class Board:
         self.recall.stash()
         current = self._telemetry.current
         self.progress.begin(held, None if current is None or not held
-                            else max(0, current - self.own), now)
+                            else max(0, current - self.own), now, read=True)
 
     def _was_refused(self, event: Failed, found: Change, tasks: TaskList, now: float) -> None:
-        self.notes.append(Note('error', f'mission upload failed: {event.reason}'))
-        self.held, self.trouble = None, True
+        self.held, self.trouble = None, event.reason != OVERTAKEN
         self._state = MissionState.UNKNOWN if self._profile.atomic else MissionState.MIXED
         self._credit(found)
+        if not self.trouble:
+            return
+        self.notes.append(Note('error', f'mission upload failed: {event.reason}'))
         stops = [item.task for item in found.items if item.completes]
         if event.result == NO_SPACE:
             self._shrink(len(stops))

@@ -163,8 +163,8 @@ class Pilot:
             failed = board.failed.popleft()
             self.events.append(TaskProgress(failed.task, 'FAILED', failed.revision,
                                             failed.reason))
-        while board.progress.claimed:
-            item = board.progress.claimed.popleft()
+        while board.progress.left:
+            item = board.progress.left.popleft()
             if item.task not in board.progress.completed:
                 self.watch.mark(item.task, item.position, False, now)
         while board.progress.skipped:
@@ -184,14 +184,14 @@ class Pilot:
             self._position(message, newest, now)
         elif kind == 'MISSION_ITEM_REACHED':
             self.board.reached(message.seq - own, now)
-        elif kind == 'MISSION_CURRENT' and newest and not self.board.open:
+        elif kind == 'MISSION_CURRENT' and newest and self.board.tells(message):
             seq = max(0, message.seq - own)
             if self.board.must_jump is None:  # else it is left from the mission before
                 progress.moved(seq, now, flying, self.telemetry.frame)
             if (message.mission_state == d.MISSION_STATE_COMPLETE and flying
                     and not self.profile.atomic):  # PX4 says so after a take-off too
                 progress.ended(seq, now, self.telemetry.frame)
-            if not self.helm.busy:
+            if not self.helm.busy and not self.board.open:
                 self.board.watch(message, now)
         elif kind == 'STATUSTEXT':
             self._text(message, now)

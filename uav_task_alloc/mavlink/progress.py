@@ -72,9 +72,11 @@ class ProgressTable:
         self.items: tuple[Item, ...] = ()
         self.current: int | None = None  # len(items): flown to the end
         self.completed: dict[str, Point | None] = {}  # in order, of all epochs; where
+        self._places: dict[str, Point] = {}  # of the tasks of the list
         self.events: deque[Progress] = deque()
         self.skipped: deque[str] = deque()  # tasks that somebody else has left out
-        self.claimed: deque[Item] = deque()  # passed without a REACHED
+        self.told_reached: set[int] = set()  # by REACHED, in this epoch
+        self.left: deque[Item] = deque()  # passed, and not seen to be flown
         self.chosen: int | None = None  # the current item, where somebody else has set it
         self.path = FlownPath()
         self._started: str | None = None
@@ -125,17 +127,27 @@ class ProgressTable:
         """REACHED of the last item has come, of this epoch or of the one before."""
         return now - self._end_at <= within
 
-    def begin(self, items: tuple[Item, ...], start: int | None, now: float) -> None:
-        """A new epoch: what REACHED and CURRENT mean from now on."""
+    def begin(self, items: tuple[Item, ...], start: int | None, now: float,
+              read: bool = False, since: float | None = None) -> None:
+        """A new epoch: what REACHED and CURRENT mean from now on.
+
+        Args:
+            items: on board, without home.
+            start: index of the one being flown; None: not known.
+            now: [s].
+            read: found on board: nobody knows since when.
+            since: [s] of the vehicle's clock from which it may have flown them; None: now.
+        """
         self.epoch += 1
-        if not all_alike(self.items, items):
+        if (self.items or read) and not all_alike(self.items, items):
             self._before = _Before(self.items, self._since, self.may_end(now), now + ECHO)
             if self.items:
                 self._unproven.clear()
         self.items, self.current, self._reached = items, start, None
+        self.told_reached.clear()
         self._jump = None if start is None else (start, now)
         self._asked = self.chosen = self._told = None
-        self._since = self._since_begin = self.path.newest
+        self._since = self._since_begin = self.path.newest if since is None else since
 
     def extend(self, items: tuple[Item, ...]) -> None:
         """A new epoch whose first items are those of the last: the vehicle goes on."""
@@ -236,6 +248,7 @@ class ProgressTable:
         if seq == self.last_flown and (self._reached is None or self._reached[0] != seq):
             self._end_at = now
         self._reached = seq, now
+        self.told_reached.add(seq)
         if self.current is None or seq >= self.current:
             if self.current is not None and self.current < seq:
                 self._claim(self.current, seq, now)
@@ -328,7 +341,7 @@ class ProgressTable:
         flown = bool(chain) and self.path.could_have(
             chain, claim.then, math.fsum(i.params[0] for i in blind), claim.since)
         for item in left:
-            if flown and item in blind and claim.sure:
+            if flown and item in blind:
                 self._complete(item.task, item.position)
             else:
                 self._leave((item,), claim)
@@ -342,6 +355,7 @@ class ProgressTable:
 
     def _leave(self, items: tuple[Item, ...], claim: _Claim) -> None:
         """They were passed over."""
+        self.left.extend(items)
         if not claim.sure:
             return
         self.skipped.extend(item.task for item in items)
@@ -360,6 +374,7 @@ class ProgressTable:
 
     def asked_for(self, tasks: Iterable[Task]) -> None:
         """One that was flown at another place is another task, and still to be flown."""
+        self._places = {task.id: task.position for task in tasks}
         for task in tasks:
             if self.completed.get(task.id) not in (None, task.position):
                 del self.completed[task.id]
@@ -388,7 +403,6 @@ class ProgressTable:
             told = not (self.items[end:] and self.items[end].command == RETURN)
             frames = (self._prior_frame, frame) if told and frame is not None and (
                 self._prior_frame is not None) else None
-            self.claimed.extend(items)
             self._claims.append(_Claim(
                 items, following, self._since, now + self._clock, now + LATE, self.epoch,
                 frames, sure))
@@ -406,6 +420,8 @@ class ProgressTable:
         return max(self._since, self.path.newest - LATE)
 
     def _complete(self, task: str, place: Point | None, unheard: bool = False) -> None:
+        if place is not None and self._places.get(task, place) != place:
+            return  # it is to be flown at another place now
         if task not in self.completed:
             self.completed[task] = place
             self.events.append(Progress(task, completed=True, unheard=unheard))

@@ -35,6 +35,7 @@ class Recall:
     def reset(self) -> None:
         """The vehicle was restarted: its place is to be found again."""
         self.placed = False
+        self._epoch, self._placed_at = -1, 0  # in which it was placed, and where
         self._until = -math.inf  # [s]
         self._flown: tuple[Item, ...] = ()  # under missions that are not on board any more
 
@@ -53,7 +54,8 @@ class Recall:
         if not self._profile.atomic and self._progress.items:  # REACHED came before CURRENT
             current = max(current, self._progress.current or 0)
         flown = len(held) if self._ended(held, current) else current
-        self._progress.begin(held, flown, now)
+        self._progress.begin(held, flown, now, read=True)
+        self._epoch, self._placed_at = self._progress.epoch, flown
         # on the ground, and the first list ever: what is on board is of an earlier mission
         if telemetry.airborne or tasks.revision > 1:
             self._until = now + MEMORY
@@ -79,8 +81,11 @@ class Recall:
 
     def _behind(self) -> tuple[Item, ...]:
         progress = self._progress
-        return tuple(item for item in progress.items[:progress.current or 0]
-                     if not item.task and item.position is None)
+        if progress.epoch != self._epoch:
+            return ()  # read again: what is behind may be of a transfer that broke off
+        return tuple(item for n, item in enumerate(progress.items[:progress.current or 0])
+                     if not item.task and item.position is None
+                     and (n < self._placed_at or n in progress.told_reached))
 
     def _ended(self, held: tuple[Item, ...], current: int) -> bool:
         telemetry, last = self._telemetry, held[-1]

@@ -20,6 +20,7 @@ REPORTED = 3.0  # [s] in which a vehicle says whether it has a position, if it e
 OFF = 10.0  # [s] a battery that says nothing is not there
 RISE = 0.03  # [0..1] by which a battery reading has to rise to be believed
 BACKWARDS = 2000  # [ms] by which time_boot_ms goes back at a restart, not by a late packet
+LATEST = 6.0  # [s] by which a message may be late
 PACE_OVER = 0.3  # [s] over which a pace is measured
 OFF_GROUND = 2.0  # [m] above home: it flies, whatever landed_state said a second ago
 # message -> rate asked for [Hz]
@@ -181,20 +182,26 @@ class Telemetry:
         return True
 
     def _clock(self, boot_ms: int, now: float) -> None:
-        """One message with an older clock may be late; two in a row are a restart."""
+        """One message with an older clock may be late; two in a row are a restart.
+
+        Where late messages may be as old as that, none that is on time must come for a while.
+        """
         silence = now - self._boot_at  # in which a running clock goes on
-        if boot_ms >= self.boot_ms - BACKWARDS + 500.0 * silence:
+        least = self.boot_ms - BACKWARDS + 500.0 * silence
+        if boot_ms >= least:
             self.boot_ms, self._boot_doubt = max(boot_ms, self.boot_ms), 0
             self._boot_at = now
             return
         self._boot_doubt += 1
-        if self._boot_doubt == 2:
+        if self._boot_doubt >= 2 and (boot_ms < least - 1000.0 * LATEST or silence > LATEST):
             self._boot_at = now
             self.restart(boot_ms)
 
     def _heartbeat(self, message: Message, now: float) -> None:
         self.armed = bool(message.base_mode & d.MAV_MODE_FLAG_SAFETY_ARMED)
         self.flight = self._profile.flight(message.custom_mode)
+        if message.system_status == d.MAV_STATE_BOOT and self._started:
+            self.restart()  # its clock will be heard later
         self.status, self.autopilot = message.system_status, message.autopilot
         # PX4 says UNINIT later as well, whenever its preflight checks fail
         self._started = self._started or self.status >= d.MAV_STATE_STANDBY

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import random
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from enum import Enum
 
 from uav_task_alloc.mavlink import peer as wire
@@ -23,6 +23,7 @@ CONFIRM = 1.5  # [s] for the final ACK, which a radio may lose
 GRACE = 2.0  # [s] after an ERROR, in which requests may go on
 ERROR_BACKOFF = (5.0, 8.0)  # [s] drawn between
 DENIED_BACKOFF = (8.0, 12.0)  # [s] the other ground station has to end first
+OVERTAKEN = 'overtaken by what was flown meanwhile, or by a newer list'
 TRIES = 3  # uploads of one mission until it is given up
 
 
@@ -91,6 +92,7 @@ class Upload:
         self.state = State.IDLE
         self.events: deque[Outcome] = deque()
         self.uploads = 0  # begun so far
+        self.overtaken: Callable[[], bool] = lambda: False  # nobody wants it any more as it is
         self._out: list[Message] = []
         self._pending: Mission | None = None
         self._wants_read = False
@@ -212,6 +214,9 @@ class Upload:
             again = True
         if again and self._tries >= TRIES:
             self._fail(f'given up after {TRIES} tries, at last: {event.value}')
+            new = State.IDLE
+        elif again and self._tries and self.overtaken():
+            self._fail(OVERTAKEN)
             new = State.IDLE
         elif again:
             self._tries += 1
