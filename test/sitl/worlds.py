@@ -11,7 +11,7 @@ from uav_task_alloc.mavlink.vehicle_config import VehicleConfig
 ORIGIN = Origin(47.397742, 8.545594, 488.0)
 SYSTEMS = (1, 2, 3, 4)
 HOMES = {n: (400.0 * n, 0.0, 0.0) for n in SYSTEMS}  # [m] ENU
-SPEED = float(os.environ.get('SITL_SPEED', '2'))  # of SITL, times real time
+SPEED = float(os.environ.get('SITL_SPEED', '3'))  # of SITL, times real time
 LIMIT = float(os.environ.get('SITL_LIMIT', '900'))  # [s] wall, for each phase of a SITL flight
 FIRST = int(os.environ.get('SITL_FIRST_INSTANCE', '0'))
 # What a bare binary lacks to arm without a radio control and a human: ArduCopter 4.5 and later.
