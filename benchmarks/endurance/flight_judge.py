@@ -48,6 +48,7 @@ class Judge:
         self._asked: dict[int, float] = {}  # modes that the bridge asked for, when [s]
         self._asked_arm, self._taken_by_arm = -math.inf, False
         self._events = 0
+        self._forgot = False  # the bridge, until its first heartbeat
         self._at = ''  # the task that it has reached, until it leaves: one visit
         self._stuck_since = self._moved_at = 0.0
 
@@ -63,8 +64,7 @@ class Judge:
 
     def forgotten(self) -> None:
         """The bridge was restarted without a file: on the ground it knows of nobody."""
-        if self.world.vehicle.flight.landed:
-            self.taken_at = self.told_at = None
+        self._forgot = True
 
     def step(self) -> None:
         """After each tick of the world."""
@@ -73,6 +73,10 @@ class Judge:
             self._at = ''
         for event in self.world.truth:
             self._truth(event)
+        if self._forgot and self.world.arrivals:  # what the first heartbeat shows
+            self._forgot = False
+            if self.world.vehicle.flight.landed:
+                self.taken_at = self.told_at = None
         for sent in self.world.arrivals:
             if self.told_at is None and self.taken_at is not None and sent > self.taken_at + 1e-6:
                 self.told_at = self.world.now

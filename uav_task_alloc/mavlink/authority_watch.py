@@ -136,6 +136,7 @@ class AuthorityWatch:
             dict.fromkeys(record.commanded, now), climb=record.climb)
         self._status = 0
         self._acks = ModeAcks()
+        self._armed_at_start = False  # somebody had armed it before this bridge was there
         self._armed_frame: int | None = None  # in which it said that it had armed
         self._adopt = False  # the next heartbeat tells the mode, and is no change
         # modes and armed states that are no news when the link is back
@@ -380,7 +381,7 @@ class AuthorityWatch:
         """The first heartbeat of this bridge: does the vehicle do what it was left to do?"""
         record = self._record
         if record is None:
-            self.authority.undecided = self.armed
+            self.authority.undecided = self._armed_at_start = self.armed
             return
         if record.state not in (State.HELD, State.SUSPENDED):
             self._record = None
@@ -409,6 +410,9 @@ class AuthorityWatch:
         if self.authority.undecided and self.mode is not None:
             if self._telemetry.grounded:
                 self.authority.undecided = False
+                if self._armed_at_start and self._policy().takeoff:
+                    self.authority.landed = True  # `takeoff` alone grants nothing
+                    self.authority.why = 'armed or landing when the bridge started'
             elif self._telemetry.airborne:
                 self.authority.undecided = False
                 self._maybe_ours = self._class(self.mode) is ModeClass.MISSION

@@ -55,8 +55,12 @@ class _Before:
 
     items: tuple[Item, ...]
     since: float  # [s] of the vehicle's clock: its current item was flown
+    end: float  # the same: until then
     may_end: bool  # at its last item
     until: float  # [s]
+
+
+_NOTHING = _Before((), -math.inf, -math.inf, False, -math.inf)
 
 
 class ProgressTable:
@@ -81,7 +85,9 @@ class ProgressTable:
         self.path = FlownPath()
         self._started: str | None = None
         self._reached: tuple[int, float] | None = None  # last seq, when
-        self._before = _Before((), -math.inf, False, -math.inf)
+        self._last_reached: tuple[int, float] | None = None  # of any epoch
+        self._credited: int | None = None  # the seq of that, once it has completed an item
+        self._before = _NOTHING
         self._unproven: dict[int, float] = {}  # REACHED of this epoch or the one before; until [s]
         self._jump: tuple[int, float] | None = None  # set by us at a time, not seen yet
         self._asked: int | None = None  # we are setting this
@@ -140,7 +146,8 @@ class ProgressTable:
         """
         self.epoch += 1
         if (self.items or read) and not all_alike(self.items, items):
-            self._before = _Before(self.items, self._since, self.may_end(now), now + ECHO)
+            self._before = _Before(self.items, self._since, now + self._clock,
+                                   self.may_end(now), now + ECHO)
             if self.items:
                 self._unproven.clear()
         self.items, self.current, self._reached = items, start, None
@@ -157,7 +164,7 @@ class ProgressTable:
     def invalidate(self) -> None:
         """Nothing is known of what is on board."""
         self.items, self.current, self._reached = (), None, None
-        self._before = _Before((), -math.inf, False, -math.inf)
+        self._before = _NOTHING
         self._unproven.clear()
         self._started = self._jump = self.chosen = self._last_frame = self._told = None
         self._claims.clear()
@@ -198,13 +205,14 @@ class ProgressTable:
 
     def reached(self, seq: int, now: float, proven: bool = False) -> None:
         """MISSION_ITEM_REACHED, once or many times; `proven`: it is of this epoch."""
+        echo = self._repeats and self._run(seq, now)
         if (proven or now >= self._before.until) and self.items:
             if 0 <= seq < len(self.items) and self._near(seq, now):
                 self._accept(seq, now)
-        elif not self._prove(seq, now):
+        elif not self._prove(seq, now, echo) and not echo:  # else it is told again
             self._unproven[seq] = now + LATE  # a position on its way may tell
 
-    def _prove(self, seq: int, now: float) -> bool:
+    def _prove(self, seq: int, now: float, echo: bool = False) -> bool:
         """Credit REACHED to the epoch at whose item the vehicle was; False: not known yet."""
         if 0 <= seq < len(self.items):
             if self._is_of_now(seq, now):
@@ -213,14 +221,24 @@ class ProgressTable:
             if self._distance(seq) <= ROUGH + self.items[seq].radius:
                 return False  # of this epoch, if what comes shows it
         before = self._before
-        if not 0 <= seq < len(before.items) or not self.was_at(
-                before.items[seq], max(before.since, self.path.newest - ECHO)):
+        if echo or not 0 <= seq < len(before.items) or not self.was_at(
+                before.items[seq], max(before.since, self.path.newest - ECHO), before.end):
             return False
         item = before.items[seq]
         if before.may_end and item.position == _last_place(before.items):
             self._end_at = now
         self.credit(item)
+        self._credited = seq
         return True
+
+    def _run(self, seq: int, now: float) -> bool:
+        """The last REACHED goes on, and was credited (PX4)."""
+        goes_on = self._last_reached is not None and self._last_reached[0] == seq and (
+            now - self._last_reached[1] < LATE)
+        if not goes_on:
+            self._credited = None
+        self._last_reached = seq, now
+        return self._credited == seq
 
     def _is_of_now(self, seq: int, now: float) -> bool:
         """Whether a REACHED that may be of the epoch before is of this one."""
@@ -247,7 +265,7 @@ class ProgressTable:
     def _accept(self, seq: int, now: float) -> None:
         if seq == self.last_flown and (self._reached is None or self._reached[0] != seq):
             self._end_at = now
-        self._reached = seq, now
+        self._reached, self._credited = (seq, now), seq
         self.told_reached.add(seq)
         if self.current is None or seq >= self.current:
             if self.current is not None and self.current < seq:
@@ -338,8 +356,11 @@ class ProgressTable:
         """Nothing more will come: what it can have flown unseen it has flown, else it was left."""
         blind = [i for i in left if verdicts[i.task] is Verdict.BLIND and i.position is not None]
         chain = [i.position for i in blind if i.position is not None]
+        last = max((n for n, i in enumerate(claim.items) if i in blind), default=-1)
+        then = next((i.position for i in claim.items[last + 1:] if i.position is not None),
+                    claim.then)  # where it was seen again, on the way there
         flown = bool(chain) and self.path.could_have(
-            chain, claim.then, math.fsum(i.params[0] for i in blind), claim.since)
+            chain, then, math.fsum(i.params[0] for i in blind), claim.since)
         for item in left:
             if flown and item in blind:
                 self._complete(item.task, item.position)
@@ -380,11 +401,12 @@ class ProgressTable:
                 del self.completed[task.id]
                 self._started = None if self._started == task.id else self._started
 
-    def was_at(self, item: Item, since: float | None = None, radius: float = 0.0) -> bool:
+    def was_at(self, item: Item, since: float | None = None,
+               until: float = math.inf) -> bool:
         """Whether the vehicle's own positions show that it has reached an item."""
         return item.position is not None and self.path.judge(
-            item.position, max(radius, item.radius), item.params[0],
-            self._since if since is None else since) is Verdict.YES
+            item.position, item.radius, item.params[0],
+            self._since if since is None else since, until) is Verdict.YES
 
     def _verdict(self, item: Item, claim: _Claim) -> Verdict:
         if item.position is None:

@@ -9,6 +9,7 @@ from uav_task_alloc.mavlink.peer import ACCEPTED, Peer, received_item
 from uav_task_alloc.mission import Item
 
 PERIOD = 1.0  # [s] until a request is repeated
+UNANSWERED, AGAIN = 4, 3  # requests of one item: PX4 may have ended the transfer; then list again
 TRIES = 12  # of one request; ArduPilot denies a list for 8 s after a broken upload
 
 
@@ -30,6 +31,7 @@ class Readback:
         self.items: list[Item] = []
         self._count = 0
         self._tries, self._due = 1, now + PERIOD
+        self._again = 0  # listings begun again
 
     @property
     def first(self) -> Message:
@@ -55,6 +57,10 @@ class Readback:
         if self._tries >= TRIES:
             self.state = ReadState.FAILED
             return []
+        if (self.state is ReadState.GETTING and self._tries >= UNANSWERED
+                and self._again < AGAIN):
+            self.state, self._tries, self._again = ReadState.LISTING, 0, self._again + 1
+            self.items.clear()
         self._tries += 1
         self._due = now + PERIOD
         return [self.first if self.state is ReadState.LISTING

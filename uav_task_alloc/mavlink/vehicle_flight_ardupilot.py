@@ -117,7 +117,9 @@ class ArduPilotFlight(Flight):
         flown = self._flown_from(upcoming)
         if flown is None:
             return False
-        self.seq, self._upcoming, self.track = flown, upcoming, None
+        self.seq, self._upcoming = flown, upcoming
+        if self.mode is Mode.MISSION:
+            self.track = None
         if self.run is not Run.ACTIVE:
             self.run = Run.STOPPED
         return True
