@@ -102,6 +102,11 @@ def flown_once_each(bench, names, limit=400.0):
     assert sorted(bench.completed()) == sorted(places(bench)) == sorted(names)
 
 
+def set_current(bench, index, n=1):
+    """A second station sets the current item."""
+    bench.tells(d.MAVLink_mission_set_current_message(n, 1, bench.board(n).own + index), n)
+
+
 def swallow(bench, way, kind, when):
     """The line loses messages of a type while `when(message)` holds."""
     bench.line.tampers.append(lambda direction, m, now: [] if (

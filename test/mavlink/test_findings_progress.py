@@ -9,6 +9,7 @@ from findings_bench import (
     flying,
     happened,
     listed,
+    set_current,
     swallow,
     truthful,
 )
@@ -54,11 +55,6 @@ def test_an_append_near_the_end_of_the_mission_is_flown(delay, before):
     bench.run(lambda: distance(bench, C) < before)
     bench.assign(task_list('CDEF', 2))
     flown_once_each(bench, 'ABCDEF')
-
-
-def set_current(bench, index, n=1):
-    """A second station sets the current item."""
-    bench.tells(d.MAVLink_mission_set_current_message(n, 1, bench.board(n).own + index), n)
 
 
 @BOTH
