@@ -40,7 +40,7 @@ class _Claim:
     """Items that the vehicle has passed, as MISSION_CURRENT says, without a REACHED."""
 
     items: tuple[Item, ...]
-    then: Point | None  # [m] ENU where it flies next
+    route: tuple[Item, ...]  # from the first of them on, to the end of the mission
     since: float  # [s] of the vehicle's clock
     until: float  # the same: then it was past them
     deadline: float  # [s] after which nothing more is expected
@@ -355,17 +355,26 @@ class ProgressTable:
                 claim: _Claim) -> None:
         """Nothing more will come: what it can have flown unseen it has flown, else it was left."""
         blind = [i for i in left if verdicts[i.task] is Verdict.BLIND and i.position is not None]
-        chain = [i.position for i in blind if i.position is not None]
-        last = max((n for n, i in enumerate(claim.items) if i in blind), default=-1)
-        then = next((i.position for i in claim.items[last + 1:] if i.position is not None),
-                    claim.then)  # where it was seen again, on the way there
-        flown = bool(chain) and self.path.could_have(
-            chain, then, math.fsum(i.params[0] for i in blind), claim.since)
+        flown = bool(blind) and self._flown_unseen(blind, claim)
         for item in left:
             if flown and item in blind:
                 self._complete(item.task, item.position)
             else:
                 self._leave((item,), claim)
+
+    def _flown_unseen(self, blind: list[Item], claim: _Claim) -> bool:
+        """Wherever it was seen again: on the way from one of the items after them to the next."""
+        at = [n for n, item in enumerate(claim.route) if any(item is one for one in blind)]
+        if not at:
+            return False
+        for end in range(at[-1] + 1, len(claim.route) + 1):
+            flown = claim.route[at[0]:end]
+            then = claim.route[end].position if end < len(claim.route) else None
+            if self.path.could_have(
+                    [item.position for item in flown if item.position is not None], then,
+                    math.fsum(item.params[0] for item in flown), claim.since):
+                return True
+        return False
 
     def _silent(self, claim: _Claim) -> bool:
         """Every frame has come in which the vehicle would have told REACHED, and it did not."""
@@ -419,14 +428,13 @@ class ProgressTable:
         items = tuple(item for item in self.items[begin:end]
                       if item.completes and item.task not in self.completed)
         if items:
-            following = next((i.position for i in self.items[end:] if i.position is not None),
-                             None)
+            route = tuple(item for item in self.items[begin:] if item.position is not None)
             # PX4 tells no REACHED of the item before RETURN
             told = not (self.items[end:] and self.items[end].command == RETURN)
             frames = (self._prior_frame, frame) if told and frame is not None and (
                 self._prior_frame is not None) else None
             self._claims.append(_Claim(
-                items, following, self._since, now + self._clock, now + LATE, self.epoch,
+                items, route, self._since, now + self._clock, now + LATE, self.epoch,
                 frames, sure))
 
     def _turn(self, seq: int) -> None:
