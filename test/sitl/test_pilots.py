@@ -60,6 +60,10 @@ class Watched(Bridge):
             if interferes(message) and message.target_system in self.taken:
                 self.taken[message.target_system].append(str(message))
 
+    def see(self, system):
+        if system in self.ground.served and self.pilot(system).authority.held:
+            super().see(system)  # else a pilot stops it wherever he likes
+
     def note(self, system, served):
         super().note(system, served)
         if not self.courses[system].done and served.pilot.board.tasks is None:
