@@ -210,6 +210,24 @@ class Board:
     def _done(self) -> frozenset[str]:
         return self.progress.pending.union(self.progress.completed)
 
+    def _starts_behind(self) -> bool:
+        """An atomic swap under way would fly its first task, which was flown meanwhile, again."""
+        if self._uploading is None or self._begun or not self._profile.atomic:
+            return False
+        found = self._uploading[0]
+        first = next((item for item in found.items[found.start:] if item.completes), None)
+        return first is not None and first.task in self.progress.completed
+
+    def beyond_flown(self) -> int | None:
+        """The item to go on at while a swap is read back, where it begins with a flown task."""
+        progress, item = self.progress, self.progress.active
+        if self._uploading is None or not self._begun or not self._profile.atomic or (
+                item is None or item.task not in progress.completed):
+            return None
+        return next((n for n, other in enumerate(progress.items[:progress.last_flown + 1])
+                     if n > (progress.current or 0) and other.task not in progress.completed),
+                    None)
+
     def _overtaken(self) -> bool:
         """Before another try: what is uploaded has been flown in part, or is of an old list."""
         return bool(self._ambiguous) or self.outdated or self._done() != self._done_then
@@ -228,6 +246,8 @@ class Board:
 
     def step(self, now: float) -> list[Message]:
         out = self.upload.step(now)
+        if self._starts_behind() and not self.upload.sent_all:
+            out += self.upload.cancel(now)
         self._settle(now)
         return out
 

@@ -65,7 +65,7 @@ class FlownPath:
         self._samples.clear()
 
     def judge(self, place: Point, radius: float, hold: float, since: float,
-              until: float = math.inf) -> Verdict:
+              until: float = math.inf, close: float = CLOSE) -> Verdict:
         """Whether it was at a place.
 
         Args:
@@ -73,8 +73,9 @@ class FlownPath:
             radius: [m] at which it counts as reached; 0: the autopilot's own.
             hold: [s] it has to stay there.
             since, until: [s] of the vehicle's clock.
+            close: [m] beyond the radius that counts as well, without a hold.
         """
-        first, last = self._stay(place, radius, since, hold > 0.0, until)
+        first, last = self._stay(place, radius, since, hold > 0.0, until, close)
         if last - first >= max(0.0, hold - HOLD_SLACK):
             return Verdict.YES
         samples = self._since(since, until)
@@ -112,12 +113,13 @@ class FlownPath:
         return self._samples[max(0, at - 1):end + 1]
 
     def _stay(self, place: Point, radius: float, since: float,
-              slow: bool = False, until: float = math.inf) -> tuple[float, float]:
+              slow: bool = False, until: float = math.inf,
+              close: float = CLOSE) -> tuple[float, float]:
         """When it came and when it was there last (`slow`: and did not leave yet).
 
         (inf, -inf) where it never was.
         """
-        near = (radius or ACCEPTED) + (0.0 if slow else CLOSE)
+        near = (radius or ACCEPTED) + (0.0 if slow else close)
         first, last = math.inf, -math.inf
         samples = self._since(since, until)
         if len(samples) == 1 and math.dist(samples[0].position, place) <= near:

@@ -200,7 +200,8 @@ class Pilot:
         if self.telemetry.has_position:
             place, velocity = self.telemetry.place_of(message)
             self.board.progress.at(
-                Sample(message.time_boot_ms * 1e-3, place, velocity), newest, now)
+                Sample(message.time_boot_ms * 1e-3, place, velocity), newest, now,
+                self.telemetry.frame)
 
     def _text(self, message: Message, now: float) -> None:
         text = str(message.text)
@@ -257,6 +258,11 @@ class Pilot:
             self.helm.fail(now)
         if not board.upload.busy:
             return None
+        beyond = board.beyond_flown()
+        if beyond is not None and self.authority.held:
+            board.progress.asked(beyond)
+            return self.helm.jump(beyond + board.own, now,
+                                  lambda t: board.progress.jumped(beyond, t))
         self.helm.waits_for = 'its upload'
         if board.upload.state in (State.BACKOFF, State.DRAINING) and board.outdated and (
                 board.held is not None and board.wanted()):

@@ -12,7 +12,7 @@ from collections import deque
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from uav_task_alloc.mavlink.flown_path import FlownPath, Sample, Verdict
+from uav_task_alloc.mavlink.flown_path import CLOSE, GAP, FlownPath, Sample, Verdict
 from uav_task_alloc.mavlink.frame_log import FrameLog
 from uav_task_alloc.mission import RETURN, Item, all_alike
 from uav_task_alloc.model import Point, Task
@@ -22,6 +22,7 @@ REACH = 60.0  # [m] beyond its radius from which an item can be reached between 
 FRESH = 3.0  # [s] a position tells where the vehicle is
 SETTLE = 3.0  # [s] in which a CURRENT sent before the last change may still come
 FRAMES_AFTER = 10  # beyond the MISSION_CURRENT that moved on: REACHED may come after it
+STAMPS = 150  # positions: half a minute at 5 Hz
 LATE = 6.0  # [s] in which REACHED and positions that were sent before may still come
 ROUGH = 10.0  # [m] from which an autopilot may count an item as reached, and turn to the next
 
@@ -46,6 +47,8 @@ class _Claim:
     deadline: float  # [s] after which nothing more is expected
     epoch: int
     frames: tuple[int, int] | None  # in which a REACHED would have come; None: not known
+    frame: int | None  # that told the item after them
+    leaps: bool  # over more than one item: somebody has set the current one
     sure: bool  # it was flying, so what was not seen may have been flown
 
 
@@ -94,6 +97,7 @@ class ProgressTable:
         self._place: tuple[Point, float] | None = None
         self._claims: list[_Claim] = []
         self._since = -math.inf  # [s] of the vehicle's clock: the current item is flown
+        self._stamps: deque[tuple[int, float]] = deque(maxlen=STAMPS)  # positions: frame, when
         self._clock = -math.inf  # [s] of the vehicle less ours, by the fastest message
         self._since_begin = -math.inf  # [s] of the vehicle's clock: this epoch
         self._end_at = -math.inf  # [s] REACHED of the last item came
@@ -170,16 +174,19 @@ class ProgressTable:
         self._claims.clear()
         self.path.clear()
         self._clock = -math.inf
+        self._stamps.clear()
         self._since = -math.inf
 
     def retag(self, items: tuple[Item, ...]) -> None:
         """The same items, now known by their tasks."""
         self.items = items
 
-    def at(self, sample: Sample, newest: bool, now: float) -> None:
+    def at(self, sample: Sample, newest: bool, now: float, frame: int | None = None) -> None:
         """A position of the vehicle, the newest or one that comes late."""
         self.path.add(sample)
         self._clock = max(self._clock, sample.t - now)
+        if frame is not None:
+            self._stamps.append((frame, sample.t))
         if newest:
             self._place = sample.position, now
 
@@ -421,7 +428,16 @@ class ProgressTable:
         if item.position is None:
             return Verdict.NO
         return self.path.judge(item.position, item.radius, item.params[0], claim.since,
-                               claim.until)
+                               self._until(claim), 0.0 if claim.leaps else CLOSE)
+
+    def _until(self, claim: _Claim) -> float:
+        """[s] of the vehicle's clock at which it was past them, by the order of its frames."""
+        if claim.frame is None:
+            return claim.until
+        after = min((t for frame, t in self._stamps if frame > claim.frame), default=claim.until)
+        before = max((t for frame, t in self._stamps if frame < claim.frame), default=after)
+        # somebody has set the current item: what it came by afterwards does not count
+        return before if claim.leaps and after - before <= GAP else after
 
     def _claim(self, begin: int, end: int, now: float, frame: int | None = None,
                sure: bool = True) -> None:
@@ -435,7 +451,7 @@ class ProgressTable:
                 self._prior_frame is not None) else None
             self._claims.append(_Claim(
                 items, route, self._since, now + self._clock, now + LATE, self.epoch,
-                frames, sure))
+                frames, frame, end - begin > 1, sure))
 
     def _turn(self, seq: int) -> None:
         """The item after `seq` is flown from when that one was reached."""

@@ -134,6 +134,11 @@ class Upload:
         self._begin(now)
         return self._flush()
 
+    def cancel(self, now: float) -> list[Message]:
+        """Tell an atomic vehicle to keep what it has; a new try follows if it is still wanted."""
+        self._go(Event.STALE, now)
+        return self._flush()
+
     def reset(self) -> None:
         """Forget a transfer that the vehicle forgot as well: it was restarted."""
         self.state, self._mission, self._pending, self._readback = State.IDLE, None, None, None
