@@ -227,9 +227,14 @@ class Flight:
             self.judge.stubborn = True  # the next try is by the service
         else:
             self.vehicle.rc_mode(STICK[self.kind][-1])
-            self._at(world.now + 4.0, lambda: self.vehicle.rc_mode(HOLD[self.kind]))
+            self._at(world.now + 4.0, self._hold)
             self.back_at = world.now + 20.0
             self.judge.stubborn = True
+
+    def _hold(self) -> None:
+        """From the sticks to HOLD, where nobody came in between."""
+        if self.vehicle.flight.custom_mode == STICK[self.kind][-1]:
+            self.vehicle.rc_mode(HOLD[self.kind])
 
     def fly(self) -> None:
         """To its end: all is flown, or time is up."""

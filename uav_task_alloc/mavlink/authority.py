@@ -192,6 +192,8 @@ class Record:
     swap_at: float | None = None  # since when it is held for an upload
     climb: float | None = None  # [m] above home, of a take-off under way
     marks: tuple[TaskMark, ...] = ()  # of the last tasks
+    mission: int | None = None  # checksum of the items on board
+    current: int | None = None  # the item of it that was flown, home not counted
 
 
 class Authority:

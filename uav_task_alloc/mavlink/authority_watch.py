@@ -68,6 +68,9 @@ class Evidence(Protocol):
     def ours(self) -> bool:
         """What was read back holds a task of the list."""
 
+    def place(self) -> tuple[int | None, int | None]:
+        """Checksum of the mission on board, and the item that is flown."""
+
     def foreign(self) -> bool:
         """Somebody else has changed the mission."""
 
@@ -673,7 +676,8 @@ class AuthorityWatch:
             authority.until_landing, self._flown, self.mode, self.armed,
             tuple(dict.fromkeys(mode for mode, _ in self._sent.modes)),
             self._sent.arm_until > -math.inf and not self.armed and authority.held,
-            self.swap_at, self._sent.climb, tuple(self.marks.values()))
+            self.swap_at, self._sent.climb, tuple(self.marks.values()),
+            *self._evidence.place())
         if record != self._saved:
             self._saved = record
             self._save(record)

@@ -18,7 +18,7 @@ from uav_task_alloc.mavlink.peer import NO_SPACE, Peer
 from uav_task_alloc.mavlink.policy import Note, TaskProgress
 from uav_task_alloc.mavlink.profiles import Profile
 from uav_task_alloc.mavlink.progress import ProgressTable
-from uav_task_alloc.mavlink.recall import Recall
+from uav_task_alloc.mavlink.recall import Recall, checksum
 from uav_task_alloc.mavlink.telemetry import Telemetry
 from uav_task_alloc.mavlink.transfer import Accepted, Failed, Held, Mission, Verified
 from uav_task_alloc.mavlink.upload import OVERTAKEN, Upload
@@ -84,6 +84,7 @@ class Board:
         self._done_then: frozenset[str] = frozenset()  # as the upload began
         self._fits = False  # the horizon is on board: there may be space for more
         self._space: int | None = None  # items that the vehicle says it has space for
+        self._checksum: tuple[tuple[Item, ...], int] | None = None
         self._infeasible: tuple[float, list[str], str, TaskList] | None = None  # to be told at [s]
         self._ambiguous: list[tuple[int, float]] = []  # REACHED of this epoch, or of the next
         self._state = MissionState.UNKNOWN
@@ -292,6 +293,17 @@ class Board:
             return False
         items = [item for item in self.wanted() if item.completes]
         return any(alike(item, held) for item in items for held in self.held)
+
+    def place(self) -> tuple[int | None, int | None]:
+        """Checksum of the mission on board, and the item that is flown; None: not known."""
+        if self.held is None or self.progress.current is None:
+            return None, None
+        if self._checksum is None or self._checksum[0] is not self.held:
+            self._checksum = self.held, checksum(self.held)
+        pending = self.progress.pending
+        return self._checksum[1], next((n for n, item in enumerate(
+            self.progress.items[:self.progress.current]) if item.task in pending),
+            self.progress.current) if pending else self.progress.current
 
     def foreign(self) -> bool:
         """Somebody else has changed what was verified."""

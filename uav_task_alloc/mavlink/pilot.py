@@ -66,10 +66,12 @@ class Pilot:
         self._restarts = 0
         self._texts: dict[str, float] = {}  # of the vehicle, when told [s]
         self._said = ''  # by the vehicle, last
+        if record is not None:
+            self.board.recall.known = record.mission, record.current
         for mark in self.watch.marks.values():
-            if mark.flown and now - mark.at < MEMORY:
-                self.board.progress.completed[mark.task] = mark[1:4]
-            elif not mark.flown:
+            if mark.flown:
+                self.board.recall.told.add(mark.task)
+            else:
                 self.board.recall.unflown[mark.task] = mark[1:4]
         self._rules = (self._linked, self._authority, self.helm.finish, self._lift, self._upload,
                        self._read, self._has_list, self._place, self._may_act, self._hold_first,
@@ -81,6 +83,10 @@ class Pilot:
             self.notes.append(Note('warning', f'task_list: revision = {tasks.revision}: expected '
                                    f'at least {self.board.tasks.revision}: ignored'))
             return []
+        if self.board.tasks is None and tasks.revision > 1:  # else all of it is new
+            for mark in self.watch.marks.values():
+                if mark.flown and now - mark.at < MEMORY:
+                    self.board.progress.completed[mark.task] = mark[1:4]
         self.board.assign(tasks)
         self._reminder.listed(self.board.told_before(), now)
         self.helm.encourage(now)
@@ -288,7 +294,7 @@ class Pilot:
         board, telemetry = self.board, self.telemetry
         assert board.tasks is not None
         if not board.recall.placed and board.held and telemetry.airborne and (
-                telemetry.current is None):
+                telemetry.current is None or not telemetry.has_position):
             return []  # what it flies is not known yet
         board.recall.place(board.held or (), board.tasks, now)
         board.catch_up(now)

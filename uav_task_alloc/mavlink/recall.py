@@ -7,6 +7,7 @@ current item of a vehicle has been flown, whoever asked for it.
 from __future__ import annotations
 
 import math
+import zlib
 from collections.abc import Iterable
 
 from pymavlink.dialects.v20 import ardupilotmega as d
@@ -22,6 +23,11 @@ NEAR = 15.0  # [m] from the last item: there
 MEMORY = 60.0  # [s] after the restart; a task at the same place later on is another one
 
 
+def checksum(items: Iterable[Item]) -> int:
+    """Tells missions apart by what every autopilot gives back unchanged."""
+    return zlib.crc32(repr([(item.command, item.x, item.y) for item in items]).encode())
+
+
 class Recall:
     """Finds the place of a vehicle in its mission once, and the tasks behind it."""
 
@@ -30,11 +36,14 @@ class Recall:
         self._profile, self._origin = profile, origin
         self._telemetry, self._progress = telemetry, progress
         self.unflown: dict[str, Point] = {}  # passed over, not by a bridge
+        self.told: set[str] = set()  # flown, as the bridge before has told
+        self.known: tuple[int | None, int | None] = None, None  # mission and item, before
         self.reset()
 
     def reset(self) -> None:
         """The vehicle was restarted: its place is to be found again."""
         self.placed = False
+        self._old: tuple[Item, ...] = ()  # behind already when the bridge before was there
         self._epoch, self._placed_at = -1, 0  # in which it was placed, and where
         self._until = -math.inf  # [s]
         self._flown: tuple[Item, ...] = ()  # under missions that are not on board any more
@@ -56,6 +65,9 @@ class Recall:
         flown = len(held) if self._ended(held, current) else current
         self._progress.begin(held, flown, now, read=True)
         self._epoch, self._placed_at = self._progress.epoch, flown
+        # what lies before that the bridge before has told of, or knew to be passed over
+        same = self.known[0] == checksum(held)
+        self._old = held[:self.known[1] or 0] if same else ()
         # on the ground, and the first list ever: what is on board is of an earlier mission
         if telemetry.airborne or tasks.revision > 1:
             self._until = now + MEMORY
@@ -76,7 +88,8 @@ class Recall:
         stops = tuple(Stop(task) for task in tasks)
         items = mission_items(TaskList(0, stops), self._profile.rules, self._origin)
         return tuple(stop.task for stop, item in zip(stops, items, strict=True)
-                     if any(alike(item, m) for m in memory)
+                     if any(alike(item, m) and (stop.task.id in self.told or not any(
+                         m is old for old in self._old)) for m in memory)
                      and self.unflown.get(stop.task.id) != stop.task.position)
 
     def _behind(self) -> tuple[Item, ...]:
