@@ -8,6 +8,8 @@ import pytest
 from findings_bench import (
     BOTH,
     FindingsBench,
+    distance,
+    flown_once_each,
     flying,
     swallow,
 )
@@ -208,6 +210,16 @@ def test_finding_27_a_vehicle_that_is_restarted_has_no_position(kind):
         assert bench.vehicles[1].flight.positioned or not bench.state().available
         return bench.state().available
     assert bench.run(available, 60.0)
+
+
+@BOTH
+@pytest.mark.parametrize('seconds', [1.0, 6.0, 30.0])
+@pytest.mark.parametrize('before', [60.0, 20.0, 5.0])
+def test_a_position_that_jumps_in_flight_costs_no_task(kind, seconds, before):
+    bench = flying(kind, 'ABC')
+    assert bench.run(lambda: distance(bench, (100.0, 100.0, 50.0)) < before)
+    bench.vehicles[1].glitch((300.0, 0.0, 0.0), seconds)
+    flown_once_each(bench, 'ABC')
 
 
 # 28: why it does not arm

@@ -18,6 +18,7 @@ CLOSE = 0.5  # [m] beyond that
 SLOW = 0.4  # [m/s] it stays, and does not leave again
 CURVE = 0.4  # [m/s2] by which the way between two positions may differ from its interpolation
 PIECES = 8  # points looked at between two positions
+JUMP = 30.0  # [m] beyond what its speed explains: it did not fly that
 ASIDE = 8.0  # [m] beside a leg: it is flown
 HOLD_SLACK = 0.1  # [s] by which a hold may look shorter than it was
 
@@ -59,6 +60,15 @@ class FlownPath:
                 self._samples.insert(at, sample)
         if len(self._samples) > KEPT + 100:
             del self._samples[:100]
+
+    def jumps(self, sample: Sample) -> bool:
+        """Whether it cannot have flown to a new sample from the newest one."""
+        if not self._samples or not 0.0 < sample.t - self.newest <= GAP:
+            return False
+        last = self._samples[-1]
+        fastest = max(math.hypot(*last.velocity), math.hypot(*sample.velocity))
+        way = math.dist(last.position, sample.position)
+        return way > JUMP + 2.0 * fastest * (sample.t - last.t)
 
     def clear(self) -> None:
         """Its clock has begun anew."""

@@ -22,6 +22,7 @@ REACH = 60.0  # [m] beyond its radius from which an item can be reached between 
 FRESH = 3.0  # [s] a position tells where the vehicle is
 SETTLE = 3.0  # [s] in which a CURRENT sent before the last change may still come
 FRAMES_AFTER = 10  # beyond the MISSION_CURRENT that moved on: REACHED may come after it
+ADRIFT = 60.0  # [s] after a jump of its position in which another brings it back
 STAMPS = 150  # positions: half a minute at 5 Hz
 LATE = 6.0  # [s] in which REACHED and positions that were sent before may still come
 ROUGH = 10.0  # [m] from which an autopilot may count an item as reached, and turn to the next
@@ -89,12 +90,14 @@ class ProgressTable:
         self._started: str | None = None
         self._reached: tuple[int, float] | None = None  # last seq, when
         self._last_reached: tuple[int, float] | None = None  # of any epoch
+        self._heard_first = False
         self._credited: int | None = None  # the seq of that, once it has completed an item
         self._before = _NOTHING
         self._unproven: dict[int, float] = {}  # REACHED of this epoch or the one before; until [s]
         self._jump: tuple[int, float] | None = None  # set by us at a time, not seen yet
         self._asked: int | None = None  # we are setting this
         self._place: tuple[Point, float] | None = None
+        self._adrift_until = -math.inf  # [s] its position has jumped, and says nothing
         self._claims: list[_Claim] = []
         self._since = -math.inf  # [s] of the vehicle's clock: the current item is flown
         self._stamps: deque[tuple[int, float]] = deque(maxlen=STAMPS)  # positions: frame, when
@@ -183,12 +186,15 @@ class ProgressTable:
 
     def at(self, sample: Sample, newest: bool, now: float, frame: int | None = None) -> None:
         """A position of the vehicle, the newest or one that comes late."""
-        self.path.add(sample)
         self._clock = max(self._clock, sample.t - now)
         if frame is not None:
             self._stamps.append((frame, sample.t))
         if newest:
+            if self.path.jumps(sample):
+                back = now < self._adrift_until
+                self._adrift_until = now + (FRESH if back else ADRIFT)
             self._place = sample.position, now
+        self.path.add(sample)
 
     def asked(self, seq: int) -> None:
         """We are about to set the current item, and may see it before we know that it is done."""
@@ -242,8 +248,8 @@ class ProgressTable:
         """The last REACHED goes on, and was credited (PX4)."""
         goes_on = self._last_reached is not None and self._last_reached[0] == seq and (
             now - self._last_reached[1] < LATE)
-        if not goes_on:
-            self._credited = None
+        if not goes_on:  # heard to begin, after another one: no repetition of a mission before
+            self._credited, self._heard_first = None, self._last_reached is not None
         self._last_reached = seq, now
         return self._credited == seq
 
@@ -259,7 +265,8 @@ class ProgressTable:
             return self._near(seq, now) if not before.items else (
                 item.position is not None and self.path.visited_at(
                     item.position, item.radius + ROUGH, self._since_begin) is not None)
-        return seq == len(self.items) - 1 and self._told == seq and self.was_at(item)
+        return seq == len(self.items) - 1 and self._told == seq and (
+            self.was_at(item) or (item.position is None and self._heard_first))
 
     def _passed_unseen(self, seq: int) -> bool:
         """It flies beyond the item, and was not seen for a while."""
@@ -473,7 +480,7 @@ class ProgressTable:
             self.events.append(Progress(task, completed=True, unheard=unheard))
 
     def _near(self, seq: int, now: float) -> bool:
-        if self._place is None or now - self._place[1] > FRESH:
+        if self._place is None or now - self._place[1] > FRESH or now < self._adrift_until:
             return True
         distance = self._distance(seq)
         return math.isinf(distance) or distance <= self.items[seq].radius + REACH
