@@ -131,7 +131,8 @@ class ArduCopter(Sitl):
         own.write_text(COPTER_DEFAULTS)
         latitude, longitude, altitude = to_geodetic(ORIGIN, HOMES[system])
         return [self.binary, '--model', '+', '--speedup', str(self.speedup), '--wipe',
-                '--base-port', str(self.port), f'-I{self.instance(system)}',
+                f'-I{self.instance(system)}',  # before the port, or it is added to that as well
+                '--base-port', str(self.port + 10 * self.instance(system)),
                 '--sysid', str(system),
                 '--defaults', f'{given},{own}' if given else str(own),
                 '--home', f'{latitude:.7f},{longitude:.7f},{altitude:.2f},0']
