@@ -3,39 +3,29 @@
 from __future__ import annotations
 
 import random
-import re
 from collections import deque
-from dataclasses import dataclass, replace
 from enum import Enum
 
 from pymavlink.dialects.v20 import ardupilotmega as d
 
-from uav_task_alloc.errors import MissionError
 from uav_task_alloc.geometry.frames import Origin
 from uav_task_alloc.mavlink.change import Change, Kind, change
 from uav_task_alloc.mavlink.codec import Message, plan_id
 from uav_task_alloc.mavlink.peer import NO_SPACE, Peer
-from uav_task_alloc.mavlink.policy import Note, TaskProgress
+from uav_task_alloc.mavlink.policy import Note
 from uav_task_alloc.mavlink.profiles import Profile
 from uav_task_alloc.mavlink.progress import ProgressTable
-from uav_task_alloc.mavlink.recall import Recall, checksum
+from uav_task_alloc.mavlink.recall import Recall
 from uav_task_alloc.mavlink.telemetry import Telemetry
 from uav_task_alloc.mavlink.transfer import Accepted, Failed, Held, Mission, Verified
+from uav_task_alloc.mavlink.transfer_reached import TransferReached
 from uav_task_alloc.mavlink.upload import OVERTAKEN, Upload
-from uav_task_alloc.mission import (
-    Item,
-    TaskList,
-    alike,
-    all_alike,
-    home_item,
-    mission_items,
-)
+from uav_task_alloc.mavlink.wanted import TaskFailed, Wanted
+from uav_task_alloc.mission import Item, TaskList, all_alike, home_item
 from uav_task_alloc.model import Task
 
 SETTLE = 3.0  # [s] in which messages sent before the last change may still come
 LATE = 6.0  # [s] around the end of a mission in which its last REACHED comes
-AMBIGUOUS = 32  # REACHED between the last item sent and the answer
-SPACE = re.compile(r'Only (\d+) items are supported')
 CHECK = 60.0  # [s] between readbacks of a mission that nobody should have changed
 
 
@@ -49,15 +39,6 @@ class MissionState(Enum):
     FOREIGN = 4
 
 
-@dataclass(frozen=True, slots=True)
-class TaskFailed:
-    """A task that this vehicle does not take."""
-
-    task: str
-    reason: str
-    revision: int  # of the list that it was asked for in
-
-
 class Board:
     """The mission of one vehicle; seq counts without home, which ArduPilot keeps at 0."""
 
@@ -68,10 +49,9 @@ class Board:
         self.progress = ProgressTable(telemetry.frames, repeats=profile.atomic)
         self.recall = Recall(profile, origin, telemetry, self.progress)
         self.own = int(profile.rules.home_first)
-        self.tasks: TaskList | None = None
+        self.list = Wanted(profile, origin, self.progress)
         self.held: tuple[Item, ...] | None = None  # None: to be read
         self.revision = 0  # of the last list verified on board
-        self.failed: deque[TaskFailed] = deque()
         self.notes: deque[Note] = deque()
         self.trouble = False  # the last transfer failed; somebody decides when to try again
         self.verified_at = 0.0  # [s]
@@ -79,14 +59,9 @@ class Board:
         self.must_jump: int | None = None  # the item to fly now, where the upload did not say it
         self.is_foreign = False  # somebody else has changed what we had verified
         self._profile, self._origin, self._telemetry = profile, origin, telemetry
-        self._refused: dict[str, tuple[Task, str]] = {}  # as it was, and why
-        self._horizon: int | None = None  # stops; None: all
         self._done_then: frozenset[str] = frozenset()  # as the upload began
-        self._fits = False  # the horizon is on board: there may be space for more
-        self._space: int | None = None  # items that the vehicle says it has space for
-        self._checksum: tuple[tuple[Item, ...], int] | None = None
         self._infeasible: tuple[float, list[str], str, TaskList] | None = None  # to be told at [s]
-        self._ambiguous: list[tuple[int, float]] = []  # REACHED of this epoch, or of the next
+        self._ambiguous = TransferReached(self.progress)  # of this epoch, or of the next
         self._state = MissionState.UNKNOWN
         self._uploading: tuple[Change, TaskList] | None = None  # and the list it is for
         self._begun = False  # the epoch of this upload
@@ -96,7 +71,6 @@ class Board:
         self._began_at = 0.0  # [s]
         self.plan_id = self._heard_plan = 0  # PX4's id of the mission verified, last heard
         self._recalled: tuple[TaskList, int] | None = None
-        self._wanted: tuple[object, tuple[Item, ...]] | None = None
 
     @property
     def state(self) -> MissionState:
@@ -130,46 +104,32 @@ class Board:
         return (self._uploading is not None and self.tasks is not None
                 and self._uploading[1].revision != self.tasks.revision)
 
-    def assign(self, tasks: TaskList) -> None:
-        """The latest list; a task that was refused is tried again where it has changed."""
-        self.tasks = tasks
-        self._horizon = None
-        asked = [stop.task for stop in tasks.stops]
-        self.progress.asked_for(asked)
-        for task in asked:
-            if self._refused.get(task.id, (task, ''))[0] != task:
-                del self._refused[task.id]
+    @property
+    def taken(self) -> bool:
+        """The vehicle has taken all of a transfer, once or of that which runs."""
+        return self._begun
 
-    def told_before(self) -> list[TaskProgress]:
-        """How those tasks of the list ended that it should not have any more."""
-        assert self.tasks is not None
-        ids, revision = [stop.task.id for stop in self.tasks.stops], self.tasks.revision
-        return [TaskProgress(i, 'COMPLETED', revision)
-                for i in ids if i in self.progress.completed] + [
-            TaskProgress(i, 'FAILED', revision, self._refused[i][1])
-            for i in ids if i in self._refused and i not in self.progress.completed]
+    @property
+    def tasks(self) -> TaskList | None:
+        """The latest list."""
+        return self.list.tasks
+
+    @property
+    def failed(self) -> deque[TaskFailed]:
+        """Tasks that the vehicle does not take, to be told."""
+        return self.list.failed
 
     def remaining(self) -> TaskList:
         """The list less what is flown or refused, up to the horizon."""
-        assert self.tasks is not None
-        tasks = self.tasks.without({
-            *self.progress.completed, *self.progress.pending, *self._refused})
-        return tasks if self._horizon is None else tasks.first(self._horizon)
+        return self.list.remaining()
 
     def wanted(self) -> tuple[Item, ...]:
-        """The items to fly from here; a task that cannot be one is refused."""
-        key = (self.tasks, len(self.progress.completed), self.progress.pending,
-               len(self._refused), self._horizon)
-        if self._wanted is not None and self._wanted[0] == key:
-            return self._wanted[1]
-        remaining = self.remaining()
-        try:
-            items = mission_items(remaining, self._profile.rules, self._origin)
-        except MissionError as error:
-            self._refuse(error.task, str(error), remaining)
-            return self.wanted()
-        self._wanted = key, items
-        return items
+        """The items to fly from here."""
+        return self.list.items()
+
+    def open_tasks(self) -> tuple[Task, ...]:
+        """Those of the list that are still to be flown, and can be."""
+        return self.list.open_tasks()
 
     def change(self) -> Change:
         """What has to change on board."""
@@ -177,11 +137,10 @@ class Board:
         wanted, current = self.wanted(), self.progress.current
         done = {*self.progress.completed, *self.progress.pending}
         found = change(self.held, current, wanted, done=done)
-        if self._horizon is not None and found.kind is not Kind.KEEP:
-            if self._enough():
+        if self.list.horizon.stops is not None and found.kind is not Kind.KEEP:
+            if self.list.enough(self.held):
                 return Change(Kind.KEEP, self.held, current or 0)
-            if self._fits:
-                self._fits, self._horizon = False, 2 * self._horizon
+            if self.list.horizon.grow():
                 return self.change()
         room = self._profile.rules.capacity - self.own
         if found.kind is Kind.APPEND and (self._profile.atomic or len(found.items) > room):
@@ -201,7 +160,8 @@ class Board:
         """Bring it on board."""
         assert self.tasks is not None
         self._uploading, self._begun, self.trouble = (found, self.tasks), False, False
-        self._began_at, self._space, self._sent_since = now, None, None
+        self._began_at, self._sent_since = now, None
+        self.list.horizon.begin()
         self._done_then = self._done()
         home = () if not self.own else (home_item(
             self._telemetry.home, self._origin, self._profile.rules),)
@@ -255,9 +215,7 @@ class Board:
     def reached(self, seq: int, now: float) -> None:
         """MISSION_ITEM_REACHED; once all items are sent it may be of either mission."""
         if self.open and self.upload.sent_all:
-            if len(self._ambiguous) < AMBIGUOUS:
-                self._ambiguous.append((seq, now))
-            self.progress.note_end(seq, now)
+            self._ambiguous.add(seq, now)
         else:
             self.progress.reached(seq, now)
 
@@ -265,18 +223,12 @@ class Board:
         """A MISSION_CURRENT is of the mission that is known, not of one that is sent now."""
         return not self.open or (self.plan_id != 0 and plan_id(message) == self.plan_id)
 
-    def note_space(self, text: str) -> None:
-        """STATUSTEXT: for how many items the vehicle has space."""
-        found = SPACE.search(text)
-        if found:
-            self._space = int(found[1])
-
     def abort(self) -> list[Message]:
         """Somebody else has the vehicle: the transfer ends where it is."""
         if self.upload.busy:
             self.upload.reset()
         if self._uploading is not None:
-            self._credit(self._uploading[0])
+            self._ambiguous.credit(self._uploading[0])
             self._uploading, self.held = None, None
             self._state = MissionState.UNKNOWN if self._profile.atomic else MissionState.MIXED
         return []
@@ -286,49 +238,6 @@ class Board:
         return (self.state is MissionState.VERIFIED and self.held is not None
                 and self.tasks is not None and bool(self.wanted())
                 and self.change().kind is Kind.KEEP)
-
-    def ours(self) -> bool:
-        """What was read back holds a task of the list: nobody else has put it there."""
-        if not self.held or self.tasks is None or not self.tasks.stops:
-            return False
-        items = [item for item in self.wanted() if item.completes]
-        return any(alike(item, held) for item in items for held in self.held)
-
-    def place(self) -> tuple[int | None, int | None]:
-        """Checksum of the mission on board, and the item that is flown; None: not known."""
-        if self.held is None or self.progress.current is None:
-            return None, None
-        if self._checksum is None or self._checksum[0] is not self.held:
-            self._checksum = self.held, checksum(self.held)
-        pending = self.progress.pending
-        return self._checksum[1], next((n for n, item in enumerate(
-            self.progress.items[:self.progress.current]) if item.task in pending),
-            self.progress.current) if pending else self.progress.current
-
-    def foreign(self) -> bool:
-        """Somebody else has changed what was verified."""
-        return self.is_foreign
-
-    def ended(self, now: float) -> bool:
-        """REACHED of the last item has just come."""
-        return self.progress.ended_lately(now, LATE)
-
-    def rejected(self, now: float) -> bool:
-        """The vehicle says that it has no valid mission, just after it took ours (PX4)."""
-        telemetry = self._telemetry
-        return (telemetry.mission_state == d.MISSION_STATE_NO_MISSION
-                and now - telemetry.current_at < LATE
-                and (self._begun or now - self.verified_at < LATE))
-
-    def returning(self) -> bool:
-        """The RETURN item is next, or is being flown."""
-        progress = self.progress
-        return progress.returns and progress.current is not None and (
-            progress.current > progress.last_flown)
-
-    def may_end(self) -> bool:
-        """The last item with a place is being flown, or is passed."""
-        return self.progress.may_end(self._telemetry.heard_at)
 
     def restarted(self) -> None:
         """The vehicle forgot its transfer, and perhaps its mission."""
@@ -358,22 +267,12 @@ class Board:
             self._recalled = self.tasks, len(memory)
             self.progress.caught_up(self.recall.flown(self.open_tasks(), now))
 
-    def open_tasks(self) -> tuple[Task, ...]:
-        """Those of the list that are still to be flown, and can be."""
-        return tuple(stop.task for stop in self.remaining().stops) if self.wanted() else ()
-
-    def infeasible(self, reason: str) -> None:
-        """The vehicle stores the mission, and will not fly it."""
-        assert self.tasks is not None
-        for task in {item.task: None for item in self.wanted() if item.completes}:
-            self._refuse(task, f'infeasible: {reason}', self.tasks)
-
     def _settle(self, now: float) -> None:
         if self._infeasible is not None and now >= self._infeasible[0]:
             _, stops, reason, asked = self._infeasible
             self._infeasible = None
             for task in stops:
-                self._refuse(task, reason, asked)
+                self.list.refuse(task, reason, asked)
         while self.upload.events:
             event = self.upload.events.popleft()
             if isinstance(event, Held):
@@ -394,7 +293,7 @@ class Board:
         if self._begun:
             return
         self._begun = True
-        of_new = self._sort_reached(found)
+        of_new = self._ambiguous.sort(found)
         self.item_time = (self.item_time + (now - self._began_at) / len(found.items)) / 2.0
         self.recall.stash()
         if found.kind is Kind.APPEND:
@@ -406,30 +305,11 @@ class Board:
         for seq, when in of_new:
             self.progress.reached(seq, when, proven=True)
 
-    def _sort_reached(self, found: Change) -> list[tuple[int, float]]:
-        """Credit what was reached to the mission at whose item the vehicle was seen."""
-        of_new, old = [], self.progress.items
-        for seq, when in self._ambiguous:
-            before = old[seq] if 0 <= seq < len(old) else None
-            after = found.items[seq] if 0 <= seq < len(found.items) else None
-            at_new = after is not None and self.progress.was_at(after)
-            if before is not None and (self.progress.was_at(before) or (
-                    after is not None and alike(before, after))):
-                self.progress.reached(seq, when)
-            elif at_new:
-                of_new.append((seq, when))
-        self._ambiguous.clear()
-        return of_new
-
-    def _credit(self, found: Change) -> None:
-        """The transfer has failed, and nobody knows which mission was flown: ask where it was."""
-        for seq, _ in self._sort_reached(found):
-            self.progress.credit(found.items[seq])
-
     def _verify(self, items: tuple[Item, ...], revision: int, now: float) -> None:
         self.held, self.revision, self.verified_at = items, revision, now
         self._state, self.read_once = MissionState.VERIFIED, True
-        self.is_foreign, self._fits = False, self._horizon is not None
+        self.is_foreign = False
+        self.list.horizon.verified()
         self.plan_id = self._heard_plan
 
     def _was_read(self, event: Held, now: float) -> None:
@@ -458,46 +338,18 @@ class Board:
     def _was_refused(self, event: Failed, found: Change, tasks: TaskList, now: float) -> None:
         self.held, self.trouble = None, event.reason != OVERTAKEN
         self._state = MissionState.UNKNOWN if self._profile.atomic else MissionState.MIXED
-        self._credit(found)
+        self._ambiguous.credit(found)
         if not self.trouble:
             return
         self.notes.append(Note('error', f'mission upload failed: {event.reason}'))
         stops = [item.task for item in found.items if item.completes]
         if event.result == NO_SPACE:
-            self._shrink(len(stops))
+            self.notes.append(Note('warning', self.list.horizon.shrink(len(stops))))
+            self.trouble = self.list.horizon.stops is None
         elif event.result is not None:
             seq = min(max((event.seq or 0) - self.own, 0), len(found.items) - 1)
             task = next((i.task for i in found.items[seq:] if i.task), stops[0] if stops else '')
-            self._refuse(task, event.reason, tasks)
+            self.list.refuse(task, event.reason, tasks)
             self.trouble = not task
         elif 'infeasible' in event.reason:  # or it was just restarted, as its clock will tell
             self._infeasible = now + LATE, stops, event.reason, tasks
-
-    def _shrink(self, stops: int) -> None:
-        """Fly fewer tasks at a time; where not even one fits the store is not open yet."""
-        if stops <= 1 or self._space == 0:
-            self._horizon = None
-            self.notes.append(Note('warning', 'no space on board for any task yet: '
-                                   'trying again'))
-            return
-        self._horizon, self._fits, self.trouble = stops // 2, False, False
-        self.notes.append(Note('warning', 'no space on board: flying the first '
-                               f'{self._horizon} tasks of {stops}, the others follow'))
-
-    def _refuse(self, task: str, reason: str, tasks: TaskList) -> None:
-        """Not to be flown as it is in that list; what has changed since is yet to be tried."""
-        asked, latest = tasks.find(task), self.tasks.find(task) if self.tasks else None
-        if asked is not None and latest in (None, asked):
-            self._refused[task] = asked, reason
-            self.failed.append(TaskFailed(task, reason, tasks.revision))
-
-    def _enough(self) -> bool:
-        """While half a horizon of the latest list is still on board, nothing is uploaded."""
-        assert self.tasks is not None
-        assert self.held is not None
-        everything = replace(self.tasks.without({*self.progress.completed, *self._refused}),
-                             returns=False, end_via=())
-        wanted = mission_items(everything, self._profile.rules, self._origin)
-        rest = self.held[self.progress.current or 0:]
-        stops = sum(item.completes for item in rest)
-        return stops >= max(1, (self._horizon or 0) // 2) and all_alike(wanted[:len(rest)], rest)

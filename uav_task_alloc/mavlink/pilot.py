@@ -23,6 +23,7 @@ from uav_task_alloc.mavlink.change import Change, Kind
 from uav_task_alloc.mavlink.codec import Message
 from uav_task_alloc.mavlink.flown_path import Sample
 from uav_task_alloc.mavlink.helm import Helm, Step
+from uav_task_alloc.mavlink.mission_evidence import MissionEvidence
 from uav_task_alloc.mavlink.peer import Peer
 from uav_task_alloc.mavlink.policy import Note, Policy, TaskProgress
 from uav_task_alloc.mavlink.profiles import Flight, Profile
@@ -52,7 +53,8 @@ class Pilot:
         self.telemetry = Telemetry(profile, origin, now)
         self.board = Board(peer, profile, origin, self.telemetry, rng)
         self.helm = Helm(peer, profile, self.telemetry)
-        self.watch = AuthorityWatch(profile, self.telemetry, self.board, lambda: self.policy,
+        evidence = MissionEvidence(self.board, self.telemetry)
+        self.watch = AuthorityWatch(profile, self.telemetry, evidence, lambda: self.policy,
                                     now, record, save)
         self.authority = self.watch.authority
         self.events: deque[TaskProgress] = deque()
@@ -87,8 +89,8 @@ class Pilot:
             for mark in self.watch.marks.values():
                 if mark.flown and now - mark.at < MEMORY:
                     self.board.progress.completed[mark.task] = mark[1:4]
-        self.board.assign(tasks)
-        self._reminder.listed(self.board.told_before(), now)
+        self.board.list.assign(tasks)
+        self._reminder.listed(self.board.list.told_before(), now)
         self.helm.encourage(now)
         return self._gate(self._act(now), now)
 
@@ -213,7 +215,7 @@ class Pilot:
         text = str(message.text)
         self.watch.text(message, now)
         self.helm.note_refusal(text)
-        self.board.note_space(text)
+        self.board.list.horizon.note(text)
         if now - self._texts.get(text, -math.inf) >= TEXT_AGAIN:
             serious = message.severity < d.MAV_SEVERITY_WARNING and not SAYS_NOTHING.search(text)
             self.notes.append(Note('error' if serious else 'info', text))
@@ -459,7 +461,7 @@ class Pilot:
             self.watch.swap_at, self.alarm = None, ''
             return helm.content()
         if helm.refused and not in_mission:
-            board.infeasible(self._said or helm.refused)
+            board.list.infeasible(self._said or helm.refused)
             helm.refused = ''
             return []
         if helm.resting(now):

@@ -1,0 +1,50 @@
+# SPDX-License-Identifier: Apache-2.0
+"""MISSION_ITEM_REACHED after the last item was sent: of the old mission, or of the new?"""
+from __future__ import annotations
+
+from uav_task_alloc.mavlink.change import Change
+from uav_task_alloc.mavlink.progress import ProgressTable
+from uav_task_alloc.mission import alike
+
+MOST = 32  # messages
+
+
+class TransferReached:
+    """Keeps them until the answer is there, and credits each where the vehicle was seen."""
+
+    def __init__(self, progress: ProgressTable) -> None:
+        self._progress = progress
+        self._heard: list[tuple[int, float]] = []  # index, when [s]
+
+    def __bool__(self) -> bool:
+        return bool(self._heard)
+
+    def add(self, seq: int, now: float) -> None:
+        """It may be of either."""
+        if len(self._heard) < MOST:
+            self._heard.append((seq, now))
+        self._progress.note_end(seq, now)
+
+    def clear(self) -> None:
+        """The vehicle was restarted."""
+        self._heard.clear()
+
+    def sort(self, found: Change) -> list[tuple[int, float]]:
+        """Credit those of the old mission; returns those of the new one."""
+        of_new, old, progress = [], self._progress.items, self._progress
+        for seq, when in self._heard:
+            before = old[seq] if 0 <= seq < len(old) else None
+            after = found.items[seq] if 0 <= seq < len(found.items) else None
+            at_new = after is not None and progress.was_at(after)
+            if before is not None and (progress.was_at(before) or (
+                    after is not None and alike(before, after))):
+                progress.reached(seq, when)
+            elif at_new:
+                of_new.append((seq, when))
+        self._heard.clear()
+        return of_new
+
+    def credit(self, found: Change) -> None:
+        """The transfer has failed, and nobody knows which mission was flown: ask where it was."""
+        for seq, _ in self.sort(found):
+            self._progress.credit(found.items[seq])

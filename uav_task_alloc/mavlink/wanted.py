@@ -1,0 +1,106 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What one vehicle should have on board: its list less what is flown, refused or beyond space."""
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass, replace
+
+from uav_task_alloc.errors import MissionError
+from uav_task_alloc.geometry.frames import Origin
+from uav_task_alloc.mavlink.horizon import Horizon
+from uav_task_alloc.mavlink.policy import TaskProgress
+from uav_task_alloc.mavlink.profiles import Profile
+from uav_task_alloc.mavlink.progress import ProgressTable
+from uav_task_alloc.mission import Item, TaskList, all_alike, mission_items
+from uav_task_alloc.model import Task
+
+
+@dataclass(frozen=True, slots=True)
+class TaskFailed:
+    """A task that this vehicle does not take."""
+
+    task: str
+    reason: str
+    revision: int  # of the list that it was asked for in
+
+
+class Wanted:
+    """The latest list of one vehicle, and the items that are still to be flown of it."""
+
+    def __init__(self, profile: Profile, origin: Origin, progress: ProgressTable) -> None:
+        self.tasks: TaskList | None = None
+        self.horizon = Horizon()
+        self.failed: deque[TaskFailed] = deque()
+        self._profile, self._origin, self._progress = profile, origin, progress
+        self._refused: dict[str, tuple[Task, str]] = {}  # as it was, and why
+        self._items: tuple[object, tuple[Item, ...]] | None = None
+
+    def assign(self, tasks: TaskList) -> None:
+        """The latest list; a task that was refused is tried again where it has changed."""
+        self.tasks = tasks
+        self.horizon.reset()
+        asked = [stop.task for stop in tasks.stops]
+        self._progress.asked_for(asked)
+        for task in asked:
+            if self._refused.get(task.id, (task, ''))[0] != task:
+                del self._refused[task.id]
+
+    def told_before(self) -> list[TaskProgress]:
+        """How those tasks of the list ended that it should not have any more."""
+        assert self.tasks is not None
+        completed = self._progress.completed
+        ids, revision = [stop.task.id for stop in self.tasks.stops], self.tasks.revision
+        return [TaskProgress(i, 'COMPLETED', revision) for i in ids if i in completed] + [
+            TaskProgress(i, 'FAILED', revision, self._refused[i][1])
+            for i in ids if i in self._refused and i not in completed]
+
+    def remaining(self) -> TaskList:
+        """The list less what is flown or refused, up to the horizon."""
+        assert self.tasks is not None
+        tasks = self.tasks.without({
+            *self._progress.completed, *self._progress.pending, *self._refused})
+        return tasks if self.horizon.stops is None else tasks.first(self.horizon.stops)
+
+    def items(self) -> tuple[Item, ...]:
+        """The items to fly from here; a task that cannot be one is refused."""
+        key = (self.tasks, len(self._progress.completed), self._progress.pending,
+               len(self._refused), self.horizon.stops)
+        if self._items is not None and self._items[0] == key:
+            return self._items[1]
+        remaining = self.remaining()
+        try:
+            items = mission_items(remaining, self._profile.rules, self._origin)
+        except MissionError as error:
+            self.refuse(error.task, str(error), remaining)
+            return self.items()
+        self._items = key, items
+        return items
+
+    def open_tasks(self) -> tuple[Task, ...]:
+        """Those of the list that are still to be flown, and can be."""
+        return tuple(stop.task for stop in self.remaining().stops) if self.items() else ()
+
+    def refuse(self, task: str, reason: str, tasks: TaskList) -> None:
+        """Not to be flown as it is in that list; what has changed since is yet to be tried."""
+        asked, latest = tasks.find(task), self.tasks.find(task) if self.tasks else None
+        if asked is not None and latest in (None, asked):
+            self._refused[task] = asked, reason
+            self.failed.append(TaskFailed(task, reason, tasks.revision))
+
+    def infeasible(self, reason: str) -> None:
+        """The vehicle stores the mission, and will not fly it."""
+        assert self.tasks is not None
+        for task in {item.task: None for item in self.items() if item.completes}:
+            self.refuse(task, f'infeasible: {reason}', self.tasks)
+
+    def enough(self, held: tuple[Item, ...]) -> bool:
+        """While half a horizon of the latest list is still on board, nothing is uploaded."""
+        assert self.tasks is not None
+        everything = replace(
+            self.tasks.without({*self._progress.completed, *self._refused}),
+            returns=False, end_via=())
+        wanted = mission_items(everything, self._profile.rules, self._origin)
+        rest = held[self._progress.current or 0:]
+        stops = sum(item.completes for item in rest)
+        return stops >= max(1, (self.horizon.stops or 0) // 2) and all_alike(
+            wanted[:len(rest)], rest)
