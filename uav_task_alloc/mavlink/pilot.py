@@ -124,6 +124,7 @@ class Pilot:
             self.notes.append(Note('warning', 'was restarted'))
             self.watch.rebooted(now)
             self._begin_anew(now)
+            self.board.recall.rebooted()
         if message.get_type() == 'HEARTBEAT' and newest:
             self.watch.heartbeat(message, now)
             if flight is Flight.MISSION and self.telemetry.flight is not Flight.MISSION:

@@ -38,10 +38,16 @@ class Recall:
         self.unflown: dict[str, Point] = {}  # passed over, not by a bridge
         self.told: set[str] = set()  # flown, as the bridge before has told
         self.known: tuple[int | None, int | None] = None, None  # mission and item, before
+        self._rebooted = False
         self.reset()
 
+    def rebooted(self) -> None:
+        """Its current item says nothing of what it has flown before."""
+        self.reset()
+        self._rebooted = True
+
     def reset(self) -> None:
-        """The vehicle was restarted: its place is to be found again."""
+        """Its place is to be found again: it was restarted, or is another one."""
         self.placed = False
         self._old: tuple[Item, ...] = ()  # behind already when the bridge before was there
         self._epoch, self._placed_at = -1, 0  # in which it was placed, and where
@@ -69,7 +75,7 @@ class Recall:
         same = self.known[0] == checksum(held)
         self._old = held[:self.known[1] or 0] if same else ()
         # on the ground, and the first list ever: what is on board is of an earlier mission
-        if telemetry.airborne or tasks.revision > 1:
+        if not self._rebooted and (telemetry.airborne or tasks.revision > 1):
             self._until = now + MEMORY
 
     def stash(self) -> None:
