@@ -5,7 +5,7 @@ import math
 import pytest
 
 from uav_task_alloc.errors import InvalidValue
-from uav_task_alloc.model import Leg, Plan, Task, ThreatZone, Uav
+from uav_task_alloc.model import Leg, Plan, Shape, Task, ThreatZone, Uav
 
 NAN = math.nan
 SQUARE = [(0, 0), (10, 0), (10, 10), (0, 10)]
@@ -96,3 +96,10 @@ def test_a_plan_gives_the_route_of_a_uav():
 def test_a_shape_is_one_of_shape():
     with pytest.raises(InvalidValue, match=r"zone z: shape = 'hemisphere': expected one of"):
         ThreatZone('z', 'hemisphere', radius=5.0)
+
+
+@pytest.mark.parametrize('shape', [Shape.HEMISPHERE, Shape.CYLINDER])
+def test_only_a_polygon_has_vertices(shape):
+    corners = ((math.nan, math.inf), (1.0, 2.0))
+    zone = ThreatZone('z', shape, (0.0, 0.0, 0.0), 10.0, vertices=corners)
+    assert zone.vertices == ()

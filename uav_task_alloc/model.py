@@ -162,8 +162,9 @@ class ThreatZone:
                                              open_low=True))
         if self.shape is not Shape.HEMISPHERE and not self.z_min < self.z_max:
             raise InvalidValue(place + 'z_min, z_max', (self.z_min, self.z_max), 'z_min < z_max')
-        if self.shape is Shape.POLYGON:
-            put(self, 'vertices', check_polygon(place + 'vertices', self.vertices))
+        # other shapes have none: what a message carries there is never looked at
+        put(self, 'vertices', check_polygon(place + 'vertices', self.vertices)
+            if self.shape is Shape.POLYGON else ())
 
     @classmethod
     def hemisphere(cls, id: str, center: Point, radius: float,
