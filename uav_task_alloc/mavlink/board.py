@@ -65,6 +65,7 @@ class Board:
         self._state = MissionState.UNKNOWN
         self._uploading: tuple[Change, TaskList] | None = None  # and the list it is for
         self._begun = False  # the epoch of this upload
+        self._unsure: tuple[Change, TaskList] | None = None  # sent, and not seen to be on board
         # [s] of the vehicle's clock: all items were sent, which it may fly since
         self._sent_since: float | None = None
         self.item_time = 0.0  # [s] that an item took in the uploads so far, roughly
@@ -95,8 +96,8 @@ class Board:
 
     @property
     def open(self) -> bool:
-        """A transfer runs, and the vehicle has not taken all of it."""
-        return self._uploading is not None and not self._begun
+        """A transfer runs, or ran, and nobody knows yet whether the vehicle has taken it."""
+        return self._unsure is not None or (self._uploading is not None and not self._begun)
 
     @property
     def outdated(self) -> bool:
@@ -214,7 +215,7 @@ class Board:
 
     def reached(self, seq: int, now: float) -> None:
         """MISSION_ITEM_REACHED; once all items are sent it may be of either mission."""
-        if self.open and self.upload.sent_all:
+        if self._unsure is not None or (self.open and self.upload.sent_all):
             self._ambiguous.add(seq, now)
         else:
             self.progress.reached(seq, now)
@@ -242,7 +243,7 @@ class Board:
     def restarted(self) -> None:
         """The vehicle forgot its transfer, and perhaps its mission."""
         self.upload.reset()
-        self.is_foreign, self._infeasible = False, None
+        self.is_foreign, self._infeasible, self._unsure = False, None, None
         self._ambiguous.clear()
         self.progress.invalidate()
         self.held, self._uploading, self._state = None, None, MissionState.UNKNOWN
@@ -317,6 +318,14 @@ class Board:
             self.trouble = True
             return
         held, known = event.items[self.own:], self.progress.items
+        if self._unsure is not None:
+            found, tasks = self._unsure
+            self._unsure = None
+            if all_alike(found.items, held):
+                self._begin(found, now)
+                self._verify(found.items, tasks.revision, now)
+                return
+            self._ambiguous.credit(found)
         if known and all_alike(known, held):
             self.held, self.verified_at = known, now
             if self._state is MissionState.UNKNOWN:
@@ -338,7 +347,10 @@ class Board:
     def _was_refused(self, event: Failed, found: Change, tasks: TaskList, now: float) -> None:
         self.held, self.trouble = None, event.reason != OVERTAKEN
         self._state = MissionState.UNKNOWN if self._profile.atomic else MissionState.MIXED
-        self._ambiguous.credit(found)
+        if event.result is None and self._sent_since is not None and not self._begun:
+            self._unsure = found, tasks
+        else:
+            self._ambiguous.credit(found)
         if not self.trouble:
             return
         self.notes.append(Note('error', f'mission upload failed: {event.reason}'))

@@ -23,6 +23,7 @@ FRESH = 3.0  # [s] a position tells where the vehicle is
 SETTLE = 3.0  # [s] in which a CURRENT sent before the last change may still come
 FRAMES_AFTER = 10  # beyond the MISSION_CURRENT that moved on: REACHED may come after it
 ADRIFT = 60.0  # [s] after a jump of its position in which another brings it back
+AT_ONCE = 2.0  # [s] in which a vehicle does not fly two legs
 STAMPS = 150  # positions: half a minute at 5 Hz
 LATE = 6.0  # [s] in which REACHED and positions that were sent before may still come
 ROUGH = 10.0  # [m] from which an autopilot may count an item as reached, and turn to the next
@@ -72,6 +73,7 @@ class ProgressTable:
 
     def __init__(self, frames: FrameLog | None = None, repeats: bool = False) -> None:
         self._frames, self._repeats = frames or FrameLog(), repeats  # REACHED, many times (PX4)
+        self._passed_over: int | None = None  # the item after those that were left out
         self._told: int | None = None  # the current item, as the vehicle said last
         self._last_frame: int | None = None  # that told the current item
         self._prior_frame: int | None = None  # the one before that
@@ -220,7 +222,7 @@ class ProgressTable:
         """MISSION_ITEM_REACHED, once or many times; `proven`: it is of this epoch."""
         echo = self._repeats and self._run(seq, now)
         if (proven or now >= self._before.until) and self.items:
-            if 0 <= seq < len(self.items) and self._near(seq, now):
+            if 0 <= seq < len(self.items) and (proven or self._near(seq, now)):
                 self._accept(seq, now)
         elif not self._prove(seq, now, echo) and not echo:  # else it is told again
             self._unproven[seq] = now + LATE  # a position on its way may tell
@@ -326,8 +328,10 @@ class ProgressTable:
                     self._claim(self.current, seq, now, frame, sure=False)
                 self.current = seq  # somebody sets it; nothing is flown
         elif self.current is not None and self.current < seq <= len(self.items):
+            self._passed_over = None
             self._claim(self.current, seq, now, frame)
             self.current, self._since = seq, self._recent()
+            self.chosen = seq if self._passed_over == seq else self.chosen
 
     def ended(self, seq: int, now: float, frame: int | None = None) -> None:
         """The vehicle says that the mission is flown to its item `seq`; more may be appended."""
@@ -450,6 +454,8 @@ class ProgressTable:
                sure: bool = True) -> None:
         items = tuple(item for item in self.items[begin:end]
                       if item.completes and item.task not in self.completed)
+        if sure and end - begin > 1 and self._told == begin and self._at_once(frame):
+            items = self._leave_out(items, self.items[begin], end)
         if items:
             route = tuple(item for item in self.items[begin:] if item.position is not None)
             # PX4 tells no REACHED of the item before RETURN
@@ -459,6 +465,26 @@ class ProgressTable:
             self._claims.append(_Claim(
                 items, route, self._since, now + self._clock, now + LATE, self.epoch,
                 frames, frame, end - begin > 1, sure))
+
+    def _at_once(self, frame: int | None) -> bool:
+        """The current item was told twice within a moment, by the order of the frames."""
+        if frame is None or self._last_frame is None:
+            return False
+        before = [t for f, t in self._stamps if f <= self._last_frame]
+        return bool(before) and max(
+            t for f, t in self._stamps if f <= frame) - max(before) < AT_ONCE
+
+    def _leave_out(self, items: tuple[Item, ...], flown: Item, end: int) -> tuple[Item, ...]:
+        """Of items passed in a moment only what was flown, and what is beside it, may be."""
+        place = flown.position
+        may_be = tuple(i for i in items if flown.completes and place is not None
+                       and i.position is not None and math.dist(i.position, place) < ROUGH)
+        left = tuple(i for i in items if i not in may_be)
+        self.left.extend(left)
+        self.skipped.extend(item.task for item in left)
+        if left:
+            self._passed_over = end
+        return may_be
 
     def _turn(self, seq: int) -> None:
         """The item after `seq` is flown from when that one was reached."""

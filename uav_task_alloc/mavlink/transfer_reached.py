@@ -21,7 +21,8 @@ class TransferReached:
 
     def add(self, seq: int, now: float) -> None:
         """It may be of either."""
-        if len(self._heard) < MOST:
+        repeated = bool(self._heard) and self._heard[-1][0] == seq  # by PX4
+        if len(self._heard) < MOST and not repeated:
             self._heard.append((seq, now))
         self._progress.note_end(seq, now)
 
