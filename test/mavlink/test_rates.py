@@ -44,6 +44,20 @@ def test_a_message_that_stays_away_is_asked_for_again_and_given_up_in_the_end(ki
 
 
 @BOTH
+def test_a_stream_that_ceases_is_asked_for_again(kind):
+    bench = FlightBench(kind, takeoff=False).found()
+    bench.run(limit=10.0)
+    assert len(asked(bench, 'EXTENDED_SYS_STATE')) == 1
+    bench.line.tampers.append(lambda way, m, now: [] if (
+        m.get_type() == 'EXTENDED_SYS_STATE') else None)
+    bench.run(limit=60.0)
+    assert len(asked(bench, 'EXTENDED_SYS_STATE')) == 1 + TRIES
+    bench.line.tampers.clear()
+    bench.run(limit=30.0)
+    assert len(asked(bench, 'EXTENDED_SYS_STATE')) == 1 + TRIES
+
+
+@BOTH
 def test_positions_that_cease_are_asked_for_again(kind):
     bench = FlightBench(kind, takeoff=False).found()
     bench.run(limit=10.0)

@@ -9,6 +9,7 @@ from uav_task_alloc.mavlink.peer import Peer
 from uav_task_alloc.mavlink.telemetry import ESTIMATE, RATES, Telemetry
 
 PERIOD, TRIES = 2.0, 5  # [s] between requests
+SILENT = 10.0  # [s] without a message that came before, and four of its periods
 QUIET = 3.0  # [s] without a position: perhaps restarted, which only new rates will show
 
 
@@ -17,6 +18,7 @@ class Rates:
 
     def __init__(self, peer: Peer, telemetry: Telemetry, now: float) -> None:
         self._peer, self._telemetry = peer, telemetry
+        self._silent: set[int] = set()  # came once, and stay away
         self.again(now)
 
     def again(self, now: float) -> None:
@@ -32,7 +34,14 @@ class Rates:
         self._came = self._came or not quiet
         estimate = ESTIMATE.get(self._telemetry.autopilot)
         rates = {**RATES, estimate: 1.0} if estimate is not None else RATES
-        missing = [number for number in rates if number not in self._telemetry.heard]
+        last = self._telemetry.heard_last
+        silent = {number for number, rate in rates.items()
+                  if now - last.get(number, now) > SILENT + 4.0 / rate}
+        if silent - self._silent and not self._telemetry.stale(now):
+            self.again(now)
+        self._silent = silent
+        missing = [number for number in rates
+                   if number in silent or number not in self._telemetry.heard]
         if now < self._due or self._asked >= TRIES or (self._asked and not missing):
             return []
         self._asked += 1

@@ -73,6 +73,7 @@ class Telemetry:
         self.mission_state = 0  # MISSION_STATE
         self.plan_id = 0  # PX4's id of the mission on board
         self.heard: set[int] = set()  # message ids since the start
+        self.heard_last: dict[int, float] = {}  # [s] by message id
         self.restarts = 0
         self.boot_ms = self._boot_doubt = 0  # [ms] its clock
         self._boot_at = now
@@ -147,6 +148,7 @@ class Telemetry:
                               if system == message.get_srcSystem()), now)
         self.frame = self.frames.note(message.get_seq(), now)
         self.heard.add(message.get_msgId())
+        self.heard_last[message.get_msgId()] = now
         boot = getattr(message, 'time_boot_ms', None)
         if boot is not None:
             self._clock(boot, now)
@@ -162,6 +164,7 @@ class Telemetry:
         self.boot_ms, self._boot_doubt = boot_ms, 0
         self.restarts += 1
         self.heard = set()
+        self.heard_last.clear()
         self.current, self.total, self.plan_id, self.mission_state = None, None, 0, 0
         self.home, self.height, self.reached = None, math.nan, None
         self.landed = d.MAV_LANDED_STATE_UNDEFINED
