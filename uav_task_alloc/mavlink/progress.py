@@ -462,6 +462,9 @@ class ProgressTable:
             told = not (self.items[end:] and self.items[end].command == RETURN)
             frames = (self._prior_frame, frame) if told and frame is not None and (
                 self._prior_frame is not None) else None
+            if self._last_reached is not None and begin <= self._last_reached[0] < end and (
+                    now - self._last_reached[1] < LATE):
+                frames = None  # one has come, of this mission or repeated: the positions tell
             self._claims.append(_Claim(
                 items, route, self._since, now + self._clock, now + LATE, self.epoch,
                 frames, frame, end - begin > 1, sure))
