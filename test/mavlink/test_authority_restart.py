@@ -139,9 +139,10 @@ def test_suspended_and_found_in_another_mode_it_is_a_loss(kind):
 
 # a swap under way
 
-def swapping(moment, kind='ardupilot'):
+def swapping(moment, kind='ardupilot', speed=0.0):
     """Killed while ArduPilot is held for an upload that the line lets through slowly."""
     bench = flying(kind, delay=(0.1, 0.1))
+    assert bench.run(lambda: bench.pilot().telemetry.speed > speed, 20.0)
     bench.assign(task_list('ZYXWV', 2))
     assert bench.run(lambda: bench.vehicles[1].flight.custom_mode == 4, 10.0)
     bench.run(limit=moment)
@@ -162,15 +163,25 @@ def test_held_for_a_swap_it_is_ours_for_a_minute(dead, state):
         assert keeps_quiet(bench, names='ABC')
 
 
+@pytest.mark.parametrize('moment', [0.0, 0.5, 1.0])
+def test_killed_while_it_brakes_for_a_swap_it_is_still_ours(moment):
+    bench = swapping(moment, speed=14.0)
+    bench.dead_for(0.2)
+    bench.assign(task_list('ZYXWV', 2))
+    assert bench.run(lambda: bench.completed()[-5:] == list('ZYXWV'), 200.0)
+
+
 def test_held_for_a_swap_and_moved_by_somebody_it_is_a_loss():
     bench = swapping(2.0)
     bench.vehicles[1].flight.set_mode(bench.vehicles[1].mode)
-    bench.dead_for(5.0)
+    bench.dead_for(1.0)
     bench.vehicles[1].flight.body.velocity = (5.0, 0.0, 0.0)
     flight = bench.vehicles[1].flight
     move = flight._follow
     flight._follow = lambda dt: flight._steer(dt, (5.0, 0.0, 0.0))
-    bench.run(limit=3.0)
+    bench.run(limit=1.0)
+    assert keeps_quiet(bench, 3.0, names='ABC')  # it might still brake
+    bench.run(limit=4.0)
     flight._follow = move
     bench.run(limit=1.0)
     assert shows(bench, L, 'the bridge was restarted, and found GUIDED')

@@ -35,6 +35,7 @@ DOUBT = 5.0  # [s] in which a message under way may explain a change of mode
 SAID = 6.0  # [s] around a change of mode in which a text speaks of it
 REST, REST_MOVED, REST_TIME = 1.0, 3.0, 6.0  # [m/s], [m], [s]: at rest, for a hand-over
 SWAP_KEPT = 60.0  # [s] that a swap may be under way when the bridge is restarted
+BRAKING = 10.0  # [s] after its hold was sent until it is at rest
 MARKS, REMEMBERED = 50, 600.0  # tasks, [s]
 LOW_BATTERY = 0.2  # [0..1] below which nothing is handed over
 _FAILSAFE = re.compile(r'failsafe|fence breach|breached|battery \d+ is (low|critical)|'
@@ -393,10 +394,11 @@ class AuthorityWatch:
         agrees = same and (self.armed == record.armed or (self.armed and record.arming))
         why = f'the bridge was restarted, and found {self._name(self.mode)}'
         if agrees and record.swap_at is not None and self._class(self.mode) is ModeClass.HOLD:
-            if not self._telemetry.has_velocity and now - record.swap_at < SWAP_KEPT:
+            held, known = now - record.swap_at, self._telemetry.has_velocity
+            rests = known and self._telemetry.speed < REST
+            if not rests and 0.0 <= held < (BRAKING if known else SWAP_KEPT):
                 return  # at rest? the next heartbeat will tell
-            agrees = (now - record.swap_at < SWAP_KEPT and now >= record.swap_at
-                      and self._telemetry.speed < REST)
+            agrees = rests and 0.0 <= held < SWAP_KEPT
             self.swap_at = record.swap_at if agrees else None
         self._record = None
         self._descending = self._profile.flight(self.mode or 0) is Flight.RETURN
