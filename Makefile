@@ -15,7 +15,8 @@ test: build
 	@echo '== ruff' && .ros/bin/ruff check .
 	@echo '== mypy' && .ros/bin/mypy
 	@tools/browser.sh .ros > /dev/null
-	@echo '== pytest' && $(RUN) && REQUIRE_ROS=1 python3 -m pytest
+	@echo '== pytest, two at a time' && $(RUN) && python3 -m pytest -n 2 --dist worksteal --ignore test/nodes
+	@echo '== pytest, real nodes' && $(RUN) && REQUIRE_ROS=1 python3 -m pytest test/nodes
 
 # After this `source install/setup.bash` is all a shell needs.
 build: install/.built install/.compiled

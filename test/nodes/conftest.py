@@ -79,12 +79,12 @@ class Probe:
         self.executor = SingleThreadedExecutor(context=self.context)
         self.executor.add_node(self.node)
 
-    def until(self, condition, timeout=20.0):
-        """Spin until condition() is true; fail after `timeout` [s]."""
+    def until(self, condition, timeout=20.0, facts=lambda: ''):
+        """Spin until condition() is true; fail after `timeout` [s], and show facts()."""
         end = time.monotonic() + timeout
         while not condition():
             if time.monotonic() > end:
-                raise AssertionError('timed out')
+                raise AssertionError(f'timed out {facts()}')
             self.executor.spin_once(timeout_sec=0.05)
 
     def collect(self, kind, topic, qos):
