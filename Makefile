@@ -15,8 +15,8 @@ test: build
 	@echo '== ruff' && .ros/bin/ruff check .
 	@echo '== mypy' && .ros/bin/mypy
 	@tools/browser.sh .ros > /dev/null
-	@echo '== pytest, two at a time' && $(RUN) && python3 -m pytest -n 2 --dist worksteal --ignore test/nodes
-	@echo '== pytest, real nodes' && $(RUN) && REQUIRE_ROS=1 python3 -m pytest test/nodes
+	@echo '== pytest, two at a time' && $(RUN) && python3 -m pytest -n 2 --dist worksteal --ignore test/nodes --ignore test/sitl
+	@echo '== pytest, real nodes and autopilots' && $(RUN) && REQUIRE_ROS=1 python3 -m pytest test/nodes test/sitl
 
 # After this `source install/setup.bash` is all a shell needs.
 build: install/.built install/.compiled
