@@ -148,6 +148,36 @@ def test_finding_07_reached_of_a_new_list_is_not_credited_to_the_old_one():
     assert bench.flown() == [(0, y, 50) for y in (170, 200, 400)]
 
 
+def test_finding_07_a_first_try_that_was_taken_is_not_forgotten_in_the_second():
+    """The readback shows something else, and no MISSION_COUNT gets through after it."""
+    bench = FlightBench('px4', tick=0.05).found()
+    bench.assign(listed(1, P=(0.0, 200.0), Q=(0.0, 400.0)))
+    assert bench.run(lambda: distance(bench, (0.0, 200.0, 50.0)) < 100.0)
+    lost = [True]
+
+    def another(way, m, now):
+        if lost[0] and way == 'down' and m.get_type() == 'MISSION_ITEM_INT':
+            m.z += 1.0
+        return None
+    bench.line.tampers.append(another)
+    swallow(bench, 'down', 'MISSION_ACK', lambda m: lost[0])
+    swallow(bench, 'up', 'MISSION_COUNT', lambda m: (
+        lost[0] and bench.board().upload.uploads > 2))
+    bench.assign(listed(2, S=(0.0, 170.0), P=(0.0, 200.0), Q=(0.0, 400.0)))
+
+    def honest():
+        assert 'P' not in bench.completed() or (0, 200, 50) in bench.flown()
+        assert 'S' not in bench.completed() or (0, 170, 50) in bench.flown()
+        return bench.flown()
+    assert bench.run(honest)
+    assert bench.flown() == [(0, 170, 50)]
+    bench.run(honest, 0.5)
+    assert bench.board().upload.uploads > 2
+    lost[0] = False
+    assert bench.run(lambda: honest() and len(bench.completed()) == 3)
+    assert bench.flown() == [(0, y, 50) for y in (170, 200, 400)]
+
+
 def test_finding_07_reached_of_the_old_list_is_not_credited_to_the_new_one():
     bench = FlightBench('px4', tick=0.05).found()
     bench.assign(listed(1, P=(0.0, 200.0), Q=(0.0, 400.0)))

@@ -199,7 +199,7 @@ class Board:
         if message.get_type() in ('MISSION_ACK', 'MISSION_COUNT'):
             self._heard_plan = plan_id(message)
         out = self.upload.receive(message, now)
-        if not self.upload.sent_all:
+        if not self.upload.maybe_taken:
             self._sent_since = None if self.upload.busy else self._sent_since
         elif self._sent_since is None:
             self._sent_since = self.progress.path.newest
@@ -215,7 +215,7 @@ class Board:
 
     def reached(self, seq: int, now: float) -> None:
         """MISSION_ITEM_REACHED; once all items are sent it may be of either mission."""
-        if self._unsure is not None or (self.open and self.upload.sent_all):
+        if self._unsure is not None or (self.open and self.upload.maybe_taken):
             self._ambiguous.add(seq, now)
         else:
             self.progress.reached(seq, now)

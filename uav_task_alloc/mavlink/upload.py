@@ -102,6 +102,7 @@ class Upload:
         self._due = 0.0
         self._asked: int | None = None
         self._sent_last = self._accepted = False
+        self._sent_once = False  # the last item of this mission, in this try or one before
 
     @property
     def busy(self) -> bool:
@@ -111,6 +112,11 @@ class Upload:
     def sent_all(self) -> bool:
         """The last item was sent: the vehicle may have taken the mission."""
         return self._mission is not None and self.busy and self._sent_last
+
+    @property
+    def maybe_taken(self) -> bool:
+        """The last item was sent, in this try or in one before: it may come late."""
+        return self._mission is not None and self.busy and self._sent_once
 
     @property
     def progress(self) -> tuple[int, int, int]:
@@ -173,10 +179,10 @@ class Upload:
     def _begin(self, now: float) -> None:
         if self.state in (State.BACKOFF, State.DRAINING) and self._pending:
             self._mission, self._pending = self._pending, None  # nothing runs: nothing to abort
-            self._tries = 0
+            self._tries, self._sent_once = 0, False
         elif self.state is State.IDLE and self._pending:
             self._mission, self._pending = self._pending, None
-            self._tries = 0
+            self._tries, self._sent_once = 0, False
             self._go(Event.START, now)
         elif self.state is State.IDLE and self._wants_read:
             self._mission, self._wants_read = None, False
@@ -193,6 +199,7 @@ class Upload:
         last = seq == len(mission.items) - 1
         self._asked = seq
         self._sent_last = self._sent_last or last
+        self._sent_once = self._sent_once or last
         self._out.append(self._peer.item(
             seq, mission.items[seq], mission.flag_start and seq == mission.start))
         self._go(Event.LAST if last else Event.REQUEST, now)
