@@ -20,6 +20,8 @@ SAME = 12.0  # [s] a mode that the bridge itself had asked for looks alike, whoe
 NEAR = 2.0  # [m] from a task's place: its item
 LEFT = 15.0  # [m] from a task: it has left
 STUCK = 60.0  # [s]
+BEAT = 1.0  # [s] between heartbeats: a mode that ends before is not seen
+DOUBT = 5.0  # [s] in which a change of mode on the ground may still turn out to be a restart
 
 
 def acts(message: Message) -> bool:
@@ -44,7 +46,9 @@ class Judge:
         self.counts: Counter[str] = Counter()
         self.reached: Counter[str] = Counter()
         self.completed: set[str] = set()
-        self._mode = world.vehicle.flight.custom_mode
+        self._mode = self._shown = world.vehicle.flight.custom_mode
+        self._mode_at = -math.inf  # [s]
+        self._armed = False  # ever
         self._asked: dict[int, float] = {}  # modes that the bridge asked for, when [s]
         self._asked_arm, self._taken_by_arm = -math.inf, False
         self._events = 0
@@ -59,8 +63,10 @@ class Judge:
         self.counts['handed_back'] += 1
 
     def rebooted(self) -> None:
-        """The vehicle: whoever had it, it is on the ground, and disarmed."""
+        """The vehicle: it is on the ground; where it was never armed, nobody has taken it."""
         self.failing = False
+        if not self._armed and (self.told_at is None or self.world.now - self.told_at < DOUBT):
+            self.taken_at = self.told_at = None
 
     def forgotten(self) -> None:
         """The bridge was restarted without a file: on the ground it knows of nobody."""
@@ -98,15 +104,21 @@ class Judge:
                         self._fault('flown_twice', f'{name} reached again')
         elif event.name == 'mode' and event.mode is not None:
             before, self._mode = self._mode, event.mode
+            if event.t - self._mode_at >= BEAT:
+                self._shown = before
+            before, self._mode_at = self._shown, event.t
             if event.cause not in (OURS, 'self'):
                 self._mode_set(before, event)
             elif event.cause == OURS and self.told_at is None:
                 self.taken_at = None  # what was sent before the news has come after it
         elif event.name == 'kill_switch' or (
                 event.name in ('armed', 'disarmed') and event.cause not in (OURS, 'self')):
+            self._armed = True
             if event.name != 'armed' or event.t - self._asked_arm > SAME:
                 self._take(event.t)
                 self._taken_by_arm = event.name == 'armed'
+        elif event.name == 'armed':
+            self._armed = True
         elif event.name == 'failsafe':
             self.failing = True
         elif event.name == 'failsafe_over':
