@@ -14,10 +14,11 @@ from findings_bench import (
     truthful,
 )
 from flight_bench import FlightBench, places
-from mission_bench import task_list
+from mission_bench import OURS, task_list
 from pymavlink.dialects.v20 import ardupilotmega as d
 
 from uav_task_alloc.mavlink.board import MissionState
+from uav_task_alloc.mavlink.upload import State
 
 C = (200.0, 100.0, 50.0)
 MISSION = 3  # custom_mode of the copter
@@ -176,6 +177,25 @@ def test_finding_07_a_first_try_that_was_taken_is_not_forgotten_in_the_second():
     lost[0] = False
     assert bench.run(lambda: honest() and len(bench.completed()) == 3)
     assert bench.flown() == [(0, y, 50) for y in (170, 200, 400)]
+
+
+def test_finding_07_a_try_that_was_taken_is_not_forgotten_for_a_newer_list():
+    """The vehicle has taken a mission and says ERROR; before the next try comes another list."""
+    bench = FlightBench('px4', tick=0.05).found()
+    bench.assign(listed(1, P=(0.0, 200.0), Q=(0.0, 400.0)))
+    assert bench.run(lambda: distance(bench, (0.0, 200.0, 50.0)) < 60.0)
+    lost = [True]
+    swallow(bench, 'down', 'MISSION_ACK', lambda m: lost[0] and m.type == 0)
+    bench.assign(listed(2, S=(0.0, 170.0), P=(0.0, 200.0), Q=(0.0, 400.0)))
+    assert bench.run(lambda: bench.board().upload.sent_all, 10.0)
+    bench.says(d.MAVLink_mission_ack_message(*OURS, d.MAV_MISSION_ERROR))
+    assert bench.run(lambda: bench.board().upload.state is State.BACKOFF, 10.0)
+    bench.assign(listed(3, Q=(0.0, 400.0), S=(0.0, 170.0), P=(0.0, 200.0)))
+    assert bench.run(lambda: bench.flown() == [(0, 170, 50)], 60.0)
+    lost[0] = False
+    assert bench.run(lambda: len(bench.completed()) == 3)
+    assert bench.completed()[0] == 'S'
+    assert sorted(bench.flown()) == [(0, y, 50) for y in (170, 200, 400)]
 
 
 def test_finding_07_reached_of_the_old_list_is_not_credited_to_the_new_one():

@@ -274,7 +274,7 @@ class Pilot:
                                   lambda t: board.progress.jumped(beyond, t))
         self.helm.waits_for = 'its upload'
         if board.upload.state in (State.BACKOFF, State.DRAINING) and board.outdated and (
-                board.held is not None and board.wanted()):
+                board.held is not None and board.wanted() and not board.upload.maybe_taken):
             return board.begin_upload(board.change(), now)
         return self._held_too_long(now) or []
 

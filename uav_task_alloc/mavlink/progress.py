@@ -24,6 +24,7 @@ SETTLE = 3.0  # [s] in which a CURRENT sent before the last change may still com
 FRAMES_AFTER = 10  # beyond the MISSION_CURRENT that moved on: REACHED may come after it
 ADRIFT = 60.0  # [s] after a jump of its position in which another brings it back
 AT_ONCE = 2.0  # [s] in which a vehicle does not fly two legs
+FRAME_TIME = 0.2  # [s] by which the time of a frame among others is known
 STAMPS = 150  # positions: half a minute at 5 Hz
 LATE = 6.0  # [s] in which REACHED and positions that were sent before may still come
 ROUGH = 10.0  # [m] from which an autopilot may count an item as reached, and turn to the next
@@ -435,6 +436,10 @@ class ProgressTable:
             item.position, item.radius, item.params[0],
             self._since if since is None else since, until) is Verdict.YES
 
+    def was_at_by(self, item: Item, when: float) -> bool:
+        """The same, before a message came at a time [s] of ours."""
+        return self.was_at(item, until=when + self._clock)
+
     def _verdict(self, item: Item, claim: _Claim) -> Verdict:
         if item.position is None:
             return Verdict.NO
@@ -445,10 +450,15 @@ class ProgressTable:
         """[s] of the vehicle's clock at which it was past them, by the order of its frames."""
         if claim.frame is None:
             return claim.until
-        after = min((t for frame, t in self._stamps if frame > claim.frame), default=claim.until)
-        before = max((t for frame, t in self._stamps if frame < claim.frame), default=after)
-        # somebody has set the current item: what it came by afterwards does not count
-        return before if claim.leaps and after - before <= GAP else after
+        after = min(((f, t) for f, t in self._stamps if f > claim.frame), default=None)
+        before = max(((f, t) for f, t in self._stamps if f < claim.frame), default=None)
+        if after is None or before is None:
+            return claim.until if after is None else after[1]
+        gap = after[1] - before[1]
+        if claim.leaps and gap <= GAP:
+            return before[1]  # what it came by after somebody had set the current item is nothing
+        share = (claim.frame - before[0]) / (after[0] - before[0])
+        return min(after[1], before[1] + gap * share + FRAME_TIME)
 
     def _claim(self, begin: int, end: int, now: float, frame: int | None = None,
                sure: bool = True) -> None:

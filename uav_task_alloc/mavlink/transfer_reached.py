@@ -36,8 +36,8 @@ class TransferReached:
         for seq, when in self._heard:
             before = old[seq] if 0 <= seq < len(old) else None
             after = found.items[seq] if 0 <= seq < len(found.items) else None
-            at_new = after is not None and progress.was_at(after)
-            if before is not None and (progress.was_at(before) or (
+            at_new = after is not None and progress.was_at_by(after, when)
+            if before is not None and (progress.was_at_by(before, when) or (
                     after is not None and alike(before, after))):
                 progress.reached(seq, when)
             elif at_new:
