@@ -305,6 +305,7 @@ class Board:
                 self.must_jump = found.start
         for seq, when in of_new:
             self.progress.reached(seq, when, proven=True)
+        self._ambiguous.goes_on()
 
     def _verify(self, items: tuple[Item, ...], revision: int, now: float) -> None:
         self.held, self.revision, self.verified_at = items, revision, now

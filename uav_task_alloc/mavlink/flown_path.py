@@ -92,9 +92,10 @@ class FlownPath:
         blind = len(samples) < 2 or any(b.t - a.t > GAP for a, b in pairwise(samples))
         return Verdict.BLIND if blind else Verdict.NO
 
-    def visited_at(self, place: Point, radius: float, since: float) -> float | None:
+    def visited_at(self, place: Point, radius: float, since: float,
+                   until: float = math.inf) -> float | None:
         """When it was there first, [s] of its clock; None: it was not seen there."""
-        first, last = self._stay(place, radius, since)
+        first, last = self._stay(place, radius, since, until=until)
         return first if last >= first else None
 
     def could_have(self, chain: Sequence[Point], then: Point | None, holds: float,

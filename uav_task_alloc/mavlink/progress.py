@@ -228,19 +228,33 @@ class ProgressTable:
         elif not self._prove(seq, now, echo) and not echo:  # else it is told again
             self._unproven[seq] = now + LATE  # a position on its way may tell
 
-    def _prove(self, seq: int, now: float, echo: bool = False) -> bool:
-        """Credit REACHED to the epoch at whose item the vehicle was; False: not known yet."""
+    def repeated(self, seq: int, now: float) -> None:
+        """The last REACHED has come again, also while nobody knew of which mission it was."""
+        if self._last_reached is not None and self._last_reached[0] == seq:
+            self._last_reached = seq, now
+
+    def _prove(self, seq: int, now: float, echo: bool = False,
+               came: float | None = None) -> bool:
+        """Credit REACHED, which came at a time, to the epoch at whose item the vehicle was.
+
+        Returns:
+            False: not known yet.
+        """
         if 0 <= seq < len(self.items):
             if self._is_of_now(seq, now):
                 self._accept(seq, now)
                 return True
-            if self._distance(seq) <= ROUGH + self.items[seq].radius:
-                return False  # of this epoch, if what comes shows it
         before = self._before
-        if echo or not 0 <= seq < len(before.items) or not self.was_at(
-                before.items[seq], max(before.since, self.path.newest - ECHO), before.end):
+        if echo or not 0 <= seq < len(before.items):
             return False
         item = before.items[seq]
+        after = self.items[seq] if 0 <= seq < len(self.items) else None
+        same = after is not None and (after.task, after.position) == (item.task, item.position)
+        if after is not None and not same and self._distance(seq) <= ROUGH + after.radius:
+            return False  # of this epoch, if what comes shows it
+        if not self.was_at(item, max(before.since, self.path.newest - ECHO), before.end) and not (
+                self.near_one(item, None if same else after, now if came is None else came)):
+            return False
         if before.may_end and item.position == _last_place(before.items):
             self._end_at = now
         self.credit(item)
@@ -345,7 +359,7 @@ class ProgressTable:
     def step(self, now: float) -> None:
         """Judge what was passed without a REACHED, and REACHED that nothing has shown."""
         for seq, until in list(self._unproven.items()):
-            if self._prove(seq, now):
+            if self._prove(seq, now, came=until - LATE):
                 self._unproven.pop(seq, None)
             elif now >= until:
                 del self._unproven[seq]
@@ -439,6 +453,19 @@ class ProgressTable:
     def was_at_by(self, item: Item, when: float) -> bool:
         """The same, before a message came at a time [s] of ours."""
         return self.was_at(item, until=when + self._clock)
+
+    def near_one(self, item: Item, other: Item | None, when: float) -> bool:
+        """It was near one item, and not near another, just before a message came at `when` [s].
+
+        PX4 may count an item as reached up to 10 m from it.
+        """
+        return self._came_near(item, when) and not (
+            other is not None and self._came_near(other, when))
+
+    def _came_near(self, item: Item, when: float) -> bool:
+        until = when + self._clock
+        return item.position is not None and self.path.visited_at(
+            item.position, item.radius + ROUGH, until - LATE, until) is not None
 
     def _verdict(self, item: Item, claim: _Claim) -> Verdict:
         if item.position is None:

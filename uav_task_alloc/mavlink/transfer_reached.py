@@ -14,7 +14,8 @@ class TransferReached:
 
     def __init__(self, progress: ProgressTable) -> None:
         self._progress = progress
-        self._heard: list[tuple[int, float]] = []  # index, when [s]
+        self._heard: list[tuple[int, float]] = []  # index, when first [s]
+        self._newest: tuple[int, float] = (-1, 0.0)  # index, when [s], repetitions as well
 
     def __bool__(self) -> bool:
         return bool(self._heard)
@@ -24,6 +25,7 @@ class TransferReached:
         repeated = bool(self._heard) and self._heard[-1][0] == seq  # by PX4
         if len(self._heard) < MOST and not repeated:
             self._heard.append((seq, now))
+        self._newest = seq, now
         self._progress.note_end(seq, now)
 
     def clear(self) -> None:
@@ -36,14 +38,21 @@ class TransferReached:
         for seq, when in self._heard:
             before = old[seq] if 0 <= seq < len(old) else None
             after = found.items[seq] if 0 <= seq < len(found.items) else None
-            at_new = after is not None and progress.was_at_by(after, when)
             if before is not None and (progress.was_at_by(before, when) or (
                     after is not None and alike(before, after))):
                 progress.reached(seq, when)
-            elif at_new:
+            elif after is not None and progress.was_at_by(after, when):
+                of_new.append((seq, when))
+            elif before is not None and progress.near_one(before, after, when):
+                progress.credit(before)
+            elif after is not None and progress.near_one(after, before, when):
                 of_new.append((seq, when))
         self._heard.clear()
         return of_new
+
+    def goes_on(self) -> None:
+        """Once those of the new mission are told: the last of all may be repeated still."""
+        self._progress.repeated(*self._newest)
 
     def credit(self, found: Change) -> None:
         """The transfer has failed, and nobody knows which mission was flown: ask where it was."""
