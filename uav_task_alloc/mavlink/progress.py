@@ -240,10 +240,9 @@ class ProgressTable:
         Returns:
             False: not known yet.
         """
-        if 0 <= seq < len(self.items):
-            if self._is_of_now(seq, now):
-                self._accept(seq, now)
-                return True
+        if 0 <= seq < len(self.items) and self._is_of_now(seq, now):
+            self._accept(seq, now)
+            return True
         before = self._before
         if echo or not 0 <= seq < len(before.items):
             return False
