@@ -11,6 +11,8 @@ from allocation import Desk
 
 from uav_task_alloc.allocator.keeper import Keeper
 from uav_task_alloc.allocator.restore import Saved
+from uav_task_alloc.errors import OriginMismatch
+from uav_task_alloc.geometry.frames import Origin
 from uav_task_alloc.journal import FILE_NAME, VERSION, Journal, Row
 
 FULL = """
@@ -33,9 +35,9 @@ print(repr(keeper.trouble))
 class Disk:
     """A keeper on a folder, with an allocator and what was complained of."""
 
-    def __init__(self, folder):
+    def __init__(self, folder, origin=None):
         self.folder, self.said = folder, []
-        self.keeper = Keeper(str(folder), self.said.append)
+        self.keeper = Keeper(str(folder), self.said.append, origin)
         self.desk = Desk(self.keeper.saved)
 
     def add(self, *ids):
@@ -217,3 +219,81 @@ def test_a_journal_that_another_allocator_has_is_left_to_it(disk):
     second.add('t2')
     assert 'database is locked; nothing is kept' in second.keeper.trouble
     assert disk.again() == {'t1'}
+
+
+ZURICH, BERN = Origin(47.397742, 8.545594, 488.0), Origin(46.948, 7.4474, 540.0)
+
+
+def test_finding_23_an_emptied_journal_is_told_and_set_aside(disk):
+    disk.add('t1')
+    disk.keeper.close()
+    (disk.folder / FILE_NAME).write_bytes(b'')
+    later = Disk(disk.folder)
+    assert later.said == [later.keeper.trouble]
+    assert 'size = 0 bytes: expected at least 16' in later.keeper.trouble
+    assert f'set aside as {FILE_NAME}.damaged-1' in later.keeper.trouble
+    later.add('t2')
+    assert later.again() == {'t2'}
+
+
+def test_finding_23_what_can_be_read_of_a_cut_journal_is_kept(disk):
+    disk.add(*(f't{k}' for k in range(50)))
+    disk.keeper.close()
+    held = (disk.folder / FILE_NAME).read_bytes()
+    (disk.folder / FILE_NAME).write_bytes(held[:-3 * 4096])
+    later = Disk(disk.folder)
+    some = len(later.keeper.saved.tasks)
+    assert 0 < some < 50
+    assert 'malformed; set aside as' in later.keeper.trouble
+    later.add('t99')
+    assert len(later.again()) == some + 1
+
+
+def test_finding_23_locked_in_the_path_is_tried_again(tmp_path):
+    (tmp_path / 'locked').touch()
+    disk = Disk(tmp_path / 'locked' / 'state')
+    disk.add('t1')
+    assert 'tried again' in disk.keeper.trouble
+    (tmp_path / 'locked').unlink()
+    disk.add('t2')
+    assert (disk.keeper.trouble, disk.again()) == ('', {'t1', 't2'})
+
+
+def test_finding_23_a_journal_of_another_origin_is_refused(tmp_path):
+    disk = Disk(tmp_path, ZURICH)
+    disk.add('t1')
+    disk.keeper.close()
+    before = (tmp_path / FILE_NAME).read_bytes()
+    with pytest.raises(OriginMismatch) as caught:
+        Disk(tmp_path, BERN)
+    for number in ('47.397742', '8.545594', '488.0', '46.948', '7.4474', '540.0'):
+        assert number in str(caught.value)
+    assert (tmp_path / FILE_NAME).read_bytes() == before
+    same = Disk(tmp_path, Origin(47.397742, 8.545594 + 1e-9, 488.0))  # and nobody holds the file
+    assert (same.said, len(same.keeper.saved.tasks)) == ([], 1)
+
+
+def test_finding_23_a_journal_without_origin_gets_one_and_says_so(disk):
+    disk.add('t1')
+    disk.keeper.close()
+    later = Disk(disk.folder, ZURICH)
+    assert 'names no origin: taken for origin latitude 47.397742' in later.said[0]
+    later.add('t2')
+    later.keeper.close()
+    with pytest.raises(OriginMismatch):
+        Disk(disk.folder, BERN)
+
+
+def test_finding_23_a_disk_that_comes_late_with_another_origin_is_left_alone(
+        disk, unopenable, tmp_path):
+    late = Disk(tmp_path / 'mount', BERN)
+    late.add('mine')
+    theirs = Disk(tmp_path / 'other', ZURICH)
+    unopenable()
+    theirs.add('mine')
+    theirs.keeper.close()
+    (tmp_path / 'mount').mkdir(exist_ok=True)
+    shutil.copy(tmp_path / 'other' / FILE_NAME, tmp_path / 'mount' / FILE_NAME)
+    late.add('more')
+    assert '47.397742' in late.keeper.trouble
+    assert late.keeper.trouble.endswith('nothing is kept until a restart')

@@ -8,8 +8,8 @@ import sys
 
 import pytest
 
-from uav_task_alloc.errors import JournalError
-from uav_task_alloc.journal import FILE_NAME, VERSION, Journal, Row
+from uav_task_alloc.errors import JournalCorrupt, JournalError, JournalForeign, JournalInUse
+from uav_task_alloc.journal import FILE_NAME, VERSION, Journal, Row, rescued, set_aside
 
 WRITER = """
 import sys
@@ -66,7 +66,7 @@ def test_a_torn_end_of_the_log_is_left_out(tmp_path):
 def test_a_second_allocator_on_the_same_folder_is_refused(tmp_path):
     first = Journal(str(tmp_path))
     first.put([Row('a', '1', 1)])
-    with pytest.raises(JournalError, match='cannot be opened: database is locked'):
+    with pytest.raises(JournalInUse, match='cannot be opened: database is locked'):
         Journal(str(tmp_path))
 
 
@@ -103,3 +103,104 @@ def test_a_full_disk_is_reported_and_changes_nothing(tmp_path):
     journal._db.execute('PRAGMA max_page_count = 1000000')
     journal.put([Row('a', '1', 3)])
     assert journal.load() == [Row('a', '1', 3)]
+
+
+@pytest.mark.parametrize('size', [0, 1, 15])
+def test_finding_23_an_emptied_file_is_no_new_journal(tmp_path, size):
+    Journal(str(tmp_path)).close()
+    with (tmp_path / FILE_NAME).open('r+b') as file:
+        file.truncate(size)
+    with pytest.raises(JournalCorrupt, match=f'size = {size} bytes: expected at least 16'):
+        Journal(str(tmp_path))
+    assert (tmp_path / FILE_NAME).stat().st_size == size
+
+
+def test_finding_23_an_emptied_file_keeps_its_log(tmp_path):
+    journal = Journal(str(tmp_path))
+    journal.put([Row('a', '1', 1)])
+    log = tmp_path / (FILE_NAME + '-wal')
+    held = log.read_bytes()
+    journal.close()
+    (tmp_path / FILE_NAME).write_bytes(b'')
+    log.write_bytes(held)
+    with pytest.raises(JournalCorrupt):
+        Journal(str(tmp_path))
+    assert log.read_bytes() == held
+
+
+def test_finding_23_a_database_without_the_table_is_empty(tmp_path):
+    database = sqlite3.connect(tmp_path / FILE_NAME)
+    database.execute('PRAGMA user_version = 0')
+    database.execute('VACUUM')  # a header, and nothing else
+    database.close()
+    with pytest.raises(JournalCorrupt, match=r'layout version = 0.*it is empty'):
+        Journal(str(tmp_path))
+
+
+def test_finding_23_a_database_of_another_program_is_left_alone(tmp_path):
+    database = sqlite3.connect(tmp_path / FILE_NAME)
+    database.execute('CREATE TABLE birds (name TEXT)')
+    database.close()
+    with pytest.raises(JournalForeign, match='a database of another program'):
+        Journal(str(tmp_path))
+
+
+def test_finding_23_a_creation_that_broke_off_leaves_no_empty_journal(tmp_path, monkeypatch):
+    def kill(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr('uav_task_alloc.journal._put_in_place', kill)
+    with pytest.raises(KeyboardInterrupt):
+        Journal(str(tmp_path))
+    monkeypatch.undo()
+    assert not (tmp_path / FILE_NAME).exists()
+    assert Journal(str(tmp_path)).load() == []
+    assert sorted(path.name for path in tmp_path.iterdir() if 'new' in path.name) == []
+
+
+def test_finding_23_a_file_system_without_links_gets_a_journal(tmp_path, monkeypatch):
+    def no_links(*_):
+        raise PermissionError(1, 'Operation not permitted')
+
+    monkeypatch.setattr('os.link', no_links)
+    journal = Journal(str(tmp_path))
+    journal.put([Row('a', '1', 1)])
+    journal.close()
+    assert Journal(str(tmp_path)).load() == [Row('a', '1', 1)]
+
+
+def test_finding_23_locked_in_the_path_is_no_foreign_lock(tmp_path):
+    (tmp_path / 'locked').touch()
+    with pytest.raises(JournalError, match='cannot be opened') as caught:
+        Journal(str(tmp_path / 'locked' / 'state'))
+    assert not isinstance(caught.value, JournalForeign)
+
+
+@pytest.mark.parametrize('pages', [2, 4, 6])
+def test_finding_23_the_rows_before_a_cut_are_rescued(tmp_path, pages):
+    journal = Journal(str(tmp_path))
+    journal.put([Row('a', f'{k:03}', 'x' * 50) for k in range(300)])
+    journal.close()
+    file = tmp_path / FILE_NAME
+    file.write_bytes(file.read_bytes()[:4096 * pages])
+    with pytest.raises(JournalCorrupt, match='malformed'):
+        Journal(str(tmp_path))
+    held = file.read_bytes()
+    aside = set_aside(str(tmp_path))
+    found = rescued(aside)
+    assert aside.read_bytes() == held
+    assert {row.body for row in found} <= {'x' * 50}
+    assert len(found) >= 30 * (pages - 2)
+
+
+def test_finding_23_the_rows_on_both_sides_of_a_bad_page_are_rescued(tmp_path):
+    journal = Journal(str(tmp_path))
+    journal.put([Row('a', f'{k:03}', 'x' * 50) for k in range(300)])
+    journal.close()
+    file = tmp_path / FILE_NAME
+    held = bytearray(file.read_bytes())
+    held[4 * 4096:5 * 4096] = bytes(range(256)) * 16
+    file.write_bytes(held)
+    found = {row.id for row in rescued(set_aside(str(tmp_path)))}
+    assert {'000', '299'} <= found
+    assert 200 <= len(found) < 300

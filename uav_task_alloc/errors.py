@@ -49,6 +49,14 @@ class JournalForeign(JournalError):
     """The journal is not ours to touch: a newer version wrote it, or another process has it."""
 
 
+class JournalInUse(JournalForeign):
+    """Another process has the journal open."""
+
+
+class OriginMismatch(JournalForeign):
+    """The journal is of another origin: its coordinates mean other places."""
+
+
 class MissionError(AllocError, ValueError):
     """A route cannot be expressed as mission items for a profile; `task` is the one at fault."""
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import shutil
 import sqlite3
 import tempfile
@@ -11,11 +12,19 @@ from itertools import count
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from uav_task_alloc.errors import JournalCorrupt, JournalError, JournalForeign
+from uav_task_alloc.errors import JournalCorrupt, JournalError, JournalForeign, JournalInUse
 
 FILE_NAME = 'journal.sqlite3'
 SIDE_FILES = ('', '-wal', '-shm')
 VERSION = 1  # of the layout; a file of a newer one is refused
+SHORTEST = 16  # [bytes] the header of SQLite; it takes a shorter file for a new database
+LONGEST = 2**30  # [bytes] a damaged header may ask for any length
+COLUMNS = ['kind', 'id', 'body']
+IN_USE = frozenset({sqlite3.SQLITE_BUSY, sqlite3.SQLITE_LOCKED})
+DAMAGED = frozenset({sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB})
+
+
+SELECT = 'SELECT kind, id, body FROM world'
 
 
 class Row(NamedTuple):
@@ -23,14 +32,15 @@ class Row(NamedTuple):
 
     kind: str
     id: str
-    body: Any  # JSON
+    body: Any  # JSON; loaded text that is no JSON: its bytes
 
 
 class Journal:
     """A file in `state_dir`.
 
     Raises JournalError, which names the file and the reason: JournalCorrupt where the file is
-    damaged, JournalForeign where it is not ours.
+    damaged, empty or no journal, JournalForeign where it is not ours, JournalInUse where another
+    process has it.
     """
 
     def __init__(self, state_dir: str) -> None:
@@ -38,9 +48,11 @@ class Journal:
         self._db: Any = None
         try:
             self.path.parent.mkdir(parents=True, exist_ok=True)
+            if not self.path.exists():
+                _create(self.path)
+            _check_length(self.path)
             # one process owns it: a second allocator would hand out the same revisions
-            self._db = sqlite3.connect(self.path, timeout=0.5, isolation_level=None,
-                                       check_same_thread=False)
+            self._db = _connect(self.path)
             self._prepare()
             self._inode = self.path.stat().st_ino
         except (sqlite3.Error, OSError) as error:
@@ -58,17 +70,24 @@ class Journal:
         if version > VERSION:
             raise JournalForeign(f'{self.path}: layout version = {version}: expected at most '
                                  f'{VERSION}, a newer uav_task_alloc wrote it')
-        self._db.execute('BEGIN IMMEDIATE')
-        self._db.execute('CREATE TABLE IF NOT EXISTS world (kind TEXT, id TEXT, '
-                         'body TEXT NOT NULL, PRIMARY KEY (kind, id)) WITHOUT ROWID')
-        self._db.execute(f'PRAGMA user_version = {VERSION}')
+        self._check_layout(version)
+        self._db.execute('BEGIN IMMEDIATE')  # nobody else has it
         self._db.execute('COMMIT')
 
+    def _check_layout(self, version: int) -> None:
+        columns = [row[1].decode() for row in self._db.execute('PRAGMA table_info(world)')]
+        if version == VERSION and columns == COLUMNS:
+            return
+        text = (f'{self.path}: layout version = {version}, columns = {columns}: '
+                f'expected {VERSION} and {COLUMNS}')
+        if self._db.execute('SELECT count(*) FROM sqlite_master').fetchone()[0]:
+            raise JournalForeign(f'{text}; it is a database of another program')
+        raise JournalCorrupt(f'{text}; it is empty')
+
     def load(self) -> list[Row]:
-        """Everything that was put and not taken out; a body that is no JSON as its text."""
+        """Everything that was put and not taken out; a body that is no JSON as its bytes."""
         try:
-            rows = self._db.execute('SELECT kind, id, body FROM world ORDER BY kind, id')
-            return [Row(kind, id, _body(text)) for kind, id, text in rows]
+            return [_row(*row) for row in self._db.execute(f'{SELECT} ORDER BY kind, id')]
         except sqlite3.Error as error:
             raise self._error('read', error) from error
 
@@ -103,19 +122,77 @@ class Journal:
             self._db.close()
 
     def _error(self, what: str, error: Exception) -> JournalError:
+        # the low byte is the primary code; errors of the Python module itself have none
+        code = getattr(error, 'sqlite_errorcode', 0) & 0xff
         kind = JournalError
-        if 'locked' in str(error):
-            kind = JournalForeign
-        elif type(error) is sqlite3.DatabaseError:  # its subclasses mean other troubles
+        if code in IN_USE:
+            kind = JournalInUse
+        elif code in DAMAGED:
             kind = JournalCorrupt
         return kind(f'{self.path} cannot be {what}: {error}')
 
 
-def _body(text: str) -> Any:
+def _connect(path: Path) -> Any:
+    made = sqlite3.connect(path, timeout=0.5, isolation_level=None, check_same_thread=False)
+    made.text_factory = bytes  # damaged text is the matter of its row
+    return made
+
+
+def _create(path: Path) -> None:
+    """Make a journal without rows; it appears as a whole, so that an empty file is damage."""
+    made = path.with_name(f'{path.name}.new-{os.getpid()}')
+    try:
+        made.unlink(missing_ok=True)
+        db = _connect(made)
+        try:
+            db.execute('BEGIN IMMEDIATE')
+            db.execute('CREATE TABLE world (kind TEXT, id TEXT, body TEXT NOT NULL, '
+                       'PRIMARY KEY (kind, id)) WITHOUT ROWID')
+            db.execute(f'PRAGMA user_version = {VERSION}')
+            db.execute('COMMIT')
+        finally:
+            db.close()
+        _put_in_place(made, path)
+    finally:
+        made.unlink(missing_ok=True)
+
+
+def _put_in_place(made: Path, path: Path) -> None:
+    """Give the file its name, unless another process was first; on disk when this returns."""
+    try:
+        os.link(made, path)
+    except FileExistsError:
+        return
+    except OSError:  # a file system without links
+        made.rename(path)
+    folder = os.open(path.parent, os.O_RDONLY)
+    try:
+        os.fsync(folder)
+    finally:
+        os.close(folder)
+
+
+def _check_length(path: Path) -> None:
+    """Raise JournalCorrupt for a file that SQLite would take for a new database."""
+    size = path.stat().st_size
+    if size < SHORTEST:
+        raise JournalCorrupt(f'{path} cannot be opened: size = {size} bytes: expected at least '
+                             f'{SHORTEST}, it was emptied or cut short')
+
+
+def _row(kind: Any, id: Any, text: Any) -> Row:
+    return Row(_text(kind), _text(id), _body(text))
+
+
+def _text(value: Any) -> str:
+    return value.decode(errors='replace') if isinstance(value, bytes) else str(value)
+
+
+def _body(text: Any) -> Any:
     try:
         return json.loads(text)
-    except ValueError:
-        return text
+    except (ValueError, TypeError, RecursionError):
+        return text if isinstance(text, bytes) else repr(text).encode()
 
 
 def set_aside(state_dir: str) -> Path:
@@ -137,16 +214,59 @@ def read_copy(state_dir: str) -> list[Row]:
 
     Raises JournalError.
     """
-    path = Path(state_dir).expanduser() / FILE_NAME
     with tempfile.TemporaryDirectory() as folder:
-        try:
-            for end in SIDE_FILES[:2]:
-                if Path(f'{path}{end}').exists():
-                    shutil.copyfile(f'{path}{end}', Path(folder, FILE_NAME + end))
-        except OSError as error:
-            raise JournalError(f'{path} cannot be read: {error}') from error
+        _copy(Path(state_dir).expanduser() / FILE_NAME, folder)
         journal = Journal(folder)
         try:
             return journal.load()
         finally:
             journal.close()
+
+
+def rescued(path: Path) -> list[Row]:
+    """The rows of a damaged file that can still be read; the file itself is not touched.
+
+    They are read from both ends, each as far as it goes. Raises JournalError where the file
+    cannot be copied.
+    """
+    with tempfile.TemporaryDirectory() as folder:
+        _copy(path, folder)
+        _pad(Path(folder, FILE_NAME))
+        db = _connect(Path(folder, FILE_NAME))
+        found: dict[tuple[str, str], Row] = {}
+        try:
+            for order in ('ASC', 'DESC'):
+                _read_on(db, f'{SELECT} ORDER BY kind {order}, id {order}', found)
+        finally:
+            db.close()
+    return list(found.values())
+
+
+def _pad(path: Path) -> None:
+    """Fill a file that was cut short with zeros: SQLite reads no page of a shorter one."""
+    with path.open('r+b') as file:
+        header = file.read(32)
+        page = int.from_bytes(header[16:18], 'big')
+        length = min(page * int.from_bytes(header[28:32], 'big'), LONGEST)
+        if path.stat().st_size < length:
+            file.truncate(length)
+
+
+def _read_on(db: Any, query: str, found: dict[tuple[str, str], Row]) -> None:
+    """Add rows to `found` until the query fails."""
+    try:
+        for each in db.execute(query):
+            row = _row(*each)
+            found.setdefault((row.kind, row.id), row)
+    except sqlite3.Error:
+        return
+
+
+def _copy(path: Path, folder: str) -> None:
+    """Copy the files of a journal under its usual name. Raises JournalError."""
+    try:
+        for end in SIDE_FILES[:2]:
+            if Path(f'{path}{end}').exists():
+                shutil.copyfile(f'{path}{end}', Path(folder, FILE_NAME + end))
+    except OSError as error:
+        raise JournalError(f'{path} cannot be read: {error}') from error

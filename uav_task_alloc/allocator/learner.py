@@ -37,7 +37,7 @@ def learner(body: Any) -> State:
     from uav_task_alloc.solver.warm import State
     try:
         return State(learnt=_tables(body))
-    except (KeyError, TypeError, ValueError):
+    except (LookupError, TypeError, ValueError, AttributeError):
         return State()
 
 
@@ -51,6 +51,8 @@ def _tables(body: Any) -> object:
         raise ValueError(f'learner: near up to {near.max()}: expected places of {n} tasks')
     tables = Tables(_unpacked(body['task'], '<f4').reshape(near.shape).astype(float),
                     _unpacked(body['start'], '<f4').reshape(m, n).astype(float))
+    if not (np.isfinite(tables.task).all() and np.isfinite(tables.start).all()):
+        raise ValueError('learner: expected finite numbers')
     return Learnt(tables, (near + m).astype(NODE), {uav_id: i for i, uav_id in enumerate(uavs)},
                   {task_id: i for i, task_id in enumerate(tasks)})
 

@@ -2,14 +2,35 @@
 """The world as rows of the journal and back."""
 from __future__ import annotations
 
-from collections.abc import Iterable
+import json
+import math
+import sys
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, fields, replace
 from enum import Enum
-from typing import Any
+from typing import Any, TypeVar
 
 from uav_task_alloc.allocator.records import Stop, TaskRecord, TaskState, UavList
+from uav_task_alloc.errors import InvalidValue
+from uav_task_alloc.geometry.frames import Origin
 from uav_task_alloc.journal import Row
-from uav_task_alloc.model import Leg, Shape, Task, ThreatZone
+from uav_task_alloc.model import (
+    Leg,
+    Point,
+    Shape,
+    Task,
+    ThreatZone,
+    check_id,
+    check_names,
+    check_number,
+    check_point,
+    check_ros_name,
+)
+
+Thing = TypeVar('Thing')
+KINDS = frozenset({'task', 'list', 'zones', 'off', 'revision', 'learner', 'origin'})
+UNREADABLE = (LookupError, TypeError, ValueError, AttributeError, OverflowError)
+LAST = 2.0**31 - 1.0  # [s] the last stamp, and the last revision, that a message can hold
 
 
 @dataclass(slots=True)
@@ -22,6 +43,7 @@ class Saved:
     off: list[str] = field(default_factory=list)  # UAVs an operator switched off
     revision: int = 0  # of the allocation
     learnt: Any = None  # by the bees: the body of their row
+    origin: Origin | None = None  # of all coordinates; None: the journal does not say
     bad: list[str] = field(default_factory=list)  # rows that are left out, and why
 
 
@@ -52,13 +74,18 @@ def revision_row(revision: int) -> Row:
     return Row('revision', '', revision)
 
 
+def origin_row(origin: Origin) -> Row:
+    """Where ENU (0, 0, 0) is."""
+    return Row('origin', '', [origin.latitude, origin.longitude, origin.altitude_amsl])
+
+
 def saved(rows: Iterable[Row]) -> Saved:
     """The world of these rows; one that is not as it was written is left out, and told."""
     found = Saved()
     for row in rows:
         try:
             _take(found, row)
-        except (KeyError, TypeError, ValueError, AttributeError) as error:
+        except UNREADABLE as error:
             found.bad.append(f'journal row {row.kind} {row.id!r} cannot be read: {error!r}')
     known = {record.task.id for record in found.tasks}
     found.lists = [replace(each, stops=tuple(s for s in each.stops if s.task.id in known))
@@ -67,20 +94,36 @@ def saved(rows: Iterable[Row]) -> Saved:
 
 
 def _take(found: Saved, row: Row) -> None:
+    if row.kind not in KINDS:
+        raise ValueError(f'unknown kind {row.kind!r}')
+    if isinstance(row.body, (bytes, str)):
+        raise ValueError('body: expected JSON')
+    json.dumps(row.body, ensure_ascii=False).encode()  # no message holds half a character
     if row.kind == 'task':
-        found.tasks.append(_task_record(row.body))
+        found.tasks.append(_task_record(row.id, row.body))
     elif row.kind == 'list':
-        found.lists.append(_list(row.body))
+        found.lists.append(_list(row.id, row.body))
     elif row.kind == 'zones':
-        found.zones = [_zone(body) for body in row.body]
+        found.zones = _each(found, 'zone', row.body, _zone)
     elif row.kind == 'off':
-        found.off = [str(uav_id) for uav_id in row.body]
+        found.off = _each(found, 'UAV switched off', row.body, _uav_id)
     elif row.kind == 'revision':
-        found.revision = int(row.body)
+        found.revision = _whole('revision', row.body)
     elif row.kind == 'learner':
         found.learnt = row.body
     else:
-        raise ValueError(f'unknown kind {row.kind!r}')
+        found.origin = Origin(*row.body)
+
+
+def _each(found: Saved, what: str, bodies: Any, read: Callable[[Any], Thing]) -> list[Thing]:
+    """Those of a row that can be read; of the others it is told."""
+    good = []
+    for body in _list_of(what, bodies):
+        try:
+            good.append(read(body))
+        except UNREADABLE as error:
+            found.bad.append(f'journal: {what} cannot be read: {error!r}')
+    return good
 
 
 def _plain(value: Any) -> Any:
@@ -96,26 +139,74 @@ def _plain(value: Any) -> Any:
 
 
 def _task(body: dict[str, Any]) -> Task:
+    check_ros_name('task id', check_id('task id', body['id']))
     return Task(**{spec.name: body[spec.name] for spec in fields(Task)})
 
 
 def _zone(body: dict[str, Any]) -> ThreatZone:
-    return ThreatZone(**{**body, 'shape': Shape(body['shape']),
+    check_ros_name('zone id', check_id('zone id', body['id']))
+    sizes = {name: check_number(f'zone {name}', body[name], -math.inf)
+             for name in ('radius', 'z_min', 'z_max')}
+    return ThreatZone(**{**body, **sizes, 'shape': Shape(body['shape']),
                          'vertices': tuple((x, y) for x, y in body['vertices'])})
 
 
-def _task_record(body: dict[str, Any]) -> TaskRecord:
-    return TaskRecord(**{**body, 'task': _task(body['task']),
-                         'announced': _task(body.get('announced', body['task'])),
-                         'state': TaskState(body['state']),
-                         'failed_on': tuple(body['failed_on'])})
+def _uav_id(body: Any) -> str:
+    return check_ros_name('uav_id', check_id('uav_id', body))
 
 
-def _list(body: dict[str, Any]) -> UavList:
-    stops = tuple(Stop(_task(stop['task']), _leg(stop['leg']), stop['eta'])
-                  for stop in body['stops'])
-    return UavList(**{**body, 'stops': stops, 'end_via': tuple(map(tuple, body['end_via']))})
+def _task_record(task_id: str, body: dict[str, Any]) -> TaskRecord:
+    record = TaskRecord(**{**body, 'task': _task(body['task']),
+                           'announced': _task(body.get('announced', body['task'])),
+                           'state': TaskState(body['state']),
+                           'failed_on': tuple(_list_of('failed_on', body['failed_on']))})
+    check_names('failed_on', record.failed_on)
+    _same('task id', record.task.id, task_id)
+    for name, text in (('uav', record.uav), ('reason', record.reason)):
+        if not isinstance(text, str):
+            raise InvalidValue(name, text, 'a string')
+    check_number('stamp', record.stamp, -LAST, LAST)
+    return record
+
+
+def _list(uav_id: str, body: dict[str, Any]) -> UavList:
+    stops = tuple(Stop(_task(stop['task']), _leg(stop['leg']), _metres('eta', stop['eta']))
+                  for stop in _list_of('stops', body['stops']))
+    found = UavList(**{**body, 'stops': stops, 'end_via': _points('end_via', body['end_via']),
+                       'revision': _whole('revision', body['revision']),
+                       'distance': _metres('distance', body['distance']),
+                       'stamp': check_number('stamp', body['stamp'], -LAST, LAST)})
+    _same('uav', _uav_id(found.uav), uav_id)
+    if not isinstance(found.returns, bool):
+        raise InvalidValue('returns', found.returns, 'true or false')
+    return found
 
 
 def _leg(body: dict[str, Any]) -> Leg:
-    return Leg(tuple((x, y, z) for x, y, z in body['via']), body['length'])
+    return Leg(_points('via', body['via']), _metres('length', body['length']))
+
+
+def _points(place: str, body: Any) -> tuple[Point, ...]:
+    return tuple(check_point(place, point) for point in _list_of(place, body))
+
+
+def _metres(place: str, body: Any) -> float:
+    """A length [m] or a time span [s]."""
+    return check_number(place, body, 0.0, sys.float_info.max)
+
+
+def _whole(place: str, body: Any) -> int:
+    if not isinstance(body, int):
+        raise InvalidValue(place, body, 'a whole number')
+    return int(check_number(place, body, 0.0, LAST))
+
+
+def _list_of(place: str, body: Any) -> list[Any]:
+    if not isinstance(body, list):
+        raise InvalidValue(place, body, 'a list')
+    return body
+
+
+def _same(place: str, value: str, expected: str) -> None:
+    if value != expected:
+        raise InvalidValue(place, value, f'{expected!r} as the row has it')

@@ -54,7 +54,7 @@ class AllocatorNode(Node):
         now = self.live.now
         self.origin = Origin(now.origin__latitude, now.origin__longitude,
                              now.origin__altitude_amsl)
-        self.keeper = Keeper(now.state_dir, self.get_logger().error)
+        self.keeper = Keeper(now.state_dir, self.get_logger().error, self.origin)
         self.core = Allocator(now, time.monotonic(), self.keeper.saved)
         self.world = self.core.world
         self.complained: dict[tuple[str, str], set[str]] = {}  # (topic, name): reasons
