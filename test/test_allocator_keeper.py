@@ -111,7 +111,7 @@ def test_a_disk_that_becomes_read_only_is_told_and_made_up_for(disk):
 @pytest.fixture
 def unopenable(monkeypatch):
     """From now on no journal opens in its place, until the function is called."""
-    def journal(state_dir):
+    def journal(state_dir, wait=0.0):
         error = sqlite3.OperationalError('attempt to write a readonly database')
         raise Journal.__new__(Journal)._error('opened', error) from error
 

@@ -17,6 +17,7 @@ from uav_task_alloc.errors import JournalCorrupt, JournalError, JournalForeign, 
 FILE_NAME = 'journal.sqlite3'
 SIDE_FILES = ('', '-wal', '-shm')
 VERSION = 1  # of the layout; a file of a newer one is refused
+WAIT = 0.5  # [s] for another process that has the file
 SHORTEST = 16  # [bytes] the header of SQLite; it takes a shorter file for a new database
 LONGEST = 2**30  # [bytes] a damaged header may ask for any length
 COLUMNS = ['kind', 'id', 'body']
@@ -43,7 +44,8 @@ class Journal:
     process has it.
     """
 
-    def __init__(self, state_dir: str) -> None:
+    def __init__(self, state_dir: str, wait: float = WAIT) -> None:
+        """wait: [s] for another process that has it."""
         self.path = Path(state_dir).expanduser() / FILE_NAME
         self._db: Any = None
         try:
@@ -52,7 +54,7 @@ class Journal:
                 _create(self.path)
             _check_length(self.path)
             # one process owns it: a second allocator would hand out the same revisions
-            self._db = _connect(self.path)
+            self._db = _connect(self.path, wait)
             self._prepare()
             self._inode = self.path.stat().st_ino
         except (sqlite3.Error, OSError) as error:
@@ -132,8 +134,8 @@ class Journal:
         return kind(f'{self.path} cannot be {what}: {error}')
 
 
-def _connect(path: Path) -> Any:
-    made = sqlite3.connect(path, timeout=0.5, isolation_level=None, check_same_thread=False)
+def _connect(path: Path, wait: float = WAIT) -> Any:
+    made = sqlite3.connect(path, timeout=wait, isolation_level=None, check_same_thread=False)
     made.text_factory = bytes  # damaged text is the matter of its row
     return made
 

@@ -19,7 +19,7 @@ from uav_task_alloc.errors import (
     OriginMismatch,
 )
 from uav_task_alloc.geometry.frames import Origin
-from uav_task_alloc.journal import Journal, Row, read_copy, rescued, set_aside
+from uav_task_alloc.journal import WAIT, Journal, Row, read_copy, rescued, set_aside
 
 RETRY = 1.0  # [s] between two tries on a disk that refused
 SAME_ANGLE, SAME_ALTITUDE = 1e-7, 0.01  # [deg], [m] an origin is the same within 1 cm
@@ -30,19 +30,21 @@ class Keeper:
     """`trouble` is what is wrong with the journal, '' while all is well.
 
     state_dir: folder of the journal, '' for none. origin: of all coordinates; None: not checked.
+    wait: [s] at the start for another process that has the journal.
     Raises OriginMismatch where the journal is of another origin.
     """
 
     def __init__(self, state_dir: str, complain: Callable[[str], object],
-                 origin: Origin | None = None) -> None:
+                 origin: Origin | None = None, wait: float = WAIT) -> None:
         self._dir, self._complain, self._origin = state_dir, complain, origin
+        self._wait = wait
         self._journal: Journal | None = None
         self._has_origin = origin is None  # the journal names it
         self._now_wrong = ''  # until it is mended
         self._lost = ''  # what the last life left that cannot be read: told until the next one
         self._given_up = not state_dir
         self._retry = 0.0  # [s]
-        self.in_use = False  # another process had the journal at the start
+        self.in_use = ''  # another process had the journal at the start: the error
         self.saved = self._begin() if state_dir else Saved()
         if self.saved.bad:
             self._lose('; '.join(filter(None, (self._lost, (
@@ -61,7 +63,7 @@ class Keeper:
             self.close()
             raise
         except JournalForeign as error:
-            self.in_use = isinstance(error, JournalInUse)
+            self.in_use = str(error) if isinstance(error, JournalInUse) else ''
             self._give_up(str(error))
         except JournalError as error:
             self._say(f'{error}; tried again every {RETRY:g} s')
@@ -89,7 +91,8 @@ class Keeper:
 
     def _open(self) -> list[Row]:
         try:
-            self._journal = Journal(self._dir)
+            self._journal = Journal(self._dir, self._wait)
+            self._wait = WAIT
             return self._journal.load()
         except JournalCorrupt as error:
             self.close()

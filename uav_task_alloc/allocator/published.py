@@ -14,6 +14,7 @@ class ListBook:
     def __init__(self, lists: Iterable[UavList] = ()) -> None:
         self.lists = {each.uav: each for each in lists}
         self.dirty: set[str] = set()  # not yet on disk
+        self.strange = False  # a UAV had a list that is not of this book
         self._old = {each.uav: each.revision for each in self.lists.values()}
         self._carried: dict[tuple[str, str], tuple[int, int]] = {}
 
@@ -41,6 +42,7 @@ class ListBook:
         held = self.get(uav_id)
         if revision <= held.revision:
             return False
+        self.strange = True
         self.lists[uav_id] = replace(held, revision=revision)
         self._old[uav_id] = revision
         return True

@@ -49,9 +49,10 @@ def from_allocation(allocation: Allocation, lists: list[m.TaskList],
 
 
 def from_health(name: str, worries: list[str], facts: dict[str, object],
-                now: float) -> DiagnosticArray:
-    """What an operator asks first."""
+                now: float, stopped: bool = False) -> DiagnosticArray:
+    """What an operator asks first. stopped: the worries are why it does nothing."""
     level = DiagnosticStatus.WARN if worries else DiagnosticStatus.OK
+    level = DiagnosticStatus.ERROR if stopped else level
     values = [KeyValue(key=key, value=str(value)) for key, value in facts.items()]
     status = DiagnosticStatus(level=level, name=f'{name}: allocation', hardware_id='',
                               message='; '.join(worries) or 'running', values=values)

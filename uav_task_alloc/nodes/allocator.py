@@ -9,20 +9,24 @@ from collections import deque
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
+from rclpy.service import Service
+from rclpy.subscription import Subscription
 from std_srvs.srv import Trigger
 from uav_task_alloc_msgs import msg as m
 from uav_task_alloc_msgs.srv import SetAvailability, SubmitTasks
 
 from uav_task_alloc.allocator import Allocator, planning
 from uav_task_alloc.allocator.keeper import Keeper
+from uav_task_alloc.allocator.leader import Role
 from uav_task_alloc.allocator.records import Answer, Note, Problem, Verdict
 from uav_task_alloc.allocator.status import facts, worries
 from uav_task_alloc.allocator.worker import Worker
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.geometry.frames import Origin
 from uav_task_alloc.nodes import allocation_messages as told, announcements
-from uav_task_alloc.nodes.bounds import cut
+from uav_task_alloc.nodes.complaints import Complaints
 from uav_task_alloc.nodes.intake import hear
+from uav_task_alloc.nodes.leader_watch import LeaderWatch
 from uav_task_alloc.nodes.messages import (
     HEARD_ANNOUNCEMENTS,
     HEARD_EVENTS,
@@ -39,9 +43,9 @@ from uav_task_alloc.nodes.teller import Teller
 from uav_task_alloc.params import AllocatorParams
 
 TICK = 0.025  # [s]
+LOCK_WAIT = 5.0  # [s] for the journal of an allocator that is just ending
 PATIENCE = 1.0  # [s] that the lists of the last life wait for somebody to hear them
 REST, MOST_REST = 3.0, 0.2  # times as long as a tick took the next one waits, at most [s]
-MOST_COMPLAINTS, MOST_REASONS = 1000, 20  # names, and reasons for each, remembered as logged
 MOST_LINES, MOST_ROWS = 200, 500  # logged, and saved, at once
 
 
@@ -54,15 +58,20 @@ class AllocatorNode(Node):
         now = self.live.now
         self.origin = Origin(now.origin__latitude, now.origin__longitude,
                              now.origin__altitude_amsl)
-        self.keeper = Keeper(now.state_dir, self.get_logger().error, self.origin)
+        self.keeper = Keeper(now.state_dir, self.get_logger().error, self.origin,
+                             LOCK_WAIT)
         self.core = Allocator(now, time.monotonic(), self.keeper.saved)
         self.world = self.core.world
-        self.complained: dict[tuple[str, str], set[str]] = {}  # (topic, name): reasons
+        self.complain = Complaints(self.get_logger().warning).say
         self.answers: deque[Answer | None] = deque()
         self.background = False
         self.rested = 0.0  # [s] steady clock
         self.fault = ''  # why the last solve failed
         self.behind = False  # there is more to tell than was told
+        self.inputs: list[Subscription] = []
+        self.offers: list[Service] = []  # once it leads
+        self.passive = False  # another allocator leads
+        self.watch = LeaderWatch(self, self.world.lists, self.keeper.in_use)
         self._listen()
         self._talk()
         self.arrived = self.create_guard_condition(self.on_answer)
@@ -78,10 +87,7 @@ class AllocatorNode(Node):
                  HEARD_ANNOUNCEMENTS),
                 (m.ThreatZoneArray, 'threat_zones', self.on_zones, LATCHED),
                 (m.TaskEvent, 'task_events', self.on_event, HEARD_EVENTS)):
-            hear(self, kind, topic, heard, qos)
-        self.create_service(SubmitTasks, '~/submit_tasks', self.on_submit)
-        self.create_service(Trigger, '~/replan', self.on_replan)
-        self.create_service(SetAvailability, '~/set_availability', self.on_availability)
+            self.inputs.append(hear(self, kind, topic, heard, qos))
         steady = Clock(clock_type=ClockType.STEADY_TIME)  # simulated time may stand still
         self.create_timer(TICK, self.on_tick, clock=steady)
         self.create_timer(1.0, self.on_second, clock=steady)
@@ -90,6 +96,30 @@ class AllocatorNode(Node):
         self.teller = Teller(self, self.world)
         self.painter = Painter(self, self.world)
         self.health = self.create_publisher(DiagnosticArray, '/diagnostics', 10)
+
+    def leads(self) -> bool:
+        """Whether this allocator may publish; where another one leads it lets go of all topics."""
+        role = self.watch.role()
+        if role is Role.LEADING and not self.offers:
+            self.offers = [
+                self.create_service(SubmitTasks, '~/submit_tasks', self.on_submit),
+                self.create_service(Trigger, '~/replan', self.on_replan),
+                self.create_service(SetAvailability, '~/set_availability', self.on_availability)]
+        if role is Role.PASSIVE and not self.passive:
+            self.step_down()
+        return role is Role.LEADING
+
+    def step_down(self) -> None:
+        """Hear, offer and publish nothing any more but /diagnostics; what was accepted is kept."""
+        self.passive = True
+        self.get_logger().error(self.watch.trouble())
+        self.keeper.save(self.core, time.monotonic())
+        for heard in self.inputs:
+            self.destroy_subscription(heard)
+        for offer in self.offers:
+            self.destroy_service(offer)
+        self.teller.close()
+        self.painter.close()
 
     def stamp(self) -> float:
         """The published clock [s]."""
@@ -153,25 +183,12 @@ class AllocatorNode(Node):
         response.success, response.message = not refused, refused or f'{request.uav_id} is {word}'
         return response
 
-    def complain(self, topic: str, name: str, reason: str) -> None:
-        """Log what is wrong with a message, once until `name` sends a good one."""
-        name = cut(name)
-        if not reason:
-            self.complained.pop((topic, name), None)
-            return
-        said = self.complained.setdefault((topic, name), set())
-        if reason not in said and len(said) < MOST_REASONS:
-            said.add(reason)
-            self.get_logger().warning(f'{topic}: {reason}: ignored; said once')
-        while len(self.complained) > MOST_COMPLAINTS:
-            del self.complained[next(iter(self.complained))]
-
     # what is solved
 
     def on_tick(self) -> None:
         """What time brings, a solve where one is due, and what has to be told."""
         now, stamp = time.monotonic(), self.stamp()
-        if now < self.rested or self.waits_for_listeners(now):
+        if not self.leads() or now < self.rested or self.waits_for_listeners(now):
             return
         if self.world.params is not self.live.now:
             self.world.params = self.live.now
@@ -233,7 +250,8 @@ class AllocatorNode(Node):
             answer = self.answers.popleft()
             self.fault = self.fault if answer is None else ''
             self.core.adopt(answer, time.monotonic(), self.stamp())
-        self.tell(self.stamp())
+        if self.leads():
+            self.tell(self.stamp())
         self.rest(began)
 
     # what is told
@@ -261,9 +279,11 @@ class AllocatorNode(Node):
 
     def on_second(self) -> None:
         """Say how it goes."""
+        stopped = self.watch.trouble()
         self.health.publish(told.from_health(
-            self.get_fully_qualified_name(), worries(self.world, self.keeper.trouble, self.fault),
-            facts(self.world), self.stamp()))
+            self.get_fully_qualified_name(),
+            [stopped] if stopped else worries(self.world, self.keeper.trouble, self.fault),
+            {**facts(self.world), **self.watch.facts()}, self.stamp(), bool(stopped)))
 
     def destroy_node(self) -> None:
         """End the worker, let go of the journal."""

@@ -14,7 +14,7 @@ GULP = 0.005  # [s] of one topic before the others have their turn
 
 
 def hear(node: Node, kind: type, topic: str, take: Callable[[Any], object],
-         qos: QoSProfile) -> None:
+         qos: QoSProfile) -> Subscription:
     """Call `take` with every message of a topic, those that wait already at once."""
     def gulp(message: Any) -> None:
         until = time.monotonic() + GULP
@@ -27,3 +27,4 @@ def hear(node: Node, kind: type, topic: str, take: Callable[[Any], object],
             take(waiting[0])
 
     subscription: Subscription = node.create_subscription(kind, topic, gulp, qos)
+    return subscription

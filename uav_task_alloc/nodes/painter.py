@@ -37,7 +37,13 @@ class Painter:
         self.zones: list[object] = []
         self.places: dict[str, Point] = {}  # of UAVs as drawn
         self.drawn = self.rested = 0.0  # [s] steady clock
-        node.create_timer(LOOK, self.on_look)
+        self.timer = node.create_timer(LOOK, self.on_look)
+
+    def close(self) -> None:
+        """Draw nothing any more."""
+        self.node.destroy_timer(self.timer)
+        for made in (*self.paths.values(), self.publisher):
+            self.node.destroy_publisher(made)
 
     def note(self, out: Outbox) -> None:
         """What the allocator told; it costs next to nothing."""

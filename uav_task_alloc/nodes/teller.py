@@ -40,6 +40,11 @@ class Teller:
         for uav_id in uav_ids:
             self._publisher(uav_id)
 
+    def close(self) -> None:
+        """Publish nothing any more; what was published is not told to later listeners."""
+        for made in (*self.publishers.values(), self.statuses, self.allocation):
+            self.node.destroy_publisher(made)
+
     def is_heard(self) -> bool:
         """Nobody is missing who might want to hear the lists that follow."""
         return all(made.get_subscription_count() for made in self.publishers.values())
