@@ -13,6 +13,7 @@ from uav_task_alloc.model import Point, Task
 # MAV_CMD and MAV_FRAME; pymavlink has no place in this room
 WAYPOINT, LOITER_TIME, RETURN = 16, 19, 20
 GLOBAL, MISSION = 5, 2
+GLOBAL_FRAMES = frozenset({0, 3, 5, 6, 10, 11})  # x, y and z are a place
 _ALIKE_FRAMES = {6: 3, 5: 0, 11: 10}  # ArduPilot gives the _INT frames back without it
 _ALTITUDE_STEP = 0.011  # [m] ArduPilot keeps whole centimetres
 _LONGEST_HOLD = 65535.0  # [s] ArduPilot keeps 16 bits
@@ -139,7 +140,7 @@ def alike(sent: Item, held: Item) -> bool:
 def _params_alike(sent: Sequence[float], held: Sequence[float]) -> bool:
     hold, others = (sent[0], held[0]), zip(sent[1:], held[1:], strict=True)
     return (math.isnan(hold[0]) or abs(hold[0] - hold[1]) < 1e-3
-            or hold[1] == math.floor(hold[0])) and all(
+            or (math.isfinite(hold[0]) and hold[1] == math.floor(hold[0]))) and all(
         b == 0.0 or math.isnan(a) or math.isclose(a, b, rel_tol=1e-6) for a, b in others)
 
 

@@ -14,10 +14,12 @@ from uav_task_alloc.errors import UnknownName
 from uav_task_alloc.geometry.frames import Origin
 from uav_task_alloc.mavlink.authority import Record
 from uav_task_alloc.mavlink.codec import Message
+from uav_task_alloc.mavlink.message_checks import defect
 from uav_task_alloc.mavlink.peer import Peer
 from uav_task_alloc.mavlink.pilot import Pilot
 from uav_task_alloc.mavlink.policy import Policy
 from uav_task_alloc.mavlink.profiles import profile_of
+from uav_task_alloc.mavlink.refusals import Refusals, failure
 from uav_task_alloc.mission import TaskList
 
 Address = Hashable  # a link and the far end on it
@@ -55,6 +57,7 @@ class Served:
     address: Address
     pilot: Pilot
     strays: int = 0  # frames with its system id from elsewhere
+    fault: str = ''  # why the bridge could not act for it, last; '': it could
 
 
 class Ground:
@@ -64,10 +67,22 @@ class Ground:
                  store: AuthorityStore | None = None) -> None:
         self._station, self._rng, self._store = station, rng, store
         self.served: dict[int, Served] = {}  # by system id
+        self.refusals = Refusals()  # messages, and lists that could not be acted on
         self._shared: list[tuple[TaskList | None, int]] = []  # lists and memories seen
 
     def receive(self, address: Address, message: Message, now: float) -> Outgoing:
-        """Take a message that came in at `address`."""
+        """Take a message that came in at `address`; one that cannot be acted on is dropped."""
+        system, component = message.get_srcSystem(), message.get_srcComponent()
+        why = defect(message)
+        if not why:
+            try:
+                return self._receive(address, message, now)
+            except Exception as error:
+                why = failure(error)
+        self.refusals.add(f'system {system}, component {component}', message.get_type(), why)
+        return []
+
+    def _receive(self, address: Address, message: Message, now: float) -> Outgoing:
         system = message.get_srcSystem()
         if message.get_srcComponent() != d.MAV_COMP_ID_AUTOPILOT1:
             return []
@@ -86,16 +101,32 @@ class Ground:
     def step(self, now: float) -> Outgoing:
         """Let time pass for all."""
         out: Outgoing = []
-        self._share(now)
+        try:
+            self._share(now)
+        except Exception as error:
+            self.refusals.add('all vehicles', 'compare what was flown', failure(error), 'error')
         for served in self.served.values():
-            out += self._sent(served, served.pilot.step(now))
+            try:
+                out += self._sent(served, served.pilot.step(now))
+                served.fault = ''
+            except Exception as error:
+                self._fault(served, 'step', error)
         return out
+
+    def _fault(self, served: Served, what: str, error: Exception) -> None:
+        """The others fly on, and nothing new is given to this one while it lasts."""
+        served.fault = f'{what} failed: {failure(error)}'
+        self.refusals.add(served.uav_id, what, failure(error), 'error')
 
     def assign(self, uav_id: str, tasks: TaskList, now: float) -> Outgoing:
         """A list for one UAV; raise UnknownName where it was not heard."""
         for served in self.served.values():
             if served.uav_id == uav_id:
-                return self._sent(served, served.pilot.assign(tasks, now))
+                try:
+                    return self._sent(served, served.pilot.assign(tasks, now))
+                except Exception as error:
+                    self._fault(served, 'task_list', error)
+                    return []
         raise UnknownName('uav', uav_id, [s.uav_id for s in self.served.values()])
 
     def hand_over(self, uav_id: str, operator: str, now: float) -> str:

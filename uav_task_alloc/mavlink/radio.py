@@ -16,6 +16,7 @@ from pymavlink.dialects.v20 import ardupilotmega as d
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.mavlink.codec import Codec, Message, Signing, make_signing
 from uav_task_alloc.mavlink.link import Link
+from uav_task_alloc.mavlink.refusals import Refusals, failure
 from uav_task_alloc.mavlink.telemetry import WANTED
 
 SIGNING_EPOCH = 1420070400  # [s] 2015-01-01, from which signatures count 10 us
@@ -38,6 +39,7 @@ class Radio:
         self._stamp_at = 0.0
         self._signing = self._load_signing(signing_key_file)
         self._voice = Codec(system, component, signing=self._signing)
+        self.refusals = Refusals()  # what could not be decoded, or encoded
         self._parsers: dict[Address, Codec] = {}
         self._lock = threading.Lock()  # held for a pack, a write or a read: none of them blocks
         self._selector = selectors.DefaultSelector()
@@ -64,10 +66,14 @@ class Radio:
         return got
 
     def send(self, messages: Iterable[tuple[Any, Message]]) -> None:
-        """Each message to its address."""
+        """Each message to its address; one that cannot be encoded is dropped and told."""
         with self._lock:
             for (number, end), message in messages:
-                frame = self._voice.pack(message)
+                try:
+                    frame = self._voice.pack(message)
+                except Exception as error:
+                    self.refusals.add(f'to {end}', message.get_type(), failure(error), 'error')
+                    continue
                 self._write_record(frame)
                 self.links[number].write(end, frame)
 
@@ -91,7 +97,7 @@ class Radio:
 
     def errors(self) -> int:
         """Frames refused so far, on all links."""
-        return sum(parser.errors for parser in self._parsers.values())
+        return sum(parser.errors for parser in list(self._parsers.values()))
 
     def close(self) -> None:
         for link in self.links:
@@ -121,7 +127,12 @@ class Radio:
             parser = self._parsers[address] = Codec(
                 *self._ids, wanted=WANTED, signing=self._signing,
                 tap=self._write_record if self._record else None)
-        messages = parser.parse(data)
+        try:
+            messages = parser.parse(data)
+        except Exception as error:
+            self.refusals.add(f'from {address[1]}', 'bytes', failure(error))
+            messages = []
+            parser.drop()
         if self.links[address[0]].datagrams:
             parser.drop()
         return [(address, message) for message in messages]

@@ -116,7 +116,7 @@ def state_of(served: Served, now: float, full_range: float = 0.0) -> UavStatus:
     """All of it at one moment; `full_range` [m] of a full battery, 0: unknown."""
     pilot = served.pilot
     telemetry, board, mode = pilot.telemetry, pilot.board, mode_of(pilot)
-    reason = why_not_available(pilot, now)
+    reason = served.fault or why_not_available(pilot, now)
     authority = State.UNKNOWN if pilot.authority.undecided else pilot.authority.state
     return UavStatus(
         served.uav_id, telemetry.position, telemetry.velocity, telemetry.home,
@@ -159,6 +159,8 @@ def facts_of(served: Served, now: float) -> tuple[int, str, dict[str, str]]:
         level, line = 3, 'link lost'
     elif telemetry.stale(now) or link:
         level, line = 1, 'link stale'
+    elif served.fault:
+        level, line = 2, served.fault
     elif mode_of(pilot) is Mode.FAULT or state is MissionState.MIXED:
         level, line = 2, f'mission {state.name}' if state is MissionState.MIXED else 'fault'
     elif pilot.alarm:
@@ -174,7 +176,7 @@ def facts_of(served: Served, now: float) -> tuple[int, str, dict[str, str]]:
         line += f', {progress}'
     if pilot.helm.waits_for and level < 3:
         line += f', waits for {pilot.helm.waits_for}'
-    authority, reason = pilot.authority, why_not_available(pilot, now)
+    authority, reason = pilot.authority, served.fault or why_not_available(pilot, now)
     return level, line, {
         'authority': State.UNKNOWN.name if authority.undecided else authority.state.name,
         'authority_why': authority.why, 'authority_for': f'{now - authority.since:.0f} s',

@@ -37,7 +37,11 @@ def check_ros_names(place: str, names: Sequence[str]) -> frozenset[str]:
     return frozenset(check_ros_name(place, name) for name in names)
 
 
-def cut(text: str) -> str:
+def printable(text: str) -> str:
     """Free text as one line for people; what cannot be printed is a question mark."""
-    line = ''.join(c if c.isprintable() else '?' for c in text[:LONGEST_TEXT])
-    return line + ('...' if len(text) > LONGEST_TEXT else '')
+    return ''.join(c if c.isprintable() else '?' for c in text)
+
+
+def cut(text: str) -> str:
+    """Free text as one short line for people."""
+    return printable(text[:LONGEST_TEXT]) + ('...' if len(text) > LONGEST_TEXT else '')

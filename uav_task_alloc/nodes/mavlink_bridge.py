@@ -21,7 +21,7 @@ from uav_task_alloc.mavlink.radio import Heartbeat, Radio
 from uav_task_alloc.mavlink.status import Told, facts_of, state_of
 from uav_task_alloc.model import ThreatZone, check_number, check_ros_name
 from uav_task_alloc.nodes import bridge_messages as convert
-from uav_task_alloc.nodes.bounds import cut
+from uav_task_alloc.nodes.bounds import cut, printable
 from uav_task_alloc.nodes.messages import EVENTS, LATCHED, STATES
 from uav_task_alloc.nodes.parameters import declare
 from uav_task_alloc.nodes.run import run
@@ -75,6 +75,7 @@ class MavlinkBridge(Node):
         self.radio = Radio(
             map(open_link, params.connections), params.system_id, params.component_id,
             wall=time.time, signing_key_file=params.signing_key_file, tlog=params.tlog)
+        self.refusals, self.refused = (self.ground.refusals, self.radio.refusals), 0
         self.lock = threading.Lock()  # of the ground station
         self.told = Told()
         self.lists: dict[str, object] = {}
@@ -109,6 +110,10 @@ class MavlinkBridge(Node):
 
     def tell(self, now: float) -> None:
         """Publish what is new."""
+        for refusals in self.refusals:
+            while refusals.notes:
+                note = refusals.notes.popleft()
+                self.log[note.level](printable(note.text))
         for served in list(self.ground.served.values()):
             with self.lock:
                 status = state_of(served, now, self.live.now.full_range)
@@ -126,7 +131,7 @@ class MavlinkBridge(Node):
                 served.uav_id, pilot.events.popleft(), self.stamp()))
         while pilot.notes:
             note = pilot.notes.popleft()
-            self.log[note.level](f'{served.uav_id}: {note.text}')
+            self.log[note.level](printable(f'{served.uav_id}: {note.text}'))
 
     def on_tick(self) -> None:
         """Listen for the lists of UAVs that were found; pass parameters on."""
@@ -188,7 +193,16 @@ class MavlinkBridge(Node):
         for link in self.radio.links:
             self.tell_trouble(link.name, link.trouble)
             facts.append((link.name, 2 if link.trouble else 0, link.trouble or 'open', {}))
+        facts.append(self.message_facts())
         self.health.publish(convert.diagnostics(facts, self.stamp()))
+
+    def message_facts(self) -> tuple[str, int, str, dict[str, str]]:
+        """What was refused of all that came; a warning while more of it comes."""
+        count, before = sum(refusals.count for refusals in self.refusals), self.refused
+        self.refused = count
+        return 'messages', int(count > before), f'{count} messages refused', {
+            'messages_refused': str(count), 'frames_refused': str(self.radio.errors()),
+            'last_refused': '; '.join(printable(r.last) for r in self.refusals if r.last)}
 
     def tell_trouble(self, name: str, trouble: str) -> None:
         """Log what is wrong with a link, once, and that it is over."""
