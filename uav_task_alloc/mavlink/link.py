@@ -114,6 +114,8 @@ class Stream:
         return self._file
 
     def read(self) -> list[tuple[Hashable, bytes]]:
+        if self._file < 0:
+            return []
         try:
             data = os.read(self._file, CHUNK)
         except BlockingIOError:

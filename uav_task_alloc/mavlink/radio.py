@@ -43,7 +43,7 @@ class Radio:
         self._parsers: dict[Address, Codec] = {}
         self._lock = threading.Lock()  # held for a pack, a write or a read: none of them blocks
         self._selector = selectors.DefaultSelector()
-        self._watched: dict[int, tuple[int, int]] = {}  # link -> its file, how often opened
+        self._watched = [(-1, 0)] * len(self.links)  # the file of each, how often opened
 
     def _load_signing(self, key_file: str) -> Signing | None:
         if not key_file:
@@ -108,16 +108,17 @@ class Radio:
                 self._record.close()
 
     def _watch(self) -> None:
-        for number, link in enumerate(self.links):
-            file, opened = link.fileno(), link.opened
-            old, was_opened = self._watched.get(number, (-1, 0))
-            if (file, opened) == (old, was_opened):
-                continue
-            if old >= 0:
-                self._selector.unregister(old)
-            if file >= 0:
-                self._selector.register(file, selectors.EVENT_READ, number)
-            self._watched[number] = file, opened
+        """Wait for the files that the links have now; a number may pass from one to another."""
+        with self._lock:  # a sender may close a line that breaks
+            files = [(link.fileno(), link.opened) for link in self.links]
+            changed = [n for n, file in enumerate(files) if file != self._watched[n]]
+            for number in changed:
+                if self._watched[number][0] >= 0:
+                    self._selector.unregister(self._watched[number][0])
+            for number in changed:
+                if files[number][0] >= 0:
+                    self._selector.register(files[number][0], selectors.EVENT_READ, number)
+            self._watched = files
 
     def _parse(self, address: Address, data: bytes) -> list[tuple[Address, Message]]:
         parser = self._parsers.get(address)
