@@ -2,11 +2,14 @@
 """Findings 11 to 13 and 24: what links, heartbeats, signing and floods do to the bridge."""
 import os
 import socket
+import threading
 
 import pytest
-from link_bench import heartbeat, nothing, receive
+from link_bench import WALL, heartbeat, nothing, receive
 
 from uav_task_alloc.mavlink.codec import Codec
+from uav_task_alloc.mavlink.heartbeat import Heartbeat
+from uav_task_alloc.mavlink.radio import Radio
 
 
 @pytest.fixture
@@ -83,3 +86,107 @@ def test_finding_11_a_line_that_a_sender_closes_is_read_no_more(radio, servers):
     link.close()
     assert link.read() == []
     assert link.trouble == 'Broken pipe'
+
+
+# 12: one stream, two threads
+
+
+class Watched:
+    """A link that notices what is done to it while the radio's lock is free."""
+
+    name, datagrams, trouble = 'x', False, ''
+
+    def __init__(self):
+        self.radio, self.unlocked = None, []
+        self.files = os.pipe()
+        os.write(self.files[1], b'x')  # always something to read
+
+    def __getattr__(self, name):
+        if not self.radio._lock.locked():
+            self.unlocked.append(name)
+        return {'fileno': lambda: self.files[0], 'opened': 1, 'read': lambda: [('y', b'x')],
+                'ends': lambda: ['y']}.get(name, lambda *_: None)
+
+
+def test_finding_12_nothing_touches_a_stream_without_the_lock(tmp_path):
+    link = Watched()
+    radio = link.radio = Radio([link], 245, 190, wall=lambda: WALL, tlog=str(tmp_path / 'x.tlog'))
+    radio.step(0.0)
+    radio.receive(0.0)
+    radio.send_to_all(heartbeat())
+    radio.send([((0, 'y'), heartbeat())])
+    radio.close()
+    for file in link.files:
+        os.close(file)
+    assert link.unlocked == []
+
+
+def test_finding_12_an_error_on_one_link_leaves_the_heartbeats_of_the_others(radio, far):
+    both = radio('udpin:127.0.0.1:0', 'udpin:127.0.0.1:0')
+    end = far(both)
+    end.say(heartbeat())
+    receive(both)
+    both.links.reverse()  # the bad one comes first
+
+    def write(end, data):
+        raise BufferError('Existing exports of data: object cannot be re-sized')
+    both.links[0].ends, both.links[0].write = lambda: ['x'], write
+    both.send_to_all(heartbeat())
+    assert end.hear()[0].get_type() == 'HEARTBEAT'
+    assert 'HEARTBEAT (to x): BufferError: Existing exports' in both.refusals.last
+
+
+def test_finding_12_a_recording_that_ends_in_one_thread_does_not_end_the_other(radio, tmp_path):
+    one = radio(tlog=str(tmp_path / 'x.tlog'))
+    one._record.close()  # as the receiver does where the disk is full
+    one._write_record(b'x')
+    assert one._record is None
+
+
+@pytest.fixture
+def beats():
+    """A heartbeat whose first two beats fail, and an event for each that succeeds."""
+    failing, beat = [BufferError('x'), RuntimeError('y')], threading.Semaphore(0)
+
+    def send(message):
+        if failing:
+            raise failing.pop(0)
+        beat.release()
+    heart = Heartbeat(send, period=0.01)
+    yield heart, beat
+    heart.close()
+
+
+def ended(heart):
+    """Wait for the end of its thread."""
+    heart._thread.join(5.0)
+    assert not heart._thread.is_alive()
+
+
+def test_finding_12_a_heartbeat_thread_that_ends_is_told_and_started_again(beats):
+    heart, beat = beats
+    heart.start()
+    for number, words in enumerate(('BufferError: x', 'RuntimeError: y'), 1):
+        ended(heart)
+        assert heart.trouble.startswith(f'its thread has ended: {words} (at ')
+        heart.watch(float(number))
+        assert heart.restarts == number
+    assert beat.acquire(timeout=5.0)
+    assert beat.acquire(timeout=5.0)
+    assert heart.trouble == ''
+    heart.watch(10.0)
+    assert heart.restarts == 2
+
+
+def test_finding_12_a_heartbeat_that_is_held_up_is_told():
+    free = threading.Event()
+    heart = Heartbeat(lambda message: free.wait(5.0), period=0.01)
+    heart.start()
+    heart.watch(0.0)
+    heart.watch(0.02)
+    assert heart.trouble == ''
+    heart.watch(0.04)
+    assert heart.trouble == 'none was sent for more than 0.03 s'
+    free.set()
+    heart.close()
+    assert heart.restarts == 0

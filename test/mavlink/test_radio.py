@@ -11,7 +11,8 @@ from pymavlink.dialects.v20 import ardupilotmega as d
 
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.mavlink.codec import make_signing
-from uav_task_alloc.mavlink.radio import Heartbeat, Radio, open_record, read_key
+from uav_task_alloc.mavlink.heartbeat import Heartbeat
+from uav_task_alloc.mavlink.radio import Radio, open_record, read_key
 
 KEY = bytes(range(32))
 

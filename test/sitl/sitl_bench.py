@@ -8,8 +8,9 @@ from pymavlink.dialects.v20 import ardupilotmega as d
 from worlds import ORIGIN, SYSTEMS
 
 from uav_task_alloc.mavlink.ground import Ground, Station
+from uav_task_alloc.mavlink.heartbeat import Heartbeat
 from uav_task_alloc.mavlink.policy import Policy
-from uav_task_alloc.mavlink.radio import Heartbeat, Radio
+from uav_task_alloc.mavlink.radio import Radio
 
 READS = {d.MAV_CMD_SET_MESSAGE_INTERVAL, d.MAV_CMD_REQUEST_MESSAGE}
 COMMANDS = {'COMMAND_LONG', 'COMMAND_INT', 'SET_MODE', 'MISSION_SET_CURRENT'}

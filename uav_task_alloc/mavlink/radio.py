@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""All links as one: a parser for each far end, one voice, signing, a recording, a heartbeat."""
+"""All links as one: a parser for each far end, one voice, signing, a recording."""
 from __future__ import annotations
 
 import hashlib
@@ -10,8 +10,6 @@ from collections.abc import Callable, Hashable, Iterable
 from contextlib import suppress
 from pathlib import Path
 from typing import Any, BinaryIO
-
-from pymavlink.dialects.v20 import ardupilotmega as d
 
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.mavlink.codec import Codec, Message, Signing, make_signing
@@ -41,7 +39,7 @@ class Radio:
         self._voice = Codec(system, component, signing=self._signing)
         self.refusals = Refusals()  # what could not be decoded, or encoded
         self._parsers: dict[Address, Codec] = {}
-        self._lock = threading.Lock()  # held for a pack, a write or a read: none of them blocks
+        self._lock = threading.Lock()  # held for all that touches a link: none of it blocks
         self._selector = selectors.DefaultSelector()
         self._watched = [(-1, 0)] * len(self.links)  # the file of each, how often opened
 
@@ -71,11 +69,10 @@ class Radio:
             for (number, end), message in messages:
                 try:
                     frame = self._voice.pack(message)
+                    self._write_record(frame)
+                    self.links[number].write(end, frame)
                 except Exception as error:
                     self.refusals.add(f'to {end}', message.get_type(), failure(error), 'error')
-                    continue
-                self._write_record(frame)
-                self.links[number].write(end, frame)
 
     def send_to_all(self, message: Message) -> None:
         """To every far end that is known."""
@@ -100,9 +97,10 @@ class Radio:
         return sum(parser.errors for parser in list(self._parsers.values()))
 
     def close(self) -> None:
-        for link in self.links:
-            link.close()
-        self._selector.close()
+        with self._lock:
+            for link in self.links:
+                link.close()
+            self._selector.close()
         if self._record:
             with suppress(OSError):
                 self._record.close()
@@ -139,14 +137,15 @@ class Radio:
         return [(address, message) for message in messages]
 
     def _write_record(self, frame: bytes) -> None:
-        if self._record is None:
+        record = self._record  # the other thread may end it meanwhile
+        if record is None:
             return
         try:
-            self._record.write(struct.pack('>Q', int(self._wall() * 1e6)) + frame)
-        except OSError:  # the disk is full: the flight goes on, and so does the heartbeat
-            with suppress(OSError):
-                self._record.close()
+            record.write(struct.pack('>Q', int(self._wall() * 1e6)) + frame)
+        except (OSError, ValueError):  # the disk is full: the flight goes on, and the heartbeat
             self._record = None
+            with suppress(OSError):
+                record.close()
 
 
 def open_record(path: str) -> BinaryIO:
@@ -174,20 +173,3 @@ def read_key(path: str) -> bytes:
     except ValueError:
         pass
     return hashlib.sha256(text).digest()
-
-
-class Heartbeat(threading.Thread):
-    """Says once a second that we are here, whatever else the process does."""
-
-    def __init__(self, send: Callable[[Message], None], period: float = 1.0) -> None:
-        super().__init__(name='heartbeat', daemon=True)
-        self._send, self._period, self._stop_now = send, period, threading.Event()
-
-    def run(self) -> None:
-        while not self._stop_now.wait(self._period):
-            self._send(d.MAVLink_heartbeat_message(
-                d.MAV_TYPE_GCS, d.MAV_AUTOPILOT_INVALID, 0, 0, d.MAV_STATE_ACTIVE, 3))
-
-    def close(self) -> None:
-        self._stop_now.set()
-        self.join(2.0 * self._period + 1.0)

@@ -15,9 +15,10 @@ from uav_task_alloc.errors import InvalidValue, UnknownName
 from uav_task_alloc.geometry.frames import Origin
 from uav_task_alloc.mavlink.authority_store import FileStore, boot_id
 from uav_task_alloc.mavlink.ground import Ground, Served, Station
+from uav_task_alloc.mavlink.heartbeat import Heartbeat
 from uav_task_alloc.mavlink.link import open_link
 from uav_task_alloc.mavlink.policy import Policy
-from uav_task_alloc.mavlink.radio import Heartbeat, Radio
+from uav_task_alloc.mavlink.radio import Radio
 from uav_task_alloc.mavlink.status import Told, facts_of, state_of
 from uav_task_alloc.model import ThreatZone, check_number, check_ros_name
 from uav_task_alloc.nodes import bridge_messages as convert
@@ -137,6 +138,8 @@ class MavlinkBridge(Node):
         """Listen for the lists of UAVs that were found; pass parameters on."""
         if not self.receiver.is_alive():
             raise RuntimeError('the receiver has died: better no bridge than a deaf one')
+        self.heartbeat.watch(time.monotonic())
+        self.tell_trouble('heartbeat', self.heartbeat.trouble)
         policy = policy_of(self.live.now, self.zones)
         for served in list(self.ground.served.values()):
             served.pilot.policy = policy
@@ -193,8 +196,14 @@ class MavlinkBridge(Node):
         for link in self.radio.links:
             self.tell_trouble(link.name, link.trouble)
             facts.append((link.name, 2 if link.trouble else 0, link.trouble or 'open', {}))
-        facts.append(self.message_facts())
+        facts += [self.heartbeat_facts(), self.message_facts()]
         self.health.publish(convert.diagnostics(facts, self.stamp()))
+
+    def heartbeat_facts(self) -> tuple[str, int, str, dict[str, str]]:
+        """Whether vehicles are told that we are here."""
+        beat = self.heartbeat
+        return 'heartbeat', 2 if beat.trouble else 0, beat.trouble or f'{beat.sent} sent', {
+            'thread_restarts': str(beat.restarts)}
 
     def message_facts(self) -> tuple[str, int, str, dict[str, str]]:
         """What was refused of all that came; a warning while more of it comes."""
@@ -205,7 +214,7 @@ class MavlinkBridge(Node):
             'last_refused': '; '.join(printable(r.last) for r in self.refusals if r.last)}
 
     def tell_trouble(self, name: str, trouble: str) -> None:
-        """Log what is wrong with a link, once, and that it is over."""
+        """Log what is wrong with a link or the like, once, and that it is over."""
         if trouble != self.troubles.get(name, ''):
             self.log['error' if trouble else 'info'](f'{name}: {trouble or "works"}')
             self.troubles[name] = trouble

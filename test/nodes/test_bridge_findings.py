@@ -1,0 +1,114 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The bridge in this process: what ends its threads, and what it hears that nobody should send."""
+import socket
+
+import pytest
+import rclpy
+from diagnostic_msgs.msg import DiagnosticArray
+from pymavlink.dialects.v20 import ardupilotmega as d
+from rclpy.executors import SingleThreadedExecutor
+
+from uav_task_alloc.mavlink.codec import Codec
+from uav_task_alloc.nodes.mavlink_bridge import MavlinkBridge
+
+pytestmark = pytest.mark.ros
+HEARTBEAT = d.MAVLink_heartbeat_message(d.MAV_TYPE_QUADROTOR, d.MAV_AUTOPILOT_PX4, 0, 0, 4, 3)
+
+
+class Bridge:
+    """A bridge with its log in lists, and one far end that it knows."""
+
+    def __init__(self):
+        self.node = MavlinkBridge()
+        self.log = {level: [] for level in self.node.log}
+        self.node.log.update({level: lines.append for level, lines in self.log.items()})
+        self.executor = SingleThreadedExecutor()
+        self.executor.add_node(self.node)
+        self.far = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self.far.bind(('127.0.0.1', 0))
+        self.far.settimeout(10.0)
+        self.codec = Codec(1, 1)
+
+    def say(self, *messages):
+        for message in messages:
+            self.far.sendto(self.codec.pack(message),
+                            ('127.0.0.1', self.node.radio.links[0].port))
+
+    def heard(self, kind):
+        """The next message of a type that it sends to the far end."""
+        while True:
+            for message in self.codec.parse(self.far.recv(65536)):
+                if message.get_type() == kind:
+                    return message
+
+    def until(self, condition):
+        for _ in range(400):
+            if condition():
+                return
+            self.executor.spin_once(timeout_sec=0.05)
+        raise AssertionError(f'timed out: {self.log}')
+
+    def close(self):
+        self.executor.shutdown()
+        self.node.destroy_node()
+        self.far.close()
+
+
+@pytest.fixture
+def bridge(domain):
+    """bridge('-p', 'name:=value') -> Bridge; closed at the end."""
+    made = []
+
+    def make(*args):
+        rclpy.init(args=['--ros-args', '-p', "connections:=['udpin:127.0.0.1:0']", *args])
+        made.append(Bridge())
+        return made[-1]
+    yield make
+    for one in made:
+        one.close()
+    rclpy.try_shutdown()
+
+
+def fact(health, name):
+    """Level, line and details of a status; None where there is none yet."""
+    return next(((ord(s.level), s.message, {v.key: v.value for v in s.values})
+                 for array in health[-1:] for s in array.status if s.hardware_id == name), None)
+
+
+def test_finding_12_the_end_of_the_heartbeat_thread_is_told_and_mended(bridge, probe):
+    health = probe.collect(DiagnosticArray, '/diagnostics', 10)
+    one = bridge()
+    heart = one.node.heartbeat
+    good = heart._send
+
+    def bad(message):
+        heart._send = good
+        raise BufferError('Existing exports of data')
+    heart._send = bad
+    one.say(HEARTBEAT)
+    one.until(lambda: heart.restarts == 1)
+    assert one.heard('HEARTBEAT').get_srcSystem() == 245
+    one.until(lambda: 'heartbeat: works' in one.log['info'])
+    line, = one.log['error']
+    assert line.startswith('heartbeat: its thread has ended: BufferError: Existing exports of')
+    one.until(lambda: not probe.executor.spin_once(timeout_sec=0.0) and (
+        fact(health, 'heartbeat') or [0, 0, {}])[2].get('thread_restarts') == '1')
+
+
+def test_finding_10_a_bad_message_is_in_the_log_once_and_in_diagnostics(bridge, probe):
+    health = probe.collect(DiagnosticArray, '/diagnostics', 10)
+    one = bridge()
+    item = d.MAVLink_mission_item_message(245, 190, 0, 3, 16, 0, 1, 0, 0, 0, 0, float('nan'),
+                                          8.5, 500.0, 0)
+    one.say(HEARTBEAT)
+    one.heard('MISSION_REQUEST_LIST')
+    one.say(d.MAVLink_mission_count_message(245, 190, 1, 0))
+    one.heard('MISSION_REQUEST_INT')
+    one.say(item, item, d.MAVLink_statustext_message(6, b'\x1b[2Jready'))
+    one.until(lambda: any('?[2Jready' in line for line in one.log['info']))
+    one.until(lambda: not probe.executor.spin_once(timeout_sec=0.0) and (
+        fact(health, 'messages') or [0, 0, {}])[2].get('messages_refused') == '2')
+    line, = (line for line in one.log['warning'] if 'MISSION_ITEM' in line)
+    assert line == ('MISSION_ITEM (system 1, component 1): x = nan: expected a finite number: '
+                    'dropped; told once')
+    assert one.node.receiver.is_alive()
