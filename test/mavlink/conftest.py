@@ -12,7 +12,7 @@ def radio():
     made = []
 
     def make(*names, **kwargs):
-        made.append(Radio([open_link(n) for n in names or ['udpin:127.0.0.1:0']], 245, 190,
+        made.append(Radio(map(open_link, names or ['udpin:127.0.0.1:0']), 245, 190,
                           wall=lambda: WALL, **kwargs))
         return made[-1]
     yield make

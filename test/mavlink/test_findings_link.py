@@ -7,6 +7,7 @@ import threading
 import pytest
 from link_bench import WALL, heartbeat, nothing, receive
 
+from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.mavlink.codec import Codec
 from uav_task_alloc.mavlink.heartbeat import Heartbeat
 from uav_task_alloc.mavlink.radio import Radio
@@ -190,3 +191,76 @@ def test_finding_12_a_heartbeat_that_is_held_up_is_told():
     free.set()
     heart.close()
     assert heart.restarts == 0
+
+
+# 13: the timestamp of signing
+
+
+@pytest.fixture
+def key_file(tmp_path):
+    path = tmp_path / 'key'
+    path.write_bytes(bytes(range(32)))
+    return path
+
+
+def forbid(key_file):
+    """Let the timestamp of a key be neither replaced nor written, also by root."""
+    key_file.with_name('key.timestamp.tmp').mkdir()
+    stamp = key_file.with_name('key.timestamp')
+    stamp.unlink(missing_ok=True)
+    stamp.symlink_to('/nowhere/at/all')
+
+
+@pytest.mark.parametrize('content', [b'', b'soon', b'-1', b'12 34', b'1e5', b'\xff\x00', b'9' * 40,
+                                     b'281474976710656'])
+def test_finding_13_a_damaged_timestamp_is_refused_at_the_start(radio, key_file, content):
+    path = key_file.with_name('key.timestamp')
+    path.write_bytes(content)
+    with pytest.raises(InvalidValue) as refused:
+        radio(signing_key_file=str(key_file))
+    assert str(refused.value).startswith(f'signing timestamp in {path} = ')
+    assert 'expected a whole number in [0, 281474976710655]; delete the file' in str(refused.value)
+    assert path.read_bytes() == content
+
+
+def test_finding_13_a_timestamp_that_cannot_be_read_is_refused_at_the_start(radio, key_file):
+    key_file.with_name('key.timestamp').mkdir()
+    with pytest.raises(InvalidValue, match=r'signing timestamp = .*: expected a readable file'):
+        radio(signing_key_file=str(key_file))
+
+
+def test_finding_13_a_timestamp_that_cannot_be_written_is_refused_at_the_start(radio, key_file):
+    forbid(key_file)
+    with pytest.raises(InvalidValue, match=r'signing timestamp = .*: expected a file that can be'):
+        radio(signing_key_file=str(key_file))
+
+
+def test_finding_13_a_timestamp_that_cannot_be_written_in_flight_is_told(radio, far, key_file):
+    one = radio(signing_key_file=str(key_file))
+    one.step(0.0)
+    assert one.signing.trouble == ''
+    forbid(key_file)
+    one.step(10.0)
+    assert 'key.timestamp: not written: ' in one.signing.trouble
+    before = one.signing.sent.timestamp
+    one.send([((0, ('127.0.0.1', 9)), heartbeat())])
+    assert one.signing.sent.timestamp == before + 1
+    key_file.with_name('key.timestamp.tmp').rmdir()
+    one.step(12.0)
+    assert one.signing.trouble != ''  # it is tried again after 5 s
+    one.step(15.0)
+    assert one.signing.trouble == ''
+    assert int(key_file.with_name('key.timestamp').read_text()) > before
+
+
+def test_finding_13_a_file_in_a_folder_that_is_read_only_is_written_in_place(radio, key_file):
+    key_file.with_name('key.timestamp.tmp').mkdir()
+    radio(signing_key_file=str(key_file))
+    assert key_file.with_name('key.timestamp').read_text().isdigit()
+
+
+def test_finding_13_a_computer_whose_clock_was_never_set_signs(key_file):
+    one = Radio([], 245, 190, wall=lambda: 0.0, signing_key_file=str(key_file))
+    one.step(0.0)
+    assert one._voice.pack(heartbeat())
+    one.close()

@@ -12,7 +12,8 @@ from pymavlink.dialects.v20 import ardupilotmega as d
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.mavlink.codec import make_signing
 from uav_task_alloc.mavlink.heartbeat import Heartbeat
-from uav_task_alloc.mavlink.radio import Radio, open_record, read_key
+from uav_task_alloc.mavlink.radio import Radio, open_record
+from uav_task_alloc.mavlink.signing import read_key
 
 KEY = bytes(range(32))
 
@@ -52,7 +53,7 @@ def test_fault_30_the_timestamp_survives_a_restart(radio, key_file, tmp_path, fa
     kept = int((tmp_path / 'key.timestamp').read_text())
     assert kept > 10**14
     second = radio(signing_key_file=key_file)
-    assert second._signing.timestamp == kept
+    assert second.signing.heard.timestamp == kept
 
 
 @pytest.mark.parametrize(('content', 'key'), [

@@ -112,3 +112,22 @@ def test_finding_10_a_bad_message_is_in_the_log_once_and_in_diagnostics(bridge, 
     assert line == ('MISSION_ITEM (system 1, component 1): x = nan: expected a finite number: '
                     'dropped; told once')
     assert one.node.receiver.is_alive()
+
+
+def test_finding_13_a_timestamp_that_cannot_be_written_is_a_warning_in_flight(
+        bridge, probe, tmp_path):
+    health = probe.collect(DiagnosticArray, '/diagnostics', 10)
+    tmp_path.joinpath('key').write_bytes(bytes(32))
+    one = bridge('-p', f'signing_key_file:={tmp_path}/key')
+    tmp_path.joinpath('key.timestamp.tmp').mkdir()
+    tmp_path.joinpath('key.timestamp').unlink()
+    tmp_path.joinpath('key.timestamp').symlink_to('/nowhere/at/all')
+    one.until(lambda: one.log['warning'])
+    assert 'signing: ' in one.log['warning'][0]
+    assert 'key.timestamp: not written: ' in one.log['warning'][0]
+    one.until(lambda: not probe.executor.spin_once(timeout_sec=0.0) and (
+        fact(health, 'signing') or [0])[0] == 1)
+    tmp_path.joinpath('key.timestamp.tmp').rmdir()
+    one.until(lambda: 'signing: works' in one.log['info'])
+    assert len(one.log['warning']) == 1
+    assert one.node.receiver.is_alive()

@@ -297,6 +297,18 @@ def test_diagnostics_name_each_uav_and_its_mission(sky, probe):
     assert details['mission'] == 'VERIFIED'
 
 
+def test_finding_13_a_damaged_signing_timestamp_ends_the_start_in_words(start, tmp_path):
+    tmp_path.joinpath('key').write_bytes(bytes(32))
+    tmp_path.joinpath('key.timestamp').write_text('soon')
+    process = start('mavlink_bridge', '-p', "connections:=['udpin:127.0.0.1:0']", '-p',
+                    f'signing_key_file:={tmp_path}/key')
+    process.popen.wait(20)
+    code, out = process.stop()
+    assert code == 1, out
+    assert f"signing timestamp in {tmp_path}/key.timestamp = 'soon': expected a whole" in out
+    assert 'Traceback' not in out
+
+
 @pytest.mark.parametrize(('given', 'text'), [
     ("connections:=['udp:1']", "connections = 'udp:1': expected udpin:HOST:PORT"),
     ("connections:=['udpin:127.0.0.1:x']", "'udpin:127.0.0.1:x': expected udpin:HOST:PORT"),

@@ -2,23 +2,20 @@
 """All links as one: a parser for each far end, one voice, signing, a recording."""
 from __future__ import annotations
 
-import hashlib
 import selectors
 import struct
 import threading
 from collections.abc import Callable, Hashable, Iterable
 from contextlib import suppress
-from pathlib import Path
 from typing import Any, BinaryIO
 
 from uav_task_alloc.errors import InvalidValue
-from uav_task_alloc.mavlink.codec import Codec, Message, Signing, make_signing
+from uav_task_alloc.mavlink.codec import Codec, Message
 from uav_task_alloc.mavlink.link import Link
 from uav_task_alloc.mavlink.refusals import Refusals, failure
+from uav_task_alloc.mavlink.signing import SigningClock
 from uav_task_alloc.mavlink.telemetry import WANTED
 
-SIGNING_EPOCH = 1420070400  # [s] 2015-01-01, from which signatures count 10 us
-STAMP_PERIOD = 5.0  # [s] between writes of the timestamp, which runs ahead by that much
 MAX_ENDS = 256  # far ends with a parser; a flood of forged senders gets no further
 
 Address = tuple[int, Hashable]  # number of the link, far end on it
@@ -30,26 +27,17 @@ class Radio:
     def __init__(self, links: Iterable[Link], system: int, component: int, *,
                  wall: Callable[[], float], signing_key_file: str = '',
                  tlog: str = '') -> None:
-        self.links = list(links)
         self._ids, self._wall = (system, component), wall
+        self.signing = SigningClock(signing_key_file, wall) if signing_key_file else None
         self._record = open_record(tlog) if tlog else None
-        self._stamp_file = Path(signing_key_file + '.timestamp') if signing_key_file else None
-        self._stamp_at = 0.0
-        self._signing = self._load_signing(signing_key_file)
-        self._voice = Codec(system, component, signing=self._signing)
+        self.links = list(links)  # last, as they may be opened by this
+        self._voice = Codec(system, component,
+                            signing=self.signing.sent if self.signing else None)
         self.refusals = Refusals()  # what could not be decoded, or encoded
         self._parsers: dict[Address, Codec] = {}
         self._lock = threading.Lock()  # held for all that touches a link: none of it blocks
         self._selector = selectors.DefaultSelector()
         self._watched = [(-1, 0)] * len(self.links)  # the file of each, how often opened
-
-    def _load_signing(self, key_file: str) -> Signing | None:
-        if not key_file:
-            return None
-        stamp = int((self._wall() - SIGNING_EPOCH) * 1e5)
-        if self._stamp_file and self._stamp_file.exists():
-            stamp = max(stamp, int(self._stamp_file.read_text() or 0))
-        return make_signing(read_key(key_file), stamp)
 
     def receive(self, timeout: float) -> list[tuple[Address, Message]]:
         """What comes within `timeout` [s]; returns as soon as there is something."""
@@ -66,6 +54,8 @@ class Radio:
     def send(self, messages: Iterable[tuple[Any, Message]]) -> None:
         """Each message to its address; one that cannot be encoded is dropped and told."""
         with self._lock:
+            if self.signing is not None:
+                self.signing.catch_up()
             for (number, end), message in messages:
                 try:
                     frame = self._voice.pack(message)
@@ -84,13 +74,8 @@ class Radio:
         with self._lock:
             for link in self.links:
                 link.step(now)
-        if self._signing is None or self._stamp_file is None or now < self._stamp_at:
-            return
-        self._stamp_at = now + STAMP_PERIOD
-        stamp = int((self._wall() - SIGNING_EPOCH) * 1e5)
-        self._signing.timestamp = max(self._signing.timestamp, stamp)
-        # ahead, so that what is signed until the next write is not used again after a crash
-        self._stamp_file.write_text(str(self._signing.timestamp + int(2e5 * STAMP_PERIOD)))
+        if self.signing is not None:
+            self.signing.step(now)
 
     def errors(self) -> int:
         """Frames refused so far, on all links."""
@@ -124,7 +109,8 @@ class Radio:
             if len(self._parsers) >= MAX_ENDS:
                 self._parsers.pop(next(iter(self._parsers)))
             parser = self._parsers[address] = Codec(
-                *self._ids, wanted=WANTED, signing=self._signing,
+                *self._ids, wanted=WANTED,
+                signing=self.signing.heard if self.signing else None,
                 tap=self._write_record if self._record else None)
         try:
             messages = parser.parse(data)
@@ -154,22 +140,3 @@ def open_record(path: str) -> BinaryIO:
         return open(path, 'ab')
     except OSError as error:
         raise InvalidValue('tlog', path, f'a file that can be written ({error})') from None
-
-
-def read_key(path: str) -> bytes:
-    """The 32 bytes of a signing key file: raw, 64 hex digits, or a pass phrase."""
-    try:
-        text = Path(path).read_bytes()
-    except OSError as error:
-        raise InvalidValue('signing_key_file', path, f'a readable file ({error})') from None
-    if len(text) == 32:
-        return text
-    text = text.strip()
-    if not text:
-        raise InvalidValue('signing_key_file', path, 'a file that is not empty')
-    try:
-        if len(text) == 64:
-            return bytes.fromhex(text.decode())
-    except ValueError:
-        pass
-    return hashlib.sha256(text).digest()

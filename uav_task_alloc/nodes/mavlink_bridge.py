@@ -196,6 +196,10 @@ class MavlinkBridge(Node):
         for link in self.radio.links:
             self.tell_trouble(link.name, link.trouble)
             facts.append((link.name, 2 if link.trouble else 0, link.trouble or 'open', {}))
+        if self.radio.signing is not None:
+            trouble = self.radio.signing.trouble
+            self.tell_trouble('signing', trouble, 'warning')
+            facts.append(('signing', int(bool(trouble)), trouble or 'timestamp kept', {}))
         facts += [self.heartbeat_facts(), self.message_facts()]
         self.health.publish(convert.diagnostics(facts, self.stamp()))
 
@@ -213,10 +217,10 @@ class MavlinkBridge(Node):
             'messages_refused': str(count), 'frames_refused': str(self.radio.errors()),
             'last_refused': '; '.join(printable(r.last) for r in self.refusals if r.last)}
 
-    def tell_trouble(self, name: str, trouble: str) -> None:
+    def tell_trouble(self, name: str, trouble: str, level: str = 'error') -> None:
         """Log what is wrong with a link or the like, once, and that it is over."""
         if trouble != self.troubles.get(name, ''):
-            self.log['error' if trouble else 'info'](f'{name}: {trouble or "works"}')
+            self.log[level if trouble else 'info'](f'{name}: {trouble or "works"}')
             self.troubles[name] = trouble
 
     def stamp(self) -> float:
