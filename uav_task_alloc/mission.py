@@ -14,6 +14,7 @@ from uav_task_alloc.model import Point, Task
 WAYPOINT, LOITER_TIME, RETURN = 16, 19, 20
 GLOBAL, MISSION = 5, 2
 GLOBAL_FRAMES = frozenset({0, 3, 5, 6, 10, 11})  # x, y and z are a place
+MOST_ITEMS = 65535  # of a mission, home included: what MISSION_COUNT holds
 _ALIKE_FRAMES = {6: 3, 5: 0, 11: 10}  # ArduPilot gives the _INT frames back without it
 _ALTITUDE_STEP = 0.011  # [m] ArduPilot keeps whole centimetres
 _LONGEST_HOLD = 65535.0  # [s] ArduPilot keeps 16 bits

@@ -6,11 +6,15 @@ import threading
 
 import pytest
 from link_bench import WALL, heartbeat, nothing, receive
+from mission_bench import ORIGIN
 
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.mavlink.codec import Codec
+from uav_task_alloc.mavlink.fleet import Fleet
 from uav_task_alloc.mavlink.heartbeat import Heartbeat
+from uav_task_alloc.mavlink.link import MOST_STRANGERS
 from uav_task_alloc.mavlink.radio import Radio
+from uav_task_alloc.mavlink.vehicle_config import VehicleConfig
 
 
 @pytest.fixture
@@ -264,3 +268,76 @@ def test_finding_13_a_computer_whose_clock_was_never_set_signs(key_file):
     one.step(0.0)
     assert one._voice.pack(heartbeat())
     one.close()
+
+
+# 24: a flood of far ends
+
+
+def flood(radio, count, data=b'\xfd\x00x'):
+    """As many strangers send something."""
+    to = ('127.0.0.1', radio.links[0].port)
+    for _ in range(count):
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as stranger:
+            stranger.bind(('127.0.0.1', 0))
+            stranger.sendto(data, to)
+            radio.receive(5.0)
+
+
+def test_finding_24_of_strangers_only_the_latest_hear_heartbeats(radio, far):
+    one = radio()
+    flood(one, 200)
+    last = far(one, 9)
+    last.say(heartbeat())
+    receive(one)
+    assert len(one.links[0].ends()) == MOST_STRANGERS
+    assert len(one._parsers) <= MOST_STRANGERS + 1
+    one.send_to_all(heartbeat())
+    assert last.hear()[0].get_type() == 'HEARTBEAT'
+
+
+def test_finding_24_a_known_vehicle_is_not_forgotten_for_strangers(radio, far):
+    one = radio()
+    vehicles = [far(one, system) for system in range(1, 41)]  # more than strangers are kept
+    known = set()
+    for vehicle in vehicles:
+        vehicle.say(heartbeat())
+        known |= {address for address, _ in receive(one)}
+        one.keep(known)
+    parsers = {address: one._parsers[address] for address in known}
+    flood(one, 200)
+    assert {(0, end) for end in one.links[0].ends()} > known
+    assert len(one.links[0].ends()) == 40 + MOST_STRANGERS
+    assert all(one._parsers[address] is parsers[address] for address in known)
+    one.send_to_all(heartbeat())
+    assert {vehicle.hear()[0].get_type() for vehicle in vehicles} == {'HEARTBEAT'}
+
+
+def test_finding_24_who_was_named_by_a_parameter_is_not_forgotten(radio):
+    far_end = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    far_end.bind(('127.0.0.1', 0))
+    one = radio(f'udpout:127.0.0.1:{far_end.getsockname()[1]}')
+    one.keep(())
+    flood(one, 100)
+    assert far_end.getsockname() in one.links[0].ends()
+    far_end.close()
+
+
+def test_finding_24_frames_refused_are_counted_when_their_sender_is_forgotten(radio):
+    one = radio()
+    flood(one, 100, b'xxx')
+    assert one.errors() == 100
+
+
+def test_finding_24_a_simulated_vehicle_speaks_to_its_target_and_the_latest_stations():
+    fleet = Fleet([(VehicleConfig('uav_1', 1, ORIGIN, (0.0, 0.0, 0.0)), 'px4')],
+                  ('127.0.0.1', 9))
+    to = ('127.0.0.1', fleet.ports['uav_1'])
+    vehicle = fleet._stations['uav_1']
+    for _ in range(100):
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as stranger:
+            stranger.bind(('127.0.0.1', 0))
+            stranger.sendto(b'x', to)
+            vehicle.hear(0.0)
+    fleet.close()
+    assert len(vehicle._parsers) == 17
+    assert ('127.0.0.1', 9) in vehicle._parsers

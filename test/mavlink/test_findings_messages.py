@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Finding 10: no message ends the bridge; a bad one is counted, told once, and dropped."""
+"""Findings 10 and 24: no message ends the bridge, none is too long, none is told too often."""
 import math
 
 import pytest
@@ -11,7 +11,8 @@ from pymavlink.dialects.v20 import ardupilotmega as d
 
 from uav_task_alloc.mavlink.readback import ReadState
 from uav_task_alloc.mavlink.status import facts_of
-from uav_task_alloc.mission import Item, all_alike
+from uav_task_alloc.mission import Item, Stop, TaskList, all_alike
+from uav_task_alloc.model import Task
 
 NAN, INF = math.nan, math.inf
 
@@ -163,3 +164,48 @@ def test_finding_10_a_message_that_cannot_be_encoded_leaves_the_others(radio, fa
     assert end.hear()[0].get_type() == 'HEARTBEAT'
     assert radio.refusals.count == 1
     assert radio.refusals.notes[0].text.startswith('MISSION_COUNT (to ')
+
+
+def far_places(count):
+    """As many places, 60 m from each other, none more than 5 km from the next or the origin."""
+    return [(60.0 * (n % 60), 60.0 * (n // 60 % 60), 50.0 + n // 3600) for n in range(count)]
+
+
+@BOTH
+def test_finding_24_of_more_items_than_a_mission_holds_the_first_tasks_are_flown(kind):
+    bench = FlightBench(kind).found()
+    places, room = far_places(66_000), 65535 - (kind == 'ardupilot')
+    bench.assign(TaskList(1, tuple(
+        Stop(Task(f't{n}', places[1000 * n + 999]), tuple(places[1000 * n:1000 * n + 999]))
+        for n in range(66))))
+    assert bench.run(lambda: bench.line.sent('MISSION_COUNT'))
+    assert (f'the list takes 66000 mission items: expected at most {room}: flying the first 65 '
+            'tasks, the others follow') in bench.notes
+    assert bench.line.sent('MISSION_COUNT')[0].count == 65_000 + (kind == 'ardupilot')
+    assert bench.failed() == []
+    assert bench.ground.refusals.count == 0
+
+
+@BOTH
+def test_finding_24_a_task_behind_more_points_than_a_mission_holds_fails_in_words(kind):
+    bench = FlightBench(kind).found()
+    room = 65535 - (kind == 'ardupilot')
+    long = Stop(Task('long', (0.0, 90.0, 50.0)), tuple(far_places(66_000)))
+    bench.assign(TaskList(1, (long, *task_list('AB').stops)))
+    assert bench.run(lambda: bench.completed() == ['A', 'B'])
+    failed, = (event for _, event in bench.events if event.event == 'FAILED')
+    assert (failed.task, failed.reason) == (
+        'long', f'task long: 66003 mission items: expected at most {room}, which is what a '
+        'mission holds')
+    assert bench.ground.refusals.count == 0
+
+
+def test_finding_24_a_flood_of_texts_does_not_flood_the_log():
+    bench = FlightBench('px4').found()
+    before = len(bench.notes)
+    for n in range(1000):
+        bench.says(d.MAVLink_statustext_message(6, f'text {n}'.encode()))
+    assert len(bench.notes) - before <= 200
+    bench.now += 61.0
+    bench.says(d.MAVLink_statustext_message(6, b'another'))
+    assert 'another' in bench.notes

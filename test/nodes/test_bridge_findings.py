@@ -7,9 +7,13 @@ import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
 from pymavlink.dialects.v20 import ardupilotmega as d
 from rclpy.executors import SingleThreadedExecutor
+from uav_task_alloc_msgs import msg as m
 
 from uav_task_alloc.mavlink.codec import Codec
+from uav_task_alloc.mavlink.link import MOST_STRANGERS
+from uav_task_alloc.model import Leg, Task
 from uav_task_alloc.nodes.mavlink_bridge import MavlinkBridge
+from uav_task_alloc.nodes.messages import planned_task
 
 pytestmark = pytest.mark.ros
 HEARTBEAT = d.MAVLink_heartbeat_message(d.MAV_TYPE_QUADROTOR, d.MAV_AUTOPILOT_PX4, 0, 0, 4, 3)
@@ -131,3 +135,33 @@ def test_finding_13_a_timestamp_that_cannot_be_written_is_a_warning_in_flight(
     one.until(lambda: 'signing: works' in one.log['info'])
     assert len(one.log['warning']) == 1
     assert one.node.receiver.is_alive()
+
+
+def test_finding_24_a_list_of_66000_points_is_refused_and_the_one_before_stays(bridge):
+    one = bridge()
+    one.say(HEARTBEAT)
+    one.until(lambda: 'uav_1' in one.node.lists)
+    short = planned_task(Task('t', (60.0, 0.0, 50.0)), Leg((), 60.0), 0.0)
+    way = Leg(((9.0, 9.0, 50.0),) * 65_998, 60.0)
+    far = planned_task(Task('far', (60.0, 0.0, 50.0)), way, 0.0)
+    one.node.on_list('uav_1', m.TaskList(uav_id='uav_1', revision=1, tasks=[short]))
+    one.node.on_list('uav_1', m.TaskList(uav_id='uav_1', revision=2, tasks=[short, far]))
+    assert one.log['warning'] == [
+        'uav_1/task_list: task_list of uav_1: points = 66000: expected at most 65533: ignored']
+    assert one.node.ground.served[1].pilot.board.tasks.revision == 1
+    assert one.node.receiver.is_alive()
+
+
+def test_finding_24_a_flood_of_strangers_leaves_the_known_vehicle(bridge):
+    one = bridge()
+    link, = one.node.radio.links
+    one.say(HEARTBEAT)
+    one.until(lambda: 'uav_1' in one.node.lists)
+    for _ in range(200):
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as stranger:
+            stranger.bind(('127.0.0.1', 0))
+            stranger.sendto(b'x', ('127.0.0.1', link.port))
+    one.until(lambda: one.node.radio.errors() == 200)
+    assert one.far.getsockname() in link.ends()
+    assert len(link.ends()) == 1 + MOST_STRANGERS
+    assert one.heard('HEARTBEAT').get_srcSystem() == 245

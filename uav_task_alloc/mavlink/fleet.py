@@ -21,6 +21,7 @@ from uav_task_alloc.mavlink.vehicle_mission import COMPONENT
 Address = tuple[str, int]
 _TICK = 0.02  # [s] wall time between steps
 _SAMPLE = 0.5  # [s] vehicle time between ground-truth samples
+_MOST_STATIONS = 16  # that a vehicle speaks to besides its target; the latest are kept
 
 
 def to_address(target: str) -> Address:
@@ -125,7 +126,8 @@ class _Station:
         self.socket.bind(('', 0))
         self.socket.setblocking(False)
         self._codec = Codec(vehicle.config.system_id, COMPONENT)
-        self._parsers = {target: Codec(vehicle.config.system_id, COMPONENT)}
+        self._target = target
+        self._parsers = {target: Codec(vehicle.config.system_id, COMPONENT)}  # last heard last
 
     def hear(self, now: float) -> None:
         """Answer every datagram that waits."""
@@ -136,10 +138,11 @@ class _Station:
                 return
             except ConnectionError:  # the other side is not there (yet)
                 continue
-            parser = self._parsers.get(address)
-            if parser is None:
-                parser = Codec(self.vehicle.config.system_id, COMPONENT)
-                self._parsers[address] = parser
+            parser = self._parsers.pop(address, None) or Codec(
+                self.vehicle.config.system_id, COMPONENT)
+            self._parsers[address] = parser
+            if len(self._parsers) > 1 + _MOST_STATIONS:
+                del self._parsers[next(a for a in self._parsers if a != self._target)]
             for message in parser.parse(data):
                 self._say(self.vehicle.receive(message, now))
             parser.drop()

@@ -98,6 +98,10 @@ class Ground:
             served.pilot.moved_address(now)
         return self._sent(served, served.pilot.receive(message, now))
 
+    def addresses(self) -> frozenset[Address]:
+        """Where the known vehicles are."""
+        return frozenset(served.address for served in self.served.values())
+
     def step(self, now: float) -> Outgoing:
         """Let time pass for all."""
         out: Outgoing = []

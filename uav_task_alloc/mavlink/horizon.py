@@ -49,6 +49,18 @@ class Horizon:
         return (f'no space on board: flying the first {self.stops} tasks of {stops}, '
                 'the others follow')
 
+    def cut(self, stops: int, items: int, most: int) -> str:
+        """Fly the tasks that a mission can hold; returns what to tell.
+
+        Args:
+            stops: tasks that fit, at least one.
+            items: what the whole list takes.
+            most: what a mission can hold.
+        """
+        self.stops, self.fits = stops, False
+        return (f'the list takes {items} mission items: expected at most {most}: flying the first '
+                f'{stops} tasks, the others follow')
+
     def grow(self) -> bool:
         """Twice as many, where what was tried fits; False: that is not known."""
         if not self.fits or self.stops is None:

@@ -6,7 +6,7 @@ import os
 import socket
 import termios
 import tty
-from collections.abc import Hashable
+from collections.abc import Collection, Hashable
 from contextlib import suppress
 from typing import Protocol
 
@@ -15,6 +15,7 @@ from uav_task_alloc.errors import InvalidValue
 CHUNK = 65536  # [B] more than any datagram
 BACKLOG = 65536  # [B] a slow line may be behind; what is more is dropped
 RECONNECT = 1.0  # [s]
+MOST_STRANGERS = 32  # far ends of one link that are of no known vehicle; the latest are kept
 EXPECTED = 'udpin:HOST:PORT, udpout:HOST:PORT, tcp:HOST:PORT or /dev/tty...:BAUD'
 
 
@@ -40,6 +41,9 @@ class Link(Protocol):
     def ends(self) -> list[Hashable]:
         """Far ends that are known."""
 
+    def keep(self, ends: Collection[Hashable]) -> None:
+        """These are of known vehicles: they are not forgotten, however many others there are."""
+
     def close(self) -> None: ...
 
 
@@ -50,7 +54,8 @@ class Udp:
 
     def __init__(self, name: str, host: str, port: int, bind: bool) -> None:
         self.name = name
-        self._ends: dict[Hashable, None] = {}
+        self._ends: dict[Hashable, None] = {}  # the one heard last at the end
+        self._given: frozenset[Hashable] = frozenset()  # far end by its parameter
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._socket.setblocking(False)
         self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4 << 20)
@@ -58,11 +63,13 @@ class Udp:
             if bind:  # without SO_REUSEADDR, which lets a second bridge steal the port unseen
                 self._socket.bind((host, port))
             else:
-                self._ends[(socket.gethostbyname(host), port)] = None
+                self._given = frozenset({(socket.gethostbyname(host), port)})
+                self._ends.update(dict.fromkeys(self._given))
                 self._socket.bind(('', 0))
         except OSError as error:
             self._socket.close()
             raise InvalidValue('connections', name, f'a free port ({error})') from None
+        self._kept: frozenset[Hashable] = self._given
 
     @property
     def port(self) -> int:
@@ -76,11 +83,20 @@ class Udp:
         try:
             while len(got) < 256:
                 data, end = self._socket.recvfrom(CHUNK)
-                self._ends[end] = None
+                self._hear(end)
                 got.append((end, data))
         except OSError:  # nothing more, or an earlier datagram had no listener
             pass
         return got
+
+    def _hear(self, end: Hashable) -> None:
+        self._ends.pop(end, None)
+        self._ends[end] = None
+        if len(self._ends) > len(self._kept) + MOST_STRANGERS:
+            del self._ends[next(old for old in self._ends if old not in self._kept)]
+
+    def keep(self, ends: Collection[Hashable]) -> None:
+        self._kept = frozenset(ends) | self._given
 
     def write(self, end: Hashable, data: bytes) -> None:
         with suppress(OSError):  # a lost datagram: the protocols above expect that
@@ -158,6 +174,9 @@ class Stream:
 
     def ends(self) -> list[Hashable]:
         return [self.name]
+
+    def keep(self, ends: Collection[Hashable]) -> None:
+        """It has one far end, which is always kept."""
 
     def close(self) -> None:
         if self._file >= 0:

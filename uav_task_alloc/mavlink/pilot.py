@@ -40,6 +40,7 @@ from uav_task_alloc.model import Task
 
 SWAP_HOLD = 30.0  # [s] that a vehicle is held for an upload, at most
 TEXT_AGAIN = 60.0  # [s] in which the same words of a vehicle are told once
+MOST_TEXTS = 200  # different words in that time
 SAYS_NOTHING = re.compile(r'Auto mission changed, restarted command')  # once for each item
 
 
@@ -180,7 +181,7 @@ class Pilot:
             task = board.progress.skipped.popleft()
             self.notes.append(Note('warning', f'{task} was passed over, not by the bridge: '
                                    'it is still to be flown'))
-        for notes in (self.watch.notes, board.notes, self.helm.notes):
+        for notes in (self.watch.notes, board.notes, board.list.notes, self.helm.notes):
             while notes:
                 self.notes.append(notes.popleft())
 
@@ -217,10 +218,11 @@ class Pilot:
         self.watch.text(message, now)
         self.helm.note_refusal(text)
         self.board.list.horizon.note(text)
-        if now - self._texts.get(text, -math.inf) >= TEXT_AGAIN:
+        if len(self._texts) >= MOST_TEXTS:
+            self._texts = {old: at for old, at in self._texts.items() if now - at < TEXT_AGAIN}
+        if now - self._texts.get(text, -math.inf) >= TEXT_AGAIN and len(self._texts) < MOST_TEXTS:
             serious = message.severity < d.MAV_SEVERITY_WARNING and not SAYS_NOTHING.search(text)
             self.notes.append(Note('error' if serious else 'info', text))
-            self._texts = {old: at for old, at in self._texts.items() if now - at < TEXT_AGAIN}
             self._texts[text] = now
         self._said = text
 

@@ -11,12 +11,10 @@ from typing import Any, BinaryIO
 
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.mavlink.codec import Codec, Message
-from uav_task_alloc.mavlink.link import Link
+from uav_task_alloc.mavlink.link import MOST_STRANGERS, Link
 from uav_task_alloc.mavlink.refusals import Refusals, failure
 from uav_task_alloc.mavlink.signing import SigningClock
 from uav_task_alloc.mavlink.telemetry import WANTED
-
-MAX_ENDS = 256  # far ends with a parser; a flood of forged senders gets no further
 
 Address = tuple[int, Hashable]  # number of the link, far end on it
 
@@ -34,7 +32,9 @@ class Radio:
         self._voice = Codec(system, component,
                             signing=self.signing.sent if self.signing else None)
         self.refusals = Refusals()  # what could not be decoded, or encoded
-        self._parsers: dict[Address, Codec] = {}
+        self._parsers: dict[Address, Codec] = {}  # the one heard last at the end
+        self._kept: frozenset[Address] = frozenset()
+        self._errors = 0  # of parsers that are gone
         self._lock = threading.Lock()  # held for all that touches a link: none of it blocks
         self._selector = selectors.DefaultSelector()
         self._watched = [(-1, 0)] * len(self.links)  # the file of each, how often opened
@@ -79,7 +79,14 @@ class Radio:
 
     def errors(self) -> int:
         """Frames refused so far, on all links."""
-        return sum(parser.errors for parser in list(self._parsers.values()))
+        return self._errors + sum(parser.errors for parser in list(self._parsers.values()))
+
+    def keep(self, addresses: Iterable[Address]) -> None:
+        """These are of known vehicles: whoever else speaks, they are not forgotten."""
+        self._kept = frozenset(addresses)
+        with self._lock:
+            for number, link in enumerate(self.links):
+                link.keep([end for at, end in self._kept if at == number])
 
     def close(self) -> None:
         with self._lock:
@@ -104,14 +111,11 @@ class Radio:
             self._watched = files
 
     def _parse(self, address: Address, data: bytes) -> list[tuple[Address, Message]]:
-        parser = self._parsers.get(address)
-        if parser is None:
-            if len(self._parsers) >= MAX_ENDS:
-                self._parsers.pop(next(iter(self._parsers)))
-            parser = self._parsers[address] = Codec(
-                *self._ids, wanted=WANTED,
-                signing=self.signing.heard if self.signing else None,
-                tap=self._write_record if self._record else None)
+        parser = self._parsers.pop(address, None) or Codec(
+            *self._ids, wanted=WANTED, signing=self.signing.heard if self.signing else None,
+            tap=self._write_record if self._record else None)
+        self._parsers[address] = parser
+        self._forget_strangers()
         try:
             messages = parser.parse(data)
         except Exception as error:
@@ -121,6 +125,14 @@ class Radio:
         if self.links[address[0]].datagrams:
             parser.drop()
         return [(address, message) for message in messages]
+
+    def _forget_strangers(self) -> None:
+        """Of datagrams; a stream may stand in the middle of a frame."""
+        strangers = [address for address in self._parsers if address not in self._kept
+                     and self.links[address[0]].datagrams] if (
+            len(self._parsers) > len(self._kept) + len(self.links) + MOST_STRANGERS) else []
+        for address in strangers[:-MOST_STRANGERS]:
+            self._errors += self._parsers.pop(address).errors
 
     def _write_record(self, frame: bytes) -> None:
         record = self._record  # the other thread may end it meanwhile

@@ -8,10 +8,10 @@ from dataclasses import dataclass, replace
 from uav_task_alloc.errors import MissionError
 from uav_task_alloc.geometry.frames import Origin
 from uav_task_alloc.mavlink.horizon import Horizon
-from uav_task_alloc.mavlink.policy import TaskProgress
+from uav_task_alloc.mavlink.policy import Note, TaskProgress
 from uav_task_alloc.mavlink.profiles import Profile
 from uav_task_alloc.mavlink.progress import ProgressTable
-from uav_task_alloc.mission import Item, TaskList, all_alike, mission_items
+from uav_task_alloc.mission import MOST_ITEMS, Item, TaskList, all_alike, mission_items
 from uav_task_alloc.model import Task
 
 
@@ -31,6 +31,8 @@ class Wanted:
         self.tasks: TaskList | None = None
         self.horizon = Horizon()
         self.failed: deque[TaskFailed] = deque()
+        self.notes: deque[Note] = deque()
+        self._room = MOST_ITEMS - int(profile.rules.home_first)
         self._profile, self._origin, self._progress = profile, origin, progress
         self._refused: dict[str, tuple[Task, str]] = {}  # as it was, and why
         self._items: tuple[object, tuple[Item, ...]] | None = None
@@ -73,8 +75,21 @@ class Wanted:
         except MissionError as error:
             self.refuse(error.task, str(error), remaining)
             return self.items()
+        if len(items) > self._room:
+            self._cut(items, remaining)
+            return self.items()
         self._items = key, items
         return items
+
+    def _cut(self, items: tuple[Item, ...], tasks: TaskList) -> None:
+        """More than a mission can hold: the first tasks only; none where even one does not fit."""
+        stops = min(sum(item.completes for item in items[:self._room]), len(tasks.stops) - 1)
+        if stops > 0:
+            self.notes.append(Note('warning', self.horizon.cut(stops, len(items), self._room)))
+        else:
+            task = tasks.stops[0].task.id
+            self.refuse(task, f'task {task}: {len(items)} mission items: expected at most '
+                        f'{self._room}, which is what a mission holds', tasks)
 
     def open_tasks(self) -> tuple[Task, ...]:
         """Those of the list that are still to be flown, and can be."""

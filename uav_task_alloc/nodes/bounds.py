@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence, Sized
 
 from uav_task_alloc.errors import InvalidValue
+from uav_task_alloc.mission import MOST_ITEMS
 from uav_task_alloc.model import check_ros_name
 
 MOST_TASKS = 10_000  # of an announcement
+MOST_POINTS = MOST_ITEMS - 2  # of a list, tasks and detour points; home and return are items too
 MOST_NAMES = 100  # capabilities, and UAVs allowed, of one task or UAV
 MOST_ZONES = 1000  # of a picture
 MOST_VERTICES = 200  # of a zone; whether its edges cross is a question for each pair

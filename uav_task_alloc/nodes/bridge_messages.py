@@ -17,6 +17,7 @@ from uav_task_alloc.mavlink.status import UavStatus
 from uav_task_alloc.mission import Stop, TaskList
 from uav_task_alloc.model import Task, ThreatZone, check_point
 from uav_task_alloc.nodes.announcements import check_picture, sort_zones
+from uav_task_alloc.nodes.bounds import MOST_POINTS
 from uav_task_alloc.nodes.messages import from_point, header, to_point, to_task, to_zone
 
 NOWHERE = (math.nan, math.nan, math.nan)
@@ -31,6 +32,9 @@ def to_list(msg: m.TaskList, uav_id: str, origin: Origin, radius: float) -> Task
     """
     if msg.uav_id not in ('', uav_id):
         raise InvalidValue('uav_id', msg.uav_id, uav_id)
+    points = len(msg.tasks) + sum(len(planned.via) for planned in msg.tasks) + len(msg.end_via)
+    if points > MOST_POINTS:
+        raise InvalidValue(f'task_list of {uav_id}: points', points, f'at most {MOST_POINTS}')
     stops = tuple(Stop(_accepted(to_task(planned.task, origin), radius), tuple(
         check_point(f'task {planned.task.task_id}: via', from_point(p)) for p in planned.via))
         for planned in msg.tasks)

@@ -104,6 +104,7 @@ class MavlinkBridge(Node):
                     out += self.ground.receive(address, message, now)
                 if now >= step_at:
                     out += self.ground.step(now)
+                    self.radio.keep(self.ground.addresses())
                     self.radio.step(now)
                     step_at = now + TICK
             self.radio.send(out)
@@ -155,7 +156,7 @@ class MavlinkBridge(Node):
             tasks = convert.to_list(msg, uav_id, self.station.origin,
                                     self.live.now.acceptance_radius)
         except InvalidValue as error:
-            self.get_logger().warning(f'{uav_id}/task_list: {error}: ignored')
+            self.log['warning'](f'{uav_id}/task_list: {error}: ignored')
             return
         with self.lock:
             out = self.ground.assign(uav_id, tasks, time.monotonic())
