@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import json
 import os
-import shutil
 import signal
 import socket
 import subprocess
@@ -17,6 +16,8 @@ from pathlib import Path
 from ament_index_python.packages import get_package_prefix, get_package_share_directory
 
 from uav_task_alloc import plots, report
+from uav_task_alloc.errors import AllocError
+from uav_task_alloc.record import run_folder
 from uav_task_alloc.scenario import load
 
 PACKAGE = 'uav_task_alloc'
@@ -64,17 +65,16 @@ def free_port() -> int:
 def start_nodes(args: argparse.Namespace, out: Path) -> list[Child]:
     """All nodes of the scenario; the last one is the live view, which ends when all is done."""
     scenario, port = load(args.scenario), free_port()
-    record = str(args.record or '')
+    record, state = str(args.record or ''), str(out / run_folder.STATE)
     origin = {'origin__latitude': scenario.origin.latitude,
               'origin__longitude': scenario.origin.longitude,
               'origin__altitude_amsl': scenario.origin.altitude_amsl}
     played = {'scenario': str(args.scenario), 'speedup': args.speedup}
     return [
         Child.start('allocator', out, uav_timeout=2.0, seed=scenario.seed,
-                    route_end=scenario.route_end,
-                    state_dir=str(out / 'state'), **origin),
+                    route_end=scenario.route_end, state_dir=state, **origin),
         Child.start('mavlink_bridge', out, connections=[f'udpin:127.0.0.1:{port}'],
-                    takeoff=True, relaunch='automatic', state_dir=str(out / 'state'), **origin),
+                    takeoff=True, relaunch='automatic', state_dir=state, **origin),
         Child.start('fleet_sim', out, target=f'127.0.0.1:{port}',
                     log_file=str(out / 'flight.jsonl'), **played),
         Child.start('scenario_player', out, wait_for_plan=True, **played),
@@ -108,8 +108,8 @@ def fly(args: argparse.Namespace) -> int:
     """Run the scenario into args.out; 0 when no task was lost or flown twice, no zone entered."""
     begin = time.monotonic()
     out = args.out
-    shutil.rmtree(out, ignore_errors=True)
-    (out / 'state').mkdir(parents=True)
+    load(args.scenario)  # a bad one costs no results of before
+    run_folder.prepare(out)
     children = start_nodes(args, out)
     try:
         faults = watch(children, args.limit)
@@ -119,10 +119,10 @@ def fly(args: argparse.Namespace) -> int:
                if code and not any(name in fault for fault in faults)]
     summary = report.summarise(out)
     summary['wall_s'] = round(time.monotonic() - begin, 1)
-    (out / 'summary.json').write_text(json.dumps(summary, indent=2) + '\n')
+    (out / run_folder.SUMMARY).write_text(json.dumps(summary, indent=2) + '\n')
     print(report.table(summary))
-    plots.draw_flight(out, out / 'map.png')
-    print(f'Details: {out}/summary.json   Map: {out}/map.png')
+    plots.draw_flight(out, out / run_folder.MAP)
+    print(f'Details: {out / run_folder.SUMMARY}   Map: {out / run_folder.MAP}')
     faults += judge(summary)
     for fault in faults:
         print(f'FAULT: {fault}', file=sys.stderr)
@@ -135,7 +135,8 @@ def main(argv: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog='demo', description=__doc__)
     parser.add_argument('--scenario', type=Path, default=share / 'config/scenarios/demo.yaml')
     parser.add_argument('--speedup', type=float, default=8.0)
-    parser.add_argument('--out', type=Path, default=Path('out/demo'))
+    parser.add_argument('--out', type=Path, default=Path('out/demo'), metavar='DIR',
+                        help='results; what an earlier demo left there is removed (%(default)s)')
     parser.add_argument('--limit', type=float, default=80.0, help='[s] of wall time')
     parser.add_argument('--record', type=Path, metavar='FILE',
                         help='MCAP file for all topics; `report FILE` draws the mission from it')
@@ -143,7 +144,11 @@ def main(argv: list[str] | None = None) -> int:
     # fleets of several demos on one machine, or on the network, must not hear each other
     os.environ.setdefault('ROS_DOMAIN_ID', str(1 + os.getpid() % 100))
     os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
-    return fly(args)
+    try:
+        return fly(args)
+    except (AllocError, OSError) as error:
+        print(error, file=sys.stderr)
+        return 1
 
 
 if __name__ == '__main__':

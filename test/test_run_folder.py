@@ -1,0 +1,80 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What the folder of a demo loses when the next demo begins, and what is never removed."""
+import re
+
+import pytest
+
+from uav_task_alloc.errors import InvalidValue
+from uav_task_alloc.record import run_folder
+
+OWN = ('summary.json', 'map.png', 'record.jsonl', 'flight.jsonl', 'allocator.log',
+       'state/journal.sqlite3', 'state/journal.sqlite3-wal', 'state/journal.sqlite3.damaged-1',
+       'state/authority_uav_1.json')
+
+
+def everything(folder):
+    return sorted(path.relative_to(folder).as_posix() for path in folder.rglob('*'))
+
+
+@pytest.fixture
+def flown(tmp_path):
+    """The folder of a demo that was flown."""
+    folder = tmp_path / 'parent' / 'out'
+    run_folder.prepare(folder)
+    for name in OWN:
+        (folder / name).write_text('x')
+    return folder
+
+
+def test_finding_34_files_of_an_earlier_demo_are_removed(flown):
+    run_folder.prepare(flown)
+    assert everything(flown) == [run_folder.MARKER, 'state']
+
+
+@pytest.mark.parametrize('name', ['notes.txt', 'state/notes.txt', 'flight.mcap', 'sub/map.png',
+                                  '.git'])
+def test_finding_34_one_strange_file_keeps_all_of_them(flown, name):
+    (flown / name).parent.mkdir(exist_ok=True)
+    (flown / name).write_text('mine')
+    before = everything(flown)
+    with pytest.raises(InvalidValue, match=rf"out = '{flown}': expected only files of an earlier "
+                                           rf"demo in it; others are {name.split('/map')[0]}"):
+        run_folder.prepare(flown)
+    assert everything(flown) == before
+
+
+def test_finding_34_files_that_only_have_the_names_of_a_demo_are_kept(flown):
+    (flown / run_folder.MARKER).unlink()
+    before = everything(flown)
+    with pytest.raises(InvalidValue, match=rf'it has no {re.escape(run_folder.MARKER)}, but '
+                                           r'allocator\.log, flight\.jsonl'):
+        run_folder.prepare(flown)
+    assert everything(flown) == before
+
+
+def test_a_folder_of_a_demo_before_there_were_markers_is_known_by_its_logs(flown):
+    (flown / run_folder.MARKER).unlink()
+    for name in run_folder.LOGS:
+        (flown / name).write_text('x')
+    run_folder.prepare(flown)
+    assert everything(flown) == [run_folder.MARKER, 'state']
+
+
+def test_finding_34_links_are_not_followed(flown, tmp_path):
+    elsewhere = tmp_path / 'elsewhere'
+    elsewhere.mkdir()
+    (elsewhere / 'journal.sqlite3').write_text('of a fleet')
+    for name in ('authority_uav_1.json', 'journal.sqlite3', 'journal.sqlite3-wal',
+                 'journal.sqlite3.damaged-1'):
+        (flown / 'state' / name).unlink()
+    (flown / 'state').rmdir()
+    (flown / 'state').symlink_to(elsewhere)
+    with pytest.raises(InvalidValue, match='others are state'):
+        run_folder.prepare(flown)
+    assert everything(elsewhere) == ['journal.sqlite3']
+
+
+def test_a_file_in_place_of_the_folder_is_refused(tmp_path):
+    (tmp_path / 'out').write_text('x')
+    with pytest.raises(InvalidValue, match='expected a folder'):
+        run_folder.prepare(tmp_path / 'out')
