@@ -1,45 +1,44 @@
 # SPDX-License-Identifier: Apache-2.0
 """A scenario in the air: allocator, bridge, simulated fleet, player and live view."""
-from launch.actions import DeclareLaunchArgument, IncludeLaunchDescription
-from launch.conditions import IfCondition
-from launch.launch_description_sources import PythonLaunchDescriptionSource
-from launch.substitutions import LaunchConfiguration, PathJoinSubstitution
-from launch_ros.actions import Node
-from launch_ros.parameter_descriptions import ParameterValue
+from launch.actions import DeclareLaunchArgument, OpaqueFunction
+from launch.substitutions import PathJoinSubstitution
 from launch_ros.substitutions import FindPackageShare
 
 from launch import LaunchDescription
+from uav_task_alloc.nodes.launching import argument, flag, node, number, on_this_machine, rviz
+from uav_task_alloc.nodes.ports import free_port
+from uav_task_alloc.scenario import load, simulation_parameters
 
 
 def generate_launch_description() -> LaunchDescription:
-    """Arguments: scenario (a YAML file), speedup, rviz (true: show it there too), record
-    (an MCAP file for all topics), bridge_state_dir (a folder that keeps over a restart who has
-    each aircraft; empty: nothing is kept).
+    """Arguments: scenario (a YAML file), speedup (empty: the scenario's), rviz (true: show it
+    there too), record (an MCAP file for all topics), bridge_state_dir (a folder that keeps over a
+    restart who has each aircraft; empty: nothing is kept).
     """
-    share = FindPackageShare('uav_task_alloc')
-    scenario = LaunchConfiguration('scenario')
-    played = {'scenario': scenario,
-              'speedup': ParameterValue(LaunchConfiguration('speedup'), value_type=float)}
-
-    def node(name: str, respawn: bool = False, **parameters: object) -> Node:
-        return Node(package='uav_task_alloc', executable=name, output='screen', respawn=respawn,
-                    parameters=[parameters] if parameters else [])
-
     return LaunchDescription([
         DeclareLaunchArgument('scenario', default_value=PathJoinSubstitution(
-            [share, 'config', 'scenarios', 'demo.yaml'])),
-        DeclareLaunchArgument('speedup', default_value='8.0'),
+            [FindPackageShare('uav_task_alloc'), 'config', 'scenarios', 'demo.yaml'])),
+        DeclareLaunchArgument('speedup', default_value=''),
         DeclareLaunchArgument('rviz', default_value='false'),
         DeclareLaunchArgument('record', default_value=''),
-        node('allocator'),
         DeclareLaunchArgument('bridge_state_dir', default_value=''),
-        node('mavlink_bridge', respawn=True, takeoff=True, relaunch='automatic',
-             state_dir=ParameterValue(LaunchConfiguration('bridge_state_dir'), value_type=str)),
-        node('fleet_sim', **played),
-        node('scenario_player', **played),
-        node('live_view', record=ParameterValue(LaunchConfiguration('record'), value_type=str)),
-        IncludeLaunchDescription(
-            PythonLaunchDescriptionSource(
-                PathJoinSubstitution([share, 'launch', 'rviz.launch.py'])),
-            condition=IfCondition(LaunchConfiguration('rviz'))),
+        OpaqueFunction(function=start),
     ])
+
+
+def start(context: object) -> list:
+    """All nodes, with the scenario's values, on loopback and for its vehicles alone."""
+    path = argument(context, 'scenario')
+    shown = [rviz()] if flag(context, 'rviz') else []
+    given = simulation_parameters(load(path), path, free_port(), number(context, 'speedup'))
+    return [
+        *on_this_machine(),
+        node('allocator', given['allocator']),
+        node('mavlink_bridge', given['mavlink_bridge'],
+             {'state_dir': argument(context, 'bridge_state_dir')}, respawn=True),
+        node('fleet_sim', given['fleet_sim']),
+        node('scenario_player', given['scenario_player']),
+        node('live_view', given['live_view'],
+             {'record': argument(context, 'record'), 'stay': True}),
+        *shown,
+    ]

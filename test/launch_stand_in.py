@@ -8,7 +8,10 @@ import sys
 import types
 from pathlib import Path
 
+import yaml
+
 SHARE = {'uav_task_alloc': str(Path(__file__).resolve().parent.parent)}
+ENVIRONMENT = 'the environment'  # no argument has this name
 
 
 def text(value, given):
@@ -30,6 +33,9 @@ class Value:
 class Configuration(Value):
     def text(self, given):
         return given[self.what]
+
+    def perform(self, context):
+        return self.text(context.launch_configurations)
 
 
 class Share(Value):
@@ -70,6 +76,8 @@ class Typed(Value):
         self.type = value_type
 
     def text(self, given):
+        if isinstance(self.what, (list, bool)):
+            return yaml.safe_dump(self.what, default_flow_style=True, width=10**6).split('\n')[0]
         value = self.type(text(self.what, given))
         return f"'{value}'" if self.type is str else str(value)  # as YAML, where '' is no value
 
@@ -108,6 +116,34 @@ class Include:
         return commands(Path(text(self.source, given)), inner)
 
 
+class Context:
+    """What a function of a launch file is given."""
+
+    def __init__(self, given):
+        self.launch_configurations = given
+
+
+class Function:
+    """Calls a function of the launch file once the arguments are known."""
+
+    def __init__(self, *, function):
+        self.function = function
+
+    def starts(self, given):
+        return [words for part in self.function(Context(given)) for words in part.starts(given)]
+
+
+class Environment:
+    """A variable for all that is started after it."""
+
+    def __init__(self, name, value):
+        self.name, self.value = name, value
+
+    def starts(self, given):
+        given.setdefault(ENVIRONMENT, {})[self.name] = text(self.value, given)
+        return []
+
+
 class Node:
     def __init__(self, *, package, executable, namespace='', name='', parameters=(), arguments=(),
                  remappings=(), output='', condition=None, respawn=False):
@@ -131,20 +167,21 @@ class Node:
                           for word in ('-p', f'{key}:={text(value, given)}')]
             else:
                 words += ['--params-file', text(each, given)]
-        return [Words(words, self.respawn)]
+        return [Words(words, self.respawn, dict(given.get(ENVIRONMENT, {})))]
 
 
 class Words(list):
-    """Of a command; `respawn`: it is started again whenever it ends."""
+    """Of a command; `respawn`: it is started again whenever it ends; `env`: to be set before."""
 
-    def __init__(self, words, respawn):
+    def __init__(self, words, respawn, env):
         super().__init__(words)
-        self.respawn = respawn
+        self.respawn, self.env = respawn, env
 
 
 MODULES = {
     'launch': {'LaunchDescription': list},
-    'launch.actions': {'DeclareLaunchArgument': Declared, 'IncludeLaunchDescription': Include},
+    'launch.actions': {'DeclareLaunchArgument': Declared, 'IncludeLaunchDescription': Include,
+                       'OpaqueFunction': Function, 'SetEnvironmentVariable': Environment},
     'launch.conditions': {'IfCondition': Condition, 'UnlessCondition': NotCondition},
     'launch.launch_description_sources': {'PythonLaunchDescriptionSource': Source},
     'launch.substitutions': {'LaunchConfiguration': Configuration, 'PathJoinSubstitution': Joined,
@@ -153,11 +190,12 @@ MODULES = {
     'launch_ros.parameter_descriptions': {'ParameterValue': Typed},
     'launch_ros.substitutions': {'FindPackageShare': Share},
 }
+USERS = ('uav_task_alloc.nodes.launching',)  # modules that have imported from these
 
 
 def commands(path, given):
     """Words of `PACKAGE EXECUTABLE ...` for each node; KeyError for an unknown argument."""
-    before = {name: sys.modules.get(name) for name in MODULES}
+    before = {name: sys.modules.pop(name, None) for name in (*MODULES, *USERS)}
     for name, members in MODULES.items():
         sys.modules[name] = types.ModuleType(name)
         sys.modules[name].__dict__.update(members)
@@ -167,9 +205,8 @@ def commands(path, given):
         parts = scope['generate_launch_description']()
     finally:
         for name, module in before.items():
-            if module is None:
-                del sys.modules[name]
-            else:
+            sys.modules.pop(name, None)
+            if module is not None:
                 sys.modules[name] = module
     declared = {part.name for part in parts if isinstance(part, Declared)}
     if set(given) - declared:

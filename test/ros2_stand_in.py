@@ -35,8 +35,8 @@ def launch(words):
     """ros2 launch PACKAGE FILE NAME:=VALUE ...: all nodes until Ctrl-C, which each is told of."""
     path = Path(SHARE[words[0]], 'launch', words[1])
     nodes = commands(path, dict(word.split(':=', 1) for word in words[2:]))
-    started = [program(*node[:2]) + node[2:] for node in nodes]
-    children = [subprocess.Popen(node) for node in started]
+    started = [(program(*node[:2]) + node[2:], node.env) for node in nodes]
+    children = [subprocess.Popen(node, env={**os.environ, **env}) for node, env in started]
     stop = []
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: stop.append(1))

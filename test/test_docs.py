@@ -238,27 +238,6 @@ def test_a_launch_file_starts_what_is_there(path):
     assert launch_stand_in.commands(path, {})
 
 
-@pytest.mark.parametrize('name', ['demo', 'fleet'])
-def test_a_launched_bridge_is_started_again_and_keeps_who_has_each_aircraft(name):
-    path = ROOT / f'launch/{name}.launch.py'
-    for given, state_dir in (({}, None), ({'bridge_state_dir': 'kept'}, "state_dir:='kept'")):
-        [bridge] = [words for words in launch_stand_in.commands(path, given)
-                    if words[1] == 'mavlink_bridge']
-        assert bridge.respawn
-        assert state_dir is None or state_dir in bridge
-        assert ('relaunch:=automatic' in bridge) is (name == 'demo')
-    assert not any(words.respawn for words in launch_stand_in.commands(path, {})
-                   if words[1] != 'mavlink_bridge')
-
-
-def test_rviz_comes_with_a_fleet_when_it_is_asked_for():
-    path = ROOT / 'launch/fleet.launch.py'
-    plain, shown = (launch_stand_in.commands(path, {'rviz': rviz, 'namespace': 'fleet'})
-                    for rviz in ('false', 'true'))
-    assert shown[:len(plain)] == plain
-    assert [node[0] for node in shown[len(plain):]] == ['rviz2', 'tf2_ros']
-
-
 @pytest.mark.parametrize(('line', 'told'), [
     ('make demmo', 'demmo'),
     ('python -m uav_task_alloc plan x.yaml --plott x.png', 'no option --plott'),

@@ -210,6 +210,7 @@ class LiveViewParams(Checked):
                         'empty: none.', fixed=True)
     settle: float = param(10.0, 'Quiet time of the scenario after which a fleet is done.',
                           low=0.0, high=3600.0, unit='s', fixed=True)
+    stay: bool = param(False, 'Whether it stays when a scenario is over.', fixed=True)
     page: bool = param(True, 'Whether there is a page in the browser.', fixed=True)
     host: str = param('127.0.0.1', 'Address the page is served on; 0.0.0.0: to the whole network, '
                       'without password.', fixed=True)

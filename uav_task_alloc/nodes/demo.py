@@ -6,7 +6,6 @@ import argparse
 import json
 import os
 import signal
-import socket
 import subprocess
 import sys
 import time
@@ -17,8 +16,10 @@ from ament_index_python.packages import get_package_prefix, get_package_share_di
 
 from uav_task_alloc import plots, report
 from uav_task_alloc.errors import AllocError
-from uav_task_alloc.record import run_folder
-from uav_task_alloc.scenario import load
+from uav_task_alloc.nodes.ports import free_port
+from uav_task_alloc.record import run_folder, truth
+from uav_task_alloc.scenario import load, simulation_parameters
+from uav_task_alloc.scenario.node_parameters import Parameters
 
 PACKAGE = 'uav_task_alloc'
 FAULTS = ('tasks_lost', 'tasks_flown_twice', 'zone_violations')
@@ -33,11 +34,11 @@ class Child:
     log: Path
 
     @classmethod
-    def start(cls, name: str, out: Path, show: bool = False, **parameters: object) -> Child:
+    def start(cls, name: str, out: Path, parameters: Parameters, show: bool = False) -> Child:
         """Start an installed executable; `show`: in this terminal, else into out/NAME.log."""
         command = [f'{get_package_prefix(PACKAGE)}/lib/{PACKAGE}/{name}', '--ros-args']
         for key, value in parameters.items():
-            command += ['-p', f'{key.replace("__", ".")}:={json.dumps(value)}']
+            command += ['-p', f'{key}:={json.dumps(value)}']
         log = out / f'{name}.log'
         with open(log, 'wb') as file:
             process = subprocess.Popen(command, stdout=None if show else file,
@@ -55,31 +56,17 @@ class Child:
             return self.process.wait()
 
 
-def free_port() -> int:
-    """A UDP port on loopback that nobody uses."""
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        probe.bind(('127.0.0.1', 0))
-        return int(probe.getsockname()[1])
-
-
 def start_nodes(args: argparse.Namespace, out: Path) -> list[Child]:
     """All nodes of the scenario; the last one is the live view, which ends when all is done."""
-    scenario, port = load(args.scenario), free_port()
-    record, state = str(args.record or ''), str(out / run_folder.STATE)
-    origin = {'origin__latitude': scenario.origin.latitude,
-              'origin__longitude': scenario.origin.longitude,
-              'origin__altitude_amsl': scenario.origin.altitude_amsl}
-    played = {'scenario': str(args.scenario), 'speedup': args.speedup}
-    return [
-        Child.start('allocator', out, uav_timeout=2.0, seed=scenario.seed,
-                    route_end=scenario.route_end, state_dir=state, **origin),
-        Child.start('mavlink_bridge', out, connections=[f'udpin:127.0.0.1:{port}'],
-                    takeoff=True, relaunch='automatic', state_dir=state, **origin),
-        Child.start('fleet_sim', out, target=f'127.0.0.1:{port}',
-                    log_file=str(out / 'flight.jsonl'), **played),
-        Child.start('scenario_player', out, wait_for_plan=True, **played),
-        Child.start('live_view', out, show=True, out_dir=str(out), record=record, **played),
-    ]
+    given = simulation_parameters(load(args.scenario), args.scenario, free_port(), args.speedup)
+    state = str(out / run_folder.STATE)
+    for node, more in {
+            'allocator': {'state_dir': state}, 'mavlink_bridge': {'state_dir': state},
+            'fleet_sim': {'log_file': str(out / truth.FILE)},
+            'live_view': {'out_dir': str(out), 'record': str(args.record or '')}}.items():
+        given[node].update(more)
+    return [Child.start(node, out, parameters, show=node == 'live_view')
+            for node, parameters in given.items()]
 
 
 def watch(children: list[Child], limit: float) -> list[str]:
@@ -134,7 +121,7 @@ def main(argv: list[str] | None = None) -> int:
     share = Path(get_package_share_directory(PACKAGE))
     parser = argparse.ArgumentParser(prog='demo', description=__doc__)
     parser.add_argument('--scenario', type=Path, default=share / 'config/scenarios/demo.yaml')
-    parser.add_argument('--speedup', type=float, default=8.0)
+    parser.add_argument('--speedup', type=float, help="(the scenario's)")
     parser.add_argument('--out', type=Path, default=Path('out/demo'), metavar='DIR',
                         help='results; what an earlier demo left there is removed (%(default)s)')
     parser.add_argument('--limit', type=float, default=80.0, help='[s] of wall time')

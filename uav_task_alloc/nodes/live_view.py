@@ -106,7 +106,8 @@ class LiveView(Node):
             self.quiet_since = None
         else:
             self.quiet_since = clock if self.quiet_since is None else self.quiet_since
-            self.finished = clock - self.quiet_since >= self.params.settle
+            self.finished = (not self.params.stay
+                             and clock - self.quiet_since >= self.params.settle)
         self.show(clock)
         self.post()
         if self.file:

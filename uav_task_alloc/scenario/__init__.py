@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Scenario files: read, checked, written and generated."""
 from uav_task_alloc.scenario.generate import generate
+from uav_task_alloc.scenario.node_parameters import fleet_parameters, simulation_parameters
 from uav_task_alloc.scenario.read import load, parse
 from uav_task_alloc.scenario.timeline import Moment, timeline
 from uav_task_alloc.scenario.values import (
@@ -12,5 +13,6 @@ from uav_task_alloc.scenario.values import (
 )
 from uav_task_alloc.scenario.write import to_yaml
 
-__all__ = ['Cancel', 'Moment', 'Scenario', 'ScenarioUav', 'TimedTask', 'TimedZone', 'generate',
-           'load', 'parse', 'timeline', 'to_yaml']
+__all__ = ['Cancel', 'Moment', 'Scenario', 'ScenarioUav', 'TimedTask', 'TimedZone',
+           'fleet_parameters', 'generate', 'load', 'parse', 'simulation_parameters', 'timeline',
+           'to_yaml']

@@ -60,7 +60,8 @@ def parse(text: str, name: str = 'scenario') -> Scenario:
     cancels = [_cancel(row, times) for row in root['cancels']]
     return Scenario(root['name'] or Path(name).stem, root['seed'], origin, uavs,
                     tuple(sorted(tasks, key=lambda timed: timed.at)), zones,
-                    tuple(sorted(cancels, key=lambda cancel: cancel.at)), root['route_end'])
+                    tuple(sorted(cancels, key=lambda cancel: cancel.at)), root['route_end'],
+                    root['speedup'])
 
 
 def _origin(row: Row | None) -> Origin:

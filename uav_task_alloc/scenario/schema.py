@@ -16,6 +16,7 @@ from uav_task_alloc.scenario.checked_yaml import (
     text,
     whole,
 )
+from uav_task_alloc.scenario.values import DEFAULT_SPEEDUP
 
 TIME = number(0.0)
 POSITIVE = number(0.0, open_low=True)
@@ -97,6 +98,8 @@ SCENARIO: Table = {
     'origin': Key(mapping(ORIGIN, 'a mapping with latitude, longitude, altitude_amsl'),
                   'where ENU (0, 0, 0) is; default: 47.397742, 8.545594, 488.0', None),
     'route_end': Key(choice('hold', 'home'), 'what a UAV does after its last task', 'hold'),
+    'speedup': Key(number(0.1, 100.0), 'how many times faster than real time demo and '
+                   'demo.launch.py fly it', DEFAULT_SPEEDUP),
     'uavs': Key(many(mapping(UAV, 'a UAV'), 'a list of UAVs'), 'the fleet'),
     'tasks': Key(many(mapping(TASK, 'a task'), 'a list of tasks'), 'tasks with their times',
                  ()),

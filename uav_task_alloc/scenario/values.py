@@ -10,6 +10,7 @@ from uav_task_alloc.geometry.frames import Origin
 from uav_task_alloc.model import Point, Task, ThreatZone, Uav
 
 DEFAULT_ORIGIN = Origin(47.397742, 8.545594, 488.0)
+DEFAULT_SPEEDUP = 8.0  # times faster than real time
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,6 +75,7 @@ class Scenario:
     zones: tuple[TimedZone, ...] = ()
     cancels: tuple[Cancel, ...] = ()  # by `at`
     route_end: str = 'hold'  # hold | home
+    speedup: float = DEFAULT_SPEEDUP  # of a simulated flight
 
     @property
     def duration(self) -> float:

@@ -19,6 +19,7 @@ def to_yaml(scenario: Scenario) -> str:
         'seed': scenario.seed,
         'origin': asdict(scenario.origin),
         'route_end': scenario.route_end,
+        'speedup': scenario.speedup,
         'uavs': [_uav(uav) for uav in scenario.uavs],
         'tasks': [_task(timed) for timed in scenario.tasks],
         'zones': [_zone(timed) for timed in scenario.zones],

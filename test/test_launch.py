@@ -1,0 +1,99 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What the launch files start, with which parameters; test/nodes/test_launch.py flies them."""
+from itertools import pairwise
+from pathlib import Path
+
+import launch_stand_in
+import pytest
+import yaml
+
+from uav_task_alloc import params
+
+ROOT = Path(__file__).parent.parent
+MOVED = """
+seed: 4000000000
+speedup: 20
+route_end: home
+origin: {latitude: -33.9, longitude: 151.2, altitude_amsl: 40.0}
+uavs:
+  - {id: drone_7, system_id: 7, position: [0, 0, 0], range: 3000, capabilities: [camera, winch]}
+  - {id: drone_9, system_id: 9, position: [50, 0, 0], range: 5000}
+tasks:
+  - {id: t1, position: [10, 20, 30]}
+"""
+
+
+def started(name, **given):
+    """{executable: words} of a launch file of this package."""
+    found = launch_stand_in.commands(ROOT / f'launch/{name}.launch.py', given)
+    return {words[1]: words for words in found}
+
+
+def values(words):
+    """The parameters of a command; a file's are read."""
+    found = {}
+    for flag, value in pairwise(words):
+        if flag == '--params-file':
+            [content] = yaml.safe_load(Path(value).read_text()).values()
+            found |= content['ros__parameters']
+        elif flag == '-p':
+            key, _, text = value.partition(':=')
+            found[key] = yaml.safe_load(text)
+    return found
+
+
+@pytest.fixture
+def moved(tmp_path):
+    path = tmp_path / 'moved.yaml'
+    path.write_text(MOVED)
+    return str(path)
+
+
+def test_finding_35_the_demo_listens_on_loopback_to_the_vehicles_of_its_scenario_alone(moved):
+    nodes = started('demo', scenario=moved)
+    bridge = values(nodes['mavlink_bridge'])
+    [connection] = bridge['connections']
+    host, port = connection.removeprefix('udpin:').split(':')
+    assert host == '127.0.0.1'
+    assert values(nodes['fleet_sim'])['target'] == f'127.0.0.1:{port}'
+    assert port != '14550'
+    assert bridge['system_ids'] == [7, 9]
+    assert bridge['takeoff'] is True
+
+
+def test_finding_35_two_demos_do_not_share_a_port():
+    ports = {values(started('demo')['mavlink_bridge'])['connections'][0] for _ in range(3)}
+    assert len(ports) > 1
+
+
+def test_the_nodes_of_a_demo_stay_on_this_machine_unless_told(monkeypatch):
+    monkeypatch.delenv('ROS_AUTOMATIC_DISCOVERY_RANGE', raising=False)
+    assert {words.env.get('ROS_AUTOMATIC_DISCOVERY_RANGE')
+            for words in started('demo').values()} == {'LOCALHOST'}
+    monkeypatch.setenv('ROS_AUTOMATIC_DISCOVERY_RANGE', 'SUBNET')
+    assert all(not words.env for words in started('demo').values())
+
+
+@pytest.mark.parametrize('name', ['demo', 'fleet'])
+def test_every_parameter_that_a_launch_file_gives_is_one(name, moved):
+    given = {'scenario': moved} if name == 'demo' else {}
+    for executable, words in started(name, **given).items():
+        kind = params.NODES[executable]
+        kind(**{key.replace('.', '__'): value for key, value in values(words).items()})
+
+
+@pytest.mark.parametrize('name', ['demo', 'fleet'])
+def test_a_launched_bridge_is_started_again_and_keeps_who_has_each_aircraft(name):
+    for given, state_dir in (({}, ''), ({'bridge_state_dir': 'kept'}, 'kept')):
+        bridge = started(name, **given)['mavlink_bridge']
+        assert bridge.respawn
+        assert values(bridge)['state_dir'] == state_dir
+        assert (values(bridge)['relaunch'] == 'automatic') is (name == 'demo')
+
+
+def test_rviz_comes_with_a_fleet_when_it_is_asked_for():
+    path = ROOT / 'launch/fleet.launch.py'
+    plain, shown = (launch_stand_in.commands(path, {'rviz': rviz, 'namespace': 'fleet'})
+                    for rviz in ('false', 'true'))
+    assert shown[:len(plain)] == plain
+    assert [node[0] for node in shown[len(plain):]] == ['rviz2', 'tf2_ros']

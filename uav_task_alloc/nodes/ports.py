@@ -1,0 +1,12 @@
+# SPDX-License-Identifier: Apache-2.0
+"""UDP ports for a fleet that is simulated on this machine."""
+from __future__ import annotations
+
+import socket
+
+
+def free_port() -> int:
+    """A UDP port on loopback that nobody uses."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        probe.bind(('127.0.0.1', 0))
+        return int(probe.getsockname()[1])
