@@ -75,9 +75,36 @@ def test_the_nodes_of_a_demo_stay_on_this_machine_unless_told(monkeypatch):
 
 
 @pytest.mark.parametrize('name', ['demo', 'fleet'])
+def test_finding_37_allocator_and_bridge_have_the_values_of_the_scenario(name, moved):
+    nodes = started(name, scenario=moved)
+    allocator, bridge = values(nodes['allocator']), values(nodes['mavlink_bridge'])
+    for node in (allocator, bridge):
+        assert [node[f'origin.{key}'] for key in ('latitude', 'longitude', 'altitude_amsl')] == [
+            -33.9, 151.2, 40.0]
+    assert allocator['route_end'] == 'home'
+    assert allocator['seed'] == 4000000000 % 2**31  # what a parameter of ROS holds
+    assert bridge['system_ids'] == [7, 9]
+    assert bridge['uav_id_pattern'] == 'drone_{sysid}'
+    assert bridge['capabilities'] == ['drone_7:camera,winch']
+
+
+@pytest.mark.parametrize(('given', 'speedup'), [({}, 20), ({'speedup': '3'}, 3)])
+def test_finding_37_a_demo_is_as_fast_as_its_scenario_says_unless_told(moved, given, speedup):
+    nodes = started('demo', scenario=moved, **given)
+    assert {values(nodes[name])['speedup']
+            for name in ('fleet_sim', 'scenario_player', 'live_view')} == {speedup}
+
+
+def test_without_a_scenario_a_fleet_has_the_values_of_its_files(tmp_path):
+    path = tmp_path / 'mine.yaml'
+    path.write_text('/**/allocator: {ros__parameters: {seed: 5, route_end: hold}}')
+    assert values(started('fleet', allocator_params=str(path))['allocator']) == {
+        'seed': 5, 'route_end': 'hold'}
+
+
+@pytest.mark.parametrize('name', ['demo', 'fleet'])
 def test_every_parameter_that_a_launch_file_gives_is_one(name, moved):
-    given = {'scenario': moved} if name == 'demo' else {}
-    for executable, words in started(name, **given).items():
+    for executable, words in started(name, scenario=moved).items():
         kind = params.NODES[executable]
         kind(**{key.replace('.', '__'): value for key, value in values(words).items()})
 

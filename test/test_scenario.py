@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 from uav_task_alloc import scenario
-from uav_task_alloc.errors import ScenarioError
+from uav_task_alloc.errors import InvalidValue, ScenarioError
 from uav_task_alloc.geometry.zones import zones_around
 from uav_task_alloc.model import Shape, ThreatZone
 from uav_task_alloc.scenario import checked_yaml, document
@@ -242,3 +242,27 @@ def test_every_key_says_what_it_is():
     ('{a: 1}', 'a mapping')])
 def test_a_refusal_shows_a_value_as_it_was_written(text, shown):
     assert checked_yaml.shown(checked_yaml.compose(text, 'f')) == shown
+
+
+@pytest.mark.parametrize(('ids', 'pattern'), [
+    ([('uav_1', 1), ('uav_12', 12)], 'uav_{sysid}'),
+    ([('a1b', 1), ('a2b', 2)], 'a{sysid}b'),
+    ([('u1_1', 1)], 'u1_{sysid}'),
+    ([('u1_1', 1), ('u1_2', 2)], 'u1_{sysid}'),
+])
+def test_the_bridge_names_the_uavs_as_the_scenario_does(ids, pattern):
+    rows = ''.join(f'  - {{id: {name}, system_id: {number}, position: [0, 0, 0]}}\n'
+                   for name, number in ids)
+    played = scenario.parse(f'uavs:\n{rows}')
+    given = scenario.fleet_parameters(played)['mavlink_bridge']
+    assert given['uav_id_pattern'] == pattern
+    assert [pattern.format(sysid=number) for _, number in ids] == [name for name, _ in ids]
+
+
+def test_names_that_the_bridge_cannot_make_are_refused():
+    played = scenario.load(ROOT / 'config/scenarios/plan_only.yaml')
+    with pytest.raises(InvalidValue) as refused:
+        scenario.fleet_parameters(played)
+    assert str(refused.value) == (
+        "scenario plan_only: id of system_id 1 = 'scout': expected ids that one pattern makes of "
+        "system ids, 'uav_1' say: the bridge names UAVs by it")

@@ -438,6 +438,8 @@ class Pilot:
         if not self.authority.held:
             return self.helm.wait('~/hand_over: it has landed' if self.authority.landed else
                                   'a pilot to arm and take off (takeoff is false)')
+        if self.policy.grounded and not self.helm.climbing:
+            return self.helm.wait(self.policy.grounded)
         home = self.telemetry.home or self.telemetry.position
         zone = zone_in_the_way(home, home, self.policy.zones)
         if zone is not None and not self.helm.climbing:
@@ -446,8 +448,9 @@ class Pilot:
         return self.helm.rise(self.policy.cruise_altitude, self._wants_to_fly, now)
 
     def _wants_to_fly(self) -> bool:
-        return self.authority.held and self.board.tasks is not None and bool(
-            self.board.remaining().stops)
+        return (self.authority.held and self.board.tasks is not None
+                and not (self.policy.grounded and not self.telemetry.airborne)
+                and bool(self.board.remaining().stops))
 
     def _fly(self, now: float) -> Step:
         """In mission mode, at the right item."""

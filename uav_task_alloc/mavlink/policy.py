@@ -17,6 +17,7 @@ class Policy:
     when_foreign: str = 'yield'  # or 'reassert': a mission that somebody else put there
     relaunch: str = 'operator'  # or 'automatic': whether it starts again after a landing of ours
     zones: tuple[ThreatZone, ...] = ()  # which RTL does not know
+    grounded: str = ''  # what whoever is on the ground waits for; '': nothing
 
 
 @dataclass(frozen=True, slots=True)

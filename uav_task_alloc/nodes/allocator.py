@@ -25,6 +25,7 @@ from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.geometry.frames import Origin
 from uav_task_alloc.nodes import allocation_messages as told, announcements
 from uav_task_alloc.nodes.complaints import Complaints
+from uav_task_alloc.nodes.fleet_origin import FleetOrigin
 from uav_task_alloc.nodes.intake import hear
 from uav_task_alloc.nodes.leader_watch import LeaderWatch
 from uav_task_alloc.nodes.messages import (
@@ -58,6 +59,8 @@ class AllocatorNode(Node):
         now = self.live.now
         self.origin = Origin(now.origin__latitude, now.origin__longitude,
                              now.origin__altitude_amsl)
+        self.origins = FleetOrigin(self, self.origin, lambda text: self.complain(
+            'fleet_origin', '', text))
         self.keeper = Keeper(now.state_dir, self.get_logger().error, self.origin,
                              LOCK_WAIT)
         self.core = Allocator(now, time.monotonic(), self.keeper.saved)
@@ -66,6 +69,7 @@ class AllocatorNode(Node):
         self.answers: deque[Answer | None] = deque()
         self.background = False
         self.rested = 0.0  # [s] steady clock
+        self.refused = ''  # which other origin was logged
         self.fault = ''  # why the last solve failed
         self.behind = False  # there is more to tell than was told
         self.inputs: list[Subscription] = []
@@ -195,7 +199,7 @@ class AllocatorNode(Node):
             self.world.touch('parameters changed', now)
         self.core.tick(now, stamp)
         # nothing is solved while the last answer is not told: telling would never come to an end
-        problem = None if self.behind else self.core.due(now, stamp)
+        problem = None if self.behind or self.origins.conflict() else self.core.due(now, stamp)
         if problem is not None:
             self.background = problem.background
             self.worker.ask(problem)
@@ -257,9 +261,9 @@ class AllocatorNode(Node):
     # what is told
 
     def tell(self, stamp: float) -> None:
-        """On disk first, then published."""
+        """On disk first, then published, while all nodes have one origin."""
         self.behind = not self.keeper.save(self.core, time.monotonic(), MOST_ROWS)
-        if self.behind:
+        if self.behind or self.origins.conflict():
             return
         out = self.core.collect()
         self.log(out.notes)
@@ -279,7 +283,12 @@ class AllocatorNode(Node):
 
     def on_second(self) -> None:
         """Say how it goes."""
-        stopped = self.watch.trouble()
+        self.origins.check()
+        conflict = self.origins.conflict()
+        stopped = self.watch.trouble() or (conflict and f'refuses to plan: {conflict}')
+        if conflict != self.refused:
+            self.refused = conflict
+            self.get_logger().error(stopped if conflict else 'fleet_origin: all agree')
         self.health.publish(told.from_health(
             self.get_fully_qualified_name(),
             [stopped] if stopped else worries(self.world, self.keeper.trouble, self.fault),

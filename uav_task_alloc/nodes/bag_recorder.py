@@ -29,6 +29,7 @@ OURS = 'uav_task_alloc_msgs/msg/'
 # those whose first message must not be missed; all others as they turn up
 KNOWN = {'task_announcements': (OURS + 'TaskAnnouncement', ANNOUNCEMENTS),
          'threat_zones': (OURS + 'ThreatZoneArray', LATCHED),
+         'fleet_origin': (OURS + 'FleetOrigin', LATCHED),
          'task_statuses': (OURS + 'TaskStatusArray', LATCHED),
          'allocation': (OURS + 'Allocation', LATCHED),
          'task_events': (OURS + 'TaskEvent', EVENTS),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import random
 import threading
 import time
+from dataclasses import replace
 
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.node import Node
@@ -23,6 +24,7 @@ from uav_task_alloc.mavlink.status import Told, facts_of, state_of
 from uav_task_alloc.model import ThreatZone, check_number, check_ros_name
 from uav_task_alloc.nodes import bridge_messages as convert
 from uav_task_alloc.nodes.bounds import cut, printable
+from uav_task_alloc.nodes.fleet_origin import FleetOrigin
 from uav_task_alloc.nodes.messages import EVENTS, LATCHED, STATES
 from uav_task_alloc.nodes.parameters import declare
 from uav_task_alloc.nodes.run import run
@@ -31,10 +33,11 @@ from uav_task_alloc.params import BridgeParams
 TICK = 0.02  # [s] between steps of the machines; messages are acted on as they come
 
 
-def policy_of(params: BridgeParams, zones: tuple[ThreatZone, ...] = ()) -> Policy:
+def policy_of(params: BridgeParams, zones: tuple[ThreatZone, ...] = (),
+              grounded: str = '') -> Policy:
     """What the operator wants, as of now."""
     return Policy(params.takeoff, params.cruise_altitude, params.when_empty, params.when_foreign,
-                  params.relaunch, zones)
+                  params.relaunch, zones, grounded)
 
 
 def station_of(params: BridgeParams) -> Station:
@@ -85,6 +88,9 @@ class MavlinkBridge(Node):
         self.task_events = self.create_publisher(m.TaskEvent, 'task_events', EVENTS)
         self.health = self.create_publisher(DiagnosticArray, '/diagnostics', 10)
         self.create_subscription(m.ThreatZoneArray, 'threat_zones', self.on_zones, LATCHED)
+        self.origins = FleetOrigin(self, self.station.origin, lambda text: self.log['warning'](
+            f'fleet_origin: {text}: ignored'))
+        self.waiting: dict[str, m.TaskList] = {}  # lists until the origins agree
         self.create_service(HandOver, '~/hand_over', self.on_hand_over)
         self.create_timer(0.05, self.on_tick)
         self.create_timer(1.0, self.on_second)
@@ -121,6 +127,9 @@ class MavlinkBridge(Node):
                 status = state_of(served, now, self.live.now.full_range)
             self.tell_events(served)
             seen = served.pilot.telemetry.position_at
+            conflict = self.origins.conflict()
+            if conflict:
+                status = replace(status, available=False, reason=conflict)
             if self.told.is_news(status, seen, now, self.live.now.state_rate):
                 self.states.publish(convert.from_status(
                     status, self.capabilities.get(served.uav_id, ()), self.stamp() - now + seen))
@@ -141,7 +150,8 @@ class MavlinkBridge(Node):
             raise RuntimeError('the receiver has died: better no bridge than a deaf one')
         self.heartbeat.watch(time.monotonic())
         self.tell_trouble('heartbeat', self.heartbeat.trouble)
-        policy = policy_of(self.live.now, self.zones)
+        conflict = self.origins.conflict()
+        policy = policy_of(self.live.now, self.zones, conflict and 'nodes with one origin')
         for served in list(self.ground.served.values()):
             served.pilot.policy = policy
             if served.uav_id not in self.lists:
@@ -149,9 +159,22 @@ class MavlinkBridge(Node):
                 self.lists[served.uav_id] = self.create_subscription(
                     m.TaskList, f'{served.uav_id}/task_list',
                     lambda msg, uav_id=served.uav_id: self.on_list(uav_id, msg), LATCHED)
+        self.take_lists()
 
     def on_list(self, uav_id: str, msg: m.TaskList) -> None:
         """A new list for a UAV."""
+        self.waiting[uav_id] = msg
+        self.take_lists()
+
+    def take_lists(self) -> None:
+        """Fly the lists that wait, unless somebody has another origin."""
+        if self.waiting and not self.origins.conflict() and self.origins.settled():
+            waiting, self.waiting = self.waiting, {}
+            for uav_id, msg in waiting.items():
+                self.take_list(uav_id, msg)
+
+    def take_list(self, uav_id: str, msg: m.TaskList) -> None:
+        """A list that may be flown."""
         try:
             tasks = convert.to_list(msg, uav_id, self.station.origin,
                                     self.live.now.acceptance_radius)
@@ -194,6 +217,11 @@ class MavlinkBridge(Node):
             if self.store is not None:
                 self.store.retry()
             facts = [(s.uav_id, *facts_of(s, now)) for s in self.ground.served.values()]
+        self.origins.check()
+        conflict = self.origins.conflict()
+        self.tell_trouble('fleet_origin', conflict and f'refuses to fly new lists: {conflict}')
+        if conflict:
+            facts.append(('fleet_origin', 2, f'refuses to fly new lists: {conflict}', {}))
         for link in self.radio.links:
             self.tell_trouble(link.name, link.trouble)
             facts.append((link.name, 2 if link.trouble else 0, link.trouble or 'open', {}))

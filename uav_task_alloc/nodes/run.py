@@ -50,6 +50,8 @@ def run(make_node: Callable[[], Node], args: list[str] | None = None, threads: i
     except AllocError as error:
         sys.exit(str(error))
     finally:
+        for number in (signal.SIGINT, signal.SIGTERM):  # a second Ctrl-C cannot hurry the end
+            signal.signal(number, signal.SIG_IGN)
         rclpy.try_shutdown()
 
 

@@ -1,0 +1,145 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Nodes whose origins differ refuse to fly, say so, and go on when they agree."""
+import pytest
+from diagnostic_msgs.msg import DiagnosticArray
+from test_allocator import Fleet, S, add, begin, task
+from test_mavlink_bridge import Sky
+from uav_task_alloc_msgs import msg as m
+
+from uav_task_alloc.geometry.frames import Origin
+from uav_task_alloc.nodes.fleet_origin import MOST, PATIENCE, Origins
+from uav_task_alloc.nodes.messages import LATCHED
+
+pytestmark = pytest.mark.ros
+HERE = Origin(47.397742, 8.545594, 488.0)
+OTHER = m.FleetOrigin(latitude=47.4, longitude=8.545594, altitude_amsl=488.0)
+SAME = m.FleetOrigin(latitude=47.397742, longitude=8.545594, altitude_amsl=488.0)
+WHY = ('fleet_origin of another node is (47.4000000, 8.5455940, 488 m), 251.061 m from origin.* '
+       '= (47.3977420, 8.5455940, 488 m) of this one: expected the same')
+
+
+@pytest.fixture
+def sky(start, probe, tmp_path):
+    made = Sky(start, probe, tmp_path / 'flight.jsonl')
+    yield made
+    if made.thread.is_alive():
+        made.land()
+
+
+def told(probe, origin):
+    """A node that has this origin."""
+    made = probe.publisher(m.FleetOrigin, 'fleet_origin', LATCHED)
+    made.publish(origin)
+    return made
+
+
+def messages(health):
+    return [status.message for array in health for status in array.status]
+
+
+@pytest.mark.parametrize('executable', ['allocator', 'mavlink_bridge'])
+def test_finding_37_both_nodes_tell_their_origin(start, probe, executable):
+    heard = probe.collect(m.FleetOrigin, 'fleet_origin', LATCHED)
+    start(executable, '-p', 'origin.latitude:=-33.9', '-p', 'origin.longitude:=151.2', '-p',
+          'origin.altitude_amsl:=40.0', *(
+              ['-p', "connections:=['udpin:127.0.0.1:0']"] * (executable == 'mavlink_bridge')))
+    probe.until(lambda: heard)
+    assert heard[0] == m.FleetOrigin(latitude=-33.9, longitude=151.2, altitude_amsl=40.0)
+
+
+def test_finding_37_a_bridge_flies_no_list_of_another_origin_until_it_is_gone(sky, probe):
+    other = told(probe, OTHER)
+    probe.until(lambda: sky.states['uav_1'].reason == WHY)
+    for n in (1, 2):
+        sky.send(n, 1, [0])
+    assert not sky.states['uav_1'].available
+    probe.until(lambda: f'refuses to fly new lists: {WHY}' in messages(sky.health))
+    assert f'refuses to fly new lists: {WHY}' in sky.bridge.output()
+    assert sky.fact(1, 'list_revision') == '0'
+    probe.node.destroy_publisher(other)
+    probe.until(lambda: all(sky.completed(n) == [f'u{n}_0'] for n in (1, 2)), 60.0)
+    assert sky.states['uav_1'].reason == ''
+
+
+def test_finding_37_a_vehicle_on_the_ground_stays_there_when_another_origin_turns_up(sky, probe):
+    sky.send(1, 1, [0, 1, 2])
+    probe.until(lambda: sky.states['uav_1'].mode == m.UavState.ON_MISSION)
+    other = told(probe, OTHER)
+    sky.send(2, 1, [0])
+    probe.until(lambda: sky.states['uav_2'].reason == WHY)
+    # who flies already flies on
+    probe.until(lambda: sky.completed(1) == ['u1_0', 'u1_1', 'u1_2'], 60.0)
+    assert sky.states['uav_2'].mode == m.UavState.STANDBY
+    probe.node.destroy_publisher(other)
+    probe.until(lambda: sky.completed(2) == ['u2_0'], 60.0)
+
+
+def test_finding_37_an_allocator_of_another_origin_is_not_flown(sky, start, probe):
+    plans = probe.collect(m.Allocation, 'allocation', LATCHED)
+    fleet = Fleet(probe)
+    health = probe.collect(DiagnosticArray, '/diagnostics', 10)
+    allocator = start('allocator', '-p', 'origin.latitude:=47.4')
+    fleet.connected()
+    fleet.tasks.publish(add(task('t0', 100)))
+    probe.until(lambda: sky.states['uav_1'].reason == WHY)
+    probe.until(lambda: any('refuses to plan: fleet_origin' in each for each in messages(health)))
+    allocator.stop()
+    probe.until(lambda: sky.states['uav_1'].reason == '')
+    assert not plans or not plans[-1].lists
+    begin(start, fleet)
+    fleet.tasks.publish(add(task('t1', 100)))
+    fleet.until_state('t1', S.COMPLETED)
+
+
+def test_finding_37_an_allocator_plans_again_when_the_other_origin_is_gone(start, probe):
+    fleet = Fleet(probe)
+    other = told_first(probe)
+    node = begin(start, fleet)
+    probe.until(lambda: 'refuses to plan: fleet_origin' in node.output())
+    fleet.uav('a', 0.0)
+    fleet.tasks.publish(add(task('t0', 100)))
+    health = probe.collect(DiagnosticArray, '/diagnostics', 10)
+    probe.until(lambda: any('refuses to plan' in each for each in messages(health)))
+    assert fleet.route('a') is None
+    probe.node.destroy_publisher(other)
+    probe.until(lambda: fleet.route('a') == ['t0'])
+
+
+def told_first(probe):
+    """Another origin, told before anybody listens."""
+    made = probe.node.create_publisher(m.FleetOrigin, 'fleet_origin', LATCHED)
+    made.publish(OTHER)
+    return made
+
+
+def test_the_same_origin_and_one_that_is_none_change_nothing(sky, probe):
+    told(probe, SAME)
+    told(probe, m.FleetOrigin(latitude=float('nan')))
+    sky.send(1, 1, [0])
+    probe.until(lambda: sky.completed(1) == ['u1_0'])
+    probe.until(lambda: 'fleet_origin: origin latitude = nan' in sky.bridge.output())
+
+
+def test_origins_a_millimetre_apart_are_the_same():
+    origins = Origins(HERE)
+    origins.hear(Origin(47.39774201, 8.54559401, 488.001))
+    assert origins.conflict(0.0) == ''
+    origins.hear(Origin(47.397742, 8.545594, 488.1))
+    assert '0.1 m from origin.*' in origins.conflict(0.0)
+
+
+def test_a_conflict_lasts_until_all_who_are_left_could_tell_again():
+    origins = Origins(HERE)
+    origins.hear(Origin(47.4, 8.5, 488.0))
+    origins.left(10.0)
+    assert origins.conflict(10.0 + 0.9 * PATIENCE)
+    assert origins.conflict(10.0 + PATIENCE) == ''
+    origins.hear(Origin(47.4, 8.5, 488.0))
+    assert origins.conflict(11.0 + PATIENCE)
+
+
+def test_a_flood_of_origins_is_bounded():
+    origins = Origins(HERE)
+    for k in range(10 * MOST):
+        origins.hear(Origin(float(k % 90), 8.5, float(k)))
+    assert len(origins._differing) == MOST

@@ -1,0 +1,148 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The launch files run as a user does, by `ros2 launch` or, where it is missing, its stand-in."""
+import os
+import shutil
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+import yaml
+from rcl_interfaces.srv import GetParameters
+from uav_task_alloc_msgs import msg as m
+
+from uav_task_alloc import scenario
+from uav_task_alloc.nodes.messages import LATCHED, STATES
+from uav_task_alloc.nodes.ports import free_port
+
+pytestmark = pytest.mark.ros
+ROOT = Path(__file__).parents[2]
+ROS2 = [shutil.which('ros2')] if shutil.which('ros2') else [
+    sys.executable, str(ROOT / 'test/ros2_stand_in.py')]
+DEMO = (ROOT / 'config/scenarios/demo.yaml').read_text()
+END = 90.0  # [s] of the machine for a flight of about 300 s, 12 times faster
+
+
+class Launched:
+    """`ros2 launch` as a process with a group of its own, as in a terminal."""
+
+    def __init__(self, folder, name, **given):
+        self.log = folder / f'{name}.launch.log'
+        with open(self.log, 'w') as out:
+            self.popen = subprocess.Popen(
+                [*ROS2, 'launch', 'uav_task_alloc', f'{name}.launch.py',
+                 *(f'{key}:={value}' for key, value in given.items())],
+                stdout=out, stderr=subprocess.STDOUT, start_new_session=True)
+
+    def output(self):
+        return self.log.read_text()
+
+    def alive(self):
+        """Whether any process of it is left."""
+        try:
+            os.killpg(self.popen.pid, 0)
+        except ProcessLookupError:
+            return False
+        return True
+
+    def stop(self):
+        """Ctrl-C, which a terminal sends to all; the exit status."""
+        if self.popen.poll() is None:
+            os.killpg(self.popen.pid, signal.SIGINT)
+        return self.popen.wait(60)
+
+
+@pytest.fixture
+def launch(domain, tmp_path):
+    started = []
+
+    def launch(name, **given):
+        started.append(Launched(tmp_path, name, **given))
+        return started[-1]
+    yield launch
+    for each in started:
+        each.stop()
+        if each.alive():
+            os.killpg(each.popen.pid, signal.SIGKILL)
+
+
+@pytest.fixture
+def moved(tmp_path):
+    """The demo at another place, faster, with another range; it ends with HOLD, as no default."""
+    text = DEMO
+    for old, new in (('route_end: hold', 'speedup: 12\nroute_end: hold'),
+                     ('latitude: 47.397742, longitude: 8.545594, altitude_amsl: 488.0',
+                      'latitude: -33.9, longitude: 151.2, altitude_amsl: 40.0'),
+                     ('position: [600, 0, 0], range: 6000', 'position: [600, 0, 0], range: 8000')):
+        assert old in text
+        text = text.replace(old, new)
+    path = tmp_path / 'moved.yaml'
+    path.write_text(text)
+    return path
+
+
+def parameters(probe, node, *names):
+    """Values of a running node."""
+    got = probe.call(GetParameters, f'/{node}/get_parameters',
+                     GetParameters.Request(names=list(names))).values
+    return [value.double_value or value.string_value for value in got]
+
+
+def flies_to_its_end(probe, path):
+    """Every task of the scenario is flown, but one that comes to lie in a zone; then all hold."""
+    played = scenario.load(path)
+    told = probe.collect(m.TaskStatusArray, 'task_statuses', LATCHED)
+    states = {}
+    probe.node.create_subscription(
+        m.UavState, 'uav_states', lambda msg: states.update({msg.uav_id: msg}), STATES)
+    for node in ('allocator', 'mavlink_bridge'):
+        assert parameters(probe, node, 'origin.latitude', 'origin.longitude') == [-33.9, 151.2]
+    assert parameters(probe, 'allocator', 'route_end') == ['hold']
+    wanted = {timed.task.id for timed in played.tasks} - {'t20'}
+
+    def statuses():
+        return {row.task_id: row for row in told[-1].statuses} if told else {}
+
+    def flown():
+        rows = statuses()
+        return all(name in rows and rows[name].state == m.TaskStatus.COMPLETED
+                   for name in wanted)
+    probe.until(flown, END, lambda: {name: (row.state, row.reason)
+                                     for name, row in statuses().items() if row.state != 3})
+    left = statuses()['t20']
+    assert (left.state, 'pop_up' in left.reason) == (m.TaskStatus.UNASSIGNED, True)
+    assert set(states) == {uav.id for uav in played.uavs}
+    modes = {m.UavState.HOLD, m.UavState.STANDBY}  # one that never flew stands where it was
+    probe.until(lambda: {state.mode for name, state in states.items() if name != 'uav_3'}
+                <= modes, END)
+    assert any(state.mode == m.UavState.HOLD for state in states.values())
+
+
+def test_finding_37_the_demo_is_flown_to_its_end_with_the_values_of_its_scenario(
+        launch, probe, moved):
+    demo = launch('demo', scenario=moved)
+    flies_to_its_end(probe, moved)
+    assert demo.stop() == 0, demo.output()
+    assert not demo.alive()
+    assert 'Traceback' not in demo.output()
+
+
+def test_finding_37_a_fleet_flies_a_scenario_to_its_end_with_its_values(
+        launch, start, probe, moved, tmp_path):
+    port = free_port()
+    bridge_params = tmp_path / 'bridge.yaml'
+    bridge_params.write_text(yaml.safe_dump({'/**/mavlink_bridge': {'ros__parameters': {
+        'connections': [f'udpin:127.0.0.1:{port}'], 'takeoff': True, 'relaunch': 'automatic'}}}))
+    allocator_params = tmp_path / 'allocator.yaml'
+    allocator_params.write_text(yaml.safe_dump({'/**/allocator': {'ros__parameters': {
+        'uav_timeout': 2.0}}}))
+    fleet = launch('fleet', scenario=moved, bridge_params=bridge_params,
+                   allocator_params=allocator_params)
+    start('fleet_sim', '-p', f'scenario:={moved}', '-p', 'speedup:=12.0', '-p',
+          f'target:=127.0.0.1:{port}')
+    start('scenario_player', '-p', f'scenario:={moved}', '-p', 'speedup:=12.0', '-p',
+          'wait_for_plan:=true')
+    flies_to_its_end(probe, moved)
+    assert fleet.stop() == 0, fleet.output()
+    assert not fleet.alive()
