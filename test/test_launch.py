@@ -18,6 +18,7 @@ origin: {latitude: -33.9, longitude: 151.2, altitude_amsl: 40.0}
 uavs:
   - {id: drone_7, system_id: 7, position: [0, 0, 0], range: 3000, capabilities: [camera, winch]}
   - {id: drone_9, system_id: 9, position: [50, 0, 0], range: 5000}
+  - {id: drone_11, system_id: 11, position: [99, 0, 0]}
 tasks:
   - {id: t1, position: [10, 20, 30]}
 """
@@ -57,7 +58,7 @@ def test_finding_35_the_demo_listens_on_loopback_to_the_vehicles_of_its_scenario
     assert host == '127.0.0.1'
     assert values(nodes['fleet_sim'])['target'] == f'127.0.0.1:{port}'
     assert port != '14550'
-    assert bridge['system_ids'] == [7, 9]
+    assert bridge['system_ids'] == [7, 9, 11]
     assert bridge['takeoff'] is True
 
 
@@ -83,9 +84,18 @@ def test_finding_37_allocator_and_bridge_have_the_values_of_the_scenario(name, m
             -33.9, 151.2, 40.0]
     assert allocator['route_end'] == 'home'
     assert allocator['seed'] == 4000000000 % 2**31  # what a parameter of ROS holds
-    assert bridge['system_ids'] == [7, 9]
+    assert bridge['system_ids'] == [7, 9, 11]
     assert bridge['uav_id_pattern'] == 'drone_{sysid}'
     assert bridge['capabilities'] == ['drone_7:camera,winch']
+
+
+@pytest.mark.parametrize('name', ['demo', 'fleet'])
+def test_finding_38_the_ranges_of_a_scenario_reach_the_nodes(name, moved):
+    nodes = started(name, scenario=moved)
+    assert values(nodes['mavlink_bridge'])['full_ranges'] == [
+        'drone_7:3000.0', 'drone_9:5000.0', 'drone_11:10000000.0']
+    # until a battery was heard; nobody has less
+    assert values(nodes['allocator'])['default_range'] == 3000.0
 
 
 @pytest.mark.parametrize(('given', 'speedup'), [({}, 20), ({'speedup': '3'}, 3)])

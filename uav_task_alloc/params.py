@@ -8,6 +8,8 @@ from typing import Any, TypeVar
 
 from uav_task_alloc.errors import InvalidValue
 
+MOST_RANGE = 1e7  # [m]
+
 
 def param(default: Any, text: str, *, low: float | None = None, high: float | None = None,
           choices: tuple[str, ...] = (), unit: str = '', fixed: bool = False) -> Any:
@@ -90,7 +92,7 @@ class AllocatorParams(Framed):
     uav_timeout: float = param(5.0, 'Silence after which the tasks of a UAV go to the others.',
                                low=0.1, high=3600.0, unit='s')
     default_range: float = param(20000.0, 'Range of a UAV that does not tell its own.', low=0.0,
-                                 high=1e7, unit='m')
+                                 high=MOST_RANGE, unit='m')
     default_cruise_speed: float = param(15.0, 'Speed of a UAV that does not tell its own.',
                                         low=0.1, high=1000.0, unit='m/s')
     clearance: float = param(10.0, 'Distance kept from zones beyond their margins.', low=0.0,
@@ -166,7 +168,10 @@ class BridgeParams(Framed):
     capabilities: tuple[str, ...] = param(
         (), 'What UAVs can do, `uav_1:camera,thermal` each.', fixed=True)
     full_range: float = param(0.0, 'Range of a full battery; 0: unknown, range_remaining is NaN.',
-                              low=0.0, high=1e7, unit='m')
+                              low=0.0, high=MOST_RANGE, unit='m')
+    full_ranges: tuple[str, ...] = param(
+        (), 'The same of single UAVs, where full_range is not theirs, `uav_1:6000` each.',
+        fixed=True)
     state_rate: float = param(10.0, 'States of one UAV published at most.', low=0.5, high=100.0,
                               unit='Hz')
     tlog: str = param('', 'File to record all frames into, as .tlog; empty: none.', fixed=True)

@@ -113,6 +113,10 @@ def flies_to_its_end(probe, path):
     left = statuses()['t20']
     assert (left.state, 'pop_up' in left.reason) == (m.TaskStatus.UNASSIGNED, True)
     assert set(states) == {uav.id for uav in played.uavs}
+    for uav in played.uavs:  # a flight of 300 s takes a part of what it can fly
+        assert 0.0 < states[uav.id].range_remaining < uav.range
+        assert states[uav.id].range_remaining == pytest.approx(
+            uav.range * states[uav.id].battery, rel=1e-5)
     modes = {m.UavState.HOLD, m.UavState.STANDBY}  # one that never flew stands where it was
     probe.until(lambda: {state.mode for name, state in states.items() if name != 'uav_3'}
                 <= modes, END)

@@ -258,6 +258,24 @@ def test_a_bad_zone_is_refused_with_a_warning_and_said_once(sky, probe):
     assert world.bridge.output().count('radius = -1.0') == 1
 
 
+def test_finding_38_each_uav_has_its_own_range(sky, probe):
+    world = sky('-p', "full_ranges:=['uav_1:6000', 'uav_3:1']", '-p', 'full_range:=9000.0')
+    probe.until(lambda: all(state.battery > 0.9 for state in world.states.values()))
+    for n, most in ((1, 6000.0), (2, 9000.0)):
+        state = world.states[f'uav_{n}']
+        assert state.range_remaining == pytest.approx(most * state.battery, rel=1e-3)
+
+
+@pytest.mark.parametrize('entry', ['uav_1', 'uav_1:', ':5', 'uav_1:far', 'uav_1:-1', 'uav_1:nan',
+                                   'uav_1:1e8'])
+def test_a_bad_range_ends_the_bridge_in_words(start, entry):
+    bridge = start('mavlink_bridge', '-p', f"full_ranges:=['{entry}']", '-p',
+                   "connections:=['udpin:127.0.0.1:0']")
+    bridge.popen.wait(20)
+    assert bridge.stop() == (1, f"full_ranges = '{entry}': expected `UAV_ID:METRES` with metres "
+                                'in [0, 1e+07], a UAV once\n')
+
+
 def test_states_carry_what_the_allocator_plans_with(sky, probe):
     world = sky('-p', 'full_range:=20000.0', '-p', "capabilities:=['uav_1:camera,thermal']")
     probe.until(lambda: world.states['uav_1'].home.x == pytest.approx(20.0, abs=0.1)

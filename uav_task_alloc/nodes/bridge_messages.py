@@ -19,6 +19,7 @@ from uav_task_alloc.model import Task, ThreatZone, check_point
 from uav_task_alloc.nodes.announcements import check_picture, sort_zones
 from uav_task_alloc.nodes.bounds import MOST_POINTS
 from uav_task_alloc.nodes.messages import from_point, header, to_point, to_task, to_zone
+from uav_task_alloc.params import MOST_RANGE
 
 NOWHERE = (math.nan, math.nan, math.nan)
 EVENT = {'STARTED': m.TaskEvent.STARTED, 'COMPLETED': m.TaskEvent.COMPLETED,
@@ -103,4 +104,20 @@ def to_capabilities(entries: Iterable[str]) -> dict[str, tuple[str, ...]]:
         if not colon or not uav_id:
             raise InvalidValue('capabilities', entry, '`UAV_ID:WORD,WORD`')
         found[uav_id] = tuple(w.strip() for w in words.split(',') if w.strip())
+    return found
+
+
+def to_full_ranges(entries: Iterable[str]) -> dict[str, float]:
+    """Ranges [m] of full batteries from `uav_1:6000` each; raise InvalidValue otherwise."""
+    found: dict[str, float] = {}
+    for entry in entries:
+        uav_id, _, number = entry.rpartition(':')
+        try:
+            value = float(number)
+        except ValueError:
+            value = math.nan
+        if not (uav_id and 0.0 <= value <= MOST_RANGE) or uav_id in found:
+            raise InvalidValue('full_ranges', entry,
+                               f'`UAV_ID:METRES` with metres in [0, {MOST_RANGE:g}], a UAV once')
+        found[uav_id] = value
     return found

@@ -68,6 +68,7 @@ class MavlinkBridge(Node):
         params = self.live.now
         self.station = station_of(params)
         self.capabilities = convert.to_capabilities(params.capabilities)
+        self.full_ranges = convert.to_full_ranges(params.full_ranges)
         logger = self.get_logger()
         self.log = {'info': lambda text: logger.info(text),  # rclpy wants a line each
                     'warning': lambda text: logger.warning(text),
@@ -124,7 +125,8 @@ class MavlinkBridge(Node):
                 self.log[note.level](printable(note.text))
         for served in list(self.ground.served.values()):
             with self.lock:
-                status = state_of(served, now, self.live.now.full_range)
+                status = state_of(served, now, self.full_ranges.get(
+                    served.uav_id, self.live.now.full_range))
             self.tell_events(served)
             seen = served.pilot.telemetry.position_at
             conflict = self.origins.conflict()

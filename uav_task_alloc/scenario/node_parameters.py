@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from uav_task_alloc.errors import InvalidValue
-from uav_task_alloc.params import BridgeParams, PlayerParams
+from uav_task_alloc.params import MOST_RANGE, BridgeParams, PlayerParams
 from uav_task_alloc.scenario.values import Scenario, ScenarioUav
 
 Value = bool | int | float | str | list[str] | list[int]
@@ -26,8 +26,11 @@ def fleet_parameters(played: Scenario) -> dict[str, Parameters]:
                           'origin.altitude_amsl': played.origin.altitude_amsl}
     capable = [f'{uav.id}:{_words(uav)}' for uav in played.uavs if uav.capabilities]
     return {
-        'allocator': {**origin, 'route_end': played.route_end, 'seed': played.seed % SEEDS},
-        'mavlink_bridge': {**origin, 'system_ids': [uav.system_id for uav in played.uavs],
+        'allocator': {**origin, 'route_end': played.route_end, 'seed': played.seed % SEEDS,
+                      'default_range': min(map(_range, played.uavs))},
+        'mavlink_bridge': {**origin,
+                           'full_ranges': [f'{uav.id}:{_range(uav)}' for uav in played.uavs],
+                           'system_ids': [uav.system_id for uav in played.uavs],
                            'uav_id_pattern': id_pattern(played),
                            **({'capabilities': capable} if capable else {})}}
 
@@ -82,6 +85,11 @@ def _patterns(uav: ScenarioUav) -> set[str]:
     number = str(uav.system_id)
     return {uav.id[:at] + '{sysid}' + uav.id[at + len(number):]
             for at in range(len(uav.id)) if uav.id.startswith(number, at)}
+
+
+def _range(uav: ScenarioUav) -> float:
+    """What it can fly with a full battery [m], as a parameter can hold it."""
+    return min(uav.range, MOST_RANGE)
 
 
 def _words(uav: ScenarioUav) -> str:
