@@ -15,6 +15,7 @@ from typing import Any
 from uav_task_alloc import scenario
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.model import Plan
+from uav_task_alloc.params import AllocatorParams
 from uav_task_alloc.progress import Progress
 from uav_task_alloc.scenario.values import Scenario
 
@@ -27,7 +28,7 @@ def main(argv: Sequence[str]) -> int:
     args = make_parser().parse_args(argv)
     draw = {path: plotter(option, path) for option, path in (
         ('--plot', args.plot), ('--plot-3d', args.plot_3d)) if path}
-    read = known_from_start(scenario.load(args.scenario))
+    read = with_options(known_from_start(scenario.load(args.scenario)), args)
     with Progress(args.budget, sys.stderr, time.monotonic) as progress:
         made = solve(read, args, progress)
     print(plan_text(made))
@@ -60,6 +61,11 @@ def make_parser() -> argparse.ArgumentParser:
     parser.add_argument('--seed', type=int, help="of the solver (the scenario's)")
     parser.add_argument('--route-end', choices=('hold', 'home'),
                         help="what a UAV does after its last task (the scenario's)")
+    for option, what in (('clearance', 'kept from zones beyond their margins'),
+                         ('altitude-min', 'lowest detour, above the origin'),
+                         ('altitude-max', 'highest detour, above the origin')):
+        parser.add_argument(f'--{option}', type=float, metavar='M',
+                            help=f"[m] {what} (the scenario's)")
     parser.add_argument('--json', type=Path, metavar='OUT', help='write the plan as JSON')
     parser.add_argument('--plot', type=Path, metavar='OUT.png', help='draw the plan from above')
     parser.add_argument('--plot-3d', type=Path, metavar='OUT.png',
@@ -76,13 +82,23 @@ def known_from_start(read: Scenario) -> Scenario:
         timed for timed in read.tasks if timed.task.id not in cancelled))
 
 
+def with_options(read: Scenario, args: argparse.Namespace) -> Scenario:
+    """The scenario with what the command line says; raise InvalidValue for what cannot be."""
+    names = ('clearance', 'altitude_min', 'altitude_max')
+    given = {name: getattr(args, name) for name in names if getattr(args, name) is not None}
+    made = replace(read, seed=read.seed if args.seed is None else args.seed,
+                   route_end=args.route_end or read.route_end, **given)
+    AllocatorParams(**{name: getattr(made, name) for name in names})  # which checks them
+    return made
+
+
 def solve(read: Scenario, args: argparse.Namespace, progress: Progress) -> Plan:
     """All tasks around all zones."""
     from uav_task_alloc.solver.solve import plan  # compiles: only where something is solved
     return plan([uav.uav for uav in read.uavs], [timed.task for timed in read.tasks],
                 [timed.zone for timed in read.zones], budget=args.budget, solver=args.solver,
-                seed=read.seed if args.seed is None else args.seed,
-                route_end=args.route_end or read.route_end, stop=progress.stop,
+                seed=read.seed, route_end=read.route_end, clearance=read.clearance,
+                altitude_min=read.altitude_min, altitude_max=read.altitude_max, stop=progress.stop,
                 on_iteration=progress.heard)
 
 

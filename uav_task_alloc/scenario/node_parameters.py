@@ -27,6 +27,8 @@ def fleet_parameters(played: Scenario) -> dict[str, Parameters]:
     capable = [f'{uav.id}:{_words(uav)}' for uav in played.uavs if uav.capabilities]
     return {
         'allocator': {**origin, 'route_end': played.route_end, 'seed': played.seed % SEEDS,
+                      'clearance': played.clearance, 'altitude_min': played.altitude_min,
+                      'altitude_max': played.altitude_max,
                       'default_range': min(map(_range, played.uavs))},
         'mavlink_bridge': {**origin,
                            'full_ranges': [f'{uav.id}:{_range(uav)}' for uav in played.uavs],

@@ -57,11 +57,14 @@ def parse(text: str, name: str = 'scenario') -> Scenario:
     if root['arrivals'] is not None:
         tasks += _arrivals(root['arrivals'], zones, tasks, root['seed'])
     times = {timed.task.id: timed.at for timed in tasks}
+    if not root['altitude_min'] < root['altitude_max']:
+        raise root.refuse('altitude_min', f'less than altitude_max = {root["altitude_max"]:g}')
     cancels = [_cancel(row, times) for row in root['cancels']]
     return Scenario(root['name'] or Path(name).stem, root['seed'], origin, uavs,
                     tuple(sorted(tasks, key=lambda timed: timed.at)), zones,
                     tuple(sorted(cancels, key=lambda cancel: cancel.at)), root['route_end'],
-                    root['speedup'])
+                    root['speedup'], root['clearance'], root['altitude_min'],
+                    root['altitude_max'])
 
 
 def _origin(row: Row | None) -> Origin:

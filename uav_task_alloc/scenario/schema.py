@@ -6,6 +6,7 @@ import math
 import re
 
 from uav_task_alloc.model import is_ros_name
+from uav_task_alloc.params import AllocatorParams
 from uav_task_alloc.scenario.checked_yaml import (
     Key,
     Table,
@@ -98,6 +99,12 @@ SCENARIO: Table = {
     'origin': Key(mapping(ORIGIN, 'a mapping with latitude, longitude, altitude_amsl'),
                   'where ENU (0, 0, 0) is; default: 47.397742, 8.545594, 488.0', None),
     'route_end': Key(choice('hold', 'home'), 'what a UAV does after its last task', 'hold'),
+    'clearance': Key(number(0.0, 10000.0), '[m] kept from zones beyond their margins',
+                     AllocatorParams.clearance),
+    'altitude_min': Key(number(-1e5, 1e5), '[m] lowest detour, above the origin',
+                        AllocatorParams.altitude_min),
+    'altitude_max': Key(number(-1e5, 1e5), '[m] highest detour, above the origin',
+                        AllocatorParams.altitude_max),
     'speedup': Key(number(0.1, 100.0), 'how many times faster than real time demo and '
                    'demo.launch.py fly it', DEFAULT_SPEEDUP),
     'uavs': Key(many(mapping(UAV, 'a UAV'), 'a list of UAVs'), 'the fleet'),

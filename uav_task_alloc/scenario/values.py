@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 from uav_task_alloc.geometry.frames import Origin
 from uav_task_alloc.model import Point, Task, ThreatZone, Uav
+from uav_task_alloc.params import AllocatorParams
 
 DEFAULT_ORIGIN = Origin(47.397742, 8.545594, 488.0)
 DEFAULT_SPEEDUP = 8.0  # times faster than real time
@@ -76,6 +77,9 @@ class Scenario:
     cancels: tuple[Cancel, ...] = ()  # by `at`
     route_end: str = 'hold'  # hold | home
     speedup: float = DEFAULT_SPEEDUP  # of a simulated flight
+    clearance: float = AllocatorParams.clearance  # [m] beyond the margins of zones
+    altitude_min: float = AllocatorParams.altitude_min  # [m] of detours
+    altitude_max: float = AllocatorParams.altitude_max  # [m] of detours
 
     @property
     def duration(self) -> float:
