@@ -74,3 +74,26 @@ def test_made_up_uavs_do_not_keep_a_real_one_out(monkeypatch):
         desk.settle(hear=False)
     assert desk.uav('b', 0.0, 0.0, 50.0) == ''
     assert sorted(desk.world.fleet.records) == ['a', 'b']
+
+
+def test_finding_33_an_event_of_a_forgotten_task_is_none_of_its_namesake():
+    desk = flown(1, keep_ended=0)
+    before = desk.world.lists.get('a').revision
+    desk.add(('t0', 0.0, 0.0))
+    desk.settle()
+    held = desk.world.lists.get('a').revision
+    assert 'did not have it' in desk.event('COMPLETED', 't0', 'a', revision=before)
+    assert 'did not have it' in desk.event('COMPLETED', 't0', 'a', revision=before)
+    desk.settle()
+    assert desk.state('t0') == 'ASSIGNED'
+    assert desk.world.lists.get('a').revision == held + 1  # the list is the answer, once a second
+    assert desk.event('COMPLETED', 't0', 'a') == ''
+
+
+def test_finding_33_an_event_for_a_revision_that_is_yet_to_come_is_not_answered():
+    desk = flown(0)
+    desk.add(('t0', 0.0, 0.0))
+    desk.settle()
+    assert 'did not have it' in desk.event('COMPLETED', 't0', 'a', revision=77)
+    desk.settle()
+    assert desk.world.lists.get('a').revision == 1

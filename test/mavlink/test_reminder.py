@@ -13,3 +13,19 @@ def test_a_later_list_asks_as_soon_as_the_first():
     assert [t for t in range(40, 50) if reminder.step(float(t))] == [42, 46]
     reminder.listed([], 50.0)
     assert not any(reminder.step(float(t)) for t in range(50, 99))
+
+
+def test_finding_33_lists_that_ask_on_after_a_task_was_told_are_counted():
+    reminder = Reminder()
+    ended = [TaskProgress('A', 'COMPLETED', 2)]
+    reminder.listed(ended, 0.0)
+    answered = []
+    for now in range(1, 30):
+        if reminder.step(float(now)):
+            answered.append(reminder.answered())
+            reminder.listed(ended, float(now))
+            assert reminder.answered() in ([], ['A'])  # a list that was under way counts for none
+            reminder.listed(ended, float(now))
+    assert answered[:4] == [[], [], ['A'], ['A']]
+    reminder.listed([], 30.0)
+    assert reminder.answered() == []

@@ -11,11 +11,15 @@ from uav_task_alloc.allocator.records import UavList
 class ListBook:
     """Lists by UAV; a revision is never used twice, not even over a restart."""
 
-    def __init__(self, lists: Iterable[UavList] = ()) -> None:
+    def __init__(self, lists: Iterable[UavList] = (), tasks: Iterable[str] = ()) -> None:
+        """lists: those of the life before. tasks: ids of all that it knew in the end."""
         self.lists = {each.uav: each for each in lists}
         self.dirty: set[str] = set()  # not yet on disk
         self.strange = False  # a UAV had a list that is not of this book
+        # revisions of the life before, and of another allocator: nobody knows what they had
         self._old = {each.uav: each.revision for each in self.lists.values()}
+        self._learned: dict[str, int] = {}
+        self._known = set(tasks)
         self._carried: dict[tuple[str, str], tuple[int, int]] = {}
 
     def get(self, uav_id: str) -> UavList:
@@ -44,14 +48,16 @@ class ListBook:
             return False
         self.strange = True
         self.lists[uav_id] = replace(held, revision=revision)
-        self._old[uav_id] = revision
+        self._learned[uav_id] = revision
         return True
 
     def carried(self, uav_id: str, task_id: str, revision: int) -> bool:
         """Whether that revision of the UAV's list had the task, as far as is remembered."""
         if revision == 0:
             return task_id in self.get(uav_id).task_ids
-        if revision <= self._old.get(uav_id, 0):
+        if revision <= self._learned.get(uav_id, 0):
+            return True
+        if revision <= self._old.get(uav_id, 0) and task_id in self._known:
             return True
         first, last = self._carried.get((uav_id, task_id), (1, 0))
         return first <= revision <= last
@@ -89,3 +95,4 @@ class ListBook:
         """These tasks are of the past; nobody will ask which revision had them."""
         self._carried = {key: span for key, span in self._carried.items()
                          if key[1] not in task_ids}
+        self._known.difference_update(task_ids)

@@ -35,6 +35,7 @@ if TYPE_CHECKING:  # it brings the compiler along, which a start must not wait f
 
 MOST_UAVS = 1000  # a flood of made-up ids ends here
 MOST_NOTES = 10_000  # lines that wait for the log
+ANSWER = 1.0  # [s] between two lists told again for old events
 LOOK = 0.5  # [s] between two looks at the way ahead of a UAV
 
 
@@ -47,7 +48,7 @@ class World:
         self.fleet = Fleet(saved.off, {
             record.uav: record.task.id for record in saved.tasks
             if record.state is TaskState.ACTIVE})
-        self.lists = ListBook(saved.lists)
+        self.lists = ListBook(saved.lists, (record.task.id for record in saved.tasks))
         self.zones = {zone.id: zone for zone in saved.zones}
         self.revision = saved.revision
         self.dirty: set[str] = set()  # rows that are not yet on disk: 'zones', 'off', ...
@@ -59,6 +60,7 @@ class World:
         self.awake = False  # the kernels are compiled: looking at zones is quick
         self._ways: Ways | None = None
         self._looked: dict[str, float] = {}
+        self._answered: dict[str, float] = {}  # [s] when a list was told again for an old event
         # the zones and the home as they were when a UAV's list was laid
         self.laid: dict[str, tuple[Ways, Point]] = {}
         self.looked_at_all = True  # no zone is new
@@ -147,7 +149,7 @@ class World:
     def event(self, event: TaskEvent, stamp: float, now: float) -> str:
         """What became of a task; returns why that is refused, '' when it is not."""
         place = f'event {event.kind.name} of task {event.task_id!r}'
-        why = self._why_not(event) or self._take_event(event, stamp)
+        why = self._why_not(event, now) or self._take_event(event, stamp)
         if why:
             return f'{place}: {why}'
         if event.kind is Kind.STARTED:
@@ -159,12 +161,22 @@ class World:
         self.outbox.statuses = True
         return ''
 
-    def _why_not(self, event: TaskEvent) -> str:
+    def _answer(self, event: TaskEvent, now: float) -> None:
+        """A UAV has flown an earlier task of that id: the list once more says that this is new."""
+        held = self.lists.get(event.uav_id)
+        if (event.kind is Kind.COMPLETED and event.revision < held.revision
+                and event.task_id in held.task_ids
+                and now - self._answered.get(event.uav_id, -ANSWER) >= ANSWER):
+            self._answered[event.uav_id] = now
+            self.again.add(event.uav_id)
+
+    def _why_not(self, event: TaskEvent, now: float) -> str:
         if event.task_id not in self.tasks.records:
             return 'unknown task'
         if event.uav_id not in self.fleet.records and event.uav_id not in self.lists.lists:
             return f'unknown UAV {event.uav_id!r}'
         if not self.lists.carried(event.uav_id, event.task_id, event.revision):
+            self._answer(event, now)
             return f'revision {event.revision} of the list of {event.uav_id} did not have it'
         return ''
 

@@ -91,6 +91,8 @@ class Pilot:
                 if mark.flown and now - mark.at < MEMORY:
                     self.board.progress.completed[mark.task] = mark[1:4]
         self.board.list.assign(tasks)
+        for task in filter(self.board.list.fly_anew, self._reminder.answered()):
+            self.notes.append(Note('info', f'{task} was announced anew: it is flown once more'))
         self._reminder.listed(self.board.list.told_before(), now)
         self.helm.encourage(now)
         return self._gate(self._act(now), now)

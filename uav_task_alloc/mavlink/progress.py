@@ -439,8 +439,12 @@ class ProgressTable:
         self._places = {task.id: task.position for task in tasks}
         for task in tasks:
             if self.completed.get(task.id) not in (None, task.position):
-                del self.completed[task.id]
-                self._started = None if self._started == task.id else self._started
+                self.forget(task.id)
+
+    def forget(self, task: str) -> None:
+        """Another task has its id now: that one is still to be flown."""
+        self.completed.pop(task, None)
+        self._started = None if self._started == task else self._started
 
     def was_at(self, item: Item, since: float | None = None,
                until: float = math.inf) -> bool:

@@ -6,6 +6,7 @@ from collections.abc import Iterable
 
 from uav_task_alloc.mavlink.policy import TaskProgress
 
+ANSWERS = 3  # lists that still ask for a task after it was told: the allocator has heard of it
 REMIND = 2.0  # [s] that lists may ask for a task that has ended; then twice as long, and so on
 
 
@@ -15,6 +16,8 @@ class Reminder:
     def __init__(self) -> None:
         self._ended: dict[str, TaskProgress] = {}
         self._due: dict[str, tuple[float, float]] = {}  # when [s], and the pause after that
+        self._told: set[str] = set()  # since the last list
+        self._answers: dict[str, int] = {}  # lists that came after it was told
 
     def listed(self, ended: Iterable[TaskProgress], now: float) -> None:
         """These tasks of a new list had ended before it came."""
@@ -22,6 +25,15 @@ class Reminder:
         soon = now + REMIND
         self._due = {task: (min(soon, self._due.get(task, (soon, 0.0))[0]), 2.0 * REMIND)
                      for task in self._ended}
+        self._answers = {task: n for task, n in self._answers.items() if task in self._ended}
+        self._told.clear()
+
+    def answered(self) -> list[str]:
+        """A new list comes: the tasks that were told before it, and before ANSWERS - 1 others."""
+        for task in self._told:
+            self._answers[task] = self._answers.get(task, 0) + 1
+        self._told.clear()
+        return [task for task, n in self._answers.items() if n >= ANSWERS]
 
     def step(self, now: float) -> list[TaskProgress]:
         """What is to be told now."""
@@ -29,4 +41,5 @@ class Reminder:
         for task in due:
             pause = self._due[task][1]
             self._due[task] = now + pause, 2.0 * pause
+            self._told.add(task)
         return [self._ended[task] for task in due]

@@ -36,6 +36,8 @@ class Wanted:
         self._profile, self._origin, self._progress = profile, origin, progress
         self._refused: dict[str, tuple[Task, str]] = {}  # as it was, and why
         self._items: tuple[object, tuple[Item, ...]] | None = None
+        self._listed: dict[str, int] = {}  # the last revision with a task that was not completed
+        self._away: frozenset[str] = frozenset()  # completed tasks that a later list did not have
 
     def assign(self, tasks: TaskList) -> None:
         """The latest list; a task that was refused is tried again where it has changed."""
@@ -43,6 +45,9 @@ class Wanted:
         self.horizon.reset()
         asked = [stop.task for stop in tasks.stops]
         self._progress.asked_for(asked)
+        ids, completed = {task.id for task in asked}, self._progress.completed.keys()
+        self._away = (self._away | (completed - ids)) & completed
+        self._listed.update(dict.fromkeys(ids - completed, tasks.revision))
         for task in asked:
             if self._refused.get(task.id, (task, ''))[0] != task:
                 del self._refused[task.id]
@@ -52,9 +57,28 @@ class Wanted:
         assert self.tasks is not None
         completed = self._progress.completed
         ids, revision = [stop.task.id for stop in self.tasks.stops], self.tasks.revision
-        return [TaskProgress(i, 'COMPLETED', revision) for i in ids if i in completed] + [
+        return [TaskProgress(i, 'COMPLETED', self._flown_in(i)) for i in ids if i in completed] + [
             TaskProgress(i, 'FAILED', revision, self._refused[i][1])
             for i in ids if i in self._refused and i not in completed]
+
+    def _flown_in(self, task: str) -> int:
+        """The revision that it was flown under, if a list came without it; else the latest."""
+        assert self.tasks is not None
+        latest = self.tasks.revision
+        return self._listed.get(task, latest) if task in self._away else latest
+
+    def fly_anew(self, task: str) -> bool:
+        """The list still asks for a task that was flown, and the allocator has heard of that.
+
+        Returns whether it is another task of that id: then a list in between did not have it.
+        """
+        assert self.tasks is not None
+        if task not in self._away or task not in self._listed or self.tasks.find(task) is None:
+            return False
+        self._progress.forget(task)
+        self._away -= {task}
+        self._listed[task] = self.tasks.revision
+        return True
 
     def remaining(self) -> TaskList:
         """The list less what is flown or refused, up to the horizon."""
