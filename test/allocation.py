@@ -73,6 +73,7 @@ class Desk:
         self.core.wake()
         self.world = self.core.world
         self.lists, self.history, self.notes, self.allocations = {}, [], [], []
+        self.forgotten = set()
 
     def uav(self, uav_id, *position, **more):
         return self.world.hear(UavReport(uav_id, position, **more), self.now, self.now)
@@ -118,6 +119,7 @@ class Desk:
     def take(self):
         out = self.core.collect()
         self.lists.update(out.lists)
+        self.forgotten |= out.forgotten
         self.history += out.lists.values()
         self.notes += [note.text for note in out.notes]
         if out.allocation:

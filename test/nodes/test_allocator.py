@@ -351,17 +351,3 @@ def test_a_damaged_journal_is_set_aside_and_told_of(start, probe, fleet, tmp_pat
     probe.until(lambda: fleet.route('a') == ['t1'])
     probe.until(lambda: health and 'set aside as' in health[-1].status[0].message)
     assert health[-1].status[0].level == DiagnosticStatus.WARN
-
-
-def test_finding_23_a_journal_of_another_origin_ends_the_start(start, probe, fleet, tmp_path):
-    state = ('-p', f'state_dir:={tmp_path}/state')
-    node = begin(start, fleet, *state, '-p', 'origin.latitude:=47.5')
-    fleet.uav('a', 0.0)
-    fleet.tasks.publish(add(task('t1', 100)))
-    probe.until(lambda: fleet.route('a') == ['t1'])
-    assert node.stop()[0] == 0
-    other = start('allocator', *state, '-p', 'origin.latitude:=46.5')
-    assert other.popen.wait(20.0) == 1
-    assert 'is of origin latitude 47.5' in other.output()
-    assert 'expected that of the parameters, origin latitude 46.5' in other.output()
-    assert 'Traceback' not in other.output()

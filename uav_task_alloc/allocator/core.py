@@ -10,6 +10,7 @@ from dataclasses import replace
 from functools import partial
 
 from uav_task_alloc.allocator import planning
+from uav_task_alloc.allocator.admission import forget_strangers
 from uav_task_alloc.allocator.answer import steady
 from uav_task_alloc.allocator.learner import learner, learner_row
 from uav_task_alloc.allocator.pace import Pace
@@ -67,6 +68,7 @@ class Allocator:
         """Whatever time brings: UAVs fall silent, ended tasks leave the lists."""
         world = self.world
         world.look_for_silence(now)
+        forget_strangers(world, now)
         look_at_all(world, now)
         for uav_id in list(world.lists.lists):
             shorter = world.lists.without_flown(uav_id, self._ended, stamp)
@@ -180,7 +182,9 @@ class Allocator:
         tasks = world.tasks.records
         rows = [task_row(tasks[task_id]) if task_id in tasks else Row('task', task_id, None)
                 for task_id in sorted(world.tasks.dirty)[:most]]
-        rows += [list_row(world.lists.lists[uav_id]) for uav_id in sorted(world.lists.dirty)]
+        lists = world.lists.lists
+        rows += [list_row(lists[uav_id]) if uav_id in lists else Row('list', uav_id, None)
+                 for uav_id in sorted(world.lists.dirty)]
         made = {'zones': lambda: zones_row(world.zones.values()),
                 'off': lambda: off_row(world.fleet.off),
                 'revision': lambda: revision_row(world.revision),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 
 from uav_task_alloc.allocator.records import UavReport
@@ -51,6 +51,7 @@ class Fleet:
         self.records: dict[str, UavRecord] = {}
         self.off = set(off)
         self.active = dict(active or {})  # UAV -> the task it is known to be flying
+        self.proven: set[str] = set()  # they hold lists of ours, or have told of a task
 
     def hear(self, report: UavReport, now: float, reserve: float = 0.0) -> UavRecord | None:
         """Take a report in; returns what was known before. reserve: of the battery [0..1]."""
@@ -67,16 +68,11 @@ class Fleet:
                 standing=before.standing, jumped=before.jumped)
         return before
 
-    def make_room(self, most: int, busy: Collection[str]) -> bool:
-        """Whether one more UAV can be known: of `most` the longest silent without work goes."""
-        if len(self.records) < most:
-            return True
-        idle = [uav_id for uav_id, record in self.records.items()
-                if record.silent and uav_id not in busy]
-        if not idle:
-            return False
-        del self.records[min(idle, key=lambda uav_id: self.records[uav_id].heard)]
-        return True
+    def forget(self, uav_id: str) -> None:
+        """It is not known any more; that it is switched off stays."""
+        self.records.pop(uav_id, None)
+        self.active.pop(uav_id, None)
+        self.proven.discard(uav_id)
 
     def fall_silent(self, now: float, timeout: float) -> list[str]:
         """Mark those not heard for `timeout` [s]; returns the newly silent."""

@@ -20,6 +20,8 @@ class ListBook:
         self._old = {each.uav: each.revision for each in self.lists.values()}
         self._learned: dict[str, int] = {}
         self._known = set(tasks)
+        self._served: set[str] = set()  # UAVs that had tasks
+        self._above = 0  # new UAVs begin above: a forgotten one may come back with its list
         self._carried: dict[tuple[str, str], tuple[int, int]] = {}
 
     def get(self, uav_id: str) -> UavList:
@@ -33,9 +35,11 @@ class ListBook:
             return None
         if not new.stops and held.revision == 0 and not again:
             return None
-        made = replace(new, revision=held.revision + 1, stamp=stamp)
+        made = replace(new, revision=(held.revision or self._above) + 1, stamp=stamp)
         self.lists[new.uav] = made
         self.dirty.add(new.uav)
+        if made.stops:
+            self._served.add(new.uav)
         for task_id in made.task_ids:
             first, _ = self._carried.get((new.uav, task_id), (made.revision, 0))
             self._carried[new.uav, task_id] = (first, made.revision)
@@ -90,6 +94,20 @@ class ListBook:
             return None
         flown = sum(stop.leg.length for stop in held.stops[:len(held.stops) - len(stops)])
         return replace(held, stops=stops, distance=held.distance - flown if stops else 0.0)
+
+    def forget_uav(self, uav_id: str) -> None:
+        """Nobody flies by that id; where it comes back its revisions rise all the same."""
+        held = self.lists.pop(uav_id, None)
+        if held is None:
+            return
+        self.dirty.add(uav_id)
+        if uav_id in self._served:
+            self._served.remove(uav_id)
+            self._above = max(self._above, held.revision)
+            self._carried = {key: span for key, span in self._carried.items()
+                             if key[0] != uav_id}
+        self._old.pop(uav_id, None)
+        self._learned.pop(uav_id, None)
 
     def forget(self, task_ids: Collection[str]) -> None:
         """These tasks are of the past; nobody will ask which revision had them."""

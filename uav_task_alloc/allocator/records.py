@@ -211,6 +211,7 @@ class Outbox:
     """What has to be told since it was last emptied."""
 
     lists: dict[str, UavList] = field(default_factory=dict)
+    forgotten: set[str] = field(default_factory=set)  # UAVs, before the lists
     allocation: Allocation | None = None
     statuses: bool = False
     notes: list[Note] = field(default_factory=list)

@@ -36,6 +36,7 @@ def worries(world: World, journal_trouble: str, solver_trouble: str = '') -> lis
     stands = standing(fleet.standing())
     left = [record for record in world.tasks.open() if record.state is TaskState.UNASSIGNED]
     found = [f'journal: {journal_trouble}'] if journal_trouble else []
+    found += [world.full] if world.full else []
     found += [f'solver: {solver_trouble}'] if solver_trouble else []
     found += [f'silent: {", ".join(silent[:20])}'] if silent else []
     low = sorted(uav_id for uav_id, record in fleet.records.items() if record.low)

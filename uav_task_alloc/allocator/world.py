@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable, Sequence
 from typing import TYPE_CHECKING
 
-from uav_task_alloc.allocator import zone_watch
+from uav_task_alloc.allocator import admission, zone_watch
 from uav_task_alloc.allocator.fleet import Fleet, UavRecord, jump, may_fly, news_of
 from uav_task_alloc.allocator.life import Event as Life
 from uav_task_alloc.allocator.published import ListBook
@@ -33,7 +33,6 @@ from uav_task_alloc.params import AllocatorParams
 if TYPE_CHECKING:  # it brings the compiler along, which a start must not wait for
     from uav_task_alloc.allocator.ways import Ways
 
-MOST_UAVS = 1000  # a flood of made-up ids ends here
 MOST_NOTES = 10_000  # lines that wait for the log
 ANSWER = 1.0  # [s] between two lists told again for old events
 LOOK = 0.5  # [s] between two looks at the way ahead of a UAV
@@ -59,12 +58,14 @@ class World:
         self.cautious = False  # shortly after a restart: tasks stay where they are
         self.awake = False  # the kernels are compiled: looking at zones is quick
         self._ways: Ways | None = None
-        self._looked: dict[str, float] = {}
-        self._answered: dict[str, float] = {}  # [s] when a list was told again for an old event
+        self.looked: dict[str, float] = {}
+        self.answered: dict[str, float] = {}  # [s] when a list was told again for an old event
         # the zones and the home as they were when a UAV's list was laid
         self.laid: dict[str, tuple[Ways, Point]] = {}
         self.looked_at_all = True  # no zone is new
         self.stranded: dict[str, str] = {}  # why a UAV has no safe way home
+        self.full = ''  # why no UAV is admitted
+        self.began = self.next_look = 0.0  # [s] first look for UAVs to forget; the next one
         self._old = {each.uav: each for each in saved.lists if each.stops}
 
     def announce(self, action: Action, tasks: Iterable[Task], stamp: float,
@@ -101,9 +102,9 @@ class World:
     def hear(self, report: UavReport, now: float, stamp: float) -> str:
         """A UAV says how it is; returns why that is refused, '' when it is not."""
         uav_id = report.uav_id
-        if uav_id not in self.fleet.records and not self.fleet.make_room(
-                MOST_UAVS, self.lists.owners().values()):
-            return f'uav_id = {uav_id!r}: expected one of the {MOST_UAVS} UAVs known already'
+        if uav_id not in self.fleet.records and not admission.admit(self, uav_id):
+            return (f'uav_id = {uav_id!r}: expected one of the {admission.MOST_UAVS} UAVs known '
+                    'already')
         active = self.fleet.active.get(uav_id)
         before = self.fleet.hear(report, now, self.params.battery_reserve)
         self._catch_up(report, stamp)
@@ -113,10 +114,11 @@ class World:
         self._look_for_jumps(before, report, now)
         if before is None or active != self.fleet.active.get(uav_id):
             self.outbox.statuses = True
+        admission.prove(self, report)
         if self.lists.learn(uav_id, report.list_revision):
             self.again.add(uav_id)
-        if self.awake and now - self._looked.get(uav_id, -LOOK) >= LOOK:
-            self._looked[uav_id] = now
+        if self.awake and now - self.looked.get(uav_id, -LOOK) >= LOOK:
+            self.looked[uav_id] = now
             zone_watch.look_ahead(self, uav_id, now)
         return ''
 
@@ -152,6 +154,7 @@ class World:
         why = self._why_not(event, now) or self._take_event(event, stamp)
         if why:
             return f'{place}: {why}'
+        self.fleet.proven.add(event.uav_id)
         if event.kind is Kind.STARTED:
             self.fleet.active[event.uav_id] = event.task_id
         elif event.task_id not in self.lists.get(event.uav_id).task_ids[:1]:
@@ -166,8 +169,8 @@ class World:
         held = self.lists.get(event.uav_id)
         if (event.kind is Kind.COMPLETED and event.revision < held.revision
                 and event.task_id in held.task_ids
-                and now - self._answered.get(event.uav_id, -ANSWER) >= ANSWER):
-            self._answered[event.uav_id] = now
+                and now - self.answered.get(event.uav_id, -ANSWER) >= ANSWER):
+            self.answered[event.uav_id] = now
             self.again.add(event.uav_id)
 
     def _why_not(self, event: TaskEvent, now: float) -> str:

@@ -135,6 +135,8 @@ class AllocatorNode(Node):
         """A UAV says how it is."""
         try:
             refused = self.world.hear(to_report(msg), time.monotonic(), self.stamp())
+            if refused:  # for want of room, which the world says once
+                return
         except InvalidValue as error:
             refused = str(error)
         self.complain('uav_states', msg.uav_id, refused)

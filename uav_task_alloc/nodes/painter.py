@@ -47,6 +47,9 @@ class Painter:
 
     def note(self, out: Outbox) -> None:
         """What the allocator told; it costs next to nothing."""
+        for uav_id in out.forgotten & self.paths.keys():
+            self.untold.discard(uav_id)
+            self.node.destroy_publisher(self.paths.pop(uav_id))
         for uav_id in out.lists:
             if uav_id not in self.paths:
                 self.paths[uav_id] = self.node.create_publisher(Path, f'{uav_id}/path', LATCHED)

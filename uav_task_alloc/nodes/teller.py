@@ -51,9 +51,18 @@ class Teller:
 
     def take(self, out: Outbox) -> None:
         """All of this is to be told."""
+        for uav_id in out.forgotten:
+            self.forget(uav_id)
         self.lists.update(out.lists)
         self.stale |= out.statuses
         self.plan = out.allocation or self.plan
+
+    def forget(self, uav_id: str) -> None:
+        """Nobody will hear lists by that id."""
+        self.lists.pop(uav_id, None)
+        self._lists.pop(uav_id, None)
+        if uav_id in self.publishers:
+            self.node.destroy_publisher(self.publishers.pop(uav_id))
 
     def tell(self, stamp: float) -> bool:
         """Lists first, as many as a slice has time for; returns whether some are left."""
