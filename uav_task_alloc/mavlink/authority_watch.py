@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -25,6 +24,7 @@ from uav_task_alloc.mavlink.mode_acks import ModeAcks
 from uav_task_alloc.mavlink.modes import ModeClass, avoids_traffic, mode_class, mode_name
 from uav_task_alloc.mavlink.policy import Note, Policy
 from uav_task_alloc.mavlink.profiles import Flight, Profile
+from uav_task_alloc.mavlink.status_texts import StatusTexts
 from uav_task_alloc.mavlink.telemetry import OFF_GROUND, STALE, Telemetry
 from uav_task_alloc.model import Point
 
@@ -32,20 +32,11 @@ IN_FLIGHT = 12.0  # [s] in which a command sent may still take effect, and be se
 CLIMBED = 0.9  # of the height asked for: the take-off has ended by itself
 CONTRADICTED = 2.5  # [s] in which a heartbeat may still show a mode that was acknowledged
 DOUBT = 5.0  # [s] in which a message under way may explain a change of mode
-SAID = 6.0  # [s] around a change of mode in which a text speaks of it
 REST, REST_MOVED, REST_TIME = 1.0, 3.0, 6.0  # [m/s], [m], [s]: at rest, for a hand-over
 SWAP_KEPT = 60.0  # [s] that a swap may be under way when the bridge is restarted
 BRAKING = 10.0  # [s] after its hold was sent until it is at rest
 MARKS, REMEMBERED = 50, 600.0  # tasks, [s]
 LOW_BATTERY = 0.2  # [0..1] below which nothing is handed over
-_FAILSAFE = re.compile(r'failsafe|fence breach|breached|battery \d+ is (low|critical)|'
-                       r'(low|critical|dangerous).{0,12}battery|data link lost|'
-                       r'(rc|manual control|gcs).{0,20}lost', re.IGNORECASE)
-_KILL = re.compile(r'emergency stop|flight terminat|terminating', re.IGNORECASE)
-_KILL_SWITCH = re.compile(r'motorestop high|kill(.?switch)? engaged', re.IGNORECASE)
-_FINISHED = re.compile(r'mission finished', re.IGNORECASE)  # PX4, at the end of its mission
-_INFEASIBLE = re.compile(r'(mission|waypoint).*(reject|infeasible|invalid|not valid|too far|'
-                         r'too close|failed)|too far', re.IGNORECASE)
 
 
 class Evidence(Protocol):
@@ -139,6 +130,7 @@ class AuthorityWatch:
             [(mode, now + IN_FLIGHT) for mode in record.commanded],
             dict.fromkeys(record.commanded, now), climb=record.climb)
         self._status = 0
+        self._texts = StatusTexts()
         self._acks = ModeAcks()
         self._armed_at_start = False  # somebody had armed it before this bridge was there
         self._armed_frame: int | None = None  # in which it said that it had armed
@@ -154,8 +146,6 @@ class AuthorityWatch:
         self._was_airborne = False
         self._landed_at = -math.inf  # [s] by our descent
         self._takeoff = policy().takeoff
-        # [s] when a text said so
-        self._failsafe_at = self._infeasible_at = self._finished_at = -math.inf
         if record is None:
             self.authority.undecided = True
 
@@ -217,16 +207,8 @@ class AuthorityWatch:
 
     def text(self, message: Message, now: float) -> None:
         """Take a STATUSTEXT: it may say why the mode changes."""
-        words = str(message.text)
-        if _FINISHED.search(words):
-            self._finished_at = now
-        urgent = message.severity <= d.MAV_SEVERITY_NOTICE
-        if _KILL_SWITCH.search(words) or (urgent and _KILL.search(words)):
-            self._apply(Event.KILLED, now, f'the vehicle says: {words}')
-        if urgent and _FAILSAFE.search(words):
-            self._failsafe_at = now
-        if urgent and _INFEASIBLE.search(words):
-            self._infeasible_at = now
+        if self._texts.receive(message, now):
+            self._apply(Event.KILLED, now, f'the vehicle says: {message.text}')
         self._keep()
 
     def step(self, now: float) -> None:
@@ -538,7 +520,7 @@ class AuthorityWatch:
             return False
         if self._class(mode) is ModeClass.HOLD:
             return (self._evidence.ended(now) or self._evidence.rejected(now)
-                    or max(self._finished_at, self._infeasible_at) > now - SAID)
+                    or self._texts.mission_over(now))
         return self._profile.flight(mode) is Flight.RETURN and self._evidence.returning()
 
     def _explicable(self, mode: int) -> bool:
@@ -547,7 +529,7 @@ class AuthorityWatch:
             hold or self._profile.flight(mode) is Flight.RETURN)
 
     def _failing(self, now: float) -> bool:
-        return bool(self._status >= d.MAV_STATE_CRITICAL) or now - self._failsafe_at < SAID
+        return bool(self._status >= d.MAV_STATE_CRITICAL) or self._texts.failsafe(now)
 
     def _resolve(self, now: float) -> None:
         doubt = self._doubt
