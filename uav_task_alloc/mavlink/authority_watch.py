@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Protocol
 
 from pymavlink.dialects.v20 import ardupilotmega as d
@@ -20,15 +20,14 @@ from uav_task_alloc.mavlink.authority import (
     TaskMark,
 )
 from uav_task_alloc.mavlink.codec import Message
-from uav_task_alloc.mavlink.mode_acks import ModeAcks
 from uav_task_alloc.mavlink.modes import ModeClass, avoids_traffic, mode_class, mode_name
 from uav_task_alloc.mavlink.policy import Note, Policy
 from uav_task_alloc.mavlink.profiles import Flight, Profile
+from uav_task_alloc.mavlink.sent_commands import IN_FLIGHT, SentCommands
 from uav_task_alloc.mavlink.status_texts import StatusTexts
 from uav_task_alloc.mavlink.telemetry import OFF_GROUND, STALE, Telemetry
 from uav_task_alloc.model import Point
 
-IN_FLIGHT = 12.0  # [s] in which a command sent may still take effect, and be seen
 CLIMBED = 0.9  # of the height asked for: the take-off has ended by itself
 CONTRADICTED = 2.5  # [s] in which a heartbeat may still show a mode that was acknowledged
 DOUBT = 5.0  # [s] in which a message under way may explain a change of mode
@@ -77,38 +76,6 @@ class _Doubt:
     ours: int | None = None  # custom_mode of ours that explains it
 
 
-@dataclass(slots=True)
-class _Sent:
-    """What was sent, and may still take effect."""
-
-    modes: list[tuple[int, float]] = field(default_factory=list)  # not seen yet; until when [s]
-    last: dict[int, float] = field(default_factory=dict)  # when [s], by mode
-    arm_until: float = -math.inf  # [s]
-    disarm_until: float = -math.inf  # [s]
-    arming: bool = False  # what was asked last: to arm
-    climb: float | None = None  # [m] above home, of our take-off
-
-    def expects(self, mode: int, now: float) -> bool:
-        """Whether a mode seen now is one that was sent; what was sent before it is over."""
-        self.modes = [each for each in self.modes if each[1] >= now]
-        found = next((n for n, each in enumerate(self.modes) if each[0] == mode), None)
-        if found is not None:
-            del self.modes[:found + 1]
-        return found is not None
-
-    def under_way(self, now: float) -> list[int]:
-        """Modes that were sent, and not seen yet."""
-        return [mode for mode, until in self.modes if until >= now]
-
-    def recently(self, mode: int, now: float) -> bool:
-        return now - self.last.get(mode, -math.inf) < IN_FLIGHT
-
-    def drop(self) -> None:
-        """Nothing more is to be sent; what is under way stays in `last`."""
-        self.modes.clear()
-        self.climb = None
-
-
 class AuthorityWatch:
     """Watches one vehicle; `authority` is who has it."""
 
@@ -126,14 +93,11 @@ class AuthorityWatch:
         self._policy, self._save, self._saved = policy, save, record
         self._record = record  # of the bridge before, until it is judged
         self._flown = record.flown if record else False
-        self._sent = _Sent() if record is None else _Sent(
-            [(mode, now + IN_FLIGHT) for mode in record.commanded],
-            dict.fromkeys(record.commanded, now), climb=record.climb)
+        self._sent = SentCommands() if record is None else (
+            SentCommands.before_restart(record, now))
         self._status = 0
         self._texts = StatusTexts()
-        self._acks = ModeAcks()
         self._armed_at_start = False  # somebody had armed it before this bridge was there
-        self._armed_frame: int | None = None  # in which it said that it had armed
         self._adopt = False  # the next heartbeat tells the mode, and is no change
         # modes and armed states that are no news when the link is back
         self._compare: tuple[frozenset[int | None], frozenset[bool]] = frozenset(), frozenset()
@@ -154,9 +118,8 @@ class AuthorityWatch:
     def heartbeat(self, message: Message, now: float) -> None:
         """Take the newest HEARTBEAT of the autopilot."""
         before, was_armed, descends = self.mode, self.armed, self._descends()
-        if self._armed_frame is not None and self._telemetry.frame > self._armed_frame:
-            # it said that it had armed: that it is not armed now is news
-            was_armed, self._flown, self._armed_frame = True, True, None
+        if self._sent.armed_before(self._telemetry.frame):
+            was_armed, self._flown = True, True  # that it is not armed now is news
         self.mode = message.custom_mode
         self.armed = bool(message.base_mode & d.MAV_MODE_FLAG_SAFETY_ARMED)
         self._status = message.system_status
@@ -175,11 +138,7 @@ class AuthorityWatch:
 
     def answered(self, message: Message, frame: int) -> None:
         """Take a COMMAND_ACK that is addressed to us, and the number of its frame."""
-        if message.command == d.MAV_CMD_DO_SET_MODE:
-            self._acks.answered(message.result, frame)
-        elif (message.command == d.MAV_CMD_COMPONENT_ARM_DISARM and self._sent.arming
-                and message.result == d.MAV_RESULT_ACCEPTED):
-            self._armed_frame = frame
+        self._sent.answered(message, frame)
 
     def _entered(self, before: int, now: float) -> int:
         """The mode before this heartbeat, also one that no heartbeat has shown.
@@ -191,10 +150,10 @@ class AuthorityWatch:
                 self._doubt.ours == self.mode):
             self._resolve(now)
             return self.mode
-        mode = self._acks.known_by(self._telemetry.frame)
+        mode = self._sent.acks.known_by(self._telemetry.frame)
         if mode is None:
             return before
-        self._acks.clear()
+        self._sent.acks.clear()
         if self.mode in (mode, *self._sent.under_way(now), before):
             self._sent.modes = [each for each in self._sent.modes
                                 if each[0] == mode == self.mode != before][-1:]
@@ -235,7 +194,7 @@ class AuthorityWatch:
     def _lose_sight(self, now: float) -> None:
         """The next heartbeat is compared with what is known, and what we have just asked for."""
         self._adopt = True
-        self._acks.clear()
+        self._sent.acks.clear()
         armed = {self.armed} | ({True} if now <= self._sent.arm_until + STALE else set())
         self._compare = frozenset({self.mode, *self._sent.under_way(now - STALE)}), frozenset(
             armed)
@@ -271,23 +230,17 @@ class AuthorityWatch:
         mode = self._profile.commanded_mode(message)
         if mode is not None:
             self._sent.climb = None
-            self._acks.sent(mode, now)
-            self._sent.modes.append((mode, now + IN_FLIGHT))
-            self._sent.last[mode] = now
+            self._sent.acks.sent(mode, now)
+            self._sent.mode(mode, now)
             self._descending = self._profile.flight(mode) is Flight.RETURN
         elif message.command == d.MAV_CMD_COMPONENT_ARM_DISARM:
-            self._sent.arming = message.param1 == 1.0
-            if self._sent.arming:
-                self._sent.arm_until = now + IN_FLIGHT
-            else:
-                self._sent.disarm_until = now + IN_FLIGHT
+            self._sent.arm(message.param1 == 1.0, now)
         elif message.command == d.MAV_CMD_NAV_TAKEOFF:
             self._descending = False
             takes_off = self._profile.takeoff_mode
             if takes_off is not None:
-                self._sent.modes.append((takes_off, now + IN_FLIGHT))
+                self._sent.mode(takes_off, now)
                 self._sent.climb = self._policy().cruise_altitude
-                self._sent.last[takes_off] = now
         self._keep()
 
     def hand_over(self, operator: str, now: float) -> str:
