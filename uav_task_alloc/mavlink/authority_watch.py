@@ -6,7 +6,6 @@ import math
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
 
 from pymavlink.dialects.v20 import ardupilotmega as d
 
@@ -20,6 +19,7 @@ from uav_task_alloc.mavlink.authority import (
     TaskMark,
 )
 from uav_task_alloc.mavlink.codec import Message
+from uav_task_alloc.mavlink.mission_evidence import MissionEvidence
 from uav_task_alloc.mavlink.modes import ModeClass, avoids_traffic, mode_class, mode_name
 from uav_task_alloc.mavlink.policy import Note, Policy
 from uav_task_alloc.mavlink.profiles import Flight, Profile
@@ -38,34 +38,6 @@ MARKS, REMEMBERED = 50, 600.0  # tasks, [s]
 LOW_BATTERY = 0.2  # [0..1] below which nothing is handed over
 
 
-class Evidence(Protocol):
-    """What the mission on board says about a change of mode."""
-
-    def ended(self, now: float) -> bool:
-        """REACHED of the last item has just come."""
-
-    def rejected(self, now: float) -> bool:
-        """The vehicle says that it has no valid mission, just after it took ours."""
-
-    def returning(self) -> bool:
-        """The RETURN item is what comes next, or is being flown."""
-
-    def may_end(self) -> bool:
-        """The last item, or the one before RETURN, is being flown."""
-
-    def verified(self) -> bool:
-        """The list is verified on board."""
-
-    def ours(self) -> bool:
-        """What was read back holds a task of the list."""
-
-    def place(self) -> tuple[int | None, int | None]:
-        """Checksum of the mission on board, and the item that is flown."""
-
-    def foreign(self) -> bool:
-        """Somebody else has changed the mission."""
-
-
 @dataclass(slots=True)
 class _Doubt:
     """A change of mode that a message under way may explain."""
@@ -79,7 +51,7 @@ class _Doubt:
 class AuthorityWatch:
     """Watches one vehicle; `authority` is who has it."""
 
-    def __init__(self, profile: Profile, telemetry: Telemetry, evidence: Evidence,
+    def __init__(self, profile: Profile, telemetry: Telemetry, evidence: MissionEvidence,
                  policy: Callable[[], Policy], now: float, record: Record | None = None,
                  save: Callable[[Record], None] = lambda record: None) -> None:
         self.authority = Authority(now, record)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the mission on board says about a change of mode; see `authority_watch.Evidence`."""
+"""What the mission on board says about a change of mode."""
 from __future__ import annotations
 
 from pymavlink.dialects.v20 import ardupilotmega as d
