@@ -18,6 +18,7 @@ from authority_bench import (
 from mission_bench import task_list
 
 from uav_task_alloc.mavlink.authority import Suspension
+from uav_task_alloc.mavlink.modes import mode_name
 from uav_task_alloc.mavlink.vehicle_modes import COPTER_MODES, PX4_MODES, px4_mode
 
 STICKS = [('ardupilot', n) for n, m in COPTER_MODES.items() if m.stick] + [
@@ -37,7 +38,7 @@ def test_any_mode_that_a_pilot_sets_in_the_mission_takes_the_aircraft(kind, mode
     bench.vehicles[1].rc_mode(mode)
     assert bench.becomes(L, 3.0)
     assert bench.commands(start) == []
-    assert shows(bench, L, 'not by the bridge: ', bench.pilot().watch._name(mode))
+    assert shows(bench, L, 'not by the bridge: ', mode_name(bench.pilot().profile.family, mode))
     assert 'MISSION mode set in flight' in bench.state().reason
 
 

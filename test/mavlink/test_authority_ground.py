@@ -35,7 +35,7 @@ def test_takeoff_set_to_true_gives_nothing_back_that_was_lost(kind):
 @pytest.mark.parametrize('state', [H, S])
 def test_takeoff_set_to_true_where_it_is_ours_changes_nothing(kind, state):
     bench = on_ground(kind, state)
-    bench.pilot().watch._takeoff = False
+    bench.pilot().watch._grant.takeoff = False
     bench.run(limit=2.0)
     assert bench.authority() is state
 
