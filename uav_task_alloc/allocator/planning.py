@@ -33,10 +33,11 @@ def problem(world: World, best: Plan, trigger: str, background: bool) -> Problem
     tasks = tuple(_restricted(record, ids) for record in world.tasks.open()
                   if record.task.id not in kept)
     held = {uav.id: world.lists.get(uav.id).task_ids for uav in uavs}
+    legs = {uav.id: tuple(stop.leg for stop in world.lists.get(uav.id).stops) for uav in uavs}
     return Problem(
         world.version, trigger, background,
         params.background_budget if background else params.solve_budget, uavs, tasks,
-        tuple(world.zones.values()), world.locked(), held=replace(best, routes=held, legs={}),
+        tuple(world.zones.values()), world.locked(), held=replace(best, routes=held, legs=legs),
         warm=best)
 
 

@@ -8,7 +8,9 @@ from dataclasses import replace
 from uav_task_alloc.allocator import planning
 from uav_task_alloc.allocator.core import Allocator
 from uav_task_alloc.allocator.records import Action, UavReport
+from uav_task_alloc.geometry.detour import find_detour
 from uav_task_alloc.geometry.distances import Distances
+from uav_task_alloc.geometry.effort import Effort
 from uav_task_alloc.model import Plan, Task, ThreatZone
 from uav_task_alloc.params import AllocatorParams
 
@@ -38,5 +40,8 @@ def rehearse(plan: Callable[..., Plan], params: AllocatorParams) -> int:
         answer = planning.solve(plan, asked, params, stop=lambda: False)
         allocator.adopt(answer, now=BUDGET, stamp=0.0)
         before = answer.fresh
-    Distances([(0.0, 0.0, 0.0), (1.0, 0.0, 0.0)], ZONES).ensure([0], [1])
+    ways = Distances([(0.0, 0.0, 0.0), (1.0, 0.0, 0.0)], ZONES)
+    ways.ensure([0], [1])
+    ways.suggest(0, 1, ())
+    find_detour((100.0, 0.0, 10.0), (400.0, 0.0, 10.0), ZONES, effort=Effort(lambda: False))
     return len(allocator.collect().lists)

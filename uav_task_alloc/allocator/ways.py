@@ -9,10 +9,13 @@ from itertools import pairwise
 import numpy as np
 
 from uav_task_alloc.allocator.lists import length
-from uav_task_alloc.geometry.detour import detour, find_detour
+from uav_task_alloc.geometry.detour import Detour, find_detour
+from uav_task_alloc.geometry.effort import Effort
 from uav_task_alloc.geometry.obstacles import blocked, pack
 from uav_task_alloc.model import Leg, Point, ThreatZone
 from uav_task_alloc.params import AllocatorParams
+
+MOST_WORK = 20_000_000  # units in one search for a way, some 50 ms
 
 
 class Ways:
@@ -23,25 +26,30 @@ class Ways:
         self.margin = params.replan_margin  # share that a way must be shorter to replace one
         self._bare = pack(self.zones)
         self._wide = pack(self.zones, 0.5 * params.clearance)
+        self._planned = pack(self.zones, params.clearance)
         rows = self._wide.rows
         self._low = np.stack([rows['x0'], rows['y0'], rows['z0']], axis=1)
         self._high = np.stack([rows['x1'], rows['y1'], rows['z1']], axis=1)
 
     def leg(self, a: Point, b: Point) -> Leg | None:
-        """The shortest safe way from a to b; None where there is none."""
-        params = self.params
-        metres, via = detour(a, b, self.zones, clearance=params.clearance,
-                             altitude_min=params.altitude_min, altitude_max=params.altitude_max)
-        return None if math.isinf(metres) else Leg(tuple(via), metres)
+        """The shortest safe way from a to b; None where there is none, or it takes too long."""
+        found = self._find(a, b)
+        return None if math.isinf(found.length) else Leg(found.points, found.length)
 
     def why_none(self, a: Point, b: Point) -> str:
         """Why there is no safe way from a to the home b, in words."""
-        params = self.params
-        found = find_detour(a, b, self.zones, clearance=params.clearance,
-                            altitude_min=params.altitude_min, altitude_max=params.altitude_max)
+        found = self._find(a, b)
         if found.goal_inside:
             return f'its home is inside zone {", ".join(found.goal_inside)}'
-        return 'zones close it off'
+        return 'none was found in the time' if found.given_up else 'zones close it off'
+
+    def _find(self, a: Point, b: Point) -> Detour:
+        """By whoever also hears and tells: a search must not keep it for long."""
+        params, effort = self.params, Effort()
+        effort.begin(MOST_WORK)
+        return find_detour(a, b, self.zones, clearance=params.clearance,
+                           altitude_min=params.altitude_min, altitude_max=params.altitude_max,
+                           effort=effort, obstacles=self._planned)
 
     def around(self, point: Point, up: float = 0.0, wide: bool = False) -> str:
         """The first zone that the point, or a point less than `up` [m] above it, is in.

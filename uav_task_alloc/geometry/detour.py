@@ -9,8 +9,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from uav_task_alloc.errors import InvalidValue
+from uav_task_alloc.geometry.effort import Effort, new_work
 from uav_task_alloc.geometry.exits import way_out
-from uav_task_alloc.geometry.obstacles import Floats, Obstacles, contains, first_around, pack
+from uav_task_alloc.geometry.obstacles import (
+    Floats,
+    Obstacles,
+    all_around,
+    first_around,
+    pack,
+)
+from uav_task_alloc.geometry.scene import in_order
 from uav_task_alloc.geometry.taut import MAX_CORNERS
 from uav_task_alloc.geometry.ways import shortest
 from uav_task_alloc.model import Point, ThreatZone, check_point
@@ -25,12 +33,15 @@ class Detour:
     start_inside: tuple[str, ...] = ()  # zones to leave first; points[0] is then outside
     goal_inside: tuple[str, ...] = ()  # zones that make the goal unreachable
     closed_off: bool = False  # zones and altitude limits leave no way
+    given_up: bool = False  # none was found in the time; there may be one
 
     @property
     def reason(self) -> str:
         """Why there is no way, or that it starts inside a zone; empty: nothing special."""
         if self.goal_inside:
             return f'the goal is inside zone {", ".join(self.goal_inside)}'
+        if self.given_up:
+            return 'no safe way found in the time'
         if self.closed_off:
             return 'closed off by zones'
         if self.start_inside:
@@ -53,16 +64,24 @@ def detour(a: Iterable[float], b: Iterable[float], zones: Iterable[ThreatZone] =
 
 def find_detour(a: Iterable[float], b: Iterable[float], zones: Iterable[ThreatZone] = (), *,
                 clearance: float = 0.0, altitude_min: float = -math.inf,
-                altitude_max: float = math.inf) -> Detour:
-    """As `detour`, and says what is special about the way. Raises InvalidValue."""
+                altitude_max: float = math.inf, effort: Effort | None = None,
+                obstacles: Obstacles | None = None) -> Detour:
+    """As `detour`, and says what is special about the way. Raises InvalidValue.
+
+    Args:
+        effort: what the search may spend; None: no limit.
+        obstacles: the zones with the clearance, packed before.
+    """
     start, goal, zones = check_point('a', a), check_point('b', b), tuple(zones)
     limits = check_limits(altitude_min, altitude_max)
-    obstacles = pack(zones, clearance)
+    obstacles = obstacles or pack(zones, clearance)
     start_inside = _around(obstacles, zones, start)
     goal_inside = _around(obstacles, zones, goal)
     if goal_inside:
         return Detour(math.inf, (), start_inside, goal_inside)
-    length, points = way_between(obstacles, start, goal, limits, bool(start_inside))
+    length, points = way_between(obstacles, start, goal, limits, bool(start_inside), effort)
+    if math.isnan(length):
+        return Detour(math.inf, (), start_inside, given_up=True)
     return Detour(length, points, start_inside, (), math.isinf(length))
 
 
@@ -74,25 +93,35 @@ def check_limits(altitude_min: float, altitude_max: float) -> Floats:
     return np.array([altitude_min, altitude_max], dtype=np.float64)
 
 
-def way_between(obstacles: Obstacles, start: Point, goal: Point, limits: Floats,
-                caught: bool) -> tuple[float, tuple[Point, ...]]:
-    """Length [m] and waypoints from start to a goal outside all zones; caught: start inside."""
+def way_between(obstacles: Obstacles, start: Point, goal: Point, limits: Floats, caught: bool,
+                effort: Effort | None = None) -> tuple[float, tuple[Point, ...]]:
+    """Length [m] and waypoints from start to a goal outside all zones; caught: start inside.
+
+    inf: there is no way; NaN: none was found with this effort.
+    """
+    work = new_work(effort.state.ctypes.data if effort else 0)
+    first: tuple[Point, ...] = ()
+    before, place = 0.0, np.array(start)
     if caught:
-        out = way_out(obstacles.rows, np.array(start), limits)
-        if math.isnan(out[0]):
-            return math.inf, ()
-        first: Point = (float(out[0]), float(out[1]), float(out[2]))
-        length, points = way_between(obstacles, first, goal, limits, False)
-        return math.dist(start, first) + length, (first, *points) if length < math.inf else ()
-    forwards = start <= goal  # one order, so that there and back are the same way
-    ends = np.array((start, goal) if forwards else (goal, start))
-    buffer = np.empty((MAX_CORNERS, 3))
-    snug = any(first_around(obstacles.rows, *end, False) >= 0 for end in (start, goal))
-    n, length = shortest(obstacles.rows, ends, limits, snug, buffer)
-    via = tuple((float(x), float(y), float(z)) for x, y, z in buffer[1:max(1, n - 1)])
-    return float(length), via if forwards else via[::-1]
+        place = way_out(obstacles.rows, place, limits, work)
+        if work[2] or math.isnan(place[0]):
+            return math.nan if work[2] else math.inf, ()
+        first = as_points(place[None])
+        before = math.dist(start, first[0])
+    ends, buffer = np.empty((2, 3)), np.empty((MAX_CORNERS, 3))
+    turned = in_order(place, np.array(goal), ends)
+    snug = any(first_around(obstacles.rows, x, y, z, False) >= 0 for x, y, z in ends)
+    n, length = shortest(obstacles.rows, ends, limits, snug, buffer, work)
+    via = as_points(buffer[1:max(1, n - 1)])
+    if not math.isfinite(length):
+        return float(length), ()
+    return before + float(length), (*first, *(via[::-1] if turned else via))
+
+
+def as_points(rows: Floats) -> tuple[Point, ...]:
+    """Rows of an array as points [m]."""
+    return tuple((float(x), float(y), float(z)) for x, y, z in rows)
 
 
 def _around(obstacles: Obstacles, zones: Sequence[ThreatZone], point: Point) -> tuple[str, ...]:
-    return tuple(zone.id for zone, row in zip(zones, obstacles.rows, strict=True)
-                 if contains(row, *point, True))
+    return tuple(zones[k].id for k in all_around(obstacles.rows, *point))

@@ -7,12 +7,14 @@ import math
 import numba
 import numpy as np
 
+from uav_task_alloc.geometry.effort import spend
 from uav_task_alloc.geometry.memory import floats_at
 from uav_task_alloc.geometry.obstacles import (
     CYLINDER,
     DOME,
     PRISM,
     Floats,
+    Ints,
     Zone,
     Zones,
     in_polygon,
@@ -42,12 +44,14 @@ def _depth(zone: Zone, x: float, y: float, z: float) -> float:
 
 
 @numba.njit(cache=True, nogil=True)
-def _ray(o: Zones, p: Floats, az: float, up: float, best: float) -> float:
+def _ray(o: Zones, p: Floats, az: float, up: float, best: float, work: Ints) -> float:
     """How far along a direction the outside begins [m]; inf: not before `best`."""
     c = math.cos(up)
     dx, dy, dz = math.cos(az) * c, math.sin(az) * c, math.sin(up)
     t = 0.0
     for _ in range(400):
+        if spend(work, o.size):
+            break
         deepest, least = 0.0, 0.0
         for k in range(o.size):
             zone = o[k]
@@ -63,9 +67,12 @@ def _ray(o: Zones, p: Floats, az: float, up: float, best: float) -> float:
 
 
 @numba.njit(cache=True, nogil=True)
-def _try(o: Zones, p: Floats, az: float, up: float, limits: Floats, best: Floats) -> bool:
+def _try(o: Zones, p: Floats, az: float, up: float, limits: Floats, best: Floats,
+         work: Ints) -> bool:
     """Take the direction (az, up) into best = (distance, az, up) where it is shorter."""
-    t = _ray(o, p, az, up, best[0])
+    if work[2]:
+        return False
+    t = _ray(o, p, az, up, best[0], work)
     z = p[2] + t * math.sin(up)
     if t >= best[0] or not min(limits[0], p[2]) <= z <= max(limits[1], p[2]):
         return False
@@ -74,11 +81,11 @@ def _try(o: Zones, p: Floats, az: float, up: float, limits: Floats, best: Floats
 
 
 @numba.njit(cache=True, nogil=True)
-def _first_tries(o: Zones, p: Floats, limits: Floats, best: Floats) -> None:
+def _first_tries(o: Zones, p: Floats, limits: Floats, best: Floats, work: Ints) -> None:
     """Straight outwards of each zone around p, up, down, and a fan about the first of them."""
     base = np.nan
-    _try(o, p, 0.0, 0.5 * math.pi, limits, best)
-    _try(o, p, 0.0, -0.5 * math.pi, limits, best)
+    _try(o, p, 0.0, 0.5 * math.pi, limits, best, work)
+    _try(o, p, 0.0, -0.5 * math.pi, limits, best, work)
     for k in range(o.size):
         zone = o[k]
         if _depth(zone, p[0], p[1], p[2]) <= 0.0:
@@ -86,33 +93,37 @@ def _first_tries(o: Zones, p: Floats, limits: Floats, best: Floats) -> None:
         dx, dy, dz = p[0] - zone.x, p[1] - zone.y, p[2] - zone.z
         az = math.atan2(dy, dx)
         base = az if math.isnan(base) else base
-        _try(o, p, az, 0.0, limits, best)
+        _try(o, p, az, 0.0, limits, best, work)
         if zone.kind == DOME:
-            _try(o, p, az, max(0.0, math.atan2(dz, math.hypot(dx, dy))), limits, best)
+            _try(o, p, az, max(0.0, math.atan2(dz, math.hypot(dx, dy))), limits, best, work)
         if zone.kind == PRISM:
             n, c = zone.count, floats_at(zone.corners)
             for i in range(n):
                 j = (i + 1) % n
                 _try(o, p, math.atan2(c[2 * i] - c[2 * j], c[2 * j + 1] - c[2 * i + 1]), 0.0,
-                     limits, best)
+                     limits, best, work)
     for i in range(2 * AROUND):
         _try(o, p, base + 2.0 * math.pi * i / AROUND, 0.25 * math.pi * (i // AROUND), limits,
-             best)
+             best, work)
 
 
 @numba.njit(cache=True, nogil=True)
-def way_out(o: Zones, p: Floats, limits: Floats) -> Floats:
-    """The nearest point outside all zones that p, inside some, sees; NaN: there is none."""
+def way_out(o: Zones, p: Floats, limits: Floats, work: Ints) -> Floats:
+    """The nearest point outside all zones that p, inside some, sees; NaN: there is none.
+
+    Or work[2] says that the search was cut short.
+    """
     best = np.array([np.inf, 0.0, 0.0])
-    _first_tries(o, p, limits, best)
+    _first_tries(o, p, limits, best, work)
     if math.isinf(best[0]):
         return np.full(3, np.nan)
     step = math.pi / AROUND
     for _ in range(24):
         az, up = best[1], best[2]
-        if not (_try(o, p, az + step, up, limits, best) or _try(o, p, az - step, up, limits, best)
-                or _try(o, p, az, up + step, limits, best)
-                or _try(o, p, az, up - step, limits, best)):
+        if not (_try(o, p, az + step, up, limits, best, work)
+                or _try(o, p, az - step, up, limits, best, work)
+                or _try(o, p, az, up + step, limits, best, work)
+                or _try(o, p, az, up - step, limits, best, work)):
             step *= 0.5
     t, c = best[0], math.cos(best[2])
     out = np.array([math.cos(best[1]) * c, math.sin(best[1]) * c, math.sin(best[2])])

@@ -20,6 +20,14 @@ from numba.extending import intrinsic
 from numpy.typing import NDArray
 
 from uav_task_alloc.geometry.memory import cast, floats_at
+from uav_task_alloc.geometry.outlines import (
+    Floats as Floats,
+    Ints as Ints,
+    circle,
+    counter_clockwise,
+    hull_of,
+    rim_of,
+)
 from uav_task_alloc.model import Shape, ThreatZone, check_number
 
 DOME, CYLINDER, PRISM = Shape.HEMISPHERE.value, Shape.CYLINDER.value, Shape.POLYGON.value
@@ -27,9 +35,8 @@ TOUCH = 1e-7  # [m] so near a surface counts as on it, not inside
 SKIN = 0.02  # [m] ways keep this much more distance, so that rounding never puts them inside
 
 RIM = 24  # corners of the outline of a cylinder
+NO_CORNERS: Floats = np.zeros((0, 2))
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 Zones = NDArray[np.void]  # of dtype ZONE
 Zone = Any  # one row of it, in a kernel
 
@@ -70,25 +77,34 @@ class Obstacles:
 def pack(zones: Sequence[ThreatZone], clearance: float = 0.0) -> Obstacles:
     """The zones enlarged by margin + clearance [m]. Raises InvalidValue."""
     clearance = check_number('clearance', clearance, 0.0, 1e6)
-    rows, outlines = np.zeros(len(zones), ZONE), []
-    for i, zone in enumerate(zones):
+    rows, outlines = [], []
+    for zone in zones:
         grow = zone.margin + clearance
         (x, y, z), size, low, high = _extent(zone)
         skin = min(SKIN, 1e-4 * (size + grow))
-        corners = _counter_clockwise(zone.vertices)
-        outline = np.array(corners, np.float64).reshape(-1, 2)
-        rim = _rim(zone, corners, grow + 1.5 * skin)
-        hull = _rim(zone, _hull(corners), grow + 1.5 * skin)
-        half = np.ptp(outline, axis=0) / 2 if len(corners) else np.array([size, size])
-        reach = half + grow + skin
+        outline, rim, hull, dented = _outlines(zone, grow + 1.5 * skin)
+        wide, deep = np.ptp(outline, axis=0) / 2 if len(outline) else (size, size)
+        wide, deep = wide + grow + skin, deep + grow + skin
         bottom = -math.inf if zone.shape is Shape.HEMISPHERE else low - grow - skin
-        rows[i] = (
+        rows.append((
             zone.shape.value, x, y, z, zone.radius + grow, low - grow, high + grow, grow, skin,
-            x - reach[0], y - reach[1], bottom, x + reach[0], y + reach[1], high + grow + skin,
-            outline.ctypes.data, len(corners), rim.ctypes.data, len(rim),
-            hull.ctypes.data, len(hull), len(_hull(corners)) < len(corners))
+            x - wide, y - deep, bottom, x + wide, y + deep, high + grow + skin,
+            outline.ctypes.data, len(outline), rim.ctypes.data, len(rim),
+            hull.ctypes.data, len(hull), dented))
         outlines += [outline, rim, hull]
-    return Obstacles(rows, tuple(outlines))
+    return Obstacles(np.array(rows, ZONE), tuple(outlines))
+
+
+def _outlines(zone: ThreatZone, reach: float) -> tuple[Floats, Floats, Floats, bool]:
+    """Corners, rim, hull of the rim `reach` [m] off it, and whether rim and hull differ."""
+    if zone.shape is Shape.HEMISPHERE:
+        return NO_CORNERS, NO_CORNERS, NO_CORNERS, False
+    if zone.shape is Shape.CYLINDER:
+        rim = circle(zone.center[0], zone.center[1], zone.radius + reach, RIM)
+        return NO_CORNERS, rim, rim, False
+    corners = counter_clockwise(np.array(zone.vertices, np.float64))
+    hull = hull_of(corners)
+    return corners, rim_of(corners, reach), rim_of(hull, reach), len(hull) < len(corners)
 
 
 def _extent(zone: ThreatZone) -> tuple[tuple[float, float, float], float, float, float]:
@@ -100,54 +116,6 @@ def _extent(zone: ThreatZone) -> tuple[tuple[float, float, float], float, float,
     xs, ys = zip(*zone.vertices, strict=True)
     middle = (min(xs) + max(xs)) / 2, (min(ys) + max(ys)) / 2, 0.0
     return middle, math.hypot(max(xs) - min(xs), max(ys) - min(ys)) / 2, zone.z_min, zone.z_max
-
-
-def _rim(zone: ThreatZone, corners: Sequence[tuple[float, float]],
-         grow: float) -> Floats:
-    """The outline `grow` off the zone, circumscribing its round corners; none for a dome."""
-    rim: list[tuple[float, float]] = []
-    if zone.shape is Shape.CYLINDER:
-        rim = _fan(zone.center, zone.radius + grow, 0.0, 2 * math.pi, RIM)
-    for i, corner in enumerate(corners):
-        before, after = corners[i - 1], corners[(i + 1) % len(corners)]
-        start = math.atan2(corner[1] - before[1], corner[0] - before[0])
-        turn = math.remainder(math.atan2(after[1] - corner[1], after[0] - corner[0]) - start,
-                              2 * math.pi)
-        rim += _fan(corner, grow, start - math.pi / 2, turn,
-                    max(1, math.ceil(4 * turn / math.pi - 1e-9)))
-    return np.array(rim, np.float64).reshape(-1, 2)
-
-
-def _hull(corners: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
-    """The convex hull, counter-clockwise, without corners on its edges."""
-    hull: list[tuple[float, float]] = []
-    for half in (sorted(corners), sorted(corners, reverse=True)):
-        chain: list[tuple[float, float]] = []
-        for p in half:
-            while len(chain) > 1 and _turn(chain[-2], chain[-1], p) <= 0.0:
-                chain.pop()
-            chain.append(p)
-        hull += chain[:-1]
-    return hull
-
-
-def _turn(p: tuple[float, float], q: tuple[float, float], r: tuple[float, float]) -> float:
-    return (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0])
-
-
-def _fan(centre: Sequence[float], radius: float, start: float, turn: float,
-         parts: int) -> list[tuple[float, float]]:
-    """Corners of the polyline that circumscribes an arc."""
-    step = turn / parts
-    far = radius / math.cos(step / 2)
-    return [(centre[0] + far * math.cos(start + (i + 0.5) * step),
-             centre[1] + far * math.sin(start + (i + 0.5) * step)) for i in range(parts)]
-
-
-def _counter_clockwise(vertices: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
-    area = sum(a[0] * b[1] - b[0] * a[1] for a, b in zip(
-        vertices, [*vertices[1:], *vertices[:1]], strict=True))
-    return list(vertices if area > 0 else reversed(vertices))
 
 
 @numba.njit(cache=True, nogil=True)
@@ -278,3 +246,14 @@ def first_around(o: Zones, x: float, y: float, z: float, snug: bool) -> int:
         if contains(o[k], x, y, z, snug):
             return k
     return -1
+
+
+@numba.njit(cache=True, nogil=True)
+def all_around(o: Zones, x: float, y: float, z: float) -> Ints:
+    """All zones that contain a point. O(zones)."""
+    found, n = np.empty(o.size, np.int64), 0
+    for k in range(o.size):
+        if contains(o[k], x, y, z, True):
+            found[n] = k
+            n += 1
+    return found[:n]

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numba
 import numpy as np
 
+from uav_task_alloc.geometry.effort import spend
 from uav_task_alloc.geometry.memory import floats_at
 from uav_task_alloc.geometry.obstacles import (
     CYLINDER,
@@ -18,6 +20,8 @@ from uav_task_alloc.geometry.obstacles import (
     Zones,
     blocked,
 )
+
+FEW_CORNERS = 160  # up to here edges are tested as late as possible
 
 
 @numba.njit(cache=True, nogil=True)
@@ -192,11 +196,24 @@ def _gap(x: Floats, i: int, j: int) -> float:
 
 
 @numba.njit(cache=True, nogil=True)
-def _sees(o: Zones, active: Ints, count: int, x: Floats, i: int, j: int, floor: float,
+def _boxes(o: Zones, active: Ints) -> Floats:
+    """x0, x1, y0, y1 of the active zones, side by side in memory."""
+    boxes = np.empty((active.size, 4))
+    for m in range(active.size):
+        zone = o[active[m]]
+        boxes[m, 0], boxes[m, 1], boxes[m, 2], boxes[m, 3] = zone.x0, zone.x1, zone.y0, zone.y1
+    return boxes
+
+
+@numba.njit(cache=True, nogil=True)
+def _sees(o: Zones, active: Ints, boxes: Floats, x: Floats, i: int, j: int, floor: float,
           snug: bool) -> bool:
-    for m in range(count):
-        if blocked(o[active[m]], x[i, 0], x[i, 1], x[i, 2], x[j, 0], x[j, 1], x[j, 2], floor,
-                   snug):
+    x0, x1 = min(x[i, 0], x[j, 0]), max(x[i, 0], x[j, 0])
+    y0, y1 = min(x[i, 1], x[j, 1]), max(x[i, 1], x[j, 1])
+    for m in range(active.size):
+        if (x0 <= boxes[m, 1] and x1 >= boxes[m, 0] and y0 <= boxes[m, 3] and y1 >= boxes[m, 2]
+                and blocked(o[active[m]], x[i, 0], x[i, 1], x[i, 2], x[j, 0], x[j, 1], x[j, 2],
+                            floor, snug)):
             return False
     return True
 
@@ -216,13 +233,27 @@ def _next_parent(x: Floats, cost: Floats, closed: Ints, done: int, v: int,
 
 
 @numba.njit(cache=True, nogil=True)
-def astar(o: Zones, active: Ints, count: int, x: Floats, n: int, floor: float, snug: bool,
-          path: Ints) -> int:
-    """Shortest way 0 -> 1 over corners x[:n] past the active zones; returns its corners, 0: none.
+def _nearest_open(cost: Floats, ahead: Floats, state: Any) -> int:
+    """The open corner with the least bound on the whole way; -1: none."""
+    v, best = -1, np.inf
+    for w in range(cost.size):
+        if state[w] == 0 and cost[w] + ahead[w] < best:
+            v, best = w, cost[w] + ahead[w]
+    return v
 
-    It is sought from 1, so that parents lead the right way. Edges are tested when they are about
-    to be used, not before: a failed one falls back on the next best closed corner. O(n) a step.
+
+@numba.njit(cache=True, nogil=True)
+def astar(o: Zones, active: Ints, x: Floats, floor: float, snug: bool, path: Ints,
+          work: Ints) -> int:
+    """Shortest way 0 -> 1 over corners x past the active zones; returns its corners, 0: none.
+
+    It is sought from 1, so that parents lead the right way. Among few corners an edge is tested
+    when it is about to be used, and a failed one falls back on the next best closed corner; among
+    many that would be sought too often, and all edges of a corner are tested when it is closed.
+    O(n) a step, or O(n zones).
     """
+    n, boxes = x.shape[0], _boxes(o, active)
+    lazy = n <= FEW_CORNERS
     cost, state = np.full(n, np.inf), np.zeros(n, np.int8)
     parent, closed, ahead = np.full(n, -1), np.empty(n, np.int64), np.empty(n)
     for v in range(n):
@@ -232,16 +263,15 @@ def astar(o: Zones, active: Ints, count: int, x: Floats, n: int, floor: float, s
         for v in range(n):
             if state[v] == 0:
                 c = cost[u] + _gap(x, u, v)
-                if c < cost[v]:
+                if c < cost[v] and (lazy or _sees(o, active, boxes, x, u, v, floor, snug)):
                     cost[v], parent[v] = c, u
-        while True:
-            v, best = -1, np.inf
-            for w in range(n):
-                if state[w] == 0 and cost[w] + ahead[w] < best:
-                    v, best = w, cost[w] + ahead[w]
-            if v < 0:
+            if v % 64 == 0 and spend(work, 64 if lazy else 64 * active.size):
                 return 0
-            if _sees(o, active, count, x, parent[v], v, floor, snug):
+        while True:
+            v = _nearest_open(cost, ahead, state)
+            if v < 0 or spend(work, n + active.size):
+                return 0
+            if not lazy or _sees(o, active, boxes, x, parent[v], v, floor, snug):
                 break
             cost[v], parent[v] = _next_parent(x, cost, closed, done, v, parent[v])
         state[v], closed[done], u = 1, v, v

@@ -14,7 +14,10 @@ STRAIGHT = 1.0 + 1e-12  # a way is straight when at most so much longer than the
 
 
 class Table:
-    """Lengths [m] by slot; a place keeps its slot for ever, so older users stay right."""
+    """Lengths [m] by slot; a place keeps its slot for ever, so older users stay right.
+
+    NaN: not asked for yet; -w - 1: not found with w units of work.
+    """
 
     def __init__(self, places: int) -> None:
         size = places + places // 4 + SPARE if places else 0
@@ -66,7 +69,7 @@ def _reach(zone: Zone, p: Floats) -> float:
 def _touches(zone: Zone, p: Floats, q: Floats, known: float, near_p: float,
              near_q: float, came: bool) -> bool:
     """Whether zone k, that came or went, may change the known length between p and q."""
-    if math.isinf(known):
+    if math.isinf(known) or known < 0.0:
         return not came
     if near_p + near_q > known:
         return False

@@ -11,11 +11,13 @@ import math
 import numba
 import numpy as np
 
+from uav_task_alloc.geometry.effort import spend
 from uav_task_alloc.geometry.obstacles import Floats, Ints, Zone, Zones, blocked
 
 MAX_CORNERS = 96  # of a way while it is worked on
 CUT_GAIN = 1e-3  # a further corner must shorten the way by this share
 PULL_GAIN = 5e-4  # as must a further round of pulling
+PULL_WORK = 30  # looks at each zone near a corner that is pulled, about
 
 
 @numba.njit(cache=True, nogil=True)
@@ -188,7 +190,7 @@ def pull(o: Zones, near: Ints, p: Floats, i: int, limits: Floats, floor: float, 
 
 @numba.njit(cache=True, nogil=True)
 def pull_all(o: Zones, near: Ints, p: Floats, n: int, limits: Floats, floor: float,
-             snug: bool, rounds: int) -> int:
+             snug: bool, rounds: int, work: Ints) -> int:
     """Drop and pull corners until a round gains next to nothing; returns the new n."""
     before = np.inf
     for _ in range(rounds):
@@ -198,6 +200,8 @@ def pull_all(o: Zones, near: Ints, p: Floats, n: int, limits: Floats, floor: flo
             break
         before = total
         for i in range(1, n - 1):
+            if spend(work, PULL_WORK * near.size):
+                return n
             pull(o, near, p, i, limits, floor, snug, 1 + rounds)
     return n
 
@@ -263,12 +267,14 @@ def cut_corners(o: Zones, near: Ints, p: Floats, n: int, limits: Floats, floor: 
 
 @numba.njit(cache=True, nogil=True)
 def tauten(o: Zones, near: Ints, p: Floats, n: int, limits: Floats, floor: float,
-           snug: bool) -> int:
+           snug: bool, work: Ints) -> int:
     """Shorten the clear way p[:n] in place, keeping it clear; returns the new n."""
-    n = pull_all(o, near, p, n, limits, floor, snug, 3)
+    n = pull_all(o, near, p, n, limits, floor, snug, 3, work)
     for _ in range(4):
+        if work[2]:
+            break
         more = cut_corners(o, near, p, n, limits, floor, snug)
         if more == n:
             break
-        n = pull_all(o, near, p, more, limits, floor, snug, 2)
+        n = pull_all(o, near, p, more, limits, floor, snug, 2, work)
     return n

@@ -8,20 +8,21 @@ from itertools import pairwise
 
 import numpy as np
 
-from uav_task_alloc.geometry.obstacles import blocked, contains, pack
+from uav_task_alloc.geometry.obstacles import all_around, blocked, contains, pack
 from uav_task_alloc.model import Point, Shape, ThreatZone, check_point
 
 
 def inside(point: Iterable[float], zone: ThreatZone, clearance: float = 0.0) -> bool:
     """Whether a point is inside the zone enlarged by its margin and `clearance` [m]."""
-    return bool(contains(pack((zone,), clearance).rows[0], *check_point('point', point), True))
+    packed = pack((zone,), clearance)  # held on to: its rows mean arrays of it
+    return bool(contains(packed.rows[0], *check_point('point', point), True))
 
 
 def zones_around(point: Iterable[float], zones: Sequence[ThreatZone],
                  clearance: float = 0.0) -> tuple[ThreatZone, ...]:
     """The enlarged zones a point is inside of."""
-    obstacles, place = pack(zones, clearance), check_point('point', point)
-    return tuple(zone for k, zone in enumerate(zones) if contains(obstacles.rows[k], *place, True))
+    packed, place = pack(zones, clearance), check_point('point', point)
+    return tuple(zones[k] for k in all_around(packed.rows, *place))
 
 
 def outline(zone: ThreatZone, clearance: float = 0.0) -> list[tuple[float, float]]:
@@ -74,8 +75,8 @@ def _to_dome(x: float, y: float, z: float, zone: ThreatZone) -> float:
 
 
 def _to_polygon(x: float, y: float, zone: ThreatZone) -> float:
-    flat = ThreatZone.polygon(zone.id, zone.vertices)
-    if contains(pack((flat,)).rows[0], x, y, 0.0, True):
+    flat = pack((ThreatZone.polygon(zone.id, zone.vertices),))
+    if contains(flat.rows[0], x, y, 0.0, True):
         return 0.0
     corners = np.array(zone.vertices)
     edges = np.roll(corners, -1, axis=0) - corners

@@ -8,6 +8,7 @@ from itertools import chain, pairwise
 
 import numpy as np
 
+from uav_task_alloc.geometry.distances import Distances
 from uav_task_alloc.model import Leg, Plan
 from uav_task_alloc.objective import excess, fit
 from uav_task_alloc.solver.problem import Problem
@@ -22,6 +23,7 @@ STRAIGHT = 1.0 + 1e-12  # a way at most so much longer than the distance has no 
 def to_plan(problem: Problem, recorder: Recorder, solver: str, warm: bool) -> Plan:
     """What `plan` answers, but for its state."""
     order = nodes_of(recorder.best, len(problem.uavs))
+    lost = _drop_lost(problem, order) if problem.distances.zones else []
     ids, routes = [task.id for task in problem.tasks], {}
     for uav, nodes in zip(problem.uavs, order, strict=True):
         held = problem.locked.get(uav.id, ())
@@ -34,7 +36,9 @@ def to_plan(problem: Problem, recorder: Recorder, solver: str, warm: bool) -> Pl
     value = math.fsum(values[task_id] for row in routes.values() for task_id in row)
     distance, penalty = math.fsum(lengths), excess(problem.uavs, lengths)
     penalty = penalty if penalty > ROUNDING else 0.0
-    left = np.flatnonzero(recorder.best.on[len(problem.uavs):problem.arrays.ends] < 0)
+    on = recorder.best.on[len(problem.uavs):problem.arrays.ends].copy()
+    on[lost] = -1
+    left = np.flatnonzero(on < 0)
     return Plan(
         routes, reasons(problem, left), distance, value,
         penalty, fit(distance, value, penalty, problem.rules.weights),
@@ -53,6 +57,23 @@ def nodes_of(routes: Routes, uavs: int) -> list[list[int]]:
             node = following[node]
         found.append(row)
     return found
+
+
+def _drop_lost(problem: Problem, order: list[list[int]]) -> list[int]:
+    """Take tasks out of the order that no way is known to after all; returns those, from 0.
+
+    A safety net: where time was over a length may have been believed, or forgotten again.
+    """
+    ways, lost = problem.distances, []
+    for u, nodes in enumerate(order):
+        place = problem.locked_places(u)[-1]
+        for node in tuple(nodes):
+            if _leg(ways, place, node).length < math.inf:
+                place = node
+            else:
+                nodes.remove(node)
+                lost.append(node - len(problem.uavs))
+    return lost
 
 
 def _all_legs(problem: Problem, order: list[list[int]]) -> Iterator[tuple[Leg, ...]]:
@@ -75,9 +96,12 @@ def _places(problem: Problem, u: int, nodes: list[int]) -> list[int]:
 
 
 def _legs(problem: Problem, places: list[int], steps: list[float]) -> tuple[Leg, ...]:
-    distances = problem.distances
-    if not distances.zones:
+    if not problem.distances.zones:
         return tuple([Leg((), metres) for metres in steps])
-    return tuple(Leg((), metres) if distances.length(i, j) <= metres * STRAIGHT
-                 else distances.leg(i, j)
-                 for metres, (i, j) in zip(steps, pairwise(places), strict=True))
+    return tuple(_leg(problem.distances, i, j) for i, j in pairwise(places))
+
+
+def _leg(ways: Distances, i: int, j: int) -> Leg:
+    """The leg from i to j; without detour points where it is straight."""
+    metres = math.dist(ways.points[i], ways.points[j])
+    return Leg((), metres) if ways.length(i, j) <= metres * STRAIGHT else ways.leg(i, j)

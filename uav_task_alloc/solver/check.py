@@ -7,9 +7,7 @@ from numbers import Integral
 from typing import TypeVar
 
 from uav_task_alloc.errors import InvalidValue
-from uav_task_alloc.geometry.detour import detour
 from uav_task_alloc.model import Task, ThreatZone, Uav, check_number
-from uav_task_alloc.solver.problem import Limits
 
 Named = TypeVar('Named', Task, Uav, ThreatZone)
 ROUTE_ENDS = ('hold', 'home')
@@ -47,9 +45,10 @@ def check_options(budget: float, seed: int, route_end: str, threads: int,
 
 
 def check_locked(locked: Mapping[str, Sequence[str]] | None, uavs: Sequence[Uav],
-                 tasks: Sequence[Task], limits: Limits) -> dict[str, tuple[Task, ...]]:
-    """Locked tasks by UAV; UAVs and tasks that are gone are passed over, as are tasks that no
-    safe way leads to any more. Raises InvalidValue where two UAVs hold one task.
+                 tasks: Sequence[Task]) -> dict[str, tuple[Task, ...]]:
+    """Locked tasks by UAV; UAVs and tasks that are gone are passed over.
+
+    Raises InvalidValue where two UAVs hold one task.
     """
     if not locked:
         return {}
@@ -65,17 +64,5 @@ def check_locked(locked: Mapping[str, Sequence[str]] | None, uavs: Sequence[Uav]
                 raise InvalidValue(f'locked[{uav.id}]', task.id,
                                    f'a task that is not locked to {holder[task.id]}, too')
             holder[task.id] = uav.id
-        held[uav.id] = _reachable(uav, row, limits) if limits.zones else tuple(row)
+        held[uav.id] = tuple(row)
     return {uav_id: row for uav_id, row in held.items() if row}
-
-
-def _reachable(uav: Uav, row: Sequence[Task], limits: Limits) -> tuple[Task, ...]:
-    place, found = uav.position, []
-    for task in row:
-        length, _ = detour(
-            place, task.position, limits.zones, clearance=limits.clearance,
-            altitude_min=limits.altitude_min, altitude_max=limits.altitude_max)
-        if length < float('inf'):
-            found.append(task)
-            place = task.position
-    return tuple(found)

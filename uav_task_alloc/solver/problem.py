@@ -16,6 +16,7 @@ from uav_task_alloc.objective import Weights
 from uav_task_alloc.solver.chance import chance
 from uav_task_alloc.solver.near import near_starts, near_tasks, nearest
 from uav_task_alloc.solver.routes import NODE, Arrays, Floats, Ints
+from uav_task_alloc.solver.way_search import SOUGHT, WaySearch
 
 NEIGHBOURS = 24  # tasks a bee looks at around a task
 STARTS = 8  # UAVs it looks at
@@ -79,32 +80,76 @@ class Problem:
 
 def make_problem(uavs: Sequence[Uav], tasks: Sequence[Task],
                  locked: Mapping[str, tuple[Task, ...]], limits: Limits, rules: Rules,
-                 known: Problem | None = None) -> Problem:
-    """The arrays of a problem; lengths that an earlier one knows are taken over."""
-    held = {t.id for each in locked.values() for t in each}
-    free = tuple(task for task in tasks if task.id not in held) if held else tuple(tasks)
-    distances = _distances(uavs, free, locked, limits, known)
-    arrays = _blank(uavs, free, rules, distances)
-    problem = Problem(tuple(uavs), free, locked, limits, rules, distances, arrays,
-                      1.0, {task.id: i for i, task in enumerate(free)})
+                 known: Problem | None = None, search: WaySearch | None = None) -> Problem:
+    """The arrays of a problem; lengths that an earlier one knows are taken over.
+
+    Locked tasks that no safe way leads to are shared out as the others are.
+    """
+    free = _not_locked(tasks, locked) if locked else tuple(tasks)
+    before = known.distances if known and limits.same_but_zones(known.limits) else None
+    distances = _distances(uavs, free, locked, limits, before, search)
+    problem = Problem(tuple(uavs), free, locked, limits, rules, distances,
+                      _blank(uavs, free, rules, distances), 1.0,
+                      {task.id: i for i, task in enumerate(free)})
+    if search is not None and limits.zones:
+        search.find_flown(distances, _places(problem))
+    reached = _reachable(problem) if limits.zones else locked
+    if reached != locked:
+        free = _not_locked(tasks, reached)
+        distances = _distances(uavs, free, reached, limits, distances, search)
+        problem = replace(problem, tasks=free, locked=reached, distances=distances,
+                          arrays=_blank(uavs, free, rules, distances),
+                          index={task.id: i for i, task in enumerate(free)})
     _apply_locks(problem)
+    arrays = problem.arrays
     floor = float(np.maximum(0.0, arrays.idle - arrays.reach).sum())
     return replace(problem, arrays=arrays._replace(excess_floor=floor),
-                   scale=_fill(problem, known))
+                   scale=_fill(problem, known, search))
+
+
+def _not_locked(tasks: Sequence[Task], locked: Mapping[str, tuple[Task, ...]]) -> tuple[Task, ...]:
+    held = {task.id for each in locked.values() for task in each}
+    return tuple(task for task in tasks if task.id not in held)
+
+
+def _places(problem: Problem) -> dict[str, int]:
+    """Where in `distances` each UAV is, and each task, by id."""
+    places = {task_id: len(problem.uavs) + i for task_id, i in problem.index.items()}
+    for u, uav in enumerate(problem.uavs):
+        start, *held = problem.locked_places(u)
+        places[uav.id] = start
+        places.update(zip((task.id for task in problem.locked.get(uav.id, ())), held,
+                          strict=True))
+    return places
+
+
+def _reachable(problem: Problem) -> Mapping[str, tuple[Task, ...]]:
+    """Locked tasks without those that no safe way leads to, from the one before."""
+    found = {}
+    for u, uav in enumerate(problem.uavs):
+        place, *places = problem.locked_places(u)
+        row = []
+        for task, there in zip(problem.locked.get(uav.id, ()), places, strict=True):
+            if problem.distances.length(place, there) < math.inf:
+                row.append(task)
+                place = there
+        if row:
+            found[uav.id] = tuple(row)
+    return found
 
 
 def _distances(uavs: Sequence[Uav], tasks: Sequence[Task],
                locked: Mapping[str, tuple[Task, ...]], limits: Limits,
-               known: Problem | None) -> Distances:
+               known: Distances | None, search: WaySearch | None) -> Distances:
     starts = [locked[u.id][-1].position if locked.get(u.id) else u.position for u in uavs]
     homes = [u.home or u.position for u in uavs]
     extra = [point for u in uavs if locked.get(u.id)
              for point in (u.position, *(t.position for t in locked[u.id]))]
     points = np.array([*starts, *(t.position for t in tasks), *homes, *extra], dtype=np.float64)
-    points = points.reshape(-1, 3)
-    if known is not None and limits.same_but_zones(known.limits):
-        return known.distances.updated(points, limits.zones)
-    return Distances(points, limits.zones, clearance=limits.clearance,
+    points, effort = points.reshape(-1, 3), search.effort if search else None
+    if known is not None:
+        return known.updated(points, limits.zones, effort)
+    return Distances(points, limits.zones, clearance=limits.clearance, effort=effort,
                      altitude_min=limits.altitude_min, altitude_max=limits.altitude_max)
 
 
@@ -172,19 +217,25 @@ def _neighbours(problem: Problem, known: Problem | None) -> tuple[Ints, Ints]:
     return near, np.setdiff1d(np.arange(n), stay, assume_unique=True)
 
 
-def _fill(problem: Problem, known: Problem | None) -> float:
+def _fill(problem: Problem, known: Problem | None, search: WaySearch | None) -> float:
     """Neighbours and prices; returns the mean way [m] to the nearest neighbour."""
     a, n = problem.arrays, len(problem.tasks)
     xyz: Floats = problem.distances.points
     if n == 0:
         return 1.0
     found, fresh = _neighbours(problem, known)
-    near_tasks(a, found, nearest(xyz[a.uavs:a.ends], found, fresh))
+    squares = nearest(xyz[a.uavs:a.ends], found, fresh)
+    if search is not None and not a.straight:
+        search.begin(SOUGHT, 0, heeds_stop=False)
+        near_starts(a, xyz, chance(0))
+        search.find_near(problem.distances, a, found)
+        search.begin(1.0, 0)  # what is not known now is asked for when it is needed
+    near_tasks(a, found, squares)
     if a.uavs == 0:
         return 1.0
     near_starts(a, xyz, chance(0))
     lost = np.flatnonzero(a.start_length[:, 0] == math.inf)  # all tasks that zones swallowed
-    a.price[[i for i in lost if problem.distances.zones_around(a.uavs + int(i))]] = 0.0
+    a.price[[i for i in lost if problem.distances.is_inside(a.uavs + int(i))]] = 0.0
     first = a.near_length[:, 0] if a.near.shape[1] else a.start_length[:, 0]
     finite = first[np.isfinite(first)]
     scale = max(float(finite.mean()) if finite.size else 1.0, 1e-6)

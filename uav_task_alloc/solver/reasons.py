@@ -44,6 +44,8 @@ def _reason(problem: Problem, i: int, short: Floats) -> str:
     if not a.may[:, i].any():
         return _unable(problem, task)
     need, nearest = _nearest(problem, i, short, np.argsort(short, kind='stable').tolist())
+    if need == math.inf and _given_up(problem, i):
+        return 'no safe way past the zones found in the time; sought again with the next plan'
     if need == math.inf:
         return _no_way_home(problem, i) or 'unreachable: no safe way past the zones' + (
             '' if a.may[:, i].all() else ' for the UAVs that may serve it')
@@ -63,6 +65,14 @@ def _nearest(problem: Problem, i: int, short: Floats, order: Iterable[int]) -> t
         if need < math.inf and (found[1] < 0 or need - a.reach[u] < least):
             least, found = need - a.reach[u], (need, u)
     return found
+
+
+def _given_up(problem: Problem, i: int) -> bool:
+    """Whether a way to the i-th task, or home from it, was not found in the time."""
+    a, ways = problem.arrays, problem.distances
+    return any(ways.given_up(int(u), a.uavs + i) or (
+        problem.rules.returns and ways.given_up(a.uavs + i, a.ends + int(u)))
+        for u in np.flatnonzero(a.may[:, i]))
 
 
 def _no_way_home(problem: Problem, i: int) -> str:

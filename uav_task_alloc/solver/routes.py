@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from uav_task_alloc.geometry.distances import Pairs, length
+from uav_task_alloc.geometry.distances import Pairs, length, length_over
 from uav_task_alloc.solver.kernel import kernel, part
 
 Floats = NDArray[np.float64]
@@ -191,10 +191,19 @@ def insert(a: Arrays, r: Routes, t: int, after: int) -> None:
 
 
 @part
+def _over(a: Arrays, r: Routes, before: int, t: int, then: int) -> float:
+    """Length [m] of the way over t, which is kept where its points are."""
+    found = float(length_over(a.pairs, WHOLE(before), WHOLE(t), WHOLE(then)))
+    return found if found < math.inf else float(r.leg[before] + r.leg[t])
+
+
+@part
 def remove(a: Arrays, r: Routes, t: int) -> None:
     """Take the task node t out of its route."""
     u, before, then = r.on[t], r.prev[t], r.next[t]
     direct = step(a, before, then)
+    if direct == math.inf:  # a way that is not known leads over t
+        direct = _over(a, r, before, t, then)
     delta = direct - r.leg[before] - r.leg[t]
     r.next[before], r.prev[then] = then, before
     r.leg[before] = direct

@@ -12,7 +12,8 @@ from itertools import pairwise
 import numpy as np
 
 from uav_task_alloc.errors import InvalidValue, UnknownName
-from uav_task_alloc.model import Plan, Task, ThreatZone, Uav
+from uav_task_alloc.geometry.detour import find_detour
+from uav_task_alloc.model import Leg, Plan, Task, ThreatZone, Uav
 from uav_task_alloc.objective import Weights
 from uav_task_alloc.solver.answer import to_plan
 from uav_task_alloc.solver.check import check_locked, check_options, check_unique
@@ -22,6 +23,7 @@ from uav_task_alloc.solver.recorder import Recorder
 from uav_task_alloc.solver.registry import SOLVERS
 from uav_task_alloc.solver.search import relieve
 from uav_task_alloc.solver.warm import State, repaired
+from uav_task_alloc.solver.way_search import IN_SEARCH, WaySearch
 
 
 def plan(uavs: Iterable[Uav], tasks: Iterable[Task], zones: Iterable[ThreatZone] = (), *,
@@ -55,14 +57,19 @@ def plan(uavs: Iterable[Uav], tasks: Iterable[Task], zones: Iterable[ThreatZone]
     rules = Rules(route_end == 'home', hard_range, weights or Weights())
     warm_up(solver, bool(limits.zones))
     began, before = clock(), State.of(warm)
-    problem = make_problem(fleet, work, check_locked(locked, fleet, work, limits), limits, rules,
-                           before.problem)
+    search = WaySearch(clock, began, budget, stop, before.flown())
+    problem = make_problem(fleet, work, check_locked(locked, fleet, work), limits, rules,
+                           before.problem, search)
     recorder = Recorder(problem, clock, began, budget, max_iterations, stop, threads,
                         warm is not None, _held(problem), on_iteration)
     if warm is not None:
         recorder.offer(repaired(problem, before.routes))
+    elif limits.zones:
+        recorder.offer(repaired(problem, {}))
+    search.begin(1.0, IN_SEARCH)
     learnt = SOLVERS[solver](recorder, seed, before.learnt)
     made = to_plan(problem, recorder, solver, warm is not None)
+    search.effort.look()  # raises what a question raised in a kernel
     return replace(made, state=State(problem, learnt, made.routes))
 
 
@@ -84,11 +91,16 @@ def warm_up(solver: str = 'chain_q', zones: bool = False) -> None:
     """
     uavs = (Uav('u', (0.0, 0.0, 0.0)), Uav('v', (9.0, 0.0, 0.0), 30.0))
     tasks = tuple(Task(f't{i}', (float(i), 1.0, 0.0)) for i in range(5))
-    between = tuple(ThreatZone.cylinder(f'z{x}', (x, 1.0), 0.3) for x in (1.5, 2.5, 4.0) if zones)
-    problem = make_problem(uavs, tasks, {}, Limits(between), Rules(returns=True))
+    between = (*(ThreatZone.cylinder(f'z{x}', (x, 1.0), 0.3) for x in (1.5, 2.5, 4.0)),
+               ThreatZone.hemisphere('dome', (3.5, 1.5, 0.0), 0.3),
+               ThreatZone.polygon('prism', ((0.4, 0.9), (0.6, 0.9), (0.5, 1.1)))) if zones else ()
+    search = WaySearch(lambda: 0.0, 0.0, 1.0, flown={'u': (('t0',), (Leg((), 0.0),))})
+    problem = make_problem(uavs, tasks, {}, Limits(between), Rules(returns=True), None, search)
     rounds = 500 if solver == 'chain_q' else 64  # until each kind of bee has flown
     recorder = Recorder(problem, lambda: 0.0, 0.0, 1.0, max_iterations=rounds)
     SOLVERS[solver](recorder, 0, None)
     to_plan(problem, recorder, '', False)
     place_all(problem.arrays, recorder.best, np.empty(0, np.int64))  # these two only have work
     relieve(problem.arrays, recorder.best)  # where ranges do not suffice
+    problem.distances.suggest(0, len(uavs), ())
+    find_detour(tasks[1].position, uavs[1].position, between, effort=search.effort)

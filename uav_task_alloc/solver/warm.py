@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from uav_task_alloc.model import Plan
+from uav_task_alloc.model import Leg, Plan
 from uav_task_alloc.solver import routes as of
 from uav_task_alloc.solver.chance import chance
 from uav_task_alloc.solver.insertion import cheapest_first
@@ -24,6 +24,7 @@ class State:
     problem: Problem | None = None  # lengths that are known
     learnt: Any = None  # what the solver wants back
     routes: Mapping[str, tuple[str, ...]] = field(default_factory=dict)  # by UAV
+    legs: Mapping[str, tuple[Leg, ...]] = field(default_factory=dict)  # of them
 
     @classmethod
     def of(cls, warm: Plan | State | None) -> State:
@@ -31,7 +32,12 @@ class State:
         if not isinstance(warm, Plan):
             return warm or cls()
         found = warm.state if isinstance(warm.state, State) else cls()
-        return replace(found, routes=warm.routes)
+        return replace(found, routes=warm.routes, legs=warm.legs)
+
+    def flown(self) -> dict[str, tuple[tuple[str, ...], tuple[Leg, ...]]]:
+        """Tasks and legs by UAV."""
+        return {uav_id: (tasks, tuple(self.legs.get(uav_id, ())))
+                for uav_id, tasks in self.routes.items()}
 
 
 def repaired(problem: Problem, before: Mapping[str, tuple[str, ...]]) -> Routes:

@@ -1,0 +1,147 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The search for ways around many zones keeps the budget, and what it leaves out is not flown."""
+import itertools
+import math
+
+import numpy as np
+import pytest
+
+from uav_task_alloc import Task, ThreatZone, Uav, plan
+from uav_task_alloc.geometry.distances import Distances
+from uav_task_alloc.geometry.effort import Effort
+from uav_task_alloc.geometry.zones import inside, way_is_clear
+from uav_task_alloc.solver.problem import Limits, Rules, make_problem
+from uav_task_alloc.solver.routes import empty_routes, insert, remove
+
+IN_TIME = 'found in the time'
+WALL = ThreatZone.cylinder('wall', (500.0, 0.0), 200.0)
+PLUG = ThreatZone.cylinder('plug', (500.0, 300.0), 200.0)
+
+
+def overlapping(count, seed, side=1500.0, tasks=12):
+    """UAVs, tasks and cylinders that lie over each other, of many heights."""
+    rng = np.random.default_rng(seed)
+    zones = [ThreatZone.cylinder(f'z{k}', rng.uniform(0.0, side, 2), rng.uniform(80.0, 220.0),
+                                 z_max=rng.uniform(60.0, 300.0)) for k in range(count)]
+    places = (tuple(rng.uniform((0.0, 0.0, 20.0), (side, side, 60.0)))
+              for _ in itertools.count())
+    free = (place for place in places if not any(inside(place, zone) for zone in zones))
+    uavs = [Uav(f'u{k}', next(free)) for k in range(2)]
+    return uavs, [Task(f't{k}', next(free)) for k in range(tasks)], zones
+
+
+class Ticking:
+    """A clock that advances by a millisecond each time it is asked."""
+
+    def __init__(self):
+        self.asked = 0
+
+    def __call__(self):
+        self.asked += 1
+        return 0.001 * self.asked
+
+
+def check(made, uavs, tasks, zones):
+    """Every task is served on clear legs or left out with a reason."""
+    place = {task.id: task.position for task in tasks}
+    served = [name for row in made.routes.values() for name in row]
+    assert sorted([*served, *made.unassigned]) == sorted(place)
+    assert all(made.unassigned.values())
+    for uav in uavs:
+        here = uav.position
+        for name, leg in zip(made.routes[uav.id], made.legs[uav.id], strict=True):
+            assert math.isfinite(leg.length)
+            assert way_is_clear([here, *leg.via, place[name]], zones)
+            here = place[name]
+
+
+def test_finding_20_the_clock_is_asked_while_ways_are_sought():
+    uavs, tasks, zones = overlapping(40, 1)
+    clock = Ticking()
+    made = plan(uavs, tasks, zones, budget=0.05, max_iterations=0, clock=clock)
+    assert 20 <= clock.asked <= 100  # half the budget is for ways; twice the budget at most
+    check(made, uavs, tasks, zones)
+
+
+def test_finding_20_a_stop_from_the_start_is_answered_with_what_is_known():
+    uavs, tasks, zones = overlapping(40, 1)
+    asked = itertools.count()
+    made = plan(uavs, tasks, zones, budget=1000.0, stop=lambda: next(asked) >= 0)
+    assert next(asked) < 100
+    check(made, uavs, tasks, zones)
+    assert any(IN_TIME in why for why in made.unassigned.values())
+    assert any(made.routes.values())
+
+
+@pytest.mark.parametrize('seed', range(8))
+def test_finding_20_what_was_not_found_in_the_time_is_not_flown(seed):
+    uavs, tasks, zones = overlapping(60, seed, tasks=20)
+    made = plan(uavs, tasks, zones, budget=0.02, clock=Ticking(), seed=seed)
+    check(made, uavs, tasks, zones)
+    again = plan(uavs, tasks, zones, budget=0.02, clock=Ticking(), seed=seed, warm=made)
+    check(again, uavs, tasks, zones)
+    assert len(again.unassigned) <= len(made.unassigned)
+
+
+def test_finding_20_what_was_not_found_in_the_time_is_found_later():
+    uavs, tasks, zones = overlapping(40, 1)
+    whole = plan(uavs, tasks, zones, budget=1000.0, max_iterations=0)
+    made = plan(uavs, tasks, zones, budget=0.02, max_iterations=0, clock=Ticking())
+    assert len(made.unassigned) > len(whole.unassigned)
+    for _ in range(1000):
+        if len(made.unassigned) == len(whole.unassigned):
+            break
+        made = plan(uavs, tasks, zones, budget=0.05, max_iterations=0, clock=Ticking(), warm=made)
+    assert made.unassigned.keys() == whole.unassigned.keys()
+
+
+def test_finding_20_a_stop_takes_no_task_from_a_plan_that_is_flown():
+    uavs, tasks, zones = overlapping(40, 1)
+    made = plan(uavs, tasks, zones, budget=1000.0, max_iterations=0)
+    moved = [Uav(uav.id, tuple(np.add(uav.position, (0.0, 0.0, 0.5)))) for uav in uavs]
+    after = plan(moved, tasks, zones, budget=1000.0, stop=lambda: True, warm=made)
+    assert after.unassigned.keys() == made.unassigned.keys()
+
+
+def test_finding_20_what_stop_raises_comes_out_of_plan():
+    def stop():
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        plan(*overlapping(40, 1), budget=1000.0, stop=stop)
+
+
+def test_finding_20_a_way_that_is_flown_is_taken_where_none_is_found_in_the_time():
+    ends = [(0.0, 0.0, 50.0), (1000.0, 100.0, 50.0)]
+    via = Distances(ends, [WALL, PLUG]).leg(0, 1).via
+    effort = Effort()
+    ways = Distances(ends, [WALL, PLUG], effort=effort)
+    effort.begin(0)
+    assert ways.length(0, 1) == math.inf
+    assert ways.given_up(0, 1)
+    assert not ways.suggest(0, 1, [(500.0, 0.0, 50.0)])  # inside
+    assert ways.suggest(0, 1, [(-50.0, 0.0, 50.0), *via])
+    assert math.isfinite(ways.length(0, 1))
+    assert ways.leg(0, 1).length == ways.length(0, 1)
+    assert way_is_clear([ends[0], *ways.leg(0, 1).via, ends[1]], [WALL, PLUG])
+
+
+@pytest.mark.parametrize('start', [(0.0, 0.0, 50.0), (310.0, 0.0, 50.0)])
+def test_finding_20_where_a_task_goes_the_way_over_it_stays(start):
+    tasks = [Task('between', (500.0, 520.0, 50.0)), Task('last', (1000.0, 20.0, 50.0))]
+    problem = make_problem([Uav('u', start)], tasks, {}, Limits((WALL, PLUG)), Rules())
+    a, routes = problem.arrays, empty_routes(problem.arrays)
+    insert(a, routes, 1, 0)
+    insert(a, routes, 2, 1)
+    whole = routes.length[0]
+    ways = Distances(problem.distances.points, (WALL, PLUG))  # knows but these two
+    over = ways.length(0, 1) + ways.length(1, 2)
+    ways.effort.begin(0)
+    arrays = a._replace(pairs=ways.pairs)
+    remove(arrays, routes, 1)
+    assert routes.length[0] == pytest.approx(whole) == pytest.approx(over)
+    assert ways.length(0, 2) == pytest.approx(over)
+    leg = ways.leg(0, 2)
+    assert tasks[0].position in leg.via
+    first = leg.via[0] if inside(start, WALL) else start
+    assert way_is_clear([first, *leg.via, tasks[1].position], [WALL, PLUG])

@@ -1,0 +1,82 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Outlines of zones in plan: the rim that lies some way off them, and convex hulls."""
+from __future__ import annotations
+
+import math
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+@numba.njit(cache=True, nogil=True)
+def _fan(x: float, y: float, radius: float, start: float, turn: float, parts: int, rim: Floats,
+         n: int) -> int:
+    """Corners of the polyline that circumscribes an arc into rim[n:]; returns the new n."""
+    step = turn / parts
+    far = radius / math.cos(step / 2)
+    for i in range(parts):
+        angle = start + (i + 0.5) * step
+        rim[n, 0], rim[n, 1] = x + far * math.cos(angle), y + far * math.sin(angle)
+        n += 1
+    return n
+
+
+@numba.njit(cache=True, nogil=True)
+def circle(x: float, y: float, radius: float, parts: int) -> Floats:
+    """Corners (parts, 2) [m] of the polygon that circumscribes a circle, counter-clockwise."""
+    rim = np.empty((parts, 2))
+    _fan(x, y, radius, 0.0, 2 * math.pi, parts, rim, 0)
+    return rim
+
+
+@numba.njit(cache=True, nogil=True)
+def rim_of(corners: Floats, grow: float) -> Floats:
+    """The outline `grow` [m] off a counter-clockwise polygon, circumscribing its round corners."""
+    count = corners.shape[0]
+    rim, n = np.empty((5 * count, 2)), 0
+    for i in range(count):
+        x, y = corners[i, 0], corners[i, 1]
+        h, j = i - 1 if i > 0 else count - 1, i + 1 if i + 1 < count else 0
+        start = math.atan2(y - corners[h, 1], x - corners[h, 0])
+        turn = math.atan2(corners[j, 1] - y, corners[j, 0] - x) - start
+        turn -= 2 * math.pi * math.floor((turn + math.pi) / (2 * math.pi))
+        parts = max(1, math.ceil(4 * turn / math.pi - 1e-9))
+        n = _fan(x, y, grow, start - math.pi / 2, turn, parts, rim, n)
+    return rim[:n].copy()
+
+
+@numba.njit(cache=True, nogil=True)
+def _chain(corners: Floats, order: Ints) -> Floats:
+    """The convex hull of corners in lexical order, by monotone chains. O(n)"""
+    size = order.size
+    hull, n, first = np.empty((2 * size + 1, 2)), 0, 0
+    for m in range(2 * size - 1):
+        i = order[m] if m < size else order[2 * size - 2 - m]
+        if m == size:
+            first = n - 1
+        while n - first > 1 and (
+                (hull[n - 1, 0] - hull[n - 2, 0]) * (corners[i, 1] - hull[n - 2, 1])
+                <= (hull[n - 1, 1] - hull[n - 2, 1]) * (corners[i, 0] - hull[n - 2, 0])):
+            n -= 1
+        hull[n, 0], hull[n, 1] = corners[i, 0], corners[i, 1]
+        n += 1
+    return hull[:n - 1].copy()
+
+
+def hull_of(corners: Floats) -> Floats:
+    """The convex hull, counter-clockwise, without corners on its edges."""
+    return _chain(corners, np.lexsort((corners[:, 1], corners[:, 0])))
+
+
+@numba.njit(cache=True, nogil=True)
+def counter_clockwise(corners: Floats) -> Floats:
+    """The polygon turned left about."""
+    area, j = 0.0, corners.shape[0] - 1
+    for i in range(corners.shape[0]):
+        area += corners[j, 0] * corners[i, 1] - corners[i, 0] * corners[j, 1]
+        j = i
+    return corners.copy() if area > 0.0 else corners[::-1].copy()
