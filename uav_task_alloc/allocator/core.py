@@ -127,7 +127,7 @@ class Allocator:
 
     def adopt(self, answer: Answer | None, now: float, stamp: float) -> None:
         """Take over what is better by the margin and still true; None: the solve failed."""
-        self.world.schedule.end(now)
+        self.world.schedule.end(now, failed=answer is None)
         if answer is None:
             return
         self._best = answer.fresh
