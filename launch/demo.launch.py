@@ -5,7 +5,17 @@ from launch.substitutions import PathJoinSubstitution
 from launch_ros.substitutions import FindPackageShare
 
 from launch import LaunchDescription
-from uav_task_alloc.nodes.launching import argument, flag, node, number, on_this_machine, rviz
+from uav_task_alloc.nodes.launching import (
+    BRIDGE_END,
+    Lasting,
+    argument,
+    flag,
+    node,
+    number,
+    on_this_machine,
+    record_file,
+    rviz,
+)
 from uav_task_alloc.nodes.ports import free_port
 from uav_task_alloc.scenario import load, simulation_parameters
 
@@ -27,18 +37,22 @@ def generate_launch_description() -> LaunchDescription:
 
 
 def start(context: object) -> list:
-    """All nodes, with the scenario's values, on loopback and for its vehicles alone."""
-    path = argument(context, 'scenario')
-    shown = [rviz()] if flag(context, 'rviz') else []
+    """All nodes, with the scenario's values, on loopback and for its vehicles alone.
+
+    Whatever is wrong with an argument is raised before anything is started.
+    """
+    path, record = argument(context, 'scenario'), record_file(context)
+    shown = [rviz(context)] if flag(context, 'rviz') else []
     given = simulation_parameters(load(path), path, free_port(), number(context, 'speedup'))
     return [
         *on_this_machine(),
-        node('allocator', given['allocator']),
-        node('mavlink_bridge', given['mavlink_bridge'],
-             {'state_dir': argument(context, 'bridge_state_dir')}, respawn=True),
+        *Lasting('allocator', given['allocator']).start(),
+        *Lasting('mavlink_bridge', given['mavlink_bridge'],
+                 {'state_dir': argument(context, 'bridge_state_dir')},
+                 sigterm_timeout=BRIDGE_END).start(),
         node('fleet_sim', given['fleet_sim']),
         node('scenario_player', given['scenario_player']),
         node('live_view', given['live_view'],
-             {'record': argument(context, 'record'), 'stay': True}),
+             {'record': record, 'stay': True}),
         *shown,
     ]

@@ -5,7 +5,16 @@ from launch.substitutions import PathJoinSubstitution
 from launch_ros.substitutions import FindPackageShare
 
 from launch import LaunchDescription
-from uav_task_alloc.nodes.launching import argument, flag, node, rviz
+from uav_task_alloc.nodes.launching import (
+    BRIDGE_END,
+    Lasting,
+    argument,
+    flag,
+    node,
+    parameter_file,
+    record_file,
+    rviz,
+)
 from uav_task_alloc.scenario import fleet_parameters, load
 
 
@@ -31,20 +40,23 @@ def generate_launch_description() -> LaunchDescription:
 
 
 def start(context: object) -> list:
-    """Both nodes, and what was asked for to look at them."""
-    namespace, record, state_dir = (
-        argument(context, name) for name in ('namespace', 'record', 'bridge_state_dir'))
-    path = argument(context, 'scenario')
+    """Both nodes, and what was asked for to look at them.
+
+    Whatever is wrong with an argument is raised before anything is started.
+    """
+    namespace, state_dir, path = (
+        argument(context, name) for name in ('namespace', 'bridge_state_dir', 'scenario'))
+    files = [parameter_file(context, name) for name in ('allocator_params', 'bridge_params')]
     given = fleet_parameters(load(path)) if path else {'allocator': {}, 'mavlink_bridge': {}}
-    shown = [rviz(namespace)] if flag(context, 'rviz') else []
+    shown = [rviz(context, namespace)] if flag(context, 'rviz') else []
+    record = record_file(context)
     if record:
         shown.insert(0, node('live_view', {'record': record, **(
             {'scenario': path, 'stay': True} if path else {})}, namespace=namespace))
     return [
-        node('allocator', argument(context, 'allocator_params'), given['allocator'],
-             namespace=namespace),
-        # started again at once: the vehicles fly on meanwhile
-        node('mavlink_bridge', argument(context, 'bridge_params'), given['mavlink_bridge'],
-             {'state_dir': state_dir} if state_dir else {}, namespace=namespace, respawn=True),
+        *Lasting('allocator', files[0], given['allocator'], namespace=namespace).start(),
+        *Lasting('mavlink_bridge', files[1], given['mavlink_bridge'],
+                 {'state_dir': state_dir} if state_dir else {}, namespace=namespace,
+                 sigterm_timeout=BRIDGE_END).start(),
         *shown,
     ]

@@ -11,6 +11,7 @@ from pathlib import Path
 import yaml
 
 SHARE = {'uav_task_alloc': str(Path(__file__).resolve().parent.parent)}
+INSTALLED = set()  # packages of others
 ENVIRONMENT = 'the environment'  # no argument has this name
 
 
@@ -41,6 +42,19 @@ class Configuration(Value):
 class Share(Value):
     def text(self, given):
         return SHARE[self.what]
+
+
+class Executable(Value):
+    """A program of a package; those of other packages are where INSTALLED says so."""
+
+    def __init__(self, *, executable, package):
+        super().__init__(executable)
+        self.package = package
+
+    def perform(self, context):
+        if self.package not in {*SHARE, *INSTALLED}:
+            raise LookupError(f"package '{self.package}' not found")
+        return self.what
 
 
 class Joined(Value):
@@ -119,8 +133,31 @@ class Include:
 class Context:
     """What a function of a launch file is given."""
 
+    is_shutdown = False
+
     def __init__(self, given):
         self.launch_configurations = given
+
+
+class Said:
+    """Something for the log."""
+
+    def __init__(self, *, msg):
+        self.msg = msg
+
+
+class End:
+    """All is to end."""
+
+    def __init__(self, *, reason):
+        self.reason = reason
+
+
+class Later:
+    """Actions that follow after some time [s]."""
+
+    def __init__(self, *, period, actions):
+        self.period, self.actions = period, actions
 
 
 class Function:
@@ -146,11 +183,12 @@ class Environment:
 
 class Node:
     def __init__(self, *, package, executable, namespace='', name='', parameters=(), arguments=(),
-                 remappings=(), output='', condition=None, respawn=False):
+                 remappings=(), output='', condition=None, respawn=False, on_exit=None,
+                 sigterm_timeout='5'):
         self.package, self.executable, self.condition = package, executable, condition
         self.namespace, self.name, self.remappings = namespace, name, remappings
         self.parameters, self.arguments = parameters, arguments
-        self.respawn = respawn
+        self.respawn, self.on_exit, self.patience = respawn, on_exit, sigterm_timeout
 
     def starts(self, given):
         if self.condition and not self.condition.holds(given):
@@ -167,28 +205,32 @@ class Node:
                           for word in ('-p', f'{key}:={text(value, given)}')]
             else:
                 words += ['--params-file', text(each, given)]
-        return [Words(words, self.respawn, dict(given.get(ENVIRONMENT, {})))]
+        return [Words(words, self, given)]
 
 
 class Words(list):
-    """Of a command; `respawn`: it is started again whenever it ends; `env`: to be set before."""
+    """Of a command; `on_exit`: what follows on its end; `env`: to be set before."""
 
-    def __init__(self, words, respawn, env):
+    def __init__(self, words, node, given):
         super().__init__(words)
-        self.respawn, self.env = respawn, env
+        self.on_exit, self.respawn, self.given = node.on_exit, node.respawn, given
+        self.patience = float(node.patience)  # [s] from SIGINT to SIGTERM
+        self.env = dict(given.get(ENVIRONMENT, {}))
 
 
 MODULES = {
     'launch': {'LaunchDescription': list},
     'launch.actions': {'DeclareLaunchArgument': Declared, 'IncludeLaunchDescription': Include,
-                       'OpaqueFunction': Function, 'SetEnvironmentVariable': Environment},
+                       'LogInfo': Said, 'OpaqueFunction': Function,
+                       'SetEnvironmentVariable': Environment, 'Shutdown': End,
+                       'TimerAction': Later},
     'launch.conditions': {'IfCondition': Condition, 'UnlessCondition': NotCondition},
     'launch.launch_description_sources': {'PythonLaunchDescriptionSource': Source},
     'launch.substitutions': {'LaunchConfiguration': Configuration, 'PathJoinSubstitution': Joined,
                              'EqualsSubstitution': Equal, 'NotEqualsSubstitution': NotEqual},
     'launch_ros': {}, 'launch_ros.actions': {'Node': Node},
     'launch_ros.parameter_descriptions': {'ParameterValue': Typed},
-    'launch_ros.substitutions': {'FindPackageShare': Share},
+    'launch_ros.substitutions': {'ExecutableInPackage': Executable, 'FindPackageShare': Share},
 }
 USERS = ('uav_task_alloc.nodes.launching',)  # modules that have imported from these
 

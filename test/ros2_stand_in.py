@@ -12,10 +12,11 @@ import signal
 import subprocess
 import sys
 import time
+import types
 from pathlib import Path
 
 import yaml
-from launch_stand_in import SHARE, commands
+from launch_stand_in import SHARE, Context, End, Later, Said, commands
 
 
 def program(package, name):
@@ -31,20 +32,76 @@ def run(words):
     os.execv(started[0], [*started, *words[2:]])
 
 
-def launch(words):
-    """ros2 launch PACKAGE FILE NAME:=VALUE ...: all nodes until Ctrl-C, which each is told of."""
-    path = Path(SHARE[words[0]], 'launch', words[1])
-    nodes = commands(path, dict(word.split(':=', 1) for word in words[2:]))
-    started = [(program(*node[:2]) + node[2:], node.env) for node in nodes]
-    children = [subprocess.Popen(node, env={**os.environ, **env}) for node, env in started]
-    stop = []
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda *_: stop.append(1))
-    while not stop and any(child.poll() is None for child in children):
+class Launch:
+    """The nodes of a launch file, and what follows on the end of each."""
+
+    def __init__(self, path, given):
+        self.children, self.later = [], []  # (process, node); (when, actions, arguments)
+        self.stop = ''
+        for node in commands(path, given):
+            self.start(node)
+
+    def start(self, node):
+        process = subprocess.Popen(program(*node[:2]) + node[2:], env={**os.environ, **node.env})
+        print(f'[INFO] [{node[1]}]: process started with pid [{process.pid}]', flush=True)
+        self.children.append((process, node))
+
+    def step(self):
+        """Look once who has ended, and what is due."""
         time.sleep(0.05)  # a signal ends it at once
-    for child in children:
-        child.send_signal(signal.SIGINT)
-    return max(abs(child.wait(60)) for child in children)
+        for process, node in [each for each in self.children if each[0].poll() is not None]:
+            self.children.remove((process, node))
+            event = types.SimpleNamespace(returncode=process.returncode)
+            for action in node.on_exit(event, Context(node.given)) if node.on_exit else ():
+                self.act(action, node.given)
+        for due in [each for each in self.later if each[0] <= time.monotonic()]:
+            self.later.remove(due)
+            for action in due[1]:
+                for words in action.starts(due[2]):
+                    self.start(words)
+
+    def act(self, action, given):
+        if isinstance(action, Said):
+            print(f'[INFO] [launch.user]: {action.msg}', flush=True)
+        elif isinstance(action, End):
+            print(f'[INFO] [launch]: {action.reason}', flush=True)
+            self.stop = action.reason
+        elif isinstance(action, Later):
+            self.later.append((time.monotonic() + action.period, action.actions, given))
+        else:
+            raise TypeError(action)
+
+    def end(self, told):
+        """`told`: the terminal has sent SIGINT to all. What does not end is made to, as there."""
+        for process, _ in self.children:
+            if not told:
+                process.send_signal(signal.SIGINT)
+        began, worst = time.monotonic(), 0
+        for process, node in self.children:
+            for number, patience in ((signal.SIGTERM, node.patience), (signal.SIGKILL, 5.0)):
+                try:
+                    process.wait(max(0.0, began + node.patience - time.monotonic())
+                                 if number == signal.SIGTERM else patience)
+                    break
+                except subprocess.TimeoutExpired:
+                    process.send_signal(number)
+            worst = max(worst, abs(process.wait()))
+        return worst
+
+
+def launch(words):
+    """ros2 launch PACKAGE FILE NAME:=VALUE ...: all nodes until Ctrl-C."""
+    path = Path(SHARE[words[0]], 'launch', words[1])
+    signals = []
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda number, _: signals.append(number))
+    try:
+        launched = Launch(path, dict(word.split(':=', 1) for word in words[2:]))
+    except Exception as error:
+        sys.exit(f'[ERROR] [launch]: Caught exception in launch: {error}')
+    while not signals and not launched.stop and (launched.children or launched.later):
+        launched.step()
+    return launched.end(signal.SIGINT in signals)
 
 
 # What is said and heard.

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What the launch files start, with which parameters; test/nodes/test_launch.py flies them."""
+import types
 from itertools import pairwise
 from pathlib import Path
 
@@ -8,6 +9,8 @@ import pytest
 import yaml
 
 from uav_task_alloc import params
+from uav_task_alloc.nodes import bridge_end
+from uav_task_alloc.nodes.restarts import Restarts, Verdict
 
 ROOT = Path(__file__).parent.parent
 MOVED = """
@@ -123,14 +126,91 @@ def test_every_parameter_that_a_launch_file_gives_is_one(name, moved):
 def test_a_launched_bridge_is_started_again_and_keeps_who_has_each_aircraft(name):
     for given, state_dir in (({}, ''), ({'bridge_state_dir': 'kept'}, 'kept')):
         bridge = started(name, **given)['mavlink_bridge']
-        assert bridge.respawn
         assert values(bridge)['state_dir'] == state_dir
         assert (values(bridge)['relaunch'] == 'automatic') is (name == 'demo')
 
 
-def test_rviz_comes_with_a_fleet_when_it_is_asked_for():
-    path = ROOT / 'launch/fleet.launch.py'
-    plain, shown = (launch_stand_in.commands(path, {'rviz': rviz, 'namespace': 'fleet'})
-                    for rviz in ('false', 'true'))
-    assert shown[:len(plain)] == plain
+@pytest.mark.parametrize('name', ['demo', 'fleet'])
+def test_rviz_comes_with_the_nodes_when_it_is_asked_for(name, monkeypatch):
+    monkeypatch.setattr(launch_stand_in, 'INSTALLED', {'rviz2', 'tf2_ros'})
+    path = ROOT / f'launch/{name}.launch.py'
+    plain, shown = (launch_stand_in.commands(path, {'rviz': rviz}) for rviz in ('false', 'true'))
+    assert [node[:2] for node in shown[:len(plain)]] == [node[:2] for node in plain]
     assert [node[0] for node in shown[len(plain):]] == ['rviz2', 'tf2_ros']
+
+
+@pytest.mark.parametrize(('name', 'given', 'refusal'), [
+    ('demo', {'rviz': 'true'}, "rviz:=true: expected rviz2 to be installed: package 'rviz2' not"),
+    ('fleet', {'rviz': 'true'}, "rviz:=true: expected rviz2 to be installed: package 'rviz2' not"),
+    ('demo', {'rviz': 'yes'}, 'rviz:=yes: expected true or false'),
+    ('demo', {'scenario': '/none.yaml'}, '/none.yaml: No such file or directory: expected a sc'),
+    ('fleet', {'scenario': '/none.yaml'}, '/none.yaml: No such file or directory: expected a sc'),
+    ('demo', {'speedup': 'fast'}, 'speedup:=fast: expected a number'),
+    ('demo', {'speedup': '1000'}, 'speedup = 1000.0: expected float in [0.1, 100]'),
+    ('fleet', {'bridge_params': '/none.yaml'}, 'bridge_params:=/none.yaml: expected a parameter'),
+    ('fleet', {'allocator_params': '/none.yaml'}, 'allocator_params:=/none.yaml: expected a para'),
+    ('fleet', {'bridge_params': str(ROOT / 'README.md')}, 'expected a parameter file'),
+    ('demo', {'record': '/none/x.mcap'}, 'record:=/none/x.mcap: expected a file that is not'),
+    ('fleet', {'record': str(ROOT / 'README.md')}, 'expected a file that is not there yet'),
+])
+def test_finding_36_nothing_is_started_before_all_arguments_are_good(
+        name, given, refusal, monkeypatch):
+    asked = []
+    monkeypatch.setattr(launch_stand_in.Node, 'starts', lambda *_: asked.append(1) or [])
+    with pytest.raises(ValueError) as refused:
+        launch_stand_in.commands(ROOT / f'launch/{name}.launch.py', given)
+    assert refusal in str(refused.value)
+    assert not asked
+
+
+def died(words, status):
+    """What a launch file does about the end of a node."""
+    event = types.SimpleNamespace(returncode=status)
+    return words.on_exit(event, launch_stand_in.Context(words.given))
+
+
+@pytest.mark.parametrize('name', ['demo', 'fleet'])
+@pytest.mark.parametrize('executable', ['allocator', 'mavlink_bridge'])
+def test_finding_36_a_node_that_dies_is_started_again_with_its_parameters(name, executable):
+    words = started(name)[executable]
+    for status in (-9, 70, 0, 1, 1):
+        said, later = died(words, status)
+        assert said.msg == f'{executable} has ended with status {status}: again in ' \
+            f'{later.period:g} s'
+        [again] = [again for action in later.actions for again in action.starts(words.given)]
+        assert again == words
+
+
+@pytest.mark.parametrize('name', ['demo', 'fleet'])
+def test_finding_36_a_bad_parameter_ends_the_launch_and_is_not_tried_again(name):
+    [end] = died(started(name)['mavlink_bridge'], 1)
+    assert end.reason == 'mavlink_bridge refuses what it is given, as it says above'
+
+
+@pytest.mark.parametrize('name', ['demo', 'fleet'])
+def test_finding_36_the_end_of_a_viewer_ends_nothing(name, tmp_path, monkeypatch):
+    monkeypatch.setattr(launch_stand_in, 'INSTALLED', {'rviz2', 'tf2_ros'})
+    nodes = started(name, rviz='true', record=str(tmp_path / 'x.mcap'))
+    assert {'live_view', 'rviz2', 'static_transform_publisher'} <= set(nodes)
+    for viewer in ('live_view', 'rviz2', 'static_transform_publisher'):
+        assert nodes[viewer].on_exit is None
+
+
+def test_a_bridge_has_time_to_end_after_its_swap():
+    assert started('fleet')['mavlink_bridge'].patience > bridge_end.LONGEST
+
+
+def test_lives_that_are_short_make_the_next_one_wait_longer():
+    restarts = Restarts()
+    delays = []
+    for lived in (5.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 100.0, 1.0):
+        assert restarts.died(70, lived) is Verdict.AGAIN
+        delays.append(restarts.delay)
+    assert delays == [1.0, 2.0, 4.0, 8.0, 16.0, 30.0, 30.0, 1.0, 2.0]
+
+
+def test_finding_36_a_node_that_refuses_again_and_again_is_given_up():
+    restarts = Restarts()
+    verdicts = [restarts.died(status, 1.0) for status in (-9, 1, 1, 70, *[1] * 5)]
+    assert verdicts == [Verdict.AGAIN] * 8 + [Verdict.GIVE_UP]
+    assert Restarts().died(1, 1.0) is Verdict.END_ALL

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The launch files run as a user does, by `ros2 launch` or, where it is missing, its stand-in."""
 import os
+import re
 import shutil
 import signal
 import subprocess
@@ -37,6 +38,11 @@ class Launched:
 
     def output(self):
         return self.log.read_text()
+
+    def pids(self, name):
+        """All processes that it has started of an executable, in order."""
+        return [int(pid) for pid in re.findall(
+            rf'\[{name}(?:-\d+)?\]: process started with pid \[(\d+)\]', self.output())]
 
     def alive(self):
         """Whether any process of it is left."""
@@ -150,3 +156,58 @@ def test_finding_37_a_fleet_flies_a_scenario_to_its_end_with_its_values(
     flies_to_its_end(probe, moved)
     assert fleet.stop() == 0, fleet.output()
     assert not fleet.alive()
+
+
+def quiet(tmp_path):
+    """Parameters of a bridge without vehicles."""
+    path = tmp_path / 'quiet.yaml'
+    path.write_text(yaml.safe_dump({'/**/mavlink_bridge': {'ros__parameters': {
+        'connections': ['udpin:127.0.0.1:0'], 'cruise_altitude': 77.0}}}))
+    return path
+
+
+@pytest.mark.parametrize(('name', 'given'), [
+    ('demo', {'scenario': '/none.yaml'}), ('fleet', {'scenario': '/none.yaml'}),
+    ('fleet', {'bridge_params': '/none.yaml'}), ('demo', {'speedup': '0'}),
+    *([] if shutil.which('rviz2') else [('demo', {'rviz': 'true'}), ('fleet', {'rviz': 'true'})])])
+def test_finding_36_a_bad_argument_leaves_no_node_behind(launch, name, given):
+    launched = launch(name, **given)
+    assert launched.popen.wait(60) != 0
+    assert not launched.alive(), launched.output()
+    assert 'process started' not in launched.output()
+    assert 'expected' in launched.output()
+
+
+def test_finding_36_a_bad_parameter_ends_all_and_is_not_tried_again(launch, tmp_path):
+    bad = tmp_path / 'bad.yaml'
+    bad.write_text(yaml.safe_dump({'/**/mavlink_bridge': {'ros__parameters': {
+        'autopilot': 'cleanflight', 'connections': ['udpin:127.0.0.1:0']}}}))
+    launched = launch('fleet', bridge_params=bad)
+    launched.popen.wait(60)
+    assert not launched.alive(), launched.output()
+    assert "autopilot = 'cleanflight': expected one of" in launched.output()
+    assert len(launched.pids('mavlink_bridge')) == 1
+
+
+@pytest.mark.parametrize('name', ['allocator', 'mavlink_bridge'])
+def test_finding_36_a_killed_node_comes_back_with_its_parameters(launch, probe, tmp_path, name):
+    launched = launch('fleet', bridge_params=quiet(tmp_path))
+    probe.until(lambda: name in probe.node.get_node_names())
+    os.kill(launched.pids(name)[0], signal.SIGKILL)
+    probe.until(lambda: len(launched.pids(name)) == 2, facts=launched.output)
+    probe.until(lambda: parameters(probe, 'mavlink_bridge', 'cruise_altitude') == [77.0])
+    assert launched.stop() == 0, launched.output()
+    assert not launched.alive()
+
+
+def test_finding_36_the_end_of_the_viewer_ends_nothing(launch, probe, tmp_path):
+    launched = launch('fleet', bridge_params=quiet(tmp_path), record=tmp_path / 'all.mcap')
+    probe.until(lambda: {'allocator', 'mavlink_bridge', 'live_view'}
+                <= set(probe.node.get_node_names()))
+    os.kill(launched.pids('live_view')[0], signal.SIGTERM)
+    probe.until(lambda: 'live_view' not in probe.node.get_node_names())
+    assert parameters(probe, 'mavlink_bridge', 'cruise_altitude') == [77.0]
+    assert parameters(probe, 'allocator', 'route_end') == ['home']
+    assert launched.stop() == 0, launched.output()
+    assert [len(launched.pids(name)) for name in ('allocator', 'mavlink_bridge', 'live_view')] == [
+        1, 1, 1]

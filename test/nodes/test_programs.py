@@ -55,6 +55,20 @@ def test_a_bad_start_parameter_ends_the_node_in_words(start, name, given, text):
     assert 'Traceback' not in out
 
 
+def test_a_node_whose_callback_raises_ends_with_a_status_of_its_own(domain):
+    code = ('from rclpy.node import Node\n'
+            'from uav_task_alloc.nodes.run import run\n'
+            'class Faulty(Node):\n'
+            '    def __init__(self):\n'
+            "        super().__init__('faulty')\n"
+            '        self.create_timer(0.01, lambda: 1 / 0)\n'
+            'run(Faulty)')
+    done = subprocess.run([sys.executable, '-c', code], capture_output=True, text=True,
+                          timeout=30, check=False)
+    assert done.returncode == nodes_run.CRASHED, done.stderr
+    assert 'ZeroDivisionError' in done.stderr
+
+
 def test_help_and_strange_arguments_are_answered_without_starting():
     def ask(*arguments):
         path = Path(get_package_prefix('uav_task_alloc'), 'lib/uav_task_alloc/allocator')

@@ -22,6 +22,7 @@ from uav_task_alloc.scenario import load, simulation_parameters
 from uav_task_alloc.scenario.node_parameters import Parameters
 
 PACKAGE = 'uav_task_alloc'
+PATIENCE = 15.0  # [s], of which the bridge takes 10 at most for a swap under way
 FAULTS = ('tasks_lost', 'tasks_flown_twice', 'zone_violations')
 
 
@@ -46,11 +47,11 @@ class Child:
         return cls(name, process, log)
 
     def stop(self) -> int:
-        """Ask it to end, wait, end it for good after 10 s; its exit status."""
+        """Ask it to end, wait, end it for good after PATIENCE; its exit status."""
         if self.process.poll() is None:
             self.process.send_signal(signal.SIGINT)
         try:
-            return self.process.wait(10)
+            return self.process.wait(PATIENCE)
         except subprocess.TimeoutExpired:
             self.process.kill()
             return self.process.wait()

@@ -24,6 +24,7 @@ from uav_task_alloc.mavlink.status import Told, facts_of, state_of
 from uav_task_alloc.model import ThreatZone, check_number, check_ros_name
 from uav_task_alloc.nodes import bridge_messages as convert
 from uav_task_alloc.nodes.bounds import cut, printable
+from uav_task_alloc.nodes.bridge_end import BridgeEnd, swapping
 from uav_task_alloc.nodes.fleet_origin import FleetOrigin
 from uav_task_alloc.nodes.messages import EVENTS, LATCHED, STATES
 from uav_task_alloc.nodes.parameters import declare
@@ -95,7 +96,7 @@ class MavlinkBridge(Node):
         self.create_service(HandOver, '~/hand_over', self.on_hand_over)
         self.create_timer(0.05, self.on_tick)
         self.create_timer(1.0, self.on_second)
-        self.closing = False
+        self.closing, self.end = False, BridgeEnd()
         self.heartbeat = Heartbeat(self.radio.send_to_all)
         self.receiver = threading.Thread(target=self.receive, name='receive', daemon=True)
         self.heartbeat.start()
@@ -153,7 +154,9 @@ class MavlinkBridge(Node):
         self.heartbeat.watch(time.monotonic())
         self.tell_trouble('heartbeat', self.heartbeat.trouble)
         conflict = self.origins.conflict()
-        policy = policy_of(self.live.now, self.zones, conflict and 'nodes with one origin')
+        policy = policy_of(
+            self.live.now, self.zones, (conflict and 'nodes with one origin')
+            or ('another bridge, as this one ends' if self.end.asked is not None else ''))
         for served in list(self.ground.served.values()):
             served.pilot.policy = policy
             if served.uav_id not in self.lists:
@@ -169,8 +172,9 @@ class MavlinkBridge(Node):
         self.take_lists()
 
     def take_lists(self) -> None:
-        """Fly the lists that wait, unless somebody has another origin."""
-        if self.waiting and not self.origins.conflict() and self.origins.settled():
+        """Fly the lists that wait, unless somebody has another origin, or this bridge ends."""
+        if (self.waiting and self.end.asked is None and not self.origins.conflict()
+                and self.origins.settled()):
             waiting, self.waiting = self.waiting, {}
             for uav_id, msg in waiting.items():
                 self.take_list(uav_id, msg)
@@ -258,8 +262,20 @@ class MavlinkBridge(Node):
         """The published clock [s]."""
         return self.get_clock().now().nanoseconds * 1e-9
 
+    def waits_to_end(self) -> bool:
+        """Asked to end: whether a swap under way comes first; no other is begun."""
+        first = self.end.asked is None
+        with self.lock:
+            fleet = list(self.ground.served.values())
+            waits = self.end.waits(fleet, time.monotonic())
+        if first and waits:
+            self.log['warning'](f'ends after the swap of {", ".join(swapping(fleet))}')
+        return waits
+
     def destroy_node(self) -> None:
-        """Stop both threads before what they use is gone."""
+        """Say who is in the air, and stop both threads before what they use is gone."""
+        for words in self.end.words(self.ground.served.values()):
+            self.log['warning'](words)
         self.closing = True
         self.heartbeat.close()
         self.receiver.join(5.0)

@@ -6,6 +6,7 @@ import json
 import os
 import signal
 import sys
+import traceback
 from collections.abc import Callable
 
 import rclpy
@@ -15,6 +16,8 @@ from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import remove_ros_args
 
 from uav_task_alloc.errors import AllocError
+
+CRASHED = 70  # exit status, EX_SOFTWARE of sysexits.h: started again by the launch files
 
 
 def with_flags(argv: list[str], *names: str) -> list[str]:
@@ -29,7 +32,13 @@ def with_flags(argv: list[str], *names: str) -> list[str]:
 
 
 def run(make_node: Callable[[], Node], args: list[str] | None = None, threads: int = 1) -> None:
-    """Spin `make_node()`; a bad parameter ends it with status 1 and one clear line."""
+    """Spin `make_node()` until SIGINT or SIGTERM, or until it has `finished`.
+
+    A node with a method `waits_to_end` goes on while that returns True.
+
+    Exit status: 0 in good order; 1 and one clear line where `make_node` refuses a parameter;
+    CRASHED where a callback raises.
+    """
     _check_arguments(remove_ros_args(args or sys.argv)[1:], make_node.__doc__)
     # rclpy's own handlers invalidate the context from another thread: a callback under way then
     # raises RCLError. Here the context lives until the node is gone.
@@ -40,19 +49,28 @@ def run(make_node: Callable[[], Node], args: list[str] | None = None, threads: i
     os.environ.setdefault('FASTDDS_BUILTIN_TRANSPORTS', 'UDPv4')
     rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
     try:
-        node = make_node()
-        executor = SingleThreadedExecutor() if threads == 1 else MultiThreadedExecutor(threads)
-        executor.add_node(node)
-        while not stop and not getattr(node, 'finished', False):
-            executor.spin_once(timeout_sec=0.2)
-        executor.shutdown()
-        node.destroy_node()
+        _spin(make_node(), threads, stop)
     except AllocError as error:
         sys.exit(str(error))
     finally:
         for number in (signal.SIGINT, signal.SIGTERM):  # a second Ctrl-C cannot hurry the end
             signal.signal(number, signal.SIG_IGN)
         rclpy.try_shutdown()
+
+
+def _spin(node: Node, threads: int, stop: list[int]) -> None:
+    """Until `stop` holds something; SystemExit CRASHED where a callback raises."""
+    executor = SingleThreadedExecutor() if threads == 1 else MultiThreadedExecutor(threads)
+    executor.add_node(node)
+    waits = getattr(node, 'waits_to_end', lambda: False)
+    try:
+        while not getattr(node, 'finished', False) and not (stop and not waits()):
+            executor.spin_once(timeout_sec=0.2)
+    except Exception:
+        traceback.print_exc()
+        sys.exit(CRASHED)
+    executor.shutdown()
+    node.destroy_node()
 
 
 def _check_arguments(rest: list[str], text: str | None) -> None:

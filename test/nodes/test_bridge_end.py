@@ -1,0 +1,84 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a bridge does before it ends: a swap under way first, and who is airborne is named."""
+import signal
+from types import SimpleNamespace
+
+import pytest
+from test_mavlink_bridge import Sky
+from uav_task_alloc_msgs import msg as m
+
+from uav_task_alloc.nodes.bridge_end import LONGEST, BridgeEnd
+
+pytestmark = pytest.mark.ros
+MANY = 150  # tasks, whose upload takes a while
+
+
+@pytest.fixture
+def sky(start, probe, tmp_path):
+    made = Sky(start, probe, tmp_path / 'flight.jsonl')
+    yield made
+    if made.thread.is_alive():
+        made.land()
+
+
+def hold_for_a_swap(sky, probe):
+    """Bring the ArduPilot vehicle into the midst of a swap: it holds, its mission comes."""
+    sky.send(1, 1, [0, 1, 2, 3])
+    probe.until(lambda: sky.completed(1))
+    sky.send(1, 2, [*range(4, MANY), 2])
+    probe.until(lambda: sky.states['uav_1'].mode == m.UavState.HOLD
+                and sky.states['uav_1'].mission_state == m.UavState.UPLOADING)
+
+
+def test_finding_36_a_bridge_ends_after_the_swap_under_way(sky, probe):
+    hold_for_a_swap(sky, probe)
+    code, said = sky.bridge.stop(signal.SIGINT, 30)
+    assert code == 0, said
+    assert 'ends after the swap of uav_1' in said
+    assert 'ends while airborne: uav_1' in said
+    assert 'held in the air' not in said
+    # it flies the new list without a bridge
+    before = len(sky.flown(1))
+    probe.until(lambda: len(sky.flown(1)) > before)
+    assert sky.flown(1)[before] == 'u1_4'
+
+
+def test_finding_36_a_swap_that_does_not_end_is_not_waited_for_without_end(sky, probe):
+    hold_for_a_swap(sky, probe)
+    sky.fleet.set_alive('uav_1', False)
+    code, said = sky.bridge.stop(signal.SIGINT, 60)
+    assert code == 0, said
+    assert 'ends while held in the air for a new list: uav_1' in said
+
+
+def test_a_bridge_takes_no_list_and_lets_nobody_take_off_once_it_is_to_end(sky, probe):
+    hold_for_a_swap(sky, probe)
+    sky.bridge.popen.send_signal(signal.SIGINT)
+    probe.until(lambda: 'ends after the swap' in sky.bridge.output())
+    sky.send(2, 1, [0])
+    assert sky.bridge.popen.wait(30) == 0
+    assert sky.states['uav_2'].mode == m.UavState.STANDBY
+    assert sky.states['uav_2'].list_revision == 0
+
+
+def served(uav_id, airborne, swap_at):
+    return SimpleNamespace(uav_id=uav_id, pilot=SimpleNamespace(
+        telemetry=SimpleNamespace(airborne=airborne), watch=SimpleNamespace(swap_at=swap_at)))
+
+
+def test_a_swap_is_waited_for_as_long_as_it_lasts_and_no_longer_than_said():
+    fleet = [served('a', True, None), served('b', True, 5.0)]
+    assert not BridgeEnd().waits(fleet[:1], 5.0)
+    end = BridgeEnd()
+    assert end.waits(fleet, 100.0)
+    assert end.waits(fleet, 100.0 + 0.9 * LONGEST)
+    assert not end.waits(fleet, 100.0 + LONGEST)
+
+
+def test_everybody_in_the_air_is_named():
+    fleet = [served('a', True, None), served('b', True, 5.0), served('c', False, None),
+             served('d', True, None)]
+    flying, held = BridgeEnd.words(fleet)
+    assert flying.startswith('ends while airborne: a, d; ')
+    assert held.startswith('ends while held in the air for a new list: b; ')
+    assert BridgeEnd.words(fleet[2:3]) == []
