@@ -6,9 +6,7 @@ the first rule that is not satisfied acts, and those after it wait.
 """
 from __future__ import annotations
 
-import math
 import random
-import re
 from collections import deque
 from collections.abc import Callable, Sequence
 
@@ -19,11 +17,13 @@ from uav_task_alloc.mavlink import authority as who
 from uav_task_alloc.mavlink.authority import Action, Hold, Record
 from uav_task_alloc.mavlink.authority_watch import AuthorityWatch
 from uav_task_alloc.mavlink.board import Board, MissionState
-from uav_task_alloc.mavlink.change import Change, Kind
+from uav_task_alloc.mavlink.board_events import passed_over, task_events
 from uav_task_alloc.mavlink.codec import Message
 from uav_task_alloc.mavlink.flown_path import Sample
+from uav_task_alloc.mavlink.fly_list import FlyList
 from uav_task_alloc.mavlink.helm import Helm, Step
 from uav_task_alloc.mavlink.mission_evidence import MissionEvidence
+from uav_task_alloc.mavlink.nothing_to_fly import NothingToFly
 from uav_task_alloc.mavlink.peer import Peer
 from uav_task_alloc.mavlink.policy import Note, Policy, TaskProgress
 from uav_task_alloc.mavlink.profiles import Flight, Profile
@@ -31,17 +31,12 @@ from uav_task_alloc.mavlink.rates import Rates
 from uav_task_alloc.mavlink.recall import MEMORY
 from uav_task_alloc.mavlink.reminder import Reminder
 from uav_task_alloc.mavlink.send_gate import allowed
-from uav_task_alloc.mavlink.service import Service
+from uav_task_alloc.mavlink.take_off import TakeOff
 from uav_task_alloc.mavlink.telemetry import Telemetry
+from uav_task_alloc.mavlink.text_notes import TextNotes
 from uav_task_alloc.mavlink.upload import State
-from uav_task_alloc.mavlink.way_home import zone_in_the_way
-from uav_task_alloc.mission import TaskList, all_alike
+from uav_task_alloc.mission import TaskList
 from uav_task_alloc.model import Task
-
-SWAP_HOLD = 30.0  # [s] that a vehicle is held for an upload, at most
-TEXT_AGAIN = 60.0  # [s] in which the same words of a vehicle are told once
-MOST_TEXTS = 200  # different words in that time
-SAYS_NOTHING = re.compile(r'Auto mission changed, restarted command')  # once for each item
 
 
 class Pilot:
@@ -60,15 +55,17 @@ class Pilot:
         self.authority = self.watch.authority
         self.events: deque[TaskProgress] = deque()
         self.notes: deque[Note] = deque()
-        self.going_home = False  # by a list without tasks
-        self.alarm = ''  # what a human has to see to
         self._rates = Rates(peer, self.telemetry, now)
-        self._was_stale = self._aimed = False
-        self._service = Service(self.board, self.telemetry, profile)
+        self._was_stale = False
         self._reminder = Reminder()
         self._restarts = 0
-        self._texts: dict[str, float] = {}  # of the vehicle, when told [s]
-        self._said = ''  # by the vehicle, last
+        self._texts = TextNotes()
+        take_off = TakeOff(self.helm, self.telemetry, self.board, self.authority,
+                           lambda: self.policy)
+        self._ending = NothingToFly(self.helm, self.telemetry, self.board, self.watch,
+                                    lambda: self.policy, self.notes)
+        fly_list = FlyList(self.helm, self.telemetry, self.board, self.watch, profile,
+                           self._ending, self._texts)
         if record is not None:
             self.board.recall.known = record.mission, record.current
         for mark in self.watch.marks.values():
@@ -76,9 +73,21 @@ class Pilot:
                 self.board.recall.told.add(mark.task)
             else:
                 self.board.recall.unflown[mark.task] = mark[1:4]
-        self._rules = (self._linked, self._authority, self.helm.finish, self._lift, self._upload,
-                       self._read, self._has_list, self._place, self._may_act, self._hold_first,
-                       self._held_too_long, self._empty, self._bring, self._rise, self._fly)
+        self._rules = (
+            self._linked, self._authority, self.helm.finish, take_off.lift, self._upload,
+            self._read, self._has_list, self._place, self._may_act, self._hold_first,
+            self._ending.held_too_long, self._ending.empty, fly_list.bring, take_off.rise,
+            fly_list.fly)
+
+    @property
+    def going_home(self) -> bool:
+        """By a list without tasks."""
+        return self._ending.going_home
+
+    @property
+    def alarm(self) -> str:
+        """What a human has to see to; '' for nothing."""
+        return self._ending.alarm
 
     def assign(self, tasks: TaskList, now: float) -> list[Message]:
         """The latest list for this UAV; an older one that comes late is ignored."""
@@ -163,26 +172,9 @@ class Pilot:
         return out
 
     def _report(self, now: float) -> None:
-        board, revision = self.board, self.board.revision
-        while board.progress.events:
-            made = board.progress.events.popleft()
-            event = 'COMPLETED' if made.completed else 'STARTED'
-            latest = board.tasks.revision if made.unheard and board.tasks else revision
-            if made.completed:
-                self.watch.mark(made.task, board.progress.completed.get(made.task), True, now)
-            self.events.append(TaskProgress(made.task, event, latest))
-        while board.failed:
-            failed = board.failed.popleft()
-            self.events.append(TaskProgress(failed.task, 'FAILED', failed.revision,
-                                            failed.reason))
-        while board.progress.left:
-            item = board.progress.left.popleft()
-            if item.task not in board.progress.completed:
-                self.watch.mark(item.task, item.position, False, now)
-        while board.progress.skipped:
-            task = board.progress.skipped.popleft()
-            self.notes.append(Note('warning', f'{task} was passed over, not by the bridge: '
-                                   'it is still to be flown'))
+        board = self.board
+        self.events += task_events(board, self.watch, now)
+        self.notes += passed_over(board, self.watch, now)
         for notes in (self.watch.notes, board.notes, board.list.notes, self.helm.notes):
             while notes:
                 self.notes.append(notes.popleft())
@@ -206,7 +198,11 @@ class Pilot:
             if not self.helm.busy and not self.board.open:
                 self.board.watch(message, now)
         elif kind == 'STATUSTEXT':
-            self._text(message, now)
+            self.watch.text(message, now)
+            self.helm.note_refusal(str(message.text))
+            self.board.list.horizon.note(str(message.text))
+            note = self._texts.take(message, now)
+            self.notes.extend(() if note is None else (note,))
 
     def _position(self, message: Message, newest: bool, now: float) -> None:
         if self.telemetry.has_position:
@@ -214,19 +210,6 @@ class Pilot:
             self.board.progress.at(
                 Sample(message.time_boot_ms * 1e-3, place, velocity), newest, now,
                 self.telemetry.frame)
-
-    def _text(self, message: Message, now: float) -> None:
-        text = str(message.text)
-        self.watch.text(message, now)
-        self.helm.note_refusal(text)
-        self.board.list.horizon.note(text)
-        if len(self._texts) >= MOST_TEXTS:
-            self._texts = {old: at for old, at in self._texts.items() if now - at < TEXT_AGAIN}
-        if now - self._texts.get(text, -math.inf) >= TEXT_AGAIN and len(self._texts) < MOST_TEXTS:
-            serious = message.severity < d.MAV_SEVERITY_WARNING and not SAYS_NOTHING.search(text)
-            self.notes.append(Note('error' if serious else 'info', text))
-            self._texts[text] = now
-        self._said = text
 
     def _begin_anew(self, now: float) -> None:
         self.board.restarted()
@@ -258,12 +241,6 @@ class Pilot:
             self.board.abort()
         return None
 
-    def _lift(self, now: float) -> Step:
-        """Armed by us: it takes off before anything else, or is disarmed."""
-        if not self.helm.armed_here or self.telemetry.airborne or not self.authority.held:
-            return None
-        return self._rise(now) if self._wants_to_fly() else self.helm.disarm(now)
-
     def _upload(self, now: float) -> Step:
         board = self.board
         if board.trouble:
@@ -280,7 +257,7 @@ class Pilot:
         if board.upload.state in (State.BACKOFF, State.DRAINING) and board.outdated and (
                 board.held is not None and board.wanted() and not board.upload.maybe_taken):
             return board.begin_upload(board.change(), now)
-        return self._held_too_long(now) or []
+        return self._ending.held_too_long(now) or []
 
     def _read(self, now: float) -> Step:
         if self.board.held is not None:
@@ -288,7 +265,7 @@ class Pilot:
         if not self.telemetry.past_boot:
             return self.helm.wait_for('the autopilot to start')
         if self.helm.resting(now):
-            return self._held_too_long(now) or []
+            return self._ending.held_too_long(now) or []
         self.helm.waits_for = 'a readback'
         return self.board.upload.read(now)
 
@@ -333,160 +310,3 @@ class Pilot:
                 authority.hold)
             return []
         return self.helm.set_mode(Flight.HOLD, now)
-
-    def _held_too_long(self, now: float) -> Step:
-        """A swap that does not come to its end: home where the way is clear, else stay."""
-        since = self.watch.swap_at
-        if since is None or now - since <= SWAP_HOLD or not self.authority.held:
-            return None
-        self.watch.swap_at = None
-        blocked = self._blocked_home()
-        if blocked:
-            self.alarm = f'held for an upload that does not end, and {blocked}: stays'
-            self.notes.append(Note('error', self.alarm))
-            return None
-        self.notes.append(Note('error', f'held for {SWAP_HOLD:g} s for an upload that does not '
-                               'end: returns'))
-        return self.helm.set_mode(Flight.RETURN, now)
-
-    def _blocked_home(self) -> str:
-        """Why it must not fly straight home, in words; '' where it may."""
-        home, zones = self.telemetry.home, self.policy.zones
-        if home is None or not self.telemetry.has_position:
-            return 'its way home is not known' if zones else ''
-        zone = zone_in_the_way(self.telemetry.position, home, zones)
-        return f'zone {zone.id} is on its way home' if zone else ''
-
-    def _empty(self, now: float) -> Step:
-        """Nothing to fly: hold or return, and keep what is on board."""
-        board, telemetry = self.board, self.telemetry
-        end, tasks = board.wanted(), board.remaining()  # less what cannot be an item
-        self.going_home = False
-        if tasks.stops:
-            return None
-        rest = (board.held or ())[board.progress.current or 0:]
-        if not board.progress.pending:
-            board.revision = tasks.revision
-        flying = telemetry.flight is Flight.MISSION and not board.progress.finished
-        if flying and end and rest and all_alike(end[-len(rest):], rest):
-            self.going_home = True
-            return self.helm.content()
-        if board.progress.pending or not telemetry.airborne or self.helm.resting(now) or (
-                not self.authority.held):
-            return []
-        returns = tasks.returns or self.policy.when_empty == 'return'
-        if tasks.end_via and tasks.returns and telemetry.flight is not Flight.RETURN:
-            self.going_home = True
-            return None  # the plain way home leads through a zone: fly the list of it
-        blocked = self._blocked_home() if returns else ''
-        if blocked and telemetry.flight is not Flight.RETURN:
-            returns = False
-            self.helm.wait(f'a way home: {blocked}')
-        if flying or (returns and telemetry.flight in (Flight.HOLD, Flight.MISSION)):
-            return self.helm.set_mode(Flight.RETURN if returns else Flight.HOLD, now)
-        return []
-
-    def _bring(self, now: float) -> Step:
-        """The list on board, by the cheapest way."""
-        board, telemetry = self.board, self.telemetry
-        found = board.change()
-        if found.kind is Kind.KEEP:
-            board.adopt(found, now)
-            return None
-        if self.helm.resting(now):
-            return []
-        if not telemetry.past_boot:
-            return self.helm.wait_for('the autopilot to start')
-        if self._chosen_by_another():
-            return self.helm.wait_for('the item that another station has chosen')
-        if found.kind is Kind.JUMP:
-            return self._jump(found, now)
-        if self._service.lasts(now):
-            self.helm.waits_for = 'the end of the service'
-            return []
-        if found.kind is Kind.SWAP and telemetry.airborne and not telemetry.good_link(now):
-            return self.helm.wait_for('a link without gaps for 10 s')
-        if (found.kind is Kind.SWAP and not self.profile.atomic and telemetry.airborne
-                and telemetry.flight is Flight.MISSION):
-            self.helm.must_start, self.watch.swap_at = True, now
-            return self.helm.set_mode(Flight.HOLD, now)
-        return board.begin_upload(found, now)
-
-    def _chosen_by_another(self) -> bool:
-        """Somebody has set the current item: it is flown, and what was left out later."""
-        progress, item = self.board.progress, self.board.progress.active
-        return (progress.chosen is not None and progress.chosen == progress.current
-                and self.telemetry.airborne
-                and self.telemetry.flight is Flight.MISSION and item is not None
-                and any(item.task == stop.task.id for stop in self.board.remaining().stops))
-
-    def _jump(self, found: Change, now: float) -> list[Message]:
-        if not self.authority.held:
-            return self.helm.wait_for('authority to set the current item')
-        tasks = self.board.tasks
-
-        def done(t: float) -> None:
-            self.board.progress.retag(found.items)
-            self.board.progress.jumped(found.start, t)
-            self.board.must_jump, self._aimed = None, True
-            self.board.adopt(found, t, tasks)
-
-        self.board.progress.asked(found.start)
-        return self.helm.jump(found.start + self.board.own, now, done)
-
-    def _rise(self, now: float) -> Step:
-        if self.telemetry.airborne and not self.helm.climbing:
-            return None
-        if not self.authority.held:
-            return self.helm.wait('~/hand_over: it has landed' if self.authority.landed else
-                                  'a pilot to arm and take off (takeoff is false)')
-        if self.policy.grounded and not self.helm.climbing:
-            return self.helm.wait(self.policy.grounded)
-        home = self.telemetry.home or self.telemetry.position
-        zone = zone_in_the_way(home, home, self.policy.zones)
-        if zone is not None and not self.helm.climbing:
-            return self.helm.wait(f'zone {zone.id} to leave its home')
-
-        return self.helm.rise(self.policy.cruise_altitude, self._wants_to_fly, now)
-
-    def _wants_to_fly(self) -> bool:
-        return (self.authority.held and self.board.tasks is not None
-                and not (self.policy.grounded and not self.telemetry.airborne)
-                and bool(self.board.remaining().stops))
-
-    def _fly(self, now: float) -> Step:
-        """In mission mode, at the right item."""
-        helm, board = self.helm, self.board
-        in_mission = self.telemetry.flight is Flight.MISSION
-        flying = in_mission and not helm.must_start
-        self._aimed = self._aimed and not flying
-        if flying and self._stands():
-            board.must_jump = board.progress.current
-            helm.must_start = True
-            return helm.set_mode(Flight.HOLD, now)  # it would begin at the first item again
-        if flying and board.must_jump is None:
-            board.progress.started()
-            self.watch.swap_at, self.alarm = None, ''
-            return helm.content()
-        if helm.refused and not in_mission:
-            board.list.infeasible(self._said or helm.refused)
-            helm.refused = ''
-            return []
-        if helm.resting(now):
-            return []
-        if self.telemetry.flight is Flight.TAKEOFF:
-            return helm.wait_for('the end of the take-off')
-        if not (flying or self._aimed or self.profile.atomic) and board.must_jump is None:
-            board.must_jump = board.progress.current  # ArduPilot resumes after what it flew last
-        if board.must_jump is not None:
-            return self._jump(Change(Kind.JUMP, board.progress.items, board.must_jump), now)
-        return helm.set_mode(Flight.MISSION, now)
-
-    def _stands(self) -> bool:
-        """ArduPilot has ended the mission that it had, and does not begin what was appended."""
-        telemetry, progress = self.telemetry, self.board.progress
-        return (not self.profile.atomic and telemetry.current is not None
-                and telemetry.mission_state == d.MISSION_STATE_COMPLETE
-                and not progress.finished and progress.active is not None
-                and telemetry.current_at > self.board.verified_at
-                and telemetry.current - self.board.own < len(progress.items) - 1)
