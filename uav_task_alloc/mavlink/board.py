@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import random
 from collections import deque
-from enum import Enum
-
-from pymavlink.dialects.v20 import ardupilotmega as d
 
 from uav_task_alloc.geometry.frames import Origin
 from uav_task_alloc.mavlink.change import Change, Kind, change
-from uav_task_alloc.mavlink.codec import Message, plan_id
-from uav_task_alloc.mavlink.peer import NO_SPACE, Peer
+from uav_task_alloc.mavlink.codec import Message
+from uav_task_alloc.mavlink.held_mission import HeldMission, MissionState
+from uav_task_alloc.mavlink.peer import Peer
 from uav_task_alloc.mavlink.policy import Note
 from uav_task_alloc.mavlink.profiles import Profile
 from uav_task_alloc.mavlink.progress import ProgressTable
@@ -20,23 +18,12 @@ from uav_task_alloc.mavlink.telemetry import Telemetry
 from uav_task_alloc.mavlink.transfer import Accepted, Failed, Held, Mission, Verified
 from uav_task_alloc.mavlink.transfer_reached import TransferReached
 from uav_task_alloc.mavlink.upload import OVERTAKEN, Upload
+from uav_task_alloc.mavlink.upload_failures import UploadFailures
 from uav_task_alloc.mavlink.wanted import TaskFailed, Wanted
 from uav_task_alloc.mission import Item, TaskList, all_alike, home_item
 from uav_task_alloc.model import Task
 
-SETTLE = 3.0  # [s] in which messages sent before the last change may still come
 LATE = 6.0  # [s] around the end of a mission in which its last REACHED comes
-CHECK = 60.0  # [s] between readbacks of a mission that nobody should have changed
-
-
-class MissionState(Enum):
-    """What is known of the mission on board; numbers as in UavState."""
-
-    UNKNOWN = 0
-    UPLOADING = 1
-    VERIFIED = 2
-    MIXED = 3
-    FOREIGN = 4
 
 
 class Board:
@@ -50,19 +37,15 @@ class Board:
         self.recall = Recall(profile, origin, telemetry, self.progress)
         self.own = int(profile.rules.home_first)
         self.list = Wanted(profile, origin, self.progress)
-        self.held: tuple[Item, ...] | None = None  # None: to be read
         self.revision = 0  # of the last list verified on board
         self.notes: deque[Note] = deque()
         self.trouble = False  # the last transfer failed; somebody decides when to try again
-        self.verified_at = 0.0  # [s]
-        self.read_once = False  # since the vehicle was first heard or restarted
         self.must_jump: int | None = None  # the item to fly now, where the upload did not say it
-        self.is_foreign = False  # somebody else has changed what we had verified
         self._profile, self._origin, self._telemetry = profile, origin, telemetry
         self._done_then: frozenset[str] = frozenset()  # as the upload began
-        self._infeasible: tuple[float, list[str], str, TaskList] | None = None  # to be told at [s]
         self._ambiguous = TransferReached(self.progress)  # of this epoch, or of the next
-        self._state = MissionState.UNKNOWN
+        self._mission = HeldMission(self.own, profile.atomic)
+        self._failures = UploadFailures(self.list, self.own, self.notes)
         self._uploading: tuple[Change, TaskList] | None = None  # and the list it is for
         self._begun = False  # the epoch of this upload
         self._unsure: tuple[Change, TaskList] | None = None  # sent, and not seen to be on board
@@ -70,17 +53,31 @@ class Board:
         self._sent_since: float | None = None
         self.item_time = 0.0  # [s] that an item took in the uploads so far, roughly
         self._began_at = 0.0  # [s]
-        self.plan_id = self._heard_plan = 0  # PX4's id of the mission verified, last heard
         self._recalled: tuple[TaskList, int] | None = None
 
     @property
+    def held(self) -> tuple[Item, ...] | None:
+        """The items on board, without home; None: to be read."""
+        return self._mission.items
+
+    @property
+    def verified_at(self) -> float:
+        """When they were read last [s]."""
+        return self._mission.verified_at
+
+    @property
+    def is_foreign(self) -> bool:
+        """Somebody else has changed what we had verified."""
+        return self._mission.is_foreign
+
+    @property
     def state(self) -> MissionState:
-        return MissionState.UPLOADING if self._uploading is not None else self._state
+        return MissionState.UPLOADING if self._uploading is not None else self._mission.state
 
     @property
     def stored(self) -> MissionState:
         """What is known of what is on board, whether or not a transfer runs."""
-        return self._state
+        return self._mission.state
 
     def upload_progress(self, now: float) -> str:
         """How far the upload is and how long it still takes, in words; '' where there is none."""
@@ -153,7 +150,7 @@ class Board:
         assert self.tasks is not None
         if tasks is not None and tasks != self.tasks:
             return
-        if self.revision != self.tasks.revision or self._state is not MissionState.VERIFIED:
+        if self.revision != self.tasks.revision or self.stored is not MissionState.VERIFIED:
             self._verify(found.items, self.tasks.revision, now)
             self.progress.retag(found.items)
 
@@ -197,7 +194,7 @@ class Board:
     def receive(self, message: Message, now: float) -> list[Message]:
         """Take a message of the mission service."""
         if message.get_type() in ('MISSION_ACK', 'MISSION_COUNT'):
-            self._heard_plan = plan_id(message)
+            self._mission.note_plan(message)
         out = self.upload.receive(message, now)
         if not self.upload.maybe_taken:
             self._sent_since = None if self.upload.busy else self._sent_since
@@ -222,7 +219,7 @@ class Board:
 
     def tells(self, message: Message) -> bool:
         """A MISSION_CURRENT is of the mission that is known, not of one that is sent now."""
-        return not self.open or (self.plan_id != 0 and plan_id(message) == self.plan_id)
+        return not self.open or self._mission.is_meant(message)
 
     def abort(self) -> list[Message]:
         """Somebody else has the vehicle: the transfer ends where it is."""
@@ -230,8 +227,8 @@ class Board:
             self.upload.reset()
         if self._uploading is not None:
             self._ambiguous.credit(self._uploading[0])
-            self._uploading, self.held = None, None
-            self._state = MissionState.UNKNOWN if self._profile.atomic else MissionState.MIXED
+            self._uploading = None
+            self._mission.break_off()
         return []
 
     def verified(self) -> bool:
@@ -243,23 +240,16 @@ class Board:
     def restarted(self) -> None:
         """The vehicle forgot its transfer, and perhaps its mission."""
         self.upload.reset()
-        self.is_foreign, self._infeasible, self._unsure = False, None, None
+        self._failures.clear()
         self._ambiguous.clear()
         self.progress.invalidate()
-        self.held, self._uploading, self._state = None, None, MissionState.UNKNOWN
-        self.read_once = False
+        self._mission.forget()
+        self._uploading = self._unsure = None
         self.recall.reset()
 
     def watch(self, message: Message, now: float) -> None:
         """Has somebody else changed the mission? What MISSION_CURRENT says is doubt, not proof."""
-        if self.held is None or now - self.verified_at < SETTLE:
-            return
-        ours, plan = self.plan_id, plan_id(message)
-        changed = (plan != ours if plan and ours else message.total not in (
-            0, 65535, len(self.held), len(self.held) + self.own))
-        gone = message.mission_state == d.MISSION_STATE_NO_MISSION and self.held
-        if changed or gone or now - self.verified_at > CHECK:
-            self.held = None  # read what is on board before anything else
+        self._mission.watch(message, now)
 
     def catch_up(self, now: float) -> None:
         """Complete what the vehicle has flown before anybody listened."""
@@ -269,11 +259,7 @@ class Board:
             self.progress.caught_up(self.recall.flown(self.open_tasks(), now))
 
     def _settle(self, now: float) -> None:
-        if self._infeasible is not None and now >= self._infeasible[0]:
-            _, stops, reason, asked = self._infeasible
-            self._infeasible = None
-            for task in stops:
-                self.list.refuse(task, reason, asked)
+        self._failures.step(now)
         while self.upload.events:
             event = self.upload.events.popleft()
             if isinstance(event, Held):
@@ -308,11 +294,9 @@ class Board:
         self._ambiguous.goes_on()
 
     def _verify(self, items: tuple[Item, ...], revision: int, now: float) -> None:
-        self.held, self.revision, self.verified_at = items, revision, now
-        self._state, self.read_once = MissionState.VERIFIED, True
-        self.is_foreign = False
+        self._mission.verify(items, now)
+        self.revision = revision
         self.list.horizon.verified()
-        self.plan_id = self._heard_plan
 
     def _was_read(self, event: Held, now: float) -> None:
         if event.items is None:
@@ -327,42 +311,26 @@ class Board:
                 self._verify(found.items, tasks.revision, now)
                 return
             self._ambiguous.credit(found)
-        if known and all_alike(known, held):
-            self.held, self.verified_at = known, now
-            if self._state is MissionState.UNKNOWN:
-                self._state = MissionState.VERIFIED
+        if not self._mission.was_read(
+                held, known, self.tasks is not None, lambda: self._goes_on(held), now):
             return
-        self.held, self.verified_at, self.plan_id = held, now, self._heard_plan
-        if self._state is MissionState.VERIFIED or (self.tasks is None and held):
-            self._state = MissionState.FOREIGN
-            self.is_foreign = self.is_foreign or self.read_once
-            self.read_once = False
-        elif self.is_foreign and self.tasks is not None and self.wanted() and change(
-                held, None, self.wanted(), done=self.progress.completed).kind is not Kind.SWAP:
-            self.is_foreign, self._state = False, MissionState.UNKNOWN
         self.recall.stash()
         current = self._telemetry.current
         self.progress.begin(held, None if current is None or not held
                             else max(0, current - self.own), now, read=True)
 
+    def _goes_on(self, held: tuple[Item, ...]) -> bool:
+        """The list can go on with a mission, without a swap."""
+        wanted = self.wanted()
+        return bool(wanted) and change(
+            held, None, wanted, done=self.progress.completed).kind is not Kind.SWAP
+
     def _was_refused(self, event: Failed, found: Change, tasks: TaskList, now: float) -> None:
-        self.held, self.trouble = None, event.reason != OVERTAKEN
-        self._state = MissionState.UNKNOWN if self._profile.atomic else MissionState.MIXED
+        self._mission.break_off()
+        self.trouble = event.reason != OVERTAKEN
         if event.result is None and self._sent_since is not None and not self._begun:
             self._unsure = found, tasks
         else:
             self._ambiguous.credit(found)
-        if not self.trouble:
-            return
-        self.notes.append(Note('error', f'mission upload failed: {event.reason}'))
-        stops = [item.task for item in found.items if item.completes]
-        if event.result == NO_SPACE:
-            self.notes.append(Note('warning', self.list.horizon.shrink(len(stops))))
-            self.trouble = self.list.horizon.stops is None
-        elif event.result is not None:
-            seq = min(max((event.seq or 0) - self.own, 0), len(found.items) - 1)
-            task = next((i.task for i in found.items[seq:] if i.task), stops[0] if stops else '')
-            self.list.refuse(task, event.reason, tasks)
-            self.trouble = not task
-        elif 'infeasible' in event.reason:  # or it was just restarted, as its clock will tell
-            self._infeasible = now + LATE, stops, event.reason, tasks
+        if self.trouble:
+            self.trouble = self._failures.take(event, found, tasks, now)

@@ -16,11 +16,12 @@ from uav_task_alloc.geometry.frames import Origin
 from uav_task_alloc.mavlink import authority as who
 from uav_task_alloc.mavlink.authority import Action, Hold, Record
 from uav_task_alloc.mavlink.authority_watch import AuthorityWatch
-from uav_task_alloc.mavlink.board import Board, MissionState
+from uav_task_alloc.mavlink.board import Board
 from uav_task_alloc.mavlink.board_events import passed_over, task_events
 from uav_task_alloc.mavlink.codec import Message
 from uav_task_alloc.mavlink.flown_path import Sample
 from uav_task_alloc.mavlink.fly_list import FlyList
+from uav_task_alloc.mavlink.held_mission import MissionState
 from uav_task_alloc.mavlink.helm import Helm, Step
 from uav_task_alloc.mavlink.mission_evidence import MissionEvidence
 from uav_task_alloc.mavlink.nothing_to_fly import NothingToFly

@@ -9,8 +9,8 @@ from enum import Enum
 from pymavlink.dialects.v20 import ardupilotmega as d
 
 from uav_task_alloc.mavlink.authority import State, Suspension
-from uav_task_alloc.mavlink.board import MissionState
 from uav_task_alloc.mavlink.ground import Served
+from uav_task_alloc.mavlink.held_mission import MissionState
 from uav_task_alloc.mavlink.pilot import Pilot
 from uav_task_alloc.mavlink.profiles import Flight
 from uav_task_alloc.mavlink.telemetry import STALE
