@@ -3,6 +3,7 @@
 import pytest
 from authority_bench import (
     BOTH,
+    LONG,
     MODES,
     PX4,
     AuthorityBench,
@@ -13,10 +14,13 @@ from authority_bench import (
     flying,
     in_flight,
     keeps_quiet,
+    lost,
     on_ground,
     shows,
     suspended,
 )
+from findings_bench import set_current
+from flight_bench import places
 from mission_bench import task_list
 
 from uav_task_alloc.mavlink.authority import Suspension
@@ -161,6 +165,30 @@ def test_held_for_a_swap_it_is_ours_for_a_minute(dead, state):
         assert bench.run(lambda: bench.completed() == list('ZYXWV'), 200.0)
     else:
         assert keeps_quiet(bench, names='ABC')
+
+
+def test_killed_in_a_swap_the_current_item_says_nothing_of_the_new_mission():
+    """ArduPilot keeps the number of its current item while another mission is written."""
+    bench = flying('ardupilot', delay=(0.1, 0.1))
+    assert bench.run(lambda: len(bench.completed()) == 2, 200.0)
+    bench.assign(task_list('ZYXWV', 2))
+    assert bench.run(lambda: bench.board().upload.sent_all, 30.0)
+    bench.run(limit=0.3)
+    bench.vehicles[1].rc_mode(3)  # a pilot has it fly on from there
+    bench.dead_for(0.5)
+    bench.assign(task_list('ZYXWV', 2))
+    bench.run(limit=8.0)
+    assert not set(bench.completed()) & set('ZYXWV') - set(places(bench))
+
+
+@BOTH
+def test_a_current_item_set_while_another_had_it_completes_nothing(kind):
+    bench = lost(kind)
+    bench.dead_for(1.0)
+    set_current(bench, 3)
+    bench.assign(task_list(LONG, 2))
+    bench.run(limit=10.0)
+    assert set(bench.completed()) <= set(places(bench))
 
 
 @pytest.mark.parametrize('moment', [0.0, 0.5, 1.0])

@@ -69,6 +69,11 @@ class Pilot:
                            self._ending, self._texts)
         if record is not None:
             self.board.recall.known = record.mission, record.current
+            # the current item may be of the mission before, or set by whoever had it
+            self.board.recall.doubtful = (
+                record.swap_at is not None and not profile.atomic) or (
+                record.state is who.State.LOST
+                and profile.flight(record.mode or 0) is not Flight.MISSION)
         for mark in self.watch.marks.values():
             if mark.flown:
                 self.board.recall.told.add(mark.task)

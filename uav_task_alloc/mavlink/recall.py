@@ -38,6 +38,7 @@ class Recall:
         self.unflown: dict[str, Point] = {}  # passed over, not by a bridge
         self.told: set[str] = set()  # flown, as the bridge before has told
         self.known: tuple[int | None, int | None] = None, None  # mission and item, before
+        self.doubtful = False  # what the current item of the vehicle says of earlier ones
         self._rebooted = False
         self.reset()
 
@@ -61,7 +62,8 @@ class Recall:
             self.placed = self.placed or not held
             return
         self.placed = True
-        if not self._profile.atomic and telemetry.flight is not Flight.MISSION:
+        if self.doubtful or (
+                not self._profile.atomic and telemetry.flight is not Flight.MISSION):
             self._progress.begin(held, None, now)  # held for a swap: current is of the old items
             return
         # not by REACHED: PX4 repeats that of the mission before for some seconds
