@@ -58,6 +58,7 @@ class Judge:
         self._crossed: set[str] = set()  # tasks whose places it crossed at such a moment
         self._at = ''  # the task that it has reached, until it leaves: one visit
         self._stuck_since = self._moved_at = 0.0
+        self._listed = world.tasks  # a new list begins a new transfer
 
     def handed_back(self) -> None:
         """By the service, or by a pilot."""
@@ -188,8 +189,8 @@ class Judge:
             stop.task.id not in self.completed for stop in world.tasks.stops)
         ready = (state is not None and state.authority.name == 'HELD' and wants
                  and world.now >= world.link.cut_until and not self.failing)
-        if not ready:
-            self._stuck_since = world.now
+        if not ready or world.tasks is not self._listed:
+            self._stuck_since, self._listed = world.now, world.tasks
         if world.now - max(self._stuck_since, self._moved_at) > STUCK:
             self._fault('held_forever', f'{flight.mode.name}, {state}')
             self._moved_at = math.inf  # once a flight

@@ -153,6 +153,23 @@ def test_fault_27_an_item_altered_on_board_is_found_and_sent_again(kind):
 
 
 @BOTH
+def test_a_late_answer_that_nothing_is_on_board_is_asked_again(kind):
+    """It answers a request from before the upload."""
+    bench = UploadBench(kind)
+    mission = bench.mission()
+    late = [True]
+
+    def empty(way, message, now):
+        if way == 'down' and message.get_type() == 'MISSION_COUNT' and late:
+            late.clear()
+            message.count = mission.own
+        return None
+    bench.line.tampers.append(empty)
+    verified(bench, bench.replace(mission))
+    assert bench.upload.uploads == 1
+
+
+@BOTH
 def test_an_upload_that_never_matches_ends_after_three_tries(kind):
     bench = UploadBench(kind)
 

@@ -102,6 +102,7 @@ class Upload:
         self._due = 0.0
         self._asked: int | None = None
         self._sent_last = self._accepted = False
+        self._read_twice = False  # accepted, and then nothing was on board
         self._sent_once = False  # the last item of this mission, in this try or one before
 
     @property
@@ -264,7 +265,7 @@ class Upload:
             return
         if self._counts == 0:
             self.uploads += 1
-            self._sent_last = self._accepted = False
+            self._sent_last = self._accepted = self._read_twice = False
             self._asked = None
         self._counts += 1
         self._out.append(self._peer.count(len(self._mission.items)))
@@ -282,6 +283,9 @@ class Upload:
         elif done and self._alike(held, self._mission):
             self.events.append(Verified(self._mission))
             self._go(Event.MATCH, now)
+        elif done and self._accepted and len(held) <= self._mission.own and not self._read_twice:
+            self._read_twice = True  # the answer may be late, to a request before the upload
+            self._enter(State.READING, now)
         elif done and self._accepted and len(held) <= self._mission.own:
             self._fail('accepted, and then no mission is on board: infeasible')
             self._go(Event.UNREAD, now)
