@@ -148,7 +148,9 @@ def test_finding_24_a_list_of_66000_points_is_refused_and_the_one_before_stays(b
     one.node.on_list('uav_1', m.TaskList(uav_id='uav_1', revision=2, tasks=[short, far]))
     assert one.log['warning'] == [
         'uav_1/task_list: task_list of uav_1: points = 66000: expected at most 65533: ignored']
-    assert one.node.ground.served[1].pilot.board.tasks.revision == 1
+    board = one.node.ground.served[1].pilot.board
+    one.until(lambda: board.tasks is not None)
+    assert board.tasks.revision == 1
     assert one.node.receiver.is_alive()
 
 

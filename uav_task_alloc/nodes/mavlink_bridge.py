@@ -21,6 +21,7 @@ from uav_task_alloc.mavlink.link import open_link
 from uav_task_alloc.mavlink.policy import Policy
 from uav_task_alloc.mavlink.radio import Radio
 from uav_task_alloc.mavlink.status import Told, facts_of, state_of
+from uav_task_alloc.mission import TaskList
 from uav_task_alloc.model import ThreatZone, check_number, check_ros_name
 from uav_task_alloc.nodes import bridge_messages as convert
 from uav_task_alloc.nodes.bounds import cut, printable
@@ -92,7 +93,7 @@ class MavlinkBridge(Node):
         self.create_subscription(m.ThreatZoneArray, 'threat_zones', self.on_zones, LATCHED)
         self.origins = FleetOrigin(self, self.station.origin, lambda text: self.log['warning'](
             f'fleet_origin: {text}: ignored'))
-        self.waiting: dict[str, m.TaskList] = {}  # lists until the origins agree
+        self.waiting: dict[str, TaskList] = {}  # lists until the origins agree
         self.create_service(HandOver, '~/hand_over', self.on_hand_over)
         self.create_timer(0.05, self.on_tick)
         self.create_timer(1.0, self.on_second)
@@ -167,8 +168,12 @@ class MavlinkBridge(Node):
         self.take_lists()
 
     def on_list(self, uav_id: str, msg: m.TaskList) -> None:
-        """A new list for a UAV."""
-        self.waiting[uav_id] = msg
+        """A new list for a UAV; a bad one leaves the one before."""
+        try:
+            self.waiting[uav_id] = convert.to_list(msg, uav_id, self.station.origin,
+                                                   self.live.now.acceptance_radius)
+        except InvalidValue as error:
+            self.log['warning'](f'{uav_id}/task_list: {error}: ignored')
         self.take_lists()
 
     def take_lists(self) -> None:
@@ -176,20 +181,10 @@ class MavlinkBridge(Node):
         if (self.waiting and self.end.asked is None and not self.origins.conflict()
                 and self.origins.settled()):
             waiting, self.waiting = self.waiting, {}
-            for uav_id, msg in waiting.items():
-                self.take_list(uav_id, msg)
-
-    def take_list(self, uav_id: str, msg: m.TaskList) -> None:
-        """A list that may be flown."""
-        try:
-            tasks = convert.to_list(msg, uav_id, self.station.origin,
-                                    self.live.now.acceptance_radius)
-        except InvalidValue as error:
-            self.log['warning'](f'{uav_id}/task_list: {error}: ignored')
-            return
-        with self.lock:
-            out = self.ground.assign(uav_id, tasks, time.monotonic())
-        self.radio.send(out)
+            for uav_id, tasks in waiting.items():
+                with self.lock:
+                    out = self.ground.assign(uav_id, tasks, time.monotonic())
+                self.radio.send(out)
 
     def on_zones(self, msg: m.ThreatZoneArray) -> None:
         """The whole picture of the zones; one whose new form is bad stays as it was."""
