@@ -203,16 +203,31 @@ def check_polygon(place: str, vertices: Iterable[Iterable[float]]) -> tuple[
         corners.pop()
     if len(corners) < 3:
         raise InvalidValue(place, tuple(corners), 'at least 3 corners')
-    n = len(corners)
-    for i in range(n):
-        for j in range(i + 1, n):
-            if _edges_meet(corners[i], corners[(i + 1) % n], corners[j], corners[(j + 1) % n],
-                           adjacent=j == i + 1 or (j + 1) % n == i):
-                raise InvalidValue(place, tuple(corners), 'edges that do not cross or touch')
+    if _crosses_itself(corners):
+        raise InvalidValue(place, tuple(corners), 'edges that do not cross or touch')
     if abs(sum(a[0] * b[1] - b[0] * a[1] for a, b in zip(
             corners, corners[1:] + corners[:1], strict=True))) < 1e-9:
         raise InvalidValue(place, tuple(corners), 'a polygon with some area')
     return tuple(corners)
+
+
+def _crosses_itself(corners: list[tuple[float, float]]) -> bool:
+    """Whether two edges cross or touch; looks only at those whose boxes do.
+
+    From left to right: an edge meets none of those that end before it begins.
+    """
+    n, ahead = len(corners), list[tuple[float, float, float, int]]()  # x1, y0, y1, edge
+    edges = [(min(a[0], b[0]), max(a[0], b[0]), min(a[1], b[1]), max(a[1], b[1]), i)
+             for i, (a, b) in enumerate(zip(corners, corners[1:] + corners[:1], strict=True))]
+    for x0, x1, y0, y1, i in sorted(edges):
+        ahead = [other for other in ahead if other[0] >= x0]
+        for _, low, high, j in ahead:
+            if y0 <= high and low <= y1 and _edges_meet(
+                    corners[i], corners[(i + 1) % n], corners[j], corners[(j + 1) % n],
+                    adjacent=(i + 1) % n == j or (j + 1) % n == i):
+                return True
+        ahead.append((x1, y0, y1, i))
+    return False
 
 
 def _edges_meet(a: tuple[float, float], b: tuple[float, float], c: tuple[float, float],

@@ -176,3 +176,52 @@ def test_for_how_long_is_a_number_or_unknown(given, seconds):
 def test_a_state_carries_who_has_the_uav():
     line = lines.state(m.UavState(authority=m.UavState.LOST, reason='why'))
     assert (line['authority'], line['reason']) == ('LOST', 'why')
+
+
+@pytest.mark.parametrize('value', ['\u00b2', '\u0663', '-1', '', '9' * 5000, '1e3'])
+def test_finding_31_a_count_of_uploads_is_plain_digits(value):
+    status = DiagnosticStatus(name='b', values=[KeyValue(key='uploads', value=value)])
+    assert lines.uploads(DiagnosticArray(status=[status]))['uploads'] == {}
+
+
+def test_finding_31_via_points_that_are_no_places_are_left_out():
+    line = lines.task_list(broken_list())
+    assert line['tasks'][0]['via'] == [(1.0, 2.0, 3.0)]
+    json.dumps(line, allow_nan=False)
+
+
+def broken_list():
+    return m.TaskList(uav_id='uav_1', revision=7, tasks=[m.PlannedTask(task=ADD.tasks[0], via=[
+        Point(x=math.nan), Point(x=1.0, y=2.0, z=3.0), Point(z=math.inf)])])
+
+
+def test_finding_31_hostile_lists_counts_and_zones_do_not_end_the_view(start, probe):
+    view = start('live_view', '-p', 'port:=0')
+    health = probe.publisher(DiagnosticArray, '/diagnostics', 10)
+    plans = probe.publisher(m.Allocation, 'allocation', LATCHED)
+    zones = probe.publisher(m.ThreatZoneArray, 'threat_zones', LATCHED)
+    states = probe.publisher(m.UavState, 'uav_states', STATES)
+    health.publish(DiagnosticArray(status=[DiagnosticStatus(
+        name='bridge', values=[KeyValue(key='uploads', value='\u00b2')])]))
+    plans.publish(m.Allocation(revision=1, lists=[broken_list()]))
+    turns = [2.0 * math.pi * k / 3000 for k in range(3000)]
+    many = m.ThreatZone(zone_id='many', shape=m.ThreatZone.POLYGON, z_min=0.0, z_max=9.0)
+    many.vertices = [Point(x=100.0 * math.cos(turn), y=100.0 * math.sin(turn)) for turn in turns]
+    good = from_zones([ThreatZone.hemisphere('z1', (1.0, 2.0, 3.0), 4.0)], 0.0).zones
+    zones.publish(m.ThreatZoneArray(zones=[many, *good]))
+    probe.until(lambda: (states.publish(state()), probe.node.count_subscribers(
+        'uav_1/task_list'))[1], 20.0, view.output)
+    probe.publisher(m.TaskList, 'uav_1/task_list', LATCHED).publish(broken_list())
+    address = re.search(r'Live page: (http://127\.0\.0\.1:\d+/)', view.output()).group(1)
+
+    def parts():
+        with urllib.request.urlopen(f'{address}at?wall=9e9', timeout=10) as answer:
+            return json.load(answer)['parts']
+
+    probe.until(lambda: {'list uav_1', 'zones'} <= parts().keys(), 20.0, view.output)
+    assert parts()['list uav_1']['tasks'][0]['via'] == [[1.0, 2.0, 3.0]]
+    assert [zone['id'] for zone in parts()['zones']] == ['z1']
+    zones.publish(m.ThreatZoneArray(zones=[m.ThreatZone() for _ in range(1001)]))
+    probe.until(lambda: 'threat_zones: zones: number = 1001: expected at most 1000'
+                in view.output(), 20.0, view.output)
+    assert view.stop()[0] == 0

@@ -41,6 +41,7 @@ from uav_task_alloc.nodes.painter import Painter
 from uav_task_alloc.nodes.parameters import declare
 from uav_task_alloc.nodes.run import run
 from uav_task_alloc.nodes.teller import Teller
+from uav_task_alloc.nodes.topic_names import TASK_LIST, check_topic
 from uav_task_alloc.params import AllocatorParams
 
 TICK = 0.025  # [s]
@@ -134,7 +135,9 @@ class AllocatorNode(Node):
     def on_state(self, msg: m.UavState) -> None:
         """A UAV says how it is."""
         try:
-            refused = self.world.hear(to_report(msg), time.monotonic(), self.stamp())
+            report = to_report(msg)
+            check_topic(self, TASK_LIST, report.uav_id)
+            refused = self.world.hear(report, time.monotonic(), self.stamp())
             if refused:  # for want of room, which the world says once
                 return
         except InvalidValue as error:

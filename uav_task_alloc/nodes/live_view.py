@@ -20,17 +20,32 @@ from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.live.board import Board
 from uav_task_alloc.live.scene import Scene
 from uav_task_alloc.model import is_ros_name
-from uav_task_alloc.nodes.messages import ANNOUNCEMENTS, LATCHED, STATES
+from uav_task_alloc.nodes import announcements
+from uav_task_alloc.nodes.bounds import cut
+from uav_task_alloc.nodes.messages import ANNOUNCEMENTS, LATCHED, STATES, to_zone
 from uav_task_alloc.nodes.parameters import declare
 from uav_task_alloc.nodes.run import run, with_flags
+from uav_task_alloc.nodes.topic_names import TASK_LIST, check_topic
 from uav_task_alloc.params import LiveViewParams
 from uav_task_alloc.record import lines
-from uav_task_alloc.record.heard import FILE, Heard
+from uav_task_alloc.record.heard import FILE, Heard, zone_to_json
 from uav_task_alloc.record.progress import fleet, headline, is_over
 
 REFRESH = 0.5  # [s] in a terminal
 PLAIN_EVERY = 4  # refreshes between two lines where the output is no terminal
+MOST_REFUSED = 200  # lines of the log
 UP_AND_CLEAR = '\x1b[{}F\x1b[J'
+
+
+def zones_line(msg: m.ThreatZoneArray) -> lines.Body:
+    """The good zones as a line of the record, within the same bounds as the allocator's.
+
+    The allocator says what is wrong with the others. Raises InvalidValue where the picture is
+    too large.
+    """
+    announcements.check_picture(msg)
+    good, _ = announcements.sort_zones(msg, to_zone)
+    return {'kind': 'zones', 'zones': [zone_to_json(each) for each in good]}
 
 
 class LiveView(Node):
@@ -42,6 +57,7 @@ class LiveView(Node):
         self.played = scenario.load(self.params.scenario) if self.params.scenario else None
         self.origin = self.played.origin if self.played else scenario.values.DEFAULT_ORIGIN
         self.heard = Heard()
+        self.refused: set[tuple[str, str]] = set()  # topic and why, as logged
         self.scene, self.board = Scene(self.heard), Board()
         self.file = self._open()
         self.recorder = self._record()
@@ -59,12 +75,12 @@ class LiveView(Node):
         for kind, topic, qos, read in (
             (m.TaskAnnouncement, 'task_announcements', ANNOUNCEMENTS,
              lambda msg: lines.announced(msg, self.origin)),
-            (m.ThreatZoneArray, 'threat_zones', LATCHED, lines.zones),
+            (m.ThreatZoneArray, 'threat_zones', LATCHED, zones_line),
             (m.TaskStatusArray, 'task_statuses', LATCHED, lines.statuses),
             (m.Allocation, 'allocation', ANNOUNCEMENTS, lines.allocation),
             (DiagnosticArray, '/diagnostics', 10, lines.uploads),
         ):
-            self.create_subscription(kind, topic, self.taking(read), qos)
+            self.create_subscription(kind, topic, self.taking(topic, read), qos)
         self.create_subscription(m.UavState, 'uav_states', self.on_state, STATES)
         for uav in self.played.uavs if self.played else ():
             self.follow(uav.id)
@@ -72,10 +88,17 @@ class LiveView(Node):
     def follow(self, uav: str) -> None:
         """Listen to the task lists of one UAV."""
         self.heard.lists[uav] = {'tasks': [], 'distance': 0.0}
-        self.create_subscription(m.TaskList, f'{uav}/task_list',
-                                 self.taking(lines.task_list), LATCHED)
+        try:
+            topic = check_topic(self, TASK_LIST, uav)
+        except InvalidValue as error:  # the rest of what it says is shown all the same
+            return self.refuse('task_list', error)
+        self.create_subscription(m.TaskList, topic, self.taking(topic, lines.task_list), LATCHED)
 
     def on_state(self, msg: m.UavState) -> None:
+        """As `take_state`, whatever the message brings."""
+        self.guarded('uav_states', lambda: self.take_state(msg))
+
+    def take_state(self, msg: m.UavState) -> None:
         """Record a state where something but the position is new, else twice a second."""
         if not is_ros_name(msg.uav_id):
             return  # has no topic of lists; the allocator says what is wrong with it
@@ -89,9 +112,25 @@ class LiveView(Node):
                 line[key] != old[key] for key in what):
             self.take(line)
 
-    def taking(self, read: Callable[[Any], lines.Body]) -> Callable[[Any], None]:
+    def taking(self, topic: str, read: Callable[[Any], lines.Body]) -> Callable[[Any], None]:
         """A callback that records what `read` makes of a message."""
-        return lambda msg: self.take({'wall': time.time(), **read(msg)})
+        return lambda msg: self.guarded(
+            topic, lambda: self.take({'wall': time.time(), **read(msg)}))
+
+    def guarded(self, topic: str, take: Callable[[], None]) -> None:
+        """Take one message; one that is bad is refused, and no more."""
+        try:
+            take()
+        except Exception as error:
+            self.refuse(topic, error)
+
+    def refuse(self, topic: str, error: Exception) -> None:
+        """Log what is wrong with a message, each fault of a topic once."""
+        why = str(error) if isinstance(error, InvalidValue) else cut(
+            f'{type(error).__name__}: {error}')
+        if len(self.refused) < MOST_REFUSED and (topic, why) not in self.refused:
+            self.refused.add((topic, why))
+            self.get_logger().warning(f'{topic}: {why}: ignored; said once')
 
     def take(self, line: lines.Body) -> None:
         """Fold a line into what is known, and write it down."""

@@ -30,6 +30,7 @@ from uav_task_alloc.nodes.fleet_origin import FleetOrigin
 from uav_task_alloc.nodes.messages import EVENTS, LATCHED, STATES
 from uav_task_alloc.nodes.parameters import declare
 from uav_task_alloc.nodes.run import run
+from uav_task_alloc.nodes.topic_names import TASK_LIST, check_topic
 from uav_task_alloc.params import BridgeParams
 
 TICK = 0.02  # [s] between steps of the machines; messages are acted on as they come
@@ -162,8 +163,14 @@ class MavlinkBridge(Node):
             served.pilot.policy = policy
             if served.uav_id not in self.lists:
                 self.get_logger().info(f'found {served.uav_id}: {served.pilot.profile.name}')
+                try:
+                    topic = check_topic(self, TASK_LIST, served.uav_id)
+                except InvalidValue as error:
+                    self.lists[served.uav_id] = None
+                    self.get_logger().error(f'it gets no task lists: {error}')
+                    continue
                 self.lists[served.uav_id] = self.create_subscription(
-                    m.TaskList, f'{served.uav_id}/task_list',
+                    m.TaskList, topic,
                     lambda msg, uav_id=served.uav_id: self.on_list(uav_id, msg), LATCHED)
         self.take_lists()
 

@@ -12,9 +12,11 @@ from visualization_msgs.msg import MarkerArray
 from uav_task_alloc.allocator.changes import changed_tasks
 from uav_task_alloc.allocator.records import Outbox, UavList
 from uav_task_alloc.allocator.world import World
+from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.model import Point
 from uav_task_alloc.nodes.markers import Picture, markers
 from uav_task_alloc.nodes.messages import LATCHED
+from uav_task_alloc.nodes.topic_names import PATH, check_topic
 from uav_task_alloc.nodes.ways import path
 
 LOOK = 0.2  # [s] between two looks at what is new
@@ -52,8 +54,12 @@ class Painter:
             self.node.destroy_publisher(self.paths.pop(uav_id))
         for uav_id in out.lists:
             if uav_id not in self.paths:
-                self.paths[uav_id] = self.node.create_publisher(Path, f'{uav_id}/path', LATCHED)
-        self.untold.update(out.lists)
+                try:
+                    topic = check_topic(self.node, PATH, uav_id)
+                except InvalidValue:
+                    continue  # whoever publishes its list says so
+                self.paths[uav_id] = self.node.create_publisher(Path, topic, LATCHED)
+            self.untold.add(uav_id)
         if out.allocation is not None:
             self.before, self.after = self.after, out.allocation.lists
             self.trigger = out.allocation.trigger

@@ -12,8 +12,10 @@ from uav_task_alloc_msgs import msg as m
 from uav_task_alloc.allocator.records import Allocation, Outbox, UavList
 from uav_task_alloc.allocator.status import status_of
 from uav_task_alloc.allocator.world import World
+from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.nodes import allocation_messages as told
 from uav_task_alloc.nodes.messages import LATCHED
+from uav_task_alloc.nodes.topic_names import TASK_LIST, check_topic
 
 SLICE = 0.02  # [s] of lists at once
 REST = 5.0  # times as long as a whole picture took none follows: a sixth of a core at most
@@ -25,6 +27,7 @@ class Teller:
     def __init__(self, node: Node, world: World) -> None:
         self.node, self.world = node, world
         self.publishers: dict[str, Publisher] = {}
+        self.unnamed: set[str] = set()  # UAVs of a journal that no topic can be named after here
         self.statuses = node.create_publisher(m.TaskStatusArray, 'task_statuses', LATCHED)
         self.allocation = node.create_publisher(m.Allocation, 'allocation', LATCHED)
         self.lists: dict[str, UavList] = {}  # not told yet, as the two below
@@ -69,7 +72,9 @@ class Teller:
         until = time.monotonic() + SLICE
         while self.lists and time.monotonic() < until:
             uav_id = next(iter(self.lists))
-            self._publisher(uav_id).publish(self._list(self.lists.pop(uav_id)))
+            uav_list = self.lists.pop(uav_id)
+            if publisher := self._publisher(uav_id):
+                publisher.publish(self._list(uav_list))
         if time.monotonic() >= self.rested:
             self._tell_all(stamp)
         return bool(self.lists)
@@ -87,10 +92,18 @@ class Teller:
         now = time.monotonic()
         self.rested = now + REST * (now - began)
 
-    def _publisher(self, uav_id: str) -> Publisher:
+    def _publisher(self, uav_id: str) -> Publisher | None:
+        """None, and a word why, where there can be no such topic."""
+        if uav_id in self.unnamed:
+            return None
         if uav_id not in self.publishers:
-            self.publishers[uav_id] = self.node.create_publisher(
-                m.TaskList, f'{uav_id}/task_list', LATCHED)
+            try:
+                topic = check_topic(self.node, TASK_LIST, uav_id)
+            except InvalidValue as error:
+                self.unnamed.add(uav_id)
+                self.node.get_logger().error(f'its task list is not published: {error}')
+                return None
+            self.publishers[uav_id] = self.node.create_publisher(m.TaskList, topic, LATCHED)
         return self.publishers[uav_id]
 
     def _list(self, uav_list: UavList) -> m.TaskList:

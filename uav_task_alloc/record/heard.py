@@ -112,10 +112,10 @@ class Heard:
 
     def on_zones(self, line: Line) -> None:
         """The whole picture of zones: what is missing from it has gone, what is new has come."""
-        now = [zone_from_json(row) for row in line['zones']]
+        now = dict.fromkeys(zone_from_json(row) for row in line['zones'])  # in order
         self.zones = [seen if seen.until < math.inf or seen.zone in now
                       else SeenZone(seen.zone, seen.since, line['wall']) for seen in self.zones]
-        there = [seen.zone for seen in self.zones if seen.until == math.inf]
+        there = {seen.zone for seen in self.zones if seen.until == math.inf}
         self.zones += [SeenZone(zone, line['wall']) for zone in now if zone not in there]
 
     def on_list(self, line: Line) -> None:

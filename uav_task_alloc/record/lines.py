@@ -6,6 +6,7 @@ A message is whatever has the fields of its type: one of rclpy, or one read from
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterable
 from typing import Any
 
@@ -24,6 +25,7 @@ STATES = ('PENDING', 'ASSIGNED', 'ACTIVE', 'COMPLETED', 'FAILED', 'CANCELLED', '
 MODES = ('UNKNOWN', 'STANDBY', 'TAKEOFF', 'ON_MISSION', 'HOLD', 'RETURNING', 'LANDING', 'FAULT')
 MISSIONS = ('UNKNOWN', 'UPLOADING', 'VERIFIED', 'MIXED', 'FOREIGN')
 AUTHORITIES = ('UNKNOWN', 'NONE', 'HELD', 'SUSPENDED', 'LOST')
+_COUNT = re.compile('[0-9]{1,18}')  # what isdigit() takes int() may not
 NOTHING = 'nothing is needed'  # gives back what the bridge has
 LOCAL = 0  # frame of a task
 
@@ -101,14 +103,15 @@ def allocation(msg: Message) -> Body:
 
 
 def task_list(msg: Message) -> Body:
-    """What a UAV has still to fly; `eta` [s] from `stamp` [unix s]."""
+    """What a UAV has still to fly; `eta` [s] from `stamp` [unix s]. Via points are places."""
     return {'kind': 'list', 'uav': msg.uav_id, 'revision': msg.revision, 'end': msg.end,
             'stamp': seconds(msg.header.stamp),
             'distance': finite(msg.distance), 'tasks': [
                 {'id': row.task.task_id, 'leg_distance': finite(row.leg_distance) or 0.0,
                  'eta': seconds(row.eta),
                  'position': [finite(v) for v in _xyz(row.task.position)],
-                 'via': [_xyz(point) for point in row.via]} for row in msg.tasks]}
+                 'via': [xyz for xyz in map(_xyz, row.via) if all(map(math.isfinite, xyz))]}
+                for row in msg.tasks]}
 
 
 def state(msg: Message) -> Body:
@@ -140,7 +143,7 @@ def uploads(msg: Message) -> Body:
 def _uploads(msg: Message) -> Iterable[tuple[str, int]]:
     for status in msg.status:
         for pair in status.values:
-            if pair.key == 'uploads' and pair.value.isdigit():
+            if pair.key == 'uploads' and _COUNT.fullmatch(pair.value):
                 yield status.name, int(pair.value)
 
 

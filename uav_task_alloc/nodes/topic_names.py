@@ -1,0 +1,29 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Topics that have the id of a UAV in their names: how long such an id may be."""
+from __future__ import annotations
+
+from rclpy.node import Node
+
+from uav_task_alloc.errors import InvalidValue
+
+LONGEST = 247  # characters of a topic's full name; rcl raises beyond
+TASK_LIST, PATH = '{}/task_list', '{}/path'
+
+
+def check_topic(node: Node, pattern: str, uav_id: str) -> str:
+    """The topic of a UAV, relative to the node's namespace.
+
+    Args:
+        node: who publishes or subscribes.
+        pattern: TASK_LIST or PATH.
+        uav_id: a ROS name.
+
+    Raises:
+        InvalidValue: the id is too long for a topic's name in this namespace.
+    """
+    namespace = node.get_namespace().rstrip('/')
+    most = LONGEST - len(namespace) - 1 - len(pattern.format(''))
+    if len(uav_id) > most:
+        raise InvalidValue('uav_id', uav_id, f'at most {most} characters in namespace '
+                           f'{namespace or "/"}: a topic has at most {LONGEST}')
+    return pattern.format(uav_id)
