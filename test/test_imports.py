@@ -26,8 +26,8 @@ ROS = {'rclpy', 'rcl_interfaces', 'builtin_interfaces', 'geometry_msgs', 'std_ms
 # a room knows those of a lower number only, and itself
 LEVELS = {
     'errors': 0, 'model': 1, 'params': 1, 'geometry': 2, 'objective': 2, 'solver': 3,
-    'scenario': 3, 'record': 4, 'allocator': 4, 'journal': 4, 'mission': 4, 'mavlink': 5,
-    'live': 5, 'plots': 5, 'progress': 5, 'planning': 6, 'study': 6,
+    'scenario': 3, 'record': 4, 'allocator': 4, 'journal': 4, 'mission': 4, 'long_legs': 4,
+    'mavlink': 5, 'live': 5, 'plots': 5, 'progress': 5, 'planning': 6, 'study': 6,
     'flight_report': 6, 'report': 6, '__main__': 7,
     'nodes': 8,
 }

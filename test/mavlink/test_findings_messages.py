@@ -168,7 +168,7 @@ def test_finding_10_a_message_that_cannot_be_encoded_leaves_the_others(radio, fa
 
 def far_places(count):
     """As many places, 60 m from each other, none more than 5 km from the next or the origin."""
-    return [(60.0 * (n % 60), 60.0 * (n // 60 % 60), 50.0 + n // 3600) for n in range(count)]
+    return [(60.0 * (n % 50), 60.0 * (n // 50 % 50), 50.0 + n // 2500) for n in range(count)]
 
 
 @BOTH

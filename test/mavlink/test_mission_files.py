@@ -13,7 +13,7 @@ from pymavlink import mavwp
 
 from uav_task_alloc import scenario
 from uav_task_alloc.errors import MissionError
-from uav_task_alloc.geometry.frames import to_geodetic
+from uav_task_alloc.geometry.frames import to_enu, to_geodetic
 from uav_task_alloc.mavlink.mission_files import file_name, mission_of, write_missions
 from uav_task_alloc.mission import GLOBAL, RETURN
 from uav_task_alloc.model import Leg, Plan
@@ -222,3 +222,33 @@ def test_what_no_item_holds_is_refused_before_anything_is_written(world, tmp_pat
     with pytest.raises(MissionError, match='service_time = 70000: expected at most 65535 s'):
         write_missions(replace(world, tasks=tasks), Plan(ROUTES, legs=LEGS), tmp_path / 'none')
     assert not (tmp_path / 'none').exists()
+
+
+FAR_WORLD = """
+origin: {latitude: 47.4, longitude: 8.5, altitude_amsl: 488}
+uavs:
+  - {id: ground, autopilot: ardupilot, position: [0, 0, 0]}
+  - {id: air, autopilot: ardupilot, position: [0, 0, 100], home: [0, 0, 0]}
+  - {id: px4, autopilot: px4, position: [0, 0, 100], home: [0, 0, 0]}
+tasks:
+  - {id: a, position: [50000, 0, 60]}
+  - {id: b, position: [50000, 12000, 80]}
+"""
+
+
+def test_finding_32_files_have_points_in_between_on_long_legs(tmp_path):
+    tmp_path.joinpath('far.yaml').write_text(FAR_WORLD)
+    far = scenario.load(tmp_path / 'far.yaml')
+    route = Plan(dict.fromkeys(('ground', 'air', 'px4'), ('a', 'b')), legs=dict.fromkeys(
+        ('ground', 'air', 'px4'), (Leg((), 1.0), Leg((), 1.0))))
+    missions = write_missions(far, route, tmp_path)
+    places = {mission.uav.id: [to_enu(far.origin, item.x / 1e7, item.y / 1e7, item.z)
+                               for item in mission.items] for mission in missions}
+    assert [len(places[uav]) for uav in ('ground', 'air', 'px4')] == [13, 14, 12]
+    for uav, start in (('ground', 60.0), ('air', 100.0), ('px4', 100.0)):
+        for x, _, z in places[uav][:-3]:
+            assert z == pytest.approx(start + (60.0 - start) * x / 50_000.0, abs=0.01)
+    assert 10_000.0 < places['px4'][0][0] < 11_200.0  # PX4 refuses what it refused before
+    assert [round(y) for _, y, _ in places['air'][-4:]] == [0, 4_000, 8_000, 12_000]
+    loader = mavwp.MAVWPLoader()
+    assert loader.load(str(tmp_path / 'air.waypoints')) == 15

@@ -40,6 +40,8 @@ class FlyList:
             return helm.wait_for('the item that another station has chosen')
         if found.kind is Kind.JUMP:
             return self._jump(found, now)
+        if board.list.leg.unknown:
+            return helm.wait_for('a position')
         if self._service.lasts(now):
             helm.waits_for = 'the end of the service'
             return []

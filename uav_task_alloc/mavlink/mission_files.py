@@ -17,7 +17,9 @@ from urllib.parse import quote
 
 from uav_task_alloc.geometry.frames import Origin, to_geodetic, to_geodetic_batch
 from uav_task_alloc.geometry.zones import way_is_clear
+from uav_task_alloc.long_legs import first_point, first_points, with_points_between
 from uav_task_alloc.mavlink.profiles import ARDUPILOT, PX4, Profile
+from uav_task_alloc.mavlink.telemetry import OFF_GROUND
 from uav_task_alloc.mission import GLOBAL, WAYPOINT, Item, Stop, TaskList, mission_items
 from uav_task_alloc.model import Plan, Point, Route, Shape, Task, ThreatZone
 from uav_task_alloc.scenario.values import Scenario, ScenarioUav
@@ -62,7 +64,7 @@ def mission_of(read: Scenario, uav: ScenarioUav, route: Route) -> Mission:
     """The mission of one route; raise MissionError where a task cannot be a mission item."""
     profile, _ = AUTOPILOTS[uav.autopilot]
     tasks = task_list(route, {timed.task.id: timed.task for timed in read.tasks})
-    items = mission_items(tasks, profile.rules, read.origin)
+    items = mission_items(_with_points_between(uav, profile, tasks), profile.rules, read.origin)
     fences, unfenced = _part(_way(uav, tasks), [timed.zone for timed in read.zones])
     return Mission(uav, read.origin, items, fences, unfenced)
 
@@ -72,6 +74,20 @@ def task_list(route: Route, tasks: Mapping[str, Task]) -> TaskList:
     home = route.legs[len(route.tasks):]
     return TaskList(1, tuple(Stop(tasks[name], leg.via) for name, leg in zip(
         route.tasks, route.legs, strict=False)), route.returns, home[0].via if home else ())
+
+
+def _with_points_between(uav: ScenarioUav, profile: Profile, tasks: TaskList) -> TaskList:
+    """Its long legs at the height of the plan; a first leg from the ground is flown level.
+
+    The files have no take-off: straight up to its first point it would fly low for kilometres.
+    """
+    start, first = uav.position, first_point(tasks)
+    if first is None:
+        return tasks
+    if start[2] - uav.home[2] < OFF_GROUND:
+        start = start[0], start[1], max(start[2], first[2])
+    return with_points_between(
+        tasks, first_points(start, first, uav.home, profile.farthest_first))
 
 
 def file_name(uav_id: str) -> str:

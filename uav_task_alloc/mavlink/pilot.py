@@ -19,6 +19,7 @@ from uav_task_alloc.mavlink.authority_watch import AuthorityWatch
 from uav_task_alloc.mavlink.board import Board
 from uav_task_alloc.mavlink.board_events import passed_over, task_events
 from uav_task_alloc.mavlink.codec import Message
+from uav_task_alloc.mavlink.first_leg import Place
 from uav_task_alloc.mavlink.flown_path import Sample
 from uav_task_alloc.mavlink.fly_list import FlyList
 from uav_task_alloc.mavlink.held_mission import MissionState
@@ -50,6 +51,7 @@ class Pilot:
         self.telemetry = Telemetry(profile, origin, now)
         self.board = Board(peer, profile, origin, self.telemetry, rng)
         self.helm = Helm(peer, profile, self.telemetry)
+        self.board.list.leg.place = self._leg_begins
         evidence = MissionEvidence(self.board, self.telemetry)
         self.watch = AuthorityWatch(profile, self.telemetry, evidence, lambda: self.policy,
                                     now, record, save)
@@ -216,6 +218,15 @@ class Pilot:
             self.board.progress.at(
                 Sample(message.time_boot_ms * 1e-3, place, velocity), newest, now,
                 self.telemetry.frame)
+
+    def _leg_begins(self) -> Place | None:
+        """Where it is, or where the take-off that is due ends; None: not known."""
+        telemetry, (x, y, z) = self.telemetry, self.telemetry.position
+        home = telemetry.home or telemetry.position
+        if not telemetry.airborne or self.helm.climbing:
+            z = max(z, home[2] + self.policy.cruise_altitude)
+        return Place((x, y, z), home, telemetry.flight is Flight.MISSION) if (
+            telemetry.has_position) else None
 
     def _begin_anew(self, now: float) -> None:
         self.board.restarted()

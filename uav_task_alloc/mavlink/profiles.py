@@ -39,6 +39,7 @@ class Profile:
     family: str = ''  # whose mode numbers these are, see `modes`; '': unknown
     jump_command: bool = True  # knows DO_SET_MISSION_CURRENT
     amsl_takeoff: bool = False  # NAV_TAKEOFF takes AMSL; else height above home
+    farthest_first: float = math.inf  # [m] from home to the first item, else it is refused
 
     def flight(self, custom_mode: int) -> Flight:
         return self.modes.get(custom_mode, Flight.PILOT if self.modes else Flight.UNKNOWN)
@@ -97,7 +98,7 @@ ARDUPLANE = replace(
 PX4 = Profile(
     # NAV_ACC_RAD is 10 m since 2026: it would fly past a task at 2 m/s and call it reached
     'px4', ItemRules(radius=2.0), atomic=True, idle_after=6.0, modes=_PX4, family='px4',
-    jump_command=False, amsl_takeoff=True,
+    jump_command=False, amsl_takeoff=True, farthest_first=10_000.0,  # MIS_DIST_1WP
     set_mode={Flight.MISSION: _px4(4, 4), Flight.HOLD: _px4(4, 3), Flight.RETURN: _px4(4, 5)})
 PX4_PLANE = replace(PX4, rules=replace(PX4.rules, loiters=True, radius=0.0))
 GENERIC = Profile('generic', ItemRules(yaw=0.0), atomic=False, idle_after=9.0, modes={},

@@ -7,6 +7,8 @@ from dataclasses import dataclass, replace
 
 from uav_task_alloc.errors import MissionError
 from uav_task_alloc.geometry.frames import Origin
+from uav_task_alloc.long_legs import first_point, with_points_between
+from uav_task_alloc.mavlink.first_leg import FirstLeg
 from uav_task_alloc.mavlink.horizon import Horizon
 from uav_task_alloc.mavlink.policy import Note, TaskProgress
 from uav_task_alloc.mavlink.profiles import Profile
@@ -35,6 +37,8 @@ class Wanted:
         self._room = MOST_ITEMS - int(profile.rules.home_first)
         self._profile, self._origin, self._progress = profile, origin, progress
         self._refused: dict[str, tuple[Task, str]] = {}  # as it was, and why
+        self.leg = FirstLeg(profile.rules.loiters, profile.farthest_first)
+        self._asked: object = None  # what the first leg is of
         self._items: tuple[object, tuple[Item, ...]] | None = None
         self._listed: dict[str, int] = {}  # the last revision with a task that was not completed
         self._away: frozenset[str] = frozenset()  # completed tasks that a later list did not have
@@ -89,13 +93,17 @@ class Wanted:
 
     def items(self) -> tuple[Item, ...]:
         """The items to fly from here; a task that cannot be one is refused."""
-        key = (self.tasks, len(self._progress.completed), self._progress.pending,
-               len(self._refused), self.horizon.stops)
+        asked = (self.tasks, len(self._progress.completed), self._progress.pending,
+                 len(self._refused), self.horizon.stops)
+        if self._asked != asked or self.leg.left:
+            self.leg.begin(self.remaining())
+            self._asked = asked
+        key = (asked, self.leg.version, self.leg.behind)
         if self._items is not None and self._items[0] == key:
             return self._items[1]
         remaining = self.remaining()
         try:
-            items = mission_items(remaining, self._profile.rules, self._origin)
+            items = self._items_of(remaining)
         except MissionError as error:
             self.refuse(error.task, str(error), remaining)
             return self.items()
@@ -104,6 +112,15 @@ class Wanted:
             return self.items()
         self._items = key, items
         return items
+
+    def _items_of(self, tasks: TaskList) -> tuple[Item, ...]:
+        """With points in between on long legs, where a mission has room for them."""
+        rules = self._profile.rules
+        filled = mission_items(with_points_between(tasks, self.leg.ahead(first_point(tasks))),
+                               rules, self._origin)
+        if len(filled) > self._room and len(tasks.stops) <= 1:
+            return mission_items(tasks, rules, self._origin)
+        return filled
 
     def _cut(self, items: tuple[Item, ...], tasks: TaskList) -> None:
         """More than a mission can hold: the first tasks only; none where even one does not fit."""
@@ -138,8 +155,9 @@ class Wanted:
         everything = replace(
             self.tasks.without({*self._progress.completed, *self._refused}),
             returns=False, end_via=())
-        wanted = mission_items(everything, self._profile.rules, self._origin)
+        wanted = self._items_of(everything)
         rest = held[self._progress.current or 0:]
         stops = sum(item.completes for item in rest)
-        return stops >= max(1, (self.horizon.stops or 0) // 2) and all_alike(
-            wanted[:len(rest)], rest)
+        first = next((n for n, item in enumerate(wanted) if item.completes), 0)
+        return stops >= max(1, (self.horizon.stops or 0) // 2) and any(
+            all_alike(wanted[n:n + len(rest)], rest) for n in range(first + 1))
