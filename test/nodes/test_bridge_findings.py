@@ -5,6 +5,7 @@ import socket
 import pytest
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
+from hostile_streams import stream
 from pymavlink.dialects.v20 import ardupilotmega as d
 from rclpy.executors import SingleThreadedExecutor
 from uav_task_alloc_msgs import msg as m
@@ -167,3 +168,22 @@ def test_finding_24_a_flood_of_strangers_leaves_the_known_vehicle(bridge):
     assert one.far.getsockname() in link.ends()
     assert len(link.ends()) == 1 + MOST_STRANGERS
     assert one.heard('HEARTBEAT').get_srcSystem() == 245
+
+
+def test_no_mavlink_stream_ends_a_running_bridge(bridge, request):
+    """`--streams 2000` sends a hundred; test/mavlink/test_hostile_streams.py sends all."""
+    one = bridge('-p', 'takeoff:=true')
+    ends = [socket.socket(socket.AF_INET, socket.SOCK_DGRAM) for _ in range(60)]
+    to = ('127.0.0.1', one.node.radio.links[0].port)
+    for seed in range(request.config.getoption('--streams') // 20):
+        for _, end, data in stream(10_000 + seed, 400):
+            ends[end].sendto(data, to)
+        one.executor.spin_once(timeout_sec=0.0)
+    for end in ends:
+        end.close()
+    one.say(HEARTBEAT)
+    one.heard('HEARTBEAT')
+    one.until(lambda: any(line.startswith('found uav_') for line in one.log['info']))
+    assert [line for level in one.log.values() for line in level if 'Error: ' in line] == []
+    assert one.node.receiver.is_alive()
+    assert one.node.heartbeat.restarts == 0

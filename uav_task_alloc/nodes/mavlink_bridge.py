@@ -162,12 +162,12 @@ class MavlinkBridge(Node):
         for served in list(self.ground.served.values()):
             served.pilot.policy = policy
             if served.uav_id not in self.lists:
-                self.get_logger().info(f'found {served.uav_id}: {served.pilot.profile.name}')
+                self.log['info'](f'found {served.uav_id}: {served.pilot.profile.name}')
                 try:
                     topic = check_topic(self, TASK_LIST, served.uav_id)
                 except InvalidValue as error:
                     self.lists[served.uav_id] = None
-                    self.get_logger().error(f'it gets no task lists: {error}')
+                    self.log['error'](f'it gets no task lists: {error}')
                     continue
                 self.lists[served.uav_id] = self.create_subscription(
                     m.TaskList, topic,
