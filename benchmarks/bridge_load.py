@@ -23,11 +23,11 @@ from rclpy.executors import SingleThreadedExecutor
 from uav_task_alloc_msgs import msg as m
 
 from uav_task_alloc.geometry.frames import Origin
-from uav_task_alloc.mavlink.codec import Codec
-from uav_task_alloc.mavlink.fleet import Fleet
-from uav_task_alloc.mavlink.vehicle_config import VehicleConfig
+from uav_task_alloc.mavlink.transport.codec import Codec
 from uav_task_alloc.model import Leg, Task
-from uav_task_alloc.nodes.messages import LATCHED, STATES, header, planned_task
+from uav_task_alloc.nodes.conversions.messages import LATCHED, STATES, header, planned_task
+from uav_task_alloc.sim.config import VehicleConfig
+from uav_task_alloc.sim.udp_fleet import UdpFleet
 
 UAVS, ITEMS, PORT = 24, 50, 14650
 ORIGIN = Origin(47.397742, 8.545594, 488.0)
@@ -36,7 +36,7 @@ WATCHED = 10.0  # [s]
 
 def fly() -> None:
     """The fleet, in a process of its own."""
-    fleet = Fleet([(VehicleConfig(f'uav_{n}', n, ORIGIN, (20.0 * n, 0.0, 0.0), arming_delay=0.0,
+    fleet = UdpFleet([(VehicleConfig(f'uav_{n}', n, ORIGIN, (20.0 * n, 0.0, 0.0), arming_delay=0.0,
                                   floods=False), ('ardupilot', 'px4')[n % 2])
                    for n in range(1, UAVS + 1)], ('127.0.0.1', PORT))
     fleet.spin()

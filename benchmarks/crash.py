@@ -34,7 +34,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from uav_task_alloc_msgs import msg as m
 from uav_task_alloc_msgs.srv import SetAvailability, SubmitTasks
 
-from uav_task_alloc.nodes.messages import EVENTS, LATCHED, STATES
+from uav_task_alloc.nodes.conversions.messages import EVENTS, LATCHED, STATES
 
 UAVS, SIDE = 5, 400.0  # number, [m]
 MOST_OPEN = 30  # tasks at once

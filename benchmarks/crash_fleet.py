@@ -11,9 +11,9 @@ from collections.abc import Callable
 from geometry_msgs.msg import Point
 from uav_task_alloc_msgs import msg as m
 
-from uav_task_alloc.mavlink.policy import TaskProgress
-from uav_task_alloc.mavlink.reminder import Reminder
-from uav_task_alloc.nodes.messages import from_stamp
+from uav_task_alloc.mavlink.gcs.event_retry import EventRetry
+from uav_task_alloc.mavlink.mission.task_progress import TaskProgress
+from uav_task_alloc.nodes.conversions.messages import from_stamp
 
 HEIGHT = 50.0  # [m]
 FLOWN_IN = (0.1, 0.5)  # [s] a task takes
@@ -100,7 +100,7 @@ class Flyer:
             uav_id, place, tell, ledger, rng)
         self.list = m.TaskList(uav_id=uav_id)
         self.flown: set[str] = set()
-        self.active, self._until, self._reminder = '', 0.0, Reminder()
+        self.active, self._until, self._reminder = '', 0.0, EventRetry()
 
     def told(self, msg: m.TaskList, now: float) -> None:
         self.list, ids = msg, [planned.task.task_id for planned in msg.tasks]

@@ -24,7 +24,7 @@ from rclpy.executors import SingleThreadedExecutor
 from uav_task_alloc_msgs import msg as m
 
 from uav_task_alloc.model import Task
-from uav_task_alloc.nodes.messages import ANNOUNCEMENTS, LATCHED, STATES, announcement
+from uav_task_alloc.nodes.conversions.messages import ANNOUNCEMENTS, LATCHED, STATES, announcement
 
 LIMIT = 60.0  # [s]
 DOMAIN = '97'  # nobody else is on this wire

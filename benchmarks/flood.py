@@ -26,7 +26,7 @@ from uav_task_alloc_msgs import msg as m
 
 from uav_task_alloc.model import Task
 from uav_task_alloc.nodes.allocator import AllocatorNode
-from uav_task_alloc.nodes.messages import (
+from uav_task_alloc.nodes.conversions.messages import (
     HEARD_ANNOUNCEMENTS,
     LATCHED,
     STATES,
@@ -35,7 +35,7 @@ from uav_task_alloc.nodes.messages import (
     from_stamp,
     header,
 )
-from uav_task_alloc.nodes.run import run
+from uav_task_alloc.nodes.ros.run import run
 
 UAVS, RATE, SIDE, TICK = 200, 1000, 10_000.0, 0.02  # states/s, [m], [s]
 REST = 5.0  # [s] of states before the flood and after the last task is answered

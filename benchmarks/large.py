@@ -13,7 +13,7 @@ import time
 
 from uav_task_alloc import plan
 from uav_task_alloc.solver.solve import warm_up
-from uav_task_alloc.study import rivals
+from uav_task_alloc.study import reference_solvers as rivals
 from uav_task_alloc.study.evaluator import judge
 from uav_task_alloc.study.instances import SLACK, Instance, make_instance
 

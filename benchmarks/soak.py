@@ -19,9 +19,16 @@ import time
 
 import psutil
 
-from uav_task_alloc.allocator import Allocator, planning
-from uav_task_alloc.allocator.keeper import Keeper
-from uav_task_alloc.allocator.records import Action, Kind, TaskEvent, UavList, UavReport
+from uav_task_alloc.allocator import Allocator
+from uav_task_alloc.allocator.persistence.persistence import Persistence
+from uav_task_alloc.allocator.records import (
+    AnnouncementAction,
+    TaskEvent,
+    TaskEventKind,
+    UavList,
+    UavReport,
+)
+from uav_task_alloc.allocator.replanning import planning
 from uav_task_alloc.model import Plan, Task, ThreatZone
 from uav_task_alloc.params import AllocatorParams
 from uav_task_alloc.solver.solve import plan
@@ -63,7 +70,7 @@ class Flight:
         stop, events = self.list.stops[0], []
         if self.started != stop.task.id:
             self.started, self.busy_until = stop.task.id, 0.0
-            events.append(self._event(Kind.STARTED, stop.task.id))
+            events.append(self._event(TaskEventKind.STARTED, stop.task.id))
         points = (*stop.leg.via, stop.task.position)
         if self._towards(points[min(self.via, len(points) - 1)]):
             if self.via < len(stop.leg.via):
@@ -72,10 +79,10 @@ class Flight:
                 self.busy_until = now + stop.task.service_time
             elif now >= self.busy_until:
                 self.via = 0
-                events.append(self._event(Kind.COMPLETED, stop.task.id))
+                events.append(self._event(TaskEventKind.COMPLETED, stop.task.id))
         return events
 
-    def _event(self, kind: Kind, task_id: str) -> TaskEvent:
+    def _event(self, kind: TaskEventKind, task_id: str) -> TaskEvent:
         return TaskEvent(task_id, self.name, self.list.revision, kind)
 
     def _towards(self, goal: tuple[float, float, float]) -> bool:
@@ -94,7 +101,7 @@ class Soak:
     def __init__(self, folder: str, seed: int) -> None:
         self.rng = random.Random(seed)
         self.params = AllocatorParams(route_end='home', keep_ended=KEEP, background_period=60.0)
-        self.keeper = Keeper(folder, print)
+        self.keeper = Persistence(folder, print)
         self.core = Allocator(self.params, 0.0)
         self.core.wake()
         self.world = self.core.world
@@ -118,7 +125,7 @@ class Soak:
         if arrivals and self.happens(ARRIVAL):
             self.figures['tasks'] += 1
             task = Task(f't{self.figures["tasks"]}', self.place(), service_time=2.0)
-            verdict, = self.world.announce(Action.ADD, [task], now, now)
+            verdict, = self.world.announce(AnnouncementAction.ADD, [task], now, now)
             assert verdict.accepted, verdict
             self.open.add(task.id)
             self.events = now
@@ -152,7 +159,7 @@ class Soak:
         for event in uav.fly(now):
             refused = self.world.event(event, now, now)
             self.events = now
-            if event.kind is Kind.COMPLETED and not refused:
+            if event.kind is TaskEventKind.COMPLETED and not refused:
                 self.figures['completed'] += 1
                 self.open.discard(event.task_id)
         self.world.hear(UavReport(uav.name, uav.place, home=uav.home, cruise_speed=SPEED,
@@ -168,7 +175,9 @@ class Soak:
         problem = self.core.due(now, now)
         if problem is not None:
             self.figures['solves'] += 1
-            self.core.adopt(planning.solve(solve, problem, self.params, lambda: False), now, now)
+            self.core.adopt(
+                planning.solve_problem(solve, problem, self.params, lambda: False), now, now
+            )
         self.keeper.save(self.core, now)
         for uav_list in self.core.collect().lists.values():
             self.listen(uav_list, now)

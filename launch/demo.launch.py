@@ -5,7 +5,7 @@ from launch.substitutions import PathJoinSubstitution
 from launch_ros.substitutions import FindPackageShare
 
 from launch import LaunchDescription
-from uav_task_alloc.nodes.launching import (
+from uav_task_alloc.nodes.ros.launch_arguments import (
     BRIDGE_END,
     Lasting,
     argument,
@@ -16,7 +16,7 @@ from uav_task_alloc.nodes.launching import (
     record_file,
     rviz,
 )
-from uav_task_alloc.nodes.ports import free_port
+from uav_task_alloc.nodes.ros.udp_ports import free_port
 from uav_task_alloc.scenario import load, simulation_parameters
 
 

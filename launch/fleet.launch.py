@@ -5,7 +5,7 @@ from launch.substitutions import PathJoinSubstitution
 from launch_ros.substitutions import FindPackageShare
 
 from launch import LaunchDescription
-from uav_task_alloc.nodes.launching import (
+from uav_task_alloc.nodes.ros.launch_arguments import (
     BRIDGE_END,
     Lasting,
     argument,

@@ -3,9 +3,15 @@
 import math
 from itertools import pairwise
 
-from uav_task_alloc.allocator import Allocator, planning
-from uav_task_alloc.allocator.fleet import may_fly
-from uav_task_alloc.allocator.records import Action, Kind, TaskEvent, UavReport
+from uav_task_alloc.allocator import Allocator
+from uav_task_alloc.allocator.records import (
+    AnnouncementAction,
+    TaskEvent,
+    TaskEventKind,
+    UavReport,
+)
+from uav_task_alloc.allocator.replanning import planning
+from uav_task_alloc.allocator.state.fleet import may_fly
 from uav_task_alloc.geometry.detour import detour
 from uav_task_alloc.model import Leg, Plan, Task
 from uav_task_alloc.params import AllocatorParams
@@ -78,7 +84,7 @@ class Desk:
     def uav(self, uav_id, *position, **more):
         return self.world.hear(UavReport(uav_id, position, **more), self.now, self.now)
 
-    def add(self, *tasks, action=Action.ADD):
+    def add(self, *tasks, action=AnnouncementAction.ADD):
         return self.world.announce(action, [task(t) for t in tasks], self.now, self.now)
 
     def cancel(self, *ids):
@@ -87,7 +93,7 @@ class Desk:
     def event(self, kind, task_id, uav_id, revision=None, reason=''):
         if revision is None:
             revision = self.world.lists.get(uav_id).revision
-        return self.world.event(TaskEvent(task_id, uav_id, revision, Kind[kind], reason),
+        return self.world.event(TaskEvent(task_id, uav_id, revision, TaskEventKind[kind], reason),
                                 self.now, self.now)
 
     def begin(self):
@@ -100,7 +106,7 @@ class Desk:
 
     def finish(self, problem):
         """Solve it and adopt the answer."""
-        answer = planning.solve(self.plan, problem, self.world.params, lambda: False)
+        answer = planning.solve_problem(self.plan, problem, self.world.params, lambda: False)
         self.solves.append(problem.trigger)
         self.now += problem.budget
         self.core.adopt(answer, self.now, self.now)

@@ -11,9 +11,9 @@ from dataclasses import dataclass
 
 from pymavlink.dialects.v20 import ardupilotmega as d
 
-from uav_task_alloc.mavlink.codec import Codec
-from uav_task_alloc.mavlink.telemetry import WANTED
-from uav_task_alloc.mavlink.vehicle_modes import px4_mode
+from uav_task_alloc.mavlink.gcs.telemetry import WANTED
+from uav_task_alloc.mavlink.transport.codec import Codec
+from uav_task_alloc.sim.modes import px4_mode
 
 LIMITS = {f'{sign}int{bits}_t': (0, 2**bits - 1) if sign else (-2**(bits - 1), 2**(bits - 1) - 1)
           for sign in ('u', '') for bits in (8, 16, 32, 64)}

@@ -232,7 +232,7 @@ MODULES = {
     'launch_ros.parameter_descriptions': {'ParameterValue': Typed},
     'launch_ros.substitutions': {'ExecutableInPackage': Executable, 'FindPackageShare': Share},
 }
-USERS = ('uav_task_alloc.nodes.launching',)  # modules that have imported from these
+USERS = ('uav_task_alloc.nodes.ros.launch_arguments',)  # modules that have imported from these
 
 
 def commands(path, given):

@@ -9,26 +9,26 @@ import sys
 import pytest
 
 from uav_task_alloc.errors import JournalCorrupt, JournalError, JournalForeign, JournalInUse
-from uav_task_alloc.journal import FILE_NAME, VERSION, Journal, Row, rescued, set_aside
+from uav_task_alloc.journal import FILE_NAME, VERSION, Journal, JournalRow, rescued, set_aside
 
 WRITER = """
 import sys
 from itertools import count
-from uav_task_alloc.journal import Journal, Row
+from uav_task_alloc.journal import Journal, JournalRow
 journal = Journal(sys.argv[1])
 for k in count():
-    journal.put([Row('a', str(k), k), Row('b', str(k), k)])
+    journal.put([JournalRow('a', str(k), k), JournalRow('b', str(k), k)])
     print(k, flush=True)
 """
 
 
 def test_what_was_put_is_there_after_a_restart(tmp_path):
     journal = Journal(str(tmp_path / 'new' / 'folder'))
-    journal.put([Row('task', 't1', {'x': 1.5}), Row('task', 't2', [1, 2])])
-    journal.put([Row('task', 't1', {'x': float('inf')}), Row('task', 't2', None)])
+    journal.put([JournalRow('task', 't1', {'x': 1.5}), JournalRow('task', 't2', [1, 2])])
+    journal.put([JournalRow('task', 't1', {'x': float('inf')}), JournalRow('task', 't2', None)])
     journal.close()
     assert Journal(str(tmp_path / 'new' / 'folder')).load() == [
-        Row('task', 't1', {'x': float('inf')})]
+        JournalRow('task', 't1', {'x': float('inf')})]
 
 
 def test_a_killed_writer_loses_nothing_it_acknowledged(tmp_path):
@@ -50,22 +50,22 @@ def test_a_killed_writer_loses_nothing_it_acknowledged(tmp_path):
 
 def test_a_torn_end_of_the_log_is_left_out(tmp_path):
     journal = Journal(str(tmp_path))
-    journal.put([Row('a', '1', 1)])
+    journal.put([JournalRow('a', '1', 1)])
     log = tmp_path / (FILE_NAME + '-wal')
     copy = tmp_path / 'copy'
     copy.mkdir()
     (copy / FILE_NAME).write_bytes((tmp_path / FILE_NAME).read_bytes())
     whole = log.read_bytes()
-    journal.put([Row('a', '2', 2)])
+    journal.put([JournalRow('a', '2', 2)])
     torn = log.read_bytes()
     assert len(torn) > len(whole)
     (copy / (FILE_NAME + '-wal')).write_bytes(torn[:len(whole) + (len(torn) - len(whole)) // 2])
-    assert Journal(str(copy)).load() == [Row('a', '1', 1)]
+    assert Journal(str(copy)).load() == [JournalRow('a', '1', 1)]
 
 
 def test_a_second_allocator_on_the_same_folder_is_refused(tmp_path):
     first = Journal(str(tmp_path))
-    first.put([Row('a', '1', 1)])
+    first.put([JournalRow('a', '1', 1)])
     with pytest.raises(JournalInUse, match='cannot be opened: database is locked'):
         Journal(str(tmp_path))
 
@@ -94,15 +94,15 @@ def test_a_folder_that_cannot_be_made_is_refused(tmp_path):
 
 def test_a_full_disk_is_reported_and_changes_nothing(tmp_path):
     journal = Journal(str(tmp_path))
-    journal.put([Row('a', '1', 1)])
+    journal.put([JournalRow('a', '1', 1)])
     pages = journal._db.execute('PRAGMA page_count').fetchone()[0]
     journal._db.execute(f'PRAGMA max_page_count = {pages}')
     with pytest.raises(JournalError, match='cannot be written: database or disk is full'):
-        journal.put([Row('a', '1', 2), Row('a', '2', 'x' * 100_000)])
-    assert journal.load() == [Row('a', '1', 1)]
+        journal.put([JournalRow('a', '1', 2), JournalRow('a', '2', 'x' * 100_000)])
+    assert journal.load() == [JournalRow('a', '1', 1)]
     journal._db.execute('PRAGMA max_page_count = 1000000')
-    journal.put([Row('a', '1', 3)])
-    assert journal.load() == [Row('a', '1', 3)]
+    journal.put([JournalRow('a', '1', 3)])
+    assert journal.load() == [JournalRow('a', '1', 3)]
 
 
 @pytest.mark.parametrize('size', [0, 1, 15])
@@ -117,7 +117,7 @@ def test_finding_23_an_emptied_file_is_no_new_journal(tmp_path, size):
 
 def test_finding_23_an_emptied_file_keeps_its_log(tmp_path):
     journal = Journal(str(tmp_path))
-    journal.put([Row('a', '1', 1)])
+    journal.put([JournalRow('a', '1', 1)])
     log = tmp_path / (FILE_NAME + '-wal')
     held = log.read_bytes()
     journal.close()
@@ -164,9 +164,9 @@ def test_finding_23_a_file_system_without_links_gets_a_journal(tmp_path, monkeyp
 
     monkeypatch.setattr('os.link', no_links)
     journal = Journal(str(tmp_path))
-    journal.put([Row('a', '1', 1)])
+    journal.put([JournalRow('a', '1', 1)])
     journal.close()
-    assert Journal(str(tmp_path)).load() == [Row('a', '1', 1)]
+    assert Journal(str(tmp_path)).load() == [JournalRow('a', '1', 1)]
 
 
 def test_finding_23_locked_in_the_path_is_no_foreign_lock(tmp_path):
@@ -179,7 +179,7 @@ def test_finding_23_locked_in_the_path_is_no_foreign_lock(tmp_path):
 @pytest.mark.parametrize('pages', [2, 4, 6])
 def test_finding_23_the_rows_before_a_cut_are_rescued(tmp_path, pages):
     journal = Journal(str(tmp_path))
-    journal.put([Row('a', f'{k:03}', 'x' * 50) for k in range(300)])
+    journal.put([JournalRow('a', f'{k:03}', 'x' * 50) for k in range(300)])
     journal.close()
     file = tmp_path / FILE_NAME
     file.write_bytes(file.read_bytes()[:4096 * pages])
@@ -195,7 +195,7 @@ def test_finding_23_the_rows_before_a_cut_are_rescued(tmp_path, pages):
 
 def test_finding_23_the_rows_on_both_sides_of_a_bad_page_are_rescued(tmp_path):
     journal = Journal(str(tmp_path))
-    journal.put([Row('a', f'{k:03}', 'x' * 50) for k in range(300)])
+    journal.put([JournalRow('a', f'{k:03}', 'x' * 50) for k in range(300)])
     journal.close()
     file = tmp_path / FILE_NAME
     held = bytearray(file.read_bytes())

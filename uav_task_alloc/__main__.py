@@ -8,20 +8,20 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from uav_task_alloc import params
-from uav_task_alloc.allocator import life
+from uav_task_alloc.allocator.state import task_state_machine as life
 from uav_task_alloc.errors import AllocError
 from uav_task_alloc.scenario.document import markdown_text
 
 
 def plan_command(argv: Sequence[str]) -> int:
     """plan the tasks of a scenario file"""
-    from uav_task_alloc.planning import main as run
+    from uav_task_alloc.cli.plan import main as run
     return run(argv)
 
 
 def study_command(argv: Sequence[str]) -> int:
     """make the paper's figures and tables anew, or run an experiment"""
-    from uav_task_alloc.study.command import main as run
+    from uav_task_alloc.cli.study import main as run
     return run(list(argv))
 
 
@@ -33,7 +33,7 @@ def bench_command(argv: Sequence[str]) -> int:
 
 def report_command(argv: Sequence[str]) -> int:
     """print the table of a recorded run and draw its map again"""
-    from uav_task_alloc.report import main as run
+    from uav_task_alloc.cli.report import main as run
     return run(argv)
 
 
@@ -58,9 +58,9 @@ def compile_command(argv: Sequence[str]) -> int:
     """compile the kernels ahead; they are kept on disk"""
     if argv:
         raise SystemExit('usage: python -m uav_task_alloc compile')
-    from uav_task_alloc.allocator.rehearsal import rehearse
+    from uav_task_alloc.allocator.replanning.warm_up import warm_up
     from uav_task_alloc.solver.solve import plan
-    rehearse(plan, params.AllocatorParams())
+    warm_up(plan, params.AllocatorParams())
     return 0
 
 

@@ -28,7 +28,7 @@ DAMAGED = frozenset({sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB})
 SELECT = 'SELECT kind, id, body FROM world'
 
 
-class Row(NamedTuple):
+class JournalRow(NamedTuple):
     """One thing of the world; a body of None takes it out."""
 
     kind: str
@@ -86,14 +86,14 @@ class Journal:
             raise JournalForeign(f'{text}; it is a database of another program')
         raise JournalCorrupt(f'{text}; it is empty')
 
-    def load(self) -> list[Row]:
+    def load(self) -> list[JournalRow]:
         """Everything that was put and not taken out; a body that is no JSON as its bytes."""
         try:
             return [_row(*row) for row in self._db.execute(f'{SELECT} ORDER BY kind, id')]
         except sqlite3.Error as error:
             raise self._error('read', error) from error
 
-    def put(self, rows: Iterable[Row]) -> None:
+    def put(self, rows: Iterable[JournalRow]) -> None:
         """All rows or none; they are on disk when this returns."""
         try:
             if not self.in_place():
@@ -182,8 +182,8 @@ def _check_length(path: Path) -> None:
                              f'{SHORTEST}, it was emptied or cut short')
 
 
-def _row(kind: Any, id: Any, text: Any) -> Row:
-    return Row(_text(kind), _text(id), _body(text))
+def _row(kind: Any, id: Any, text: Any) -> JournalRow:
+    return JournalRow(_text(kind), _text(id), _body(text))
 
 
 def _text(value: Any) -> str:
@@ -211,7 +211,7 @@ def set_aside(state_dir: str) -> Path:
     return aside
 
 
-def read_copy(state_dir: str) -> list[Row]:
+def read_copy(state_dir: str) -> list[JournalRow]:
     """What a journal holds that cannot be opened in its place, as on a read-only disk.
 
     Raises JournalError.
@@ -225,7 +225,7 @@ def read_copy(state_dir: str) -> list[Row]:
             journal.close()
 
 
-def rescued(path: Path) -> list[Row]:
+def rescued(path: Path) -> list[JournalRow]:
     """The rows of a damaged file that can still be read; the file itself is not touched.
 
     They are read from both ends, each as far as it goes. Raises JournalError where the file
@@ -235,7 +235,7 @@ def rescued(path: Path) -> list[Row]:
         _copy(path, folder)
         _pad(Path(folder, FILE_NAME))
         db = _connect(Path(folder, FILE_NAME))
-        found: dict[tuple[str, str], Row] = {}
+        found: dict[tuple[str, str], JournalRow] = {}
         try:
             for order in ('ASC', 'DESC'):
                 _read_on(db, f'{SELECT} ORDER BY kind {order}, id {order}', found)
@@ -254,7 +254,7 @@ def _pad(path: Path) -> None:
             file.truncate(length)
 
 
-def _read_on(db: Any, query: str, found: dict[tuple[str, str], Row]) -> None:
+def _read_on(db: Any, query: str, found: dict[tuple[str, str], JournalRow]) -> None:
     """Add rows to `found` until the query fails."""
     try:
         for each in db.execute(query):

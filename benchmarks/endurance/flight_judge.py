@@ -8,9 +8,9 @@ from collections import Counter
 from flight_world import BRIDGE, World
 from pymavlink.dialects.v20 import ardupilotmega as d
 
-from uav_task_alloc.mavlink.codec import Message
-from uav_task_alloc.mavlink.modes import ModeClass, mode_class
-from uav_task_alloc.mavlink.vehicle_config import Event
+from uav_task_alloc.mavlink.gcs.flight_modes import ModeClass, mode_class
+from uav_task_alloc.mavlink.transport.codec import Message
+from uav_task_alloc.sim.config import TruthEvent
 
 OURS = f'station {BRIDGE[0]}/{BRIDGE[1]}'
 ACTS = {d.MAV_CMD_DO_SET_MODE, d.MAV_CMD_COMPONENT_ARM_DISARM, d.MAV_CMD_NAV_TAKEOFF,
@@ -101,7 +101,7 @@ class Judge:
     def _class(self, mode: int) -> ModeClass | None:
         return mode_class(self.family, mode)
 
-    def _truth(self, event: Event) -> None:
+    def _truth(self, event: TruthEvent) -> None:
         if event.name == 'item_reached':
             for name, place in self.places.items():
                 if math.dist(place, event.point) < NEAR and name != self._at:
@@ -133,7 +133,7 @@ class Judge:
         elif event.name == 'failsafe_over':
             self.failing = False
 
-    def _mode_set(self, before: int, event: Event) -> None:
+    def _mode_set(self, before: int, event: TruthEvent) -> None:
         assert event.mode is not None
         was, new = self._class(before), self._class(event.mode)
         airborne = not self.world.vehicle.flight.landed

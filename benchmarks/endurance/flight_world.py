@@ -8,14 +8,15 @@ import random
 from collections.abc import Iterator
 
 from uav_task_alloc.geometry.frames import Origin
-from uav_task_alloc.mavlink.authority import Record
-from uav_task_alloc.mavlink.codec import Codec, Message
-from uav_task_alloc.mavlink.ground import Ground, Station
-from uav_task_alloc.mavlink.policy import Policy, TaskProgress
-from uav_task_alloc.mavlink.status import UavStatus, state_of
-from uav_task_alloc.mavlink.vehicle import AUTOPILOTS, Vehicle
-from uav_task_alloc.mavlink.vehicle_config import Event, VehicleConfig
-from uav_task_alloc.mission import TaskList
+from uav_task_alloc.mavlink.gcs.authority import AuthorityRecord
+from uav_task_alloc.mavlink.gcs.ground_station import GcsConfig, GroundStation
+from uav_task_alloc.mavlink.gcs.policy import Policy
+from uav_task_alloc.mavlink.gcs.status import UavStatus, state_of
+from uav_task_alloc.mavlink.mission.items import TaskList
+from uav_task_alloc.mavlink.mission.task_progress import TaskProgress
+from uav_task_alloc.mavlink.transport.codec import Codec, Message
+from uav_task_alloc.sim.config import TruthEvent, VehicleConfig
+from uav_task_alloc.sim.vehicle import AUTOPILOTS, Vehicle
 
 ORIGIN = Origin(47.397742, 8.545594, 488.0)
 BRIDGE, OTHER = (245, 190), (255, 190)  # system, component
@@ -57,12 +58,12 @@ class Store:
     """The bridge's state_dir."""
 
     def __init__(self) -> None:
-        self.records: dict[str, Record] = {}
+        self.records: dict[str, AuthorityRecord] = {}
 
-    def load(self, uav_id: str) -> Record | None:
+    def load(self, uav_id: str) -> AuthorityRecord | None:
         return self.records.get(uav_id)
 
-    def save(self, uav_id: str, record: Record) -> None:
+    def save(self, uav_id: str, record: AuthorityRecord) -> None:
         self.records[uav_id] = record
 
 
@@ -77,7 +78,7 @@ class World:
         self.link, self.store = Link(rng, lossy), Store()
         self._down = Codec(1, 1)
         self.events: list[TaskProgress] = []
-        self.truth: list[Event] = []  # of the last tick
+        self.truth: list[TruthEvent] = []  # of the last tick
         self.arrivals: list[float] = []  # when heartbeats of the last tick were sent [s]
         self.sent: list[tuple[float, Message]] = []  # by the bridge, in the last tick
         self.notes: list[str] = []
@@ -89,7 +90,7 @@ class World:
         """A new bridge, after a kill -9; `keep`: it has a state_dir."""
         if not keep:
             self.store = Store()
-        self.ground = Ground(Station(origin=ORIGIN, policy=self.policy),
+        self.ground = GroundStation(GcsConfig(origin=ORIGIN, policy=self.policy),
                              random.Random(self.rng.random()), self.store)
         self._up, self._ear, self._vehicle_ear = Codec(*BRIDGE), Codec(*BRIDGE), Codec(1, 1)
         self.started_at, self._assigned = self.now, False

@@ -29,11 +29,11 @@ from flight_judge import Judge
 from flight_world import World
 from pymavlink.dialects.v20 import ardupilotmega as d
 
-from uav_task_alloc.mavlink.authority import Authority, State
-from uav_task_alloc.mavlink.policy import Policy
-from uav_task_alloc.mavlink.vehicle_modes import px4_mode
-from uav_task_alloc.mission import Stop, TaskList
+from uav_task_alloc.mavlink.gcs.authority import Authority, AuthorityState
+from uav_task_alloc.mavlink.gcs.policy import Policy
+from uav_task_alloc.mavlink.mission.items import MissionStop, TaskList
 from uav_task_alloc.model import Task
+from uav_task_alloc.sim.modes import px4_mode
 
 LIMIT = 600.0  # [s] of a flight
 QUIET = 150.0  # [s] nothing is thrown at it from then on
@@ -199,8 +199,15 @@ class Flight:
 
     def _assign(self, names: list[str]) -> None:
         self.listed, self.revision = names, self.revision + 1
-        self.world.assign(TaskList(self.revision, tuple(
-            Stop(Task(name, self.places[name], service_time=self.service)) for name in names)))
+        self.world.assign(
+            TaskList(
+                self.revision,
+                tuple(
+                    MissionStop(Task(name, self.places[name], service_time=self.service))
+                    for name in names
+                ),
+            )
+        )
 
     def shorten(self) -> None:
         """What is completed is taken off the list, as an allocator does."""
@@ -216,7 +223,11 @@ class Flight:
                 min(self.back_at, QUIET + 20.0), world.link.cut_until + 4.0):
             return
         self.back_at = world.now + 3.0
-        if state.authority is State.HELD or state.authority is State.UNKNOWN or state.available:
+        if (
+            state.authority is AuthorityState.HELD
+            or state.authority is AuthorityState.UNKNOWN
+            or state.available
+        ):
             return
         flight, way = self.vehicle.flight, self.rng.random()
         if not self.airborne or way < 0.6 or flight.failsafes or self.judge.stubborn:

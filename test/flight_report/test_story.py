@@ -11,7 +11,7 @@ from uav_task_alloc.flight_report import figures
 from uav_task_alloc.flight_report.page import page
 from uav_task_alloc.flight_report.story import Gap, Replan, Span, fold
 from uav_task_alloc.model import ThreatZone
-from uav_task_alloc.record.heard import zone_to_json
+from uav_task_alloc.record.run_state import zone_to_json
 
 BEGIN = 1000.0
 HOSTILE = '</script><script>alert(1)</script>'

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """A small run as lines of a record: two UAVs, five tasks, one zone, two plans."""
-from uav_task_alloc.live.board import Board
 from uav_task_alloc.live.scene import Scene
-from uav_task_alloc.record.heard import Heard
+from uav_task_alloc.live.snapshot_store import SnapshotStore
+from uav_task_alloc.record.run_state import RunState
 
 BEGIN = 1_800_000_000.0  # [unix s]
 TASKS = {'t1': (100.0, 300.0), 't2': (100.0, 500.0), 't3': (500.0, 300.0), 't4': (500.0, 500.0),
@@ -77,7 +77,7 @@ class Run:
     """A scene and its board, fed by hand."""
 
     def __init__(self):
-        self.scene, self.board = Scene(Heard()), Board()
+        self.scene, self.board = Scene(RunState()), SnapshotStore()
 
     def hear(self, *lines):
         """Take lines of one moment, and put what is new on the board."""

@@ -4,7 +4,7 @@ import random
 
 import pytest
 
-from uav_task_alloc.live.board import ENTRIES, Board
+from uav_task_alloc.live.snapshot_store import ENTRIES, SnapshotStore
 
 
 def put(board, wall, parts, events=()):
@@ -16,7 +16,7 @@ def at(board, wall):
 
 
 def test_a_page_gets_everything_then_only_what_is_new():
-    board = Board()
+    board = SnapshotStore()
     put(board, 1.0, {'a': 1, 'b': 2}, ['x'])
     version, text = board.news(0)
     first = json.loads(text)
@@ -29,13 +29,13 @@ def test_a_page_gets_everything_then_only_what_is_new():
 
 
 def test_a_page_that_knows_a_board_of_before_a_restart_gets_everything():
-    board = Board()
+    board = SnapshotStore()
     put(board, 1.0, {'a': 1})
     assert json.loads(board.news(99)[1])['all'] is True
 
 
 def test_every_moment_of_the_past_is_as_it_was():
-    board = Board()
+    board = SnapshotStore()
     put(board, 1.0, {'a': 1, 'b': 1})
     put(board, 2.0, {'a': 2})
     put(board, 3.0, {'b': 3})
@@ -46,7 +46,7 @@ def test_every_moment_of_the_past_is_as_it_was():
 def test_beyond_the_limit_the_oldest_goes_but_not_what_is_in_force():
     seed = 5
     noise = random.Random(seed)
-    board = Board(limit=5000)
+    board = SnapshotStore(limit=5000)
     put(board, 0.0, {'zones': 'still there'})
     for wall in range(1, 100):
         put(board, float(wall), {'uavs': [wall, noise.randbytes(200).hex()]})
@@ -57,11 +57,11 @@ def test_beyond_the_limit_the_oldest_goes_but_not_what_is_in_force():
 
 
 def test_the_logs_are_bounded():
-    board = Board()
+    board = SnapshotStore()
     put(board, 1.0, {}, range(3 * ENTRIES))
     assert json.loads(board.news(0)[1])['events'] == list(range(2 * ENTRIES, 3 * ENTRIES))
 
 
 def test_what_json_does_not_know_is_not_sent():
     with pytest.raises(ValueError, match='JSON'):
-        put(Board(), 1.0, {'a': float('nan')})
+        put(SnapshotStore(), 1.0, {'a': float('nan')})

@@ -7,8 +7,8 @@ import socket
 import pytest
 from small_run import BEGIN
 
-from uav_task_alloc.live.board import Board
 from uav_task_alloc.live.server import MOST_PAGES, PAGE, Server, name_of
+from uav_task_alloc.live.snapshot_store import SnapshotStore
 
 PATHS = [*PAGE, '/plotly.js', '/stream', '/at']
 
@@ -71,7 +71,7 @@ def test_the_name_in_a_host_header():
 
 def test_a_port_in_use_is_an_error_at_once(run, serve):
     with pytest.raises(OSError, match='in use'):
-        Server(Board(), '127.0.0.1', serve(run.board).port)
+        Server(SnapshotStore(), '127.0.0.1', serve(run.board).port)
 
 
 def test_a_moment_that_is_no_number_is_refused(run, serve):

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 import pytest
 
-from uav_task_alloc.live.replans import changes, in_words, summary
+from uav_task_alloc.record.plan_diff import changes, in_words, summary
 
 
 def test_a_task_that_moves_is_told_on_both_sides():

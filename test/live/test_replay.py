@@ -5,7 +5,7 @@ import pytest
 from small_run import BEGIN, FIRST, LATER
 
 from uav_task_alloc.live.__main__ import play
-from uav_task_alloc.record.heard import FILE
+from uav_task_alloc.record.run_state import FILE
 
 
 @pytest.fixture

@@ -15,15 +15,15 @@ from small_run import (
     zones,
 )
 
-from uav_task_alloc.live.events import some
 from uav_task_alloc.live.scene import Scene
-from uav_task_alloc.record.heard import Heard
+from uav_task_alloc.record.events import some
 from uav_task_alloc.record.progress import fleet
+from uav_task_alloc.record.run_state import RunState
 
 
 def told(*moments):
     """(parts, events, plans) of the last of several moments."""
-    scene = Scene(Heard())
+    scene = Scene(RunState())
     for lines in moments:
         for line in lines:
             scene.take(line)
@@ -107,7 +107,7 @@ def test_a_uav_says_who_has_it_since_when_and_what_gives_it_back():
 
 
 def test_the_terminal_says_who_has_a_uav():
-    heard = Heard()
+    heard = RunState()
     for line in (state(BEGIN, 'u1', (0.0, 0.0), authority='LOST', reason='lost: why'),
                  state(BEGIN, 'u2', (0.0, 0.0), authority='HELD', reason='no position yet'),
                  state(BEGIN, 'u3', (0.0, 0.0)), held(BEGIN, 'u1', 'LOST', 'why', 5.0, '~/x'),

@@ -8,11 +8,16 @@ from flight_bench import FlightBench, Store
 from mission_bench import task_list
 from pymavlink.dialects.v20 import ardupilotmega as d
 
-from uav_task_alloc.mavlink.authority import State, Suspension
-from uav_task_alloc.mavlink.board import MissionState
-from uav_task_alloc.mavlink.vehicle_modes import px4_mode
+from uav_task_alloc.mavlink.gcs.authority import AuthorityState, Suspension
+from uav_task_alloc.mavlink.gcs.onboard_mission import MissionState
+from uav_task_alloc.sim.modes import px4_mode
 
-N, H, S, L = State.NONE, State.HELD, State.SUSPENDED, State.LOST
+N, H, S, L = (
+    AuthorityState.NONE,
+    AuthorityState.HELD,
+    AuthorityState.SUSPENDED,
+    AuthorityState.LOST,
+)
 BOTH = pytest.mark.parametrize('kind', ['ardupilot', 'px4'])
 ARDUPILOT = pytest.mark.parametrize('kind', ['ardupilot'])
 PX4 = pytest.mark.parametrize('kind', ['px4'])

@@ -3,8 +3,8 @@
 import pytest
 from link_bench import WALL, End
 
-from uav_task_alloc.mavlink.link import open_link
-from uav_task_alloc.mavlink.radio import Radio
+from uav_task_alloc.mavlink.transport.connections import Connections
+from uav_task_alloc.mavlink.transport.link import open_link
 
 
 @pytest.fixture
@@ -12,7 +12,7 @@ def radio():
     made = []
 
     def make(*names, **kwargs):
-        made.append(Radio(map(open_link, names or ['udpin:127.0.0.1:0']), 245, 190,
+        made.append(Connections(map(open_link, names or ['udpin:127.0.0.1:0']), 245, 190,
                           wall=lambda: WALL, **kwargs))
         return made[-1]
     yield make

@@ -7,9 +7,9 @@ from flight_bench import FlightBench, places
 from mission_bench import task_list
 from pymavlink.dialects.v20 import ardupilotmega as d
 
-from uav_task_alloc.mavlink.vehicle_modes import px4_mode
-from uav_task_alloc.mission import Stop, TaskList
+from uav_task_alloc.mavlink.mission.items import MissionStop, TaskList
 from uav_task_alloc.model import Task
+from uav_task_alloc.sim.modes import px4_mode
 
 BOTH = pytest.mark.parametrize('kind', ['ardupilot', 'px4'])
 KINDS = ('ardupilot', 'px4')
@@ -50,7 +50,7 @@ def flying(kind, names='ABC', **kwargs):
 
 def listed(revision, **stops):
     """A list of tasks by name, each at a place (x, y) [m], 50 m high."""
-    return TaskList(revision, tuple(Stop(Task(name, (*place, 50.0)))
+    return TaskList(revision, tuple(MissionStop(Task(name, (*place, 50.0)))
                                     for name, place in stops.items()))
 
 

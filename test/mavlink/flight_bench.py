@@ -4,10 +4,10 @@ import random
 
 from mission_bench import ORIGIN, OURS, Line, make_vehicle, task_list
 
-from uav_task_alloc.mavlink.codec import Codec
-from uav_task_alloc.mavlink.ground import Ground, Station
-from uav_task_alloc.mavlink.policy import Policy
-from uav_task_alloc.mavlink.status import state_of
+from uav_task_alloc.mavlink.gcs.ground_station import GcsConfig, GroundStation
+from uav_task_alloc.mavlink.gcs.policy import Policy
+from uav_task_alloc.mavlink.gcs.status import state_of
+from uav_task_alloc.mavlink.transport.codec import Codec
 
 
 class FlightBench:
@@ -28,7 +28,7 @@ class FlightBench:
 
     def start(self):
         """A new bridge, as after kill -9: it knows what its `store` kept, nothing without one."""
-        self.ground = Ground(Station(origin=ORIGIN, policy=self.policy),
+        self.ground = GroundStation(GcsConfig(origin=ORIGIN, policy=self.policy),
                              random.Random(self.seed), self.store)
         for n in self.vehicles:
             self.codecs['up', n] = Codec(*OURS)

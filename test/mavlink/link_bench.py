@@ -4,7 +4,7 @@ import socket
 
 from pymavlink.dialects.v20 import ardupilotmega as d
 
-from uav_task_alloc.mavlink.codec import Codec
+from uav_task_alloc.mavlink.transport.codec import Codec
 
 WALL = 1.8e9  # [s]
 

@@ -7,15 +7,15 @@ import random
 from pymavlink.dialects.v20 import ardupilotmega as d
 
 from uav_task_alloc.geometry.frames import Origin
-from uav_task_alloc.mavlink.codec import Codec
-from uav_task_alloc.mavlink.peer import Peer
-from uav_task_alloc.mavlink.profiles import ARDUPILOT, PX4
-from uav_task_alloc.mavlink.transfer import Mission, Verified
-from uav_task_alloc.mavlink.upload import Upload
-from uav_task_alloc.mavlink.vehicle import AUTOPILOTS, Vehicle
-from uav_task_alloc.mavlink.vehicle_config import VehicleConfig
-from uav_task_alloc.mission import Stop, TaskList, home_item, mission_items
+from uav_task_alloc.mavlink.autopilots import ARDUPILOT, PX4
+from uav_task_alloc.mavlink.mission.items import MissionStop, TaskList, home_item, mission_items
+from uav_task_alloc.mavlink.mission.outcomes import Mission, Verified
+from uav_task_alloc.mavlink.mission.peer import Peer
+from uav_task_alloc.mavlink.mission.upload import Upload
+from uav_task_alloc.mavlink.transport.codec import Codec
 from uav_task_alloc.model import Task
+from uav_task_alloc.sim.config import VehicleConfig
+from uav_task_alloc.sim.vehicle import AUTOPILOTS, Vehicle
 
 ORIGIN = Origin(47.397742, 8.545594, 488.0)
 OURS, TICK = (245, 190), 0.05  # [s]
@@ -34,7 +34,7 @@ def task_list(names, revision=1, *, side=100.0, service=0.0, returns=False, via=
     stops = []
     for n, name in enumerate(names):
         place = places.get(name) or square(n + shift + 1, side)[-1]
-        stops.append(Stop(Task(name, place, service_time=service),
+        stops.append(MissionStop(Task(name, place, service_time=service),
                           tuple((via or {}).get(name, ()))))
     return TaskList(revision, tuple(stops), returns)
 

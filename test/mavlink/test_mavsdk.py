@@ -14,14 +14,14 @@ import pytest
 from mission_bench import ORIGIN, task_list
 
 from uav_task_alloc.geometry.frames import to_geodetic
-from uav_task_alloc.mavlink.authority import State
-from uav_task_alloc.mavlink.board import MissionState
-from uav_task_alloc.mavlink.ground import Ground, Station
-from uav_task_alloc.mavlink.link import open_link
-from uav_task_alloc.mavlink.profiles import PX4
-from uav_task_alloc.mavlink.radio import Radio
-from uav_task_alloc.mavlink.status import Mode, state_of
-from uav_task_alloc.mission import mission_items
+from uav_task_alloc.mavlink.autopilots import PX4
+from uav_task_alloc.mavlink.gcs.authority import AuthorityState
+from uav_task_alloc.mavlink.gcs.ground_station import GcsConfig, GroundStation
+from uav_task_alloc.mavlink.gcs.onboard_mission import MissionState
+from uav_task_alloc.mavlink.gcs.status import UavMode, state_of
+from uav_task_alloc.mavlink.mission.items import mission_items
+from uav_task_alloc.mavlink.transport.connections import Connections
+from uav_task_alloc.mavlink.transport.link import open_link
 
 SCRIPT = Path(__file__).with_name('mavsdk_autopilot.py')
 pytestmark = pytest.mark.skipif(importlib.util.find_spec('mavsdk') is None,
@@ -75,10 +75,10 @@ class Peers:
     """A ground station on a real socket, and MAVSDK at the other end of it."""
 
     def __init__(self, *systems, loss=0.0):
-        self.radio = Radio([open_link('udpin:127.0.0.1:0')], 245, 190, wall=time.time)
+        self.radio = Connections([open_link('udpin:127.0.0.1:0')], 245, 190, wall=time.time)
         port = self.radio.links[0].port
         self.proxy = Proxy(port, loss) if loss else None
-        self.ground = Ground(Station(origin=ORIGIN, autopilot='px4'), random.Random(1))
+        self.ground = GroundStation(GcsConfig(origin=ORIGIN, autopilot='px4'), random.Random(1))
         self.events, self.told, self._half = [], [], ''
         self.process = subprocess.Popen(
             [sys.executable, str(SCRIPT), str(
@@ -99,7 +99,7 @@ class Peers:
         """They are in the air, in Hold, when the bridge starts: they are somebody else's."""
         for served in self.ground.served.values():
             self.until(lambda served=served: served.pilot.telemetry.airborne)
-            assert served.pilot.authority.state is not State.HELD
+            assert served.pilot.authority.state is not AuthorityState.HELD
             assert self.ground.hand_over(served.uav_id, 'test', time.monotonic()) == ''
 
     def serve(self):
@@ -190,7 +190,7 @@ def stored(mission):
 
 def flying(peers, system, revision=1):
     peers.until(lambda: peers.board(system).revision == revision
-                and peers.state(system).mode is Mode.ON_MISSION)
+                and peers.state(system).mode is UavMode.ON_MISSION)
 
 
 def test_mavsdk_two_systems_on_one_port_hold_exactly_their_lists(mavsdk):

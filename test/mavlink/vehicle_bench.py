@@ -5,9 +5,9 @@ import math
 from pymavlink.dialects.v20 import ardupilotmega as d
 
 from uav_task_alloc.geometry.frames import Origin, to_geodetic
-from uav_task_alloc.mavlink.codec import Codec
-from uav_task_alloc.mavlink.vehicle import AUTOPILOTS, Vehicle
-from uav_task_alloc.mavlink.vehicle_config import Mode, VehicleConfig
+from uav_task_alloc.mavlink.transport.codec import Codec
+from uav_task_alloc.sim.config import FlightMode, VehicleConfig
+from uav_task_alloc.sim.vehicle import AUTOPILOTS, Vehicle
 
 ORIGIN = Origin(47.397742, 8.545594, 488.0)
 READY = 60.0  # [s] after boot: there is a position estimate
@@ -116,7 +116,7 @@ class Bench:
 
     def set_mode(self, mode):
         """DO_SET_MODE with a Mode or a custom_mode."""
-        number = self.flight.custom_modes[mode] if isinstance(mode, Mode) else mode
+        number = self.flight.custom_modes[mode] if isinstance(mode, FlightMode) else mode
         if number > 0xffff:
             return self.command(d.MAV_CMD_DO_SET_MODE, 1, number >> 16 & 0xff, number >> 24)
         return self.command(d.MAV_CMD_DO_SET_MODE, 1, number)
@@ -127,7 +127,7 @@ class Bench:
     def rise(self, height=30.0):
         """In the air and holding, at `height` [m]."""
         if self.own:
-            self.set_mode(Mode.GUIDED)
+            self.set_mode(FlightMode.GUIDED)
         assert self.command(d.MAV_CMD_COMPONENT_ARM_DISARM, 1) == 0
         amsl = 0.0 if self.own else ORIGIN.altitude_amsl
         assert self.command(d.MAV_CMD_NAV_TAKEOFF, 0, 0, 0, 0, 0, 0, amsl + height) == 0
@@ -138,7 +138,7 @@ class Bench:
         """Take off, and begin this mission."""
         self.rise()
         self.load(*items)
-        assert self.set_mode(Mode.MISSION) == 0
+        assert self.set_mode(FlightMode.MISSION) == 0
 
     def reach(self, number):
         """Let the flown item number (from 0) be reached."""

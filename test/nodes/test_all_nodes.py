@@ -9,7 +9,7 @@ from uav_task_alloc_msgs import msg as m
 from uav_task_alloc_msgs.srv import SetAvailability
 
 from uav_task_alloc.model import Task, ThreatZone
-from uav_task_alloc.nodes.messages import (
+from uav_task_alloc.nodes.conversions.messages import (
     ANNOUNCEMENTS,
     EVENTS,
     LATCHED,

@@ -15,7 +15,7 @@ from uav_task_alloc_msgs import msg as m
 from uav_task_alloc_msgs.srv import SetAvailability, SubmitTasks
 from visualization_msgs.msg import MarkerArray
 
-from uav_task_alloc.nodes.messages import ANNOUNCEMENTS, EVENTS, LATCHED, STATES
+from uav_task_alloc.nodes.conversions.messages import ANNOUNCEMENTS, EVENTS, LATCHED, STATES
 
 pytestmark = pytest.mark.ros
 S = m.TaskStatus

@@ -3,12 +3,12 @@
 import pytest
 from test_allocator import Fleet, add, begin, task
 
-from uav_task_alloc.allocator import admission
+from uav_task_alloc.allocator.persistence.restore import Saved
 from uav_task_alloc.allocator.records import Outbox, UavList
-from uav_task_alloc.allocator.restore import Saved
-from uav_task_alloc.allocator.world import World
-from uav_task_alloc.nodes.painter import Painter
-from uav_task_alloc.nodes.teller import Teller
+from uav_task_alloc.allocator.state import admission
+from uav_task_alloc.allocator.state.world import World
+from uav_task_alloc.nodes.ros.allocation_publisher import AllocationPublisher
+from uav_task_alloc.nodes.rviz.marker_publisher import MarkerPublisher
 from uav_task_alloc.params import AllocatorParams
 
 pytestmark = pytest.mark.ros
@@ -35,7 +35,7 @@ def test_finding_23_a_journal_of_another_origin_ends_the_start(start, probe, fle
 
 def test_finding_24_the_publishers_of_a_forgotten_uav_are_gone(probe):
     world = World(AllocatorParams(), Saved())
-    teller, painter = Teller(probe.node, world), Painter(probe.node, world)
+    teller, painter = AllocationPublisher(probe.node, world), MarkerPublisher(probe.node, world)
     lists = {uav_id: UavList(uav_id, 1) for uav_id in ('real', 'ghost')}
     world.lists.lists.update(lists)
 

@@ -9,11 +9,11 @@ from mcap.writer import Writer
 from rclpy.serialization import serialize_message
 from uav_task_alloc_msgs import msg as m
 
-from uav_task_alloc import report
+from uav_task_alloc.cli import report
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.model import Task, ThreatZone
-from uav_task_alloc.nodes.definitions import definition
-from uav_task_alloc.nodes.messages import announcement, from_zones, header
+from uav_task_alloc.nodes.conversions.message_definitions import definition
+from uav_task_alloc.nodes.conversions.messages import announcement, from_zones, header
 from uav_task_alloc.record.bag import Bag
 from uav_task_alloc.record.bag_reader import BagReader
 

@@ -13,11 +13,10 @@ from mcap_ros2.decoder import DecoderFactory
 from nav_msgs.msg import Path as PathMsg
 from uav_task_alloc_msgs import msg as m
 
-from uav_task_alloc import report
+from uav_task_alloc.cli import report
 from uav_task_alloc.model import Task
-from uav_task_alloc.nodes import definitions
-from uav_task_alloc.nodes.bag_recorder import BagRecorder
-from uav_task_alloc.nodes.messages import (
+from uav_task_alloc.nodes.conversions import message_definitions as definitions
+from uav_task_alloc.nodes.conversions.messages import (
     ANNOUNCEMENTS,
     EVENTS,
     LATCHED,
@@ -25,7 +24,8 @@ from uav_task_alloc.nodes.messages import (
     announcement,
     header,
 )
-from uav_task_alloc.nodes.run import with_flags
+from uav_task_alloc.nodes.ros.bag_recorder import BagRecorder
+from uav_task_alloc.nodes.ros.run import with_flags
 from uav_task_alloc.record.bag_reader import BagReader
 
 pytestmark = pytest.mark.ros

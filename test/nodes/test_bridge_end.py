@@ -7,7 +7,7 @@ import pytest
 from test_mavlink_bridge import Sky
 from uav_task_alloc_msgs import msg as m
 
-from uav_task_alloc.nodes.bridge_end import LONGEST, BridgeEnd
+from uav_task_alloc.nodes.ros.bridge_shutdown import LONGEST, BridgeShutdown
 
 pytestmark = pytest.mark.ros
 MANY = 150  # tasks, whose upload takes a while
@@ -68,8 +68,8 @@ def served(uav_id, airborne, swap_at):
 
 def test_a_swap_is_waited_for_as_long_as_it_lasts_and_no_longer_than_said():
     fleet = [served('a', True, None), served('b', True, 5.0)]
-    assert not BridgeEnd().waits(fleet[:1], 5.0)
-    end = BridgeEnd()
+    assert not BridgeShutdown().waits(fleet[:1], 5.0)
+    end = BridgeShutdown()
     assert end.waits(fleet, 100.0)
     assert end.waits(fleet, 100.0 + 0.9 * LONGEST)
     assert not end.waits(fleet, 100.0 + LONGEST)
@@ -78,7 +78,7 @@ def test_a_swap_is_waited_for_as_long_as_it_lasts_and_no_longer_than_said():
 def test_everybody_in_the_air_is_named():
     fleet = [served('a', True, None), served('b', True, 5.0), served('c', False, None),
              served('d', True, None)]
-    flying, held = BridgeEnd.words(fleet)
+    flying, held = BridgeShutdown.words(fleet)
     assert flying.startswith('ends while airborne: a, d; ')
     assert held.startswith('ends while held in the air for a new list: b; ')
-    assert BridgeEnd.words(fleet[2:3]) == []
+    assert BridgeShutdown.words(fleet[2:3]) == []

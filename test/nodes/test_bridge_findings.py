@@ -10,11 +10,11 @@ from pymavlink.dialects.v20 import ardupilotmega as d
 from rclpy.executors import SingleThreadedExecutor
 from uav_task_alloc_msgs import msg as m
 
-from uav_task_alloc.mavlink.codec import Codec
-from uav_task_alloc.mavlink.link import MOST_STRANGERS
+from uav_task_alloc.mavlink.transport.codec import Codec
+from uav_task_alloc.mavlink.transport.link import MOST_STRANGERS
 from uav_task_alloc.model import Leg, Task
+from uav_task_alloc.nodes.conversions.messages import planned_task
 from uav_task_alloc.nodes.mavlink_bridge import MavlinkBridge
-from uav_task_alloc.nodes.messages import planned_task
 
 pytestmark = pytest.mark.ros
 HEARTBEAT = d.MAVLink_heartbeat_message(d.MAV_TYPE_QUADROTOR, d.MAV_AUTOPILOT_PX4, 0, 0, 4, 3)
@@ -171,7 +171,7 @@ def test_finding_24_a_flood_of_strangers_leaves_the_known_vehicle(bridge):
 
 
 def test_no_mavlink_stream_ends_a_running_bridge(bridge, request):
-    """`--streams 2000` sends a hundred; test/mavlink/test_hostile_streams.py sends all."""
+    """`--streams 2000` sends a hundred; transport/test_hostile_streams.py sends all."""
     one = bridge('-p', 'takeoff:=true')
     ends = [socket.socket(socket.AF_INET, socket.SOCK_DGRAM) for _ in range(60)]
     to = ('127.0.0.1', one.node.radio.links[0].port)

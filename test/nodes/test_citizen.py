@@ -10,7 +10,7 @@ import pytest
 from geometry_msgs.msg import Point
 from uav_task_alloc_msgs import msg as m
 
-from uav_task_alloc.nodes.messages import ANNOUNCEMENTS, LATCHED, STATES
+from uav_task_alloc.nodes.conversions.messages import ANNOUNCEMENTS, LATCHED, STATES
 
 pytestmark = pytest.mark.ros
 POLICIES = ElementTree.parse(Path(__file__).parents[2] / 'config/sros2/policies.xml')

@@ -7,8 +7,8 @@ from test_mavlink_bridge import Sky
 from uav_task_alloc_msgs import msg as m
 
 from uav_task_alloc.geometry.frames import Origin
-from uav_task_alloc.nodes.fleet_origin import MOST, PATIENCE, Origins
-from uav_task_alloc.nodes.messages import LATCHED
+from uav_task_alloc.nodes.conversions.messages import LATCHED
+from uav_task_alloc.nodes.ros.origin_check import MOST, PATIENCE, OriginReports
 
 pytestmark = pytest.mark.ros
 HERE = Origin(47.397742, 8.545594, 488.0)
@@ -121,7 +121,7 @@ def test_the_same_origin_and_one_that_is_none_change_nothing(sky, probe):
 
 
 def test_origins_a_millimetre_apart_are_the_same():
-    origins = Origins(HERE)
+    origins = OriginReports(HERE)
     origins.hear(Origin(47.39774201, 8.54559401, 488.001))
     assert origins.conflict(0.0) == ''
     origins.hear(Origin(47.397742, 8.545594, 488.1))
@@ -129,7 +129,7 @@ def test_origins_a_millimetre_apart_are_the_same():
 
 
 def test_a_conflict_lasts_until_all_who_are_left_could_tell_again():
-    origins = Origins(HERE)
+    origins = OriginReports(HERE)
     origins.hear(Origin(47.4, 8.5, 488.0))
     origins.left(10.0)
     assert origins.conflict(10.0 + 0.9 * PATIENCE)
@@ -139,7 +139,7 @@ def test_a_conflict_lasts_until_all_who_are_left_could_tell_again():
 
 
 def test_a_flood_of_origins_is_bounded():
-    origins = Origins(HERE)
+    origins = OriginReports(HERE)
     for k in range(10 * MOST):
         origins.hear(Origin(float(k % 90), 8.5, float(k)))
     assert len(origins._differing) == MOST

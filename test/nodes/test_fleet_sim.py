@@ -7,7 +7,7 @@ import time
 import pytest
 from uav_task_alloc_msgs.srv import SetAvailability
 
-from uav_task_alloc.mavlink.codec import Codec
+from uav_task_alloc.mavlink.transport.codec import Codec
 
 pytestmark = pytest.mark.ros
 

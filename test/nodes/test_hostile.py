@@ -16,9 +16,9 @@ from uav_task_alloc_msgs.srv import SetAvailability, SubmitTasks
 
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.geometry.frames import Origin
-from uav_task_alloc.nodes import messages
 from uav_task_alloc.nodes.allocator import AllocatorNode
-from uav_task_alloc.nodes.messages import ANNOUNCEMENTS, EVENTS, LATCHED, STATES
+from uav_task_alloc.nodes.conversions import messages
+from uav_task_alloc.nodes.conversions.messages import ANNOUNCEMENTS, EVENTS, LATCHED, STATES
 
 pytestmark = pytest.mark.ros
 SEED, BATCH = 20_261_121, 10  # messages in one example

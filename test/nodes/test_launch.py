@@ -15,8 +15,8 @@ from rcl_interfaces.srv import GetParameters
 from uav_task_alloc_msgs import msg as m
 
 from uav_task_alloc import scenario
-from uav_task_alloc.nodes.messages import LATCHED, STATES
-from uav_task_alloc.nodes.ports import free_port
+from uav_task_alloc.nodes.conversions.messages import LATCHED, STATES
+from uav_task_alloc.nodes.ros.udp_ports import free_port
 
 pytestmark = pytest.mark.ros
 ROOT = Path(__file__).parents[2]

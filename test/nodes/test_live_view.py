@@ -14,14 +14,14 @@ from uav_task_alloc_msgs import msg as m
 
 from uav_task_alloc.geometry.frames import Origin
 from uav_task_alloc.model import Task, ThreatZone
-from uav_task_alloc.nodes.messages import (
+from uav_task_alloc.nodes.conversions.messages import (
     ANNOUNCEMENTS,
     LATCHED,
     STATES,
     announcement,
     from_zones,
 )
-from uav_task_alloc.record import heard, lines
+from uav_task_alloc.record import message_records as lines, run_state as heard
 
 TEXT = """uavs:
   - {id: uav_1, position: [0, 0, 0]}
@@ -71,9 +71,9 @@ def test_it_shows_records_and_ends_when_all_is_settled(start, probe, tmp_path):
     probe.until(over)
     assert view.popen.returncode == 0
     assert '1 of 1 tasks completed; 0 zones' in view.output()
-    said = heard.read(tmp_path / 'out')
+    said = heard.read_record(tmp_path / 'out')
     assert said.tasks['t1'].position == (10.0, 20.0, 30.0)
-    assert said.statuses['t1'] == heard.Status('COMPLETED', 'uav_1', '')
+    assert said.statuses['t1'] == heard.ReportedStatus('COMPLETED', 'uav_1', '')
     assert [(solve.milliseconds, solve.trigger) for solve in said.solves] == [
         (pytest.approx(100.0), '1 new task')]
     assert said.uavs['uav_1']['mode'] == 'STANDBY'
@@ -139,7 +139,7 @@ def test_zones_come_back_from_the_record_as_they_were():
     zones = [ThreatZone.hemisphere('a', (1.0, 2.0, 3.0), 4.0, 5.0),
              ThreatZone.cylinder('b', (1.0, 2.0), 3.0),
              ThreatZone.polygon('c', [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)], 0.0, 9.0)]
-    text = json.dumps(lines.zones(from_zones(zones, 0.0)), allow_nan=False)
+    text = json.dumps(lines.announced_zones(from_zones(zones, 0.0)), allow_nan=False)
     assert [heard.zone_from_json(row) for row in json.loads(text)['zones']] == zones
 
 
@@ -147,7 +147,7 @@ def test_a_bad_task_of_an_announcement_is_left_out():
     bad = announcement(m.TaskAnnouncement.ADD, [Task('t2', (1.0, 2.0, 3.0))], 0.0)
     bad.tasks[0].position = Point(x=math.nan)
     bad.tasks += ADD.tasks
-    assert [task['id'] for task in lines.announced(bad, ORIGIN)['tasks']] == ['t1']
+    assert [task['id'] for task in lines.announced_tasks(bad, ORIGIN)['tasks']] == ['t1']
 
 
 def test_uploads_and_health_are_taken_from_the_diagnostics():
@@ -185,7 +185,7 @@ def test_finding_31_a_count_of_uploads_is_plain_digits(value):
 
 
 def test_finding_31_via_points_that_are_no_places_are_left_out():
-    line = lines.task_list(broken_list())
+    line = lines.task_list_record(broken_list())
     assert line['tasks'][0]['via'] == [(1.0, 2.0, 3.0)]
     json.dumps(line, allow_nan=False)
 

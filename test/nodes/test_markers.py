@@ -11,21 +11,27 @@ from picture_checks import check_markers, check_path, points, texts
 from uav_task_alloc_msgs import msg as m
 from visualization_msgs.msg import Marker, MarkerArray
 
-from uav_task_alloc.allocator.fleet import UavRecord
 from uav_task_alloc.allocator.records import (
+    ListStop,
     Outbox,
-    Stop,
     TaskRecord,
     TaskState,
     UavList,
     UavReport,
 )
+from uav_task_alloc.allocator.state.fleet import UavRecord
 from uav_task_alloc.geometry.zones import inside
 from uav_task_alloc.model import Leg, Task, ThreatZone
-from uav_task_alloc.nodes import painter, zone_bodies
-from uav_task_alloc.nodes.markers import MOST_STOPS, MOST_TEXTS, Picture, markers
-from uav_task_alloc.nodes.messages import ANNOUNCEMENTS, LATCHED, STATES, announcement, from_zones
-from uav_task_alloc.nodes.ways import ahead, path
+from uav_task_alloc.nodes.conversions.messages import (
+    ANNOUNCEMENTS,
+    LATCHED,
+    STATES,
+    announcement,
+    from_zones,
+)
+from uav_task_alloc.nodes.conversions.path_messages import ahead, path
+from uav_task_alloc.nodes.rviz import marker_publisher as painter, zone_markers as zone_bodies
+from uav_task_alloc.nodes.rviz.markers import MOST_STOPS, MOST_TEXTS, Picture, markers
 
 AT = 5.0
 NOTCHED = ThreatZone.polygon('p', [(0, 0), (90, 0), (90, 90), (45, 20), (0, 90)], 5.0, 60.0, 4.0)
@@ -36,7 +42,7 @@ def uav(uav_id, *position, home=(0.0, 0.0, 0.0), **more):
 
 
 def stop(name, *position, via=()):
-    return Stop(Task(name, position), Leg(via, 1.0), 0.0)
+    return ListStop(Task(name, position), Leg(via, 1.0), 0.0)
 
 
 def record(name, *position, state=TaskState.PENDING, **more):
@@ -141,7 +147,7 @@ def test_a_dome_is_half_a_ball_with_its_margin():
     NOTCHED, ThreatZone.polygon('q', [(0, 0), (0, 9), (9, 9), (9, 0)], margin=1.0)])
 def test_a_prism_is_closed_to_its_top_and_covers_the_polygon_once(zone):
     marker = zone_bodies.shape(Marker(), zone)
-    low, high = zone_bodies.span(zone)
+    low, high = zone_bodies.height_span(zone)
     at = marker.pose.position
     corners = [(at.x + p.x, at.y + p.y, at.z + p.z) for p in marker.points]
     assert {z for _, _, z in corners} == {low, high}
@@ -172,7 +178,7 @@ def test_nothing_is_drawn_while_nobody_looks_or_nothing_is_new(probe, monkeypatc
         picture))
     monkeypatch.setattr(painter, 'REST', 0.0)
     desk = Desk()
-    artist = painter.Painter(probe.node, desk.world)
+    artist = painter.MarkerPublisher(probe.node, desk.world)
     desk.uav('u1', 0.0, 0.0, 50.0)
     desk.add(('t1', 100.0, 0.0))
     artist.note(Outbox(statuses=True))

@@ -11,10 +11,8 @@ from uav_task_alloc_msgs import msg as m
 from uav_task_alloc_msgs.srv import HandOver
 
 from uav_task_alloc.geometry.frames import Origin
-from uav_task_alloc.mavlink.fleet import Fleet
-from uav_task_alloc.mavlink.vehicle_config import VehicleConfig
 from uav_task_alloc.model import Leg, Task, ThreatZone
-from uav_task_alloc.nodes.messages import (
+from uav_task_alloc.nodes.conversions.messages import (
     ANNOUNCEMENTS,
     EVENTS,
     LATCHED,
@@ -24,6 +22,8 @@ from uav_task_alloc.nodes.messages import (
     header,
     planned_task,
 )
+from uav_task_alloc.sim.config import VehicleConfig
+from uav_task_alloc.sim.udp_fleet import UdpFleet
 
 pytestmark = pytest.mark.ros
 ORIGIN = Origin(47.397742, 8.545594, 488.0)
@@ -38,7 +38,7 @@ class Sky:
             free.bind(('127.0.0.1', 0))
             self.port = free.getsockname()[1]
         self.probe, self._start, self._args, self.log = probe, start, args, log
-        self.fleet = Fleet([(VehicleConfig(f'uav_{n}', n, ORIGIN, (20.0 * n, 0.0, 0.0),
+        self.fleet = UdpFleet([(VehicleConfig(f'uav_{n}', n, ORIGIN, (20.0 * n, 0.0, 0.0),
                                            arming_delay=0.0, floods=False), kind)
                             for n, kind in KINDS.items()], ('127.0.0.1', self.port), 10.0, log)
         self.states, self.events = {}, []

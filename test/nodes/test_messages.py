@@ -8,7 +8,7 @@ from uav_task_alloc_msgs import msg as m
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.geometry.frames import Origin
 from uav_task_alloc.model import Leg, Task, ThreatZone
-from uav_task_alloc.nodes import bridge_messages, messages
+from uav_task_alloc.nodes.conversions import bridge_messages, messages
 
 ORIGIN = Origin(47.397742, 8.545594, 488.0)
 

@@ -13,7 +13,7 @@ from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
 from rcl_interfaces.srv import DescribeParameters, GetParameters, SetParameters
 
 from uav_task_alloc import params
-from uav_task_alloc.nodes import run as nodes_run
+from uav_task_alloc.nodes.ros import run as nodes_run
 
 pytestmark = pytest.mark.ros
 SHARE = Path(get_package_share_directory('uav_task_alloc'))
@@ -57,7 +57,7 @@ def test_a_bad_start_parameter_ends_the_node_in_words(start, name, given, text):
 
 def test_a_node_whose_callback_raises_ends_with_a_status_of_its_own(domain):
     code = ('from rclpy.node import Node\n'
-            'from uav_task_alloc.nodes.run import run\n'
+            'from uav_task_alloc.nodes.ros.run import run\n'
             'class Faulty(Node):\n'
             '    def __init__(self):\n'
             "        super().__init__('faulty')\n"

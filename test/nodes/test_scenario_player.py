@@ -6,7 +6,7 @@ from uav_task_alloc_msgs.srv import SetAvailability
 
 from uav_task_alloc import scenario
 from uav_task_alloc.model import Shape
-from uav_task_alloc.nodes.messages import ANNOUNCEMENTS, LATCHED, from_stamp
+from uav_task_alloc.nodes.conversions.messages import ANNOUNCEMENTS, LATCHED, from_stamp
 
 TEXT = """uavs:
   - {id: uav_1, position: [0, 0, 0], dies_at: 4}

@@ -6,7 +6,7 @@ import pytest
 from geometry_msgs.msg import Point
 from uav_task_alloc_msgs import msg as m
 
-from uav_task_alloc.nodes.messages import ANNOUNCEMENTS, LATCHED, STATES
+from uav_task_alloc.nodes.conversions.messages import ANNOUNCEMENTS, LATCHED, STATES
 
 pytestmark = pytest.mark.ros
 SPACE, LONG = '/' + 'n' * 120, 'u' * 150

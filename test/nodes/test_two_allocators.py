@@ -9,7 +9,7 @@ from rosgraph_msgs.msg import Clock
 from test_allocator import Fleet, add, task
 from uav_task_alloc_msgs.srv import SubmitTasks
 
-from uav_task_alloc.nodes.messages import LATCHED
+from uav_task_alloc.nodes.conversions.messages import LATCHED
 
 pytestmark = pytest.mark.ros
 SECOND = ('-r', '__node:=second')

@@ -7,10 +7,10 @@ import time
 from pymavlink.dialects.v20 import ardupilotmega as d
 from worlds import ORIGIN, SYSTEMS
 
-from uav_task_alloc.mavlink.ground import Ground, Station
-from uav_task_alloc.mavlink.heartbeat import Heartbeat
-from uav_task_alloc.mavlink.policy import Policy
-from uav_task_alloc.mavlink.radio import Radio
+from uav_task_alloc.mavlink.gcs.ground_station import GcsConfig, GroundStation
+from uav_task_alloc.mavlink.gcs.policy import Policy
+from uav_task_alloc.mavlink.transport.connections import Connections
+from uav_task_alloc.mavlink.transport.heartbeat import Heartbeat
 
 READS = {d.MAV_CMD_SET_MESSAGE_INTERVAL, d.MAV_CMD_REQUEST_MESSAGE}
 COMMANDS = {'COMMAND_LONG', 'COMMAND_INT', 'SET_MODE', 'MISSION_SET_CURRENT'}
@@ -39,9 +39,9 @@ class Bridge:
 
     def __init__(self, world, courses):
         self.limit, self.courses = world.limit, courses
-        self.radio = Radio(world.links, 245, 190, wall=time.time)
+        self.radio = Connections(world.links, 245, 190, wall=time.time)
         self.heartbeat = Heartbeat(self.radio.send_to_all)
-        self.ground = Ground(Station(origin=ORIGIN, system_ids=SYSTEMS, policy=Policy(
+        self.ground = GroundStation(GcsConfig(origin=ORIGIN, system_ids=SYSTEMS, policy=Policy(
             takeoff=True, cruise_altitude=30.0)), random.Random(1))
         self.events, self.notes = [], []
         self.began = self.now()
@@ -105,7 +105,7 @@ class SecondStation:
     """Another ground station, with links of its own to the vehicles; it sets modes."""
 
     def __init__(self, world):
-        self.radio = Radio(world.second_links(), 255, 190, wall=time.time)
+        self.radio = Connections(world.second_links(), 255, 190, wall=time.time)
         self.heartbeat = Heartbeat(self.radio.send_to_all)
         self.sticks_of = set()  # systems whose sticks it holds in the middle
         self._at = 0.0

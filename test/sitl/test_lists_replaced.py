@@ -8,8 +8,8 @@ from collections import Counter
 from sitl_bench import Bridge, Visits
 from worlds import HOMES, SYSTEMS
 
-from uav_task_alloc.mavlink.status import Mode, state_of
-from uav_task_alloc.mission import Stop, TaskList
+from uav_task_alloc.mavlink.gcs.status import UavMode, state_of
+from uav_task_alloc.mavlink.mission.items import MissionStop, TaskList
 from uav_task_alloc.model import Task
 
 REPLACED = 10  # times, each vehicle
@@ -45,12 +45,12 @@ class Course:
         assert not self.withdrawn & {*names, *keep}
         self.listed, self.revision = names, self.revision + 1
         return TaskList(self.revision, tuple(
-            Stop(Task(name, self.places[name], service_time=2.0)) for name in names))
+            MissionStop(Task(name, self.places[name], service_time=2.0)) for name in names))
 
     def is_due(self, mode):
         """Another list after each task, or where the last one is flown."""
         return self.revision == 0 or (self.revision <= REPLACED and len(self.done) > self._seen
-                                      and mode in (Mode.ON_MISSION, Mode.HOLD))
+                                      and mode in (UavMode.ON_MISSION, UavMode.HOLD))
 
 
 class Replacing(Bridge):

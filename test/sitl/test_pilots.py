@@ -8,9 +8,9 @@ import pytest
 from sitl_bench import Bridge, SecondStation, Visits, interferes
 from worlds import HOMES, SYSTEMS
 
-from uav_task_alloc.mavlink.authority import State
-from uav_task_alloc.mavlink.profiles import Flight
-from uav_task_alloc.mission import Stop, TaskList
+from uav_task_alloc.mavlink.autopilots import ModeFunction
+from uav_task_alloc.mavlink.gcs.authority import AuthorityState
+from uav_task_alloc.mavlink.mission.items import MissionStop, TaskList
 from uav_task_alloc.model import Task
 
 TASKS = 8  # of each vehicle
@@ -28,8 +28,13 @@ class Course:
         x, y, _ = HOMES[system]
         self.places = {f'u{system}_{k}': (x, y + 60.0 * (k + 1), 40.0) for k in range(TASKS)}
         self.visits, self.done = Visits(self.places), []
-        self.list = TaskList(1, tuple(
-            Stop(Task(name, place, service_time=2.0)) for name, place in self.places.items()))
+        self.list = TaskList(
+            1,
+            tuple(
+                MissionStop(Task(name, place, service_time=2.0))
+                for name, place in self.places.items()
+            ),
+        )
 
     @property
     def ended(self):
@@ -81,7 +86,7 @@ class Watched(Bridge):
     def in_mid_mission(self, system):
         """On its way between two tasks."""
         course = self.courses[system]
-        if len(course.done) < 2 or self.telemetry(system).flight is not Flight.MISSION:
+        if len(course.done) < 2 or self.telemetry(system).flight is not ModeFunction.MISSION:
             return False
         at = self.telemetry(system).position
         return min(math.dist(at, place) for place in course.places.values()) > 12.0
@@ -153,7 +158,11 @@ def test_what_a_second_station_commands_stands_until_it_is_handed_over(pilots):
     assert math.dist(held.position, at) < 10.0
     assert bridge.taken == {LANDED: [], RETURNED: [], HELD: []}, '\n'.join(bridge.notes)
     assert {n: bridge.pilot(n).authority.state for n in SYSTEMS} == {
-        LANDED: State.LOST, RETURNED: State.LOST, HELD: State.LOST, LEFT_ALONE: State.HELD}
+        LANDED: AuthorityState.LOST,
+        RETURNED: AuthorityState.LOST,
+        HELD: AuthorityState.LOST,
+        LEFT_ALONE: AuthorityState.HELD,
+    }
     pilots.until(lambda: bridge.courses[LEFT_ALONE].ended, 'the fourth has flown its list')
 
     for system in (LANDED, RETURNED):  # on the ground it takes the operator's leave to start

@@ -4,9 +4,9 @@ import os
 import subprocess
 
 from uav_task_alloc.geometry.frames import Origin, to_geodetic
-from uav_task_alloc.mavlink.fleet import Fleet
-from uav_task_alloc.mavlink.link import open_link
-from uav_task_alloc.mavlink.vehicle_config import VehicleConfig
+from uav_task_alloc.mavlink.transport.link import open_link
+from uav_task_alloc.sim.config import VehicleConfig
+from uav_task_alloc.sim.udp_fleet import UdpFleet
 
 ORIGIN = Origin(47.397742, 8.545594, 488.0)
 SYSTEMS = (1, 2, 3, 4)
@@ -47,7 +47,7 @@ class FleetSim:
     def __init__(self, kind):
         self.kind = kind
         self.links = [open_link('udpin:127.0.0.1:0')]
-        self.fleet = Fleet([(VehicleConfig(f'uav_{n}', n, ORIGIN, HOMES[n], arming_delay=0.0,
+        self.fleet = UdpFleet([(VehicleConfig(f'uav_{n}', n, ORIGIN, HOMES[n], arming_delay=0.0,
                                            floods=False), kind) for n in SYSTEMS],
                            ('127.0.0.1', self.links[0].port), self.speedup)
         self.thread = self.fleet.start()

@@ -8,19 +8,19 @@ from optimum import subsets
 from plan_checks import make
 
 from uav_task_alloc.errors import UnknownName
-from uav_task_alloc.solver.baselines.cbba import GRAPHS, Settings, make_agents, make_graph
+from uav_task_alloc.solver.baselines.cbba import GRAPHS, CbbaSettings, make_agents, make_graph
 from uav_task_alloc.solver.baselines.consensus import (
     NOBODY,
     RULES,
-    Action,
     Agent,
-    Message,
+    ConsensusMessage,
+    EntryAction,
     diameter,
     one_round,
 )
 from uav_task_alloc.solver.problem import Limits, Rules, make_problem
 
-UPDATE, RESET, LEAVE = Action.UPDATE, Action.RESET, Action.LEAVE
+UPDATE, RESET, LEAVE = EntryAction.UPDATE, EntryAction.RESET, EntryAction.LEAVE
 
 
 class Coverage:
@@ -145,7 +145,7 @@ def test_gains_that_grow_do_not_keep_agents_from_agreeing():
         problem = make_problem(uavs, tasks, {}, Limits(), Rules())
         for kind in GRAPHS:
             graph, rounds = make_graph(kind, 5), 0
-            agents = make_agents(problem, Settings())
+            agents = make_agents(problem, CbbaSettings())
             while one_round(agents, graph, rounds + 1):
                 rounds += 1
                 assert rounds <= 20 * diameter(graph)
@@ -198,7 +198,7 @@ def test_a_receiver_does_what_table_1_says(theirs, mine, higher, more_of_m, more
     agent = Agent(ME, 4, 1, None, 1)
     agent.winner[0], agent.bid[0], agent.heard[:] = mine, 5.0, 5
     bid = 6.0 if higher else 4.0
-    agent.listen([Message(K, np.array([bid]), np.array([theirs]),
+    agent.listen([ConsensusMessage(K, np.array([bid]), np.array([theirs]),
                           np.array([5, 6, 6 if more_of_m else 4, 6 if more_of_n else 4]))])
     assert (agent.winner[0], agent.bid[0]) == {
         UPDATE: (theirs, bid), RESET: (NOBODY, 0.0), LEAVE: (mine, 5.0)}[action]
@@ -216,7 +216,7 @@ def test_a_lost_task_takes_those_behind_it_along():
     first, second, *behind = agent.bundle
     winner, bid = np.full(4, NOBODY), np.zeros(4)
     winner[second], bid[second] = 1, 99.0
-    agent.listen([Message(1, bid, winner, np.array([0, 1]))])
+    agent.listen([ConsensusMessage(1, bid, winner, np.array([0, 1]))])
     assert agent.bundle == agent.path == [first]
     assert agent.winner[second] == 1
     assert (agent.winner[behind] == NOBODY).all()

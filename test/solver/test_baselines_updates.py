@@ -10,8 +10,8 @@ from uav_task_alloc.objective import excess, fit
 from uav_task_alloc.solver import routes as of
 from uav_task_alloc.solver.baselines import bee_colony, ga, paper_chain_q, q_learning
 from uav_task_alloc.solver.baselines.population import Coding
-from uav_task_alloc.solver.chance import chance
 from uav_task_alloc.solver.problem import Limits, Rules, make_problem
+from uav_task_alloc.solver.rng import chance
 
 
 def on_a_line(starts, tasks):
@@ -77,7 +77,7 @@ def test_a_greedy_bee_takes_the_greatest_q_of_each_position_that_is_unvisited():
     routes, uavs, tasks = of.empty_routes(problem.arrays), np.zeros(3, int), np.zeros(3, int)
     scratch = paper_chain_q.Scratch(np.empty(2, np.bool_), np.empty(3, np.bool_), np.empty(2),
                                     np.empty(3))
-    steps = paper_chain_q.fly(problem.arrays, routes, uavs, tasks, q, 1.0, scratch, chance(1))
+    steps = paper_chain_q.fly_bee(problem.arrays, routes, uavs, tasks, q, 1.0, scratch, chance(1))
     assert (steps, uavs[:2].tolist(), tasks.tolist()) == (3, [1, 0], [1, 2, 0])
 
 
@@ -93,14 +93,14 @@ def test_single_agent_q_learning_is_eq_2_5():
 
 
 def test_onlookers_choose_by_eq_2_8_with_one_over_fit():
-    assert bee_colony.probabilities(np.array([1.0, 2.0, 4.0])) == pytest.approx(
+    assert bee_colony.source_probabilities(np.array([1.0, 2.0, 4.0])) == pytest.approx(
         [4.0 / 7.0, 2.0 / 7.0, 1.0 / 7.0])
-    assert bee_colony.probabilities(np.array([math.inf, math.inf])).tolist() == [0.5, 0.5]
+    assert bee_colony.source_probabilities(np.array([math.inf, math.inf])).tolist() == [0.5, 0.5]
 
 
 def test_a_food_source_says_who_by_interval_and_when_by_size():
     coding = Coding(problem_of(*on_a_line([0.0, 9.0], [1.0, 2.0, 3.0, 4.0])))
-    colony = bee_colony.Colony(coding, bee_colony.Settings(), np.random.default_rng(1))
+    colony = bee_colony.AbcColony(coding, bee_colony.AbcSettings(), np.random.default_rng(1))
     row, who = colony.decoded(np.array([[0.1, 0.9, 0.7, 0.0]]))
     assert who.tolist() == [[0, 1, 1, 0]]
     assert row.tolist() == [[3, 0, 2, 1]]
@@ -133,7 +133,7 @@ def test_a_child_keeps_a_slice_and_takes_the_rest_in_the_others_order():
 def test_children_of_a_generation_serve_every_task_once_by_whom_it_allows():
     uavs, tasks = on_a_line([0.0, 9.0], [1.0, 2.0, 3.0, 4.0])
     tasks.append(Task('only', (5.0, 0.0, 0.0), allowed_uavs=frozenset({'u1'})))
-    population = ga.Population(Coding(problem_of(uavs, tasks)), ga.Settings(),
+    population = ga.Population(Coding(problem_of(uavs, tasks)), ga.GaSettings(),
                                np.random.default_rng(1))
     best = population.fits.min()
     for _ in range(20):

@@ -10,9 +10,9 @@ from uav_task_alloc import plan
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.solver import routes as of
 from uav_task_alloc.solver.bidding import Bidding
-from uav_task_alloc.solver.chance import chance
-from uav_task_alloc.solver.colony import PHASES, Colony, Habits
+from uav_task_alloc.solver.colony import PHASES, Colony, ColonyParams
 from uav_task_alloc.solver.problem import Limits, Rules, make_problem
+from uav_task_alloc.solver.rng import chance
 from uav_task_alloc.solver.scouts import Scouts
 from uav_task_alloc.solver.tables import FIRST, fresh_tables, keep
 from uav_task_alloc.solver.warm import repaired
@@ -47,7 +47,7 @@ def test_the_search_improves_on_the_construction():
 
 
 def test_bees_cool_twice_and_then_stay_cold(monkeypatch):
-    colony = Colony(PROBLEM, repaired(PROBLEM, {}), 1, Habits(scouts=0.0))
+    colony = Colony(PROBLEM, repaired(PROBLEM, {}), 1, ColonyParams(scouts=0.0))
     home, seen = [], []
     monkeypatch.setattr(colony, '_go_home', home.append)
     for begin, end in pairwise(PHASES):
@@ -61,7 +61,7 @@ def test_bees_cool_twice_and_then_stay_cold(monkeypatch):
 
 def test_at_home_bees_go_on_from_the_best():
     start = repaired(PROBLEM, {})
-    colony = Colony(PROBLEM, start, 1, Habits())
+    colony = Colony(PROBLEM, start, 1, ColonyParams())
     of.clear(colony.arrays, colony.routes)  # as if they had flown off
     colony.arrays.price[:] *= 2.0
     colony._go_home(1e6)

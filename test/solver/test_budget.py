@@ -8,7 +8,7 @@ import pytest
 
 from uav_task_alloc import Task, ThreatZone, Uav, plan
 from uav_task_alloc.geometry.distances import Distances
-from uav_task_alloc.geometry.effort import Effort
+from uav_task_alloc.geometry.search_budget import SearchBudget
 from uav_task_alloc.geometry.zones import inside, way_is_clear
 from uav_task_alloc.solver.problem import Limits, Rules, make_problem
 from uav_task_alloc.solver.routes import empty_routes, insert, remove
@@ -114,7 +114,7 @@ def test_finding_20_what_stop_raises_comes_out_of_plan():
 def test_finding_20_a_way_that_is_flown_is_taken_where_none_is_found_in_the_time():
     ends = [(0.0, 0.0, 50.0), (1000.0, 100.0, 50.0)]
     via = Distances(ends, [WALL, PLUG]).leg(0, 1).via
-    effort = Effort()
+    effort = SearchBudget()
     ways = Distances(ends, [WALL, PLUG], effort=effort)
     effort.begin(0)
     assert ways.length(0, 1) == math.inf

@@ -11,10 +11,10 @@ from plan_checks import make, problem
 
 from uav_task_alloc.model import Task, ThreatZone
 from uav_task_alloc.solver import routes as of
-from uav_task_alloc.solver.chance import below, chance, uniform
 from uav_task_alloc.solver.insertion import cheapest_first
-from uav_task_alloc.solver.near import nearest
+from uav_task_alloc.solver.neighbours import nearest
 from uav_task_alloc.solver.problem import Limits, Rules, make_problem
+from uav_task_alloc.solver.rng import below, chance, uniform
 from uav_task_alloc.solver.ruin import empty_log, recreate, ruin, undo
 
 NOBODY = np.empty(0, np.int64)

@@ -5,16 +5,16 @@ import json
 import pytest
 
 from uav_task_alloc.errors import InvalidValue, UnknownName
-from uav_task_alloc.study import bench, rivals
-from uav_task_alloc.study.gap_plot import draw
-from uav_task_alloc.study.gaps import Run, table
+from uav_task_alloc.study import bench, reference_solvers as rivals
+from uav_task_alloc.study.gap_plot import draw_gaps
+from uav_task_alloc.study.gaps import InstanceRuns, gap_table
 
 SMALL = ['--sizes', '2x6', '--seeds', '2', '--first', '3', '--budgets', '0.02,0.01']
 CHAO = 'n 4\nm 1\ntmax 9\n0\t0\t0\n1\t1\t10\n90\t1\t20\n4\t4\t0\n'
 
 
 def run(scores, collects=False, known=None, group='s-2-6'):
-    made = Run(group, collects, known)
+    made = InstanceRuns(group, collects, known)
     for name, score in scores.items():
         made.found[name] = [{'budget': 1.0, 'score': score}]
     return made
@@ -42,7 +42,7 @@ def test_a_rival_is_asked_once_for_the_longest_budget(monkeypatch):
         uav = instance.uavs[0].id
         return [(0.015, {uav: names}), (0.5, {uav: []})]
 
-    monkeypatch.setitem(rivals.RIVALS, 'pyvrp', slow)
+    monkeypatch.setitem(rivals.REFERENCE_SOLVERS, 'pyvrp', slow)
     source = {'uavs': 1, 'tasks': 3, 'seed': 1, 'slack': 9.0}
     found = bench.measure(source, 'pyvrp', (0.01, 0.02, 1.0))['found']
     assert asked == [('spread*9-1-3-1', 1.0)]
@@ -84,7 +84,7 @@ def test_what_cannot_be_run_is_refused(given, error, text):
 
 
 def test_a_plan_that_leaves_tasks_out_is_counted_apart():
-    text = table({'1': run({'a': 100.0, 'b': None}), '2': run({'a': 103.0, 'b': 100.0})})
+    text = gap_table({'1': run({'a': 100.0, 'b': None}), '2': run({'a': 103.0, 'b': 100.0})})
     assert text.splitlines()[2:] == ['| s-2-6 | 1.50 | 0.00 (1/2) |',
                                      '| best reached | 1/2 | 1/2 |']
 
@@ -96,5 +96,5 @@ def test_a_value_falls_short_of_the_published_one_a_length_exceeds_it():
 
 
 def test_a_picture_of_nobody_answering_is_drawn(tmp_path):
-    draw({'1': run({'a': None})}, tmp_path / 'gap.svg')
+    draw_gaps({'1': run({'a': None})}, tmp_path / 'gap.svg')
     assert '<svg' in (tmp_path / 'gap.svg').read_text()

@@ -13,7 +13,7 @@ import pytest
 
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.study import executors
-from uav_task_alloc.study.campaign import LIVES, Job, kept, run
+from uav_task_alloc.study.campaign import LIVES, Job, kept, run_campaign
 
 distributed = pytest.importorskip('distributed')
 
@@ -57,40 +57,40 @@ def silent(text):
 
 
 def test_results_come_back_and_are_kept_as_files(tmp_path):
-    outcome = run(jobs(3), tmp_path, threads, silent, lambda: 0.0)
+    outcome = run_campaign(jobs(3), tmp_path, threads, silent, lambda: 0.0)
     assert outcome.results == squares(3) == kept(jobs(3), tmp_path).results
     assert sorted(p.name for p in tmp_path.iterdir()) == [f'square-{i}.json' for i in range(3)]
 
 
 def test_a_second_run_does_only_what_is_missing(tmp_path):
-    run(jobs(2), tmp_path, threads, silent, lambda: 0.0)
+    run_campaign(jobs(2), tmp_path, threads, silent, lambda: 0.0)
     said = []
-    run(jobs(3), tmp_path, threads, said.append, lambda: 0.0)
+    run_campaign(jobs(3), tmp_path, threads, said.append, lambda: 0.0)
     assert said == ['2 of 3 results were there', '[3/3] square-2; about 0 s left']
 
 
 def test_a_result_of_other_settings_is_made_anew(tmp_path):
-    run([Job('same', square, {'x': 2})], tmp_path, threads, silent, lambda: 0.0)
-    outcome = run([Job('same', square, {'x': 3})], tmp_path, threads, silent, lambda: 0.0)
+    run_campaign([Job('same', square, {'x': 2})], tmp_path, threads, silent, lambda: 0.0)
+    outcome = run_campaign([Job('same', square, {'x': 3})], tmp_path, threads, silent, lambda: 0.0)
     assert outcome.results['same']['square'] == 9
 
 
 def test_a_file_that_was_cut_off_is_made_anew(tmp_path):
-    run(jobs(1), tmp_path, threads, silent, lambda: 0.0)
+    run_campaign(jobs(1), tmp_path, threads, silent, lambda: 0.0)
     (tmp_path / 'square-0.json').write_text('{"key": ')
-    assert run(jobs(1), tmp_path, threads, silent, lambda: 0.0).results == squares(1)
+    assert run_campaign(jobs(1), tmp_path, threads, silent, lambda: 0.0).results == squares(1)
 
 
 def test_the_rest_is_estimated_by_weight(tmp_path):
     said, clock = [], itertools.count(0, 10)
     work = [Job('long', square, {'x': 1}, weight=3.0), Job('short', square, {'x': 2})]
-    run(work, tmp_path, threads, said.append, lambda: float(next(clock)))
+    run_campaign(work, tmp_path, threads, said.append, lambda: float(next(clock)))
     assert {'[1/2] long; about 3 s left', '[1/2] short; about 30 s left'} & set(said)
     assert len(said) == 2
 
 
 def test_a_job_that_raises_is_told_of_and_tried_again_next_time(tmp_path):
-    outcome = run(jobs(2) + jobs(1, refuse), tmp_path, threads, silent, lambda: 0.0)
+    outcome = run_campaign(jobs(2) + jobs(1, refuse), tmp_path, threads, silent, lambda: 0.0)
     assert outcome.results == squares(2)
     assert outcome.failed == {'refuse-0': 'ValueError: 0 is refused'}
     assert 'refuse-0' not in kept(jobs(1, refuse), tmp_path).results
@@ -101,21 +101,22 @@ def test_an_interrupt_keeps_what_was_done(tmp_path):
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        run(jobs(5), tmp_path, threads, interrupt, lambda: 0.0)
+        run_campaign(jobs(5), tmp_path, threads, interrupt, lambda: 0.0)
     assert len(kept(jobs(5), tmp_path).results) == 1
 
 
 def test_a_killed_process_loses_nothing(tmp_path):
     killer = Job('killer', die_once, {'x': 7, 'mark': str(tmp_path / 'mark')}, weight=2.0)
-    outcome = run([*jobs(6), killer], tmp_path / 'kept', lambda: executors.processes(1), silent,
-                  lambda: 0.0)
+    outcome = run_campaign(
+        [*jobs(6), killer], tmp_path / 'kept', lambda: executors.processes(1), silent, lambda: 0.0
+    )
     assert outcome.results == squares(6) | {'killer': square(7)}
     assert not outcome.failed
 
 
 def test_a_job_that_always_kills_its_process_is_given_up_in_the_end(tmp_path):
     said = []
-    outcome = run(jobs(1, die), tmp_path, lambda: executors.processes(1), said.append,
+    outcome = run_campaign(jobs(1, die), tmp_path, lambda: executors.processes(1), said.append,
                   lambda: 0.0)
     assert list(outcome.failed) == ['die-0']
     assert len(said) == LIVES
@@ -135,7 +136,7 @@ def cluster(monkeypatch):
 @pytest.mark.filterwarnings('default')  # the library's own at its end
 def test_a_cluster_worker_killed_in_the_middle_loses_nothing(tmp_path, cluster):
     killer = Job('killer', die_once, {'x': 7, 'mark': str(tmp_path / 'mark')}, weight=0.5)
-    outcome = run([*jobs(20), killer], tmp_path / 'kept',
+    outcome = run_campaign([*jobs(20), killer], tmp_path / 'kept',
                   lambda: executors.dask(cluster.scheduler_address), silent, lambda: 0.0)
     assert outcome.results == squares(20) | {'killer': square(7)}
     assert (tmp_path / 'mark').exists()

@@ -7,11 +7,12 @@ from contextlib import contextmanager
 
 import pytest
 
-from uav_task_alloc.study import command, figures, program, tables, trials
+from uav_task_alloc.cli import study as command
+from uav_task_alloc.study import experiments as program, figures, tables, trials
+from uav_task_alloc.study.experiments import Experiments
 from uav_task_alloc.study.figures import mean_curve
-from uav_task_alloc.study.program import Program
 
-TINY = Program(7, (2, 6, 1), 2, (1.0, 5.0), 0.002, ((2, 6), (3, 12)), 1, 0.002, 2, 100)
+TINY = Experiments(7, (2, 6, 1), 2, (1.0, 5.0), 0.002, ((2, 6), (3, 12)), 1, 0.002, 2, 100)
 FIGURES = {f'{name}{end}' for end in ('.svg', '.png') for name in (
     'figure1_coefficient', 'figure2_convergence', 'figure3_allocation_chain_q',
     'figure3_allocation_paper_chain_q')}
@@ -85,7 +86,7 @@ def test_a_study_that_could_not_be_drawn_does_not_begin(tmp_path, monkeypatch):
 
 
 def test_a_quick_study_has_every_figure_and_the_whole_span_of_sizes():
-    quick, full = program.quick(3), Program(3)
+    quick, full = program.quick(3), Experiments(3)
     assert {job.name.split('-')[0] for job in program.jobs(quick)} == {
         job.name.split('-')[0] for job in program.jobs(full)}
     assert quick.runs == full.runs == 10
@@ -94,7 +95,7 @@ def test_a_quick_study_has_every_figure_and_the_whole_span_of_sizes():
 
 
 def test_the_paper_s_solver_is_not_asked_for_more_tasks_than_its_tables_hold():
-    asked = {key for key in program.size_jobs(Program(1)) if key[3] == 'paper_chain_q'}
+    asked = {key for key in program.size_jobs(Experiments(1)) if key[3] == 'paper_chain_q'}
     assert max(tasks for _, tasks, _, _ in asked) == 200
 
 

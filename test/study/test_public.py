@@ -38,7 +38,7 @@ CORDEAU = """2 2 3 2
 
 
 def test_team_orienteering_starts_at_the_first_point_and_ends_at_the_last():
-    read = public.parse('p1.txt', CHAO, known=35.0)
+    read = public.parse_instance('p1.txt', CHAO, known=35.0)
     assert [(u.position, u.home, u.range) for u in read.uavs] == [
         ((0.0, 0.0, 0.0), (5.0, 5.0, 0.0), 7.5)] * 2
     assert [(t.id, t.position, t.value) for t in read.tasks] == [
@@ -47,7 +47,7 @@ def test_team_orienteering_starts_at_the_first_point_and_ends_at_the_last():
 
 
 def test_multi_source_orienteering_has_so_many_uavs_at_each_start():
-    read = public.parse('g1.txt', MSTOP)
+    read = public.parse_instance('g1.txt', MSTOP)
     assert [u.position for u in read.uavs] == [(0.0, 0.0, 0.0)] * 2 + [(9.0, 0.0, 0.0)]
     assert {u.home for u in read.uavs} == {(5.0, 5.0, 0.0)}
     assert [t.id for t in read.tasks] == ['t2', 't3']
@@ -56,20 +56,22 @@ def test_multi_source_orienteering_has_so_many_uavs_at_each_start():
 def test_flags_alone_say_where_routes_start_and_end():
     flagged = MSTOP.replace('\t1\t2\n', '\t1\t0\n').replace('\t1\t1\n', '\t1\t0\n').replace(
         '1.0\t2.0\t10\t0\t0', '1.0\t2.0\t0\t0\t1')
-    read = public.parse('g1.txt', flagged)
+    read = public.parse_instance('g1.txt', flagged)
     assert [u.position[0] for u in read.uavs] == [0.0, 9.0, 0.0]  # in turn
     assert {u.home for u in read.uavs} == {(1.0, 2.0, 0.0)}
 
 
 def test_a_multi_depot_problem_has_its_uavs_at_the_depots_with_durations_as_ranges():
-    read = public.parse('p01', CORDEAU, known=77.0)
+    read = public.parse_instance('p01', CORDEAU, known=77.0)
     assert [(u.position[0], u.range) for u in read.uavs] == [(0.0, 60.0)] * 2 + [(40.0, 80.0)] * 2
     assert [t.position[0] for t in read.tasks] == [10.0, 20.0, 30.0]
     assert (read.route_end, read.collects, read.known) == ('home', False, 77.0)
 
 
 def test_a_published_length_does_not_hold_where_loads_bind():
-    assert math.isnan(public.parse('p01', CORDEAU.replace('60 0', '60 10'), known=77.0).known)
+    assert math.isnan(
+        public.parse_instance('p01', CORDEAU.replace('60 0', '60 10'), known=77.0).known
+    )
 
 
 @pytest.mark.parametrize(('text', 'why'), [
@@ -82,7 +84,7 @@ def test_a_published_length_does_not_hold_where_loads_bind():
 ])
 def test_what_is_no_instance_for_us_is_refused(text, why):
     with pytest.raises(InvalidValue, match=why):
-        public.parse('file', text)
+        public.parse_instance('file', text)
 
 
 def test_a_folder_is_read_by_name_and_says_what_it_leaves_out(tmp_path):

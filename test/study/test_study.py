@@ -4,8 +4,8 @@ import math
 
 import pytest
 
-from uav_task_alloc.study.command import main
-from uav_task_alloc.study.instances import CLEAR, make_instance, make_scene
+from uav_task_alloc.cli.study import main
+from uav_task_alloc.study.instances import CLEAR, make_dome_scene, make_instance
 from uav_task_alloc.study.learning import confidence
 
 
@@ -19,8 +19,8 @@ def test_an_instance_is_the_same_again_and_within_reach():
 
 
 def test_a_scene_is_the_same_again_and_its_domes_hold_nothing():
-    scene = make_scene(3, 40, 8, 2)
-    assert scene == make_scene(3, 40, 8, 2) != make_scene(3, 40, 8, 3)
+    scene = make_dome_scene(3, 40, 8, 2)
+    assert scene == make_dome_scene(3, 40, 8, 2) != make_dome_scene(3, 40, 8, 3)
     assert all(math.dist(each.position, zone.center) > zone.radius + CLEAR
                for each in (*scene.uavs, *scene.tasks) for zone in scene.zones)
 

@@ -9,13 +9,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from functools import partial
 
-from uav_task_alloc.allocator import planning
-from uav_task_alloc.allocator.admission import forget_strangers
-from uav_task_alloc.allocator.answer import steady
-from uav_task_alloc.allocator.learner import learner, learner_row
-from uav_task_alloc.allocator.pace import Pace
-from uav_task_alloc.allocator.records import Allocation, Answer, Outbox, Problem, UavList
-from uav_task_alloc.allocator.restore import (
+from uav_task_alloc.allocator.persistence.restore import (
     Saved,
     list_row,
     off_row,
@@ -23,9 +17,21 @@ from uav_task_alloc.allocator.restore import (
     task_row,
     zones_row,
 )
-from uav_task_alloc.allocator.world import World
-from uav_task_alloc.allocator.zone_watch import look_at_all
-from uav_task_alloc.journal import Row
+from uav_task_alloc.allocator.records import (
+    Allocation,
+    Outbox,
+    ReplanAnswer,
+    ReplanProblem,
+    UavList,
+)
+from uav_task_alloc.allocator.replanning import planning
+from uav_task_alloc.allocator.replanning.learned_state import learner, learner_row
+from uav_task_alloc.allocator.replanning.list_rate_limiter import ListRateLimiter
+from uav_task_alloc.allocator.replanning.plan_acceptance import steady
+from uav_task_alloc.allocator.state.admission import forget_strangers
+from uav_task_alloc.allocator.state.world import World
+from uav_task_alloc.allocator.state.zone_checks import look_at_all
+from uav_task_alloc.journal import JournalRow
 from uav_task_alloc.model import Plan
 from uav_task_alloc.params import AllocatorParams
 
@@ -46,7 +52,7 @@ class Allocator:
         self._best = Plan({each.uav: each.task_ids for each in saved.lists})
         self._learnt = saved.learnt
         self._learnt_at = now
-        self._pace = Pace()
+        self._pace = ListRateLimiter()
         self._left: dict[str, str] = {}  # task id -> why it is left out
         # UAVs of the journal get time to be heard before they lose anything
         self._wait_for = {each.uav for each in saved.lists if each.stops}
@@ -97,7 +103,7 @@ class Allocator:
         record = self.world.tasks.records.get(task_id)
         return record is None or not record.open
 
-    def due(self, now: float, stamp: float) -> Problem | None:
+    def due(self, now: float, stamp: float) -> ReplanProblem | None:
         """The problem to solve now, if any; nothing while one is being solved."""
         world, schedule, params = self.world, self.world.schedule, self.world.params
         if not world.awake or schedule.busy or self._waiting(now):
@@ -125,7 +131,7 @@ class Allocator:
         return schedule.settled(now, params.settle) and (
             background or schedule.overdue(now, params.solve_budget))
 
-    def adopt(self, answer: Answer | None, now: float, stamp: float) -> None:
+    def adopt(self, answer: ReplanAnswer | None, now: float, stamp: float) -> None:
         """Take over what is better by the margin and still true; None: the solve failed."""
         self.world.schedule.end(now, failed=answer is None)
         if answer is None:
@@ -176,14 +182,14 @@ class Allocator:
         out, self.world.outbox = self.world.outbox, Outbox()
         return out
 
-    def rows(self, most: int | None = None) -> list[Row]:
+    def rows(self, most: int | None = None) -> list[JournalRow]:
         """What changed and is not on disk yet, `most` tasks of it; `written` says that it is."""
         world = self.world
         tasks = world.tasks.records
-        rows = [task_row(tasks[task_id]) if task_id in tasks else Row('task', task_id, None)
+        rows = [task_row(tasks[task_id]) if task_id in tasks else JournalRow('task', task_id, None)
                 for task_id in sorted(world.tasks.dirty)[:most]]
         lists = world.lists.lists
-        rows += [list_row(lists[uav_id]) if uav_id in lists else Row('list', uav_id, None)
+        rows += [list_row(lists[uav_id]) if uav_id in lists else JournalRow('list', uav_id, None)
                  for uav_id in sorted(world.lists.dirty)]
         made = {'zones': lambda: zones_row(world.zones.values()),
                 'off': lambda: off_row(world.fleet.off),
@@ -198,7 +204,7 @@ class Allocator:
         world.lists.dirty.update(world.lists.lists)
         world.dirty.update(('zones', 'off', 'revision', 'learner'))
 
-    def written(self, rows: Iterable[Row] | None = None) -> bool:
+    def written(self, rows: Iterable[JournalRow] | None = None) -> bool:
         """These are on disk, None: need not be; returns whether nothing is left to save."""
         world = self.world
         books = {'task': world.tasks.dirty, 'list': world.lists.dirty}

@@ -30,7 +30,7 @@ class Role(Enum):
 
 
 @dataclass(frozen=True, slots=True, order=True)
-class Instance:
+class AllocatorInstance:
     """One run of an allocator; the lesser leads: the earlier start, then the lesser id."""
 
     started: int  # [ns] of the computer's clock, not of simulated time
@@ -48,7 +48,7 @@ class Instance:
 class Leader:
     """Decides the role of `me` from what the others say. `reason`: why it is passive."""
 
-    def __init__(self, me: Instance, now: float, restarted: bool = False) -> None:
+    def __init__(self, me: AllocatorInstance, now: float, restarted: bool = False) -> None:
         """restarted: it has the lists of an earlier life."""
         self.me, self.role, self.reason = me, Role.STARTING, ''
         self.silent_others = False  # it leads though others publish that say nothing
@@ -56,7 +56,7 @@ class Leader:
         self._listened, self._until = now + LISTEN, now + WAIT
         self._heard = now  # [s] last word of a leader, once passive
 
-    def hear(self, other: Instance, role: Role, now: float) -> None:
+    def hear(self, other: AllocatorInstance, role: Role, now: float) -> None:
         """Another allocator of this fleet says who it is, and what it does."""
         if other.id == self.me.id or role is Role.PASSIVE:
             return
@@ -65,7 +65,7 @@ class Leader:
         elif self._yields(other, role):
             self.refuse(f'another allocator leads this fleet: {other.text}', now)
 
-    def _yields(self, other: Instance, role: Role) -> bool:
+    def _yields(self, other: AllocatorInstance, role: Role) -> bool:
         """Whoever leads already stays; among equals the earlier start leads."""
         if self.role is not role:
             return role is Role.LEADING
@@ -97,13 +97,15 @@ class Leader:
         return f'passive: {self.reason}; this one publishes nothing until it is restarted{end}'
 
 
-def told(me: Instance, role: Role, topic: str) -> dict[str, object]:
+def told(me: AllocatorInstance, role: Role, topic: str) -> dict[str, object]:
     """What the others have to know, as words. topic: the full name of `allocation`."""
     return {'allocation topic': topic, 'instance': me.id, 'started': me.started,
             'role': role.value}
 
 
-def heard(node: str, values: Mapping[str, str], topic: str) -> tuple[Instance, Role] | None:
+def heard(
+    node: str, values: Mapping[str, str], topic: str
+) -> tuple[AllocatorInstance, Role] | None:
     """The reverse of `told`; None where it is of no allocator, or of another fleet.
 
     Raises InvalidValue, as the words may be anybody's.
@@ -120,4 +122,4 @@ def heard(node: str, values: Mapping[str, str], topic: str) -> tuple[Instance, R
     except ValueError:
         raise InvalidValue('role', values.get('role', ''),
                            f'one of {", ".join(role.value for role in Role)}') from None
-    return Instance(int(started), id, node[:LONGEST]), role
+    return AllocatorInstance(int(started), id, node[:LONGEST]), role

@@ -38,7 +38,7 @@ OPEN = frozenset({TaskState.PENDING, TaskState.ASSIGNED, TaskState.ACTIVE,
 ENDED = frozenset({TaskState.COMPLETED, TaskState.FAILED, TaskState.CANCELLED})
 
 
-class Action(Enum):
+class AnnouncementAction(Enum):
     """What an announcement does; the numbers are those of the message."""
 
     ADD = 0
@@ -46,7 +46,7 @@ class Action(Enum):
     CANCEL = 2
 
 
-class Kind(Enum):
+class TaskEventKind(Enum):
     """What happened to a task; the numbers are those of the TaskEvent message."""
 
     STARTED = 0
@@ -73,7 +73,7 @@ class TaskRecord:
 
 
 @dataclass(frozen=True, slots=True)
-class Verdict:
+class TaskVerdict:
     """The answer to one task of an announcement."""
 
     task_id: str
@@ -93,7 +93,7 @@ class TaskEvent:
     task_id: str
     uav_id: str
     revision: int  # of the list it was flown from; 0: not told
-    kind: Kind
+    kind: TaskEventKind
     reason: str = ''
 
 
@@ -130,7 +130,7 @@ class UavReport:
 
 
 @dataclass(frozen=True, slots=True)
-class Stop:
+class ListStop:
     """A task in a list, the way to it, and when the UAV is there."""
 
     task: Task
@@ -144,7 +144,7 @@ class UavList:
 
     uav: str
     revision: int  # strictly rising
-    stops: tuple[Stop, ...] = ()
+    stops: tuple[ListStop, ...] = ()
     returns: bool = False  # home after the last task
     end_via: tuple[Point, ...] = ()  # [m] ENU, flown before the return home
     distance: float = 0.0  # [m] of all legs, with the way home where it returns
@@ -163,7 +163,7 @@ class UavList:
 
 
 @dataclass(frozen=True, slots=True)
-class Problem:
+class ReplanProblem:
     """The world as a worker solves it, apart from the world that goes on meanwhile."""
 
     version: int
@@ -179,10 +179,10 @@ class Problem:
 
 
 @dataclass(frozen=True, slots=True)
-class Answer:
+class ReplanAnswer:
     """What a worker found: the held lists repaired, and the best plan."""
 
-    problem: Problem
+    problem: ReplanProblem
     base: Plan
     fresh: Plan
 
@@ -199,7 +199,7 @@ class Allocation:
 
 
 @dataclass(frozen=True, slots=True)
-class Note:
+class LogNote:
     """A line for the log."""
 
     warning: bool
@@ -214,4 +214,4 @@ class Outbox:
     forgotten: set[str] = field(default_factory=set)  # UAVs, before the lists
     allocation: Allocation | None = None
     statuses: bool = False
-    notes: list[Note] = field(default_factory=list)
+    notes: list[LogNote] = field(default_factory=list)

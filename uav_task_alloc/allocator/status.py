@@ -6,12 +6,12 @@ from collections import Counter
 from dataclasses import dataclass
 
 from uav_task_alloc.allocator.records import TaskRecord, TaskState
-from uav_task_alloc.allocator.world import World
-from uav_task_alloc.allocator.zone_watch import NAMED, standing
+from uav_task_alloc.allocator.state.world import World
+from uav_task_alloc.allocator.state.zone_checks import NAMED, standing
 
 
 @dataclass(frozen=True, slots=True)
-class Status:
+class TaskStatus:
     """Where one task stands."""
 
     task_id: str
@@ -21,12 +21,12 @@ class Status:
     stamp: float  # [s] of the last change
 
 
-def status_of(task_id: str, known: TaskRecord | tuple[str, float]) -> Status:
+def status_of(task_id: str, known: TaskRecord | tuple[str, float]) -> TaskStatus:
     """Of an accepted task, or of one that was refused for a reason at a time [s]."""
     if isinstance(known, TaskRecord):
-        return Status(task_id, known.state, known.uav, known.reason, known.stamp)
+        return TaskStatus(task_id, known.state, known.uav, known.reason, known.stamp)
     reason, stamp = known
-    return Status(task_id, TaskState.REJECTED, '', reason, stamp)
+    return TaskStatus(task_id, TaskState.REJECTED, '', reason, stamp)
 
 
 def worries(world: World, journal_trouble: str, solver_trouble: str = '') -> list[str]:

@@ -28,7 +28,7 @@ TALLEST = 4000  # [px]
 TIME = 'mission time [s]'
 
 
-def colour(index: int) -> str:
+def uav_colour(index: int) -> str:
     """The colour of the UAV with this place in the fleet."""
     return COLOURS[index % len(COLOURS)]
 
@@ -42,16 +42,16 @@ def flight_map(story: Story) -> Any:
         flown = [sample.point for sample in story.tracks.get(uav, ())]
         legs = [point for leg in story.planned.get(uav, ()) for point in (*leg, None)]
         for points, name, paint, dash, width in (
-                (flown[::1 + len(flown) // MOST_POINTS], 'flown', colour(k), 'solid', 4.0),
+                (flown[::1 + len(flown) // MOST_POINTS], 'flown', uav_colour(k), 'solid', 4.0),
                 (legs, 'planned', PLANNED, 'dash', 1.2),
-                (story.rest(uav), 'not flown yet', colour(k), 'dot', 2.0)):
+                (story.rest(uav), 'not flown yet', uav_colour(k), 'dot', 2.0)):
             if points:
                 _way(figure, points, f'{escape(uav)} {name}', paint, dash, width)
         if flown:
             figure.add_scatter(
                 x=[flown[0][0]], y=[flown[0][1]], mode='markers+text', text=[escape(uav)],
                 textposition='bottom center', showlegend=False, hoverinfo='text',
-                marker={'symbol': 'square', 'size': 12, 'color': colour(k),
+                marker={'symbol': 'square', 'size': 12, 'color': uav_colour(k),
                         'line': {'width': 1, 'color': 'black'}})
     _tasks(figure, story)
     figure.update_xaxes(title='east [m]')
@@ -108,7 +108,7 @@ def _zone(figure: Any, zone: ThreatZone) -> None:
             legendgroup='zones', showlegend=k == 0)
 
 
-def timeline(story: Story) -> Any:
+def timeline_figure(story: Story) -> Any:
     """A row for each task: a bar for each state it was in, a mark where it ended."""
     names = list(story.tasks())
     row = {name: k for k, name in enumerate(names)}
@@ -151,7 +151,7 @@ def solving(story: Story) -> Any:
             ('fit (smaller is better)', [plan.fit for plan in story.replans]),
             ('tasks listed', [plan.listed for plan in story.replans])), 1):
         figure.add_scatter(x=when, y=values, mode='lines+markers', hovertext=text, row=k, col=1,
-                           line={'shape': 'hv' if k > 1 else 'linear', 'color': colour(k - 1)},
+                           line={'shape': 'hv' if k > 1 else 'linear', 'color': uav_colour(k - 1)},
                            hovertemplate='%{hovertext}<br>%{y}<extra></extra>')
         figure.update_yaxes(title=title, row=k, col=1, rangemode='tozero')
     figure.update_xaxes(title=TIME, row=3, col=1)
@@ -193,5 +193,5 @@ def _laid_out(figure: Any, title: str, height: int) -> Any:
 
 def all_figures(story: Story) -> Iterable[tuple[str, Any]]:
     """(name, figure) in the order of the page."""
-    yield from (('map', flight_map(story)), ('timeline', timeline(story)),
+    yield from (('map', flight_map(story)), ('timeline', timeline_figure(story)),
                 ('solving', solving(story)), ('gaps', silence(story)))

@@ -31,7 +31,7 @@ CONFIG = {'displaylogo': False, 'responsive': True,
 Cell = str | float | int | None
 
 
-def write(bag: Path, html: Path) -> tuple[Story, list[str]]:
+def write_report(bag: Path, html: Path) -> tuple[Story, list[str]]:
     """Draw the report of an MCAP file from it alone; the story, and what could not be read.
 
     Raises OSError where a file cannot be opened, InvalidValue where it tells of no flight.
@@ -61,7 +61,7 @@ def page(story: Story, name: str, trouble: Iterable[str] = ()) -> str:
         f'<title>{escape(head)}</title><style>{STYLE}</style>',
         f'<script>{get_plotlyjs()}</script></head><body><h1>{escape(head)}</h1>',
         *(f'<p class="trouble">{escape(text)}</p>' for text in trouble),
-        table('Key figures', (f'of {name}', ''), key_figures(story)),
+        html_table('Key figures', (f'of {name}', ''), key_figures(story)),
         figures, tables(story), '</body></html>']
     return '\n'.join(parts)
 
@@ -98,21 +98,21 @@ def tables(story: Story) -> str:
         return round(story.clock(wall), 1)
 
     return ''.join((
-        table('Tasks', ('task', 'state', 'UAV', 'value', 'announced [s]', 'begun [s]',
+        html_table('Tasks', ('task', 'state', 'UAV', 'value', 'announced [s]', 'begun [s]',
                         'ended [s]', 'reason'),
               (_task(story, task) for task in story.tasks())),
-        table('UAVs', ('UAV', 'tasks completed', 'metres flown', 'metres planned', 'battery',
+        html_table('UAVs', ('UAV', 'tasks completed', 'metres flown', 'metres planned', 'battery',
                        'last mode', 'not heard [s]'),
               (_uav(story, uav) for uav in sorted(story.tracks))),
-        table('Re-plans', ('at [s]', 'plan', 'because of', 'what changed', 'solved in [ms]',
+        html_table('Re-plans', ('at [s]', 'plan', 'because of', 'what changed', 'solved in [ms]',
                            'fit', 'metres'),
               ((at(plan.wall), plan.revision, plan.trigger, plan.changed or 'nothing',
                 round(plan.milliseconds, 1), plan.fit and round(plan.fit, 4),
                 plan.distance and round(plan.distance)) for plan in story.replans)),
-        table('Gaps', ('UAV', 'from [s]', 'to [s]', 'wall time [s]'),
+        html_table('Gaps', ('UAV', 'from [s]', 'to [s]', 'wall time [s]'),
               ((gap.uav or 'nobody was heard', at(gap.since), at(gap.until),
                 round(gap.until - gap.since, 1)) for gap in story.gaps)),
-        table('Events', ('at [s]', 'what'),
+        html_table('Events', ('at [s]', 'what'),
               ((at(wall), text) for wall, _, text in story.events))))
 
 
@@ -141,7 +141,7 @@ def _uav(story: Story, uav: str) -> tuple[Cell, ...]:
             round(silent, 1))
 
 
-def table(title: str, heads: Sequence[str], rows: Iterable[Sequence[Cell]]) -> str:
+def html_table(title: str, heads: Sequence[str], rows: Iterable[Sequence[Cell]]) -> str:
     """A table of a page; numbers to the right, nothing for None."""
     body = ''.join(f'<tr>{"".join(map(_cell, row))}</tr>\n' for row in rows)
     head = ''.join(f'<th>{escape(text)}</th>' for text in heads)

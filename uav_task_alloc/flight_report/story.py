@@ -8,12 +8,12 @@ from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import Any
 
-from uav_task_alloc.live import replans
-from uav_task_alloc.live.events import events
 from uav_task_alloc.model import Point
-from uav_task_alloc.record.heard import Heard, Line, Status
+from uav_task_alloc.record import plan_diff as replans
+from uav_task_alloc.record.events import sentences
+from uav_task_alloc.record.ground_truth import TrueSample
 from uav_task_alloc.record.progress import SILENT
-from uav_task_alloc.record.truth import Sample
+from uav_task_alloc.record.run_state import Line, ReportedStatus, RunState
 
 EVERY = 0.2  # [s] between two samples of a track that are kept
 MOST_EVENTS = 5000  # the first
@@ -56,8 +56,8 @@ class Gap:
 class Story:
     """A flight as it was told; `take` folds one more line into it, `close` ends it."""
 
-    heard: Heard = field(default_factory=Heard)
-    tracks: dict[str, list[Sample]] = field(default_factory=dict)
+    heard: RunState = field(default_factory=RunState)
+    tracks: dict[str, list[TrueSample]] = field(default_factory=dict)
     last_state: dict[str, float] = field(default_factory=dict)  # [unix s] of each UAV
     planned: dict[str, list[list[Point]]] = field(default_factory=dict)  # legs as they began
     places: dict[str, Point] = field(default_factory=dict)  # of tasks, as planned [m]
@@ -77,7 +77,7 @@ class Story:
         if 0.0 < self.heard.last < line['wall'] - SILENT:
             self.gaps.append(Gap('', self.heard.last, line['wall']))
         if len(self.events) < MOST_EVENTS:
-            self.events += [(line['wall'], *event) for event in events(self.heard, line)]
+            self.events += [(line['wall'], *event) for event in sentences(self.heard, line)]
         tell = getattr(self, 'on_' + line['kind'], None)
         if tell is not None:
             tell(line)
@@ -103,7 +103,7 @@ class Story:
         self.last_state[uav] = wall
         track = self.tracks.setdefault(uav, [])
         if None not in line['position'] and (not track or wall - track[-1].wall >= EVERY):
-            track.append(Sample(wall, tuple(line['position'])))
+            track.append(TrueSample(wall, tuple(line['position'])))
 
     def on_list(self, line: Line) -> None:
         """The leg to a task that has become the next counts as planned from where the UAV is."""
@@ -162,9 +162,9 @@ class Story:
         told = {name: task.position for name, task in self.heard.tasks.items()}
         return {name: self.places.get(name) or told.get(name) for name in names}
 
-    def status(self, task: str) -> Status:
+    def status(self, task: str) -> ReportedStatus:
         """How a task stands at the end."""
-        return self.heard.statuses.get(task) or Status('PENDING', '', 'no status was told')
+        return self.heard.statuses.get(task) or ReportedStatus('PENDING', '', 'no status was told')
 
     def metres(self, uav: str) -> float:
         """Length of a track [m]."""

@@ -9,8 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from uav_task_alloc.errors import InvalidValue
-from uav_task_alloc.geometry.effort import Effort, new_work
-from uav_task_alloc.geometry.exits import way_out
+from uav_task_alloc.geometry.escape import way_out
 from uav_task_alloc.geometry.obstacles import (
     Floats,
     Obstacles,
@@ -19,8 +18,9 @@ from uav_task_alloc.geometry.obstacles import (
     pack,
 )
 from uav_task_alloc.geometry.scene import in_order
+from uav_task_alloc.geometry.search_budget import SearchBudget, new_work
+from uav_task_alloc.geometry.shortest_path import shortest
 from uav_task_alloc.geometry.taut import MAX_CORNERS
-from uav_task_alloc.geometry.ways import shortest
 from uav_task_alloc.model import Point, ThreatZone, check_point
 
 
@@ -64,7 +64,7 @@ def detour(a: Iterable[float], b: Iterable[float], zones: Iterable[ThreatZone] =
 
 def find_detour(a: Iterable[float], b: Iterable[float], zones: Iterable[ThreatZone] = (), *,
                 clearance: float = 0.0, altitude_min: float = -math.inf,
-                altitude_max: float = math.inf, effort: Effort | None = None,
+                altitude_max: float = math.inf, effort: SearchBudget | None = None,
                 obstacles: Obstacles | None = None) -> Detour:
     """As `detour`, and says what is special about the way. Raises InvalidValue.
 
@@ -94,7 +94,7 @@ def check_limits(altitude_min: float, altitude_max: float) -> Floats:
 
 
 def way_between(obstacles: Obstacles, start: Point, goal: Point, limits: Floats, caught: bool,
-                effort: Effort | None = None) -> tuple[float, tuple[Point, ...]]:
+                effort: SearchBudget | None = None) -> tuple[float, tuple[Point, ...]]:
     """Length [m] and waypoints from start to a goal outside all zones; caught: start inside.
 
     inf: there is no way; NaN: none was found with this effort.

@@ -17,9 +17,9 @@ from numpy.typing import ArrayLike
 
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.geometry.detour import as_points, check_limits, way_between
-from uav_task_alloc.geometry.effort import CUT, MOST, OVER, Effort
-from uav_task_alloc.geometry.memory import float_of, floats_at, ints_at
+from uav_task_alloc.geometry.numba_pointers import float_of, floats_at, ints_at
 from uav_task_alloc.geometry.obstacles import Ints, Obstacles, all_around, pack
+from uav_task_alloc.geometry.path_store import PathStore, remember
 from uav_task_alloc.geometry.scene import (
     CAUGHT,
     EFFORT,
@@ -32,10 +32,10 @@ from uav_task_alloc.geometry.scene import (
     kept_way,
     make_scene,
 )
-from uav_task_alloc.geometry.table import Table, forget
+from uav_task_alloc.geometry.search_budget import CUT, MOST, OVER, SearchBudget
+from uav_task_alloc.geometry.shortest_path import is_clear
+from uav_task_alloc.geometry.table import LengthTable, forget
 from uav_task_alloc.geometry.taut import MAX_CORNERS, length_of
-from uav_task_alloc.geometry.way_store import WayStore, remember
-from uav_task_alloc.geometry.ways import is_clear
 from uav_task_alloc.model import Leg, Point, ThreatZone
 
 DENSE_MAX = 2048  # points; the table takes 8 n^2 bytes
@@ -44,7 +44,7 @@ MOST_LOOKS = 20_000_000  # at pairs and changed zones; beyond, the table begins 
 
 
 class _Addresses(NamedTuple):
-    """Sizes and addresses; see geometry/memory.py for why."""
+    """Sizes and addresses; see geometry/numba_pointers.py for why."""
 
     points: int
     zones: int
@@ -192,8 +192,8 @@ class Distances:
 
     def __init__(self, points: ArrayLike, zones: Sequence[ThreatZone] = (), *,
                  clearance: float = 0.0, altitude_min: float = -np.inf,
-                 altitude_max: float = np.inf, effort: Effort | None = None,
-                 _before: Distances | None = None, _table: Table | None = None) -> None:
+                 altitude_max: float = np.inf, effort: SearchBudget | None = None,
+                 _before: Distances | None = None, _table: LengthTable | None = None) -> None:
         self.points = np.ascontiguousarray(points, dtype=np.float64).reshape(-1, 3)
         if not np.isfinite(self.points).all():
             raise InvalidValue('points', self.points, 'finite coordinates [m]')
@@ -202,12 +202,12 @@ class Distances:
         same = _before is not None and _before.zones == self.zones
         self._obstacles: Obstacles = (_before._obstacles if _before and same
                                       else pack(self.zones, clearance))
-        self._store: WayStore = _before._store if _before else WayStore()
-        self.effort = effort or Effort()
+        self._store: PathStore = _before._store if _before else PathStore()
+        self.effort = effort or SearchBudget()
         self._scene = make_scene(self.points, self._obstacles.rows, limits, self.effort,
                                  self._store)
         dense = bool(self.zones) and len(self.points) <= DENSE_MAX
-        self._table = _table or Table(len(self.points) if dense else 0)
+        self._table = _table or LengthTable(len(self.points) if dense else 0)
         self.pairs = self._pairs(dense)
 
     def _pairs(self, dense: bool) -> Pairs:
@@ -226,7 +226,7 @@ class Distances:
 
     def updated(self, points: ArrayLike | None = None,
                 zones: Sequence[ThreatZone] | None = None,
-                effort: Effort | None = None) -> Distances:
+                effort: SearchBudget | None = None) -> Distances:
         """For other points, in any order, or zones that came, moved or vanished."""
         new_points = self.points if points is None else np.asarray(points, dtype=np.float64)
         new_zones = self.zones if zones is None else tuple(zones)
@@ -237,7 +237,7 @@ class Distances:
         return Distances(new_points, new_zones, clearance=self.clearance, altitude_min=low,
                          altitude_max=high, effort=effort, _before=self, _table=table)
 
-    def _still_true(self, zones: tuple[ThreatZone, ...]) -> Table | None:
+    def _still_true(self, zones: tuple[ThreatZone, ...]) -> LengthTable | None:
         """The table without what other zones change; None: all would take longer to look at."""
         before, after = set(self.zones), set(zones)
         gone, come = before - after, after - before

@@ -19,8 +19,8 @@ from numba import types
 from numba.extending import intrinsic
 from numpy.typing import NDArray
 
-from uav_task_alloc.geometry.memory import cast, floats_at
-from uav_task_alloc.geometry.outlines import (
+from uav_task_alloc.geometry.numba_pointers import cast, floats_at
+from uav_task_alloc.geometry.outline import (
     Floats as Floats,
     Ints as Ints,
     circle,

@@ -10,19 +10,19 @@ import numba
 import numpy as np
 from numba import carray  # type: ignore[attr-defined]
 
-from uav_task_alloc.geometry.effort import Effort, is_over, new_work
-from uav_task_alloc.geometry.exits import way_out
-from uav_task_alloc.geometry.memory import floats_at, ints_at
+from uav_task_alloc.geometry.escape import way_out
+from uav_task_alloc.geometry.numba_pointers import floats_at, ints_at
 from uav_task_alloc.geometry.obstacles import Floats, Ints, Zones, first_around, zones_at
+from uav_task_alloc.geometry.path_store import PathStore, recall, remember
+from uav_task_alloc.geometry.search_budget import SearchBudget, is_over, new_work
+from uav_task_alloc.geometry.shortest_path import is_clear, shortest
 from uav_task_alloc.geometry.taut import MAX_CORNERS, copy_point, length_of
-from uav_task_alloc.geometry.way_store import WayStore, recall, remember
-from uav_task_alloc.geometry.ways import is_clear, shortest
 
 OUTSIDE, SNUG, INSIDE = 0, 1, 2
 CAUGHT, EFFORT = 3, 7  # where `addresses` has those of Scene.caught and Scene.state
 
 
-class Scene(NamedTuple):
+class PathScene(NamedTuple):
     """Points among zones, as kernels take them."""
 
     xyz: Floats  # (n, 3) [m]
@@ -34,13 +34,13 @@ class Scene(NamedTuple):
     store: int  # address of a WayStore
 
 
-def make_scene(xyz: Floats, zones: Zones, limits: Floats, effort: Effort,
-               store: WayStore) -> Scene:
+def make_scene(xyz: Floats, zones: Zones, limits: Floats, effort: SearchBudget,
+               store: PathStore) -> PathScene:
     """The scene; ways out of zones are found when they are asked for."""
     caught, out = np.zeros(len(xyz), np.int64), np.full((len(xyz), 3), np.inf)
     if zones.size:
         _catch(zones, xyz, caught)
-    return Scene(xyz, caught, out, limits, zones, effort.state, store.address)
+    return PathScene(xyz, caught, out, limits, zones, effort.state, store.address)
 
 
 @numba.njit(cache=True, nogil=True)
@@ -58,7 +58,7 @@ def _catch(o: Zones, xyz: Floats, caught: Ints) -> None:
 
 
 @numba.njit(cache=True, nogil=True)
-def _leave(scene: Scene, i: int, work: Ints) -> Floats:
+def _leave(scene: PathScene, i: int, work: Ints) -> Floats:
     """Where the caught point i is outside first; NaN: nowhere, or work[2]: not known."""
     if math.isinf(scene.out[i, 0]):
         free: Floats = way_out(scene.zones, scene.xyz[i], scene.limits, work)
@@ -69,17 +69,17 @@ def _leave(scene: Scene, i: int, work: Ints) -> Floats:
     return first
 
 
-def addresses(scene: Scene) -> Ints:
+def addresses(scene: PathScene) -> Ints:
     """Sizes and addresses of the scene's arrays, in the order that `_scene_at` reads."""
     return np.array([len(scene.xyz), len(scene.zones),
                      *(array.ctypes.data for array in scene[:6]), scene.store], np.int64)
 
 
 @numba.njit(cache=True, nogil=True)
-def _scene_at(address: int) -> Scene:
+def _scene_at(address: int) -> PathScene:
     at = ints_at(address)
     n, k = at[0], at[1]
-    return Scene(
+    return PathScene(
         carray(floats_at(at[2]), (n, 3)), carray(ints_at(at[3]), n),
         carray(floats_at(at[4]), (n, 3)), carray(floats_at(at[5]), 2),
         carray(zones_at(at[6]), k), carray(ints_at(at[7]), 5), at[8])
@@ -96,7 +96,7 @@ def in_order(p: Floats, q: Floats, ends: Floats) -> bool:
 
 
 @numba.njit(cache=True, nogil=True)
-def kept_as(scene: Scene, i: int, j: int, ends: Floats) -> bool:
+def kept_as(scene: PathScene, i: int, j: int, ends: Floats) -> bool:
     """The ends by which the way from i to j is kept; whether it is kept the other way round.
 
     One out of a zone is no way back, and begins with the point outside.
@@ -109,7 +109,7 @@ def kept_as(scene: Scene, i: int, j: int, ends: Floats) -> bool:
 
 
 @numba.njit(cache=True, nogil=True)
-def kept_way(scene: Scene, i: int, j: int, way: Floats) -> int:
+def kept_way(scene: PathScene, i: int, j: int, way: Floats) -> int:
     """The points of the way from i to j that is known, if it is clear; their number or 0."""
     ends, caught = np.empty((2, 3)), scene.caught[i] == INSIDE
     snug = scene.caught[i] == SNUG or scene.caught[j] == SNUG

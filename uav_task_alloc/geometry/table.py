@@ -13,7 +13,7 @@ SPARE = 64  # rows for places to come
 STRAIGHT = 1.0 + 1e-12  # a way is straight when at most so much longer than the distance
 
 
-class Table:
+class LengthTable:
     """Lengths [m] by slot; a place keeps its slot for ever, so older users stay right.
 
     NaN: not asked for yet; -w - 1: not found with w units of work.
@@ -38,9 +38,9 @@ class Table:
             self.used += 1
         return np.array([self._slots[key] for key in keys], np.int64)
 
-    def copy(self) -> Table:
+    def copy(self) -> LengthTable:
         """The same lengths in cells of its own."""
-        other = Table(0)
+        other = LengthTable(0)
         other.cells, other.places = self.cells.copy(), self.places.copy()
         other.used, other._slots = self.used, dict(self._slots)
         return other
@@ -49,7 +49,7 @@ class Table:
         """A new square with the known places among the wanted; the old one is left as it is."""
         keep = [key for key in dict.fromkeys(wanted) if key in self._slots]
         old = np.array([self._slots[key] for key in keep], np.int64)
-        other = Table(len(dict.fromkeys(wanted)))
+        other = LengthTable(len(dict.fromkeys(wanted)))
         other.cells[:len(old), :len(old)] = self.cells[np.ix_(old, old)]
         other.places[:len(old)], other.used = self.places[old], len(old)
         self.cells, self.places, self.used = other.cells, other.places, other.used

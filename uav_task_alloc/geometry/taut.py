@@ -11,8 +11,8 @@ import math
 import numba
 import numpy as np
 
-from uav_task_alloc.geometry.effort import spend
 from uav_task_alloc.geometry.obstacles import Floats, Ints, Zone, Zones, blocked
+from uav_task_alloc.geometry.search_budget import spend
 
 MAX_CORNERS = 96  # of a way while it is worked on
 CUT_GAIN = 1e-3  # a further corner must shorten the way by this share
@@ -37,7 +37,7 @@ def free(o: Zones, near: Ints, px: float, py: float, pz: float, qx: float, qy: f
 
 
 @numba.njit(cache=True, nogil=True)
-def span(p: Floats, i: int, j: int) -> float:
+def point_span(p: Floats, i: int, j: int) -> float:
     """Distance between two points of a way."""
     dx, dy, dz = p[i, 0] - p[j, 0], p[i, 1] - p[j, 1], p[i, 2] - p[j, 2]
     return math.sqrt(dx * dx + dy * dy + dz * dz)
@@ -48,7 +48,7 @@ def length_of(p: Floats, n: int) -> float:
     """Length of the way p[:n]."""
     total = 0.0
     for i in range(1, n):
-        total += span(p, i - 1, i)
+        total += point_span(p, i - 1, i)
     return total
 
 
@@ -113,7 +113,7 @@ def _put(q: Floats, p: Floats, i: int, axes: Floats, t: float, turn: float, s: f
 @numba.njit(cache=True, nogil=True)
 def _axes(p: Floats, i: int, axes: Floats) -> tuple[float, float, float]:
     """Chord direction, direction off it to corner i, third axis; chord, foot and offset [m]."""
-    chord = span(p, i - 1, i + 1)
+    chord = point_span(p, i - 1, i + 1)
     if chord < 1e-9:
         return 0.0, 0.0, 0.0
     foot = 0.0
@@ -166,7 +166,7 @@ def pull(o: Zones, near: Ints, p: Floats, i: int, limits: Floats, floor: float, 
     chord, t, s = _axes(p, i, axes)
     if s < 1e-6:
         return
-    near = zones_near(o, near, p, i - 1, i + 1, span(p, i - 1, i) + span(p, i, i + 1))
+    near = zones_near(o, near, p, i - 1, i + 1, point_span(p, i - 1, i) + point_span(p, i, i + 1))
     s = _press(o, near, p, i, axes, q, t, 0.0, s, limits, floor, snug)
     turn, step_t, step_turn = 0.0, 0.25 * min(chord, 4.0 * s), 0.4
     for _ in range(rounds):
@@ -210,7 +210,7 @@ def pull_all(o: Zones, near: Ints, p: Floats, n: int, limits: Floats, floor: flo
 def _cut(o: Zones, near: Ints, p: Floats, i: int, limits: Floats, floor: float,
          snug: bool) -> float:
     """How far from corner i, on both its legs, the corner can be cut off."""
-    before, after = span(p, i - 1, i), span(p, i, i + 1)
+    before, after = point_span(p, i - 1, i), point_span(p, i, i + 1)
     low, high = 0.0, 0.98 * min(before, after)
     for j, leg in ((i - 1, before), (i + 1, after)):  # an end may lie beyond the limits
         if not limits[0] <= p[j, 2] <= limits[1]:
@@ -246,8 +246,8 @@ def cut_corners(o: Zones, near: Ints, p: Floats, n: int, limits: Floats, floor: 
     least = CUT_GAIN * length_of(p, n)
     i = 1
     while i < n - 1 and n < MAX_CORNERS - 1:
-        before, after = span(p, i - 1, i), span(p, i, i + 1)
-        bend = before + after - span(p, i - 1, i + 1)
+        before, after = point_span(p, i - 1, i), point_span(p, i, i + 1)
+        bend = before + after - point_span(p, i - 1, i + 1)
         if bend < least:
             i += 1
             continue

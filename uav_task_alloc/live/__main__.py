@@ -6,15 +6,15 @@ import argparse
 import math
 from pathlib import Path
 
-from uav_task_alloc.live.board import Board
 from uav_task_alloc.live.scene import Scene
 from uav_task_alloc.live.server import TICK, Server
-from uav_task_alloc.record import heard
+from uav_task_alloc.live.snapshot_store import SnapshotStore
+from uav_task_alloc.record import run_state as heard
 
 
-def play(out_dir: Path, until: float = math.inf) -> Board:
+def play(out_dir: Path, until: float = math.inf) -> SnapshotStore:
     """The board as it stood at the end of a record, or `until` [s] after its first task."""
-    board, said = Board(), heard.Heard()
+    board, said = SnapshotStore(), heard.RunState()
     scene, put = Scene(said), -math.inf
 
     def post() -> None:

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
-from uav_task_alloc.live import replans
-from uav_task_alloc.live.events import events
-from uav_task_alloc.record.heard import Heard, Line, zone_to_json
+from uav_task_alloc.record import plan_diff as replans
+from uav_task_alloc.record.events import sentences
 from uav_task_alloc.record.progress import SILENT
+from uav_task_alloc.record.run_state import Line, RunState, zone_to_json
 
 DAY = 86400.0  # [s] a stamp older than that is of another clock
 PARTS = {'announcement': 'tasks', 'statuses': 'statuses', 'zones': 'zones', 'state': 'uavs',
@@ -18,19 +18,19 @@ Entry = dict[str, Any]  # of a log: wall [unix s], and what the page writes
 class Scene:
     """Parts of the page that became new, and entries of its two logs, since the last `news`."""
 
-    def __init__(self, heard: Heard) -> None:
+    def __init__(self, heard: RunState) -> None:
         self.heard = heard
         self.dirty: set[str] = set()
         self.events: list[Entry] = []
         self.solved: list[Line] = []  # plans not told yet
-        self.routes: replans.Routes | None = None  # of the last plan told
+        self.routes: replans.RouteLists | None = None  # of the last plan told
         self.silent: set[str] = set()
         self.told_authority: Entry = {}
 
     def take(self, line: Line) -> None:
         """Note what a line changes, then fold it into `heard`."""
         self.events += [{'wall': line['wall'], 'kind': kind, 'text': text}
-                        for kind, text in events(self.heard, line)]
+                        for kind, text in sentences(self.heard, line)]
         kind = line['kind']
         if kind in PARTS:
             self.dirty.add(PARTS[kind])

@@ -16,7 +16,7 @@ from typing import Final
 from aiohttp import web
 from plotly.offline import get_plotlyjs
 
-from uav_task_alloc.live.board import Board
+from uav_task_alloc.live.snapshot_store import SnapshotStore
 
 TICK = 0.5  # [s] between two messages to a page
 MOST_PAGES = 32  # streams at once
@@ -56,7 +56,7 @@ class Server:
     Raises OSError where the port is taken or the host is not of this machine.
     """
 
-    def __init__(self, board: Board, host: str, port: int) -> None:
+    def __init__(self, board: SnapshotStore, host: str, port: int) -> None:
         self.board = board
         self.host = host
         family = socket.AF_INET6 if ':' in host else socket.AF_INET

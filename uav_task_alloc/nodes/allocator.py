@@ -15,20 +15,17 @@ from std_srvs.srv import Trigger
 from uav_task_alloc_msgs import msg as m
 from uav_task_alloc_msgs.srv import SetAvailability, SubmitTasks
 
-from uav_task_alloc.allocator import Allocator, planning
-from uav_task_alloc.allocator.keeper import Keeper
+from uav_task_alloc.allocator import Allocator
 from uav_task_alloc.allocator.leader import Role
-from uav_task_alloc.allocator.records import Answer, Note, Problem, Verdict
+from uav_task_alloc.allocator.persistence.persistence import Persistence
+from uav_task_alloc.allocator.records import LogNote, ReplanAnswer, ReplanProblem, TaskVerdict
+from uav_task_alloc.allocator.replanning import planning
+from uav_task_alloc.allocator.replanning.worker import Worker
 from uav_task_alloc.allocator.status import facts, worries
-from uav_task_alloc.allocator.worker import Worker
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.geometry.frames import Origin
-from uav_task_alloc.nodes import allocation_messages as told, announcements
-from uav_task_alloc.nodes.complaints import Complaints
-from uav_task_alloc.nodes.fleet_origin import FleetOrigin
-from uav_task_alloc.nodes.intake import hear
-from uav_task_alloc.nodes.leader_watch import LeaderWatch
-from uav_task_alloc.nodes.messages import (
+from uav_task_alloc.nodes.conversions import allocation_messages as told, announcements
+from uav_task_alloc.nodes.conversions.messages import (
     HEARD_ANNOUNCEMENTS,
     HEARD_EVENTS,
     HEARD_STATES,
@@ -37,11 +34,15 @@ from uav_task_alloc.nodes.messages import (
     to_report,
     to_zone,
 )
-from uav_task_alloc.nodes.painter import Painter
-from uav_task_alloc.nodes.parameters import declare
-from uav_task_alloc.nodes.run import run
-from uav_task_alloc.nodes.teller import Teller
-from uav_task_alloc.nodes.topic_names import TASK_LIST, check_topic
+from uav_task_alloc.nodes.ros.allocation_publisher import AllocationPublisher
+from uav_task_alloc.nodes.ros.batched_subscription import subscribe_batched
+from uav_task_alloc.nodes.ros.leader_election import LeaderElection
+from uav_task_alloc.nodes.ros.origin_check import OriginCheck
+from uav_task_alloc.nodes.ros.parameters import declare
+from uav_task_alloc.nodes.ros.refusal_log import RefusalLog
+from uav_task_alloc.nodes.ros.run import run
+from uav_task_alloc.nodes.ros.topic_names import TASK_LIST, check_topic
+from uav_task_alloc.nodes.rviz.marker_publisher import MarkerPublisher
 from uav_task_alloc.params import AllocatorParams
 
 TICK = 0.025  # [s]
@@ -60,14 +61,14 @@ class AllocatorNode(Node):
         now = self.live.now
         self.origin = Origin(now.origin__latitude, now.origin__longitude,
                              now.origin__altitude_amsl)
-        self.origins = FleetOrigin(self, self.origin, lambda text: self.complain(
+        self.origins = OriginCheck(self, self.origin, lambda text: self.complain(
             'fleet_origin', '', text))
-        self.keeper = Keeper(now.state_dir, self.get_logger().error, self.origin,
+        self.keeper = Persistence(now.state_dir, self.get_logger().error, self.origin,
                              LOCK_WAIT)
         self.core = Allocator(now, time.monotonic(), self.keeper.saved)
         self.world = self.core.world
-        self.complain = Complaints(self.get_logger().warning).say
-        self.answers: deque[Answer | None] = deque()
+        self.complain = RefusalLog(self.get_logger().warning).say
+        self.answers: deque[ReplanAnswer | None] = deque()
         self.background = False
         self.rested = 0.0  # [s] steady clock
         self.refused = ''  # which other origin was logged
@@ -76,7 +77,7 @@ class AllocatorNode(Node):
         self.inputs: list[Subscription] = []
         self.offers: list[Service] = []  # once it leads
         self.passive = False  # another allocator leads
-        self.watch = LeaderWatch(self, self.world.lists, self.keeper.in_use)
+        self.watch = LeaderElection(self, self.world.lists, self.keeper.in_use)
         self._listen()
         self._talk()
         self.arrived = self.create_guard_condition(self.on_answer)
@@ -92,14 +93,14 @@ class AllocatorNode(Node):
                  HEARD_ANNOUNCEMENTS),
                 (m.ThreatZoneArray, 'threat_zones', self.on_zones, LATCHED),
                 (m.TaskEvent, 'task_events', self.on_event, HEARD_EVENTS)):
-            self.inputs.append(hear(self, kind, topic, heard, qos))
+            self.inputs.append(subscribe_batched(self, kind, topic, heard, qos))
         steady = Clock(clock_type=ClockType.STEADY_TIME)  # simulated time may stand still
         self.create_timer(TICK, self.on_tick, clock=steady)
         self.create_timer(1.0, self.on_second, clock=steady)
 
     def _talk(self) -> None:
-        self.teller = Teller(self, self.world)
-        self.painter = Painter(self, self.world)
+        self.teller = AllocationPublisher(self, self.world)
+        self.painter = MarkerPublisher(self, self.world)
         self.health = self.create_publisher(DiagnosticArray, '/diagnostics', 10)
 
     def leads(self) -> bool:
@@ -144,7 +145,7 @@ class AllocatorNode(Node):
             refused = str(error)
         self.complain('uav_states', msg.uav_id, refused)
 
-    def on_tasks(self, msg: m.TaskAnnouncement) -> list[Verdict]:
+    def on_tasks(self, msg: m.TaskAnnouncement) -> list[TaskVerdict]:
         """Tasks are added, changed or withdrawn."""
         return announcements.take(self.world, msg, self.origin, self.stamp(), time.monotonic())
 
@@ -227,16 +228,16 @@ class AllocatorNode(Node):
 
     def prepare(self) -> None:
         """In the worker's thread: load the compiler and all it has compiled."""
-        from uav_task_alloc.allocator.rehearsal import rehearse
+        from uav_task_alloc.allocator.replanning.warm_up import warm_up
         from uav_task_alloc.solver.solve import plan
-        rehearse(plan, self.live.now)
+        warm_up(plan, self.live.now)
 
-    def solve(self, problem: Problem, stop) -> Answer:
+    def solve(self, problem: ReplanProblem, stop) -> ReplanAnswer:
         """In the worker's thread."""
         from uav_task_alloc.solver.solve import plan
-        return planning.solve(plan, problem, self.live.now, stop)
+        return planning.solve_problem(plan, problem, self.live.now, stop)
 
-    def deliver(self, answer: Answer | None) -> None:
+    def deliver(self, answer: ReplanAnswer | None) -> None:
         """In the worker's thread: wake the node's."""
         self.answers.append(answer)
         self.arrived.trigger()
@@ -276,7 +277,7 @@ class AllocatorNode(Node):
         self.behind = self.teller.tell(stamp)
         self.painter.note(out)
 
-    def log(self, notes: list[Note]) -> None:
+    def log(self, notes: list[LogNote]) -> None:
         """A line each, of a flood the first; rclpy wants one place in the source a severity."""
         for note in notes[:MOST_LINES]:
             if note.warning:

@@ -14,10 +14,11 @@ from pathlib import Path
 
 from ament_index_python.packages import get_package_prefix, get_package_share_directory
 
-from uav_task_alloc import plots, report
+from uav_task_alloc import plots
+from uav_task_alloc.cli import report
 from uav_task_alloc.errors import AllocError
-from uav_task_alloc.nodes.ports import free_port
-from uav_task_alloc.record import run_folder, truth
+from uav_task_alloc.nodes.ros.udp_ports import free_port
+from uav_task_alloc.record import ground_truth as truth, run_folder
 from uav_task_alloc.scenario import load, simulation_parameters
 from uav_task_alloc.scenario.node_parameters import Parameters
 
@@ -87,12 +88,12 @@ def watch(children: list[Child], limit: float) -> list[str]:
     return [f'not finished after {limit:g} s']
 
 
-def judge(summary: dict[str, object]) -> list[str]:
+def find_faults(summary: dict[str, object]) -> list[str]:
     """The faults that a summary tells of."""
     return [f'{name} = {summary[name]}' for name in FAULTS if summary[name]]
 
 
-def fly(args: argparse.Namespace) -> int:
+def fly_scenario(args: argparse.Namespace) -> int:
     """Run the scenario into args.out; 0 when no task was lost or flown twice, no zone entered."""
     begin = time.monotonic()
     out = args.out
@@ -108,10 +109,10 @@ def fly(args: argparse.Namespace) -> int:
     summary = report.summarise(out)
     summary['wall_s'] = round(time.monotonic() - begin, 1)
     (out / run_folder.SUMMARY).write_text(json.dumps(summary, indent=2) + '\n')
-    print(report.table(summary))
+    print(report.summary_table(summary))
     plots.draw_flight(out, out / run_folder.MAP)
     print(f'Details: {out / run_folder.SUMMARY}   Map: {out / run_folder.MAP}')
-    faults += judge(summary)
+    faults += find_faults(summary)
     for fault in faults:
         print(f'FAULT: {fault}', file=sys.stderr)
     return 1 if faults else 0
@@ -133,7 +134,7 @@ def main(argv: list[str] | None = None) -> int:
     os.environ.setdefault('ROS_DOMAIN_ID', str(1 + os.getpid() % 100))
     os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
     try:
-        return fly(args)
+        return fly_scenario(args)
     except (AllocError, OSError) as error:
         print(error, file=sys.stderr)
         return 1

@@ -6,11 +6,11 @@ from rclpy.node import Node
 from uav_task_alloc_msgs.srv import SetAvailability
 
 from uav_task_alloc import scenario
-from uav_task_alloc.mavlink.fleet import Fleet, to_address
-from uav_task_alloc.mavlink.vehicle_config import VehicleConfig
-from uav_task_alloc.nodes.parameters import declare
-from uav_task_alloc.nodes.run import run
+from uav_task_alloc.nodes.ros.parameters import declare
+from uav_task_alloc.nodes.ros.run import run
 from uav_task_alloc.params import FleetSimParams
+from uav_task_alloc.sim.config import VehicleConfig
+from uav_task_alloc.sim.udp_fleet import UdpFleet, to_address
 
 
 class FleetSim(Node):
@@ -20,7 +20,7 @@ class FleetSim(Node):
         super().__init__('fleet_sim')
         params = declare(self, FleetSimParams).now
         played = scenario.load(params.scenario)
-        self.fleet = Fleet([(config_of(uav, played, params), uav.autopilot)
+        self.fleet = UdpFleet([(config_of(uav, played, params), uav.autopilot)
                             for uav in played.uavs],
                            to_address(params.target), params.speedup, params.log_file)
         self.thread = self.fleet.start()

@@ -17,19 +17,19 @@ from uav_task_alloc_msgs import msg as m
 
 from uav_task_alloc import scenario
 from uav_task_alloc.errors import InvalidValue
-from uav_task_alloc.live.board import Board
 from uav_task_alloc.live.scene import Scene
+from uav_task_alloc.live.snapshot_store import SnapshotStore
 from uav_task_alloc.model import is_ros_name
-from uav_task_alloc.nodes import announcements
-from uav_task_alloc.nodes.bounds import cut
-from uav_task_alloc.nodes.messages import ANNOUNCEMENTS, LATCHED, STATES, to_zone
-from uav_task_alloc.nodes.parameters import declare
-from uav_task_alloc.nodes.run import run, with_flags
-from uav_task_alloc.nodes.topic_names import TASK_LIST, check_topic
+from uav_task_alloc.nodes.conversions import announcements
+from uav_task_alloc.nodes.conversions.message_limits import cut
+from uav_task_alloc.nodes.conversions.messages import ANNOUNCEMENTS, LATCHED, STATES, to_zone
+from uav_task_alloc.nodes.ros.parameters import declare
+from uav_task_alloc.nodes.ros.run import run, with_flags
+from uav_task_alloc.nodes.ros.topic_names import TASK_LIST, check_topic
 from uav_task_alloc.params import LiveViewParams
-from uav_task_alloc.record import lines
-from uav_task_alloc.record.heard import FILE, Heard, zone_to_json
+from uav_task_alloc.record import message_records as lines
 from uav_task_alloc.record.progress import fleet, headline, is_over
+from uav_task_alloc.record.run_state import FILE, RunState, zone_to_json
 
 REFRESH = 0.5  # [s] in a terminal
 PLAIN_EVERY = 4  # refreshes between two lines where the output is no terminal
@@ -37,7 +37,7 @@ MOST_REFUSED = 200  # lines of the log
 UP_AND_CLEAR = '\x1b[{}F\x1b[J'
 
 
-def zones_line(msg: m.ThreatZoneArray) -> lines.Body:
+def zones_line(msg: m.ThreatZoneArray) -> lines.RecordBody:
     """The good zones as a line of the record, within the same bounds as the allocator's.
 
     The allocator says what is wrong with the others. Raises InvalidValue where the picture is
@@ -56,9 +56,9 @@ class LiveView(Node):
         self.params = declare(self, LiveViewParams).now
         self.played = scenario.load(self.params.scenario) if self.params.scenario else None
         self.origin = self.played.origin if self.played else scenario.values.DEFAULT_ORIGIN
-        self.heard = Heard()
+        self.heard = RunState()
         self.refused: set[tuple[str, str]] = set()  # topic and why, as logged
-        self.scene, self.board = Scene(self.heard), Board()
+        self.scene, self.board = Scene(self.heard), SnapshotStore()
         self.file = self._open()
         self.recorder = self._record()
         self.finished = False
@@ -74,10 +74,10 @@ class LiveView(Node):
         """Subscribe to what is recorded; lists follow as UAVs become known."""
         for kind, topic, qos, read in (
             (m.TaskAnnouncement, 'task_announcements', ANNOUNCEMENTS,
-             lambda msg: lines.announced(msg, self.origin)),
+             lambda msg: lines.announced_tasks(msg, self.origin)),
             (m.ThreatZoneArray, 'threat_zones', LATCHED, zones_line),
             (m.TaskStatusArray, 'task_statuses', LATCHED, lines.statuses),
-            (m.Allocation, 'allocation', ANNOUNCEMENTS, lines.allocation),
+            (m.Allocation, 'allocation', ANNOUNCEMENTS, lines.allocation_record),
             (DiagnosticArray, '/diagnostics', 10, lines.uploads),
         ):
             self.create_subscription(kind, topic, self.taking(topic, read), qos)
@@ -92,7 +92,9 @@ class LiveView(Node):
             topic = check_topic(self, TASK_LIST, uav)
         except InvalidValue as error:  # the rest of what it says is shown all the same
             return self.refuse('task_list', error)
-        self.create_subscription(m.TaskList, topic, self.taking(topic, lines.task_list), LATCHED)
+        self.create_subscription(
+            m.TaskList, topic, self.taking(topic, lines.task_list_record), LATCHED
+        )
 
     def on_state(self, msg: m.UavState) -> None:
         """As `take_state`, whatever the message brings."""
@@ -112,7 +114,7 @@ class LiveView(Node):
                 line[key] != old[key] for key in what):
             self.take(line)
 
-    def taking(self, topic: str, read: Callable[[Any], lines.Body]) -> Callable[[Any], None]:
+    def taking(self, topic: str, read: Callable[[Any], lines.RecordBody]) -> Callable[[Any], None]:
         """A callback that records what `read` makes of a message."""
         return lambda msg: self.guarded(
             topic, lambda: self.take({'wall': time.time(), **read(msg)}))
@@ -132,7 +134,7 @@ class LiveView(Node):
             self.refused.add((topic, why))
             self.get_logger().warning(f'{topic}: {why}: ignored; said once')
 
-    def take(self, line: lines.Body) -> None:
+    def take(self, line: lines.RecordBody) -> None:
         """Fold a line into what is known, and write it down."""
         self.scene.take(line)
         if self.file:
@@ -205,7 +207,7 @@ class LiveView(Node):
         if not self.params.record:
             return None
         try:
-            from uav_task_alloc.nodes.bag_recorder import BagRecorder
+            from uav_task_alloc.nodes.ros.bag_recorder import BagRecorder
             recorder = BagRecorder(Path(self.params.record), self.get_namespace(), {
                 'speedup': str(self.params.speedup),
                 **({f'origin.{name}': str(value) for name, value in asdict(

@@ -14,23 +14,24 @@ from uav_task_alloc_msgs.srv import HandOver
 
 from uav_task_alloc.errors import InvalidValue, UnknownName
 from uav_task_alloc.geometry.frames import Origin
-from uav_task_alloc.mavlink.authority_store import FileStore, boot_id
-from uav_task_alloc.mavlink.ground import Ground, Served, Station
-from uav_task_alloc.mavlink.heartbeat import Heartbeat
-from uav_task_alloc.mavlink.link import open_link
-from uav_task_alloc.mavlink.policy import Policy
-from uav_task_alloc.mavlink.radio import Radio
-from uav_task_alloc.mavlink.status import Told, facts_of, state_of
-from uav_task_alloc.mission import TaskList
+from uav_task_alloc.mavlink.gcs.authority_store import FileStore, boot_id
+from uav_task_alloc.mavlink.gcs.ground_station import GcsConfig, GroundStation, VehicleSession
+from uav_task_alloc.mavlink.gcs.policy import Policy
+from uav_task_alloc.mavlink.gcs.status import Told, facts_of, state_of
+from uav_task_alloc.mavlink.gcs.telemetry import WANTED
+from uav_task_alloc.mavlink.mission.items import TaskList
+from uav_task_alloc.mavlink.transport.connections import Connections
+from uav_task_alloc.mavlink.transport.heartbeat import Heartbeat
+from uav_task_alloc.mavlink.transport.link import open_link
 from uav_task_alloc.model import ThreatZone, check_number, check_ros_name
-from uav_task_alloc.nodes import bridge_messages as convert
-from uav_task_alloc.nodes.bounds import cut, printable
-from uav_task_alloc.nodes.bridge_end import BridgeEnd, swapping
-from uav_task_alloc.nodes.fleet_origin import FleetOrigin
-from uav_task_alloc.nodes.messages import EVENTS, LATCHED, STATES
-from uav_task_alloc.nodes.parameters import declare
-from uav_task_alloc.nodes.run import run
-from uav_task_alloc.nodes.topic_names import TASK_LIST, check_topic
+from uav_task_alloc.nodes.conversions import bridge_messages as convert
+from uav_task_alloc.nodes.conversions.message_limits import cut, printable
+from uav_task_alloc.nodes.conversions.messages import EVENTS, LATCHED, STATES
+from uav_task_alloc.nodes.ros.bridge_shutdown import BridgeShutdown, swapping
+from uav_task_alloc.nodes.ros.origin_check import OriginCheck
+from uav_task_alloc.nodes.ros.parameters import declare
+from uav_task_alloc.nodes.ros.run import run
+from uav_task_alloc.nodes.ros.topic_names import TASK_LIST, check_topic
 from uav_task_alloc.params import BridgeParams
 
 TICK = 0.02  # [s] between steps of the machines; messages are acted on as they come
@@ -43,7 +44,7 @@ def policy_of(params: BridgeParams, zones: tuple[ThreatZone, ...] = (),
                   params.relaunch, zones, grounded)
 
 
-def station_of(params: BridgeParams) -> Station:
+def station_of(params: BridgeParams) -> GcsConfig:
     """Who we are; raise InvalidValue for a pattern that makes no ROS name."""
     try:
         names = {params.uav_id_pattern.format(sysid=number) for number in (1, 2)}
@@ -58,7 +59,7 @@ def station_of(params: BridgeParams) -> Station:
         check_number('system_ids', number, 1, 255)
     origin = Origin(params.origin__latitude, params.origin__longitude,
                     params.origin__altitude_amsl)
-    return Station(params.system_id, params.component_id, params.system_ids,
+    return GcsConfig(params.system_id, params.component_id, params.system_ids,
                    params.uav_id_pattern, params.autopilot, origin, policy_of(params))
 
 
@@ -78,11 +79,12 @@ class MavlinkBridge(Node):
                     'error': lambda text: logger.error(text)}
         self.store = FileStore(params.state_dir, self.log['error'],
                                boot_id()) if params.state_dir else None
-        self.ground = Ground(self.station, random.Random(time.time_ns()), self.store)
+        self.ground = GroundStation(self.station, random.Random(time.time_ns()), self.store)
         self.zones: tuple[ThreatZone, ...] = ()
-        self.radio = Radio(
+        self.radio = Connections(
             map(open_link, params.connections), params.system_id, params.component_id,
-            wall=time.time, signing_key_file=params.signing_key_file, tlog=params.tlog)
+            wall=time.time, wanted=WANTED, signing_key_file=params.signing_key_file,
+            tlog=params.tlog)
         self.refusals, self.refused = (self.ground.refusals, self.radio.refusals), 0
         self.lock = threading.Lock()  # of the ground station
         self.told = Told()
@@ -92,13 +94,13 @@ class MavlinkBridge(Node):
         self.task_events = self.create_publisher(m.TaskEvent, 'task_events', EVENTS)
         self.health = self.create_publisher(DiagnosticArray, '/diagnostics', 10)
         self.create_subscription(m.ThreatZoneArray, 'threat_zones', self.on_zones, LATCHED)
-        self.origins = FleetOrigin(self, self.station.origin, lambda text: self.log['warning'](
+        self.origins = OriginCheck(self, self.station.origin, lambda text: self.log['warning'](
             f'fleet_origin: {text}: ignored'))
         self.waiting: dict[str, TaskList] = {}  # lists until the origins agree
         self.create_service(HandOver, '~/hand_over', self.on_hand_over)
         self.create_timer(0.05, self.on_tick)
         self.create_timer(1.0, self.on_second)
-        self.closing, self.end = False, BridgeEnd()
+        self.closing, self.end = False, BridgeShutdown()
         self.heartbeat = Heartbeat(self.radio.send_to_all)
         self.receiver = threading.Thread(target=self.receive, name='receive', daemon=True)
         self.heartbeat.start()
@@ -136,10 +138,10 @@ class MavlinkBridge(Node):
             if conflict:
                 status = replace(status, available=False, reason=conflict)
             if self.told.is_news(status, seen, now, self.live.now.state_rate):
-                self.states.publish(convert.from_status(
+                self.states.publish(convert.from_uav_status(
                     status, self.capabilities.get(served.uav_id, ()), self.stamp() - now + seen))
 
-    def tell_events(self, served: Served) -> None:
+    def tell_events(self, served: VehicleSession) -> None:
         """Publish progress, log notes."""
         pilot = served.pilot
         while pilot.events:

@@ -10,9 +10,14 @@ from uav_task_alloc_msgs import msg as m
 from uav_task_alloc_msgs.srv import SetAvailability
 
 from uav_task_alloc import scenario
-from uav_task_alloc.nodes.messages import ANNOUNCEMENTS, LATCHED, announcement, from_zones
-from uav_task_alloc.nodes.parameters import declare
-from uav_task_alloc.nodes.run import run
+from uav_task_alloc.nodes.conversions.messages import (
+    ANNOUNCEMENTS,
+    LATCHED,
+    announcement,
+    from_zones,
+)
+from uav_task_alloc.nodes.ros.parameters import declare
+from uav_task_alloc.nodes.ros.run import run
 from uav_task_alloc.params import PlayerParams
 
 TICK = 0.02  # [s]

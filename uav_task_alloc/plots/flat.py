@@ -14,7 +14,7 @@ from matplotlib.patches import Circle, Polygon
 
 from uav_task_alloc.model import Point, Shape, ThreatZone
 from uav_task_alloc.plots import style
-from uav_task_alloc.plots.labels import Label, place
+from uav_task_alloc.plots.labels import Label, place_labels
 from uav_task_alloc.plots.style import RED, ROUTE, SMALL
 
 
@@ -115,7 +115,7 @@ class Map:
         self.axes.margins(0.07)
         self.figure.draw_without_rendering()  # only now the limits are what they will be
         low, high = self.axes.get_xlim()
-        place(self.axes, self._labels, self._ways)
+        place_labels(self.axes, self._labels, self._ways)
         if handles:
             self._scale_bar(high - low)
         self.figure.savefig(png)

@@ -11,9 +11,9 @@ from typing import Any
 from uav_task_alloc.plots import style
 from uav_task_alloc.plots.flat import Map
 from uav_task_alloc.plots.style import RED
-from uav_task_alloc.record import heard, truth
-from uav_task_alloc.record.heard import Heard
-from uav_task_alloc.record.truth import Truth
+from uav_task_alloc.record import ground_truth as truth, run_state as heard
+from uav_task_alloc.record.ground_truth import Truth
+from uav_task_alloc.record.run_state import RunState
 
 AT_START = 0.2  # [s] wall: tasks announced this soon after the first were there from the start
 
@@ -21,7 +21,7 @@ AT_START = 0.2  # [s] wall: tasks announced this soon after the first were there
 def draw_flight(out_dir: str | Path, png: str | Path) -> None:
     """The map of the run recorded in a folder; OSError when there is none."""
     out = Path(out_dir)
-    said, flown = heard.read(out), truth.read(out)
+    said, flown = heard.read_record(out), truth.read_truth(out)
     drawn = Map((task.position for task in said.tasks.values()), len(said.tasks))
     for seen in said.zones:
         late = seen.since > said.start() + AT_START
@@ -32,7 +32,7 @@ def draw_flight(out_dir: str | Path, png: str | Path) -> None:
     drawn.finish(_title(said, flown), handles, png)
 
 
-def _tracks(drawn: Map, said: Heard, flown: Truth, places: Mapping[str, int]) -> list[Any]:
+def _tracks(drawn: Map, said: RunState, flown: Truth, places: Mapping[str, int]) -> list[Any]:
     handles = []
     for uav, index in places.items():
         points = [sample.point for sample in flown.tracks[uav]]
@@ -47,7 +47,7 @@ def _tracks(drawn: Map, said: Heard, flown: Truth, places: Mapping[str, int]) ->
     return handles
 
 
-def _tasks(drawn: Map, said: Heard, flown: Truth, places: Mapping[str, int]) -> list[Any]:
+def _tasks(drawn: Map, said: RunState, flown: Truth, places: Mapping[str, int]) -> list[Any]:
     visits = truth.visits(flown, {name: task.position for name, task in said.tasks.items()})
     for name, task in said.tasks.items():
         marker = 'o' if task.wall <= said.start() + AT_START else 'D'
@@ -61,7 +61,7 @@ def _tasks(drawn: Map, said: Heard, flown: Truth, places: Mapping[str, int]) -> 
             style.mark('o', 'white', RED, 'task not flown')]
 
 
-def _title(said: Heard, flown: Truth) -> str:
+def _title(said: RunState, flown: Truth) -> str:
     done, out = said.count('COMPLETED'), said.count('UNASSIGNED', 'REJECTED')
     return (f'{done} of {len(said.tasks)} tasks completed, {out} unassigned; '
             f'{len(flown.tracks)} UAVs, {flown.metres() / 1e3:.1f} km flown')

@@ -37,7 +37,7 @@ class Label:
     within: bool = False  # an area, and so no mark to keep clear of
 
 
-def place(axes: Axes, labels: Sequence[Label], ways: Iterable[Sequence[tuple[float, float]]]
+def place_labels(axes: Axes, labels: Sequence[Label], ways: Iterable[Sequence[tuple[float, float]]]
           ) -> None:
     """Write labels; `ways` are lines in data, which names had better not cover.
 

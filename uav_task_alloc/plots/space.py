@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from uav_task_alloc.model import Plan, Point, Shape, Task, ThreatZone, Uav
 from uav_task_alloc.plots import style
-from uav_task_alloc.plots.labels import Label, place
+from uav_task_alloc.plots.labels import Label, place_labels
 from uav_task_alloc.plots.plan import handles_of, title_of, way_of
 from uav_task_alloc.plots.style import RED, ROUTE, SMALL
 
@@ -55,8 +55,8 @@ def draw_plan_3d(uavs: Sequence[Uav], tasks: Sequence[Task], zones: Sequence[Thr
     for name in plan.unassigned:
         _mark(axes, places[name], low[2], 'o', size, 'white', RED)
     if few:
-        names += [(name, place, False, RED if name in plan.unassigned else 'black')
-                  for name, place in places.items()]
+        names += [(name, place_labels, False, RED if name in plan.unassigned else 'black')
+                  for name, place_labels in places.items()]
     _frame(axes, low, high)
     figure.text(0.03, 0.94, title_of(plan, len(tasks)), fontsize=style.LARGE, fontweight='bold')
     figure.text(RIGHT, 0.97, note, fontsize=SMALL - 2.0, va='top')
@@ -172,7 +172,7 @@ def _write(axes: Any, names: Iterable[Name], ways: Iterable[Sequence[Point]]) ->
 
     labels = [Label(text, *flat([spot])[0], style.PLAIN if bold and ink == 'black' else SMALL,
                     9.0, ink, bold) for text, spot, bold, ink in names]
-    place(axes, labels, map(flat, ways))
+    place_labels(axes, labels, map(flat, ways))
 
 
 def _frame(axes: Any, low: NDArray[np.float64], high: NDArray[np.float64]) -> None:

@@ -17,16 +17,16 @@ from zstandard import ZstdError
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.geometry.frames import Origin
 from uav_task_alloc.model import check_number
-from uav_task_alloc.record import lines
+from uav_task_alloc.record import message_records as lines
 from uav_task_alloc.record.bag import ABOUT
-from uav_task_alloc.record.heard import Line
+from uav_task_alloc.record.run_state import Line
 
 OURS = 'uav_task_alloc_msgs/msg/'
 LONGEST = 2**30  # [bytes] of a record that is believed in
 # by type, so that the namespace of a fleet does not matter
-READ: dict[str, Callable[[Any], lines.Body]] = {
-    OURS + 'ThreatZoneArray': lines.zones, OURS + 'TaskStatusArray': lines.statuses,
-    OURS + 'Allocation': lines.allocation, OURS + 'TaskList': lines.task_list,
+READ: dict[str, Callable[[Any], lines.RecordBody]] = {
+    OURS + 'ThreatZoneArray': lines.announced_zones, OURS + 'TaskStatusArray': lines.statuses,
+    OURS + 'Allocation': lines.allocation_record, OURS + 'TaskList': lines.task_list_record,
     OURS + 'UavState': lines.state, 'diagnostic_msgs/msg/DiagnosticArray': lines.uploads}
 TASKS = OURS + 'TaskAnnouncement'
 
@@ -96,8 +96,11 @@ class BagReader:
             decode = self.decoders.decoder_for(channel.message_encoding, schema)
             if decode is None:
                 raise ValueError(f'{channel.message_encoding}: expected cdr')
-            body = (lines.announced(decode(message.data), self.origin) if schema.name == TASKS
-                    else READ[schema.name](decode(message.data)))
+            body = (
+                lines.announced_tasks(decode(message.data), self.origin)
+                if schema.name == TASKS
+                else READ[schema.name](decode(message.data))
+            )
         except Exception:  # whatever a decoder makes of bytes that are none of its type
             self.unread[channel.topic] += 1
             return

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 
-from uav_task_alloc.record.heard import FINAL, Heard, Line
+from uav_task_alloc.record.run_state import FINAL, Line, RunState
 from uav_task_alloc.scenario import Scenario
 
 AT_REST = 0.5  # [m/s]
 SILENT = 2.0  # [s] wall time after which a UAV is shown as silent
 
 
-def headline(heard: Heard, clock: float) -> str:
+def headline(heard: RunState, clock: float) -> str:
     """One line: tasks by state, re-plans, zones; `clock` [s] of the scenario."""
     counts = ''.join(f', {heard.count(state)} {state.lower()}' for state in (
         'ACTIVE', 'ASSIGNED', 'PENDING', 'UNASSIGNED', 'REJECTED', 'FAILED', 'CANCELLED')
@@ -25,7 +25,7 @@ def headline(heard: Heard, clock: float) -> str:
     return text
 
 
-def fleet(heard: Heard, now: float) -> list[str]:
+def fleet(heard: RunState, now: float) -> list[str]:
     """One line for each UAV; `now` [unix s]."""
     lines = []
     for uav, state in sorted(heard.uavs.items()):
@@ -40,7 +40,7 @@ def fleet(heard: Heard, now: float) -> list[str]:
     return lines
 
 
-def authority(heard: Heard, uav: str, now: float) -> str:
+def authority(heard: RunState, uav: str, now: float) -> str:
     """Who has a UAV, since when, why, and what gives it back; why it is not available."""
     state, said = heard.uavs[uav], heard.authority.get(uav)
     name, reason = state.get('authority', ''), state.get('reason', '')
@@ -53,7 +53,7 @@ def authority(heard: Heard, uav: str, now: float) -> str:
     return text if not reason or said.why in reason else f'{text}; not available: {reason}'
 
 
-def is_over(heard: Heard, scenario: Scenario, clock: float) -> bool:
+def is_over(heard: RunState, scenario: Scenario, clock: float) -> bool:
     """Whether all of a scenario was announced and settled, and its living UAVs are at rest."""
     dead = {uav.id for uav in scenario.uavs if uav.dies_at is not None}
     return (clock > scenario.duration

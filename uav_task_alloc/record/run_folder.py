@@ -8,7 +8,7 @@ from pathlib import Path
 
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.params import NODES
-from uav_task_alloc.record import heard, truth
+from uav_task_alloc.record import ground_truth as truth, run_state as heard
 
 MARKER = '.uav_task_alloc_demo'  # a folder with it was made, or found empty, by a demo
 STATE = 'state'  # of allocator and bridge

@@ -17,7 +17,7 @@ INFINITE = {'.inf': math.inf, '+.inf': math.inf, '-.inf': -math.inf}  # YAML's s
 
 
 @dataclass(frozen=True, slots=True)
-class Kind:
+class ValueKind:
     """What a value may be: in words, for the docs and for refusals, and how it is read."""
 
     words: str
@@ -28,16 +28,16 @@ class Kind:
 class Key:
     """One key of a table; null, or leaving it out, means the default."""
 
-    kind: Kind
+    kind: ValueKind
     text: str
     default: Any = REQUIRED
 
 
-Table = Mapping[str, Key]
+KeyTable = Mapping[str, Key]
 
 
 @dataclass(frozen=True, slots=True)
-class Row:
+class YamlRow:
     """What a mapping held, by key, and where in the file it stands."""
 
     place: str
@@ -53,7 +53,7 @@ class Row:
         node = self.nodes.get(key)
         if node is None:
             return refusal(self.node, f'{self.place}.{key} is missing: expected {expected}')
-        return refusal(node, f'{self.place}.{key} = {shown(node)}: expected {expected}')
+        return refusal(node, f'{self.place}.{key} = {shown_yaml(node)}: expected {expected}')
 
 
 def refusal(node: yaml.Node, reason: str) -> ScenarioError:
@@ -61,12 +61,12 @@ def refusal(node: yaml.Node, reason: str) -> ScenarioError:
     return ScenarioError(f'{node.start_mark.name}:{node.start_mark.line + 1}: {reason}')
 
 
-def shown(node: yaml.Node) -> str:
+def shown_yaml(node: yaml.Node) -> str:
     """A value as a refusal names it, never longer than half a line."""
     if isinstance(node, yaml.MappingNode):
         return 'a mapping'
     if isinstance(node, yaml.SequenceNode):
-        inner = ', '.join(shown(child) for child in node.value[:4])
+        inner = ', '.join(shown_yaml(child) for child in node.value[:4])
         return f'[{inner}{", ..." if len(node.value) > 4 else ""}]'[:45]
     return repr(node.value[:40]) if node.style else str(node.value[:40]) or 'null'
 
@@ -104,12 +104,12 @@ def _refuse_circles(node: yaml.Node, above: tuple[int, ...], done: set[int]) -> 
     done.add(id(node))
 
 
-def read_row(table: Table, place: str, node: yaml.Node) -> Row:
+def read_row(table: KeyTable, place: str, node: yaml.Node) -> YamlRow:
     """One mapping read key by key; unknown, repeated and missing keys are refused."""
     if not isinstance(node, yaml.MappingNode):
-        raise refusal(node, f'{place} = {shown(node)}: expected a mapping with '
+        raise refusal(node, f'{place} = {shown_yaml(node)}: expected a mapping with '
                             f'{", ".join(table)}')
-    row = Row(place, node, _children(table, place, node), {})
+    row = YamlRow(place, node, _children(table, place, node), {})
     for key, entry in table.items():
         given = row.nodes.get(key)
         if given is not None and not is_null(given):
@@ -121,10 +121,10 @@ def read_row(table: Table, place: str, node: yaml.Node) -> Row:
     return row
 
 
-def _children(table: Table, place: str, node: yaml.MappingNode) -> dict[str, yaml.Node]:
+def _children(table: KeyTable, place: str, node: yaml.MappingNode) -> dict[str, yaml.Node]:
     lines: dict[str, int] = {}
     for name, _ in node.value:
-        key = name.value if isinstance(name, yaml.ScalarNode) else shown(name)
+        key = name.value if isinstance(name, yaml.ScalarNode) else shown_yaml(name)
         if key not in table:
             near = get_close_matches(key, table, 1, 0.0)[0]
             raise refusal(name, f'{place}: unknown key {key!r}: expected one of '
@@ -141,7 +141,7 @@ def is_null(node: yaml.Node) -> bool:
     return bool(node.tag == 'tag:yaml.org,2002:null')
 
 
-def scalar(words: str, convert: Callable[[str], Any]) -> Kind:
+def scalar(words: str, convert: Callable[[str], Any]) -> ValueKind:
     """A single value; `convert` raises ValueError for what is not meant."""
     def read(place: str, node: yaml.Node) -> Any:
         try:
@@ -149,12 +149,12 @@ def scalar(words: str, convert: Callable[[str], Any]) -> Kind:
                 raise ValueError
             return convert(node.value)
         except ValueError:
-            raise refusal(node, f'{place} = {shown(node)}: expected {words}') from None
-    return Kind(words, read)
+            raise refusal(node, f'{place} = {shown_yaml(node)}: expected {words}') from None
+    return ValueKind(words, read)
 
 
 def number(low: float = -math.inf, high: float = math.inf, *, open_low: bool = False,
-           infinite: bool = False) -> Kind:
+           infinite: bool = False) -> ValueKind:
     """A number in [low, high], or (low, high] where open_low; infinite only where it may."""
     def convert(text: str) -> float:
         value = INFINITE.get(text.lower())
@@ -171,7 +171,7 @@ def number(low: float = -math.inf, high: float = math.inf, *, open_low: bool = F
     return scalar(f'a number in {left}{low:g}, {high:g}{right}', convert)
 
 
-def whole(low: int, high: int) -> Kind:
+def whole_number(low: int, high: int) -> ValueKind:
     """A whole number in [low, high]."""
     def convert(text: str) -> int:
         value = int(text)
@@ -181,7 +181,7 @@ def whole(low: int, high: int) -> Kind:
     return scalar(f'a whole number in [{low}, {high}]', convert)
 
 
-def choice(*names: str) -> Kind:
+def choice(*names: str) -> ValueKind:
     """One of some words."""
     def convert(text: str) -> str:
         if text not in names:
@@ -190,7 +190,7 @@ def choice(*names: str) -> Kind:
     return scalar(f'one of {", ".join(names)}', convert)
 
 
-def text(words: str, accepts: Callable[[str], object] = str.strip) -> Kind:
+def text_value(words: str, accepts: Callable[[str], object] = str.strip) -> ValueKind:
     """A string that `accepts` takes."""
     def convert(value: str) -> str:
         if not accepts(value):
@@ -199,15 +199,15 @@ def text(words: str, accepts: Callable[[str], object] = str.strip) -> Kind:
     return scalar(words, convert)
 
 
-def many(kind: Kind, words: str, least: int = 0, most: float = math.inf) -> Kind:
+def many(kind: ValueKind, words: str, least: int = 0, most: float = math.inf) -> ValueKind:
     """A list of values of one kind, read as a tuple."""
     def read(place: str, node: yaml.Node) -> tuple[Any, ...]:
         if not isinstance(node, yaml.SequenceNode) or not least <= len(node.value) <= most:
-            raise refusal(node, f'{place} = {shown(node)}: expected {words}')
+            raise refusal(node, f'{place} = {shown_yaml(node)}: expected {words}')
         return tuple(kind.read(f'{place}[{i}]', child) for i, child in enumerate(node.value))
-    return Kind(words, read)
+    return ValueKind(words, read)
 
 
-def mapping(table: Table, words: str) -> Kind:
+def mapping(table: KeyTable, words: str) -> ValueKind:
     """A nested mapping, read as a Row."""
-    return Kind(words, lambda place, node: read_row(table, place, node))
+    return ValueKind(words, lambda place, node: read_row(table, place, node))

@@ -12,7 +12,7 @@ import numpy as np
 from uav_task_alloc.errors import InvalidValue, ScenarioError
 from uav_task_alloc.geometry.frames import Origin, to_enu
 from uav_task_alloc.model import Point, Shape, Task, ThreatZone
-from uav_task_alloc.scenario.checked_yaml import Row, compose, read_row, refusal
+from uav_task_alloc.scenario.checked_yaml import YamlRow, compose, read_row, refusal
 from uav_task_alloc.scenario.generate import draw_points
 from uav_task_alloc.scenario.schema import SCENARIO
 from uav_task_alloc.scenario.values import (
@@ -67,13 +67,13 @@ def parse(text: str, name: str = 'scenario') -> Scenario:
                     root['altitude_max'])
 
 
-def _origin(row: Row | None) -> Origin:
+def _origin(row: YamlRow | None) -> Origin:
     if row is None:
         return DEFAULT_ORIGIN
     return Origin(row['latitude'], row['longitude'], row['altitude_amsl'])
 
 
-def _uav(row: Row, place: int) -> ScenarioUav:
+def _uav(row: YamlRow, place: int) -> ScenarioUav:
     uav = ScenarioUav(
         row['id'], row['system_id'] or place, row['autopilot'], row['position'],
         row['home'] or row['position'], row['cruise_speed'], row['range'],
@@ -83,7 +83,7 @@ def _uav(row: Row, place: int) -> ScenarioUav:
     return uav
 
 
-def _task(row: Row, origin: Origin, uavs: list[str]) -> TimedTask:
+def _task(row: YamlRow, origin: Origin, uavs: list[str]) -> TimedTask:
     allowed = row['allowed_uavs']
     for name in allowed or ():
         if name not in uavs:
@@ -94,7 +94,7 @@ def _task(row: Row, origin: Origin, uavs: list[str]) -> TimedTask:
         row['acceptance_radius'])))
 
 
-def _position(row: Row, origin: Origin) -> Point:
+def _position(row: YamlRow, origin: Origin) -> Point:
     geodetic = [row[key] for key in ('latitude', 'longitude', 'altitude')]
     if (row['position'] is None) == all(value is None for value in geodetic):
         raise row.refuse('position', 'either position, or latitude, longitude and altitude')
@@ -108,7 +108,7 @@ def _position(row: Row, origin: Origin) -> Point:
     return to_enu(origin, latitude, longitude, origin.altitude_amsl + altitude)
 
 
-def _zone(row: Row) -> TimedZone:
+def _zone(row: YamlRow) -> TimedZone:
     shape = Shape[row['shape'].upper()]
     for key in ('vertices',) if shape is Shape.POLYGON else ('center', 'radius'):
         if row[key] is None:
@@ -123,7 +123,7 @@ def _zone(row: Row) -> TimedZone:
     return TimedZone(_valid(row, lambda: _volume(row, shape)), row['appears'], row['vanishes'])
 
 
-def _volume(row: Row, shape: Shape) -> ThreatZone:
+def _volume(row: YamlRow, shape: Shape) -> ThreatZone:
     if shape is Shape.POLYGON:
         return ThreatZone.polygon(row['id'], row['vertices'], row['z_min'], row['z_max'],
                                   row['margin'])
@@ -135,7 +135,7 @@ def _volume(row: Row, shape: Shape) -> ThreatZone:
     return ThreatZone.hemisphere(row['id'], row['center'], row['radius'], row['margin'])
 
 
-def _cancel(row: Row, times: dict[str, float]) -> Cancel:
+def _cancel(row: YamlRow, times: dict[str, float]) -> Cancel:
     if row['task'] not in times:
         raise row.refuse('task', _known('tasks', row['task'], times))
     if row['at'] < times[row['task']]:
@@ -143,7 +143,7 @@ def _cancel(row: Row, times: dict[str, float]) -> Cancel:
     return Cancel(row['at'], row['task'])
 
 
-def _arrivals(row: Row, zones: Iterable[TimedZone], tasks: list[TimedTask],
+def _arrivals(row: YamlRow, zones: Iterable[TimedZone], tasks: list[TimedTask],
               seed: int) -> list[TimedTask]:
     first, last = row['between']
     low, high = row['area']
@@ -169,8 +169,8 @@ def _known(kind: str, name: str, known: Iterable[str]) -> str:
     return f'one of the {kind} of this file' + (f'; nearest is {near[0]!r}' if near else '')
 
 
-def _unique(rows: Iterable[Row], key: str, values: Iterable[Any]) -> None:
-    seen: dict[Any, Row] = {}
+def _unique(rows: Iterable[YamlRow], key: str, values: Iterable[Any]) -> None:
+    seen: dict[Any, YamlRow] = {}
     for row, value in zip(rows, values, strict=True):
         if value in seen:
             line = seen[value].node.start_mark.line + 1
@@ -180,7 +180,7 @@ def _unique(rows: Iterable[Row], key: str, values: Iterable[Any]) -> None:
         seen[value] = row
 
 
-def _valid(row: Row, make: Callable[[], Made]) -> Made:
+def _valid(row: YamlRow, make: Callable[[], Made]) -> Made:
     """What `make` makes; its InvalidValue gets the line of the row."""
     try:
         return make()

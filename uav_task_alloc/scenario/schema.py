@@ -9,13 +9,13 @@ from uav_task_alloc.model import is_ros_name
 from uav_task_alloc.params import AllocatorParams
 from uav_task_alloc.scenario.checked_yaml import (
     Key,
-    Table,
+    KeyTable,
     choice,
     many,
     mapping,
     number,
-    text,
-    whole,
+    text_value,
+    whole_number,
 )
 from uav_task_alloc.scenario.values import DEFAULT_SPEEDUP
 
@@ -23,21 +23,21 @@ TIME = number(0.0)
 POSITIVE = number(0.0, open_low=True)
 POINT = many(number(), 'three numbers [x, y, z]', 3, 3)
 CORNER = many(number(), 'two numbers [x, y]', 2, 2)
-NAME = text('a non-empty string')
-ID = text('letters, digits, _ and / after a letter or _', is_ros_name)
-ROS_NAME = text('letters, digits and _ after a letter, as it names topics',
+NAME = text_value('a non-empty string')
+ID = text_value('letters, digits, _ and / after a letter or _', is_ros_name)
+ROS_NAME = text_value('letters, digits and _ after a letter, as it names topics',
                 re.compile(r'[A-Za-z][A-Za-z0-9_]*').fullmatch)
 NAMES = many(NAME, 'a list of names')
 
-ORIGIN: Table = {
+ORIGIN: KeyTable = {
     'latitude': Key(number(-90.0, 90.0), '[deg] WGS84'),
     'longitude': Key(number(-180.0, 180.0), '[deg] WGS84'),
     'altitude_amsl': Key(number(-1000.0, 10000.0), '[m] above mean sea level', 0.0),
 }
 
-UAV: Table = {
+UAV: KeyTable = {
     'id': Key(ROS_NAME, 'name, and namespace of its topics'),
-    'system_id': Key(whole(1, 255), 'MAVLink system id; default: its place in the list'
+    'system_id': Key(whole_number(1, 255), 'MAVLink system id; default: its place in the list'
                      ' from 1', None),
     'autopilot': Key(choice('ardupilot', 'px4'), 'which autopilot is simulated', 'ardupilot'),
     'position': Key(POINT, '[m] ENU at the start'),
@@ -48,7 +48,7 @@ UAV: Table = {
     'dies_at': Key(TIME, '[s] when it falls silent for good; default: never', None),
 }
 
-TASK: Table = {
+TASK: KeyTable = {
     'id': Key(ID, 'name of the task'),
     'at': Key(TIME, '[s] when it is announced', 0.0),
     'position': Key(POINT, '[m] ENU; either this or the next three', None),
@@ -63,7 +63,7 @@ TASK: Table = {
     'allowed_uavs': Key(NAMES, 'which UAVs may fly it; default: any', None),
 }
 
-ZONE: Table = {
+ZONE: KeyTable = {
     'id': Key(ID, 'name of the zone'),
     'shape': Key(choice('hemisphere', 'cylinder', 'polygon'), 'its form'),
     'center': Key(many(number(), 'three numbers [x, y, z] (cylinder: [x, y] suffices)', 2, 3),
@@ -78,8 +78,8 @@ ZONE: Table = {
     'vanishes': Key(number(0.0, infinite=True), '[s] when it goes; default: never', math.inf),
 }
 
-ARRIVALS: Table = {
-    'count': Key(whole(0, 100_000), 'how many tasks are drawn from `seed`'),
+ARRIVALS: KeyTable = {
+    'count': Key(whole_number(0, 100_000), 'how many tasks are drawn from `seed`'),
     'between': Key(many(TIME, 'two times [first, last]', 2, 2), '[s] when they come'),
     'area': Key(many(POINT, 'two corners [[x, y, z], [x, y, z]]', 2, 2),
                 '[m] ENU box they lie in, never inside a zone'),
@@ -88,14 +88,14 @@ ARRIVALS: Table = {
     'prefix': Key(ID, 'ids are the prefix and a number from 01', 'a'),
 }
 
-CANCEL: Table = {
+CANCEL: KeyTable = {
     'task': Key(ID, 'id of the task that is taken back'),
     'at': Key(TIME, '[s]'),
 }
 
-SCENARIO: Table = {
+SCENARIO: KeyTable = {
     'name': Key(NAME, 'what it is called; default: the name of the file', None),
-    'seed': Key(whole(0, 2**32 - 1), 'of all that is random in it', 0),
+    'seed': Key(whole_number(0, 2**32 - 1), 'of all that is random in it', 0),
     'origin': Key(mapping(ORIGIN, 'a mapping with latitude, longitude, altitude_amsl'),
                   'where ENU (0, 0, 0) is; default: 47.397742, 8.545594, 488.0', None),
     'route_end': Key(choice('hold', 'home'), 'what a UAV does after its last task', 'hold'),

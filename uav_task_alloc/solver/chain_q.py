@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import threading
 
-from uav_task_alloc.solver.colony import Colony, Habits
+from uav_task_alloc.solver.colony import Colony, ColonyParams
 from uav_task_alloc.solver.recorder import Recorder
 from uav_task_alloc.solver.warm import repaired
 
-COLD_START, WARM_START = Habits(), Habits(hot=0.3, cold=0.02, again=3.0)
+COLD_START, WARM_START = ColonyParams(), ColonyParams(hot=0.3, cold=0.02, again=3.0)
 LONGEST = 0.005  # [s] between looks at the clock
 FIXED = 100  # rounds a flight where iterations are limited
 EXCHANGES = 20  # times that colonies look at each other's best
 
 
 def solve(recorder: Recorder, seed: int, learnt: object = None,
-          habits: Habits | None = None) -> object:
+          habits: ColonyParams | None = None) -> object:
     """Fly until the budget ends; returns the tables for the next warm start."""
     problem = recorder.problem
     if not recorder.history:

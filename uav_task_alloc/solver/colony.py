@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 from uav_task_alloc.solver import routes as of
 from uav_task_alloc.solver.bidding import Bidding
-from uav_task_alloc.solver.chance import chance
 from uav_task_alloc.solver.pool import empty_pool
 from uav_task_alloc.solver.problem import Problem
 from uav_task_alloc.solver.recombine import recombine
+from uav_task_alloc.solver.rng import chance
 from uav_task_alloc.solver.routes import EXCESS, TINY, VALUE, Routes
 from uav_task_alloc.solver.ruin import empty_log
 from uav_task_alloc.solver.scouts import Scouts
@@ -20,7 +20,7 @@ WORK = 150.0  # looks at stops of the pool for each round of the whole search
 
 
 @dataclass(frozen=True, slots=True)
-class Habits:
+class ColonyParams:
     """How bees behave; temperatures in mean ways to the nearest neighbour."""
 
     hot: float = 3.0
@@ -39,7 +39,7 @@ class Habits:
 class Colony:
     """Bees around routes of their own; `best` is what they found."""
 
-    def __init__(self, problem: Problem, start: Routes, seed: int, habits: Habits,
+    def __init__(self, problem: Problem, start: Routes, seed: int, habits: ColonyParams,
                  learnt: object = None) -> None:
         arrays = problem.arrays
         self.arrays = arrays._replace(strain=arrays.strain.copy(), price=arrays.price.copy())

@@ -7,8 +7,8 @@ import math
 
 import numpy as np
 
-from uav_task_alloc.solver.chance import Chance, uniform
 from uav_task_alloc.solver.kernel import kernel, maker, part
+from uav_task_alloc.solver.rng import Chance, uniform
 from uav_task_alloc.solver.routes import WHOLE, Arrays, Ints, Routes, insert, lengthened, step
 
 
@@ -104,7 +104,7 @@ def place_all(a: Arrays, r: Routes, tasks: Ints) -> int:
 
 
 @maker
-def auction(a: Arrays, r: Routes, noise: float, rng: Chance) -> None:
+def insert_by_auction(a: Arrays, r: Routes, noise: float, rng: Chance) -> None:
     """Insert all left out tasks, always the one that costs least now. O(n k log n).
 
     Bids stand in a heap; a stale one is made anew when it comes up. `noise` scatters them.
@@ -143,7 +143,7 @@ def _bid_again(a: Arrays, r: Routes, t: int, heap: list[tuple[float, int]]) -> N
 
 def cheapest_first(a: Arrays, r: Routes, rng: Chance, noise: float = 0.0) -> None:
     """The auction, then what is left out wherever there is room."""
-    auction(a, r, noise, rng)
+    insert_by_auction(a, r, noise, rng)
     left = np.flatnonzero(r.on[a.uavs:a.ends] < 0).astype(np.int64) + np.int64(a.uavs)
     if left.size:
         place_all(a, r, left)

@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 from uav_task_alloc.geometry.distances import Distances
 from uav_task_alloc.model import Task, ThreatZone, Uav
 from uav_task_alloc.objective import Weights
-from uav_task_alloc.solver.chance import chance
-from uav_task_alloc.solver.near import near_starts, near_tasks, nearest
+from uav_task_alloc.solver.neighbours import near_starts, near_tasks, nearest
+from uav_task_alloc.solver.path_preparation import SOUGHT, PathPreparation
+from uav_task_alloc.solver.rng import chance
 from uav_task_alloc.solver.routes import NODE, Arrays, Floats, Ints
-from uav_task_alloc.solver.way_search import SOUGHT, WaySearch
 
 NEIGHBOURS = 24  # tasks a bee looks at around a task
 STARTS = 8  # UAVs it looks at
@@ -80,7 +80,7 @@ class Problem:
 
 def make_problem(uavs: Sequence[Uav], tasks: Sequence[Task],
                  locked: Mapping[str, tuple[Task, ...]], limits: Limits, rules: Rules,
-                 known: Problem | None = None, search: WaySearch | None = None) -> Problem:
+                 known: Problem | None = None, search: PathPreparation | None = None) -> Problem:
     """The arrays of a problem; lengths that an earlier one knows are taken over.
 
     Locked tasks that no safe way leads to are shared out as the others are.
@@ -140,7 +140,7 @@ def _reachable(problem: Problem) -> Mapping[str, tuple[Task, ...]]:
 
 def _distances(uavs: Sequence[Uav], tasks: Sequence[Task],
                locked: Mapping[str, tuple[Task, ...]], limits: Limits,
-               known: Distances | None, search: WaySearch | None) -> Distances:
+               known: Distances | None, search: PathPreparation | None) -> Distances:
     starts = [locked[u.id][-1].position if locked.get(u.id) else u.position for u in uavs]
     homes = [u.home or u.position for u in uavs]
     extra = [point for u in uavs if locked.get(u.id)
@@ -217,7 +217,7 @@ def _neighbours(problem: Problem, known: Problem | None) -> tuple[Ints, Ints]:
     return near, np.setdiff1d(np.arange(n), stay, assume_unique=True)
 
 
-def _fill(problem: Problem, known: Problem | None, search: WaySearch | None) -> float:
+def _fill(problem: Problem, known: Problem | None, search: PathPreparation | None) -> float:
     """Neighbours and prices; returns the mean way [m] to the nearest neighbour."""
     a, n = problem.arrays, len(problem.tasks)
     xyz: Floats = problem.distances.points

@@ -9,9 +9,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from uav_task_alloc.solver.chance import Chance, below, uniform
 from uav_task_alloc.solver.insertion import any_place, near_place
 from uav_task_alloc.solver.kernel import kernel, part
+from uav_task_alloc.solver.rng import Chance, below, uniform
 from uav_task_alloc.solver.routes import (
     NODE,
     TINY,

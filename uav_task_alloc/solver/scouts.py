@@ -7,9 +7,9 @@ import functools
 import numpy as np
 
 from uav_task_alloc.solver import routes as of
-from uav_task_alloc.solver.chance import Chance
 from uav_task_alloc.solver.insertion import place_all
 from uav_task_alloc.solver.problem import Problem
+from uav_task_alloc.solver.rng import Chance
 from uav_task_alloc.solver.routes import Arrays, Routes
 from uav_task_alloc.solver.tables import DECAY, Tables, construct, fresh_tables, keep, reinforce
 

@@ -18,17 +18,17 @@ from uav_task_alloc.objective import Weights
 from uav_task_alloc.solver.answer import to_plan
 from uav_task_alloc.solver.check import check_locked, check_options, check_unique
 from uav_task_alloc.solver.insertion import place_all
+from uav_task_alloc.solver.path_preparation import IN_SEARCH, PathPreparation
 from uav_task_alloc.solver.problem import Limits, Problem, Rules, make_problem
 from uav_task_alloc.solver.recorder import Recorder
 from uav_task_alloc.solver.registry import SOLVERS
 from uav_task_alloc.solver.search import relieve
-from uav_task_alloc.solver.warm import State, repaired
-from uav_task_alloc.solver.way_search import IN_SEARCH, WaySearch
+from uav_task_alloc.solver.warm import WarmState, repaired
 
 
 def plan(uavs: Iterable[Uav], tasks: Iterable[Task], zones: Iterable[ThreatZone] = (), *,
          budget: float = 0.1, seed: int = 0, solver: str = 'chain_q',
-         warm: Plan | State | None = None, route_end: str = 'hold', hard_range: bool = True,
+         warm: Plan | WarmState | None = None, route_end: str = 'hold', hard_range: bool = True,
          locked: Mapping[str, Sequence[str]] | None = None, weights: Weights | None = None,
          clearance: float = 0.0, altitude_min: float = -math.inf,
          altitude_max: float = math.inf, threads: int = 1,
@@ -49,15 +49,15 @@ def plan(uavs: Iterable[Uav], tasks: Iterable[Task], zones: Iterable[ThreatZone]
     if not isinstance(solver, str) or solver not in SOLVERS:
         raise UnknownName('solver', solver, list(SOLVERS))
     check_options(budget, seed, route_end, threads, max_iterations)
-    if not isinstance(warm, (Plan, State, type(None))):
+    if not isinstance(warm, (Plan, WarmState, type(None))):
         raise InvalidValue('warm', type(warm).__name__, 'a Plan, its state or None')
     fleet, work = check_unique('uav', uavs, Uav), check_unique('task', tasks, Task)
     limits = Limits(check_unique('zone', zones, ThreatZone), clearance, altitude_min,
                     altitude_max)
     rules = Rules(route_end == 'home', hard_range, weights or Weights())
     warm_up(solver, bool(limits.zones))
-    began, before = clock(), State.of(warm)
-    search = WaySearch(clock, began, budget, stop, before.flown())
+    began, before = clock(), WarmState.of(warm)
+    search = PathPreparation(clock, began, budget, stop, before.flown())
     problem = make_problem(fleet, work, check_locked(locked, fleet, work), limits, rules,
                            before.problem, search)
     recorder = Recorder(problem, clock, began, budget, max_iterations, stop, threads,
@@ -70,7 +70,7 @@ def plan(uavs: Iterable[Uav], tasks: Iterable[Task], zones: Iterable[ThreatZone]
     learnt = SOLVERS[solver](recorder, seed, before.learnt)
     made = to_plan(problem, recorder, solver, warm is not None)
     search.effort.look()  # raises what a question raised in a kernel
-    return replace(made, state=State(problem, learnt, made.routes))
+    return replace(made, state=WarmState(problem, learnt, made.routes))
 
 
 def _held(problem: Problem) -> tuple[float, float]:
@@ -94,7 +94,7 @@ def warm_up(solver: str = 'chain_q', zones: bool = False) -> None:
     between = (*(ThreatZone.cylinder(f'z{x}', (x, 1.0), 0.3) for x in (1.5, 2.5, 4.0)),
                ThreatZone.hemisphere('dome', (3.5, 1.5, 0.0), 0.3),
                ThreatZone.polygon('prism', ((0.4, 0.9), (0.6, 0.9), (0.5, 1.1)))) if zones else ()
-    search = WaySearch(lambda: 0.0, 0.0, 1.0, flown={'u': (('t0',), (Leg((), 0.0),))})
+    search = PathPreparation(lambda: 0.0, 0.0, 1.0, flown={'u': (('t0',), (Leg((), 0.0),))})
     problem = make_problem(uavs, tasks, {}, Limits(between), Rules(returns=True), None, search)
     rounds = 500 if solver == 'chain_q' else 64  # until each kind of bee has flown
     recorder = Recorder(problem, lambda: 0.0, 0.0, 1.0, max_iterations=rounds)

@@ -8,9 +8,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from uav_task_alloc.solver.chance import Chance, uniform
 from uav_task_alloc.solver.kernel import kernel, part
 from uav_task_alloc.solver.problem import Problem
+from uav_task_alloc.solver.rng import Chance, uniform
 from uav_task_alloc.solver.routes import Arrays, Floats, Ints, Nodes, Routes, clear, insert, step
 
 FIRST, FLOOR = 0.5, 0.01  # Q of a leg never flown; the least Q, so that nothing is ruled out

@@ -10,15 +10,15 @@ import numpy as np
 
 from uav_task_alloc.model import Leg, Plan
 from uav_task_alloc.solver import routes as of
-from uav_task_alloc.solver.chance import chance
 from uav_task_alloc.solver.insertion import cheapest_first
 from uav_task_alloc.solver.kernel import kernel
 from uav_task_alloc.solver.problem import Problem
+from uav_task_alloc.solver.rng import chance
 from uav_task_alloc.solver.routes import Arrays, Ints, Routes, insert, lengthened, step
 
 
 @dataclass(frozen=True, slots=True)
-class State:
+class WarmState:
     """What a plan carries for the next warm start."""
 
     problem: Problem | None = None  # lengths that are known
@@ -27,11 +27,11 @@ class State:
     legs: Mapping[str, tuple[Leg, ...]] = field(default_factory=dict)  # of them
 
     @classmethod
-    def of(cls, warm: Plan | State | None) -> State:
+    def of(cls, warm: Plan | WarmState | None) -> WarmState:
         """The state of a plan, with the plan's routes; an empty one where there is none."""
         if not isinstance(warm, Plan):
             return warm or cls()
-        found = warm.state if isinstance(warm.state, State) else cls()
+        found = warm.state if isinstance(warm.state, WarmState) else cls()
         return replace(found, routes=warm.routes, legs=warm.legs)
 
     def flown(self) -> dict[str, tuple[tuple[str, ...], tuple[Leg, ...]]]:

@@ -17,10 +17,10 @@ from typing import Any
 from uav_task_alloc.errors import InvalidValue, UnknownName
 from uav_task_alloc.solver.registry import SOLVERS
 from uav_task_alloc.solver.solve import plan
-from uav_task_alloc.study import campaign, executors, public, rivals
+from uav_task_alloc.study import campaign, executors, public, reference_solvers as rivals
 from uav_task_alloc.study.campaign import Job
-from uav_task_alloc.study.evaluator import Routes, judge
-from uav_task_alloc.study.gaps import Run, table
+from uav_task_alloc.study.evaluator import RoutesByUav, judge
+from uav_task_alloc.study.gaps import InstanceRuns, gap_table
 from uav_task_alloc.study.instances import SLACK, Instance, make_instance
 
 
@@ -35,28 +35,30 @@ def main(argv: Sequence[str]) -> int:
         sum(asked.budgets) if name in SOLVERS else max(asked.budgets))
         for (key, source), name in product(_sources(asked), names)}
     with tempfile.TemporaryDirectory() as scratch:
-        outcome = campaign.run(list(jobs.values()), asked.keep or Path(scratch),
+        outcome = campaign.run_campaign(list(jobs.values()), asked.keep or Path(scratch),
                                executors.chosen(asked), _say, time.monotonic)
     runs = _gathered(jobs, outcome.results)
-    print(table(runs))
+    print(gap_table(runs))
     if asked.json:
         asked.json.write_text(json.dumps({key: run.plain() for key, run in runs.items()},
                                          indent=1, allow_nan=False) + '\n')
     if asked.plot:
-        from uav_task_alloc.study.gap_plot import draw  # needs matplotlib
-        draw(runs, asked.plot)
+        from uav_task_alloc.study.gap_plot import draw_gaps  # needs matplotlib
+        draw_gaps(runs, asked.plot)
     return int(bool(outcome.failed))
 
 
 def _gathered(jobs: Mapping[tuple[str, str], Job],
-              results: Mapping[str, Any]) -> dict[str, Run]:
+              results: Mapping[str, Any]) -> dict[str, InstanceRuns]:
     """Results by instance; faults that the judge found are told of."""
-    runs: dict[str, Run] = {}
+    runs: dict[str, InstanceRuns] = {}
     for (key, name), job in jobs.items():
         result = results.get(job.name)
         if result is None:
             continue
-        run = runs.setdefault(key, Run(result['group'], result['collects'], result['known']))
+        run = runs.setdefault(
+            key, InstanceRuns(result['group'], result['collects'], result['known'])
+        )
         run.found[name] = result['found']
         for each in result['found']:
             for fault in each['faults']:
@@ -77,7 +79,11 @@ def _parser() -> argparse.ArgumentParser:
     add('--match', default='*', metavar='GLOB', help='which files of the folder')
     add('--budgets', type=_numbers, default=(0.1, 1.0), help='[s] of CPU time, ... (0.1,1)')
     add('--solvers', default='chain_q', help=f'of {", ".join(SOLVERS)}')
-    add('--against', default=','.join(rivals.RIVALS), help='rivals (%(default)s), or none')
+    add(
+        '--against',
+        default=','.join(rivals.REFERENCE_SOLVERS),
+        help='rivals (%(default)s), or none',
+    )
     add('--keep', type=Path, metavar='DIR', help='keep results; what it holds is not run again')
     add('--json', type=Path, metavar='OUT.json', help='all lengths, values and gaps')
     add('--plot', type=Path, metavar='OUT.png', help='gap over time (.png, .svg)')
@@ -93,7 +99,10 @@ def _names(asked: argparse.Namespace) -> list[str]:
     """Solvers and the rivals that are here. Raises UnknownName."""
     ours, wanted = asked.solvers.split(','), asked.against.split(',')
     wanted = [] if wanted == ['none'] else wanted
-    for kind, names, known in (('solver', ours, SOLVERS), ('rival', wanted, rivals.RIVALS)):
+    for kind, names, known in (
+        ('solver', ours, SOLVERS),
+        ('rival', wanted, rivals.REFERENCE_SOLVERS),
+    ):
         for name in names:
             if name not in known:
                 raise UnknownName(kind, name, list(known))
@@ -130,13 +139,13 @@ def measure(source: Mapping[str, Any], name: str, budgets: Sequence[float]) -> d
 
     Ours plan anew for each budget; a rival is asked once, for the longest.
     """
-    instance = public.parse(**source) if 'text' in source else make_instance(**source)
+    instance = public.parse_instance(**source) if 'text' in source else make_instance(**source)
     group = source['name'].split('.')[0].split('_')[0] if 'text' in source else (
         instance.name.rpartition('-')[0])
     if name in SOLVERS:
-        answers: list[Routes | None] = [_ours(instance, name, budget) for budget in budgets]
+        answers: list[RoutesByUav | None] = [_ours(instance, name, budget) for budget in budgets]
     else:
-        found = rivals.RIVALS[name](instance, max(budgets))
+        found = rivals.REFERENCE_SOLVERS[name](instance, max(budgets))
         answers = [rivals.at(found, budget) for budget in budgets]
     return {'group': group, 'collects': instance.collects,
             'known': instance.known if math.isfinite(instance.known) else None,
@@ -144,13 +153,13 @@ def measure(source: Mapping[str, Any], name: str, budgets: Sequence[float]) -> d
                       for budget, routes in zip(budgets, answers, strict=True)]}
 
 
-def _ours(instance: Instance, solver: str, budget: float) -> Routes:
+def _ours(instance: Instance, solver: str, budget: float) -> RoutesByUav:
     made = plan(instance.uavs, instance.tasks, solver=solver, budget=budget,
                 route_end=instance.route_end, clock=time.thread_time)
     return made.routes
 
 
-def _judged(instance: Instance, routes: Routes | None) -> dict[str, Any]:
+def _judged(instance: Instance, routes: RoutesByUav | None) -> dict[str, Any]:
     """`score`: value where that counts, else length [m]; None where there is no answer."""
     if routes is None:
         return {'score': None, 'missing': len(instance.tasks), 'faults': []}

@@ -31,16 +31,16 @@ class Job:
 
 
 @dataclass(slots=True)
-class Outcome:
+class CampaignOutcome:
     """What came of a campaign, by job."""
 
     results: dict[str, Any] = field(default_factory=dict)
     failed: dict[str, str] = field(default_factory=dict)  # why
 
 
-def kept(jobs: Sequence[Job], folder: Path) -> Outcome:
+def kept(jobs: Sequence[Job], folder: Path) -> CampaignOutcome:
     """The results that an earlier run left in the folder for the same settings."""
-    found = Outcome()
+    found = CampaignOutcome()
     for job in jobs:
         try:
             stored = json.loads((folder / f'{job.name}.json').read_text())
@@ -51,8 +51,8 @@ def kept(jobs: Sequence[Job], folder: Path) -> Outcome:
     return found
 
 
-def run(jobs: Sequence[Job], folder: Path, opened: Opened, say: Callable[[str], None],
-        clock: Callable[[], float]) -> Outcome:
+def run_campaign(jobs: Sequence[Job], folder: Path, opened: Opened, say: Callable[[str], None],
+        clock: Callable[[], float]) -> CampaignOutcome:
     """Do what the folder does not hold yet; `clock` [s] is for the estimate of what is left.
 
     `opened` opens an executor; one that breaks (a worker was killed) is opened again for what it
@@ -62,7 +62,7 @@ def run(jobs: Sequence[Job], folder: Path, opened: Opened, say: Callable[[str], 
     outcome = kept(jobs, folder)
     if outcome.results:
         say(f'{len(outcome.results)} of {len(jobs)} results were there')
-    progress = Progress(jobs, outcome, say, clock)
+    progress = CampaignProgress(jobs, outcome, say, clock)
     lives = LIVES
     while left := [job for job in jobs if job.name not in progress.told()]:
         before = len(progress.told())
@@ -109,11 +109,11 @@ def _keep(folder: Path, job: Job, result: Any) -> Any:
 
 
 @dataclass(slots=True)
-class Progress:
+class CampaignProgress:
     """Says how far a campaign is, and about how long the rest will take."""
 
     jobs: Sequence[Job]
-    outcome: Outcome
+    outcome: CampaignOutcome
     say: Callable[[str], None]
     clock: Callable[[], float]  # [s]
     began: float = field(init=False)

@@ -12,7 +12,7 @@ from uav_task_alloc.study.instances import Instance
 
 ROUNDING = 1e-9  # share of a range that floating point may add
 
-Routes = Mapping[str, Sequence[str]]  # UAV id -> task ids in order
+RoutesByUav = Mapping[str, Sequence[str]]  # UAV id -> task ids in order
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,7 +29,7 @@ class Judged:
         return not self.faults and (collects or not self.missing)
 
 
-def judge(instance: Instance, routes: Routes) -> Judged:
+def judge(instance: Instance, routes: RoutesByUav) -> Judged:
     """Judge routes of straight legs. Raises InvalidValue where zones would bend them."""
     if instance.zones:
         raise InvalidValue('zones', len(instance.zones), 'none: legs are straight here')

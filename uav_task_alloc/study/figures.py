@@ -5,10 +5,9 @@ from __future__ import annotations
 import textwrap
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict
-from importlib import import_module
 from pathlib import Path
 from statistics import fmean, stdev
-from typing import Any, TypeVar
+from typing import Any, TypeVar, get_args, get_type_hints
 
 import matplotlib as mpl
 import numpy as np
@@ -18,10 +17,10 @@ from uav_task_alloc.plots import COLOURS, draw_plan_3d
 from uav_task_alloc.plots.plan import way_of
 from uav_task_alloc.solver.chain_q import COLD_START
 from uav_task_alloc.solver.registry import SOLVERS
-from uav_task_alloc.study import program, tables, trials
+from uav_task_alloc.study import experiments as program, tables, trials
 from uav_task_alloc.study.campaign import Job
+from uav_task_alloc.study.experiments import Experiments
 from uav_task_alloc.study.gap_plot import plain_log
-from uav_task_alloc.study.program import Program
 
 LINES = '-', '--', '-.', ':', (0, (5, 1, 1, 1, 1, 1))  # told apart without colours, too
 POINTS = 120  # of a mean curve
@@ -30,7 +29,7 @@ Key = TypeVar('Key')
 Curve = list[tuple[float, float]]  # (iteration or [s], mean fit)
 
 
-def draw(asked: Program, results: Mapping[str, Any], out: Path) -> None:
+def draw_figures(asked: Experiments, results: Mapping[str, Any], out: Path) -> None:
     """Draw what there are results for."""
     coefficient = _there(program.coefficient_jobs(asked), results)
     convergence = _there(program.convergence_jobs(asked), results)
@@ -48,7 +47,7 @@ def _there(jobs: Mapping[Key, Job], results: Mapping[str, Any]) -> dict[Key, Any
     return {key: results[job.name] for key, job in jobs.items() if job.name in results}
 
 
-def _coefficient(asked: Program, found: Mapping[tuple[float, int], Any], out: Path) -> None:
+def _coefficient(asked: Experiments, found: Mapping[tuple[float, int], Any], out: Path) -> None:
     """Figure 1: fit over generations for each k, and what it comes to."""
     figure = Figure(figsize=(11.0, 5.4), layout='constrained')
     left, right = figure.subplots(1, 2, width_ratios=(3, 2))
@@ -69,11 +68,11 @@ def _coefficient(asked: Program, found: Mapping[tuple[float, int], Any], out: Pa
     _finish(figure, out, 'Objective under different reward coefficients k', [
         scene_text(asked), f'paper_chain_q, {runs} runs each, the same seeds for every k',
         settings_text('paper_chain_q', 'k')])
-    tables.write(out.with_suffix('.csv'), [{'k': k, 'generation': x, 'mean fit': y}
+    tables.write_csv(out.with_suffix('.csv'), [{'k': k, 'generation': x, 'mean fit': y}
                                            for k in ks for x, y in curves[k]])
 
 
-def _convergence(asked: Program, found: Mapping[tuple[str, int], Any], out: Path) -> None:
+def _convergence(asked: Experiments, found: Mapping[tuple[str, int], Any], out: Path) -> None:
     """Figure 2: mean fit over iterations and over CPU seconds."""
     figure = Figure(figsize=(12.0, 6.4), layout='constrained')
     axes = figure.subplots(1, 2, sharey=True)
@@ -84,7 +83,7 @@ def _convergence(asked: Program, found: Mapping[tuple[str, int], Any], out: Path
         for i, (name, curve) in enumerate(curves.items()):
             axes[column].plot(*zip(*curve, strict=True), color=COLOURS[i], ls=LINES[i],
                               label=name)
-        tables.write(out.with_name(f'figure2{suffix}.csv'), [
+        tables.write_csv(out.with_name(f'figure2{suffix}.csv'), [
             {'solver': name, unit: x, 'mean fit': y} for name in solvers
             for x, y in curves[name]])
     axes[0].set(xscale='log', yscale='log', ylabel='mean best fit (eq 2.12)',
@@ -96,19 +95,19 @@ def _convergence(asked: Program, found: Mapping[tuple[str, int], Any], out: Path
         'same work for each solver, CPU time is', *map(settings_text, solvers)])
 
 
-def _allocation(asked: Program, found: Mapping[str, Any], out: Path) -> None:
+def _allocation(asked: Experiments, found: Mapping[str, Any], out: Path) -> None:
     """Figure 3: who flies where, in three dimensions; a picture a solver."""
     instance = trials.instance_of(asked.pictured())
     places = {task.id: task.position for task in instance.tasks}
     for solver, result in found.items():
-        made, name = trials.allocation(result), out.with_name(f'{out.name}_{solver}')
+        made, name = trials.allocation_trial(result), out.with_name(f'{out.name}_{solver}')
         note = '\n'.join(_wrapped([
             f'fit {made.fit:.4g}, {made.penalty:.0f} m beyond range', scene_text(asked),
             settings_text(solver)], NARROW))
         for suffix in ('.svg', '.png'):
             draw_plan_3d(instance.uavs, instance.tasks, instance.zones, made,
                          name.with_suffix(suffix), note)
-        tables.write(name.with_suffix('.csv'), [
+        tables.write_csv(name.with_suffix('.csv'), [
             {'UAV': uav.id, 'point': n, 'east [m]': x, 'north [m]': y, 'up [m]': z}
             for uav in instance.uavs for n, (x, y, z) in enumerate(way_of(uav, made, places))])
 
@@ -127,7 +126,7 @@ def mean_curve(runs: Sequence[Mapping[str, Any]], column: int) -> Curve:
     return [(float(x), float(y)) for x, y in zip(grid, np.mean(rows, axis=0), strict=True)]
 
 
-def scene_text(asked: Program) -> str:
+def scene_text(asked: Experiments) -> str:
     """The settings of the instance behind the figures."""
     uavs, tasks, domes = asked.scene
     return (f'{uavs} UAVs, {tasks} tasks, {domes} domes in 10 x 10 km, seed {asked.seed}; '
@@ -137,8 +136,8 @@ def scene_text(asked: Program) -> str:
 
 def settings_text(solver: str, *but: str) -> str:
     """A solver's settings as a line."""
-    made = COLD_START if solver == 'chain_q' else import_module(
-        SOLVERS[solver].__module__).Settings()
+    made = COLD_START if solver == 'chain_q' else get_args(
+        get_type_hints(SOLVERS[solver])['settings'])[0]()
     return f'{solver}: ' + ', '.join(f'{name} {value}' for name, value in asdict(made).items()
                                      if name not in but)
 

@@ -12,13 +12,13 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter
 
 from uav_task_alloc.plots import COLOURS
-from uav_task_alloc.study.gaps import Means, Run, groups, means
+from uav_task_alloc.study.gaps import InstanceRuns, Means, groups, means
 
 MARKS = 'osD^vP*X'
 ACROSS = 4  # panels
 
 
-def draw(runs: Mapping[str, Run], out: Path) -> None:
+def draw_gaps(runs: Mapping[str, InstanceRuns], out: Path) -> None:
     """One line a solver, one mark a budget; hollow where not every instance was answered."""
     names = groups(runs)
     down, across = max(1, math.ceil(len(names) / ACROSS)), max(1, min(ACROSS, len(names)))

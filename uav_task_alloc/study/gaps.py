@@ -11,7 +11,7 @@ Means = dict[str, tuple[float | None, int, int]]  # 'solver@budget' -> mean gap 
 
 
 @dataclass(slots=True)
-class Run:
+class InstanceRuns:
     """One instance: what each solver had after each budget."""
 
     group: str
@@ -47,7 +47,7 @@ class Run:
                 'gap_percent': self.gaps()}
 
 
-def means(runs: Mapping[str, Run], group: str) -> Means:
+def means(runs: Mapping[str, InstanceRuns], group: str) -> Means:
     """Mean gap of a group by column, over the instances with an answer, and how many those are."""
     rows = [run.gaps() for run in runs.values() if run.group == group]
     made: Means = {}
@@ -58,12 +58,12 @@ def means(runs: Mapping[str, Run], group: str) -> Means:
     return made
 
 
-def groups(runs: Mapping[str, Run]) -> list[str]:
+def groups(runs: Mapping[str, InstanceRuns]) -> list[str]:
     """In the order in which they come."""
     return list(dict.fromkeys(run.group for run in runs.values()))
 
 
-def table(runs: Mapping[str, Run]) -> str:
+def gap_table(runs: Mapping[str, InstanceRuns]) -> str:
     """Mean gap [%] to the best of each instance by group, and how many were answered.
 
     The last row: on how many instances the best was reached.
@@ -77,7 +77,7 @@ def table(runs: Mapping[str, Run]) -> str:
     return '\n'.join(f'| {" | ".join(line)} |' for line in lines)
 
 
-def _reached(runs: Mapping[str, Run], column: str) -> str:
+def _reached(runs: Mapping[str, InstanceRuns], column: str) -> str:
     gaps = [run.gaps()[column] for run in runs.values() if column in run.gaps()]
     return f'{sum(gap is not None and gap < SAME for gap in gaps)}/{len(gaps)}'
 

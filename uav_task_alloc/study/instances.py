@@ -52,7 +52,7 @@ def make_instance(uavs: int, tasks: int, seed: int, one_base: bool = False,
         tuple(Task(f't{i}', (x, y, 0.0)) for i, (x, y) in enumerate(places)))
 
 
-def make_scene(uavs: int, tasks: int, domes: int, seed: int) -> Instance:
+def make_dome_scene(uavs: int, tasks: int, domes: int, seed: int) -> Instance:
     """As above, spread, but in three dimensions and among domes, which hold no task or start."""
     rng = np.random.default_rng((seed, uavs, tasks, domes))
     zones = [ThreatZone.hemisphere(f'z{i}', (*rng.uniform(0.1 * SIDE, 0.9 * SIDE, 2), 0.0),

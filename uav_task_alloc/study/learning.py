@@ -11,10 +11,10 @@ import numpy as np
 from scipy import stats
 
 from uav_task_alloc.solver import chain_q, routes as of
-from uav_task_alloc.solver.chance import chance
-from uav_task_alloc.solver.colony import Habits
+from uav_task_alloc.solver.colony import ColonyParams
 from uav_task_alloc.solver.problem import Limits, Problem, Rules, make_problem
 from uav_task_alloc.solver.recorder import Recorder
+from uav_task_alloc.solver.rng import chance
 from uav_task_alloc.solver.routes import DISTANCE, Routes
 from uav_task_alloc.solver.scouts import Scouts
 from uav_task_alloc.solver.solve import warm_up
@@ -29,7 +29,7 @@ def scouts(budget: float = 1.0, runs: int = 10, size: str = '8x50') -> None:
     gaps: dict[bool, list[float]] = {True: [], False: []}
     short = {True: 0, False: 0}
     for problem, seed in _problems(size, runs):
-        best = _search(problem, REFERENCE * budget, seed, Habits())
+        best = _search(problem, REFERENCE * budget, seed, ColonyParams())
         for learning in gaps:
             found = _scouts_alone(problem, budget, seed, learning)
             gaps[learning].append(100.0 * (found.sums[DISTANCE] / best - 1.0))
@@ -39,15 +39,15 @@ def scouts(budget: float = 1.0, runs: int = 10, size: str = '8x50') -> None:
               f'{short[learning]} of {runs} plans left a task out')
 
 
-def whole(budget: float = 0.1, runs: int = 30, size: str = '20x200') -> None:
+def whole_solver(budget: float = 0.1, runs: int = 30, size: str = '20x200') -> None:
     """Forms of learning in the whole solver, each against the solver without: paired gain."""
     warm_up()
-    plain = Habits(scouts=0.0, bids=False)
+    plain = ColonyParams(scouts=0.0, bids=False)
     forms = {
         'chained Q in scouts': replace(plain, scouts=0.05),
         'frozen Q in scouts': replace(plain, scouts=0.05, learning=False),
         'bids between ruin sizes': replace(plain, bids=True),
-        'all, as shipped': Habits(),
+        'all, as shipped': ColonyParams(),
     }
     gains: dict[str, list[float]] = {name: [] for name in forms}
     for problem, seed in _problems(size, runs):
@@ -76,7 +76,7 @@ def _problems(size: str, runs: int) -> list[tuple[Problem, int]]:
             for seed, each in enumerate(made)]
 
 
-def _search(problem: Problem, budget: float, seed: int, habits: Habits) -> float:
+def _search(problem: Problem, budget: float, seed: int, habits: ColonyParams) -> float:
     """Length [m] that the whole solver finds, what it leaves out at its price added."""
     recorder = Recorder(problem, time.process_time, time.process_time(), budget)
     chain_q.solve(recorder, seed, None, habits)

@@ -30,7 +30,7 @@ def read_folder(folder: Path, pattern: str = '*') -> tuple[dict[str, str], dict[
             continue
         try:
             texts[path.name] = path.read_text()
-            parse(path.name, texts[path.name])
+            parse_instance(path.name, texts[path.name])
         except (InvalidValue, UnicodeDecodeError) as error:
             texts.pop(path.name, None)
             left[path.name] = str(error)
@@ -45,7 +45,7 @@ def best_known(folder: Path) -> dict[str, float]:
     return {row[0]: float(row[1]) for row in rows}
 
 
-def parse(name: str, text: str, known: float = math.nan) -> Instance:
+def parse_instance(name: str, text: str, known: float = math.nan) -> Instance:
     """The instance a file's text describes. Raises InvalidValue."""
     lines = [line.split() for line in text.splitlines() if line.strip()]
     try:

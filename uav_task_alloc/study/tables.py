@@ -9,38 +9,40 @@ from pathlib import Path
 from statistics import fmean, median
 from typing import Any
 
-from uav_task_alloc.study import program
-from uav_task_alloc.study.program import Program
+from uav_task_alloc.study import experiments as program
+from uav_task_alloc.study.experiments import Experiments
 
-Row = dict[str, Any]
+ResultRow = dict[str, Any]
 NEAR = 5, 1  # [%] above the best: what "time to" and "success" are told for
 
 
-def write(path: Path, rows: Sequence[Row]) -> None:
+def write_csv(path: Path, rows: Sequence[ResultRow]) -> None:
     """A CSV file, numbers to six digits."""
     with path.open('w', newline='') as file:
         out = csv.writer(file, lineterminator='\n')
         out.writerow(rows[0] if rows else [])
-        out.writerows([text(value) for value in row.values()] for row in rows)
+        out.writerows([cell_text(value) for value in row.values()] for row in rows)
 
 
-def markdown(rows: Sequence[Row]) -> str:
+def markdown(rows: Sequence[ResultRow]) -> str:
     """The same for reading."""
     if not rows:
         return 'no results yet'
     lines = [list(rows[0]), ['---'] * len(rows[0]),
-             *([text(value, 4) for value in row.values()] for row in rows)]
+             *([cell_text(value, 4) for value in row.values()] for row in rows)]
     return '\n'.join(f'| {" | ".join(line)} |' for line in lines)
 
 
-def text(value: Any, digits: int = 6) -> str:
+def cell_text(value: Any, digits: int = 6) -> str:
     """A cell; nothing where there is no number."""
     if isinstance(value, float):
         return f'{value:.{digits}g}' if math.isfinite(value) else ''
     return str(value)
 
 
-def sizes(asked: Program, results: Mapping[str, Any]) -> tuple[list[Row], list[Row]]:
+def sizes(
+    asked: Experiments, results: Mapping[str, Any]
+) -> tuple[list[ResultRow], list[ResultRow]]:
     """Fit, iterations to 5 and 1 % and success by size and solver; CPU seconds apart from it."""
     jobs = program.size_jobs(asked)
     groups: dict[tuple[int, int, str], list[tuple[Any, float]]] = {}
@@ -57,8 +59,8 @@ def sizes(asked: Program, results: Mapping[str, Any]) -> tuple[list[Row], list[R
     return same, timed
 
 
-def _quality(found: Sequence[tuple[Any, float]]) -> Row:
-    row: Row = {
+def _quality(found: Sequence[tuple[Any, float]]) -> ResultRow:
+    row: ResultRow = {
         'fit': fmean(result['fit'] for result, _ in found),
         'gap [%]': round(fmean(100.0 * (result['fit'] / best - 1.0)
                                for result, best in found), 6),
@@ -73,8 +75,8 @@ def _quality(found: Sequence[tuple[Any, float]]) -> Row:
     return row | {'iterations': round(fmean(result['iterations'] for result, _ in found))}
 
 
-def _timing(found: Sequence[tuple[Any, float]]) -> Row:
-    row: Row = {f'to {percent} % [s]': _median(
+def _timing(found: Sequence[tuple[Any, float]]) -> ResultRow:
+    row: ResultRow = {f'to {percent} % [s]': _median(
         when(result, best, percent)[1] for result, best in found) for percent in NEAR}
     return row | {'in all [s]': fmean(result['seconds'] for result, _ in found)}
 
@@ -91,7 +93,9 @@ def _median(values: Iterable[float]) -> float:
     return float(median(values))
 
 
-def events(asked: Program, results: Mapping[str, Any]) -> tuple[list[Row], list[Row]]:
+def events_table(
+    asked: Experiments, results: Mapping[str, Any]
+) -> tuple[list[ResultRow], list[ResultRow]]:
     """Warm against cold by size and kind; CPU seconds apart from it."""
     same, timed = [], []
     for (uavs, tasks, kind), job in program.event_jobs(asked).items():

@@ -21,17 +21,17 @@ from uav_task_alloc.solver.registry import SOLVERS
 from uav_task_alloc.solver.routes import DISTANCE, EXCESS
 from uav_task_alloc.solver.solve import plan, warm_up
 from uav_task_alloc.study import warm
-from uav_task_alloc.study.instances import Instance, make_instance, make_scene
+from uav_task_alloc.study.instances import Instance, make_dome_scene, make_instance
 
-Scene: TypeAlias = Mapping[str, Any]  # what instances.make_... take, by name
+SceneSpec: TypeAlias = Mapping[str, Any]  # what instances.make_... take, by name
 
 
-def instance_of(scene: Scene) -> Instance:
+def instance_of(scene: SceneSpec) -> Instance:
     """The instance that `uavs`, `tasks`, `seed` and, where there are any, `domes` describe."""
-    return make_scene(**scene) if 'domes' in scene else make_instance(**scene)
+    return make_dome_scene(**scene) if 'domes' in scene else make_instance(**scene)
 
 
-def converge(scene: Scene, solver: str, seed: int, iterations: int,
+def converge(scene: SceneSpec, solver: str, seed: int, iterations: int,
              k: float | None = None) -> dict[str, Any]:
     """Every task assigned, range excess priced as eq 2.12 does: how fit falls.
 
@@ -52,7 +52,7 @@ def converge(scene: Scene, solver: str, seed: int, iterations: int,
     recorder = Recorder(problem, time.thread_time, began, LONGEST, iterations,
                         on_iteration=note)
     solve = SOLVERS[solver] if k is None else partial(
-        paper_chain_q.solve, settings=paper_chain_q.Settings(k=k))
+        paper_chain_q.solve, settings=paper_chain_q.PaperSettings(k=k))
     solve(recorder, seed, None)
     note(recorder.iterations, math.inf)
     for iteration, (seconds, fit) in zip(counts, recorder.history, strict=True):
@@ -64,7 +64,7 @@ def converge(scene: Scene, solver: str, seed: int, iterations: int,
             'iterations': recorder.iterations, 'seconds': recorder.elapsed()}
 
 
-def allocate(scene: Scene, solver: str, seed: int, iterations: int) -> dict[str, Any]:
+def allocate(scene: SceneSpec, solver: str, seed: int, iterations: int) -> dict[str, Any]:
     """A whole plan: what `allocation` makes a Plan of again."""
     instance = instance_of(scene)
     made = plan(instance.uavs, instance.tasks, instance.zones, solver=solver, seed=seed,
@@ -74,7 +74,7 @@ def allocate(scene: Scene, solver: str, seed: int, iterations: int) -> dict[str,
         'fit': made.fit, 'distance': made.distance, 'penalty': made.penalty}
 
 
-def allocation(result: Mapping[str, Any]) -> Plan:
+def allocation_trial(result: Mapping[str, Any]) -> Plan:
     """The plan that `allocate` found."""
     legs = {uav: tuple(Leg(tuple(map(tuple, leg['via'])), leg['length']) for leg in row)
             for uav, row in result['legs'].items()}
@@ -82,7 +82,7 @@ def allocation(result: Mapping[str, Any]) -> Plan:
                 **{name: result[name] for name in ('fit', 'distance', 'penalty')})
 
 
-def events(scene: Scene, seed: int, iterations: int, count: int) -> list[
+def events_trial(scene: SceneSpec, seed: int, iterations: int, count: int) -> list[
         dict[str, float]]:
     """Random arrivals in a row, each planned warm and cold in as many iterations."""
     return warm.compare(make_instance(**scene), seed, iterations, count)

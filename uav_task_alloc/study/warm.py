@@ -22,7 +22,7 @@ BACKGROUND = 10.0  # times the budget that is searched between events, as the al
 BEFORE = 100.0  # times the budget of the first plan
 
 
-def events(budget: float = 0.02, runs: int = 50, size: str = '20x200') -> None:
+def run_events(budget: float = 0.02, runs: int = 50, size: str = '20x200') -> None:
     """Per event: time to the first valid plan, gap to a long solve from the same plan."""
     warm_up()
     uavs, tasks = (int(each) for each in size.split('x'))

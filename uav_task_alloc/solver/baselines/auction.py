@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from uav_task_alloc.solver.baselines.bidder import Bidder
-from uav_task_alloc.solver.baselines.ways import all_ways, routes_of
+from uav_task_alloc.solver.baselines.leg_lengths import all_ways, routes_of
 from uav_task_alloc.solver.recorder import Recorder
 
 

@@ -19,14 +19,14 @@ from uav_task_alloc.solver.routes import Floats, Ints
 
 
 @dataclass(frozen=True, slots=True)
-class Settings:
+class AbcSettings:
     """Karaboga's control parameters."""
 
     sources: int = 50  # food sources; as many employed bees and as many onlookers
     limit: int | None = None  # trials; None: sources times tasks, as Karaboga has it
 
 
-def probabilities(fits: Floats) -> Floats:
+def source_probabilities(fits: Floats) -> Floats:
     """Chance of each source to be chosen by an onlooker: its share of all 1/fit (eq 2.8)."""
     worth = 1.0 / np.maximum(fits, 1e-300)
     total = worth.sum()
@@ -34,10 +34,10 @@ def probabilities(fits: Floats) -> Floats:
     return shares
 
 
-class Colony:
+class AbcColony:
     """Food sources and the bees that work on them."""
 
-    def __init__(self, coding: Coding, settings: Settings, rng: np.random.Generator) -> None:
+    def __init__(self, coding: Coding, settings: AbcSettings, rng: np.random.Generator) -> None:
         self._coding, self._rng = coding, rng
         n = len(coding.work)
         self._limit = settings.limit if settings.limit is not None else settings.sources * n
@@ -58,7 +58,7 @@ class Colony:
         """A generation: employed bees, onlookers, a scout."""
         count = len(self.sources)
         self._visit(np.arange(count))
-        self._visit(self._rng.choice(count, count, p=probabilities(self.fits)))  # eq 2.8
+        self._visit(self._rng.choice(count, count, p=source_probabilities(self.fits)))  # eq 2.8
         tired = int(np.argmax(self._trials))
         if self._trials[tired] > self._limit:
             self.sources[tired] = self._rng.random(self.sources.shape[1])
@@ -84,14 +84,17 @@ class Colony:
 
 
 def solve(recorder: Recorder, seed: int, learnt: object = None,
-          settings: Settings | None = None) -> None:
+          settings: AbcSettings | None = None) -> None:
     """Generations until the budget ends. Raises InvalidValue where there are too many tasks."""
     if not recorder.problem.uavs or not recorder.problem.tasks:
         return
     coding = Coding(recorder.problem)
     if not len(coding.work):
         return
-    colony, offered = Colony(coding, settings or Settings(), np.random.default_rng(seed)), np.inf
+    colony, offered = (
+        AbcColony(coding, settings or AbcSettings(), np.random.default_rng(seed)),
+        np.inf,
+    )
     while True:
         best = int(np.argmin(colony.fits))
         if colony.fits[best] < offered:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from uav_task_alloc.solver.baselines.ways import Ways
+from uav_task_alloc.solver.baselines.leg_lengths import LegLengths
 from uav_task_alloc.solver.problem import Problem
 from uav_task_alloc.solver.routes import TINY, Floats, Ints
 
@@ -14,7 +14,7 @@ from uav_task_alloc.solver.routes import TINY, Floats, Ints
 class Bidder:
     """UAV u, who knows its own legs, range and abilities only."""
 
-    def __init__(self, problem: Problem, u: int, ways: Ways) -> None:
+    def __init__(self, problem: Problem, u: int, ways: LegLengths) -> None:
         a = problem.arrays
         self._start, self._uavs, self._onward = u, a.uavs, ways.onward
         self._last = ways.final[:, u]

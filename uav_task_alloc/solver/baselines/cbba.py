@@ -16,7 +16,7 @@ import numpy as np
 from uav_task_alloc.errors import UnknownName
 from uav_task_alloc.solver.baselines.bidder import Bidder
 from uav_task_alloc.solver.baselines.consensus import Agent, Graph, Score, diameter, one_round
-from uav_task_alloc.solver.baselines.ways import all_ways, routes_of
+from uav_task_alloc.solver.baselines.leg_lengths import all_ways, routes_of
 from uav_task_alloc.solver.problem import Problem
 from uav_task_alloc.solver.recorder import Recorder
 from uav_task_alloc.solver.routes import Floats, Ints
@@ -29,7 +29,7 @@ GRAPHS: Mapping[str, Callable[[int, int], Sequence[int]]] = {  # neighbours of a
 
 
 @dataclass(frozen=True, slots=True)
-class Settings:
+class CbbaSettings:
     """Who hears whom and how much one bids for."""
 
     graph: str = 'ring'  # one of GRAPHS
@@ -44,9 +44,9 @@ def make_graph(kind: str, agents: int) -> Graph:
 
 
 def solve(recorder: Recorder, seed: int, learnt: object = None,
-          settings: Settings | None = None) -> None:
+          settings: CbbaSettings | None = None) -> None:
     """Offer what the UAVs agree on. Raises InvalidValue where there are too many tasks."""
-    problem, known = recorder.problem, settings or Settings()
+    problem, known = recorder.problem, settings or CbbaSettings()
     if not problem.uavs or not problem.tasks:
         return
     agents, now = make_agents(problem, known), 0
@@ -60,7 +60,7 @@ def solve(recorder: Recorder, seed: int, learnt: object = None,
     recorder.count()  # the round in which nobody had anything to tell
 
 
-def make_agents(problem: Problem, settings: Settings) -> list[Agent]:
+def make_agents(problem: Problem, settings: CbbaSettings) -> list[Agent]:
     """An agent for each UAV."""
     ways, n, m = all_ways(problem), len(problem.tasks), len(problem.uavs)
     most = math.ceil(settings.shares * n / m)

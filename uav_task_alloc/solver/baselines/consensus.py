@@ -24,7 +24,7 @@ Score = Callable[[Sequence[int]], tuple[Floats, Ints]]  # path -> gain of each t
 Graph = Sequence[Sequence[int]]  # neighbours of each agent
 
 
-class Message(NamedTuple):
+class ConsensusMessage(NamedTuple):
     """All that an agent tells its neighbours."""
 
     sender: int
@@ -33,7 +33,7 @@ class Message(NamedTuple):
     heard: Ints  # (m) s: round of its latest word from each agent
 
 
-class Action(Enum):
+class EntryAction(Enum):
     """What the receiver does to its own entry of a task."""
 
     LEAVE = 0
@@ -50,36 +50,36 @@ class Clash(NamedTuple):
     newer_of_mine: bool  # the sender has later word of whom the receiver takes for the winner
 
 
-def _update_if(wanted: bool) -> Action:
-    return Action.UPDATE if wanted else Action.LEAVE
+def _update_if(wanted: bool) -> EntryAction:
+    return EntryAction.UPDATE if wanted else EntryAction.LEAVE
 
 
-def _rule_12(c: Clash) -> Action:
+def _rule_12(c: Clash) -> EntryAction:
     if c.newer and (c.newer_of_mine or c.higher):
-        return Action.UPDATE
-    return Action.RESET if c.newer_of_mine and c.older else Action.LEAVE
+        return EntryAction.UPDATE
+    return EntryAction.RESET if c.newer_of_mine and c.older else EntryAction.LEAVE
 
 
 # table 1: (whom the sender takes for the winner, whom the receiver) -> what the receiver does;
 # 'other' is a third agent, 'same' the one that the sender means, too
-RULES: Mapping[tuple[str, str], Callable[[Clash], Action]] = {
+RULES: Mapping[tuple[str, str], Callable[[Clash], EntryAction]] = {
     ('sender', 'receiver'): lambda c: _update_if(c.higher),
-    ('sender', 'sender'): lambda c: Action.UPDATE,
+    ('sender', 'sender'): lambda c: EntryAction.UPDATE,
     ('sender', 'other'): lambda c: _update_if(c.newer_of_mine or c.higher),
-    ('sender', 'nobody'): lambda c: Action.UPDATE,
-    ('receiver', 'receiver'): lambda c: Action.LEAVE,
-    ('receiver', 'sender'): lambda c: Action.RESET,
-    ('receiver', 'other'): lambda c: Action.RESET if c.newer_of_mine else Action.LEAVE,
-    ('receiver', 'nobody'): lambda c: Action.LEAVE,
+    ('sender', 'nobody'): lambda c: EntryAction.UPDATE,
+    ('receiver', 'receiver'): lambda c: EntryAction.LEAVE,
+    ('receiver', 'sender'): lambda c: EntryAction.RESET,
+    ('receiver', 'other'): lambda c: EntryAction.RESET if c.newer_of_mine else EntryAction.LEAVE,
+    ('receiver', 'nobody'): lambda c: EntryAction.LEAVE,
     ('other', 'receiver'): lambda c: _update_if(c.newer and c.higher),
-    ('other', 'sender'): lambda c: Action.UPDATE if c.newer else Action.RESET,
+    ('other', 'sender'): lambda c: EntryAction.UPDATE if c.newer else EntryAction.RESET,
     ('other', 'same'): lambda c: _update_if(c.newer),
     ('other', 'other'): _rule_12,
     ('other', 'nobody'): lambda c: _update_if(c.newer),
-    ('nobody', 'receiver'): lambda c: Action.LEAVE,
-    ('nobody', 'sender'): lambda c: Action.UPDATE,
+    ('nobody', 'receiver'): lambda c: EntryAction.LEAVE,
+    ('nobody', 'sender'): lambda c: EntryAction.UPDATE,
     ('nobody', 'other'): lambda c: _update_if(c.newer_of_mine),
-    ('nobody', 'nobody'): lambda c: Action.LEAVE,
+    ('nobody', 'nobody'): lambda c: EntryAction.LEAVE,
 }
 
 
@@ -110,12 +110,12 @@ class Agent:
             self.bid[task] = least = offer[task]
             self.winner[task] = self.me
 
-    def message(self, now: int) -> Message:
+    def message(self, now: int) -> ConsensusMessage:
         """What to tell in round `now`."""
         self.heard[self.me] = now
-        return Message(self.me, self.bid.copy(), self.winner.copy(), self.heard.copy())
+        return ConsensusMessage(self.me, self.bid.copy(), self.winner.copy(), self.heard.copy())
 
-    def listen(self, messages: Sequence[Message]) -> None:
+    def listen(self, messages: Sequence[ConsensusMessage]) -> None:
         """Phase 2: one message after another, then let go what was lost."""
         for message in messages:
             for task in np.flatnonzero((message.winner != self.winner)
@@ -124,7 +124,7 @@ class Agent:
             np.maximum(self.heard, message.heard, out=self.heard)
         self._release()
 
-    def _settle(self, task: int, told: Message) -> None:
+    def _settle(self, task: int, told: ConsensusMessage) -> None:
         theirs, mine = int(told.winner[task]), int(self.winner[task])
         newer = told.heard > self.heard
         bids = told.bid[task], self.bid[task]
@@ -133,9 +133,9 @@ class Agent:
                       bool(newer[mine]))
         action = RULES[self._who(theirs, told.sender), 'same' if theirs == mine and theirs not in (
             told.sender, self.me, NOBODY) else self._who(mine, told.sender)](clash)
-        if action is Action.UPDATE:
+        if action is EntryAction.UPDATE:
             self.bid[task], self.winner[task] = told.bid[task], theirs
-        elif action is Action.RESET:
+        elif action is EntryAction.RESET:
             self.bid[task], self.winner[task] = 0.0, NOBODY
 
     def _who(self, agent: int, sender: int) -> str:

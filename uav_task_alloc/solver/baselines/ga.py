@@ -18,7 +18,7 @@ from uav_task_alloc.solver.routes import Ints
 
 
 @dataclass(frozen=True, slots=True)
-class Settings:
+class GaSettings:
     """The usual knobs."""
 
     size: int = 100  # plans in a generation
@@ -43,7 +43,7 @@ def crossed(first: Ints, second: Ints, begin: Ints, end: Ints) -> Ints:
 class Population:
     """Plans of one generation; `row` (p, k) tasks by UAV in order, `who` (p, k) UAVs by task."""
 
-    def __init__(self, coding: Coding, settings: Settings, rng: np.random.Generator) -> None:
+    def __init__(self, coding: Coding, settings: GaSettings, rng: np.random.Generator) -> None:
         self._coding, self._settings, self._rng = coding, settings, rng
         k = len(coding.work)
         tasks = np.tile(np.arange(k), (settings.size, 1))
@@ -98,14 +98,14 @@ class Population:
 
 
 def solve(recorder: Recorder, seed: int, learnt: object = None,
-          settings: Settings | None = None) -> None:
+          settings: GaSettings | None = None) -> None:
     """Generations until the budget ends. Raises InvalidValue where there are too many tasks."""
     if not recorder.problem.uavs or not recorder.problem.tasks:
         return
     coding = Coding(recorder.problem)
     if not len(coding.work):
         return
-    population = Population(coding, settings or Settings(), np.random.default_rng(seed))
+    population = Population(coding, settings or GaSettings(), np.random.default_rng(seed))
     offered: float = np.inf
     while True:
         best = int(np.argmin(population.fits))

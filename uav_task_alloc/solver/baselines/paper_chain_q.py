@@ -33,17 +33,17 @@ from numpy.typing import NDArray
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.solver import routes as of
 from uav_task_alloc.solver.baselines.judging import judged
-from uav_task_alloc.solver.baselines.ways import place_rest
-from uav_task_alloc.solver.chance import Chance, chance, uniform
+from uav_task_alloc.solver.baselines.leg_lengths import place_rest
 from uav_task_alloc.solver.kernel import kernel, part
 from uav_task_alloc.solver.recorder import Recorder
+from uav_task_alloc.solver.rng import Chance, chance, uniform
 from uav_task_alloc.solver.routes import Arrays, Floats, Ints, Routes, insert, lengthened, step
 
 MOST_TASKS = 200  # the tables take 8 n^3 bytes
 
 
 @dataclass(frozen=True, slots=True)
-class Settings:
+class PaperSettings:
     """What the paper does not print: the best of 48 sets at 8 x 50 (docs/solver.md)."""
 
     bees: int = 20
@@ -131,7 +131,7 @@ def _open_tasks(a: Arrays, r: Routes, u: int, open_: NDArray[np.bool_]) -> None:
 
 
 @kernel
-def fly(a: Arrays, r: Routes, uavs: Ints, tasks: Ints, q: Chains, greedy_rate: float,
+def fly_bee(a: Arrays, r: Routes, uavs: Ints, tasks: Ints, q: Chains, greedy_rate: float,
         scratch: Scratch, rng: Chance) -> int:
     """One bee makes its chains; returns how many steps it made. O(n (n + m))."""
     of.clear(a, r)
@@ -157,7 +157,7 @@ def fly_all(a: Arrays, r: Routes, swarm: Swarm, q: Chains, greedy_rate: float, s
             rng: Chance) -> None:
     """A generation; r is scratch."""
     for b in range(swarm.steps.size):
-        swarm.steps[b] = fly(a, r, swarm.uavs[b], swarm.tasks[b], q, greedy_rate, scratch, rng)
+        swarm.steps[b] = fly_bee(a, r, swarm.uavs[b], swarm.tasks[b], q, greedy_rate, scratch, rng)
         for i in range(r.sums.size):
             swarm.sums[b, i] = r.sums[i]
 
@@ -204,9 +204,9 @@ def _share(best: float, fit: float) -> float:
 
 
 def solve(recorder: Recorder, seed: int, learnt: object = None,
-          settings: Settings | None = None) -> None:
+          settings: PaperSettings | None = None) -> None:
     """Generations of bees until the budget ends. Raises InvalidValue beyond MOST_TASKS."""
-    problem, known, rng = recorder.problem, settings or Settings(), chance(seed)
+    problem, known, rng = recorder.problem, settings or PaperSettings(), chance(seed)
     a, n, m = problem.arrays, len(problem.tasks), len(problem.uavs)
     if n > MOST_TASKS:
         raise InvalidValue('tasks', n, f'at most {MOST_TASKS} for paper_chain_q')

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from uav_task_alloc.solver.baselines.ways import all_ways, routes_of
+from uav_task_alloc.solver.baselines.leg_lengths import all_ways, routes_of
 from uav_task_alloc.solver.problem import Problem
 from uav_task_alloc.solver.routes import TINY, Floats, Ints, Routes
 

@@ -15,15 +15,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from uav_task_alloc.solver import routes as of
-from uav_task_alloc.solver.baselines.ways import all_ways, place_rest
-from uav_task_alloc.solver.chance import Chance, chance, uniform
+from uav_task_alloc.solver.baselines.leg_lengths import all_ways, place_rest
 from uav_task_alloc.solver.kernel import kernel
 from uav_task_alloc.solver.recorder import Recorder
+from uav_task_alloc.solver.rng import Chance, chance, uniform
 from uav_task_alloc.solver.routes import Arrays, Floats, Routes, insert, lengthened, step
 
 
 @dataclass(frozen=True, slots=True)
-class Settings:
+class QLearningSettings:
     """How the agent learns."""
 
     alpha: float = 0.1  # learning rate
@@ -69,9 +69,9 @@ def episode(a: Arrays, r: Routes, q: Floats, unit: float, alpha: float, gamma: f
 
 
 def solve(recorder: Recorder, seed: int, learnt: object = None,
-          settings: Settings | None = None) -> None:
+          settings: QLearningSettings | None = None) -> None:
     """Episodes until the budget ends. Raises InvalidValue where there are too many tasks."""
-    problem, known, rng = recorder.problem, settings or Settings(), chance(seed)
+    problem, known, rng = recorder.problem, settings or QLearningSettings(), chance(seed)
     a = problem.arrays
     if not problem.uavs or not problem.tasks:
         return

@@ -1,0 +1,128 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Damaged rows of a journal: each costs itself only, is told, and ends no start."""
+import json
+import math
+import random
+import sqlite3
+
+import pytest
+from allocation import Desk
+
+from uav_task_alloc.allocator.persistence.persistence import Persistence
+from uav_task_alloc.allocator.persistence.restore import saved
+from uav_task_alloc.journal import FILE_NAME, JournalRow
+from uav_task_alloc.model import ThreatZone
+
+EVIL = (None, True, -1, 0, 1.5, 10**400, 1e308, math.nan, math.inf, -math.inf, '', 'x', 'a b',
+        '\ud800', [], [[]], {}, {'id': 'x'}, [1.0, 2.0, math.nan], [None] * 3)
+ZONES = (ThreatZone.hemisphere('z1', (500.0, 900.0, 0.0), 100.0),
+         ThreatZone.polygon('z2', ((0.0, 800.0), (9.0, 800.0), (9.0, 820.0)), -5.0, 70.0, 2.0))
+BODIES = {'invalid UTF-8': b'{"a": "\xff"}', 'half an object': b'{"task": ', 'a number': 5,
+          'nested too deep': '[' * 100_000, 'nothing': ''}
+
+
+def filled(folder):
+    """A keeper with tasks t1, t2, t3, lists, zones and a UAV that is switched off."""
+    keeper = Persistence(str(folder), print)
+    desk = Desk(keeper.saved)
+    desk.uav('a', 0.0, 0.0, 50.0)
+    desk.uav('b', 0.0, 500.0, 50.0)
+    desk.world.set_zones(ZONES, (), desk.now)
+    desk.add(('t1', 100, 0), ('t2', 1000, 0), ('t3', 100, 500))
+    desk.settle()
+    desk.event('COMPLETED', 't1', 'a')
+    desk.world.set_available('b', False, desk.now)
+    desk.settle()
+    keeper.save(desk.core, desk.now)
+    return keeper
+
+
+@pytest.fixture
+def rows(tmp_path):
+    keeper = filled(tmp_path)
+    held = keeper._journal.load()
+    keeper.close()
+    return held
+
+
+def paths(body, path=()):
+    """The way to every value of a JSON body."""
+    yield path
+    items = body.items() if isinstance(body, dict) else enumerate(body) if isinstance(
+        body, list) else ()
+    for key, value in items:
+        yield from paths(value, (*path, key))
+
+
+def with_value(body, path, value):
+    if not path:
+        return value
+    copy = json.loads(json.dumps(body))
+    place = copy
+    for key in path[:-1]:
+        place = place[key]
+    place[path[-1]] = value
+    return copy
+
+
+@pytest.mark.parametrize('name', BODIES)
+def test_finding_23_a_damaged_row_is_left_out_and_told_and_the_rest_kept(tmp_path, name):
+    filled(tmp_path).close()
+    database = sqlite3.connect(tmp_path / FILE_NAME)
+    body = BODIES[name]
+    database.execute('UPDATE world SET body = ' + (
+        'CAST(? AS TEXT)' if isinstance(body, bytes) else '?')
+        + " WHERE kind = 'task' AND id = 't2'", (body,))
+    database.commit()
+    database.close()
+    for _ in range(2):
+        said = []
+        keeper = Persistence(str(tmp_path), said.append)
+        assert [record.task.id for record in keeper.saved.tasks][:2] == ['t1', 't3']
+        assert 't2' not in Desk(keeper.saved).world.tasks.records
+        assert "1 left out: journal row task 't2' cannot be read" in keeper.trouble
+        assert said == [keeper.trouble]
+        desk = Desk(keeper.saved)
+        desk.add(('t4', 0, 0))
+        keeper.save(desk.core, desk.now)
+        assert 'tried again' not in keeper.trouble
+        keeper.close()
+    assert {'t1', 't3', 't4'} == {record.task.id for record in Persistence(
+        str(tmp_path), print).saved.tasks}
+
+
+def test_finding_23_a_row_whose_id_is_no_text_costs_that_row_only(tmp_path):
+    filled(tmp_path).close()
+    database = sqlite3.connect(tmp_path / FILE_NAME)
+    database.execute("INSERT INTO world VALUES ('task', CAST(x'ff' AS TEXT), '1')")
+    database.execute("INSERT INTO world VALUES (7, x'00', '1')")
+    database.commit()
+    database.close()
+    keeper = Persistence(str(tmp_path), print)
+    assert len(keeper.saved.tasks) == 3
+    assert len(keeper.saved.bad) == 2
+
+
+def test_finding_23_no_value_of_a_row_ends_a_start(rows):
+    """Every value of every row replaced by every evil one; the allocator starts and plans."""
+    rng = random.Random(23)
+    print('seed 23')
+    for k, row in enumerate(rows):
+        for path in paths(row.body):
+            for value in rng.sample(EVIL, 5):
+                bad = JournalRow(row.kind, row.id, with_value(row.body, path, value))
+                found = saved([*rows[:k], bad, *rows[k + 1:]])
+                desk = Desk(found)
+                desk.uav('a', 0.0, 0.0, 50.0)
+                desk.settle()
+                json.dumps([each.body for each in desk.core.rows()])
+                assert 2 <= len(found.tasks) <= 3
+                assert found.bad or len(found.tasks) == 3
+
+
+def test_finding_23_one_damaged_zone_costs_that_zone_only(rows):
+    k = next(k for k, row in enumerate(rows) if row.kind == 'zones')
+    bad = JournalRow('zones', '', with_value(rows[k].body, (0, 'radius'), math.nan))
+    found = saved([*rows[:k], bad, *rows[k + 1:]])
+    assert [zone.id for zone in found.zones] == ['z2']
+    assert 'zone z1' in found.bad[0] or 'zone radius = nan' in found.bad[0]

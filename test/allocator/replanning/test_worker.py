@@ -1,0 +1,70 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The worker's thread and the rehearsal: nobody waits, nothing kills it."""
+from queue import Queue
+
+from allocation import greedy
+
+from uav_task_alloc.allocator.records import ReplanAnswer, ReplanProblem
+from uav_task_alloc.allocator.replanning.warm_up import warm_up
+from uav_task_alloc.allocator.replanning.worker import Worker
+from uav_task_alloc.model import Plan
+from uav_task_alloc.params import AllocatorParams
+
+
+def problem(trigger):
+    return ReplanProblem(1, trigger, False, 0.1, (), (), (), {}, Plan({}), Plan({}))
+
+
+def test_problems_are_answered_in_turn_after_the_preparation():
+    got, prepared = Queue(), []
+    worker = Worker(lambda: prepared.append(1),
+                    lambda asked, stop: ReplanAnswer(asked, Plan({}), Plan({})), got.put, got.put)
+    worker.start()
+    assert got.get(timeout=10) is None
+    assert prepared == [1]
+    for trigger in 'xy':
+        worker.ask(problem(trigger))
+        assert got.get(timeout=10).problem.trigger == trigger
+    worker.close()
+
+
+def test_a_running_solve_hurries_when_asked():
+    got, began = Queue(), Queue()
+
+    def solve(asked, stop):
+        began.put(1)
+        while not stop():
+            pass
+        return ReplanAnswer(asked, Plan({}), Plan({}))
+
+    worker = Worker(lambda: None, solve, got.put, got.put)
+    worker.start()
+    assert got.get(timeout=10) is None
+    worker.ask(problem('x'))
+    began.get(timeout=10)
+    worker.hurry()
+    assert got.get(timeout=10).problem.trigger == 'x'
+    worker.close()
+
+
+def test_a_solver_that_fails_is_told_and_the_next_problem_is_solved():
+    got, failed = Queue(), Queue()
+
+    def solve(asked, stop):
+        if asked.trigger == 'bad':
+            raise RuntimeError('out of bees')
+        return ReplanAnswer(asked, Plan({}), Plan({}))
+
+    worker = Worker(lambda: None, solve, got.put, failed.put)
+    worker.start()
+    assert got.get(timeout=10) is None
+    worker.ask(problem('bad'))
+    assert got.get(timeout=10) is None
+    assert str(failed.get(timeout=10)) == 'out of bees'
+    worker.ask(problem('good'))
+    assert got.get(timeout=10).problem.trigger == 'good'
+    worker.close()
+
+
+def test_a_rehearsal_goes_all_the_way_to_lists():
+    assert warm_up(greedy, AllocatorParams()) > 0

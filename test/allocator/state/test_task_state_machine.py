@@ -1,0 +1,145 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The life of a task: the whole table, and events that come late, twice or out of order."""
+from pathlib import Path
+
+import pytest
+from allocation import Desk
+
+from uav_task_alloc.allocator.records import ENDED, OPEN, TaskState
+from uav_task_alloc.allocator.state import task_state_machine as life
+from uav_task_alloc.allocator.state.task_state_machine import TABLE, TaskTransition, after
+
+S = TaskState
+
+
+def test_every_event_has_an_answer_in_every_state():
+    assert set(TABLE) == set(TaskTransition)
+    for row in TABLE.values():
+        assert set(row) == set(S)
+
+
+@pytest.mark.parametrize('event', TaskTransition)
+@pytest.mark.parametrize('state', S)
+def test_what_nothing_follows_from_says_why(state, event):
+    rule = after(state, event, 'a', 'because')
+    assert rule.state is not None or rule.reason
+    assert '{' not in rule.reason
+
+
+@pytest.mark.parametrize('event', TaskTransition)
+def test_what_is_completed_or_cancelled_stays_so(event):
+    for state in (S.COMPLETED, S.CANCELLED):
+        assert after(state, event).state is None
+
+
+def test_only_an_announcement_makes_a_task():
+    makes = [event for event in TaskTransition if after(S.REJECTED, event).state]
+    assert makes == [TaskTransition.ADD]
+
+
+def test_every_state_is_left_or_is_an_end():
+    for state in S:
+        leads = {after(state, event).state for event in TaskTransition} - {None, state}
+        assert bool(leads) == (state in OPEN or state in (S.FAILED, S.REJECTED))
+
+
+def test_no_plan_moves_a_task_that_has_ended():
+    for state in ENDED:
+        for event in (
+            TaskTransition.WAIT,
+            TaskTransition.LIST,
+            TaskTransition.LEAVE,
+            TaskTransition.START,
+            TaskTransition.FAIL,
+        ):
+            assert after(state, event).state is None
+
+
+def test_braces_of_a_reason_are_text():
+    assert (
+        after(S.ACTIVE, TaskTransition.FAIL, 'a', '{uav} {0}').reason == 'failed on a: {uav} {0}'
+    )
+
+
+def test_the_picture_in_the_docs_is_that_of_the_table():
+    path = Path(__file__).parents[3] / 'docs/task_states.md'
+    assert path.read_text() == life.markdown_text()
+
+
+@pytest.fixture
+def desk():
+    desk = Desk(uav_timeout=5.0)
+    desk.uav('a', 0.0, 0.0, 50.0)
+    desk.uav('b', 1000.0, 0.0, 50.0)
+    desk.add(('t1', 100, 0), ('t2', 900, 0))
+    desk.settle()
+    return desk
+
+
+def moved(desk):
+    """b has t1 of a, which is believed lost."""
+    desk.now += 6.0
+    desk.uav('b', 1000.0, 0.0, 50.0)
+    desk.settle(hear=False)
+    assert 't1' in desk.route('b')
+
+
+@pytest.mark.parametrize(('first', 'then', 'why', 'state'), [
+    ('COMPLETED', 'COMPLETED', 'it is COMPLETED already', 'COMPLETED'),
+    ('COMPLETED', 'FAILED', 'it is COMPLETED already', 'COMPLETED'),
+    ('COMPLETED', 'STARTED', 'it is COMPLETED already', 'COMPLETED'),
+    ('STARTED', 'STARTED', '', 'ACTIVE'),
+    ('STARTED', 'COMPLETED', '', 'COMPLETED'),
+    ('FAILED', 'COMPLETED', '', 'COMPLETED'),
+    ('FAILED', 'STARTED', '', 'ACTIVE'),  # it is in the list of a until the next plan
+])
+def test_events_out_of_order_land_right(desk, first, then, why, state):
+    assert desk.event(first, 't1', 'a', revision=1) == ''
+    said = desk.event(then, 't1', 'a', revision=1)
+    assert said.endswith(why) if why else said == ''
+    assert desk.state('t1') == state
+
+
+@pytest.mark.parametrize('kind', ['STARTED', 'COMPLETED', 'FAILED'])
+def test_a_cancelled_task_stays_cancelled(desk, kind):
+    desk.cancel('t1')
+    assert desk.event(kind, 't1', 'a', revision=1).endswith('it was cancelled')
+    assert desk.state('t1') == 'CANCELLED'
+
+
+@pytest.mark.parametrize(('kind', 'state'), [
+    ('STARTED', 'ASSIGNED'), ('FAILED', 'ASSIGNED'), ('COMPLETED', 'COMPLETED')])
+def test_a_uav_believed_lost_may_complete_what_was_moved_but_not_take_it_back(desk, kind, state):
+    moved(desk)
+    desk.event(kind, 't1', 'a', revision=1)
+    desk.core.tick(desk.now, desk.now)
+    assert desk.state('t1') == state
+    record = desk.world.tasks.records['t1']
+    assert record.failed_on == ()
+    assert record.uav == ('a' if state == 'COMPLETED' else 'b')
+    desk.uav('b', 1000.0, 0.0, 50.0)
+    desk.settle(hear=False)
+    assert ('t1' in desk.route('b')) == (state != 'COMPLETED')
+
+
+def test_a_task_both_have_flown_is_completed_once(desk):
+    moved(desk)
+    assert desk.event('COMPLETED', 't1', 'b') == ''
+    assert desk.event('COMPLETED', 't1', 'a', revision=1).endswith('it is COMPLETED already')
+    assert desk.world.tasks.records['t1'].uav == 'b'
+
+
+def test_a_task_that_failed_for_good_and_was_flown_all_the_same_is_completed(desk):
+    for uav_id in ('a', 'b'):
+        desk.settle()
+        desk.event('FAILED', 't1', uav_id)
+    assert desk.state('t1') == 'FAILED'
+    desk.settle()
+    assert desk.event('COMPLETED', 't1', 'a', revision=1) == ''
+    assert (desk.state('t1'), desk.reason('t1')) == ('COMPLETED', 'completed after it was moved')
+
+
+def test_an_event_of_a_uav_that_was_never_heard_since_the_restart_is_no_surprise(desk):
+    del desk.world.fleet.records['a']
+    assert desk.event('STARTED', 't1', 'a') == ''
+    assert desk.state('t1') == 'ACTIVE'

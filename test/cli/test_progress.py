@@ -1,0 +1,85 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Progress on a terminal, silence in a pipe, and Ctrl-C, over virtual time and for real."""
+import io
+import json
+import os
+import pty
+import select
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from uav_task_alloc.cli.progress import WIPE, SolveProgress
+
+ROOT = Path(__file__).parents[2]
+FILE = str(ROOT / 'config/scenarios/plan_only.yaml')
+
+
+class Terminal(io.StringIO):
+    """A stream that says it is one."""
+
+    def isatty(self):
+        return True
+
+
+def run(stream, times):
+    """Ask at each time [s]; a plan of fit 60.5 is found at the first."""
+    now = [times[0]]
+    with SolveProgress(10.0, stream, lambda: now[0]) as progress:
+        for now[0] in times:
+            assert not progress.stop()
+            progress.heard(100, 60.5)
+    return stream.getvalue()
+
+
+def test_nothing_is_shown_in_the_first_second():
+    assert run(Terminal(), [100.0, 100.5, 101.0]) == ''
+
+
+def test_then_the_best_fit_and_the_time_left_are_and_in_the_end_the_line_is_wiped():
+    assert run(Terminal(), [100.0, 104.1]) == (
+        f'{WIPE}solving: 4 s, 6 s left; fit 60.5, better 4 s ago; Ctrl-C takes it{WIPE}')
+
+
+def test_the_line_is_renewed_five_times_a_second_at_most():
+    shown = run(Terminal(), [0.0, *(2.0 + 0.01 * i for i in range(100))])
+    assert shown.count('solving') == 5
+
+
+def test_nothing_is_shown_in_a_pipe():
+    assert run(io.StringIO(), [100.0, 104.0, 109.0]) == ''
+
+
+def test_the_first_ctrl_c_is_a_wish_and_the_second_an_end():
+    before = signal.getsignal(signal.SIGINT)
+    progress = SolveProgress(10.0, Terminal(), lambda: 0.0)
+    with progress:
+        signal.raise_signal(signal.SIGINT)
+        assert progress.stop()
+        with pytest.raises(KeyboardInterrupt):
+            signal.raise_signal(signal.SIGINT)
+    assert signal.getsignal(signal.SIGINT) is before
+
+
+def test_ctrl_c_at_a_terminal_prints_and_writes_the_best_plan_so_far(tmp_path):
+    ours, theirs = pty.openpty()
+    out = tmp_path / 'plan.json'
+    with subprocess.Popen(
+            [sys.executable, '-m', 'uav_task_alloc', 'plan', FILE, '--budget', '600', '--json',
+             str(out)], cwd=ROOT, stdout=subprocess.PIPE, stderr=theirs) as process:
+        os.close(theirs)
+        shown, end = b'', time.monotonic() + 120.0
+        while b'left; fit' not in shown and time.monotonic() < end:
+            if select.select([ours], [], [], 1.0)[0]:
+                shown += os.read(ours, 4096)
+        process.send_signal(signal.SIGINT)
+        printed, _ = process.communicate(timeout=60)
+    os.close(ours)
+    assert b'left; fit' in shown
+    assert process.returncode == 130
+    assert b'5 tasks planned, 1 unassigned' in printed
+    assert len(json.loads(out.read_text())['routes']) == 3

@@ -1,0 +1,122 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The figures of a run: what was said is believed only where the vehicles were there too."""
+import json
+
+import pytest
+
+from uav_task_alloc.cli import report
+from uav_task_alloc.model import ThreatZone
+from uav_task_alloc.record import ground_truth as truth, run_state as heard
+from uav_task_alloc.record.run_state import zone_to_json
+
+HUT = ThreatZone.cylinder('hut', (50.0, 0.0), 5.0)
+PLACES = {'a': (0.0, 0.0, 50.0), 'b': (100.0, 0.0, 50.0), 'c': (200.0, 0.0, 50.0),
+          'd': (300.0, 0.0, 50.0), 'e': (400.0, 0.0, 50.0)}
+KEYS = {'tasks_announced', 'tasks_completed', 'tasks_unassigned', 'tasks_lost',
+        'tasks_flown_twice', 'zone_violations', 'replans', 'resolve_ms_median',
+        'resolve_ms_p99', 'uploads', 'metres_flown', 'metres_planned', 'uavs_lost', 'wall_s'}
+
+
+def status(task, state, reason=''):
+    return {'task': task, 'state': state, 'uav': 'u1', 'reason': reason}
+
+
+def write_run(out, statuses, reached=PLACES, zones=(), solves=(100.0, 20.0, 30.0)):
+    """A run of one UAV from a to e and on, which reaches the items of `reached`."""
+    lines = [{'kind': 'announcement', 'action': 'ADD', 'tasks': [
+                 {'id': name, 'position': list(place)} for name, place in PLACES.items()]},
+             {'kind': 'zones', 'zones': [zone_to_json(zone) for zone in zones]}]
+    lines += [{'kind': 'allocation', 'solve_ms': ms, 'trigger': 'x'} for ms in solves]
+    lines += [{'kind': 'list', 'uav': 'u1', 'distance': 130.0, 'tasks': [
+                   {'id': 'a', 'leg_distance': 60.0}] if first else []} for first in (1, 0)]
+    lines.append({'kind': 'statuses', 'statuses': statuses})
+    _jsonl(out / heard.FILE, [{'wall': 0.5, **line} for line in lines])
+    flight = [{'t': float(k), 'wall': float(k), 'uav': 'u1', 'x': 100.0 * k, 'y': 0.0,
+               'z': 50.0, 'alive': True} for k in range(5)]
+    flight += [{'t': 9.0, 'wall': 9.0, 'uav': 'u1', 'event': 'item_reached', 'seq': 1,
+                'x': PLACES[name][0] + 0.01, 'y': 0.0, 'z': 50.0} for name in reached]
+    _jsonl(out / truth.FILE, flight)
+
+
+def _jsonl(path, lines):
+    path.write_text(''.join(json.dumps(line) + '\n' for line in lines))
+
+
+@pytest.fixture
+def run(tmp_path):
+    def summarise(statuses, **more):
+        write_run(tmp_path, statuses, **more)
+        return report.summarise(tmp_path)
+    return summarise
+
+
+ALL_DONE = [status(name, 'COMPLETED') for name in PLACES]
+
+
+def test_a_run_in_which_all_went_well(run):
+    summary = run(ALL_DONE)
+    assert summary.keys() >= KEYS
+    assert (summary['tasks_announced'], summary['tasks_completed']) == (5, 5)
+    faults = ('tasks_lost', 'tasks_flown_twice', 'tasks_unassigned', 'zone_violations')
+    assert [summary[key] for key in faults] == [0, 0, 0, 0]
+    assert (summary['replans'], summary['resolve_ms_median']) == (2, 25.0)
+    assert summary['resolve_ms_p99'] == pytest.approx(29.9)
+    assert (summary['metres_flown'], summary['metres_planned']) == (400.0, 190.0)
+    json.dumps(summary, allow_nan=False)
+
+
+def test_each_task_has_one_fate(run):
+    summary = run([status('a', 'COMPLETED'), status('b', 'UNASSIGNED', 'inside zone hut'),
+                   status('c', 'UNASSIGNED'), status('d', 'COMPLETED'), status('e', 'ACTIVE')],
+                  reached='a')
+    assert (summary['tasks_completed'], summary['tasks_unassigned']) == (1, 1)
+    assert summary['unassigned'] == {'b': 'inside zone hut'}
+    assert summary['lost'] == {
+        'c': 'last seen UNASSIGNED', 'd': 'said to be completed, but no vehicle was there',
+        'e': 'last seen ACTIVE'}
+    assert summary['tasks_lost'] == 3
+
+
+def test_a_task_without_any_status_is_lost(run):
+    assert run(ALL_DONE[:4])['lost'] == {'e': 'no status'}
+
+
+def test_a_task_that_was_flown_twice_is_told(run):
+    summary = run(ALL_DONE, reached=[*PLACES, 'b'])
+    assert (summary['tasks_flown_twice'], summary['flown_twice']) == (1, ['b'])
+
+
+def test_a_flight_into_a_zone_is_told_with_its_place(run):
+    summary = run(ALL_DONE, zones=[HUT])
+    assert summary['zone_violations'] == 0  # seen from 0.5 s on: it came around the vehicle
+    summary = run(ALL_DONE, zones=[ThreatZone.cylinder('hut', (250.0, 0.0), 5.0)])
+    assert summary['entries'] == ['u1 into hut at (245.0, 0.0, 50.0)']
+
+
+def test_a_run_without_any_plan_has_figures_too(run):
+    summary = run([], solves=(), reached=())
+    assert (summary['replans'], summary['resolve_ms_median'], summary['wall_s']) == (0, 0.0, 0.0)
+    assert 'tasks announced' in report.summary_table(summary)
+
+
+def test_the_table_names_every_figure_a_person_asks_for(run):
+    text = report.summary_table(run([*ALL_DONE[:4], status('e', 'UNASSIGNED', 'inside zone hut')]))
+    for words in ('tasks announced            5', 'completed                4',
+                  'unassigned               1  e: inside zone hut', 'lost                     0',
+                  'planned 190 (+110.5 %)', 're-plans', '25 ms  p99 30 ms', 'uploads'):
+        assert words in text
+
+
+def test_the_report_command_prints_the_table_and_draws_the_map(run, tmp_path, capsys):
+    (tmp_path / 'summary.json').write_text(json.dumps({**run(ALL_DONE), 'wall_s': 77.0}))
+    for place, wall in ((tmp_path, '0.0 s'), (tmp_path / 'summary.json', '77.0 s')):
+        assert report.main([str(place)]) == 0
+        assert wall in capsys.readouterr().out
+    assert (tmp_path / 'map.png').stat().st_size > 10_000
+
+
+def test_the_report_command_refuses_what_is_no_run(tmp_path):
+    with pytest.raises(SystemExit, match=r'record\.jsonl: No such file .*expected a recorded run'):
+        report.main([str(tmp_path)])
+    with pytest.raises(SystemExit, match='2'):
+        report.main([])

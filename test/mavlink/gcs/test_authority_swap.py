@@ -1,0 +1,187 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A pilot or a failsafe in the middle of a swap, and a swap that does not end."""
+import pytest
+from authority_bench import (
+    ARDUPILOT,
+    BOTH,
+    MODES,
+    H,
+    L,
+    N,
+    S,
+    flying,
+    keeps_quiet,
+    lost,
+    risen_by_pilot,
+    shows,
+)
+from mission_bench import task_list
+
+from uav_task_alloc.mavlink.gcs.onboard_mission import MissionState
+from uav_task_alloc.model import Shape, ThreatZone
+
+NEW = 'ZYXWVUTSRQ'
+MOMENTS = pytest.mark.parametrize('moment', ['holding', 'counting', 'sending', 'sent', 'reading'])
+
+
+def swapping(kind, moment, **kwargs):
+    """In flight, a new list on its way, at some moment of that."""
+    bench = flying(kind, delay=(0.1, 0.1), tick=0.1, **kwargs)
+    start = len(bench.sent)
+    bench.assign(task_list(NEW, 2))
+
+    def count(name):
+        return sum(m.get_type() == name for _, _, m in bench.sent[start:])
+    last = len(NEW) + bench.board().own
+    reached = {'holding': lambda: kind == 'px4' or bench.modes(start),
+               'counting': lambda: count('MISSION_COUNT'),
+               'sending': lambda: count('MISSION_ITEM_INT') >= 5,
+               'sent': lambda: count('MISSION_ITEM_INT') >= last,
+               'reading': lambda: count('MISSION_REQUEST_INT') >= 5}[moment]
+    assert bench.run(reached, 20.0)
+    if moment == 'holding':
+        bench.run(limit=0.15)  # the command is there: of two in flight the last one counts
+    assert bench.authority() is H
+    return bench
+
+
+def transfer_ended(bench, start):
+    """Nothing but reading after the news."""
+    bench.run(limit=20.0)
+    assert {what for _, what, _ in bench.sent[start:]} <= {'read'}
+    assert bench.vehicles[1].flight.custom_mode != MODES[
+        'px4' if bench.pilot().profile.atomic else 'ardupilot'].mission
+    assert keeps_quiet(bench, 40.0)
+
+
+@BOTH
+@MOMENTS
+@pytest.mark.parametrize('mode', ['stick', 'rtl'])
+def test_a_pilot_in_the_middle_of_a_swap_ends_the_transfer(kind, moment, mode):
+    bench = swapping(kind, moment)
+    bench.vehicles[1].rc_mode(getattr(MODES[kind], mode))
+    assert bench.run(lambda: bench.authority() is L, 3.0)
+    transfer_ended(bench, len(bench.sent))
+    assert shows(bench, L, 'not by the bridge')
+    assert bench.board().state is not MissionState.UPLOADING
+    assert bench.pilot().watch.swap_at is None
+
+
+@BOTH
+@MOMENTS
+def test_a_failsafe_in_the_middle_of_a_swap_ends_the_transfer(kind, moment):
+    bench = swapping(kind, moment)
+    bench.vehicles[1].failsafe('battery', MODES[kind].rtl)
+    assert bench.run(lambda: bench.authority() is not H, 3.0)
+    start = len(bench.sent)
+    assert bench.run(lambda: bench.authority() is L, 3.0)
+    transfer_ended(bench, start)
+    assert shows(bench, L, 'failsafe: ')
+
+
+@BOTH
+@MOMENTS
+def test_a_failsafe_that_leaves_the_mode_stops_the_transfer_and_then_takes_it(kind, moment):
+    bench = swapping(kind, moment)
+    bench.vehicles[1].failsafe('radio', None)
+    assert bench.run(lambda: bench.authority() is S, 3.0)
+    start = len(bench.sent)
+    bench.run(limit=10.0)
+    assert bench.sent[start:] == []
+    bench.vehicles[1].failsafe('battery', MODES[kind].rtl)
+    assert bench.run(lambda: bench.authority() is L, 3.0)
+    transfer_ended(bench, start)
+
+
+@BOTH
+@pytest.mark.parametrize('moment', ['sending', 'reading'])
+def test_a_failsafe_that_leaves_the_mode_and_passes_lets_the_swap_go_on(kind, moment):
+    bench = swapping(kind, moment)
+    bench.vehicles[1].failsafe('radio', None)
+    assert bench.run(lambda: bench.authority() is S, 3.0)
+    bench.run(limit=8.0)
+    bench.vehicles[1].failsafe_over()
+    assert bench.run(lambda: bench.completed()[-len(NEW):] == list(NEW), 400.0)
+
+
+@BOTH
+def test_where_it_is_not_ours_nobody_swaps_in_flight(kind):
+    bench = lost(kind)
+    start = len(bench.sent)
+    bench.vehicles[1].failsafe('battery', MODES[kind].rtl)
+    assert keeps_quiet(bench)
+    assert {what for _, what, _ in bench.sent[start:]} <= {'read'}
+    bench = risen_by_pilot(kind)
+    start = len(bench.sent)
+    assert keeps_quiet(bench)
+    assert {what for _, what, _ in bench.sent[start:]} <= {'read'}
+    assert bench.authority() is N
+
+
+# a good link, at most 30 s
+
+@BOTH
+def test_in_flight_a_swap_begins_only_on_a_link_that_was_good_for_ten_seconds(kind):
+    bench = flying(kind)
+    bench.line.cut = True
+    bench.run(limit=2.6)  # not stale
+    bench.line.cut = False
+    bench.run(limit=0.5)
+    assert bench.authority() is H
+    start, since = len(bench.sent), bench.now
+    bench.assign(task_list('ZYX', 2))
+    assert bench.run(lambda: any(w != 'read' for _, w, _ in bench.sent[start:]), 20.0)
+    assert bench.now - since > 9.0
+    assert bench.run(lambda: bench.completed()[-3:] == ['Z', 'Y', 'X'], 200.0)
+
+
+def stuck(**kwargs):
+    """Held for an upload of which no item arrives."""
+    bench = flying('ardupilot', **kwargs)
+    bench.run(limit=4.0)
+    bench.line.tampers.append(lambda way, m, now: [] if way == 'up' and (
+        m.get_type() == 'MISSION_ITEM_INT') else None)
+    start = len(bench.sent)
+    bench.assign(task_list(NEW, 2))
+    assert bench.run(lambda: bench.vehicles[1].flight.custom_mode == 4, 10.0)
+    return bench, start, bench.now
+
+
+def test_held_for_30_seconds_it_returns_where_the_way_is_clear():
+    bench, start, since = stuck()
+    assert bench.run(lambda: bench.vehicles[1].flight.custom_mode == 6, 60.0)
+    assert 29.0 < bench.now - since < 45.0
+    assert bench.modes(start) == [4, 6]
+    assert any('held for 30 s' in note and 'returns' in note for note in bench.notes)
+    assert bench.authority() is H
+    bench.run(lambda: not bench.vehicles[1].flight.armed, 100.0)
+    bench.run(limit=3.0)
+    assert shows(bench, N)
+
+
+def test_held_for_30_seconds_with_a_zone_on_the_way_home_it_stays_and_gives_an_alarm():
+    zone = ThreatZone('Z1', Shape.CYLINDER, (0.0, 20.0, 0.0), 5.0)
+    bench, start, since = stuck()
+    bench.wants(zones=(zone,))
+    bench.run(lambda: bench.pilot().alarm, 60.0)
+    assert 29.0 < bench.now - since < 45.0
+    bench.run(limit=60.0)
+    assert 6 not in bench.modes(start)
+    assert bench.vehicles[1].flight.custom_mode == 4
+    assert bench.state().reason == ('held for an upload that does not end, and zone Z1 is on its '
+                                    'way home: stays')
+    assert not bench.state().available
+    bench.line.tampers.clear()
+    assert bench.run(lambda: bench.completed() == list(NEW), 400.0)
+    assert bench.state().available
+
+
+@ARDUPILOT
+@pytest.mark.parametrize('seconds', [5.0, 40.0])
+def test_a_pilot_who_takes_it_from_a_swap_that_is_stuck_keeps_it(kind, seconds):
+    bench, _, _ = stuck()
+    bench.run(limit=seconds)
+    bench.vehicles[1].rc_mode(5)
+    assert bench.run(lambda: bench.authority() is L, 3.0)
+    bench.line.tampers.clear()
+    transfer_ended(bench, len(bench.sent))

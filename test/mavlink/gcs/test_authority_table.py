@@ -1,0 +1,320 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The table of authority by itself: each cell, suspensions, kills, holds, and what may be sent."""
+import itertools
+
+import pytest
+from pymavlink.dialects.v20 import ardupilotmega as d
+
+from uav_task_alloc.mavlink.gcs import authority
+from uav_task_alloc.mavlink.gcs.authority import (
+    MAY,
+    TABLE,
+    Authority,
+    AuthorityEvent,
+    AuthorityRecord,
+    AuthorityState,
+    HoldStage,
+    SendAction,
+    Suspension,
+    table_text,
+)
+from uav_task_alloc.mavlink.gcs.send_gate import action_of, allowed
+
+E = AuthorityEvent
+N, H, S, L = (
+    AuthorityState.NONE,
+    AuthorityState.HELD,
+    AuthorityState.SUSPENDED,
+    AuthorityState.LOST,
+)
+# event -> what HELD, SUSPENDED, LOST and NONE become, by shared/authority.md, written down again
+CELLS = {
+    E.GRANTED: (H, S, L, H), E.WITHDRAWN_IN_AIR: (H, S, L, N), E.WITHDRAWN: (N, S, L, N),
+    E.OWN: (H, L, L, N), E.OWN_LANDING: (N, L, L, N), E.MISSION_ENDED: (H, L, L, N),
+    E.UNEXPLAINED: (S, L, L, N), E.EXPLAINED: (H, H, L, N), E.TAKEN: (L, L, L, L),
+    E.AVOIDING: (S, S, L, N), E.AVOIDED: (H, H, L, N), E.STICK_TO_HOLD: (H, L, H, H),
+    E.TO_MISSION: (H, H, H, H), E.FAILSAFE_MODE: (L, L, L, N), E.FAILSAFE_STAYS: (S, S, L, N),
+    E.FAILSAFE_OVER: (H, H, L, N), E.SWAP_TAKEN: (L, L, L, N), E.ARMED_BY_OTHER: (L, L, L, N),
+    E.KILLED: (L, L, L, L), E.LINK_STALE: (S, S, L, N), E.LINK_BACK: (H, H, L, N),
+    E.LINK_CHANGED: (L, L, L, N), E.NEW_ADDRESS: (S, S, L, N), E.REBOOTED: (H, S, L, N),
+    E.REBOOTED_FLOWN: (L, L, L, N), E.RESTART_AGREES: (H, H, L, N),
+    E.RESTART_DIFFERS: (L, L, L, N), E.RESTART_OURS: (H, S, H, H),
+    E.RESTART_AIRBORNE: (L, L, L, L), E.FOREIGN: (S, S, L, N), E.FOREIGN_OVER: (H, H, L, N),
+    E.HAND_OVER: (H, S, H, H),
+}
+ENDS = {E.AVOIDED: E.AVOIDING, E.FAILSAFE_OVER: E.FAILSAFE_STAYS, E.LINK_BACK: E.LINK_STALE,
+        E.FOREIGN_OVER: E.FOREIGN, E.EXPLAINED: E.UNEXPLAINED}
+
+
+def machine(state, event=None):
+    """In a state; SUSPENDED by what `event` ends, else by the link."""
+    made = Authority(0.0, AuthorityRecord(L if state is S else state))
+    if state is H:
+        made.apply(E.RESTART_AGREES, 0.0)
+    elif state is S:
+        made.apply(E.HAND_OVER, 0.0)
+        made.hold = HoldStage.NO
+        made.apply(ENDS.get(event, E.LINK_STALE), 0.0)
+    assert made.state is state
+    return made
+
+
+def suspended(*events):
+    made = machine(H)
+    for event in events:
+        made.apply(event, 1.0, event.name)
+    assert made.state is S
+    return made
+
+
+@pytest.mark.parametrize('event', AuthorityEvent)
+@pytest.mark.parametrize('column', range(4))
+def test_each_event_makes_of_each_state_what_the_table_says(event, column):
+    made = machine((H, S, L, N)[column], event)
+    before = made.state, made.why, made.since, made.hold
+    made.suspensions.pop(Suspension.RESTART, None)
+    if event is E.RESTART_AGREES and made.state is S:
+        made = Authority(0.0, AuthorityRecord(H))
+    changed = made.apply(event, 5.0, 'because')
+    assert made.state is CELLS[event][column]
+    assert made.held is (made.state is H)
+    if made.state is before[0]:
+        assert made.since == 0.0
+    else:
+        assert changed
+        assert (made.why, made.since) == ('because', 5.0)
+    if TABLE[event].of(before[0]) is None:
+        assert not changed
+        assert (made.state, made.why, made.since, made.hold) == before
+
+
+def test_the_table_has_a_row_for_each_event_and_each_suspension_has_an_end():
+    assert set(TABLE) == set(AuthorityEvent) == set(CELLS)
+    assert set(authority._SUSPENDS.values()) == set(Suspension) - {Suspension.RESTART}
+    assert set(authority._ENDS.values()) == set(Suspension) == set(authority._GIVES_BACK)
+
+
+PAIRS = [(a, b) for a, b in itertools.permutations(ENDS.items(), 2)
+         if b[1] is not E.UNEXPLAINED]  # a change of mode while SUSPENDED is a loss
+
+
+@pytest.mark.parametrize(('first', 'second'), PAIRS,
+                         ids=[f'{a[1].name}-{b[1].name}' for a, b in PAIRS])
+def test_suspended_for_two_causes_it_is_held_again_only_after_the_end_of_both(first, second):
+    made = suspended(first[1], second[1])
+    words = [authority._GIVES_BACK[authority._SUSPENDS[each]] for each in (first[1], second[1])]
+    assert made.why == f'{first[1].name}; {second[1].name}'
+    assert made.gives_back == ' and '.join(words)
+    made.apply(first[0], 2.0)
+    assert made.state is S
+    assert (made.why, made.gives_back) == (second[1].name, words[1])
+    made.apply(first[0], 3.0)
+    assert made.state is S
+    made.apply(second[0], 4.0)
+    assert made.state is H
+    assert made.suspensions == {}
+    assert made.gives_back == ''
+
+
+def test_the_same_suspension_twice_needs_one_end():
+    made = suspended(E.LINK_STALE, E.LINK_STALE, E.NEW_ADDRESS)
+    assert made.suspended_by(Suspension.LINK)
+    made.apply(E.LINK_BACK, 2.0)
+    assert made.held
+
+
+def test_what_is_lost_while_suspended_does_not_come_back_with_the_end_of_the_suspension():
+    for ends, begins in ENDS.items():
+        made = suspended(begins)
+        made.apply(E.TAKEN, 2.0)
+        made.apply(ends, 3.0)
+        assert made.state is L
+        assert made.suspensions == {}
+
+
+def test_a_mission_mode_set_by_a_pilot_ends_every_suspension_but_a_foreign_mission():
+    made = suspended(E.AVOIDING, E.FAILSAFE_STAYS)
+    made.apply(E.TO_MISSION, 2.0)
+    assert made.held
+    made = suspended(E.AVOIDING, E.FOREIGN)
+    made.apply(E.TO_MISSION, 2.0)
+    assert set(made.suspensions) == {Suspension.FOREIGN}
+    assert made.state is S
+
+
+@pytest.mark.parametrize('state', [H, S, L, N])
+def test_after_a_kill_nothing_but_a_hand_over_gives_it_back(state):
+    made = machine(state)
+    assert made.apply(E.KILLED, 1.0, 'killed')
+    assert not made.apply(E.KILLED, 2.0, 'killed again')
+    for event in AuthorityEvent:
+        if event is not E.HAND_OVER:
+            made.apply(event, 3.0)
+            assert (made.state, made.killed, made.why) == (L, True, 'killed')
+    assert made.gives_back == '~/hand_over, on the ground and disarmed'
+    assert made.apply(E.HAND_OVER, 4.0)
+    assert (made.held, made.killed) == (True, False)
+
+
+def test_a_kill_is_kept_over_a_restart():
+    made = Authority(0.0, AuthorityRecord(L, 'killed', killed=True))
+    assert not made.apply(E.TO_MISSION, 1.0)
+    assert made.state is L
+
+
+@pytest.mark.parametrize('state', [H, L, N])
+@pytest.mark.parametrize(('event', 'hold'), [
+    (E.HAND_OVER, HoldStage.FIRST), (E.STICK_TO_HOLD, HoldStage.FIRST),
+    (E.TO_MISSION, HoldStage.UNLESS_VERIFIED)])
+def test_who_gets_it_in_flight_holds_first(state, event, hold):
+    made = machine(state)
+    made.apply(event, 1.0)
+    assert made.hold is (HoldStage.NO if TABLE[event].of(state) is None else hold)
+    made.apply(E.LINK_STALE, 2.0)
+    assert made.hold is (
+        HoldStage.NO if TABLE[event].of(state) is None else hold
+    )  # it is still due
+    made.apply(E.TAKEN, 3.0)
+    assert made.hold is HoldStage.NO
+
+
+def test_a_grant_on_the_ground_needs_no_hold():
+    made = machine(N)
+    made.apply(E.GRANTED, 1.0)
+    assert made.hold is HoldStage.NO
+
+
+def test_after_a_landing_of_ours_it_is_given_back_by_a_hand_over_only():
+    made = machine(H)
+    made.apply(E.OWN_LANDING, 1.0)
+    assert (made.state, made.landed, made.gives_back) == (N, True, '~/hand_over')
+    made.apply(E.HAND_OVER, 2.0)
+    assert not made.landed
+    made.apply(E.WITHDRAWN, 3.0)
+    assert not made.landed
+    assert made.gives_back.startswith('takeoff: true on the ground, ')
+
+
+def test_takeoff_withdrawn_in_the_air_counts_until_it_is_taken_or_lands():
+    for event in (E.OWN_LANDING, E.TAKEN):
+        made = machine(H)
+        made.apply(E.WITHDRAWN_IN_AIR, 1.0)
+        assert made.until_landing
+        made.apply(E.LINK_STALE, 2.0)
+        made.apply(E.LINK_BACK, 3.0)
+        assert made.until_landing
+        made.apply(event, 4.0)
+        assert not made.until_landing
+
+
+def test_a_restarted_bridge_has_nothing_until_the_vehicle_is_seen_to_agree():
+    for state in (H, S):
+        made = Authority(0.0, AuthorityRecord(state, 'before'))
+        assert (made.state, made.why) == (S, 'before')
+        assert not any(made.allows(action) for action in SendAction)
+        made.apply(E.RESTART_AGREES, 1.0)
+        assert made.held
+    for state in (L, N):
+        assert Authority(0.0, AuthorityRecord(state)).state is state
+
+
+# what may be sent
+
+SENT = {
+    N: {SendAction.READ, SendAction.UPLOAD},
+    H: set(SendAction),
+    S: set(),
+    L: {SendAction.READ},
+}
+
+
+@pytest.mark.parametrize('state', [N, H, S, L])
+def test_each_state_allows_what_the_table_says(state):
+    made = machine(state)
+    assert {action for action in SendAction if made.allows(action)} == SENT[state] == set(
+        MAY[state][1])
+
+
+def test_while_it_is_not_known_who_has_it_and_beside_a_foreign_mission_only_reading_is_allowed():
+    made = machine(N)
+    made.undecided = True
+    assert [action for action in SendAction if made.allows(action)] == [SendAction.READ]
+    assert not made.held
+    made = suspended(E.FOREIGN)  # else nobody would see its end
+    assert [action for action in SendAction if made.allows(action)] == [SendAction.READ]
+    made.apply(E.LINK_STALE, 2.0)
+    assert not any(made.allows(action) for action in SendAction)
+
+
+def command(number, *params):
+    return d.MAVLink_command_long_message(1, 1, number, 0, *params, *[0] * (7 - len(params)))
+
+
+READS = [
+    d.MAVLink_mission_request_list_message(1, 1), d.MAVLink_mission_request_int_message(1, 1, 0),
+    d.MAVLink_mission_request_message(1, 1, 0), d.MAVLink_mission_ack_message(1, 1, 0),
+    command(d.MAV_CMD_SET_MESSAGE_INTERVAL), command(d.MAV_CMD_REQUEST_MESSAGE)]
+UPLOADS = [
+    d.MAVLink_mission_count_message(1, 1, 3),
+    d.MAVLink_mission_item_int_message(1, 1, 0, 0, 16, 0, 1, 0, 0, 0, 0, 0, 0, 0.0),
+    d.MAVLink_mission_ack_message(1, 1, d.MAV_MISSION_OPERATION_CANCELLED)]
+KNOWN_COMMANDS = ('DO_SET_MODE', 'COMPONENT_ARM_DISARM', 'NAV_TAKEOFF', 'DO_SET_MISSION_CURRENT',
+                  'MISSION_START', 'DO_PAUSE_CONTINUE', 'NAV_RETURN_TO_LAUNCH', 'DO_REPOSITION',
+                  'DO_FLIGHTTERMINATION', 'NAV_LAND')
+
+
+def test_each_message_kind_counts_as_reading_uploading_or_else_as_a_command():
+    assert {action_of(m) for m in READS} == {SendAction.READ}
+    assert {action_of(m) for m in UPLOADS} == {SendAction.UPLOAD}
+    for name in KNOWN_COMMANDS:
+        assert action_of(command(getattr(d, 'MAV_CMD_' + name))) is SendAction.COMMAND
+    harmless = {m.get_type() for m in READS + UPLOADS}
+    for number, kind in d.mavlink_map.items():
+        message = kind.__new__(kind)
+        message._type = kind.msgname
+        if kind.msgname not in harmless:
+            assert action_of(message) is SendAction.COMMAND, number
+
+
+class Watch:
+    """Notes what it is told of."""
+
+    def __init__(self, made):
+        self.authority, self.commands = made, []
+
+    def sent(self, message, now):
+        self.commands.append(message)
+
+
+@pytest.mark.parametrize('state', [N, H, S, L])
+def test_the_gate_lets_pass_what_the_state_allows_in_order_and_records_commands(state):
+    commands = [command(getattr(d, 'MAV_CMD_' + name)) for name in KNOWN_COMMANDS]
+    commands.append(d.MAVLink_mission_set_current_message(1, 1, 2))
+    watch = Watch(machine(state))
+    out = allowed([*commands, *UPLOADS, *READS], watch, 1.0)
+    assert out == [*(commands if SendAction.COMMAND in SENT[state] else []),
+                   *(UPLOADS if SendAction.UPLOAD in SENT[state] else []),
+                   *(READS if SendAction.READ in SENT[state] else [])]
+    assert watch.commands == (commands if state is H else [])
+
+
+# the drawn table
+
+def test_the_drawn_table_has_each_state_each_event_and_each_cell():
+    lines = table_text().splitlines()
+    for state in (N, H, S, L):
+        assert sum(line.startswith(f'| {state.name} |') for line in lines) == 1
+    rows = {line.split(' | ')[0].removeprefix('| '): line for line in lines}
+    for event, row in TABLE.items():
+        cells = rows[event.value].strip('| ').split(' | ')[1:5]
+        for cell, target in zip(cells, (row.held, row.suspended, row.lost, row.none),
+                                strict=True):
+            assert cell == ('same' if target is None else target.name)
+        assert row.note in rows[event.value]
+    assert {
+        line.count('|')
+        for line in lines
+        if line.startswith('| event')
+        or '---|---|---|---' in line
+        or line.split(' | ')[0].removeprefix('| ') in {e.value for e in AuthorityEvent}
+    } == {7}

@@ -1,0 +1,68 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Messages are asked for at their rates, again where they stay away, and not for ever."""
+import pytest
+from flight_bench import FlightBench
+from pymavlink.dialects.v20 import ardupilotmega as d
+
+from uav_task_alloc.mavlink.gcs.message_rates import TRIES
+
+BOTH = pytest.mark.parametrize('kind', ['ardupilot', 'px4'])
+SPEC = {'GLOBAL_POSITION_INT': 5.0, 'MISSION_CURRENT': 2.0, 'BATTERY_STATUS': 1.0,
+        'SYS_STATUS': 1.0, 'EXTENDED_SYS_STATE': 1.0, 'HOME_POSITION': 0.2}
+
+
+def asked(bench, kind):
+    """Rates [Hz] that were asked for, of one message."""
+    number = getattr(d, 'MAVLINK_MSG_ID_' + kind)
+    return [round(1e6 / m.param2, 3) for m in bench.line.sent('COMMAND_LONG')
+            if m.command == d.MAV_CMD_SET_MESSAGE_INTERVAL and m.param1 == number]
+
+
+@BOTH
+def test_each_message_is_asked_for_at_its_rate_and_comes_at_it(kind):
+    bench = FlightBench(kind, takeoff=False).found()
+    bench.run(limit=2.0)
+    assert {name: asked(bench, name)[0] for name in SPEC} == SPEC
+    before = {name: len(bench.line.sent(name, 'down')) for name in SPEC}
+    bench.run(limit=30.0)
+    for name, rate in SPEC.items():
+        came = (len(bench.line.sent(name, 'down')) - before[name]) / 30.0
+        # PX4 tells the current item at its own 1 Hz
+        own = kind == 'px4' and name == 'MISSION_CURRENT'
+        assert came == pytest.approx(1.0 if own else rate, rel=0.15), name
+
+
+@BOTH
+def test_a_message_that_stays_away_is_asked_for_again_and_given_up_in_the_end(kind):
+    bench = FlightBench(kind, takeoff=False)
+    bench.line.tampers.append(lambda way, m, now: [] if (
+        m.get_type() == 'BATTERY_STATUS') else None)
+    bench.found()
+    bench.run(limit=60.0)
+    assert len(asked(bench, 'BATTERY_STATUS')) == TRIES
+    assert len(asked(bench, 'GLOBAL_POSITION_INT')) == 1
+
+
+@BOTH
+def test_a_stream_that_ceases_is_asked_for_again(kind):
+    bench = FlightBench(kind, takeoff=False).found()
+    bench.run(limit=10.0)
+    assert len(asked(bench, 'EXTENDED_SYS_STATE')) == 1
+    bench.line.tampers.append(lambda way, m, now: [] if (
+        m.get_type() == 'EXTENDED_SYS_STATE') else None)
+    bench.run(limit=60.0)
+    assert len(asked(bench, 'EXTENDED_SYS_STATE')) == 1 + TRIES
+    bench.line.tampers.clear()
+    bench.run(limit=30.0)
+    assert len(asked(bench, 'EXTENDED_SYS_STATE')) == 1 + TRIES
+
+
+@BOTH
+def test_positions_that_cease_are_asked_for_again(kind):
+    bench = FlightBench(kind, takeoff=False).found()
+    bench.run(limit=10.0)
+    before = len(asked(bench, 'GLOBAL_POSITION_INT'))
+    bench.line.tampers.append(lambda way, m, now: [] if (
+        m.get_type() == 'GLOBAL_POSITION_INT') else None)
+    bench.run(limit=5.0)
+    assert len(asked(bench, 'GLOBAL_POSITION_INT')) > before

@@ -1,0 +1,57 @@
+# SPDX-License-Identifier: Apache-2.0
+"""PX4 calls its mission complete after a take-off and a landing: that completes no task."""
+from flight_bench import FlightBench, flying, places
+from mission_bench import task_list
+from pymavlink.dialects.v20 import ardupilotmega as d
+
+from uav_task_alloc.sim.config import FlightMode
+
+
+def taken_off(names):
+    """Over its home in Hold, with the list on board."""
+    bench = FlightBench('px4')
+    bench.found()
+    bench.assign(task_list(names))
+    vehicle = bench.vehicles[1]
+    assert bench.run(lambda: vehicle.flight.mode is FlightMode.TAKEOFF)
+    assert bench.run(lambda: vehicle.flight.mode is FlightMode.HOLD)
+    assert vehicle.mission.progress()[1] == d.MISSION_STATE_COMPLETE
+    return bench
+
+
+def test_a_bridge_started_again_after_a_take_off_takes_no_task_for_flown():
+    bench = taken_off('ABC')
+    bench.start()
+    bench.found()
+    bench.assign(task_list('ABC', 2))
+    bench.run(limit=20.0)
+    assert bench.completed() == []
+
+
+def test_a_bridge_started_again_after_a_landing_takes_no_task_for_flown():
+    bench = flying('px4', 'ABC')
+    vehicle = bench.vehicles[1]
+    assert bench.run(lambda: bench.completed() == ['A'])
+    vehicle.flight.set_mode(FlightMode.LAND)
+    assert bench.run(lambda: not vehicle.flight.armed)
+    assert vehicle.mission.progress()[1] == d.MISSION_STATE_COMPLETE
+    bench.start()
+    bench.found()
+    bench.assign(task_list('ABC', 2))
+    bench.run(limit=20.0)
+    assert not {'B', 'C'} & set(bench.completed())
+
+
+def test_complete_left_over_from_the_take_off_ends_no_list_of_one_task():
+    bench = taken_off('A')
+
+    def late(way, message, now):
+        """What PX4 told before it was in mission mode comes after that."""
+        if way == 'down' and message.get_type() == 'MISSION_CURRENT':
+            message.mission_state = d.MISSION_STATE_COMPLETE
+        return None
+
+    bench.line.tampers.append(late)
+    assert bench.run(lambda: bench.completed() == ['A'])
+    assert places(bench) == ['A']
+    assert not any('passed over' in str(note) for note in bench.notes)

@@ -1,0 +1,82 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The way home around zones: flown point by point, after the last task and after a restart."""
+import dataclasses
+
+import pytest
+from flight_bench import FlightBench
+from mission_bench import task_list
+
+from uav_task_alloc.mavlink.gcs.status import UavMode
+
+BOTH = pytest.mark.parametrize('kind', ['ardupilot', 'px4'])
+WAY = ((-80.0, 60.0, 50.0), (-40.0, 20.0, 50.0))  # [m] ENU
+SEEN = [(-80, 60, 50), (-40, 20, 50)]
+
+
+def homeward(names, revision):
+    """A list that ends at home by the way around."""
+    return dataclasses.replace(task_list(names, revision, returns=True), end_via=WAY)
+
+
+def shrink(bench, names):
+    """The allocator takes each task off the list once it is completed."""
+    for revision in range(2, 2 + len(names)):
+        done = len(bench.completed()) + 1
+        assert bench.run(lambda done=done: len(bench.completed()) == done)
+        bench.assign(homeward([n for n in names if n not in bench.completed()], revision))
+
+
+@BOTH
+def test_after_the_last_task_the_points_of_the_way_home_are_flown(kind):
+    bench = FlightBench(kind).found()
+    bench.assign(homeward('AB', 1))
+    shrink(bench, 'AB')
+    assert bench.run(lambda: bench.state().mode is UavMode.RETURNING, 10.0)
+    assert bench.run(lambda: bench.state().mode is UavMode.STANDBY)
+    assert [p for p in bench.flown() if p in SEEN] == SEEN
+    assert bench.flown()[:4] == [(0, 100, 50), (100, 100, 50), *SEEN]
+    assert bench.completed() == ['A', 'B']
+    assert bench.board().upload.uploads == 1
+    assert bench.board().revision == 3
+    x, y, z = bench.vehicles[1].flight.body.position
+    assert (abs(x), abs(y - 10.0), abs(z)) < (3.0, 3.0, 1.0)
+
+
+@BOTH
+@pytest.mark.parametrize('reached', [2, 3])
+def test_a_bridge_killed_on_the_way_home_lets_the_vehicle_fly_it(kind, reached):
+    bench = FlightBench(kind).found()
+    bench.assign(homeward('AB', 1))
+    shrink(bench, 'AB')
+    assert bench.run(lambda: len(bench.flown()) == reached)
+    bench.start()
+    bench.found()
+    bench.assign(homeward('', 3))
+    assert bench.run(lambda: bench.state().mode is UavMode.STANDBY)
+    assert bench.flown()[:4] == [(0, 100, 50), (100, 100, 50), *SEEN]
+    assert bench.board().upload.uploads == 0
+
+
+@BOTH
+def test_a_new_way_home_replaces_the_one_being_flown(kind):
+    bench = FlightBench(kind).found()
+    bench.assign(homeward('AB', 1))
+    shrink(bench, 'AB')
+    bench.run(limit=2.0)
+    other = ((200.0, 60.0, 50.0),)
+    bench.assign(dataclasses.replace(task_list('', 4, returns=True), end_via=other))
+    assert bench.run(lambda: bench.state().mode is UavMode.STANDBY)
+    assert bench.flown()[2] == (200, 60, 50)
+    assert not set(SEEN) & set(bench.flown())
+
+
+@BOTH
+def test_a_task_that_comes_on_the_way_home_is_flown_first(kind):
+    bench = FlightBench(kind).found()
+    bench.assign(homeward('A', 1))
+    shrink(bench, 'A')
+    bench.run(limit=2.0)
+    bench.assign(homeward('C', 3))
+    assert bench.run(lambda: bench.completed() == ['A', 'C'])
+    assert bench.run(lambda: bench.state().mode is UavMode.STANDBY)
+    assert bench.flown()[:4] == [(0, 100, 50), (200, 100, 50), *SEEN]

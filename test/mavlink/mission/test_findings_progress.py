@@ -1,0 +1,305 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Findings 4-8, 16, 17: what nobody flew is not COMPLETED, and is flown later."""
+import pytest
+from findings_bench import (
+    BOTH,
+    FindingsBench,
+    distance,
+    flown_once_each,
+    flying,
+    happened,
+    listed,
+    set_current,
+    swallow,
+    truthful,
+)
+from flight_bench import FlightBench, places
+from mission_bench import OURS, task_list
+from pymavlink.dialects.v20 import ardupilotmega as d
+
+from uav_task_alloc.mavlink.gcs.onboard_mission import MissionState
+from uav_task_alloc.mavlink.mission.upload import UploadState
+
+C = (200.0, 100.0, 50.0)
+MISSION = 3  # custom_mode of the copter
+
+
+def appended(lost=(), **kwargs):
+    """A copter that reaches its last item while more of them are under way to it."""
+    bench = flying('ardupilot', 'ABC', **kwargs)
+    assert truthful(bench, lambda: bench.completed() == ['A', 'B'])
+    bench.run(lambda: distance(bench, C) < 40.0)
+    swallow(bench, 'up', 'MISSION_ITEM_INT',
+            lambda m: m.seq > 3 and not happened(bench, 'mission_end'))
+    for message in lost:
+        swallow(bench, 'down', message, lambda m: bench.now < lost_until[0])
+    lost_until = [bench.now + 6.0]
+    bench.assign(task_list('CDEF', 2))
+    assert truthful(bench, lambda: happened(bench, 'mission_end'), 30.0)
+    assert bench.board().open
+    return bench
+
+
+def test_finding_04_what_is_appended_while_the_last_item_ends_is_flown():
+    flown_once_each(appended(), 'ABCDEF')
+
+
+def test_finding_04_also_where_the_last_reached_is_lost():
+    flown_once_each(appended(lost=['MISSION_ITEM_REACHED']), 'ABCDEF')
+
+
+@pytest.mark.parametrize('delay', [0.1, 0.3, 0.6])
+@pytest.mark.parametrize('before', [5.0, 20.0])
+def test_an_append_near_the_end_of_the_mission_is_flown(delay, before):
+    bench = flying('ardupilot', 'ABC', delay=(delay, delay))
+    assert truthful(bench, lambda: bench.completed() == ['A', 'B'])
+    bench.run(lambda: distance(bench, C) < before)
+    bench.assign(task_list('CDEF', 2))
+    flown_once_each(bench, 'ABCDEF')
+
+
+@BOTH
+@pytest.mark.parametrize('moment', [2.0, 6.0, 9.0])
+@pytest.mark.parametrize('index', [2, 4])
+def test_finding_05_what_another_station_skips_is_flown_later(kind, moment, index):
+    bench = flying(kind, 'ABCDE')
+    truthful(bench, lambda: False, moment)
+    before = places(bench)
+    set_current(bench, index)
+    flown_once_each(bench, 'ABCDE')
+    assert places(bench)[len(before)] == 'ABCDE'[index]
+    assert bench.noted('A was passed over')
+
+
+@BOTH
+@pytest.mark.parametrize('lost', ['MISSION_ITEM_REACHED', 'GLOBAL_POSITION_INT'])
+def test_finding_05_also_on_a_line_that_loses_what_would_tell(kind, lost):
+    bench = flying(kind, 'ABCDE')
+    truthful(bench, lambda: False, 3.0)
+    begin = bench.now
+    swallow(bench, 'down', lost, lambda m: begin < bench.now < begin + 4.0)
+    set_current(bench, 3)
+    flown_once_each(bench, 'ABCDE')
+    assert places(bench)[0] == 'D'
+
+
+@BOTH
+def test_finding_05_a_new_list_does_not_call_off_what_the_human_chose(kind):
+    bench = flying(kind, 'ABCDE')
+    truthful(bench, lambda: False, 2.0)
+    set_current(bench, 3)
+    truthful(bench, lambda: False, 8.0)  # it is seen, and judged
+    bench.assign(task_list('EDCBAF', 2))
+    flown_once_each(bench, 'ABCDEF')
+    assert places(bench)[0] == 'D'
+
+
+def swapped_beside(second, lost):
+    """PX4 near a task that it has just reached, with another list: its first item is close by.
+
+    REACHED of the task is repeated for 10 s; of these `lost` [s] are swallowed.
+    """
+    bench = FlightBench('px4', tick=0.05).found()
+    bench.assign(listed(1, P=(0.0, 100.0), Q=(0.0, 400.0)))
+    swallow(bench, 'down', 'MISSION_ITEM_REACHED', lambda m: not reached or (
+        bench.now < reached[0] + lost))
+    reached = []
+    assert bench.run(lambda: bench.flown())
+    if lost:
+        reached.append(bench.now)
+    else:
+        bench.line.tampers.clear()
+    bench.assign(listed(2, S=second, Q=(0.0, 400.0)))
+    return bench
+
+
+@pytest.mark.parametrize('lost', [0.0, 2.5])
+@pytest.mark.parametrize('second', [(20.0, 115.0), (40.0, 130.0), (0.0, 60.0)])
+def test_finding_06_a_reached_of_the_list_before_completes_nothing_of_the_new(lost, second):
+    bench = swapped_beside(second, lost)
+    there = (*map(round, second), 50)
+
+    def done():
+        assert 'S' not in bench.completed() or there in bench.flown()
+        return 'S' in bench.completed() and 'Q' in bench.completed()
+    assert bench.run(done)
+    assert bench.flown() == [(0, 100, 50), there, (0, 400, 50)]
+    assert [t for t in bench.completed() if t != 'P'] == ['S', 'Q']
+
+
+def test_finding_07_reached_of_a_new_list_is_not_credited_to_the_old_one():
+    bench = FlightBench('px4', tick=0.05).found()
+    bench.assign(listed(1, P=(0.0, 200.0), Q=(0.0, 400.0)))
+    assert bench.run(lambda: distance(bench, (0.0, 200.0, 50.0)) < 100.0)
+    lost = [True]
+    for message in ('MISSION_ACK', 'MISSION_COUNT'):
+        swallow(bench, 'down', message, lambda m: lost[0])
+    bench.assign(listed(2, S=(0.0, 170.0), P=(0.0, 200.0), Q=(0.0, 400.0)))
+
+    def honest():
+        assert 'P' not in bench.completed() or (0, 200, 50) in bench.flown()
+        assert 'S' not in bench.completed() or (0, 170, 50) in bench.flown()
+        return bench.flown()
+    assert bench.run(honest)
+    assert bench.flown() == [(0, 170, 50)]
+    bench.run(honest, 0.5)
+    lost[0] = False
+    assert bench.run(lambda: honest() and len(bench.completed()) == 3)
+    assert bench.completed() == ['S', 'P', 'Q']
+    assert bench.flown() == [(0, y, 50) for y in (170, 200, 400)]
+
+
+def test_finding_07_a_first_try_that_was_taken_is_not_forgotten_in_the_second():
+    """The readback shows something else, and no MISSION_COUNT gets through after it."""
+    bench = FlightBench('px4', tick=0.05).found()
+    bench.assign(listed(1, P=(0.0, 200.0), Q=(0.0, 400.0)))
+    assert bench.run(lambda: distance(bench, (0.0, 200.0, 50.0)) < 100.0)
+    lost = [True]
+
+    def another(way, m, now):
+        if lost[0] and way == 'down' and m.get_type() == 'MISSION_ITEM_INT':
+            m.z += 1.0
+        return None
+    bench.line.tampers.append(another)
+    swallow(bench, 'down', 'MISSION_ACK', lambda m: lost[0])
+    swallow(bench, 'up', 'MISSION_COUNT', lambda m: (
+        lost[0] and bench.board().upload.uploads > 2))
+    bench.assign(listed(2, S=(0.0, 170.0), P=(0.0, 200.0), Q=(0.0, 400.0)))
+
+    def honest():
+        assert 'P' not in bench.completed() or (0, 200, 50) in bench.flown()
+        assert 'S' not in bench.completed() or (0, 170, 50) in bench.flown()
+        return bench.flown()
+    assert bench.run(honest)
+    assert bench.flown() == [(0, 170, 50)]
+    bench.run(honest, 0.5)
+    assert bench.board().upload.uploads > 2
+    lost[0] = False
+    assert bench.run(lambda: honest() and len(bench.completed()) == 3)
+    assert bench.flown() == [(0, y, 50) for y in (170, 200, 400)]
+
+
+def test_finding_07_a_try_that_was_taken_is_not_forgotten_for_a_newer_list():
+    """The vehicle has taken a mission and says ERROR; before the next try comes another list."""
+    bench = FlightBench('px4', tick=0.05).found()
+    bench.assign(listed(1, P=(0.0, 200.0), Q=(0.0, 400.0)))
+    assert bench.run(lambda: distance(bench, (0.0, 200.0, 50.0)) < 60.0)
+    lost = [True]
+    swallow(bench, 'down', 'MISSION_ACK', lambda m: lost[0] and m.type == 0)
+    bench.assign(listed(2, S=(0.0, 170.0), P=(0.0, 200.0), Q=(0.0, 400.0)))
+    assert bench.run(lambda: bench.board().upload.sent_all, 10.0)
+    bench.says(d.MAVLink_mission_ack_message(*OURS, d.MAV_MISSION_ERROR))
+    assert bench.run(lambda: bench.board().upload.state is UploadState.BACKOFF, 10.0)
+    bench.assign(listed(3, Q=(0.0, 400.0), S=(0.0, 170.0), P=(0.0, 200.0)))
+    assert bench.run(lambda: bench.flown() == [(0, 170, 50)], 60.0)
+    lost[0] = False
+    assert bench.run(lambda: len(bench.completed()) == 3)
+    assert bench.completed()[0] == 'S'
+    assert sorted(bench.flown()) == [(0, y, 50) for y in (170, 200, 400)]
+
+
+def test_finding_07_reached_of_the_old_list_is_not_credited_to_the_new_one():
+    bench = FlightBench('px4', tick=0.05).found()
+    bench.assign(listed(1, P=(0.0, 200.0), Q=(0.0, 400.0)))
+    assert bench.run(lambda: distance(bench, (0.0, 200.0, 50.0)) < 25.0)
+    swallow(bench, 'up', 'MISSION_ITEM_INT', lambda m: m.seq == 2 and not bench.flown())
+    bench.assign(listed(2, S=(20.0, 220.0), P=(0.0, 200.0), Q=(0.0, 400.0)))
+
+    def done():
+        assert 'S' not in bench.completed() or (20, 220, 50) in bench.flown()
+        return len(bench.completed()) == 3
+    assert bench.run(done)
+    assert bench.completed() == ['P', 'S', 'Q']
+    assert bench.flown() == [(0, 200, 50), (20, 220, 50), (0, 400, 50)]
+
+
+def test_what_is_appended_and_reached_before_the_answer_is_completed_once():
+    bench = flying('ardupilot', 'AB')
+    assert truthful(bench, lambda: distance(bench, (100.0, 100.0, 50.0)) < 25.0)
+    lost = [True]
+    for message in ('MISSION_ACK', 'MISSION_COUNT'):
+        swallow(bench, 'down', message, lambda m: lost[0])
+    bench.assign(task_list('BCD', 2))
+    assert truthful(bench, lambda: places(bench) == ['A', 'B', 'C'])
+    lost[0] = False
+    flown_once_each(bench, 'ABCD')
+
+
+@pytest.mark.parametrize(('slow', 'unheard'), [(3.0, False), (0.0, True), (3.0, True)])
+def test_finding_08_the_end_of_the_old_mission_during_a_swap_is_no_pilot(slow, unheard):
+    bench = flying('px4', 'C', tick=0.05)
+    assert bench.run(lambda: distance(bench, C) < 30.0)
+    ended = []
+
+    def tamper(way, m, now):
+        kind = m.get_type()
+        if happened(bench, 'mission_end') and not ended:
+            ended.append(now)
+        if way == 'up' and kind == 'MISSION_ITEM_INT' and m.seq == 1 and not ended:
+            return []
+        if way == 'down' and ended:
+            if kind == 'MISSION_COUNT' and now < ended[0] + slow:
+                return []
+            if kind == 'MISSION_ITEM_REACHED' and unheard and now < ended[0] + 3.0:
+                return []
+        return [] if kind == 'MISSION_ITEM_REACHED' and unheard and not ended else None
+    bench.line.tampers.append(tamper)
+    bench.assign(task_list('DE', 2))
+    flown_once_each(bench, 'CDE')
+
+
+@BOTH
+def test_finding_16_verified_is_not_told_of_a_list_that_came_during_set_current(kind):
+    bench = FindingsBench(kind, delay=(0.2, 0.2)).found()
+    bench.assign(task_list('AB', via={'A': ((-150.0, 50.0, 50.0),)}))
+    assert bench.run(lambda: bench.started() == ['A'])
+    bench.run(limit=3.0)
+    bench.assign(task_list('AB', 2))  # without the detour: it is on board, from an item on
+    bench.run(limit=0.1)
+    bench.assign(task_list('XY', 3))
+    own, seen = bench.board().own, set()
+
+    def told():
+        state, held = bench.state(), bench.vehicles[1].mission.items[own:]
+        if state.mission_state is MissionState.VERIFIED:
+            seen.add(state.list_revision)
+        if state.list_revision == 3:
+            assert len(held) == 2
+        return bench.completed() == ['X', 'Y']
+    assert bench.run(told)
+    assert 3 in seen
+    assert places(bench) == ['X', 'Y']
+
+
+@pytest.mark.parametrize('index', [1, 2])
+def test_finding_17_a_late_current_completes_nothing_while_it_is_held(index):
+    bench = flying('ardupilot', 'ABC')
+    assert truthful(bench, lambda: bench.completed() == ['A'])
+    held = [True]
+    swallow(bench, 'up', 'COMMAND_LONG', lambda m: held[0] and (
+        m.command == d.MAV_CMD_DO_SET_MODE and m.param2 == MISSION))
+    bench.assign(task_list('XYZ', 2))
+    assert bench.run(lambda: bench.line.sent('COMMAND_LONG')[-1].param2 == MISSION
+                     and bench.vehicles[1].mode.name == 'GUIDED')
+    bench.run(limit=3.5)
+    for _ in range(3):
+        bench.says(d.MAVLink_mission_current_message(bench.board().own + index, 3, 4, 2))
+    truthful(bench, lambda: False, 2.0)
+    held[0] = False
+    flown_once_each(bench, 'AXYZ')
+
+
+@BOTH
+def test_a_late_current_after_a_swap_completes_nothing_in_flight(kind):
+    bench = flying(kind, 'ABCDE')
+    late = []
+
+    def tamper(way, m, now):
+        if way == 'down' and m.get_type() == 'MISSION_CURRENT' and late and now < late[0]:
+            return [(0.0, m), (4.5, m)]
+        return None
+    bench.line.tampers.append(tamper)
+    assert truthful(bench, lambda: bench.completed() == ['A', 'B'])
+    late.append(bench.now + 3.0)
+    bench.assign(task_list('XYC', 2))
+    flown_once_each(bench, 'ABXYC')

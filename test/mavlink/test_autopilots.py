@@ -1,0 +1,80 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Which autopilot is which, and what its mission store is given."""
+import math
+
+import pytest
+from mission_bench import ORIGIN, task_list
+from pymavlink.dialects.v20 import ardupilotmega as d
+
+from uav_task_alloc.mavlink import autopilots as profiles
+from uav_task_alloc.mavlink.autopilots import ModeFunction, profile_of
+from uav_task_alloc.mavlink.mission.items import LOITER_TIME, RETURN, WAYPOINT, mission_items
+from uav_task_alloc.mavlink.mission.peer import Peer
+
+ALL = pytest.mark.parametrize('profile', [
+    profiles.ARDUPILOT, profiles.ARDUPLANE, profiles.PX4, profiles.PX4_PLANE, profiles.GENERIC])
+
+
+def heartbeat(autopilot, kind=d.MAV_TYPE_QUADROTOR):
+    return d.MAVLink_heartbeat_message(kind, autopilot, 0, 0, 4, 3)
+
+
+@pytest.mark.parametrize(('autopilot', 'kind', 'profile'), [
+    (d.MAV_AUTOPILOT_ARDUPILOTMEGA, d.MAV_TYPE_QUADROTOR, profiles.ARDUPILOT),
+    (d.MAV_AUTOPILOT_ARDUPILOTMEGA, d.MAV_TYPE_FIXED_WING, profiles.ARDUPLANE),
+    (d.MAV_AUTOPILOT_PX4, d.MAV_TYPE_HEXAROTOR, profiles.PX4),
+    (d.MAV_AUTOPILOT_PX4, d.MAV_TYPE_FIXED_WING, profiles.PX4_PLANE),
+    (d.MAV_AUTOPILOT_GENERIC, d.MAV_TYPE_QUADROTOR, profiles.GENERIC)])
+def test_the_profile_is_found_from_the_heartbeat(autopilot, kind, profile):
+    assert profile_of(heartbeat(autopilot, kind)) is profile
+
+
+def test_a_profile_that_is_set_wins_over_the_heartbeat():
+    assert profile_of(heartbeat(d.MAV_AUTOPILOT_GENERIC), 'px4') is profiles.PX4
+
+
+@ALL
+@pytest.mark.parametrize('service', [0.0, 2.5])
+def test_fault_26_no_nan_on_anything_but_the_yaw_of_a_waypoint(profile, service):
+    for item in mission_items(task_list('ABC', service=service, returns=True), profile.rules,
+                              ORIGIN):
+        nans = [n for n, value in enumerate(item.params) if math.isnan(value)]
+        assert not nans or (item.command == WAYPOINT and nans == [3] and profile.atomic)
+
+
+@ALL
+def test_a_service_is_a_hold_on_a_copter_and_a_loiter_on_a_plane(profile):
+    item = mission_items(task_list('A', service=2.5), profile.rules, ORIGIN)[0]
+    assert item.command == (LOITER_TIME if profile.rules.loiters else WAYPOINT)
+    assert item.params[0] == (3.0 if profile.rules.whole_seconds else 2.5)
+
+
+def test_a_plane_flies_through_a_task_without_service():
+    item = mission_items(task_list('A'), profiles.ARDUPLANE.rules, ORIGIN)[0]
+    assert (item.command, item.params[0]) == (WAYPOINT, 0.0)
+
+
+@ALL
+def test_the_return_is_sent_in_the_frame_that_the_store_takes(profile):
+    items = mission_items(task_list('A', returns=True), profile.rules, ORIGIN)
+    assert items[-1].command == RETURN
+    assert items[-1].frame == (3 if profile.name == 'ardupilot' else 2)
+
+
+@ALL
+@pytest.mark.parametrize('flight', [ModeFunction.MISSION, ModeFunction.HOLD, ModeFunction.RETURN])
+def test_every_profile_can_fly_its_mission_hold_and_return(profile, flight):
+    message = profile.mode_command(Peer(1), flight)
+    assert message.target_system == 1
+    if flight in profile.set_mode:
+        assert message.command == d.MAV_CMD_DO_SET_MODE
+        assert profile.flight(profile.set_mode[flight]) is flight
+
+
+def test_a_px4_copter_is_told_how_near_is_there_where_the_task_does_not_say():
+    for profile, radius in ((profiles.PX4, 2.0), (profiles.PX4_PLANE, 0.0),
+                            (profiles.ARDUPILOT, 0.0)):
+        tasks = task_list('A', via={'A': [(50.0, 50.0, 50.0)]})
+        made = mission_items(tasks, profile.rules, ORIGIN)
+        assert [item.params[1] for item in made] == [radius, radius]
+        assert [item.radius for item in made] == [radius, radius]

@@ -1,0 +1,345 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Findings 11 to 13 and 24: what links, heartbeats, signing and floods do to the bridge."""
+import os
+import socket
+import threading
+
+import pytest
+from link_bench import WALL, heartbeat, nothing, receive
+from mission_bench import ORIGIN
+
+from uav_task_alloc.errors import InvalidValue
+from uav_task_alloc.mavlink.transport.codec import Codec
+from uav_task_alloc.mavlink.transport.connections import Connections
+from uav_task_alloc.mavlink.transport.heartbeat import Heartbeat
+from uav_task_alloc.mavlink.transport.link import MOST_STRANGERS
+from uav_task_alloc.sim.config import VehicleConfig
+from uav_task_alloc.sim.udp_fleet import UdpFleet
+
+
+@pytest.fixture
+def servers():
+    """Two TCP servers, the first of which does not listen yet."""
+    made = [socket.socket(), socket.socket()]
+    for one in made:
+        one.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        one.bind(('127.0.0.1', 0))
+        one.settimeout(5.0)
+    yield made
+    for one in made:
+        one.close()
+
+
+def free_until(number):
+    """Take all free file numbers below one, so that the next file to be opened gets it."""
+    held = [os.dup(0)]
+    while held[-1] < number:
+        held.append(os.dup(0))
+    os.close(held.pop())
+    return held
+
+
+# 11: a file number that passes from one link to another
+
+
+def test_finding_11_a_file_number_may_pass_from_one_link_to_the_other(radio, servers):
+    one, two = radio(*(f'tcp:127.0.0.1:{s.getsockname()[1]}' for s in servers)), servers[1]
+    first, second = one.links
+    two.listen()
+    one.step(0.0)  # the first is refused, the second is connected
+    far, _ = two.accept()
+    assert nothing(one)
+    assert first.fileno() == -1
+    number = second.fileno()
+    far.close()
+    held = free_until(number)
+    second._broken('closed by the far end')  # as a heartbeat does that meets the broken line
+    servers[0].listen()
+    one.step(10.0)
+    for file in held:
+        os.close(file)
+    assert first.fileno() == number
+    far, _ = servers[0].accept()
+    far.sendall(Codec(1, 1).pack(heartbeat()))
+    assert [address[0] for address, _ in receive(one)] == [0]
+    far.close()
+
+
+def test_finding_11_two_links_may_swap_their_files(radio, servers):
+    one = radio(*(f'tcp:127.0.0.1:{s.getsockname()[1]}' for s in servers))
+    for server in servers:
+        server.listen()
+    one.step(0.0)
+    fars = [server.accept()[0] for server in servers]
+    assert nothing(one)
+    first, second = one.links
+    first._file, second._file = second._file, first._file  # as if both had been opened again
+    first.opened, second.opened = 2, 2
+    for number, far in enumerate(fars):
+        far.sendall(Codec(1, 1).pack(heartbeat()))
+        assert [address[0] for address, _ in receive(one)] == [1 - number]
+        far.close()
+
+
+def test_finding_11_a_line_that_a_sender_closes_is_read_no_more(radio, servers):
+    servers[0].listen()
+    one = radio(f'tcp:127.0.0.1:{servers[0].getsockname()[1]}')
+    one.step(0.0)
+    assert nothing(one)
+    link, = one.links
+    link.trouble = 'Broken pipe'
+    link.close()
+    assert link.read() == []
+    assert link.trouble == 'Broken pipe'
+
+
+# 12: one stream, two threads
+
+
+class Watched:
+    """A link that notices what is done to it while the radio's lock is free."""
+
+    name, datagrams, trouble = 'x', False, ''
+
+    def __init__(self):
+        self.radio, self.unlocked = None, []
+        self.files = os.pipe()
+        os.write(self.files[1], b'x')  # always something to read
+
+    def __getattr__(self, name):
+        if not self.radio._lock.locked():
+            self.unlocked.append(name)
+        return {'fileno': lambda: self.files[0], 'opened': 1, 'read': lambda: [('y', b'x')],
+                'ends': lambda: ['y']}.get(name, lambda *_: None)
+
+
+def test_finding_12_nothing_touches_a_stream_without_the_lock(tmp_path):
+    link = Watched()
+    radio = link.radio = Connections(
+        [link], 245, 190, wall=lambda: WALL, tlog=str(tmp_path / 'x.tlog')
+    )
+    radio.step(0.0)
+    radio.receive(0.0)
+    radio.send_to_all(heartbeat())
+    radio.send([((0, 'y'), heartbeat())])
+    radio.close()
+    for file in link.files:
+        os.close(file)
+    assert link.unlocked == []
+
+
+def test_finding_12_an_error_on_one_link_leaves_the_heartbeats_of_the_others(radio, far):
+    both = radio('udpin:127.0.0.1:0', 'udpin:127.0.0.1:0')
+    end = far(both)
+    end.say(heartbeat())
+    receive(both)
+    both.links.reverse()  # the bad one comes first
+
+    def write(end, data):
+        raise BufferError('Existing exports of data: object cannot be re-sized')
+    both.links[0].ends, both.links[0].write = lambda: ['x'], write
+    both.send_to_all(heartbeat())
+    assert end.hear()[0].get_type() == 'HEARTBEAT'
+    assert 'HEARTBEAT (to x): BufferError: Existing exports' in both.refusals.last
+
+
+def test_finding_12_a_recording_that_ends_in_one_thread_does_not_end_the_other(radio, tmp_path):
+    one = radio(tlog=str(tmp_path / 'x.tlog'))
+    one._record.close()  # as the receiver does where the disk is full
+    one._write_record(b'x')
+    assert one._record is None
+
+
+@pytest.fixture
+def beats():
+    """A heartbeat whose first two beats fail, and an event for each that succeeds."""
+    failing, beat = [BufferError('x'), RuntimeError('y')], threading.Semaphore(0)
+
+    def send(message):
+        if failing:
+            raise failing.pop(0)
+        beat.release()
+    heart = Heartbeat(send, period=0.01)
+    yield heart, beat
+    heart.close()
+
+
+def ended(heart):
+    """Wait for the end of its thread."""
+    heart._thread.join(5.0)
+    assert not heart._thread.is_alive()
+
+
+def test_finding_12_a_heartbeat_thread_that_ends_is_told_and_started_again(beats):
+    heart, beat = beats
+    heart.start()
+    for number, words in enumerate(('BufferError: x', 'RuntimeError: y'), 1):
+        ended(heart)
+        assert heart.trouble.startswith(f'its thread has ended: {words} (at ')
+        heart.watch(float(number))
+        assert heart.restarts == number
+    assert beat.acquire(timeout=5.0)
+    assert beat.acquire(timeout=5.0)
+    assert heart.trouble == ''
+    heart.watch(10.0)
+    assert heart.restarts == 2
+
+
+def test_finding_12_a_heartbeat_that_is_held_up_is_told():
+    free = threading.Event()
+    heart = Heartbeat(lambda message: free.wait(5.0), period=0.01)
+    heart.start()
+    heart.watch(0.0)
+    heart.watch(0.02)
+    assert heart.trouble == ''
+    heart.watch(0.04)
+    assert heart.trouble == 'none was sent for more than 0.03 s'
+    free.set()
+    heart.close()
+    assert heart.restarts == 0
+
+
+# 13: the timestamp of signing
+
+
+@pytest.fixture
+def key_file(tmp_path):
+    path = tmp_path / 'key'
+    path.write_bytes(bytes(range(32)))
+    return path
+
+
+def forbid(key_file):
+    """Let the timestamp of a key be neither replaced nor written, also by root."""
+    key_file.with_name('key.timestamp.tmp').mkdir()
+    stamp = key_file.with_name('key.timestamp')
+    stamp.unlink(missing_ok=True)
+    stamp.symlink_to('/nowhere/at/all')
+
+
+@pytest.mark.parametrize('content', [b'', b'soon', b'-1', b'12 34', b'1e5', b'\xff\x00', b'9' * 40,
+                                     b'281474976710656'])
+def test_finding_13_a_damaged_timestamp_is_refused_at_the_start(radio, key_file, content):
+    path = key_file.with_name('key.timestamp')
+    path.write_bytes(content)
+    with pytest.raises(InvalidValue) as refused:
+        radio(signing_key_file=str(key_file))
+    assert str(refused.value).startswith(f'signing timestamp in {path} = ')
+    assert 'expected a whole number in [0, 281474976710655]; delete the file' in str(refused.value)
+    assert path.read_bytes() == content
+
+
+def test_finding_13_a_timestamp_that_cannot_be_read_is_refused_at_the_start(radio, key_file):
+    key_file.with_name('key.timestamp').mkdir()
+    with pytest.raises(InvalidValue, match=r'signing timestamp = .*: expected a readable file'):
+        radio(signing_key_file=str(key_file))
+
+
+def test_finding_13_a_timestamp_that_cannot_be_written_is_refused_at_the_start(radio, key_file):
+    forbid(key_file)
+    with pytest.raises(InvalidValue, match=r'signing timestamp = .*: expected a file that can be'):
+        radio(signing_key_file=str(key_file))
+
+
+def test_finding_13_a_timestamp_that_cannot_be_written_in_flight_is_told(radio, far, key_file):
+    one = radio(signing_key_file=str(key_file))
+    one.step(0.0)
+    assert one.signing.trouble == ''
+    forbid(key_file)
+    one.step(10.0)
+    assert 'key.timestamp: not written: ' in one.signing.trouble
+    before = one.signing.sent.timestamp
+    one.send([((0, ('127.0.0.1', 9)), heartbeat())])
+    assert one.signing.sent.timestamp == before + 1
+    key_file.with_name('key.timestamp.tmp').rmdir()
+    one.step(12.0)
+    assert one.signing.trouble != ''  # it is tried again after 5 s
+    one.step(15.0)
+    assert one.signing.trouble == ''
+    assert int(key_file.with_name('key.timestamp').read_text()) > before
+
+
+def test_finding_13_a_file_in_a_folder_that_is_read_only_is_written_in_place(radio, key_file):
+    key_file.with_name('key.timestamp.tmp').mkdir()
+    radio(signing_key_file=str(key_file))
+    assert key_file.with_name('key.timestamp').read_text().isdigit()
+
+
+def test_finding_13_a_computer_whose_clock_was_never_set_signs(key_file):
+    one = Connections([], 245, 190, wall=lambda: 0.0, signing_key_file=str(key_file))
+    one.step(0.0)
+    assert one._voice.pack(heartbeat())
+    one.close()
+
+
+# 24: a flood of far ends
+
+
+def flood(radio, count, data=b'\xfd\x00x'):
+    """As many strangers send something."""
+    to = ('127.0.0.1', radio.links[0].port)
+    for _ in range(count):
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as stranger:
+            stranger.bind(('127.0.0.1', 0))
+            stranger.sendto(data, to)
+            radio.receive(5.0)
+
+
+def test_finding_24_of_strangers_only_the_latest_hear_heartbeats(radio, far):
+    one = radio()
+    flood(one, 200)
+    last = far(one, 9)
+    last.say(heartbeat())
+    receive(one)
+    assert len(one.links[0].ends()) == MOST_STRANGERS
+    assert len(one._parsers) <= MOST_STRANGERS + 1
+    one.send_to_all(heartbeat())
+    assert last.hear()[0].get_type() == 'HEARTBEAT'
+
+
+def test_finding_24_a_known_vehicle_is_not_forgotten_for_strangers(radio, far):
+    one = radio()
+    vehicles = [far(one, system) for system in range(1, 41)]  # more than strangers are kept
+    known = set()
+    for vehicle in vehicles:
+        vehicle.say(heartbeat())
+        known |= {address for address, _ in receive(one)}
+        one.keep(known)
+    parsers = {address: one._parsers[address] for address in known}
+    flood(one, 200)
+    assert {(0, end) for end in one.links[0].ends()} > known
+    assert len(one.links[0].ends()) == 40 + MOST_STRANGERS
+    assert all(one._parsers[address] is parsers[address] for address in known)
+    one.send_to_all(heartbeat())
+    assert {vehicle.hear()[0].get_type() for vehicle in vehicles} == {'HEARTBEAT'}
+
+
+def test_finding_24_who_was_named_by_a_parameter_is_not_forgotten(radio):
+    far_end = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    far_end.bind(('127.0.0.1', 0))
+    one = radio(f'udpout:127.0.0.1:{far_end.getsockname()[1]}')
+    one.keep(())
+    flood(one, 100)
+    assert far_end.getsockname() in one.links[0].ends()
+    far_end.close()
+
+
+def test_finding_24_frames_refused_are_counted_when_their_sender_is_forgotten(radio):
+    one = radio()
+    flood(one, 100, b'xxx')
+    assert one.errors() == 100
+
+
+def test_finding_24_a_simulated_vehicle_speaks_to_its_target_and_the_latest_stations():
+    fleet = UdpFleet([(VehicleConfig('uav_1', 1, ORIGIN, (0.0, 0.0, 0.0)), 'px4')],
+                  ('127.0.0.1', 9))
+    to = ('127.0.0.1', fleet.ports['uav_1'])
+    vehicle = fleet._stations['uav_1']
+    for _ in range(100):
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as stranger:
+            stranger.bind(('127.0.0.1', 0))
+            stranger.sendto(b'x', to)
+            vehicle.hear(0.0)
+    fleet.close()
+    assert len(vehicle._parsers) == 17
+    assert ('127.0.0.1', 9) in vehicle._parsers

@@ -1,0 +1,198 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Whatever comes over its links, the bridge lives, says what is wrong, and finds the next vehicle.
+
+`pytest test/mavlink/transport/test_hostile_streams.py --streams 2000`
+sends as many; the seeds stay.
+"""
+import random
+
+import pytest
+from hostile_streams import stream
+from mission_bench import ORIGIN, make_vehicle
+from pymavlink.dialects.v20 import ardupilotmega as d
+
+from uav_task_alloc.mavlink.gcs.ground_station import GcsConfig, GroundStation
+from uav_task_alloc.mavlink.gcs.policy import Policy
+from uav_task_alloc.mavlink.gcs.status import Told, facts_of, state_of
+from uav_task_alloc.mavlink.gcs.telemetry import WANTED
+from uav_task_alloc.mavlink.mission.items import MissionStop, TaskList
+from uav_task_alloc.mavlink.transport.codec import Codec, make_signing
+from uav_task_alloc.mavlink.transport.connections import Connections
+from uav_task_alloc.model import Task
+
+LENGTH = 400  # datagrams in a stream
+GOOD = 200  # the system id of a vehicle that means well
+FORESEEN = 'expected a'  # in what names a field; all else are errors that nobody thought of
+
+
+class Wire:
+    """A link without a socket: `bring` is what comes, `sent` what goes."""
+
+    name, opened, trouble = 'wire', 1, ''
+
+    def __init__(self, datagrams):
+        self.datagrams, self.come, self.sent = datagrams, [], []
+
+    def fileno(self):
+        return -1
+
+    def read(self):
+        come, self.come = self.come, []
+        return come
+
+    def write(self, end, data):
+        self.sent.append((end, data))
+
+    def step(self, now):
+        """Nothing to do."""
+
+    def ends(self):
+        return ['far']
+
+    def keep(self, ends):
+        """All of them."""
+
+    def close(self):
+        """Nothing to do."""
+
+
+class Bridge:
+    """What the node does with its radio and its ground station, in virtual time."""
+
+    def __init__(self, seed, datagrams):
+        self.rng = random.Random(seed)
+        self.wire = Wire(datagrams)
+        self.radio = Connections([self.wire], 245, 190, wall=lambda: 1.8e9, wanted=WANTED)
+        self.ground = GroundStation(GcsConfig(origin=ORIGIN, policy=Policy(
+            takeoff=True, when_foreign=self.rng.choice(['yield', 'reassert']))),
+            random.Random(seed))
+        self.now, self.step_at, self.revision = 0.0, 0.0, 0
+        self.told, self.states = Told(), set()
+
+    def hear(self, end, data):
+        """As `receive` of the node does, without waiting."""
+        out = []
+        for address, message in self.radio._parse((0, end), data):
+            out += self.ground.receive(address, message, self.now)
+        self.radio.send(out)
+
+    def pass_time(self, pause):
+        self.now += pause
+        if self.now >= self.step_at:
+            self.radio.send(self.ground.step(self.now))
+            self.radio.keep(self.ground.addresses())
+            self.radio.step(self.now)
+            self.step_at = self.now + 0.02
+        for served in self.ground.served.values():
+            status = state_of(served, self.now, 20_000.0)
+            self.told.is_news(status, served.pilot.telemetry.position_at, self.now, 5.0)
+            facts_of(served, self.now)
+            self.states |= {status.mission_state.name, status.authority.name}
+            served.pilot.notes.clear()
+            served.pilot.events.clear()
+
+    def command(self):
+        """Now and then a list or a hand-over for a vehicle that seems to be there."""
+        if not self.ground.served or self.rng.random() > 0.1:
+            return
+        served = self.rng.choice(list(self.ground.served.values()))
+        self.revision += 1
+        names = self.rng.sample(range(8), self.rng.randint(0, 5))
+        far = self.rng.choice([300.0, 30_000.0])
+        tasks = TaskList(self.revision, tuple(
+            MissionStop(Task(f't{k}', (far * k, far, 50.0), service_time=k / 2)) for k in names),
+            self.rng.random() < 0.5)
+        self.radio.send(self.ground.assign(served.uav_id, tasks, self.now))
+        if self.rng.random() < 0.3:
+            self.ground.hand_over(served.uav_id, 'test', self.now)
+
+    def unforeseen(self):
+        """What was refused for no reason that anybody had thought of."""
+        return [note.text for refusals in (self.ground.refusals, self.radio.refusals)
+                for note in refusals.notes if FORESEEN not in note.text]
+
+    def flies(self, guest):
+        """A vehicle that comes when all is over, on a system id that nobody has, is served."""
+        self.ground.served.pop(guest.system, None)  # perhaps somebody has spoken as it
+        end = self.now + 120.0
+        while self.now < end:
+            self.pass_time(0.1)
+            guest.live(self)
+            served = self.ground.served.get(guest.system)
+            if served is None:
+                continue
+            if served.pilot.board.tasks is None:
+                self.radio.send(self.ground.assign(served.uav_id, TaskList(1, (
+                    MissionStop(Task('good', (0.0, 2060.0, 50.0))),)), self.now))
+            if 'good' in served.pilot.board.progress.completed:
+                return True
+        return False
+
+
+class Guest:
+    """A simulated vehicle at a far end."""
+
+    def __init__(self, kind, system, end):
+        self.system, self.end, self.vehicle = system, end, make_vehicle(kind, system)
+        self.codec, self.ear = Codec(system, 1), Codec(system, 1)
+
+    def live(self, bridge):
+        """Hear what was sent to it, and say what it has to say."""
+        sent, bridge.wire.sent = bridge.wire.sent, []
+        said = self.vehicle.step(bridge.now)
+        for to, data in sent:
+            for message in self.ear.parse(data) if to == self.end else ():
+                said += self.vehicle.receive(message, bridge.now)
+        for message in said:
+            bridge.hear(self.end, self.codec.pack(message))
+
+
+def attacked(seed):
+    """A bridge after a stream; in every second one a vehicle flies, and the stream is as it."""
+    bridge = Bridge(seed, datagrams=seed % 4 != 0)
+    guest = Guest(bridge.rng.choice(['px4', 'ardupilot']), 1, 0) if seed % 2 else None
+    for pause, end, data in stream(seed, LENGTH):
+        bridge.hear(end if bridge.wire.datagrams else 'far', data)
+        bridge.pass_time(pause)
+        bridge.command()
+        if guest is not None:
+            guest.live(bridge)
+    return bridge
+
+
+@pytest.fixture(scope='module')
+def attacks(request):
+    """By seed: the bridge after each stream, and after every 20th whether it flies a vehicle."""
+    made = {}
+    for seed in range(request.config.getoption('--streams')):
+        bridge = attacked(seed)
+        flown = seed % 20 or bridge.flies(Guest('px4', GOOD, 'good'))
+        made[seed] = (bridge.unforeseen(), bridge.states, bridge.ground.refusals.count, flown)
+    return made
+
+
+def test_no_stream_ends_the_bridge_or_is_refused_for_an_unforeseen_reason(attacks):
+    assert {seed: found for seed, (found, *_) in attacks.items() if found} == {}
+
+
+def test_after_a_hostile_stream_a_good_vehicle_is_flown(attacks):
+    assert [seed for seed, (*_, flown) in attacks.items() if not flown] == []
+
+
+def test_the_streams_get_far_into_the_bridge(attacks):
+    assert set().union(*(states for _, states, *_ in attacks.values())) >= {
+        'UNKNOWN', 'UPLOADING', 'VERIFIED', 'NONE', 'HELD', 'LOST', 'SUSPENDED'}
+    assert sum(refused for _, _, refused, _ in attacks.values()) > 10 * len(attacks)
+
+
+def test_a_signed_stream_ends_no_bridge_without_its_key(tmp_path):
+    tmp_path.joinpath('key').write_bytes(bytes(32))
+    radio = Connections([Wire(True)], 245, 190, wall=lambda: 1.8e9,
+                  signing_key_file=str(tmp_path / 'key'))
+    forger = Codec(1, 1, signing=make_signing(b'x' * 32, 10**14))
+    rng = random.Random(1)
+    for pause, end, data in stream(1, LENGTH):
+        signed = forger.pack(d.MAVLink_heartbeat_message(2, 12, 0, 0, 4, 3))
+        cut = signed[:rng.randrange(len(signed))]
+        assert radio._parse((0, end), rng.choice([data, signed, cut])) == [], pause
+    assert radio.refusals.count == 0

@@ -1,0 +1,96 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The zones as they are now, packed once, and asked often: is this way clear, how long is it?"""
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from itertools import pairwise
+
+import numpy as np
+
+from uav_task_alloc.allocator.replanning.task_lists import polyline_length
+from uav_task_alloc.geometry.detour import Detour, find_detour
+from uav_task_alloc.geometry.obstacles import blocked, pack
+from uav_task_alloc.geometry.search_budget import SearchBudget
+from uav_task_alloc.model import Leg, Point, ThreatZone
+from uav_task_alloc.params import AllocatorParams
+
+MOST_WORK = 20_000_000  # units in one search for a way, some 50 ms
+
+
+class SafePaths:
+    """Ways around `zones`; half the clearance is left to wind and GPS once a way is flown."""
+
+    def __init__(self, zones: Sequence[ThreatZone], params: AllocatorParams) -> None:
+        self.zones, self.params = tuple(zones), params
+        self.margin = params.replan_margin  # share that a way must be shorter to replace one
+        self._bare = pack(self.zones)
+        self._wide = pack(self.zones, 0.5 * params.clearance)
+        self._planned = pack(self.zones, params.clearance)
+        rows = self._wide.rows
+        self._low = np.stack([rows['x0'], rows['y0'], rows['z0']], axis=1)
+        self._high = np.stack([rows['x1'], rows['y1'], rows['z1']], axis=1)
+
+    def leg(self, a: Point, b: Point) -> Leg | None:
+        """The shortest safe way from a to b; None where there is none, or it takes too long."""
+        found = self._find(a, b)
+        return None if math.isinf(found.length) else Leg(found.points, found.length)
+
+    def why_none(self, a: Point, b: Point) -> str:
+        """Why there is no safe way from a to the home b, in words."""
+        found = self._find(a, b)
+        if found.goal_inside:
+            return f'its home is inside zone {", ".join(found.goal_inside)}'
+        return 'none was found in the time' if found.given_up else 'zones close it off'
+
+    def _find(self, a: Point, b: Point) -> Detour:
+        """By whoever also hears and tells: a search must not keep it for long."""
+        params, effort = self.params, SearchBudget()
+        effort.begin(MOST_WORK)
+        return find_detour(a, b, self.zones, clearance=params.clearance,
+                           altitude_min=params.altitude_min, altitude_max=params.altitude_max,
+                           effort=effort, obstacles=self._planned)
+
+    def around(self, point: Point, up: float = 0.0, wide: bool = False) -> str:
+        """The first zone that the point, or a point less than `up` [m] above it, is in.
+
+        Args:
+            point: [m] ENU.
+            up: [m].
+            wide: with half the clearance, not the margin alone.
+
+        Returns:
+            Its id, '' where there is none.
+        """
+        rows, top = (self._wide if wide else self._bare).rows, (*point[:2], point[2] + up)
+        near = ((top >= self._low) & (point <= self._high)).all(axis=1)
+        return next((self.zones[k].id for k in np.flatnonzero(near)
+                     if blocked(rows[k], *point, *top, -np.inf, True)), '')
+
+    def clear(self, *points: Point) -> bool:
+        """The polyline enters no zone. O(zones) a segment, most of them by their boxes"""
+        return not self.zones or not any(self._cut(a, b) for a, b in pairwise(points))
+
+    def _cut(self, a: Point, b: Point) -> bool:
+        near = ((np.maximum(a, b) >= self._low) & (np.minimum(a, b) <= self._high)).all(axis=1)
+        rows = self._wide.rows
+        return any(blocked(rows[k], *a, *b, -np.inf, True) for k in np.flatnonzero(near))
+
+    def rest(self, position: Point, leg: Leg, goal: Point) -> float | None:
+        """Metres still to fly on a leg under way, by the via points ahead; None: it is cut."""
+        ahead = len(leg.via) - _passed(position, leg.via, goal)
+        for left in (ahead, *range(ahead - 1, -1, -1), *range(ahead + 1, len(leg.via) + 1)):
+            points = (position, *leg.via[len(leg.via) - left:], goal)
+            if self.clear(*points):
+                return polyline_length(points)
+        return None
+
+
+def _passed(position: Point, via: Sequence[Point], goal: Point) -> int:
+    """How many via points lie behind: the way on from there leads past the UAV."""
+    stops = (*via, goal)
+    for k in range(len(via), 0, -1):
+        here, onward = stops[k - 1], stops[k]
+        if sum((p - h) * (o - h) for p, h, o in zip(position, here, onward, strict=True)) > 0.0:
+            return k
+    return 0

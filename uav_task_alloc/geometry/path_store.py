@@ -1,0 +1,98 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The points of ways found, by their ends: a ring that forgets the oldest, for one search each.
+
+Several threads may write at once, and zones may have changed since: who recalls a way has to look
+whether it is clear, and as long as expected.
+"""
+from __future__ import annotations
+
+from typing import Any
+
+import numba
+import numpy as np
+from numba import carray  # type: ignore[attr-defined]
+
+from uav_task_alloc.geometry.numba_pointers import floats_at, ints_at
+from uav_task_alloc.geometry.obstacles import Floats
+from uav_task_alloc.geometry.taut import MAX_CORNERS, copy_point
+
+PLACES = 1 << 16  # of ways; a power of two
+PROBES = 4  # places a way may have
+ROOM = 1 << 19  # points kept, ends among them
+
+
+class PathStore:
+    """Room for the points of ways; `address` is what kernels take."""
+
+    def __init__(self) -> None:
+        self._place = np.full(PLACES, -1, np.int64)  # where in the ring a way begins
+        self._points = np.empty((ROOM, 3))  # number of points, then the points
+        self._state = np.zeros(3, np.int64)
+        self._state[1:] = self._place.ctypes.data, self._points.ctypes.data
+
+    @property
+    def address(self) -> int:
+        """Of the state: next free row, addresses of places and points."""
+        return int(self._state.ctypes.data)
+
+
+@numba.njit(cache=True, nogil=True)
+def _first_place(ends: Floats) -> int:
+    mixed: Any = np.int64(17)
+    for i in range(2):
+        for m in range(3):
+            mixed = (mixed ^ np.int64(ends[i, m] * 1024.0)) * 0x9E3779B1
+            mixed ^= mixed >> 29
+    return int(mixed & (PLACES - 1))
+
+
+@numba.njit(cache=True, nogil=True)
+def _same(points: Floats, first: int, ends: Floats) -> bool:
+    """Whether the way that begins in row `first` has these ends."""
+    n = int(points[first, 0])
+    if not 2 <= n <= MAX_CORNERS or first + n >= ROOM:
+        return False
+    for m in range(3):
+        if points[first + 1, m] != ends[0, m] or points[first + n, m] != ends[1, m]:
+            return False
+    return True
+
+
+@numba.njit(cache=True, nogil=True)
+def remember(address: int, way: Floats, n: int, ends: Floats) -> None:
+    """Keep the way[:n] between `ends`."""
+    state = ints_at(address)
+    place = carray(ints_at(state[1]), PLACES)
+    points = carray(floats_at(state[2]), (ROOM, 3))
+    first = state[0]
+    if first + n >= ROOM:
+        first = 0
+    state[0] = first + n + 1
+    points[first, 0] = n
+    for i in range(n):
+        copy_point(way, i, points, first + 1 + i)
+    at = _first_place(ends)
+    slot = at
+    for k in range(PROBES):
+        old = place[(at + k) & (PLACES - 1)]
+        if old < 0 or _same(points, old, ends):
+            slot = (at + k) & (PLACES - 1)
+            break
+    place[slot] = first
+
+
+@numba.njit(cache=True, nogil=True)
+def recall(address: int, ends: Floats, way: Floats) -> int:
+    """The points of the way between `ends` into way; returns their number, 0: not kept."""
+    state = ints_at(address)
+    place = carray(ints_at(state[1]), PLACES)
+    points = carray(floats_at(state[2]), (ROOM, 3))
+    at = _first_place(ends)
+    for k in range(PROBES):
+        first = place[(at + k) & (PLACES - 1)]
+        if first >= 0 and _same(points, first, ends):
+            n = int(points[first, 0])
+            for i in range(n):
+                copy_point(points, first + 1 + i, way, i)
+            return n
+    return 0

@@ -1,0 +1,248 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The shortest way past one zone in closed form, for domes, cylinders and prisms.
+
+Past a dome: tangent, arc, tangent in the plane through both ends and the centre. Past the others
+the shortest of: around, on either side, with z rising evenly; over the top; beneath. Arcs become
+circumscribed polylines of as few corners as the tolerance allows.
+"""
+from __future__ import annotations
+
+import math
+
+import numba
+import numpy as np
+from numba import carray  # type: ignore[attr-defined]
+
+from uav_task_alloc.geometry.numba_pointers import floats_at
+from uav_task_alloc.geometry.obstacles import CYLINDER, DOME, Floats, Zone
+from uav_task_alloc.geometry.taut import copy_point, length_of
+
+ARC_GAIN = 1.5e-3  # an arc's polyline may be longer by this share of the way
+MAX_PARTS = 12  # corners of one arc
+SLIDES = 10  # rounds in which both rim points of a way over the top find their places
+
+
+@numba.njit(cache=True, nogil=True)
+def _parts(radius: float, arc: float, straight: float) -> int:
+    """Corners for an arc [rad]: k of them make it longer by about radius arc^3 / (12 k^2)."""
+    excess = radius * arc ** 3 / (12.0 * ARC_GAIN * (straight + radius * arc))
+    return min(MAX_PARTS, max(1, math.ceil(math.sqrt(excess)), math.ceil(arc)))
+
+
+@numba.njit(cache=True, nogil=True)
+def _dot(u: Floats, v: Floats) -> float:
+    return float(u[0] * v[0] + u[1] * v[1] + u[2] * v[2])
+
+
+@numba.njit(cache=True, nogil=True)
+def _bend(centre: Floats, radius: float, way: Floats, flat: bool, out: Floats) -> int:
+    """Tangent, arc, tangent about a ball, or in plan about a circle; 0: no such way."""
+    u, v = np.empty(3), np.empty(3)
+    for m in range(3):
+        u[m], v[m] = way[0, m] - centre[m], way[1, m] - centre[m]
+    if flat:
+        u[2], v[2] = 0.0, 0.0
+    du, dv = math.sqrt(_dot(u, u)), math.sqrt(_dot(v, v))
+    if du <= radius or dv <= radius:
+        return 0
+    along = _dot(u, v) / du
+    for m in range(3):
+        u[m] /= du
+        v[m] -= along * u[m]
+    off = math.sqrt(_dot(v, v))
+    first = math.acos(radius / du)
+    arc = math.atan2(off, along) - first - math.acos(radius / dv)
+    if off < 1e-9 * dv:
+        if not flat:
+            return 0
+        v[0], v[1], off = -u[1], u[0], 1.0
+    if arc <= 0.0:
+        return 0
+    straight = math.sqrt(du * du - radius * radius) + math.sqrt(dv * dv - radius * radius)
+    k = _parts(radius, arc, straight)
+    far = radius / math.cos(0.5 * arc / k)
+    for j in range(k):
+        angle = first + (j + 0.5) * arc / k
+        c, s = far * math.cos(angle), far * math.sin(angle) / off
+        for m in range(3):
+            out[j + 1, m] = centre[m] + c * u[m] + s * v[m]
+    copy_point(way, 0, out, 0)
+    copy_point(way, 1, out, k + 1)
+    return k + 2
+
+
+@numba.njit(cache=True, nogil=True)
+def _rise(p: Floats, n: int) -> None:
+    """Let z of the corners rise evenly with the length in plan from p[0] to p[n - 1]."""
+    total = 0.0
+    for i in range(1, n):
+        total += math.hypot(p[i, 0] - p[i - 1, 0], p[i, 1] - p[i - 1, 1])
+    done = 0.0
+    for i in range(1, n - 1):
+        done += math.hypot(p[i, 0] - p[i - 1, 0], p[i, 1] - p[i - 1, 1])
+        p[i, 2] = p[0, 2] + (p[n - 1, 2] - p[0, 2]) * done / total
+
+
+@numba.njit(cache=True, nogil=True)
+def _wrap(rim: Floats, way: Floats, side: float, out: Floats) -> int:
+    """From a to b around one side (1: left) of a convex rim in plan, by gift wrapping."""
+    copy_point(way, 0, out, 0)
+    n = 1
+    while n <= rim.shape[0] + 1:
+        x, y = out[n - 1, 0], out[n - 1, 1]
+        bx, by, last = way[1, 0], way[1, 1], True
+        for i in range(rim.shape[0]):
+            cross = (bx - x) * (rim[i, 1] - y) - (by - y) * (rim[i, 0] - x)
+            if side * cross > 0.0 and (rim[i, 0] != x or rim[i, 1] != y):
+                bx, by, last = rim[i, 0], rim[i, 1], False
+        if last:
+            copy_point(way, 1, out, n)
+            return n + 1
+        out[n, 0], out[n, 1] = bx, by
+        n += 1
+    return 0
+
+
+@numba.njit(cache=True, nogil=True)
+def _in_hull(hull: Floats, p: Floats) -> bool:
+    for i in range(hull.shape[0]):
+        j = i + 1 if i + 1 < hull.shape[0] else 0
+        if (hull[j, 0] - hull[i, 0]) * (p[1] - hull[i, 1]) < (hull[j, 1] - hull[i, 1]) * (
+                p[0] - hull[i, 0]):
+            return False
+    return True
+
+
+@numba.njit(cache=True, nogil=True)
+def _crossed(rim: Floats, way: Floats) -> tuple[int, int, float, float]:
+    """The first and last edge of a rim that the line ab crosses in plan, and where; -1: none."""
+    enter, leave, s, t = -1, -1, np.inf, -np.inf
+    dx, dy = way[1, 0] - way[0, 0], way[1, 1] - way[0, 1]
+    n = rim.shape[0]
+    i = n - 1
+    si = dx * (rim[i, 1] - way[0, 1]) - dy * (rim[i, 0] - way[0, 0])
+    for j in range(n):
+        sj = dx * (rim[j, 1] - way[0, 1]) - dy * (rim[j, 0] - way[0, 0])
+        if (si > 0.0) != (sj > 0.0):
+            f = si / (si - sj)
+            x = rim[i, 0] + f * (rim[j, 0] - rim[i, 0]) - way[0, 0]
+            y = rim[i, 1] + f * (rim[j, 1] - rim[i, 1]) - way[0, 1]
+            u = (x * dx + y * dy) / (dx * dx + dy * dy)
+            if u < s:
+                enter, s = i, u
+            if u > t:
+                leave, t = i, u
+        i, si = j, sj
+    return enter, leave, s, t
+
+
+@numba.njit(cache=True, nogil=True)
+def _slide(rim: Floats, edge: int, z: float, p: Floats, q: Floats, x: Floats) -> int:
+    """x = where on an edge of the rim at height z the way p x q is shortest; the edge to try next.
+
+    Unfolded about the edge the way is straight, so x divides the feet of p and q in the ratio of
+    their distances from it.
+    """
+    n = rim.shape[0]
+    j = edge + 1 if edge + 1 < n else 0
+    ex, ey = rim[j, 0] - rim[edge, 0], rim[j, 1] - rim[edge, 1]
+    size = math.hypot(ex, ey)
+    ex, ey = ex / size, ey / size
+    fp = (p[0] - rim[edge, 0]) * ex + (p[1] - rim[edge, 1]) * ey
+    fq = (q[0] - rim[edge, 0]) * ex + (q[1] - rim[edge, 1]) * ey
+    hp = math.hypot((p[0] - rim[edge, 0]) * ey - (p[1] - rim[edge, 1]) * ex, p[2] - z)
+    hq = math.hypot((q[0] - rim[edge, 0]) * ey - (q[1] - rim[edge, 1]) * ex, q[2] - z)
+    s = fp + (fq - fp) * hp / (hp + hq) if hp + hq > 0.0 else fp
+    t = min(size, max(0.0, s))
+    x[0], x[1], x[2] = rim[edge, 0] + t * ex, rim[edge, 1] + t * ey, z
+    if s < 0.0:
+        return edge - 1 if edge > 0 else n - 1
+    return j if s > size else edge
+
+
+@numba.njit(cache=True, nogil=True)
+def _beside(zone: Zone, p: Floats) -> bool:
+    """Whether p is outside a cylinder in plan; it may be within its rim, that circumscribes it."""
+    return bool(zone.kind == CYLINDER
+                and math.hypot(p[0] - zone.x, p[1] - zone.y) > zone.radius + zone.skin)
+
+
+@numba.njit(cache=True, nogil=True)
+def _over(zone: Zone, rim: Floats, z: float, side: float, way: Floats, out: Floats) -> int:
+    """Over the rim at height z (side 1), or beneath it (-1); 0: no such way."""
+    enter, leave, s, t = _crossed(rim, way)
+    climbs, sinks = side * (z - way[0, 2]) > 0.0, side * (z - way[1, 2]) > 0.0
+    if (enter < 0 or leave < 0 or (climbs and s <= 0.0 and not _beside(zone, way[0]))
+            or (sinks and t >= 1.0 and not _beside(zone, way[1]))):
+        return 0
+    p, q = np.empty(3), np.empty(3)
+    for m in range(2):
+        p[m] = way[0, m] + (max(0.0, s) if climbs else 0.0) * (way[1, m] - way[0, m])
+        q[m] = way[0, m] + (min(1.0, t) if sinks else 1.0) * (way[1, m] - way[0, m])
+    p[2], q[2] = z if climbs else way[0, 2], z if sinks else way[1, 2]
+    for _ in range(SLIDES if climbs and sinks else 4):
+        if climbs:
+            enter = _slide(rim, enter, z, way[0], q, p)
+        if sinks:
+            leave = _slide(rim, leave, z, p, way[1], q)
+    copy_point(way, 0, out, 0)
+    n = 1
+    if climbs:
+        out[n, 0], out[n, 1], out[n, 2] = p[0], p[1], p[2]
+        n += 1
+    if sinks:
+        out[n, 0], out[n, 1], out[n, 2] = q[0], q[1], q[2]
+        n += 1
+    copy_point(way, 1, out, n)
+    return n + 1
+
+
+@numba.njit(cache=True, nogil=True)
+def _over_bound(z: float, side: float, way: Floats) -> float:
+    """Over (or beneath) height z the way is at least so long [m]."""
+    up = max(0.0, side * (z - way[0, 2])) + max(0.0, side * (z - way[1, 2]))
+    return math.hypot(math.hypot(way[1, 0] - way[0, 0], way[1, 1] - way[0, 1]),
+                      max(up, abs(way[1, 2] - way[0, 2])))
+
+
+@numba.njit(cache=True, nogil=True)
+def keep_best(trial: Floats, n: int, out: Floats, best: int) -> int:
+    """Copy the trial way to out where it is shorter; returns the number of points there."""
+    if n == 0 or (best > 0 and length_of(trial, n) >= length_of(out, best)):
+        return best
+    for i in range(n):
+        copy_point(trial, i, out, i)
+    return n
+
+
+@numba.njit(cache=True, nogil=True)
+def past_one(zone: Zone, way: Floats, limits: Floats, floor: float,
+             out: Floats) -> int:
+    """The shortest way past a zone alone into out; returns its points, 0: no closed form."""
+    skin, centre = 1.5 * zone.skin, np.array([zone.x, zone.y, zone.z])
+    if zone.kind == DOME:
+        n = _bend(centre, zone.radius + skin, way, False, out) if floor >= zone.low else 0
+        for i in range(1, n - 1):
+            if not limits[0] <= out[i, 2] <= limits[1]:
+                return 0
+        return n
+    if floor < limits[0] or max(way[0, 2], way[1, 2]) > limits[1]:
+        return 0
+    rim = carray(floats_at(zone.rim), (zone.rims, 2))
+    hull = carray(floats_at(zone.hull), (zone.hulls, 2))
+    if zone.dented and (_in_hull(hull, way[0]) or _in_hull(hull, way[1])):
+        return 0
+    trial, best = np.empty((zone.hulls + 3, 3)), 0
+    for side in (-1.0, 1.0):
+        if zone.kind == CYLINDER:
+            n = _bend(centre, zone.radius + skin, way, True, trial) if side > 0.0 else 0
+        else:
+            n = _wrap(hull, way, side, trial)
+        _rise(trial, n)
+        best = keep_best(trial, n, out, best)
+    for side in (-1.0, 1.0):
+        z = zone.high + skin if side > 0.0 else zone.low - skin
+        if limits[0] <= z <= limits[1] and not math.isinf(z) and (
+                best == 0 or _over_bound(z, side, way) < length_of(out, best)):
+            best = keep_best(trial, _over(zone, rim, z, side, way, trial), out, best)
+    return best

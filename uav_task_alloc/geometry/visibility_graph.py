@@ -1,0 +1,285 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The coarse way: A* over a visibility graph with its corners just outside the active zones."""
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numba
+import numpy as np
+
+from uav_task_alloc.geometry.numba_pointers import floats_at
+from uav_task_alloc.geometry.obstacles import (
+    CYLINDER,
+    DOME,
+    PRISM,
+    Floats,
+    Ints,
+    Zone,
+    Zones,
+    blocked,
+)
+from uav_task_alloc.geometry.search_budget import spend
+
+FEW_CORNERS = 160  # up to here edges are tested as late as possible
+
+
+@numba.njit(cache=True, nogil=True)
+def corner_bound(zone: Zone, ring: int, levels: int) -> int:
+    """At most so many corners come from a zone, with those at further levels."""
+    if zone.kind == PRISM:
+        return int((10 + 2 * levels) * zone.count)
+    return (4 + levels) * ring + 1
+
+
+@numba.njit(cache=True, nogil=True)
+def _height(way: Floats, x: float, y: float) -> float:
+    """z of the straight way ab where (x, y) is nearest to it in plan."""
+    dx, dy = way[1, 0] - way[0, 0], way[1, 1] - way[0, 1]
+    span = dx * dx + dy * dy
+    t = 0.5
+    if span > 0.0:
+        t = min(1.0, max(0.0, ((x - way[0, 0]) * dx + (y - way[0, 1]) * dy) / span))
+    return float(way[0, 2] + t * (way[1, 2] - way[0, 2]))
+
+
+@numba.njit(cache=True, nogil=True)
+def _heading(zone: Zone, way: Floats) -> tuple[float, float]:
+    """The way's direction in plan, so that what is built on it turns with the scene."""
+    dx, dy = way[1, 0] - way[0, 0], way[1, 1] - way[0, 1]
+    size = math.hypot(dx, dy)
+    if size <= 1e-9 * abs(way[1, 2] - way[0, 2]):
+        dx, dy = way[0, 0] - zone.x, way[0, 1] - zone.y
+        size = math.hypot(dx, dy)
+    return (dx / size, dy / size) if size > 0.0 else (1.0, 0.0)
+
+
+@numba.njit(cache=True, nogil=True)
+def _ring(zone: Zone, way: Floats, limits: Floats, radius: float, z: float, ring: int,
+          out: Floats, n: int) -> int:
+    """`ring` corners around the axis of zone k at height z (NaN: that of the way)."""
+    ux, uy = _heading(zone, way)
+    low, high = limits[0], limits[1]
+    for j in range(ring):
+        c, s = math.cos(2 * math.pi * j / ring), math.sin(2 * math.pi * j / ring)
+        ex, ey = ux * c - uy * s, ux * s + uy * c
+        x, y, h = zone.x + radius * ex, zone.y + radius * ey, z
+        if math.isnan(z):
+            h = min(high, max(low, _height(way, x, y)))
+            if zone.kind == DOME:
+                up = max(0.0, h - zone.z)
+                if up >= radius:
+                    continue
+                wide = math.sqrt(radius * radius - up * up)
+                x, y = zone.x + wide * ex, zone.y + wide * ey
+        out[n, 0], out[n, 1], out[n, 2] = x, y, h
+        n += 1
+    return n
+
+
+@numba.njit(cache=True, nogil=True)
+def _dome_corners(zone: Zone, way: Floats, limits: Floats, floor: float, ring: int,
+                  out: Floats, n: int) -> int:
+    radius = (zone.radius + 1.5 * zone.skin) / math.cos(math.pi / ring)
+    n = _ring(zone, way, limits, radius, np.nan, ring, out, n)
+    for step in range(1, 3):
+        up = min(radius * math.sin(math.pi / 6 * step), limits[1] - zone.z)
+        if up > 0.0 and zone.z + up >= limits[0]:
+            n = _ring(zone, way, limits, math.sqrt(radius * radius - up * up),
+                      zone.z + up, ring, out, n)
+    if limits[0] <= zone.z + radius <= limits[1]:
+        out[n, 0], out[n, 1], out[n, 2] = zone.x, zone.y, zone.z + radius
+        n += 1
+    under = zone.low - 1.5 * zone.skin
+    if floor < zone.low and limits[0] <= under <= limits[1]:
+        n = _ring(zone, way, limits, radius, under, ring, out, n)
+    return n
+
+
+@numba.njit(cache=True, nogil=True)
+def _crossing(way: Floats, px: float, py: float, qx: float, qy: float) -> float:
+    """Where along pq, in 0..1, the straight way ab crosses it in plan; NaN: nowhere."""
+    dx, dy = way[1, 0] - way[0, 0], way[1, 1] - way[0, 1]
+    sp = dx * (py - way[0, 1]) - dy * (px - way[0, 0])
+    sq = dx * (qy - way[0, 1]) - dy * (qx - way[0, 0])
+    return sp / (sp - sq) if sp * sq < 0.0 else np.nan
+
+
+@numba.njit(cache=True, nogil=True)
+def _edge_corners(zone: Zone, way: Floats, z: float, reach: float, out: Floats,
+                  n: int) -> int:
+    """Corners on a rim of the enlarged prism: each edge's middle and where the way crosses it."""
+    c, count = floats_at(zone.corners), zone.count
+    for i in range(count):
+        j = (i + 1) % count
+        px, py = c[2 * i], c[2 * i + 1]
+        dx, dy = c[2 * j] - px, c[2 * j + 1] - py
+        size = math.hypot(dx, dy)
+        px, py = px + dy * reach / size, py - dx * reach / size
+        cross = _crossing(way, px, py, px + dx, py + dy)
+        for t in (0.5, cross):
+            if not math.isnan(t):
+                out[n, 0], out[n, 1], out[n, 2] = px + t * dx, py + t * dy, z
+                n += 1
+    return n
+
+
+@numba.njit(cache=True, nogil=True)
+def _prism_corners(zone: Zone, way: Floats, limits: Floats, z: float, out: Floats,
+                   n: int) -> int:
+    """Mitred corners at the convex corners of the enlarged polygon, at z (NaN: the way's)."""
+    reach = zone.grow + 1.5 * zone.skin
+    corners, count = floats_at(zone.corners), zone.count
+    for i in range(count):
+        h, j = (i - 1) % count, (i + 1) % count
+        cx, cy = corners[2 * i], corners[2 * i + 1]
+        before = math.atan2(cy - corners[2 * h + 1], cx - corners[2 * h])
+        turn = math.atan2(corners[2 * j + 1] - cy, corners[2 * j] - cx) - before
+        turn -= 2 * math.pi * math.floor((turn + math.pi) / (2 * math.pi))
+        if turn <= 0.0:
+            continue
+        parts = max(1, math.ceil(turn / (0.5 * math.pi) - 1e-9))
+        far = reach / math.cos(0.5 * turn / parts)
+        for j in range(parts):
+            angle = before - 0.5 * math.pi + (j + 0.5) * turn / parts
+            x, y = cx + far * math.cos(angle), cy + far * math.sin(angle)
+            out[n, 0], out[n, 1] = x, y
+            out[n, 2] = min(limits[1], max(limits[0], _height(way, x, y))) if math.isnan(
+                z) else z
+            n += 1
+    return n
+
+
+@numba.njit(cache=True, nogil=True)
+def add_corners(zone: Zone, way: Floats, limits: Floats, floor: float, ring: int,
+                out: Floats, n: int) -> int:
+    """Write the corners of zone k for the way ab into out[n:]; returns the new n."""
+    if zone.kind == DOME:
+        return _dome_corners(zone, way, limits, floor, ring, out, n)
+    radius = (zone.radius + 1.5 * zone.skin) / math.cos(math.pi / ring)
+    for level in range(3):
+        z = np.nan
+        if level == 1:
+            z = zone.high + 1.5 * zone.skin
+        elif level == 2:
+            z = zone.low - 1.5 * zone.skin
+        if z < limits[0] or z > limits[1] or math.isinf(z):
+            continue
+        if zone.kind == CYLINDER:
+            n = _ring(zone, way, limits, radius, z, ring, out, n)
+        else:
+            n = _prism_corners(zone, way, limits, z, out, n)
+            if not math.isnan(z):
+                n = _edge_corners(zone, way, z, zone.grow + 1.5 * zone.skin, out, n)
+    return n
+
+
+@numba.njit(cache=True, nogil=True)
+def add_level(zone: Zone, way: Floats, limits: Floats, z: float, ring: int, out: Floats,
+              n: int) -> int:
+    """Write corners around a zone at a height where another zone ends; returns the new n."""
+    low = zone.z if zone.kind == DOME else zone.low
+    if not (max(low, limits[0]) < z < min(zone.high, limits[1])):
+        return n
+    if zone.kind == PRISM:
+        return _prism_corners(zone, way, limits, z, out, n)
+    radius = (zone.radius + 1.5 * zone.skin) / math.cos(math.pi / ring)
+    if zone.kind == DOME:
+        radius = math.sqrt(radius * radius - (z - zone.z) ** 2)
+    return _ring(zone, way, limits, radius, z, ring, out, n)
+
+
+@numba.njit(cache=True, nogil=True)
+def _gap(x: Floats, i: int, j: int) -> float:
+    dx, dy, dz = x[i, 0] - x[j, 0], x[i, 1] - x[j, 1], x[i, 2] - x[j, 2]
+    return math.sqrt(dx * dx + dy * dy + dz * dz)
+
+
+@numba.njit(cache=True, nogil=True)
+def _boxes(o: Zones, active: Ints) -> Floats:
+    """x0, x1, y0, y1 of the active zones, side by side in memory."""
+    boxes = np.empty((active.size, 4))
+    for m in range(active.size):
+        zone = o[active[m]]
+        boxes[m, 0], boxes[m, 1], boxes[m, 2], boxes[m, 3] = zone.x0, zone.x1, zone.y0, zone.y1
+    return boxes
+
+
+@numba.njit(cache=True, nogil=True)
+def _sees(o: Zones, active: Ints, boxes: Floats, x: Floats, i: int, j: int, floor: float,
+          snug: bool) -> bool:
+    x0, x1 = min(x[i, 0], x[j, 0]), max(x[i, 0], x[j, 0])
+    y0, y1 = min(x[i, 1], x[j, 1]), max(x[i, 1], x[j, 1])
+    for m in range(active.size):
+        if (x0 <= boxes[m, 1] and x1 >= boxes[m, 0] and y0 <= boxes[m, 3] and y1 >= boxes[m, 2]
+                and blocked(o[active[m]], x[i, 0], x[i, 1], x[i, 2], x[j, 0], x[j, 1], x[j, 2],
+                            floor, snug)):
+            return False
+    return True
+
+
+@numba.njit(cache=True, nogil=True)
+def _next_parent(x: Floats, cost: Floats, closed: Ints, done: int, v: int,
+                 failed: int) -> tuple[float, int]:
+    """The next best way to v over a closed corner, after the one that failed; ties in turn."""
+    best, parent, above, passed = np.inf, -1, cost[v], False
+    for m in range(done):
+        u = closed[m]
+        c = cost[u] + _gap(x, u, v)
+        if c < best and (c > above or (c == above and passed)):
+            best, parent = c, u
+        passed = passed or u == failed
+    return best, parent
+
+
+@numba.njit(cache=True, nogil=True)
+def _nearest_open(cost: Floats, ahead: Floats, state: Any) -> int:
+    """The open corner with the least bound on the whole way; -1: none."""
+    v, best = -1, np.inf
+    for w in range(cost.size):
+        if state[w] == 0 and cost[w] + ahead[w] < best:
+            v, best = w, cost[w] + ahead[w]
+    return v
+
+
+@numba.njit(cache=True, nogil=True)
+def astar(o: Zones, active: Ints, x: Floats, floor: float, snug: bool, path: Ints,
+          work: Ints) -> int:
+    """Shortest way 0 -> 1 over corners x past the active zones; returns its corners, 0: none.
+
+    It is sought from 1, so that parents lead the right way. Among few corners an edge is tested
+    when it is about to be used, and a failed one falls back on the next best closed corner; among
+    many that would be sought too often, and all edges of a corner are tested when it is closed.
+    O(n) a step, or O(n zones).
+    """
+    n, boxes = x.shape[0], _boxes(o, active)
+    lazy = n <= FEW_CORNERS
+    cost, state = np.full(n, np.inf), np.zeros(n, np.int8)
+    parent, closed, ahead = np.full(n, -1), np.empty(n, np.int64), np.empty(n)
+    for v in range(n):
+        ahead[v] = _gap(x, v, 0)
+    cost[1], state[1], closed[0], done, u = 0.0, 1, 1, 1, 1
+    while True:
+        for v in range(n):
+            if state[v] == 0:
+                c = cost[u] + _gap(x, u, v)
+                if c < cost[v] and (lazy or _sees(o, active, boxes, x, u, v, floor, snug)):
+                    cost[v], parent[v] = c, u
+            if v % 64 == 0 and spend(work, 64 if lazy else 64 * active.size):
+                return 0
+        while True:
+            v = _nearest_open(cost, ahead, state)
+            if v < 0 or spend(work, n + active.size):
+                return 0
+            if not lazy or _sees(o, active, boxes, x, parent[v], v, floor, snug):
+                break
+            cost[v], parent[v] = _next_parent(x, cost, closed, done, v, parent[v])
+        state[v], closed[done], u = 1, v, v
+        done += 1
+        if v == 0:
+            break
+    size = 0
+    while v >= 0:
+        path[size] = v
+        size, v = size + 1, parent[v]
+    return size

@@ -1,0 +1,99 @@
+# SPDX-License-Identifier: Apache-2.0
+"""HOLD or RETURN: at the end of a list, and where a swap does not come to its end."""
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+
+from uav_task_alloc.mavlink.autopilots import ModeFunction
+from uav_task_alloc.mavlink.gcs.authority_watch import AuthorityWatch
+from uav_task_alloc.mavlink.gcs.command_sender import CommandSender, NextMessages
+from uav_task_alloc.mavlink.gcs.onboard_mission import OnboardMission
+from uav_task_alloc.mavlink.gcs.policy import Policy
+from uav_task_alloc.mavlink.gcs.return_path import zone_in_the_way
+from uav_task_alloc.mavlink.gcs.telemetry import Telemetry
+from uav_task_alloc.mavlink.mission.items import TaskList, all_alike
+from uav_task_alloc.mavlink.transport.notes import OperatorNote
+
+SWAP_HOLD = 30.0  # [s] that a vehicle is held for an upload, at most
+
+
+class EndOfList:
+    """Sends a vehicle home where its list is empty or held too long, and the way is clear."""
+
+    def __init__(
+        self,
+        helm: CommandSender,
+        telemetry: Telemetry,
+        board: OnboardMission,
+        watch: AuthorityWatch,
+        policy: Callable[[], Policy],
+        notes: deque[OperatorNote],
+    ) -> None:
+        self._helm, self._telemetry, self._board = helm, telemetry, board
+        self._watch, self._policy, self._notes = watch, policy, notes
+        self.going_home = False  # by a list without tasks
+        self.alarm = ''  # what a human has to see to
+
+    def swap_ended(self) -> None:
+        """It flies its list."""
+        self._watch.swap_at, self.alarm = None, ''
+
+    def held_too_long(self, now: float) -> NextMessages:
+        """A swap that does not come to its end: home where the way is clear, else stay."""
+        since = self._watch.swap_at
+        if since is None or now - since <= SWAP_HOLD or not self._watch.authority.held:
+            return None
+        self._watch.swap_at = None
+        blocked = self._blocked_home()
+        if blocked:
+            self.alarm = f'held for an upload that does not end, and {blocked}: stays'
+            self._notes.append(OperatorNote('error', self.alarm))
+            return None
+        self._notes.append(
+            OperatorNote(
+                'error', f'held for {SWAP_HOLD:g} s for an upload that does not end: returns'
+            )
+        )
+        return self._helm.set_mode(ModeFunction.RETURN, now)
+
+    def empty(self, now: float) -> NextMessages:
+        """Nothing to fly: hold or return, and keep what is on board."""
+        board, telemetry, helm = self._board, self._telemetry, self._helm
+        end, tasks = board.wanted(), board.remaining()  # less what cannot be an item
+        self.going_home = False
+        if tasks.stops:
+            return None
+        rest = (board.held or ())[board.progress.current or 0:]
+        if not board.progress.pending:
+            board.revision = tasks.revision
+        flying = telemetry.flight is ModeFunction.MISSION and not board.progress.finished
+        if flying and end and rest and all_alike(end[-len(rest):], rest):
+            self.going_home = True
+            return helm.content()
+        if board.progress.pending or not telemetry.airborne or helm.resting(now) or (
+                not self._watch.authority.held):
+            return []
+        return self._end(tasks, flying, now)
+
+    def _end(self, tasks: TaskList, flying: bool, now: float) -> NextMessages:
+        telemetry = self._telemetry
+        returns = tasks.returns or self._policy().when_empty == 'return'
+        if tasks.end_via and tasks.returns and telemetry.flight is not ModeFunction.RETURN:
+            self.going_home = True
+            return None  # the plain way home leads through a zone: fly the list of it
+        blocked = self._blocked_home() if returns else ''
+        if blocked and telemetry.flight is not ModeFunction.RETURN:
+            returns = False
+            self._helm.wait(f'a way home: {blocked}')
+        if flying or (returns and telemetry.flight in (ModeFunction.HOLD, ModeFunction.MISSION)):
+            return self._helm.set_mode(ModeFunction.RETURN if returns else ModeFunction.HOLD, now)
+        return []
+
+    def _blocked_home(self) -> str:
+        """Why it must not fly straight home, in words; '' where it may."""
+        telemetry, zones = self._telemetry, self._policy().zones
+        if telemetry.home is None or not telemetry.has_position:
+            return 'its way home is not known' if zones else ''
+        zone = zone_in_the_way(telemetry.position, telemetry.home, zones)
+        return f'zone {zone.id} is on its way home' if zone else ''

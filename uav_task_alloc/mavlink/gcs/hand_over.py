@@ -1,0 +1,79 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Hand-over to the bridge: by `~/hand_over`, or from the sticks to HOLD at rest."""
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+from pymavlink.dialects.v20 import ardupilotmega as d
+
+from uav_task_alloc.mavlink.gcs.authority import AuthorityEvent, AuthorityState
+from uav_task_alloc.mavlink.gcs.authority_watch_state import AuthorityWatchState
+from uav_task_alloc.mavlink.gcs.mission_evidence import MissionEvidence
+from uav_task_alloc.mavlink.gcs.policy import Policy
+
+REST, REST_MOVED, REST_TIME = 1.0, 3.0, 6.0  # [m/s], [m], [s]: at rest, for a hand-over
+LOW_BATTERY = 0.2  # [0..1] below which nothing is handed over
+
+
+class HandOver:
+    """Gives one vehicle to the bridge, or says why not."""
+
+    def __init__(self, state: AuthorityWatchState, evidence: MissionEvidence,
+                 policy: Callable[[], Policy]) -> None:
+        self._state, self._evidence, self._policy = state, evidence, policy
+
+    def ask(self, operator: str, now: float) -> str:
+        """An operator gives an aircraft that the bridge does not have; why not, or ''."""
+        refusal = self._refusal(now)
+        if not refusal:
+            state = self._state
+            state.forget_mode()
+            state.sent.drop()
+            state.flown = state.armed
+            state.authority.undecided = False
+            state.apply(
+                AuthorityEvent.HAND_OVER, now, f'handed over by {operator or "an operator"}'
+            )
+        return refusal
+
+    def _refusal(self, now: float) -> str:
+        state, telemetry, authority = self._state, self._state.telemetry, self._state.authority
+        if telemetry.stale(now) or state.mode is None:
+            return 'its link is stale'
+        if state.status >= d.MAV_STATE_CRITICAL and not authority.killed:
+            return 'a failsafe is active'
+        if self._evidence.foreign():
+            return 'the mission on board is foreign'
+        if authority.state is AuthorityState.SUSPENDED:
+            return f'SUSPENDED: {authority.why}'
+        if telemetry.battery < LOW_BATTERY:
+            return (f'battery = {telemetry.battery:.0%}: expected at least {LOW_BATTERY:.0%}')
+        if not telemetry.past_boot:
+            return 'the autopilot is starting'
+        if not (telemetry.airborne or telemetry.grounded):
+            return 'not known whether it is in the air'
+        if authority.killed and (state.armed or not telemetry.grounded):
+            return 'after a kill only on the ground and disarmed'
+        if state.status >= d.MAV_STATE_CRITICAL:
+            return 'a failsafe is active'
+        if telemetry.grounded and not self._policy().takeoff:
+            return 'on the ground, and takeoff is false'
+        return ''
+
+    def step(self, now: float) -> None:
+        """STICK -> HOLD is a hand-over once it has been at rest for a while."""
+        state, telemetry = self._state, self._state.telemetry
+        if state.rest is None:
+            return
+        since, place = state.rest
+        moved = math.dist(telemetry.position, place)
+        calm = (telemetry.speed < REST and moved < REST_MOVED and telemetry.airborne
+                and now - telemetry.position_at < 2.0 and state.status == d.MAV_STATE_ACTIVE
+                and not state.failing(now))
+        if not calm:
+            state.rest = None
+        elif now - since >= REST_TIME:
+            state.rest = None
+            state.apply(AuthorityEvent.STICK_TO_HOLD, now,
+                        f'{state.name_of(state.mode)} at rest for {REST_TIME:g} s')

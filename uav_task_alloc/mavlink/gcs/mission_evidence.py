@@ -1,0 +1,67 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What the mission on board says about a change of mode."""
+from __future__ import annotations
+
+from pymavlink.dialects.v20 import ardupilotmega as d
+
+from uav_task_alloc.mavlink.gcs.onboard_mission import LATE, OnboardMission
+from uav_task_alloc.mavlink.gcs.resume import checksum
+from uav_task_alloc.mavlink.gcs.telemetry import Telemetry
+from uav_task_alloc.mavlink.mission.items import Item, alike
+
+
+class MissionEvidence:
+    """Reads the board of one vehicle, and changes nothing."""
+
+    def __init__(self, board: OnboardMission, telemetry: Telemetry) -> None:
+        self._board, self._telemetry = board, telemetry
+        self._checksum: tuple[tuple[Item, ...], int] | None = None
+
+    def ended(self, now: float) -> bool:
+        """REACHED of the last item has just come."""
+        return self._board.progress.ended_lately(now, LATE)
+
+    def rejected(self, now: float) -> bool:
+        """The vehicle says that it has no valid mission, just after it took ours (PX4)."""
+        telemetry, board = self._telemetry, self._board
+        return (telemetry.mission_state == d.MISSION_STATE_NO_MISSION
+                and now - telemetry.current_at < LATE
+                and (board.taken or now - board.verified_at < LATE))
+
+    def returning(self) -> bool:
+        """The RETURN item is next, or is being flown."""
+        progress = self._board.progress
+        return progress.returns and progress.current is not None and (
+            progress.current > progress.last_flown)
+
+    def may_end(self) -> bool:
+        """The last item with a place is being flown, or is passed."""
+        return self._board.progress.may_end(self._telemetry.heard_at)
+
+    def verified(self) -> bool:
+        """The list is verified on board."""
+        return self._board.verified()
+
+    def ours(self) -> bool:
+        """What was read back holds a task of the list: nobody else has put it there."""
+        board = self._board
+        if not board.held or board.tasks is None or not board.tasks.stops:
+            return False
+        items = [item for item in board.wanted() if item.completes]
+        return any(alike(item, held) for item in items for held in board.held)
+
+    def foreign(self) -> bool:
+        """Somebody else has changed what was verified."""
+        return self._board.is_foreign
+
+    def place(self) -> tuple[int | None, int | None]:
+        """Checksum of the mission on board, and the item that is flown; None: not known."""
+        held, progress = self._board.held, self._board.progress
+        if held is None or progress.current is None:
+            return None, None
+        if self._checksum is None or self._checksum[0] is not held:
+            self._checksum = held, checksum(held)
+        pending = progress.pending
+        return self._checksum[1], next((n for n, item in enumerate(
+            progress.items[:progress.current]) if item.task in pending),
+            progress.current) if pending else progress.current

@@ -1,0 +1,58 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What the STATUSTEXTs of a vehicle say about a change of mode, and when they said so."""
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass
+
+from pymavlink.dialects.v20 import ardupilotmega as d
+
+from uav_task_alloc.mavlink.transport.codec import Message
+
+TEXT_WINDOW = 6.0  # [s] around a change of mode in which a text speaks of it
+_FAILSAFE = re.compile(r'failsafe|fence breach|breached|battery \d+ is (low|critical)|'
+                       r'(low|critical|dangerous).{0,12}battery|data link lost|'
+                       r'(rc|manual control|gcs).{0,20}lost', re.IGNORECASE)
+_KILL = re.compile(r'emergency stop|flight terminat|terminating', re.IGNORECASE)
+_KILL_SWITCH = re.compile(r'motorestop high|kill(.?switch)? engaged', re.IGNORECASE)
+_FINISHED = re.compile(r'mission finished', re.IGNORECASE)  # PX4, at the end of its mission
+_INFEASIBLE = re.compile(r'(mission|waypoint).*(reject|infeasible|invalid|not valid|too far|'
+                         r'too close|failed)|too far', re.IGNORECASE)
+
+
+@dataclass(slots=True)
+class StatusTexts:
+    """The newest text of each meaning."""
+
+    failsafe_at: float = -math.inf  # [s]
+    infeasible_at: float = -math.inf  # [s]
+    finished_at: float = -math.inf  # [s]
+
+    def receive(self, message: Message, now: float) -> bool:
+        """Take a STATUSTEXT.
+
+        Args:
+            message: the STATUSTEXT.
+            now: steady time [s].
+
+        Returns:
+            Whether it says that the motors were stopped, or the flight terminated.
+        """
+        words = str(message.text)
+        urgent = message.severity <= d.MAV_SEVERITY_NOTICE
+        if _FINISHED.search(words):
+            self.finished_at = now
+        if urgent and _FAILSAFE.search(words):
+            self.failsafe_at = now
+        if urgent and _INFEASIBLE.search(words):
+            self.infeasible_at = now
+        return bool(_KILL_SWITCH.search(words) or (urgent and _KILL.search(words)))
+
+    def failsafe(self, now: float) -> bool:
+        """A failsafe was named a moment ago."""
+        return now - self.failsafe_at < TEXT_WINDOW
+
+    def mission_over(self, now: float) -> bool:
+        """The mission was called finished or infeasible a moment ago."""
+        return max(self.finished_at, self.infeasible_at) > now - TEXT_WINDOW

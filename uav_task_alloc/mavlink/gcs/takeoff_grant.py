@@ -1,0 +1,35 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Grants and withdraws authority by the parameter `takeoff`."""
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from uav_task_alloc.mavlink.gcs.authority import AuthorityEvent, AuthorityState
+from uav_task_alloc.mavlink.gcs.authority_watch_state import AuthorityWatchState
+from uav_task_alloc.mavlink.gcs.policy import Policy
+
+
+class TakeoffGrant:
+    """Follows `takeoff` for one vehicle."""
+
+    def __init__(self, state: AuthorityWatchState, policy: Callable[[], Policy]) -> None:
+        self._state, self._policy = state, policy
+        self.takeoff = policy().takeoff  # as acted on last
+
+    def step(self, now: float) -> None:
+        """Act where the parameter or the vehicle has changed."""
+        state, authority = self._state, self._state.authority
+        takeoff, telemetry = self._policy().takeoff, self._state.telemetry
+        idle = state.mode is not None and not state.armed
+        if not takeoff and (self.takeoff or (idle and authority.held)):
+            air = telemetry.airborne
+            state.apply(AuthorityEvent.WITHDRAWN_IN_AIR if air else AuthorityEvent.WITHDRAWN, now,
+                        'takeoff is false' + (': until the landing' if air else ''))
+        elif takeoff and not self.takeoff:
+            authority.until_landing = False
+        if authority.state is not AuthorityState.SUSPENDED or takeoff:
+            self.takeoff = takeoff  # else it becomes false when that is over
+        if (takeoff and idle and authority.state is AuthorityState.NONE and not authority.landed
+                and not authority.undecided and telemetry.grounded and telemetry.past_boot
+                and not telemetry.stale(now)):
+            state.apply(AuthorityEvent.GRANTED, now, 'takeoff is true')

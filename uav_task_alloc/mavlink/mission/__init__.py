@@ -1,0 +1,2 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Missions without I/O: items, transfer, comparison, progress, files."""

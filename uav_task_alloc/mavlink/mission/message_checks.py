@@ -1,0 +1,45 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Which received messages have a field that no vehicle can mean; whoever sends may be hostile."""
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+from uav_task_alloc.mavlink.mission.items import GLOBAL_FRAMES
+from uav_task_alloc.mavlink.transport.codec import Message
+
+LATITUDE, LONGITUDE = 90 * 10**7, 180 * 10**7  # [1e-7 deg]
+# message -> field, least, most
+RANGES: dict[str, tuple[tuple[str, int, int], ...]] = {
+    'GLOBAL_POSITION_INT': (('lat', -LATITUDE, LATITUDE), ('lon', -LONGITUDE, LONGITUDE)),
+    'HOME_POSITION': (('latitude', -LATITUDE, LATITUDE), ('longitude', -LONGITUDE, LONGITUDE)),
+    'BATTERY_STATUS': (('battery_remaining', -128, 100),),  # below 0: it does not say
+    'SYS_STATUS': (('battery_remaining', -128, 100),),
+}
+ITEMS = ('MISSION_ITEM', 'MISSION_ITEM_INT')
+PLACE, PARAMS = ('x', 'y', 'z'), ('param1', 'param2', 'param3', 'param4')
+
+
+def defect(message: Message) -> str:
+    """The first field that is wrong, its value and what was expected; '' where none is.
+
+    A parameter of a mission item may be NaN, which leaves it to the autopilot; a coordinate in a
+    global frame may not, and nothing may be infinite.
+    """
+    return next(_defects(message), '')
+
+
+def _defects(message: Message) -> Iterator[str]:
+    kind = message.get_type()
+    for name, least, most in RANGES.get(kind, ()):
+        value = getattr(message, name)
+        if not least <= value <= most:
+            yield f'{name} = {value}: expected a number in [{least}, {most}]'
+    if kind not in ITEMS:
+        return
+    placed = message.frame in GLOBAL_FRAMES
+    for name in PLACE + PARAMS:
+        value = getattr(message, name)
+        if math.isinf(value) or (math.isnan(value) and name in PLACE and (
+                placed or kind == 'MISSION_ITEM')):
+            yield f'{name} = {value}: expected a finite number'

@@ -1,0 +1,69 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The two ends of a mission service: builds what we say and knows what is said to us."""
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+
+from uav_task_alloc.mavlink.mission.items import Item
+from uav_task_alloc.mavlink.transport.codec import Message
+
+ACCEPTED, ERROR, NO_SPACE, INVALID_SEQUENCE, DENIED, CANCELLED = 0, 1, 4, 13, 14, 15
+
+
+@dataclass(frozen=True, slots=True)
+class Peer:
+    """A vehicle and the ids by which we speak to it."""
+
+    system: int
+    component: int = 1
+    our_system: int = 245
+    our_component: int = 190
+    mission_type: int = 0
+
+    def says(self, message: Message) -> bool:
+        """Whether it comes from this vehicle, to us or to all, and concerns our mission type."""
+        return (message.get_srcSystem() == self.system
+                and message.get_srcComponent() == self.component
+                and getattr(message, 'target_system', 0) in (0, self.our_system)
+                and getattr(message, 'target_component', 0) in (0, self.our_component)
+                and getattr(message, 'mission_type', self.mission_type) == self.mission_type)
+
+    def count(self, count: int) -> Message:
+        return dialect.MAVLink_mission_count_message(
+            self.system, self.component, count, self.mission_type)
+
+    def item(self, seq: int, item: Item, current: bool) -> Message:
+        return dialect.MAVLink_mission_item_int_message(
+            self.system, self.component, seq, item.frame, item.command, int(current), 1,
+            *item.params, item.x, item.y, item.z, self.mission_type)
+
+    def ack(self, result: int) -> Message:
+        return dialect.MAVLink_mission_ack_message(
+            self.system, self.component, result, self.mission_type)
+
+    def request_list(self) -> Message:
+        return dialect.MAVLink_mission_request_list_message(
+            self.system, self.component, self.mission_type)
+
+    def request(self, seq: int) -> Message:
+        return dialect.MAVLink_mission_request_int_message(
+            self.system, self.component, seq, self.mission_type)
+
+    def set_current(self, seq: int) -> Message:
+        return dialect.MAVLink_mission_set_current_message(self.system, self.component, seq)
+
+    def command(self, command: int, *params: float) -> Message:
+        """COMMAND_LONG; parameters left out are 0."""
+        filled = (*params, *(0.0,) * (7 - len(params)))
+        return dialect.MAVLink_command_long_message(
+            self.system, self.component, command, 0, *filled)
+
+
+def received_item(message: Message) -> Item:
+    """A MISSION_ITEM_INT, or the older MISSION_ITEM in degrees, as an item."""
+    scale = 1 if message.get_type() == 'MISSION_ITEM_INT' else 1e7
+    return Item(message.command, message.frame, round(message.x * scale),
+                round(message.y * scale), message.z,
+                (message.param1, message.param2, message.param3, message.param4))

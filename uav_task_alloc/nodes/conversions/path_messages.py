@@ -1,0 +1,58 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The way a UAV has still to fly: as points, and as a nav_msgs/Path."""
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from itertools import pairwise
+
+from geometry_msgs.msg import PoseStamped
+from nav_msgs.msg import Path
+
+from uav_task_alloc.allocator.records import UavList
+from uav_task_alloc.allocator.state.fleet import UavRecord
+from uav_task_alloc.model import Point
+from uav_task_alloc.nodes.conversions.messages import header, to_point
+
+
+def way(uav_list: UavList, uav: UavRecord | None) -> list[Point]:
+    """Where it is (where that is known), detour points and tasks in order, and home [m]."""
+    points: list[Point] = []
+    for k, stop in enumerate(uav_list.stops):
+        leg = [*stop.leg.via, stop.task.position]
+        points += ahead(uav.report.position, leg) if uav and k == 0 else leg
+    if uav is None or not points:
+        return points
+    end = [*uav_list.end_via, uav.home] if uav_list.returns else []
+    return [uav.report.position, *points, *end]
+
+
+def ahead(place: Point, points: Sequence[Point]) -> Sequence[Point]:
+    """Those of a polyline that come after the spot of it nearest to `place`."""
+    nearest, passed = math.inf, 0
+    for k, (a, b) in enumerate(pairwise(points)):
+        along = tuple(q - p for p, q in zip(a, b, strict=True))
+        square = math.fsum(d * d for d in along)
+        share = math.fsum((v - p) * d for v, p, d in zip(
+            place, a, along, strict=True)) / square if square > 0.0 else 0.0
+        share = min(max(share, 0.0), 1.0)
+        gap = math.dist(place, tuple(p + share * d for p, d in zip(a, along, strict=True)))
+        if gap < nearest:
+            nearest, passed = gap, k + (share > 0.0)
+    return points[passed:]
+
+
+def path(uav_list: UavList, uav: UavRecord | None) -> Path:
+    """The way as a message; each pose looks to the next, the last as the one before it."""
+    made = Path(header=header(uav_list.stamp))
+    points = way(uav_list, uav)
+    yaw = 0.0
+    for a, b in pairwise([*points, *points[-1:]]):
+        east, north = b[0] - a[0], b[1] - a[1]
+        yaw = math.atan2(north, east) if east or north else yaw
+        pose = PoseStamped(header=made.header)
+        pose.pose.position = to_point(a)
+        pose.pose.orientation.z = math.sin(yaw / 2.0)
+        pose.pose.orientation.w = math.cos(yaw / 2.0)
+        made.poses.append(pose)
+    return made

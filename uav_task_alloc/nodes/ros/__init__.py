@@ -1,0 +1,2 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What nodes share: parameters, running, subscriptions, publishers, recording."""

@@ -1,0 +1,178 @@
+# SPDX-License-Identifier: Apache-2.0
+"""ArduCopter in flight: a mission that stops, resumes and completes, and stays in AUTO."""
+from __future__ import annotations
+
+from enum import Enum
+from typing import ClassVar
+
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+
+from uav_task_alloc.sim import stored_item as item_
+from uav_task_alloc.sim.boot import BootTimes
+from uav_task_alloc.sim.config import FlightMode, StorageChange
+from uav_task_alloc.sim.dynamics import Track
+from uav_task_alloc.sim.flight import CRITICAL, WARNING, VehicleFlight
+from uav_task_alloc.sim.modes import COPTER_MODES, COPTER_NOT_ARMABLE
+from uav_task_alloc.sim.stored_item import StoredItem
+
+_GUIDED = {4, 20}  # GUIDED, GUIDED_NOGPS
+_FIRST_PREARM, _PREARM_PERIOD = 15.0, 30.0  # [s] after power-up; between texts
+
+
+class MissionRun(Enum):
+    """State of the mission; the values are those of MISSION_CURRENT.mission_state."""
+
+    NOT_STARTED = 2
+    ACTIVE = 3
+    STOPPED = 4
+    COMPLETE = 5
+
+
+class ArduPilotFlight(VehicleFlight):
+    """Flies from seq 1 on; what it flies now is a copy that a changed storage restarts."""
+
+    modes = COPTER_MODES
+    custom_modes: ClassVar[dict[FlightMode, int]] = {
+        FlightMode.MANUAL: 0,
+        FlightMode.MISSION: 3,
+        FlightMode.GUIDED: 4,
+        FlightMode.HOLD: 5,
+        FlightMode.RETURN: 6,
+        FlightMode.LAND: 9,
+        FlightMode.BRAKE: 17,
+    }
+    boot_states = (dialect.MAV_STATE_BOOT, dialect.MAV_STATE_CALIBRATING)
+    boot_times = BootTimes(boot=8.0, position=41.0, settling=0.0)
+    start_mode = FlightMode.MANUAL
+    return_height = 15.0
+    real_radius = 2.0
+    takeoff_height = 10.0
+
+    def reboot(self, now: float) -> None:
+        super().reboot(now)
+        self.run = MissionRun.NOT_STARTED
+        self._upcoming = 1  # seq where the search for the next flown item begins
+        self._prearm_at = now + _FIRST_PREARM
+
+    def arming_refusal(self) -> str:
+        mode, number = self.modes[self.custom_mode], self.custom_mode
+        armable = number in _GUIDED or (mode.stick and number not in COPTER_NOT_ARMABLE)
+        return super().arming_refusal() if armable else f'{mode.name} mode not armable'
+
+    def report_refusal(self, reason: str) -> None:
+        self.texts.append((CRITICAL, f'Arm: {reason}'))
+
+    def step(self, now: float) -> None:
+        super().step(now)
+        if now < self._prearm_at:
+            return
+        self._prearm_at = now + _PREARM_PERIOD
+        reason = '' if self.armed else self.prearm_refusal()
+        if reason:
+            self.texts.append((CRITICAL, f'PreArm: {reason}'))
+
+    def takeoff(self, height: float) -> bool:
+        if self.mode is not FlightMode.GUIDED or not self.armed or not self.landed:
+            return False
+        x, y, z = self.body.position
+        if height <= z:
+            return False
+        self.track = Track(((x, y, height),), 0.3)
+        return True
+
+    def can_fly_mission(self) -> bool:
+        if len(self.items) < 2:
+            self.texts.append((WARNING, 'Mode change to AUTO failed: no mission'))
+            return False
+        if self.armed and self.landed and self._first_flown() != item_.TAKEOFF:
+            self.texts.append((CRITICAL, 'Auto: Missing Takeoff Cmd'))
+            return False
+        return True
+
+    def _first_flown(self) -> int | None:
+        return next((i.command for i in self.items[1:] if i.command != item_.CHANGE_SPEED), None)
+
+    def leave(self, mode: FlightMode) -> None:
+        if mode is FlightMode.MISSION and self.run is MissionRun.ACTIVE:
+            self.run = MissionRun.STOPPED
+            if self.track is not None:
+                self._upcoming = self.seq  # what was interrupted is flown again
+
+    def enter(self, mode: FlightMode) -> None:
+        super().enter(mode)
+        if mode is FlightMode.MISSION:
+            self._resume()
+
+    def start_mission(self) -> bool:
+        if not self.set_mode(FlightMode.MISSION):
+            return False
+        if self.run is not MissionRun.ACTIVE:
+            self._resume()
+        return True
+
+    def _resume(self) -> None:
+        if self.run in (MissionRun.COMPLETE, MissionRun.NOT_STARTED):
+            self._upcoming = 1  # a completed mission begins anew
+        self.run = MissionRun.ACTIVE
+
+    def set_current(self, seq: int) -> bool:
+        if len(self.items) < 2 or seq >= len(self.items):
+            return False
+        upcoming = max(seq, 1)
+        flown = self._flown_from(upcoming)
+        if flown is None:
+            return False
+        self.seq, self._upcoming = flown, upcoming
+        if self.mode is FlightMode.MISSION:
+            self.track = None
+        if self.run is not MissionRun.ACTIVE:
+            self.run = MissionRun.STOPPED
+        return True
+
+    def _flown_from(self, seq: int) -> int | None:
+        return next((i for i in range(seq, len(self.items))
+                     if self.items[i].command != item_.CHANGE_SPEED), None)
+
+    def changed(self, change: StorageChange, flagged: int | None) -> None:
+        if change is StorageChange.CLEARED:
+            self.seq, self._upcoming, self.run = 0, 1, MissionRun.NOT_STARTED
+        if (
+            change is StorageChange.WRITTEN
+            and self.mode is FlightMode.MISSION
+            and self.track is not None
+        ):
+            self._restart()
+
+    def _restart(self) -> None:
+        if self.seq < len(self.items):
+            self.begin(self.seq)
+            self.texts.append((CRITICAL, 'Auto mission changed, restarted command'))
+        else:  # it flies on to where the old item was
+            self.texts.append((CRITICAL, 'Auto mission changed but failed to restart command'))
+
+    def next_item(self) -> None:
+        if self.run is not MissionRun.ACTIVE:
+            return
+        flown = self._flown_from(self._upcoming)
+        for seq in range(self._upcoming, len(self.items) if flown is None else flown):
+            self.do(self.items[seq])
+            self.tell_reached(seq, self.body.position)
+        if flown is None:
+            self.run = MissionRun.COMPLETE
+            self.note('mission_end')
+            return
+        self._upcoming = flown + 1
+        self.begin(flown)
+
+    def begin(self, seq: int) -> None:
+        self._landing = self.items[seq].command == item_.LAND
+        super().begin(seq)
+
+    def item_done(self) -> None:
+        if not self._landing:  # it disarms before it could tell
+            self.tell_reached(self.seq, self.target)
+        self._upcoming = self.seq + 1
+        self.next_item()
+
+    def radius(self, item: StoredItem) -> float:
+        return self.acceptance_radius  # WPNAV_RADIUS, whatever param2 said

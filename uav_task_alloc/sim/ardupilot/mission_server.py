@@ -1,0 +1,168 @@
+# SPDX-License-Identifier: Apache-2.0
+"""ArduCopter's mission service: each item overwrites the storage at once; nothing is atomic."""
+from __future__ import annotations
+
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+
+from uav_task_alloc.mavlink.transport.codec import Message
+from uav_task_alloc.sim.ardupilot.flight import ArduPilotFlight, MissionRun
+from uav_task_alloc.sim.config import FlightMode, StorageChange
+from uav_task_alloc.sim.flight import WARNING
+from uav_task_alloc.sim.mission_server import MISSION, MissionService, RemoteIds
+from uav_task_alloc.sim.stored_item import (
+    Refusal,
+    StoredItem,
+    from_message,
+    stored_by_ardupilot,
+    to_float_message,
+    to_message,
+)
+
+RETRY = 1.0  # [s] between requests for the same item
+GIVE_UP = 8.0  # [s] without an item
+_ALL = dialect.MAV_MISSION_TYPE_ALL
+
+
+class ArduPilotMission(MissionService):
+    """Storage truncated at COUNT and overwritten item by item; seq 0 is home."""
+
+    flight: ArduPilotFlight
+
+    def __init__(self, system_id: int, capacity: int) -> None:
+        super().__init__(system_id, capacity)
+        self._peer: RemoteIds | None = None  # who is uploading
+        self._wanted = 0
+        self._expected = 0
+        self._heard = 0.0  # [s]
+        self._asked = 0.0  # [s]
+        self._unloaded: list[StoredItem] | None = None  # the storage, not read yet
+
+    def reboot(self) -> None:
+        self._peer = None
+        if self.flight.boot.active:
+            self._unloaded = [*(self._unloaded or ()), *self.items]
+            self.items.clear()
+        self.load()
+
+    def load(self) -> None:
+        if self._unloaded is not None and not self.flight.boot.active:
+            self.items[:], self._unloaded = self._unloaded, None
+
+    @property
+    def _space(self) -> int:
+        """Items that can be stored now."""
+        return 0 if self.flight.boot.active else self._capacity
+
+    def read(self, seq: int) -> StoredItem:
+        return self.flight.home_item() if seq == 0 else self.items[seq]
+
+    def progress(self) -> tuple[int, int, int]:
+        if len(self.items) < 2:
+            return 0, 1, 2  # MISSION_STATE_NO_MISSION
+        return (len(self.items) - 1, self.flight.run.value,
+                1 if self.flight.mode is FlightMode.MISSION else 2)
+
+    def step(self, now: float) -> None:
+        self.load()
+        if self._peer is None:
+            return
+        if now - self._heard > GIVE_UP:
+            self._send_ack(self._peer, dialect.MAV_MISSION_OPERATION_CANCELLED)
+            self._peer = None
+        elif now - self._asked > RETRY:
+            self._ask(now)
+
+    def _ask(self, now: float) -> None:
+        assert self._peer is not None
+        self._asked = now
+        self.out.append(dialect.MAVLink_mission_request_message(
+            *self._peer, self._wanted, MISSION))
+
+    def _count(self, message: Message, peer: RemoteIds, now: float) -> None:
+        if message.mission_type != MISSION:
+            self._send_ack(peer, dialect.MAV_MISSION_UNSUPPORTED, message.mission_type)
+            return
+        if self._peer not in (None, peer):
+            self._send_ack(peer, dialect.MAV_MISSION_DENIED)
+            return
+        self._peer = None
+        if message.count > self._space:
+            self._send_ack(peer, dialect.MAV_MISSION_NO_SPACE)
+            self._send_text(WARNING, f'Only {self._space} items are supported')
+            return
+        if self._unloaded is not None:
+            self._unloaded.clear()
+        if message.count < len(self.items):
+            del self.items[message.count:]
+            self._changed(StorageChange.TRUNCATED)
+        if message.count == 0:
+            self._send_ack(peer, dialect.MAV_MISSION_ACCEPTED)
+            return
+        self._peer, self._wanted, self._expected = peer, 0, message.count
+        self._heard = now
+        self._ask(now)
+
+    def _item(self, message: Message, peer: RemoteIds, now: float) -> None:
+        if message.mission_type != MISSION:
+            self._send_ack(peer, dialect.MAV_MISSION_UNSUPPORTED, message.mission_type)
+        elif self._peer is None:
+            self._send_ack(peer, dialect.MAV_MISSION_ERROR)
+        elif message.seq != self._wanted:
+            self._send_ack(peer, dialect.MAV_MISSION_INVALID_SEQUENCE)
+        elif peer != self._peer:
+            self._send_ack(peer, dialect.MAV_MISSION_DENIED)
+        else:
+            self._write(message, peer, now)
+
+    def _write(self, message: Message, peer: RemoteIds, now: float) -> None:
+        stored = (stored_by_ardupilot(from_message(message)) if message.seq
+                  else self.flight.home_item())
+        if isinstance(stored, Refusal):  # what came before stays overwritten
+            self._send_ack(peer, stored.result)
+            self._peer = None
+            return
+        self.items[message.seq:message.seq + 1] = [stored]
+        self._changed(StorageChange.WRITTEN)
+        self._heard = now
+        self._wanted += 1
+        if self._wanted == self._expected:
+            self._peer = None
+            self._send_ack(peer, dialect.MAV_MISSION_ACCEPTED)
+        else:
+            self._ask(now)
+
+    def _request_list(self, message: Message, peer: RemoteIds, now: float) -> None:
+        if self._peer is not None:
+            self._send_ack(peer, dialect.MAV_MISSION_DENIED, message.mission_type)
+            return
+        count = len(self.items) if message.mission_type == MISSION else 0
+        self.out.append(dialect.MAVLink_mission_count_message(*peer, count, message.mission_type))
+
+    def _request(self, message: Message, peer: RemoteIds, now: float) -> None:
+        if self._peer is not None:
+            self._send_ack(peer, dialect.MAV_MISSION_DENIED, message.mission_type)
+        elif message.mission_type != MISSION:
+            self._send_ack(peer, dialect.MAV_MISSION_ERROR, message.mission_type)
+        elif message.seq != 0 and message.seq >= len(self.items):
+            self._request_list(message, peer, now)  # it tells the station how many there are
+            self._send_ack(peer, dialect.MAV_MISSION_ERROR)
+        else:
+            make = to_message if message.get_type().endswith('_INT') else to_float_message
+            self.out.append(make(self.read(message.seq), message.seq,
+                                 message.seq == self.flight.seq, peer))
+
+    def _clear(self, message: Message, peer: RemoteIds, now: float) -> None:
+        if self._peer is not None:
+            self._send_ack(peer, dialect.MAV_MISSION_DENIED, message.mission_type)
+        elif message.mission_type in (MISSION, _ALL) and self.flight.run is MissionRun.ACTIVE:
+            self._send_ack(peer, dialect.MAV_MISSION_ERROR, message.mission_type)
+        else:
+            if message.mission_type in (MISSION, _ALL):
+                self.items.clear()
+                if self._unloaded is not None:
+                    self._unloaded.clear()
+                self._changed(StorageChange.CLEARED)
+            self._send_ack(peer, dialect.MAV_MISSION_ACCEPTED, message.mission_type)
+
+    def _ack(self, message: Message, peer: RemoteIds, now: float) -> None:
+        """Ignored whatever it says: a cancel too."""

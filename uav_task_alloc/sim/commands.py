@@ -1,0 +1,140 @@
+# SPDX-License-Identifier: Apache-2.0
+"""COMMAND_LONG and COMMAND_INT as a simulated autopilot carries them out, with their result."""
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from functools import partial
+
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+
+from uav_task_alloc.mavlink.transport.codec import Message
+from uav_task_alloc.sim.config import FlightMode
+from uav_task_alloc.sim.flight import VehicleFlight
+from uav_task_alloc.sim.modes import px4_mode
+from uav_task_alloc.sim.streams import Streams
+
+Params = tuple[float, float, float, float, float, float, float]
+_ACCEPTED = int(dialect.MAV_RESULT_ACCEPTED)
+_DENIED = int(dialect.MAV_RESULT_DENIED)
+_FAILED = int(dialect.MAV_RESULT_FAILED)
+_UNSUPPORTED = int(dialect.MAV_RESULT_UNSUPPORTED)
+_REJECTED = int(dialect.MAV_RESULT_TEMPORARILY_REJECTED)
+_FORCE = 21196  # param2 of ARM_DISARM
+_MODE_COMMANDS = {
+    dialect.MAV_CMD_NAV_RETURN_TO_LAUNCH: FlightMode.RETURN,
+    dialect.MAV_CMD_NAV_LAND: FlightMode.LAND,
+    dialect.MAV_CMD_NAV_LOITER_UNLIM: FlightMode.HOLD,
+}
+_PLAIN_COMMANDS = {
+    dialect.MAV_CMD_NAV_TAKEOFF: 'takeoff', dialect.MAV_CMD_MISSION_START: 'mission start'}
+
+
+class Commands:
+    """One handler a command; `refused` is what this autopilot answers where it may not."""
+
+    refused = _FAILED
+
+    def __init__(self, flight: VehicleFlight, streams: Streams) -> None:
+        self.flight = flight
+        self.streams = streams
+        self.out: list[Message] = []  # what REQUEST_MESSAGE asks for
+        self.handlers: dict[int, Callable[[Params], int]] = {
+            dialect.MAV_CMD_COMPONENT_ARM_DISARM: self._arm_disarm,
+            dialect.MAV_CMD_NAV_TAKEOFF: self._takeoff,
+            dialect.MAV_CMD_DO_SET_MODE: self._set_mode,
+            dialect.MAV_CMD_MISSION_START: lambda p: self._result(self.flight.start_mission()),
+            dialect.MAV_CMD_SET_MESSAGE_INTERVAL: self._set_message_interval,
+            dialect.MAV_CMD_REQUEST_MESSAGE: self._request_message,
+            dialect.MAV_CMD_DO_CHANGE_SPEED: self._change_speed,
+        }
+        for command, mode in _MODE_COMMANDS.items():
+            self.handlers[command] = partial(self._enter, mode)
+
+    def run(self, command: int, params: Params) -> int:
+        """The MAV_RESULT of a command."""
+        handler = self.handlers.get(command)
+        return _UNSUPPORTED if handler is None else handler(params)
+
+    def note(self, command: int, params: Params, station: str) -> None:
+        """Note a command about mode, arming, take-off or the mission in the ground truth."""
+        flight, modes = self.flight, self.flight.custom_modes
+        if command == dialect.MAV_CMD_COMPONENT_ARM_DISARM:
+            forced = 'forced ' if params[1] == _FORCE else ''
+            word = forced + ('arm' if params[0] == 1.0 else 'disarm')
+            flight.note('command', command=word, cause=station)
+        elif command == dialect.MAV_CMD_DO_SET_MODE:
+            flight.note('command', command='mode', mode=self.custom_mode(params), cause=station)
+        elif command in _MODE_COMMANDS:
+            flight.note('command', command='mode', mode=modes[_MODE_COMMANDS[command]],
+                        cause=station)
+        elif command == dialect.MAV_CMD_DO_SET_MISSION_CURRENT:
+            flight.note('command', command='set current', seq=int(params[0]), cause=station)
+        elif command in _PLAIN_COMMANDS:
+            flight.note('command', command=_PLAIN_COMMANDS[command], cause=station)
+
+    def custom_mode(self, params: Params) -> int:
+        """The custom mode that DO_SET_MODE asks for."""
+        raise NotImplementedError
+
+    def _result(self, done: bool) -> int:
+        return _ACCEPTED if done else self.refused
+
+    def _enter(self, mode: FlightMode, _: Params) -> int:
+        return self._result(self.flight.set_mode(mode))
+
+    def _arm_disarm(self, p: Params) -> int:
+        if p[0] == 1.0:
+            return self._result(self.flight.arm(p[1] == _FORCE))
+        return self._result(p[0] == 0.0 and self.flight.disarm(p[1] == _FORCE))
+
+    def _takeoff(self, p: Params) -> int:
+        raise NotImplementedError
+
+    def _set_mode(self, p: Params) -> int:
+        return self._result(self.flight.set_custom_mode(self.custom_mode(p)))
+
+    def _set_message_interval(self, p: Params) -> int:
+        known = self.streams.set_interval(int(p[0]), p[1], self.flight.now)
+        return _ACCEPTED if known else _FAILED
+
+    def _request_message(self, p: Params) -> int:
+        messages = self.streams.make(int(p[0]))
+        self.out += messages
+        return _ACCEPTED if messages else _FAILED
+
+    def _change_speed(self, p: Params) -> int:
+        if not p[1] > 0.0:
+            return _DENIED
+        self.flight.speed = p[1]
+        return _ACCEPTED
+
+
+class ArduPilotCommands(Commands):
+    """Refuses with FAILED; takes 224; take-off height is above home."""
+
+    def __init__(self, flight: VehicleFlight, streams: Streams) -> None:
+        super().__init__(flight, streams)
+        self.handlers[dialect.MAV_CMD_DO_SET_MISSION_CURRENT] = (
+            lambda p: self._result(self.flight.set_current(int(p[0]))))
+
+    def custom_mode(self, params: Params) -> int:
+        return int(params[1])
+
+    def _takeoff(self, p: Params) -> int:
+        return self._result(self.flight.takeoff(self.flight.home[2] + p[6]))
+
+
+class Px4Commands(Commands):
+    """Refuses with TEMPORARILY_REJECTED; 224 is unsupported; take-off height is AMSL."""
+
+    refused = _REJECTED
+
+    def custom_mode(self, params: Params) -> int:
+        return px4_mode(int(params[1]), int(params[2]))
+
+    def _takeoff(self, p: Params) -> int:
+        flight = self.flight
+        low = flight.body.position[2] + flight.takeoff_height
+        height = p[6] - flight.home_amsl + flight.home[2]
+        return self._result(flight.takeoff(low if math.isnan(height) else max(low, height)))

@@ -1,0 +1,77 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a simulated vehicle is given, and the flight modes both autopilots have in common."""
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from enum import Enum
+
+from uav_task_alloc.geometry.frames import Origin
+from uav_task_alloc.model import Point
+
+
+@dataclass(frozen=True, slots=True)
+class VehicleConfig:
+    """One airframe; None means: as the real autopilot has it."""
+
+    uav: str
+    system_id: int  # 1..255
+    origin: Origin
+    position: Point  # [m] ENU on the ground, at the start
+    home: Point | None = None  # [m] ENU; None: the position
+    cruise_speed: float = 15.0  # [m/s]
+    climb_rate: float = 4.0  # [m/s] up and down
+    acceleration: float = 3.0  # [m/s2]
+    range: float = math.inf  # [m] at cruise speed with a full battery
+    acceptance_radius: float | None = None  # [m] WPNAV_RADIUS, NAV_ACC_RAD
+    arming_delay: float | None = None  # [s] from power-up to a position estimate
+    boot_delay: float | None = None  # [s] from power-up to the end of the boot
+    settling_time: float | None = None  # [s] for which the first position estimate jumps
+    batteries: int = 1  # 1 or 2
+    second_battery: float = 0.7  # what remains in it, as a share of what remains in the first
+    capacity: int | None = None  # items of the mission storage
+    floods: bool = True  # PX4 streams its onboard set unasked
+
+
+class FlightMode(Enum):
+    """What the vehicle does; `vehicle_modes` has the custom modes of each autopilot.
+
+    MANUAL is flown by the pilot's stick, and so is HOLD on ArduCopter (LOITER).
+    """
+
+    MANUAL = 'manual'
+    MISSION = 'mission'
+    GUIDED = 'guided'
+    HOLD = 'hold'
+    BRAKE = 'brake'
+    TAKEOFF = 'takeoff'
+    RETURN = 'return'
+    LAND = 'land'
+    OTHER = 'other'  # any that stops and stays, as CIRCLE or OFFBOARD do here
+
+
+class StorageChange(Enum):
+    """What happened to the stored mission, for the flight that may be using it."""
+
+    TRUNCATED = 'truncated'
+    WRITTEN = 'written'
+    SWAPPED = 'swapped'
+    CLEARED = 'cleared'
+
+
+@dataclass(frozen=True, slots=True)
+class TruthEvent:
+    """Something that happened on board, for the ground-truth log.
+
+    Names: armed, disarmed, takeoff, item_reached, mission_end, died, mode, command, crashed,
+    reboot, failsafe, failsafe_over, kill_switch, kill_switch_off, glitch. Causes: `station
+    SYSTEM/COMPONENT`, pilot, failsafe, self; of a failsafe its kind.
+    """
+
+    t: float  # [s] vehicle time
+    name: str
+    point: Point  # [m] ENU: of the item's target as stored, else of the vehicle
+    seq: int | None = None  # mission item: item_reached, and a command to set the current one
+    mode: int | None = None  # custom_mode: mode, and a command to change it
+    cause: str = ''  # of mode, armed, disarmed, crashed, command, failsafe
+    command: str = ''  # arm, disarm, forced arm, forced disarm, mode, takeoff, ...

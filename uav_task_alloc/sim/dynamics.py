@@ -1,0 +1,163 @@
+# SPDX-License-Identifier: Apache-2.0
+"""How a simulated copter moves and drains: a point mass with limits, and a track to follow."""
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from uav_task_alloc.geometry.frames import Origin, to_geodetic_batch
+from uav_task_alloc.model import Point
+from uav_task_alloc.sim.config import VehicleConfig
+
+_CORNER = 1.0  # [m] a turn may swing out
+_HOVER = 0.25  # a hovering copter drains as one at this share of its cruise speed
+_BRAKING = 0.7  # share of the acceleration that braking is planned with
+
+
+class PointMass:
+    """Position, velocity and battery in ENU; `step` moves it towards a point."""
+
+    def __init__(self, config: VehicleConfig) -> None:
+        self._config = config
+        self.position: Point = config.position  # [m]
+        self.velocity: Point = (0.0, 0.0, 0.0)  # [m/s]
+        self.heading = 0.0  # [rad] from east, counter-clockwise
+        self.flown = 0.0  # [m]
+        self.battery = 1.0  # [0..1]
+        self._near = _NearGeodetic(config.origin)
+
+    def step(self, dt: float, target: Point | None, speed: float, exit_speed: float) -> None:
+        """Fly `dt` [s] towards the target, to pass it at `exit_speed`; None: stop."""
+        self.steer(dt, (0.0, 0.0, 0.0) if target is None
+                   else self._wish(dt, target, speed, exit_speed))
+
+    def steer(self, dt: float, velocity: Point) -> None:
+        """Fly `dt` [s] towards a velocity [m/s], within the acceleration."""
+        change = _minus(velocity, self.velocity)
+        most = self._config.acceleration * dt
+        share = min(1.0, most / max(_norm(change), 1e-9))
+        self.velocity = vx, vy, _ = _plus(self.velocity, change, share)
+        if math.hypot(vx, vy) > 0.5:
+            self.heading = math.atan2(vy, vx)
+        self.position = _plus(self.position, self.velocity, dt)
+        moved = _norm(self.velocity)
+        self.flown += moved * dt
+        drain = max(moved, _HOVER * self._config.cruise_speed) * dt / self._config.range
+        self.battery = max(0.0, self.battery - drain)
+
+    def fall(self, dt: float, speed: float) -> None:
+        """Fall straight down for `dt` [s], without motors."""
+        self.velocity = (0.0, 0.0, -speed)
+        self.position = _plus(self.position, self.velocity, dt)
+
+    def _wish(self, dt: float, target: Point, speed: float, exit_speed: float) -> Point:
+        gap = _minus(target, self.position)
+        distance = _norm(gap)
+        if distance < 1e-6:
+            return 0.0, 0.0, 0.0
+        braking = _BRAKING * self._config.acceleration
+        limit = min(speed, math.sqrt(exit_speed**2 + 2.0 * braking * distance))
+        if exit_speed == 0.0:
+            limit = min(limit, distance / dt)
+        # what is left of the acceleration goes into ending the motion across the way
+        along = sum(v * g for v, g in zip(self.velocity, gap, strict=True)) / distance
+        limit = min(limit, max(0.0, along) + self._config.acceleration * dt)
+        steep = abs(gap[2]) / distance
+        if limit * steep > self._config.climb_rate:
+            limit = self._config.climb_rate / steep
+        return gap[0] / distance * limit, gap[1] / distance * limit, gap[2] / distance * limit
+
+    def land_at(self, height: float) -> None:
+        """Touch the ground, and stay there."""
+        self.position = (self.position[0], self.position[1], height)
+        self.velocity = (0.0, 0.0, 0.0)
+
+    def geodetic(self, offset: Point = (0.0, 0.0, 0.0)) -> tuple[float, float, float]:
+        """Latitude [deg], longitude [deg], altitude AMSL [m] of the position, `offset` [m] off."""
+        return self._near.place(_plus(self.position, offset, 1.0))
+
+
+class _NearGeodetic:
+    """ENU to WGS84 by a linear map that is made anew every 50 m: below 1 mm off, and cheap."""
+
+    def __init__(self, origin: Origin) -> None:
+        self._origin = origin
+        self._around: Point | None = None
+        self._base: list[float] = []
+        self._slope: list[list[float]] = []
+
+    def place(self, point: Point) -> tuple[float, float, float]:
+        if self._around is None or metres_between(point, self._around) > 50.0:
+            x, y, z = self._around = point
+            rows = to_geodetic_batch(self._origin, [
+                point, (x + 10.0, y, z), (x, y + 10.0, z), (x, y, z + 10.0)])
+            self._base = rows[0].tolist()
+            self._slope = ((rows[1:] - rows[0]) / 10.0).astype(np.float64).tolist()
+        dx, dy, dz = _minus(point, self._around)
+        (ax, ay, az), (bx, by, bz), (cx, cy, cz) = self._slope
+        latitude, longitude, altitude = self._base
+        return (latitude + dx * ax + dy * bx + dz * cx, longitude + dx * ay + dy * by + dz * cy,
+                altitude + dx * az + dy * bz + dz * cz)
+
+
+class Track:
+    """Points to pass one after the other, then a time to stay at the last."""
+
+    def __init__(self, points: Sequence[Point], radius: float, hold: float = 0.0,
+                 lands: bool = False) -> None:
+        self.points = tuple(points)
+        self.radius = radius  # [m] near enough to have passed a point
+        self.hold = hold  # [s]
+        self.lands = lands  # it ends on the ground
+        self._next = 0
+        self._arrived: float | None = None
+
+    @property
+    def target(self) -> Point | None:
+        """Where to fly now; the last point while holding, None where there is none."""
+        return self.points[min(self._next, len(self.points) - 1)] if self.points else None
+
+    def exit_speed(self, position: Point, then: Point | None, acceleration: float) -> float:
+        """Speed [m/s] at which the target may be passed, so that the turn stays tight."""
+        if self._next < len(self.points) - 1:
+            then = self.points[self._next + 1]
+        elif self.hold > 0.0 or self.lands:
+            return 0.0
+        target = self.target
+        if then is None or target is None or self._next >= len(self.points):
+            return 0.0
+        inward, outward = _minus(target, position), _minus(then, target)
+        lengths = _norm(inward) * _norm(outward)
+        cosine = sum(a * b for a, b in zip(inward, outward, strict=True)) / max(lengths, 1e-9)
+        sine = 1.0 if cosine <= 0.0 else math.sqrt(max(0.0, 1.0 - cosine**2))
+        return math.sqrt(2.0 * acceleration * _CORNER) / max(sine, 1e-3)
+
+    def done(self, position: Point, now: float) -> bool:
+        """Note what is passed by now [s]; True once the last point was held long enough."""
+        while (self._next < len(self.points)
+               and metres_between(position, self.points[self._next]) <= self.radius):
+            self._next += 1
+        if self._next < len(self.points):
+            return False
+        if self._arrived is None:
+            self._arrived = now
+        return now - self._arrived >= self.hold - 1e-9
+
+
+def metres_between(a: Point, b: Point) -> float:
+    """[m] between two points."""
+    return _norm(_minus(a, b))
+
+
+def _minus(a: Point, b: Point) -> Point:
+    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
+
+
+def _plus(a: Point, b: Point, factor: float) -> Point:
+    return a[0] + b[0] * factor, a[1] + b[1] * factor, a[2] + b[2] * factor
+
+
+def _norm(a: Point) -> float:
+    return math.sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2])

@@ -1,0 +1,145 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What pilots and failsafes do to a simulated vehicle by themselves, not by MAVLink."""
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from uav_task_alloc.errors import InvalidValue
+from uav_task_alloc.model import Point
+from uav_task_alloc.sim.ardupilot.flight import ArduPilotFlight
+from uav_task_alloc.sim.estimate import Estimate
+from uav_task_alloc.sim.flight import CRITICAL, INFO, WARNING, VehicleFlight
+from uav_task_alloc.sim.modes import AVOID_ADSB
+
+KINDS = ('radio', 'gcs', 'battery', 'ekf', 'fence')
+_ALERT = 1  # MAV_SEVERITY
+_ADSB = 'adsb'  # an avoidance sets CRITICAL too
+
+
+class Texts(NamedTuple):
+    """The STATUSTEXTs of one autopilot: (severity, text)."""
+
+    begin: dict[str, tuple[tuple[int, str], ...]]  # by kind of failsafe
+    over: dict[str, tuple[int, str]]
+    kill: tuple[int, str]
+    kill_over: tuple[int, str]
+
+
+_ARDUPILOT = Texts(
+    begin={
+        'radio': ((WARNING, 'Radio Failsafe'),),
+        'gcs': ((WARNING, 'GCS Failsafe'),),
+        'battery': ((WARNING, 'Battery 1 is low 10.50V used 100 mAh'),
+                    (WARNING, 'Battery Failsafe')),
+        'ekf': ((CRITICAL, 'EKF variance: over thresholds'),
+                (CRITICAL, 'EKF Failsafe: changed to {mode} Mode')),
+        'fence': ((CRITICAL, 'Fence Breached'),),
+    },
+    over={
+        'radio': (WARNING, 'Radio Failsafe Cleared'),
+        'gcs': (WARNING, 'GCS Failsafe Cleared'),
+        'battery': (WARNING, 'Battery Failsafe Cleared'),
+        'ekf': (CRITICAL, 'EKF Failsafe Cleared'),
+        'fence': (WARNING, 'Fence Failsafe Cleared'),
+    },
+    kill=(INFO, 'RC7: MotorEStop HIGH'), kill_over=(INFO, 'RC7: MotorEStop LOW'))
+_ACTIVATED = (CRITICAL, 'Failsafe activated')  # PX4 tells the reason in an EVENT only
+_PX4 = Texts(
+    begin={
+        'radio': ((CRITICAL, 'Manual control lost'), _ACTIVATED),
+        'gcs': ((INFO, 'Connection to ground station lost'), _ACTIVATED),
+        'battery': (_ACTIVATED,),
+        'ekf': (_ACTIVATED,),
+        'fence': (_ACTIVATED,),
+    },
+    over=dict.fromkeys(KINDS, (INFO, 'Failsafe mode deactivated')),
+    kill=(CRITICAL, 'Kill engaged'), kill_over=(INFO, 'Kill disengaged'))
+
+
+class Interventions:
+    """The pilot's radio control, the failsafes and the satellites of one vehicle."""
+
+    flight: VehicleFlight
+    estimate: Estimate
+    _before_avoid: int | None = None  # custom_mode
+
+    @property
+    def _is_ardupilot(self) -> bool:
+        return isinstance(self.flight, ArduPilotFlight)
+
+    @property
+    def _texts(self) -> Texts:
+        return _ARDUPILOT if self._is_ardupilot else _PX4
+
+    def rc_mode(self, custom_mode: int) -> bool:
+        """The pilot's mode switch; False where the autopilot does not enter that mode."""
+        with self.flight.caused_by('pilot'):
+            return self.flight.set_custom_mode(custom_mode)
+
+    def rc_arm(self, armed: bool, force: bool = False) -> bool:
+        """The pilot's arm switch; False where it is refused. A forced disarm in the air falls."""
+        with self.flight.caused_by('pilot'):
+            return self.flight.arm(force) if armed else self.flight.disarm(force)
+
+    def rc_stick(self, velocity: Point | None) -> None:
+        """The pilot's sticks ask for a velocity [m/s] ENU in stick modes; None: centred."""
+        self.flight.stick = velocity
+
+    def failsafe(self, kind: str, mode: int | None) -> None:
+        """A failsafe of one of `KINDS` begins: CRITICAL, and a custom mode unless None."""
+        if kind not in KINDS:
+            raise InvalidValue('kind', kind, f'one of {", ".join(KINDS)}')
+        flight = self.flight
+        flight.failsafes[kind] = None
+        name = flight.modes[flight.custom_mode if mode is None else mode].name
+        flight.texts += [(severity, text.format(mode=name))
+                         for severity, text in self._texts.begin[kind]]
+        flight.note('failsafe', cause=kind, mode=mode)
+        if mode is not None:
+            with flight.caused_by('failsafe'):
+                flight.set_custom_mode(mode)
+
+    def failsafe_over(self) -> None:
+        """All failsafes end; the mode stays."""
+        flight = self.flight
+        for kind in [kind for kind in flight.failsafes if kind in KINDS]:
+            del flight.failsafes[kind]
+            flight.texts.append(self._texts.over[kind])
+            flight.note('failsafe_over', cause=kind)
+
+    def kill_switch(self) -> None:
+        """The pilot stops the motors at once, wherever it is; it stays disarmed until `_off`."""
+        flight = self.flight
+        flight.terminated = True
+        flight.texts.append(self._texts.kill)
+        flight.note('kill_switch', cause='pilot')
+        with flight.caused_by('pilot'):
+            flight.disarm(force=True)
+
+    def kill_switch_off(self) -> None:
+        """The pilot lets the motors run again; nothing arms by itself."""
+        self.flight.terminated = False
+        self.flight.texts.append(self._texts.kill_over)
+        self.flight.note('kill_switch_off', cause='pilot')
+
+    def avoid(self, active: bool) -> None:
+        """ArduPilot enters AVOID_ADSB, and later the mode before, unless somebody changed it."""
+        flight = self.flight
+        if not self._is_ardupilot or active is (_ADSB in flight.failsafes):
+            return
+        with flight.caused_by('failsafe'):
+            if active:
+                flight.failsafes[_ADSB] = None
+                flight.texts.append((_ALERT, 'Avoid: Performing action: 4'))
+                self._before_avoid = flight.custom_mode
+                flight.set_custom_mode(AVOID_ADSB)
+                return
+            del flight.failsafes[_ADSB]
+            flight.texts.append((_ALERT, 'Avoid: Resuming with action: 1'))
+            if self._before_avoid is not None and flight.custom_mode == AVOID_ADSB:
+                flight.set_custom_mode(self._before_avoid)
+
+    def glitch(self, offset: Point, seconds: float) -> None:
+        """Let the reported position, not the real one, be `offset` [m] ENU off for a time."""
+        self.estimate.glitch(offset, seconds)
+        self.flight.note('glitch')

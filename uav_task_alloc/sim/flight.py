@@ -1,0 +1,312 @@
+# SPDX-License-Identifier: Apache-2.0
+"""How a simulated autopilot flies: modes, arming, and the mission as it stands in storage."""
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from typing import ClassVar
+
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+
+from uav_task_alloc.model import Point
+from uav_task_alloc.sim.boot import Boot, BootTimes
+from uav_task_alloc.sim.config import FlightMode, StorageChange, TruthEvent, VehicleConfig
+from uav_task_alloc.sim.dynamics import Track
+from uav_task_alloc.sim.modes import CustomMode
+from uav_task_alloc.sim.navigation import Navigation
+from uav_task_alloc.sim.stored_item import StoredItem
+
+_STEP = 0.1  # [s] longest step of the body
+_STRIDE = 1.0  # [m] longest step of the body: well inside the acceptance radius
+_GROUND_IDLE = 10.0  # [s] armed on the ground until it disarms itself
+_FALL = 1.5  # [s] from any height to the ground without motors
+CRITICAL, WARNING, INFO = 2, 4, 6  # MAV_SEVERITY
+
+
+class VehicleFlight(Navigation):
+    """What both autopilots share; subclasses decide what a mission change or its end means.
+
+    `reached` and `texts` fill for the owner to send and empty; `events` are the ground truth.
+    """
+
+    modes: ClassVar[dict[int, CustomMode]]  # by custom_mode
+    custom_modes: ClassVar[dict[FlightMode, int]]  # the custom_mode that `set_mode` enters
+    boot_states: ClassVar[tuple[int, int]]  # MAV_STATE in the two halves of the boot
+    boot_times: ClassVar[BootTimes]
+    start_mode: ClassVar[FlightMode]
+    takeoff_height: float  # [m] above the ground where no height is given
+
+    def __init__(self, config: VehicleConfig, items: Sequence[StoredItem]) -> None:
+        super().__init__(config, items)
+        self.boot = Boot(config, self.boot_times)
+        self.reached: list[int] = []
+        self.texts: list[tuple[int, str]] = []
+        self.events: list[TruthEvent] = []
+        self.refuses = ''  # why it refuses to arm; '': no reason of this kind
+        self.terminated = False  # the kill switch is on
+        self.stick: Point | None = None  # [m/s] ENU that the pilot asks for
+        self.now = 0.0  # [s]
+        self.custom_mode = self.custom_modes[self.start_mode]
+        self.armed, self.landed = False, True
+        self._cause = 'self'
+        self.reboot(0.0)
+
+    def reboot(self, now: float) -> None:
+        """As after power-up: disarmed, at the start of the mission; in the air it falls."""
+        self.now = self.booted = now
+        self.boot.elapsed = 0.0
+        self.note('reboot')
+        self._set_number(self.custom_modes[self.start_mode])
+        self.failsafes: dict[str, None] = {}  # the kinds that are active, oldest first
+        self.seq = 0
+        self.speed = self.config.cruise_speed  # [m/s]
+        self.track, self.then = None, None
+        self.target = self.body.position
+        self._idle_since = now
+        self._fall_speed = 0.0  # [m/s]
+        if self.landed:
+            self.body.land_at(self.body.position[2])
+        self._stop_motors()
+
+    @property
+    def mode(self) -> FlightMode:
+        """What the custom mode makes it do."""
+        return self.modes[self.custom_mode].mode
+
+    @property
+    def positioned(self) -> bool:
+        """Whether there is a position estimate, without which it does not arm."""
+        return self.boot.positioned
+
+    @property
+    def system_status(self) -> int:
+        """MAV_STATE."""
+        if self.boot.active:
+            return self.boot_states[0 if self.boot.initialising else 1]
+        if self.terminated:
+            return int(dialect.MAV_STATE_FLIGHT_TERMINATION)
+        if self.failsafes:
+            return int(dialect.MAV_STATE_CRITICAL)
+        return int(dialect.MAV_STATE_STANDBY if self.landed else dialect.MAV_STATE_ACTIVE)
+
+    @contextmanager
+    def caused_by(self, cause: str) -> Iterator[None]:
+        """Events within are noted as caused by somebody else than the autopilot."""
+        before, self._cause = self._cause, cause
+        try:
+            yield
+        finally:
+            self._cause = before
+
+    # commands
+
+    def arm(self, force: bool = False) -> bool:
+        """False, and what the autopilot says about it, where it may not."""
+        refusal = self._never_arms() if force else self.arming_refusal()
+        if refusal:
+            self.report_refusal(refusal)
+            return False
+        if not self.armed:
+            self.armed, self._idle_since = True, self.now
+            self.note('armed', cause=self._cause)
+        return True
+
+    def _never_arms(self) -> str:
+        """Why it does not arm even when forced."""
+        if self.boot.active:
+            return 'System not initialised'
+        if self.terminated:
+            return 'Motors Emergency Stopped'
+        return 'Leaning' if self._fall_speed > 0.0 else ''
+
+    def prearm_refusal(self) -> str:
+        """Why it does not arm in any mode; empty where it does."""
+        reason = self._never_arms() or self.refuses
+        if reason:
+            return reason
+        if not self.positioned:
+            return 'Need Position Estimate'
+        return 'Battery low' if self.body.battery < 0.05 else ''
+
+    def arming_refusal(self) -> str:
+        """Why it does not arm now; empty where it does."""
+        return self.prearm_refusal()
+
+    def report_refusal(self, reason: str) -> None:
+        """Tell the stations why it does not arm."""
+
+    def disarm(self, force: bool = False) -> bool:
+        """Motors off; refused in the air unless forced: then it falls."""
+        if not self.landed and not force:
+            return False
+        self._stop_motors()
+        return True
+
+    def _stop_motors(self) -> None:
+        if self.armed:
+            self.armed = False
+            self.note('disarmed', cause=self._cause)
+        if not self.landed and self._fall_speed == 0.0:
+            self.track = None
+            self._fall_speed = max(1.0, (self.body.position[2] - self.home[2]) / _FALL)
+            self._fall_cause = self._cause
+
+    def takeoff(self, height: float) -> bool:
+        """Climb to `height` [m] ENU from the ground."""
+        raise NotImplementedError
+
+    def set_mode(self, mode: FlightMode) -> bool:
+        """Change the mode; False where it is unknown or not possible now."""
+        return mode in self.custom_modes and self.set_custom_mode(self.custom_modes[mode])
+
+    def set_custom_mode(self, number: int) -> bool:
+        """Change the mode; False where it is unknown or not possible now."""
+        if number not in self.modes:
+            return False
+        mode = self.modes[number].mode
+        if mode is FlightMode.MISSION and not self.can_fly_mission():
+            return False
+        if number != self.custom_mode:
+            self.leave(self.mode)
+            self._set_number(number)
+            self.track, self.then = None, None
+            self.speed = self.config.cruise_speed
+            self.enter(mode)
+        return True
+
+    def _set_number(self, number: int) -> None:
+        if number != self.custom_mode:
+            self.custom_mode = number
+            self.note('mode', mode=number, cause=self._cause)
+
+    def can_fly_mission(self) -> bool:
+        """Whether the mission mode is open now; a text says why not."""
+        raise NotImplementedError
+
+    def start_mission(self) -> bool:
+        """MISSION_START."""
+        raise NotImplementedError
+
+    def set_current(self, seq: int) -> bool:
+        """Fly this item next; False where there is none."""
+        raise NotImplementedError
+
+    def changed(self, change: StorageChange, flagged: int | None) -> None:
+        """The storage has changed; `flagged`: the seq that the station marked as current."""
+        raise NotImplementedError
+
+    def leave(self, mode: FlightMode) -> None:
+        """About to leave a mode."""
+
+    def enter(self, mode: FlightMode) -> None:
+        """Entered a mode."""
+        if mode in (FlightMode.RETURN, FlightMode.LAND) and self.landed:
+            self.disarm()
+        elif mode is FlightMode.RETURN:
+            self.track = self.way_home()
+        elif mode is FlightMode.LAND:
+            self.track = self.descent(self.body.position)
+
+    # motion
+
+    def step(self, now: float) -> None:
+        """Fly until `now` [s], in steps short enough to pass no point unseen."""
+        while self.now < now - 1e-9 and (self.armed or not self.landed):
+            dt = min(_STEP, _STRIDE / self.speed, now - self.now)
+            self._set_time(self.now + dt)
+            if self.armed:
+                self._move(dt)
+            else:
+                self._fall(dt)
+        self._set_time(max(self.now, now))
+
+    def _set_time(self, now: float) -> None:
+        self.now = now
+        self.boot.elapsed = now - self.booted
+
+    def _fall(self, dt: float) -> None:
+        self.body.fall(dt, self._fall_speed)
+        if self.body.position[2] <= self.home[2]:
+            self._touch_down()
+            self.note('crashed', cause=self._fall_cause)
+
+    def lie_down(self) -> None:
+        """On the ground below, whatever it did."""
+        if not self.landed:
+            self._touch_down()
+
+    def _touch_down(self) -> None:
+        self.body.land_at(self.home[2])
+        self.landed, self._idle_since, self._fall_speed = True, self.now, 0.0
+
+    def _move(self, dt: float) -> None:
+        if self.mode is FlightMode.MISSION and self.track is None:
+            self.next_item()
+        stick = self.stick if self.modes[self.custom_mode].stick else None
+        if self.landed:
+            climbs = stick is not None and stick[2] > 0.0
+            if not climbs and (self.track is None or self.track.target is None):
+                self._stay()
+                return
+            self.landed = False
+            self.note('takeoff')
+        if stick is None:
+            self._follow(dt)
+        else:
+            self._steer(dt, stick)
+        if self.body.battery <= 0.0 and self.mode is not FlightMode.LAND and not self.landed:
+            self.texts.append((CRITICAL, 'Battery empty: landing'))
+            with self.caused_by('failsafe'):
+                self.set_mode(FlightMode.LAND)
+
+    def _steer(self, dt: float, velocity: Point) -> None:
+        self.body.steer(dt, velocity)
+        if self.body.position[2] <= self.home[2] and velocity[2] <= 0.0:
+            self._touch_down()
+
+    def _follow(self, dt: float) -> None:
+        track, target, exit_speed = self.track, None, 0.0
+        if track is not None:
+            target = track.target
+            exit_speed = min(self.speed, track.exit_speed(
+                self.body.position, self.then, self.config.acceleration))
+        self.body.step(dt, target, self.speed, exit_speed)
+        if track is not None and track.done(self.body.position, self.now):
+            self._end_of(track)
+
+    def _stay(self) -> None:
+        if self.now - self._idle_since > _GROUND_IDLE:
+            self.disarm()
+
+    def _end_of(self, track: Track) -> None:
+        self.track = None
+        if track.lands:
+            self._touch_down()
+        if self.mode is FlightMode.MISSION:
+            self.item_done()
+        elif self.mode is FlightMode.TAKEOFF:
+            self.set_mode(FlightMode.HOLD)
+        if track.lands:
+            self.disarm()
+
+    # mission
+
+    def next_item(self) -> None:
+        """Begin the item whose turn it is, or end the mission."""
+        raise NotImplementedError
+
+    def item_done(self) -> None:
+        """The item at `seq` has been flown."""
+        raise NotImplementedError
+
+    def tell_reached(self, seq: int, point: Point) -> None:
+        """MISSION_ITEM_REACHED, and the ground truth of it."""
+        self.reached.append(seq)
+        self.events.append(TruthEvent(self.now, 'item_reached', point, seq))
+
+    def note(self, name: str, *, seq: int | None = None, mode: int | None = None,
+             cause: str = '', command: str = '') -> None:
+        """An event for the ground truth, where the vehicle is now."""
+        self.events.append(
+            TruthEvent(self.now, name, self.body.position, seq, mode, cause, command)
+        )

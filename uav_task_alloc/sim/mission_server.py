@@ -1,0 +1,105 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The mission service of a simulated autopilot: what both kinds share, without their quirks."""
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+
+from uav_task_alloc.mavlink.transport.codec import Message
+from uav_task_alloc.sim.config import StorageChange
+from uav_task_alloc.sim.flight import VehicleFlight
+from uav_task_alloc.sim.stored_item import StoredItem
+
+RemoteIds = tuple[int, int]  # system, component
+MISSION = dialect.MAV_MISSION_TYPE_MISSION
+COMPONENT = dialect.MAV_COMP_ID_AUTOPILOT1
+
+
+class MissionService:
+    """Items in storage and the transfer that may be under way; replies go to `out`."""
+
+    flight: VehicleFlight
+
+    def __init__(self, system_id: int, capacity: int) -> None:
+        self.items: list[StoredItem] = []
+        self.out: list[Message] = []
+        self._system_id = system_id
+        self._capacity = capacity
+        self._handlers: dict[str, Callable[[Message, RemoteIds, float], None]] = {
+            'MISSION_COUNT': self._count,
+            'MISSION_ITEM_INT': self._item,
+            'MISSION_REQUEST_LIST': self._request_list,
+            'MISSION_REQUEST': self._request,
+            'MISSION_REQUEST_INT': self._request,
+            'MISSION_CLEAR_ALL': self._clear,
+            'MISSION_ACK': self._ack,
+        }
+
+    def serve(self, flight: VehicleFlight) -> None:
+        """Tell this flight, which flies from `items`, about every change."""
+        self.flight = flight
+
+    def progress(self) -> tuple[int, int, int]:
+        """total, mission_state and mission_mode of MISSION_CURRENT."""
+        raise NotImplementedError
+
+    def _changed(self, change: StorageChange, flagged: int | None = None) -> None:
+        self.flight.changed(change, flagged)
+
+    def handle(self, message: Message, now: float) -> bool:
+        """Take a message of the mission protocol; False where it is none or for another."""
+        self.load()
+        handler = self._handlers.get(message.get_type())
+        if handler is None or not self._for_us(message):
+            return False
+        handler(message, (message.get_srcSystem(), message.get_srcComponent()), now)
+        return True
+
+    def step(self, now: float) -> None:
+        """Repeat requests and give up, as the autopilot does."""
+        raise NotImplementedError
+
+    def reboot(self) -> None:
+        """Forget the transfer; the items stay."""
+        raise NotImplementedError
+
+    def load(self) -> None:
+        """Bring the items back once the boot is over."""
+
+    @property
+    def mission_id(self) -> int | None:
+        """The autopilot's own id of what is stored; None where it has none."""
+        return None
+
+    def read(self, seq: int) -> StoredItem:
+        """An item as a ground station reads it back."""
+        return self.items[seq]
+
+    def _for_us(self, message: Message) -> bool:
+        return (message.target_system == self._system_id
+                and message.target_component in (COMPONENT, 0))
+
+    def _send_ack(self, peer: RemoteIds, result: int, mission_type: int = MISSION) -> None:
+        self.out.append(dialect.MAVLink_mission_ack_message(*peer, result, mission_type))
+
+    def _send_text(self, severity: int, text: str) -> None:
+        self.out.append(dialect.MAVLink_statustext_message(severity, text.encode()))
+
+    def _count(self, message: Message, peer: RemoteIds, now: float) -> None:
+        raise NotImplementedError
+
+    def _item(self, message: Message, peer: RemoteIds, now: float) -> None:
+        raise NotImplementedError
+
+    def _request_list(self, message: Message, peer: RemoteIds, now: float) -> None:
+        raise NotImplementedError
+
+    def _request(self, message: Message, peer: RemoteIds, now: float) -> None:
+        raise NotImplementedError
+
+    def _clear(self, message: Message, peer: RemoteIds, now: float) -> None:
+        raise NotImplementedError
+
+    def _ack(self, message: Message, peer: RemoteIds, now: float) -> None:
+        raise NotImplementedError

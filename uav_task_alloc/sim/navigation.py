@@ -1,0 +1,100 @@
+# SPDX-License-Identifier: Apache-2.0
+"""How a simulated autopilot turns a mission item, a landing or the way home into a track."""
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from uav_task_alloc.geometry.frames import to_enu, to_geodetic
+from uav_task_alloc.model import Point
+from uav_task_alloc.sim import stored_item as item_
+from uav_task_alloc.sim.config import VehicleConfig
+from uav_task_alloc.sim.dynamics import PointMass, Track
+from uav_task_alloc.sim.stored_item import StoredItem
+
+_NEAR = 0.3  # [m] end of a climb, of a landing
+
+
+class Navigation:
+    """The body, its home and the stored items; subclasses override how an item is flown."""
+
+    return_height: float  # [m] above home
+    real_radius: float  # [m] WPNAV_RADIUS or NAV_ACC_RAD, unless configured
+
+    def __init__(self, config: VehicleConfig, items: Sequence[StoredItem]) -> None:
+        self.config = config
+        self.items = items
+        given = config.acceptance_radius
+        self.acceptance_radius = self.real_radius if given is None else given  # [m]
+        self.body = PointMass(config)
+        self.home: Point = config.position if config.home is None else config.home
+        self.home_amsl = to_geodetic(config.origin, self.home)[2]  # [m]
+        self.seq = 0  # current item, as MISSION_CURRENT says
+        self.track: Track | None = None
+        self.target: Point = self.body.position  # [m] of the item being flown
+        self.then: Point | None = None  # where the next item is
+        self.speed = config.cruise_speed  # [m/s]
+
+    def begin(self, seq: int) -> None:
+        """Copy an item out of the storage and fly it, whatever happens to the storage."""
+        self.seq = seq
+        item = self.items[seq]
+        self.track = self.make_track(item)
+        self.target = self.track.points[-1] if self.track.points else self.body.position
+        after = (i for i in self.items[seq + 1:] if i.command in item_.POSITIONAL)
+        following = next(after, None)
+        self.then = None if following is None else self.point(following)
+
+    def do(self, item: StoredItem) -> None:
+        """Carry out an item that is not flown."""
+        if item.command == item_.CHANGE_SPEED and item.p2 > 0.0:
+            self.speed = item.p2
+
+    def make_track(self, item: StoredItem) -> Track:
+        """How an item is flown from here."""
+        if item.command == item_.RETURN:
+            return self.way_home()
+        if item.command == item_.DELAY:
+            return Track((), self.acceptance_radius, item.p1)
+        target = self.point(item)
+        if item.command == item_.LAND:
+            x, y, z = target[0], target[1], self.body.position[2]
+            return Track(((x, y, z), (x, y, self.home[2])), _NEAR, lands=True)
+        if item.command == item_.TAKEOFF:
+            return self.climb(target)
+        hold = math.inf if item.command == item_.LOITER_UNLIMITED else item.p1
+        return Track((target,), self.radius(item), hold)
+
+    def climb(self, target: Point) -> Track:
+        """How NAV_TAKEOFF is flown: straight up."""
+        x, y, z = self.body.position
+        return Track(((x, y, max(z, target[2])),), _NEAR)
+
+    def radius(self, item: StoredItem) -> float:
+        """[m] at which an item counts as reached."""
+        return self.acceptance_radius
+
+    def point(self, item: StoredItem) -> Point:
+        """ENU of an item's place; without one it is here."""
+        base = self.home_amsl if item.frame in item_.RELATIVE_FRAMES else 0.0
+        if item.x == 0 and item.y == 0:
+            x, y, _ = self.body.position
+            return x, y, base + item.z - self.home_amsl + self.home[2]
+        return to_enu(self.config.origin, item.x * 1e-7, item.y * 1e-7, base + item.z)
+
+    def home_item(self) -> StoredItem:
+        """Home as an item: what HOME_POSITION says, and ArduPilot's seq 0."""
+        latitude, longitude, altitude = to_geodetic(self.config.origin, self.home)
+        return StoredItem(0, item_.WAYPOINT, 0.0, 0.0, 0.0, 0.0, round(latitude * 1e7),
+                          round(longitude * 1e7), round(altitude, 2))
+
+    def way_home(self) -> Track:
+        """Up, over home, down."""
+        x, y, z = self.body.position
+        top = max(z, self.home[2] + self.return_height)
+        hx, hy, hz = self.home
+        return Track(((x, y, top), (hx, hy, top), (hx, hy, hz)), _NEAR, lands=True)
+
+    def descent(self, point: Point) -> Track:
+        """Straight down."""
+        return Track(((point[0], point[1], self.home[2]),), _NEAR, lands=True)

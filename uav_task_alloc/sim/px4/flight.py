@@ -1,0 +1,188 @@
+# SPDX-License-Identifier: Apache-2.0
+"""PX4 in flight: a mission that is checked as a whole, swapped as a whole, and ends in Hold."""
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import ClassVar
+
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+
+from uav_task_alloc.model import Point
+from uav_task_alloc.sim import stored_item as item_
+from uav_task_alloc.sim.boot import BootTimes
+from uav_task_alloc.sim.config import FlightMode, StorageChange
+from uav_task_alloc.sim.dynamics import Track, metres_between
+from uav_task_alloc.sim.flight import CRITICAL, VehicleFlight
+from uav_task_alloc.sim.modes import PX4_MODES, px4_mode
+from uav_task_alloc.sim.stored_item import StoredItem
+
+_FARTHEST = 10_000.0  # [m] MIS_DIST_1WP and MIS_DIST_WPS
+_REPEATS = 10  # times REACHED is sent again
+_REPEAT_PERIOD = 1.0  # [s]
+
+
+@dataclass(slots=True)
+class Result:
+    """What the navigator says of its last mission, take-off or landing."""
+
+    finished: bool = False
+    reached: bool = False  # an item of the mission on board
+
+
+class Px4Flight(VehicleFlight):
+    """Flies the item at `seq`; a swap goes to the flagged one at once."""
+
+    modes = PX4_MODES
+    custom_modes: ClassVar[dict[FlightMode, int]] = {
+        FlightMode.MANUAL: px4_mode(3),
+        FlightMode.TAKEOFF: px4_mode(4, 2),
+        FlightMode.HOLD: px4_mode(4, 3),
+        FlightMode.MISSION: px4_mode(4, 4),
+        FlightMode.RETURN: px4_mode(4, 5),
+        FlightMode.LAND: px4_mode(4, 6),
+    }
+    boot_states = (dialect.MAV_STATE_UNINIT, dialect.MAV_STATE_BOOT)
+    boot_times = BootTimes(boot=4.0, position=20.0, settling=5.0)
+    start_mode = FlightMode.HOLD
+    return_height = 60.0
+    real_radius = 10.0
+    takeoff_height = 2.5
+
+    def reboot(self, now: float) -> None:
+        super().reboot(now)
+        self._finished = False
+        self.result = Result()
+        self.feasible = not self._infeasible()  # the mission on board
+        self._last_reached: int | None = None
+        self._repeats = 0
+        self._repeat_at = now
+
+    def takeoff(self, height: float) -> bool:
+        if not self.positioned or not self.landed:
+            return False
+        self.set_mode(FlightMode.TAKEOFF)
+        self.track = self._rise_to(height)
+        return True
+
+    def _rise_to(self, height: float) -> Track:
+        x, y, _ = self.body.position
+        return Track(((x, y, height),), 0.3)
+
+    def disarm(self, force: bool = False) -> bool:
+        was_armed, done = self.armed, super().disarm(force)
+        if was_armed and self.landed and self.mode in (FlightMode.RETURN, FlightMode.LAND):
+            self.set_mode(FlightMode.HOLD)
+        return done
+
+    def can_fly_mission(self) -> bool:
+        reason = self._infeasible()
+        if reason:
+            self.texts.append((CRITICAL, reason))
+        return not reason
+
+    def _infeasible(self) -> str:
+        if not self.items:
+            return 'Mission rejected: no valid mission'
+        points = [self.home, *(self.point(i) for i in self.items
+                               if i.command in item_.POSITIONAL)]
+        for number, (a, b) in enumerate(pairwise(points)):
+            gap = metres_between(a, b)
+            if gap > _FARTHEST:
+                what = 'First waypoint' if number == 0 else 'Distance between waypoints'
+                return f'{what} too far: {gap:.0f} m, {_FARTHEST:.0f} max'
+        return ''
+
+    def enter(self, mode: FlightMode) -> None:
+        super().enter(mode)
+        if mode in (FlightMode.TAKEOFF, FlightMode.LAND, FlightMode.MISSION):
+            self.result.finished = False
+        if mode is FlightMode.TAKEOFF:
+            self.track = self._rise_to(max(self.body.position[2],
+                                           self.home[2] + self.takeoff_height))
+        if mode is FlightMode.MISSION and self._finished:
+            self.seq, self._finished = 0, False
+
+    def start_mission(self) -> bool:
+        return self.set_mode(FlightMode.MISSION) and self.arm()
+
+    def set_current(self, seq: int) -> bool:
+        if seq >= len(self.items):
+            self.texts.append((CRITICAL, 'New mission waypoint sequence out of bounds'))
+            return False
+        self.seq, self._finished, self.result.finished = seq, False, False
+        if self.mode is FlightMode.MISSION:
+            self.track = None
+        return True
+
+    def changed(self, change: StorageChange, flagged: int | None) -> None:
+        if change not in (StorageChange.SWAPPED, StorageChange.CLEARED):
+            return
+        last = max(0, len(self.items) - 1)
+        self.seq = min(self.seq, last) if flagged is None else flagged
+        self._finished, self.result = False, Result()
+        reason = self._infeasible() if self.items else ''
+        self.feasible = bool(self.items) and not reason
+        if reason:
+            self.texts.append((CRITICAL, reason))
+        if self.mode is FlightMode.MISSION:
+            self.track = None
+            if reason or not self.items:
+                self.set_mode(FlightMode.HOLD)
+
+    def next_item(self) -> None:
+        item = self.items[self.seq]
+        if item.command in (item_.CHANGE_SPEED,):
+            self.do(item)
+            self._advance(self.body.position)
+        elif item.command == item_.RETURN:
+            self.set_mode(FlightMode.RETURN)  # which is never told as reached
+        else:
+            self.begin(self.seq)
+
+    def item_done(self) -> None:
+        self._advance(self.target)
+
+    def _advance(self, point: Point) -> None:
+        self.tell_reached(self.seq, point)
+        if self.seq + 1 < len(self.items):
+            self.seq += 1
+            return
+        self._finished = self.result.finished = True
+        self.note('mission_end')
+        self.set_mode(FlightMode.HOLD)
+
+    def _end_of(self, track: Track) -> None:
+        if self.mode in (FlightMode.TAKEOFF, FlightMode.LAND):
+            self.result.finished = True
+        super()._end_of(track)
+
+    def tell_reached(self, seq: int, point: Point) -> None:
+        super().tell_reached(seq, point)
+        self.result.reached = True
+        self._last_reached, self._repeats = seq, 0
+        self._repeat_at = self.now + _REPEAT_PERIOD
+
+    def step(self, now: float) -> None:
+        super().step(now)
+        while (self._last_reached is not None and self._repeats < _REPEATS
+               and self._repeat_at <= now):
+            self.reached.append(self._last_reached)
+            self._repeats += 1
+            self._repeat_at += _REPEAT_PERIOD
+
+    def make_track(self, item: StoredItem) -> Track:
+        track = super().make_track(item)
+        if not self.landed or not track.points or track.lands:
+            return track
+        x, y, z = self.body.position
+        top = max(track.points[0][2], z + self.takeoff_height)
+        return Track(((x, y, top), *track.points), min(track.radius, 2.0), track.hold)
+
+    def climb(self, target: Point) -> Track:
+        return Track((target,), self.acceptance_radius)  # in the air: a waypoint
+
+    def radius(self, item: StoredItem) -> float:
+        if item.command == item_.WAYPOINT and item.p2 > 0.0:
+            return item.p2
+        return self.acceptance_radius

@@ -1,0 +1,199 @@
+# SPDX-License-Identifier: Apache-2.0
+"""PX4's mission service: a second storage is filled and swapped in when the last item is there."""
+from __future__ import annotations
+
+import math
+from enum import Enum
+
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+
+from uav_task_alloc.mavlink.transport.codec import Message, with_plan_id
+from uav_task_alloc.sim.config import FlightMode, StorageChange
+from uav_task_alloc.sim.mission_server import MISSION, MissionService, RemoteIds
+from uav_task_alloc.sim.px4.flight import Px4Flight
+from uav_task_alloc.sim.stored_item import (
+    Refusal,
+    StoredItem,
+    from_message,
+    px4_crc,
+    stored_by_px4,
+    to_float_message,
+    to_message,
+)
+
+RETRY = 0.25  # [s] between requests for the same item
+GIVE_UP = 5.0  # [s] without a word
+_ALL = dialect.MAV_MISSION_TYPE_ALL
+
+
+class _State(Enum):
+    IDLE = 'idle'
+    GETLIST = 'getlist'  # receives
+    SENDLIST = 'sendlist'  # is read back
+
+
+class Px4Mission(MissionService):
+    """Atomic: a transfer that fails leaves the old mission; a CRC names the new one."""
+
+    flight: Px4Flight
+
+    def __init__(self, system_id: int, capacity: int) -> None:
+        super().__init__(system_id, capacity)
+        self._id = 0
+        self._told = 0  # mission_state; stays where no rule has another
+        self.reboot()
+
+    def reboot(self) -> None:
+        self._state = _State.IDLE
+        self._peer: RemoteIds = (0, 0)
+        self._seq = 0  # expected next, in either direction
+        self._expected = 0
+        self._incoming: list[StoredItem] = []
+        self._flagged: int | None = None
+        self._int = False  # until the first MISSION_ITEM_INT
+        self._heard = -math.inf  # [s]
+        self._asked = -math.inf  # [s]
+
+    @property
+    def mission_id(self) -> int:
+        return self._id
+
+    def progress(self) -> tuple[int, int, int]:
+        runs = self.flight.mode in (FlightMode.MISSION, FlightMode.TAKEOFF, FlightMode.LAND)
+        return len(self.items) or 65535, self._state_of_mission(runs), 1 if runs else 2
+
+    def _state_of_mission(self, runs: bool) -> int:
+        """As PX4 has it: a take-off and a landing end as a mission does."""
+        result = self.flight.result
+        if not self.items or not self.flight.feasible:
+            self._told = dialect.MISSION_STATE_NO_MISSION
+        elif result.finished:
+            self._told = dialect.MISSION_STATE_COMPLETE
+        elif runs:
+            self._told = dialect.MISSION_STATE_ACTIVE
+        elif result.reached:
+            self._told = dialect.MISSION_STATE_PAUSED
+        elif self.flight.seq < 1:
+            self._told = dialect.MISSION_STATE_NOT_STARTED
+        return self._told
+
+    def step(self, now: float) -> None:
+        if self._state is _State.IDLE:
+            return
+        if now - self._heard > GIVE_UP:
+            self._state = _State.IDLE
+        elif self._state is _State.GETLIST and now - self._asked > RETRY:
+            self._ask(now)
+
+    def _ask(self, now: float) -> None:
+        self._asked = now
+        kind = (dialect.MAVLink_mission_request_int_message if self._int
+                else dialect.MAVLink_mission_request_message)
+        self.out.append(kind(*self._peer, self._seq, MISSION))
+
+    def _count(self, message: Message, peer: RemoteIds, now: float) -> None:
+        self._heard = now
+        if self._state is _State.IDLE:
+            self._begin(message, peer, now)
+        elif self._state is _State.GETLIST and self._seq == 0:
+            self._ask(now)  # our request must have been lost
+        else:  # to the partner, whoever sent it; the transfer goes on
+            self._send_ack(self._peer, dialect.MAV_MISSION_ERROR)
+
+    def _begin(self, message: Message, peer: RemoteIds, now: float) -> None:
+        if message.mission_type != MISSION:
+            self._send_ack(peer, dialect.MAV_MISSION_UNSUPPORTED, message.mission_type)
+            return
+        self._peer = peer
+        if message.count > self._capacity:
+            self._send_ack(peer, dialect.MAV_MISSION_NO_SPACE)
+            return
+        self._incoming, self._flagged = [], None
+        self._seq, self._expected = 0, message.count
+        if message.count == 0:
+            self._store(StorageChange.CLEARED)
+            self._send_ack(peer, dialect.MAV_MISSION_ACCEPTED)
+            return
+        self._state = _State.GETLIST
+        self._ask(now)
+
+    def _item(self, message: Message, peer: RemoteIds, now: float) -> None:
+        self._int = True
+        if peer != self._peer:
+            return
+        if self._state is _State.GETLIST:
+            self._heard = now
+            if message.seq == self._seq:
+                self._take(message, now)
+        elif self._state is _State.IDLE and message.seq + 1 == self._seq:
+            self._accept()  # the last item again: our ACK must have been lost
+        else:
+            self._send_ack(peer, dialect.MAV_MISSION_ERROR)
+
+    def _take(self, message: Message, now: float) -> None:
+        stored = stored_by_px4(from_message(message))
+        if isinstance(stored, Refusal):
+            self._state = _State.IDLE
+            self._send_ack(self._peer, stored.result)
+            return
+        self._incoming.append(stored)
+        if message.current:
+            self._flagged = message.seq
+        self._seq += 1
+        if self._seq == self._expected:
+            self._state = _State.IDLE
+            self._store(StorageChange.SWAPPED)
+            self._accept()
+        else:
+            self._ask(now)
+
+    def _store(self, change: StorageChange) -> None:
+        self.items[:] = self._incoming
+        self._id = px4_crc(self.items)
+        self._changed(change, self._flagged)
+
+    def _accept(self) -> None:
+        self.out.append(with_plan_id(dialect.MAVLink_mission_ack_message(
+            *self._peer, dialect.MAV_MISSION_ACCEPTED, MISSION), self._id))
+
+    def _request_list(self, message: Message, peer: RemoteIds, now: float) -> None:
+        if self._seq == len(self.items):  # all was sent: the station's ACK may be lost
+            self._state = _State.IDLE
+        again = self._state is _State.SENDLIST and peer == self._peer
+        if self._state is not _State.IDLE and not again:
+            return
+        count = len(self.items) if message.mission_type == MISSION else 0
+        if message.mission_type == MISSION:
+            self._state, self._peer, self._seq, self._heard = _State.SENDLIST, peer, 0, now
+        self.out.append(with_plan_id(dialect.MAVLink_mission_count_message(
+            *peer, count, message.mission_type), self._id if count else 0))
+
+    def _request(self, message: Message, peer: RemoteIds, now: float) -> None:
+        self._int = message.get_type().endswith('_INT')
+        if peer != self._peer or self._state is not _State.SENDLIST:
+            return
+        self._heard = now
+        if message.seq == self._seq < len(self.items):
+            self._seq += 1
+        elif message.seq != self._seq - 1 or message.seq >= len(self.items):
+            self._state = _State.IDLE
+            self._send_ack(peer, dialect.MAV_MISSION_ERROR)
+            return
+        make = to_message if self._int else to_float_message
+        self.out.append(make(self.items[message.seq], message.seq,
+                             message.seq == self.flight.seq, peer))
+
+    def _clear(self, message: Message, peer: RemoteIds, now: float) -> None:
+        if self._state is not _State.IDLE:
+            return
+        if message.mission_type in (MISSION, _ALL):
+            self._incoming, self._flagged = [], None
+            self._store(StorageChange.CLEARED)
+        self._send_ack(peer, dialect.MAV_MISSION_ACCEPTED, message.mission_type)
+
+    def _ack(self, message: Message, peer: RemoteIds, now: float) -> None:
+        if peer != self._peer:
+            return
+        cancelled = message.type == dialect.MAV_MISSION_OPERATION_CANCELLED
+        if self._state is _State.SENDLIST or (self._state is _State.GETLIST and cancelled):
+            self._state = _State.IDLE

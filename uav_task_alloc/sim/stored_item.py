@@ -1,0 +1,122 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A mission item as each autopilot stores it: what it refuses, and what it silently changes."""
+from __future__ import annotations
+
+import math
+import struct
+import zlib
+from collections.abc import Iterable
+from typing import NamedTuple
+
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+
+from uav_task_alloc.mavlink.transport.codec import Message
+
+WAYPOINT = dialect.MAV_CMD_NAV_WAYPOINT
+LOITER_UNLIMITED = dialect.MAV_CMD_NAV_LOITER_UNLIM
+LOITER_TIME = dialect.MAV_CMD_NAV_LOITER_TIME
+RETURN = dialect.MAV_CMD_NAV_RETURN_TO_LAUNCH
+LAND = dialect.MAV_CMD_NAV_LAND
+TAKEOFF = dialect.MAV_CMD_NAV_TAKEOFF
+DELAY = dialect.MAV_CMD_NAV_DELAY
+CHANGE_SPEED = dialect.MAV_CMD_DO_CHANGE_SPEED
+POSITIONAL = {WAYPOINT, LOITER_UNLIMITED, LOITER_TIME, LAND, TAKEOFF}
+KNOWN = POSITIONAL | {RETURN, DELAY, CHANGE_SPEED}
+
+_NAN_ALLOWED = {WAYPOINT, LAND, TAKEOFF}  # ArduPilot, in param4
+_ARDUPILOT_FRAMES = {0: 0, 2: 0, 3: 3, 5: 0, 6: 3, 10: 10, 11: 10}  # sent -> read back
+_PX4_FRAMES = {0, 3, 5, 6}
+RELATIVE_FRAMES = {3, 6, 10, 11}  # height above home; 10 and 11: above the (flat) terrain
+
+
+class StoredItem(NamedTuple):
+    """The fields of MISSION_ITEM_INT that a vehicle keeps."""
+
+    frame: int
+    command: int
+    p1: float
+    p2: float
+    p3: float
+    p4: float
+    x: int  # [1e-7 deg]
+    y: int  # [1e-7 deg]
+    z: float  # [m]
+    autocontinue: int = 1
+
+
+class Refusal(NamedTuple):
+    """An item that is not stored, and the MISSION_ACK type that says so."""
+
+    result: int
+
+
+def from_message(m: Message) -> StoredItem:
+    """What a MISSION_ITEM_INT carries."""
+    return StoredItem(m.frame, m.command, m.param1, m.param2, m.param3, m.param4, m.x, m.y, m.z,
+                      m.autocontinue)
+
+
+def to_message(item: StoredItem, seq: int, current: bool, peer: tuple[int, int]) -> Message:
+    """The MISSION_ITEM_INT of a stored item for a (system, component)."""
+    return dialect.MAVLink_mission_item_int_message(
+        *peer, seq, item.frame, item.command, int(current), item.autocontinue, item.p1, item.p2,
+        item.p3, item.p4, item.x, item.y, item.z)
+
+
+def to_float_message(item: StoredItem, seq: int, current: bool, peer: tuple[int, int]) -> Message:
+    """The MISSION_ITEM that answers an old MISSION_REQUEST: float32 degrees, metres are lost."""
+    scale = 1e-7 if item.command in POSITIONAL else 1.0
+    return dialect.MAVLink_mission_item_message(
+        *peer, seq, item.frame, item.command, int(current), item.autocontinue, item.p1, item.p2,
+        item.p3, item.p4, item.x * scale, item.y * scale, item.z)
+
+
+def stored_by_ardupilot(item: StoredItem) -> StoredItem | Refusal:
+    """The lossy copy ArduCopter keeps: whole seconds, centimetres, no yaw, three frames."""
+    bad = _ardupilot_nan(item)
+    if bad:
+        return Refusal(bad)
+    if item.command not in KNOWN:
+        return Refusal(dialect.MAV_MISSION_UNSUPPORTED)
+    if item.command not in POSITIONAL:
+        p1 = item.p1 if item.command in (CHANGE_SPEED, DELAY) else 0.0
+        p2, p3 = (item.p2, item.p3) if item.command == CHANGE_SPEED else (0.0, 0.0)
+        return StoredItem(0, item.command, p1, p2, p3, 0.0, 0, 0, 0.0)
+    if item.frame not in _ARDUPILOT_FRAMES:
+        return Refusal(dialect.MAV_MISSION_UNSUPPORTED_FRAME)
+    if abs(item.x) > 90 * 10**7:
+        return Refusal(dialect.MAV_MISSION_INVALID_PARAM5_X)
+    if abs(item.y) > 180 * 10**7:
+        return Refusal(dialect.MAV_MISSION_INVALID_PARAM6_Y)
+    centimetres = math.trunc(item.z * 100.0 + math.copysign(1e-3, item.z))
+    return StoredItem(_ARDUPILOT_FRAMES[item.frame], item.command, float(math.trunc(item.p1)),
+                      0.0, 0.0, 0.0, item.x, item.y, centimetres / 100.0)
+
+
+def _ardupilot_nan(item: StoredItem) -> int:
+    """The MISSION_ACK type that names the first NaN ArduPilot does not take; 0: none."""
+    for number, value in enumerate((item.p1, item.p2, item.p3, item.p4), start=1):
+        if math.isnan(value) and not (number == 4 and item.command in _NAN_ALLOWED):
+            return int(dialect.MAV_MISSION_INVALID_PARAM1) + number - 1
+    return int(dialect.MAV_MISSION_INVALID_PARAM7) if math.isnan(item.z) else 0
+
+
+def stored_by_px4(item: StoredItem) -> StoredItem | Refusal:
+    """The exact copy PX4 keeps; the frame must fit the command."""
+    if item.frame != dialect.MAV_FRAME_MISSION and item.frame not in _PX4_FRAMES:
+        return Refusal(dialect.MAV_MISSION_UNSUPPORTED_FRAME)
+    if item.command not in KNOWN:
+        return Refusal(dialect.MAV_MISSION_UNSUPPORTED)
+    if (item.command in POSITIONAL) == (item.frame == dialect.MAV_FRAME_MISSION):
+        return Refusal(dialect.MAV_MISSION_UNSUPPORTED)
+    return item
+
+
+def px4_crc(items: Iterable[StoredItem]) -> int:
+    """PX4's id of a mission: NuttX's crc32part over the packed items, 0 for none."""
+    crc = 0
+    for item in items:
+        raw = struct.pack('<BHB4fiif', item.frame, item.command, item.autocontinue, item.p1,
+                          item.p2, item.p3, item.p4, item.x, item.y, item.z)
+        crc = zlib.crc32(raw, crc ^ 0xFFFFFFFF) ^ 0xFFFFFFFF  # no inversion at either end
+    return crc

@@ -1,0 +1,204 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A simulated autopilot: messages and time in, messages out; it flies what its storage holds."""
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+
+from uav_task_alloc.mavlink.transport.codec import Message, with_plan_id
+from uav_task_alloc.sim.ardupilot.flight import ArduPilotFlight
+from uav_task_alloc.sim.ardupilot.mission_server import ArduPilotMission
+from uav_task_alloc.sim.commands import ArduPilotCommands, Commands, Px4Commands
+from uav_task_alloc.sim.config import FlightMode, TruthEvent, VehicleConfig
+from uav_task_alloc.sim.estimate import Estimate
+from uav_task_alloc.sim.failsafe import Interventions
+from uav_task_alloc.sim.flight import VehicleFlight
+from uav_task_alloc.sim.mission_server import COMPONENT, MissionService
+from uav_task_alloc.sim.px4.flight import Px4Flight
+from uav_task_alloc.sim.px4.mission_server import Px4Mission
+from uav_task_alloc.sim.streams import Streams
+from uav_task_alloc.sim.telemetry import TelemetryMessages
+
+_CURRENT = dialect.MAVLINK_MSG_ID_MISSION_CURRENT
+
+
+@dataclass(frozen=True, slots=True)
+class Autopilot:
+    """One row of what differs: classes and figures of a kind of autopilot."""
+
+    name: str
+    number: int  # MAV_AUTOPILOT
+    flight: type[VehicleFlight]
+    mission: type[MissionService]
+    commands: type[Commands]
+    capacity: int  # items
+    rates: dict[int, float]  # [Hz] by message id, unasked
+    asks_current: bool  # MISSION_CURRENT is a stream; else it comes at 1 Hz by itself
+
+
+ARDUPILOT = Autopilot(
+    'ardupilot', dialect.MAV_AUTOPILOT_ARDUPILOTMEGA, ArduPilotFlight, ArduPilotMission,
+    ArduPilotCommands, 650, {dialect.MAVLINK_MSG_ID_HEARTBEAT: 1.0}, asks_current=True)
+PX4 = Autopilot(
+    'px4', dialect.MAV_AUTOPILOT_PX4, Px4Flight, Px4Mission, Px4Commands, 500, {
+        dialect.MAVLINK_MSG_ID_HEARTBEAT: 1.0,
+        dialect.MAVLINK_MSG_ID_ATTITUDE: 100.0,
+        dialect.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: 50.0,
+        dialect.MAVLINK_MSG_ID_LOCAL_POSITION_NED: 30.0,
+        dialect.MAVLINK_MSG_ID_VFR_HUD: 10.0,
+        dialect.MAVLINK_MSG_ID_SYS_STATUS: 5.0,
+        dialect.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: 5.0,
+        dialect.MAVLINK_MSG_ID_GPS_RAW_INT: 1.0,
+        dialect.MAVLINK_MSG_ID_ESTIMATOR_STATUS: 1.0,
+        dialect.MAVLINK_MSG_ID_BATTERY_STATUS: 0.5,
+        dialect.MAVLINK_MSG_ID_HOME_POSITION: 0.5,
+    }, asks_current=False)
+AUTOPILOTS = {row.name: row for row in (ARDUPILOT, PX4)}
+
+
+class Vehicle(Interventions):
+    """Flight, mission service, commands and telemetry of one system; time is vehicle seconds."""
+
+    def __init__(self, config: VehicleConfig, autopilot: Autopilot, now: float = 0.0) -> None:
+        self.config, self.autopilot = config, autopilot
+        self.alive = True
+        capacity = autopilot.capacity if config.capacity is None else config.capacity
+        self.mission = autopilot.mission(config.system_id, capacity)
+        self.flight = autopilot.flight(config, self.mission.items)
+        self.mission.serve(self.flight)
+        self.estimate = Estimate(self.flight)
+        self._telemetry = TelemetryMessages(self.flight, self.estimate, autopilot.number,
+                                    config.system_id)
+        makers = self._telemetry.makers
+        rates = autopilot.rates
+        if not config.floods:
+            rates = {number: min(rate, 2.0) for number, rate in rates.items()}
+        if autopilot.asks_current:
+            makers = {**makers, _CURRENT: lambda: [self._mission_current()]}
+        self._streams = Streams(makers, rates)
+        self._commands = autopilot.commands(self.flight, self._streams)
+        self._handlers: dict[str, Callable[[Message], list[Message]]] = {
+            'COMMAND_LONG': self._command_long, 'COMMAND_INT': self._command_int,
+            'SET_MODE': self._set_mode, 'MISSION_SET_CURRENT': self._set_current,
+        }
+        self.reboot(now)
+        self.flight.events.clear()
+
+    def reboot(self, now: float) -> None:
+        """Power off and on: boot time, rates and transfers are lost, the stored mission is not.
+
+        In the air it falls.
+        """
+        self.flight.reboot(now)
+        self.estimate.reboot()
+        self.mission.reboot()
+        self._streams.reboot(now)
+        self._told: tuple[int, int] = (self.flight.seq, 0)
+        self._tell_current_at = now
+
+    def kill(self) -> None:
+        """End radio and motion for good."""
+        if self.alive:
+            self.alive = False
+            self.flight.note('died')
+
+    def revive(self, now: float) -> None:
+        """Boot again on the ground below where it died."""
+        self.alive = True
+        self.flight.lie_down()
+        self.reboot(now)
+
+    @property
+    def mode(self) -> FlightMode:
+        """What it does now."""
+        return self.flight.mode
+
+    def take_events(self) -> list[TruthEvent]:
+        """What happened since the last call."""
+        events, self.flight.events = self.flight.events, []
+        return events
+
+    def receive(self, message: Message, now: float) -> list[Message]:
+        """What it answers to a message at time now [s]."""
+        if not self.alive:
+            return []
+        self.flight.step(now)
+        handler = self._handlers.get(message.get_type())
+        if handler is None:
+            self.mission.handle(message, now)
+            return self._drain()
+        if message.target_system not in (self.config.system_id, 0):
+            return []
+        with self.flight.caused_by(_station(message)):
+            answers = handler(message)
+        return answers + self._drain()
+
+    def step(self, now: float) -> list[Message]:
+        """Fly and stream until now [s]."""
+        if not self.alive:
+            return []
+        self.flight.step(now)
+        self.mission.step(now)
+        out = self._drain()
+        if not self.autopilot.asks_current and now >= self._tell_current_at:
+            self._tell_current_at = now + 1.0
+            out.append(self._mission_current())
+        return out + self._streams.step(now)
+
+    def _drain(self) -> list[Message]:
+        flight = self.flight
+        out = [dialect.MAVLink_statustext_message(severity, text[:50].encode())
+               for severity, text in flight.texts]
+        out += [dialect.MAVLink_mission_item_reached_message(seq) for seq in flight.reached]
+        told = (flight.seq, len(self.mission.items))
+        if told != self._told:
+            self._told = told
+            if not self.autopilot.asks_current:
+                out.append(self._mission_current())
+        out += self.mission.out
+        flight.texts.clear()
+        flight.reached.clear()
+        self.mission.out.clear()
+        return out
+
+    def _mission_current(self) -> Message:
+        total, state, mode = self.mission.progress()
+        message = dialect.MAVLink_mission_current_message(self.flight.seq, total, state, mode)
+        mission_id = self.mission.mission_id
+        return message if mission_id is None else with_plan_id(message, mission_id)
+
+    def _command_long(self, m: Message) -> list[Message]:
+        return self._command(m, (m.param1, m.param2, m.param3, m.param4, m.param5, m.param6,
+                                 m.param7))
+
+    def _command_int(self, m: Message) -> list[Message]:
+        return self._command(m, (m.param1, m.param2, m.param3, m.param4, m.x, m.y, m.z))
+
+    def _command(self, m: Message, params: tuple[float, ...]) -> list[Message]:
+        if m.target_component not in (COMPONENT, 0):
+            return []
+        self._commands.note(m.command, params, _station(m))  # type: ignore[arg-type]
+        result = self._commands.run(m.command, params)  # type: ignore[arg-type]
+        ack = dialect.MAVLink_command_ack_message(
+            m.command, result, 0, 0, m.get_srcSystem(), m.get_srcComponent())
+        asked, self._commands.out = self._commands.out, []
+        if m.command == dialect.MAV_CMD_DO_SET_MISSION_CURRENT and result == 0:
+            asked.append(self._mission_current())
+        return [ack, *asked]
+
+    def _set_mode(self, m: Message) -> list[Message]:
+        self.flight.note('command', command='mode', mode=m.custom_mode, cause=_station(m))
+        self.flight.set_custom_mode(m.custom_mode)
+        return []
+
+    def _set_current(self, m: Message) -> list[Message]:
+        if m.target_component not in (COMPONENT, 0):
+            return []
+        self.flight.note('command', command='set current', seq=m.seq, cause=_station(m))
+        return [self._mission_current()] if self.flight.set_current(m.seq) else []
+
+
+def _station(m: Message) -> str:
+    return f'station {m.get_srcSystem()}/{m.get_srcComponent()}'

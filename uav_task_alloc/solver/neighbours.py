@@ -1,0 +1,154 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Who is near whom: nearest tasks by a grid, nearest starts by looking at all."""
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from uav_task_alloc.solver.kernel import kernel, maker, part
+from uav_task_alloc.solver.rng import Chance, below, uniform
+from uav_task_alloc.solver.routes import TINY, Arrays, Floats, Ints, step
+
+NOISE = 4096  # random numbers drawn once, to begin at any of them
+
+
+@maker
+def _cells(xyz: Floats, per_cell: float) -> tuple[Ints, Ints, Ints, Floats]:
+    """Points sorted into square cells: cell of each, first of each cell, order, (x0, y0, side)."""
+    n = len(xyz)
+    x0, y0 = xyz[:, 0].min(), xyz[:, 1].min()
+    wide = max(xyz[:, 0].max() - x0, xyz[:, 1].max() - y0, 1e-6)
+    across = max(1, int(math.sqrt(n / per_cell)))
+    side = wide / across * (1.0 + 1e-9)
+    cell = np.empty(n, np.int64)
+    first = np.zeros(across * across + 1, np.int64)
+    for i in range(n):
+        cell[i] = int((xyz[i, 1] - y0) / side) * across + int((xyz[i, 0] - x0) / side)
+        first[cell[i] + 1] += 1
+    first[:] = np.cumsum(first)
+    order, fill = np.empty(n, np.int64), first.copy()
+    for i in range(n):
+        order[fill[cell[i]]] = i
+        fill[cell[i]] += 1
+    return cell, first, order, np.array((x0, y0, side))
+
+
+@kernel
+def _keep(ids: Ints, squares: Floats, kept: int, j: int, square: float) -> int:
+    """Insert j into the sorted front of `ids`, nearest first; returns how many are kept."""
+    k = ids.size
+    if kept == k and square >= squares[k - 1]:
+        return kept
+    place = min(kept, k - 1)
+    while place > 0 and squares[place - 1] > square:
+        ids[place], squares[place] = ids[place - 1], squares[place - 1]
+        place -= 1
+    ids[place], squares[place] = j, square
+    return min(kept + 1, k)
+
+
+@part
+def _square(xyz: Floats, i: int, j: int) -> float:
+    x, y, z = xyz[i, 0] - xyz[j, 0], xyz[i, 1] - xyz[j, 1], xyz[i, 2] - xyz[j, 2]
+    return float(x * x + y * y + z * z)
+
+
+@maker
+def nearest(xyz: Floats, near: Ints, fresh: Ints) -> Floats:
+    """Fill near (n, k) with the k nearest others of each point, nearest first. O(n k) about.
+
+    Returns their squared distances as the crow flies. A row that begins with -1 is searched for;
+    in another stand those that were nearest before the points `fresh` came.
+    """
+    n, k = near.shape
+    squares = np.empty((n, k))
+    if k == 0:
+        return squares
+    cell, first, order, frame = _cells(xyz, 3.0)
+    side, across = frame[2], int(math.sqrt(first.size - 1) + 0.5)
+    held = np.empty(k, np.int64)
+    for i in range(n):
+        if near[i, 0] >= 0:
+            held[:], kept = near[i], 0
+            for some in (held, fresh):
+                for m in range(some.size):
+                    kept = _keep(near[i], squares[i], kept, some[m], _square(xyz, i, some[m]))
+            continue
+        row, column, kept, ring = cell[i] // across, cell[i] % across, 0, 0
+        while ring < across:
+            if kept == k and squares[i, k - 1] <= ((ring - 1) * side) ** 2:
+                break
+            for y in range(max(0, row - ring), min(across, row + ring + 1)):
+                edge = abs(y - row) == ring
+                for x in range(column - ring, column + ring + 1, 1 if edge or ring == 0
+                               else 2 * ring):
+                    if x < 0 or x >= across:
+                        continue
+                    for m in range(first[y * across + x], first[y * across + x + 1]):
+                        j = order[m]
+                        if j != i:
+                            kept = _keep(near[i], squares[i], kept, j, _square(xyz, i, j))
+            ring += 1
+    return squares
+
+
+@kernel
+def near_tasks(a: Arrays, found: Ints, squares: Floats) -> None:
+    """Fill a.near with the found neighbours in order of the way to fly. O(n k^2)."""
+    n, k = a.near.shape
+    for i in range(n):
+        for m in range(k):
+            j, t, place = a.uavs + found[i, m], a.uavs + i, m
+            if a.straight:
+                a.near[i, m], a.near_length[i, m] = j, math.sqrt(squares[i, m])
+                continue
+            d = step(a, j, t)  # inf: t lies inside a zone
+            if d < np.inf:
+                d = max(d, step(a, t, j))  # inf: j does
+            while place > 0 and a.near_length[i, place - 1] > d:
+                a.near[i, place] = a.near[i, place - 1]
+                a.near_length[i, place] = a.near_length[i, place - 1]
+                place -= 1
+            a.near[i, place], a.near_length[i, place] = j, d
+
+
+@maker
+def near_starts(a: Arrays, xyz: Floats, rng: Chance) -> None:
+    """Fill a.starts with the starts nearest to each task, equally near ones shuffled. O(n m).
+
+    Where no range is exceeded, UAVs that cannot get there are no neighbours, and the price of
+    tasks that nobody can get to becomes 0.
+    """
+    n, s = a.starts.shape
+    squares, every, shuffled = np.empty(s), np.empty(a.uavs), np.empty(a.uavs)
+    xs, ys, zs = xyz[:a.uavs, 0].copy(), xyz[:a.uavs, 1].copy(), xyz[:a.uavs, 2].copy()
+    most = np.full(a.uavs, np.inf)  # square of how far it gets
+    if a.hard:
+        for u in range(a.uavs):
+            most[u] = (a.reach[u] + TINY) ** 2 if a.reach[u] >= 0.0 else -1.0
+    noise = np.empty(NOISE + a.uavs)
+    for m in range(noise.size):
+        noise[m] = 1e-6 * uniform(rng)
+    for i in range(n):
+        kept, t, spare, row = 0, a.uavs + i, -np.inf, a.starts[i]
+        x, y, z = xyz[t, 0], xyz[t, 1], xyz[t, 2]
+        some = noise[below(rng, NOISE):]
+        for u in range(a.uavs):  # nothing else in this loop: many at once
+            every[u] = (xs[u] - x) ** 2 + (ys[u] - y) ** 2 + (zs[u] - z) ** 2
+            shuffled[u] = every[u] + some[u] * (every[u] + 1.0)
+        for u in range(a.uavs):
+            if a.picky[i] and not a.may[u, i]:
+                continue
+            more = a.reach[u] - spare
+            if more > 0.0 and every[u] < more * more:
+                spare = a.reach[u] - math.sqrt(every[u])
+            if every[u] <= most[u] and (kept < s or shuffled[u] < squares[s - 1]):
+                kept = _keep(row, squares, kept, u, shuffled[u])
+        if a.hard and spare < -TINY:
+            a.price[i] = 0.0
+        for m in range(s):
+            if m < kept:
+                a.start_length[i, m] = step(a, a.starts[i, m], t)
+            else:
+                a.starts[i, m], a.start_length[i, m] = 0, np.inf
