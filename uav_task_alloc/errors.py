@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The errors a caller may handle; what can be expected is returned, not raised."""
 
-LONGEST = 200  # characters of a value that are shown
+_LONGEST = 200  # characters of a value that are shown
 
 
 class AllocError(Exception):
@@ -19,7 +19,7 @@ class InvalidValue(AllocError, ValueError):
 def shown(value: object) -> str:
     """A value as a line of text, cut where it is long: whoever sent it may be hostile."""
     text = repr(value)
-    return text if len(text) <= LONGEST else f'{text[:LONGEST]}... ({len(text)} characters)'
+    return text if len(text) <= _LONGEST else f'{text[:_LONGEST]}... ({len(text)} characters)'
 
 
 class UnknownName(AllocError, KeyError):

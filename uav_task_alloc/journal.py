@@ -19,8 +19,8 @@ SIDE_FILES = ('', '-wal', '-shm')
 VERSION = 1  # of the layout; a file of a newer one is refused
 WAIT = 0.5  # [s] for another process that has the file
 SHORTEST = 16  # [bytes] the header of SQLite; it takes a shorter file for a new database
-LONGEST = 2**30  # [bytes] a damaged header may ask for any length
-COLUMNS = ['kind', 'id', 'body']
+_LONGEST = 2**30  # [bytes] a damaged header may ask for any length
+_COLUMNS = ['kind', 'id', 'body']
 IN_USE = frozenset({sqlite3.SQLITE_BUSY, sqlite3.SQLITE_LOCKED})
 DAMAGED = frozenset({sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB})
 
@@ -78,10 +78,10 @@ class Journal:
 
     def _check_layout(self, version: int) -> None:
         columns = [row[1].decode() for row in self._db.execute('PRAGMA table_info(world)')]
-        if version == VERSION and columns == COLUMNS:
+        if version == VERSION and columns == _COLUMNS:
             return
         text = (f'{self.path}: layout version = {version}, columns = {columns}: '
-                f'expected {VERSION} and {COLUMNS}')
+                f'expected {VERSION} and {_COLUMNS}')
         if self._db.execute('SELECT count(*) FROM sqlite_master').fetchone()[0]:
             raise JournalForeign(f'{text}; it is a database of another program')
         raise JournalCorrupt(f'{text}; it is empty')
@@ -249,7 +249,7 @@ def _pad(path: Path) -> None:
     with path.open('r+b') as file:
         header = file.read(32)
         page = int.from_bytes(header[16:18], 'big')
-        length = min(page * int.from_bytes(header[28:32], 'big'), LONGEST)
+        length = min(page * int.from_bytes(header[28:32], 'big'), _LONGEST)
         if path.stat().st_size < length:
             file.truncate(length)
 

@@ -67,7 +67,7 @@ class Checked:
             object.__setattr__(self, spec.name, check(spec, getattr(self, spec.name)))
 
 
-P = TypeVar('P', bound=Checked)
+_P = TypeVar('_P', bound=Checked)
 
 
 @dataclass(frozen=True)

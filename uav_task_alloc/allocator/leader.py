@@ -18,7 +18,7 @@ LISTEN = 1.5  # [s] from the start until other nodes are discovered
 SETTLE = 0.3  # [s] the same after a restart, which must not keep the UAVs waiting
 WAIT = 3.0  # [s] for a word of another publisher of `allocation`; allocators speak every second
 GONE = 5.0  # [s] after the last word of a leader it may be gone
-LONGEST = 200  # characters of what another allocator tells of itself
+_LONGEST = 200  # characters of what another allocator tells of itself
 
 
 class Role(Enum):
@@ -113,8 +113,8 @@ def heard(
     if values.get('allocation topic') != topic:
         return None
     id, started = values.get('instance', ''), values.get('started', '')
-    if not id or len(id) > LONGEST:
-        raise InvalidValue('instance', id, f'1 to {LONGEST} characters')
+    if not id or len(id) > _LONGEST:
+        raise InvalidValue('instance', id, f'1 to {_LONGEST} characters')
     if not (started.isascii() and started.isdecimal() and len(started) <= 20):
         raise InvalidValue('started', started, 'a time [ns]')
     try:
@@ -122,4 +122,4 @@ def heard(
     except ValueError:
         raise InvalidValue('role', values.get('role', ''),
                            f'one of {", ".join(role.value for role in Role)}') from None
-    return AllocatorInstance(int(started), id, node[:LONGEST]), role
+    return AllocatorInstance(int(started), id, node[:_LONGEST]), role

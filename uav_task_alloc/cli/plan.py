@@ -20,7 +20,7 @@ from uav_task_alloc.params import AllocatorParams
 from uav_task_alloc.scenario.values import Scenario
 
 PICTURES = ('.png', '.pdf', '.svg')
-INTERRUPTED = 130  # what a shell expects after Ctrl-C
+_INTERRUPTED = 130  # what a shell expects after Ctrl-C
 
 
 def main(argv: Sequence[str]) -> int:
@@ -42,7 +42,7 @@ def main(argv: Sequence[str]) -> int:
     if progress.interrupted:
         print(f'stopped after {made.solve_time:.1f} s of {args.budget:g} s: the best plan so far',
               file=sys.stderr)
-    return INTERRUPTED if progress.interrupted else 0
+    return _INTERRUPTED if progress.interrupted else 0
 
 
 def make_parser() -> argparse.ArgumentParser:
@@ -52,7 +52,7 @@ def make_parser() -> argparse.ArgumentParser:
         description='Plan all tasks of a scenario file around all its zones, as if everything '
                     'in it were known from the start; cancelled tasks are left out. Ctrl-C ends '
                     'the solving early: the best plan so far is told and written all the same, '
-                    f'with exit status {INTERRUPTED}.')
+                    f'with exit status {_INTERRUPTED}.')
     parser.add_argument('scenario', type=Path, metavar='SCENARIO.yaml')
     parser.add_argument('--solver', default='chain_q',
                         help='%(default)s, or one to compare with: paper_chain_q, q_learning, '

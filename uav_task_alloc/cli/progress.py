@@ -7,8 +7,8 @@ from collections.abc import Callable
 from types import FrameType, TracebackType
 from typing import TextIO
 
-PATIENCE = 1.0  # [s] of solving before anything is shown
-PERIOD = 0.2  # [s] between two lines
+_PATIENCE = 1.0  # [s] of solving before anything is shown
+_PERIOD = 0.2  # [s] between two lines
 WIPE = '\r\x1b[K'  # back to the start of the line, and empty it
 
 
@@ -47,7 +47,7 @@ class SolveProgress:
         if self._began < 0.0:
             self._began = now
         passed = now - self._began
-        if self._shows and passed > PATIENCE and now - self._shown_at >= PERIOD:
+        if self._shows and passed > _PATIENCE and now - self._shown_at >= _PERIOD:
             self._shown_at = now
             self._write(WIPE + self._line(now))
         return self.interrupted

@@ -73,7 +73,7 @@ def write_study(made: Experiments, outcome: CampaignOutcome, out: Path) -> int:
         tables.write_csv(out / f'table_{name}.csv', same)
         tables.write_csv(out / f'table_{name}_timing.csv', timed)
     (out / 'settings.json').write_text(json.dumps(asdict(made), indent=1) + '\n')
-    for which, head in enumerate((SAME, TIMED)):
+    for which, head in enumerate((_SAME, TIMED)):
         (out / ('tables.md', 'timing.md')[which]).write_text(head + ''.join(
             f'\n## {title}\n\n{tables.markdown(parts[name][which])}\n'
             for name, title in TITLES.items()))
@@ -84,7 +84,7 @@ def write_study(made: Experiments, outcome: CampaignOutcome, out: Path) -> int:
 
 
 TITLES = {'sizes': 'Solvers by size', 'dynamic': 'Random arrivals, warm against cold'}
-SAME = """# The study: tables
+_SAME = """# The study: tables
 
 Budgets are iterations, so the same seed gives the same tables however fast the machine is; what
 took how long is in timing.md. Settings: settings.json. Solvers by size: ranges are soft (eq 2.12),

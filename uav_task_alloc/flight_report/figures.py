@@ -17,15 +17,15 @@ from uav_task_alloc.model import Point, Shape, ThreatZone
 # those of plots/style.py, which would take matplotlib
 COLOURS = ('#0072b2', '#e69f00', '#009e73', '#cc79a7', '#56b4e9', '#000000', '#540078', '#c0b478')
 RED, PLANNED = '#c62828', '#222222'
-STATES = {'PENDING': '#b0b0b0', 'ASSIGNED': '#56b4e9', 'ACTIVE': '#e69f00',
+_STATES = {'PENDING': '#b0b0b0', 'ASSIGNED': '#56b4e9', 'ACTIVE': '#e69f00',
           'UNASSIGNED': '#cc79a7', 'COMPLETED': '#009e73', 'FAILED': '#d55e00',
           'CANCELLED': '#7f7f7f', 'REJECTED': '#5e3c99'}
 SYMBOLS = {'COMPLETED': 'circle', 'FAILED': 'x', 'CANCELLED': 'line-ew-open',
            'REJECTED': 'x-thin-open'}
-MOST_POINTS = 5000  # of a track that is drawn
+_MOST_POINTS = 5000  # of a track that is drawn
 ROW = 16  # [px] of the timeline
 TALLEST = 4000  # [px]
-TIME = 'mission time [s]'
+_TIME = 'mission time [s]'
 
 
 def uav_colour(index: int) -> str:
@@ -42,7 +42,7 @@ def flight_map(story: Story) -> Any:
         flown = [sample.point for sample in story.tracks.get(uav, ())]
         legs = [point for leg in story.planned.get(uav, ()) for point in (*leg, None)]
         for points, name, paint, dash, width in (
-                (flown[::1 + len(flown) // MOST_POINTS], 'flown', uav_colour(k), 'solid', 4.0),
+                (flown[::1 + len(flown) // _MOST_POINTS], 'flown', uav_colour(k), 'solid', 4.0),
                 (legs, 'planned', PLANNED, 'dash', 1.2),
                 (story.rest(uav), 'not flown yet', uav_colour(k), 'dot', 2.0)):
             if points:
@@ -83,7 +83,7 @@ def _tasks(figure: Any, story: Story) -> None:
             text=[escape(name) for name in names], textposition='top center',
             name=f'{len(rows)} {state.lower()}', textfont={'size': 10},
             hovertext=[_about(story, name) for name in names], hoverinfo='text',
-            marker={'size': 9, 'color': STATES.get(state, 'white'),
+            marker={'size': 9, 'color': _STATES.get(state, 'white'),
                     'line': {'width': 1, 'color': 'black'}})
 
 
@@ -129,13 +129,13 @@ def timeline_figure(story: Story) -> Any:
         figure.add_bar(
             y=rows, base=starts, x=lengths, orientation='h', name=state.lower(), hovertext=texts,
             hovertemplate='%{hovertext}<br>%{base:.1f} s for %{x:.1f} s<extra></extra>',
-            marker={'color': STATES.get(state, 'white'), 'line': {'width': 0}}, width=0.8)
+            marker={'color': _STATES.get(state, 'white'), 'line': {'width': 0}}, width=0.8)
     for state, ended in marks.items():
         at, when, said = zip(*ended, strict=True)
         figure.add_scatter(
             y=at, x=when, mode='markers', name=state.lower(), hovertext=said,
             hovertemplate='%{hovertext}<br>%{x:.1f} s<extra></extra>',
-            marker={'symbol': SYMBOLS[state], 'size': 8, 'color': STATES[state]})
+            marker={'symbol': SYMBOLS[state], 'size': 8, 'color': _STATES[state]})
     figure.update_layout(barmode='overlay')
     _rows(figure, names)
     return _laid_out(figure, 'Timeline of tasks', min(TALLEST, 160 + ROW * len(names)))
@@ -154,7 +154,7 @@ def solving(story: Story) -> Any:
                            line={'shape': 'hv' if k > 1 else 'linear', 'color': uav_colour(k - 1)},
                            hovertemplate='%{hovertext}<br>%{y}<extra></extra>')
         figure.update_yaxes(title=title, row=k, col=1, rangemode='tozero')
-    figure.update_xaxes(title=TIME, row=3, col=1)
+    figure.update_xaxes(title=_TIME, row=3, col=1)
     figure.update_layout(showlegend=False)
     return _laid_out(figure, 'Re-plans: time to solve, and how good', 600)
 
@@ -182,7 +182,7 @@ def silence(story: Story) -> Any:
 def _rows(figure: Any, names: Sequence[str]) -> None:
     figure.update_yaxes(tickvals=list(range(len(names))), ticktext=[escape(n) for n in names],
                         autorange='reversed', tickfont={'size': 10})
-    figure.update_xaxes(title=TIME)
+    figure.update_xaxes(title=_TIME)
 
 
 def _laid_out(figure: Any, title: str, height: int) -> Any:

@@ -15,7 +15,7 @@ from uav_task_alloc.record.ground_truth import TrueSample
 from uav_task_alloc.record.progress import SILENT
 from uav_task_alloc.record.run_state import Line, ReportedStatus, RunState
 
-EVERY = 0.2  # [s] between two samples of a track that are kept
+_EVERY = 0.2  # [s] between two samples of a track that are kept
 MOST_EVENTS = 5000  # the first
 ENDED = ('COMPLETED', 'FAILED', 'CANCELLED', 'REJECTED')
 
@@ -102,7 +102,7 @@ class Story:
             self.gaps.append(Gap(uav, self.last_state[uav], wall))
         self.last_state[uav] = wall
         track = self.tracks.setdefault(uav, [])
-        if None not in line['position'] and (not track or wall - track[-1].wall >= EVERY):
+        if None not in line['position'] and (not track or wall - track[-1].wall >= _EVERY):
             track.append(TrueSample(wall, tuple(line['position'])))
 
     def on_list(self, line: Line) -> None:

@@ -21,7 +21,7 @@ from uav_task_alloc.geometry.obstacles import (
 )
 from uav_task_alloc.geometry.search_budget import spend
 
-AROUND = 24  # directions tried at first, level and rising
+_AROUND = 24  # directions tried at first, level and rising
 
 
 @numba.njit(cache=True, nogil=True)
@@ -102,8 +102,8 @@ def _first_tries(o: Zones, p: Floats, limits: Floats, best: Floats, work: Ints) 
                 j = (i + 1) % n
                 _try(o, p, math.atan2(c[2 * i] - c[2 * j], c[2 * j + 1] - c[2 * i + 1]), 0.0,
                      limits, best, work)
-    for i in range(2 * AROUND):
-        _try(o, p, base + 2.0 * math.pi * i / AROUND, 0.25 * math.pi * (i // AROUND), limits,
+    for i in range(2 * _AROUND):
+        _try(o, p, base + 2.0 * math.pi * i / _AROUND, 0.25 * math.pi * (i // _AROUND), limits,
              best, work)
 
 
@@ -117,7 +117,7 @@ def way_out(o: Zones, p: Floats, limits: Floats, work: Ints) -> Floats:
     _first_tries(o, p, limits, best, work)
     if math.isinf(best[0]):
         return np.full(3, np.nan)
-    step = math.pi / AROUND
+    step = math.pi / _AROUND
     for _ in range(24):
         az, up = best[1], best[2]
         if not (_try(o, p, az + step, up, limits, best, work)

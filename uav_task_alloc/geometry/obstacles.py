@@ -42,7 +42,7 @@ Zone = Any  # one row of it, in a kernel
 
 
 #: One enlarged zone, all lengths [m]. Corners are x, y, x, y, ..., counter-clockwise.
-ZONE = np.dtype([
+_ZONE = np.dtype([
     ('kind', np.int64),
     ('x', np.float64), ('y', np.float64), ('z', np.float64),  # centre; z is a dome's base
     ('radius', np.float64), ('low', np.float64), ('high', np.float64),  # enlarged
@@ -59,7 +59,7 @@ ZONE = np.dtype([
 @intrinsic
 def _zones_at(typing_context: Any, address: int) -> Any:
     """The rows of dtype ZONE at an address."""
-    row = types.CPointer(numba.from_dtype(ZONE))  # type: ignore[no-untyped-call]
+    row = types.CPointer(numba.from_dtype(_ZONE))  # type: ignore[no-untyped-call]
     return row(types.int64), cast
 
 
@@ -92,7 +92,7 @@ def pack(zones: Sequence[ThreatZone], clearance: float = 0.0) -> Obstacles:
             outline.ctypes.data, len(outline), rim.ctypes.data, len(rim),
             hull.ctypes.data, len(hull), dented))
         outlines += [outline, rim, hull]
-    return Obstacles(np.array(rows, ZONE), tuple(outlines))
+    return Obstacles(np.array(rows, _ZONE), tuple(outlines))
 
 
 def _outlines(zone: ThreatZone, reach: float) -> tuple[Floats, Floats, Floats, bool]:

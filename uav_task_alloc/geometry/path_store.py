@@ -18,7 +18,7 @@ from uav_task_alloc.geometry.taut import MAX_CORNERS, copy_point
 
 PLACES = 1 << 16  # of ways; a power of two
 PROBES = 4  # places a way may have
-ROOM = 1 << 19  # points kept, ends among them
+_ROOM = 1 << 19  # points kept, ends among them
 
 
 class PathStore:
@@ -26,7 +26,7 @@ class PathStore:
 
     def __init__(self) -> None:
         self._place = np.full(PLACES, -1, np.int64)  # where in the ring a way begins
-        self._points = np.empty((ROOM, 3))  # number of points, then the points
+        self._points = np.empty((_ROOM, 3))  # number of points, then the points
         self._state = np.zeros(3, np.int64)
         self._state[1:] = self._place.ctypes.data, self._points.ctypes.data
 
@@ -50,7 +50,7 @@ def _first_place(ends: Floats) -> int:
 def _same(points: Floats, first: int, ends: Floats) -> bool:
     """Whether the way that begins in row `first` has these ends."""
     n = int(points[first, 0])
-    if not 2 <= n <= MAX_CORNERS or first + n >= ROOM:
+    if not 2 <= n <= MAX_CORNERS or first + n >= _ROOM:
         return False
     for m in range(3):
         if points[first + 1, m] != ends[0, m] or points[first + n, m] != ends[1, m]:
@@ -63,9 +63,9 @@ def remember(address: int, way: Floats, n: int, ends: Floats) -> None:
     """Keep the way[:n] between `ends`."""
     state = ints_at(address)
     place = carray(ints_at(state[1]), PLACES)
-    points = carray(floats_at(state[2]), (ROOM, 3))
+    points = carray(floats_at(state[2]), (_ROOM, 3))
     first = state[0]
-    if first + n >= ROOM:
+    if first + n >= _ROOM:
         first = 0
     state[0] = first + n + 1
     points[first, 0] = n
@@ -86,7 +86,7 @@ def recall(address: int, ends: Floats, way: Floats) -> int:
     """The points of the way between `ends` into way; returns their number, 0: not kept."""
     state = ints_at(address)
     place = carray(ints_at(state[1]), PLACES)
-    points = carray(floats_at(state[2]), (ROOM, 3))
+    points = carray(floats_at(state[2]), (_ROOM, 3))
     at = _first_place(ends)
     for k in range(PROBES):
         first = place[(at + k) & (PLACES - 1)]

@@ -16,7 +16,7 @@ from uav_task_alloc.geometry.numba_pointers import float_of, ints_at
 from uav_task_alloc.geometry.obstacles import Ints
 
 SINCE, OVER, MOST, CUT, ASK = range(5)  # what the state holds
-EVERY = 50_000  # units between two looks at the clock
+_EVERY = 50_000  # units between two looks at the clock
 UNLIMITED = 1 << 62
 
 _Question = ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_int64, ctypes.c_int64, ctypes.c_int64)
@@ -89,7 +89,7 @@ def spend(work: Ints, units: int) -> bool:
     state = ints_at(work[1])
     work[0] += units
     state[SINCE] += units
-    if state[SINCE] > EVERY:
+    if state[SINCE] > _EVERY:
         state[SINCE] = 0
         if state[ASK] != 0 and float_of(state[ASK], 0, 0, 0) != 0.0:
             state[OVER] = 1

@@ -24,7 +24,7 @@ from uav_task_alloc.geometry.taut import (
 )
 from uav_task_alloc.geometry.visibility_graph import add_corners, add_level, astar, corner_bound
 
-RINGS = (12, 24, 64)  # corners around a zone; finer ones where no way was found
+_RINGS = (12, 24, 64)  # corners around a zone; finer ones where no way was found
 COARSE = 2  # zones at most in the way for which the first ring is fine enough
 MANY = 8  # zones in the way; among more, levels of those around a zone must do
 PATIENT = 5  # searches past the zones hit so far, before those around them are heeded, too
@@ -93,7 +93,7 @@ def _corners_of(o: Zones, k: int, levels: Floats, way: Floats, limits: Floats, f
     x = np.empty((corner_bound(o[k], ring, levels.size), 3))
     n = add_corners(o[k], way, limits, floor, ring, x, 0)
     for z in levels:
-        n = add_level(o[k], way, limits, z, RINGS[0], x, n)
+        n = add_level(o[k], way, limits, z, _RINGS[0], x, n)
     return x[:n]
 
 
@@ -124,7 +124,7 @@ def _corners(o: Zones, active: Ints, way: Floats, limits: Floats, floor: float, 
     for m in range(active.size):
         beside = _beside(o, active, active[m])
         levels = np.empty(0)
-        if ring > RINGS[0]:
+        if ring > _RINGS[0]:
             levels = _levels(o, active if active.size <= MANY else beside, o[active[m]])
         found = _corners_of(o, active[m], levels, way, limits, floor, ring)
         if n + found.shape[0] > x.shape[0]:
@@ -230,11 +230,11 @@ def shortest(o: Zones, way: Floats, limits: Floats, snug: bool, out: Floats,
         return 0, np.nan
     hit, n, trial = np.zeros(o.size, np.int64), 0, np.empty((MAX_CORNERS, 3))
     hit_by(o, way, 0, 1, floor, snug, hit)
-    for ring in RINGS:
+    for ring in _RINGS:
         known = length_of(out, n) if n else np.inf
         n = keep_best(trial, _search(o, way, limits, floor, snug, ring, known, hit, trial, work),
                       out, n)
-        if work[2] or (n and (ring > RINGS[0] or hit.sum() <= COARSE)):
+        if work[2] or (n and (ring > _RINGS[0] or hit.sum() <= COARSE)):
             break
     if n == 0:
         return 0, np.nan if work[2] else np.inf

@@ -10,7 +10,7 @@ import numpy as np
 from uav_task_alloc.geometry.obstacles import Floats, Ints, Zone, Zones, blocked, contains
 
 SPARE = 64  # rows for places to come
-STRAIGHT = 1.0 + 1e-12  # a way is straight when at most so much longer than the distance
+_STRAIGHT = 1.0 + 1e-12  # a way is straight when at most so much longer than the distance
 
 
 class LengthTable:
@@ -74,7 +74,7 @@ def _touches(zone: Zone, p: Floats, q: Floats, known: float, near_p: float,
     if near_p + near_q > known:
         return False
     dx, dy, dz = p[0] - q[0], p[1] - q[1], p[2] - q[2]
-    if known > STRAIGHT * math.sqrt(dx * dx + dy * dy + dz * dz):
+    if known > _STRAIGHT * math.sqrt(dx * dx + dy * dy + dz * dz):
         return True
     return came and blocked(zone, p[0], p[1], p[2], q[0], q[1], q[2], min(p[2], q[2]), False)
 

@@ -45,9 +45,9 @@ from uav_task_alloc.nodes.ros.topic_names import TASK_LIST, check_topic
 from uav_task_alloc.nodes.rviz.marker_publisher import MarkerPublisher
 from uav_task_alloc.params import AllocatorParams
 
-TICK = 0.025  # [s]
+_TICK = 0.025  # [s]
 LOCK_WAIT = 5.0  # [s] for the journal of an allocator that is just ending
-PATIENCE = 1.0  # [s] that the lists of the last life wait for somebody to hear them
+_PATIENCE = 1.0  # [s] that the lists of the last life wait for somebody to hear them
 REST, MOST_REST = 3.0, 0.2  # times as long as a tick took the next one waits, at most [s]
 MOST_LINES, MOST_ROWS = 200, 500  # logged, and saved, at once
 
@@ -81,7 +81,7 @@ class AllocatorNode(Node):
         self._listen()
         self._talk()
         self.arrived = self.create_guard_condition(self.on_answer)
-        self.patient_until = time.monotonic() + PATIENCE
+        self.patient_until = time.monotonic() + _PATIENCE
         self.teller.prepare(self.world.lists.lists)
         self.worker = Worker(self.prepare, self.solve, self.deliver, self.failed)
         self.worker.start()
@@ -95,7 +95,7 @@ class AllocatorNode(Node):
                 (m.TaskEvent, 'task_events', self.on_event, HEARD_EVENTS)):
             self.inputs.append(subscribe_batched(self, kind, topic, heard, qos))
         steady = Clock(clock_type=ClockType.STEADY_TIME)  # simulated time may stand still
-        self.create_timer(TICK, self.on_tick, clock=steady)
+        self.create_timer(_TICK, self.on_tick, clock=steady)
         self.create_timer(1.0, self.on_second, clock=steady)
 
     def _talk(self) -> None:

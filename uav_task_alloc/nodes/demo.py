@@ -22,8 +22,8 @@ from uav_task_alloc.record import ground_truth as truth, run_folder
 from uav_task_alloc.scenario import load, simulation_parameters
 from uav_task_alloc.scenario.node_parameters import Parameters
 
-PACKAGE = 'uav_task_alloc'
-PATIENCE = 15.0  # [s], of which the bridge takes 10 at most for a swap under way
+_PACKAGE = 'uav_task_alloc'
+_PATIENCE = 15.0  # [s], of which the bridge takes 10 at most for a swap under way
 FAULTS = ('tasks_lost', 'tasks_flown_twice', 'zone_violations')
 
 
@@ -38,7 +38,7 @@ class Child:
     @classmethod
     def start(cls, name: str, out: Path, parameters: Parameters, show: bool = False) -> Child:
         """Start an installed executable; `show`: in this terminal, else into out/NAME.log."""
-        command = [f'{get_package_prefix(PACKAGE)}/lib/{PACKAGE}/{name}', '--ros-args']
+        command = [f'{get_package_prefix(_PACKAGE)}/lib/{_PACKAGE}/{name}', '--ros-args']
         for key, value in parameters.items():
             command += ['-p', f'{key}:={json.dumps(value)}']
         log = out / f'{name}.log'
@@ -52,7 +52,7 @@ class Child:
         if self.process.poll() is None:
             self.process.send_signal(signal.SIGINT)
         try:
-            return self.process.wait(PATIENCE)
+            return self.process.wait(_PATIENCE)
         except subprocess.TimeoutExpired:
             self.process.kill()
             return self.process.wait()
@@ -120,7 +120,7 @@ def fly_scenario(args: argparse.Namespace) -> int:
 
 def main(argv: list[str] | None = None) -> int:
     """Command line of the demo; its exit status."""
-    share = Path(get_package_share_directory(PACKAGE))
+    share = Path(get_package_share_directory(_PACKAGE))
     parser = argparse.ArgumentParser(prog='demo', description=__doc__)
     parser.add_argument('--scenario', type=Path, default=share / 'config/scenarios/demo.yaml')
     parser.add_argument('--speedup', type=float, help="(the scenario's)")

@@ -34,7 +34,7 @@ from uav_task_alloc.nodes.ros.run import run
 from uav_task_alloc.nodes.ros.topic_names import TASK_LIST, check_topic
 from uav_task_alloc.params import BridgeParams
 
-TICK = 0.02  # [s] between steps of the machines; messages are acted on as they come
+_TICK = 0.02  # [s] between steps of the machines; messages are acted on as they come
 
 
 def policy_of(params: BridgeParams, zones: tuple[ThreatZone, ...] = (),
@@ -110,7 +110,7 @@ class MavlinkBridge(Node):
         """Messages to the machines as they come, and time in between."""
         step_at = 0.0
         while not self.closing:
-            got, now, out = self.radio.receive(TICK), time.monotonic(), []
+            got, now, out = self.radio.receive(_TICK), time.monotonic(), []
             with self.lock:
                 for address, message in got:
                     out += self.ground.receive(address, message, now)
@@ -118,7 +118,7 @@ class MavlinkBridge(Node):
                     out += self.ground.step(now)
                     self.radio.keep(self.ground.addresses())
                     self.radio.step(now)
-                    step_at = now + TICK
+                    step_at = now + _TICK
             self.radio.send(out)
             self.tell(now)
 

@@ -20,7 +20,7 @@ from uav_task_alloc.nodes.ros.parameters import declare
 from uav_task_alloc.nodes.ros.run import run
 from uav_task_alloc.params import PlayerParams
 
-TICK = 0.02  # [s]
+_TICK = 0.02  # [s]
 # the second is what a node is called while its name is still on the way
 NO_ALLOCATOR = ('live_view', '_NODE_NAME_UNKNOWN_')
 
@@ -43,7 +43,7 @@ class ScenarioPlayer(Node):
         self.zones = self.create_publisher(m.ThreatZoneArray, 'threat_zones', LATCHED)
         self.set_alive = self.create_client(SetAvailability, 'fleet_sim/set_alive')
         self.doomed: list[str] = []  # UAVs whose death the simulator has not heard of yet
-        self.create_timer(TICK, self.tick)
+        self.create_timer(_TICK, self.tick)
         self.get_logger().info(
             f'{played.name}: {len(played.uavs)} UAVs, {len(played.tasks)} tasks, '
             f'{len(played.zones)} zones; waiting for an allocator')

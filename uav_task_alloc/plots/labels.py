@@ -18,7 +18,7 @@ SIDES = ((1, 0, 'left', 'center'), (0, 1, 'center', 'bottom'), (0, -1, 'center',
 WITHIN = ((0, 0, 'center', 'center'), (0, -1, 'center', 'top'), (0, 1, 'center', 'bottom'),
           (1, 0, 'left', 'center'), (-1, 0, 'right', 'center'))
 WIDE, TALL = 0.62, 1.15  # of a letter, in font sizes
-STEP = 6.0  # [px] between the points that stand for a line
+_STEP = 6.0  # [px] between the points that stand for a line
 
 Box = tuple[float, float, float, float]  # [px] left, low, right, high
 
@@ -85,5 +85,5 @@ def _hidden(box: Box, taken: Iterable[Box], dots: NDArray[np.float64]) -> float:
 def _dots(way: NDArray[np.float64]) -> NDArray[np.float64]:
     """Points along a line, no further apart than STEP [px]."""
     along = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(way, axis=0).T))))
-    at = np.arange(0.0, along[-1] + STEP, STEP)
+    at = np.arange(0.0, along[-1] + _STEP, _STEP)
     return np.column_stack([np.interp(at, along, way[:, k]) for k in (0, 1)])

@@ -15,7 +15,7 @@ from uav_task_alloc.model import Shape, ThreatZone
 # Okabe and Ito, "Color Universal Design", and two more; test_plots.py measures that all stay
 # apart, from RED as well, also where red, green or blue is not seen
 COLOURS = ('#0072b2', '#e69f00', '#009e73', '#cc79a7', '#56b4e9', '#000000', '#540078', '#c0b478')
-LINES: tuple[Any, ...] = ('-', (0, (4, 1.2)), (0, (1, 1)))  # once all colours are used up
+_LINES: tuple[Any, ...] = ('-', (0, (4, 1.2)), (0, (1, 1)))  # once all colours are used up
 RED, DARK_RED = '#c62828', '#8e0000'
 ZONE = (0.78, 0.16, 0.16, 0.16)
 SIZE = (12.8, 7.2)  # [in] 16:9
@@ -33,7 +33,7 @@ def colour(index: int) -> str:
 
 def line(index: int) -> Any:
     """Its line style, which tells apart UAVs that share a colour."""
-    return LINES[index // len(COLOURS) % len(LINES)]
+    return _LINES[index // len(COLOURS) % len(_LINES)]
 
 
 def halo(width: float = 3.0) -> list[Any]:

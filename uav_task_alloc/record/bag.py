@@ -12,7 +12,7 @@ from mcap.writer import Writer
 from uav_task_alloc.errors import InvalidValue
 
 ABOUT = 'uav_task_alloc'  # name of the metadata: origin, speedup
-CHUNK = 512 * 1024  # [bytes] held in memory at most, before compression
+_CHUNK = 512 * 1024  # [bytes] held in memory at most, before compression
 
 
 class Bag:
@@ -28,7 +28,7 @@ class Bag:
             raise InvalidValue('record', str(path), 'a file that is not there yet')
         path.parent.mkdir(parents=True, exist_ok=True)
         self.file = path.open('wb')
-        self.writer = Writer(self.file, chunk_size=CHUNK)
+        self.writer = Writer(self.file, chunk_size=_CHUNK)
         self.writer.start(profile=Profile.ROS2, library='uav_task_alloc')
         self.writer.add_metadata(ABOUT, dict(about))
         self.flush()

@@ -21,14 +21,14 @@ from uav_task_alloc.record import message_records as lines
 from uav_task_alloc.record.bag import ABOUT
 from uav_task_alloc.record.run_state import Line
 
-OURS = 'uav_task_alloc_msgs/msg/'
-LONGEST = 2**30  # [bytes] of a record that is believed in
+_OURS = 'uav_task_alloc_msgs/msg/'
+_LONGEST = 2**30  # [bytes] of a record that is believed in
 # by type, so that the namespace of a fleet does not matter
 READ: dict[str, Callable[[Any], lines.RecordBody]] = {
-    OURS + 'ThreatZoneArray': lines.announced_zones, OURS + 'TaskStatusArray': lines.statuses,
-    OURS + 'Allocation': lines.allocation_record, OURS + 'TaskList': lines.task_list_record,
-    OURS + 'UavState': lines.state, 'diagnostic_msgs/msg/DiagnosticArray': lines.uploads}
-TASKS = OURS + 'TaskAnnouncement'
+    _OURS + 'ThreatZoneArray': lines.announced_zones, _OURS + 'TaskStatusArray': lines.statuses,
+    _OURS + 'Allocation': lines.allocation_record, _OURS + 'TaskList': lines.task_list_record,
+    _OURS + 'UavState': lines.state, 'diagnostic_msgs/msg/DiagnosticArray': lines.uploads}
+TASKS = _OURS + 'TaskAnnouncement'
 
 
 class BagReader:
@@ -64,7 +64,7 @@ class BagReader:
 
     def records(self, file: IO[bytes]) -> Iterator[Line]:
         """The lines, until the end or the first fault."""
-        for record in StreamReader(file, record_size_limit=LONGEST, validate_crcs=True).records:
+        for record in StreamReader(file, record_size_limit=_LONGEST, validate_crcs=True).records:
             if isinstance(record, Schema):
                 self.schemas[record.id] = record
             elif isinstance(record, Channel):

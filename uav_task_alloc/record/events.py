@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Iterator
 
 from uav_task_alloc.record.run_state import Line, RunState
 
-NAMED = 3  # ids in one sentence
+_NAMED = 3  # ids in one sentence
 Sentence = tuple[str, str]  # (kind: task, good, fault, zone, uav or plan; sentence)
 SAID = {  # state of a task: (kind of event, sentence)
     'ACTIVE': ('uav', '{uav} flies to {tasks}'),
@@ -22,8 +22,8 @@ ANNOUNCED = {'ADD': 'announced: {}', 'UPDATE': 'changed: {}', 'CANCEL': 'to be w
 def some(names: Iterable[str]) -> str:
     """`t1, t2, t3 and 4 more`."""
     given = list(names)
-    more = len(given) - NAMED
-    return ', '.join(given[:NAMED]) + (f' and {more} more' if more > 0 else '')
+    more = len(given) - _NAMED
+    return ', '.join(given[:_NAMED]) + (f' and {more} more' if more > 0 else '')
 
 
 def sentences(heard: RunState, line: Line) -> Iterator[Sentence]:

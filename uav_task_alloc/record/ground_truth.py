@@ -14,7 +14,7 @@ from uav_task_alloc.record.run_state import Line, SeenZone, read_lines
 
 FILE = 'flight.jsonl'
 SAME_PLACE = 1.5  # [m] between a task and an item that flies it
-STEP = 1.0  # [m] between points of a track that are held against the zones
+_STEP = 1.0  # [m] between points of a track that are held against the zones
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,7 +112,7 @@ def _entries(uav: str, track: Sequence[TrueSample], seen: SeenZone) -> Iterator[
 def fine(track: Sequence[TrueSample]) -> Iterable[tuple[float, Point]]:
     """(wall [unix s], point [m]) along a track, at most STEP apart."""
     for a, b in pairwise(track):
-        steps = max(1, math.ceil(math.dist(a.point, b.point) / STEP))
+        steps = max(1, math.ceil(math.dist(a.point, b.point) / _STEP))
         for k in range(steps):
             share = k / steps
             x, y, z = (p + share * (q - p) for p, q in zip(a.point, b.point, strict=True))

@@ -16,11 +16,11 @@ from uav_task_alloc.model import Point, Shape, ThreatZone, check_number, check_p
 from uav_task_alloc.record.run_state import zone_to_json
 
 RecordBody = dict[str, Any]  # a line without its wall time
-Message = Any
+_Message = Any
 
 # constants of the messages, by value
 ACTIONS = ('ADD', 'UPDATE', 'CANCEL')
-STATES = ('PENDING', 'ASSIGNED', 'ACTIVE', 'COMPLETED', 'FAILED', 'CANCELLED', 'REJECTED',
+_STATES = ('PENDING', 'ASSIGNED', 'ACTIVE', 'COMPLETED', 'FAILED', 'CANCELLED', 'REJECTED',
           'UNASSIGNED')
 MODES = ('UNKNOWN', 'STANDBY', 'TAKEOFF', 'ON_MISSION', 'HOLD', 'RETURNING', 'LANDING', 'FAULT')
 MISSIONS = ('UNKNOWN', 'UPLOADING', 'VERIFIED', 'MIXED', 'FOREIGN')
@@ -35,7 +35,7 @@ def word(words: tuple[str, ...], value: int) -> str:
     return words[value] if value < len(words) else ''
 
 
-def announced_tasks(msg: Message, origin: Origin | None) -> RecordBody:
+def announced_tasks(msg: _Message, origin: Origin | None) -> RecordBody:
     """The tasks that are good; the allocator says what is wrong with the others.
 
     Without an origin, those in degrees have no place and are left out.
@@ -56,7 +56,7 @@ def announced_tasks(msg: Message, origin: Origin | None) -> RecordBody:
     return {'kind': 'announcement', 'action': word(ACTIONS, msg.action), 'tasks': tasks}
 
 
-def task_place(task: Message, origin: Origin | None) -> Point | None:
+def task_place(task: _Message, origin: Origin | None) -> Point | None:
     """Where a Task message is [m]; None where that takes an origin. Raises InvalidValue."""
     if task.frame == LOCAL:
         return check_point('position', _xyz(task.position))
@@ -68,7 +68,7 @@ def task_place(task: Message, origin: Origin | None) -> Point | None:
                   origin.altitude_amsl + task.altitude)
 
 
-def announced_zones(msg: Message) -> RecordBody:
+def announced_zones(msg: _Message) -> RecordBody:
     """The zones that are good; the allocator says what is wrong with the others."""
     good: dict[str, ThreatZone] = {}
     for row in msg.zones:
@@ -79,7 +79,7 @@ def announced_zones(msg: Message) -> RecordBody:
     return {'kind': 'zones', 'zones': [zone_to_json(each) for each in good.values()]}
 
 
-def zone(row: Message) -> ThreatZone:
+def zone(row: _Message) -> ThreatZone:
     """A ThreatZone message as a value. Raises InvalidValue, or ValueError for no shape."""
     return ThreatZone(
         row.zone_id, Shape(row.shape), _xyz(row.center), row.radius,
@@ -89,14 +89,14 @@ def zone(row: Message) -> ThreatZone:
         0.0 if math.isnan(row.margin) else row.margin)
 
 
-def statuses(msg: Message) -> RecordBody:
+def statuses(msg: _Message) -> RecordBody:
     """Where every task stands."""
     return {'kind': 'statuses', 'statuses': [
-        {'task': row.task_id, 'state': word(STATES, row.state), 'uav': row.uav_id,
+        {'task': row.task_id, 'state': word(_STATES, row.state), 'uav': row.uav_id,
          'reason': row.reason} for row in msg.statuses]}
 
 
-def allocation_record(msg: Message) -> RecordBody:
+def allocation_record(msg: _Message) -> RecordBody:
     """A plan in figures."""
     return {
         'kind': 'allocation',
@@ -111,7 +111,7 @@ def allocation_record(msg: Message) -> RecordBody:
     }
 
 
-def task_list_record(msg: Message) -> RecordBody:
+def task_list_record(msg: _Message) -> RecordBody:
     """What a UAV has still to fly; `eta` [s] from `stamp` [unix s]. Via points are places."""
     return {'kind': 'list', 'uav': msg.uav_id, 'revision': msg.revision, 'end': msg.end,
             'stamp': seconds(msg.header.stamp),
@@ -123,7 +123,7 @@ def task_list_record(msg: Message) -> RecordBody:
                 for row in msg.tasks]}
 
 
-def state(msg: Message) -> RecordBody:
+def state(msg: _Message) -> RecordBody:
     """What a UAV does."""
     return {'kind': 'state', 'uav': msg.uav_id, 'mode': word(MODES, msg.mode),
             'mission_state': word(MISSIONS, msg.mission_state), 'active': msg.active_task_id,
@@ -136,7 +136,7 @@ def state(msg: Message) -> RecordBody:
             'reason': getattr(msg, 'reason', '')}
 
 
-def uploads(msg: Message) -> RecordBody:
+def uploads(msg: _Message) -> RecordBody:
     """The upload counters a bridge puts into its diagnostics, by name of the status.
 
     `health`: [level, sentence] by what it is about, a UAV where the bridge speaks; `authority`:
@@ -149,14 +149,14 @@ def uploads(msg: Message) -> RecordBody:
         for status in msg.status}}
 
 
-def _uploads(msg: Message) -> Iterable[tuple[str, int]]:
+def _uploads(msg: _Message) -> Iterable[tuple[str, int]]:
     for status in msg.status:
         for pair in status.values:
             if pair.key == 'uploads' and _COUNT.fullmatch(pair.value):
                 yield status.name, int(pair.value)
 
 
-def _authority(msg: Message) -> Iterable[tuple[str, RecordBody]]:
+def _authority(msg: _Message) -> Iterable[tuple[str, RecordBody]]:
     """By UAV: the state, why, for how long [s; None: unknown], and what gives it back."""
     for status in msg.status:
         said = {pair.key: pair.value for pair in status.values}
@@ -181,10 +181,10 @@ def finite_or_none(value: float) -> float | None:
     return float(value) if math.isfinite(value) else None
 
 
-def seconds(time: Message) -> float:
+def seconds(time: _Message) -> float:
     """A Time or Duration message in [s]."""
     return float(time.sec) + float(time.nanosec) * 1e-9
 
 
-def _xyz(point: Message) -> Point:
+def _xyz(point: _Message) -> Point:
     return point.x, point.y, point.z

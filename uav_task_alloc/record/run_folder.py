@@ -16,7 +16,7 @@ SUMMARY, MAP = 'summary.json', 'map.png'
 FILES = (MARKER, SUMMARY, MAP, heard.FILE, truth.FILE, *(f'{node}.log' for node in NODES))
 STATE_FILES = ('journal.*', 'authority_*.json', 'authority_*.tmp')  # patterns
 LOGS = ('allocator.log', 'mavlink_bridge.log', 'fleet_sim.log')  # mark those of versions before
-NAMED = 5  # strange entries that a refusal names
+_NAMED = 5  # strange entries that a refusal names
 
 
 def prepare(folder: Path) -> None:
@@ -73,5 +73,5 @@ def _is_folder(path: Path) -> bool:
 
 
 def _names(paths: list[Path], folder: Path) -> str:
-    more = f' and {len(paths) - NAMED} more' if len(paths) > NAMED else ''
-    return ', '.join(os.fspath(path.relative_to(folder)) for path in paths[:NAMED]) + more
+    more = f' and {len(paths) - _NAMED} more' if len(paths) > _NAMED else ''
+    return ', '.join(os.fspath(path.relative_to(folder)) for path in paths[:_NAMED]) + more

@@ -17,7 +17,7 @@ from uav_task_alloc.scenario.values import (
     TimedZone,
 )
 
-TRIES = 1000  # per point, before a box counts as full
+_TRIES = 1000  # per point, before a box counts as full
 KEEP_OFF = 10.0  # [m] between a drawn point and a zone with its margin
 
 
@@ -25,7 +25,7 @@ def draw_points(rng: np.random.Generator, count: int, low: Point, high: Point,
                 zones: Sequence[ThreatZone]) -> list[Point]:
     """Points [m] of a box clear of every zone, in 0.1 m; fewer when there is no room."""
     points: list[Point] = []
-    for _ in range(count * TRIES):
+    for _ in range(count * _TRIES):
         if len(points) == count:
             break
         x, y, z = (round(float(v), 1) for v in rng.uniform(low, high))

@@ -24,7 +24,7 @@ from uav_task_alloc.scenario.values import (
     TimedZone,
 )
 
-Made = TypeVar('Made')
+_Made = TypeVar('_Made')
 
 
 def load(path: str | Path) -> Scenario:
@@ -180,7 +180,7 @@ def _unique(rows: Iterable[YamlRow], key: str, values: Iterable[Any]) -> None:
         seen[value] = row
 
 
-def _valid(row: YamlRow, make: Callable[[], Made]) -> Made:
+def _valid(row: YamlRow, make: Callable[[], _Made]) -> _Made:
     """What `make` makes; its InvalidValue gets the line of the row."""
     try:
         return make()

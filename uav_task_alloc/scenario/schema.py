@@ -19,7 +19,7 @@ from uav_task_alloc.scenario.checked_yaml import (
 )
 from uav_task_alloc.scenario.values import DEFAULT_SPEEDUP
 
-TIME = number(0.0)
+_TIME = number(0.0)
 POSITIVE = number(0.0, open_low=True)
 POINT = many(number(), 'three numbers [x, y, z]', 3, 3)
 CORNER = many(number(), 'two numbers [x, y]', 2, 2)
@@ -45,12 +45,12 @@ UAV: KeyTable = {
     'cruise_speed': Key(number(0.0, 1000.0, open_low=True), '[m/s]', 15.0),
     'range': Key(number(0.0, infinite=True), '[m] it can fly in all', math.inf),
     'capabilities': Key(NAMES, 'what it can do', ()),
-    'dies_at': Key(TIME, '[s] when it falls silent for good; default: never', None),
+    'dies_at': Key(_TIME, '[s] when it falls silent for good; default: never', None),
 }
 
 TASK: KeyTable = {
     'id': Key(ID, 'name of the task'),
-    'at': Key(TIME, '[s] when it is announced', 0.0),
+    'at': Key(_TIME, '[s] when it is announced', 0.0),
     'position': Key(POINT, '[m] ENU; either this or the next three', None),
     'latitude': Key(number(-90.0, 90.0), '[deg] WGS84', None),
     'longitude': Key(number(-180.0, 180.0), '[deg] WGS84', None),
@@ -63,7 +63,7 @@ TASK: KeyTable = {
     'allowed_uavs': Key(NAMES, 'which UAVs may fly it; default: any', None),
 }
 
-ZONE: KeyTable = {
+_ZONE: KeyTable = {
     'id': Key(ID, 'name of the zone'),
     'shape': Key(choice('hemisphere', 'cylinder', 'polygon'), 'its form'),
     'center': Key(many(number(), 'three numbers [x, y, z] (cylinder: [x, y] suffices)', 2, 3),
@@ -74,13 +74,13 @@ ZONE: KeyTable = {
     'z_min': Key(number(infinite=True), '[m] its floor; cylinder and polygon', -math.inf),
     'z_max': Key(number(infinite=True), '[m] its ceiling; cylinder and polygon', math.inf),
     'margin': Key(number(0.0), '[m] kept clear around it', 0.0),
-    'appears': Key(TIME, '[s] when it is first announced', 0.0),
+    'appears': Key(_TIME, '[s] when it is first announced', 0.0),
     'vanishes': Key(number(0.0, infinite=True), '[s] when it goes; default: never', math.inf),
 }
 
-ARRIVALS: KeyTable = {
+_ARRIVALS: KeyTable = {
     'count': Key(whole_number(0, 100_000), 'how many tasks are drawn from `seed`'),
-    'between': Key(many(TIME, 'two times [first, last]', 2, 2), '[s] when they come'),
+    'between': Key(many(_TIME, 'two times [first, last]', 2, 2), '[s] when they come'),
     'area': Key(many(POINT, 'two corners [[x, y, z], [x, y, z]]', 2, 2),
                 '[m] ENU box they lie in, never inside a zone'),
     'value': Key(POSITIVE, 'of each', 1.0),
@@ -90,7 +90,7 @@ ARRIVALS: KeyTable = {
 
 CANCEL: KeyTable = {
     'task': Key(ID, 'id of the task that is taken back'),
-    'at': Key(TIME, '[s]'),
+    'at': Key(_TIME, '[s]'),
 }
 
 SCENARIO: KeyTable = {
@@ -110,13 +110,13 @@ SCENARIO: KeyTable = {
     'uavs': Key(many(mapping(UAV, 'a UAV'), 'a list of UAVs'), 'the fleet'),
     'tasks': Key(many(mapping(TASK, 'a task'), 'a list of tasks'), 'tasks with their times',
                  ()),
-    'zones': Key(many(mapping(ZONE, 'a zone'), 'a list of zones'), 'zones with their times',
+    'zones': Key(many(mapping(_ZONE, 'a zone'), 'a list of zones'), 'zones with their times',
                  ()),
-    'arrivals': Key(mapping(ARRIVALS, 'a mapping with count, between, area'),
+    'arrivals': Key(mapping(_ARRIVALS, 'a mapping with count, between, area'),
                     'tasks at random times and places; default: none', None),
     'cancels': Key(many(mapping(CANCEL, 'a cancel'), 'a list of cancels'),
                    'tasks that are taken back', ()),
 }
 
-TABLES = {'scenario': SCENARIO, 'origin': ORIGIN, 'uavs': UAV, 'tasks': TASK, 'zones': ZONE,
-          'arrivals': ARRIVALS, 'cancels': CANCEL}
+TABLES = {'scenario': SCENARIO, 'origin': ORIGIN, 'uavs': UAV, 'tasks': TASK, 'zones': _ZONE,
+          'arrivals': _ARRIVALS, 'cancels': CANCEL}

@@ -14,14 +14,14 @@ from uav_task_alloc.mavlink.transport.codec import Message
 
 WAYPOINT = dialect.MAV_CMD_NAV_WAYPOINT
 LOITER_UNLIMITED = dialect.MAV_CMD_NAV_LOITER_UNLIM
-LOITER_TIME = dialect.MAV_CMD_NAV_LOITER_TIME
+_LOITER_TIME = dialect.MAV_CMD_NAV_LOITER_TIME
 RETURN = dialect.MAV_CMD_NAV_RETURN_TO_LAUNCH
 LAND = dialect.MAV_CMD_NAV_LAND
 TAKEOFF = dialect.MAV_CMD_NAV_TAKEOFF
 DELAY = dialect.MAV_CMD_NAV_DELAY
 CHANGE_SPEED = dialect.MAV_CMD_DO_CHANGE_SPEED
-POSITIONAL = {WAYPOINT, LOITER_UNLIMITED, LOITER_TIME, LAND, TAKEOFF}
-KNOWN = POSITIONAL | {RETURN, DELAY, CHANGE_SPEED}
+POSITIONAL = {WAYPOINT, LOITER_UNLIMITED, _LOITER_TIME, LAND, TAKEOFF}
+_KNOWN = POSITIONAL | {RETURN, DELAY, CHANGE_SPEED}
 
 _NAN_ALLOWED = {WAYPOINT, LAND, TAKEOFF}  # ArduPilot, in param4
 _ARDUPILOT_FRAMES = {0: 0, 2: 0, 3: 3, 5: 0, 6: 3, 10: 10, 11: 10}  # sent -> read back
@@ -76,7 +76,7 @@ def stored_by_ardupilot(item: StoredItem) -> StoredItem | Refusal:
     bad = _ardupilot_nan(item)
     if bad:
         return Refusal(bad)
-    if item.command not in KNOWN:
+    if item.command not in _KNOWN:
         return Refusal(dialect.MAV_MISSION_UNSUPPORTED)
     if item.command not in POSITIONAL:
         p1 = item.p1 if item.command in (CHANGE_SPEED, DELAY) else 0.0
@@ -105,7 +105,7 @@ def stored_by_px4(item: StoredItem) -> StoredItem | Refusal:
     """The exact copy PX4 keeps; the frame must fit the command."""
     if item.frame != dialect.MAV_FRAME_MISSION and item.frame not in _PX4_FRAMES:
         return Refusal(dialect.MAV_MISSION_UNSUPPORTED_FRAME)
-    if item.command not in KNOWN:
+    if item.command not in _KNOWN:
         return Refusal(dialect.MAV_MISSION_UNSUPPORTED)
     if (item.command in POSITIONAL) == (item.frame == dialect.MAV_FRAME_MISSION):
         return Refusal(dialect.MAV_MISSION_UNSUPPORTED)

@@ -16,8 +16,8 @@ from uav_task_alloc.solver.reasons import reasons
 from uav_task_alloc.solver.recorder import Recorder
 from uav_task_alloc.solver.routes import Routes
 
-ROUNDING = 1e-6  # [m] beyond range that is no excess
-STRAIGHT = 1.0 + 1e-12  # a way at most so much longer than the distance has no detour points
+_ROUNDING = 1e-6  # [m] beyond range that is no excess
+_STRAIGHT = 1.0 + 1e-12  # a way at most so much longer than the distance has no detour points
 
 
 def to_plan(problem: Problem, recorder: Recorder, solver: str, warm: bool) -> Plan:
@@ -35,7 +35,7 @@ def to_plan(problem: Problem, recorder: Recorder, solver: str, warm: bool) -> Pl
               for task in held}
     value = math.fsum(values[task_id] for row in routes.values() for task_id in row)
     distance, penalty = math.fsum(lengths), excess(problem.uavs, lengths)
-    penalty = penalty if penalty > ROUNDING else 0.0
+    penalty = penalty if penalty > _ROUNDING else 0.0
     on = recorder.best.on[len(problem.uavs):problem.arrays.ends].copy()
     on[lost] = -1
     left = np.flatnonzero(on < 0)
@@ -104,4 +104,4 @@ def _legs(problem: Problem, places: list[int], steps: list[float]) -> tuple[Leg,
 def _leg(ways: Distances, i: int, j: int) -> Leg:
     """The leg from i to j; without detour points where it is straight."""
     metres = math.dist(ways.points[i], ways.points[j])
-    return Leg((), metres) if ways.length(i, j) <= metres * STRAIGHT else ways.leg(i, j)
+    return Leg((), metres) if ways.length(i, j) <= metres * _STRAIGHT else ways.leg(i, j)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 RANKS = (0.6, 0.3, 0.1)  # share of the best, second, third kind
-MEMORY = 0.8  # how much of what a kind brought still counts a round later
+_MEMORY = 0.8  # how much of what a kind brought still counts a round later
 
 
 class Bidding:
@@ -32,4 +32,4 @@ class Bidding:
         """Write down what a flight cost and what it brought."""
         self._work[kind] += work
         before = self._brought[kind]
-        self._brought[kind] = MEMORY * before + (1.0 - MEMORY) * gain / work
+        self._brought[kind] = _MEMORY * before + (1.0 - _MEMORY) * gain / work

@@ -9,7 +9,7 @@ from uav_task_alloc.solver.recorder import Recorder
 from uav_task_alloc.solver.warm import repaired
 
 COLD_START, WARM_START = ColonyParams(), ColonyParams(hot=0.3, cold=0.02, again=3.0)
-LONGEST = 0.005  # [s] between looks at the clock
+_LONGEST = 0.005  # [s] between looks at the clock
 FIXED = 100  # rounds a flight where iterations are limited
 EXCHANGES = 20  # times that colonies look at each other's best
 
@@ -52,6 +52,6 @@ def _live(colony: Colony, recorder: Recorder) -> None:
         now = recorder.elapsed()
         step = spent - before
         if flown and not fixed:
-            aim = min(LONGEST, recorder.budget - now)
+            aim = min(_LONGEST, recorder.budget - now)
             rounds = max(16, min(100_000, int(rounds * min(4.0, aim / max(1e-6, now - since)))))
         since = now

@@ -12,22 +12,22 @@ from typing import Any, TypeVar
 import numba
 
 NJIT: Any = numba.njit  # its stubs do not know all options
-Made = TypeVar('Made', bound=Callable[..., Any])
+_Made = TypeVar('_Made', bound=Callable[..., Any])
 
 
-def kernel(function: Made) -> Made:
+def kernel(function: _Made) -> _Made:
     """Compile a function that is called from Python."""
-    made: Made = NJIT(cache=True, nogil=True, _nrt=False)(function)
+    made: _Made = NJIT(cache=True, nogil=True, _nrt=False)(function)
     return made
 
 
-def part(function: Made) -> Made:
+def part(function: _Made) -> _Made:
     """Compile a function into each kernel that calls it."""
-    made: Made = NJIT(cache=True, nogil=True, _nrt=False, forceinline=True)(function)
+    made: _Made = NJIT(cache=True, nogil=True, _nrt=False, forceinline=True)(function)
     return made
 
 
-def maker(function: Made) -> Made:
+def maker(function: _Made) -> _Made:
     """Compile a function that makes arrays."""
-    made: Made = NJIT(cache=True, nogil=True)(function)
+    made: _Made = NJIT(cache=True, nogil=True)(function)
     return made

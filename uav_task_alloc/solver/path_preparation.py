@@ -17,9 +17,9 @@ from uav_task_alloc.model import Leg
 from uav_task_alloc.solver.routes import Arrays, Ints
 
 FLOWN, SOUGHT = 0.25, 0.5  # shares of the budget that are over when these searches end
-LEAST = 0.02  # [s] of budget: with less no way is found at all
+_LEAST = 0.02  # [s] of budget: with less no way is found at all
 ROUNDS = (0, 100_000, 1_000_000, 10_000_000, UNLIMITED)  # units of work that one search may take
-IN_FLIGHT = 20_000_000  # for a way that is flown already
+_IN_FLIGHT = 20_000_000  # for a way that is flown already
 IN_SEARCH = 1_000_000  # for one that bees ask for
 
 
@@ -30,7 +30,7 @@ class PathPreparation:
                  stop: Callable[[], bool] | None = None,
                  flown: Mapping[str, tuple[Sequence[str], Sequence[Leg]]] | None = None) -> None:
         self.effort, self.flown = SearchBudget(self._over), flown or {}
-        self._clock, self._began, self._budget = clock, began, max(budget, LEAST)
+        self._clock, self._began, self._budget = clock, began, max(budget, _LEAST)
         self._stop: Callable[[], bool] | None = stop
         self._share, self._heeds_stop = 1.0, True
 
@@ -53,7 +53,7 @@ class PathPreparation:
 
         What is not found is taken as it is flown, where that is still clear.
         """
-        self.begin(FLOWN, IN_FLIGHT, heeds_stop=False)
+        self.begin(FLOWN, _IN_FLIGHT, heeds_stop=False)
         rows = []
         for uav_id, (tasks, legs) in self.flown.items():
             stops = [place.get(name, -1) for name in (uav_id, *tasks)]

@@ -11,7 +11,7 @@ from uav_task_alloc.solver.pool import Pool, collect, column_of
 from uav_task_alloc.solver.routes import NODE, TINY, Arrays, Ints, Routes, clear, insert, total
 
 GROUP = 10  # UAVs
-AROUND = 6  # neighbours of a task by which routes are next to each other
+_AROUND = 6  # neighbours of a task by which routes are next to each other
 PASSES = 2  # through all groups
 DEEPEST = 20_000  # columns tried in a group
 TRY = 4.0  # such a try costs as much as so many looks at a stop
@@ -27,7 +27,7 @@ def _group(a: Arrays, pool: Pool, on: Ints, flown: Ints, seed: int) -> Flags:
         e = flown[newest]
         if e >= 0:
             for t in pool.stops[pool.first[e]:pool.first[e + 1]]:
-                for c in a.near[t - a.uavs, :AROUND]:
+                for c in a.near[t - a.uavs, :_AROUND]:
                     if on[c] >= 0:
                         beside[on[c]] += 1
                 for s in a.starts[t - a.uavs]:
@@ -45,7 +45,7 @@ def _tasks_of(a: Arrays, on: Ints, group: Flags) -> Ints:
             inside[t] = group[on[t]]
         else:
             inside[t] = a.uavs <= GROUP
-            for c in a.near[t - a.uavs, :AROUND]:
+            for c in a.near[t - a.uavs, :_AROUND]:
                 inside[t] |= on[c] >= 0 and group[on[c]]
     return np.flatnonzero(inside)
 

@@ -27,7 +27,7 @@ from uav_task_alloc.solver.routes import (
 STRING = 10  # tasks in a string at most
 SPLIT = 0.5  # share of strings with a part that stays
 STAY = 0.98  # chance that one more does, so often only ends of a route come out
-REACH = 12  # neighbours looked at for a place
+_REACH = 12  # neighbours looked at for a place
 PITY = 0.5  # share of rounds around a task that is left out, if there is one
 RELIEF = 0.2  # share around a route beyond range, if there is one
 FEW, DEARER = 0.05, 1.3  # what few who are left out are worth rises so much a look
@@ -192,7 +192,7 @@ def recreate(a: Arrays, r: Routes, log: Log, rng: Chance) -> None:
     _order(a, log, rng)
     for i in range(log.size[1]):
         t = log.out[i]
-        place, delta = near_place(a, r, t, REACH, BLINKS, rng)
+        place, delta = near_place(a, r, t, _REACH, BLINKS, rng)
         if place < 0 and (a.picky[t - a.uavs] or not a.hard):
             place, delta = any_place(a, r, t)
         if place >= 0 and (not a.hard or delta < a.price[t - a.uavs]):

@@ -10,13 +10,13 @@ from itertools import pairwise
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.study.instances import Instance
 
-ROUNDING = 1e-9  # share of a range that floating point may add
+_ROUNDING = 1e-9  # share of a range that floating point may add
 
 RoutesByUav = Mapping[str, Sequence[str]]  # UAV id -> task ids in order
 
 
 @dataclass(frozen=True, slots=True)
-class Judged:
+class _Judged:
     """What routes are worth, and what is wrong with them."""
 
     length: float  # [m]
@@ -29,7 +29,7 @@ class Judged:
         return not self.faults and (collects or not self.missing)
 
 
-def judge(instance: Instance, routes: RoutesByUav) -> Judged:
+def judge(instance: Instance, routes: RoutesByUav) -> _Judged:
     """Judge routes of straight legs. Raises InvalidValue where zones would bend them."""
     if instance.zones:
         raise InvalidValue('zones', len(instance.zones), 'none: legs are straight here')
@@ -51,9 +51,9 @@ def judge(instance: Instance, routes: RoutesByUav) -> Judged:
         if instance.route_end == 'home' and row:
             stops.append(uav.home or uav.position)
         length = math.fsum(math.dist(a, b) for a, b in pairwise(stops))
-        if length > uav.range * (1.0 + ROUNDING):
+        if length > uav.range * (1.0 + _ROUNDING):
             faults.append(f'{uav_id} flies {length:.9g} m, its range is {uav.range:.9g} m')
         total += length
     served = seen.keys() & tasks.keys()
-    return Judged(total, math.fsum(tasks[each].value for each in served),
+    return _Judged(total, math.fsum(tasks[each].value for each in served),
                   len(tasks) - len(served), tuple(faults))

@@ -16,7 +16,7 @@ from multiprocessing.connection import wait
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.study.campaign import Opened
 
-PATIENCE = 10.0  # [s] that a scheduler may take to answer
+_PATIENCE = 10.0  # [s] that a scheduler may take to answer
 
 
 @contextmanager
@@ -55,7 +55,7 @@ def dask(address: str) -> Iterator[Executor]:
     except ModuleNotFoundError as error:
         raise InvalidValue('--dask', address, f"dask.distributed to be installed ({error}); "
                            "pip install '.[study]'") from None
-    with distributed.Client(address, timeout=PATIENCE, set_as_default=False) as client:
+    with distributed.Client(address, timeout=_PATIENCE, set_as_default=False) as client:
         yield client.get_executor(pure=False)
 
 

@@ -22,10 +22,10 @@ from uav_task_alloc.study.campaign import Job
 from uav_task_alloc.study.experiments import Experiments
 from uav_task_alloc.study.gap_plot import plain_log
 
-LINES = '-', '--', '-.', ':', (0, (5, 1, 1, 1, 1, 1))  # told apart without colours, too
+_LINES = '-', '--', '-.', ':', (0, (5, 1, 1, 1, 1, 1))  # told apart without colours, too
 POINTS = 120  # of a mean curve
 WIDE, NARROW = 150, 36  # [letters] lines of settings, below a figure and beside it
-Key = TypeVar('Key')
+_Key = TypeVar('_Key')
 Curve = list[tuple[float, float]]  # (iteration or [s], mean fit)
 
 
@@ -43,7 +43,7 @@ def draw_figures(asked: Experiments, results: Mapping[str, Any], out: Path) -> N
             _allocation(asked, allocation, out / 'figure3_allocation')
 
 
-def _there(jobs: Mapping[Key, Job], results: Mapping[str, Any]) -> dict[Key, Any]:
+def _there(jobs: Mapping[_Key, Job], results: Mapping[str, Any]) -> dict[_Key, Any]:
     return {key: results[job.name] for key, job in jobs.items() if job.name in results}
 
 
@@ -54,7 +54,7 @@ def _coefficient(asked: Experiments, found: Mapping[tuple[float, int], Any], out
     ks = sorted({k for k, _ in found})
     curves = {k: mean_curve([run for key, run in found.items() if key[0] == k], 0) for k in ks}
     for i, k in enumerate(ks):
-        left.plot(*zip(*curves[k], strict=True), color=COLOURS[i], ls=LINES[i % len(LINES)],
+        left.plot(*zip(*curves[k], strict=True), color=COLOURS[i], ls=_LINES[i % len(_LINES)],
                   label=f'k = {k:g}')
     left.set(xscale='log', xlabel='generations', ylabel='mean best fit (eq 2.12)')
     left.legend(frameon=False)
@@ -81,7 +81,7 @@ def _convergence(asked: Experiments, found: Mapping[tuple[str, int], Any], out: 
     for column, suffix, unit in ((0, '_iterations', 'iteration'), (1, '_timing', 'CPU [s]')):
         curves = {name: mean_curve(by[name], column) for name in solvers}
         for i, (name, curve) in enumerate(curves.items()):
-            axes[column].plot(*zip(*curve, strict=True), color=COLOURS[i], ls=LINES[i],
+            axes[column].plot(*zip(*curve, strict=True), color=COLOURS[i], ls=_LINES[i],
                               label=name)
         tables.write_csv(out.with_name(f'figure2{suffix}.csv'), [
             {'solver': name, unit: x, 'mean fit': y} for name in solvers

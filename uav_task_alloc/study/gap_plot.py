@@ -14,7 +14,7 @@ from matplotlib.ticker import NullFormatter
 from uav_task_alloc.plots import COLOURS
 from uav_task_alloc.study.gaps import InstanceRuns, Means, groups, means
 
-MARKS = 'osD^vP*X'
+_MARKS = 'osD^vP*X'
 ACROSS = 4  # panels
 
 
@@ -44,7 +44,7 @@ def _panel(axes: Axes, found: Means, solvers: Sequence[str]) -> None:
                 for column, (gap, there, asked) in found.items()
                 if column.rpartition('@')[0] == name and gap is not None]
         style: dict[str, Any] = {'color': COLOURS[i % len(COLOURS)], 'ms': 8, 'mew': 1.6}
-        mark = MARKS[i % len(MARKS)]
+        mark = _MARKS[i % len(_MARKS)]
         axes.plot([row[0] for row in rows], [row[1] for row in rows], mark + '-', label=name,
                   fillstyle='none', **style)
         for budget, gap, whole in rows:

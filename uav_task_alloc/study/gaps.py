@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-SAME = 1e-4  # [%] from the best that is but rounding
+_SAME = 1e-4  # [%] from the best that is but rounding
 Means = dict[str, tuple[float | None, int, int]]  # 'solver@budget' -> mean gap [%], of, asked
 
 
@@ -79,7 +79,7 @@ def gap_table(runs: Mapping[str, InstanceRuns]) -> str:
 
 def _reached(runs: Mapping[str, InstanceRuns], column: str) -> str:
     gaps = [run.gaps()[column] for run in runs.values() if column in run.gaps()]
-    return f'{sum(gap is not None and gap < SAME for gap in gaps)}/{len(gaps)}'
+    return f'{sum(gap is not None and gap < _SAME for gap in gaps)}/{len(gaps)}'
 
 
 def _cell(mean: Sequence[Any] | None) -> str:

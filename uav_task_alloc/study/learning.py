@@ -20,7 +20,7 @@ from uav_task_alloc.solver.scouts import Scouts
 from uav_task_alloc.solver.solve import warm_up
 from uav_task_alloc.study.instances import make_instance
 
-REFERENCE = 5.0  # times the budget that the whole solver gets for the length to compare with
+_REFERENCE = 5.0  # times the budget that the whole solver gets for the length to compare with
 
 
 def scouts(budget: float = 1.0, runs: int = 10, size: str = '8x50') -> None:
@@ -29,7 +29,7 @@ def scouts(budget: float = 1.0, runs: int = 10, size: str = '8x50') -> None:
     gaps: dict[bool, list[float]] = {True: [], False: []}
     short = {True: 0, False: 0}
     for problem, seed in _problems(size, runs):
-        best = _search(problem, REFERENCE * budget, seed, ColonyParams())
+        best = _search(problem, _REFERENCE * budget, seed, ColonyParams())
         for learning in gaps:
             found = _scouts_alone(problem, budget, seed, learning)
             gaps[learning].append(100.0 * (found.sums[DISTANCE] / best - 1.0))

@@ -19,7 +19,7 @@ from uav_task_alloc.study.evaluator import RoutesByUav
 from uav_task_alloc.study.instances import Instance
 
 COUNTS = 1e6  # both count in integers: the longest leg is so many
-UNLIMITED = 2 ** 40
+_UNLIMITED = 2 ** 40
 WAITING = 20.0  # times the CPU seconds that OR-Tools may take by the wall
 Found = list[tuple[float, RoutesByUav]]  # CPU [s] and routes, whenever better ones were found
 
@@ -38,7 +38,7 @@ class Model:
     def reach(self, crew: int) -> int:
         """Range of a UAV of this crew."""
         metres = self.crews[crew][0].range
-        return int(self.unit * metres) if metres < math.inf else UNLIMITED
+        return int(self.unit * metres) if metres < math.inf else _UNLIMITED
 
 
 def model(instance: Instance) -> Model:

@@ -13,7 +13,7 @@ from uav_task_alloc.study import experiments as program
 from uav_task_alloc.study.experiments import Experiments
 
 ResultRow = dict[str, Any]
-NEAR = 5, 1  # [%] above the best: what "time to" and "success" are told for
+_NEAR = 5, 1  # [%] above the best: what "time to" and "success" are told for
 
 
 def write_csv(path: Path, rows: Sequence[ResultRow]) -> None:
@@ -66,10 +66,10 @@ def _quality(found: Sequence[tuple[Any, float]]) -> ResultRow:
                                for result, best in found), 6),
         'distance [km]': 1e-3 * fmean(result['distance'] for result, _ in found),
         'beyond range [m]': fmean(result['penalty'] for result, _ in found)}
-    for percent in NEAR:
+    for percent in _NEAR:
         row[f'within {percent} % [% of instances]'] = 100.0 * fmean(
             when(result, best, percent)[0] < math.inf for result, best in found)
-    for percent in NEAR:
+    for percent in _NEAR:
         row[f'iterations to {percent} %'] = _median(
             when(result, best, percent)[0] for result, best in found)
     return row | {'iterations': round(fmean(result['iterations'] for result, _ in found))}
@@ -77,7 +77,7 @@ def _quality(found: Sequence[tuple[Any, float]]) -> ResultRow:
 
 def _timing(found: Sequence[tuple[Any, float]]) -> ResultRow:
     row: ResultRow = {f'to {percent} % [s]': _median(
-        when(result, best, percent)[1] for result, best in found) for percent in NEAR}
+        when(result, best, percent)[1] for result, best in found) for percent in _NEAR}
     return row | {'in all [s]': fmean(result['seconds'] for result, _ in found)}
 
 

@@ -14,9 +14,9 @@ from uav_task_alloc.solver.solve import plan, warm_up
 from uav_task_alloc.study.instances import SIDE, Instance, make_instance
 
 ARRIVALS, STEP = 5, 300.0  # tasks, [m] flown between events
-ROOM = 1.5  # ranges, as multiples of those of the instance
+_ROOM = 1.5  # ranges, as multiples of those of the instance
 SEED = 11  # of the instance and the arrivals; nothing was tuned on it
-REFERENCE = 20  # times the budget that the plan to compare with gets
+_REFERENCE = 20  # times the budget that the plan to compare with gets
 BETWEEN = 5  # times the iterations of an event that are searched until the next
 BACKGROUND = 10.0  # times the budget that is searched between events, as the allocator does
 BEFORE = 100.0  # times the budget of the first plan
@@ -38,7 +38,7 @@ def _chain(uavs: int, tasks: int, one_base: bool, budget: float,
            runs: int) -> tuple[list[float], list[float]]:
     instance, rng = make_instance(uavs, tasks, SEED, one_base), np.random.default_rng(SEED)
     # more tasks arrive than the ranges are made for
-    fleet = tuple(replace(uav, range=ROOM * uav.range) for uav in instance.uavs)
+    fleet = tuple(replace(uav, range=_ROOM * uav.range) for uav in instance.uavs)
     work = instance.tasks
     known = plan(fleet, work, budget=BEFORE * budget, clock=time.process_time)
     gaps: list[float] = []
@@ -49,7 +49,7 @@ def _chain(uavs: int, tasks: int, one_base: bool, budget: float,
                       for i in range(ARRIVALS))
         fresh = plan(fleet, work, budget=budget, warm=known, clock=time.process_time)
         known = plan(fleet, work, budget=BACKGROUND * budget, warm=fresh, clock=time.process_time)
-        best = plan(fleet, work, budget=REFERENCE * budget, warm=known, clock=time.process_time)
+        best = plan(fleet, work, budget=_REFERENCE * budget, warm=known, clock=time.process_time)
         gaps.append(_gap(fresh, best))
         first.append(fresh.history[0][0])
     return gaps, first
@@ -63,10 +63,10 @@ def compare(instance: Instance, seed: int, iterations: int, count: int) -> list[
     iterations; the gap is to REFERENCE times as many from the better of both.
     """
     rng = np.random.default_rng((seed, count))
-    fleet = tuple(replace(uav, range=ROOM * uav.range) for uav in instance.uavs)
+    fleet = tuple(replace(uav, range=_ROOM * uav.range) for uav in instance.uavs)
     work, rows = instance.tasks, list[dict[str, float]]()
     solved = partial(plan, budget=LONGEST, seed=seed, clock=time.thread_time)
-    known = solved(fleet, work, max_iterations=REFERENCE * iterations)
+    known = solved(fleet, work, max_iterations=_REFERENCE * iterations)
     for event in range(count):
         fleet, work = _flown(fleet, work, known)
         arrived = int(rng.poisson(len(instance.tasks) / 20.0))
@@ -75,7 +75,7 @@ def compare(instance: Instance, seed: int, iterations: int, count: int) -> list[
         warm = solved(fleet, work, warm=known, max_iterations=iterations)
         cold = solved(fleet, work, max_iterations=iterations)
         better = min(warm, cold, key=lambda made: (-made.value, made.distance))
-        best = solved(fleet, work, warm=better, max_iterations=REFERENCE * iterations)
+        best = solved(fleet, work, warm=better, max_iterations=_REFERENCE * iterations)
         rows.append({'arrived': arrived, 'tasks': len(work),
                      'warm_gap': _gap(warm, best), 'cold_gap': _gap(cold, best),
                      'warm_first_s': warm.history[0][0], 'cold_first_s': cold.history[0][0],

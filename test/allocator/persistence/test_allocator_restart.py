@@ -221,9 +221,9 @@ def test_what_was_learnt_is_bounded(monkeypatch):
     near = np.tile(np.arange(3, 7), (40, 1))
     learnt = Learnt(tables, near, {'a': 0, 'b': 1, 'c': 2}, {f't{k}': k for k in range(40)})
     assert learner(learner_row(WarmState(learnt=learnt)).body).learnt.uavs == learnt.uavs
-    monkeypatch.setattr('uav_task_alloc.allocator.replanning.learned_state.MOST', 119)
+    monkeypatch.setattr('uav_task_alloc.allocator.replanning.learned_state._MOST', 119)
     assert learner_row(WarmState(learnt=learnt)).body is None
-    monkeypatch.setattr('uav_task_alloc.allocator.replanning.learned_state.MOST', 160)
+    monkeypatch.setattr('uav_task_alloc.allocator.replanning.learned_state._MOST', 160)
     wide = learnt._replace(tables=tables._replace(start=np.full((5, 40), 0.5)), near=near + 2,
                            uavs={f'u{k}': k for k in range(5)})
     kept = learner(learner_row(WarmState(learnt=wide)).body).learnt  # the starts are 200: left out

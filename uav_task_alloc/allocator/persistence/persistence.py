@@ -21,7 +21,7 @@ from uav_task_alloc.errors import (
 from uav_task_alloc.geometry.frames import Origin
 from uav_task_alloc.journal import WAIT, Journal, JournalRow, read_copy, rescued, set_aside
 
-RETRY = 1.0  # [s] between two tries on a disk that refused
+_RETRY = 1.0  # [s] between two tries on a disk that refused
 SAME_ANGLE, SAME_ALTITUDE = 1e-7, 0.01  # [deg], [m] an origin is the same within 1 cm
 GIVEN_UP = 'nothing is kept until a restart'
 
@@ -66,7 +66,7 @@ class Persistence:
             self.in_use = str(error) if isinstance(error, JournalInUse) else ''
             self._give_up(str(error))
         except JournalError as error:
-            self._say(f'{error}; tried again every {RETRY:g} s')
+            self._say(f'{error}; tried again every {_RETRY:g} s')
             try:
                 return self._checked(read_copy(self._dir))
             except OriginMismatch:
@@ -127,8 +127,8 @@ class Persistence:
         except JournalForeign as error:
             self._give_up(str(error))
         except JournalError as error:
-            self._retry = now + RETRY
-            self._say(f'{error}; tried again every {RETRY:g} s')
+            self._retry = now + _RETRY
+            self._say(f'{error}; tried again every {_RETRY:g} s')
         else:
             self._say('')
             return allocator.written(rows)

@@ -28,7 +28,7 @@ from uav_task_alloc.model import (
 )
 
 Thing = TypeVar('Thing')
-KINDS = frozenset({'task', 'list', 'zones', 'off', 'revision', 'learner', 'origin'})
+_KINDS = frozenset({'task', 'list', 'zones', 'off', 'revision', 'learner', 'origin'})
 UNREADABLE = (LookupError, TypeError, ValueError, AttributeError, OverflowError)
 LAST = 2.0**31 - 1.0  # [s] the last stamp, and the last revision, that a message can hold
 
@@ -94,7 +94,7 @@ def saved(rows: Iterable[JournalRow]) -> Saved:
 
 
 def _take(found: Saved, row: JournalRow) -> None:
-    if row.kind not in KINDS:
+    if row.kind not in _KINDS:
         raise ValueError(f'unknown kind {row.kind!r}')
     if isinstance(row.body, (bytes, str)):
         raise ValueError('body: expected JSON')

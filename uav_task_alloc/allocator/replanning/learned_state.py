@@ -13,7 +13,7 @@ from uav_task_alloc.journal import JournalRow
 if TYPE_CHECKING:  # it brings the compiler along, which a start must not wait for
     from uav_task_alloc.solver.warm import WarmState
 
-MOST = 200_000  # entries kept of a table; 5000 tasks with 24 neighbours are 120 000
+_MOST = 200_000  # entries kept of a table; 5000 tasks with 24 neighbours are 120 000
 
 
 def learner_row(state: object) -> JournalRow:
@@ -22,10 +22,10 @@ def learner_row(state: object) -> JournalRow:
     """
     from uav_task_alloc.solver.tables import Learnt
     learnt = getattr(state, 'learnt', None)
-    if not isinstance(learnt, Learnt) or learnt.near.size > MOST:
+    if not isinstance(learnt, Learnt) or learnt.near.size > _MOST:
         return JournalRow('learner', '', None)
     starts, near = learnt.tables.start, learnt.near - len(learnt.uavs)  # places of tasks from 0
-    uavs = sorted(learnt.uavs, key=learnt.uavs.__getitem__) if starts.size <= MOST else []
+    uavs = sorted(learnt.uavs, key=learnt.uavs.__getitem__) if starts.size <= _MOST else []
     return JournalRow('learner', '', {
         'uavs': uavs, 'tasks': sorted(learnt.tasks, key=learnt.tasks.__getitem__),
         'near': _packed(near, '<i4'), 'task': _packed(learnt.tables.task, '<f4'),

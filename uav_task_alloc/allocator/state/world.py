@@ -35,7 +35,7 @@ if TYPE_CHECKING:  # it brings the compiler along, which a start must not wait f
 
 MOST_NOTES = 10_000  # lines that wait for the log
 ANSWER = 1.0  # [s] between two lists told again for old events
-LOOK = 0.5  # [s] between two looks at the way ahead of a UAV
+_LOOK = 0.5  # [s] between two looks at the way ahead of a UAV
 
 
 class World:
@@ -119,7 +119,7 @@ class World:
         admission.prove(self, report)
         if self.lists.learn(uav_id, report.list_revision):
             self.again.add(uav_id)
-        if self.awake and now - self.looked.get(uav_id, -LOOK) >= LOOK:
+        if self.awake and now - self.looked.get(uav_id, -_LOOK) >= _LOOK:
             self.looked[uav_id] = now
             zone_watch.look_ahead(self, uav_id, now)
         return ''

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from uav_task_alloc.allocator.state.fleet import UavRecord
     from uav_task_alloc.allocator.state.world import World
 
-CLIMB = 5.0  # [m] above the ground: as high as everybody climbs first, and heights are as wrong
+_CLIMB = 5.0  # [m] above the ground: as high as everybody climbs first, and heights are as wrong
 NAMED = 5  # in one sentence
 
 
@@ -24,8 +24,8 @@ def look(world: World, uav_id: str, now: float) -> None:
     record, ways = world.fleet.records[uav_id], world.ways()
     stands, position = record.report.standby, record.report.position
     # a position on the ground wanders: out of a zone is who is well out of it
-    zone = ways.around(position, CLIMB, bool(record.zone)) if stands else ways.around(position)
-    home_zone = ways.around(record.home, CLIMB, bool(record.home_zone))
+    zone = ways.around(position, _CLIMB, bool(record.zone)) if stands else ways.around(position)
+    home_zone = ways.around(record.home, _CLIMB, bool(record.home_zone))
     standing = _standing(uav_id, zone, home_zone) if stands else ''
     world.fleet.set_zone(uav_id, zone, home_zone, standing)
     if standing != record.standing:

@@ -10,8 +10,8 @@ from pymavlink.dialects.v20 import ardupilotmega as d
 
 from uav_task_alloc.mavlink.transport.codec import Message
 
-PERIOD = 1.0  # [s] until a command is repeated
-TRIES = 5
+_PERIOD = 1.0  # [s] until a command is repeated
+_TRIES = 5
 
 
 def _always() -> bool:
@@ -35,7 +35,7 @@ class Command:
     message: Message
     seen: Callable[[], bool]  # whether the vehicle is seen to have done it
     ack_suffices: bool = True
-    tries: int = TRIES
+    tries: int = _TRIES
     patient: bool = False  # a refusal may pass: go on trying
     wanted: Callable[[], bool] = _always  # no longer: it is dropped between two tries
     fallback: Command | None = None
@@ -56,7 +56,7 @@ class Command:
         elif now >= self._due:
             if self._sent < self.tries:
                 self._sent += 1
-                self._due = now + PERIOD
+                self._due = now + _PERIOD
                 return [self.message]
             self._end(self.reason or f'no answer to {self.tries} tries')
             return self.step(now)

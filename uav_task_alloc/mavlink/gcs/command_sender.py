@@ -20,7 +20,7 @@ from uav_task_alloc.mavlink.transport.notes import OperatorNote
 
 ARM = 'arm'
 ARM_TRIES = 120  # one a second: a position estimate may take that long
-CLIMB = 120.0  # [s] for a take-off
+_CLIMB = 120.0  # [s] for a take-off
 ENOUGH = 0.9  # of the height asked for
 RETRY, RETRIES = 10.0, 5  # [s] after a failure that may pass
 SLOW_RETRY = 60.0  # [s] after more of them, without end
@@ -229,7 +229,7 @@ class CommandSender:
         self._telemetry.armed = self.armed_here = True
 
     def _took_off(self, now: float) -> None:
-        self.climbing, self._climb_until = True, now + CLIMB
+        self.climbing, self._climb_until = True, now + _CLIMB
         self.armed_here = False
         self.commanded = ModeFunction.TAKEOFF
 

@@ -9,8 +9,8 @@ from uav_task_alloc.mavlink.mission.peer import Peer
 from uav_task_alloc.mavlink.transport.codec import Message
 
 PERIOD, TRIES = 2.0, 5  # [s] between requests
-SILENT = 10.0  # [s] without a message that came before, and four of its periods
-QUIET = 3.0  # [s] without a position: perhaps restarted, which only new rates will show
+_SILENT = 10.0  # [s] without a message that came before, and four of its periods
+_QUIET = 3.0  # [s] without a position: perhaps restarted, which only new rates will show
 
 
 class MessageRates:
@@ -27,7 +27,7 @@ class MessageRates:
 
     def step(self, now: float) -> list[Message]:
         """What is to be asked now."""
-        quiet = now - self._telemetry.positions_at > QUIET
+        quiet = now - self._telemetry.positions_at > _QUIET
         if self._came and quiet and not self._telemetry.stale(now):
             self._telemetry.heard.clear()
             self.again(now)
@@ -36,7 +36,7 @@ class MessageRates:
         rates = {**RATES, estimate: 1.0} if estimate is not None else RATES
         last = self._telemetry.heard_last
         silent = {number for number, rate in rates.items()
-                  if now - last.get(number, now) > SILENT + 4.0 / rate}
+                  if now - last.get(number, now) > _SILENT + 4.0 / rate}
         if silent - self._silent and not self._telemetry.stale(now):
             self.again(now)
         self._silent = silent

@@ -19,7 +19,7 @@ from uav_task_alloc.mavlink.mission.items import Item, MissionStop, TaskList, al
 from uav_task_alloc.mavlink.mission.progress import ProgressTable
 from uav_task_alloc.model import Point, Task
 
-NEAR = 15.0  # [m] from the last item: there
+_NEAR = 15.0  # [m] from the last item: there
 MEMORY = 60.0  # [s] after the restart; a task at the same place later on is another one
 
 
@@ -118,5 +118,5 @@ class Resume:
             and telemetry.airborne
             and telemetry.flight is ModeFunction.HOLD
             and current == len(held) - 1
-            and math.dist(telemetry.position, place) < last.params[1] + NEAR
+            and math.dist(telemetry.position, place) < last.params[1] + _NEAR
         )

@@ -11,7 +11,7 @@ from uav_task_alloc.mavlink.transport.codec import Message
 from uav_task_alloc.mavlink.transport.notes import OperatorNote
 
 TEXT_AGAIN = 60.0  # [s] in which the same words of a vehicle are told once
-MOST_TEXTS = 200  # different words in that time
+_MOST_TEXTS = 200  # different words in that time
 SAYS_NOTHING = re.compile(r'Auto mission changed, restarted command')  # once for each item
 
 
@@ -25,9 +25,9 @@ class StatusTextLog:
     def take(self, message: Message, now: float) -> OperatorNote | None:
         """A STATUSTEXT; returns what a human should read, None where it was told lately."""
         text = self.last = str(message.text)
-        if len(self._told) >= MOST_TEXTS:
+        if len(self._told) >= _MOST_TEXTS:
             self._told = {old: at for old, at in self._told.items() if now - at < TEXT_AGAIN}
-        if now - self._told.get(text, -math.inf) < TEXT_AGAIN or len(self._told) >= MOST_TEXTS:
+        if now - self._told.get(text, -math.inf) < TEXT_AGAIN or len(self._told) >= _MOST_TEXTS:
             return None
         self._told[text] = now
         serious = message.severity < d.MAV_SEVERITY_WARNING and not SAYS_NOTHING.search(text)

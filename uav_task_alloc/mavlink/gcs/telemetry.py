@@ -33,7 +33,7 @@ RATES = {
 ESTIMATE = {d.MAV_AUTOPILOT_ARDUPILOTMEGA: d.MAVLINK_MSG_ID_EKF_STATUS_REPORT,
             d.MAV_AUTOPILOT_PX4: d.MAVLINK_MSG_ID_ESTIMATOR_STATUS}
 # what an older frame must not overwrite; REACHED, texts and the mission service are events
-STATES = frozenset({'HEARTBEAT', 'GLOBAL_POSITION_INT', 'HOME_POSITION', 'BATTERY_STATUS',
+_STATES = frozenset({'HEARTBEAT', 'GLOBAL_POSITION_INT', 'HOME_POSITION', 'BATTERY_STATUS',
                     'SYS_STATUS', 'EXTENDED_SYS_STATE', 'MISSION_CURRENT', 'GPS_RAW_INT',
                     'EKF_STATUS_REPORT', 'ESTIMATOR_STATUS'})
 WANTED = frozenset({*RATES, *ESTIMATE.values(), *(
@@ -151,7 +151,7 @@ class Telemetry:
         boot = getattr(message, 'time_boot_ms', None)
         if boot is not None:
             self._clock(boot, now)
-        if message.get_type() in STATES and not self._is_newest(message, now):
+        if message.get_type() in _STATES and not self._is_newest(message, now):
             return False
         take = self._takes.get(message.get_type())
         if take:

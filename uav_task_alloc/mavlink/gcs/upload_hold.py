@@ -9,9 +9,9 @@ from uav_task_alloc.mavlink.gcs.onboard_mission import OnboardMission
 from uav_task_alloc.mavlink.gcs.telemetry import UNKNOWN, Telemetry
 from uav_task_alloc.mavlink.mission.items import Item, alike
 
-NEAR = 15.0  # [m] from a point, beyond its radius: there
+_NEAR = 15.0  # [m] from a point, beyond its radius: there
 ARRIVAL = 2.0  # [s] before a task is reached, and the time of an upload: no swap is begun
-PATIENCE = 10.0  # [s] beyond its hold that a service is waited for
+_PATIENCE = 10.0  # [s] beyond its hold that a service is waited for
 
 
 class UploadHold:
@@ -29,14 +29,14 @@ class UploadHold:
             self._until = math.inf
             return False
         if math.isinf(self._until):
-            self._until = now + item.params[0] + PATIENCE
+            self._until = now + item.params[0] + _PATIENCE
         return now < self._until
 
     def _is_near(self, item: Item, first: Item) -> bool:
         distance = math.dist(self._telemetry.position, first.position or UNKNOWN) - first.radius
         same, board = alike(first, item), self._board
         span = ARRIVAL + board.item_time * len(board.wanted())
-        if same and self._profile.atomic and distance < NEAR + span * self._telemetry.pace:
+        if same and self._profile.atomic and distance < _NEAR + span * self._telemetry.pace:
             return True
         served = same or (item.completes and item.task == first.task)
-        return served and item.params[0] > 0.0 and distance < NEAR
+        return served and item.params[0] > 0.0 and distance < _NEAR

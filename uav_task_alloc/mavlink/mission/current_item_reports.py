@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from uav_task_alloc.mavlink.mission.position_history import LATE
 
-SETTLE = 3.0  # [s] in which a CURRENT sent before the last change may still come
+_SETTLE = 3.0  # [s] in which a CURRENT sent before the last change may still come
 
 
 class CurrentItemReports:
@@ -49,7 +49,7 @@ class CurrentItemReports:
             return True
         if self._set is not None:
             start, when = self._set
-            if seq != start and (seq < start or now - when < SETTLE):
+            if seq != start and (seq < start or now - when < _SETTLE):
                 return True
             self._set = None
         return False

@@ -8,9 +8,9 @@ from uav_task_alloc.mavlink.mission.items import Item
 from uav_task_alloc.mavlink.mission.peer import ACCEPTED, Peer, received_item
 from uav_task_alloc.mavlink.transport.codec import Message
 
-PERIOD = 1.0  # [s] until a request is repeated
+_PERIOD = 1.0  # [s] until a request is repeated
 UNANSWERED, AGAIN = 4, 3  # requests of one item: PX4 may have ended the transfer; then list again
-TRIES = 12  # of one request; ArduPilot denies a list for 8 s after a broken upload
+_TRIES = 12  # of one request; ArduPilot denies a list for 8 s after a broken upload
 
 
 class DownloadState(Enum):
@@ -30,7 +30,7 @@ class Download:
         self.state = DownloadState.LISTING
         self.items: list[Item] = []
         self._count = 0
-        self._tries, self._due = 1, now + PERIOD
+        self._tries, self._due = 1, now + _PERIOD
         self._again = 0  # listings begun again
 
     @property
@@ -54,7 +54,7 @@ class Download:
         """Repeat the request that is due, or give up."""
         if self.state not in (DownloadState.LISTING, DownloadState.GETTING) or now < self._due:
             return []
-        if self._tries >= TRIES:
+        if self._tries >= _TRIES:
             self.state = DownloadState.FAILED
             return []
         if (self.state is DownloadState.GETTING and self._tries >= UNANSWERED
@@ -62,7 +62,7 @@ class Download:
             self.state, self._tries, self._again = DownloadState.LISTING, 0, self._again + 1
             self.items.clear()
         self._tries += 1
-        self._due = now + PERIOD
+        self._due = now + _PERIOD
         return [self.first if self.state is DownloadState.LISTING
                 else self._peer.request(len(self.items))]
 
@@ -70,5 +70,5 @@ class Download:
         if len(self.items) == self._count:
             self.state = DownloadState.DONE
             return [self._peer.ack(ACCEPTED)]
-        self._tries, self._due = 1, now + PERIOD
+        self._tries, self._due = 1, now + _PERIOD
         return [self._peer.request(len(self.items))]

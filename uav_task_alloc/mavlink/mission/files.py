@@ -30,7 +30,7 @@ from uav_task_alloc.mavlink.mission.long_legs import first_point, first_points, 
 from uav_task_alloc.model import Plan, Point, Route, Shape, Task, ThreatZone
 from uav_task_alloc.scenario.values import Scenario, ScenarioUav
 
-AUTOPILOTS: Mapping[str, tuple[Profile, int]] = {  # and the MAV_AUTOPILOT
+_AUTOPILOTS: Mapping[str, tuple[Profile, int]] = {  # and the MAV_AUTOPILOT
     'ardupilot': (ARDUPILOT, 3), 'px4': (PX4, 12)}
 QUADROTOR = 2  # MAV_TYPE
 ABSOLUTE = 2  # QGroundControl's altitude mode: AMSL
@@ -68,7 +68,7 @@ def write_missions(read: Scenario, made: Plan, folder: str | Path) -> list[Plann
 
 def mission_of(read: Scenario, uav: ScenarioUav, route: Route) -> PlannedMission:
     """The mission of one route; raise MissionError where a task cannot be a mission item."""
-    profile, _ = AUTOPILOTS[uav.autopilot]
+    profile, _ = _AUTOPILOTS[uav.autopilot]
     tasks = list_for_route(route, {timed.task.id: timed.task for timed in read.tasks})
     items = mission_items(_with_points_between(uav, profile, tasks), profile.rules, read.origin)
     fences, unfenced = _part(_way(uav, tasks), [timed.zone for timed in read.zones])
@@ -108,7 +108,7 @@ def plan_file(mission: PlannedMission) -> dict[str, Any]:
     return {
         'fileType': 'Plan', 'version': 1, 'groundStation': 'uav_task_alloc',
         'mission': {
-            'version': 2, 'firmwareType': AUTOPILOTS[uav.autopilot][1], 'vehicleType': QUADROTOR,
+            'version': 2, 'firmwareType': _AUTOPILOTS[uav.autopilot][1], 'vehicleType': QUADROTOR,
             'cruiseSpeed': uav.cruise_speed, 'hoverSpeed': uav.cruise_speed,
             'globalPlanAltitudeMode': ABSOLUTE,
             'plannedHomePosition': _home(mission),

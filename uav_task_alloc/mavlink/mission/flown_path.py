@@ -11,9 +11,9 @@ from typing import NamedTuple
 
 from uav_task_alloc.model import Point
 
-KEPT = 900  # samples: three minutes at 5 Hz
+_KEPT = 900  # samples: three minutes at 5 Hz
 GAP = 2.5  # [s] between two positions: beyond, nobody knows where it was
-ACCEPTED = 2.0  # [m] at which autopilots count a waypoint as reached, where the task says nothing
+_ACCEPTED = 2.0  # [m] at which autopilots count a waypoint as reached, where the task says nothing
 CLOSE = 0.5  # [m] beyond that
 SLOW = 0.4  # [m/s] it stays, and does not leave again
 CURVE = 0.4  # [m/s2] by which the way between two positions may differ from its interpolation
@@ -58,7 +58,7 @@ class FlownPath:
             at = bisect_left(self._samples, sample.t, key=lambda one: one.t)
             if self._samples[at].t != sample.t:
                 self._samples.insert(at, sample)
-        if len(self._samples) > KEPT + 100:
+        if len(self._samples) > _KEPT + 100:
             del self._samples[:100]
 
     def jumps(self, sample: PositionSample) -> bool:
@@ -130,7 +130,7 @@ class FlownPath:
 
         (inf, -inf) where it never was.
         """
-        near = (radius or ACCEPTED) + (0.0 if slow else close)
+        near = (radius or _ACCEPTED) + (0.0 if slow else close)
         first, last = math.inf, -math.inf
         samples = self._since(since, until)
         if len(samples) == 1 and math.dist(samples[0].position, place) <= near:

@@ -34,7 +34,7 @@ class Claim:
     sure: bool  # it was flying, so what was not seen may have been flown
 
 
-class Judged(NamedTuple):
+class _Judged(NamedTuple):
     """Items of one claim that need not be waited for any more."""
 
     flown: tuple[Item, ...]
@@ -61,7 +61,7 @@ class PassedItems:
         """Nothing is known of what is on board."""
         self._claims.clear()
 
-    def judge(self, claim: Claim, items: tuple[Item, ...], now: float) -> Judged:
+    def judge(self, claim: Claim, items: tuple[Item, ...], now: float) -> _Judged:
         """What became of items of a claim, which is dropped once all of them are judged.
 
         Args:
@@ -71,17 +71,17 @@ class PassedItems:
         """
         if self._silent(claim):
             self._claims.remove(claim)
-            return Judged((), items)
+            return _Judged((), items)
         if items and claim.frames is not None and now < claim.deadline:
-            return Judged((), ())  # REACHED may still come, or all that came without it
+            return _Judged((), ())  # REACHED may still come, or all that came without it
         verdicts = {item.task: self._verdict(item, claim) for item in items}
         seen = tuple(i for i in items if verdicts[i.task] is Visit.YES)
         rest = tuple(i for i in items if verdicts[i.task] is not Visit.YES)
         if rest and now < claim.deadline:
-            return Judged(seen, ())
+            return _Judged(seen, ())
         self._claims.remove(claim)
         unseen = self._settle(rest, verdicts, claim)
-        return Judged(seen + unseen, tuple(i for i in rest if i not in unseen))
+        return _Judged(seen + unseen, tuple(i for i in rest if i not in unseen))
 
     def _settle(self, rest: tuple[Item, ...], verdicts: dict[str, Visit],
                 claim: Claim) -> tuple[Item, ...]:

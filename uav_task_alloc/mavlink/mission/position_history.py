@@ -9,7 +9,7 @@ from uav_task_alloc.mavlink.mission.flown_path import GAP, FlownPath, PositionSa
 from uav_task_alloc.mavlink.mission.items import Item
 from uav_task_alloc.model import Point
 
-REACH = 60.0  # [m] beyond its radius from which an item can be reached between two positions
+_REACH = 60.0  # [m] beyond its radius from which an item can be reached between two positions
 FRESH = 3.0  # [s] a position tells where the vehicle is
 ADRIFT = 60.0  # [s] after a jump of its position in which another brings it back
 AT_ONCE = 2.0  # [s] in which a vehicle does not fly two legs
@@ -85,7 +85,7 @@ class PositionHistory:
         if self.place is None or now - self.place[1] > FRESH or now < self._adrift_until:
             return True
         distance = self.distance(item)
-        return math.isinf(distance) or distance <= item.radius + REACH
+        return math.isinf(distance) or distance <= item.radius + _REACH
 
     def distance(self, item: Item) -> float:
         """[m] from the newest position; inf where either is not known."""

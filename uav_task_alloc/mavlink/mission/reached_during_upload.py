@@ -6,7 +6,7 @@ from uav_task_alloc.mavlink.mission.diff import MissionDiff
 from uav_task_alloc.mavlink.mission.items import alike
 from uav_task_alloc.mavlink.mission.progress import ProgressTable
 
-MOST = 32  # messages
+_MOST = 32  # messages
 
 
 class ReachedDuringUpload:
@@ -23,7 +23,7 @@ class ReachedDuringUpload:
     def add(self, seq: int, now: float) -> None:
         """It may be of either."""
         repeated = bool(self._heard) and self._heard[-1][0] == seq  # by PX4
-        if len(self._heard) < MOST and not repeated:
+        if len(self._heard) < _MOST and not repeated:
             self._heard.append((seq, now))
         self._newest = seq, now
         self._progress.note_end(seq, now)

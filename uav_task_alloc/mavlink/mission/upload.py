@@ -31,7 +31,7 @@ GRACE = 2.0  # [s] after an ERROR, in which requests may go on
 ERROR_BACKOFF = (5.0, 8.0)  # [s] drawn between
 DENIED_BACKOFF = (8.0, 12.0)  # [s] the other ground station has to end first
 OVERTAKEN = 'overtaken by what was flown meanwhile, or by a newer list'
-TRIES = 3  # uploads of one mission until it is given up
+_TRIES = 3  # uploads of one mission until it is given up
 
 
 class UploadState(Enum):
@@ -240,8 +240,8 @@ class Upload:
             and new is UploadState.COUNTING
         ):
             again = True
-        if again and self._tries >= TRIES:
-            self._fail(f'given up after {TRIES} tries, at last: {event.value}')
+        if again and self._tries >= _TRIES:
+            self._fail(f'given up after {_TRIES} tries, at last: {event.value}')
             new = UploadState.IDLE
         elif again and self._tries and self.overtaken():
             self._fail(OVERTAKEN)

@@ -10,7 +10,7 @@ from pymavlink.dialects.v20 import ardupilotmega as d
 from uav_task_alloc.mavlink.mission.items import Item, all_alike
 from uav_task_alloc.mavlink.transport.codec import Message, plan_id
 
-SETTLE = 3.0  # [s] in which messages sent before the last change may still come
+_SETTLE = 3.0  # [s] in which messages sent before the last change may still come
 CHECK = 60.0  # [s] between readbacks of a mission that nobody should have changed
 
 
@@ -61,7 +61,7 @@ class VerifiedMission:
 
     def watch(self, message: Message, now: float) -> None:
         """Has somebody else changed the mission? What MISSION_CURRENT says is doubt, not proof."""
-        if self.items is None or now - self.verified_at < SETTLE:
+        if self.items is None or now - self.verified_at < _SETTLE:
             return
         ours, plan = self._plan, plan_id(message)
         changed = (plan != ours if plan and ours else message.total not in (

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Iterable
 
-KEPT = 1024  # frames
+_KEPT = 1024  # frames
 SILENCE = 1.0  # [s] in which the numbers may have begun again: something is missing then
 
 
@@ -30,7 +30,7 @@ class FrameLog:
         if number not in self._came:
             self._came.add(number)
             self._order.append(number)
-            if len(self._order) > KEPT:
+            if len(self._order) > _KEPT:
                 self._came.discard(self._order.popleft())
         return number
 
@@ -41,7 +41,7 @@ class FrameLog:
 
     def whole(self, first: int, last: int) -> bool:
         """Whether every frame from `first` to `last` has come."""
-        return last - first < KEPT and all(n in self._came for n in range(first, last + 1))
+        return last - first < _KEPT and all(n in self._came for n in range(first, last + 1))
 
     def clear(self) -> None:
         """The vehicle counts from the start again."""

@@ -11,14 +11,14 @@ from pymavlink.dialects.v20 import ardupilotmega as d
 from uav_task_alloc.mavlink.transport.codec import Message
 from uav_task_alloc.mavlink.transport.refused_messages import failure
 
-PERIOD = 1.0  # [s]
+_PERIOD = 1.0  # [s]
 OVERDUE = 3.0  # periods without a heartbeat
 
 
 class Heartbeat:
     """Says once in a period that we are here, whatever else the process does."""
 
-    def __init__(self, send: Callable[[Message], None], period: float = PERIOD) -> None:
+    def __init__(self, send: Callable[[Message], None], period: float = _PERIOD) -> None:
         self.sent = 0  # heartbeats so far
         self.restarts = 0  # of the thread, after an error
         self.trouble = ''  # why there is no heartbeat; '': there is

@@ -12,11 +12,11 @@ from typing import Protocol
 
 from uav_task_alloc.errors import InvalidValue
 
-CHUNK = 65536  # [B] more than any datagram
+_CHUNK = 65536  # [B] more than any datagram
 BACKLOG = 65536  # [B] a slow line may be behind; what is more is dropped
 RECONNECT = 1.0  # [s]
 MOST_STRANGERS = 32  # far ends of one link that are of no known vehicle; the latest are kept
-EXPECTED = 'udpin:HOST:PORT, udpout:HOST:PORT, tcp:HOST:PORT or /dev/tty...:BAUD'
+_EXPECTED = 'udpin:HOST:PORT, udpout:HOST:PORT, tcp:HOST:PORT or /dev/tty...:BAUD'
 
 
 class Link(Protocol):
@@ -82,7 +82,7 @@ class Udp:
         got: list[tuple[Hashable, bytes]] = []
         try:
             while len(got) < 256:
-                data, end = self._socket.recvfrom(CHUNK)
+                data, end = self._socket.recvfrom(_CHUNK)
                 self._hear(end)
                 got.append((end, data))
         except OSError:  # nothing more, or an earlier datagram had no listener
@@ -133,7 +133,7 @@ class Stream:
         if self._file < 0:
             return []
         try:
-            data = os.read(self._file, CHUNK)
+            data = os.read(self._file, _CHUNK)
         except BlockingIOError:
             return []
         except OSError as error:
@@ -236,11 +236,11 @@ def open_link(name: str) -> Link:
             'serial', *name.rsplit(':', 1))
         number = int(port)
     except ValueError:
-        raise InvalidValue('connections', name, EXPECTED) from None
+        raise InvalidValue('connections', name, _EXPECTED) from None
     if kind == 'serial':
         return Serial(name, host, number)
     if kind not in ('udpin', 'udpout', 'tcp') or not 0 <= number <= 65535:
-        raise InvalidValue('connections', name, EXPECTED)
+        raise InvalidValue('connections', name, _EXPECTED)
     if kind == 'tcp':
         return Tcp(name, host, number)
     return Udp(name, host, number, bind=kind == 'udpin')

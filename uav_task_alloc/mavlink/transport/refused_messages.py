@@ -9,7 +9,7 @@ from pathlib import Path
 from uav_task_alloc.mavlink.transport.notes import OperatorNote
 
 MOST_TOLD = 100  # kinds and senders with a line in the log: a flood of them gets no further
-LONGEST = 300  # characters of a reason
+_LONGEST = 300  # characters of a reason
 
 
 class RefusedMessages:
@@ -31,7 +31,7 @@ class RefusedMessages:
             level: of the line in the log.
         """
         self.count += 1
-        self.last = f'{kind} ({sender}): {why[:LONGEST]}'
+        self.last = f'{kind} ({sender}): {why[:_LONGEST]}'
         if (sender, kind) in self._told or len(self._told) > MOST_TOLD:
             return
         self._told.add((sender, kind))

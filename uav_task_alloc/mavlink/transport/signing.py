@@ -11,9 +11,9 @@ from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.mavlink.transport.codec import make_signing
 
 EPOCH = 1420070400  # [s] 2015-01-01, from which timestamps count 10 us
-MOST = 2**48 - 1  # [10 us] what a frame holds
-PERIOD = 5.0  # [s] between writes of the timestamp, which runs ahead by twice that much
-EXPECTED = (f'a whole number in [0, {MOST}]; delete the file if the clock of this computer is '
+_MOST = 2**48 - 1  # [10 us] what a frame holds
+_PERIOD = 5.0  # [s] between writes of the timestamp, which runs ahead by twice that much
+_EXPECTED = (f'a whole number in [0, {_MOST}]; delete the file if the clock of this computer is '
             'right')
 
 
@@ -50,7 +50,7 @@ class SigningClock:
         """
         if now < self._write_at:
             return
-        self._write_at = now + PERIOD
+        self._write_at = now + _PERIOD
         self.heard.timestamp = max(self.heard.timestamp, self._now())
         try:
             self._write()
@@ -64,8 +64,8 @@ class SigningClock:
 
     def _write(self) -> None:
         # ahead, so that what is signed until the next write is not used again after a crash
-        stamp = max(self.heard.timestamp, self.sent.timestamp) + int(2e5 * PERIOD)
-        text = str(min(stamp, MOST))
+        stamp = max(self.heard.timestamp, self.sent.timestamp) + int(2e5 * _PERIOD)
+        text = str(min(stamp, _MOST))
         temporary = self._path.with_name(self._path.name + '.tmp')
         try:
             temporary.write_text(text)
@@ -83,8 +83,8 @@ def read_timestamp(path: Path) -> int:
         return 0
     except OSError as error:
         raise InvalidValue('signing timestamp', str(path), f'a readable file ({error})') from None
-    if not (text.isascii() and text.isdigit() and int(text) <= MOST):
-        raise InvalidValue(f'signing timestamp in {path}', text, EXPECTED)
+    if not (text.isascii() and text.isdigit() and int(text) <= _MOST):
+        raise InvalidValue(f'signing timestamp in {path}', text, _EXPECTED)
     return int(text)
 
 

@@ -17,7 +17,7 @@ from uav_task_alloc.nodes.conversions.messages import (
     to_stamp,
 )
 
-LEFT_OUT = (m.TaskStatus.PENDING, m.TaskStatus.UNASSIGNED)
+_LEFT_OUT = (m.TaskStatus.PENDING, m.TaskStatus.UNASSIGNED)
 
 
 def from_list(uav_list: UavList) -> m.TaskList:
@@ -47,7 +47,7 @@ def from_allocation(allocation: Allocation, lists: list[m.TaskList],
     plan = allocation.plan
     return m.Allocation(
         header=header(allocation.stamp), revision=allocation.revision,
-        lists=lists, unassigned=[s for s in statuses if s.state in LEFT_OUT],
+        lists=lists, unassigned=[s for s in statuses if s.state in _LEFT_OUT],
         fit=float(plan.fit), distance=float(plan.distance), value=float(plan.value),
         penalty=float(plan.penalty),
         solve_time=to_duration(plan.solve_time), iterations=int(plan.iterations),

@@ -10,7 +10,7 @@ from uav_task_alloc.model import check_ros_name
 
 MOST_TASKS = 10_000  # of an announcement
 MOST_POINTS = MOST_ITEMS - 2  # of a list, tasks and detour points; home and return are items too
-MOST_NAMES = 100  # capabilities, and UAVs allowed, of one task or UAV
+_MOST_NAMES = 100  # capabilities, and UAVs allowed, of one task or UAV
 MOST_ZONES = 1000  # of a picture
 MOST_VERTICES = 200  # of a zone; whether its edges cross is a question for each pair
 MOST_CORNERS = 5000  # of all zones of a picture
@@ -26,7 +26,7 @@ def check_count(place: str, many: Sized, most: int) -> None:
 
 def check_words(place: str, words: Sequence[str]) -> frozenset[str]:
     """Free words as a set: not too many, and none too long, blank or unprintable."""
-    check_count(place, words, MOST_NAMES)
+    check_count(place, words, _MOST_NAMES)
     for word in words:
         if not word.strip() or len(word) > LONGEST_TEXT or not word.isprintable():
             raise InvalidValue(place, word, f'1 to {LONGEST_TEXT} printable characters')
@@ -35,7 +35,7 @@ def check_words(place: str, words: Sequence[str]) -> frozenset[str]:
 
 def check_ros_names(place: str, names: Sequence[str]) -> frozenset[str]:
     """ROS names as a set, not too many."""
-    check_count(place, names, MOST_NAMES)
+    check_count(place, names, _MOST_NAMES)
     return frozenset(check_ros_name(place, name) for name in names)
 
 

@@ -18,7 +18,7 @@ from uav_task_alloc.nodes.conversions.messages import LATCHED
 from uav_task_alloc.nodes.ros.topic_names import TASK_LIST, check_topic
 
 SLICE = 0.02  # [s] of lists at once
-REST = 5.0  # times as long as a whole picture took none follows: a sixth of a core at most
+_REST = 5.0  # times as long as a whole picture took none follows: a sixth of a core at most
 
 
 class AllocationPublisher:
@@ -90,7 +90,7 @@ class AllocationPublisher:
             lists = [self._list(each) for each in plan.lists]
             self.allocation.publish(told.from_allocation(plan, lists, self._all_statuses()))
         now = time.monotonic()
-        self.rested = now + REST * (now - began)
+        self.rested = now + _REST * (now - began)
 
     def _publisher(self, uav_id: str) -> Publisher | None:
         """None, and a word why, where there can be no such topic."""

@@ -21,19 +21,19 @@ from uav_task_alloc.nodes.conversions.message_definitions import definition
 from uav_task_alloc.nodes.conversions.messages import ANNOUNCEMENTS, EVENTS, LATCHED, STATES
 from uav_task_alloc.record.bag import Bag
 
-LOOK = 1.0  # [s] between two looks for new topics, and at first between two chunks on disk
+_LOOK = 1.0  # [s] between two looks for new topics, and at first between two chunks on disk
 RARER = 1.0 / 3600.0  # of its age a recording waits for a chunk, as their index is in memory
 RAREST = 10.0  # [s] between two chunks, however old it is
 DEPTH = 1000  # messages that wait for the disk, a topic
-OURS = 'uav_task_alloc_msgs/msg/'
+_OURS = 'uav_task_alloc_msgs/msg/'
 # those whose first message must not be missed; all others as they turn up
-KNOWN = {'task_announcements': (OURS + 'TaskAnnouncement', ANNOUNCEMENTS),
-         'threat_zones': (OURS + 'ThreatZoneArray', LATCHED),
-         'fleet_origin': (OURS + 'FleetOrigin', LATCHED),
-         'task_statuses': (OURS + 'TaskStatusArray', LATCHED),
-         'allocation': (OURS + 'Allocation', LATCHED),
-         'task_events': (OURS + 'TaskEvent', EVENTS),
-         'uav_states': (OURS + 'UavState', STATES)}
+_KNOWN = {'task_announcements': (_OURS + 'TaskAnnouncement', ANNOUNCEMENTS),
+         'threat_zones': (_OURS + 'ThreatZoneArray', LATCHED),
+         'fleet_origin': (_OURS + 'FleetOrigin', LATCHED),
+         'task_statuses': (_OURS + 'TaskStatusArray', LATCHED),
+         'allocation': (_OURS + 'Allocation', LATCHED),
+         'task_events': (_OURS + 'TaskEvent', EVENTS),
+         'uav_states': (_OURS + 'UavState', STATES)}
 
 
 class BagRecorder:
@@ -52,9 +52,9 @@ class BagRecorder:
                          context=context)
         self.within = namespace.rstrip('/') + '/'
         self.known: set[str] = set()  # topics that are recorded, or cannot be
-        for name, (type_name, qos) in KNOWN.items():
+        for name, (type_name, qos) in _KNOWN.items():
             self.record(self.within + name, type_name, qos)
-        self.node.create_timer(LOOK, self.on_look)
+        self.node.create_timer(_LOOK, self.on_look)
         self.began = self.flushed = time.monotonic()
         self.ending = Event()
         self.thread = Thread(target=self.run, name='recorder', daemon=True)

@@ -26,7 +26,7 @@ from launch_ros.substitutions import ExecutableInPackage, FindPackageShare
 from uav_task_alloc.nodes.ros.restart_policy import RestartPolicy, RestartVerdict
 from uav_task_alloc.scenario.node_parameters import Value
 
-PACKAGE = 'uav_task_alloc'
+_PACKAGE = 'uav_task_alloc'
 BRIDGE_END = '15'  # [s] from Ctrl-C to SIGTERM, as the bridge ends after a swap under way
 
 
@@ -54,7 +54,7 @@ def number(context: Any, name: str) -> float | None:
 
 def node(executable: str, *parameters: str | Mapping[str, Value], **more: Any) -> Node:
     """One of this package's executables; parameters are files or values, the last one counts."""
-    return Node(package=PACKAGE, executable=executable, output='screen',
+    return Node(package=_PACKAGE, executable=executable, output='screen',
                 parameters=[each if isinstance(each, str) else typed(each)
                             for each in parameters if each], **more)
 
@@ -128,7 +128,7 @@ def rviz(context: Any, namespace: str = '') -> IncludeLaunchDescription:
             raise ValueError(f'rviz:=true: expected {package} to be installed: {error}') from None
     return IncludeLaunchDescription(
         PythonLaunchDescriptionSource(PathJoinSubstitution(
-            [FindPackageShare(PACKAGE), 'launch', 'rviz.launch.py'])),
+            [FindPackageShare(_PACKAGE), 'launch', 'rviz.launch.py'])),
         launch_arguments={'namespace': namespace}.items())
 
 

@@ -14,7 +14,7 @@ from uav_task_alloc.geometry.frames import Origin, to_enu
 from uav_task_alloc.nodes.conversions.messages import LATCHED
 
 TOPIC = 'fleet_origin'
-SAME = 0.01  # [m] that origins of the same place may differ
+_SAME = 0.01  # [m] that origins of the same place may differ
 MOST = 10  # differing origins that are remembered
 PATIENCE = 3.0  # [s] for the origin of a node that is known but was not heard
 
@@ -31,7 +31,7 @@ class OriginReports:
     def hear(self, other: Origin) -> None:
         """Another node, or oneself, has told its origin."""
         apart = self._apart(other)
-        if apart > SAME and other not in self._differing and len(self._differing) < MOST:
+        if apart > _SAME and other not in self._differing and len(self._differing) < MOST:
             self._differing.append(other)
 
     def left(self, now: float) -> None:

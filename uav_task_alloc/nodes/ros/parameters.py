@@ -18,7 +18,7 @@ from rclpy.parameter import Parameter
 from uav_task_alloc import params
 from uav_task_alloc.errors import InvalidValue
 
-P = TypeVar('P', bound=params.Checked)
+_P = TypeVar('_P', bound=params.Checked)
 _BIG = 1.7e308
 _TYPES = {bool: Parameter.Type.BOOL, int: Parameter.Type.INTEGER, float: Parameter.Type.DOUBLE,
           str: Parameter.Type.STRING}
@@ -50,7 +50,7 @@ def descriptor(spec: Any) -> ParameterDescriptor:
     return described
 
 
-def declare(node: Node, kind: type[P]) -> LiveParameters:
+def declare(node: Node, kind: type[_P]) -> LiveParameters:
     """Declare every field of `kind` on `node`; raise InvalidValue for a bad start value."""
     values = {}
     for spec in fields(kind):

@@ -6,7 +6,7 @@ from rclpy.node import Node
 
 from uav_task_alloc.errors import InvalidValue
 
-LONGEST = 247  # characters of a topic's full name; rcl raises beyond
+_LONGEST = 247  # characters of a topic's full name; rcl raises beyond
 TASK_LIST, PATH = '{}/task_list', '{}/path'
 
 
@@ -22,8 +22,8 @@ def check_topic(node: Node, pattern: str, uav_id: str) -> str:
         InvalidValue: the id is too long for a topic's name in this namespace.
     """
     namespace = node.get_namespace().rstrip('/')
-    most = LONGEST - len(namespace) - 1 - len(pattern.format(''))
+    most = _LONGEST - len(namespace) - 1 - len(pattern.format(''))
     if len(uav_id) > most:
         raise InvalidValue('uav_id', uav_id, f'at most {most} characters in namespace '
-                           f'{namespace or "/"}: a topic has at most {LONGEST}')
+                           f'{namespace or "/"}: a topic has at most {_LONGEST}')
     return pattern.format(uav_id)

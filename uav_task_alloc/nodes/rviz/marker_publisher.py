@@ -19,7 +19,7 @@ from uav_task_alloc.nodes.conversions.path_messages import path
 from uav_task_alloc.nodes.ros.topic_names import PATH, check_topic
 from uav_task_alloc.nodes.rviz.markers import Picture, markers
 
-LOOK = 0.2  # [s] between two looks at what is new
+_LOOK = 0.2  # [s] between two looks at what is new
 MOVED = 1.0  # [s] between two pictures where only UAVs moved
 REST = 20.0  # times as long as a picture took nothing is drawn after it: 5 % of a core at most
 
@@ -39,7 +39,7 @@ class MarkerPublisher:
         self.zones: list[object] = []
         self.places: dict[str, Point] = {}  # of UAVs as drawn
         self.drawn = self.rested = 0.0  # [s] steady clock
-        self.timer = node.create_timer(LOOK, self.on_look)
+        self.timer = node.create_timer(_LOOK, self.on_look)
 
     def close(self) -> None:
         """Draw nothing any more."""

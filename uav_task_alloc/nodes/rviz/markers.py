@@ -21,10 +21,10 @@ from uav_task_alloc.nodes.rviz import zone_markers as zone_bodies
 
 Colour = tuple[float, float, float]
 # readable side by side on RViz's dark ground, also for the colour-blind
-COLOURS: tuple[Colour, ...] = (
+_COLOURS: tuple[Colour, ...] = (
     (0.0, 0.45, 0.7), (0.9, 0.6, 0.0), (0.0, 0.62, 0.45), (0.8, 0.4, 0.7), (0.35, 0.7, 0.9),
     (0.84, 0.37, 0.0))
-STATES: dict[TaskState, Colour] = {  # withdrawn and refused tasks are not drawn
+_STATES: dict[TaskState, Colour] = {  # withdrawn and refused tasks are not drawn
     TaskState.PENDING: (0.7, 0.7, 0.7), TaskState.ASSIGNED: (0.35, 0.7, 0.9),
     TaskState.ACTIVE: (0.95, 0.9, 0.25), TaskState.UNASSIGNED: (0.8, 0.4, 0.7),
     TaskState.FAILED: (0.84, 0.37, 0.0), TaskState.COMPLETED: (0.0, 0.62, 0.45)}
@@ -33,7 +33,7 @@ SIZES = (0.7, 1.0, 1.4, 2.0)  # of a task by its value, in units
 MOST_DONE = 500  # completed tasks drawn, the newest
 MOST_STOPS = 200  # arrows and numbers in all: the next ones of each UAV
 MOST_TEXTS = 200  # labels of tasks left out, and of zones
-LONGEST = 80  # letters of a label
+_LONGEST = 80  # letters of a label
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,7 +67,7 @@ class Sheet:
         marker = Marker(header=self.header, ns=space, id=number, type=kind, action=Marker.ADD,
                         color=ColorRGBA(r=red, g=green, b=blue, a=alpha),
                         scale=Vector3(x=size, y=size, z=size),
-                        points=[to_point(point) for point in points], text=text[:LONGEST])
+                        points=[to_point(point) for point in points], text=text[:_LONGEST])
         marker.pose.orientation.w = 1.0
         if at is not None:
             marker.pose.position = to_point(at)
@@ -93,7 +93,7 @@ def markers(picture: Picture) -> MarkerArray:
     lists = sorted(picture.lists, key=lambda each: each.uav)
     uavs = picture.uavs or {}
     stops = max(1, MOST_STOPS // max(1, sum(bool(each.stops) for each in lists)))
-    colours = {uav_id: COLOURS[k % len(COLOURS)] for k, uav_id in enumerate(
+    colours = {uav_id: _COLOURS[k % len(_COLOURS)] for k, uav_id in enumerate(
         sorted({*uavs, *(each.uav for each in lists)}))}
     for each in lists:
         _route(sheet, each, uavs.get(each.uav), colours[each.uav], stops)
@@ -122,13 +122,13 @@ def _tasks(sheet: Sheet, records: Sequence[TaskRecord]) -> None:
         size = min(len(SIZES) - 1, int(len(SIZES) * (record.task.value / most)))
         groups.setdefault((record.state, size), []).append(record.task.position)
     for (state, size), points in groups.items():
-        if state in STATES:
-            sheet.add('tasks', Marker.SPHERE_LIST, STATES[state], SIZES[size], points=points,
+        if state in _STATES:
+            sheet.add('tasks', Marker.SPHERE_LIST, _STATES[state], SIZES[size], points=points,
                       alpha=0.4 if state is TaskState.COMPLETED else 1.0)
     left = [record for record in open_ones if record.state is TaskState.UNASSIGNED]
     for record in left[:MOST_TEXTS]:
         sheet.label('left_out', f'{record.task.id}: {record.reason}', record.task.position,
-                    STATES[TaskState.UNASSIGNED])
+                    _STATES[TaskState.UNASSIGNED])
 
 
 def _route(sheet: Sheet, uav_list: UavList, uav: UavRecord | None, colour: Colour,

@@ -50,7 +50,7 @@ def shape(marker: Marker, zone: ThreatZone) -> Marker:
     marker.type = Marker.TRIANGLE_LIST
     if zone.shape is Shape.HEMISPHERE:
         _place(marker, zone.center, (width, width, width))
-        marker.points = DOME
+        marker.points = _DOME
     else:  # around its own middle: a GPU counts in 32 bits
         from uav_task_alloc.geometry.zones import outline  # brings the compiler along
         _place(marker, (x, y, low), (1.0, 1.0, 1.0))
@@ -118,4 +118,4 @@ def _dome() -> list[PointMsg]:
     return corners
 
 
-DOME = _dome()
+_DOME = _dome()

@@ -18,8 +18,8 @@ from uav_task_alloc.sim.stored_item import (
     to_message,
 )
 
-RETRY = 1.0  # [s] between requests for the same item
-GIVE_UP = 8.0  # [s] without an item
+_RETRY = 1.0  # [s] between requests for the same item
+_GIVE_UP = 8.0  # [s] without an item
 _ALL = dialect.MAV_MISSION_TYPE_ALL
 
 
@@ -66,10 +66,10 @@ class ArduPilotMission(MissionService):
         self.load()
         if self._peer is None:
             return
-        if now - self._heard > GIVE_UP:
+        if now - self._heard > _GIVE_UP:
             self._send_ack(self._peer, dialect.MAV_MISSION_OPERATION_CANCELLED)
             self._peer = None
-        elif now - self._asked > RETRY:
+        elif now - self._asked > _RETRY:
             self._ask(now)
 
     def _ask(self, now: float) -> None:

@@ -21,8 +21,8 @@ from uav_task_alloc.sim.stored_item import (
     to_message,
 )
 
-RETRY = 0.25  # [s] between requests for the same item
-GIVE_UP = 5.0  # [s] without a word
+_RETRY = 0.25  # [s] between requests for the same item
+_GIVE_UP = 5.0  # [s] without a word
 _ALL = dialect.MAV_MISSION_TYPE_ALL
 
 
@@ -80,9 +80,9 @@ class Px4Mission(MissionService):
     def step(self, now: float) -> None:
         if self._state is _State.IDLE:
             return
-        if now - self._heard > GIVE_UP:
+        if now - self._heard > _GIVE_UP:
             self._state = _State.IDLE
-        elif self._state is _State.GETLIST and now - self._asked > RETRY:
+        elif self._state is _State.GETLIST and now - self._asked > _RETRY:
             self._ask(now)
 
     def _ask(self, now: float) -> None:

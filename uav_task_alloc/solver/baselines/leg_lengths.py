@@ -15,7 +15,7 @@ from uav_task_alloc.solver.problem import Problem
 from uav_task_alloc.solver.routes import Arrays, Floats, Routes, step
 from uav_task_alloc.solver.warm import replay
 
-MOST_TASKS = 2000  # the table takes 8 (n + m)^2 bytes
+_MOST_TASKS = 2000  # the table takes 8 (n + m)^2 bytes
 
 
 class LegLengths(NamedTuple):
@@ -38,8 +38,8 @@ def _fill(a: Arrays, onward: Floats, final: Floats) -> None:
 def all_ways(problem: Problem) -> LegLengths:
     """Find them all. Raises InvalidValue beyond MOST_TASKS."""
     a, n = problem.arrays, len(problem.tasks)
-    if n > MOST_TASKS:
-        raise InvalidValue('tasks', n, f'at most {MOST_TASKS} for this baseline')
+    if n > _MOST_TASKS:
+        raise InvalidValue('tasks', n, f'at most {_MOST_TASKS} for this baseline')
     ways = LegLengths(np.empty((a.ends, n)), np.full((a.ends, a.uavs), np.inf))
     _fill(a, ways.onward, ways.final)
     return ways
