@@ -90,7 +90,7 @@ class World:
         """A new bridge, after a kill -9; `keep`: it has a state_dir."""
         if not keep:
             self.store = Store()
-        self.ground = GroundStation(GcsConfig(origin=ORIGIN, policy=self.policy),
+        self.ground_station = GroundStation(GcsConfig(origin=ORIGIN, policy=self.policy),
                              random.Random(self.rng.random()), self.store)
         self._up, self._ear, self._vehicle_ear = Codec(*BRIDGE), Codec(*BRIDGE), Codec(1, 1)
         self.started_at, self._assigned = self.now, False
@@ -98,8 +98,8 @@ class World:
     @property
     def state(self) -> UavStatus | None:
         """What the bridge tells of the UAV; None where it has not found it."""
-        served = self.ground.served.get(1)
-        return None if served is None else state_of(served, self.now)
+        session = self.ground_station.sessions.get(1)
+        return None if session is None else state_of(session, self.now)
 
     def assign(self, tasks: TaskList) -> None:
         """A list for the UAV, again after a restart of the bridge."""
@@ -107,9 +107,9 @@ class World:
 
     def hand_over(self) -> str:
         """An operator calls the service; returns why it is refused."""
-        if 1 not in self.ground.served:
+        if 1 not in self.ground_station.sessions:
             return 'not found'
-        return self.ground.hand_over('uav_1', 'operator', self.now)
+        return self.ground_station.hand_over('uav_1', 'operator', self.now)
 
     def station(self, message: Message) -> None:
         """Another ground station, on a link of its own."""
@@ -121,10 +121,10 @@ class World:
         self.now += TICK
         self.arrivals, self.sent = [], []
         self._send_down(self.vehicle.step(self.now))
-        self._send_up(self.ground.step(self.now))
-        if self.tasks is not None and not self._assigned and 1 in self.ground.served:
+        self._send_up(self.ground_station.step(self.now))
+        if self.tasks is not None and not self._assigned and 1 in self.ground_station.sessions:
             self._assigned = True
-            self._send_up(self.ground.assign('uav_1', self.tasks, self.now))
+            self._send_up(self.ground_station.assign('uav_1', self.tasks, self.now))
         for way, sent, frame in self.link.due(self.now):
             if way == 'up':
                 for m in self._vehicle_ear.parse(frame):
@@ -133,13 +133,13 @@ class World:
                 for m in self._ear.parse(frame):
                     if m.get_type() == 'HEARTBEAT':
                         self.arrivals.append(sent)
-                    self._send_up(self.ground.receive('link', m, self.now))
+                    self._send_up(self.ground_station.receive('link', m, self.now))
         self.truth = self.vehicle.take_events()
-        for served in self.ground.served.values():
-            while served.pilot.events:
-                self.events.append(served.pilot.events.popleft())
-            while served.pilot.notes:
-                self.notes.append(f'{self.now:.1f} {served.pilot.notes.popleft().text}')
+        for session in self.ground_station.sessions.values():
+            while session.executor.events:
+                self.events.append(session.executor.events.popleft())
+            while session.executor.notes:
+                self.notes.append(f'{self.now:.1f} {session.executor.notes.popleft().text}')
 
     def _send_down(self, messages: list[Message]) -> None:
         for m in messages:

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 pytestmark = pytest.mark.ros
-CUT = Path(__file__).parents[2] / 'benchmarks/cut.py'
+CUT = Path(__file__).parents[2] / 'benchmarks/endurance/cut.py'
 
 
 def test_two_machines_meet_again_after_a_cut_and_nothing_is_lost():

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Two machines and a wire: the allocator in one network namespace, UAV and tasks in another.
 
-Run as root in a sourced shell: `python benchmarks/cut.py --seconds 30`. The wire is cut for so
-long while tasks are announced; the last line is JSON, the status 1 where a task of before or of
+Run as root in a sourced shell: `python benchmarks/endurance/cut.py --seconds 30`. The wire is cut
+for so long while tasks are announced; the last line is JSON, the status 1 where a task of before or of
 the cut is not in the UAV's list after it. Without the right to make namespaces it says `skipped`.
 """
 from __future__ import annotations

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Load of the allocator: 10 000 tasks in one second, 1000 states a second from 200 UAVs.
 
-Run in a sourced shell: `python benchmarks/flood.py`. The node runs with a journal; its callbacks
+Run in a sourced shell: `python benchmarks/endurance/flood.py`. The node runs with a journal; its callbacks
 are timed from within, all else is seen from outside. The last line is JSON; the status is 1 where
 one is missed: p99 of the callbacks 50 ms, states 1 s old, every task acknowledged or refused.
 """

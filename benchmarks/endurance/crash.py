@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Crashes: the allocator is killed at random moments of a busy run; nothing may be lost.
 
-    python benchmarks/crash.py [--kills 200] [--seed 1] [--json]
+    python benchmarks/endurance/crash.py [--kills 200] [--seed 1] [--json]
 
 Run after `colcon build`, in a sourced shell. A made-up fleet here flies the lists, submits tasks
 by service and by topic, withdraws some, switches UAVs off; kill -9 ends the allocator, one kill

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Hours of service over virtual time: tasks arrive, UAVs are lost and return, zones come and go.
 
-Run: `python benchmarks/soak.py --hours 8`. The allocator is the real one with solver and journal,
+Run: `python benchmarks/endurance/soak.py --hours 8`. The allocator is the real one with solver and journal,
 only its clock is virtual; the UAVs fly straight and honestly. The last line is JSON; the status is
 1 where memory grew by more than 5 % (second half against first, after the warm-up), a task has
 neither end nor reason, or a list went back to what it was within 10 s without an event.
