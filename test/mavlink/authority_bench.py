@@ -47,7 +47,7 @@ class AuthorityBench(FlightBench):
         for address, m in outgoing:
             n = self.moved.get(address, address)
             self.sent.append((self.now, does(m), m))
-            assert does(m) in may(self.pilot(n).authority), (self.now, self.authority(n), m)
+            assert does(m) in may(self.executor(n).authority), (self.now, self.authority(n), m)
             super()._up([(n, m)])
 
     def commands(self, since=0):
@@ -56,13 +56,13 @@ class AuthorityBench(FlightBench):
 
     def modes(self, since=0):
         """Custom modes that were commanded."""
-        profile = self.pilot().profile
+        profile = self.executor().profile
         return [profile.commanded_mode(m) for m in self.commands(since)
                 if profile.commanded_mode(m) is not None]
 
     def wants(self, n=1, **changes):
         """The operator sets parameters."""
-        self.pilot(n).policy = replace(self.pilot(n).policy, **changes)
+        self.executor(n).policy = replace(self.executor(n).policy, **changes)
 
     def becomes(self, state, limit=15.0, n=1):
         """Whether it comes to a state."""
@@ -70,18 +70,18 @@ class AuthorityBench(FlightBench):
 
     def dead_for(self, seconds=0.0, store=True):
         """kill -9, and a new bridge after a while; without a store it knows nothing."""
-        self.ground = SimpleNamespace(served={}, step=lambda now: [],
+        self.ground_station = SimpleNamespace(sessions={}, step=lambda now: [],
                                       receive=lambda address, m, now: [])
         self.run(limit=seconds)
         if not store:
             self.store = Store()
         self.start()
-        self.found()
+        self.discover()
 
     def move_address(self, n=1, address='new'):
         """What the vehicle sends comes from elsewhere from now on."""
-        take, self.moved[address] = self.ground.receive, n
-        self.ground.receive = lambda _, m, now: take(address, m, now)
+        take, self.moved[address] = self.ground_station.receive, n
+        self.ground_station.receive = lambda _, m, now: take(address, m, now)
 
 
 def does(m):
@@ -102,7 +102,7 @@ def may(authority):
 
 def flying(kind, names=LONG, **kwargs):
     """HELD, on its way to the first task, and seen in the mission mode."""
-    bench = AuthorityBench(kind, **kwargs).found()
+    bench = AuthorityBench(kind, **kwargs).discover()
     bench.assign(task_list(names))
     assert bench.run(lambda: bench.started() == [names[0]])
     bench.run(limit=2.0)
@@ -115,26 +115,26 @@ def risen_by_pilot(kind, names=LONG, **kwargs):
     bench = AuthorityBench(kind, takeoff=False, **kwargs)
     vehicle = bench.vehicles[1]
     vehicle.rc_mode(MODES[kind].stick)
-    bench.found()
+    bench.discover()
     bench.assign(task_list(names))
-    assert bench.run(lambda: bench.board().state is MissionState.VERIFIED, 20.0)
+    assert bench.run(lambda: bench.onboard().state is MissionState.VERIFIED, 20.0)
     assert vehicle.rc_arm(True)
     vehicle.rc_stick((0.0, 0.0, 3.0))
     bench.run(limit=12.0)
     vehicle.rc_stick(None)
     bench.run(limit=4.0)
-    assert bench.pilot().telemetry.airborne
+    assert bench.executor().telemetry.airborne
     assert bench.authority() is N
     return bench
 
 
 def upload_by_another(bench, n=1, items=1):
     """Another station puts a mission on board."""
-    own = bench.board(n).own
-    bench.tells(d.MAVLink_mission_count_message(n, 1, items + own, 0), n)
+    own = bench.onboard(n).own
+    bench.from_station(d.MAVLink_mission_count_message(n, 1, items + own, 0), n)
     for seq in range(items + own):
         x, y = 473990000 + 9000 * seq, 85460000
-        bench.tells(d.MAVLink_mission_item_int_message(
+        bench.from_station(d.MAVLink_mission_item_int_message(
             n, 1, seq, 5, 16, 0, 1, 0, 0, 0, 0, x, y, 540.0, 0), n)
 
 
@@ -151,7 +151,7 @@ def suspended(kind, cause=Suspension.FAILSAFE, **kwargs):
         bench.run(limit=3.0)
         upload_by_another(bench, items=20)
     assert bench.run(lambda: bench.authority() is S, 20.0)
-    assert bench.pilot().authority.suspended_by(cause)
+    assert bench.executor().authority.suspended_by(cause)
     bench.run(limit=6.5)  # what a vehicle said of its failsafe is old
     assert bench.authority() is S
     return bench
@@ -173,7 +173,7 @@ def in_flight(kind, state, **kwargs):
 def on_ground(kind, state, **kwargs):
     """On the ground, disarmed, past boot, with a list on board, nothing else going on."""
     takeoff = kwargs.pop('takeoff', state is not N)
-    bench = AuthorityBench(kind, takeoff=takeoff, **kwargs).found()
+    bench = AuthorityBench(kind, takeoff=takeoff, **kwargs).discover()
     vehicle = bench.vehicles[1]
     assert bench.run(lambda: bench.authority() is (H if takeoff else N), 20.0)
     if state is S:
@@ -208,7 +208,7 @@ def set_mode(number, kind, n=1):
 
 def shows(bench, state, *words, n=1):
     """UavState and the notes say who has it, why, and what gives it back."""
-    status, authority = bench.state(n), bench.pilot(n).authority
+    status, authority = bench.state(n), bench.executor(n).authority
     assert bench.authority(n) is state
     assert status.authority is state
     for word in words:
@@ -219,21 +219,21 @@ def shows(bench, state, *words, n=1):
         assert status.reason == ''
     elif not status.reason.startswith('its link'):
         assert status.reason == (f'authority {state.name}: {authority.why}; given back by '
-                                 f'{authority.gives_back}')
-        assert authority.gives_back
+                                 f'{authority.given_back_by}')
+        assert authority.given_back_by
     said = [note for note in bench.notes if note.startswith('authority ')]
     if said:
         assert said[-1].startswith(f'authority {state.name}: '), said
         assert state is S or authority.why in said[-1], said[-1]
-        if authority.gives_back:
-            assert said[-1].endswith(f'; given back by {authority.gives_back}')
+        if authority.given_back_by:
+            assert said[-1].endswith(f'; given back by {authority.given_back_by}')
     return True
 
 
 def keeps_quiet(bench, seconds=60.0, names='XYZ', n=1):
     """No command leaves while new lists come, and the state stays."""
     start, state = len(bench.sent), bench.authority(n)
-    tasks = bench.board(n).tasks
+    tasks = bench.onboard(n).tasks
     revision = tasks.revision if tasks else 0
     for more in range(4):
         bench.assign(task_list(names[more % 2:] if more < 3 else '', revision + 1 + more), n)

@@ -14,10 +14,10 @@ from uav_task_alloc_msgs.srv import HandOver
 
 from uav_task_alloc.errors import InvalidValue, UnknownName
 from uav_task_alloc.geometry.frames import Origin
-from uav_task_alloc.mavlink.gcs.authority_store import FileStore, boot_id
+from uav_task_alloc.mavlink.gcs.authority_store import AuthorityFileStore, boot_id
 from uav_task_alloc.mavlink.gcs.ground_station import GcsConfig, GroundStation, VehicleSession
 from uav_task_alloc.mavlink.gcs.policy import Policy
-from uav_task_alloc.mavlink.gcs.status import Told, facts_of, state_of
+from uav_task_alloc.mavlink.gcs.status import PublishedStates, facts_of, state_of
 from uav_task_alloc.mavlink.gcs.telemetry import WANTED
 from uav_task_alloc.mavlink.mission.items import TaskList
 from uav_task_alloc.mavlink.transport.connections import Connections
@@ -77,17 +77,17 @@ class MavlinkBridge(Node):
         self.log = {'info': lambda text: logger.info(text),  # rclpy wants a line each
                     'warning': lambda text: logger.warning(text),
                     'error': lambda text: logger.error(text)}
-        self.store = FileStore(params.state_dir, self.log['error'],
+        self.store = AuthorityFileStore(params.state_dir, self.log['error'],
                                boot_id()) if params.state_dir else None
-        self.ground = GroundStation(self.station, random.Random(time.time_ns()), self.store)
+        self.ground_station = GroundStation(self.station, random.Random(time.time_ns()), self.store)
         self.zones: tuple[ThreatZone, ...] = ()
         self.radio = Connections(
             map(open_link, params.connections), params.system_id, params.component_id,
             wall=time.time, wanted=WANTED, signing_key_file=params.signing_key_file,
             tlog=params.tlog)
-        self.refusals, self.refused = (self.ground.refusals, self.radio.refusals), 0
+        self.refusals, self.refused = (self.ground_station.refusals, self.radio.refusals), 0
         self.lock = threading.Lock()  # of the ground station
-        self.told = Told()
+        self.told = PublishedStates()
         self.lists: dict[str, object] = {}
         self.troubles: dict[str, str] = {}  # logged, by link or topic
         self.states = self.create_publisher(m.UavState, 'uav_states', STATES)
@@ -113,10 +113,10 @@ class MavlinkBridge(Node):
             got, now, out = self.radio.receive(_TICK), time.monotonic(), []
             with self.lock:
                 for address, message in got:
-                    out += self.ground.receive(address, message, now)
+                    out += self.ground_station.receive(address, message, now)
                 if now >= step_at:
-                    out += self.ground.step(now)
-                    self.radio.keep(self.ground.addresses())
+                    out += self.ground_station.step(now)
+                    self.radio.keep(self.ground_station.addresses())
                     self.radio.step(now)
                     step_at = now + _TICK
             self.radio.send(out)
@@ -128,28 +128,28 @@ class MavlinkBridge(Node):
             while refusals.notes:
                 note = refusals.notes.popleft()
                 self.log[note.level](printable(note.text))
-        for served in list(self.ground.served.values()):
+        for session in list(self.ground_station.sessions.values()):
             with self.lock:
-                status = state_of(served, now, self.full_ranges.get(
-                    served.uav_id, self.live.now.full_range))
-            self.tell_events(served)
-            seen = served.pilot.telemetry.position_at
+                status = state_of(session, now, self.full_ranges.get(
+                    session.uav_id, self.live.now.full_range))
+            self.tell_events(session)
+            seen = session.executor.telemetry.position_at
             conflict = self.origins.conflict()
             if conflict:
                 status = replace(status, available=False, reason=conflict)
-            if self.told.is_news(status, seen, now, self.live.now.state_rate):
+            if self.told.is_due(status, seen, now, self.live.now.state_rate):
                 self.states.publish(convert.from_uav_status(
-                    status, self.capabilities.get(served.uav_id, ()), self.stamp() - now + seen))
+                    status, self.capabilities.get(session.uav_id, ()), self.stamp() - now + seen))
 
-    def tell_events(self, served: VehicleSession) -> None:
+    def tell_events(self, session: VehicleSession) -> None:
         """Publish progress, log notes."""
-        pilot = served.pilot
-        while pilot.events:
+        executor = session.executor
+        while executor.events:
             self.task_events.publish(convert.from_progress(
-                served.uav_id, pilot.events.popleft(), self.stamp()))
-        while pilot.notes:
-            note = pilot.notes.popleft()
-            self.log[note.level](printable(f'{served.uav_id}: {note.text}'))
+                session.uav_id, executor.events.popleft(), self.stamp()))
+        while executor.notes:
+            note = executor.notes.popleft()
+            self.log[note.level](printable(f'{session.uav_id}: {note.text}'))
 
     def on_tick(self) -> None:
         """Listen for the lists of UAVs that were found; pass parameters on."""
@@ -161,19 +161,19 @@ class MavlinkBridge(Node):
         policy = policy_of(
             self.live.now, self.zones, (conflict and 'nodes with one origin')
             or ('another bridge, as this one ends' if self.end.asked is not None else ''))
-        for served in list(self.ground.served.values()):
-            served.pilot.policy = policy
-            if served.uav_id not in self.lists:
-                self.log['info'](f'found {served.uav_id}: {served.pilot.profile.name}')
+        for session in list(self.ground_station.sessions.values()):
+            session.executor.policy = policy
+            if session.uav_id not in self.lists:
+                self.log['info'](f'found {session.uav_id}: {session.executor.profile.name}')
                 try:
-                    topic = check_topic(self, TASK_LIST, served.uav_id)
+                    topic = check_topic(self, TASK_LIST, session.uav_id)
                 except InvalidValue as error:
-                    self.lists[served.uav_id] = None
+                    self.lists[session.uav_id] = None
                     self.log['error'](f'it gets no task lists: {error}')
                     continue
-                self.lists[served.uav_id] = self.create_subscription(
+                self.lists[session.uav_id] = self.create_subscription(
                     m.TaskList, topic,
-                    lambda msg, uav_id=served.uav_id: self.on_list(uav_id, msg), LATCHED)
+                    lambda msg, uav_id=session.uav_id: self.on_list(uav_id, msg), LATCHED)
         self.take_lists()
 
     def on_list(self, uav_id: str, msg: m.TaskList) -> None:
@@ -192,7 +192,7 @@ class MavlinkBridge(Node):
             waiting, self.waiting = self.waiting, {}
             for uav_id, tasks in waiting.items():
                 with self.lock:
-                    out = self.ground.assign(uav_id, tasks, time.monotonic())
+                    out = self.ground_station.assign(uav_id, tasks, time.monotonic())
                 self.radio.send(out)
 
     def on_zones(self, msg: m.ThreatZoneArray) -> None:
@@ -211,7 +211,7 @@ class MavlinkBridge(Node):
         uav_id, operator = cut(request.uav_id), cut(request.operator_name) or 'unnamed'
         try:
             with self.lock:
-                refused = self.ground.hand_over(uav_id, operator, time.monotonic())
+                refused = self.ground_station.hand_over(uav_id, operator, time.monotonic())
         except UnknownName as error:
             refused = str(error)
         response.success = not refused
@@ -226,7 +226,7 @@ class MavlinkBridge(Node):
         with self.lock:
             if self.store is not None:
                 self.store.retry()
-            facts = [(s.uav_id, *facts_of(s, now)) for s in self.ground.served.values()]
+            facts = [(s.uav_id, *facts_of(s, now)) for s in self.ground_station.sessions.values()]
         self.origins.check()
         conflict = self.origins.conflict()
         self.tell_trouble('fleet_origin', conflict and f'refuses to fly new lists: {conflict}')
@@ -270,7 +270,7 @@ class MavlinkBridge(Node):
         """Asked to end: whether a swap under way comes first; no other is begun."""
         first = self.end.asked is None
         with self.lock:
-            fleet = list(self.ground.served.values())
+            fleet = list(self.ground_station.sessions.values())
             waits = self.end.waits(fleet, time.monotonic())
         if first and waits:
             self.log['warning'](f'ends after the swap of {", ".join(swapping(fleet))}')
@@ -278,7 +278,7 @@ class MavlinkBridge(Node):
 
     def destroy_node(self) -> None:
         """Say who is in the air, and stop both threads before what they use is gone."""
-        for words in self.end.words(self.ground.served.values()):
+        for words in self.end.words(self.ground_station.sessions.values()):
             self.log['warning'](words)
         self.closing = True
         self.heartbeat.close()

@@ -15,7 +15,7 @@ import pytest
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.mavlink.gcs import authority_store
 from uav_task_alloc.mavlink.gcs.authority import AuthorityRecord, AuthorityState
-from uav_task_alloc.mavlink.gcs.authority_store import FileStore, boot_id, uav_file_name
+from uav_task_alloc.mavlink.gcs.authority_store import AuthorityFileStore, boot_id, uav_file_name
 
 FULL = AuthorityRecord(
     AuthorityState.HELD,
@@ -35,8 +35,8 @@ WRITER = """
 import sys
 from itertools import count
 from uav_task_alloc.mavlink.gcs.authority import AuthorityRecord, AuthorityState
-from uav_task_alloc.mavlink.gcs.authority_store import FileStore
-store = FileStore(sys.argv[1], print)
+from uav_task_alloc.mavlink.gcs.authority_store import AuthorityFileStore
+store = AuthorityFileStore(sys.argv[1], print)
 for k in count():
     store.save('uav_1', AuthorityRecord(
         AuthorityState.HELD, 'x' * (k % 7 * 1000), float(k), mode=k))
@@ -51,7 +51,7 @@ def said():
 
 @pytest.fixture
 def store(tmp_path, said):
-    return FileStore(str(tmp_path / 'new' / 'folder'), said.append, 'boot')
+    return AuthorityFileStore(str(tmp_path / 'new' / 'folder'), said.append, 'boot')
 
 
 @pytest.mark.parametrize(
@@ -59,7 +59,7 @@ def store(tmp_path, said):
 )
 def test_what_was_saved_is_loaded_after_a_restart(store, tmp_path, said, record):
     store.save('uav_1', record)
-    again = FileStore(str(tmp_path / 'new' / 'folder'), said.append, 'boot')
+    again = AuthorityFileStore(str(tmp_path / 'new' / 'folder'), said.append, 'boot')
     assert again.load('uav_1') == record
     assert again.load('uav_2') is None
     assert said == []
@@ -85,7 +85,7 @@ def test_nothing_but_the_files_of_the_uavs_is_left_in_the_folder(store):
 
 def test_after_a_restart_of_the_computer_a_swap_is_long_ago(store, tmp_path, said):
     store.save('uav_1', FULL)
-    other = FileStore(str(tmp_path / 'new' / 'folder'), said.append, 'other boot')
+    other = AuthorityFileStore(str(tmp_path / 'new' / 'folder'), said.append, 'other boot')
     assert other.load('uav_1') == replace(FULL, since=0.0, swap_at=authority_store.LONG_AGO)
     assert boot_id() == boot_id()
 
@@ -117,7 +117,7 @@ def test_a_killed_bridge_leaves_a_whole_file_at_every_moment(tmp_path, said):
                 if last == 20:
                     writer.send_signal(signal.SIGKILL)
         writer.wait()
-        found = FileStore(str(tmp_path), said.append).load('uav_1')
+        found = AuthorityFileStore(str(tmp_path), said.append).load('uav_1')
         assert found.mode in (last, last + 1)
         assert found.why == 'x' * (found.mode % 7 * 1000)
     assert said == []
@@ -181,7 +181,7 @@ def test_a_folder_that_cannot_be_created_is_refused_at_the_start(tmp_path, said)
     (tmp_path / 'file').write_text('')
     for folder in (tmp_path / 'file', tmp_path / 'file' / 'below'):
         with pytest.raises(InvalidValue, match=r'state_dir = .*expected a folder that can be w'):
-            FileStore(str(folder), said.append)
+            AuthorityFileStore(str(folder), said.append)
 
 
 def changed(change):

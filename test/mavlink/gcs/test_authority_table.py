@@ -7,8 +7,8 @@ from pymavlink.dialects.v20 import ardupilotmega as d
 
 from uav_task_alloc.mavlink.gcs import authority
 from uav_task_alloc.mavlink.gcs.authority import (
-    MAY,
-    TABLE,
+    AUTHORITY_TABLE,
+    PERMISSIONS,
     Authority,
     AuthorityEvent,
     AuthorityRecord,
@@ -18,7 +18,7 @@ from uav_task_alloc.mavlink.gcs.authority import (
     Suspension,
     table_text,
 )
-from uav_task_alloc.mavlink.gcs.send_gate import action_of, allowed
+from uav_task_alloc.mavlink.gcs.send_gate import action_of, allowed_messages
 
 E = AuthorityEvent
 N, H, S, L = (
@@ -83,13 +83,13 @@ def test_each_event_makes_of_each_state_what_the_table_says(event, column):
     else:
         assert changed
         assert (made.why, made.since) == ('because', 5.0)
-    if TABLE[event].of(before[0]) is None:
+    if AUTHORITY_TABLE[event].next_state(before[0]) is None:
         assert not changed
         assert (made.state, made.why, made.since, made.hold) == before
 
 
 def test_the_table_has_a_row_for_each_event_and_each_suspension_has_an_end():
-    assert set(TABLE) == set(AuthorityEvent) == set(CELLS)
+    assert set(AUTHORITY_TABLE) == set(AuthorityEvent) == set(CELLS)
     assert set(authority._SUSPENDS.values()) == set(Suspension) - {Suspension.RESTART}
     assert set(authority._ENDS.values()) == set(Suspension) == set(authority._GIVES_BACK)
 
@@ -104,16 +104,16 @@ def test_suspended_for_two_causes_it_is_held_again_only_after_the_end_of_both(fi
     made = suspended(first[1], second[1])
     words = [authority._GIVES_BACK[authority._SUSPENDS[each]] for each in (first[1], second[1])]
     assert made.why == f'{first[1].name}; {second[1].name}'
-    assert made.gives_back == ' and '.join(words)
+    assert made.given_back_by == ' and '.join(words)
     made.apply(first[0], 2.0)
     assert made.state is S
-    assert (made.why, made.gives_back) == (second[1].name, words[1])
+    assert (made.why, made.given_back_by) == (second[1].name, words[1])
     made.apply(first[0], 3.0)
     assert made.state is S
     made.apply(second[0], 4.0)
     assert made.state is H
     assert made.suspensions == {}
-    assert made.gives_back == ''
+    assert made.given_back_by == ''
 
 
 def test_the_same_suspension_twice_needs_one_end():
@@ -151,7 +151,7 @@ def test_after_a_kill_nothing_but_a_hand_over_gives_it_back(state):
         if event is not E.HAND_OVER:
             made.apply(event, 3.0)
             assert (made.state, made.killed, made.why) == (L, True, 'killed')
-    assert made.gives_back == '~/hand_over, on the ground and disarmed'
+    assert made.given_back_by == '~/hand_over, on the ground and disarmed'
     assert made.apply(E.HAND_OVER, 4.0)
     assert (made.held, made.killed) == (True, False)
 
@@ -169,10 +169,11 @@ def test_a_kill_is_kept_over_a_restart():
 def test_who_gets_it_in_flight_holds_first(state, event, hold):
     made = machine(state)
     made.apply(event, 1.0)
-    assert made.hold is (HoldStage.NO if TABLE[event].of(state) is None else hold)
+    due = HoldStage.NO if AUTHORITY_TABLE[event].next_state(state) is None else hold
+    assert made.hold is due
     made.apply(E.LINK_STALE, 2.0)
     assert made.hold is (
-        HoldStage.NO if TABLE[event].of(state) is None else hold
+        HoldStage.NO if AUTHORITY_TABLE[event].next_state(state) is None else hold
     )  # it is still due
     made.apply(E.TAKEN, 3.0)
     assert made.hold is HoldStage.NO
@@ -187,12 +188,12 @@ def test_a_grant_on_the_ground_needs_no_hold():
 def test_after_a_landing_of_ours_it_is_given_back_by_a_hand_over_only():
     made = machine(H)
     made.apply(E.OWN_LANDING, 1.0)
-    assert (made.state, made.landed, made.gives_back) == (N, True, '~/hand_over')
+    assert (made.state, made.landed, made.given_back_by) == (N, True, '~/hand_over')
     made.apply(E.HAND_OVER, 2.0)
     assert not made.landed
     made.apply(E.WITHDRAWN, 3.0)
     assert not made.landed
-    assert made.gives_back.startswith('takeoff: true on the ground, ')
+    assert made.given_back_by.startswith('takeoff: true on the ground, ')
 
 
 def test_takeoff_withdrawn_in_the_air_counts_until_it_is_taken_or_lands():
@@ -232,7 +233,7 @@ SENT = {
 def test_each_state_allows_what_the_table_says(state):
     made = machine(state)
     assert {action for action in SendAction if made.allows(action)} == SENT[state] == set(
-        MAY[state][1])
+        PERMISSIONS[state][1])
 
 
 def test_while_it_is_not_known_who_has_it_and_beside_a_foreign_mission_only_reading_is_allowed():
@@ -282,7 +283,7 @@ class Watch:
     def __init__(self, made):
         self.authority, self.commands = made, []
 
-    def sent(self, message, now):
+    def record_command(self, message, now):
         self.commands.append(message)
 
 
@@ -291,7 +292,7 @@ def test_the_gate_lets_pass_what_the_state_allows_in_order_and_records_commands(
     commands = [command(getattr(d, 'MAV_CMD_' + name)) for name in KNOWN_COMMANDS]
     commands.append(d.MAVLink_mission_set_current_message(1, 1, 2))
     watch = Watch(machine(state))
-    out = allowed([*commands, *UPLOADS, *READS], watch, 1.0)
+    out = allowed_messages([*commands, *UPLOADS, *READS], watch, 1.0)
     assert out == [*(commands if SendAction.COMMAND in SENT[state] else []),
                    *(UPLOADS if SendAction.UPLOAD in SENT[state] else []),
                    *(READS if SendAction.READ in SENT[state] else [])]
@@ -305,7 +306,7 @@ def test_the_drawn_table_has_each_state_each_event_and_each_cell():
     for state in (N, H, S, L):
         assert sum(line.startswith(f'| {state.name} |') for line in lines) == 1
     rows = {line.split(' | ')[0].removeprefix('| '): line for line in lines}
-    for event, row in TABLE.items():
+    for event, row in AUTHORITY_TABLE.items():
         cells = rows[event.value].strip('| ').split(' | ')[1:5]
         for cell, target in zip(cells, (row.held, row.suspended, row.lost, row.none),
                                 strict=True):

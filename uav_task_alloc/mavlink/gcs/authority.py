@@ -91,7 +91,7 @@ class AuthorityRow:
     none: AuthorityState | None
     note: str = ''  # what else it means, for the drawn table
 
-    def of(self, state: AuthorityState) -> AuthorityState | None:
+    def next_state(self, state: AuthorityState) -> AuthorityState | None:
         return {
             AuthorityState.HELD: self.held,
             AuthorityState.SUSPENDED: self.suspended,
@@ -107,7 +107,7 @@ _N, _H, _S, _L = (
     AuthorityState.LOST,
 )
 E = AuthorityEvent
-TABLE: dict[AuthorityEvent, AuthorityRow] = {
+AUTHORITY_TABLE: dict[AuthorityEvent, AuthorityRow] = {
     E.GRANTED: AuthorityRow(
         _H, None, None, _H, 'toggling the parameter gives nothing back that was lost'
     ),
@@ -143,7 +143,7 @@ TABLE: dict[AuthorityEvent, AuthorityRow] = {
     E.FOREIGN_OVER: AuthorityRow(_H, _H, None, None),
     E.HAND_OVER: AuthorityRow(_H, None, _H, _H, 'hold first; refused while SUSPENDED'),
 }
-MAY = {
+PERMISSIONS = {
     AuthorityState.NONE: (
         'never granted, or landed',
         frozenset({SendAction.READ, SendAction.UPLOAD}),
@@ -237,7 +237,7 @@ class Authority:
         """Whether this may be sent now."""
         if self.undecided or set(self.suspensions) == {Suspension.FOREIGN}:
             return action is SendAction.READ  # else nobody would see a foreign mission end
-        return self.state in MAY and action in MAY[self.state][1]
+        return self.state in PERMISSIONS and action in PERMISSIONS[self.state][1]
 
     @property
     def held(self) -> bool:
@@ -257,7 +257,7 @@ class Authority:
         Returns:
             Whether the state or its cause has changed.
         """
-        target = TABLE[event].of(self.state)
+        target = AUTHORITY_TABLE[event].next_state(self.state)
         if target is None or (
             self.killed and target is AuthorityState.HELD and event not in _UNLOCKS
         ):
@@ -313,7 +313,7 @@ class Authority:
         return True
 
     @property
-    def gives_back(self) -> str:
+    def given_back_by(self) -> str:
         """What would give the aircraft to the bridge, in words; '' where it has it."""
         if self.state is AuthorityState.LOST:
             if self.killed:
@@ -329,11 +329,11 @@ class Authority:
 def table_text() -> str:
     """The two tables as Markdown, for docs/mavlink.md."""
     lines = ['| state | what it means | what the bridge may send |', '|---|---|---|']
-    for state, (meaning, actions) in MAY.items():
+    for state, (meaning, actions) in PERMISSIONS.items():
         sent = '; '.join(a.value for a in SendAction if a in actions) or 'nothing'
         lines.append(f'| {state.name} | {meaning} | {sent} |')
     lines += ['', '| event | HELD | SUSPENDED | LOST | NONE | |', '|---|---|---|---|---|---|']
-    for event, row in TABLE.items():
+    for event, row in AUTHORITY_TABLE.items():
         cells = (row.held, row.suspended, row.lost, row.none)
         names = ' | '.join('same' if cell is None else cell.name for cell in cells)
         lines.append(f'| {event.value} | {names} | {row.note} |')

@@ -42,7 +42,7 @@ def uav_file_name(uav_id: str) -> str:
     return f'authority_{name}.json'
 
 
-class FileStore:
+class AuthorityFileStore:
     """An `AuthorityStore` on disk.
 
     Args:

@@ -14,7 +14,7 @@ from uav_task_alloc.mavlink.gcs.authority import (
     AuthorityRecord,
     TaskMark,
 )
-from uav_task_alloc.mavlink.gcs.authority_record import AuthorityRecorder
+from uav_task_alloc.mavlink.gcs.authority_recorder import AuthorityRecorder
 from uav_task_alloc.mavlink.gcs.authority_watch_state import AuthorityWatchState
 from uav_task_alloc.mavlink.gcs.bridge_restart import BridgeRestart
 from uav_task_alloc.mavlink.gcs.hand_over import HandOver
@@ -82,7 +82,7 @@ class AuthorityWatch:
 
     # what the vehicle shows
 
-    def heartbeat(self, message: Message, now: float) -> None:
+    def receive_heartbeat(self, message: Message, now: float) -> None:
         """Take the newest HEARTBEAT of the autopilot."""
         state = self._state
         before, was_armed, descends = state.mode, state.armed, self._arming.descends()
@@ -102,11 +102,11 @@ class AuthorityWatch:
         check_status(state, now)
         self._keep()
 
-    def answered(self, message: Message, frame: int) -> None:
+    def receive_command_ack(self, message: Message, frame: int) -> None:
         """Take a COMMAND_ACK that is addressed to us, and the number of its frame."""
         self._state.sent.answered(message, frame)
 
-    def text(self, message: Message, now: float) -> None:
+    def receive_status_text(self, message: Message, now: float) -> None:
         """Take a STATUSTEXT: it may say why the mode changes."""
         if self._state.texts.receive(message, now):
             self._state.apply(AuthorityEvent.KILLED, now, f'the vehicle says: {message.text}')
@@ -124,22 +124,22 @@ class AuthorityWatch:
         check_foreign(self._state, foreign, now)
         self._keep()
 
-    def new_address(self, now: float) -> None:
+    def address_changed(self, now: float) -> None:
         """It speaks from elsewhere: the same vehicle, or another one with its id."""
         self._link.new_address(now)
 
-    def rebooted(self, now: float) -> None:
+    def vehicle_rebooted(self, now: float) -> None:
         """Its clock went back."""
         self._link.rebooted(now)
         self._keep()
 
-    def mark(self, task: str, place: Point | None, flown: bool, now: float) -> None:
+    def mark_task(self, task: str, place: Point | None, flown: bool, now: float) -> None:
         """A task was flown, or passed over: a restarted bridge could not see which."""
         self._record.mark(task, place, flown, now)
 
     # what we do
 
-    def sent(self, message: Message, now: float) -> None:
+    def record_command(self, message: Message, now: float) -> None:
         """A command is about to be sent: written down before it is."""
         if message.get_type() != 'COMMAND_LONG':
             return

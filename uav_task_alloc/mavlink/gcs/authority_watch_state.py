@@ -64,7 +64,7 @@ class AuthorityWatchState:
 
     def returns(self, mode: int | None) -> bool:
         """Whether a mode takes it home."""
-        return mode is not None and self.profile.flight(mode) is ModeFunction.RETURN
+        return mode is not None and self.profile.mode_function(mode) is ModeFunction.RETURN
 
     @property
     def booting(self) -> bool:
@@ -102,7 +102,7 @@ class AuthorityWatchState:
             self.swap_at = (
                 now if state in (AuthorityState.HELD, AuthorityState.SUSPENDED) else None
             )
-        back = self.authority.gives_back
+        back = self.authority.given_back_by
         self.notes.append(
             OperatorNote(
                 'info' if state in (AuthorityState.HELD, AuthorityState.NONE) else 'warning',

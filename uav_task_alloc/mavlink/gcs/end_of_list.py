@@ -10,7 +10,7 @@ from uav_task_alloc.mavlink.gcs.authority_watch import AuthorityWatch
 from uav_task_alloc.mavlink.gcs.command_sender import CommandSender, NextMessages
 from uav_task_alloc.mavlink.gcs.onboard_mission import OnboardMission
 from uav_task_alloc.mavlink.gcs.policy import Policy
-from uav_task_alloc.mavlink.gcs.return_path import zone_in_the_way
+from uav_task_alloc.mavlink.gcs.return_path import zone_across_path
 from uav_task_alloc.mavlink.gcs.telemetry import Telemetry
 from uav_task_alloc.mavlink.mission.items import TaskList, all_alike
 from uav_task_alloc.mavlink.transport.notes import OperatorNote
@@ -23,14 +23,14 @@ class EndOfList:
 
     def __init__(
         self,
-        helm: CommandSender,
+        sender: CommandSender,
         telemetry: Telemetry,
-        board: OnboardMission,
+        onboard: OnboardMission,
         watch: AuthorityWatch,
         policy: Callable[[], Policy],
         notes: deque[OperatorNote],
     ) -> None:
-        self._helm, self._telemetry, self._board = helm, telemetry, board
+        self._sender, self._telemetry, self._onboard = sender, telemetry, onboard
         self._watch, self._policy, self._notes = watch, policy, notes
         self.going_home = False  # by a list without tasks
         self.alarm = ''  # what a human has to see to
@@ -55,23 +55,23 @@ class EndOfList:
                 'error', f'held for {SWAP_HOLD:g} s for an upload that does not end: returns'
             )
         )
-        return self._helm.set_mode(ModeFunction.RETURN, now)
+        return self._sender.set_mode(ModeFunction.RETURN, now)
 
     def empty(self, now: float) -> NextMessages:
         """Nothing to fly: hold or return, and keep what is on board."""
-        board, telemetry, helm = self._board, self._telemetry, self._helm
-        end, tasks = board.wanted(), board.remaining()  # less what cannot be an item
+        onboard, telemetry, sender = self._onboard, self._telemetry, self._sender
+        end, tasks = onboard.wanted(), onboard.remaining()  # less what cannot be an item
         self.going_home = False
         if tasks.stops:
             return None
-        rest = (board.held or ())[board.progress.current or 0:]
-        if not board.progress.pending:
-            board.revision = tasks.revision
-        flying = telemetry.flight is ModeFunction.MISSION and not board.progress.finished
+        rest = (onboard.held or ())[onboard.progress.current or 0:]
+        if not onboard.progress.pending:
+            onboard.revision = tasks.revision
+        flying = telemetry.mode is ModeFunction.MISSION and not onboard.progress.finished
         if flying and end and rest and all_alike(end[-len(rest):], rest):
             self.going_home = True
-            return helm.content()
-        if board.progress.pending or not telemetry.airborne or helm.resting(now) or (
+            return sender.satisfied()
+        if onboard.progress.pending or not telemetry.airborne or sender.backing_off(now) or (
                 not self._watch.authority.held):
             return []
         return self._end(tasks, flying, now)
@@ -79,15 +79,15 @@ class EndOfList:
     def _end(self, tasks: TaskList, flying: bool, now: float) -> NextMessages:
         telemetry = self._telemetry
         returns = tasks.returns or self._policy().when_empty == 'return'
-        if tasks.end_via and tasks.returns and telemetry.flight is not ModeFunction.RETURN:
+        if tasks.end_via and tasks.returns and telemetry.mode is not ModeFunction.RETURN:
             self.going_home = True
             return None  # the plain way home leads through a zone: fly the list of it
         blocked = self._blocked_home() if returns else ''
-        if blocked and telemetry.flight is not ModeFunction.RETURN:
+        if blocked and telemetry.mode is not ModeFunction.RETURN:
             returns = False
-            self._helm.wait(f'a way home: {blocked}')
-        if flying or (returns and telemetry.flight in (ModeFunction.HOLD, ModeFunction.MISSION)):
-            return self._helm.set_mode(ModeFunction.RETURN if returns else ModeFunction.HOLD, now)
+            self._sender.wait(f'a way home: {blocked}')
+        if flying or (returns and telemetry.mode in (ModeFunction.HOLD, ModeFunction.MISSION)):
+            return self._sender.set_mode(ModeFunction.RETURN if returns else ModeFunction.HOLD, now)
         return []
 
     def _blocked_home(self) -> str:
@@ -95,5 +95,5 @@ class EndOfList:
         telemetry, zones = self._telemetry, self._policy().zones
         if telemetry.home is None or not telemetry.has_position:
             return 'its way home is not known' if zones else ''
-        zone = zone_in_the_way(telemetry.position, telemetry.home, zones)
+        zone = zone_across_path(telemetry.position, telemetry.home, zones)
         return f'zone {zone.id} is on its way home' if zone else ''

@@ -26,7 +26,7 @@ from uav_task_alloc.mavlink.gcs.mission_evidence import MissionEvidence
 from uav_task_alloc.mavlink.gcs.onboard_mission import OnboardMission
 from uav_task_alloc.mavlink.gcs.policy import Policy
 from uav_task_alloc.mavlink.gcs.resume import MEMORY
-from uav_task_alloc.mavlink.gcs.send_gate import allowed
+from uav_task_alloc.mavlink.gcs.send_gate import allowed_messages
 from uav_task_alloc.mavlink.gcs.status_text_log import StatusTextLog
 from uav_task_alloc.mavlink.gcs.takeoff import Takeoff
 from uav_task_alloc.mavlink.gcs.task_events import passed_over, task_events
@@ -51,10 +51,10 @@ class MissionExecutor:
                  save: Callable[[AuthorityRecord], None] = lambda record: None) -> None:
         self.profile, self.policy, self._peer = profile, policy, peer
         self.telemetry = Telemetry(profile, origin, now)
-        self.board = OnboardMission(peer, profile, origin, self.telemetry, rng)
-        self.helm = CommandSender(peer, profile, self.telemetry)
-        self.board.list.leg.place = self._leg_begins
-        evidence = MissionEvidence(self.board, self.telemetry)
+        self.onboard = OnboardMission(peer, profile, origin, self.telemetry, rng)
+        self.sender = CommandSender(peer, profile, self.telemetry)
+        self.onboard.list.leg.place = self._leg_begins
+        evidence = MissionEvidence(self.onboard, self.telemetry)
         self.watch = AuthorityWatch(profile, self.telemetry, evidence, lambda: self.policy,
                                     now, record, save)
         self.authority = self.watch.authority
@@ -65,26 +65,26 @@ class MissionExecutor:
         self._reminder = EventRetry()
         self._restarts = 0
         self._texts = StatusTextLog()
-        take_off = Takeoff(self.helm, self.telemetry, self.board, self.authority,
+        take_off = Takeoff(self.sender, self.telemetry, self.onboard, self.authority,
                            lambda: self.policy)
-        self._ending = EndOfList(self.helm, self.telemetry, self.board, self.watch,
+        self._ending = EndOfList(self.sender, self.telemetry, self.onboard, self.watch,
                                     lambda: self.policy, self.notes)
-        fly_list = ListExecution(self.helm, self.telemetry, self.board, self.watch, profile,
+        fly_list = ListExecution(self.sender, self.telemetry, self.onboard, self.watch, profile,
                            self._ending, self._texts)
         if record is not None:
-            self.board.recall.known = record.mission, record.current
+            self.onboard.resume.known = record.mission, record.current
             # the current item may be of the mission before, or set by whoever had it
-            self.board.recall.doubtful = (
+            self.onboard.resume.doubtful = (
                 record.swap_at is not None and not profile.atomic) or (
                 record.state is who.AuthorityState.LOST
-                and profile.flight(record.mode or 0) is not ModeFunction.MISSION)
+                and profile.mode_function(record.mode or 0) is not ModeFunction.MISSION)
         for mark in self.watch.marks.values():
             if mark.flown:
-                self.board.recall.told.add(mark.task)
+                self.onboard.resume.told.add(mark.task)
             else:
-                self.board.recall.unflown[mark.task] = mark[1:4]
+                self.onboard.resume.unflown[mark.task] = mark[1:4]
         self._rules = (
-            self._linked, self._authority, self.helm.finish, take_off.lift, self._upload,
+            self._linked, self._authority, self.sender.finish, take_off.lift, self._upload,
             self._read, self._has_list, self._place, self._may_act, self._hold_first,
             self._ending.held_too_long, self._ending.empty, fly_list.bring, take_off.rise,
             fly_list.fly)
@@ -101,88 +101,88 @@ class MissionExecutor:
 
     def assign(self, tasks: TaskList, now: float) -> list[Message]:
         """The latest list for this UAV; an older one that comes late is ignored."""
-        if self.board.tasks is not None and tasks.revision < self.board.tasks.revision:
+        if self.onboard.tasks is not None and tasks.revision < self.onboard.tasks.revision:
             self.notes.append(
                 OperatorNote(
                     'warning',
                     f'task_list: revision = {tasks.revision}: expected '
-                    f'at least {self.board.tasks.revision}: ignored',
+                    f'at least {self.onboard.tasks.revision}: ignored',
                 )
             )
             return []
-        if self.board.tasks is None and tasks.revision > 1:  # else all of it is new
+        if self.onboard.tasks is None and tasks.revision > 1:  # else all of it is new
             for mark in self.watch.marks.values():
                 if mark.flown and now - mark.at < MEMORY:
-                    self.board.progress.completed[mark.task] = mark[1:4]
-        self.board.list.assign(tasks)
-        for task in filter(self.board.list.fly_anew, self._reminder.answered()):
+                    self.onboard.progress.completed[mark.task] = mark[1:4]
+        self.onboard.list.assign(tasks)
+        for task in filter(self.onboard.list.fly_anew, self._reminder.answered()):
             self.notes.append(
                 OperatorNote('info', f'{task} was announced anew: it is flown once more')
             )
-        self._reminder.listed(self.board.list.told_before(), now)
-        self.helm.encourage(now)
+        self._reminder.listed(self.onboard.list.told_before(), now)
+        self.sender.clear_backoff(now)
         return self._gate(self._act(now), now)
 
-    def relieve(self, tasks: Sequence[Task], other: str) -> None:
+    def drop_flown(self, tasks: Sequence[Task], other: str) -> None:
         """Tasks of the list that another UAV has flown before we listened."""
         for task in tasks:
             self.notes.append(OperatorNote('info', f'{task.id} was flown by {other}, unheard'))
-        self.board.progress.caught_up(tasks)
+        self.onboard.progress.caught_up(tasks)
 
     def hand_over(self, operator: str, now: float) -> str:
         """An operator gives the aircraft to the bridge; returns why not, '' where it has it."""
         refusal = self.watch.hand_over(operator, now)
         if not refusal:
-            self.helm.encourage(now)
+            self.sender.clear_backoff(now)
         self._report(now)
         return refusal
 
     def moved_address(self, now: float) -> None:
         """It speaks from a new address: it, or another vehicle with the same id."""
-        self.watch.new_address(now)
+        self.watch.address_changed(now)
         self.telemetry.restart()
         self._restarts = self.telemetry.restarts
         self._begin_anew(now)
 
     def receive(self, message: Message, now: float) -> list[Message]:
         """Take any message of this vehicle."""
-        flight = self.telemetry.flight
+        flight = self.telemetry.mode
         newest = self.telemetry.receive(message, now)
         if self.telemetry.restarts != self._restarts:
             self._restarts = self.telemetry.restarts
             self.notes.append(OperatorNote('warning', 'was restarted'))
-            self.watch.rebooted(now)
+            self.watch.vehicle_rebooted(now)
             self._begin_anew(now)
-            self.board.recall.rebooted()
+            self.onboard.resume.rebooted()
         if message.get_type() == 'HEARTBEAT' and newest:
-            self.watch.heartbeat(message, now)
+            self.watch.receive_heartbeat(message, now)
             if (
                 flight is ModeFunction.MISSION
-                and self.telemetry.flight is not ModeFunction.MISSION
+                and self.telemetry.mode is not ModeFunction.MISSION
             ):
-                self.board.progress.stopped()
-        out = self.board.receive(message, now)
-        self.helm.receive(message)
+                self.onboard.progress.stopped()
+        out = self.onboard.receive(message, now)
+        self.sender.receive(message)
         if message.get_type() == 'COMMAND_ACK' and self._peer.says(message):
-            self.watch.answered(message, self.telemetry.frame)
+            self.watch.receive_command_ack(message, self.telemetry.frame)
         self._progress(message, newest, now)
         return self._gate(out + self._act(now), now)
 
     def step(self, now: float) -> list[Message]:
         """Let time pass."""
         self.events += self._reminder.step(now)
-        self.board.progress.step(now)
-        out = self.board.step(now) + self._rates.step(now)
+        self.onboard.progress.step(now)
+        out = self.onboard.step(now) + self._rates.step(now)
         return self._gate(out + self._act(now), now)
 
     def _gate(self, messages: list[Message], now: float) -> list[Message]:
         """The one way out: what authority does not allow is not sent, retries included."""
-        return allowed(messages, self.watch, now)
+        return allowed_messages(messages, self.watch, now)
 
     def _act(self, now: float) -> list[Message]:
         out: list[Message] = []
         self.watch.step(now)
-        self.board.catch_up(now)
+        self.onboard.catch_up(now)
         for rule in self._rules:
             step = rule(now)
             if step is not None:
@@ -192,42 +192,42 @@ class MissionExecutor:
         return out
 
     def _report(self, now: float) -> None:
-        board = self.board
-        self.events += task_events(board, self.watch, now)
-        self.notes += passed_over(board, self.watch, now)
-        for notes in (self.watch.notes, board.notes, board.list.notes, self.helm.notes):
+        onboard = self.onboard
+        self.events += task_events(onboard, self.watch, now)
+        self.notes += passed_over(onboard, self.watch, now)
+        for notes in (self.watch.notes, onboard.notes, onboard.list.notes, self.sender.notes):
             while notes:
                 self.notes.append(notes.popleft())
 
     # What is heard
 
     def _progress(self, message: Message, newest: bool, now: float) -> None:
-        kind, progress, own = message.get_type(), self.board.progress, self.board.own
-        flying = self.telemetry.flight is ModeFunction.MISSION
+        kind, progress, own = message.get_type(), self.onboard.progress, self.onboard.own
+        flying = self.telemetry.mode is ModeFunction.MISSION
         if kind == 'GLOBAL_POSITION_INT':
             self._position(message, newest, now)
         elif kind == 'MISSION_ITEM_REACHED':
-            self.board.reached(message.seq - own, now)
-        elif kind == 'MISSION_CURRENT' and newest and self.board.tells(message):
+            self.onboard.reached(message.seq - own, now)
+        elif kind == 'MISSION_CURRENT' and newest and self.onboard.is_of_known_mission(message):
             seq = max(0, message.seq - own)
-            if self.board.must_jump is None:  # else it is left from the mission before
+            if self.onboard.must_jump is None:  # else it is left from the mission before
                 progress.moved(seq, now, flying, self.telemetry.frame)
             if (message.mission_state == d.MISSION_STATE_COMPLETE and flying
                     and not self.profile.atomic):  # PX4 says so after a take-off too
                 progress.ended(seq, now, self.telemetry.frame)
-            if not self.helm.busy and not self.board.open:
-                self.board.watch(message, now)
+            if not self.sender.busy and not self.onboard.open:
+                self.onboard.watch(message, now)
         elif kind == 'STATUSTEXT':
-            self.watch.text(message, now)
-            self.helm.note_refusal(str(message.text))
-            self.board.list.horizon.note(str(message.text))
+            self.watch.receive_status_text(message, now)
+            self.sender.note_refusal(str(message.text))
+            self.onboard.list.horizon.note(str(message.text))
             note = self._texts.take(message, now)
             self.notes.extend(() if note is None else (note,))
 
     def _position(self, message: Message, newest: bool, now: float) -> None:
         if self.telemetry.has_position:
             place, velocity = self.telemetry.place_of(message)
-            self.board.progress.at(
+            self.onboard.progress.at(
                 PositionSample(message.time_boot_ms * 1e-3, place, velocity), newest, now,
                 self.telemetry.frame)
 
@@ -235,26 +235,26 @@ class MissionExecutor:
         """Where it is, or where the take-off that is due ends; None: not known."""
         telemetry, (x, y, z) = self.telemetry, self.telemetry.position
         home = telemetry.home or telemetry.position
-        if not telemetry.airborne or self.helm.climbing:
+        if not telemetry.airborne or self.sender.climbing:
             z = max(z, home[2] + self.policy.cruise_altitude)
-        return LegStart((x, y, z), home, telemetry.flight is ModeFunction.MISSION) if (
+        return LegStart((x, y, z), home, telemetry.mode is ModeFunction.MISSION) if (
             telemetry.has_position) else None
 
     def _begin_anew(self, now: float) -> None:
-        self.board.restarted()
-        self.helm.reset(now)
+        self.onboard.restarted()
+        self.sender.reset(now)
         self._rates.again(now)
 
     # The rules
 
     def _linked(self, now: float) -> NextMessages:
         if self.telemetry.stale(now):
-            self._was_stale, self.helm.waits_for = True, 'its link'
-            self.helm.drop()
+            self._was_stale, self.sender.waits_for = True, 'its link'
+            self.sender.drop()
             return []
         if self._was_stale:
             self._was_stale = False
-            self.helm.encourage(now)
+            self.sender.clear_backoff(now)
         return None
 
     def _authority(self, now: float) -> NextMessages:
@@ -262,83 +262,83 @@ class MissionExecutor:
         if self.authority.held:
             return None
         if not self.authority.allows(SendAction.COMMAND):
-            self.helm.drop()
+            self.sender.drop()
         if not self.authority.allows(SendAction.READ):
-            return self.helm.wait_for(f'authority: {self.authority.why}')
-        if not self.authority.allows(SendAction.UPLOAD) and self.board.state is (
+            return self.sender.wait_for(f'authority: {self.authority.why}')
+        if not self.authority.allows(SendAction.UPLOAD) and self.onboard.state is (
                 MissionState.UPLOADING):
-            self.board.abort()
+            self.onboard.abort()
         return None
 
     def _upload(self, now: float) -> NextMessages:
-        board = self.board
-        if board.trouble:
-            board.trouble = False
-            self.helm.fail(now)
-        if not board.upload.busy:
+        onboard = self.onboard
+        if onboard.trouble:
+            onboard.trouble = False
+            self.sender.fail(now)
+        if not onboard.upload.busy:
             return None
-        beyond = board.beyond_flown()
+        beyond = onboard.beyond_flown()
         if beyond is not None and self.authority.held:
-            board.progress.asked(beyond)
-            return self.helm.jump(beyond + board.own, now,
-                                  lambda t: board.progress.jumped(beyond, t))
-        self.helm.waits_for = 'its upload'
+            onboard.progress.asked(beyond)
+            return self.sender.jump(beyond + onboard.own, now,
+                                  lambda t: onboard.progress.jumped(beyond, t))
+        self.sender.waits_for = 'its upload'
         if (
-            board.upload.state in (UploadState.BACKOFF, UploadState.DRAINING)
-            and board.outdated
-            and (board.held is not None and board.wanted() and not board.upload.maybe_taken)
+            onboard.upload.state in (UploadState.BACKOFF, UploadState.DRAINING)
+            and onboard.outdated
+            and (onboard.held is not None and onboard.wanted() and not onboard.upload.maybe_taken)
         ):
-            return board.begin_upload(board.change(), now)
+            return onboard.begin_upload(onboard.change(), now)
         return self._ending.held_too_long(now) or []
 
     def _read(self, now: float) -> NextMessages:
-        if self.board.held is not None:
+        if self.onboard.held is not None:
             return None
         if not self.telemetry.past_boot:
-            return self.helm.wait_for('the autopilot to start')
-        if self.helm.resting(now):
+            return self.sender.wait_for('the autopilot to start')
+        if self.sender.backing_off(now):
             return self._ending.held_too_long(now) or []
-        self.helm.waits_for = 'a readback'
-        return self.board.upload.read(now)
+        self.sender.waits_for = 'a readback'
+        return self.onboard.upload.read(now)
 
     def _has_list(self, now: float) -> NextMessages:
-        self.helm.waits_for = 'a list' if self.board.tasks is None else ''
-        return [] if self.board.tasks is None else None
+        self.sender.waits_for = 'a list' if self.onboard.tasks is None else ''
+        return [] if self.onboard.tasks is None else None
 
     def _place(self, now: float) -> NextMessages:
         """After a restart of the bridge: what was flown meanwhile is not repeated."""
-        board, telemetry = self.board, self.telemetry
-        assert board.tasks is not None
-        if not board.recall.placed and board.held and telemetry.airborne and (
+        onboard, telemetry = self.onboard, self.telemetry
+        assert onboard.tasks is not None
+        if not onboard.resume.placed and onboard.held and telemetry.airborne and (
                 telemetry.current is None or not telemetry.has_position):
             return []  # what it flies is not known yet
-        board.recall.place(board.held or (), board.tasks, now)
-        board.catch_up(now)
+        onboard.resume.place(onboard.held or (), onboard.tasks, now)
+        onboard.catch_up(now)
         return None
 
     def _may_act(self, now: float) -> NextMessages:
         if self.authority.state is who.AuthorityState.LOST:
-            return self.helm.wait('the pilot to give it back')
+            return self.sender.wait('the pilot to give it back')
         if not self.authority.allows(SendAction.UPLOAD):
-            return self.helm.wait_for(f'authority: {self.authority.why}')
+            return self.sender.wait_for(f'authority: {self.authority.why}')
         if self.authority.held or not self.telemetry.airborne:
             return None
         # a pilot flies what is on board: it is not changed under him
-        return self.helm.wait_for('the pilot to hand it over')
+        return self.sender.wait_for('the pilot to hand it over')
 
     def _hold_first(self, now: float) -> NextMessages:
         """After a hand-over in flight nothing else is done before it holds."""
-        authority, flight = self.authority, self.telemetry.flight
+        authority, flight = self.authority, self.telemetry.mode
         if authority.hold is HoldStage.NO or not self.telemetry.airborne:
             authority.hold = HoldStage.NO
             return None
         if flight is ModeFunction.HOLD or (authority.hold is HoldStage.UNLESS_VERIFIED
-                                     and flight is ModeFunction.MISSION and self.board.verified()):
-            self.helm.must_start = flight is ModeFunction.HOLD
+                                     and flight is ModeFunction.MISSION and self.onboard.verified()):
+            self.sender.must_start = flight is ModeFunction.HOLD
             authority.hold = HoldStage.NO
             return None
-        if self.helm.resting(now) or ModeFunction.HOLD not in self.profile.set_mode:
+        if self.sender.backing_off(now) or ModeFunction.HOLD not in self.profile.set_mode:
             authority.hold = HoldStage.NO if ModeFunction.HOLD not in self.profile.set_mode else (
                 authority.hold)
             return []
-        return self.helm.set_mode(ModeFunction.HOLD, now)
+        return self.sender.set_mode(ModeFunction.HOLD, now)

@@ -2,16 +2,16 @@
 """Whether the straight way home is clear, seen from above: RTL flies it at a height of its own."""
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable
 from itertools import pairwise
 
+from uav_task_alloc.geometry.polyline import segment_distance
 from uav_task_alloc.model import Point, Shape, ThreatZone
 
 XY = tuple[float, float]
 
 
-def zone_in_the_way(a: Point, b: Point, zones: Iterable[ThreatZone]) -> ThreatZone | None:
+def zone_across_path(a: Point, b: Point, zones: Iterable[ThreatZone]) -> ThreatZone | None:
     """The first zone that the vertical plane from a to b enters, whatever its heights.
 
     Args:
@@ -27,20 +27,13 @@ def zone_in_the_way(a: Point, b: Point, zones: Iterable[ThreatZone]) -> ThreatZo
 
 def _enters(a: XY, b: XY, zone: ThreatZone) -> bool:
     if zone.shape is not Shape.POLYGON:
-        return _distance((zone.center[0], zone.center[1]), a, b) <= zone.radius + zone.margin
+        center = zone.center[0], zone.center[1]
+        return segment_distance(center, a, b) <= zone.radius + zone.margin
     edges = list(pairwise((*zone.vertices, zone.vertices[0])))
     return _inside(a, edges) or any(
-        _cross(a, b, c, e) or min(_distance(c, a, b), _distance(a, c, e), _distance(b, c, e))
-        <= zone.margin for c, e in edges)
-
-
-def _distance(p: XY, a: XY, b: XY) -> float:
-    """[m] from a point to a segment."""
-    dx, dy = b[0] - a[0], b[1] - a[1]
-    square = dx * dx + dy * dy
-    share = 0.0 if square == 0.0 else ((p[0] - a[0]) * dx + (p[1] - a[1]) * dy) / square
-    share = min(1.0, max(0.0, share))
-    return math.hypot(p[0] - a[0] - share * dx, p[1] - a[1] - share * dy)
+        _cross(a, b, c, e) or zone.margin >= min(
+            segment_distance(c, a, b), segment_distance(a, c, e), segment_distance(b, c, e))
+        for c, e in edges)
 
 
 def _side(a: XY, b: XY, p: XY) -> float:

@@ -23,13 +23,13 @@ def action_of(message: Message) -> SendAction:
     return SendAction.UPLOAD if kind in _UPLOADING or kind == 'MISSION_ACK' else SendAction.COMMAND
 
 
-def allowed(messages: list[Message], watch: AuthorityWatch, now: float) -> list[Message]:
+def allowed_messages(messages: list[Message], watch: AuthorityWatch, now: float) -> list[Message]:
     """Those that may be sent now; the watch writes commands down before they are."""
     out = []
     for message in messages:
         action = action_of(message)
         if watch.authority.allows(action):
             if action is SendAction.COMMAND:
-                watch.sent(message, now)
+                watch.record_command(message, now)
             out.append(message)
     return out

@@ -68,76 +68,76 @@ class UavStatus:
                 self.list_revision, self.authority, self.reason)
 
 
-def mode_of(pilot: MissionExecutor) -> UavMode:
+def mode_of(executor: MissionExecutor) -> UavMode:
     """The mode that people and the allocator understand."""
-    telemetry, progress = pilot.telemetry, pilot.board.progress
+    telemetry, progress = executor.telemetry, executor.onboard.progress
     if telemetry.faulty:
         return UavMode.FAULT
-    if not telemetry.airborne and not pilot.helm.climbing:
+    if not telemetry.airborne and not executor.sender.climbing:
         return UavMode.STANDBY
-    if pilot.helm.climbing:
+    if executor.sender.climbing:
         return UavMode.TAKEOFF
-    if telemetry.flight is ModeFunction.MISSION:
+    if telemetry.mode is ModeFunction.MISSION:
         item = progress.active
-        if (item is not None and item.command == RETURN) or pilot.going_home:
+        if (item is not None and item.command == RETURN) or executor.going_home:
             return UavMode.RETURNING
         return UavMode.HOLD if progress.finished else UavMode.ON_MISSION
-    return _BY_FLIGHT.get(telemetry.flight, _BY_LANDED.get(telemetry.landed, UavMode.UNKNOWN))
+    return _BY_FLIGHT.get(telemetry.mode, _BY_LANDED.get(telemetry.landed, UavMode.UNKNOWN))
 
 
-def active_task(pilot: MissionExecutor) -> str:
+def active_task(executor: MissionExecutor) -> str:
     """The task whose leg or hold is being flown; one that waits must be on the list as well."""
-    board, mode = pilot.board, mode_of(pilot)
-    item = board.progress.active
-    if board.tasks is None or item is None or item.task in board.progress.completed:
+    onboard, mode = executor.onboard, mode_of(executor)
+    item = onboard.progress.active
+    if onboard.tasks is None or item is None or item.task in onboard.progress.completed:
         return ''
     waits = mode in (UavMode.HOLD, UavMode.TAKEOFF) and any(
-        stop.task.id == item.task for stop in board.tasks.stops)
+        stop.task.id == item.task for stop in onboard.tasks.stops)
     return item.task if waits or mode is UavMode.ON_MISSION else ''
 
 
-def why_not_available(pilot: MissionExecutor, now: float) -> str:
+def why_not_available(executor: MissionExecutor, now: float) -> str:
     """Why a UAV may not be given tasks, and what would change that; '' where it may."""
-    telemetry, authority = pilot.telemetry, pilot.authority
+    telemetry, authority = executor.telemetry, executor.authority
     if telemetry.stale(now):
         return 'its link is stale'
     if authority.undecided:
         return 'not known yet who has it'
     if authority.state in (AuthorityState.LOST, AuthorityState.SUSPENDED) or authority.landed:
         return (f'authority {authority.state.name}: {authority.why}; given back by '
-                f'{authority.gives_back}')
-    if mode_of(pilot) is UavMode.FAULT:
+                f'{authority.given_back_by}')
+    if mode_of(executor) is UavMode.FAULT:
         return 'it says that it is in a critical state'
     if not telemetry.past_boot:
         return 'the autopilot is starting'
     if not telemetry.has_position:
         return 'no position yet'
-    if pilot.alarm:
-        return pilot.alarm
-    if pilot.helm.failing:
-        return f'what is tried fails again and again: mission {pilot.board.stored.name}'
+    if executor.alarm:
+        return executor.alarm
+    if executor.sender.failing:
+        return f'what is tried fails again and again: mission {executor.onboard.stored.name}'
     return ''
 
 
-def state_of(served: VehicleSession, now: float, full_range: float = 0.0) -> UavStatus:
+def state_of(session: VehicleSession, now: float, full_range: float = 0.0) -> UavStatus:
     """All of it at one moment; `full_range` [m] of a full battery, 0: unknown."""
-    pilot = served.pilot
-    telemetry, board, mode = pilot.telemetry, pilot.board, mode_of(pilot)
-    reason = served.fault or why_not_available(pilot, now)
-    authority = AuthorityState.UNKNOWN if pilot.authority.undecided else pilot.authority.state
+    executor = session.executor
+    telemetry, onboard, mode = executor.telemetry, executor.onboard, mode_of(executor)
+    reason = session.fault or why_not_available(executor, now)
+    authority = AuthorityState.UNKNOWN if executor.authority.undecided else executor.authority.state
     return UavStatus(
-        served.uav_id, telemetry.position, telemetry.velocity, telemetry.home,
+        session.uav_id, telemetry.position, telemetry.velocity, telemetry.home,
         telemetry.battery, full_range * telemetry.battery if full_range > 0.0 else math.nan,
-        not reason, mode, board.state, active_task(pilot), board.revision, authority, reason)
+        not reason, mode, onboard.state, active_task(executor), onboard.revision, authority, reason)
 
 
-class Told:
+class PublishedStates:
     """What was told of each UAV last, and what is worth telling now."""
 
     def __init__(self) -> None:
         self._told: dict[str, tuple[UavStatus, float]] = {}  # and the time of its position [s]
 
-    def is_news(self, status: UavStatus, position_at: float, now: float, rate: float) -> bool:
+    def is_due(self, status: UavStatus, position_at: float, now: float, rate: float) -> bool:
         """A new position, at most `rate` [Hz], or something that cannot wait; then it is told.
 
         A UAV that is silent is told of once, as no longer available: whatever else happens to
@@ -156,43 +156,43 @@ class Told:
         return True
 
 
-def facts_of(served: VehicleSession, now: float) -> tuple[int, str, dict[str, str]]:
+def facts_of(session: VehicleSession, now: float) -> tuple[int, str, dict[str, str]]:
     """Level (0 ok, 1 warning, 2 error, 3 stale), one line, and details."""
-    pilot = served.pilot
-    telemetry, board = pilot.telemetry, pilot.board
-    state = board.state
-    link = pilot.authority.suspended_by(Suspension.LINK)
-    if telemetry.lost(now) or (link and pilot.watch.was_lost):
+    executor = session.executor
+    telemetry, onboard = executor.telemetry, executor.onboard
+    state = onboard.state
+    link = executor.authority.suspended_by(Suspension.LINK)
+    if telemetry.lost(now) or (link and executor.watch.was_lost):
         level, line = 3, 'link lost'
     elif telemetry.stale(now) or link:
         level, line = 1, 'link stale'
-    elif served.fault:
-        level, line = 2, served.fault
-    elif mode_of(pilot) is UavMode.FAULT or state is MissionState.MIXED:
+    elif session.fault:
+        level, line = 2, session.fault
+    elif mode_of(executor) is UavMode.FAULT or state is MissionState.MIXED:
         level, line = 2, f'mission {state.name}' if state is MissionState.MIXED else 'fault'
-    elif pilot.alarm:
-        level, line = 2, pilot.alarm
-    elif pilot.authority.state in (AuthorityState.LOST, AuthorityState.SUSPENDED):
-        level, line = 1, f'authority {pilot.authority.state.name}: {pilot.authority.why}'
+    elif executor.alarm:
+        level, line = 2, executor.alarm
+    elif executor.authority.state in (AuthorityState.LOST, AuthorityState.SUSPENDED):
+        level, line = 1, f'authority {executor.authority.state.name}: {executor.authority.why}'
     elif state is MissionState.FOREIGN:
         level, line = 1, 'mission FOREIGN'
     else:
         level, line = 0, f'mission {state.name}'
-    progress = board.upload_progress(now)
+    progress = onboard.upload_progress(now)
     if progress and level < 3:
         line += f', {progress}'
-    if pilot.helm.waits_for and level < 3:
-        line += f', waits for {pilot.helm.waits_for}'
-    authority, reason = pilot.authority, served.fault or why_not_available(pilot, now)
+    if executor.sender.waits_for and level < 3:
+        line += f', waits for {executor.sender.waits_for}'
+    authority, reason = executor.authority, session.fault or why_not_available(executor, now)
     return level, line, {
         'authority': AuthorityState.UNKNOWN.name if authority.undecided else authority.state.name,
         'authority_why': authority.why, 'authority_for': f'{now - authority.since:.0f} s',
-        'given_back_by': authority.gives_back or 'nothing is needed',
+        'given_back_by': authority.given_back_by or 'nothing is needed',
         'not_available': reason or 'it is available',
-        'autopilot': pilot.profile.name, 'address': str(served.address),
-        'mode': mode_of(pilot).name, 'mission': state.name,
-        'list_revision': str(board.revision), 'epoch': str(board.progress.epoch),
-        'item': f'{board.progress.current} of {len(board.progress.items)}',
-        'upload': progress or 'none', 'uploads': str(board.upload.uploads),
+        'autopilot': executor.profile.name, 'address': str(session.address),
+        'mode': mode_of(executor).name, 'mission': state.name,
+        'list_revision': str(onboard.revision), 'epoch': str(onboard.progress.epoch),
+        'item': f'{onboard.progress.current} of {len(onboard.progress.items)}',
+        'upload': progress or 'none', 'uploads': str(onboard.upload.uploads),
         'restarts': str(telemetry.restarts),
-        'silent_for': f'{now - telemetry.heard_at:.1f} s', 'strays': str(served.strays)}
+        'silent_for': f'{now - telemetry.received_at:.1f} s', 'strays': str(session.strays)}

@@ -8,7 +8,7 @@ from uav_task_alloc.mavlink.gcs.authority import Authority
 from uav_task_alloc.mavlink.gcs.command_sender import CommandSender, NextMessages
 from uav_task_alloc.mavlink.gcs.onboard_mission import OnboardMission
 from uav_task_alloc.mavlink.gcs.policy import Policy
-from uav_task_alloc.mavlink.gcs.return_path import zone_in_the_way
+from uav_task_alloc.mavlink.gcs.return_path import zone_across_path
 from uav_task_alloc.mavlink.gcs.telemetry import Telemetry
 
 
@@ -17,39 +17,39 @@ class Takeoff:
 
     def __init__(
         self,
-        helm: CommandSender,
+        sender: CommandSender,
         telemetry: Telemetry,
-        board: OnboardMission,
+        onboard: OnboardMission,
         authority: Authority,
         policy: Callable[[], Policy],
     ) -> None:
-        self._helm, self._telemetry, self._board = helm, telemetry, board
+        self._sender, self._telemetry, self._onboard = sender, telemetry, onboard
         self._authority, self._policy = authority, policy
 
     def lift(self, now: float) -> NextMessages:
         """Armed by us: it takes off before anything else, or is disarmed."""
-        if not self._helm.armed_here or self._telemetry.airborne or not self._authority.held:
+        if not self._sender.armed_here or self._telemetry.airborne or not self._authority.held:
             return None
-        return self.rise(now) if self._wants_to_fly() else self._helm.disarm(now)
+        return self.rise(now) if self._wants_to_fly() else self._sender.disarm(now)
 
     def rise(self, now: float) -> NextMessages:
         """Arm, take off and climb; satisfied in the air."""
-        telemetry, helm, policy = self._telemetry, self._helm, self._policy()
-        if telemetry.airborne and not helm.climbing:
+        telemetry, sender, policy = self._telemetry, self._sender, self._policy()
+        if telemetry.airborne and not sender.climbing:
             return None
         if not self._authority.held:
-            return helm.wait('~/hand_over: it has landed' if self._authority.landed else
+            return sender.wait('~/hand_over: it has landed' if self._authority.landed else
                              'a pilot to arm and take off (takeoff is false)')
-        if policy.grounded and not helm.climbing:
-            return helm.wait(policy.grounded)
+        if policy.grounded and not sender.climbing:
+            return sender.wait(policy.grounded)
         home = telemetry.home or telemetry.position
-        zone = zone_in_the_way(home, home, policy.zones)
-        if zone is not None and not helm.climbing:
-            return helm.wait(f'zone {zone.id} to leave its home')
+        zone = zone_across_path(home, home, policy.zones)
+        if zone is not None and not sender.climbing:
+            return sender.wait(f'zone {zone.id} to leave its home')
 
-        return helm.rise(policy.cruise_altitude, self._wants_to_fly, now)
+        return sender.rise(policy.cruise_altitude, self._wants_to_fly, now)
 
     def _wants_to_fly(self) -> bool:
-        return (self._authority.held and self._board.tasks is not None
+        return (self._authority.held and self._onboard.tasks is not None
                 and not (self._policy().grounded and not self._telemetry.airborne)
-                and bool(self._board.remaining().stops))
+                and bool(self._onboard.remaining().stops))

@@ -8,29 +8,29 @@ from uav_task_alloc.mavlink.mission.task_progress import TaskProgress
 from uav_task_alloc.mavlink.transport.notes import OperatorNote
 
 
-def task_events(board: OnboardMission, watch: AuthorityWatch, now: float) -> list[TaskProgress]:
+def task_events(onboard: OnboardMission, watch: AuthorityWatch, now: float) -> list[TaskProgress]:
     """What became of tasks since the last call; each that is completed is marked in the record."""
-    events, progress, revision = [], board.progress, board.revision
+    events, progress, revision = [], onboard.progress, onboard.revision
     while progress.events:
         made = progress.events.popleft()
         event = 'COMPLETED' if made.completed else 'STARTED'
-        latest = board.tasks.revision if made.unheard and board.tasks else revision
+        latest = onboard.tasks.revision if made.unheard and onboard.tasks else revision
         if made.completed:
-            watch.mark(made.task, progress.completed.get(made.task), True, now)
+            watch.mark_task(made.task, progress.completed.get(made.task), True, now)
         events.append(TaskProgress(made.task, event, latest))
-    while board.failed:
-        failed = board.failed.popleft()
+    while onboard.failed:
+        failed = onboard.failed.popleft()
         events.append(TaskProgress(failed.task, 'FAILED', failed.revision, failed.reason))
     return events
 
 
-def passed_over(board: OnboardMission, watch: AuthorityWatch, now: float) -> list[OperatorNote]:
+def passed_over(onboard: OnboardMission, watch: AuthorityWatch, now: float) -> list[OperatorNote]:
     """Notes of tasks passed over since the last call; what was left is marked in the record."""
-    progress, notes = board.progress, []
+    progress, notes = onboard.progress, []
     while progress.left:
         item = progress.left.popleft()
         if item.task not in progress.completed:
-            watch.mark(item.task, item.position, False, now)
+            watch.mark_task(item.task, item.position, False, now)
     while progress.skipped:
         task = progress.skipped.popleft()
         notes.append(OperatorNote('warning', f'{task} was passed over, not by the bridge: '
