@@ -29,7 +29,7 @@ from uav_task_alloc.nodes.conversions.messages import (
     announcement,
     from_zones,
 )
-from uav_task_alloc.nodes.conversions.path_messages import ahead, path
+from uav_task_alloc.nodes.conversions.path_messages import path
 from uav_task_alloc.nodes.rviz import marker_publisher as painter, zone_markers as zone_bodies
 from uav_task_alloc.nodes.rviz.markers import MOST_STOPS, MOST_TEXTS, Picture, markers
 
@@ -161,14 +161,6 @@ def test_a_prism_is_closed_to_its_top_and_covers_the_polygon_once(zone):
         rim[0::3], rim[1::3], strict=True)) / 2
     assert area == pytest.approx(shoelace)
     assert area > 0.0
-
-
-def test_detour_points_already_passed_are_not_flown_again():
-    way = [(10.0, 10.0, 0.0), (20.0, 0.0, 0.0), (30.0, 0.0, 0.0)]
-    assert list(ahead((0.0, 0.0, 0.0), way)) == way
-    assert list(ahead((15.0, 5.0, 0.0), way)) == way[1:]
-    assert list(ahead((29.0, 0.0, 0.0), way)) == way[2:]
-    assert list(ahead((40.0, 0.0, 0.0), way)) == way[2:]
 
 
 @pytest.mark.ros

@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
-from itertools import pairwise
 from typing import Any
 
+from uav_task_alloc.geometry.polyline import polyline_length
 from uav_task_alloc.model import Point
 from uav_task_alloc.record import plan_diff as replans
 from uav_task_alloc.record.events import sentences
@@ -168,12 +168,11 @@ class Story:
 
     def metres(self, uav: str) -> float:
         """Length of a track [m]."""
-        return math.fsum(math.dist(a.point, b.point) for a, b in pairwise(self.tracks[uav]))
+        return polyline_length([sample.point for sample in self.tracks[uav]])
 
     def metres_planned(self, uav: str) -> float:
         """Length of the legs that were begun, as planned then [m]."""
-        return math.fsum(math.dist(a, b) for leg in self.planned.get(uav, ())
-                         for a, b in pairwise(leg))
+        return math.fsum(map(polyline_length, self.planned.get(uav, ())))
 
     def clock(self, wall: float) -> float:
         """Mission time [s]: since the first task was announced."""

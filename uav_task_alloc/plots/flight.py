@@ -2,12 +2,11 @@
 """A flown scenario from above: who flew where and which tasks, as the vehicles really were."""
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
-from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
+from uav_task_alloc.geometry.polyline import polyline_length
 from uav_task_alloc.plots import style
 from uav_task_alloc.plots.flat import Map
 from uav_task_alloc.plots.style import RED
@@ -40,7 +39,7 @@ def _tracks(drawn: Map, said: RunState, flown: Truth, places: Mapping[str, int])
         drawn.home(points[0], uav, index)
         done = sum(status.state == 'COMPLETED' and status.uav == uav
                    for status in said.statuses.values())
-        metres = math.fsum(math.dist(a, b) for a, b in pairwise(points))
+        metres = polyline_length(points)
         handles.append(style.route(index, f'{uav}: {style.count(done)}, {metres / 1e3:.1f} km'))
     for uav, sample in flown.died.items():
         drawn.lost(sample.point, f'{uav} lost at {said.clock(sample.wall):.0f} s')

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from itertools import pairwise
 from pathlib import Path
 
+from uav_task_alloc.geometry.polyline import polyline_length
 from uav_task_alloc.geometry.zones import distance
 from uav_task_alloc.model import Point
 from uav_task_alloc.record.run_state import Line, SeenZone, read_lines
@@ -66,8 +67,8 @@ class Truth:
 
     def metres(self) -> float:
         """Length of all tracks [m]."""
-        return math.fsum(math.dist(a.point, b.point) for track in self.tracks.values()
-                         for a, b in pairwise(track))
+        return math.fsum(polyline_length([sample.point for sample in track])
+                         for track in self.tracks.values())
 
 
 def read_truth(out_dir: Path) -> Truth:

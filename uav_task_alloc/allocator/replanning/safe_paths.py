@@ -8,9 +8,9 @@ from itertools import pairwise
 
 import numpy as np
 
-from uav_task_alloc.allocator.replanning.task_lists import polyline_length
 from uav_task_alloc.geometry.detour import Detour, find_detour
 from uav_task_alloc.geometry.obstacles import blocked, pack
+from uav_task_alloc.geometry.polyline import points_passed, polyline_length
 from uav_task_alloc.geometry.search_budget import SearchBudget
 from uav_task_alloc.model import Leg, Point, ThreatZone
 from uav_task_alloc.params import AllocatorParams
@@ -78,19 +78,9 @@ class SafePaths:
 
     def rest(self, position: Point, leg: Leg, goal: Point) -> float | None:
         """Metres still to fly on a leg under way, by the via points ahead; None: it is cut."""
-        ahead = len(leg.via) - _passed(position, leg.via, goal)
+        ahead = len(leg.via) - points_passed(position, (*leg.via, goal))
         for left in (ahead, *range(ahead - 1, -1, -1), *range(ahead + 1, len(leg.via) + 1)):
             points = (position, *leg.via[len(leg.via) - left:], goal)
             if self.clear(*points):
                 return polyline_length(points)
         return None
-
-
-def _passed(position: Point, via: Sequence[Point], goal: Point) -> int:
-    """How many via points lie behind: the way on from there leads past the UAV."""
-    stops = (*via, goal)
-    for k in range(len(via), 0, -1):
-        here, onward = stops[k - 1], stops[k]
-        if sum((p - h) * (o - h) for p, h, o in zip(position, here, onward, strict=True)) > 0.0:
-            return k
-    return 0

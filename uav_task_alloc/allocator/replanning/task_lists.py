@@ -9,6 +9,7 @@ from itertools import pairwise
 from typing import TYPE_CHECKING
 
 from uav_task_alloc.allocator.records import ListStop, UavList
+from uav_task_alloc.geometry.polyline import polyline_length
 from uav_task_alloc.model import Leg, Plan, Point, Task, Uav
 
 if TYPE_CHECKING:  # it brings the compiler along, which a start must not wait for
@@ -16,11 +17,6 @@ if TYPE_CHECKING:  # it brings the compiler along, which a start must not wait f
 
 START, HOME = '', '~'  # neither is a task id
 WORTH = 1.0  # [m] a way at least so much shorter replaces a published one
-
-
-def polyline_length(points: Sequence[Point]) -> float:
-    """Metres along a polyline."""
-    return math.fsum(math.dist(a, b) for a, b in pairwise(points))
 
 
 def planned_legs(plan: Plan) -> dict[tuple[str, str, str], Leg]:

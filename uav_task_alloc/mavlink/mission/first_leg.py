@@ -10,6 +10,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from uav_task_alloc.geometry.polyline import segment_fraction
 from uav_task_alloc.mavlink.mission.items import TaskList
 from uav_task_alloc.mavlink.mission.long_legs import (
     LONGEST,
@@ -82,7 +83,7 @@ class FirstLeg:
         """How many points of the first leg the vehicle has passed."""
         place, start = self.place(), self._start()
         if place is not None and start is not None and self._target is not None:
-            rest = _along(place.point, start, self._target)
+            rest = _metres_left(place.point, start, self._target)
             self._behind = sum(math.dist(point, self._target) > rest + BEHIND
                                for point in self._points)
         return self._behind
@@ -98,16 +99,12 @@ class FirstLeg:
         return None if self._target is None else self._starts.get(self._target)
 
     def _is_off(self, place: LegStart, start: Point, end: Point) -> bool:
-        share = min(1.0, max(0.0, 1.0 - _along(place.point, start, end)
-                             / max(math.dist(start, end), 1e-9)))
+        share = min(1.0, max(0.0, segment_fraction(place.point, start, end)))
         on = tuple(a + (b - a) * share for a, b in zip(start, end, strict=True))
         return math.dist(place.point[:2], on[:2]) > self._beside or (
             not place.on_mission and abs(place.point[2] - on[2]) > ABOVE)
 
 
-def _along(place: Point, start: Point, end: Point) -> float:
+def _metres_left(place: Point, start: Point, end: Point) -> float:
     """How much of a leg is still ahead [m]; more than its length before its start."""
-    whole = math.dist(start, end)
-    if whole == 0.0:
-        return 0.0
-    return sum((e - p) * (e - s) for p, s, e in zip(place, start, end, strict=True)) / whole
+    return (1.0 - segment_fraction(place, start, end)) * math.dist(start, end)

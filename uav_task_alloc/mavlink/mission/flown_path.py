@@ -9,6 +9,7 @@ from enum import Enum
 from itertools import pairwise
 from typing import NamedTuple
 
+from uav_task_alloc.geometry.polyline import polyline_length, segment_distance
 from uav_task_alloc.model import Point
 
 _KEPT = 900  # samples: three minutes at 5 Hz
@@ -112,11 +113,11 @@ class FlownPath:
         if len(samples) < 2:
             return False
         a, b = max(pairwise(samples), key=lambda two: two[1].t - two[0].t)
-        way = math.fsum(math.dist(p, q) for p, q in pairwise((a.position, *chain, b.position)))
+        way = polyline_length((a.position, *chain, b.position))
         fastest = max(5.0, *(math.hypot(*s.velocity) for s in self._samples[-200:]))
         if way > 1.1 * fastest * (b.t - a.t - 0.8 * holds) + 10.0:
             return False
-        return _to_segment(b.position, chain[-1], then or chain[-1]) <= ASIDE
+        return segment_distance(b.position, chain[-1], then or chain[-1]) <= ASIDE
 
     def _since(self, since: float, until: float = math.inf) -> list[PositionSample]:
         at = bisect_left(self._samples, since, key=lambda one: one.t)
@@ -163,12 +164,3 @@ def _between(a: PositionSample, b: PositionSample, share: float) -> Point:
     x, y, z = (k[0] * p + k[1] * u + k[2] * q + k[3] * w for p, u, q, w in zip(
         a.position, a.velocity, b.position, b.velocity, strict=True))
     return x, y, z
-
-
-def _to_segment(p: Point, a: Point, b: Point) -> float:
-    """[m] from a point to a segment."""
-    ab = tuple(v - u for u, v in zip(a, b, strict=True))
-    square = math.fsum(v * v for v in ab)
-    share = 0.0 if square == 0.0 else min(1.0, max(0.0, math.fsum(
-        (v - u) * w for u, v, w in zip(a, p, ab, strict=True)) / square))
-    return math.dist(p, [u + share * w for u, w in zip(a, ab, strict=True)])

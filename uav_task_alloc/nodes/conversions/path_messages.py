@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from itertools import pairwise
 
 from geometry_msgs.msg import PoseStamped
@@ -11,6 +10,7 @@ from nav_msgs.msg import Path
 
 from uav_task_alloc.allocator.records import UavList
 from uav_task_alloc.allocator.state.fleet import UavRecord
+from uav_task_alloc.geometry.polyline import points_passed
 from uav_task_alloc.model import Point
 from uav_task_alloc.nodes.conversions.messages import header, to_point
 
@@ -20,26 +20,12 @@ def way(uav_list: UavList, uav: UavRecord | None) -> list[Point]:
     points: list[Point] = []
     for k, stop in enumerate(uav_list.stops):
         leg = [*stop.leg.via, stop.task.position]
-        points += ahead(uav.report.position, leg) if uav and k == 0 else leg
+        passed = points_passed(uav.report.position, leg) if uav and k == 0 else 0
+        points += leg[passed:]
     if uav is None or not points:
         return points
     end = [*uav_list.end_via, uav.home] if uav_list.returns else []
     return [uav.report.position, *points, *end]
-
-
-def ahead(place: Point, points: Sequence[Point]) -> Sequence[Point]:
-    """Those of a polyline that come after the spot of it nearest to `place`."""
-    nearest, passed = math.inf, 0
-    for k, (a, b) in enumerate(pairwise(points)):
-        along = tuple(q - p for p, q in zip(a, b, strict=True))
-        square = math.fsum(d * d for d in along)
-        share = math.fsum((v - p) * d for v, p, d in zip(
-            place, a, along, strict=True)) / square if square > 0.0 else 0.0
-        share = min(max(share, 0.0), 1.0)
-        gap = math.dist(place, tuple(p + share * d for p, d in zip(a, along, strict=True)))
-        if gap < nearest:
-            nearest, passed = gap, k + (share > 0.0)
-    return points[passed:]
 
 
 def path(uav_list: UavList, uav: UavRecord | None) -> Path:

@@ -1,0 +1,83 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Polylines in plain Python: length, projection, and which of the points a vehicle has passed.
+
+Imports nothing heavy (no numba, no numpy), so that a start need not wait for it.
+"""
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from itertools import pairwise
+
+Coordinates = Sequence[float]  # [m], 2 or 3 of them
+_TIE = 1e-6  # [m] distances that differ by less are equal: rounding at coordinates of 1e8 m
+
+
+def polyline_length(points: Sequence[Coordinates]) -> float:
+    """Return the length of a polyline.
+
+    Args:
+        points: [m], in order; all of the same dimension.
+
+    Returns:
+        [m]; 0.0 for less than two points.
+    """
+    return math.fsum(math.dist(a, b) for a, b in pairwise(points))
+
+
+def segment_fraction(point: Coordinates, start: Coordinates, end: Coordinates) -> float:
+    """Project a point on the line through a segment.
+
+    Args:
+        point, start, end: [m], of the same dimension.
+
+    Returns:
+        0.0 at `start`, 1.0 at `end`; below 0 before the segment and above 1 beyond it.
+        0.0 where the segment has no length.
+    """
+    along = [q - p for p, q in zip(start, end, strict=True)]
+    square = sum(d * d for d in along)
+    if square == 0.0:
+        return 0.0
+    return sum((x - p) * d for x, p, d in zip(point, start, along, strict=True)) / square
+
+
+def segment_distance(point: Coordinates, start: Coordinates, end: Coordinates) -> float:
+    """Return the distance from a point to the nearest spot of a segment.
+
+    Args:
+        point, start, end: [m], of the same dimension.
+
+    Returns:
+        [m].
+    """
+    fraction = min(1.0, max(0.0, segment_fraction(point, start, end)))
+    return math.dist(point, [p + fraction * (q - p) for p, q in zip(start, end, strict=True)])
+
+
+def points_passed(position: Coordinates, points: Sequence[Coordinates],
+                  start: Coordinates | None = None) -> int:
+    """Count the points of a polyline that a vehicle which follows it has passed.
+
+    A point is passed when the spot of the polyline that is nearest to the vehicle lies after it.
+    Of spots equally near the first counts (a polyline may double back on itself). The last point
+    is where the vehicle flies to, and never passed. O(points).
+
+    Args:
+        position: of the vehicle [m].
+        points: detour points in order, and the goal [m].
+        start: where the vehicle began [m]. Without it a vehicle still before the first point is
+            projected on the later segments, and may count as having passed that point.
+
+    Returns:
+        0 to len(points) - 1: `points[n:]` are still to be flown. 0 where there are no points, or
+        where `position` is not a number.
+    """
+    line = points if start is None else (start, *points)
+    distances = [segment_distance(position, a, b) for a, b in pairwise(line)]
+    nearest = min(distances, default=0.0) + _TIE
+    k = next((k for k, distance in enumerate(distances) if distance <= nearest), None)
+    if k is None:
+        return 0
+    metres = segment_fraction(position, line[k], line[k + 1]) * math.dist(line[k], line[k + 1])
+    return max(0, k + (metres > _TIE) - (start is not None))
