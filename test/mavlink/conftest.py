@@ -8,7 +8,7 @@ from uav_task_alloc.mavlink.transport.link import open_link
 
 
 @pytest.fixture
-def radio():
+def connections():
     made = []
 
     def make(*names, **kwargs):

@@ -30,8 +30,8 @@ class FindingsBench(FlightBench):
         self.kind = kinds[0]
 
     def _collect(self):
-        for served in self.ground.served.values():
-            self.levels += [(note.level, note.text) for note in served.pilot.notes]
+        for session in self.ground_station.sessions.values():
+            self.levels += [(note.level, note.text) for note in session.executor.notes]
         super()._collect()
 
     def noted(self, *words):
@@ -42,7 +42,7 @@ class FindingsBench(FlightBench):
 def flying(kind, names='ABC', **kwargs):
     """A vehicle on its way to the first of some tasks."""
     lists = {key: kwargs.pop(key) for key in ('service', 'side', 'returns') if key in kwargs}
-    bench = FindingsBench(kind, **kwargs).found()
+    bench = FindingsBench(kind, **kwargs).discover()
     bench.assign(task_list(names, **lists))
     assert bench.run(lambda: bench.started() == [names[0]])
     return bench
@@ -63,7 +63,7 @@ def take(bench, mode, who='station', n=1):
         vehicle.failsafe('radio', number)
     else:
         main, sub = (number >> 16 & 0xff, number >> 24) if number > 0xffff else (number, 0)
-        bench.tells(d.MAVLink_command_long_message(
+        bench.from_station(d.MAVLink_command_long_message(
             n, 1, d.MAV_CMD_DO_SET_MODE, 0, 1, main, sub, 0, 0, 0, 0), n)
     assert vehicle.flight.custom_mode == number
 
@@ -104,7 +104,8 @@ def flown_once_each(bench, names, limit=400.0):
 
 def set_current(bench, index, n=1):
     """A second station sets the current item."""
-    bench.tells(d.MAVLink_mission_set_current_message(n, 1, bench.board(n).own + index), n)
+    seq = bench.onboard(n).own + index
+    bench.from_station(d.MAVLink_mission_set_current_message(n, 1, seq), n)
 
 
 def swallow(bench, way, kind, when):

@@ -22,39 +22,39 @@ class FlightBench:
                          for n, kind in enumerate(kinds, 1)}
         self.line = Line(seed, loss, delay)
         self.codecs = {('down', n): Codec(n, 1) for n in self.vehicles}
-        self.ears = {('up', n): Codec(*OURS) for n in self.vehicles}
+        self.decoders = {('up', n): Codec(*OURS) for n in self.vehicles}
         self.truth = {n: [] for n in self.vehicles}  # events on board
         self.start()
 
     def start(self):
         """A new bridge, as after kill -9: it knows what its `store` kept, nothing without one."""
-        self.ground = GroundStation(GcsConfig(origin=ORIGIN, policy=self.policy),
+        self.ground_station = GroundStation(GcsConfig(origin=ORIGIN, policy=self.policy),
                              random.Random(self.seed), self.store)
         for n in self.vehicles:
             self.codecs['up', n] = Codec(*OURS)
-            self.ears['down', n] = Codec(*OURS)
+            self.decoders['down', n] = Codec(*OURS)
         for n in self.vehicles:
-            self.ears['up', n] = Codec(n, 1)
+            self.decoders['up', n] = Codec(n, 1)
         self.events, self.notes = [], []
 
-    def pilot(self, n=1):
-        return self.ground.served[n].pilot
+    def executor(self, n=1):
+        return self.ground_station.sessions[n].executor
 
-    def board(self, n=1):
-        return self.pilot(n).board
+    def onboard(self, n=1):
+        return self.executor(n).onboard
 
     def assign(self, tasks, n=1):
-        self._up(self.ground.assign(f'uav_{n}', tasks, self.now))
+        self._up(self.ground_station.assign(f'uav_{n}', tasks, self.now))
 
-    def says(self, message, n=1):
+    def from_vehicle(self, message, n=1):
         """Something that comes from a vehicle without it."""
-        self._up(self.ground.receive(n, self.ears['down', n].parse(
+        self._up(self.ground_station.receive(n, self.decoders['down', n].parse(
             self.codecs['down', n].pack(message))[0], self.now))
         self._collect()
 
-    def tells(self, message, n=1, system=255):
+    def from_station(self, message, n=1, system=255):
         """Something another ground station sends to a vehicle."""
-        for m in self.ears['up', n].parse(Codec(system, 190).pack(message)):
+        for m in self.decoders['up', n].parse(Codec(system, 190).pack(message)):
             self._down(n, self.vehicles[n].receive(m, self.now))
 
     def run(self, until=lambda: False, limit=300.0):
@@ -67,9 +67,9 @@ class FlightBench:
             self.now += self.tick
         return bool(until())
 
-    def found(self):
+    def discover(self):
         """Until all vehicles are known."""
-        assert self.run(lambda: len(self.ground.served) == len(self.vehicles), 30.0)
+        assert self.run(lambda: len(self.ground_station.sessions) == len(self.vehicles), 30.0)
         return self
 
     def completed(self, n=1):
@@ -83,13 +83,13 @@ class FlightBench:
 
     def hand_over(self, n=1):
         """An operator does; returns why it is refused."""
-        return self.ground.hand_over(f'uav_{n}', 'test', self.now)
+        return self.ground_station.hand_over(f'uav_{n}', 'test', self.now)
 
     def authority(self, n=1):
-        return self.pilot(n).authority.state
+        return self.executor(n).authority.state
 
     def state(self, n=1):
-        return state_of(self.ground.served[n], self.now)
+        return state_of(self.ground_station.sessions[n], self.now)
 
     def flown(self, n=1, radius=3.0):
         """Places [m] where the vehicle really reached an item, in order."""
@@ -99,25 +99,25 @@ class FlightBench:
     def _move(self):
         for n, vehicle in self.vehicles.items():
             self._down(n, vehicle.step(self.now))
-        self._up(self.ground.step(self.now))
+        self._up(self.ground_station.step(self.now))
         busy = True
         while busy:
             busy = False
             for direction, n, frame in self.line.due(self.now):
                 busy = True
-                for m in self.ears[direction, n].parse(frame):
+                for m in self.decoders[direction, n].parse(frame):
                     if direction == 'up':
                         self._down(n, self.vehicles[n].receive(m, self.now))
                     else:
-                        self._up(self.ground.receive(n, m, self.now))
+                        self._up(self.ground_station.receive(n, m, self.now))
         self._collect()
 
     def _collect(self):
-        for served in self.ground.served.values():
-            while served.pilot.events:
-                self.events.append((served.uav_id, served.pilot.events.popleft()))
-            while served.pilot.notes:
-                self.notes.append(served.pilot.notes.popleft().text)
+        for session in self.ground_station.sessions.values():
+            while session.executor.events:
+                self.events.append((session.uav_id, session.executor.events.popleft()))
+            while session.executor.notes:
+                self.notes.append(session.executor.notes.popleft().text)
         for n, vehicle in self.vehicles.items():
             self.truth[n] += vehicle.take_events()
 
@@ -133,7 +133,7 @@ class FlightBench:
 def flying(kind, names='ABC', **kwargs):
     """A vehicle on its way to the first of some tasks."""
     service = kwargs.pop('service', 0.0)
-    bench = FlightBench(kind, **kwargs).found()
+    bench = FlightBench(kind, **kwargs).discover()
     bench.assign(task_list(names, service=service))
     assert bench.run(lambda: bench.started() == [names[0]])
     return bench

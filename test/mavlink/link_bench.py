@@ -16,12 +16,12 @@ def heartbeat(autopilot=d.MAV_AUTOPILOT_PX4):
 class End:
     """A far end on UDP."""
 
-    def __init__(self, radio, system=1, signing=None):
+    def __init__(self, connections, system=1, signing=None):
         self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self.socket.bind(('127.0.0.1', 0))
         self.socket.settimeout(5.0)
         self.codec = Codec(system, 1, signing=signing)
-        self.to = ('127.0.0.1', radio.links[0].port)
+        self.to = ('127.0.0.1', connections.links[0].port)
 
     def say(self, message):
         frame = self.codec.pack(message)
@@ -32,14 +32,14 @@ class End:
         return self.codec.parse(self.socket.recv(65536))
 
 
-def receive(radio, count=1):
+def receive(connections, count=1):
     got = []
     for _ in range(100):
-        got += radio.receive(0.1)
+        got += connections.receive(0.1)
         if len(got) >= count:
             break
     return got
 
 
-def nothing(radio):
-    return radio.receive(0.05) == []
+def nothing(connections):
+    return connections.receive(0.05) == []

@@ -97,7 +97,7 @@ class UploadBench:
         self.upload = Upload(self.peer, idle_after=self.profile.idle_after,
                              rng=random.Random(seed))
         self.codecs = {'up': Codec(*OURS), 'down': Codec(1, 1)}
-        self.ears = {'up': Codec(1, 1), 'down': Codec(*OURS)}
+        self.decoders = {'up': Codec(1, 1), 'down': Codec(*OURS)}
         self.events = []
 
     def mission(self, names='ABC', **kwargs):
@@ -111,10 +111,10 @@ class UploadBench:
         self._up(self.upload.replace(mission, self.now))
         return mission
 
-    def says(self, message, system=1, component=1):
+    def from_vehicle(self, message, system=1, component=1):
         """Something a vehicle says that its service did not."""
         codec = Codec(system, component)
-        for m in self.ears['down'].parse(codec.pack(message)):
+        for m in self.decoders['down'].parse(codec.pack(message)):
             self._up(self.upload.receive(m, self.now))
 
     def run(self, until=lambda: False, limit=120.0):
@@ -140,7 +140,7 @@ class UploadBench:
             busy = False
             for direction, _, frame in self.line.due(self.now):
                 busy = True
-                for m in self.ears[direction].parse(frame):
+                for m in self.decoders[direction].parse(frame):
                     if direction == 'up':
                         self._down(self.vehicle.receive(m, self.now))
                     else:

@@ -68,7 +68,7 @@ def test_every_profile_can_fly_its_mission_hold_and_return(profile, flight):
     assert message.target_system == 1
     if flight in profile.set_mode:
         assert message.command == d.MAV_CMD_DO_SET_MODE
-        assert profile.flight(profile.set_mode[flight]) is flight
+        assert profile.mode_function(profile.set_mode[flight]) is flight
 
 
 def test_a_px4_copter_is_told_how_near_is_there_where_the_task_does_not_say():

@@ -75,16 +75,17 @@ class Peers:
     """A ground station on a real socket, and MAVSDK at the other end of it."""
 
     def __init__(self, *systems, loss=0.0):
-        self.radio = Connections([open_link('udpin:127.0.0.1:0')], 245, 190, wall=time.time)
-        port = self.radio.links[0].port
+        self.connections = Connections([open_link('udpin:127.0.0.1:0')], 245, 190, wall=time.time)
+        port = self.connections.links[0].port
         self.proxy = Proxy(port, loss) if loss else None
-        self.ground = GroundStation(GcsConfig(origin=ORIGIN, autopilot='px4'), random.Random(1))
+        self.ground_station = GroundStation(GcsConfig(origin=ORIGIN, autopilot='px4'),
+                                            random.Random(1))
         self.events, self.told, self._half = [], [], ''
         self.process = subprocess.Popen(
             [sys.executable, str(SCRIPT), str(
                 self.proxy.front.getsockname()[1] if self.proxy else port), *map(str, systems)],
             stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL)
-        self.until(lambda: set(self.ground.served) == set(systems))
+        self.until(lambda: set(self.ground_station.sessions) == set(systems))
         self.hand_over()
 
     def until(self, condition, limit=30.0):
@@ -97,22 +98,22 @@ class Peers:
 
     def hand_over(self):
         """They are in the air, in Hold, when the bridge starts: they are somebody else's."""
-        for served in self.ground.served.values():
-            self.until(lambda served=served: served.pilot.telemetry.airborne)
-            assert served.pilot.authority.state is not AuthorityState.HELD
-            assert self.ground.hand_over(served.uav_id, 'test', time.monotonic()) == ''
+        for session in self.ground_station.sessions.values():
+            self.until(lambda session=session: session.executor.telemetry.airborne)
+            assert session.executor.authority.state is not AuthorityState.HELD
+            assert self.ground_station.hand_over(session.uav_id, 'test', time.monotonic()) == ''
 
     def serve(self):
         out = []
         if self.proxy:
             self.proxy.step()
-        for address, message in self.radio.receive(0.005 if self.proxy else 0.02):
-            out += self.ground.receive(address, message, time.monotonic())
-        out += self.ground.step(time.monotonic())
-        self.radio.send(out)
-        for served in self.ground.served.values():
-            while served.pilot.events:
-                self.events.append((served.uav_id, served.pilot.events.popleft()))
+        for address, message in self.connections.receive(0.005 if self.proxy else 0.02):
+            out += self.ground_station.receive(address, message, time.monotonic())
+        out += self.ground_station.step(time.monotonic())
+        self.connections.send(out)
+        for session in self.ground_station.sessions.values():
+            while session.executor.events:
+                self.events.append((session.uav_id, session.executor.events.popleft()))
         self.listen()
 
     def listen(self):
@@ -128,13 +129,13 @@ class Peers:
         self.process.stdin.flush()
 
     def assign(self, system, tasks):
-        self.radio.send(self.ground.assign(f'uav_{system}', tasks, time.monotonic()))
+        self.connections.send(self.ground_station.assign(f'uav_{system}', tasks, time.monotonic()))
 
-    def board(self, system):
-        return self.ground.served[system].pilot.board
+    def onboard(self, system):
+        return self.ground_station.sessions[system].executor.onboard
 
     def state(self, system):
-        return state_of(self.ground.served[system], time.monotonic())
+        return state_of(self.ground_station.sessions[system], time.monotonic())
 
     def missions(self, system):
         """Item lists as MAVSDK stored them."""
@@ -161,7 +162,7 @@ class Peers:
         self.process.wait()
         self.process.stdin.close()
         self.process.stdout.close()
-        self.radio.close()
+        self.connections.close()
         if self.proxy:
             self.proxy.close()
 
@@ -189,7 +190,7 @@ def stored(mission):
 
 
 def flying(peers, system, revision=1):
-    peers.until(lambda: peers.board(system).revision == revision
+    peers.until(lambda: peers.onboard(system).revision == revision
                 and peers.state(system).mode is UavMode.ON_MISSION)
 
 
@@ -202,7 +203,7 @@ def test_mavsdk_two_systems_on_one_port_hold_exactly_their_lists(mavsdk):
         flying(peers, system)
         peers.until(lambda system=system: peers.missions(system))
         assert stored(peers.missions(system)[-1]) == items(tasks)
-        assert peers.board(system).state is MissionState.VERIFIED
+        assert peers.onboard(system).state is MissionState.VERIFIED
 
 
 def test_mavsdk_a_list_is_replaced_while_flying(mavsdk):
@@ -240,7 +241,7 @@ def test_mavsdk_a_proxy_that_loses_a_fifth_delays_and_changes_nothing(mavsdk):
     peers = mavsdk(1, loss=0.2)
     for revision, names in enumerate(['ABCDE', 'EDCBA'], 1):
         peers.assign(1, task_list(names, revision))
-        peers.until(lambda revision=revision: peers.board(1).revision == revision, 90.0)
+        peers.until(lambda revision=revision: peers.onboard(1).revision == revision, 90.0)
         peers.until(lambda: peers.missions(1))
         assert stored(peers.missions(1)[-1]) == items(task_list(names))
     assert peers.proxy.lost > 20
@@ -251,7 +252,7 @@ def test_mavsdk_a_reboot_gets_its_mission_again(mavsdk):
     peers.assign(1, task_list('AB'))
     flying(peers, 1)
     peers.tell('reboot', 1)
-    peers.until(lambda: peers.ground.served[1].pilot.telemetry.restarts == 1)
+    peers.until(lambda: peers.ground_station.sessions[1].executor.telemetry.restarts == 1)
     peers.until(lambda: len(peers.missions(1)) == 2)
     flying(peers, 1)
     assert stored(peers.missions(1)[-1]) == items(task_list('AB'))

@@ -61,13 +61,13 @@ def test_a_bridge_takes_no_list_and_lets_nobody_take_off_once_it_is_to_end(sky, 
     assert sky.states['uav_2'].list_revision == 0
 
 
-def served(uav_id, airborne, swap_at):
-    return SimpleNamespace(uav_id=uav_id, pilot=SimpleNamespace(
+def session(uav_id, airborne, swap_at):
+    return SimpleNamespace(uav_id=uav_id, executor=SimpleNamespace(
         telemetry=SimpleNamespace(airborne=airborne), watch=SimpleNamespace(swap_at=swap_at)))
 
 
 def test_a_swap_is_waited_for_as_long_as_it_lasts_and_no_longer_than_said():
-    fleet = [served('a', True, None), served('b', True, 5.0)]
+    fleet = [session('a', True, None), session('b', True, 5.0)]
     assert not BridgeShutdown().waits(fleet[:1], 5.0)
     end = BridgeShutdown()
     assert end.waits(fleet, 100.0)
@@ -76,8 +76,8 @@ def test_a_swap_is_waited_for_as_long_as_it_lasts_and_no_longer_than_said():
 
 
 def test_everybody_in_the_air_is_named():
-    fleet = [served('a', True, None), served('b', True, 5.0), served('c', False, None),
-             served('d', True, None)]
+    fleet = [session('a', True, None), session('b', True, 5.0), session('c', False, None),
+             session('d', True, None)]
     flying, held = BridgeShutdown.words(fleet)
     assert flying.startswith('ends while airborne: a, d; ')
     assert held.startswith('ends while held in the air for a new list: b; ')

@@ -11,7 +11,7 @@ from rclpy.executors import SingleThreadedExecutor
 from uav_task_alloc_msgs import msg as m
 
 from uav_task_alloc.mavlink.transport.codec import Codec
-from uav_task_alloc.mavlink.transport.link import MOST_STRANGERS
+from uav_task_alloc.mavlink.transport.link import MAX_UNCONFIRMED
 from uav_task_alloc.model import Leg, Task
 from uav_task_alloc.nodes.conversions.messages import planned_task
 from uav_task_alloc.nodes.mavlink_bridge import MavlinkBridge
@@ -37,7 +37,7 @@ class Bridge:
     def say(self, *messages):
         for message in messages:
             self.far.sendto(self.codec.pack(message),
-                            ('127.0.0.1', self.node.radio.links[0].port))
+                            ('127.0.0.1', self.node.connections.links[0].port))
 
     def heard(self, kind):
         """The next message of a type that it sends to the far end."""
@@ -149,24 +149,24 @@ def test_finding_24_a_list_of_66000_points_is_refused_and_the_one_before_stays(b
     one.node.on_list('uav_1', m.TaskList(uav_id='uav_1', revision=2, tasks=[short, far]))
     assert one.log['warning'] == [
         'uav_1/task_list: task_list of uav_1: points = 66000: expected at most 65533: ignored']
-    board = one.node.ground.served[1].pilot.board
-    one.until(lambda: board.tasks is not None)
-    assert board.tasks.revision == 1
+    onboard = one.node.ground_station.sessions[1].executor.onboard
+    one.until(lambda: onboard.tasks is not None)
+    assert onboard.tasks.revision == 1
     assert one.node.receiver.is_alive()
 
 
 def test_finding_24_a_flood_of_strangers_leaves_the_known_vehicle(bridge):
     one = bridge()
-    link, = one.node.radio.links
+    link, = one.node.connections.links
     one.say(HEARTBEAT)
     one.until(lambda: 'uav_1' in one.node.lists)
     for _ in range(200):
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as stranger:
             stranger.bind(('127.0.0.1', 0))
             stranger.sendto(b'x', ('127.0.0.1', link.port))
-    one.until(lambda: one.node.radio.errors() == 200)
+    one.until(lambda: one.node.connections.errors() == 200)
     assert one.far.getsockname() in link.ends()
-    assert len(link.ends()) == 1 + MOST_STRANGERS
+    assert len(link.ends()) == 1 + MAX_UNCONFIRMED
     assert one.heard('HEARTBEAT').get_srcSystem() == 245
 
 
@@ -174,7 +174,7 @@ def test_no_mavlink_stream_ends_a_running_bridge(bridge, request):
     """`--streams 2000` sends a hundred; transport/test_hostile_streams.py sends all."""
     one = bridge('-p', 'takeoff:=true')
     ends = [socket.socket(socket.AF_INET, socket.SOCK_DGRAM) for _ in range(60)]
-    to = ('127.0.0.1', one.node.radio.links[0].port)
+    to = ('127.0.0.1', one.node.connections.links[0].port)
     for seed in range(request.config.getoption('--streams') // 20):
         for _, end, data in stream(10_000 + seed, 400):
             ends[end].sendto(data, to)

@@ -39,10 +39,11 @@ class Bridge:
 
     def __init__(self, world, courses):
         self.limit, self.courses = world.limit, courses
-        self.radio = Connections(world.links, 245, 190, wall=time.time)
-        self.heartbeat = Heartbeat(self.radio.send_to_all)
-        self.ground = GroundStation(GcsConfig(origin=ORIGIN, system_ids=SYSTEMS, policy=Policy(
-            takeoff=True, cruise_altitude=30.0)), random.Random(1))
+        self.connections = Connections(world.links, 245, 190, wall=time.time)
+        self.heartbeat = Heartbeat(self.connections.send_to_all)
+        policy = Policy(takeoff=True, cruise_altitude=30.0)
+        self.ground_station = GroundStation(GcsConfig(
+            origin=ORIGIN, system_ids=SYSTEMS, policy=policy), random.Random(1))
         self.events, self.notes = [], []
         self.began = self.now()
         self.heartbeat.start()
@@ -55,36 +56,36 @@ class Bridge:
         """Before the bridge takes a message of a vehicle."""
 
     def send(self, out):
-        self.radio.send(out)
+        self.connections.send(out)
 
     def serve(self):
         """Take what comes, and let time pass."""
         now = self.now()
-        for address, message in self.radio.receive(0.01):
+        for address, message in self.connections.receive(0.01):
             self.hear(message, now)
-            self.send(self.ground.receive(address, message, now))
+            self.send(self.ground_station.receive(address, message, now))
             if message.get_type() == 'GLOBAL_POSITION_INT':
                 self.see(message.get_srcSystem())
-        self.send(self.ground.step(now))
-        self.radio.step(now)
-        for system, served in self.ground.served.items():
-            self.note(system, served)
+        self.send(self.ground_station.step(now))
+        self.connections.step(now)
+        for system, session in self.ground_station.sessions.items():
+            self.note(system, session)
 
     def see(self, system):
-        served = self.ground.served.get(system)
-        if served and served.pilot.telemetry.airborne:
-            telemetry = served.pilot.telemetry
+        session = self.ground_station.sessions.get(system)
+        if session and session.executor.telemetry.airborne:
+            telemetry = session.executor.telemetry
             self.courses[system].visits.see(telemetry.position, telemetry.velocity)
 
-    def note(self, system, served):
-        while served.pilot.events:
-            event = served.pilot.events.popleft()
+    def note(self, system, session):
+        while session.executor.events:
+            event = session.executor.events.popleft()
             self.events.append((system, event))
             if event.event == 'COMPLETED':
                 self.courses[system].done.append(event.task)
-        while served.pilot.notes:
-            note = served.pilot.notes.popleft()
-            self.notes.append(f'{self.now() - self.began:6.1f} {served.uav_id}: '
+        while session.executor.notes:
+            note = session.executor.notes.popleft()
+            self.notes.append(f'{self.now() - self.began:6.1f} {session.uav_id}: '
                               f'{note.level}: {note.text}')
 
     def until(self, condition, what):
@@ -98,15 +99,15 @@ class Bridge:
 
     def close(self):
         self.heartbeat.close()
-        self.radio.close()
+        self.connections.close()
 
 
 class SecondStation:
     """Another ground station, with links of its own to the vehicles; it sets modes."""
 
     def __init__(self, world):
-        self.radio = Connections(world.second_links(), 255, 190, wall=time.time)
-        self.heartbeat = Heartbeat(self.radio.send_to_all)
+        self.connections = Connections(world.second_links(), 255, 190, wall=time.time)
+        self.heartbeat = Heartbeat(self.connections.send_to_all)
         self.sticks_of = set()  # systems whose sticks it holds in the middle
         self._at = 0.0
         self.heartbeat.start()
@@ -114,8 +115,8 @@ class SecondStation:
     def serve(self):
         """Drop what comes; a radio control that stops is a failsafe, so it goes on."""
         now = time.monotonic()
-        self.radio.receive(0.0)
-        self.radio.step(now)
+        self.connections.receive(0.0)
+        self.connections.step(now)
         if now < self._at:
             return
         self._at = now + 0.1
@@ -130,11 +131,12 @@ class SecondStation:
 
     def _send(self, system, message):
         number = SYSTEMS.index(system)
-        self.radio.send(((number, end), message) for end in self.radio.links[number].ends())
+        link = self.connections.links[number]
+        self.connections.send(((number, end), message) for end in link.ends())
 
     def close(self):
         self.heartbeat.close()
-        self.radio.close()
+        self.connections.close()
 
 
 def interferes(message):

@@ -56,11 +56,11 @@ class Course:
 class Replacing(Bridge):
     """Hands out lists that are due."""
 
-    def note(self, system, served):
-        super().note(system, served)
+    def note(self, system, session):
+        super().note(system, session)
         now, course = time.monotonic(), self.courses[system]
-        if course.is_due(state_of(served, now).mode):
-            self.send(self.ground.assign(served.uav_id, course.next(), now))
+        if course.is_due(state_of(session, now).mode):
+            self.send(self.ground_station.assign(session.uav_id, course.next(), now))
 
 
 def test_each_task_is_reached_once_and_none_that_was_withdrawn(world):

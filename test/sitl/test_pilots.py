@@ -66,27 +66,29 @@ class Watched(Bridge):
                 self.taken[message.target_system].append(str(message))
 
     def see(self, system):
-        if system in self.ground.served and self.pilot(system).authority.held:
+        if system in self.ground_station.sessions and self.executor(system).authority.held:
             super().see(system)  # else a pilot stops it wherever he likes
 
-    def note(self, system, served):
-        super().note(system, served)
-        if not self.courses[system].done and served.pilot.board.tasks is None:
-            self.send(self.ground.assign(served.uav_id, self.courses[system].list, self.now()))
+    def note(self, system, session):
+        super().note(system, session)
+        if not self.courses[system].done and session.executor.onboard.tasks is None:
+            tasks = self.courses[system].list
+            self.send(self.ground_station.assign(session.uav_id, tasks, self.now()))
 
     def hand_over(self, system):
-        return self.ground.hand_over(self.ground.served[system].uav_id, 'pilot', self.now())
+        uav_id = self.ground_station.sessions[system].uav_id
+        return self.ground_station.hand_over(uav_id, 'pilot', self.now())
 
-    def pilot(self, system):
-        return self.ground.served[system].pilot
+    def executor(self, system):
+        return self.ground_station.sessions[system].executor
 
     def telemetry(self, system):
-        return self.pilot(system).telemetry
+        return self.executor(system).telemetry
 
     def in_mid_mission(self, system):
         """On its way between two tasks."""
         course = self.courses[system]
-        if len(course.done) < 2 or self.telemetry(system).flight is not ModeFunction.MISSION:
+        if len(course.done) < 2 or self.telemetry(system).mode is not ModeFunction.MISSION:
             return False
         at = self.telemetry(system).position
         return min(math.dist(at, place) for place in course.places.values()) > 12.0
@@ -139,7 +141,7 @@ def pilots(world):
 
 def test_what_a_second_station_commands_stands_until_it_is_handed_over(pilots):
     bridge = pilots.bridge
-    pilots.until(lambda: len(bridge.ground.served) == len(SYSTEMS), 'all vehicles heard')
+    pilots.until(lambda: len(bridge.ground_station.sessions) == len(SYSTEMS), 'all vehicles heard')
     for system, name in ((LANDED, 'land'), (RETURNED, 'return'), (HELD, 'hold')):
         pilots.take(system, name)
     held = bridge.telemetry(HELD)
@@ -157,7 +159,7 @@ def test_what_a_second_station_commands_stands_until_it_is_handed_over(pilots):
     assert held.airborne
     assert math.dist(held.position, at) < 10.0
     assert bridge.taken == {LANDED: [], RETURNED: [], HELD: []}, '\n'.join(bridge.notes)
-    assert {n: bridge.pilot(n).authority.state for n in SYSTEMS} == {
+    assert {n: bridge.executor(n).authority.state for n in SYSTEMS} == {
         LANDED: AuthorityState.LOST,
         RETURNED: AuthorityState.LOST,
         HELD: AuthorityState.LOST,
@@ -166,10 +168,10 @@ def test_what_a_second_station_commands_stands_until_it_is_handed_over(pilots):
     pilots.until(lambda: bridge.courses[LEFT_ALONE].ended, 'the fourth has flown its list')
 
     for system in (LANDED, RETURNED):  # on the ground it takes the operator's leave to start
-        pilot = bridge.pilot(system)
-        pilot.policy = replace(pilot.policy, takeoff=False)
+        executor = bridge.executor(system)
+        executor.policy = replace(executor.policy, takeoff=False)
         assert 'takeoff is false' in bridge.hand_over(system)
-        pilot.policy = replace(pilot.policy, takeoff=True)
+        executor.policy = replace(executor.policy, takeoff=True)
     pilots.wait(3.0)
     assert bridge.taken == {LANDED: [], RETURNED: [], HELD: []}, '\n'.join(bridge.notes)
     pilots.station.sticks_of.clear()

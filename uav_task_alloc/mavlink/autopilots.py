@@ -63,7 +63,7 @@ class Profile:
     amsl_takeoff: bool = False  # NAV_TAKEOFF takes AMSL; else height above home
     farthest_first: float = math.inf  # [m] from home to the first item, else it is refused
 
-    def flight(self, custom_mode: int) -> ModeFunction:
+    def mode_function(self, custom_mode: int) -> ModeFunction:
         return self.modes.get(
             custom_mode, ModeFunction.PILOT if self.modes else ModeFunction.UNKNOWN
         )

@@ -79,15 +79,16 @@ class MavlinkBridge(Node):
                     'error': lambda text: logger.error(text)}
         self.store = AuthorityFileStore(params.state_dir, self.log['error'],
                                boot_id()) if params.state_dir else None
-        self.ground_station = GroundStation(self.station, random.Random(time.time_ns()), self.store)
+        self.ground_station = GroundStation(
+            self.station, random.Random(time.time_ns()), self.store)
         self.zones: tuple[ThreatZone, ...] = ()
-        self.radio = Connections(
+        self.connections = Connections(
             map(open_link, params.connections), params.system_id, params.component_id,
             wall=time.time, wanted=WANTED, signing_key_file=params.signing_key_file,
             tlog=params.tlog)
-        self.refusals, self.refused = (self.ground_station.refusals, self.radio.refusals), 0
+        self.refusals, self.refused = (self.ground_station.refusals, self.connections.refusals), 0
         self.lock = threading.Lock()  # of the ground station
-        self.told = PublishedStates()
+        self.published = PublishedStates()
         self.lists: dict[str, object] = {}
         self.troubles: dict[str, str] = {}  # logged, by link or topic
         self.states = self.create_publisher(m.UavState, 'uav_states', STATES)
@@ -101,7 +102,7 @@ class MavlinkBridge(Node):
         self.create_timer(0.05, self.on_tick)
         self.create_timer(1.0, self.on_second)
         self.closing, self.end = False, BridgeShutdown()
-        self.heartbeat = Heartbeat(self.radio.send_to_all)
+        self.heartbeat = Heartbeat(self.connections.send_to_all)
         self.receiver = threading.Thread(target=self.receive, name='receive', daemon=True)
         self.heartbeat.start()
         self.receiver.start()
@@ -110,16 +111,16 @@ class MavlinkBridge(Node):
         """Messages to the machines as they come, and time in between."""
         step_at = 0.0
         while not self.closing:
-            got, now, out = self.radio.receive(_TICK), time.monotonic(), []
+            got, now, out = self.connections.receive(_TICK), time.monotonic(), []
             with self.lock:
                 for address, message in got:
                     out += self.ground_station.receive(address, message, now)
                 if now >= step_at:
                     out += self.ground_station.step(now)
-                    self.radio.keep(self.ground_station.addresses())
-                    self.radio.step(now)
+                    self.connections.keep(self.ground_station.addresses())
+                    self.connections.step(now)
                     step_at = now + _TICK
-            self.radio.send(out)
+            self.connections.send(out)
             self.tell(now)
 
     def tell(self, now: float) -> None:
@@ -137,7 +138,7 @@ class MavlinkBridge(Node):
             conflict = self.origins.conflict()
             if conflict:
                 status = replace(status, available=False, reason=conflict)
-            if self.told.is_due(status, seen, now, self.live.now.state_rate):
+            if self.published.is_due(status, seen, now, self.live.now.state_rate):
                 self.states.publish(convert.from_uav_status(
                     status, self.capabilities.get(session.uav_id, ()), self.stamp() - now + seen))
 
@@ -193,7 +194,7 @@ class MavlinkBridge(Node):
             for uav_id, tasks in waiting.items():
                 with self.lock:
                     out = self.ground_station.assign(uav_id, tasks, time.monotonic())
-                self.radio.send(out)
+                self.connections.send(out)
 
     def on_zones(self, msg: m.ThreatZoneArray) -> None:
         """The whole picture of the zones; one whose new form is bad stays as it was."""
@@ -232,11 +233,11 @@ class MavlinkBridge(Node):
         self.tell_trouble('fleet_origin', conflict and f'refuses to fly new lists: {conflict}')
         if conflict:
             facts.append(('fleet_origin', 2, f'refuses to fly new lists: {conflict}', {}))
-        for link in self.radio.links:
+        for link in self.connections.links:
             self.tell_trouble(link.name, link.trouble)
             facts.append((link.name, 2 if link.trouble else 0, link.trouble or 'open', {}))
-        if self.radio.signing is not None:
-            trouble = self.radio.signing.trouble
+        if self.connections.signing is not None:
+            trouble = self.connections.signing.trouble
             self.tell_trouble('signing', trouble, 'warning')
             facts.append(('signing', int(bool(trouble)), trouble or 'timestamp kept', {}))
         facts += [self.heartbeat_facts(), self.message_facts()]
@@ -253,7 +254,7 @@ class MavlinkBridge(Node):
         count, before = sum(refusals.count for refusals in self.refusals), self.refused
         self.refused = count
         return 'messages', int(count > before), f'{count} messages refused', {
-            'messages_refused': str(count), 'frames_refused': str(self.radio.errors()),
+            'messages_refused': str(count), 'frames_refused': str(self.connections.errors()),
             'last_refused': '; '.join(printable(r.last) for r in self.refusals if r.last)}
 
     def tell_trouble(self, name: str, trouble: str, level: str = 'error') -> None:
@@ -283,7 +284,7 @@ class MavlinkBridge(Node):
         self.closing = True
         self.heartbeat.close()
         self.receiver.join(5.0)
-        self.radio.close()
+        self.connections.close()
         super().destroy_node()
 
 

@@ -73,7 +73,7 @@ def test_a_hold_that_is_not_at_rest_hands_nothing_over(kind, state, spoilt):
 def test_on_the_ground_a_change_from_sticks_to_hold_changes_nothing(kind):
     bench = on_ground(kind, H)
     assert bench.vehicles[1].flight.custom_mode == 0
-    bench.tells(set_mode(MODES[kind].hold, kind))
+    bench.from_station(set_mode(MODES[kind].hold, kind))
     bench.run(limit=10.0)
     assert shows(bench, H, 'takeoff is true')
 
@@ -85,7 +85,7 @@ def test_on_the_ground_a_change_from_sticks_to_hold_changes_nothing(kind):
 def test_the_mission_mode_set_in_flight_hands_it_over_and_a_verified_list_is_flown_on(kind,
                                                                                      state):
     bench = in_flight(kind, state)
-    assert bench.board().state is MissionState.VERIFIED
+    assert bench.onboard().state is MissionState.VERIFIED
     start = len(bench.sent)
     bench.vehicles[1].rc_mode(MODES[kind].mission)
     assert bench.becomes(H, 3.0)
@@ -136,8 +136,8 @@ def test_the_mission_mode_soon_after_our_own_command_may_be_that_command_and_giv
 def test_a_take_off_in_the_mission_mode_is_a_hand_over_where_our_list_is_verified(kind, names):
     bench = on_ground(kind, N)
     bench.assign(task_list('AB'))
-    assert bench.run(lambda: bench.board().state is MissionState.VERIFIED, 20.0)
-    bench.tells(set_mode(MODES[kind].mission, kind))
+    assert bench.run(lambda: bench.onboard().state is MissionState.VERIFIED, 20.0)
+    bench.from_station(set_mode(MODES[kind].mission, kind))
     bench.run(limit=2.0)
     assert bench.authority() is N
     bench.vehicles[1].rc_arm(True)
@@ -145,7 +145,7 @@ def test_a_take_off_in_the_mission_mode_is_a_hand_over_where_our_list_is_verifie
         bench.line.tampers.append(lambda way, m, now: [] if way == 'up' and (
             m.get_type() == 'MISSION_COUNT') else None)
         bench.assign(task_list('XY', 2))
-    assert bench.run(lambda: bench.pilot().telemetry.airborne, 10.0)
+    assert bench.run(lambda: bench.executor().telemetry.airborne, 10.0)
     bench.run(limit=1.0)
     if names == 'XY':
         assert keeps_quiet(bench, 12.0)
@@ -234,7 +234,7 @@ def test_lost_or_never_granted_the_end_of_a_mission_gives_nothing(kind):
     bench = risen_by_pilot(kind, 'AB', when_foreign='yield')
     upload_by_another(bench)
     bench.run(limit=5.0)
-    bench.tells(set_mode(MODES[kind].mission, kind))
+    bench.from_station(set_mode(MODES[kind].mission, kind))
     bench.run(limit=90.0)
     assert bench.vehicles[1].mode.name == 'HOLD'
     assert bench.authority() is not H

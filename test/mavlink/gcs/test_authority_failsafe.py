@@ -25,9 +25,9 @@ from pymavlink.dialects.v20 import ardupilotmega as d
 
 from uav_task_alloc.mavlink.gcs.authority import Suspension
 from uav_task_alloc.mavlink.gcs.onboard_mission import MissionState
-from uav_task_alloc.sim.failsafe import KINDS
+from uav_task_alloc.sim.failsafe import FAILSAFE_KINDS
 
-KIND_OF = pytest.mark.parametrize('failsafe', KINDS)
+KIND_OF = pytest.mark.parametrize('failsafe', FAILSAFE_KINDS)
 BACK = '~/hand_over, on the ground and disarmed'
 
 
@@ -123,7 +123,7 @@ def test_two_causes_have_both_to_end(kind):
     bench = suspended(kind)
     bench.line.cut = True
     bench.run(limit=5.0)
-    assert set(bench.pilot().authority.suspensions) == {Suspension.FAILSAFE, Suspension.LINK}
+    assert set(bench.executor().authority.suspensions) == {Suspension.FAILSAFE, Suspension.LINK}
     bench.line.cut = False
     bench.run(limit=3.0)
     assert shows(bench, S, 'a failsafe is active')
@@ -187,7 +187,7 @@ def test_who_ends_an_avoidance_by_another_mode_takes_it(kind, mode):
 def test_a_kill_takes_it_for_good(kind, state):
     bench = in_flight(kind, state)
     bench.vehicles[1].kill_switch()
-    assert bench.run(lambda: bench.pilot().authority.killed, 3.0)
+    assert bench.run(lambda: bench.executor().authority.killed, 3.0)
     assert bench.authority() is L
     assert shows(bench, L, 'MotorEStop HIGH' if kind == 'ardupilot' else 'Kill engaged')
     assert bench.state().reason.endswith(BACK)
@@ -213,7 +213,7 @@ def test_a_kill_on_the_ground_takes_it_too(kind):
     assert bench.becomes(L, 3.0)
     bench.vehicles[1].kill_switch_off()
     assert keeps_quiet(bench)
-    assert bench.pilot().authority.killed
+    assert bench.executor().authority.killed
 
 
 @BOTH
@@ -224,7 +224,7 @@ def test_a_text_of_a_kill_takes_it(kind, text):
     bench.vehicles[1].flight.texts.append((6 if 'RC7' in text else 2, text))
     assert bench.becomes(L, 3.0)
     assert shows(bench, L, text)
-    assert bench.pilot().authority.killed
+    assert bench.executor().authority.killed
 
 
 @BOTH
@@ -240,8 +240,8 @@ def test_the_end_of_a_kill_is_none(kind, text):
 @BOTH
 def test_after_a_kill_it_is_handed_over_on_the_ground_and_disarmed_only(kind):
     bench = flying(kind)
-    bench.says(d.MAVLink_statustext_message(2, b'Kill engaged'))
-    assert bench.pilot().authority.killed
+    bench.from_vehicle(d.MAVLink_statustext_message(2, b'Kill engaged'))
+    assert bench.executor().authority.killed
     assert bench.hand_over() == 'after a kill only on the ground and disarmed'
     bench.vehicles[1].rc_mode(MODES[kind].stick)
     bench.run(limit=13.0)
@@ -264,9 +264,9 @@ def test_a_disarming_in_the_air_counts_as_a_kill(kind):
     bench = flying(kind)
     beat = bench.vehicles[1]._telemetry.heartbeat()
     beat.base_mode &= ~d.MAV_MODE_FLAG_SAFETY_ARMED
-    bench.says(beat)
+    bench.from_vehicle(beat)
     assert shows(bench, L, 'disarmed in the air')
-    assert bench.pilot().authority.killed
+    assert bench.executor().authority.killed
 
 
 @BOTH
@@ -276,7 +276,7 @@ def test_a_landing_of_its_pilot_is_no_kill(kind):
     assert bench.run(lambda: not bench.vehicles[1].flight.armed, 100.0)
     bench.run(limit=3.0)
     assert shows(bench, L, 'not by the bridge')
-    assert not bench.pilot().authority.killed
+    assert not bench.executor().authority.killed
 
 
 # a foreign mission
@@ -301,7 +301,7 @@ def test_with_reassert_a_foreign_mission_takes_nothing(kind):
     upload_by_another(bench, items=20)
     bench.run(limit=10.0)
     assert shows(bench, H)
-    assert bench.run(lambda: bench.board().state is MissionState.VERIFIED, 60.0)
+    assert bench.run(lambda: bench.onboard().state is MissionState.VERIFIED, 60.0)
 
 
 @BOTH
@@ -317,6 +317,6 @@ def test_a_foreign_mission_of_an_aircraft_not_ours_changes_nothing(kind, state):
 @BOTH
 def test_a_foreign_mission_that_its_station_starts_again_stays_foreign(kind):
     bench = suspended(kind, Suspension.FOREIGN)
-    bench.tells(set_mode(MODES[kind].mission, kind))
+    bench.from_station(set_mode(MODES[kind].mission, kind))
     assert keeps_quiet(bench, 20.0)
     assert bench.authority() is S

@@ -112,7 +112,7 @@ def test_each_command_is_written_down_before_it_is_sent(kind):
     store = Log()
     bench = AuthorityBench(kind, store=store, relaunch='automatic')
     store.line = bench.line
-    bench.found()
+    bench.discover()
     bench.assign(task_list('ABC'))
     assert bench.run(lambda: bench.started() == ['A'])
     bench.run(limit=3.0)
@@ -120,7 +120,7 @@ def test_each_command_is_written_down_before_it_is_sent(kind):
     assert bench.run(lambda: bench.completed() == ['C', 'A'])
     bench.assign(task_list('', 3, returns=True))
     assert bench.run(lambda: not bench.vehicles[1].flight.armed, 100.0)
-    seen, profile = set(), bench.pilot().profile
+    seen, profile = set(), bench.executor().profile
     for at, (_, way, m) in enumerate(bench.line.log):
         before = [record for size, record in store.all if size <= at]
         if way != 'up' or m.get_type() != 'COMMAND_LONG':
@@ -160,5 +160,5 @@ def test_a_loss_is_written_down_in_the_moment_it_is_known(kind):
     assert bench.run(lambda: bench.authority() is L, 3.0)
     record = bench.store.load('uav_1')
     assert (record.state, record.mode, record.why) == (
-        L, MODES[kind].stick, bench.pilot().authority.why)
+        L, MODES[kind].stick, bench.executor().authority.why)
     assert record == replace(record, commanded=(), arming=False, swap_at=None)

@@ -38,7 +38,7 @@ def test_any_mode_that_a_pilot_sets_in_the_mission_takes_the_aircraft(kind, mode
     bench.vehicles[1].rc_mode(mode)
     assert bench.becomes(L, 3.0)
     assert bench.commands(start) == []
-    assert shows(bench, L, 'not by the bridge: ', mode_name(bench.pilot().profile.family, mode))
+    assert shows(bench, L, 'not by the bridge: ', mode_name(bench.executor().profile.family, mode))
     assert 'MISSION mode set in flight' in bench.state().reason
 
 
@@ -54,7 +54,7 @@ def test_after_a_pilot_took_it_nothing_is_sent_for_a_minute_whatever_lists_come(
 @pytest.mark.parametrize(('kind', 'mode'), FEW)
 def test_another_station_that_sets_a_mode_takes_it_like_a_pilot(kind, mode):
     bench = flying(kind)
-    bench.tells(set_mode(mode, kind))
+    bench.from_station(set_mode(mode, kind))
     assert bench.becomes(L, 3.0)
     assert keeps_quiet(bench)
     assert shows(bench, L)
@@ -96,7 +96,7 @@ def test_a_command_that_is_being_repeated_ends_with_the_news(kind, state):
     bench.assign(task_list('', 2))  # hold
     bench.run(limit=1.5)
     assert len(bench.modes()) >= 2
-    assert bench.pilot().helm.busy
+    assert bench.executor().sender.busy
     start = len(bench.sent)
     if state is L:
         bench.vehicles[1].rc_mode(MODES[kind].stick)
@@ -106,8 +106,8 @@ def test_a_command_that_is_being_repeated_ends_with_the_news(kind, state):
     start = len(bench.sent)
     assert keeps_quiet(bench)
     assert bench.commands(start) == []
-    assert not bench.pilot().helm.busy
-    assert not bench.pilot().helm.must_start
+    assert not bench.executor().sender.busy
+    assert not bench.executor().sender.must_start
 
 
 @BOTH
@@ -161,9 +161,9 @@ def test_another_stations_delayed_commands_are_its_own(kind):
     bench.assign(task_list('', 2))  # the bridge holds it
     bench.run(limit=5.0)
     assert bench.authority() is H
-    bench.tells(set_mode(modes.rtl, kind))
+    bench.from_station(set_mode(modes.rtl, kind))
     assert bench.becomes(L, 3.0)
-    bench.tells(set_mode(modes.hold, kind))
+    bench.from_station(set_mode(modes.hold, kind))
     bench.run(limit=12.0)
     assert bench.authority() is L
     assert keeps_quiet(bench, 40.0)

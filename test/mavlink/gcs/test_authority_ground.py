@@ -35,7 +35,7 @@ def test_takeoff_set_to_true_gives_nothing_back_that_was_lost(kind):
 @pytest.mark.parametrize('state', [H, S])
 def test_takeoff_set_to_true_where_it_is_ours_changes_nothing(kind, state):
     bench = on_ground(kind, state)
-    bench.pilot().watch._grant.takeoff = False
+    bench.executor().watch._grant.takeoff = False
     bench.run(limit=2.0)
     assert bench.authority() is state
 
@@ -53,7 +53,7 @@ def test_takeoff_set_to_true_on_the_ground_grants_it(kind):
 
 @BOTH
 def test_nothing_is_granted_before_the_end_of_the_boot(kind):
-    bench = AuthorityBench(kind, configs={1: {'boot_delay': 15.0}}).found()
+    bench = AuthorityBench(kind, configs={1: {'boot_delay': 15.0}}).discover()
     bench.assign(task_list('AB'))
     bench.run(lambda: bench.now >= 14.0)
     assert bench.authority() is N
@@ -128,7 +128,7 @@ def test_takeoff_set_to_false_drops_a_pending_arming_and_take_off(kind, armed):
         bench.vehicles[1].flight.refuses = 'Gyros inconsistent'
         bench.assign(task_list('AB', 2))
         bench.run(limit=8.0)
-        assert bench.pilot().helm.busy
+        assert bench.executor().sender.busy
     bench.wants(takeoff=False)
     bench.run(limit=0.2)
     assert bench.authority() is N
@@ -188,8 +188,8 @@ def unknown(**kwargs):
         if m.get_type() == 'HEARTBEAT' and way == 'down':
             m.autopilot = d.MAV_AUTOPILOT_GENERIC
     bench.line.tampers.append(rename)
-    bench.found()
-    assert bench.pilot().profile.name == 'generic'
+    bench.discover()
+    assert bench.executor().profile.name == 'generic'
     return bench
 
 

@@ -74,7 +74,7 @@ def test_it_is_refused_beside_a_foreign_mission(kind):
 @BOTH
 def test_it_is_refused_while_traffic_is_avoided_or_something_else_suspends(kind):
     bench = flying(kind)
-    bench.pilot().authority.apply(AuthorityEvent.AVOIDING, bench.now, 'avoids')
+    bench.executor().authority.apply(AuthorityEvent.AVOIDING, bench.now, 'avoids')
     assert bench.hand_over() == 'SUSPENDED: avoids'
 
 
@@ -89,7 +89,7 @@ def test_it_is_refused_on_the_ground_without_takeoff(kind, state):
 
 @BOTH
 def test_it_is_refused_while_the_autopilot_starts(kind):
-    bench = AuthorityBench(kind, configs={1: {'boot_delay': 30.0}}).found()
+    bench = AuthorityBench(kind, configs={1: {'boot_delay': 30.0}}).discover()
     bench.run(limit=3.0)
     assert refused(bench, 'the autopilot is starting')
 
@@ -123,7 +123,7 @@ def test_in_flight_it_is_granted_and_holds_before_anything_else(kind, state):
     assert shows(bench, H, 'handed over by test')
     assert bench.modes(start) == [modes.hold, modes.mission]
     first = bench.commands(start)[0]
-    assert bench.pilot().profile.commanded_mode(first) == modes.hold
+    assert bench.executor().profile.commanded_mode(first) == modes.hold
     assert bench.run(lambda: len(bench.completed()) >= 2, 60.0)
 
 
@@ -149,7 +149,7 @@ def test_with_a_new_list_waiting_it_holds_before_the_upload(kind):
     start = len(bench.sent)
     assert bench.hand_over() == ''
     assert bench.run(lambda: bench.completed()[-3:] == ['Z', 'Y', 'X'], 200.0)
-    kinds = [(m.get_type(), bench.pilot().profile.commanded_mode(m))
+    kinds = [(m.get_type(), bench.executor().profile.commanded_mode(m))
              for _, what, m in bench.sent[start:] if what != 'read']
     assert kinds[0] == ('COMMAND_LONG', modes.hold)
     assert kinds[1][0] == 'MISSION_COUNT'
@@ -232,5 +232,5 @@ def test_nothing_that_was_sent_before_counts_after_a_hand_over(kind):
     bench.run(limit=2.0)
     bench.vehicles[1].rc_mode(modes.rtl)
     assert bench.becomes(L, 3.0)
-    assert bench.board().state is MissionState.VERIFIED
+    assert bench.onboard().state is MissionState.VERIFIED
     assert keeps_quiet(bench, 20.0)

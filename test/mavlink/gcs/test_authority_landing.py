@@ -27,7 +27,7 @@ BY_HAND = '; given back by ~/hand_over'
 @pytest.mark.parametrize('end', ['item', 'mode'])
 @pytest.mark.parametrize('relaunch', ['operator', 'automatic'])
 def test_after_our_landing_it_starts_again_as_relaunch_says(kind, relaunch, end):
-    bench = AuthorityBench(kind, relaunch=relaunch).found()
+    bench = AuthorityBench(kind, relaunch=relaunch).discover()
     bench.assign(task_list('A', returns=end == 'item'))
     assert bench.run(lambda: bench.completed() == ['A'], 60.0)
     bench.assign(task_list('', 2, returns=True))

@@ -108,7 +108,7 @@ def test_silence_gives_and_takes_nothing_where_it_is_not_ours(kind, state, mode)
 def test_silence_while_it_is_suspended_takes_it_where_the_mode_has_changed(kind):
     bench = suspended(kind)
     silent(bench)
-    assert set(bench.pilot().authority.suspensions) == {Suspension.FAILSAFE, Suspension.LINK}
+    assert set(bench.executor().authority.suspensions) == {Suspension.FAILSAFE, Suspension.LINK}
     bench.vehicles[1].rc_mode(MODES[kind].stick)
     heard_again(bench, 1.5)
     assert shows(bench, L)
@@ -176,7 +176,7 @@ def test_a_reboot_of_one_never_armed_leaves_it_ours(kind, silence):
 @ARDUPILOT
 @pytest.mark.parametrize('silence', [0.0, 6.0])
 def test_a_reboot_while_it_refuses_to_arm_leaves_it_ours(kind, silence):
-    bench = AuthorityBench(kind, configs={1: {'boot_delay': 8.0}}).found()
+    bench = AuthorityBench(kind, configs={1: {'boot_delay': 8.0}}).discover()
     bench.vehicles[1].flight.refuses = 'Gyros inconsistent'
     bench.assign(task_list('AB'))
     assert bench.run(lambda: bench.vehicles[1].flight.custom_mode == 4, 20.0)

@@ -85,7 +85,7 @@ def test_suspended_it_is_ours_again_where_nothing_has_changed_and_the_cause_is_o
 @pytest.mark.parametrize('state', [L, N])
 def test_what_was_not_ours_is_not_ours_after_a_restart(kind, state):
     bench = in_flight(kind, state)
-    why = bench.pilot().authority.why
+    why = bench.executor().authority.why
     bench.dead_for(5.0)
     bench.run(limit=10.0)
     assert shows(bench, state, why)
@@ -101,7 +101,7 @@ def test_a_kill_is_kept(kind):
     bench.run(limit=3.0)
     bench.dead_for(5.0)
     assert keeps_quiet(bench)
-    assert bench.pilot().authority.killed
+    assert bench.executor().authority.killed
     assert bench.hand_over() == ''
     assert bench.authority() is H
 
@@ -112,8 +112,8 @@ def test_a_kill_is_kept(kind):
 @pytest.mark.parametrize('mode', ['hold', 'stick', 'rtl', 'own'])
 def test_in_another_mode_than_it_was_left_it_is_a_loss(kind, mode):
     bench = flying(kind)
-    bench.ground.step = lambda now: []
-    bench.ground.receive = lambda address, m, now: []
+    bench.ground_station.step = lambda now: []
+    bench.ground_station.receive = lambda address, m, now: []
     bench.vehicles[1].rc_mode(getattr(MODES[kind], mode))
     bench.dead_for(3.0)
     bench.run(limit=1.0)
@@ -146,11 +146,11 @@ def test_suspended_and_found_in_another_mode_it_is_a_loss(kind):
 def swapping(moment, kind='ardupilot', speed=0.0):
     """Killed while ArduPilot is held for an upload that the line lets through slowly."""
     bench = flying(kind, delay=(0.1, 0.1))
-    assert bench.run(lambda: bench.pilot().telemetry.speed > speed, 20.0)
+    assert bench.run(lambda: bench.executor().telemetry.speed > speed, 20.0)
     bench.assign(task_list('ZYXWV', 2))
     assert bench.run(lambda: bench.vehicles[1].flight.custom_mode == 4, 10.0)
     bench.run(limit=moment)
-    assert bench.pilot().watch.swap_at is not None
+    assert bench.executor().watch.swap_at is not None
     return bench
 
 
@@ -172,7 +172,7 @@ def test_killed_in_a_swap_the_current_item_says_nothing_of_the_new_mission():
     bench = flying('ardupilot', delay=(0.1, 0.1))
     assert bench.run(lambda: len(bench.completed()) == 2, 200.0)
     bench.assign(task_list('ZYXWV', 2))
-    assert bench.run(lambda: bench.board().upload.sent_all, 30.0)
+    assert bench.run(lambda: bench.onboard().upload.sent_all, 30.0)
     bench.run(limit=0.3)
     bench.vehicles[1].rc_mode(3)  # a pilot has it fly on from there
     bench.dead_for(0.5)
@@ -244,7 +244,7 @@ def test_killed_just_after_it_was_told_to_hold_it_is_not_lost(moment):
 @BOTH
 @pytest.mark.parametrize('height', [2.0, 20.0, 30.0])
 def test_killed_in_a_climb_it_is_ours_and_flies_its_list(kind, height):
-    bench = AuthorityBench(kind).found()
+    bench = AuthorityBench(kind).discover()
     bench.assign(task_list('AB'))
     assert bench.run(lambda: bench.vehicles[1].flight.body.position[2] > height, 60.0)
     bench.dead_for(3.0)
@@ -252,12 +252,12 @@ def test_killed_in_a_climb_it_is_ours_and_flies_its_list(kind, height):
     assert bench.authority() is H
     bench.assign(task_list('AB'))
     assert bench.run(lambda: bench.completed() == ['A', 'B'], 100.0)
-    assert bench.pilot().authority.state is H
+    assert bench.executor().authority.state is H
 
 
 @PX4
 def test_a_climb_that_ended_while_no_bridge_was_there_is_a_loss(kind):
-    bench = AuthorityBench(kind).found()
+    bench = AuthorityBench(kind).discover()
     bench.assign(task_list('AB'))
     assert bench.run(lambda: bench.vehicles[1].flight.body.position[2] > 20.0, 60.0)
     bench.dead_for(30.0)
@@ -268,7 +268,7 @@ def test_a_climb_that_ended_while_no_bridge_was_there_is_a_loss(kind):
 
 @PX4
 def test_a_climb_that_a_pilot_ends_below_its_height_is_a_loss(kind):
-    bench = AuthorityBench(kind).found()
+    bench = AuthorityBench(kind).discover()
     bench.assign(task_list('AB'))
     assert bench.run(lambda: bench.vehicles[1].flight.body.position[2] > 10.0, 60.0)
     bench.dead_for()

@@ -32,7 +32,7 @@ def swapping(kind, moment, **kwargs):
 
     def count(name):
         return sum(m.get_type() == name for _, _, m in bench.sent[start:])
-    last = len(NEW) + bench.board().own
+    last = len(NEW) + bench.onboard().own
     reached = {'holding': lambda: kind == 'px4' or bench.modes(start),
                'counting': lambda: count('MISSION_COUNT'),
                'sending': lambda: count('MISSION_ITEM_INT') >= 5,
@@ -50,7 +50,7 @@ def transfer_ended(bench, start):
     bench.run(limit=20.0)
     assert {what for _, what, _ in bench.sent[start:]} <= {'read'}
     assert bench.vehicles[1].flight.custom_mode != MODES[
-        'px4' if bench.pilot().profile.atomic else 'ardupilot'].mission
+        'px4' if bench.executor().profile.atomic else 'ardupilot'].mission
     assert keeps_quiet(bench, 40.0)
 
 
@@ -63,8 +63,8 @@ def test_a_pilot_in_the_middle_of_a_swap_ends_the_transfer(kind, moment, mode):
     assert bench.run(lambda: bench.authority() is L, 3.0)
     transfer_ended(bench, len(bench.sent))
     assert shows(bench, L, 'not by the bridge')
-    assert bench.board().state is not MissionState.UPLOADING
-    assert bench.pilot().watch.swap_at is None
+    assert bench.onboard().state is not MissionState.UPLOADING
+    assert bench.executor().watch.swap_at is None
 
 
 @BOTH
@@ -163,7 +163,7 @@ def test_held_for_30_seconds_with_a_zone_on_the_way_home_it_stays_and_gives_an_a
     zone = ThreatZone('Z1', Shape.CYLINDER, (0.0, 20.0, 0.0), 5.0)
     bench, start, since = stuck()
     bench.wants(zones=(zone,))
-    bench.run(lambda: bench.pilot().alarm, 60.0)
+    bench.run(lambda: bench.executor().alarm, 60.0)
     assert 29.0 < bench.now - since < 45.0
     bench.run(limit=60.0)
     assert 6 not in bench.modes(start)

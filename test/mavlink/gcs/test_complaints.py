@@ -20,7 +20,7 @@ def test_ardupilot_138_3338_a_mission_that_is_half_old_is_never_flown():
     modes = set()
     bench.run(lambda: modes.add(bench.vehicles[1].mode.name), 60.0)
     assert modes == {'GUIDED'}
-    assert bench.board().state is MissionState.MIXED
+    assert bench.onboard().state is MissionState.MIXED
 
 
 def test_ardupilot_2445_6307_no_old_command_and_no_phantom_item_is_left():
@@ -35,7 +35,7 @@ def test_px4_14981_the_old_waypoint_is_not_flown_to_after_a_swap():
     bench = flying('px4', 'ABC')
     bench.run(limit=3.0)
     bench.assign(task_list('CB', 2))
-    assert bench.run(lambda: bench.board().revision == 2)
+    assert bench.run(lambda: bench.onboard().revision == 2)
     assert bench.vehicles[1].flight.seq == 0
     assert bench.run(lambda: bench.completed() == ['C', 'B'])
     assert places(bench) == ['C', 'B']
@@ -43,14 +43,14 @@ def test_px4_14981_the_old_waypoint_is_not_flown_to_after_a_swap():
 
 @BOTH
 def test_qgroundcontrol_5664_no_vehicle_gets_the_mission_of_another(kind):
-    bench = FlightBench(kind, kind, takeoff=False, delay=(0.0, 0.3)).found()
+    bench = FlightBench(kind, kind, takeoff=False, delay=(0.0, 0.3)).discover()
     lists = {1: task_list('ABC'), 2: task_list('DEF')}
     for n, tasks in lists.items():
         bench.assign(tasks, n)
-    assert bench.run(lambda: all(bench.board(n).revision == 1 for n in lists), 60.0)
+    assert bench.run(lambda: all(bench.onboard(n).revision == 1 for n in lists), 60.0)
     for n, tasks in lists.items():
-        own = bench.board(n).own
-        sent = mission_items(tasks, bench.pilot(n).profile.rules, ORIGIN)
+        own = bench.onboard(n).own
+        sent = mission_items(tasks, bench.executor(n).profile.rules, ORIGIN)
         held = bench.vehicles[n].mission.items[own:]
         assert [(i.x, i.y) for i in held] == [(i.x, i.y) for i in sent]
 
@@ -95,5 +95,6 @@ def test_mavros_1867_an_upload_always_ends_with_an_answer(kind):
 def test_what_a_vehicle_says_in_words_reaches_the_log_once(kind):
     bench = flying(kind, 'AB')
     for _ in range(3):
-        bench.says(d.MAVLink_statustext_message(d.MAV_SEVERITY_CRITICAL, b'Motor 3 is hot'))
+        bench.from_vehicle(d.MAVLink_statustext_message(
+            d.MAV_SEVERITY_CRITICAL, b'Motor 3 is hot'))
     assert bench.notes.count('Motor 3 is hot') == 1

@@ -62,7 +62,7 @@ def test_a_mixture_of_faults_never_ends_in_a_false_success(kind, seed):
 def test_lists_replaced_over_a_line_of_faults_complete_what_was_flown_and_no_more(kind, seed):
     rng = random.Random(1000 + seed)
     bench = FlightBench(kind, seed=seed, loss=rng.uniform(0.0, 0.25),
-                        delay=(0.0, rng.uniform(0.0, 0.5))).found()
+                        delay=(0.0, rng.uniform(0.0, 0.5))).discover()
     given = list('ABCDEFGH')
     bench.assign(task_list(given))
     for revision in range(2, 5):
@@ -75,7 +75,7 @@ def test_lists_replaced_over_a_line_of_faults_complete_what_was_flown_and_no_mor
     real = [(round(p[0] / 100.0), round(p[1] / 100.0)) for p in bench.flown()]
     assert len(set(real)) == 8, f'seed {seed}: a task was told that was not flown'
     assert len(real) == 8, f'seed {seed}: a task was flown twice'
-    assert bench.run(lambda: bench.board().state is MissionState.VERIFIED)
+    assert bench.run(lambda: bench.onboard().state is MissionState.VERIFIED)
 
 
 @BOTH

@@ -28,7 +28,7 @@ WHILE = {'ardupilot': ['RTL', 'LOITER', 'BRAKE', 'PAUSE'], 'px4': ['RTL', 'LOITE
 
 def climbing(kind):
     """A vehicle that climbs to its cruise altitude."""
-    bench = FindingsBench(kind).found()
+    bench = FindingsBench(kind).discover()
     bench.assign(task_list('ABC'))
     assert bench.run(lambda: bench.vehicles[1].flight.body.position[2] > 15.0)
     return bench
@@ -65,7 +65,7 @@ def at(moment, kind):
     elif moment == 'verified':
         bench = flying(kind, 'ABC')
         bench.assign(task_list('CAB', 2))
-        assert bench.run(lambda: bench.board().revision == 2)
+        assert bench.run(lambda: bench.onboard().revision == 2)
         bench.run(limit=1.5)
     elif moment == 'readback':
         bench = flying(kind, 'EAB', side=300.0)
@@ -94,7 +94,7 @@ def test_finding_02_a_mode_that_another_has_set_stays(kind, moment, mode):
 
 @BOTH
 def test_a_heartbeat_with_the_mode_before_a_change_of_ours_is_no_pilot(kind):
-    bench = FindingsBench(kind).found()
+    bench = FindingsBench(kind).discover()
     late = []
 
     def tamper(way, m, now):
@@ -115,7 +115,7 @@ class Rerouted:
     """A ground station that hears the vehicle from a new address."""
 
     def __init__(self, ground):
-        self._ground, self.served = ground, ground.served
+        self._ground, self.sessions = ground, ground.sessions
 
     def _back(self, outgoing):
         return [(n if isinstance(n, int) else n[1], m) for n, m in outgoing]
@@ -142,11 +142,11 @@ def test_finding_03_a_pause_of_the_pilot_is_not_forgotten(kind, mode, after):
     bench.run(limit=5.0)
     bench.line.cut = False
     if after == 'new address':
-        bench.ground = Rerouted(bench.ground)
+        bench.ground_station = Rerouted(bench.ground_station)
     else:
         bench.store = bench.store if after == 'restart' else type(bench.store)()
         bench.start()
-        bench.found()
+        bench.discover()
     bench.assign(task_list('ABC', 2))
     left_alone(bench)
     assert bench.vehicles[1].flight.custom_mode == MODES[kind][mode]
@@ -156,12 +156,12 @@ def test_finding_03_a_pause_of_the_pilot_is_not_forgotten(kind, mode, after):
 @BOTH
 @pytest.mark.parametrize('change', ['takeoff', 'list'])
 def test_finding_14_arming_ends_when_it_is_not_wanted_any_more(kind, change):
-    bench = FindingsBench(kind).found()
+    bench = FindingsBench(kind).discover()
     bench.vehicles[1].flight.refuses = 'Gyros inconsistent'
     bench.assign(task_list('AB'))
     assert bench.run(lambda: len(arms(bench)) == 5, 30.0)
     if change == 'takeoff':
-        bench.pilot().policy = dataclasses.replace(bench.pilot().policy, takeoff=False)
+        bench.executor().policy = dataclasses.replace(bench.executor().policy, takeoff=False)
     else:
         bench.assign(task_list('', 2))
     bench.run(limit=60.0)
@@ -174,11 +174,11 @@ def test_finding_14_arming_ends_when_it_is_not_wanted_any_more(kind, change):
 @BOTH
 @pytest.mark.parametrize('change', ['takeoff', 'list'])
 def test_what_is_armed_in_the_moment_it_is_withdrawn_does_not_take_off(kind, change):
-    bench = FindingsBench(kind, delay=(0.3, 0.3)).found()
+    bench = FindingsBench(kind, delay=(0.3, 0.3)).discover()
     bench.assign(task_list('AB'))
     assert bench.run(lambda: arms(bench), 30.0)
     if change == 'takeoff':
-        bench.pilot().policy = dataclasses.replace(bench.pilot().policy, takeoff=False)
+        bench.executor().policy = dataclasses.replace(bench.executor().policy, takeoff=False)
     else:
         bench.assign(task_list('', 2))
     bench.run(limit=60.0)
@@ -189,13 +189,13 @@ def test_what_is_armed_in_the_moment_it_is_withdrawn_does_not_take_off(kind, cha
 
 @BOTH
 def test_finding_15_an_answer_to_another_station_is_not_taken(kind):
-    bench = FindingsBench(kind).found()
+    bench = FindingsBench(kind).discover()
     swallow(bench, 'up', 'COMMAND_LONG',
             lambda m: m.command == d.MAV_CMD_COMPONENT_ARM_DISARM and len(arms(bench)) < 9)
     bench.assign(task_list('AB'))
     assert bench.run(lambda: arms(bench), 30.0)
     for station, component in ((255, 190), (245, 191)):
-        bench.says(d.MAVLink_command_ack_message(
+        bench.from_vehicle(d.MAVLink_command_ack_message(
             d.MAV_CMD_COMPONENT_ARM_DISARM, d.MAV_RESULT_ACCEPTED, 0, 0, station, component))
     bench.run(limit=5.0)
     assert len(arms(bench)) >= 5
@@ -205,10 +205,10 @@ def test_finding_15_an_answer_to_another_station_is_not_taken(kind):
 
 @BOTH
 def test_finding_19_no_way_home_is_flown_into_a_zone_over_home(kind):
-    bench = FindingsBench(kind).found()
+    bench = FindingsBench(kind).discover()
     bench.assign(task_list('AB', returns=True))
     assert bench.run(lambda: bench.started() == ['A'])
-    bench.pilot().policy = FindingsBench(kind, zones=(AROUND_HOME,)).policy
+    bench.executor().policy = FindingsBench(kind, zones=(AROUND_HOME,)).policy
     assert bench.run(lambda: bench.completed() == ['A', 'B'])
     bench.assign(task_list('', 2, returns=True))
     bench.run(limit=60.0)
@@ -223,7 +223,8 @@ def test_finding_19_no_way_home_is_flown_into_a_zone_over_home(kind):
 def test_finding_19_an_empty_list_that_returns_holds_outside_the_zone(kind, when_empty):
     bench = flying(kind, 'AB', when_empty=when_empty)
     assert bench.run(lambda: bench.completed() == ['A'])
-    bench.pilot().policy = FindingsBench(kind, when_empty=when_empty, zones=(AROUND_HOME,)).policy
+    bench.executor().policy = FindingsBench(
+        kind, when_empty=when_empty, zones=(AROUND_HOME,)).policy
     bench.assign(task_list('', 2, returns=when_empty == 'hold'))
     bench.run(limit=40.0)
     assert MODES[kind]['RTL'] not in [e.mode for e in bench.truth[1]]
@@ -233,12 +234,12 @@ def test_finding_19_an_empty_list_that_returns_holds_outside_the_zone(kind, when
 
 @BOTH
 def test_finding_19_on_the_ground_in_a_zone_nothing_starts(kind):
-    bench = FindingsBench(kind, zones=(AROUND_HOME,)).found()
+    bench = FindingsBench(kind, zones=(AROUND_HOME,)).discover()
     bench.assign(task_list('AB'))
     bench.run(limit=60.0)
     assert not happened(bench, 'armed')
     assert bench.noted('zone Z')
-    bench.pilot().policy = dataclasses.replace(bench.pilot().policy, zones=())
+    bench.executor().policy = dataclasses.replace(bench.executor().policy, zones=())
     assert bench.run(lambda: bench.completed() == ['A', 'B'])
 
 
@@ -252,7 +253,7 @@ def test_finding_25_a_bridge_restarted_without_positions_does_not_take_off(kind,
         swallow(bench, 'down', message, lambda m: silent[0])
     bench.store = bench.store if file else type(bench.store)()
     bench.start()
-    bench.found()
+    bench.discover()
     bench.assign(task_list('ABC', 2))
     bench.run(limit=30.0)
     assert [m.command for m in bench.line.sent('COMMAND_LONG')].count(

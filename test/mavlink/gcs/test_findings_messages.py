@@ -19,9 +19,9 @@ NAN, INF = math.nan, math.inf
 
 def read_back(kind):
     """A bench whose vehicle is asked for an item of its mission at this moment."""
-    bench = FlightBench(kind, delay=(0.15, 0.15)).found()
+    bench = FlightBench(kind, delay=(0.15, 0.15)).discover()
     bench.assign(task_list('ABC'))
-    upload = bench.board().upload
+    upload = bench.onboard().upload
     assert bench.run(lambda: upload._readback is not None and upload._mission is not None
                      and upload._readback.state is DownloadState.GETTING)
     return bench, len(upload._readback.items)
@@ -50,8 +50,8 @@ def new_item(seq, z, param1=0.0):
 def test_finding_10_an_item_that_is_no_place_is_dropped_and_told_once(kind, make, words):
     bench, seq = read_back(kind)
     for _ in range(3):
-        bench.says(make(seq))
-    refusals = bench.ground.refusals
+        bench.from_vehicle(make(seq))
+    refusals = bench.ground_station.refusals
     assert refusals.count == 3
     assert len(refusals.notes) == 1
     assert words in refusals.notes[0].text
@@ -69,14 +69,14 @@ def test_finding_10_an_item_that_is_no_place_is_dropped_and_told_once(kind, make
      'battery_remaining = 127: expected a number in [-128, 100]'),
 ], ids=['latitude', 'longitude', 'battery'])
 def test_finding_10_a_field_that_no_vehicle_means_changes_nothing(message, words):
-    bench = FlightBench('px4').found()
+    bench = FlightBench('px4').discover()
     bench.run(limit=10.0)
     before = bench.state()
-    bench.says(message)
+    bench.from_vehicle(message)
     after = bench.state()
     assert (after.position, after.home, after.battery) == (
         before.position, before.home, before.battery)
-    assert words in bench.ground.refusals.last
+    assert words in bench.ground_station.refusals.last
 
 
 def test_finding_10_an_infinite_hold_on_board_is_unlike_any_other():
@@ -86,20 +86,20 @@ def test_finding_10_an_infinite_hold_on_board_is_unlike_any_other():
 
 
 def test_finding_10_an_error_that_nobody_expected_drops_the_message_only(monkeypatch):
-    bench = FlightBench('px4', 'px4').found()
+    bench = FlightBench('px4', 'px4').discover()
     bench.assign(task_list('AB'), 2)
-    good = bench.pilot(1).receive
+    good = bench.executor(1).receive
 
     def bad(message, now):
         raise ValueError('never\nseen')
-    monkeypatch.setattr(bench.pilot(1), 'receive', bad)
+    monkeypatch.setattr(bench.executor(1), 'receive', bad)
     assert bench.run(lambda: bench.completed(2) == list('AB'))
-    refusals = bench.ground.refusals
+    refusals = bench.ground_station.refusals
     assert refusals.count > 10
     assert 'ValueError: never seen (at test_findings_messages.py:' in refusals.last
     texts = [note.text for note in refusals.notes]
     assert len({text.split(':')[0] for text in texts}) == len(texts)
-    monkeypatch.setattr(bench.pilot(1), 'receive', good)
+    monkeypatch.setattr(bench.executor(1), 'receive', good)
     bench.assign(task_list('AB'), 1)
     assert bench.run(lambda: bench.completed(1) == list('AB'))
 
@@ -107,41 +107,41 @@ def test_finding_10_an_error_that_nobody_expected_drops_the_message_only(monkeyp
 @pytest.mark.parametrize('what', ['step', 'assign'])
 def test_finding_10_a_vehicle_that_cannot_be_served_is_not_available_while_that_lasts(
         monkeypatch, what):
-    bench = FlightBench('px4', 'px4').found()
+    bench = FlightBench('px4', 'px4').discover()
     assert bench.run(lambda: bench.state(1).available)
 
     def bad(*_):
         raise KeyError('x')
-    good = getattr(bench.pilot(1), what)
-    monkeypatch.setattr(bench.pilot(1), what, bad)
+    good = getattr(bench.executor(1), what)
+    monkeypatch.setattr(bench.executor(1), what, bad)
     if what == 'step':
         bench.run(limit=1.0)
     else:
         bench.assign(task_list('AB'), 1)
     assert "KeyError: 'x'" in bench.state(1).reason
-    assert facts_of(bench.ground.served[1], bench.now)[0] == 2
-    assert [note.level for note in bench.ground.refusals.notes] == ['error']
-    monkeypatch.setattr(bench.pilot(1), what, good)
+    assert facts_of(bench.ground_station.sessions[1], bench.now)[0] == 2
+    assert [note.level for note in bench.ground_station.refusals.notes] == ['error']
+    monkeypatch.setattr(bench.executor(1), what, good)
     bench.assign(task_list('AB'), 2)
     assert bench.run(lambda: bench.completed(2) == list('AB'))
     assert bench.state(1).available
 
 
 def test_finding_10_a_flood_of_kinds_and_senders_does_not_flood_the_log(monkeypatch):
-    bench = FlightBench('px4').found()
+    bench = FlightBench('px4').discover()
     for kind in range(1000):
-        bench.ground.refusals.add(f'system {kind % 250}', f'KIND_{kind}', 'x' * 10_000)
-    assert bench.ground.refusals.count == 1000
-    assert len(bench.ground.refusals.notes) == 101
-    assert max(len(note.text) for note in bench.ground.refusals.notes) < 400
+        bench.ground_station.refusals.add(f'system {kind % 250}', f'KIND_{kind}', 'x' * 10_000)
+    assert bench.ground_station.refusals.count == 1000
+    assert len(bench.ground_station.refusals.notes) == 101
+    assert max(len(note.text) for note in bench.ground_station.refusals.notes) < 400
 
 
-def test_finding_10_bytes_that_cannot_be_decoded_drop_one_datagram(radio, far, monkeypatch):
-    radio = radio()
-    end = far(radio)
+def test_finding_10_bytes_that_cannot_be_decoded_drop_one_datagram(connections, far, monkeypatch):
+    connections = connections()
+    end = far(connections)
     end.say(heartbeat())
-    assert len(receive(radio)) == 1
-    parser, = radio._parsers.values()
+    assert len(receive(connections)) == 1
+    parser, = connections._parsers.values()
     good = parser.parse
 
     def bad(data):
@@ -150,20 +150,20 @@ def test_finding_10_bytes_that_cannot_be_decoded_drop_one_datagram(radio, far, m
     monkeypatch.setattr(parser, 'parse', bad)
     end.say(heartbeat())
     end.say(heartbeat())
-    assert len(receive(radio)) == 1
-    assert 'IndexError: x' in radio.refusals.last
+    assert len(receive(connections)) == 1
+    assert 'IndexError: x' in connections.refusals.last
 
 
-def test_finding_10_a_message_that_cannot_be_encoded_leaves_the_others(radio, far):
-    radio = radio()
-    end = far(radio)
+def test_finding_10_a_message_that_cannot_be_encoded_leaves_the_others(connections, far):
+    connections = connections()
+    end = far(connections)
     end.say(heartbeat())
-    (address, _), = receive(radio)
+    (address, _), = receive(connections)
     count = d.MAVLink_mission_count_message(1, 1, 66_000, 0)
-    radio.send([(address, count), (address, heartbeat())])
+    connections.send([(address, count), (address, heartbeat())])
     assert end.hear()[0].get_type() == 'HEARTBEAT'
-    assert radio.refusals.count == 1
-    assert radio.refusals.notes[0].text.startswith('MISSION_COUNT (to ')
+    assert connections.refusals.count == 1
+    assert connections.refusals.notes[0].text.startswith('MISSION_COUNT (to ')
 
 
 def far_places(count):
@@ -173,7 +173,7 @@ def far_places(count):
 
 @BOTH
 def test_finding_24_of_more_items_than_a_mission_holds_the_first_tasks_are_flown(kind):
-    bench = FlightBench(kind).found()
+    bench = FlightBench(kind).discover()
     places, room = far_places(66_000), 65535 - (kind == 'ardupilot')
     bench.assign(TaskList(1, tuple(
         MissionStop(Task(f't{n}', places[1000 * n + 999]), tuple(places[1000 * n:1000 * n + 999]))
@@ -183,12 +183,12 @@ def test_finding_24_of_more_items_than_a_mission_holds_the_first_tasks_are_flown
             'tasks, the others follow') in bench.notes
     assert bench.line.sent('MISSION_COUNT')[0].count == 65_000 + (kind == 'ardupilot')
     assert bench.failed() == []
-    assert bench.ground.refusals.count == 0
+    assert bench.ground_station.refusals.count == 0
 
 
 @BOTH
 def test_finding_24_a_task_behind_more_points_than_a_mission_holds_fails_in_words(kind):
-    bench = FlightBench(kind).found()
+    bench = FlightBench(kind).discover()
     room = 65535 - (kind == 'ardupilot')
     long = MissionStop(Task('long', (0.0, 90.0, 50.0)), tuple(far_places(66_000)))
     bench.assign(TaskList(1, (long, *task_list('AB').stops)))
@@ -197,15 +197,15 @@ def test_finding_24_a_task_behind_more_points_than_a_mission_holds_fails_in_word
     assert (failed.task, failed.reason) == (
         'long', f'task long: 66003 mission items: expected at most {room}, which is what a '
         'mission holds')
-    assert bench.ground.refusals.count == 0
+    assert bench.ground_station.refusals.count == 0
 
 
 def test_finding_24_a_flood_of_texts_does_not_flood_the_log():
-    bench = FlightBench('px4').found()
+    bench = FlightBench('px4').discover()
     before = len(bench.notes)
     for n in range(1000):
-        bench.says(d.MAVLink_statustext_message(6, f'text {n}'.encode()))
+        bench.from_vehicle(d.MAVLink_statustext_message(6, f'text {n}'.encode()))
     assert len(bench.notes) - before <= 200
     bench.now += 61.0
-    bench.says(d.MAVLink_statustext_message(6, b'another'))
+    bench.from_vehicle(d.MAVLink_statustext_message(6, b'another'))
     assert 'another' in bench.notes

@@ -26,12 +26,12 @@ FLOOD = 'Auto mission changed, restarted command'
 
 def powered_on(kind, **kwargs):
     """A vehicle that boots as the real one does, seen from its first heartbeat on."""
-    return FindingsBench(kind, configs={1: REAL}, **kwargs).found()
+    return FindingsBench(kind, configs={1: REAL}, **kwargs).discover()
 
 
 def line_of(bench):
     """What diagnostics say."""
-    return facts_of(bench.ground.served[1], bench.now)[1]
+    return facts_of(bench.ground_station.sessions[1], bench.now)[1]
 
 
 # 9: retries without an end
@@ -39,7 +39,7 @@ def line_of(bench):
 
 @BOTH
 def test_finding_09_after_many_failures_it_is_not_available_and_tries_on(kind):
-    bench = FindingsBench(kind).found()
+    bench = FindingsBench(kind).discover()
     broken = [True]
     swallow(bench, 'up', 'MISSION_ITEM_INT', lambda m: broken[0] and m.seq == 2)
     bench.assign(task_list('ABC'))
@@ -73,13 +73,13 @@ def test_finding_18_of_two_batteries_the_one_with_least_remaining_decides(kind):
 
 @BOTH
 def test_finding_18_a_reading_that_wavers_changes_nothing(kind):
-    bench = FindingsBench(kind, takeoff=False).found()
+    bench = FindingsBench(kind, takeoff=False).discover()
     swallow(bench, 'down', 'SYS_STATUS', lambda m: True)
     swallow(bench, 'down', 'BATTERY_STATUS', lambda m: True)
     bench.run(limit=12.0)
     readings = set()
     for n in range(20):
-        bench.says(battery(0, 50 + n % 2))
+        bench.from_vehicle(battery(0, 50 + n % 2))
         readings.add(bench.state().battery)
     assert readings == {0.5}
 
@@ -90,7 +90,7 @@ def battery(number, percent):
 
 
 def test_a_battery_that_is_silent_does_not_decide_any_more():
-    bench = FindingsBench('px4', takeoff=False, configs={1: {'batteries': 2}}).found()
+    bench = FindingsBench('px4', takeoff=False, configs={1: {'batteries': 2}}).discover()
     bench.run(limit=5.0)
     assert bench.state().battery == pytest.approx(0.7)
     swallow(bench, 'down', 'BATTERY_STATUS', lambda m: m.id == 1)
@@ -107,7 +107,7 @@ def test_finding_26_a_list_that_is_there_at_power_on_is_flown_as_a_whole():
     assert bench.run(lambda: len(bench.completed()) == 5)
     assert places(bench) == list('ABCDE')
     assert bench.failed() == []
-    assert bench.board().upload.uploads == 1
+    assert bench.onboard().upload.uploads == 1
     assert bench.noted('no space') == []
 
 
@@ -124,13 +124,13 @@ def test_finding_26_nothing_is_uploaded_before_the_boot_has_ended(kind, names):
 @BOTH
 @pytest.mark.parametrize('names', ['A', 'ABCDE'])
 def test_finding_26_a_store_without_any_space_is_not_final(kind, names):
-    bench = FindingsBench(kind).found()
+    bench = FindingsBench(kind).discover()
     closed = [True]
 
     def refuse(way, message, now):
         if way == 'up' and message.get_type() == 'MISSION_COUNT' and closed[0]:
-            bench.says(d.MAVLink_statustext_message(4, b'Only 0 items are supported'))
-            bench.says(d.MAVLink_mission_ack_message(245, 190, d.MAV_MISSION_NO_SPACE, 0))
+            bench.from_vehicle(d.MAVLink_statustext_message(4, b'Only 0 items are supported'))
+            bench.from_vehicle(d.MAVLink_mission_ack_message(245, 190, d.MAV_MISSION_NO_SPACE, 0))
             return []
         return None
     bench.line.tampers.append(refuse)
@@ -140,19 +140,19 @@ def test_finding_26_a_store_without_any_space_is_not_final(kind, names):
     closed[0] = False
     assert bench.run(lambda: len(bench.completed()) == len(names))
     assert {m.count for m in bench.line.sent('MISSION_COUNT')} == {
-        len(names) + bench.board().own}
+        len(names) + bench.onboard().own}
 
 
 @BOTH
 def test_finding_26_a_horizon_grows_again_where_there_is_space(kind):
-    bench = FindingsBench(kind, configs={1: {'capacity': 5}}).found()
+    bench = FindingsBench(kind, configs={1: {'capacity': 5}}).discover()
     bench.assign(task_list('ABCDEFGHIJ'))
     assert bench.run(lambda: bench.completed() == ['A'])
     assert max(len(bench.vehicles[1].mission.items), 5) == 5
     bench.vehicles[1].mission._capacity = 100
     assert bench.run(lambda: len(bench.completed()) == 10, 600.0)
     assert places(bench) == list('ABCDEFGHIJ')
-    counts = [m.count - bench.board().own for m in bench.line.sent('MISSION_COUNT')]
+    counts = [m.count - bench.onboard().own for m in bench.line.sent('MISSION_COUNT')]
     assert counts[-1] > 4
     assert bench.failed() == []
 
@@ -181,7 +181,7 @@ def test_finding_27_before_there_is_a_position_the_vehicle_is_not_available(kind
 @BOTH
 @pytest.mark.parametrize('lost', ['', 'GPS_RAW_INT', 'estimator'])
 def test_finding_27_a_position_that_nobody_vouches_for_is_no_state(kind, lost):
-    bench = FindingsBench(kind, takeoff=False).found()
+    bench = FindingsBench(kind, takeoff=False).discover()
     bench.run(limit=5.0)
     assert bench.state().available
     estimator = 'EKF_STATUS_REPORT' if kind == 'ardupilot' else 'ESTIMATOR_STATUS'
@@ -190,9 +190,10 @@ def test_finding_27_a_position_that_nobody_vouches_for_is_no_state(kind, lost):
     if lost == 'estimator':
         swallow(bench, 'down', 'GPS_RAW_INT', lambda m: True)
     bench.start()
-    bench.found()
+    bench.discover()
     if lost == 'estimator':
-        bench.says(d.MAVLink_gps_raw_int_message(0, d.GPS_FIX_TYPE_2D_FIX, 0, 0, 0, 0, 0, 0, 0, 5))
+        bench.from_vehicle(d.MAVLink_gps_raw_int_message(
+            0, d.GPS_FIX_TYPE_2D_FIX, 0, 0, 0, 0, 0, 0, 0, 5))
     bench.run(limit=6.0)
     assert all(map(math.isnan, bench.state().position))
     assert not bench.state().available
@@ -201,7 +202,7 @@ def test_finding_27_a_position_that_nobody_vouches_for_is_no_state(kind, lost):
 @BOTH
 def test_finding_27_a_vehicle_that_is_restarted_has_no_position(kind):
     bench = FindingsBench(kind, takeoff=False, configs={1: {
-        'arming_delay': 20.0, 'boot_delay': 4.0}}).found()
+        'arming_delay': 20.0, 'boot_delay': 4.0}}).discover()
     assert bench.run(lambda: bench.state().available, 40.0)
     bench.vehicles[1].reboot(bench.now)
     assert bench.run(lambda: not bench.state().available, 10.0)
@@ -227,7 +228,7 @@ def test_a_position_that_jumps_in_flight_costs_no_task(kind, seconds, before):
 
 @BOTH
 def test_finding_28_a_refused_arming_says_why_once_and_how_long_it_was_tried(kind):
-    bench = FindingsBench(kind).found()
+    bench = FindingsBench(kind).discover()
     flight = bench.vehicles[1].flight
     flight.refuses = 'Gyros inconsistent'
     bench.assign(task_list('AB'))
@@ -247,7 +248,7 @@ def test_finding_28_a_refused_arming_says_why_once_and_how_long_it_was_tried(kin
 
 
 def test_finding_28_the_sensors_that_px4_calls_unhealthy_are_named():
-    bench = FindingsBench('px4').found()
+    bench = FindingsBench('px4').discover()
     bench.vehicles[1].flight.refuses = 'horizontal velocity unstable'
     gyro, prearm = d.MAV_SYS_STATUS_SENSOR_3D_GYRO, d.MAV_SYS_STATUS_PREARM_CHECK
 
@@ -270,20 +271,20 @@ def test_finding_30_the_restarted_commands_of_an_append_are_one_line_and_no_erro
     for revision, names in enumerate(('ABCDEF', 'ABCDEFGHI', 'ABCDEFGHIJKL'), 2):
         bench.assign(task_list(names, revision))
         bench.run(limit=2.0)
-        bench.says(d.MAVLink_statustext_message(6, f'Mission: {revision} WP'.encode()))
+        bench.from_vehicle(d.MAVLink_statustext_message(6, f'Mission: {revision} WP'.encode()))
     sent = [m for m in bench.line.sent('STATUSTEXT', 'down') if str(m.text) == FLOOD]
     assert len(sent) > 10
     assert [level for level, text in bench.levels if text == FLOOD] == ['info']
 
 
 def test_finding_30_a_refusal_is_told_once_until_it_changes():
-    bench = FindingsBench('ardupilot').found()
+    bench = FindingsBench('ardupilot').discover()
     result = [d.MAV_RESULT_DENIED]
 
     def refuse(way, message, now):
         if (way == 'up' and message.get_type() == 'COMMAND_LONG' and result[0]
                 and message.command == d.MAV_CMD_DO_SET_MODE):
-            bench.says(d.MAVLink_command_ack_message(message.command, result[0]))
+            bench.from_vehicle(d.MAVLink_command_ack_message(message.command, result[0]))
             return []
         return None
     bench.line.tampers.append(refuse)

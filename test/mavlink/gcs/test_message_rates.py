@@ -20,7 +20,7 @@ def asked(bench, kind):
 
 @BOTH
 def test_each_message_is_asked_for_at_its_rate_and_comes_at_it(kind):
-    bench = FlightBench(kind, takeoff=False).found()
+    bench = FlightBench(kind, takeoff=False).discover()
     bench.run(limit=2.0)
     assert {name: asked(bench, name)[0] for name in SPEC} == SPEC
     before = {name: len(bench.line.sent(name, 'down')) for name in SPEC}
@@ -37,7 +37,7 @@ def test_a_message_that_stays_away_is_asked_for_again_and_given_up_in_the_end(ki
     bench = FlightBench(kind, takeoff=False)
     bench.line.tampers.append(lambda way, m, now: [] if (
         m.get_type() == 'BATTERY_STATUS') else None)
-    bench.found()
+    bench.discover()
     bench.run(limit=60.0)
     assert len(asked(bench, 'BATTERY_STATUS')) == TRIES
     assert len(asked(bench, 'GLOBAL_POSITION_INT')) == 1
@@ -45,7 +45,7 @@ def test_a_message_that_stays_away_is_asked_for_again_and_given_up_in_the_end(ki
 
 @BOTH
 def test_a_stream_that_ceases_is_asked_for_again(kind):
-    bench = FlightBench(kind, takeoff=False).found()
+    bench = FlightBench(kind, takeoff=False).discover()
     bench.run(limit=10.0)
     assert len(asked(bench, 'EXTENDED_SYS_STATE')) == 1
     bench.line.tampers.append(lambda way, m, now: [] if (
@@ -59,7 +59,7 @@ def test_a_stream_that_ceases_is_asked_for_again(kind):
 
 @BOTH
 def test_positions_that_cease_are_asked_for_again(kind):
-    bench = FlightBench(kind, takeoff=False).found()
+    bench = FlightBench(kind, takeoff=False).discover()
     bench.run(limit=10.0)
     before = len(asked(bench, 'GLOBAL_POSITION_INT'))
     bench.line.tampers.append(lambda way, m, now: [] if (

@@ -26,11 +26,11 @@ def test_a_list_is_flown_and_each_task_told_once(kind):
 
 @BOTH
 def test_without_takeoff_the_bridge_waits_for_a_pilot_and_says_so_once(kind):
-    bench = FlightBench(kind, takeoff=False).found()
+    bench = FlightBench(kind, takeoff=False).discover()
     bench.assign(task_list('AB'))
     bench.run(limit=30.0)
     assert not bench.vehicles[1].flight.armed
-    assert bench.board().state is MissionState.VERIFIED
+    assert bench.onboard().state is MissionState.VERIFIED
     assert bench.notes == ['waits for a pilot to arm and take off (takeoff is false)']
     assert bench.state().available
 
@@ -41,9 +41,9 @@ def test_a_list_that_shrinks_as_tasks_complete_needs_no_upload(kind):
     for revision, (done, rest) in enumerate([('A', 'BC'), ('B', 'C')], 2):
         assert bench.run(lambda done=done: done in bench.completed())
         bench.assign(task_list(rest, revision))
-        assert bench.board().revision == revision
+        assert bench.onboard().revision == revision
     assert bench.run(lambda: len(bench.completed()) == 3)
-    assert bench.board().upload.uploads == 1
+    assert bench.onboard().upload.uploads == 1
 
 
 @BOTH
@@ -60,7 +60,7 @@ def test_a_list_replaced_in_flight_is_what_is_flown(kind, after):
 @BOTH
 def test_via_points_that_were_passed_are_not_flown_again(kind):
     via = {'A': ((-50.0, 50.0, 50.0), (-50.0, 100.0, 50.0))}
-    bench = FlightBench(kind).found()
+    bench = FlightBench(kind).discover()
     bench.assign(task_list('AB', via=via))
     assert bench.run(lambda: len(bench.flown()) == 1)
     bench.assign(task_list('AC', 2, via=via))
@@ -79,12 +79,12 @@ def test_a_new_via_before_the_task_being_flown_is_flown(kind):
 def test_ardupilot_is_held_while_its_mission_is_mixed_and_appended_hot():
     bench = flying('ardupilot', 'AB')
     bench.assign(task_list('ABC', 2))
-    bench.run(lambda: bench.board().revision == 2)
+    bench.run(lambda: bench.onboard().revision == 2)
     modes = [m.param2 for m in bench.line.sent('COMMAND_LONG')
              if m.command == d.MAV_CMD_DO_SET_MODE]
     assert modes == [4, 3]  # to take off, to start: an append needs no hold
     bench.assign(task_list('AC', 3))
-    assert bench.run(lambda: bench.board().revision == 3)
+    assert bench.run(lambda: bench.onboard().revision == 3)
     bench.run(limit=1.0)
     modes = [m.param2 for m in bench.line.sent('COMMAND_LONG')
              if m.command == d.MAV_CMD_DO_SET_MODE]
@@ -94,7 +94,7 @@ def test_ardupilot_is_held_while_its_mission_is_mixed_and_appended_hot():
 def test_px4_is_swapped_at_once_with_the_item_to_fly_flagged():
     bench = flying('px4', 'ABC')
     bench.assign(task_list('CA', 2))
-    assert bench.run(lambda: bench.board().revision == 2)
+    assert bench.run(lambda: bench.onboard().revision == 2)
     items = bench.line.sent('MISSION_ITEM_INT')[-2:]
     assert [m.current for m in items] == [1, 0]
     assert bench.vehicles[1].flight.mode.name == 'MISSION'
@@ -105,10 +105,10 @@ def test_a_swap_waits_for_the_end_of_a_service(kind):
     bench = flying(kind, 'AB', service=8.0)
     place = (0.0, 100.0, 50.0)
     assert bench.run(lambda: sum((a - b) ** 2 for a, b in zip(
-        bench.pilot().telemetry.position, place, strict=True)) < 4.0)
+        bench.executor().telemetry.position, place, strict=True)) < 4.0)
     bench.assign(task_list('AC', 2, service=8.0))
     bench.run(limit=2.0)
-    assert bench.board().upload.uploads == 1
+    assert bench.onboard().upload.uploads == 1
     assert bench.run(lambda: bench.completed() == ['A', 'C'])
     assert places(bench) == ['A', 'C']
 
@@ -124,7 +124,7 @@ def test_after_an_empty_list_a_new_one_is_flown(kind):
 
 @BOTH
 def test_no_space_flies_a_rolling_horizon(kind):
-    bench = FlightBench(kind, configs={1: {'capacity': 5}}).found()
+    bench = FlightBench(kind, configs={1: {'capacity': 5}}).discover()
     bench.assign(task_list('ABCDEFGH'))
     assert bench.run(lambda: len(bench.completed()) == 8, 400.0)
     assert places(bench) == list('ABCDEFGH')
@@ -137,14 +137,14 @@ def test_a_pilot_who_takes_over_is_not_fought(kind):
     bench = flying(kind, 'ABC')
     bench.run(limit=5.0)
     mode = (5, 0) if kind == 'ardupilot' else (4, 3)
-    bench.tells(d.MAVLink_command_long_message(1, 1, 176, 0, 1, *mode, 0, 0, 0, 0))
+    bench.from_station(d.MAVLink_command_long_message(1, 1, 176, 0, 1, *mode, 0, 0, 0, 0))
     bench.run(limit=10.0)
     bench.assign(task_list('CB', 2))
     bench.run(limit=20.0)
     assert bench.vehicles[1].mode.name == 'HOLD'
     assert 'waits for the pilot to give it back' in bench.notes
     mode = (3, 0) if kind == 'ardupilot' else (4, 4)
-    bench.tells(d.MAVLink_command_long_message(1, 1, 176, 0, 1, *mode, 0, 0, 0, 0))
+    bench.from_station(d.MAVLink_command_long_message(1, 1, 176, 0, 1, *mode, 0, 0, 0, 0))
     assert bench.run(lambda: bench.completed() == ['C', 'B'])
 
 
@@ -161,13 +161,13 @@ def test_a_vehicle_that_holds_after_its_last_task_returns_when_told(kind):
 
 @BOTH
 def test_a_list_that_returns_ends_at_home_and_a_new_one_flies_again(kind):
-    bench = FlightBench(kind, relaunch='automatic').found()
+    bench = FlightBench(kind, relaunch='automatic').discover()
     bench.assign(task_list('A', returns=True))
     assert bench.run(lambda: bench.completed() == ['A'])
     bench.assign(task_list('', 2, returns=True))
     assert bench.run(lambda: bench.state().mode is UavMode.RETURNING, 10.0)
     assert bench.run(lambda: bench.state().mode is UavMode.STANDBY)
-    assert bench.board().upload.uploads == 1
+    assert bench.onboard().upload.uploads == 1
     bench.assign(task_list('B', 3, returns=True))
     assert bench.run(lambda: bench.completed() == ['A', 'B'])
 
@@ -199,7 +199,7 @@ def test_a_link_that_is_silent_is_stale_and_the_list_goes_on_later(kind):
 @pytest.mark.parametrize('loss', [0.2])
 @pytest.mark.parametrize('seed', range(5))
 def test_lists_replaced_over_a_bad_line_are_flown_once_each(kind, seed, loss):
-    bench = FlightBench(kind, seed=seed, loss=loss, delay=(0.0, 0.3)).found()
+    bench = FlightBench(kind, seed=seed, loss=loss, delay=(0.0, 0.3)).discover()
     bench.assign(task_list('ABC'))
     bench.run(limit=40.0)
     bench.assign(task_list([t for t in 'DCBAE' if t not in bench.completed()], 2))
@@ -209,11 +209,11 @@ def test_lists_replaced_over_a_bad_line_are_flown_once_each(kind, seed, loss):
 
 
 def test_positions_are_exact_to_a_centimetre_at_five_kilometres():
-    bench = FlightBench('px4', takeoff=False).found()
+    bench = FlightBench('px4', takeoff=False).discover()
     tasks = task_list('A')
     task = tasks.stops[0].task.__class__('far', (3535.53, 3535.53, 60.0))
     bench.assign(tasks.__class__(1, (tasks.stops[0].__class__(task),)))
-    assert bench.run(lambda: bench.board().revision == 1, 10.0)
+    assert bench.run(lambda: bench.onboard().revision == 1, 10.0)
     m = bench.vehicles[1].mission.items[0]
     place = to_enu(ORIGIN, m.x * 1e-7, m.y * 1e-7, m.z)
     assert max(abs(a - b) for a, b in zip(place, task.position, strict=True)) < 0.01

@@ -18,7 +18,7 @@ BOTH = pytest.mark.parametrize('kind', ['ardupilot', 'px4'])
 
 @BOTH
 def test_fault_11_two_systems_do_not_mix_up(kind):
-    bench = FlightBench('ardupilot', 'px4', kind).found()
+    bench = FlightBench('ardupilot', 'px4', kind).discover()
     for n, names in ((1, 'ABC'), (2, 'DEF'), (3, 'GHI')):
         bench.assign(task_list(names), n)
     assert bench.run(lambda: all(len(bench.completed(n)) == 3 for n in (1, 2, 3)))
@@ -28,16 +28,16 @@ def test_fault_11_two_systems_do_not_mix_up(kind):
 
 @BOTH
 def test_fault_17_a_reboot_in_mid_upload_starts_over(kind):
-    bench = FlightBench(kind, delay=(0.1, 0.1), takeoff=False).found()
+    bench = FlightBench(kind, delay=(0.1, 0.1), takeoff=False).discover()
     bench.run(limit=10.0)
     bench.assign(task_list('ABCDE'))
     bench.run(limit=0.5)
-    assert bench.board().state is MissionState.UPLOADING
+    assert bench.onboard().state is MissionState.UPLOADING
     asked = len(bench.line.sent('COMMAND_LONG'))
     bench.vehicles[1].reboot(bench.now)
     assert bench.run(lambda: 'was restarted' in bench.notes, 30.0)
-    assert bench.board().state is not MissionState.VERIFIED
-    assert bench.run(lambda: bench.board().state is MissionState.VERIFIED, 60.0)
+    assert bench.onboard().state is not MissionState.VERIFIED
+    assert bench.run(lambda: bench.onboard().state is MissionState.VERIFIED, 60.0)
     again = bench.line.sent('COMMAND_LONG')[asked:]
     assert {m.param1 for m in again if m.command == d.MAV_CMD_SET_MESSAGE_INTERVAL} >= {33.0, 42.0}
 
@@ -48,7 +48,7 @@ def test_fault_18_a_link_cut_in_mid_upload_leaves_the_vehicle_held_and_says_mixe
     assert bench.run(lambda: len(bench.line.sent('MISSION_ITEM_INT')) == 7, 20.0)
     bench.line.cut = True
     bench.run(limit=40.0)
-    assert bench.board().state is MissionState.MIXED
+    assert bench.onboard().state is MissionState.MIXED
     assert not bench.state().available
     assert bench.vehicles[1].mode.name == 'GUIDED'
     bench.line.cut = False
@@ -62,10 +62,10 @@ def test_fault_20_reached_during_an_upload_belongs_to_the_old_list(kind):
     first = 1 if kind == 'ardupilot' else 0
     names = 'ABCD' if kind == 'ardupilot' else 'ADCB'
     bench.assign(task_list(names, 2))
-    assert bench.run(lambda: bench.board().open, 10.0)
-    bench.pilot().telemetry.position_at = -100.0
-    bench.board().progress._positions.place = None
-    bench.says(d.MAVLink_mission_item_reached_message(first))
+    assert bench.run(lambda: bench.onboard().open, 10.0)
+    bench.executor().telemetry.position_at = -100.0
+    bench.onboard().progress._positions.place = None
+    bench.from_vehicle(d.MAVLink_mission_item_reached_message(first))
     assert bench.completed() == ['A']
     assert bench.run(lambda: len(bench.completed()) == 4)
     assert sorted(bench.completed()) == list('ABCD')
@@ -77,7 +77,7 @@ def test_fault_21_a_repeated_reached_completes_once(kind):
     assert bench.run(lambda: bench.completed() == ['A'])
     seq = 1 if kind == 'ardupilot' else 0
     for _ in range(11):
-        bench.says(d.MAVLink_mission_item_reached_message(seq))
+        bench.from_vehicle(d.MAVLink_mission_item_reached_message(seq))
     assert bench.completed() == ['A']
 
 
@@ -101,21 +101,21 @@ def test_fault_21_what_we_jump_over_is_not_completed(kind):
 
 @BOTH
 def test_fault_22_the_same_list_from_another_item_on_needs_set_current_only(kind):
-    bench = FlightBench(kind, takeoff=False).found()
+    bench = FlightBench(kind, takeoff=False).discover()
     bench.assign(task_list('ABC'))
-    assert bench.run(lambda: bench.board().revision == 1, 10.0)
-    bench.tells(d.MAVLink_mission_set_current_message(1, 1, bench.board().own + 2))
+    assert bench.run(lambda: bench.onboard().revision == 1, 10.0)
+    bench.from_station(d.MAVLink_mission_set_current_message(1, 1, bench.onboard().own + 2))
     bench.run(limit=5.0)
-    bench.pilot().policy = dataclasses.replace(bench.pilot().policy, takeoff=True)
+    bench.executor().policy = dataclasses.replace(bench.executor().policy, takeoff=True)
     bench.assign(task_list('ABC', 2))
     assert bench.run(lambda: bench.completed() == ['A', 'B', 'C'])
-    assert bench.board().upload.uploads == 1
+    assert bench.onboard().upload.uploads == 1
     assert places(bench) == ['A', 'B', 'C']
 
 
 @BOTH
 def test_fault_23_accepted_and_then_no_mission_is_infeasible(kind):
-    bench = FlightBench(kind).found()
+    bench = FlightBench(kind).discover()
 
     def vanish(way, message, now):
         if way == 'down' and message.get_type() == 'MISSION_ACK':
@@ -126,13 +126,13 @@ def test_fault_23_accepted_and_then_no_mission_is_infeasible(kind):
     assert bench.run(lambda: len(bench.failed()) == 2, 60.0)
     reason = bench.events[-1][1].reason
     assert reason == 'accepted, and then no mission is on board: infeasible'
-    assert bench.board().upload.uploads == 1
+    assert bench.onboard().upload.uploads == 1
 
 
 @pytest.fixture
 def refused():
     """A PX4 that has just refused a task as too far away."""
-    bench = FlightBench('px4').found()
+    bench = FlightBench('px4').discover()
     bench.assign(single('far', FAR))
     assert bench.run(lambda: bench.failed() == ['far'], 120.0)
     return bench
@@ -151,7 +151,7 @@ def test_fault_23_a_mission_that_px4_will_not_fly_fails_with_its_own_words(refus
 
 @BOTH
 def test_what_no_item_can_hold_fails_alone_and_by_its_own_name(kind):
-    bench = FlightBench(kind).found()
+    bench = FlightBench(kind).discover()
     long = Task('B1', (0.0, 200.0, 50.0), service_time=70000.0)
     bench.assign(TaskList(1, (MissionStop(long),)))
     bench.run(limit=5.0)
@@ -166,7 +166,7 @@ def test_what_no_item_can_hold_fails_alone_and_by_its_own_name(kind):
 
 def refusing(name, before):
     """A PX4 that has flown a list and refuses the item of a task, whatever happens before."""
-    bench = FlightBench('px4', delay=(0.2, 0.2)).found()
+    bench = FlightBench('px4', delay=(0.2, 0.2)).discover()
     bench.assign(task_list('Z'))
     assert bench.run(lambda: bench.completed() == ['Z'])
 
@@ -174,7 +174,8 @@ def refusing(name, before):
         bad = way == 'up' and message.get_type() == 'MISSION_ITEM_INT' and message.x == item.x
         if bad:
             before(bench)
-            bench.says(d.MAVLink_mission_ack_message(245, 190, d.MAV_MISSION_INVALID_PARAM5_X, 0))
+            bench.from_vehicle(d.MAVLink_mission_ack_message(
+                245, 190, d.MAV_MISSION_INVALID_PARAM5_X, 0))
         return [] if bad else None
     item = mission_items(task_list(name), PROFILES['px4'].rules, ORIGIN)[0]
     bench.line.tampers.append(refuse)
@@ -200,7 +201,7 @@ def test_a_list_that_still_has_what_was_refused_is_told_so_again(refused):
     refused.assign(single('far', FAR, 7))
     assert refused.run(lambda: refused.failed() == ['far', 'far'], 3.0)
     assert refused.events[-1][1] == dataclasses.replace(first, revision=7)
-    assert refused.board().upload.uploads == 1
+    assert refused.onboard().upload.uploads == 1
 
 
 def test_what_was_refused_is_tried_again_where_it_has_changed(refused):
@@ -244,11 +245,11 @@ def test_lists_that_change_all_the_time_put_nothing_off(kind):
 
 def upload_by_another(bench, n=1):
     """A human's ground station puts a mission of one item on board."""
-    own = bench.board(n).own
-    bench.tells(d.MAVLink_mission_count_message(n, 1, 1 + own, 0), n)
+    own = bench.onboard(n).own
+    bench.from_station(d.MAVLink_mission_count_message(n, 1, 1 + own, 0), n)
     for seq in range(1 + own):
         x, y = 473990000, 85460000
-        bench.tells(d.MAVLink_mission_item_int_message(
+        bench.from_station(d.MAVLink_mission_item_int_message(
             n, 1, seq, 5, 16, 0, 1, 0, 0, 0, 0, x, y, 540.0, 0), n)
 
 
@@ -257,11 +258,11 @@ def test_fault_24_a_foreign_mission_is_left_alone_where_the_policy_says_yield(ki
     bench = flying(kind, 'ABC')
     bench.run(limit=4.0)
     upload_by_another(bench)
-    assert bench.run(lambda: bench.board().state is MissionState.FOREIGN, 20.0)
+    assert bench.run(lambda: bench.onboard().state is MissionState.FOREIGN, 20.0)
     bench.run(limit=20.0)
-    assert bench.board().state is MissionState.FOREIGN
+    assert bench.onboard().state is MissionState.FOREIGN
     assert not bench.state().available
-    assert bench.board().upload.uploads == 1
+    assert bench.onboard().upload.uploads == 1
 
 
 @BOTH
@@ -270,8 +271,8 @@ def test_fault_24_a_foreign_mission_is_replaced_where_the_policy_says_reassert(k
     bench.run(limit=4.0)
     upload_by_another(bench)
     assert bench.run(lambda: len(bench.completed()) == 3)
-    assert bench.board().upload.uploads == 2
-    assert bench.board().state is MissionState.VERIFIED
+    assert bench.onboard().upload.uploads == 2
+    assert bench.onboard().state is MissionState.VERIFIED
 
 
 @BOTH
@@ -281,10 +282,10 @@ def test_fault_24_a_foreign_mission_is_replaced_where_the_policy_says_reassert(k
 def test_fault_25_an_empty_list_holds_or_returns_and_never_clears(kind, policy, flight):
     bench = flying(kind, 'ABC', when_empty=policy)
     bench.assign(task_list('', 2))
-    assert bench.run(lambda: bench.pilot().telemetry.flight is flight, 5.0)
+    assert bench.run(lambda: bench.executor().telemetry.mode is flight, 5.0)
     bench.run(limit=10.0)
     assert bench.completed() == []
-    assert bench.board().revision == 2
+    assert bench.onboard().revision == 2
     assert not bench.line.sent('MISSION_CLEAR_ALL')
     assert all(m.count for m in bench.line.sent('MISSION_COUNT'))
 
@@ -292,13 +293,13 @@ def test_fault_25_an_empty_list_holds_or_returns_and_never_clears(kind, policy, 
 @BOTH
 @pytest.mark.parametrize('answer', ['none', 'unsupported'])
 def test_fault_28_set_current_falls_back_to_the_old_way(kind, answer):
-    bench = FlightBench(kind).found()
+    bench = FlightBench(kind).discover()
 
     def refuse(way, m, now):
         if m.get_type() != 'COMMAND_LONG' or m.command != d.MAV_CMD_DO_SET_MISSION_CURRENT:
             return None
         if answer == 'unsupported':
-            bench.says(d.MAVLink_command_ack_message(m.command, 3))
+            bench.from_vehicle(d.MAVLink_command_ack_message(m.command, 3))
         return []
     bench.line.tampers.append(refuse)
     bench.assign(task_list('ABC'))
@@ -312,6 +313,6 @@ def test_fault_29_a_current_at_or_beyond_the_end_harms_nothing(kind):
     bench.run(limit=4.0)
     count = len(bench.vehicles[1].mission.items)
     for seq in (count + 1, 65535):
-        bench.says(d.MAVLink_mission_current_message(seq, 65535, 0, 0))
+        bench.from_vehicle(d.MAVLink_mission_current_message(seq, 65535, 0, 0))
     assert bench.completed() == []
     assert bench.run(lambda: bench.completed() == ['A', 'B'])

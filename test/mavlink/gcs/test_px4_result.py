@@ -10,7 +10,7 @@ from uav_task_alloc.sim.config import FlightMode
 def taken_off(names):
     """Over its home in Hold, with the list on board."""
     bench = FlightBench('px4')
-    bench.found()
+    bench.discover()
     bench.assign(task_list(names))
     vehicle = bench.vehicles[1]
     assert bench.run(lambda: vehicle.flight.mode is FlightMode.TAKEOFF)
@@ -22,7 +22,7 @@ def taken_off(names):
 def test_a_bridge_started_again_after_a_take_off_takes_no_task_for_flown():
     bench = taken_off('ABC')
     bench.start()
-    bench.found()
+    bench.discover()
     bench.assign(task_list('ABC', 2))
     bench.run(limit=20.0)
     assert bench.completed() == []
@@ -36,7 +36,7 @@ def test_a_bridge_started_again_after_a_landing_takes_no_task_for_flown():
     assert bench.run(lambda: not vehicle.flight.armed)
     assert vehicle.mission.progress()[1] == d.MISSION_STATE_COMPLETE
     bench.start()
-    bench.found()
+    bench.discover()
     bench.assign(task_list('ABC', 2))
     bench.run(limit=20.0)
     assert not {'B', 'C'} & set(bench.completed())

@@ -24,7 +24,7 @@ def test_a_killed_bridge_finds_what_each_vehicle_holds_and_flies_no_task_twice(k
     counts = len(bench.line.sent('MISSION_COUNT'))
     bench.start()
     bench.run(limit=8.0)
-    bench.found()
+    bench.discover()
     rest = [t for t in 'ABCDE' if t not in before]
     bench.assign(task_list(rest, 5))
     assert bench.run(lambda: len(bench.completed()) == len(rest))
@@ -40,7 +40,7 @@ def test_a_task_flown_while_the_bridge_was_dead_is_completed_under_a_new_list(ki
     bench.run(lambda: len(bench.flown()) == 3)
     bench.line.cut = False
     bench.start()
-    bench.found()
+    bench.discover()
     bench.assign(task_list('EDCB', 2))
     assert bench.run(lambda: len(bench.completed()) == 4)
     assert bench.completed() == ['C', 'B', 'E', 'D']
@@ -55,7 +55,7 @@ def test_a_bridge_killed_in_mid_upload_brings_the_list_on_board(kind, moment):
     bench.run(limit=moment)
     before = bench.completed()
     bench.start()
-    bench.found()
+    bench.discover()
     bench.assign(task_list('CDEFAB', 2))
     assert bench.run(lambda: len(bench.completed()) == 6)
     assert before + bench.completed() == list('CDEFAB') == places(bench)
@@ -68,14 +68,14 @@ def dead_until(bench, count):
     bench.run(limit=12.0)
     bench.line.cut = False
     bench.start()
-    bench.found()
+    bench.discover()
 
 
 def handed_over_where_it_held(bench, n=1):
     """PX4 went to Hold while no bridge was there to see why: an operator gives it back."""
-    if bench.authority(n) is AuthorityState.LOST and bench.pilot(n).telemetry.airborne:
-        assert bench.pilot(n).profile.name == 'px4'
-        assert bench.pilot(n).authority.why.endswith(('found Hold', 'Hold instead of Mission'))
+    if bench.authority(n) is AuthorityState.LOST and bench.executor(n).telemetry.airborne:
+        assert bench.executor(n).profile.name == 'px4'
+        assert bench.executor(n).authority.why.endswith(('found Hold', 'Hold instead of Mission'))
         assert bench.hand_over(n) == ''
 
 
@@ -98,7 +98,7 @@ def test_what_was_flown_unheard_is_known_after_a_list_without_it(kind, first):
 
 @pytest.mark.parametrize('kinds', [('ardupilot', 'px4'), ('px4', 'ardupilot')])
 def test_what_one_has_flown_unheard_is_not_flown_by_another(kinds):
-    bench = FlightBench(*kinds).found()
+    bench = FlightBench(*kinds).discover()
     bench.assign(task_list('ABC', service=1.0))
     bench.assign(task_list('X'), 2)
     assert bench.run(lambda: bench.started() == ['A'] and bench.started(2) == ['X'])
@@ -115,7 +115,7 @@ def test_what_one_has_flown_unheard_is_not_flown_by_another(kinds):
 
 @BOTH
 def test_what_was_withdrawn_unflown_is_flown_when_it_comes_back_to_another(kind):
-    bench = FlightBench(kind, kind).found()
+    bench = FlightBench(kind, kind).discover()
     bench.assign(task_list('ABC'))
     bench.assign(task_list('X'), 2)
     assert bench.run(lambda: bench.started() == ['A'])
@@ -123,7 +123,7 @@ def test_what_was_withdrawn_unflown_is_flown_when_it_comes_back_to_another(kind)
     bench.run(limit=1.0)
     bench.line.cut = False
     bench.start()
-    bench.found()
+    bench.discover()
     bench.assign(task_list('C', 2))
     bench.assign(task_list('XAB', 2), 2)
     assert bench.run(lambda: bench.completed() == ['C'] and len(bench.completed(2)) == 3)
@@ -136,7 +136,7 @@ def test_what_was_flown_unheard_is_flown_again_where_its_place_has_changed(kind)
     bench = flying(kind, 'ABC')
     assert bench.run(lambda: bench.completed() == ['A'])
     bench.start()
-    bench.found()
+    bench.discover()
     bench.assign(task_list('ABC', 2))
     assert bench.run(lambda: 'A' in bench.completed())
     assert next(e.revision for _, e in bench.events if e.event == 'COMPLETED') == 2
@@ -149,12 +149,12 @@ def test_what_was_flown_unheard_is_flown_again_where_its_place_has_changed(kind)
 
 @BOTH
 def test_a_first_list_on_the_ground_is_flown_though_the_same_is_on_board(kind):
-    bench = FlightBench(kind, relaunch='automatic').found()
+    bench = FlightBench(kind, relaunch='automatic').discover()
     bench.assign(task_list('AB', returns=True))
     assert bench.run(lambda: bench.completed() == ['A', 'B'])
     assert bench.run(lambda: bench.state().mode is UavMode.STANDBY)
     bench.start()
-    bench.found()
+    bench.discover()
     bench.run(limit=5.0)
     bench.assign(task_list('AB', returns=True))
     assert bench.run(lambda: bench.completed() == ['A', 'B'])
@@ -195,7 +195,7 @@ class Dealer:
 def test_killed_at_random_and_dealt_anew_each_task_is_flown_once(kind, seed):
     rng = random.Random(seed)
     other = {'ardupilot': 'px4', 'px4': 'ardupilot'}[kind]
-    bench = FlightBench(kind, other, seed=seed, delay=(0.02, 0.02)).found()
+    bench = FlightBench(kind, other, seed=seed, delay=(0.02, 0.02)).discover()
     dealer = Dealer(bench, 'ABCDEFGH', rng)
     dealer.deal()
     for _ in range(3):
@@ -204,7 +204,7 @@ def test_killed_at_random_and_dealt_anew_each_task_is_flown_once(kind, seed):
         bench.run(limit=rng.uniform(0.5, 30.0))
         bench.line.cut = False
         bench.start()
-        bench.found()
+        bench.discover()
         dealer.deal()
         bench.run(dealer.hear, rng.uniform(0.0, 3.0))
         dealer.deal()

@@ -28,7 +28,7 @@ def shrink(bench, names):
 
 @BOTH
 def test_after_the_last_task_the_points_of_the_way_home_are_flown(kind):
-    bench = FlightBench(kind).found()
+    bench = FlightBench(kind).discover()
     bench.assign(homeward('AB', 1))
     shrink(bench, 'AB')
     assert bench.run(lambda: bench.state().mode is UavMode.RETURNING, 10.0)
@@ -36,8 +36,8 @@ def test_after_the_last_task_the_points_of_the_way_home_are_flown(kind):
     assert [p for p in bench.flown() if p in SEEN] == SEEN
     assert bench.flown()[:4] == [(0, 100, 50), (100, 100, 50), *SEEN]
     assert bench.completed() == ['A', 'B']
-    assert bench.board().upload.uploads == 1
-    assert bench.board().revision == 3
+    assert bench.onboard().upload.uploads == 1
+    assert bench.onboard().revision == 3
     x, y, z = bench.vehicles[1].flight.body.position
     assert (abs(x), abs(y - 10.0), abs(z)) < (3.0, 3.0, 1.0)
 
@@ -45,21 +45,21 @@ def test_after_the_last_task_the_points_of_the_way_home_are_flown(kind):
 @BOTH
 @pytest.mark.parametrize('reached', [2, 3])
 def test_a_bridge_killed_on_the_way_home_lets_the_vehicle_fly_it(kind, reached):
-    bench = FlightBench(kind).found()
+    bench = FlightBench(kind).discover()
     bench.assign(homeward('AB', 1))
     shrink(bench, 'AB')
     assert bench.run(lambda: len(bench.flown()) == reached)
     bench.start()
-    bench.found()
+    bench.discover()
     bench.assign(homeward('', 3))
     assert bench.run(lambda: bench.state().mode is UavMode.STANDBY)
     assert bench.flown()[:4] == [(0, 100, 50), (100, 100, 50), *SEEN]
-    assert bench.board().upload.uploads == 0
+    assert bench.onboard().upload.uploads == 0
 
 
 @BOTH
 def test_a_new_way_home_replaces_the_one_being_flown(kind):
-    bench = FlightBench(kind).found()
+    bench = FlightBench(kind).discover()
     bench.assign(homeward('AB', 1))
     shrink(bench, 'AB')
     bench.run(limit=2.0)
@@ -72,7 +72,7 @@ def test_a_new_way_home_replaces_the_one_being_flown(kind):
 
 @BOTH
 def test_a_task_that_comes_on_the_way_home_is_flown_first(kind):
-    bench = FlightBench(kind).found()
+    bench = FlightBench(kind).discover()
     bench.assign(homeward('A', 1))
     shrink(bench, 'A')
     bench.run(limit=2.0)

@@ -20,7 +20,7 @@ def fly(kind, seed, *, loss, delay, late, lists):
     """
     rng = random.Random(seed)
     bench = FlightBench(kind, seed=seed, loss=loss, delay=(0.0, delay),
-                        relaunch='automatic').found()  # a swap that takes too long ends at home
+                        relaunch='automatic').discover()  # a swap that takes too long ends at home
     bench.line.tampers.append(lambda way, m, now: [(rng.uniform(0.0, 5.0), m)] if (
         rng.random() < late) else None)
     given = list(NAMES)
@@ -28,8 +28,8 @@ def fly(kind, seed, *, loss, delay, late, lists):
     assert truthful(bench, bench.started, 300.0), f'seed {seed}'
     for revision in range(2, 2 + lists):
         truthful(bench, lambda: False, rng.uniform(1.0, 15.0))
-        ahead = len(bench.vehicles[1].mission.items) - bench.board().own
-        now = bench.vehicles[1].flight.seq - bench.board().own
+        ahead = len(bench.vehicles[1].mission.items) - bench.onboard().own
+        now = bench.vehicles[1].flight.seq - bench.onboard().own
         if now + 1 < ahead:
             set_current(bench, rng.randint(now + 1, ahead - 1))
         truthful(bench, lambda: False, rng.uniform(1.0, 25.0))

@@ -7,18 +7,18 @@ from flight_bench import FlightBench, flying
 from mission_bench import task_list
 
 from uav_task_alloc.mavlink.gcs.onboard_mission import MissionState
-from uav_task_alloc.mavlink.gcs.status import Told, UavMode, facts_of
+from uav_task_alloc.mavlink.gcs.status import PublishedStates, UavMode, facts_of
 
 BOTH = pytest.mark.parametrize('kind', ['ardupilot', 'px4'])
 
 
 def watch(bench, seconds):
     """What is told within some time, as (available, position, mission state, active task)."""
-    told, out = Told(), []
+    told, out = PublishedStates(), []
 
     def look():
         status = bench.state()
-        if told.is_news(status, bench.pilot().telemetry.position_at, bench.now, 10.0):
+        if told.is_due(status, bench.executor().telemetry.position_at, bench.now, 10.0):
             out.append(status)
     bench.run(look, seconds)
     return out
@@ -45,33 +45,33 @@ def test_a_task_withdrawn_is_not_active_while_the_vehicle_holds(kind):
 @BOTH
 def test_a_silent_vehicle_is_told_of_once_as_unavailable_and_then_no_more(kind):
     bench = flying(kind, 'ABC')
-    told = Told()
-    assert told.is_news(bench.state(), bench.pilot().telemetry.position_at, bench.now, 10.0)
+    told = PublishedStates()
+    assert told.is_due(bench.state(), bench.executor().telemetry.position_at, bench.now, 10.0)
     bench.line.cut = True
     bench.assign(task_list('CB', 2))  # an upload, which will fail
-    seen = bench.pilot().telemetry.position_at
+    seen = bench.executor().telemetry.position_at
     news = []
 
     def look():
-        if bench.now - seen > 3.1 and told.is_news(
-                bench.state(), bench.pilot().telemetry.position_at, bench.now, 10.0):
+        if bench.now - seen > 3.1 and told.is_due(
+                bench.state(), bench.executor().telemetry.position_at, bench.now, 10.0):
             news.append(bench.state())
     bench.run(look, 60.0)
     assert [status.available for status in news] == [False]
-    assert bench.board().state is not MissionState.UPLOADING  # it has failed meanwhile
+    assert bench.onboard().state is not MissionState.UPLOADING  # it has failed meanwhile
     bench.line.cut = False
     assert bench.run(lambda: look() or news[-1].available, 10.0)
 
 
 def test_positions_are_told_at_most_at_the_rate_and_changes_at_once():
-    bench = FlightBench('px4', takeoff=False).found()
+    bench = FlightBench('px4', takeoff=False).discover()
     bench.run(limit=5.0)
-    told, status = Told(), bench.state()
-    assert told.is_news(status, 10.0, 10.0, 5.0)
-    assert not told.is_news(status, 10.1, 10.1, 5.0)
-    assert told.is_news(dataclasses.replace(status, list_revision=7), 10.1, 10.1, 5.0)
-    assert not told.is_news(dataclasses.replace(status, list_revision=7), 10.2, 10.2, 5.0)
-    assert told.is_news(dataclasses.replace(status, list_revision=7), 10.4, 10.4, 5.0)
+    told, status = PublishedStates(), bench.state()
+    assert told.is_due(status, 10.0, 10.0, 5.0)
+    assert not told.is_due(status, 10.1, 10.1, 5.0)
+    assert told.is_due(dataclasses.replace(status, list_revision=7), 10.1, 10.1, 5.0)
+    assert not told.is_due(dataclasses.replace(status, list_revision=7), 10.2, 10.2, 5.0)
+    assert told.is_due(dataclasses.replace(status, list_revision=7), 10.4, 10.4, 5.0)
 
 
 @BOTH
@@ -80,7 +80,7 @@ def test_a_link_is_stale_after_three_seconds_lost_after_ten_and_back(kind):
     levels = []
 
     def look():
-        level, line, _ = facts_of(bench.ground.served[1], bench.now)
+        level, line, _ = facts_of(bench.ground_station.sessions[1], bench.now)
         if not levels or levels[-1] != (level, line.partition(',')[0]):
             levels.append((level, line.partition(',')[0]))
     bench.run(look, 1.0)
@@ -94,19 +94,19 @@ def test_a_link_is_stale_after_three_seconds_lost_after_ten_and_back(kind):
 
 @BOTH
 def test_an_upload_tells_how_far_it_is_and_about_when_it_ends(kind):
-    bench = FlightBench(kind, takeoff=False, delay=(0.1, 0.1), tick=0.05).found()
-    assert bench.run(lambda: bench.board().held is not None)
+    bench = FlightBench(kind, takeoff=False, delay=(0.1, 0.1), tick=0.05).discover()
+    assert bench.run(lambda: bench.onboard().held is not None)
     bench.assign(task_list('ABCDEFGHIJKLMNOPQRST'))
     seen = []
 
     def look():
-        _, line, facts = facts_of(bench.ground.served[1], bench.now)
+        _, line, facts = facts_of(bench.ground_station.sessions[1], bench.now)
         assert facts['upload'] == 'none' or facts['upload'] in line
         if not seen or seen[-1][1] != facts['upload']:
             seen.append((bench.now, facts['upload']))
         return bench.state().mission_state is MissionState.VERIFIED
     assert bench.run(look)
-    count = 20 + bench.board().own
+    count = 20 + bench.onboard().own
     steps = [text.partition(',')[0] for _, text in seen]
     assert steps[-1] == 'none'
     parts = [f'sent {n} of {count} items' for n in range(1, count + 1)]

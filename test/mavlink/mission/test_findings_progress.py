@@ -36,7 +36,7 @@ def appended(lost=(), **kwargs):
     lost_until = [bench.now + 6.0]
     bench.assign(task_list('CDEF', 2))
     assert truthful(bench, lambda: happened(bench, 'mission_end'), 30.0)
-    assert bench.board().open
+    assert bench.onboard().open
     return bench
 
 
@@ -99,7 +99,7 @@ def swapped_beside(second, lost):
 
     REACHED of the task is repeated for 10 s; of these `lost` [s] are swallowed.
     """
-    bench = FlightBench('px4', tick=0.05).found()
+    bench = FlightBench('px4', tick=0.05).discover()
     bench.assign(listed(1, P=(0.0, 100.0), Q=(0.0, 400.0)))
     swallow(bench, 'down', 'MISSION_ITEM_REACHED', lambda m: not reached or (
         bench.now < reached[0] + lost))
@@ -128,7 +128,7 @@ def test_finding_06_a_reached_of_the_list_before_completes_nothing_of_the_new(lo
 
 
 def test_finding_07_reached_of_a_new_list_is_not_credited_to_the_old_one():
-    bench = FlightBench('px4', tick=0.05).found()
+    bench = FlightBench('px4', tick=0.05).discover()
     bench.assign(listed(1, P=(0.0, 200.0), Q=(0.0, 400.0)))
     assert bench.run(lambda: distance(bench, (0.0, 200.0, 50.0)) < 100.0)
     lost = [True]
@@ -151,7 +151,7 @@ def test_finding_07_reached_of_a_new_list_is_not_credited_to_the_old_one():
 
 def test_finding_07_a_first_try_that_was_taken_is_not_forgotten_in_the_second():
     """The readback shows something else, and no MISSION_COUNT gets through after it."""
-    bench = FlightBench('px4', tick=0.05).found()
+    bench = FlightBench('px4', tick=0.05).discover()
     bench.assign(listed(1, P=(0.0, 200.0), Q=(0.0, 400.0)))
     assert bench.run(lambda: distance(bench, (0.0, 200.0, 50.0)) < 100.0)
     lost = [True]
@@ -163,7 +163,7 @@ def test_finding_07_a_first_try_that_was_taken_is_not_forgotten_in_the_second():
     bench.line.tampers.append(another)
     swallow(bench, 'down', 'MISSION_ACK', lambda m: lost[0])
     swallow(bench, 'up', 'MISSION_COUNT', lambda m: (
-        lost[0] and bench.board().upload.uploads > 2))
+        lost[0] and bench.onboard().upload.uploads > 2))
     bench.assign(listed(2, S=(0.0, 170.0), P=(0.0, 200.0), Q=(0.0, 400.0)))
 
     def honest():
@@ -173,7 +173,7 @@ def test_finding_07_a_first_try_that_was_taken_is_not_forgotten_in_the_second():
     assert bench.run(honest)
     assert bench.flown() == [(0, 170, 50)]
     bench.run(honest, 0.5)
-    assert bench.board().upload.uploads > 2
+    assert bench.onboard().upload.uploads > 2
     lost[0] = False
     assert bench.run(lambda: honest() and len(bench.completed()) == 3)
     assert bench.flown() == [(0, y, 50) for y in (170, 200, 400)]
@@ -181,15 +181,15 @@ def test_finding_07_a_first_try_that_was_taken_is_not_forgotten_in_the_second():
 
 def test_finding_07_a_try_that_was_taken_is_not_forgotten_for_a_newer_list():
     """The vehicle has taken a mission and says ERROR; before the next try comes another list."""
-    bench = FlightBench('px4', tick=0.05).found()
+    bench = FlightBench('px4', tick=0.05).discover()
     bench.assign(listed(1, P=(0.0, 200.0), Q=(0.0, 400.0)))
     assert bench.run(lambda: distance(bench, (0.0, 200.0, 50.0)) < 60.0)
     lost = [True]
     swallow(bench, 'down', 'MISSION_ACK', lambda m: lost[0] and m.type == 0)
     bench.assign(listed(2, S=(0.0, 170.0), P=(0.0, 200.0), Q=(0.0, 400.0)))
-    assert bench.run(lambda: bench.board().upload.sent_all, 10.0)
-    bench.says(d.MAVLink_mission_ack_message(*OURS, d.MAV_MISSION_ERROR))
-    assert bench.run(lambda: bench.board().upload.state is UploadState.BACKOFF, 10.0)
+    assert bench.run(lambda: bench.onboard().upload.sent_all, 10.0)
+    bench.from_vehicle(d.MAVLink_mission_ack_message(*OURS, d.MAV_MISSION_ERROR))
+    assert bench.run(lambda: bench.onboard().upload.state is UploadState.BACKOFF, 10.0)
     bench.assign(listed(3, Q=(0.0, 400.0), S=(0.0, 170.0), P=(0.0, 200.0)))
     assert bench.run(lambda: bench.flown() == [(0, 170, 50)], 60.0)
     lost[0] = False
@@ -199,7 +199,7 @@ def test_finding_07_a_try_that_was_taken_is_not_forgotten_for_a_newer_list():
 
 
 def test_finding_07_reached_of_the_old_list_is_not_credited_to_the_new_one():
-    bench = FlightBench('px4', tick=0.05).found()
+    bench = FlightBench('px4', tick=0.05).discover()
     bench.assign(listed(1, P=(0.0, 200.0), Q=(0.0, 400.0)))
     assert bench.run(lambda: distance(bench, (0.0, 200.0, 50.0)) < 25.0)
     swallow(bench, 'up', 'MISSION_ITEM_INT', lambda m: m.seq == 2 and not bench.flown())
@@ -250,14 +250,14 @@ def test_finding_08_the_end_of_the_old_mission_during_a_swap_is_no_pilot(slow, u
 
 @BOTH
 def test_finding_16_verified_is_not_told_of_a_list_that_came_during_set_current(kind):
-    bench = FindingsBench(kind, delay=(0.2, 0.2)).found()
+    bench = FindingsBench(kind, delay=(0.2, 0.2)).discover()
     bench.assign(task_list('AB', via={'A': ((-150.0, 50.0, 50.0),)}))
     assert bench.run(lambda: bench.started() == ['A'])
     bench.run(limit=3.0)
     bench.assign(task_list('AB', 2))  # without the detour: it is on board, from an item on
     bench.run(limit=0.1)
     bench.assign(task_list('XY', 3))
-    own, seen = bench.board().own, set()
+    own, seen = bench.onboard().own, set()
 
     def told():
         state, held = bench.state(), bench.vehicles[1].mission.items[own:]
@@ -283,7 +283,7 @@ def test_finding_17_a_late_current_completes_nothing_while_it_is_held(index):
                      and bench.vehicles[1].mode.name == 'GUIDED')
     bench.run(limit=3.5)
     for _ in range(3):
-        bench.says(d.MAVLink_mission_current_message(bench.board().own + index, 3, 4, 2))
+        bench.from_vehicle(d.MAVLink_mission_current_message(bench.onboard().own + index, 3, 4, 2))
     truthful(bench, lambda: False, 2.0)
     held[0] = False
     flown_once_each(bench, 'AXYZ')

@@ -11,7 +11,7 @@ from flight_bench import FlightBench
 from uav_task_alloc.mavlink.gcs.onboard_mission import MissionState
 from uav_task_alloc.mavlink.mission.first_leg import FirstLeg, LegStart
 from uav_task_alloc.mavlink.mission.items import RETURN, MissionStop, TaskList
-from uav_task_alloc.mavlink.mission.long_legs import LONGEST
+from uav_task_alloc.mavlink.mission.long_legs import MAX_LEG_LENGTH
 from uav_task_alloc.model import Task
 
 FAST = {'cruise_speed': 300.0, 'acceleration': 100.0, 'climb_rate': 40.0}
@@ -27,21 +27,21 @@ def far_list(names, revision=1, **fields):
 
 
 def bench_of(kind, **config):
-    bench = FlightBench(kind, configs={1: {**FAST, **config}}).found()
+    bench = FlightBench(kind, configs={1: {**FAST, **config}}).discover()
     assert bench.run(lambda: bench.state().available)
     return bench
 
 
 def on_board(bench):
     """Places of the items in the vehicle's own memory, with a task or ''."""
-    own = bench.board().own
-    assert len(bench.vehicles[1].mission.items) == len(bench.board().held) + own
+    own = bench.onboard().own
+    assert len(bench.vehicles[1].mission.items) == len(bench.onboard().held) + own
     return [(item.position, item.task if item.completes else '')
-            for item in bench.board().held if item.command != RETURN]
+            for item in bench.onboard().held if item.command != RETURN]
 
 
 def is_verified(bench):
-    return bench.board().state is MissionState.VERIFIED
+    return bench.onboard().state is MissionState.VERIFIED
 
 
 @BOTH
@@ -54,7 +54,7 @@ def test_finding_32_long_legs_have_points_in_between_on_board(kind):
     places = [place for place, _ in items]
     assert [round(x) for x, _, _ in places] == [
         0, 4_500, 9_000, 4_500, 0, -4_500, -9_000]
-    assert max(map(math.dist, places, places[1:])) <= LONGEST
+    assert max(map(math.dist, places, places[1:])) <= MAX_LEG_LENGTH
     assert [round(z, 3) for _, _, z in places] == [50, 65, 80, 75, 70, 65, 60]
 
 
@@ -63,7 +63,7 @@ def test_finding_32_points_in_between_cost_no_upload_and_are_no_tasks(kind):
     bench = bench_of(kind)
     bench.assign(far_list('BCD'))
     assert bench.run(lambda: bench.started() == ['B'])
-    uploads = bench.board().upload.uploads
+    uploads = bench.onboard().upload.uploads
 
     def renewed(names, revision):  # the list begins with the leg that is flown
         bench.assign(far_list(names, revision))
@@ -77,9 +77,9 @@ def test_finding_32_points_in_between_cost_no_upload_and_are_no_tasks(kind):
         assert bench.run(lambda place=place: bench.state().position[0] < place)
         renewed('CD', revision)
     assert bench.run(lambda: bench.completed() == ['B', 'C', 'D'])
-    assert bench.board().upload.uploads == uploads
+    assert bench.onboard().upload.uploads == uploads
     assert (bench.started(), bench.failed()) == (['B', 'C', 'D'], [])
-    assert bench.pilot().telemetry.flight.value in ('mission', 'hold')
+    assert bench.executor().telemetry.mode.value in ('mission', 'hold')
 
 
 @BOTH
@@ -92,7 +92,7 @@ def test_finding_32_a_list_that_changes_in_mid_leg_does_not_fly_back(kind):
     assert bench.run(lambda: east.append(bench.state().position[0]) or bench.completed())
     assert min(east) > 6_000.0 - 10.0
     assert bench.run(lambda: bench.completed() == ['B', 'D'])
-    assert bench.ground.refusals.count == 0
+    assert bench.ground_station.refusals.count == 0
 
 
 @BOTH

@@ -9,7 +9,7 @@ import pytest
 from uav_task_alloc.geometry.frames import Origin, to_enu_batch, to_geodetic_batch
 from uav_task_alloc.mavlink.mission.items import MissionStop, TaskList
 from uav_task_alloc.mavlink.mission.long_legs import (
-    LONGEST,
+    MAX_LEG_LENGTH,
     first_point,
     first_points,
     legs,
@@ -72,7 +72,7 @@ def test_finding_32_a_first_item_that_is_too_far_stays_too_far(far):
     points = first_points(start, end, (0.0, 0.0, 0.0), 10_000.0)
     assert 10_050.0 < points[0][0] <= 11_100.0
     way = [start, *points, end]
-    assert max(map(math.dist, way[1:], way[2:])) <= LONGEST
+    assert max(map(math.dist, way[1:], way[2:])) <= MAX_LEG_LENGTH
     assert too_high(ORIGINS['zurich'], way, start, end) < 2.5
     assert too_high(ORIGINS['zurich'], way[1:], start, end) < 0.5
     assert first_points(start, end, (0.0, 0.0, 0.0), math.inf) == points_between(start, end)
@@ -101,7 +101,7 @@ def test_finding_32_points_in_between_are_detour_points_and_no_tasks():
     assert after.stops[0].via == ((-9.0, 0.0, 50.0),)
     assert set(before.stops[1].via) < set(after.stops[1].via)
     assert after.end_via == ((15_000.0, 4_500.0, 50.0), (15_000.0, 9_000.0, 50.0))
-    assert all(math.dist(one, two) <= LONGEST for one, two in legs(after, None))
+    assert all(math.dist(one, two) <= MAX_LEG_LENGTH for one, two in legs(after, None))
 
 
 def test_finding_32_short_legs_stay_as_they_are():

@@ -14,7 +14,7 @@ from pymavlink import mavwp
 from uav_task_alloc import scenario
 from uav_task_alloc.errors import MissionError
 from uav_task_alloc.geometry.frames import to_enu, to_geodetic
-from uav_task_alloc.mavlink.mission.files import file_name, mission_of, write_missions
+from uav_task_alloc.mavlink.mission.files import file_name, planned_mission, write_missions
 from uav_task_alloc.mavlink.mission.items import GLOBAL, RETURN
 from uav_task_alloc.model import Leg, Plan
 
@@ -91,7 +91,7 @@ def test_pymavlink_reads_home_and_the_items_in_order_from_waypoints(world, folde
 @pytest.mark.parametrize('uav', ROUTES)
 def test_both_files_hold_what_the_bridge_would_upload(world, folder, uav):
     who = next(each for each in world.uavs if each.id == uav)
-    sent = mission_of(world, who, Plan(ROUTES, legs=LEGS, returns=True).route(uav)).items
+    sent = planned_mission(world, who, Plan(ROUTES, legs=LEGS, returns=True).route(uav)).items
     loader = mavwp.MAVWPLoader()
     loader.load(str(folder / f'{uav}.waypoints'))
     rows = json.loads((folder / f'{uav}.plan').read_text())['mission']['items']

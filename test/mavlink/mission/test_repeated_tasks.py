@@ -29,7 +29,7 @@ class Fleet:
 
     def __init__(self, kind, **params):
         self.make_desk = load_desk()
-        self.bench = FindingsBench(kind).found()
+        self.bench = FindingsBench(kind).discover()
         self.deaf = False  # nobody hears the events of the bridge
         self.start(**params)
 
@@ -52,7 +52,7 @@ class Fleet:
         bench.run(limit=0.25)
         desk.now = 1000.0 + bench.now
         state = bench.state()
-        desk.world.hear(UavReport('uav_1', state.position, list_revision=bench.board().revision),
+        desk.world.hear(UavReport('uav_1', state.position, list_revision=bench.onboard().revision),
                         desk.now, desk.now)
         self.tell_events()
         desk.settle(hear=False)

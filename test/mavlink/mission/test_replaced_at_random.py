@@ -14,7 +14,7 @@ BOTH = pytest.mark.parametrize('kind', ['ardupilot', 'px4'])
 @pytest.mark.parametrize('seed', range(12))
 def test_each_task_is_reached_once_and_none_that_was_withdrawn(kind, service, seed):
     rng = random.Random(seed)
-    bench = FlightBench(kind, seed=seed, loss=rng.choice([0.0, 0.1]), delay=(0.02, 0.1)).found()
+    bench = FlightBench(kind, seed=seed, loss=rng.choice([0.0, 0.1]), delay=(0.02, 0.1)).discover()
     fresh = list('ABCDEFGHIJKLMNOPQRSTUVWXY')
     rng.shuffle(fresh)
     given, withdrawn = [fresh.pop() for _ in range(5)], set()

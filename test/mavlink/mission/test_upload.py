@@ -61,7 +61,7 @@ def test_fault_04_a_request_twice_gets_the_same_item_and_an_ack_twice_nothing(ki
     verified(bench, bench.replace(bench.mission()))
     assert sum(isinstance(e, Verified) for e in bench.events) == 1
     before = len(bench.line.log)
-    bench.says(ack(0))
+    bench.from_vehicle(ack(0))
     assert not bench.upload.busy
     assert len(bench.line.log) == before
 
@@ -72,7 +72,7 @@ def test_fault_05_a_late_request_of_an_earlier_item_is_answered(kind):
     bench.line.tampers.append(drop({'MISSION_ITEM_INT'}, 99, 'up'))
     bench.replace(bench.mission('ABCDE'))
     for seq in (0, 1, 2, 1):
-        bench.says(request(seq))
+        bench.from_vehicle(request(seq))
     assert [m.seq for m in bench.line.sent('MISSION_ITEM_INT')] == [0, 1, 2, 1]
 
 
@@ -94,7 +94,7 @@ def test_fault_07_a_request_back_to_zero_gets_the_whole_list_again(kind):
     mission = bench.replace(bench.mission('ABC'))
     n = len(mission.items)
     for seq in [*range(n - 1), *range(n)]:
-        bench.says(request(seq))
+        bench.from_vehicle(request(seq))
     assert [m.seq for m in bench.line.sent('MISSION_ITEM_INT')] == [*range(n - 1), *range(n)]
 
 

@@ -14,7 +14,7 @@ def test_fault_09_a_request_beyond_the_end_is_cancelled_and_started_again(kind):
     bench = UploadBench(kind)
     bench.line.tampers.append(drop({'MISSION_COUNT'}, 1, 'up'))
     mission = bench.replace(bench.mission())
-    bench.says(request(77))
+    bench.from_vehicle(request(77))
     assert bench.upload.state is UploadState.DRAINING
     assert bench.line.sent('MISSION_ACK')[0].type == 15
     verified(bench, mission)
@@ -30,7 +30,7 @@ def test_fault_10_what_is_not_for_us_is_ignored(kind, message, source):
     bench = UploadBench(kind)
     bench.line.tampers.append(drop({'MISSION_COUNT'}, 99, 'up'))
     bench.replace(bench.mission())
-    bench.says(message, *source)
+    bench.from_vehicle(message, *source)
     assert bench.upload.state is UploadState.COUNTING
     assert bench.line.sent('MISSION_ITEM_INT') == []
 
@@ -39,7 +39,7 @@ def test_fault_10_what_is_not_for_us_is_ignored(kind, message, source):
 def test_fault_12_an_old_request_is_answered_with_an_int_item(kind):
     bench = UploadBench(kind)
     mission = bench.replace(bench.mission())
-    bench.says(d.MAVLink_mission_request_message(245, 190, 0, 0))
+    bench.from_vehicle(d.MAVLink_mission_request_message(245, 190, 0, 0))
     verified(bench, mission)
     assert bench.line.sent('MISSION_REQUEST', 'down')
     assert bench.line.sent('MISSION_ITEM') == []
@@ -50,7 +50,7 @@ def test_fault_13_invalid_sequence_midway_is_not_final(kind):
     bench = UploadBench(kind)
     bench.line.tampers.append(drop({'MISSION_ITEM_INT'}, 1, 'up'))
     mission = bench.replace(bench.mission())
-    bench.says(ack(13))
+    bench.from_vehicle(ack(13))
     verified(bench, mission)
     assert len(bench.line.sent('MISSION_COUNT')) == 1
 
@@ -67,8 +67,8 @@ def test_fault_14_each_nak_does_what_the_table_says(kind, result, when):
     mission = bench.replace(bench.mission('ABCDE'))
     asked = {'start': 0, 'middle': 3, 'end': len(mission.items)}[when]
     for seq in range(asked):
-        bench.says(request(seq))
-    bench.says(ack(result))
+        bench.from_vehicle(request(seq))
+    bench.from_vehicle(ack(result))
     bench.run(limit=0.1)
     expected = {1: UploadState.GRACE, 14: UploadState.BACKOFF, 15: UploadState.COUNTING}.get(
         result, UploadState.IDLE
@@ -91,7 +91,7 @@ def test_fault_15_denied_backs_off_eight_seconds_or_more_with_jitter(kind):
         bench = UploadBench(kind, seed=seed)
         bench.line.tampers.append(drop({'MISSION_COUNT'}, 1, 'up'))
         mission = bench.replace(bench.mission())
-        bench.says(ack(14))
+        bench.from_vehicle(ack(14))
         verified(bench, mission)
         waits.add(bench.now)
         assert bench.now >= 8.0
@@ -103,8 +103,8 @@ def test_fault_16_an_early_accepted_is_no_success(kind):
     bench = UploadBench(kind)
     bench.line.tampers.append(drop({'MISSION_COUNT', 'MISSION_ITEM_INT'}, 3, 'up'))
     mission = bench.replace(bench.mission('ABCDE'))
-    bench.says(request(0))
-    bench.says(ack(0))
+    bench.from_vehicle(request(0))
+    bench.from_vehicle(ack(0))
     assert bench.events == []
     verified(bench, mission)
     assert bench.line.sent('MISSION_REQUEST_LIST')

@@ -25,35 +25,35 @@ def key_file(tmp_path):
     return str(path)
 
 
-def test_fault_30_only_frames_signed_with_the_key_are_heard(radio, key_file, far):
-    radio = radio(signing_key_file=key_file)
+def test_fault_30_only_frames_signed_with_the_key_are_heard(connections, key_file, far):
+    connections = connections(signing_key_file=key_file)
     stamp = int((WALL - 1420070400) * 1e5)
-    good = far(radio, 1, make_signing(KEY, stamp + 10))
+    good = far(connections, 1, make_signing(KEY, stamp + 10))
     frame = good.say(heartbeat())
-    assert len(receive(radio)) == 1
+    assert len(receive(connections)) == 1
     good.socket.sendto(frame, good.to)  # replayed, by the same sender
-    assert nothing(radio)
-    far(radio, 2).socket.sendto(frame, good.to)  # and by another
-    assert nothing(radio)
-    far(radio, 1).say(heartbeat())  # unsigned
-    assert nothing(radio)
-    far(radio, 1, make_signing(bytes(32), stamp + 10**6)).say(heartbeat())  # another key
-    assert nothing(radio)
+    assert nothing(connections)
+    far(connections, 2).socket.sendto(frame, good.to)  # and by another
+    assert nothing(connections)
+    far(connections, 1).say(heartbeat())  # unsigned
+    assert nothing(connections)
+    far(connections, 1, make_signing(bytes(32), stamp + 10**6)).say(heartbeat())  # another key
+    assert nothing(connections)
     good.say(heartbeat())  # the forger has not locked it out
-    assert len(receive(radio)) == 1
-    assert radio.errors() == 4
+    assert len(receive(connections)) == 1
+    assert connections.errors() == 4
 
 
-def test_fault_30_the_timestamp_survives_a_restart(radio, key_file, tmp_path, far):
-    first = radio(signing_key_file=key_file)
+def test_fault_30_the_timestamp_survives_a_restart(connections, key_file, tmp_path, far):
+    first = connections(signing_key_file=key_file)
     end = far(first, 1, make_signing(KEY, 10**14))
     end.say(heartbeat())
     receive(first)
     first.step(0.0)
     kept = int((tmp_path / 'key.timestamp').read_text())
     assert kept > 10**14
-    second = radio(signing_key_file=key_file)
-    assert second.signing.heard.timestamp == kept
+    second = connections(signing_key_file=key_file)
+    assert second.signing.incoming.timestamp == kept
 
 
 @pytest.mark.parametrize(('content', 'key'), [
@@ -73,28 +73,28 @@ def test_an_empty_key_file_is_refused(tmp_path):
         read_key(str(tmp_path / 'key'))
 
 
-def test_a_tlog_holds_every_frame_both_ways_with_its_time(radio, tmp_path, far):
-    radio = radio(tlog=str(tmp_path / 'x.tlog'))
-    end = far(radio)
+def test_a_tlog_holds_every_frame_both_ways_with_its_time(connections, tmp_path, far):
+    connections = connections(tlog=str(tmp_path / 'x.tlog'))
+    end = far(connections)
     frames = [end.say(heartbeat()), end.say(d.MAVLink_attitude_message(1, 0, 0, 0, 0, 0, 0))]
-    receive(radio)
-    radio.receive(0.2)  # both may have come at once
-    radio.send_to_all(heartbeat())
+    receive(connections)
+    connections.receive(0.2)  # both may have come at once
+    connections.send_to_all(heartbeat())
     frames.append(end.socket.recv(1000))
-    radio.close()
+    connections.close()
     data = (tmp_path / 'x.tlog').read_bytes()
     stamp = struct.pack('>Q', int(WALL * 1e6))
     assert data == b''.join(stamp + f for f in frames)
 
 
 @pytest.mark.skipif(not os.path.exists('/dev/full'), reason='there is no /dev/full')
-def test_a_full_disk_ends_the_recording_and_nothing_else(radio, far):
-    radio = radio(tlog='/dev/full')
-    end = far(radio)
+def test_a_full_disk_ends_the_recording_and_nothing_else(connections, far):
+    connections = connections(tlog='/dev/full')
+    end = far(connections)
     end.say(heartbeat())
-    receive(radio)
+    receive(connections)
     for _ in range(1000):
-        radio.send_to_all(heartbeat())
+        connections.send_to_all(heartbeat())
     assert end.hear()[0].get_type() == 'HEARTBEAT'
 
 
@@ -103,13 +103,13 @@ def test_a_recording_that_cannot_be_written_is_refused():
         open_record('/nowhere/x')
 
 
-def test_fault_31_the_heart_beats_while_the_node_is_busy(radio, far):
-    radio = radio()
-    end = far(radio)
+def test_fault_31_the_heart_beats_while_the_node_is_busy(connections, far):
+    connections = connections()
+    end = far(connections)
     end.say(heartbeat())
-    receive(radio)
+    receive(connections)
     busy = threading.Lock()  # that of the node, held all the time
-    heart = Heartbeat(radio.send_to_all, period=0.02)
+    heart = Heartbeat(connections.send_to_all, period=0.02)
     with busy:
         heart.start()
         beats = [end.hear()[0] for _ in range(10)]
@@ -151,12 +151,12 @@ class OneAtATime:
 
 def test_a_beat_never_writes_to_a_line_that_is_read_or_opened_again():
     link = OneAtATime()
-    radio = Connections([link], 245, 190, wall=lambda: WALL)
-    heart = Heartbeat(radio.send_to_all, period=0.001)
+    connections = Connections([link], 245, 190, wall=lambda: WALL)
+    heart = Heartbeat(connections.send_to_all, period=0.001)
     heart.start()
     for now in range(50):
-        radio.step(float(now))
-        radio.receive(0.0)
+        connections.step(float(now))
+        connections.receive(0.0)
     heart.close()
-    radio.close()
+    connections.close()
     assert link.collisions == 0

@@ -12,7 +12,7 @@ from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.mavlink.transport.codec import Codec
 from uav_task_alloc.mavlink.transport.connections import Connections
 from uav_task_alloc.mavlink.transport.heartbeat import Heartbeat
-from uav_task_alloc.mavlink.transport.link import MOST_STRANGERS
+from uav_task_alloc.mavlink.transport.link import MAX_UNCONFIRMED
 from uav_task_alloc.sim.config import VehicleConfig
 from uav_task_alloc.sim.udp_fleet import UdpFleet
 
@@ -42,8 +42,8 @@ def free_until(number):
 # 11: a file number that passes from one link to another
 
 
-def test_finding_11_a_file_number_may_pass_from_one_link_to_the_other(radio, servers):
-    one, two = radio(*(f'tcp:127.0.0.1:{s.getsockname()[1]}' for s in servers)), servers[1]
+def test_finding_11_a_file_number_may_pass_from_one_link_to_the_other(connections, servers):
+    one, two = connections(*(f'tcp:127.0.0.1:{s.getsockname()[1]}' for s in servers)), servers[1]
     first, second = one.links
     two.listen()
     one.step(0.0)  # the first is refused, the second is connected
@@ -65,8 +65,8 @@ def test_finding_11_a_file_number_may_pass_from_one_link_to_the_other(radio, ser
     far.close()
 
 
-def test_finding_11_two_links_may_swap_their_files(radio, servers):
-    one = radio(*(f'tcp:127.0.0.1:{s.getsockname()[1]}' for s in servers))
+def test_finding_11_two_links_may_swap_their_files(connections, servers):
+    one = connections(*(f'tcp:127.0.0.1:{s.getsockname()[1]}' for s in servers))
     for server in servers:
         server.listen()
     one.step(0.0)
@@ -81,9 +81,9 @@ def test_finding_11_two_links_may_swap_their_files(radio, servers):
         far.close()
 
 
-def test_finding_11_a_line_that_a_sender_closes_is_read_no_more(radio, servers):
+def test_finding_11_a_line_that_a_sender_closes_is_read_no_more(connections, servers):
     servers[0].listen()
-    one = radio(f'tcp:127.0.0.1:{servers[0].getsockname()[1]}')
+    one = connections(f'tcp:127.0.0.1:{servers[0].getsockname()[1]}')
     one.step(0.0)
     assert nothing(one)
     link, = one.links
@@ -102,12 +102,12 @@ class Watched:
     name, datagrams, trouble = 'x', False, ''
 
     def __init__(self):
-        self.radio, self.unlocked = None, []
+        self.connections, self.unlocked = None, []
         self.files = os.pipe()
         os.write(self.files[1], b'x')  # always something to read
 
     def __getattr__(self, name):
-        if not self.radio._lock.locked():
+        if not self.connections._lock.locked():
             self.unlocked.append(name)
         return {'fileno': lambda: self.files[0], 'opened': 1, 'read': lambda: [('y', b'x')],
                 'ends': lambda: ['y']}.get(name, lambda *_: None)
@@ -115,21 +115,21 @@ class Watched:
 
 def test_finding_12_nothing_touches_a_stream_without_the_lock(tmp_path):
     link = Watched()
-    radio = link.radio = Connections(
+    connections = link.connections = Connections(
         [link], 245, 190, wall=lambda: WALL, tlog=str(tmp_path / 'x.tlog')
     )
-    radio.step(0.0)
-    radio.receive(0.0)
-    radio.send_to_all(heartbeat())
-    radio.send([((0, 'y'), heartbeat())])
-    radio.close()
+    connections.step(0.0)
+    connections.receive(0.0)
+    connections.send_to_all(heartbeat())
+    connections.send([((0, 'y'), heartbeat())])
+    connections.close()
     for file in link.files:
         os.close(file)
     assert link.unlocked == []
 
 
-def test_finding_12_an_error_on_one_link_leaves_the_heartbeats_of_the_others(radio, far):
-    both = radio('udpin:127.0.0.1:0', 'udpin:127.0.0.1:0')
+def test_finding_12_an_error_on_one_link_leaves_the_heartbeats_of_the_others(connections, far):
+    both = connections('udpin:127.0.0.1:0', 'udpin:127.0.0.1:0')
     end = far(both)
     end.say(heartbeat())
     receive(both)
@@ -143,8 +143,9 @@ def test_finding_12_an_error_on_one_link_leaves_the_heartbeats_of_the_others(rad
     assert 'HEARTBEAT (to x): BufferError: Existing exports' in both.refusals.last
 
 
-def test_finding_12_a_recording_that_ends_in_one_thread_does_not_end_the_other(radio, tmp_path):
-    one = radio(tlog=str(tmp_path / 'x.tlog'))
+def test_finding_12_a_recording_that_ends_in_one_thread_does_not_end_the_other(
+        connections, tmp_path):
+    one = connections(tlog=str(tmp_path / 'x.tlog'))
     one._record.close()  # as the receiver does where the disk is full
     one._write_record(b'x')
     assert one._record is None
@@ -219,38 +220,40 @@ def forbid(key_file):
 
 @pytest.mark.parametrize('content', [b'', b'soon', b'-1', b'12 34', b'1e5', b'\xff\x00', b'9' * 40,
                                      b'281474976710656'])
-def test_finding_13_a_damaged_timestamp_is_refused_at_the_start(radio, key_file, content):
+def test_finding_13_a_damaged_timestamp_is_refused_at_the_start(connections, key_file, content):
     path = key_file.with_name('key.timestamp')
     path.write_bytes(content)
     with pytest.raises(InvalidValue) as refused:
-        radio(signing_key_file=str(key_file))
+        connections(signing_key_file=str(key_file))
     assert str(refused.value).startswith(f'signing timestamp in {path} = ')
     assert 'expected a whole number in [0, 281474976710655]; delete the file' in str(refused.value)
     assert path.read_bytes() == content
 
 
-def test_finding_13_a_timestamp_that_cannot_be_read_is_refused_at_the_start(radio, key_file):
+def test_finding_13_a_timestamp_that_cannot_be_read_is_refused_at_the_start(connections, key_file):
     key_file.with_name('key.timestamp').mkdir()
     with pytest.raises(InvalidValue, match=r'signing timestamp = .*: expected a readable file'):
-        radio(signing_key_file=str(key_file))
+        connections(signing_key_file=str(key_file))
 
 
-def test_finding_13_a_timestamp_that_cannot_be_written_is_refused_at_the_start(radio, key_file):
+def test_finding_13_a_timestamp_that_cannot_be_written_is_refused_at_the_start(
+        connections, key_file):
     forbid(key_file)
     with pytest.raises(InvalidValue, match=r'signing timestamp = .*: expected a file that can be'):
-        radio(signing_key_file=str(key_file))
+        connections(signing_key_file=str(key_file))
 
 
-def test_finding_13_a_timestamp_that_cannot_be_written_in_flight_is_told(radio, far, key_file):
-    one = radio(signing_key_file=str(key_file))
+def test_finding_13_a_timestamp_that_cannot_be_written_in_flight_is_reported(
+        connections, far, key_file):
+    one = connections(signing_key_file=str(key_file))
     one.step(0.0)
     assert one.signing.trouble == ''
     forbid(key_file)
     one.step(10.0)
     assert 'key.timestamp: not written: ' in one.signing.trouble
-    before = one.signing.sent.timestamp
+    before = one.signing.outgoing.timestamp
     one.send([((0, ('127.0.0.1', 9)), heartbeat())])
-    assert one.signing.sent.timestamp == before + 1
+    assert one.signing.outgoing.timestamp == before + 1
     key_file.with_name('key.timestamp.tmp').rmdir()
     one.step(12.0)
     assert one.signing.trouble != ''  # it is tried again after 5 s
@@ -259,46 +262,47 @@ def test_finding_13_a_timestamp_that_cannot_be_written_in_flight_is_told(radio, 
     assert int(key_file.with_name('key.timestamp').read_text()) > before
 
 
-def test_finding_13_a_file_in_a_folder_that_is_read_only_is_written_in_place(radio, key_file):
+def test_finding_13_a_file_in_a_folder_that_is_read_only_is_written_in_place(
+        connections, key_file):
     key_file.with_name('key.timestamp.tmp').mkdir()
-    radio(signing_key_file=str(key_file))
+    connections(signing_key_file=str(key_file))
     assert key_file.with_name('key.timestamp').read_text().isdigit()
 
 
 def test_finding_13_a_computer_whose_clock_was_never_set_signs(key_file):
     one = Connections([], 245, 190, wall=lambda: 0.0, signing_key_file=str(key_file))
     one.step(0.0)
-    assert one._voice.pack(heartbeat())
+    assert one._encoder.pack(heartbeat())
     one.close()
 
 
 # 24: a flood of far ends
 
 
-def flood(radio, count, data=b'\xfd\x00x'):
+def flood(connections, count, data=b'\xfd\x00x'):
     """As many strangers send something."""
-    to = ('127.0.0.1', radio.links[0].port)
+    to = ('127.0.0.1', connections.links[0].port)
     for _ in range(count):
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as stranger:
             stranger.bind(('127.0.0.1', 0))
             stranger.sendto(data, to)
-            radio.receive(5.0)
+            connections.receive(5.0)
 
 
-def test_finding_24_of_strangers_only_the_latest_hear_heartbeats(radio, far):
-    one = radio()
+def test_finding_24_of_strangers_only_the_latest_hear_heartbeats(connections, far):
+    one = connections()
     flood(one, 200)
     last = far(one, 9)
     last.say(heartbeat())
     receive(one)
-    assert len(one.links[0].ends()) == MOST_STRANGERS
-    assert len(one._parsers) <= MOST_STRANGERS + 1
+    assert len(one.links[0].ends()) == MAX_UNCONFIRMED
+    assert len(one._parsers) <= MAX_UNCONFIRMED + 1
     one.send_to_all(heartbeat())
     assert last.hear()[0].get_type() == 'HEARTBEAT'
 
 
-def test_finding_24_a_known_vehicle_is_not_forgotten_for_strangers(radio, far):
-    one = radio()
+def test_finding_24_a_known_vehicle_is_not_forgotten_for_strangers(connections, far):
+    one = connections()
     vehicles = [far(one, system) for system in range(1, 41)]  # more than strangers are kept
     known = set()
     for vehicle in vehicles:
@@ -308,24 +312,24 @@ def test_finding_24_a_known_vehicle_is_not_forgotten_for_strangers(radio, far):
     parsers = {address: one._parsers[address] for address in known}
     flood(one, 200)
     assert {(0, end) for end in one.links[0].ends()} > known
-    assert len(one.links[0].ends()) == 40 + MOST_STRANGERS
+    assert len(one.links[0].ends()) == 40 + MAX_UNCONFIRMED
     assert all(one._parsers[address] is parsers[address] for address in known)
     one.send_to_all(heartbeat())
     assert {vehicle.hear()[0].get_type() for vehicle in vehicles} == {'HEARTBEAT'}
 
 
-def test_finding_24_who_was_named_by_a_parameter_is_not_forgotten(radio):
+def test_finding_24_who_was_named_by_a_parameter_is_not_forgotten(connections):
     far_end = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     far_end.bind(('127.0.0.1', 0))
-    one = radio(f'udpout:127.0.0.1:{far_end.getsockname()[1]}')
+    one = connections(f'udpout:127.0.0.1:{far_end.getsockname()[1]}')
     one.keep(())
     flood(one, 100)
     assert far_end.getsockname() in one.links[0].ends()
     far_end.close()
 
 
-def test_finding_24_frames_refused_are_counted_when_their_sender_is_forgotten(radio):
-    one = radio()
+def test_finding_24_frames_refused_are_counted_when_their_sender_is_forgotten(connections):
+    one = connections()
     flood(one, 100, b'xxx')
     assert one.errors() == 100
 

@@ -13,7 +13,7 @@ from pymavlink.dialects.v20 import ardupilotmega as d
 
 from uav_task_alloc.mavlink.gcs.ground_station import GcsConfig, GroundStation
 from uav_task_alloc.mavlink.gcs.policy import Policy
-from uav_task_alloc.mavlink.gcs.status import Told, facts_of, state_of
+from uav_task_alloc.mavlink.gcs.status import PublishedStates, facts_of, state_of
 from uav_task_alloc.mavlink.gcs.telemetry import WANTED
 from uav_task_alloc.mavlink.mission.items import MissionStop, TaskList
 from uav_task_alloc.mavlink.transport.codec import Codec, make_signing
@@ -62,69 +62,69 @@ class Bridge:
     def __init__(self, seed, datagrams):
         self.rng = random.Random(seed)
         self.wire = Wire(datagrams)
-        self.radio = Connections([self.wire], 245, 190, wall=lambda: 1.8e9, wanted=WANTED)
-        self.ground = GroundStation(GcsConfig(origin=ORIGIN, policy=Policy(
+        self.connections = Connections([self.wire], 245, 190, wall=lambda: 1.8e9, wanted=WANTED)
+        self.ground_station = GroundStation(GcsConfig(origin=ORIGIN, policy=Policy(
             takeoff=True, when_foreign=self.rng.choice(['yield', 'reassert']))),
             random.Random(seed))
         self.now, self.step_at, self.revision = 0.0, 0.0, 0
-        self.told, self.states = Told(), set()
+        self.published, self.states = PublishedStates(), set()
 
     def hear(self, end, data):
         """As `receive` of the node does, without waiting."""
         out = []
-        for address, message in self.radio._parse((0, end), data):
-            out += self.ground.receive(address, message, self.now)
-        self.radio.send(out)
+        for address, message in self.connections._parse((0, end), data):
+            out += self.ground_station.receive(address, message, self.now)
+        self.connections.send(out)
 
     def pass_time(self, pause):
         self.now += pause
         if self.now >= self.step_at:
-            self.radio.send(self.ground.step(self.now))
-            self.radio.keep(self.ground.addresses())
-            self.radio.step(self.now)
+            self.connections.send(self.ground_station.step(self.now))
+            self.connections.keep(self.ground_station.addresses())
+            self.connections.step(self.now)
             self.step_at = self.now + 0.02
-        for served in self.ground.served.values():
-            status = state_of(served, self.now, 20_000.0)
-            self.told.is_news(status, served.pilot.telemetry.position_at, self.now, 5.0)
-            facts_of(served, self.now)
+        for session in self.ground_station.sessions.values():
+            status = state_of(session, self.now, 20_000.0)
+            self.published.is_due(status, session.executor.telemetry.position_at, self.now, 5.0)
+            facts_of(session, self.now)
             self.states |= {status.mission_state.name, status.authority.name}
-            served.pilot.notes.clear()
-            served.pilot.events.clear()
+            session.executor.notes.clear()
+            session.executor.events.clear()
 
     def command(self):
         """Now and then a list or a hand-over for a vehicle that seems to be there."""
-        if not self.ground.served or self.rng.random() > 0.1:
+        if not self.ground_station.sessions or self.rng.random() > 0.1:
             return
-        served = self.rng.choice(list(self.ground.served.values()))
+        session = self.rng.choice(list(self.ground_station.sessions.values()))
         self.revision += 1
         names = self.rng.sample(range(8), self.rng.randint(0, 5))
         far = self.rng.choice([300.0, 30_000.0])
         tasks = TaskList(self.revision, tuple(
             MissionStop(Task(f't{k}', (far * k, far, 50.0), service_time=k / 2)) for k in names),
             self.rng.random() < 0.5)
-        self.radio.send(self.ground.assign(served.uav_id, tasks, self.now))
+        self.connections.send(self.ground_station.assign(session.uav_id, tasks, self.now))
         if self.rng.random() < 0.3:
-            self.ground.hand_over(served.uav_id, 'test', self.now)
+            self.ground_station.hand_over(session.uav_id, 'test', self.now)
 
     def unforeseen(self):
         """What was refused for no reason that anybody had thought of."""
-        return [note.text for refusals in (self.ground.refusals, self.radio.refusals)
+        return [note.text for refusals in (self.ground_station.refusals, self.connections.refusals)
                 for note in refusals.notes if FORESEEN not in note.text]
 
     def flies(self, guest):
         """A vehicle that comes when all is over, on a system id that nobody has, is served."""
-        self.ground.served.pop(guest.system, None)  # perhaps somebody has spoken as it
+        self.ground_station.sessions.pop(guest.system, None)  # perhaps somebody has spoken as it
         end = self.now + 120.0
         while self.now < end:
             self.pass_time(0.1)
             guest.live(self)
-            served = self.ground.served.get(guest.system)
-            if served is None:
+            session = self.ground_station.sessions.get(guest.system)
+            if session is None:
                 continue
-            if served.pilot.board.tasks is None:
-                self.radio.send(self.ground.assign(served.uav_id, TaskList(1, (
+            if session.executor.onboard.tasks is None:
+                self.connections.send(self.ground_station.assign(session.uav_id, TaskList(1, (
                     MissionStop(Task('good', (0.0, 2060.0, 50.0))),)), self.now))
-            if 'good' in served.pilot.board.progress.completed:
+            if 'good' in session.executor.onboard.progress.completed:
                 return True
         return False
 
@@ -134,14 +134,14 @@ class Guest:
 
     def __init__(self, kind, system, end):
         self.system, self.end, self.vehicle = system, end, make_vehicle(kind, system)
-        self.codec, self.ear = Codec(system, 1), Codec(system, 1)
+        self.codec, self.decoder = Codec(system, 1), Codec(system, 1)
 
     def live(self, bridge):
         """Hear what was sent to it, and say what it has to say."""
         sent, bridge.wire.sent = bridge.wire.sent, []
         said = self.vehicle.step(bridge.now)
         for to, data in sent:
-            for message in self.ear.parse(data) if to == self.end else ():
+            for message in self.decoder.parse(data) if to == self.end else ():
                 said += self.vehicle.receive(message, bridge.now)
         for message in said:
             bridge.hear(self.end, self.codec.pack(message))
@@ -167,7 +167,8 @@ def attacks(request):
     for seed in range(request.config.getoption('--streams')):
         bridge = attacked(seed)
         flown = seed % 20 or bridge.flies(Guest('px4', GOOD, 'good'))
-        made[seed] = (bridge.unforeseen(), bridge.states, bridge.ground.refusals.count, flown)
+        refused = bridge.ground_station.refusals.count
+        made[seed] = (bridge.unforeseen(), bridge.states, refused, flown)
     return made
 
 
@@ -187,12 +188,12 @@ def test_the_streams_get_far_into_the_bridge(attacks):
 
 def test_a_signed_stream_ends_no_bridge_without_its_key(tmp_path):
     tmp_path.joinpath('key').write_bytes(bytes(32))
-    radio = Connections([Wire(True)], 245, 190, wall=lambda: 1.8e9,
+    connections = Connections([Wire(True)], 245, 190, wall=lambda: 1.8e9,
                   signing_key_file=str(tmp_path / 'key'))
     forger = Codec(1, 1, signing=make_signing(b'x' * 32, 10**14))
     rng = random.Random(1)
     for pause, end, data in stream(1, LENGTH):
         signed = forger.pack(d.MAVLink_heartbeat_message(2, 12, 0, 0, 4, 3))
         cut = signed[:rng.randrange(len(signed))]
-        assert radio._parse((0, end), rng.choice([data, signed, cut])) == [], pause
-    assert radio.refusals.count == 0
+        assert connections._parse((0, end), rng.choice([data, signed, cut])) == [], pause
+    assert connections.refusals.count == 0

@@ -29,7 +29,8 @@ class ArmingAndLanding:
         if state.mode is None:
             return False
         return (state.descending and state.returns(state.mode)) or (
-            state.profile.flight(state.mode) is ModeFunction.MISSION and self._evidence.returning()
+            state.profile.mode_function(state.mode) is ModeFunction.MISSION
+            and self._evidence.returning()
         )
 
     def changed(self, descends: bool, now: float) -> None:

@@ -69,9 +69,9 @@ class CommandSender:
     def reset(self, now: float) -> None:
         """The vehicle was restarted."""
         self.drop()
-        self.encourage(now)
+        self.clear_backoff(now)
 
-    def encourage(self, now: float) -> None:
+    def clear_backoff(self, now: float) -> None:
         """A new list, a new link: what failed may be tried again."""
         self._retry_at, self._retries = now, 0
 
@@ -80,7 +80,7 @@ class CommandSender:
         self._retries += 1
         self._retry_at = now + (RETRY if self._retries <= RETRIES else SLOW_RETRY)
 
-    def resting(self, now: float) -> bool:
+    def backing_off(self, now: float) -> bool:
         """After a failure, before the next try."""
         if now < self._retry_at:
             self.waits_for = 'the next try'
@@ -98,7 +98,7 @@ class CommandSender:
         self.waits_for = what
         return []
 
-    def content(self) -> list[Message]:
+    def satisfied(self) -> list[Message]:
         """All is as it should be."""
         self.waits_for = self._said = ''
         self._retries = 0
@@ -168,13 +168,13 @@ class CommandSender:
         telemetry = self._telemetry
 
         def done(t: float) -> None:
-            telemetry.flight = flight  # a heartbeat sent before may say otherwise for a moment
+            telemetry.mode = flight  # a heartbeat sent before may say otherwise for a moment
             if flight is ModeFunction.MISSION:
                 self.must_start = False
 
         self.commanded = flight
         return self.do(Command(_mode_name(flight), self._profile.mode_command(
-            self._peer, flight), lambda: telemetry.flight is flight), now, done)
+            self._peer, flight), lambda: telemetry.mode is flight), now, done)
 
     def jump(self, seq: int, now: float, then: Then) -> list[Message]:
         """To an item: by command, and where that is unknown the old way."""
@@ -193,14 +193,14 @@ class CommandSender:
         telemetry = self._telemetry
         if telemetry.airborne and not self.climbing:
             return None
-        if self.resting(now):
+        if self.backing_off(now):
             return []
         if self.climbing:
             return self._climb(height, now)
         if not telemetry.grounded or not telemetry.has_position:
             self.waits_for = 'a position' if telemetry.grounded else 'its landed state'
             return []
-        if telemetry.flight is not ModeFunction.HOLD and not self._profile.amsl_takeoff and (
+        if telemetry.mode is not ModeFunction.HOLD and not self._profile.amsl_takeoff and (
                 ModeFunction.HOLD in self._profile.set_mode):
             return self.set_mode(ModeFunction.HOLD, now)  # ArduPilot arms and climbs in GUIDED
         if not telemetry.armed:
@@ -215,7 +215,7 @@ class CommandSender:
         ground = telemetry.altitude - (
             0.0 if math.isnan(telemetry.height) else telemetry.height)
         up = self._profile.takeoff_command(self._peer, height, ground)
-        return self.do(Command('take off', up, lambda: telemetry.flight is ModeFunction.TAKEOFF,
+        return self.do(Command('take off', up, lambda: telemetry.mode is ModeFunction.TAKEOFF,
                                wanted=wanted), now, self._took_off)
 
     def disarm(self, now: float) -> list[Message]:

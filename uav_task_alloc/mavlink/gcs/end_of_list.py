@@ -87,7 +87,8 @@ class EndOfList:
             returns = False
             self._sender.wait(f'a way home: {blocked}')
         if flying or (returns and telemetry.mode in (ModeFunction.HOLD, ModeFunction.MISSION)):
-            return self._sender.set_mode(ModeFunction.RETURN if returns else ModeFunction.HOLD, now)
+            mode = ModeFunction.RETURN if returns else ModeFunction.HOLD
+            return self._sender.set_mode(mode, now)
         return []
 
     def _blocked_home(self) -> str:

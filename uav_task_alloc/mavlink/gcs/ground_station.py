@@ -55,7 +55,7 @@ class VehicleSession:
 
     uav_id: str
     address: RemoteKey
-    pilot: MissionExecutor
+    executor: MissionExecutor
     strays: int = 0  # frames with its system id from elsewhere
     fault: str = ''  # why the bridge could not act for it, last; '': it could
 
@@ -66,7 +66,7 @@ class GroundStation:
     def __init__(self, station: GcsConfig, rng: random.Random,
                  store: AuthorityStore | None = None) -> None:
         self._station, self._rng, self._store = station, rng, store
-        self.served: dict[int, VehicleSession] = {}  # by system id
+        self.sessions: dict[int, VehicleSession] = {}  # by system id
         self.refusals = RefusedMessages()  # messages, and lists that could not be acted on
         self._shared: list[tuple[TaskList | None, int]] = []  # lists and memories seen
 
@@ -86,21 +86,21 @@ class GroundStation:
         system = message.get_srcSystem()
         if message.get_srcComponent() != d.MAV_COMP_ID_AUTOPILOT1:
             return []
-        served = self.served.get(system) or self._discover(address, message, now)
-        if served is None:
+        session = self.sessions.get(system) or self._discover(address, message, now)
+        if session is None:
             return []
-        if served.address != address:
+        if session.address != address:
             # the same id twice would bring one plane's mission to the other
-            if not served.pilot.telemetry.stale(now):
-                served.strays += 1
+            if not session.executor.telemetry.stale(now):
+                session.strays += 1
                 return []
-            served.address = address
-            served.pilot.moved_address(now)
-        return self._sent(served, served.pilot.receive(message, now))
+            session.address = address
+            session.executor.moved_address(now)
+        return self._sent(session, session.executor.receive(message, now))
 
     def addresses(self) -> frozenset[RemoteKey]:
         """Where the known vehicles are."""
-        return frozenset(served.address for served in self.served.values())
+        return frozenset(session.address for session in self.sessions.values())
 
     def step(self, now: float) -> Outgoing:
         """Let time pass for all."""
@@ -109,29 +109,29 @@ class GroundStation:
             self._share(now)
         except Exception as error:
             self.refusals.add('all vehicles', 'compare what was flown', failure(error), 'error')
-        for served in self.served.values():
+        for session in self.sessions.values():
             try:
-                out += self._sent(served, served.pilot.step(now))
-                served.fault = ''
+                out += self._sent(session, session.executor.step(now))
+                session.fault = ''
             except Exception as error:
-                self._fault(served, 'step', error)
+                self._fault(session, 'step', error)
         return out
 
-    def _fault(self, served: VehicleSession, what: str, error: Exception) -> None:
+    def _fault(self, session: VehicleSession, what: str, error: Exception) -> None:
         """The others fly on, and nothing new is given to this one while it lasts."""
-        served.fault = f'{what} failed: {failure(error)}'
-        self.refusals.add(served.uav_id, what, failure(error), 'error')
+        session.fault = f'{what} failed: {failure(error)}'
+        self.refusals.add(session.uav_id, what, failure(error), 'error')
 
     def assign(self, uav_id: str, tasks: TaskList, now: float) -> Outgoing:
         """A list for one UAV; raise UnknownName where it was not heard."""
-        for served in self.served.values():
-            if served.uav_id == uav_id:
+        for session in self.sessions.values():
+            if session.uav_id == uav_id:
                 try:
-                    return self._sent(served, served.pilot.assign(tasks, now))
+                    return self._sent(session, session.executor.assign(tasks, now))
                 except Exception as error:
-                    self._fault(served, 'task_list', error)
+                    self._fault(session, 'task_list', error)
                     return []
-        raise UnknownName('uav', uav_id, [s.uav_id for s in self.served.values()])
+        raise UnknownName('uav', uav_id, [s.uav_id for s in self.sessions.values()])
 
     def hand_over(self, uav_id: str, operator: str, now: float) -> str:
         """An operator gives a UAV to the bridge.
@@ -142,22 +142,22 @@ class GroundStation:
         Raises:
             UnknownName: no such UAV was heard.
         """
-        for served in self.served.values():
-            if served.uav_id == uav_id:
-                return served.pilot.hand_over(operator, now)
-        raise UnknownName('uav', uav_id, [s.uav_id for s in self.served.values()])
+        for session in self.sessions.values():
+            if session.uav_id == uav_id:
+                return session.executor.hand_over(operator, now)
+        raise UnknownName('uav', uav_id, [s.uav_id for s in self.sessions.values()])
 
     def _share(self, now: float) -> None:
         """What one has flown before we listened is not flown by another who has it now."""
-        pilots = [(s.uav_id, s.pilot) for s in self.served.values()]
+        executors = [(s.uav_id, s.executor) for s in self.sessions.values()]
         known: list[tuple[TaskList | None, int]] = [
-            (p.board.tasks, len(p.board.recall.memory(now))) for _, p in pilots]
+            (p.onboard.tasks, len(p.onboard.resume.memory(now))) for _, p in executors]
         if known == self._shared or not any(flown for _, flown in known):
             return
         self._shared = known
-        for (_, has), (other, did) in permutations(pilots, 2):
-            if has.board.tasks is not None:
-                has.relieve(did.board.recall.flown(has.board.open_tasks(), now), other)
+        for (_, has), (other, did) in permutations(executors, 2):
+            if has.onboard.tasks is not None:
+                has.drop_flown(did.onboard.resume.flown(has.onboard.open_tasks(), now), other)
 
     def _discover(self, address: RemoteKey, message: Message, now: float) -> VehicleSession | None:
         station, system = self._station, message.get_srcSystem()
@@ -174,12 +174,12 @@ class GroundStation:
             if store is not None:
                 store.save(uav_id, changed)
 
-        pilot = MissionExecutor(peer, profile_of(message, station.autopilot), station.origin,
+        executor = MissionExecutor(peer, profile_of(message, station.autopilot), station.origin,
                       station.policy, random.Random(self._rng.random()), now, record, save)
-        served = VehicleSession(uav_id, address, pilot)
-        self.served[system] = served
-        return served
+        session = VehicleSession(uav_id, address, executor)
+        self.sessions[system] = session
+        return session
 
     @staticmethod
-    def _sent(served: VehicleSession, messages: Iterable[Message]) -> Outgoing:
-        return [(served.address, message) for message in messages]
+    def _sent(session: VehicleSession, messages: Iterable[Message]) -> Outgoing:
+        return [(session.address, message) for message in messages]

@@ -20,105 +20,107 @@ class ListExecution:
 
     def __init__(
         self,
-        helm: CommandSender,
+        sender: CommandSender,
         telemetry: Telemetry,
-        board: OnboardMission,
+        onboard: OnboardMission,
         watch: AuthorityWatch,
         profile: Profile,
         ending: EndOfList,
         texts: StatusTextLog,
     ) -> None:
-        self._helm, self._telemetry, self._board = helm, telemetry, board
+        self._sender, self._telemetry, self._onboard = sender, telemetry, onboard
         self._watch, self._profile, self._ending, self._texts = watch, profile, ending, texts
-        self._service = UploadHold(board, telemetry, profile)
+        self._service = UploadHold(onboard, telemetry, profile)
         self._aimed = False  # its current item is set by us since it flew last
 
     def bring(self, now: float) -> NextMessages:
         """The list on board, by the cheapest way."""
-        board, telemetry, helm = self._board, self._telemetry, self._helm
-        found = board.change()
+        onboard, telemetry, sender = self._onboard, self._telemetry, self._sender
+        found = onboard.change()
         if found.kind is DiffKind.KEEP:
-            board.adopt(found, now)
+            onboard.adopt(found, now)
             return None
-        if helm.resting(now):
+        if sender.backing_off(now):
             return []
         if not telemetry.past_boot:
-            return helm.wait_for('the autopilot to start')
+            return sender.wait_for('the autopilot to start')
         if self._chosen_by_another():
-            return helm.wait_for('the item that another station has chosen')
+            return sender.wait_for('the item that another station has chosen')
         if found.kind is DiffKind.JUMP:
             return self._jump(found, now)
-        if board.list.leg.unknown:
-            return helm.wait_for('a position')
+        if onboard.list.leg.unknown:
+            return sender.wait_for('a position')
         if self._service.lasts(now):
-            helm.waits_for = 'the end of the service'
+            sender.waits_for = 'the end of the service'
             return []
         if found.kind is DiffKind.SWAP and telemetry.airborne and not telemetry.good_link(now):
-            return helm.wait_for('a link without gaps for 10 s')
+            return sender.wait_for('a link without gaps for 10 s')
         if (found.kind is DiffKind.SWAP and not self._profile.atomic and telemetry.airborne
-                and telemetry.flight is ModeFunction.MISSION):
-            helm.must_start, self._watch.swap_at = True, now
-            return helm.set_mode(ModeFunction.HOLD, now)
-        return board.begin_upload(found, now)
+                and telemetry.mode is ModeFunction.MISSION):
+            sender.must_start, self._watch.swap_at = True, now
+            return sender.set_mode(ModeFunction.HOLD, now)
+        return onboard.begin_upload(found, now)
 
     def _chosen_by_another(self) -> bool:
         """Somebody has set the current item: it is flown, and what was left out later."""
-        progress, item = self._board.progress, self._board.progress.active
+        progress, item = self._onboard.progress, self._onboard.progress.active
         return (progress.chosen is not None and progress.chosen == progress.current
                 and self._telemetry.airborne
-                and self._telemetry.flight is ModeFunction.MISSION and item is not None
-                and any(item.task == stop.task.id for stop in self._board.remaining().stops))
+                and self._telemetry.mode is ModeFunction.MISSION and item is not None
+                and any(item.task == stop.task.id for stop in self._onboard.remaining().stops))
 
     def _jump(self, found: MissionDiff, now: float) -> NextMessages:
-        board = self._board
+        onboard = self._onboard
         if not self._watch.authority.held:
-            return self._helm.wait_for('authority to set the current item')
-        tasks = board.tasks
+            return self._sender.wait_for('authority to set the current item')
+        tasks = onboard.tasks
 
         def done(t: float) -> None:
-            board.progress.retag(found.items)
-            board.progress.jumped(found.start, t)
-            board.must_jump, self._aimed = None, True
-            board.adopt(found, t, tasks)
+            onboard.progress.retag(found.items)
+            onboard.progress.jumped(found.start, t)
+            onboard.must_jump, self._aimed = None, True
+            onboard.adopt(found, t, tasks)
 
-        board.progress.asked(found.start)
-        return self._helm.jump(found.start + board.own, now, done)
+        onboard.progress.asked(found.start)
+        return self._sender.jump(found.start + onboard.own, now, done)
 
     def fly(self, now: float) -> NextMessages:
         """In mission mode, at the right item."""
-        helm, board = self._helm, self._board
-        in_mission = self._telemetry.flight is ModeFunction.MISSION
-        flying = in_mission and not helm.must_start
+        sender, onboard = self._sender, self._onboard
+        in_mission = self._telemetry.mode is ModeFunction.MISSION
+        flying = in_mission and not sender.must_start
         self._aimed = self._aimed and not flying
         if flying and self._stands():
-            board.must_jump = board.progress.current
-            helm.must_start = True
-            return helm.set_mode(ModeFunction.HOLD, now)  # it would begin at the first item again
-        if flying and board.must_jump is None:
-            board.progress.started()
+            onboard.must_jump = onboard.progress.current
+            sender.must_start = True
+            # in mission mode it would start again at the first item
+            return sender.set_mode(ModeFunction.HOLD, now)
+        if flying and onboard.must_jump is None:
+            onboard.progress.started()
             self._ending.swap_ended()
-            return helm.content()
-        if helm.refused and not in_mission:
-            board.list.infeasible(self._texts.last or helm.refused)
-            helm.refused = ''
+            return sender.satisfied()
+        if sender.refused and not in_mission:
+            onboard.list.infeasible(self._texts.last or sender.refused)
+            sender.refused = ''
             return []
-        if helm.resting(now):
+        if sender.backing_off(now):
             return []
-        if self._telemetry.flight is ModeFunction.TAKEOFF:
-            return helm.wait_for('the end of the take-off')
-        if not (flying or self._aimed or self._profile.atomic) and board.must_jump is None:
-            board.must_jump = board.progress.current  # ArduPilot resumes after what it flew last
-        if board.must_jump is not None:
+        if self._telemetry.mode is ModeFunction.TAKEOFF:
+            return sender.wait_for('the end of the take-off')
+        if not (flying or self._aimed or self._profile.atomic) and onboard.must_jump is None:
+            # ArduPilot resumes after the item that it flew last
+            onboard.must_jump = onboard.progress.current
+        if onboard.must_jump is not None:
             return self._jump(
-                MissionDiff(DiffKind.JUMP, board.progress.items, board.must_jump), now
+                MissionDiff(DiffKind.JUMP, onboard.progress.items, onboard.must_jump), now
             )
-        return helm.set_mode(ModeFunction.MISSION, now)
+        return sender.set_mode(ModeFunction.MISSION, now)
 
     def _stands(self) -> bool:
         """ArduPilot has ended the mission that it had, and does not begin what was appended."""
-        telemetry, progress = self._telemetry, self._board.progress
+        telemetry, progress = self._telemetry, self._onboard.progress
         return (not self._profile.atomic and telemetry.current is not None
                 and telemetry.mission_state == d.MISSION_STATE_COMPLETE
                 and not progress.finished and progress.active is not None
-                and telemetry.current_at > self._board.verified_at
-                and telemetry.current - self._board.own < len(progress.items) - 1)
+                and telemetry.current_at > self._onboard.verified_at
+                and telemetry.current - self._onboard.own < len(progress.items) - 1)

@@ -29,19 +29,19 @@ class MessageRates:
         """What is to be asked now."""
         quiet = now - self._telemetry.positions_at > _QUIET
         if self._came and quiet and not self._telemetry.stale(now):
-            self._telemetry.heard.clear()
+            self._telemetry.received_ids.clear()
             self.again(now)
         self._came = self._came or not quiet
         estimate = ESTIMATE.get(self._telemetry.autopilot)
         rates = {**RATES, estimate: 1.0} if estimate is not None else RATES
-        last = self._telemetry.heard_last
+        last = self._telemetry.received_last
         silent = {number for number, rate in rates.items()
                   if now - last.get(number, now) > _SILENT + 4.0 / rate}
         if silent - self._silent and not self._telemetry.stale(now):
             self.again(now)
         self._silent = silent
         missing = [number for number in rates
-                   if number in silent or number not in self._telemetry.heard]
+                   if number in silent or number not in self._telemetry.received_ids]
         if now < self._due or self._asked >= TRIES or (self._asked and not missing):
             return []
         self._asked += 1

@@ -13,50 +13,50 @@ from uav_task_alloc.mavlink.mission.items import Item, alike
 class MissionEvidence:
     """Reads the board of one vehicle, and changes nothing."""
 
-    def __init__(self, board: OnboardMission, telemetry: Telemetry) -> None:
-        self._board, self._telemetry = board, telemetry
+    def __init__(self, onboard: OnboardMission, telemetry: Telemetry) -> None:
+        self._onboard, self._telemetry = onboard, telemetry
         self._checksum: tuple[tuple[Item, ...], int] | None = None
 
     def ended(self, now: float) -> bool:
         """REACHED of the last item has just come."""
-        return self._board.progress.ended_lately(now, LATE)
+        return self._onboard.progress.ended_lately(now, LATE)
 
     def rejected(self, now: float) -> bool:
         """The vehicle says that it has no valid mission, just after it took ours (PX4)."""
-        telemetry, board = self._telemetry, self._board
+        telemetry, onboard = self._telemetry, self._onboard
         return (telemetry.mission_state == d.MISSION_STATE_NO_MISSION
                 and now - telemetry.current_at < LATE
-                and (board.taken or now - board.verified_at < LATE))
+                and (onboard.taken or now - onboard.verified_at < LATE))
 
     def returning(self) -> bool:
         """The RETURN item is next, or is being flown."""
-        progress = self._board.progress
+        progress = self._onboard.progress
         return progress.returns and progress.current is not None and (
             progress.current > progress.last_flown)
 
     def may_end(self) -> bool:
         """The last item with a place is being flown, or is passed."""
-        return self._board.progress.may_end(self._telemetry.heard_at)
+        return self._onboard.progress.may_end(self._telemetry.received_at)
 
     def verified(self) -> bool:
         """The list is verified on board."""
-        return self._board.verified()
+        return self._onboard.verified()
 
     def ours(self) -> bool:
         """What was read back holds a task of the list: nobody else has put it there."""
-        board = self._board
-        if not board.held or board.tasks is None or not board.tasks.stops:
+        onboard = self._onboard
+        if not onboard.held or onboard.tasks is None or not onboard.tasks.stops:
             return False
-        items = [item for item in board.wanted() if item.completes]
-        return any(alike(item, held) for item in items for held in board.held)
+        items = [item for item in onboard.wanted() if item.completes]
+        return any(alike(item, held) for item in items for held in onboard.held)
 
     def foreign(self) -> bool:
         """Somebody else has changed what was verified."""
-        return self._board.is_foreign
+        return self._onboard.is_foreign
 
     def place(self) -> tuple[int | None, int | None]:
         """Checksum of the mission on board, and the item that is flown; None: not known."""
-        held, progress = self._board.held, self._board.progress
+        held, progress = self._onboard.held, self._onboard.progress
         if held is None or progress.current is None:
             return None, None
         if self._checksum is None or self._checksum[0] is not held:

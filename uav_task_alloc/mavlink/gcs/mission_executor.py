@@ -80,7 +80,7 @@ class MissionExecutor:
                 and profile.mode_function(record.mode or 0) is not ModeFunction.MISSION)
         for mark in self.watch.marks.values():
             if mark.flown:
-                self.onboard.resume.told.add(mark.task)
+                self.onboard.resume.reported.add(mark.task)
             else:
                 self.onboard.resume.unflown[mark.task] = mark[1:4]
         self._rules = (
@@ -332,8 +332,9 @@ class MissionExecutor:
         if authority.hold is HoldStage.NO or not self.telemetry.airborne:
             authority.hold = HoldStage.NO
             return None
-        if flight is ModeFunction.HOLD or (authority.hold is HoldStage.UNLESS_VERIFIED
-                                     and flight is ModeFunction.MISSION and self.onboard.verified()):
+        if flight is ModeFunction.HOLD or (
+                authority.hold is HoldStage.UNLESS_VERIFIED
+                and flight is ModeFunction.MISSION and self.onboard.verified()):
             self.sender.must_start = flight is ModeFunction.HOLD
             authority.hold = HoldStage.NO
             return None

@@ -12,11 +12,11 @@ from uav_task_alloc.mavlink.gcs.telemetry import Telemetry
 from uav_task_alloc.mavlink.gcs.upload_failures import UploadFailures
 from uav_task_alloc.mavlink.mission.diff import DiffKind, MissionDiff, diff_missions
 from uav_task_alloc.mavlink.mission.items import Item, TaskList, all_alike, home_item
-from uav_task_alloc.mavlink.mission.outcomes import Accepted, Failed, Held, Mission, Verified
+from uav_task_alloc.mavlink.mission.outcomes import Accepted, Failed, Downloaded, Mission, Verified
 from uav_task_alloc.mavlink.mission.peer import Peer
 from uav_task_alloc.mavlink.mission.progress import ProgressTable
 from uav_task_alloc.mavlink.mission.reached_during_upload import ReachedDuringUpload
-from uav_task_alloc.mavlink.mission.upload import OVERTAKEN, Upload
+from uav_task_alloc.mavlink.mission.upload import SUPERSEDED, Upload
 from uav_task_alloc.mavlink.mission.verified_mission import MissionState, VerifiedMission
 from uav_task_alloc.mavlink.mission.wanted_mission import TaskFailed, WantedMission
 from uav_task_alloc.mavlink.transport.codec import Message
@@ -34,7 +34,7 @@ class OnboardMission:
         self.upload = Upload(peer, idle_after=profile.idle_after, rng=rng)
         self.upload.overtaken = self._overtaken
         self.progress = ProgressTable(telemetry.frames, repeats=profile.atomic)
-        self.recall = Resume(profile, origin, telemetry, self.progress)
+        self.resume = Resume(profile, origin, telemetry, self.progress)
         self.own = int(profile.rules.home_first)
         self.list = WantedMission(profile, origin, self.progress)
         self.revision = 0  # of the last list verified on board
@@ -219,7 +219,7 @@ class OnboardMission:
         else:
             self.progress.reached(seq, now)
 
-    def tells(self, message: Message) -> bool:
+    def is_of_known_mission(self, message: Message) -> bool:
         """A MISSION_CURRENT is of the mission that is known, not of one that is sent now."""
         return not self.open or self._mission.is_meant(message)
 
@@ -247,7 +247,7 @@ class OnboardMission:
         self.progress.invalidate()
         self._mission.forget()
         self._uploading = self._unsure = None
-        self.recall.reset()
+        self.resume.reset()
 
     def watch(self, message: Message, now: float) -> None:
         """Has somebody else changed the mission? What MISSION_CURRENT says is doubt, not proof."""
@@ -255,16 +255,16 @@ class OnboardMission:
 
     def catch_up(self, now: float) -> None:
         """Complete what the vehicle has flown before anybody listened."""
-        memory = self.recall.memory(now)
+        memory = self.resume.memory(now)
         if memory and self.tasks and (self.tasks, len(memory)) != self._recalled:
             self._recalled = self.tasks, len(memory)
-            self.progress.caught_up(self.recall.flown(self.open_tasks(), now))
+            self.progress.caught_up(self.resume.flown(self.open_tasks(), now))
 
     def _settle(self, now: float) -> None:
         self._failures.step(now)
         while self.upload.events:
             event = self.upload.events.popleft()
-            if isinstance(event, Held):
+            if isinstance(event, Downloaded):
                 self._was_read(event, now)
             elif self._uploading is not None:
                 found, tasks = self._uploading
@@ -284,7 +284,7 @@ class OnboardMission:
         self._begun = True
         of_new = self._ambiguous.sort(found)
         self.item_time = (self.item_time + (now - self._began_at) / len(found.items)) / 2.0
-        self.recall.stash()
+        self.resume.stash()
         if found.kind is DiffKind.APPEND:
             self.progress.extend(found.items)
         else:
@@ -300,7 +300,7 @@ class OnboardMission:
         self.revision = revision
         self.list.horizon.verified()
 
-    def _was_read(self, event: Held, now: float) -> None:
+    def _was_read(self, event: Downloaded, now: float) -> None:
         if event.items is None:
             self.trouble = True
             return
@@ -316,7 +316,7 @@ class OnboardMission:
         if not self._mission.was_read(
                 held, known, self.tasks is not None, lambda: self._goes_on(held), now):
             return
-        self.recall.stash()
+        self.resume.stash()
         current = self._telemetry.current
         self.progress.begin(held, None if current is None or not held
                             else max(0, current - self.own), now, read=True)
@@ -329,7 +329,7 @@ class OnboardMission:
 
     def _was_refused(self, event: Failed, found: MissionDiff, tasks: TaskList, now: float) -> None:
         self._mission.break_off()
-        self.trouble = event.reason != OVERTAKEN
+        self.trouble = event.reason != SUPERSEDED
         if event.result is None and self._sent_since is not None and not self._begun:
             self._unsure = found, tasks
         else:

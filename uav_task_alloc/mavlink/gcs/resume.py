@@ -36,7 +36,7 @@ class Resume:
         self._profile, self._origin = profile, origin
         self._telemetry, self._progress = telemetry, progress
         self.unflown: dict[str, Point] = {}  # passed over, not by a bridge
-        self.told: set[str] = set()  # flown, as the bridge before has told
+        self.reported: set[str] = set()  # flown, as the bridge before has told
         self.known: tuple[int | None, int | None] = None, None  # mission and item, before
         self.doubtful = False  # what the current item of the vehicle says of earlier ones
         self._rebooted = False
@@ -63,7 +63,7 @@ class Resume:
             return
         self.placed = True
         if self.doubtful or (
-                not self._profile.atomic and telemetry.flight is not ModeFunction.MISSION):
+                not self._profile.atomic and telemetry.mode is not ModeFunction.MISSION):
             self._progress.begin(held, None, now)  # held for a swap: current is of the old items
             return
         # not by REACHED: PX4 repeats that of the mission before for some seconds
@@ -96,7 +96,7 @@ class Resume:
         stops = tuple(MissionStop(task) for task in tasks)
         items = mission_items(TaskList(0, stops), self._profile.rules, self._origin)
         return tuple(stop.task for stop, item in zip(stops, items, strict=True)
-                     if any(alike(item, m) and (stop.task.id in self.told or not any(
+                     if any(alike(item, m) and (stop.task.id in self.reported or not any(
                          m is old for old in self._old)) for m in memory)
                      and self.unflown.get(stop.task.id) != stop.task.position)
 
@@ -116,7 +116,7 @@ class Resume:
         return (
             self._profile.atomic
             and telemetry.airborne
-            and telemetry.flight is ModeFunction.HOLD
+            and telemetry.mode is ModeFunction.HOLD
             and current == len(held) - 1
             and math.dist(telemetry.position, place) < last.params[1] + _NEAR
         )

@@ -124,11 +124,12 @@ def state_of(session: VehicleSession, now: float, full_range: float = 0.0) -> Ua
     executor = session.executor
     telemetry, onboard, mode = executor.telemetry, executor.onboard, mode_of(executor)
     reason = session.fault or why_not_available(executor, now)
-    authority = AuthorityState.UNKNOWN if executor.authority.undecided else executor.authority.state
+    authority = executor.authority
+    owner = AuthorityState.UNKNOWN if authority.undecided else authority.state
     return UavStatus(
         session.uav_id, telemetry.position, telemetry.velocity, telemetry.home,
         telemetry.battery, full_range * telemetry.battery if full_range > 0.0 else math.nan,
-        not reason, mode, onboard.state, active_task(executor), onboard.revision, authority, reason)
+        not reason, mode, onboard.state, active_task(executor), onboard.revision, owner, reason)
 
 
 class PublishedStates:

@@ -49,7 +49,7 @@ class Telemetry:
 
     def __init__(self, profile: Profile, origin: Origin, now: float) -> None:
         self._profile, self._origin = profile, origin
-        self.heard_at = now  # [s] any message
+        self.received_at = now  # [s] any message
         self.position, self.velocity = UNKNOWN, UNKNOWN  # ENU [m], [m/s]
         self.home: Point | None = None  # ENU [m]
         self.position_at = -math.inf  # [s]
@@ -60,7 +60,7 @@ class Telemetry:
         self.altitude = math.nan  # [m] AMSL
         self.battery = math.nan  # 0..1, of the battery with least remaining
         self.armed = False
-        self.flight = ModeFunction.UNKNOWN
+        self.mode = ModeFunction.UNKNOWN
         self.landed = d.MAV_LANDED_STATE_UNDEFINED
         self.status = 0  # MAV_STATE
         self.autopilot = 0  # MAV_AUTOPILOT
@@ -71,8 +71,8 @@ class Telemetry:
         self.total: int | None = None  # items as the vehicle counts them
         self.mission_state = 0  # MISSION_STATE
         self.plan_id = 0  # PX4's id of the mission on board
-        self.heard: set[int] = set()  # message ids since the start
-        self.heard_last: dict[int, float] = {}  # [s] by message id
+        self.received_ids: set[int] = set()  # message ids since the start
+        self.received_last: dict[int, float] = {}  # [s] by message id
         self.restarts = 0
         self.boot_ms = self._boot_doubt = 0  # [ms] its clock
         self._boot_at = now
@@ -129,25 +129,25 @@ class Telemetry:
         return bool(self.status >= d.MAV_STATE_CRITICAL)
 
     def stale(self, now: float) -> bool:
-        return now - self.heard_at > STALE
+        return now - self.received_at > STALE
 
     def lost(self, now: float) -> bool:
-        return now - self.heard_at > LOST
+        return now - self.received_at > LOST
 
     def good_link(self, now: float) -> bool:
         """No silence of more than 2 s within the last 10 s."""
-        return now - self.heard_at <= QUIET and now - self._gap_at >= STEADY
+        return now - self.received_at <= QUIET and now - self._gap_at >= STEADY
 
     def receive(self, message: Message, now: float) -> bool:
         """Take any message of this vehicle; False where a newer one of its kind came before."""
-        if now - self.heard_at > QUIET:
+        if now - self.received_at > QUIET:
             self._gap_at = now
-        self.heard_at = now
+        self.received_at = now
         self.frames.note_all((seq for system, seq in getattr(message, 'passed', ())
                               if system == message.get_srcSystem()), now)
         self.frame = self.frames.note(message.get_seq(), now)
-        self.heard.add(message.get_msgId())
-        self.heard_last[message.get_msgId()] = now
+        self.received_ids.add(message.get_msgId())
+        self.received_last[message.get_msgId()] = now
         boot = getattr(message, 'time_boot_ms', None)
         if boot is not None:
             self._clock(boot, now)
@@ -162,8 +162,8 @@ class Telemetry:
         """It begins anew, or it is another one: nothing that was heard holds any more."""
         self.boot_ms, self._boot_doubt = boot_ms, 0
         self.restarts += 1
-        self.heard = set()
-        self.heard_last.clear()
+        self.received_ids = set()
+        self.received_last.clear()
         self.current, self.total, self.plan_id, self.mission_state = None, None, 0, 0
         self.home, self.height, self.reached = None, math.nan, None
         self.landed = d.MAV_LANDED_STATE_UNDEFINED
@@ -201,7 +201,7 @@ class Telemetry:
 
     def _heartbeat(self, message: Message, now: float) -> None:
         self.armed = bool(message.base_mode & d.MAV_MODE_FLAG_SAFETY_ARMED)
-        self.flight = self._profile.flight(message.custom_mode)
+        self.mode = self._profile.mode_function(message.custom_mode)
         if message.system_status == d.MAV_STATE_BOOT and self._started:
             self.restart()  # its clock will be heard later
         self.status, self.autopilot = message.system_status, message.autopilot
@@ -233,9 +233,9 @@ class Telemetry:
         """An estimator that says yes, else a GPS fix; a vehicle that tells neither is believed."""
         if self._first_at is None:
             self._first_at = now
-        if ESTIMATE.get(self.autopilot) in self.heard:
+        if ESTIMATE.get(self.autopilot) in self.received_ids:
             return self._estimates
-        if d.MAVLINK_MSG_ID_GPS_RAW_INT in self.heard:
+        if d.MAVLINK_MSG_ID_GPS_RAW_INT in self.received_ids:
             return self._fix
         return now - self._first_at >= REPORTED
 

@@ -17,14 +17,14 @@ _PATIENCE = 10.0  # [s] beyond its hold that a service is waited for
 class UploadHold:
     """The service of the first task of the list, where it is also the one flown."""
 
-    def __init__(self, board: OnboardMission, telemetry: Telemetry, profile: Profile) -> None:
-        self._board, self._telemetry, self._profile = board, telemetry, profile
+    def __init__(self, onboard: OnboardMission, telemetry: Telemetry, profile: Profile) -> None:
+        self._onboard, self._telemetry, self._profile = onboard, telemetry, profile
         self._until = math.inf  # [s]; inf: none
 
     def lasts(self, now: float) -> bool:
         """An upload would start the hold of the task anew, or have it reached once more."""
-        item, first = self._board.progress.active, self._board.wanted()[0]
-        if item is None or self._telemetry.flight is not ModeFunction.MISSION or not (
+        item, first = self._onboard.progress.active, self._onboard.wanted()[0]
+        if item is None or self._telemetry.mode is not ModeFunction.MISSION or not (
                 first.completes and self._is_near(item, first)):
             self._until = math.inf
             return False
@@ -34,9 +34,9 @@ class UploadHold:
 
     def _is_near(self, item: Item, first: Item) -> bool:
         distance = math.dist(self._telemetry.position, first.position or UNKNOWN) - first.radius
-        same, board = alike(first, item), self._board
-        span = ARRIVAL + board.item_time * len(board.wanted())
+        same, onboard = alike(first, item), self._onboard
+        span = ARRIVAL + onboard.item_time * len(onboard.wanted())
         if same and self._profile.atomic and distance < _NEAR + span * self._telemetry.pace:
             return True
-        served = same or (item.completes and item.task == first.task)
-        return served and item.params[0] > 0.0 and distance < _NEAR
+        session = same or (item.completes and item.task == first.task)
+        return session and item.params[0] > 0.0 and distance < _NEAR

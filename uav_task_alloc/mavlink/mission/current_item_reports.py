@@ -2,7 +2,7 @@
 """MISSION_CURRENT against the current item that we have set: which was sent before that?"""
 from __future__ import annotations
 
-from uav_task_alloc.mavlink.mission.position_history import LATE
+from uav_task_alloc.mavlink.mission.position_history import MAX_MESSAGE_DELAY
 
 _SETTLE = 3.0  # [s] in which a CURRENT sent before the last change may still come
 
@@ -70,7 +70,7 @@ class CurrentItemReports:
             self._back = None
         elif self._back is None or self._back[0] != seq:
             self._back = seq, now
-        elif now - self._back[1] >= LATE:
+        elif now - self._back[1] >= MAX_MESSAGE_DELAY:
             self._back = None
             return True
         return False

@@ -9,7 +9,7 @@ from uav_task_alloc.mavlink.mission.peer import ACCEPTED, Peer, received_item
 from uav_task_alloc.mavlink.transport.codec import Message
 
 _PERIOD = 1.0  # [s] until a request is repeated
-UNANSWERED, AGAIN = 4, 3  # requests of one item: PX4 may have ended the transfer; then list again
+_RELIST_AFTER, _MAX_RELISTS = 4, 3  # requests of one item: PX4 may have ended the transfer; then list again
 _TRIES = 12  # of one request; ArduPilot denies a list for 8 s after a broken upload
 
 
@@ -57,8 +57,8 @@ class Download:
         if self._tries >= _TRIES:
             self.state = DownloadState.FAILED
             return []
-        if (self.state is DownloadState.GETTING and self._tries >= UNANSWERED
-                and self._again < AGAIN):
+        if (self.state is DownloadState.GETTING and self._tries >= _RELIST_AFTER
+                and self._again < _MAX_RELISTS):
             self.state, self._tries, self._again = DownloadState.LISTING, 0, self._again + 1
             self.items.clear()
         self._tries += 1

@@ -33,7 +33,7 @@ from uav_task_alloc.scenario.values import Scenario, ScenarioUav
 _AUTOPILOTS: Mapping[str, tuple[Profile, int]] = {  # and the MAV_AUTOPILOT
     'ardupilot': (ARDUPILOT, 3), 'px4': (PX4, 12)}
 QUADROTOR = 2  # MAV_TYPE
-ABSOLUTE = 2  # QGroundControl's altitude mode: AMSL
+_ALTITUDE_MODE_AMSL = 2  # QGroundControl's altitude mode: AMSL
 _FILE_FRAME = {GLOBAL: 0}  # files hold degrees, so not the _INT frames
 ALTITUDE_DIGITS = 4  # of metres: finer than what a message carries
 
@@ -55,7 +55,7 @@ def write_missions(read: Scenario, made: Plan, folder: str | Path) -> list[Plann
     A UAV without tasks gets empty missions, so that none of an earlier plan stays behind. Raises
     MissionError where a task cannot be a mission item, OSError.
     """
-    missions = [mission_of(read, uav, made.route(uav.id)) for uav in read.uavs]
+    missions = [planned_mission(read, uav, made.route(uav.id)) for uav in read.uavs]
     place = Path(folder)
     place.mkdir(parents=True, exist_ok=True)
     for mission in missions:
@@ -66,7 +66,7 @@ def write_missions(read: Scenario, made: Plan, folder: str | Path) -> list[Plann
     return missions
 
 
-def mission_of(read: Scenario, uav: ScenarioUav, route: Route) -> PlannedMission:
+def planned_mission(read: Scenario, uav: ScenarioUav, route: Route) -> PlannedMission:
     """The mission of one route; raise MissionError where a task cannot be a mission item."""
     profile, _ = _AUTOPILOTS[uav.autopilot]
     tasks = list_for_route(route, {timed.task.id: timed.task for timed in read.tasks})
@@ -110,7 +110,7 @@ def plan_file(mission: PlannedMission) -> dict[str, Any]:
         'mission': {
             'version': 2, 'firmwareType': _AUTOPILOTS[uav.autopilot][1], 'vehicleType': QUADROTOR,
             'cruiseSpeed': uav.cruise_speed, 'hoverSpeed': uav.cruise_speed,
-            'globalPlanAltitudeMode': ABSOLUTE,
+            'globalPlanAltitudeMode': _ALTITUDE_MODE_AMSL,
             'plannedHomePosition': _home(mission),
             'items': [_simple_item(number, item) for number, item in enumerate(mission.items, 1)],
         },
@@ -137,7 +137,7 @@ def waypoints_text(mission: PlannedMission) -> str:
 
 def _simple_item(number: int, item: Item) -> dict[str, Any]:
     place = _place(item)
-    altitude = {'AMSLAltAboveTerrain': None, 'Altitude': place[2], 'AltitudeMode': ABSOLUTE}
+    altitude = {'AMSLAltAboveTerrain': None, 'Altitude': place[2], 'AltitudeMode': _ALTITUDE_MODE_AMSL}
     return {
         **(altitude if item.frame == GLOBAL else {}),
         'type': 'SimpleItem', 'doJumpId': number, 'command': item.command, 'autoContinue': True,

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from uav_task_alloc.geometry.polyline import segment_fraction
 from uav_task_alloc.mavlink.mission.items import TaskList
 from uav_task_alloc.mavlink.mission.long_legs import (
-    LONGEST,
+    MAX_LEG_LENGTH,
     first_point,
     first_points,
     legs,
@@ -21,9 +21,9 @@ from uav_task_alloc.mavlink.mission.long_legs import (
 )
 from uav_task_alloc.model import Point
 
-BEHIND = 200.0  # [m] by which a point is passed before it is left out: it is not flown back to
-BESIDE, BESIDE_PLANE = 50.0, 300.0  # [m] from its leg a vehicle is still on it; planes turn wide
-ABOVE = 30.0  # [m] the same; while it flies its mission its autopilot climbs as it likes
+_PASSED_MARGIN = 200.0  # [m] by which a point is passed before it is left out: it is not flown back to
+_OFF_TRACK, _OFF_TRACK_PLANE = 50.0, 300.0  # [m] from its leg a vehicle is still on it; planes turn wide
+_OFF_ALTITUDE = 30.0  # [m] the same; while it flies its mission its autopilot climbs as it likes
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,7 +41,7 @@ class FirstLeg:
     def __init__(self, plane: bool = False, farthest: float = math.inf) -> None:
         self.place: Callable[[], LegStart | None] = lambda: None  # None: not known
         self.version = 0  # of the start of the first leg
-        self._beside, self._farthest = BESIDE_PLANE if plane else BESIDE, farthest
+        self._beside, self._farthest = _OFF_TRACK_PLANE if plane else _OFF_TRACK, farthest
         self._starts: dict[Point, Point] = {}  # of the legs, by their ends
         self._target: Point | None = None
         self._points: tuple[Point, ...] = ()  # of the first leg
@@ -76,7 +76,7 @@ class FirstLeg:
     def unknown(self) -> bool:
         """Nobody knows where it begins, and it may be a long one: to upload it is too early."""
         return (self._target is not None and self._start() is None
-                and math.hypot(*self._target) > LONGEST)
+                and math.hypot(*self._target) > MAX_LEG_LENGTH)
 
     @property
     def behind(self) -> int:
@@ -84,7 +84,7 @@ class FirstLeg:
         place, start = self.place(), self._start()
         if place is not None and start is not None and self._target is not None:
             rest = _metres_left(place.point, start, self._target)
-            self._behind = sum(math.dist(point, self._target) > rest + BEHIND
+            self._behind = sum(math.dist(point, self._target) > rest + _PASSED_MARGIN
                                for point in self._points)
         return self._behind
 
@@ -102,7 +102,7 @@ class FirstLeg:
         share = min(1.0, max(0.0, segment_fraction(place.point, start, end)))
         on = tuple(a + (b - a) * share for a, b in zip(start, end, strict=True))
         return math.dist(place.point[:2], on[:2]) > self._beside or (
-            not place.on_mission and abs(place.point[2] - on[2]) > ABOVE)
+            not place.on_mission and abs(place.point[2] - on[2]) > _OFF_ALTITUDE)
 
 
 def _metres_left(place: Point, start: Point, end: Point) -> float:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-SPACE = re.compile(r'Only (\d+) items are supported')
+_SPACE_TEXT = re.compile(r'Only (\d+) items are supported')
 
 
 class Horizon:
@@ -29,7 +29,7 @@ class Horizon:
 
     def note(self, text: str) -> None:
         """STATUSTEXT: for how many items the vehicle has space."""
-        found = SPACE.search(text)
+        found = _SPACE_TEXT.search(text)
         if found:
             self._space = int(found[1])
 

@@ -15,12 +15,12 @@ from itertools import pairwise
 from uav_task_alloc.mavlink.mission.items import MissionStop, TaskList
 from uav_task_alloc.model import Point
 
-LONGEST = 5000.0  # [m] between items: at most 0.5 m too high, R being at least 6335 km
+MAX_LEG_LENGTH = 5000.0  # [m] between items: at most 0.5 m too high, R being at least 6335 km
 PER_LEG = 5  # a first point lies within LONGEST / PER_LEG of where it may be
-SURE = 100.0  # [m] by which it is farther than what is refused
+_REFUSAL_MARGIN = 100.0  # [m] by which it is farther than what is refused
 
 
-def points_between(start: Point, end: Point, longest: float = LONGEST) -> tuple[Point, ...]:
+def points_between(start: Point, end: Point, longest: float = MAX_LEG_LENGTH) -> tuple[Point, ...]:
     """Evenly on the straight way, without its ends; none where it is not too long. ENU [m]."""
     parts = math.ceil(math.dist(start, end) / longest)
     return tuple((start[0] + (end[0] - start[0]) * n / parts,
@@ -42,9 +42,9 @@ def first_points(start: Point, end: Point, home: Point, farthest: float) -> tupl
     """
     if math.dist(home, end) <= farthest or math.dist(home, start) > farthest:
         return points_between(start, end)
-    points = points_between(start, end, LONGEST / PER_LEG)
+    points = points_between(start, end, MAX_LEG_LENGTH / PER_LEG)
     first = next((n for n, point in enumerate(points)
-                  if math.dist(home, point) > farthest + SURE), len(points))
+                  if math.dist(home, point) > farthest + _REFUSAL_MARGIN), len(points))
     return points[first::PER_LEG]
 
 

@@ -8,16 +8,16 @@ from collections.abc import Iterator
 from uav_task_alloc.mavlink.mission.items import GLOBAL_FRAMES
 from uav_task_alloc.mavlink.transport.codec import Message
 
-LATITUDE, LONGITUDE = 90 * 10**7, 180 * 10**7  # [1e-7 deg]
+_MAX_LATITUDE, _MAX_LONGITUDE = 90 * 10**7, 180 * 10**7  # [1e-7 deg]
 # message -> field, least, most
-RANGES: dict[str, tuple[tuple[str, int, int], ...]] = {
-    'GLOBAL_POSITION_INT': (('lat', -LATITUDE, LATITUDE), ('lon', -LONGITUDE, LONGITUDE)),
-    'HOME_POSITION': (('latitude', -LATITUDE, LATITUDE), ('longitude', -LONGITUDE, LONGITUDE)),
+_RANGES: dict[str, tuple[tuple[str, int, int], ...]] = {
+    'GLOBAL_POSITION_INT': (('lat', -_MAX_LATITUDE, _MAX_LATITUDE), ('lon', -_MAX_LONGITUDE, _MAX_LONGITUDE)),
+    'HOME_POSITION': (('latitude', -_MAX_LATITUDE, _MAX_LATITUDE), ('longitude', -_MAX_LONGITUDE, _MAX_LONGITUDE)),
     'BATTERY_STATUS': (('battery_remaining', -128, 100),),  # below 0: it does not say
     'SYS_STATUS': (('battery_remaining', -128, 100),),
 }
-ITEMS = ('MISSION_ITEM', 'MISSION_ITEM_INT')
-PLACE, PARAMS = ('x', 'y', 'z'), ('param1', 'param2', 'param3', 'param4')
+_ITEM_MESSAGES = ('MISSION_ITEM', 'MISSION_ITEM_INT')
+_COORDINATES, _PARAMS = ('x', 'y', 'z'), ('param1', 'param2', 'param3', 'param4')
 
 
 def defect(message: Message) -> str:
@@ -31,15 +31,15 @@ def defect(message: Message) -> str:
 
 def _defects(message: Message) -> Iterator[str]:
     kind = message.get_type()
-    for name, least, most in RANGES.get(kind, ()):
+    for name, least, most in _RANGES.get(kind, ()):
         value = getattr(message, name)
         if not least <= value <= most:
             yield f'{name} = {value}: expected a number in [{least}, {most}]'
-    if kind not in ITEMS:
+    if kind not in _ITEM_MESSAGES:
         return
     placed = message.frame in GLOBAL_FRAMES
-    for name in PLACE + PARAMS:
+    for name in _COORDINATES + _PARAMS:
         value = getattr(message, name)
-        if math.isinf(value) or (math.isnan(value) and name in PLACE and (
+        if math.isinf(value) or (math.isnan(value) and name in _COORDINATES and (
                 placed or kind == 'MISSION_ITEM')):
             yield f'{name} = {value}: expected a finite number'

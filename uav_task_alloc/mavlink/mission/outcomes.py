@@ -48,10 +48,10 @@ class Accepted:
 
 
 @dataclass(frozen=True, slots=True)
-class Held:
+class Downloaded:
     """What the vehicle holds, read without an upload; None where it did not answer."""
 
     items: tuple[Item, ...] | None
 
 
-Outcome = Verified | Failed | Accepted | Held
+Outcome = Verified | Failed | Accepted | Downloaded

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 from uav_task_alloc.mavlink.mission.flown_path import CLOSE, Visit
 from uav_task_alloc.mavlink.mission.items import Item
-from uav_task_alloc.mavlink.mission.position_history import ROUGH, PositionHistory
+from uav_task_alloc.mavlink.mission.position_history import LOOSE_RADIUS, PositionHistory
 from uav_task_alloc.mavlink.transport.frame_log import FrameLog
 
 FRAMES_AFTER = 10  # beyond the MISSION_CURRENT that moved on: REACHED may come after it
@@ -126,8 +126,8 @@ class PassedItems:
         return self._positions.sent_before(claim.frame, claim.until, earliest=claim.leaps)
 
 
-def flown_beside(items: tuple[Item, ...], flown: Item) -> tuple[Item, ...]:
+def flown_nearby(items: tuple[Item, ...], flown: Item) -> tuple[Item, ...]:
     """Of items passed in a moment only what was flown, and what is beside it, may be completed."""
     place = flown.position
     return tuple(i for i in items if flown.completes and place is not None
-                 and i.position is not None and math.dist(i.position, place) < ROUGH)
+                 and i.position is not None and math.dist(i.position, place) < LOOSE_RADIUS)

@@ -11,12 +11,12 @@ from uav_task_alloc.model import Point
 
 _REACH = 60.0  # [m] beyond its radius from which an item can be reached between two positions
 FRESH = 3.0  # [s] a position tells where the vehicle is
-ADRIFT = 60.0  # [s] after a jump of its position in which another brings it back
+_JUMP_RECOVERY = 60.0  # [s] after a jump of its position in which another brings it back
 AT_ONCE = 2.0  # [s] in which a vehicle does not fly two legs
 FRAME_TIME = 0.2  # [s] by which the time of a frame among others is known
 STAMPS = 150  # positions: half a minute at 5 Hz
-LATE = 6.0  # [s] in which REACHED and positions that were sent before may still come
-ROUGH = 10.0  # [m] from which an autopilot may count an item as reached, and turn to the next
+MAX_MESSAGE_DELAY = 6.0  # [s] in which REACHED and positions that were sent before may still come
+LOOSE_RADIUS = 10.0  # [m] from which an autopilot may count an item as reached, and turn to the next
 
 
 class PositionHistory:
@@ -39,7 +39,7 @@ class PositionHistory:
         if newest:
             if self.path.jumps(sample):
                 back = now < self._adrift_until
-                self._adrift_until = now + (FRESH if back else ADRIFT)
+                self._adrift_until = now + (FRESH if back else _JUMP_RECOVERY)
             self.place = sample.position, now
         self.path.add(sample)
 
@@ -55,7 +55,7 @@ class PositionHistory:
 
     def recent(self, since: float) -> float:
         """[s] of the vehicle's clock: positions since then may be newer than the last message."""
-        return max(since, self.path.newest - LATE)
+        return max(since, self.path.newest - MAX_MESSAGE_DELAY)
 
     def was_at(self, item: Item, since: float, until: float = math.inf) -> bool:
         """Whether the vehicle's own positions show that it has reached an item."""
@@ -78,7 +78,7 @@ class PositionHistory:
     def _came_near(self, item: Item, when: float) -> bool:
         until = self.vehicle_time(when)
         return item.position is not None and self.path.visited_at(
-            item.position, item.radius + ROUGH, until - LATE, until) is not None
+            item.position, item.radius + LOOSE_RADIUS, until - MAX_MESSAGE_DELAY, until) is not None
 
     def can_have_reached(self, item: Item, now: float) -> bool:
         """Its newest position does not speak against an item, or says nothing."""

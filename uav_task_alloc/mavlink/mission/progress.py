@@ -15,9 +15,9 @@ from dataclasses import dataclass
 from uav_task_alloc.mavlink.mission.current_item_reports import CurrentItemReports
 from uav_task_alloc.mavlink.mission.flown_path import PositionSample
 from uav_task_alloc.mavlink.mission.items import RETURN, Item, all_alike
-from uav_task_alloc.mavlink.mission.passed_items import Claim, PassedItems, flown_beside
-from uav_task_alloc.mavlink.mission.position_history import LATE, PositionHistory
-from uav_task_alloc.mavlink.mission.reached_epoch import ECHO, EpochBefore, EpochNow, ReachedEpoch
+from uav_task_alloc.mavlink.mission.passed_items import Claim, PassedItems, flown_nearby
+from uav_task_alloc.mavlink.mission.position_history import MAX_MESSAGE_DELAY, PositionHistory
+from uav_task_alloc.mavlink.mission.reached_epoch import REPEAT_WINDOW, PreviousEpoch, CurrentEpoch, ReachedEpoch
 from uav_task_alloc.mavlink.transport.frame_log import FrameLog
 from uav_task_alloc.model import Point, Task
 
@@ -105,9 +105,9 @@ class ProgressTable:
         """
         self.epoch += 1
         if (self.items or read) and not all_alike(self.items, items):
-            self._epochs.begin(EpochBefore(
+            self._epochs.begin(PreviousEpoch(
                 self.items, self._since, self._positions.vehicle_time(now), self.may_end(now),
-                now + ECHO))
+                now + REPEAT_WINDOW))
         self.items, self.current, self._reached = items, start, None
         self.told_reached.clear()
         self._currents.begin(start, now)
@@ -167,7 +167,7 @@ class ProgressTable:
                     proven or self._positions.can_have_reached(self.items[seq], now)):
                 self._accept(seq, now)
         elif not self._prove(seq, now, now, echo) and not echo:  # else it is told again
-            self._epochs.unproven[seq] = now + LATE  # a position on its way may tell
+            self._epochs.unproven[seq] = now + MAX_MESSAGE_DELAY  # a position on its way may tell
 
     def repeated(self, seq: int, now: float) -> None:
         """The last REACHED has come again, also while nobody knew of which mission it was."""
@@ -179,7 +179,7 @@ class ProgressTable:
         Returns:
             False: not known yet.
         """
-        epoch = EpochNow(self.items, self._currents.told, self._since, self._since_begin)
+        epoch = CurrentEpoch(self.items, self._currents.told, self._since, self._since_begin)
         if 0 <= seq < len(self.items) and self._epochs.is_of_now(seq, epoch, now):
             self._accept(seq, now)
             return True
@@ -254,7 +254,7 @@ class ProgressTable:
         """Judge what was passed without a REACHED, and REACHED that nothing has shown."""
         unproven = self._epochs.unproven
         for seq, until in list(unproven.items()):
-            if self._prove(seq, now, until - LATE):
+            if self._prove(seq, now, until - MAX_MESSAGE_DELAY):
                 unproven.pop(seq, None)
             elif now >= until:
                 del unproven[seq]
@@ -317,11 +317,11 @@ class ProgressTable:
                       if item.completes and item.task not in self.completed)
         if sure and end - begin > 1 and self._currents.told == begin and (
                 self._positions.at_once(self._currents.last_frame, frame)):
-            items = self._leave_out(items, flown_beside(items, self.items[begin]), end)
+            items = self._leave_out(items, flown_nearby(items, self.items[begin]), end)
         if items:
             route = tuple(item for item in self.items[begin:] if item.position is not None)
             self._passed.add(Claim(
-                items, route, self._since, self._positions.vehicle_time(now), now + LATE,
+                items, route, self._since, self._positions.vehicle_time(now), now + MAX_MESSAGE_DELAY,
                 self.epoch, self._frames_of_reached(begin, end, now, frame), frame,
                 end - begin > 1, sure))
 

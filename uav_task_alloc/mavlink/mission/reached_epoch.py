@@ -9,14 +9,14 @@ import math
 from dataclasses import dataclass
 
 from uav_task_alloc.mavlink.mission.items import Item
-from uav_task_alloc.mavlink.mission.position_history import LATE, ROUGH, PositionHistory
+from uav_task_alloc.mavlink.mission.position_history import MAX_MESSAGE_DELAY, LOOSE_RADIUS, PositionHistory
 from uav_task_alloc.model import Point
 
-ECHO = 15.0  # [s] in which a REACHED of the epoch before may come; PX4 repeats it for 10 s
+REPEAT_WINDOW = 15.0  # [s] in which a REACHED of the epoch before may come; PX4 repeats it for 10 s
 
 
 @dataclass(frozen=True, slots=True)
-class EpochBefore:
+class PreviousEpoch:
     """The epoch before: until when a REACHED may be of it."""
 
     items: tuple[Item, ...]
@@ -27,7 +27,7 @@ class EpochBefore:
 
 
 @dataclass(frozen=True, slots=True)
-class EpochNow:
+class CurrentEpoch:
     """This epoch, where a REACHED comes."""
 
     items: tuple[Item, ...]
@@ -36,7 +36,7 @@ class EpochNow:
     begin: float  # the same: this epoch
 
 
-NOTHING_BEFORE = EpochBefore((), -math.inf, -math.inf, False, -math.inf)
+_NO_EPOCH = PreviousEpoch((), -math.inf, -math.inf, False, -math.inf)
 
 
 class ReachedEpoch:
@@ -44,13 +44,13 @@ class ReachedEpoch:
 
     def __init__(self, positions: PositionHistory, repeats: bool) -> None:
         self._positions, self._repeats = positions, repeats  # many times (PX4)
-        self.before = NOTHING_BEFORE
+        self.before = _NO_EPOCH
         self.credited: int | None = None  # the seq of the last, once it has completed an item
         self.unproven: dict[int, float] = {}  # of this epoch or the one before; until [s]
         self._last: tuple[int, float] | None = None  # seq, when [s], of any epoch
         self._heard_first = False
 
-    def begin(self, before: EpochBefore) -> None:
+    def begin(self, before: PreviousEpoch) -> None:
         """Another mission is on board."""
         self.before = before
         if before.items:
@@ -58,14 +58,14 @@ class ReachedEpoch:
 
     def clear(self) -> None:
         """Nothing is known of what is on board."""
-        self.before = NOTHING_BEFORE
+        self.before = _NO_EPOCH
         self.unproven.clear()
 
     def note_reached(self, seq: int, now: float) -> bool:
         """One has come; returns whether it repeats the last one, which was credited (PX4)."""
         if not self._repeats:
             return False
-        goes_on = self._last is not None and self._last[0] == seq and now - self._last[1] < LATE
+        goes_on = self._last is not None and self._last[0] == seq and now - self._last[1] < MAX_MESSAGE_DELAY
         if not goes_on:  # heard to begin, after another one: no repetition of a mission before
             self.credited, self._heard_first = None, self._last is not None
         self._last = seq, now
@@ -79,24 +79,24 @@ class ReachedEpoch:
     def came_lately(self, begin: int, end: int, now: float) -> bool:
         """One of the items from `begin` up to `end` was told, of this mission or repeated."""
         return self._last is not None and begin <= self._last[0] < end and (
-            now - self._last[1] < LATE)
+            now - self._last[1] < MAX_MESSAGE_DELAY)
 
     def may_have_ended(self, now: float) -> bool:
         """The epoch before was at its last item, and has just gone."""
-        return self.before.may_end and now < self.before.until - ECHO + LATE
+        return self.before.may_end and now < self.before.until - REPEAT_WINDOW + MAX_MESSAGE_DELAY
 
-    def is_of_now(self, seq: int, epoch: EpochNow, now: float) -> bool:
+    def is_of_now(self, seq: int, epoch: CurrentEpoch, now: float) -> bool:
         """Whether a REACHED that may be of the epoch before is of this one."""
         item, before, positions = epoch.items[seq], self.before, self._positions
         if not self._repeats:  # told once, where the vehicle is
             near = positions.can_have_reached(item, now) if not before.items else (
-                positions.distance(item) <= ROUGH + item.radius)
+                positions.distance(item) <= LOOSE_RADIUS + item.radius)
             return near or positions.was_at(item, epoch.since)
         # a repetition goes on while the current item stays what it was
         if epoch.told is not None and epoch.told > seq:
             return positions.can_have_reached(item, now) if not before.items else (
                 item.position is not None and positions.path.visited_at(
-                    item.position, item.radius + ROUGH, epoch.begin) is not None)
+                    item.position, item.radius + LOOSE_RADIUS, epoch.begin) is not None)
         return seq == len(epoch.items) - 1 and epoch.told == seq and (
             positions.was_at(item, epoch.since) or (
                 item.position is None and self._heard_first))
@@ -118,9 +118,9 @@ class ReachedEpoch:
         item = before.items[seq]
         after = items[seq] if 0 <= seq < len(items) else None
         same = after is not None and (after.task, after.position) == (item.task, item.position)
-        if after is not None and not same and positions.distance(after) <= ROUGH + after.radius:
+        if after is not None and not same and positions.distance(after) <= LOOSE_RADIUS + after.radius:
             return None  # of this epoch, if what comes shows it
-        since = max(before.since, positions.path.newest - ECHO)
+        since = max(before.since, positions.path.newest - REPEAT_WINDOW)
         if positions.was_at(item, since, before.end) or positions.near_one(
                 item, None if same else after, when):
             return item

@@ -16,7 +16,7 @@ from uav_task_alloc.mavlink.mission.items import Item, all_alike
 from uav_task_alloc.mavlink.mission.outcomes import (
     Accepted,
     Failed,
-    Held,
+    Downloaded,
     Mission,
     Outcome,
     Verified,
@@ -30,7 +30,7 @@ CONFIRM = 1.5  # [s] for the final ACK, which a radio may lose
 GRACE = 2.0  # [s] after an ERROR, in which requests may go on
 ERROR_BACKOFF = (5.0, 8.0)  # [s] drawn between
 DENIED_BACKOFF = (8.0, 12.0)  # [s] the other ground station has to end first
-OVERTAKEN = 'overtaken by what was flown meanwhile, or by a newer list'
+SUPERSEDED = 'overtaken by what was flown meanwhile, or by a newer list'
 _TRIES = 3  # uploads of one mission until it is given up
 
 
@@ -67,28 +67,28 @@ class UploadEvent(Enum):
     UNREAD = 'no readback'
 
 
-S, E = UploadState, UploadEvent
-_WHILE_OPEN = {E.REQUEST: S.SENDING, E.LAST: S.CONFIRMING, E.STALE: S.DRAINING,
-               E.ACCEPTED: S.READING, E.EARLY: S.CONFIRMING, E.ERROR: S.GRACE,
-               E.DENIED: S.BACKOFF, E.CANCELLED: S.COUNTING, E.REFUSED: S.IDLE,
-               E.EXHAUSTED: S.IDLE}
+_S, _E = UploadState, UploadEvent
+_WHILE_OPEN = {_E.REQUEST: _S.SENDING, _E.LAST: _S.CONFIRMING, _E.STALE: _S.DRAINING,
+               _E.ACCEPTED: _S.READING, _E.EARLY: _S.CONFIRMING, _E.ERROR: _S.GRACE,
+               _E.DENIED: _S.BACKOFF, _E.CANCELLED: _S.COUNTING, _E.REFUSED: _S.IDLE,
+               _E.EXHAUSTED: _S.IDLE}
 # An event that a state does not list is ignored there.
 TRANSITIONS: dict[UploadState, dict[UploadEvent, UploadState]] = {
-    S.IDLE: {E.START: S.COUNTING},
-    S.COUNTING: {**_WHILE_OPEN, E.TIMEOUT: S.COUNTING},
-    S.SENDING: {**_WHILE_OPEN, E.TIMEOUT: S.READING},
-    S.CONFIRMING: {**_WHILE_OPEN, E.TIMEOUT: S.READING},
-    S.GRACE: {**_WHILE_OPEN, E.ERROR: S.GRACE, E.TIMEOUT: S.BACKOFF},
-    S.BACKOFF: {E.START: S.BACKOFF, E.REQUEST: S.SENDING, E.LAST: S.CONFIRMING,
-                E.ACCEPTED: S.READING, E.TIMEOUT: S.COUNTING, E.EXHAUSTED: S.IDLE},
-    S.DRAINING: {E.START: S.DRAINING, E.CANCELLED: S.COUNTING, E.TIMEOUT: S.COUNTING,
-                 E.EXHAUSTED: S.IDLE},
-    S.READING: {E.REQUEST: S.SENDING, E.LAST: S.CONFIRMING, E.MATCH: S.IDLE,
-                E.MISMATCH: S.COUNTING, E.UNREAD: S.IDLE, E.EXHAUSTED: S.IDLE},
+    _S.IDLE: {_E.START: _S.COUNTING},
+    _S.COUNTING: {**_WHILE_OPEN, _E.TIMEOUT: _S.COUNTING},
+    _S.SENDING: {**_WHILE_OPEN, _E.TIMEOUT: _S.READING},
+    _S.CONFIRMING: {**_WHILE_OPEN, _E.TIMEOUT: _S.READING},
+    _S.GRACE: {**_WHILE_OPEN, _E.ERROR: _S.GRACE, _E.TIMEOUT: _S.BACKOFF},
+    _S.BACKOFF: {_E.START: _S.BACKOFF, _E.REQUEST: _S.SENDING, _E.LAST: _S.CONFIRMING,
+                _E.ACCEPTED: _S.READING, _E.TIMEOUT: _S.COUNTING, _E.EXHAUSTED: _S.IDLE},
+    _S.DRAINING: {_E.START: _S.DRAINING, _E.CANCELLED: _S.COUNTING, _E.TIMEOUT: _S.COUNTING,
+                 _E.EXHAUSTED: _S.IDLE},
+    _S.READING: {_E.REQUEST: _S.SENDING, _E.LAST: _S.CONFIRMING, _E.MATCH: _S.IDLE,
+                _E.MISMATCH: _S.COUNTING, _E.UNREAD: _S.IDLE, _E.EXHAUSTED: _S.IDLE},
 }
 # What an ACK means; all others are permanent: the mission is never sent again unchanged.
-ACKS = {wire.ACCEPTED: E.ACCEPTED, wire.ERROR: E.ERROR, wire.INVALID_SEQUENCE: None,
-        wire.DENIED: E.DENIED, wire.CANCELLED: E.CANCELLED}
+ACKS = {wire.ACCEPTED: _E.ACCEPTED, wire.ERROR: _E.ERROR, wire.INVALID_SEQUENCE: None,
+        wire.DENIED: _E.DENIED, wire.CANCELLED: _E.CANCELLED}
 
 
 class Upload:
@@ -244,7 +244,7 @@ class Upload:
             self._fail(f'given up after {_TRIES} tries, at last: {event.value}')
             new = UploadState.IDLE
         elif again and self._tries and self.overtaken():
-            self._fail(OVERTAKEN)
+            self._fail(SUPERSEDED)
             new = UploadState.IDLE
         elif again:
             self._tries += 1
@@ -298,7 +298,7 @@ class Upload:
         done = state is DownloadState.DONE
         self._readback = None
         if self._mission is None:
-            self.events.append(Held(held if done else None))
+            self.events.append(Downloaded(held if done else None))
             self._enter(UploadState.IDLE, now)
         elif done and self._alike(held, self._mission):
             self.events.append(Verified(self._mission))

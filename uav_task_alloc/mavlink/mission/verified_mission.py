@@ -11,7 +11,7 @@ from uav_task_alloc.mavlink.mission.items import Item, all_alike
 from uav_task_alloc.mavlink.transport.codec import Message, plan_id
 
 _SETTLE = 3.0  # [s] in which messages sent before the last change may still come
-CHECK = 60.0  # [s] between readbacks of a mission that nobody should have changed
+READBACK_PERIOD = 60.0  # [s] between readbacks of a mission that nobody should have changed
 
 
 class MissionState(Enum):
@@ -67,7 +67,7 @@ class VerifiedMission:
         changed = (plan != ours if plan and ours else message.total not in (
             0, 65535, len(self.items), len(self.items) + self._own))
         gone = message.mission_state == d.MISSION_STATE_NO_MISSION and self.items
-        if changed or gone or now - self.verified_at > CHECK:
+        if changed or gone or now - self.verified_at > READBACK_PERIOD:
             self.items = None  # read what is on board before anything else
 
     def was_read(self, items: tuple[Item, ...], known: tuple[Item, ...], listed: bool,

@@ -8,7 +8,7 @@ from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
-MOST_PASSED = 512  # frames that nobody wants, remembered until one comes that somebody does
+MAX_SKIPPED = 512  # frames that nobody wants, remembered until one comes that somebody does
 Message = Any  # a dialect.MAVLink_message; the dialect has no usable types
 Signing = Any  # a dialect.MAVLinkSigning; all parsers share one, else a replay finds a new one
 
@@ -88,7 +88,7 @@ class Codec:
         if messages and self._mav.passed:
             messages[0].passed = tuple(self._mav.passed)
             self._mav.passed.clear()
-        del self._mav.passed[:-MOST_PASSED]
+        del self._mav.passed[:-MAX_SKIPPED]
         return messages
 
     def drop(self) -> None:

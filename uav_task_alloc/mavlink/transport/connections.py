@@ -11,7 +11,7 @@ from typing import Any, BinaryIO
 
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.mavlink.transport.codec import Codec, Message
-from uav_task_alloc.mavlink.transport.link import MOST_STRANGERS, Link
+from uav_task_alloc.mavlink.transport.link import MAX_UNCONFIRMED, Link
 from uav_task_alloc.mavlink.transport.refused_messages import RefusedMessages, failure
 from uav_task_alloc.mavlink.transport.signing import SigningClock
 
@@ -29,8 +29,8 @@ class Connections:
         self.signing = SigningClock(signing_key_file, wall) if signing_key_file else None
         self._record = open_record(tlog) if tlog else None
         self.links = list(links)  # last, as they may be opened by this
-        self._voice = Codec(system, component,
-                            signing=self.signing.sent if self.signing else None)
+        self._encoder = Codec(system, component,
+                            signing=self.signing.outgoing if self.signing else None)
         self.refusals = RefusedMessages()  # what could not be decoded, or encoded
         self._parsers: dict[Address, Codec] = {}  # the one heard last at the end
         self._kept: frozenset[Address] = frozenset()
@@ -58,7 +58,7 @@ class Connections:
                 self.signing.catch_up()
             for (number, end), message in messages:
                 try:
-                    frame = self._voice.pack(message)
+                    frame = self._encoder.pack(message)
                     self._write_record(frame)
                     self.links[number].write(end, frame)
                 except Exception as error:
@@ -112,10 +112,11 @@ class Connections:
 
     def _parse(self, address: Address, data: bytes) -> list[tuple[Address, Message]]:
         parser = self._parsers.pop(address, None) or Codec(
-            *self._ids, wanted=self._wanted, signing=self.signing.heard if self.signing else None,
+            *self._ids, wanted=self._wanted,
+            signing=self.signing.incoming if self.signing else None,
             tap=self._write_record if self._record else None)
         self._parsers[address] = parser
-        self._forget_strangers()
+        self._forget_unconfirmed()
         try:
             messages = parser.parse(data)
         except Exception as error:
@@ -126,12 +127,12 @@ class Connections:
             parser.drop()
         return [(address, message) for message in messages]
 
-    def _forget_strangers(self) -> None:
+    def _forget_unconfirmed(self) -> None:
         """Of datagrams; a stream may stand in the middle of a frame."""
         strangers = [address for address in self._parsers if address not in self._kept
                      and self.links[address[0]].datagrams] if (
-            len(self._parsers) > len(self._kept) + len(self.links) + MOST_STRANGERS) else []
-        for address in strangers[:-MOST_STRANGERS]:
+            len(self._parsers) > len(self._kept) + len(self.links) + MAX_UNCONFIRMED) else []
+        for address in strangers[:-MAX_UNCONFIRMED]:
             self._errors += self._parsers.pop(address).errors
 
     def _write_record(self, frame: bytes) -> None:

@@ -15,7 +15,7 @@ from uav_task_alloc.errors import InvalidValue
 _CHUNK = 65536  # [B] more than any datagram
 BACKLOG = 65536  # [B] a slow line may be behind; what is more is dropped
 RECONNECT = 1.0  # [s]
-MOST_STRANGERS = 32  # far ends of one link that are of no known vehicle; the latest are kept
+MAX_UNCONFIRMED = 32  # far ends of one link that are of no known vehicle; the latest are kept
 _EXPECTED = 'udpin:HOST:PORT, udpout:HOST:PORT, tcp:HOST:PORT or /dev/tty...:BAUD'
 
 
@@ -92,7 +92,7 @@ class Udp:
     def _hear(self, end: Hashable) -> None:
         self._ends.pop(end, None)
         self._ends[end] = None
-        if len(self._ends) > len(self._kept) + MOST_STRANGERS:
+        if len(self._ends) > len(self._kept) + MAX_UNCONFIRMED:
             del self._ends[next(old for old in self._ends if old not in self._kept)]
 
     def keep(self, ends: Collection[Hashable]) -> None:

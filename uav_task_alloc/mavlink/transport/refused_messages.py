@@ -8,7 +8,7 @@ from pathlib import Path
 
 from uav_task_alloc.mavlink.transport.notes import OperatorNote
 
-MOST_TOLD = 100  # kinds and senders with a line in the log: a flood of them gets no further
+MAX_LOGGED = 100  # kinds and senders with a line in the log: a flood of them gets no further
 _LONGEST = 300  # characters of a reason
 
 
@@ -32,11 +32,11 @@ class RefusedMessages:
         """
         self.count += 1
         self.last = f'{kind} ({sender}): {why[:_LONGEST]}'
-        if (sender, kind) in self._told or len(self._told) > MOST_TOLD:
+        if (sender, kind) in self._told or len(self._told) > MAX_LOGGED:
             return
         self._told.add((sender, kind))
         self.notes.append(OperatorNote(level, f'{self.last}: dropped; told once' if len(
-            self._told) <= MOST_TOLD else f'messages of more than {MOST_TOLD} kinds and senders '
+            self._told) <= MAX_LOGGED else f'messages of more than {MAX_LOGGED} kinds and senders '
             'were dropped: more are only counted, see /diagnostics'))
 
 

@@ -28,8 +28,8 @@ class SigningClock:
         self._wall, self._path = wall, Path(key_file + '.timestamp')
         key = read_key(key_file)
         stamp = max(self._now(), read_timestamp(self._path))
-        self.heard = make_signing(key, stamp)  # all parsers share it
-        self.sent = make_signing(key, stamp)  # another thread signs with it
+        self.incoming = make_signing(key, stamp)  # all parsers share it
+        self.outgoing = make_signing(key, stamp)  # another thread signs with it
         self.trouble = ''
         self._write_at = 0.0
         try:
@@ -40,7 +40,7 @@ class SigningClock:
 
     def catch_up(self) -> None:
         """Before something is signed: no timestamp is older than one that was heard."""
-        self.sent.timestamp = max(self.sent.timestamp, self.heard.timestamp)
+        self.outgoing.timestamp = max(self.outgoing.timestamp, self.incoming.timestamp)
 
     def step(self, now: float) -> None:
         """Let time pass: keep the timestamp on disk, or try it again.
@@ -51,7 +51,7 @@ class SigningClock:
         if now < self._write_at:
             return
         self._write_at = now + _PERIOD
-        self.heard.timestamp = max(self.heard.timestamp, self._now())
+        self.incoming.timestamp = max(self.incoming.timestamp, self._now())
         try:
             self._write()
             self.trouble = ''
@@ -64,7 +64,7 @@ class SigningClock:
 
     def _write(self) -> None:
         # ahead, so that what is signed until the next write is not used again after a crash
-        stamp = max(self.heard.timestamp, self.sent.timestamp) + int(2e5 * _PERIOD)
+        stamp = max(self.incoming.timestamp, self.outgoing.timestamp) + int(2e5 * _PERIOD)
         text = str(min(stamp, _MOST))
         temporary = self._path.with_name(self._path.name + '.tmp')
         try:

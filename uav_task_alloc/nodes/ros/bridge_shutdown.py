@@ -23,9 +23,9 @@ class BridgeShutdown:
     @staticmethod
     def words(fleet: Iterable[VehicleSession]) -> list[str]:
         """Who is in the air and what becomes of them, for the log; nothing where nobody is."""
-        airborne = [served for served in fleet if served.pilot.telemetry.airborne]
+        airborne = [session for session in fleet if session.executor.telemetry.airborne]
         held = swapping(airborne)
-        flying = [served.uav_id for served in airborne if served.uav_id not in held]
+        flying = [session.uav_id for session in airborne if session.uav_id not in held]
         said = []
         if flying:
             said.append(f'ends while airborne: {", ".join(flying)}; each goes on with what is on '
@@ -38,4 +38,4 @@ class BridgeShutdown:
 
 def swapping(fleet: Iterable[VehicleSession]) -> list[str]:
     """UAVs that are held for an upload."""
-    return [served.uav_id for served in fleet if served.pilot.watch.swap_at is not None]
+    return [session.uav_id for session in fleet if session.executor.watch.swap_at is not None]
