@@ -6,7 +6,7 @@ from vehicle_bench import Bench, of, waypoint
 
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.sim.config import FlightMode
-from uav_task_alloc.sim.failsafe import KINDS
+from uav_task_alloc.sim.failsafe import FAILSAFE_KINDS
 from uav_task_alloc.sim.modes import px4_mode
 
 FAR = (400.0, 0.0, 30.0)
@@ -32,7 +32,7 @@ def return_mode(bench):
     return bench.flight.custom_modes[FlightMode.RETURN]
 
 
-@pytest.mark.parametrize('kind', KINDS)
+@pytest.mark.parametrize('kind', FAILSAFE_KINDS)
 def test_a_failsafe_that_changes_the_mode_is_critical_and_says_why(bench, kind):
     bench.vehicle.failsafe(kind, return_mode(bench))
     beat = heartbeat(bench)
@@ -40,7 +40,7 @@ def test_a_failsafe_that_changes_the_mode_is_critical_and_says_why(bench, kind):
     assert (TEXTS[kind] if bench.own else 'Failsafe activated') in bench.texts()
 
 
-@pytest.mark.parametrize('kind', KINDS)
+@pytest.mark.parametrize('kind', FAILSAFE_KINDS)
 def test_a_failsafe_that_keeps_the_mode_is_critical_until_it_is_over(bench, kind):
     before = bench.flight.custom_mode
     bench.vehicle.failsafe(kind, None)

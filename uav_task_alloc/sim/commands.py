@@ -14,7 +14,7 @@ from uav_task_alloc.sim.flight import VehicleFlight
 from uav_task_alloc.sim.modes import px4_mode
 from uav_task_alloc.sim.streams import Streams
 
-Params = tuple[float, float, float, float, float, float, float]
+CommandParams = tuple[float, float, float, float, float, float, float]
 _ACCEPTED = int(dialect.MAV_RESULT_ACCEPTED)
 _DENIED = int(dialect.MAV_RESULT_DENIED)
 _FAILED = int(dialect.MAV_RESULT_FAILED)
@@ -39,7 +39,7 @@ class Commands:
         self.flight = flight
         self.streams = streams
         self.out: list[Message] = []  # what REQUEST_MESSAGE asks for
-        self.handlers: dict[int, Callable[[Params], int]] = {
+        self.handlers: dict[int, Callable[[CommandParams], int]] = {
             dialect.MAV_CMD_COMPONENT_ARM_DISARM: self._arm_disarm,
             dialect.MAV_CMD_NAV_TAKEOFF: self._takeoff,
             dialect.MAV_CMD_DO_SET_MODE: self._set_mode,
@@ -51,12 +51,12 @@ class Commands:
         for command, mode in _MODE_COMMANDS.items():
             self.handlers[command] = partial(self._enter, mode)
 
-    def run(self, command: int, params: Params) -> int:
+    def run(self, command: int, params: CommandParams) -> int:
         """The MAV_RESULT of a command."""
         handler = self.handlers.get(command)
         return _UNSUPPORTED if handler is None else handler(params)
 
-    def note(self, command: int, params: Params, station: str) -> None:
+    def note(self, command: int, params: CommandParams, station: str) -> None:
         """Note a command about mode, arming, take-off or the mission in the ground truth."""
         flight, modes = self.flight, self.flight.custom_modes
         if command == dialect.MAV_CMD_COMPONENT_ARM_DISARM:
@@ -73,37 +73,37 @@ class Commands:
         elif command in _PLAIN_COMMANDS:
             flight.note('command', command=_PLAIN_COMMANDS[command], cause=station)
 
-    def custom_mode(self, params: Params) -> int:
+    def custom_mode(self, params: CommandParams) -> int:
         """The custom mode that DO_SET_MODE asks for."""
         raise NotImplementedError
 
     def _result(self, done: bool) -> int:
         return _ACCEPTED if done else self.refused
 
-    def _enter(self, mode: FlightMode, _: Params) -> int:
+    def _enter(self, mode: FlightMode, _: CommandParams) -> int:
         return self._result(self.flight.set_mode(mode))
 
-    def _arm_disarm(self, p: Params) -> int:
+    def _arm_disarm(self, p: CommandParams) -> int:
         if p[0] == 1.0:
             return self._result(self.flight.arm(p[1] == _FORCE))
         return self._result(p[0] == 0.0 and self.flight.disarm(p[1] == _FORCE))
 
-    def _takeoff(self, p: Params) -> int:
+    def _takeoff(self, p: CommandParams) -> int:
         raise NotImplementedError
 
-    def _set_mode(self, p: Params) -> int:
+    def _set_mode(self, p: CommandParams) -> int:
         return self._result(self.flight.set_custom_mode(self.custom_mode(p)))
 
-    def _set_message_interval(self, p: Params) -> int:
+    def _set_message_interval(self, p: CommandParams) -> int:
         known = self.streams.set_interval(int(p[0]), p[1], self.flight.now)
         return _ACCEPTED if known else _FAILED
 
-    def _request_message(self, p: Params) -> int:
+    def _request_message(self, p: CommandParams) -> int:
         messages = self.streams.make(int(p[0]))
         self.out += messages
         return _ACCEPTED if messages else _FAILED
 
-    def _change_speed(self, p: Params) -> int:
+    def _change_speed(self, p: CommandParams) -> int:
         if not p[1] > 0.0:
             return _DENIED
         self.flight.speed = p[1]
@@ -118,10 +118,10 @@ class ArduPilotCommands(Commands):
         self.handlers[dialect.MAV_CMD_DO_SET_MISSION_CURRENT] = (
             lambda p: self._result(self.flight.set_current(int(p[0]))))
 
-    def custom_mode(self, params: Params) -> int:
+    def custom_mode(self, params: CommandParams) -> int:
         return int(params[1])
 
-    def _takeoff(self, p: Params) -> int:
+    def _takeoff(self, p: CommandParams) -> int:
         return self._result(self.flight.takeoff(self.flight.home[2] + p[6]))
 
 
@@ -130,10 +130,10 @@ class Px4Commands(Commands):
 
     refused = _REJECTED
 
-    def custom_mode(self, params: Params) -> int:
+    def custom_mode(self, params: CommandParams) -> int:
         return px4_mode(int(params[1]), int(params[2]))
 
-    def _takeoff(self, p: Params) -> int:
+    def _takeoff(self, p: CommandParams) -> int:
         flight = self.flight
         low = flight.body.position[2] + flight.takeoff_height
         height = p[6] - flight.home_amsl + flight.home[2]

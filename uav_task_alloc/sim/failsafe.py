@@ -11,12 +11,12 @@ from uav_task_alloc.sim.estimate import Estimate
 from uav_task_alloc.sim.flight import CRITICAL, INFO, WARNING, VehicleFlight
 from uav_task_alloc.sim.modes import AVOID_ADSB
 
-KINDS = ('radio', 'gcs', 'battery', 'ekf', 'fence')
+FAILSAFE_KINDS = ('radio', 'gcs', 'battery', 'ekf', 'fence')
 _ALERT = 1  # MAV_SEVERITY
 _ADSB = 'adsb'  # an avoidance sets CRITICAL too
 
 
-class Texts(NamedTuple):
+class FailsafeTexts(NamedTuple):
     """The STATUSTEXTs of one autopilot: (severity, text)."""
 
     begin: dict[str, tuple[tuple[int, str], ...]]  # by kind of failsafe
@@ -25,7 +25,7 @@ class Texts(NamedTuple):
     kill_over: tuple[int, str]
 
 
-_ARDUPILOT = Texts(
+_ARDUPILOT = FailsafeTexts(
     begin={
         'radio': ((WARNING, 'Radio Failsafe'),),
         'gcs': ((WARNING, 'GCS Failsafe'),),
@@ -44,7 +44,7 @@ _ARDUPILOT = Texts(
     },
     kill=(INFO, 'RC7: MotorEStop HIGH'), kill_over=(INFO, 'RC7: MotorEStop LOW'))
 _ACTIVATED = (CRITICAL, 'Failsafe activated')  # PX4 tells the reason in an EVENT only
-_PX4 = Texts(
+_PX4 = FailsafeTexts(
     begin={
         'radio': ((CRITICAL, 'Manual control lost'), _ACTIVATED),
         'gcs': ((INFO, 'Connection to ground station lost'), _ACTIVATED),
@@ -52,7 +52,7 @@ _PX4 = Texts(
         'ekf': (_ACTIVATED,),
         'fence': (_ACTIVATED,),
     },
-    over=dict.fromkeys(KINDS, (INFO, 'Failsafe mode deactivated')),
+    over=dict.fromkeys(FAILSAFE_KINDS, (INFO, 'Failsafe mode deactivated')),
     kill=(CRITICAL, 'Kill engaged'), kill_over=(INFO, 'Kill disengaged'))
 
 
@@ -68,7 +68,7 @@ class Interventions:
         return isinstance(self.flight, ArduPilotFlight)
 
     @property
-    def _texts(self) -> Texts:
+    def _texts(self) -> FailsafeTexts:
         return _ARDUPILOT if self._is_ardupilot else _PX4
 
     def rc_mode(self, custom_mode: int) -> bool:
@@ -87,8 +87,8 @@ class Interventions:
 
     def failsafe(self, kind: str, mode: int | None) -> None:
         """A failsafe of one of `KINDS` begins: CRITICAL, and a custom mode unless None."""
-        if kind not in KINDS:
-            raise InvalidValue('kind', kind, f'one of {", ".join(KINDS)}')
+        if kind not in FAILSAFE_KINDS:
+            raise InvalidValue('kind', kind, f'one of {", ".join(FAILSAFE_KINDS)}')
         flight = self.flight
         flight.failsafes[kind] = None
         name = flight.modes[flight.custom_mode if mode is None else mode].name
@@ -102,7 +102,7 @@ class Interventions:
     def failsafe_over(self) -> None:
         """All failsafes end; the mode stays."""
         flight = self.flight
-        for kind in [kind for kind in flight.failsafes if kind in KINDS]:
+        for kind in [kind for kind in flight.failsafes if kind in FAILSAFE_KINDS]:
             del flight.failsafes[kind]
             flight.texts.append(self._texts.over[kind])
             flight.note('failsafe_over', cause=kind)

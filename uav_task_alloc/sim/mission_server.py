@@ -12,11 +12,11 @@ from uav_task_alloc.sim.flight import VehicleFlight
 from uav_task_alloc.sim.stored_item import StoredItem
 
 RemoteIds = tuple[int, int]  # system, component
-MISSION = dialect.MAV_MISSION_TYPE_MISSION
-COMPONENT = dialect.MAV_COMP_ID_AUTOPILOT1
+MISSION_TYPE = dialect.MAV_MISSION_TYPE_MISSION
+AUTOPILOT_COMPONENT = dialect.MAV_COMP_ID_AUTOPILOT1
 
 
-class MissionService:
+class MissionServer:
     """Items in storage and the transfer that may be under way; replies go to `out`."""
 
     flight: VehicleFlight
@@ -78,9 +78,9 @@ class MissionService:
 
     def _for_us(self, message: Message) -> bool:
         return (message.target_system == self._system_id
-                and message.target_component in (COMPONENT, 0))
+                and message.target_component in (AUTOPILOT_COMPONENT, 0))
 
-    def _send_ack(self, peer: RemoteIds, result: int, mission_type: int = MISSION) -> None:
+    def _send_ack(self, peer: RemoteIds, result: int, mission_type: int = MISSION_TYPE) -> None:
         self.out.append(dialect.MAVLink_mission_ack_message(*peer, result, mission_type))
 
     def _send_text(self, severity: int, text: str) -> None:

@@ -15,7 +15,7 @@ from typing import Any
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.mavlink.transport.codec import Codec, Message
 from uav_task_alloc.sim.config import VehicleConfig
-from uav_task_alloc.sim.mission_server import COMPONENT
+from uav_task_alloc.sim.mission_server import AUTOPILOT_COMPONENT
 from uav_task_alloc.sim.vehicle import AUTOPILOTS, Vehicle
 
 UdpAddress = tuple[str, int]
@@ -125,9 +125,9 @@ class _Station:
         self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self.socket.bind(('', 0))
         self.socket.setblocking(False)
-        self._codec = Codec(vehicle.config.system_id, COMPONENT)
+        self._codec = Codec(vehicle.config.system_id, AUTOPILOT_COMPONENT)
         self._target = target
-        self._parsers = {target: Codec(vehicle.config.system_id, COMPONENT)}  # last heard last
+        self._parsers = {target: Codec(vehicle.config.system_id, AUTOPILOT_COMPONENT)}  # last heard last
 
     def hear(self, now: float) -> None:
         """Answer every datagram that waits."""
@@ -139,7 +139,7 @@ class _Station:
             except ConnectionError:  # the other side is not there (yet)
                 continue
             parser = self._parsers.pop(address, None) or Codec(
-                self.vehicle.config.system_id, COMPONENT)
+                self.vehicle.config.system_id, AUTOPILOT_COMPONENT)
             self._parsers[address] = parser
             if len(self._parsers) > 1 + _MOST_STATIONS:
                 del self._parsers[next(a for a in self._parsers if a != self._target)]

@@ -9,15 +9,15 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from uav_task_alloc.mavlink.transport.codec import Message, with_plan_id
 from uav_task_alloc.sim.ardupilot.flight import ArduPilotFlight
-from uav_task_alloc.sim.ardupilot.mission_server import ArduPilotMission
+from uav_task_alloc.sim.ardupilot.mission_server import ArduPilotMissionServer
 from uav_task_alloc.sim.commands import ArduPilotCommands, Commands, Px4Commands
 from uav_task_alloc.sim.config import FlightMode, TruthEvent, VehicleConfig
 from uav_task_alloc.sim.estimate import Estimate
 from uav_task_alloc.sim.failsafe import Interventions
 from uav_task_alloc.sim.flight import VehicleFlight
-from uav_task_alloc.sim.mission_server import COMPONENT, MissionService
+from uav_task_alloc.sim.mission_server import AUTOPILOT_COMPONENT, MissionServer
 from uav_task_alloc.sim.px4.flight import Px4Flight
-from uav_task_alloc.sim.px4.mission_server import Px4Mission
+from uav_task_alloc.sim.px4.mission_server import Px4MissionServer
 from uav_task_alloc.sim.streams import Streams
 from uav_task_alloc.sim.telemetry import TelemetryMessages
 
@@ -31,18 +31,18 @@ class Autopilot:
     name: str
     number: int  # MAV_AUTOPILOT
     flight: type[VehicleFlight]
-    mission: type[MissionService]
+    mission: type[MissionServer]
     commands: type[Commands]
     capacity: int  # items
     rates: dict[int, float]  # [Hz] by message id, unasked
     asks_current: bool  # MISSION_CURRENT is a stream; else it comes at 1 Hz by itself
 
 
-ARDUPILOT = Autopilot(
-    'ardupilot', dialect.MAV_AUTOPILOT_ARDUPILOTMEGA, ArduPilotFlight, ArduPilotMission,
+_ARDUPILOT = Autopilot(
+    'ardupilot', dialect.MAV_AUTOPILOT_ARDUPILOTMEGA, ArduPilotFlight, ArduPilotMissionServer,
     ArduPilotCommands, 650, {dialect.MAVLINK_MSG_ID_HEARTBEAT: 1.0}, asks_current=True)
-PX4 = Autopilot(
-    'px4', dialect.MAV_AUTOPILOT_PX4, Px4Flight, Px4Mission, Px4Commands, 500, {
+_PX4 = Autopilot(
+    'px4', dialect.MAV_AUTOPILOT_PX4, Px4Flight, Px4MissionServer, Px4Commands, 500, {
         dialect.MAVLINK_MSG_ID_HEARTBEAT: 1.0,
         dialect.MAVLINK_MSG_ID_ATTITUDE: 100.0,
         dialect.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: 50.0,
@@ -55,7 +55,7 @@ PX4 = Autopilot(
         dialect.MAVLINK_MSG_ID_BATTERY_STATUS: 0.5,
         dialect.MAVLINK_MSG_ID_HOME_POSITION: 0.5,
     }, asks_current=False)
-AUTOPILOTS = {row.name: row for row in (ARDUPILOT, PX4)}
+AUTOPILOTS = {row.name: row for row in (_ARDUPILOT, _PX4)}
 
 
 class Vehicle(Interventions):
@@ -177,7 +177,7 @@ class Vehicle(Interventions):
         return self._command(m, (m.param1, m.param2, m.param3, m.param4, m.x, m.y, m.z))
 
     def _command(self, m: Message, params: tuple[float, ...]) -> list[Message]:
-        if m.target_component not in (COMPONENT, 0):
+        if m.target_component not in (AUTOPILOT_COMPONENT, 0):
             return []
         self._commands.note(m.command, params, _station(m))  # type: ignore[arg-type]
         result = self._commands.run(m.command, params)  # type: ignore[arg-type]
@@ -194,7 +194,7 @@ class Vehicle(Interventions):
         return []
 
     def _set_current(self, m: Message) -> list[Message]:
-        if m.target_component not in (COMPONENT, 0):
+        if m.target_component not in (AUTOPILOT_COMPONENT, 0):
             return []
         self.flight.note('command', command='set current', seq=m.seq, cause=_station(m))
         return [self._mission_current()] if self.flight.set_current(m.seq) else []

@@ -19,7 +19,7 @@ _GUIDED = {4, 20}  # GUIDED, GUIDED_NOGPS
 _FIRST_PREARM, _PREARM_PERIOD = 15.0, 30.0  # [s] after power-up; between texts
 
 
-class MissionRun(Enum):
+class MissionRunState(Enum):
     """State of the mission; the values are those of MISSION_CURRENT.mission_state."""
 
     NOT_STARTED = 2
@@ -50,7 +50,7 @@ class ArduPilotFlight(VehicleFlight):
 
     def reboot(self, now: float) -> None:
         super().reboot(now)
-        self.run = MissionRun.NOT_STARTED
+        self.run = MissionRunState.NOT_STARTED
         self._upcoming = 1  # seq where the search for the next flown item begins
         self._prearm_at = now + _FIRST_PREARM
 
@@ -93,8 +93,8 @@ class ArduPilotFlight(VehicleFlight):
         return next((i.command for i in self.items[1:] if i.command != item_.CHANGE_SPEED), None)
 
     def leave(self, mode: FlightMode) -> None:
-        if mode is FlightMode.MISSION and self.run is MissionRun.ACTIVE:
-            self.run = MissionRun.STOPPED
+        if mode is FlightMode.MISSION and self.run is MissionRunState.ACTIVE:
+            self.run = MissionRunState.STOPPED
             if self.track is not None:
                 self._upcoming = self.seq  # what was interrupted is flown again
 
@@ -106,14 +106,14 @@ class ArduPilotFlight(VehicleFlight):
     def start_mission(self) -> bool:
         if not self.set_mode(FlightMode.MISSION):
             return False
-        if self.run is not MissionRun.ACTIVE:
+        if self.run is not MissionRunState.ACTIVE:
             self._resume()
         return True
 
     def _resume(self) -> None:
-        if self.run in (MissionRun.COMPLETE, MissionRun.NOT_STARTED):
+        if self.run in (MissionRunState.COMPLETE, MissionRunState.NOT_STARTED):
             self._upcoming = 1  # a completed mission begins anew
-        self.run = MissionRun.ACTIVE
+        self.run = MissionRunState.ACTIVE
 
     def set_current(self, seq: int) -> bool:
         if len(self.items) < 2 or seq >= len(self.items):
@@ -125,8 +125,8 @@ class ArduPilotFlight(VehicleFlight):
         self.seq, self._upcoming = flown, upcoming
         if self.mode is FlightMode.MISSION:
             self.track = None
-        if self.run is not MissionRun.ACTIVE:
-            self.run = MissionRun.STOPPED
+        if self.run is not MissionRunState.ACTIVE:
+            self.run = MissionRunState.STOPPED
         return True
 
     def _flown_from(self, seq: int) -> int | None:
@@ -135,7 +135,7 @@ class ArduPilotFlight(VehicleFlight):
 
     def changed(self, change: StorageChange, flagged: int | None) -> None:
         if change is StorageChange.CLEARED:
-            self.seq, self._upcoming, self.run = 0, 1, MissionRun.NOT_STARTED
+            self.seq, self._upcoming, self.run = 0, 1, MissionRunState.NOT_STARTED
         if (
             change is StorageChange.WRITTEN
             and self.mode is FlightMode.MISSION
@@ -151,14 +151,14 @@ class ArduPilotFlight(VehicleFlight):
             self.texts.append((CRITICAL, 'Auto mission changed but failed to restart command'))
 
     def next_item(self) -> None:
-        if self.run is not MissionRun.ACTIVE:
+        if self.run is not MissionRunState.ACTIVE:
             return
         flown = self._flown_from(self._upcoming)
         for seq in range(self._upcoming, len(self.items) if flown is None else flown):
             self.do(self.items[seq])
             self.tell_reached(seq, self.body.position)
         if flown is None:
-            self.run = MissionRun.COMPLETE
+            self.run = MissionRunState.COMPLETE
             self.note('mission_end')
             return
         self._upcoming = flown + 1

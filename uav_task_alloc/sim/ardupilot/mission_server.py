@@ -5,10 +5,10 @@ from __future__ import annotations
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from uav_task_alloc.mavlink.transport.codec import Message
-from uav_task_alloc.sim.ardupilot.flight import ArduPilotFlight, MissionRun
+from uav_task_alloc.sim.ardupilot.flight import ArduPilotFlight, MissionRunState
 from uav_task_alloc.sim.config import FlightMode, StorageChange
 from uav_task_alloc.sim.flight import WARNING
-from uav_task_alloc.sim.mission_server import MISSION, MissionService, RemoteIds
+from uav_task_alloc.sim.mission_server import MISSION_TYPE, MissionServer, RemoteIds
 from uav_task_alloc.sim.stored_item import (
     Refusal,
     StoredItem,
@@ -23,7 +23,7 @@ _GIVE_UP = 8.0  # [s] without an item
 _ALL = dialect.MAV_MISSION_TYPE_ALL
 
 
-class ArduPilotMission(MissionService):
+class ArduPilotMissionServer(MissionServer):
     """Storage truncated at COUNT and overwritten item by item; seq 0 is home."""
 
     flight: ArduPilotFlight
@@ -76,10 +76,10 @@ class ArduPilotMission(MissionService):
         assert self._peer is not None
         self._asked = now
         self.out.append(dialect.MAVLink_mission_request_message(
-            *self._peer, self._wanted, MISSION))
+            *self._peer, self._wanted, MISSION_TYPE))
 
     def _count(self, message: Message, peer: RemoteIds, now: float) -> None:
-        if message.mission_type != MISSION:
+        if message.mission_type != MISSION_TYPE:
             self._send_ack(peer, dialect.MAV_MISSION_UNSUPPORTED, message.mission_type)
             return
         if self._peer not in (None, peer):
@@ -103,7 +103,7 @@ class ArduPilotMission(MissionService):
         self._ask(now)
 
     def _item(self, message: Message, peer: RemoteIds, now: float) -> None:
-        if message.mission_type != MISSION:
+        if message.mission_type != MISSION_TYPE:
             self._send_ack(peer, dialect.MAV_MISSION_UNSUPPORTED, message.mission_type)
         elif self._peer is None:
             self._send_ack(peer, dialect.MAV_MISSION_ERROR)
@@ -135,13 +135,13 @@ class ArduPilotMission(MissionService):
         if self._peer is not None:
             self._send_ack(peer, dialect.MAV_MISSION_DENIED, message.mission_type)
             return
-        count = len(self.items) if message.mission_type == MISSION else 0
+        count = len(self.items) if message.mission_type == MISSION_TYPE else 0
         self.out.append(dialect.MAVLink_mission_count_message(*peer, count, message.mission_type))
 
     def _request(self, message: Message, peer: RemoteIds, now: float) -> None:
         if self._peer is not None:
             self._send_ack(peer, dialect.MAV_MISSION_DENIED, message.mission_type)
-        elif message.mission_type != MISSION:
+        elif message.mission_type != MISSION_TYPE:
             self._send_ack(peer, dialect.MAV_MISSION_ERROR, message.mission_type)
         elif message.seq != 0 and message.seq >= len(self.items):
             self._request_list(message, peer, now)  # it tells the station how many there are
@@ -154,10 +154,10 @@ class ArduPilotMission(MissionService):
     def _clear(self, message: Message, peer: RemoteIds, now: float) -> None:
         if self._peer is not None:
             self._send_ack(peer, dialect.MAV_MISSION_DENIED, message.mission_type)
-        elif message.mission_type in (MISSION, _ALL) and self.flight.run is MissionRun.ACTIVE:
+        elif message.mission_type in (MISSION_TYPE, _ALL) and self.flight.run is MissionRunState.ACTIVE:
             self._send_ack(peer, dialect.MAV_MISSION_ERROR, message.mission_type)
         else:
-            if message.mission_type in (MISSION, _ALL):
+            if message.mission_type in (MISSION_TYPE, _ALL):
                 self.items.clear()
                 if self._unloaded is not None:
                     self._unloaded.clear()

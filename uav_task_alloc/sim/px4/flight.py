@@ -23,7 +23,7 @@ _REPEAT_PERIOD = 1.0  # [s]
 
 
 @dataclass(slots=True)
-class Result:
+class NavigatorResult:
     """What the navigator says of its last mission, take-off or landing."""
 
     finished: bool = False
@@ -52,7 +52,7 @@ class Px4Flight(VehicleFlight):
     def reboot(self, now: float) -> None:
         super().reboot(now)
         self._finished = False
-        self.result = Result()
+        self.result = NavigatorResult()
         self.feasible = not self._infeasible()  # the mission on board
         self._last_reached: int | None = None
         self._repeats = 0
@@ -120,7 +120,7 @@ class Px4Flight(VehicleFlight):
             return
         last = max(0, len(self.items) - 1)
         self.seq = min(self.seq, last) if flagged is None else flagged
-        self._finished, self.result = False, Result()
+        self._finished, self.result = False, NavigatorResult()
         reason = self._infeasible() if self.items else ''
         self.feasible = bool(self.items) and not reason
         if reason:

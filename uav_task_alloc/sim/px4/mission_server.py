@@ -9,7 +9,7 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from uav_task_alloc.mavlink.transport.codec import Message, with_plan_id
 from uav_task_alloc.sim.config import FlightMode, StorageChange
-from uav_task_alloc.sim.mission_server import MISSION, MissionService, RemoteIds
+from uav_task_alloc.sim.mission_server import MISSION_TYPE, MissionServer, RemoteIds
 from uav_task_alloc.sim.px4.flight import Px4Flight
 from uav_task_alloc.sim.stored_item import (
     Refusal,
@@ -32,7 +32,7 @@ class _State(Enum):
     SENDLIST = 'sendlist'  # is read back
 
 
-class Px4Mission(MissionService):
+class Px4MissionServer(MissionServer):
     """Atomic: a transfer that fails leaves the old mission; a CRC names the new one."""
 
     flight: Px4Flight
@@ -89,7 +89,7 @@ class Px4Mission(MissionService):
         self._asked = now
         kind = (dialect.MAVLink_mission_request_int_message if self._int
                 else dialect.MAVLink_mission_request_message)
-        self.out.append(kind(*self._peer, self._seq, MISSION))
+        self.out.append(kind(*self._peer, self._seq, MISSION_TYPE))
 
     def _count(self, message: Message, peer: RemoteIds, now: float) -> None:
         self._heard = now
@@ -101,7 +101,7 @@ class Px4Mission(MissionService):
             self._send_ack(self._peer, dialect.MAV_MISSION_ERROR)
 
     def _begin(self, message: Message, peer: RemoteIds, now: float) -> None:
-        if message.mission_type != MISSION:
+        if message.mission_type != MISSION_TYPE:
             self._send_ack(peer, dialect.MAV_MISSION_UNSUPPORTED, message.mission_type)
             return
         self._peer = peer
@@ -154,7 +154,7 @@ class Px4Mission(MissionService):
 
     def _accept(self) -> None:
         self.out.append(with_plan_id(dialect.MAVLink_mission_ack_message(
-            *self._peer, dialect.MAV_MISSION_ACCEPTED, MISSION), self._id))
+            *self._peer, dialect.MAV_MISSION_ACCEPTED, MISSION_TYPE), self._id))
 
     def _request_list(self, message: Message, peer: RemoteIds, now: float) -> None:
         if self._seq == len(self.items):  # all was sent: the station's ACK may be lost
@@ -162,8 +162,8 @@ class Px4Mission(MissionService):
         again = self._state is _State.SENDLIST and peer == self._peer
         if self._state is not _State.IDLE and not again:
             return
-        count = len(self.items) if message.mission_type == MISSION else 0
-        if message.mission_type == MISSION:
+        count = len(self.items) if message.mission_type == MISSION_TYPE else 0
+        if message.mission_type == MISSION_TYPE:
             self._state, self._peer, self._seq, self._heard = _State.SENDLIST, peer, 0, now
         self.out.append(with_plan_id(dialect.MAVLink_mission_count_message(
             *peer, count, message.mission_type), self._id if count else 0))
@@ -186,7 +186,7 @@ class Px4Mission(MissionService):
     def _clear(self, message: Message, peer: RemoteIds, now: float) -> None:
         if self._state is not _State.IDLE:
             return
-        if message.mission_type in (MISSION, _ALL):
+        if message.mission_type in (MISSION_TYPE, _ALL):
             self._incoming, self._flagged = [], None
             self._store(StorageChange.CLEARED)
         self._send_ack(peer, dialect.MAV_MISSION_ACCEPTED, message.mission_type)
