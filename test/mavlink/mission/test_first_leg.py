@@ -151,13 +151,13 @@ class Somewhere:
         self.leg.begin(TASKS)
 
     def at(self, x, y, z, flying=True):
-        self.leg.place = lambda: LegStart((x, y, z), START, flying)
+        self.leg.locate = lambda: LegStart((x, y, z), START, flying)
         return self
 
     def ahead(self):
-        if self.leg.left:
+        if self.leg.is_off:
             self.leg.begin(TASKS)
-        return [point[0] for point in self.leg.ahead(END)]
+        return [point[0] for point in self.leg.points_ahead(END)]
 
 
 def test_finding_32_points_are_left_out_once_they_are_well_behind():
@@ -165,7 +165,7 @@ def test_finding_32_points_are_left_out_once_they_are_well_behind():
     assert one.ahead() == [5_000.0, 10_000.0, 15_000.0]
     assert one.at(5_150.0, 20.0, 50.0).ahead() == [5_000.0, 10_000.0, 15_000.0]
     assert one.at(5_250.0, 20.0, 50.0).ahead() == [10_000.0, 15_000.0]
-    one.leg.place = lambda: None  # for a moment nobody knows where it is
+    one.leg.locate = lambda: None  # for a moment nobody knows where it is
     assert one.ahead() == [10_000.0, 15_000.0]
     assert one.at(19_000.0, 20.0, 50.0).ahead() == []
 
@@ -176,26 +176,26 @@ def test_finding_32_a_new_list_begins_where_the_vehicle_is_if_it_has_left_the_le
         plane, beside, stays):
     one = Somewhere(plane)
     one.at(7_500.0, beside, 50.0).leg.begin(replace(TASKS, revision=2))
-    assert (one.leg.ahead(END)[0][1] == 0.0) is stays
+    assert (one.leg.points_ahead(END)[0][1] == 0.0) is stays
 
 
 def test_finding_32_a_vehicle_that_flies_its_mission_keeps_its_points():
     one = Somewhere()
     one.at(7_500.0, 900.0, 90.0)
-    assert not one.leg.left
+    assert not one.leg.is_off
     one.at(7_500.0, 900.0, 90.0, flying=False)  # a pilot has it
-    assert one.leg.left
+    assert one.leg.is_off
     assert len(one.ahead()) == 2
-    assert not one.leg.left
-    assert one.at(7_500.0, 900.0, 130.0, flying=False).leg.left  # and climbs
+    assert not one.leg.is_off
+    assert one.at(7_500.0, 900.0, 130.0, flying=False).leg.is_off  # and climbs
 
 
 def test_finding_32_a_vehicle_whose_place_is_not_known_has_no_points_until_it_is():
     leg = FirstLeg()
     leg.begin(TASKS)
-    assert not leg.left
-    assert leg.ahead(END) == ()
-    leg.place = lambda: LegStart(START, START)
-    assert leg.left
+    assert not leg.is_off
+    assert leg.points_ahead(END) == ()
+    leg.locate = lambda: LegStart(START, START)
+    assert leg.is_off
     leg.begin(TASKS)
-    assert len(leg.ahead(END)) == 3
+    assert len(leg.points_ahead(END)) == 3

@@ -106,7 +106,7 @@ class CommandSender:
 
     def receive(self, message: Message) -> None:
         """Take a COMMAND_ACK; one to another station says nothing of our command."""
-        if self._command and self._peer.says(message):
+        if self._command and self._peer.is_from_vehicle(message):
             self._command.receive(message)
 
     def note_refusal(self, text: str) -> None:

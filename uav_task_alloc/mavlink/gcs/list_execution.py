@@ -48,14 +48,14 @@ class ListExecution:
             return sender.wait_for('the item that another station has chosen')
         if found.kind is DiffKind.JUMP:
             return self._jump(found, now)
-        if onboard.list.leg.unknown:
+        if onboard.list.leg.start_unknown:
             return sender.wait_for('a position')
         if self._service.lasts(now):
             sender.waits_for = 'the end of the service'
             return []
-        if found.kind is DiffKind.SWAP and telemetry.airborne and not telemetry.good_link(now):
+        if found.kind is DiffKind.REPLACE and telemetry.airborne and not telemetry.good_link(now):
             return sender.wait_for('a link without gaps for 10 s')
-        if (found.kind is DiffKind.SWAP and not self._profile.atomic and telemetry.airborne
+        if (found.kind is DiffKind.REPLACE and not self._profile.atomic and telemetry.airborne
                 and telemetry.mode is ModeFunction.MISSION):
             sender.must_start, self._watch.swap_at = True, now
             return sender.set_mode(ModeFunction.HOLD, now)
@@ -64,7 +64,7 @@ class ListExecution:
     def _chosen_by_another(self) -> bool:
         """Somebody has set the current item: it is flown, and what was left out later."""
         progress, item = self._onboard.progress, self._onboard.progress.active
-        return (progress.chosen is not None and progress.chosen == progress.current
+        return (progress.set_by_other is not None and progress.set_by_other == progress.current
                 and self._telemetry.airborne
                 and self._telemetry.mode is ModeFunction.MISSION and item is not None
                 and any(item.task == stop.task.id for stop in self._onboard.remaining().stops))
@@ -77,11 +77,11 @@ class ListExecution:
 
         def done(t: float) -> None:
             onboard.progress.retag(found.items)
-            onboard.progress.jumped(found.start, t)
+            onboard.progress.note_set_current(found.start, t)
             onboard.must_jump, self._aimed = None, True
             onboard.adopt(found, t, tasks)
 
-        onboard.progress.asked(found.start)
+        onboard.progress.begin_set_current(found.start)
         return self._sender.jump(found.start + onboard.own, now, done)
 
     def fly(self, now: float) -> NextMessages:
@@ -96,7 +96,7 @@ class ListExecution:
             # in mission mode it would start again at the first item
             return sender.set_mode(ModeFunction.HOLD, now)
         if flying and onboard.must_jump is None:
-            onboard.progress.started()
+            onboard.progress.note_mission_mode()
             self._ending.swap_ended()
             return sender.satisfied()
         if sender.refused and not in_mission:

@@ -53,7 +53,7 @@ class MissionExecutor:
         self.telemetry = Telemetry(profile, origin, now)
         self.onboard = OnboardMission(peer, profile, origin, self.telemetry, rng)
         self.sender = CommandSender(peer, profile, self.telemetry)
-        self.onboard.list.leg.place = self._leg_begins
+        self.onboard.list.leg.locate = self._leg_begins
         evidence = MissionEvidence(self.onboard, self.telemetry)
         self.watch = AuthorityWatch(profile, self.telemetry, evidence, lambda: self.policy,
                                     now, record, save)
@@ -115,11 +115,11 @@ class MissionExecutor:
                 if mark.flown and now - mark.at < MEMORY:
                     self.onboard.progress.completed[mark.task] = mark[1:4]
         self.onboard.list.assign(tasks)
-        for task in filter(self.onboard.list.fly_anew, self._reminder.answered()):
+        for task in filter(self.onboard.list.repeat, self._reminder.answered()):
             self.notes.append(
                 OperatorNote('info', f'{task} was announced anew: it is flown once more')
             )
-        self._reminder.listed(self.onboard.list.told_before(), now)
+        self._reminder.listed(self.onboard.list.ended_before(), now)
         self.sender.clear_backoff(now)
         return self._gate(self._act(now), now)
 
@@ -127,7 +127,7 @@ class MissionExecutor:
         """Tasks of the list that another UAV has flown before we listened."""
         for task in tasks:
             self.notes.append(OperatorNote('info', f'{task.id} was flown by {other}, unheard'))
-        self.onboard.progress.caught_up(tasks)
+        self.onboard.progress.complete_offline(tasks)
 
     def hand_over(self, operator: str, now: float) -> str:
         """An operator gives the aircraft to the bridge; returns why not, '' where it has it."""
@@ -160,10 +160,10 @@ class MissionExecutor:
                 flight is ModeFunction.MISSION
                 and self.telemetry.mode is not ModeFunction.MISSION
             ):
-                self.onboard.progress.stopped()
+                self.onboard.progress.note_mission_left()
         out = self.onboard.receive(message, now)
         self.sender.receive(message)
-        if message.get_type() == 'COMMAND_ACK' and self._peer.says(message):
+        if message.get_type() == 'COMMAND_ACK' and self._peer.is_from_vehicle(message):
             self.watch.receive_command_ack(message, self.telemetry.frame)
         self._progress(message, newest, now)
         return self._gate(out + self._act(now), now)
@@ -211,10 +211,10 @@ class MissionExecutor:
         elif kind == 'MISSION_CURRENT' and newest and self.onboard.is_of_known_mission(message):
             seq = max(0, message.seq - own)
             if self.onboard.must_jump is None:  # else it is left from the mission before
-                progress.moved(seq, now, flying, self.telemetry.frame)
+                progress.note_current(seq, now, flying, self.telemetry.frame)
             if (message.mission_state == d.MISSION_STATE_COMPLETE and flying
                     and not self.profile.atomic):  # PX4 says so after a take-off too
-                progress.ended(seq, now, self.telemetry.frame)
+                progress.note_mission_complete(seq, now, self.telemetry.frame)
             if not self.sender.busy and not self.onboard.open:
                 self.onboard.watch(message, now)
         elif kind == 'STATUSTEXT':
@@ -227,7 +227,7 @@ class MissionExecutor:
     def _position(self, message: Message, newest: bool, now: float) -> None:
         if self.telemetry.has_position:
             place, velocity = self.telemetry.place_of(message)
-            self.onboard.progress.at(
+            self.onboard.progress.add_position(
                 PositionSample(message.time_boot_ms * 1e-3, place, velocity), newest, now,
                 self.telemetry.frame)
 
@@ -279,14 +279,14 @@ class MissionExecutor:
             return None
         beyond = onboard.beyond_flown()
         if beyond is not None and self.authority.held:
-            onboard.progress.asked(beyond)
+            onboard.progress.begin_set_current(beyond)
             return self.sender.jump(beyond + onboard.own, now,
-                                  lambda t: onboard.progress.jumped(beyond, t))
+                                  lambda t: onboard.progress.note_set_current(beyond, t))
         self.sender.waits_for = 'its upload'
         if (
             onboard.upload.state in (UploadState.BACKOFF, UploadState.DRAINING)
             and onboard.outdated
-            and (onboard.held is not None and onboard.wanted() and not onboard.upload.maybe_taken)
+            and (onboard.held is not None and onboard.wanted() and not onboard.upload.may_be_stored)
         ):
             return onboard.begin_upload(onboard.change(), now)
         return self._ending.held_too_long(now) or []

@@ -32,7 +32,7 @@ class OnboardMission:
     def __init__(self, peer: Peer, profile: Profile, origin: Origin, telemetry: Telemetry,
                  rng: random.Random) -> None:
         self.upload = Upload(peer, idle_after=profile.idle_after, rng=rng)
-        self.upload.overtaken = self._overtaken
+        self.upload.is_superseded = self._overtaken
         self.progress = ProgressTable(telemetry.frames, repeats=profile.atomic)
         self.resume = Resume(profile, origin, telemetry, self.progress)
         self.own = int(profile.rules.home_first)
@@ -138,7 +138,7 @@ class OnboardMission:
         done = {*self.progress.completed, *self.progress.pending}
         found = diff_missions(self.held, current, wanted, done=done)
         if self.list.horizon.stops is not None and found.kind is not DiffKind.KEEP:
-            if self.list.enough(self.held):
+            if self.list.has_enough(self.held):
                 return MissionDiff(DiffKind.KEEP, self.held, current or 0)
             if self.list.horizon.grow():
                 return self.change()
@@ -196,9 +196,9 @@ class OnboardMission:
     def receive(self, message: Message, now: float) -> list[Message]:
         """Take a message of the mission service."""
         if message.get_type() in ('MISSION_ACK', 'MISSION_COUNT'):
-            self._mission.note_plan(message)
+            self._mission.note_mission_id(message)
         out = self.upload.receive(message, now)
-        if not self.upload.maybe_taken:
+        if not self.upload.may_be_stored:
             self._sent_since = None if self.upload.busy else self._sent_since
         elif self._sent_since is None:
             self._sent_since = self.progress.path.newest
@@ -214,14 +214,14 @@ class OnboardMission:
 
     def reached(self, seq: int, now: float) -> None:
         """MISSION_ITEM_REACHED; once all items are sent it may be of either mission."""
-        if self._unsure is not None or (self.open and self.upload.maybe_taken):
+        if self._unsure is not None or (self.open and self.upload.may_be_stored):
             self._ambiguous.add(seq, now)
         else:
-            self.progress.reached(seq, now)
+            self.progress.note_reached(seq, now)
 
     def is_of_known_mission(self, message: Message) -> bool:
         """A MISSION_CURRENT is of the mission that is known, not of one that is sent now."""
-        return not self.open or self._mission.is_meant(message)
+        return not self.open or self._mission.has_mission_id(message)
 
     def abort(self) -> list[Message]:
         """Somebody else has the vehicle: the transfer ends where it is."""
@@ -230,7 +230,7 @@ class OnboardMission:
         if self._uploading is not None:
             self._ambiguous.credit(self._uploading[0])
             self._uploading = None
-            self._mission.break_off()
+            self._mission.interrupt()
         return []
 
     def verified(self) -> bool:
@@ -245,20 +245,20 @@ class OnboardMission:
         self._failures.clear()
         self._ambiguous.clear()
         self.progress.invalidate()
-        self._mission.forget()
+        self._mission.reset()
         self._uploading = self._unsure = None
         self.resume.reset()
 
     def watch(self, message: Message, now: float) -> None:
         """Has somebody else changed the mission? What MISSION_CURRENT says is doubt, not proof."""
-        self._mission.watch(message, now)
+        self._mission.check_current(message, now)
 
     def catch_up(self, now: float) -> None:
         """Complete what the vehicle has flown before anybody listened."""
         memory = self.resume.memory(now)
         if memory and self.tasks and (self.tasks, len(memory)) != self._recalled:
             self._recalled = self.tasks, len(memory)
-            self.progress.caught_up(self.resume.flown(self.open_tasks(), now))
+            self.progress.complete_offline(self.resume.flown(self.open_tasks(), now))
 
     def _settle(self, now: float) -> None:
         self._failures.step(now)
@@ -282,7 +282,7 @@ class OnboardMission:
         if self._begun:
             return
         self._begun = True
-        of_new = self._ambiguous.sort(found)
+        of_new = self._ambiguous.assign_epochs(found)
         self.item_time = (self.item_time + (now - self._began_at) / len(found.items)) / 2.0
         self.resume.stash()
         if found.kind is DiffKind.APPEND:
@@ -292,8 +292,8 @@ class OnboardMission:
             if not self._profile.atomic:
                 self.must_jump = found.start
         for seq, when in of_new:
-            self.progress.reached(seq, when, proven=True)
-        self._ambiguous.goes_on()
+            self.progress.note_reached(seq, when, proven=True)
+        self._ambiguous.continue_repetition()
 
     def _verify(self, items: tuple[Item, ...], revision: int, now: float) -> None:
         self._mission.verify(items, now)
@@ -313,7 +313,7 @@ class OnboardMission:
                 self._verify(found.items, tasks.revision, now)
                 return
             self._ambiguous.credit(found)
-        if not self._mission.was_read(
+        if not self._mission.note_readback(
                 held, known, self.tasks is not None, lambda: self._goes_on(held), now):
             return
         self.resume.stash()
@@ -325,10 +325,10 @@ class OnboardMission:
         """The list can go on with a mission, without a swap."""
         wanted = self.wanted()
         return bool(wanted) and diff_missions(
-            held, None, wanted, done=self.progress.completed).kind is not DiffKind.SWAP
+            held, None, wanted, done=self.progress.completed).kind is not DiffKind.REPLACE
 
     def _was_refused(self, event: Failed, found: MissionDiff, tasks: TaskList, now: float) -> None:
-        self._mission.break_off()
+        self._mission.interrupt()
         self.trouble = event.reason != SUPERSEDED
         if event.result is None and self._sent_since is not None and not self._begun:
             self._unsure = found, tasks

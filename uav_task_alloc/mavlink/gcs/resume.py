@@ -106,7 +106,7 @@ class Resume:
             return ()  # read again: what is behind may be of a transfer that broke off
         return tuple(item for n, item in enumerate(progress.items[:progress.current or 0])
                      if not item.task and item.position is None
-                     and (n < self._placed_at or n in progress.told_reached))
+                     and (n < self._placed_at or n in progress.reached_seqs))
 
     def _ended(self, held: tuple[Item, ...], current: int) -> bool:
         telemetry, last = self._telemetry, held[-1]

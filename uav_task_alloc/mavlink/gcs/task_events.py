@@ -14,7 +14,7 @@ def task_events(onboard: OnboardMission, watch: AuthorityWatch, now: float) -> l
     while progress.events:
         made = progress.events.popleft()
         event = 'COMPLETED' if made.completed else 'STARTED'
-        latest = onboard.tasks.revision if made.unheard and onboard.tasks else revision
+        latest = onboard.tasks.revision if made.while_offline and onboard.tasks else revision
         if made.completed:
             watch.mark_task(made.task, progress.completed.get(made.task), True, now)
         events.append(TaskProgress(made.task, event, latest))
@@ -27,8 +27,8 @@ def task_events(onboard: OnboardMission, watch: AuthorityWatch, now: float) -> l
 def passed_over(onboard: OnboardMission, watch: AuthorityWatch, now: float) -> list[OperatorNote]:
     """Notes of tasks passed over since the last call; what was left is marked in the record."""
     progress, notes = onboard.progress, []
-    while progress.left:
-        item = progress.left.popleft()
+    while progress.passed_over:
+        item = progress.passed_over.popleft()
         if item.task not in progress.completed:
             watch.mark_task(item.task, item.position, False, now)
     while progress.skipped:

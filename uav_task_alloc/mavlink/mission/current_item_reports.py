@@ -11,32 +11,32 @@ class CurrentItemReports:
     """What MISSION_CURRENT told last, in which frames, and what we have set."""
 
     def __init__(self) -> None:
-        self.told: int | None = None  # the current item, as the vehicle said last
+        self.reported: int | None = None  # the current item, as the vehicle said last
         self.last_frame: int | None = None  # that told the current item
-        self.prior_frame: int | None = None  # the one before that
+        self.previous_frame: int | None = None  # the one before that
         self._back: tuple[int, float] | None = None  # it flies an item before ours since [s]
         self._set: tuple[int, float] | None = None  # by us at a time [s], not seen yet
         self._asked: int | None = None  # we are setting this
 
     @property
-    def awaited(self) -> bool:
+    def awaits_set(self) -> bool:
         """We have set the current item, and not seen it yet."""
         return self._set is not None
 
     def begin(self, start: int | None, now: float) -> None:
         """Another mission is on board, which starts at an item; None: not known."""
         self._set = None if start is None else (start, now)
-        self._asked = self.told = None
+        self._asked = self.reported = None
 
     def clear(self) -> None:
         """Nothing is known of what is on board."""
-        self._set = self.last_frame = self.told = None
+        self._set = self.last_frame = self.reported = None
 
-    def asked(self, seq: int) -> None:
+    def begin_set(self, seq: int) -> None:
         """We are about to set the current item."""
         self._asked = seq
 
-    def has_set(self, seq: int, now: float) -> None:
+    def note_set(self, seq: int, now: float) -> None:
         """It is done."""
         self._set, self._asked = (seq, now), None
 
@@ -54,11 +54,11 @@ class CurrentItemReports:
             self._set = None
         return False
 
-    def came(self, seq: int, frame: int | None) -> None:
+    def note(self, seq: int, frame: int | None) -> None:
         """One was taken in."""
-        self.told, self.last_frame = seq, frame
+        self.reported, self.last_frame = seq, frame
 
-    def stays_back(self, seq: int, now: float, before: int | None) -> bool:
+    def was_set_back(self, seq: int, now: float, before: int | None) -> bool:
         """Somebody has set the current item back, some time ago.
 
         Args:

@@ -15,7 +15,7 @@ class DiffKind(Enum):
     KEEP = 'keep'
     JUMP = 'jump'  # set the current item
     APPEND = 'append'  # nothing changes but the end
-    SWAP = 'swap'
+    REPLACE = 'swap'
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,8 +51,8 @@ def diff_missions(held: tuple[Item, ...], current: int | None, wanted: tuple[Ite
         ahead = wanted[passed:]
         if append and len(ahead) > len(rest) and all_alike(ahead[:len(rest)], rest):
             return MissionDiff(DiffKind.APPEND, held[:current] + ahead, current)
-        return MissionDiff(DiffKind.SWAP, wanted, passed)
-    return MissionDiff(DiffKind.SWAP, wanted, 0)
+        return MissionDiff(DiffKind.REPLACE, wanted, passed)
+    return MissionDiff(DiffKind.REPLACE, wanted, 0)
 
 
 def _may_be_open(item: Item, done: Container[str]) -> bool:

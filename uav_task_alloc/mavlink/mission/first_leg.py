@@ -39,7 +39,7 @@ class FirstLeg:
     """Where the legs of the list begin that is flown, and what of the first one lies ahead."""
 
     def __init__(self, plane: bool = False, farthest: float = math.inf) -> None:
-        self.place: Callable[[], LegStart | None] = lambda: None  # None: not known
+        self.locate: Callable[[], LegStart | None] = lambda: None  # None: not known
         self.version = 0  # of the start of the first leg
         self._beside, self._farthest = _OFF_TRACK_PLANE if plane else _OFF_TRACK, farthest
         self._starts: dict[Point, Point] = {}  # of the legs, by their ends
@@ -51,7 +51,7 @@ class FirstLeg:
     def begin(self, tasks: TaskList) -> None:
         """This is flown from here on."""
         self._target, self._behind = first_point(tasks), 0
-        start, place = self._start(), self.place()
+        start, place = self._start(), self.locate()
         if self._target is not None and place is not None and (
                 start is None or self._is_off(place, start, self._target)):
             start = place.point
@@ -65,33 +65,33 @@ class FirstLeg:
                 start, self._target, start if place is None else place.home, self._farthest)
 
     @property
-    def left(self) -> bool:
+    def is_off(self) -> bool:
         """The vehicle is elsewhere, or it is known only now where it is: `begin` again."""
-        place, start = self.place(), self._start()
+        place, start = self.locate(), self._start()
         if self._target is None or place is None:
             return False
         return start is None or (not place.on_mission and self._is_off(place, start, self._target))
 
     @property
-    def unknown(self) -> bool:
+    def start_unknown(self) -> bool:
         """Nobody knows where it begins, and it may be a long one: to upload it is too early."""
         return (self._target is not None and self._start() is None
                 and math.hypot(*self._target) > MAX_LEG_LENGTH)
 
     @property
-    def behind(self) -> int:
+    def passed(self) -> int:
         """How many points of the first leg the vehicle has passed."""
-        place, start = self.place(), self._start()
+        place, start = self.locate(), self._start()
         if place is not None and start is not None and self._target is not None:
             rest = _metres_left(place.point, start, self._target)
             self._behind = sum(math.dist(point, self._target) > rest + _PASSED_MARGIN
                                for point in self._points)
         return self._behind
 
-    def ahead(self, target: Point | None) -> tuple[Point, ...]:
+    def points_ahead(self, target: Point | None) -> tuple[Point, ...]:
         """Points in between that are still to be flown on the way to `target`."""
         if target == self._target:
-            return self._points[self.behind:]
+            return self._points[self.passed:]
         start = None if target is None else self._starts.get(target)
         return () if start is None or target is None else points_between(start, target)
 

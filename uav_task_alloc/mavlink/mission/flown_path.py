@@ -29,7 +29,7 @@ class Visit(Enum):
 
     YES = 'yes'
     NO = 'no'
-    BLIND = 'it was not seen for a while'
+    UNOBSERVED = 'it was not seen for a while'
 
 
 class PositionSample(NamedTuple):
@@ -75,7 +75,7 @@ class FlownPath:
         """Its clock has begun anew."""
         self._samples.clear()
 
-    def judge(self, place: Point, radius: float, hold: float, since: float,
+    def visited(self, place: Point, radius: float, hold: float, since: float,
               until: float = math.inf, close: float = CLOSE) -> Visit:
         """Whether it was at a place.
 
@@ -91,7 +91,7 @@ class FlownPath:
             return Visit.YES
         samples = self._since(since, until)
         blind = len(samples) < 2 or any(b.t - a.t > GAP for a, b in pairwise(samples))
-        return Visit.BLIND if blind else Visit.NO
+        return Visit.UNOBSERVED if blind else Visit.NO
 
     def visited_at(self, place: Point, radius: float, since: float,
                    until: float = math.inf) -> float | None:
@@ -99,7 +99,7 @@ class FlownPath:
         first, last = self._stay(place, radius, since, until=until)
         return first if last >= first else None
 
-    def could_have(self, chain: Sequence[Point], then: Point | None, holds: float,
+    def could_have_flown(self, chain: Sequence[Point], then: Point | None, holds: float,
                    since: float) -> bool:
         """Whether it can have flown through `chain` while it was not seen, and is past it.
 

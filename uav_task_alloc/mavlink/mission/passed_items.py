@@ -30,8 +30,8 @@ class Claim:
     epoch: int
     frames: tuple[int, int] | None  # in which a REACHED would have come; None: not known
     frame: int | None  # that told the item after them
-    leaps: bool  # over more than one item: somebody has set the current one
-    sure: bool  # it was flying, so what was not seen may have been flown
+    skips: bool  # over more than one item: somebody has set the current one
+    in_flight: bool  # it was flying, so what was not seen may have been flown
 
 
 class _Judged(NamedTuple):
@@ -87,7 +87,7 @@ class PassedItems:
                 claim: Claim) -> tuple[Item, ...]:
         """Nothing more will come: what it can have flown unseen it has flown, else it was left."""
         blind = tuple(
-            i for i in rest if verdicts[i.task] is Visit.BLIND and i.position is not None)
+            i for i in rest if verdicts[i.task] is Visit.UNOBSERVED and i.position is not None)
         return blind if blind and self._flown_unseen(blind, claim) else ()
 
     def _flown_unseen(self, blind: tuple[Item, ...], claim: Claim) -> bool:
@@ -98,7 +98,7 @@ class PassedItems:
         for end in range(at[-1] + 1, len(claim.route) + 1):
             flown = claim.route[at[0]:end]
             then = claim.route[end].position if end < len(claim.route) else None
-            if self._positions.path.could_have(
+            if self._positions.path.could_have_flown(
                     [item.position for item in flown if item.position is not None], then,
                     math.fsum(item.params[0] for item in flown), claim.since):
                 return True
@@ -114,16 +114,16 @@ class PassedItems:
     def _verdict(self, item: Item, claim: Claim) -> Visit:
         if item.position is None:
             return Visit.NO
-        return self._positions.path.judge(
+        return self._positions.path.visited(
             item.position, item.radius, item.params[0], claim.since, self._until(claim),
-            0.0 if claim.leaps else CLOSE)
+            0.0 if claim.skips else CLOSE)
 
     def _until(self, claim: Claim) -> float:
         """[s] of the vehicle's clock at which it was past them, by the order of its frames."""
         if claim.frame is None:
             return claim.until
         # what it came by after somebody had set the current item is nothing
-        return self._positions.sent_before(claim.frame, claim.until, earliest=claim.leaps)
+        return self._positions.sent_before(claim.frame, claim.until, earliest=claim.skips)
 
 
 def flown_nearby(items: tuple[Item, ...], flown: Item) -> tuple[Item, ...]:

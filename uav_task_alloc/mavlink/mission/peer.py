@@ -22,7 +22,7 @@ class Peer:
     our_component: int = 190
     mission_type: int = 0
 
-    def says(self, message: Message) -> bool:
+    def is_from_vehicle(self, message: Message) -> bool:
         """Whether it comes from this vehicle, to us or to all, and concerns our mission type."""
         return (message.get_srcSystem() == self.system
                 and message.get_srcComponent() == self.component

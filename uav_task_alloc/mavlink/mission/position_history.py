@@ -59,13 +59,13 @@ class PositionHistory:
 
     def was_at(self, item: Item, since: float, until: float = math.inf) -> bool:
         """Whether the vehicle's own positions show that it has reached an item."""
-        return item.position is not None and self.path.judge(
+        return item.position is not None and self.path.visited(
             item.position, item.radius, item.params[0], since, until) is Visit.YES
 
     def not_seen_at(self, item: Item, since: float) -> bool:
         """It was not seen at an item, nor all the time elsewhere."""
-        return item.position is not None and self.path.judge(
-            item.position, item.radius, item.params[0], since) is Visit.BLIND
+        return item.position is not None and self.path.visited(
+            item.position, item.radius, item.params[0], since) is Visit.UNOBSERVED
 
     def near_one(self, item: Item, other: Item | None, when: float) -> bool:
         """It was near one item, and not near another, just before a message came at `when` [s].

@@ -28,7 +28,7 @@ class ProgressEvent:
 
     task: str
     completed: bool
-    unheard: bool = False  # it was flown while nobody listened
+    while_offline: bool = False  # it was flown while nobody listened
 
 
 class ProgressTable:
@@ -47,9 +47,9 @@ class ProgressTable:
         self._places: dict[str, Point] = {}  # of the tasks of the list
         self.events: deque[ProgressEvent] = deque()
         self.skipped: deque[str] = deque()  # tasks that somebody else has left out
-        self.told_reached: set[int] = set()  # by REACHED, in this epoch
-        self.left: deque[Item] = deque()  # passed, and not seen to be flown
-        self.chosen: int | None = None  # the current item, where somebody else has set it
+        self.reached_seqs: set[int] = set()  # by REACHED, in this epoch
+        self.passed_over: deque[Item] = deque()  # passed, and not seen to be flown
+        self.set_by_other: int | None = None  # the current item, where somebody else has set it
         self._started: str | None = None
         self._reached: int | None = None  # the last item of this epoch
         self._passed_over: int | None = None  # the item after those that were left out
@@ -109,9 +109,9 @@ class ProgressTable:
                 self.items, self._since, self._positions.vehicle_time(now), self.may_end(now),
                 now + REPEAT_WINDOW))
         self.items, self.current, self._reached = items, start, None
-        self.told_reached.clear()
+        self.reached_seqs.clear()
         self._currents.begin(start, now)
-        self.chosen = None
+        self.set_by_other = None
         self._since = self._since_begin = self.path.newest if since is None else since
 
     def extend(self, items: tuple[Item, ...]) -> None:
@@ -124,7 +124,7 @@ class ProgressTable:
         self.items, self.current, self._reached = (), None, None
         self._epochs.clear()
         self._currents.clear()
-        self._started = self.chosen = None
+        self._started = self.set_by_other = None
         self._passed.clear()
         self._positions.clear()
         self._since = -math.inf
@@ -133,33 +133,33 @@ class ProgressTable:
         """The same items, now known by their tasks."""
         self.items = items
 
-    def at(
+    def add_position(
         self, sample: PositionSample, newest: bool, now: float, frame: int | None = None
     ) -> None:
         """A position of the vehicle, the newest or one that comes late."""
         self._positions.add(sample, newest, now, frame)
 
-    def asked(self, seq: int) -> None:
+    def begin_set_current(self, seq: int) -> None:
         """We are about to set the current item, and may see it before we know that it is done."""
-        self._currents.asked(seq)
+        self._currents.begin_set(seq)
 
-    def jumped(self, seq: int, now: float) -> None:
+    def note_set_current(self, seq: int, now: float) -> None:
         """We have set the current item: what lies between was not flown."""
-        self._currents.has_set(seq, now)
-        self.current, self.chosen, self._since = seq, None, self.path.newest
+        self._currents.note_set(seq, now)
+        self.current, self.set_by_other, self._since = seq, None, self.path.newest
 
-    def started(self) -> None:
+    def note_mission_mode(self) -> None:
         """The vehicle flies its mission: the task of the current item has begun."""
         item = self.active
         if item and item.task and item.task != self._started and item.task not in self.completed:
             self._started = item.task
             self.events.append(ProgressEvent(item.task, completed=False))
 
-    def stopped(self) -> None:
+    def note_mission_left(self) -> None:
         """The vehicle does not fly this list any more: what goes on later starts anew."""
-        self._started = self.chosen = None
+        self._started = self.set_by_other = None
 
-    def reached(self, seq: int, now: float, proven: bool = False) -> None:
+    def note_reached(self, seq: int, now: float, proven: bool = False) -> None:
         """MISSION_ITEM_REACHED, once or many times; `proven`: it is of this epoch."""
         echo = self._epochs.note_reached(seq, now)
         if (proven or now >= self._epochs.before.until) and self.items:
@@ -169,9 +169,9 @@ class ProgressTable:
         elif not self._prove(seq, now, now, echo) and not echo:  # else it is told again
             self._epochs.unproven[seq] = now + MAX_MESSAGE_DELAY  # a position on its way may tell
 
-    def repeated(self, seq: int, now: float) -> None:
+    def note_repeated(self, seq: int, now: float) -> None:
         """The last REACHED has come again, also while nobody knew of which mission it was."""
-        self._epochs.repeated(seq, now)
+        self._epochs.note_repeated(seq, now)
 
     def _prove(self, seq: int, now: float, when: float, echo: bool = False) -> bool:
         """Credit REACHED, which came at `when` [s], to the epoch at whose item the vehicle was.
@@ -179,14 +179,14 @@ class ProgressTable:
         Returns:
             False: not known yet.
         """
-        epoch = CurrentEpoch(self.items, self._currents.told, self._since, self._since_begin)
-        if 0 <= seq < len(self.items) and self._epochs.is_of_now(seq, epoch, now):
+        epoch = CurrentEpoch(self.items, self._currents.reported, self._since, self._since_begin)
+        if 0 <= seq < len(self.items) and self._epochs.is_of_current(seq, epoch, now):
             self._accept(seq, now)
             return True
-        item = None if echo else self._epochs.item_before(seq, self.items, when)
+        item = None if echo else self._epochs.previous_item(seq, self.items, when)
         if item is None:
             return False
-        if self._epochs.ends_before(item):
+        if self._epochs.ends_previous(item):
             self._end_at = now
         self.credit(item)
         self._epochs.credited = seq
@@ -201,7 +201,7 @@ class ProgressTable:
         if seq == self.last_flown and self._reached != seq:
             self._end_at = now
         self._reached = self._epochs.credited = seq
-        self.told_reached.add(seq)
+        self.reached_seqs.add(seq)
         if self.current is None or seq >= self.current:
             if self.current is not None and self.current < seq:
                 self._claim(self.current, seq, now)
@@ -215,14 +215,14 @@ class ProgressTable:
         if seq == self.last_flown:
             self._end_at = now
 
-    def moved(self, seq: int, now: float, flying: bool, frame: int | None = None) -> None:
+    def note_current(self, seq: int, now: float, flying: bool, frame: int | None = None) -> None:
         """MISSION_CURRENT in a frame: where it is flying, items before it were passed."""
         currents = self._currents
-        currents.prior_frame = currents.last_frame
+        currents.previous_frame = currents.last_frame
         if not currents.is_old(seq, now):
             self._move(seq, now, flying, frame)
-        currents.came(seq, frame)
-        if currents.stays_back(seq, now, None if not flying or self.current is None else (
+        currents.note(seq, frame)
+        if currents.was_set_back(seq, now, None if not flying or self.current is None else (
                 min(self.current, len(self.items) - 1))):
             self._fly_from(seq)
 
@@ -240,12 +240,12 @@ class ProgressTable:
             self._passed_over = None
             self._claim(self.current, seq, now, frame)
             self._fly_from(seq)
-            self.chosen = seq if self._passed_over == seq else self.chosen
+            self.set_by_other = seq if self._passed_over == seq else self.set_by_other
 
-    def ended(self, seq: int, now: float, frame: int | None = None) -> None:
+    def note_mission_complete(self, seq: int, now: float, frame: int | None = None) -> None:
         """The vehicle says that the mission is flown to its item `seq`; more may be appended."""
         end = min(seq + 1, len(self.items))
-        if (self.current is not None and not self._currents.awaited and self._started is not None
+        if (self.current is not None and not self._currents.awaits_set and self._started is not None
                 and self.current < end):
             self._claim(self.current, end, now, frame)
             self._fly_from(end)
@@ -269,24 +269,24 @@ class ProgressTable:
 
     def _leave(self, items: tuple[Item, ...], claim: Claim) -> None:
         """They were passed over."""
-        self.left.extend(items)
-        if not claim.sure:
+        self.passed_over.extend(items)
+        if not claim.in_flight:
             return
         self.skipped.extend(item.task for item in items)
         if items and claim.epoch == self.epoch:
-            self.chosen = self.current
+            self.set_by_other = self.current
 
-    def caught_up(self, tasks: Iterable[Task]) -> None:
+    def complete_offline(self, tasks: Iterable[Task]) -> None:
         """These were flown while nobody listened."""
         for task in tasks:
-            self._complete(task.id, task.position, unheard=True)
+            self._complete(task.id, task.position, while_offline=True)
 
     def credit(self, item: Item) -> None:
         """It was reached, whichever mission it was of."""
         if item.completes:
             self._complete(item.task, item.position)
 
-    def asked_for(self, tasks: Iterable[Task]) -> None:
+    def set_listed_tasks(self, tasks: Iterable[Task]) -> None:
         """One that was flown at another place is another task, and still to be flown."""
         self._places = {task.id: task.position for task in tasks}
         for task in tasks:
@@ -315,7 +315,7 @@ class ProgressTable:
                sure: bool = True) -> None:
         items = tuple(item for item in self.items[begin:end]
                       if item.completes and item.task not in self.completed)
-        if sure and end - begin > 1 and self._currents.told == begin and (
+        if sure and end - begin > 1 and self._currents.reported == begin and (
                 self._positions.at_once(self._currents.last_frame, frame)):
             items = self._leave_out(items, flown_nearby(items, self.items[begin]), end)
         if items:
@@ -328,19 +328,19 @@ class ProgressTable:
     def _frames_of_reached(self, begin: int, end: int, now: float,
                            frame: int | None) -> tuple[int, int] | None:
         """In which a REACHED of the items passed would have come; None: not known."""
-        prior = self._currents.prior_frame
+        prior = self._currents.previous_frame
         if frame is None or prior is None:
             return None
         if self.items[end:] and self.items[end].command == RETURN:
             return None  # PX4 tells no REACHED of the item before RETURN
-        if self._epochs.came_lately(begin, end, now):
+        if self._epochs.reached_recently(begin, end, now):
             return None  # one has come, of this mission or repeated: the positions tell
         return prior, frame
 
     def _leave_out(self, items: tuple[Item, ...], may_be: tuple[Item, ...],
                    end: int) -> tuple[Item, ...]:
         left = tuple(i for i in items if i not in may_be)
-        self.left.extend(left)
+        self.passed_over.extend(left)
         self.skipped.extend(item.task for item in left)
         if left:
             self._passed_over = end
@@ -351,12 +351,12 @@ class ProgressTable:
         item = self.items[seq]
         at = None if item.position is None else self.path.visited_at(
             item.position, item.radius, self._positions.recent(self._since))
-        self.current, self.chosen = seq + 1, None
+        self.current, self.set_by_other = seq + 1, None
         self._since = self._positions.recent(self._since) if at is None else at
 
-    def _complete(self, task: str, place: Point | None, unheard: bool = False) -> None:
+    def _complete(self, task: str, place: Point | None, while_offline: bool = False) -> None:
         if place is not None and self._places.get(task, place) != place:
             return  # it is to be flown at another place now
         if task not in self.completed:
             self.completed[task] = place
-            self.events.append(ProgressEvent(task, completed=True, unheard=unheard))
+            self.events.append(ProgressEvent(task, completed=True, while_offline=while_offline))

@@ -32,7 +32,7 @@ class ReachedDuringUpload:
         """The vehicle was restarted."""
         self._heard.clear()
 
-    def sort(self, found: MissionDiff) -> list[tuple[int, float]]:
+    def assign_epochs(self, found: MissionDiff) -> list[tuple[int, float]]:
         """Credit those of the old mission; returns those of the new one."""
         of_new, old, progress = [], self._progress.items, self._progress
         for seq, when in self._heard:
@@ -40,7 +40,7 @@ class ReachedDuringUpload:
             after = found.items[seq] if 0 <= seq < len(found.items) else None
             if before is not None and (progress.was_at_by(before, when) or (
                     after is not None and alike(before, after))):
-                progress.reached(seq, when)
+                progress.note_reached(seq, when)
             elif after is not None and progress.was_at_by(after, when):
                 of_new.append((seq, when))
             elif before is not None and progress.near_one(before, after, when):
@@ -50,11 +50,11 @@ class ReachedDuringUpload:
         self._heard.clear()
         return of_new
 
-    def goes_on(self) -> None:
+    def continue_repetition(self) -> None:
         """Once those of the new mission are told: the last of all may be repeated still."""
-        self._progress.repeated(*self._newest)
+        self._progress.note_repeated(*self._newest)
 
     def credit(self, found: MissionDiff) -> None:
         """The transfer has failed, and nobody knows which mission was flown: ask where it was."""
-        for seq, _ in self.sort(found):
+        for seq, _ in self.assign_epochs(found):
             self._progress.credit(found.items[seq])

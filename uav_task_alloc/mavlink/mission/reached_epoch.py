@@ -31,7 +31,7 @@ class CurrentEpoch:
     """This epoch, where a REACHED comes."""
 
     items: tuple[Item, ...]
-    told: int | None  # the current item, as the vehicle said last
+    current: int | None  # the current item, as the vehicle said last
     since: float  # [s] of the vehicle's clock: the current item is flown
     begin: float  # the same: this epoch
 
@@ -71,12 +71,12 @@ class ReachedEpoch:
         self._last = seq, now
         return self.credited == seq
 
-    def repeated(self, seq: int, now: float) -> None:
+    def note_repeated(self, seq: int, now: float) -> None:
         """The last REACHED has come again, also while nobody knew of which mission it was."""
         if self._last is not None and self._last[0] == seq:
             self._last = seq, now
 
-    def came_lately(self, begin: int, end: int, now: float) -> bool:
+    def reached_recently(self, begin: int, end: int, now: float) -> bool:
         """One of the items from `begin` up to `end` was told, of this mission or repeated."""
         return self._last is not None and begin <= self._last[0] < end and (
             now - self._last[1] < MAX_MESSAGE_DELAY)
@@ -85,7 +85,7 @@ class ReachedEpoch:
         """The epoch before was at its last item, and has just gone."""
         return self.before.may_end and now < self.before.until - REPEAT_WINDOW + MAX_MESSAGE_DELAY
 
-    def is_of_now(self, seq: int, epoch: CurrentEpoch, now: float) -> bool:
+    def is_of_current(self, seq: int, epoch: CurrentEpoch, now: float) -> bool:
         """Whether a REACHED that may be of the epoch before is of this one."""
         item, before, positions = epoch.items[seq], self.before, self._positions
         if not self._repeats:  # told once, where the vehicle is
@@ -93,15 +93,15 @@ class ReachedEpoch:
                 positions.distance(item) <= LOOSE_RADIUS + item.radius)
             return near or positions.was_at(item, epoch.since)
         # a repetition goes on while the current item stays what it was
-        if epoch.told is not None and epoch.told > seq:
+        if epoch.current is not None and epoch.current > seq:
             return positions.can_have_reached(item, now) if not before.items else (
                 item.position is not None and positions.path.visited_at(
                     item.position, item.radius + LOOSE_RADIUS, epoch.begin) is not None)
-        return seq == len(epoch.items) - 1 and epoch.told == seq and (
+        return seq == len(epoch.items) - 1 and epoch.current == seq and (
             positions.was_at(item, epoch.since) or (
                 item.position is None and self._heard_first))
 
-    def item_before(self, seq: int, items: tuple[Item, ...], when: float) -> Item | None:
+    def previous_item(self, seq: int, items: tuple[Item, ...], when: float) -> Item | None:
         """The item of the epoch before that a REACHED names, where the vehicle was at it.
 
         Args:
@@ -126,7 +126,7 @@ class ReachedEpoch:
             return item
         return None
 
-    def ends_before(self, item: Item) -> bool:
+    def ends_previous(self, item: Item) -> bool:
         """An item is the last place of the epoch before, which had come to it."""
         return self.before.may_end and item.position == _last_place(self.before.items)
 

@@ -99,7 +99,7 @@ class Upload:
         self.state = UploadState.IDLE
         self.events: deque[Outcome] = deque()
         self.uploads = 0  # begun so far
-        self.overtaken: Callable[[], bool] = lambda: False  # nobody wants it any more as it is
+        self.is_superseded: Callable[[], bool] = lambda: False  # nobody wants it any more as it is
         self._out: list[Message] = []
         self._pending: Mission | None = None
         self._wants_read = False
@@ -122,7 +122,7 @@ class Upload:
         return self._mission is not None and self.busy and self._sent_last
 
     @property
-    def maybe_taken(self) -> bool:
+    def may_be_stored(self) -> bool:
         """The last item was sent, in this try or in one before: it may come late."""
         return self._mission is not None and self.busy and self._sent_once
 
@@ -165,7 +165,7 @@ class Upload:
 
     def receive(self, message: Message, now: float) -> list[Message]:
         """Take a message of the vehicle; those for others are ignored."""
-        if self._peer.says(message):
+        if self._peer.is_from_vehicle(message):
             kind = message.get_type()
             if kind in ('MISSION_REQUEST', 'MISSION_REQUEST_INT'):
                 self._request(message.seq, now)
@@ -243,7 +243,7 @@ class Upload:
         if again and self._tries >= _TRIES:
             self._fail(f'given up after {_TRIES} tries, at last: {event.value}')
             new = UploadState.IDLE
-        elif again and self._tries and self.overtaken():
+        elif again and self._tries and self.is_superseded():
             self._fail(SUPERSEDED)
             new = UploadState.IDLE
         elif again:

@@ -36,11 +36,11 @@ class VerifiedMission:
         self.is_foreign = False  # somebody else has changed what we had verified
         self._plan = self._heard_plan = 0  # PX4's id of the mission verified, last heard
 
-    def note_plan(self, message: Message) -> None:
+    def note_mission_id(self, message: Message) -> None:
         """MISSION_ACK and MISSION_COUNT tell PX4's id of the mission that they are about."""
         self._heard_plan = plan_id(message)
 
-    def is_meant(self, message: Message) -> bool:
+    def has_mission_id(self, message: Message) -> bool:
         """A MISSION_CURRENT is of this mission, by PX4's id."""
         return self._plan != 0 and plan_id(message) == self._plan
 
@@ -49,17 +49,17 @@ class VerifiedMission:
         self.items, self.verified_at, self._plan = items, now, self._heard_plan
         self.state, self.read_once, self.is_foreign = MissionState.VERIFIED, True, False
 
-    def break_off(self) -> None:
+    def interrupt(self) -> None:
         """A transfer has ended before its end: what is on board is to be read."""
         self.items = None
         self.state = MissionState.UNKNOWN if self._atomic else MissionState.MIXED
 
-    def forget(self) -> None:
+    def reset(self) -> None:
         """The vehicle was restarted."""
         self.items, self.state = None, MissionState.UNKNOWN
         self.is_foreign = self.read_once = False
 
-    def watch(self, message: Message, now: float) -> None:
+    def check_current(self, message: Message, now: float) -> None:
         """Has somebody else changed the mission? What MISSION_CURRENT says is doubt, not proof."""
         if self.items is None or now - self.verified_at < _SETTLE:
             return
@@ -70,7 +70,7 @@ class VerifiedMission:
         if changed or gone or now - self.verified_at > READBACK_PERIOD:
             self.items = None  # read what is on board before anything else
 
-    def was_read(self, items: tuple[Item, ...], known: tuple[Item, ...], listed: bool,
+    def note_readback(self, items: tuple[Item, ...], known: tuple[Item, ...], listed: bool,
                  goes_on: Callable[[], bool], now: float) -> bool:
         """A readback has come that no upload of ours explains.
 

@@ -55,7 +55,7 @@ class WantedMission:
         self.tasks = tasks
         self.horizon.reset()
         asked = [stop.task for stop in tasks.stops]
-        self._progress.asked_for(asked)
+        self._progress.set_listed_tasks(asked)
         ids, completed = {task.id for task in asked}, self._progress.completed.keys()
         self._away = (self._away | (completed - ids)) & completed
         self._listed.update(dict.fromkeys(ids - completed, tasks.revision))
@@ -63,7 +63,7 @@ class WantedMission:
             if self._refused.get(task.id, (task, ''))[0] != task:
                 del self._refused[task.id]
 
-    def told_before(self) -> list[TaskProgress]:
+    def ended_before(self) -> list[TaskProgress]:
         """How those tasks of the list ended that it should not have any more."""
         assert self.tasks is not None
         completed = self._progress.completed
@@ -78,7 +78,7 @@ class WantedMission:
         latest = self.tasks.revision
         return self._listed.get(task, latest) if task in self._away else latest
 
-    def fly_anew(self, task: str) -> bool:
+    def repeat(self, task: str) -> bool:
         """The list still asks for a task that was flown, and the allocator has heard of that.
 
         Returns whether it is another task of that id: then a list in between did not have it.
@@ -102,10 +102,10 @@ class WantedMission:
         """The items to fly from here; a task that cannot be one is refused."""
         asked = (self.tasks, len(self._progress.completed), self._progress.pending,
                  len(self._refused), self.horizon.stops)
-        if self._asked != asked or self.leg.left:
+        if self._asked != asked or self.leg.is_off:
             self.leg.begin(self.remaining())
             self._asked = asked
-        key = (asked, self.leg.version, self.leg.behind)
+        key = (asked, self.leg.version, self.leg.passed)
         if self._items is not None and self._items[0] == key:
             return self._items[1]
         remaining = self.remaining()
@@ -123,7 +123,7 @@ class WantedMission:
     def _items_of(self, tasks: TaskList) -> tuple[Item, ...]:
         """With points in between on long legs, where a mission has room for them."""
         rules = self._profile.rules
-        filled = mission_items(with_points_between(tasks, self.leg.ahead(first_point(tasks))),
+        filled = mission_items(with_points_between(tasks, self.leg.points_ahead(first_point(tasks))),
                                rules, self._origin)
         if len(filled) > self._room and len(tasks.stops) <= 1:
             return mission_items(tasks, rules, self._origin)
@@ -158,7 +158,7 @@ class WantedMission:
         for task in {item.task: None for item in self.items() if item.completes}:
             self.refuse(task, f'infeasible: {reason}', self.tasks)
 
-    def enough(self, held: tuple[Item, ...]) -> bool:
+    def has_enough(self, held: tuple[Item, ...]) -> bool:
         """While half a horizon of the latest list is still on board, nothing is uploaded."""
         assert self.tasks is not None
         everything = replace(
