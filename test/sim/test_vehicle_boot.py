@@ -39,24 +39,24 @@ def test_the_heartbeats_of_a_boot_say_so(kind, expected):
 def test_the_boot_takes_as_long_as_the_real_one(kind, seconds):
     bench = Bench(kind, ready=0.0)
     bench.pass_time(seconds - 0.1)
-    assert bench.flight.boot.active
+    assert bench.flight.boot.booting
     bench.pass_time(0.2)
-    assert not bench.flight.boot.active
+    assert not bench.flight.boot.booting
 
 
 @pytest.mark.parametrize('kind', KINDS)
 def test_without_an_arming_delay_there_is_no_boot_unless_it_is_given(kind):
     config = {'uav': 'u', 'system_id': 1, 'origin': ORIGIN, 'position': (0.0, 0.0, 0.0),
               'arming_delay': 0.0}
-    assert not Vehicle(VehicleConfig(**config), AUTOPILOTS[kind]).flight.boot.active
+    assert not Vehicle(VehicleConfig(**config), AUTOPILOTS[kind]).flight.boot.booting
     booting = Vehicle(VehicleConfig(**config, boot_delay=3.0), AUTOPILOTS[kind])
-    assert booting.flight.boot.active
+    assert booting.flight.boot.booting
     assert not booting.flight.positioned
 
 
 def test_it_does_not_arm_during_the_boot(bench):
     bench.vehicle.reboot(bench.now)
-    bench.flight.refuses = 'Gyros inconsistent'  # which nobody has checked yet
+    bench.flight.arming_fault = 'Gyros inconsistent'  # which nobody has checked yet
     refused = d.MAV_RESULT_FAILED if bench.own else d.MAV_RESULT_TEMPORARILY_REJECTED
     assert bench.arm() == refused
     assert bench.command(d.MAV_CMD_COMPONENT_ARM_DISARM, 1, 21196) == refused
@@ -134,15 +134,15 @@ def test_a_vehicle_that_is_revived_boots_on_the_ground():
     ('px4', d.MAV_RESULT_TEMPORARILY_REJECTED, [])])
 def test_a_forced_refusal_is_told_as_the_autopilot_does(kind, result, texts):
     bench = Bench(kind)
-    bench.flight.refuses = 'Gyros inconsistent'
+    bench.flight.arming_fault = 'Gyros inconsistent'
     assert bench.arm() == result
     assert bench.texts() == texts
-    bench.flight.refuses = ''
+    bench.flight.arming_fault = ''
     assert bench.arm() == d.MAV_RESULT_ACCEPTED
 
 
 def test_a_copter_that_cannot_arm_says_why_every_30_s(copter):
-    copter.flight.refuses = 'Gyros inconsistent'
+    copter.flight.arming_fault = 'Gyros inconsistent'
     copter.pass_time(65.0)
     assert copter.texts() == ['PreArm: Gyros inconsistent'] * 2
     assert of(copter.heard, 'STATUSTEXT')[0].severity == d.MAV_SEVERITY_CRITICAL
@@ -155,7 +155,7 @@ def test_the_arming_text_names_the_mode_that_is_not_armable(copter):
 
 
 def test_a_forced_arming_skips_the_checks(bench):
-    bench.flight.refuses = 'Gyros inconsistent'
+    bench.flight.arming_fault = 'Gyros inconsistent'
     assert bench.command(d.MAV_CMD_COMPONENT_ARM_DISARM, 1, 21196) == 0
     assert bench.flight.armed
 
@@ -166,9 +166,9 @@ def test_the_prearm_bit_is_healthy_only_when_it_would_arm(bench):
         return (m.onboard_control_sensors_present, m.onboard_control_sensors_enabled,
                 m.onboard_control_sensors_health)
     assert bits() == (PREARM, PREARM, PREARM)
-    bench.flight.refuses = 'Gyros inconsistent'
+    bench.flight.arming_fault = 'Gyros inconsistent'
     assert bits() == (PREARM, PREARM, 0)
-    bench.flight.refuses = ''
+    bench.flight.arming_fault = ''
     bench.vehicle.reboot(bench.now)
     bench.pass_time(10.0)
     assert bits() == (PREARM, PREARM, 0)
@@ -177,5 +177,5 @@ def test_the_prearm_bit_is_healthy_only_when_it_would_arm(bench):
 def test_the_prearm_bit_stays_healthy_while_armed(bench):
     bench.set_mode(FlightMode.GUIDED if bench.own else FlightMode.HOLD)
     bench.arm()
-    bench.flight.refuses = 'Gyros inconsistent'
+    bench.flight.arming_fault = 'Gyros inconsistent'
     assert bench.request('SYS_STATUS')[0].onboard_control_sensors_health == PREARM

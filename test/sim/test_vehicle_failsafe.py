@@ -156,7 +156,7 @@ def test_the_pilot_does_not_disarm_in_the_air_unless_forced(bench):
 
 def test_a_refusal_holds_for_the_pilot_too():
     bench = Bench('ardupilot')
-    bench.flight.refuses = 'Gyros inconsistent'
+    bench.flight.arming_fault = 'Gyros inconsistent'
     assert not bench.vehicle.rc_arm(True)
     assert bench.vehicle.rc_arm(True, force=True)
 

@@ -92,7 +92,7 @@ def commands(bench):
     (d.MAV_CMD_NAV_TAKEOFF, (0, 0, 0, 0, 0, 0, 20), 'takeoff'),
     (d.MAV_CMD_MISSION_START, (), 'mission start')])
 def test_a_command_is_noted_with_its_sender_even_when_refused(bench, number, params, expected):
-    bench.flight.refuses = 'Gyros inconsistent'
+    bench.flight.arming_fault = 'Gyros inconsistent'
     bench.command(number, *params, **OURS)
     assert commands(bench) == [(expected, None, None)]
 

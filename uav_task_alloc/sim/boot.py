@@ -33,7 +33,7 @@ class Boot:
         return self.elapsed < self.times.boot / 2.0
 
     @property
-    def active(self) -> bool:
+    def booting(self) -> bool:
         """Whether it still boots."""
         return self.elapsed < self.times.boot
 

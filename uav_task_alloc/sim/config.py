@@ -55,7 +55,7 @@ class StorageChange(Enum):
 
     TRUNCATED = 'truncated'
     WRITTEN = 'written'
-    SWAPPED = 'swapped'
+    REPLACED = 'swapped'
     CLEARED = 'cleared'
 
 

@@ -134,7 +134,7 @@ class Track:
         sine = 1.0 if cosine <= 0.0 else math.sqrt(max(0.0, 1.0 - cosine**2))
         return math.sqrt(2.0 * acceleration * _CORNER) / max(sine, 1e-3)
 
-    def done(self, position: Point, now: float) -> bool:
+    def finished(self, position: Point, now: float) -> bool:
         """Note what is passed by now [s]; True once the last point was held long enough."""
         while (self._next < len(self.points)
                and metres_between(position, self.points[self._next]) <= self.radius):

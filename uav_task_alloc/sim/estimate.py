@@ -54,7 +54,7 @@ class Estimate:
         return glitch[0] + x, glitch[1] + y, glitch[2] + z
 
     @property
-    def flags(self) -> int:
+    def status_flags(self) -> int:
         """EKF_STATUS_FLAGS and ESTIMATOR_STATUS_FLAGS, as far as they are the same."""
         if self._flight.positioned and 'ekf' not in self._flight.failsafes:
             return int(_FIX)

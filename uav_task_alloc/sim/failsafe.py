@@ -20,9 +20,9 @@ class FailsafeTexts(NamedTuple):
     """The STATUSTEXTs of one autopilot: (severity, text)."""
 
     begin: dict[str, tuple[tuple[int, str], ...]]  # by kind of failsafe
-    over: dict[str, tuple[int, str]]
+    cleared: dict[str, tuple[int, str]]
     kill: tuple[int, str]
-    kill_over: tuple[int, str]
+    kill_cleared: tuple[int, str]
 
 
 _ARDUPILOT = FailsafeTexts(
@@ -35,14 +35,14 @@ _ARDUPILOT = FailsafeTexts(
                 (CRITICAL, 'EKF Failsafe: changed to {mode} Mode')),
         'fence': ((CRITICAL, 'Fence Breached'),),
     },
-    over={
+    cleared={
         'radio': (WARNING, 'Radio Failsafe Cleared'),
         'gcs': (WARNING, 'GCS Failsafe Cleared'),
         'battery': (WARNING, 'Battery Failsafe Cleared'),
         'ekf': (CRITICAL, 'EKF Failsafe Cleared'),
         'fence': (WARNING, 'Fence Failsafe Cleared'),
     },
-    kill=(INFO, 'RC7: MotorEStop HIGH'), kill_over=(INFO, 'RC7: MotorEStop LOW'))
+    kill=(INFO, 'RC7: MotorEStop HIGH'), kill_cleared=(INFO, 'RC7: MotorEStop LOW'))
 _ACTIVATED = (CRITICAL, 'Failsafe activated')  # PX4 tells the reason in an EVENT only
 _PX4 = FailsafeTexts(
     begin={
@@ -52,8 +52,8 @@ _PX4 = FailsafeTexts(
         'ekf': (_ACTIVATED,),
         'fence': (_ACTIVATED,),
     },
-    over=dict.fromkeys(FAILSAFE_KINDS, (INFO, 'Failsafe mode deactivated')),
-    kill=(CRITICAL, 'Kill engaged'), kill_over=(INFO, 'Kill disengaged'))
+    cleared=dict.fromkeys(FAILSAFE_KINDS, (INFO, 'Failsafe mode deactivated')),
+    kill=(CRITICAL, 'Kill engaged'), kill_cleared=(INFO, 'Kill disengaged'))
 
 
 class Interventions:
@@ -104,7 +104,7 @@ class Interventions:
         flight = self.flight
         for kind in [kind for kind in flight.failsafes if kind in FAILSAFE_KINDS]:
             del flight.failsafes[kind]
-            flight.texts.append(self._texts.over[kind])
+            flight.texts.append(self._texts.cleared[kind])
             flight.note('failsafe_over', cause=kind)
 
     def kill_switch(self) -> None:
@@ -119,7 +119,7 @@ class Interventions:
     def kill_switch_off(self) -> None:
         """The pilot lets the motors run again; nothing arms by itself."""
         self.flight.terminated = False
-        self.flight.texts.append(self._texts.kill_over)
+        self.flight.texts.append(self._texts.kill_cleared)
         self.flight.note('kill_switch_off', cause='pilot')
 
     def avoid(self, active: bool) -> None:

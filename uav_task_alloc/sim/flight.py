@@ -42,7 +42,7 @@ class VehicleFlight(Navigation):
         self.reached: list[int] = []
         self.texts: list[tuple[int, str]] = []
         self.events: list[TruthEvent] = []
-        self.refuses = ''  # why it refuses to arm; '': no reason of this kind
+        self.arming_fault = ''  # why it refuses to arm; '': no reason of this kind
         self.terminated = False  # the kill switch is on
         self.stick: Point | None = None  # [m/s] ENU that the pilot asks for
         self.now = 0.0  # [s]
@@ -60,7 +60,7 @@ class VehicleFlight(Navigation):
         self.failsafes: dict[str, None] = {}  # the kinds that are active, oldest first
         self.seq = 0
         self.speed = self.config.cruise_speed  # [m/s]
-        self.track, self.then = None, None
+        self.track, self.next_point = None, None
         self.target = self.body.position
         self._idle_since = now
         self._fall_speed = 0.0  # [m/s]
@@ -81,7 +81,7 @@ class VehicleFlight(Navigation):
     @property
     def system_status(self) -> int:
         """MAV_STATE."""
-        if self.boot.active:
+        if self.boot.booting:
             return self.boot_states[0 if self.boot.initialising else 1]
         if self.terminated:
             return int(dialect.MAV_STATE_FLIGHT_TERMINATION)
@@ -113,7 +113,7 @@ class VehicleFlight(Navigation):
 
     def _never_arms(self) -> str:
         """Why it does not arm even when forced."""
-        if self.boot.active:
+        if self.boot.booting:
             return 'System not initialised'
         if self.terminated:
             return 'Motors Emergency Stopped'
@@ -121,7 +121,7 @@ class VehicleFlight(Navigation):
 
     def prearm_refusal(self) -> str:
         """Why it does not arm in any mode; empty where it does."""
-        reason = self._never_arms() or self.refuses
+        reason = self._never_arms() or self.arming_fault
         if reason:
             return reason
         if not self.positioned:
@@ -169,7 +169,7 @@ class VehicleFlight(Navigation):
         if number != self.custom_mode:
             self.leave(self.mode)
             self._set_number(number)
-            self.track, self.then = None, None
+            self.track, self.next_point = None, None
             self.speed = self.config.cruise_speed
             self.enter(mode)
         return True
@@ -191,7 +191,7 @@ class VehicleFlight(Navigation):
         """Fly this item next; False where there is none."""
         raise NotImplementedError
 
-    def changed(self, change: StorageChange, flagged: int | None) -> None:
+    def storage_changed(self, change: StorageChange, flagged: int | None) -> None:
         """The storage has changed; `flagged`: the seq that the station marked as current."""
         raise NotImplementedError
 
@@ -203,7 +203,7 @@ class VehicleFlight(Navigation):
         if mode in (FlightMode.RETURN, FlightMode.LAND) and self.landed:
             self.disarm()
         elif mode is FlightMode.RETURN:
-            self.track = self.way_home()
+            self.track = self.path_home()
         elif mode is FlightMode.LAND:
             self.track = self.descent(self.body.position)
 
@@ -230,7 +230,7 @@ class VehicleFlight(Navigation):
             self._touch_down()
             self.note('crashed', cause=self._fall_cause)
 
-    def lie_down(self) -> None:
+    def settle_on_ground(self) -> None:
         """On the ground below, whatever it did."""
         if not self.landed:
             self._touch_down()
@@ -269,9 +269,9 @@ class VehicleFlight(Navigation):
         if track is not None:
             target = track.target
             exit_speed = min(self.speed, track.exit_speed(
-                self.body.position, self.then, self.config.acceleration))
+                self.body.position, self.next_point, self.config.acceleration))
         self.body.step(dt, target, self.speed, exit_speed)
-        if track is not None and track.done(self.body.position, self.now):
+        if track is not None and track.finished(self.body.position, self.now):
             self._end_of(track)
 
     def _stay(self) -> None:
@@ -299,7 +299,7 @@ class VehicleFlight(Navigation):
         """The item at `seq` has been flown."""
         raise NotImplementedError
 
-    def tell_reached(self, seq: int, point: Point) -> None:
+    def report_reached(self, seq: int, point: Point) -> None:
         """MISSION_ITEM_REACHED, and the ground truth of it."""
         self.reached.append(seq)
         self.events.append(TruthEvent(self.now, 'item_reached', point, seq))

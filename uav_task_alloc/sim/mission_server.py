@@ -36,7 +36,7 @@ class MissionServer:
             'MISSION_ACK': self._ack,
         }
 
-    def serve(self, flight: VehicleFlight) -> None:
+    def attach(self, flight: VehicleFlight) -> None:
         """Tell this flight, which flies from `items`, about every change."""
         self.flight = flight
 
@@ -45,7 +45,7 @@ class MissionServer:
         raise NotImplementedError
 
     def _changed(self, change: StorageChange, flagged: int | None = None) -> None:
-        self.flight.changed(change, flagged)
+        self.flight.storage_changed(change, flagged)
 
     def handle(self, message: Message, now: float) -> bool:
         """Take a message of the mission protocol; False where it is none or for another."""

@@ -19,23 +19,23 @@ class Navigation:
     """The body, its home and the stored items; subclasses override how an item is flown."""
 
     return_height: float  # [m] above home
-    real_radius: float  # [m] WPNAV_RADIUS or NAV_ACC_RAD, unless configured
+    default_radius: float  # [m] WPNAV_RADIUS or NAV_ACC_RAD, unless configured
 
     def __init__(self, config: VehicleConfig, items: Sequence[StoredItem]) -> None:
         self.config = config
         self.items = items
         given = config.acceptance_radius
-        self.acceptance_radius = self.real_radius if given is None else given  # [m]
+        self.acceptance_radius = self.default_radius if given is None else given  # [m]
         self.body = PointMass(config)
         self.home: Point = config.position if config.home is None else config.home
         self.home_amsl = to_geodetic(config.origin, self.home)[2]  # [m]
         self.seq = 0  # current item, as MISSION_CURRENT says
         self.track: Track | None = None
         self.target: Point = self.body.position  # [m] of the item being flown
-        self.then: Point | None = None  # where the next item is
+        self.next_point: Point | None = None  # where the next item is
         self.speed = config.cruise_speed  # [m/s]
 
-    def begin(self, seq: int) -> None:
+    def begin_item(self, seq: int) -> None:
         """Copy an item out of the storage and fly it, whatever happens to the storage."""
         self.seq = seq
         item = self.items[seq]
@@ -43,9 +43,9 @@ class Navigation:
         self.target = self.track.points[-1] if self.track.points else self.body.position
         after = (i for i in self.items[seq + 1:] if i.command in item_.POSITIONAL)
         following = next(after, None)
-        self.then = None if following is None else self.point(following)
+        self.next_point = None if following is None else self.point(following)
 
-    def do(self, item: StoredItem) -> None:
+    def execute(self, item: StoredItem) -> None:
         """Carry out an item that is not flown."""
         if item.command == item_.CHANGE_SPEED and item.p2 > 0.0:
             self.speed = item.p2
@@ -53,7 +53,7 @@ class Navigation:
     def make_track(self, item: StoredItem) -> Track:
         """How an item is flown from here."""
         if item.command == item_.RETURN:
-            return self.way_home()
+            return self.path_home()
         if item.command == item_.DELAY:
             return Track((), self.acceptance_radius, item.p1)
         target = self.point(item)
@@ -88,7 +88,7 @@ class Navigation:
         return StoredItem(0, item_.WAYPOINT, 0.0, 0.0, 0.0, 0.0, round(latitude * 1e7),
                           round(longitude * 1e7), round(altitude, 2))
 
-    def way_home(self) -> Track:
+    def path_home(self) -> Track:
         """Up, over home, down."""
         x, y, z = self.body.position
         top = max(z, self.home[2] + self.return_height)

@@ -100,15 +100,15 @@ class TelemetryMessages:
             self._course() * 100, 10)
 
     def ekf_status_report(self) -> Message:
-        flags = self._estimate.flags
+        flags = self._estimate.status_flags
         flags |= dialect.EKF_GPS_GLITCHING if self._estimate.glitching else 0
         flags |= 0 if self._flight.positioned else dialect.EKF_CONST_POS_MODE
-        if self._flight.boot.active:
+        if self._flight.boot.booting:
             flags = dialect.EKF_UNINITIALIZED
         return dialect.MAVLink_ekf_status_report_message(flags, *[self._variance()] * 4, 0.0)
 
     def estimator_status(self) -> Message:
-        flags = self._estimate.flags
+        flags = self._estimate.status_flags
         flags |= dialect.ESTIMATOR_GPS_GLITCH if self._estimate.glitching else 0
         ratio = self._variance()
         return dialect.MAVLink_estimator_status_message(

@@ -35,12 +35,12 @@ class Autopilot:
     commands: type[Commands]
     capacity: int  # items
     rates: dict[int, float]  # [Hz] by message id, unasked
-    asks_current: bool  # MISSION_CURRENT is a stream; else it comes at 1 Hz by itself
+    streams_current: bool  # MISSION_CURRENT is a stream; else it comes at 1 Hz by itself
 
 
 _ARDUPILOT = Autopilot(
     'ardupilot', dialect.MAV_AUTOPILOT_ARDUPILOTMEGA, ArduPilotFlight, ArduPilotMissionServer,
-    ArduPilotCommands, 650, {dialect.MAVLINK_MSG_ID_HEARTBEAT: 1.0}, asks_current=True)
+    ArduPilotCommands, 650, {dialect.MAVLINK_MSG_ID_HEARTBEAT: 1.0}, streams_current=True)
 _PX4 = Autopilot(
     'px4', dialect.MAV_AUTOPILOT_PX4, Px4Flight, Px4MissionServer, Px4Commands, 500, {
         dialect.MAVLINK_MSG_ID_HEARTBEAT: 1.0,
@@ -54,7 +54,7 @@ _PX4 = Autopilot(
         dialect.MAVLINK_MSG_ID_ESTIMATOR_STATUS: 1.0,
         dialect.MAVLINK_MSG_ID_BATTERY_STATUS: 0.5,
         dialect.MAVLINK_MSG_ID_HOME_POSITION: 0.5,
-    }, asks_current=False)
+    }, streams_current=False)
 AUTOPILOTS = {row.name: row for row in (_ARDUPILOT, _PX4)}
 
 
@@ -67,7 +67,7 @@ class Vehicle(Interventions):
         capacity = autopilot.capacity if config.capacity is None else config.capacity
         self.mission = autopilot.mission(config.system_id, capacity)
         self.flight = autopilot.flight(config, self.mission.items)
-        self.mission.serve(self.flight)
+        self.mission.attach(self.flight)
         self.estimate = Estimate(self.flight)
         self._telemetry = TelemetryMessages(self.flight, self.estimate, autopilot.number,
                                     config.system_id)
@@ -75,7 +75,7 @@ class Vehicle(Interventions):
         rates = autopilot.rates
         if not config.floods:
             rates = {number: min(rate, 2.0) for number, rate in rates.items()}
-        if autopilot.asks_current:
+        if autopilot.streams_current:
             makers = {**makers, _CURRENT: lambda: [self._mission_current()]}
         self._streams = Streams(makers, rates)
         self._commands = autopilot.commands(self.flight, self._streams)
@@ -107,7 +107,7 @@ class Vehicle(Interventions):
     def revive(self, now: float) -> None:
         """Boot again on the ground below where it died."""
         self.alive = True
-        self.flight.lie_down()
+        self.flight.settle_on_ground()
         self.reboot(now)
 
     @property
@@ -142,7 +142,7 @@ class Vehicle(Interventions):
         self.flight.step(now)
         self.mission.step(now)
         out = self._drain()
-        if not self.autopilot.asks_current and now >= self._tell_current_at:
+        if not self.autopilot.streams_current and now >= self._tell_current_at:
             self._tell_current_at = now + 1.0
             out.append(self._mission_current())
         return out + self._streams.step(now)
@@ -155,7 +155,7 @@ class Vehicle(Interventions):
         told = (flight.seq, len(self.mission.items))
         if told != self._told:
             self._told = told
-            if not self.autopilot.asks_current:
+            if not self.autopilot.streams_current:
                 out.append(self._mission_current())
         out += self.mission.out
         flight.texts.clear()

@@ -125,14 +125,14 @@ def test_takeoff_set_to_false_drops_a_pending_arming_and_take_off(kind, armed):
         bench = armed_by_us(on_ground(kind, H))
     else:
         bench = on_ground(kind, H)
-        bench.vehicles[1].flight.refuses = 'Gyros inconsistent'
+        bench.vehicles[1].flight.arming_fault = 'Gyros inconsistent'
         bench.assign(task_list('AB', 2))
         bench.run(limit=8.0)
         assert bench.executor().sender.busy
     bench.wants(takeoff=False)
     bench.run(limit=0.2)
     assert bench.authority() is N
-    bench.vehicles[1].flight.refuses = ''
+    bench.vehicles[1].flight.arming_fault = ''
     assert keeps_quiet(bench)
     assert not bench.vehicles[1].flight.armed
 

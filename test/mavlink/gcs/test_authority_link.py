@@ -177,13 +177,13 @@ def test_a_reboot_of_one_never_armed_leaves_it_ours(kind, silence):
 @pytest.mark.parametrize('silence', [0.0, 6.0])
 def test_a_reboot_while_it_refuses_to_arm_leaves_it_ours(kind, silence):
     bench = AuthorityBench(kind, configs={1: {'boot_delay': 8.0}}).discover()
-    bench.vehicles[1].flight.refuses = 'Gyros inconsistent'
+    bench.vehicles[1].flight.arming_fault = 'Gyros inconsistent'
     bench.assign(task_list('AB'))
     assert bench.run(lambda: bench.vehicles[1].flight.custom_mode == 4, 20.0)
     bench.run(limit=8.0)
     bench.line.cut = silence > 0.0
     bench.vehicles[1].reboot(bench.now)
-    bench.vehicles[1].flight.refuses = ''
+    bench.vehicles[1].flight.arming_fault = ''
     bench.run(limit=silence)
     heard_again(bench, 8.0)
     assert bench.authority() is H

@@ -157,7 +157,7 @@ def test_finding_03_a_pause_of_the_pilot_is_not_forgotten(kind, mode, after):
 @pytest.mark.parametrize('change', ['takeoff', 'list'])
 def test_finding_14_arming_ends_when_it_is_not_wanted_any_more(kind, change):
     bench = FindingsBench(kind).discover()
-    bench.vehicles[1].flight.refuses = 'Gyros inconsistent'
+    bench.vehicles[1].flight.arming_fault = 'Gyros inconsistent'
     bench.assign(task_list('AB'))
     assert bench.run(lambda: len(arms(bench)) == 5, 30.0)
     if change == 'takeoff':
@@ -166,7 +166,7 @@ def test_finding_14_arming_ends_when_it_is_not_wanted_any_more(kind, change):
         bench.assign(task_list('', 2))
     bench.run(limit=60.0)
     assert len(arms(bench)) == 5
-    bench.vehicles[1].flight.refuses = ''
+    bench.vehicles[1].flight.arming_fault = ''
     bench.run(limit=10.0)
     assert not happened(bench, 'armed')
 

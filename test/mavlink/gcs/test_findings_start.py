@@ -117,7 +117,7 @@ def test_finding_26_nothing_is_uploaded_before_the_boot_has_ended(kind, names):
     bench = powered_on(kind)
     bench.assign(task_list(names))
     assert bench.run(lambda: bench.line.sent('MISSION_COUNT'), 60.0)
-    assert not bench.vehicles[1].flight.boot.active
+    assert not bench.vehicles[1].flight.boot.booting
     assert bench.run(lambda: len(bench.completed()) == len(names))
 
 
@@ -170,7 +170,7 @@ def test_finding_27_before_there_is_a_position_the_vehicle_is_not_available(kind
         if not flight.positioned:
             assert not state.available
             assert all(map(math.isnan, state.position))
-        if not flight.boot.active and not flight.positioned:
+        if not flight.boot.booting and not flight.positioned:
             booted.append(state.reason)
         return state.available
     assert bench.run(looked, 90.0)
@@ -230,26 +230,26 @@ def test_a_position_that_jumps_in_flight_costs_no_task(kind, seconds, before):
 def test_finding_28_a_refused_arming_says_why_once_and_how_long_it_was_tried(kind):
     bench = FindingsBench(kind).discover()
     flight = bench.vehicles[1].flight
-    flight.refuses = 'Gyros inconsistent'
+    flight.arming_fault = 'Gyros inconsistent'
     bench.assign(task_list('AB'))
     bench.run(limit=25.0)
     why = 'Gyros inconsistent' if kind == 'ardupilot' else 'preflight checks fail'
     assert len(bench.noted('arm: refused for', why)) == 1
     assert re.search(rf'arm: refused for 2[45] s: {why}', line_of(bench))
     if kind == 'ardupilot':
-        flight.refuses = 'Compass not calibrated'
+        flight.arming_fault = 'Compass not calibrated'
         bench.run(limit=25.0)
         assert len(bench.noted('arm: refused for', 'Gyros inconsistent')) == 1
         assert len(bench.noted('arm: refused for', 'Compass not calibrated')) == 1
     bench.run(limit=150.0)  # more tries than one command has
     assert len(bench.noted('arm: refused')) == 1 + (kind == 'ardupilot')
-    flight.refuses = ''
+    flight.arming_fault = ''
     assert bench.run(lambda: bench.completed() == ['A', 'B'])
 
 
 def test_finding_28_the_sensors_that_px4_calls_unhealthy_are_named():
     bench = FindingsBench('px4').discover()
-    bench.vehicles[1].flight.refuses = 'horizontal velocity unstable'
+    bench.vehicles[1].flight.arming_fault = 'horizontal velocity unstable'
     gyro, prearm = d.MAV_SYS_STATUS_SENSOR_3D_GYRO, d.MAV_SYS_STATUS_PREARM_CHECK
 
     def gyro_fails(way, message, now):

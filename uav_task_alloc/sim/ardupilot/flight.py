@@ -45,7 +45,7 @@ class ArduPilotFlight(VehicleFlight):
     boot_times = BootTimes(boot=8.0, position=41.0, settling=0.0)
     start_mode = FlightMode.MANUAL
     return_height = 15.0
-    real_radius = 2.0
+    default_radius = 2.0
     takeoff_height = 10.0
 
     def reboot(self, now: float) -> None:
@@ -133,7 +133,7 @@ class ArduPilotFlight(VehicleFlight):
         return next((i for i in range(seq, len(self.items))
                      if self.items[i].command != item_.CHANGE_SPEED), None)
 
-    def changed(self, change: StorageChange, flagged: int | None) -> None:
+    def storage_changed(self, change: StorageChange, flagged: int | None) -> None:
         if change is StorageChange.CLEARED:
             self.seq, self._upcoming, self.run = 0, 1, MissionRunState.NOT_STARTED
         if (
@@ -145,7 +145,7 @@ class ArduPilotFlight(VehicleFlight):
 
     def _restart(self) -> None:
         if self.seq < len(self.items):
-            self.begin(self.seq)
+            self.begin_item(self.seq)
             self.texts.append((CRITICAL, 'Auto mission changed, restarted command'))
         else:  # it flies on to where the old item was
             self.texts.append((CRITICAL, 'Auto mission changed but failed to restart command'))
@@ -155,22 +155,22 @@ class ArduPilotFlight(VehicleFlight):
             return
         flown = self._flown_from(self._upcoming)
         for seq in range(self._upcoming, len(self.items) if flown is None else flown):
-            self.do(self.items[seq])
-            self.tell_reached(seq, self.body.position)
+            self.execute(self.items[seq])
+            self.report_reached(seq, self.body.position)
         if flown is None:
             self.run = MissionRunState.COMPLETE
             self.note('mission_end')
             return
         self._upcoming = flown + 1
-        self.begin(flown)
+        self.begin_item(flown)
 
-    def begin(self, seq: int) -> None:
+    def begin_item(self, seq: int) -> None:
         self._landing = self.items[seq].command == item_.LAND
-        super().begin(seq)
+        super().begin_item(seq)
 
     def item_done(self) -> None:
         if not self._landing:  # it disarms before it could tell
-            self.tell_reached(self.seq, self.target)
+            self.report_reached(self.seq, self.target)
         self._upcoming = self.seq + 1
         self.next_item()
 

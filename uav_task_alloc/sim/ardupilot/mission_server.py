@@ -39,19 +39,19 @@ class ArduPilotMissionServer(MissionServer):
 
     def reboot(self) -> None:
         self._peer = None
-        if self.flight.boot.active:
+        if self.flight.boot.booting:
             self._unloaded = [*(self._unloaded or ()), *self.items]
             self.items.clear()
         self.load()
 
     def load(self) -> None:
-        if self._unloaded is not None and not self.flight.boot.active:
+        if self._unloaded is not None and not self.flight.boot.booting:
             self.items[:], self._unloaded = self._unloaded, None
 
     @property
     def _space(self) -> int:
         """Items that can be stored now."""
-        return 0 if self.flight.boot.active else self._capacity
+        return 0 if self.flight.boot.booting else self._capacity
 
     def read(self, seq: int) -> StoredItem:
         return self.flight.home_item() if seq == 0 else self.items[seq]

@@ -46,7 +46,7 @@ class Px4Flight(VehicleFlight):
     boot_times = BootTimes(boot=4.0, position=20.0, settling=5.0)
     start_mode = FlightMode.HOLD
     return_height = 60.0
-    real_radius = 10.0
+    default_radius = 10.0
     takeoff_height = 2.5
 
     def reboot(self, now: float) -> None:
@@ -115,8 +115,8 @@ class Px4Flight(VehicleFlight):
             self.track = None
         return True
 
-    def changed(self, change: StorageChange, flagged: int | None) -> None:
-        if change not in (StorageChange.SWAPPED, StorageChange.CLEARED):
+    def storage_changed(self, change: StorageChange, flagged: int | None) -> None:
+        if change not in (StorageChange.REPLACED, StorageChange.CLEARED):
             return
         last = max(0, len(self.items) - 1)
         self.seq = min(self.seq, last) if flagged is None else flagged
@@ -133,18 +133,18 @@ class Px4Flight(VehicleFlight):
     def next_item(self) -> None:
         item = self.items[self.seq]
         if item.command in (item_.CHANGE_SPEED,):
-            self.do(item)
+            self.execute(item)
             self._advance(self.body.position)
         elif item.command == item_.RETURN:
             self.set_mode(FlightMode.RETURN)  # which is never told as reached
         else:
-            self.begin(self.seq)
+            self.begin_item(self.seq)
 
     def item_done(self) -> None:
         self._advance(self.target)
 
     def _advance(self, point: Point) -> None:
-        self.tell_reached(self.seq, point)
+        self.report_reached(self.seq, point)
         if self.seq + 1 < len(self.items):
             self.seq += 1
             return
@@ -157,8 +157,8 @@ class Px4Flight(VehicleFlight):
             self.result.finished = True
         super()._end_of(track)
 
-    def tell_reached(self, seq: int, point: Point) -> None:
-        super().tell_reached(seq, point)
+    def report_reached(self, seq: int, point: Point) -> None:
+        super().report_reached(seq, point)
         self.result.reached = True
         self._last_reached, self._repeats = seq, 0
         self._repeat_at = self.now + _REPEAT_PERIOD

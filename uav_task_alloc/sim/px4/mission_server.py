@@ -142,7 +142,7 @@ class Px4MissionServer(MissionServer):
         self._seq += 1
         if self._seq == self._expected:
             self._state = _State.IDLE
-            self._store(StorageChange.SWAPPED)
+            self._store(StorageChange.REPLACED)
             self._accept()
         else:
             self._ask(now)
