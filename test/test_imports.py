@@ -29,6 +29,8 @@ LEVELS = {
     'model': 1,
     'params': 1,
     'journal': 1,
+    'zone_codec': 1,
+    'geometry.polygon': 0,  # the model checks zones with it
     'geometry': 2,
     'objective': 2,
     'solver': 3,

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sized
 from dataclasses import dataclass, field
 from enum import Enum
 from typing import Any
 
 from uav_task_alloc.errors import InvalidValue
+from uav_task_alloc.geometry.polygon import is_simple, signed_area
 
 Point = tuple[float, float, float]  # [m] ENU
 FAR = 1e8  # [m] no coordinate is beyond
@@ -40,6 +41,12 @@ def check_number(place: str, value: float, low: float, high: float = math.inf,
     if not low <= number <= high or (open_low and number == low):
         raise InvalidValue(place, number, f'a number in {interval}')
     return number
+
+
+def check_count(place: str, many: Sized, most: int) -> None:
+    """Raise InvalidValue where there are more than `most`."""
+    if len(many) > most:
+        raise InvalidValue(f'{place}: number', len(many), f'at most {most}')
 
 
 def check_id(place: str, value: object) -> str:
@@ -203,54 +210,11 @@ def check_polygon(place: str, vertices: Iterable[Iterable[float]]) -> tuple[
         corners.pop()
     if len(corners) < 3:
         raise InvalidValue(place, tuple(corners), 'at least 3 corners')
-    if _crosses_itself(corners):
+    if not is_simple(corners):
         raise InvalidValue(place, tuple(corners), 'edges that do not cross or touch')
-    if abs(sum(a[0] * b[1] - b[0] * a[1] for a, b in zip(
-            corners, corners[1:] + corners[:1], strict=True))) < 1e-9:
+    if abs(signed_area(corners)) < 5e-10:
         raise InvalidValue(place, tuple(corners), 'a polygon with some area')
     return tuple(corners)
-
-
-def _crosses_itself(corners: list[tuple[float, float]]) -> bool:
-    """Whether two edges cross or touch; looks only at those whose boxes do.
-
-    From left to right: an edge meets none of those that end before it begins.
-    """
-    n, ahead = len(corners), list[tuple[float, float, float, int]]()  # x1, y0, y1, edge
-    edges = [(min(a[0], b[0]), max(a[0], b[0]), min(a[1], b[1]), max(a[1], b[1]), i)
-             for i, (a, b) in enumerate(zip(corners, corners[1:] + corners[:1], strict=True))]
-    for x0, x1, y0, y1, i in sorted(edges):
-        ahead = [other for other in ahead if other[0] >= x0]
-        for _, low, high, j in ahead:
-            if y0 <= high and low <= y1 and _edges_meet(
-                    corners[i], corners[(i + 1) % n], corners[j], corners[(j + 1) % n],
-                    adjacent=(i + 1) % n == j or (j + 1) % n == i):
-                return True
-        ahead.append((x1, y0, y1, i))
-    return False
-
-
-def _edges_meet(a: tuple[float, float], b: tuple[float, float], c: tuple[float, float],
-                d: tuple[float, float], adjacent: bool) -> bool:
-    def turn(p: tuple[float, float], q: tuple[float, float], r: tuple[float, float]) -> float:
-        return (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0])
-
-    def between(p: tuple[float, float], q: tuple[float, float], r: tuple[float, float]) -> bool:
-        return (min(p[0], q[0]) <= r[0] <= max(p[0], q[0])
-                and min(p[1], q[1]) <= r[1] <= max(p[1], q[1]))
-
-    if a == b or c == d:
-        return True
-    if adjacent:  # neighbours share a corner; they may not fold back on each other
-        shared, other, mine = (b, d, a) if b == c else (a, c, b)
-        dot = ((other[0] - shared[0]) * (mine[0] - shared[0])
-               + (other[1] - shared[1]) * (mine[1] - shared[1]))
-        return turn(mine, shared, other) == 0.0 and dot > 0.0
-    t1, t2, t3, t4 = turn(a, b, c), turn(a, b, d), turn(c, d, a), turn(c, d, b)
-    if t1 * t2 < 0 and t3 * t4 < 0:
-        return True
-    return ((t1 == 0 and between(a, b, c)) or (t2 == 0 and between(a, b, d))
-            or (t3 == 0 and between(c, d, a)) or (t4 == 0 and between(c, d, b)))
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,7 +7,7 @@ import pytest
 from uav_task_alloc.cli import report
 from uav_task_alloc.model import ThreatZone
 from uav_task_alloc.record import ground_truth as truth, run_state as heard
-from uav_task_alloc.record.run_state import zone_to_json
+from uav_task_alloc.zone_codec import JSON_ZONE, encode_zone
 
 HUT = ThreatZone.cylinder('hut', (50.0, 0.0), 5.0)
 PLACES = {'a': (0.0, 0.0, 50.0), 'b': (100.0, 0.0, 50.0), 'c': (200.0, 0.0, 50.0),
@@ -25,7 +25,7 @@ def write_run(out, statuses, reached=PLACES, zones=(), solves=(100.0, 20.0, 30.0
     """A run of one UAV from a to e and on, which reaches the items of `reached`."""
     lines = [{'kind': 'announcement', 'action': 'ADD', 'tasks': [
                  {'id': name, 'position': list(place)} for name, place in PLACES.items()]},
-             {'kind': 'zones', 'zones': [zone_to_json(zone) for zone in zones]}]
+             {'kind': 'zones', 'zones': [encode_zone(zone, JSON_ZONE) for zone in zones]}]
     lines += [{'kind': 'allocation', 'solve_ms': ms, 'trigger': 'x'} for ms in solves]
     lines += [{'kind': 'list', 'uav': 'u1', 'distance': 130.0, 'tasks': [
                    {'id': 'a', 'leg_distance': 60.0}] if first else []} for first in (1, 0)]

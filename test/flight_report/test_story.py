@@ -11,7 +11,7 @@ from uav_task_alloc.flight_report import figures
 from uav_task_alloc.flight_report.page import page
 from uav_task_alloc.flight_report.story import Gap, Replan, Span, fold
 from uav_task_alloc.model import ThreatZone
-from uav_task_alloc.record.run_state import zone_to_json
+from uav_task_alloc.zone_codec import JSON_ZONE, encode_zone
 
 BEGIN = 1000.0
 HOSTILE = '</script><script>alert(1)</script>'
@@ -96,7 +96,7 @@ def figure(text, name):
 def test_the_page_holds_each_task_with_its_reason_and_a_row_in_the_timeline():
     zone = ThreatZone.polygon('z', [(0, 0), (9, 0), (9, 9)], margin=2.0)
     text = page(fold([*FLIGHT, {'kind': 'zones', 'wall': 1009.5,
-                                'zones': [zone_to_json(zone)]}]), 'x.mcap')
+                                'zones': [encode_zone(zone, JSON_ZONE)]}]), 'x.mcap')
     assert '<td>b</td><td>unassigned</td>' in text
     assert '<td>inside zone &lt;z&gt;</td>' in text
     traces, layout = figure(text, 'timeline')

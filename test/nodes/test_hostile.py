@@ -19,6 +19,7 @@ from uav_task_alloc.geometry.frames import Origin
 from uav_task_alloc.nodes.allocator import AllocatorNode
 from uav_task_alloc.nodes.conversions import messages
 from uav_task_alloc.nodes.conversions.messages import ANNOUNCEMENTS, EVENTS, LATCHED, STATES
+from uav_task_alloc.zone_codec import decode_zone_message
 
 pytestmark = pytest.mark.ros
 SEED, BATCH = 20_261_121, 10  # messages in one example
@@ -32,7 +33,7 @@ GOOD = {
     'state': (lambda: m.UavState(uav_id='u1', battery=0.5, range_remaining=9.0, cruise_speed=9.0),
               messages.to_report),
     'event': (lambda: m.TaskEvent(task_id='t1', uav_id='u1'), messages.to_event),
-    'zone': (lambda: m.ThreatZone(zone_id='z1', radius=9.0), messages.to_zone)}
+    'zone': (lambda: m.ThreatZone(zone_id='z1', radius=9.0), decode_zone_message)}
 
 
 def bombard(test, count):

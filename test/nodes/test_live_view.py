@@ -22,6 +22,7 @@ from uav_task_alloc.nodes.conversions.messages import (
     from_zones,
 )
 from uav_task_alloc.record import message_records as lines, run_state as heard
+from uav_task_alloc.zone_codec import decode_zone
 
 TEXT = """uavs:
   - {id: uav_1, position: [0, 0, 0]}
@@ -140,7 +141,7 @@ def test_zones_come_back_from_the_record_as_they_were():
              ThreatZone.cylinder('b', (1.0, 2.0), 3.0),
              ThreatZone.polygon('c', [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)], 0.0, 9.0)]
     text = json.dumps(lines.announced_zones(from_zones(zones, 0.0)), allow_nan=False)
-    assert [heard.zone_from_json(row) for row in json.loads(text)['zones']] == zones
+    assert [decode_zone(row) for row in json.loads(text)['zones']] == zones
 
 
 def test_a_bad_task_of_an_announcement_is_left_out():

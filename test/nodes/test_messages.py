@@ -9,6 +9,7 @@ from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.geometry.frames import Origin
 from uav_task_alloc.model import Leg, Task, ThreatZone
 from uav_task_alloc.nodes.conversions import bridge_messages, messages
+from uav_task_alloc.zone_codec import decode_zone_message
 
 ORIGIN = Origin(47.397742, 8.545594, 488.0)
 
@@ -85,17 +86,17 @@ def test_a_bad_state_is_refused_by_the_name_of_its_field(changed, text):
     ThreatZone.polygon('z1', [(0.0, 0.0), (10.0, 0.0), (0.0, 10.0)], 0.0, 50.0, margin=2.0),
 ])
 def test_a_zone_comes_back_as_it_went(zone):
-    assert messages.to_zone(messages.from_zone(zone)) == zone
+    assert decode_zone_message(messages.from_zone(zone)) == zone
 
 
 def test_a_bad_zone_is_refused_by_the_name_of_its_field():
     bad = messages.from_zone(ThreatZone.hemisphere('z1', (0.0, 0.0, 0.0), 80.0))
     bad.shape = 7
     with pytest.raises(InvalidValue, match='zone z1: shape = 7'):
-        messages.to_zone(bad)
+        decode_zone_message(bad)
     bad.shape, bad.radius = 0, math.nan
     with pytest.raises(InvalidValue, match='zone z1: radius = nan'):
-        messages.to_zone(bad)
+        decode_zone_message(bad)
 
 
 @pytest.mark.parametrize('seconds', [0.0, 1.5, -1.5, 1_800_000_000.123456, 0.9999999999])

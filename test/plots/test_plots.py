@@ -12,7 +12,7 @@ from uav_task_alloc.model import Leg, Plan, Task, ThreatZone, Uav
 from uav_task_alloc.plots import labels, plan as plan_map, space, style
 from uav_task_alloc.plots.flat import Map
 from uav_task_alloc.record import ground_truth as truth, run_state as heard
-from uav_task_alloc.record.run_state import zone_to_json
+from uav_task_alloc.zone_codec import JSON_ZONE, encode_zone
 
 ZONES = [ThreatZone.hemisphere('dome', (100.0, 100.0, 0.0), 30.0, margin=5.0),
          ThreatZone.polygon('field', [(200.0, 0.0), (260.0, 10.0), (230.0, 60.0)])]
@@ -135,8 +135,9 @@ def test_a_flight_with_a_late_zone_a_late_task_and_a_dead_uav_is_drawn(tmp_path)
                 'tasks': [{'id': name, 'position': place}]}
     write(tmp_path / heard.FILE,
           add(1.0, 'a', 50.0, 90.0, 40.0), add(2.0, 'b', 10.0, 20.0, 30.0),
-          {'wall': 1.0, 'kind': 'zones', 'zones': [zone_to_json(ZONES[0])]},
-          {'wall': 2.0, 'kind': 'zones', 'zones': [zone_to_json(zone) for zone in ZONES]})
+          {'wall': 1.0, 'kind': 'zones', 'zones': [encode_zone(ZONES[0], JSON_ZONE)]},
+          {'wall': 2.0, 'kind': 'zones',
+           'zones': [encode_zone(zone, JSON_ZONE) for zone in ZONES]})
     write(tmp_path / truth.FILE,
           *({'t': float(k), 'wall': float(k), 'uav': 'u1', 'x': 25.0 * k, 'y': 45.0 * k,
              'z': 40.0, 'alive': True} for k in range(4)),

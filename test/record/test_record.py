@@ -10,7 +10,8 @@ from uav_task_alloc.model import ThreatZone
 from uav_task_alloc.record import ground_truth as truth, run_state as heard
 from uav_task_alloc.record.ground_truth import Truth
 from uav_task_alloc.record.progress import fleet, headline, is_over
-from uav_task_alloc.record.run_state import RunState, SeenZone, zone_to_json
+from uav_task_alloc.record.run_state import RunState, SeenZone
+from uav_task_alloc.zone_codec import JSON_ZONE, encode_zone
 
 DOME = ThreatZone.hemisphere('dome', (100.0, 0.0, 0.0), 20.0, margin=10.0)
 HUT = ThreatZone.cylinder('hut', (100.0, 0.0), 20.0, z_max=30.0)
@@ -38,7 +39,7 @@ def announced(action, *names):
 
 
 def zones(*there):
-    return 'zones', {'zones': [zone_to_json(zone) for zone in there]}
+    return 'zones', {'zones': [encode_zone(zone, JSON_ZONE) for zone in there]}
 
 
 def tasks_left(*names, distance=0.0, leg=100.0, uav='u1'):

@@ -7,7 +7,8 @@ from typing import Any
 from uav_task_alloc.record import plan_diff as replans
 from uav_task_alloc.record.events import sentences
 from uav_task_alloc.record.progress import SILENT
-from uav_task_alloc.record.run_state import Line, RunState, zone_to_json
+from uav_task_alloc.record.run_state import Line, RunState
+from uav_task_alloc.zone_codec import JSON_ZONE, encode_zone
 
 DAY = 86400.0  # [s] a stamp older than that is of another clock
 PARTS = {'announcement': 'tasks', 'statuses': 'statuses', 'zones': 'zones', 'state': 'uavs',
@@ -90,7 +91,7 @@ class Scene:
             return {task: [row.state, row.uav, row.reason]
                     for task, row in heard.statuses.items()}
         if name == 'zones':
-            return [zone_to_json(zone) for zone in heard.zones_now()]
+            return [encode_zone(zone, JSON_ZONE) for zone in heard.zones_now()]
         if name == 'uavs':
             return {uav: self.uav(uav, state) for uav, state in sorted(heard.uavs.items())}
         if name == 'authority':

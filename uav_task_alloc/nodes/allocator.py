@@ -32,7 +32,6 @@ from uav_task_alloc.nodes.conversions.messages import (
     LATCHED,
     to_event,
     to_report,
-    to_zone,
 )
 from uav_task_alloc.nodes.ros.allocation_publisher import AllocationPublisher
 from uav_task_alloc.nodes.ros.batched_subscription import subscribe_batched
@@ -44,6 +43,7 @@ from uav_task_alloc.nodes.ros.run import run
 from uav_task_alloc.nodes.ros.topic_names import TASK_LIST, check_topic
 from uav_task_alloc.nodes.rviz.marker_publisher import MarkerPublisher
 from uav_task_alloc.params import AllocatorParams
+from uav_task_alloc.zone_codec import decode_zone_array
 
 _TICK = 0.025  # [s]
 LOCK_WAIT = 5.0  # [s] for the journal of an allocator that is just ending
@@ -152,11 +152,10 @@ class AllocatorNode(Node):
     def on_zones(self, msg: m.ThreatZoneArray) -> None:
         """The whole picture of the zones."""
         try:
-            announcements.check_picture(msg)
+            zones, bad = decode_zone_array(msg)
         except InvalidValue as error:
             return self.complain('threat_zones', '', str(error))
         self.complain('threat_zones', '', '')
-        zones, bad = announcements.sort_zones(msg, to_zone)
         for zone in msg.zones:
             self.complain('threat_zones', zone.zone_id, bad.get(zone.zone_id, ''))
         self.world.set_zones(zones, bad, time.monotonic())

@@ -20,32 +20,20 @@ from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.live.scene import Scene
 from uav_task_alloc.live.snapshot_store import SnapshotStore
 from uav_task_alloc.model import is_ros_name
-from uav_task_alloc.nodes.conversions import announcements
 from uav_task_alloc.nodes.conversions.message_limits import cut
-from uav_task_alloc.nodes.conversions.messages import ANNOUNCEMENTS, LATCHED, STATES, to_zone
+from uav_task_alloc.nodes.conversions.messages import ANNOUNCEMENTS, LATCHED, STATES
 from uav_task_alloc.nodes.ros.parameters import declare
 from uav_task_alloc.nodes.ros.run import run, with_flags
 from uav_task_alloc.nodes.ros.topic_names import TASK_LIST, check_topic
 from uav_task_alloc.params import LiveViewParams
 from uav_task_alloc.record import message_records as lines
 from uav_task_alloc.record.progress import fleet, headline, is_over
-from uav_task_alloc.record.run_state import FILE, RunState, zone_to_json
+from uav_task_alloc.record.run_state import FILE, RunState
 
 REFRESH = 0.5  # [s] in a terminal
 PLAIN_EVERY = 4  # refreshes between two lines where the output is no terminal
 MOST_REFUSED = 200  # lines of the log
 UP_AND_CLEAR = '\x1b[{}F\x1b[J'
-
-
-def zones_line(msg: m.ThreatZoneArray) -> lines.RecordBody:
-    """The good zones as a line of the record, within the same bounds as the allocator's.
-
-    The allocator says what is wrong with the others. Raises InvalidValue where the picture is
-    too large.
-    """
-    announcements.check_picture(msg)
-    good, _ = announcements.sort_zones(msg, to_zone)
-    return {'kind': 'zones', 'zones': [zone_to_json(each) for each in good]}
 
 
 class LiveView(Node):
@@ -75,7 +63,7 @@ class LiveView(Node):
         for kind, topic, qos, read in (
             (m.TaskAnnouncement, 'task_announcements', ANNOUNCEMENTS,
              lambda msg: lines.announced_tasks(msg, self.origin)),
-            (m.ThreatZoneArray, 'threat_zones', LATCHED, zones_line),
+            (m.ThreatZoneArray, 'threat_zones', LATCHED, lines.announced_zones),
             (m.TaskStatusArray, 'task_statuses', LATCHED, lines.statuses),
             (m.Allocation, 'allocation', ANNOUNCEMENTS, lines.allocation_record),
             (DiagnosticArray, '/diagnostics', 10, lines.uploads),

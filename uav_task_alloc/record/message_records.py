@@ -12,8 +12,8 @@ from typing import Any
 
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.geometry.frames import Origin, to_enu
-from uav_task_alloc.model import Point, Shape, ThreatZone, check_number, check_point
-from uav_task_alloc.record.run_state import zone_to_json
+from uav_task_alloc.model import Point, check_number, check_point
+from uav_task_alloc.zone_codec import JSON_ZONE, decode_zone_array, encode_zone
 
 RecordBody = dict[str, Any]  # a line without its wall time
 _Message = Any
@@ -69,24 +69,9 @@ def task_place(task: _Message, origin: Origin | None) -> Point | None:
 
 
 def announced_zones(msg: _Message) -> RecordBody:
-    """The zones that are good; the allocator says what is wrong with the others."""
-    good: dict[str, ThreatZone] = {}
-    for row in msg.zones:
-        try:
-            good.setdefault(row.zone_id, zone(row))
-        except (InvalidValue, ValueError):
-            continue
-    return {'kind': 'zones', 'zones': [zone_to_json(each) for each in good.values()]}
-
-
-def zone(row: _Message) -> ThreatZone:
-    """A ThreatZone message as a value. Raises InvalidValue, or ValueError for no shape."""
-    return ThreatZone(
-        row.zone_id, Shape(row.shape), _xyz(row.center), row.radius,
-        -math.inf if math.isnan(row.z_min) else row.z_min,
-        math.inf if math.isnan(row.z_max) else row.z_max,
-        tuple((corner.x, corner.y) for corner in row.vertices),
-        0.0 if math.isnan(row.margin) else row.margin)
+    """The valid zones; the allocator reports the others. Raises InvalidValue for too many."""
+    valid, _ = decode_zone_array(msg)
+    return {'kind': 'zones', 'zones': [encode_zone(zone, JSON_ZONE) for zone in valid]}
 
 
 def statuses(msg: _Message) -> RecordBody:

@@ -9,7 +9,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from uav_task_alloc.model import Point, Shape, ThreatZone
+from uav_task_alloc.model import Point, ThreatZone
+from uav_task_alloc.zone_codec import decode_zone
 
 FILE = 'record.jsonl'
 FINAL = ('COMPLETED', 'FAILED', 'CANCELLED', 'REJECTED', 'UNASSIGNED')
@@ -112,7 +113,7 @@ class RunState:
 
     def on_zones(self, line: Line) -> None:
         """The whole picture of zones: what is missing from it has gone, what is new has come."""
-        now = dict.fromkeys(zone_from_json(row) for row in line['zones'])  # in order
+        now = dict.fromkeys(decode_zone(row) for row in line['zones'])  # in order
         self.zones = [seen if seen.until < math.inf or seen.zone in now
                       else SeenZone(seen.zone, seen.since, line['wall']) for seen in self.zones]
         there = {seen.zone for seen in self.zones if seen.until == math.inf}
@@ -186,20 +187,3 @@ def read_lines(path: Path) -> Iterable[Line]:
         for text in file:
             if text.endswith('\n'):
                 yield json.loads(text)
-
-
-def zone_to_json(zone: ThreatZone) -> dict[str, Any]:
-    """A zone as strict JSON: unbounded is null."""
-    return {'id': zone.id, 'shape': zone.shape.name, 'center': list(zone.center),
-            'radius': zone.radius, 'vertices': [list(corner) for corner in zone.vertices],
-            'z_min': zone.z_min if math.isfinite(zone.z_min) else None,
-            'z_max': zone.z_max if math.isfinite(zone.z_max) else None, 'margin': zone.margin}
-
-
-def zone_from_json(row: Mapping[str, Any]) -> ThreatZone:
-    """The zone that zone_to_json wrote."""
-    return ThreatZone(
-        row['id'], Shape[row['shape']], tuple(row['center']), row['radius'],
-        -math.inf if row['z_min'] is None else row['z_min'],
-        math.inf if row['z_max'] is None else row['z_max'],
-        tuple((x, y) for x, y in row['vertices']), row['margin'])

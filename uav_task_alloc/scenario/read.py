@@ -11,7 +11,7 @@ import numpy as np
 
 from uav_task_alloc.errors import InvalidValue, ScenarioError
 from uav_task_alloc.geometry.frames import Origin, to_enu
-from uav_task_alloc.model import Point, Shape, Task, ThreatZone
+from uav_task_alloc.model import Point, Shape, Task
 from uav_task_alloc.scenario.checked_yaml import YamlRow, compose, read_row, refusal
 from uav_task_alloc.scenario.generate import draw_points
 from uav_task_alloc.scenario.schema import SCENARIO
@@ -23,6 +23,7 @@ from uav_task_alloc.scenario.values import (
     TimedTask,
     TimedZone,
 )
+from uav_task_alloc.zone_codec import USED_KEYS, decode_zone
 
 _Made = TypeVar('_Made')
 
@@ -109,30 +110,20 @@ def _position(row: YamlRow, origin: Origin) -> Point:
 
 
 def _zone(row: YamlRow) -> TimedZone:
-    shape = Shape[row['shape'].upper()]
-    for key in ('vertices',) if shape is Shape.POLYGON else ('center', 'radius'):
+    used = USED_KEYS[Shape[row['shape'].upper()]]
+    for key in used:
         if row[key] is None:
             raise row.refuse(key, f'it for a {row["shape"]}')
-    unused = {'hemisphere': ('vertices', 'z_min', 'z_max'), 'cylinder': ('vertices',),
-              'polygon': ('center', 'radius')}[row['shape']]
-    for key in unused:
-        if key in row.nodes:
+    for key in ('center', 'radius', 'vertices', 'z_min', 'z_max'):
+        if key in row.nodes and key not in used:
             raise row.refuse(key, f'no such key for a {row["shape"]}')
+    if row['shape'] == 'hemisphere' and len(row['center']) < 3:
+        raise row.refuse('center', 'three numbers [x, y, z] for a hemisphere')
     if not row['appears'] < row['vanishes']:
         raise row.refuse('vanishes', f'a time after appears = {row["appears"]:g}')
-    return TimedZone(_valid(row, lambda: _volume(row, shape)), row['appears'], row['vanishes'])
-
-
-def _volume(row: YamlRow, shape: Shape) -> ThreatZone:
-    if shape is Shape.POLYGON:
-        return ThreatZone.polygon(row['id'], row['vertices'], row['z_min'], row['z_max'],
-                                  row['margin'])
-    if shape is Shape.CYLINDER:
-        return ThreatZone.cylinder(row['id'], row['center'], row['radius'], row['z_min'],
-                                   row['z_max'], row['margin'])
-    if len(row['center']) < 3:
-        raise row.refuse('center', 'three numbers [x, y, z] for a hemisphere')
-    return ThreatZone.hemisphere(row['id'], row['center'], row['radius'], row['margin'])
+    zone = _valid(row, lambda: decode_zone(
+        {key: row[key] for key in ('id', 'shape', *used, 'margin')}))
+    return TimedZone(zone, row['appears'], row['vanishes'])
 
 
 def _cancel(row: YamlRow, times: dict[str, float]) -> Cancel:

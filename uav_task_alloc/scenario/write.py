@@ -8,8 +8,9 @@ from typing import Any
 
 import yaml
 
-from uav_task_alloc.model import Shape, Task, ThreatZone
+from uav_task_alloc.model import Task
 from uav_task_alloc.scenario.values import Scenario, ScenarioUav, TimedTask, TimedZone
+from uav_task_alloc.zone_codec import SCENARIO_ZONE, encode_zone
 
 
 def to_yaml(scenario: Scenario) -> str:
@@ -48,13 +49,5 @@ def _task(timed: TimedTask) -> dict[str, Any]:
 
 
 def _zone(timed: TimedZone) -> dict[str, Any]:
-    zone: ThreatZone = timed.zone
-    row: dict[str, Any] = {'id': zone.id, 'shape': zone.shape.name.lower()}
-    if zone.shape is Shape.POLYGON:
-        row['vertices'] = [list(corner) for corner in zone.vertices]
-    else:
-        row |= {'center': list(zone.center), 'radius': zone.radius}
-    if zone.shape is not Shape.HEMISPHERE:
-        row |= {'z_min': zone.z_min, 'z_max': zone.z_max}
-    row |= {'margin': zone.margin, 'appears': timed.appears}
+    row = encode_zone(timed.zone, SCENARIO_ZONE) | {'appears': timed.appears}
     return row if math.isinf(timed.vanishes) else row | {'vanishes': timed.vanishes}

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 import sys
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, fields, replace
@@ -17,7 +16,6 @@ from uav_task_alloc.journal import JournalRow
 from uav_task_alloc.model import (
     Leg,
     Point,
-    Shape,
     Task,
     ThreatZone,
     check_id,
@@ -26,6 +24,7 @@ from uav_task_alloc.model import (
     check_point,
     check_ros_name,
 )
+from uav_task_alloc.zone_codec import JOURNAL_ZONE, decode_zone, encode_zone
 
 Thing = TypeVar('Thing')
 _KINDS = frozenset({'task', 'list', 'zones', 'off', 'revision', 'learner', 'origin'})
@@ -61,7 +60,7 @@ def list_row(uav_list: UavList) -> JournalRow:
 
 def zones_row(zones: Iterable[ThreatZone]) -> JournalRow:
     """All zones, a whole picture."""
-    return JournalRow('zones', '', [_plain(zone) for zone in zones])
+    return JournalRow('zones', '', [encode_zone(zone, JOURNAL_ZONE) for zone in zones])
 
 
 def off_row(off: Iterable[str]) -> JournalRow:
@@ -104,7 +103,7 @@ def _take(found: Saved, row: JournalRow) -> None:
     elif row.kind == 'list':
         found.lists.append(_list(row.id, row.body))
     elif row.kind == 'zones':
-        found.zones = _each(found, 'zone', row.body, _zone)
+        found.zones = _each(found, 'zone', row.body, decode_zone)
     elif row.kind == 'off':
         found.off = _each(found, 'UAV switched off', row.body, _uav_id)
     elif row.kind == 'revision':
@@ -141,14 +140,6 @@ def _plain(value: Any) -> Any:
 def _task(body: dict[str, Any]) -> Task:
     check_ros_name('task id', check_id('task id', body['id']))
     return Task(**{spec.name: body[spec.name] for spec in fields(Task)})
-
-
-def _zone(body: dict[str, Any]) -> ThreatZone:
-    check_ros_name('zone id', check_id('zone id', body['id']))
-    sizes = {name: check_number(f'zone {name}', body[name], -math.inf)
-             for name in ('radius', 'z_min', 'z_max')}
-    return ThreatZone(**{**body, **sizes, 'shape': Shape(body['shape']),
-                         'vertices': tuple((x, y) for x, y in body['vertices'])})
 
 
 def _uav_id(body: Any) -> str:

@@ -2,8 +2,6 @@
 """Announcements taken apart: good tasks and zones to the world, bad ones refused by name."""
 from __future__ import annotations
 
-from collections.abc import Callable
-
 from uav_task_alloc_msgs import msg as m
 from uav_task_alloc_msgs.srv import SubmitTasks
 
@@ -11,12 +9,9 @@ from uav_task_alloc.allocator.records import AnnouncementAction, TaskVerdict
 from uav_task_alloc.allocator.state.world import World
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.geometry.frames import Origin
-from uav_task_alloc.model import ThreatZone, check_ros_name
+from uav_task_alloc.model import check_count, check_ros_name
 from uav_task_alloc.nodes.conversions.message_limits import (
-    MOST_CORNERS,
     MOST_TASKS,
-    MOST_ZONES,
-    check_count,
     cut,
 )
 from uav_task_alloc.nodes.conversions.messages import to_task
@@ -62,25 +57,3 @@ def answer(verdicts: list[TaskVerdict], response: SubmitTasks.Response) -> Submi
             response.rejected.append(verdict.task_id)
             response.reasons.append(verdict.reason)
     return response
-
-
-def check_picture(msg: m.ThreatZoneArray) -> None:
-    """Raise InvalidValue where there is too much of it to be judged zone by zone."""
-    check_count('zones', msg.zones, MOST_ZONES)
-    check_count('vertices of all zones', range(sum(len(zone.vertices) for zone in msg.zones)),
-                MOST_CORNERS)
-
-
-def sort_zones(msg: m.ThreatZoneArray, to_zone: Callable[[m.ThreatZone], ThreatZone],
-               ) -> tuple[list[ThreatZone], dict[str, str]]:
-    """The good zones, and for each bad one its id and why."""
-    good: dict[str, ThreatZone] = {}
-    bad: dict[str, str] = {}
-    for zone in msg.zones:
-        try:
-            if zone.zone_id in good:
-                raise InvalidValue('zone_id', zone.zone_id, 'each id once')
-            good[zone.zone_id] = to_zone(zone)
-        except InvalidValue as error:
-            bad[zone.zone_id] = str(error)
-    return list(good.values()), bad

@@ -16,16 +16,15 @@ from uav_task_alloc.mavlink.gcs.status import UavStatus
 from uav_task_alloc.mavlink.mission.items import MissionStop, TaskList
 from uav_task_alloc.mavlink.mission.task_progress import TaskProgress
 from uav_task_alloc.model import Task, ThreatZone, check_point
-from uav_task_alloc.nodes.conversions.announcements import check_picture, sort_zones
 from uav_task_alloc.nodes.conversions.message_limits import MOST_POINTS
 from uav_task_alloc.nodes.conversions.messages import (
     from_point,
     header,
     to_point,
     to_task,
-    to_zone,
 )
 from uav_task_alloc.params import MOST_RANGE
+from uav_task_alloc.zone_codec import decode_zone_array
 
 NOWHERE = (math.nan, math.nan, math.nan)
 EVENT = {'STARTED': m.TaskEvent.STARTED, 'COMPLETED': m.TaskEvent.COMPLETED,
@@ -62,8 +61,7 @@ def to_zones(msg: m.ThreatZoneArray, before: Iterable[ThreatZone],
 
     Raise InvalidValue where there is too much of it to be judged zone by zone.
     """
-    check_picture(msg)
-    zones, bad = sort_zones(msg, to_zone)
+    zones, bad = decode_zone_array(msg)
     found = {zone.id: zone for zone in before if zone.id in bad}
     found.update((zone.id, zone) for zone in zones)
     return tuple(found.values()), next(iter(bad.values()), '')

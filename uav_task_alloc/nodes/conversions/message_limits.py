@@ -2,26 +2,17 @@
 """How much of anything one message may bring: whoever sends may be hostile, or broken."""
 from __future__ import annotations
 
-from collections.abc import Sequence, Sized
+from collections.abc import Sequence
 
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.mavlink.mission.items import MOST_ITEMS
-from uav_task_alloc.model import check_ros_name
+from uav_task_alloc.model import check_count, check_ros_name
 
 MOST_TASKS = 10_000  # of an announcement
 MOST_POINTS = MOST_ITEMS - 2  # of a list, tasks and detour points; home and return are items too
 _MOST_NAMES = 100  # capabilities, and UAVs allowed, of one task or UAV
-MOST_ZONES = 1000  # of a picture
-MOST_VERTICES = 200  # of a zone; whether its edges cross is a question for each pair
-MOST_CORNERS = 5000  # of all zones of a picture
 LONGEST_TEXT = 200  # characters of a word or a reason
 MOST_VALUE = 1e12  # of a task; sums of them stay numbers
-
-
-def check_count(place: str, many: Sized, most: int) -> None:
-    """Raise InvalidValue where there are more than `most`."""
-    if len(many) > most:
-        raise InvalidValue(f'{place}: number', len(many), f'at most {most}')
 
 
 def check_words(place: str, words: Sequence[str]) -> frozenset[str]:

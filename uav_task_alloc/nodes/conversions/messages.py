@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 from builtin_interfaces.msg import Duration, Time
 from geometry_msgs.msg import Point as PointMsg
@@ -17,7 +17,6 @@ from uav_task_alloc.geometry.frames import Origin, to_enu
 from uav_task_alloc.model import (
     Leg,
     Point,
-    Shape,
     Task,
     ThreatZone,
     check_number,
@@ -25,12 +24,11 @@ from uav_task_alloc.model import (
 )
 from uav_task_alloc.nodes.conversions.message_limits import (
     MOST_VALUE,
-    MOST_VERTICES,
-    check_count,
     check_ros_names,
     check_words,
     cut,
 )
+from uav_task_alloc.zone_codec import JOURNAL_ZONE, encode_zone
 
 FRAME_ID = 'map'  # REP-105, ENU
 MOST_REVISIONS = 2**31  # half of what a message can count to
@@ -71,7 +69,7 @@ def header(now: float) -> Header:
     return Header(stamp=to_stamp(now), frame_id=FRAME_ID)
 
 
-def to_point(point: Point) -> PointMsg:
+def to_point(point: Sequence[float]) -> PointMsg:
     """[m] ENU as a message."""
     return PointMsg(x=point[0], y=point[1], z=point[2])
 
@@ -155,28 +153,12 @@ def to_event(msg: m.TaskEvent) -> TaskEvent:
     return TaskEvent(msg.task_id, msg.uav_id, msg.revision, kind, cut(msg.reason))
 
 
-def to_zone(msg: m.ThreatZone) -> ThreatZone:
-    """Raise InvalidValue, naming the field, where the message is no good zone."""
-    check_ros_name('zone_id', msg.zone_id)
-    try:
-        shape = Shape(msg.shape)
-    except ValueError:
-        raise InvalidValue(f'zone {msg.zone_id}: shape', msg.shape,
-                           'HEMISPHERE (0), CYLINDER (1) or POLYGON (2)') from None
-    check_count(f'zone {msg.zone_id}: vertices', msg.vertices, MOST_VERTICES)
-    return ThreatZone(
-        msg.zone_id, shape, from_point(msg.center), msg.radius,
-        -math.inf if math.isnan(msg.z_min) else msg.z_min,
-        math.inf if math.isnan(msg.z_max) else msg.z_max,
-        tuple((v.x, v.y) for v in msg.vertices), known(msg.margin) or 0.0)
-
-
 def from_zone(zone: ThreatZone) -> m.ThreatZone:
     """The message of a zone."""
+    values = encode_zone(zone, JOURNAL_ZONE)
     return m.ThreatZone(
-        zone_id=zone.id, shape=zone.shape.value, center=to_point(zone.center),
-        radius=zone.radius, z_min=zone.z_min, z_max=zone.z_max,
-        vertices=[PointMsg(x=x, y=y) for x, y in zone.vertices], margin=zone.margin)
+        zone_id=values.pop('id'), center=to_point(values.pop('center')),
+        vertices=[PointMsg(x=x, y=y) for x, y in values.pop('vertices')], **values)
 
 
 def from_zones(zones: Iterable[ThreatZone], now: float) -> m.ThreatZoneArray:
