@@ -18,7 +18,7 @@ ROOMS = {
     'plotly': ('flight_report/', 'live/'),
     'aiohttp': ('live/',),
     'pymap3d': ('geometry/',),
-    'numba': ('geometry/', 'solver/'),
+    'numba': ('geometry/', 'solver/', 'kernel'),
 }
 ROS = {'rclpy', 'rcl_interfaces', 'builtin_interfaces', 'geometry_msgs', 'std_msgs', 'std_srvs',
        'diagnostic_msgs', 'nav_msgs', 'visualization_msgs', 'uav_task_alloc_msgs',
@@ -29,6 +29,8 @@ LEVELS = {
     'model': 1,
     'params': 1,
     'journal': 1,
+    'kernel_cache': 1,
+    'kernel': 1,
     'zone_codec': 1,
     'geometry.polygon': 0,  # the model checks zones with it
     'geometry': 2,

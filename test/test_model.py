@@ -4,7 +4,6 @@ import math
 
 import pytest
 
-from uav_task_alloc import model
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.model import Leg, Plan, Shape, Task, ThreatZone, Uav
 
@@ -104,23 +103,3 @@ def test_only_a_polygon_has_vertices(shape):
     corners = ((math.nan, math.inf), (1.0, 2.0))
     zone = ThreatZone('z', shape, (0.0, 0.0, 0.0), 10.0, vertices=corners)
     assert zone.vertices == ()
-
-
-def test_finding_31_edges_far_apart_are_not_compared(monkeypatch):
-    compared, count = [], 3000
-    meet = model._edges_meet
-    monkeypatch.setattr(model, '_edges_meet', lambda *given, **more: (
-        compared.append(given), meet(*given, **more))[1])
-    turns = [2.0 * math.pi * k / count for k in range(count)]
-    ThreatZone.polygon('round', [(math.cos(turn), math.sin(turn)) for turn in turns])
-    assert len(compared) <= 10 * count
-
-
-@pytest.mark.parametrize('corners', [
-    [(0, 0), (10, 0), (10, 10), (5, -1)], [(0, 0), (10, 0), (10, 10), (5, 0)],
-    [(0, 0), (10, 0), (4, 0), (4, 9)], [(5, 5), (0, 0), (9, 0), (5, 5), (5, 9)]])
-def test_finding_31_polygons_that_touch_themselves_are_refused_as_ever(corners):
-    for k in range(len(corners)):
-        for turned in (corners[k:] + corners[:k], (corners[k:] + corners[:k])[::-1]):
-            with pytest.raises(InvalidValue, match='edges that do not cross or touch'):
-                ThreatZone.polygon('z', turned)

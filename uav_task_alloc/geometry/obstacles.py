@@ -24,10 +24,11 @@ from uav_task_alloc.geometry.outline import (
     Floats as Floats,
     Ints as Ints,
     circle,
-    counter_clockwise,
     hull_of,
     rim_of,
 )
+from uav_task_alloc.geometry.polygon import crosses_ray, segments_cross, signed_area
+from uav_task_alloc.kernel import allocating_kernel
 from uav_task_alloc.model import Shape, ThreatZone, check_number
 
 DOME, CYLINDER, PRISM = Shape.HEMISPHERE.value, Shape.CYLINDER.value, Shape.POLYGON.value
@@ -102,7 +103,8 @@ def _outlines(zone: ThreatZone, reach: float) -> tuple[Floats, Floats, Floats, b
     if zone.shape is Shape.CYLINDER:
         rim = circle(zone.center[0], zone.center[1], zone.radius + reach, RIM)
         return NO_CORNERS, rim, rim, False
-    corners = counter_clockwise(np.array(zone.vertices, np.float64))
+    clockwise = signed_area(zone.vertices) < 0.0
+    corners = np.array(zone.vertices[::-1] if clockwise else zone.vertices, np.float64)
     hull = hull_of(corners)
     return corners, rim_of(corners, reach), rim_of(hull, reach), len(hull) < len(corners)
 
@@ -118,7 +120,7 @@ def _extent(zone: ThreatZone) -> tuple[tuple[float, float, float], float, float,
     return middle, math.hypot(max(xs) - min(xs), max(ys) - min(ys)) / 2, zone.z_min, zone.z_max
 
 
-@numba.njit(cache=True, nogil=True)
+@allocating_kernel
 def off_segment(px: float, py: float, ax: float, ay: float, bx: float, by: float) -> float:
     """Squared distance in plan from p to the segment ab."""
     dx, dy = bx - ax, by - ay
@@ -130,21 +132,20 @@ def off_segment(px: float, py: float, ax: float, ay: float, bx: float, by: float
     return ex * ex + ey * ey
 
 
-@numba.njit(cache=True, nogil=True)
+@allocating_kernel
 def in_polygon(zone: Zone, x: float, y: float) -> bool:
     """Whether (x, y) lies in the polygon as it is (even-odd rule)."""
     odd = False
     c, n = floats_at(zone.corners), zone.count
     j = n - 1
     for i in range(n):
-        xi, yi, xj, yj = c[2 * i], c[2 * i + 1], c[2 * j], c[2 * j + 1]
-        if (yi > y) != (yj > y) and x < (xj - xi) * (y - yi) / (yj - yi) + xi:
+        if crosses_ray((x, y), (c[2 * i], c[2 * i + 1]), (c[2 * j], c[2 * j + 1])):
             odd = not odd
         j = i
     return odd
 
 
-@numba.njit(cache=True, nogil=True)
+@allocating_kernel
 def _meets_polygon(zone: Zone, ax: float, ay: float, bx: float, by: float,
                    reach: float) -> bool:
     """Whether the plan segment ab comes nearer to the polygon than `reach`. O(corners)."""
@@ -153,11 +154,7 @@ def _meets_polygon(zone: Zone, ax: float, ay: float, bx: float, by: float,
     cx, cy = c[2 * n - 2], c[2 * n - 1]
     for i in range(n):
         dx, dy = c[2 * i], c[2 * i + 1]
-        sa = (dx - cx) * (ay - cy) - (dy - cy) * (ax - cx)
-        sb = (dx - cx) * (by - cy) - (dy - cy) * (bx - cx)
-        sc = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
-        sd = (bx - ax) * (dy - ay) - (by - ay) * (dx - ax)
-        if sa * sb < 0.0 and sc * sd < 0.0:
+        if segments_cross((ax, ay), (bx, by), (cx, cy), (dx, dy)):
             return True
         if limit > 0.0 and (off_segment(ax, ay, cx, cy, dx, dy) < limit
                             or off_segment(bx, by, cx, cy, dx, dy) < limit
@@ -168,7 +165,7 @@ def _meets_polygon(zone: Zone, ax: float, ay: float, bx: float, by: float,
     return in_polygon(zone, ax, ay) or in_polygon(zone, (ax + bx) / 2, (ay + by) / 2)
 
 
-@numba.njit(cache=True, nogil=True)
+@allocating_kernel
 def _clip(pz: float, qz: float, low: float, high: float) -> tuple[float, float]:
     """The part [s, t] of a segment that is strictly between two heights; s >= t: none."""
     if pz == qz:
@@ -179,7 +176,7 @@ def _clip(pz: float, qz: float, low: float, high: float) -> tuple[float, float]:
     return max(0.0, s), min(1.0, t)
 
 
-@numba.njit(cache=True, nogil=True)
+@allocating_kernel
 def _near_centre(zone: Zone, px: float, py: float, pz: float, dx: float, dy: float,
                  dz: float, s: float, t: float) -> float:
     """Squared distance from the centre to the part [s, t] of p + d."""
@@ -192,7 +189,7 @@ def _near_centre(zone: Zone, px: float, py: float, pz: float, dx: float, dy: flo
     return float(fx * fx + fy * fy + fz * fz)
 
 
-@numba.njit(cache=True, nogil=True)
+@allocating_kernel
 def _meets_dome(zone: Zone, px: float, py: float, pz: float, qx: float, qy: float,
                 qz: float, floor: float, skin: float) -> bool:
     reach = zone.radius + skin
@@ -210,7 +207,7 @@ def _meets_dome(zone: Zone, px: float, py: float, pz: float, qx: float, qy: floa
                                   t) < reach * reach
 
 
-@numba.njit(cache=True, nogil=True)
+@allocating_kernel
 def blocked(zone: Zone, px: float, py: float, pz: float, qx: float, qy: float,
             qz: float, floor: float, snug: bool) -> bool:
     """Whether the segment pq enters a zone. `snug`: up to the surface, without the skin."""
@@ -233,13 +230,13 @@ def blocked(zone: Zone, px: float, py: float, pz: float, qx: float, qy: float,
                           zone.grow + skin)
 
 
-@numba.njit(cache=True, nogil=True)
+@allocating_kernel
 def contains(zone: Zone, x: float, y: float, z: float, snug: bool) -> bool:
     """Whether a point is inside a zone; the space beneath a dome is not."""
     return blocked(zone, x, y, z, x, y, z, -np.inf, snug)
 
 
-@numba.njit(cache=True, nogil=True)
+@allocating_kernel
 def first_around(o: Zones, x: float, y: float, z: float, snug: bool) -> int:
     """The first zone that contains a point; -1: none. O(zones)."""
     for k in range(o.size):
@@ -248,7 +245,7 @@ def first_around(o: Zones, x: float, y: float, z: float, snug: bool) -> int:
     return -1
 
 
-@numba.njit(cache=True, nogil=True)
+@allocating_kernel
 def all_around(o: Zones, x: float, y: float, z: float) -> Ints:
     """All zones that contain a point. O(zones)."""
     found, n = np.empty(o.size, np.int64), 0

@@ -4,15 +4,21 @@ from __future__ import annotations
 
 import math
 
-import numba
 import numpy as np
+from numba.extending import register_jitable
 from numpy.typing import NDArray
+
+from uav_task_alloc.geometry.polygon import crosses_ray, orientation, segments_cross
+from uav_task_alloc.kernel import allocating_kernel
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
+for _predicate in (orientation, segments_cross, crosses_ray):  # so kernels may call them
+    register_jitable(_predicate)
 
-@numba.njit(cache=True, nogil=True)
+
+@allocating_kernel
 def _fan(x: float, y: float, radius: float, start: float, turn: float, parts: int, rim: Floats,
          n: int) -> int:
     """Corners of the polyline that circumscribes an arc into rim[n:]; returns the new n."""
@@ -25,7 +31,7 @@ def _fan(x: float, y: float, radius: float, start: float, turn: float, parts: in
     return n
 
 
-@numba.njit(cache=True, nogil=True)
+@allocating_kernel
 def circle(x: float, y: float, radius: float, parts: int) -> Floats:
     """Corners (parts, 2) [m] of the polygon that circumscribes a circle, counter-clockwise."""
     rim = np.empty((parts, 2))
@@ -33,7 +39,7 @@ def circle(x: float, y: float, radius: float, parts: int) -> Floats:
     return rim
 
 
-@numba.njit(cache=True, nogil=True)
+@allocating_kernel
 def rim_of(corners: Floats, grow: float) -> Floats:
     """The outline `grow` [m] off a counter-clockwise polygon, circumscribing its round corners."""
     count = corners.shape[0]
@@ -49,7 +55,7 @@ def rim_of(corners: Floats, grow: float) -> Floats:
     return rim[:n].copy()
 
 
-@numba.njit(cache=True, nogil=True)
+@allocating_kernel
 def _chain(corners: Floats, order: Ints) -> Floats:
     """The convex hull of corners in lexical order, by monotone chains. O(n)"""
     size = order.size
@@ -58,9 +64,9 @@ def _chain(corners: Floats, order: Ints) -> Floats:
         i = order[m] if m < size else order[2 * size - 2 - m]
         if m == size:
             first = n - 1
-        while n - first > 1 and (
-                (hull[n - 1, 0] - hull[n - 2, 0]) * (corners[i, 1] - hull[n - 2, 1])
-                <= (hull[n - 1, 1] - hull[n - 2, 1]) * (corners[i, 0] - hull[n - 2, 0])):
+        corner = corners[i, 0], corners[i, 1]
+        while n - first > 1 and orientation(
+                (hull[n - 2, 0], hull[n - 2, 1]), (hull[n - 1, 0], hull[n - 1, 1]), corner) <= 0.0:
             n -= 1
         hull[n, 0], hull[n, 1] = corners[i, 0], corners[i, 1]
         n += 1
@@ -70,13 +76,3 @@ def _chain(corners: Floats, order: Ints) -> Floats:
 def hull_of(corners: Floats) -> Floats:
     """The convex hull, counter-clockwise, without corners on its edges."""
     return _chain(corners, np.lexsort((corners[:, 1], corners[:, 0])))
-
-
-@numba.njit(cache=True, nogil=True)
-def counter_clockwise(corners: Floats) -> Floats:
-    """The polygon turned left about."""
-    area, j = 0.0, corners.shape[0] - 1
-    for i in range(corners.shape[0]):
-        area += corners[j, 0] * corners[i, 1] - corners[i, 0] * corners[j, 1]
-        j = i
-    return corners.copy() if area > 0.0 else corners[::-1].copy()

@@ -9,32 +9,33 @@ from __future__ import annotations
 
 import math
 
-import numba
 import numpy as np
 from numba import carray  # type: ignore[attr-defined]
 
 from uav_task_alloc.geometry.numba_pointers import floats_at
 from uav_task_alloc.geometry.obstacles import CYLINDER, DOME, Floats, Zone
+from uav_task_alloc.geometry.polygon import orientation
 from uav_task_alloc.geometry.taut import copy_point, length_of
+from uav_task_alloc.kernel import allocating_kernel
 
 ARC_GAIN = 1.5e-3  # an arc's polyline may be longer by this share of the way
 MAX_PARTS = 12  # corners of one arc
 SLIDES = 10  # rounds in which both rim points of a way over the top find their places
 
 
-@numba.njit(cache=True, nogil=True)
+@allocating_kernel
 def _parts(radius: float, arc: float, straight: float) -> int:
     """Corners for an arc [rad]: k of them make it longer by about radius arc^3 / (12 k^2)."""
     excess = radius * arc ** 3 / (12.0 * ARC_GAIN * (straight + radius * arc))
     return min(MAX_PARTS, max(1, math.ceil(math.sqrt(excess)), math.ceil(arc)))
 
 
-@numba.njit(cache=True, nogil=True)
+@allocating_kernel
 def _dot(u: Floats, v: Floats) -> float:
     return float(u[0] * v[0] + u[1] * v[1] + u[2] * v[2])
 
 
-@numba.njit(cache=True, nogil=True)
+@allocating_kernel
 def _bend(centre: Floats, radius: float, way: Floats, flat: bool, out: Floats) -> int:
     """Tangent, arc, tangent about a ball, or in plan about a circle; 0: no such way."""
     u, v = np.empty(3), np.empty(3)
@@ -71,7 +72,7 @@ def _bend(centre: Floats, radius: float, way: Floats, flat: bool, out: Floats) -
     return k + 2
 
 
-@numba.njit(cache=True, nogil=True)
+@allocating_kernel
 def _rise(p: Floats, n: int) -> None:
     """Let z of the corners rise evenly with the length in plan from p[0] to p[n - 1]."""
     total = 0.0
@@ -83,7 +84,7 @@ def _rise(p: Floats, n: int) -> None:
         p[i, 2] = p[0, 2] + (p[n - 1, 2] - p[0, 2]) * done / total
 
 
-@numba.njit(cache=True, nogil=True)
+@allocating_kernel
 def _wrap(rim: Floats, way: Floats, side: float, out: Floats) -> int:
     """From a to b around one side (1: left) of a convex rim in plan, by gift wrapping."""
     copy_point(way, 0, out, 0)
@@ -92,8 +93,8 @@ def _wrap(rim: Floats, way: Floats, side: float, out: Floats) -> int:
         x, y = out[n - 1, 0], out[n - 1, 1]
         bx, by, last = way[1, 0], way[1, 1], True
         for i in range(rim.shape[0]):
-            cross = (bx - x) * (rim[i, 1] - y) - (by - y) * (rim[i, 0] - x)
-            if side * cross > 0.0 and (rim[i, 0] != x or rim[i, 1] != y):
+            turn = orientation((x, y), (bx, by), (rim[i, 0], rim[i, 1]))
+            if side * turn > 0.0 and (rim[i, 0] != x or rim[i, 1] != y):
                 bx, by, last = rim[i, 0], rim[i, 1], False
         if last:
             copy_point(way, 1, out, n)
@@ -103,26 +104,26 @@ def _wrap(rim: Floats, way: Floats, side: float, out: Floats) -> int:
     return 0
 
 
-@numba.njit(cache=True, nogil=True)
+@allocating_kernel
 def _in_hull(hull: Floats, p: Floats) -> bool:
     for i in range(hull.shape[0]):
         j = i + 1 if i + 1 < hull.shape[0] else 0
-        if (hull[j, 0] - hull[i, 0]) * (p[1] - hull[i, 1]) < (hull[j, 1] - hull[i, 1]) * (
-                p[0] - hull[i, 0]):
+        if orientation((hull[i, 0], hull[i, 1]), (hull[j, 0], hull[j, 1]), (p[0], p[1])) < 0.0:
             return False
     return True
 
 
-@numba.njit(cache=True, nogil=True)
+@allocating_kernel
 def _crossed(rim: Floats, way: Floats) -> tuple[int, int, float, float]:
     """The first and last edge of a rim that the line ab crosses in plan, and where; -1: none."""
     enter, leave, s, t = -1, -1, np.inf, -np.inf
     dx, dy = way[1, 0] - way[0, 0], way[1, 1] - way[0, 1]
     n = rim.shape[0]
+    a, b = (way[0, 0], way[0, 1]), (way[1, 0], way[1, 1])
     i = n - 1
-    si = dx * (rim[i, 1] - way[0, 1]) - dy * (rim[i, 0] - way[0, 0])
+    si = orientation(a, b, (rim[i, 0], rim[i, 1]))
     for j in range(n):
-        sj = dx * (rim[j, 1] - way[0, 1]) - dy * (rim[j, 0] - way[0, 0])
+        sj = orientation(a, b, (rim[j, 0], rim[j, 1]))
         if (si > 0.0) != (sj > 0.0):
             f = si / (si - sj)
             x = rim[i, 0] + f * (rim[j, 0] - rim[i, 0]) - way[0, 0]
@@ -136,7 +137,7 @@ def _crossed(rim: Floats, way: Floats) -> tuple[int, int, float, float]:
     return enter, leave, s, t
 
 
-@numba.njit(cache=True, nogil=True)
+@allocating_kernel
 def _slide(rim: Floats, edge: int, z: float, p: Floats, q: Floats, x: Floats) -> int:
     """x = where on an edge of the rim at height z the way p x q is shortest; the edge to try next.
 
@@ -160,14 +161,14 @@ def _slide(rim: Floats, edge: int, z: float, p: Floats, q: Floats, x: Floats) ->
     return j if s > size else edge
 
 
-@numba.njit(cache=True, nogil=True)
+@allocating_kernel
 def _beside(zone: Zone, p: Floats) -> bool:
     """Whether p is outside a cylinder in plan; it may be within its rim, that circumscribes it."""
     return bool(zone.kind == CYLINDER
                 and math.hypot(p[0] - zone.x, p[1] - zone.y) > zone.radius + zone.skin)
 
 
-@numba.njit(cache=True, nogil=True)
+@allocating_kernel
 def _over(zone: Zone, rim: Floats, z: float, side: float, way: Floats, out: Floats) -> int:
     """Over the rim at height z (side 1), or beneath it (-1); 0: no such way."""
     enter, leave, s, t = _crossed(rim, way)
@@ -197,7 +198,7 @@ def _over(zone: Zone, rim: Floats, z: float, side: float, way: Floats, out: Floa
     return n + 1
 
 
-@numba.njit(cache=True, nogil=True)
+@allocating_kernel
 def _over_bound(z: float, side: float, way: Floats) -> float:
     """Over (or beneath) height z the way is at least so long [m]."""
     up = max(0.0, side * (z - way[0, 2])) + max(0.0, side * (z - way[1, 2]))
@@ -205,7 +206,7 @@ def _over_bound(z: float, side: float, way: Floats) -> float:
                       max(up, abs(way[1, 2] - way[0, 2])))
 
 
-@numba.njit(cache=True, nogil=True)
+@allocating_kernel
 def keep_best(trial: Floats, n: int, out: Floats, best: int) -> int:
     """Copy the trial way to out where it is shorter; returns the number of points there."""
     if n == 0 or (best > 0 and length_of(trial, n) >= length_of(out, best)):
@@ -215,7 +216,7 @@ def keep_best(trial: Floats, n: int, out: Floats, best: int) -> int:
     return n
 
 
-@numba.njit(cache=True, nogil=True)
+@allocating_kernel
 def past_one(zone: Zone, way: Floats, limits: Floats, floor: float,
              out: Floats) -> int:
     """The shortest way past a zone alone into out; returns its points, 0: no closed form."""

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from typing import Any
 
-import numba
 import numpy as np
 
 from uav_task_alloc.geometry.numba_pointers import floats_at
@@ -19,12 +18,14 @@ from uav_task_alloc.geometry.obstacles import (
     Zones,
     blocked,
 )
+from uav_task_alloc.geometry.polygon import orientation
 from uav_task_alloc.geometry.search_budget import spend
+from uav_task_alloc.kernel import allocating_kernel
 
 FEW_CORNERS = 160  # up to here edges are tested as late as possible
 
 
-@numba.njit(cache=True, nogil=True)
+@allocating_kernel
 def corner_bound(zone: Zone, ring: int, levels: int) -> int:
     """At most so many corners come from a zone, with those at further levels."""
     if zone.kind == PRISM:
@@ -32,7 +33,7 @@ def corner_bound(zone: Zone, ring: int, levels: int) -> int:
     return (4 + levels) * ring + 1
 
 
-@numba.njit(cache=True, nogil=True)
+@allocating_kernel
 def _height(way: Floats, x: float, y: float) -> float:
     """z of the straight way ab where (x, y) is nearest to it in plan."""
     dx, dy = way[1, 0] - way[0, 0], way[1, 1] - way[0, 1]
@@ -43,7 +44,7 @@ def _height(way: Floats, x: float, y: float) -> float:
     return float(way[0, 2] + t * (way[1, 2] - way[0, 2]))
 
 
-@numba.njit(cache=True, nogil=True)
+@allocating_kernel
 def _heading(zone: Zone, way: Floats) -> tuple[float, float]:
     """The way's direction in plan, so that what is built on it turns with the scene."""
     dx, dy = way[1, 0] - way[0, 0], way[1, 1] - way[0, 1]
@@ -54,7 +55,7 @@ def _heading(zone: Zone, way: Floats) -> tuple[float, float]:
     return (dx / size, dy / size) if size > 0.0 else (1.0, 0.0)
 
 
-@numba.njit(cache=True, nogil=True)
+@allocating_kernel
 def _ring(zone: Zone, way: Floats, limits: Floats, radius: float, z: float, ring: int,
           out: Floats, n: int) -> int:
     """`ring` corners around the axis of zone k at height z (NaN: that of the way)."""
@@ -77,7 +78,7 @@ def _ring(zone: Zone, way: Floats, limits: Floats, radius: float, z: float, ring
     return n
 
 
-@numba.njit(cache=True, nogil=True)
+@allocating_kernel
 def _dome_corners(zone: Zone, way: Floats, limits: Floats, floor: float, ring: int,
                   out: Floats, n: int) -> int:
     radius = (zone.radius + 1.5 * zone.skin) / math.cos(math.pi / ring)
@@ -96,16 +97,15 @@ def _dome_corners(zone: Zone, way: Floats, limits: Floats, floor: float, ring: i
     return n
 
 
-@numba.njit(cache=True, nogil=True)
+@allocating_kernel
 def _crossing(way: Floats, px: float, py: float, qx: float, qy: float) -> float:
     """Where along pq, in 0..1, the straight way ab crosses it in plan; NaN: nowhere."""
-    dx, dy = way[1, 0] - way[0, 0], way[1, 1] - way[0, 1]
-    sp = dx * (py - way[0, 1]) - dy * (px - way[0, 0])
-    sq = dx * (qy - way[0, 1]) - dy * (qx - way[0, 0])
+    a, b = (way[0, 0], way[0, 1]), (way[1, 0], way[1, 1])
+    sp, sq = orientation(a, b, (px, py)), orientation(a, b, (qx, qy))
     return sp / (sp - sq) if sp * sq < 0.0 else np.nan
 
 
-@numba.njit(cache=True, nogil=True)
+@allocating_kernel
 def _edge_corners(zone: Zone, way: Floats, z: float, reach: float, out: Floats,
                   n: int) -> int:
     """Corners on a rim of the enlarged prism: each edge's middle and where the way crosses it."""
@@ -124,7 +124,7 @@ def _edge_corners(zone: Zone, way: Floats, z: float, reach: float, out: Floats,
     return n
 
 
-@numba.njit(cache=True, nogil=True)
+@allocating_kernel
 def _prism_corners(zone: Zone, way: Floats, limits: Floats, z: float, out: Floats,
                    n: int) -> int:
     """Mitred corners at the convex corners of the enlarged polygon, at z (NaN: the way's)."""
@@ -150,7 +150,7 @@ def _prism_corners(zone: Zone, way: Floats, limits: Floats, z: float, out: Float
     return n
 
 
-@numba.njit(cache=True, nogil=True)
+@allocating_kernel
 def add_corners(zone: Zone, way: Floats, limits: Floats, floor: float, ring: int,
                 out: Floats, n: int) -> int:
     """Write the corners of zone k for the way ab into out[n:]; returns the new n."""
@@ -174,7 +174,7 @@ def add_corners(zone: Zone, way: Floats, limits: Floats, floor: float, ring: int
     return n
 
 
-@numba.njit(cache=True, nogil=True)
+@allocating_kernel
 def add_level(zone: Zone, way: Floats, limits: Floats, z: float, ring: int, out: Floats,
               n: int) -> int:
     """Write corners around a zone at a height where another zone ends; returns the new n."""
@@ -189,13 +189,13 @@ def add_level(zone: Zone, way: Floats, limits: Floats, z: float, ring: int, out:
     return _ring(zone, way, limits, radius, z, ring, out, n)
 
 
-@numba.njit(cache=True, nogil=True)
+@allocating_kernel
 def _gap(x: Floats, i: int, j: int) -> float:
     dx, dy, dz = x[i, 0] - x[j, 0], x[i, 1] - x[j, 1], x[i, 2] - x[j, 2]
     return math.sqrt(dx * dx + dy * dy + dz * dz)
 
 
-@numba.njit(cache=True, nogil=True)
+@allocating_kernel
 def _boxes(o: Zones, active: Ints) -> Floats:
     """x0, x1, y0, y1 of the active zones, side by side in memory."""
     boxes = np.empty((active.size, 4))
@@ -205,7 +205,7 @@ def _boxes(o: Zones, active: Ints) -> Floats:
     return boxes
 
 
-@numba.njit(cache=True, nogil=True)
+@allocating_kernel
 def _sees(o: Zones, active: Ints, boxes: Floats, x: Floats, i: int, j: int, floor: float,
           snug: bool) -> bool:
     x0, x1 = min(x[i, 0], x[j, 0]), max(x[i, 0], x[j, 0])
@@ -218,7 +218,7 @@ def _sees(o: Zones, active: Ints, boxes: Floats, x: Floats, i: int, j: int, floo
     return True
 
 
-@numba.njit(cache=True, nogil=True)
+@allocating_kernel
 def _next_parent(x: Floats, cost: Floats, closed: Ints, done: int, v: int,
                  failed: int) -> tuple[float, int]:
     """The next best way to v over a closed corner, after the one that failed; ties in turn."""
@@ -232,7 +232,7 @@ def _next_parent(x: Floats, cost: Floats, closed: Ints, done: int, v: int,
     return best, parent
 
 
-@numba.njit(cache=True, nogil=True)
+@allocating_kernel
 def _nearest_open(cost: Floats, ahead: Floats, state: Any) -> int:
     """The open corner with the least bound on the whole way; -1: none."""
     v, best = -1, np.inf
@@ -242,7 +242,7 @@ def _nearest_open(cost: Floats, ahead: Floats, state: Any) -> int:
     return v
 
 
-@numba.njit(cache=True, nogil=True)
+@allocating_kernel
 def astar(o: Zones, active: Ints, x: Floats, floor: float, snug: bool, path: Ints,
           work: Ints) -> int:
     """Shortest way 0 -> 1 over corners x past the active zones; returns its corners, 0: none.

@@ -6,9 +6,9 @@ import math
 from collections.abc import Iterable, Sequence
 from itertools import pairwise
 
-import numpy as np
-
 from uav_task_alloc.geometry.obstacles import all_around, blocked, contains, pack
+from uav_task_alloc.geometry.polygon import contains_point, edges
+from uav_task_alloc.geometry.polyline import segment_distance
 from uav_task_alloc.model import Point, Shape, ThreatZone, check_point
 
 
@@ -39,8 +39,10 @@ def distance(point: Iterable[float], zone: ThreatZone) -> float:
     above = max(zone.z_min - z, z - zone.z_max, 0.0)
     if zone.shape is Shape.CYLINDER:
         aside = max(0.0, math.hypot(x - zone.center[0], y - zone.center[1]) - zone.radius)
+    elif contains_point(zone.vertices, (x, y)):
+        aside = 0.0
     else:
-        aside = _to_polygon(x, y, zone)
+        aside = min(segment_distance((x, y), a, b) for a, b in edges(zone.vertices))
     return math.hypot(aside, above)
 
 
@@ -56,7 +58,7 @@ def cut_by(a: Iterable[float], b: Iterable[float], zones: Sequence[ThreatZone],
     start, end = check_point('a', a), check_point('b', b)
     obstacles = pack(zones, clearance)
     for k, zone in enumerate(zones):
-        if blocked(obstacles.rows[k], *start, *end, -np.inf, True):
+        if blocked(obstacles.rows[k], *start, *end, -math.inf, True):
             return zone
     return None
 
@@ -72,14 +74,3 @@ def _to_dome(x: float, y: float, z: float, zone: ThreatZone) -> float:
     if up >= 0.0:
         return max(0.0, math.hypot(aside, up) - zone.radius)
     return math.hypot(max(0.0, aside - zone.radius), up)
-
-
-def _to_polygon(x: float, y: float, zone: ThreatZone) -> float:
-    flat = pack((ThreatZone.polygon(zone.id, zone.vertices),))
-    if contains(flat.rows[0], x, y, 0.0, True):
-        return 0.0
-    corners = np.array(zone.vertices)
-    edges = np.roll(corners, -1, axis=0) - corners
-    offset = np.array((x, y)) - corners
-    along = np.clip((offset * edges).sum(1) / (edges * edges).sum(1), 0.0, 1.0)
-    return float(np.hypot(*(offset - along[:, None] * edges).T).min())

@@ -9,6 +9,7 @@ from itertools import pairwise
 from geometry_msgs.msg import Point as PointMsg
 from visualization_msgs.msg import Marker
 
+from uav_task_alloc.geometry.polygon import orientation
 from uav_task_alloc.model import FAR, Shape, ThreatZone
 
 ENDLESS = 1000.0  # [m] as high as an unbounded zone is drawn
@@ -86,14 +87,10 @@ def ears(rim: Sequence[Flat]) -> list[tuple[Flat, Flat, Flat]]:
 
 def _is_ear(left: list[Flat], k: int) -> bool:
     a, b, c = left[k - 1], left[k], left[(k + 1) % len(left)]
-    if _turn(a, b, c) < 0.0:
+    if orientation(a, b, c) < 0.0:
         return False
-    return not any(_turn(a, b, p) > 0.0 and _turn(b, c, p) > 0.0 and _turn(c, a, p) > 0.0
-                   for p in left)
-
-
-def _turn(p: Flat, q: Flat, r: Flat) -> float:
-    return (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0])
+    return not any(all(orientation(p, q, other) > 0.0 for p, q in ((a, b), (b, c), (c, a)))
+                   for other in left)
 
 
 def _place(marker: Marker, centre: Sequence[float], scale: Sequence[float]) -> None:
