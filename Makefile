@@ -34,8 +34,7 @@ install/.built: .ros/.made setup.py setup.cfg package.xml colcon_defaults.yaml \
 	@touch $@
 
 install/.compiled: install/.built $(wildcard uav_task_alloc/*.py uav_task_alloc/*/*.py uav_task_alloc/*/*/*.py)
-	@echo '== compiling kernels (about a minute when they changed)'
-	@find uav_task_alloc -name "*.nb[ic]" -delete  # no cache knows that a callee in another file changed
+	@echo '== kernels'
 	@$(RUN) && python3 -m uav_task_alloc compile
 	@touch $@
 

@@ -11,7 +11,6 @@ import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
-import numba
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -36,6 +35,7 @@ from uav_task_alloc.geometry.search_budget import CUT, MOST, OVER, SearchBudget
 from uav_task_alloc.geometry.shortest_path import is_clear
 from uav_task_alloc.geometry.table import LengthTable, forget
 from uav_task_alloc.geometry.taut import MAX_CORNERS, length_of
+from uav_task_alloc.kernel import allocating_kernel
 from uav_task_alloc.model import Leg, Point, ThreatZone
 
 DENSE_MAX = 2048  # points; the table takes 8 n^2 bytes
@@ -68,7 +68,7 @@ class Pairs(_Addresses):
         raise TypeError('Pairs hold addresses of this process: make Distances anew elsewhere')
 
 
-@numba.njit(cache=True, nogil=True)
+@allocating_kernel
 def length(pairs: Pairs, i: int, j: int) -> float:
     """Length [m] of the shortest safe way from point i to point j; inf: there is none."""
     if pairs.row > 0:
@@ -83,7 +83,7 @@ def length(pairs: Pairs, i: int, j: int) -> float:
     return math.sqrt(dx * dx + dy * dy + dz * dz)
 
 
-@numba.njit(cache=True, nogil=True)
+@allocating_kernel
 def _sought(pairs: Pairs, i: int, j: int, known: float) -> float:
     """Length [m] found now; -w - 1: not with w units of work, NaN: there was no time at all.
 
@@ -102,7 +102,7 @@ def _sought(pairs: Pairs, i: int, j: int, known: float) -> float:
     return known if state[OVER] != 0 else -1.0 - state[MOST]
 
 
-@numba.njit(cache=True, nogil=True)
+@allocating_kernel
 def _find_for_table(pairs: Pairs, i: int, j: int) -> float:
     slot, table = ints_at(pairs.slot), floats_at(pairs.table)
     place = slot[i] * pairs.row + slot[j]
@@ -114,7 +114,7 @@ def _find_for_table(pairs: Pairs, i: int, j: int) -> float:
     return found if found >= 0.0 else np.inf
 
 
-@numba.njit(cache=True, nogil=True)
+@allocating_kernel
 def _find_for_cache(pairs: Pairs, i: int, j: int) -> float:
     keys, answers = ints_at(pairs.keys), floats_at(pairs.answers)
     caught = ints_at(ints_at(pairs.scene)[CAUGHT])
@@ -130,7 +130,7 @@ def _find_for_cache(pairs: Pairs, i: int, j: int) -> float:
     return found if found >= 0.0 else np.inf
 
 
-@numba.njit(cache=True, nogil=True)
+@allocating_kernel
 def _known(pairs: Pairs, i: int, j: int) -> float:
     """The length [m], if it is known; otherwise NaN or negative."""
     if pairs.row > 0:
@@ -147,7 +147,7 @@ def _known(pairs: Pairs, i: int, j: int) -> float:
     return np.nan
 
 
-@numba.njit(cache=True, nogil=True)
+@allocating_kernel
 def _learn(pairs: Pairs, i: int, j: int, found: float) -> None:
     """The way from i, which need not be back, to j, which is outside all zones."""
     caught = ints_at(ints_at(pairs.scene)[CAUGHT])
@@ -163,7 +163,7 @@ def _learn(pairs: Pairs, i: int, j: int, found: float) -> None:
         ints_at(pairs.keys)[place], floats_at(pairs.answers)[place] = key, found
 
 
-@numba.njit(cache=True, nogil=True)
+@allocating_kernel
 def length_over(pairs: Pairs, i: int, k: int, j: int) -> float:
     """Length [m] of the way from i to j: as `length`, or over point k where none is known.
 
@@ -178,7 +178,7 @@ def length_over(pairs: Pairs, i: int, k: int, j: int) -> float:
     return float(found)
 
 
-@numba.njit(cache=True, nogil=True)
+@allocating_kernel
 def _ensure(pairs: Pairs, origins: Ints, goals: Ints) -> None:
     for m in range(origins.size):
         length(pairs, origins[m], goals[m])

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 
-import numba
 import numpy as np
 
 from uav_task_alloc.geometry.numba_pointers import floats_at
@@ -20,11 +19,12 @@ from uav_task_alloc.geometry.obstacles import (
     off_segment,
 )
 from uav_task_alloc.geometry.search_budget import spend
+from uav_task_alloc.kernel import allocating_kernel
 
 _AROUND = 24  # directions tried at first, level and rising
 
 
-@numba.njit(cache=True, nogil=True)
+@allocating_kernel
 def _depth(zone: Zone, x: float, y: float, z: float) -> float:
     """At least so far it is to the outside of zone k [m]; <= 0: outside. Not under a dome."""
     skin = 1.5 * zone.skin
@@ -43,7 +43,7 @@ def _depth(zone: Zone, x: float, y: float, z: float) -> float:
     return float(min(ends, edge + zone.grow + skin))
 
 
-@numba.njit(cache=True, nogil=True)
+@allocating_kernel
 def _ray(o: Zones, p: Floats, az: float, up: float, best: float, work: Ints) -> float:
     """How far along a direction the outside begins [m]; inf: not before `best`."""
     c = math.cos(up)
@@ -66,7 +66,7 @@ def _ray(o: Zones, p: Floats, az: float, up: float, best: float, work: Ints) -> 
     return np.inf
 
 
-@numba.njit(cache=True, nogil=True)
+@allocating_kernel
 def _try(o: Zones, p: Floats, az: float, up: float, limits: Floats, best: Floats,
          work: Ints) -> bool:
     """Take the direction (az, up) into best = (distance, az, up) where it is shorter."""
@@ -80,7 +80,7 @@ def _try(o: Zones, p: Floats, az: float, up: float, limits: Floats, best: Floats
     return True
 
 
-@numba.njit(cache=True, nogil=True)
+@allocating_kernel
 def _first_tries(o: Zones, p: Floats, limits: Floats, best: Floats, work: Ints) -> None:
     """Straight outwards of each zone around p, up, down, and a fan about the first of them."""
     base = np.nan
@@ -107,7 +107,7 @@ def _first_tries(o: Zones, p: Floats, limits: Floats, best: Floats, work: Ints) 
              best, work)
 
 
-@numba.njit(cache=True, nogil=True)
+@allocating_kernel
 def way_out(o: Zones, p: Floats, limits: Floats, work: Ints) -> Floats:
     """The nearest point outside all zones that p, inside some, sees; NaN: there is none.
 

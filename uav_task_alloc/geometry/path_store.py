@@ -8,13 +8,13 @@ from __future__ import annotations
 
 from typing import Any
 
-import numba
 import numpy as np
 from numba import carray  # type: ignore[attr-defined]
 
 from uav_task_alloc.geometry.numba_pointers import floats_at, ints_at
 from uav_task_alloc.geometry.obstacles import Floats
 from uav_task_alloc.geometry.taut import MAX_CORNERS, copy_point
+from uav_task_alloc.kernel import allocating_kernel
 
 PLACES = 1 << 16  # of ways; a power of two
 PROBES = 4  # places a way may have
@@ -36,7 +36,7 @@ class PathStore:
         return int(self._state.ctypes.data)
 
 
-@numba.njit(cache=True, nogil=True)
+@allocating_kernel
 def _first_place(ends: Floats) -> int:
     mixed: Any = np.int64(17)
     for i in range(2):
@@ -46,7 +46,7 @@ def _first_place(ends: Floats) -> int:
     return int(mixed & (PLACES - 1))
 
 
-@numba.njit(cache=True, nogil=True)
+@allocating_kernel
 def _same(points: Floats, first: int, ends: Floats) -> bool:
     """Whether the way that begins in row `first` has these ends."""
     n = int(points[first, 0])
@@ -58,7 +58,7 @@ def _same(points: Floats, first: int, ends: Floats) -> bool:
     return True
 
 
-@numba.njit(cache=True, nogil=True)
+@allocating_kernel
 def remember(address: int, way: Floats, n: int, ends: Floats) -> None:
     """Keep the way[:n] between `ends`."""
     state = ints_at(address)
@@ -81,7 +81,7 @@ def remember(address: int, way: Floats, n: int, ends: Floats) -> None:
     place[slot] = first
 
 
-@numba.njit(cache=True, nogil=True)
+@allocating_kernel
 def recall(address: int, ends: Floats, way: Floats) -> int:
     """The points of the way between `ends` into way; returns their number, 0: not kept."""
     state = ints_at(address)

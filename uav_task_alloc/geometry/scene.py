@@ -17,6 +17,7 @@ from uav_task_alloc.geometry.path_store import PathStore, recall, remember
 from uav_task_alloc.geometry.search_budget import SearchBudget, is_over, new_work
 from uav_task_alloc.geometry.shortest_path import is_clear, shortest
 from uav_task_alloc.geometry.taut import MAX_CORNERS, copy_point, length_of
+from uav_task_alloc.kernel import allocating_kernel
 
 OUTSIDE, SNUG, INSIDE = 0, 1, 2
 CAUGHT, EFFORT = 3, 7  # where `addresses` has those of Scene.caught and Scene.state
@@ -43,7 +44,7 @@ def make_scene(xyz: Floats, zones: Zones, limits: Floats, effort: SearchBudget,
     return PathScene(xyz, caught, out, limits, zones, effort.state, store.address)
 
 
-@numba.njit(cache=True, nogil=True)
+@allocating_kernel
 def how_caught(o: Zones, p: Floats) -> int:
     """Whether p is INSIDE a zone, SNUG at one or OUTSIDE all."""
     if first_around(o, p[0], p[1], p[2], False) < 0:
@@ -51,13 +52,13 @@ def how_caught(o: Zones, p: Floats) -> int:
     return INSIDE if first_around(o, p[0], p[1], p[2], True) >= 0 else SNUG
 
 
-@numba.njit(cache=True, nogil=True)
+@allocating_kernel
 def _catch(o: Zones, xyz: Floats, caught: Ints) -> None:
     for i in range(xyz.shape[0]):
         caught[i] = how_caught(o, xyz[i])
 
 
-@numba.njit(cache=True, nogil=True)
+@allocating_kernel
 def _leave(scene: PathScene, i: int, work: Ints) -> Floats:
     """Where the caught point i is outside first; NaN: nowhere, or work[2]: not known."""
     if math.isinf(scene.out[i, 0]):
@@ -75,7 +76,7 @@ def addresses(scene: PathScene) -> Ints:
                      *(array.ctypes.data for array in scene[:6]), scene.store], np.int64)
 
 
-@numba.njit(cache=True, nogil=True)
+@allocating_kernel
 def _scene_at(address: int) -> PathScene:
     at = ints_at(address)
     n, k = at[0], at[1]
@@ -85,7 +86,7 @@ def _scene_at(address: int) -> PathScene:
         carray(zones_at(at[6]), k), carray(ints_at(at[7]), 5), at[8])
 
 
-@numba.njit(cache=True, nogil=True)
+@allocating_kernel
 def in_order(p: Floats, q: Floats, ends: Floats) -> bool:
     """Both into ends in one order, so that there and back are the same way; whether turned."""
     turned = bool(p[0] > q[0] or (
@@ -95,7 +96,7 @@ def in_order(p: Floats, q: Floats, ends: Floats) -> bool:
     return turned
 
 
-@numba.njit(cache=True, nogil=True)
+@allocating_kernel
 def kept_as(scene: PathScene, i: int, j: int, ends: Floats) -> bool:
     """The ends by which the way from i to j is kept; whether it is kept the other way round.
 
@@ -108,7 +109,7 @@ def kept_as(scene: PathScene, i: int, j: int, ends: Floats) -> bool:
     return False
 
 
-@numba.njit(cache=True, nogil=True)
+@allocating_kernel
 def kept_way(scene: PathScene, i: int, j: int, way: Floats) -> int:
     """The points of the way from i to j that is known, if it is clear; their number or 0."""
     ends, caught = np.empty((2, 3)), scene.caught[i] == INSIDE

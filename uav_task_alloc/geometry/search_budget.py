@@ -9,11 +9,11 @@ from __future__ import annotations
 import ctypes
 from collections.abc import Callable
 
-import numba
 import numpy as np
 
 from uav_task_alloc.geometry.numba_pointers import float_of, ints_at
 from uav_task_alloc.geometry.obstacles import Ints
+from uav_task_alloc.kernel import allocating_kernel
 
 SINCE, OVER, MOST, CUT, ASK = range(5)  # what the state holds
 _EVERY = 50_000  # units between two looks at the clock
@@ -67,13 +67,13 @@ class SearchBudget:
         return int(self.state[CUT])
 
 
-@numba.njit(cache=True, nogil=True)
+@allocating_kernel
 def is_over(address: int) -> bool:
     """Whether no search may go on."""
     return address != 0 and ints_at(address)[OVER] != 0
 
 
-@numba.njit(cache=True, nogil=True)
+@allocating_kernel
 def new_work(address: int) -> Ints:
     """The account of one search: units spent, where the state is (0: unlimited), cut short."""
     work = np.zeros(3, np.int64)
@@ -81,7 +81,7 @@ def new_work(address: int) -> Ints:
     return work
 
 
-@numba.njit(cache=True, nogil=True)
+@allocating_kernel
 def spend(work: Ints, units: int) -> bool:
     """Spend units of work; whether the search has to end."""
     if work[1] == 0:

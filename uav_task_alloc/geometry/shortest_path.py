@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 
-import numba
 import numpy as np
 
 from uav_task_alloc.geometry.obstacles import Floats, Ints, Zone, Zones, blocked, contains
@@ -23,6 +22,7 @@ from uav_task_alloc.geometry.taut import (
     zones_near,
 )
 from uav_task_alloc.geometry.visibility_graph import add_corners, add_level, astar, corner_bound
+from uav_task_alloc.kernel import allocating_kernel
 
 _RINGS = (12, 24, 64)  # corners around a zone; finer ones where no way was found
 COARSE = 2  # zones at most in the way for which the first ring is fine enough
@@ -30,7 +30,7 @@ MANY = 8  # zones in the way; among more, levels of those around a zone must do
 PATIENT = 5  # searches past the zones hit so far, before those around them are heeded, too
 
 
-@numba.njit(cache=True, nogil=True)
+@allocating_kernel
 def next_hit(o: Zones, k: int, p: Floats, i: int, j: int, floor: float, snug: bool) -> int:
     """The first zone from k on that the segment p[i] p[j] enters; o.size: none. O(zones)."""
     x0, x1 = min(p[i, 0], p[j, 0]), max(p[i, 0], p[j, 0])
@@ -44,7 +44,7 @@ def next_hit(o: Zones, k: int, p: Floats, i: int, j: int, floor: float, snug: bo
     return k
 
 
-@numba.njit(cache=True, nogil=True)
+@allocating_kernel
 def hit_by(o: Zones, p: Floats, i: int, j: int, floor: float, snug: bool, hit: Ints) -> int:
     """Mark the zones that the segment p[i] p[j] enters in hit; returns how many are new."""
     new, k = 0, next_hit(o, 0, p, i, j, floor, snug)
@@ -55,7 +55,7 @@ def hit_by(o: Zones, p: Floats, i: int, j: int, floor: float, snug: bool, hit: I
     return new
 
 
-@numba.njit(cache=True, nogil=True)
+@allocating_kernel
 def _beside(o: Zones, active: Ints, k: int) -> Ints:
     """The other active zones that corners of zone k may lie in, which lie within twice its box."""
     zone, found, n = o[k], np.empty(active.size, np.int64), 0
@@ -69,7 +69,7 @@ def _beside(o: Zones, active: Ints, k: int) -> Ints:
     return found[:n]
 
 
-@numba.njit(cache=True, nogil=True)
+@allocating_kernel
 def _levels(o: Zones, among: Ints, zone: Zone) -> Floats:
     """Heights [m] between the ends of a zone at which others end, each once."""
     found, n = np.empty(2 * among.size), 0
@@ -86,7 +86,7 @@ def _levels(o: Zones, among: Ints, zone: Zone) -> Floats:
     return found[:n]
 
 
-@numba.njit(cache=True, nogil=True)
+@allocating_kernel
 def _corners_of(o: Zones, k: int, levels: Floats, way: Floats, limits: Floats, floor: float,
                 ring: int) -> Floats:
     """The corners of zone k, also at these levels."""
@@ -97,7 +97,7 @@ def _corners_of(o: Zones, k: int, levels: Floats, way: Floats, limits: Floats, f
     return x[:n]
 
 
-@numba.njit(cache=True, nogil=True)
+@allocating_kernel
 def _in_any(o: Zones, among: Ints, p: Floats, i: int, snug: bool) -> bool:
     for m in range(among.size):  # noqa: SIM110 - numba knows no any()
         if contains(o[among[m]], p[i, 0], p[i, 1], p[i, 2], snug):
@@ -105,13 +105,13 @@ def _in_any(o: Zones, among: Ints, p: Floats, i: int, snug: bool) -> bool:
     return False
 
 
-@numba.njit(cache=True, nogil=True)
+@allocating_kernel
 def _off(p: Floats, i: int, q: Floats, j: int) -> float:
     dx, dy, dz = p[i, 0] - q[j, 0], p[i, 1] - q[j, 1], p[i, 2] - q[j, 2]
     return math.sqrt(dx * dx + dy * dy + dz * dz)
 
 
-@numba.njit(cache=True, nogil=True)
+@allocating_kernel
 def _corners(o: Zones, active: Ints, way: Floats, limits: Floats, floor: float, snug: bool,
              ring: int, known: float, work: Ints) -> Floats:
     """Both ends, and the corners of the active zones that a way of at most `known` can touch.
@@ -141,7 +141,7 @@ def _corners(o: Zones, active: Ints, way: Floats, limits: Floats, floor: float, 
     return x[:n]
 
 
-@numba.njit(cache=True, nogil=True)
+@allocating_kernel
 def _activate(o: Zones, hit: Ints, before: Ints) -> None:
     """Heed the zones as well that overlap those hit since `before`."""
     for k in range(o.size):
@@ -154,7 +154,7 @@ def _activate(o: Zones, hit: Ints, before: Ints) -> None:
                     hit[m] = 1
 
 
-@numba.njit(cache=True, nogil=True)
+@allocating_kernel
 def _search(o: Zones, way: Floats, limits: Floats, floor: float, snug: bool, ring: int,
             known: float, hit: Ints, out: Floats, work: Ints) -> int:
     """A clear, coarse way into out, at most as long as one `known`; marks the zones heeded in hit.
@@ -185,7 +185,7 @@ def _search(o: Zones, way: Floats, limits: Floats, floor: float, snug: bool, rin
             return 0
 
 
-@numba.njit(cache=True, nogil=True)
+@allocating_kernel
 def is_clear(o: Zones, p: Floats, n: int, floor: float, snug: bool) -> bool:
     """Whether the way p[:n] is clear of all zones."""
     x, y, z = p[0, 0], p[0, 1], p[0, 2]
@@ -205,7 +205,7 @@ def is_clear(o: Zones, p: Floats, n: int, floor: float, snug: bool) -> bool:
     return True
 
 
-@numba.njit(cache=True, nogil=True)
+@allocating_kernel
 def shortest(o: Zones, way: Floats, limits: Floats, snug: bool, out: Floats,
              work: Ints) -> tuple[int, float]:
     """Points of the shortest safe way between the ends way[0] and way[1], both outside all zones.

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 
-import numba
 import numpy as np
 
 from uav_task_alloc.geometry.obstacles import Floats, Ints, Zone, Zones, blocked, contains
+from uav_task_alloc.kernel import allocating_kernel
 
 SPARE = 64  # rows for places to come
 _STRAIGHT = 1.0 + 1e-12  # a way is straight when at most so much longer than the distance
@@ -56,7 +56,7 @@ class LengthTable:
         self._slots = {key: s for s, key in enumerate(keep)}
 
 
-@numba.njit(cache=True, nogil=True)
+@allocating_kernel
 def _reach(zone: Zone, p: Floats) -> float:
     """Distance from p to the box around a zone."""
     dx = max(zone.x0 - p[0], p[0] - zone.x1, 0.0)
@@ -65,7 +65,7 @@ def _reach(zone: Zone, p: Floats) -> float:
     return math.sqrt(dx * dx + dy * dy + dz * dz)
 
 
-@numba.njit(cache=True, nogil=True)
+@allocating_kernel
 def _touches(zone: Zone, p: Floats, q: Floats, known: float, near_p: float,
              near_q: float, came: bool) -> bool:
     """Whether zone k, that came or went, may change the known length between p and q."""
@@ -79,7 +79,7 @@ def _touches(zone: Zone, p: Floats, q: Floats, known: float, near_p: float,
     return came and blocked(zone, p[0], p[1], p[2], q[0], q[1], q[2], min(p[2], q[2]), False)
 
 
-@numba.njit(cache=True, nogil=True)
+@allocating_kernel
 def _forget_for(cells: Floats, places: Floats, used: int, zone: Zone,
                 came: bool) -> None:
     near, inside = np.empty(used), np.zeros(used, np.bool_)
@@ -94,7 +94,7 @@ def _forget_for(cells: Floats, places: Floats, used: int, zone: Zone,
                 cells[i, j] = np.nan
 
 
-@numba.njit(cache=True, nogil=True)
+@allocating_kernel
 def forget(cells: Floats, places: Floats, used: int, gone: Zones, come: Zones) -> None:
     """Make unknown every length that a zone that went or came may change. O(zones n^2)."""
     for k in range(gone.size):

@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import math
 
-import numba
 import numpy as np
 
 from uav_task_alloc.geometry.obstacles import Floats, Ints, Zone, Zones, blocked
 from uav_task_alloc.geometry.search_budget import spend
+from uav_task_alloc.kernel import allocating_kernel
 
 MAX_CORNERS = 96  # of a way while it is worked on
 CUT_GAIN = 1e-3  # a further corner must shorten the way by this share
@@ -20,13 +20,13 @@ PULL_GAIN = 5e-4  # as must a further round of pulling
 PULL_WORK = 30  # looks at each zone near a corner that is pulled, about
 
 
-@numba.njit(cache=True, nogil=True)
+@allocating_kernel
 def copy_point(source: Floats, i: int, to: Floats, j: int) -> None:
     """to[j] = source[i]; slices would do, but take a second each to compile."""
     to[j, 0], to[j, 1], to[j, 2] = source[i, 0], source[i, 1], source[i, 2]
 
 
-@numba.njit(cache=True, nogil=True)
+@allocating_kernel
 def free(o: Zones, near: Ints, px: float, py: float, pz: float, qx: float, qy: float,
          qz: float, floor: float, snug: bool) -> bool:
     """Whether the segment pq is clear of the zones `near`."""
@@ -36,14 +36,14 @@ def free(o: Zones, near: Ints, px: float, py: float, pz: float, qx: float, qy: f
     return True
 
 
-@numba.njit(cache=True, nogil=True)
+@allocating_kernel
 def point_span(p: Floats, i: int, j: int) -> float:
     """Distance between two points of a way."""
     dx, dy, dz = p[i, 0] - p[j, 0], p[i, 1] - p[j, 1], p[i, 2] - p[j, 2]
     return math.sqrt(dx * dx + dy * dy + dz * dz)
 
 
-@numba.njit(cache=True, nogil=True)
+@allocating_kernel
 def length_of(p: Floats, n: int) -> float:
     """Length of the way p[:n]."""
     total = 0.0
@@ -52,7 +52,7 @@ def length_of(p: Floats, n: int) -> float:
     return total
 
 
-@numba.njit(cache=True, nogil=True)
+@allocating_kernel
 def _off_box(zone: Zone, p: Floats, i: int) -> float:
     dx = max(zone.x0 - p[i, 0], p[i, 0] - zone.x1, 0.0)
     dy = max(zone.y0 - p[i, 1], p[i, 1] - zone.y1, 0.0)
@@ -60,7 +60,7 @@ def _off_box(zone: Zone, p: Floats, i: int) -> float:
     return math.sqrt(dx * dx + dy * dy + dz * dz)
 
 
-@numba.njit(cache=True, nogil=True)
+@allocating_kernel
 def zones_near(o: Zones, among: Ints, p: Floats, i: int, j: int, length: float) -> Ints:
     """Those `among` the zones that a way of at most `length` from p[i] to p[j] could meet."""
     near, n = np.empty(among.size, np.int64), 0
@@ -71,7 +71,7 @@ def zones_near(o: Zones, among: Ints, p: Floats, i: int, j: int, length: float) 
     return near[:n]
 
 
-@numba.njit(cache=True, nogil=True)
+@allocating_kernel
 def drop_corners(o: Zones, near: Ints, p: Floats, n: int, floor: float, snug: bool) -> int:
     """Leave out every corner whose neighbours see each other; returns the new n."""
     i = 1
@@ -87,7 +87,7 @@ def drop_corners(o: Zones, near: Ints, p: Floats, n: int, floor: float, snug: bo
     return n
 
 
-@numba.njit(cache=True, nogil=True)
+@allocating_kernel
 def _fits(o: Zones, near: Ints, p: Floats, i: int, q: Floats, limits: Floats, floor: float,
           snug: bool) -> bool:
     """Whether corner i may move to q."""
@@ -102,7 +102,7 @@ def _fits(o: Zones, near: Ints, p: Floats, i: int, q: Floats, limits: Floats, fl
     return True
 
 
-@numba.njit(cache=True, nogil=True)
+@allocating_kernel
 def _put(q: Floats, p: Floats, i: int, axes: Floats, t: float, turn: float, s: float) -> None:
     """q = the point t along the chord of corner i's neighbours and s off it, turned by `turn`."""
     c, d = math.cos(turn) * s, math.sin(turn) * s
@@ -110,7 +110,7 @@ def _put(q: Floats, p: Floats, i: int, axes: Floats, t: float, turn: float, s: f
         q[m] = p[i - 1, m] + t * axes[0, m] + c * axes[1, m] + d * axes[2, m]
 
 
-@numba.njit(cache=True, nogil=True)
+@allocating_kernel
 def _axes(p: Floats, i: int, axes: Floats) -> tuple[float, float, float]:
     """Chord direction, direction off it to corner i, third axis; chord, foot and offset [m]."""
     chord = point_span(p, i - 1, i + 1)
@@ -134,7 +134,7 @@ def _axes(p: Floats, i: int, axes: Floats) -> tuple[float, float, float]:
     return chord, foot, off
 
 
-@numba.njit(cache=True, nogil=True)
+@allocating_kernel
 def _on_ellipse(chord: float, foot: float, off: float, t: float) -> float:
     """The offset at t that makes a way as long as (foot, off) does; negative: none."""
     total = math.hypot(foot, off) + math.hypot(chord - foot, off)
@@ -143,7 +143,7 @@ def _on_ellipse(chord: float, foot: float, off: float, t: float) -> float:
     return 0.5 * math.sqrt(wide) if wide > 0.0 and across > 0.0 else -1.0
 
 
-@numba.njit(cache=True, nogil=True)
+@allocating_kernel
 def _press(o: Zones, near: Ints, p: Floats, i: int, axes: Floats, q: Floats, t: float,
            turn: float, s: float, limits: Floats, floor: float, snug: bool) -> float:
     """The least offset, from the good one s inwards, at which corner i fits."""
@@ -158,7 +158,7 @@ def _press(o: Zones, near: Ints, p: Floats, i: int, axes: Floats, q: Floats, t: 
     return high
 
 
-@numba.njit(cache=True, nogil=True)
+@allocating_kernel
 def pull(o: Zones, near: Ints, p: Floats, i: int, limits: Floats, floor: float, snug: bool,
          rounds: int) -> None:
     """Move corner i to where its two legs are shortest: inwards, along and around its chord."""
@@ -188,7 +188,7 @@ def pull(o: Zones, near: Ints, p: Floats, i: int, limits: Floats, floor: float, 
     p[i, 0], p[i, 1], p[i, 2] = q[0], q[1], q[2]
 
 
-@numba.njit(cache=True, nogil=True)
+@allocating_kernel
 def pull_all(o: Zones, near: Ints, p: Floats, n: int, limits: Floats, floor: float,
              snug: bool, rounds: int, work: Ints) -> int:
     """Drop and pull corners until a round gains next to nothing; returns the new n."""
@@ -206,7 +206,7 @@ def pull_all(o: Zones, near: Ints, p: Floats, n: int, limits: Floats, floor: flo
     return n
 
 
-@numba.njit(cache=True, nogil=True)
+@allocating_kernel
 def _cut(o: Zones, near: Ints, p: Floats, i: int, limits: Floats, floor: float,
          snug: bool) -> float:
     """How far from corner i, on both its legs, the corner can be cut off."""
@@ -229,7 +229,7 @@ def _cut(o: Zones, near: Ints, p: Floats, i: int, limits: Floats, floor: float,
     return low
 
 
-@numba.njit(cache=True, nogil=True)
+@allocating_kernel
 def _chord(p: Floats, i: int, before: float, after: float) -> float:
     """Distance of the points one metre before and after corner i, on legs of these lengths."""
     total = 0.0
@@ -239,7 +239,7 @@ def _chord(p: Floats, i: int, before: float, after: float) -> float:
     return math.sqrt(total)
 
 
-@numba.njit(cache=True, nogil=True)
+@allocating_kernel
 def cut_corners(o: Zones, near: Ints, p: Floats, n: int, limits: Floats, floor: float,
                 snug: bool) -> int:
     """Replace each corner by two where that shortens the way enough; returns the new n."""
@@ -265,7 +265,7 @@ def cut_corners(o: Zones, near: Ints, p: Floats, n: int, limits: Floats, floor: 
     return n
 
 
-@numba.njit(cache=True, nogil=True)
+@allocating_kernel
 def tauten(o: Zones, near: Ints, p: Floats, n: int, limits: Floats, floor: float,
            snug: bool, work: Ints) -> int:
     """Shorten the clear way p[:n] in place, keeping it clear; returns the new n."""

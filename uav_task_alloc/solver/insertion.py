@@ -7,12 +7,12 @@ import math
 
 import numpy as np
 
-from uav_task_alloc.solver.kernel import kernel, maker, part
+from uav_task_alloc.kernel import allocating_kernel, inline_kernel, kernel
 from uav_task_alloc.solver.rng import Chance, uniform
 from uav_task_alloc.solver.routes import WHOLE, Arrays, Ints, Routes, insert, lengthened, step
 
 
-@part
+@inline_kernel
 def between(a: Arrays, r: Routes, t: int, before: int, first: float, least: float) -> float:
     """Cost [m] of t behind node `before`, `first` [m] away; some number >= least if no less."""
     u, then = r.on[before], r.next[before]
@@ -22,7 +22,7 @@ def between(a: Arrays, r: Routes, t: int, before: int, first: float, least: floa
     return lengthened(a, r, u, delta)
 
 
-@part
+@inline_kernel
 def beside(a: Arrays, r: Routes, t: int, c: int, d: float, least: float) -> tuple[int, float]:
     """The better side of c, d [m] from t, if it costs less than `least`: (node before, cost)."""
     u, best = r.on[c], -1
@@ -45,7 +45,7 @@ def beside(a: Arrays, r: Routes, t: int, c: int, d: float, least: float) -> tupl
     return best, least
 
 
-@part
+@inline_kernel
 def near_place(a: Arrays, r: Routes, t: int, k: int, blinks: float,
                rng: Chance) -> tuple[int, float]:
     """The cheapest place among k neighbours and the starts: (node before or -1, cost). O(k).
@@ -86,7 +86,7 @@ def any_place(a: Arrays, r: Routes, t: int) -> tuple[int, float]:
     return best, least
 
 
-@maker
+@allocating_kernel
 def place_all(a: Arrays, r: Routes, tasks: Ints) -> int:
     """Insert task nodes one by one where each costs least; returns how many found no place."""
     missing, rng = 0, np.ones(1, np.uint64)
@@ -103,7 +103,7 @@ def place_all(a: Arrays, r: Routes, tasks: Ints) -> int:
     return missing
 
 
-@maker
+@allocating_kernel
 def insert_by_auction(a: Arrays, r: Routes, noise: float, rng: Chance) -> None:
     """Insert all left out tasks, always the one that costs least now. O(n k log n).
 
@@ -130,7 +130,7 @@ def insert_by_auction(a: Arrays, r: Routes, noise: float, rng: Chance) -> None:
         _bid_again(a, r, t, heap)
 
 
-@maker
+@allocating_kernel
 def _bid_again(a: Arrays, r: Routes, t: int, heap: list[tuple[float, int]]) -> None:
     """Neighbours of the task just inserted may have got cheaper."""
     for m in range(min(12, a.near.shape[1])):

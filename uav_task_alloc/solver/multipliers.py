@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from uav_task_alloc.solver.kernel import kernel, maker
+from uav_task_alloc.kernel import allocating_kernel, kernel
 from uav_task_alloc.solver.pool import Pool
 from uav_task_alloc.solver.routes import TINY, Arrays, Floats, Ints
 
@@ -47,7 +47,7 @@ def _bound(a: Arrays, pool: Pool, price: Floats, reduced: Floats, least: Floats,
     return bound
 
 
-@maker
+@allocating_kernel
 def _first_prices(a: Arrays, pool: Pool, flown: Ints) -> Floats:
     """Multipliers by node, no more than leaving a task out costs, that share out what is flown."""
     price = np.zeros(a.ends)
@@ -70,7 +70,7 @@ def _count(pool: Pool, chosen: Ints, served: Ints) -> None:
                 served[pool.stops[i]] += 1
 
 
-@maker
+@allocating_kernel
 def reduced_costs(a: Arrays, pool: Pool, flown: Ints, worth: float,
                   work: float) -> tuple[Reduced, float]:
     """Reduced costs for a high lower bound, and that bound; the columns flown cost `worth` [m].

@@ -6,14 +6,14 @@ import math
 
 import numpy as np
 
-from uav_task_alloc.solver.kernel import kernel, maker, part
+from uav_task_alloc.kernel import allocating_kernel, inline_kernel, kernel
 from uav_task_alloc.solver.rng import Chance, below, uniform
 from uav_task_alloc.solver.routes import TINY, Arrays, Floats, Ints, step
 
 NOISE = 4096  # random numbers drawn once, to begin at any of them
 
 
-@maker
+@allocating_kernel
 def _cells(xyz: Floats, per_cell: float) -> tuple[Ints, Ints, Ints, Floats]:
     """Points sorted into square cells: cell of each, first of each cell, order, (x0, y0, side)."""
     n = len(xyz)
@@ -48,13 +48,13 @@ def _keep(ids: Ints, squares: Floats, kept: int, j: int, square: float) -> int:
     return min(kept + 1, k)
 
 
-@part
+@inline_kernel
 def _square(xyz: Floats, i: int, j: int) -> float:
     x, y, z = xyz[i, 0] - xyz[j, 0], xyz[i, 1] - xyz[j, 1], xyz[i, 2] - xyz[j, 2]
     return float(x * x + y * y + z * z)
 
 
-@maker
+@allocating_kernel
 def nearest(xyz: Floats, near: Ints, fresh: Ints) -> Floats:
     """Fill near (n, k) with the k nearest others of each point, nearest first. O(n k) about.
 
@@ -113,7 +113,7 @@ def near_tasks(a: Arrays, found: Ints, squares: Floats) -> None:
             a.near[i, place], a.near_length[i, place] = j, d
 
 
-@maker
+@allocating_kernel
 def near_starts(a: Arrays, xyz: Floats, rng: Chance) -> None:
     """Fill a.starts with the starts nearest to each task, equally near ones shuffled. O(n m).
 

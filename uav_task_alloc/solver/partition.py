@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from uav_task_alloc.solver.kernel import maker, part
+from uav_task_alloc.kernel import allocating_kernel, inline_kernel
 from uav_task_alloc.solver.multipliers import Reduced
 from uav_task_alloc.solver.pool import Pool
 from uav_task_alloc.solver.routes import TINY, Floats, Ints
@@ -39,7 +39,7 @@ class Path(NamedTuple):
     flies: Flags  # by UAV
 
 
-@maker
+@allocating_kernel
 def _candidates(pool: Pool, reduced: Reduced, group: Flags, tasks: Ints, spare: float) -> Ints:
     """Columns of a group that serve none but its tasks, those with the least cost first."""
     inside = np.zeros(reduced.left.size, np.bool_)
@@ -58,7 +58,7 @@ def _candidates(pool: Pool, reduced: Reduced, group: Flags, tasks: Ints, spare: 
     return some[np.argsort(reduced.column[some])]
 
 
-@maker
+@allocating_kernel
 def _branches(pool: Pool, some: Ints, tasks: Ints, nodes: int) -> Branches:
     """Columns by task."""
     begin = np.zeros(nodes + 1, np.int64)
@@ -75,7 +75,7 @@ def _branches(pool: Pool, some: Ints, tasks: Ints, nodes: int) -> Branches:
     return Branches(order, begin, column)
 
 
-@part
+@inline_kernel
 def _mark(pool: Pool, e: int, path: Path, chosen: bool) -> None:
     """Column e is chosen, or no longer."""
     path.flies[pool.uav[e]] = chosen
@@ -83,7 +83,7 @@ def _mark(pool: Pool, e: int, path: Path, chosen: bool) -> None:
         path.served[pool.stops[i]] = chosen
 
 
-@part
+@inline_kernel
 def _fits(pool: Pool, e: int, path: Path) -> bool:
     """Whether column e goes with what is chosen."""
     if path.flies[pool.uav[e]]:
@@ -94,7 +94,7 @@ def _fits(pool: Pool, e: int, path: Path) -> bool:
     return True
 
 
-@part
+@inline_kernel
 def _next_branch(pool: Pool, reduced: Reduced, b: Branches, path: Path, depth: int,
                  spare: float) -> tuple[float, int]:
     """Take the next column that fits, or leave the task out: (cost with it, columns tried).
@@ -118,14 +118,14 @@ def _next_branch(pool: Pool, reduced: Reduced, b: Branches, path: Path, depth: i
     return np.inf, i - begin
 
 
-@part
+@inline_kernel
 def _open_branch(b: Branches, path: Path, depth: int, place: int, spent: float) -> None:
     """Begin to serve the task at that place in the order."""
     path.task[depth], path.at[depth] = place, b.begin[b.tasks[place]]
     path.took[depth], path.spent[depth] = OPEN, spent
 
 
-@part
+@inline_kernel
 def _take_over(pool: Pool, group: Flags, b: Branches, path: Path, depth: int, flown: Ints,
                on: Ints) -> None:
     """The group flies what was chosen."""
@@ -142,7 +142,7 @@ def _take_over(pool: Pool, group: Flags, b: Branches, path: Path, depth: int, fl
                 on[pool.stops[i]] = pool.uav[e]
 
 
-@maker
+@allocating_kernel
 def _search(pool: Pool, reduced: Reduced, group: Flags, b: Branches, spare: float, limit: int,
             flown: Ints, on: Ints) -> tuple[bool, int]:
     """See `repartition`; `spare` [m] is the reduced cost of what is flown now."""
@@ -178,7 +178,7 @@ def _search(pool: Pool, reduced: Reduced, group: Flags, b: Branches, spare: floa
     return found, tried
 
 
-@maker
+@allocating_kernel
 def repartition(pool: Pool, reduced: Reduced, group: Flags, tasks: Ints, limit: int,
                 flown: Ints, on: Ints) -> tuple[bool, int]:
     """Give a group of UAVs the columns through their tasks that cost least together.

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from uav_task_alloc.solver.kernel import kernel, part
+from uav_task_alloc.kernel import inline_kernel, kernel
 from uav_task_alloc.solver.routes import NODE, TINY, Arrays, Floats, Ints, Nodes, Routes
 
 COLUMNS, STOPS = 1 << 14, 1 << 18  # room; a pool that runs out of it begins anew
@@ -35,7 +35,7 @@ def empty_pool(a: Arrays) -> Pool:
                 np.empty(STOPS, NODE), np.zeros(1, np.int64))
 
 
-@part
+@inline_kernel
 def _key(a: Arrays, r: Routes, pool: Pool, u: int) -> Any:
     """What UAV u's route is found by, whatever its order."""
     key, t = pool.word[u], r.next[u]
@@ -45,7 +45,7 @@ def _key(a: Arrays, r: Routes, pool: Pool, u: int) -> Any:
     return key
 
 
-@part
+@inline_kernel
 def _slot(pool: Pool, key: Any) -> int:
     """Where in the table that key is, or would be."""
     at = np.int64(key & MASK)
@@ -54,13 +54,13 @@ def _slot(pool: Pool, key: Any) -> int:
     return int(at)
 
 
-@part
+@inline_kernel
 def column_of(a: Arrays, r: Routes, pool: Pool, u: int) -> int:
     """The column of UAV u's tasks, -1 if it is not in the pool."""
     return int(pool.table[_slot(pool, _key(a, r, pool, u))])
 
 
-@part
+@inline_kernel
 def _cost(a: Arrays, r: Routes, u: int) -> float:
     """What UAV u's route costs more than none [m]."""
     cost, t = r.leg[u] - a.idle[u], r.next[u]
@@ -72,7 +72,7 @@ def _cost(a: Arrays, r: Routes, u: int) -> float:
     return float(cost)
 
 
-@part
+@inline_kernel
 def _new_column(pool: Pool, tasks: int) -> int:
     """A column with room for so many tasks, -1 if there is no more."""
     e = pool.size[0]

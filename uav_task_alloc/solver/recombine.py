@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from uav_task_alloc.solver.kernel import maker
+from uav_task_alloc.kernel import allocating_kernel
 from uav_task_alloc.solver.multipliers import reduced_costs
 from uav_task_alloc.solver.partition import Flags, repartition
 from uav_task_alloc.solver.pool import Pool, collect, column_of
@@ -17,7 +17,7 @@ DEEPEST = 20_000  # columns tried in a group
 TRY = 4.0  # such a try costs as much as so many looks at a stop
 
 
-@maker
+@allocating_kernel
 def _group(a: Arrays, pool: Pool, on: Ints, flown: Ints, seed: int) -> Flags:
     """Whose routes are nearest to that of one UAV, it among them."""
     inside, beside = np.zeros(a.uavs, np.bool_), np.zeros(a.uavs, np.int64)
@@ -36,7 +36,7 @@ def _group(a: Arrays, pool: Pool, on: Ints, flown: Ints, seed: int) -> Flags:
     return inside
 
 
-@maker
+@allocating_kernel
 def _tasks_of(a: Arrays, on: Ints, group: Flags) -> Ints:
     """Tasks that a group of UAVs serves, and those that nobody does next to them."""
     inside = np.zeros(a.ends, np.bool_)
@@ -50,7 +50,7 @@ def _tasks_of(a: Arrays, on: Ints, group: Flags) -> Ints:
     return np.flatnonzero(inside)
 
 
-@maker
+@allocating_kernel
 def _improve(a: Arrays, pool: Pool, work: float, flown: Ints, on: Ints) -> bool:
     """Let groups around each UAV exchange while that pays; whether it did."""
     worth = 0.0
@@ -77,7 +77,7 @@ def _improve(a: Arrays, pool: Pool, work: float, flown: Ints, on: Ints) -> bool:
     return found
 
 
-@maker
+@allocating_kernel
 def recombine(a: Arrays, best: Routes, pool: Pool, work: float, into: Routes) -> bool:
     """Put columns together that cost less than the best, if there are any; whether there are.
 

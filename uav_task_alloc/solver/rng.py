@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from uav_task_alloc.solver.kernel import part
+from uav_task_alloc.kernel import inline_kernel
 
 Chance = NDArray[np.uint64]  # one number, never 0
 
@@ -15,7 +15,7 @@ def chance(seed: int) -> Chance:
     return np.random.SeedSequence(seed % 2 ** 64).generate_state(1, np.uint64) | np.uint64(1)
 
 
-@part
+@inline_kernel
 def uniform(state: Chance) -> float:
     """In [0, 1)."""
     x = state[0]
@@ -26,7 +26,7 @@ def uniform(state: Chance) -> float:
     return np.float64(x >> np.uint64(11)) * (1.0 / 9007199254740992.0)
 
 
-@part
+@inline_kernel
 def below(state: Chance, n: int) -> int:
     """0..n-1, each as likely."""
     return int(uniform(state) * n)

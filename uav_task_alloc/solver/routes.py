@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uav_task_alloc.geometry.distances import Pairs, length, length_over
-from uav_task_alloc.solver.kernel import kernel, part
+from uav_task_alloc.kernel import inline_kernel, kernel
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -61,7 +61,7 @@ class Routes(NamedTuple):
     sums: Floats  # DISTANCE, EXCESS [m], LEFT_OUT [m], VALUE, STRAIN [m]
 
 
-@part
+@inline_kernel
 def step(a: Arrays, i: int, j: int) -> float:
     """Length [m] of the leg from node i to node j."""
     if j >= a.ends:
@@ -149,10 +149,11 @@ def better_now(a: Arrays, r: Routes, s: Routes) -> bool:
     return bool(gain >= -slack and shorter > TINY + 1e-12 * s.sums[DISTANCE])
 
 
-cost, better = part(cost_now), part(better_now)  # handing arrays to a kernel takes 0.1 ms
+# of their own in kernels: handing arrays to a kernel takes 0.1 ms
+cost, better = inline_kernel(cost_now), inline_kernel(better_now)
 
 
-@part
+@inline_kernel
 def lengthened(a: Arrays, r: Routes, u: int, delta: float) -> float:
     """Cost [m] of making UAV u's route longer by delta [m]; inf where it may not."""
     if not delta < math.inf:
@@ -164,7 +165,7 @@ def lengthened(a: Arrays, r: Routes, u: int, delta: float) -> float:
     return float(delta + a.strain[u] * (max(0.0, after) - max(0.0, before)))
 
 
-@part
+@inline_kernel
 def stretch(a: Arrays, r: Routes, u: int, delta: float) -> None:
     """Make UAV u's route longer by delta [m]."""
     before = r.length[u]
@@ -175,7 +176,7 @@ def stretch(a: Arrays, r: Routes, u: int, delta: float) -> None:
     r.sums[STRAIN] += min(a.strain[u], STRICT) * over
 
 
-@part
+@inline_kernel
 def insert(a: Arrays, r: Routes, t: int, after: int) -> None:
     """Put the left out task node t behind node `after`."""
     u, then = r.on[after], r.next[after]
@@ -190,14 +191,14 @@ def insert(a: Arrays, r: Routes, t: int, after: int) -> None:
     r.sums[VALUE] += a.value[t - a.uavs]
 
 
-@part
+@inline_kernel
 def _over(a: Arrays, r: Routes, before: int, t: int, then: int) -> float:
     """Length [m] of the way over t, which is kept where its points are."""
     found = float(length_over(a.pairs, WHOLE(before), WHOLE(t), WHOLE(then)))
     return found if found < math.inf else float(r.leg[before] + r.leg[t])
 
 
-@part
+@inline_kernel
 def remove(a: Arrays, r: Routes, t: int) -> None:
     """Take the task node t out of its route."""
     u, before, then = r.on[t], r.prev[t], r.next[t]

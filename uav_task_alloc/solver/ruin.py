@@ -9,8 +9,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from uav_task_alloc.kernel import inline_kernel, kernel
 from uav_task_alloc.solver.insertion import any_place, near_place
-from uav_task_alloc.solver.kernel import kernel, part
 from uav_task_alloc.solver.rng import Chance, below, uniform
 from uav_task_alloc.solver.routes import (
     NODE,
@@ -56,7 +56,7 @@ def empty_log(a: Arrays) -> Log:
                np.empty(a.uavs, np.int64))
 
 
-@part
+@inline_kernel
 def _take(a: Arrays, r: Routes, log: Log, t: int) -> None:
     log.node[log.size[0]], log.after[log.size[0]] = t, r.prev[t]
     log.out[log.size[1]] = t
@@ -65,7 +65,7 @@ def _take(a: Arrays, r: Routes, log: Log, t: int) -> None:
     remove(a, r, t)
 
 
-@part
+@inline_kernel
 def undo(a: Arrays, r: Routes, log: Log) -> None:
     """Back to how it was."""
     while log.size[0] > 0:
@@ -77,7 +77,7 @@ def undo(a: Arrays, r: Routes, log: Log) -> None:
             insert(a, r, node, NODE(after))
 
 
-@part
+@inline_kernel
 def _string(a: Arrays, r: Routes, log: Log, c: int, size: int, rng: Chance) -> None:
     """Remove `size` tasks around c, sometimes leaving a few within the string."""
     count, stay = r.tasks[r.on[c]], 0
@@ -116,7 +116,7 @@ def look_for_trouble(a: Arrays, r: Routes, log: Log) -> None:
             a.price[t] = min(DEARER * a.price[t], a.dearest[t])
 
 
-@part
+@inline_kernel
 def _seed(a: Arrays, r: Routes, log: Log, rng: Chance) -> Any:
     """Around whom to ruin: anybody, and often somebody left out or on a route beyond range."""
     if log.size[2] > 0 and uniform(rng) < PITY:
@@ -133,7 +133,7 @@ def _seed(a: Arrays, r: Routes, log: Log, rng: Chance) -> Any:
     return NODE(a.uavs + below(rng, a.ends - a.uavs))
 
 
-@part
+@inline_kernel
 def ruin(a: Arrays, r: Routes, log: Log, mean: float, round_id: int, rng: Chance) -> None:
     """Remove about `mean` tasks in strings of routes around a random one. O(mean)."""
     log.size[0] = log.size[1] = 0
@@ -158,7 +158,7 @@ def ruin(a: Arrays, r: Routes, log: Log, mean: float, round_id: int, rng: Chance
             _string(a, r, log, c, size, rng)
 
 
-@part
+@inline_kernel
 def _is_out(log: Log, t: int) -> bool:
     for i in range(log.size[1]):  # noqa: SIM110 - numba knows no any()
         if log.out[i] == t:
@@ -166,7 +166,7 @@ def _is_out(log: Log, t: int) -> bool:
     return False
 
 
-@part
+@inline_kernel
 def _order(a: Arrays, log: Log, rng: Chance) -> None:
     """Sort who is out: at random, furthest first, nearest first or dearest first."""
     kind = below(rng, 8)
@@ -186,7 +186,7 @@ def _order(a: Arrays, log: Log, rng: Chance) -> None:
         log.key[place], log.out[place] = key, t
 
 
-@part
+@inline_kernel
 def recreate(a: Arrays, r: Routes, log: Log, rng: Chance) -> None:
     """Put back in who is out, each where it costs least and less than leaving it out."""
     _order(a, log, rng)

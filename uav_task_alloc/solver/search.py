@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from uav_task_alloc.solver.kernel import kernel
+from uav_task_alloc.kernel import kernel
 from uav_task_alloc.solver.pool import Pool, collect
 from uav_task_alloc.solver.rng import Chance, uniform
 from uav_task_alloc.solver.routes import (

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from uav_task_alloc.solver.kernel import kernel, part
+from uav_task_alloc.kernel import inline_kernel, kernel
 from uav_task_alloc.solver.problem import Problem
 from uav_task_alloc.solver.rng import Chance, uniform
 from uav_task_alloc.solver.routes import Arrays, Floats, Ints, Nodes, Routes, clear, insert, step
@@ -70,13 +70,13 @@ def _take_over(a: Arrays, q: Floats, was: Ints, old: Floats, old_near: Nodes,
                     q[i, k] = old[was[i], j]
 
 
-@part
+@inline_kernel
 def _pull(d: float) -> float:
     """How much nearness attracts."""
     return 1.0 / (d * d * d + 1e-9)
 
 
-@part
+@inline_kernel
 def _may_end(a: Arrays, r: Routes, u: int, t: int, d: float) -> bool:
     """The range mask: whether UAV u may fly on to t and end there."""
     last = r.prev[a.ends + u]
@@ -85,7 +85,7 @@ def _may_end(a: Arrays, r: Routes, u: int, t: int, d: float) -> bool:
         not a.hard or r.length[u] + more <= a.reach[u])
 
 
-@part
+@inline_kernel
 def _row(a: Arrays, r: Routes, q: Tables, u: int, wanted: float) -> tuple[float, int]:
     """Attraction of all candidates of UAV u's end, or the one at which the sum passes `wanted`."""
     last, total = r.prev[a.ends + u], 0.0

@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from uav_task_alloc.kernel import kernel
 from uav_task_alloc.model import Leg, Plan
 from uav_task_alloc.solver import routes as of
 from uav_task_alloc.solver.insertion import cheapest_first
-from uav_task_alloc.solver.kernel import kernel
 from uav_task_alloc.solver.problem import Problem
 from uav_task_alloc.solver.rng import chance
 from uav_task_alloc.solver.routes import Arrays, Ints, Routes, insert, lengthened, step

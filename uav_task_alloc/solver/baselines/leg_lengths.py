@@ -8,9 +8,9 @@ from typing import NamedTuple
 import numpy as np
 
 from uav_task_alloc.errors import InvalidValue
+from uav_task_alloc.kernel import kernel
 from uav_task_alloc.solver import routes as of
 from uav_task_alloc.solver.insertion import place_all
-from uav_task_alloc.solver.kernel import kernel
 from uav_task_alloc.solver.problem import Problem
 from uav_task_alloc.solver.routes import Arrays, Floats, Routes, step
 from uav_task_alloc.solver.warm import replay

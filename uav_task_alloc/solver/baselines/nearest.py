@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from uav_task_alloc.kernel import kernel
 from uav_task_alloc.solver import routes as of
 from uav_task_alloc.solver.baselines.leg_lengths import place_rest
-from uav_task_alloc.solver.kernel import kernel
 from uav_task_alloc.solver.recorder import Recorder
 from uav_task_alloc.solver.routes import Arrays, Routes, insert, lengthened, step
 

@@ -31,10 +31,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uav_task_alloc.errors import InvalidValue
+from uav_task_alloc.kernel import inline_kernel, kernel
 from uav_task_alloc.solver import routes as of
 from uav_task_alloc.solver.baselines.judging import judged
 from uav_task_alloc.solver.baselines.leg_lengths import place_rest
-from uav_task_alloc.solver.kernel import kernel, part
 from uav_task_alloc.solver.recorder import Recorder
 from uav_task_alloc.solver.rng import Chance, chance, uniform
 from uav_task_alloc.solver.routes import Arrays, Floats, Ints, Routes, insert, lengthened, step
@@ -102,7 +102,7 @@ def probabilities(q: Floats, open_: NDArray[np.bool_], p: Floats) -> bool:
     return total > 0.0
 
 
-@part
+@inline_kernel
 def _draw(p: Floats, greedy_rate: float, rng: Chance) -> int:
     """The likeliest choice if q < eps, else one by its probability (eq 2.7)."""
     best = 0

@@ -14,9 +14,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from uav_task_alloc.kernel import kernel
 from uav_task_alloc.solver import routes as of
 from uav_task_alloc.solver.baselines.leg_lengths import all_ways, place_rest
-from uav_task_alloc.solver.kernel import kernel
 from uav_task_alloc.solver.recorder import Recorder
 from uav_task_alloc.solver.rng import Chance, chance, uniform
 from uav_task_alloc.solver.routes import Arrays, Floats, Routes, insert, lengthened, step

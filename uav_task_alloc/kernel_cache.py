@@ -1,0 +1,137 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Compiled kernels on disk, keyed by all sources with kernels; and the notice of a compilation.
+
+By itself numba compiles a kernel again when the file that holds it has changed, but not when a
+function has that it calls in another file. Here the key is a hash of all files with kernels.
+"""
+from __future__ import annotations
+
+import functools
+import hashlib
+import re
+import shutil
+import signal
+import sys
+import threading
+import time
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+from numba.core import caching, event
+
+ROOMS = ('geometry', 'solver')
+COMPILE_TIME = 70.0  # [s] of CPU for all kernels of the allocator
+_UNUSED = 600.0  # [s] a folder of another hash is kept after the last write: it may be in use
+_FOLDER = 'kernels-'
+# comments and docstrings; whatever has a quote in it and is no docstring stays
+_NO_CODE = re.compile(r'^\s*""".*?"""$|\s*#[^\'"\n]*$', re.MULTILINE | re.DOTALL)
+
+
+def kernel_sources(root: Path = Path(__file__).parent) -> list[Path]:
+    """Files whose code or constants are compiled into kernels: those that use numba, model.py."""
+    files = [path for room in ROOMS for path in (root / room).rglob('*.py')]
+    return sorted([path for path in files if re.search('numba|kernel', path.read_text())]
+                  + [root / 'kernel.py', root / 'model.py'])
+
+
+@functools.cache
+def sources_hash(root: Path = Path(__file__).parent) -> str:
+    """Hash of the kernel sources, without comments and docstrings, as they are at the first call.
+
+    Returns:
+        16 hexadecimal digits.
+    """
+    digest = hashlib.sha256()
+    for path in kernel_sources(root):
+        code = _NO_CODE.sub('', path.read_text())
+        digest.update(f'{path.relative_to(root).as_posix()}\0{code}\0'.encode())
+    return digest.hexdigest()[:16]
+
+
+class KernelCacheLocator(caching._CacheLocator):
+    """Where numba keeps the kernels of one source file: a folder for each hash of all sources.
+
+    The folder lies where numba's own locators put their files: in NUMBA_CACHE_DIR if that is set,
+    in `__pycache__` beside the source, or else in the user's cache directory.
+    """
+
+    def __init__(self, py_file: str, parent: str) -> None:
+        self._py_file = py_file
+        self._parent = Path(parent)
+
+    @classmethod
+    def from_function(cls, py_func: Any, py_file: str) -> KernelCacheLocator | None:
+        """The locator of a function; None for functions of other packages."""
+        if not py_func.__module__.startswith(f'{__package__}.'):
+            return None
+        for base in (caching.UserProvidedCacheLocator, caching.InTreeCacheLocator,
+                     caching.UserWideCacheLocator):
+            found = base.from_function(py_func, py_file)
+            if found is not None:
+                return cls(py_file, found.get_cache_path())
+        return None
+
+    def get_cache_path(self) -> str:
+        """The folder; it need not exist."""
+        return str(self._parent / f'{_FOLDER}{sources_hash()}')
+
+    def get_source_stamp(self) -> str:
+        """What an entry must have been written for to be valid."""
+        return sources_hash()
+
+    def get_disambiguator(self) -> str:
+        """Nothing: names are unique in a file, and lines may shift without compiling again."""
+        return 'kernel'
+
+    def ensure_cache_path(self) -> None:
+        """Make the folder, before each write; remove those of other hashes not in use."""
+        super().ensure_cache_path()
+        for other in self._parent.glob(f'{_FOLDER}*'):
+            with suppress(OSError):
+                if (str(other) != self.get_cache_path()
+                        and time.time() - other.stat().st_mtime > _UNUSED):
+                    shutil.rmtree(other, ignore_errors=True)
+        for older in self._parent.glob('*.nb[ic]'):  # as numba names them by itself
+            older.unlink(missing_ok=True)
+
+
+class CompilationNotice(event.Listener):
+    """Says once on stderr that kernels are compiled, and lets Ctrl-C end the process meanwhile.
+
+    Python would handle SIGINT only when LLVM returns, seconds later. The signal's default action
+    stands in for Python's own handler while a kernel is compiled in the main thread of a program;
+    any other handler, and that of an interactive session, stays.
+    """
+
+    def __init__(self) -> None:
+        self._said = False
+        self._depth = 0  # passes under way in the main thread: a kernel compiles those it calls
+        self._replaced: Any = None
+
+    def on_start(self, event: Any) -> None:
+        """A pass of the compiler begins, over a kernel of this package or over what it calls."""
+        ours = str(event.data['module']).startswith(f'{__package__}.')
+        if ours and not self._said:
+            self._said = True
+            print(f'compiling kernels (once, about {COMPILE_TIME:.0f} s)', file=sys.stderr,
+                  flush=True)
+        if threading.current_thread() is threading.main_thread() and (ours or self._depth):
+            self._depth += 1
+            if (self._depth == 1 and not hasattr(sys, 'ps1')
+                    and signal.getsignal(signal.SIGINT) is signal.default_int_handler):
+                self._replaced = signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+    def on_end(self, event: Any) -> None:
+        """It ends."""
+        if threading.current_thread() is threading.main_thread() and self._depth:
+            self._depth -= 1
+            if self._depth == 0 and self._replaced is not None:
+                signal.signal(signal.SIGINT, self._replaced)
+                self._replaced = None
+
+
+def install() -> None:
+    """Make numba keep kernels of this package here, and report compilations."""
+    caching.CacheImpl._locator_classes.insert(0, KernelCacheLocator)
+    event.register('numba:run_pass', CompilationNotice())
