@@ -40,14 +40,14 @@ def heard_again(bench, seconds=4.0):
 def test_while_nothing_is_heard_nothing_is_sent_and_the_same_mode_gives_it_back(kind, seconds):
     bench = flying(kind)
     silent(bench, 3.5)
-    assert shows(bench, S, 'nothing heard for 3 s')
+    assert shows(bench, S, 'no message for 3 s')
     assert bench.state().reason == 'its link is stale'
     start = len(bench.sent)
     bench.assign(task_list('ZYX', 2))
     bench.run(limit=seconds)
     assert bench.sent[start:] == []
     heard_again(bench, 1.5)
-    assert shows(bench, H, 'heard again, in ')
+    assert shows(bench, H, 'the link is back, in ')
     assert bench.run(lambda: bench.completed()[-3:] == ['Z', 'Y', 'X'], 200.0)
 
 
@@ -58,7 +58,7 @@ def test_another_mode_after_silence_is_a_loss(kind, mode):
     silent(bench)
     bench.vehicles[1].rc_mode(getattr(MODES[kind], mode))
     heard_again(bench, 1.5)
-    assert shows(bench, L, 'heard again, in ', ' instead of ')
+    assert shows(bench, L, 'the link is back, in ', ' instead of ')
     assert keeps_quiet(bench)
 
 
@@ -77,7 +77,7 @@ def test_what_we_had_commanded_just_before_the_silence_is_no_other_mode(kind):
     assert bench.run(lambda: bench.vehicles[1].flight.custom_mode == MODES[kind].hold, 3.0)
     silent(bench)
     heard_again(bench, 1.5)
-    assert shows(bench, H, 'heard again, in ')
+    assert shows(bench, H, 'the link is back, in ')
 
 
 @BOTH
@@ -124,7 +124,7 @@ def test_from_a_new_address_nothing_is_done_before_the_mode_is_confirmed(kind):
     bench.line.tampers.append(lambda way, m, now: [] if m.get_type() == 'HEARTBEAT' else None)
     heard_again(bench, 2.0)
     assert bench.authority() is S
-    assert any('heard from a new address' in note for note in bench.notes)
+    assert any('its messages come from a new address' in note for note in bench.notes)
     start = len(bench.sent)
     bench.assign(task_list('ZYX', 2))
     bench.run(limit=5.0)
@@ -142,7 +142,7 @@ def test_from_a_new_address_in_another_mode_it_is_a_loss(kind, mode):
     bench.move_address()
     bench.vehicles[1].rc_mode(getattr(MODES[kind], mode))
     heard_again(bench, 2.0)
-    assert shows(bench, L, 'heard again, in ')
+    assert shows(bench, L, 'the link is back, in ')
     assert keeps_quiet(bench)
 
 

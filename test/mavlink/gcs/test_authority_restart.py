@@ -34,7 +34,7 @@ def test_in_the_mission_mode_it_flies_on_and_stays_ours(kind, seconds):
     bench.dead_for(seconds)
     assert bench.authority() is H
     bench.run(limit=3.0)
-    assert shows(bench, H, 'the bridge was restarted, and found ')
+    assert shows(bench, H, 'the bridge was restarted, the vehicle is in ')
     start = len(bench.sent)
     bench.assign(task_list('ABCDEFGHIJKLMNOPQRSTUVWXY', 2))
     bench.run(limit=20.0)
@@ -117,7 +117,7 @@ def test_in_another_mode_than_it_was_left_it_is_a_loss(kind, mode):
     bench.vehicles[1].rc_mode(getattr(MODES[kind], mode))
     bench.dead_for(3.0)
     bench.run(limit=1.0)
-    assert shows(bench, L, 'the bridge was restarted, and found ')
+    assert shows(bench, L, 'the bridge was restarted, the vehicle is in ')
     assert keeps_quiet(bench, names='ABC')
 
 
@@ -212,7 +212,7 @@ def test_held_for_a_swap_and_moved_by_somebody_it_is_a_loss():
     bench.run(limit=4.0)
     flight._follow = move
     bench.run(limit=1.0)
-    assert shows(bench, L, 'the bridge was restarted, and found GUIDED')
+    assert shows(bench, L, 'the bridge was restarted, the vehicle is in GUIDED')
     assert keeps_quiet(bench, names='ABC')
 
 
@@ -262,7 +262,7 @@ def test_a_climb_that_ended_while_no_bridge_was_there_is_a_loss(kind):
     assert bench.run(lambda: bench.vehicles[1].flight.body.position[2] > 20.0, 60.0)
     bench.dead_for(30.0)
     bench.run(limit=1.0)
-    assert shows(bench, L, 'found Hold')
+    assert shows(bench, L, 'the vehicle is in Hold')
     assert bench.hand_over() == ''
 
 

@@ -203,7 +203,7 @@ def set_field(name, value):
     (lambda path: path.write_bytes(b'\xff\xfe' * 9), 'utf-8'),
     (lambda path: path.write_text('[' * 60000), 'recursion'),
     (lambda path: path.write_text('x' * 99999), 'larger than 65536 bytes'),
-    (lambda path: path.write_text('{"format": 1}'), 'not written by this program, or damaged'),
+    (lambda path: path.write_text('{"format": 1}'), 'corrupt or not an authority record'),
     (lambda path: (path.unlink(), path.mkdir()), 'no regular file|Is a directory'),
     (lambda path: (path.unlink(), os.mkfifo(path)), 'no regular file'),
     (changed(lambda body: body.update(format=2)), 'format = 2: expected 1'),

@@ -91,7 +91,7 @@ def test_each_event_makes_of_each_state_what_the_table_says(event, column):
 def test_the_table_has_a_row_for_each_event_and_each_suspension_has_an_end():
     assert set(AUTHORITY_TABLE) == set(AuthorityEvent) == set(CELLS)
     assert set(authority._SUSPENDS.values()) == set(Suspension) - {Suspension.RESTART}
-    assert set(authority._ENDS.values()) == set(Suspension) == set(authority._GIVES_BACK)
+    assert set(authority._ENDS.values()) == set(Suspension) == set(authority._GIVEN_BACK_BY)
 
 
 PAIRS = [(a, b) for a, b in itertools.permutations(ENDS.items(), 2)
@@ -102,7 +102,7 @@ PAIRS = [(a, b) for a, b in itertools.permutations(ENDS.items(), 2)
                          ids=[f'{a[1].name}-{b[1].name}' for a, b in PAIRS])
 def test_suspended_for_two_causes_it_is_held_again_only_after_the_end_of_both(first, second):
     made = suspended(first[1], second[1])
-    words = [authority._GIVES_BACK[authority._SUSPENDS[each]] for each in (first[1], second[1])]
+    words = [authority._GIVEN_BACK_BY[authority._SUSPENDS[each]] for each in (first[1], second[1])]
     assert made.why == f'{first[1].name}; {second[1].name}'
     assert made.given_back_by == ' and '.join(words)
     made.apply(first[0], 2.0)

@@ -75,7 +75,7 @@ def handed_over_where_it_held(bench, n=1):
     """PX4 went to Hold while no bridge was there to see why: an operator gives it back."""
     if bench.authority(n) is AuthorityState.LOST and bench.executor(n).telemetry.airborne:
         assert bench.executor(n).profile.name == 'px4'
-        assert bench.executor(n).authority.why.endswith(('found Hold', 'Hold instead of Mission'))
+        assert bench.executor(n).authority.why.endswith(('the vehicle is in Hold', 'Hold instead of Mission'))
         assert bench.hand_over(n) == ''
 
 

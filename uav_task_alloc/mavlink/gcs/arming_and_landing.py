@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Judges arming, disarming, landing, and a take-off with a mission that another started."""
+"""Finds who armed, disarmed, landed or launched a vehicle, and applies the authority event."""
 from __future__ import annotations
 
 import math
@@ -12,32 +12,37 @@ from uav_task_alloc.mavlink.gcs.authority import AuthorityEvent, HoldStage
 from uav_task_alloc.mavlink.gcs.authority_watch_state import AuthorityWatchState
 from uav_task_alloc.mavlink.gcs.mission_evidence import MissionEvidence
 from uav_task_alloc.mavlink.gcs.policy import Policy
-from uav_task_alloc.mavlink.gcs.sent_commands import IN_FLIGHT
+from uav_task_alloc.mavlink.gcs.sent_commands import COMMAND_LIFETIME
 
 
 class ArmingAndLanding:
-    """Follows one vehicle from the ground into the air and back."""
+    """Applies the authority events of take-off, landing, arming and disarming of one vehicle.
+
+    Args:
+        state: of the vehicle; changed by the methods.
+        evidence: of its mission.
+        policy: returns the present parameters.
+    """
 
     def __init__(self, state: AuthorityWatchState, evidence: MissionEvidence,
                  policy: Callable[[], Policy]) -> None:
         self._state, self._evidence, self._policy = state, evidence, policy
-        self._landed_at = -math.inf  # [s] by our descent
+        self._landed_at = -math.inf  # [s] after our RETURN
 
-    def descends(self) -> bool:
-        """We sent it home, by mode or by the last item."""
+    def is_returning(self) -> bool:
+        """Whether it returns by our command: the mode, or the last item."""
         state = self._state
         if state.mode is None:
             return False
-        return (state.descending and state.returns(state.mode)) or (
-            state.profile.mode_function(state.mode) is ModeFunction.MISSION
-            and self._evidence.returning()
-        )
+        in_mission = state.profile.mode_function(state.mode) is ModeFunction.MISSION
+        return (state.descending and state.is_return(state.mode)) or (
+            in_mission and self._evidence.returning())
 
-    def changed(self, descends: bool, now: float) -> None:
-        """It was armed or disarmed.
+    def armed_changed(self, was_returning: bool, now: float) -> None:
+        """Apply an arming or disarming.
 
         Args:
-            descends: whether it was on its way home before this heartbeat.
+            was_returning: whether it returned by our command before this heartbeat.
             now: steady time [s].
         """
         state = self._state
@@ -47,31 +52,32 @@ class ArmingAndLanding:
                 state.apply(AuthorityEvent.OWN, now, 'armed by the bridge')
             else:
                 state.apply(AuthorityEvent.ARMED_BY_OTHER, now, 'armed, not by the bridge')
-        elif descends:
-            self._landed(now)
-        elif now <= max(state.sent.disarm_until, self._landed_at + IN_FLIGHT):
+        elif was_returning:
+            self._apply_landing(now)
+        elif now <= max(state.sent.disarm_until, self._landed_at + COMMAND_LIFETIME):
             state.apply(AuthorityEvent.OWN, now, 'disarmed by the bridge, or after its landing')
-        elif state.was_airborne and self._falls():
+        elif state.was_airborne and self._is_off_ground():
             state.apply(AuthorityEvent.KILLED, now, 'disarmed in the air')
         else:
             state.apply(AuthorityEvent.ARMED_BY_OTHER, now, 'disarmed, not by the bridge')
 
-    def _falls(self) -> bool:
-        """Off the ground by both: landed_state is told once a second, and a home may be low."""
+    def _is_off_ground(self) -> bool:
+        """By height and landed_state: that one comes at 1 Hz, and the ground may not be level."""
         telemetry = self._state.telemetry
         return (telemetry.height > OFF_GROUND
                 and telemetry.landed != d.MAV_LANDED_STATE_ON_GROUND)
 
-    def _landed(self, now: float) -> None:
+    def _apply_landing(self, now: float) -> None:
         state, policy = self._state, self._policy()
-        again = (policy.relaunch == 'automatic' and policy.takeoff
-                 and not state.authority.until_landing)
-        state.sent.drop()
+        relaunches = (policy.relaunch == 'automatic' and policy.takeoff
+                      and not state.authority.until_landing)
+        state.sent.clear_pending()
         self._landed_at = now
-        state.apply(AuthorityEvent.OWN if again else AuthorityEvent.OWN_LANDING, now, 'landed')
+        state.apply(AuthorityEvent.OWN if relaunches else AuthorityEvent.OWN_LANDING, now,
+                    'landed')
 
     def step(self, now: float) -> None:
-        """Landing, and take-off with a mission that somebody started on the ground."""
+        """Apply a landing, or a take-off in a MISSION mode that another station has set."""
         state, telemetry = self._state, self._state.telemetry
         if state.hold_due and (telemetry.airborne or telemetry.grounded):
             state.hold_due = False
@@ -80,10 +86,10 @@ class ArmingAndLanding:
         if telemetry.airborne:
             if state.mission_on_ground:
                 state.mission_on_ground = False
-                if not state.failing(now) and self._evidence.verified():
+                if not state.failsafe_active(now) and self._evidence.verified():
                     state.apply(AuthorityEvent.TO_MISSION, now, 'took off with our mission')
             state.was_airborne = True
         elif state.was_airborne and telemetry.grounded and not state.unconfirmed:
             state.was_airborne = False
-            if state.authority.held and (self.descends() or state.authority.until_landing):
-                self._landed(now)
+            if state.authority.held and (self.is_returning() or state.authority.until_landing):
+                self._apply_landing(now)

@@ -137,7 +137,7 @@ AUTHORITY_TABLE: dict[AuthorityEvent, AuthorityRow] = {
     _E.NEW_ADDRESS: AuthorityRow(_S, _S, None, None),
     _E.REBOOTED: AuthorityRow(_H, None, None, None),
     _E.REBOOTED_FLOWN: AuthorityRow(_L, _L, None, None),
-    _E.RESTART_AGREES: AuthorityRow(_H, _H, None, None, 'SUSPENDED as the link'),
+    _E.RESTART_AGREES: AuthorityRow(_H, _H, None, None, 'SUSPENDED until a heartbeat confirms it'),
     _E.RESTART_DIFFERS: AuthorityRow(_L, _L, None, None),
     _E.RESTART_OURS: AuthorityRow(_H, None, _H, _H),
     _E.RESTART_AIRBORNE: AuthorityRow(_L, _L, _L, _L),
@@ -218,7 +218,12 @@ class AuthorityRecord:
 
 
 class Authority:
-    """The state of one vehicle; `apply` follows `TABLE`."""
+    """The authority over one vehicle.
+
+    Args:
+        now: steady time [s].
+        record: of the previous run; None: there is none.
+    """
 
     def __init__(self, now: float, record: AuthorityRecord | None = None) -> None:
         record = record or AuthorityRecord(since=now)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Writes down what a restarted bridge has to know of a vehicle, where it has changed."""
+"""Saves the authority record of a vehicle for a restarted bridge whenever it has changed."""
 from __future__ import annotations
 
 import math
@@ -10,11 +10,21 @@ from uav_task_alloc.mavlink.gcs.authority_watch_state import AuthorityWatchState
 from uav_task_alloc.mavlink.gcs.mission_evidence import MissionEvidence
 from uav_task_alloc.model import Point
 
-MARKS, REMEMBERED = 50, 600.0  # tasks, [s]
+_MARKS, _MARK_LIFETIME = 50, 600.0  # tasks, [s]
 
 
 class AuthorityRecorder:
-    """The record of one vehicle, and the tasks that were flown or passed over."""
+    """The record of one vehicle, and its tasks that were flown or skipped.
+
+    Args:
+        state: of the vehicle.
+        evidence: of its mission.
+        record: of the previous run; None: there is none.
+        save: called with each changed record.
+
+    Attributes:
+        marks: tasks that were flown or skipped, by id.
+    """
 
     def __init__(
         self,
@@ -27,17 +37,17 @@ class AuthorityRecorder:
         self._save, self._saved = save, record
         self.marks: dict[str, TaskMark] = {m.task: m for m in record.marks} if record else {}
 
-    def mark(self, task: str, place: Point | None, flown: bool, now: float) -> None:
-        """A task was flown, or passed over: a restarted bridge could not see which."""
-        if place is None:
+    def mark_task(self, task: str, position: Point | None, flown: bool, now: float) -> None:
+        """See `AuthorityWatch.mark_task`."""
+        if position is None:
             return
         self.marks.pop(task, None)
-        self.marks = {old: mark for old, mark in list(self.marks.items())[-MARKS:]
-                      if now - mark.at < REMEMBERED}
-        self.marks[task] = TaskMark(task, *place, round(now, 3), flown)
+        self.marks = {old: mark for old, mark in list(self.marks.items())[-_MARKS:]
+                      if now - mark.at < _MARK_LIFETIME}
+        self.marks[task] = TaskMark(task, *position, round(now, 3), flown)
 
-    def keep(self) -> None:
-        """Hand the record to whoever keeps it, where it has changed."""
+    def save_if_changed(self) -> None:
+        """Save the record where it differs from the one saved last."""
         state, authority, sent = self._state, self._state.authority, self._state.sent
         if authority.undecided or authority.suspended_by(Suspension.RESTART):
             return
@@ -46,7 +56,8 @@ class AuthorityRecorder:
             authority.until_landing, state.flown, state.mode, state.armed,
             tuple(dict.fromkeys(mode for mode, _ in sent.modes)),
             sent.arm_until > -math.inf and not state.armed and authority.held,
-            state.swap_at, sent.climb, tuple(self.marks.values()), *self._evidence.place())
+            state.swap_at, sent.climb, tuple(self.marks.values()),
+            *self._evidence.mission_position())
         if record != self._saved:
             self._saved = record
             self._save(record)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Keeps who has each aircraft in a folder, one JSON file for each UAV, replaced as a whole."""
+"""Stores the authority record of each UAV as a JSON file in a folder, replaced atomically."""
 from __future__ import annotations
 
 import hashlib
@@ -15,30 +15,34 @@ from urllib.parse import quote
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.mavlink.gcs.authority import AuthorityRecord, AuthorityState, TaskMark
 
-FORMAT = 1  # of the file; one of a newer format is refused
-LONGEST_NAME = 150  # characters; file systems take 255 bytes
-LARGEST = 65536  # [bytes] of a file that is read
-MOST_SECONDS = 1e11  # [s] of a steady clock
-LONG_AGO = -1e9  # [s] steady time of what happened before the computer was started
-BOOT_ID = Path('/proc/sys/kernel/random/boot_id')
-WITHOUT = ('after a restart of the bridge an airborne vehicle is left to its pilot, unless it '
-           'flies our mission')
+_FORMAT = 1  # of the file; one of a newer format is refused
+_NAME_LIMIT = 150  # characters; file systems allow 255 bytes
+_FILE_LIMIT = 65536  # [bytes] of a file that is read
+_TIME_LIMIT = 1e11  # [s] of a steady clock
+LONG_AGO = -1e9  # [s] steady time of events before the last boot of the computer
+_BOOT_ID = Path('/proc/sys/kernel/random/boot_id')
+_CONSEQUENCE = ('after a restart of the bridge an airborne vehicle is left to its pilot, unless '
+                'it flies our mission')
 
 
 def boot_id() -> str:
-    """Names this start of the computer, with which steady time began; '' where unknown."""
+    """Return the id of this boot of the computer, which starts the steady clock.
+
+    Returns:
+        The kernel's boot_id; '' where it cannot be read.
+    """
     try:
-        return BOOT_ID.read_text('ascii').strip()
+        return _BOOT_ID.read_text('ascii').strip()
     except (OSError, ValueError):
         return ''
 
 
 def uav_file_name(uav_id: str) -> str:
-    """A name of its own for each UAV, without separators."""
+    """Return a file name that is unique for each UAV id and contains no separator."""
     name = quote(uav_id, safe='')
-    if len(name) > LONGEST_NAME:
+    if len(name) > _NAME_LIMIT:
         digest = hashlib.sha256(uav_id.encode('utf-8', 'replace')).hexdigest()
-        name = f'{name[:LONGEST_NAME - 65]}~{digest}'
+        name = f'{name[:_NAME_LIMIT - 65]}~{digest}'
     return f'authority_{name}.json'
 
 
@@ -47,17 +51,17 @@ class AuthorityFileStore:
 
     Args:
         folder: created where it is missing.
-        report: takes a line for the operator where a file cannot be read or written.
-        boot: names this start of the computer; times of another start are long ago.
+        report: called with a line for the operator where a file cannot be read or written.
+        boot: id of this boot of the computer; times of another boot are set to `LONG_AGO`.
 
     Raises:
-        InvalidValue: the folder cannot be created, or no file in it.
+        InvalidValue: the folder cannot be created or written to.
     """
 
     def __init__(self, folder: str, report: Callable[[str], object], boot: str = '') -> None:
         self._folder, self._report, self._boot = Path(folder).expanduser(), report, boot
-        self._waiting: dict[str, AuthorityRecord] = {}  # not on disk, by UAV
-        self._trouble = ''  # as reported; '' while all is on disk
+        self._unsaved: dict[str, AuthorityRecord] = {}  # by UAV id
+        self._error = ''  # the write error reported last; '' while all is on disk
         probe = self._folder / '.probe'
         try:
             self._folder.mkdir(parents=True, exist_ok=True)
@@ -68,14 +72,17 @@ class AuthorityFileStore:
                                f'a folder that can be written to ({error})') from None
 
     def path(self, uav_id: str) -> Path:
-        """The file of a UAV."""
+        """Return the path of a UAV's file."""
         return self._folder / uav_file_name(uav_id)
 
     def load(self, uav_id: str) -> AuthorityRecord | None:
-        """What was saved last.
+        """Load the record saved last.
+
+        Args:
+            uav_id: of the UAV.
 
         Returns:
-            None where nothing was, or the file cannot be used, which is reported.
+            None where there is no file, or where it cannot be used, which is reported.
         """
         path = self.path(uav_id)
         try:
@@ -93,29 +100,37 @@ class AuthorityFileStore:
         return record
 
     def save(self, uav_id: str, record: AuthorityRecord) -> None:
-        """On disk when this returns; else that is reported once, and `retry` tries again."""
-        self._waiting[uav_id] = record
+        """Write a record to disk before returning.
+
+        A failure is reported once; `retry` tries again.
+
+        Args:
+            uav_id: of the UAV.
+            record: replaces the one saved before.
+        """
+        self._unsaved[uav_id] = record
         self.retry()
 
     def retry(self) -> None:
-        """Write what could not be written before."""
-        found = ''
-        for uav_id, record in list(self._waiting.items()):
+        """Write the records that could not be written before."""
+        first_error = ''
+        for uav_id, record in list(self._unsaved.items()):
             path = self.path(uav_id)
             try:
                 self._write(path, self._text(uav_id, record))
             except (OSError, ValueError) as error:
-                found = found or f'{path}: not written: {error}{self._remove(path)}'
+                error_text = f'{path}: not written: {error}{self._remove(path)}'
+                first_error = first_error or error_text
             else:
-                del self._waiting[uav_id]
-        if found and not self._trouble:
-            self._report(f'{found}; tried again; meanwhile {WITHOUT}')
-        elif self._trouble and not found:
+                del self._unsaved[uav_id]
+        if first_error and not self._error:
+            self._report(f'{first_error}; it is tried again; until then, {_CONSEQUENCE}')
+        elif self._error and not first_error:
             self._report(f'{self._folder}: written again')
-        self._trouble = found
+        self._error = first_error
 
     def _remove(self, path: Path) -> str:
-        """Remove a file that is out of date; why that cannot be done, '' where it is gone."""
+        """Remove an outdated file; returns an error text, '' where it is removed."""
         try:
             path.unlink(missing_ok=True)
             self._sync()
@@ -125,12 +140,12 @@ class AuthorityFileStore:
 
     def _text(self, uav_id: str, record: AuthorityRecord) -> str:
         plain = {spec.name: getattr(record, spec.name) for spec in fields(record)}
-        body = {'format': FORMAT, 'uav_id': uav_id, 'boot': self._boot,
+        body = {'format': _FORMAT, 'uav_id': uav_id, 'boot': self._boot,
                 'record': plain | {'state': record.state.name}}
         return json.dumps(body, indent=1, allow_nan=False) + '\n'
 
     def _write(self, path: Path, text: str) -> None:
-        """The old content or the new one, whenever the process or the computer ends."""
+        """Replace a file atomically: at any crash it has the old content or the new one."""
         temporary = path.with_suffix('.tmp')
         try:
             with open(temporary, 'w', encoding='utf-8') as file:
@@ -144,7 +159,7 @@ class AuthorityFileStore:
         self._sync()
 
     def _sync(self) -> None:
-        """The names in the folder are on disk, too."""
+        """Flush the directory entries to disk."""
         folder = os.open(self._folder, os.O_RDONLY | os.O_DIRECTORY)
         try:
             os.fsync(folder)
@@ -156,30 +171,30 @@ def _read(path: Path) -> str:
     with open(os.open(path, os.O_RDONLY | os.O_NONBLOCK), 'rb') as file:
         if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
             raise ValueError('no regular file')
-        data = file.read(LARGEST + 1)
-    if len(data) > LARGEST:
-        raise ValueError(f'larger than {LARGEST} bytes')
+        data = file.read(_FILE_LIMIT + 1)
+    if len(data) > _FILE_LIMIT:
+        raise ValueError(f'larger than {_FILE_LIMIT} bytes')
     return data.decode('utf-8')
 
 
 def _record(body: Any, uav_id: str) -> AuthorityRecord:
-    """The record of a file. Raises ValueError, which says what is wrong with it."""
+    """Build the record from the JSON body. Raises ValueError with the defect."""
     if not isinstance(body, dict) or set(body) != {'format', 'uav_id', 'boot', 'record'}:
-        raise ValueError('not written by this program, or damaged')
-    if body['format'] != FORMAT:
-        raise ValueError(f'format = {body["format"]!r:.50}: expected {FORMAT}')
+        raise ValueError('corrupt or not an authority record')
+    if body['format'] != _FORMAT:
+        raise ValueError(f'format = {body["format"]!r:.50}: expected {_FORMAT}')
     if body['uav_id'] != uav_id:
         raise ValueError(f'uav_id = {body["uav_id"]!r:.250}: expected {uav_id!r}')
     row = body['record']
     if not isinstance(row, dict) or row.keys() != _CHECKS.keys():
         raise ValueError('record: expected ' + ', '.join(_CHECKS))
-    found = {}
+    record = {}
     for name, value in row.items():
-        right, made = _CHECKS[name]
-        if not right(value):
+        is_valid, convert = _CHECKS[name]
+        if not is_valid(value):
             raise ValueError(f'{name} = {value!r:.50}: expected another type of value')
-        found[name] = made(value)
-    return AuthorityRecord(**found)
+        record[name] = convert(value)
+    return AuthorityRecord(**record)
 
 
 def _is_whole(value: Any) -> bool:
@@ -187,22 +202,22 @@ def _is_whole(value: Any) -> bool:
 
 
 def _is_time(value: Any) -> bool:
-    return type(value) in (int, float) and -MOST_SECONDS < value < MOST_SECONDS
+    return type(value) in (int, float) and -_TIME_LIMIT < value < _TIME_LIMIT
 
 
 def _is_text(value: Any) -> bool:
-    return isinstance(value, str) and value.isprintable()  # a log takes it
+    return isinstance(value, str) and value.isprintable()  # safe to log
 
 
 def _is_state(value: Any) -> bool:
     return isinstance(value, str) and value in AuthorityState.__members__ and value != 'UNKNOWN'
 
 
-def _or_none(right: Callable[[Any], bool]) -> Callable[[Any], bool]:
-    return lambda value: value is None or right(value)
+def _or_none(is_valid: Callable[[Any], bool]) -> Callable[[Any], bool]:
+    return lambda value: value is None or is_valid(value)
 
 
-def _same(value: Any) -> Any:
+def _unchanged(value: Any) -> Any:
     return value
 
 
@@ -212,14 +227,14 @@ def _are_marks(value: Any) -> bool:
         and all(map(_is_time, mark[1:5])) and isinstance(mark[5], bool) for mark in value)
 
 
-# whether a JSON value is of that type, and the value
+# by type of the field: whether a JSON value is valid, and its conversion
 _TYPES: dict[Any, tuple[Callable[[Any], bool], Callable[[Any], Any]]] = {
     AuthorityState: (_is_state, AuthorityState.__getitem__),
-    str: (_is_text, _same),
-    bool: (lambda value: isinstance(value, bool), _same),
+    str: (_is_text, _unchanged),
+    bool: (lambda value: isinstance(value, bool), _unchanged),
     float: (_is_time, float),
     float | None: (_or_none(_is_time), lambda value: None if value is None else float(value)),
-    int | None: (_or_none(_is_whole), _same),
+    int | None: (_or_none(_is_whole), _unchanged),
     tuple[int, ...]: (lambda value: isinstance(value, list) and all(map(_is_whole, value)),
                       tuple),
     tuple[TaskMark, ...]: (_are_marks, lambda value: tuple(TaskMark(*mark) for mark in value)),

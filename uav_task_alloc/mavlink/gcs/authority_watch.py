@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Turns what a vehicle shows, and what was sent to it, into events of the authority table."""
+"""Turns messages from a vehicle and commands to it into events of the authority table."""
 from __future__ import annotations
 
 from collections.abc import Callable
@@ -23,7 +23,7 @@ from uav_task_alloc.mavlink.gcs.mission_evidence import MissionEvidence
 from uav_task_alloc.mavlink.gcs.mode_changes import ModeChanges
 from uav_task_alloc.mavlink.gcs.policy import Policy
 from uav_task_alloc.mavlink.gcs.sent_commands import SentCommands
-from uav_task_alloc.mavlink.gcs.suspension_checks import check_foreign, check_status
+from uav_task_alloc.mavlink.gcs.suspension_checks import check_foreign, check_system_status
 from uav_task_alloc.mavlink.gcs.takeoff_grant import TakeoffGrant
 from uav_task_alloc.mavlink.gcs.telemetry import Telemetry
 from uav_task_alloc.mavlink.transport.codec import Message
@@ -31,7 +31,21 @@ from uav_task_alloc.model import Point
 
 
 class AuthorityWatch:
-    """Watches one vehicle; `authority` is who has it."""
+    """Keeps the authority over one vehicle up to date.
+
+    Args:
+        profile: kind of autopilot.
+        telemetry: of the vehicle; each message is given to it before it comes here.
+        evidence: of its mission.
+        policy: returns the present parameters.
+        now: steady time [s].
+        record: of the previous run; None: there is none.
+        save: called with the record when it has changed, before a command is sent.
+
+    Attributes:
+        authority: the state, and what may be sent.
+        notes: for the operator, oldest first; the caller removes them.
+    """
 
     def __init__(self, profile: Profile, telemetry: Telemetry, evidence: MissionEvidence,
                  policy: Callable[[], Policy], now: float, record: AuthorityRecord | None = None,
@@ -39,7 +53,7 @@ class AuthorityWatch:
         self.authority = Authority(now, record)
         self._state = state = AuthorityWatchState(
             profile, telemetry, self.authority,
-            SentCommands.before_restart(record, now) if record else SentCommands(),
+            SentCommands.from_record(record, now) if record else SentCommands(),
             flown=record.flown if record else False)
         self.notes = state.notes
         self._evidence, self._policy = evidence, policy
@@ -49,7 +63,7 @@ class AuthorityWatch:
         self._arming = ArmingAndLanding(state, evidence, policy)
         self._hand_over = HandOver(state, evidence, policy)
         self._grant = TakeoffGrant(state, policy)
-        self._record = AuthorityRecorder(state, evidence, record, save)
+        self._recorder = AuthorityRecorder(state, evidence, record, save)
 
     @property
     def mode(self) -> int | None:
@@ -58,62 +72,64 @@ class AuthorityWatch:
 
     @property
     def armed(self) -> bool:
-        """As in the newest heartbeat."""
+        """Whether the newest heartbeat shows it armed."""
         return self._state.armed
 
     @property
     def was_lost(self) -> bool:
-        """The link was, and the mode is not confirmed yet."""
+        """Whether the link was lost and no heartbeat has confirmed the mode since."""
         return self._link.was_lost
 
     @property
     def marks(self) -> dict[str, TaskMark]:
-        """Tasks that were flown or passed over, by id."""
-        return self._record.marks
+        """Tasks that were flown or skipped, by id."""
+        return self._recorder.marks
 
     @property
     def swap_at(self) -> float | None:
-        """Since when we hold it for an upload [s]; None: we do not."""
+        """Since when it is held for a mission replacement [s]; None: it is not."""
         return self._state.swap_at
 
     @swap_at.setter
     def swap_at(self, since: float | None) -> None:
         self._state.swap_at = since
 
-    # what the vehicle shows
+    # messages from the vehicle
 
     def receive_heartbeat(self, message: Message, now: float) -> None:
-        """Take the newest HEARTBEAT of the autopilot."""
+        """Process the newest HEARTBEAT of the autopilot."""
         state = self._state
-        before, was_armed, descends = state.mode, state.armed, self._arming.descends()
-        if state.sent.armed_before(state.telemetry.frame):
-            was_armed, state.flown = True, True  # that it is not armed now is news
+        before, was_armed = state.mode, state.armed
+        was_returning = self._arming.is_returning()
+        if state.sent.take_armed_before(state.telemetry.frame):
+            was_armed, state.flown = True, True  # a heartbeat that shows disarmed is a change
         state.mode = message.custom_mode
         state.armed = bool(message.base_mode & d.MAV_MODE_FLAG_SAFETY_ARMED)
         state.status = message.system_status
         if before is None or self._restart.pending:
-            self._restart.heartbeat(now)
+            self._restart.receive_heartbeat(now)
         elif state.unconfirmed:
             self._link.confirm(now)
         else:
-            self._modes.heartbeat(before, message.custom_mode, now)
+            self._modes.receive_heartbeat(before, message.custom_mode, now)
             if state.armed != was_armed:
-                self._arming.changed(descends, now)
-        check_status(state, now)
-        self._keep()
+                self._arming.armed_changed(was_returning, now)
+        check_system_status(state, now)
+        self._save_record()
 
     def receive_command_ack(self, message: Message, frame: int) -> None:
-        """Take a COMMAND_ACK that is addressed to us, and the number of its frame."""
-        self._state.sent.answered(message, frame)
+        """Process a COMMAND_ACK that is addressed to us, and the number of its frame."""
+        self._state.sent.receive_command_ack(message, frame)
 
     def receive_status_text(self, message: Message, now: float) -> None:
-        """Take a STATUSTEXT: it may say why the mode changes."""
+        """Process a STATUSTEXT, which may contain the cause of a mode change."""
         if self._state.texts.receive(message, now):
-            self._state.apply(AuthorityEvent.KILLED, now, f'the vehicle says: {message.text}')
-        self._keep()
+            self._state.apply(AuthorityEvent.KILLED, now,
+                              f'the vehicle reports: {message.text}')
+        self._save_record()
 
     def step(self, now: float) -> None:
-        """Let time pass, after each message too."""
+        """Apply what depends on time and telemetry; called after each message too."""
         self._link.step(now)
         self._restart.step(now)
         self._modes.resolve(now)
@@ -122,61 +138,68 @@ class AuthorityWatch:
         self._grant.step(now)
         foreign = self._evidence.foreign() and self._policy().when_foreign == 'yield'
         check_foreign(self._state, foreign, now)
-        self._keep()
+        self._save_record()
 
     def address_changed(self, now: float) -> None:
-        """It speaks from elsewhere: the same vehicle, or another one with its id."""
-        self._link.new_address(now)
+        """Apply that its messages come from a new address: it may be another vehicle."""
+        self._link.address_changed(now)
 
     def vehicle_rebooted(self, now: float) -> None:
-        """Its clock went back."""
-        self._link.rebooted(now)
-        self._keep()
+        """Apply a reboot of the vehicle, of which its clock went back."""
+        self._link.vehicle_rebooted(now)
+        self._save_record()
 
-    def mark_task(self, task: str, place: Point | None, flown: bool, now: float) -> None:
-        """A task was flown, or passed over: a restarted bridge could not see which."""
-        self._record.mark(task, place, flown, now)
+    def mark_task(self, task: str, position: Point | None, flown: bool, now: float) -> None:
+        """Record that a task was flown or skipped, for a restarted bridge.
 
-    # what we do
+        Args:
+            task: its id.
+            position: [m] ENU; None: not known, nothing is recorded.
+            flown: False: another station has set the current item beyond it.
+            now: steady time [s].
+        """
+        self._recorder.mark_task(task, position, flown, now)
+
+    # commands to the vehicle, and to the bridge
 
     def record_command(self, message: Message, now: float) -> None:
-        """A command is about to be sent: written down before it is."""
+        """Record a command that is about to be sent; the record is saved when this returns."""
         if message.get_type() != 'COMMAND_LONG':
             return
         state, sent = self._state, self._state.sent
         mode = state.profile.commanded_mode(message)
         if mode is not None:
             sent.climb = None
-            sent.acks.sent(mode, now)
-            sent.mode(mode, now)
-            state.descending = state.returns(mode)
+            sent.acks.command_sent(mode, now)
+            sent.add_mode(mode, now)
+            state.descending = state.is_return(mode)
         elif message.command == d.MAV_CMD_COMPONENT_ARM_DISARM:
-            sent.arm(message.param1 == 1.0, now)
+            sent.add_arming(message.param1 == 1.0, now)
         elif message.command == d.MAV_CMD_NAV_TAKEOFF:
             state.descending = False
-            takes_off = state.profile.takeoff_mode
-            if takes_off is not None:
-                sent.mode(takes_off, now)
+            takeoff_mode = state.profile.takeoff_mode
+            if takeoff_mode is not None:
+                sent.add_mode(takeoff_mode, now)
                 sent.climb = self._policy().cruise_altitude
-        self._keep()
+        self._save_record()
 
     def hand_over(self, operator: str, now: float) -> str:
-        """An operator gives the aircraft to the bridge.
+        """Hand the vehicle over to the bridge, as an operator requests.
 
         Args:
-            operator: who does, for the log.
+            operator: name of the operator, for the log.
             now: steady time [s].
 
         Returns:
-            Why it is refused; '' where the bridge has it now.
+            Why it is refused; '' where the vehicle is HELD now.
         """
         if self.authority.held:
             return ''
-        refusal = self._hand_over.ask(operator, now)
+        refusal = self._hand_over.request(operator, now)
         if not refusal:
-            self._keep()
+            self._save_record()
         return refusal
 
-    def _keep(self) -> None:
+    def _save_record(self) -> None:
         if not self._restart.pending:
-            self._record.keep()
+            self._recorder.save_if_changed()

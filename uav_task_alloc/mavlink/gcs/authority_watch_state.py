@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What is known of one vehicle as far as authority is concerned; shared by all that judge it."""
+"""The state of one vehicle that all checks of authority share: modes, arming, pending causes."""
 from __future__ import annotations
 
 from collections import deque
@@ -17,22 +17,22 @@ from uav_task_alloc.mavlink.gcs.telemetry import Telemetry
 from uav_task_alloc.mavlink.transport.notes import OperatorNote
 from uav_task_alloc.model import Point
 
-DOUBT = 5.0  # [s] in which a message under way may explain a change of mode
+EXPLANATION_TIME = 5.0  # [s] in which a delayed message may explain a change of mode
 
 
 @dataclass(slots=True)
-class Doubt:
-    """A change of mode that a message under way may explain."""
+class UnexplainedChange:
+    """A change of mode that a delayed message may still explain."""
 
     until: float  # [s]
     explained: Callable[[float], bool]
-    why: str  # it is lost otherwise
-    ours: int | None = None  # custom_mode of ours that explains it
+    why: str  # reason of LOST otherwise
+    ours: int | None = None  # custom_mode commanded by us that explains it
 
 
 @dataclass(slots=True)
 class AuthorityWatchState:
-    """What was seen of one vehicle and sent to it, and what of that is still open."""
+    """What was received from one vehicle and sent to it, as far as authority depends on it."""
 
     profile: Profile
     telemetry: Telemetry
@@ -44,55 +44,55 @@ class AuthorityWatchState:
     mode: int | None = None  # custom_mode of the newest heartbeat
     armed: bool = False
     status: int = 0  # MAV_STATE
-    unconfirmed: bool = False  # the next heartbeat tells the mode, and is no change
-    doubt: Doubt | None = None
-    rest: tuple[float, Point] | None = None  # since when [s], where: STICK -> HOLD
-    mission_on_ground: bool = False  # MISSION was set on the ground, by another
+    unconfirmed: bool = False  # the next heartbeat shows the mode, without a change of mode
+    unexplained: UnexplainedChange | None = None
+    rest: tuple[float, Point] | None = None  # since when [s], and where: STICK -> HOLD
+    mission_on_ground: bool = False  # another station has set MISSION on the ground
     maybe_ours: bool = False  # in MISSION when the bridge started
-    hold_due: bool = False  # first, where it turns out to be in the air after a restart
+    hold_due: bool = False  # command HOLD if it is airborne, after a restart of the bridge
     descending: bool = False  # by our RETURN
     was_airborne: bool = False
-    swap_at: float | None = None  # [s] since when we hold it for an upload
+    swap_at: float | None = None  # [s] since when it is held for a mission replacement
 
     def class_of(self, mode: int | None) -> ModeClass | None:
-        """Who decides in a mode; None: not known."""
+        """The class of a custom_mode; None: not known."""
         return None if mode is None else mode_class(self.profile.family, mode)
 
     def name_of(self, mode: int | None) -> str:
-        """A mode, as its own ground station shows it."""
+        """The name of a custom_mode, as the vehicle's own ground station shows it."""
         return 'no mode' if mode is None else mode_name(self.profile.family, mode)
 
-    def returns(self, mode: int | None) -> bool:
-        """Whether a mode takes it home."""
+    def is_return(self, mode: int | None) -> bool:
+        """Whether a custom_mode returns the vehicle to its home."""
         return mode is not None and self.profile.mode_function(mode) is ModeFunction.RETURN
 
     @property
     def booting(self) -> bool:
-        """A heartbeat says so: while SUSPENDED nothing asks for a message with its clock."""
+        """Whether the autopilot boots, by its heartbeat (SUSPENDED, no clock is requested)."""
         return self.status in (d.MAV_STATE_BOOT, d.MAV_STATE_CALIBRATING)
 
-    def failing(self, now: float) -> bool:
-        """A failsafe is active, or was named a moment ago."""
-        return bool(self.status >= d.MAV_STATE_CRITICAL) or self.texts.failsafe(now)
+    def failsafe_active(self, now: float) -> bool:
+        """Whether a failsafe is active, or was reported by a STATUSTEXT a moment ago."""
+        return bool(self.status >= d.MAV_STATE_CRITICAL) or self.texts.recent_failsafe(now)
 
     def forget_mode(self) -> None:
-        """What was concluded from the mode before holds no longer."""
+        """Clear what was concluded from the previous mode."""
         self.rest, self.mission_on_ground, self.maybe_ours = None, False, False
 
     def apply(self, event: AuthorityEvent, now: float, why: str) -> None:
-        """Follow the authority table, and drop what the new state makes void.
+        """Make the transition of the authority table, and clear what the new state invalidates.
 
         Args:
             event: what happened.
             now: steady time [s].
-            why: in words, for people.
+            why: the reason shown to the operator.
         """
         before = self.authority.state
         if not self.authority.apply(event, now, why):
             return
         state = self.authority.state
         if state is AuthorityState.LOST and before is not AuthorityState.LOST:
-            self.doubt, self.rest = None, None
+            self.unexplained, self.rest = None, None
             self.sent.modes.clear()
         if state is AuthorityState.SUSPENDED and not self.unconfirmed:
             self.sent.modes.clear()
@@ -110,8 +110,13 @@ class AuthorityWatchState:
             )
         )
 
-    def take(self, why: str, now: float) -> None:
-        """Somebody else has changed the mode."""
+    def apply_taken(self, why: str, now: float) -> None:
+        """Apply a change of mode by a pilot or another station.
+
+        Args:
+            why: the change of mode, for the reason shown to the operator.
+            now: steady time [s].
+        """
         swap = self.swap_at is not None and self.authority.held
         self.apply(
             AuthorityEvent.SWAP_TAKEN if swap else AuthorityEvent.TAKEN,
@@ -119,16 +124,17 @@ class AuthorityWatchState:
             f'not by the bridge: {why}',
         )
 
-    def wait_for_reason(self, explained: Callable[[float], bool], why: str, now: float, *,
-                        within: float = DOUBT, ours: int | None = None) -> None:
-        """A change of mode that nothing explains yet: SUSPENDED until something does.
+    def suspend_until_explained(self, explained: Callable[[float], bool], why: str, now: float,
+                                *, within: float = EXPLANATION_TIME,
+                                ours: int | None = None) -> None:
+        """Suspend authority after a change of mode that no message explains yet.
 
         Args:
-            explained: whether something explains it by a time [s].
-            why: what changed, in words.
+            explained: whether the change is explained at a steady time [s].
+            why: the change of mode, for the reason shown to the operator.
             now: steady time [s].
-            within: [s] in which it has to be explained; it is lost after that.
-            ours: custom_mode of ours that explains it, if it is seen.
+            within: [s] in which it has to be explained; LOST after that.
+            ours: custom_mode commanded by us that explains it when a heartbeat shows it.
         """
-        self.doubt = Doubt(now + within, explained, why, ours)
+        self.unexplained = UnexplainedChange(now + within, explained, why, ours)
         self.apply(AuthorityEvent.UNEXPLAINED, now, why)

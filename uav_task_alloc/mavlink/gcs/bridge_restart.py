@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Judges a vehicle that the bridge finds at its start, with a record of it or without one."""
+"""Decides the authority over a vehicle after a start of the bridge, with or without a record."""
 from __future__ import annotations
 
 from collections.abc import Callable
@@ -7,32 +7,39 @@ from collections.abc import Callable
 from uav_task_alloc.mavlink.gcs.authority import AuthorityEvent, AuthorityRecord, AuthorityState
 from uav_task_alloc.mavlink.gcs.authority_watch_state import AuthorityWatchState
 from uav_task_alloc.mavlink.gcs.flight_modes import ModeClass
-from uav_task_alloc.mavlink.gcs.hand_over import REST
+from uav_task_alloc.mavlink.gcs.hand_over import REST_SPEED
 from uav_task_alloc.mavlink.gcs.mission_evidence import MissionEvidence
 from uav_task_alloc.mavlink.gcs.policy import Policy
 
-SWAP_KEPT = 60.0  # [s] that a swap may be under way when the bridge is restarted
-BRAKING = 10.0  # [s] after its hold was sent until it is at rest
+_SWAP_KEPT = 60.0  # [s] after which a swap of the previous run is not continued
+_BRAKING_TIME = 10.0  # [s] from the HOLD command until the vehicle is at rest
 
 
 class BridgeRestart:
-    """Compares one vehicle with what the bridge before left."""
+    """Compares one vehicle with the record of the previous run.
+
+    Args:
+        state: of the vehicle; changed by the methods.
+        evidence: of its mission.
+        policy: returns the present parameters.
+        record: of the previous run; None: there is none.
+    """
 
     def __init__(self, state: AuthorityWatchState, evidence: MissionEvidence,
                  policy: Callable[[], Policy], record: AuthorityRecord | None) -> None:
         self._state, self._evidence, self._policy = state, evidence, policy
-        self._record = record  # of the bridge before, until it is judged
-        self._armed_at_start = False  # somebody had armed it before this bridge was there
+        self._record = record  # None once it is compared
+        self._armed_at_start = False  # it was armed before the bridge started
         if record is None:
             state.authority.undecided = True
 
     @property
     def pending(self) -> bool:
-        """The record is not judged yet."""
+        """Whether the record is still to be compared with a heartbeat."""
         return self._record is not None
 
-    def heartbeat(self, now: float) -> None:
-        """The first heartbeat of this bridge: does the vehicle do what it was left to do?"""
+    def receive_heartbeat(self, now: float) -> None:
+        """Compare the first heartbeat of this run with the record."""
         state, record = self._state, self._record
         if record is None:
             state.authority.undecided = self._armed_at_start = state.armed
@@ -43,13 +50,13 @@ class BridgeRestart:
         agrees = self._agrees(record)
         if agrees and record.swap_at is not None and (
                 state.class_of(state.mode) is ModeClass.HOLD):
-            rests = self._rests(record.swap_at, now)
-            if rests is None:
-                return  # the next heartbeat will tell
-            agrees = rests
+            at_rest = self._at_rest(record.swap_at, now)
+            if at_rest is None:
+                return  # decided at a later heartbeat
+            agrees = at_rest
             state.swap_at = record.swap_at if agrees else None
         self._record = None
-        self._go_on(record, agrees, now)
+        self._apply_result(record, agrees, now)
 
     def _agrees(self, record: AuthorityRecord) -> bool:
         state = self._state
@@ -57,33 +64,33 @@ class BridgeRestart:
             state.mode in (record.mode, *record.commanded))
         return same and (state.armed == record.armed or (state.armed and record.arming))
 
-    def _rests(self, swap_at: float, now: float) -> bool | None:
+    def _at_rest(self, swap_at: float, now: float) -> bool | None:
         """Whether it is at rest for a swap; None: not known, or it may still be braking."""
         telemetry = self._state.telemetry
-        held, known = now - swap_at, telemetry.has_velocity
-        rests = known and telemetry.speed < REST
-        if not rests and 0.0 <= held < (BRAKING if known else SWAP_KEPT):
+        held_for, known = now - swap_at, telemetry.has_velocity
+        at_rest = known and telemetry.speed < REST_SPEED
+        if not at_rest and 0.0 <= held_for < (_BRAKING_TIME if known else _SWAP_KEPT):
             return None
-        return rests and 0.0 <= held < SWAP_KEPT
+        return at_rest and 0.0 <= held_for < _SWAP_KEPT
 
-    def _go_on(self, record: AuthorityRecord, agrees: bool, now: float) -> None:
+    def _apply_result(self, record: AuthorityRecord, agrees: bool, now: float) -> None:
         state = self._state
-        state.descending = state.returns(state.mode or 0)
+        state.descending = state.is_return(state.mode or 0)
         if agrees and state.mode is not None:
-            # a hold that was sent, or was to be sent, and was not seen
+            # a HOLD that was sent, or due, and that no heartbeat has confirmed
             mode_class = state.class_of(state.mode)
             state.hold_due = mode_class is ModeClass.STICK or (
                 mode_class is not ModeClass.HOLD
                 and ModeClass.HOLD in map(state.class_of, record.commanded))
-            state.sent.expects(state.mode, now)
+            state.sent.confirm_mode(state.mode, now)
         state.apply(
             AuthorityEvent.RESTART_AGREES if agrees else AuthorityEvent.RESTART_DIFFERS,
             now,
-            f'the bridge was restarted, and found {state.name_of(state.mode)}',
+            f'the bridge was restarted, the vehicle is in {state.name_of(state.mode)}',
         )
 
     def step(self, now: float) -> None:
-        """After a start without a record: on the ground, or in the air?"""
+        """Decide after a start without a record: on the ground, or airborne."""
         state, authority = self._state, self._state.authority
         if authority.undecided and state.mode is not None:
             if state.telemetry.grounded:

@@ -1,43 +1,70 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The flight modes of ArduPilot and PX4 by number: their names, and who flies in them."""
+"""The flight modes of ArduPilot and PX4 by number: their names and their classes."""
 from __future__ import annotations
 
 from enum import Enum
 
+from pymavlink.dialects.v20 import ardupilotmega as d
+
 
 class ModeClass(Enum):
-    """Who decides where the vehicle goes in a mode."""
+    """What controls the path of the vehicle in a mode."""
 
-    MISSION = 'the stored mission'
-    HOLD = 'holds, or goes where a station says'
-    STICK = 'a human'
-    OWN = 'the vehicle, or whoever sent it'
+    MISSION = 'the onboard mission'
+    HOLD = 'holds, or flies to the point that a ground station sets'
+    STICK = 'the pilot'
+    OWN = 'the autopilot, or another station'
 
 
+_COPTER_RATE_ACRO = 29  # newer than the dialect
 _COPTER = {
-    0: 'STABILIZE', 1: 'ACRO', 2: 'ALT_HOLD', 3: 'AUTO', 4: 'GUIDED', 5: 'LOITER', 6: 'RTL',
-    7: 'CIRCLE', 9: 'LAND', 11: 'DRIFT', 13: 'SPORT', 14: 'FLIP', 15: 'AUTOTUNE', 16: 'POSHOLD',
-    17: 'BRAKE', 18: 'THROW', 19: 'AVOID_ADSB', 20: 'GUIDED_NOGPS', 21: 'SMART_RTL',
-    22: 'FLOWHOLD', 23: 'FOLLOW', 24: 'ZIGZAG', 25: 'SYSTEMID', 26: 'AUTOROTATE', 27: 'AUTO_RTL',
-    28: 'TURTLE', 29: 'RATE_ACRO'}
+    d.COPTER_MODE_STABILIZE: 'STABILIZE', d.COPTER_MODE_ACRO: 'ACRO',
+    d.COPTER_MODE_ALT_HOLD: 'ALT_HOLD', d.COPTER_MODE_AUTO: 'AUTO',
+    d.COPTER_MODE_GUIDED: 'GUIDED', d.COPTER_MODE_LOITER: 'LOITER', d.COPTER_MODE_RTL: 'RTL',
+    d.COPTER_MODE_CIRCLE: 'CIRCLE', d.COPTER_MODE_LAND: 'LAND', d.COPTER_MODE_DRIFT: 'DRIFT',
+    d.COPTER_MODE_SPORT: 'SPORT', d.COPTER_MODE_FLIP: 'FLIP', d.COPTER_MODE_AUTOTUNE: 'AUTOTUNE',
+    d.COPTER_MODE_POSHOLD: 'POSHOLD', d.COPTER_MODE_BRAKE: 'BRAKE', d.COPTER_MODE_THROW: 'THROW',
+    d.COPTER_MODE_AVOID_ADSB: 'AVOID_ADSB', d.COPTER_MODE_GUIDED_NOGPS: 'GUIDED_NOGPS',
+    d.COPTER_MODE_SMART_RTL: 'SMART_RTL', d.COPTER_MODE_FLOWHOLD: 'FLOWHOLD',
+    d.COPTER_MODE_FOLLOW: 'FOLLOW', d.COPTER_MODE_ZIGZAG: 'ZIGZAG',
+    d.COPTER_MODE_SYSTEMID: 'SYSTEMID', d.COPTER_MODE_AUTOROTATE: 'AUTOROTATE',
+    d.COPTER_MODE_AUTO_RTL: 'AUTO_RTL', d.COPTER_MODE_TURTLE: 'TURTLE',
+    _COPTER_RATE_ACRO: 'RATE_ACRO'}
 _PLANE = {
-    0: 'MANUAL', 1: 'CIRCLE', 2: 'STABILIZE', 3: 'TRAINING', 4: 'ACRO', 5: 'FBWA', 6: 'FBWB',
-    7: 'CRUISE', 8: 'AUTOTUNE', 10: 'AUTO', 11: 'RTL', 12: 'LOITER', 13: 'TAKEOFF',
-    14: 'AVOID_ADSB', 15: 'GUIDED', 17: 'QSTABILIZE', 18: 'QHOVER', 19: 'QLOITER', 20: 'QLAND',
-    21: 'QRTL', 22: 'QAUTOTUNE', 23: 'QACRO', 24: 'THERMAL', 25: 'LOITER_ALT_QLAND',
-    26: 'AUTOLAND'}
+    d.PLANE_MODE_MANUAL: 'MANUAL', d.PLANE_MODE_CIRCLE: 'CIRCLE',
+    d.PLANE_MODE_STABILIZE: 'STABILIZE', d.PLANE_MODE_TRAINING: 'TRAINING',
+    d.PLANE_MODE_ACRO: 'ACRO', d.PLANE_MODE_FLY_BY_WIRE_A: 'FBWA',
+    d.PLANE_MODE_FLY_BY_WIRE_B: 'FBWB', d.PLANE_MODE_CRUISE: 'CRUISE',
+    d.PLANE_MODE_AUTOTUNE: 'AUTOTUNE', d.PLANE_MODE_AUTO: 'AUTO', d.PLANE_MODE_RTL: 'RTL',
+    d.PLANE_MODE_LOITER: 'LOITER', d.PLANE_MODE_TAKEOFF: 'TAKEOFF',
+    d.PLANE_MODE_AVOID_ADSB: 'AVOID_ADSB', d.PLANE_MODE_GUIDED: 'GUIDED',
+    d.PLANE_MODE_QSTABILIZE: 'QSTABILIZE', d.PLANE_MODE_QHOVER: 'QHOVER',
+    d.PLANE_MODE_QLOITER: 'QLOITER', d.PLANE_MODE_QLAND: 'QLAND', d.PLANE_MODE_QRTL: 'QRTL',
+    d.PLANE_MODE_QAUTOTUNE: 'QAUTOTUNE', d.PLANE_MODE_QACRO: 'QACRO',
+    d.PLANE_MODE_THERMAL: 'THERMAL', d.PLANE_MODE_LOITER_ALT_QLAND: 'LOITER_ALT_QLAND',
+    d.PLANE_MODE_AUTOLAND: 'AUTOLAND'}
+# PX4's modes are not in the dialect: px4_custom_mode.h
 _PX4_MAIN = {1: 'Manual', 2: 'Altitude', 3: 'Position', 5: 'Acro', 6: 'Offboard',
              7: 'Stabilized', 8: 'Rattitude', 10: 'Termination'}
 _PX4_AUTO = {1: 'Ready', 2: 'Takeoff', 3: 'Hold', 4: 'Mission', 5: 'Return', 6: 'Land',
              8: 'Follow', 9: 'Precision Land', 10: 'VTOL Takeoff'}
 _AUTO = 4  # PX4's main mode with sub modes
 
-# family -> (mission, hold, flown by stick); every other mode is OWN
+# family -> (MISSION, HOLD, STICK); every other mode is OWN
 _ARDUPILOT = {
-    'copter': (3, 4, frozenset({0, 1, 2, 5, 11, 13, 14, 15, 16, 18, 22, 24, 25, 26, 28, 29})),
-    'plane': (10, 15, frozenset({0, *range(2, 9), 17, 18, 19, 23}))}
+    'copter': (d.COPTER_MODE_AUTO, d.COPTER_MODE_GUIDED, frozenset({
+        d.COPTER_MODE_STABILIZE, d.COPTER_MODE_ACRO, d.COPTER_MODE_ALT_HOLD,
+        d.COPTER_MODE_LOITER, d.COPTER_MODE_DRIFT, d.COPTER_MODE_SPORT, d.COPTER_MODE_FLIP,
+        d.COPTER_MODE_AUTOTUNE, d.COPTER_MODE_POSHOLD, d.COPTER_MODE_THROW,
+        d.COPTER_MODE_FLOWHOLD, d.COPTER_MODE_ZIGZAG, d.COPTER_MODE_SYSTEMID,
+        d.COPTER_MODE_AUTOROTATE, d.COPTER_MODE_TURTLE, _COPTER_RATE_ACRO})),
+    'plane': (d.PLANE_MODE_AUTO, d.PLANE_MODE_GUIDED, frozenset({
+        d.PLANE_MODE_MANUAL, d.PLANE_MODE_STABILIZE, d.PLANE_MODE_TRAINING, d.PLANE_MODE_ACRO,
+        d.PLANE_MODE_FLY_BY_WIRE_A, d.PLANE_MODE_FLY_BY_WIRE_B, d.PLANE_MODE_CRUISE,
+        d.PLANE_MODE_AUTOTUNE, d.PLANE_MODE_QSTABILIZE, d.PLANE_MODE_QHOVER,
+        d.PLANE_MODE_QLOITER, d.PLANE_MODE_QACRO}))}
 _PX4_STICK = frozenset({1, 2, 3, 5, 7, 8})  # main modes
-_AVOIDS = {'copter': 19, 'plane': 14}
+_AVOIDS = {'copter': d.COPTER_MODE_AVOID_ADSB, 'plane': d.PLANE_MODE_AVOID_ADSB}
 _NAMES = {'copter': _COPTER, 'plane': _PLANE}
 
 
@@ -46,7 +73,7 @@ def _px4_parts(custom_mode: int) -> tuple[int, int]:
 
 
 def mode_class(family: str, custom_mode: int) -> ModeClass | None:
-    """Classify a mode.
+    """Classify a mode (ArduPilot mode.h, PX4 px4_custom_mode.h).
 
     Args:
         family: 'copter', 'plane', 'px4', or '' for an autopilot of unknown kind.
@@ -54,8 +81,6 @@ def mode_class(family: str, custom_mode: int) -> ModeClass | None:
 
     Returns:
         The class; None for an autopilot of unknown kind.
-
-    Source: ArduPilot mode.h (Number), PX4 px4_custom_mode.h.
     """
     if family == 'px4':
         main, sub = _px4_parts(custom_mode)
@@ -71,7 +96,15 @@ def mode_class(family: str, custom_mode: int) -> ModeClass | None:
 
 
 def mode_name(family: str, custom_mode: int) -> str:
-    """The name of a mode as its own ground station shows it; its number where it has none."""
+    """Name a mode as the vehicle's own ground station shows it.
+
+    Args:
+        family: as in `mode_class`.
+        custom_mode: HEARTBEAT.custom_mode.
+
+    Returns:
+        The name; 'mode NUMBER' where it has none.
+    """
     if family == 'px4':
         main, sub = _px4_parts(custom_mode)
         name = _PX4_AUTO.get(sub) if main == _AUTO else _PX4_MAIN.get(main)
@@ -81,5 +114,5 @@ def mode_name(family: str, custom_mode: int) -> str:
 
 
 def avoids_traffic(family: str, custom_mode: int) -> bool:
-    """Whether the autopilot is getting out of the way of another aircraft (AVOID_ADSB)."""
+    """Whether the autopilot avoids another aircraft in this mode (AVOID_ADSB)."""
     return _AVOIDS.get(family) == custom_mode

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Hand-over to the bridge: by `~/hand_over`, or from the sticks to HOLD at rest."""
+"""Hand-over to the bridge: by `~/hand_over`, or by a change from a stick mode to HOLD at rest."""
 from __future__ import annotations
 
 import math
@@ -12,24 +12,31 @@ from uav_task_alloc.mavlink.gcs.authority_watch_state import AuthorityWatchState
 from uav_task_alloc.mavlink.gcs.mission_evidence import MissionEvidence
 from uav_task_alloc.mavlink.gcs.policy import Policy
 
-REST, REST_MOVED, REST_TIME = 1.0, 3.0, 6.0  # [m/s], [m], [s]: at rest, for a hand-over
-LOW_BATTERY = 0.2  # [0..1] below which nothing is handed over
+REST_SPEED = 1.0  # [m/s] below which a vehicle is at rest
+_REST_DISTANCE, _REST_TIME = 3.0, 6.0  # [m], [s]: at rest, for a hand-over
+_LOW_BATTERY = 0.2  # [0..1] below which a hand-over is refused
 
 
 class HandOver:
-    """Gives one vehicle to the bridge, or says why not."""
+    """Hands one vehicle over to the bridge, or refuses with a reason.
+
+    Args:
+        state: of the vehicle; changed by the methods.
+        evidence: of its mission.
+        policy: returns the present parameters.
+    """
 
     def __init__(self, state: AuthorityWatchState, evidence: MissionEvidence,
                  policy: Callable[[], Policy]) -> None:
         self._state, self._evidence, self._policy = state, evidence, policy
 
-    def ask(self, operator: str, now: float) -> str:
-        """An operator gives an aircraft that the bridge does not have; why not, or ''."""
+    def request(self, operator: str, now: float) -> str:
+        """Hand over a vehicle that is not HELD; returns the refusal, '' on success."""
         refusal = self._refusal(now)
         if not refusal:
             state = self._state
             state.forget_mode()
-            state.sent.drop()
+            state.sent.clear_pending()
             state.flown = state.armed
             state.authority.undecided = False
             state.apply(
@@ -47,8 +54,8 @@ class HandOver:
             return 'the mission on board is foreign'
         if authority.state is AuthorityState.SUSPENDED:
             return f'SUSPENDED: {authority.why}'
-        if telemetry.battery < LOW_BATTERY:
-            return (f'battery = {telemetry.battery:.0%}: expected at least {LOW_BATTERY:.0%}')
+        if telemetry.battery < _LOW_BATTERY:
+            return f'battery = {telemetry.battery:.0%}: expected at least {_LOW_BATTERY:.0%}'
         if not telemetry.past_boot:
             return 'the autopilot is starting'
         if not (telemetry.airborne or telemetry.grounded):
@@ -62,18 +69,18 @@ class HandOver:
         return ''
 
     def step(self, now: float) -> None:
-        """STICK -> HOLD is a hand-over once it has been at rest for a while."""
+        """Apply the hand-over by STICK -> HOLD once the vehicle has been at rest long enough."""
         state, telemetry = self._state, self._state.telemetry
         if state.rest is None:
             return
-        since, place = state.rest
-        moved = math.dist(telemetry.position, place)
-        calm = (telemetry.speed < REST and moved < REST_MOVED and telemetry.airborne
-                and now - telemetry.position_at < 2.0 and state.status == d.MAV_STATE_ACTIVE
-                and not state.failing(now))
-        if not calm:
+        since, position = state.rest
+        moved = math.dist(telemetry.position, position)
+        at_rest = (telemetry.speed < REST_SPEED and moved < _REST_DISTANCE and telemetry.airborne
+                   and now - telemetry.position_at < 2.0
+                   and state.status == d.MAV_STATE_ACTIVE and not state.failsafe_active(now))
+        if not at_rest:
             state.rest = None
-        elif now - since >= REST_TIME:
+        elif now - since >= _REST_TIME:
             state.rest = None
             state.apply(AuthorityEvent.STICK_TO_HOLD, now,
-                        f'{state.name_of(state.mode)} at rest for {REST_TIME:g} s')
+                        f'{state.name_of(state.mode)} at rest for {_REST_TIME:g} s')

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the mission on board says about a change of mode."""
+"""What the onboard mission says about the cause of a mode change."""
 from __future__ import annotations
 
 from pymavlink.dialects.v20 import ardupilotmega as d
@@ -11,39 +11,44 @@ from uav_task_alloc.mavlink.mission.items import Item, alike
 
 
 class MissionEvidence:
-    """Reads the board of one vehicle, and changes nothing."""
+    """A read-only view of one vehicle's onboard mission for the checks of authority.
+
+    Args:
+        onboard: the mission of the vehicle.
+        telemetry: of the vehicle.
+    """
 
     def __init__(self, onboard: OnboardMission, telemetry: Telemetry) -> None:
         self._onboard, self._telemetry = onboard, telemetry
         self._checksum: tuple[tuple[Item, ...], int] | None = None
 
     def ended(self, now: float) -> bool:
-        """REACHED of the last item has just come."""
+        """Whether REACHED of the last item was received within `LATE`."""
         return self._onboard.progress.ended_lately(now, LATE)
 
     def rejected(self, now: float) -> bool:
-        """The vehicle says that it has no valid mission, just after it took ours (PX4)."""
+        """Whether the vehicle reports no valid mission just after it accepted ours (PX4)."""
         telemetry, onboard = self._telemetry, self._onboard
         return (telemetry.mission_state == d.MISSION_STATE_NO_MISSION
                 and now - telemetry.current_at < LATE
                 and (onboard.taken or now - onboard.verified_at < LATE))
 
     def returning(self) -> bool:
-        """The RETURN item is next, or is being flown."""
+        """Whether the RETURN item is next, or is being flown."""
         progress = self._onboard.progress
         return progress.returns and progress.current is not None and (
             progress.current > progress.last_flown)
 
     def may_end(self) -> bool:
-        """The last item with a place is being flown, or is passed."""
+        """Whether the last item with a position is being flown, or is passed."""
         return self._onboard.progress.may_end(self._telemetry.received_at)
 
     def verified(self) -> bool:
-        """The list is verified on board."""
+        """Whether the list is VERIFIED on board."""
         return self._onboard.verified()
 
     def ours(self) -> bool:
-        """What was read back holds a task of the list: nobody else has put it there."""
+        """Whether the mission read back holds a task of the list, so that it is ours."""
         onboard = self._onboard
         if not onboard.held or onboard.tasks is None or not onboard.tasks.stops:
             return False
@@ -51,11 +56,11 @@ class MissionEvidence:
         return any(alike(item, held) for item in items for held in onboard.held)
 
     def foreign(self) -> bool:
-        """Somebody else has changed what was verified."""
+        """Whether another station has changed the verified mission."""
         return self._onboard.is_foreign
 
-    def place(self) -> tuple[int | None, int | None]:
-        """Checksum of the mission on board, and the item that is flown; None: not known."""
+    def mission_position(self) -> tuple[int | None, int | None]:
+        """Checksum of the onboard mission, and index of the item being flown; None: not known."""
         held, progress = self._onboard.held, self._onboard.progress
         if held is None or progress.current is None:
             return None, None

@@ -84,10 +84,10 @@ class MissionExecutor:
             else:
                 self.onboard.resume.unflown[mark.task] = mark[1:4]
         self._rules = (
-            self._linked, self._authority, self.sender.finish, take_off.lift, self._upload,
-            self._read, self._has_list, self._place, self._may_act, self._hold_first,
-            self._ending.held_too_long, self._ending.empty, fly_list.bring, take_off.rise,
-            fly_list.fly)
+            self._linked, self._authority, self.sender.finish, take_off.continue_takeoff,
+            self._upload, self._read, self._has_list, self._place, self._may_act,
+            self._hold_first, self._ending.held_too_long, self._ending.empty, fly_list.bring,
+            take_off.take_off, fly_list.fly)
 
     @property
     def going_home(self) -> bool:
@@ -219,7 +219,7 @@ class MissionExecutor:
                 self.onboard.watch(message, now)
         elif kind == 'STATUSTEXT':
             self.watch.receive_status_text(message, now)
-            self.sender.note_refusal(str(message.text))
+            self.sender.note_arming_refusal(str(message.text))
             self.onboard.list.horizon.note(str(message.text))
             note = self._texts.take(message, now)
             self.notes.extend(() if note is None else (note,))
@@ -280,7 +280,7 @@ class MissionExecutor:
         beyond = onboard.beyond_flown()
         if beyond is not None and self.authority.held:
             onboard.progress.begin_set_current(beyond)
-            return self.sender.jump(beyond + onboard.own, now,
+            return self.sender.set_current(beyond + onboard.own, now,
                                   lambda t: onboard.progress.note_set_current(beyond, t))
         self.sender.waits_for = 'its upload'
         if (

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Judges a change of mode: ours, a pilot's, a failsafe's, or the vehicle's own."""
+"""Finds the cause of a mode change: our command, a pilot, a failsafe, or the vehicle itself."""
 from __future__ import annotations
 
 from collections.abc import Callable
@@ -9,62 +9,67 @@ from uav_task_alloc.mavlink.gcs.authority_watch_state import AuthorityWatchState
 from uav_task_alloc.mavlink.gcs.flight_modes import ModeClass, avoids_traffic
 from uav_task_alloc.mavlink.gcs.mission_evidence import MissionEvidence
 
-CLIMBED = 0.9  # of the height asked for: the take-off has ended by itself
-CONTRADICTED = 2.5  # [s] in which a heartbeat may still show a mode that was acknowledged
+_CLIMBED = 0.9  # of the commanded height: the take-off has ended by itself
+_CONTRADICTED = 2.5  # [s] in which a heartbeat may still show a mode that was acknowledged
 
 
 class ModeChanges:
-    """Judges the modes of one vehicle, heartbeat by heartbeat."""
+    """Applies the authority event of each mode change of one vehicle.
+
+    Args:
+        state: of the vehicle; changed by the methods.
+        evidence: of its mission.
+    """
 
     def __init__(self, state: AuthorityWatchState, evidence: MissionEvidence) -> None:
         self._state, self._evidence = state, evidence
         self._family = state.profile.family
 
-    def heartbeat(self, before: int, mode: int, now: float) -> None:
-        """Compare the mode of a heartbeat with that of the one before."""
-        before = self._entered(before, mode, now)
+    def receive_heartbeat(self, before: int, mode: int, now: float) -> None:
+        """Compare the custom_mode of a heartbeat with that of the previous one."""
+        before = self._mode_before(before, mode, now)
         if mode != before and self._state.class_of(before) is not None:
             self._changed(before, mode, now)
 
     def resolve(self, now: float) -> None:
-        """A change of mode that was not explained: is it by now, or is it too late?"""
-        state, doubt = self._state, self._state.doubt
-        if doubt is None:
+        """End the wait for an explanation of a mode change: explained, or too late."""
+        state, unexplained = self._state, self._state.unexplained
+        if unexplained is None:
             return
-        if doubt.explained(now):
-            state.doubt = None
-            if state.returns(state.mode):
+        if unexplained.explained(now):
+            state.unexplained = None
+            if state.is_return(state.mode):
                 state.descending = True
-            state.apply(AuthorityEvent.EXPLAINED, now, doubt.why)
-        elif now >= doubt.until:
-            state.doubt = None
+            state.apply(AuthorityEvent.EXPLAINED, now, unexplained.why)
+        elif now >= unexplained.until:
+            state.unexplained = None
             if state.unconfirmed:
                 state.unconfirmed = False
-                state.apply(AuthorityEvent.LINK_CHANGED, now, doubt.why)
+                state.apply(AuthorityEvent.LINK_CHANGED, now, unexplained.why)
             else:
-                state.take(doubt.why, now)
+                state.apply_taken(unexplained.why, now)
 
-    def _entered(self, before: int, mode: int, now: float) -> int:
+    def _mode_before(self, before: int, mode: int, now: float) -> int:
         """The mode before this heartbeat, also one that no heartbeat has shown.
 
-        A mode that was acknowledged and is not there is doubted until the next heartbeat: PX4
-        may answer a moment before it tells its new mode.
+        A mode that was acknowledged and is not shown suspends authority until the next
+        heartbeat: PX4 may acknowledge a moment before its heartbeat shows the new mode.
         """
         state, sent = self._state, self._state.sent
-        if state.doubt is not None and state.doubt.ours == mode:
+        if state.unexplained is not None and state.unexplained.ours == mode:
             self.resolve(now)
             return mode
-        entered = sent.acks.known_by(state.telemetry.frame)
+        entered = sent.acks.mode_entered_by(state.telemetry.frame)
         if entered is None:
             return before
         sent.acks.clear()
-        if mode in (entered, *sent.under_way(now), before):
+        if mode in (entered, *sent.pending_modes(now), before):
             sent.modes = [each for each in sent.modes
                           if each[0] == entered == mode != before][-1:]
-            if mode != entered and state.authority.held and state.doubt is None:
+            if mode != entered and state.authority.held and state.unexplained is None:
                 why = f'{state.name_of(entered)} -> {state.name_of(mode)}'
-                state.wait_for_reason(lambda t: state.mode == entered, why, now,
-                                      within=CONTRADICTED, ours=entered)
+                state.suspend_until_explained(lambda t: state.mode == entered, why, now,
+                                              within=_CONTRADICTED, ours=entered)
                 before = mode
         return before
 
@@ -73,38 +78,38 @@ class ModeChanges:
         was, new = state.class_of(before), state.class_of(mode)
         state.forget_mode()
         why = f'{state.name_of(before)} -> {state.name_of(mode)}'
-        if self._known(before, mode, now, why):
+        if self._apply_known_cause(before, mode, now, why):
             return
         if new is ModeClass.MISSION:
             self._mission_set(mode, now, why)
-        elif was is ModeClass.MISSION and self._explained(mode, now):
+        elif was is ModeClass.MISSION and self._mission_ended(mode, now):
             state.apply(AuthorityEvent.MISSION_ENDED, now, why)
-            state.descending = state.returns(mode)
-        elif was is ModeClass.MISSION and self._explicable(mode):
-            state.wait_for_reason(lambda t: self._explained(mode, t), why, now)
+            state.descending = state.is_return(mode)
+        elif was is ModeClass.MISSION and self._mission_may_have_ended(mode):
+            state.suspend_until_explained(lambda t: self._mission_ended(mode, t), why, now)
         elif new is ModeClass.HOLD:
             self._hold_set(before, mode, now, why)
         elif not state.flown and not state.armed and state.authority.held:
-            # never armed: a restart of the autopilot looks alike until its clock is heard
-            state.wait_for_reason(self._restarted_since(), why, now)
+            # never armed: a reboot looks the same until a message with its clock is received
+            state.suspend_until_explained(self._rebooted_since(), why, now)
         elif state.authority.state is not AuthorityState.NONE or state.telemetry.past_boot:
-            state.take(why, now)
+            state.apply_taken(why, now)
 
-    def _known(self, before: int, mode: int, now: float, why: str) -> bool:
-        """Whether the cause is known, whatever the modes mean; it is applied then."""
+    def _apply_known_cause(self, before: int, mode: int, now: float, why: str) -> bool:
+        """Apply the event where the cause does not depend on the mode classes; False: unknown."""
         state = self._state
-        if state.doubt is not None:
-            state.doubt = None
+        if state.unexplained is not None:
+            state.unexplained = None
             state.apply(AuthorityEvent.TAKEN, now, why)
-        elif state.sent.expects(mode, now):
+        elif state.sent.confirm_mode(mode, now):
             state.apply(AuthorityEvent.OWN, now, why)
-        elif avoids_traffic(self._family, mode):  # it says CRITICAL as well
+        elif avoids_traffic(self._family, mode):  # system_status is CRITICAL as well
             state.apply(AuthorityEvent.AVOIDING, now, why)
         elif (state.class_of(mode) is ModeClass.MISSION
                 and state.authority.suspended_by(Suspension.AVOID)
                 and avoids_traffic(self._family, before)):
             state.apply(AuthorityEvent.AVOIDED, now, why)
-        elif state.failing(now):
+        elif state.failsafe_active(now):
             event = (
                 AuthorityEvent.SWAP_TAKEN
                 if state.swap_at is not None
@@ -116,9 +121,9 @@ class ModeChanges:
         return True
 
     def _mission_set(self, mode: int, now: float, why: str) -> None:
-        """MISSION, not expected: by a human, unless a command of ours came late."""
+        """Apply an unexpected MISSION: set by a pilot, unless our own command was delayed."""
         state = self._state
-        if state.sent.recently(mode, now):
+        if state.sent.was_recently_sent(mode, now):
             state.apply(AuthorityEvent.OWN, now, why)
         elif state.telemetry.airborne:
             state.apply(AuthorityEvent.TO_MISSION, now, f'{why} in flight')
@@ -126,53 +131,54 @@ class ModeChanges:
             state.mission_on_ground = True  # it may take off with it
 
     def _hold_set(self, before: int, mode: int, now: float, why: str) -> None:
-        """HOLD, not expected: at the end of a take-off or a landing, or by a human."""
+        """Apply an unexpected HOLD: the end of a take-off or landing, or set by a pilot."""
         state, telemetry = self._state, self._state.telemetry
         was, climb = state.class_of(before), state.sent.climb
         if state.profile.takeoff_mode == before and climb is not None:
             self._climb_ended(climb, now, why)
-        elif state.descending and state.returns(before):
-            # PX4 goes to Hold when it has landed
+        elif state.descending and state.is_return(before):
+            # PX4 changes to Hold when it has landed
             if not telemetry.grounded:
-                state.wait_for_reason(lambda t: telemetry.grounded, why, now)
-        elif state.sent.recently(mode, now):
-            # a command of ours that came late: it hands nothing over
+                state.suspend_until_explained(lambda t: telemetry.grounded, why, now)
+        elif state.sent.was_recently_sent(mode, now):
+            # our own command was delayed: no hand-over by the pilot
             if was is ModeClass.MISSION:
-                state.take(why, now)
+                state.apply_taken(why, now)
         elif was is ModeClass.STICK:
             if telemetry.airborne:
                 state.rest = now, telemetry.position
         elif telemetry.airborne and (was is ModeClass.MISSION or state.authority.held
                                      or avoids_traffic(self._family, before)):
-            state.take(why, now)
+            state.apply_taken(why, now)
 
     def _climb_ended(self, climb: float, now: float, why: str) -> None:
-        """Of our take-off, by itself where it is high enough [m]."""
+        """Apply the end of our take-off, which is by itself at the height `climb` [m] only."""
         state, telemetry = self._state, self._state.telemetry
 
         def climbed(t: float) -> bool:
-            return telemetry.height >= CLIMBED * climb
+            return telemetry.height >= _CLIMBED * climb
 
         state.sent.climb = None
         if climbed(now):
             state.apply(AuthorityEvent.OWN, now, why)
         else:
-            state.wait_for_reason(climbed, why, now)
+            state.suspend_until_explained(climbed, why, now)
 
-    def _explained(self, mode: int, now: float) -> bool:
-        """The vehicle has left the mission by itself, at its end (PX4)."""
+    def _mission_ended(self, mode: int, now: float) -> bool:
+        """Whether the vehicle has left MISSION by itself at the end of its mission (PX4)."""
         if self._family != 'px4':
             return False
         if self._state.class_of(mode) is ModeClass.HOLD:
             return (self._evidence.ended(now) or self._evidence.rejected(now)
-                    or self._state.texts.mission_over(now))
-        return self._state.returns(mode) and self._evidence.returning()
+                    or self._state.texts.mission_ended(now))
+        return self._state.is_return(mode) and self._evidence.returning()
 
-    def _explicable(self, mode: int) -> bool:
-        """It may have: the message that says so may be under way."""
+    def _mission_may_have_ended(self, mode: int) -> bool:
+        """Whether it may have ended, with the message that reports it delayed (PX4)."""
         return self._family == 'px4' and self._evidence.may_end() and (
-            self._state.class_of(mode) is ModeClass.HOLD or self._state.returns(mode))
+            self._state.class_of(mode) is ModeClass.HOLD or self._state.is_return(mode))
 
-    def _restarted_since(self) -> Callable[[float], bool]:
+    def _rebooted_since(self) -> Callable[[float], bool]:
+        """A predicate: the vehicle has rebooted after this call."""
         state, restarts = self._state, self._state.telemetry.restarts
         return lambda now: state.telemetry.restarts != restarts or state.booting

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The commands that were sent to a vehicle, and may still take effect."""
+"""Commands that were sent to a vehicle and may still take effect."""
 from __future__ import annotations
 
 import math
@@ -11,73 +11,74 @@ from uav_task_alloc.mavlink.gcs.authority import AuthorityRecord
 from uav_task_alloc.mavlink.gcs.mode_acks import ModeAcks
 from uav_task_alloc.mavlink.transport.codec import Message
 
-IN_FLIGHT = 12.0  # [s] in which a command sent may still take effect, and be seen
+COMMAND_LIFETIME = 12.0  # [s] in which a sent command may take effect and show in a heartbeat
 
 
 @dataclass(slots=True)
 class SentCommands:
     """What was sent to one vehicle, and what it has acknowledged."""
 
-    modes: list[tuple[int, float]] = field(default_factory=list)  # not seen yet; until when [s]
-    last: dict[int, float] = field(default_factory=dict)  # when [s], by mode
+    # custom modes that no heartbeat has shown yet, and until when [s] one may
+    modes: list[tuple[int, float]] = field(default_factory=list)
+    sent_at: dict[int, float] = field(default_factory=dict)  # [s], by custom_mode
     arm_until: float = -math.inf  # [s]
     disarm_until: float = -math.inf  # [s]
-    arming: bool = False  # what was asked last: to arm
-    armed_frame: int | None = None  # in which the vehicle said that it had armed
+    arming: bool = False  # whether the last command was to arm
+    armed_frame: int | None = None  # frame of the COMMAND_ACK that accepted arming
     climb: float | None = None  # [m] above home, of our take-off
     acks: ModeAcks = field(default_factory=ModeAcks)
 
     @classmethod
-    def before_restart(cls, record: AuthorityRecord, now: float) -> SentCommands:
-        """What the bridge before this one had sent, as if it was sent now."""
-        return cls([(mode, now + IN_FLIGHT) for mode in record.commanded],
+    def from_record(cls, record: AuthorityRecord, now: float) -> SentCommands:
+        """What the previous run of the bridge had sent, as if sent at `now` [s]."""
+        return cls([(mode, now + COMMAND_LIFETIME) for mode in record.commanded],
                    dict.fromkeys(record.commanded, now), climb=record.climb)
 
-    def mode(self, mode: int, now: float) -> None:
-        """A custom_mode is to be entered."""
-        self.modes.append((mode, now + IN_FLIGHT))
-        self.last[mode] = now
+    def add_mode(self, mode: int, now: float) -> None:
+        """Add a command for a custom_mode."""
+        self.modes.append((mode, now + COMMAND_LIFETIME))
+        self.sent_at[mode] = now
 
-    def arm(self, arms: bool, now: float) -> None:
-        """It is to arm, or to disarm."""
-        self.arming = arms
-        if arms:
-            self.arm_until = now + IN_FLIGHT
+    def add_arming(self, arm: bool, now: float) -> None:
+        """Add a command to arm, or to disarm."""
+        self.arming = arm
+        if arm:
+            self.arm_until = now + COMMAND_LIFETIME
         else:
-            self.disarm_until = now + IN_FLIGHT
+            self.disarm_until = now + COMMAND_LIFETIME
 
-    def answered(self, message: Message, frame: int) -> None:
-        """Take a COMMAND_ACK that is addressed to us, and the number of its frame."""
+    def receive_command_ack(self, message: Message, frame: int) -> None:
+        """Process a COMMAND_ACK that is addressed to us, and the number of its frame."""
         if message.command == d.MAV_CMD_DO_SET_MODE:
-            self.acks.answered(message.result, frame)
+            self.acks.acknowledged(message.result, frame)
         elif (message.command == d.MAV_CMD_COMPONENT_ARM_DISARM and self.arming
                 and message.result == d.MAV_RESULT_ACCEPTED):
             self.armed_frame = frame
 
-    def armed_before(self, frame: int) -> bool:
-        """It has said that it had armed, before this frame was sent; asked once."""
+    def take_armed_before(self, frame: int) -> bool:
+        """Whether arming was accepted before this frame was sent; True once."""
         if self.armed_frame is None or frame <= self.armed_frame:
             return False
         self.armed_frame = None
         return True
 
-    def expects(self, mode: int, now: float) -> bool:
-        """Whether a mode seen now is one that was sent; what was sent before it is over."""
+    def confirm_mode(self, mode: int, now: float) -> bool:
+        """Whether a mode that a heartbeat shows was commanded; removes it and those before."""
         self.modes = [each for each in self.modes if each[1] >= now]
-        found = next((n for n, each in enumerate(self.modes) if each[0] == mode), None)
-        if found is not None:
-            del self.modes[:found + 1]
-        return found is not None
+        index = next((n for n, each in enumerate(self.modes) if each[0] == mode), None)
+        if index is not None:
+            del self.modes[:index + 1]
+        return index is not None
 
-    def under_way(self, now: float) -> list[int]:
-        """Modes that were sent, and not seen yet."""
+    def pending_modes(self, now: float) -> list[int]:
+        """Custom modes that were sent and that no heartbeat has shown yet."""
         return [mode for mode, until in self.modes if until >= now]
 
-    def recently(self, mode: int, now: float) -> bool:
-        """Whether a mode was sent a moment ago, seen or not."""
-        return now - self.last.get(mode, -math.inf) < IN_FLIGHT
+    def was_recently_sent(self, mode: int, now: float) -> bool:
+        """Whether a mode was sent within `COMMAND_LIFETIME`, shown by a heartbeat or not."""
+        return now - self.sent_at.get(mode, -math.inf) < COMMAND_LIFETIME
 
-    def drop(self) -> None:
-        """Nothing more is to be sent; what is under way stays in `last`."""
+    def clear_pending(self) -> None:
+        """Expect no mode any more; `sent_at` keeps those that may still take effect."""
         self.modes.clear()
         self.climb = None

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the STATUSTEXTs of a vehicle say about a change of mode, and when they said so."""
+"""When the STATUSTEXTs of a vehicle last named a failsafe, a kill or the end of a mission."""
 from __future__ import annotations
 
 import math
@@ -10,7 +10,7 @@ from pymavlink.dialects.v20 import ardupilotmega as d
 
 from uav_task_alloc.mavlink.transport.codec import Message
 
-TEXT_WINDOW = 6.0  # [s] around a change of mode in which a text speaks of it
+_TEXT_WINDOW = 6.0  # [s] around a mode change in which a text refers to it
 _FAILSAFE = re.compile(r'failsafe|fence breach|breached|battery \d+ is (low|critical)|'
                        r'(low|critical|dangerous).{0,12}battery|data link lost|'
                        r'(rc|manual control|gcs).{0,20}lost', re.IGNORECASE)
@@ -23,36 +23,36 @@ _INFEASIBLE = re.compile(r'(mission|waypoint).*(reject|infeasible|invalid|not va
 
 @dataclass(slots=True)
 class StatusTexts:
-    """The newest text of each meaning."""
+    """The time of the newest text of each meaning."""
 
     failsafe_at: float = -math.inf  # [s]
     infeasible_at: float = -math.inf  # [s]
     finished_at: float = -math.inf  # [s]
 
     def receive(self, message: Message, now: float) -> bool:
-        """Take a STATUSTEXT.
+        """Process a STATUSTEXT.
 
         Args:
             message: the STATUSTEXT.
             now: steady time [s].
 
         Returns:
-            Whether it says that the motors were stopped, or the flight terminated.
+            Whether it reports that the motors were stopped, or the flight terminated.
         """
-        words = str(message.text)
+        text = str(message.text)
         urgent = message.severity <= d.MAV_SEVERITY_NOTICE
-        if _FINISHED.search(words):
+        if _FINISHED.search(text):
             self.finished_at = now
-        if urgent and _FAILSAFE.search(words):
+        if urgent and _FAILSAFE.search(text):
             self.failsafe_at = now
-        if urgent and _INFEASIBLE.search(words):
+        if urgent and _INFEASIBLE.search(text):
             self.infeasible_at = now
-        return bool(_KILL_SWITCH.search(words) or (urgent and _KILL.search(words)))
+        return bool(_KILL_SWITCH.search(text) or (urgent and _KILL.search(text)))
 
-    def failsafe(self, now: float) -> bool:
-        """A failsafe was named a moment ago."""
-        return now - self.failsafe_at < TEXT_WINDOW
+    def recent_failsafe(self, now: float) -> bool:
+        """Whether a failsafe was named a moment ago."""
+        return now - self.failsafe_at < _TEXT_WINDOW
 
-    def mission_over(self, now: float) -> bool:
-        """The mission was called finished or infeasible a moment ago."""
-        return max(self.finished_at, self.infeasible_at) > now - TEXT_WINDOW
+    def mission_ended(self, now: float) -> bool:
+        """Whether the mission was called finished or infeasible a moment ago."""
+        return max(self.finished_at, self.infeasible_at) > now - _TEXT_WINDOW

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Suspends authority while a failsafe is active or the mission is another's, and resumes it."""
+"""Suspends authority while a failsafe is active or the mission is FOREIGN, and resumes it."""
 from __future__ import annotations
 
 from pymavlink.dialects.v20 import ardupilotmega as d
@@ -8,8 +8,8 @@ from uav_task_alloc.mavlink.gcs.authority import AuthorityEvent, Suspension
 from uav_task_alloc.mavlink.gcs.authority_watch_state import AuthorityWatchState
 
 
-def check_status(state: AuthorityWatchState, now: float) -> None:
-    """Judge MAV_STATE: a failsafe suspends, an emergency or a flight termination takes."""
+def check_system_status(state: AuthorityWatchState, now: float) -> None:
+    """Apply MAV_STATE: CRITICAL is a failsafe, EMERGENCY and above count as a kill."""
     if state.status > d.MAV_STATE_CRITICAL:
         state.apply(AuthorityEvent.KILLED, now, 'emergency, or flight terminated')
     elif state.status == d.MAV_STATE_CRITICAL:
@@ -20,7 +20,13 @@ def check_status(state: AuthorityWatchState, now: float) -> None:
 
 
 def check_foreign(state: AuthorityWatchState, yields: bool, now: float) -> None:
-    """Judge the mission on board; `yields`: it is another's, and that is to be left alone."""
+    """Apply a FOREIGN mission, or its end.
+
+    Args:
+        state: of the vehicle.
+        yields: the mission is FOREIGN, and `when_foreign` is 'yield'.
+        now: steady time [s].
+    """
     suspended = state.authority.suspended_by(Suspension.FOREIGN)
     if yields and not suspended:
         state.apply(AuthorityEvent.FOREIGN, now, 'somebody else changed the mission: yield')

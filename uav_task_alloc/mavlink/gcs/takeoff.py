@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""When a vehicle arms and takes off, and when one that was armed by us is disarmed again."""
+"""Arms a vehicle and has it take off, or disarms one that we armed and that must not fly."""
 from __future__ import annotations
 
 from collections.abc import Callable
@@ -13,7 +13,15 @@ from uav_task_alloc.mavlink.gcs.telemetry import Telemetry
 
 
 class Takeoff:
-    """Off the ground where the list has tasks, the bridge has the vehicle, and nothing waits."""
+    """Takes off where the list has tasks, authority is HELD, and nothing forbids it.
+
+    Args:
+        sender: of the commands to the vehicle.
+        telemetry: of the vehicle.
+        onboard: its mission and list.
+        authority: over the vehicle.
+        policy: returns the present parameters.
+    """
 
     def __init__(
         self,
@@ -26,28 +34,27 @@ class Takeoff:
         self._sender, self._telemetry, self._onboard = sender, telemetry, onboard
         self._authority, self._policy = authority, policy
 
-    def lift(self, now: float) -> NextMessages:
-        """Armed by us: it takes off before anything else, or is disarmed."""
+    def continue_takeoff(self, now: float) -> NextMessages:
+        """Let a vehicle that we armed take off before anything else is sent, or disarm it."""
         if not self._sender.armed_here or self._telemetry.airborne or not self._authority.held:
             return None
-        return self.rise(now) if self._wants_to_fly() else self._sender.disarm(now)
+        return self.take_off(now) if self._wants_to_fly() else self._sender.disarm(now)
 
-    def rise(self, now: float) -> NextMessages:
-        """Arm, take off and climb; satisfied in the air."""
+    def take_off(self, now: float) -> NextMessages:
+        """Arm, take off and climb; None: it is airborne and does not climb."""
         telemetry, sender, policy = self._telemetry, self._sender, self._policy()
         if telemetry.airborne and not sender.climbing:
             return None
         if not self._authority.held:
             return sender.wait('~/hand_over: it has landed' if self._authority.landed else
-                             'a pilot to arm and take off (takeoff is false)')
+                               'a pilot to arm and take off (takeoff is false)')
         if policy.grounded and not sender.climbing:
             return sender.wait(policy.grounded)
         home = telemetry.home or telemetry.position
         zone = zone_across_path(home, home, policy.zones)
         if zone is not None and not sender.climbing:
-            return sender.wait(f'zone {zone.id} to leave its home')
-
-        return sender.rise(policy.cruise_altitude, self._wants_to_fly, now)
+            return sender.wait(f'zone {zone.id} to be removed: it covers the home')
+        return sender.take_off(policy.cruise_altitude, self._wants_to_fly, now)
 
     def _wants_to_fly(self) -> bool:
         return (self._authority.held and self._onboard.tasks is not None

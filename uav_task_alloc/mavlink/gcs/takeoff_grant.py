@@ -10,25 +10,31 @@ from uav_task_alloc.mavlink.gcs.policy import Policy
 
 
 class TakeoffGrant:
-    """Follows `takeoff` for one vehicle."""
+    """Applies changes of `takeoff` to one vehicle.
+
+    Args:
+        state: of the vehicle.
+        policy: returns the present parameters.
+    """
 
     def __init__(self, state: AuthorityWatchState, policy: Callable[[], Policy]) -> None:
         self._state, self._policy = state, policy
-        self.takeoff = policy().takeoff  # as acted on last
+        self.takeoff = policy().takeoff  # the value applied last
 
     def step(self, now: float) -> None:
-        """Act where the parameter or the vehicle has changed."""
+        """Grant or withdraw authority where the parameter or the vehicle has changed."""
         state, authority = self._state, self._state.authority
         takeoff, telemetry = self._policy().takeoff, self._state.telemetry
         idle = state.mode is not None and not state.armed
         if not takeoff and (self.takeoff or (idle and authority.held)):
-            air = telemetry.airborne
-            state.apply(AuthorityEvent.WITHDRAWN_IN_AIR if air else AuthorityEvent.WITHDRAWN, now,
-                        'takeoff is false' + (': until the landing' if air else ''))
+            airborne = telemetry.airborne
+            event = AuthorityEvent.WITHDRAWN_IN_AIR if airborne else AuthorityEvent.WITHDRAWN
+            state.apply(event, now,
+                        'takeoff is false' + (': until the landing' if airborne else ''))
         elif takeoff and not self.takeoff:
             authority.until_landing = False
         if authority.state is not AuthorityState.SUSPENDED or takeoff:
-            self.takeoff = takeoff  # else it becomes false when that is over
+            self.takeoff = takeoff  # else it is applied after the suspension
         if (takeoff and idle and authority.state is AuthorityState.NONE and not authority.landed
                 and not authority.undecided and telemetry.grounded and telemetry.past_boot
                 and not telemetry.stale(now)):
