@@ -1,14 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Radios and far ends that are closed at the end of a test."""
+"""Connections and remotes that are closed at the end of a test."""
 import pytest
-from link_bench import WALL, End
+from link_bench import WALL, Remote
 
 from uav_task_alloc.mavlink.transport.connections import Connections
 from uav_task_alloc.mavlink.transport.link import open_link
 
 
 @pytest.fixture
-def connections():
+def make_connections():
+    """make_connections(*names, **kwargs) -> Connections; one udpin link by default."""
     made = []
 
     def make(*names, **kwargs):
@@ -21,12 +22,12 @@ def connections():
 
 
 @pytest.fixture
-def far():
-    """far(radio, system) -> End; closed at the end."""
+def make_remote():
+    """make_remote(connections, system) -> Remote."""
     made = []
 
     def make(*args):
-        made.append(End(*args))
+        made.append(Remote(*args))
         return made[-1]
     yield make
     for one in made:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A radio and far ends on real sockets."""
+"""Remotes on real sockets, and what a `Connections` receives."""
 import socket
 
 from pymavlink.dialects.v20 import ardupilotmega as d
@@ -13,8 +13,8 @@ def heartbeat(autopilot=d.MAV_AUTOPILOT_PX4):
     return d.MAVLink_heartbeat_message(d.MAV_TYPE_QUADROTOR, autopilot, 0, 0, 4, 3)
 
 
-class End:
-    """A far end on UDP."""
+class Remote:
+    """A MAVLink remote on UDP."""
 
     def __init__(self, connections, system=1, signing=None):
         self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
@@ -23,23 +23,23 @@ class End:
         self.codec = Codec(system, 1, signing=signing)
         self.to = ('127.0.0.1', connections.links[0].port)
 
-    def say(self, message):
+    def send(self, message):
         frame = self.codec.pack(message)
         self.socket.sendto(frame, self.to)
         return frame
 
-    def hear(self):
+    def receive(self):
         return self.codec.parse(self.socket.recv(65536))
 
 
 def receive(connections, count=1):
-    got = []
+    received = []
     for _ in range(100):
-        got += connections.receive(0.1)
-        if len(got) >= count:
+        received += connections.receive(0.1)
+        if len(received) >= count:
             break
-    return got
+    return received
 
 
-def nothing(connections):
+def nothing_received(connections):
     return connections.receive(0.05) == []

@@ -8,7 +8,7 @@ from pymavlink.dialects.v20 import ardupilotmega as d
 
 from uav_task_alloc.mavlink import autopilots as profiles
 from uav_task_alloc.mavlink.autopilots import ModeFunction, profile_of
-from uav_task_alloc.mavlink.mission.items import LOITER_TIME, RETURN, WAYPOINT, mission_items
+from uav_task_alloc.mavlink.mission.items import mission_items
 from uav_task_alloc.mavlink.mission.peer import Peer
 
 ALL = pytest.mark.parametrize('profile', [
@@ -39,25 +39,27 @@ def test_fault_26_no_nan_on_anything_but_the_yaw_of_a_waypoint(profile, service)
     for item in mission_items(task_list('ABC', service=service, returns=True), profile.rules,
                               ORIGIN):
         nans = [n for n, value in enumerate(item.params) if math.isnan(value)]
-        assert not nans or (item.command == WAYPOINT and nans == [3] and profile.atomic)
+        assert not nans or (
+            item.command == d.MAV_CMD_NAV_WAYPOINT and nans == [3] and profile.atomic)
 
 
 @ALL
 def test_a_service_is_a_hold_on_a_copter_and_a_loiter_on_a_plane(profile):
     item = mission_items(task_list('A', service=2.5), profile.rules, ORIGIN)[0]
-    assert item.command == (LOITER_TIME if profile.rules.loiters else WAYPOINT)
+    assert item.command == (
+        d.MAV_CMD_NAV_LOITER_TIME if profile.rules.loiters else d.MAV_CMD_NAV_WAYPOINT)
     assert item.params[0] == (3.0 if profile.rules.whole_seconds else 2.5)
 
 
 def test_a_plane_flies_through_a_task_without_service():
     item = mission_items(task_list('A'), profiles.ARDUPLANE.rules, ORIGIN)[0]
-    assert (item.command, item.params[0]) == (WAYPOINT, 0.0)
+    assert (item.command, item.params[0]) == (d.MAV_CMD_NAV_WAYPOINT, 0.0)
 
 
 @ALL
 def test_the_return_is_sent_in_the_frame_that_the_store_takes(profile):
     items = mission_items(task_list('A', returns=True), profile.rules, ORIGIN)
-    assert items[-1].command == RETURN
+    assert items[-1].command == d.MAV_CMD_NAV_RETURN_TO_LAUNCH
     assert items[-1].frame == (3 if profile.name == 'ardupilot' else 2)
 
 

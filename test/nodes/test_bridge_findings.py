@@ -115,7 +115,7 @@ def test_finding_10_a_bad_message_is_in_the_log_once_and_in_diagnostics(bridge, 
         fact(health, 'messages') or [0, 0, {}])[2].get('messages_refused') == '2')
     line, = (line for line in one.log['warning'] if 'MISSION_ITEM' in line)
     assert line == ('MISSION_ITEM (system 1, component 1): x = nan: expected a finite number: '
-                    'dropped; told once')
+                    'dropped; logged once')
     assert one.node.receiver.is_alive()
 
 
@@ -165,8 +165,8 @@ def test_finding_24_a_flood_of_strangers_leaves_the_known_vehicle(bridge):
             stranger.bind(('127.0.0.1', 0))
             stranger.sendto(b'x', ('127.0.0.1', link.port))
     one.until(lambda: one.node.connections.errors() == 200)
-    assert one.far.getsockname() in link.ends()
-    assert len(link.ends()) == 1 + MAX_UNCONFIRMED
+    assert one.far.getsockname() in link.remotes()
+    assert len(link.remotes()) == 1 + MAX_UNCONFIRMED
     assert one.heard('HEARTBEAT').get_srcSystem() == 245
 
 

@@ -132,7 +132,7 @@ class SecondStation:
     def _send(self, system, message):
         number = SYSTEMS.index(system)
         link = self.connections.links[number]
-        self.connections.send(((number, end), message) for end in link.ends())
+        self.connections.send(((number, remote), message) for remote in link.remotes())
 
     def close(self):
         self.heartbeat.close()

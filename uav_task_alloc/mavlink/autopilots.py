@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What differs between autopilots: stored items, modes, whether a swap is atomic, commands."""
+"""Autopilot profiles: mission item rules, custom modes, atomic replacement, mode commands."""
 from __future__ import annotations
 
 import math
@@ -12,91 +12,107 @@ from pymavlink.dialects.v20 import ardupilotmega as d
 
 from uav_task_alloc.mavlink.transport.codec import Message
 
-OFF_GROUND = 2.0  # [m] above home: it flies, whatever landed_state said a second ago
+OFF_GROUND = 2.0  # [m] above home: airborne, whatever the latest landed_state is
 
 
 class ModeFunction(Enum):
-    """What an autopilot's mode means to the bridge."""
+    """The function of an autopilot's custom mode, as far as the bridge distinguishes them."""
 
     MISSION = 'mission'
-    HOLD = 'hold'  # commanded, not by a stick
+    HOLD = 'hold'  # position hold without stick input
     RETURN = 'return'
     TAKEOFF = 'takeoff'
     LAND = 'land'
-    PILOT = 'pilot'  # a human flies, or wants it to wait
+    PILOT = 'pilot'  # flown or held by a human
     UNKNOWN = 'unknown'
 
 
 class CommandTarget(Protocol):
-    """A vehicle that commands are addressed to."""
+    """The addressee of a command, see `mission.peer.Peer`."""
 
     def command(self, command: int, *params: float) -> Message:
-        """COMMAND_LONG; parameters left out are 0."""
+        """COMMAND_LONG to it; omitted parameters are 0."""
 
 
 @dataclass(frozen=True, slots=True)
 class ItemRules:
-    """What the mission store of an autopilot keeps and takes."""
+    """How an autopilot stores mission items."""
 
     home_first: bool = False  # seq 0 is home, not an item
-    whole_seconds: bool = False  # a hold is cut to whole seconds: round up
+    whole_seconds: bool = False  # a hold is truncated to whole seconds: round up
     keeps_radius: bool = True  # p2 of a waypoint is its acceptance radius
-    radius: float = 0.0  # [m] accepted around a point that says none; 0: the autopilot's own
-    yaw: float = math.nan  # p4 of a waypoint where the yaw is left to the autopilot
-    command_frame: int = d.MAV_FRAME_MISSION  # of items without a position
-    loiters: bool = False  # fixed wing: it cannot hold, it loiters
+    radius: float = 0.0  # [m] default acceptance radius; 0: that of the autopilot
+    yaw: float = math.nan  # p4 of a waypoint whose yaw the autopilot chooses
+    command_frame: int = d.MAV_FRAME_MISSION  # MAV_FRAME of items without a position
+    loiters: bool = False  # fixed wing: loiters in place of a hold
     capacity: int = 500  # items
 
 
 @dataclass(frozen=True, slots=True)
 class Profile:
-    """One kind of autopilot."""
+    """How one kind of autopilot is commanded, and how it stores missions."""
 
     name: str
     rules: ItemRules
-    atomic: bool  # a mission is swapped at the end of an upload; else it is mixed until then
-    idle_after: float  # [s] until a stale transfer is forgotten
+    atomic: bool  # an upload replaces the mission at its end; else item by item
+    idle_after: float  # [s] until the autopilot drops a stale transfer
     modes: Mapping[int, ModeFunction]  # by custom_mode
-    set_mode: Mapping[ModeFunction, int]  # custom_mode
-    family: str = ''  # whose mode numbers these are, see `modes`; '': unknown
-    jump_command: bool = True  # knows DO_SET_MISSION_CURRENT
-    amsl_takeoff: bool = False  # NAV_TAKEOFF takes AMSL; else height above home
-    farthest_first: float = math.inf  # [m] from home to the first item, else it is refused
+    set_mode: Mapping[ModeFunction, int]  # custom_mode by function
+    family: str = ''  # the set of custom mode numbers: 'copter', 'plane', 'px4'; '': unknown
+    jump_command: bool = True  # supports DO_SET_MISSION_CURRENT
+    amsl_takeoff: bool = False  # NAV_TAKEOFF altitude is AMSL; else above home
+    farthest_first: float = math.inf  # [m] largest distance from home to the first item
 
     def mode_function(self, custom_mode: int) -> ModeFunction:
+        """The function of a custom mode; PILOT for a mode that the profile does not list."""
         return self.modes.get(
             custom_mode, ModeFunction.PILOT if self.modes else ModeFunction.UNKNOWN
         )
 
     @property
     def takeoff_mode(self) -> int | None:
-        """The custom_mode that a take-off command brings; None: it changes no mode."""
-        return next((number for number, flight in self.modes.items()
-                     if flight is ModeFunction.TAKEOFF), None) if self.amsl_takeoff else None
+        """The custom_mode that NAV_TAKEOFF enters; None: it changes no mode."""
+        return next((number for number, function in self.modes.items()
+                     if function is ModeFunction.TAKEOFF), None) if self.amsl_takeoff else None
 
     def commanded_mode(self, message: Message) -> int | None:
-        """The custom_mode that a DO_SET_MODE asks for; None for other messages."""
+        """The custom_mode requested by a DO_SET_MODE; None for other messages."""
         if message.get_type() != 'COMMAND_LONG' or message.command != d.MAV_CMD_DO_SET_MODE:
             return None
         main, sub = int(message.param2), int(message.param3)
         return _px4(main, sub) if self.family == 'px4' else main
 
-    def mode_command(self, peer: CommandTarget, flight: ModeFunction) -> Message:
-        """The command that brings it there."""
-        if flight not in self.set_mode:
+    def mode_command(self, peer: CommandTarget, function: ModeFunction) -> Message:
+        """The command that enters a mode.
+
+        Args:
+            peer: the vehicle.
+            function: a key of `set_mode`, or MISSION, HOLD or RETURN.
+
+        Returns:
+            DO_SET_MODE; where the profile has no mode number, MISSION_START, DO_PAUSE_CONTINUE
+            or NAV_RETURN_TO_LAUNCH.
+        """
+        if function not in self.set_mode:
             number = {ModeFunction.MISSION: d.MAV_CMD_MISSION_START,
                       ModeFunction.HOLD: d.MAV_CMD_DO_PAUSE_CONTINUE,
-                      ModeFunction.RETURN: d.MAV_CMD_NAV_RETURN_TO_LAUNCH}[flight]
+                      ModeFunction.RETURN: d.MAV_CMD_NAV_RETURN_TO_LAUNCH}[function]
             return peer.command(number)
-        mode = self.set_mode[flight]
+        mode = self.set_mode[function]
         main, sub = (mode >> 16 & 0xff, mode >> 24) if mode > 0xffff else (mode, 0)
         return peer.command(d.MAV_CMD_DO_SET_MODE, d.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED, main, sub)
 
     def takeoff_command(self, peer: CommandTarget, height: float, home_amsl: float) -> Message:
-        """Climb to `height` [m] above home, where it is."""
+        """NAV_TAKEOFF at the present position.
+
+        Args:
+            peer: the vehicle.
+            height: [m] above home.
+            home_amsl: [m] altitude of home.
+        """
         altitude = home_amsl + height if self.amsl_takeoff else height
-        free = math.nan if self.amsl_takeoff else 0.0
-        return peer.command(d.MAV_CMD_NAV_TAKEOFF, 0.0, 0.0, 0.0, free, free, free, altitude)
+        unset = math.nan if self.amsl_takeoff else 0.0
+        return peer.command(d.MAV_CMD_NAV_TAKEOFF, 0.0, 0.0, 0.0, unset, unset, unset, altitude)
 
 
 def _px4(main: int, sub: int = 0) -> int:
@@ -130,7 +146,7 @@ _PX4 = {
 
 ARDUPILOT = Profile(
     'ardupilot', ItemRules(home_first=True, whole_seconds=True, keeps_radius=False, yaw=0.0,
-                           command_frame=3, capacity=650),
+                           command_frame=d.MAV_FRAME_GLOBAL_RELATIVE_ALT, capacity=650),
     atomic=False, idle_after=9.0, modes=_COPTER, family='copter',
     set_mode={ModeFunction.MISSION: 3, ModeFunction.HOLD: 4, ModeFunction.RETURN: 6})
 ARDUPLANE = replace(
@@ -138,7 +154,7 @@ ARDUPLANE = replace(
     family='plane',
     set_mode={ModeFunction.MISSION: 10, ModeFunction.HOLD: 15, ModeFunction.RETURN: 11})
 PX4 = Profile(
-    # NAV_ACC_RAD is 10 m since 2026: it would fly past a task at 2 m/s and call it reached
+    # NAV_ACC_RAD is 10 m since 2026: a task would count as reached when passed at that distance
     'px4',
     ItemRules(radius=2.0),
     atomic=True,
@@ -164,7 +180,12 @@ _BY_NUMBER = {d.MAV_AUTOPILOT_ARDUPILOTMEGA: 'ardupilot', d.MAV_AUTOPILOT_PX4: '
 
 
 def profile_of(heartbeat: Message, autopilot: str = 'auto') -> Profile:
-    """By the heartbeat, or as set."""
+    """The profile of a vehicle.
+
+    Args:
+        heartbeat: HEARTBEAT of its autopilot.
+        autopilot: 'ardupilot', 'px4' or 'generic'; 'auto': by the heartbeat.
+    """
     name = (_BY_NUMBER.get(heartbeat.autopilot, 'generic') if autopilot == 'auto'
             else autopilot)
     if heartbeat.type == d.MAV_TYPE_FIXED_WING:

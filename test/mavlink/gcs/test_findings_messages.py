@@ -136,10 +136,11 @@ def test_finding_10_a_flood_of_kinds_and_senders_does_not_flood_the_log(monkeypa
     assert max(len(note.text) for note in bench.ground_station.refusals.notes) < 400
 
 
-def test_finding_10_bytes_that_cannot_be_decoded_drop_one_datagram(connections, far, monkeypatch):
-    connections = connections()
-    end = far(connections)
-    end.say(heartbeat())
+def test_finding_10_bytes_that_cannot_be_decoded_drop_one_datagram(
+        make_connections, make_remote, monkeypatch):
+    connections = make_connections()
+    remote = make_remote(connections)
+    remote.send(heartbeat())
     assert len(receive(connections)) == 1
     parser, = connections._parsers.values()
     good = parser.parse
@@ -148,20 +149,21 @@ def test_finding_10_bytes_that_cannot_be_decoded_drop_one_datagram(connections, 
         monkeypatch.setattr(parser, 'parse', good)
         raise IndexError('x')
     monkeypatch.setattr(parser, 'parse', bad)
-    end.say(heartbeat())
-    end.say(heartbeat())
+    remote.send(heartbeat())
+    remote.send(heartbeat())
     assert len(receive(connections)) == 1
     assert 'IndexError: x' in connections.refusals.last
 
 
-def test_finding_10_a_message_that_cannot_be_encoded_leaves_the_others(connections, far):
-    connections = connections()
-    end = far(connections)
-    end.say(heartbeat())
+def test_finding_10_a_message_that_cannot_be_encoded_leaves_the_others(
+        make_connections, make_remote):
+    connections = make_connections()
+    remote = make_remote(connections)
+    remote.send(heartbeat())
     (address, _), = receive(connections)
     count = d.MAVLink_mission_count_message(1, 1, 66_000, 0)
     connections.send([(address, count), (address, heartbeat())])
-    assert end.hear()[0].get_type() == 'HEARTBEAT'
+    assert remote.receive()[0].get_type() == 'HEARTBEAT'
     assert connections.refusals.count == 1
     assert connections.refusals.notes[0].text.startswith('MISSION_COUNT (to ')
 

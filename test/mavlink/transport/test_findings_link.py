@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Findings 11 to 13 and 24: what links, heartbeats, signing and floods do to the bridge."""
+"""Findings 11 to 13 and 24: links that fail, heartbeats, signing, floods of remotes."""
 import os
 import socket
 import threading
 
 import pytest
-from link_bench import WALL, heartbeat, nothing, receive
+from link_bench import WALL, heartbeat, nothing_received, receive
 from mission_bench import ORIGIN
 
 from uav_task_alloc.errors import InvalidValue
@@ -19,7 +19,7 @@ from uav_task_alloc.sim.udp_fleet import UdpFleet
 
 @pytest.fixture
 def servers():
-    """Two TCP servers, the first of which does not listen yet."""
+    """Two TCP servers; the first one does not listen yet."""
     made = [socket.socket(), socket.socket()]
     for one in made:
         one.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
@@ -31,7 +31,7 @@ def servers():
 
 
 def free_until(number):
-    """Take all free file numbers below one, so that the next file to be opened gets it."""
+    """Occupy all free file numbers below `number`, so that the next open file gets it."""
     held = [os.dup(0)]
     while held[-1] < number:
         held.append(os.dup(0))
@@ -39,53 +39,54 @@ def free_until(number):
     return held
 
 
-# 11: a file number that passes from one link to another
+# 11: a file number that is reused by another link
 
 
-def test_finding_11_a_file_number_may_pass_from_one_link_to_the_other(connections, servers):
-    one, two = connections(*(f'tcp:127.0.0.1:{s.getsockname()[1]}' for s in servers)), servers[1]
+def test_finding_11_a_file_number_may_be_reused_by_another_link(make_connections, servers):
+    one = make_connections(*(f'tcp:127.0.0.1:{s.getsockname()[1]}' for s in servers))
+    two = servers[1]
     first, second = one.links
     two.listen()
     one.step(0.0)  # the first is refused, the second is connected
-    far, _ = two.accept()
-    assert nothing(one)
+    remote, _ = two.accept()
+    assert nothing_received(one)
     assert first.fileno() == -1
     number = second.fileno()
-    far.close()
+    remote.close()
     held = free_until(number)
-    second._broken('closed by the far end')  # as a heartbeat does that meets the broken line
+    second._broken('closed by the remote')  # as a heartbeat does on a failed link
     servers[0].listen()
     one.step(10.0)
     for file in held:
         os.close(file)
     assert first.fileno() == number
-    far, _ = servers[0].accept()
-    far.sendall(Codec(1, 1).pack(heartbeat()))
+    remote, _ = servers[0].accept()
+    remote.sendall(Codec(1, 1).pack(heartbeat()))
     assert [address[0] for address, _ in receive(one)] == [0]
-    far.close()
+    remote.close()
 
 
-def test_finding_11_two_links_may_swap_their_files(connections, servers):
-    one = connections(*(f'tcp:127.0.0.1:{s.getsockname()[1]}' for s in servers))
+def test_finding_11_two_links_may_exchange_their_file_numbers(make_connections, servers):
+    one = make_connections(*(f'tcp:127.0.0.1:{s.getsockname()[1]}' for s in servers))
     for server in servers:
         server.listen()
     one.step(0.0)
-    fars = [server.accept()[0] for server in servers]
-    assert nothing(one)
+    remotes = [server.accept()[0] for server in servers]
+    assert nothing_received(one)
     first, second = one.links
-    first._file, second._file = second._file, first._file  # as if both had been opened again
+    first._file, second._file = second._file, first._file  # as if both were reopened
     first.opened, second.opened = 2, 2
-    for number, far in enumerate(fars):
-        far.sendall(Codec(1, 1).pack(heartbeat()))
+    for number, remote in enumerate(remotes):
+        remote.sendall(Codec(1, 1).pack(heartbeat()))
         assert [address[0] for address, _ in receive(one)] == [1 - number]
-        far.close()
+        remote.close()
 
 
-def test_finding_11_a_line_that_a_sender_closes_is_read_no_more(connections, servers):
+def test_finding_11_a_link_closed_by_a_sender_is_not_read(make_connections, servers):
     servers[0].listen()
-    one = connections(f'tcp:127.0.0.1:{servers[0].getsockname()[1]}')
+    one = make_connections(f'tcp:127.0.0.1:{servers[0].getsockname()[1]}')
     one.step(0.0)
-    assert nothing(one)
+    assert nothing_received(one)
     link, = one.links
     link.trouble = 'Broken pipe'
     link.close()
@@ -96,8 +97,8 @@ def test_finding_11_a_line_that_a_sender_closes_is_read_no_more(connections, ser
 # 12: one stream, two threads
 
 
-class Watched:
-    """A link that notices what is done to it while the radio's lock is free."""
+class LockChecked:
+    """A link that records what is called while the lock of its connections is free."""
 
     name, datagrams, trouble = 'x', False, ''
 
@@ -110,11 +111,11 @@ class Watched:
         if not self.connections._lock.locked():
             self.unlocked.append(name)
         return {'fileno': lambda: self.files[0], 'opened': 1, 'read': lambda: [('y', b'x')],
-                'ends': lambda: ['y']}.get(name, lambda *_: None)
+                'remotes': lambda: ['y']}.get(name, lambda *_: None)
 
 
-def test_finding_12_nothing_touches_a_stream_without_the_lock(tmp_path):
-    link = Watched()
+def test_finding_12_no_link_is_used_without_the_lock(tmp_path):
+    link = LockChecked()
     connections = link.connections = Connections(
         [link], 245, 190, wall=lambda: WALL, tlog=str(tmp_path / 'x.tlog')
     )
@@ -128,76 +129,77 @@ def test_finding_12_nothing_touches_a_stream_without_the_lock(tmp_path):
     assert link.unlocked == []
 
 
-def test_finding_12_an_error_on_one_link_leaves_the_heartbeats_of_the_others(connections, far):
-    both = connections('udpin:127.0.0.1:0', 'udpin:127.0.0.1:0')
-    end = far(both)
-    end.say(heartbeat())
+def test_finding_12_an_error_on_one_link_leaves_the_heartbeats_of_the_others(
+        make_connections, make_remote):
+    both = make_connections('udpin:127.0.0.1:0', 'udpin:127.0.0.1:0')
+    remote = make_remote(both)
+    remote.send(heartbeat())
     receive(both)
-    both.links.reverse()  # the bad one comes first
+    both.links.reverse()  # the failing one comes first
 
-    def write(end, data):
+    def write(remote, data):
         raise BufferError('Existing exports of data: object cannot be re-sized')
-    both.links[0].ends, both.links[0].write = lambda: ['x'], write
+    both.links[0].remotes, both.links[0].write = lambda: ['x'], write
     both.send_to_all(heartbeat())
-    assert end.hear()[0].get_type() == 'HEARTBEAT'
+    assert remote.receive()[0].get_type() == 'HEARTBEAT'
     assert 'HEARTBEAT (to x): BufferError: Existing exports' in both.refusals.last
 
 
 def test_finding_12_a_recording_that_ends_in_one_thread_does_not_end_the_other(
-        connections, tmp_path):
-    one = connections(tlog=str(tmp_path / 'x.tlog'))
-    one._record.close()  # as the receiver does where the disk is full
+        make_connections, tmp_path):
+    one = make_connections(tlog=str(tmp_path / 'x.tlog'))
+    one._record.close()  # as the receiver does on a full disk
     one._write_record(b'x')
     assert one._record is None
 
 
 @pytest.fixture
-def beats():
-    """A heartbeat whose first two beats fail, and an event for each that succeeds."""
-    failing, beat = [BufferError('x'), RuntimeError('y')], threading.Semaphore(0)
+def heartbeats():
+    """A heartbeat whose first two messages fail, and a semaphore of those that succeed."""
+    failing, sent = [BufferError('x'), RuntimeError('y')], threading.Semaphore(0)
 
     def send(message):
         if failing:
             raise failing.pop(0)
-        beat.release()
-    heart = Heartbeat(send, period=0.01)
-    yield heart, beat
-    heart.close()
+        sent.release()
+    heartbeats = Heartbeat(send, period=0.01)
+    yield heartbeats, sent
+    heartbeats.close()
 
 
-def ended(heart):
+def wait_for_end(heartbeats):
     """Wait for the end of its thread."""
-    heart._thread.join(5.0)
-    assert not heart._thread.is_alive()
+    heartbeats._thread.join(5.0)
+    assert not heartbeats._thread.is_alive()
 
 
-def test_finding_12_a_heartbeat_thread_that_ends_is_told_and_started_again(beats):
-    heart, beat = beats
-    heart.start()
+def test_finding_12_a_heartbeat_thread_that_ends_is_reported_and_restarted(heartbeats):
+    sender, sent = heartbeats
+    sender.start()
     for number, words in enumerate(('BufferError: x', 'RuntimeError: y'), 1):
-        ended(heart)
-        assert heart.trouble.startswith(f'its thread has ended: {words} (at ')
-        heart.watch(float(number))
-        assert heart.restarts == number
-    assert beat.acquire(timeout=5.0)
-    assert beat.acquire(timeout=5.0)
-    assert heart.trouble == ''
-    heart.watch(10.0)
-    assert heart.restarts == 2
+        wait_for_end(sender)
+        assert sender.trouble.startswith(f'its thread has ended: {words} (at ')
+        sender.watch(float(number))
+        assert sender.restarts == number
+    assert sent.acquire(timeout=5.0)
+    assert sent.acquire(timeout=5.0)
+    assert sender.trouble == ''
+    sender.watch(10.0)
+    assert sender.restarts == 2
 
 
-def test_finding_12_a_heartbeat_that_is_held_up_is_told():
+def test_finding_12_a_heartbeat_that_is_blocked_is_reported():
     free = threading.Event()
-    heart = Heartbeat(lambda message: free.wait(5.0), period=0.01)
-    heart.start()
-    heart.watch(0.0)
-    heart.watch(0.02)
-    assert heart.trouble == ''
-    heart.watch(0.04)
-    assert heart.trouble == 'none was sent for more than 0.03 s'
+    sender = Heartbeat(lambda message: free.wait(5.0), period=0.01)
+    sender.start()
+    sender.watch(0.0)
+    sender.watch(0.02)
+    assert sender.trouble == ''
+    sender.watch(0.04)
+    assert sender.trouble == 'none was sent for more than 0.03 s'
     free.set()
-    heart.close()
-    assert heart.restarts == 0
+    sender.close()
+    assert sender.restarts == 0
 
 
 # 13: the timestamp of signing
@@ -211,7 +213,7 @@ def key_file(tmp_path):
 
 
 def forbid(key_file):
-    """Let the timestamp of a key be neither replaced nor written, also by root."""
+    """Make the timestamp of a key impossible to replace or write, also for root."""
     key_file.with_name('key.timestamp.tmp').mkdir()
     stamp = key_file.with_name('key.timestamp')
     stamp.unlink(missing_ok=True)
@@ -220,32 +222,34 @@ def forbid(key_file):
 
 @pytest.mark.parametrize('content', [b'', b'soon', b'-1', b'12 34', b'1e5', b'\xff\x00', b'9' * 40,
                                      b'281474976710656'])
-def test_finding_13_a_damaged_timestamp_is_refused_at_the_start(connections, key_file, content):
+def test_finding_13_a_damaged_timestamp_is_refused_at_the_start(
+        make_connections, key_file, content):
     path = key_file.with_name('key.timestamp')
     path.write_bytes(content)
     with pytest.raises(InvalidValue) as refused:
-        connections(signing_key_file=str(key_file))
+        make_connections(signing_key_file=str(key_file))
     assert str(refused.value).startswith(f'signing timestamp in {path} = ')
     assert 'expected a whole number in [0, 281474976710655]; delete the file' in str(refused.value)
     assert path.read_bytes() == content
 
 
-def test_finding_13_a_timestamp_that_cannot_be_read_is_refused_at_the_start(connections, key_file):
+def test_finding_13_a_timestamp_that_cannot_be_read_is_refused_at_the_start(
+        make_connections, key_file):
     key_file.with_name('key.timestamp').mkdir()
     with pytest.raises(InvalidValue, match=r'signing timestamp = .*: expected a readable file'):
-        connections(signing_key_file=str(key_file))
+        make_connections(signing_key_file=str(key_file))
 
 
 def test_finding_13_a_timestamp_that_cannot_be_written_is_refused_at_the_start(
-        connections, key_file):
+        make_connections, key_file):
     forbid(key_file)
     with pytest.raises(InvalidValue, match=r'signing timestamp = .*: expected a file that can be'):
-        connections(signing_key_file=str(key_file))
+        make_connections(signing_key_file=str(key_file))
 
 
 def test_finding_13_a_timestamp_that_cannot_be_written_in_flight_is_reported(
-        connections, far, key_file):
-    one = connections(signing_key_file=str(key_file))
+        make_connections, make_remote, key_file):
+    one = make_connections(signing_key_file=str(key_file))
     one.step(0.0)
     assert one.signing.trouble == ''
     forbid(key_file)
@@ -256,16 +260,16 @@ def test_finding_13_a_timestamp_that_cannot_be_written_in_flight_is_reported(
     assert one.signing.outgoing.timestamp == before + 1
     key_file.with_name('key.timestamp.tmp').rmdir()
     one.step(12.0)
-    assert one.signing.trouble != ''  # it is tried again after 5 s
+    assert one.signing.trouble != ''  # the next attempt is after 5 s
     one.step(15.0)
     assert one.signing.trouble == ''
     assert int(key_file.with_name('key.timestamp').read_text()) > before
 
 
 def test_finding_13_a_file_in_a_folder_that_is_read_only_is_written_in_place(
-        connections, key_file):
+        make_connections, key_file):
     key_file.with_name('key.timestamp.tmp').mkdir()
-    connections(signing_key_file=str(key_file))
+    make_connections(signing_key_file=str(key_file))
     assert key_file.with_name('key.timestamp').read_text().isdigit()
 
 
@@ -276,73 +280,75 @@ def test_finding_13_a_computer_whose_clock_was_never_set_signs(key_file):
     one.close()
 
 
-# 24: a flood of far ends
+# 24: a flood of remotes
 
 
 def flood(connections, count, data=b'\xfd\x00x'):
-    """As many strangers send something."""
+    """As many unknown senders send something."""
     to = ('127.0.0.1', connections.links[0].port)
     for _ in range(count):
-        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as stranger:
-            stranger.bind(('127.0.0.1', 0))
-            stranger.sendto(data, to)
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
+            sender.bind(('127.0.0.1', 0))
+            sender.sendto(data, to)
             connections.receive(5.0)
 
 
-def test_finding_24_of_strangers_only_the_latest_hear_heartbeats(connections, far):
-    one = connections()
+def test_finding_24_of_unknown_senders_only_the_latest_receive_heartbeats(
+        make_connections, make_remote):
+    one = make_connections()
     flood(one, 200)
-    last = far(one, 9)
-    last.say(heartbeat())
+    last = make_remote(one, 9)
+    last.send(heartbeat())
     receive(one)
-    assert len(one.links[0].ends()) == MAX_UNCONFIRMED
+    assert len(one.links[0].remotes()) == MAX_UNCONFIRMED
     assert len(one._parsers) <= MAX_UNCONFIRMED + 1
     one.send_to_all(heartbeat())
-    assert last.hear()[0].get_type() == 'HEARTBEAT'
+    assert last.receive()[0].get_type() == 'HEARTBEAT'
 
 
-def test_finding_24_a_known_vehicle_is_not_forgotten_for_strangers(connections, far):
-    one = connections()
-    vehicles = [far(one, system) for system in range(1, 41)]  # more than strangers are kept
+def test_finding_24_a_known_vehicle_is_not_removed_for_unknown_senders(
+        make_connections, make_remote):
+    one = make_connections()
+    vehicles = [make_remote(one, system) for system in range(1, 41)]  # > MAX_UNCONFIRMED
     known = set()
     for vehicle in vehicles:
-        vehicle.say(heartbeat())
+        vehicle.send(heartbeat())
         known |= {address for address, _ in receive(one)}
         one.keep(known)
     parsers = {address: one._parsers[address] for address in known}
     flood(one, 200)
-    assert {(0, end) for end in one.links[0].ends()} > known
-    assert len(one.links[0].ends()) == 40 + MAX_UNCONFIRMED
+    assert {(0, remote) for remote in one.links[0].remotes()} > known
+    assert len(one.links[0].remotes()) == 40 + MAX_UNCONFIRMED
     assert all(one._parsers[address] is parsers[address] for address in known)
     one.send_to_all(heartbeat())
-    assert {vehicle.hear()[0].get_type() for vehicle in vehicles} == {'HEARTBEAT'}
+    assert {vehicle.receive()[0].get_type() for vehicle in vehicles} == {'HEARTBEAT'}
 
 
-def test_finding_24_who_was_named_by_a_parameter_is_not_forgotten(connections):
-    far_end = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-    far_end.bind(('127.0.0.1', 0))
-    one = connections(f'udpout:127.0.0.1:{far_end.getsockname()[1]}')
+def test_finding_24_a_configured_remote_is_not_removed(make_connections):
+    remote = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    remote.bind(('127.0.0.1', 0))
+    one = make_connections(f'udpout:127.0.0.1:{remote.getsockname()[1]}')
     one.keep(())
     flood(one, 100)
-    assert far_end.getsockname() in one.links[0].ends()
-    far_end.close()
+    assert remote.getsockname() in one.links[0].remotes()
+    remote.close()
 
 
-def test_finding_24_frames_refused_are_counted_when_their_sender_is_forgotten(connections):
-    one = connections()
+def test_finding_24_refused_frames_are_counted_after_their_sender_is_removed(make_connections):
+    one = make_connections()
     flood(one, 100, b'xxx')
     assert one.errors() == 100
 
 
-def test_finding_24_a_simulated_vehicle_speaks_to_its_target_and_the_latest_stations():
+def test_finding_24_a_simulated_vehicle_sends_to_its_target_and_the_latest_stations():
     fleet = UdpFleet([(VehicleConfig('uav_1', 1, ORIGIN, (0.0, 0.0, 0.0)), 'px4')],
                   ('127.0.0.1', 9))
     to = ('127.0.0.1', fleet.ports['uav_1'])
     vehicle = fleet._stations['uav_1']
     for _ in range(100):
-        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as stranger:
-            stranger.bind(('127.0.0.1', 0))
-            stranger.sendto(b'x', to)
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
+            sender.bind(('127.0.0.1', 0))
+            sender.sendto(b'x', to)
             vehicle.hear(0.0)
     fleet.close()
     assert len(vehicle._parsers) == 17

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Whatever comes over its links, the bridge lives, says what is wrong, and finds the next vehicle.
+"""Hostile byte streams: the bridge survives, reports refusals, and serves the next vehicle.
 
-`pytest test/mavlink/transport/test_hostile_streams.py --streams 2000`
-sends as many; the seeds stay.
+`pytest test/mavlink/transport/test_hostile_streams.py --streams 2000` sets the number of streams;
+the seeds are fixed.
 """
 import random
 
@@ -21,43 +21,43 @@ from uav_task_alloc.mavlink.transport.connections import Connections
 from uav_task_alloc.model import Task
 
 LENGTH = 400  # datagrams in a stream
-GOOD = 200  # the system id of a vehicle that means well
-FORESEEN = 'expected a'  # in what names a field; all else are errors that nobody thought of
+GOOD = 200  # system id of the correct vehicle
+EXPECTED = 'expected a'  # in a refusal that names a field; all others are unexpected errors
 
 
 class Wire:
-    """A link without a socket: `bring` is what comes, `sent` what goes."""
+    """A link without a socket: `incoming` is received next, `sent` was sent."""
 
     name, opened, trouble = 'wire', 1, ''
 
     def __init__(self, datagrams):
-        self.datagrams, self.come, self.sent = datagrams, [], []
+        self.datagrams, self.incoming, self.sent = datagrams, [], []
 
     def fileno(self):
         return -1
 
     def read(self):
-        come, self.come = self.come, []
-        return come
+        incoming, self.incoming = self.incoming, []
+        return incoming
 
-    def write(self, end, data):
-        self.sent.append((end, data))
+    def write(self, remote, data):
+        self.sent.append((remote, data))
 
     def step(self, now):
         """Nothing to do."""
 
-    def ends(self):
-        return ['far']
+    def remotes(self):
+        return ['remote']
 
-    def keep(self, ends):
-        """All of them."""
+    def keep(self, remotes):
+        """Nothing to do: all are kept."""
 
     def close(self):
         """Nothing to do."""
 
 
 class Bridge:
-    """What the node does with its radio and its ground station, in virtual time."""
+    """Connections and ground station as in the node, in virtual time."""
 
     def __init__(self, seed, datagrams):
         self.rng = random.Random(seed)
@@ -69,10 +69,10 @@ class Bridge:
         self.now, self.step_at, self.revision = 0.0, 0.0, 0
         self.published, self.states = PublishedStates(), set()
 
-    def hear(self, end, data):
-        """As `receive` of the node does, without waiting."""
+    def receive(self, remote, data):
+        """As `receive` of the node, without waiting."""
         out = []
-        for address, message in self.connections._parse((0, end), data):
+        for address, message in self.connections._parse((0, remote), data):
             out += self.ground_station.receive(address, message, self.now)
         self.connections.send(out)
 
@@ -92,32 +92,34 @@ class Bridge:
             session.executor.events.clear()
 
     def command(self):
-        """Now and then a list or a hand-over for a vehicle that seems to be there."""
+        """In one of ten calls, assign a list to a known vehicle, or hand it over."""
         if not self.ground_station.sessions or self.rng.random() > 0.1:
             return
         session = self.rng.choice(list(self.ground_station.sessions.values()))
         self.revision += 1
         names = self.rng.sample(range(8), self.rng.randint(0, 5))
-        far = self.rng.choice([300.0, 30_000.0])
+        distance = self.rng.choice([300.0, 30_000.0])
         tasks = TaskList(self.revision, tuple(
-            MissionStop(Task(f't{k}', (far * k, far, 50.0), service_time=k / 2)) for k in names),
+            MissionStop(Task(f't{k}', (distance * k, distance, 50.0), service_time=k / 2))
+            for k in names),
             self.rng.random() < 0.5)
         self.connections.send(self.ground_station.assign(session.uav_id, tasks, self.now))
         if self.rng.random() < 0.3:
             self.ground_station.hand_over(session.uav_id, 'test', self.now)
 
-    def unforeseen(self):
-        """What was refused for no reason that anybody had thought of."""
+    def unexpected(self):
+        """Refusals by an unexpected error."""
         return [note.text for refusals in (self.ground_station.refusals, self.connections.refusals)
-                for note in refusals.notes if FORESEEN not in note.text]
+                for note in refusals.notes if EXPECTED not in note.text]
 
     def flies(self, guest):
-        """A vehicle that comes when all is over, on a system id that nobody has, is served."""
-        self.ground_station.sessions.pop(guest.system, None)  # perhaps somebody has spoken as it
+        """Whether a correct vehicle that appears after the stream is served."""
+        # the stream may have used its system id
+        self.ground_station.sessions.pop(guest.system, None)
         end = self.now + 120.0
         while self.now < end:
             self.pass_time(0.1)
-            guest.live(self)
+            guest.step(self)
             session = self.ground_station.sessions.get(guest.system)
             if session is None:
                 continue
@@ -130,70 +132,70 @@ class Bridge:
 
 
 class Guest:
-    """A simulated vehicle at a far end."""
+    """A simulated vehicle as a remote."""
 
-    def __init__(self, kind, system, end):
-        self.system, self.end, self.vehicle = system, end, make_vehicle(kind, system)
+    def __init__(self, kind, system, remote):
+        self.system, self.remote, self.vehicle = system, remote, make_vehicle(kind, system)
         self.codec, self.decoder = Codec(system, 1), Codec(system, 1)
 
-    def live(self, bridge):
-        """Hear what was sent to it, and say what it has to say."""
+    def step(self, bridge):
+        """Receive what was sent to it, and send its messages."""
         sent, bridge.wire.sent = bridge.wire.sent, []
-        said = self.vehicle.step(bridge.now)
+        replies = self.vehicle.step(bridge.now)
         for to, data in sent:
-            for message in self.decoder.parse(data) if to == self.end else ():
-                said += self.vehicle.receive(message, bridge.now)
-        for message in said:
-            bridge.hear(self.end, self.codec.pack(message))
+            for message in self.decoder.parse(data) if to == self.remote else ():
+                replies += self.vehicle.receive(message, bridge.now)
+        for message in replies:
+            bridge.receive(self.remote, self.codec.pack(message))
 
 
 def attacked(seed):
-    """A bridge after a stream; in every second one a vehicle flies, and the stream is as it."""
+    """A bridge after a stream; every second stream shares its system id with a flying vehicle."""
     bridge = Bridge(seed, datagrams=seed % 4 != 0)
     guest = Guest(bridge.rng.choice(['px4', 'ardupilot']), 1, 0) if seed % 2 else None
-    for pause, end, data in stream(seed, LENGTH):
-        bridge.hear(end if bridge.wire.datagrams else 'far', data)
+    for pause, remote, data in stream(seed, LENGTH):
+        bridge.receive(remote if bridge.wire.datagrams else 'remote', data)
         bridge.pass_time(pause)
         bridge.command()
         if guest is not None:
-            guest.live(bridge)
+            guest.step(bridge)
     return bridge
 
 
 @pytest.fixture(scope='module')
 def attacks(request):
     """By seed: the bridge after each stream, and after every 20th whether it flies a vehicle."""
-    made = {}
+    results = {}
     for seed in range(request.config.getoption('--streams')):
         bridge = attacked(seed)
         flown = seed % 20 or bridge.flies(Guest('px4', GOOD, 'good'))
         refused = bridge.ground_station.refusals.count
-        made[seed] = (bridge.unforeseen(), bridge.states, refused, flown)
-    return made
+        results[seed] = (bridge.unexpected(), bridge.states, refused, flown)
+    return results
 
 
-def test_no_stream_ends_the_bridge_or_is_refused_for_an_unforeseen_reason(attacks):
-    assert {seed: found for seed, (found, *_) in attacks.items() if found} == {}
+def test_no_stream_ends_the_bridge_or_is_refused_by_an_unexpected_error(attacks):
+    assert {seed: errors for seed, (errors, *_) in attacks.items() if errors} == {}
 
 
-def test_after_a_hostile_stream_a_good_vehicle_is_flown(attacks):
+def test_after_a_hostile_stream_a_correct_vehicle_is_flown(attacks):
     assert [seed for seed, (*_, flown) in attacks.items() if not flown] == []
 
 
-def test_the_streams_get_far_into_the_bridge(attacks):
+def test_the_streams_reach_most_states_of_the_bridge(attacks):
     assert set().union(*(states for _, states, *_ in attacks.values())) >= {
         'UNKNOWN', 'UPLOADING', 'VERIFIED', 'NONE', 'HELD', 'LOST', 'SUSPENDED'}
     assert sum(refused for _, _, refused, _ in attacks.values()) > 10 * len(attacks)
 
 
-def test_a_signed_stream_ends_no_bridge_without_its_key(tmp_path):
+def test_frames_signed_with_another_key_are_dropped_without_an_error(tmp_path):
     tmp_path.joinpath('key').write_bytes(bytes(32))
     connections = Connections([Wire(True)], 245, 190, wall=lambda: 1.8e9,
-                  signing_key_file=str(tmp_path / 'key'))
+                              signing_key_file=str(tmp_path / 'key'))
     forger = Codec(1, 1, signing=make_signing(b'x' * 32, 10**14))
     rng = random.Random(1)
-    for pause, end, data in stream(1, LENGTH):
+    for pause, remote, data in stream(1, LENGTH):
         signed = forger.pack(d.MAVLink_heartbeat_message(2, 12, 0, 0, 4, 3))
         cut = signed[:rng.randrange(len(signed))]
-        assert connections._parse((0, end), rng.choice([data, signed, cut])) == [], pause
+        assert connections._parse((0, remote), rng.choice([data, signed, cut])) == [], pause
     assert connections.refusals.count == 0

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""One command until the vehicle has done it, in a bounded number of tries."""
+"""One command, repeated a bounded number of times until the vehicle has executed it."""
 from __future__ import annotations
 
 from collections.abc import Callable
@@ -11,7 +11,7 @@ from pymavlink.dialects.v20 import ardupilotmega as d
 from uav_task_alloc.mavlink.transport.codec import Message
 
 _PERIOD = 1.0  # [s] until a command is repeated
-_TRIES = 5
+_ATTEMPTS = 5
 
 
 def _always() -> bool:
@@ -19,67 +19,70 @@ def _always() -> bool:
 
 
 class CommandResult(Enum):
-    """What has become of a command."""
+    """Outcome of a command."""
 
     OPEN = 'open'
     DONE = 'done'
     FAILED = 'failed'
-    DROPPED = 'dropped'  # no longer wanted
+    DROPPED = 'dropped'  # not wanted any more
 
 
 @dataclass(slots=True)
 class Command:
-    """Sent every second until acknowledged or seen to be done; then perhaps another way."""
+    """A command that is sent every second until acknowledged or executed, with a fallback.
+
+    `result` is OPEN until then; `reason` tells why an attempt was refused.
+    """
 
     name: str
     message: Message
-    seen: Callable[[], bool]  # whether the vehicle is seen to have done it
+    executed: Callable[[], bool]  # whether telemetry shows that the vehicle has executed it
     ack_suffices: bool = True
-    tries: int = _TRIES
-    patient: bool = False  # a refusal may pass: go on trying
-    wanted: Callable[[], bool] = _always  # no longer: it is dropped between two tries
-    fallback: Command | None = None
-    answer: CommandResult = CommandResult.OPEN
+    attempts: int = _ATTEMPTS
+    retry_refused: bool = False  # a refusal may be temporary: repeat
+    wanted: Callable[[], bool] = _always  # False: dropped before the next attempt
+    fallback: Command | None = None  # sent after the last attempt or a refusal
+    result: CommandResult = CommandResult.OPEN
     reason: str = ''
     _due: float = float('-inf')
     _sent: int = 0
 
     def step(self, now: float) -> list[Message]:
-        """Send what is due."""
-        if self.answer is not CommandResult.OPEN:
+        """The message if it is due; `now`: steady time [s]."""
+        if self.result is not CommandResult.OPEN:
             return []
         if not self.wanted():
-            self.answer = CommandResult.DROPPED
+            self.result = CommandResult.DROPPED
             return []
-        if self._sent and self.seen():
-            self.answer = CommandResult.DONE
+        if self._sent and self.executed():
+            self.result = CommandResult.DONE
         elif now >= self._due:
-            if self._sent < self.tries:
+            if self._sent < self.attempts:
                 self._sent += 1
                 self._due = now + _PERIOD
                 return [self.message]
-            self._end(self.reason or f'no answer to {self.tries} tries')
+            self._end(self.reason or f'no answer to {self.attempts} attempts')
             return self.step(now)
         return []
 
     def receive(self, message: Message) -> None:
-        """Take a COMMAND_ACK that is addressed to us."""
-        if (self.answer is not CommandResult.OPEN or message.get_type() != 'COMMAND_ACK'
+        """Process a COMMAND_ACK addressed to this ground station; others are ignored."""
+        if (self.result is not CommandResult.OPEN or message.get_type() != 'COMMAND_ACK'
                 or message.command != getattr(self.message, 'command', None) or not self._sent):
             return
         if message.result == d.MAV_RESULT_ACCEPTED:
             if self.ack_suffices:
-                self.answer = CommandResult.DONE
+                self.result = CommandResult.DONE
         elif message.result != d.MAV_RESULT_IN_PROGRESS:
             self.reason = f'refused with MAV_RESULT {message.result}'
-            if not self.patient and message.result != d.MAV_RESULT_TEMPORARILY_REJECTED:
+            if not self.retry_refused and message.result != d.MAV_RESULT_TEMPORARILY_REJECTED:
                 self._end(self.reason)
 
     def _end(self, reason: str) -> None:
         other = self.fallback
         if other is None:
-            self.answer, self.reason = CommandResult.FAILED, reason
+            self.result, self.reason = CommandResult.FAILED, reason
             return
         self.message, self.ack_suffices = other.message, other.ack_suffices
-        self.tries, self.fallback, self.reason = other.tries, other.fallback, ''
+        self.attempts, self.fallback, self.reason = other.attempts, other.fallback, ''
         self._sent, self._due = 0, float('-inf')

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Commands to one vehicle, one after the other: modes, arming, take-off, the current item.
+"""Sends commands to one vehicle, one at a time: modes, arming, take-off, the current item.
 
-Whether one may be sent is not decided here: `authority` is asked at every send.
+Whether a command may be sent is decided by `authority` at each send, not here.
 """
 from __future__ import annotations
 
@@ -19,36 +19,42 @@ from uav_task_alloc.mavlink.transport.codec import Message
 from uav_task_alloc.mavlink.transport.notes import OperatorNote
 
 ARM = 'arm'
-ARM_TRIES = 120  # one a second: a position estimate may take that long
-_CLIMB = 120.0  # [s] for a take-off
-ENOUGH = 0.9  # of the height asked for
-RETRY, RETRIES = 10.0, 5  # [s] after a failure that may pass
-SLOW_RETRY = 60.0  # [s] after more of them, without end
-REFUSAL = 5.0  # [s] that an arming is tried before its refusal is told: the reason may follow
+ARM_ATTEMPTS = 120  # one per second: a position estimate may take that long
+_CLIMB_LIMIT = 120.0  # [s] for a take-off
+_REACHED_HEIGHT = 0.9  # fraction of the commanded height
+RETRY, RETRIES = 10.0, 5  # [s] after a failure that may be temporary
+SLOW_RETRY = 60.0  # [s] after more failures, without limit
+_REFUSAL_DELAY = 5.0  # [s] of arming attempts before a refusal is logged: the reason may follow
 
-Then = Callable[[float], None]
-NextMessages = list[Message] | None  # None: satisfied
+_Completion = Callable[[float], None]
+NextMessages = list[Message] | None  # None: the rule is satisfied
 
 
 class CommandSender:
-    """One command at a time until it is done; what was commanded last."""
+    """Executes one command at a time, with back-off after failures.
+
+    Args:
+        peer: the vehicle.
+        profile: of its autopilot.
+        telemetry: of the vehicle; shows which commands were executed.
+    """
 
     def __init__(self, peer: Peer, profile: Profile, telemetry: Telemetry) -> None:
         self._peer, self._profile, self._telemetry = peer, profile, telemetry
         self.notes: deque[OperatorNote] = deque()
-        self.waits_for = ''  # why nothing is done, for a human
-        self.commanded: ModeFunction | None = None  # by us, last
-        self.must_start = False  # in the air and held by us
-        self.armed_here = False  # by us, on the ground: it takes off next, or is disarmed
-        self.climbing = False  # by our take-off
-        self.refused = ''  # why the mission mode was refused, at the last try
-        self.refusal = ''  # why it does not arm, in the vehicle's words
+        self.waits_for = ''  # what the bridge waits for, in words; '': nothing
+        self.commanded: ModeFunction | None = None  # the latest mode set by the bridge
+        self.must_start = False  # airborne and held by the bridge: set mission mode
+        self.armed_here = False  # armed by the bridge, on the ground: take-off or disarm is next
+        self.climbing = False  # by a take-off of the bridge
+        self.mission_refused = ''  # why the last attempt to set mission mode was refused
+        self.arming_refusal = ''  # the vehicle's text on why it does not arm
         self._command: Command | None = None
-        self._then: Then | None = None
+        self._completion: _Completion | None = None
         self._climb_until = math.inf
-        self._said = ''
-        self._told: dict[str, str] = {}  # why a command failed, as told last
-        self._arming_since: float | None = None  # [s] it is tried, without success
+        self._logged_wait = ''
+        self._logged: dict[str, str] = {}  # reason logged last, by the name of the failed command
+        self._arming_since: float | None = None  # [s] of the first of the failing attempts
         self._retry_at, self._retries = -math.inf, 0
 
     @property
@@ -57,139 +63,154 @@ class CommandSender:
 
     @property
     def failing(self) -> bool:
-        """It was tried often enough to say that it does not work."""
+        """More than RETRIES failures in a row."""
         return self._retries > RETRIES
 
     def drop(self) -> None:
-        """Somebody else has the vehicle: nothing that is under way is repeated."""
+        """Drop the open command and its state: another party controls the vehicle."""
         self._command = self._arming_since = None
         self.climbing = self.must_start = self.armed_here = False
-        self.commanded, self.refused = None, ''
+        self.commanded, self.mission_refused = None, ''
 
     def reset(self, now: float) -> None:
-        """The vehicle was restarted."""
+        """Drop everything after a restart of the vehicle."""
         self.drop()
         self.clear_backoff(now)
 
     def clear_backoff(self, now: float) -> None:
-        """A new list, a new link: what failed may be tried again."""
+        """End the back-off: a new list or a restored link may change the outcome."""
         self._retry_at, self._retries = now, 0
 
     def fail(self, now: float) -> None:
-        """Wait before the next try, longer where many have failed."""
+        """Start the back-off after a failure, a longer one after RETRIES failures."""
         self._retries += 1
         self._retry_at = now + (RETRY if self._retries <= RETRIES else SLOW_RETRY)
 
     def backing_off(self, now: float) -> bool:
-        """After a failure, before the next try."""
+        """Whether the back-off after a failure lasts."""
         if now < self._retry_at:
-            self.waits_for = 'the next try'
+            self.waits_for = 'the next attempt'
         return now < self._retry_at
 
     def wait(self, what: str) -> list[Message]:
-        """Do nothing, and say once why."""
-        if self._said != what:
+        """Send nothing; the reason is shown in diagnostics and logged once."""
+        if self._logged_wait != what:
             self.notes.append(OperatorNote('warning', f'waits for {what}'))
-        self.waits_for = self._said = what
+        self.waits_for = self._logged_wait = what
         return []
 
     def wait_for(self, what: str) -> list[Message]:
-        """Do nothing; why is said in diagnostics, or was told by who decided it."""
+        """Send nothing; the reason is shown in diagnostics only."""
         self.waits_for = what
         return []
 
     def satisfied(self) -> list[Message]:
-        """All is as it should be."""
-        self.waits_for = self._said = ''
+        """Send nothing: the goal is reached. Resets waiting and failures."""
+        self.waits_for = self._logged_wait = ''
         self._retries = 0
         return []
 
     def receive(self, message: Message) -> None:
-        """Take a COMMAND_ACK; one to another station says nothing of our command."""
+        """Process a COMMAND_ACK; one to another station is ignored."""
         if self._command and self._peer.is_from_vehicle(message):
             self._command.receive(message)
 
-    def note_refusal(self, text: str) -> None:
-        """STATUSTEXT: why the vehicle does not arm, where that is what is tried."""
+    def note_arming_refusal(self, text: str) -> None:
+        """Keep the text of a STATUSTEXT that gives the reason why the vehicle does not arm."""
         prefix, _, reason = text.partition(': ')
         if prefix in ('Arm', 'PreArm') and reason:
-            self.refusal = reason
+            self.arming_refusal = reason
 
     def finish(self, now: float) -> NextMessages:
-        """The command under way."""
+        """Continue the open command; None if there is none, or it has ended now."""
         command = self._command
         if command is None:
             return None
         out = command.step(now)
-        if command.answer is CommandResult.OPEN:
-            self.waits_for = command.name + self._tell_arming(command, now)
+        if command.result is CommandResult.OPEN:
+            self.waits_for = command.name + self._log_arming_refusal(command, now)
             return out
-        self._command, then = None, self._then
-        if command.name == ARM and command.answer is not CommandResult.FAILED:
+        self._command, completion = None, self._completion
+        if command.name == ARM and command.result is not CommandResult.FAILED:
             self._arming_since = None
-        if command.answer is CommandResult.DONE and then:
-            self._told.pop(command.name, None)
-            then(now)
-        elif command.answer is CommandResult.FAILED:
-            self._tell_failed(command)
+        if command.result is CommandResult.DONE and completion:
+            self._logged.pop(command.name, None)
+            completion(now)
+        elif command.result is CommandResult.FAILED:
+            self._log_failure(command)
             if command.name == _mode_name(ModeFunction.MISSION) and 'refused' in command.reason:
-                self.refused = command.reason
+                self.mission_refused = command.reason
             self.fail(now)
         return None
 
-    def _tell_failed(self, command: Command) -> None:
-        """Once until the reason changes; why it does not arm was told before."""
-        if command.name == ARM and ARM in self._told:
+    def _log_failure(self, command: Command) -> None:
+        """Log a reason once until it changes; a refusal to arm is logged before."""
+        if command.name == ARM and ARM in self._logged:
             return
-        if self._told.get(command.name) != command.reason:
+        if self._logged.get(command.name) != command.reason:
             self.notes.append(OperatorNote('error', f'{command.name}: {command.reason}'))
-        self._told[command.name] = command.reason
+        self._logged[command.name] = command.reason
 
-    def _tell_arming(self, command: Command, now: float) -> str:
-        """Why it does not arm, once until the reason changes, and for how long it was tried."""
+    def _log_arming_refusal(self, command: Command, now: float) -> str:
+        """Text on why and for how long arming is refused, logged once until the reason changes."""
         tried = now - (now if self._arming_since is None else self._arming_since)
-        if command.name != ARM or not command.reason or tried < REFUSAL:
+        if command.name != ARM or not command.reason or tried < _REFUSAL_DELAY:
             return ''
-        why = self.refusal or self._telemetry.unhealthy or command.reason
-        text = f': refused for {tried:.0f} s: {why}'
-        if self._told.get(ARM) != why:
-            self._told[ARM] = why
+        reason = self.arming_refusal or self._telemetry.unhealthy or command.reason
+        text = f': refused for {tried:.0f} s: {reason}'
+        if self._logged.get(ARM) != reason:
+            self._logged[ARM] = reason
             self.notes.append(OperatorNote('warning', ARM + text))
         return text
 
-    def do(self, command: Command, now: float, then: Then) -> list[Message]:
-        """Begin a command; `then` is called once it is done."""
-        self._command, self._then = command, then
-        self.waits_for, self.refused = command.name, ''
+    def start(self, command: Command, now: float, completion: _Completion) -> list[Message]:
+        """Start a command; `completion(now)` is called once it is executed."""
+        self._command, self._completion = command, completion
+        self.waits_for, self.mission_refused = command.name, ''
         return command.step(now)
 
-    def set_mode(self, flight: ModeFunction, now: float) -> list[Message]:
-        """Into a mode, seen by the ACK or by a heartbeat."""
+    def set_mode(self, mode: ModeFunction, now: float) -> list[Message]:
+        """Command a mode; confirmed by COMMAND_ACK or HEARTBEAT."""
         telemetry = self._telemetry
 
         def done(t: float) -> None:
-            telemetry.mode = flight  # a heartbeat sent before may say otherwise for a moment
-            if flight is ModeFunction.MISSION:
+            telemetry.mode = mode  # an older heartbeat may still report the previous mode
+            if mode is ModeFunction.MISSION:
                 self.must_start = False
 
-        self.commanded = flight
-        return self.do(Command(_mode_name(flight), self._profile.mode_command(
-            self._peer, flight), lambda: telemetry.mode is flight), now, done)
+        self.commanded = mode
+        return self.start(Command(_mode_name(mode), self._profile.mode_command(
+            self._peer, mode), lambda: telemetry.mode is mode), now, done)
 
-    def jump(self, seq: int, now: float, then: Then) -> list[Message]:
-        """To an item: by command, and where that is unknown the old way."""
-        telemetry, asked = self._telemetry, now
+    def set_current(self, seq: int, now: float, completion: _Completion) -> list[Message]:
+        """Set the current mission item, by MISSION_SET_CURRENT if the command is unsupported.
 
-        def seen() -> bool:
-            return telemetry.current == seq and telemetry.current_at >= asked
+        Args:
+            seq: on the wire, that is with home on ArduPilot.
+            now: steady time [s].
+            completion: called once MISSION_CURRENT confirms it.
+        """
+        telemetry, sent_at = self._telemetry, now
 
-        old_way = Command('set current', self._peer.set_current(seq), seen)
-        new_way = Command('set current', self._peer.command(
-            d.MAV_CMD_DO_SET_MISSION_CURRENT, seq), seen, tries=2, fallback=old_way)
-        return self.do(new_way if self._profile.jump_command else old_way, now, then)
+        def executed() -> bool:
+            return telemetry.current == seq and telemetry.current_at >= sent_at
 
-    def rise(self, height: float, wanted: Callable[[], bool], now: float) -> NextMessages:
-        """Off the ground to `height` [m]; each try asks whether that is still wanted."""
+        message = Command('set current', self._peer.set_current(seq), executed)
+        command = Command('set current', self._peer.command(
+            d.MAV_CMD_DO_SET_MISSION_CURRENT, seq), executed, attempts=2, fallback=message)
+        return self.start(command if self._profile.jump_command else message, now, completion)
+
+    def take_off(self, height: float, wanted: Callable[[], bool], now: float) -> NextMessages:
+        """Arm, take off and climb.
+
+        Args:
+            height: [m] above home.
+            wanted: checked before each attempt; False drops the command.
+            now: steady time [s].
+
+        Returns:
+            The next messages; None once the vehicle is airborne at that height.
+        """
         telemetry = self._telemetry
         if telemetry.airborne and not self.climbing:
             return None
@@ -207,34 +228,35 @@ class CommandSender:
             self.armed_here = False
             arm = self._peer.command(d.MAV_CMD_COMPONENT_ARM_DISARM, 1.0)
             if self._arming_since is None:
-                self._arming_since, self.refusal = now, ''
-            return self.do(Command(ARM, arm, lambda: telemetry.armed, tries=ARM_TRIES,
-                                   patient=True, wanted=wanted), now, self._armed)
+                self._arming_since, self.arming_refusal = now, ''
+            return self.start(Command(ARM, arm, lambda: telemetry.armed, attempts=ARM_ATTEMPTS,
+                                      retry_refused=True, wanted=wanted), now, self._armed)
         if not self.armed_here:
-            return self.wait_for('it to disarm: it was armed by another, or has just landed')
+            return self.wait_for('it to disarm: it was armed by another party, or has just landed')
         ground = telemetry.altitude - (
             0.0 if math.isnan(telemetry.height) else telemetry.height)
-        up = self._profile.takeoff_command(self._peer, height, ground)
-        return self.do(Command('take off', up, lambda: telemetry.mode is ModeFunction.TAKEOFF,
-                               wanted=wanted), now, self._took_off)
+        takeoff = self._profile.takeoff_command(self._peer, height, ground)
+        return self.start(Command('take off', takeoff,
+                                  lambda: telemetry.mode is ModeFunction.TAKEOFF,
+                                  wanted=wanted), now, self._took_off)
 
     def disarm(self, now: float) -> list[Message]:
-        """On the ground, where we armed it and nothing is to be flown any more."""
+        """Disarm on the ground, after arming by the bridge, when there is nothing to fly."""
         self.armed_here = False
-        off = self._peer.command(d.MAV_CMD_COMPONENT_ARM_DISARM, 0.0)
-        return self.do(Command('disarm', off, lambda: not self._telemetry.armed), now,
+        disarm = self._peer.command(d.MAV_CMD_COMPONENT_ARM_DISARM, 0.0)
+        return self.start(Command('disarm', disarm, lambda: not self._telemetry.armed), now,
                        lambda t: None)
 
     def _armed(self, now: float) -> None:
         self._telemetry.armed = self.armed_here = True
 
     def _took_off(self, now: float) -> None:
-        self.climbing, self._climb_until = True, now + _CLIMB
+        self.climbing, self._climb_until = True, now + _CLIMB_LIMIT
         self.armed_here = False
         self.commanded = ModeFunction.TAKEOFF
 
     def _climb(self, height: float, now: float) -> NextMessages:
-        if self._telemetry.height >= ENOUGH * height:
+        if self._telemetry.height >= _REACHED_HEIGHT * height:
             self.climbing, self.must_start = False, True
             return None
         self.waits_for = 'its height'
@@ -244,5 +266,5 @@ class CommandSender:
         return []
 
 
-def _mode_name(flight: ModeFunction) -> str:
-    return f'mode {flight.value}'
+def _mode_name(mode: ModeFunction) -> str:
+    return f'mode {mode.value}'

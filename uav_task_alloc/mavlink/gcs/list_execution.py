@@ -82,7 +82,7 @@ class ListExecution:
             onboard.adopt(found, t, tasks)
 
         onboard.progress.begin_set_current(found.start)
-        return self._sender.jump(found.start + onboard.own, now, done)
+        return self._sender.set_current(found.start + onboard.own, now, done)
 
     def fly(self, now: float) -> NextMessages:
         """In mission mode, at the right item."""
@@ -99,9 +99,9 @@ class ListExecution:
             onboard.progress.note_mission_mode()
             self._ending.swap_ended()
             return sender.satisfied()
-        if sender.refused and not in_mission:
-            onboard.list.infeasible(self._texts.last or sender.refused)
-            sender.refused = ''
+        if sender.mission_refused and not in_mission:
+            onboard.list.infeasible(self._texts.last or sender.mission_refused)
+            sender.mission_refused = ''
             return []
         if sender.backing_off(now):
             return []

@@ -143,7 +143,7 @@ class Telemetry:
         if now - self.received_at > QUIET:
             self._gap_at = now
         self.received_at = now
-        self.frames.note_all((seq for system, seq in getattr(message, 'passed', ())
+        self.frames.note_all((seq for system, seq in getattr(message, 'skipped', ())
                               if system == message.get_srcSystem()), now)
         self.frame = self.frames.note(message.get_seq(), now)
         self.received_ids.add(message.get_msgId())

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Bytes to MAVLink messages and back for one peer, signed where asked; no socket, no clock."""
+"""Encodes and decodes MAVLink frames of one remote, with optional signing; no socket, no clock."""
 from __future__ import annotations
 
 import struct
@@ -8,24 +8,24 @@ from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
-MAX_SKIPPED = 512  # frames that nobody wants, remembered until one comes that somebody does
+MAX_SKIPPED = 512  # skipped frames kept until the next decoded message
 Message = Any  # a dialect.MAVLink_message; the dialect has no usable types
-Signing = Any  # a dialect.MAVLinkSigning; all parsers share one, else a replay finds a new one
+Signing = Any  # a dialect.MAVLinkSigning; shared by all parsers, which detects replays
 
-# The dialect lacks the mission id that PX4 appends (opaque_id, mission_id): where it begins.
+# Payload offset of the mission id that PX4 appends (opaque_id, mission_id); not in the dialect.
 _PLAN_ID_AT = {
     dialect.MAVLINK_MSG_ID_MISSION_COUNT: 5,
     dialect.MAVLINK_MSG_ID_MISSION_ACK: 4,
     dialect.MAVLINK_MSG_ID_MISSION_CURRENT: 6,
 }
-_RADIO_STATUS = dialect.MAVLINK_MSG_ID_RADIO_STATUS  # made by the radio, which has no key
+_RADIO_STATUS = dialect.MAVLINK_MSG_ID_RADIO_STATUS  # sent by the modem, which has no key
 
 
 class _Parser(dialect.MAVLink):  # type: ignore[misc]
-    """The dialect's parser, which skips unwanted messages and survives forged signatures."""
+    """The dialect's parser; skips unwanted messages and resists forged signatures."""
 
     wanted: Collection[int] | None = None
-    passed: list[tuple[int, int]]  # system and sequence number of frames that nobody wants
+    skipped: list[tuple[int, int]]  # system id and sequence number of unwanted frames
     tap: Callable[[bytes], None] | None = None
 
     def decode(self, msgbuf: bytearray) -> Message:
@@ -35,25 +35,32 @@ class _Parser(dialect.MAVLink):  # type: ignore[misc]
             number = (msgbuf[7] | msgbuf[8] << 8 | msgbuf[9] << 16 if msgbuf[0] == 253
                       else msgbuf[5])
             if number not in self.wanted:
-                at = 4 if msgbuf[0] == 253 else 2  # sequence number, and the system after it
-                self.passed.append((msgbuf[at + 1], msgbuf[at]))
+                at = 4 if msgbuf[0] == 253 else 2  # sequence number, followed by system id
+                self.skipped.append((msgbuf[at + 1], msgbuf[at]))
                 return dialect.MAVLink_unknown(number, msgbuf)
         return super().decode(msgbuf)
 
     def check_signature(self, msgbuf: bytearray, system: int, component: int) -> bool:
-        # The dialect notes the timestamp before it knows the sender: a forger could lock out.
+        # The dialect stores the timestamp before it checks the signature: a forged frame would
+        # lock the sender out.
         before = dict(self.signing.stream_timestamps)
-        good: bool = super().check_signature(msgbuf, system, component)
-        if not good:
+        valid: bool = super().check_signature(msgbuf, system, component)
+        if not valid:
             self.signing.stream_timestamps = before
-        return good
+        return valid
 
 
 class Codec:
-    """What one station says (`pack`) and hears (`parse`); one for each peer: parsers hold state.
+    """Encoder (`pack`) and stateful decoder (`parse`) of one remote.
 
-    `wanted` names the message ids worth decoding, None all of them; `tap` sees every whole frame.
-    Bad bytes are counted in `errors`, never raised.
+    Invalid bytes are counted in `errors`, never raised.
+
+    Args:
+        system_id: source system id of encoded frames.
+        component_id: source component id of encoded frames.
+        wanted: message ids to decode; None: all.
+        signing: signs encoded frames and checks decoded ones; None: no signing.
+        tap: called with each complete frame.
     """
 
     def __init__(self, system_id: int, component_id: int, *,
@@ -61,17 +68,17 @@ class Codec:
                  tap: Callable[[bytes], None] | None = None) -> None:
         self._mav = _Parser(None, system_id, component_id)
         self._mav.robust_parsing = True
-        self._mav.wanted, self._mav.tap, self._mav.passed = wanted, tap, []
+        self._mav.wanted, self._mav.tap, self._mav.skipped = wanted, tap, []
         if signing is not None:
             self._mav.signing = signing
 
     @property
     def errors(self) -> int:
-        """Frames and stray bytes refused so far."""
+        """Number of rejected frames and bytes."""
         return int(self._mav.total_receive_errors)
 
     def pack(self, message: Message) -> bytes:
-        """The frame of a message; `with_plan_id` adds what the dialect lacks."""
+        """Encode a message; `with_plan_id` adds the mission id that the dialect lacks."""
         plan_id = getattr(message, 'plan_id', None)
         if plan_id is None:
             frame = message.pack(self._mav)
@@ -83,21 +90,27 @@ class Codec:
         return bytes(frame)
 
     def parse(self, data: bytes) -> list[Message]:
-        """The whole messages in the stream so far; half a frame waits for the rest."""
+        """Decode the complete frames so far; an incomplete frame is kept for the next call."""
         messages = [m for m in self._mav.parse_buffer(data) or () if m.get_msgId() >= 0]
-        if messages and self._mav.passed:
-            messages[0].passed = tuple(self._mav.passed)
-            self._mav.passed.clear()
-        del self._mav.passed[:-MAX_SKIPPED]
+        if messages and self._mav.skipped:
+            messages[0].skipped = tuple(self._mav.skipped)
+            self._mav.skipped.clear()
+        del self._mav.skipped[:-MAX_SKIPPED]
         return messages
 
     def drop(self) -> None:
-        """Forget half a frame: a datagram is whole, or damaged."""
+        """Discard an incomplete frame: frames do not span datagrams."""
         self._mav.buf, self._mav.buf_index = bytearray(), 0
 
 
 def make_signing(key: bytes, timestamp: int, link_id: int = 0) -> Signing:
-    """Sign what goes out and refuse what is not signed by `key` (32 bytes); time in 10 us."""
+    """Signing of sent frames and checking of received ones.
+
+    Args:
+        key: 32 bytes; a frame that is not signed with it is rejected.
+        timestamp: [10 us] since 2015-01-01.
+        link_id: of sent frames.
+    """
     signing = dialect.MAVLinkSigning()
     signing.secret_key = key
     signing.timestamp = timestamp
@@ -108,14 +121,14 @@ def make_signing(key: bytes, timestamp: int, link_id: int = 0) -> Signing:
 
 
 def plan_id(message: Message) -> int:
-    """The id of the mission on board in a COUNT, ACK or CURRENT; 0 where there is none."""
+    """The id of the onboard mission in a COUNT, ACK or CURRENT (PX4); 0: none."""
     at = _PLAN_ID_AT[message.get_msgId()]
     frame = message.get_msgbuf()
     payload = bytes(frame[10:10 + frame[1]] if frame[:1] == b'\xfd' else b'')
-    return int.from_bytes(payload[at:at + 4], 'little')  # zeros at the end are cut on the wire
+    return int.from_bytes(payload[at:at + 4], 'little')  # trailing zeros are truncated on the wire
 
 
 def with_plan_id(message: Message, value: int) -> Message:
-    """The same COUNT, ACK or CURRENT with a mission id for `Codec.pack`."""
+    """Set the mission id of a COUNT, ACK or CURRENT for `Codec.pack`; returns the message."""
     message.plan_id = value
     return message

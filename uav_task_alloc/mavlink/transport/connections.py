@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""All links as one: a parser for each far end, one voice, signing, a recording."""
+"""All links as one: a decoder for each remote, one encoder, signing, and the tlog recording."""
 from __future__ import annotations
 
 import selectors
@@ -15,62 +15,82 @@ from uav_task_alloc.mavlink.transport.link import MAX_UNCONFIRMED, Link
 from uav_task_alloc.mavlink.transport.refused_messages import RefusedMessages, failure
 from uav_task_alloc.mavlink.transport.signing import SigningClock
 
-Address = tuple[int, Hashable]  # number of the link, far end on it
+Address = tuple[int, Hashable]  # index of the link, remote on it
 
 
 class Connections:
-    """Bytes on links to messages and back; thread safe to send, one thread may receive."""
+    """Messages on several links; any thread may send, one thread may receive.
+
+    Args:
+        links: opened or opening links; an Address holds the index of one.
+        system: own system id.
+        component: own component id.
+        wall: wall clock [s] since 1970, for signing and the recording.
+        wanted: message ids to decode; None: all.
+        signing_key_file: path of the key; '': no signing.
+        tlog: path of the recording; '': none.
+
+    Raises:
+        InvalidValue: the key, its timestamp or the recording cannot be opened.
+    """
 
     def __init__(self, links: Iterable[Link], system: int, component: int, *,
                  wall: Callable[[], float], wanted: Collection[int] | None = None,
                  signing_key_file: str = '', tlog: str = '') -> None:
-        """`wanted`: ids of the messages to decode; None: all."""
         self._ids, self._wall, self._wanted = (system, component), wall, wanted
         self.signing = SigningClock(signing_key_file, wall) if signing_key_file else None
         self._record = open_record(tlog) if tlog else None
-        self.links = list(links)  # last, as they may be opened by this
+        self.links = list(links)  # last: iterating may open them
         self._encoder = Codec(system, component,
                             signing=self.signing.outgoing if self.signing else None)
-        self.refusals = RefusedMessages()  # what could not be decoded, or encoded
-        self._parsers: dict[Address, Codec] = {}  # the one heard last at the end
+        self.refusals = RefusedMessages()  # could not be decoded or encoded
+        self._parsers: dict[Address, Codec] = {}  # ordered by the last reception
         self._kept: frozenset[Address] = frozenset()
-        self._errors = 0  # of parsers that are gone
-        self._lock = threading.Lock()  # held for all that touches a link: none of it blocks
+        self._errors = 0  # of removed parsers
+        self._lock = threading.Lock()  # held while a link is used; no link operation blocks
         self._selector = selectors.DefaultSelector()
-        self._watched = [(-1, 0)] * len(self.links)  # the file of each, how often opened
+        self._watched = [(-1, 0)] * len(self.links)  # file number and open count of each
 
     def receive(self, timeout: float) -> list[tuple[Address, Message]]:
-        """What comes within `timeout` [s]; returns as soon as there is something."""
+        """Wait for messages, at most `timeout` [s].
+
+        Returns:
+            Decoded messages, each with the address it came from; [] on timeout.
+        """
         self._watch()
-        got: list[tuple[Address, Message]] = []
+        received: list[tuple[Address, Message]] = []
         for key, _ in self._selector.select(timeout):
             number = key.data
-            with self._lock:  # a line that breaks drops what a sender may be writing
-                read = self.links[number].read()
-            for end, data in read:
-                got += self._parse((number, end), data)
-        return got
+            with self._lock:  # a link that fails drops its send buffer, which `send` may be using
+                chunks = self.links[number].read()
+            for remote, data in chunks:
+                received += self._parse((number, remote), data)
+        return received
 
     def send(self, messages: Iterable[tuple[Any, Message]]) -> None:
-        """Each message to its address; one that cannot be encoded is dropped and told."""
+        """Send each message to its address; one that cannot be encoded is dropped and reported.
+
+        Args:
+            messages: pairs of Address and message.
+        """
         with self._lock:
             if self.signing is not None:
                 self.signing.catch_up()
-            for (number, end), message in messages:
+            for (number, remote), message in messages:
                 try:
                     frame = self._encoder.pack(message)
                     self._write_record(frame)
-                    self.links[number].write(end, frame)
+                    self.links[number].write(remote, frame)
                 except Exception as error:
-                    self.refusals.add(f'to {end}', message.get_type(), failure(error), 'error')
+                    self.refusals.add(f'to {remote}', message.get_type(), failure(error), 'error')
 
     def send_to_all(self, message: Message) -> None:
-        """To every far end that is known."""
-        self.send(((number, end), message) for number, link in enumerate(self.links)
-                  for end in link.ends())
+        """Send to every known remote."""
+        self.send(((number, remote), message) for number, link in enumerate(self.links)
+                  for remote in link.remotes())
 
     def step(self, now: float) -> None:
-        """Let time pass: reconnect, and keep the signing timestamp on disk."""
+        """Reconnect links, and save the signing timestamp; `now`: steady time [s]."""
         with self._lock:
             for link in self.links:
                 link.step(now)
@@ -78,15 +98,15 @@ class Connections:
             self.signing.step(now)
 
     def errors(self) -> int:
-        """Frames refused so far, on all links."""
+        """Number of rejected frames and bytes on all links."""
         return self._errors + sum(parser.errors for parser in list(self._parsers.values()))
 
     def keep(self, addresses: Iterable[Address]) -> None:
-        """These are of known vehicles: whoever else speaks, they are not forgotten."""
+        """Set the addresses of known vehicles, which are never removed."""
         self._kept = frozenset(addresses)
         with self._lock:
             for number, link in enumerate(self.links):
-                link.keep([end for at, end in self._kept if at == number])
+                link.keep([remote for at, remote in self._kept if at == number])
 
     def close(self) -> None:
         with self._lock:
@@ -98,8 +118,8 @@ class Connections:
                 self._record.close()
 
     def _watch(self) -> None:
-        """Wait for the files that the links have now; a number may pass from one to another."""
-        with self._lock:  # a sender may close a line that breaks
+        """Update the selector; links may be reopened, and exchange file numbers."""
+        with self._lock:  # a sender closes a link that fails
             files = [(link.fileno(), link.opened) for link in self.links]
             changed = [n for n, file in enumerate(files) if file != self._watched[n]]
             for number in changed:
@@ -128,27 +148,31 @@ class Connections:
         return [(address, message) for message in messages]
 
     def _forget_unconfirmed(self) -> None:
-        """Of datagrams; a stream may stand in the middle of a frame."""
-        strangers = [address for address in self._parsers if address not in self._kept
-                     and self.links[address[0]].datagrams] if (
+        """Remove the oldest parsers of unconfirmed remotes; a stream keeps its split frame."""
+        unconfirmed = [address for address in self._parsers if address not in self._kept
+                       and self.links[address[0]].datagrams] if (
             len(self._parsers) > len(self._kept) + len(self.links) + MAX_UNCONFIRMED) else []
-        for address in strangers[:-MAX_UNCONFIRMED]:
+        for address in unconfirmed[:-MAX_UNCONFIRMED]:
             self._errors += self._parsers.pop(address).errors
 
     def _write_record(self, frame: bytes) -> None:
-        record = self._record  # the other thread may end it meanwhile
+        record = self._record  # another thread may close it
         if record is None:
             return
         try:
             record.write(struct.pack('>Q', int(self._wall() * 1e6)) + frame)
-        except (OSError, ValueError):  # the disk is full: the flight goes on, and the heartbeat
+        except (OSError, ValueError):  # disk full: end the recording only
             self._record = None
             with suppress(OSError):
                 record.close()
 
 
 def open_record(path: str) -> BinaryIO:
-    """A recording to add to; raise InvalidValue where that cannot be."""
+    """Open a recording for appending.
+
+    Raises:
+        InvalidValue: it cannot be written.
+    """
     try:
         return open(path, 'ab')
     except OSError as error:

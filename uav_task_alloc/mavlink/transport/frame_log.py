@@ -1,50 +1,58 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Which frames of a vehicle have come, by their sequence numbers: was anything lost in between?"""
+"""The received frames of one vehicle by sequence number, to detect lost ones."""
 from __future__ import annotations
 
 from collections import deque
 from collections.abc import Iterable
 
 _KEPT = 1024  # frames
-SILENCE = 1.0  # [s] in which the numbers may have begun again: something is missing then
+_SILENCE = 1.0  # [s] after which sequence numbers may have wrapped: frames are missing
 
 
 class FrameLog:
-    """Numbers frames without end; late ones are put in where they belong."""
+    """Maps the 8-bit sequence numbers to unbounded frame numbers; accepts late frames."""
 
     def __init__(self) -> None:
         self.newest = 0  # the number of the newest frame
         self._known, self._at = False, 0.0
         self._order: deque[int] = deque()
-        self._came: set[int] = set()
+        self._received: set[int] = set()
 
     def note(self, seq: int, now: float) -> int:
-        """Take the sequence number (0..255) of a frame; returns its number without end."""
+        """Record a received frame.
+
+        Args:
+            seq: sequence number, 0..255.
+            now: steady time [s].
+
+        Returns:
+            The unbounded frame number.
+        """
         if not self._known:
             self._known, self.newest = True, seq
-        elif now - self._at > SILENCE:
+        elif now - self._at > _SILENCE:
             self.newest += 256
         self._at = now
         number = self.newest + (seq - self.newest + 128) % 256 - 128
         self.newest = max(self.newest, number)
-        if number not in self._came:
-            self._came.add(number)
+        if number not in self._received:
+            self._received.add(number)
             self._order.append(number)
             if len(self._order) > _KEPT:
-                self._came.discard(self._order.popleft())
+                self._received.discard(self._order.popleft())
         return number
 
     def note_all(self, seqs: Iterable[int], now: float) -> None:
-        """Take frames that nobody looked at."""
+        """Record frames that were not decoded, by their sequence numbers."""
         for seq in seqs:
             self.note(seq, now)
 
     def whole(self, first: int, last: int) -> bool:
-        """Whether every frame from `first` to `last` has come."""
-        return last - first < _KEPT and all(n in self._came for n in range(first, last + 1))
+        """Whether every frame from `first` to `last` was received."""
+        return last - first < _KEPT and all(n in self._received for n in range(first, last + 1))
 
     def clear(self) -> None:
-        """The vehicle counts from the start again."""
+        """Reset after a restart of the vehicle."""
         self._known = False
         self._order.clear()
-        self._came.clear()
+        self._received.clear()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The heartbeat of the bridge: a thread that nothing else holds up, and that is watched."""
+"""The heartbeat of the bridge: a monitored thread that no other work can block."""
 from __future__ import annotations
 
 import math
@@ -12,27 +12,32 @@ from uav_task_alloc.mavlink.transport.codec import Message
 from uav_task_alloc.mavlink.transport.refused_messages import failure
 
 _PERIOD = 1.0  # [s]
-OVERDUE = 3.0  # periods without a heartbeat
+_OVERDUE = 3.0  # periods without a heartbeat
 
 
 class Heartbeat:
-    """Says once in a period that we are here, whatever else the process does."""
+    """Sends HEARTBEAT periodically from a thread of its own.
+
+    Args:
+        send: thread safe; sends a message to all remotes.
+        period: [s] between heartbeats.
+    """
 
     def __init__(self, send: Callable[[Message], None], period: float = _PERIOD) -> None:
-        self.sent = 0  # heartbeats so far
-        self.restarts = 0  # of the thread, after an error
-        self.trouble = ''  # why there is no heartbeat; '': there is
+        self.sent = 0  # number of heartbeats
+        self.restarts = 0  # number of restarts of the thread after an error
+        self.trouble = ''  # why no heartbeat is sent; '': it is sent
         self._send, self._period, self._stop = send, period, threading.Event()
         self._thread: threading.Thread | None = None
         self._seen, self._seen_at = -1, -math.inf
 
     def start(self) -> None:
-        """Begin to beat."""
+        """Start the thread."""
         self._thread = threading.Thread(target=self._run, name='heartbeat', daemon=True)
         self._thread.start()
 
     def watch(self, now: float) -> None:
-        """Start the thread again where it has ended; `trouble` says why, until it beats again.
+        """Restart the thread if it has ended; `trouble` holds the reason until the next heartbeat.
 
         Args:
             now: steady time [s].
@@ -44,11 +49,11 @@ class Heartbeat:
             self.start()
         if self.sent != self._seen:
             self._seen, self._seen_at = self.sent, now
-        elif now - self._seen_at > OVERDUE * self._period and not self.trouble:
-            self.trouble = f'none was sent for more than {OVERDUE * self._period:g} s'
+        elif now - self._seen_at > _OVERDUE * self._period and not self.trouble:
+            self.trouble = f'none was sent for more than {_OVERDUE * self._period:g} s'
 
     def close(self) -> None:
-        """No more; returns when the thread has ended, or after some periods."""
+        """Stop the thread; returns when it has ended, or after some periods."""
         self._stop.set()
         if self._thread is not None:
             self._thread.join(2.0 * self._period + 1.0)

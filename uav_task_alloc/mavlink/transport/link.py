@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The only sockets: UDP in and out, TCP and serial, none of which ever blocks."""
+"""Non-blocking links: UDP in and out, TCP client, serial; the only sockets of the bridge."""
 from __future__ import annotations
 
 import os
@@ -12,64 +12,66 @@ from typing import Protocol
 
 from uav_task_alloc.errors import InvalidValue
 
-_CHUNK = 65536  # [B] more than any datagram
-BACKLOG = 65536  # [B] a slow line may be behind; what is more is dropped
-RECONNECT = 1.0  # [s]
-MAX_UNCONFIRMED = 32  # far ends of one link that are of no known vehicle; the latest are kept
+_CHUNK = 65536  # [B] larger than any datagram
+_BACKLOG = 65536  # [B] of the send buffer of a stream; more is dropped
+_RECONNECT = 1.0  # [s] between attempts
+MAX_UNCONFIRMED = 32  # remotes of one link without a known vehicle; the latest are kept
 _EXPECTED = 'udpin:HOST:PORT, udpout:HOST:PORT, tcp:HOST:PORT or /dev/tty...:BAUD'
 
 
 class Link(Protocol):
-    """One way to some far ends."""
+    """A transport to one or several remotes."""
 
     name: str
-    datagrams: bool  # each read is whole
-    opened: int  # how often; a new file may have the number of the old one
-    trouble: str  # why nothing comes; empty: no reason is known
+    datagrams: bool  # no frame spans two reads
+    opened: int  # open count; a reopened link may have the same file number
+    trouble: str  # why nothing can be received; '': no reason is known
 
-    def fileno(self) -> int: ...
+    def fileno(self) -> int:
+        """The open file number; -1: closed."""
 
     def read(self) -> list[tuple[Hashable, bytes]]:
-        """What has come, by far end; [] where nothing has."""
+        """Received bytes with their remote; [] if there are none."""
 
-    def write(self, end: Hashable, data: bytes) -> None:
-        """Send, or drop where the line is full."""
+    def write(self, remote: Hashable, data: bytes) -> None:
+        """Send to a remote; dropped if the link is closed or its buffer full."""
 
     def step(self, now: float) -> None:
-        """Open what has closed, send what waits."""
+        """Reopen a closed link, send buffered bytes; `now`: steady time [s]."""
 
-    def ends(self) -> list[Hashable]:
-        """Far ends that are known."""
+    def remotes(self) -> list[Hashable]:
+        """Known remotes."""
 
-    def keep(self, ends: Collection[Hashable]) -> None:
-        """These are of known vehicles: they are not forgotten, however many others there are."""
+    def keep(self, remotes: Collection[Hashable]) -> None:
+        """Set the remotes of known vehicles, which are never removed."""
 
-    def close(self) -> None: ...
+    def close(self) -> None:
+        """Close the file; buffered bytes are dropped."""
 
 
 class Udp:
-    """udpin learns its far ends by hearing them, udpout has one from the start."""
+    """UDP: udpin learns its remotes by reception, udpout has one from the start."""
 
     datagrams, opened, trouble = True, 1, ''
 
     def __init__(self, name: str, host: str, port: int, bind: bool) -> None:
         self.name = name
-        self._ends: dict[Hashable, None] = {}  # the one heard last at the end
-        self._given: frozenset[Hashable] = frozenset()  # far end by its parameter
+        self._remotes: dict[Hashable, None] = {}  # ordered by the last reception
+        self._configured: frozenset[Hashable] = frozenset()  # the remote of udpout
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._socket.setblocking(False)
         self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4 << 20)
         try:
-            if bind:  # without SO_REUSEADDR, which lets a second bridge steal the port unseen
+            if bind:  # without SO_REUSEADDR, which would let a second bridge take over the port
                 self._socket.bind((host, port))
             else:
-                self._given = frozenset({(socket.gethostbyname(host), port)})
-                self._ends.update(dict.fromkeys(self._given))
+                self._configured = frozenset({(socket.gethostbyname(host), port)})
+                self._remotes.update(dict.fromkeys(self._configured))
                 self._socket.bind(('', 0))
         except OSError as error:
             self._socket.close()
             raise InvalidValue('connections', name, f'a free port ({error})') from None
-        self._kept: frozenset[Hashable] = self._given
+        self._kept: frozenset[Hashable] = self._configured
 
     @property
     def port(self) -> int:
@@ -79,49 +81,49 @@ class Udp:
         return self._socket.fileno()
 
     def read(self) -> list[tuple[Hashable, bytes]]:
-        got: list[tuple[Hashable, bytes]] = []
+        received: list[tuple[Hashable, bytes]] = []
         try:
-            while len(got) < 256:
-                data, end = self._socket.recvfrom(_CHUNK)
-                self._hear(end)
-                got.append((end, data))
-        except OSError:  # nothing more, or an earlier datagram had no listener
+            while len(received) < 256:
+                data, remote = self._socket.recvfrom(_CHUNK)
+                self._remember(remote)
+                received.append((remote, data))
+        except OSError:  # queue empty, or port unreachable for an earlier datagram
             pass
-        return got
+        return received
 
-    def _hear(self, end: Hashable) -> None:
-        self._ends.pop(end, None)
-        self._ends[end] = None
-        if len(self._ends) > len(self._kept) + MAX_UNCONFIRMED:
-            del self._ends[next(old for old in self._ends if old not in self._kept)]
+    def _remember(self, remote: Hashable) -> None:
+        self._remotes.pop(remote, None)
+        self._remotes[remote] = None
+        if len(self._remotes) > len(self._kept) + MAX_UNCONFIRMED:
+            del self._remotes[next(old for old in self._remotes if old not in self._kept)]
 
-    def keep(self, ends: Collection[Hashable]) -> None:
-        self._kept = frozenset(ends) | self._given
+    def keep(self, remotes: Collection[Hashable]) -> None:
+        self._kept = frozenset(remotes) | self._configured
 
-    def write(self, end: Hashable, data: bytes) -> None:
-        with suppress(OSError):  # a lost datagram: the protocols above expect that
-            self._socket.sendto(data, end)  # type: ignore[call-overload]
+    def write(self, remote: Hashable, data: bytes) -> None:
+        with suppress(OSError):  # a lost datagram, which the protocols tolerate
+            self._socket.sendto(data, remote)  # type: ignore[call-overload]
 
     def step(self, now: float) -> None:
-        """Nothing to do."""
+        """Nothing to do: a UDP socket stays open."""
 
-    def ends(self) -> list[Hashable]:
-        return list(self._ends)
+    def remotes(self) -> list[Hashable]:
+        return list(self._remotes)
 
     def close(self) -> None:
         self._socket.close()
 
 
 class Stream:
-    """A byte stream with one far end: what TCP and a serial line have in common."""
+    """Base class of byte streams with one remote: TCP and serial."""
 
     datagrams = False
 
     def __init__(self, name: str) -> None:
         self.name, self.opened, self.trouble = name, 0, ''
         self._file = -1
-        self._waiting = bytearray()
-        self._try_at = float('-inf')
+        self._send_buffer = bytearray()
+        self._open_at = float('-inf')  # [s] next attempt
 
     def _open(self) -> int:
         raise NotImplementedError
@@ -139,75 +141,75 @@ class Stream:
         except OSError as error:
             return self._broken(error.strerror)
         if not data:
-            return self._broken('closed by the far end')
+            return self._broken('closed by the remote')
         self.trouble = ''
         return [(self.name, data)]
 
-    def _broken(self, why: str | None) -> list[tuple[Hashable, bytes]]:
-        self.trouble = why or 'broken'
+    def _broken(self, reason: str | None) -> list[tuple[Hashable, bytes]]:
+        self.trouble = reason or 'broken'
         self.close()
         return []
 
-    def write(self, end: Hashable, data: bytes) -> None:
-        if self._file >= 0 and len(self._waiting) + len(data) <= BACKLOG:
-            self._waiting += data
+    def write(self, remote: Hashable, data: bytes) -> None:
+        if self._file >= 0 and len(self._send_buffer) + len(data) <= _BACKLOG:
+            self._send_buffer += data
             self._flush()
 
     def step(self, now: float) -> None:
-        if self._file < 0 and now >= self._try_at:
-            self._try_at = now + RECONNECT
+        if self._file < 0 and now >= self._open_at:
+            self._open_at = now + _RECONNECT
             try:
                 self._file = self._open()
                 self.opened += 1
             except OSError as error:
                 self._file, self.trouble = -1, error.strerror or str(error)
-        elif self._waiting:
+        elif self._send_buffer:
             self._flush()
 
     def _flush(self) -> None:
         try:
-            del self._waiting[:os.write(self._file, self._waiting)]
+            del self._send_buffer[:os.write(self._file, self._send_buffer)]
         except BlockingIOError:
             pass
         except OSError as error:
             self._broken(error.strerror)
 
-    def ends(self) -> list[Hashable]:
+    def remotes(self) -> list[Hashable]:
         return [self.name]
 
-    def keep(self, ends: Collection[Hashable]) -> None:
-        """It has one far end, which is always kept."""
+    def keep(self, remotes: Collection[Hashable]) -> None:
+        """Nothing to do: the only remote is always kept."""
 
     def close(self) -> None:
         if self._file >= 0:
             os.close(self._file)
         self._file = -1
-        self._waiting.clear()
+        self._send_buffer.clear()
 
 
 class Tcp(Stream):
-    """A client, as SITL waits for one; it connects again when the line breaks."""
+    """A TCP client, as SITL listens; reconnects when the connection is lost."""
 
     def __init__(self, name: str, host: str, port: int) -> None:
         super().__init__(name)
         self._address = host, port
 
     def _open(self) -> int:
-        line = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
-        line.setblocking(False)
-        line.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        client = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+        client.setblocking(False)
+        client.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         try:
-            line.connect(self._address)
+            client.connect(self._address)
         except BlockingIOError:
-            pass  # under way; a refusal shows when reading
+            pass  # in progress; a refusal is reported by the first read
         except OSError:
-            line.close()
+            client.close()
             raise
-        return line.detach()
+        return client.detach()
 
 
 class Serial(Stream):
-    """A serial line in raw mode."""
+    """A serial port in raw mode."""
 
     def __init__(self, name: str, path: str, baud: int) -> None:
         super().__init__(name)
@@ -217,20 +219,27 @@ class Serial(Stream):
             raise InvalidValue('connections', name, 'a usual baud rate (57600, 115200, 921600)')
 
     def _open(self) -> int:
-        line = os.open(self._path, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
+        port = os.open(self._path, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
         try:
-            tty.setraw(line)
-            settings = termios.tcgetattr(line)
+            tty.setraw(port)
+            settings = termios.tcgetattr(port)
             settings[4] = settings[5] = self._speed
-            termios.tcsetattr(line, termios.TCSANOW, settings)
+            termios.tcsetattr(port, termios.TCSANOW, settings)
         except (OSError, termios.error) as error:
-            os.close(line)
+            os.close(port)
             raise OSError(str(error)) from None
-        return line
+        return port
 
 
 def open_link(name: str) -> Link:
-    """The link of one entry of `connections`; raise InvalidValue where it is none."""
+    """Open the link of one entry of the parameter `connections`.
+
+    Args:
+        name: udpin:HOST:PORT, udpout:HOST:PORT, tcp:HOST:PORT or /dev/tty...:BAUD.
+
+    Raises:
+        InvalidValue: the entry is malformed, or its UDP port is not free.
+    """
     try:
         kind, host, port = name.rsplit(':', 2) if not name.startswith('/') else (
             'serial', *name.rsplit(':', 1))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the bridge has to say to the people who run it: lines for the log."""
+"""Log lines for the operators of the bridge."""
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class OperatorNote:
-    """Something a human should read."""
+    """One log line."""
 
     level: str  # 'info', 'warning', 'error'
     text: str

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Counts what was refused, and tells each kind of it from each sender once."""
+"""Counts refused messages; logs each message type of each sender once."""
 from __future__ import annotations
 
 import traceback
@@ -8,40 +8,40 @@ from pathlib import Path
 
 from uav_task_alloc.mavlink.transport.notes import OperatorNote
 
-MAX_LOGGED = 100  # kinds and senders with a line in the log: a flood of them gets no further
-_LONGEST = 300  # characters of a reason
+MAX_LOGGED = 100  # message types and senders with a log line; more are only counted
+_MAX_REASON = 300  # characters
 
 
 class RefusedMessages:
-    """What was dropped so far; `notes` are for the log."""
+    """Counters of dropped messages."""
 
     def __init__(self) -> None:
         self.count = 0
-        self.last = ''  # which, and why; '': nothing was refused
-        self.notes: deque[OperatorNote] = deque()
-        self._told: set[tuple[str, str]] = set()
+        self.last = ''  # the latest one and its reason; '': none was refused
+        self.notes: deque[OperatorNote] = deque()  # to be logged
+        self._logged: set[tuple[str, str]] = set()  # sender and message type
 
-    def add(self, sender: str, kind: str, why: str, level: str = 'warning') -> None:
-        """Count one.
+    def add(self, sender: str, kind: str, reason: str, level: str = 'warning') -> None:
+        """Count a refused message.
 
         Args:
-            sender: who sent it, or whom it is for.
-            kind: message type or name of what was attempted.
-            why: field, value and expectation, or the error.
-            level: of the line in the log.
+            sender: sender or addressee of the message.
+            kind: message type, or the operation that failed.
+            reason: field, value and expectation, or the error.
+            level: of the log line.
         """
         self.count += 1
-        self.last = f'{kind} ({sender}): {why[:_LONGEST]}'
-        if (sender, kind) in self._told or len(self._told) > MAX_LOGGED:
+        self.last = f'{kind} ({sender}): {reason[:_MAX_REASON]}'
+        if (sender, kind) in self._logged or len(self._logged) > MAX_LOGGED:
             return
-        self._told.add((sender, kind))
-        self.notes.append(OperatorNote(level, f'{self.last}: dropped; told once' if len(
-            self._told) <= MAX_LOGGED else f'messages of more than {MAX_LOGGED} kinds and senders '
-            'were dropped: more are only counted, see /diagnostics'))
+        self._logged.add((sender, kind))
+        self.notes.append(OperatorNote(level, f'{self.last}: dropped; logged once' if len(
+            self._logged) <= MAX_LOGGED else f'messages of more than {MAX_LOGGED} types and '
+            'senders were dropped: more are only counted, see /diagnostics'))
 
 
 def failure(error: Exception) -> str:
-    """An error that nobody expected, in a line: its type, its text, and where it was raised."""
+    """An unexpected error on one line: its type, its text, and where it was raised."""
     frame = traceback.extract_tb(error.__traceback__)[-1]
     text = ' '.join(str(error).split())
     return f'{type(error).__name__}: {text} (at {Path(frame.filename).name}:{frame.lineno})'

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The signing key, and its timestamp, which must never go back: a file beside the key keeps it."""
+"""The signing key, and its monotonic timestamp in a file next to the key."""
 from __future__ import annotations
 
 import hashlib
@@ -10,26 +10,32 @@ from pathlib import Path
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.mavlink.transport.codec import make_signing
 
-EPOCH = 1420070400  # [s] 2015-01-01, from which timestamps count 10 us
-_MOST = 2**48 - 1  # [10 us] what a frame holds
-_PERIOD = 5.0  # [s] between writes of the timestamp, which runs ahead by twice that much
-_EXPECTED = (f'a whole number in [0, {_MOST}]; delete the file if the clock of this computer is '
-            'right')
+_EPOCH = 1420070400  # [s] 2015-01-01, from which timestamps count 10 us
+_MAX_TIMESTAMP = 2**48 - 1  # [10 us] of the field in a frame
+_PERIOD = 5.0  # [s] between writes; the stored timestamp is ahead by twice that
+_EXPECTED = (f'a whole number in [0, {_MAX_TIMESTAMP}]; delete the file if the clock of this '
+             'computer is right')
 
 
 class SigningClock:
-    """Signing for what is sent and for what is heard, and the timestamp of both on disk.
+    """Signing of sent and received frames, and the timestamp of both on disk.
 
-    Raises InvalidValue where key or timestamp cannot be read, or the timestamp not be written.
-    Later, while it cannot be written, `trouble` says why and signing goes on.
+    While the timestamp cannot be written, `trouble` holds the reason, and signing continues.
+
+    Args:
+        key_file: see `read_key`; the timestamp is stored in `key_file`.timestamp.
+        wall: wall clock [s] since 1970.
+
+    Raises:
+        InvalidValue: key or timestamp cannot be read, or the timestamp not written.
     """
 
     def __init__(self, key_file: str, wall: Callable[[], float]) -> None:
         self._wall, self._path = wall, Path(key_file + '.timestamp')
         key = read_key(key_file)
         stamp = max(self._now(), read_timestamp(self._path))
-        self.incoming = make_signing(key, stamp)  # all parsers share it
-        self.outgoing = make_signing(key, stamp)  # another thread signs with it
+        self.incoming = make_signing(key, stamp)  # shared by all parsers
+        self.outgoing = make_signing(key, stamp)  # used by the sending threads
         self.trouble = ''
         self._write_at = 0.0
         try:
@@ -39,11 +45,11 @@ class SigningClock:
                                f'a file that can be written ({error})') from None
 
     def catch_up(self) -> None:
-        """Before something is signed: no timestamp is older than one that was heard."""
+        """Advance the timestamp of sent frames to the latest received one."""
         self.outgoing.timestamp = max(self.outgoing.timestamp, self.incoming.timestamp)
 
     def step(self, now: float) -> None:
-        """Let time pass: keep the timestamp on disk, or try it again.
+        """Write the timestamp to disk if due.
 
         Args:
             now: steady time [s].
@@ -56,26 +62,33 @@ class SigningClock:
             self._write()
             self.trouble = ''
         except OSError as error:
-            self.trouble = (f'{self._path}: not written: {error}; signing goes on; a bridge that '
-                            'starts again with a clock that went back would be refused')
+            self.trouble = (f'{self._path}: not written: {error}; signing continues; after a '
+                            'restart with a clock set back, its frames would be rejected')
 
     def _now(self) -> int:
-        return max(0, int((self._wall() - EPOCH) * 1e5))  # a clock that was never set is earlier
+        return max(0, int((self._wall() - _EPOCH) * 1e5))  # 0: the clock was never set
 
     def _write(self) -> None:
-        # ahead, so that what is signed until the next write is not used again after a crash
+        # ahead, so that no timestamp used until the next write is repeated after a crash
         stamp = max(self.incoming.timestamp, self.outgoing.timestamp) + int(2e5 * _PERIOD)
-        text = str(min(stamp, _MOST))
+        text = str(min(stamp, _MAX_TIMESTAMP))
         temporary = self._path.with_name(self._path.name + '.tmp')
         try:
             temporary.write_text(text)
             os.replace(temporary, self._path)
         except OSError:
-            self._path.write_text(text)  # its folder may be read-only
+            self._path.write_text(text)  # the directory may be read-only
 
 
 def read_timestamp(path: Path) -> int:
-    """The timestamp [10 us] in a file; 0 where there is none. Raises InvalidValue."""
+    """Read a signing timestamp.
+
+    Returns:
+        [10 us] since 2015-01-01; 0 if the file does not exist.
+
+    Raises:
+        InvalidValue: the file cannot be read, or holds no timestamp.
+    """
     try:
         with open(path, 'rb') as file:
             text = file.read(100).decode('ascii', 'replace').strip()
@@ -83,13 +96,23 @@ def read_timestamp(path: Path) -> int:
         return 0
     except OSError as error:
         raise InvalidValue('signing timestamp', str(path), f'a readable file ({error})') from None
-    if not (text.isascii() and text.isdigit() and int(text) <= _MOST):
+    if not (text.isascii() and text.isdigit() and int(text) <= _MAX_TIMESTAMP):
         raise InvalidValue(f'signing timestamp in {path}', text, _EXPECTED)
     return int(text)
 
 
 def read_key(path: str) -> bytes:
-    """The 32 bytes of a signing key file: raw, 64 hex digits, or a pass phrase."""
+    """Read a signing key.
+
+    Args:
+        path: file of 32 raw bytes, 64 hex digits, or a pass phrase.
+
+    Returns:
+        32 bytes; of a pass phrase its SHA-256.
+
+    Raises:
+        InvalidValue: the file cannot be read, or is empty.
+    """
     try:
         text = Path(path).read_bytes()
     except OSError as error:
