@@ -125,7 +125,7 @@ def test_fault_23_accepted_and_then_no_mission_is_infeasible(kind):
     bench.assign(task_list('AB'))
     assert bench.run(lambda: len(bench.failed()) == 2, 60.0)
     reason = bench.events[-1][1].reason
-    assert reason == 'accepted, and then no mission is on board: infeasible'
+    assert reason == 'accepted, but no mission is on board: infeasible'
     assert bench.onboard().upload.uploads == 1
 
 

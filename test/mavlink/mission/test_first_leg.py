@@ -7,10 +7,11 @@ from dataclasses import replace
 import pytest
 from findings_bench import BOTH
 from flight_bench import FlightBench
+from pymavlink.dialects.v20 import ardupilotmega as d
 
 from uav_task_alloc.mavlink.gcs.onboard_mission import MissionState
 from uav_task_alloc.mavlink.mission.first_leg import FirstLeg, LegStart
-from uav_task_alloc.mavlink.mission.items import RETURN, MissionStop, TaskList
+from uav_task_alloc.mavlink.mission.items import MissionStop, TaskList
 from uav_task_alloc.mavlink.mission.long_legs import MAX_LEG_LENGTH
 from uav_task_alloc.model import Task
 
@@ -37,7 +38,7 @@ def on_board(bench):
     own = bench.onboard().own
     assert len(bench.vehicles[1].mission.items) == len(bench.onboard().held) + own
     return [(item.position, item.task if item.completes else '')
-            for item in bench.onboard().held if item.command != RETURN]
+            for item in bench.onboard().held if item.command != d.MAV_CMD_NAV_RETURN_TO_LAUNCH]
 
 
 def is_verified(bench):

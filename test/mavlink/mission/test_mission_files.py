@@ -10,12 +10,12 @@ from pathlib import Path
 
 import pytest
 from pymavlink import mavwp
+from pymavlink.dialects.v20 import ardupilotmega as d
 
 from uav_task_alloc import scenario
 from uav_task_alloc.errors import MissionError
 from uav_task_alloc.geometry.frames import to_enu, to_geodetic
 from uav_task_alloc.mavlink.mission.files import file_name, planned_mission, write_missions
-from uav_task_alloc.mavlink.mission.items import GLOBAL, RETURN
 from uav_task_alloc.model import Leg, Plan
 
 WORLD = """
@@ -81,11 +81,12 @@ def test_pymavlink_reads_home_and_the_items_in_order_from_waypoints(world, folde
     assert [item.seq for item in items] == list(range(count))
     assert [item.current for item in items] == [1] + [0] * (count - 1)
     assert_at(world, (items[0].x, items[0].y, items[0].z), HOMES[uav])
-    flown = [item for item in items[1:] if item.command != RETURN]
+    flown = [item for item in items[1:] if item.command != d.MAV_CMD_NAV_RETURN_TO_LAUNCH]
     assert all((item.frame, item.command, item.autocontinue) == (0, 16, 1) for item in flown)
     for item, point in zip(flown, PLACES[uav], strict=True):
         assert_at(world, (item.x, item.y, item.z), point)
-    assert [item.command for item in items[1:]][-1:] == [RETURN] * bool(PLACES[uav])
+    returns = [d.MAV_CMD_NAV_RETURN_TO_LAUNCH] * bool(PLACES[uav])
+    assert [item.command for item in items[1:]][-1:] == returns
 
 
 @pytest.mark.parametrize('uav', ROUTES)
@@ -97,7 +98,7 @@ def test_both_files_hold_what_the_bridge_would_upload(world, folder, uav):
     rows = json.loads((folder / f'{uav}.plan').read_text())['mission']['items']
     assert len(sent) == len(rows) == loader.count() - 1
     for seq, (item, row) in enumerate(zip(sent, rows, strict=True), 1):
-        line, frame = loader.wp(seq), 0 if item.frame == GLOBAL else item.frame
+        line, frame = loader.wp(seq), 0 if item.frame == d.MAV_FRAME_GLOBAL_INT else item.frame
         assert (line.command, line.frame) == (row['command'], row['frame']) == (item.command,
                                                                                 frame)
         for text, number, value in zip(
@@ -135,7 +136,7 @@ def test_a_plan_is_as_the_published_format_says(world, folder, uav):
         assert all(type(item[key]) is kind for key, kind in REQUIRED.items())
         assert (item['type'], item['doJumpId'], len(item['params'])) == ('SimpleItem', number, 7)
         assert all(isinstance(value, float) or value is None for value in item['params'][:4])
-        if item['command'] != RETURN:
+        if item['command'] != d.MAV_CMD_NAV_RETURN_TO_LAUNCH:
             assert (item['AltitudeMode'], item['AMSLAltAboveTerrain']) == (2, None)
             assert item['Altitude'] == item['params'][6]
     assert read['rallyPoints'] == {'version': 2, 'points': []}
@@ -193,7 +194,7 @@ def test_mavsdk_imports_the_plans(world, folder):
         if autopilots[uav] == 3:  # MAVSDK puts the planned home before them
             _, _, _, x, y, z, _ = items.pop(0)
             assert_at(world, (x / 1e7, y / 1e7, z), HOMES[uav])
-        flown = [item for item in items if item[2] != RETURN]
+        flown = [item for item in items if item[2] != d.MAV_CMD_NAV_RETURN_TO_LAUNCH]
         assert all(item[1:3] == [0, 16] for item in flown)
         for (_, _, _, x, y, z, _), point in zip(flown, PLACES[uav], strict=True):
             assert_at(world, (x / 1e7, y / 1e7, z), point)

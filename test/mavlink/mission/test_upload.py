@@ -181,7 +181,7 @@ def test_an_upload_that_never_matches_ends_after_three_tries(kind):
     bench.replace(bench.mission())
     last = bench.settle()
     assert isinstance(last, Failed)
-    assert 'given up after 3 tries, at last: readback differs' in last.reason
+    assert 'given up after 3 tries; last event: readback differs' in last.reason
     assert bench.upload.uploads == 3
 
 

@@ -13,7 +13,6 @@ from uav_task_alloc.mavlink.gcs.authority import AuthorityState, Suspension
 from uav_task_alloc.mavlink.gcs.ground_station import VehicleSession
 from uav_task_alloc.mavlink.gcs.mission_executor import MissionExecutor
 from uav_task_alloc.mavlink.gcs.telemetry import STALE
-from uav_task_alloc.mavlink.mission.items import RETURN
 from uav_task_alloc.mavlink.mission.verified_mission import MissionState
 from uav_task_alloc.model import Point
 
@@ -79,7 +78,8 @@ def mode_of(executor: MissionExecutor) -> UavMode:
         return UavMode.TAKEOFF
     if telemetry.mode is ModeFunction.MISSION:
         item = progress.active
-        if (item is not None and item.command == RETURN) or executor.going_home:
+        returns = item is not None and item.command == d.MAV_CMD_NAV_RETURN_TO_LAUNCH
+        if returns or executor.going_home:
             return UavMode.RETURNING
         return UavMode.HOLD if progress.finished else UavMode.ON_MISSION
     return _BY_FLIGHT.get(telemetry.mode, _BY_LANDED.get(telemetry.landed, UavMode.UNKNOWN))

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections import deque
 
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+
 from uav_task_alloc.mavlink.mission.diff import MissionDiff
 from uav_task_alloc.mavlink.mission.items import TaskList
 from uav_task_alloc.mavlink.mission.outcomes import Failed
-from uav_task_alloc.mavlink.mission.peer import NO_SPACE
 from uav_task_alloc.mavlink.mission.wanted_mission import WantedMission
 from uav_task_alloc.mavlink.transport.notes import OperatorNote
 
@@ -47,7 +48,7 @@ class UploadFailures:
         """
         self._notes.append(OperatorNote('error', f'mission upload failed: {event.reason}'))
         stops = [item.task for item in found.items if item.completes]
-        if event.result == NO_SPACE:
+        if event.result == dialect.MAV_MISSION_NO_SPACE:
             self._notes.append(OperatorNote('warning', self._list.horizon.shrink(len(stops))))
             return self._list.horizon.stops is None
         if event.result is not None:

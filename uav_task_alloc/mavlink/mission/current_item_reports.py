@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""MISSION_CURRENT against the current item that we have set: which was sent before that?"""
+"""Tells MISSION_CURRENT sent before our set-current command from those sent after it."""
 from __future__ import annotations
 
 from uav_task_alloc.mavlink.mission.position_history import MAX_MESSAGE_DELAY
@@ -8,44 +8,47 @@ _SETTLE = 3.0  # [s] in which a CURRENT sent before the last change may still co
 
 
 class CurrentItemReports:
-    """What MISSION_CURRENT told last, in which frames, and what we have set."""
+    """The last reported current item, the frames that reported it, and what we have set.
+
+    All `seq` are indices without home.
+    """
 
     def __init__(self) -> None:
-        self.reported: int | None = None  # the current item, as the vehicle said last
-        self.last_frame: int | None = None  # that told the current item
-        self.previous_frame: int | None = None  # the one before that
-        self._back: tuple[int, float] | None = None  # it flies an item before ours since [s]
-        self._set: tuple[int, float] | None = None  # by us at a time [s], not seen yet
-        self._asked: int | None = None  # we are setting this
+        self.reported: int | None = None  # the current item last reported by the vehicle
+        self.last_frame: int | None = None  # number of the last MISSION_CURRENT
+        self.previous_frame: int | None = None  # number of the one before
+        self._earlier: tuple[int, float] | None = None  # an item before ours, reported since [s]
+        self._set: tuple[int, float] | None = None  # by us at a time [s], not confirmed yet
+        self._setting: int | None = None  # set-current sent, not acknowledged yet
 
     @property
     def awaits_set(self) -> bool:
-        """We have set the current item, and not seen it yet."""
+        """Whether our set-current is not confirmed by a MISSION_CURRENT yet."""
         return self._set is not None
 
     def begin(self, start: int | None, now: float) -> None:
-        """Another mission is on board, which starts at an item; None: not known."""
+        """Start a new epoch at an item; None: its current item is not known."""
         self._set = None if start is None else (start, now)
-        self._asked = self.reported = None
+        self._setting = self.reported = None
 
     def clear(self) -> None:
-        """Nothing is known of what is on board."""
+        """Reset: the mission on board is unknown."""
         self._set = self.last_frame = self.reported = None
 
     def begin_set(self, seq: int) -> None:
-        """We are about to set the current item."""
-        self._asked = seq
+        """Note that a set-current command is about to be sent."""
+        self._setting = seq
 
     def note_set(self, seq: int, now: float) -> None:
-        """It is done."""
-        self._set, self._asked = (seq, now), None
+        """Note that the set-current command was acknowledged."""
+        self._set, self._setting = (seq, now), None
 
     def is_old(self, seq: int, now: float) -> bool:
-        """It was sent before we set the current item, or tells what we are setting.
+        """Whether a report is older than our set-current, or reports the item being set.
 
-        One that was sent after ends the wait for what we have set.
+        A newer report ends the wait for the confirmation.
         """
-        if seq == self._asked:
+        if seq == self._setting:
             return True
         if self._set is not None:
             start, when = self._set
@@ -55,22 +58,25 @@ class CurrentItemReports:
         return False
 
     def note(self, seq: int, frame: int | None) -> None:
-        """One was taken in."""
+        """Store a report as the last one."""
         self.reported, self.last_frame = seq, frame
 
     def was_set_back(self, seq: int, now: float, before: int | None) -> bool:
-        """Somebody has set the current item back, some time ago.
+        """Whether another station has set the current item back, MAX_MESSAGE_DELAY ago.
 
         Args:
-            seq: told now.
+            seq: the reported current item.
             now: [s].
-            before: the item that it is to be before; None: that would mean nothing.
+            before: the item known as current; None: a lower `seq` has no meaning now.
+
+        Returns:
+            True once an item before `before` has been reported for MAX_MESSAGE_DELAY.
         """
-        if before is None or seq >= before or self._set is not None or seq == self._asked:
-            self._back = None
-        elif self._back is None or self._back[0] != seq:
-            self._back = seq, now
-        elif now - self._back[1] >= MAX_MESSAGE_DELAY:
-            self._back = None
+        if before is None or seq >= before or self._set is not None or seq == self._setting:
+            self._earlier = None
+        elif self._earlier is None or self._earlier[0] != seq:
+            self._earlier = seq, now
+        elif now - self._earlier[1] >= MAX_MESSAGE_DELAY:
+            self._earlier = None
             return True
         return False

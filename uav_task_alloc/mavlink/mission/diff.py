@@ -10,12 +10,12 @@ from uav_task_alloc.mavlink.mission.items import Item, all_alike
 
 
 class DiffKind(Enum):
-    """Ways to a new list, the cheapest first."""
+    """Means of bringing a new list on board, the cheapest first."""
 
     KEEP = 'keep'
     JUMP = 'jump'  # set the current item
     APPEND = 'append'  # nothing changes but the end
-    REPLACE = 'swap'
+    REPLACE = 'replace'  # a whole new mission
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,13 +28,25 @@ class MissionDiff:
 
 
 def diff_missions(held: tuple[Item, ...], current: int | None, wanted: tuple[Item, ...], *,
-           done: Container[str] = (), append: bool = True) -> MissionDiff:
-    """From the items on board, of which `current` is flown (None: none), to the wanted ones.
+                  done: Container[str] = (), append: bool = True) -> MissionDiff:
+    """Compare the items on board with the wanted ones; O(n) for n items.
 
-    `wanted` begins with the way to its first task. Detour points of it that have been flown are
-    not flown again; those that have not are, even where the vehicle is beyond: a zone is there.
-    No jump leaves out a task that is not `done`, nor an item that may be one: after a restart of
-    the bridge, what lies behind has been flown.
+    Detour points of the first leg that have been flown are not flown again; the others are, even
+    where the vehicle is past them, as they lead around a zone. No jump skips a task that is not
+    `done`, nor an item that may stand for one (after a restart of the bridge items carry no task).
+
+    Args:
+        held: items on board, without home.
+        current: index of the item being flown; None: none is.
+        wanted: items of the new list, beginning with the leg to its first task.
+        done: ids of completed tasks.
+        append: whether the autopilot takes a longer list without restarting the current item.
+
+    Returns:
+        The change with the fewest side effects on the flight.
+
+    Raises:
+        ValueError: `wanted` is empty.
     """
     if not wanted:
         raise ValueError('wanted items = (): expected at least one')
@@ -42,11 +54,11 @@ def diff_missions(held: tuple[Item, ...], current: int | None, wanted: tuple[Ite
         passed = _passed(held, current, wanted)
         rest = held[current:]
         if passed is not None and rest and all_alike(wanted[passed:], rest):
-            return MissionDiff(DiffKind.KEEP, _retag(held, current, wanted[passed:]), current)
+            return MissionDiff(DiffKind.KEEP, held[:current] + wanted[passed:], current)
     start = len(held) - len(wanted)
     if start >= 0 and all_alike(wanted, held[start:]) and not any(
             _may_be_open(item, done) for item in held[current or 0:start]):
-        return MissionDiff(DiffKind.JUMP, _retag(held, start, wanted), start)
+        return MissionDiff(DiffKind.JUMP, held[:start] + wanted, start)
     if current is not None and rest and passed is not None:
         ahead = wanted[passed:]
         if append and len(ahead) > len(rest) and all_alike(ahead[:len(rest)], rest):
@@ -60,16 +72,10 @@ def _may_be_open(item: Item, done: Container[str]) -> bool:
 
 
 def _passed(held: tuple[Item, ...], current: int, wanted: tuple[Item, ...]) -> int | None:
-    """How many detour points of the first leg lie behind; None where another leg is flown."""
+    """Number of detour points of the first leg already passed; None where it is not flown."""
     leg = next((n for n, item in enumerate(wanted) if item.completes or not item.task),
                len(wanted) - 1)
     for count in range(min(leg, current), -1, -1):
         if all_alike(wanted[:count + 1], held[current - count:current + 1]):
             return count
     return None
-
-
-def _retag(held: tuple[Item, ...], start: int, wanted: tuple[Item, ...]) -> tuple[Item, ...]:
-    """What was read back knows no tasks: take them from the list."""
-    return held[:start] + wanted
-

@@ -15,12 +15,12 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+
 from uav_task_alloc.geometry.frames import Origin, to_geodetic, to_geodetic_batch
 from uav_task_alloc.geometry.zones import way_is_clear
 from uav_task_alloc.mavlink.autopilots import ARDUPILOT, OFF_GROUND, PX4, Profile
 from uav_task_alloc.mavlink.mission.items import (
-    GLOBAL,
-    WAYPOINT,
     Item,
     MissionStop,
     TaskList,
@@ -31,61 +31,76 @@ from uav_task_alloc.model import Plan, Point, Route, Shape, Task, ThreatZone
 from uav_task_alloc.scenario.values import Scenario, ScenarioUav
 
 _AUTOPILOTS: Mapping[str, tuple[Profile, int]] = {  # and the MAV_AUTOPILOT
-    'ardupilot': (ARDUPILOT, 3), 'px4': (PX4, 12)}
-QUADROTOR = 2  # MAV_TYPE
-_ALTITUDE_MODE_AMSL = 2  # QGroundControl's altitude mode: AMSL
-_FILE_FRAME = {GLOBAL: 0}  # files hold degrees, so not the _INT frames
-ALTITUDE_DIGITS = 4  # of metres: finer than what a message carries
+    'ardupilot': (ARDUPILOT, dialect.MAV_AUTOPILOT_ARDUPILOTMEGA),
+    'px4': (PX4, dialect.MAV_AUTOPILOT_PX4),
+}
+_ALTITUDE_MODE_AMSL = 2  # QGroundControl's altitude mode
+# files hold degrees, so not the _INT frames
+_FILE_FRAME = {dialect.MAV_FRAME_GLOBAL_INT: dialect.MAV_FRAME_GLOBAL}
+_ALTITUDE_DIGITS = 4  # of metres: finer than what a message carries
 
 
 @dataclass(frozen=True, slots=True)
 class PlannedMission:
-    """What one UAV flies, as a ground station wants to know it."""
+    """The mission of one UAV, and the zones that its file can hold as fences."""
 
     uav: ScenarioUav
     origin: Origin
     items: tuple[Item, ...]  # without home; none where it has no task
-    fences: tuple[ThreatZone, ...]  # that its way keeps out of at any height
+    fences: tuple[ThreatZone, ...]  # that its path keeps out of at any height
     unfenced: tuple[ThreatZone, ...]  # that it passes over or under: a fence has no height
 
 
-def write_missions(read: Scenario, made: Plan, folder: str | Path) -> list[PlannedMission]:
-    """Write ID.plan and ID.waypoints for each UAV of a scenario into a folder, which is made.
+def write_missions(scenario: Scenario, plan: Plan, folder: str | Path) -> list[PlannedMission]:
+    """Write ID.plan and ID.waypoints for each UAV of a scenario.
 
-    A UAV without tasks gets empty missions, so that none of an earlier plan stays behind. Raises
-    MissionError where a task cannot be a mission item, OSError.
+    A UAV without tasks gets empty missions, which replace those of an earlier plan.
+
+    Args:
+        scenario: the UAVs, tasks and zones, and the origin of the ENU frame.
+        plan: a plan for that scenario.
+        folder: where to write; it is created.
+
+    Returns:
+        The missions written, in the order of the scenario's UAVs.
+
+    Raises:
+        MissionError: a task cannot be a mission item.
+        OSError: a file cannot be written.
     """
-    missions = [planned_mission(read, uav, made.route(uav.id)) for uav in read.uavs]
-    place = Path(folder)
-    place.mkdir(parents=True, exist_ok=True)
+    missions = [planned_mission(scenario, uav, plan.route(uav.id)) for uav in scenario.uavs]
+    directory = Path(folder)
+    directory.mkdir(parents=True, exist_ok=True)
     for mission in missions:
         name = file_name(mission.uav.id)
-        place.joinpath(f'{name}.plan').write_text(
+        directory.joinpath(f'{name}.plan').write_text(
             json.dumps(plan_file(mission), indent=2, allow_nan=False) + '\n')
-        place.joinpath(f'{name}.waypoints').write_text(waypoints_text(mission))
+        directory.joinpath(f'{name}.waypoints').write_text(waypoints_text(mission))
     return missions
 
 
-def planned_mission(read: Scenario, uav: ScenarioUav, route: Route) -> PlannedMission:
-    """The mission of one route; raise MissionError where a task cannot be a mission item."""
+def planned_mission(scenario: Scenario, uav: ScenarioUav, route: Route) -> PlannedMission:
+    """The mission of one route; raises MissionError where a task cannot be a mission item."""
     profile, _ = _AUTOPILOTS[uav.autopilot]
-    tasks = list_for_route(route, {timed.task.id: timed.task for timed in read.tasks})
-    items = mission_items(_with_points_between(uav, profile, tasks), profile.rules, read.origin)
-    fences, unfenced = _part(_way(uav, tasks), [timed.zone for timed in read.zones])
-    return PlannedMission(uav, read.origin, items, fences, unfenced)
+    tasks = list_for_route(route, {timed.task.id: timed.task for timed in scenario.tasks})
+    items = mission_items(
+        _with_points_between(uav, profile, tasks), profile.rules, scenario.origin)
+    fences, unfenced = _split_zones(_path(uav, tasks), [timed.zone for timed in scenario.zones])
+    return PlannedMission(uav, scenario.origin, items, fences, unfenced)
 
 
 def list_for_route(route: Route, tasks: Mapping[str, Task]) -> TaskList:
-    """The list that the bridge would be sent for a route."""
+    """The list that the allocator would publish for a route; `tasks` by id."""
     home = route.legs[len(route.tasks):]
     return TaskList(1, tuple(MissionStop(tasks[name], leg.via) for name, leg in zip(
         route.tasks, route.legs, strict=False)), route.returns, home[0].via if home else ())
 
 
 def _with_points_between(uav: ScenarioUav, profile: Profile, tasks: TaskList) -> TaskList:
-    """Its long legs at the height of the plan; a first leg from the ground is flown level.
+    """Divide long legs, so that they keep the plan's heights; a first leg from the ground is level.
 
-    The files have no take-off: straight up to its first point it would fly low for kilometres.
+    The files have no take-off item: a straight climb to its first point would be low for
+    kilometres.
     """
     start, first = uav.position, first_point(tasks)
     if first is None:
@@ -97,19 +112,19 @@ def _with_points_between(uav: ScenarioUav, profile: Profile, tasks: TaskList) ->
 
 
 def file_name(uav_id: str) -> str:
-    """An id as a file's name in any file system: `team/uav 1` is team%2Fuav%201."""
+    """Quote an id as a file name for any file system: `team/uav 1` is team%2Fuav%201."""
     name = quote(uav_id, safe='')
     return '%2E' + name[1:] if name.startswith('.') else name
 
 
 def plan_file(mission: PlannedMission) -> dict[str, Any]:
-    """The contents of a .plan file; places in degrees, altitudes in metres AMSL."""
+    """The contents of a .plan file (JSON object); positions in degrees, altitudes in m AMSL."""
     uav = mission.uav
     return {
         'fileType': 'Plan', 'version': 1, 'groundStation': 'uav_task_alloc',
         'mission': {
-            'version': 2, 'firmwareType': _AUTOPILOTS[uav.autopilot][1], 'vehicleType': QUADROTOR,
-            'cruiseSpeed': uav.cruise_speed, 'hoverSpeed': uav.cruise_speed,
+            'version': 2, 'firmwareType': _AUTOPILOTS[uav.autopilot][1], 
+            'vehicleType': dialect.MAV_TYPE_QUADROTOR, 'cruiseSpeed': uav.cruise_speed, 'hoverSpeed': uav.cruise_speed,
             'globalPlanAltitudeMode': _ALTITUDE_MODE_AMSL,
             'plannedHomePosition': _home(mission),
             'items': [_simple_item(number, item) for number, item in enumerate(mission.items, 1)],
@@ -126,57 +141,58 @@ def plan_file(mission: PlannedMission) -> dict[str, Any]:
 
 
 def waypoints_text(mission: PlannedMission) -> str:
-    """The contents of a .waypoints file: a line an item, home first, fields parted by tabs."""
-    home = [0, 1, 0, WAYPOINT, 0, 0, 0, 0, *_degrees(*_home(mission)), 1]
+    """The contents of a .waypoints file: one line per item, home first, fields split by tabs."""
+    home = [0, 1, 0, dialect.MAV_CMD_NAV_WAYPOINT, 0, 0, 0, 0, *_degrees(*_home(mission)), 1]
     rows = [home] + [
         [seq, 0, _FILE_FRAME.get(item.frame, item.frame), item.command,
-         *(f'{value:g}' for value in item.params), *_degrees(*_place(item)), 1]
+         *(f'{value:g}' for value in item.params), *_degrees(*_position(item)), 1]
         for seq, item in enumerate(mission.items, 1)]
     return '\n'.join(['QGC WPL 110', *('\t'.join(map(str, row)) for row in rows)]) + '\n'
 
 
 def _simple_item(number: int, item: Item) -> dict[str, Any]:
-    place = _place(item)
-    altitude = {'AMSLAltAboveTerrain': None, 'Altitude': place[2], 'AltitudeMode': _ALTITUDE_MODE_AMSL}
+    position = _position(item)
+    altitude = {'AMSLAltAboveTerrain': None, 'Altitude': position[2],
+                'AltitudeMode': _ALTITUDE_MODE_AMSL}
     return {
-        **(altitude if item.frame == GLOBAL else {}),
+        **(altitude if item.frame == dialect.MAV_FRAME_GLOBAL_INT else {}),
         'type': 'SimpleItem', 'doJumpId': number, 'command': item.command, 'autoContinue': True,
         'frame': _FILE_FRAME.get(item.frame, item.frame),
-        'params': [None if math.isnan(value) else value for value in item.params] + place,
+        'params': [None if math.isnan(value) else value for value in item.params] + position,
     }
 
 
-def _place(item: Item) -> list[float]:
-    return [item.x / 1e7, item.y / 1e7, round(item.z, ALTITUDE_DIGITS)]
+def _position(item: Item) -> list[float]:
+    return [item.x / 1e7, item.y / 1e7, round(item.z, _ALTITUDE_DIGITS)]
 
 
 def _home(mission: PlannedMission) -> list[float]:
     latitude, longitude, altitude = to_geodetic(mission.origin, mission.uav.home)
-    return [round(latitude, 7), round(longitude, 7), round(altitude, ALTITUDE_DIGITS)]
+    return [round(latitude, 7), round(longitude, 7), round(altitude, _ALTITUDE_DIGITS)]
 
 
 def _degrees(latitude: float, longitude: float, altitude: float) -> list[str]:
-    return [f'{latitude:.7f}', f'{longitude:.7f}', f'{altitude:.{ALTITUDE_DIGITS}f}']
+    return [f'{latitude:.7f}', f'{longitude:.7f}', f'{altitude:.{_ALTITUDE_DIGITS}f}']
 
 
-def _way(uav: ScenarioUav, tasks: TaskList) -> list[Point]:
-    """Where it passes, with the straight way home, as a return would break a fence on that."""
-    way = [uav.position]
+def _path(uav: ScenarioUav, tasks: TaskList) -> list[Point]:
+    """The path flown, with the straight leg home: a return would breach a fence on that."""
+    path = [uav.position]
     for stop in tasks.stops:
-        way += [*stop.via, stop.task.position]
-    return [*way, *tasks.end_via, uav.home]
+        path += [*stop.via, stop.task.position]
+    return [*path, *tasks.end_via, uav.home]
 
 
-def _part(way: Sequence[Point], zones: Sequence[ThreatZone]) -> tuple[
+def _split_zones(path: Sequence[Point], zones: Sequence[ThreatZone]) -> tuple[
         tuple[ThreatZone, ...], tuple[ThreatZone, ...]]:
-    """The zones that a way keeps out of at any height, and the others."""
-    clear = {zone.id: way_is_clear(way, [_column(zone)]) for zone in zones}
+    """The zones that a path keeps out of at any height, and the others."""
+    clear = {zone.id: way_is_clear(path, [_column(zone)]) for zone in zones}
     return (tuple(zone for zone in zones if clear[zone.id]),
             tuple(zone for zone in zones if not clear[zone.id]))
 
 
 def _column(zone: ThreatZone) -> ThreatZone:
-    """What a fence makes of a zone: no floor, no ceiling, and no margin, which is for plans."""
+    """A zone as a fence has it: no floor, no ceiling, and no margin, which is for plans."""
     if zone.shape is Shape.POLYGON:
         return replace(zone, z_min=-math.inf, z_max=math.inf, margin=0.0)
     return ThreatZone.cylinder(zone.id, zone.center, zone.radius)

@@ -6,24 +6,34 @@ import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+
 from uav_task_alloc.errors import MissionError
 from uav_task_alloc.geometry.frames import Origin, to_geodetic_batch
 from uav_task_alloc.mavlink.autopilots import ItemRules
 from uav_task_alloc.model import Point, Task
 
-# MAV_CMD and MAV_FRAME; pymavlink has no place in this room
-WAYPOINT, LOITER_TIME, RETURN = 16, 19, 20
-GLOBAL, MISSION = 5, 2
-GLOBAL_FRAMES = frozenset({0, 3, 5, 6, 10, 11})  # x, y and z are a place
-MOST_ITEMS = 65535  # of a mission, home included: what MISSION_COUNT holds
-_ALIKE_FRAMES = {6: 3, 5: 0, 11: 10}  # ArduPilot gives the _INT frames back without it
+GLOBAL_FRAMES = frozenset({  # x, y and z are a position
+    dialect.MAV_FRAME_GLOBAL,
+    dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT,
+    dialect.MAV_FRAME_GLOBAL_INT,
+    dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT,
+    dialect.MAV_FRAME_GLOBAL_TERRAIN_ALT,
+    dialect.MAV_FRAME_GLOBAL_TERRAIN_ALT_INT,
+})
+MOST_ITEMS = 65535  # of a mission, home included: the range of MISSION_COUNT.count
+_FRAME_READ_BACK = {  # ArduPilot returns an _INT frame as the one without it
+    dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT: dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT,
+    dialect.MAV_FRAME_GLOBAL_INT: dialect.MAV_FRAME_GLOBAL,
+    dialect.MAV_FRAME_GLOBAL_TERRAIN_ALT_INT: dialect.MAV_FRAME_GLOBAL_TERRAIN_ALT,
+}
 _ALTITUDE_STEP = 0.011  # [m] ArduPilot keeps whole centimetres
 _LONGEST_HOLD = 65535.0  # [s] ArduPilot keeps 16 bits
 
 
 @dataclass(frozen=True, slots=True)
 class MissionStop:
-    """A task and the detour points flown before it."""
+    """A task and the detour points flown before it, ENU [m]."""
 
     task: Task
     via: tuple[Point, ...] = ()  # [m] ENU
@@ -31,7 +41,7 @@ class MissionStop:
 
 @dataclass(frozen=True, slots=True)
 class TaskList:
-    """What one UAV has still to fly, in order."""
+    """The tasks that one UAV is to fly, in order; as published in TaskList."""
 
     revision: int
     stops: tuple[MissionStop, ...] = ()
@@ -39,16 +49,16 @@ class TaskList:
     end_via: tuple[Point, ...] = ()  # [m] ENU, flown before the return
 
     def without(self, tasks: Iterable[str]) -> TaskList:
-        """The same list less some tasks."""
-        gone = set(tasks)
-        return replace(self, stops=tuple(s for s in self.stops if s.task.id not in gone))
+        """Return the list without the tasks of these ids."""
+        removed = set(tasks)
+        return replace(self, stops=tuple(s for s in self.stops if s.task.id not in removed))
 
     def find(self, task_id: str) -> Task | None:
-        """The task of that id, if the list has it."""
+        """Return the task of that id, None where the list has none."""
         return next((s.task for s in self.stops if s.task.id == task_id), None)
 
     def first(self, count: int) -> TaskList:
-        """A rolling horizon: the first stops only, and no return before the others."""
+        """Return a rolling horizon: the first stops only, and no return before the others."""
         if count >= len(self.stops):
             return self
         return replace(self, stops=self.stops[:count], returns=False, end_via=())
@@ -56,71 +66,94 @@ class TaskList:
 
 @dataclass(frozen=True, slots=True)
 class Item:
-    """One mission item as sent; `task` is what it is flown for and stays on the ground."""
+    """The fields of one MISSION_ITEM_INT; those after `params` are not sent.
+
+    Items compare by the fields that are sent.
+    """
 
     command: int
-    frame: int = GLOBAL
+    frame: int = dialect.MAV_FRAME_GLOBAL_INT
     x: int = 0  # [1e-7 deg] latitude
     y: int = 0  # [1e-7 deg] longitude
     z: float = 0.0  # [m] AMSL
     params: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
-    task: str = field(default='', compare=False)
+    task: str = field(default='', compare=False)  # id of the task that it is flown for
     completes: bool = field(default=False, compare=False)  # the task, once reached
     position: Point | None = field(default=None, compare=False)  # [m] ENU
     radius: float = field(default=0.0, compare=False)  # [m] accepted around it; 0: unknown
 
 
 def mission_items(tasks: TaskList, rules: ItemRules, origin: Origin) -> tuple[Item, ...]:
-    """The items of a list, without home; raise MissionError where one cannot be stored."""
+    """Compile a task list into mission items.
+
+    Args:
+        tasks: the list; positions ENU [m].
+        rules: what the autopilot takes.
+        origin: of the ENU frame.
+
+    Returns:
+        Items without home; none where the list has no point.
+
+    Raises:
+        MissionError: a service time does not fit into an item.
+    """
     points = [p for stop in tasks.stops for p in (*stop.via, stop.task.position)]
     points += tasks.end_via if tasks.returns else ()
     if not points:
         return ()
-    places = iter(zip(points, to_geodetic_batch(origin, points).tolist(), strict=True))
+    geodetic = iter(zip(points, to_geodetic_batch(origin, points).tolist(), strict=True))
     items: list[Item] = []
     for stop in tasks.stops:
-        items += (_waypoint(*next(places), rules, stop.task.id) for _ in stop.via)
-        items.append(_task_item(*next(places), rules, stop.task))
-    items += (_waypoint(*place, rules, '') for place in places)
+        items += (_waypoint(*next(geodetic), rules, stop.task.id) for _ in stop.via)
+        items.append(_task_item(*next(geodetic), rules, stop.task))
+    items += (_waypoint(*pair, rules, '') for pair in geodetic)
     if tasks.returns:
-        items.append(Item(RETURN, frame=rules.command_frame))
+        items.append(Item(dialect.MAV_CMD_NAV_RETURN_TO_LAUNCH, frame=rules.command_frame))
     return tuple(items)
 
 
 def home_item(home: Point | None, origin: Origin, rules: ItemRules) -> Item:
-    """What goes to seq 0 where that is home; the vehicle puts the real home there."""
-    place = home or (0.0, 0.0, 0.0)
-    return _waypoint(place, to_geodetic_batch(origin, [place]).tolist()[0], rules, '')
+    """The item sent as seq 0 where that is home (ArduPilot); the vehicle stores its own there.
+
+    Args:
+        home: ENU [m]; None: not known.
+        origin: of the ENU frame.
+        rules: what the autopilot takes.
+    """
+    point = home or (0.0, 0.0, 0.0)
+    return _waypoint(point, to_geodetic_batch(origin, [point]).tolist()[0], rules, '')
 
 
-def _waypoint(point: Point, place: Sequence[float], rules: ItemRules, task: str) -> Item:
-    latitude, longitude, altitude = place
-    # round, as cutting the seventh digit off moves a point by a centimetre, always south-west
-    return Item(WAYPOINT, GLOBAL, round(latitude * 1e7), round(longitude * 1e7), altitude,
-                (0.0, rules.radius, 0.0, rules.yaw), task, position=point, radius=rules.radius)
+def _waypoint(point: Point, geodetic: Sequence[float], rules: ItemRules, task: str) -> Item:
+    latitude, longitude, altitude = geodetic
+    # round: truncation to 1e-7 deg moves a point by up to a centimetre, always south-west
+    return Item(dialect.MAV_CMD_NAV_WAYPOINT, x=round(latitude * 1e7), y=round(longitude * 1e7),
+                z=altitude, params=(0.0, rules.radius, 0.0, rules.yaw), task=task,
+                position=point, radius=rules.radius)
 
 
-def _task_item(point: Point, place: Sequence[float], rules: ItemRules, task: Task) -> Item:
+def _task_item(point: Point, geodetic: Sequence[float], rules: ItemRules, task: Task) -> Item:
     hold = math.ceil(task.service_time) if rules.whole_seconds else task.service_time
     if not 0.0 <= hold <= _LONGEST_HOLD:
         raise MissionError(f'task {task.id}: service_time = {task.service_time:g}: expected at '
                            f'most {_LONGEST_HOLD:g} s, which is what a mission item holds',
                            task.id)
     radius = task.acceptance_radius or rules.radius
-    item = replace(_waypoint(point, place, rules, task.id), completes=True, radius=radius)
-    if rules.loiters and hold > 0.0:  # NaN is refused here
-        return replace(item, command=LOITER_TIME, params=(float(hold), 0.0, 0.0, 0.0))
+    item = replace(_waypoint(point, geodetic, rules, task.id), completes=True, radius=radius)
+    if rules.loiters and hold > 0.0:  # no NaN: LOITER_TIME is refused with one
+        return replace(item, command=dialect.MAV_CMD_NAV_LOITER_TIME,
+                       params=(float(hold), 0.0, 0.0, 0.0))
     return replace(item, params=(float(hold), radius if rules.keeps_radius else 0.0, 0.0,
                                  rules.yaw))
 
 
 def alike(sent: Item, held: Item) -> bool:
-    """Whether what is held may be what was sent, after all that autopilots round off."""
+    """Whether an item read back may be the item sent, given how autopilots round the fields."""
     if sent.command != held.command or not _params_alike(sent.params, held.params):
         return False
-    if sent.command == RETURN:
+    if sent.command == dialect.MAV_CMD_NAV_RETURN_TO_LAUNCH:
         return True
-    frames = (_ALIKE_FRAMES.get(item.frame, item.frame) for item in (sent, held))
+    frames = (_FRAME_READ_BACK.get(item.frame, item.frame) for item in (sent, held))
     return (len(set(frames)) == 1 and abs(sent.x - held.x) <= 1 and abs(sent.y - held.y) <= 1
             and abs(sent.z - held.z) <= _ALTITUDE_STEP)
 
@@ -133,5 +166,5 @@ def _params_alike(sent: Sequence[float], held: Sequence[float]) -> bool:
 
 
 def all_alike(sent: Sequence[Item], held: Sequence[Item]) -> bool:
-    """Whether two missions are item by item alike."""
+    """Whether two missions have the same number of items, all `alike`."""
     return len(sent) == len(held) and all(map(alike, sent, held))

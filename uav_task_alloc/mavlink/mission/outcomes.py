@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What an upload carries, and the ways in which it can end."""
+"""The mission that an upload carries, and the outcomes of an upload."""
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -10,12 +10,12 @@ from uav_task_alloc.mavlink.mission.items import Item
 
 @dataclass(frozen=True, slots=True)
 class Mission:
-    """Items as they go on board, and the one to fly now."""
+    """Items as uploaded, and the one to fly now."""
 
     items: tuple[Item, ...]
     start: int = 0  # seq
-    flag_start: bool = False  # say it with current=1, which PX4 jumps to
-    own: int = 0  # items at the front that are the vehicle's own: home
+    flag_start: bool = False  # mark it with current=1, to which PX4 jumps
+    own: int = 0  # leading items that the vehicle sets itself: home
 
     def __post_init__(self) -> None:
         if not self.items:
@@ -25,31 +25,31 @@ class Mission:
 
 @dataclass(frozen=True, slots=True)
 class Verified:
-    """The readback is alike: this is on board."""
+    """The readback matches: this mission is on board."""
 
     mission: Mission
 
 
 @dataclass(frozen=True, slots=True)
 class Failed:
-    """This upload has ended without success; what is on board is known from a readback only."""
+    """The upload failed; only a readback shows the mission on board."""
 
     mission: Mission
     reason: str
     result: int | None = None  # MAV_MISSION_RESULT
-    seq: int | None = None  # the item last asked for, where the vehicle refused
+    seq: int | None = None  # the item last requested, where the vehicle refused
 
 
 @dataclass(frozen=True, slots=True)
 class Accepted:
-    """The vehicle has taken all items: REACHED speaks of them from now on."""
+    """The vehicle has accepted all items: MISSION_ITEM_REACHED refers to them from now on."""
 
     mission: Mission
 
 
 @dataclass(frozen=True, slots=True)
 class Downloaded:
-    """What the vehicle holds, read without an upload; None where it did not answer."""
+    """The mission on board, read without an upload; None where the vehicle did not answer."""
 
     items: tuple[Item, ...] | None
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The two ends of a mission service: builds what we say and knows what is said to us."""
+"""The addresses of a mission transfer: builds our messages and filters the vehicle's."""
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -9,21 +9,18 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 from uav_task_alloc.mavlink.mission.items import Item
 from uav_task_alloc.mavlink.transport.codec import Message
 
-ACCEPTED, ERROR, NO_SPACE, INVALID_SEQUENCE, DENIED, CANCELLED = 0, 1, 4, 13, 14, 15
-
 
 @dataclass(frozen=True, slots=True)
 class Peer:
-    """A vehicle and the ids by which we speak to it."""
+    """A vehicle's ids, and ours on its link; builds each message of the mission protocol."""
 
     system: int
-    component: int = 1
+    component: int = dialect.MAV_COMP_ID_AUTOPILOT1
     our_system: int = 245
-    our_component: int = 190
-    mission_type: int = 0
-
+    our_component: int = dialect.MAV_COMP_ID_MISSIONPLANNER
+    mission_type: int = dialect.MAV_MISSION_TYPE_MISSION
     def is_from_vehicle(self, message: Message) -> bool:
-        """Whether it comes from this vehicle, to us or to all, and concerns our mission type."""
+        """Whether a message is sent by this vehicle to us or to all, of our mission type."""
         return (message.get_srcSystem() == self.system
                 and message.get_srcComponent() == self.component
                 and getattr(message, 'target_system', 0) in (0, self.our_system)
@@ -31,27 +28,33 @@ class Peer:
                 and getattr(message, 'mission_type', self.mission_type) == self.mission_type)
 
     def count(self, count: int) -> Message:
+        """MISSION_COUNT: begin an upload of so many items."""
         return dialect.MAVLink_mission_count_message(
             self.system, self.component, count, self.mission_type)
 
     def item(self, seq: int, item: Item, current: bool) -> Message:
+        """MISSION_ITEM_INT."""
         return dialect.MAVLink_mission_item_int_message(
             self.system, self.component, seq, item.frame, item.command, int(current), 1,
             *item.params, item.x, item.y, item.z, self.mission_type)
 
     def ack(self, result: int) -> Message:
+        """MISSION_ACK."""
         return dialect.MAVLink_mission_ack_message(
             self.system, self.component, result, self.mission_type)
 
     def request_list(self) -> Message:
+        """MISSION_REQUEST_LIST."""
         return dialect.MAVLink_mission_request_list_message(
             self.system, self.component, self.mission_type)
 
     def request(self, seq: int) -> Message:
+        """MISSION_REQUEST_INT."""
         return dialect.MAVLink_mission_request_int_message(
             self.system, self.component, seq, self.mission_type)
 
     def set_current(self, seq: int) -> Message:
+        """MISSION_SET_CURRENT; `seq` counts home where the autopilot stores it."""
         return dialect.MAVLink_mission_set_current_message(self.system, self.component, seq)
 
     def command(self, command: int, *params: float) -> Message:
@@ -62,7 +65,7 @@ class Peer:
 
 
 def received_item(message: Message) -> Item:
-    """A MISSION_ITEM_INT, or the older MISSION_ITEM in degrees, as an item."""
+    """Convert a MISSION_ITEM_INT [1e-7 deg], or the older MISSION_ITEM [deg], to an Item."""
     scale = 1 if message.get_type() == 'MISSION_ITEM_INT' else 1e7
     return Item(message.command, message.frame, round(message.x * scale),
                 round(message.y * scale), message.z,

@@ -12,12 +12,19 @@ from collections import deque
 from collections.abc import Iterable
 from dataclasses import dataclass
 
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+
 from uav_task_alloc.mavlink.mission.current_item_reports import CurrentItemReports
 from uav_task_alloc.mavlink.mission.flown_path import PositionSample
-from uav_task_alloc.mavlink.mission.items import RETURN, Item, all_alike
+from uav_task_alloc.mavlink.mission.items import Item, all_alike
 from uav_task_alloc.mavlink.mission.passed_items import Claim, PassedItems, flown_nearby
 from uav_task_alloc.mavlink.mission.position_history import MAX_MESSAGE_DELAY, PositionHistory
-from uav_task_alloc.mavlink.mission.reached_epoch import REPEAT_WINDOW, PreviousEpoch, CurrentEpoch, ReachedEpoch
+from uav_task_alloc.mavlink.mission.reached_epoch import (
+    REPEAT_WINDOW,
+    CurrentEpoch,
+    PreviousEpoch,
+    ReachedEpoch,
+)
 from uav_task_alloc.mavlink.transport.frame_log import FrameLog
 from uav_task_alloc.model import Point, Task
 
@@ -80,7 +87,7 @@ class ProgressTable:
 
     @property
     def returns(self) -> bool:
-        return bool(self.items) and self.items[-1].command == RETURN
+        return bool(self.items) and self.items[-1].command == dialect.MAV_CMD_NAV_RETURN_TO_LAUNCH
 
     def may_end(self, now: float) -> bool:
         """The last item with a place is flown, or passed; or was, where a swap has just come."""
@@ -331,7 +338,7 @@ class ProgressTable:
         prior = self._currents.previous_frame
         if frame is None or prior is None:
             return None
-        if self.items[end:] and self.items[end].command == RETURN:
+        if self.items[end:] and self.items[end].command == dialect.MAV_CMD_NAV_RETURN_TO_LAUNCH:
             return None  # PX4 tells no REACHED of the item before RETURN
         if self._epochs.reached_recently(begin, end, now):
             return None  # one has come, of this mission or repeated: the positions tell

@@ -9,7 +9,11 @@ import math
 from dataclasses import dataclass
 
 from uav_task_alloc.mavlink.mission.items import Item
-from uav_task_alloc.mavlink.mission.position_history import MAX_MESSAGE_DELAY, LOOSE_RADIUS, PositionHistory
+from uav_task_alloc.mavlink.mission.position_history import (
+    LOOSE_RADIUS,
+    MAX_MESSAGE_DELAY,
+    PositionHistory,
+)
 from uav_task_alloc.model import Point
 
 REPEAT_WINDOW = 15.0  # [s] in which a REACHED of the epoch before may come; PX4 repeats it for 10 s

@@ -10,13 +10,14 @@ from collections import deque
 from collections.abc import Callable, Sequence
 from enum import Enum
 
-from uav_task_alloc.mavlink.mission import peer as wire
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+
 from uav_task_alloc.mavlink.mission.download import Download, DownloadState
 from uav_task_alloc.mavlink.mission.items import Item, all_alike
 from uav_task_alloc.mavlink.mission.outcomes import (
     Accepted,
-    Failed,
     Downloaded,
+    Failed,
     Mission,
     Outcome,
     Verified,
@@ -26,16 +27,16 @@ from uav_task_alloc.mavlink.transport.codec import Message
 
 COUNT_PERIOD, COUNT_TRIES = 1.0, 5  # [s], only until the first request
 INACTIVITY = 10.0  # [s] without a request; the whole transfer has no limit
-CONFIRM = 1.5  # [s] for the final ACK, which a radio may lose
+CONFIRM = 1.5  # [s] for the final ACK, which a link may lose
 GRACE = 2.0  # [s] after an ERROR, in which requests may go on
 ERROR_BACKOFF = (5.0, 8.0)  # [s] drawn between
-DENIED_BACKOFF = (8.0, 12.0)  # [s] the other ground station has to end first
-SUPERSEDED = 'overtaken by what was flown meanwhile, or by a newer list'
+DENIED_BACKOFF = (8.0, 12.0)  # [s] drawn between; another ground station is uploading
+SUPERSEDED = 'superseded by tasks completed meanwhile or by a newer list'
 _TRIES = 3  # uploads of one mission until it is given up
 
 
 class UploadState(Enum):
-    """Where an upload stands."""
+    """State of an upload."""
 
     IDLE = 'idle'
     COUNTING = 'counting'
@@ -48,23 +49,23 @@ class UploadState(Enum):
 
 
 class UploadEvent(Enum):
-    """What moves an upload."""
+    """Events of an upload: messages received, deadlines, results of the readback."""
 
     START = 'start'
     REQUEST = 'request'  # of any item but the last
     LAST = 'request of the last item'
     STALE = 'request beyond the end'
     ACCEPTED = 'ACK accepted, all sent'
-    EARLY = 'ACK accepted too early'
+    EARLY = 'ACK accepted before the last item'
     ERROR = 'ACK error'
     DENIED = 'ACK denied'
     CANCELLED = 'ACK cancelled'
-    REFUSED = 'ACK refused for good'
-    TIMEOUT = 'time is up'
+    REFUSED = 'ACK refused permanently'
+    TIMEOUT = 'timeout'
     EXHAUSTED = 'no tries left'
-    MATCH = 'readback alike'
+    MATCH = 'readback matches'
     MISMATCH = 'readback differs'
-    UNREAD = 'no readback'
+    UNREAD = 'readback failed'
 
 
 _S, _E = UploadState, UploadEvent
@@ -87,43 +88,57 @@ TRANSITIONS: dict[UploadState, dict[UploadEvent, UploadState]] = {
                 _E.MISMATCH: _S.COUNTING, _E.UNREAD: _S.IDLE, _E.EXHAUSTED: _S.IDLE},
 }
 # What an ACK means; all others are permanent: the mission is never sent again unchanged.
-ACKS = {wire.ACCEPTED: _E.ACCEPTED, wire.ERROR: _E.ERROR, wire.INVALID_SEQUENCE: None,
-        wire.DENIED: _E.DENIED, wire.CANCELLED: _E.CANCELLED}
+ACKS = {
+    dialect.MAV_MISSION_ACCEPTED: _E.ACCEPTED,
+    dialect.MAV_MISSION_ERROR: _E.ERROR,
+    dialect.MAV_MISSION_INVALID_SEQUENCE: None,
+    dialect.MAV_MISSION_DENIED: _E.DENIED,
+    dialect.MAV_MISSION_OPERATION_CANCELLED: _E.CANCELLED,
+}
 
 
 class Upload:
-    """Brings the latest mission on board, one transfer at a time."""
+    """Uploads the latest mission to one vehicle, one transfer at a time.
 
+    Every method that returns messages returns those to send to the vehicle. Outcomes are appended
+    to `events`. Protocol: https://mavlink.io/en/services/mission.html#uploading_mission
+
+    Args:
+        peer: the vehicle.
+        idle_after: time [s] after which the vehicle has given up a transfer.
+        rng: draws the back-off times.
+    """
     def __init__(self, peer: Peer, *, idle_after: float, rng: random.Random) -> None:
         self._peer, self._idle_after, self._rng = peer, idle_after, rng
         self.state = UploadState.IDLE
         self.events: deque[Outcome] = deque()
-        self.uploads = 0  # begun so far
-        self.is_superseded: Callable[[], bool] = lambda: False  # nobody wants it any more as it is
+        self.uploads = 0  # started so far
+        self.is_superseded: Callable[[], bool] = lambda: False  # it would not be retried unchanged
         self._out: list[Message] = []
         self._pending: Mission | None = None
-        self._wants_read = False
+        self._read_pending = False
         self._mission: Mission | None = None  # None while only reading
         self._readback: Download | None = None
         self._tries = self._counts = 0
         self._due = 0.0
-        self._asked: int | None = None
+        self._requested: int | None = None
         self._sent_last = self._accepted = False
-        self._read_twice = False  # accepted, and then nothing was on board
-        self._sent_once = False  # the last item of this mission, in this try or one before
+        self._read_twice = False  # accepted, but the readback was empty
+        self._sent_once = False  # the last item of this mission, in this try or an earlier one
 
     @property
     def busy(self) -> bool:
+        """Whether a transfer is under way."""
         return self.state is not UploadState.IDLE
 
     @property
     def sent_all(self) -> bool:
-        """The last item was sent: the vehicle may have taken the mission."""
+        """Whether the last item was sent in this try: the vehicle may have stored the mission."""
         return self._mission is not None and self.busy and self._sent_last
 
     @property
     def may_be_stored(self) -> bool:
-        """The last item was sent, in this try or in one before: it may come late."""
+        """Whether the last item was sent in this try or an earlier one, and may arrive late."""
         return self._mission is not None and self.busy and self._sent_once
 
     @property
@@ -134,37 +149,33 @@ class Upload:
         count = len(self._mission.items)
         if self.state is UploadState.READING and self._readback is not None:
             return count, min(count, len(self._readback.items)), count
-        return 0 if self._asked is None else self._asked + 1, 0, count
+        return 0 if self._requested is None else self._requested + 1, 0, count
 
     def replace(self, mission: Mission, now: float) -> list[Message]:
-        """Upload this; a transfer that runs ends first, and of many only the latest follows."""
+        """Upload a mission after the running transfer; of several waiting only the latest is."""
         self._pending = mission
         self._begin(now)
         return self._flush()
 
     def read(self, now: float) -> list[Message]:
-        """Read what is on board, after whatever runs."""
-        self._wants_read = True
+        """Download the mission on board after the running transfer."""
+        self._read_pending = True
         self._begin(now)
         return self._flush()
 
     def cancel(self, now: float) -> list[Message]:
-        """Tell an atomic vehicle to keep what it has; a new try follows if it is still wanted."""
+        """Cancel the transfer, after which an atomic vehicle keeps its mission; then retry."""
         self._go(UploadEvent.STALE, now)
         return self._flush()
 
     def reset(self) -> None:
-        """Forget a transfer that the vehicle forgot as well: it was restarted."""
-        self.state, self._mission, self._pending, self._readback = (
-            UploadState.IDLE,
-            None,
-            None,
-            None,
-        )
-        self._wants_read = False
+        """Drop everything after a reboot of the vehicle, which has dropped its transfer too."""
+        self.state = UploadState.IDLE
+        self._mission = self._pending = self._readback = None
+        self._read_pending = False
 
     def receive(self, message: Message, now: float) -> list[Message]:
-        """Take a message of the vehicle; those for others are ignored."""
+        """Handle a message; those not from this vehicle to us are ignored."""
         if self._peer.is_from_vehicle(message):
             kind = message.get_type()
             if kind in ('MISSION_REQUEST', 'MISSION_REQUEST_INT'):
@@ -173,14 +184,14 @@ class Upload:
                 self._ack(message.type, now)
             elif self.state is UploadState.READING and self._readback:
                 self._out += self._readback.receive(message, now)
-                self._judge(now)
+                self._judge_readback(now)
         return self._flush()
 
     def step(self, now: float) -> list[Message]:
-        """Let time pass."""
+        """Retry and time out as of `now` [s]."""
         if self.state is UploadState.READING and self._readback:
             self._out += self._readback.step(now)
-            self._judge(now)
+            self._judge_readback(now)
         elif self.busy and now >= self._due:
             self._go(UploadEvent.TIMEOUT, now)
         return self._flush()
@@ -197,8 +208,8 @@ class Upload:
             self._mission, self._pending = self._pending, None
             self._tries, self._sent_once = 0, False
             self._go(UploadEvent.START, now)
-        elif self.state is UploadState.IDLE and self._wants_read:
-            self._mission, self._wants_read = None, False
+        elif self.state is UploadState.IDLE and self._read_pending:
+            self._mission, self._read_pending = None, False
             self._enter(UploadState.READING, now)
 
     def _request(self, seq: int, now: float) -> None:
@@ -210,7 +221,7 @@ class Upload:
             self._go(UploadEvent.STALE, now)
             return
         last = seq == len(mission.items) - 1
-        self._asked = seq
+        self._requested = seq
         self._sent_last = self._sent_last or last
         self._sent_once = self._sent_once or last
         self._out.append(self._peer.item(
@@ -224,7 +235,7 @@ class Upload:
         if event is UploadEvent.ACCEPTED and not self._sent_last:
             event = UploadEvent.EARLY
         if event is UploadEvent.REFUSED and event in TRANSITIONS[self.state]:
-            self._fail(f'refused with MAV_MISSION_RESULT {result}', result, self._asked)
+            self._fail(f'refused with MAV_MISSION_RESULT {result}', result, self._requested)
         if event is UploadEvent.ACCEPTED and event in TRANSITIONS[self.state]:
             self._accepted = True
             self.events.append(Accepted(self._mission))
@@ -234,19 +245,16 @@ class Upload:
         new = TRANSITIONS[self.state].get(event)
         if new is None:
             return
-        again = new is UploadState.COUNTING and event is not UploadEvent.TIMEOUT
-        if (
-            self.state in (UploadState.BACKOFF, UploadState.DRAINING)
-            and new is UploadState.COUNTING
-        ):
-            again = True
-        if again and self._tries >= _TRIES:
-            self._fail(f'given up after {_TRIES} tries, at last: {event.value}')
+        retries = new is UploadState.COUNTING and (
+            event is not UploadEvent.TIMEOUT
+            or self.state in (UploadState.BACKOFF, UploadState.DRAINING))
+        if retries and self._tries >= _TRIES:
+            self._fail(f'given up after {_TRIES} tries; last event: {event.value}')
             new = UploadState.IDLE
-        elif again and self._tries and self.is_superseded():
+        elif retries and self._tries and self.is_superseded():
             self._fail(SUPERSEDED)
             new = UploadState.IDLE
-        elif again:
+        elif retries:
             self._tries += 1
             self._counts = 0
         self._enter(new, now, event)
@@ -259,7 +267,7 @@ class Upload:
             self._readback = Download(self._peer, now)
             self._out.append(self._readback.first)
         elif new is UploadState.DRAINING and event is UploadEvent.STALE:
-            self._out.append(self._peer.ack(wire.CANCELLED))
+            self._out.append(self._peer.ack(dialect.MAV_MISSION_OPERATION_CANCELLED))
         elif new is UploadState.IDLE:
             self._begin(now)
             return
@@ -267,8 +275,8 @@ class Upload:
 
     def _limit(self, state: UploadState, event: UploadEvent) -> float:
         if state is UploadState.BACKOFF:
-            span = DENIED_BACKOFF if event is UploadEvent.DENIED else ERROR_BACKOFF
-            return self._rng.uniform(*span)
+            return self._rng.uniform(
+                *(DENIED_BACKOFF if event is UploadEvent.DENIED else ERROR_BACKOFF))
         return {
             UploadState.COUNTING: COUNT_PERIOD,
             UploadState.SENDING: INACTIVITY,
@@ -286,11 +294,11 @@ class Upload:
         if self._counts == 0:
             self.uploads += 1
             self._sent_last = self._accepted = self._read_twice = False
-            self._asked = None
+            self._requested = None
         self._counts += 1
         self._out.append(self._peer.count(len(self._mission.items)))
 
-    def _judge(self, now: float) -> None:
+    def _judge_readback(self, now: float) -> None:
         assert self._readback is not None
         state, held = self._readback.state, tuple(self._readback.items)
         if state not in (DownloadState.DONE, DownloadState.FAILED):
@@ -304,10 +312,10 @@ class Upload:
             self.events.append(Verified(self._mission))
             self._go(UploadEvent.MATCH, now)
         elif done and self._accepted and len(held) <= self._mission.own and not self._read_twice:
-            self._read_twice = True  # the answer may be late, to a request before the upload
+            self._read_twice = True  # a late answer to a request sent before the upload
             self._enter(UploadState.READING, now)
         elif done and self._accepted and len(held) <= self._mission.own:
-            self._fail('accepted, and then no mission is on board: infeasible')
+            self._fail('accepted, but no mission is on board: infeasible')
             self._go(UploadEvent.UNREAD, now)
         elif done:
             self._go(UploadEvent.MISMATCH, now)
