@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A flight bench that checks who has the aircraft whenever a message leaves the bridge."""
+"""A flight bench that checks every message of the bridge against the state of authority."""
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -36,23 +36,24 @@ _ASKS = {d.MAV_CMD_SET_MESSAGE_INTERVAL, d.MAV_CMD_REQUEST_MESSAGE}
 
 
 class AuthorityBench(FlightBench):
-    """Fails when a message leaves the bridge that the state of the moment forbids."""
+    """Fails when the bridge sends a message that the present state forbids."""
 
     def __init__(self, *args, tick=0.2, **kwargs):
-        self.sent = []  # (now, what it does, message)
+        self.sent = []  # (now, action, message)
         self.moved = {}  # new address -> vehicle
         super().__init__(*args, tick=tick, **kwargs)
 
     def _up(self, outgoing):
         for address, m in outgoing:
             n = self.moved.get(address, address)
-            self.sent.append((self.now, does(m), m))
-            assert does(m) in may(self.executor(n).authority), (self.now, self.authority(n), m)
+            self.sent.append((self.now, action_of(m), m))
+            allowed = allowed_actions(self.executor(n).authority)
+            assert action_of(m) in allowed, (self.now, self.authority(n), m)
             super()._up([(n, m)])
 
     def commands(self, since=0):
-        """Messages that have a vehicle do something, from the `since`-th message on."""
-        return [m for _, what, m in self.sent[since:] if what == 'command']
+        """Messages of the class 'command', from the `since`-th message on."""
+        return [m for _, action, m in self.sent[since:] if action == 'command']
 
     def modes(self, since=0):
         """Custom modes that were commanded."""
@@ -60,16 +61,16 @@ class AuthorityBench(FlightBench):
         return [profile.commanded_mode(m) for m in self.commands(since)
                 if profile.commanded_mode(m) is not None]
 
-    def wants(self, n=1, **changes):
+    def set_policy(self, n=1, **changes):
         """The operator sets parameters."""
         self.executor(n).policy = replace(self.executor(n).policy, **changes)
 
-    def becomes(self, state, limit=15.0, n=1):
-        """Whether it comes to a state."""
+    def reaches(self, state, limit=15.0, n=1):
+        """Whether a state is reached within `limit` [s]."""
         return self.run(lambda: self.authority(n) is state, limit)
 
-    def dead_for(self, seconds=0.0, store=True):
-        """kill -9, and a new bridge after a while; without a store it knows nothing."""
+    def kill_and_restart(self, seconds=0.0, store=True):
+        """Kill the bridge and start a new one after a while; without a store: no record."""
         self.ground_station = SimpleNamespace(sessions={}, step=lambda now: [],
                                       receive=lambda address, m, now: [])
         self.run(limit=seconds)
@@ -79,13 +80,13 @@ class AuthorityBench(FlightBench):
         self.discover()
 
     def move_address(self, n=1, address='new'):
-        """What the vehicle sends comes from elsewhere from now on."""
-        take, self.moved[address] = self.ground_station.receive, n
-        self.ground_station.receive = lambda _, m, now: take(address, m, now)
+        """Let the messages of the vehicle come from a new address from now on."""
+        receive, self.moved[address] = self.ground_station.receive, n
+        self.ground_station.receive = lambda _, m, now: receive(address, m, now)
 
 
-def does(m):
-    """What a message does to a vehicle, judged without the code under test."""
+def action_of(m):
+    """The class of a message to a vehicle, independent of the code under test."""
     kind = m.get_type()
     if kind in _READS or (kind == 'MISSION_ACK' and m.type == 0) or (
             kind == 'COMMAND_LONG' and m.command in _ASKS):
@@ -93,7 +94,8 @@ def does(m):
     return 'upload' if kind in _UPLOADS or kind == 'MISSION_ACK' else 'command'
 
 
-def may(authority):
+def allowed_actions(authority):
+    """The classes of messages that may be sent, independent of the code under test."""
     if authority.undecided or set(authority.suspensions) == {Suspension.FOREIGN}:
         return {'read'}
     return {H: {'read', 'upload', 'command'}, N: {'read', 'upload'}, L: {'read'}, S: set()}[
@@ -101,7 +103,7 @@ def may(authority):
 
 
 def flying(kind, names=LONG, **kwargs):
-    """HELD, on its way to the first task, and seen in the mission mode."""
+    """HELD, on the leg to the first task, and a heartbeat has shown the mission mode."""
     bench = AuthorityBench(kind, **kwargs).discover()
     bench.assign(task_list(names))
     assert bench.run(lambda: bench.started() == [names[0]])
@@ -110,8 +112,8 @@ def flying(kind, names=LONG, **kwargs):
     return bench
 
 
-def risen_by_pilot(kind, names=LONG, **kwargs):
-    """NONE, hovering by its pilot's sticks, with the list on board."""
+def flown_up_by_pilot(kind, names=LONG, **kwargs):
+    """NONE, hovering in a stick mode, with the list on board."""
     bench = AuthorityBench(kind, takeoff=False, **kwargs)
     vehicle = bench.vehicles[1]
     vehicle.rc_mode(MODES[kind].stick)
@@ -135,7 +137,8 @@ def upload_by_another(bench, n=1, items=1):
     for seq in range(items + own):
         x, y = 473990000 + 9000 * seq, 85460000
         bench.from_station(d.MAVLink_mission_item_int_message(
-            n, 1, seq, 5, 16, 0, 1, 0, 0, 0, 0, x, y, 540.0, 0), n)
+            n, 1, seq, d.MAV_FRAME_GLOBAL_INT, d.MAV_CMD_NAV_WAYPOINT, 0, 1, 0, 0, 0, 0,
+            x, y, 540.0, 0), n)
 
 
 def suspended(kind, cause=Suspension.FAILSAFE, **kwargs):
@@ -152,22 +155,22 @@ def suspended(kind, cause=Suspension.FAILSAFE, **kwargs):
         upload_by_another(bench, items=20)
     assert bench.run(lambda: bench.authority() is S, 20.0)
     assert bench.executor().authority.suspended_by(cause)
-    bench.run(limit=6.5)  # what a vehicle said of its failsafe is old
+    bench.run(limit=6.5)  # the STATUSTEXT of the failsafe no longer counts
     assert bench.authority() is S
     return bench
 
 
 def lost(kind, **kwargs):
-    """LOST in flight: the pilot holds it by his sticks."""
+    """LOST in flight: the pilot holds it in a stick mode."""
     bench = flying(kind, **kwargs)
     bench.vehicles[1].rc_mode(MODES[kind].stick)
-    assert bench.becomes(L)
-    bench.run(limit=12.0)  # what we sent before has taken effect, or never will
+    assert bench.reaches(L)
+    bench.run(limit=12.0)  # commands sent before have taken effect, or never will
     return bench
 
 
 def in_flight(kind, state, **kwargs):
-    return {H: flying, S: suspended, L: lost, N: risen_by_pilot}[state](kind, **kwargs)
+    return {H: flying, S: suspended, L: lost, N: flown_up_by_pilot}[state](kind, **kwargs)
 
 
 def on_ground(kind, state, **kwargs):
@@ -178,10 +181,10 @@ def on_ground(kind, state, **kwargs):
     assert bench.run(lambda: bench.authority() is (H if takeoff else N), 20.0)
     if state is S:
         vehicle.failsafe('battery', None)
-        assert bench.becomes(S)
+        assert bench.reaches(S)
     elif state is L:
         vehicle.rc_arm(True)
-        assert bench.becomes(L)
+        assert bench.reaches(L)
         vehicle.rc_arm(False)
     bench.run(limit=7.0)
     assert bench.authority() is state
@@ -189,9 +192,8 @@ def on_ground(kind, state, **kwargs):
 
 
 def armed_by_us(bench):
-    """Waiting on the ground while its take-off command is lost."""
-    bench.line.tampers.append(lambda way, m, now: [] if way == 'up' and (
-        m.get_type() == 'COMMAND_LONG' and m.command == d.MAV_CMD_NAV_TAKEOFF) else None)
+    """Armed on the ground while the take-off commands are lost."""
+    lose_command(bench, d.MAV_CMD_NAV_TAKEOFF)
     bench.assign(task_list('AB', 2))
     assert bench.run(lambda: bench.vehicles[1].flight.armed, 10.0)
     bench.run(limit=2.5)
@@ -202,12 +204,37 @@ def armed_by_us(bench):
 def set_mode(number, kind, n=1):
     """DO_SET_MODE as any station sends it."""
     main, sub = (number >> 16 & 0xff, number >> 24) if kind == 'px4' else (number, 0)
-    return d.MAVLink_command_long_message(n, 1, d.MAV_CMD_DO_SET_MODE, 0, 1, main, sub,
+    return d.MAVLink_command_long_message(n, 1, d.MAV_CMD_DO_SET_MODE, 0,
+                                          d.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED, main, sub,
                                           0, 0, 0, 0)
 
 
-def shows(bench, state, *words, n=1):
-    """UavState and the notes say who has it, why, and what gives it back."""
+def is_command(m, number):
+    """Whether a message is a COMMAND_LONG with this MAV_CMD."""
+    return m.get_type() == 'COMMAND_LONG' and m.command == number
+
+
+def lose_command(bench, number):
+    """The line loses each COMMAND_LONG with this MAV_CMD from now on."""
+    bench.line.tampers.append(lambda direction, m, now: [] if (
+        direction == 'up' and is_command(m, number)) else None)
+
+
+def delay_one_command(bench, number, delay):
+    """The line delays the next COMMAND_LONG with this MAV_CMD.
+
+    Returns the list of delays [s] that are still due: empty once it is delayed.
+    """
+    due = [delay]
+
+    def hold_back(direction, m, now):
+        return [(due.pop(), m)] if direction == 'up' and is_command(m, number) and due else None
+    bench.line.tampers.append(hold_back)
+    return due
+
+
+def status_is(bench, state, *words, n=1):
+    """UavState and the notes report the state, its reason, and what returns it to HELD."""
     status, authority = bench.state(n), bench.executor(n).authority
     assert bench.authority(n) is state
     assert status.authority is state
@@ -221,17 +248,17 @@ def shows(bench, state, *words, n=1):
         assert status.reason == (f'authority {state.name}: {authority.why}; given back by '
                                  f'{authority.given_back_by}')
         assert authority.given_back_by
-    said = [note for note in bench.notes if note.startswith('authority ')]
-    if said:
-        assert said[-1].startswith(f'authority {state.name}: '), said
-        assert state is S or authority.why in said[-1], said[-1]
+    notes = [note for note in bench.notes if note.startswith('authority ')]
+    if notes:
+        assert notes[-1].startswith(f'authority {state.name}: '), notes
+        assert state is S or authority.why in notes[-1], notes[-1]
         if authority.given_back_by:
-            assert said[-1].endswith(f'; given back by {authority.given_back_by}')
+            assert notes[-1].endswith(f'; given back by {authority.given_back_by}')
     return True
 
 
-def keeps_quiet(bench, seconds=60.0, names='XYZ', n=1):
-    """No command leaves while new lists come, and the state stays."""
+def sends_no_command(bench, seconds=60.0, names='XYZ', n=1):
+    """No command is sent while new lists arrive, and the state stays."""
     start, state = len(bench.sent), bench.authority(n)
     tasks = bench.onboard(n).tasks
     revision = tasks.revision if tasks else 0
@@ -244,5 +271,6 @@ def keeps_quiet(bench, seconds=60.0, names='XYZ', n=1):
 
 
 __all__ = ['ARDUPILOT', 'BOTH', 'LONG', 'MODES', 'PX4', 'AuthorityBench', 'H', 'L', 'N', 'S',
-           'Store', 'armed_by_us', 'flying', 'in_flight', 'keeps_quiet', 'lost', 'on_ground',
-           'risen_by_pilot', 'set_mode', 'shows', 'suspended', 'upload_by_another']
+           'Store', 'armed_by_us', 'delay_one_command', 'flown_up_by_pilot', 'flying',
+           'in_flight', 'is_command', 'lose_command', 'lost', 'on_ground', 'sends_no_command',
+           'set_mode', 'status_is', 'suspended', 'upload_by_another']

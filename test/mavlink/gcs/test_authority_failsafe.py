@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Failsafes, traffic, kills and foreign missions: who has the aircraft, and what is sent."""
+"""Authority and the messages sent during failsafes, traffic avoidance, kills, FOREIGN missions."""
 import pytest
 from authority_bench import (
     ARDUPILOT,
@@ -12,11 +12,11 @@ from authority_bench import (
     S,
     flying,
     in_flight,
-    keeps_quiet,
     lost,
     on_ground,
+    sends_no_command,
     set_mode,
-    shows,
+    status_is,
     suspended,
     upload_by_another,
 )
@@ -35,80 +35,80 @@ BACK = '~/hand_over, on the ground and disarmed'
 
 @BOTH
 @KIND_OF
-def test_a_failsafe_that_changes_the_mode_takes_the_aircraft(kind, failsafe):
+def test_a_failsafe_that_changes_the_mode_is_a_loss(kind, failsafe):
     bench = flying(kind)
     bench.vehicles[1].failsafe(failsafe, MODES[kind].rtl)
-    assert bench.becomes(L, 3.0)
-    assert shows(bench, L, 'failsafe: ', f'-> {MODES[kind].names[MODES[kind].rtl]}')
-    assert keeps_quiet(bench)
+    assert bench.reaches(L, 3.0)
+    assert status_is(bench, L, 'failsafe: ', f'-> {MODES[kind].names[MODES[kind].rtl]}')
+    assert sends_no_command(bench)
     assert bench.authority() is L
 
 
 @BOTH
 @pytest.mark.parametrize('mode', ['hold', 'land', 'stick'])
-def test_a_failsafe_into_any_mode_takes_it_and_its_end_gives_nothing_back(kind, mode):
+def test_a_failsafe_into_any_mode_is_a_loss_that_outlasts_the_failsafe(kind, mode):
     bench = flying(kind)
     bench.vehicles[1].failsafe('battery', getattr(MODES[kind], mode))
-    assert bench.becomes(L, 3.0)
+    assert bench.reaches(L, 3.0)
     bench.run(limit=3.0)
     bench.vehicles[1].failsafe_over()
     bench.run(limit=8.0)
-    assert keeps_quiet(bench, 40.0)
-    assert shows(bench, L)
+    assert sends_no_command(bench, 40.0)
+    assert status_is(bench, L)
 
 
 @BOTH
 @KIND_OF
-def test_a_failsafe_that_changes_the_mode_while_it_is_suspended_takes_it(kind, failsafe):
+def test_a_failsafe_that_changes_the_mode_while_suspended_is_a_loss(kind, failsafe):
     bench = suspended(kind)
     bench.vehicles[1].failsafe(failsafe, MODES[kind].rtl)
-    assert bench.becomes(L, 3.0)
-    assert shows(bench, L, 'failsafe: ')
-    assert keeps_quiet(bench, 20.0)
+    assert bench.reaches(L, 3.0)
+    assert status_is(bench, L, 'failsafe: ')
+    assert sends_no_command(bench, 20.0)
 
 
 @BOTH
 @pytest.mark.parametrize('state', [L, N])
-def test_a_failsafe_of_an_aircraft_that_is_not_ours_gives_nothing(kind, state):
+def test_a_failsafe_of_a_vehicle_that_is_not_held_grants_nothing(kind, state):
     bench = in_flight(kind, state)
     bench.vehicles[1].failsafe('radio', MODES[kind].rtl)
     bench.run(limit=5.0)
     assert bench.authority() is state
-    assert keeps_quiet(bench, 20.0)
+    assert sends_no_command(bench, 20.0)
     assert bench.commands() == [] or state is L
 
 
 @PX4
-def test_a_text_alone_tells_a_failsafe_where_the_status_comes_late(kind):
+def test_a_text_alone_reports_a_failsafe_where_the_system_status_is_delayed(kind):
     bench = flying(kind)
     flight = bench.vehicles[1].flight
     flight.texts.append((2, 'Failsafe activated'))
     bench.vehicles[1].rc_mode(MODES[kind].hold)
-    assert bench.becomes(L, 3.0)
-    assert shows(bench, L, 'failsafe: ')
+    assert bench.reaches(L, 3.0)
+    assert status_is(bench, L, 'failsafe: ')
 
 
 # a failsafe while the mode stays
 
 @BOTH
 @KIND_OF
-def test_a_failsafe_that_leaves_the_mode_suspends_until_it_is_cleared(kind, failsafe):
+def test_a_failsafe_that_keeps_the_mode_suspends_until_it_is_cleared(kind, failsafe):
     bench = flying(kind)
     bench.vehicles[1].failsafe(failsafe, None)
-    assert bench.becomes(S, 3.0)
-    assert shows(bench, S, 'a failsafe is active')
-    assert keeps_quiet(bench, names='ABC')
+    assert bench.reaches(S, 3.0)
+    assert status_is(bench, S, 'a failsafe is active')
+    assert sends_no_command(bench, names='ABC')
     bench.vehicles[1].failsafe_over()
-    assert bench.becomes(H, 3.0)
+    assert bench.reaches(H, 3.0)
     bench.run(limit=2.0)
-    assert shows(bench, H, 'the failsafe is over')
+    assert status_is(bench, H, 'the failsafe is over')
     bench.assign(task_list('ZY', 9))
     assert bench.run(lambda: bench.completed()[-2:] == ['Z', 'Y'], 200.0)
 
 
 @BOTH
 @pytest.mark.parametrize('state', [L, N])
-def test_a_failsafe_that_leaves_the_mode_of_an_aircraft_not_ours_changes_nothing(kind, state):
+def test_a_failsafe_that_keeps_the_mode_of_a_vehicle_not_held_changes_nothing(kind, state):
     bench = in_flight(kind, state)
     bench.vehicles[1].failsafe('gcs', None)
     bench.run(limit=5.0)
@@ -119,25 +119,25 @@ def test_a_failsafe_that_leaves_the_mode_of_an_aircraft_not_ours_changes_nothing
 
 
 @BOTH
-def test_two_causes_have_both_to_end(kind):
+def test_two_causes_of_a_suspension_must_both_end(kind):
     bench = suspended(kind)
     bench.line.cut = True
     bench.run(limit=5.0)
     assert set(bench.executor().authority.suspensions) == {Suspension.FAILSAFE, Suspension.LINK}
     bench.line.cut = False
     bench.run(limit=3.0)
-    assert shows(bench, S, 'a failsafe is active')
+    assert status_is(bench, S, 'a failsafe is active')
     bench.vehicles[1].failsafe_over()
-    assert bench.becomes(H, 3.0)
+    assert bench.reaches(H, 3.0)
 
 
 @BOTH
 def test_on_the_ground_a_failsafe_suspends_and_nothing_arms(kind):
     bench = on_ground(kind, S)
-    assert keeps_quiet(bench, 40.0)
-    assert shows(bench, S)
+    assert sends_no_command(bench, 40.0)
+    assert status_is(bench, S)
     bench.vehicles[1].failsafe_over()
-    assert bench.becomes(H, 3.0)
+    assert bench.reaches(H, 3.0)
     bench.assign(task_list('AB', 9))
     assert bench.run(lambda: bench.completed() == ['A', 'B'], 200.0)
 
@@ -145,21 +145,21 @@ def test_on_the_ground_a_failsafe_suspends_and_nothing_arms(kind):
 # AVOID_ADSB
 
 @ARDUPILOT
-def test_while_it_avoids_traffic_it_is_left_alone_and_goes_on_afterwards(kind):
+def test_while_it_avoids_traffic_nothing_is_sent_and_its_list_is_continued_afterwards(kind):
     bench = flying(kind)
     bench.vehicles[1].avoid(True)
-    assert bench.becomes(S, 3.0)
-    assert shows(bench, S, 'AUTO -> AVOID_ADSB')
-    assert keeps_quiet(bench, names='ABC')
+    assert bench.reaches(S, 3.0)
+    assert status_is(bench, S, 'AUTO -> AVOID_ADSB')
+    assert sends_no_command(bench, names='ABC')
     bench.vehicles[1].avoid(False)
-    assert bench.becomes(H, 3.0)
+    assert bench.reaches(H, 3.0)
     bench.assign(task_list('ZY', 9))
     assert bench.run(lambda: bench.completed()[-2:] == ['Z', 'Y'], 200.0)
 
 
 @ARDUPILOT
 @pytest.mark.parametrize('state', [S, L, N])
-def test_an_avoidance_of_an_aircraft_that_is_not_held_changes_nothing(kind, state):
+def test_an_avoidance_by_a_vehicle_that_is_not_held_changes_nothing(kind, state):
     bench = in_flight(kind, state)
     bench.vehicles[1].avoid(True)
     bench.run(limit=5.0)
@@ -167,78 +167,78 @@ def test_an_avoidance_of_an_aircraft_that_is_not_held_changes_nothing(kind, stat
     bench.vehicles[1].avoid(False)
     bench.run(limit=8.0)
     assert bench.authority() is (L if state is N else state)  # back to a stick mode
-    assert keeps_quiet(bench, 20.0)
+    assert sends_no_command(bench, 20.0)
 
 
 @ARDUPILOT
 @pytest.mark.parametrize('mode', ['stick', 'rtl', 'hold', 'own'])
-def test_who_ends_an_avoidance_by_another_mode_takes_it(kind, mode):
+def test_a_pilot_who_ends_an_avoidance_by_another_mode_takes_the_vehicle(kind, mode):
     bench = suspended(kind, Suspension.AVOID)
     bench.vehicles[1].rc_mode(getattr(MODES[kind], mode))
-    assert bench.becomes(L, 3.0)
-    assert keeps_quiet(bench)
-    assert shows(bench, L)
+    assert bench.reaches(L, 3.0)
+    assert sends_no_command(bench)
+    assert status_is(bench, L)
 
 
 # kill
 
 @BOTH
 @pytest.mark.parametrize('state', [H, S, L, N])
-def test_a_kill_takes_it_for_good(kind, state):
+def test_a_kill_is_a_loss_until_a_hand_over(kind, state):
     bench = in_flight(kind, state)
     bench.vehicles[1].kill_switch()
     assert bench.run(lambda: bench.executor().authority.killed, 3.0)
     assert bench.authority() is L
-    assert shows(bench, L, 'MotorEStop HIGH' if kind == 'ardupilot' else 'Kill engaged')
+    assert status_is(bench, L, 'MotorEStop HIGH' if kind == 'ardupilot' else 'Kill engaged')
     assert bench.state().reason.endswith(BACK)
-    assert keeps_quiet(bench, 20.0)
+    assert sends_no_command(bench, 20.0)
     assert bench.hand_over() == 'a failsafe is active'
     bench.vehicles[1].kill_switch_off()
     bench.vehicles[1].failsafe_over()
     bench.run(limit=8.0)
     for takeoff in (False, True):
-        bench.wants(takeoff=takeoff)
+        bench.set_policy(takeoff=takeoff)
         bench.run(limit=3.0)
-    assert shows(bench, L)
+    assert status_is(bench, L)
     assert bench.state().reason.endswith(BACK)
     assert bench.hand_over() == ''
     bench.run(limit=0.2)
-    assert shows(bench, H, 'handed over by test')
+    assert status_is(bench, H, 'handed over by test')
 
 
 @BOTH
-def test_a_kill_on_the_ground_takes_it_too(kind):
+def test_a_kill_on_the_ground_is_a_loss_too(kind):
     bench = on_ground(kind, H)
     bench.vehicles[1].kill_switch()
-    assert bench.becomes(L, 3.0)
+    assert bench.reaches(L, 3.0)
     bench.vehicles[1].kill_switch_off()
-    assert keeps_quiet(bench)
+    assert sends_no_command(bench)
     assert bench.executor().authority.killed
 
 
 @BOTH
 @pytest.mark.parametrize('text', ['Kill engaged', 'Kill-switch engaged', 'Emergency Stop',
                                   'RC7: MotorEStop HIGH', 'Flight termination active'])
-def test_a_text_of_a_kill_takes_it(kind, text):
+def test_a_text_that_reports_a_kill_is_a_loss(kind, text):
     bench = flying(kind)
     bench.vehicles[1].flight.texts.append((6 if 'RC7' in text else 2, text))
-    assert bench.becomes(L, 3.0)
-    assert shows(bench, L, text)
+    assert bench.reaches(L, 3.0)
+    assert status_is(bench, L, text)
     assert bench.executor().authority.killed
 
 
 @BOTH
 @pytest.mark.parametrize('text', ['Kill disengaged', 'Kill-switch disengaged',
                                   'RC7: MotorEStop LOW'])
-def test_the_end_of_a_kill_is_none(kind, text):
+def test_the_text_that_reports_the_end_of_a_kill_is_no_kill(kind, text):
     bench = flying(kind)
     bench.vehicles[1].flight.texts.append((6, text))
     bench.run(limit=3.0)
-    assert shows(bench, H)
+    assert status_is(bench, H)
 
 
 @BOTH
-def test_after_a_kill_it_is_handed_over_on_the_ground_and_disarmed_only(kind):
+def test_after_a_kill_a_hand_over_needs_the_ground_and_disarmed(kind):
     bench = flying(kind)
     bench.from_vehicle(d.MAVLink_statustext_message(2, b'Kill engaged'))
     assert bench.executor().authority.killed
@@ -251,7 +251,7 @@ def test_after_a_kill_it_is_handed_over_on_the_ground_and_disarmed_only(kind):
     bench.run(limit=2.0)
     bench.vehicles[1].rc_mode(MODES[kind].hold)
     bench.run(limit=10.0)
-    assert shows(bench, L)
+    assert status_is(bench, L)
     bench.vehicles[1].rc_mode(MODES[kind].land)
     assert bench.run(lambda: not bench.vehicles[1].flight.armed, 60.0)
     bench.run(limit=3.0)
@@ -265,58 +265,58 @@ def test_a_disarming_in_the_air_counts_as_a_kill(kind):
     beat = bench.vehicles[1]._telemetry.heartbeat()
     beat.base_mode &= ~d.MAV_MODE_FLAG_SAFETY_ARMED
     bench.from_vehicle(beat)
-    assert shows(bench, L, 'disarmed in the air')
+    assert status_is(bench, L, 'disarmed in the air')
     assert bench.executor().authority.killed
 
 
 @BOTH
-def test_a_landing_of_its_pilot_is_no_kill(kind):
+def test_a_landing_by_the_pilot_is_no_kill(kind):
     bench = lost(kind)
     bench.vehicles[1].rc_mode(MODES[kind].rtl)
     assert bench.run(lambda: not bench.vehicles[1].flight.armed, 100.0)
     bench.run(limit=3.0)
-    assert shows(bench, L, 'not by the bridge')
+    assert status_is(bench, L, 'not by the bridge')
     assert not bench.executor().authority.killed
 
 
 # a foreign mission
 
 @BOTH
-def test_a_foreign_mission_suspends_and_ours_on_board_again_gives_it_back(kind):
+def test_a_foreign_mission_suspends_until_our_mission_is_on_board_again(kind):
     bench = suspended(kind, Suspension.FOREIGN)
-    assert shows(bench, S, 'somebody else changed the mission')
+    assert status_is(bench, S, 'somebody else changed the mission')
     start = len(bench.sent)
-    assert keeps_quiet(bench, names='ABC')
-    assert {what for _, what, _ in bench.sent[start:]} <= {'read'}
-    bench.wants(when_foreign='reassert')
-    assert bench.becomes(H, 3.0)
+    assert sends_no_command(bench, names='ABC')
+    assert {action for _, action, _ in bench.sent[start:]} <= {'read'}
+    bench.set_policy(when_foreign='reassert')
+    assert bench.reaches(H, 3.0)
     bench.assign(task_list('ZY', 9))
     assert bench.run(lambda: bench.completed()[-2:] == ['Z', 'Y'], 200.0)
 
 
 @BOTH
-def test_with_reassert_a_foreign_mission_takes_nothing(kind):
+def test_with_reassert_a_foreign_mission_is_no_loss(kind):
     bench = flying(kind, when_foreign='reassert')
     bench.run(limit=3.0)
     upload_by_another(bench, items=20)
     bench.run(limit=10.0)
-    assert shows(bench, H)
+    assert status_is(bench, H)
     assert bench.run(lambda: bench.onboard().state is MissionState.VERIFIED, 60.0)
 
 
 @BOTH
 @pytest.mark.parametrize('state', [L, N])
-def test_a_foreign_mission_of_an_aircraft_not_ours_changes_nothing(kind, state):
+def test_a_foreign_mission_on_a_vehicle_that_is_not_held_changes_nothing(kind, state):
     bench = in_flight(kind, state)
     upload_by_another(bench, items=20)
     bench.run(limit=10.0)
     assert bench.authority() is state
-    assert keeps_quiet(bench, 20.0)
+    assert sends_no_command(bench, 20.0)
 
 
 @BOTH
 def test_a_foreign_mission_that_its_station_starts_again_stays_foreign(kind):
     bench = suspended(kind, Suspension.FOREIGN)
     bench.from_station(set_mode(MODES[kind].mission, kind))
-    assert keeps_quiet(bench, 20.0)
+    assert sends_no_command(bench, 20.0)
     assert bench.authority() is S

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A bridge started again without its file, and what is written to it before which message."""
+"""A bridge restarted without its record, and when the record is saved."""
 from dataclasses import replace
 
 import pytest
@@ -13,33 +13,35 @@ from authority_bench import (
     N,
     Store,
     flying,
-    keeps_quiet,
+    is_command,
     on_ground,
-    shows,
+    sends_no_command,
+    status_is,
     upload_by_another,
 )
 from mission_bench import task_list
+from pymavlink.dialects.v20 import ardupilotmega as d
 
-# without a file
+# without a record
 
 @BOTH
-def test_without_a_file_on_the_ground_it_is_granted_as_at_first(kind):
+def test_without_a_record_on_the_ground_it_is_granted_again(kind):
     bench = on_ground(kind, L)
-    bench.dead_for(1.0, store=False)
+    bench.kill_and_restart(1.0, store=False)
     bench.run(limit=2.0)
-    assert shows(bench, H, 'takeoff is true')
+    assert status_is(bench, H, 'takeoff is true')
 
 
 @BOTH
-def test_without_a_file_in_the_air_with_our_mission_it_is_ours(kind):
+def test_without_a_record_airborne_with_our_mission_it_is_held(kind):
     bench = flying(kind)
-    bench.dead_for(1.0, store=False)
+    bench.kill_and_restart(1.0, store=False)
     assert not bench.state().available
     bench.run(limit=3.0)
-    assert shows(bench, L, 'in the air in ')
+    assert status_is(bench, L, 'in the air in ')
     bench.assign(task_list('ABCDEFGHIJKLMNOPQRSTUVWXY', 2))
-    assert bench.becomes(H, 5.0)
-    assert shows(bench, H, 'flies our mission')
+    assert bench.reaches(H, 5.0)
+    assert status_is(bench, H, 'flies our mission')
     start = len(bench.sent)
     bench.run(limit=15.0)
     assert bench.modes(start) == []
@@ -47,68 +49,69 @@ def test_without_a_file_in_the_air_with_our_mission_it_is_ours(kind):
 
 @BOTH
 @pytest.mark.parametrize('mission', ['other list', 'foreign'])
-def test_without_a_file_in_the_air_with_another_mission_it_is_not_ours(kind, mission):
+def test_without_a_record_airborne_with_another_mission_it_is_lost(kind, mission):
     bench = flying(kind)
     if mission == 'foreign':
         upload_by_another(bench, items=20)
-    bench.dead_for(1.0, store=False)
+    bench.kill_and_restart(1.0, store=False)
     bench.run(limit=3.0)
-    assert keeps_quiet(bench, names='ZZZ' if mission == 'other list' else 'ABC')
-    assert shows(bench, L, 'in the air in ')
+    assert sends_no_command(bench, names='ZZZ' if mission == 'other list' else 'ABC')
+    assert status_is(bench, L, 'in the air in ')
 
 
 @BOTH
 @pytest.mark.parametrize('mode', ['hold', 'stick', 'rtl'])
-def test_without_a_file_in_the_air_in_another_mode_it_is_not_ours(kind, mode):
+def test_without_a_record_airborne_in_another_mode_it_is_lost(kind, mode):
     bench = flying(kind)
     bench.vehicles[1].rc_mode(getattr(MODES[kind], mode))
-    bench.dead_for(1.0, store=False)
+    bench.kill_and_restart(1.0, store=False)
     bench.run(limit=3.0)
-    assert shows(bench, L, 'in the air in ')
-    assert keeps_quiet(bench, names='ABC')
+    assert status_is(bench, L, 'in the air in ')
+    assert sends_no_command(bench, names='ABC')
 
 
 @BOTH
-def test_without_a_file_it_is_not_known_who_has_it_before_it_tells_where_it_is(kind):
+def test_without_a_record_the_authority_is_unknown_until_it_reports_its_position(kind):
     bench = flying(kind)
-    bench.line.tampers.append(lambda way, m, now: [] if way == 'down' and m.get_type() not in (
-        'HEARTBEAT', 'MISSION_COUNT', 'MISSION_ITEM_INT') else None)
-    bench.dead_for(1.0, store=False)
+    bench.line.tampers.append(lambda direction, m, now: [] if (
+        direction == 'down' and m.get_type() not in (
+            'HEARTBEAT', 'MISSION_COUNT', 'MISSION_ITEM_INT')) else None)
+    bench.kill_and_restart(1.0, store=False)
     start = len(bench.sent)
     bench.assign(task_list('ABC', 2))
     bench.run(limit=20.0)
     status = bench.state()
     assert status.authority.name == 'UNKNOWN'
     assert status.reason == 'not known yet who has it'
-    assert {what for _, what, _ in bench.sent[start:]} <= {'read'}
+    assert {action for _, action, _ in bench.sent[start:]} <= {'read'}
 
 
 @BOTH
-def test_without_a_file_armed_on_the_ground_nothing_is_granted(kind):
+def test_without_a_record_armed_on_the_ground_nothing_is_granted(kind):
     bench = on_ground(kind, H)
     bench.vehicles[1].rc_arm(True)
-    bench.dead_for(0.0, store=False)
+    bench.kill_and_restart(0.0, store=False)
     bench.run(limit=5.0)
-    assert shows(bench, N)
-    assert keeps_quiet(bench, 4.0)
+    assert status_is(bench, N)
+    assert sends_no_command(bench, 4.0)
 
 
-# what is written down, and when
+# when the record is saved
 
 class Log(Store):
-    """Notes how many messages had left when a record was saved."""
+    """Counts how many messages had been sent when a record was saved."""
 
     def __init__(self):
         super().__init__()
-        self.all, self.line = [], None
+        self.saves, self.line = [], None
 
     def save(self, uav_id, record):
         super().save(uav_id, record)
-        self.all.append((len(self.line.log) if self.line else 0, record))
+        self.saves.append((len(self.line.log) if self.line else 0, record))
 
 
 @BOTH
-def test_each_command_is_written_down_before_it_is_sent(kind):
+def test_each_command_is_saved_before_it_is_sent(kind):
     store = Log()
     bench = AuthorityBench(kind, store=store, relaunch='automatic')
     store.line = bench.line
@@ -121,40 +124,40 @@ def test_each_command_is_written_down_before_it_is_sent(kind):
     bench.assign(task_list('', 3, returns=True))
     assert bench.run(lambda: not bench.vehicles[1].flight.armed, 100.0)
     seen, profile = set(), bench.executor().profile
-    for at, (_, way, m) in enumerate(bench.line.log):
-        before = [record for size, record in store.all if size <= at]
-        if way != 'up' or m.get_type() != 'COMMAND_LONG':
+    for at, (_, direction, m) in enumerate(bench.line.log):
+        before = [record for size, record in store.saves if size <= at]
+        if direction != 'up' or m.get_type() != 'COMMAND_LONG':
             continue
         mode = profile.commanded_mode(m)
         if mode is not None:
             assert mode in before[-1].commanded
             seen.add('mode')
-        elif m.command == 400 and m.param1 == 1.0:
+        elif m.command == d.MAV_CMD_COMPONENT_ARM_DISARM and m.param1 == 1.0:
             assert before[-1].arming
             seen.add('arm')
-        elif m.command == 22:
+        elif m.command == d.MAV_CMD_NAV_TAKEOFF:
             assert before[-1].climb == 50.0 or kind == 'ardupilot'
             seen.add('climb')
     assert seen == {'mode', 'arm', 'climb'}
-    assert {record.state for _, record in store.all} == {H, N}
+    assert {record.state for _, record in store.saves} == {H, N}
 
 
 @ARDUPILOT
-def test_a_swap_is_written_down_before_the_hold_is_sent(kind):
+def test_a_swap_is_saved_before_the_hold_is_sent(kind):
     store = Log()
     bench = flying(kind, store=store)
     store.line = bench.line
     start = len(bench.line.log)
     bench.assign(task_list('ZYX', 2))
     bench.run(limit=5.0)
-    at = next(n for n, (_, way, m) in enumerate(bench.line.log) if n >= start
-              and way == 'up' and m.get_type() == 'COMMAND_LONG' and m.command == 176)
-    before = [record for size, record in store.all if size <= at][-1]
+    at = next(n for n, (_, direction, m) in enumerate(bench.line.log) if n >= start
+              and direction == 'up' and is_command(m, d.MAV_CMD_DO_SET_MODE))
+    before = [record for size, record in store.saves if size <= at][-1]
     assert (before.swap_at, before.commanded) == (bench.line.log[at][0], (4,))
 
 
 @BOTH
-def test_a_loss_is_written_down_in_the_moment_it_is_known(kind):
+def test_a_loss_is_saved_at_once(kind):
     bench = flying(kind)
     bench.vehicles[1].rc_mode(MODES[kind].stick)
     assert bench.run(lambda: bench.authority() is L, 3.0)

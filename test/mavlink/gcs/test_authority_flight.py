@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Pilots and other stations change modes in flight: who has the aircraft, and what is sent."""
+"""Authority and the messages sent when pilots and other stations change modes in flight."""
 import pytest
 from authority_bench import (
     BOTH,
@@ -8,14 +8,17 @@ from authority_bench import (
     L,
     N,
     S,
+    delay_one_command,
     flying,
     in_flight,
-    keeps_quiet,
+    lose_command,
+    sends_no_command,
     set_mode,
-    shows,
+    status_is,
     suspended,
 )
 from mission_bench import task_list
+from pymavlink.dialects.v20 import ardupilotmega as d
 
 from uav_task_alloc.mavlink.gcs.authority import Suspension
 from uav_task_alloc.mavlink.gcs.flight_modes import mode_name
@@ -32,67 +35,67 @@ FEW = [(kind, mode) for kind in MODES
 
 
 @pytest.mark.parametrize(('kind', 'mode'), STICKS + OWN + TO_HOLD)
-def test_any_mode_that_a_pilot_sets_in_the_mission_takes_the_aircraft(kind, mode):
+def test_any_mode_that_a_pilot_sets_during_the_mission_is_a_loss(kind, mode):
     bench = flying(kind)
     start = len(bench.sent)
     bench.vehicles[1].rc_mode(mode)
-    assert bench.becomes(L, 3.0)
+    assert bench.reaches(L, 3.0)
     assert bench.commands(start) == []
-    assert shows(bench, L, 'not by the bridge: ', mode_name(bench.executor().profile.family, mode))
+    name = mode_name(bench.executor().profile.family, mode)
+    assert status_is(bench, L, 'not by the bridge: ', name)
     assert 'MISSION mode set in flight' in bench.state().reason
 
 
 @pytest.mark.parametrize(('kind', 'mode'), FEW)
-def test_after_a_pilot_took_it_nothing_is_sent_for_a_minute_whatever_lists_come(kind, mode):
+def test_after_a_loss_to_a_pilot_no_command_is_sent_whatever_lists_arrive(kind, mode):
     bench = flying(kind)
     bench.vehicles[1].rc_mode(mode)
-    assert bench.becomes(L, 3.0)
-    assert keeps_quiet(bench)
+    assert bench.reaches(L, 3.0)
+    assert sends_no_command(bench)
     assert 'waits for the pilot to give it back' in bench.notes
 
 
 @pytest.mark.parametrize(('kind', 'mode'), FEW)
-def test_another_station_that_sets_a_mode_takes_it_like_a_pilot(kind, mode):
+def test_a_mode_set_by_another_station_is_a_loss_as_by_a_pilot(kind, mode):
     bench = flying(kind)
     bench.from_station(set_mode(mode, kind))
-    assert bench.becomes(L, 3.0)
-    assert keeps_quiet(bench)
-    assert shows(bench, L)
+    assert bench.reaches(L, 3.0)
+    assert sends_no_command(bench)
+    assert status_is(bench, L)
 
 
 @pytest.mark.parametrize(('kind', 'mode'), FEW)
-def test_a_mode_set_while_it_is_suspended_takes_it(kind, mode):
+def test_a_mode_set_while_suspended_is_a_loss(kind, mode):
     bench = suspended(kind, Suspension.FOREIGN)
     start = len(bench.sent)
     bench.vehicles[1].rc_mode(mode)
-    assert bench.becomes(L, 3.0)
-    assert keeps_quiet(bench)
+    assert bench.reaches(L, 3.0)
+    assert sends_no_command(bench)
     assert bench.commands(start) == []
-    assert shows(bench, L, 'not by the bridge')
+    assert status_is(bench, L, 'not by the bridge')
 
 
 @pytest.mark.parametrize(('kind', 'mode'), FEW)
 @pytest.mark.parametrize('state', [L, N])
-def test_a_pilot_who_flies_by_himself_may_set_what_he_likes(kind, mode, state):
+def test_a_pilot_in_control_may_set_any_mode(kind, mode, state):
     bench = in_flight(kind, state)
     if mode == MODES[kind].hold:
         bench.vehicles[1].rc_mode(MODES[kind].own)
-        bench.run(limit=2.0)  # from OWN to HOLD hands nothing over, and from STICK it does
+        bench.run(limit=2.0)  # OWN -> HOLD is no hand-over, STICK -> HOLD is one
     bench.vehicles[1].rc_mode(mode)
     bench.run(limit=3.0)
     assert bench.authority() is (N if state is N and mode == MODES[kind].stick else L)
-    assert keeps_quiet(bench)
-    assert shows(bench, bench.authority())
+    assert sends_no_command(bench)
+    assert status_is(bench, bench.authority())
 
 
 # retries
 
 @BOTH
 @pytest.mark.parametrize('state', [L, S])
-def test_a_command_that_is_being_repeated_ends_with_the_news(kind, state):
+def test_a_command_that_is_being_retried_is_dropped_on_a_loss_or_suspension(kind, state):
     bench = flying(kind)
-    bench.line.tampers.append(lambda way, m, now: [] if way == 'up' and (
-        m.get_type() == 'COMMAND_LONG' and m.command == 176) else None)
+    lose_command(bench, d.MAV_CMD_DO_SET_MODE)
     bench.assign(task_list('', 2))  # hold
     bench.run(limit=1.5)
     assert len(bench.modes()) >= 2
@@ -102,9 +105,9 @@ def test_a_command_that_is_being_repeated_ends_with_the_news(kind, state):
         bench.vehicles[1].rc_mode(MODES[kind].stick)
     else:
         bench.vehicles[1].failsafe('radio', None)
-    assert bench.becomes(state, 3.0)
+    assert bench.reaches(state, 3.0)
     start = len(bench.sent)
-    assert keeps_quiet(bench)
+    assert sends_no_command(bench)
     assert bench.commands(start) == []
     assert not bench.executor().sender.busy
     assert not bench.executor().sender.must_start
@@ -112,58 +115,46 @@ def test_a_command_that_is_being_repeated_ends_with_the_news(kind, state):
 
 @BOTH
 @pytest.mark.parametrize('delay', [1.0, 5.0, 11.0])
-def test_our_own_command_that_comes_late_does_not_take_it_back_from_the_pilot(kind, delay):
+def test_our_own_delayed_command_is_no_hand_over_by_the_pilot(kind, delay):
     bench, modes = flying(kind), MODES[kind]
     bench.assign(task_list('', 2))
     assert bench.run(lambda: bench.vehicles[1].flight.custom_mode == modes.hold, 5.0)
     bench.run(limit=2.0)
-    late = [delay]
-
-    def hold_back(way, m, now):
-        if way == 'up' and m.get_type() == 'COMMAND_LONG' and m.command == 176 and late:
-            return [(late.pop(), m)]
-        return None
-    bench.line.tampers.append(hold_back)
+    due = delay_one_command(bench, d.MAV_CMD_DO_SET_MODE, delay)
     bench.assign(task_list('XYZ', 3))
-    assert bench.run(lambda: not late, 20.0)
+    assert bench.run(lambda: not due, 20.0)
     assert bench.modes()[-1] == modes.mission
     bench.vehicles[1].rc_mode(modes.stick)
     taken = bench.now
-    assert bench.becomes(L, 3.0)
+    assert bench.reaches(L, 3.0)
     assert bench.run(lambda: bench.vehicles[1].flight.custom_mode == modes.mission,
                      delay + 1.0) or bench.now < taken
-    assert keeps_quiet(bench, 40.0, 'YX')
-    assert shows(bench, L, 'not by the bridge')
+    assert sends_no_command(bench, 40.0, 'YX')
+    assert status_is(bench, L, 'not by the bridge')
 
 
 @BOTH
-def test_our_own_hold_that_comes_late_is_no_hand_over_by_the_pilot(kind):
+def test_our_own_delayed_hold_is_no_hand_over_by_the_pilot(kind):
     bench, modes = flying(kind), MODES[kind]
-    late = [4.0]
-
-    def hold_back(way, m, now):
-        if way == 'up' and m.get_type() == 'COMMAND_LONG' and m.command == 176 and late:
-            return [(late.pop(), m)]
-        return None
-    bench.line.tampers.append(hold_back)
+    delay_one_command(bench, d.MAV_CMD_DO_SET_MODE, 4.0)
     bench.assign(task_list('', 2))
     bench.run(limit=0.5)
     bench.vehicles[1].rc_mode(modes.stick)
-    assert bench.becomes(L, 3.0)
+    assert bench.reaches(L, 3.0)
     assert bench.run(lambda: bench.vehicles[1].flight.custom_mode == modes.hold, 6.0)
-    assert keeps_quiet(bench, 40.0)
-    assert shows(bench, L)
+    assert sends_no_command(bench, 40.0)
+    assert status_is(bench, L)
 
 
 @BOTH
-def test_another_stations_delayed_commands_are_its_own(kind):
+def test_delayed_commands_of_another_station_are_not_taken_for_ours(kind):
     bench, modes = flying(kind), MODES[kind]
     bench.assign(task_list('', 2))  # the bridge holds it
     bench.run(limit=5.0)
     assert bench.authority() is H
     bench.from_station(set_mode(modes.rtl, kind))
-    assert bench.becomes(L, 3.0)
+    assert bench.reaches(L, 3.0)
     bench.from_station(set_mode(modes.hold, kind))
     bench.run(limit=12.0)
     assert bench.authority() is L
-    assert keeps_quiet(bench, 40.0)
+    assert sends_no_command(bench, 40.0)

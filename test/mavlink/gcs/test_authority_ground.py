@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`takeoff` becomes true and false, and an autopilot of unknown kind."""
+"""Authority by the parameter `takeoff`, and of an autopilot of unknown kind."""
 import pytest
 from authority_bench import (
     ARDUPILOT,
@@ -12,9 +12,9 @@ from authority_bench import (
     armed_by_us,
     flying,
     in_flight,
-    keeps_quiet,
     on_ground,
-    shows,
+    sends_no_command,
+    status_is,
 )
 from mission_bench import task_list
 from pymavlink.dialects.v20 import ardupilotmega as d
@@ -22,18 +22,18 @@ from pymavlink.dialects.v20 import ardupilotmega as d
 # takeoff becomes true
 
 @BOTH
-def test_takeoff_set_to_true_gives_nothing_back_that_was_lost(kind):
+def test_takeoff_set_to_true_does_not_recover_a_lost_vehicle(kind):
     bench = on_ground(kind, L)
     for takeoff in (False, True, False, True):
-        bench.wants(takeoff=takeoff)
+        bench.set_policy(takeoff=takeoff)
         bench.run(limit=2.0)
-    assert keeps_quiet(bench, 20.0)
-    assert shows(bench, L)
+    assert sends_no_command(bench, 20.0)
+    assert status_is(bench, L)
 
 
 @BOTH
 @pytest.mark.parametrize('state', [H, S])
-def test_takeoff_set_to_true_where_it_is_ours_changes_nothing(kind, state):
+def test_takeoff_set_to_true_while_held_or_suspended_changes_nothing(kind, state):
     bench = on_ground(kind, state)
     bench.executor().watch._grant.takeoff = False
     bench.run(limit=2.0)
@@ -43,10 +43,10 @@ def test_takeoff_set_to_true_where_it_is_ours_changes_nothing(kind, state):
 @BOTH
 def test_takeoff_set_to_true_on_the_ground_grants_it(kind):
     bench = on_ground(kind, N)
-    assert shows(bench, N, 'never granted')
-    bench.wants(takeoff=True)
+    assert status_is(bench, N, 'never granted')
+    bench.set_policy(takeoff=True)
     bench.run(limit=0.3)
-    assert shows(bench, H, 'takeoff is true')
+    assert status_is(bench, H, 'takeoff is true')
     bench.assign(task_list('AB'))
     assert bench.run(lambda: bench.completed() == ['A', 'B'], 100.0)
 
@@ -58,18 +58,18 @@ def test_nothing_is_granted_before_the_end_of_the_boot(kind):
     bench.run(lambda: bench.now >= 14.0)
     assert bench.authority() is N
     assert bench.commands() == []
-    assert bench.becomes(H, 5.0)
+    assert bench.reaches(H, 5.0)
 
 
 @BOTH
-def test_nothing_is_granted_in_the_air_nor_to_one_that_is_armed(kind):
+def test_nothing_is_granted_in_the_air_or_while_armed(kind):
     bench = in_flight(kind, N)
-    bench.wants(takeoff=True)
-    assert keeps_quiet(bench)
+    bench.set_policy(takeoff=True)
+    assert sends_no_command(bench)
     bench = on_ground(kind, N)
     bench.vehicles[1].rc_arm(True)
     bench.run(limit=1.5)
-    bench.wants(takeoff=True)
+    bench.set_policy(takeoff=True)
     bench.run(limit=4.0)
     assert bench.authority() is N
     assert bench.commands() == []
@@ -79,43 +79,43 @@ def test_nothing_is_granted_in_the_air_nor_to_one_that_is_armed(kind):
 
 @BOTH
 @pytest.mark.parametrize('relaunch', ['operator', 'automatic'])
-def test_takeoff_set_to_false_in_the_air_counts_from_the_landing_on(kind, relaunch):
+def test_takeoff_set_to_false_in_the_air_takes_effect_at_the_landing(kind, relaunch):
     bench = flying(kind, 'AB', relaunch=relaunch)
-    bench.wants(takeoff=False)
+    bench.set_policy(takeoff=False)
     bench.run(limit=1.0)
-    assert shows(bench, H)
+    assert status_is(bench, H)
     bench.vehicles[1].failsafe('radio', None)
-    assert bench.becomes(S)
+    assert bench.reaches(S)
     bench.run(limit=6.5)
     bench.vehicles[1].failsafe_over()
-    assert bench.becomes(H)
+    assert bench.reaches(H)
     assert bench.run(lambda: bench.completed() == ['A', 'B'], 60.0)
     bench.assign(task_list('', 2, returns=True))
     assert bench.run(lambda: not bench.vehicles[1].flight.armed, 100.0)
-    assert bench.becomes(N, 3.0)
-    assert keeps_quiet(bench)
-    assert shows(bench, N, 'landed')
+    assert bench.reaches(N, 3.0)
+    assert sends_no_command(bench)
+    assert status_is(bench, N, 'landed')
 
 
 @BOTH
 def test_takeoff_set_to_false_and_true_again_in_the_air_changes_nothing(kind):
     bench = flying(kind, 'AB', relaunch='automatic')
-    bench.wants(takeoff=False)
+    bench.set_policy(takeoff=False)
     bench.run(limit=1.0)
-    bench.wants(takeoff=True)
+    bench.set_policy(takeoff=True)
     bench.assign(task_list('', 2, returns=True))
     assert bench.run(lambda: not bench.vehicles[1].flight.armed, 100.0)
     bench.run(limit=2.0)
-    assert shows(bench, H)
+    assert status_is(bench, H)
 
 
 @BOTH
-def test_takeoff_set_to_false_on_the_ground_ends_it(kind):
+def test_takeoff_set_to_false_on_the_ground_withdraws_authority(kind):
     bench = on_ground(kind, H)
-    bench.wants(takeoff=False)
+    bench.set_policy(takeoff=False)
     bench.run(limit=0.2)
-    assert shows(bench, N, 'takeoff is false')
-    assert keeps_quiet(bench)
+    assert status_is(bench, N, 'takeoff is false')
+    assert sends_no_command(bench)
 
 
 @BOTH
@@ -129,53 +129,53 @@ def test_takeoff_set_to_false_drops_a_pending_arming_and_take_off(kind, armed):
         bench.assign(task_list('AB', 2))
         bench.run(limit=8.0)
         assert bench.executor().sender.busy
-    bench.wants(takeoff=False)
+    bench.set_policy(takeoff=False)
     bench.run(limit=0.2)
     assert bench.authority() is N
     bench.vehicles[1].flight.arming_fault = ''
-    assert keeps_quiet(bench)
+    assert sends_no_command(bench)
     assert not bench.vehicles[1].flight.armed
 
 
 @BOTH
 @pytest.mark.parametrize('cause', ['link', 'failsafe'])
-def test_takeoff_set_to_false_while_it_is_suspended_counts_afterwards(kind, cause):
+def test_takeoff_set_to_false_while_suspended_takes_effect_afterwards(kind, cause):
     bench = on_ground(kind, H)
     if cause == 'link':
         bench.line.cut = True
     else:
         bench.vehicles[1].failsafe('radio', None)
-    assert bench.becomes(S, 5.0)
-    bench.wants(takeoff=False)
+    assert bench.reaches(S, 5.0)
+    bench.set_policy(takeoff=False)
     bench.run(limit=3.0)
     assert bench.authority() is S
     bench.line.cut = False
     bench.vehicles[1].failsafe_over()
-    assert bench.becomes(N, 3.0)
-    assert keeps_quiet(bench)
+    assert bench.reaches(N, 3.0)
+    assert sends_no_command(bench)
     assert bench.commands() == []
 
 
 @BOTH
-def test_takeoff_set_to_false_while_no_bridge_was_there_ends_it_on_the_ground(kind):
+def test_takeoff_set_to_false_while_no_bridge_ran_withdraws_authority_on_the_ground(kind):
     bench = on_ground(kind, H)
     bench.policy = type(bench.policy)(takeoff=False)
-    bench.dead_for(3.0)
+    bench.kill_and_restart(3.0)
     bench.run(limit=2.0)
-    assert shows(bench, N, 'takeoff is false')
-    assert keeps_quiet(bench)
+    assert status_is(bench, N, 'takeoff is false')
+    assert sends_no_command(bench)
 
 
 @BOTH
 @pytest.mark.parametrize('state', [L, N])
-def test_takeoff_set_to_false_changes_nothing_where_it_is_not_ours(kind, state):
+def test_takeoff_set_to_false_changes_nothing_while_not_held(kind, state):
     bench = in_flight(kind, state)
-    bench.wants(takeoff=True)
+    bench.set_policy(takeoff=True)
     bench.run(limit=1.0)
-    bench.wants(takeoff=False)
+    bench.set_policy(takeoff=False)
     bench.run(limit=2.0)
     assert bench.authority() is state
-    assert keeps_quiet(bench, 20.0)
+    assert sends_no_command(bench, 20.0)
 
 
 # an autopilot of unknown kind
@@ -184,8 +184,8 @@ def unknown(**kwargs):
     """Its heartbeat names no autopilot that the bridge knows."""
     bench = AuthorityBench('ardupilot', **kwargs)
 
-    def rename(way, m, now):
-        if m.get_type() == 'HEARTBEAT' and way == 'down':
+    def rename(direction, m, now):
+        if m.get_type() == 'HEARTBEAT' and direction == 'down':
             m.autopilot = d.MAV_AUTOPILOT_GENERIC
     bench.line.tampers.append(rename)
     bench.discover()
@@ -194,17 +194,17 @@ def unknown(**kwargs):
 
 
 @ARDUPILOT
-def test_an_unknown_autopilot_is_ours_by_takeoff_whatever_its_modes(kind):
+def test_an_unknown_autopilot_is_held_by_takeoff_whatever_its_modes(kind):
     bench = unknown()
-    assert bench.becomes(H)
+    assert bench.reaches(H)
     for mode in (5, 4, 3, 6, 17, 0):
         bench.vehicles[1].rc_mode(mode)
         bench.run(limit=8.0)
-        assert shows(bench, H)
+        assert status_is(bench, H)
 
 
 @ARDUPILOT
-def test_an_unknown_autopilot_is_ours_by_a_hand_over_and_never_by_a_mode(kind):
+def test_an_unknown_autopilot_is_held_by_a_hand_over_and_never_by_a_mode(kind):
     bench = unknown(takeoff=False)
     vehicle = bench.vehicles[1]
     vehicle.rc_mode(5)
@@ -215,14 +215,14 @@ def test_an_unknown_autopilot_is_ours_by_a_hand_over_and_never_by_a_mode(kind):
     for mode in (4, 3, 5, 4):
         vehicle.rc_mode(mode)
         bench.run(limit=8.0)
-        assert shows(bench, N)
+        assert status_is(bench, N)
     assert bench.hand_over() == ''
     bench.run(limit=1.0)
-    assert shows(bench, H, 'handed over by test')
+    assert status_is(bench, H, 'handed over by test')
     vehicle.rc_mode(5)
     bench.run(limit=3.0)
     assert bench.authority() is H
     vehicle.failsafe('radio', None)
-    assert bench.becomes(S)
+    assert bench.reaches(S)
     vehicle.kill_switch()
-    assert bench.becomes(L)
+    assert bench.reaches(L)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`~/hand_over`: refused in each named case with its words, granted otherwise, and hold first."""
+"""`~/hand_over`: refused in each case with its reason, granted otherwise, and HOLD comes first."""
 import pytest
 from authority_bench import (
     BOTH,
@@ -10,25 +10,27 @@ from authority_bench import (
     L,
     N,
     S,
+    flown_up_by_pilot,
     flying,
     in_flight,
-    keeps_quiet,
+    lose_command,
     lost,
     on_ground,
-    risen_by_pilot,
-    shows,
+    sends_no_command,
+    status_is,
     suspended,
 )
 from mission_bench import drop, task_list
+from pymavlink.dialects.v20 import ardupilotmega as d
 
 from uav_task_alloc.mavlink.gcs.authority import AuthorityEvent, Suspension
 from uav_task_alloc.mavlink.gcs.onboard_mission import MissionState
 
 
-def refused(bench, words):
-    """Nothing changes, and nothing is sent."""
+def refused(bench, reason):
+    """The hand-over is refused: the state stays, and no command is sent."""
     state, start = bench.authority(), len(bench.sent)
-    assert bench.hand_over() == words
+    assert bench.hand_over() == reason
     assert bench.authority() is state
     bench.run(limit=5.0)
     assert bench.commands(start) == []
@@ -63,11 +65,11 @@ def test_it_is_refused_on_a_low_battery(kind, state):
 
 
 @BOTH
-def test_it_is_refused_beside_a_foreign_mission(kind):
+def test_it_is_refused_with_a_foreign_mission(kind):
     bench = suspended(kind, Suspension.FOREIGN)
     assert refused(bench, 'the mission on board is foreign')
     bench.vehicles[1].rc_mode(MODES[kind].stick)
-    assert bench.becomes(L, 3.0)
+    assert bench.reaches(L, 3.0)
     assert refused(bench, 'the mission on board is foreign')
 
 
@@ -82,7 +84,7 @@ def test_it_is_refused_while_traffic_is_avoided_or_something_else_suspends(kind)
 @pytest.mark.parametrize('state', [L, N])
 def test_it_is_refused_on_the_ground_without_takeoff(kind, state):
     bench = on_ground(kind, state)
-    bench.wants(takeoff=False)
+    bench.set_policy(takeoff=False)
     bench.run(limit=1.0)
     assert refused(bench, 'on the ground, and takeoff is false')
 
@@ -95,22 +97,22 @@ def test_it_is_refused_while_the_autopilot_starts(kind):
 
 
 @BOTH
-def test_it_is_refused_while_it_is_not_known_whether_it_flies(kind):
+def test_it_is_refused_while_it_is_not_known_whether_it_is_airborne(kind):
     bench = flying(kind)
     bench.line.tampers.append(drop({'EXTENDED_SYS_STATE', 'GLOBAL_POSITION_INT'}, 1 << 30))
-    bench.dead_for(1.0, store=False)
+    bench.kill_and_restart(1.0, store=False)
     bench.run(limit=2.0)
     assert bench.hand_over() == 'not known whether it is in the air'
 
 
 @BOTH
-def test_what_is_ours_already_is_granted_and_nothing_changes(kind):
+def test_a_hand_over_of_a_held_vehicle_succeeds_and_changes_nothing(kind):
     bench = flying(kind)
     start = len(bench.sent)
     assert bench.hand_over() == ''
     bench.run(limit=10.0)
     assert bench.commands(start) == []
-    assert shows(bench, H, 'takeoff is true')
+    assert status_is(bench, H, 'takeoff is true')
 
 
 @BOTH
@@ -120,7 +122,7 @@ def test_in_flight_it_is_granted_and_holds_before_anything_else(kind, state):
     start = len(bench.sent)
     assert bench.hand_over() == ''
     assert bench.run(lambda: len(bench.modes(start)) == 2, 20.0)
-    assert shows(bench, H, 'handed over by test')
+    assert status_is(bench, H, 'handed over by test')
     assert bench.modes(start) == [modes.hold, modes.mission]
     first = bench.commands(start)[0]
     assert bench.executor().profile.commanded_mode(first) == modes.hold
@@ -129,7 +131,7 @@ def test_in_flight_it_is_granted_and_holds_before_anything_else(kind, state):
 
 @BOTH
 @pytest.mark.parametrize('mode', ['mission', 'rtl', 'land', 'own'])
-def test_from_any_mode_it_holds_first_though_its_list_is_verified(kind, mode):
+def test_from_any_mode_it_holds_first_even_if_its_list_is_verified(kind, mode):
     bench, modes = lost(kind), MODES[kind]
     bench.vehicles[1].rc_mode(modes.own)
     bench.run(limit=2.0)
@@ -142,7 +144,7 @@ def test_from_any_mode_it_holds_first_though_its_list_is_verified(kind, mode):
 
 
 @BOTH
-def test_with_a_new_list_waiting_it_holds_before_the_upload(kind):
+def test_with_a_new_list_pending_it_holds_before_the_upload(kind):
     bench, modes = lost(kind), MODES[kind]
     bench.assign(task_list('ZYX', 2))
     bench.run(limit=3.0)
@@ -150,16 +152,15 @@ def test_with_a_new_list_waiting_it_holds_before_the_upload(kind):
     assert bench.hand_over() == ''
     assert bench.run(lambda: bench.completed()[-3:] == ['Z', 'Y', 'X'], 200.0)
     kinds = [(m.get_type(), bench.executor().profile.commanded_mode(m))
-             for _, what, m in bench.sent[start:] if what != 'read']
+             for _, action, m in bench.sent[start:] if action != 'read']
     assert kinds[0] == ('COMMAND_LONG', modes.hold)
     assert kinds[1][0] == 'MISSION_COUNT'
 
 
 @BOTH
-def test_a_hold_that_does_not_come_about_is_tried_again_and_nothing_else_is_done(kind):
+def test_a_hold_that_fails_is_retried_and_nothing_else_is_sent(kind):
     bench, modes = lost(kind), MODES[kind]
-    bench.line.tampers.append(lambda way, m, now: [] if way == 'up' and (
-        m.get_type() == 'COMMAND_LONG' and m.command == 176) else None)
+    lose_command(bench, d.MAV_CMD_DO_SET_MODE)
     start = len(bench.sent)
     assert bench.hand_over() == ''
     bench.run(limit=40.0)
@@ -170,24 +171,23 @@ def test_a_hold_that_does_not_come_about_is_tried_again_and_nothing_else_is_done
 
 
 @BOTH
-def test_the_pilot_takes_it_again_right_after_a_hand_over(kind):
+def test_a_mode_set_by_the_pilot_right_after_a_hand_over_is_a_loss(kind):
     bench, modes = lost(kind), MODES[kind]
     assert bench.hand_over() == ''
     assert bench.run(lambda: bench.vehicles[1].flight.custom_mode == modes.mission, 3.0)
     bench.run(limit=1.0)
     bench.vehicles[1].rc_mode(modes.stick)
-    assert bench.becomes(L, 3.0)
-    assert keeps_quiet(bench)
+    assert bench.reaches(L, 3.0)
+    assert sends_no_command(bench)
 
 
 @BOTH
 def test_killed_right_after_a_hand_over_it_still_holds_first(kind):
     bench, modes = lost(kind), MODES[kind]
-    bench.line.tampers.append(lambda way, m, now: [] if way == 'up' and (
-        m.get_type() == 'COMMAND_LONG' and m.command == 176) else None)
+    lose_command(bench, d.MAV_CMD_DO_SET_MODE)
     assert bench.hand_over() == ''
     bench.run(limit=2.0)
-    bench.dead_for(2.0)
+    bench.kill_and_restart(2.0)
     bench.line.tampers.clear()
     bench.run(limit=3.0)
     assert bench.authority() is H
@@ -201,36 +201,36 @@ def test_killed_right_after_a_hand_over_it_still_holds_first(kind):
 @pytest.mark.parametrize('state', [L, N])
 def test_on_the_ground_it_is_granted_and_takes_off(kind, state):
     bench = on_ground(kind, state)
-    bench.wants(takeoff=True)
+    bench.set_policy(takeoff=True)
     assert bench.hand_over() == ''
     bench.run(limit=0.2)
-    assert shows(bench, H, 'handed over by test')
+    assert status_is(bench, H, 'handed over by test')
     bench.assign(task_list('AB', 2))
     assert bench.run(lambda: bench.completed() == ['A', 'B'], 100.0)
 
 
 @BOTH
-def test_with_takeoff_false_a_hand_over_in_flight_counts_until_the_landing(kind):
-    bench = risen_by_pilot(kind, 'A')
+def test_with_takeoff_false_a_hand_over_in_flight_lasts_until_the_landing(kind):
+    bench = flown_up_by_pilot(kind, 'A')
     assert bench.hand_over() == ''
     assert bench.run(lambda: bench.completed() == ['A'], 60.0)
     bench.assign(task_list('', 2, returns=True))
     assert bench.run(lambda: not bench.vehicles[1].flight.armed, 100.0)
-    assert bench.becomes(N, 3.0)
-    assert keeps_quiet(bench, 20.0)
+    assert bench.reaches(N, 3.0)
+    assert sends_no_command(bench, 20.0)
 
 
 @BOTH
-def test_nothing_that_was_sent_before_counts_after_a_hand_over(kind):
+def test_commands_sent_before_a_hand_over_explain_no_mode_after_it(kind):
     bench, modes = flying(kind), MODES[kind]
     bench.assign(task_list('', 2))
     bench.run(limit=3.0)
     bench.vehicles[1].rc_mode(modes.stick)
-    assert bench.becomes(L, 3.0)
+    assert bench.reaches(L, 3.0)
     assert bench.hand_over() == ''
     assert bench.run(lambda: bench.vehicles[1].flight.custom_mode == modes.hold, 3.0)
     bench.run(limit=2.0)
     bench.vehicles[1].rc_mode(modes.rtl)
-    assert bench.becomes(L, 3.0)
+    assert bench.reaches(L, 3.0)
     assert bench.onboard().state is MissionState.VERIFIED
-    assert keeps_quiet(bench, 20.0)
+    assert sends_no_command(bench, 20.0)

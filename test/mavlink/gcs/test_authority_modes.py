@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The class of each flight mode by number, and the table of authority as the docs show it."""
+"""The class of each flight mode by number, and the table of authority in the docs."""
 from pathlib import Path
 
 import pytest
@@ -77,14 +77,14 @@ def test_the_stick_modes_of_the_simulated_vehicles_are_those_of_the_table():
             assert mode.stick is (mode_class(family, number) is STICK), (family, number)
 
 
-def test_only_avoid_adsb_gets_out_of_the_way_of_traffic():
-    found = [(family, number) for family in ('copter', 'plane', 'px4', '')
+def test_only_avoid_adsb_avoids_traffic():
+    avoiding = [(family, number) for family in ('copter', 'plane', 'px4', '')
              for number in range(256) if avoids_traffic(family, number)]
-    assert found == [('copter', 19), ('plane', 14)]
+    assert avoiding == [('copter', 19), ('plane', 14)]
 
 
 @pytest.mark.parametrize('profile', [ARDUPILOT, ARDUPLANE, PX4, PX4_PLANE])
-def test_what_the_bridge_commands_is_of_the_class_it_means(profile):
+def test_each_mode_that_the_bridge_commands_has_the_class_of_its_function(profile):
     assert mode_class(profile.family, profile.set_mode[ModeFunction.MISSION]) is M
     assert mode_class(profile.family, profile.set_mode[ModeFunction.HOLD]) is HOLD
     assert mode_class(profile.family, profile.set_mode[ModeFunction.RETURN]) is OWN
@@ -92,7 +92,7 @@ def test_what_the_bridge_commands_is_of_the_class_it_means(profile):
         assert (mode_class(profile.family, number) is M) is (flight is ModeFunction.MISSION)
 
 
-def test_the_docs_show_the_table_as_it_is():
+def test_the_docs_contain_the_generated_table():
     section = DOCS.read_text('utf-8').split('## Who has the aircraft\n')[1].split('\n## ')[0]
     rows = [line for line in section.splitlines() if line.startswith('|')]
     expected = [line for line in table_text().splitlines() if line]

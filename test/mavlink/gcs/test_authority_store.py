@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Who has each aircraft, on disk: whole or not at all, and no failure ends the bridge."""
+"""The authority records on disk: replaced atomically, and no failure ends the bridge."""
 import errno
 import json
 import os
@@ -45,24 +45,24 @@ for k in count():
 
 
 @pytest.fixture
-def said():
+def reports():
     return []
 
 
 @pytest.fixture
-def store(tmp_path, said):
-    return AuthorityFileStore(str(tmp_path / 'new' / 'folder'), said.append, 'boot')
+def store(tmp_path, reports):
+    return AuthorityFileStore(str(tmp_path / 'new' / 'folder'), reports.append, 'boot')
 
 
 @pytest.mark.parametrize(
     'record', [AuthorityRecord(), FULL, AuthorityRecord(AuthorityState.LOST, 'ä "quoted" text')]
 )
-def test_what_was_saved_is_loaded_after_a_restart(store, tmp_path, said, record):
+def test_what_was_saved_is_loaded_after_a_restart(store, tmp_path, reports, record):
     store.save('uav_1', record)
-    again = AuthorityFileStore(str(tmp_path / 'new' / 'folder'), said.append, 'boot')
-    assert again.load('uav_1') == record
-    assert again.load('uav_2') is None
-    assert said == []
+    restarted = AuthorityFileStore(str(tmp_path / 'new' / 'folder'), reports.append, 'boot')
+    assert restarted.load('uav_1') == record
+    assert restarted.load('uav_2') is None
+    assert reports == []
 
 
 @pytest.mark.parametrize('names', [
@@ -83,15 +83,16 @@ def test_nothing_but_the_files_of_the_uavs_is_left_in_the_folder(store):
     assert [path.name for path in store.path('x').parent.iterdir()] == ['authority_uav_1.json']
 
 
-def test_after_a_restart_of_the_computer_a_swap_is_long_ago(store, tmp_path, said):
+def test_after_a_restart_of_the_computer_a_swap_is_long_ago(store, tmp_path, reports):
     store.save('uav_1', FULL)
-    other = AuthorityFileStore(str(tmp_path / 'new' / 'folder'), said.append, 'other boot')
+    other = AuthorityFileStore(str(tmp_path / 'new' / 'folder'), reports.append, 'other boot')
     assert other.load('uav_1') == replace(FULL, since=0.0, swap_at=authority_store.LONG_AGO)
     assert boot_id() == boot_id()
 
 
 @pytest.mark.parametrize('moment', ['fsync', 'replace'])
-def test_a_bridge_that_ends_amid_a_write_leaves_the_old_content(store, said, monkeypatch, moment):
+def test_a_bridge_that_ends_during_a_write_leaves_the_old_content(
+        store, reports, monkeypatch, moment):
     store.save('uav_1', FULL)
 
     def end(*_):
@@ -102,10 +103,10 @@ def test_a_bridge_that_ends_amid_a_write_leaves_the_old_content(store, said, mon
         store.save('uav_1', AuthorityRecord(AuthorityState.LOST))
     monkeypatch.undo()
     assert store.load('uav_1') == FULL
-    assert said == []
+    assert reports == []
 
 
-def test_a_killed_bridge_leaves_a_whole_file_at_every_moment(tmp_path, said):
+def test_a_killed_bridge_leaves_a_complete_file_at_any_time(tmp_path, reports):
     for _ in range(5):
         writer = subprocess.Popen([sys.executable, '-c', WRITER, str(tmp_path)],
                                   stdout=subprocess.PIPE, text=True,
@@ -117,39 +118,39 @@ def test_a_killed_bridge_leaves_a_whole_file_at_every_moment(tmp_path, said):
                 if last == 20:
                     writer.send_signal(signal.SIGKILL)
         writer.wait()
-        found = AuthorityFileStore(str(tmp_path), said.append).load('uav_1')
-        assert found.mode in (last, last + 1)
-        assert found.why == 'x' * (found.mode % 7 * 1000)
-    assert said == []
+        record = AuthorityFileStore(str(tmp_path), reports.append).load('uav_1')
+        assert record.mode in (last, last + 1)
+        assert record.why == 'x' * (record.mode % 7 * 1000)
+    assert reports == []
 
 
 def full_disk(*_):
     raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
 
-def test_a_full_disk_is_reported_once_and_leaves_no_file_that_is_out_of_date(
-        store, said, monkeypatch):
+def test_a_full_disk_is_reported_once_and_leaves_no_outdated_file(
+        store, reports, monkeypatch):
     store.save('uav_1', FULL)
     monkeypatch.setattr(os, 'replace', full_disk)
     for k in range(3):
         store.save('uav_1', replace(FULL, since=float(k)))
         store.save('uav_2', FULL)
-    assert len(said) == 1
-    assert 'authority_uav_1.json: not written: [Errno 28] No space left on device' in said[0]
-    assert 'after a restart of the bridge an airborne vehicle is left to its pilot' in said[0]
+    assert len(reports) == 1
+    assert 'authority_uav_1.json: not written: [Errno 28] No space left on device' in reports[0]
+    assert 'after a restart of the bridge an airborne vehicle is left to its pilot' in reports[0]
     assert list(store.path('x').parent.iterdir()) == []
     monkeypatch.undo()
     store.retry()
     assert (store.load('uav_1').since, store.load('uav_2')) == (2.0, FULL)
-    assert said[1:] == [f'{store.path("x").parent}: written again']
+    assert reports[1:] == [f'{store.path("x").parent}: written again']
     store.retry()
     monkeypatch.setattr(os, 'replace', full_disk)
     store.save('uav_1', AuthorityRecord(AuthorityState.LOST))
-    assert len(said) == 3
+    assert len(reports) == 3
 
 
-def test_a_folder_that_cannot_be_written_to_any_more_is_reported_with_what_stays_there(
-        store, said, monkeypatch):
+def test_a_folder_that_becomes_read_only_is_reported_with_the_outdated_file(
+        store, reports, monkeypatch):
     store.save('uav_1', FULL)
 
     def read_only(*_, **__):
@@ -158,39 +159,39 @@ def test_a_folder_that_cannot_be_written_to_any_more_is_reported_with_what_stays
     monkeypatch.setattr(os, 'replace', read_only)
     monkeypatch.setattr(type(store.path('x')), 'unlink', read_only)
     store.save('uav_1', AuthorityRecord(AuthorityState.LOST))
-    assert len(said) == 1
-    assert 'what it holds is out of date, and it cannot be removed' in said[0]
+    assert len(reports) == 1
+    assert 'what it holds is out of date, and it cannot be removed' in reports[0]
 
 
-def test_one_file_that_cannot_be_written_does_not_hinder_the_others(store, said):
+def test_one_file_that_cannot_be_written_does_not_affect_the_others(store, reports):
     store.path('uav_1').mkdir()
     store.save('uav_1', FULL)
     store.save('uav_2', FULL)
     assert store.load('uav_2') == FULL
-    assert len(said) == 1
+    assert len(reports) == 1
 
 
-def test_a_folder_that_is_removed_meanwhile_ends_nothing(store, said):
+def test_a_folder_that_is_removed_at_run_time_is_reported(store, reports):
     store.path('x').parent.rmdir()
     store.save('uav_1', FULL)
     assert store.load('uav_1') is None
-    assert len(said) == 1
+    assert len(reports) == 1
 
 
-def test_a_folder_that_cannot_be_created_is_refused_at_the_start(tmp_path, said):
+def test_a_folder_that_cannot_be_created_is_refused_at_the_start(tmp_path, reports):
     (tmp_path / 'file').write_text('')
     for folder in (tmp_path / 'file', tmp_path / 'file' / 'below'):
         with pytest.raises(InvalidValue, match=r'state_dir = .*expected a folder that can be w'):
-            AuthorityFileStore(str(folder), said.append)
+            AuthorityFileStore(str(folder), reports.append)
 
 
 def changed(change):
-    """A file whose content is another."""
-    def make(path):
+    """A function that changes the JSON body of a file."""
+    def rewrite(path):
         body = json.loads(path.read_text())
         change(body)
         path.write_text(json.dumps(body))
-    return make
+    return rewrite
 
 
 def set_field(name, value):
@@ -217,17 +218,18 @@ def set_field(name, value):
     (set_field('swap_at', 10**400), 'swap_at = 1000'), (set_field('why', '\ud800'), 'why = '),
     (set_field('commanded', [1, None]), 'commanded = '), (set_field('mode', -1), 'mode = -1'),
 ])
-def test_a_file_that_cannot_be_used_is_reported_and_not_believed(store, said, damage, words):
+def test_a_file_that_cannot_be_used_is_reported_and_ignored(store, reports, damage, words):
     store.save('uav_1', FULL)
     damage(store.path('uav_1'))
     assert store.load('uav_1') is None
-    assert len(said) == 1
-    assert re.search(words, said[0])
-    assert said[0].startswith(str(store.path('uav_1')))
-    assert said[0].endswith('an airborne uav_1 is left to its pilot, unless it flies our mission')
+    assert len(reports) == 1
+    assert re.search(words, reports[0])
+    assert reports[0].startswith(str(store.path('uav_1')))
+    assert reports[0].endswith(
+        'an airborne uav_1 is left to its pilot unless it flies our mission')
 
 
-def test_whatever_a_file_holds_load_returns_a_record_or_none(store, said):
+def test_load_returns_a_record_or_none_for_any_content(store, reports):
     store.save('uav_1', FULL)
     path, rng = store.path('uav_1'), random.Random(11)
     good = path.read_bytes()
@@ -238,13 +240,13 @@ def test_whatever_a_file_holds_load_returns_a_record_or_none(store, said):
             data[at:at + rng.randrange(4)] = rng.choice(
                 (rng.randbytes(2), b'"', b'}', b'null', b'1e999', b'[', b'true', b''))
         path.write_bytes(data)
-        found = store.load('uav_1')
-        if found is not None:
-            assert isinstance(found.state, AuthorityState)
+        record = store.load('uav_1')
+        if record is not None:
+            assert isinstance(record.state, AuthorityState)
             assert all(
                 isinstance(
-                    getattr(found, spec.name),
+                    getattr(record, spec.name),
                     (bool, int, float, str, tuple, AuthorityState, type(None)),
                 )
-                for spec in fields(found)
+                for spec in fields(record)
             )

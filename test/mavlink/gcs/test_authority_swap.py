@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A pilot or a failsafe in the middle of a swap, and a swap that does not end."""
+"""A pilot or a failsafe during a swap (a mission replaced in flight), and a swap that stalls."""
 import pytest
 from authority_bench import (
     ARDUPILOT,
@@ -9,11 +9,11 @@ from authority_bench import (
     L,
     N,
     S,
+    flown_up_by_pilot,
     flying,
-    keeps_quiet,
     lost,
-    risen_by_pilot,
-    shows,
+    sends_no_command,
+    status_is,
 )
 from mission_bench import task_list
 
@@ -25,7 +25,7 @@ MOMENTS = pytest.mark.parametrize('moment', ['holding', 'counting', 'sending', '
 
 
 def swapping(kind, moment, **kwargs):
-    """In flight, a new list on its way, at some moment of that."""
+    """In flight, at some moment of the upload of a new list."""
     bench = flying(kind, delay=(0.1, 0.1), tick=0.1, **kwargs)
     start = len(bench.sent)
     bench.assign(task_list(NEW, 2))
@@ -40,48 +40,48 @@ def swapping(kind, moment, **kwargs):
                'reading': lambda: count('MISSION_REQUEST_INT') >= 5}[moment]
     assert bench.run(reached, 20.0)
     if moment == 'holding':
-        bench.run(limit=0.15)  # the command is there: of two in flight the last one counts
+        bench.run(limit=0.15)  # the command has arrived: of two pending ones the last one counts
     assert bench.authority() is H
     return bench
 
 
 def transfer_ended(bench, start):
-    """Nothing but reading after the news."""
+    """Only reading after the loss."""
     bench.run(limit=20.0)
-    assert {what for _, what, _ in bench.sent[start:]} <= {'read'}
+    assert {action for _, action, _ in bench.sent[start:]} <= {'read'}
     assert bench.vehicles[1].flight.custom_mode != MODES[
         'px4' if bench.executor().profile.atomic else 'ardupilot'].mission
-    assert keeps_quiet(bench, 40.0)
+    assert sends_no_command(bench, 40.0)
 
 
 @BOTH
 @MOMENTS
 @pytest.mark.parametrize('mode', ['stick', 'rtl'])
-def test_a_pilot_in_the_middle_of_a_swap_ends_the_transfer(kind, moment, mode):
+def test_a_pilot_during_a_swap_ends_the_transfer(kind, moment, mode):
     bench = swapping(kind, moment)
     bench.vehicles[1].rc_mode(getattr(MODES[kind], mode))
     assert bench.run(lambda: bench.authority() is L, 3.0)
     transfer_ended(bench, len(bench.sent))
-    assert shows(bench, L, 'not by the bridge')
+    assert status_is(bench, L, 'not by the bridge')
     assert bench.onboard().state is not MissionState.UPLOADING
     assert bench.executor().watch.swap_at is None
 
 
 @BOTH
 @MOMENTS
-def test_a_failsafe_in_the_middle_of_a_swap_ends_the_transfer(kind, moment):
+def test_a_failsafe_during_a_swap_ends_the_transfer(kind, moment):
     bench = swapping(kind, moment)
     bench.vehicles[1].failsafe('battery', MODES[kind].rtl)
     assert bench.run(lambda: bench.authority() is not H, 3.0)
     start = len(bench.sent)
     assert bench.run(lambda: bench.authority() is L, 3.0)
     transfer_ended(bench, start)
-    assert shows(bench, L, 'failsafe: ')
+    assert status_is(bench, L, 'failsafe: ')
 
 
 @BOTH
 @MOMENTS
-def test_a_failsafe_that_leaves_the_mode_stops_the_transfer_and_then_takes_it(kind, moment):
+def test_a_failsafe_that_keeps_the_mode_stops_the_transfer_and_then_is_a_loss(kind, moment):
     bench = swapping(kind, moment)
     bench.vehicles[1].failsafe('radio', None)
     assert bench.run(lambda: bench.authority() is S, 3.0)
@@ -95,7 +95,7 @@ def test_a_failsafe_that_leaves_the_mode_stops_the_transfer_and_then_takes_it(ki
 
 @BOTH
 @pytest.mark.parametrize('moment', ['sending', 'reading'])
-def test_a_failsafe_that_leaves_the_mode_and_passes_lets_the_swap_go_on(kind, moment):
+def test_a_swap_continues_after_a_failsafe_that_kept_the_mode(kind, moment):
     bench = swapping(kind, moment)
     bench.vehicles[1].failsafe('radio', None)
     assert bench.run(lambda: bench.authority() is S, 3.0)
@@ -105,23 +105,23 @@ def test_a_failsafe_that_leaves_the_mode_and_passes_lets_the_swap_go_on(kind, mo
 
 
 @BOTH
-def test_where_it_is_not_ours_nobody_swaps_in_flight(kind):
+def test_without_authority_no_mission_is_replaced_in_flight(kind):
     bench = lost(kind)
     start = len(bench.sent)
     bench.vehicles[1].failsafe('battery', MODES[kind].rtl)
-    assert keeps_quiet(bench)
-    assert {what for _, what, _ in bench.sent[start:]} <= {'read'}
-    bench = risen_by_pilot(kind)
+    assert sends_no_command(bench)
+    assert {action for _, action, _ in bench.sent[start:]} <= {'read'}
+    bench = flown_up_by_pilot(kind)
     start = len(bench.sent)
-    assert keeps_quiet(bench)
-    assert {what for _, what, _ in bench.sent[start:]} <= {'read'}
+    assert sends_no_command(bench)
+    assert {action for _, action, _ in bench.sent[start:]} <= {'read'}
     assert bench.authority() is N
 
 
 # a good link, at most 30 s
 
 @BOTH
-def test_in_flight_a_swap_begins_only_on_a_link_that_was_good_for_ten_seconds(kind):
+def test_in_flight_a_swap_begins_only_after_ten_seconds_of_good_link(kind):
     bench = flying(kind)
     bench.line.cut = True
     bench.run(limit=2.6)  # not stale
@@ -130,16 +130,16 @@ def test_in_flight_a_swap_begins_only_on_a_link_that_was_good_for_ten_seconds(ki
     assert bench.authority() is H
     start, since = len(bench.sent), bench.now
     bench.assign(task_list('ZYX', 2))
-    assert bench.run(lambda: any(w != 'read' for _, w, _ in bench.sent[start:]), 20.0)
+    assert bench.run(lambda: any(action != 'read' for _, action, _ in bench.sent[start:]), 20.0)
     assert bench.now - since > 9.0
     assert bench.run(lambda: bench.completed()[-3:] == ['Z', 'Y', 'X'], 200.0)
 
 
-def stuck(**kwargs):
-    """Held for an upload of which no item arrives."""
+def stalled_swap(**kwargs):
+    """Held for an upload whose items are all lost."""
     bench = flying('ardupilot', **kwargs)
     bench.run(limit=4.0)
-    bench.line.tampers.append(lambda way, m, now: [] if way == 'up' and (
+    bench.line.tampers.append(lambda direction, m, now: [] if direction == 'up' and (
         m.get_type() == 'MISSION_ITEM_INT') else None)
     start = len(bench.sent)
     bench.assign(task_list(NEW, 2))
@@ -147,8 +147,8 @@ def stuck(**kwargs):
     return bench, start, bench.now
 
 
-def test_held_for_30_seconds_it_returns_where_the_way_is_clear():
-    bench, start, since = stuck()
+def test_held_for_30_seconds_it_returns_when_the_return_path_is_clear():
+    bench, start, since = stalled_swap()
     assert bench.run(lambda: bench.vehicles[1].flight.custom_mode == 6, 60.0)
     assert 29.0 < bench.now - since < 45.0
     assert bench.modes(start) == [4, 6]
@@ -156,20 +156,20 @@ def test_held_for_30_seconds_it_returns_where_the_way_is_clear():
     assert bench.authority() is H
     bench.run(lambda: not bench.vehicles[1].flight.armed, 100.0)
     bench.run(limit=3.0)
-    assert shows(bench, N)
+    assert status_is(bench, N)
 
 
-def test_held_for_30_seconds_with_a_zone_on_the_way_home_it_stays_and_gives_an_alarm():
+def test_held_for_30_seconds_with_a_zone_on_the_return_path_it_stays_with_an_alarm():
     zone = ThreatZone('Z1', Shape.CYLINDER, (0.0, 20.0, 0.0), 5.0)
-    bench, start, since = stuck()
-    bench.wants(zones=(zone,))
+    bench, start, since = stalled_swap()
+    bench.set_policy(zones=(zone,))
     bench.run(lambda: bench.executor().alarm, 60.0)
     assert 29.0 < bench.now - since < 45.0
     bench.run(limit=60.0)
     assert 6 not in bench.modes(start)
     assert bench.vehicles[1].flight.custom_mode == 4
     assert bench.state().reason == ('held for an upload that does not end, and zone Z1 is on its '
-                                    'way home: stays')
+                                    'path home: stays')
     assert not bench.state().available
     bench.line.tampers.clear()
     assert bench.run(lambda: bench.completed() == list(NEW), 400.0)
@@ -178,8 +178,8 @@ def test_held_for_30_seconds_with_a_zone_on_the_way_home_it_stays_and_gives_an_a
 
 @ARDUPILOT
 @pytest.mark.parametrize('seconds', [5.0, 40.0])
-def test_a_pilot_who_takes_it_from_a_swap_that_is_stuck_keeps_it(kind, seconds):
-    bench, _, _ = stuck()
+def test_a_pilot_who_takes_over_during_a_stalled_swap_keeps_control(kind, seconds):
+    bench, _, _ = stalled_swap()
     bench.run(limit=seconds)
     bench.vehicles[1].rc_mode(5)
     assert bench.run(lambda: bench.authority() is L, 3.0)

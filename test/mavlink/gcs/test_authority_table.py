@@ -1,12 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The table of authority by itself: each cell, suspensions, kills, holds, and what may be sent."""
+"""The state machine of authority: each cell, suspensions, kills, holds, and what may be sent."""
 import itertools
 
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as d
 
-from uav_task_alloc.mavlink.gcs import authority
 from uav_task_alloc.mavlink.gcs.authority import (
+    _ENDS,
+    _GIVEN_BACK_BY,
+    _SUSPENDS,
     AUTHORITY_TABLE,
     PERMISSIONS,
     Authority,
@@ -27,7 +29,7 @@ N, H, S, L = (
     AuthorityState.SUSPENDED,
     AuthorityState.LOST,
 )
-# event -> what HELD, SUSPENDED, LOST and NONE become, by shared/authority.md, written down again
+# event -> the next state for HELD, SUSPENDED, LOST and NONE, independent of the code
 CELLS = {
     E.GRANTED: (H, S, L, H), E.WITHDRAWN_IN_AIR: (H, S, L, N), E.WITHDRAWN: (N, S, L, N),
     E.OWN: (H, L, L, N), E.OWN_LANDING: (N, L, L, N), E.MISSION_ENDED: (H, L, L, N),
@@ -46,52 +48,52 @@ ENDS = {E.AVOIDED: E.AVOIDING, E.FAILSAFE_OVER: E.FAILSAFE_STAYS, E.LINK_BACK: E
         E.FOREIGN_OVER: E.FOREIGN, E.EXPLAINED: E.UNEXPLAINED}
 
 
-def machine(state, event=None):
+def authority_in(state, event=None):
     """In a state; SUSPENDED by what `event` ends, else by the link."""
-    made = Authority(0.0, AuthorityRecord(L if state is S else state))
+    authority = Authority(0.0, AuthorityRecord(L if state is S else state))
     if state is H:
-        made.apply(E.RESTART_AGREES, 0.0)
+        authority.apply(E.RESTART_AGREES, 0.0)
     elif state is S:
-        made.apply(E.HAND_OVER, 0.0)
-        made.hold = HoldStage.NO
-        made.apply(ENDS.get(event, E.LINK_STALE), 0.0)
-    assert made.state is state
-    return made
+        authority.apply(E.HAND_OVER, 0.0)
+        authority.hold = HoldStage.NO
+        authority.apply(ENDS.get(event, E.LINK_STALE), 0.0)
+    assert authority.state is state
+    return authority
 
 
 def suspended(*events):
-    made = machine(H)
+    authority = authority_in(H)
     for event in events:
-        made.apply(event, 1.0, event.name)
-    assert made.state is S
-    return made
+        authority.apply(event, 1.0, event.name)
+    assert authority.state is S
+    return authority
 
 
 @pytest.mark.parametrize('event', AuthorityEvent)
 @pytest.mark.parametrize('column', range(4))
-def test_each_event_makes_of_each_state_what_the_table_says(event, column):
-    made = machine((H, S, L, N)[column], event)
-    before = made.state, made.why, made.since, made.hold
-    made.suspensions.pop(Suspension.RESTART, None)
-    if event is E.RESTART_AGREES and made.state is S:
-        made = Authority(0.0, AuthorityRecord(H))
-    changed = made.apply(event, 5.0, 'because')
-    assert made.state is CELLS[event][column]
-    assert made.held is (made.state is H)
-    if made.state is before[0]:
-        assert made.since == 0.0
+def test_each_event_leads_from_each_state_to_the_next_state_of_the_table(event, column):
+    authority = authority_in((H, S, L, N)[column], event)
+    before = authority.state, authority.why, authority.since, authority.hold
+    authority.suspensions.pop(Suspension.RESTART, None)
+    if event is E.RESTART_AGREES and authority.state is S:
+        authority = Authority(0.0, AuthorityRecord(H))
+    changed = authority.apply(event, 5.0, 'because')
+    assert authority.state is CELLS[event][column]
+    assert authority.held is (authority.state is H)
+    if authority.state is before[0]:
+        assert authority.since == 0.0
     else:
         assert changed
-        assert (made.why, made.since) == ('because', 5.0)
+        assert (authority.why, authority.since) == ('because', 5.0)
     if AUTHORITY_TABLE[event].next_state(before[0]) is None:
         assert not changed
-        assert (made.state, made.why, made.since, made.hold) == before
+        assert (authority.state, authority.why, authority.since, authority.hold) == before
 
 
 def test_the_table_has_a_row_for_each_event_and_each_suspension_has_an_end():
     assert set(AUTHORITY_TABLE) == set(AuthorityEvent) == set(CELLS)
-    assert set(authority._SUSPENDS.values()) == set(Suspension) - {Suspension.RESTART}
-    assert set(authority._ENDS.values()) == set(Suspension) == set(authority._GIVEN_BACK_BY)
+    assert set(_SUSPENDS.values()) == set(Suspension) - {Suspension.RESTART}
+    assert set(_ENDS.values()) == set(Suspension) == set(_GIVEN_BACK_BY)
 
 
 PAIRS = [(a, b) for a, b in itertools.permutations(ENDS.items(), 2)
@@ -101,120 +103,120 @@ PAIRS = [(a, b) for a, b in itertools.permutations(ENDS.items(), 2)
 @pytest.mark.parametrize(('first', 'second'), PAIRS,
                          ids=[f'{a[1].name}-{b[1].name}' for a, b in PAIRS])
 def test_suspended_for_two_causes_it_is_held_again_only_after_the_end_of_both(first, second):
-    made = suspended(first[1], second[1])
-    words = [authority._GIVEN_BACK_BY[authority._SUSPENDS[each]] for each in (first[1], second[1])]
-    assert made.why == f'{first[1].name}; {second[1].name}'
-    assert made.given_back_by == ' and '.join(words)
-    made.apply(first[0], 2.0)
-    assert made.state is S
-    assert (made.why, made.given_back_by) == (second[1].name, words[1])
-    made.apply(first[0], 3.0)
-    assert made.state is S
-    made.apply(second[0], 4.0)
-    assert made.state is H
-    assert made.suspensions == {}
-    assert made.given_back_by == ''
+    authority = suspended(first[1], second[1])
+    words = [_GIVEN_BACK_BY[_SUSPENDS[each]] for each in (first[1], second[1])]
+    assert authority.why == f'{first[1].name}; {second[1].name}'
+    assert authority.given_back_by == ' and '.join(words)
+    authority.apply(first[0], 2.0)
+    assert authority.state is S
+    assert (authority.why, authority.given_back_by) == (second[1].name, words[1])
+    authority.apply(first[0], 3.0)
+    assert authority.state is S
+    authority.apply(second[0], 4.0)
+    assert authority.state is H
+    assert authority.suspensions == {}
+    assert authority.given_back_by == ''
 
 
 def test_the_same_suspension_twice_needs_one_end():
-    made = suspended(E.LINK_STALE, E.LINK_STALE, E.NEW_ADDRESS)
-    assert made.suspended_by(Suspension.LINK)
-    made.apply(E.LINK_BACK, 2.0)
-    assert made.held
+    authority = suspended(E.LINK_STALE, E.LINK_STALE, E.NEW_ADDRESS)
+    assert authority.suspended_by(Suspension.LINK)
+    authority.apply(E.LINK_BACK, 2.0)
+    assert authority.held
 
 
-def test_what_is_lost_while_suspended_does_not_come_back_with_the_end_of_the_suspension():
+def test_a_loss_while_suspended_outlasts_the_suspension():
     for ends, begins in ENDS.items():
-        made = suspended(begins)
-        made.apply(E.TAKEN, 2.0)
-        made.apply(ends, 3.0)
-        assert made.state is L
-        assert made.suspensions == {}
+        authority = suspended(begins)
+        authority.apply(E.TAKEN, 2.0)
+        authority.apply(ends, 3.0)
+        assert authority.state is L
+        assert authority.suspensions == {}
 
 
 def test_a_mission_mode_set_by_a_pilot_ends_every_suspension_but_a_foreign_mission():
-    made = suspended(E.AVOIDING, E.FAILSAFE_STAYS)
-    made.apply(E.TO_MISSION, 2.0)
-    assert made.held
-    made = suspended(E.AVOIDING, E.FOREIGN)
-    made.apply(E.TO_MISSION, 2.0)
-    assert set(made.suspensions) == {Suspension.FOREIGN}
-    assert made.state is S
+    authority = suspended(E.AVOIDING, E.FAILSAFE_STAYS)
+    authority.apply(E.TO_MISSION, 2.0)
+    assert authority.held
+    authority = suspended(E.AVOIDING, E.FOREIGN)
+    authority.apply(E.TO_MISSION, 2.0)
+    assert set(authority.suspensions) == {Suspension.FOREIGN}
+    assert authority.state is S
 
 
 @pytest.mark.parametrize('state', [H, S, L, N])
-def test_after_a_kill_nothing_but_a_hand_over_gives_it_back(state):
-    made = machine(state)
-    assert made.apply(E.KILLED, 1.0, 'killed')
-    assert not made.apply(E.KILLED, 2.0, 'killed again')
+def test_after_a_kill_only_a_hand_over_leads_to_held(state):
+    authority = authority_in(state)
+    assert authority.apply(E.KILLED, 1.0, 'killed')
+    assert not authority.apply(E.KILLED, 2.0, 'killed again')
     for event in AuthorityEvent:
         if event is not E.HAND_OVER:
-            made.apply(event, 3.0)
-            assert (made.state, made.killed, made.why) == (L, True, 'killed')
-    assert made.given_back_by == '~/hand_over, on the ground and disarmed'
-    assert made.apply(E.HAND_OVER, 4.0)
-    assert (made.held, made.killed) == (True, False)
+            authority.apply(event, 3.0)
+            assert (authority.state, authority.killed, authority.why) == (L, True, 'killed')
+    assert authority.given_back_by == '~/hand_over, on the ground and disarmed'
+    assert authority.apply(E.HAND_OVER, 4.0)
+    assert (authority.held, authority.killed) == (True, False)
 
 
-def test_a_kill_is_kept_over_a_restart():
-    made = Authority(0.0, AuthorityRecord(L, 'killed', killed=True))
-    assert not made.apply(E.TO_MISSION, 1.0)
-    assert made.state is L
+def test_a_kill_persists_over_a_restart():
+    authority = Authority(0.0, AuthorityRecord(L, 'killed', killed=True))
+    assert not authority.apply(E.TO_MISSION, 1.0)
+    assert authority.state is L
 
 
 @pytest.mark.parametrize('state', [H, L, N])
 @pytest.mark.parametrize(('event', 'hold'), [
     (E.HAND_OVER, HoldStage.FIRST), (E.STICK_TO_HOLD, HoldStage.FIRST),
     (E.TO_MISSION, HoldStage.UNLESS_VERIFIED)])
-def test_who_gets_it_in_flight_holds_first(state, event, hold):
-    made = machine(state)
-    made.apply(event, 1.0)
+def test_a_hand_over_in_flight_holds_first(state, event, hold):
+    authority = authority_in(state)
+    authority.apply(event, 1.0)
     due = HoldStage.NO if AUTHORITY_TABLE[event].next_state(state) is None else hold
-    assert made.hold is due
-    made.apply(E.LINK_STALE, 2.0)
-    assert made.hold is (
+    assert authority.hold is due
+    authority.apply(E.LINK_STALE, 2.0)
+    assert authority.hold is (
         HoldStage.NO if AUTHORITY_TABLE[event].next_state(state) is None else hold
     )  # it is still due
-    made.apply(E.TAKEN, 3.0)
-    assert made.hold is HoldStage.NO
+    authority.apply(E.TAKEN, 3.0)
+    assert authority.hold is HoldStage.NO
 
 
 def test_a_grant_on_the_ground_needs_no_hold():
-    made = machine(N)
-    made.apply(E.GRANTED, 1.0)
-    assert made.hold is HoldStage.NO
+    authority = authority_in(N)
+    authority.apply(E.GRANTED, 1.0)
+    assert authority.hold is HoldStage.NO
 
 
-def test_after_a_landing_of_ours_it_is_given_back_by_a_hand_over_only():
-    made = machine(H)
-    made.apply(E.OWN_LANDING, 1.0)
-    assert (made.state, made.landed, made.given_back_by) == (N, True, '~/hand_over')
-    made.apply(E.HAND_OVER, 2.0)
-    assert not made.landed
-    made.apply(E.WITHDRAWN, 3.0)
-    assert not made.landed
-    assert made.given_back_by.startswith('takeoff: true on the ground, ')
+def test_after_our_own_landing_only_a_hand_over_leads_to_held():
+    authority = authority_in(H)
+    authority.apply(E.OWN_LANDING, 1.0)
+    assert (authority.state, authority.landed, authority.given_back_by) == (N, True, '~/hand_over')
+    authority.apply(E.HAND_OVER, 2.0)
+    assert not authority.landed
+    authority.apply(E.WITHDRAWN, 3.0)
+    assert not authority.landed
+    assert authority.given_back_by.startswith('takeoff: true on the ground, ')
 
 
-def test_takeoff_withdrawn_in_the_air_counts_until_it_is_taken_or_lands():
+def test_takeoff_withdrawn_in_the_air_lasts_until_a_loss_or_the_landing():
     for event in (E.OWN_LANDING, E.TAKEN):
-        made = machine(H)
-        made.apply(E.WITHDRAWN_IN_AIR, 1.0)
-        assert made.until_landing
-        made.apply(E.LINK_STALE, 2.0)
-        made.apply(E.LINK_BACK, 3.0)
-        assert made.until_landing
-        made.apply(event, 4.0)
-        assert not made.until_landing
+        authority = authority_in(H)
+        authority.apply(E.WITHDRAWN_IN_AIR, 1.0)
+        assert authority.until_landing
+        authority.apply(E.LINK_STALE, 2.0)
+        authority.apply(E.LINK_BACK, 3.0)
+        assert authority.until_landing
+        authority.apply(event, 4.0)
+        assert not authority.until_landing
 
 
-def test_a_restarted_bridge_has_nothing_until_the_vehicle_is_seen_to_agree():
+def test_after_a_restart_nothing_may_be_sent_until_a_heartbeat_agrees():
     for state in (H, S):
-        made = Authority(0.0, AuthorityRecord(state, 'before'))
-        assert (made.state, made.why) == (S, 'before')
-        assert not any(made.allows(action) for action in SendAction)
-        made.apply(E.RESTART_AGREES, 1.0)
-        assert made.held
+        authority = Authority(0.0, AuthorityRecord(state, 'before'))
+        assert (authority.state, authority.why) == (S, 'before')
+        assert not any(authority.allows(action) for action in SendAction)
+        authority.apply(E.RESTART_AGREES, 1.0)
+        assert authority.held
     for state in (L, N):
         assert Authority(0.0, AuthorityRecord(state)).state is state
 
@@ -230,21 +232,21 @@ SENT = {
 
 
 @pytest.mark.parametrize('state', [N, H, S, L])
-def test_each_state_allows_what_the_table_says(state):
-    made = machine(state)
-    assert {action for action in SendAction if made.allows(action)} == SENT[state] == set(
+def test_each_state_allows_the_actions_of_the_table(state):
+    authority = authority_in(state)
+    assert {action for action in SendAction if authority.allows(action)} == SENT[state] == set(
         PERMISSIONS[state][1])
 
 
-def test_while_it_is_not_known_who_has_it_and_beside_a_foreign_mission_only_reading_is_allowed():
-    made = machine(N)
-    made.undecided = True
-    assert [action for action in SendAction if made.allows(action)] == [SendAction.READ]
-    assert not made.held
-    made = suspended(E.FOREIGN)  # else nobody would see its end
-    assert [action for action in SendAction if made.allows(action)] == [SendAction.READ]
-    made.apply(E.LINK_STALE, 2.0)
-    assert not any(made.allows(action) for action in SendAction)
+def test_while_undecided_or_with_a_foreign_mission_only_reading_is_allowed():
+    authority = authority_in(N)
+    authority.undecided = True
+    assert [action for action in SendAction if authority.allows(action)] == [SendAction.READ]
+    assert not authority.held
+    authority = suspended(E.FOREIGN)  # else its end would not be detected
+    assert [action for action in SendAction if authority.allows(action)] == [SendAction.READ]
+    authority.apply(E.LINK_STALE, 2.0)
+    assert not any(authority.allows(action) for action in SendAction)
 
 
 def command(number, *params):
@@ -264,7 +266,7 @@ KNOWN_COMMANDS = ('DO_SET_MODE', 'COMPONENT_ARM_DISARM', 'NAV_TAKEOFF', 'DO_SET_
                   'DO_FLIGHTTERMINATION', 'NAV_LAND')
 
 
-def test_each_message_kind_counts_as_reading_uploading_or_else_as_a_command():
+def test_each_message_type_is_a_read_an_upload_or_a_command():
     assert {action_of(m) for m in READS} == {SendAction.READ}
     assert {action_of(m) for m in UPLOADS} == {SendAction.UPLOAD}
     for name in KNOWN_COMMANDS:
@@ -278,20 +280,20 @@ def test_each_message_kind_counts_as_reading_uploading_or_else_as_a_command():
 
 
 class Watch:
-    """Notes what it is told of."""
+    """Stores the commands that it is to record."""
 
-    def __init__(self, made):
-        self.authority, self.commands = made, []
+    def __init__(self, authority):
+        self.authority, self.commands = authority, []
 
     def record_command(self, message, now):
         self.commands.append(message)
 
 
 @pytest.mark.parametrize('state', [N, H, S, L])
-def test_the_gate_lets_pass_what_the_state_allows_in_order_and_records_commands(state):
+def test_the_gate_keeps_the_order_of_allowed_messages_and_records_commands(state):
     commands = [command(getattr(d, 'MAV_CMD_' + name)) for name in KNOWN_COMMANDS]
     commands.append(d.MAVLink_mission_set_current_message(1, 1, 2))
-    watch = Watch(machine(state))
+    watch = Watch(authority_in(state))
     out = allowed_messages([*commands, *UPLOADS, *READS], watch, 1.0)
     assert out == [*(commands if SendAction.COMMAND in SENT[state] else []),
                    *(UPLOADS if SendAction.UPLOAD in SENT[state] else []),
@@ -299,9 +301,9 @@ def test_the_gate_lets_pass_what_the_state_allows_in_order_and_records_commands(
     assert watch.commands == (commands if state is H else [])
 
 
-# the drawn table
+# the generated table
 
-def test_the_drawn_table_has_each_state_each_event_and_each_cell():
+def test_the_generated_table_has_each_state_each_event_and_each_cell():
     lines = table_text().splitlines()
     for state in (N, H, S, L):
         assert sum(line.startswith(f'| {state.name} |') for line in lines) == 1

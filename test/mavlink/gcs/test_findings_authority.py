@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Findings 1-3, 14, 15, 19, 25: nobody is fought, and nothing is commanded blindly."""
+"""Findings 1-3, 14, 15, 19, 25: no command against a pilot, and none without knowing the state."""
 import dataclasses
 
 import pytest
@@ -22,7 +22,7 @@ from pymavlink.dialects.v20 import ardupilotmega as d
 from uav_task_alloc.model import Shape, ThreatZone
 
 AROUND_HOME = ThreatZone('Z', Shape.CYLINDER, (0.0, 10.0, 0.0), 30.0)
-MOMENTS = ['start', 'upload', 'verified', 'readback', 'last task', 'way home']
+MOMENTS = ['start', 'upload', 'verified', 'readback', 'last task', 'return path']
 WHILE = {'ardupilot': ['RTL', 'LOITER', 'BRAKE', 'PAUSE'], 'px4': ['RTL', 'LOITER', 'PAUSE']}
 
 
@@ -38,7 +38,7 @@ def climbing(kind):
 @pytest.mark.parametrize('moment', ['climb', 'mission'])
 @pytest.mark.parametrize('who', ['station', 'pilot', 'failsafe'])
 @pytest.mark.parametrize('mode', ['LAND', 'RTL'])
-def test_finding_01_who_was_landed_by_another_stays_on_the_ground(kind, moment, who, mode):
+def test_finding_01_a_vehicle_landed_by_somebody_else_stays_on_the_ground(kind, moment, who, mode):
     bench = climbing(kind) if moment == 'climb' else flying(kind)
     take(bench, mode, who)
     assert bench.run(lambda: not bench.vehicles[1].flight.armed, 200.0)
@@ -53,7 +53,7 @@ def test_finding_01_who_was_landed_by_another_stays_on_the_ground(kind, moment, 
 
 
 def at(moment, kind):
-    """A vehicle in flight at a moment at which its mode was set again."""
+    """A vehicle in flight at a moment at which the bridge used to set its mode again."""
     if moment == 'start':
         bench = flying(kind)  # no heartbeat has shown the mission mode
     elif moment == 'upload':
@@ -83,7 +83,7 @@ def at(moment, kind):
 
 @pytest.mark.parametrize(('kind', 'mode'), [(k, m) for k, modes in WHILE.items() for m in modes])
 @pytest.mark.parametrize('moment', MOMENTS)
-def test_finding_02_a_mode_that_another_has_set_stays(kind, moment, mode):
+def test_finding_02_a_mode_that_somebody_else_has_set_stays(kind, moment, mode):
     bench = at(moment, kind)
     if bench.vehicles[1].flight.custom_mode == MODES[kind][mode]:
         mode = 'LAND'  # PX4 is in its return mode already, the copter is held for a swap
@@ -93,14 +93,14 @@ def test_finding_02_a_mode_that_another_has_set_stays(kind, moment, mode):
 
 
 @BOTH
-def test_a_heartbeat_with_the_mode_before_a_change_of_ours_is_no_pilot(kind):
+def test_a_heartbeat_with_the_mode_before_our_own_change_is_no_loss(kind):
     bench = FindingsBench(kind).discover()
     late = []
 
-    def tamper(way, m, now):
-        if way == 'down' and m.get_type() == 'HEARTBEAT' and (
+    def tamper(direction, m, now):
+        if direction == 'down' and m.get_type() == 'HEARTBEAT' and (
                 bench.started() and m.custom_mode == MODES[kind]['AUTO'] and not late):
-            late.append(now)  # PX4 answers a moment before it tells its new mode
+            late.append(now)  # PX4 acknowledges a moment before its heartbeat shows the new mode
             m.custom_mode = MODES[kind]['PAUSE']
         return None
     bench.line.tampers.append(tamper)
@@ -112,7 +112,7 @@ def test_a_heartbeat_with_the_mode_before_a_change_of_ours_is_no_pilot(kind):
 
 
 class Rerouted:
-    """A ground station that hears the vehicle from a new address."""
+    """A ground station that receives the vehicle's messages from a new address."""
 
     def __init__(self, ground):
         self._ground, self.sessions = ground, ground.sessions
@@ -133,7 +133,7 @@ class Rerouted:
 @BOTH
 @pytest.mark.parametrize('mode', ['PAUSE', 'LOITER'])
 @pytest.mark.parametrize('after', ['new address', 'restart', 'restart without a file'])
-def test_finding_03_a_pause_of_the_pilot_is_not_forgotten(kind, mode, after):
+def test_finding_03_a_pause_by_the_pilot_persists(kind, mode, after):
     bench = flying(kind, 'ABC')
     bench.run(limit=2.0)
     take(bench, mode)
@@ -155,7 +155,7 @@ def test_finding_03_a_pause_of_the_pilot_is_not_forgotten(kind, mode, after):
 
 @BOTH
 @pytest.mark.parametrize('change', ['takeoff', 'list'])
-def test_finding_14_arming_ends_when_it_is_not_wanted_any_more(kind, change):
+def test_finding_14_arming_retries_end_when_it_is_not_wanted_any_more(kind, change):
     bench = FindingsBench(kind).discover()
     bench.vehicles[1].flight.arming_fault = 'Gyros inconsistent'
     bench.assign(task_list('AB'))
@@ -173,7 +173,7 @@ def test_finding_14_arming_ends_when_it_is_not_wanted_any_more(kind, change):
 
 @BOTH
 @pytest.mark.parametrize('change', ['takeoff', 'list'])
-def test_what_is_armed_in_the_moment_it_is_withdrawn_does_not_take_off(kind, change):
+def test_a_vehicle_armed_while_takeoff_is_withdrawn_does_not_take_off(kind, change):
     bench = FindingsBench(kind, delay=(0.3, 0.3)).discover()
     bench.assign(task_list('AB'))
     assert bench.run(lambda: arms(bench), 30.0)
@@ -188,7 +188,7 @@ def test_what_is_armed_in_the_moment_it_is_withdrawn_does_not_take_off(kind, cha
 
 
 @BOTH
-def test_finding_15_an_answer_to_another_station_is_not_taken(kind):
+def test_finding_15_an_acknowledgement_to_another_station_is_ignored(kind):
     bench = FindingsBench(kind).discover()
     swallow(bench, 'up', 'COMMAND_LONG',
             lambda m: m.command == d.MAV_CMD_COMPONENT_ARM_DISARM and len(arms(bench)) < 9)
@@ -204,7 +204,7 @@ def test_finding_15_an_answer_to_another_station_is_not_taken(kind):
 
 
 @BOTH
-def test_finding_19_no_way_home_is_flown_into_a_zone_over_home(kind):
+def test_finding_19_no_return_path_is_flown_into_a_zone_over_home(kind):
     bench = FindingsBench(kind).discover()
     bench.assign(task_list('AB', returns=True))
     assert bench.run(lambda: bench.started() == ['A'])
@@ -215,7 +215,7 @@ def test_finding_19_no_way_home_is_flown_into_a_zone_over_home(kind):
     x, y, z = bench.vehicles[1].flight.body.position
     assert (round(x, -1), round(y, -1), round(z, -1)) == (100.0, 100.0, 50.0)
     assert MODES[kind]['RTL'] not in [e.mode for e in bench.truth[1]]
-    assert bench.noted('a way home', 'zone Z')
+    assert bench.noted('a path home', 'zone Z')
 
 
 @BOTH
@@ -229,11 +229,11 @@ def test_finding_19_an_empty_list_that_returns_holds_outside_the_zone(kind, when
     bench.run(limit=40.0)
     assert MODES[kind]['RTL'] not in [e.mode for e in bench.truth[1]]
     assert bench.vehicles[1].flight.body.position[2] > 40.0
-    assert bench.noted('a way home', 'zone Z')
+    assert bench.noted('a path home', 'zone Z')
 
 
 @BOTH
-def test_finding_19_on_the_ground_in_a_zone_nothing_starts(kind):
+def test_finding_19_on_the_ground_in_a_zone_nothing_takes_off(kind):
     bench = FindingsBench(kind, zones=(AROUND_HOME,)).discover()
     bench.assign(task_list('AB'))
     bench.run(limit=60.0)

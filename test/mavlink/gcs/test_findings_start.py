@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Findings 9, 18, 26-28, 30: from power-on to the first flight, and what people read of it."""
+"""Findings 9, 18, 26-28, 30: from power-on to the first flight, and its texts for the operator."""
 import itertools
 import math
 import re
@@ -30,15 +30,15 @@ def powered_on(kind, **kwargs):
 
 
 def line_of(bench):
-    """What diagnostics say."""
+    """The status line of the diagnostics."""
     return facts_of(bench.ground_station.sessions[1], bench.now)[1]
 
 
-# 9: retries without an end
+# 9: unlimited retries
 
 
 @BOTH
-def test_finding_09_after_many_failures_it_is_not_available_and_tries_on(kind):
+def test_finding_09_after_many_failures_it_is_not_available_and_retries(kind):
     bench = FindingsBench(kind).discover()
     broken = [True]
     swallow(bench, 'up', 'MISSION_ITEM_INT', lambda m: broken[0] and m.seq == 2)
@@ -72,7 +72,7 @@ def test_finding_18_of_two_batteries_the_one_with_least_remaining_decides(kind):
 
 
 @BOTH
-def test_finding_18_a_reading_that_wavers_changes_nothing(kind):
+def test_finding_18_a_fluctuating_reading_changes_nothing(kind):
     bench = FindingsBench(kind, takeoff=False).discover()
     swallow(bench, 'down', 'SYS_STATUS', lambda m: True)
     swallow(bench, 'down', 'BATTERY_STATUS', lambda m: True)
@@ -89,7 +89,7 @@ def battery(number, percent):
         number, 0, 0, 32767, [65535] * 10, -1, -1, -1, percent)
 
 
-def test_a_battery_that_is_silent_does_not_decide_any_more():
+def test_a_battery_without_messages_no_longer_decides():
     bench = FindingsBench('px4', takeoff=False, configs={1: {'batteries': 2}}).discover()
     bench.run(limit=5.0)
     assert bench.state().battery == pytest.approx(0.7)
@@ -101,7 +101,7 @@ def test_a_battery_that_is_silent_does_not_decide_any_more():
 # 26: the mission store of a vehicle that boots
 
 
-def test_finding_26_a_list_that_is_there_at_power_on_is_flown_as_a_whole():
+def test_finding_26_a_list_assigned_at_power_on_is_flown_completely():
     bench = powered_on('ardupilot')
     bench.assign(task_list('ABCDE'))
     assert bench.run(lambda: len(bench.completed()) == 5)
@@ -123,12 +123,12 @@ def test_finding_26_nothing_is_uploaded_before_the_boot_has_ended(kind, names):
 
 @BOTH
 @pytest.mark.parametrize('names', ['A', 'ABCDE'])
-def test_finding_26_a_store_without_any_space_is_not_final(kind, names):
+def test_finding_26_a_mission_store_without_space_during_boot_is_retried(kind, names):
     bench = FindingsBench(kind).discover()
     closed = [True]
 
-    def refuse(way, message, now):
-        if way == 'up' and message.get_type() == 'MISSION_COUNT' and closed[0]:
+    def refuse(direction, message, now):
+        if direction == 'up' and message.get_type() == 'MISSION_COUNT' and closed[0]:
             bench.from_vehicle(d.MAVLink_statustext_message(4, b'Only 0 items are supported'))
             bench.from_vehicle(d.MAVLink_mission_ack_message(245, 190, d.MAV_MISSION_NO_SPACE, 0))
             return []
@@ -144,7 +144,7 @@ def test_finding_26_a_store_without_any_space_is_not_final(kind, names):
 
 
 @BOTH
-def test_finding_26_a_horizon_grows_again_where_there_is_space(kind):
+def test_finding_26_a_horizon_grows_again_when_there_is_space(kind):
     bench = FindingsBench(kind, configs={1: {'capacity': 5}}).discover()
     bench.assign(task_list('ABCDEFGHIJ'))
     assert bench.run(lambda: bench.completed() == ['A'])
@@ -157,7 +157,7 @@ def test_finding_26_a_horizon_grows_again_where_there_is_space(kind):
     assert bench.failed() == []
 
 
-# 27: positions that are none
+# 27: invalid positions
 
 
 @BOTH
@@ -165,7 +165,7 @@ def test_finding_27_before_there_is_a_position_the_vehicle_is_not_available(kind
     bench = powered_on(kind)
     booted = []
 
-    def looked():
+    def checked():
         state, flight = bench.state(), bench.vehicles[1].flight
         if not flight.positioned:
             assert not state.available
@@ -173,14 +173,14 @@ def test_finding_27_before_there_is_a_position_the_vehicle_is_not_available(kind
         if not flight.boot.booting and not flight.positioned:
             booted.append(state.reason)
         return state.available
-    assert bench.run(looked, 90.0)
+    assert bench.run(checked, 90.0)
     assert booted[-1] == 'no position yet'
     assert math.dist(bench.state().position, bench.vehicles[1].flight.body.position) < 60.0
 
 
 @BOTH
 @pytest.mark.parametrize('lost', ['', 'GPS_RAW_INT', 'estimator'])
-def test_finding_27_a_position_that_nobody_vouches_for_is_no_state(kind, lost):
+def test_finding_27_a_position_without_a_fix_or_estimator_is_not_published(kind, lost):
     bench = FindingsBench(kind, takeoff=False).discover()
     bench.run(limit=5.0)
     assert bench.state().available
@@ -200,7 +200,7 @@ def test_finding_27_a_position_that_nobody_vouches_for_is_no_state(kind, lost):
 
 
 @BOTH
-def test_finding_27_a_vehicle_that_is_restarted_has_no_position(kind):
+def test_finding_27_a_rebooted_vehicle_has_no_position(kind):
     bench = FindingsBench(kind, takeoff=False, configs={1: {
         'arming_delay': 20.0, 'boot_delay': 4.0}}).discover()
     assert bench.run(lambda: bench.state().available, 40.0)
@@ -216,7 +216,7 @@ def test_finding_27_a_vehicle_that_is_restarted_has_no_position(kind):
 @BOTH
 @pytest.mark.parametrize('seconds', [1.0, 6.0, 30.0])
 @pytest.mark.parametrize('before', [60.0, 20.0, 5.0])
-def test_a_position_that_jumps_in_flight_costs_no_task(kind, seconds, before):
+def test_a_position_that_jumps_in_flight_loses_no_task(kind, seconds, before):
     bench = flying(kind, 'ABC')
     assert bench.run(lambda: distance(bench, (100.0, 100.0, 50.0)) < before)
     bench.vehicles[1].glitch((300.0, 0.0, 0.0), seconds)
@@ -227,7 +227,7 @@ def test_a_position_that_jumps_in_flight_costs_no_task(kind, seconds, before):
 
 
 @BOTH
-def test_finding_28_a_refused_arming_says_why_once_and_how_long_it_was_tried(kind):
+def test_finding_28_a_refused_arming_is_logged_once_with_its_reason_and_duration(kind):
     bench = FindingsBench(kind).discover()
     flight = bench.vehicles[1].flight
     flight.arming_fault = 'Gyros inconsistent'
@@ -252,8 +252,8 @@ def test_finding_28_the_sensors_that_px4_calls_unhealthy_are_named():
     bench.vehicles[1].flight.arming_fault = 'horizontal velocity unstable'
     gyro, prearm = d.MAV_SYS_STATUS_SENSOR_3D_GYRO, d.MAV_SYS_STATUS_PREARM_CHECK
 
-    def gyro_fails(way, message, now):
-        if way == 'down' and message.get_type() == 'SYS_STATUS':
+    def gyro_fails(direction, message, now):
+        if direction == 'down' and message.get_type() == 'SYS_STATUS':
             return [(0.0, d.MAVLink_sys_status_message(
                 gyro | prearm, gyro | prearm, 0, 0, 12000, 0, 90, 0, 0, 0, 0, 0, 0))]
         return None
@@ -263,10 +263,10 @@ def test_finding_28_the_sensors_that_px4_calls_unhealthy_are_named():
     assert bench.noted('arm: refused for', 'preflight checks fail (3d_gyro)')
 
 
-# 30: what is read of it
+# 30: texts for the operator
 
 
-def test_finding_30_the_restarted_commands_of_an_append_are_one_line_and_no_error():
+def test_finding_30_the_restarted_commands_of_an_append_are_logged_once_as_info():
     bench = flying('ardupilot', 'AB')
     for revision, names in enumerate(('ABCDEF', 'ABCDEFGHI', 'ABCDEFGHIJKL'), 2):
         bench.assign(task_list(names, revision))
@@ -277,12 +277,12 @@ def test_finding_30_the_restarted_commands_of_an_append_are_one_line_and_no_erro
     assert [level for level, text in bench.levels if text == FLOOD] == ['info']
 
 
-def test_finding_30_a_refusal_is_told_once_until_it_changes():
+def test_finding_30_a_refusal_is_logged_once_until_it_changes():
     bench = FindingsBench('ardupilot').discover()
     result = [d.MAV_RESULT_DENIED]
 
-    def refuse(way, message, now):
-        if (way == 'up' and message.get_type() == 'COMMAND_LONG' and result[0]
+    def refuse(direction, message, now):
+        if (direction == 'up' and message.get_type() == 'COMMAND_LONG' and result[0]
                 and message.command == d.MAV_CMD_DO_SET_MODE):
             bench.from_vehicle(d.MAVLink_command_ack_message(message.command, result[0]))
             return []

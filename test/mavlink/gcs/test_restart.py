@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A bridge killed and started again: what was flown is found, and not flown twice."""
+"""A bridge killed and restarted: tasks flown meanwhile are detected, and not flown twice."""
 
 import random
 from dataclasses import replace
@@ -17,7 +17,7 @@ BOTH = pytest.mark.parametrize('kind', ['ardupilot', 'px4'])
 
 @BOTH
 @pytest.mark.parametrize('moment', [0.5, 2.0, 6.0, 14.0, 22.0])
-def test_a_killed_bridge_finds_what_each_vehicle_holds_and_flies_no_task_twice(kind, moment):
+def test_a_killed_bridge_reads_each_onboard_mission_and_flies_no_task_twice(kind, moment):
     bench = flying(kind, 'ABCDE')
     bench.run(limit=moment)
     before = bench.completed()
@@ -49,7 +49,7 @@ def test_a_task_flown_while_the_bridge_was_dead_is_completed_under_a_new_list(ki
 
 @BOTH
 @pytest.mark.parametrize('moment', [0.2, 0.4, 0.8, 1.2])
-def test_a_bridge_killed_in_mid_upload_brings_the_list_on_board(kind, moment):
+def test_a_bridge_killed_during_an_upload_completes_it_after_the_restart(kind, moment):
     bench = flying(kind, 'ABC', delay=(0.05, 0.05), tick=0.05)
     bench.assign(task_list('CDEFAB', 2))
     bench.run(limit=moment)
@@ -62,7 +62,7 @@ def test_a_bridge_killed_in_mid_upload_brings_the_list_on_board(kind, moment):
 
 
 def dead_until(bench, count):
-    """The bridge is killed, the vehicles fly on; a new one starts once so many were reached."""
+    """Kill the bridge, and start a new one when `count` items were reached."""
     bench.line.cut = True
     assert bench.run(lambda: len(bench.flown()) == count)
     bench.run(limit=12.0)
@@ -71,25 +71,26 @@ def dead_until(bench, count):
     bench.discover()
 
 
-def handed_over_where_it_held(bench, n=1):
-    """PX4 went to Hold while no bridge was there to see why: an operator gives it back."""
+def hand_over_in_hold(bench, n=1):
+    """Hand over a PX4 that changed to Hold while no bridge ran (LOST)."""
     if bench.authority(n) is AuthorityState.LOST and bench.executor(n).telemetry.airborne:
         assert bench.executor(n).profile.name == 'px4'
-        assert bench.executor(n).authority.why.endswith(('the vehicle is in Hold', 'Hold instead of Mission'))
+        assert bench.executor(n).authority.why.endswith(
+            ('the vehicle is in Hold', 'Hold instead of Mission'))
         assert bench.hand_over(n) == ''
 
 
 @BOTH
 @pytest.mark.parametrize('first', ['', 'X'])
-def test_what_was_flown_unheard_is_known_after_a_list_without_it(kind, first):
+def test_a_task_flown_while_no_bridge_ran_is_known_after_a_list_without_it(kind, first):
     bench = flying(kind, 'ABC')
     bench.run(limit=1.5)  # a heartbeat has shown the mission mode
     dead_until(bench, 3)
-    bench.assign(task_list(first, 2))  # the allocator has given it up meanwhile
+    bench.assign(task_list(first, 2))  # the allocator has withdrawn the tasks meanwhile
     bench.run(limit=4.0)
     assert bench.authority() is (AuthorityState.LOST if kind == 'px4' else AuthorityState.HELD)
     bench.assign(task_list('CBDA', 3))
-    handed_over_where_it_held(bench)
+    hand_over_in_hold(bench)
     assert bench.run(lambda: len(bench.completed()) == 4)
     assert sorted(bench.completed()) == list('ABCD')
     assert bench.run(lambda: len(bench.flown()) == 4)
@@ -97,7 +98,7 @@ def test_what_was_flown_unheard_is_known_after_a_list_without_it(kind, first):
 
 
 @pytest.mark.parametrize('kinds', [('ardupilot', 'px4'), ('px4', 'ardupilot')])
-def test_what_one_has_flown_unheard_is_not_flown_by_another(kinds):
+def test_a_task_flown_while_no_bridge_ran_is_not_flown_by_another_uav(kinds):
     bench = FlightBench(*kinds).discover()
     bench.assign(task_list('ABC', service=1.0))
     bench.assign(task_list('X'), 2)
@@ -105,16 +106,16 @@ def test_what_one_has_flown_unheard_is_not_flown_by_another(kinds):
     dead_until(bench, 3)
     bench.assign(task_list('', 2))
     bench.assign(task_list('CBDA', 3, service=1.0), 2)
-    assert bench.run(lambda: handed_over_where_it_held(bench, 2) or (
+    assert bench.run(lambda: hand_over_in_hold(bench, 2) or (
         bench.authority(2) is AuthorityState.HELD), 10.0)
     assert bench.run(lambda: len(bench.completed(2)) == 4)
     assert bench.run(lambda: len(bench.flown(2)) == 2)
     assert places(bench, 2)[1:] == ['D']
-    assert 'A was flown by uav_1, unheard' in bench.notes
+    assert 'A was flown by uav_1 while the bridge was down' in bench.notes
 
 
 @BOTH
-def test_what_was_withdrawn_unflown_is_flown_when_it_comes_back_to_another(kind):
+def test_a_withdrawn_task_is_flown_when_it_is_assigned_to_another_uav(kind):
     bench = FlightBench(kind, kind).discover()
     bench.assign(task_list('ABC'))
     bench.assign(task_list('X'), 2)
@@ -132,7 +133,7 @@ def test_what_was_withdrawn_unflown_is_flown_when_it_comes_back_to_another(kind)
 
 
 @BOTH
-def test_what_was_flown_unheard_is_flown_again_where_its_place_has_changed(kind):
+def test_a_task_flown_while_no_bridge_ran_is_flown_again_when_its_position_changes(kind):
     bench = flying(kind, 'ABC')
     assert bench.run(lambda: bench.completed() == ['A'])
     bench.start()
@@ -148,7 +149,7 @@ def test_what_was_flown_unheard_is_flown_again_where_its_place_has_changed(kind)
 
 
 @BOTH
-def test_a_first_list_on_the_ground_is_flown_though_the_same_is_on_board(kind):
+def test_a_first_list_on_the_ground_is_flown_even_if_it_is_on_board_already(kind):
     bench = FlightBench(kind, relaunch='automatic').discover()
     bench.assign(task_list('AB', returns=True))
     assert bench.run(lambda: bench.completed() == ['A', 'B'])
@@ -161,23 +162,23 @@ def test_a_first_list_on_the_ground_is_flown_though_the_same_is_on_board(kind):
     assert bench.run(lambda: places(bench) == list('ABAB'), 1.0)
 
 
-class Dealer:
-    """A careless allocator: deals what is not completed at random, takes back what is."""
+class RandomAllocator:
+    """Assigns open tasks to two UAVs at random, and withdraws completed ones."""
 
     def __init__(self, bench, names, rng):
         self.bench, self.names, self.rng = bench, names, rng
         self.done, self.lists, self.revision = set(), {1: [], 2: []}, 1
 
-    def hear(self):
+    def update(self):
         for n in self.lists:
-            handed_over_where_it_held(self.bench, n)
+            hand_over_in_hold(self.bench, n)
             self.done |= {*self.bench.completed(n)}
         for n, tasks in self.lists.items():
             if any(t in self.done and t not in self.bench.completed(n) for t in tasks):
                 self.send(n, [t for t in tasks if t not in self.done])
         return self.done == set(self.names)
 
-    def deal(self):
+    def assign(self):
         left = [t for t in self.names if t not in self.done]
         self.rng.shuffle(left)
         cut = self.rng.randint(0, len(left))
@@ -192,22 +193,22 @@ class Dealer:
 
 @BOTH
 @pytest.mark.parametrize('seed', range(20))
-def test_killed_at_random_and_dealt_anew_each_task_is_flown_once(kind, seed):
+def test_killed_at_random_and_reassigned_each_task_is_flown_once(kind, seed):
     rng = random.Random(seed)
     other = {'ardupilot': 'px4', 'px4': 'ardupilot'}[kind]
     bench = FlightBench(kind, other, seed=seed, delay=(0.02, 0.02)).discover()
-    dealer = Dealer(bench, 'ABCDEFGH', rng)
-    dealer.deal()
+    allocator = RandomAllocator(bench, 'ABCDEFGH', rng)
+    allocator.assign()
     for _ in range(3):
-        bench.run(dealer.hear, rng.uniform(8.0, 25.0))
+        bench.run(allocator.update, rng.uniform(8.0, 25.0))
         bench.line.cut = True
         bench.run(limit=rng.uniform(0.5, 30.0))
         bench.line.cut = False
         bench.start()
         bench.discover()
-        dealer.deal()
-        bench.run(dealer.hear, rng.uniform(0.0, 3.0))
-        dealer.deal()
-    assert bench.run(dealer.hear)
+        allocator.assign()
+        bench.run(allocator.update, rng.uniform(0.0, 3.0))
+        allocator.assign()
+    assert bench.run(allocator.update)
     bench.run(limit=5.0)
     assert sorted(places(bench) + places(bench, 2)) == list('ABCDEFGH'), f'seed {seed}'

@@ -21,7 +21,7 @@ _FILE_LIMIT = 65536  # [bytes] of a file that is read
 _TIME_LIMIT = 1e11  # [s] of a steady clock
 LONG_AGO = -1e9  # [s] steady time of events before the last boot of the computer
 _BOOT_ID = Path('/proc/sys/kernel/random/boot_id')
-_CONSEQUENCE = ('after a restart of the bridge an airborne vehicle is left to its pilot, unless '
+_CONSEQUENCE = ('after a restart of the bridge an airborne vehicle is left to its pilot unless '
                 'it flies our mission')
 
 
@@ -92,7 +92,7 @@ class AuthorityFileStore:
             return None
         except (OSError, ValueError, RecursionError) as error:
             self._report(f'{path}: {error or type(error).__name__}: not used; an airborne '
-                         f'{uav_id} is left to its pilot, unless it flies our mission')
+                         f'{uav_id} is left to its pilot unless it flies our mission')
             return None
         if body['boot'] != self._boot:
             record = replace(record, since=0.0, marks=(),
