@@ -6,7 +6,7 @@ import pytest
 
 from uav_task_alloc import __main__ as cli, scenario
 from uav_task_alloc.geometry.frames import to_enu
-from uav_task_alloc.geometry.zones import way_is_clear
+from uav_task_alloc.geometry.zones import path_is_clear
 from uav_task_alloc.params import AllocatorParams
 
 MAST = """uavs:
@@ -43,8 +43,8 @@ def plan(tmp_path):
 ])
 def test_finding_39_missions_keep_the_clearance(plan, line, options, clearance):
     points, zones = plan(line + MAST, *options)
-    assert way_is_clear(points, zones, clearance - ROUNDED)
-    assert not way_is_clear(points, zones, clearance + 1.0)  # no more than was asked for
+    assert path_is_clear(points, zones, clearance - ROUNDED)
+    assert not path_is_clear(points, zones, clearance + 1.0)  # no more than was asked for
 
 
 @pytest.mark.parametrize(('line', 'options', 'low', 'high'), [

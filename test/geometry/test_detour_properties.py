@@ -87,7 +87,7 @@ def odd_scenes(draw):
 
 @RUNS
 @given(odd_scenes())
-def test_whatever_the_scene_a_way_is_clear_once_it_is_outside_and_keeps_the_limits(scene):
+def test_whatever_the_scene_a_path_is_clear_once_it_is_outside_and_keeps_the_limits(scene):
     zones, (a, b), low, high = scene
     found = find_detour(a, b, zones, altitude_min=low, altitude_max=high)
     if math.isinf(found.length):

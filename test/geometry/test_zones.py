@@ -9,7 +9,7 @@ from uav_task_alloc.geometry.zones import (
     distance,
     inside,
     is_clear,
-    way_is_clear,
+    path_is_clear,
     zones_around,
 )
 from uav_task_alloc.model import ThreatZone
@@ -73,10 +73,10 @@ def test_a_segment_that_slopes_over_the_top_is_clear():
     assert cut_by((-50, 0, 19), (60, 5, 19), [DOME, BLOCK]) is DOME
 
 
-def test_a_way_is_clear_when_each_of_its_segments_is():
+def test_a_path_is_clear_when_each_of_its_segments_is():
     corner = [(-50.0, 5.0, 5.0), (5.0, 60.0, 5.0), (60.0, 5.0, 5.0)]
-    assert way_is_clear(corner, [BLOCK])
-    assert not way_is_clear([corner[0], corner[2]], [BLOCK])
+    assert path_is_clear(corner, [BLOCK])
+    assert not path_is_clear([corner[0], corner[2]], [BLOCK])
 
 
 def test_all_zones_around_a_point_are_named():

@@ -9,7 +9,7 @@ import pytest
 from uav_task_alloc import Task, ThreatZone, Uav, plan
 from uav_task_alloc.geometry.distances import Distances
 from uav_task_alloc.geometry.search_budget import SearchBudget
-from uav_task_alloc.geometry.zones import inside, way_is_clear
+from uav_task_alloc.geometry.zones import inside, path_is_clear
 from uav_task_alloc.solver.problem import Limits, Rules, make_problem
 from uav_task_alloc.solver.routes import empty_routes, insert, remove
 
@@ -51,7 +51,7 @@ def check(made, uavs, tasks, zones):
         here = uav.position
         for name, leg in zip(made.routes[uav.id], made.legs[uav.id], strict=True):
             assert math.isfinite(leg.length)
-            assert way_is_clear([here, *leg.via, place[name]], zones)
+            assert path_is_clear([here, *leg.via, place[name]], zones)
             here = place[name]
 
 
@@ -114,16 +114,16 @@ def test_finding_20_what_stop_raises_comes_out_of_plan():
 def test_finding_20_a_way_that_is_flown_is_taken_where_none_is_found_in_the_time():
     ends = [(0.0, 0.0, 50.0), (1000.0, 100.0, 50.0)]
     via = Distances(ends, [WALL, PLUG]).leg(0, 1).via
-    effort = SearchBudget()
-    ways = Distances(ends, [WALL, PLUG], effort=effort)
-    effort.begin(0)
+    budget = SearchBudget()
+    ways = Distances(ends, [WALL, PLUG], budget=budget)
+    budget.start_stage(0)
     assert ways.length(0, 1) == math.inf
     assert ways.given_up(0, 1)
-    assert not ways.suggest(0, 1, [(500.0, 0.0, 50.0)])  # inside
-    assert ways.suggest(0, 1, [(-50.0, 0.0, 50.0), *via])
+    assert not ways.offer_path(0, 1, [(500.0, 0.0, 50.0)])  # inside
+    assert ways.offer_path(0, 1, [(-50.0, 0.0, 50.0), *via])
     assert math.isfinite(ways.length(0, 1))
     assert ways.leg(0, 1).length == ways.length(0, 1)
-    assert way_is_clear([ends[0], *ways.leg(0, 1).via, ends[1]], [WALL, PLUG])
+    assert path_is_clear([ends[0], *ways.leg(0, 1).via, ends[1]], [WALL, PLUG])
 
 
 @pytest.mark.parametrize('start', [(0.0, 0.0, 50.0), (310.0, 0.0, 50.0)])
@@ -136,7 +136,7 @@ def test_finding_20_where_a_task_goes_the_way_over_it_stays(start):
     whole = routes.length[0]
     ways = Distances(problem.distances.points, (WALL, PLUG))  # knows but these two
     over = ways.length(0, 1) + ways.length(1, 2)
-    ways.effort.begin(0)
+    ways.budget.start_stage(0)
     arrays = a._replace(pairs=ways.pairs)
     remove(arrays, routes, 1)
     assert routes.length[0] == pytest.approx(whole) == pytest.approx(over)
@@ -144,4 +144,4 @@ def test_finding_20_where_a_task_goes_the_way_over_it_stays(start):
     leg = ways.leg(0, 2)
     assert tasks[0].position in leg.via
     first = leg.via[0] if inside(start, WALL) else start
-    assert way_is_clear([first, *leg.via, tasks[1].position], [WALL, PLUG])
+    assert path_is_clear([first, *leg.via, tasks[1].position], [WALL, PLUG])

@@ -9,17 +9,17 @@ from dataclasses import dataclass
 import numpy as np
 
 from uav_task_alloc.errors import InvalidValue
-from uav_task_alloc.geometry.escape import way_out
+from uav_task_alloc.geometry.escape import escape_point
 from uav_task_alloc.geometry.obstacles import (
     Floats,
     Obstacles,
-    all_around,
-    first_around,
+    containing_zones,
+    first_containing,
     pack,
 )
-from uav_task_alloc.geometry.scene import in_order
+from uav_task_alloc.geometry.scene import ordered_ends
 from uav_task_alloc.geometry.search_budget import SearchBudget, new_work
-from uav_task_alloc.geometry.shortest_path import shortest
+from uav_task_alloc.geometry.shortest_path import shortest_path
 from uav_task_alloc.geometry.taut import MAX_CORNERS
 from uav_task_alloc.model import Point, ThreatZone, check_point
 
@@ -64,7 +64,7 @@ def detour(a: Iterable[float], b: Iterable[float], zones: Iterable[ThreatZone] =
 
 def find_detour(a: Iterable[float], b: Iterable[float], zones: Iterable[ThreatZone] = (), *,
                 clearance: float = 0.0, altitude_min: float = -math.inf,
-                altitude_max: float = math.inf, effort: SearchBudget | None = None,
+                altitude_max: float = math.inf, budget: SearchBudget | None = None,
                 obstacles: Obstacles | None = None) -> Detour:
     """As `detour`, and says what is special about the way. Raises InvalidValue.
 
@@ -79,7 +79,7 @@ def find_detour(a: Iterable[float], b: Iterable[float], zones: Iterable[ThreatZo
     goal_inside = _around(obstacles, zones, goal)
     if goal_inside:
         return Detour(math.inf, (), start_inside, goal_inside)
-    length, points = way_between(obstacles, start, goal, limits, bool(start_inside), effort)
+    length, points = path_between(obstacles, start, goal, limits, bool(start_inside), budget)
     if math.isnan(length):
         return Detour(math.inf, (), start_inside, given_up=True)
     return Detour(length, points, start_inside, (), math.isinf(length))
@@ -93,29 +93,30 @@ def check_limits(altitude_min: float, altitude_max: float) -> Floats:
     return np.array([altitude_min, altitude_max], dtype=np.float64)
 
 
-def way_between(obstacles: Obstacles, start: Point, goal: Point, limits: Floats, caught: bool,
-                effort: SearchBudget | None = None) -> tuple[float, tuple[Point, ...]]:
+def path_between(obstacles: Obstacles, start: Point, goal: Point, limits: Floats,
+                 start_inside: bool,
+                 budget: SearchBudget | None = None) -> tuple[float, tuple[Point, ...]]:
     """Length [m] and waypoints from start to a goal outside all zones; caught: start inside.
 
     inf: there is no way; NaN: none was found with this effort.
     """
-    work = new_work(effort.state.ctypes.data if effort else 0)
+    work = new_work(budget.state.ctypes.data if budget else 0)
     first: tuple[Point, ...] = ()
     before, place = 0.0, np.array(start)
-    if caught:
-        place = way_out(obstacles.rows, place, limits, work)
+    if start_inside:
+        place = escape_point(obstacles.rows, place, limits, work)
         if work[2] or math.isnan(place[0]):
             return math.nan if work[2] else math.inf, ()
         first = as_points(place[None])
         before = math.dist(start, first[0])
     ends, buffer = np.empty((2, 3)), np.empty((MAX_CORNERS, 3))
-    turned = in_order(place, np.array(goal), ends)
-    snug = any(first_around(obstacles.rows, x, y, z, False) >= 0 for x, y, z in ends)
-    n, length = shortest(obstacles.rows, ends, limits, snug, buffer, work)
+    swapped = ordered_ends(place, np.array(goal), ends)
+    no_skin = any(first_containing(obstacles.rows, x, y, z, False) >= 0 for x, y, z in ends)
+    n, length = shortest_path(obstacles.rows, ends, limits, no_skin, buffer, work)
     via = as_points(buffer[1:max(1, n - 1)])
     if not math.isfinite(length):
         return float(length), ()
-    return before + float(length), (*first, *(via[::-1] if turned else via))
+    return before + float(length), (*first, *(via[::-1] if swapped else via))
 
 
 def as_points(rows: Floats) -> tuple[Point, ...]:
@@ -124,4 +125,4 @@ def as_points(rows: Floats) -> tuple[Point, ...]:
 
 
 def _around(obstacles: Obstacles, zones: Sequence[ThreatZone], point: Point) -> tuple[str, ...]:
-    return tuple(zones[k].id for k in all_around(obstacles.rows, *point))
+    return tuple(zones[k].id for k in containing_zones(obstacles.rows, *point))

@@ -15,32 +15,33 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from uav_task_alloc.errors import InvalidValue
-from uav_task_alloc.geometry.detour import as_points, check_limits, way_between
-from uav_task_alloc.geometry.numba_pointers import float_of, floats_at, ints_at
-from uav_task_alloc.geometry.obstacles import Ints, Obstacles, all_around, pack
-from uav_task_alloc.geometry.path_store import PathStore, remember
+from uav_task_alloc.geometry.detour import as_points, check_limits, path_between
+from uav_task_alloc.geometry.numba_pointers import call_float, floats_at, ints_at
+from uav_task_alloc.geometry.obstacles import Ints, Obstacles, containing_zones, pack
+from uav_task_alloc.geometry.path_store import PathStore, store_path
+from uav_task_alloc.geometry.points import path_length
 from uav_task_alloc.geometry.scene import (
-    CAUGHT,
-    EFFORT,
+    BUDGET_INDEX,
     INSIDE,
-    SNUG,
-    addresses,
-    finder,
-    joiner,
-    kept_as,
-    kept_way,
+    LOCATION_INDEX,
+    WITHIN_SKIN,
+    find_address,
+    join_address,
     make_scene,
+    scene_addresses,
+    stored_ends,
+    stored_path,
 )
-from uav_task_alloc.geometry.search_budget import CUT, MOST, OVER, SearchBudget
-from uav_task_alloc.geometry.shortest_path import is_clear
-from uav_task_alloc.geometry.table import LengthTable, forget
-from uav_task_alloc.geometry.taut import MAX_CORNERS, length_of
+from uav_task_alloc.geometry.search_budget import CUT_SHORT, EXHAUSTED, MAX_UNITS, SearchBudget
+from uav_task_alloc.geometry.shortest_path import path_clears
+from uav_task_alloc.geometry.table import LengthTable, invalidate
+from uav_task_alloc.geometry.taut import MAX_CORNERS
 from uav_task_alloc.kernel import allocating_kernel
 from uav_task_alloc.model import Leg, Point, ThreatZone
 
 DENSE_MAX = 2048  # points; the table takes 8 n^2 bytes
 CACHE_SIZE = 1 << 20  # answers kept beyond that; a power of two
-MOST_LOOKS = 20_000_000  # at pairs and changed zones; beyond, the table begins anew
+MAX_CHECKS = 20_000_000  # at pairs and changed zones; beyond, the table begins anew
 
 
 class _Addresses(NamedTuple):
@@ -53,7 +54,7 @@ class _Addresses(NamedTuple):
     slot: int  # int64: row and column of each point in the table
     table: int  # float64 [m], NaN: unknown
     keys: int  # int64: i * points + j of each answer in the cache
-    answers: int  # float64 [m]
+    lengths: int  # float64 [m]
     scene: int  # what `find` reads
     find: int  # C function (scene, i, j) -> length [m]; 0 where there are no zones
     join: int  # C function (scene, i, k << 32 | j) -> length [m]; 0 where there are no zones
@@ -84,87 +85,87 @@ def length(pairs: Pairs, i: int, j: int) -> float:
 
 
 @allocating_kernel
-def _sought(pairs: Pairs, i: int, j: int, known: float) -> float:
+def _search_length(pairs: Pairs, i: int, j: int, known: float) -> float:
     """Length [m] found now; -w - 1: not with w units of work, NaN: there was no time at all.
 
     known: what an earlier search that was cut short left.
     """
-    state = ints_at(ints_at(pairs.scene)[EFFORT])
-    if state[OVER] != 0:
+    state = ints_at(ints_at(pairs.scene)[BUDGET_INDEX])
+    if state[EXHAUSTED] != 0:
         return known
-    if -known > state[MOST]:
-        state[CUT] += 1
+    if -known > state[MAX_UNITS]:
+        state[CUT_SHORT] += 1
         return known
-    found = float_of(pairs.find, pairs.scene, i, j)
+    found = call_float(pairs.find, pairs.scene, i, j)
     if found == found:
         return float(found)
-    state[CUT] += 1
-    return known if state[OVER] != 0 else -1.0 - state[MOST]
+    state[CUT_SHORT] += 1
+    return known if state[EXHAUSTED] != 0 else -1.0 - state[MAX_UNITS]
 
 
 @allocating_kernel
 def _find_for_table(pairs: Pairs, i: int, j: int) -> float:
     slot, table = ints_at(pairs.slot), floats_at(pairs.table)
     place = slot[i] * pairs.row + slot[j]
-    found = _sought(pairs, i, j, table[place])
+    found = _search_length(pairs, i, j, table[place])
     table[place] = found
-    caught = ints_at(ints_at(pairs.scene)[CAUGHT])
-    if caught[i] != INSIDE and caught[j] != INSIDE:
+    location = ints_at(ints_at(pairs.scene)[LOCATION_INDEX])
+    if location[i] != INSIDE and location[j] != INSIDE:
         table[slot[j] * pairs.row + slot[i]] = found
     return found if found >= 0.0 else np.inf
 
 
 @allocating_kernel
 def _find_for_cache(pairs: Pairs, i: int, j: int) -> float:
-    keys, answers = ints_at(pairs.keys), floats_at(pairs.answers)
-    caught = ints_at(ints_at(pairs.scene)[CAUGHT])
-    if j < i and caught[i] != INSIDE and caught[j] != INSIDE:
+    keys, lengths = ints_at(pairs.keys), floats_at(pairs.lengths)
+    location = ints_at(ints_at(pairs.scene)[LOCATION_INDEX])
+    if j < i and location[i] != INSIDE and location[j] != INSIDE:
         i, j = j, i
     key = i * pairs.points + j
     place = (key * 0x9E3779B1 >> 8) & (CACHE_SIZE - 1)
-    if keys[place] == key and answers[place] >= 0.0:
-        return float(answers[place])
-    found = _sought(pairs, i, j, answers[place] if keys[place] == key else np.nan)
+    if keys[place] == key and lengths[place] >= 0.0:
+        return float(lengths[place])
+    found = _search_length(pairs, i, j, lengths[place] if keys[place] == key else np.nan)
     if found == found:
-        keys[place], answers[place] = key, found
+        keys[place], lengths[place] = key, found
     return found if found >= 0.0 else np.inf
 
 
 @allocating_kernel
-def _known(pairs: Pairs, i: int, j: int) -> float:
+def _known_length(pairs: Pairs, i: int, j: int) -> float:
     """The length [m], if it is known; otherwise NaN or negative."""
     if pairs.row > 0:
         slot = ints_at(pairs.slot)
         return float(floats_at(pairs.table)[slot[i] * pairs.row + slot[j]])
     if pairs.zones == 0:
         return length(pairs, i, j)
-    keys, answers = ints_at(pairs.keys), floats_at(pairs.answers)
+    keys, lengths = ints_at(pairs.keys), floats_at(pairs.lengths)
     for a, b in ((i, j), (j, i)):
         key = a * pairs.points + b
         place = (key * 0x9E3779B1 >> 8) & (CACHE_SIZE - 1)
         if keys[place] == key:
-            return float(answers[place])
+            return float(lengths[place])
     return np.nan
 
 
 @allocating_kernel
-def _learn(pairs: Pairs, i: int, j: int, found: float) -> None:
+def _store_length(pairs: Pairs, i: int, j: int, found: float) -> None:
     """The way from i, which need not be back, to j, which is outside all zones."""
-    caught = ints_at(ints_at(pairs.scene)[CAUGHT])
+    location = ints_at(ints_at(pairs.scene)[LOCATION_INDEX])
     if pairs.row > 0:
         slot, table = ints_at(pairs.slot), floats_at(pairs.table)
         table[slot[i] * pairs.row + slot[j]] = found
-        if caught[i] != INSIDE:
+        if location[i] != INSIDE:
             table[slot[j] * pairs.row + slot[i]] = found
     elif pairs.zones > 0:
-        key = (i * pairs.points + j if caught[i] == INSIDE
+        key = (i * pairs.points + j if location[i] == INSIDE
                else min(i, j) * pairs.points + max(i, j))
         place = (key * 0x9E3779B1 >> 8) & (CACHE_SIZE - 1)
-        ints_at(pairs.keys)[place], floats_at(pairs.answers)[place] = key, found
+        ints_at(pairs.keys)[place], floats_at(pairs.lengths)[place] = key, found
 
 
 @allocating_kernel
-def length_over(pairs: Pairs, i: int, k: int, j: int) -> float:
+def length_via(pairs: Pairs, i: int, k: int, j: int) -> float:
     """Length [m] of the way from i to j: as `length`, or over point k where none is known.
 
     inf: nor are the ways from i to k and on to j kept.
@@ -172,9 +173,9 @@ def length_over(pairs: Pairs, i: int, k: int, j: int) -> float:
     found = length(pairs, i, j)
     if found < np.inf or pairs.zones == 0:
         return found
-    found = float_of(pairs.join, pairs.scene, i, (k << 32) | j)
+    found = call_float(pairs.join, pairs.scene, i, (k << 32) | j)
     if found < np.inf:
-        _learn(pairs, i, j, found)
+        _store_length(pairs, i, j, found)
     return float(found)
 
 
@@ -192,19 +193,19 @@ class Distances:
 
     def __init__(self, points: ArrayLike, zones: Sequence[ThreatZone] = (), *,
                  clearance: float = 0.0, altitude_min: float = -np.inf,
-                 altitude_max: float = np.inf, effort: SearchBudget | None = None,
-                 _before: Distances | None = None, _table: LengthTable | None = None) -> None:
+                 altitude_max: float = np.inf, budget: SearchBudget | None = None,
+                 _previous: Distances | None = None, _table: LengthTable | None = None) -> None:
         self.points = np.ascontiguousarray(points, dtype=np.float64).reshape(-1, 3)
         if not np.isfinite(self.points).all():
             raise InvalidValue('points', self.points, 'finite coordinates [m]')
         self.zones, self.clearance = tuple(zones), clearance
         limits = check_limits(altitude_min, altitude_max)
-        same = _before is not None and _before.zones == self.zones
-        self._obstacles: Obstacles = (_before._obstacles if _before and same
+        same = _previous is not None and _previous.zones == self.zones
+        self._obstacles: Obstacles = (_previous._obstacles if _previous and same
                                       else pack(self.zones, clearance))
-        self._store: PathStore = _before._store if _before else PathStore()
-        self.effort = effort or SearchBudget()
-        self._scene = make_scene(self.points, self._obstacles.rows, limits, self.effort,
+        self._store: PathStore = _previous._store if _previous else PathStore()
+        self.budget = budget or SearchBudget()
+        self._scene = make_scene(self.points, self._obstacles.rows, limits, self.budget,
                                  self._store)
         dense = bool(self.zones) and len(self.points) <= DENSE_MAX
         self._table = _table or LengthTable(len(self.points) if dense else 0)
@@ -214,38 +215,38 @@ class Distances:
         slot = self._table.slots(self.points) if dense else np.zeros(0, np.int64)
         cells = self._table.cells
         cached = CACHE_SIZE if self.zones and not dense else 0
-        keys, answers = np.full(cached, -1, np.int64), np.empty(cached)
-        scene = addresses(self._scene)
+        keys, lengths = np.full(cached, -1, np.int64), np.empty(cached)
+        scene = scene_addresses(self._scene)
         pairs = Pairs(len(self.points), len(self.zones), self.points.ctypes.data,
                       len(cells) if dense else 0, slot.ctypes.data, cells.ctypes.data,
-                      keys.ctypes.data, answers.ctypes.data, scene.ctypes.data,
-                      finder(bool(self.zones)), joiner(bool(self.zones)))
-        pairs.owner = (self._obstacles, self._scene, self._store, self.effort, slot, cells, keys,
-                       answers, scene)
+                      keys.ctypes.data, lengths.ctypes.data, scene.ctypes.data,
+                      find_address(bool(self.zones)), join_address(bool(self.zones)))
+        pairs.owner = (self._obstacles, self._scene, self._store, self.budget, slot, cells, keys,
+                       lengths, scene)
         return pairs
 
     def updated(self, points: ArrayLike | None = None,
                 zones: Sequence[ThreatZone] | None = None,
-                effort: SearchBudget | None = None) -> Distances:
+                budget: SearchBudget | None = None) -> Distances:
         """For other points, in any order, or zones that came, moved or vanished."""
         new_points = self.points if points is None else np.asarray(points, dtype=np.float64)
         new_zones = self.zones if zones is None else tuple(zones)
         low, high = self._scene.limits
         table = None
         if self.zones and new_zones and len(new_points) <= DENSE_MAX >= len(self.points):
-            table = self._table if new_zones == self.zones else self._still_true(new_zones)
+            table = self._table if new_zones == self.zones else self._still_valid(new_zones)
         return Distances(new_points, new_zones, clearance=self.clearance, altitude_min=low,
-                         altitude_max=high, effort=effort, _before=self, _table=table)
+                         altitude_max=high, budget=budget, _previous=self, _table=table)
 
-    def _still_true(self, zones: tuple[ThreatZone, ...]) -> LengthTable | None:
+    def _still_valid(self, zones: tuple[ThreatZone, ...]) -> LengthTable | None:
         """The table without what other zones change; None: all would take longer to look at."""
         before, after = set(self.zones), set(zones)
-        gone, come = before - after, after - before
-        if (len(gone) + len(come)) * self._table.used ** 2 > MOST_LOOKS:
+        removed, added = before - after, after - before
+        if (len(removed) + len(added)) * self._table.used ** 2 > MAX_CHECKS:
             return None
         table = self._table.copy()
-        left, new = pack(tuple(gone), self.clearance), pack(tuple(come), self.clearance)
-        forget(table.cells, table.places, table.used, left.rows, new.rows)
+        left, new = pack(tuple(removed), self.clearance), pack(tuple(added), self.clearance)
+        invalidate(table.cells, table.places, table.used, left.rows, new.rows)
         return table
 
     def ensure(self, origins: ArrayLike, goals: ArrayLike) -> None:
@@ -253,23 +254,23 @@ class Distances:
         _ensure(self.pairs, np.asarray(origins, dtype=np.int64).ravel(),
                 np.asarray(goals, dtype=np.int64).ravel())
 
-    def suggest(self, i: int, j: int, via: Sequence[Point]) -> bool:
+    def offer_path(self, i: int, j: int, via: Sequence[Point]) -> bool:
         """Take this way from i to j, or the rest of it from one of its points on, if it is clear.
 
         For one that no way was found for in the time; whether it is taken.
         """
         scene = self._scene
-        if INSIDE in (scene.caught[i], scene.caught[j]):
+        if INSIDE in (scene.location[i], scene.location[j]):
             return False
-        snug = bool(scene.caught[i] == SNUG or scene.caught[j] == SNUG)
-        ends, way = np.empty((2, 3)), np.empty((MAX_CORNERS, 3))
-        turned = kept_as(scene, i, j, ends)
+        no_skin = bool(scene.location[i] == WITHIN_SKIN or scene.location[j] == WITHIN_SKIN)
+        ends, path = np.empty((2, 3)), np.empty((MAX_CORNERS, 3))
+        swapped = stored_ends(scene, i, j, ends)
         for first in range(len(via) + 1 if len(via) < MAX_CORNERS - 1 else 0):
             rest = [self._point(i), *via[first:], self._point(j)]
-            way[:len(rest)] = rest[::-1] if turned else rest
-            if is_clear(scene.zones, way, len(rest), min(ends[0, 2], ends[1, 2]), snug):
-                remember(self._store.address, way, len(rest), ends)
-                _learn(self.pairs, i, j, length_of(way, len(rest)))
+            path[:len(rest)] = rest[::-1] if swapped else rest
+            if path_clears(scene.zones, path, len(rest), min(ends[0, 2], ends[1, 2]), no_skin):
+                store_path(self._store.address, path, len(rest), ends)
+                _store_length(self.pairs, i, j, path_length(path, len(rest)))
                 return True
         return False
 
@@ -286,32 +287,32 @@ class Distances:
         scene = self._scene
         if i == j:
             return Leg((), 0.0)
-        if scene.caught[j] == INSIDE:
+        if scene.location[j] == INSIDE:
             return Leg((), math.inf)
-        known = _known(self.pairs, i, j)
+        known = _known_length(self.pairs, i, j)
         if known >= 0.0:
-            way = np.empty((MAX_CORNERS, 3))
-            n = kept_way(scene, i, j, way)
-            if n and abs(length_of(way, n) - known) < 1e-6:
-                return Leg(as_points(way[1:n - 1]), known)
-        metres, points = way_between(
+            path = np.empty((MAX_CORNERS, 3))
+            n = stored_path(scene, i, j, path)
+            if n and abs(path_length(path, n) - known) < 1e-6:
+                return Leg(as_points(path[1:n - 1]), known)
+        metres, points = path_between(
             self._obstacles, self._point(i), self._point(j), scene.limits,
-            bool(scene.caught[i] == INSIDE), None if known >= 0.0 else self.effort)
+            bool(scene.location[i] == INSIDE), None if known >= 0.0 else self.budget)
         return Leg(points, math.inf if math.isnan(metres) else metres)
 
     def given_up(self, i: int, j: int) -> bool:
         """Whether the way from i to j was not found in the time; there may be one."""
-        return bool(self.zones) and not _known(self.pairs, i, j) >= 0.0 and (
-            bool(self._scene.caught[j] != INSIDE) and i != j)
+        return bool(self.zones) and not _known_length(self.pairs, i, j) >= 0.0 and (
+            bool(self._scene.location[j] != INSIDE) and i != j)
 
     def is_inside(self, i: int) -> bool:
         """Whether point i is inside an enlarged zone."""
-        return bool(self._scene.caught[i] == INSIDE)
+        return bool(self._scene.location[i] == INSIDE)
 
     def zones_around(self, i: int) -> tuple[str, ...]:
         """Ids of the enlarged zones that point i is inside of."""
         return tuple(self.zones[k].id
-                     for k in all_around(self._obstacles.rows, *self._point(i)))
+                     for k in containing_zones(self._obstacles.rows, *self._point(i)))
 
     def _point(self, i: int) -> Point:
         x, y, z = self.points[i]

@@ -35,7 +35,7 @@ def _ints_at(typing_context: Any, address: int) -> tuple[Signature, Callable[...
 
 
 @intrinsic
-def _float_of(typing_context: Any, address: int, a: int, b: int, c: int) -> tuple[
+def _call_float(typing_context: Any, address: int, a: int, b: int, c: int) -> tuple[
         Signature, Callable[..., Any]]:
     """What the C function float64(int64, int64, int64) at an address returns."""
     def call(context: Any, builder: Any, signature: Signature, args: Any) -> Any:
@@ -45,6 +45,6 @@ def _float_of(typing_context: Any, address: int, a: int, b: int, c: int) -> tupl
     return types.float64(types.int64, types.int64, types.int64, types.int64), call
 
 
-float_of: Callable[[int, int, int, int], float] = _float_of  # type: ignore[assignment]
+call_float: Callable[[int, int, int, int], float] = _call_float  # type: ignore[assignment]
 floats_at: Callable[[int], Any] = _floats_at  # type: ignore[assignment]
 ints_at: Callable[[int], Any] = _ints_at  # type: ignore[assignment]

@@ -23,9 +23,9 @@ from uav_task_alloc.geometry.numba_pointers import cast, floats_at
 from uav_task_alloc.geometry.outline import (
     Floats as Floats,
     Ints as Ints,
-    circle,
-    hull_of,
-    rim_of,
+    circle_rim,
+    convex_hull,
+    polygon_rim,
 )
 from uav_task_alloc.geometry.polygon import crosses_ray, segments_cross, signed_area
 from uav_task_alloc.kernel import allocating_kernel
@@ -35,7 +35,7 @@ DOME, CYLINDER, PRISM = Shape.HEMISPHERE.value, Shape.CYLINDER.value, Shape.POLY
 TOUCH = 1e-7  # [m] so near a surface counts as on it, not inside
 SKIN = 0.02  # [m] ways keep this much more distance, so that rounding never puts them inside
 
-RIM = 24  # corners of the outline of a cylinder
+RIM_CORNERS = 24  # corners of the outline of a cylinder
 NO_CORNERS: Floats = np.zeros((0, 2))
 
 Zones = NDArray[np.void]  # of dtype ZONE
@@ -50,10 +50,10 @@ _ZONE = np.dtype([
     ('grow', np.float64), ('skin', np.float64),  # margin + clearance
     ('x0', np.float64), ('y0', np.float64), ('z0', np.float64),  # box around it, with the skin
     ('x1', np.float64), ('y1', np.float64), ('z1', np.float64),
-    ('corners', np.int64), ('count', np.int64),  # PRISM: address and number, not enlarged
-    ('rim', np.int64), ('rims', np.int64),  # its outline, 1.5 skins off; none for a dome
-    ('hull', np.int64), ('hulls', np.int64),  # the rim's convex hull
-    ('dented', np.int64),  # 1: they are not the same
+    ('corners', np.int64), ('corner_count', np.int64),  # PRISM: address and number, not enlarged
+    ('rim', np.int64), ('rim_count', np.int64),  # its outline, 1.5 skins off; none for a dome
+    ('hull', np.int64), ('hull_count', np.int64),  # the rim's convex hull
+    ('concave', np.int64),  # 1: they are not the same
 ])
 
 
@@ -83,7 +83,7 @@ def pack(zones: Sequence[ThreatZone], clearance: float = 0.0) -> Obstacles:
         grow = zone.margin + clearance
         (x, y, z), size, low, high = _extent(zone)
         skin = min(SKIN, 1e-4 * (size + grow))
-        outline, rim, hull, dented = _outlines(zone, grow + 1.5 * skin)
+        outline, rim, hull, concave = _outlines(zone, grow + 1.5 * skin)
         wide, deep = np.ptp(outline, axis=0) / 2 if len(outline) else (size, size)
         wide, deep = wide + grow + skin, deep + grow + skin
         bottom = -math.inf if zone.shape is Shape.HEMISPHERE else low - grow - skin
@@ -91,7 +91,7 @@ def pack(zones: Sequence[ThreatZone], clearance: float = 0.0) -> Obstacles:
             zone.shape.value, x, y, z, zone.radius + grow, low - grow, high + grow, grow, skin,
             x - wide, y - deep, bottom, x + wide, y + deep, high + grow + skin,
             outline.ctypes.data, len(outline), rim.ctypes.data, len(rim),
-            hull.ctypes.data, len(hull), dented))
+            hull.ctypes.data, len(hull), concave))
         outlines += [outline, rim, hull]
     return Obstacles(np.array(rows, _ZONE), tuple(outlines))
 
@@ -101,12 +101,12 @@ def _outlines(zone: ThreatZone, reach: float) -> tuple[Floats, Floats, Floats, b
     if zone.shape is Shape.HEMISPHERE:
         return NO_CORNERS, NO_CORNERS, NO_CORNERS, False
     if zone.shape is Shape.CYLINDER:
-        rim = circle(zone.center[0], zone.center[1], zone.radius + reach, RIM)
+        rim = circle_rim(zone.center[0], zone.center[1], zone.radius + reach, RIM_CORNERS)
         return NO_CORNERS, rim, rim, False
     clockwise = signed_area(zone.vertices) < 0.0
     corners = np.array(zone.vertices[::-1] if clockwise else zone.vertices, np.float64)
-    hull = hull_of(corners)
-    return corners, rim_of(corners, reach), rim_of(hull, reach), len(hull) < len(corners)
+    hull = convex_hull(corners)
+    return corners, polygon_rim(corners, reach), polygon_rim(hull, reach), len(hull) < len(corners)
 
 
 def _extent(zone: ThreatZone) -> tuple[tuple[float, float, float], float, float, float]:
@@ -121,7 +121,17 @@ def _extent(zone: ThreatZone) -> tuple[tuple[float, float, float], float, float,
 
 
 @allocating_kernel
-def off_segment(px: float, py: float, ax: float, ay: float, bx: float, by: float) -> float:
+def box_distance(zone: Zone, x: float, y: float, z: float) -> float:
+    """Distance [m] from a point to the box around a zone; 0.0 inside."""
+    dx = max(zone.x0 - x, x - zone.x1, 0.0)
+    dy = max(zone.y0 - y, y - zone.y1, 0.0)
+    dz = max(zone.z0 - z, z - zone.z1, 0.0)
+    return math.sqrt(dx * dx + dy * dy + dz * dz)
+
+
+@allocating_kernel
+def squared_segment_distance(px: float, py: float, ax: float, ay: float, bx: float,
+                             by: float) -> float:
     """Squared distance in plan from p to the segment ab."""
     dx, dy = bx - ax, by - ay
     span = dx * dx + dy * dy
@@ -136,7 +146,7 @@ def off_segment(px: float, py: float, ax: float, ay: float, bx: float, by: float
 def in_polygon(zone: Zone, x: float, y: float) -> bool:
     """Whether (x, y) lies in the polygon as it is (even-odd rule)."""
     odd = False
-    c, n = floats_at(zone.corners), zone.count
+    c, n = floats_at(zone.corners), zone.corner_count
     j = n - 1
     for i in range(n):
         if crosses_ray((x, y), (c[2 * i], c[2 * i + 1]), (c[2 * j], c[2 * j + 1])):
@@ -150,16 +160,16 @@ def _meets_polygon(zone: Zone, ax: float, ay: float, bx: float, by: float,
                    reach: float) -> bool:
     """Whether the plan segment ab comes nearer to the polygon than `reach`. O(corners)."""
     limit = reach * reach
-    c, n = floats_at(zone.corners), zone.count
+    c, n = floats_at(zone.corners), zone.corner_count
     cx, cy = c[2 * n - 2], c[2 * n - 1]
     for i in range(n):
         dx, dy = c[2 * i], c[2 * i + 1]
         if segments_cross((ax, ay), (bx, by), (cx, cy), (dx, dy)):
             return True
-        if limit > 0.0 and (off_segment(ax, ay, cx, cy, dx, dy) < limit
-                            or off_segment(bx, by, cx, cy, dx, dy) < limit
-                            or off_segment(cx, cy, ax, ay, bx, by) < limit
-                            or off_segment(dx, dy, ax, ay, bx, by) < limit):
+        if limit > 0.0 and (squared_segment_distance(ax, ay, cx, cy, dx, dy) < limit
+                            or squared_segment_distance(bx, by, cx, cy, dx, dy) < limit
+                            or squared_segment_distance(cx, cy, ax, ay, bx, by) < limit
+                            or squared_segment_distance(dx, dy, ax, ay, bx, by) < limit):
             return True
         cx, cy = dx, dy
     return in_polygon(zone, ax, ay) or in_polygon(zone, (ax + bx) / 2, (ay + by) / 2)
@@ -177,8 +187,8 @@ def _clip(pz: float, qz: float, low: float, high: float) -> tuple[float, float]:
 
 
 @allocating_kernel
-def _near_centre(zone: Zone, px: float, py: float, pz: float, dx: float, dy: float,
-                 dz: float, s: float, t: float) -> float:
+def _squared_centre_distance(zone: Zone, px: float, py: float, pz: float, dx: float, dy: float,
+                             dz: float, s: float, t: float) -> float:
     """Squared distance from the centre to the part [s, t] of p + d."""
     fx, fy, fz = px - zone.x, py - zone.y, pz - zone.z
     span = dx * dx + dy * dy + dz * dz
@@ -196,26 +206,27 @@ def _meets_dome(zone: Zone, px: float, py: float, pz: float, qx: float, qy: floa
     grounded = floor >= zone.low
     base = zone.z if grounded else zone.low - skin
     s, t = _clip(pz, qz, base, np.inf)
-    if s < t and _near_centre(zone, px, py, pz, qx - px, qy - py, qz - pz, s, t) < reach * reach:
+    if s < t and _squared_centre_distance(zone, px, py, pz, qx - px, qy - py, qz - pz, s,
+                                          t) < reach * reach:
         return True
     if not grounded:
         return False
     s, t = _clip(pz, qz, -np.inf, base)
     if pz == base and qz == base:
         s, t = 0.0, 1.0
-    return s < t and _near_centre(zone, px, py, zone.z, qx - px, qy - py, 0.0, s,
-                                  t) < reach * reach
+    return s < t and _squared_centre_distance(zone, px, py, zone.z, qx - px, qy - py, 0.0, s,
+                                              t) < reach * reach
 
 
 @allocating_kernel
 def blocked(zone: Zone, px: float, py: float, pz: float, qx: float, qy: float,
-            qz: float, floor: float, snug: bool) -> bool:
+            qz: float, floor: float, no_skin: bool) -> bool:
     """Whether the segment pq enters a zone. `snug`: up to the surface, without the skin."""
     if (min(px, qx) > zone.x1 or max(px, qx) < zone.x0
             or min(py, qy) > zone.y1 or max(py, qy) < zone.y0
             or min(pz, qz) > zone.z1 or max(pz, qz) < zone.z0):
         return False
-    skin = -TOUCH if snug else zone.skin
+    skin = -TOUCH if no_skin else zone.skin
     if zone.kind == DOME:
         return _meets_dome(zone, px, py, pz, qx, qy, qz, floor, skin)
     s, t = _clip(pz, qz, zone.low - skin, zone.high + skin)
@@ -223,34 +234,34 @@ def blocked(zone: Zone, px: float, py: float, pz: float, qx: float, qy: float,
         return False
     if zone.kind == CYLINDER:
         reach = zone.radius + skin
-        return bool(_near_centre(zone, px, py, zone.z, qx - px, qy - py, 0.0, s,
-                                 t) < reach * reach)
+        return bool(_squared_centre_distance(zone, px, py, zone.z, qx - px, qy - py, 0.0, s,
+                                             t) < reach * reach)
     dx, dy = qx - px, qy - py
     return _meets_polygon(zone, px + s * dx, py + s * dy, px + t * dx, py + t * dy,
                           zone.grow + skin)
 
 
 @allocating_kernel
-def contains(zone: Zone, x: float, y: float, z: float, snug: bool) -> bool:
+def contains(zone: Zone, x: float, y: float, z: float, no_skin: bool) -> bool:
     """Whether a point is inside a zone; the space beneath a dome is not."""
-    return blocked(zone, x, y, z, x, y, z, -np.inf, snug)
+    return blocked(zone, x, y, z, x, y, z, -np.inf, no_skin)
 
 
 @allocating_kernel
-def first_around(o: Zones, x: float, y: float, z: float, snug: bool) -> int:
+def first_containing(zones: Zones, x: float, y: float, z: float, no_skin: bool) -> int:
     """The first zone that contains a point; -1: none. O(zones)."""
-    for k in range(o.size):
-        if contains(o[k], x, y, z, snug):
+    for k in range(zones.size):
+        if contains(zones[k], x, y, z, no_skin):
             return k
     return -1
 
 
 @allocating_kernel
-def all_around(o: Zones, x: float, y: float, z: float) -> Ints:
+def containing_zones(zones: Zones, x: float, y: float, z: float) -> Ints:
     """All zones that contain a point. O(zones)."""
-    found, n = np.empty(o.size, np.int64), 0
-    for k in range(o.size):
-        if contains(o[k], x, y, z, True):
+    found, n = np.empty(zones.size, np.int64), 0
+    for k in range(zones.size):
+        if contains(zones[k], x, y, z, True):
             found[n] = k
             n += 1
     return found[:n]

@@ -19,6 +19,19 @@ for _predicate in (orientation, segments_cross, crosses_ray):  # so kernels may 
 
 
 @allocating_kernel
+def corner_turn(ax: float, ay: float, x: float, y: float, bx: float,
+                by: float) -> tuple[float, float]:
+    """Heading [rad] from a to the corner (x, y), and the turn [rad] there towards b.
+
+    Returns:
+        The turn is in [-pi, pi), positive to the left.
+    """
+    heading = math.atan2(y - ay, x - ax)
+    turn = math.atan2(by - y, bx - x) - heading
+    return heading, turn - 2 * math.pi * math.floor((turn + math.pi) / (2 * math.pi))
+
+
+@allocating_kernel
 def _fan(x: float, y: float, radius: float, start: float, turn: float, parts: int, rim: Floats,
          n: int) -> int:
     """Corners of the polyline that circumscribes an arc into rim[n:]; returns the new n."""
@@ -32,7 +45,7 @@ def _fan(x: float, y: float, radius: float, start: float, turn: float, parts: in
 
 
 @allocating_kernel
-def circle(x: float, y: float, radius: float, parts: int) -> Floats:
+def circle_rim(x: float, y: float, radius: float, parts: int) -> Floats:
     """Corners (parts, 2) [m] of the polygon that circumscribes a circle, counter-clockwise."""
     rim = np.empty((parts, 2))
     _fan(x, y, radius, 0.0, 2 * math.pi, parts, rim, 0)
@@ -40,23 +53,21 @@ def circle(x: float, y: float, radius: float, parts: int) -> Floats:
 
 
 @allocating_kernel
-def rim_of(corners: Floats, grow: float) -> Floats:
+def polygon_rim(corners: Floats, grow: float) -> Floats:
     """The outline `grow` [m] off a counter-clockwise polygon, circumscribing its round corners."""
     count = corners.shape[0]
     rim, n = np.empty((5 * count, 2)), 0
     for i in range(count):
         x, y = corners[i, 0], corners[i, 1]
         h, j = i - 1 if i > 0 else count - 1, i + 1 if i + 1 < count else 0
-        start = math.atan2(y - corners[h, 1], x - corners[h, 0])
-        turn = math.atan2(corners[j, 1] - y, corners[j, 0] - x) - start
-        turn -= 2 * math.pi * math.floor((turn + math.pi) / (2 * math.pi))
+        start, turn = corner_turn(corners[h, 0], corners[h, 1], x, y, corners[j, 0], corners[j, 1])
         parts = max(1, math.ceil(4 * turn / math.pi - 1e-9))
         n = _fan(x, y, grow, start - math.pi / 2, turn, parts, rim, n)
     return rim[:n].copy()
 
 
 @allocating_kernel
-def _chain(corners: Floats, order: Ints) -> Floats:
+def _monotone_chain(corners: Floats, order: Ints) -> Floats:
     """The convex hull of corners in lexical order, by monotone chains. O(n)"""
     size = order.size
     hull, n, first = np.empty((2 * size + 1, 2)), 0, 0
@@ -73,6 +84,6 @@ def _chain(corners: Floats, order: Ints) -> Floats:
     return hull[:n - 1].copy()
 
 
-def hull_of(corners: Floats) -> Floats:
+def convex_hull(corners: Floats) -> Floats:
     """The convex hull, counter-clockwise, without corners on its edges."""
-    return _chain(corners, np.lexsort((corners[:, 1], corners[:, 0])))
+    return _monotone_chain(corners, np.lexsort((corners[:, 1], corners[:, 0])))

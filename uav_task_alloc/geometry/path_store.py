@@ -13,20 +13,21 @@ from numba import carray  # type: ignore[attr-defined]
 
 from uav_task_alloc.geometry.numba_pointers import floats_at, ints_at
 from uav_task_alloc.geometry.obstacles import Floats
-from uav_task_alloc.geometry.taut import MAX_CORNERS, copy_point
+from uav_task_alloc.geometry.points import copy_point
+from uav_task_alloc.geometry.taut import MAX_CORNERS
 from uav_task_alloc.kernel import allocating_kernel
 
-PLACES = 1 << 16  # of ways; a power of two
+SLOTS = 1 << 16  # of ways; a power of two
 PROBES = 4  # places a way may have
-_ROOM = 1 << 19  # points kept, ends among them
+_CAPACITY = 1 << 19  # points kept, ends among them
 
 
 class PathStore:
     """Room for the points of ways; `address` is what kernels take."""
 
     def __init__(self) -> None:
-        self._place = np.full(PLACES, -1, np.int64)  # where in the ring a way begins
-        self._points = np.empty((_ROOM, 3))  # number of points, then the points
+        self._place = np.full(SLOTS, -1, np.int64)  # where in the ring a way begins
+        self._points = np.empty((_CAPACITY, 3))  # number of points, then the points
         self._state = np.zeros(3, np.int64)
         self._state[1:] = self._place.ctypes.data, self._points.ctypes.data
 
@@ -43,14 +44,14 @@ def _first_place(ends: Floats) -> int:
         for m in range(3):
             mixed = (mixed ^ np.int64(ends[i, m] * 1024.0)) * 0x9E3779B1
             mixed ^= mixed >> 29
-    return int(mixed & (PLACES - 1))
+    return int(mixed & (SLOTS - 1))
 
 
 @allocating_kernel
 def _same(points: Floats, first: int, ends: Floats) -> bool:
     """Whether the way that begins in row `first` has these ends."""
     n = int(points[first, 0])
-    if not 2 <= n <= MAX_CORNERS or first + n >= _ROOM:
+    if not 2 <= n <= MAX_CORNERS or first + n >= _CAPACITY:
         return False
     for m in range(3):
         if points[first + 1, m] != ends[0, m] or points[first + n, m] != ends[1, m]:
@@ -59,40 +60,40 @@ def _same(points: Floats, first: int, ends: Floats) -> bool:
 
 
 @allocating_kernel
-def remember(address: int, way: Floats, n: int, ends: Floats) -> None:
+def store_path(address: int, path: Floats, n: int, ends: Floats) -> None:
     """Keep the way[:n] between `ends`."""
     state = ints_at(address)
-    place = carray(ints_at(state[1]), PLACES)
-    points = carray(floats_at(state[2]), (_ROOM, 3))
+    slots = carray(ints_at(state[1]), SLOTS)
+    points = carray(floats_at(state[2]), (_CAPACITY, 3))
     first = state[0]
-    if first + n >= _ROOM:
+    if first + n >= _CAPACITY:
         first = 0
     state[0] = first + n + 1
     points[first, 0] = n
     for i in range(n):
-        copy_point(way, i, points, first + 1 + i)
-    at = _first_place(ends)
-    slot = at
+        copy_point(path, i, points, first + 1 + i)
+    first_slot = _first_place(ends)
+    slot = first_slot
     for k in range(PROBES):
-        old = place[(at + k) & (PLACES - 1)]
+        old = slots[(first_slot + k) & (SLOTS - 1)]
         if old < 0 or _same(points, old, ends):
-            slot = (at + k) & (PLACES - 1)
+            slot = (first_slot + k) & (SLOTS - 1)
             break
-    place[slot] = first
+    slots[slot] = first
 
 
 @allocating_kernel
-def recall(address: int, ends: Floats, way: Floats) -> int:
+def load_path(address: int, ends: Floats, path: Floats) -> int:
     """The points of the way between `ends` into way; returns their number, 0: not kept."""
     state = ints_at(address)
-    place = carray(ints_at(state[1]), PLACES)
-    points = carray(floats_at(state[2]), (_ROOM, 3))
-    at = _first_place(ends)
+    slots = carray(ints_at(state[1]), SLOTS)
+    points = carray(floats_at(state[2]), (_CAPACITY, 3))
+    first_slot = _first_place(ends)
     for k in range(PROBES):
-        first = place[(at + k) & (PLACES - 1)]
+        first = slots[(first_slot + k) & (SLOTS - 1)]
         if first >= 0 and _same(points, first, ends):
             n = int(points[first, 0])
             for i in range(n):
-                copy_point(points, first + 1 + i, way, i)
+                copy_point(points, first + 1 + i, path, i)
             return n
     return 0

@@ -11,66 +11,66 @@ from collections.abc import Callable
 
 import numpy as np
 
-from uav_task_alloc.geometry.numba_pointers import float_of, ints_at
+from uav_task_alloc.geometry.numba_pointers import call_float, ints_at
 from uav_task_alloc.geometry.obstacles import Ints
 from uav_task_alloc.kernel import allocating_kernel
 
-SINCE, OVER, MOST, CUT, ASK = range(5)  # what the state holds
+UNCHECKED, EXHAUSTED, MAX_UNITS, CUT_SHORT, CLOCK = range(5)  # what the state holds
 _EVERY = 50_000  # units between two looks at the clock
 UNLIMITED = 1 << 62
 
-_Question = ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_int64, ctypes.c_int64, ctypes.c_int64)
+_Callback = ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_int64, ctypes.c_int64, ctypes.c_int64)
 
 
 class SearchBudget:
     """What searches may spend: all together until `over` says so, each at most `most` units."""
 
-    def __init__(self, over: Callable[[], bool] | None = None) -> None:
+    def __init__(self, time_is_up: Callable[[], bool] | None = None) -> None:
         self.state = np.zeros(5, np.int64)
-        self.state[MOST] = UNLIMITED
-        self._over = over
+        self.state[MAX_UNITS] = UNLIMITED
+        self._time_is_up = time_is_up
         self._error: BaseException | None = None
-        self._question = _Question(self._ask) if over else None
-        if self._question:
-            self.state[ASK] = ctypes.cast(self._question, ctypes.c_void_p).value or 0
+        self._callback = _Callback(self._poll) if time_is_up else None
+        if self._callback:
+            self.state[CLOCK] = ctypes.cast(self._callback, ctypes.c_void_p).value or 0
 
-    def _ask(self, *_: int) -> float:
+    def _poll(self, *_: int) -> float:
         """Called by kernels; what is raised here would be lost there."""
         try:
-            return 1.0 if self._over and self._over() else 0.0
+            return 1.0 if self._time_is_up and self._time_is_up() else 0.0
         except BaseException as error:
             self._error = self._error or error
             return 1.0
 
-    def begin(self, most: int = UNLIMITED) -> None:
+    def start_stage(self, max_units: int = UNLIMITED) -> None:
         """A stage in which each search may take `most` units; nothing is cut yet."""
-        self.state[[OVER, MOST, CUT]] = 0, most, 0
-        self.look()
+        self.state[[EXHAUSTED, MAX_UNITS, CUT_SHORT]] = 0, max_units, 0
+        self.check()
 
-    def look(self) -> bool:
+    def check(self) -> bool:
         """Ask the clock now; whether the time is over. Raises what the question raised."""
-        if self._ask() > 0.0:
-            self.state[OVER] = 1
+        if self._poll() > 0.0:
+            self.state[EXHAUSTED] = 1
         if self._error is not None:
             error, self._error = self._error, None
             raise error
-        return self.is_over
+        return self.is_exhausted
 
     @property
-    def is_over(self) -> bool:
+    def is_exhausted(self) -> bool:
         """Whether the time was over when the clock was asked last."""
-        return bool(self.state[OVER])
+        return bool(self.state[EXHAUSTED])
 
     @property
-    def cut(self) -> int:
+    def interrupted(self) -> int:
         """Searches cut short in this stage."""
-        return int(self.state[CUT])
+        return int(self.state[CUT_SHORT])
 
 
 @allocating_kernel
-def is_over(address: int) -> bool:
+def is_exhausted(address: int) -> bool:
     """Whether no search may go on."""
-    return address != 0 and ints_at(address)[OVER] != 0
+    return address != 0 and ints_at(address)[EXHAUSTED] != 0
 
 
 @allocating_kernel
@@ -88,11 +88,11 @@ def spend(work: Ints, units: int) -> bool:
         return False
     state = ints_at(work[1])
     work[0] += units
-    state[SINCE] += units
-    if state[SINCE] > _EVERY:
-        state[SINCE] = 0
-        if state[ASK] != 0 and float_of(state[ASK], 0, 0, 0) != 0.0:
-            state[OVER] = 1
-    if state[OVER] != 0 or work[0] > state[MOST]:
+    state[UNCHECKED] += units
+    if state[UNCHECKED] > _EVERY:
+        state[UNCHECKED] = 0
+        if state[CLOCK] != 0 and call_float(state[CLOCK], 0, 0, 0) != 0.0:
+            state[EXHAUSTED] = 1
+    if state[EXHAUSTED] != 0 or work[0] > state[MAX_UNITS]:
         work[2] = 1
     return bool(work[2] != 0)

@@ -14,17 +14,17 @@ from numba import carray  # type: ignore[attr-defined]
 
 from uav_task_alloc.geometry.numba_pointers import floats_at
 from uav_task_alloc.geometry.obstacles import CYLINDER, DOME, Floats, Zone
+from uav_task_alloc.geometry.points import copy_point, path_length
 from uav_task_alloc.geometry.polygon import orientation
-from uav_task_alloc.geometry.taut import copy_point, length_of
 from uav_task_alloc.kernel import allocating_kernel
 
 ARC_GAIN = 1.5e-3  # an arc's polyline may be longer by this share of the way
 MAX_PARTS = 12  # corners of one arc
-SLIDES = 10  # rounds in which both rim points of a way over the top find their places
+SLIDE_ROUNDS = 10  # rounds in which both rim points of a way over the top find their places
 
 
 @allocating_kernel
-def _parts(radius: float, arc: float, straight: float) -> int:
+def _arc_corners(radius: float, arc: float, straight: float) -> int:
     """Corners for an arc [rad]: k of them make it longer by about radius arc^3 / (12 k^2)."""
     excess = radius * arc ** 3 / (12.0 * ARC_GAIN * (straight + radius * arc))
     return min(MAX_PARTS, max(1, math.ceil(math.sqrt(excess)), math.ceil(arc)))
@@ -36,11 +36,11 @@ def _dot(u: Floats, v: Floats) -> float:
 
 
 @allocating_kernel
-def _bend(centre: Floats, radius: float, way: Floats, flat: bool, out: Floats) -> int:
+def _tangent_path(centre: Floats, radius: float, ends: Floats, flat: bool, out: Floats) -> int:
     """Tangent, arc, tangent about a ball, or in plan about a circle; 0: no such way."""
     u, v = np.empty(3), np.empty(3)
     for m in range(3):
-        u[m], v[m] = way[0, m] - centre[m], way[1, m] - centre[m]
+        u[m], v[m] = ends[0, m] - centre[m], ends[1, m] - centre[m]
     if flat:
         u[2], v[2] = 0.0, 0.0
     du, dv = math.sqrt(_dot(u, u)), math.sqrt(_dot(v, v))
@@ -60,20 +60,20 @@ def _bend(centre: Floats, radius: float, way: Floats, flat: bool, out: Floats) -
     if arc <= 0.0:
         return 0
     straight = math.sqrt(du * du - radius * radius) + math.sqrt(dv * dv - radius * radius)
-    k = _parts(radius, arc, straight)
+    k = _arc_corners(radius, arc, straight)
     far = radius / math.cos(0.5 * arc / k)
     for j in range(k):
         angle = first + (j + 0.5) * arc / k
         c, s = far * math.cos(angle), far * math.sin(angle) / off
         for m in range(3):
             out[j + 1, m] = centre[m] + c * u[m] + s * v[m]
-    copy_point(way, 0, out, 0)
-    copy_point(way, 1, out, k + 1)
+    copy_point(ends, 0, out, 0)
+    copy_point(ends, 1, out, k + 1)
     return k + 2
 
 
 @allocating_kernel
-def _rise(p: Floats, n: int) -> None:
+def _interpolate_heights(p: Floats, n: int) -> None:
     """Let z of the corners rise evenly with the length in plan from p[0] to p[n - 1]."""
     total = 0.0
     for i in range(1, n):
@@ -85,19 +85,19 @@ def _rise(p: Floats, n: int) -> None:
 
 
 @allocating_kernel
-def _wrap(rim: Floats, way: Floats, side: float, out: Floats) -> int:
+def _path_around_hull(rim: Floats, ends: Floats, side: float, out: Floats) -> int:
     """From a to b around one side (1: left) of a convex rim in plan, by gift wrapping."""
-    copy_point(way, 0, out, 0)
+    copy_point(ends, 0, out, 0)
     n = 1
     while n <= rim.shape[0] + 1:
         x, y = out[n - 1, 0], out[n - 1, 1]
-        bx, by, last = way[1, 0], way[1, 1], True
+        bx, by, last = ends[1, 0], ends[1, 1], True
         for i in range(rim.shape[0]):
             turn = orientation((x, y), (bx, by), (rim[i, 0], rim[i, 1]))
             if side * turn > 0.0 and (rim[i, 0] != x or rim[i, 1] != y):
                 bx, by, last = rim[i, 0], rim[i, 1], False
         if last:
-            copy_point(way, 1, out, n)
+            copy_point(ends, 1, out, n)
             return n + 1
         out[n, 0], out[n, 1] = bx, by
         n += 1
@@ -114,20 +114,20 @@ def _in_hull(hull: Floats, p: Floats) -> bool:
 
 
 @allocating_kernel
-def _crossed(rim: Floats, way: Floats) -> tuple[int, int, float, float]:
+def _crossed_edges(rim: Floats, ends: Floats) -> tuple[int, int, float, float]:
     """The first and last edge of a rim that the line ab crosses in plan, and where; -1: none."""
     enter, leave, s, t = -1, -1, np.inf, -np.inf
-    dx, dy = way[1, 0] - way[0, 0], way[1, 1] - way[0, 1]
+    dx, dy = ends[1, 0] - ends[0, 0], ends[1, 1] - ends[0, 1]
     n = rim.shape[0]
-    a, b = (way[0, 0], way[0, 1]), (way[1, 0], way[1, 1])
+    a, b = (ends[0, 0], ends[0, 1]), (ends[1, 0], ends[1, 1])
     i = n - 1
     si = orientation(a, b, (rim[i, 0], rim[i, 1]))
     for j in range(n):
         sj = orientation(a, b, (rim[j, 0], rim[j, 1]))
         if (si > 0.0) != (sj > 0.0):
             f = si / (si - sj)
-            x = rim[i, 0] + f * (rim[j, 0] - rim[i, 0]) - way[0, 0]
-            y = rim[i, 1] + f * (rim[j, 1] - rim[i, 1]) - way[0, 1]
+            x = rim[i, 0] + f * (rim[j, 0] - rim[i, 0]) - ends[0, 0]
+            y = rim[i, 1] + f * (rim[j, 1] - rim[i, 1]) - ends[0, 1]
             u = (x * dx + y * dy) / (dx * dx + dy * dy)
             if u < s:
                 enter, s = i, u
@@ -138,7 +138,7 @@ def _crossed(rim: Floats, way: Floats) -> tuple[int, int, float, float]:
 
 
 @allocating_kernel
-def _slide(rim: Floats, edge: int, z: float, p: Floats, q: Floats, x: Floats) -> int:
+def _rim_point(rim: Floats, edge: int, z: float, p: Floats, q: Floats, x: Floats) -> int:
     """x = where on an edge of the rim at height z the way p x q is shortest; the edge to try next.
 
     Unfolded about the edge the way is straight, so x divides the feet of p and q in the ratio of
@@ -162,31 +162,32 @@ def _slide(rim: Floats, edge: int, z: float, p: Floats, q: Floats, x: Floats) ->
 
 
 @allocating_kernel
-def _beside(zone: Zone, p: Floats) -> bool:
+def _outside_cylinder(zone: Zone, p: Floats) -> bool:
     """Whether p is outside a cylinder in plan; it may be within its rim, that circumscribes it."""
     return bool(zone.kind == CYLINDER
                 and math.hypot(p[0] - zone.x, p[1] - zone.y) > zone.radius + zone.skin)
 
 
 @allocating_kernel
-def _over(zone: Zone, rim: Floats, z: float, side: float, way: Floats, out: Floats) -> int:
+def _path_over_rim(zone: Zone, rim: Floats, z: float, side: float, ends: Floats,
+                   out: Floats) -> int:
     """Over the rim at height z (side 1), or beneath it (-1); 0: no such way."""
-    enter, leave, s, t = _crossed(rim, way)
-    climbs, sinks = side * (z - way[0, 2]) > 0.0, side * (z - way[1, 2]) > 0.0
-    if (enter < 0 or leave < 0 or (climbs and s <= 0.0 and not _beside(zone, way[0]))
-            or (sinks and t >= 1.0 and not _beside(zone, way[1]))):
+    enter, leave, s, t = _crossed_edges(rim, ends)
+    climbs, sinks = side * (z - ends[0, 2]) > 0.0, side * (z - ends[1, 2]) > 0.0
+    if (enter < 0 or leave < 0 or (climbs and s <= 0.0 and not _outside_cylinder(zone, ends[0]))
+            or (sinks and t >= 1.0 and not _outside_cylinder(zone, ends[1]))):
         return 0
     p, q = np.empty(3), np.empty(3)
     for m in range(2):
-        p[m] = way[0, m] + (max(0.0, s) if climbs else 0.0) * (way[1, m] - way[0, m])
-        q[m] = way[0, m] + (min(1.0, t) if sinks else 1.0) * (way[1, m] - way[0, m])
-    p[2], q[2] = z if climbs else way[0, 2], z if sinks else way[1, 2]
-    for _ in range(SLIDES if climbs and sinks else 4):
+        p[m] = ends[0, m] + (max(0.0, s) if climbs else 0.0) * (ends[1, m] - ends[0, m])
+        q[m] = ends[0, m] + (min(1.0, t) if sinks else 1.0) * (ends[1, m] - ends[0, m])
+    p[2], q[2] = z if climbs else ends[0, 2], z if sinks else ends[1, 2]
+    for _ in range(SLIDE_ROUNDS if climbs and sinks else 4):
         if climbs:
-            enter = _slide(rim, enter, z, way[0], q, p)
+            enter = _rim_point(rim, enter, z, ends[0], q, p)
         if sinks:
-            leave = _slide(rim, leave, z, p, way[1], q)
-    copy_point(way, 0, out, 0)
+            leave = _rim_point(rim, leave, z, p, ends[1], q)
+    copy_point(ends, 0, out, 0)
     n = 1
     if climbs:
         out[n, 0], out[n, 1], out[n, 2] = p[0], p[1], p[2]
@@ -194,22 +195,22 @@ def _over(zone: Zone, rim: Floats, z: float, side: float, way: Floats, out: Floa
     if sinks:
         out[n, 0], out[n, 1], out[n, 2] = q[0], q[1], q[2]
         n += 1
-    copy_point(way, 1, out, n)
+    copy_point(ends, 1, out, n)
     return n + 1
 
 
 @allocating_kernel
-def _over_bound(z: float, side: float, way: Floats) -> float:
+def _least_length_over(z: float, side: float, ends: Floats) -> float:
     """Over (or beneath) height z the way is at least so long [m]."""
-    up = max(0.0, side * (z - way[0, 2])) + max(0.0, side * (z - way[1, 2]))
-    return math.hypot(math.hypot(way[1, 0] - way[0, 0], way[1, 1] - way[0, 1]),
-                      max(up, abs(way[1, 2] - way[0, 2])))
+    up = max(0.0, side * (z - ends[0, 2])) + max(0.0, side * (z - ends[1, 2]))
+    return math.hypot(math.hypot(ends[1, 0] - ends[0, 0], ends[1, 1] - ends[0, 1]),
+                      max(up, abs(ends[1, 2] - ends[0, 2])))
 
 
 @allocating_kernel
 def keep_best(trial: Floats, n: int, out: Floats, best: int) -> int:
     """Copy the trial way to out where it is shorter; returns the number of points there."""
-    if n == 0 or (best > 0 and length_of(trial, n) >= length_of(out, best)):
+    if n == 0 or (best > 0 and path_length(trial, n) >= path_length(out, best)):
         return best
     for i in range(n):
         copy_point(trial, i, out, i)
@@ -217,33 +218,33 @@ def keep_best(trial: Floats, n: int, out: Floats, best: int) -> int:
 
 
 @allocating_kernel
-def past_one(zone: Zone, way: Floats, limits: Floats, floor: float,
-             out: Floats) -> int:
+def path_past_zone(zone: Zone, ends: Floats, limits: Floats, floor: float,
+                   out: Floats) -> int:
     """The shortest way past a zone alone into out; returns its points, 0: no closed form."""
     skin, centre = 1.5 * zone.skin, np.array([zone.x, zone.y, zone.z])
     if zone.kind == DOME:
-        n = _bend(centre, zone.radius + skin, way, False, out) if floor >= zone.low else 0
+        n = _tangent_path(centre, zone.radius + skin, ends, False, out) if floor >= zone.low else 0
         for i in range(1, n - 1):
             if not limits[0] <= out[i, 2] <= limits[1]:
                 return 0
         return n
-    if floor < limits[0] or max(way[0, 2], way[1, 2]) > limits[1]:
+    if floor < limits[0] or max(ends[0, 2], ends[1, 2]) > limits[1]:
         return 0
-    rim = carray(floats_at(zone.rim), (zone.rims, 2))
-    hull = carray(floats_at(zone.hull), (zone.hulls, 2))
-    if zone.dented and (_in_hull(hull, way[0]) or _in_hull(hull, way[1])):
+    rim = carray(floats_at(zone.rim), (zone.rim_count, 2))
+    hull = carray(floats_at(zone.hull), (zone.hull_count, 2))
+    if zone.concave and (_in_hull(hull, ends[0]) or _in_hull(hull, ends[1])):
         return 0
-    trial, best = np.empty((zone.hulls + 3, 3)), 0
+    trial, best = np.empty((zone.hull_count + 3, 3)), 0
     for side in (-1.0, 1.0):
         if zone.kind == CYLINDER:
-            n = _bend(centre, zone.radius + skin, way, True, trial) if side > 0.0 else 0
+            n = _tangent_path(centre, zone.radius + skin, ends, True, trial) if side > 0.0 else 0
         else:
-            n = _wrap(hull, way, side, trial)
-        _rise(trial, n)
+            n = _path_around_hull(hull, ends, side, trial)
+        _interpolate_heights(trial, n)
         best = keep_best(trial, n, out, best)
     for side in (-1.0, 1.0):
         z = zone.high + skin if side > 0.0 else zone.low - skin
         if limits[0] <= z <= limits[1] and not math.isinf(z) and (
-                best == 0 or _over_bound(z, side, way) < length_of(out, best)):
-            best = keep_best(trial, _over(zone, rim, z, side, way, trial), out, best)
+                best == 0 or _least_length_over(z, side, ends) < path_length(out, best)):
+            best = keep_best(trial, _path_over_rim(zone, rim, z, side, ends, trial), out, best)
     return best

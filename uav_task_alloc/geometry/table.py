@@ -6,7 +6,15 @@ import math
 
 import numpy as np
 
-from uav_task_alloc.geometry.obstacles import Floats, Ints, Zone, Zones, blocked, contains
+from uav_task_alloc.geometry.obstacles import (
+    Floats,
+    Ints,
+    Zone,
+    Zones,
+    blocked,
+    box_distance,
+    contains,
+)
 from uav_task_alloc.kernel import allocating_kernel
 
 SPARE = 64  # rows for places to come
@@ -57,47 +65,38 @@ class LengthTable:
 
 
 @allocating_kernel
-def _reach(zone: Zone, p: Floats) -> float:
-    """Distance from p to the box around a zone."""
-    dx = max(zone.x0 - p[0], p[0] - zone.x1, 0.0)
-    dy = max(zone.y0 - p[1], p[1] - zone.y1, 0.0)
-    dz = max(zone.z0 - p[2], p[2] - zone.z1, 0.0)
-    return math.sqrt(dx * dx + dy * dy + dz * dz)
-
-
-@allocating_kernel
 def _touches(zone: Zone, p: Floats, q: Floats, known: float, near_p: float,
-             near_q: float, came: bool) -> bool:
+             near_q: float, added: bool) -> bool:
     """Whether zone k, that came or went, may change the known length between p and q."""
     if math.isinf(known) or known < 0.0:
-        return not came
+        return not added
     if near_p + near_q > known:
         return False
     dx, dy, dz = p[0] - q[0], p[1] - q[1], p[2] - q[2]
     if known > _STRAIGHT * math.sqrt(dx * dx + dy * dy + dz * dz):
         return True
-    return came and blocked(zone, p[0], p[1], p[2], q[0], q[1], q[2], min(p[2], q[2]), False)
+    return added and blocked(zone, p[0], p[1], p[2], q[0], q[1], q[2], min(p[2], q[2]), False)
 
 
 @allocating_kernel
-def _forget_for(cells: Floats, places: Floats, used: int, zone: Zone,
-                came: bool) -> None:
+def _invalidate_for(cells: Floats, places: Floats, used: int, zone: Zone,
+                    added: bool) -> None:
     near, inside = np.empty(used), np.zeros(used, np.bool_)
     for i in range(used):
-        near[i] = _reach(zone, places[i])
+        near[i] = box_distance(zone, places[i, 0], places[i, 1], places[i, 2])
         inside[i] = contains(zone, places[i, 0], places[i, 1], places[i, 2], True)
     for i in range(used):
         for j in range(used):
             known = cells[i, j]
             if known == known and (inside[i] or inside[j] or _touches(
-                    zone, places[i], places[j], known, near[i], near[j], came)):
+                    zone, places[i], places[j], known, near[i], near[j], added)):
                 cells[i, j] = np.nan
 
 
 @allocating_kernel
-def forget(cells: Floats, places: Floats, used: int, gone: Zones, come: Zones) -> None:
+def invalidate(cells: Floats, places: Floats, used: int, removed: Zones, added: Zones) -> None:
     """Make unknown every length that a zone that went or came may change. O(zones n^2)."""
-    for k in range(gone.size):
-        _forget_for(cells, places, used, gone[k], False)
-    for k in range(come.size):
-        _forget_for(cells, places, used, come[k], True)
+    for k in range(removed.size):
+        _invalidate_for(cells, places, used, removed[k], False)
+    for k in range(added.size):
+        _invalidate_for(cells, places, used, added[k], True)

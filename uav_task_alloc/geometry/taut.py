@@ -10,7 +10,8 @@ import math
 
 import numpy as np
 
-from uav_task_alloc.geometry.obstacles import Floats, Ints, Zone, Zones, blocked
+from uav_task_alloc.geometry.obstacles import Floats, Ints, Zones, blocked, box_distance
+from uav_task_alloc.geometry.points import copy_point, path_length, point_distance
 from uav_task_alloc.geometry.search_budget import spend
 from uav_task_alloc.kernel import allocating_kernel
 
@@ -21,63 +22,34 @@ PULL_WORK = 30  # looks at each zone near a corner that is pulled, about
 
 
 @allocating_kernel
-def copy_point(source: Floats, i: int, to: Floats, j: int) -> None:
-    """to[j] = source[i]; slices would do, but take a second each to compile."""
-    to[j, 0], to[j, 1], to[j, 2] = source[i, 0], source[i, 1], source[i, 2]
-
-
-@allocating_kernel
-def free(o: Zones, near: Ints, px: float, py: float, pz: float, qx: float, qy: float,
-         qz: float, floor: float, snug: bool) -> bool:
+def segment_clears(zones: Zones, near: Ints, px: float, py: float, pz: float, qx: float, qy: float,
+                   qz: float, floor: float, no_skin: bool) -> bool:
     """Whether the segment pq is clear of the zones `near`."""
     for m in range(near.size):
-        if blocked(o[near[m]], px, py, pz, qx, qy, qz, floor, snug):
+        if blocked(zones[near[m]], px, py, pz, qx, qy, qz, floor, no_skin):
             return False
     return True
 
 
 @allocating_kernel
-def point_span(p: Floats, i: int, j: int) -> float:
-    """Distance between two points of a way."""
-    dx, dy, dz = p[i, 0] - p[j, 0], p[i, 1] - p[j, 1], p[i, 2] - p[j, 2]
-    return math.sqrt(dx * dx + dy * dy + dz * dz)
-
-
-@allocating_kernel
-def length_of(p: Floats, n: int) -> float:
-    """Length of the way p[:n]."""
-    total = 0.0
-    for i in range(1, n):
-        total += point_span(p, i - 1, i)
-    return total
-
-
-@allocating_kernel
-def _off_box(zone: Zone, p: Floats, i: int) -> float:
-    dx = max(zone.x0 - p[i, 0], p[i, 0] - zone.x1, 0.0)
-    dy = max(zone.y0 - p[i, 1], p[i, 1] - zone.y1, 0.0)
-    dz = max(zone.z0 - p[i, 2], p[i, 2] - zone.z1, 0.0)
-    return math.sqrt(dx * dx + dy * dy + dz * dz)
-
-
-@allocating_kernel
-def zones_near(o: Zones, among: Ints, p: Floats, i: int, j: int, length: float) -> Ints:
+def zones_near(zones: Zones, among: Ints, p: Floats, i: int, j: int, length: float) -> Ints:
     """Those `among` the zones that a way of at most `length` from p[i] to p[j] could meet."""
     near, n = np.empty(among.size, np.int64), 0
     for m in range(among.size):
-        if _off_box(o[among[m]], p, i) + _off_box(o[among[m]], p, j) <= length:
+        if (box_distance(zones[among[m]], p[i, 0], p[i, 1], p[i, 2])
+                + box_distance(zones[among[m]], p[j, 0], p[j, 1], p[j, 2])) <= length:
             near[n] = among[m]
             n += 1
     return near[:n]
 
 
 @allocating_kernel
-def drop_corners(o: Zones, near: Ints, p: Floats, n: int, floor: float, snug: bool) -> int:
+def drop_corners(zones: Zones, near: Ints, p: Floats, n: int, floor: float, no_skin: bool) -> int:
     """Leave out every corner whose neighbours see each other; returns the new n."""
     i = 1
     while i < n - 1:
-        if free(o, near, p[i - 1, 0], p[i - 1, 1], p[i - 1, 2], p[i + 1, 0], p[i + 1, 1],
-                p[i + 1, 2], floor, snug):
+        if segment_clears(zones, near, p[i - 1, 0], p[i - 1, 1], p[i - 1, 2], p[i + 1, 0],
+                          p[i + 1, 1], p[i + 1, 2], floor, no_skin):
             for j in range(i, n - 1):
                 copy_point(p, j + 1, p, j)
             n -= 1
@@ -88,16 +60,16 @@ def drop_corners(o: Zones, near: Ints, p: Floats, n: int, floor: float, snug: bo
 
 
 @allocating_kernel
-def _fits(o: Zones, near: Ints, p: Floats, i: int, q: Floats, limits: Floats, floor: float,
-          snug: bool) -> bool:
+def _fits(zones: Zones, near: Ints, p: Floats, i: int, q: Floats, limits: Floats, floor: float,
+          no_skin: bool) -> bool:
     """Whether corner i may move to q."""
     if q[2] < limits[0] or q[2] > limits[1]:
         return False
     x, y, z = q[0], q[1], q[2]
     for m in range(near.size):
-        zone = o[near[m]]
-        if (blocked(zone, p[i - 1, 0], p[i - 1, 1], p[i - 1, 2], x, y, z, floor, snug)
-                or blocked(zone, x, y, z, p[i + 1, 0], p[i + 1, 1], p[i + 1, 2], floor, snug)):
+        zone = zones[near[m]]
+        if (blocked(zone, p[i - 1, 0], p[i - 1, 1], p[i - 1, 2], x, y, z, floor, no_skin)
+                or blocked(zone, x, y, z, p[i + 1, 0], p[i + 1, 1], p[i + 1, 2], floor, no_skin)):
             return False
     return True
 
@@ -113,7 +85,7 @@ def _put(q: Floats, p: Floats, i: int, axes: Floats, t: float, turn: float, s: f
 @allocating_kernel
 def _axes(p: Floats, i: int, axes: Floats) -> tuple[float, float, float]:
     """Chord direction, direction off it to corner i, third axis; chord, foot and offset [m]."""
-    chord = point_span(p, i - 1, i + 1)
+    chord = point_distance(p, i - 1, p, i + 1)
     if chord < 1e-9:
         return 0.0, 0.0, 0.0
     foot = 0.0
@@ -144,14 +116,14 @@ def _on_ellipse(chord: float, foot: float, off: float, t: float) -> float:
 
 
 @allocating_kernel
-def _press(o: Zones, near: Ints, p: Floats, i: int, axes: Floats, q: Floats, t: float,
-           turn: float, s: float, limits: Floats, floor: float, snug: bool) -> float:
+def _press(zones: Zones, near: Ints, p: Floats, i: int, axes: Floats, q: Floats, t: float,
+           turn: float, s: float, limits: Floats, floor: float, no_skin: bool) -> float:
     """The least offset, from the good one s inwards, at which corner i fits."""
     low, high = 0.0, s
     for _ in range(6):
         middle = 0.5 * (low + high)
         _put(q, p, i, axes, t, turn, middle)
-        if _fits(o, near, p, i, q, limits, floor, snug):
+        if _fits(zones, near, p, i, q, limits, floor, no_skin):
             high = middle
         else:
             low = middle
@@ -159,15 +131,16 @@ def _press(o: Zones, near: Ints, p: Floats, i: int, axes: Floats, q: Floats, t: 
 
 
 @allocating_kernel
-def pull(o: Zones, near: Ints, p: Floats, i: int, limits: Floats, floor: float, snug: bool,
+def pull(zones: Zones, near: Ints, p: Floats, i: int, limits: Floats, floor: float, no_skin: bool,
          rounds: int) -> None:
     """Move corner i to where its two legs are shortest: inwards, along and around its chord."""
     axes, q = np.empty((3, 3)), np.empty(3)
     chord, t, s = _axes(p, i, axes)
     if s < 1e-6:
         return
-    near = zones_near(o, near, p, i - 1, i + 1, point_span(p, i - 1, i) + point_span(p, i, i + 1))
-    s = _press(o, near, p, i, axes, q, t, 0.0, s, limits, floor, snug)
+    legs = point_distance(p, i - 1, p, i) + point_distance(p, i, p, i + 1)
+    near = zones_near(zones, near, p, i - 1, i + 1, legs)
+    s = _press(zones, near, p, i, axes, q, t, 0.0, s, limits, floor, no_skin)
     turn, step_t, step_turn = 0.0, 0.25 * min(chord, 4.0 * s), 0.4
     for _ in range(rounds):
         moved = False
@@ -179,9 +152,9 @@ def pull(o: Zones, near: Ints, p: Floats, i: int, limits: Floats, floor: float, 
             if r <= 0.0:
                 continue
             _put(q, p, i, axes, u, v, r)
-            if _fits(o, near, p, i, q, limits, floor, snug):
+            if _fits(zones, near, p, i, q, limits, floor, no_skin):
                 t, turn, moved = u, v, True
-                s = _press(o, near, p, i, axes, q, t, turn, r, limits, floor, snug)
+                s = _press(zones, near, p, i, axes, q, t, turn, r, limits, floor, no_skin)
         if not moved:
             step_t, step_turn = 0.4 * step_t, 0.4 * step_turn
     _put(q, p, i, axes, t, turn, s)
@@ -189,28 +162,28 @@ def pull(o: Zones, near: Ints, p: Floats, i: int, limits: Floats, floor: float, 
 
 
 @allocating_kernel
-def pull_all(o: Zones, near: Ints, p: Floats, n: int, limits: Floats, floor: float,
-             snug: bool, rounds: int, work: Ints) -> int:
+def pull_all(zones: Zones, near: Ints, p: Floats, n: int, limits: Floats, floor: float,
+             no_skin: bool, rounds: int, work: Ints) -> int:
     """Drop and pull corners until a round gains next to nothing; returns the new n."""
     before = np.inf
     for _ in range(rounds):
-        n = drop_corners(o, near, p, n, floor, snug)
-        total = length_of(p, n)
+        n = drop_corners(zones, near, p, n, floor, no_skin)
+        total = path_length(p, n)
         if n <= 2 or total > before * (1.0 - PULL_GAIN):
             break
         before = total
         for i in range(1, n - 1):
             if spend(work, PULL_WORK * near.size):
                 return n
-            pull(o, near, p, i, limits, floor, snug, 1 + rounds)
+            pull(zones, near, p, i, limits, floor, no_skin, 1 + rounds)
     return n
 
 
 @allocating_kernel
-def _cut(o: Zones, near: Ints, p: Floats, i: int, limits: Floats, floor: float,
-         snug: bool) -> float:
+def _cut(zones: Zones, near: Ints, p: Floats, i: int, limits: Floats, floor: float,
+         no_skin: bool) -> float:
     """How far from corner i, on both its legs, the corner can be cut off."""
-    before, after = point_span(p, i - 1, i), point_span(p, i, i + 1)
+    before, after = point_distance(p, i - 1, p, i), point_distance(p, i, p, i + 1)
     low, high = 0.0, 0.98 * min(before, after)
     for j, leg in ((i - 1, before), (i + 1, after)):  # an end may lie beyond the limits
         if not limits[0] <= p[j, 2] <= limits[1]:
@@ -219,10 +192,10 @@ def _cut(o: Zones, near: Ints, p: Floats, i: int, limits: Floats, floor: float,
     for _ in range(7):
         d = 0.5 * (low + high)
         f, g = d / before, d / after
-        if free(o, near, p[i, 0] + f * (p[i - 1, 0] - p[i, 0]),
+        if segment_clears(zones, near, p[i, 0] + f * (p[i - 1, 0] - p[i, 0]),
                 p[i, 1] + f * (p[i - 1, 1] - p[i, 1]), p[i, 2] + f * (p[i - 1, 2] - p[i, 2]),
                 p[i, 0] + g * (p[i + 1, 0] - p[i, 0]), p[i, 1] + g * (p[i + 1, 1] - p[i, 1]),
-                p[i, 2] + g * (p[i + 1, 2] - p[i, 2]), floor, snug):
+                p[i, 2] + g * (p[i + 1, 2] - p[i, 2]), floor, no_skin):
             low = d
         else:
             high = d
@@ -240,18 +213,18 @@ def _chord(p: Floats, i: int, before: float, after: float) -> float:
 
 
 @allocating_kernel
-def cut_corners(o: Zones, near: Ints, p: Floats, n: int, limits: Floats, floor: float,
-                snug: bool) -> int:
+def cut_corners(zones: Zones, near: Ints, p: Floats, n: int, limits: Floats, floor: float,
+                no_skin: bool) -> int:
     """Replace each corner by two where that shortens the way enough; returns the new n."""
-    least = CUT_GAIN * length_of(p, n)
+    least = CUT_GAIN * path_length(p, n)
     i = 1
     while i < n - 1 and n < MAX_CORNERS - 1:
-        before, after = point_span(p, i - 1, i), point_span(p, i, i + 1)
-        bend = before + after - point_span(p, i - 1, i + 1)
+        before, after = point_distance(p, i - 1, p, i), point_distance(p, i, p, i + 1)
+        bend = before + after - point_distance(p, i - 1, p, i + 1)
         if bend < least:
             i += 1
             continue
-        d = _cut(o, near, p, i, limits, floor, snug)
+        d = _cut(zones, near, p, i, limits, floor, no_skin)
         if d * (2.0 - _chord(p, i, before, after)) < least:
             i += 1
             continue
@@ -266,15 +239,15 @@ def cut_corners(o: Zones, near: Ints, p: Floats, n: int, limits: Floats, floor: 
 
 
 @allocating_kernel
-def tauten(o: Zones, near: Ints, p: Floats, n: int, limits: Floats, floor: float,
-           snug: bool, work: Ints) -> int:
+def tauten(zones: Zones, near: Ints, p: Floats, n: int, limits: Floats, floor: float,
+           no_skin: bool, work: Ints) -> int:
     """Shorten the clear way p[:n] in place, keeping it clear; returns the new n."""
-    n = pull_all(o, near, p, n, limits, floor, snug, 3, work)
+    n = pull_all(zones, near, p, n, limits, floor, no_skin, 3, work)
     for _ in range(4):
         if work[2]:
             break
-        more = cut_corners(o, near, p, n, limits, floor, snug)
+        more = cut_corners(zones, near, p, n, limits, floor, no_skin)
         if more == n:
             break
-        n = pull_all(o, near, p, more, limits, floor, snug, 2, work)
+        n = pull_all(zones, near, p, more, limits, floor, no_skin, 2, work)
     return n

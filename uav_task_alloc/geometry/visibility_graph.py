@@ -18,6 +18,8 @@ from uav_task_alloc.geometry.obstacles import (
     Zones,
     blocked,
 )
+from uav_task_alloc.geometry.outline import corner_turn
+from uav_task_alloc.geometry.points import point_distance
 from uav_task_alloc.geometry.polygon import orientation
 from uav_task_alloc.geometry.search_budget import spend
 from uav_task_alloc.kernel import allocating_kernel
@@ -29,44 +31,44 @@ FEW_CORNERS = 160  # up to here edges are tested as late as possible
 def corner_bound(zone: Zone, ring: int, levels: int) -> int:
     """At most so many corners come from a zone, with those at further levels."""
     if zone.kind == PRISM:
-        return int((10 + 2 * levels) * zone.count)
+        return int((10 + 2 * levels) * zone.corner_count)
     return (4 + levels) * ring + 1
 
 
 @allocating_kernel
-def _height(way: Floats, x: float, y: float) -> float:
+def _height(ends: Floats, x: float, y: float) -> float:
     """z of the straight way ab where (x, y) is nearest to it in plan."""
-    dx, dy = way[1, 0] - way[0, 0], way[1, 1] - way[0, 1]
+    dx, dy = ends[1, 0] - ends[0, 0], ends[1, 1] - ends[0, 1]
     span = dx * dx + dy * dy
     t = 0.5
     if span > 0.0:
-        t = min(1.0, max(0.0, ((x - way[0, 0]) * dx + (y - way[0, 1]) * dy) / span))
-    return float(way[0, 2] + t * (way[1, 2] - way[0, 2]))
+        t = min(1.0, max(0.0, ((x - ends[0, 0]) * dx + (y - ends[0, 1]) * dy) / span))
+    return float(ends[0, 2] + t * (ends[1, 2] - ends[0, 2]))
 
 
 @allocating_kernel
-def _heading(zone: Zone, way: Floats) -> tuple[float, float]:
+def _heading(zone: Zone, ends: Floats) -> tuple[float, float]:
     """The way's direction in plan, so that what is built on it turns with the scene."""
-    dx, dy = way[1, 0] - way[0, 0], way[1, 1] - way[0, 1]
+    dx, dy = ends[1, 0] - ends[0, 0], ends[1, 1] - ends[0, 1]
     size = math.hypot(dx, dy)
-    if size <= 1e-9 * abs(way[1, 2] - way[0, 2]):
-        dx, dy = way[0, 0] - zone.x, way[0, 1] - zone.y
+    if size <= 1e-9 * abs(ends[1, 2] - ends[0, 2]):
+        dx, dy = ends[0, 0] - zone.x, ends[0, 1] - zone.y
         size = math.hypot(dx, dy)
     return (dx / size, dy / size) if size > 0.0 else (1.0, 0.0)
 
 
 @allocating_kernel
-def _ring(zone: Zone, way: Floats, limits: Floats, radius: float, z: float, ring: int,
+def _ring(zone: Zone, ends: Floats, limits: Floats, radius: float, z: float, ring: int,
           out: Floats, n: int) -> int:
     """`ring` corners around the axis of zone k at height z (NaN: that of the way)."""
-    ux, uy = _heading(zone, way)
+    ux, uy = _heading(zone, ends)
     low, high = limits[0], limits[1]
     for j in range(ring):
         c, s = math.cos(2 * math.pi * j / ring), math.sin(2 * math.pi * j / ring)
         ex, ey = ux * c - uy * s, ux * s + uy * c
         x, y, h = zone.x + radius * ex, zone.y + radius * ey, z
         if math.isnan(z):
-            h = min(high, max(low, _height(way, x, y)))
+            h = min(high, max(low, _height(ends, x, y)))
             if zone.kind == DOME:
                 up = max(0.0, h - zone.z)
                 if up >= radius:
@@ -79,44 +81,44 @@ def _ring(zone: Zone, way: Floats, limits: Floats, radius: float, z: float, ring
 
 
 @allocating_kernel
-def _dome_corners(zone: Zone, way: Floats, limits: Floats, floor: float, ring: int,
+def _dome_corners(zone: Zone, ends: Floats, limits: Floats, floor: float, ring: int,
                   out: Floats, n: int) -> int:
     radius = (zone.radius + 1.5 * zone.skin) / math.cos(math.pi / ring)
-    n = _ring(zone, way, limits, radius, np.nan, ring, out, n)
+    n = _ring(zone, ends, limits, radius, np.nan, ring, out, n)
     for step in range(1, 3):
         up = min(radius * math.sin(math.pi / 6 * step), limits[1] - zone.z)
         if up > 0.0 and zone.z + up >= limits[0]:
-            n = _ring(zone, way, limits, math.sqrt(radius * radius - up * up),
+            n = _ring(zone, ends, limits, math.sqrt(radius * radius - up * up),
                       zone.z + up, ring, out, n)
     if limits[0] <= zone.z + radius <= limits[1]:
         out[n, 0], out[n, 1], out[n, 2] = zone.x, zone.y, zone.z + radius
         n += 1
     under = zone.low - 1.5 * zone.skin
     if floor < zone.low and limits[0] <= under <= limits[1]:
-        n = _ring(zone, way, limits, radius, under, ring, out, n)
+        n = _ring(zone, ends, limits, radius, under, ring, out, n)
     return n
 
 
 @allocating_kernel
-def _crossing(way: Floats, px: float, py: float, qx: float, qy: float) -> float:
+def _crossing(ends: Floats, px: float, py: float, qx: float, qy: float) -> float:
     """Where along pq, in 0..1, the straight way ab crosses it in plan; NaN: nowhere."""
-    a, b = (way[0, 0], way[0, 1]), (way[1, 0], way[1, 1])
+    a, b = (ends[0, 0], ends[0, 1]), (ends[1, 0], ends[1, 1])
     sp, sq = orientation(a, b, (px, py)), orientation(a, b, (qx, qy))
     return sp / (sp - sq) if sp * sq < 0.0 else np.nan
 
 
 @allocating_kernel
-def _edge_corners(zone: Zone, way: Floats, z: float, reach: float, out: Floats,
+def _edge_corners(zone: Zone, ends: Floats, z: float, reach: float, out: Floats,
                   n: int) -> int:
     """Corners on a rim of the enlarged prism: each edge's middle and where the way crosses it."""
-    c, count = floats_at(zone.corners), zone.count
+    c, count = floats_at(zone.corners), zone.corner_count
     for i in range(count):
         j = (i + 1) % count
         px, py = c[2 * i], c[2 * i + 1]
         dx, dy = c[2 * j] - px, c[2 * j + 1] - py
         size = math.hypot(dx, dy)
         px, py = px + dy * reach / size, py - dx * reach / size
-        cross = _crossing(way, px, py, px + dx, py + dy)
+        cross = _crossing(ends, px, py, px + dx, py + dy)
         for t in (0.5, cross):
             if not math.isnan(t):
                 out[n, 0], out[n, 1], out[n, 2] = px + t * dx, py + t * dy, z
@@ -125,17 +127,16 @@ def _edge_corners(zone: Zone, way: Floats, z: float, reach: float, out: Floats,
 
 
 @allocating_kernel
-def _prism_corners(zone: Zone, way: Floats, limits: Floats, z: float, out: Floats,
+def _prism_corners(zone: Zone, ends: Floats, limits: Floats, z: float, out: Floats,
                    n: int) -> int:
     """Mitred corners at the convex corners of the enlarged polygon, at z (NaN: the way's)."""
     reach = zone.grow + 1.5 * zone.skin
-    corners, count = floats_at(zone.corners), zone.count
+    corners, count = floats_at(zone.corners), zone.corner_count
     for i in range(count):
         h, j = (i - 1) % count, (i + 1) % count
         cx, cy = corners[2 * i], corners[2 * i + 1]
-        before = math.atan2(cy - corners[2 * h + 1], cx - corners[2 * h])
-        turn = math.atan2(corners[2 * j + 1] - cy, corners[2 * j] - cx) - before
-        turn -= 2 * math.pi * math.floor((turn + math.pi) / (2 * math.pi))
+        before, turn = corner_turn(corners[2 * h], corners[2 * h + 1], cx, cy,
+                                   corners[2 * j], corners[2 * j + 1])
         if turn <= 0.0:
             continue
         parts = max(1, math.ceil(turn / (0.5 * math.pi) - 1e-9))
@@ -144,18 +145,18 @@ def _prism_corners(zone: Zone, way: Floats, limits: Floats, z: float, out: Float
             angle = before - 0.5 * math.pi + (j + 0.5) * turn / parts
             x, y = cx + far * math.cos(angle), cy + far * math.sin(angle)
             out[n, 0], out[n, 1] = x, y
-            out[n, 2] = min(limits[1], max(limits[0], _height(way, x, y))) if math.isnan(
+            out[n, 2] = min(limits[1], max(limits[0], _height(ends, x, y))) if math.isnan(
                 z) else z
             n += 1
     return n
 
 
 @allocating_kernel
-def add_corners(zone: Zone, way: Floats, limits: Floats, floor: float, ring: int,
+def add_corners(zone: Zone, ends: Floats, limits: Floats, floor: float, ring: int,
                 out: Floats, n: int) -> int:
     """Write the corners of zone k for the way ab into out[n:]; returns the new n."""
     if zone.kind == DOME:
-        return _dome_corners(zone, way, limits, floor, ring, out, n)
+        return _dome_corners(zone, ends, limits, floor, ring, out, n)
     radius = (zone.radius + 1.5 * zone.skin) / math.cos(math.pi / ring)
     for level in range(3):
         z = np.nan
@@ -166,54 +167,48 @@ def add_corners(zone: Zone, way: Floats, limits: Floats, floor: float, ring: int
         if z < limits[0] or z > limits[1] or math.isinf(z):
             continue
         if zone.kind == CYLINDER:
-            n = _ring(zone, way, limits, radius, z, ring, out, n)
+            n = _ring(zone, ends, limits, radius, z, ring, out, n)
         else:
-            n = _prism_corners(zone, way, limits, z, out, n)
+            n = _prism_corners(zone, ends, limits, z, out, n)
             if not math.isnan(z):
-                n = _edge_corners(zone, way, z, zone.grow + 1.5 * zone.skin, out, n)
+                n = _edge_corners(zone, ends, z, zone.grow + 1.5 * zone.skin, out, n)
     return n
 
 
 @allocating_kernel
-def add_level(zone: Zone, way: Floats, limits: Floats, z: float, ring: int, out: Floats,
+def add_level(zone: Zone, ends: Floats, limits: Floats, z: float, ring: int, out: Floats,
               n: int) -> int:
     """Write corners around a zone at a height where another zone ends; returns the new n."""
     low = zone.z if zone.kind == DOME else zone.low
     if not (max(low, limits[0]) < z < min(zone.high, limits[1])):
         return n
     if zone.kind == PRISM:
-        return _prism_corners(zone, way, limits, z, out, n)
+        return _prism_corners(zone, ends, limits, z, out, n)
     radius = (zone.radius + 1.5 * zone.skin) / math.cos(math.pi / ring)
     if zone.kind == DOME:
         radius = math.sqrt(radius * radius - (z - zone.z) ** 2)
-    return _ring(zone, way, limits, radius, z, ring, out, n)
+    return _ring(zone, ends, limits, radius, z, ring, out, n)
 
 
 @allocating_kernel
-def _gap(x: Floats, i: int, j: int) -> float:
-    dx, dy, dz = x[i, 0] - x[j, 0], x[i, 1] - x[j, 1], x[i, 2] - x[j, 2]
-    return math.sqrt(dx * dx + dy * dy + dz * dz)
-
-
-@allocating_kernel
-def _boxes(o: Zones, active: Ints) -> Floats:
+def _boxes(zones: Zones, active: Ints) -> Floats:
     """x0, x1, y0, y1 of the active zones, side by side in memory."""
     boxes = np.empty((active.size, 4))
     for m in range(active.size):
-        zone = o[active[m]]
+        zone = zones[active[m]]
         boxes[m, 0], boxes[m, 1], boxes[m, 2], boxes[m, 3] = zone.x0, zone.x1, zone.y0, zone.y1
     return boxes
 
 
 @allocating_kernel
-def _sees(o: Zones, active: Ints, boxes: Floats, x: Floats, i: int, j: int, floor: float,
-          snug: bool) -> bool:
+def _is_visible(zones: Zones, active: Ints, boxes: Floats, x: Floats, i: int, j: int, floor: float,
+                no_skin: bool) -> bool:
     x0, x1 = min(x[i, 0], x[j, 0]), max(x[i, 0], x[j, 0])
     y0, y1 = min(x[i, 1], x[j, 1]), max(x[i, 1], x[j, 1])
     for m in range(active.size):
         if (x0 <= boxes[m, 1] and x1 >= boxes[m, 0] and y0 <= boxes[m, 3] and y1 >= boxes[m, 2]
-                and blocked(o[active[m]], x[i, 0], x[i, 1], x[i, 2], x[j, 0], x[j, 1], x[j, 2],
-                            floor, snug)):
+                and blocked(zones[active[m]], x[i, 0], x[i, 1], x[i, 2], x[j, 0], x[j, 1], x[j, 2],
+                            floor, no_skin)):
             return False
     return True
 
@@ -225,7 +220,7 @@ def _next_parent(x: Floats, cost: Floats, closed: Ints, done: int, v: int,
     best, parent, above, passed = np.inf, -1, cost[v], False
     for m in range(done):
         u = closed[m]
-        c = cost[u] + _gap(x, u, v)
+        c = cost[u] + point_distance(x, u, x, v)
         if c < best and (c > above or (c == above and passed)):
             best, parent = c, u
         passed = passed or u == failed
@@ -243,7 +238,7 @@ def _nearest_open(cost: Floats, ahead: Floats, state: Any) -> int:
 
 
 @allocating_kernel
-def astar(o: Zones, active: Ints, x: Floats, floor: float, snug: bool, path: Ints,
+def astar(zones: Zones, active: Ints, x: Floats, floor: float, no_skin: bool, path: Ints,
           work: Ints) -> int:
     """Shortest way 0 -> 1 over corners x past the active zones; returns its corners, 0: none.
 
@@ -252,18 +247,19 @@ def astar(o: Zones, active: Ints, x: Floats, floor: float, snug: bool, path: Int
     many that would be sought too often, and all edges of a corner are tested when it is closed.
     O(n) a step, or O(n zones).
     """
-    n, boxes = x.shape[0], _boxes(o, active)
+    n, boxes = x.shape[0], _boxes(zones, active)
     lazy = n <= FEW_CORNERS
     cost, state = np.full(n, np.inf), np.zeros(n, np.int8)
     parent, closed, ahead = np.full(n, -1), np.empty(n, np.int64), np.empty(n)
     for v in range(n):
-        ahead[v] = _gap(x, v, 0)
+        ahead[v] = point_distance(x, v, x, 0)
     cost[1], state[1], closed[0], done, u = 0.0, 1, 1, 1, 1
     while True:
         for v in range(n):
             if state[v] == 0:
-                c = cost[u] + _gap(x, u, v)
-                if c < cost[v] and (lazy or _sees(o, active, boxes, x, u, v, floor, snug)):
+                c = cost[u] + point_distance(x, u, x, v)
+                if c < cost[v] and (lazy or _is_visible(zones, active, boxes, x, u, v, floor,
+                                                        no_skin)):
                     cost[v], parent[v] = c, u
             if v % 64 == 0 and spend(work, 64 if lazy else 64 * active.size):
                 return 0
@@ -271,7 +267,7 @@ def astar(o: Zones, active: Ints, x: Floats, floor: float, snug: bool, path: Int
             v = _nearest_open(cost, ahead, state)
             if v < 0 or spend(work, n + active.size):
                 return 0
-            if not lazy or _sees(o, active, boxes, x, parent[v], v, floor, snug):
+            if not lazy or _is_visible(zones, active, boxes, x, parent[v], v, floor, no_skin):
                 break
             cost[v], parent[v] = _next_parent(x, cost, closed, done, v, parent[v])
         state[v], closed[done], u = 1, v, v

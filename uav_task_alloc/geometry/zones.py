@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable, Sequence
 from itertools import pairwise
 
-from uav_task_alloc.geometry.obstacles import all_around, blocked, contains, pack
+from uav_task_alloc.geometry.obstacles import blocked, containing_zones, contains, pack
 from uav_task_alloc.geometry.polygon import contains_point, edges
 from uav_task_alloc.geometry.polyline import segment_distance
 from uav_task_alloc.model import Point, Shape, ThreatZone, check_point
@@ -22,7 +22,7 @@ def zones_around(point: Iterable[float], zones: Sequence[ThreatZone],
                  clearance: float = 0.0) -> tuple[ThreatZone, ...]:
     """The enlarged zones a point is inside of."""
     packed, place = pack(zones, clearance), check_point('point', point)
-    return tuple(zones[k] for k in all_around(packed.rows, *place))
+    return tuple(zones[k] for k in containing_zones(packed.rows, *place))
 
 
 def outline(zone: ThreatZone, clearance: float = 0.0) -> list[tuple[float, float]]:
@@ -63,8 +63,8 @@ def cut_by(a: Iterable[float], b: Iterable[float], zones: Sequence[ThreatZone],
     return None
 
 
-def way_is_clear(points: Sequence[Point], zones: Sequence[ThreatZone],
-                 clearance: float = 0.0) -> bool:
+def path_is_clear(points: Sequence[Point], zones: Sequence[ThreatZone],
+                  clearance: float = 0.0) -> bool:
     """Whether the polyline through `points` stays outside every enlarged zone."""
     return all(is_clear(a, b, zones, clearance) for a, b in pairwise(points))
 

@@ -24,12 +24,12 @@ IN_SEARCH = 1_000_000  # for one that bees ask for
 
 
 class PathPreparation:
-    """The effort of one solve; `legs` are those of the plan before, by UAV with its task ids."""
+    """The search budget of one solve; `flown` are the legs of the previous plan by UAV."""
 
     def __init__(self, clock: Callable[[], float], began: float, budget: float,
                  stop: Callable[[], bool] | None = None,
                  flown: Mapping[str, tuple[Sequence[str], Sequence[Leg]]] | None = None) -> None:
-        self.effort, self.flown = SearchBudget(self._over), flown or {}
+        self.path_budget, self.flown = SearchBudget(self._over), flown or {}
         self._clock, self._began, self._budget = clock, began, max(budget, _LEAST)
         self._stop: Callable[[], bool] | None = stop
         self._share, self._heeds_stop = 1.0, True
@@ -46,7 +46,7 @@ class PathPreparation:
         would take tasks away.
         """
         self._share, self._heeds_stop = share, heeds_stop
-        self.effort.begin(most)
+        self.path_budget.start_stage(most)
 
     def find_flown(self, ways: Distances, place: Mapping[str, int]) -> None:
         """Seek the legs that are flown already; `place` has UAVs' starts and tasks by id.
@@ -64,9 +64,9 @@ class PathPreparation:
         if not rows or not ways.zones:
             return
         ways.ensure([row[0] for row in rows], [row[1] for row in rows])
-        for i, j, points in rows if self.effort.cut else ():
+        for i, j, points in rows if self.path_budget.interrupted else ():
             if ways.given_up(i, j):
-                ways.suggest(i, j, points)
+                ways.offer_path(i, j, points)
 
     def find_near(self, ways: Distances, a: Arrays, near: Ints) -> None:
         """Seek the ways from each task to the tasks near it (rows of `near`), and from starts."""
@@ -77,5 +77,5 @@ class PathPreparation:
         for most in ROUNDS:
             self.begin(SOUGHT, most, heeds_stop=most > 0)
             ways.ensure(origins, goals)
-            if self.effort.is_over or not self.effort.cut:
+            if self.path_budget.is_exhausted or not self.path_budget.interrupted:
                 break

@@ -146,10 +146,10 @@ def _distances(uavs: Sequence[Uav], tasks: Sequence[Task],
     extra = [point for u in uavs if locked.get(u.id)
              for point in (u.position, *(t.position for t in locked[u.id]))]
     points = np.array([*starts, *(t.position for t in tasks), *homes, *extra], dtype=np.float64)
-    points, effort = points.reshape(-1, 3), search.effort if search else None
+    points, budget = points.reshape(-1, 3), search.path_budget if search else None
     if known is not None:
-        return known.updated(points, limits.zones, effort)
-    return Distances(points, limits.zones, clearance=limits.clearance, effort=effort,
+        return known.updated(points, limits.zones, budget)
+    return Distances(points, limits.zones, clearance=limits.clearance, budget=budget,
                      altitude_min=limits.altitude_min, altitude_max=limits.altitude_max)
 
 

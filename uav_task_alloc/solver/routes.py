@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from uav_task_alloc.geometry.distances import Pairs, length, length_over
+from uav_task_alloc.geometry.distances import Pairs, length, length_via
 from uav_task_alloc.kernel import inline_kernel, kernel
 
 Floats = NDArray[np.float64]
@@ -194,7 +194,7 @@ def insert(a: Arrays, r: Routes, t: int, after: int) -> None:
 @inline_kernel
 def _over(a: Arrays, r: Routes, before: int, t: int, then: int) -> float:
     """Length [m] of the way over t, which is kept where its points are."""
-    found = float(length_over(a.pairs, WHOLE(before), WHOLE(t), WHOLE(then)))
+    found = float(length_via(a.pairs, WHOLE(before), WHOLE(t), WHOLE(then)))
     return found if found < math.inf else float(r.leg[before] + r.leg[t])
 
 

@@ -69,7 +69,7 @@ def plan(uavs: Iterable[Uav], tasks: Iterable[Task], zones: Iterable[ThreatZone]
     search.begin(1.0, IN_SEARCH)
     learnt = SOLVERS[solver](recorder, seed, before.learnt)
     made = to_plan(problem, recorder, solver, warm is not None)
-    search.effort.look()  # raises what a question raised in a kernel
+    search.path_budget.check()  # raises what a question raised in a kernel
     return replace(made, state=WarmState(problem, learnt, made.routes))
 
 
@@ -102,5 +102,5 @@ def warm_up(solver: str = 'chain_q', zones: bool = False) -> None:
     to_plan(problem, recorder, '', False)
     place_all(problem.arrays, recorder.best, np.empty(0, np.int64))  # these two only have work
     relieve(problem.arrays, recorder.best)  # where ranges do not suffice
-    problem.distances.suggest(0, len(uavs), ())
-    find_detour(tasks[1].position, uavs[1].position, between, effort=search.effort)
+    problem.distances.offer_path(0, len(uavs), ())
+    find_detour(tasks[1].position, uavs[1].position, between, budget=search.path_budget)

@@ -8,7 +8,7 @@ from allocation import Desk
 from uav_task_alloc.allocator.records import UavReport
 from uav_task_alloc.allocator.status import worries
 from uav_task_alloc.errors import InvalidValue
-from uav_task_alloc.geometry.zones import way_is_clear
+from uav_task_alloc.geometry.zones import path_is_clear
 from uav_task_alloc.model import ThreatZone
 
 
@@ -192,7 +192,7 @@ def test_a_way_home_on_a_low_battery_leads_around_a_zone():
     desk.settle()
     home = [(1000.0, 0.0, 50.0), *desk.lists['a'].end_via, (0.0, 0.0, 50.0)]
     assert len(home) > 2
-    assert way_is_clear(home, [dome])
+    assert path_is_clear(home, [dome])
 
 
 def test_a_battery_is_good_again_when_it_is_well_above_the_reserve():

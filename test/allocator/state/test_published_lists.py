@@ -10,7 +10,7 @@ from uav_task_alloc import plan
 from uav_task_alloc.allocator.records import AnnouncementAction, ListStop, ReplanAnswer, UavList
 from uav_task_alloc.allocator.replanning.list_rate_limiter import ListRateLimiter
 from uav_task_alloc.allocator.replanning.plan_acceptance import exchanges, steady
-from uav_task_alloc.geometry.zones import way_is_clear
+from uav_task_alloc.geometry.zones import path_is_clear
 from uav_task_alloc.model import Leg, ThreatZone
 
 DOME = ThreatZone.hemisphere('dome', (500.0, 5.0, 0.0), 100.0)
@@ -42,7 +42,7 @@ def test_only_lists_that_changed_are_told(desk):
 
 def test_a_list_leads_around_a_zone(desk):
     assert desk.lists['a'].stops[0].leg.via
-    assert way_is_clear(points(desk, 'a', (0.0, 0.0, 50.0)), [DOME])
+    assert path_is_clear(points(desk, 'a', (0.0, 0.0, 50.0)), [DOME])
 
 
 def test_the_way_stays_as_told_while_the_uav_flies_it(desk):
@@ -60,7 +60,7 @@ def test_a_new_zone_that_cuts_a_way_changes_it(desk):
     desk.world.set_zones([DOME, wall], (), desk.now)
     desk.settle()
     assert desk.lists['a'].revision == 2
-    assert way_is_clear(points(desk, 'a', (0.0, 0.0, 50.0)), [DOME, wall])
+    assert path_is_clear(points(desk, 'a', (0.0, 0.0, 50.0)), [DOME, wall])
     assert 'b' not in [each.uav for each in desk.history[2:]]
     assert 'zones wall' in desk.solves[-1]
 
@@ -98,7 +98,7 @@ def test_a_uav_caught_in_a_zone_gets_the_way_out_first(desk):
     desk.settle(wait=1.0)
     assert any('a is inside a zone' in note for note in desk.notes)
     way = points(desk, 'a', (0.0, 0.0, 50.0))
-    assert way_is_clear(way[1:], [DOME, trap])
+    assert path_is_clear(way[1:], [DOME, trap])
     solves = len(desk.solves)
     desk.settle(wait=1.0)
     assert len(desk.solves) == solves  # it knows already
@@ -188,7 +188,7 @@ def test_the_way_home_leads_around_a_zone_too(returning):
     told = returning.lists['a']
     assert told.returns
     assert told.end_via
-    assert way_is_clear(home_bound(returning), [DOME])
+    assert path_is_clear(home_bound(returning), [DOME])
 
 
 def test_the_way_home_stays_as_told_once_all_is_flown(returning):
@@ -209,7 +209,7 @@ def test_a_new_zone_on_the_way_home_changes_it(returning):
     wall = ThreatZone.cylinder('wall', (750.0, 0.0), 100.0)
     returning.world.set_zones([DOME, wall], (), returning.now)
     returning.settle()
-    assert way_is_clear(home_bound(returning), [DOME, wall])
+    assert path_is_clear(home_bound(returning), [DOME, wall])
 
 
 def test_a_task_served_more_changes_only_the_lists_that_it_takes():

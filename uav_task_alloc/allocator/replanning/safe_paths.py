@@ -45,11 +45,11 @@ class SafePaths:
 
     def _find(self, a: Point, b: Point) -> Detour:
         """By whoever also hears and tells: a search must not keep it for long."""
-        params, effort = self.params, SearchBudget()
-        effort.begin(MOST_WORK)
+        params, budget = self.params, SearchBudget()
+        budget.start_stage(MOST_WORK)
         return find_detour(a, b, self.zones, clearance=params.clearance,
                            altitude_min=params.altitude_min, altitude_max=params.altitude_max,
-                           effort=effort, obstacles=self._planned)
+                           budget=budget, obstacles=self._planned)
 
     def around(self, point: Point, up: float = 0.0, wide: bool = False) -> str:
         """The first zone that the point, or a point less than `up` [m] above it, is in.

@@ -42,6 +42,6 @@ def warm_up(plan: Callable[..., Plan], params: AllocatorParams) -> int:
         before = answer.fresh
     ways = Distances([(0.0, 0.0, 0.0), (1.0, 0.0, 0.0)], ZONES)
     ways.ensure([0], [1])
-    ways.suggest(0, 1, ())
-    find_detour((100.0, 0.0, 10.0), (400.0, 0.0, 10.0), ZONES, effort=SearchBudget(lambda: False))
+    ways.offer_path(0, 1, ())
+    find_detour((100.0, 0.0, 10.0), (400.0, 0.0, 10.0), ZONES, budget=SearchBudget(lambda: False))
     return len(allocator.collect().lists)

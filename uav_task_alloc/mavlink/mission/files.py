@@ -18,7 +18,7 @@ from urllib.parse import quote
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from uav_task_alloc.geometry.frames import Origin, to_geodetic, to_geodetic_batch
-from uav_task_alloc.geometry.zones import way_is_clear
+from uav_task_alloc.geometry.zones import path_is_clear
 from uav_task_alloc.mavlink.autopilots import ARDUPILOT, OFF_GROUND, PX4, Profile
 from uav_task_alloc.mavlink.mission.items import (
     Item,
@@ -97,7 +97,7 @@ def list_for_route(route: Route, tasks: Mapping[str, Task]) -> TaskList:
 
 
 def _with_points_between(uav: ScenarioUav, profile: Profile, tasks: TaskList) -> TaskList:
-    """Divide long legs, so that they keep the plan's heights; a first leg from the ground is level.
+    """Divide long legs, which so keep the plan's heights; a first leg from the ground is level.
 
     The files have no take-off item: a straight climb to its first point would be low for
     kilometres.
@@ -123,8 +123,9 @@ def plan_file(mission: PlannedMission) -> dict[str, Any]:
     return {
         'fileType': 'Plan', 'version': 1, 'groundStation': 'uav_task_alloc',
         'mission': {
-            'version': 2, 'firmwareType': _AUTOPILOTS[uav.autopilot][1], 
-            'vehicleType': dialect.MAV_TYPE_QUADROTOR, 'cruiseSpeed': uav.cruise_speed, 'hoverSpeed': uav.cruise_speed,
+            'version': 2, 'firmwareType': _AUTOPILOTS[uav.autopilot][1],
+            'vehicleType': dialect.MAV_TYPE_QUADROTOR,
+            'cruiseSpeed': uav.cruise_speed, 'hoverSpeed': uav.cruise_speed,
             'globalPlanAltitudeMode': _ALTITUDE_MODE_AMSL,
             'plannedHomePosition': _home(mission),
             'items': [_simple_item(number, item) for number, item in enumerate(mission.items, 1)],
@@ -186,7 +187,7 @@ def _path(uav: ScenarioUav, tasks: TaskList) -> list[Point]:
 def _split_zones(path: Sequence[Point], zones: Sequence[ThreatZone]) -> tuple[
         tuple[ThreatZone, ...], tuple[ThreatZone, ...]]:
     """The zones that a path keeps out of at any height, and the others."""
-    clear = {zone.id: way_is_clear(path, [_column(zone)]) for zone in zones}
+    clear = {zone.id: path_is_clear(path, [_column(zone)]) for zone in zones}
     return (tuple(zone for zone in zones if clear[zone.id]),
             tuple(zone for zone in zones if not clear[zone.id]))
 
