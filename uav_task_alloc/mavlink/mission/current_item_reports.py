@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from uav_task_alloc.mavlink.mission.position_history import MAX_MESSAGE_DELAY
 
-_SETTLE = 3.0  # [s] in which a CURRENT sent before the last change may still come
+SETTLE_TIME = 3.0  # [s] in which a MISSION_CURRENT sent before a change may still arrive
 
 
 class CurrentItemReports:
@@ -52,7 +52,7 @@ class CurrentItemReports:
             return True
         if self._set is not None:
             start, when = self._set
-            if seq != start and (seq < start or now - when < _SETTLE):
+            if seq != start and (seq < start or now - when < SETTLE_TIME):
                 return True
             self._set = None
         return False

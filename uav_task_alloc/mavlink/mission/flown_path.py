@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Where a vehicle has been, by its own positions and clock: was it at a place, how long?"""
+"""Where a vehicle has been, by its own positions and clock: was it at a point, how long?"""
 from __future__ import annotations
 
 import math
@@ -13,46 +13,46 @@ from uav_task_alloc.geometry.polyline import polyline_length, segment_distance
 from uav_task_alloc.model import Point
 
 _KEPT = 900  # samples: three minutes at 5 Hz
-GAP = 2.5  # [s] between two positions: beyond, nobody knows where it was
-_ACCEPTED = 2.0  # [m] at which autopilots count a waypoint as reached, where the task says nothing
-CLOSE = 0.5  # [m] beyond that
-SLOW = 0.4  # [m/s] it stays, and does not leave again
-CURVE = 0.4  # [m/s2] by which the way between two positions may differ from its interpolation
-PIECES = 8  # points looked at between two positions
-JUMP = 30.0  # [m] beyond what its speed explains: it did not fly that
-ASIDE = 8.0  # [m] beside a leg: it is flown
-HOLD_SLACK = 0.1  # [s] by which a hold may look shorter than it was
+GAP = 2.5  # [s] between two samples, beyond which the path between them is unknown
+_DEFAULT_RADIUS = 2.0  # [m] acceptance radius where the task has none
+CLOSE = 0.5  # [m] tolerance beyond the acceptance radius
+_HOLD_SPEED = 0.4  # [m/s] below it a vehicle holds its position
+_CURVE = 0.4  # [m/s2] error bound of the interpolation between two samples
+_PIECES = 8  # interpolated points between two samples
+_JUMP = 30.0  # [m] beyond the distance its speed explains: the estimate jumped
+_CORRIDOR = 8.0  # [m] from a leg at which a vehicle flies it
+_HOLD_SLACK = 0.1  # [s] by which a sampled hold may be shorter than the real one
 
 
 class Visit(Enum):
-    """Whether a vehicle was at a place."""
+    """Whether a vehicle was at a point."""
 
     YES = 'yes'
     NO = 'no'
-    UNOBSERVED = 'it was not seen for a while'
+    UNOBSERVED = 'unobserved'  # no for the samples, which have a gap
 
 
 class PositionSample(NamedTuple):
     """One GLOBAL_POSITION_INT."""
 
-    t: float  # [s] of the vehicle's clock
+    t: float  # [s] vehicle time
     position: Point  # [m] ENU
     velocity: Point  # [m/s] ENU
 
 
 class FlownPath:
-    """Samples in the order of the vehicle's clock, however late they come."""
+    """The last samples of one vehicle in the order of its clock, also where they arrive late."""
 
     def __init__(self) -> None:
         self._samples: list[PositionSample] = []
 
     @property
     def newest(self) -> float:
-        """[s] of the vehicle's clock; -inf where nothing is known."""
+        """Vehicle time [s] of the newest sample; -inf where there is none."""
         return self._samples[-1].t if self._samples else -math.inf
 
     def add(self, sample: PositionSample) -> None:
-        """Take a position in, in O(1) where they come in order."""
+        """Add a sample; O(1) where they arrive in order."""
         if not self._samples or sample.t > self._samples[-1].t:
             self._samples.append(sample)
         else:
@@ -63,98 +63,102 @@ class FlownPath:
             del self._samples[:100]
 
     def jumps(self, sample: PositionSample) -> bool:
-        """Whether it cannot have flown to a new sample from the newest one."""
+        """Whether a new sample is too far from the newest one to have been flown."""
         if not self._samples or not 0.0 < sample.t - self.newest <= GAP:
             return False
         last = self._samples[-1]
         fastest = max(math.hypot(*last.velocity), math.hypot(*sample.velocity))
-        way = math.dist(last.position, sample.position)
-        return way > JUMP + 2.0 * fastest * (sample.t - last.t)
+        distance = math.dist(last.position, sample.position)
+        return distance > _JUMP + 2.0 * fastest * (sample.t - last.t)
 
     def clear(self) -> None:
-        """Its clock has begun anew."""
+        """Drop all samples: the vehicle's clock has restarted."""
         self._samples.clear()
 
-    def visited(self, place: Point, radius: float, hold: float, since: float,
+    def visited(self, point: Point, radius: float, hold: float, since: float,
               until: float = math.inf, close: float = CLOSE) -> Visit:
-        """Whether it was at a place.
+        """Whether the vehicle was at a point, and held there; O(n) for n samples.
 
         Args:
-            place: [m] ENU.
-            radius: [m] at which it counts as reached; 0: the autopilot's own.
-            hold: [s] it has to stay there.
-            since, until: [s] of the vehicle's clock.
-            close: [m] beyond the radius that counts as well, without a hold.
+            point: ENU [m].
+            radius: acceptance radius [m]; 0: the autopilot's default.
+            hold: required time at the point [s].
+            since: vehicle time [s].
+            until: vehicle time [s].
+            close: tolerance [m] added to the radius where no hold is required.
         """
-        first, last = self._stay(place, radius, since, hold > 0.0, until, close)
-        if last - first >= max(0.0, hold - HOLD_SLACK):
+        first, last = self._stay(point, radius, since, hold > 0.0, until, close)
+        if last - first >= max(0.0, hold - _HOLD_SLACK):
             return Visit.YES
         samples = self._since(since, until)
-        blind = len(samples) < 2 or any(b.t - a.t > GAP for a, b in pairwise(samples))
-        return Visit.UNOBSERVED if blind else Visit.NO
+        has_gap = len(samples) < 2 or any(b.t - a.t > GAP for a, b in pairwise(samples))
+        return Visit.UNOBSERVED if has_gap else Visit.NO
 
-    def visited_at(self, place: Point, radius: float, since: float,
+    def visited_at(self, point: Point, radius: float, since: float,
                    until: float = math.inf) -> float | None:
-        """When it was there first, [s] of its clock; None: it was not seen there."""
-        first, last = self._stay(place, radius, since, until=until)
+        """Vehicle time [s] at which it was first at a point; None where it was not seen there."""
+        first, last = self._stay(point, radius, since, until=until)
         return first if last >= first else None
 
     def could_have_flown(self, chain: Sequence[Point], then: Point | None, holds: float,
                    since: float) -> bool:
-        """Whether it can have flown through `chain` while it was not seen, and is past it.
+        """Whether it can have flown through `chain` in the longest gap of the samples.
 
         Args:
-            chain: places [m] ENU in order.
-            then: where it flies from there; None: it stays at the last.
-            holds: [s] it stays at them in all.
-            since: [s] of the vehicle's clock.
+            chain: points in order, ENU [m].
+            then: the next point, ENU [m]; None: it stays at the last one.
+            holds: sum of the hold times [s].
+            since: vehicle time [s].
+
+        Returns:
+            True where the gap is long enough and the sample after it lies on the following leg.
         """
         samples = self._since(since)
         if len(samples) < 2:
             return False
         a, b = max(pairwise(samples), key=lambda two: two[1].t - two[0].t)
-        way = polyline_length((a.position, *chain, b.position))
+        length = polyline_length((a.position, *chain, b.position))
         fastest = max(5.0, *(math.hypot(*s.velocity) for s in self._samples[-200:]))
-        if way > 1.1 * fastest * (b.t - a.t - 0.8 * holds) + 10.0:
+        if length > 1.1 * fastest * (b.t - a.t - 0.8 * holds) + 10.0:
             return False
-        return segment_distance(b.position, chain[-1], then or chain[-1]) <= ASIDE
+        return segment_distance(b.position, chain[-1], then or chain[-1]) <= _CORRIDOR
 
     def _since(self, since: float, until: float = math.inf) -> list[PositionSample]:
         at = bisect_left(self._samples, since, key=lambda one: one.t)
         end = bisect_left(self._samples, until, key=lambda one: one.t)
         return self._samples[max(0, at - 1):end + 1]
 
-    def _stay(self, place: Point, radius: float, since: float,
+    def _stay(self, point: Point, radius: float, since: float,
               slow: bool = False, until: float = math.inf,
               close: float = CLOSE) -> tuple[float, float]:
-        """When it came and when it was there last (`slow`: and did not leave yet).
+        """First and last vehicle time [s] at a point (`slow`: at less than _HOLD_SPEED).
 
-        (inf, -inf) where it never was.
+        (inf, -inf) where it never was there.
         """
-        near = (radius or _ACCEPTED) + (0.0 if slow else close)
+        near = (radius or _DEFAULT_RADIUS) + (0.0 if slow else close)
         first, last = math.inf, -math.inf
         samples = self._since(since, until)
-        if len(samples) == 1 and math.dist(samples[0].position, place) <= near:
+        if len(samples) == 1 and math.dist(samples[0].position, point) <= near:
             return samples[0].t, samples[0].t
         for a, b in pairwise(samples):
             gap = b.t - a.t
             if gap > GAP or b.t < since or min(
-                    math.dist(a.position, place), math.dist(b.position, place)) > (
+                    math.dist(a.position, point), math.dist(b.position, point)) > (
                         near + 5.0 + 30.0 * gap):
                 continue
-            reach = near + CURVE * gap * gap
-            for k in range(PIECES + 1):
-                t, share = a.t + gap * k / PIECES, k / PIECES
-                if since <= t <= until and math.dist(_between(a, b, share), place) <= reach:
+            reach = near + _CURVE * gap * gap
+            for k in range(_PIECES + 1):
+                t, share = a.t + gap * k / _PIECES, k / _PIECES
+                if since <= t <= until and math.dist(_between(a, b, share), point) <= reach:
                     first = min(first, t)
                     if not slow or math.dist(a.velocity, (0, 0, 0)) * (1 - share) + share * (
-                            math.dist(b.velocity, (0, 0, 0))) < SLOW:
+                            math.dist(b.velocity, (0, 0, 0))) < _HOLD_SPEED:
                         last = max(last, t)
         return first, last
 
 
 def _between(a: PositionSample, b: PositionSample, share: float) -> Point:
-    """Cubic Hermite interpolation: both positions, both velocities."""
+    """Cubic Hermite interpolation between two samples; linear where a velocity is unknown."""
     h, s = b.t - a.t, share
     if any(math.isnan(v) for v in (*a.velocity, *b.velocity)):
         x, y, z = (p + (q - p) * s for p, q in zip(a.position, b.position, strict=True))

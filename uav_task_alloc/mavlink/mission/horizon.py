@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How many tasks go on board at a time, where the mission store of a vehicle has no space."""
+"""Rolling horizon: the number of tasks uploaded at a time where a mission store is too small."""
 from __future__ import annotations
 
 import re
@@ -8,61 +8,64 @@ _SPACE_TEXT = re.compile(r'Only (\d+) items are supported')
 
 
 class Horizon:
-    """Shrinks where the vehicle refuses, and grows again where what is on board fits."""
+    """Halves when the vehicle refuses with NO_SPACE, doubles once the shorter list is on board."""
 
     def __init__(self) -> None:
         self.stops: int | None = None  # None: all
-        self.fits = False  # it is on board: there may be space for more
-        self._space: int | None = None  # items that the vehicle says it has space for
+        self.fits = False  # the shortened list is on board: there may be space for more
+        self._space: int | None = None  # [items] reported by STATUSTEXT
 
     def reset(self) -> None:
-        """A new list is tried as a whole."""
+        """Try a new list as a whole."""
         self.stops = None
 
     def begin(self) -> None:
-        """An upload begins: what was said of space was said before."""
+        """Drop the space reported before this upload."""
         self._space = None
 
     def verified(self) -> None:
-        """What was uploaded is on board."""
+        """Note that the uploaded list is on board."""
         self.fits = self.stops is not None
 
     def note(self, text: str) -> None:
-        """STATUSTEXT: for how many items the vehicle has space."""
-        found = _SPACE_TEXT.search(text)
-        if found:
-            self._space = int(found[1])
+        """Read the space from a STATUSTEXT (ArduPilot)."""
+        match = _SPACE_TEXT.search(text)
+        if match:
+            self._space = int(match[1])
 
     def shrink(self, stops: int) -> str:
-        """Fly fewer tasks at a time; where not even one fits the store is not open yet.
+        """Fly fewer tasks at a time; where not even one fits, the store is not loaded yet.
 
         Args:
-            stops: tasks that were refused.
+            stops: number of tasks that were refused.
 
         Returns:
-            What to tell; `stops` is None where the same is tried again.
+            A warning for the operator; `self.stops` is None where the whole list is retried.
         """
         if stops <= 1 or self._space == 0:
             self.stops = None
-            return 'no space on board for any task yet: trying again'
+            return 'no space on board for any task yet: retrying'
         self.stops, self.fits = stops // 2, False
         return (f'no space on board: flying the first {self.stops} tasks of {stops}, '
                 'the others follow')
 
     def cut(self, stops: int, items: int, most: int) -> str:
-        """Fly the tasks that a mission can hold; returns what to tell.
+        """Fly the tasks that a mission can hold.
 
         Args:
-            stops: tasks that fit, at least one.
-            items: what the whole list takes.
-            most: what a mission can hold.
+            stops: number of tasks that fit, at least one.
+            items: number of items of the whole list.
+            most: number of items that a mission can hold.
+
+        Returns:
+            A warning for the operator.
         """
         self.stops, self.fits = stops, False
         return (f'the list takes {items} mission items: expected at most {most}: flying the first '
                 f'{stops} tasks, the others follow')
 
     def grow(self) -> bool:
-        """Twice as many, where what was tried fits; False: that is not known."""
+        """Double the horizon where the present one is on board; False where that is not known."""
         if not self.fits or self.stops is None:
             return False
         self.fits, self.stops = False, 2 * self.stops

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Points put into the long legs of a list, so that they are flown at the height of the plan.
 
-A leg of a plan is straight in ENU. An autopilot changes its altitude above sea level evenly from
-item to item, and so follows the earth: half-way of a leg of length L it is L^2 / 8R higher, 49 m
-on 50 km.
+A leg of a plan is straight in ENU. An autopilot interpolates its altitude above sea level between
+two items, and so follows the earth: in the middle of a leg of length L it is L^2 / 8R higher than
+planned, 49 m on 50 km.
 """
 from __future__ import annotations
 
@@ -16,12 +16,18 @@ from uav_task_alloc.mavlink.mission.items import MissionStop, TaskList
 from uav_task_alloc.model import Point
 
 MAX_LEG_LENGTH = 5000.0  # [m] between items: at most 0.5 m too high, R being at least 6335 km
-PER_LEG = 5  # a first point lies within LONGEST / PER_LEG of where it may be
-_REFUSAL_MARGIN = 100.0  # [m] by which it is farther than what is refused
+PER_LEG = 5  # the first point is placed to MAX_LEG_LENGTH / PER_LEG
+_REFUSAL_MARGIN = 100.0  # [m] by which a first point is beyond the refused distance
 
 
 def points_between(start: Point, end: Point, longest: float = MAX_LEG_LENGTH) -> tuple[Point, ...]:
-    """Evenly on the straight way, without its ends; none where it is not too long. ENU [m]."""
+    """Points that divide a straight leg evenly, ENU [m]; none where it is not longer than that.
+
+    Args:
+        start: of the leg.
+        end: of the leg.
+        longest: largest distance between two points [m].
+    """
     parts = math.ceil(math.dist(start, end) / longest)
     return tuple((start[0] + (end[0] - start[0]) * n / parts,
                   start[1] + (end[1] - start[1]) * n / parts,
@@ -29,16 +35,17 @@ def points_between(start: Point, end: Point, longest: float = MAX_LEG_LENGTH) ->
 
 
 def first_points(start: Point, end: Point, home: Point, farthest: float) -> tuple[Point, ...]:
-    """The same for the first leg of a mission.
+    """Points that divide the first leg of a mission.
 
-    PX4 refuses a mission whose first item is too far from home: it is of another place. What it
-    refuses without points in between it refuses with them, so none is nearer than that.
+    PX4 refuses a mission whose first item is too far from home (MIS_DIST_1WP), as it may belong to
+    another site. A mission that is refused without these points must stay refused with them, so
+    none is nearer to home than that limit.
 
     Args:
         start: where the leg begins, ENU [m].
-        end: the first point of the list.
-        home: of the vehicle.
-        farthest: from home to the first item [m]; inf: nothing is refused.
+        end: the first point of the list, ENU [m].
+        home: of the vehicle, ENU [m].
+        farthest: largest distance from home to the first item [m]; inf: no limit.
     """
     if math.dist(home, end) <= farthest or math.dist(home, start) > farthest:
         return points_between(start, end)
@@ -49,15 +56,19 @@ def first_points(start: Point, end: Point, home: Point, farthest: float) -> tupl
 
 
 def with_points_between(tasks: TaskList, before: Sequence[Point] = ()) -> TaskList:
-    """The same list with more detour points; `before` are put in before its first point.
+    """Divide the long legs of a list by more detour points.
 
     The flight home after the last point is the autopilot's own and stays as it is.
+
+    Args:
+        tasks: the list.
+        before: points of its first leg, ENU [m].
     """
     stops: list[MissionStop] = []
     last: Point | None = None
     for stop in tasks.stops:
-        way = _filled(last, (*stop.via, stop.task.position))
-        stops.append(replace(stop, via=(*(() if stops else before), *way[:-1])))
+        path = _filled(last, (*stop.via, stop.task.position))
+        stops.append(replace(stop, via=(*(() if stops else before), *path[:-1])))
         last = stop.task.position
     end = _filled(last, tasks.end_via) if tasks.returns else tasks.end_via
     if not stops and end:
@@ -66,12 +77,12 @@ def with_points_between(tasks: TaskList, before: Sequence[Point] = ()) -> TaskLi
 
 
 def first_point(tasks: TaskList) -> Point | None:
-    """What a list leads to first; None where it is a return at most."""
+    """The first point of a list, ENU [m]; None where it has no point."""
     return next(_points(tasks), None)
 
 
 def legs(tasks: TaskList, start: Point | None) -> Iterator[tuple[Point, Point]]:
-    """The straight ways from point to point, from `start` if that is known."""
+    """The straight legs between the points of a list, the first from `start` where known."""
     return pairwise((*(() if start is None else (start,)), *_points(tasks)))
 
 
@@ -83,11 +94,11 @@ def _points(tasks: TaskList) -> Iterator[Point]:
         yield from tasks.end_via
 
 
-def _filled(start: Point | None, way: Sequence[Point]) -> tuple[Point, ...]:
-    found: list[Point] = []
-    for point in way:
+def _filled(start: Point | None, path: Sequence[Point]) -> tuple[Point, ...]:
+    filled: list[Point] = []
+    for point in path:
         if start is not None:
-            found += points_between(start, point)
-        found.append(point)
+            filled += points_between(start, point)
+        filled.append(point)
         start = point
-    return tuple(found)
+    return tuple(filled)

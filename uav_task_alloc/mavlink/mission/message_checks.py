@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Which received messages have a field that no vehicle can mean; whoever sends may be hostile."""
+"""Range checks of received messages: fields that no vehicle can mean; senders may be hostile."""
 from __future__ import annotations
 
 import math
@@ -11,9 +11,11 @@ from uav_task_alloc.mavlink.transport.codec import Message
 _MAX_LATITUDE, _MAX_LONGITUDE = 90 * 10**7, 180 * 10**7  # [1e-7 deg]
 # message -> field, least, most
 _RANGES: dict[str, tuple[tuple[str, int, int], ...]] = {
-    'GLOBAL_POSITION_INT': (('lat', -_MAX_LATITUDE, _MAX_LATITUDE), ('lon', -_MAX_LONGITUDE, _MAX_LONGITUDE)),
-    'HOME_POSITION': (('latitude', -_MAX_LATITUDE, _MAX_LATITUDE), ('longitude', -_MAX_LONGITUDE, _MAX_LONGITUDE)),
-    'BATTERY_STATUS': (('battery_remaining', -128, 100),),  # below 0: it does not say
+    'GLOBAL_POSITION_INT': (('lat', -_MAX_LATITUDE, _MAX_LATITUDE),
+                            ('lon', -_MAX_LONGITUDE, _MAX_LONGITUDE)),
+    'HOME_POSITION': (('latitude', -_MAX_LATITUDE, _MAX_LATITUDE),
+                      ('longitude', -_MAX_LONGITUDE, _MAX_LONGITUDE)),
+    'BATTERY_STATUS': (('battery_remaining', -128, 100),),  # below 0: not known
     'SYS_STATUS': (('battery_remaining', -128, 100),),
 }
 _ITEM_MESSAGES = ('MISSION_ITEM', 'MISSION_ITEM_INT')
@@ -21,10 +23,13 @@ _COORDINATES, _PARAMS = ('x', 'y', 'z'), ('param1', 'param2', 'param3', 'param4'
 
 
 def defect(message: Message) -> str:
-    """The first field that is wrong, its value and what was expected; '' where none is.
+    """Describe the first invalid field of a message.
 
     A parameter of a mission item may be NaN, which leaves it to the autopilot; a coordinate in a
     global frame may not, and nothing may be infinite.
+
+    Returns:
+        Field, value and expectation; '' where all fields are valid.
     """
     return next(_defects(message), '')
 
@@ -37,9 +42,9 @@ def _defects(message: Message) -> Iterator[str]:
             yield f'{name} = {value}: expected a number in [{least}, {most}]'
     if kind not in _ITEM_MESSAGES:
         return
-    placed = message.frame in GLOBAL_FRAMES
+    is_global = message.frame in GLOBAL_FRAMES
     for name in _COORDINATES + _PARAMS:
         value = getattr(message, name)
         if math.isinf(value) or (math.isnan(value) and name in _COORDINATES and (
-                placed or kind == 'MISSION_ITEM')):
+                is_global or kind == 'MISSION_ITEM')):
             yield f'{name} = {value}: expected a finite number'

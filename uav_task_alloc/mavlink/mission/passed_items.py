@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Items passed as MISSION_CURRENT says, without a REACHED: were they flown, or left out?
+"""Items passed by MISSION_CURRENT without a REACHED: were they flown, or skipped?
 
-That the current item has moved on is a claim: it completes what it passes only where the vehicle
-was, by its own positions.
+A current item that has moved on only claims that the items before it were flown: those are
+completed at which the vehicle's own positions were.
 """
 from __future__ import annotations
 
@@ -15,34 +15,39 @@ from uav_task_alloc.mavlink.mission.items import Item
 from uav_task_alloc.mavlink.mission.position_history import LOOSE_RADIUS, PositionHistory
 from uav_task_alloc.mavlink.transport.frame_log import FrameLog
 
-FRAMES_AFTER = 10  # beyond the MISSION_CURRENT that moved on: REACHED may come after it
+_FRAMES_AFTER = 10  # frames after MISSION_CURRENT in which REACHED may follow
 
 
 @dataclass(frozen=True, slots=True)
 class Claim:
-    """Items that the vehicle has passed, as MISSION_CURRENT says, without a REACHED."""
+    """Items that the vehicle has passed by MISSION_CURRENT, without a REACHED."""
 
     items: tuple[Item, ...]
     route: tuple[Item, ...]  # from the first of them on, to the end of the mission
-    since: float  # [s] of the vehicle's clock
-    until: float  # the same: then it was past them
-    deadline: float  # [s] after which nothing more is expected
+    since: float  # vehicle time [s] at which the first of them became current
+    until: float  # vehicle time [s] at which it was past them
+    deadline: float  # [s] after which no evidence is awaited
     epoch: int
-    frames: tuple[int, int] | None  # in which a REACHED would have come; None: not known
-    frame: int | None  # that told the item after them
-    skips: bool  # over more than one item: somebody has set the current one
-    in_flight: bool  # it was flying, so what was not seen may have been flown
+    frames: tuple[int, int] | None  # between which a REACHED would be; None: not known
+    frame: int | None  # of the MISSION_CURRENT with the item after them
+    skips: bool  # more than one item: another station has set the current item
+    in_flight: bool  # in mission mode, so that unobserved items may have been flown
 
 
 class _Judged(NamedTuple):
-    """Items of one claim that need not be waited for any more."""
+    """Items of one claim that are decided."""
 
     flown: tuple[Item, ...]
-    left: tuple[Item, ...]  # passed over
+    passed_over: tuple[Item, ...]
 
 
 class PassedItems:
-    """The claims that nothing has shown yet to be true or not."""
+    """The claims that are not decided yet.
+
+    Args:
+        frames: numbers of the frames received.
+        positions: of the vehicle.
+    """
 
     def __init__(self, frames: FrameLog, positions: PositionHistory) -> None:
         self._frames, self._positions = frames, positions
@@ -54,45 +59,48 @@ class PassedItems:
         return tuple(self._claims)
 
     def add(self, claim: Claim) -> None:
-        """One that `judge` is to be asked about."""
+        """Add a claim, to be judged."""
         self._claims.append(claim)
 
     def clear(self) -> None:
-        """Nothing is known of what is on board."""
+        """Drop all claims: the mission on board is unknown."""
         self._claims.clear()
 
     def judge(self, claim: Claim, items: tuple[Item, ...], now: float) -> _Judged:
-        """What became of items of a claim, which is dropped once all of them are judged.
+        """Decide which items of a claim were flown; the claim is dropped once all are decided.
 
         Args:
-            claim: one that is open.
+            claim: an open one.
             items: those of it that are not completed.
-            now: [s].
+            now: steady time [s].
+
+        Returns:
+            The items decided by this call.
         """
-        if self._silent(claim):
+        if self._has_no_reached(claim):
             self._claims.remove(claim)
             return _Judged((), items)
         if items and claim.frames is not None and now < claim.deadline:
-            return _Judged((), ())  # REACHED may still come, or all that came without it
-        verdicts = {item.task: self._verdict(item, claim) for item in items}
-        seen = tuple(i for i in items if verdicts[i.task] is Visit.YES)
-        rest = tuple(i for i in items if verdicts[i.task] is not Visit.YES)
+            return _Judged((), ())  # REACHED may still come, or every frame without one
+        visits = {item.task: self._visit(item, claim) for item in items}
+        seen = tuple(i for i in items if visits[i.task] is Visit.YES)
+        rest = tuple(i for i in items if visits[i.task] is not Visit.YES)
         if rest and now < claim.deadline:
             return _Judged(seen, ())
         self._claims.remove(claim)
-        unseen = self._settle(rest, verdicts, claim)
+        unseen = self._unobserved(rest, visits, claim)
         return _Judged(seen + unseen, tuple(i for i in rest if i not in unseen))
 
-    def _settle(self, rest: tuple[Item, ...], verdicts: dict[str, Visit],
-                claim: Claim) -> tuple[Item, ...]:
-        """Nothing more will come: what it can have flown unseen it has flown, else it was left."""
-        blind = tuple(
-            i for i in rest if verdicts[i.task] is Visit.UNOBSERVED and i.position is not None)
-        return blind if blind and self._flown_unseen(blind, claim) else ()
+    def _unobserved(self, rest: tuple[Item, ...], visits: dict[str, Visit],
+                    claim: Claim) -> tuple[Item, ...]:
+        """At the deadline: the items that can have been flown in a gap of the positions."""
+        items = tuple(
+            i for i in rest if visits[i.task] is Visit.UNOBSERVED and i.position is not None)
+        return items if items and self._flown_unseen(items, claim) else ()
 
-    def _flown_unseen(self, blind: tuple[Item, ...], claim: Claim) -> bool:
-        """Wherever it was seen again: on the way from one of the items after them to the next."""
-        at = [n for n, item in enumerate(claim.route) if any(item is one for one in blind)]
+    def _flown_unseen(self, items: tuple[Item, ...], claim: Claim) -> bool:
+        """Whether it reappeared on a leg after them, and had the time to fly there."""
+        at = [n for n, item in enumerate(claim.route) if any(item is one for one in items)]
         if not at:
             return False
         for end in range(at[-1] + 1, len(claim.route) + 1):
@@ -104,14 +112,14 @@ class PassedItems:
                 return True
         return False
 
-    def _silent(self, claim: Claim) -> bool:
-        """Every frame has come in which the vehicle would have told REACHED, and it did not."""
+    def _has_no_reached(self, claim: Claim) -> bool:
+        """Whether every frame was received among which REACHED would be, and it was not there."""
         if claim.frames is None:
             return False
-        first, last = claim.frames[0], claim.frames[1] + FRAMES_AFTER
+        first, last = claim.frames[0], claim.frames[1] + _FRAMES_AFTER
         return self._frames.newest >= last and self._frames.whole(first, last)
 
-    def _verdict(self, item: Item, claim: Claim) -> Visit:
+    def _visit(self, item: Item, claim: Claim) -> Visit:
         if item.position is None:
             return Visit.NO
         return self._positions.path.visited(
@@ -119,15 +127,20 @@ class PassedItems:
             0.0 if claim.skips else CLOSE)
 
     def _until(self, claim: Claim) -> float:
-        """[s] of the vehicle's clock at which it was past them, by the order of its frames."""
+        """Vehicle time [s] at which it was past them, by the order of its frames."""
         if claim.frame is None:
             return claim.until
-        # what it came by after somebody had set the current item is nothing
+        # a place passed after another station had set the current item does not count
         return self._positions.sent_before(claim.frame, claim.until, earliest=claim.skips)
 
 
 def flown_nearby(items: tuple[Item, ...], flown: Item) -> tuple[Item, ...]:
-    """Of items passed in a moment only what was flown, and what is beside it, may be completed."""
-    place = flown.position
-    return tuple(i for i in items if flown.completes and place is not None
-                 and i.position is not None and math.dist(i.position, place) < LOOSE_RADIUS)
+    """Of items passed at once, those that may be completed: the one flown, and those next to it.
+
+    Args:
+        items: passed at once.
+        flown: the item that was being flown.
+    """
+    at = flown.position
+    return tuple(i for i in items if flown.completes and at is not None
+                 and i.position is not None and math.dist(i.position, at) < LOOSE_RADIUS)

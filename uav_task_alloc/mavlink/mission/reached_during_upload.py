@@ -6,38 +6,45 @@ from uav_task_alloc.mavlink.mission.diff import MissionDiff
 from uav_task_alloc.mavlink.mission.items import alike
 from uav_task_alloc.mavlink.mission.progress import ProgressTable
 
-_MOST = 32  # messages
+_MAX_MESSAGES = 32
 
 
 class ReachedDuringUpload:
-    """Keeps them until the answer is there, and credits each where the vehicle was seen."""
+    """Keeps each REACHED until the upload is decided; then credits it by the positions."""
 
     def __init__(self, progress: ProgressTable) -> None:
         self._progress = progress
-        self._heard: list[tuple[int, float]] = []  # index, when first [s]
-        self._newest: tuple[int, float] = (-1, 0.0)  # index, when [s], repetitions as well
+        self._reached: list[tuple[int, float]] = []  # seq, first received at [s]
+        self._newest: tuple[int, float] = (-1, 0.0)  # seq, received at [s], with repetitions
 
     def __bool__(self) -> bool:
-        return bool(self._heard)
+        return bool(self._reached)
 
     def add(self, seq: int, now: float) -> None:
-        """It may be of either."""
-        repeated = bool(self._heard) and self._heard[-1][0] == seq  # by PX4
-        if len(self._heard) < _MOST and not repeated:
-            self._heard.append((seq, now))
+        """Keep a REACHED that may be of the old or of the new mission."""
+        repeated = bool(self._reached) and self._reached[-1][0] == seq  # by PX4
+        if len(self._reached) < _MAX_MESSAGES and not repeated:
+            self._reached.append((seq, now))
         self._newest = seq, now
         self._progress.note_end(seq, now)
 
     def clear(self) -> None:
-        """The vehicle was restarted."""
-        self._heard.clear()
+        """Drop them: the vehicle was restarted."""
+        self._reached.clear()
 
-    def assign_epochs(self, found: MissionDiff) -> list[tuple[int, float]]:
-        """Credit those of the old mission; returns those of the new one."""
+    def assign_epochs(self, uploaded: MissionDiff) -> list[tuple[int, float]]:
+        """Credit those of the old mission.
+
+        Args:
+            uploaded: the new mission.
+
+        Returns:
+            (seq, received at [s]) of those of the new mission.
+        """
         of_new, old, progress = [], self._progress.items, self._progress
-        for seq, when in self._heard:
+        for seq, when in self._reached:
             before = old[seq] if 0 <= seq < len(old) else None
-            after = found.items[seq] if 0 <= seq < len(found.items) else None
+            after = uploaded.items[seq] if 0 <= seq < len(uploaded.items) else None
             if before is not None and (progress.was_at_by(before, when) or (
                     after is not None and alike(before, after))):
                 progress.note_reached(seq, when)
@@ -47,14 +54,14 @@ class ReachedDuringUpload:
                 progress.credit(before)
             elif after is not None and progress.near_one(after, before, when):
                 of_new.append((seq, when))
-        self._heard.clear()
+        self._reached.clear()
         return of_new
 
     def continue_repetition(self) -> None:
-        """Once those of the new mission are told: the last of all may be repeated still."""
+        """Note the last one, which may still be repeated, after those of the new mission."""
         self._progress.note_repeated(*self._newest)
 
-    def credit(self, found: MissionDiff) -> None:
-        """The transfer has failed, and nobody knows which mission was flown: ask where it was."""
-        for seq, _ in self.assign_epochs(found):
-            self._progress.credit(found.items[seq])
+    def credit(self, uploaded: MissionDiff) -> None:
+        """Credit all by the positions after a failed transfer: either mission may be flown."""
+        for seq, _ in self.assign_epochs(uploaded):
+            self._progress.credit(uploaded.items[seq])

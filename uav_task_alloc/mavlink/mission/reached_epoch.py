@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""MISSION_ITEM_REACHED just after an upload: is it of this epoch, or of the one before?
+"""MISSION_ITEM_REACHED after an upload: is it of the current epoch, or of the previous one?
 
 PX4 repeats it for 10 s, also once another mission is on board.
 """
@@ -16,105 +16,111 @@ from uav_task_alloc.mavlink.mission.position_history import (
 )
 from uav_task_alloc.model import Point
 
-REPEAT_WINDOW = 15.0  # [s] in which a REACHED of the epoch before may come; PX4 repeats it for 10 s
+REPEAT_WINDOW = 15.0  # [s] after an upload in which a REACHED may be of the previous epoch
 
 
 @dataclass(frozen=True, slots=True)
 class PreviousEpoch:
-    """The epoch before: until when a REACHED may be of it."""
+    """The previous epoch, and until when a REACHED may be of it."""
 
     items: tuple[Item, ...]
-    since: float  # [s] of the vehicle's clock: its current item was flown
-    end: float  # the same: until then
-    may_end: bool  # at its last item
-    until: float  # [s]
+    since: float  # vehicle time [s] from which its current item was flown
+    end: float  # vehicle time [s] at which it ended
+    may_end: bool  # it was at its last item
+    until: float  # [s] until when a REACHED may be of it
 
 
 @dataclass(frozen=True, slots=True)
 class CurrentEpoch:
-    """This epoch, where a REACHED comes."""
+    """The current epoch when a REACHED is received."""
 
     items: tuple[Item, ...]
-    current: int | None  # the current item, as the vehicle said last
-    since: float  # [s] of the vehicle's clock: the current item is flown
-    begin: float  # the same: this epoch
+    current: int | None  # the current item last reported
+    since: float  # vehicle time [s] from which the current item is flown
+    begin: float  # vehicle time [s] at which this epoch began
 
 
 _NO_EPOCH = PreviousEpoch((), -math.inf, -math.inf, False, -math.inf)
 
 
 class ReachedEpoch:
-    """The epoch before, and the REACHED that may be of either until something shows which."""
+    """Assigns each REACHED to the current or the previous epoch, once the evidence allows it.
+
+    Args:
+        positions: of the vehicle.
+        repeats: whether the autopilot repeats REACHED (PX4).
+    """
 
     def __init__(self, positions: PositionHistory, repeats: bool) -> None:
-        self._positions, self._repeats = positions, repeats  # many times (PX4)
+        self._positions, self._repeats = positions, repeats
         self.before = _NO_EPOCH
-        self.credited: int | None = None  # the seq of the last, once it has completed an item
-        self.unproven: dict[int, float] = {}  # of this epoch or the one before; until [s]
-        self._last: tuple[int, float] | None = None  # seq, when [s], of any epoch
-        self._heard_first = False
+        self.credited: int | None = None  # seq of the last REACHED, once it has completed an item
+        self.unproven: dict[int, float] = {}  # seq -> [s] until when evidence is awaited
+        self._last: tuple[int, float] | None = None  # seq, received at [s], of any epoch
+        self._is_first = False  # the last series of repetitions was received from its start
 
     def begin(self, before: PreviousEpoch) -> None:
-        """Another mission is on board."""
+        """Begin a new epoch; `before` is the one that it ends."""
         self.before = before
         if before.items:
             self.unproven.clear()
 
     def clear(self) -> None:
-        """Nothing is known of what is on board."""
+        """Drop the previous epoch: the mission on board is unknown."""
         self.before = _NO_EPOCH
         self.unproven.clear()
 
     def note_reached(self, seq: int, now: float) -> bool:
-        """One has come; returns whether it repeats the last one, which was credited (PX4)."""
+        """Note a REACHED; returns whether it repeats the last one, which was credited (PX4)."""
         if not self._repeats:
             return False
-        goes_on = self._last is not None and self._last[0] == seq and now - self._last[1] < MAX_MESSAGE_DELAY
-        if not goes_on:  # heard to begin, after another one: no repetition of a mission before
-            self.credited, self._heard_first = None, self._last is not None
+        repetition = (self._last is not None and self._last[0] == seq
+                      and now - self._last[1] < MAX_MESSAGE_DELAY)
+        if not repetition:  # after another one: no repetition from an earlier mission
+            self.credited, self._is_first = None, self._last is not None
         self._last = seq, now
         return self.credited == seq
 
     def note_repeated(self, seq: int, now: float) -> None:
-        """The last REACHED has come again, also while nobody knew of which mission it was."""
+        """Note that the last REACHED was repeated, also while its epoch was unknown."""
         if self._last is not None and self._last[0] == seq:
             self._last = seq, now
 
     def reached_recently(self, begin: int, end: int, now: float) -> bool:
-        """One of the items from `begin` up to `end` was told, of this mission or repeated."""
+        """Whether the last REACHED named an item in [begin, end), perhaps as a repetition."""
         return self._last is not None and begin <= self._last[0] < end and (
             now - self._last[1] < MAX_MESSAGE_DELAY)
 
     def may_have_ended(self, now: float) -> bool:
-        """The epoch before was at its last item, and has just gone."""
+        """Whether the previous epoch was at its last item, and has just ended."""
         return self.before.may_end and now < self.before.until - REPEAT_WINDOW + MAX_MESSAGE_DELAY
 
     def is_of_current(self, seq: int, epoch: CurrentEpoch, now: float) -> bool:
-        """Whether a REACHED that may be of the epoch before is of this one."""
+        """Whether a REACHED that may be of the previous epoch is of the current one."""
         item, before, positions = epoch.items[seq], self.before, self._positions
-        if not self._repeats:  # told once, where the vehicle is
+        if not self._repeats:  # sent once, where the vehicle is
             near = positions.can_have_reached(item, now) if not before.items else (
                 positions.distance(item) <= LOOSE_RADIUS + item.radius)
             return near or positions.was_at(item, epoch.since)
-        # a repetition goes on while the current item stays what it was
+        # a repetition continues while the current item stays the same
         if epoch.current is not None and epoch.current > seq:
             return positions.can_have_reached(item, now) if not before.items else (
                 item.position is not None and positions.path.visited_at(
                     item.position, item.radius + LOOSE_RADIUS, epoch.begin) is not None)
         return seq == len(epoch.items) - 1 and epoch.current == seq and (
             positions.was_at(item, epoch.since) or (
-                item.position is None and self._heard_first))
+                item.position is None and self._is_first))
 
     def previous_item(self, seq: int, items: tuple[Item, ...], when: float) -> Item | None:
-        """The item of the epoch before that a REACHED names, where the vehicle was at it.
+        """The item of the previous epoch that a REACHED names, if the vehicle was at it.
 
         Args:
             seq: named by REACHED.
-            items: of this epoch.
-            when: [s] it came.
+            items: of the current epoch.
+            when: steady time [s] at which it was received.
 
         Returns:
-            None: not known yet, or of this epoch.
+            None where its epoch is unknown, or is the current one.
         """
         before, positions = self.before, self._positions
         if not 0 <= seq < len(before.items):
@@ -122,8 +128,9 @@ class ReachedEpoch:
         item = before.items[seq]
         after = items[seq] if 0 <= seq < len(items) else None
         same = after is not None and (after.task, after.position) == (item.task, item.position)
-        if after is not None and not same and positions.distance(after) <= LOOSE_RADIUS + after.radius:
-            return None  # of this epoch, if what comes shows it
+        if after is not None and not same and (
+                positions.distance(after) <= LOOSE_RADIUS + after.radius):
+            return None  # perhaps of the current epoch
         since = max(before.since, positions.path.newest - REPEAT_WINDOW)
         if positions.was_at(item, since, before.end) or positions.near_one(
                 item, None if same else after, when):
@@ -131,7 +138,7 @@ class ReachedEpoch:
         return None
 
     def ends_previous(self, item: Item) -> bool:
-        """An item is the last place of the epoch before, which had come to it."""
+        """Whether an item is the last position of the previous epoch, which was at its end."""
         return self.before.may_end and item.position == _last_place(self.before.items)
 
 

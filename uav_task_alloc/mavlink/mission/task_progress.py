@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What became of a task on one UAV, as the bridge reports it."""
+"""Progress of a task on one UAV, as the bridge publishes it in TaskEvent."""
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class TaskProgress:
-    """STARTED, COMPLETED or FAILED, of a task on this UAV."""
+    """One event of a task on this UAV."""
 
-    task: str
-    event: str
-    revision: int
-    reason: str = ''
+    task: str  # id
+    event: str  # STARTED, COMPLETED or FAILED
+    revision: int  # of the list with that task
+    reason: str = ''  # of FAILED

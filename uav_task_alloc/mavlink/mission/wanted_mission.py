@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What one vehicle should have on board: its list less what is flown, refused or beyond space."""
+"""The mission that one vehicle should have: its list less what is completed, refused or cut."""
 from __future__ import annotations
 
 from collections import deque
@@ -26,45 +26,50 @@ from uav_task_alloc.model import Task
 
 @dataclass(frozen=True, slots=True)
 class TaskFailed:
-    """A task that this vehicle does not take."""
+    """A task that the autopilot of this vehicle refuses."""
 
-    task: str
+    task: str  # id
     reason: str
-    revision: int  # of the list that it was asked for in
+    revision: int  # of the list with that task
 
 
 class WantedMission:
-    """The latest list of one vehicle, and the items that are still to be flown of it."""
+    """The latest list of one vehicle, and the items of it that are still to be flown.
 
+    Args:
+        profile: of the autopilot.
+        origin: of the ENU frame.
+        progress: the completed tasks of this vehicle.
+    """
     def __init__(self, profile: Profile, origin: Origin, progress: ProgressTable) -> None:
         self.tasks: TaskList | None = None
         self.horizon = Horizon()
         self.failed: deque[TaskFailed] = deque()
         self.notes: deque[OperatorNote] = deque()
-        self._room = MOST_ITEMS - int(profile.rules.home_first)
+        self._capacity = MOST_ITEMS - int(profile.rules.home_first)  # [items]
         self._profile, self._origin, self._progress = profile, origin, progress
-        self._refused: dict[str, tuple[Task, str]] = {}  # as it was, and why
+        self._refused: dict[str, tuple[Task, str]] = {}  # the task as refused, and the reason
         self.leg = FirstLeg(profile.rules.loiters, profile.farthest_first)
-        self._asked: object = None  # what the first leg is of
-        self._items: tuple[object, tuple[Item, ...]] | None = None
+        self._leg_key: object = None  # the state for which the first leg was begun
+        self._items: tuple[object, tuple[Item, ...]] | None = None  # cached, with their key
         self._listed: dict[str, int] = {}  # the last revision with a task that was not completed
-        self._away: frozenset[str] = frozenset()  # completed tasks that a later list did not have
+        self._dropped: frozenset[str] = frozenset()  # completed tasks that a later list dropped
 
     def assign(self, tasks: TaskList) -> None:
-        """The latest list; a task that was refused is tried again where it has changed."""
+        """Take the latest list; a refused task is tried again where it has changed."""
         self.tasks = tasks
         self.horizon.reset()
-        asked = [stop.task for stop in tasks.stops]
-        self._progress.set_listed_tasks(asked)
-        ids, completed = {task.id for task in asked}, self._progress.completed.keys()
-        self._away = (self._away | (completed - ids)) & completed
+        listed = [stop.task for stop in tasks.stops]
+        self._progress.set_listed_tasks(listed)
+        ids, completed = {task.id for task in listed}, self._progress.completed.keys()
+        self._dropped = (self._dropped | (completed - ids)) & completed
         self._listed.update(dict.fromkeys(ids - completed, tasks.revision))
-        for task in asked:
+        for task in listed:
             if self._refused.get(task.id, (task, ''))[0] != task:
                 del self._refused[task.id]
 
     def ended_before(self) -> list[TaskProgress]:
-        """How those tasks of the list ended that it should not have any more."""
+        """The ends of those tasks of the list that were completed or refused before."""
         assert self.tasks is not None
         completed = self._progress.completed
         ids, revision = [stop.task.id for stop in self.tasks.stops], self.tasks.revision
@@ -73,39 +78,40 @@ class WantedMission:
             for i in ids if i in self._refused and i not in completed]
 
     def _flown_in(self, task: str) -> int:
-        """The revision that it was flown under, if a list came without it; else the latest."""
+        """The revision under which it was flown if a later list dropped it; else the latest."""
         assert self.tasks is not None
         latest = self.tasks.revision
-        return self._listed.get(task, latest) if task in self._away else latest
+        return self._listed.get(task, latest) if task in self._dropped else latest
 
     def repeat(self, task: str) -> bool:
-        """The list still asks for a task that was flown, and the allocator has heard of that.
+        """Fly a completed task again, whose completion the allocator has acknowledged.
 
-        Returns whether it is another task of that id: then a list in between did not have it.
+        Returns:
+            Whether it is another task of that id: a list in between did not have it.
         """
         assert self.tasks is not None
-        if task not in self._away or task not in self._listed or self.tasks.find(task) is None:
+        if task not in self._dropped or task not in self._listed or self.tasks.find(task) is None:
             return False
         self._progress.forget(task)
-        self._away -= {task}
+        self._dropped -= {task}
         self._listed[task] = self.tasks.revision
         return True
 
     def remaining(self) -> TaskList:
-        """The list less what is flown or refused, up to the horizon."""
+        """The list less completed and refused tasks, up to the horizon."""
         assert self.tasks is not None
         tasks = self.tasks.without({
             *self._progress.completed, *self._progress.pending, *self._refused})
         return tasks if self.horizon.stops is None else tasks.first(self.horizon.stops)
 
     def items(self) -> tuple[Item, ...]:
-        """The items to fly from here; a task that cannot be one is refused."""
-        asked = (self.tasks, len(self._progress.completed), self._progress.pending,
+        """The items to fly from here; a task that cannot be an item is refused."""
+        state = (self.tasks, len(self._progress.completed), self._progress.pending,
                  len(self._refused), self.horizon.stops)
-        if self._asked != asked or self.leg.is_off:
+        if self._leg_key != state or self.leg.is_off:
             self.leg.begin(self.remaining())
-            self._asked = asked
-        key = (asked, self.leg.version, self.leg.passed)
+            self._leg_key = state
+        key = (state, self.leg.version, self.leg.passed)
         if self._items is not None and self._items[0] == key:
             return self._items[1]
         remaining = self.remaining()
@@ -114,52 +120,52 @@ class WantedMission:
         except MissionError as error:
             self.refuse(error.task, str(error), remaining)
             return self.items()
-        if len(items) > self._room:
+        if len(items) > self._capacity:
             self._cut(items, remaining)
             return self.items()
         self._items = key, items
         return items
 
     def _items_of(self, tasks: TaskList) -> tuple[Item, ...]:
-        """With points in between on long legs, where a mission has room for them."""
+        """The items of a list, with long legs divided where a mission has the capacity."""
         rules = self._profile.rules
-        filled = mission_items(with_points_between(tasks, self.leg.points_ahead(first_point(tasks))),
-                               rules, self._origin)
-        if len(filled) > self._room and len(tasks.stops) <= 1:
+        ahead = self.leg.points_ahead(first_point(tasks))
+        filled = mission_items(with_points_between(tasks, ahead), rules, self._origin)
+        if len(filled) > self._capacity and len(tasks.stops) <= 1:
             return mission_items(tasks, rules, self._origin)
         return filled
 
     def _cut(self, items: tuple[Item, ...], tasks: TaskList) -> None:
-        """More than a mission can hold: the first tasks only; none where even one does not fit."""
-        stops = min(sum(item.completes for item in items[:self._room]), len(tasks.stops) - 1)
+        """Shorten to the tasks that a mission can hold; refuse a task that does not fit alone."""
+        stops = min(sum(item.completes for item in items[:self._capacity]), len(tasks.stops) - 1)
         if stops > 0:
             self.notes.append(
-                OperatorNote('warning', self.horizon.cut(stops, len(items), self._room))
+                OperatorNote('warning', self.horizon.cut(stops, len(items), self._capacity))
             )
         else:
             task = tasks.stops[0].task.id
             self.refuse(task, f'task {task}: {len(items)} mission items: expected at most '
-                        f'{self._room}, which is what a mission holds', tasks)
+                        f'{self._capacity}, which is what a mission holds', tasks)
 
     def open_tasks(self) -> tuple[Task, ...]:
-        """Those of the list that are still to be flown, and can be."""
+        """The tasks of the list that are still to be flown and are not refused."""
         return tuple(stop.task for stop in self.remaining().stops) if self.items() else ()
 
     def refuse(self, task: str, reason: str, tasks: TaskList) -> None:
-        """Not to be flown as it is in that list; what has changed since is yet to be tried."""
-        asked, latest = tasks.find(task), self.tasks.find(task) if self.tasks else None
-        if asked is not None and latest in (None, asked):
-            self._refused[task] = asked, reason
+        """Refuse a task as it is in that list; one that has changed since is still tried."""
+        refused, latest = tasks.find(task), self.tasks.find(task) if self.tasks else None
+        if refused is not None and latest in (None, refused):
+            self._refused[task] = refused, reason
             self.failed.append(TaskFailed(task, reason, tasks.revision))
 
     def infeasible(self, reason: str) -> None:
-        """The vehicle stores the mission, and will not fly it."""
+        """Refuse all tasks of the mission, which the vehicle stores but does not fly."""
         assert self.tasks is not None
         for task in {item.task: None for item in self.items() if item.completes}:
             self.refuse(task, f'infeasible: {reason}', self.tasks)
 
     def has_enough(self, held: tuple[Item, ...]) -> bool:
-        """While half a horizon of the latest list is still on board, nothing is uploaded."""
+        """Whether at least half a horizon of the latest list is still on board."""
         assert self.tasks is not None
         everything = replace(
             self.tasks.without({*self._progress.completed, *self._refused}),
