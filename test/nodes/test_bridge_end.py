@@ -61,9 +61,10 @@ def test_a_bridge_takes_no_list_and_lets_nobody_take_off_once_it_is_to_end(sky, 
     assert sky.states['uav_2'].list_revision == 0
 
 
-def session(uav_id, airborne, swap_at):
+def session(uav_id, airborne, replacing_since):
     return SimpleNamespace(uav_id=uav_id, executor=SimpleNamespace(
-        telemetry=SimpleNamespace(airborne=airborne), watch=SimpleNamespace(swap_at=swap_at)))
+        telemetry=SimpleNamespace(airborne=airborne),
+        watch=SimpleNamespace(replacing_since=replacing_since)))
 
 
 def test_a_swap_is_waited_for_as_long_as_it_lasts_and_no_longer_than_said():

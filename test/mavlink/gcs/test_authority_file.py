@@ -153,7 +153,7 @@ def test_a_swap_is_saved_before_the_hold_is_sent(kind):
     at = next(n for n, (_, direction, m) in enumerate(bench.line.log) if n >= start
               and direction == 'up' and is_command(m, d.MAV_CMD_DO_SET_MODE))
     before = [record for size, record in store.saves if size <= at][-1]
-    assert (before.swap_at, before.commanded) == (bench.line.log[at][0], (4,))
+    assert (before.replacing_since, before.commanded) == (bench.line.log[at][0], (4,))
 
 
 @BOTH
@@ -164,4 +164,4 @@ def test_a_loss_is_saved_at_once(kind):
     record = bench.store.load('uav_1')
     assert (record.state, record.mode, record.why) == (
         L, MODES[kind].stick, bench.executor().authority.why)
-    assert record == replace(record, commanded=(), arming=False, swap_at=None)
+    assert record == replace(record, commanded=(), arming=False, replacing_since=None)

@@ -150,7 +150,7 @@ def swapping(moment, kind='ardupilot', speed=0.0):
     bench.assign(task_list('ZYXWV', 2))
     assert bench.run(lambda: bench.vehicles[1].flight.custom_mode == 4, 10.0)
     bench.run(limit=moment)
-    assert bench.executor().watch.swap_at is not None
+    assert bench.executor().watch.replacing_since is not None
     return bench
 
 

@@ -13,9 +13,13 @@ from dataclasses import fields, replace
 import pytest
 
 from uav_task_alloc.errors import InvalidValue
-from uav_task_alloc.mavlink.gcs import authority_store
 from uav_task_alloc.mavlink.gcs.authority import AuthorityRecord, AuthorityState
-from uav_task_alloc.mavlink.gcs.authority_store import AuthorityFileStore, boot_id, uav_file_name
+from uav_task_alloc.mavlink.gcs.authority_store import (
+    LONG_AGO,
+    AuthorityFileStore,
+    boot_id,
+    uav_file_name,
+)
 
 FULL = AuthorityRecord(
     AuthorityState.HELD,
@@ -83,10 +87,10 @@ def test_nothing_but_the_files_of_the_uavs_is_left_in_the_folder(store):
     assert [path.name for path in store.path('x').parent.iterdir()] == ['authority_uav_1.json']
 
 
-def test_after_a_restart_of_the_computer_a_swap_is_long_ago(store, tmp_path, reports):
+def test_after_a_restart_of_the_computer_a_replacement_is_long_ago(store, tmp_path, reports):
     store.save('uav_1', FULL)
     other = AuthorityFileStore(str(tmp_path / 'new' / 'folder'), reports.append, 'other boot')
-    assert other.load('uav_1') == replace(FULL, since=0.0, swap_at=authority_store.LONG_AGO)
+    assert other.load('uav_1') == replace(FULL, since=0.0, replacing_since=LONG_AGO)
     assert boot_id() == boot_id()
 
 

@@ -64,7 +64,7 @@ def test_a_pilot_during_a_swap_ends_the_transfer(kind, moment, mode):
     transfer_ended(bench, len(bench.sent))
     assert status_is(bench, L, 'not by the bridge')
     assert bench.onboard().state is not MissionState.UPLOADING
-    assert bench.executor().watch.swap_at is None
+    assert bench.executor().watch.replacing_since is None
 
 
 @BOTH

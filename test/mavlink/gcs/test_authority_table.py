@@ -36,7 +36,7 @@ CELLS = {
     E.UNEXPLAINED: (S, L, L, N), E.EXPLAINED: (H, H, L, N), E.TAKEN: (L, L, L, L),
     E.AVOIDING: (S, S, L, N), E.AVOIDED: (H, H, L, N), E.STICK_TO_HOLD: (H, L, H, H),
     E.TO_MISSION: (H, H, H, H), E.FAILSAFE_MODE: (L, L, L, N), E.FAILSAFE_STAYS: (S, S, L, N),
-    E.FAILSAFE_OVER: (H, H, L, N), E.SWAP_TAKEN: (L, L, L, N), E.ARMED_BY_OTHER: (L, L, L, N),
+    E.FAILSAFE_OVER: (H, H, L, N), E.REPLACEMENT_TAKEN: (L, L, L, N), E.ARMED_BY_OTHER: (L, L, L, N),
     E.KILLED: (L, L, L, L), E.LINK_STALE: (S, S, L, N), E.LINK_BACK: (H, H, L, N),
     E.LINK_CHANGED: (L, L, L, N), E.NEW_ADDRESS: (S, S, L, N), E.REBOOTED: (H, S, L, N),
     E.REBOOTED_FLOWN: (L, L, L, N), E.RESTART_AGREES: (H, H, L, N),

@@ -62,7 +62,7 @@ class AuthorityEvent(Enum):
     FAILSAFE_MODE = 'RC, GCS, battery, EKF failsafe or fence breach that changes the mode'
     FAILSAFE_STAYS = 'the same while the mode stays (system CRITICAL)'
     FAILSAFE_OVER = 'the same is cleared'
-    SWAP_TAKEN = 'failsafe or pilot in the middle of our swap; the transfer ends'
+    REPLACEMENT_TAKEN = 'failsafe or pilot during our mission replacement; the transfer ends'
     ARMED_BY_OTHER = 'arm or disarm not by us, DISARM_DELAY'
     KILLED = 'emergency stop, kill, flight termination; LOST until `~/hand_over` on the ground, ' \
         'disarmed'
@@ -72,7 +72,8 @@ class AuthorityEvent(Enum):
     NEW_ADDRESS = 'new address, until the mode is confirmed'
     REBOOTED = 'reboot of the vehicle, never armed since the grant'
     REBOOTED_FLOWN = 'reboot of the vehicle, armed since the grant'
-    RESTART_AGREES = 'restart of the bridge, its file agrees (own swap under way: < 60 s, at rest)'
+    RESTART_AGREES = 'restart of the bridge, its file agrees (during a replacement: < 60 s, ' \
+        'at rest)'
     RESTART_DIFFERS = 'restart of the bridge, its file does not agree'
     RESTART_OURS = 'restart without a file: airborne in MISSION with our mission'
     RESTART_AIRBORNE = 'restart without a file: otherwise airborne'
@@ -128,7 +129,7 @@ AUTHORITY_TABLE: dict[AuthorityEvent, AuthorityRow] = {
     _E.FAILSAFE_MODE: AuthorityRow(_L, _L, None, None),
     _E.FAILSAFE_STAYS: AuthorityRow(_S, _S, None, None),
     _E.FAILSAFE_OVER: AuthorityRow(_H, _H, None, None),
-    _E.SWAP_TAKEN: AuthorityRow(_L, _L, None, None),
+    _E.REPLACEMENT_TAKEN: AuthorityRow(_L, _L, None, None),
     _E.ARMED_BY_OTHER: AuthorityRow(_L, _L, None, None),
     _E.KILLED: AuthorityRow(_L, _L, _L, _L),
     _E.LINK_STALE: AuthorityRow(_S, _S, None, None),
@@ -210,7 +211,7 @@ class AuthorityRecord:
     armed: bool = False
     commanded: tuple[int, ...] = ()  # custom modes sent and not confirmed by a heartbeat
     arming: bool = False
-    swap_at: float | None = None  # since when it is held for a mission replacement
+    replacing_since: float | None = None  # since when it is held for a mission replacement
     climb: float | None = None  # [m] above home, of a take-off in progress
     marks: tuple[TaskMark, ...] = ()  # of the last tasks
     mission: int | None = None  # checksum of the items on board

@@ -56,7 +56,7 @@ class AuthorityRecorder:
             authority.until_landing, state.flown, state.mode, state.armed,
             tuple(dict.fromkeys(mode for mode, _ in sent.modes)),
             sent.arm_until > -math.inf and not state.armed and authority.held,
-            state.swap_at, sent.climb, tuple(self.marks.values()),
+            state.replacing_since, sent.climb, tuple(self.marks.values()),
             *self._evidence.mission_position())
         if record != self._saved:
             self._saved = record

@@ -96,7 +96,7 @@ class AuthorityFileStore:
             return None
         if body['boot'] != self._boot:
             record = replace(record, since=0.0, marks=(),
-                             swap_at=None if record.swap_at is None else LONG_AGO)
+                             replacing_since=None if record.replacing_since is None else LONG_AGO)
         return record
 
     def save(self, uav_id: str, record: AuthorityRecord) -> None:
@@ -139,9 +139,10 @@ class AuthorityFileStore:
         return ''
 
     def _text(self, uav_id: str, record: AuthorityRecord) -> str:
-        plain = {spec.name: getattr(record, spec.name) for spec in fields(record)}
+        row = {_KEYS.get(spec.name, spec.name): getattr(record, spec.name)
+               for spec in fields(record)}
         body = {'format': _FORMAT, 'uav_id': uav_id, 'boot': self._boot,
-                'record': plain | {'state': record.state.name}}
+                'record': row | {'state': record.state.name}}
         return json.dumps(body, indent=1, allow_nan=False) + '\n'
 
     def _write(self, path: Path, text: str) -> None:
@@ -189,10 +190,10 @@ def _record(body: Any, uav_id: str) -> AuthorityRecord:
     if not isinstance(row, dict) or row.keys() != _CHECKS.keys():
         raise ValueError('record: expected ' + ', '.join(_CHECKS))
     record = {}
-    for name, value in row.items():
-        is_valid, convert = _CHECKS[name]
+    for key, value in row.items():
+        name, is_valid, convert = _CHECKS[key]
         if not is_valid(value):
-            raise ValueError(f'{name} = {value!r:.50}: expected another type of value')
+            raise ValueError(f'{key} = {value!r:.50}: expected another type of value')
         record[name] = convert(value)
     return AuthorityRecord(**record)
 
@@ -239,4 +240,6 @@ _TYPES: dict[Any, tuple[Callable[[Any], bool], Callable[[Any], Any]]] = {
                       tuple),
     tuple[TaskMark, ...]: (_are_marks, lambda value: tuple(TaskMark(*mark) for mark in value)),
 }
-_CHECKS = {name: _TYPES[hint] for name, hint in get_type_hints(AuthorityRecord).items()}
+_KEYS = {'replacing_since': 'swap_at'}  # fields with another key in the file
+_CHECKS = {_KEYS.get(name, name): (name, *_TYPES[hint])
+           for name, hint in get_type_hints(AuthorityRecord).items()}

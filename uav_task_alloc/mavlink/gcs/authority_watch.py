@@ -86,13 +86,13 @@ class AuthorityWatch:
         return self._recorder.marks
 
     @property
-    def swap_at(self) -> float | None:
+    def replacing_since(self) -> float | None:
         """Since when it is held for a mission replacement [s]; None: it is not."""
-        return self._state.swap_at
+        return self._state.replacing_since
 
-    @swap_at.setter
-    def swap_at(self, since: float | None) -> None:
-        self._state.swap_at = since
+    @replacing_since.setter
+    def replacing_since(self, since: float | None) -> None:
+        self._state.replacing_since = since
 
     # messages from the vehicle
 

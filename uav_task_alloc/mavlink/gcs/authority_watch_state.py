@@ -52,7 +52,7 @@ class AuthorityWatchState:
     hold_due: bool = False  # command HOLD if it is airborne, after a restart of the bridge
     descending: bool = False  # by our RETURN
     was_airborne: bool = False
-    swap_at: float | None = None  # [s] since when it is held for a mission replacement
+    replacing_since: float | None = None  # [s] since when it is held for a mission replacement
 
     def class_of(self, mode: int | None) -> ModeClass | None:
         """The class of a custom_mode; None: not known."""
@@ -98,8 +98,8 @@ class AuthorityWatchState:
             self.sent.modes.clear()
         if state is AuthorityState.HELD and before in (AuthorityState.LOST, AuthorityState.NONE):
             self.flown = self.armed
-        if self.swap_at is not None:
-            self.swap_at = (
+        if self.replacing_since is not None:
+            self.replacing_since = (
                 now if state in (AuthorityState.HELD, AuthorityState.SUSPENDED) else None
             )
         back = self.authority.given_back_by
@@ -117,9 +117,9 @@ class AuthorityWatchState:
             why: the change of mode, for the reason shown to the operator.
             now: steady time [s].
         """
-        swap = self.swap_at is not None and self.authority.held
+        replacing = self.replacing_since is not None and self.authority.held
         self.apply(
-            AuthorityEvent.SWAP_TAKEN if swap else AuthorityEvent.TAKEN,
+            AuthorityEvent.REPLACEMENT_TAKEN if replacing else AuthorityEvent.TAKEN,
             now,
             f'not by the bridge: {why}',
         )

@@ -11,7 +11,7 @@ from uav_task_alloc.mavlink.gcs.hand_over import REST_SPEED
 from uav_task_alloc.mavlink.gcs.mission_evidence import MissionEvidence
 from uav_task_alloc.mavlink.gcs.policy import Policy
 
-_SWAP_KEPT = 60.0  # [s] after which a swap of the previous run is not continued
+_REPLACEMENT_KEPT = 60.0  # [s] after which a replacement of the previous run is not continued
 _BRAKING_TIME = 10.0  # [s] from the HOLD command until the vehicle is at rest
 
 
@@ -48,13 +48,13 @@ class BridgeRestart:
             self._record = None
             return
         agrees = self._agrees(record)
-        if agrees and record.swap_at is not None and (
+        if agrees and record.replacing_since is not None and (
                 state.class_of(state.mode) is ModeClass.HOLD):
-            at_rest = self._at_rest(record.swap_at, now)
+            at_rest = self._at_rest(record.replacing_since, now)
             if at_rest is None:
                 return  # decided at a later heartbeat
             agrees = at_rest
-            state.swap_at = record.swap_at if agrees else None
+            state.replacing_since = record.replacing_since if agrees else None
         self._record = None
         self._apply_result(record, agrees, now)
 
@@ -64,14 +64,14 @@ class BridgeRestart:
             state.mode in (record.mode, *record.commanded))
         return same and (state.armed == record.armed or (state.armed and record.arming))
 
-    def _at_rest(self, swap_at: float, now: float) -> bool | None:
-        """Whether it is at rest for a swap; None: not known, or it may still be braking."""
+    def _at_rest(self, replacing_since: float, now: float) -> bool | None:
+        """Whether it is at rest for a replacement; None: not known, or it may still be braking."""
         telemetry = self._state.telemetry
-        held_for, known = now - swap_at, telemetry.has_velocity
+        held_for, known = now - replacing_since, telemetry.has_velocity
         at_rest = known and telemetry.speed < REST_SPEED
-        if not at_rest and 0.0 <= held_for < (_BRAKING_TIME if known else _SWAP_KEPT):
+        if not at_rest and 0.0 <= held_for < (_BRAKING_TIME if known else _REPLACEMENT_KEPT):
             return None
-        return at_rest and 0.0 <= held_for < _SWAP_KEPT
+        return at_rest and 0.0 <= held_for < _REPLACEMENT_KEPT
 
     def _apply_result(self, record: AuthorityRecord, agrees: bool, now: float) -> None:
         state = self._state

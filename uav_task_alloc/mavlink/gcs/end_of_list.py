@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""HOLD or RETURN: at the end of a list, and where a swap does not come to its end."""
+"""Hold or return: with an empty list, and when a replacement of the mission takes too long."""
 from __future__ import annotations
 
 from collections import deque
@@ -15,11 +15,11 @@ from uav_task_alloc.mavlink.gcs.telemetry import Telemetry
 from uav_task_alloc.mavlink.mission.items import TaskList, all_alike
 from uav_task_alloc.mavlink.transport.notes import OperatorNote
 
-SWAP_HOLD = 30.0  # [s] that a vehicle is held for an upload, at most
+_MAX_HOLD = 30.0  # [s] of a hold for an upload
 
 
 class EndOfList:
-    """Sends a vehicle home where its list is empty or held too long, and the way is clear."""
+    """Holds a vehicle, or returns it home if its path home is clear of zones."""
 
     def __init__(
         self,
@@ -33,18 +33,18 @@ class EndOfList:
         self._sender, self._telemetry, self._onboard = sender, telemetry, onboard
         self._watch, self._policy, self._notes = watch, policy, notes
         self.going_home = False  # by a list without tasks
-        self.alarm = ''  # what a human has to see to
+        self.alarm = ''  # condition that requires action by a human; '': none
 
-    def swap_ended(self) -> None:
-        """It flies its list."""
-        self._watch.swap_at, self.alarm = None, ''
+    def end_hold(self) -> None:
+        """The vehicle flies its list: the hold for an upload is over."""
+        self._watch.replacing_since, self.alarm = None, ''
 
     def held_too_long(self, now: float) -> NextMessages:
-        """A swap that does not come to its end: home where the way is clear, else stay."""
-        since = self._watch.swap_at
-        if since is None or now - since <= SWAP_HOLD or not self._watch.authority.held:
+        """Return home after a too long hold for an upload; stay if a zone is across the path."""
+        since = self._watch.replacing_since
+        if since is None or now - since <= _MAX_HOLD or not self._watch.authority.held:
             return None
-        self._watch.swap_at = None
+        self._watch.replacing_since = None
         blocked = self._blocked_home()
         if blocked:
             self.alarm = f'held for an upload that does not end, and {blocked}: stays'
@@ -52,15 +52,15 @@ class EndOfList:
             return None
         self._notes.append(
             OperatorNote(
-                'error', f'held for {SWAP_HOLD:g} s for an upload that does not end: returns'
+                'error', f'held for {_MAX_HOLD:g} s for an upload that does not end: returns'
             )
         )
         return self._sender.set_mode(ModeFunction.RETURN, now)
 
     def empty(self, now: float) -> NextMessages:
-        """Nothing to fly: hold or return, and keep what is on board."""
+        """With an empty list, hold or return, and keep the onboard mission; None: it has tasks."""
         onboard, telemetry, sender = self._onboard, self._telemetry, self._sender
-        end, tasks = onboard.wanted(), onboard.remaining()  # less what cannot be an item
+        end, tasks = onboard.wanted(), onboard.remaining()  # without refused tasks
         self.going_home = False
         if tasks.stops:
             return None
@@ -81,20 +81,20 @@ class EndOfList:
         returns = tasks.returns or self._policy().when_empty == 'return'
         if tasks.end_via and tasks.returns and telemetry.mode is not ModeFunction.RETURN:
             self.going_home = True
-            return None  # the plain way home leads through a zone: fly the list of it
+            return None  # the straight path home crosses a zone: fly the list with the detour
         blocked = self._blocked_home() if returns else ''
         if blocked and telemetry.mode is not ModeFunction.RETURN:
             returns = False
-            self._sender.wait(f'a way home: {blocked}')
+            self._sender.wait(f'a path home: {blocked}')
         if flying or (returns and telemetry.mode in (ModeFunction.HOLD, ModeFunction.MISSION)):
             mode = ModeFunction.RETURN if returns else ModeFunction.HOLD
             return self._sender.set_mode(mode, now)
         return []
 
     def _blocked_home(self) -> str:
-        """Why it must not fly straight home, in words; '' where it may."""
+        """Why it must not fly straight home, in words; '': it may."""
         telemetry, zones = self._telemetry, self._policy().zones
         if telemetry.home is None or not telemetry.has_position:
-            return 'its way home is not known' if zones else ''
+            return 'its path home is not known' if zones else ''
         zone = zone_across_path(telemetry.position, telemetry.home, zones)
-        return f'zone {zone.id} is on its way home' if zone else ''
+        return f'zone {zone.id} is across its path home' if zone else ''

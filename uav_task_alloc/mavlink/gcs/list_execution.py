@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The list on board and flown: upload, jump or swap, then mission mode at the right item."""
+"""Executes a list with tasks: upload or set current, then mission mode at the right item."""
 from __future__ import annotations
 
 from pymavlink.dialects.v20 import ardupilotmega as d
@@ -16,7 +16,7 @@ from uav_task_alloc.mavlink.mission.diff import DiffKind, MissionDiff
 
 
 class ListExecution:
-    """Brings a list with tasks on board, and has it flown."""
+    """Updates the onboard mission to the list, and flies it."""
 
     def __init__(
         self,
@@ -25,20 +25,21 @@ class ListExecution:
         onboard: OnboardMission,
         watch: AuthorityWatch,
         profile: Profile,
-        ending: EndOfList,
-        texts: StatusTextLog,
+        end_of_list: EndOfList,
+        status_text_log: StatusTextLog,
     ) -> None:
         self._sender, self._telemetry, self._onboard = sender, telemetry, onboard
-        self._watch, self._profile, self._ending, self._texts = watch, profile, ending, texts
-        self._service = UploadHold(onboard, telemetry, profile)
-        self._aimed = False  # its current item is set by us since it flew last
+        self._watch, self._profile, self._end_of_list = watch, profile, end_of_list
+        self._status_text_log = status_text_log
+        self._upload_hold = UploadHold(onboard, telemetry, profile)
+        self._current_set = False  # the bridge has set the current item since the last flight
 
-    def bring(self, now: float) -> NextMessages:
-        """The list on board, by the cheapest way."""
+    def update_mission(self, now: float) -> NextMessages:
+        """Change the onboard mission to the list by the smallest transfer; None: it is."""
         onboard, telemetry, sender = self._onboard, self._telemetry, self._sender
-        found = onboard.change()
-        if found.kind is DiffKind.KEEP:
-            onboard.adopt(found, now)
+        diff = onboard.diff()
+        if diff.kind is DiffKind.KEEP:
+            onboard.adopt(diff, now)
             return None
         if sender.backing_off(now):
             return []
@@ -46,78 +47,79 @@ class ListExecution:
             return sender.wait_for('the autopilot to start')
         if self._chosen_by_another():
             return sender.wait_for('the item that another station has chosen')
-        if found.kind is DiffKind.JUMP:
-            return self._jump(found, now)
+        if diff.kind is DiffKind.JUMP:
+            return self._set_current(diff, now)
         if onboard.list.leg.start_unknown:
             return sender.wait_for('a position')
-        if self._service.lasts(now):
+        if self._upload_hold.active(now):
             sender.waits_for = 'the end of the service'
             return []
-        if found.kind is DiffKind.REPLACE and telemetry.airborne and not telemetry.good_link(now):
+        if diff.kind is DiffKind.REPLACE and telemetry.airborne and not telemetry.good_link(now):
             return sender.wait_for('a link without gaps for 10 s')
-        if (found.kind is DiffKind.REPLACE and not self._profile.atomic and telemetry.airborne
+        if (diff.kind is DiffKind.REPLACE and not self._profile.atomic and telemetry.airborne
                 and telemetry.mode is ModeFunction.MISSION):
-            sender.must_start, self._watch.swap_at = True, now
+            sender.must_start, self._watch.replacing_since = True, now
             return sender.set_mode(ModeFunction.HOLD, now)
-        return onboard.begin_upload(found, now)
+        return onboard.begin_upload(diff, now)
 
     def _chosen_by_another(self) -> bool:
-        """Somebody has set the current item: it is flown, and what was left out later."""
+        """Whether another station has set the current item: it is flown first."""
         progress, item = self._onboard.progress, self._onboard.progress.active
         return (progress.set_by_other is not None and progress.set_by_other == progress.current
                 and self._telemetry.airborne
                 and self._telemetry.mode is ModeFunction.MISSION and item is not None
                 and any(item.task == stop.task.id for stop in self._onboard.remaining().stops))
 
-    def _jump(self, found: MissionDiff, now: float) -> NextMessages:
+    def _set_current(self, diff: MissionDiff, now: float) -> NextMessages:
         onboard = self._onboard
         if not self._watch.authority.held:
             return self._sender.wait_for('authority to set the current item')
         tasks = onboard.tasks
 
         def done(t: float) -> None:
-            onboard.progress.retag(found.items)
-            onboard.progress.note_set_current(found.start, t)
-            onboard.must_jump, self._aimed = None, True
-            onboard.adopt(found, t, tasks)
+            onboard.progress.retag(diff.items)
+            onboard.progress.note_set_current(diff.start, t)
+            onboard.set_current_to, self._current_set = None, True
+            onboard.adopt(diff, t, tasks)
 
-        onboard.progress.begin_set_current(found.start)
-        return self._sender.set_current(found.start + onboard.own, now, done)
+        onboard.progress.begin_set_current(diff.start)
+        return self._sender.set_current(diff.start + onboard.own, now, done)
 
     def fly(self, now: float) -> NextMessages:
-        """In mission mode, at the right item."""
+        """Fly the onboard mission from the right item; None is never returned."""
         sender, onboard = self._sender, self._onboard
         in_mission = self._telemetry.mode is ModeFunction.MISSION
         flying = in_mission and not sender.must_start
-        self._aimed = self._aimed and not flying
-        if flying and self._stands():
-            onboard.must_jump = onboard.progress.current
+        self._current_set = self._current_set and not flying
+        if flying and self._mission_ended():
+            onboard.set_current_to = onboard.progress.current
             sender.must_start = True
             # in mission mode it would start again at the first item
             return sender.set_mode(ModeFunction.HOLD, now)
-        if flying and onboard.must_jump is None:
+        if flying and onboard.set_current_to is None:
             onboard.progress.note_mission_mode()
-            self._ending.swap_ended()
+            self._end_of_list.end_hold()
             return sender.satisfied()
         if sender.mission_refused and not in_mission:
-            onboard.list.infeasible(self._texts.last or sender.mission_refused)
+            onboard.list.infeasible(self._status_text_log.last or sender.mission_refused)
             sender.mission_refused = ''
             return []
         if sender.backing_off(now):
             return []
         if self._telemetry.mode is ModeFunction.TAKEOFF:
             return sender.wait_for('the end of the take-off')
-        if not (flying or self._aimed or self._profile.atomic) and onboard.must_jump is None:
+        if onboard.set_current_to is None and not (
+                flying or self._current_set or self._profile.atomic):
             # ArduPilot resumes after the item that it flew last
-            onboard.must_jump = onboard.progress.current
-        if onboard.must_jump is not None:
-            return self._jump(
-                MissionDiff(DiffKind.JUMP, onboard.progress.items, onboard.must_jump), now
+            onboard.set_current_to = onboard.progress.current
+        if onboard.set_current_to is not None:
+            return self._set_current(
+                MissionDiff(DiffKind.JUMP, onboard.progress.items, onboard.set_current_to), now
             )
         return sender.set_mode(ModeFunction.MISSION, now)
 
-    def _stands(self) -> bool:
-        """ArduPilot has ended the mission that it had, and does not begin what was appended."""
+    def _mission_ended(self) -> bool:
+        """Whether ArduPilot has ended its mission and does not start the appended items."""
         telemetry, progress = self._telemetry, self._onboard.progress
         return (not self._profile.atomic and telemetry.current is not None
                 and telemetry.mission_state == d.MISSION_STATE_COMPLETE

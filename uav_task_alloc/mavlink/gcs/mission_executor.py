@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Flies one UAV by its list: compares what is wanted with what is, and does the next thing.
+"""Executes the task list of one UAV: compares the wanted state with the actual one, and acts.
 
-Without I/O: messages and steady time in, messages and events out. `_rules` is the whole of it:
-the first rule that is not satisfied acts, and those after it wait.
+Without I/O: messages and steady time in, messages and events out. `_rules` is the whole logic:
+the first rule that is not satisfied returns its messages; the following ones wait.
 """
 from __future__ import annotations
 
@@ -14,8 +14,12 @@ from pymavlink.dialects.v20 import ardupilotmega as d
 
 from uav_task_alloc.geometry.frames import Origin
 from uav_task_alloc.mavlink.autopilots import ModeFunction, Profile
-from uav_task_alloc.mavlink.gcs import authority as who
-from uav_task_alloc.mavlink.gcs.authority import AuthorityRecord, HoldStage, SendAction
+from uav_task_alloc.mavlink.gcs.authority import (
+    AuthorityRecord,
+    AuthorityState,
+    HoldStage,
+    SendAction,
+)
 from uav_task_alloc.mavlink.gcs.authority_watch import AuthorityWatch
 from uav_task_alloc.mavlink.gcs.command_sender import CommandSender, NextMessages
 from uav_task_alloc.mavlink.gcs.end_of_list import EndOfList
@@ -25,7 +29,7 @@ from uav_task_alloc.mavlink.gcs.message_rates import MessageRates
 from uav_task_alloc.mavlink.gcs.mission_evidence import MissionEvidence
 from uav_task_alloc.mavlink.gcs.onboard_mission import OnboardMission
 from uav_task_alloc.mavlink.gcs.policy import Policy
-from uav_task_alloc.mavlink.gcs.resume import MEMORY
+from uav_task_alloc.mavlink.gcs.resume import MAX_AGE
 from uav_task_alloc.mavlink.gcs.send_gate import allowed_messages
 from uav_task_alloc.mavlink.gcs.status_text_log import StatusTextLog
 from uav_task_alloc.mavlink.gcs.takeoff import Takeoff
@@ -44,7 +48,21 @@ from uav_task_alloc.model import Task
 
 
 class MissionExecutor:
-    """One vehicle as the bridge flies it."""
+    """Executes task lists on one vehicle.
+
+    `events` and `notes` are queues that the caller empties: task progress to publish, and lines
+    for the log. `policy` may be replaced at any time.
+
+    Args:
+        peer: the vehicle.
+        profile: of its autopilot.
+        origin: of the local ENU frame.
+        policy: of the operator.
+        rng: for back-off jitter.
+        now: steady time [s], as in all methods.
+        record: authority of the previous run; None: first run.
+        save: stores a changed authority record.
+    """
 
     def __init__(self, peer: Peer, profile: Profile, origin: Origin, policy: Policy,
                  rng: random.Random, now: float, record: AuthorityRecord | None = None,
@@ -53,7 +71,7 @@ class MissionExecutor:
         self.telemetry = Telemetry(profile, origin, now)
         self.onboard = OnboardMission(peer, profile, origin, self.telemetry, rng)
         self.sender = CommandSender(peer, profile, self.telemetry)
-        self.onboard.list.leg.locate = self._leg_begins
+        self.onboard.list.leg.locate = self._leg_start
         evidence = MissionEvidence(self.onboard, self.telemetry)
         self.watch = AuthorityWatch(profile, self.telemetry, evidence, lambda: self.policy,
                                     now, record, save)
@@ -62,45 +80,58 @@ class MissionExecutor:
         self.notes: deque[OperatorNote] = deque()
         self._rates = MessageRates(peer, self.telemetry, now)
         self._was_stale = False
-        self._reminder = EventRetry()
+        self._event_retry = EventRetry()
         self._restarts = 0
-        self._texts = StatusTextLog()
-        take_off = Takeoff(self.sender, self.telemetry, self.onboard, self.authority,
-                           lambda: self.policy)
-        self._ending = EndOfList(self.sender, self.telemetry, self.onboard, self.watch,
-                                    lambda: self.policy, self.notes)
-        fly_list = ListExecution(self.sender, self.telemetry, self.onboard, self.watch, profile,
-                           self._ending, self._texts)
+        self._status_text_log = StatusTextLog()
+        takeoff = Takeoff(self.sender, self.telemetry, self.onboard, self.authority,
+                          lambda: self.policy)
+        self._end_of_list = EndOfList(self.sender, self.telemetry, self.onboard, self.watch,
+                                      lambda: self.policy, self.notes)
+        execution = ListExecution(self.sender, self.telemetry, self.onboard, self.watch, profile,
+                                  self._end_of_list, self._status_text_log)
+        self._restore(record)
+        self._rules = (
+            self._linked, self._authority, self.sender.finish, takeoff.continue_takeoff,
+            self._upload, self._read, self._has_list, self._resume, self._may_act,
+            self._hold_first, self._end_of_list.held_too_long, self._end_of_list.empty,
+            execution.update_mission, takeoff.take_off, execution.fly)
+
+    def _restore(self, record: AuthorityRecord | None) -> None:
+        """Pass what the previous run recorded to `onboard.resume`."""
+        resume = self.onboard.resume
         if record is not None:
-            self.onboard.resume.known = record.mission, record.current
-            # the current item may be of the mission before, or set by whoever had it
-            self.onboard.resume.doubtful = (
-                record.swap_at is not None and not profile.atomic) or (
-                record.state is who.AuthorityState.LOST
-                and profile.mode_function(record.mode or 0) is not ModeFunction.MISSION)
+            resume.recorded = record.mission, record.current
+            # the current item may be of the replaced mission, or set by another party
+            resume.current_unreliable = (
+                record.replacing_since is not None and not self.profile.atomic) or (
+                record.state is AuthorityState.LOST
+                and self.profile.mode_function(record.mode or 0) is not ModeFunction.MISSION)
         for mark in self.watch.marks.values():
             if mark.flown:
-                self.onboard.resume.reported.add(mark.task)
+                resume.reported.add(mark.task)
             else:
-                self.onboard.resume.unflown[mark.task] = mark[1:4]
-        self._rules = (
-            self._linked, self._authority, self.sender.finish, take_off.continue_takeoff,
-            self._upload, self._read, self._has_list, self._place, self._may_act,
-            self._hold_first, self._ending.held_too_long, self._ending.empty, fly_list.bring,
-            take_off.take_off, fly_list.fly)
+                resume.unflown[mark.task] = mark[1:4]
 
     @property
     def going_home(self) -> bool:
-        """By a list without tasks."""
-        return self._ending.going_home
+        """Whether it returns as its list has no tasks."""
+        return self._end_of_list.going_home
 
     @property
     def alarm(self) -> str:
-        """What a human has to see to; '' for nothing."""
-        return self._ending.alarm
+        """A condition that requires action by a human, in words; '': none."""
+        return self._end_of_list.alarm
 
     def assign(self, tasks: TaskList, now: float) -> list[Message]:
-        """The latest list for this UAV; an older one that comes late is ignored."""
+        """Execute a new task list.
+
+        Args:
+            tasks: the list; one with an older revision than the present one is ignored.
+            now: steady time [s].
+
+        Returns:
+            Messages to send to the vehicle.
+        """
         if self.onboard.tasks is not None and tasks.revision < self.onboard.tasks.revision:
             self.notes.append(
                 OperatorNote(
@@ -110,27 +141,28 @@ class MissionExecutor:
                 )
             )
             return []
-        if self.onboard.tasks is None and tasks.revision > 1:  # else all of it is new
+        if self.onboard.tasks is None and tasks.revision > 1:  # revision 1: all tasks are new
             for mark in self.watch.marks.values():
-                if mark.flown and now - mark.at < MEMORY:
+                if mark.flown and now - mark.at < MAX_AGE:
                     self.onboard.progress.completed[mark.task] = mark[1:4]
         self.onboard.list.assign(tasks)
-        for task in filter(self.onboard.list.repeat, self._reminder.answered()):
+        for task in filter(self.onboard.list.repeat, self._event_retry.wanted_again()):
             self.notes.append(
-                OperatorNote('info', f'{task} was announced anew: it is flown once more')
+                OperatorNote('info', f'{task} was announced again: it is flown once more')
             )
-        self._reminder.listed(self.onboard.list.ended_before(), now)
+        self._event_retry.set_ended(self.onboard.list.ended_before(), now)
         self.sender.clear_backoff(now)
         return self._gate(self._act(now), now)
 
     def drop_flown(self, tasks: Sequence[Task], other: str) -> None:
-        """Tasks of the list that another UAV has flown before we listened."""
+        """Complete tasks of the list that UAV `other` has flown while the bridge was down."""
         for task in tasks:
-            self.notes.append(OperatorNote('info', f'{task.id} was flown by {other}, unheard'))
+            self.notes.append(OperatorNote(
+                'info', f'{task.id} was flown by {other} while the bridge was down'))
         self.onboard.progress.complete_offline(tasks)
 
     def hand_over(self, operator: str, now: float) -> str:
-        """An operator gives the aircraft to the bridge; returns why not, '' where it has it."""
+        """An operator gives control to the bridge; returns why it is refused, '' on success."""
         refusal = self.watch.hand_over(operator, now)
         if not refusal:
             self.sender.clear_backoff(now)
@@ -138,51 +170,49 @@ class MissionExecutor:
         return refusal
 
     def moved_address(self, now: float) -> None:
-        """It speaks from a new address: it, or another vehicle with the same id."""
+        """Start over: its system id is used at a new address, perhaps by another vehicle."""
         self.watch.address_changed(now)
         self.telemetry.restart()
         self._restarts = self.telemetry.restarts
-        self._begin_anew(now)
+        self._start_over(now)
 
     def receive(self, message: Message, now: float) -> list[Message]:
-        """Take any message of this vehicle."""
-        flight = self.telemetry.mode
+        """Process a message of this vehicle; returns the messages to send."""
+        mode_before = self.telemetry.mode
         newest = self.telemetry.receive(message, now)
         if self.telemetry.restarts != self._restarts:
             self._restarts = self.telemetry.restarts
             self.notes.append(OperatorNote('warning', 'was restarted'))
             self.watch.vehicle_rebooted(now)
-            self._begin_anew(now)
+            self._start_over(now)
             self.onboard.resume.rebooted()
         if message.get_type() == 'HEARTBEAT' and newest:
             self.watch.receive_heartbeat(message, now)
-            if (
-                flight is ModeFunction.MISSION
-                and self.telemetry.mode is not ModeFunction.MISSION
-            ):
+            if (mode_before is ModeFunction.MISSION
+                    and self.telemetry.mode is not ModeFunction.MISSION):
                 self.onboard.progress.note_mission_left()
         out = self.onboard.receive(message, now)
         self.sender.receive(message)
         if message.get_type() == 'COMMAND_ACK' and self._peer.is_from_vehicle(message):
             self.watch.receive_command_ack(message, self.telemetry.frame)
-        self._progress(message, newest, now)
+        self._update_progress(message, newest, now)
         return self._gate(out + self._act(now), now)
 
     def step(self, now: float) -> list[Message]:
-        """Let time pass."""
-        self.events += self._reminder.step(now)
+        """Advance time; returns the messages to send."""
+        self.events += self._event_retry.step(now)
         self.onboard.progress.step(now)
         out = self.onboard.step(now) + self._rates.step(now)
         return self._gate(out + self._act(now), now)
 
     def _gate(self, messages: list[Message], now: float) -> list[Message]:
-        """The one way out: what authority does not allow is not sent, retries included."""
+        """Drop messages that authority does not allow; every message passes here."""
         return allowed_messages(messages, self.watch, now)
 
     def _act(self, now: float) -> list[Message]:
         out: list[Message] = []
         self.watch.step(now)
-        self.onboard.catch_up(now)
+        self.onboard.complete_flown(now)
         for rule in self._rules:
             step = rule(now)
             if step is not None:
@@ -199,9 +229,9 @@ class MissionExecutor:
             while notes:
                 self.notes.append(notes.popleft())
 
-    # What is heard
+    # Received messages
 
-    def _progress(self, message: Message, newest: bool, now: float) -> None:
+    def _update_progress(self, message: Message, newest: bool, now: float) -> None:
         kind, progress, own = message.get_type(), self.onboard.progress, self.onboard.own
         flying = self.telemetry.mode is ModeFunction.MISSION
         if kind == 'GLOBAL_POSITION_INT':
@@ -210,10 +240,10 @@ class MissionExecutor:
             self.onboard.reached(message.seq - own, now)
         elif kind == 'MISSION_CURRENT' and newest and self.onboard.is_of_known_mission(message):
             seq = max(0, message.seq - own)
-            if self.onboard.must_jump is None:  # else it is left from the mission before
+            if self.onboard.set_current_to is None:  # else seq is of the previous mission
                 progress.note_current(seq, now, flying, self.telemetry.frame)
             if (message.mission_state == d.MISSION_STATE_COMPLETE and flying
-                    and not self.profile.atomic):  # PX4 says so after a take-off too
+                    and not self.profile.atomic):  # PX4 reports it after a take-off too
                 progress.note_mission_complete(seq, now, self.telemetry.frame)
             if not self.sender.busy and not self.onboard.open:
                 self.onboard.watch(message, now)
@@ -221,18 +251,18 @@ class MissionExecutor:
             self.watch.receive_status_text(message, now)
             self.sender.note_arming_refusal(str(message.text))
             self.onboard.list.horizon.note(str(message.text))
-            note = self._texts.take(message, now)
+            note = self._status_text_log.receive(message, now)
             self.notes.extend(() if note is None else (note,))
 
     def _position(self, message: Message, newest: bool, now: float) -> None:
         if self.telemetry.has_position:
-            place, velocity = self.telemetry.place_of(message)
+            position, velocity = self.telemetry.enu_of(message)
             self.onboard.progress.add_position(
-                PositionSample(message.time_boot_ms * 1e-3, place, velocity), newest, now,
+                PositionSample(message.time_boot_ms * 1e-3, position, velocity), newest, now,
                 self.telemetry.frame)
 
-    def _leg_begins(self) -> LegStart | None:
-        """Where it is, or where the take-off that is due ends; None: not known."""
+    def _leg_start(self) -> LegStart | None:
+        """Its position, at the height after a take-off if one is due; None: unknown."""
         telemetry, (x, y, z) = self.telemetry, self.telemetry.position
         home = telemetry.home or telemetry.position
         if not telemetry.airborne or self.sender.climbing:
@@ -240,14 +270,15 @@ class MissionExecutor:
         return LegStart((x, y, z), home, telemetry.mode is ModeFunction.MISSION) if (
             telemetry.has_position) else None
 
-    def _begin_anew(self, now: float) -> None:
+    def _start_over(self, now: float) -> None:
         self.onboard.restarted()
         self.sender.reset(now)
-        self._rates.again(now)
+        self._rates.restart(now)
 
-    # The rules
+    # Rules
 
     def _linked(self, now: float) -> NextMessages:
+        """Send nothing while the link is stale."""
         if self.telemetry.stale(now):
             self._was_stale, self.sender.waits_for = True, 'its link'
             self.sender.drop()
@@ -258,7 +289,7 @@ class MissionExecutor:
         return None
 
     def _authority(self, now: float) -> NextMessages:
-        """Whoever has it, nothing that was begun for us goes on."""
+        """Stop commands and uploads of the bridge when another party has the authority."""
         if self.authority.held:
             return None
         if not self.authority.allows(SendAction.COMMAND):
@@ -271,33 +302,33 @@ class MissionExecutor:
         return None
 
     def _upload(self, now: float) -> NextMessages:
+        """Continue an upload; set the current item past tasks flown in the meantime."""
         onboard = self.onboard
-        if onboard.trouble:
-            onboard.trouble = False
+        if onboard.transfer_failed:
+            onboard.transfer_failed = False
             self.sender.fail(now)
         if not onboard.upload.busy:
             return None
-        beyond = onboard.beyond_flown()
-        if beyond is not None and self.authority.held:
-            onboard.progress.begin_set_current(beyond)
-            return self.sender.set_current(beyond + onboard.own, now,
-                                  lambda t: onboard.progress.note_set_current(beyond, t))
+        seq = onboard.next_unflown()
+        if seq is not None and self.authority.held:
+            onboard.progress.begin_set_current(seq)
+            return self.sender.set_current(
+                seq + onboard.own, now, lambda t: onboard.progress.note_set_current(seq, t))
         self.sender.waits_for = 'its upload'
-        if (
-            onboard.upload.state in (UploadState.BACKOFF, UploadState.DRAINING)
-            and onboard.outdated
-            and (onboard.held is not None and onboard.wanted() and not onboard.upload.may_be_stored)
-        ):
-            return onboard.begin_upload(onboard.change(), now)
-        return self._ending.held_too_long(now) or []
+        if (onboard.upload.state in (UploadState.BACKOFF, UploadState.DRAINING)
+                and onboard.outdated and onboard.held is not None and onboard.wanted()
+                and not onboard.upload.may_be_stored):
+            return onboard.begin_upload(onboard.diff(), now)
+        return self._end_of_list.held_too_long(now) or []
 
     def _read(self, now: float) -> NextMessages:
+        """Read the onboard mission where it is unknown."""
         if self.onboard.held is not None:
             return None
         if not self.telemetry.past_boot:
             return self.sender.wait_for('the autopilot to start')
         if self.sender.backing_off(now):
-            return self._ending.held_too_long(now) or []
+            return self._end_of_list.held_too_long(now) or []
         self.sender.waits_for = 'a readback'
         return self.onboard.upload.read(now)
 
@@ -305,37 +336,37 @@ class MissionExecutor:
         self.sender.waits_for = 'a list' if self.onboard.tasks is None else ''
         return [] if self.onboard.tasks is None else None
 
-    def _place(self, now: float) -> NextMessages:
-        """After a restart of the bridge: what was flown meanwhile is not repeated."""
+    def _resume(self, now: float) -> NextMessages:
+        """After a restart of the bridge, complete the tasks flown in the meantime."""
         onboard, telemetry = self.onboard, self.telemetry
         assert onboard.tasks is not None
-        if not onboard.resume.placed and onboard.held and telemetry.airborne and (
+        if not onboard.resume.located and onboard.held and telemetry.airborne and (
                 telemetry.current is None or not telemetry.has_position):
-            return []  # what it flies is not known yet
-        onboard.resume.place(onboard.held or (), onboard.tasks, now)
-        onboard.catch_up(now)
+            return []  # its current item is not known yet
+        onboard.resume.locate(onboard.held or (), onboard.tasks, now)
+        onboard.complete_flown(now)
         return None
 
     def _may_act(self, now: float) -> NextMessages:
-        if self.authority.state is who.AuthorityState.LOST:
+        if self.authority.state is AuthorityState.LOST:
             return self.sender.wait('the pilot to give it back')
         if not self.authority.allows(SendAction.UPLOAD):
             return self.sender.wait_for(f'authority: {self.authority.why}')
         if self.authority.held or not self.telemetry.airborne:
             return None
-        # a pilot flies what is on board: it is not changed under him
+        # a pilot flies the onboard mission: do not replace it
         return self.sender.wait_for('the pilot to hand it over')
 
     def _hold_first(self, now: float) -> NextMessages:
-        """After a hand-over in flight nothing else is done before it holds."""
-        authority, flight = self.authority, self.telemetry.mode
+        """After a hand-over in flight, hold before anything else."""
+        authority, mode = self.authority, self.telemetry.mode
         if authority.hold is HoldStage.NO or not self.telemetry.airborne:
             authority.hold = HoldStage.NO
             return None
-        if flight is ModeFunction.HOLD or (
+        if mode is ModeFunction.HOLD or (
                 authority.hold is HoldStage.UNLESS_VERIFIED
-                and flight is ModeFunction.MISSION and self.onboard.verified()):
-            self.sender.must_start = flight is ModeFunction.HOLD
+                and mode is ModeFunction.MISSION and self.onboard.verified()):
+            self.sender.must_start = mode is ModeFunction.HOLD
             authority.hold = HoldStage.NO
             return None
         if self.sender.backing_off(now) or ModeFunction.HOLD not in self.profile.set_mode:

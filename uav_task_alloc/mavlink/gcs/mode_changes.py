@@ -111,8 +111,8 @@ class ModeChanges:
             state.apply(AuthorityEvent.AVOIDED, now, why)
         elif state.failsafe_active(now):
             event = (
-                AuthorityEvent.SWAP_TAKEN
-                if state.swap_at is not None
+                AuthorityEvent.REPLACEMENT_TAKEN
+                if state.replacing_since is not None
                 else AuthorityEvent.FAILSAFE_MODE
             )
             state.apply(event, now, f'failsafe: {why}')

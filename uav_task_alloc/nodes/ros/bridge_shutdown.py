@@ -1,41 +1,42 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a bridge that is asked to end waits for, and what it says of the UAVs it leaves."""
+"""What a bridge that is asked to exit waits for, and what it logs about the UAVs it leaves."""
 from __future__ import annotations
 
 from collections.abc import Iterable
 
 from uav_task_alloc.mavlink.gcs.ground_station import VehicleSession
 
-LONGEST = 10.0  # [s] that a swap under way is waited for
+UPLOAD_TIMEOUT = 10.0  # [s] that a running upload is waited for
 
 
 class BridgeShutdown:
-    """From the first request to end on; `asked` is its time [s], None before."""
+    """State from the first request to exit on; `requested_at` [s] is None before."""
 
     def __init__(self) -> None:
-        self.asked: float | None = None
+        self.requested_at: float | None = None
 
     def waits(self, fleet: Iterable[VehicleSession], now: float) -> bool:
-        """Whether a UAV is held for an upload whose end is waited for, at most LONGEST."""
-        self.asked = now if self.asked is None else self.asked
-        return now - self.asked < LONGEST and any(swapping(fleet))
+        """Whether a UAV is held for an upload; False once UPLOAD_TIMEOUT is over."""
+        self.requested_at = now if self.requested_at is None else self.requested_at
+        return now - self.requested_at < UPLOAD_TIMEOUT and any(held_for_upload(fleet))
 
     @staticmethod
-    def words(fleet: Iterable[VehicleSession]) -> list[str]:
-        """Who is in the air and what becomes of them, for the log; nothing where nobody is."""
+    def warnings(fleet: Iterable[VehicleSession]) -> list[str]:
+        """Which UAVs are airborne and what they do without the bridge; one line for each case."""
         airborne = [session for session in fleet if session.executor.telemetry.airborne]
-        held = swapping(airborne)
+        held = held_for_upload(airborne)
         flying = [session.uav_id for session in airborne if session.uav_id not in held]
-        said = []
+        lines = []
         if flying:
-            said.append(f'ends while airborne: {", ".join(flying)}; each goes on with what is on '
-                        'board')
+            lines.append(f'exits while airborne: {", ".join(flying)}; each continues its onboard '
+                         'mission')
         if held:
-            said.append(f'ends while held in the air for a new list: {", ".join(held)}; a pilot '
-                        'or the next bridge has to start the mission again')
-        return said
+            lines.append(f'exits while held in the air for a new list: {", ".join(held)}; a pilot '
+                         'or the next bridge has to start the mission again')
+        return lines
 
 
-def swapping(fleet: Iterable[VehicleSession]) -> list[str]:
-    """UAVs that are held for an upload."""
-    return [session.uav_id for session in fleet if session.executor.watch.swap_at is not None]
+def held_for_upload(fleet: Iterable[VehicleSession]) -> list[str]:
+    """Ids of the UAVs that are held in the air for an upload."""
+    return [session.uav_id for session in fleet
+            if session.executor.watch.replacing_since is not None]
