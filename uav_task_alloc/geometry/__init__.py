@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Where things are: zones, detours, distances and frames; knows no solver, no ROS."""
+"""Zones, detours, distances, polylines, polygons and frames; no solver, no ROS."""

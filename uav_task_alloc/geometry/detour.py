@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The shortest safe way between two points, with the waypoints that fly it."""
+"""The shortest safe path between two points, with the waypoints that fly it."""
 from __future__ import annotations
 
 import math
@@ -26,18 +26,21 @@ from uav_task_alloc.model import Point, ThreatZone, check_point
 
 @dataclass(frozen=True, slots=True)
 class Detour:
-    """A way and what is special about it; `length` is inf and `points` empty where none exists."""
+    """A path between two points and what is special about it.
+
+    `length` is inf and `points` is empty where there is no path.
+    """
 
     length: float  # [m] of the polyline, from end to end
     points: tuple[Point, ...] = ()  # [m] ENU, without both ends
     start_inside: tuple[str, ...] = ()  # zones to leave first; points[0] is then outside
     goal_inside: tuple[str, ...] = ()  # zones that make the goal unreachable
-    closed_off: bool = False  # zones and altitude limits leave no way
-    given_up: bool = False  # none was found in the time; there may be one
+    closed_off: bool = False  # zones and altitude limits leave no path
+    given_up: bool = False  # the budget was spent before one was found; there may be one
 
     @property
     def reason(self) -> str:
-        """Why there is no way, or that it starts inside a zone; empty: nothing special."""
+        """Why there is no path, or that it starts inside a zone; empty: nothing special."""
         if self.goal_inside:
             return f'the goal is inside zone {", ".join(self.goal_inside)}'
         if self.given_up:
@@ -52,10 +55,22 @@ class Detour:
 def detour(a: Iterable[float], b: Iterable[float], zones: Iterable[ThreatZone] = (), *,
            clearance: float = 0.0, altitude_min: float = -math.inf,
            altitude_max: float = math.inf) -> tuple[float, tuple[Point, ...]]:
-    """Length [m] and waypoints (without a and b) of the shortest safe way; (inf, ()): none.
+    """Find the shortest path between two points that stays outside every zone.
 
-    The polyline a, waypoints, b stays outside every zone enlarged by its margin and `clearance`
-    [m]; the altitude limits bind the waypoints [m], not the ends. Raises InvalidValue.
+    Args:
+        a: start [m] ENU. Inside zones the path first leads to the nearest point outside.
+        b: goal [m] ENU.
+        zones: each is enlarged by its own margin and `clearance`.
+        clearance: [m], at least 0.
+        altitude_min: lowest waypoint [m] ENU; does not bind a and b.
+        altitude_max: highest waypoint [m] ENU; does not bind a and b.
+
+    Returns:
+        Length [m] of the polyline a, waypoints, b, and its waypoints [m] ENU without a and b.
+        (inf, ()) where there is no path.
+
+    Raises:
+        InvalidValue: a point is not finite, the clearance is negative, or the limits are reversed.
     """
     found = find_detour(a, b, zones, clearance=clearance, altitude_min=altitude_min,
                         altitude_max=altitude_max)
@@ -66,11 +81,23 @@ def find_detour(a: Iterable[float], b: Iterable[float], zones: Iterable[ThreatZo
                 clearance: float = 0.0, altitude_min: float = -math.inf,
                 altitude_max: float = math.inf, budget: SearchBudget | None = None,
                 obstacles: Obstacles | None = None) -> Detour:
-    """As `detour`, and says what is special about the way. Raises InvalidValue.
+    """As `detour`, and report what is special about the path.
 
     Args:
-        effort: what the search may spend; None: no limit.
-        obstacles: the zones with the clearance, packed before.
+        a: start [m] ENU.
+        b: goal [m] ENU.
+        zones: each is enlarged by its own margin and `clearance`.
+        clearance: [m], at least 0.
+        altitude_min: lowest waypoint [m] ENU; does not bind a and b.
+        altitude_max: highest waypoint [m] ENU; does not bind a and b.
+        budget: what the search may spend; None: no limit.
+        obstacles: the zones with the clearance, packed before; None: they are packed now.
+
+    Returns:
+        The path, or why there is none.
+
+    Raises:
+        InvalidValue: as `detour`.
     """
     start, goal, zones = check_point('a', a), check_point('b', b), tuple(zones)
     limits = check_limits(altitude_min, altitude_max)
@@ -86,7 +113,14 @@ def find_detour(a: Iterable[float], b: Iterable[float], zones: Iterable[ThreatZo
 
 
 def check_limits(altitude_min: float, altitude_max: float) -> Floats:
-    """The altitude limits [m] as kernels take them. Raises InvalidValue."""
+    """Check altitude limits.
+
+    Returns:
+        (altitude_min, altitude_max) [m], float64, as kernels take them.
+
+    Raises:
+        InvalidValue: they are reversed, or not numbers.
+    """
     if not altitude_min <= altitude_max:
         raise InvalidValue('altitude_min, altitude_max', (altitude_min, altitude_max),
                            'altitude_min <= altitude_max')
@@ -96,9 +130,19 @@ def check_limits(altitude_min: float, altitude_max: float) -> Floats:
 def path_between(obstacles: Obstacles, start: Point, goal: Point, limits: Floats,
                  start_inside: bool,
                  budget: SearchBudget | None = None) -> tuple[float, tuple[Point, ...]]:
-    """Length [m] and waypoints from start to a goal outside all zones; caught: start inside.
+    """Find the shortest path from a start to a goal outside all zones.
 
-    inf: there is no way; NaN: none was found with this effort.
+    Args:
+        obstacles: the enlarged zones.
+        start: [m] ENU.
+        goal: [m] ENU.
+        limits: altitude_min and altitude_max [m].
+        start_inside: the start is inside a zone and has to be left first.
+        budget: what the search may spend; None: no limit.
+
+    Returns:
+        Length [m] and waypoints [m] without both ends. inf: there is no path; NaN: none was found
+        within the budget.
     """
     work = new_work(budget.state.ctypes.data if budget else 0)
     first: tuple[Point, ...] = ()
@@ -120,7 +164,7 @@ def path_between(obstacles: Obstacles, start: Point, goal: Point, limits: Floats
 
 
 def as_points(rows: Floats) -> tuple[Point, ...]:
-    """Rows of an array as points [m]."""
+    """Rows of a float64 array of shape (n, 3) as points [m]."""
     return tuple((float(x), float(y), float(z)) for x, y, z in rows)
 
 

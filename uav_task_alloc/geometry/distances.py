@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Lengths of the safe ways between numbered points, for kernels: known, or found when asked for.
+"""Lengths of safe paths between numbered points, for kernels: known, or searched for when needed.
 
 `length(pairs, i, j)` may be called in any kernel, also without the GIL. Up to DENSE_MAX points the
-lengths fill a square table (NaN: not asked for yet); beyond, there is a cache of the last answers.
-A way not found with the effort allowed counts as none until more is allowed.
+lengths fill a square table (NaN: not known yet); beyond, there is a cache of the last ones. A path
+not found within the budget counts as none until a greater budget is allowed.
 """
 from __future__ import annotations
 
@@ -40,12 +40,12 @@ from uav_task_alloc.kernel import allocating_kernel
 from uav_task_alloc.model import Leg, Point, ThreatZone
 
 DENSE_MAX = 2048  # points; the table takes 8 n^2 bytes
-CACHE_SIZE = 1 << 20  # answers kept beyond that; a power of two
-MAX_CHECKS = 20_000_000  # at pairs and changed zones; beyond, the table begins anew
+CACHE_SIZE = 1 << 20  # lengths kept beyond that; a power of two
+MAX_CHECKS = 20_000_000  # of pairs against changed zones; beyond, the table starts empty
 
 
 class _Addresses(NamedTuple):
-    """Sizes and addresses; see geometry/numba_pointers.py for why."""
+    """Sizes and addresses; numba_pointers.py says why."""
 
     points: int
     zones: int
@@ -53,7 +53,7 @@ class _Addresses(NamedTuple):
     row: int  # length of a row of the table; 0: no table
     slot: int  # int64: row and column of each point in the table
     table: int  # float64 [m], NaN: unknown
-    keys: int  # int64: i * points + j of each answer in the cache
+    keys: int  # int64: i * points + j of each length in the cache
     lengths: int  # float64 [m]
     scene: int  # what `find` reads
     find: int  # C function (scene, i, j) -> length [m]; 0 where there are no zones
@@ -61,7 +61,7 @@ class _Addresses(NamedTuple):
 
 
 class Pairs(_Addresses):
-    """What `length` needs inside a kernel; made by Distances, opaque to everybody else."""
+    """What `length` needs inside a kernel; made by Distances, opaque to all others."""
 
     owner: object  # keeps alive what the addresses point to
 
@@ -71,7 +71,7 @@ class Pairs(_Addresses):
 
 @allocating_kernel
 def length(pairs: Pairs, i: int, j: int) -> float:
-    """Length [m] of the shortest safe way from point i to point j; inf: there is none."""
+    """Length [m] of the shortest safe path from point i to point j; inf: none. O(1) once known."""
     if pairs.row > 0:
         slot = ints_at(pairs.slot)
         known = floats_at(pairs.table)[slot[i] * pairs.row + slot[j]]
@@ -86,9 +86,10 @@ def length(pairs: Pairs, i: int, j: int) -> float:
 
 @allocating_kernel
 def _search_length(pairs: Pairs, i: int, j: int, known: float) -> float:
-    """Length [m] found now; -w - 1: not with w units of work, NaN: there was no time at all.
+    """Search for a length now; `known` is what an earlier search left that was cut short.
 
-    known: what an earlier search that was cut short left.
+    Returns:
+        [m]; -w - 1: not found with w units of work; NaN: there was no time to search.
     """
     state = ints_at(ints_at(pairs.scene)[BUDGET_INDEX])
     if state[EXHAUSTED] != 0:
@@ -105,6 +106,7 @@ def _search_length(pairs: Pairs, i: int, j: int, known: float) -> float:
 
 @allocating_kernel
 def _find_for_table(pairs: Pairs, i: int, j: int) -> float:
+    """As `length`, where the table does not have it yet."""
     slot, table = ints_at(pairs.slot), floats_at(pairs.table)
     place = slot[i] * pairs.row + slot[j]
     found = _search_length(pairs, i, j, table[place])
@@ -117,6 +119,7 @@ def _find_for_table(pairs: Pairs, i: int, j: int) -> float:
 
 @allocating_kernel
 def _find_for_cache(pairs: Pairs, i: int, j: int) -> float:
+    """As `length`, with the cache instead of the table."""
     keys, lengths = ints_at(pairs.keys), floats_at(pairs.lengths)
     location = ints_at(ints_at(pairs.scene)[LOCATION_INDEX])
     if j < i and location[i] != INSIDE and location[j] != INSIDE:
@@ -133,7 +136,7 @@ def _find_for_cache(pairs: Pairs, i: int, j: int) -> float:
 
 @allocating_kernel
 def _known_length(pairs: Pairs, i: int, j: int) -> float:
-    """The length [m], if it is known; otherwise NaN or negative."""
+    """The length [m] if it is known; NaN or negative otherwise. O(1)"""
     if pairs.row > 0:
         slot = ints_at(pairs.slot)
         return float(floats_at(pairs.table)[slot[i] * pairs.row + slot[j]])
@@ -150,7 +153,7 @@ def _known_length(pairs: Pairs, i: int, j: int) -> float:
 
 @allocating_kernel
 def _store_length(pairs: Pairs, i: int, j: int, found: float) -> None:
-    """The way from i, which need not be back, to j, which is outside all zones."""
+    """Store the length of a path from i to j, which is outside all zones. O(1)"""
     location = ints_at(ints_at(pairs.scene)[LOCATION_INDEX])
     if pairs.row > 0:
         slot, table = ints_at(pairs.slot), floats_at(pairs.table)
@@ -166,9 +169,10 @@ def _store_length(pairs: Pairs, i: int, j: int, found: float) -> None:
 
 @allocating_kernel
 def length_via(pairs: Pairs, i: int, k: int, j: int) -> float:
-    """Length [m] of the way from i to j: as `length`, or over point k where none is known.
+    """Length [m] of the path from i to j, or over point k where none is known.
 
-    inf: nor are the ways from i to k and on to j kept.
+    Returns:
+        inf: nor are the paths from i to k and from k to j known.
     """
     found = length(pairs, i, j)
     if found < np.inf or pairs.zones == 0:
@@ -181,14 +185,26 @@ def length_via(pairs: Pairs, i: int, k: int, j: int) -> float:
 
 @allocating_kernel
 def _ensure(pairs: Pairs, origins: Ints, goals: Ints) -> None:
+    """Search for the lengths of all pairs (origins[m], goals[m]), int64 (n,)."""
     for m in range(origins.size):
         length(pairs, origins[m], goals[m])
 
 
 class Distances:
-    """Detour lengths between points 0..n-1; asymmetric only where a point lies inside a zone.
+    """Lengths of safe paths between points 0..n-1; asymmetric only where a point is inside a zone.
 
-    Immutable to its user: `updated` gives another one, which takes over all that still holds.
+    Immutable to its user: `updated` returns another one, which takes over all that is still valid.
+
+    Args:
+        points: (n, 3), ENU [m].
+        zones: each is enlarged by its margin and `clearance`.
+        clearance: [m].
+        altitude_min: lowest waypoint [m].
+        altitude_max: highest waypoint [m].
+        budget: what searches may spend; None: no limit.
+
+    Raises:
+        InvalidValue: a point is not finite, the clearance is negative, or the limits are reversed.
     """
 
     def __init__(self, points: ArrayLike, zones: Sequence[ThreatZone] = (), *,
@@ -228,7 +244,16 @@ class Distances:
     def updated(self, points: ArrayLike | None = None,
                 zones: Sequence[ThreatZone] | None = None,
                 budget: SearchBudget | None = None) -> Distances:
-        """For other points, in any order, or zones that came, moved or vanished."""
+        """Distances for other points, in any order, or for zones that changed.
+
+        Args:
+            points: (n, 3), ENU [m]; None: the same.
+            zones: None: the same.
+            budget: None: no limit.
+
+        Raises:
+            InvalidValue: as the constructor.
+        """
         new_points = self.points if points is None else np.asarray(points, dtype=np.float64)
         new_zones = self.zones if zones is None else tuple(zones)
         low, high = self._scene.limits
@@ -239,7 +264,7 @@ class Distances:
                          altitude_max=high, budget=budget, _previous=self, _table=table)
 
     def _still_valid(self, zones: tuple[ThreatZone, ...]) -> LengthTable | None:
-        """The table without what other zones change; None: all would take longer to look at."""
+        """The table without what other zones change; None: that takes too long."""
         before, after = set(self.zones), set(zones)
         removed, added = before - after, after - before
         if (len(removed) + len(added)) * self._table.used ** 2 > MAX_CHECKS:
@@ -250,14 +275,26 @@ class Distances:
         return table
 
     def ensure(self, origins: ArrayLike, goals: ArrayLike) -> None:
-        """Find the lengths of these pairs now; all others are found when asked for."""
+        """Search for the lengths of pairs now; all others are searched for when first needed.
+
+        Args:
+            origins: (n,) indices of points.
+            goals: (n,) indices of points.
+        """
         _ensure(self.pairs, np.asarray(origins, dtype=np.int64).ravel(),
                 np.asarray(goals, dtype=np.int64).ravel())
 
     def offer_path(self, i: int, j: int, via: Sequence[Point]) -> bool:
-        """Take this way from i to j, or the rest of it from one of its points on, if it is clear.
+        """Take a path from i to j, or its remainder from one of its points on, if that is clear.
 
-        For one that no way was found for in the time; whether it is taken.
+        For pairs whose path was not found within the budget.
+
+        Args:
+            i, j: indices of points.
+            via: [m] ENU, without both ends.
+
+        Returns:
+            Whether it was taken.
         """
         scene = self._scene
         if INSIDE in (scene.location[i], scene.location[j]):
@@ -275,14 +312,17 @@ class Distances:
         return False
 
     def length(self, i: int, j: int) -> float:
-        """Length [m] of the way from i to j; inf where there is none."""
+        """Length [m] of the path from i to j; inf where there is none."""
         return float(length(self.pairs, i, j))
 
     def leg(self, i: int, j: int) -> Leg:
-        """The way from i to j with its detour points.
+        """The path from i to j with its detour points.
 
-        One whose length is known is looked up, or found again whatever that takes; else none is
-        found where no effort is left.
+        A path whose length is known is loaded, or searched for again without a limit; any other is
+        searched for within the budget.
+
+        Returns:
+            Of infinite length where there is none.
         """
         scene = self._scene
         if i == j:
@@ -301,7 +341,7 @@ class Distances:
         return Leg(points, math.inf if math.isnan(metres) else metres)
 
     def given_up(self, i: int, j: int) -> bool:
-        """Whether the way from i to j was not found in the time; there may be one."""
+        """Whether the path from i to j was not found in the time; there may be one."""
         return bool(self.zones) and not _known_length(self.pairs, i, j) >= 0.0 and (
             bool(self._scene.location[j] != INSIDE) and i != j)
 

@@ -13,10 +13,13 @@ from uav_task_alloc.model import Point, check_number
 
 @dataclass(frozen=True, slots=True)
 class Origin:
-    """Where ENU (0, 0, 0) is. Raises InvalidValue.
+    """The position of ENU (0, 0, 0).
 
     Altitudes are AMSL throughout. pymap3d takes them as ellipsoidal; as origin and points are
     shifted by the same geoid height, which is near constant over a mission, ENU does not change.
+
+    Raises:
+        InvalidValue: a value is out of range.
     """
 
     latitude: float  # [deg]
@@ -32,7 +35,7 @@ class Origin:
 
 
 def to_enu(origin: Origin, latitude: float, longitude: float, altitude_amsl: float) -> Point:
-    """ENU [m] of a place in degrees and metres AMSL."""
+    """ENU [m] of a position in degrees and metres AMSL."""
     x, y, z = to_enu_batch(origin, [(latitude, longitude, altitude_amsl)])[0]
     return float(x), float(y), float(z)
 
@@ -44,14 +47,30 @@ def to_geodetic(origin: Origin, point: Point) -> tuple[float, float, float]:
 
 
 def to_enu_batch(origin: Origin, places: ArrayLike) -> NDArray[np.float64]:
-    """ENU rows [m] of rows (latitude [deg], longitude [deg], altitude AMSL [m])."""
+    """Convert many positions at once.
+
+    Args:
+        origin: of the ENU frame.
+        places: (n, 3): latitude [deg], longitude [deg], altitude AMSL [m].
+
+    Returns:
+        (n, 3), ENU [m].
+    """
     rows = np.asarray(places, dtype=np.float64).reshape(-1, 3)
     return np.column_stack(pymap3d.geodetic2enu(
         *rows.T, origin.latitude, origin.longitude, origin.altitude_amsl))
 
 
 def to_geodetic_batch(origin: Origin, points: ArrayLike) -> NDArray[np.float64]:
-    """Rows (latitude [deg], longitude [deg], altitude AMSL [m]) of ENU rows [m]."""
+    """Convert many ENU points at once.
+
+    Args:
+        origin: of the ENU frame.
+        points: (n, 3), ENU [m].
+
+    Returns:
+        (n, 3): latitude [deg], longitude [deg], altitude AMSL [m].
+    """
     rows = np.asarray(points, dtype=np.float64).reshape(-1, 3)
     return np.column_stack(pymap3d.enu2geodetic(
         *rows.T, origin.latitude, origin.longitude, origin.altitude_amsl))

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Arrays and functions behind plain addresses, for kernels that would else wait for Python.
+"""Arrays and functions behind plain addresses, for kernels that would otherwise wait for Python.
 
-Numba counts a reference for each array of a tuple that a call passes on: 100 ns for a look-up that
-takes 3. A function object in such a tuple makes its type be found anew: 130 us a call from Python.
-Whoever makes an address keeps the array or function alive.
+Numba counts a reference for each array of a tuple that a call passes on: 100 ns for a lookup that
+takes 3. A function object in such a tuple makes numba resolve its type again: 130 us for a call
+from Python. The code that takes an address has to keep the array or function alive.
 """
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def _ints_at(typing_context: Any, address: int) -> tuple[Signature, Callable[...
 @intrinsic
 def _call_float(typing_context: Any, address: int, a: int, b: int, c: int) -> tuple[
         Signature, Callable[..., Any]]:
-    """What the C function float64(int64, int64, int64) at an address returns."""
+    """Call the C function float64(int64, int64, int64) at an address."""
     def call(context: Any, builder: Any, signature: Signature, args: Any) -> Any:
         whole = ir.IntType(64)
         kind = ir.FunctionType(ir.DoubleType(), [whole, whole, whole])

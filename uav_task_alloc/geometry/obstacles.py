@@ -1,10 +1,19 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Zones as arrays, enlarged, and what kernels ask of them: does a point, a segment get inside?
+"""Zones as arrays, enlarged, and the predicates of kernels: does a point or a segment enter one?
 
 A dome enlarged by g is the ball of radius R + g above z0 - g; a cylinder or prism grows by g
 sideways and at both ends. Each holds the exact enlargement (all points nearer than g) and exceeds
-it only at its rims. A dome stands on the ground: while both ends of a way are above its base (the
-lower one is `floor`), the space beneath it is closed too, so that nobody digs under it.
+it only at its rims. A dome rests on the ground: while both ends of a path are above its base (the
+lower one is `floor`), the space beneath it is closed too, so that no path leads under it.
+
+Arguments that kernels of this package share:
+    zones: rows of dtype _ZONE, shape (zones,); `zone` is one row.
+    p, path, out: points, float64 (n, 3) [m]. ends: start and goal, float64 (2, 3) [m].
+    px ... qz: coordinates [m] of the ends p and q of a segment.
+    limits: lowest and highest waypoint, float64 (2,) [m].
+    floor: z of the lower end of the whole path [m]; -inf: the space beneath domes is open.
+    no_skin: up to the surface; otherwise a skin of 0.02 m around each zone counts as inside.
+    work: int64 (3,), see search_budget.py.
 """
 from __future__ import annotations
 
@@ -33,12 +42,12 @@ from uav_task_alloc.model import Shape, ThreatZone, check_number
 
 DOME, CYLINDER, PRISM = Shape.HEMISPHERE.value, Shape.CYLINDER.value, Shape.POLYGON.value
 TOUCH = 1e-7  # [m] so near a surface counts as on it, not inside
-SKIN = 0.02  # [m] ways keep this much more distance, so that rounding never puts them inside
+SKIN = 0.02  # [m] paths keep this much more distance, so that rounding never puts them inside
 
 RIM_CORNERS = 24  # corners of the outline of a cylinder
 NO_CORNERS: Floats = np.zeros((0, 2))
 
-Zones = NDArray[np.void]  # of dtype ZONE
+Zones = NDArray[np.void]  # of dtype _ZONE
 Zone = Any  # one row of it, in a kernel
 
 
@@ -59,7 +68,7 @@ _ZONE = np.dtype([
 
 @intrinsic
 def _zones_at(typing_context: Any, address: int) -> Any:
-    """The rows of dtype ZONE at an address."""
+    """The rows of dtype _ZONE at an address."""
     row = types.CPointer(numba.from_dtype(_ZONE))  # type: ignore[no-untyped-call]
     return row(types.int64), cast
 
@@ -69,14 +78,30 @@ zones_at: Callable[[int], Any] = _zones_at  # type: ignore[assignment]
 
 @dataclass(frozen=True, eq=False)
 class Obstacles:
-    """Enlarged zones as kernels take them: `rows` of dtype ZONE, and what their addresses mean."""
+    """Enlarged zones as kernels take them.
+
+    Attributes:
+        rows: dtype _ZONE, one for each zone.
+        outlines: the arrays whose addresses `rows` hold.
+    """
 
     rows: Zones
     outlines: tuple[Floats, ...]
 
 
 def pack(zones: Sequence[ThreatZone], clearance: float = 0.0) -> Obstacles:
-    """The zones enlarged by margin + clearance [m]. Raises InvalidValue."""
+    """Pack zones for kernels; O(corners log corners).
+
+    Args:
+        zones: the zones.
+        clearance: [m] by which they are enlarged beyond their margins.
+
+    Returns:
+        One row for each zone, in the same order.
+
+    Raises:
+        InvalidValue: the clearance is negative or not a number.
+    """
     clearance = check_number('clearance', clearance, 0.0, 1e6)
     rows, outlines = [], []
     for zone in zones:
@@ -97,7 +122,7 @@ def pack(zones: Sequence[ThreatZone], clearance: float = 0.0) -> Obstacles:
 
 
 def _outlines(zone: ThreatZone, reach: float) -> tuple[Floats, Floats, Floats, bool]:
-    """Corners, rim, hull of the rim `reach` [m] off it, and whether rim and hull differ."""
+    """Corners, rim and hull of the rim, `reach` [m] off it, and whether rim and hull differ."""
     if zone.shape is Shape.HEMISPHERE:
         return NO_CORNERS, NO_CORNERS, NO_CORNERS, False
     if zone.shape is Shape.CYLINDER:
@@ -110,7 +135,7 @@ def _outlines(zone: ThreatZone, reach: float) -> tuple[Floats, Floats, Floats, b
 
 
 def _extent(zone: ThreatZone) -> tuple[tuple[float, float, float], float, float, float]:
-    """Centre, size, lowest and highest z of a zone as it is [m]."""
+    """Centre, radius of the circle around it, lowest and highest z of a zone as it is [m]."""
     if zone.shape is Shape.HEMISPHERE:
         return zone.center, zone.radius, zone.center[2], zone.center[2] + zone.radius
     if zone.shape is Shape.CYLINDER:
@@ -132,7 +157,7 @@ def box_distance(zone: Zone, x: float, y: float, z: float) -> float:
 @allocating_kernel
 def squared_segment_distance(px: float, py: float, ax: float, ay: float, bx: float,
                              by: float) -> float:
-    """Squared distance in plan from p to the segment ab."""
+    """Squared distance [m2] in plan view from p to the segment ab."""
     dx, dy = bx - ax, by - ay
     span = dx * dx + dy * dy
     t = 0.0
@@ -144,7 +169,7 @@ def squared_segment_distance(px: float, py: float, ax: float, ay: float, bx: flo
 
 @allocating_kernel
 def in_polygon(zone: Zone, x: float, y: float) -> bool:
-    """Whether (x, y) lies in the polygon as it is (even-odd rule)."""
+    """Whether (x, y) [m] lies in the polygon without its margin; O(corners)."""
     odd = False
     c, n = floats_at(zone.corners), zone.corner_count
     j = n - 1
@@ -158,7 +183,7 @@ def in_polygon(zone: Zone, x: float, y: float) -> bool:
 @allocating_kernel
 def _meets_polygon(zone: Zone, ax: float, ay: float, bx: float, by: float,
                    reach: float) -> bool:
-    """Whether the plan segment ab comes nearer to the polygon than `reach`. O(corners)."""
+    """Whether ab comes nearer than `reach` [m] to the polygon in plan view; O(corners)."""
     limit = reach * reach
     c, n = floats_at(zone.corners), zone.corner_count
     cx, cy = c[2 * n - 2], c[2 * n - 1]
@@ -177,7 +202,7 @@ def _meets_polygon(zone: Zone, ax: float, ay: float, bx: float, by: float,
 
 @allocating_kernel
 def _clip(pz: float, qz: float, low: float, high: float) -> tuple[float, float]:
-    """The part [s, t] of a segment that is strictly between two heights; s >= t: none."""
+    """The part [s, t] of a segment strictly between two heights [m]; s >= t: none."""
     if pz == qz:
         return (0.0, 1.0) if low < pz < high else (1.0, 0.0)
     s, t = (low - pz) / (qz - pz), (high - pz) / (qz - pz)
@@ -189,7 +214,7 @@ def _clip(pz: float, qz: float, low: float, high: float) -> tuple[float, float]:
 @allocating_kernel
 def _squared_centre_distance(zone: Zone, px: float, py: float, pz: float, dx: float, dy: float,
                              dz: float, s: float, t: float) -> float:
-    """Squared distance from the centre to the part [s, t] of p + d."""
+    """Squared distance [m2] from the centre to the part [s, t] of p + d."""
     fx, fy, fz = px - zone.x, py - zone.y, pz - zone.z
     span = dx * dx + dy * dy + dz * dz
     u = s
@@ -202,6 +227,7 @@ def _squared_centre_distance(zone: Zone, px: float, py: float, pz: float, dx: fl
 @allocating_kernel
 def _meets_dome(zone: Zone, px: float, py: float, pz: float, qx: float, qy: float,
                 qz: float, floor: float, skin: float) -> bool:
+    """Whether the segment pq enters a dome, or the closed space beneath it."""
     reach = zone.radius + skin
     grounded = floor >= zone.low
     base = zone.z if grounded else zone.low - skin
@@ -221,7 +247,7 @@ def _meets_dome(zone: Zone, px: float, py: float, pz: float, qx: float, qy: floa
 @allocating_kernel
 def blocked(zone: Zone, px: float, py: float, pz: float, qx: float, qy: float,
             qz: float, floor: float, no_skin: bool) -> bool:
-    """Whether the segment pq enters a zone. `snug`: up to the surface, without the skin."""
+    """Whether the segment pq enters a zone; O(corners), O(1) where the boxes are apart."""
     if (min(px, qx) > zone.x1 or max(px, qx) < zone.x0
             or min(py, qy) > zone.y1 or max(py, qy) < zone.y0
             or min(pz, qz) > zone.z1 or max(pz, qz) < zone.z0):
@@ -243,13 +269,13 @@ def blocked(zone: Zone, px: float, py: float, pz: float, qx: float, qy: float,
 
 @allocating_kernel
 def contains(zone: Zone, x: float, y: float, z: float, no_skin: bool) -> bool:
-    """Whether a point is inside a zone; the space beneath a dome is not."""
+    """Whether a point is inside a zone; the space beneath a dome is not. O(corners)"""
     return blocked(zone, x, y, z, x, y, z, -np.inf, no_skin)
 
 
 @allocating_kernel
 def first_containing(zones: Zones, x: float, y: float, z: float, no_skin: bool) -> int:
-    """The first zone that contains a point; -1: none. O(zones)."""
+    """Index of the first zone that contains a point; -1: none. O(zones)"""
     for k in range(zones.size):
         if contains(zones[k], x, y, z, no_skin):
             return k
@@ -258,7 +284,7 @@ def first_containing(zones: Zones, x: float, y: float, z: float, no_skin: bool) 
 
 @allocating_kernel
 def containing_zones(zones: Zones, x: float, y: float, z: float) -> Ints:
-    """All zones that contain a point. O(zones)."""
+    """Indices, int64 (n,), of all zones that contain a point without skin. O(zones)"""
     found, n = np.empty(zones.size, np.int64), 0
     for k in range(zones.size):
         if contains(zones[k], x, y, z, True):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Outlines of zones in plan: the rim that lies some way off them, and convex hulls."""
+"""Outlines of zones in plan view: rims at a distance from them, and convex hulls."""
 from __future__ import annotations
 
 import math
@@ -34,7 +34,7 @@ def corner_turn(ax: float, ay: float, x: float, y: float, bx: float,
 @allocating_kernel
 def _fan(x: float, y: float, radius: float, start: float, turn: float, parts: int, rim: Floats,
          n: int) -> int:
-    """Corners of the polyline that circumscribes an arc into rim[n:]; returns the new n."""
+    """Write the polyline that circumscribes an arc into rim[n:]; returns the new n. O(parts)"""
     step = turn / parts
     far = radius / math.cos(step / 2)
     for i in range(parts):
@@ -46,7 +46,7 @@ def _fan(x: float, y: float, radius: float, start: float, turn: float, parts: in
 
 @allocating_kernel
 def circle_rim(x: float, y: float, radius: float, parts: int) -> Floats:
-    """Corners (parts, 2) [m] of the polygon that circumscribes a circle, counter-clockwise."""
+    """Corners, float64 (parts, 2) [m], counter-clockwise, of a polygon around a circle."""
     rim = np.empty((parts, 2))
     _fan(x, y, radius, 0.0, 2 * math.pi, parts, rim, 0)
     return rim
@@ -54,7 +54,15 @@ def circle_rim(x: float, y: float, radius: float, parts: int) -> Floats:
 
 @allocating_kernel
 def polygon_rim(corners: Floats, grow: float) -> Floats:
-    """The outline `grow` [m] off a counter-clockwise polygon, circumscribing its round corners."""
+    """The outline of a polygon enlarged by `grow` [m]; its round corners are circumscribed. O(n)
+
+    Args:
+        corners: float64 (n, 2) [m], counter-clockwise.
+        grow: [m].
+
+    Returns:
+        float64 (m, 2) [m], counter-clockwise, m <= 5 n. It crosses itself where a notch is narrow.
+    """
     count = corners.shape[0]
     rim, n = np.empty((5 * count, 2)), 0
     for i in range(count):
@@ -68,7 +76,7 @@ def polygon_rim(corners: Floats, grow: float) -> Floats:
 
 @allocating_kernel
 def _monotone_chain(corners: Floats, order: Ints) -> Floats:
-    """The convex hull of corners in lexical order, by monotone chains. O(n)"""
+    """The convex hull of corners (n, 2) in the lexical `order` (n,); O(n)."""
     size = order.size
     hull, n, first = np.empty((2 * size + 1, 2)), 0, 0
     for m in range(2 * size - 1):
@@ -85,5 +93,12 @@ def _monotone_chain(corners: Floats, order: Ints) -> Floats:
 
 
 def convex_hull(corners: Floats) -> Floats:
-    """The convex hull, counter-clockwise, without corners on its edges."""
+    """The convex hull of corners, by Andrew's monotone chains; O(n log n).
+
+    Args:
+        corners: float64 (n, 2) [m].
+
+    Returns:
+        float64 (m, 2) [m], counter-clockwise, without corners on its edges.
+    """
     return _monotone_chain(corners, np.lexsort((corners[:, 1], corners[:, 0])))

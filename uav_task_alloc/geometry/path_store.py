@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The points of ways found, by their ends: a ring that forgets the oldest, for one search each.
+"""Paths that were found, by their ends: a ring buffer that overwrites the oldest.
 
-Several threads may write at once, and zones may have changed since: who recalls a way has to look
-whether it is clear, and as long as expected.
+Several threads may write at once, and zones may have changed since. Whoever loads a path has to
+check that it is clear, and as long as expected.
 """
 from __future__ import annotations
 
@@ -17,28 +17,29 @@ from uav_task_alloc.geometry.points import copy_point
 from uav_task_alloc.geometry.taut import MAX_CORNERS
 from uav_task_alloc.kernel import allocating_kernel
 
-SLOTS = 1 << 16  # of ways; a power of two
-PROBES = 4  # places a way may have
-_CAPACITY = 1 << 19  # points kept, ends among them
+SLOTS = 1 << 16  # for paths; a power of two
+PROBES = 4  # slots that a path may take
+_CAPACITY = 1 << 19  # rows: points and a count for each path
 
 
 class PathStore:
-    """Room for the points of ways; `address` is what kernels take."""
+    """Memory for the points of paths; kernels take its `address`."""
 
     def __init__(self) -> None:
-        self._place = np.full(SLOTS, -1, np.int64)  # where in the ring a way begins
+        self._place = np.full(SLOTS, -1, np.int64)  # row in which a path begins
         self._points = np.empty((_CAPACITY, 3))  # number of points, then the points
         self._state = np.zeros(3, np.int64)
         self._state[1:] = self._place.ctypes.data, self._points.ctypes.data
 
     @property
     def address(self) -> int:
-        """Of the state: next free row, addresses of places and points."""
+        """Address of the state: next free row, addresses of slots and points."""
         return int(self._state.ctypes.data)
 
 
 @allocating_kernel
 def _first_place(ends: Floats) -> int:
+    """The first slot for a path with these ends (2, 3): a hash of them in 1/1024 m."""
     mixed: Any = np.int64(17)
     for i in range(2):
         for m in range(3):
@@ -49,7 +50,7 @@ def _first_place(ends: Floats) -> int:
 
 @allocating_kernel
 def _same(points: Floats, first: int, ends: Floats) -> bool:
-    """Whether the way that begins in row `first` has these ends."""
+    """Whether the path that begins in row `first` has these ends (2, 3)."""
     n = int(points[first, 0])
     if not 2 <= n <= MAX_CORNERS or first + n >= _CAPACITY:
         return False
@@ -61,7 +62,14 @@ def _same(points: Floats, first: int, ends: Floats) -> bool:
 
 @allocating_kernel
 def store_path(address: int, path: Floats, n: int, ends: Floats) -> None:
-    """Keep the way[:n] between `ends`."""
+    """Store the polyline path[:n] under its ends; O(n).
+
+    Args:
+        address: PathStore.address.
+        path: (at least n, 3) [m].
+        n: number of points, both ends included.
+        ends: (2, 3) [m], the key; they need not be the first and last point in this order.
+    """
     state = ints_at(address)
     slots = carray(ints_at(state[1]), SLOTS)
     points = carray(floats_at(state[2]), (_CAPACITY, 3))
@@ -84,7 +92,16 @@ def store_path(address: int, path: Floats, n: int, ends: Floats) -> None:
 
 @allocating_kernel
 def load_path(address: int, ends: Floats, path: Floats) -> int:
-    """The points of the way between `ends` into way; returns their number, 0: not kept."""
+    """Copy the path between `ends` into `path`; O(n).
+
+    Args:
+        address: PathStore.address.
+        ends: (2, 3) [m], as stored.
+        path: (MAX_CORNERS, 3) [m], the result.
+
+    Returns:
+        Its number of points; 0: not stored, or overwritten.
+    """
     state = ints_at(address)
     slots = carray(ints_at(state[1]), SLOTS)
     points = carray(floats_at(state[2]), (_CAPACITY, 3))

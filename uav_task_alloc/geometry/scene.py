@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Points among zones, and the kernel that finds the way from one to another."""
+"""Points among zones, and the kernels that find the path from one to another."""
 from __future__ import annotations
 
 import functools
@@ -21,24 +21,24 @@ from uav_task_alloc.geometry.taut import MAX_CORNERS
 from uav_task_alloc.kernel import allocating_kernel
 
 OUTSIDE, WITHIN_SKIN, INSIDE = 0, 1, 2
-LOCATION_INDEX, BUDGET_INDEX = 3, 7  # where `addresses` has those of Scene.caught and Scene.state
+LOCATION_INDEX, BUDGET_INDEX = 3, 7  # in scene_addresses
 
 
 class PathScene(NamedTuple):
     """Points among zones, as kernels take them."""
 
     xyz: Floats  # (n, 3) [m]
-    location: Ints  # OUTSIDE, SNUG (less than the skin away) or INSIDE
+    location: Ints  # OUTSIDE, WITHIN_SKIN (nearer than the skin) or INSIDE
     exits: Floats  # (n, 3) [m] nearest point outside; NaN: none, inf: not searched for yet
     limits: Floats  # altitude_min, altitude_max [m]
     zones: Zones
-    budget: Ints  # of Effort
-    store: int  # address of a WayStore
+    budget: Ints  # state of the SearchBudget
+    store: int  # PathStore.address
 
 
 def make_scene(xyz: Floats, zones: Zones, limits: Floats, budget: SearchBudget,
                store: PathStore) -> PathScene:
-    """The scene; ways out of zones are found when they are asked for."""
+    """The scene of points (n, 3) [m]; escape points are searched for when first needed."""
     location, exits = np.zeros(len(xyz), np.int64), np.full((len(xyz), 3), np.inf)
     if zones.size:
         _locate_all(zones, xyz, location)
@@ -47,7 +47,7 @@ def make_scene(xyz: Floats, zones: Zones, limits: Floats, budget: SearchBudget,
 
 @allocating_kernel
 def locate(zones: Zones, p: Floats) -> int:
-    """Whether p is INSIDE a zone, SNUG at one or OUTSIDE all."""
+    """Whether p (3,) is INSIDE a zone, WITHIN_SKIN of one or OUTSIDE all; O(zones)."""
     if first_containing(zones, p[0], p[1], p[2], False) < 0:
         return OUTSIDE
     return INSIDE if first_containing(zones, p[0], p[1], p[2], True) >= 0 else WITHIN_SKIN
@@ -55,16 +55,17 @@ def locate(zones: Zones, p: Floats) -> int:
 
 @allocating_kernel
 def _locate_all(zones: Zones, xyz: Floats, location: Ints) -> None:
+    """Set location (n,) for all points; O(n zones)."""
     for i in range(xyz.shape[0]):
         location[i] = locate(zones, xyz[i])
 
 
 @allocating_kernel
 def _exit_point(scene: PathScene, i: int, work: Ints) -> Floats:
-    """Where the caught point i is outside first; NaN: nowhere, or work[2]: not known."""
+    """The escape point of point i, inside a zone; NaN: none, or the search was cut short."""
     if math.isinf(scene.exits[i, 0]):
         point: Floats = escape_point(scene.zones, scene.xyz[i], scene.limits, work)
-        if work[2] == 0:  # x last, which others look at
+        if work[2] == 0:  # x last: other threads read it
             scene.exits[i, 2], scene.exits[i, 1], scene.exits[i, 0] = point[2], point[1], point[0]
         return point
     first: Floats = scene.exits[i]
@@ -72,13 +73,14 @@ def _exit_point(scene: PathScene, i: int, work: Ints) -> Floats:
 
 
 def scene_addresses(scene: PathScene) -> Ints:
-    """Sizes and addresses of the scene's arrays, in the order that `_scene_at` reads."""
+    """Sizes and addresses of the scene's arrays, int64 (9,), as `_scene_at` reads them."""
     return np.array([len(scene.xyz), len(scene.zones),
                      *(array.ctypes.data for array in scene[:6]), scene.store], np.int64)
 
 
 @allocating_kernel
 def _scene_at(address: int) -> PathScene:
+    """The scene whose `scene_addresses` are at an address."""
     at = ints_at(address)
     n, k = at[0], at[1]
     return PathScene(
@@ -89,7 +91,7 @@ def _scene_at(address: int) -> PathScene:
 
 @allocating_kernel
 def ordered_ends(p: Floats, q: Floats, ends: Floats) -> bool:
-    """Both into ends in one order, so that there and back are the same way; whether turned."""
+    """Write p and q into ends in lexical order, one for both directions; True: swapped."""
     swapped = bool(p[0] > q[0] or (
         p[0] == q[0] and (p[1] > q[1] or (p[1] == q[1] and p[2] > q[2]))))
     for m in range(3):
@@ -99,9 +101,12 @@ def ordered_ends(p: Floats, q: Floats, ends: Floats) -> bool:
 
 @allocating_kernel
 def stored_ends(scene: PathScene, i: int, j: int, ends: Floats) -> bool:
-    """The ends by which the way from i to j is kept; whether it is kept the other way round.
+    """Write the ends under which the path from i to j is stored.
 
-    One out of a zone is no way back, and begins with the point outside.
+    A path out of a zone is no path back, and begins with the point outside.
+
+    Returns:
+        Whether the path is stored in the opposite direction.
     """
     if scene.location[i] != INSIDE:
         return bool(ordered_ends(scene.xyz[i], scene.xyz[j], ends))
@@ -112,7 +117,11 @@ def stored_ends(scene: PathScene, i: int, j: int, ends: Floats) -> bool:
 
 @allocating_kernel
 def stored_path(scene: PathScene, i: int, j: int, path: Floats) -> int:
-    """The points of the way from i to j that is known, if it is clear; their number or 0."""
+    """Write the known path from i to j into path (MAX_CORNERS, 3), if it is clear; O(zones n).
+
+    Returns:
+        Its number of points; 0: not known, or no longer clear.
+    """
     ends, start_inside = np.empty((2, 3)), scene.location[i] == INSIDE
     no_skin = scene.location[i] == WITHIN_SKIN or scene.location[j] == WITHIN_SKIN
     floor = min(scene.xyz[i, 2], scene.xyz[j, 2])
@@ -135,9 +144,14 @@ def stored_path(scene: PathScene, i: int, j: int, path: Floats) -> int:
 
 
 def _join(address: int, i: int, between: int) -> float:
-    """Keep the ways from i to k and on to j as one; its length [m] or inf.
+    """Store the known paths from i to k and from k to j as one.
 
-    between: k << 32 | j.
+    Args:
+        address: of scene_addresses.
+        between: k << 32 | j.
+
+    Returns:
+        Its length [m]; inf: they are not known, or have too many points.
     """
     scene, k, j = _scene_at(address), between >> 32, between & 0xFFFFFFFF
     path, onward = np.empty((2 * MAX_CORNERS, 3)), np.empty((MAX_CORNERS, 3))
@@ -155,7 +169,7 @@ def _join(address: int, i: int, between: int) -> float:
 
 
 def _find(address: int, i: int, j: int) -> float:
-    """Length [m] of the way from point i to point j of the scene; inf: none, NaN: not known."""
+    """Length [m] of the path from point i to point j; inf: none, NaN: not known."""
     scene = _scene_at(address)
     if i == j:
         return 0.0
@@ -195,7 +209,7 @@ def _compiled(join: bool) -> Any:
 
 
 def find_address(zones: bool) -> int:
-    """Address of `_find`, compiled apart so that its callers compile fast; 0 without zones."""
+    """Address of `_find`, compiled apart so that callers compile fast; 0 without zones."""
     return int(_compiled(False).address) if zones else 0
 
 

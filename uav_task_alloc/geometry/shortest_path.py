@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The shortest safe way between two points, as a kernel: straight, or searched and pulled taut.
+"""The shortest safe path between two points, as a kernel: straight, or searched and pulled taut.
 
-Only zones that turn out to be in the way take part: the shortest way past some of the zones is
-never longer than that past all, so when it happens to be clear of all, it is the answer.
+Only zones that prove to be in the way take part: the shortest path past some of the zones is
+never longer than that past all, so if it happens to be clear of all, it is the result.
 """
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ from uav_task_alloc.geometry.taut import MAX_CORNERS, tauten, zones_near
 from uav_task_alloc.geometry.visibility_graph import add_corners, add_level, astar, corner_bound
 from uav_task_alloc.kernel import allocating_kernel
 
-_RINGS = (12, 24, 64)  # corners around a zone; finer ones where no way was found
-FEW_ZONES = 2  # zones at most in the way for which the first ring is fine enough
-MANY_ZONES = 8  # zones in the way; among more, levels of those around a zone must do
-FIRST_SEARCHES = 5  # searches past the zones hit so far, before those around them are heeded, too
+_RINGS = (12, 24, 64)  # corners around a zone; finer ones where no path was found
+FEW_ZONES = 2  # blocking zones up to which the first ring is fine enough
+MANY_ZONES = 8  # blocking zones; among more, levels only of those beside a zone
+FIRST_SEARCHES = 5  # with the blocking zones only; then with those that overlap them
 
 
 @allocating_kernel
 def next_blocking(zones: Zones, k: int, p: Floats, i: int, j: int, floor: float,
                   no_skin: bool) -> int:
-    """The first zone from k on that the segment p[i] p[j] enters; o.size: none. O(zones)."""
+    """Index of the first zone from k on that p[i] p[j] enters; zones.size: none. O(zones)"""
     x0, x1 = min(p[i, 0], p[j, 0]), max(p[i, 0], p[j, 0])
     y0, y1 = min(p[i, 1], p[j, 1]), max(p[i, 1], p[j, 1])
     while k < zones.size:
@@ -40,7 +40,7 @@ def next_blocking(zones: Zones, k: int, p: Floats, i: int, j: int, floor: float,
 @allocating_kernel
 def mark_blocking(zones: Zones, p: Floats, i: int, j: int, floor: float, no_skin: bool,
                   blocking: Ints) -> int:
-    """Mark the zones that the segment p[i] p[j] enters in hit; returns how many are new."""
+    """Mark the zones that p[i] p[j] enters in blocking (zones,); returns how many are new."""
     new, k = 0, next_blocking(zones, 0, p, i, j, floor, no_skin)
     while k < zones.size:
         new += 1 - blocking[k]
@@ -51,7 +51,7 @@ def mark_blocking(zones: Zones, p: Floats, i: int, j: int, floor: float, no_skin
 
 @allocating_kernel
 def _zones_beside(zones: Zones, active: Ints, k: int) -> Ints:
-    """The other active zones that corners of zone k may lie in, which lie within twice its box."""
+    """The other active zones in which corners of zone k may lie: within twice its box."""
     zone, found, n = zones[k], np.empty(active.size, np.int64), 0
     wide, deep = 0.5 * (zone.x1 - zone.x0), 0.5 * (zone.y1 - zone.y0)
     for m in active:
@@ -65,7 +65,7 @@ def _zones_beside(zones: Zones, active: Ints, k: int) -> Ints:
 
 @allocating_kernel
 def _levels(zones: Zones, among: Ints, zone: Zone) -> Floats:
-    """Heights [m] between the ends of a zone at which others end, each once."""
+    """Heights [m] between the ends of a zone at which others end, each once. O(among^2)"""
     found, n = np.empty(2 * among.size), 0
     for m in range(among.size):
         other = zones[among[m]]
@@ -83,7 +83,7 @@ def _levels(zones: Zones, among: Ints, zone: Zone) -> Floats:
 @allocating_kernel
 def _zone_corners(zones: Zones, k: int, levels: Floats, ends: Floats, limits: Floats, floor: float,
                   ring: int) -> Floats:
-    """The corners of zone k, also at these levels."""
+    """The corners of zone k, float64 (n, 3) [m], also at these levels."""
     x = np.empty((corner_bound(zones[k], ring, levels.size), 3))
     n = add_corners(zones[k], ends, limits, floor, ring, x, 0)
     for z in levels:
@@ -93,6 +93,7 @@ def _zone_corners(zones: Zones, k: int, levels: Floats, ends: Floats, limits: Fl
 
 @allocating_kernel
 def _is_inside_any(zones: Zones, among: Ints, p: Floats, i: int, no_skin: bool) -> bool:
+    """Whether p[i] is inside a zone with an index `among`. O(among)"""
     for m in range(among.size):
         if contains(zones[among[m]], p[i, 0], p[i, 1], p[i, 2], no_skin):
             return True
@@ -102,9 +103,12 @@ def _is_inside_any(zones: Zones, among: Ints, p: Floats, i: int, no_skin: bool) 
 @allocating_kernel
 def _graph_corners(zones: Zones, active: Ints, ends: Floats, limits: Floats, floor: float,
                    no_skin: bool, ring: int, known: float, work: Ints) -> Floats:
-    """Both ends, and the corners of the active zones that a way of at most `known` can touch.
+    """Both ends, and the corners of active zones that a path of at most `known` [m] can touch.
 
-    Corners inside another active zone are none.
+    Corners inside another active zone are left out.
+
+    Returns:
+        float64 (n, 3) [m].
     """
     x, n = np.empty((64, 3)), 2
     copy_point(ends, 0, x, 0)
@@ -132,7 +136,7 @@ def _graph_corners(zones: Zones, active: Ints, ends: Floats, limits: Floats, flo
 
 @allocating_kernel
 def _add_overlapping(zones: Zones, blocking: Ints, before: Ints) -> None:
-    """Heed the zones as well that overlap those hit since `before`."""
+    """Mark as blocking also the zones that overlap those marked since `before`."""
     for k in range(zones.size):
         if blocking[k] and not before[k]:
             zone = zones[k]
@@ -146,9 +150,10 @@ def _add_overlapping(zones: Zones, blocking: Ints, before: Ints) -> None:
 @allocating_kernel
 def _search(zones: Zones, ends: Floats, limits: Floats, floor: float, no_skin: bool, ring: int,
             known: float, blocking: Ints, out: Floats, work: Ints) -> int:
-    """A clear, coarse way into out, at most as long as one `known`; marks the zones heeded in hit.
+    """Write a clear, coarse path of at most `known` [m] into `out`; marks the zones it considers.
 
-    0: none found, or work[2] says that the search was cut short.
+    Returns:
+        Its number of points; 0: none found, or the search was cut short (work[2]).
     """
     tries = 0
     while True:
@@ -176,7 +181,7 @@ def _search(zones: Zones, ends: Floats, limits: Floats, floor: float, no_skin: b
 
 @allocating_kernel
 def path_clears(zones: Zones, p: Floats, n: int, floor: float, no_skin: bool) -> bool:
-    """Whether the way p[:n] is clear of all zones."""
+    """Whether the polyline p[:n] enters no zone; O(zones n), most of them by their boxes."""
     x, y, z = p[0, 0], p[0, 1], p[0, 2]
     u, v, w = x, y, z
     for i in range(1, n):
@@ -197,11 +202,15 @@ def path_clears(zones: Zones, p: Floats, n: int, floor: float, no_skin: bool) ->
 @allocating_kernel
 def shortest_path(zones: Zones, ends: Floats, limits: Floats, no_skin: bool, out: Floats,
                   work: Ints) -> tuple[int, float]:
-    """Points of the shortest safe way between the ends way[0] and way[1], both outside all zones.
+    """Write the shortest safe path between two ends, both outside all zones, into `out`.
 
-    Writes them to out (MAX_CORNERS rows), returns their number and the length [m]; 0, inf: none;
-    0, NaN: not known, as the work came to its limit. What was found before that is returned.
-    `snug`: an end is so near to a zone that the way cannot keep the skin's distance.
+    Args:
+        no_skin: an end is so near to a zone that the path cannot keep the skin's distance.
+        out: float64 (MAX_CORNERS, 3) [m].
+
+    Returns:
+        Number of points and length [m]. (0, inf): there is none; (0, NaN): not known, as the
+        search was cut short. A path found before that is returned.
     """
     copy_point(ends, 0, out, 0)
     copy_point(ends, 1, out, 1)

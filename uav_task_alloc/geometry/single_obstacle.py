@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The shortest way past one zone in closed form, for domes, cylinders and prisms.
+"""The shortest path past a single zone in closed form, for domes, cylinders and prisms.
 
 Past a dome: tangent, arc, tangent in the plane through both ends and the centre. Past the others
-the shortest of: around, on either side, with z rising evenly; over the top; beneath. Arcs become
+the shortest of: around on either side, with z rising evenly; over the top; beneath. Arcs become
 circumscribed polylines of as few corners as the tolerance allows.
 """
 from __future__ import annotations
@@ -18,14 +18,14 @@ from uav_task_alloc.geometry.points import copy_point, path_length
 from uav_task_alloc.geometry.polygon import orientation
 from uav_task_alloc.kernel import allocating_kernel
 
-ARC_GAIN = 1.5e-3  # an arc's polyline may be longer by this share of the way
+ARC_GAIN = 1.5e-3  # share of the path by which an arc's polyline may be longer
 MAX_PARTS = 12  # corners of one arc
-SLIDE_ROUNDS = 10  # rounds in which both rim points of a way over the top find their places
+SLIDE_ROUNDS = 10  # rounds in which both rim points of a path over the top converge
 
 
 @allocating_kernel
 def _arc_corners(radius: float, arc: float, straight: float) -> int:
-    """Corners for an arc [rad]: k of them make it longer by about radius arc^3 / (12 k^2)."""
+    """Corners for an arc [rad]: k of them make it about radius arc^3 / (12 k^2) longer."""
     excess = radius * arc ** 3 / (12.0 * ARC_GAIN * (straight + radius * arc))
     return min(MAX_PARTS, max(1, math.ceil(math.sqrt(excess)), math.ceil(arc)))
 
@@ -37,7 +37,7 @@ def _dot(u: Floats, v: Floats) -> float:
 
 @allocating_kernel
 def _tangent_path(centre: Floats, radius: float, ends: Floats, flat: bool, out: Floats) -> int:
-    """Tangent, arc, tangent about a ball, or in plan about a circle; 0: no such way."""
+    """Tangent, arc, tangent around a ball, or a circle in plan view; 0: no such path."""
     u, v = np.empty(3), np.empty(3)
     for m in range(3):
         u[m], v[m] = ends[0, m] - centre[m], ends[1, m] - centre[m]
@@ -74,7 +74,7 @@ def _tangent_path(centre: Floats, radius: float, ends: Floats, flat: bool, out: 
 
 @allocating_kernel
 def _interpolate_heights(p: Floats, n: int) -> None:
-    """Let z of the corners rise evenly with the length in plan from p[0] to p[n - 1]."""
+    """Let z rise evenly with the length in plan view from p[0] to p[n - 1]. O(n)"""
     total = 0.0
     for i in range(1, n):
         total += math.hypot(p[i, 0] - p[i - 1, 0], p[i, 1] - p[i - 1, 1])
@@ -86,7 +86,7 @@ def _interpolate_heights(p: Floats, n: int) -> None:
 
 @allocating_kernel
 def _path_around_hull(rim: Floats, ends: Floats, side: float, out: Floats) -> int:
-    """From a to b around one side (1: left) of a convex rim in plan, by gift wrapping."""
+    """Path around one side (1: left) of a convex rim, by gift wrapping. O(n rim)"""
     copy_point(ends, 0, out, 0)
     n = 1
     while n <= rim.shape[0] + 1:
@@ -106,6 +106,7 @@ def _path_around_hull(rim: Floats, ends: Floats, side: float, out: Floats) -> in
 
 @allocating_kernel
 def _in_hull(hull: Floats, p: Floats) -> bool:
+    """Whether p lies in a convex hull (n, 2), counter-clockwise, or on it. O(n)"""
     for i in range(hull.shape[0]):
         j = i + 1 if i + 1 < hull.shape[0] else 0
         if orientation((hull[i, 0], hull[i, 1]), (hull[j, 0], hull[j, 1]), (p[0], p[1])) < 0.0:
@@ -115,7 +116,11 @@ def _in_hull(hull: Floats, p: Floats) -> bool:
 
 @allocating_kernel
 def _crossed_edges(rim: Floats, ends: Floats) -> tuple[int, int, float, float]:
-    """The first and last edge of a rim that the line ab crosses in plan, and where; -1: none."""
+    """The first and last edge of a rim (n, 2) that a line crosses in plan view. O(n)
+
+    Returns:
+        Both edges (-1: none), and where along the line (0: ends[0], 1: ends[1]).
+    """
     enter, leave, s, t = -1, -1, np.inf, -np.inf
     dx, dy = ends[1, 0] - ends[0, 0], ends[1, 1] - ends[0, 1]
     n = rim.shape[0]
@@ -139,10 +144,13 @@ def _crossed_edges(rim: Floats, ends: Floats) -> tuple[int, int, float, float]:
 
 @allocating_kernel
 def _rim_point(rim: Floats, edge: int, z: float, p: Floats, q: Floats, x: Floats) -> int:
-    """x = where on an edge of the rim at height z the way p x q is shortest; the edge to try next.
+    """Set x to the point on an edge of the rim at height z over which the path p x q is shortest.
 
-    Unfolded about the edge the way is straight, so x divides the feet of p and q in the ratio of
+    Unfolded about the edge the path is straight, so x divides the feet of p and q in the ratio of
     their distances from it.
+
+    Returns:
+        The edge to try next.
     """
     n = rim.shape[0]
     j = edge + 1 if edge + 1 < n else 0
@@ -163,7 +171,7 @@ def _rim_point(rim: Floats, edge: int, z: float, p: Floats, q: Floats, x: Floats
 
 @allocating_kernel
 def _outside_cylinder(zone: Zone, p: Floats) -> bool:
-    """Whether p is outside a cylinder in plan; it may be within its rim, that circumscribes it."""
+    """Whether p is outside a cylinder in plan view, though perhaps within its rim."""
     return bool(zone.kind == CYLINDER
                 and math.hypot(p[0] - zone.x, p[1] - zone.y) > zone.radius + zone.skin)
 
@@ -171,7 +179,7 @@ def _outside_cylinder(zone: Zone, p: Floats) -> bool:
 @allocating_kernel
 def _path_over_rim(zone: Zone, rim: Floats, z: float, side: float, ends: Floats,
                    out: Floats) -> int:
-    """Over the rim at height z (side 1), or beneath it (-1); 0: no such way."""
+    """Path over the rim at height z (side 1), or beneath it (-1); 0: no such path."""
     enter, leave, s, t = _crossed_edges(rim, ends)
     climbs, sinks = side * (z - ends[0, 2]) > 0.0, side * (z - ends[1, 2]) > 0.0
     if (enter < 0 or leave < 0 or (climbs and s <= 0.0 and not _outside_cylinder(zone, ends[0]))
@@ -201,7 +209,7 @@ def _path_over_rim(zone: Zone, rim: Floats, z: float, side: float, ends: Floats,
 
 @allocating_kernel
 def _least_length_over(z: float, side: float, ends: Floats) -> float:
-    """Over (or beneath) height z the way is at least so long [m]."""
+    """A lower bound [m] of the length of a path over (or beneath) height z."""
     up = max(0.0, side * (z - ends[0, 2])) + max(0.0, side * (z - ends[1, 2]))
     return math.hypot(math.hypot(ends[1, 0] - ends[0, 0], ends[1, 1] - ends[0, 1]),
                       max(up, abs(ends[1, 2] - ends[0, 2])))
@@ -209,7 +217,7 @@ def _least_length_over(z: float, side: float, ends: Floats) -> float:
 
 @allocating_kernel
 def keep_best(trial: Floats, n: int, out: Floats, best: int) -> int:
-    """Copy the trial way to out where it is shorter; returns the number of points there."""
+    """Copy the path trial[:n] to `out` where it is shorter than out[:best]; returns its size."""
     if n == 0 or (best > 0 and path_length(trial, n) >= path_length(out, best)):
         return best
     for i in range(n):
@@ -220,7 +228,14 @@ def keep_best(trial: Floats, n: int, out: Floats, best: int) -> int:
 @allocating_kernel
 def path_past_zone(zone: Zone, ends: Floats, limits: Floats, floor: float,
                    out: Floats) -> int:
-    """The shortest way past a zone alone into out; returns its points, 0: no closed form."""
+    """Write the shortest path that passes one zone into `out`; O(rim^2).
+
+    Args:
+        out: float64 (MAX_CORNERS, 3) [m].
+
+    Returns:
+        Its number of points; 0: there is no closed form.
+    """
     skin, centre = 1.5 * zone.skin, np.array([zone.x, zone.y, zone.z])
     if zone.kind == DOME:
         n = _tangent_path(centre, zone.radius + skin, ends, False, out) if floor >= zone.low else 0

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A square of known lengths between places, that grows, and forgets what a zone change touches."""
+"""A square table of lengths between points, which grows, and which zone changes invalidate."""
 from __future__ import annotations
 
 import math
@@ -17,14 +17,20 @@ from uav_task_alloc.geometry.obstacles import (
 )
 from uav_task_alloc.kernel import allocating_kernel
 
-SPARE = 64  # rows for places to come
-_STRAIGHT = 1.0 + 1e-12  # a way is straight when at most so much longer than the distance
+SPARE = 64  # rows for points to come
+_STRAIGHT = 1.0 + 1e-12  # a path is straight if its length is at most this times the distance
 
 
 class LengthTable:
-    """Lengths [m] by slot; a place keeps its slot for ever, so older users stay right.
+    """Lengths [m] by slot; a point keeps its slot, so that older users of the table stay valid.
 
-    NaN: not asked for yet; -w - 1: not found with w units of work.
+    Args:
+        places: number of points that it has to hold at first.
+
+    Attributes:
+        cells: float64 (size, size). NaN: not known yet; -w - 1: not found with w units of work.
+        places: float64 (size, 3), the point of each slot [m].
+        used: number of slots in use.
     """
 
     def __init__(self, places: int) -> None:
@@ -35,7 +41,14 @@ class LengthTable:
         self._slots: dict[tuple[float, float, float], int] = {}
 
     def slots(self, points: Floats) -> Ints:
-        """The slots of these places; new places get new ones, in a bigger square if need be."""
+        """The slots of points; new points get new ones, in a larger table if need be.
+
+        Args:
+            points: (n, 3) [m].
+
+        Returns:
+            int64 (n,).
+        """
         keys = list(map(tuple, points.tolist()))
         fresh = [key for key in dict.fromkeys(keys) if key not in self._slots]
         if self.used + len(fresh) > len(self.cells):
@@ -54,7 +67,7 @@ class LengthTable:
         return other
 
     def _rebuild(self, wanted: list[tuple[float, ...]]) -> None:
-        """A new square with the known places among the wanted; the old one is left as it is."""
+        """A new table with the known points among the wanted; the old cells are left."""
         keep = [key for key in dict.fromkeys(wanted) if key in self._slots]
         old = np.array([self._slots[key] for key in keep], np.int64)
         other = LengthTable(len(dict.fromkeys(wanted)))
@@ -67,7 +80,7 @@ class LengthTable:
 @allocating_kernel
 def _touches(zone: Zone, p: Floats, q: Floats, known: float, near_p: float,
              near_q: float, added: bool) -> bool:
-    """Whether zone k, that came or went, may change the known length between p and q."""
+    """Whether a zone that was added or removed may change the known length of a path p q."""
     if math.isinf(known) or known < 0.0:
         return not added
     if near_p + near_q > known:
@@ -81,6 +94,7 @@ def _touches(zone: Zone, p: Floats, q: Floats, known: float, near_p: float,
 @allocating_kernel
 def _invalidate_for(cells: Floats, places: Floats, used: int, zone: Zone,
                     added: bool) -> None:
+    """As `invalidate`, for one zone; O(used^2)."""
     near, inside = np.empty(used), np.zeros(used, np.bool_)
     for i in range(used):
         near[i] = box_distance(zone, places[i, 0], places[i, 1], places[i, 2])
@@ -95,7 +109,15 @@ def _invalidate_for(cells: Floats, places: Floats, used: int, zone: Zone,
 
 @allocating_kernel
 def invalidate(cells: Floats, places: Floats, used: int, removed: Zones, added: Zones) -> None:
-    """Make unknown every length that a zone that went or came may change. O(zones n^2)."""
+    """Forget every length that the removal or addition of zones may change; O(zones used^2).
+
+    Args:
+        cells: of a LengthTable; set to NaN.
+        places: of the LengthTable.
+        used: of the LengthTable.
+        removed: rows of zones that are no longer there.
+        added: rows of zones that are new.
+    """
     for k in range(removed.size):
         _invalidate_for(cells, places, used, removed[k], False)
     for k in range(added.size):

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A coarse way pulled taut: corners dropped, slid around zones and cut, never through a zone.
+"""Pull a coarse path taut: drop, slide and cut corners, never through a zone.
 
-A polyline is what an autopilot flies, so this works on polylines: where a way bends around a
-curved zone, the result circumscribes it, with as few corners as the tolerance allows.
+An autopilot flies a polyline, so this works on polylines: where a path bends around a curved
+zone, the result circumscribes it, with as few corners as the tolerance allows.
 """
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ from uav_task_alloc.geometry.points import copy_point, path_length, point_distan
 from uav_task_alloc.geometry.search_budget import spend
 from uav_task_alloc.kernel import allocating_kernel
 
-MAX_CORNERS = 96  # of a way while it is worked on
-CUT_GAIN = 1e-3  # a further corner must shorten the way by this share
-PULL_GAIN = 5e-4  # as must a further round of pulling
-PULL_WORK = 30  # looks at each zone near a corner that is pulled, about
+MAX_CORNERS = 96  # of a path while it is shortened
+CUT_GAIN = 1e-3  # share of the length by which a further corner must shorten a path
+PULL_GAIN = 5e-4  # the same for a further round of pulling
+PULL_WORK = 30  # tests of each zone near a corner that is pulled, about
 
 
 @allocating_kernel
 def segment_clears(zones: Zones, near: Ints, px: float, py: float, pz: float, qx: float, qy: float,
                    qz: float, floor: float, no_skin: bool) -> bool:
-    """Whether the segment pq is clear of the zones `near`."""
+    """Whether the segment pq enters none of the zones with indices `near`. O(near)"""
     for m in range(near.size):
         if blocked(zones[near[m]], px, py, pz, qx, qy, qz, floor, no_skin):
             return False
@@ -33,7 +33,7 @@ def segment_clears(zones: Zones, near: Ints, px: float, py: float, pz: float, qx
 
 @allocating_kernel
 def zones_near(zones: Zones, among: Ints, p: Floats, i: int, j: int, length: float) -> Ints:
-    """Those `among` the zones that a way of at most `length` from p[i] to p[j] could meet."""
+    """Those `among` the zones that a path of at most `length` [m] from p[i] to p[j] may meet."""
     near, n = np.empty(among.size, np.int64), 0
     for m in range(among.size):
         if (box_distance(zones[among[m]], p[i, 0], p[i, 1], p[i, 2])
@@ -45,7 +45,7 @@ def zones_near(zones: Zones, among: Ints, p: Floats, i: int, j: int, length: flo
 
 @allocating_kernel
 def drop_corners(zones: Zones, near: Ints, p: Floats, n: int, floor: float, no_skin: bool) -> int:
-    """Leave out every corner whose neighbours see each other; returns the new n."""
+    """Remove every corner whose neighbours see each other; returns the new n. O(n^2 near)"""
     i = 1
     while i < n - 1:
         if segment_clears(zones, near, p[i - 1, 0], p[i - 1, 1], p[i - 1, 2], p[i + 1, 0],
@@ -62,7 +62,7 @@ def drop_corners(zones: Zones, near: Ints, p: Floats, n: int, floor: float, no_s
 @allocating_kernel
 def _fits(zones: Zones, near: Ints, p: Floats, i: int, q: Floats, limits: Floats, floor: float,
           no_skin: bool) -> bool:
-    """Whether corner i may move to q."""
+    """Whether corner i may move to q (3,)."""
     if q[2] < limits[0] or q[2] > limits[1]:
         return False
     x, y, z = q[0], q[1], q[2]
@@ -76,7 +76,7 @@ def _fits(zones: Zones, near: Ints, p: Floats, i: int, q: Floats, limits: Floats
 
 @allocating_kernel
 def _put(q: Floats, p: Floats, i: int, axes: Floats, t: float, turn: float, s: float) -> None:
-    """q = the point t along the chord of corner i's neighbours and s off it, turned by `turn`."""
+    """q = the point t along the chord of corner i's neighbours, s off it, turned by `turn`."""
     c, d = math.cos(turn) * s, math.sin(turn) * s
     for m in range(3):
         q[m] = p[i - 1, m] + t * axes[0, m] + c * axes[1, m] + d * axes[2, m]
@@ -108,7 +108,7 @@ def _axes(p: Floats, i: int, axes: Floats) -> tuple[float, float, float]:
 
 @allocating_kernel
 def _on_ellipse(chord: float, foot: float, off: float, t: float) -> float:
-    """The offset at t that makes a way as long as (foot, off) does; negative: none."""
+    """The offset [m] at t of a path as long as that over (foot, off); negative: none."""
     total = math.hypot(foot, off) + math.hypot(chord - foot, off)
     across = 1.0 - ((2.0 * t - chord) / total) ** 2
     wide = (total * total - chord * chord) * across
@@ -118,7 +118,7 @@ def _on_ellipse(chord: float, foot: float, off: float, t: float) -> float:
 @allocating_kernel
 def _press(zones: Zones, near: Ints, p: Floats, i: int, axes: Floats, q: Floats, t: float,
            turn: float, s: float, limits: Floats, floor: float, no_skin: bool) -> float:
-    """The least offset, from the good one s inwards, at which corner i fits."""
+    """The least offset [m], from the valid one s inwards, at which corner i fits; bisection."""
     low, high = 0.0, s
     for _ in range(6):
         middle = 0.5 * (low + high)
@@ -133,7 +133,12 @@ def _press(zones: Zones, near: Ints, p: Floats, i: int, axes: Floats, q: Floats,
 @allocating_kernel
 def pull(zones: Zones, near: Ints, p: Floats, i: int, limits: Floats, floor: float, no_skin: bool,
          rounds: int) -> None:
-    """Move corner i to where its two legs are shortest: inwards, along and around its chord."""
+    """Move corner i to where both its legs are shortest: inwards, along and around its chord.
+
+    Args:
+        near: indices of the zones to keep clear of.
+        rounds: of the pattern search; O(near) each.
+    """
     axes, q = np.empty((3, 3)), np.empty(3)
     chord, t, s = _axes(p, i, axes)
     if s < 1e-6:
@@ -164,7 +169,7 @@ def pull(zones: Zones, near: Ints, p: Floats, i: int, limits: Floats, floor: flo
 @allocating_kernel
 def pull_all(zones: Zones, near: Ints, p: Floats, n: int, limits: Floats, floor: float,
              no_skin: bool, rounds: int, work: Ints) -> int:
-    """Drop and pull corners until a round gains next to nothing; returns the new n."""
+    """Drop and pull corners until a round gains less than PULL_GAIN; returns the new n."""
     before = np.inf
     for _ in range(rounds):
         n = drop_corners(zones, near, p, n, floor, no_skin)
@@ -182,7 +187,7 @@ def pull_all(zones: Zones, near: Ints, p: Floats, n: int, limits: Floats, floor:
 @allocating_kernel
 def _cut(zones: Zones, near: Ints, p: Floats, i: int, limits: Floats, floor: float,
          no_skin: bool) -> float:
-    """How far from corner i, on both its legs, the corner can be cut off."""
+    """The distance [m] from corner i, on both its legs, at which the corner can be cut off."""
     before, after = point_distance(p, i - 1, p, i), point_distance(p, i, p, i + 1)
     low, high = 0.0, 0.98 * min(before, after)
     for j, leg in ((i - 1, before), (i + 1, after)):  # an end may lie beyond the limits
@@ -204,7 +209,7 @@ def _cut(zones: Zones, near: Ints, p: Floats, i: int, limits: Floats, floor: flo
 
 @allocating_kernel
 def _chord(p: Floats, i: int, before: float, after: float) -> float:
-    """Distance of the points one metre before and after corner i, on legs of these lengths."""
+    """Distance [m] of the points 1 m before and after corner i, on legs of these lengths."""
     total = 0.0
     for m in range(3):
         d = (p[i - 1, m] - p[i, m]) / before - (p[i + 1, m] - p[i, m]) / after
@@ -215,7 +220,7 @@ def _chord(p: Floats, i: int, before: float, after: float) -> float:
 @allocating_kernel
 def cut_corners(zones: Zones, near: Ints, p: Floats, n: int, limits: Floats, floor: float,
                 no_skin: bool) -> int:
-    """Replace each corner by two where that shortens the way enough; returns the new n."""
+    """Replace a corner by two where that shortens the path enough; returns the new n."""
     least = CUT_GAIN * path_length(p, n)
     i = 1
     while i < n - 1 and n < MAX_CORNERS - 1:
@@ -241,7 +246,16 @@ def cut_corners(zones: Zones, near: Ints, p: Floats, n: int, limits: Floats, flo
 @allocating_kernel
 def tauten(zones: Zones, near: Ints, p: Floats, n: int, limits: Floats, floor: float,
            no_skin: bool, work: Ints) -> int:
-    """Shorten the clear way p[:n] in place, keeping it clear; returns the new n."""
+    """Shorten the clear path p[:n] in place and keep it clear.
+
+    Args:
+        near: indices of the zones that a shorter path can meet, int64.
+        p: float64 (MAX_CORNERS, 3) [m].
+        n: number of points.
+
+    Returns:
+        The new n. The path is clear also where the search was cut short.
+    """
     n = pull_all(zones, near, p, n, limits, floor, no_skin, 3, work)
     for _ in range(4):
         if work[2]:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The coarse way: A* over a visibility graph with its corners just outside the active zones."""
+"""A coarse path: A* over a visibility graph with corners just outside the active zones."""
 from __future__ import annotations
 
 import math
@@ -29,7 +29,7 @@ FEW_CORNERS = 160  # up to here edges are tested as late as possible
 
 @allocating_kernel
 def corner_bound(zone: Zone, ring: int, levels: int) -> int:
-    """At most so many corners come from a zone, with those at further levels."""
+    """An upper bound of the corners from a zone, with those at `levels` further heights."""
     if zone.kind == PRISM:
         return int((10 + 2 * levels) * zone.corner_count)
     return (4 + levels) * ring + 1
@@ -37,7 +37,7 @@ def corner_bound(zone: Zone, ring: int, levels: int) -> int:
 
 @allocating_kernel
 def _height(ends: Floats, x: float, y: float) -> float:
-    """z of the straight way ab where (x, y) is nearest to it in plan."""
+    """z [m] of the straight path between `ends` where (x, y) is nearest to it in plan view."""
     dx, dy = ends[1, 0] - ends[0, 0], ends[1, 1] - ends[0, 1]
     span = dx * dx + dy * dy
     t = 0.5
@@ -48,7 +48,7 @@ def _height(ends: Floats, x: float, y: float) -> float:
 
 @allocating_kernel
 def _heading(zone: Zone, ends: Floats) -> tuple[float, float]:
-    """The way's direction in plan, so that what is built on it turns with the scene."""
+    """Direction of the path in plan view, so that corners built on it turn with the scene."""
     dx, dy = ends[1, 0] - ends[0, 0], ends[1, 1] - ends[0, 1]
     size = math.hypot(dx, dy)
     if size <= 1e-9 * abs(ends[1, 2] - ends[0, 2]):
@@ -60,7 +60,7 @@ def _heading(zone: Zone, ends: Floats) -> tuple[float, float]:
 @allocating_kernel
 def _ring(zone: Zone, ends: Floats, limits: Floats, radius: float, z: float, ring: int,
           out: Floats, n: int) -> int:
-    """`ring` corners around the axis of zone k at height z (NaN: that of the way)."""
+    """Write `ring` corners around the axis of a zone at height z (NaN: that of the path)."""
     ux, uy = _heading(zone, ends)
     low, high = limits[0], limits[1]
     for j in range(ring):
@@ -83,6 +83,7 @@ def _ring(zone: Zone, ends: Floats, limits: Floats, radius: float, z: float, rin
 @allocating_kernel
 def _dome_corners(zone: Zone, ends: Floats, limits: Floats, floor: float, ring: int,
                   out: Floats, n: int) -> int:
+    """Write the corners around a dome into out[n:]; returns the new n."""
     radius = (zone.radius + 1.5 * zone.skin) / math.cos(math.pi / ring)
     n = _ring(zone, ends, limits, radius, np.nan, ring, out, n)
     for step in range(1, 3):
@@ -101,7 +102,7 @@ def _dome_corners(zone: Zone, ends: Floats, limits: Floats, floor: float, ring: 
 
 @allocating_kernel
 def _crossing(ends: Floats, px: float, py: float, qx: float, qy: float) -> float:
-    """Where along pq, in 0..1, the straight way ab crosses it in plan; NaN: nowhere."""
+    """Where along pq, in 0..1, the straight path crosses it in plan view; NaN: nowhere."""
     a, b = (ends[0, 0], ends[0, 1]), (ends[1, 0], ends[1, 1])
     sp, sq = orientation(a, b, (px, py)), orientation(a, b, (qx, qy))
     return sp / (sp - sq) if sp * sq < 0.0 else np.nan
@@ -110,7 +111,7 @@ def _crossing(ends: Floats, px: float, py: float, qx: float, qy: float) -> float
 @allocating_kernel
 def _edge_corners(zone: Zone, ends: Floats, z: float, reach: float, out: Floats,
                   n: int) -> int:
-    """Corners on a rim of the enlarged prism: each edge's middle and where the way crosses it."""
+    """Write each edge's middle and crossing with the path, on a rim of the prism."""
     c, count = floats_at(zone.corners), zone.corner_count
     for i in range(count):
         j = (i + 1) % count
@@ -129,7 +130,7 @@ def _edge_corners(zone: Zone, ends: Floats, z: float, reach: float, out: Floats,
 @allocating_kernel
 def _prism_corners(zone: Zone, ends: Floats, limits: Floats, z: float, out: Floats,
                    n: int) -> int:
-    """Mitred corners at the convex corners of the enlarged polygon, at z (NaN: the way's)."""
+    """Write mitred corners at a prism's convex corners, at height z (NaN: the path's)."""
     reach = zone.grow + 1.5 * zone.skin
     corners, count = floats_at(zone.corners), zone.corner_count
     for i in range(count):
@@ -154,7 +155,16 @@ def _prism_corners(zone: Zone, ends: Floats, limits: Floats, z: float, out: Floa
 @allocating_kernel
 def add_corners(zone: Zone, ends: Floats, limits: Floats, floor: float, ring: int,
                 out: Floats, n: int) -> int:
-    """Write the corners of zone k for the way ab into out[n:]; returns the new n."""
+    """Write the corners of a zone for a path between `ends` into out[n:]; O(corner_bound).
+
+    Args:
+        ring: corners around a dome or cylinder.
+        out: float64 (at least n + corner_bound, 3) [m].
+        n: rows in use.
+
+    Returns:
+        The new n.
+    """
     if zone.kind == DOME:
         return _dome_corners(zone, ends, limits, floor, ring, out, n)
     radius = (zone.radius + 1.5 * zone.skin) / math.cos(math.pi / ring)
@@ -178,7 +188,7 @@ def add_corners(zone: Zone, ends: Floats, limits: Floats, floor: float, ring: in
 @allocating_kernel
 def add_level(zone: Zone, ends: Floats, limits: Floats, z: float, ring: int, out: Floats,
               n: int) -> int:
-    """Write corners around a zone at a height where another zone ends; returns the new n."""
+    """Write corners at the height z [m] where another zone ends; returns the new n."""
     low = zone.z if zone.kind == DOME else zone.low
     if not (max(low, limits[0]) < z < min(zone.high, limits[1])):
         return n
@@ -192,7 +202,7 @@ def add_level(zone: Zone, ends: Floats, limits: Floats, z: float, ring: int, out
 
 @allocating_kernel
 def _boxes(zones: Zones, active: Ints) -> Floats:
-    """x0, x1, y0, y1 of the active zones, side by side in memory."""
+    """x0, x1, y0, y1 of the active zones, float64 (active, 4), side by side in memory."""
     boxes = np.empty((active.size, 4))
     for m in range(active.size):
         zone = zones[active[m]]
@@ -203,6 +213,7 @@ def _boxes(zones: Zones, active: Ints) -> Floats:
 @allocating_kernel
 def _is_visible(zones: Zones, active: Ints, boxes: Floats, x: Floats, i: int, j: int, floor: float,
                 no_skin: bool) -> bool:
+    """Whether the segment x[i] x[j] enters no active zone. O(active)"""
     x0, x1 = min(x[i, 0], x[j, 0]), max(x[i, 0], x[j, 0])
     y0, y1 = min(x[i, 1], x[j, 1]), max(x[i, 1], x[j, 1])
     for m in range(active.size):
@@ -216,7 +227,7 @@ def _is_visible(zones: Zones, active: Ints, boxes: Floats, x: Floats, i: int, j:
 @allocating_kernel
 def _next_parent(x: Floats, cost: Floats, closed: Ints, done: int, v: int,
                  failed: int) -> tuple[float, int]:
-    """The next best way to v over a closed corner, after the one that failed; ties in turn."""
+    """The next best path to v over a closed corner, after the one that failed."""
     best, parent, above, passed = np.inf, -1, cost[v], False
     for m in range(done):
         u = closed[m]
@@ -229,7 +240,7 @@ def _next_parent(x: Floats, cost: Floats, closed: Ints, done: int, v: int,
 
 @allocating_kernel
 def _nearest_open(cost: Floats, ahead: Floats, state: Any) -> int:
-    """The open corner with the least bound on the whole way; -1: none."""
+    """The open corner with the least bound on the whole path; -1: none. O(n)"""
     v, best = -1, np.inf
     for w in range(cost.size):
         if state[w] == 0 and cost[w] + ahead[w] < best:
@@ -240,12 +251,20 @@ def _nearest_open(cost: Floats, ahead: Floats, state: Any) -> int:
 @allocating_kernel
 def astar(zones: Zones, active: Ints, x: Floats, floor: float, no_skin: bool, path: Ints,
           work: Ints) -> int:
-    """Shortest way 0 -> 1 over corners x past the active zones; returns its corners, 0: none.
+    """Find the shortest path from x[0] to x[1] over corners x past the active zones.
 
-    It is sought from 1, so that parents lead the right way. Among few corners an edge is tested
-    when it is about to be used, and a failed one falls back on the next best closed corner; among
-    many that would be sought too often, and all edges of a corner are tested when it is closed.
+    Searched from x[1], so that parents lead forwards. Among few corners an edge is tested when it
+    is about to be used, and a failed one falls back on the next best closed corner; among many
+    that would repeat too often, and all edges of a corner are tested when it is closed.
     O(n) a step, or O(n zones).
+
+    Args:
+        active: indices of the zones, int64.
+        x: corners, float64 (n, 3) [m].
+        path: int64 (n,), the result: indices of corners from 0 to 1.
+
+    Returns:
+        Number of corners in `path`; 0: there is none, or the search was cut short.
     """
     n, boxes = x.shape[0], _boxes(zones, active)
     lazy = n <= FEW_CORNERS

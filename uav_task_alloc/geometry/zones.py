@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Zones asked one at a time: is a point inside, how far is it, is a segment clear?"""
+"""Queries about single zones: is a point inside, how far is it, is a segment clear?"""
 from __future__ import annotations
 
 import math
@@ -13,26 +13,64 @@ from uav_task_alloc.model import Point, Shape, ThreatZone, check_point
 
 
 def inside(point: Iterable[float], zone: ThreatZone, clearance: float = 0.0) -> bool:
-    """Whether a point is inside the zone enlarged by its margin and `clearance` [m]."""
-    packed = pack((zone,), clearance)  # held on to: its rows mean arrays of it
+    """Whether a point is inside a zone enlarged by its margin and `clearance`.
+
+    Args:
+        point: [m] ENU.
+        zone: the zone.
+        clearance: [m].
+
+    Returns:
+        False on the surface. The space beneath a dome is outside.
+
+    Raises:
+        InvalidValue: the point is not finite or the clearance is negative.
+    """
+    packed = pack((zone,), clearance)  # kept alive: its rows point into it
     return bool(contains(packed.rows[0], *check_point('point', point), True))
 
 
 def zones_around(point: Iterable[float], zones: Sequence[ThreatZone],
                  clearance: float = 0.0) -> tuple[ThreatZone, ...]:
-    """The enlarged zones a point is inside of."""
+    """The enlarged zones that a point is inside of; O(zones).
+
+    Args:
+        point: [m] ENU.
+        zones: each is enlarged by its margin and `clearance`.
+        clearance: [m].
+
+    Raises:
+        InvalidValue: as `inside`.
+    """
     packed, place = pack(zones, clearance), check_point('point', point)
     return tuple(zones[k] for k in containing_zones(packed.rows, *place))
 
 
 def outline(zone: ThreatZone, clearance: float = 0.0) -> list[tuple[float, float]]:
-    """The rim (x, y) [m] of an enlarged cylinder or prism, counter-clockwise; none of a dome."""
+    """The outline of a zone enlarged by its margin and `clearance`, in plan view.
+
+    Args:
+        zone: the zone.
+        clearance: [m].
+
+    Returns:
+        Corners (x, y) [m] counter-clockwise, a polygon that circumscribes the enlarged cylinder or
+        prism; none for a dome.
+    """
     _, rim, _ = pack((zone,), clearance).outlines
     return [(float(x), float(y)) for x, y in rim]
 
 
 def distance(point: Iterable[float], zone: ThreatZone) -> float:
-    """Metres from a point to the zone as it is, without margin; 0 inside."""
+    """Distance from a point to a zone as it is, without margin.
+
+    Args:
+        point: [m] ENU.
+        zone: the zone.
+
+    Returns:
+        [m]; 0.0 inside.
+    """
     x, y, z = check_point('point', point)
     if zone.shape is Shape.HEMISPHERE:
         return _to_dome(x, y, z, zone)
@@ -48,13 +86,25 @@ def distance(point: Iterable[float], zone: ThreatZone) -> float:
 
 def is_clear(a: Iterable[float], b: Iterable[float], zones: Sequence[ThreatZone],
              clearance: float = 0.0) -> bool:
-    """Whether the segment ab stays outside every enlarged zone."""
+    """Whether the segment ab [m] enters no zone enlarged by its margin and `clearance` [m]."""
     return cut_by(a, b, zones, clearance) is None
 
 
 def cut_by(a: Iterable[float], b: Iterable[float], zones: Sequence[ThreatZone],
            clearance: float = 0.0) -> ThreatZone | None:
-    """The first enlarged zone that the segment ab enters; None: it is clear."""
+    """The first zone that a segment enters; O(zones).
+
+    Args:
+        a, b: ends of the segment [m] ENU.
+        zones: each is enlarged by its margin and `clearance`.
+        clearance: [m].
+
+    Returns:
+        None where the segment is clear of all.
+
+    Raises:
+        InvalidValue: as `inside`.
+    """
     start, end = check_point('a', a), check_point('b', b)
     obstacles = pack(zones, clearance)
     for k, zone in enumerate(zones):
@@ -65,11 +115,18 @@ def cut_by(a: Iterable[float], b: Iterable[float], zones: Sequence[ThreatZone],
 
 def path_is_clear(points: Sequence[Point], zones: Sequence[ThreatZone],
                   clearance: float = 0.0) -> bool:
-    """Whether the polyline through `points` stays outside every enlarged zone."""
+    """Whether a polyline enters no zone; O(points zones).
+
+    Args:
+        points: [m] ENU.
+        zones: each is enlarged by its margin and `clearance`.
+        clearance: [m].
+    """
     return all(is_clear(a, b, zones, clearance) for a, b in pairwise(points))
 
 
 def _to_dome(x: float, y: float, z: float, zone: ThreatZone) -> float:
+    """Distance [m] from (x, y, z) to the upper half of a ball."""
     aside, up = math.hypot(x - zone.center[0], y - zone.center[1]), z - zone.center[2]
     if up >= 0.0:
         return max(0.0, math.hypot(aside, up) - zone.radius)
