@@ -141,9 +141,9 @@ def test_suspended_and_then_in_another_mode_it_is_a_loss(kind):
     assert sends_no_command(bench, 20.0)
 
 
-# a swap in progress
+# a replacement in progress
 
-def swapping(moment, kind='ardupilot', speed=0.0):
+def replacing(moment, kind='ardupilot', speed=0.0):
     """Killed while ArduPilot is held for an upload that the line lets through slowly."""
     bench = flying(kind, delay=(0.1, 0.1))
     assert bench.run(lambda: bench.executor().telemetry.speed > speed, 20.0)
@@ -155,8 +155,8 @@ def swapping(moment, kind='ardupilot', speed=0.0):
 
 
 @pytest.mark.parametrize(('dead', 'state'), [(5.0, H), (50.0, H), (65.0, L)])
-def test_held_for_a_swap_it_stays_held_for_a_minute(dead, state):
-    bench = swapping(2.0)
+def test_held_for_a_replacement_it_stays_held_for_a_minute(dead, state):
+    bench = replacing(2.0)
     bench.kill_and_restart(dead)
     bench.run(limit=2.0)
     assert status_is(bench, state)
@@ -167,7 +167,7 @@ def test_held_for_a_swap_it_stays_held_for_a_minute(dead, state):
         assert sends_no_command(bench, names='ABC')
 
 
-def test_killed_in_a_swap_the_current_item_does_not_refer_to_the_new_mission():
+def test_killed_in_a_replacement_the_current_item_does_not_refer_to_the_new_mission():
     """ArduPilot keeps the number of its current item while another mission is written."""
     bench = flying('ardupilot', delay=(0.1, 0.1))
     assert bench.run(lambda: len(bench.completed()) == 2, 200.0)
@@ -192,15 +192,15 @@ def test_a_current_item_set_while_lost_completes_nothing(kind):
 
 
 @pytest.mark.parametrize('moment', [0.0, 0.5, 1.0])
-def test_killed_while_it_brakes_for_a_swap_it_stays_held(moment):
-    bench = swapping(moment, speed=14.0)
+def test_killed_while_it_brakes_for_a_replacement_it_stays_held(moment):
+    bench = replacing(moment, speed=14.0)
     bench.kill_and_restart(0.2)
     bench.assign(task_list('ZYXWV', 2))
     assert bench.run(lambda: bench.completed()[-5:] == list('ZYXWV'), 200.0)
 
 
-def test_held_for_a_swap_and_moved_by_somebody_else_it_is_a_loss():
-    bench = swapping(2.0)
+def test_held_for_a_replacement_and_moved_by_somebody_else_it_is_a_loss():
+    bench = replacing(2.0)
     bench.vehicles[1].flight.set_mode(bench.vehicles[1].mode)
     bench.kill_and_restart(1.0)
     bench.vehicles[1].flight.body.velocity = (5.0, 0.0, 0.0)
@@ -216,8 +216,8 @@ def test_held_for_a_swap_and_moved_by_somebody_else_it_is_a_loss():
     assert sends_no_command(bench, names='ABC')
 
 
-def test_another_mode_after_a_swap_is_a_loss():
-    bench = swapping(2.0)
+def test_another_mode_after_a_replacement_is_a_loss():
+    bench = replacing(2.0)
     bench.vehicles[1].rc_mode(5)
     bench.kill_and_restart(5.0)
     bench.run(limit=1.0)

@@ -86,7 +86,7 @@ def at(moment, kind):
 def test_finding_02_a_mode_that_somebody_else_has_set_stays(kind, moment, mode):
     bench = at(moment, kind)
     if bench.vehicles[1].flight.custom_mode == MODES[kind][mode]:
-        mode = 'LAND'  # PX4 is in its return mode already, the copter is held for a swap
+        mode = 'LAND'  # PX4 is in its return mode already, the copter is held for a replacement
     take(bench, mode)
     left_alone(bench)
     assert not bench.state().available

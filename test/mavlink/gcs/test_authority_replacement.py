@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A pilot or a failsafe during a swap (a mission replaced in flight), and a swap that stalls."""
+"""A pilot or a failsafe while a mission is replaced in flight, and a replacement that stalls."""
 import pytest
 from authority_bench import (
     ARDUPILOT,
@@ -24,7 +24,7 @@ NEW = 'ZYXWVUTSRQ'
 MOMENTS = pytest.mark.parametrize('moment', ['holding', 'counting', 'sending', 'sent', 'reading'])
 
 
-def swapping(kind, moment, **kwargs):
+def replacing(kind, moment, **kwargs):
     """In flight, at some moment of the upload of a new list."""
     bench = flying(kind, delay=(0.1, 0.1), tick=0.1, **kwargs)
     start = len(bench.sent)
@@ -57,8 +57,8 @@ def transfer_ended(bench, start):
 @BOTH
 @MOMENTS
 @pytest.mark.parametrize('mode', ['stick', 'rtl'])
-def test_a_pilot_during_a_swap_ends_the_transfer(kind, moment, mode):
-    bench = swapping(kind, moment)
+def test_a_pilot_during_a_replacement_ends_the_transfer(kind, moment, mode):
+    bench = replacing(kind, moment)
     bench.vehicles[1].rc_mode(getattr(MODES[kind], mode))
     assert bench.run(lambda: bench.authority() is L, 3.0)
     transfer_ended(bench, len(bench.sent))
@@ -69,8 +69,8 @@ def test_a_pilot_during_a_swap_ends_the_transfer(kind, moment, mode):
 
 @BOTH
 @MOMENTS
-def test_a_failsafe_during_a_swap_ends_the_transfer(kind, moment):
-    bench = swapping(kind, moment)
+def test_a_failsafe_during_a_replacement_ends_the_transfer(kind, moment):
+    bench = replacing(kind, moment)
     bench.vehicles[1].failsafe('battery', MODES[kind].rtl)
     assert bench.run(lambda: bench.authority() is not H, 3.0)
     start = len(bench.sent)
@@ -82,7 +82,7 @@ def test_a_failsafe_during_a_swap_ends_the_transfer(kind, moment):
 @BOTH
 @MOMENTS
 def test_a_failsafe_that_keeps_the_mode_stops_the_transfer_and_then_is_a_loss(kind, moment):
-    bench = swapping(kind, moment)
+    bench = replacing(kind, moment)
     bench.vehicles[1].failsafe('radio', None)
     assert bench.run(lambda: bench.authority() is S, 3.0)
     start = len(bench.sent)
@@ -95,8 +95,8 @@ def test_a_failsafe_that_keeps_the_mode_stops_the_transfer_and_then_is_a_loss(ki
 
 @BOTH
 @pytest.mark.parametrize('moment', ['sending', 'reading'])
-def test_a_swap_continues_after_a_failsafe_that_kept_the_mode(kind, moment):
-    bench = swapping(kind, moment)
+def test_a_replacement_continues_after_a_failsafe_that_kept_the_mode(kind, moment):
+    bench = replacing(kind, moment)
     bench.vehicles[1].failsafe('radio', None)
     assert bench.run(lambda: bench.authority() is S, 3.0)
     bench.run(limit=8.0)
@@ -121,7 +121,7 @@ def test_without_authority_no_mission_is_replaced_in_flight(kind):
 # a good link, at most 30 s
 
 @BOTH
-def test_in_flight_a_swap_begins_only_after_ten_seconds_of_good_link(kind):
+def test_in_flight_a_replacement_begins_only_after_ten_seconds_of_good_link(kind):
     bench = flying(kind)
     bench.line.cut = True
     bench.run(limit=2.6)  # not stale
@@ -135,7 +135,7 @@ def test_in_flight_a_swap_begins_only_after_ten_seconds_of_good_link(kind):
     assert bench.run(lambda: bench.completed()[-3:] == ['Z', 'Y', 'X'], 200.0)
 
 
-def stalled_swap(**kwargs):
+def stalled_replacement(**kwargs):
     """Held for an upload whose items are all lost."""
     bench = flying('ardupilot', **kwargs)
     bench.run(limit=4.0)
@@ -148,7 +148,7 @@ def stalled_swap(**kwargs):
 
 
 def test_held_for_30_seconds_it_returns_when_the_return_path_is_clear():
-    bench, start, since = stalled_swap()
+    bench, start, since = stalled_replacement()
     assert bench.run(lambda: bench.vehicles[1].flight.custom_mode == 6, 60.0)
     assert 29.0 < bench.now - since < 45.0
     assert bench.modes(start) == [4, 6]
@@ -161,7 +161,7 @@ def test_held_for_30_seconds_it_returns_when_the_return_path_is_clear():
 
 def test_held_for_30_seconds_with_a_zone_on_the_return_path_it_stays_with_an_alarm():
     zone = ThreatZone('Z1', Shape.CYLINDER, (0.0, 20.0, 0.0), 5.0)
-    bench, start, since = stalled_swap()
+    bench, start, since = stalled_replacement()
     bench.set_policy(zones=(zone,))
     bench.run(lambda: bench.executor().alarm, 60.0)
     assert 29.0 < bench.now - since < 45.0
@@ -178,8 +178,8 @@ def test_held_for_30_seconds_with_a_zone_on_the_return_path_it_stays_with_an_ala
 
 @ARDUPILOT
 @pytest.mark.parametrize('seconds', [5.0, 40.0])
-def test_a_pilot_who_takes_over_during_a_stalled_swap_keeps_control(kind, seconds):
-    bench, _, _ = stalled_swap()
+def test_a_pilot_who_takes_over_during_a_stalled_replacement_keeps_control(kind, seconds):
+    bench, _, _ = stalled_replacement()
     bench.run(limit=seconds)
     bench.vehicles[1].rc_mode(5)
     assert bench.run(lambda: bench.authority() is L, 3.0)

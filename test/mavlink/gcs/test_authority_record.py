@@ -143,7 +143,7 @@ def test_each_command_is_saved_before_it_is_sent(kind):
 
 
 @ARDUPILOT
-def test_a_swap_is_saved_before_the_hold_is_sent(kind):
+def test_a_replacement_is_saved_before_the_hold_is_sent(kind):
     store = Log()
     bench = flying(kind, store=store)
     store.line = bench.line
