@@ -44,7 +44,7 @@ class Detour:
         if self.goal_inside:
             return f'the goal is inside zone {", ".join(self.goal_inside)}'
         if self.given_up:
-            return 'no safe way found in the time'
+            return 'no safe path found in the time'
         if self.closed_off:
             return 'closed off by zones'
         if self.start_inside:

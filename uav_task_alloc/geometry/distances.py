@@ -66,7 +66,7 @@ class Pairs(_Addresses):
     owner: object  # keeps alive what the addresses point to
 
     def __reduce__(self) -> str:
-        raise TypeError('Pairs hold addresses of this process: make Distances anew elsewhere')
+        raise TypeError('Pairs hold addresses of this process: make new Distances there')
 
 
 @allocating_kernel
