@@ -80,7 +80,7 @@ class Profile:
         if message.get_type() != 'COMMAND_LONG' or message.command != d.MAV_CMD_DO_SET_MODE:
             return None
         main, sub = int(message.param2), int(message.param3)
-        return _px4(main, sub) if self.family == 'px4' else main
+        return px4_custom_mode(main, sub) if self.family == 'px4' else main
 
     def mode_command(self, peer: CommandTarget, function: ModeFunction) -> Message:
         """The command that enters a mode.
@@ -99,7 +99,7 @@ class Profile:
                       ModeFunction.RETURN: d.MAV_CMD_NAV_RETURN_TO_LAUNCH}[function]
             return peer.command(number)
         mode = self.set_mode[function]
-        main, sub = (mode >> 16 & 0xff, mode >> 24) if mode > 0xffff else (mode, 0)
+        main, sub = px4_mode_parts(mode) if self.family == 'px4' else (mode, 0)
         return peer.command(d.MAV_CMD_DO_SET_MODE, d.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED, main, sub)
 
     def takeoff_command(self, peer: CommandTarget, height: float, home_amsl: float) -> Message:
@@ -115,44 +115,52 @@ class Profile:
         return peer.command(d.MAV_CMD_NAV_TAKEOFF, 0.0, 0.0, 0.0, unset, unset, unset, altitude)
 
 
-def _px4(main: int, sub: int = 0) -> int:
+def px4_custom_mode(main: int, sub: int = 0) -> int:
+    """Combine PX4's main and sub mode into a custom_mode (px4_custom_mode.h)."""
     return main << 16 | sub << 24
 
 
+def px4_mode_parts(custom_mode: int) -> tuple[int, int]:
+    """Split a custom_mode of PX4 into its main and sub mode."""
+    return custom_mode >> 16 & 0xff, custom_mode >> 24 & 0xff
+
+
 _COPTER = {
-    3: ModeFunction.MISSION,
-    4: ModeFunction.HOLD,
-    6: ModeFunction.RETURN,
-    21: ModeFunction.RETURN,
-    27: ModeFunction.RETURN,
-    9: ModeFunction.LAND,
+    d.COPTER_MODE_AUTO: ModeFunction.MISSION,
+    d.COPTER_MODE_GUIDED: ModeFunction.HOLD,
+    d.COPTER_MODE_RTL: ModeFunction.RETURN,
+    d.COPTER_MODE_SMART_RTL: ModeFunction.RETURN,
+    d.COPTER_MODE_AUTO_RTL: ModeFunction.RETURN,
+    d.COPTER_MODE_LAND: ModeFunction.LAND,
 }
 _PLANE = {
-    10: ModeFunction.MISSION,
-    15: ModeFunction.HOLD,
-    11: ModeFunction.RETURN,
-    21: ModeFunction.RETURN,
-    13: ModeFunction.TAKEOFF,
-    20: ModeFunction.LAND,
+    d.PLANE_MODE_AUTO: ModeFunction.MISSION,
+    d.PLANE_MODE_GUIDED: ModeFunction.HOLD,
+    d.PLANE_MODE_RTL: ModeFunction.RETURN,
+    d.PLANE_MODE_QRTL: ModeFunction.RETURN,
+    d.PLANE_MODE_TAKEOFF: ModeFunction.TAKEOFF,
+    d.PLANE_MODE_QLAND: ModeFunction.LAND,
 }
 _PX4 = {
-    _px4(4, 2): ModeFunction.TAKEOFF,
-    _px4(4, 3): ModeFunction.HOLD,
-    _px4(4, 4): ModeFunction.MISSION,
-    _px4(4, 5): ModeFunction.RETURN,
-    _px4(4, 6): ModeFunction.LAND,
-    _px4(4, 1): ModeFunction.HOLD,
+    px4_custom_mode(4, 2): ModeFunction.TAKEOFF,
+    px4_custom_mode(4, 3): ModeFunction.HOLD,
+    px4_custom_mode(4, 4): ModeFunction.MISSION,
+    px4_custom_mode(4, 5): ModeFunction.RETURN,
+    px4_custom_mode(4, 6): ModeFunction.LAND,
+    px4_custom_mode(4, 1): ModeFunction.HOLD,
 }
 
 ARDUPILOT = Profile(
     'ardupilot', ItemRules(home_first=True, whole_seconds=True, keeps_radius=False, yaw=0.0,
                            command_frame=d.MAV_FRAME_GLOBAL_RELATIVE_ALT, capacity=650),
     atomic=False, idle_after=9.0, modes=_COPTER, family='copter',
-    set_mode={ModeFunction.MISSION: 3, ModeFunction.HOLD: 4, ModeFunction.RETURN: 6})
+    set_mode={ModeFunction.MISSION: d.COPTER_MODE_AUTO, ModeFunction.HOLD: d.COPTER_MODE_GUIDED,
+              ModeFunction.RETURN: d.COPTER_MODE_RTL})
 ARDUPLANE = replace(
     ARDUPILOT, rules=replace(ARDUPILOT.rules, loiters=True), modes=_PLANE,
     family='plane',
-    set_mode={ModeFunction.MISSION: 10, ModeFunction.HOLD: 15, ModeFunction.RETURN: 11})
+    set_mode={ModeFunction.MISSION: d.PLANE_MODE_AUTO, ModeFunction.HOLD: d.PLANE_MODE_GUIDED,
+              ModeFunction.RETURN: d.PLANE_MODE_RTL})
 PX4 = Profile(
     # NAV_ACC_RAD is 10 m since 2026: a task would count as reached when passed at that distance
     'px4',
@@ -165,9 +173,9 @@ PX4 = Profile(
     amsl_takeoff=True,
     farthest_first=10_000.0,  # MIS_DIST_1WP
     set_mode={
-        ModeFunction.MISSION: _px4(4, 4),
-        ModeFunction.HOLD: _px4(4, 3),
-        ModeFunction.RETURN: _px4(4, 5),
+        ModeFunction.MISSION: px4_custom_mode(4, 4),
+        ModeFunction.HOLD: px4_custom_mode(4, 3),
+        ModeFunction.RETURN: px4_custom_mode(4, 5),
     },
 )
 PX4_PLANE = replace(PX4, rules=replace(PX4.rules, loiters=True, radius=0.0))

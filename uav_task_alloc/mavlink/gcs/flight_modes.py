@@ -6,6 +6,8 @@ from enum import Enum
 
 from pymavlink.dialects.v20 import ardupilotmega as d
 
+from uav_task_alloc.mavlink.autopilots import px4_mode_parts
+
 
 class ModeClass(Enum):
     """What controls the path of the vehicle in a mode."""
@@ -68,9 +70,6 @@ _AVOIDS = {'copter': d.COPTER_MODE_AVOID_ADSB, 'plane': d.PLANE_MODE_AVOID_ADSB}
 _NAMES = {'copter': _COPTER, 'plane': _PLANE}
 
 
-def _px4_parts(custom_mode: int) -> tuple[int, int]:
-    return custom_mode >> 16 & 0xff, custom_mode >> 24 & 0xff
-
 
 def mode_class(family: str, custom_mode: int) -> ModeClass | None:
     """Classify a mode (ArduPilot mode.h, PX4 px4_custom_mode.h).
@@ -83,7 +82,7 @@ def mode_class(family: str, custom_mode: int) -> ModeClass | None:
         The class; None for an autopilot of unknown kind.
     """
     if family == 'px4':
-        main, sub = _px4_parts(custom_mode)
+        main, sub = px4_mode_parts(custom_mode)
         if main == _AUTO:
             return {4: ModeClass.MISSION, 3: ModeClass.HOLD}.get(sub, ModeClass.OWN)
         return ModeClass.STICK if main in _PX4_STICK else ModeClass.OWN
@@ -106,7 +105,7 @@ def mode_name(family: str, custom_mode: int) -> str:
         The name; 'mode NUMBER' where it has none.
     """
     if family == 'px4':
-        main, sub = _px4_parts(custom_mode)
+        main, sub = px4_mode_parts(custom_mode)
         name = _PX4_AUTO.get(sub) if main == _AUTO else _PX4_MAIN.get(main)
     else:
         name = _NAMES.get(family, {}).get(custom_mode)
