@@ -4,7 +4,7 @@ import pytest
 from flight_bench import FlightBench
 from pymavlink.dialects.v20 import ardupilotmega as d
 
-from uav_task_alloc.mavlink.gcs.message_rates import TRIES
+from uav_task_alloc.mavlink.gcs.message_rates import MAX_REQUESTS
 
 BOTH = pytest.mark.parametrize('kind', ['ardupilot', 'px4'])
 SPEC = {'GLOBAL_POSITION_INT': 5.0, 'MISSION_CURRENT': 2.0, 'BATTERY_STATUS': 1.0,
@@ -39,7 +39,7 @@ def test_a_message_that_stays_away_is_asked_for_again_and_given_up_in_the_end(ki
         m.get_type() == 'BATTERY_STATUS') else None)
     bench.discover()
     bench.run(limit=60.0)
-    assert len(asked(bench, 'BATTERY_STATUS')) == TRIES
+    assert len(asked(bench, 'BATTERY_STATUS')) == MAX_REQUESTS
     assert len(asked(bench, 'GLOBAL_POSITION_INT')) == 1
 
 
@@ -51,10 +51,10 @@ def test_a_stream_that_ceases_is_asked_for_again(kind):
     bench.line.tampers.append(lambda way, m, now: [] if (
         m.get_type() == 'EXTENDED_SYS_STATE') else None)
     bench.run(limit=60.0)
-    assert len(asked(bench, 'EXTENDED_SYS_STATE')) == 1 + TRIES
+    assert len(asked(bench, 'EXTENDED_SYS_STATE')) == 1 + MAX_REQUESTS
     bench.line.tampers.clear()
     bench.run(limit=30.0)
-    assert len(asked(bench, 'EXTENDED_SYS_STATE')) == 1 + TRIES
+    assert len(asked(bench, 'EXTENDED_SYS_STATE')) == 1 + MAX_REQUESTS
 
 
 @BOTH

@@ -68,7 +68,7 @@ def test_finding_05_what_another_station_skips_is_flown_later(kind, moment, inde
     set_current(bench, index)
     flown_once_each(bench, 'ABCDE')
     assert places(bench)[len(before)] == 'ABCDE'[index]
-    assert bench.noted('A was passed over')
+    assert bench.noted('A was skipped')
 
 
 @BOTH

@@ -1,45 +1,45 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What has ended and a list still asks for: told again, as the allocator may have been deaf."""
+"""Repeats the final events of tasks that lists still contain: the allocator may have lost them."""
 from __future__ import annotations
 
 from collections.abc import Iterable
 
 from uav_task_alloc.mavlink.mission.task_progress import TaskProgress
 
-ANSWERS = 3  # lists that still ask for a task after it was told: the allocator has heard of it
-REMIND = 2.0  # [s] that lists may ask for a task that has ended; then twice as long, and so on
+_MAX_LISTS = 3  # lists that contain a task after a repetition: the allocator knows, and wants it
+_RETRY = 2.0  # [s] until the first repetition; doubled after each
 
 
 class EventRetry:
-    """Holds no task longer than the lists have it; a new list asks anew, and puts nothing off."""
+    """Final events to repeat; a task that a new list does not contain is removed."""
 
     def __init__(self) -> None:
         self._ended: dict[str, TaskProgress] = {}
-        self._due: dict[str, tuple[float, float]] = {}  # when [s], and the pause after that
-        self._told: set[str] = set()  # since the last list
-        self._answers: dict[str, int] = {}  # lists that came after it was told
+        self._due: dict[str, tuple[float, float]] = {}  # time [s], and the next pause [s]
+        self._resent: set[str] = set()  # since the last list
+        self._lists: dict[str, int] = {}  # number of lists after a repetition, by task
 
-    def listed(self, ended: Iterable[TaskProgress], now: float) -> None:
-        """These tasks of a new list had ended before it came."""
+    def set_ended(self, ended: Iterable[TaskProgress], now: float) -> None:
+        """Set the final events of the tasks of a new list that had ended before it."""
         self._ended = {each.task: each for each in ended}
-        soon = now + REMIND
-        self._due = {task: (min(soon, self._due.get(task, (soon, 0.0))[0]), 2.0 * REMIND)
+        soon = now + _RETRY
+        self._due = {task: (min(soon, self._due.get(task, (soon, 0.0))[0]), 2.0 * _RETRY)
                      for task in self._ended}
-        self._answers = {task: n for task, n in self._answers.items() if task in self._ended}
-        self._told.clear()
+        self._lists = {task: n for task, n in self._lists.items() if task in self._ended}
+        self._resent.clear()
 
-    def answered(self) -> list[str]:
-        """A new list comes: the tasks that were told before it, and before ANSWERS - 1 others."""
-        for task in self._told:
-            self._answers[task] = self._answers.get(task, 0) + 1
-        self._told.clear()
-        return [task for task, n in self._answers.items() if n >= ANSWERS]
+    def wanted_again(self) -> list[str]:
+        """Count a new list; returns the tasks that _MAX_LISTS lists contain after a repetition."""
+        for task in self._resent:
+            self._lists[task] = self._lists.get(task, 0) + 1
+        self._resent.clear()
+        return [task for task, n in self._lists.items() if n >= _MAX_LISTS]
 
     def step(self, now: float) -> list[TaskProgress]:
-        """What is to be told now."""
+        """The events to repeat now."""
         due = [task for task, (when, _) in self._due.items() if now >= when]
         for task in due:
             pause = self._due[task][1]
             self._due[task] = now + pause, 2.0 * pause
-            self._told.add(task)
+            self._resent.add(task)
         return [self._ended[task] for task in due]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The ground station for many vehicles on many links, without I/O: finds them, and keeps apart."""
+"""The ground station for many vehicles on many links, without I/O: discovery and routing."""
 from __future__ import annotations
 
 import random
@@ -22,27 +22,27 @@ from uav_task_alloc.mavlink.mission.peer import Peer
 from uav_task_alloc.mavlink.transport.codec import Message
 from uav_task_alloc.mavlink.transport.refused_messages import RefusedMessages, failure
 
-RemoteKey = Hashable  # a link and the far end on it
+RemoteKey = Hashable  # link and remote, see `transport.connections.Address`
 Outgoing = list[tuple[RemoteKey, Message]]
 
 
 class AuthorityStore(Protocol):
-    """Keeps who has each aircraft over a restart of the bridge."""
+    """Stores the authority records over a restart of the bridge."""
 
     def load(self, uav_id: str) -> AuthorityRecord | None:
-        """What was saved last; None where nothing was."""
+        """The record of a UAV saved last; None if there is none."""
 
     def save(self, uav_id: str, record: AuthorityRecord) -> None:
-        """On disk when this returns."""
+        """Save a record; it is on disk when this returns."""
 
 
 @dataclass(frozen=True, slots=True)
 class GcsConfig:
-    """Who we are and whom we serve."""
+    """Identity of the ground station, and the vehicles it serves."""
 
     system: int = 245
     component: int = 190
-    system_ids: Collection[int] = ()  # empty: all that are heard
+    system_ids: Collection[int] = ()  # of vehicles to serve; empty: all
     uav_id_pattern: str = 'uav_{sysid}'
     autopilot: str = 'auto'
     origin: Origin = field(default_factory=lambda: Origin(0.0, 0.0))
@@ -51,35 +51,50 @@ class GcsConfig:
 
 @dataclass(slots=True)
 class VehicleSession:
-    """One vehicle and where it was last heard."""
+    """One vehicle, its address and its executor."""
 
     uav_id: str
     address: RemoteKey
     executor: MissionExecutor
-    strays: int = 0  # frames with its system id from elsewhere
-    fault: str = ''  # why the bridge could not act for it, last; '': it could
+    strays: int = 0  # frames with its system id from other addresses
+    fault: str = ''  # error of the latest call of the executor; '': none
 
 
 class GroundStation:
-    """Routes each message to the pilot of its vehicle, and the answers back the same way."""
+    """Routes messages to the executor of their vehicle, and its messages to the vehicle's address.
 
-    def __init__(self, station: GcsConfig, rng: random.Random,
+    Args:
+        config: identity and policy.
+        rng: seeds the executors.
+        store: of authority records; None: not stored.
+    """
+
+    def __init__(self, config: GcsConfig, rng: random.Random,
                  store: AuthorityStore | None = None) -> None:
-        self._station, self._rng, self._store = station, rng, store
+        self._config, self._rng, self._store = config, rng, store
         self.sessions: dict[int, VehicleSession] = {}  # by system id
-        self.refusals = RefusedMessages()  # messages, and lists that could not be acted on
-        self._shared: list[tuple[TaskList | None, int]] = []  # lists and memories seen
+        self.refusals = RefusedMessages()  # messages and lists whose processing failed
+        self._compared: list[tuple[TaskList | None, int]] = []  # lists and flown items
 
     def receive(self, address: RemoteKey, message: Message, now: float) -> Outgoing:
-        """Take a message that came in at `address`; one that cannot be acted on is dropped."""
+        """Process a message; one that is invalid or cannot be processed is dropped and counted.
+
+        Args:
+            address: the address it was received from.
+            message: of any vehicle or station.
+            now: steady time [s].
+
+        Returns:
+            Messages to send, with their addresses.
+        """
         system, component = message.get_srcSystem(), message.get_srcComponent()
-        why = defect(message)
-        if not why:
+        reason = defect(message)
+        if not reason:
             try:
                 return self._receive(address, message, now)
             except Exception as error:
-                why = failure(error)
-        self.refusals.add(f'system {system}, component {component}', message.get_type(), why)
+                reason = failure(error)
+        self.refusals.add(f'system {system}, component {component}', message.get_type(), reason)
         return []
 
     def _receive(self, address: RemoteKey, message: Message, now: float) -> Outgoing:
@@ -90,96 +105,106 @@ class GroundStation:
         if session is None:
             return []
         if session.address != address:
-            # the same id twice would bring one plane's mission to the other
+            # with a duplicate id, one vehicle would get the mission of the other
             if not session.executor.telemetry.stale(now):
                 session.strays += 1
                 return []
             session.address = address
             session.executor.moved_address(now)
-        return self._sent(session, session.executor.receive(message, now))
+        return self._addressed(session, session.executor.receive(message, now))
 
     def addresses(self) -> frozenset[RemoteKey]:
-        """Where the known vehicles are."""
+        """Addresses of the known vehicles."""
         return frozenset(session.address for session in self.sessions.values())
 
     def step(self, now: float) -> Outgoing:
-        """Let time pass for all."""
+        """Advance the time of all executors; returns messages to send, with their addresses."""
         out: Outgoing = []
         try:
-            self._share(now)
+            self._drop_flown_by_others(now)
         except Exception as error:
-            self.refusals.add('all vehicles', 'compare what was flown', failure(error), 'error')
+            self.refusals.add('all vehicles', 'compare flown tasks', failure(error), 'error')
         for session in self.sessions.values():
             try:
-                out += self._sent(session, session.executor.step(now))
+                out += self._addressed(session, session.executor.step(now))
                 session.fault = ''
             except Exception as error:
                 self._fault(session, 'step', error)
         return out
 
     def _fault(self, session: VehicleSession, what: str, error: Exception) -> None:
-        """The others fly on, and nothing new is given to this one while it lasts."""
+        """Record an error of one executor: its UAV is unavailable, the others continue."""
         session.fault = f'{what} failed: {failure(error)}'
         self.refusals.add(session.uav_id, what, failure(error), 'error')
 
     def assign(self, uav_id: str, tasks: TaskList, now: float) -> Outgoing:
-        """A list for one UAV; raise UnknownName where it was not heard."""
+        """Assign a task list to one UAV.
+
+        Returns:
+            Messages to send, with their addresses.
+
+        Raises:
+            UnknownName: no such UAV was discovered.
+        """
         for session in self.sessions.values():
             if session.uav_id == uav_id:
                 try:
-                    return self._sent(session, session.executor.assign(tasks, now))
+                    return self._addressed(session, session.executor.assign(tasks, now))
                 except Exception as error:
                     self._fault(session, 'task_list', error)
                     return []
         raise UnknownName('uav', uav_id, [s.uav_id for s in self.sessions.values()])
 
     def hand_over(self, uav_id: str, operator: str, now: float) -> str:
-        """An operator gives a UAV to the bridge.
+        """An operator gives control of a UAV to the bridge.
 
         Returns:
-            Why it is refused; '' where the bridge has it now.
+            Why it is refused; '' on success.
 
         Raises:
-            UnknownName: no such UAV was heard.
+            UnknownName: no such UAV was discovered.
         """
         for session in self.sessions.values():
             if session.uav_id == uav_id:
                 return session.executor.hand_over(operator, now)
         raise UnknownName('uav', uav_id, [s.uav_id for s in self.sessions.values()])
 
-    def _share(self, now: float) -> None:
-        """What one has flown before we listened is not flown by another who has it now."""
+    def _drop_flown_by_others(self, now: float) -> None:
+        """Complete tasks of a list that another UAV has flown while the bridge was down."""
         executors = [(s.uav_id, s.executor) for s in self.sessions.values()]
         known: list[tuple[TaskList | None, int]] = [
-            (p.onboard.tasks, len(p.onboard.resume.memory(now))) for _, p in executors]
-        if known == self._shared or not any(flown for _, flown in known):
+            (executor.onboard.tasks, len(executor.onboard.resume.flown_items(now)))
+            for _, executor in executors]
+        if known == self._compared or not any(flown for _, flown in known):
             return
-        self._shared = known
-        for (_, has), (other, did) in permutations(executors, 2):
-            if has.onboard.tasks is not None:
-                has.drop_flown(did.onboard.resume.flown(has.onboard.open_tasks(), now), other)
+        self._compared = known
+        for (_, assigned), (other, executor) in permutations(executors, 2):
+            if assigned.onboard.tasks is not None:
+                assigned.drop_flown(executor.onboard.resume.flown_tasks(
+                    assigned.onboard.open_tasks(), now), other)
 
     def _discover(self, address: RemoteKey, message: Message, now: float) -> VehicleSession | None:
-        station, system = self._station, message.get_srcSystem()
-        if (message.get_type() != 'HEARTBEAT' or system in (0, station.system)
+        config, system = self._config, message.get_srcSystem()
+        if (message.get_type() != 'HEARTBEAT' or system in (0, config.system)
                 or message.autopilot == d.MAV_AUTOPILOT_INVALID
                 or message.type == d.MAV_TYPE_GCS
-                or (station.system_ids and system not in station.system_ids)):
+                or (config.system_ids and system not in config.system_ids)):
             return None
-        peer = Peer(system, message.get_srcComponent(), station.system, station.component)
-        uav_id, store = station.uav_id_pattern.format(sysid=system), self._store
+        peer = Peer(system, message.get_srcComponent(), config.system, config.component)
+        uav_id, store = config.uav_id_pattern.format(sysid=system), self._store
         record = None if store is None else store.load(uav_id)
 
         def save(changed: AuthorityRecord) -> None:
             if store is not None:
                 store.save(uav_id, changed)
 
-        executor = MissionExecutor(peer, profile_of(message, station.autopilot), station.origin,
-                      station.policy, random.Random(self._rng.random()), now, record, save)
+        executor = MissionExecutor(peer, profile_of(message, config.autopilot), config.origin,
+                                   config.policy, random.Random(self._rng.random()), now,
+                                   record, save)
         session = VehicleSession(uav_id, address, executor)
         self.sessions[system] = session
         return session
 
     @staticmethod
-    def _sent(session: VehicleSession, messages: Iterable[Message]) -> Outgoing:
+    def _addressed(session: VehicleSession, messages: Iterable[Message]) -> Outgoing:
         return [(session.address, message) for message in messages]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pymavlink.dialects.v20 import ardupilotmega as d
 
-from uav_task_alloc.mavlink.gcs.onboard_mission import LATE, OnboardMission
+from uav_task_alloc.mavlink.gcs.onboard_mission import LATE_REACHED, OnboardMission
 from uav_task_alloc.mavlink.gcs.resume import checksum
 from uav_task_alloc.mavlink.gcs.telemetry import Telemetry
 from uav_task_alloc.mavlink.mission.items import Item, alike
@@ -23,15 +23,15 @@ class MissionEvidence:
         self._checksum: tuple[tuple[Item, ...], int] | None = None
 
     def ended(self, now: float) -> bool:
-        """Whether REACHED of the last item was received within `LATE`."""
-        return self._onboard.progress.ended_lately(now, LATE)
+        """Whether REACHED of the last item was received within `LATE_REACHED`."""
+        return self._onboard.progress.ended_lately(now, LATE_REACHED)
 
     def rejected(self, now: float) -> bool:
         """Whether the vehicle reports no valid mission just after it accepted ours (PX4)."""
         telemetry, onboard = self._telemetry, self._onboard
         return (telemetry.mission_state == d.MISSION_STATE_NO_MISSION
-                and now - telemetry.current_at < LATE
-                and (onboard.taken or now - onboard.verified_at < LATE))
+                and now - telemetry.current_at < LATE_REACHED
+                and (onboard.taken or now - onboard.verified_at < LATE_REACHED))
 
     def returning(self) -> bool:
         """Whether the RETURN item is next, or is being flown."""

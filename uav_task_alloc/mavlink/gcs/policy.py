@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the operator wants of the bridge."""
+"""Operator policy of the bridge."""
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -9,12 +9,12 @@ from uav_task_alloc.model import ThreatZone
 
 @dataclass(frozen=True, slots=True)
 class Policy:
-    """What the operator wants of the bridge."""
+    """Operator settings that the mission executors follow."""
 
-    takeoff: bool = False  # arm and take off
-    cruise_altitude: float = 50.0  # [m] above home, to take off to
-    when_empty: str = 'hold'  # or 'return': an empty list in flight
-    when_foreign: str = 'yield'  # or 'reassert': a mission that somebody else put there
-    relaunch: str = 'operator'  # or 'automatic': whether it starts again after a landing of ours
-    zones: tuple[ThreatZone, ...] = ()  # which RTL does not know
-    grounded: str = ''  # what whoever is on the ground waits for; '': nothing
+    takeoff: bool = False  # the bridge may arm and take off
+    cruise_altitude: float = 50.0  # [m] above home after a take-off
+    when_empty: str = 'hold'  # or 'return': with an empty list in flight
+    when_foreign: str = 'yield'  # or 'reassert': with a mission of another station
+    relaunch: str = 'operator'  # or 'automatic': take-off after a landing by the bridge
+    zones: tuple[ThreatZone, ...] = ()  # that a return must not cross
+    grounded: str = ''  # what a vehicle on the ground waits for before a take-off; '': nothing

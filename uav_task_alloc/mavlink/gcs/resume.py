@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a vehicle has flown before this bridge listened: items known by their places only.
+"""Finds out what a vehicle has flown while the bridge was down, from the onboard items alone.
 
-No jump of ours leaves out a task that is not flown (see `change`), so what lies behind the
-current item of a vehicle has been flown, whoever asked for it.
+The bridge never sets the current item past a task that is not flown (see `mission.diff`), so the
+items before the current one have been flown, whichever station commanded it.
 """
 from __future__ import annotations
 
@@ -19,104 +19,119 @@ from uav_task_alloc.mavlink.mission.items import Item, MissionStop, TaskList, al
 from uav_task_alloc.mavlink.mission.progress import ProgressTable
 from uav_task_alloc.model import Point, Task
 
-_NEAR = 15.0  # [m] from the last item: there
-MEMORY = 60.0  # [s] after the restart; a task at the same place later on is another one
+_NEAR = 15.0  # [m] from the last item that counts as reached
+MAX_AGE = 60.0  # [s] after the restart; a later task at the same position is a new one
 
 
 def checksum(items: Iterable[Item]) -> int:
-    """Tells missions apart by what every autopilot gives back unchanged."""
+    """CRC-32 of the item fields that every autopilot returns unchanged; identifies a mission."""
     return zlib.crc32(repr([(item.command, item.x, item.y) for item in items]).encode())
 
 
 class Resume:
-    """Finds the place of a vehicle in its mission once, and the tasks behind it."""
+    """Locates a vehicle in its onboard mission once, and finds the tasks it has flown.
+
+    Args:
+        profile: of its autopilot.
+        origin: of the local ENU frame.
+        telemetry: of the vehicle.
+        progress: table that is set to the onboard mission.
+    """
 
     def __init__(self, profile: Profile, origin: Origin, telemetry: Telemetry,
                  progress: ProgressTable) -> None:
         self._profile, self._origin = profile, origin
         self._telemetry, self._progress = telemetry, progress
-        self.unflown: dict[str, Point] = {}  # passed over, not by a bridge
-        self.reported: set[str] = set()  # flown, as the bridge before has told
-        self.known: tuple[int | None, int | None] = None, None  # mission and item, before
-        self.doubtful = False  # what the current item of the vehicle says of earlier ones
+        self.unflown: dict[str, Point] = {}  # [m] ENU, by task; skipped by another station
+        self.reported: set[str] = set()  # flown and reported by the previous run
+        # checksum of the mission and current item, as recorded by the previous run
+        self.recorded: tuple[int | None, int | None] = None, None
+        self.current_unreliable = False  # items before the current one may be unflown
         self._rebooted = False
         self.reset()
 
     def rebooted(self) -> None:
-        """Its current item says nothing of what it has flown before."""
+        """Reset after a restart of the vehicle, whose current item starts at the first."""
         self.reset()
         self._rebooted = True
 
     def reset(self) -> None:
-        """Its place is to be found again: it was restarted, or is another one."""
-        self.placed = False
-        self._old: tuple[Item, ...] = ()  # behind already when the bridge before was there
-        self._epoch, self._placed_at = -1, 0  # in which it was placed, and where
+        """Forget the location: the vehicle was restarted, or is another one."""
+        self.located = False
+        self._old: tuple[Item, ...] = ()  # flown in the previous run
+        self._epoch, self._located_at = -1, 0  # epoch and seq of the location
         self._until = -math.inf  # [s]
-        self._flown: tuple[Item, ...] = ()  # under missions that are not on board any more
+        self._flown: tuple[Item, ...] = ()  # of missions that were replaced
 
-    def place(self, held: tuple[Item, ...], tasks: TaskList, now: float) -> None:
-        """Find, once, where in its mission the vehicle is."""
+    def locate(self, held: tuple[Item, ...], tasks: TaskList, now: float) -> None:
+        """Locate the vehicle in its onboard mission, once.
+
+        Args:
+            held: the items on board, without home.
+            tasks: the present list.
+            now: steady time [s].
+        """
         telemetry = self._telemetry
-        if self.placed or not held or telemetry.current is None:
-            self.placed = self.placed or not held
+        if self.located or not held or telemetry.current is None:
+            self.located = self.located or not held
             return
-        self.placed = True
-        if self.doubtful or (
+        self.located = True
+        if self.current_unreliable or (
                 not self._profile.atomic and telemetry.mode is not ModeFunction.MISSION):
-            self._progress.begin(held, None, now)  # held for a swap: current is of the old items
+            self._progress.begin(held, None, now)  # the current item may be of the old mission
             return
-        # not by REACHED: PX4 repeats that of the mission before for some seconds
+        # not by REACHED: PX4 repeats that of the previous mission for some seconds
         current = min(max(0, telemetry.current - self._profile.rules.home_first), len(held))
-        if not self._profile.atomic and self._progress.items:  # REACHED came before CURRENT
+        if not self._profile.atomic and self._progress.items:  # REACHED was received first
             current = max(current, self._progress.current or 0)
         flown = len(held) if self._ended(held, current) else current
         self._progress.begin(held, flown, now, read=True)
-        self._epoch, self._placed_at = self._progress.epoch, flown
-        # what lies before that the bridge before has told of, or knew to be passed over
-        same = self.known[0] == checksum(held)
-        self._old = held[:self.known[1] or 0] if same else ()
-        # on the ground, and the first list ever: what is on board is of an earlier mission
+        self._epoch, self._located_at = self._progress.epoch, flown
+        # the previous run has reported the items before that, or knew that they were skipped
+        same = self.recorded[0] == checksum(held)
+        self._old = held[:self.recorded[1] or 0] if same else ()
+        # on the ground with the first list: the onboard mission is of an earlier flight
         if not self._rebooted and (telemetry.airborne or tasks.revision > 1):
-            self._until = now + MEMORY
+            self._until = now + MAX_AGE
 
-    def stash(self) -> None:
-        """Another mission goes on board: keep what was flown of this one."""
-        self._flown += self._behind()
+    def keep_flown(self) -> None:
+        """Keep the flown items of this mission before it is replaced."""
+        self._flown += self._flown_here()
 
-    def memory(self, now: float) -> tuple[Item, ...]:
-        """Items flown that nobody has told of."""
-        return (*self._flown, *self._behind()) if now < self._until else ()
+    def flown_items(self, now: float) -> tuple[Item, ...]:
+        """Flown items that were not reported; none after MAX_AGE."""
+        return (*self._flown, *self._flown_here()) if now < self._until else ()
 
-    def flown(self, tasks: Iterable[Task], now: float) -> tuple[Task, ...]:
-        """Those of the tasks that are flown already."""
-        memory = self.memory(now)
-        if not memory:
+    def flown_tasks(self, tasks: Iterable[Task], now: float) -> tuple[Task, ...]:
+        """The given tasks that are among the flown items."""
+        flown = self.flown_items(now)
+        if not flown:
             return ()
         stops = tuple(MissionStop(task) for task in tasks)
         items = mission_items(TaskList(0, stops), self._profile.rules, self._origin)
         return tuple(stop.task for stop, item in zip(stops, items, strict=True)
-                     if any(alike(item, m) and (stop.task.id in self.reported or not any(
-                         m is old for old in self._old)) for m in memory)
+                     if any(alike(item, other) and (stop.task.id in self.reported or not any(
+                         other is old for old in self._old)) for other in flown)
                      and self.unflown.get(stop.task.id) != stop.task.position)
 
-    def _behind(self) -> tuple[Item, ...]:
+    def _flown_here(self) -> tuple[Item, ...]:
+        """Flown items of the onboard mission that belong to no task of the list."""
         progress = self._progress
         if progress.epoch != self._epoch:
-            return ()  # read again: what is behind may be of a transfer that broke off
+            return ()  # read again: earlier items may be of an interrupted transfer
         return tuple(item for n, item in enumerate(progress.items[:progress.current or 0])
                      if not item.task and item.position is None
-                     and (n < self._placed_at or n in progress.reached_seqs))
+                     and (n < self._located_at or n in progress.reached_seqs))
 
     def _ended(self, held: tuple[Item, ...], current: int) -> bool:
         telemetry, last = self._telemetry, held[-1]
         if telemetry.mission_state == d.MISSION_STATE_COMPLETE and not self._profile.atomic:
-            return True  # PX4 says so after a take-off and a landing too
-        place = to_enu(self._origin, last.x * 1e-7, last.y * 1e-7, last.z)
+            return True  # PX4 reports it after a take-off and a landing too
+        end = to_enu(self._origin, last.x * 1e-7, last.y * 1e-7, last.z)
         return (
             self._profile.atomic
             and telemetry.airborne
             and telemetry.mode is ModeFunction.HOLD
             and current == len(held) - 1
-            and math.dist(telemetry.position, place) < last.params[1] + _NEAR
+            and math.dist(telemetry.position, end) < last.params[1] + _NEAR
         )

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a vehicle says in STATUSTEXT, as notes: the same words once a minute."""
+"""Log notes of STATUSTEXT messages, each text at most once a minute."""
 from __future__ import annotations
 
 import math
@@ -10,25 +10,27 @@ from pymavlink.dialects.v20 import ardupilotmega as d
 from uav_task_alloc.mavlink.transport.codec import Message
 from uav_task_alloc.mavlink.transport.notes import OperatorNote
 
-TEXT_AGAIN = 60.0  # [s] in which the same words of a vehicle are told once
-_MOST_TEXTS = 200  # different words in that time
-SAYS_NOTHING = re.compile(r'Auto mission changed, restarted command')  # once for each item
+_REPEAT_AFTER = 60.0  # [s] in which the same text is logged once
+_MAX_TEXTS = 200  # different texts in that time
+_HARMLESS = re.compile(r'Auto mission changed, restarted command')  # CRITICAL, for each item
 
 
 class StatusTextLog:
-    """The words of one vehicle, and when they were told."""
+    """The texts of one vehicle; `last` is the latest one."""
 
     def __init__(self) -> None:
         self.last = ''
-        self._told: dict[str, float] = {}  # when [s]
+        self._logged_at: dict[str, float] = {}  # [s] by text
 
-    def take(self, message: Message, now: float) -> OperatorNote | None:
-        """A STATUSTEXT; returns what a human should read, None where it was told lately."""
+    def receive(self, message: Message, now: float) -> OperatorNote | None:
+        """Process a STATUSTEXT; returns a note, None if it was logged lately."""
         text = self.last = str(message.text)
-        if len(self._told) >= _MOST_TEXTS:
-            self._told = {old: at for old, at in self._told.items() if now - at < TEXT_AGAIN}
-        if now - self._told.get(text, -math.inf) < TEXT_AGAIN or len(self._told) >= _MOST_TEXTS:
+        logged_at = self._logged_at
+        if len(logged_at) >= _MAX_TEXTS:
+            logged_at = self._logged_at = {
+                old: at for old, at in logged_at.items() if now - at < _REPEAT_AFTER}
+        if now - logged_at.get(text, -math.inf) < _REPEAT_AFTER or len(logged_at) >= _MAX_TEXTS:
             return None
-        self._told[text] = now
-        serious = message.severity < d.MAV_SEVERITY_WARNING and not SAYS_NOTHING.search(text)
+        logged_at[text] = now
+        serious = message.severity < d.MAV_SEVERITY_WARNING and not _HARMLESS.search(text)
         return OperatorNote('error' if serious else 'info', text)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tasks begun, completed, failed or passed over on board, as events; marked for a restart."""
+"""Task events and notes from the progress of the onboard mission; marks for a restart."""
 from __future__ import annotations
 
 from uav_task_alloc.mavlink.gcs.authority_watch import AuthorityWatch
@@ -9,15 +9,15 @@ from uav_task_alloc.mavlink.transport.notes import OperatorNote
 
 
 def task_events(onboard: OnboardMission, watch: AuthorityWatch, now: float) -> list[TaskProgress]:
-    """What became of tasks since the last call; each that is completed is marked in the record."""
+    """Events of tasks since the last call; completed ones are marked in the authority record."""
     events, progress, revision = [], onboard.progress, onboard.revision
     while progress.events:
-        made = progress.events.popleft()
-        event = 'COMPLETED' if made.completed else 'STARTED'
-        latest = onboard.tasks.revision if made.while_offline and onboard.tasks else revision
-        if made.completed:
-            watch.mark_task(made.task, progress.completed.get(made.task), True, now)
-        events.append(TaskProgress(made.task, event, latest))
+        event = progress.events.popleft()
+        kind = 'COMPLETED' if event.completed else 'STARTED'
+        latest = onboard.tasks.revision if event.while_offline and onboard.tasks else revision
+        if event.completed:
+            watch.mark_task(event.task, progress.completed.get(event.task), True, now)
+        events.append(TaskProgress(event.task, kind, latest))
     while onboard.failed:
         failed = onboard.failed.popleft()
         events.append(TaskProgress(failed.task, 'FAILED', failed.revision, failed.reason))
@@ -25,7 +25,7 @@ def task_events(onboard: OnboardMission, watch: AuthorityWatch, now: float) -> l
 
 
 def passed_over(onboard: OnboardMission, watch: AuthorityWatch, now: float) -> list[OperatorNote]:
-    """Notes of tasks passed over since the last call; what was left is marked in the record."""
+    """Notes on tasks skipped by another station; unflown ones are marked in the record."""
     progress, notes = onboard.progress, []
     while progress.passed_over:
         item = progress.passed_over.popleft()
@@ -33,6 +33,6 @@ def passed_over(onboard: OnboardMission, watch: AuthorityWatch, now: float) -> l
             watch.mark_task(item.task, item.position, False, now)
     while progress.skipped:
         task = progress.skipped.popleft()
-        notes.append(OperatorNote('warning', f'{task} was passed over, not by the bridge: '
+        notes.append(OperatorNote('warning', f'{task} was skipped, not by the bridge: '
                           'it is still to be flown'))
     return notes

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What one vehicle has told of itself: where, which mode, how alive, how often restarted."""
+"""The telemetry of one vehicle: position, mode, battery, link, restarts."""
 from __future__ import annotations
 
 import math
@@ -13,26 +13,26 @@ from uav_task_alloc.mavlink.transport.codec import Message, plan_id
 from uav_task_alloc.mavlink.transport.frame_log import FrameLog
 from uav_task_alloc.model import Point
 
-STALE, LOST = 3.0, 10.0  # [s] of silence
-QUIET, STEADY = 2.0, 10.0  # [s] a link without such a silence for so long is good
-ORDERED = 5.0  # [s] in which the sequence numbers of frames tell which is older
-REPORTED = 3.0  # [s] in which a vehicle says whether it has a position, if it ever does
-OFF = 10.0  # [s] a battery that says nothing is not there
-RISE = 0.03  # [0..1] by which a battery reading has to rise to be believed
-BACKWARDS = 2000  # [ms] by which time_boot_ms goes back at a restart, not by a late packet
-LATEST = 6.0  # [s] by which a message may be late
-PACE_OVER = 0.3  # [s] over which a pace is measured
-# message -> rate asked for [Hz]
+STALE, LOST = 3.0, 10.0  # [s] without a message
+_QUIET, _STEADY = 2.0, 10.0  # [s] a link is good with no gap of _QUIET for _STEADY
+_ORDERED = 5.0  # [s] in which sequence numbers order two frames
+_REPORTED = 3.0  # [s] until a vehicle without estimator or GPS reports is trusted
+_BATTERY_TIMEOUT = 10.0  # [s] without a report: the battery does not count
+_BATTERY_RISE = 0.03  # [0..1] smallest accepted rise of a battery reading
+_RESTART_STEP = 2000  # [ms] decrease of time_boot_ms that shows a restart, not a late message
+_MAX_DELAY = 6.0  # [s] of a late message
+_PACE_OVER = 0.3  # [s] between two positions that measure the pace
+# requested rate [Hz] by message id
 RATES = {
     d.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: 5.0, d.MAVLINK_MSG_ID_MISSION_CURRENT: 2.0,
     d.MAVLINK_MSG_ID_BATTERY_STATUS: 1.0, d.MAVLINK_MSG_ID_SYS_STATUS: 1.0,
     d.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: 1.0, d.MAVLINK_MSG_ID_HOME_POSITION: 0.2,
     d.MAVLINK_MSG_ID_GPS_RAW_INT: 1.0,
 }
-# the report of its position estimate, by HEARTBEAT.autopilot
+# id of the estimator report by HEARTBEAT.autopilot
 ESTIMATE = {d.MAV_AUTOPILOT_ARDUPILOTMEGA: d.MAVLINK_MSG_ID_EKF_STATUS_REPORT,
             d.MAV_AUTOPILOT_PX4: d.MAVLINK_MSG_ID_ESTIMATOR_STATUS}
-# what an older frame must not overwrite; REACHED, texts and the mission service are events
+# types that report a state: an older frame is ignored; all others are events
 _STATES = frozenset({'HEARTBEAT', 'GLOBAL_POSITION_INT', 'HOME_POSITION', 'BATTERY_STATUS',
                     'SYS_STATUS', 'EXTENDED_SYS_STATE', 'MISSION_CURRENT', 'GPS_RAW_INT',
                     'EKF_STATUS_REPORT', 'ESTIMATOR_STATUS'})
@@ -45,16 +45,22 @@ UNKNOWN: Point = (math.nan, math.nan, math.nan)
 
 
 class Telemetry:
-    """The latest of each; NaN or None where nothing was heard."""
+    """The latest state of one vehicle; NaN or None where none was received.
+
+    Args:
+        profile: of its autopilot.
+        origin: of the local ENU frame.
+        now: steady time [s], as in all methods.
+    """
 
     def __init__(self, profile: Profile, origin: Origin, now: float) -> None:
         self._profile, self._origin = profile, origin
-        self.received_at = now  # [s] any message
+        self.received_at = now  # [s] of the latest message
         self.position, self.velocity = UNKNOWN, UNKNOWN  # ENU [m], [m/s]
         self.home: Point | None = None  # ENU [m]
         self.position_at = -math.inf  # [s]
-        self.positions_at = -math.inf  # [s] any GLOBAL_POSITION_INT, also one that says nothing
-        self.pace = 0.0  # [m/s] between positions as they come: a simulator may run faster
+        self.positions_at = -math.inf  # [s] of any GLOBAL_POSITION_INT, valid or not
+        self.pace = 0.0  # [m/s] in time of reception: a simulator may run faster than real time
         self._paced: tuple[Point, float] = UNKNOWN, now
         self.height = math.nan  # [m] above home
         self.altitude = math.nan  # [m] AMSL
@@ -64,28 +70,28 @@ class Telemetry:
         self.landed = d.MAV_LANDED_STATE_UNDEFINED
         self.status = 0  # MAV_STATE
         self.autopilot = 0  # MAV_AUTOPILOT
-        self.unhealthy = ''  # why it says that it would not arm; '': it does not say so
-        self.current: int | None = None  # seq as on the wire
+        self.unhealthy = ''  # failing prearm checks, in words; '': none reported
+        self.current: int | None = None  # seq on the wire
         self.current_at = -math.inf  # [s]
-        self.reached: int | None = None  # seq, as last told
-        self.total: int | None = None  # items as the vehicle counts them
+        self.reached: int | None = None  # seq on the wire, latest
+        self.total: int | None = None  # number of items as the vehicle reports it
         self.mission_state = 0  # MISSION_STATE
-        self.plan_id = 0  # PX4's id of the mission on board
+        self.plan_id = 0  # PX4's id of the onboard mission
         self.received_ids: set[int] = set()  # message ids since the start
         self.received_last: dict[int, float] = {}  # [s] by message id
         self.restarts = 0
-        self.boot_ms = self._boot_doubt = 0  # [ms] its clock
+        self.boot_ms = self._older_clocks = 0  # [ms] time_boot_ms; messages in a row before it
         self._boot_at = now
-        self._gap_at = -math.inf  # [s] the last silence of more than QUIET ended
+        self._gap_at = -math.inf  # [s] end of the latest gap of _QUIET
         self.frames = FrameLog()
-        self.frame = 0  # the number of the last frame
-        self._newest: dict[str, tuple[int, float]] = {}  # sequence number, when [s], by type
-        self._first_at: float | None = None  # [s] the first position that is one
+        self.frame = 0  # frame number of the latest message
+        self._newest: dict[str, tuple[int, float]] = {}  # sequence number and time [s] by type
+        self._first_at: float | None = None  # [s] of the first position
         self._fix = self._estimates = False
-        self._started = False  # its boot has ended
-        self.has_position = False  # its estimator, or its GPS, vouches for what it tells
-        self._batteries: dict[int, tuple[float, float]] = {}  # remaining, when [s], by id
-        self._takes: dict[str, Callable[[Message, float], None]] = {
+        self._started = False  # it has finished booting
+        self.has_position = False  # valid by its estimator or its GPS
+        self._batteries: dict[int, tuple[float, float]] = {}  # remaining 0..1 and time [s] by id
+        self._handlers: dict[str, Callable[[Message, float], None]] = {
             'HEARTBEAT': self._heartbeat, 'GLOBAL_POSITION_INT': self._global_position,
             'HOME_POSITION': self._home, 'BATTERY_STATUS': self._battery,
             'SYS_STATUS': self._sys_status, 'EXTENDED_SYS_STATE': self._extended,
@@ -94,24 +100,25 @@ class Telemetry:
             'ESTIMATOR_STATUS': self._estimate}
 
     @property
-    def high(self) -> bool:
-        """Off the ground, as far as its position and its landing detector tell."""
+    def off_ground(self) -> bool:
+        """Off the ground, by its height or its landed state."""
         return self.height > OFF_GROUND or self.landed in (
             d.MAV_LANDED_STATE_IN_AIR, d.MAV_LANDED_STATE_TAKEOFF, d.MAV_LANDED_STATE_LANDING)
 
     @property
     def airborne(self) -> bool:
-        """Armed and off the ground, as far as it tells."""
-        return self.armed and self.high
+        """Armed and off the ground."""
+        return self.armed and self.off_ground
 
     @property
     def grounded(self) -> bool:
-        """Known to be on the ground; neither this nor airborne where it has not said so."""
+        """Known to be on the ground; both this and `airborne` are False if it is unknown."""
         return not self.armed or (self.landed == d.MAV_LANDED_STATE_ON_GROUND
                                   and not self.height > OFF_GROUND)
 
     @property
     def has_velocity(self) -> bool:
+        """Whether a velocity was received."""
         return not math.isnan(self.velocity[0])
 
     @property
@@ -121,26 +128,29 @@ class Telemetry:
 
     @property
     def past_boot(self) -> bool:
-        """The autopilot has started: its mission store is open. Others tell no such state."""
+        """Whether the autopilot has booted, so that its mission store is available."""
         return self.autopilot not in ESTIMATE or self._started
 
     @property
     def faulty(self) -> bool:
+        """Whether it reports MAV_STATE_CRITICAL or worse."""
         return bool(self.status >= d.MAV_STATE_CRITICAL)
 
     def stale(self, now: float) -> bool:
+        """Whether no message was received for STALE."""
         return now - self.received_at > STALE
 
     def lost(self, now: float) -> bool:
+        """Whether no message was received for LOST."""
         return now - self.received_at > LOST
 
     def good_link(self, now: float) -> bool:
-        """No silence of more than 2 s within the last 10 s."""
-        return now - self.received_at <= QUIET and now - self._gap_at >= STEADY
+        """Whether the last 10 s had no gap of more than 2 s."""
+        return now - self.received_at <= _QUIET and now - self._gap_at >= _STEADY
 
     def receive(self, message: Message, now: float) -> bool:
-        """Take any message of this vehicle; False where a newer one of its kind came before."""
-        if now - self.received_at > QUIET:
+        """Process a message of this vehicle; False if a newer one of its type was received."""
+        if now - self.received_at > _QUIET:
             self._gap_at = now
         self.received_at = now
         self.frames.note_all((seq for system, seq in getattr(message, 'skipped', ())
@@ -153,14 +163,14 @@ class Telemetry:
             self._clock(boot, now)
         if message.get_type() in _STATES and not self._is_newest(message, now):
             return False
-        take = self._takes.get(message.get_type())
-        if take:
-            take(message, now)
+        handler = self._handlers.get(message.get_type())
+        if handler:
+            handler(message, now)
         return True
 
     def restart(self, boot_ms: int = 0) -> None:
-        """It begins anew, or it is another one: nothing that was heard holds any more."""
-        self.boot_ms, self._boot_doubt = boot_ms, 0
+        """Reset after a restart, or when another vehicle uses its system id."""
+        self.boot_ms, self._older_clocks = boot_ms, 0
         self.restarts += 1
         self.received_ids = set()
         self.received_last.clear()
@@ -177,25 +187,26 @@ class Telemetry:
         """By the sequence number of its frame: links may deliver out of order."""
         kind = message.get_type() + str(getattr(message, 'id', ''))
         seq = message.get_seq()
-        newest, when = self._newest.get(kind, (seq, now))
-        if now - when < ORDERED and (seq - newest) % 256 > 128:
+        newest, received_at = self._newest.get(kind, (seq, now))
+        if now - received_at < _ORDERED and (seq - newest) % 256 > 128:
             return False
         self._newest[kind] = seq, now
         return True
 
     def _clock(self, boot_ms: int, now: float) -> None:
-        """One message with an older clock may be late; two in a row are a restart.
+        """Detect a restart: two messages in a row with an older clock, as one may be late.
 
-        Where late messages may be as old as that, none that is on time must come for a while.
+        If late messages may be as old as that, no message on time may follow for a while.
         """
-        silence = now - self._boot_at  # in which a running clock goes on
-        least = self.boot_ms - BACKWARDS + 500.0 * silence
+        silence = now - self._boot_at  # a running clock advances by that
+        least = self.boot_ms - _RESTART_STEP + 500.0 * silence
         if boot_ms >= least:
-            self.boot_ms, self._boot_doubt = max(boot_ms, self.boot_ms), 0
+            self.boot_ms, self._older_clocks = max(boot_ms, self.boot_ms), 0
             self._boot_at = now
             return
-        self._boot_doubt += 1
-        if self._boot_doubt >= 2 and (boot_ms < least - 1000.0 * LATEST or silence > LATEST):
+        self._older_clocks += 1
+        if self._older_clocks >= 2 and (
+                boot_ms < least - 1000.0 * _MAX_DELAY or silence > _MAX_DELAY):
             self._boot_at = now
             self.restart(boot_ms)
 
@@ -203,41 +214,41 @@ class Telemetry:
         self.armed = bool(message.base_mode & d.MAV_MODE_FLAG_SAFETY_ARMED)
         self.mode = self._profile.mode_function(message.custom_mode)
         if message.system_status == d.MAV_STATE_BOOT and self._started:
-            self.restart()  # its clock will be heard later
+            self.restart()  # its clock is received later
         self.status, self.autopilot = message.system_status, message.autopilot
-        # PX4 says UNINIT later as well, whenever its preflight checks fail
+        # PX4 reports UNINIT later as well, when its preflight checks fail
         self._started = self._started or self.status >= d.MAV_STATE_STANDBY
 
     def _global_position(self, message: Message, now: float) -> None:
         self.positions_at = now
-        self.has_position = (message.lat, message.lon) != (0, 0) and self._vouched(now)
+        self.has_position = (message.lat, message.lon) != (0, 0) and self._is_valid(now)
         if not self.has_position:
             return
         self.altitude = message.alt * 1e-3
-        self.position, self.velocity = self.place_of(message)
+        self.position, self.velocity = self.enu_of(message)
         self.position_at = now
-        since, when = self._paced
-        if now - when >= PACE_OVER:
-            moved = math.dist(self.position, since)
-            self.pace = 0.0 if math.isnan(moved) else moved / (now - when)
+        start, start_at = self._paced
+        if now - start_at >= _PACE_OVER:
+            moved = math.dist(self.position, start)
+            self.pace = 0.0 if math.isnan(moved) else moved / (now - start_at)
             self._paced = self.position, now
         self.height = message.relative_alt * 1e-3
 
-    def place_of(self, message: Message) -> tuple[Point, Point]:
-        """Position [m] and velocity [m/s] in ENU of a GLOBAL_POSITION_INT."""
-        place = to_enu(self._origin, message.lat * 1e-7, message.lon * 1e-7, message.alt * 1e-3)
+    def enu_of(self, message: Message) -> tuple[Point, Point]:
+        """Position [m] and velocity [m/s], both ENU, of a GLOBAL_POSITION_INT."""
+        position = to_enu(self._origin, message.lat * 1e-7, message.lon * 1e-7, message.alt * 1e-3)
         # north, east, down [cm/s]; local axes turn by less than 0.1 degrees in 5 km
-        return place, (message.vy * 0.01, message.vx * 0.01, -message.vz * 0.01)
+        return position, (message.vy * 0.01, message.vx * 0.01, -message.vz * 0.01)
 
-    def _vouched(self, now: float) -> bool:
-        """An estimator that says yes, else a GPS fix; a vehicle that tells neither is believed."""
+    def _is_valid(self, now: float) -> bool:
+        """Valid by its estimator, else by a GPS fix; trusted after _REPORTED without either."""
         if self._first_at is None:
             self._first_at = now
         if ESTIMATE.get(self.autopilot) in self.received_ids:
             return self._estimates
         if d.MAVLINK_MSG_ID_GPS_RAW_INT in self.received_ids:
             return self._fix
-        return now - self._first_at >= REPORTED
+        return now - self._first_at >= _REPORTED
 
     def _gps(self, message: Message, now: float) -> None:
         self._fix = message.fix_type >= d.GPS_FIX_TYPE_3D_FIX
@@ -256,15 +267,17 @@ class Telemetry:
             self._least_battery(now)
 
     def _least_battery(self, now: float) -> None:
-        """The battery with least remaining decides; a reading that hardly rises does not."""
-        least = min(value for value, when in self._batteries.values() if now - when < OFF)
-        if math.isnan(self.battery) or least < self.battery or least > self.battery + RISE:
+        """Use the battery with least remaining; a rise below _BATTERY_RISE is noise."""
+        least = min(value for value, at in self._batteries.values()
+                    if now - at < _BATTERY_TIMEOUT)
+        before = self.battery
+        if math.isnan(before) or least < before or least > before + _BATTERY_RISE:
             self.battery = least
 
     def _sys_status(self, message: Message, now: float) -> None:
         self.unhealthy = unhealthy(message)
         if message.battery_remaining >= 0 and not any(
-                now - when < OFF for _, when in self._batteries.values()):
+                now - at < _BATTERY_TIMEOUT for _, at in self._batteries.values()):
             self.battery = message.battery_remaining / 100.0
 
     def _extended(self, message: Message, now: float) -> None:
@@ -281,16 +294,16 @@ class Telemetry:
 
 
 def unhealthy(message: Message) -> str:
-    """What a SYS_STATUS says against arming: 'preflight checks fail', and which sensors.
+    """Failing prearm checks of a SYS_STATUS, in words with the unhealthy sensors; '': none.
 
-    PX4 sets the health bit of the check and never its present and enabled bits.
+    PX4 sets the health bit of the prearm check, and never its present and enabled bits.
     """
     prearm = d.MAV_SYS_STATUS_PREARM_CHECK
     if message.onboard_control_sensors_health & prearm:
         return ''
-    bad = (message.onboard_control_sensors_present & message.onboard_control_sensors_enabled
-           & ~message.onboard_control_sensors_health & ~prearm)
+    failing = (message.onboard_control_sensors_present & message.onboard_control_sensors_enabled
+               & ~message.onboard_control_sensors_health & ~prearm)
     names = [entry.name.removeprefix('MAV_SYS_STATUS_').removeprefix('SENSOR_').lower()
              for bit, entry in d.enums['MAV_SYS_STATUS_SENSOR'].items()
-             if bit & bad and bit & (bit - 1) == 0]
+             if bit & failing and bit & (bit - 1) == 0]
     return 'preflight checks fail' + (f' ({", ".join(names)})' if names else '')

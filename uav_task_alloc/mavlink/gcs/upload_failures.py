@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What follows from an upload that the vehicle did not take: fewer tasks, or a task refused."""
+"""Handles failed uploads: a shorter horizon, a refused task, or another attempt."""
 from __future__ import annotations
 
 from collections import deque
 
-from pymavlink.dialects.v20 import ardupilotmega as dialect
+from pymavlink.dialects.v20 import ardupilotmega as d
 
 from uav_task_alloc.mavlink.mission.diff import MissionDiff
 from uav_task_alloc.mavlink.mission.items import TaskList
@@ -12,50 +12,50 @@ from uav_task_alloc.mavlink.mission.outcomes import Failed
 from uav_task_alloc.mavlink.mission.wanted_mission import WantedMission
 from uav_task_alloc.mavlink.transport.notes import OperatorNote
 
-RESTART = 6.0  # [s] after a mission was called infeasible in which a restart may show
+_RESTART_DELAY = 6.0  # [s] in which a restart of the vehicle may explain an infeasible mission
 
 
 class UploadFailures:
-    """Refuses tasks of the list, at once or once the vehicle was seen not to have restarted."""
+    """Refuses tasks of the list, at once, or once a restart of the vehicle is ruled out."""
 
     def __init__(self, wanted: WantedMission, own: int, notes: deque[OperatorNote]) -> None:
         self._list, self._own, self._notes = wanted, own, notes
-        self._infeasible: tuple[float, list[str], str, TaskList] | None = None  # to be told at [s]
+        self._infeasible: tuple[float, list[str], str, TaskList] | None = None  # from time [s] on
 
     def step(self, now: float) -> None:
-        """Refuse what was infeasible a while ago."""
+        """Refuse the tasks of an infeasible mission when the delay is over."""
         if self._infeasible is not None and now >= self._infeasible[0]:
-            _, stops, reason, asked = self._infeasible
+            _, stops, reason, tasks = self._infeasible
             self._infeasible = None
             for task in stops:
-                self._list.refuse(task, reason, asked)
+                self._list.refuse(task, reason, tasks)
 
     def clear(self) -> None:
-        """The vehicle was restarted."""
+        """Cancel a pending refusal: the vehicle was restarted."""
         self._infeasible = None
 
-    def take(self, event: Failed, found: MissionDiff, tasks: TaskList, now: float) -> bool:
-        """An upload has failed.
+    def take(self, event: Failed, diff: MissionDiff, tasks: TaskList, now: float) -> bool:
+        """Process the failure of an upload.
 
         Args:
-            event: how.
-            found: what was uploaded.
-            tasks: the list that it was for.
-            now: [s].
+            event: the failure.
+            diff: the uploaded mission.
+            tasks: its list.
+            now: steady time [s].
 
         Returns:
-            Whether the same is still to be tried, so that somebody decides when.
+            Whether the same upload is to be tried again.
         """
         self._notes.append(OperatorNote('error', f'mission upload failed: {event.reason}'))
-        stops = [item.task for item in found.items if item.completes]
-        if event.result == dialect.MAV_MISSION_NO_SPACE:
+        stops = [item.task for item in diff.items if item.completes]
+        if event.result == d.MAV_MISSION_NO_SPACE:
             self._notes.append(OperatorNote('warning', self._list.horizon.shrink(len(stops))))
             return self._list.horizon.stops is None
         if event.result is not None:
-            seq = min(max((event.seq or 0) - self._own, 0), len(found.items) - 1)
-            task = next((i.task for i in found.items[seq:] if i.task), stops[0] if stops else '')
+            seq = min(max((event.seq or 0) - self._own, 0), len(diff.items) - 1)
+            task = next((i.task for i in diff.items[seq:] if i.task), stops[0] if stops else '')
             self._list.refuse(task, event.reason, tasks)
             return not task
-        if 'infeasible' in event.reason:  # or it was just restarted, as its clock will tell
-            self._infeasible = now + RESTART, stops, event.reason, tasks
+        if 'infeasible' in event.reason:  # or it was restarted, which its clock shows later
+            self._infeasible = now + _RESTART_DELAY, stops, event.reason, tasks
         return True
