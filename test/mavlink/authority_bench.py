@@ -22,13 +22,17 @@ BOTH = pytest.mark.parametrize('kind', ['ardupilot', 'px4'])
 ARDUPILOT = pytest.mark.parametrize('kind', ['ardupilot'])
 PX4 = pytest.mark.parametrize('kind', ['px4'])
 MODES = {
-    'ardupilot': SimpleNamespace(mission=3, hold=4, stick=5, rtl=6, land=9, own=17,
-                                 names={3: 'AUTO', 4: 'GUIDED', 5: 'LOITER', 6: 'RTL'}),
+    'ardupilot': SimpleNamespace(
+        mission=d.COPTER_MODE_AUTO, hold=d.COPTER_MODE_GUIDED, stick=d.COPTER_MODE_LOITER,
+        rtl=d.COPTER_MODE_RTL, land=d.COPTER_MODE_LAND, own=d.COPTER_MODE_BRAKE,
+        names={d.COPTER_MODE_AUTO: 'AUTO', d.COPTER_MODE_GUIDED: 'GUIDED',
+               d.COPTER_MODE_LOITER: 'LOITER', d.COPTER_MODE_RTL: 'RTL'}),
     'px4': SimpleNamespace(
         mission=px4_mode(4, 4), hold=px4_mode(4, 3), stick=px4_mode(3), rtl=px4_mode(4, 5),
         land=px4_mode(4, 6), own=px4_mode(6),
         names={px4_mode(4, 4): 'Mission', px4_mode(4, 3): 'Hold', px4_mode(3): 'Position',
                px4_mode(4, 5): 'Return'})}
+COPTER = MODES['ardupilot']
 LONG = 'ABCDEFGHIJKLMNOPQRSTUVWXY'  # more than two minutes
 _READS = {'MISSION_REQUEST_LIST', 'MISSION_REQUEST_INT', 'MISSION_REQUEST'}
 _UPLOADS = {'MISSION_COUNT', 'MISSION_ITEM_INT'}
@@ -270,7 +274,7 @@ def sends_no_command(bench, seconds=60.0, names='XYZ', n=1):
     return True
 
 
-__all__ = ['ARDUPILOT', 'BOTH', 'LONG', 'MODES', 'PX4', 'AuthorityBench', 'H', 'L', 'N', 'S',
-           'Store', 'armed_by_us', 'delay_one_command', 'flown_up_by_pilot', 'flying',
+__all__ = ['ARDUPILOT', 'BOTH', 'COPTER', 'LONG', 'MODES', 'PX4', 'AuthorityBench', 'H', 'L',
+           'N', 'S', 'Store', 'armed_by_us', 'delay_one_command', 'flown_up_by_pilot', 'flying',
            'in_flight', 'is_command', 'lose_command', 'lost', 'on_ground', 'sends_no_command',
            'set_mode', 'status_is', 'suspended', 'upload_by_another']

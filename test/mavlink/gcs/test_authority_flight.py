@@ -26,7 +26,10 @@ from uav_task_alloc.sim.modes import COPTER_MODES, PX4_MODES, px4_mode
 
 STICKS = [('ardupilot', n) for n, m in COPTER_MODES.items() if m.stick] + [
     ('px4', n) for n, m in PX4_MODES.items() if m.stick]
-OWN = [('ardupilot', n) for n in (6, 7, 9, 17, 20, 21, 23, 27)] + [
+OWN = [('ardupilot', n) for n in (
+    d.COPTER_MODE_RTL, d.COPTER_MODE_CIRCLE, d.COPTER_MODE_LAND, d.COPTER_MODE_BRAKE,
+    d.COPTER_MODE_GUIDED_NOGPS, d.COPTER_MODE_SMART_RTL, d.COPTER_MODE_FOLLOW,
+    d.COPTER_MODE_AUTO_RTL)] + [
     ('px4', px4_mode(*n)) for n in ((4, 1), (4, 2), (4, 5), (4, 6), (4, 8), (4, 9), (4, 10), (6,),
                                     (10,))]
 TO_HOLD = [(kind, MODES[kind].hold) for kind in MODES]

@@ -22,6 +22,7 @@ from authority_bench import (
     upload_by_another,
 )
 from mission_bench import drop, task_list
+from pymavlink.dialects.v20 import ardupilotmega as d
 
 from uav_task_alloc.mavlink.gcs.authority import Suspension
 from uav_task_alloc.mavlink.gcs.onboard_mission import MissionState
@@ -72,7 +73,7 @@ def test_a_hold_that_is_not_at_rest_is_no_hand_over(kind, state, disturbance):
 @ARDUPILOT
 def test_on_the_ground_a_change_from_a_stick_mode_to_hold_changes_nothing(kind):
     bench = on_ground(kind, H)
-    assert bench.vehicles[1].flight.custom_mode == 0
+    assert bench.vehicles[1].flight.custom_mode == d.COPTER_MODE_STABILIZE
     bench.from_station(set_mode(MODES[kind].hold, kind))
     bench.run(limit=10.0)
     assert status_is(bench, H, 'takeoff is true')

@@ -4,6 +4,7 @@ import pytest
 from authority_bench import (
     ARDUPILOT,
     BOTH,
+    COPTER,
     AuthorityBench,
     H,
     L,
@@ -197,7 +198,7 @@ def unknown(**kwargs):
 def test_an_unknown_autopilot_is_held_by_takeoff_whatever_its_modes(kind):
     bench = unknown()
     assert bench.reaches(H)
-    for mode in (5, 4, 3, 6, 17, 0):
+    for mode in (COPTER.stick, COPTER.hold, COPTER.mission, COPTER.rtl, COPTER.own, 0):
         bench.vehicles[1].rc_mode(mode)
         bench.run(limit=8.0)
         assert status_is(bench, H)
@@ -207,19 +208,19 @@ def test_an_unknown_autopilot_is_held_by_takeoff_whatever_its_modes(kind):
 def test_an_unknown_autopilot_is_held_by_a_hand_over_and_never_by_a_mode(kind):
     bench = unknown(takeoff=False)
     vehicle = bench.vehicles[1]
-    vehicle.rc_mode(5)
+    vehicle.rc_mode(COPTER.stick)
     vehicle.rc_arm(True)
     vehicle.rc_stick((0.0, 0.0, 3.0))
     bench.run(limit=12.0)
     vehicle.rc_stick(None)
-    for mode in (4, 3, 5, 4):
+    for mode in (COPTER.hold, COPTER.mission, COPTER.stick, COPTER.hold):
         vehicle.rc_mode(mode)
         bench.run(limit=8.0)
         assert status_is(bench, N)
     assert bench.hand_over() == ''
     bench.run(limit=1.0)
     assert status_is(bench, H, 'handed over by test')
-    vehicle.rc_mode(5)
+    vehicle.rc_mode(COPTER.stick)
     bench.run(limit=3.0)
     assert bench.authority() is H
     vehicle.failsafe('radio', None)

@@ -4,6 +4,7 @@ import pytest
 from authority_bench import (
     ARDUPILOT,
     BOTH,
+    COPTER,
     MODES,
     PX4,
     AuthorityBench,
@@ -179,7 +180,7 @@ def test_a_reboot_while_it_refuses_to_arm_keeps_it_held(kind, silence):
     bench = AuthorityBench(kind, configs={1: {'boot_delay': 8.0}}).discover()
     bench.vehicles[1].flight.arming_fault = 'Gyros inconsistent'
     bench.assign(task_list('AB'))
-    assert bench.run(lambda: bench.vehicles[1].flight.custom_mode == 4, 20.0)
+    assert bench.run(lambda: bench.vehicles[1].flight.custom_mode == COPTER.hold, 20.0)
     bench.run(limit=8.0)
     bench.line.cut = silence > 0.0
     bench.vehicles[1].reboot(bench.now)

@@ -6,6 +6,7 @@ import pytest
 from authority_bench import (
     ARDUPILOT,
     BOTH,
+    COPTER,
     MODES,
     AuthorityBench,
     H,
@@ -153,7 +154,7 @@ def test_a_replacement_is_saved_before_the_hold_is_sent(kind):
     at = next(n for n, (_, direction, m) in enumerate(bench.line.log) if n >= start
               and direction == 'up' and is_command(m, d.MAV_CMD_DO_SET_MODE))
     before = [record for size, record in store.saves if size <= at][-1]
-    assert (before.replacing_since, before.commanded) == (bench.line.log[at][0], (4,))
+    assert (before.replacing_since, before.commanded) == (bench.line.log[at][0], (COPTER.hold,))
 
 
 @BOTH

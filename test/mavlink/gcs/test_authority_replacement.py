@@ -4,6 +4,7 @@ import pytest
 from authority_bench import (
     ARDUPILOT,
     BOTH,
+    COPTER,
     MODES,
     H,
     L,
@@ -143,15 +144,15 @@ def stalled_replacement(**kwargs):
         m.get_type() == 'MISSION_ITEM_INT') else None)
     start = len(bench.sent)
     bench.assign(task_list(NEW, 2))
-    assert bench.run(lambda: bench.vehicles[1].flight.custom_mode == 4, 10.0)
+    assert bench.run(lambda: bench.vehicles[1].flight.custom_mode == COPTER.hold, 10.0)
     return bench, start, bench.now
 
 
 def test_held_for_30_seconds_it_returns_when_the_return_path_is_clear():
     bench, start, since = stalled_replacement()
-    assert bench.run(lambda: bench.vehicles[1].flight.custom_mode == 6, 60.0)
+    assert bench.run(lambda: bench.vehicles[1].flight.custom_mode == COPTER.rtl, 60.0)
     assert 29.0 < bench.now - since < 45.0
-    assert bench.modes(start) == [4, 6]
+    assert bench.modes(start) == [COPTER.hold, COPTER.rtl]
     assert any('held for 30 s' in note and 'returns' in note for note in bench.notes)
     assert bench.authority() is H
     bench.run(lambda: not bench.vehicles[1].flight.armed, 100.0)
@@ -166,8 +167,8 @@ def test_held_for_30_seconds_with_a_zone_on_the_return_path_it_stays_with_an_ala
     bench.run(lambda: bench.executor().alarm, 60.0)
     assert 29.0 < bench.now - since < 45.0
     bench.run(limit=60.0)
-    assert 6 not in bench.modes(start)
-    assert bench.vehicles[1].flight.custom_mode == 4
+    assert COPTER.rtl not in bench.modes(start)
+    assert bench.vehicles[1].flight.custom_mode == COPTER.hold
     assert bench.state().reason == ('held for an upload that does not end, and zone Z1 is on its '
                                     'path home: stays')
     assert not bench.state().available
@@ -181,7 +182,7 @@ def test_held_for_30_seconds_with_a_zone_on_the_return_path_it_stays_with_an_ala
 def test_a_pilot_who_takes_over_during_a_stalled_replacement_keeps_control(kind, seconds):
     bench, _, _ = stalled_replacement()
     bench.run(limit=seconds)
-    bench.vehicles[1].rc_mode(5)
+    bench.vehicles[1].rc_mode(COPTER.stick)
     assert bench.run(lambda: bench.authority() is L, 3.0)
     bench.line.tampers.clear()
     transfer_ended(bench, len(bench.sent))

@@ -3,6 +3,7 @@
 import pytest
 from authority_bench import (
     BOTH,
+    COPTER,
     LONG,
     MODES,
     PX4,
@@ -148,7 +149,7 @@ def replacing(moment, kind='ardupilot', speed=0.0):
     bench = flying(kind, delay=(0.1, 0.1))
     assert bench.run(lambda: bench.executor().telemetry.speed > speed, 20.0)
     bench.assign(task_list('ZYXWV', 2))
-    assert bench.run(lambda: bench.vehicles[1].flight.custom_mode == 4, 10.0)
+    assert bench.run(lambda: bench.vehicles[1].flight.custom_mode == COPTER.hold, 10.0)
     bench.run(limit=moment)
     assert bench.executor().watch.replacing_since is not None
     return bench
@@ -174,7 +175,7 @@ def test_killed_in_a_replacement_the_current_item_does_not_refer_to_the_new_miss
     bench.assign(task_list('ZYXWV', 2))
     assert bench.run(lambda: bench.onboard().upload.sent_all, 30.0)
     bench.run(limit=0.3)
-    bench.vehicles[1].rc_mode(3)  # a pilot continues the mission
+    bench.vehicles[1].rc_mode(COPTER.mission)  # a pilot continues the mission
     bench.kill_and_restart(0.5)
     bench.assign(task_list('ZYXWV', 2))
     bench.run(limit=8.0)
@@ -218,7 +219,7 @@ def test_held_for_a_replacement_and_moved_by_somebody_else_it_is_a_loss():
 
 def test_another_mode_after_a_replacement_is_a_loss():
     bench = replacing(2.0)
-    bench.vehicles[1].rc_mode(5)
+    bench.vehicles[1].rc_mode(COPTER.stick)
     bench.kill_and_restart(5.0)
     bench.run(limit=1.0)
     assert status_is(bench, L, 'LOITER')
@@ -230,7 +231,7 @@ def test_killed_just_after_the_hold_command_it_is_not_lost(moment):
     """The command is in the record, and takes effect while no bridge runs."""
     bench = flying('ardupilot', delay=(0.05, 0.05), tick=0.05)
     bench.assign(task_list('ZYXWV', 2))
-    assert bench.run(lambda: 4 in bench.modes()[-1:], 20.0)
+    assert bench.run(lambda: COPTER.hold in bench.modes()[-1:], 20.0)
     bench.run(limit=moment)
     bench.kill_and_restart(0.0)
     bench.run(limit=0.5)
