@@ -12,10 +12,10 @@ import resource
 import time
 
 from uav_task_alloc import plan
-from uav_task_alloc.solver.solve import warm_up
-from uav_task_alloc.study import reference_solvers as rivals
-from uav_task_alloc.study.evaluator import judge
+from uav_task_alloc.solver.solve import load_kernels
+from uav_task_alloc.study.evaluator import evaluate
 from uav_task_alloc.study.instances import SLACK, Instance, make_instance
+from uav_task_alloc.study.reference_solvers import pyvrp
 
 
 def ours(instance: Instance, budget: float) -> None:
@@ -29,8 +29,8 @@ def ours(instance: Instance, budget: float) -> None:
 
 def rival(instance: Instance, seconds: float) -> None:
     """Print when PyVRP first served all, and its best."""
-    judged = [(when, judge(instance, routes)) for when, routes in rivals.pyvrp(instance, seconds)]
-    served = [(when, each.length) for when, each in judged if each.counts(collects=False)]
+    results = [(when, evaluate(instance, routes)) for when, routes in pyvrp(instance, seconds)]
+    served = [(when, result.length) for when, result in results if result.is_valid(collects=False)]
     text = (f'{served[-1][1] / 1000:.1f} km, the first plan after {served[0][0]:.1f} s'
             if served else 'no plan')
     print(f'{instance.name}: PyVRP, {seconds:g} s: {text}', flush=True)
@@ -48,7 +48,7 @@ def main() -> None:
     uavs, tasks = (int(each) for each in asked.size.split('x'))
     instances = [make_instance(uavs, tasks, 11 + seed, one_base, asked.slack)
                  for seed in range(asked.seeds) for one_base in (False, True)]
-    warm_up()
+    load_kernels()
     for instance in instances:
         for budget in asked.budgets.split(','):
             ours(instance, float(budget))

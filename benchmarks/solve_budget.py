@@ -26,7 +26,7 @@ from scenes import CLEARANCE, random_zones, violations  # noqa: E402
 
 from uav_task_alloc import Plan, Task, ThreatZone, Uav, plan  # noqa: E402
 from uav_task_alloc.geometry.obstacles import pack  # noqa: E402
-from uav_task_alloc.solver.solve import warm_up  # noqa: E402
+from uav_task_alloc.solver.solve import load_kernels  # noqa: E402
 
 MOST_ZONES, MOST_TASKS, MOST_UAVS = 1000, 200, 20
 SIDES = (2000.0, 5000.0, 10_000.0)  # [m]
@@ -94,7 +94,7 @@ def main() -> int:
                         help='budget and time are CPU time: for a machine with other work')
     asked = parser.parse_args()
     clock = time.process_time if asked.cpu else time.perf_counter
-    warm_up('chain_q', True)
+    load_kernels('chain_q', True)
     rows, wrong = [], []
     for k in range(asked.scenes):
         uavs, tasks, zones = random_scene(np.random.default_rng((asked.seed, k)))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Eq 2.12 and its weights."""
+"""The objective, eq 2.12, and its weights."""
 import math
 
 import pytest
@@ -9,7 +9,7 @@ from uav_task_alloc.model import Uav
 from uav_task_alloc.objective import Weights, excess, fit
 
 
-def test_fit_is_as_the_paper_writes_it():
+def test_fit_is_eq_2_12():
     assert fit(2000.0, 8.0, 3.0) == 0.01 * 2000.0 + 100.0 / 8.0 + 3.0
 
 
@@ -17,7 +17,7 @@ def test_weights_are_parameters():
     assert fit(2000.0, 8.0, 3.0, Weights(1.0, 0.0, 2.0)) == 2006.0
 
 
-def test_a_plan_that_serves_nothing_is_infinitely_bad():
+def test_the_fit_of_a_plan_that_serves_nothing_is_infinite():
     assert fit(0.0, 0.0, 0.0) == math.inf
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The command `plan`: what it keeps from zones, as the mission files that it writes show."""
+"""The command `plan`: clearance and altitude limits of the mission files that it writes."""
 import json
 
 import pytest
@@ -27,11 +27,11 @@ def plan(tmp_path):
         file.write_text(text)
         assert cli.main(['plan', str(file), '--budget', '0.05', '--missions',
                          str(tmp_path / 'm'), *options]) == 0
-        read = scenario.load(file)
+        loaded = scenario.load(file)
         rows = [line.split('\t') for line in
                 (tmp_path / 'm/u1.waypoints').read_text().splitlines()[2:]]
-        points = [to_enu(read.origin, *map(float, row[8:11])) for row in rows]
-        return [read.uavs[0].position, *points], [timed.zone for timed in read.zones]
+        points = [to_enu(loaded.origin, *map(float, row[8:11])) for row in rows]
+        return [loaded.uavs[0].position, *points], [timed.zone for timed in loaded.zones]
     return run
 
 
@@ -44,7 +44,7 @@ def plan(tmp_path):
 def test_finding_39_missions_keep_the_clearance(plan, line, options, clearance):
     points, zones = plan(line + MAST, *options)
     assert path_is_clear(points, zones, clearance - ROUNDED)
-    assert not path_is_clear(points, zones, clearance + 1.0)  # no more than was asked for
+    assert not path_is_clear(points, zones, clearance + 1.0)  # no more than requested
 
 
 @pytest.mark.parametrize(('line', 'options', 'low', 'high'), [
@@ -67,7 +67,7 @@ def test_finding_39_detours_keep_the_altitude_limits(plan, line, options, low, h
     (('--altitude-min', '60', '--altitude-max', '50'),
      'altitude_min = 60.0: expected less than altitude_max = 50'),
 ])
-def test_a_limit_that_cannot_be_is_refused(tmp_path, capsys, options, refusal):
+def test_an_invalid_limit_is_refused(tmp_path, capsys, options, refusal):
     (tmp_path / 'mast.yaml').write_text(MAST)
     assert cli.main(['plan', str(tmp_path / 'mast.yaml'), *options]) == 1
     assert capsys.readouterr().err == f'{refusal}\n'
@@ -80,12 +80,12 @@ def test_a_scenario_whose_limits_contradict_is_refused(tmp_path, capsys):
         capsys.readouterr().err)
 
 
-def test_a_plan_as_json_is_not_touched_by_limits_that_do_not_matter(tmp_path):
+def test_limits_at_their_defaults_do_not_change_the_plan(tmp_path):
     (tmp_path / 'mast.yaml').write_text(MAST)
-    made = []
+    legs = []
     for options in ((), ('--clearance', '10', '--altitude-min', '0')):
         out = tmp_path / 'plan.json'
         cli.main(['plan', str(tmp_path / 'mast.yaml'), '--budget', '0.05', '--json', str(out),
                   *options])
-        made.append(json.loads(out.read_text())['legs'])
-    assert made[0] == made[1]
+        legs.append(json.loads(out.read_text())['legs'])
+    assert legs[0] == legs[1]

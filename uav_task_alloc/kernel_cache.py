@@ -65,11 +65,12 @@ class KernelCacheLocator(caching._CacheLocator):
         """The locator of a function; None for functions of other packages."""
         if not py_func.__module__.startswith(f'{__package__}.'):
             return None
-        for base in (caching.UserProvidedCacheLocator, caching.InTreeCacheLocator,
-                     caching.UserWideCacheLocator):
-            found = base.from_function(py_func, py_file)
-            if found is not None:
-                return cls(py_file, found.get_cache_path())
+        bases: Any = (caching.UserProvidedCacheLocator, caching.InTreeCacheLocator,
+                      caching.UserWideCacheLocator)
+        for base in bases:
+            locator = base.from_function(py_func, py_file)
+            if locator is not None:
+                return cls(py_file, locator.get_cache_path())
         return None
 
     def get_cache_path(self) -> str:
@@ -86,7 +87,7 @@ class KernelCacheLocator(caching._CacheLocator):
 
     def ensure_cache_path(self) -> None:
         """Make the folder, before each write; remove those of other hashes not in use."""
-        super().ensure_cache_path()
+        super().ensure_cache_path()  # type: ignore[no-untyped-call]
         for other in self._parent.glob(f'{_FOLDER}*'):
             with suppress(OSError):
                 if (str(other) != self.get_cache_path()
@@ -97,7 +98,7 @@ class KernelCacheLocator(caching._CacheLocator):
 
 
 class CompilationNotice(event.Listener):
-    """Says once on stderr that kernels are compiled, and lets Ctrl-C end the process meanwhile.
+    """Prints once on stderr that kernels are compiled, and lets Ctrl-C end the process meanwhile.
 
     Python would handle SIGINT only when LLVM returns, seconds later. The signal's default action
     stands in for Python's own handler while a kernel is compiled in the main thread of a program;
@@ -105,22 +106,22 @@ class CompilationNotice(event.Listener):
     """
 
     def __init__(self) -> None:
-        self._said = False
+        self._printed = False
         self._depth = 0  # passes under way in the main thread: a kernel compiles those it calls
         self._replaced: Any = None
 
     def on_start(self, event: Any) -> None:
         """A pass of the compiler begins, over a kernel of this package or over what it calls."""
         ours = str(event.data['module']).startswith(f'{__package__}.')
-        if ours and not self._said:
-            self._said = True
-            print(f'compiling kernels (once, about {COMPILE_TIME:.0f} s)', file=sys.stderr,
-                  flush=True)
         if threading.current_thread() is threading.main_thread() and (ours or self._depth):
             self._depth += 1
             if (self._depth == 1 and not hasattr(sys, 'ps1')
                     and signal.getsignal(signal.SIGINT) is signal.default_int_handler):
                 self._replaced = signal.signal(signal.SIGINT, signal.SIG_DFL)
+        if ours and not self._printed:
+            self._printed = True
+            print(f'compiling kernels (once, about {COMPILE_TIME:.0f} s)', file=sys.stderr,
+                  flush=True)
 
     def on_end(self, event: Any) -> None:
         """It ends."""
@@ -133,5 +134,7 @@ class CompilationNotice(event.Listener):
 
 def install() -> None:
     """Make numba keep kernels of this package here, and report compilations."""
-    caching.CacheImpl._locator_classes.insert(0, KernelCacheLocator)
-    event.register('numba:run_pass', CompilationNotice())
+    locators: Any = caching.CacheImpl._locator_classes
+    locators.insert(0, KernelCacheLocator)
+    register: Any = event.register
+    register('numba:run_pass', CompilationNotice())

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The one definition of good: distance, value, penalty and the fit of eq 2.12."""
+"""The objective: distance, value, penalty and the fit of eq 2.12."""
 from __future__ import annotations
 
 import math
@@ -11,7 +11,11 @@ from uav_task_alloc.model import Uav, check_number
 
 @dataclass(frozen=True, slots=True)
 class Weights:
-    """The coefficients of eq 2.12, by default as the paper has them. Raises InvalidValue."""
+    """The coefficients of eq 2.12; the defaults are those of the paper.
+
+    Raises:
+        InvalidValue: a coefficient is not in [0, 1e9].
+    """
 
     distance: float = 0.01  # [1/m]
     value: float = 100.0
@@ -24,9 +28,16 @@ class Weights:
 
 
 def fit(distance: float, value: float, penalty: float, weights: Weights | None = None) -> float:
-    """Eq 2.12, smaller is better; infinite where nothing is served (R = 0).
+    """Eq 2.12; smaller is better.
 
-    `distance` [m] is D of eq 2.1, `value` is R, `penalty` [m] is P of eq 2.2.
+    Args:
+        distance: [m] of all routes, D of eq 2.1.
+        value: of all served tasks, R.
+        penalty: [m] beyond the ranges, P of eq 2.2.
+        weights: None: those of the paper.
+
+    Returns:
+        w1 D + w2 / R + w3 P; infinite where nothing is served (R = 0).
     """
     w = weights or Weights()
     if value <= 0.0:
@@ -35,6 +46,6 @@ def fit(distance: float, value: float, penalty: float, weights: Weights | None =
 
 
 def excess(uavs: Iterable[Uav], lengths: Iterable[float]) -> float:
-    """Metres that routes of these lengths [m] fly beyond the ranges: P of eq 2.2."""
+    """Metres by which routes of these lengths [m] exceed the ranges of their UAVs: P of eq 2.2."""
     return math.fsum(max(0.0, length - uav.range)
                      for uav, length in zip(uavs, lengths, strict=True))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Exact optima of small problems by dynamic programming over sets of tasks; knows no solver."""
+"""Exact optima of small problems by dynamic programming over sets of tasks; uses no solver."""
 import math
 from itertools import combinations
 
@@ -27,13 +27,13 @@ def subsets(whole):
 
 def shortest(uav, tasks, home):
     """Length [m] of the shortest route over each set of tasks (Held and Karp)."""
-    n, way = len(tasks), math.dist
-    end = {1 << i: {i: way(uav.position, tasks[i].position)} for i in range(n)}
+    n, length = len(tasks), math.dist
+    end = {1 << i: {i: length(uav.position, tasks[i].position)} for i in range(n)}
     for size in range(2, n + 1):
         for chosen in combinations(range(n), size):
             mine = sum(1 << i for i in chosen)
-            end[mine] = {i: min(metres + way(tasks[j].position, tasks[i].position)
+            end[mine] = {i: min(metres + length(tasks[j].position, tasks[i].position)
                                 for j, metres in end[mine ^ 1 << i].items()) for i in chosen}
-    back = [way(task.position, uav.home or uav.position) if home else 0.0 for task in tasks]
+    back = [length(task.position, uav.home or uav.position) if home else 0.0 for task in tasks]
     return [0.0, *(min(metres + back[i] for i, metres in end[mine].items())
                    for mine in range(1, 1 << n))]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Any small world: the plan is right, says why a task is left out, and a warm one is no worse."""
+"""Random small worlds: plans are valid and give reasons; a warm plan is no worse."""
 import math
 from dataclasses import replace
 
@@ -28,8 +28,8 @@ def works(most=9):
     allowed = st.none() | st.frozensets(st.sampled_from(['u0', 'u1', 'u9']))
     task = st.tuples(points, st.sampled_from([1.0, 2.5]), skills, allowed)
     return st.lists(task, max_size=most).map(lambda rows: [
-        Task(f't{i}', place, value, required_capabilities=able, allowed_uavs=who)
-        for i, (place, value, able, who) in enumerate(rows)])
+        Task(f't{i}', place, value, required_capabilities=able, allowed_uavs=allowed_ids)
+        for i, (place, value, able, allowed_ids) in enumerate(rows)])
 
 
 ZONES = st.lists(st.one_of(
@@ -47,15 +47,15 @@ def quick(uavs, tasks, zones, **options):
 
 
 def alone(task, uav, zones, options):
-    """Metres beyond range when this UAV flies for this task only; inf: it may not or cannot."""
-    made = plan([replace(uav, range=math.inf)], [task], zones, budget=60.0, max_iterations=0,
+    """Metres beyond range when this UAV serves only this task; inf: it may not or cannot."""
+    result = plan([replace(uav, range=math.inf)], [task], zones, budget=60.0, max_iterations=0,
                 route_end=options['route_end'])
-    return math.inf if made.unassigned else made.distance - uav.range
+    return math.inf if result.unassigned else result.distance - uav.range
 
 
-def check_reasons(made, uavs, tasks, zones, options):
-    for task in (each for each in tasks if each.id in made.unassigned):
-        reason = made.unassigned[task.id]
+def check_reasons(result, uavs, tasks, zones, options):
+    for task in (each for each in tasks if each.id in result.unassigned):
+        reason = result.unassigned[task.id]
         short = [alone(task, uav, zones, options) for uav in uavs]
         if reason.startswith('left out'):
             assert min(short) <= 1e-6
@@ -65,27 +65,27 @@ def check_reasons(made, uavs, tasks, zones, options):
             assert min(short, default=math.inf) == math.inf
 
 
-def order(made):
-    """What a plan is judged by: more value, then less way and less excess."""
-    return -made.value, made.distance + 100.0 * made.penalty
+def order(result):
+    """Sort key of plans: more value, then less distance and excess."""
+    return -result.value, result.distance + 100.0 * result.penalty
 
 
 @settings(max_examples=60, deadline=None, derandomize=True,
           phases=[Phase.generate])
 @given(uavs=fleets(), tasks=works(), zones=ZONES, options=OPTIONS)
-def test_any_small_world_is_planned_right(uavs, tasks, zones, options):
-    made = quick(uavs, tasks, zones, **options)
-    check(made, uavs, tasks, options['hard_range'])
-    check_reasons(made, uavs, tasks, zones, options)
-    assert math.isfinite(made.distance)
+def test_plans_of_random_small_worlds_are_valid(uavs, tasks, zones, options):
+    result = quick(uavs, tasks, zones, **options)
+    check(result, uavs, tasks, options['hard_range'])
+    check_reasons(result, uavs, tasks, zones, options)
+    assert math.isfinite(result.distance)
     if options['threads'] == 1:
-        assert quick(uavs, tasks, zones, **options).routes == made.routes
+        assert quick(uavs, tasks, zones, **options).routes == result.routes
 
 
 @settings(max_examples=60, deadline=None, derandomize=True,
           phases=[Phase.generate])
 @given(uavs=fleets(), tasks=works(), zones=ZONES, options=OPTIONS, data=st.data())
-def test_any_small_change_is_planned_right(uavs, tasks, zones, options, data):
+def test_plans_after_random_small_changes_are_valid(uavs, tasks, zones, options, data):
     before = quick(uavs, tasks, zones, **options)
     moved = [replace(uav, position=data.draw(points), range=data.draw(ranges)) for uav in uavs]
     fleet = moved[data.draw(st.integers(0, 1)):]
@@ -97,24 +97,24 @@ def test_any_small_change_is_planned_right(uavs, tasks, zones, options, data):
         if task_id in ids])}
     repaired = plan(fleet, work, zones, budget=60.0, max_iterations=0, warm=before,
                     locked=locked, **options)
-    made = quick(fleet, work, zones, warm=before, locked=locked, **options)
-    check_locked_plan(made, fleet, work, zones, locked, options)
-    assert order(made)[0] <= order(repaired)[0] + 1e-9
-    if made.value == pytest.approx(repaired.value):
-        assert order(made)[1] <= order(repaired)[1] + 1e-6
+    result = quick(fleet, work, zones, warm=before, locked=locked, **options)
+    check_locked_plan(result, fleet, work, zones, locked, options)
+    assert order(result)[0] <= order(repaired)[0] + 1e-9
+    if result.value == pytest.approx(repaired.value):
+        assert order(result)[1] <= order(repaired)[1] + 1e-6
 
 
-def check_locked_plan(made, uavs, tasks, zones, locked, options):
-    """As check, but a locked row stays in front even beyond range; then no way is added to it."""
+def check_locked_plan(result, uavs, tasks, zones, locked, options):
+    """As check, but locked tasks stay first even beyond range; then nothing is added to them."""
     for uav in uavs:
-        row = [task_id for task_id in locked.get(uav.id, ()) if task_id not in made.unassigned]
-        assert list(made.routes[uav.id][:len(row)]) == row
-    flown = [task_id for row in made.routes.values() for task_id in row]
-    assert sorted([*flown, *made.unassigned]) == sorted(task.id for task in tasks)
-    assert math.isfinite(made.distance)
+        row = [task_id for task_id in locked.get(uav.id, ()) if task_id not in result.unassigned]
+        assert list(result.routes[uav.id][:len(row)]) == row
+    flown = [task_id for row in result.routes.values() for task_id in row]
+    assert sorted([*flown, *result.unassigned]) == sorted(task.id for task in tasks)
+    assert math.isfinite(result.distance)
     if options['hard_range']:
         held = [task for task in tasks if any(task.id in row for row in locked.values())]
         alone = quick(uavs, held, zones, locked=locked, **options)
         for uav in uavs:
-            assert made.route(uav.id).distance <= 1e-6 + max(
+            assert result.route(uav.id).distance <= 1e-6 + max(
                 uav.range, alone.route(uav.id).distance)

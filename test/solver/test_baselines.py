@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Every solver against exact optima, and that each repeats itself."""
+"""Every solver against exact optima; every solver is repeatable."""
 import math
 from dataclasses import replace
 
@@ -21,15 +21,15 @@ GAPS = {'chain_q': (3000, 0.5, 1.0), 'abc': (300, 2.5, 1.0), 'ga': (100, 5.0, 3.
 
 @pytest.mark.parametrize('world', [OPEN, HOME], ids=['open', 'home'])
 @pytest.mark.parametrize('solver', SOLVERS)
-def test_a_solver_is_so_near_to_the_optimum_and_never_beyond(solver, world):
+def test_the_gap_of_a_solver_to_the_optimum_is_small_and_never_negative(solver, world):
     gaps = []
     for seed in SEEDS:
         uavs, tasks = make(3, 8 + seed % 2, seed, world['reach'])
-        made = plan(uavs, tasks, budget=60.0, max_iterations=GAPS[solver][0], solver=solver,
+        result = plan(uavs, tasks, budget=60.0, max_iterations=GAPS[solver][0], solver=solver,
                     hard_range=False, route_end=world['route_end'])
-        check(made, uavs, tasks, hard=False)
-        assert not made.unassigned
-        gaps.append(100.0 * (made.fit / best_fit(uavs, tasks, world is HOME) - 1.0))
+        check(result, uavs, tasks, hard=False)
+        assert not result.unassigned
+        gaps.append(100.0 * (result.fit / best_fit(uavs, tasks, world is HOME) - 1.0))
     assert min(gaps) > -1e-6
     assert sum(gaps) / len(gaps) <= GAPS[solver][1 if world is OPEN else 2], gaps
 
@@ -45,25 +45,25 @@ def test_the_optimum_is_that_of_four_corners():
 @pytest.mark.parametrize('solver', SOLVERS)
 def test_a_seed_and_a_number_of_iterations_repeat_the_plan(solver):
     uavs, tasks = make(4, 25, reach=2000.0)
-    told = [[], []]
+    calls = [[], []]
     first, second = (plan(uavs, tasks, solver=solver, budget=60.0, max_iterations=15, seed=3,
-                          on_iteration=lambda *each, to=to: to.append(each)) for to in told)
+                          on_iteration=lambda *each, to=to: to.append(each)) for to in calls)
     assert first.routes == second.routes
     assert first.fit == second.fit
-    assert told[0] == told[1]
-    assert told[0][-1] == (first.iterations, pytest.approx(first.fit))
+    assert calls[0] == calls[1]
+    assert calls[0][-1] == (first.iterations, pytest.approx(first.fit))
 
 
 @pytest.mark.parametrize('solver', ['paper_chain_q', 'q_learning', 'abc', 'ga'])
-def test_what_draws_at_random_depends_on_the_seed(solver):
+def test_randomised_solvers_depend_on_the_seed(solver):
     uavs, tasks = make(4, 60)
-    made = [plan(uavs, tasks, solver=solver, budget=60.0, max_iterations=90, seed=seed)
+    result = [plan(uavs, tasks, solver=solver, budget=60.0, max_iterations=90, seed=seed)
             for seed in (1, 2)]
-    assert made[0].routes != made[1].routes
+    assert result[0].routes != result[1].routes
 
 
 @pytest.mark.parametrize('solver', SOLVERS)
-def test_a_plan_is_right_with_all_that_a_problem_can_ask(solver):
+def test_a_plan_is_valid_with_all_features_of_a_problem(solver):
     uavs, tasks = make(4, 24, seed=5, reach=2500.0)
     uavs = [replace(uav, home=(500.0, 300.0, 0.0), capabilities=frozenset(able))
             for uav, able in zip(uavs, (['lidar'], ['lidar'], [], ['camera']), strict=True)]
@@ -73,24 +73,25 @@ def test_a_plan_is_right_with_all_that_a_problem_can_ask(solver):
     zones = [ThreatZone.hemisphere('dome', (500.0, 600.0, 0.0), 120.0)]
     locked = {'u2': ['t3'], 'u0': ['t4', 't1']}
     for hard in (True, False):
-        made = plan(uavs, tasks, zones, budget=60.0, max_iterations=10, solver=solver,
+        result = plan(uavs, tasks, zones, budget=60.0, max_iterations=10, solver=solver,
                     hard_range=hard, route_end='home', locked=locked)
-        check(made, uavs, tasks, hard)
-        assert [made.routes[u][:len(row)] for u, row in locked.items()] == [('t3',), ('t4', 't1')]
-        assert hard or set(made.unassigned.values()) <= {'inside zone dome'}
+        check(result, uavs, tasks, hard)
+        assert [result.routes[u][:len(row)] for u, row in locked.items()] == [
+            ('t3',), ('t4', 't1')]
+        assert hard or set(result.unassigned.values()) <= {'inside zone dome'}
 
 
 @pytest.mark.parametrize('solver', SOLVERS)
 def test_a_solver_ends_with_its_budget(solver):
     uavs, tasks = make(10, 100)
     now = iter(i * 0.001 for i in range(10 ** 9))
-    made = plan(uavs, tasks, solver=solver, budget=0.05, clock=lambda: next(now))
-    check(made, uavs, tasks)
-    assert not made.unassigned
-    assert made.solve_time < 0.1
+    result = plan(uavs, tasks, solver=solver, budget=0.05, clock=lambda: next(now))
+    check(result, uavs, tasks)
+    assert not result.unassigned
+    assert result.solve_time < 0.1
 
 
-def test_tables_that_would_not_fit_are_refused():
+def test_problems_beyond_the_table_sizes_are_refused():
     uavs, tasks = make(1, 2001)
     for solver, most in (('paper_chain_q', 200), ('abc', 2000), ('auction', 2000)):
         with pytest.raises(InvalidValue, match=f'tasks = 2001: expected at most {most}'):
@@ -99,8 +100,8 @@ def test_tables_that_would_not_fit_are_refused():
 
 @pytest.mark.parametrize('solver', SOLVERS)
 @pytest.mark.parametrize('weights', [Weights(value=0.0), Weights(0.0, 0.0, 0.0)])
-def test_a_fit_of_nothing_is_no_trouble(solver, weights):
+def test_a_fit_of_zero_is_handled(solver, weights):
     uavs = [Uav(f'u{i}', (0.0, 0.0, 0.0)) for i in range(2)]
     tasks = [Task(f't{i}', (0.0, 0.0, 0.0)) for i in range(4)]
-    made = plan(uavs, tasks, solver=solver, budget=60.0, max_iterations=5, weights=weights)
-    assert (made.fit, made.unassigned) == (0.0, {})
+    result = plan(uavs, tasks, solver=solver, budget=60.0, max_iterations=5, weights=weights)
+    assert (result.fit, result.unassigned) == (0.0, {})

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""CBBA: agents that only hear their neighbours agree in time, and on what its authors prove."""
+"""CBBA: agents that receive only from neighbours agree within the rounds proven by its authors."""
 from itertools import product
 
 import numpy as np
@@ -10,7 +10,7 @@ from plan_checks import make
 from uav_task_alloc.errors import UnknownName
 from uav_task_alloc.solver.baselines.cbba import GRAPHS, CbbaSettings, make_agents, make_graph
 from uav_task_alloc.solver.baselines.consensus import (
-    NOBODY,
+    NO_AGENT,
     RULES,
     Agent,
     ConsensusMessage,
@@ -34,14 +34,14 @@ class Coverage:
         return float(self.own[path].sum() + self.worth[self.seen[path].any(axis=0)].sum())
 
     def __call__(self, path):
-        """What Agent asks for: gain of each task, and its place, which is always the end."""
+        """The score of an agent: gain of each task, and its place, which is always the end."""
         now, tasks = self.value(path), range(len(self.seen))
         gain = np.array([0.0 if t in path else self.value([*path, t]) - now for t in tasks])
         return gain, np.full(len(gain), len(path))
 
 
 def make_scores(agents, tasks, seed, ties=False):
-    """Agents to whom tasks and cells are worth unlike much; ties: cells are worth 1 to all."""
+    """Agents that value tasks and cells differently; ties: cells are worth 1 to all."""
     rng = np.random.default_rng(seed)
     seen = rng.random((tasks, 12)) < 0.4
     return [Coverage(np.zeros(tasks), np.ones(12), seen) if ties else
@@ -61,7 +61,7 @@ def agree(scores, graph, most=None):
 
 
 def check_free_of_conflict(agents):
-    """All know the same winners, and each flies just what it won."""
+    """All have the same winners, and each path holds just the tasks won."""
     for agent in agents:
         assert (agent.winner == agents[0].winner).all()
         assert (agent.bid == agents[0].bid).all()
@@ -70,7 +70,7 @@ def check_free_of_conflict(agents):
 
 
 def greedy(scores, most):
-    """The central sequential greedy algorithm: the greatest gain of all, again and again."""
+    """The central sequential greedy algorithm: always the greatest gain of all."""
     paths = [[] for _ in scores]
     while True:
         best = (0.0, 0, 0, 0)
@@ -87,7 +87,7 @@ def greedy(scores, most):
 
 @pytest.mark.parametrize('kind', GRAPHS)
 @pytest.mark.parametrize('seed', range(12))
-def test_agents_agree_in_time_on_what_nobody_would_outbid(kind, seed):
+def test_agents_agree_in_time_on_bids_that_none_can_beat(kind, seed):
     agents, tasks, most = 2 + seed % 5, 3 + seed % 7, 1 + seed % 4
     scores = make_scores(agents, tasks, seed)
     for limit in (tasks, most):
@@ -119,7 +119,7 @@ def test_equal_bids_do_not_keep_agents_from_agreeing(kind, seed):
 
 
 @pytest.mark.parametrize('seed', range(10))
-def test_what_is_agreed_is_worth_half_the_optimum_at_least(seed):
+def test_the_agreement_has_at_least_half_the_value_of_the_optimum(seed):
     scores = make_scores(3, 7, seed)
     found, _ = agree(scores, make_graph('line', 3))
     reached = sum(score.value(agent.path) for score, agent in zip(scores, found, strict=True))
@@ -152,15 +152,15 @@ def test_gains_that_grow_do_not_keep_agents_from_agreeing():
             check_free_of_conflict(agents)
 
 
-def test_time_ends_the_talk_between_two_agents():
-    scores, asked = make_scores(4, 6, 1), []
+def test_the_end_of_the_budget_ends_a_round_between_two_agents():
+    scores, polls = make_scores(4, 6, 1), []
     agents = [Agent(i, 4, 6, score, 6) for i, score in enumerate(scores)]
-    assert not one_round(agents, make_graph('ring', 4), 1, lambda: asked.append(1) or len(
-        asked) > 2)
+    assert not one_round(agents, make_graph('ring', 4), 1, lambda: polls.append(1) or len(
+        polls) > 2)
     assert [bool(agent.bundle) for agent in agents] == [True, True, False, False]
 
 
-def test_graphs_reach_everybody_in_so_many_hops():
+def test_diameters_of_the_graphs():
     assert make_graph('ring', 5) == [[1, 4], [0, 2], [1, 3], [2, 4], [0, 3]]
     assert [diameter(make_graph(kind, 6)) for kind in ('full', 'ring', 'line')] == [1, 3, 5]
     assert make_graph('ring', 1) == [[]]
@@ -171,14 +171,14 @@ def test_graphs_reach_everybody_in_so_many_hops():
 
 
 ME, K, M, N = 0, 1, 2, 3  # receiver, sender, others
-TABLE = [  # sender's winner, receiver's; sender's bid is higher, knows more of M, of N; action
+TABLE = [  # sender's winner, receiver's; sender's bid is higher, newer about M, about N; action
     (K, ME, True, False, False, UPDATE), (K, ME, False, True, True, LEAVE),
     (K, K, False, False, False, UPDATE),
     (K, M, False, True, False, UPDATE), (K, M, True, False, False, UPDATE),
-    (K, M, False, False, False, LEAVE), (K, NOBODY, False, False, False, UPDATE),
+    (K, M, False, False, False, LEAVE), (K, NO_AGENT, False, False, False, UPDATE),
     (ME, ME, True, True, True, LEAVE), (ME, K, False, False, False, RESET),
     (ME, M, False, True, False, RESET), (ME, M, True, False, False, LEAVE),
-    (ME, NOBODY, True, True, True, LEAVE),
+    (ME, NO_AGENT, True, True, True, LEAVE),
     (M, ME, True, True, False, UPDATE), (M, ME, True, False, False, LEAVE),
     (M, ME, False, True, False, LEAVE),
     (M, K, False, True, False, UPDATE), (M, K, True, False, False, RESET),
@@ -186,38 +186,38 @@ TABLE = [  # sender's winner, receiver's; sender's bid is higher, knows more of 
     (M, N, False, True, True, UPDATE), (M, N, True, True, False, UPDATE),
     (M, N, False, True, False, LEAVE), (M, N, True, False, True, RESET),
     (M, N, True, False, False, LEAVE),
-    (M, NOBODY, False, True, False, UPDATE), (M, NOBODY, True, False, False, LEAVE),
-    (NOBODY, ME, False, True, True, LEAVE), (NOBODY, K, False, False, False, UPDATE),
-    (NOBODY, M, False, True, False, UPDATE), (NOBODY, M, False, False, False, LEAVE),
-    (NOBODY, NOBODY, False, True, True, LEAVE),
+    (M, NO_AGENT, False, True, False, UPDATE), (M, NO_AGENT, True, False, False, LEAVE),
+    (NO_AGENT, ME, False, True, True, LEAVE), (NO_AGENT, K, False, False, False, UPDATE),
+    (NO_AGENT, M, False, True, False, UPDATE), (NO_AGENT, M, False, False, False, LEAVE),
+    (NO_AGENT, NO_AGENT, False, True, True, LEAVE),
 ]
 
 
-@pytest.mark.parametrize(('theirs', 'mine', 'higher', 'more_of_m', 'more_of_n', 'action'), TABLE)
-def test_a_receiver_does_what_table_1_says(theirs, mine, higher, more_of_m, more_of_n, action):
+@pytest.mark.parametrize(('theirs', 'mine', 'higher', 'newer_m', 'newer_n', 'action'), TABLE)
+def test_a_receiver_acts_by_table_1(theirs, mine, higher, newer_m, newer_n, action):
     agent = Agent(ME, 4, 1, None, 1)
-    agent.winner[0], agent.bid[0], agent.heard[:] = mine, 5.0, 5
+    agent.winner[0], agent.bid[0], agent.updated[:] = mine, 5.0, 5
     bid = 6.0 if higher else 4.0
-    agent.listen([ConsensusMessage(K, np.array([bid]), np.array([theirs]),
-                          np.array([5, 6, 6 if more_of_m else 4, 6 if more_of_n else 4]))])
+    agent.receive([ConsensusMessage(K, np.array([bid]), np.array([theirs]),
+                                    np.array([5, 6, 6 if newer_m else 4, 6 if newer_n else 4]))])
     assert (agent.winner[0], agent.bid[0]) == {
-        UPDATE: (theirs, bid), RESET: (NOBODY, 0.0), LEAVE: (mine, 5.0)}[action]
+        UPDATE: (theirs, bid), RESET: (NO_AGENT, 0.0), LEAVE: (mine, 5.0)}[action]
 
 
-def test_table_1_knows_every_case():
-    who = ('sender', 'receiver', 'nobody', 'other')
-    assert set(RULES) == {*product(who, who), ('other', 'same')}
+def test_table_1_covers_every_case():
+    roles = ('sender', 'receiver', 'none', 'other')
+    assert set(RULES) == {*product(roles, roles), ('other', 'same')}
 
 
-def test_a_lost_task_takes_those_behind_it_along():
+def test_a_lost_task_releases_those_after_it():
     scores = make_scores(2, 4, 3)
     agent = Agent(0, 2, 4, scores[0], 4)
     agent.build()
-    first, second, *behind = agent.bundle
-    winner, bid = np.full(4, NOBODY), np.zeros(4)
+    first, second, *after = agent.bundle
+    winner, bid = np.full(4, NO_AGENT), np.zeros(4)
     winner[second], bid[second] = 1, 99.0
-    agent.listen([ConsensusMessage(1, bid, winner, np.array([0, 1]))])
+    agent.receive([ConsensusMessage(1, bid, winner, np.array([0, 1]))])
     assert agent.bundle == agent.path == [first]
     assert agent.winner[second] == 1
-    assert (agent.winner[behind] == NOBODY).all()
-    assert not agent.bid[behind].any()
+    assert (agent.winner[after] == NO_AGENT).all()
+    assert not agent.bid[after].any()

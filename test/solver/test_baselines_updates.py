@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The baselines' equations, worked out by hand."""
+"""The equations of the baselines, with values worked out by hand."""
 import math
 
 import numpy as np
@@ -7,11 +7,11 @@ import pytest
 
 from uav_task_alloc import Task, Uav, plan
 from uav_task_alloc.objective import excess, fit
-from uav_task_alloc.solver import routes as of
 from uav_task_alloc.solver.baselines import bee_colony, ga, paper_chain_q, q_learning
 from uav_task_alloc.solver.baselines.population import Coding
 from uav_task_alloc.solver.problem import Limits, Rules, make_problem
-from uav_task_alloc.solver.rng import chance
+from uav_task_alloc.solver.rng import rng_state
+from uav_task_alloc.solver.routes import empty_routes
 
 
 def on_a_line(starts, tasks):
@@ -36,7 +36,7 @@ def test_both_chains_learn_by_eq_2_6_from_the_next_position():
                         np.empty(3, np.bool_))
     assert q.uav[0, 0, 1] == pytest.approx(1.0 + 0.1 * (0.5 + 0.5 * 3.0 - 1.0))
     assert q.task[0, 0, 2] == pytest.approx(1.0 + 0.1 * (0.5 + 0.5 * 4.0 - 1.0))  # 9: visited
-    assert q.uav[1, 1, 0] == pytest.approx(2.0 + 0.1 * (0.5 - 2.0))  # behind it is nothing
+    assert q.uav[1, 1, 0] == pytest.approx(2.0 + 0.1 * (0.5 - 2.0))  # no next step
     assert q.task[1, 2, 0] == pytest.approx(4.0 + 0.1 * (0.5 - 4.0))
     assert np.count_nonzero(q.uav != 1.0) == 3  # 1.1, 1.85 and the 3 set above
     assert np.count_nonzero(q.task != 1.0) == 4
@@ -74,10 +74,11 @@ def test_a_greedy_bee_takes_the_greatest_q_of_each_position_that_is_unvisited():
     q.uav[1, 1] = 3.0, 1.0
     q.task[:, :, 1] = 9.0  # at each position, but it is visited once only
     q.task[1, 1, 2] = 5.0
-    routes, uavs, tasks = of.empty_routes(problem.arrays), np.zeros(3, int), np.zeros(3, int)
+    routes, uavs, tasks = empty_routes(problem.arrays), np.zeros(3, int), np.zeros(3, int)
     scratch = paper_chain_q.Scratch(np.empty(2, np.bool_), np.empty(3, np.bool_), np.empty(2),
                                     np.empty(3))
-    steps = paper_chain_q.fly_bee(problem.arrays, routes, uavs, tasks, q, 1.0, scratch, chance(1))
+    steps = paper_chain_q.fly_bee(problem.arrays, routes, uavs, tasks, q, 1.0, scratch,
+                                  rng_state(1))
     assert (steps, uavs[:2].tolist(), tasks.tolist()) == (3, [1, 0], [1, 2, 0])
 
 
@@ -85,8 +86,8 @@ def test_single_agent_q_learning_is_eq_2_5():
     uavs, tasks = on_a_line([0.0], [100.0, 300.0])
     problem = problem_of(uavs, tasks)
     q = np.array([[-1.0, -3.0], [0.0, -2.0], [-2.0, 0.0]])
-    q_learning.episode(problem.arrays, of.empty_routes(problem.arrays), q, 100.0, 0.5, 0.8, 1.0,
-                       chance(1))
+    q_learning.episode(problem.arrays, empty_routes(problem.arrays), q, 100.0, 0.5, 0.8, 1.0,
+                       rng_state(1))
     assert q[0].tolist() == pytest.approx([-1.0 + 0.5 * (-1.0 + 0.8 * -2.0 + 1.0), -3.0])
     assert q[1].tolist() == pytest.approx([0.0, -2.0])  # reward -2, nothing ahead
     assert q[2].tolist() == [-2.0, 0.0]
@@ -98,39 +99,39 @@ def test_onlookers_choose_by_eq_2_8_with_one_over_fit():
     assert bee_colony.source_probabilities(np.array([math.inf, math.inf])).tolist() == [0.5, 0.5]
 
 
-def test_a_food_source_says_who_by_interval_and_when_by_size():
+def test_a_key_selects_the_uav_by_interval_and_the_order_by_size():
     coding = Coding(problem_of(*on_a_line([0.0, 9.0], [1.0, 2.0, 3.0, 4.0])))
     colony = bee_colony.AbcColony(coding, bee_colony.AbcSettings(), np.random.default_rng(1))
-    row, who = colony.decoded(np.array([[0.1, 0.9, 0.7, 0.0]]))
-    assert who.tolist() == [[0, 1, 1, 0]]
+    row, uav_of = colony.decoded(np.array([[0.1, 0.9, 0.7, 0.0]]))
+    assert uav_of.tolist() == [[0, 1, 1, 0]]
     assert row.tolist() == [[3, 0, 2, 1]]
 
 
 @pytest.mark.parametrize('home', [False, True])
-def test_rows_are_judged_as_the_routes_that_they_mean(home):
+def test_rows_are_evaluated_as_the_routes_that_they_encode(home):
     rng = np.random.default_rng(7)
     uavs = [Uav(f'u{i}', (*rng.uniform(0.0, 900.0, 2), 0.0), 700.0, home=(0.0, 0.0, 50.0))
             for i in range(3)]
     tasks = [Task(f't{i}', (*rng.uniform(0.0, 900.0, 2), 9.0), 1.0 + i) for i in range(6)]
     coding = Coding(problem_of(uavs, tasks, Rules(returns=home, hard=False)))
-    who = rng.integers(0, 3, (20, 6))
-    row = coding.rows(rng.permuted(np.tile(np.arange(6), (20, 1)), axis=1), who)
-    for k, found in enumerate(coding.fits(row, who)):
+    uav_of = rng.integers(0, 3, (20, 6))
+    row = coding.rows(rng.permuted(np.tile(np.arange(6), (20, 1)), axis=1), uav_of)
+    for k, fitness in enumerate(coding.fits(row, uav_of)):
         lengths = []
         for u, uav in enumerate(uavs):
-            flown = [tasks[t].position for t in row[k] if who[k, t] == u]
+            flown = [tasks[t].position for t in row[k] if uav_of[k, t] == u]
             stops = [uav.position, *flown, *([uav.home] if home and flown else [])]
             lengths.append(sum(map(math.dist, stops, stops[1:])))
-        assert found == pytest.approx(fit(sum(lengths), 21.0, excess(uavs, lengths)))
+        assert fitness == pytest.approx(fit(sum(lengths), 21.0, excess(uavs, lengths)))
 
 
 def test_a_child_keeps_a_slice_and_takes_the_rest_in_the_others_order():
-    child = ga.crossed(np.array([[0, 1, 2, 3, 4]] * 2), np.array([[4, 2, 0, 1, 3]] * 2),
+    child = ga.crossover(np.array([[0, 1, 2, 3, 4]] * 2), np.array([[4, 2, 0, 1, 3]] * 2),
                        np.array([1, 0]), np.array([3, 0]))
     assert child.tolist() == [[4, 1, 2, 0, 3], [4, 2, 0, 1, 3]]
 
 
-def test_children_of_a_generation_serve_every_task_once_by_whom_it_allows():
+def test_children_of_a_generation_serve_every_task_once_by_an_allowed_uav():
     uavs, tasks = on_a_line([0.0, 9.0], [1.0, 2.0, 3.0, 4.0])
     tasks.append(Task('only', (5.0, 0.0, 0.0), allowed_uavs=frozenset({'u1'})))
     population = ga.Population(Coding(problem_of(uavs, tasks)), ga.GaSettings(),
@@ -139,16 +140,16 @@ def test_children_of_a_generation_serve_every_task_once_by_whom_it_allows():
     for _ in range(20):
         population.breed()
         assert (np.sort(population.row, axis=1) == np.arange(5)).all()
-        assert (population.who[:, 4] == 1).all()
-        assert population.fits.min() <= best  # the elite lives on
+        assert (population.uav_of[:, 4] == 1).all()
+        assert population.fits.min() <= best  # the elite is kept
         best = population.fits.min()
 
 
-def test_nearest_balances_before_it_looks_at_the_way():
-    made = plan(*on_a_line([0.0, 1000.0], [10.0, 20.0, 30.0]), solver='nearest')
-    assert made.routes == {'u0': ('t0', 't1'), 'u1': ('t2',)}
+def test_nearest_balances_before_it_compares_lengths():
+    result = plan(*on_a_line([0.0, 1000.0], [10.0, 20.0, 30.0]), solver='nearest')
+    assert result.routes == {'u0': ('t0', 't1'), 'u1': ('t2',)}
 
 
 def test_each_bid_of_the_auction_builds_on_what_was_won():
-    made = plan(*on_a_line([0.0, 100.0], [40.0, 52.0, 90.0]), solver='auction')
-    assert made.routes == {'u0': (), 'u1': ('t2', 't1', 't0')}  # 10 < 38 < 12 < u0's 40
+    result = plan(*on_a_line([0.0, 100.0], [40.0, 52.0, 90.0]), solver='auction')
+    assert result.routes == {'u0': (), 'u1': ('t2', 't1', 't0')}  # 10 < 38 < 12 < u0's 40

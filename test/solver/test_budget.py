@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The search for ways around many zones keeps the budget, and what it leaves out is not flown."""
+"""Path searches around many zones keep the budget; legs without a known path are not flown."""
 import itertools
 import math
 
@@ -31,79 +31,80 @@ def overlapping(count, seed, side=1500.0, tasks=12):
 
 
 class Ticking:
-    """A clock that advances by a millisecond each time it is asked."""
+    """A clock that advances by a millisecond at each call."""
 
     def __init__(self):
-        self.asked = 0
+        self.calls = 0
 
     def __call__(self):
-        self.asked += 1
-        return 0.001 * self.asked
+        self.calls += 1
+        return 0.001 * self.calls
 
 
-def check(made, uavs, tasks, zones):
+def check(result, uavs, tasks, zones):
     """Every task is served on clear legs or left out with a reason."""
     place = {task.id: task.position for task in tasks}
-    served = [name for row in made.routes.values() for name in row]
-    assert sorted([*served, *made.unassigned]) == sorted(place)
-    assert all(made.unassigned.values())
+    served = [name for row in result.routes.values() for name in row]
+    assert sorted([*served, *result.unassigned]) == sorted(place)
+    assert all(result.unassigned.values())
     for uav in uavs:
         here = uav.position
-        for name, leg in zip(made.routes[uav.id], made.legs[uav.id], strict=True):
+        for name, leg in zip(result.routes[uav.id], result.legs[uav.id], strict=True):
             assert math.isfinite(leg.length)
             assert path_is_clear([here, *leg.via, place[name]], zones)
             here = place[name]
 
 
-def test_finding_20_the_clock_is_asked_while_ways_are_sought():
+def test_finding_20_the_clock_is_read_during_path_searches():
     uavs, tasks, zones = overlapping(40, 1)
     clock = Ticking()
-    made = plan(uavs, tasks, zones, budget=0.05, max_iterations=0, clock=clock)
-    assert 20 <= clock.asked <= 100  # half the budget is for ways; twice the budget at most
-    check(made, uavs, tasks, zones)
+    result = plan(uavs, tasks, zones, budget=0.05, max_iterations=0, clock=clock)
+    assert 20 <= clock.calls <= 100  # half the budget for paths; at most twice the budget
+    check(result, uavs, tasks, zones)
 
 
-def test_finding_20_a_stop_from_the_start_is_answered_with_what_is_known():
+def test_finding_20_a_stop_from_the_start_returns_a_plan_of_known_legs():
     uavs, tasks, zones = overlapping(40, 1)
-    asked = itertools.count()
-    made = plan(uavs, tasks, zones, budget=1000.0, stop=lambda: next(asked) >= 0)
-    assert next(asked) < 100
-    check(made, uavs, tasks, zones)
-    assert any(IN_TIME in why for why in made.unassigned.values())
-    assert any(made.routes.values())
+    polls = itertools.count()
+    result = plan(uavs, tasks, zones, budget=1000.0, stop=lambda: next(polls) >= 0)
+    assert next(polls) < 100
+    check(result, uavs, tasks, zones)
+    assert any(IN_TIME in reason for reason in result.unassigned.values())
+    assert any(result.routes.values())
 
 
 @pytest.mark.parametrize('seed', range(8))
-def test_finding_20_what_was_not_found_in_the_time_is_not_flown(seed):
+def test_finding_20_legs_not_found_in_time_are_not_flown(seed):
     uavs, tasks, zones = overlapping(60, seed, tasks=20)
-    made = plan(uavs, tasks, zones, budget=0.02, clock=Ticking(), seed=seed)
-    check(made, uavs, tasks, zones)
-    again = plan(uavs, tasks, zones, budget=0.02, clock=Ticking(), seed=seed, warm=made)
+    result = plan(uavs, tasks, zones, budget=0.02, clock=Ticking(), seed=seed)
+    check(result, uavs, tasks, zones)
+    again = plan(uavs, tasks, zones, budget=0.02, clock=Ticking(), seed=seed, warm=result)
     check(again, uavs, tasks, zones)
-    assert len(again.unassigned) <= len(made.unassigned)
+    assert len(again.unassigned) <= len(result.unassigned)
 
 
-def test_finding_20_what_was_not_found_in_the_time_is_found_later():
+def test_finding_20_legs_not_found_in_time_are_found_later():
     uavs, tasks, zones = overlapping(40, 1)
     whole = plan(uavs, tasks, zones, budget=1000.0, max_iterations=0)
-    made = plan(uavs, tasks, zones, budget=0.02, max_iterations=0, clock=Ticking())
-    assert len(made.unassigned) > len(whole.unassigned)
+    result = plan(uavs, tasks, zones, budget=0.02, max_iterations=0, clock=Ticking())
+    assert len(result.unassigned) > len(whole.unassigned)
     for _ in range(1000):
-        if len(made.unassigned) == len(whole.unassigned):
+        if len(result.unassigned) == len(whole.unassigned):
             break
-        made = plan(uavs, tasks, zones, budget=0.05, max_iterations=0, clock=Ticking(), warm=made)
-    assert made.unassigned.keys() == whole.unassigned.keys()
+        result = plan(uavs, tasks, zones, budget=0.05, max_iterations=0, clock=Ticking(),
+                      warm=result)
+    assert result.unassigned.keys() == whole.unassigned.keys()
 
 
-def test_finding_20_a_stop_takes_no_task_from_a_plan_that_is_flown():
+def test_finding_20_a_stop_removes_no_task_from_the_earlier_plan():
     uavs, tasks, zones = overlapping(40, 1)
-    made = plan(uavs, tasks, zones, budget=1000.0, max_iterations=0)
+    result = plan(uavs, tasks, zones, budget=1000.0, max_iterations=0)
     moved = [Uav(uav.id, tuple(np.add(uav.position, (0.0, 0.0, 0.5)))) for uav in uavs]
-    after = plan(moved, tasks, zones, budget=1000.0, stop=lambda: True, warm=made)
-    assert after.unassigned.keys() == made.unassigned.keys()
+    after = plan(moved, tasks, zones, budget=1000.0, stop=lambda: True, warm=result)
+    assert after.unassigned.keys() == result.unassigned.keys()
 
 
-def test_finding_20_what_stop_raises_comes_out_of_plan():
+def test_finding_20_an_exception_of_stop_is_raised_by_plan():
     def stop():
         raise KeyboardInterrupt
 
@@ -111,37 +112,37 @@ def test_finding_20_what_stop_raises_comes_out_of_plan():
         plan(*overlapping(40, 1), budget=1000.0, stop=stop)
 
 
-def test_finding_20_a_way_that_is_flown_is_taken_where_none_is_found_in_the_time():
+def test_finding_20_a_leg_that_is_flown_is_kept_where_no_path_is_found_in_time():
     ends = [(0.0, 0.0, 50.0), (1000.0, 100.0, 50.0)]
     via = Distances(ends, [WALL, PLUG]).leg(0, 1).via
     budget = SearchBudget()
-    ways = Distances(ends, [WALL, PLUG], budget=budget)
+    distances = Distances(ends, [WALL, PLUG], budget=budget)
     budget.start_stage(0)
-    assert ways.length(0, 1) == math.inf
-    assert ways.given_up(0, 1)
-    assert not ways.offer_path(0, 1, [(500.0, 0.0, 50.0)])  # inside
-    assert ways.offer_path(0, 1, [(-50.0, 0.0, 50.0), *via])
-    assert math.isfinite(ways.length(0, 1))
-    assert ways.leg(0, 1).length == ways.length(0, 1)
-    assert path_is_clear([ends[0], *ways.leg(0, 1).via, ends[1]], [WALL, PLUG])
+    assert distances.length(0, 1) == math.inf
+    assert distances.given_up(0, 1)
+    assert not distances.offer_path(0, 1, [(500.0, 0.0, 50.0)])  # inside
+    assert distances.offer_path(0, 1, [(-50.0, 0.0, 50.0), *via])
+    assert math.isfinite(distances.length(0, 1))
+    assert distances.leg(0, 1).length == distances.length(0, 1)
+    assert path_is_clear([ends[0], *distances.leg(0, 1).via, ends[1]], [WALL, PLUG])
 
 
 @pytest.mark.parametrize('start', [(0.0, 0.0, 50.0), (310.0, 0.0, 50.0)])
-def test_finding_20_where_a_task_goes_the_way_over_it_stays(start):
+def test_finding_20_the_path_over_a_removed_task_stays_usable(start):
     tasks = [Task('between', (500.0, 520.0, 50.0)), Task('last', (1000.0, 20.0, 50.0))]
     problem = make_problem([Uav('u', start)], tasks, {}, Limits((WALL, PLUG)), Rules())
     a, routes = problem.arrays, empty_routes(problem.arrays)
     insert(a, routes, 1, 0)
     insert(a, routes, 2, 1)
     whole = routes.length[0]
-    ways = Distances(problem.distances.points, (WALL, PLUG))  # knows but these two
-    over = ways.length(0, 1) + ways.length(1, 2)
-    ways.budget.start_stage(0)
-    arrays = a._replace(pairs=ways.pairs)
+    distances = Distances(problem.distances.points, (WALL, PLUG))  # knows only these two
+    over = distances.length(0, 1) + distances.length(1, 2)
+    distances.budget.start_stage(0)
+    arrays = a._replace(pairs=distances.pairs)
     remove(arrays, routes, 1)
     assert routes.length[0] == pytest.approx(whole) == pytest.approx(over)
-    assert ways.length(0, 2) == pytest.approx(over)
-    leg = ways.leg(0, 2)
+    assert distances.length(0, 2) == pytest.approx(over)
+    leg = distances.leg(0, 2)
     assert tasks[0].position in leg.via
     first = leg.via[0] if inside(start, WALL) else start
     assert path_is_clear([first, *leg.via, tasks[1].position], [WALL, PLUG])

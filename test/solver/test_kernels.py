@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The kernels: sums stay true, undo undoes, neighbours are the nearest."""
+"""The kernels: sums stay consistent, undo restores the routes, neighbours are the nearest."""
 import subprocess
 import sys
 from dataclasses import replace
@@ -7,47 +7,48 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
-from plan_checks import make, problem
+from plan_checks import make, random_problem
 
 from uav_task_alloc.model import Task, ThreatZone
-from uav_task_alloc.solver import routes as of
-from uav_task_alloc.solver.insertion import cheapest_first
-from uav_task_alloc.solver.neighbours import nearest
+from uav_task_alloc.solver.insertion import insert_cheapest_first
+from uav_task_alloc.solver.neighbours import find_nearest
 from uav_task_alloc.solver.problem import Limits, Rules, make_problem
-from uav_task_alloc.solver.rng import below, chance, uniform
+from uav_task_alloc.solver.rng import below, rng_state, uniform
+from uav_task_alloc.solver.routes import DISTANCE, copy, empty_routes, leg_length
 from uav_task_alloc.solver.ruin import empty_log, recreate, ruin, undo
 
-NOBODY = np.empty(0, np.int64)
+NO_NEW = np.empty(0, np.int64)
 
 
-def lengths(made, routes):
-    """Route lengths summed anew from the points."""
-    a, found = made.arrays, []
+def lengths(problem, routes):
+    """Route lengths recomputed from the legs."""
+    a, sums = problem.arrays, []
     for u in range(a.uavs):
         node, length = u, 0.0
         while node < a.ends:
-            length += of.step(a, node, routes.next[node])
+            length += leg_length(a, node, routes.next[node])
             node = routes.next[node]
-        found.append(length)
-    return found
+        sums.append(length)
+    return sums
 
 
 @settings(max_examples=25, deadline=None)
 @given(seed=st.integers(0, 2 ** 32), tasks=st.integers(1, 40), returns=st.booleans())
-def test_sums_stay_true_and_undo_undoes(seed, tasks, returns):
-    made = problem(3, tasks, seed, returns=returns)
-    routes, rng, log = of.empty_routes(made.arrays), chance(seed), empty_log(made.arrays)
-    cheapest_first(made.arrays, routes, rng)
+def test_sums_stay_consistent_and_undo_restores_the_routes(seed, tasks, returns):
+    problem = random_problem(3, tasks, seed, returns=returns)
+    routes, rng, log = empty_routes(problem.arrays), rng_state(seed), empty_log(problem.arrays)
+    insert_cheapest_first(problem.arrays, routes, rng)
     for i in range(20):
-        before = of.twin(routes)
-        log.hit[:] = -1
-        ruin(made.arrays, routes, log, 10.0, i, rng)
-        recreate(made.arrays, routes, log, rng)
-        assert routes.length == pytest.approx(lengths(made, routes), abs=1e-6)
-        assert routes.sums[of.DISTANCE] == pytest.approx(sum(lengths(made, routes)), abs=1e-6)
-        assert routes.tasks.sum() == (routes.on[made.arrays.uavs:made.arrays.ends] >= 0).sum()
+        before = copy(routes)
+        log.last_ruined[:] = -1
+        ruin(problem.arrays, routes, log, 10.0, i, rng)
+        recreate(problem.arrays, routes, log, rng)
+        assert routes.length == pytest.approx(lengths(problem, routes), abs=1e-6)
+        assert routes.sums[DISTANCE] == pytest.approx(sum(lengths(problem, routes)), abs=1e-6)
+        nodes = slice(problem.arrays.uavs, problem.arrays.ends)
+        assert routes.tasks.sum() == (routes.uav_of[nodes] >= 0).sum()
         if i % 2:
-            undo(made.arrays, routes, log)
+            undo(problem.arrays, routes, log)
             assert (routes.next == before.next).all()
             assert routes.length == pytest.approx(before.length, abs=1e-6)
 
@@ -56,17 +57,17 @@ def test_sums_stay_true_and_undo_undoes(seed, tasks, returns):
 def test_neighbours_are_the_nearest(n):
     xyz = np.random.default_rng(n).uniform(0.0, 100.0, (n, 3))
     k = min(10, n - 1)
-    ways = np.linalg.norm(xyz[:, None] - xyz[None], axis=2) + np.diag(np.full(n, np.inf))
+    lengths = np.linalg.norm(xyz[:, None] - xyz[None], axis=2) + np.diag(np.full(n, np.inf))
     found = np.full((n, k), -1)
-    squares = nearest(xyz, found, NOBODY)
+    squares = find_nearest(xyz, found, NO_NEW)
     for i in range(n):
-        assert ways[i, found[i]] == pytest.approx(np.sort(ways[i])[:k])
-        assert squares[i] == pytest.approx(np.sort(ways[i])[:k] ** 2)
+        assert lengths[i, found[i]] == pytest.approx(np.sort(lengths[i])[:k])
+        assert squares[i] == pytest.approx(np.sort(lengths[i])[:k] ** 2)
 
 
 def test_neighbours_of_coincident_points_are_found():
     found = np.full((3, 2), -1)
-    nearest(np.zeros((3, 3)), found, NOBODY)
+    find_nearest(np.zeros((3, 3)), found, NO_NEW)
     assert {tuple(sorted(row)) for row in found.tolist()} == {(0, 1), (0, 2), (1, 2)}
 
 
@@ -81,48 +82,48 @@ def test_neighbours_are_the_same_with_and_without_those_of_an_earlier_problem(zo
         tasks[7] = replace(tasks[7], position=(*rng.uniform(0.0, 1000.0, 2), 0.0))
         rng.shuffle(tasks)
         known = make_problem(uavs, tasks, {}, limits, Rules(), known)
-        anew = make_problem(uavs, tasks, {}, limits, Rules())
-        assert known.arrays.near_length == pytest.approx(anew.arrays.near_length)
+        fresh = make_problem(uavs, tasks, {}, limits, Rules())
+        assert known.arrays.near_length == pytest.approx(fresh.arrays.near_length)
         assert {*map(frozenset, known.arrays.near.tolist())} == {
-            *map(frozenset, anew.arrays.near.tolist())}
-        assert known.arrays.starts.tolist() == anew.arrays.starts.tolist()
+            *map(frozenset, fresh.arrays.near.tolist())}
+        assert known.arrays.starts.tolist() == fresh.arrays.starts.tolist()
 
 
 @pytest.mark.parametrize('hard', [True, False])
-def test_starts_whose_range_does_not_get_there_are_no_neighbours_where_ranges_are_hard(hard):
+def test_starts_out_of_range_are_no_neighbours_where_ranges_are_hard(hard):
     uavs, tasks = make(12, 30)
     uavs = [replace(uav, range=400.0 if i % 2 else 0.0) for i, uav in enumerate(uavs)]
     a = make_problem(uavs, tasks, {}, Limits(), Rules(hard=hard)).arrays
     for i in range(len(tasks)):
-        ways = np.array([of.step(a, u, a.uavs + i) for u in range(a.uavs)])
-        near = np.argsort(ways)
-        near = [u for u in near if not hard or ways[u] <= a.reach[u]][:a.starts.shape[1]]
+        legs = np.array([leg_length(a, u, a.uavs + i) for u in range(a.uavs)])
+        near = np.argsort(legs)
+        near = [u for u in near if not hard or legs[u] <= a.range_left[u]][:a.starts.shape[1]]
         got = a.start_length[i] < np.inf
         assert a.starts[i][got].tolist() == near
-        assert a.start_length[i][got] == pytest.approx(ways[near])
+        assert a.start_length[i][got] == pytest.approx(legs[near])
 
 
-def test_few_ways_are_sought_out_of_a_zone_that_none_leads_into():
+def test_few_searches_start_from_a_task_that_a_zone_contains():
     uavs, tasks = make(2, 200, 3, 1e9)
     around = ThreatZone.cylinder('around', tasks[7].position[:2], 5.0)
-    made = make_problem(uavs, tasks, {}, Limits((around,)), Rules())
-    routes = of.empty_routes(made.arrays)
-    cheapest_first(made.arrays, routes, chance(1))
-    slots = made.distances._table.slots(np.array([task.position for task in tasks]))
-    known = ~np.isnan(made.distances._table.cells[slots[7]])
+    problem = make_problem(uavs, tasks, {}, Limits((around,)), Rules())
+    routes = empty_routes(problem.arrays)
+    insert_cheapest_first(problem.arrays, routes, rng_state(1))
+    slots = problem.distances._table.slots(np.array([task.position for task in tasks]))
+    known = ~np.isnan(problem.distances._table.cells[slots[7]])
     assert known.sum() < 60  # from neighbours
-    assert routes.on[made.arrays.uavs + 7] < 0
+    assert routes.uav_of[problem.arrays.uavs + 7] < 0
 
 
-def test_chance_is_even_and_the_same_again():
-    state = chance(5)
+def test_random_numbers_are_uniform_and_repeatable():
+    state = rng_state(5)
     drawn = [uniform(state) for _ in range(4000)]
     assert 0.48 < np.mean(drawn) < 0.52
     assert min(drawn) >= 0.0
     assert max(drawn) < 1.0
-    again = chance(5)
-    assert drawn[0] == uniform(again)
-    assert {below(again, 3) for _ in range(100)} == {0, 1, 2}
+    same = rng_state(5)
+    assert drawn[0] == uniform(same)
+    assert {below(same, 3) for _ in range(100)} == {0, 1, 2}
 
 
 LOADED = """

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""No plan waits for the compiler: all kernels are loaded before its budget begins."""
+"""All kernels are loaded before the budget of a plan begins."""
 import subprocess
 import sys
 
-LOOK = """
+SCRIPT = """
 import sys
 
 from numba.core.registry import CPUDispatcher
@@ -35,5 +35,6 @@ print('late:', *sorted(loaded() - before))
 
 
 def test_a_tight_world_with_zones_finds_all_kernels_loaded():
-    seen = subprocess.run([sys.executable, '-c', LOOK], capture_output=True, text=True, check=True)
-    assert seen.stdout == 'late:\n'
+    done = subprocess.run([sys.executable, '-c', SCRIPT], capture_output=True, text=True,
+                          check=True)
+    assert done.stdout == 'late:\n'

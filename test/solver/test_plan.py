@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`plan` as its callers see it."""
+"""`plan`: routes, reasons, options, errors."""
 import math
 
 import pytest
@@ -18,36 +18,36 @@ def quick(uavs, tasks, zones=(), **options):
 @pytest.mark.parametrize('solver', SOLVERS)
 @pytest.mark.parametrize('route_end', ['hold', 'home'])
 @pytest.mark.parametrize('hard', [True, False])
-def test_every_solver_gives_a_right_plan(solver, route_end, hard):
+def test_every_solver_gives_a_valid_plan(solver, route_end, hard):
     uavs, tasks = make(3, 15, reach=1500.0)
-    made = quick(uavs, tasks, solver=solver, route_end=route_end, hard_range=hard,
+    result = quick(uavs, tasks, solver=solver, route_end=route_end, hard_range=hard,
                  max_iterations=20)
-    check(made, uavs, tasks, hard)
-    assert made.solver == solver
-    assert hard or not made.unassigned
+    check(result, uavs, tasks, hard)
+    assert result.solver == solver
+    assert hard or not result.unassigned
 
 
 def test_four_corners_are_flown_in_order():
     tasks = [Task(name, place) for name, place in (
         ('c', (100.0, 100.0, 0.0)), ('a', (100.0, 0.0, 0.0)), ('d', (0.0, 110.0, 0.0)))]
-    made = quick([ONE], tasks)
-    assert made.routes == {'u1': ('a', 'c', 'd')}
-    assert made.distance == pytest.approx(200.0 + math.hypot(100.0, 10.0))
-    assert [leg.via for leg in made.legs['u1']] == [(), (), ()]
+    result = quick([ONE], tasks)
+    assert result.routes == {'u1': ('a', 'c', 'd')}
+    assert result.distance == pytest.approx(200.0 + math.hypot(100.0, 10.0))
+    assert [leg.via for leg in result.legs['u1']] == [(), (), ()]
 
 
-def test_a_route_home_counts_the_way_to_a_home_elsewhere():
+def test_the_leg_to_a_separate_home_counts():
     uav = Uav('u1', (0.0, 0.0, 0.0), home=(0.0, 50.0, 0.0))
-    made = quick([uav], [Task('t', (100.0, 50.0, 0.0))], route_end='home')
-    assert made.distance == pytest.approx(math.hypot(100.0, 50.0) + 100.0)
-    assert made.returns
+    result = quick([uav], [Task('t', (100.0, 50.0, 0.0))], route_end='home')
+    assert result.distance == pytest.approx(math.hypot(100.0, 50.0) + 100.0)
+    assert result.returns
 
 
 def test_a_uav_without_tasks_flies_nowhere():
     uavs = [ONE, Uav('far', (9e3, 0.0, 0.0), home=(0.0, 9e3, 0.0))]
-    made = quick(uavs, [Task('t', (1.0, 0.0, 0.0))], route_end='home')
-    assert made.routes['far'] == ()
-    assert made.legs['far'] == ()
+    result = quick(uavs, [Task('t', (1.0, 0.0, 0.0))], route_end='home')
+    assert result.routes['far'] == ()
+    assert result.legs['far'] == ()
 
 
 def test_without_tasks_or_uavs_the_plan_is_empty():
@@ -59,15 +59,15 @@ def test_without_tasks_or_uavs_the_plan_is_empty():
 
 def test_coincident_points_and_range_0_are_served():
     tasks = [Task(f't{i}', (0.0, 0.0, 0.0)) for i in range(4)]
-    made = quick([Uav('u1', (0.0, 0.0, 0.0), range=0.0)], tasks)
-    assert not made.unassigned
-    assert made.distance == 0.0
+    result = quick([Uav('u1', (0.0, 0.0, 0.0), range=0.0)], tasks)
+    assert not result.unassigned
+    assert result.distance == 0.0
 
 
 def test_a_range_that_just_suffices_suffices():
-    made = quick([Uav('u1', (0.0, 0.0, 0.0), range=100.0)], [Task('t', (100.0, 0.0, 0.0))])
-    assert made.routes == {'u1': ('t',)}
-    assert made.penalty == 0.0
+    result = quick([Uav('u1', (0.0, 0.0, 0.0), range=100.0)], [Task('t', (100.0, 0.0, 0.0))])
+    assert result.routes == {'u1': ('t',)}
+    assert result.penalty == 0.0
 
 
 @pytest.mark.parametrize(('task', 'reason'), [
@@ -79,96 +79,96 @@ def test_a_range_that_just_suffices_suffices():
      'not allowed: only u9 may serve it'),
     (Task('t', (100.0, 100.0, 10.0)), 'inside zone z'),
 ])
-def test_a_task_that_nobody_can_serve_is_left_out_with_the_reason(task, reason):
+def test_a_task_that_no_uav_can_serve_is_unassigned_with_a_reason(task, reason):
     uav = Uav('u1', (0.0, 0.0, 0.0), 300.0, capabilities=frozenset({'camera'}))
     zone = ThreatZone.hemisphere('z', (100.0, 100.0, 0.0), 50.0)
-    made = quick([uav], [task, Task('near', (2.0, 0.0, 0.0))], [zone])
-    assert made.unassigned == {'t': reason}
-    assert made.routes == {'u1': ('near',)}
+    result = quick([uav], [task, Task('near', (2.0, 0.0, 0.0))], [zone])
+    assert result.unassigned == {'t': reason}
+    assert result.routes == {'u1': ('near',)}
 
 
 def test_where_ranges_do_not_suffice_the_most_value_is_served():
     tasks = [Task('poor', (-90.0, 0.0, 0.0)), Task('rich', (90.0, 0.0, 0.0), value=5.0),
              Task('on the way', (50.0, 0.0, 0.0))]
-    made = quick([Uav('u1', (0.0, 0.0, 0.0), range=100.0)], tasks)
-    assert made.routes == {'u1': ('on the way', 'rich')}
-    assert made.unassigned == {'poor': 'left out: the ranges do not suffice for all tasks'}
+    result = quick([Uav('u1', (0.0, 0.0, 0.0), range=100.0)], tasks)
+    assert result.routes == {'u1': ('on the way', 'rich')}
+    assert result.unassigned == {'poor': 'left out: the ranges do not suffice for all tasks'}
 
 
 def test_with_soft_range_every_task_is_served_at_a_penalty():
-    made = quick([Uav('u1', (0.0, 0.0, 0.0), 30.0)], [Task('t', (100.0, 0.0, 0.0))],
+    result = quick([Uav('u1', (0.0, 0.0, 0.0), 30.0)], [Task('t', (100.0, 0.0, 0.0))],
                  hard_range=False)
-    assert made.routes == {'u1': ('t',)}
-    assert made.penalty == 70.0
+    assert result.routes == {'u1': ('t',)}
+    assert result.penalty == 70.0
 
 
 def test_a_restricted_task_is_served_wherever_its_uav_is():
     uavs, tasks = make(4, 40)
     tasks += [Task(f'only{i}', (10.0, 10.0, 0.0), allowed_uavs=frozenset({f'u{i}'}))
               for i in range(4)]
-    made = quick(uavs, tasks)
-    check(made, uavs, tasks)
-    assert not made.unassigned
+    result = quick(uavs, tasks)
+    check(result, uavs, tasks)
+    assert not result.unassigned
 
 
 def test_legs_lead_around_zones():
     zone = ThreatZone.cylinder('z', (50.0, 0.0), 20.0)
-    made = quick([ONE], [Task('t', (100.0, 0.0, 0.0))], [zone])
-    leg, = made.legs['u1']
+    result = quick([ONE], [Task('t', (100.0, 0.0, 0.0))], [zone])
+    leg, = result.legs['u1']
     assert leg.via
-    assert leg.length == made.distance > 100.0
+    assert leg.length == result.distance > 100.0
 
 
 def test_locked_tasks_come_first_in_their_order():
     uavs, tasks = make(3, 12)
-    made = quick(uavs, tasks, locked={'u1': ['t7', 't2'], 'gone': ['t1'], 'u2': ['gone']})
-    check(made, uavs, tasks)
-    assert made.routes['u1'][:2] == ('t7', 't2')
+    result = quick(uavs, tasks, locked={'u1': ['t7', 't2'], 'unknown': ['t1'], 'u2': ['unknown']})
+    check(result, uavs, tasks)
+    assert result.routes['u1'][:2] == ('t7', 't2')
 
 
-def test_a_locked_uav_flies_home_behind_its_task():
-    made = quick([ONE], [Task('t', (100.0, 0.0, 0.0))], locked={'u1': ['t']}, route_end='home')
-    assert made.distance == 200.0
-    assert [leg.length for leg in made.legs['u1']] == [100.0, 100.0]
+def test_a_locked_uav_flies_home_after_its_task():
+    result = quick([ONE], [Task('t', (100.0, 0.0, 0.0))], locked={'u1': ['t']}, route_end='home')
+    assert result.distance == 200.0
+    assert [leg.length for leg in result.legs['u1']] == [100.0, 100.0]
 
 
-def test_a_locked_task_that_a_zone_swallows_is_left_out():
+def test_a_locked_task_inside_a_zone_is_left_out():
     zone = ThreatZone.hemisphere('z', (100.0, 0.0, 0.0), 50.0)
-    made = quick([ONE], [Task('t', (100.0, 0.0, 10.0))], [zone], locked={'u1': ['t']})
-    assert made.unassigned == {'t': 'inside zone z'}
+    result = quick([ONE], [Task('t', (100.0, 0.0, 10.0))], [zone], locked={'u1': ['t']})
+    assert result.unassigned == {'t': 'inside zone z'}
 
 
 def test_the_history_falls_and_ends_with_the_fit():
     uavs, tasks = make(3, 30)
-    made = quick(uavs, tasks)
-    fits = [fit for _, fit in made.history]
+    result = quick(uavs, tasks)
+    fits = [fit for _, fit in result.history]
     assert fits == sorted(fits, reverse=True)
-    assert fits[-1] == pytest.approx(made.fit)
+    assert fits[-1] == pytest.approx(result.fit)
 
 
 def test_the_budget_is_kept_on_the_given_clock():
     now = iter(i * 0.01 for i in range(10_000))
     uavs, tasks = make(3, 30)
-    made = plan(uavs, tasks, budget=1.0, clock=lambda: next(now))
-    assert 0.9 <= made.solve_time <= 1.3
+    result = plan(uavs, tasks, budget=1.0, clock=lambda: next(now))
+    assert 0.9 <= result.solve_time <= 1.3
 
 
-def test_every_iteration_is_told_with_the_best_fit_so_far():
+def test_every_iteration_is_reported_with_the_best_fit_so_far():
     uavs, tasks = make(3, 30)
-    told = []
-    made = quick(uavs, tasks, on_iteration=lambda *each: told.append(each))
-    counts, fits = zip(*told, strict=True)
+    calls = []
+    result = quick(uavs, tasks, on_iteration=lambda *each: calls.append(each))
+    counts, fits = zip(*calls, strict=True)
     assert sorted(set(counts)) == list(counts)
-    assert counts[-1] == made.iterations >= 300
+    assert counts[-1] == result.iterations >= 300
     assert sorted(fits, reverse=True) == list(fits)
-    assert fits[-1] == pytest.approx(made.fit)
+    assert fits[-1] == pytest.approx(result.fit)
 
 
-def test_stop_ends_the_search_with_the_answer_so_far():
+def test_stop_ends_the_search_with_the_best_plan_so_far():
     uavs, tasks = make(3, 30)
-    made = plan(uavs, tasks, budget=60.0, stop=lambda: True)
-    check(made, uavs, tasks)
-    assert made.iterations == 0
+    result = plan(uavs, tasks, budget=60.0, stop=lambda: True)
+    check(result, uavs, tasks)
+    assert result.iterations == 0
 
 
 @pytest.mark.parametrize(('options', 'text'), [
@@ -195,37 +195,37 @@ def test_ids_are_used_once():
         plan(['u1'], [])
 
 
-def test_two_uavs_cannot_hold_one_task():
+def test_a_task_cannot_be_locked_to_two_uavs():
     with pytest.raises(InvalidValue, match='not locked to u1, too'):
         plan([ONE, Uav('u2', (0.0, 0.0, 0.0))], [Task('t', (0.0, 0.0, 0.0))],
              locked={'u1': ['t'], 'u2': ['t']})
 
 
-def test_an_unknown_solver_is_named_with_the_known_ones():
+def test_an_unknown_solver_is_refused_with_the_known_names():
     with pytest.raises(UnknownName, match=r"solver 'magic': expected one of chain_q, "):
         plan([ONE], [], solver='magic')
 
 
 @pytest.mark.parametrize('solver', SOLVERS)
 @pytest.mark.parametrize('route_end', ['hold', 'home'])
-def test_a_task_inside_a_zone_is_left_out_however_long_bees_fly(solver, route_end):
+def test_a_task_inside_a_zone_is_left_out_by_every_solver(solver, route_end):
     uavs, tasks = make(3, 12, seed=4, reach=4000.0)
     over = tasks[5].position
     dome = ThreatZone.hemisphere('dome', (over[0] + 5.0, over[1], 0.0), 60.0)
-    made = quick(uavs, tasks, [dome], solver=solver, route_end=route_end,
+    result = quick(uavs, tasks, [dome], solver=solver, route_end=route_end,
                  max_iterations=6000 if solver == 'chain_q' else 60)
-    check(made, uavs, tasks)
-    assert made.unassigned == {'t5': 'inside zone dome'}
+    check(result, uavs, tasks)
+    assert result.unassigned == {'t5': 'inside zone dome'}
 
 
 @pytest.mark.parametrize('reach', [math.inf, 9e4])
 @pytest.mark.parametrize('zone', [ThreatZone.cylinder('z', (0.0, 0.0), 50.0),
                                   ThreatZone.hemisphere('z', (0.0, 0.0, -1.0), 50.0)])
-def test_a_home_inside_a_zone_is_the_reason_why_nothing_is_flown(reach, zone):
+def test_a_home_inside_a_zone_is_the_reason_that_no_task_is_served(reach, zone):
     uav = Uav('u1', (300.0, 0.0, 30.0), reach, home=(0.0, 0.0, 0.0))
-    made = quick([uav], [Task('t', (350.0, 0.0, 30.0))], [zone], route_end='home')
-    assert made.routes == {'u1': ()}
-    assert made.unassigned == {'t': 'no safe way home; home of u1 lies inside zone z'}
+    result = quick([uav], [Task('t', (350.0, 0.0, 30.0))], [zone], route_end='home')
+    assert result.routes == {'u1': ()}
+    assert result.unassigned == {'t': 'no safe way home; home of u1 lies inside zone z'}
     assert quick([uav], [Task('t', (350.0, 0.0, 30.0))], [zone]).routes == {'u1': ('t',)}
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The recorder's best as a Plan: ids, legs with their detour points, reasons, figures."""
+"""Converts the recorder's best routes to a Plan: ids, legs with detour points, reasons, sums."""
 from __future__ import annotations
 
 import math
@@ -16,14 +16,21 @@ from uav_task_alloc.solver.reasons import reasons
 from uav_task_alloc.solver.recorder import Recorder
 from uav_task_alloc.solver.routes import Routes
 
-_ROUNDING = 1e-6  # [m] beyond range that is no excess
-_STRAIGHT = 1.0 + 1e-12  # a way at most so much longer than the distance has no detour points
+_RANGE_TOLERANCE = 1e-6  # [m] smaller excess over a range is rounding
+_STRAIGHT_RATIO = 1.0 + 1e-12  # a leg up to so much longer than the distance is straight
 
 
 def to_plan(problem: Problem, recorder: Recorder, solver: str, warm: bool) -> Plan:
-    """What `plan` answers, but for its state."""
+    """The plan of the recorder's best routes, without the state for a warm start.
+
+    Args:
+        problem: what was solved.
+        recorder: holds the best routes and their history.
+        solver: name of the solver.
+        warm: whether the solve started from an earlier plan.
+    """
     order = nodes_of(recorder.best, len(problem.uavs))
-    lost = _drop_lost(problem, order) if problem.distances.zones else []
+    unreachable = _drop_unreachable(problem, order) if problem.distances.zones else []
     ids, routes = [task.id for task in problem.tasks], {}
     for uav, nodes in zip(problem.uavs, order, strict=True):
         held = problem.locked.get(uav.id, ())
@@ -35,40 +42,40 @@ def to_plan(problem: Problem, recorder: Recorder, solver: str, warm: bool) -> Pl
               for task in held}
     value = math.fsum(values[task_id] for row in routes.values() for task_id in row)
     distance, penalty = math.fsum(lengths), excess(problem.uavs, lengths)
-    penalty = penalty if penalty > _ROUNDING else 0.0
-    on = recorder.best.on[len(problem.uavs):problem.arrays.ends].copy()
-    on[lost] = -1
-    left = np.flatnonzero(on < 0)
+    penalty = penalty if penalty > _RANGE_TOLERANCE else 0.0
+    uav_of = recorder.best.uav_of[len(problem.uavs):problem.arrays.ends].copy()
+    uav_of[unreachable] = -1
+    unassigned = np.flatnonzero(uav_of < 0)
     return Plan(
-        routes, reasons(problem, left), distance, value,
+        routes, reasons(problem, unassigned), distance, value,
         penalty, fit(distance, value, penalty, problem.rules.weights),
         tuple(recorder.history), None, legs, problem.rules.returns, solver,
         recorder.elapsed(), recorder.iterations, warm)
 
 
 def nodes_of(routes: Routes, uavs: int) -> list[list[int]]:
-    """Task nodes of each UAV in order."""
-    following, found = routes.next.tolist(), []
+    """Task nodes of each of the `uavs` UAVs in order."""
+    following, nodes = routes.next.tolist(), []
     ends = len(following) - uavs
     for u in range(uavs):
         row, node = [], following[u]
         while node < ends:
             row.append(node)
             node = following[node]
-        found.append(row)
-    return found
+        nodes.append(row)
+    return nodes
 
 
-def _drop_lost(problem: Problem, order: list[list[int]]) -> list[int]:
-    """Take tasks out of the order that no way is known to after all; returns those, from 0.
+def _drop_unreachable(problem: Problem, order: list[list[int]]) -> list[int]:
+    """Remove tasks that no path is known to; returns their indices, from 0.
 
-    A safety net: where time was over a length may have been believed, or forgotten again.
+    A safeguard: where the budget ran out, a length may have been estimated, or dropped again.
     """
-    ways, lost = problem.distances, []
+    distances, lost = problem.distances, []
     for u, nodes in enumerate(order):
         place = problem.locked_places(u)[-1]
         for node in tuple(nodes):
-            if _leg(ways, place, node).length < math.inf:
+            if _leg_between(distances, place, node).length < math.inf:
                 place = node
             else:
                 nodes.remove(node)
@@ -77,17 +84,17 @@ def _drop_lost(problem: Problem, order: list[list[int]]) -> list[int]:
 
 
 def _all_legs(problem: Problem, order: list[list[int]]) -> Iterator[tuple[Leg, ...]]:
-    """Of each UAV a leg before each task, locked ones too, and one home where routes return."""
-    rows = [_places(problem, u, nodes) for u, nodes in enumerate(order)]
+    """Legs of each UAV: one before each task, locked ones included, and one home."""
+    rows = [_route_places(problem, u, nodes) for u, nodes in enumerate(order)]
     points = problem.distances.points[list(chain.from_iterable(rows))]
-    steps, last = np.sqrt((np.diff(points, axis=0) ** 2).sum(axis=1)).tolist(), 0
+    straight, last = np.sqrt((np.diff(points, axis=0) ** 2).sum(axis=1)).tolist(), 0
     for places in rows:
         first, last = last, last + len(places)
-        yield _legs(problem, places, steps[first:last - 1])
+        yield _legs(problem, places, straight[first:last - 1])
 
 
-def _places(problem: Problem, u: int, nodes: list[int]) -> list[int]:
-    """Where UAV u comes by, from its start to its home where routes return and it can."""
+def _route_places(problem: Problem, u: int, nodes: list[int]) -> list[int]:
+    """Points of UAV u's route: start, tasks, and its home where routes return and it can."""
     places, home = [*problem.locked_places(u), *nodes], problem.arrays.ends + u
     if problem.rules.returns and len(places) > 1 and (
             problem.distances.length(places[-1], home) < math.inf):
@@ -95,13 +102,16 @@ def _places(problem: Problem, u: int, nodes: list[int]) -> list[int]:
     return places
 
 
-def _legs(problem: Problem, places: list[int], steps: list[float]) -> tuple[Leg, ...]:
+def _legs(problem: Problem, places: list[int], straight: list[float]) -> tuple[Leg, ...]:
+    """The legs between places; `straight` are the distances between them [m]."""
     if not problem.distances.zones:
-        return tuple([Leg((), metres) for metres in steps])
-    return tuple(_leg(problem.distances, i, j) for i, j in pairwise(places))
+        return tuple([Leg((), metres) for metres in straight])
+    return tuple(_leg_between(problem.distances, i, j) for i, j in pairwise(places))
 
 
-def _leg(ways: Distances, i: int, j: int) -> Leg:
+def _leg_between(distances: Distances, i: int, j: int) -> Leg:
     """The leg from i to j; without detour points where it is straight."""
-    metres = math.dist(ways.points[i], ways.points[j])
-    return Leg((), metres) if ways.length(i, j) <= metres * _STRAIGHT else ways.leg(i, j)
+    metres = math.dist(distances.points[i], distances.points[j])
+    if distances.length(i, j) <= metres * _STRAIGHT_RATIO:
+        return Leg((), metres)
+    return distances.leg(i, j)

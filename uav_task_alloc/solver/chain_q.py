@@ -1,57 +1,68 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The product, chain_q: colonies of bees, one a thread, improve the recorder's best in time."""
+"""The default solver, chain_q: bee colonies, one a thread, improve the recorder's best plan."""
 from __future__ import annotations
 
 import threading
 
 from uav_task_alloc.solver.colony import Colony, ColonyParams
 from uav_task_alloc.solver.recorder import Recorder
-from uav_task_alloc.solver.warm import repaired
+from uav_task_alloc.solver.warm import repair
 
-COLD_START, WARM_START = ColonyParams(), ColonyParams(hot=0.3, cold=0.02, again=3.0)
-_LONGEST = 0.005  # [s] between looks at the clock
-FIXED = 100  # rounds a flight where iterations are limited
-EXCHANGES = 20  # times that colonies look at each other's best
+COLD_START = ColonyParams()
+WARM_START = ColonyParams(start_temperature=0.3, end_temperature=0.02, reheat_temperature=3.0)
+_ROUND_TIME = 0.005  # [s] of one flight: the clock is read between flights
+FIXED_ROUNDS = 100  # rounds of a flight where iterations are limited
+EXCHANGES = 20  # how often in a budget a colony takes over the recorder's best
 
 
 def solve(recorder: Recorder, seed: int, learnt: object = None,
-          habits: ColonyParams | None = None) -> object:
-    """Fly until the budget ends; returns the tables for the next warm start."""
+          params: ColonyParams | None = None) -> object:
+    """Improve the recorder's best until the budget ends. An iteration: one ruin and recreate.
+
+    Args:
+        recorder: holds the problem, the best routes and the budget.
+        seed: of the random numbers; thread i uses seed + 7919 i.
+        learnt: what an earlier call returned, or None.
+        params: of the colonies; None: COLD_START or WARM_START.
+
+    Returns:
+        The Q tables, for the next warm start.
+    """
     problem = recorder.problem
     if not recorder.history:
-        recorder.offer(repaired(problem, {}))
+        recorder.offer(repair(problem, {}))
     if not problem.tasks or not problem.uavs or recorder.over():
         return learnt
-    habits = habits or (WARM_START if recorder.warm else COLD_START)
-    colonies = [Colony(problem, recorder.best, seed + 7919 * i, habits, learnt)
+    params = params or (WARM_START if recorder.warm else COLD_START)
+    colonies = [Colony(problem, recorder.best, seed + 7919 * i, params, learnt)
                 for i in range(recorder.threads)]
-    others = [threading.Thread(target=_live, args=(each, recorder), daemon=True)
+    others = [threading.Thread(target=_run_colony, args=(each, recorder), daemon=True)
               for each in colonies[1:]]
     for thread in others:
         thread.start()
-    _live(colonies[0], recorder)
+    _run_colony(colonies[0], recorder)
     for thread in others:
         thread.join()
     return colonies[0].scouts.learnt()
 
 
-def _live(colony: Colony, recorder: Recorder) -> None:
-    """Rounds of bees, each about as long as the clock may stay unseen."""
-    fixed = recorder.max_iterations is not None  # then nothing may depend on the clock
-    rounds, first, since = FIXED if fixed else 64, recorder.spent(), recorder.elapsed()
-    spent, step, met = first, 0.0, first
+def _run_colony(colony: Colony, recorder: Recorder) -> None:
+    """Run flights of about _ROUND_TIME until the recorder ends the solve."""
+    fixed = recorder.max_iterations is not None  # then nothing depends on the clock
+    rounds, first, since = FIXED_ROUNDS if fixed else 64, recorder.spent(), recorder.elapsed()
+    spent, step, exchanged = first, 0.0, first
     while not recorder.over():
         share = (spent - first) / (1.0 - first)
         flown = colony.fly(share, min(1.0, share + step), rounds)
         recorder.offer(colony.best)
         recorder.count(max(1, flown))
-        if recorder.threads > 1 and spent - met > 1.0 / EXCHANGES:
-            met = spent
-            recorder.teach(colony.best)
+        if recorder.threads > 1 and spent - exchanged > 1.0 / EXCHANGES:
+            exchanged = spent
+            recorder.copy_best_to(colony.best)
         before, spent = spent, recorder.spent()
         now = recorder.elapsed()
         step = spent - before
         if flown and not fixed:
-            aim = min(_LONGEST, recorder.budget - now)
-            rounds = max(16, min(100_000, int(rounds * min(4.0, aim / max(1e-6, now - since)))))
+            target = min(_ROUND_TIME, recorder.budget - now)
+            rounds = max(16, min(100_000, int(rounds * min(4.0, target / max(1e-6, now - since)))))
         since = now

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What `plan` refuses, with value, expectation and place."""
+"""Checks of the arguments of `plan`; errors state value, expectation and place."""
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -9,30 +9,31 @@ from typing import TypeVar
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.model import Task, ThreatZone, Uav, check_number
 
-Named = TypeVar('Named', Task, Uav, ThreatZone)
+_Named = TypeVar('_Named', Task, Uav, ThreatZone)
 ROUTE_ENDS = ('hold', 'home')
-LONGEST = 86_400.0  # [s]
+MAX_BUDGET = 86_400.0  # [s]
 
 
-def check_unique(kind: str, given: Iterable[Named], wanted: type[Named]) -> tuple[Named, ...]:
-    """All of the wanted type, no id twice. Raises InvalidValue."""
-    if not isinstance(given, Iterable):
-        raise InvalidValue(f'{kind}s', given, f'an iterable of {wanted.__name__}')
-    found = tuple(given)
+def check_unique(kind: str, values: Iterable[_Named],
+                 expected: type[_Named]) -> tuple[_Named, ...]:
+    """The objects as a tuple; raises InvalidValue for a wrong type or a repeated id."""
+    if not isinstance(values, Iterable):
+        raise InvalidValue(f'{kind}s', values, f'an iterable of {expected.__name__}')
+    checked = tuple(values)
     seen: set[str] = set()
-    for each in found:
-        if not isinstance(each, wanted):
-            raise InvalidValue(f'{kind}s', each, f'a {wanted.__name__}')
+    for each in checked:
+        if not isinstance(each, expected):
+            raise InvalidValue(f'{kind}s', each, f'a {expected.__name__}')
         if each.id in seen:
             raise InvalidValue(f'{kind} id', each.id, 'an id used once')
         seen.add(each.id)
-    return found
+    return checked
 
 
 def check_options(budget: float, seed: int, route_end: str, threads: int,
                   max_iterations: int | None) -> None:
-    """The options of `plan` that are no objects of the world. Raises InvalidValue."""
-    check_number('budget', budget, 0.0, LONGEST)
+    """Check the scalar options of `plan`; raises InvalidValue."""
+    check_number('budget', budget, 0.0, MAX_BUDGET)
     if not isinstance(seed, Integral):
         raise InvalidValue('seed', seed, 'an integer')
     if route_end not in ROUTE_ENDS:
@@ -46,9 +47,10 @@ def check_options(budget: float, seed: int, route_end: str, threads: int,
 
 def check_locked(locked: Mapping[str, Sequence[str]] | None, uavs: Sequence[Uav],
                  tasks: Sequence[Task]) -> dict[str, tuple[Task, ...]]:
-    """Locked tasks by UAV; UAVs and tasks that are gone are passed over.
+    """Locked tasks by UAV id; unknown UAVs and tasks are ignored.
 
-    Raises InvalidValue where two UAVs hold one task.
+    Raises:
+        InvalidValue: a task is locked to two UAVs.
     """
     if not locked:
         return {}

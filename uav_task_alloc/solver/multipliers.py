@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Lagrange multipliers of tasks, and what columns of the pool cost less them.
+"""Lagrange multipliers of tasks and reduced costs of the columns of the pool.
 
-Relaxed is that each task is served once or left out; what remains is that each UAV flies at most
-one column. Subgradient optimization after Held, Wolfe and Crowder (1974).
+The relaxed constraint is that each task is served once or stays unassigned; the one that remains
+is that each UAV flies at most one column. Subgradient optimization: Held, Wolfe and Crowder,
+Validation of Subgradient Optimization, Mathematical Programming 6 (1974).
 """
 from __future__ import annotations
 
@@ -14,22 +15,26 @@ from uav_task_alloc.kernel import allocating_kernel, kernel
 from uav_task_alloc.solver.pool import Pool
 from uav_task_alloc.solver.routes import TINY, Arrays, Floats, Ints
 
-FEWEST, MOST = 30, 1000  # steps
-PATIENCE, SHORTER = 8, 0.7  # after so many steps in vain they get so much shorter
+MIN_STEPS, MAX_STEPS = 30, 1000  # subgradient steps
+STALLED_STEPS, STEP_FACTOR = 8, 0.7  # after so many steps without gain they shrink by so much
 
 
 class Reduced(NamedTuple):
-    """Reduced costs, none below 0 [m]: a plan costs the bound and those of all it consists of."""
+    """Reduced costs >= 0 [m]: a plan costs the bound plus those of all that it consists of."""
 
-    column: Floats  # of flying it
-    stay: Floats  # (m) of a UAV without tasks
-    left: Floats  # (m + n) of leaving a task out, by node
+    column: Floats  # by column, of flying it
+    stay: Floats  # (m) of a UAV that gets no tasks
+    unassigned: Floats  # (m + n) of not serving a task, by node
 
 
 @kernel
 def _bound(a: Arrays, pool: Pool, price: Floats, reduced: Floats, least: Floats,
            chosen: Ints) -> float:
-    """Costs less multipliers; the least of each UAV, 0 if it stays, and its column; the bound."""
+    """Lower bound [m] for these multipliers. O(stops of the pool).
+
+    price: (m + n) multipliers. Writes reduced: cost of each column less its multipliers;
+    least: (m) the least of them for each UAV, 0 if it stays; chosen: (m) its column or -1.
+    """
     least[:] = 0.0
     chosen[:] = -1
     for e in range(pool.size[0]):
@@ -49,9 +54,9 @@ def _bound(a: Arrays, pool: Pool, price: Floats, reduced: Floats, least: Floats,
 
 @allocating_kernel
 def _first_prices(a: Arrays, pool: Pool, flown: Ints) -> Floats:
-    """Multipliers by node, no more than leaving a task out costs, that share out what is flown."""
+    """First multipliers by node: the costs of the columns flown, split among their tasks. O(n)."""
     price = np.zeros(a.ends)
-    price[a.uavs:] = a.price
+    price[a.uavs:] = a.unassigned_cost
     for e in flown[flown >= 0]:
         begin, end = pool.first[e], pool.first[e + 1]
         for i in range(begin, end):
@@ -62,7 +67,7 @@ def _first_prices(a: Arrays, pool: Pool, flown: Ints) -> Floats:
 
 @kernel
 def _count(pool: Pool, chosen: Ints, served: Ints) -> None:
-    """How often each task is served by the chosen columns."""
+    """Write to `served` how many of the chosen columns contain each node. O(n)."""
     served[:] = 0
     for e in chosen:
         if e >= 0:
@@ -73,35 +78,36 @@ def _count(pool: Pool, chosen: Ints, served: Ints) -> None:
 @allocating_kernel
 def reduced_costs(a: Arrays, pool: Pool, flown: Ints, worth: float,
                   work: float) -> tuple[Reduced, float]:
-    """Reduced costs for a high lower bound, and that bound; the columns flown cost `worth` [m].
+    """Reduced costs for a high lower bound [m], and that bound. O(work).
 
-    Looks at about `work` stops.
+    flown: (m) column of each UAV or -1; they and unassigned tasks cost `worth` [m]; `work` is how
+    many stops of the pool may be read.
     """
     price = _first_prices(a, pool, flown)
-    kept, highest, length, vain = price.copy(), -np.inf, 1.0, 0
+    best_price, highest, length, stalled = price.copy(), -np.inf, 1.0, 0
     reduced, least = np.empty(pool.size[0]), np.empty(a.uavs)
     chosen, served = np.empty(a.uavs, np.int64), np.empty(a.ends, np.int64)
     steps = work / max(1, pool.first[pool.size[0]])
-    for _ in range(int(min(MOST, max(FEWEST, steps)))):
+    for _ in range(int(min(MAX_STEPS, max(MIN_STEPS, steps)))):
         bound = _bound(a, pool, price, reduced, least, chosen)
-        vain += 1
+        stalled += 1
         if bound > highest:
             if bound > highest + 1e-4 * abs(worth - bound):
-                vain = 0
-            kept[:], highest = price, bound
-        if vain >= PATIENCE:
-            vain, length = 0, SHORTER * length
-            price[:] = kept
+                stalled = 0
+            best_price[:], highest = price, bound
+        if stalled >= STALLED_STEPS:
+            stalled, length = 0, STEP_FACTOR * length
+            price[:] = best_price
             continue
         _count(pool, chosen, served)
-        wrong = ((served[a.uavs:] - 1) ** 2).sum()
-        if wrong == 0 or highest >= worth - TINY:
+        violation = ((served[a.uavs:] - 1) ** 2).sum()
+        if violation == 0 or highest >= worth - TINY:
             break
-        stride = length * (worth - bound) / wrong
+        stride = length * (worth - bound) / violation
         for t in range(a.uavs, a.ends):
-            price[t] = min(a.price[t - a.uavs], price[t] + stride * (1 - served[t]))
-    highest = _bound(a, pool, kept, reduced, least, chosen)
+            price[t] = min(a.unassigned_cost[t - a.uavs], price[t] + stride * (1 - served[t]))
+    highest = _bound(a, pool, best_price, reduced, least, chosen)
     for e in range(reduced.size):
         reduced[e] -= least[pool.uav[e]]
-    kept[a.uavs:] = a.price - kept[a.uavs:]
-    return Reduced(reduced, -least, kept), highest
+    best_price[a.uavs:] = a.unassigned_cost - best_price[a.uavs:]
+    return Reduced(reduced, -least, best_price), highest

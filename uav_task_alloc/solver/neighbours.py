@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Who is near whom: nearest tasks by a grid, nearest starts by looking at all."""
+"""Neighbour lists: nearest tasks by a grid, nearest starts by comparing all."""
 from __future__ import annotations
 
 import math
@@ -7,15 +7,19 @@ import math
 import numpy as np
 
 from uav_task_alloc.kernel import allocating_kernel, inline_kernel, kernel
-from uav_task_alloc.solver.rng import Chance, below, uniform
-from uav_task_alloc.solver.routes import TINY, Arrays, Floats, Ints, step
+from uav_task_alloc.solver.rng import RngState, below, uniform
+from uav_task_alloc.solver.routes import TINY, Arrays, Floats, Ints, leg_length
 
-NOISE = 4096  # random numbers drawn once, to begin at any of them
+_NOISE = 4096  # random numbers drawn once; each task reads them from a random offset
 
 
 @allocating_kernel
 def _cells(xyz: Floats, per_cell: float) -> tuple[Ints, Ints, Ints, Floats]:
-    """Points sorted into square cells: cell of each, first of each cell, order, (x0, y0, side)."""
+    """Points (n, 3) sorted into square cells, O(n).
+
+    Returns the cell of each point (n), the first index of each cell in the order, with one more
+    entry for the end, the order (n), and (x0, y0, side) of the grid [m].
+    """
     n = len(xyz)
     x0, y0 = xyz[:, 0].min(), xyz[:, 1].min()
     wide = max(xyz[:, 0].max() - x0, xyz[:, 1].max() - y0, 1e-6)
@@ -35,8 +39,8 @@ def _cells(xyz: Floats, per_cell: float) -> tuple[Ints, Ints, Ints, Floats]:
 
 
 @kernel
-def _keep(ids: Ints, squares: Floats, kept: int, j: int, square: float) -> int:
-    """Insert j into the sorted front of `ids`, nearest first; returns how many are kept."""
+def _insert_sorted(ids: Ints, squares: Floats, kept: int, j: int, square: float) -> int:
+    """Insert j into the first `kept` ids, nearest first; returns how many are kept now. O(k)."""
     k = ids.size
     if kept == k and square >= squares[k - 1]:
         return kept
@@ -50,16 +54,17 @@ def _keep(ids: Ints, squares: Floats, kept: int, j: int, square: float) -> int:
 
 @inline_kernel
 def _square(xyz: Floats, i: int, j: int) -> float:
+    """Squared distance [m^2] of two points. O(1)."""
     x, y, z = xyz[i, 0] - xyz[j, 0], xyz[i, 1] - xyz[j, 1], xyz[i, 2] - xyz[j, 2]
     return float(x * x + y * y + z * z)
 
 
 @allocating_kernel
-def nearest(xyz: Floats, near: Ints, fresh: Ints) -> Floats:
-    """Fill near (n, k) with the k nearest others of each point, nearest first. O(n k) about.
+def find_nearest(xyz: Floats, near: Ints, fresh: Ints) -> Floats:
+    """Fill near (n, k) with the k nearest others of each point, nearest first. About O(n k).
 
-    Returns their squared distances as the crow flies. A row that begins with -1 is searched for;
-    in another stand those that were nearest before the points `fresh` came.
+    Returns their squared Euclidean distances (n, k) [m^2]. A row that begins with -1 is searched
+    for; any other row holds the nearest points before the points `fresh` were added.
     """
     n, k = near.shape
     squares = np.empty((n, k))
@@ -71,9 +76,10 @@ def nearest(xyz: Floats, near: Ints, fresh: Ints) -> Floats:
     for i in range(n):
         if near[i, 0] >= 0:
             held[:], kept = near[i], 0
-            for some in (held, fresh):
-                for m in range(some.size):
-                    kept = _keep(near[i], squares[i], kept, some[m], _square(xyz, i, some[m]))
+            for ids in (held, fresh):
+                for m in range(ids.size):
+                    kept = _insert_sorted(near[i], squares[i], kept, ids[m],
+                                          _square(xyz, i, ids[m]))
             continue
         row, column, kept, ring = cell[i] // across, cell[i] % across, 0, 0
         while ring < across:
@@ -88,14 +94,17 @@ def nearest(xyz: Floats, near: Ints, fresh: Ints) -> Floats:
                     for m in range(first[y * across + x], first[y * across + x + 1]):
                         j = order[m]
                         if j != i:
-                            kept = _keep(near[i], squares[i], kept, j, _square(xyz, i, j))
+                            kept = _insert_sorted(near[i], squares[i], kept, j, _square(xyz, i, j))
             ring += 1
     return squares
 
 
 @kernel
-def near_tasks(a: Arrays, found: Ints, squares: Floats) -> None:
-    """Fill a.near with the found neighbours in order of the way to fly. O(n k^2)."""
+def fill_near_tasks(a: Arrays, found: Ints, squares: Floats) -> None:
+    """Fill a.near (n, k) with neighbours, sorted by leg length. O(n k^2).
+
+    found: (n, k) tasks from 0; squares: (n, k) their squared Euclidean distances [m^2].
+    """
     n, k = a.near.shape
     for i in range(n):
         for m in range(k):
@@ -103,9 +112,9 @@ def near_tasks(a: Arrays, found: Ints, squares: Floats) -> None:
             if a.straight:
                 a.near[i, m], a.near_length[i, m] = j, math.sqrt(squares[i, m])
                 continue
-            d = step(a, j, t)  # inf: t lies inside a zone
+            d = leg_length(a, j, t)  # inf: t lies inside a zone
             if d < np.inf:
-                d = max(d, step(a, t, j))  # inf: j does
+                d = max(d, leg_length(a, t, j))  # inf: j does
             while place > 0 and a.near_length[i, place - 1] > d:
                 a.near[i, place] = a.near[i, place - 1]
                 a.near_length[i, place] = a.near_length[i, place - 1]
@@ -114,41 +123,41 @@ def near_tasks(a: Arrays, found: Ints, squares: Floats) -> None:
 
 
 @allocating_kernel
-def near_starts(a: Arrays, xyz: Floats, rng: Chance) -> None:
-    """Fill a.starts with the starts nearest to each task, equally near ones shuffled. O(n m).
+def fill_near_starts(a: Arrays, xyz: Floats, rng: RngState) -> None:
+    """Fill a.starts (n, s) with the starts nearest to each task, equal ones shuffled. O(n m).
 
-    Where no range is exceeded, UAVs that cannot get there are no neighbours, and the price of
-    tasks that nobody can get to becomes 0.
+    Where ranges are hard, UAVs that cannot reach the task are left out, and the unassigned cost
+    of tasks that no UAV can reach becomes 0.
     """
     n, s = a.starts.shape
-    squares, every, shuffled = np.empty(s), np.empty(a.uavs), np.empty(a.uavs)
+    squares, squared, shuffled = np.empty(s), np.empty(a.uavs), np.empty(a.uavs)
     xs, ys, zs = xyz[:a.uavs, 0].copy(), xyz[:a.uavs, 1].copy(), xyz[:a.uavs, 2].copy()
-    most = np.full(a.uavs, np.inf)  # square of how far it gets
+    most = np.full(a.uavs, np.inf)  # [m^2] squared range
     if a.hard:
         for u in range(a.uavs):
-            most[u] = (a.reach[u] + TINY) ** 2 if a.reach[u] >= 0.0 else -1.0
-    noise = np.empty(NOISE + a.uavs)
+            most[u] = (a.range_left[u] + TINY) ** 2 if a.range_left[u] >= 0.0 else -1.0
+    noise = np.empty(_NOISE + a.uavs)
     for m in range(noise.size):
         noise[m] = 1e-6 * uniform(rng)
     for i in range(n):
         kept, t, spare, row = 0, a.uavs + i, -np.inf, a.starts[i]
         x, y, z = xyz[t, 0], xyz[t, 1], xyz[t, 2]
-        some = noise[below(rng, NOISE):]
-        for u in range(a.uavs):  # nothing else in this loop: many at once
-            every[u] = (xs[u] - x) ** 2 + (ys[u] - y) ** 2 + (zs[u] - z) ** 2
-            shuffled[u] = every[u] + some[u] * (every[u] + 1.0)
+        noise_from = noise[below(rng, _NOISE):]
+        for u in range(a.uavs):  # kept minimal so that LLVM vectorises it
+            squared[u] = (xs[u] - x) ** 2 + (ys[u] - y) ** 2 + (zs[u] - z) ** 2
+            shuffled[u] = squared[u] + noise_from[u] * (squared[u] + 1.0)
         for u in range(a.uavs):
-            if a.picky[i] and not a.may[u, i]:
+            if a.restricted[i] and not a.compatible[u, i]:
                 continue
-            more = a.reach[u] - spare
-            if more > 0.0 and every[u] < more * more:
-                spare = a.reach[u] - math.sqrt(every[u])
-            if every[u] <= most[u] and (kept < s or shuffled[u] < squares[s - 1]):
-                kept = _keep(row, squares, kept, u, shuffled[u])
+            more = a.range_left[u] - spare
+            if more > 0.0 and squared[u] < more * more:
+                spare = a.range_left[u] - math.sqrt(squared[u])
+            if squared[u] <= most[u] and (kept < s or shuffled[u] < squares[s - 1]):
+                kept = _insert_sorted(row, squares, kept, u, shuffled[u])
         if a.hard and spare < -TINY:
-            a.price[i] = 0.0
+            a.unassigned_cost[i] = 0.0
         for m in range(s):
             if m < kept:
-                a.start_length[i, m] = step(a, a.starts[i, m], t)
+                a.start_length[i, m] = leg_length(a, a.starts[i, m], t)
             else:
                 a.starts[i, m], a.start_length[i, m] = 0, np.inf

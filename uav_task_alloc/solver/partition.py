@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Set partitioning for a group of UAVs: which columns of the pool serve its tasks at least cost.
+"""Set partitioning for a group of UAVs: the columns of the pool that serve its tasks cheapest.
 
-Branch and bound in depth: the next task not served yet that has fewest columns is served by each
-of them that fits, those with the least reduced cost first, or left out.
+Depth-first branch and bound: branch on the unserved task with the fewest columns; try each column
+that fits, those with the least reduced cost first, then leave the task unassigned.
 """
 from __future__ import annotations
 
@@ -17,34 +17,34 @@ from uav_task_alloc.solver.pool import Pool
 from uav_task_alloc.solver.routes import TINY, Floats, Ints
 
 Flags = NDArray[np.bool_]
-OPEN, LEFT_OUT = -1, -2  # instead of a column: nothing tried yet; the task is left out
+UNTRIED, UNSERVED = -1, -2  # instead of a column: nothing tried yet; the task is not served
 
 
 class Branches(NamedTuple):
-    """What there is to choose from."""
+    """The columns to choose from."""
 
-    tasks: Ints  # nodes, those with fewest columns first
-    begin: Ints  # by node: where its columns begin in `column`; and where the last one's end
-    column: Ints  # by task, those with the least reduced cost first
+    tasks: Ints  # task nodes, those with the fewest columns first
+    begin: Ints  # by node: first index of its columns in `column`; one more entry for the end
+    column: Ints  # columns of each task, those with the least reduced cost first
 
 
-class Path(NamedTuple):
-    """What is chosen so far, by depth."""
+class Choices(NamedTuple):
+    """The choices so far, by depth."""
 
-    task: Ints  # place in Branches.tasks
-    at: Ints  # next place in Branches.column
-    took: Ints  # column, OPEN or LEFT_OUT
-    spent: Floats  # [m] reduced cost before
-    served: Flags  # by node
-    flies: Flags  # by UAV
+    task: Ints  # index in Branches.tasks
+    next_choice: Ints  # next index in Branches.column
+    choice: Ints  # column, UNTRIED or UNSERVED
+    spent: Floats  # [m] reduced cost of the choices before
+    task_served: Flags  # by node
+    uav_used: Flags  # by UAV
 
 
 @allocating_kernel
 def _candidates(pool: Pool, reduced: Reduced, group: Flags, tasks: Ints, spare: float) -> Ints:
-    """Columns of a group that serve none but its tasks, those with the least cost first."""
-    inside = np.zeros(reduced.left.size, np.bool_)
+    """Columns of a group that serve only its tasks, least reduced cost first. O(stops of pool)."""
+    inside = np.zeros(reduced.unassigned.size, np.bool_)
     inside[tasks] = True
-    some, count = np.empty(pool.size[0], np.int64), 0
+    columns, count = np.empty(pool.size[0], np.int64), 0
     for e in range(pool.size[0]):
         fits = group[pool.uav[e]] and reduced.column[e] < spare
         i = pool.first[e]
@@ -52,23 +52,23 @@ def _candidates(pool: Pool, reduced: Reduced, group: Flags, tasks: Ints, spare: 
             fits = inside[pool.stops[i]]
             i += 1
         if fits:
-            some[count] = e
+            columns[count] = e
             count += 1
-    some = some[:count]
-    return some[np.argsort(reduced.column[some])]
+    columns = columns[:count]
+    return columns[np.argsort(reduced.column[columns])]
 
 
 @allocating_kernel
-def _branches(pool: Pool, some: Ints, tasks: Ints, nodes: int) -> Branches:
-    """Columns by task."""
+def _branches(pool: Pool, columns: Ints, tasks: Ints, nodes: int) -> Branches:
+    """Sort columns by task. O(stops of the columns)."""
     begin = np.zeros(nodes + 1, np.int64)
-    for e in some:
+    for e in columns:
         for i in range(pool.first[e], pool.first[e + 1]):
             begin[pool.stops[i] + 1] += 1
     order = tasks[np.argsort(begin[tasks + 1])]
     begin[:] = np.cumsum(begin)
     column, fill = np.empty(begin[nodes], np.int64), begin.copy()
-    for e in some:
+    for e in columns:
         for i in range(pool.first[e], pool.first[e + 1]):
             column[fill[pool.stops[i]]] = e
             fill[pool.stops[i]] += 1
@@ -76,120 +76,122 @@ def _branches(pool: Pool, some: Ints, tasks: Ints, nodes: int) -> Branches:
 
 
 @inline_kernel
-def _mark(pool: Pool, e: int, path: Path, chosen: bool) -> None:
-    """Column e is chosen, or no longer."""
-    path.flies[pool.uav[e]] = chosen
+def _set_chosen(pool: Pool, e: int, chosen: Choices, flies: bool) -> None:
+    """Mark column e as chosen or not. O(stops of the column)."""
+    chosen.uav_used[pool.uav[e]] = flies
     for i in range(pool.first[e], pool.first[e + 1]):
-        path.served[pool.stops[i]] = chosen
+        chosen.task_served[pool.stops[i]] = flies
 
 
 @inline_kernel
-def _fits(pool: Pool, e: int, path: Path) -> bool:
-    """Whether column e goes with what is chosen."""
-    if path.flies[pool.uav[e]]:
+def _fits(pool: Pool, e: int, chosen: Choices) -> bool:
+    """Whether column e is compatible with the chosen ones. O(stops of the column)."""
+    if chosen.uav_used[pool.uav[e]]:
         return False
-    for i in range(pool.first[e], pool.first[e + 1]):  # noqa: SIM110 - numba knows no any()
-        if path.served[pool.stops[i]]:
+    for i in range(pool.first[e], pool.first[e + 1]):
+        if chosen.task_served[pool.stops[i]]:
             return False
     return True
 
 
 @inline_kernel
-def _next_branch(pool: Pool, reduced: Reduced, b: Branches, path: Path, depth: int,
+def _next_branch(pool: Pool, reduced: Reduced, b: Branches, chosen: Choices, depth: int,
                  spare: float) -> tuple[float, int]:
-    """Take the next column that fits, or leave the task out: (cost with it, columns tried).
+    """Choose the next column that fits, or none: (cost with it [m], columns tried).
 
-    The cost is inf where nothing is left to be tried.
+    The cost is inf where no choice is left.
     """
-    t, spent = b.tasks[path.task[depth]], path.spent[depth]
-    begin, end = path.at[depth], b.begin[t + 1]
+    t, spent = b.tasks[chosen.task[depth]], chosen.spent[depth]
+    begin, end = chosen.next_choice[depth], b.begin[t + 1]
     i = begin
     while i < end and spent + reduced.column[b.column[i]] < spare:
-        if _fits(pool, b.column[i], path):
-            path.took[depth], path.at[depth] = b.column[i], i + 1
-            _mark(pool, b.column[i], path, True)
+        if _fits(pool, b.column[i], chosen):
+            chosen.choice[depth], chosen.next_choice[depth] = b.column[i], i + 1
+            _set_chosen(pool, b.column[i], chosen, True)
             return spent + reduced.column[b.column[i]], i + 1 - begin
         i += 1
-    path.at[depth] = end
-    if spent + reduced.left[t] < spare:
-        path.took[depth] = LEFT_OUT
-        path.served[t] = True
-        return spent + reduced.left[t], i - begin
+    chosen.next_choice[depth] = end
+    if spent + reduced.unassigned[t] < spare:
+        chosen.choice[depth] = UNSERVED
+        chosen.task_served[t] = True
+        return spent + reduced.unassigned[t], i - begin
     return np.inf, i - begin
 
 
 @inline_kernel
-def _open_branch(b: Branches, path: Path, depth: int, place: int, spent: float) -> None:
-    """Begin to serve the task at that place in the order."""
-    path.task[depth], path.at[depth] = place, b.begin[b.tasks[place]]
-    path.took[depth], path.spent[depth] = OPEN, spent
+def _open_branch(b: Branches, chosen: Choices, depth: int, place: int, spent: float) -> None:
+    """Start a branch on the task at that index of the order. O(1)."""
+    chosen.task[depth], chosen.next_choice[depth] = place, b.begin[b.tasks[place]]
+    chosen.choice[depth], chosen.spent[depth] = UNTRIED, spent
 
 
 @inline_kernel
-def _take_over(pool: Pool, group: Flags, b: Branches, path: Path, depth: int, flown: Ints,
-               on: Ints) -> None:
-    """The group flies what was chosen."""
+def _store_choices(pool: Pool, group: Flags, b: Branches, chosen: Choices, depth: int, flown: Ints,
+               uav_of: Ints) -> None:
+    """Write the chosen columns to flown and uav_of. O(tasks)."""
     for u in range(group.size):
         if group[u]:
             flown[u] = -1
     for t in b.tasks:
-        on[t] = -1
+        uav_of[t] = -1
     for d in range(depth + 1):
-        e = path.took[d]
+        e = chosen.choice[d]
         if e >= 0:
             flown[pool.uav[e]] = e
             for i in range(pool.first[e], pool.first[e + 1]):
-                on[pool.stops[i]] = pool.uav[e]
+                uav_of[pool.stops[i]] = pool.uav[e]
 
 
 @allocating_kernel
-def _search(pool: Pool, reduced: Reduced, group: Flags, b: Branches, spare: float, limit: int,
-            flown: Ints, on: Ints) -> tuple[bool, int]:
-    """See `repartition`; `spare` [m] is the reduced cost of what is flown now."""
+def _branch_and_bound(pool: Pool, reduced: Reduced, group: Flags, b: Branches, spare: float,
+                      limit: int, flown: Ints, uav_of: Ints) -> tuple[bool, int]:
+    """See `repartition`; `spare` [m] is the reduced cost of the current columns."""
     room = b.tasks.size
-    path = Path(np.empty(room, np.int64), np.empty(room, np.int64), np.empty(room, np.int64),
-                np.empty(room), np.zeros(reduced.left.size, np.bool_),
-                np.zeros(group.size, np.bool_))
-    depth, tried, found = 0, 0, False
-    _open_branch(b, path, 0, 0, 0.0)
+    chosen = Choices(np.empty(room, np.int64), np.empty(room, np.int64), np.empty(room, np.int64),
+                     np.empty(room), np.zeros(reduced.unassigned.size, np.bool_),
+                     np.zeros(group.size, np.bool_))
+    depth, tried, improved = 0, 0, False
+    _open_branch(b, chosen, 0, 0, 0.0)
     while depth >= 0 and tried < limit:
-        if path.took[depth] >= 0:
-            _mark(pool, path.took[depth], path, False)
-        if path.took[depth] == LEFT_OUT:  # the last branch
-            path.served[b.tasks[path.task[depth]]] = False
+        if chosen.choice[depth] >= 0:
+            _set_chosen(pool, chosen.choice[depth], chosen, False)
+        if chosen.choice[depth] == UNSERVED:  # the last branch
+            chosen.task_served[b.tasks[chosen.task[depth]]] = False
             depth -= 1
             continue
-        spent, looked = _next_branch(pool, reduced, b, path, depth, spare)
-        tried += 1 + looked
+        spent, attempts = _next_branch(pool, reduced, b, chosen, depth, spare)
+        tried += 1 + attempts
         if spent == np.inf:
             depth -= 1
             continue
-        place = path.task[depth]
-        while place < room and path.served[b.tasks[place]]:
+        place = chosen.task[depth]
+        while place < room and chosen.task_served[b.tasks[place]]:
             place += 1
         if place < room:
             depth += 1
-            _open_branch(b, path, depth, place, spent)
+            _open_branch(b, chosen, depth, place, spent)
             continue
-        spent += reduced.stay[group & ~path.flies].sum()
+        spent += reduced.stay[group & ~chosen.uav_used].sum()
         if spent < spare:
-            spare, found = spent - TINY, True
-            _take_over(pool, group, b, path, depth, flown, on)
-    return found, tried
+            spare, improved = spent - TINY, True
+            _store_choices(pool, group, b, chosen, depth, flown, uav_of)
+    return improved, tried
 
 
 @allocating_kernel
 def repartition(pool: Pool, reduced: Reduced, group: Flags, tasks: Ints, limit: int,
-                flown: Ints, on: Ints) -> tuple[bool, int]:
-    """Give a group of UAVs the columns through their tasks that cost least together.
+                flown: Ints, uav_of: Ints) -> tuple[bool, int]:
+    """Choose the cheapest columns for a group of UAVs and its tasks.
 
-    flown: column by UAV, -1: none; on: UAV by node, -1: left out; both are changed. Tries about
-    `limit` columns at most. Returns whether less is spent than before, and how many were tried.
+    group: (m) bool; tasks: int64 task nodes; flown: (m) column of each UAV, -1: none; uav_of:
+    (m + n) UAV by node, -1: unassigned. The last two are changed. Tries about `limit` columns.
+    Returns whether the cost fell, and how many columns were tried.
     """
-    spare = reduced.stay[group & (flown < 0)].sum() + reduced.left[tasks[on[tasks] < 0]].sum()
+    spare = reduced.stay[group & (flown < 0)].sum()
+    spare += reduced.unassigned[tasks[uav_of[tasks] < 0]].sum()
     spare += reduced.column[flown[group & (flown >= 0)]].sum() - TINY
     if tasks.size == 0 or spare <= 0.0:
         return False, 1
-    some = _candidates(pool, reduced, group, tasks, spare)
-    branches = _branches(pool, some, tasks, on.size)
-    return _search(pool, reduced, group, branches, spare, limit, flown, on)
+    columns = _candidates(pool, reduced, group, tasks, spare)
+    branches = _branches(pool, columns, tasks, uav_of.size)
+    return _branch_and_bound(pool, reduced, group, branches, spare, limit, flown, uav_of)

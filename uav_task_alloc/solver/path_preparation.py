@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Which ways around zones are sought before a solve, in which order, and for how long.
+"""Which paths around zones are searched for before a solve, in which order, and for how long.
 
-First those that are flown already, then the straight ones, then those around zones, each with
-little work at first: one that takes long must not keep many easy ones from being found.
+First the legs that are flown already, then straight ones, then those around zones, each with a
+small work limit at first, so that one hard search does not prevent many easy ones.
 """
 from __future__ import annotations
 
@@ -16,21 +16,29 @@ from uav_task_alloc.geometry.search_budget import UNLIMITED, SearchBudget
 from uav_task_alloc.model import Leg
 from uav_task_alloc.solver.routes import Arrays, Ints
 
-FLOWN, SOUGHT = 0.25, 0.5  # shares of the budget that are over when these searches end
-_LEAST = 0.02  # [s] of budget: with less no way is found at all
-ROUNDS = (0, 100_000, 1_000_000, 10_000_000, UNLIMITED)  # units of work that one search may take
-_IN_FLIGHT = 20_000_000  # for a way that is flown already
-IN_SEARCH = 1_000_000  # for one that bees ask for
+FLOWN_SHARE, NEAR_SHARE = 0.25, 0.5  # shares of the budget at which these searches end
+_MIN_BUDGET = 0.02  # [s] shorter budgets are taken as this: else no path is found at all
+WORK_LIMITS = (0, 100_000, 1_000_000, 10_000_000, UNLIMITED)  # of one search, in units of work
+_FLOWN_LIMIT = 20_000_000  # of a search for a leg that is flown already
+SEARCH_LIMIT = 1_000_000  # of a search that the solver causes
 
 
 class PathPreparation:
-    """The search budget of one solve; `flown` are the legs of the previous plan by UAV."""
+    """The path searches of one solve.
+
+    Args:
+        clock: [s], monotonic.
+        began: [s] when the solve began.
+        budget: [s] of the solve.
+        stop: returns True to end the solve.
+        flown: by UAV id the task ids and legs of the earlier plan.
+    """
 
     def __init__(self, clock: Callable[[], float], began: float, budget: float,
                  stop: Callable[[], bool] | None = None,
                  flown: Mapping[str, tuple[Sequence[str], Sequence[Leg]]] | None = None) -> None:
         self.path_budget, self.flown = SearchBudget(self._over), flown or {}
-        self._clock, self._began, self._budget = clock, began, max(budget, _LEAST)
+        self._clock, self._began, self._budget = clock, began, max(budget, _MIN_BUDGET)
         self._stop: Callable[[], bool] | None = stop
         self._share, self._heeds_stop = 1.0, True
 
@@ -40,20 +48,22 @@ class PathPreparation:
         return self._clock() - self._began >= self._share * self._budget
 
     def begin(self, share: float, most: int, heeds_stop: bool = True) -> None:
-        """Until this share of the budget is over each search may take `most` units of work.
+        """Allow each search `most` units of work until this share of the budget is used.
 
-        What is known of the ways that are flown does not depend on `stop`: an answer without them
-        would take tasks away.
+        The search for legs that are flown ignores `stop`: without them tasks of the earlier plan
+        would be dropped.
         """
         self._share, self._heeds_stop = share, heeds_stop
         self.path_budget.start_stage(most)
 
-    def find_flown(self, ways: Distances, place: Mapping[str, int]) -> None:
-        """Seek the legs that are flown already; `place` has UAVs' starts and tasks by id.
+    def find_flown(self, distances: Distances, place: Mapping[str, int]) -> None:
+        """Search for the legs that are flown already.
 
-        What is not found is taken as it is flown, where that is still clear.
+        Args:
+            distances: of the problem; a leg not found keeps its known path, where that is clear.
+            place: index in `distances` of UAV starts and tasks, by id.
         """
-        self.begin(FLOWN, _IN_FLIGHT, heeds_stop=False)
+        self.begin(FLOWN_SHARE, _FLOWN_LIMIT, heeds_stop=False)
         rows = []
         for uav_id, (tasks, legs) in self.flown.items():
             stops = [place.get(name, -1) for name in (uav_id, *tasks)]
@@ -61,21 +71,21 @@ class PathPreparation:
             via += [()] * (len(tasks) - len(via))
             rows += [(i, j, points) for (i, j), points in zip(pairwise(stops), via, strict=True)
                      if i >= 0 and j >= 0]
-        if not rows or not ways.zones:
+        if not rows or not distances.zones:
             return
-        ways.ensure([row[0] for row in rows], [row[1] for row in rows])
+        distances.ensure([row[0] for row in rows], [row[1] for row in rows])
         for i, j, points in rows if self.path_budget.interrupted else ():
-            if ways.given_up(i, j):
-                ways.offer_path(i, j, points)
+            if distances.given_up(i, j):
+                distances.offer_path(i, j, points)
 
-    def find_near(self, ways: Distances, a: Arrays, near: Ints) -> None:
-        """Seek the ways from each task to the tasks near it (rows of `near`), and from starts."""
+    def find_near(self, distances: Distances, a: Arrays, near: Ints) -> None:
+        """Search for the paths to each task from near tasks (n, k) and from near starts."""
         n, count = near.shape
         tasks = np.arange(n) + a.uavs
         origins = np.concatenate([a.starts.T.ravel(), np.tile(tasks, count)])
         goals = np.concatenate([np.tile(tasks, a.starts.shape[1]), near.T.ravel() + a.uavs])
-        for most in ROUNDS:
-            self.begin(SOUGHT, most, heeds_stop=most > 0)
-            ways.ensure(origins, goals)
+        for most in WORK_LIMITS:
+            self.begin(NEAR_SHARE, most, heeds_stop=most > 0)
+            distances.ensure(origins, goals)
             if self.path_budget.is_exhausted or not self.path_budget.interrupted:
                 break

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The route pool: columns of a set partitioning problem, collected from what bees fly."""
+"""The route pool: columns of a set partitioning problem, collected during the search."""
 from __future__ import annotations
 
 from typing import Any, NamedTuple
@@ -10,45 +10,46 @@ from numpy.typing import NDArray
 from uav_task_alloc.kernel import inline_kernel, kernel
 from uav_task_alloc.solver.routes import NODE, TINY, Arrays, Floats, Ints, Nodes, Routes
 
-COLUMNS, STOPS = 1 << 14, 1 << 18  # room; a pool that runs out of it begins anew
-MASK: Any = np.uint64(2 * COLUMNS - 1)
+MAX_COLUMNS, MAX_STOPS = 1 << 14, 1 << 18  # capacity; a full pool is emptied
+_MASK: Any = np.uint64(2 * MAX_COLUMNS - 1)
 
 
 class Pool(NamedTuple):
-    """Columns: who serves which tasks at what cost, each in the shortest order seen."""
+    """Columns, each a UAV, a set of tasks and the cost of the shortest order seen."""
 
-    word: NDArray[np.uint64]  # (m + n) a random number a node
-    table: Ints  # open addressing: column, -1: free
-    key: NDArray[np.uint64]  # by column: exclusive or of the words of its UAV and tasks
-    uav: Ints
-    cost: Floats  # [m] more than if that UAV stayed
-    first: Ints  # where its stops begin; and where the last one's end
-    stops: Nodes
-    size: Ints  # columns
+    node_hash: NDArray[np.uint64]  # (m + n) random number of each node (Zobrist hashing)
+    table: Ints  # hash table, open addressing: column, -1: free
+    key: NDArray[np.uint64]  # by column: exclusive or of node_hash of its UAV and tasks
+    uav: Ints  # by column
+    cost: Floats  # by column [m] above the length of the UAV's empty route
+    first: Ints  # by column: index of its first stop; one more entry for the end
+    stops: Nodes  # task nodes of all columns
+    size: Ints  # (1) number of columns
 
 
 def empty_pool(a: Arrays) -> Pool:
     """A pool without columns."""
-    words = np.random.default_rng(0).integers(1, 2 ** 64, a.ends, np.uint64)
-    return Pool(words, np.full(2 * COLUMNS, -1, np.int64), np.empty(COLUMNS, np.uint64),
-                np.empty(COLUMNS, np.int64), np.empty(COLUMNS), np.zeros(COLUMNS + 1, np.int64),
-                np.empty(STOPS, NODE), np.zeros(1, np.int64))
+    hashes = np.random.default_rng(0).integers(1, 2 ** 64, a.ends, np.uint64)
+    return Pool(hashes, np.full(2 * MAX_COLUMNS, -1, np.int64), np.empty(MAX_COLUMNS, np.uint64),
+                np.empty(MAX_COLUMNS, np.int64), np.empty(MAX_COLUMNS),
+                np.zeros(MAX_COLUMNS + 1, np.int64), np.empty(MAX_STOPS, NODE),
+                np.zeros(1, np.int64))
 
 
 @inline_kernel
-def _key(a: Arrays, r: Routes, pool: Pool, u: int) -> Any:
-    """What UAV u's route is found by, whatever its order."""
-    key, t = pool.word[u], r.next[u]
+def _route_key(a: Arrays, r: Routes, pool: Pool, u: int) -> Any:
+    """Hash of UAV u's route, independent of the order. O(tasks)."""
+    key, t = pool.node_hash[u], r.next[u]
     while t < a.ends:
-        key ^= pool.word[t]
+        key ^= pool.node_hash[t]
         t = r.next[t]
     return key
 
 
 @inline_kernel
 def _slot(pool: Pool, key: Any) -> int:
-    """Where in the table that key is, or would be."""
-    at = np.int64(key & MASK)
+    """Index in the hash table where that key is, or would be. O(1) on average."""
+    at = np.int64(key & _MASK)
     while pool.table[at] >= 0 and pool.key[pool.table[at]] != key:
         at = (at + 1) % pool.table.size
     return int(at)
@@ -56,25 +57,25 @@ def _slot(pool: Pool, key: Any) -> int:
 
 @inline_kernel
 def column_of(a: Arrays, r: Routes, pool: Pool, u: int) -> int:
-    """The column of UAV u's tasks, -1 if it is not in the pool."""
-    return int(pool.table[_slot(pool, _key(a, r, pool, u))])
+    """The column of UAV u's tasks; -1 if it is not in the pool. O(tasks)."""
+    return int(pool.table[_slot(pool, _route_key(a, r, pool, u))])
 
 
 @inline_kernel
 def _cost(a: Arrays, r: Routes, u: int) -> float:
-    """What UAV u's route costs more than none [m]."""
-    cost, t = r.leg[u] - a.idle[u], r.next[u]
+    """Cost [m] of UAV u's route above that of its empty route. O(tasks)."""
+    cost, t = r.leg[u] - a.empty_route_length[u], r.next[u]
     while t < a.ends:
         cost += r.leg[t]
         t = r.next[t]
     if not a.hard:
-        cost += a.strain[u] * max(0.0, r.length[u] - a.reach[u])
+        cost += a.range_penalty[u] * max(0.0, r.length[u] - a.range_left[u])
     return float(cost)
 
 
 @inline_kernel
 def _new_column(pool: Pool, tasks: int) -> int:
-    """A column with room for so many tasks, -1 if there is no more."""
+    """A new column for so many tasks; -1 if the pool is full. O(1)."""
     e = pool.size[0]
     if e == pool.uav.size or pool.first[e] + tasks > pool.stops.size:
         return -1
@@ -85,11 +86,11 @@ def _new_column(pool: Pool, tasks: int) -> int:
 
 @kernel
 def collect(a: Arrays, r: Routes, pool: Pool) -> None:
-    """Note the routes that are flown and may be. O(n)."""
+    """Add the routes that are allowed to be flown to the pool. O(n)."""
     for u in range(a.uavs):
-        if r.tasks[u] == 0 or (a.hard and r.length[u] > a.reach[u] + TINY):
+        if r.tasks[u] == 0 or (a.hard and r.length[u] > a.range_left[u] + TINY):
             continue
-        key, cost = _key(a, r, pool, u), _cost(a, r, u)
+        key, cost = _route_key(a, r, pool, u), _cost(a, r, u)
         slot = _slot(pool, key)
         e = pool.table[slot]
         if e < 0:
@@ -99,7 +100,7 @@ def collect(a: Arrays, r: Routes, pool: Pool) -> None:
                 pool.table[:] = -1
                 return
             pool.table[slot] = e
-        elif (pool.cost[e] <= cost + TINY  # or, one in 2^64, another set of tasks
+        elif (pool.cost[e] <= cost + TINY  # or, once in 2^64, a hash collision
                 or pool.first[e + 1] - pool.first[e] != r.tasks[u]):
             continue
         pool.key[e], pool.uav[e], pool.cost[e] = key, u, cost

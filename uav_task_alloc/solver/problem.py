@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A problem once as objects and once as the arrays that kernels take; nothing is solved here."""
+"""A problem as objects and as the arrays that kernels take; nothing is solved here."""
 from __future__ import annotations
 
 import math
@@ -13,20 +13,20 @@ from numpy.typing import NDArray
 from uav_task_alloc.geometry.distances import Distances
 from uav_task_alloc.model import Task, ThreatZone, Uav
 from uav_task_alloc.objective import Weights
-from uav_task_alloc.solver.neighbours import near_starts, near_tasks, nearest
-from uav_task_alloc.solver.path_preparation import SOUGHT, PathPreparation
-from uav_task_alloc.solver.rng import chance
+from uav_task_alloc.solver.neighbours import fill_near_starts, fill_near_tasks, find_nearest
+from uav_task_alloc.solver.path_preparation import NEAR_SHARE, PathPreparation
+from uav_task_alloc.solver.rng import rng_state
 from uav_task_alloc.solver.routes import NODE, Arrays, Floats, Ints
 
-NEIGHBOURS = 24  # tasks a bee looks at around a task
-STARTS = 8  # UAVs it looks at
-PRICE = 20.0  # leaving an average task out costs so many mean legs
-DEAREST = 300.0  # and at most so many times that after it was in vain for long
+NEIGHBOURS = 24  # nearest tasks of a task
+STARTS = 8  # nearest UAV starts of a task
+UNASSIGNED_LEGS = 20.0  # first cost of not serving an average task, in mean legs
+MAX_COST_GROWTH = 300.0  # upper bound of that cost over the first
 
 
 @dataclass(frozen=True, slots=True)
 class Limits:
-    """Where UAVs may fly."""
+    """Where UAVs may fly: threat zones and altitudes."""
 
     zones: tuple[ThreatZone, ...] = ()
     clearance: float = 0.0  # [m] beyond the zones' margins
@@ -34,40 +34,40 @@ class Limits:
     altitude_max: float = math.inf  # [m]
 
     def same_but_zones(self, other: Limits) -> bool:
-        """Whether only the zones may differ."""
+        """Whether all but the zones are equal."""
         return replace(self, zones=()) == replace(other, zones=())
 
 
 @dataclass(frozen=True, slots=True)
 class Rules:
-    """How a plan is judged."""
+    """How routes end and how a plan is evaluated."""
 
     returns: bool = False  # routes end at home
-    hard: bool = True  # no range is ever exceeded
+    hard: bool = True  # ranges are hard constraints
     weights: Weights = field(default_factory=Weights)
 
 
 @dataclass(frozen=True, slots=True)
 class Problem:
-    """Who may serve what and how far things are apart.
+    """UAVs, tasks, distances, and the arrays of them.
 
-    A UAV starts behind the tasks that are locked to it; those are no longer among `tasks`.
-    Places of `distances`: effective starts, tasks, homes, then starts and locked tasks of UAVs
-    with locks.
+    A UAV effectively starts after the tasks that are locked to it, which are not among `tasks`.
+    Points of `distances`: effective starts (m), tasks (n), homes (m), then the start and locked
+    tasks of each UAV that has any.
     """
 
     uavs: tuple[Uav, ...]
-    tasks: tuple[Task, ...]  # those to be shared out
+    tasks: tuple[Task, ...]  # to be assigned
     locked: Mapping[str, tuple[Task, ...]]
     limits: Limits
     rules: Rules
     distances: Distances
     arrays: Arrays
-    scale: float  # [m] mean way to the nearest neighbour
-    index: Mapping[str, int]  # task id -> place in tasks
+    scale: float  # [m] mean leg length to the nearest neighbour
+    index: Mapping[str, int]  # task id -> index in tasks
 
     def locked_places(self, u: int) -> list[int]:
-        """Places of UAV u's start and its locked tasks in `distances`."""
+        """Indices of UAV u's start and its locked tasks in `distances`."""
         if not self.locked:
             return [u]
         place = 2 * len(self.uavs) + len(self.tasks)
@@ -81,30 +81,41 @@ class Problem:
 def make_problem(uavs: Sequence[Uav], tasks: Sequence[Task],
                  locked: Mapping[str, tuple[Task, ...]], limits: Limits, rules: Rules,
                  known: Problem | None = None, search: PathPreparation | None = None) -> Problem:
-    """The arrays of a problem; lengths that an earlier one knows are taken over.
+    """Build a problem.
 
-    Locked tasks that no safe way leads to are shared out as the others are.
+    Args:
+        uavs: the fleet.
+        tasks: all tasks, locked ones included.
+        locked: by UAV id the tasks that it serves first; those that no safe path leads to are
+            assigned like the others.
+        limits: zones and altitudes.
+        rules: how routes end, ranges, weights.
+        known: an earlier problem, of which known lengths and neighbours are reused.
+        search: searches for paths around zones within the budget; None: without limit.
+
+    Returns:
+        The problem, with neighbours and costs filled in.
     """
-    free = _not_locked(tasks, locked) if locked else tuple(tasks)
+    unlocked = _not_locked(tasks, locked) if locked else tuple(tasks)
     before = known.distances if known and limits.same_but_zones(known.limits) else None
-    distances = _distances(uavs, free, locked, limits, before, search)
-    problem = Problem(tuple(uavs), free, locked, limits, rules, distances,
-                      _blank(uavs, free, rules, distances), 1.0,
-                      {task.id: i for i, task in enumerate(free)})
+    distances = _distances(uavs, unlocked, locked, limits, before, search)
+    problem = Problem(tuple(uavs), unlocked, locked, limits, rules, distances,
+                      _empty_arrays(uavs, unlocked, rules, distances), 1.0,
+                      {task.id: i for i, task in enumerate(unlocked)})
     if search is not None and limits.zones:
-        search.find_flown(distances, _places(problem))
+        search.find_flown(distances, _place_by_id(problem))
     reached = _reachable(problem) if limits.zones else locked
     if reached != locked:
-        free = _not_locked(tasks, reached)
-        distances = _distances(uavs, free, reached, limits, distances, search)
-        problem = replace(problem, tasks=free, locked=reached, distances=distances,
-                          arrays=_blank(uavs, free, rules, distances),
-                          index={task.id: i for i, task in enumerate(free)})
+        unlocked = _not_locked(tasks, reached)
+        distances = _distances(uavs, unlocked, reached, limits, distances, search)
+        problem = replace(problem, tasks=unlocked, locked=reached, distances=distances,
+                          arrays=_empty_arrays(uavs, unlocked, rules, distances),
+                          index={task.id: i for i, task in enumerate(unlocked)})
     _apply_locks(problem)
     arrays = problem.arrays
-    floor = float(np.maximum(0.0, arrays.idle - arrays.reach).sum())
+    floor = float(np.maximum(0.0, arrays.empty_route_length - arrays.range_left).sum())
     return replace(problem, arrays=arrays._replace(excess_floor=floor),
-                   scale=_fill(problem, known, search))
+                   scale=_fill_neighbours(problem, known, search))
 
 
 def _not_locked(tasks: Sequence[Task], locked: Mapping[str, tuple[Task, ...]]) -> tuple[Task, ...]:
@@ -112,8 +123,8 @@ def _not_locked(tasks: Sequence[Task], locked: Mapping[str, tuple[Task, ...]]) -
     return tuple(task for task in tasks if task.id not in held)
 
 
-def _places(problem: Problem) -> dict[str, int]:
-    """Where in `distances` each UAV is, and each task, by id."""
+def _place_by_id(problem: Problem) -> dict[str, int]:
+    """Index in `distances` of the start of each UAV and of each task, by id."""
     places = {task_id: len(problem.uavs) + i for task_id, i in problem.index.items()}
     for u, uav in enumerate(problem.uavs):
         start, *held = problem.locked_places(u)
@@ -124,8 +135,8 @@ def _places(problem: Problem) -> dict[str, int]:
 
 
 def _reachable(problem: Problem) -> Mapping[str, tuple[Task, ...]]:
-    """Locked tasks without those that no safe way leads to, from the one before."""
-    found = {}
+    """Locked tasks without those that no safe path leads to from the one before."""
+    reachable = {}
     for u, uav in enumerate(problem.uavs):
         place, *places = problem.locked_places(u)
         row = []
@@ -134,8 +145,8 @@ def _reachable(problem: Problem) -> Mapping[str, tuple[Task, ...]]:
                 row.append(task)
                 place = there
         if row:
-            found[uav.id] = tuple(row)
-    return found
+            reachable[uav.id] = tuple(row)
+    return reachable
 
 
 def _distances(uavs: Sequence[Uav], tasks: Sequence[Task],
@@ -153,54 +164,55 @@ def _distances(uavs: Sequence[Uav], tasks: Sequence[Task],
                      altitude_min=limits.altitude_min, altitude_max=limits.altitude_max)
 
 
-def _may(uavs: Sequence[Uav], tasks: Sequence[Task]) -> NDArray[np.bool_]:
-    """Who may serve what, by capabilities and allowed UAVs."""
-    may = np.ones((len(uavs), len(tasks)), np.bool_)
+def _compatible(uavs: Sequence[Uav], tasks: Sequence[Task]) -> NDArray[np.bool_]:
+    """(m, n) whether a UAV may serve a task, by capabilities and allowed UAVs."""
+    compatible = np.ones((len(uavs), len(tasks)), np.bool_)
     for i, task in enumerate(tasks):
         if task.required_capabilities or task.allowed_uavs is not None:
-            may[:, i] = [task.required_capabilities <= uav.capabilities
+            compatible[:, i] = [task.required_capabilities <= uav.capabilities
                          and (task.allowed_uavs is None or uav.id in task.allowed_uavs)
                          for uav in uavs]
-    return may
+    return compatible
 
 
-def _blank(uavs: Sequence[Uav], tasks: Sequence[Task], rules: Rules,
+def _empty_arrays(uavs: Sequence[Uav], tasks: Sequence[Task], rules: Rules,
            distances: Distances) -> Arrays:
+    """Arrays whose neighbours and costs are not filled in yet. O(m n)."""
     m, n = len(uavs), len(tasks)
     k, s = min(NEIGHBOURS, max(0, n - 1)), min(STARTS, m)
-    may = _may(uavs, tasks)
+    compatible = _compatible(uavs, tasks)
     return Arrays(
         m, m + n, rules.returns, rules.hard,
         0.0, np.full(m, math.inf if rules.hard else excess_cost(rules.weights)),
         distances.pairs, not distances.zones, distances.points,
-        np.array([u.range for u in uavs], dtype=np.float64), np.zeros(m), may,
-        np.any(~may, axis=0, keepdims=True)[0],
+        np.array([u.range for u in uavs], dtype=np.float64), np.zeros(m), compatible,
+        np.any(~compatible, axis=0, keepdims=True)[0],
         np.array([t.value for t in tasks], dtype=np.float64), np.ones(n), np.empty(n),
         np.empty((n, k), NODE), np.empty((n, k)), np.empty((n, s), NODE),
         np.empty((n, s)))
 
 
 def excess_cost(weights: Weights) -> float:
-    """Metres of way that a metre beyond range weighs as much as."""
-    most = 1e6
-    return min(weights.penalty / weights.distance, most) if weights.distance > 0.0 else most
+    """Weight of a metre beyond range over that of a metre of distance (eq 2.12), at most 1e6."""
+    limit = 1e6
+    return min(weights.penalty / weights.distance, limit) if weights.distance > 0.0 else limit
 
 
 def _apply_locks(problem: Problem) -> None:
-    """Locked tasks use up range; a UAV that flies them returns even when it gets no more."""
+    """Subtract locked legs from the ranges; a UAV with locked tasks returns home in any case."""
     a = problem.arrays
     for u, uav in enumerate(problem.uavs):
         if uav.id in problem.locked:
             places = problem.locked_places(u)
-            a.reach[u] -= sum(problem.distances.length(i, j)
-                              for i, j in pairwise(places))
+            a.range_left[u] -= sum(problem.distances.length(i, j) for i, j in pairwise(places))
             if problem.rules.returns:
-                way = problem.distances.length(u, a.ends + u)
-                a.idle[u] = way if way < math.inf else 0.0  # it stays behind its last task
+                leg_home = problem.distances.length(u, a.ends + u)
+                # it stays at its last task where no path leads home
+                a.empty_route_length[u] = leg_home if leg_home < math.inf else 0.0
 
 
 def _neighbours(problem: Problem, known: Problem | None) -> tuple[Ints, Ints]:
-    """Near tasks as an earlier problem knows them, -1 where it does not; those new to it."""
+    """(n, k) near tasks that an earlier problem knows, -1: unknown; indices of new tasks."""
     n, k = problem.arrays.near.shape
     near = np.full((n, k), -1, np.int64)
     if known is None or known.arrays.near.shape[1] != k or k == 0:
@@ -217,30 +229,32 @@ def _neighbours(problem: Problem, known: Problem | None) -> tuple[Ints, Ints]:
     return near, np.setdiff1d(np.arange(n), stay, assume_unique=True)
 
 
-def _fill(problem: Problem, known: Problem | None, search: PathPreparation | None) -> float:
-    """Neighbours and prices; returns the mean way [m] to the nearest neighbour."""
+def _fill_neighbours(problem: Problem, known: Problem | None,
+                     search: PathPreparation | None) -> float:
+    """Fill in neighbours and costs; returns the mean leg length [m] to the nearest neighbour."""
     a, n = problem.arrays, len(problem.tasks)
     xyz: Floats = problem.distances.points
     if n == 0:
         return 1.0
-    found, fresh = _neighbours(problem, known)
-    squares = nearest(xyz[a.uavs:a.ends], found, fresh)
+    near, new = _neighbours(problem, known)
+    squares = find_nearest(xyz[a.uavs:a.ends], near, new)
     if search is not None and not a.straight:
-        search.begin(SOUGHT, 0, heeds_stop=False)
-        near_starts(a, xyz, chance(0))
-        search.find_near(problem.distances, a, found)
-        search.begin(1.0, 0)  # what is not known now is asked for when it is needed
-    near_tasks(a, found, squares)
+        search.begin(NEAR_SHARE, 0, heeds_stop=False)
+        fill_near_starts(a, xyz, rng_state(0))
+        search.find_near(problem.distances, a, near)
+        search.begin(1.0, 0)  # other paths are searched for when they are needed
+    fill_near_tasks(a, near, squares)
     if a.uavs == 0:
         return 1.0
-    near_starts(a, xyz, chance(0))
-    lost = np.flatnonzero(a.start_length[:, 0] == math.inf)  # all tasks that zones swallowed
-    a.price[[i for i in lost if problem.distances.is_inside(a.uavs + int(i))]] = 0.0
+    fill_near_starts(a, xyz, rng_state(0))
+    unreachable = np.flatnonzero(a.start_length[:, 0] == math.inf)
+    inside = [i for i in unreachable if problem.distances.is_inside(a.uavs + int(i))]
+    a.unassigned_cost[inside] = 0.0
     first = a.near_length[:, 0] if a.near.shape[1] else a.start_length[:, 0]
     finite = first[np.isfinite(first)]
     scale = max(float(finite.mean()) if finite.size else 1.0, 1e-6)
     finite = a.start_length[:, 0][np.isfinite(a.start_length[:, 0])]
     far = float(finite.mean()) if finite.size else 0.0
-    a.price[:] *= a.value / a.value.mean() * max(PRICE * scale, 2.0 * far)
-    a.dearest[:] = DEAREST * a.price
+    a.unassigned_cost[:] *= a.value / a.value.mean() * max(UNASSIGNED_LEGS * scale, 2.0 * far)
+    a.max_unassigned_cost[:] = MAX_COST_GROWTH * a.unassigned_cost
     return scale

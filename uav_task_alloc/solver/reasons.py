@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Why a task is left out, in words for the person who announced it."""
+"""Texts for users: why a task is unassigned."""
 from __future__ import annotations
 
 import math
@@ -12,25 +12,33 @@ from uav_task_alloc.solver.problem import Problem
 from uav_task_alloc.solver.routes import Floats, Ints
 
 
-def reasons(problem: Problem, left: Ints) -> dict[str, str]:
-    """Why each of these tasks is in no route, by id."""
-    short = _short_at_least(problem, left)
+def reasons(problem: Problem, unassigned: Ints) -> dict[str, str]:
+    """Why each of these tasks is in no route.
+
+    Args:
+        problem: what was solved.
+        unassigned: indices of the unassigned tasks.
+
+    Returns:
+        A text for each task id.
+    """
+    short = _short_at_least(problem, unassigned)
     return {problem.tasks[i].id: _reason(problem, i, short[row])
-            for row, i in enumerate(left.tolist())}
+            for row, i in enumerate(unassigned.tolist())}
 
 
-def _short_at_least(problem: Problem, left: Ints) -> Floats:
-    """Metres that (task, UAV) lack as the crow flies; inf where the UAV may not serve it."""
+def _short_at_least(problem: Problem, unassigned: Ints) -> Floats:
+    """(tasks, m) Euclidean distance [m] needed beyond the range; inf: the UAV may not serve it."""
     a, xyz = problem.arrays, problem.distances.points
 
-    def ways(places: Floats) -> Floats:
-        found = [np.sqrt(((places - xyz[a.uavs + i]) ** 2).sum(axis=1)) for i in left]
-        return np.array(found).reshape(len(left), a.uavs)
+    def lengths(points: Floats) -> Floats:
+        rows = [np.sqrt(((points - xyz[a.uavs + i]) ** 2).sum(axis=1)) for i in unassigned]
+        return np.array(rows).reshape(len(unassigned), a.uavs)
 
-    need = ways(xyz[:a.uavs])
+    need = lengths(xyz[:a.uavs])
     if problem.rules.returns:
-        need += ways(xyz[a.ends:a.ends + a.uavs])
-    return np.where(a.may[:, left].T, need - a.reach, math.inf)
+        need += lengths(xyz[a.ends:a.ends + a.uavs])
+    return np.where(a.compatible[:, unassigned].T, need - a.range_left, math.inf)
 
 
 def _reason(problem: Problem, i: int, short: Floats) -> str:
@@ -41,44 +49,44 @@ def _reason(problem: Problem, i: int, short: Floats) -> str:
     around = problem.distances.zones_around(a.uavs + i)
     if around:
         return f'inside zone {", ".join(around)}'
-    if not a.may[:, i].any():
+    if not a.compatible[:, i].any():
         return _unable(problem, task)
     need, nearest = _nearest(problem, i, short, np.argsort(short, kind='stable').tolist())
     if need == math.inf and _given_up(problem, i):
         return 'no safe way past the zones found in the time; sought again with the next plan'
     if need == math.inf:
         return _no_way_home(problem, i) or 'unreachable: no safe way past the zones' + (
-            '' if a.may[:, i].all() else ' for the UAVs that may serve it')
-    if need > a.reach[nearest]:
+            '' if a.compatible[:, i].all() else ' for the UAVs that may serve it')
+    if need > a.range_left[nearest]:
         return (f'beyond the range of every UAV: {problem.uavs[nearest].id} needs '
-                f'{need:.0f} m and has {max(0.0, a.reach[nearest]):.0f} m left')
+                f'{need:.0f} m and has {max(0.0, a.range_left[nearest]):.0f} m left')
     return 'left out: the ranges do not suffice for all tasks'
 
 
 def _nearest(problem: Problem, i: int, short: Floats, order: Iterable[int]) -> tuple[float, int]:
-    """Metres needed by the UAV that lacks least for the i-th task alone, and that UAV."""
-    a, least, found = problem.arrays, math.inf, (math.inf, -1)
+    """Metres that the UAV with the least shortage needs for the i-th task alone; that UAV."""
+    a, least, best = problem.arrays, math.inf, (math.inf, -1)
     for u in order:
-        if short[u] >= least or not a.may[u, i]:
-            break  # the rest lack more, or may not
+        if short[u] >= least or not a.compatible[u, i]:
+            break  # the others lack more, or may not serve it
         need = _need(problem, u, a.uavs + i)
-        if need < math.inf and (found[1] < 0 or need - a.reach[u] < least):
-            least, found = need - a.reach[u], (need, u)
-    return found
+        if need < math.inf and (best[1] < 0 or need - a.range_left[u] < least):
+            least, best = need - a.range_left[u], (need, u)
+    return best
 
 
 def _given_up(problem: Problem, i: int) -> bool:
-    """Whether a way to the i-th task, or home from it, was not found in the time."""
-    a, ways = problem.arrays, problem.distances
-    return any(ways.given_up(int(u), a.uavs + i) or (
-        problem.rules.returns and ways.given_up(a.uavs + i, a.ends + int(u)))
-        for u in np.flatnonzero(a.may[:, i]))
+    """Whether a search for a path to the i-th task, or home from it, ran out of budget."""
+    a, distances = problem.arrays, problem.distances
+    return any(distances.given_up(int(u), a.uavs + i) or (
+        problem.rules.returns and distances.given_up(a.uavs + i, a.ends + int(u)))
+        for u in np.flatnonzero(a.compatible[:, i]))
 
 
 def _no_way_home(problem: Problem, i: int) -> str:
-    """The reason of the i-th task where some UAV gets there, but none back; else empty."""
+    """The reason of the i-th task where a UAV can reach it, but none returns; else empty."""
     a, uavs = problem.arrays, problem.uavs
-    able = [u for u in np.flatnonzero(a.may[:, i])
+    able = [u for u in np.flatnonzero(a.compatible[:, i])
             if problem.distances.length(int(u), a.uavs + i) < math.inf]
     if not problem.rules.returns or not able:
         return ''
@@ -89,6 +97,7 @@ def _no_way_home(problem: Problem, i: int) -> str:
 
 
 def _unable(problem: Problem, task: Task) -> str:
+    """The reason of a task that no UAV may serve."""
     allowed = [uav for uav in problem.uavs
                if task.allowed_uavs is None or uav.id in task.allowed_uavs]
     if not allowed:
@@ -102,8 +111,8 @@ def _unable(problem: Problem, task: Task) -> str:
 
 
 def _need(problem: Problem, u: int, place: int) -> float:
-    """Metres that UAV u flies for this task alone, behind its locked ones."""
-    there = problem.distances.length(u, place)
+    """Metres that UAV u flies for this task alone, after its locked ones."""
+    outward = problem.distances.length(u, place)
     if not problem.rules.returns:
-        return there
-    return there + problem.distances.length(place, problem.arrays.ends + u)
+        return outward
+    return outward + problem.distances.length(place, problem.arrays.ends + u)

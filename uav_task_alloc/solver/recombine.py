@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Routes of the pool put together anew: groups of UAVs next to each other exchange their tasks."""
+"""Recombination of routes of the pool: groups of neighbouring UAVs exchange their tasks."""
 from __future__ import annotations
 
 import numpy as np
@@ -8,90 +8,99 @@ from uav_task_alloc.kernel import allocating_kernel
 from uav_task_alloc.solver.multipliers import reduced_costs
 from uav_task_alloc.solver.partition import Flags, repartition
 from uav_task_alloc.solver.pool import Pool, collect, column_of
-from uav_task_alloc.solver.routes import NODE, TINY, Arrays, Ints, Routes, clear, insert, total
+from uav_task_alloc.solver.routes import (
+    NODE,
+    TINY,
+    Arrays,
+    Ints,
+    Routes,
+    clear,
+    insert,
+    update_sums,
+)
 
-GROUP = 10  # UAVs
-_AROUND = 6  # neighbours of a task by which routes are next to each other
-PASSES = 2  # through all groups
-DEEPEST = 20_000  # columns tried in a group
-TRY = 4.0  # such a try costs as much as so many looks at a stop
+GROUP_SIZE = 10  # UAVs
+_NEAR_TASKS = 6  # neighbours of a task that make two routes adjacent
+PASSES = 2  # over all groups
+MAX_TRIES = 20_000  # columns tried in a group at most
+TRY_COST = 4.0  # work of a try, in stops read
 
 
 @allocating_kernel
-def _group(a: Arrays, pool: Pool, on: Ints, flown: Ints, seed: int) -> Flags:
-    """Whose routes are nearest to that of one UAV, it among them."""
-    inside, beside = np.zeros(a.uavs, np.bool_), np.zeros(a.uavs, np.int64)
-    newest = seed
-    for _ in range(min(GROUP, a.uavs)):
-        inside[newest] = True
-        e = flown[newest]
+def _group(a: Arrays, pool: Pool, uav_of: Ints, flown: Ints, seed: int) -> Flags:
+    """The UAVs with routes nearest to that of one UAV, which is included: (m) bool. O(n)."""
+    in_group, adjacency = np.zeros(a.uavs, np.bool_), np.zeros(a.uavs, np.int64)
+    added = seed
+    for _ in range(min(GROUP_SIZE, a.uavs)):
+        in_group[added] = True
+        e = flown[added]
         if e >= 0:
             for t in pool.stops[pool.first[e]:pool.first[e + 1]]:
-                for c in a.near[t - a.uavs, :_AROUND]:
-                    if on[c] >= 0:
-                        beside[on[c]] += 1
+                for c in a.near[t - a.uavs, :_NEAR_TASKS]:
+                    if uav_of[c] >= 0:
+                        adjacency[uav_of[c]] += 1
                 for s in a.starts[t - a.uavs]:
-                    beside[s] += 1
-        newest = int(np.argmax(np.where(inside, -1, beside)))
-    return inside
+                    adjacency[s] += 1
+        added = int(np.argmax(np.where(in_group, -1, adjacency)))
+    return in_group
 
 
 @allocating_kernel
-def _tasks_of(a: Arrays, on: Ints, group: Flags) -> Ints:
-    """Tasks that a group of UAVs serves, and those that nobody does next to them."""
-    inside = np.zeros(a.ends, np.bool_)
+def _tasks_of(a: Arrays, uav_of: Ints, group: Flags) -> Ints:
+    """Task nodes that a group of UAVs serves, and adjacent unassigned ones. O(n)."""
+    in_group = np.zeros(a.ends, np.bool_)
     for t in range(a.uavs, a.ends):
-        if on[t] >= 0:
-            inside[t] = group[on[t]]
+        if uav_of[t] >= 0:
+            in_group[t] = group[uav_of[t]]
         else:
-            inside[t] = a.uavs <= GROUP
-            for c in a.near[t - a.uavs, :_AROUND]:
-                inside[t] |= on[c] >= 0 and group[on[c]]
-    return np.flatnonzero(inside)
+            in_group[t] = a.uavs <= GROUP_SIZE
+            for c in a.near[t - a.uavs, :_NEAR_TASKS]:
+                in_group[t] |= uav_of[c] >= 0 and group[uav_of[c]]
+    return np.flatnonzero(in_group)
 
 
 @allocating_kernel
-def _improve(a: Arrays, pool: Pool, work: float, flown: Ints, on: Ints) -> bool:
-    """Let groups around each UAV exchange while that pays; whether it did."""
+def _improve(a: Arrays, pool: Pool, work: float, flown: Ints, uav_of: Ints) -> bool:
+    """Repartition the groups around each UAV while that lowers the cost; whether it did."""
     worth = 0.0
     for t in range(a.uavs, a.ends):
-        worth += a.price[t - a.uavs] if on[t] < 0 else 0.0
+        worth += a.unassigned_cost[t - a.uavs] if uav_of[t] < 0 else 0.0
     worth += pool.cost[flown[flown >= 0]].sum()
     reduced, bound = reduced_costs(a, pool, flown, worth, work)
-    found, tries = False, int(work / TRY)
+    improved, tries = False, int(work / TRY_COST)
     if worth - bound < TINY:
         return False
     for _ in range(PASSES):
-        again = False
+        improved_in_pass = False
         for u in range(a.uavs):
             if tries <= 0:
                 break
-            group = _group(a, pool, on, flown, u)
-            better, tried = repartition(pool, reduced, group, _tasks_of(a, on, group),
-                                        min(DEEPEST, tries), flown, on)
-            again |= better
+            group = _group(a, pool, uav_of, flown, u)
+            better, tried = repartition(pool, reduced, group, _tasks_of(a, uav_of, group),
+                                        min(MAX_TRIES, tries), flown, uav_of)
+            improved_in_pass |= better
             tries -= tried
-        found |= again
-        if not again:
+        improved |= improved_in_pass
+        if not improved_in_pass:
             break
-    return found
+    return improved
 
 
 @allocating_kernel
 def recombine(a: Arrays, best: Routes, pool: Pool, work: float, into: Routes) -> bool:
-    """Put columns together that cost less than the best, if there are any; whether there are.
+    """Write to `into` a combination of columns that costs less than `best`; whether there is one.
 
-    Does about `work` looks at stops for a bound, and as much again to search.
+    Reads about `work` stops for a bound, and as many again in the search.
     """
     collect(a, best, pool)
-    flown, on = np.full(a.uavs, -1, np.int64), np.full(a.ends, -1, np.int64)
-    on[a.uavs:] = best.on[a.uavs:a.ends]
+    flown, uav_of = np.full(a.uavs, -1, np.int64), np.full(a.ends, -1, np.int64)
+    uav_of[a.uavs:] = best.uav_of[a.uavs:a.ends]
     for u in range(a.uavs):
         if best.tasks[u] > 0:
             flown[u] = column_of(a, best, pool, u)
             if flown[u] < 0:
                 return False
-    if not _improve(a, pool, work, flown, on):
+    if not _improve(a, pool, work, flown, uav_of):
         return False
     clear(a, into)
     for u in range(a.uavs):
@@ -100,5 +109,5 @@ def recombine(a: Arrays, best: Routes, pool: Pool, work: float, into: Routes) ->
             for t in pool.stops[pool.first[flown[u]]:pool.first[flown[u] + 1]]:
                 insert(a, into, t, after)
                 after = t
-    total(a, into)
+    update_sums(a, into)
     return True

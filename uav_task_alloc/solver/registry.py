@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The solvers by name: each improves on the recorder's best, returns a state to go on from."""
+"""The solvers by name; each improves the recorder's best and returns a state for warm starts."""
 from __future__ import annotations
 
 from collections.abc import Callable
@@ -18,7 +18,7 @@ from uav_task_alloc.solver.recorder import Recorder
 
 Solver = Callable[[Recorder, int, object], object]  # (recorder, seed, learnt) -> learnt
 
-SOLVERS: dict[str, Solver] = {  # yours as well: SOLVERS['mine'] = solve
+SOLVERS: dict[str, Solver] = {  # extensible: SOLVERS['mine'] = solve
     'chain_q': chain_q.solve,
     'paper_chain_q': paper_chain_q.solve,
     'q_learning': q_learning.solve,

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Random numbers for kernels: xorshift64 whose whole state is an array that the caller owns."""
+"""Random numbers for kernels: xorshift64 (Marsaglia 2003) on a state that the caller owns."""
 from __future__ import annotations
 
 import numpy as np
@@ -7,17 +7,17 @@ from numpy.typing import NDArray
 
 from uav_task_alloc.kernel import inline_kernel
 
-Chance = NDArray[np.uint64]  # one number, never 0
+RngState = NDArray[np.uint64]  # (1) uint64, never 0
 
 
-def chance(seed: int) -> Chance:
-    """A state from any integer; near seeds give unlike sequences."""
+def rng_state(seed: int) -> RngState:
+    """State of a generator from any integer; near seeds give uncorrelated sequences."""
     return np.random.SeedSequence(seed % 2 ** 64).generate_state(1, np.uint64) | np.uint64(1)
 
 
 @inline_kernel
-def uniform(state: Chance) -> float:
-    """In [0, 1)."""
+def uniform(state: RngState) -> float:
+    """A float64 in [0, 1)."""
     x = state[0]
     x ^= x << np.uint64(13)
     x ^= x >> np.uint64(7)
@@ -27,6 +27,6 @@ def uniform(state: Chance) -> float:
 
 
 @inline_kernel
-def below(state: Chance, n: int) -> int:
-    """0..n-1, each as likely."""
+def below(state: RngState, n: int) -> int:
+    """An integer in 0..n-1, uniformly distributed."""
     return int(uniform(state) * n)

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Routes as linked lists in arrays, and the kernels that change them: O(1) a change.
+"""Routes as doubly linked lists in arrays, and the kernels that change them in O(1).
 
-Nodes: UAV starts 0..m-1, tasks m..m+n-1, route ends m+n..2m+n-1. Sums are float64.
-"""
+With m UAVs and n tasks the nodes are: UAV starts 0..m-1, tasks m..m+n-1, route ends m+n..2m+n-1.
+In all kernels of this package `a` is the problem (Arrays), `r` are routes (Routes), `u` is a UAV,
+`t` a task node. Lengths are float64 [m]. """
 from __future__ import annotations
 
 import math
@@ -16,33 +17,33 @@ from uav_task_alloc.kernel import inline_kernel, kernel
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
-Nodes = NDArray[np.uint32]  # unsigned: numba need not ask whether an index counts from the end
+Nodes = NDArray[np.uint32]  # unsigned: numba omits the check for negative indices
 NODE: Any = np.uint32
-WHOLE: Any = np.int64  # in kernels int() of an unsigned number is unsigned
-DISTANCE, EXCESS, LEFT_OUT, VALUE, STRAIN = range(5)  # what Routes.sums holds
-TINY = 1e-7  # [m] what rounding may add up to
-STRICT = 1e9  # [m/m] at most this in sums, where inf would make NaN
+SIGNED: Any = np.int64  # to int64: in kernels int() of an unsigned number is unsigned
+DISTANCE, EXCESS, UNASSIGNED_COST, VALUE, RANGE_PENALTY = range(5)  # what Routes.sums holds
+TINY = 1e-7  # [m] tolerance for accumulated rounding
+PENALTY_CAP = 1e9  # [m/m] in sums: an infinite range penalty times 0 m would give NaN
 
 
 class Arrays(NamedTuple):
-    """A problem as kernels take it."""
+    """A problem as kernels take it: m UAVs, n tasks, k neighbours and s starts for each task."""
 
     uavs: int
     ends: int  # first end node
     returns: bool  # routes end at home
-    hard: bool  # no range is ever exceeded
-    excess_floor: float  # [m] beyond range that no plan can avoid
-    strain: Floats  # (m) [m/m] what a metre beyond range costs now; inf: none is allowed
+    hard: bool  # ranges are hard constraints
+    excess_floor: float  # [m] excess over the ranges that no plan can avoid
+    range_penalty: Floats  # (m) [m/m] current cost of a metre beyond range; inf: not allowed
     pairs: Pairs  # lengths by node
-    straight: bool  # no zones: lengths are distances of xyz
+    straight: bool  # no zones: leg lengths are Euclidean distances of xyz
     xyz: Floats  # (2m + n, 3) [m]
-    reach: Floats  # (m) [m] range
-    idle: Floats  # (m) [m] length of the route without tasks
-    may: NDArray[np.bool_]  # (m, n) who may serve what
-    picky: NDArray[np.bool_]  # (n) not everybody may
+    range_left: Floats  # (m) [m] range, less what locked tasks use
+    empty_route_length: Floats  # (m) [m] length of the route without tasks
+    compatible: NDArray[np.bool_]  # (m, n) whether a UAV may serve a task
+    restricted: NDArray[np.bool_]  # (n) some UAV may not serve it
     value: Floats  # (n)
-    price: Floats  # (n) [m] of leaving a task out now; 0: nobody can serve it
-    dearest: Floats  # (n) [m] what that may rise to
+    unassigned_cost: Floats  # (n) [m] current cost of not serving a task; 0: no UAV can
+    max_unassigned_cost: Floats  # (n) [m] upper bound of unassigned_cost
     near: Nodes  # (n, k) task nodes, nearest first
     near_length: Floats  # (n, k) [m]
     starts: Nodes  # (n, s) starts, nearest first
@@ -50,62 +51,62 @@ class Arrays(NamedTuple):
 
 
 class Routes(NamedTuple):
-    """Who flies what in which order; on[node] = -1: left out."""
+    """Routes of all UAVs; arrays by node have 2 m + n entries."""
 
-    next: Nodes
-    prev: Nodes
-    on: Ints
-    leg: Floats  # [m] length of the leg that leaves the node
-    length: Floats  # (m) [m]
-    tasks: Ints  # (m) tasks
-    sums: Floats  # DISTANCE, EXCESS [m], LEFT_OUT [m], VALUE, STRAIN [m]
+    next: Nodes  # by node
+    prev: Nodes  # by node
+    uav_of: Ints  # by node; -1: unassigned
+    leg: Floats  # by node [m] length of the leg that leaves it
+    length: Floats  # (m) [m] of each route
+    tasks: Ints  # (m) number of tasks of each route
+    sums: Floats  # (5) DISTANCE, EXCESS [m], UNASSIGNED_COST [m], VALUE, RANGE_PENALTY [m]
 
 
 @inline_kernel
-def step(a: Arrays, i: int, j: int) -> float:
-    """Length [m] of the leg from node i to node j."""
+def leg_length(a: Arrays, i: int, j: int) -> float:
+    """Length [m] of the leg from node i to node j. O(1) where it is known."""
     if j >= a.ends:
         if i < a.uavs:
-            return float(a.idle[i])
+            return float(a.empty_route_length[i])
         if not a.returns:
             return 0.0
     if a.straight:
         x, y, z = a.xyz[i, 0] - a.xyz[j, 0], a.xyz[i, 1] - a.xyz[j, 1], a.xyz[i, 2] - a.xyz[j, 2]
         return math.sqrt(x * x + y * y + z * z)
-    return float(length(a.pairs, WHOLE(i), WHOLE(j)))
+    return float(length(a.pairs, SIGNED(i), SIGNED(j)))
 
 
 @kernel
 def clear(a: Arrays, r: Routes) -> None:
-    """Leave everything out."""
-    r.on[:] = -1
+    """Make all routes empty. O(m + n)."""
+    r.uav_of[:] = -1
     for u in range(a.uavs):
         end = a.ends + u
         r.next[u], r.prev[u], r.next[end], r.prev[end] = end, u, u, u
-        r.on[u] = r.on[end] = u
-        r.leg[u] = r.length[u] = a.idle[u]
+        r.uav_of[u] = r.uav_of[end] = u
+        r.leg[u] = r.length[u] = a.empty_route_length[u]
         r.tasks[u] = 0
-    total(a, r)
+    update_sums(a, r)
 
 
 @kernel
-def total(a: Arrays, r: Routes) -> None:
-    """Sum up anew what changes only change. O(n)."""
+def update_sums(a: Arrays, r: Routes) -> None:
+    """Recompute r.sums, which insert and remove update incrementally. O(m + n)."""
     r.sums[:] = 0.0
     for u in range(a.uavs):
         r.sums[DISTANCE] += r.length[u]
-        over = max(0.0, r.length[u] - a.reach[u])
+        over = max(0.0, r.length[u] - a.range_left[u])
         r.sums[EXCESS] += over
-        r.sums[STRAIN] += min(a.strain[u], STRICT) * over
-    for i in range(a.price.size):
-        if r.on[a.uavs + i] < 0:
-            r.sums[LEFT_OUT] += a.price[i]
+        r.sums[RANGE_PENALTY] += min(a.range_penalty[u], PENALTY_CAP) * over
+    for i in range(a.unassigned_cost.size):
+        if r.uav_of[a.uavs + i] < 0:
+            r.sums[UNASSIGNED_COST] += a.unassigned_cost[i]
         else:
             r.sums[VALUE] += a.value[i]
 
 
 def empty_routes(a: Arrays) -> Routes:
-    """Routes without tasks."""
+    """New routes without tasks."""
     nodes = a.ends + a.uavs
     routes = Routes(np.empty(nodes, NODE), np.empty(nodes, NODE),
                     np.empty(nodes, np.int64), np.zeros(nodes), np.empty(a.uavs),
@@ -115,28 +116,29 @@ def empty_routes(a: Arrays) -> Routes:
 
 
 @kernel
-def copy(a: Any, b: Any) -> None:
-    """Routes b become what routes a are."""
-    for i in range(a.next.size):
-        b.next[i], b.prev[i], b.on[i], b.leg[i] = a.next[i], a.prev[i], a.on[i], a.leg[i]
-    for u in range(a.length.size):
-        b.length[u], b.tasks[u] = a.length[u], a.tasks[u]
-    for i in range(a.sums.size):
-        b.sums[i] = a.sums[i]
+def copy_into(r: Any, out: Any) -> None:
+    """Copy routes r into the arrays of routes `out`. O(m + n)."""
+    for i in range(r.next.size):
+        out.next[i], out.prev[i], out.uav_of[i] = r.next[i], r.prev[i], r.uav_of[i]
+        out.leg[i] = r.leg[i]
+    for u in range(r.length.size):
+        out.length[u], out.tasks[u] = r.length[u], r.tasks[u]
+    for i in range(r.sums.size):
+        out.sums[i] = r.sums[i]
 
 
-def twin(a: Routes) -> Routes:
-    """The same routes in arrays of their own."""
-    return Routes(*[part.copy() for part in a])  # type: ignore[arg-type]
+def copy(r: Routes) -> Routes:
+    """The same routes in new arrays."""
+    return Routes(*[array.copy() for array in r])  # type: ignore[arg-type]
 
 
-def cost_now(a: Arrays, r: Routes) -> float:
-    """What the search makes small [m]."""
-    return float(r.sums[DISTANCE] + r.sums[LEFT_OUT] + r.sums[STRAIN])
+def total_cost(a: Arrays, r: Routes) -> float:
+    """Objective of the search [m]: distance, cost of unassigned tasks, range penalty."""
+    return float(r.sums[DISTANCE] + r.sums[UNASSIGNED_COST] + r.sums[RANGE_PENALTY])
 
 
-def better_now(a: Arrays, r: Routes, s: Routes) -> bool:
-    """Whether r is better than s: more value; as much, then shorter; hard: within range."""
+def is_better(a: Arrays, r: Routes, s: Routes) -> bool:
+    """Whether r has more value than s, or as much and is shorter; False beyond hard ranges."""
     if a.hard and not r.sums[EXCESS] <= a.excess_floor + TINY:
         return False
     gain = r.sums[VALUE] - s.sums[VALUE]
@@ -145,71 +147,71 @@ def better_now(a: Arrays, r: Routes, s: Routes) -> bool:
         return True
     shorter = s.sums[DISTANCE] - r.sums[DISTANCE]
     if not a.hard:
-        shorter += s.sums[STRAIN] - r.sums[STRAIN]
+        shorter += s.sums[RANGE_PENALTY] - r.sums[RANGE_PENALTY]
     return bool(gain >= -slack and shorter > TINY + 1e-12 * s.sums[DISTANCE])
 
 
-# of their own in kernels: handing arrays to a kernel takes 0.1 ms
-cost, better = inline_kernel(cost_now), inline_kernel(better_now)
+# versions for kernels; from Python a call costs 0.1 ms, because arrays are unboxed
+total_cost_kernel, is_better_kernel = inline_kernel(total_cost), inline_kernel(is_better)
 
 
 @inline_kernel
-def lengthened(a: Arrays, r: Routes, u: int, delta: float) -> float:
-    """Cost [m] of making UAV u's route longer by delta [m]; inf where it may not."""
+def lengthening_cost(a: Arrays, r: Routes, u: int, delta: float) -> float:
+    """Cost [m] of making UAV u's route longer by delta [m]; inf if not allowed."""
     if not delta < math.inf:
         return math.inf
-    before = r.length[u] - a.reach[u]
+    before = r.length[u] - a.range_left[u]
     after = before + delta
     if after <= TINY and before <= TINY:
         return delta
-    return float(delta + a.strain[u] * (max(0.0, after) - max(0.0, before)))
+    return float(delta + a.range_penalty[u] * (max(0.0, after) - max(0.0, before)))
 
 
 @inline_kernel
-def stretch(a: Arrays, r: Routes, u: int, delta: float) -> None:
-    """Make UAV u's route longer by delta [m]."""
+def add_length(a: Arrays, r: Routes, u: int, delta: float) -> None:
+    """Add delta [m] to the length of UAV u's route, and to the sums."""
     before = r.length[u]
     r.length[u] = before + delta
     r.sums[DISTANCE] += delta
-    over = max(0.0, before + delta - a.reach[u]) - max(0.0, before - a.reach[u])
+    over = max(0.0, before + delta - a.range_left[u]) - max(0.0, before - a.range_left[u])
     r.sums[EXCESS] += over
-    r.sums[STRAIN] += min(a.strain[u], STRICT) * over
+    r.sums[RANGE_PENALTY] += min(a.range_penalty[u], PENALTY_CAP) * over
 
 
 @inline_kernel
 def insert(a: Arrays, r: Routes, t: int, after: int) -> None:
-    """Put the left out task node t behind node `after`."""
-    u, then = r.on[after], r.next[after]
-    first, second = step(a, after, t), step(a, t, then)
+    """Insert the unassigned task node t after node `after`."""
+    u, then = r.uav_of[after], r.next[after]
+    first, second = leg_length(a, after, t), leg_length(a, t, then)
     delta = first + second - r.leg[after]
     r.next[after], r.prev[t], r.next[t], r.prev[then] = t, after, then, t
     r.leg[after], r.leg[t] = first, second
-    r.on[t] = u
+    r.uav_of[t] = u
     r.tasks[u] += 1
-    stretch(a, r, u, delta)
-    r.sums[LEFT_OUT] -= a.price[t - a.uavs]
+    add_length(a, r, u, delta)
+    r.sums[UNASSIGNED_COST] -= a.unassigned_cost[t - a.uavs]
     r.sums[VALUE] += a.value[t - a.uavs]
 
 
 @inline_kernel
-def _over(a: Arrays, r: Routes, before: int, t: int, then: int) -> float:
-    """Length [m] of the way over t, which is kept where its points are."""
-    found = float(length_via(a.pairs, WHOLE(before), WHOLE(t), WHOLE(then)))
-    return found if found < math.inf else float(r.leg[before] + r.leg[t])
+def _length_over(a: Arrays, r: Routes, before: int, t: int, then: int) -> float:
+    """Length [m] of the path over t, which is stored with the known lengths."""
+    length_known = float(length_via(a.pairs, SIGNED(before), SIGNED(t), SIGNED(then)))
+    return length_known if length_known < math.inf else float(r.leg[before] + r.leg[t])
 
 
 @inline_kernel
 def remove(a: Arrays, r: Routes, t: int) -> None:
-    """Take the task node t out of its route."""
-    u, before, then = r.on[t], r.prev[t], r.next[t]
-    direct = step(a, before, then)
-    if direct == math.inf:  # a way that is not known leads over t
-        direct = _over(a, r, before, t, then)
+    """Remove the task node t from its route."""
+    u, before, then = r.uav_of[t], r.prev[t], r.next[t]
+    direct = leg_length(a, before, then)
+    if direct == math.inf:  # no path is known: keep the one over t
+        direct = _length_over(a, r, before, t, then)
     delta = direct - r.leg[before] - r.leg[t]
     r.next[before], r.prev[then] = then, before
     r.leg[before] = direct
-    r.on[t] = -1
+    r.uav_of[t] = -1
     r.tasks[u] -= 1
-    stretch(a, r, u, delta)
-    r.sums[LEFT_OUT] += a.price[t - a.uavs]
+    add_length(a, r, u, delta)
+    r.sums[UNASSIGNED_COST] += a.unassigned_cost[t - a.uavs]
     r.sums[VALUE] -= a.value[t - a.uavs]

@@ -1,25 +1,38 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Constructing bees: they grow routes by chained Q and learn from each other's rank."""
+"""Scouts: bees that construct routes by chained Q and learn from the ranking (eq 2.14)."""
 from __future__ import annotations
 
 import functools
 
 import numpy as np
 
-from uav_task_alloc.solver import routes as of
 from uav_task_alloc.solver.insertion import place_all
 from uav_task_alloc.solver.problem import Problem
-from uav_task_alloc.solver.rng import Chance
-from uav_task_alloc.solver.routes import Arrays, Routes
-from uav_task_alloc.solver.tables import DECAY, Tables, construct, fresh_tables, keep, reinforce
+from uav_task_alloc.solver.rng import RngState
+from uav_task_alloc.solver.routes import (
+    Arrays,
+    Routes,
+    copy_into,
+    empty_routes,
+    is_better,
+    total_cost,
+)
+from uav_task_alloc.solver.tables import (
+    RANK_DECAY,
+    Tables,
+    construct,
+    fresh_tables,
+    reinforce,
+    to_learnt,
+)
 
-BEES = 8  # that fly before the tables are changed
+BEES = 8  # flights between two updates of the tables
 
 
 class Scouts:
-    """A swarm of constructing bees with their tables; `learning` False freezes Q."""
+    """A swarm of scouts with their Q tables; `learning` False freezes Q."""
 
-    def __init__(self, problem: Problem, arrays: Arrays, rng: Chance, learnt: object = None,
+    def __init__(self, problem: Problem, arrays: Arrays, rng: RngState, learnt: object = None,
                  learning: bool = True) -> None:
         self.arrays, self.rng, self.learning = arrays, rng, learning
         self._problem, self._learnt = problem, learnt
@@ -30,41 +43,39 @@ class Scouts:
 
     @functools.cached_property
     def tables(self) -> Tables:
-        """Made when the first bee flies: a short solve has no time for them."""
+        """The Q tables, allocated for the first flight: a short solve has no time for them."""
         return fresh_tables(self._problem, self._learnt)
 
     def learnt(self) -> object:
-        """What the next warm start wants."""
-        return keep(self._problem, self.tables) if self._bees else self._learnt
+        """The Q tables for the next warm start."""
+        return to_learnt(self._problem, self.tables) if self._bees else self._learnt
 
     def fly(self, best: Routes) -> bool:
-        """One flight of all; `best` is improved if a bee brings better, and learnt from."""
-        a, found = self.arrays, False
+        """Construct routes with all scouts; copy a better one to `best`; whether there was one."""
+        a, improved = self.arrays, False
         if not self._bees:
-            self._bees = [of.empty_routes(a) for _ in range(BEES)]
-        strain = a.strain.copy()
+            self._bees = [empty_routes(a) for _ in range(BEES)]
+        penalty = a.range_penalty.copy()
         if a.hard:
-            a.strain[:] = np.inf
+            a.range_penalty[:] = np.inf
         for bee in self._bees:
             construct(a, bee, self.tables, self._sums, self.rng)
-            left = np.flatnonzero(bee.on[a.uavs:a.ends] < 0) + a.uavs
-            if left.size:
-                place_all(a, bee, left)
-            if of.better_now(a, bee, best):
-                of.copy(bee, best)
-                found = True
+            unassigned = np.flatnonzero(bee.uav_of[a.uavs:a.ends] < 0) + a.uavs
+            if unassigned.size:
+                place_all(a, bee, unassigned)
+            if is_better(a, bee, best):
+                copy_into(bee, best)
+                improved = True
         if self.learning:
             self._learn(best)
-        a.strain[:] = strain
-        return found
+        a.range_penalty[:] = penalty
+        return improved
 
     def _learn(self, best: Routes) -> None:
-        """The recorder's best first, then the bees by rank (eq 2.14), each by k / fit."""
+        """Reinforce the best routes, then the bees by rank (eq 2.14), each with reward k / fit."""
         a = self.arrays
-        ranked = sorted(self._bees, key=lambda bee: of.cost_now(a, bee))
-        goal = max(of.cost_now(a, best), 1e-9)
+        ranked = sorted(self._bees, key=lambda bee: total_cost(a, bee))
+        goal = max(total_cost(a, best), 1e-9)
         for rank, bee in enumerate([best, *ranked[:4]]):
-            share = (1.0 - DECAY) * DECAY ** rank
-            reinforce(a, bee, self.tables, share, min(1.0, goal / max(of.cost_now(a, bee), 1e-9)))
-
-
+            share = (1.0 - RANK_DECAY) * RANK_DECAY ** rank
+            reinforce(a, bee, self.tables, share, min(1.0, goal / max(total_cost(a, bee), 1e-9)))

@@ -1,83 +1,83 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The searching bees' kernel: ruin and recreate under annealing, keeping the best."""
+"""Ruin and recreate with simulated annealing: the kernel of employed and onlooker bees."""
 from __future__ import annotations
 
 import math
 
 from uav_task_alloc.kernel import kernel
 from uav_task_alloc.solver.pool import Pool, collect
-from uav_task_alloc.solver.rng import Chance, uniform
+from uav_task_alloc.solver.rng import RngState, uniform
 from uav_task_alloc.solver.routes import (
     EXCESS,
     TINY,
     Arrays,
     Routes,
-    better,
-    copy,
-    cost,
+    copy_into,
+    is_better_kernel,
+    leg_length,
     remove,
-    step,
-    total,
+    total_cost_kernel,
+    update_sums,
 )
-from uav_task_alloc.solver.ruin import Log, look_for_trouble, recreate, ruin, undo
+from uav_task_alloc.solver.ruin import RuinLog, list_unassigned_and_overrange, recreate, ruin, undo
 
-LEAST, MOST = 0.1, 1000.0  # [m/m] cost of metres beyond range
-DEARER, CHEAPER = 1.2, 0.9  # it changes so much at every look
-LOOKS = 8  # of them in as many rounds as there are tasks
+MIN_RANGE_PENALTY, MAX_RANGE_PENALTY = 0.1, 1000.0  # [m/m] bounds of a range penalty
+PENALTY_GROWTH, PENALTY_DECAY = 1.2, 0.9  # factors of a range penalty at each update
+PENALTY_UPDATES = 8  # updates in as many rounds as there are tasks
 
 
 @kernel
-def _look(a: Arrays, r: Routes, log: Log, pool: Pool) -> int:
-    """Price left out tasks and metres beyond range anew; returns rounds until the next time."""
-    if a.hard:  # dear enough that routes come back into range, cheap enough to pass through
-        fine = r.sums[EXCESS] <= a.excess_floor + TINY
+def _update_penalties(a: Arrays, r: Routes, log: RuinLog, pool: Pool) -> int:
+    """Adapt penalties and costs of unassigned tasks; returns rounds to the next update. O(n)."""
+    if a.hard:  # high enough that routes return into range, low enough to pass through
+        in_range = r.sums[EXCESS] <= a.excess_floor + TINY
         for u in range(a.uavs):
-            if fine:
-                a.strain[u] = max(LEAST, a.strain[u] * CHEAPER)
-            elif r.length[u] > a.reach[u] + TINY:
-                a.strain[u] = min(MOST, a.strain[u] * DEARER)
-    look_for_trouble(a, r, log)
+            if in_range:
+                a.range_penalty[u] = max(MIN_RANGE_PENALTY, a.range_penalty[u] * PENALTY_DECAY)
+            elif r.length[u] > a.range_left[u] + TINY:
+                a.range_penalty[u] = min(MAX_RANGE_PENALTY, a.range_penalty[u] * PENALTY_GROWTH)
+    list_unassigned_and_overrange(a, r, log)
     collect(a, r, pool)
-    total(a, r)
-    return max(20, a.price.size // LOOKS)
+    update_sums(a, r)
+    return max(20, a.unassigned_cost.size // PENALTY_UPDATES)
 
 
 @kernel
-def relieve(a: Arrays, r: Routes) -> None:
-    """Leave out tasks of routes beyond range, always the one whose leg saves most. O(n)."""
+def trim_to_range(a: Arrays, r: Routes) -> None:
+    """Remove tasks of routes beyond range, always the one that saves most. O(n^2) at worst."""
     for u in range(a.uavs):
-        while r.length[u] > a.reach[u] + TINY and r.tasks[u] > 0:
-            t, out, most = r.next[u], r.next[u], -1.0
+        while r.length[u] > a.range_left[u] + TINY and r.tasks[u] > 0:
+            t, worst, most = r.next[u], r.next[u], -1.0
             while t < a.ends:
-                saved = r.leg[r.prev[t]] + r.leg[t] - step(a, r.prev[t], r.next[t])
+                saved = r.leg[r.prev[t]] + r.leg[t] - leg_length(a, r.prev[t], r.next[t])
                 if saved > most:
-                    out, most = t, saved
+                    worst, most = t, saved
                 t = r.next[t]
-            remove(a, r, out)
+            remove(a, r, worst)
 
 
 @kernel
-def search(a: Arrays, r: Routes, best: Routes, log: Log, pool: Pool, mean: float,
-           hot: float, cold: float, rounds: int, rng: Chance) -> int:
-    """Anneal r from temperature `hot` to `cold` [m]; returns how often `best` got better.
+def search(a: Arrays, r: Routes, best: Routes, log: RuinLog, pool: Pool, mean: float,
+           start: float, end: float, rounds: int, rng: RngState) -> int:
+    """Anneal r from temperature `start` to `end` [m]; returns how often `best` improved.
 
-    A round takes out about `mean` tasks and costs O(mean k).
+    A round removes about `mean` tasks and costs O(mean k).
     """
-    temperature = hot
-    falls = (cold / hot) ** (1.0 / max(1, rounds))
-    found, log.hit[:] = 0, -1
+    temperature = start
+    decay = (end / start) ** (1.0 / max(1, rounds))
+    improvements, log.last_ruined[:] = 0, -1
     for i in range(rounds):
-        log.size[4] -= 1
-        if log.size[4] < 0:
-            log.size[4] = _look(a, r, log, pool)
-        before = cost(a, r)
+        log.counts[4] -= 1
+        if log.counts[4] < 0:
+            log.counts[4] = _update_penalties(a, r, log, pool)
+        before = total_cost_kernel(a, r)
         ruin(a, r, log, mean, i, rng)
         recreate(a, r, log, rng)
-        if cost(a, r) < before - temperature * math.log(1.0 - uniform(rng)):
-            if better(a, r, best):
-                copy(r, best)
-                found += 1
+        if total_cost_kernel(a, r) < before - temperature * math.log(1.0 - uniform(rng)):
+            if is_better_kernel(a, r, best):
+                copy_into(r, best)
+                improvements += 1
         else:
             undo(a, r, log)
-        temperature *= falls
-    return found
+        temperature *= decay
+    return improvements

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The recipe: check, make arrays, repair or construct, let a solver improve it, answer."""
+"""`plan`: check arguments, build the problem, repair or construct, run a solver, convert."""
 from __future__ import annotations
 
 import functools
@@ -18,12 +18,12 @@ from uav_task_alloc.objective import Weights
 from uav_task_alloc.solver.answer import to_plan
 from uav_task_alloc.solver.check import check_locked, check_options, check_unique
 from uav_task_alloc.solver.insertion import place_all
-from uav_task_alloc.solver.path_preparation import IN_SEARCH, PathPreparation
+from uav_task_alloc.solver.path_preparation import SEARCH_LIMIT, PathPreparation
 from uav_task_alloc.solver.problem import Limits, Problem, Rules, make_problem
 from uav_task_alloc.solver.recorder import Recorder
 from uav_task_alloc.solver.registry import SOLVERS
-from uav_task_alloc.solver.search import relieve
-from uav_task_alloc.solver.warm import WarmState, repaired
+from uav_task_alloc.solver.search import trim_to_range
+from uav_task_alloc.solver.warm import WarmState, repair
 
 
 def plan(uavs: Iterable[Uav], tasks: Iterable[Task], zones: Iterable[ThreatZone] = (), *,
@@ -35,16 +35,39 @@ def plan(uavs: Iterable[Uav], tasks: Iterable[Task], zones: Iterable[ThreatZone]
          stop: Callable[[], bool] | None = None, max_iterations: int | None = None,
          on_iteration: Callable[[int, float], None] | None = None,
          clock: Callable[[], float] = time.perf_counter) -> Plan:
-    """Who does what in which order: the best found within `budget` [s].
+    """Assign tasks to UAVs and order them: the best plan found within the budget.
 
-    Every task that can be served is served; where ranges do not suffice the most value is, then
-    on the shortest way. hard_range=False: ranges may be exceeded at the price of eq 2.12.
-    `warm` is an earlier plan, or its state, to go on from, never worsened; `locked` lists the
-    first tasks of UAVs that stay as they are. `stop` is asked between rounds. The same seed and
-    `max_iterations` on one thread give the same plan; what an iteration is each solver says.
-    `on_iteration(iterations so far, best fit)` is called behind each, or behind a few. The first
-    call in a process loads or compiles the solver's kernels before its budget begins.
-    Raises InvalidValue, UnknownName.
+    Every task that can be served is served; where ranges do not suffice, the most value is, then
+    on the shortest routes. The first call in a process loads or compiles the solver's kernels
+    before its budget begins. The same seed and `max_iterations` on one thread give the same plan.
+
+    Args:
+        uavs: the fleet, ids unique.
+        tasks: ids unique.
+        zones: threat zones that every leg stays outside of.
+        budget: [s] of solving, in [0, 86400].
+        seed: of the random numbers.
+        solver: a name in SOLVERS.
+        warm: an earlier plan, or its state, to start from; the result is not worse.
+        route_end: 'hold' at the last task, or 'home'.
+        hard_range: False: ranges may be exceeded at the penalty of eq 2.12.
+        locked: by UAV id the first tasks of its route, which stay as they are.
+        weights: coefficients of eq 2.12; None: those of the paper.
+        clearance: [m] kept from zones beyond their margins.
+        altitude_min: [m] lowest detour point.
+        altitude_max: [m] highest detour point.
+        threads: in [1, 64]; only chain_q uses more than one.
+        stop: polled between iterations; True ends the solve with the best plan so far.
+        max_iterations: ends the solve as well; None: no limit. Each solver defines its iteration.
+        on_iteration: called with (iterations so far, best fit) after each or a few iterations.
+        clock: [s], monotonic.
+
+    Returns:
+        Routes, legs, the reasons of unassigned tasks, and the sums of eq 2.12.
+
+    Raises:
+        InvalidValue: an argument is out of range, or an id is used twice.
+        UnknownName: there is no such solver.
     """
     if not isinstance(solver, str) or solver not in SOLVERS:
         raise UnknownName('solver', solver, list(SOLVERS))
@@ -55,26 +78,26 @@ def plan(uavs: Iterable[Uav], tasks: Iterable[Task], zones: Iterable[ThreatZone]
     limits = Limits(check_unique('zone', zones, ThreatZone), clearance, altitude_min,
                     altitude_max)
     rules = Rules(route_end == 'home', hard_range, weights or Weights())
-    warm_up(solver, bool(limits.zones))
+    load_kernels(solver, bool(limits.zones))
     began, before = clock(), WarmState.of(warm)
     search = PathPreparation(clock, began, budget, stop, before.flown())
     problem = make_problem(fleet, work, check_locked(locked, fleet, work), limits, rules,
                            before.problem, search)
     recorder = Recorder(problem, clock, began, budget, max_iterations, stop, threads,
-                        warm is not None, _held(problem), on_iteration)
+                        warm is not None, _locked_sums(problem), on_iteration)
     if warm is not None:
-        recorder.offer(repaired(problem, before.routes))
+        recorder.offer(repair(problem, before.routes))
     elif limits.zones:
-        recorder.offer(repaired(problem, {}))
-    search.begin(1.0, IN_SEARCH)
+        recorder.offer(repair(problem, {}))
+    search.begin(1.0, SEARCH_LIMIT)
     learnt = SOLVERS[solver](recorder, seed, before.learnt)
-    made = to_plan(problem, recorder, solver, warm is not None)
-    search.path_budget.check()  # raises what a question raised in a kernel
-    return replace(made, state=WarmState(problem, learnt, made.routes))
+    result = to_plan(problem, recorder, solver, warm is not None)
+    search.path_budget.check()  # raises what a callback raised within a kernel
+    return replace(result, state=WarmState(problem, learnt, result.routes))
 
 
-def _held(problem: Problem) -> tuple[float, float]:
-    """Length [m] and value of what is locked."""
+def _locked_sums(problem: Problem) -> tuple[float, float]:
+    """Length [m] of the locked legs, and value of the locked tasks."""
     length, value = 0.0, 0.0
     for u, uav in enumerate(problem.uavs):
         places = problem.locked_places(u)
@@ -84,10 +107,12 @@ def _held(problem: Problem) -> tuple[float, float]:
 
 
 @functools.cache
-def warm_up(solver: str = 'chain_q', zones: bool = False) -> None:
-    """Load a solver's kernels, compile those not on disk yet; does nothing a second time.
+def load_kernels(solver: str = 'chain_q', zones: bool = False) -> None:
+    """Load a solver's kernels, compile those not on disk yet; further calls do nothing.
 
-    zones: those that find ways around zones as well.
+    Args:
+        solver: a name in SOLVERS.
+        zones: whether to load the kernels that find paths around zones, too.
     """
     uavs = (Uav('u', (0.0, 0.0, 0.0)), Uav('v', (9.0, 0.0, 0.0), 30.0))
     tasks = tuple(Task(f't{i}', (float(i), 1.0, 0.0)) for i in range(5))
@@ -96,11 +121,11 @@ def warm_up(solver: str = 'chain_q', zones: bool = False) -> None:
                ThreatZone.polygon('prism', ((0.4, 0.9), (0.6, 0.9), (0.5, 1.1)))) if zones else ()
     search = PathPreparation(lambda: 0.0, 0.0, 1.0, flown={'u': (('t0',), (Leg((), 0.0),))})
     problem = make_problem(uavs, tasks, {}, Limits(between), Rules(returns=True), None, search)
-    rounds = 500 if solver == 'chain_q' else 64  # until each kind of bee has flown
+    rounds = 500 if solver == 'chain_q' else 64  # until each kind of bee has had a flight
     recorder = Recorder(problem, lambda: 0.0, 0.0, 1.0, max_iterations=rounds)
     SOLVERS[solver](recorder, 0, None)
     to_plan(problem, recorder, '', False)
-    place_all(problem.arrays, recorder.best, np.empty(0, np.int64))  # these two only have work
-    relieve(problem.arrays, recorder.best)  # where ranges do not suffice
+    place_all(problem.arrays, recorder.best, np.empty(0, np.int64))  # these two are only called
+    trim_to_range(problem.arrays, recorder.best)  # where ranges do not suffice
     problem.distances.offer_path(0, len(uavs), ())
     find_detour(tasks[1].position, uavs[1].position, between, budget=search.path_budget)

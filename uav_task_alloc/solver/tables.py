@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Chained Q: what it was worth to fly from one stop to a neighbour of it, kept by id."""
+"""Chained Q: the value of flying from a stop to one of its neighbours, kept by id."""
 from __future__ import annotations
 
 import math
@@ -10,23 +10,32 @@ import numpy as np
 
 from uav_task_alloc.kernel import inline_kernel, kernel
 from uav_task_alloc.solver.problem import Problem
-from uav_task_alloc.solver.rng import Chance, uniform
-from uav_task_alloc.solver.routes import Arrays, Floats, Ints, Nodes, Routes, clear, insert, step
+from uav_task_alloc.solver.rng import RngState, uniform
+from uav_task_alloc.solver.routes import (
+    Arrays,
+    Floats,
+    Ints,
+    Nodes,
+    Routes,
+    clear,
+    insert,
+    leg_length,
+)
 
-FIRST, FLOOR = 0.5, 0.01  # Q of a leg never flown; the least Q, so that nothing is ruled out
-LEARNING, DISCOUNT = 0.2, 0.1  # alpha and gamma of eq 2.6
-DECAY = 0.5  # each rank counts that much of the one before (eq 2.14)
+INITIAL_Q, MIN_Q = 0.5, 0.01  # Q of a leg never flown; least Q, so that no leg is excluded
+LEARNING_RATE, DISCOUNT = 0.2, 0.1  # alpha and gamma of eq 2.6
+RANK_DECAY = 0.5  # weight of a rank over that of the one before (eq 2.14)
 
 
 class Tables(NamedTuple):
     """Q[previous stop -> next task] on one UAV; a stop is a task or the UAV's start."""
 
-    task: Floats  # (n, k) by place in Arrays.near
+    task: Floats  # (n, k) by index in Arrays.near
     start: Floats  # (m, n)
 
 
 class Learnt(NamedTuple):
-    """Tables that outlive their problem: rows are found again by id."""
+    """Tables that outlive their problem: rows are identified by UAV and task ids."""
 
     tables: Tables
     near: Nodes
@@ -35,13 +44,13 @@ class Learnt(NamedTuple):
 
 
 def fresh_tables(problem: Problem, learnt: object = None) -> Tables:
-    """Tables for a problem, with what an earlier one taught about ids that are still here."""
+    """Tables for a problem, with the values that an earlier one learnt for the same ids."""
     n, m = len(problem.tasks), len(problem.uavs)
-    tables = Tables(np.full(problem.arrays.near.shape, FIRST), np.full((m, n), FIRST))
+    tables = Tables(np.full(problem.arrays.near.shape, INITIAL_Q), np.full((m, n), INITIAL_Q))
     if not isinstance(learnt, Learnt) or not n:
         return tables
     was = np.array([learnt.tasks.get(task.id, -1) for task in problem.tasks], np.int64)
-    _take_over(problem.arrays, tables.task, was, learnt.tables.task, learnt.near,
+    _copy_known_rows(problem.arrays, tables.task, was, learnt.tables.task, learnt.near,
                len(learnt.uavs))
     known = np.flatnonzero(was >= 0)
     for u, uav in enumerate(problem.uavs):
@@ -50,16 +59,19 @@ def fresh_tables(problem: Problem, learnt: object = None) -> Tables:
     return tables
 
 
-def keep(problem: Problem, tables: Tables) -> Learnt:
-    """What the next warm start wants."""
+def to_learnt(problem: Problem, tables: Tables) -> Learnt:
+    """The tables with their ids, for the next warm start."""
     return Learnt(tables, problem.arrays.near, {u.id: i for i, u in enumerate(problem.uavs)},
                   problem.index)
 
 
 @kernel
-def _take_over(a: Arrays, q: Floats, was: Ints, old: Floats, old_near: Nodes,
+def _copy_known_rows(a: Arrays, q: Floats, was: Ints, old: Floats, old_near: Nodes,
                old_uavs: int) -> None:
-    """Rows and entries of tasks that were known. O(n k^2)."""
+    """Copy entries of known tasks from `old` to `q`, both (n, k). O(n k^2).
+
+    was: (n) index of each task in the earlier problem, -1: new.
+    """
     for i in range(q.shape[0]):
         if was[i] < 0:
             continue
@@ -71,54 +83,60 @@ def _take_over(a: Arrays, q: Floats, was: Ints, old: Floats, old_near: Nodes,
 
 
 @inline_kernel
-def _pull(d: float) -> float:
-    """How much nearness attracts."""
+def _attraction(d: float) -> float:
+    """Attraction of a leg of length d [m]: about 1 / d^3. O(1)."""
     return 1.0 / (d * d * d + 1e-9)
 
 
 @inline_kernel
-def _may_end(a: Arrays, r: Routes, u: int, t: int, d: float) -> bool:
-    """The range mask: whether UAV u may fly on to t and end there."""
+def _can_end_at(a: Arrays, r: Routes, u: int, t: int, d: float) -> bool:
+    """Range mask: whether UAV u may append t, d [m] from its last stop. O(1)."""
     last = r.prev[a.ends + u]
-    more = d + step(a, t, a.ends + u) - r.leg[last]
-    return a.may[u, t - a.uavs] and more < math.inf and (
-        not a.hard or r.length[u] + more <= a.reach[u])
+    more = d + leg_length(a, t, a.ends + u) - r.leg[last]
+    return a.compatible[u, t - a.uavs] and more < math.inf and (
+        not a.hard or r.length[u] + more <= a.range_left[u])
 
 
 @inline_kernel
-def _row(a: Arrays, r: Routes, q: Tables, u: int, wanted: float) -> tuple[float, int]:
-    """Attraction of all candidates of UAV u's end, or the one at which the sum passes `wanted`."""
+def _weigh_legs(a: Arrays, r: Routes, q: Tables, u: int, wanted: float) -> tuple[float, int]:
+    """Sum of the attractions of UAV u's next legs, up to the one that passes `wanted`. O(n).
+
+    Returns the sum and the task node of that leg, -1 if none passes.
+    """
     last, total = r.prev[a.ends + u], 0.0
     if last < a.uavs:
-        for i in range(a.price.size):
-            if r.on[a.uavs + i] < 0:
-                d = step(a, last, a.uavs + i)
-                if _may_end(a, r, u, a.uavs + i, d):
-                    total += q.start[u, i] * _pull(d)
+        for i in range(a.unassigned_cost.size):
+            if r.uav_of[a.uavs + i] < 0:
+                d = leg_length(a, last, a.uavs + i)
+                if _can_end_at(a, r, u, a.uavs + i, d):
+                    total += q.start[u, i] * _attraction(d)
                     if total > wanted:
                         return total, a.uavs + i
         return total, -1
     for k in range(a.near.shape[1]):
         t = a.near[last - a.uavs, k]
         d = a.near_length[last - a.uavs, k]
-        if r.on[t] < 0 and _may_end(a, r, u, t, d):
-            total += q.task[last - a.uavs, k] * _pull(d)
+        if r.uav_of[t] < 0 and _can_end_at(a, r, u, t, d):
+            total += q.task[last - a.uavs, k] * _attraction(d)
             if total > wanted:
                 return total, t
     return total, -1
 
 
 @kernel
-def construct(a: Arrays, r: Routes, q: Tables, sums: Floats, rng: Chance) -> None:
-    """A scout: grow all routes at their ends by jointly drawn legs, Q (1/d)^3 each. O(n m k)."""
+def construct(a: Arrays, r: Routes, q: Tables, sums: Floats, rng: RngState) -> None:
+    """A scout: append legs drawn jointly over all UAVs with p ~ Q / d^3. O(n m k).
+
+    sums: (m) scratch.
+    """
     clear(a, r)
     for u in range(a.uavs):
-        sums[u], _ = _row(a, r, q, u, math.inf)
-    for _ in range(a.price.size):
+        sums[u], _ = _weigh_legs(a, r, q, u, math.inf)
+    for _ in range(a.unassigned_cost.size):
         total = 0.0
         for u in range(a.uavs):
             if r.prev[a.ends + u] >= a.uavs:
-                sums[u], _ = _row(a, r, q, u, math.inf)
+                sums[u], _ = _weigh_legs(a, r, q, u, math.inf)
             total += sums[u]
         if not total > 0.0:
             break
@@ -126,19 +144,22 @@ def construct(a: Arrays, r: Routes, q: Tables, sums: Floats, rng: Chance) -> Non
         while u < a.uavs - 1 and wanted >= sums[u]:
             wanted -= sums[u]
             u += 1
-        _, t = _row(a, r, q, u, wanted)
+        _, t = _weigh_legs(a, r, q, u, wanted)
         sums[u], _ = (0.0, 0) if t < 0 else (sums[u], 0)
         if t >= 0:
             last = r.prev[a.ends + u]
             insert(a, r, t, last)
             if last < a.uavs:
-                sums[u], _ = _row(a, r, q, u, math.inf)
+                sums[u], _ = _weigh_legs(a, r, q, u, math.inf)
 
 
 @kernel
 def reinforce(a: Arrays, r: Routes, q: Tables, share: float, reward: float) -> None:
-    """Eq 2.14 for one bee: every leg it flew moves towards what it brought. O(n k)."""
-    rate = LEARNING * share
+    """Eq 2.14 for one bee: move Q of every leg it flew towards its reward. O(n k).
+
+    share: weight of the bee's rank; reward: in [0, 1].
+    """
+    rate = LEARNING_RATE * share
     for u in range(a.uavs):
         t, before = r.next[u], u
         while t < a.ends:
@@ -147,12 +168,12 @@ def reinforce(a: Arrays, r: Routes, q: Tables, share: float, reward: float) -> N
                 best = max(best, q.task[t - a.uavs, k])
             worth = (1.0 - DISCOUNT) * reward + DISCOUNT * best  # eq 2.6
             if before < a.uavs:
-                for i in range(a.price.size):
+                for i in range(a.unassigned_cost.size):
                     goal = worth if a.uavs + i == t else 0.0
-                    q.start[u, i] = max(FLOOR, q.start[u, i] + rate * (goal - q.start[u, i]))
+                    q.start[u, i] = max(MIN_Q, q.start[u, i] + rate * (goal - q.start[u, i]))
             else:
                 for k in range(a.near.shape[1]):
                     goal = worth if a.near[before - a.uavs, k] == t else 0.0
                     now = q.task[before - a.uavs, k]
-                    q.task[before - a.uavs, k] = max(FLOOR, now + rate * (goal - now))
+                    q.task[before - a.uavs, k] = max(MIN_Q, now + rate * (goal - now))
             t, before = r.next[t], t

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Events in a row: tasks arrive, UAVs have moved, and the plan goes on from the last one."""
+"""Experiment on warm starts: tasks arrive, UAVs move, each plan continues the one before."""
 from __future__ import annotations
 
 import time
@@ -9,101 +9,124 @@ from functools import partial
 import numpy as np
 
 from uav_task_alloc.model import Plan, Task, Uav
-from uav_task_alloc.solver.check import LONGEST
-from uav_task_alloc.solver.solve import plan, warm_up
+from uav_task_alloc.solver.check import MAX_BUDGET
+from uav_task_alloc.solver.solve import load_kernels, plan
 from uav_task_alloc.study.instances import SIDE, Instance, make_instance
 
-ARRIVALS, STEP = 5, 300.0  # tasks, [m] flown between events
-_ROOM = 1.5  # ranges, as multiples of those of the instance
-SEED = 11  # of the instance and the arrivals; nothing was tuned on it
-_REFERENCE = 20  # times the budget that the plan to compare with gets
-BETWEEN = 5  # times the iterations of an event that are searched until the next
-BACKGROUND = 10.0  # times the budget that is searched between events, as the allocator does
-BEFORE = 100.0  # times the budget of the first plan
+_ARRIVALS = 5  # tasks at each event
+_STEP = 300.0  # [m] flown between events
+_RANGE_FACTOR = 1.5  # ranges over those of the instance, as more tasks arrive
+_SEED = 11  # of the instance and the arrivals; not used for tuning
+# effort over that of the plan measured at an event:
+_REFERENCE_FACTOR = 20  # of the reference plan
+_ITERATIONS_BETWEEN = 5  # of the search until the next event in `compare`
+_BACKGROUND_FACTOR = 10.0  # of the search until the next event in `run_events`
+_FIRST_PLAN_FACTOR = 100.0  # of the plan before the first event
 
 
 def run_events(budget: float = 0.02, runs: int = 50, size: str = '20x200') -> None:
-    """Per event: time to the first valid plan, gap to a long solve from the same plan."""
-    warm_up()
+    """Print the time to the first valid plan at an event, and the gap to a longer solve.
+
+    Args:
+        budget: [s] of CPU time of a plan.
+        runs: number of events.
+        size: UAVs x tasks.
+    """
+    load_kernels()
     uavs, tasks = (int(each) for each in size.split('x'))
     for one_base in (False, True):
-        gaps, first = _chain(uavs, tasks, one_base, budget, runs)
+        gaps, first = _measure_events(uavs, tasks, one_base, budget, runs)
         kind = 'one base' if one_base else 'spread'
         print(f'{kind}: first plan {1e3 * np.median(first):.1f} ms (worst '
               f'{1e3 * max(first):.1f}), gap at {1e3 * budget:g} ms: median '
               f'{np.median(gaps):.2f} %, worst {max(gaps):.2f} %', flush=True)
 
 
-def _chain(uavs: int, tasks: int, one_base: bool, budget: float,
+def _measure_events(uavs: int, tasks: int, one_base: bool, budget: float,
            runs: int) -> tuple[list[float], list[float]]:
-    instance, rng = make_instance(uavs, tasks, SEED, one_base), np.random.default_rng(SEED)
-    # more tasks arrive than the ranges are made for
-    fleet = tuple(replace(uav, range=_ROOM * uav.range) for uav in instance.uavs)
+    instance, rng = make_instance(uavs, tasks, _SEED, one_base), np.random.default_rng(_SEED)
+    fleet = tuple(replace(uav, range=_RANGE_FACTOR * uav.range) for uav in instance.uavs)
     work = instance.tasks
-    known = plan(fleet, work, budget=BEFORE * budget, clock=time.process_time)
+    solve = partial(plan, clock=time.process_time)
+    known = solve(fleet, work, budget=_FIRST_PLAN_FACTOR * budget)
     gaps: list[float] = []
     first: list[float] = []
     for event in range(runs):
-        fleet, work = _flown(fleet, work, known)
+        fleet, work = _advance(fleet, work, known)
         work += tuple(Task(f'e{event}-{i}', (*rng.uniform(0.0, SIDE, 2), 0.0))
-                      for i in range(ARRIVALS))
-        fresh = plan(fleet, work, budget=budget, warm=known, clock=time.process_time)
-        known = plan(fleet, work, budget=BACKGROUND * budget, warm=fresh, clock=time.process_time)
-        best = plan(fleet, work, budget=_REFERENCE * budget, warm=known, clock=time.process_time)
-        gaps.append(_gap(fresh, best))
+                      for i in range(_ARRIVALS))
+        fresh = solve(fleet, work, budget=budget, warm=known)
+        known = solve(fleet, work, budget=_BACKGROUND_FACTOR * budget, warm=fresh)
+        best = solve(fleet, work, budget=_REFERENCE_FACTOR * budget, warm=known)
+        gaps.append(_gap_percent(fresh, best))
         first.append(fresh.history[0][0])
     return gaps, first
 
 
 def compare(instance: Instance, seed: int, iterations: int, count: int) -> list[
         dict[str, float]]:
-    """Random arrivals in a row: gap [%] of a warm and a cold plan each, and their CPU seconds.
+    """Compare warm and cold starts over a sequence of random arrivals.
 
-    An event brings Poisson(a twentieth of the first tasks) new ones. Both plans get as many
-    iterations; the gap is to REFERENCE times as many from the better of both.
+    The number of arrivals at an event is Poisson distributed, its mean a twentieth of the tasks
+    of the instance. The gap is to a plan of _REFERENCE_FACTOR times the iterations, started from
+    the better of both.
+
+    Args:
+        instance: the UAVs and the first tasks.
+        seed: of the arrivals and the solver.
+        iterations: of the warm and of the cold plan.
+        count: number of events.
+
+    Returns:
+        For each event: tasks `arrived`, `tasks` in all; for both starts the gap [%], CPU seconds
+        to the first plan and in all.
     """
     rng = np.random.default_rng((seed, count))
-    fleet = tuple(replace(uav, range=_ROOM * uav.range) for uav in instance.uavs)
+    fleet = tuple(replace(uav, range=_RANGE_FACTOR * uav.range) for uav in instance.uavs)
     work, rows = instance.tasks, list[dict[str, float]]()
-    solved = partial(plan, budget=LONGEST, seed=seed, clock=time.thread_time)
-    known = solved(fleet, work, max_iterations=_REFERENCE * iterations)
+    solve = partial(plan, budget=MAX_BUDGET, seed=seed, clock=time.thread_time)
+    known = solve(fleet, work, max_iterations=_REFERENCE_FACTOR * iterations)
     for event in range(count):
-        fleet, work = _flown(fleet, work, known)
+        fleet, work = _advance(fleet, work, known)
         arrived = int(rng.poisson(len(instance.tasks) / 20.0))
         work += tuple(Task(f'e{event}-{i}', (*rng.uniform(0.0, SIDE, 2), 0.0))
                       for i in range(arrived))
-        warm = solved(fleet, work, warm=known, max_iterations=iterations)
-        cold = solved(fleet, work, max_iterations=iterations)
-        better = min(warm, cold, key=lambda made: (-made.value, made.distance))
-        best = solved(fleet, work, warm=better, max_iterations=_REFERENCE * iterations)
+        warm = solve(fleet, work, warm=known, max_iterations=iterations)
+        cold = solve(fleet, work, max_iterations=iterations)
+        better = min(warm, cold, key=lambda result: (-result.value, result.distance))
+        best = solve(fleet, work, warm=better, max_iterations=_REFERENCE_FACTOR * iterations)
         rows.append({'arrived': arrived, 'tasks': len(work),
-                     'warm_gap': _gap(warm, best), 'cold_gap': _gap(cold, best),
+                     'warm_gap': _gap_percent(warm, best), 'cold_gap': _gap_percent(cold, best),
                      'warm_first_s': warm.history[0][0], 'cold_first_s': cold.history[0][0],
                      'warm_s': warm.solve_time, 'cold_s': cold.solve_time})
-        known = solved(fleet, work, warm=warm, max_iterations=BETWEEN * iterations)
+        known = solve(fleet, work, warm=warm, max_iterations=_ITERATIONS_BETWEEN * iterations)
     return rows
 
 
-def _gap(made: Plan, best: Plan) -> float:
-    """Percent longer than the best plan; a task that is left out counts as 100 %."""
-    return (100.0 * (best.value - made.value)
-            + 100.0 * (made.distance / best.distance - 1.0))
+def _gap_percent(result: Plan, best: Plan) -> float:
+    """[%] by which a plan is longer than the best; a unit of value left out counts as 100 %."""
+    return (100.0 * (best.value - result.value)
+            + 100.0 * (result.distance / best.distance - 1.0))
 
 
-def _flown(fleet: tuple[Uav, ...], work: tuple[Task, ...],
-           known: Plan) -> tuple[tuple[Uav, ...], tuple[Task, ...]]:
-    """Everybody STEP metres further along its route; tasks passed are done, ranges shrink."""
-    place, done, moved = {task.id: task.position for task in work}, set[str](), []
+def _advance(fleet: tuple[Uav, ...], work: tuple[Task, ...],
+             known: Plan) -> tuple[tuple[Uav, ...], tuple[Task, ...]]:
+    """Move every UAV _STEP along its route: reached tasks are done, ranges shrink.
+
+    Returns:
+        The UAVs, and the tasks that remain.
+    """
+    positions, done, moved = {task.id: task.position for task in work}, set[str](), []
     for uav in fleet:
-        here, left = np.array(uav.position), STEP
+        here, left = np.array(uav.position), _STEP
         for task_id in known.routes[uav.id]:
-            way = np.array(place[task_id]) - here
-            length = float(np.linalg.norm(way))
+            leg = np.array(positions[task_id]) - here
+            length = float(np.linalg.norm(leg))
             if length > left:
-                here = here + way * (left / length)
+                here = here + leg * (left / length)
                 left = 0.0
                 break
-            here, left = np.array(place[task_id]), left - length
+            here, left = np.array(positions[task_id]), left - length
             done.add(task_id)
-        moved.append(replace(uav, position=tuple(here), range=uav.range - (STEP - left)))
+        moved.append(replace(uav, position=tuple(here), range=uav.range - (_STEP - left)))
     return tuple(moved), tuple(task for task in work if task.id not in done)

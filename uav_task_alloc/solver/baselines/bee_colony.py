@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The artificial bee colony (ABC) of Karaboga (2005) on numbers that stand for a plan.
+"""The artificial bee colony (ABC) of Karaboga on random keys.
 
-A food source is a number in [0, 1) for each task: which of its UAVs serves it (by the interval
-that the number lies in), and when (UAVs serve by rising numbers). Employed and onlooker bees move
-one number of a source towards or away from that of another source and keep what is better; a
-source that did not improve for `limit` trials is left for a random one by a scout, one a
-generation. Eq 2.8 wants larger-is-better: 1/fit. An iteration is a generation.
+Karaboga, An Idea Based on Honey Bee Swarm for Numerical Optimization, TR06, Erciyes University,
+2005. A food source has a key in [0, 1) for each task: the interval that it lies in selects the
+UAV, and UAVs serve their tasks by ascending keys. Employed and onlooker bees move one key of a
+source towards or away from that of another source and keep the better one; a source that did not
+improve for `limit` trials is replaced by a random one, one a generation. Eq 2.8 is applied to
+1/fit, which is larger for better plans. An iteration is a generation.
 """
 from __future__ import annotations
 
@@ -27,7 +28,7 @@ class AbcSettings:
 
 
 def source_probabilities(fits: Floats) -> Floats:
-    """Chance of each source to be chosen by an onlooker: its share of all 1/fit (eq 2.8)."""
+    """Probability that an onlooker chooses each source: its share of all 1/fit (eq 2.8)."""
     worth = 1.0 / np.maximum(fits, 1e-300)
     total = worth.sum()
     shares: Floats = worth / total if total > 0.0 else np.full(len(fits), 1.0 / len(fits))
@@ -35,11 +36,11 @@ def source_probabilities(fits: Floats) -> Floats:
 
 
 class AbcColony:
-    """Food sources and the bees that work on them."""
+    """Food sources (sources, n) and the bees that change them."""
 
     def __init__(self, coding: Coding, settings: AbcSettings, rng: np.random.Generator) -> None:
         self._coding, self._rng = coding, rng
-        n = len(coding.work)
+        n = len(coding.tasks)
         self._limit = settings.limit if settings.limit is not None else settings.sources * n
         self.sources = rng.random((settings.sources, n))
         self.fits = self._judge(self.sources)
@@ -48,8 +49,8 @@ class AbcColony:
     def decoded(self, sources: Floats) -> tuple[Ints, Ints]:
         """Tasks by UAV in order, and UAVs by task."""
         tasks = np.broadcast_to(np.arange(sources.shape[1]), sources.shape)
-        who = self._coding.uav(tasks, sources)
-        return self._coding.rows(np.argsort(sources, axis=1, kind='stable'), who), who
+        uav_of = self._coding.uav(tasks, sources)
+        return self._coding.rows(np.argsort(sources, axis=1, kind='stable'), uav_of), uav_of
 
     def _judge(self, sources: Floats) -> Floats:
         return self._coding.fits(*self.decoded(sources))
@@ -59,21 +60,21 @@ class AbcColony:
         count = len(self.sources)
         self._visit(np.arange(count))
         self._visit(self._rng.choice(count, count, p=source_probabilities(self.fits)))  # eq 2.8
-        tired = int(np.argmax(self._trials))
-        if self._trials[tired] > self._limit:
-            self.sources[tired] = self._rng.random(self.sources.shape[1])
-            self.fits[tired] = self._judge(self.sources[tired:tired + 1])[0]
-            self._trials[tired] = 0
+        worst = int(np.argmax(self._trials))
+        if self._trials[worst] > self._limit:
+            self.sources[worst] = self._rng.random(self.sources.shape[1])
+            self.fits[worst] = self._judge(self.sources[worst:worst + 1])[0]
+            self._trials[worst] = 0
 
     def _visit(self, chosen: Ints) -> None:
-        """Each bee tries v = x + phi (x - x_k) in one number of its source, keeps the better."""
+        """Each bee tries v = x + phi (x - x_k) for one key of its source and keeps the better."""
         count, n = self.sources.shape
-        bees, number = np.arange(len(chosen)), self._rng.integers(n, size=len(chosen))
+        bees, key = np.arange(len(chosen)), self._rng.integers(n, size=len(chosen))
         other = (chosen + self._rng.integers(1, max(2, count), size=len(chosen))) % count
         phi = self._rng.uniform(-1.0, 1.0, len(chosen))
         tried = self.sources[chosen].copy()
-        x = tried[bees, number]
-        tried[bees, number] = np.clip(x + phi * (x - self.sources[other, number]), 0.0, 1.0)
+        x = tried[bees, key]
+        tried[bees, key] = np.clip(x + phi * (x - self.sources[other, key]), 0.0, 1.0)
         fits = self._judge(tried)
         for bee, source in enumerate(chosen):
             if fits[bee] < self.fits[source]:
@@ -85,22 +86,24 @@ class AbcColony:
 
 def solve(recorder: Recorder, seed: int, learnt: object = None,
           settings: AbcSettings | None = None) -> None:
-    """Generations until the budget ends. Raises InvalidValue where there are too many tasks."""
+    """Run generations until the budget ends.
+
+    Raises:
+        InvalidValue: there are too many tasks for a table of leg lengths.
+    """
     if not recorder.problem.uavs or not recorder.problem.tasks:
         return
     coding = Coding(recorder.problem)
-    if not len(coding.work):
+    if not len(coding.tasks):
         return
-    colony, offered = (
-        AbcColony(coding, settings or AbcSettings(), np.random.default_rng(seed)),
-        np.inf,
-    )
+    colony = AbcColony(coding, settings or AbcSettings(), np.random.default_rng(seed))
+    offered = np.inf
     while True:
         best = int(np.argmin(colony.fits))
         if colony.fits[best] < offered:
             offered = colony.fits[best]
-            row, who = colony.decoded(colony.sources[best:best + 1])
-            recorder.offer(coding.routes(row[0], who[0]))
+            row, uav_of = colony.decoded(colony.sources[best:best + 1])
+            recorder.offer(coding.routes(row[0], uav_of[0]))
         recorder.count()
         if recorder.over():
             return

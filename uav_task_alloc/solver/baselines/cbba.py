@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """CBBA as a solver: every UAV is an agent of the consensus protocol, over a graph of links.
 
-An agent's score of a path is what its tasks are worth less the way; a task's worth is its price,
-so tasks are bid on where that is above the way that they add. An iteration is a round: both phases
-of all agents.
+An agent's score of a path is the worth of its tasks less the path length; a task's worth is the
+cost of not serving it, so tasks are bid on where that exceeds the length that they add. An
+iteration is a round: both phases of all agents.
 """
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ import numpy as np
 from uav_task_alloc.errors import UnknownName
 from uav_task_alloc.solver.baselines.bidder import Bidder
 from uav_task_alloc.solver.baselines.consensus import Agent, Graph, Score, diameter, one_round
-from uav_task_alloc.solver.baselines.leg_lengths import all_ways, routes_of
+from uav_task_alloc.solver.baselines.leg_lengths import all_leg_lengths, routes_of
 from uav_task_alloc.solver.problem import Problem
 from uav_task_alloc.solver.recorder import Recorder
 from uav_task_alloc.solver.routes import Floats, Ints
@@ -30,7 +30,7 @@ GRAPHS: Mapping[str, Callable[[int, int], Sequence[int]]] = {  # neighbours of a
 
 @dataclass(frozen=True, slots=True)
 class CbbaSettings:
-    """Who hears whom and how much one bids for."""
+    """Communication graph and bundle size."""
 
     graph: str = 'ring'  # one of GRAPHS
     shares: float = 4.0  # L, tasks in a bundle at most, in fair shares (tasks over UAVs)
@@ -45,31 +45,35 @@ def make_graph(kind: str, agents: int) -> Graph:
 
 def solve(recorder: Recorder, seed: int, learnt: object = None,
           settings: CbbaSettings | None = None) -> None:
-    """Offer what the UAVs agree on. Raises InvalidValue where there are too many tasks."""
-    problem, known = recorder.problem, settings or CbbaSettings()
+    """Offer the plan that the agents agree on.
+
+    Raises:
+        InvalidValue: there are too many tasks for a table of leg lengths.
+    """
+    problem, chosen = recorder.problem, settings or CbbaSettings()
     if not problem.uavs or not problem.tasks:
         return
-    agents, now = make_agents(problem, known), 0
-    graph = make_graph(known.graph, len(agents))
-    bound = len(problem.tasks) * diameter(graph)  # rounds until they agree, as is proven
+    agents, now = make_agents(problem, chosen), 0
+    graph = make_graph(chosen.graph, len(agents))
+    bound = len(problem.tasks) * diameter(graph)  # rounds until agreement (Choi et al.)
     while now <= bound and not recorder.over() and one_round(
             agents, graph, now + 1, recorder.over):
         now += 1
         recorder.count()
-    recorder.offer(routes_of(problem, agreed(agents)))
-    recorder.count()  # the round in which nobody had anything to tell
+    recorder.offer(routes_of(problem, agreed_paths(agents)))
+    recorder.count()  # the round without changes
 
 
 def make_agents(problem: Problem, settings: CbbaSettings) -> list[Agent]:
     """An agent for each UAV."""
-    ways, n, m = all_ways(problem), len(problem.tasks), len(problem.uavs)
+    legs, n, m = all_leg_lengths(problem), len(problem.tasks), len(problem.uavs)
     most = math.ceil(settings.shares * n / m)
-    return [Agent(u, m, n, _score(problem, Bidder(problem, u, ways)), most) for u in range(m)]
+    return [Agent(u, m, n, _score(problem, Bidder(problem, u, legs)), most) for u in range(m)]
 
 
 def _score(problem: Problem, bidder: Bidder) -> Score:
-    """Worth of each task less what it costs."""
-    worth = problem.arrays.price
+    """Gain of each task: its worth less its cost."""
+    worth = problem.arrays.unassigned_cost
 
     def gains(path: Sequence[int]) -> tuple[Floats, Ints]:
         cost, place = bidder.costs(path)
@@ -77,8 +81,8 @@ def _score(problem: Problem, bidder: Bidder) -> Score:
     return gains
 
 
-def agreed(agents: Sequence[Agent]) -> list[list[int]]:
-    """Paths, each task on that of its highest bidder only: time may end the talk too early."""
+def agreed_paths(agents: Sequence[Agent]) -> list[list[int]]:
+    """Paths with each task at its highest bidder only: the budget may end before agreement."""
     bids = np.full((len(agents), agents[0].bid.size), -np.inf)
     for agent in agents:
         bids[agent.me, agent.bundle] = agent.bid[agent.bundle]

@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The consensus-based bundle algorithm: agents that bid, talk to neighbours, and come to agree.
+"""The consensus-based bundle algorithm (CBBA): agents bid, exchange bids with neighbours, agree.
 
 Choi, Brunet and How, Consensus-Based Decentralized Auctions for Robust Task Allocation, IEEE
 Transactions on Robotics 25 (2009): phase 1 is their algorithm 3, phase 2 their table 1. An agent
-knows its own score and what its neighbours tell it. Two things are added, as their authors do in
-later work: equal bids are settled by the lower agent, and a bid is never above the one before it
+knows its own score and the messages of its neighbours. Two rules are added, as the authors do in
+later work: of equal bids that of the lower agent wins, and a bid is never above the one before it
 in the bundle (Johnson, Choi and How, 2012), so that scores need not have diminishing marginal
-gains. What is agreed is stable, but not always what a central greedy would choose: an agent that a
-bid deterred does not build its bundle anew when that bid is withdrawn.
+gains. The agreement is stable, but may differ from the central greedy solution: an agent that was
+outbid does not rebuild its bundle when that bid is withdrawn.
 """
 from __future__ import annotations
 
@@ -19,35 +19,35 @@ import numpy as np
 
 from uav_task_alloc.solver.routes import Floats, Ints
 
-NOBODY = -1
+NO_AGENT = -1
 Score = Callable[[Sequence[int]], tuple[Floats, Ints]]  # path -> gain of each task (n), its place
 Graph = Sequence[Sequence[int]]  # neighbours of each agent
 
 
 class ConsensusMessage(NamedTuple):
-    """All that an agent tells its neighbours."""
+    """What an agent sends to its neighbours: its view of all bids."""
 
     sender: int
-    bid: Floats  # (n) y: highest bids it knows of
-    winner: Ints  # (n) z: who made them
-    heard: Ints  # (m) s: round of its latest word from each agent
+    bid: Floats  # (n) y: highest known bid of each task
+    winner: Ints  # (n) z: agent of each
+    updated: Ints  # (m) s: round of its latest information from each agent
 
 
 class EntryAction(Enum):
-    """What the receiver does to its own entry of a task."""
+    """What the receiver does with its own entry of a task."""
 
     LEAVE = 0
-    UPDATE = 1  # take over the sender's
-    RESET = 2  # to nobody
+    UPDATE = 1  # copy the sender's
+    RESET = 2  # to no agent
 
 
 class Clash(NamedTuple):
-    """Sender and receiver differ about a task."""
+    """How the views of sender and receiver on a task differ."""
 
     higher: bool  # the sender's bid beats the receiver's
-    newer: bool  # the sender has later word of whom the sender takes for the winner
-    older: bool  # the receiver has
-    newer_of_mine: bool  # the sender has later word of whom the receiver takes for the winner
+    newer: bool  # the sender has later information from the winner in its view
+    older: bool  # the receiver has later information from that agent
+    newer_of_mine: bool  # the sender has it from the winner in the receiver's view
 
 
 def _update_if(wanted: bool) -> EntryAction:
@@ -60,26 +60,26 @@ def _rule_12(c: Clash) -> EntryAction:
     return EntryAction.RESET if c.newer_of_mine and c.older else EntryAction.LEAVE
 
 
-# table 1: (whom the sender takes for the winner, whom the receiver) -> what the receiver does;
-# 'other' is a third agent, 'same' the one that the sender means, too
+# table 1: (winner in the sender's view, in the receiver's view) -> action of the receiver;
+# 'other' is a third agent, 'same' the third agent that the sender's view has
 RULES: Mapping[tuple[str, str], Callable[[Clash], EntryAction]] = {
     ('sender', 'receiver'): lambda c: _update_if(c.higher),
     ('sender', 'sender'): lambda c: EntryAction.UPDATE,
     ('sender', 'other'): lambda c: _update_if(c.newer_of_mine or c.higher),
-    ('sender', 'nobody'): lambda c: EntryAction.UPDATE,
+    ('sender', 'none'): lambda c: EntryAction.UPDATE,
     ('receiver', 'receiver'): lambda c: EntryAction.LEAVE,
     ('receiver', 'sender'): lambda c: EntryAction.RESET,
     ('receiver', 'other'): lambda c: EntryAction.RESET if c.newer_of_mine else EntryAction.LEAVE,
-    ('receiver', 'nobody'): lambda c: EntryAction.LEAVE,
+    ('receiver', 'none'): lambda c: EntryAction.LEAVE,
     ('other', 'receiver'): lambda c: _update_if(c.newer and c.higher),
     ('other', 'sender'): lambda c: EntryAction.UPDATE if c.newer else EntryAction.RESET,
     ('other', 'same'): lambda c: _update_if(c.newer),
     ('other', 'other'): _rule_12,
-    ('other', 'nobody'): lambda c: _update_if(c.newer),
-    ('nobody', 'receiver'): lambda c: EntryAction.LEAVE,
-    ('nobody', 'sender'): lambda c: EntryAction.UPDATE,
-    ('nobody', 'other'): lambda c: _update_if(c.newer_of_mine),
-    ('nobody', 'nobody'): lambda c: EntryAction.LEAVE,
+    ('other', 'none'): lambda c: _update_if(c.newer),
+    ('none', 'receiver'): lambda c: EntryAction.LEAVE,
+    ('none', 'sender'): lambda c: EntryAction.UPDATE,
+    ('none', 'other'): lambda c: _update_if(c.newer_of_mine),
+    ('none', 'none'): lambda c: EntryAction.LEAVE,
 }
 
 
@@ -91,8 +91,8 @@ class Agent:
         self.bundle: list[int] = []  # b: tasks in the order in which they were bid on
         self.path: list[int] = []  # p: the same in the order of flight
         self.bid = np.zeros(tasks)  # y
-        self.winner = np.full(tasks, NOBODY, np.int64)  # z
-        self.heard = np.zeros(agents, np.int64)  # s
+        self.winner = np.full(tasks, NO_AGENT, np.int64)  # z
+        self.updated = np.zeros(agents, np.int64)  # s
 
     def build(self) -> None:
         """Phase 1: bid on the task that gains most while one can be won."""
@@ -111,52 +111,65 @@ class Agent:
             self.winner[task] = self.me
 
     def message(self, now: int) -> ConsensusMessage:
-        """What to tell in round `now`."""
-        self.heard[self.me] = now
-        return ConsensusMessage(self.me, self.bid.copy(), self.winner.copy(), self.heard.copy())
+        """The message of round `now`."""
+        self.updated[self.me] = now
+        return ConsensusMessage(self.me, self.bid.copy(), self.winner.copy(), self.updated.copy())
 
-    def listen(self, messages: Sequence[ConsensusMessage]) -> None:
-        """Phase 2: one message after another, then let go what was lost."""
+    def receive(self, messages: Sequence[ConsensusMessage]) -> None:
+        """Phase 2: process the messages in order, then release lost tasks."""
         for message in messages:
             for task in np.flatnonzero((message.winner != self.winner)
                                        | (message.bid != self.bid)):
                 self._settle(int(task), message)
-            np.maximum(self.heard, message.heard, out=self.heard)
+            np.maximum(self.updated, message.updated, out=self.updated)
         self._release()
 
-    def _settle(self, task: int, told: ConsensusMessage) -> None:
-        theirs, mine = int(told.winner[task]), int(self.winner[task])
-        newer = told.heard > self.heard
-        bids = told.bid[task], self.bid[task]
+    def _settle(self, task: int, message: ConsensusMessage) -> None:
+        """Apply table 1 to a task."""
+        theirs, mine = int(message.winner[task]), int(self.winner[task])
+        newer = message.updated > self.updated
+        bids = message.bid[task], self.bid[task]
         clash = Clash(bool(bids[0] > bids[1] or (bids[0] == bids[1] and theirs < mine)),
-                      bool(newer[theirs]), bool(told.heard[theirs] < self.heard[theirs]),
+                      bool(newer[theirs]), bool(message.updated[theirs] < self.updated[theirs]),
                       bool(newer[mine]))
-        action = RULES[self._who(theirs, told.sender), 'same' if theirs == mine and theirs not in (
-            told.sender, self.me, NOBODY) else self._who(mine, told.sender)](clash)
+        sender, role = message.sender, self._role(mine, message.sender)
+        if theirs == mine and theirs not in (sender, self.me, NO_AGENT):
+            role = 'same'
+        action = RULES[self._role(theirs, sender), role](clash)
         if action is EntryAction.UPDATE:
-            self.bid[task], self.winner[task] = told.bid[task], theirs
+            self.bid[task], self.winner[task] = message.bid[task], theirs
         elif action is EntryAction.RESET:
-            self.bid[task], self.winner[task] = 0.0, NOBODY
+            self.bid[task], self.winner[task] = 0.0, NO_AGENT
 
-    def _who(self, agent: int, sender: int) -> str:
-        return {sender: 'sender', self.me: 'receiver', NOBODY: 'nobody'}.get(agent, 'other')
+    def _role(self, agent: int, sender: int) -> str:
+        return {sender: 'sender', self.me: 'receiver', NO_AGENT: 'none'}.get(agent, 'other')
 
     def _release(self) -> None:
-        """A lost task takes those behind it in the bundle along: their bids built on it."""
+        """Release lost tasks and all after them in the bundle, whose bids depended on them."""
         kept = next((i for i, task in enumerate(self.bundle) if self.winner[task] != self.me),
                     len(self.bundle))
         for task in self.bundle[kept:]:
             self.path.remove(task)
             if self.winner[task] == self.me:
-                self.bid[task], self.winner[task] = 0.0, NOBODY
+                self.bid[task], self.winner[task] = 0.0, NO_AGENT
         del self.bundle[kept:]
 
 
 def one_round(agents: Sequence[Agent], graph: Graph, now: int,
-              over: Callable[[], bool] = lambda: False) -> bool:
-    """Both phases for all agents at once; False if nobody had anything to tell or time is over."""
+              is_over: Callable[[], bool] = lambda: False) -> bool:
+    """Run both phases for all agents.
+
+    Args:
+        agents: all of them.
+        graph: neighbours of each agent.
+        now: number of the round.
+        is_over: polled between agents; True ends the round.
+
+    Returns:
+        False if all views agree already, or the round was ended.
+    """
     for agent in agents:
-        if over():
+        if is_over():
             return False
         agent.build()
     first = agents[0]
@@ -165,12 +178,16 @@ def one_round(agents: Sequence[Agent], graph: Graph, now: int,
         return False
     messages = [agent.message(now) for agent in agents]
     for agent in agents:
-        agent.listen([messages[k] for k in graph[agent.me]])
+        agent.receive([messages[k] for k in graph[agent.me]])
     return True
 
 
 def diameter(graph: Graph) -> int:
-    """Most hops between two agents, at least 1. Raises ValueError where some cannot be reached."""
+    """Diameter of the graph in hops, at least 1.
+
+    Raises:
+        ValueError: the graph is not connected.
+    """
     longest = 1
     for start in range(len(graph)):
         hops, front = {start: 0}, [start]

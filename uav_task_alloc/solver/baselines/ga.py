@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A genetic algorithm on plans: linear order crossover, inversion, relocation, tournaments.
+"""A genetic algorithm: linear order crossover, inversion, relocation, tournament selection.
 
-A chromosome is all tasks in one order, UAV by UAV, with the UAV of each. A child keeps a slice of
-one parent, with its UAVs, in place; the tasks that are missing come in the order, and with the
-UAVs, of the other (linear order crossover, Falkenauer and Bouffouix 1991). An iteration is a
-generation.
+A chromosome is a permutation of all tasks, UAV by UAV, with the UAV of each. A child keeps a slice
+of one parent, with its UAVs, in place; the other tasks follow in the order, and with the UAVs, of
+the other parent (linear order crossover: Falkenauer and Bouffouix, A Genetic Algorithm for Job
+Shop, ICRA 1991). An iteration is a generation.
 """
 from __future__ import annotations
 
@@ -19,57 +19,57 @@ from uav_task_alloc.solver.routes import Ints
 
 @dataclass(frozen=True, slots=True)
 class GaSettings:
-    """The usual knobs."""
+    """Parameters of the genetic algorithm."""
 
     size: int = 100  # plans in a generation
-    elite: int = 2  # best that live on as they are
+    elite: int = 2  # best plans that are copied unchanged
     tournament: int = 2  # plans of which the best becomes a parent
     crossover: float = 0.6  # share of children with two parents
-    inversion: float = 0.3  # share of children with a slice turned round
-    relocation: float = 0.9  # share with a task moved behind another
+    inversion: float = 0.3  # share of children with a reversed slice
+    relocation: float = 0.9  # share of children with a task moved
 
 
-def crossed(first: Ints, second: Ints, begin: Ints, end: Ints) -> Ints:
+def crossover(first: Ints, second: Ints, begin: Ints, end: Ints) -> Ints:
     """Children (p, k): first[begin:end] stays in place, the rest in the order of `second`."""
     place = np.arange(first.shape[1])
     kept = (place >= begin[:, None]) & (place < end[:, None])
     is_kept = np.zeros(first.shape, np.bool_)
     np.put_along_axis(is_kept, first, kept, 1)
     child = first.copy()
-    child[~kept] = second[~np.take_along_axis(is_kept, second, 1)]  # as many in each row
+    child[~kept] = second[~np.take_along_axis(is_kept, second, 1)]  # equal counts in each row
     return child
 
 
 class Population:
-    """Plans of one generation; `row` (p, k) tasks by UAV in order, `who` (p, k) UAVs by task."""
+    """Plans of a generation: `row` (p, k) tasks by UAV in order, `uav_of` (p, k) UAVs by task."""
 
     def __init__(self, coding: Coding, settings: GaSettings, rng: np.random.Generator) -> None:
         self._coding, self._settings, self._rng = coding, settings, rng
-        k = len(coding.work)
+        k = len(coding.tasks)
         tasks = np.tile(np.arange(k), (settings.size, 1))
-        self.who = coding.uav(tasks, rng.random(tasks.shape))
-        self.row = coding.rows(rng.permuted(tasks, axis=1), self.who)
-        self.fits = coding.fits(self.row, self.who)
+        self.uav_of = coding.uav(tasks, rng.random(tasks.shape))
+        self.row = coding.rows(rng.permuted(tasks, axis=1), self.uav_of)
+        self.fits = coding.fits(self.row, self.uav_of)
 
     def breed(self) -> None:
-        """The next generation."""
+        """Replace the plans by the next generation."""
         s, k = self._settings, self.row.shape[1]
         births = s.size - s.elite
         first, second = self._parents(births), self._parents(births)
         cuts = np.sort(self._rng.integers(0, k + 1, (births, 2)), axis=1)
         cuts[self._rng.random(births) >= s.crossover] = 0, k
-        row = crossed(self.row[first], self.row[second], cuts[:, 0], cuts[:, 1])
-        who = self.who[second]
+        row = crossover(self.row[first], self.row[second], cuts[:, 0], cuts[:, 1])
+        uav_of = self.uav_of[second]
         place = np.arange(k)
         kept = (place >= cuts[:, :1]) & (place < cuts[:, 1:])
         child, at = np.nonzero(kept)
-        who[child, row[child, at]] = self.who[first[child], row[child, at]]
-        self._mutate(row, who)
-        row = self._coding.rows(row, who)
+        uav_of[child, row[child, at]] = self.uav_of[first[child], row[child, at]]
+        self._mutate(row, uav_of)
+        row = self._coding.rows(row, uav_of)
         elite = np.argsort(self.fits, kind='stable')[:s.elite]
-        self.fits = np.concatenate([self.fits[elite], self._coding.fits(row, who)])
+        self.fits = np.concatenate([self.fits[elite], self._coding.fits(row, uav_of)])
         self.row = np.concatenate([self.row[elite], row])
-        self.who = np.concatenate([self.who[elite], who])
+        self.uav_of = np.concatenate([self.uav_of[elite], uav_of])
 
     def _parents(self, births: int) -> Ints:
         entrants = self._rng.integers(0, len(self.fits), (births, self._settings.tournament))
@@ -77,33 +77,37 @@ class Population:
         parents: Ints = entrants[np.arange(births), best]
         return parents
 
-    def _mutate(self, row: Ints, who: Ints) -> None:
+    def _mutate(self, row: Ints, uav_of: Ints) -> None:
         s, k = self._settings, row.shape[1]
         for child in np.flatnonzero(self._rng.random(len(row)) < s.inversion):
             i, j = np.sort(self._rng.integers(0, k + 1, 2))
             row[child, i:j] = row[child, i:j][::-1].copy()
         for child in np.flatnonzero(self._rng.random(len(row)) < s.relocation):
             i, j = self._rng.integers(0, k, 2)
-            self._relocate(row[child], who[child], int(i), int(j))
+            self._relocate(row[child], uav_of[child], int(i), int(j))
 
-    def _relocate(self, row: Ints, who: Ints, i: int, j: int) -> None:
+    def _relocate(self, row: Ints, uav_of: Ints, i: int, j: int) -> None:
         """Move the task at i to place j, onto the UAV of the task there if that may serve it."""
-        task, there = row[i], who[row[j]]
+        task, there = row[i], uav_of[row[j]]
         if i != j and self._coding.able[there, task]:
             if i < j:
                 row[i:j] = row[i + 1:j + 1].copy()
             else:
                 row[j + 1:i + 1] = row[j:i].copy()
-            row[j], who[task] = task, there
+            row[j], uav_of[task] = task, there
 
 
 def solve(recorder: Recorder, seed: int, learnt: object = None,
           settings: GaSettings | None = None) -> None:
-    """Generations until the budget ends. Raises InvalidValue where there are too many tasks."""
+    """Run generations until the budget ends.
+
+    Raises:
+        InvalidValue: there are too many tasks for a table of leg lengths.
+    """
     if not recorder.problem.uavs or not recorder.problem.tasks:
         return
     coding = Coding(recorder.problem)
-    if not len(coding.work):
+    if not len(coding.tasks):
         return
     population = Population(coding, settings or GaSettings(), np.random.default_rng(seed))
     offered: float = np.inf
@@ -111,7 +115,7 @@ def solve(recorder: Recorder, seed: int, learnt: object = None,
         best = int(np.argmin(population.fits))
         if population.fits[best] < offered:
             offered = population.fits[best]
-            recorder.offer(coding.routes(population.row[best], population.who[best]))
+            recorder.offer(coding.routes(population.row[best], population.uav_of[best]))
         recorder.count()
         if recorder.over():
             return

@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the learning baselines make small: the fit of eq 2.12, tasks left out at their price."""
+"""The objective of the learning baselines: eq 2.12 with a cost for unassigned tasks."""
 from __future__ import annotations
 
 from uav_task_alloc.objective import fit
 from uav_task_alloc.solver.problem import Problem
-from uav_task_alloc.solver.routes import DISTANCE, EXCESS, LEFT_OUT, VALUE, Floats
+from uav_task_alloc.solver.routes import DISTANCE, EXCESS, UNASSIGNED_COST, VALUE, Floats
 
 
-def judged(problem: Problem, sums: Floats) -> float:
-    """Eq 2.12 by the sums of routes; what is left out counts as way [m], else it would pay."""
-    return fit(float(sums[DISTANCE] + sums[LEFT_OUT]), float(sums[VALUE]), float(sums[EXCESS]),
-               problem.rules.weights)
+def penalised_fit(problem: Problem, sums: Floats) -> float:
+    """Eq 2.12 of Routes.sums, with the cost of unassigned tasks [m] added to the distance."""
+    return fit(float(sums[DISTANCE] + sums[UNASSIGNED_COST]), float(sums[VALUE]),
+               float(sums[EXCESS]), problem.rules.weights)

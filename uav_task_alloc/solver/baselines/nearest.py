@@ -1,23 +1,29 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The original allocation, shortest distance and balance: UAVs take their nearest task in turn.
+"""The original allocation, by shortest distance and balance: a balanced nearest neighbour.
 
-Of the UAVs with the fewest tasks that can still take one, the one whose route ends nearest to a
-task left flies on to it. The whole is one iteration.
+Of the UAVs with the fewest tasks that can still take one, the one whose route ends nearest to an
+unassigned task gets that task. The whole construction is one iteration.
 """
 from __future__ import annotations
 
 import numpy as np
 
 from uav_task_alloc.kernel import kernel
-from uav_task_alloc.solver import routes as of
 from uav_task_alloc.solver.baselines.leg_lengths import place_rest
 from uav_task_alloc.solver.recorder import Recorder
-from uav_task_alloc.solver.routes import Arrays, Routes, insert, lengthened, step
+from uav_task_alloc.solver.routes import (
+    Arrays,
+    Routes,
+    empty_routes,
+    insert,
+    leg_length,
+    lengthening_cost,
+)
 
 
 @kernel
 def give_nearest(a: Arrays, r: Routes) -> bool:
-    """Extend a route of the fewest tasks by the shortest leg there is; whether any. O(n m)."""
+    """Extend a route with the fewest tasks by the shortest leg; whether any was. O(n m)."""
     fewest, shortest, task, after = a.ends, np.inf, -1, -1
     for u in range(a.uavs):
         if r.tasks[u] > fewest:
@@ -25,12 +31,12 @@ def give_nearest(a: Arrays, r: Routes) -> bool:
         end = a.ends + u
         last = r.prev[end]
         for t in range(a.uavs, a.ends):
-            if r.on[t] >= 0 or not a.may[u, t - a.uavs]:
+            if r.uav_of[t] >= 0 or not a.compatible[u, t - a.uavs]:
                 continue
-            d = step(a, last, t)
+            d = leg_length(a, last, t)
             if r.tasks[u] == fewest and d >= shortest:
                 continue
-            if lengthened(a, r, u, d + step(a, t, end) - r.leg[last]) < np.inf:
+            if lengthening_cost(a, r, u, d + leg_length(a, t, end) - r.leg[last]) < np.inf:
                 fewest, shortest, task, after = r.tasks[u], d, t, last
     if task >= 0:
         insert(a, r, task, after)
@@ -38,9 +44,9 @@ def give_nearest(a: Arrays, r: Routes) -> bool:
 
 
 def solve(recorder: Recorder, seed: int, learnt: object = None) -> None:
-    """Offer the plan that comes of it; what no route could end with goes in where it fits."""
+    """Offer the constructed plan; other tasks are inserted where they fit."""
     a = recorder.problem.arrays
-    routes = of.empty_routes(a)
+    routes = empty_routes(a)
     while give_nearest(a, routes) and not recorder.over():
         pass
     place_rest(a, routes)

@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The published method as literally as it can be read: two Q chains over all steps, a bee colony.
+"""The published method, implemented literally: two Q chains over all steps, a bee colony.
 
-Chain X1 says which UAV makes step i, chain X2 which task it serves: step i draws a UAV from
-Q_1^(i)[UAV of step i-1] and a task from Q_2^(i)[task of step i-1], and the UAV flies on to the
-task. A table belongs to a position in the chains, not to a UAV's route. How gaps and slips of the
-paper are settled:
+Chain X1 holds the UAV of step i, chain X2 the task that it serves: step i draws a UAV from
+Q_1^(i)[UAV of step i-1] and a task from Q_2^(i)[task of step i-1], which is appended to the UAV's
+route. A table belongs to a position in the chains, not to a UAV's route. Gaps and errors of the
+paper are resolved as follows:
 - 2.1 counts only target-to-target legs: the leg from the start is included.
 - 2.4: the maximum is over the next action a'.
-- 2.6 bootstraps from Q^(i+1), as 2.13 does; behind the last step there is nothing.
+- 2.6 bootstraps from Q^(i+1), as 2.13 does; after the last step the value is 0.
 - 2.7 is greedy if q < eps, so eps is the exploitation rate: `greedy_rate`.
 - 2.9, 2.10: Q is floored above 0, so that they are probabilities.
 - No repeat rule is given: visited tasks are masked, the rest renormalised, and the maximum is over
@@ -15,11 +15,11 @@ paper are settled:
 - 2.11: only the stepwise choice is kept, no A*.
 - 2.14 does not say where the ranking coefficients enter: they scale alpha.
 - The reward is k / fit at every step; as k has no scale, it is in units of the best fit so far.
-- fit is eq 2.12; where ranges do not suffice, what is left out counts as way at its price.
-- A plan that is recorded gets the tasks that its bee could not reach where they fit, as all plans
-  of this package serve what can be served; the bee is judged, and learnt from, without.
-- The paper prints no parameters: those of `Settings` are this file's own.
-An iteration is a generation: every bee flies once.
+- fit is eq 2.12; where ranges do not suffice, the cost of unassigned tasks is added to D.
+- Before a plan is recorded, tasks that its bee could not reach are inserted where they fit, as all
+  plans of this package serve what can be served; the bee is evaluated and learnt from without.
+- The paper prints no parameters: those of `PaperSettings` were chosen here.
+An iteration is a generation: every bee constructs one plan.
 """
 from __future__ import annotations
 
@@ -32,22 +32,31 @@ from numpy.typing import NDArray
 
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.kernel import inline_kernel, kernel
-from uav_task_alloc.solver import routes as of
-from uav_task_alloc.solver.baselines.judging import judged
+from uav_task_alloc.solver.baselines.judging import penalised_fit
 from uav_task_alloc.solver.baselines.leg_lengths import place_rest
 from uav_task_alloc.solver.recorder import Recorder
-from uav_task_alloc.solver.rng import Chance, chance, uniform
-from uav_task_alloc.solver.routes import Arrays, Floats, Ints, Routes, insert, lengthened, step
+from uav_task_alloc.solver.rng import RngState, rng_state, uniform
+from uav_task_alloc.solver.routes import (
+    Arrays,
+    Floats,
+    Ints,
+    Routes,
+    clear,
+    empty_routes,
+    insert,
+    leg_length,
+    lengthening_cost,
+)
 
-MOST_TASKS = 200  # the tables take 8 n^3 bytes
+MAX_TABLE_TASKS = 200  # the tables take 8 n^3 bytes
 
 
 @dataclass(frozen=True, slots=True)
 class PaperSettings:
-    """What the paper does not print: the best of 48 sets at 8 x 50 (docs/solver.md)."""
+    """Parameters that the paper does not print: the best of 48 sets at 8 x 50 (docs/solver.md)."""
 
     bees: int = 20
-    ranked: int = 5  # bees that are learnt from
+    ranked: int = 5  # best bees, which are learnt from
     decay: float = 0.5  # ranking coefficient over that of the rank before
     k: float = 1.0  # reward coefficient
     alpha: float = 0.5  # learning rate
@@ -58,23 +67,23 @@ class PaperSettings:
 
 
 class Chains(NamedTuple):
-    """Positional tables: first index the step, second the choice before, third the choice."""
+    """Q tables by position: first index the step, second the choice before, third the choice."""
 
     uav: Floats  # (n, m, m) of X1
     task: Floats  # (n, n, n) of X2
 
 
 class Swarm(NamedTuple):
-    """What each bee flew, and what its routes came to."""
+    """The chains of each bee, and the sums of its routes."""
 
     uavs: Ints  # (bees, n) X1
     tasks: Ints  # (bees, n) X2
-    steps: Ints  # (bees) how many of them it could make
+    steps: Ints  # (bees) how many steps it could make
     sums: Floats  # (bees, 5) as in Routes
 
 
 class Scratch(NamedTuple):
-    """What flights need room for."""
+    """Scratch arrays of a flight."""
 
     may_fly: NDArray[np.bool_]  # (m)
     open: NDArray[np.bool_]  # (n)
@@ -91,7 +100,7 @@ def rank_coefficients(bees: int, decay: float) -> Floats:
 
 @kernel
 def probabilities(q: Floats, open_: NDArray[np.bool_], p: Floats) -> bool:
-    """Write to p the share of each open choice in their Q (eq 2.9, 2.10); whether one is open."""
+    """Write to p the probability of each open choice (eq 2.9, 2.10); whether one is open. O(n)."""
     total = 0.0
     for i in range(q.size):
         p[i] = q[i] if open_[i] else 0.0
@@ -103,8 +112,8 @@ def probabilities(q: Floats, open_: NDArray[np.bool_], p: Floats) -> bool:
 
 
 @inline_kernel
-def _draw(p: Floats, greedy_rate: float, rng: Chance) -> int:
-    """The likeliest choice if q < eps, else one by its probability (eq 2.7)."""
+def _draw(p: Floats, greedy_rate: float, rng: RngState) -> int:
+    """The likeliest choice if q < eps, else one by its probability (eq 2.7). O(n)."""
     best = 0
     for i in range(p.size):
         if p[i] > p[best]:
@@ -121,22 +130,23 @@ def _draw(p: Floats, greedy_rate: float, rng: Chance) -> int:
 
 @kernel
 def _open_tasks(a: Arrays, r: Routes, u: int, open_: NDArray[np.bool_]) -> None:
-    """Which tasks UAV u may fly on to: unvisited, allowed and, if ranges are hard, in range."""
+    """Write to open_ (n) the tasks that UAV u may append: unvisited, allowed, in range. O(n)."""
     last = r.prev[a.ends + u]
     for t in range(open_.size):
         open_[t] = False
-        if r.on[a.uavs + t] < 0 and a.may[u, t]:
-            more = step(a, last, a.uavs + t) + step(a, a.uavs + t, a.ends + u) - r.leg[last]
-            open_[t] = lengthened(a, r, u, more) < np.inf
+        if r.uav_of[a.uavs + t] < 0 and a.compatible[u, t]:
+            more = leg_length(a, last, a.uavs + t) + leg_length(a, a.uavs + t, a.ends + u)
+            more -= r.leg[last]
+            open_[t] = lengthening_cost(a, r, u, more) < np.inf
 
 
 @kernel
 def fly_bee(a: Arrays, r: Routes, uavs: Ints, tasks: Ints, q: Chains, greedy_rate: float,
-        scratch: Scratch, rng: Chance) -> int:
-    """One bee makes its chains; returns how many steps it made. O(n (n + m))."""
-    of.clear(a, r)
+            scratch: Scratch, rng: RngState) -> int:
+    """Construct the chains of one bee; returns the number of steps. O(n (n + m))."""
+    clear(a, r)
     u, t = 0, 0  # there is no choice before the first: its tables have one row that counts
-    for i in range(a.price.size):
+    for i in range(a.unassigned_cost.size):
         scratch.may_fly[:] = True
         while True:
             if not probabilities(q.uav[i, u], scratch.may_fly, scratch.p_uav):
@@ -149,13 +159,13 @@ def fly_bee(a: Arrays, r: Routes, uavs: Ints, tasks: Ints, q: Chains, greedy_rat
         u, t = v, _draw(scratch.p_task, greedy_rate, rng)
         insert(a, r, a.uavs + t, r.prev[a.ends + u])
         uavs[i], tasks[i] = u, t
-    return a.price.size
+    return a.unassigned_cost.size
 
 
 @kernel
 def fly_all(a: Arrays, r: Routes, swarm: Swarm, q: Chains, greedy_rate: float, scratch: Scratch,
-            rng: Chance) -> None:
-    """A generation; r is scratch."""
+            rng: RngState) -> None:
+    """Fly all bees of a generation; r is scratch. O(bees n (n + m))."""
     for b in range(swarm.steps.size):
         swarm.steps[b] = fly_bee(a, r, swarm.uavs[b], swarm.tasks[b], q, greedy_rate, scratch, rng)
         for i in range(r.sums.size):
@@ -164,8 +174,8 @@ def fly_all(a: Arrays, r: Routes, swarm: Swarm, q: Chains, greedy_rate: float, s
 
 @kernel
 def trace(a: Arrays, r: Routes, uavs: Ints, tasks: Ints, steps: int) -> None:
-    """Routes r become those that the chains say."""
-    of.clear(a, r)
+    """Write the routes of these chains to r. O(n)."""
+    clear(a, r)
     for i in range(steps):
         insert(a, r, a.uavs + tasks[i], r.prev[a.ends + uavs[i]])
 
@@ -205,23 +215,27 @@ def _share(best: float, fit: float) -> float:
 
 def solve(recorder: Recorder, seed: int, learnt: object = None,
           settings: PaperSettings | None = None) -> None:
-    """Generations of bees until the budget ends. Raises InvalidValue beyond MOST_TASKS."""
-    problem, known, rng = recorder.problem, settings or PaperSettings(), chance(seed)
+    """Run generations of bees until the budget ends.
+
+    Raises:
+        InvalidValue: there are more than MAX_TABLE_TASKS tasks.
+    """
+    problem, chosen, rng = recorder.problem, settings or PaperSettings(), rng_state(seed)
     a, n, m = problem.arrays, len(problem.tasks), len(problem.uavs)
-    if n > MOST_TASKS:
-        raise InvalidValue('tasks', n, f'at most {MOST_TASKS} for paper_chain_q')
+    if n > MAX_TABLE_TASKS:
+        raise InvalidValue('tasks', n, f'at most {MAX_TABLE_TASKS} for paper_chain_q')
     if not n or not m:
         return
-    q = Chains(np.full((n, m, m), known.first), np.full((n, n, n), known.first))
+    q = Chains(np.full((n, m, m), chosen.first), np.full((n, n, n), chosen.first))
     scratch = Scratch(np.empty(m, np.bool_), np.empty(n, np.bool_), np.empty(m), np.empty(n))
-    swarm = Swarm(np.zeros((known.bees, n), np.int64), np.zeros((known.bees, n), np.int64),
-                  np.zeros(known.bees, np.int64), np.empty((known.bees, 5)))
-    routes, best = of.empty_routes(a), math.inf
-    coefficients = rank_coefficients(min(known.ranked, known.bees), known.decay).tolist()
+    swarm = Swarm(np.zeros((chosen.bees, n), np.int64), np.zeros((chosen.bees, n), np.int64),
+                  np.zeros(chosen.bees, np.int64), np.empty((chosen.bees, 5)))
+    routes, best = empty_routes(a), math.inf
+    coefficients = rank_coefficients(min(chosen.ranked, chosen.bees), chosen.decay).tolist()
     while True:
-        fly_all(a, routes, swarm, q, known.greedy_rate, scratch, rng)
-        fits = [judged(problem, sums) for sums in swarm.sums]
-        ranking = sorted(range(known.bees), key=fits.__getitem__)  # the bidding of the bees
+        fly_all(a, routes, swarm, q, chosen.greedy_rate, scratch, rng)
+        fits = [penalised_fit(problem, sums) for sums in swarm.sums]
+        ranking = sorted(range(chosen.bees), key=fits.__getitem__)  # rank bidding
         if not recorder.history or fits[ranking[0]] < best:
             best = fits[ranking[0]]
             trace(a, routes, swarm.uavs[ranking[0]], swarm.tasks[ranking[0]],
@@ -229,9 +243,9 @@ def solve(recorder: Recorder, seed: int, learnt: object = None,
             place_rest(a, routes)
             recorder.offer(routes)
         for b, coefficient in zip(ranking, coefficients, strict=False):
-            reward = known.k * _share(best, fits[b])
+            reward = chosen.k * _share(best, fits[b])
             learn(q, swarm.uavs[b], swarm.tasks[b], swarm.steps[b], reward,
-                  known.alpha * coefficient, known.gamma, known.floor, scratch.open)  # eq 2.14
+                  chosen.alpha * coefficient, chosen.gamma, chosen.floor, scratch.open)  # eq 2.14
         recorder.count()
         if recorder.over():
             return

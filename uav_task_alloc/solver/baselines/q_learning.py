@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Q-learning by a single agent that flies all UAVs: one table of legs, one plan an episode.
+"""Q-learning by a single agent for all UAVs: one table of legs, one plan an episode.
 
 The state is where the routes end now; an action is a leg from one of these ends to an unvisited
 task, and Q[end -> task] its value, so that one table serves any number of UAVs. The reward of a
-leg is minus what it costs: metres added (with metres beyond range at their price) in mean ways to
-the nearest neighbour. A leg never flown is worth minus its length: without learning this is
+leg is minus its cost: metres added, with the penalty of metres beyond range, in mean leg lengths
+to the nearest neighbour. A leg never flown is worth minus its length: without learning this is
 nearest first. Actions are chosen as eq 2.7 says, eps being the exploitation rate. An iteration is
 an episode.
 """
@@ -15,16 +15,24 @@ from dataclasses import dataclass
 import numpy as np
 
 from uav_task_alloc.kernel import kernel
-from uav_task_alloc.solver import routes as of
-from uav_task_alloc.solver.baselines.leg_lengths import all_ways, place_rest
+from uav_task_alloc.solver.baselines.leg_lengths import all_leg_lengths, place_rest
 from uav_task_alloc.solver.recorder import Recorder
-from uav_task_alloc.solver.rng import Chance, chance, uniform
-from uav_task_alloc.solver.routes import Arrays, Floats, Routes, insert, lengthened, step
+from uav_task_alloc.solver.rng import RngState, rng_state, uniform
+from uav_task_alloc.solver.routes import (
+    Arrays,
+    Floats,
+    Routes,
+    clear,
+    empty_routes,
+    insert,
+    leg_length,
+    lengthening_cost,
+)
 
 
 @dataclass(frozen=True, slots=True)
 class QLearningSettings:
-    """How the agent learns."""
+    """Parameters of the learning."""
 
     alpha: float = 0.1  # learning rate
     gamma: float = 0.8  # discount
@@ -33,9 +41,9 @@ class QLearningSettings:
 
 @kernel
 def episode(a: Arrays, r: Routes, q: Floats, unit: float, alpha: float, gamma: float,
-            greedy_rate: float, rng: Chance) -> None:
-    """Fly one plan and learn from each leg; q is (m + n, n), `unit` [m]. O(n^2 m)."""
-    of.clear(a, r)
+            greedy_rate: float, rng: RngState) -> None:
+    """Construct one plan and learn from each leg; q is (m + n, n), `unit` [m]. O(n^2 m)."""
+    clear(a, r)
     before, then, reward = -1, -1, 0.0  # the leg flown last
     while True:
         explores, legs = uniform(rng) >= greedy_rate, 0
@@ -44,10 +52,12 @@ def episode(a: Arrays, r: Routes, q: Floats, unit: float, alpha: float, gamma: f
             last = r.prev[a.ends + u]
             for i in range(q.shape[1]):
                 t = a.uavs + i
-                if r.on[t] >= 0 or not a.may[u, i] or (q[last, i] <= best and not explores):
+                if r.uav_of[t] >= 0 or not a.compatible[u, i]:
                     continue
-                delta = step(a, last, t) + step(a, t, a.ends + u) - r.leg[last]
-                if not lengthened(a, r, u, delta) < np.inf:
+                if q[last, i] <= best and not explores:
+                    continue
+                delta = leg_length(a, last, t) + leg_length(a, t, a.ends + u) - r.leg[last]
+                if not lengthening_cost(a, r, u, delta) < np.inf:
                     continue
                 if q[last, i] > best:
                     best, best_t, best_u = q[last, i], t, u
@@ -62,23 +72,27 @@ def episode(a: Arrays, r: Routes, q: Floats, unit: float, alpha: float, gamma: f
             return
         t, u = (any_t, any_u) if explores else (best_t, best_u)  # eq 2.7
         last = r.prev[a.ends + u]
-        delta = step(a, last, t) + step(a, t, a.ends + u) - r.leg[last]
-        reward = -lengthened(a, r, u, delta) / unit
+        delta = leg_length(a, last, t) + leg_length(a, t, a.ends + u) - r.leg[last]
+        reward = -lengthening_cost(a, r, u, delta) / unit
         before, then = last, t - a.uavs
         insert(a, r, t, last)
 
 
 def solve(recorder: Recorder, seed: int, learnt: object = None,
           settings: QLearningSettings | None = None) -> None:
-    """Episodes until the budget ends. Raises InvalidValue where there are too many tasks."""
-    problem, known, rng = recorder.problem, settings or QLearningSettings(), chance(seed)
+    """Run episodes until the budget ends.
+
+    Raises:
+        InvalidValue: there are too many tasks for a table of leg lengths.
+    """
+    problem, chosen, rng = recorder.problem, settings or QLearningSettings(), rng_state(seed)
     a = problem.arrays
     if not problem.uavs or not problem.tasks:
         return
-    q = -all_ways(problem).onward / problem.scale
-    routes = of.empty_routes(a)
+    q = -all_leg_lengths(problem).onward / problem.scale
+    routes = empty_routes(a)
     while True:
-        episode(a, routes, q, problem.scale, known.alpha, known.gamma, known.greedy_rate, rng)
+        episode(a, routes, q, problem.scale, chosen.alpha, chosen.gamma, chosen.greedy_rate, rng)
         place_rest(a, routes)
         recorder.offer(routes)
         recorder.count()

@@ -1,0 +1,139 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The kernel cache: edited sources are compiled again, old entries removed, Ctrl-C ends it."""
+import ast
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+import uav_task_alloc
+from uav_task_alloc.kernel_cache import kernel_sources, sources_hash
+
+PACKAGE = Path(uav_task_alloc.__file__).parent
+DECORATORS = {'kernel', 'inline_kernel', 'allocating_kernel', 'intrinsic'}
+CALLEE = """
+from uav_task_alloc.kernel import inline_kernel
+
+
+@inline_kernel
+def callee(x):
+    return x + 1.0
+"""
+CALLER = """
+from uav_task_alloc.kernel import kernel
+from uav_task_alloc.solver.callee import callee
+
+
+@kernel
+def caller(x):
+    return callee(x)
+"""
+CALL = 'from uav_task_alloc.solver.caller import caller; print(caller(1.0))'
+NOTICE = 'compiling kernels (once, about '
+
+
+@pytest.fixture
+def package(tmp_path):
+    """A copy of the package without compiled kernels, with a kernel and its callee."""
+    copy = tmp_path / 'uav_task_alloc'
+    shutil.copytree(PACKAGE, copy, ignore=shutil.ignore_patterns('__pycache__'))
+    (copy / 'solver/callee.py').write_text(CALLEE)
+    (copy / 'solver/caller.py').write_text(CALLER)
+    return copy
+
+
+def start(package, code):
+    environment = {**os.environ, 'PYTHONPATH': str(package.parent), 'NUMBA_CACHE_DIR': ''}
+    return subprocess.Popen([sys.executable, '-c', code], env=environment, cwd=package.parent,
+                            stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+
+
+def output(package, code=CALL):
+    """What a new process prints, and whether it compiled."""
+    printed, errors = start(package, code).communicate(timeout=60.0)
+    return printed.strip(), NOTICE in errors
+
+
+def test_a_kernel_is_compiled_again_when_a_callee_in_another_file_was_edited(package):
+    assert output(package) == ('2.0', True)
+    assert output(package) == ('2.0', False)
+    (package / 'solver/callee.py').write_text(CALLEE.replace('x + 1.0', 'x + 5.0'))
+    assert output(package) == ('6.0', True)
+    (package / 'solver/callee.py').write_text(CALLEE)
+    assert output(package) == ('2.0', False)  # the earlier folder is kept for a while
+
+
+def test_folders_of_other_sources_are_removed_when_a_kernel_is_written(package):
+    cache = package / 'solver/__pycache__'
+    old, recent = cache / 'kernels-old', cache / 'kernels-recent'
+    for folder in (old, recent):
+        folder.mkdir(parents=True)
+        (folder / 'search.1.nbc').touch()
+    (cache / 'search.search-1.py311.nbi').touch()  # where numba puts it by itself
+    os.utime(old, (1e9, 1e9))
+    output(package)
+    folders = {folder.name for folder in cache.glob('kernels-*')}
+    assert folders == {'kernels-recent', f'kernels-{sources_hash.__wrapped__(package)}'}
+    assert not list(cache.glob('*.nb*'))
+
+
+@pytest.mark.parametrize('written', [0, 4])
+def test_ctrl_c_ends_a_compilation_at_once(package, written):
+    code = 'from uav_task_alloc.solver import solve; solve.load_kernels()'
+    with start(package, code) as process:
+        assert process.stderr.readline().startswith(NOTICE)
+        while len(list(package.rglob('*.nbc'))) < written:
+            assert process.poll() is None
+            time.sleep(0.01)
+        process.send_signal(signal.SIGINT)
+        began = time.monotonic()
+        assert process.wait(timeout=30.0) == -signal.SIGINT
+        assert time.monotonic() - began < 1.0
+
+
+def test_ctrl_c_raises_keyboard_interrupt_after_a_compilation(package):
+    code = f'{CALL}\nimport signal\ntry:\n    signal.raise_signal(signal.SIGINT)\n' \
+           "except KeyboardInterrupt:\n    print('raised')"
+    assert output(package, code) == ('2.0\nraised', True)
+
+
+def test_comments_and_docstrings_do_not_change_the_hash_but_code_does(package):
+    source, before = package / 'solver/search.py', sources_hash.__wrapped__(package)
+    text = source.read_text()
+    source.write_text('# a comment\n' + text.replace('"""Anneal r', '"""Anneal routes r'))
+    assert sources_hash.__wrapped__(package) == before
+    source.write_text(text.replace('log.counts[4] -= 1', 'log.counts[4] -= 2'))
+    assert sources_hash.__wrapped__(package) != before
+
+
+def decorated(tree):
+    """Functions of a module that are compiled."""
+    for node in tree.body:
+        if isinstance(node, ast.FunctionDef) and any(
+                isinstance(each, ast.Name) and each.id in DECORATORS
+                for each in node.decorator_list):
+            yield node
+
+
+@pytest.mark.parametrize('path', kernel_sources(), ids=lambda p: p.relative_to(PACKAGE).as_posix())
+def test_kernels_use_only_names_from_hashed_sources(path):
+    tree = ast.parse(path.read_text())
+    hashed = {'.'.join(each.relative_to(PACKAGE.parent).with_suffix('').parts)
+              for each in kernel_sources()}
+    other = {alias.asname or alias.name for node in tree.body if isinstance(node, ast.ImportFrom)
+             if node.module.startswith('uav_task_alloc') and node.module not in hashed
+             for alias in node.names}
+    used = {node.id for function in decorated(tree) for statement in function.body
+            for node in ast.walk(statement) if isinstance(node, ast.Name)}
+    assert used & other == set()
+
+
+def test_every_kernel_is_compiled_by_the_decorators_of_kernel_py():
+    direct = [path.name for path in PACKAGE.rglob('*.py')
+              if 'njit' in path.read_text() and path.name != 'kernel.py']
+    assert direct == []
