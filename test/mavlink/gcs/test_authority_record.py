@@ -39,7 +39,7 @@ def test_without_a_record_airborne_with_our_mission_it_is_held(kind):
     bench.kill_and_restart(1.0, store=False)
     assert not bench.state().available
     bench.run(limit=3.0)
-    assert status_is(bench, L, 'in the air in ')
+    assert status_is(bench, L, 'airborne in ')
     bench.assign(task_list('ABCDEFGHIJKLMNOPQRSTUVWXY', 2))
     assert bench.reaches(H, 5.0)
     assert status_is(bench, H, 'flies our mission')
@@ -57,7 +57,7 @@ def test_without_a_record_airborne_with_another_mission_it_is_lost(kind, mission
     bench.kill_and_restart(1.0, store=False)
     bench.run(limit=3.0)
     assert sends_no_command(bench, names='ZZZ' if mission == 'other list' else 'ABC')
-    assert status_is(bench, L, 'in the air in ')
+    assert status_is(bench, L, 'airborne in ')
 
 
 @BOTH
@@ -67,7 +67,7 @@ def test_without_a_record_airborne_in_another_mode_it_is_lost(kind, mode):
     bench.vehicles[1].rc_mode(getattr(MODES[kind], mode))
     bench.kill_and_restart(1.0, store=False)
     bench.run(limit=3.0)
-    assert status_is(bench, L, 'in the air in ')
+    assert status_is(bench, L, 'airborne in ')
     assert sends_no_command(bench, names='ABC')
 
 

@@ -102,7 +102,7 @@ class BridgeRestart:
                 authority.undecided = False
                 state.maybe_ours = state.class_of(state.mode) is ModeClass.MISSION
                 state.apply(AuthorityEvent.RESTART_AIRBORNE, now,
-                            f'in the air in {state.name_of(state.mode)} when the bridge started')
+                            f'airborne in {state.name_of(state.mode)} when the bridge started')
         if state.maybe_ours and authority.state is AuthorityState.LOST and self._evidence.ours():
             state.maybe_ours = False
             state.apply(AuthorityEvent.RESTART_OURS, now, 'flies our mission')
