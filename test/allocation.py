@@ -76,13 +76,13 @@ class Desk:
         params.setdefault('list_interval', 0.0)
         self.now, self.plan, self.solves = 1000.0, plan, []
         self.core = Allocator(AllocatorParams(**params), self.now, saved)
-        self.core.wake()
+        self.core.set_kernels_ready()
         self.world = self.core.world
         self.lists, self.history, self.notes, self.allocations = {}, [], [], []
         self.forgotten = set()
 
     def uav(self, uav_id, *position, **more):
-        return self.world.hear(UavReport(uav_id, position, **more), self.now, self.now)
+        return self.world.update_uav(UavReport(uav_id, position, **more), self.now, self.now)
 
     def add(self, *tasks, action=AnnouncementAction.ADD):
         return self.world.announce(action, [task(t) for t in tasks], self.now, self.now)
@@ -112,12 +112,12 @@ class Desk:
         self.core.adopt(answer, self.now, self.now)
         self.take()
 
-    def settle(self, wait=0.0, hear=True):
+    def settle(self, wait=0.0, report=True):
         """Solve until nothing is due; UAVs keep talking meanwhile."""
         self.now += wait
-        if hear:
+        if report:
             for record in list(self.world.fleet.records.values()):
-                self.world.hear(record.report, self.now, self.now)
+                self.world.update_uav(record.report, self.now, self.now)
         self.core.tick(self.now, self.now)
         while (problem := self.begin()) is not None:
             self.finish(problem)

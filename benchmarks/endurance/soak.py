@@ -103,7 +103,7 @@ class Soak:
         self.params = AllocatorParams(route_end='home', keep_ended=KEEP, background_period=60.0)
         self.keeper = Persistence(folder, print)
         self.core = Allocator(self.params, 0.0)
-        self.core.wake()
+        self.core.set_kernels_ready()
         self.world = self.core.world
         self.fleet = [Flight(f'uav_{k}', (SIDE * k / UAVS, 0.0, 50.0)) for k in range(UAVS)]
         self.open: set[str] = set()  # accepted, and not ended yet
@@ -162,7 +162,7 @@ class Soak:
             if event.kind is TaskEventKind.COMPLETED and not refused:
                 self.figures['completed'] += 1
                 self.open.discard(event.task_id)
-        self.world.hear(UavReport(uav.name, uav.place, home=uav.home, cruise_speed=SPEED,
+        self.world.update_uav(UavReport(uav.name, uav.place, home=uav.home, cruise_speed=SPEED,
                                   active_task=uav.started if uav.list.stops else '',
                                   list_revision=uav.list.revision), now, now)
 

@@ -1,51 +1,51 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Several allocators of one fleet: exactly one leads, in every order of starts and messages."""
+"""Leader election: exactly one allocator leads, in every order of starts and messages."""
 from itertools import permutations
 
 import pytest
 
 from uav_task_alloc.allocator.leader import (
-    LISTEN,
-    SETTLE,
-    WAIT,
+    DISCOVERY,
+    RESTART_DISCOVERY,
+    STATUS_WAIT,
     AllocatorInstance,
     Leader,
     Role,
-    heard,
-    told,
+    parse_status,
+    status_values,
 )
 from uav_task_alloc.errors import InvalidValue
 
 STEP = 0.1  # [s]
 
 
-class Fleet:
-    """Allocators in virtual time that speak every second; they hear each other at once."""
+class Allocators:
+    """Allocators in virtual time that publish their status every second, without delay."""
 
     def __init__(self):
-        self.now, self.leaders, self.spoken = 100.0, [], {}
+        self.now, self.leaders, self.published = 100.0, [], {}
 
     def start(self, started, id):
         leader = Leader(AllocatorInstance(started, id, f'/{id}'), self.now)
         self.leaders.append(leader)
-        self.spoken[id] = self.now + 0.3 * len(self.leaders) - 1.0
+        self.published[id] = self.now + 0.3 * len(self.leaders) - 1.0
         return leader
 
     def kill(self, leader):
         self.leaders.remove(leader)
 
     def run(self, seconds, cut=False):
-        """cut: nobody hears anybody."""
+        """Let time pass; `cut`: no status is received."""
         for _ in range(round(seconds / STEP)):
             self.now += STEP
             others = 0 if cut else sum(
                 each.role is not Role.PASSIVE for each in self.leaders) - 1
             for each in self.leaders:
                 each.tick(others, self.now)
-                if self.now - self.spoken[each.me.id] >= 1.0:
-                    self.spoken[each.me.id] = self.now
+                if self.now - self.published[each.me.id] >= 1.0:
+                    self.published[each.me.id] = self.now
                     for other in () if cut else self.leaders:
-                        other.hear(each.me, each.role, self.now)
+                        other.update(each.me, each.role, self.now)
 
     @property
     def leading(self):
@@ -54,42 +54,42 @@ class Fleet:
 
 @pytest.fixture
 def fleet():
-    return Fleet()
+    return Allocators()
 
 
-def test_finding_22_an_allocator_alone_leads_after_a_moment(fleet):
+def test_finding_22_a_single_allocator_leads_after_the_discovery(fleet):
     fleet.start(1, 'a')
     assert fleet.leading == []
-    fleet.run(LISTEN + STEP)
+    fleet.run(DISCOVERY + STEP)
     assert fleet.leading == ['a']
 
 
-def test_finding_22_a_restarted_one_leads_soon_unless_a_uav_has_a_list_of_another(fleet):
+def test_finding_22_a_restarted_one_leads_soon_unless_a_uav_has_a_foreign_list(fleet):
     leader = Leader(AllocatorInstance(1, 'a', '/a'), fleet.now, restarted=True)
-    leader.tick(0, fleet.now + SETTLE)
+    leader.tick(0, fleet.now + RESTART_DISCOVERY)
     assert leader.role is Role.LEADING
-    leader.tick(0, fleet.now + SETTLE + STEP, strange=True)
+    leader.tick(0, fleet.now + RESTART_DISCOVERY + STEP, foreign=True)
     assert leader.role is Role.STARTING
-    leader.tick(0, fleet.now + LISTEN - STEP, strange=True)
+    leader.tick(0, fleet.now + DISCOVERY - STEP, foreign=True)
     assert leader.role is Role.STARTING
-    leader.tick(0, fleet.now + LISTEN, strange=True)
+    leader.tick(0, fleet.now + DISCOVERY, foreign=True)
     assert leader.role is Role.LEADING
 
 
-@pytest.mark.parametrize('started', [2, 1, 0])  # 0: a computer whose clock is behind
-def test_finding_22_whoever_leads_already_stays(fleet, started):
+@pytest.mark.parametrize('started', [2, 1, 0])  # 0: a computer whose clock is slow
+def test_finding_22_the_present_leader_stays(fleet, started):
     fleet.start(1, 'b')
     fleet.run(5.0)
     late = fleet.start(started, 'a')
     fleet.run(5.0)
     assert fleet.leading == ['b']
-    assert late.trouble(fleet.now) == (
+    assert late.error(fleet.now) == (
         'passive: another allocator leads this fleet: /b (instance b, started '
         '1970-01-01T00:00:00+00:00); this one publishes nothing until it is restarted')
 
 
 @pytest.mark.parametrize('order', permutations([(1, 'b'), (2, 'a'), (2, 'c')]))
-def test_finding_22_of_those_that_start_at_once_the_earliest_leads(fleet, order):
+def test_finding_22_of_several_starts_at_once_the_earliest_leads(fleet, order):
     for each in order:
         fleet.start(*each)
     for _ in range(50):
@@ -122,19 +122,19 @@ def test_finding_22_a_killed_allocator_may_be_restarted_beside_a_passive_one(fle
     fleet.kill(first)
     fleet.run(30.0)
     assert fleet.leading == []  # the tasks are in the journal of the killed one
-    assert passive.trouble(fleet.now).endswith('that one was not heard for 30 s')
+    assert passive.error(fleet.now).endswith('no status of it for 30 s')
     fleet.start(3, 'a2')
     fleet.run(2.0)
     assert fleet.leading == ['a2']
 
 
-def test_finding_22_a_publisher_that_says_nothing_delays_a_start_only(fleet):
+def test_finding_22_a_publisher_without_status_delays_a_start_only(fleet):
     leader = fleet.start(1, 'a')
-    while fleet.now < 100.0 + WAIT - STEP:
+    while fleet.now < 100.0 + STATUS_WAIT - STEP:
         fleet.now += STEP
         leader.tick(1, fleet.now)
         assert leader.role is Role.STARTING
-    leader.tick(1, 100.0 + WAIT)
+    leader.tick(1, 100.0 + STATUS_WAIT)
     assert (leader.role, leader.silent_others) == (Role.LEADING, True)
 
 
@@ -143,27 +143,27 @@ def test_finding_22_an_allocator_whose_journal_is_in_use_never_leads(fleet):
     leader.refuse('journal.sqlite3 cannot be opened: database is locked', fleet.now)
     fleet.run(2.0)
     assert fleet.leading == []
-    assert 'database is locked' in leader.trouble(fleet.now)
+    assert 'database is locked' in leader.error(fleet.now)
 
 
-def test_finding_22_what_an_allocator_tells_is_read_by_its_fleet_only():
+def test_finding_22_a_status_is_parsed_by_allocators_of_the_same_fleet_only():
     me = AllocatorInstance(17, 'a1', '/north/allocator')
-    words = {key: str(value) for key, value in
-             told(me, Role.LEADING, '/north/allocation').items()}
-    assert heard('/north/allocator', words, '/north/allocation') == (me, Role.LEADING)
-    assert heard('/north/allocator', words, '/south/allocation') is None
-    assert heard('/bridge', {}, '/north/allocation') is None
+    values = {key: str(value) for key, value in
+             status_values(me, Role.LEADING, '/north/allocation').items()}
+    assert parse_status('/north/allocator', values, '/north/allocation') == (me, Role.LEADING)
+    assert parse_status('/north/allocator', values, '/south/allocation') is None
+    assert parse_status('/bridge', {}, '/north/allocation') is None
 
 
 @pytest.mark.parametrize(('key', 'value'), [
     ('started', '²'), ('started', '-1'), ('started', ''), ('started', '9' * 5000),
     ('instance', ''), ('instance', 'x' * 201), ('role', 'king')])
-def test_finding_22_hostile_words_are_refused(key, value):
-    words = {key: str(value) for key, value in
-             told(AllocatorInstance(1, 'a', ''), Role.LEADING, '/allocation').items()}
+def test_finding_22_hostile_values_are_refused(key, value):
+    values = {key: str(value) for key, value in
+             status_values(AllocatorInstance(1, 'a', ''), Role.LEADING, '/allocation').items()}
     with pytest.raises(InvalidValue, match=key):
-        heard('/allocator', {**words, key: value}, '/allocation')
+        parse_status('/allocator', {**values, key: value}, '/allocation')
 
 
-def test_finding_22_any_start_time_that_is_read_can_be_shown():
+def test_finding_22_any_start_time_that_is_parsed_can_be_formatted():
     assert 'started 5138-' in AllocatorInstance(10**20 - 1, 'a', '/a').text

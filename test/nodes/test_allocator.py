@@ -101,7 +101,7 @@ def test_a_burst_is_answered_by_one_plan_and_only_changed_lists_follow(start, pr
     markers = probe.collect(MarkerArray, 'allocation_markers', LATCHED)
     health = probe.collect(DiagnosticArray, '/diagnostics', 10)
     fleet.tasks.publish(add(task('t0', 100)))
-    assert fleet.until_state('t0', S.PENDING).reason == 'no UAV heard yet'
+    assert fleet.until_state('t0', S.PENDING).reason == 'no UAV known yet'
     fleet.uav('a', 0.0)
     fleet.uav('b', 1000.0, cruise_speed=20.0)
     probe.until(lambda: fleet.route('a') == ['t0'])
@@ -125,7 +125,7 @@ def test_a_burst_is_answered_by_one_plan_and_only_changed_lists_follow(start, pr
     assert told.value == pytest.approx(21.0)
     assert 'ADD t1' in told.trigger
     probe.until(lambda: markers and health)
-    assert any(pair.key == 'UAVs heard' for pair in health[-1].status[0].values)
+    assert any(pair.key == 'UAVs known' for pair in health[-1].status[0].values)
     code, out = node.stop()
     assert code == 0
     assert 'Traceback' not in out
@@ -279,9 +279,9 @@ def test_finding_19_the_operator_reads_who_has_no_safe_way_home(start, probe, fl
     fleet.zones.publish(m.ThreatZoneArray(zones=[m.ThreatZone(
         zone_id='base', shape=m.ThreatZone.CYLINDER, radius=100.0, z_max=80.0)]))
     probe.until(lambda: fleet.lists['a'].end == m.TaskList.HOLD)
-    words = 'a has no safe way home (its home is inside zone base): its list ends with HOLD'
+    words = 'a has no safe path home (its home is inside zone base): its list ends with HOLD'
     probe.until(lambda: words in node.output())
-    probe.until(lambda: any('a has no safe way home: its home is inside zone base' in each.message
+    probe.until(lambda: any('a has no safe path home: its home is inside zone base' in each.message
                             for array in health for each in array.status))
     fleet.uav('b', 900.0, home=Point(), mode=m.UavState.STANDBY)
     probe.until(lambda: 'the home of b is inside zone base: it gets no tasks' in node.output())

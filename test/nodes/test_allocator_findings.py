@@ -3,9 +3,8 @@
 import pytest
 from test_allocator import Fleet, add, begin, task
 
-from uav_task_alloc.allocator.persistence.restore import Saved
-from uav_task_alloc.allocator.records import Outbox, UavList
-from uav_task_alloc.allocator.state import admission
+from uav_task_alloc.allocator.core import make_safe_paths
+from uav_task_alloc.allocator.records import Outbox, SavedState, UavList
 from uav_task_alloc.allocator.state.world import World
 from uav_task_alloc.nodes.ros.allocation_publisher import AllocationPublisher
 from uav_task_alloc.nodes.rviz.marker_publisher import MarkerPublisher
@@ -33,27 +32,28 @@ def test_finding_23_a_journal_of_another_origin_ends_the_start(start, probe, fle
     assert 'Traceback' not in other.output()
 
 
-def test_finding_24_the_publishers_of_a_forgotten_uav_are_gone(probe):
-    world = World(AllocatorParams(), Saved())
-    teller, painter = AllocationPublisher(probe.node, world), MarkerPublisher(probe.node, world)
+def test_finding_24_the_publishers_of_a_forgotten_uav_are_destroyed(probe):
+    world = World(AllocatorParams(), SavedState(), make_safe_paths, lambda *_: None)
+    publisher = AllocationPublisher(probe.node, world)
+    marker_publisher = MarkerPublisher(probe.node, world)
     lists = {uav_id: UavList(uav_id, 1) for uav_id in ('real', 'ghost')}
     world.lists.lists.update(lists)
 
-    def take(out):
-        teller.take(out)
-        painter.note(out)
-        assert not teller.tell(0.0)
+    def publish(outbox):
+        publisher.enqueue(outbox)
+        marker_publisher.update(outbox)
+        assert not publisher.publish_some(0.0)
 
-    def published(uav_id):
+    def publishers(uav_id):
         return [probe.node.count_publishers(f'/{uav_id}/{topic}') for topic in (
             'task_list', 'path')]
 
-    take(Outbox(lists=dict(lists)))
-    assert published('real') == published('ghost') == [1, 1]
-    admission.forget(world, 'ghost')
-    take(world.outbox)
-    probe.until(lambda: published('ghost') == [0, 0])
-    assert published('real') == [1, 1]
-    take(Outbox(forgotten={'real'}, lists={'real': lists['real']}))  # and heard again at once
-    probe.until(lambda: published('real') == [1, 1])
-    painter.on_look()
+    publish(Outbox(lists=dict(lists)))
+    assert publishers('real') == publishers('ghost') == [1, 1]
+    world.forget_uav('ghost')
+    publish(world.outbox)
+    probe.until(lambda: publishers('ghost') == [0, 0])
+    assert publishers('real') == [1, 1]
+    publish(Outbox(forgotten={'real'}, lists={'real': lists['real']}))  # and reported again at once
+    probe.until(lambda: publishers('real') == [1, 1])
+    marker_publisher.on_timer()

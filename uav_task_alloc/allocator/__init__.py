@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The allocator without ROS: a world of events, a schedule of solves, lists that stay calm."""
+"""The allocator without ROS: world state, replanning, persistence, leader election."""
 from uav_task_alloc.allocator.core import Allocator
 
 __all__ = ['Allocator']

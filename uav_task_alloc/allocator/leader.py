@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Which of several allocators of one fleet leads: one publishes, the others say that they do not.
+"""Leader election among the allocators of one fleet: one publishes, the others are passive.
 
-No clock, no I/O: `now` is [s] of a steady clock. Each allocator tells all others its instance and
-role every second. One that has stepped down stays passive until it is restarted: the tasks that
-the leader accepted are in the leader's journal, not in this one's.
+No clock, no I/O: `now` is [s] of a steady clock. Each allocator publishes its instance and role
+every second. A passive one stays so until it is restarted: the tasks that the leader accepted are
+in the leader's journal, not in its own.
 """
 from __future__ import annotations
 
@@ -14,24 +14,24 @@ from enum import Enum
 
 from uav_task_alloc.errors import InvalidValue
 
-LISTEN = 1.5  # [s] from the start until other nodes are discovered
-SETTLE = 0.3  # [s] the same after a restart, which must not keep the UAVs waiting
-WAIT = 3.0  # [s] for a word of another publisher of `allocation`; allocators speak every second
-GONE = 5.0  # [s] after the last word of a leader it may be gone
-_LONGEST = 200  # characters of what another allocator tells of itself
+DISCOVERY = 1.5  # [s] from the start until other nodes are discovered
+RESTART_DISCOVERY = 0.3  # [s] the same after a restart, when UAVs wait for their lists
+STATUS_WAIT = 3.0  # [s] for the status of another publisher of `allocation`; one comes a second
+LEADER_TIMEOUT = 5.0  # [s] after the last status of a leader, which may have ended
+_MAX_TEXT = 200  # characters of an instance id, and of a node name
 
 
 class Role(Enum):
-    """What an allocator does for its fleet."""
+    """Role of an allocator in its fleet."""
 
-    STARTING = 'starting'  # it looks for others, and publishes nothing yet
+    STARTING = 'starting'  # it waits for others, and publishes nothing yet
     LEADING = 'leading'
-    PASSIVE = 'passive'  # another one leads; it publishes and hears nothing until a restart
+    PASSIVE = 'passive'  # another one leads; no inputs or outputs until a restart
 
 
 @dataclass(frozen=True, slots=True, order=True)
 class AllocatorInstance:
-    """One run of an allocator; the lesser leads: the earlier start, then the lesser id."""
+    """One run of an allocator; the smallest leads: the earliest start, then the smallest id."""
 
     started: int  # [ns] of the computer's clock, not of simulated time
     id: str
@@ -39,82 +39,101 @@ class AllocatorInstance:
 
     @property
     def text(self) -> str:
-        """Node, id and start, for people."""
+        """Node, id and start, for the log."""
         start = datetime.fromtimestamp(self.started * 1e-9, timezone.utc)
         return (f'{self.node} (instance {self.id}, started '
                 f'{start.isoformat(timespec="seconds")})')
 
 
 class Leader:
-    """Decides the role of `me` from what the others say. `reason`: why it is passive."""
+    """Decides the role of `me` from the status of the others.
+
+    `reason`: why it is passive. `silent_others`: it leads though others publish without a status.
+
+    Args:
+        me: this run.
+        now: [s].
+        restarted: it has the lists of a previous run.
+    """
 
     def __init__(self, me: AllocatorInstance, now: float, restarted: bool = False) -> None:
-        """restarted: it has the lists of an earlier life."""
         self.me, self.role, self.reason = me, Role.STARTING, ''
-        self.silent_others = False  # it leads though others publish that say nothing
-        self._settled = now + (SETTLE if restarted else LISTEN)
-        self._listened, self._until = now + LISTEN, now + WAIT
-        self._heard = now  # [s] last word of a leader, once passive
+        self.silent_others = False
+        self._earliest = now + (RESTART_DISCOVERY if restarted else DISCOVERY)
+        self._discovered, self._latest = now + DISCOVERY, now + STATUS_WAIT
+        self._leader_seen = now  # [s] last status of the leader, once passive
 
-    def hear(self, other: AllocatorInstance, role: Role, now: float) -> None:
-        """Another allocator of this fleet says who it is, and what it does."""
+    def update(self, other: AllocatorInstance, role: Role, now: float) -> None:
+        """Apply the status of another allocator of this fleet."""
         if other.id == self.me.id or role is Role.PASSIVE:
             return
         if self.role is Role.PASSIVE:
-            self._heard = now if role is Role.LEADING else self._heard
+            self._leader_seen = now if role is Role.LEADING else self._leader_seen
         elif self._yields(other, role):
             self.refuse(f'another allocator leads this fleet: {other.text}', now)
 
     def _yields(self, other: AllocatorInstance, role: Role) -> bool:
-        """Whoever leads already stays; among equals the earlier start leads."""
+        """Whether the other one leads: the present leader, else the smaller instance."""
         if self.role is not role:
             return role is Role.LEADING
         return other < self.me
 
     def refuse(self, reason: str, now: float) -> None:
-        """It is passive from now on."""
-        self.role, self.reason, self._heard = Role.PASSIVE, reason, now
+        """Become passive for a reason."""
+        self.role, self.reason, self._leader_seen = Role.PASSIVE, reason, now
 
-    def tick(self, others: int, now: float, strange: bool = False) -> None:
-        """It leads when nobody else does.
+    def tick(self, others: int, now: float, foreign: bool = False) -> None:
+        """Become the leader if there is no other one.
 
-        others: number of other publishers of `allocation`. strange: a UAV has a list that this
-        allocator did not publish, so there may be another one.
+        Args:
+            others: number of other publishers of `allocation`.
+            now: [s].
+            foreign: a UAV has a list that this allocator did not publish, so that there may be
+                another allocator.
         """
-        if self.role is Role.LEADING and strange and now < self._listened:
+        if self.role is Role.LEADING and foreign and now < self._discovered:
             self.role = Role.STARTING
-        if self.role is not Role.STARTING or now < (self._listened if strange else self._settled):
+        if self.role is not Role.STARTING or now < (
+                self._discovered if foreign else self._earliest):
             return
-        if others <= 0 or now >= self._until:
+        if others <= 0 or now >= self._latest:
             self.role, self.silent_others = Role.LEADING, others > 0
 
-    def trouble(self, now: float) -> str:
-        """What an operator has to know; '' while it leads."""
+    def error(self, now: float) -> str:
+        """Return why it is passive, for an operator; '' if it is not."""
         if self.role is not Role.PASSIVE:
             return ''
-        gone = now - self._heard
-        end = f'; that one was not heard for {gone:.0f} s' if gone >= GONE else ''
+        silence = now - self._leader_seen
+        end = f'; no status of it for {silence:.0f} s' if silence >= LEADER_TIMEOUT else ''
         return f'passive: {self.reason}; this one publishes nothing until it is restarted{end}'
 
 
-def told(me: AllocatorInstance, role: Role, topic: str) -> dict[str, object]:
-    """What the others have to know, as words. topic: the full name of `allocation`."""
+def status_values(me: AllocatorInstance, role: Role, topic: str) -> dict[str, object]:
+    """Return what the others have to know; `topic` is the full name of `allocation`."""
     return {'allocation topic': topic, 'instance': me.id, 'started': me.started,
             'role': role.value}
 
 
-def heard(
-    node: str, values: Mapping[str, str], topic: str
-) -> tuple[AllocatorInstance, Role] | None:
-    """The reverse of `told`; None where it is of no allocator, or of another fleet.
+def parse_status(node: str, values: Mapping[str, str],
+                 topic: str) -> tuple[AllocatorInstance, Role] | None:
+    """Parse the `status_values` of an allocator.
 
-    Raises InvalidValue, as the words may be anybody's.
+    Args:
+        node: its full name.
+        values: of its status.
+        topic: full name of the own `allocation`.
+
+    Returns:
+        Its instance and role; None for the status of another node, or of another fleet.
+
+    Raises:
+        InvalidValue: a value is not one that an allocator sends.
     """
     if values.get('allocation topic') != topic:
         return None
     id, started = values.get('instance', ''), values.get('started', '')
-    if not id or len(id) > _LONGEST:
-        raise InvalidValue('instance', id, f'1 to {_LONGEST} characters')
+    if not id or len(id) > _MAX_TEXT:
+        raise InvalidValue('instance', id, f'1 to {_MAX_TEXT} characters')
     if not (started.isascii() and started.isdecimal() and len(started) <= 20):
         raise InvalidValue('started', started, 'a time [ns]')
     try:
@@ -122,4 +141,4 @@ def heard(
     except ValueError:
         raise InvalidValue('role', values.get('role', ''),
                            f'one of {", ".join(role.value for role in Role)}') from None
-    return AllocatorInstance(int(started), id, node[:_LONGEST]), role
+    return AllocatorInstance(int(started), id, node[:_MAX_TEXT]), role

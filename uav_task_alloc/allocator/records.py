@@ -1,11 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the allocator knows of tasks, UAVs and lists: frozen values, SI units, ENU."""
+"""Values of the allocator: tasks, UAV reports, task lists, problems, plans; SI units, ENU."""
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import Enum
+from typing import Any
 
+from uav_task_alloc.geometry.frames import Origin
 from uav_task_alloc.model import (
     Leg,
     Plan,
@@ -21,7 +23,7 @@ from uav_task_alloc.model import (
 
 
 class TaskState(Enum):
-    """Where a task stands; the numbers are those of the TaskStatus message."""
+    """State of a task; the numbers are those of the TaskStatus message."""
 
     PENDING = 0
     ASSIGNED = 1
@@ -33,9 +35,9 @@ class TaskState(Enum):
     UNASSIGNED = 7
 
 
-OPEN = frozenset({TaskState.PENDING, TaskState.ASSIGNED, TaskState.ACTIVE,
-                  TaskState.UNASSIGNED})
-ENDED = frozenset({TaskState.COMPLETED, TaskState.FAILED, TaskState.CANCELLED})
+OPEN_STATES = frozenset({TaskState.PENDING, TaskState.ASSIGNED, TaskState.ACTIVE,
+                         TaskState.UNASSIGNED})
+ENDED_STATES = frozenset({TaskState.COMPLETED, TaskState.FAILED, TaskState.CANCELLED})
 
 
 class AnnouncementAction(Enum):
@@ -56,61 +58,65 @@ class TaskEventKind(Enum):
 
 @dataclass(frozen=True, slots=True)
 class TaskRecord:
-    """One accepted task and its fate."""
+    """One accepted task, its state, and the UAV that has it."""
 
     task: Task
-    announced: Task  # as first added: a replay of that announcement is known again
+    announced: Task  # as first added, to recognise a replay of that announcement
     state: TaskState = TaskState.PENDING
-    uav: str = ''  # who has it, or had it when it ended
+    uav: str = ''  # that has it, or had it when it ended
     reason: str = ''
     stamp: float = 0.0  # [s] of the last change of state
     failed_on: tuple[str, ...] = ()  # UAVs that could not do it
 
     @property
     def open(self) -> bool:
-        """It is still to be done."""
-        return self.state in OPEN
+        """Whether it is still to be done."""
+        return self.state in OPEN_STATES
 
 
 @dataclass(frozen=True, slots=True)
 class TaskVerdict:
-    """The answer to one task of an announcement."""
+    """Whether one task of an announcement was accepted."""
 
     task_id: str
     accepted: bool
-    reason: str = ''  # why not; where accepted: that it changes nothing
+    reason: str = ''  # why it was rejected; where accepted: that it changes nothing
 
     @property
     def unchanged(self) -> bool:
-        """It was accepted before."""
+        """Whether it was accepted before, with the same content."""
         return self.accepted and bool(self.reason)
 
 
 @dataclass(frozen=True, slots=True)
 class TaskEvent:
-    """A UAV says what became of a task."""
+    """Progress of a task as a UAV reports it."""
 
     task_id: str
     uav_id: str
-    revision: int  # of the list it was flown from; 0: not told
+    revision: int  # of the list it was flown from; 0: unknown
     kind: TaskEventKind
     reason: str = ''
 
 
 @dataclass(frozen=True, slots=True)
 class UavReport:
-    """What one UAV says of itself; None where it does not know. Raises InvalidValue."""
+    """State of one UAV as it reports it; None where it is unknown.
+
+    Raises:
+        InvalidValue: a field is out of bounds.
+    """
 
     uav_id: str
     position: Point  # [m] ENU
     home: Point | None = None  # [m] ENU
-    range: float | None = None  # [m] it can still fly
+    range: float | None = None  # [m] remaining
     cruise_speed: float | None = None  # [m/s]
     capabilities: frozenset[str] = frozenset()
     battery: float | None = None  # [0..1]
-    available: bool = True  # and not in FAULT
-    active_task: str = ''  # being flown
-    list_revision: int = 0  # last list verified on board
+    available: bool = True  # for tasks, and not in FAULT
+    active_task: str = ''  # id of the task being flown
+    list_revision: int = 0  # of the last list verified on board
     standby: bool = False  # on the ground
 
     def __post_init__(self) -> None:
@@ -131,7 +137,7 @@ class UavReport:
 
 @dataclass(frozen=True, slots=True)
 class ListStop:
-    """A task in a list, the way to it, and when the UAV is there."""
+    """A task in a list, the leg to it, and the estimated arrival."""
 
     task: Task
     leg: Leg
@@ -140,23 +146,23 @@ class ListStop:
 
 @dataclass(frozen=True, slots=True)
 class UavList:
-    """What one UAV has still to fly, in order."""
+    """The tasks one UAV has still to fly, in order."""
 
     uav: str
-    revision: int  # strictly rising
+    revision: int  # strictly increasing
     stops: tuple[ListStop, ...] = ()
-    returns: bool = False  # home after the last task
+    returns: bool = False  # returns home after the last task
     end_via: tuple[Point, ...] = ()  # [m] ENU, flown before the return home
-    distance: float = 0.0  # [m] of all legs, with the way home where it returns
-    stamp: float = 0.0  # [s] when it was planned
+    distance: float = 0.0  # [m] of all legs, including the leg home where it returns
+    stamp: float = 0.0  # [s] of the plan
 
     @property
     def task_ids(self) -> tuple[str, ...]:
-        """The ids in the order flown."""
+        """The task ids in the order flown."""
         return tuple(stop.task.id for stop in self.stops)
 
-    def flies_as(self, other: UavList) -> bool:
-        """The same tasks by the same ways to the same end: nothing to tell the UAV."""
+    def same_route(self, other: UavList) -> bool:
+        """Whether tasks, detour points and end are equal: there is nothing to publish."""
         return (self.returns, self.end_via) == (other.returns, other.end_via) and [
             (stop.task, stop.leg.via) for stop in self.stops] == [
             (stop.task, stop.leg.via) for stop in other.stops]
@@ -164,34 +170,34 @@ class UavList:
 
 @dataclass(frozen=True, slots=True)
 class ReplanProblem:
-    """The world as a worker solves it, apart from the world that goes on meanwhile."""
+    """A snapshot of the world for the worker; the world goes on while it is solved."""
 
     version: int
     trigger: str
-    background: bool  # nothing happened: publish only what is better by the margin
+    background: bool  # without an event: only what is better by the margin is published
     budget: float  # [s]
     uavs: tuple[Uav, ...]
     tasks: tuple[Task, ...]
     zones: tuple[ThreatZone, ...]
     locked: Mapping[str, tuple[str, ...]]
-    held: Plan  # the lists as they are out
-    warm: Plan  # the best found so far, from which the search goes on
+    published: Plan  # the lists in force
+    warm: Plan  # the best plan so far, from which the search continues
 
 
 @dataclass(frozen=True, slots=True)
 class ReplanAnswer:
-    """What a worker found: the held lists repaired, and the best plan."""
+    """Result of the worker."""
 
     problem: ReplanProblem
-    base: Plan
-    fresh: Plan
+    repaired: Plan  # the published lists, repaired by insertion
+    best: Plan  # the best plan within the budget
 
 
 @dataclass(frozen=True, slots=True)
 class Allocation:
-    """The plan in force, as it is told to everybody."""
+    """The plan in force, as it is published."""
 
-    revision: int  # strictly rising
+    revision: int  # strictly increasing
     lists: tuple[UavList, ...]
     plan: Plan
     trigger: str
@@ -208,10 +214,24 @@ class LogNote:
 
 @dataclass(slots=True)
 class Outbox:
-    """What has to be told since it was last emptied."""
+    """What is to be published since it was last collected."""
 
     lists: dict[str, UavList] = field(default_factory=dict)
-    forgotten: set[str] = field(default_factory=set)  # UAVs, before the lists
+    forgotten: set[str] = field(default_factory=set)  # UAVs; applied before the lists
     allocation: Allocation | None = None
     statuses: bool = False
     notes: list[LogNote] = field(default_factory=list)
+
+
+@dataclass(slots=True)
+class SavedState:
+    """What the journal restores after a restart."""
+
+    tasks: list[TaskRecord] = field(default_factory=list)
+    lists: list[UavList] = field(default_factory=list)
+    zones: list[ThreatZone] = field(default_factory=list)
+    switched_off: list[str] = field(default_factory=list)  # UAVs, by an operator
+    revision: int = 0  # of the allocation
+    learned: Any = None  # body of the row with the learned state
+    origin: Origin | None = None  # of all coordinates; None: the journal has none
+    unreadable: list[str] = field(default_factory=list)  # rows that were left out, and why

@@ -1,18 +1,22 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What people ask: where each task stands, and how the allocator is."""
+"""Status for operators: of each task, and of the allocator as warnings and key values."""
 from __future__ import annotations
 
 from collections import Counter
 from dataclasses import dataclass
 
 from uav_task_alloc.allocator.records import TaskRecord, TaskState
+from uav_task_alloc.allocator.state.fleet import Fleet
 from uav_task_alloc.allocator.state.world import World
-from uav_task_alloc.allocator.state.zone_checks import NAMED, standing
+from uav_task_alloc.allocator.state.zone_checks import blocked_text
+
+_MAX_NAMED = 20  # silent UAVs in a warning
+_MAX_STRANDED = 5  # warnings of UAVs without a safe path home
 
 
 @dataclass(frozen=True, slots=True)
 class TaskStatus:
-    """Where one task stands."""
+    """State of one task, for publication."""
 
     task_id: str
     state: TaskState
@@ -22,41 +26,49 @@ class TaskStatus:
 
 
 def status_of(task_id: str, known: TaskRecord | tuple[str, float]) -> TaskStatus:
-    """Of an accepted task, or of one that was refused for a reason at a time [s]."""
+    """Return the status of an accepted task, or of a refused one (reason, stamp [s])."""
     if isinstance(known, TaskRecord):
         return TaskStatus(task_id, known.state, known.uav, known.reason, known.stamp)
     reason, stamp = known
     return TaskStatus(task_id, TaskState.REJECTED, '', reason, stamp)
 
 
-def worries(world: World, journal_trouble: str, solver_trouble: str = '') -> list[str]:
-    """What an operator should look at."""
-    fleet = world.fleet
+def health_warnings(world: World, journal_error: str, solver_error: str = '') -> list[str]:
+    """Return what an operator has to know.
+
+    Args:
+        world: of the allocator.
+        journal_error, solver_error: '' where there is none.
+    """
+    fleet, open_tasks = world.fleet, world.tasks.open()
+    left_out = [record for record in open_tasks if record.state is TaskState.UNASSIGNED]
+    blocked = blocked_text(fleet.blocked_on_ground())
+    warnings = [f'journal: {journal_error}'] if journal_error else []
+    warnings += [world.admission.full] if world.admission.full else []
+    warnings += [f'solver: {solver_error}'] if solver_error else []
+    warnings += _uav_warnings(fleet)
+    warnings += [f'{blocked}: no tasks'] if blocked else []
+    warnings += [f'{uav_id} has no safe path home: {why}'
+                 for uav_id, why in sorted(world.zone_checks.stranded.items())
+                 if uav_id in fleet.records and not fleet.records[uav_id].silent][:_MAX_STRANDED]
+    warnings += [f'{len(left_out)} tasks unassigned, {left_out[0].task.id}: '
+                 f'{left_out[0].reason}'] if left_out else []
+    return warnings + (['no UAV available'] if open_tasks and not world.any_usable() else [])
+
+
+def _uav_warnings(fleet: Fleet) -> list[str]:
     silent = sorted(uav_id for uav_id, record in fleet.records.items() if record.silent)
-    stands = standing(fleet.standing())
-    left = [record for record in world.tasks.open() if record.state is TaskState.UNASSIGNED]
-    found = [f'journal: {journal_trouble}'] if journal_trouble else []
-    found += [world.full] if world.full else []
-    found += [f'solver: {solver_trouble}'] if solver_trouble else []
-    found += [f'silent: {", ".join(silent[:20])}'] if silent else []
     low = sorted(uav_id for uav_id, record in fleet.records.items() if record.low)
-    found += [f'battery low: {", ".join(low)}'] if low else []
-    found += [f'{stands}: no tasks'] if stands else []
-    found += [f'{uav_id} has no safe way home: {why}'
-              for uav_id, why in sorted(world.stranded.items())
-              if uav_id in fleet.records and uav_id not in silent][:NAMED]
-    found += [f'{len(left)} tasks unassigned, {left[0].task.id}: {left[0].reason}'] if left else []
-    if world.tasks.open() and not any(fleet.usable(uav_id) for uav_id in fleet.records):
-        found.append('no UAV available')
-    return found
+    warnings = [f'silent: {", ".join(silent[:_MAX_NAMED])}'] if silent else []
+    return warnings + ([f'battery low: {", ".join(low)}'] if low else [])
 
 
-def facts(world: World) -> dict[str, object]:
-    """Numbers of UAVs, tasks and zones, and the revision in force."""
+def health_values(world: World, solving: bool) -> dict[str, object]:
+    """Return numbers of UAVs, tasks and zones, and the revision in force, by name."""
     states = Counter(record.state for record in world.tasks.records.values())
-    usable = [uav_id for uav_id in world.fleet.records if world.fleet.usable(uav_id)]
-    return {'UAVs heard': len(world.fleet.records), 'UAVs available': len(usable),
+    return {'UAVs known': len(world.fleet.records),
+            'UAVs available': len(world.fleet.usable_ids()),
             'zones': len(world.zones), 'revision': world.revision,
             **{f'tasks {state.name}': states[state] for state in TaskState
                if state is not TaskState.REJECTED},
-            'tasks REJECTED': len(world.tasks.rejected), 'solving': world.schedule.busy}
+            'tasks REJECTED': len(world.tasks.rejected), 'solving': solving}

@@ -1,10 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The allocator as a node: hears UAVs, tasks and zones, publishes a list for each UAV."""
+"""The allocator as a node: takes UAV states, tasks and zones, publishes a list for each UAV."""
 from __future__ import annotations
 
 import gc
 import time
 from collections import deque
+from collections.abc import Callable
+from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.clock import Clock, ClockType
@@ -21,14 +23,15 @@ from uav_task_alloc.allocator.persistence.persistence import Persistence
 from uav_task_alloc.allocator.records import LogNote, ReplanAnswer, ReplanProblem, TaskVerdict
 from uav_task_alloc.allocator.replanning import planning
 from uav_task_alloc.allocator.replanning.worker import Worker
-from uav_task_alloc.allocator.status import facts, worries
+from uav_task_alloc.allocator.status import health_values, health_warnings
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.geometry.frames import Origin
-from uav_task_alloc.nodes.conversions import allocation_messages as told, announcements
+from uav_task_alloc.nodes.conversions import announcements
+from uav_task_alloc.nodes.conversions.diagnostics import allocator_row, from_diagnostics
 from uav_task_alloc.nodes.conversions.messages import (
-    HEARD_ANNOUNCEMENTS,
-    HEARD_EVENTS,
-    HEARD_STATES,
+    INPUT_ANNOUNCEMENTS,
+    INPUT_EVENTS,
+    INPUT_STATES,
     LATCHED,
     to_event,
     to_report,
@@ -45,69 +48,81 @@ from uav_task_alloc.nodes.rviz.marker_publisher import MarkerPublisher
 from uav_task_alloc.params import AllocatorParams
 from uav_task_alloc.zone_codec import decode_zone_array
 
-_TICK = 0.025  # [s]
-LOCK_WAIT = 5.0  # [s] for the journal of an allocator that is just ending
-_PATIENCE = 1.0  # [s] that the lists of the last life wait for somebody to hear them
-REST, MOST_REST = 3.0, 0.2  # times as long as a tick took the next one waits, at most [s]
-MOST_LINES, MOST_ROWS = 200, 500  # logged, and saved, at once
+_STEP_PERIOD = 0.025  # [s]
+_LOCK_TIMEOUT = 5.0  # [s] for the journal of an allocator that is exiting
+_SUBSCRIBER_TIMEOUT = 1.0  # [s] that the lists of the previous run wait for subscribers
+# a step is followed by a pause, in which messages are taken: a multiple of its duration
+_PAUSE_FACTOR, _LONGEST_PAUSE = 3.0, 0.2  # and at most [s]
+_MOST_LINES, _MOST_ROWS = 200, 500  # logged, and saved, per step
 
 
 class AllocatorNode(Node):
-    """Wires topics to the world, the world to the worker, answers to topics."""
+    """Allocates tasks to UAVs, and plans again whenever something has changed.
+
+    Publishes:
+        `<uav_id>/task_list` (TaskList), `task_statuses` (TaskStatusArray), `allocation`
+        (Allocation), `allocation_markers` (MarkerArray), `<uav_id>/path` (nav_msgs/Path),
+        `fleet_origin` (FleetOrigin), all latched; `/diagnostics` (DiagnosticArray).
+    Subscribes to:
+        `uav_states` (UavState), `task_announcements` (TaskAnnouncement), `threat_zones`
+        (ThreatZoneArray), `task_events` (TaskEvent), `fleet_origin`, `/diagnostics`.
+    Services:
+        `~/submit_tasks` (SubmitTasks), `~/replan` (Trigger), `~/set_availability`
+        (SetAvailability).
+    Parameters:
+        AllocatorParams, see docs/parameters.md.
+    """
 
     def __init__(self) -> None:
         super().__init__('allocator')
         self.live = declare(self, AllocatorParams)
-        now = self.live.now
-        self.origin = Origin(now.origin__latitude, now.origin__longitude,
-                             now.origin__altitude_amsl)
-        self.origins = OriginCheck(self, self.origin, lambda text: self.complain(
-            'fleet_origin', '', text))
-        self.keeper = Persistence(now.state_dir, self.get_logger().error, self.origin,
-                             LOCK_WAIT)
-        self.core = Allocator(now, time.monotonic(), self.keeper.saved)
+        params = self.live.now
+        self.refusals = RefusalLog(self.get_logger().warning)
+        self.origin = Origin(params.origin__latitude, params.origin__longitude,
+                             params.origin__altitude_amsl)
+        self.origins = OriginCheck(self, self.origin, lambda reason: self.refusals.report(
+            'fleet_origin', '', reason))
+        self.persistence = Persistence(params.state_dir, self.get_logger().error, self.origin,
+                                       _LOCK_TIMEOUT)
+        self.core = Allocator(params, time.monotonic(), self.persistence.saved)
         self.world = self.core.world
-        self.complain = RefusalLog(self.get_logger().warning).say
-        self.answers: deque[ReplanAnswer | None] = deque()
-        self.background = False
-        self.rested = 0.0  # [s] steady clock
-        self.refused = ''  # which other origin was logged
-        self.fault = ''  # why the last solve failed
-        self.behind = False  # there is more to tell than was told
-        self.inputs: list[Subscription] = []
-        self.offers: list[Service] = []  # once it leads
+        self.results: deque[ReplanAnswer | None] = deque()  # of the worker
+        self.background = False  # the running solve is one between events
+        self.pause_until = 0.0  # [s] steady clock
+        self.logged_conflict = ''  # of origins
+        self.solver_error = ''  # of the last solve
+        self.pending = False  # something is not yet saved or published
         self.passive = False  # another allocator leads
-        self.watch = LeaderElection(self, self.world.lists, self.keeper.in_use)
-        self._listen()
-        self._talk()
-        self.arrived = self.create_guard_condition(self.on_answer)
-        self.patient_until = time.monotonic() + _PATIENCE
-        self.teller.prepare(self.world.lists.lists)
-        self.worker = Worker(self.prepare, self.solve, self.deliver, self.failed)
+        self.election = LeaderElection(self, self.world.lists, self.persistence.in_use)
+        self._create_topics()
+        self.result_ready = self.create_guard_condition(self.on_results)
+        self.subscribers_by = time.monotonic() + _SUBSCRIBER_TIMEOUT
+        self.worker = Worker(self.load_solver, self.solve, self.deliver, self.on_solver_error)
         self.worker.start()
 
-    def _listen(self) -> None:
-        for kind, topic, heard, qos in (
-                (m.UavState, 'uav_states', self.on_state, HEARD_STATES),
-                (m.TaskAnnouncement, 'task_announcements', self.on_tasks,
-                 HEARD_ANNOUNCEMENTS),
-                (m.ThreatZoneArray, 'threat_zones', self.on_zones, LATCHED),
-                (m.TaskEvent, 'task_events', self.on_event, HEARD_EVENTS)):
-            self.inputs.append(subscribe_batched(self, kind, topic, heard, qos))
-        steady = Clock(clock_type=ClockType.STEADY_TIME)  # simulated time may stand still
-        self.create_timer(_TICK, self.on_tick, clock=steady)
-        self.create_timer(1.0, self.on_second, clock=steady)
+    def _create_topics(self) -> None:
+        self.publisher = AllocationPublisher(self, self.world)
+        self.publisher.prepare(self.world.lists.lists)
+        self.markers = MarkerPublisher(self, self.world)
+        self.diagnostics = self.create_publisher(DiagnosticArray, '/diagnostics', 10)
+        self.inputs: list[Subscription[Any]] = [
+            subscribe_batched(self, m.UavState, 'uav_states', self.on_state, INPUT_STATES),
+            subscribe_batched(self, m.TaskAnnouncement, 'task_announcements', self.on_tasks,
+                              INPUT_ANNOUNCEMENTS),
+            subscribe_batched(self, m.ThreatZoneArray, 'threat_zones', self.on_zones, LATCHED),
+            subscribe_batched(self, m.TaskEvent, 'task_events', self.on_event, INPUT_EVENTS)]
+        self.offered: list[Service] = []  # while it leads
+        steady = Clock(clock_type=ClockType.STEADY_TIME)  # simulated time may be paused
+        self.create_timer(_STEP_PERIOD, self.on_step, clock=steady)
+        self.create_timer(1.0, self.publish_diagnostics, clock=steady)
 
-    def _talk(self) -> None:
-        self.teller = AllocationPublisher(self, self.world)
-        self.painter = MarkerPublisher(self, self.world)
-        self.health = self.create_publisher(DiagnosticArray, '/diagnostics', 10)
+    # which allocator leads
 
     def leads(self) -> bool:
-        """Whether this allocator may publish; where another one leads it lets go of all topics."""
-        role = self.watch.role()
-        if role is Role.LEADING and not self.offers:
-            self.offers = [
+        """Whether this allocator may publish; it offers its services from then on."""
+        role = self.election.role()
+        if role is Role.LEADING and not self.offered:
+            self.offered = [
                 self.create_service(SubmitTasks, '~/submit_tasks', self.on_submit),
                 self.create_service(Trigger, '~/replan', self.on_replan),
                 self.create_service(SetAvailability, '~/set_availability', self.on_availability)]
@@ -116,194 +131,206 @@ class AllocatorNode(Node):
         return role is Role.LEADING
 
     def step_down(self) -> None:
-        """Hear, offer and publish nothing any more but /diagnostics; what was accepted is kept."""
+        """Destroy all topics and services but /diagnostics; what was accepted is saved."""
         self.passive = True
-        self.get_logger().error(self.watch.trouble())
-        self.keeper.save(self.core, time.monotonic())
-        for heard in self.inputs:
-            self.destroy_subscription(heard)
-        for offer in self.offers:
-            self.destroy_service(offer)
-        self.teller.close()
-        self.painter.close()
+        self.get_logger().error(self.election.trouble())
+        self.save()
+        for subscription in self.inputs:
+            self.destroy_subscription(subscription)
+        for service in self.offered:
+            self.destroy_service(service)
+        self.publisher.close()
+        self.markers.close()
 
-    def stamp(self) -> float:
-        """The published clock [s]."""
-        return self.get_clock().now().nanoseconds * 1e-9
-
-    # what is heard
+    # topics and services
 
     def on_state(self, msg: m.UavState) -> None:
-        """A UAV says how it is."""
+        """Take the state of a UAV."""
         try:
             report = to_report(msg)
             check_topic(self, TASK_LIST, report.uav_id)
-            refused = self.world.hear(report, time.monotonic(), self.stamp())
-            if refused:  # for want of room, which the world says once
-                return
+            if self.world.update_uav(report, time.monotonic(), self.stamp()):
+                return  # there are too many UAVs, which the world reports once
+            refusal = ''
         except InvalidValue as error:
-            refused = str(error)
-        self.complain('uav_states', msg.uav_id, refused)
+            refusal = str(error)
+        self.refusals.report('uav_states', msg.uav_id, refusal)
 
     def on_tasks(self, msg: m.TaskAnnouncement) -> list[TaskVerdict]:
-        """Tasks are added, changed or withdrawn."""
-        return announcements.take(self.world, msg, self.origin, self.stamp(), time.monotonic())
+        """Add, update or cancel tasks."""
+        return announcements.announce(self.world, msg, self.origin, self.stamp(),
+                                      time.monotonic())
 
     def on_zones(self, msg: m.ThreatZoneArray) -> None:
-        """The whole picture of the zones."""
+        """Replace all zones; one that is invalid stays as it was."""
         try:
-            zones, bad = decode_zone_array(msg)
+            zones, invalid = decode_zone_array(msg)
         except InvalidValue as error:
-            return self.complain('threat_zones', '', str(error))
-        self.complain('threat_zones', '', '')
+            return self.refusals.report('threat_zones', '', str(error))
+        self.refusals.report('threat_zones', '', '')
         for zone in msg.zones:
-            self.complain('threat_zones', zone.zone_id, bad.get(zone.zone_id, ''))
-        self.world.set_zones(zones, bad, time.monotonic())
+            self.refusals.report('threat_zones', zone.zone_id, invalid.get(zone.zone_id, ''))
+        self.world.set_zones(zones, invalid, time.monotonic())
 
     def on_event(self, msg: m.TaskEvent) -> None:
-        """A task was started, completed, or failed."""
+        """Take the start, the completion or the failure of a task."""
         try:
-            refused = self.world.event(to_event(msg), self.stamp(), time.monotonic())
+            refusal = self.world.event(to_event(msg), self.stamp(), time.monotonic())
         except InvalidValue as error:
-            refused = str(error)
-        if refused:
-            self.get_logger().warning(f'task_events: {refused}: ignored')
-        self.keeper.save(self.core, time.monotonic())
+            refusal = str(error)
+        if refusal:
+            self.get_logger().warning(f'task_events: {refusal}: ignored')
+        self.save()
 
     def on_submit(self, request: SubmitTasks.Request,
                   response: SubmitTasks.Response) -> SubmitTasks.Response:
-        """The same as an announcement, with an answer; it is on disk before that."""
+        """Take an announcement; it is saved before the response."""
         verdicts = self.on_tasks(request.announcement)
-        self.keeper.save(self.core, time.monotonic())
-        return announcements.answer(verdicts, response)
+        self.save()
+        return announcements.from_verdicts(verdicts, response)
 
     def on_replan(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        """Somebody wants a new plan."""
-        self.world.touch('replan service', time.monotonic())
+        """Plan again without a change."""
+        self.world.request_replan('replan service', time.monotonic())
         response.success, response.message = True, 'a new plan follows on `allocation`'
         return response
 
     def on_availability(self, request: SetAvailability.Request,
                         response: SetAvailability.Response) -> SetAvailability.Response:
-        """An operator takes a UAV out, or puts it back."""
-        refused = self.world.set_available(request.uav_id, request.available, time.monotonic())
-        self.keeper.save(self.core, time.monotonic())
-        word = 'available' if request.available else 'not available'
-        response.success, response.message = not refused, refused or f'{request.uav_id} is {word}'
+        """Set whether a UAV may be given tasks; persists until it is changed."""
+        refusal = self.world.set_available(request.uav_id, request.available, time.monotonic())
+        self.save()
+        state = 'available' if request.available else 'not available'
+        response.success = not refusal
+        response.message = refusal or f'{request.uav_id} is {state}'
         return response
 
-    # what is solved
+    # the solver, in the worker's thread
 
-    def on_tick(self) -> None:
-        """What time brings, a solve where one is due, and what has to be told."""
-        now, stamp = time.monotonic(), self.stamp()
-        if not self.leads() or now < self.rested or self.waits_for_listeners(now):
-            return
-        if self.world.params is not self.live.now:
-            self.world.params = self.live.now
-            self.world.touch('parameters changed', now)
-        self.core.tick(now, stamp)
-        # nothing is solved while the last answer is not told: telling would never come to an end
-        problem = None if self.behind or self.origins.conflict() else self.core.due(now, stamp)
-        if problem is not None:
-            self.background = problem.background
-            self.worker.ask(problem)
-        elif self.core.hurry(now, self.background):
-            self.worker.hurry()
-        self.tell(stamp)
-        self.rest(now)
-
-    def waits_for_listeners(self, now: float) -> bool:
-        """After a restart: what is told before it is heard may take DDS 3 s to be told again."""
-        if now < self.patient_until and not self.teller.is_heard():
-            return True
-        self.patient_until = now
-        return False
-
-    def rest(self, began: float) -> None:
-        """What is heard has its turn between two pieces of work, however full the world."""
-        now = time.monotonic()
-        self.rested = now + min(REST * (now - began), MOST_REST)
-
-    def prepare(self) -> None:
-        """In the worker's thread: load the compiler and all it has compiled."""
-        from uav_task_alloc.allocator.replanning.warm_up import warm_up
+    def load_solver(self) -> None:
+        """Import the compiler and load all compiled kernels."""
+        from uav_task_alloc.allocator.warm_up import compile_kernels
         from uav_task_alloc.solver.solve import plan
-        warm_up(plan, self.live.now)
+        compile_kernels(plan, self.live.now)
 
-    def solve(self, problem: ReplanProblem, stop) -> ReplanAnswer:
-        """In the worker's thread."""
+    def solve(self, problem: ReplanProblem, stop: Callable[[], bool]) -> ReplanAnswer:
+        """Solve a problem; `stop()` is true once the solve should end early."""
         from uav_task_alloc.solver.solve import plan
         return planning.solve_problem(plan, problem, self.live.now, stop)
 
-    def deliver(self, answer: ReplanAnswer | None) -> None:
-        """In the worker's thread: wake the node's."""
-        self.answers.append(answer)
-        self.arrived.trigger()
+    def deliver(self, result: ReplanAnswer | None) -> None:
+        """Pass a result to the node's thread; None: the solver is loaded, or has failed."""
+        self.results.append(result)
+        self.result_ready.trigger()
 
-    def failed(self, error: Exception) -> None:
-        """In the worker's thread."""
-        self.fault = f'{type(error).__name__}: {error}'[:500]
-        self.get_logger().error(f'solver: {self.fault}', throttle_duration_sec=10.0)
+    def on_solver_error(self, error: Exception) -> None:
+        """Log why a solve has failed."""
+        self.solver_error = f'{type(error).__name__}: {error}'[:500]
+        self.get_logger().error(f'solver: {self.solver_error}', throttle_duration_sec=10.0)
 
-    def on_answer(self) -> None:
-        """The worker has an answer, or is ready for the first problem."""
-        began = time.monotonic()
-        while self.answers:
-            if not self.world.awake:
-                self.core.wake()
-                self.answers.popleft()
-                gc.freeze()  # a collection need not look through the compiler each time
+    # steps
+
+    def on_step(self) -> None:
+        """Let time pass, start a solve where one is due, and publish changes."""
+        now, stamp = time.monotonic(), self.stamp()
+        if not self.leads() or now < self.pause_until or self.waits_for_subscribers(now):
+            return
+        self.world.set_params(self.live.now, now)
+        self.core.tick(now, stamp)
+        self.start_solve(now, stamp)
+        self.publish(stamp)
+        self.pause_after(now)
+
+    def start_solve(self, now: float, stamp: float) -> None:
+        """Give the worker a problem that is due, or end a background solve for it."""
+        # not before the last result is published: under load that would never complete
+        blocked = self.pending or self.origins.conflict()
+        problem = None if blocked else self.core.due(now, stamp)
+        if problem is not None:
+            self.background = problem.background
+            self.worker.submit(problem)
+        elif self.core.stop_early(now, self.background):
+            self.worker.stop_early()
+
+    def waits_for_subscribers(self, now: float) -> bool:
+        """Whether the lists of the previous run still wait for subscribers.
+
+        What is published before a subscriber is matched may reach it 3 s later.
+        """
+        if now < self.subscribers_by and not self.publisher.all_subscribed():
+            return True
+        self.subscribers_by = now
+        return False
+
+    def pause_after(self, started: float) -> None:
+        """Leave time for messages after work that began at `started` [s]."""
+        now = time.monotonic()
+        self.pause_until = now + min(_PAUSE_FACTOR * (now - started), _LONGEST_PAUSE)
+
+    def on_results(self) -> None:
+        """Adopt the worker's results; the first one means that the solver is loaded."""
+        started = time.monotonic()
+        while self.results:
+            result = self.results.popleft()
+            if not self.world.kernels_ready:
+                self.core.set_kernels_ready()
+                gc.freeze()  # collections need not traverse the compiler's objects
                 self.get_logger().info('ready')
                 continue
-            answer = self.answers.popleft()
-            self.fault = self.fault if answer is None else ''
-            self.core.adopt(answer, time.monotonic(), self.stamp())
+            self.solver_error = self.solver_error if result is None else ''
+            self.core.adopt(result, time.monotonic(), self.stamp())
         if self.leads():
-            self.tell(self.stamp())
-        self.rest(began)
+            self.publish(self.stamp())
+        self.pause_after(started)
 
-    # what is told
-
-    def tell(self, stamp: float) -> None:
-        """On disk first, then published, while all nodes have one origin."""
-        self.behind = not self.keeper.save(self.core, time.monotonic(), MOST_ROWS)
-        if self.behind or self.origins.conflict():
+    def publish(self, stamp: float) -> None:
+        """Save changes, then publish them while all nodes have one origin."""
+        self.pending = not self.persistence.save(self.core, time.monotonic(), _MOST_ROWS)
+        if self.pending or self.origins.conflict():
             return
-        out = self.core.collect()
-        self.log(out.notes)
-        self.teller.take(out)
-        self.behind = self.teller.tell(stamp)
-        self.painter.note(out)
+        outbox = self.core.collect()
+        self.log_notes(outbox.notes)
+        self.publisher.enqueue(outbox)
+        self.pending = self.publisher.publish_some(stamp)
+        self.markers.update(outbox)
 
-    def log(self, notes: list[LogNote]) -> None:
-        """A line each, of a flood the first; rclpy wants one place in the source a severity."""
-        for note in notes[:MOST_LINES]:
+    def save(self) -> None:
+        """Save all changes."""
+        self.persistence.save(self.core, time.monotonic())
+
+    def log_notes(self, notes: list[LogNote]) -> None:
+        """Log the first notes; rclpy requires a call site for each severity."""
+        for note in notes[:_MOST_LINES]:
             if note.warning:
                 self.get_logger().warning(note.text)
             else:
                 self.get_logger().info(note.text)
-        if len(notes) > MOST_LINES:
-            self.get_logger().warning(f'and {len(notes) - MOST_LINES} lines more')
+        if len(notes) > _MOST_LINES:
+            self.get_logger().warning(f'and {len(notes) - _MOST_LINES} lines more')
 
-    def on_second(self) -> None:
-        """Say how it goes."""
+    def publish_diagnostics(self) -> None:
+        """Publish warnings and figures, and compare the origins of the nodes."""
         self.origins.check()
         conflict = self.origins.conflict()
-        stopped = self.watch.trouble() or (conflict and f'refuses to plan: {conflict}')
-        if conflict != self.refused:
-            self.refused = conflict
+        stopped = self.election.trouble() or (conflict and f'refuses to plan: {conflict}')
+        if conflict != self.logged_conflict:
+            self.logged_conflict = conflict
             self.get_logger().error(stopped if conflict else 'fleet_origin: all agree')
-        self.health.publish(told.from_health(
-            self.get_fully_qualified_name(),
-            [stopped] if stopped else worries(self.world, self.keeper.trouble, self.fault),
-            {**facts(self.world), **self.watch.facts()}, self.stamp(), bool(stopped)))
+        warnings = health_warnings(self.world, self.persistence.error, self.solver_error)
+        self.diagnostics.publish(from_diagnostics([allocator_row(
+            self.get_fully_qualified_name(), [stopped] if stopped else warnings,
+            {**health_values(self.world, self.core.schedule.busy), **self.election.facts()},
+            bool(stopped))], self.stamp()))
+
+    def stamp(self) -> float:
+        """The published clock [s]."""
+        return self.get_clock().now().nanoseconds * 1e-9
 
     def destroy_node(self) -> None:
-        """End the worker, let go of the journal."""
+        """End the worker, save, and release the journal."""
         self.worker.close()
-        self.keeper.save(self.core, time.monotonic())
-        self.keeper.close()
+        self.save()
+        self.persistence.close()
         super().destroy_node()
 
 

@@ -5,8 +5,8 @@ import pytest
 from allocation import Desk
 
 from uav_task_alloc import plan
-from uav_task_alloc.allocator.persistence.restore import saved
-from uav_task_alloc.allocator.replanning.learned_state import learner, learner_row
+from uav_task_alloc.allocator.persistence.restore import restored_state
+from uav_task_alloc.allocator.replanning.learned_state import learned_row, learned_state
 from uav_task_alloc.journal import JournalRow
 from uav_task_alloc.model import Task, ThreatZone
 from uav_task_alloc.solver.tables import Learnt, Tables
@@ -35,30 +35,30 @@ def rows():
 
 
 def test_the_world_is_the_same_after_a_restart(rows):
-    before, after = saved(rows), Desk(saved(rows))
+    before, after = restored_state(rows), Desk(restored_state(rows))
     assert list(after.world.tasks.records.values()) == before.tasks
     assert {t.task.id: t.state.name for t in before.tasks} == {
         't1': 'COMPLETED', 't2': 'ASSIGNED', 't3': 'CANCELLED', 't4': 'UNASSIGNED',
         't5': 'ASSIGNED'}
     assert tuple(after.world.zones.values()) == ZONES
-    assert after.world.fleet.off == {'b'}
+    assert after.world.fleet.switched_off == {'b'}
     assert after.core.rows() == []
 
 
 def test_lists_are_told_again_under_a_higher_revision(rows):
-    revisions = {each.uav: each.revision for each in saved(rows).lists}
-    desk = Desk(saved(rows))
+    revisions = {each.uav: each.revision for each in restored_state(rows).lists}
+    desk = Desk(restored_state(rows))
     desk.core.tick(desk.now, desk.now)
     desk.take()
     assert {u: each.revision for u, each in desk.lists.items()} == {
         u: revision + 1 for u, revision in revisions.items()}
     assert set(desk.route('a')) == {'t2', 't5'}
     assert desk.lists['a'].stops[0].leg.via == next(
-        each for each in saved(rows).lists if each.uav == 'a').stops[0].leg.via
+        each for each in restored_state(rows).lists if each.uav == 'a').stops[0].leg.via
 
 
 def test_nothing_is_withdrawn_before_the_uavs_had_time_to_be_heard(rows):
-    desk = Desk(saved(rows), uav_timeout=5.0)
+    desk = Desk(restored_state(rows), uav_timeout=5.0)
     desk.add(('t9', 1, 1))
     desk.settle()
     assert desk.solves == []
@@ -67,11 +67,11 @@ def test_nothing_is_withdrawn_before_the_uavs_had_time_to_be_heard(rows):
     assert desk.route('a')[0] == 't2'
     assert 't9' in desk.route('a')
     assert [each.revision for each in desk.allocations] == [
-        saved(rows).revision + 1, saved(rows).revision + 2]
+        restored_state(rows).revision + 1, restored_state(rows).revision + 2]
 
 
 def test_a_uav_that_is_not_heard_after_a_restart_loses_its_tasks(rows):
-    desk = Desk(saved(rows), uav_timeout=5.0)
+    desk = Desk(restored_state(rows), uav_timeout=5.0)
     desk.uav('c', 0.0, 0.0, 50.0)
     desk.settle()
     assert desk.solves == []
@@ -81,17 +81,17 @@ def test_a_uav_that_is_not_heard_after_a_restart_loses_its_tasks(rows):
 
 
 def test_what_was_flown_while_nobody_listened_counts_when_it_is_told(rows):
-    desk = Desk(saved(rows))
+    desk = Desk(restored_state(rows))
     assert desk.event('COMPLETED', 't2', 'a', revision=1) == ''
     assert desk.state('t2') == 'COMPLETED'
     desk.core.tick(desk.now, desk.now)
 
 
 def test_a_uav_that_is_past_a_task_flew_it_while_nobody_listened(rows):
-    before, = (each for each in saved(rows).lists if each.uav == 'a')
+    before, = (each for each in restored_state(rows).lists if each.uav == 'a')
     first, second = before.task_ids
     for revision, state in ((before.revision - 1, 'ASSIGNED'), (before.revision, 'COMPLETED')):
-        desk = Desk(saved(rows))
+        desk = Desk(restored_state(rows))
         desk.uav('a', 0.0, 0.0, 50.0, active_task=second, list_revision=revision)
         assert desk.state(first) == state
     desk.settle()
@@ -99,28 +99,29 @@ def test_a_uav_that_is_past_a_task_flew_it_while_nobody_listened(rows):
 
 
 def test_a_row_that_nobody_wrote_is_left_out_and_told(rows):
-    found = saved([*rows, JournalRow('task', 't9', {'id': 't9'}), JournalRow('mood', '', 'good'),
-                   JournalRow('learner', '', {'uavs': ['a'], 'tasks': [], 'near': '!', 'task': '',
-                                       'start': ''})])
-    assert found.tasks == saved(rows).tasks
-    assert len(found.bad) == 2
+    found = restored_state([
+        *rows, JournalRow('task', 't9', {'id': 't9'}), JournalRow('mood', '', 'good'),
+        JournalRow('learner', '', {'uavs': ['a'], 'tasks': [], 'near': '!', 'task': '',
+                                   'start': ''})])
+    assert found.tasks == restored_state(rows).tasks
+    assert len(found.unreadable) == 2
     assert Desk(found).core._best.state == WarmState()
-    assert found.bad[0].startswith("journal row task 't9' cannot be read: KeyError")
-    assert "unknown kind 'mood'" in found.bad[1]
+    assert found.unreadable[0].startswith("journal row task 't9' cannot be read: KeyError")
+    assert "unknown kind 'mood'" in found.unreadable[1]
 
 
 def test_a_list_forgets_a_task_whose_row_is_gone(rows):
-    found = saved([row for row in rows if row.id != 't2'])
+    found = restored_state([row for row in rows if row.id != 't2'])
     assert all('t2' not in each.task_ids for each in found.lists)
 
 
 def test_the_plan_of_the_last_life_is_told_before_any_other(rows):
-    desk = Desk(saved(rows))
+    desk = Desk(restored_state(rows))
     desk.core.tick(desk.now, desk.now)
     desk.take()
     told, = desk.allocations
-    assert (told.trigger, told.revision) == ('restart', saved(rows).revision + 1)
-    assert told.plan.routes == {each.uav: each.task_ids for each in saved(rows).lists}
+    assert (told.trigger, told.revision) == ('restart', restored_state(rows).revision + 1)
+    assert told.plan.routes == {each.uav: each.task_ids for each in restored_state(rows).lists}
     assert told.plan.distance == pytest.approx(sum(each.distance for each in told.lists))
 
 
@@ -130,7 +131,7 @@ def test_what_was_being_flown_is_known_before_its_uav_is_heard():
     desk.add(('t1', 100, 0), ('t2', 200, 0))
     desk.settle()
     desk.event('STARTED', 't2', 'a')
-    after = Desk(saved(desk.core.rows()))
+    after = Desk(restored_state(desk.core.rows()))
     assert after.state('t2') == 'ACTIVE'
     assert after.event('STARTED', 't1', 'a', revision=1) == ''
     after.event('STARTED', 't2', 'a', revision=1)
@@ -146,7 +147,7 @@ def test_shortly_after_a_restart_no_task_changes_hands(seconds, heard):
     desk.uav('a', 0.0, 0.0, 50.0)
     desk.add(('t1', 100, 0), ('t2', 200, 0))
     desk.settle()
-    after = Desk(saved(desk.core.rows()))
+    after = Desk(restored_state(desk.core.rows()))
     after.settle(wait=heard)
     after.uav('a', 0.0, 0.0, 50.0)
     after.uav('b', 150.0, 0.0, 50.0)
@@ -166,13 +167,13 @@ def test_a_list_told_again_is_known_to_be_flown_in_its_order():
     desk.uav('a', 0.0, 0.0, 50.0)
     desk.add(('t1', 100, 0), ('t2', 200, 0))
     desk.settle()
-    after = Desk(saved(desk.core.rows()))
+    after = Desk(restored_state(desk.core.rows()))
     after.core.tick(after.now, after.now)
     after.take()
     assert after.lists['a'].revision == 2
     after.uav('a', 150.0, 0.0, 50.0, active_task='t2', list_revision=2)
     assert (after.state('t1'), after.reason('t1')) == (
-        'COMPLETED', 'passed while nobody listened')
+        'COMPLETED', 'passed while the allocator was down')
 
 
 def test_no_list_is_told_again_with_what_was_completed_out_of_turn():
@@ -181,7 +182,7 @@ def test_no_list_is_told_again_with_what_was_completed_out_of_turn():
     desk.add(('t1', 100, 0), ('t2', 200, 0), ('t3', 300, 0))
     desk.settle()
     desk.event('COMPLETED', 't2', 'a')
-    after = Desk(saved(desk.core.rows()))
+    after = Desk(restored_state(desk.core.rows()))
     after.core.tick(after.now, after.now)
     after.take()
     assert after.history == []
@@ -204,7 +205,7 @@ def test_what_the_bees_learnt_survives():
         desk.add(*((f't{k}_{i}', 37 * i % 400, 91 * i % 300) for i in range(10)))
         desk.settle(wait=6.0)
     before = desk.core._best.state.learnt
-    after = Desk(saved(desk.core.rows()), plan=patient)
+    after = Desk(restored_state(desk.core.rows()), plan=patient)
     kept = after.core._best.state.learnt
     assert (kept.uavs, kept.tasks) == (before.uavs, before.tasks)
     assert np.allclose(kept.tables.task, before.tables.task)
@@ -220,13 +221,14 @@ def test_what_was_learnt_is_bounded(monkeypatch):
     tables = Tables(np.full((40, 4), 0.25), np.full((3, 40), 0.75))
     near = np.tile(np.arange(3, 7), (40, 1))
     learnt = Learnt(tables, near, {'a': 0, 'b': 1, 'c': 2}, {f't{k}': k for k in range(40)})
-    assert learner(learner_row(WarmState(learnt=learnt)).body).learnt.uavs == learnt.uavs
-    monkeypatch.setattr('uav_task_alloc.allocator.replanning.learned_state._MOST', 119)
-    assert learner_row(WarmState(learnt=learnt)).body is None
-    monkeypatch.setattr('uav_task_alloc.allocator.replanning.learned_state._MOST', 160)
+    assert learned_state(learned_row(WarmState(learnt=learnt)).body).learnt.uavs == learnt.uavs
+    monkeypatch.setattr('uav_task_alloc.allocator.replanning.learned_state._MAX_ENTRIES', 119)
+    assert learned_row(WarmState(learnt=learnt)).body is None
+    monkeypatch.setattr('uav_task_alloc.allocator.replanning.learned_state._MAX_ENTRIES', 160)
     wide = learnt._replace(tables=tables._replace(start=np.full((5, 40), 0.5)), near=near + 2,
                            uavs={f'u{k}': k for k in range(5)})
-    kept = learner(learner_row(WarmState(learnt=wide)).body).learnt  # the starts are 200: left out
+    # the table of UAVs has 200 entries, and is left out
+    kept = learned_state(learned_row(WarmState(learnt=wide)).body).learnt
     assert (kept.uavs, kept.tables.start.shape) == ({}, (0, 40))
     assert (kept.near == np.arange(4)).all()
     assert (kept.tables.task == 0.25).all()

@@ -9,7 +9,7 @@ import pytest
 from allocation import Desk
 
 from uav_task_alloc.allocator.persistence.persistence import Persistence
-from uav_task_alloc.allocator.persistence.restore import saved
+from uav_task_alloc.allocator.persistence.restore import restored_state
 from uav_task_alloc.journal import FILE_NAME, JournalRow
 from uav_task_alloc.model import ThreatZone
 
@@ -80,12 +80,12 @@ def test_finding_23_a_damaged_row_is_left_out_and_told_and_the_rest_kept(tmp_pat
         keeper = Persistence(str(tmp_path), said.append)
         assert [record.task.id for record in keeper.saved.tasks][:2] == ['t1', 't3']
         assert 't2' not in Desk(keeper.saved).world.tasks.records
-        assert "1 left out: journal row task 't2' cannot be read" in keeper.trouble
-        assert said == [keeper.trouble]
+        assert "1 left out: journal row task 't2' cannot be read" in keeper.error
+        assert said == [keeper.error]
         desk = Desk(keeper.saved)
         desk.add(('t4', 0, 0))
         keeper.save(desk.core, desk.now)
-        assert 'tried again' not in keeper.trouble
+        assert 'tried again' not in keeper.error
         keeper.close()
     assert {'t1', 't3', 't4'} == {record.task.id for record in Persistence(
         str(tmp_path), print).saved.tasks}
@@ -100,7 +100,7 @@ def test_finding_23_a_row_whose_id_is_no_text_costs_that_row_only(tmp_path):
     database.close()
     keeper = Persistence(str(tmp_path), print)
     assert len(keeper.saved.tasks) == 3
-    assert len(keeper.saved.bad) == 2
+    assert len(keeper.saved.unreadable) == 2
 
 
 def test_finding_23_no_value_of_a_row_ends_a_start(rows):
@@ -111,18 +111,18 @@ def test_finding_23_no_value_of_a_row_ends_a_start(rows):
         for path in paths(row.body):
             for value in rng.sample(EVIL, 5):
                 bad = JournalRow(row.kind, row.id, with_value(row.body, path, value))
-                found = saved([*rows[:k], bad, *rows[k + 1:]])
+                found = restored_state([*rows[:k], bad, *rows[k + 1:]])
                 desk = Desk(found)
                 desk.uav('a', 0.0, 0.0, 50.0)
                 desk.settle()
                 json.dumps([each.body for each in desk.core.rows()])
                 assert 2 <= len(found.tasks) <= 3
-                assert found.bad or len(found.tasks) == 3
+                assert found.unreadable or len(found.tasks) == 3
 
 
 def test_finding_23_one_damaged_zone_costs_that_zone_only(rows):
     k = next(k for k, row in enumerate(rows) if row.kind == 'zones')
     bad = JournalRow('zones', '', with_value(rows[k].body, (0, 'radius'), math.nan))
-    found = saved([*rows[:k], bad, *rows[k + 1:]])
+    found = restored_state([*rows[:k], bad, *rows[k + 1:]])
     assert [zone.id for zone in found.zones] == ['z2']
-    assert 'zone z1' in found.bad[0] or 'zone radius = nan' in found.bad[0]
+    assert 'zone z1' in found.unreadable[0] or 'zone radius = nan' in found.unreadable[0]

@@ -10,7 +10,7 @@ import pytest
 from allocation import Desk
 
 from uav_task_alloc.allocator.persistence.persistence import Persistence
-from uav_task_alloc.allocator.persistence.restore import Saved
+from uav_task_alloc.allocator.records import SavedState
 from uav_task_alloc.errors import OriginMismatch
 from uav_task_alloc.geometry.frames import Origin
 from uav_task_alloc.journal import FILE_NAME, VERSION, Journal, JournalRow
@@ -25,10 +25,10 @@ resource.setrlimit(resource.RLIMIT_FSIZE, (60_000, resource.RLIM_INFINITY))
 for k in range(200):
     desk.add((f't{k}', 100, 0))
     keeper.save(desk.core, desk.now + k)
-print(len(said), keeper.trouble)
+print(len(said), keeper.error)
 resource.setrlimit(resource.RLIMIT_FSIZE, (resource.RLIM_INFINITY,) * 2)
 keeper.save(desk.core, desk.now + 1000.0)
-print(repr(keeper.trouble))
+print(repr(keeper.error))
 """
 
 
@@ -66,7 +66,7 @@ def test_a_keeper_brings_back_what_it_saved(disk):
     disk.add('t1')
     assert disk.desk.core.rows() == []
     assert disk.again() == {'t1'}
-    assert Persistence('', print).saved == Saved()
+    assert Persistence('', print).saved == SavedState()
 
 
 def test_a_full_disk_is_told_once_and_made_up_for_when_there_is_room(disk):
@@ -75,10 +75,10 @@ def test_a_full_disk_is_told_once_and_made_up_for_when_there_is_room(disk):
     for k in range(300):
         disk.add(f't{k}')
     assert len(disk.said) == 1
-    assert disk.keeper.trouble.endswith('database or disk is full; tried again every 1 s')
+    assert disk.keeper.error.endswith('database or disk is full; tried again every 1 s')
     database.execute('PRAGMA max_page_count = 1000000')
     disk.add('last')
-    assert disk.keeper.trouble == ''
+    assert disk.keeper.error == ''
     assert len(disk.again()) == 301
 
 
@@ -100,12 +100,12 @@ def read_only(disk):
 def test_a_disk_that_becomes_read_only_is_told_and_made_up_for(disk):
     read_only(disk)
     disk.add('t1')
-    assert disk.keeper.trouble == (
+    assert disk.keeper.error == (
         f'{disk.folder / FILE_NAME} cannot be written: attempt to write a readonly database; '
         'tried again every 1 s')
     disk.keeper._journal._db.execute('PRAGMA query_only = OFF')
     disk.add('t2')
-    assert (disk.keeper.trouble, disk.again()) == ('', {'t1', 't2'})
+    assert (disk.keeper.error, disk.again()) == ('', {'t1', 't2'})
 
 
 @pytest.fixture
@@ -127,10 +127,10 @@ def test_a_journal_on_a_read_only_disk_is_read_and_written_later(disk, unopenabl
     later = Disk(disk.folder)
     assert [record.task.id for record in later.keeper.saved.tasks] == ['t1']
     later.add('t2')
-    assert 'readonly database; tried again' in later.keeper.trouble
+    assert 'readonly database; tried again' in later.keeper.error
     unopenable()
     later.add('t3')
-    assert (later.keeper.trouble, later.again()) == ('', {'t1', 't2', 't3'})
+    assert (later.keeper.error, later.again()) == ('', {'t1', 't2', 't3'})
 
 
 def test_a_disk_that_comes_late_with_another_world_is_left_alone(disk, unopenable, tmp_path):
@@ -143,7 +143,7 @@ def test_a_disk_that_comes_late_with_another_world_is_left_alone(disk, unopenabl
     shutil.copy(disk.folder / FILE_NAME, tmp_path / 'mount' / FILE_NAME)
     late.add('more')
     assert 'has 1 tasks that were not read at the start, theirs say; nothing is kept' in (
-        late.keeper.trouble)
+        late.keeper.error)
     assert late.again() == {'theirs'}
 
 
@@ -151,19 +151,19 @@ def test_a_folder_that_cannot_be_made_is_tried_again(tmp_path):
     (tmp_path / 'file').touch()
     disk = Disk(tmp_path / 'file' / 'state')
     disk.add('t1')
-    assert 'cannot be opened' in disk.keeper.trouble
+    assert 'cannot be opened' in disk.keeper.error
     (tmp_path / 'file').unlink()
     disk.add('t2')
-    assert (disk.keeper.trouble, disk.again()) == ('', {'t1', 't2'})
+    assert (disk.keeper.error, disk.again()) == ('', {'t1', 't2'})
 
 
 def test_a_folder_that_was_removed_gets_the_whole_world_again(disk):
     disk.add('t1')
     shutil.rmtree(disk.folder)
     disk.add('t2')
-    assert 'it was removed or replaced' in disk.keeper.trouble
+    assert 'it was removed or replaced' in disk.keeper.error
     disk.add('t3')
-    assert (disk.keeper.trouble, disk.again()) == ('', {'t1', 't2', 't3'})
+    assert (disk.keeper.error, disk.again()) == ('', {'t1', 't2', 't3'})
 
 
 def test_a_damaged_file_is_set_aside_and_a_new_one_kept(tmp_path):
@@ -172,7 +172,7 @@ def test_a_damaged_file_is_set_aside_and_a_new_one_kept(tmp_path):
         (tmp_path / FILE_NAME).write_bytes(damaged)
         disk = Disk(tmp_path)
         disk.add(f't{k}')
-        assert disk.said == [disk.keeper.trouble]
+        assert disk.said == [disk.keeper.error]
         assert f'file is not a database; set aside as {FILE_NAME}.damaged-{k}' in disk.said[0]
         assert (tmp_path / f'{FILE_NAME}.damaged-{k}').read_bytes() == damaged
         assert disk.again() == {f't{k}'}
@@ -185,7 +185,7 @@ def test_a_page_that_was_overwritten_is_noticed(disk):
     held[4096:] = b'x' * (len(held) - 4096)
     (disk.folder / FILE_NAME).write_bytes(held)
     later = Disk(disk.folder)
-    assert 'malformed; set aside as' in later.keeper.trouble
+    assert 'malformed; set aside as' in later.keeper.error
     later.add('t99')
     assert later.again() == {'t99'}
 
@@ -197,7 +197,7 @@ def test_one_bad_row_costs_that_row_only(disk):
     disk.keeper.close()
     later = Disk(disk.folder)
     assert [record.task.id for record in later.keeper.saved.tasks] == ['t2']
-    assert 'left out: journal row ' in later.keeper.trouble
+    assert 'left out: journal row ' in later.keeper.error
 
 
 def test_a_journal_of_a_newer_version_is_left_alone(tmp_path):
@@ -208,8 +208,8 @@ def test_a_journal_of_a_newer_version_is_left_alone(tmp_path):
     before = (tmp_path / FILE_NAME).read_bytes()
     disk = Disk(tmp_path)
     disk.add('t1')
-    assert disk.said == [disk.keeper.trouble]
-    assert disk.keeper.trouble.endswith('a newer uav_task_alloc wrote it; nothing is kept until '
+    assert disk.said == [disk.keeper.error]
+    assert disk.keeper.error.endswith('a newer uav_task_alloc wrote it; nothing is kept until '
                                         'a restart')
     assert (tmp_path / FILE_NAME).read_bytes() == before
 
@@ -218,7 +218,7 @@ def test_a_journal_that_another_allocator_has_is_left_to_it(disk):
     disk.add('t1')
     second = Disk(disk.folder)
     second.add('t2')
-    assert 'database is locked; nothing is kept' in second.keeper.trouble
+    assert 'database is locked; nothing is kept' in second.keeper.error
     assert disk.again() == {'t1'}
 
 
@@ -230,9 +230,9 @@ def test_finding_23_an_emptied_journal_is_told_and_set_aside(disk):
     disk.keeper.close()
     (disk.folder / FILE_NAME).write_bytes(b'')
     later = Disk(disk.folder)
-    assert later.said == [later.keeper.trouble]
-    assert 'size = 0 bytes: expected at least 16' in later.keeper.trouble
-    assert f'set aside as {FILE_NAME}.damaged-1' in later.keeper.trouble
+    assert later.said == [later.keeper.error]
+    assert 'size = 0 bytes: expected at least 16' in later.keeper.error
+    assert f'set aside as {FILE_NAME}.damaged-1' in later.keeper.error
     later.add('t2')
     assert later.again() == {'t2'}
 
@@ -245,7 +245,7 @@ def test_finding_23_what_can_be_read_of_a_cut_journal_is_kept(disk):
     later = Disk(disk.folder)
     some = len(later.keeper.saved.tasks)
     assert 0 < some < 50
-    assert 'malformed; set aside as' in later.keeper.trouble
+    assert 'malformed; set aside as' in later.keeper.error
     later.add('t99')
     assert len(later.again()) == some + 1
 
@@ -254,10 +254,10 @@ def test_finding_23_locked_in_the_path_is_tried_again(tmp_path):
     (tmp_path / 'locked').touch()
     disk = Disk(tmp_path / 'locked' / 'state')
     disk.add('t1')
-    assert 'tried again' in disk.keeper.trouble
+    assert 'tried again' in disk.keeper.error
     (tmp_path / 'locked').unlink()
     disk.add('t2')
-    assert (disk.keeper.trouble, disk.again()) == ('', {'t1', 't2'})
+    assert (disk.keeper.error, disk.again()) == ('', {'t1', 't2'})
 
 
 def test_finding_23_a_journal_of_another_origin_is_refused(tmp_path):
@@ -278,7 +278,7 @@ def test_finding_23_a_journal_without_origin_gets_one_and_says_so(disk):
     disk.add('t1')
     disk.keeper.close()
     later = Disk(disk.folder, ZURICH)
-    assert 'names no origin: taken for origin latitude 47.397742' in later.said[0]
+    assert 'names no origin: assumed origin latitude 47.397742' in later.said[0]
     later.add('t2')
     later.keeper.close()
     with pytest.raises(OriginMismatch):
@@ -296,5 +296,5 @@ def test_finding_23_a_disk_that_comes_late_with_another_origin_is_left_alone(
     (tmp_path / 'mount').mkdir(exist_ok=True)
     shutil.copy(tmp_path / 'other' / FILE_NAME, tmp_path / 'mount' / FILE_NAME)
     late.add('more')
-    assert '47.397742' in late.keeper.trouble
-    assert late.keeper.trouble.endswith('nothing is kept until a restart')
+    assert '47.397742' in late.keeper.error
+    assert late.keeper.error.endswith('nothing is kept until a restart')

@@ -3,7 +3,7 @@
 import pytest
 from allocation import Desk
 
-from uav_task_alloc.allocator.replanning.schedule import SELDOM
+from uav_task_alloc.allocator.replanning.schedule import MAX_RETRY
 
 
 @pytest.fixture
@@ -35,35 +35,35 @@ def seconds_until_due(desk, most):
 def test_finding_21_a_solve_that_failed_is_tried_again_for_what_asked_for_it(desk):
     first = desk.begin()
     fail(desk, first)
-    _, again = seconds_until_due(desk, SELDOM)
+    _, again = seconds_until_due(desk, MAX_RETRY)
     assert again is not None
     assert again.trigger == first.trigger
     desk.finish(again)
     assert desk.route('u') == ('t',)
-    assert seconds_until_due(desk, 2.0 * SELDOM)[1] is None
+    assert seconds_until_due(desk, 2.0 * MAX_RETRY)[1] is None
 
 
 def test_finding_21_what_fails_again_and_again_is_tried_more_and_more_seldom(desk):
     problem, waits = desk.begin(), []
     for _ in range(10):
         fail(desk, problem)
-        waited, problem = seconds_until_due(desk, 2.0 * SELDOM)
+        waited, problem = seconds_until_due(desk, 2.0 * MAX_RETRY)
         waits.append(waited)
     assert waits == sorted(waits)
     assert waits[0] < 2.0
-    assert waits[-1] == pytest.approx(SELDOM, rel=0.1)
+    assert waits[-1] == pytest.approx(MAX_RETRY, rel=0.1)
 
 
 def test_finding_21_something_new_does_not_wait_for_the_next_try_and_old_triggers_are_told(desk):
     problem = desk.begin()
     for _ in range(6):
         fail(desk, problem)
-        _, problem = seconds_until_due(desk, 2.0 * SELDOM)
+        _, problem = seconds_until_due(desk, 2.0 * MAX_RETRY)
     fail(desk, problem)
     desk.add(('later', 200.0, 0.0))
     problem = desk.begin()
     assert problem is not None
-    assert problem.trigger == 'u heard, ADD t, ADD later'
+    assert problem.trigger == 'u reports, ADD t, ADD later'
     desk.finish(problem)
     assert desk.route('u') == ('t', 'later')
 
@@ -73,4 +73,4 @@ def test_finding_21_what_happened_during_a_solve_that_failed_is_solved_with_it(d
     desk.add(('later', 200.0, 0.0))
     fail(desk, problem)
     problem = desk.begin()
-    assert problem.trigger == 'u heard, ADD t, ADD later'
+    assert problem.trigger == 'u reports, ADD t, ADD later'

@@ -5,8 +5,8 @@ from queue import Queue
 from allocation import greedy
 
 from uav_task_alloc.allocator.records import ReplanAnswer, ReplanProblem
-from uav_task_alloc.allocator.replanning.warm_up import warm_up
 from uav_task_alloc.allocator.replanning.worker import Worker
+from uav_task_alloc.allocator.warm_up import compile_kernels
 from uav_task_alloc.model import Plan
 from uav_task_alloc.params import AllocatorParams
 
@@ -23,7 +23,7 @@ def test_problems_are_answered_in_turn_after_the_preparation():
     assert got.get(timeout=10) is None
     assert prepared == [1]
     for trigger in 'xy':
-        worker.ask(problem(trigger))
+        worker.submit(problem(trigger))
         assert got.get(timeout=10).problem.trigger == trigger
     worker.close()
 
@@ -40,9 +40,9 @@ def test_a_running_solve_hurries_when_asked():
     worker = Worker(lambda: None, solve, got.put, got.put)
     worker.start()
     assert got.get(timeout=10) is None
-    worker.ask(problem('x'))
+    worker.submit(problem('x'))
     began.get(timeout=10)
-    worker.hurry()
+    worker.stop_early()
     assert got.get(timeout=10).problem.trigger == 'x'
     worker.close()
 
@@ -58,13 +58,13 @@ def test_a_solver_that_fails_is_told_and_the_next_problem_is_solved():
     worker = Worker(lambda: None, solve, got.put, failed.put)
     worker.start()
     assert got.get(timeout=10) is None
-    worker.ask(problem('bad'))
+    worker.submit(problem('bad'))
     assert got.get(timeout=10) is None
     assert str(failed.get(timeout=10)) == 'out of bees'
-    worker.ask(problem('good'))
+    worker.submit(problem('good'))
     assert got.get(timeout=10).problem.trigger == 'good'
     worker.close()
 
 
 def test_a_rehearsal_goes_all_the_way_to_lists():
-    assert warm_up(greedy, AllocatorParams()) > 0
+    assert compile_kernels(greedy, AllocatorParams()) > 0

@@ -6,7 +6,7 @@ import pytest
 from allocation import Desk
 
 from uav_task_alloc.allocator.records import UavReport
-from uav_task_alloc.allocator.status import worries
+from uav_task_alloc.allocator.status import health_warnings
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.geometry.zones import path_is_clear
 from uav_task_alloc.model import ThreatZone
@@ -25,11 +25,11 @@ def desk():
 def test_a_silent_uav_loses_its_tasks_and_its_list_is_withdrawn(desk):
     desk.now += 4.0
     desk.uav('b', 1000.0, 0.0, 50.0)
-    desk.settle(hear=False)
+    desk.settle(report=False)
     assert desk.route('a') == ('t1', 't2')
     desk.now += 2.0
     desk.uav('b', 1000.0, 0.0, 50.0)
-    desk.settle(hear=False)
+    desk.settle(report=False)
     assert (desk.route('a'), desk.lists['a'].revision) == ((), 2)
     assert set(desk.route('b')) == {'t1', 't2', 't3'}
     assert 'a silent' in desk.solves[-1]
@@ -39,7 +39,7 @@ def test_a_silent_uav_loses_its_tasks_and_its_list_is_withdrawn(desk):
 def test_a_uav_that_is_back_is_considered_again(desk):
     desk.now += 6.0
     desk.uav('b', 1000.0, 0.0, 50.0)
-    desk.settle(hear=False)
+    desk.settle(report=False)
     desk.uav('a', 0.0, 0.0, 50.0)
     desk.add(('t4', 10, 0))
     desk.settle()
@@ -48,12 +48,12 @@ def test_a_uav_that_is_back_is_considered_again(desk):
 
 
 def test_a_word_that_a_silent_uav_is_not_available_changes_nothing(desk):
-    desk.settle(wait=6.0, hear=False)
+    desk.settle(wait=6.0, report=False)
     desk.uav('b', 1000.0, 0.0, 50.0)
-    desk.settle(hear=False)
+    desk.settle(report=False)
     solves = len(desk.solves)
     desk.uav('a', 0.0, 0.0, 50.0, available=False)
-    desk.settle(hear=False)
+    desk.settle(report=False)
     desk.now += 6.0
     desk.uav('b', 1000.0, 0.0, 50.0)
     desk.core.tick(desk.now, desk.now)
@@ -62,11 +62,11 @@ def test_a_word_that_a_silent_uav_is_not_available_changes_nothing(desk):
 
 
 def test_when_all_are_silent_every_task_says_why_it_waits(desk):
-    desk.settle(wait=6.0, hear=False)
+    desk.settle(wait=6.0, report=False)
     assert desk.route('a') == desk.route('b') == ()
     assert (desk.state('t1'), desk.reason('t1')) == ('UNASSIGNED', 'no UAV available')
     desk.uav('a', 0.0, 0.0, 50.0)
-    desk.settle(hear=False)
+    desk.settle(report=False)
     assert set(desk.route('a')) == {'t1', 't2', 't3'}
 
 
@@ -86,7 +86,7 @@ def test_an_operator_takes_a_uav_out_and_puts_it_back(desk):
     desk.settle()
     assert desk.route('a') == ('t4',)
     assert desk.world.set_available('z', False, desk.now) == (
-        "uav_id = 'z': expected a UAV that was heard")
+        "uav_id = 'z': expected a known UAV")
 
 
 def test_what_is_flown_stays_first_where_it_is(desk):
@@ -177,8 +177,8 @@ def test_a_low_battery_sends_a_uav_home_and_its_tasks_to_the_others():
     desk.settle()
     assert (desk.route('a'), desk.lists['a'].returns) == ((), True)
     assert set(desk.route('b')) == {'t1', 't2'}
-    assert 'a battery 19 %: below the reserve, it goes home' in desk.solves[-1]
-    assert worries(desk.world, '')[0] == 'battery low: a'
+    assert 'a battery 19 %: below the reserve, it returns home' in desk.solves[-1]
+    assert health_warnings(desk.world, '')[0] == 'battery low: a'
 
 
 def test_a_way_home_on_a_low_battery_leads_around_a_zone():
@@ -243,10 +243,10 @@ def test_a_uav_that_comes_back_under_another_id_leaves_its_tasks_to_itself(desk)
         desk.now += 2.0
         desk.uav('c', 10.0, 0.0, 50.0)
         desk.uav('b', 1000.0, 0.0, 50.0)
-        desk.settle(hear=False)
+        desk.settle(report=False)
     assert desk.route('a') == ()
     assert set(desk.route('c')) >= {'t1', 't2'}
-    assert worries(desk.world, '')[0] == 'silent: a'
+    assert health_warnings(desk.world, '')[0] == 'silent: a'
 
 
 def test_published_clocks_that_jump_change_no_list(desk):
@@ -255,7 +255,7 @@ def test_published_clocks_that_jump_change_no_list(desk):
         desk.now += 1.0
         for uav_id, x in (('a', 0.0), ('b', 1000.0)):
             report = UavReport(uav_id, (x, 0.0, 50.0))
-            desk.world.hear(report, desk.now, stamp)
+            desk.world.update_uav(report, desk.now, stamp)
         desk.core.tick(desk.now, stamp)
         assert desk.core.due(desk.now, stamp) is None
         desk.take()
@@ -271,9 +271,9 @@ def test_tasks_after_the_one_being_flown_stay_as_far_as_committed():
     desk.add(('t9', 1, 1))
     assert desk.begin().locked == {}  # it does not fly yet
     desk.event('STARTED', 't1', 'a')
-    assert desk.world.locked() == {'a': ('t1', 't2', 't3')}
+    assert desk.world.locked_tasks() == {'a': ('t1', 't2', 't3')}
     desk.cancel('t2')
-    assert desk.world.locked() == {'a': ('t1', 't3', 't4')}
+    assert desk.world.locked_tasks() == {'a': ('t1', 't3', 't4')}
 
 
 def test_nothing_is_committed_where_nothing_shall_be():
@@ -282,4 +282,4 @@ def test_nothing_is_committed_where_nothing_shall_be():
     desk.add(('t1', 100, 0))
     desk.settle()
     desk.event('STARTED', 't1', 'a')
-    assert desk.world.locked() == {}
+    assert desk.world.locked_tasks() == {}

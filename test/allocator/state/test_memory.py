@@ -2,9 +2,9 @@
 """What an allocator remembers is bounded: ended tasks go, open ones stay, a flood is refused."""
 from allocation import Desk
 
-from uav_task_alloc.allocator.persistence.restore import saved
+from uav_task_alloc.allocator.persistence.restore import restored_state
 from uav_task_alloc.allocator.state import admission, tasks
-from uav_task_alloc.allocator.status import worries
+from uav_task_alloc.allocator.status import health_warnings
 
 
 def flown(count, **params):
@@ -21,7 +21,7 @@ def flown(count, **params):
 def test_only_the_newest_ended_tasks_are_remembered():
     desk = flown(6, keep_ended=3)
     assert sorted(desk.world.tasks.records) == ['t3', 't4', 't5']
-    assert desk.world.lists._carried.keys() <= {('a', f't{k}') for k in (3, 4, 5)}
+    assert desk.world.lists._contained.keys() <= {('a', f't{k}') for k in (3, 4, 5)}
 
 
 def test_what_is_forgotten_leaves_the_journal_too():
@@ -46,13 +46,13 @@ def test_an_open_task_is_never_forgotten_however_old():
 
 def test_the_order_in_which_tasks_ended_survives_a_restart():
     before = flown(4)
-    after = Desk(saved(before.core.rows()), keep_ended=2)
+    after = Desk(restored_state(before.core.rows()), keep_ended=2)
     after.settle()
     assert sorted(after.world.tasks.records) == ['t2', 't3']
 
 
 def test_more_open_tasks_than_can_be_held_are_refused(monkeypatch):
-    monkeypatch.setattr(tasks, 'MOST_OPEN', 2)
+    monkeypatch.setattr(tasks, 'MAX_OPEN', 2)
     desk = Desk()
     verdicts = desk.add(*((f't{k}', 0.0, 0.0) for k in range(3)))
     assert [v.accepted for v in verdicts] == [True, True, False]
@@ -62,7 +62,7 @@ def test_more_open_tasks_than_can_be_held_are_refused(monkeypatch):
 
 
 def test_made_up_uavs_do_not_keep_a_real_one_out(monkeypatch):
-    monkeypatch.setattr(admission, 'MOST_UAVS', 2)
+    monkeypatch.setattr(admission, 'MAX_UAVS', 2)
     desk = Desk()
     desk.uav('a', 0.0, 0.0, 50.0)
     desk.add(('t0', 100.0, 0.0))
@@ -72,7 +72,7 @@ def test_made_up_uavs_do_not_keep_a_real_one_out(monkeypatch):
     for _ in range(4):  # the ghost falls silent
         desk.now += 2.0
         desk.uav('a', 0.0, 0.0, 50.0)
-        desk.settle(hear=False)
+        desk.settle(report=False)
     assert desk.uav('b', 0.0, 0.0, 50.0) == ''
     assert sorted(desk.world.fleet.records) == ['a', 'b']
 
@@ -127,12 +127,12 @@ def flying():
     desk.settle()
     desk.event('COMPLETED', 't0', 'home')
     desk.uav('real', 0.0, 0.0, 50.0)
-    desk.settle(hear=False)
+    desk.settle(report=False)
     desk.now += 5.0
     desk.core.tick(desk.now, desk.now)
     desk.add(('t1', 100, 0))
     talk(desk, 1.0)
-    desk.settle(hear=False)
+    desk.settle(report=False)
     talk(desk, 1.0)
     assert desk.route('real') == ('t1',)
     return desk
@@ -146,16 +146,18 @@ def written(desk):
 def test_finding_24_a_flood_of_made_up_uavs_leaves_no_lists_and_no_rows():
     desk = flying()
     flood(desk, 5000, list_revision=7)
-    assert len(desk.world.fleet.records) == admission.MOST_UAVS
-    assert len(desk.world.lists.lists) <= admission.MOST_UAVS + 1
-    assert len(written(desk)) <= admission.MOST_UAVS + 1
+    assert len(desk.world.fleet.records) == admission.MAX_UAVS
+    assert len(desk.world.lists.lists) <= admission.MAX_UAVS + 1
+    assert len(written(desk)) <= admission.MAX_UAVS + 1
     assert desk.forgotten >= {f'g{k}' for k in range(3000)}
-    talk(desk, admission.FORGET + admission.LOOK + 5.0)
+    talk(desk, admission.FORGET_AFTER + admission.CHECK_PERIOD + 5.0)
     assert set(desk.world.fleet.records) == {'real', 'home'}
     assert written(desk) == set(desk.world.lists.lists) == {'real', 'home'}
     assert desk.route('real') == ('t1',)
-    for book in (desk.world.looked, desk.world.laid, desk.world.stranded, desk.world.answered):
-        assert set(book) <= {'real', 'home'}
+    world = desk.world
+    for by_uav in (world.zone_checks._checked, world.zone_checks.stranded,
+                   world._validity.zones_when_built, world._events._resent):
+        assert set(by_uav) <= {'real', 'home'}
 
 
 def test_finding_24_made_up_uavs_do_not_push_out_one_that_has_flown():
@@ -170,12 +172,12 @@ def test_finding_24_that_no_uav_is_admitted_is_told_once_until_there_is_room():
     flood(desk, 1500, each_second=500)
     full = [note for note in desk.notes if 'UAVs = 1000: expected fewer' in note]
     assert len(full) == 1
-    assert any('UAVs = 1000' in worry for worry in worries(desk.world, ''))
+    assert any('UAVs = 1000' in warning for warning in health_warnings(desk.world, ''))
     talk(desk, 5.0)
     assert desk.uav('new', 0.0, 0.0, 50.0) == ''
-    talk(desk, admission.FORGET + admission.LOOK)
+    talk(desk, admission.FORGET_AFTER + admission.CHECK_PERIOD)
     desk.uav('newer', 0.0, 0.0, 50.0)
-    assert not any('UAVs = 1000' in worry for worry in worries(desk.world, ''))
+    assert not any('UAVs = 1000' in warning for warning in health_warnings(desk.world, ''))
 
 
 def test_finding_24_a_uav_that_comes_back_after_it_was_forgotten_gets_a_higher_revision():
@@ -184,9 +186,9 @@ def test_finding_24_a_uav_that_comes_back_after_it_was_forgotten_gets_a_higher_r
     desk.add(('t0', 100, 0))
     desk.settle()
     desk.cancel('t0')
-    desk.settle(hear=False, wait=5.0)
+    desk.settle(report=False, wait=5.0)
     before = desk.lists['a'].revision
-    talk(desk, admission.FORGET + admission.LOOK + 1.0)
+    talk(desk, admission.FORGET_AFTER + admission.CHECK_PERIOD + 1.0)
     assert 'a' not in desk.world.fleet.records
     assert 'a' not in desk.world.lists.lists
     desk.uav('a', 100.0, 0.0, 50.0)
@@ -198,9 +200,9 @@ def test_finding_24_a_uav_that_comes_back_after_it_was_forgotten_gets_a_higher_r
 def test_finding_24_lists_of_a_journal_whose_uavs_never_come_are_forgotten():
     desk = flying()
     flood(desk, 900, list_revision=7)
-    after = Desk(saved(desk.core.rows()), uav_timeout=3.0)
+    after = Desk(restored_state(desk.core.rows()), uav_timeout=3.0)
     assert len(after.world.lists.lists) > 900
-    talk(after, admission.FORGET + admission.LOOK + 5.0)
+    talk(after, admission.FORGET_AFTER + admission.CHECK_PERIOD + 5.0)
     assert set(after.world.lists.lists) == {'real'}
 
 
@@ -212,7 +214,7 @@ def test_finding_24_an_answer_for_a_uav_that_was_forgotten_meanwhile_is_taken():
     problem = desk.begin()
     talk(desk, 5.0)
     desk.uav('a', 0.0, 0.0, 50.0)
-    admission.forget(desk.world, 'ghost')
+    desk.world.forget_uav('ghost')
     desk.finish(problem)
     desk.settle()
     assert set(desk.world.lists.owners()) == {'t0', 't1'}

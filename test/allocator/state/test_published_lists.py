@@ -9,7 +9,7 @@ from allocation import Desk, as_plan, greedy, task
 from uav_task_alloc import plan
 from uav_task_alloc.allocator.records import AnnouncementAction, ListStop, ReplanAnswer, UavList
 from uav_task_alloc.allocator.replanning.list_rate_limiter import ListRateLimiter
-from uav_task_alloc.allocator.replanning.plan_acceptance import exchanges, steady
+from uav_task_alloc.allocator.replanning.plan_acceptance import accepted_plan, exchange_groups
 from uav_task_alloc.geometry.zones import path_is_clear
 from uav_task_alloc.model import Leg, ThreatZone
 
@@ -112,7 +112,7 @@ def test_a_uav_that_drifts_behind_a_zone_is_planned_anew(desk):
     desk.now += 1.0
     desk.uav('a', 385.0, 5.0, 0.0)
     desk.settle()
-    assert 'way of a cut' in desk.solves[-1] or desk.lists['a'].stops[0].leg.via == told
+    assert 'leg of a cut' in desk.solves[-1] or desk.lists['a'].stops[0].leg.via == told
 
 
 def test_a_route_home_ends_the_list():
@@ -127,7 +127,7 @@ def test_a_route_home_ends_the_list():
 def test_uavs_that_exchange_tasks_change_together():
     before = {'a': ('1', '2'), 'b': ('3',), 'c': ('4', '5'), 'd': ('6',)}
     after = {'a': ('1',), 'b': ('3', '2'), 'c': ('5', '4'), 'd': ('6',)}
-    assert set(exchanges(before, after)) == {frozenset('ab'), frozenset('c')}
+    assert set(exchange_groups(before, after)) == {frozenset('ab'), frozenset('c')}
 
 
 def better(routes):
@@ -197,7 +197,7 @@ def test_the_way_home_stays_as_told_once_all_is_flown(returning):
     returning.settle()
     assert (returning.lists['a'].stops, returning.lists['a'].end_via) == ((), told)
     returning.uav('a', *told[0])
-    returning.world.touch('test', returning.now)
+    returning.world.request_replan('test', returning.now)
     returning.settle()
     assert returning.lists['a'].end_via == told
 
@@ -220,11 +220,11 @@ def test_a_task_served_more_changes_only_the_lists_that_it_takes():
     desk.settle()
     desk.add(('t3', 100, 5000))
     problem = desk.begin()
-    base = greedy(problem.uavs, [t for t in problem.tasks if t.id != 't3'], warm=problem.held)
+    base = greedy(problem.uavs, [t for t in problem.tasks if t.id != 't3'], warm=problem.published)
     base = replace(base, unassigned={'t3': 'no range'})
     place = {task.id: task for task in problem.tasks}
     fresh = as_plan(problem.uavs, place, (), {'a': ('t2', 't1'), 'b': ('t3',)})
-    chosen = steady(ReplanAnswer(problem, base, fresh), 0.5)
+    chosen = accepted_plan(ReplanAnswer(problem, base, fresh), 0.5)
     assert chosen.routes == {'a': ('t1', 't2'), 'b': ('t3',)}
     assert chosen.unassigned == {}
 
@@ -237,7 +237,7 @@ def test_what_would_serve_less_is_not_taken():
     place = {task.id: task for task in problem.tasks}
     base = as_plan(problem.uavs, place, (), {'a': ('t1', 't2')})
     fresh = as_plan(problem.uavs, place, (), {'a': ('t2',)}, {'t1': 'too far'})
-    assert steady(ReplanAnswer(problem, base, fresh), 0.01) == base
+    assert accepted_plan(ReplanAnswer(problem, base, fresh), 0.01) == base
 
 
 @pytest.mark.parametrize('margin', [0.01, 0.05])
@@ -299,7 +299,7 @@ def test_a_list_that_was_held_back_follows_by_itself(paced):
     paced.settle()
     paced.settle(wait=1.0)
     assert paced.route('a') == ('t1', 't2')
-    assert paced.solves[-1] == 'lists held back'
+    assert paced.solves[-1] == 'deferred lists'
 
 
 @pytest.mark.parametrize('what', ['withdrawn', 'moved', 'not available', 'zone', 'idle'])
@@ -322,11 +322,11 @@ def test_uavs_that_exchange_a_task_are_told_together_or_not_at_all():
     held = {'a': UavList('a', 1, stops('t1', 't2')), 'b': UavList('b', 1, stops('t3'))}
     new = {'a': UavList('a', 1, stops('t1')), 'b': UavList('b', 1, stops('t3', 't2'))}
     pace = ListRateLimiter()
-    pace.told(['b'], 10.0)
+    pace.published(['b'], 10.0)
     never = set().__contains__
-    assert pace.ripe(held, new, never, 10.4, 1.0) == {}
+    assert pace.permitted(held, new, never, 10.4, 1.0) == {}
     assert not pace.due(10.9)
     assert pace.due(11.0)
     assert not pace.due(12.0)
-    assert pace.ripe(held, new, never, 11.0, 1.0) == new
-    assert pace.ripe(held, new, {'a'}.__contains__, 10.4, 1.0) == new
+    assert pace.permitted(held, new, never, 11.0, 1.0) == new
+    assert pace.permitted(held, new, {'a'}.__contains__, 10.4, 1.0) == new

@@ -5,23 +5,23 @@ from pathlib import Path
 import pytest
 from allocation import Desk
 
-from uav_task_alloc.allocator.records import ENDED, OPEN, TaskState
-from uav_task_alloc.allocator.state import task_state_machine as life
-from uav_task_alloc.allocator.state.task_state_machine import TABLE, TaskTransition, after
+from uav_task_alloc.allocator.records import ENDED_STATES, OPEN_STATES, TaskState
+from uav_task_alloc.allocator.state import task_state_machine
+from uav_task_alloc.allocator.state.task_state_machine import TRANSITIONS, TaskTransition, rule_for
 
 S = TaskState
 
 
 def test_every_event_has_an_answer_in_every_state():
-    assert set(TABLE) == set(TaskTransition)
-    for row in TABLE.values():
+    assert set(TRANSITIONS) == set(TaskTransition)
+    for row in TRANSITIONS.values():
         assert set(row) == set(S)
 
 
 @pytest.mark.parametrize('event', TaskTransition)
 @pytest.mark.parametrize('state', S)
 def test_what_nothing_follows_from_says_why(state, event):
-    rule = after(state, event, 'a', 'because')
+    rule = rule_for(state, event, 'a', 'because')
     assert rule.state is not None or rule.reason
     assert '{' not in rule.reason
 
@@ -29,22 +29,22 @@ def test_what_nothing_follows_from_says_why(state, event):
 @pytest.mark.parametrize('event', TaskTransition)
 def test_what_is_completed_or_cancelled_stays_so(event):
     for state in (S.COMPLETED, S.CANCELLED):
-        assert after(state, event).state is None
+        assert rule_for(state, event).state is None
 
 
 def test_only_an_announcement_makes_a_task():
-    makes = [event for event in TaskTransition if after(S.REJECTED, event).state]
+    makes = [event for event in TaskTransition if rule_for(S.REJECTED, event).state]
     assert makes == [TaskTransition.ADD]
 
 
 def test_every_state_is_left_or_is_an_end():
     for state in S:
-        leads = {after(state, event).state for event in TaskTransition} - {None, state}
-        assert bool(leads) == (state in OPEN or state in (S.FAILED, S.REJECTED))
+        leads = {rule_for(state, event).state for event in TaskTransition} - {None, state}
+        assert bool(leads) == (state in OPEN_STATES or state in (S.FAILED, S.REJECTED))
 
 
 def test_no_plan_moves_a_task_that_has_ended():
-    for state in ENDED:
+    for state in ENDED_STATES:
         for event in (
             TaskTransition.WAIT,
             TaskTransition.LIST,
@@ -52,18 +52,17 @@ def test_no_plan_moves_a_task_that_has_ended():
             TaskTransition.START,
             TaskTransition.FAIL,
         ):
-            assert after(state, event).state is None
+            assert rule_for(state, event).state is None
 
 
 def test_braces_of_a_reason_are_text():
-    assert (
-        after(S.ACTIVE, TaskTransition.FAIL, 'a', '{uav} {0}').reason == 'failed on a: {uav} {0}'
-    )
+    rule = rule_for(S.ACTIVE, TaskTransition.FAIL, 'a', '{uav} {0}')
+    assert rule.reason == 'failed on a: {uav} {0}'
 
 
 def test_the_picture_in_the_docs_is_that_of_the_table():
     path = Path(__file__).parents[3] / 'docs/task_states.md'
-    assert path.read_text() == life.markdown_text()
+    assert path.read_text() == task_state_machine.task_states_markdown()
 
 
 @pytest.fixture
@@ -80,7 +79,7 @@ def moved(desk):
     """b has t1 of a, which is believed lost."""
     desk.now += 6.0
     desk.uav('b', 1000.0, 0.0, 50.0)
-    desk.settle(hear=False)
+    desk.settle(report=False)
     assert 't1' in desk.route('b')
 
 
@@ -118,7 +117,7 @@ def test_a_uav_believed_lost_may_complete_what_was_moved_but_not_take_it_back(de
     assert record.failed_on == ()
     assert record.uav == ('a' if state == 'COMPLETED' else 'b')
     desk.uav('b', 1000.0, 0.0, 50.0)
-    desk.settle(hear=False)
+    desk.settle(report=False)
     assert ('t1' in desk.route('b')) == (state != 'COMPLETED')
 
 

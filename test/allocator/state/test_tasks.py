@@ -21,7 +21,7 @@ def test_a_task_is_pending_until_a_uav_is_heard():
     desk = Desk()
     desk.add(('t1', 100, 0))
     desk.settle()
-    assert (desk.state('t1'), desk.reason('t1')) == ('PENDING', 'no UAV heard yet')
+    assert (desk.state('t1'), desk.reason('t1')) == ('PENDING', 'no UAV known yet')
     assert desk.allocations[-1].revision == 1
     desk.uav('a', 0.0, 0.0, 50.0)
     desk.settle()
@@ -187,13 +187,13 @@ def test_a_late_event_of_an_older_list_counts(desk):
 def test_what_was_flown_by_a_uav_believed_lost_is_not_flown_again(desk):
     desk.now += 10.0
     desk.uav('b', 1000.0, 0.0, 50.0)
-    desk.settle(hear=False)
+    desk.settle(report=False)
     assert set(desk.route('b')) == {'t1', 't2', 't3'}
     assert desk.event('COMPLETED', 't1', 'a', revision=1) == ''
     assert desk.event('FAILED', 't2', 'a', revision=1) == (
         "event FAILED of task 't2': a does not have it any more")
     desk.uav('b', 1000.0, 0.0, 50.0)
-    desk.settle(hear=False)
+    desk.settle(report=False)
     assert set(desk.route('b')) == {'t2', 't3'}
     assert desk.world.tasks.records['t1'].uav == 'a'
 
@@ -238,7 +238,7 @@ def test_a_task_for_a_uav_nobody_heard_of_waits_and_says_so(desk):
     desk.add(Task('t4', (0.0, 10.0, 50.0), allowed_uavs=frozenset({'z'})))
     desk.settle()
     assert desk.state('t4') == 'UNASSIGNED'
-    assert desk.reason('t4') == 'allowed for z only: not heard yet'
+    assert desk.reason('t4') == 'allowed for z only: not known yet'
     desk.uav('z', 0.0, 500.0, 50.0)
     desk.settle()
     assert desk.route('z') == ('t4',)

@@ -5,15 +5,14 @@ import pytest
 from allocation import Desk
 
 from uav_task_alloc import plan
-from uav_task_alloc.allocator.persistence.restore import saved
-from uav_task_alloc.allocator.replanning.planning import must_change
-from uav_task_alloc.allocator.status import worries
+from uav_task_alloc.allocator.persistence.restore import restored_state
+from uav_task_alloc.allocator.status import health_warnings
 from uav_task_alloc.model import ThreatZone
 
 HOME = (0.0, 0.0, 0.0)
 OVER = ThreatZone.cylinder('base', (0.0, 0.0), 100.0, 0.0, 80.0)
 AWAY = ThreatZone.cylinder('away', (5000.0, 5000.0), 10.0)
-NO_WAY = 'a has no safe way home (its home is inside zone base): its list ends with HOLD'
+NO_WAY = 'a has no safe path home (its home is inside zone base): its list ends with HOLD'
 
 
 @pytest.fixture
@@ -78,12 +77,12 @@ def test_finding_19_the_operator_reads_it_once_until_it_changes(desk):
     for k in range(4):
         put(desk, OVER, *[AWAY] * (k % 2))
     assert desk.notes.count(NO_WAY) == 1
-    assert ('a has no safe way home: its home is inside zone base'
-            in worries(desk.world, ''))
+    assert ('a has no safe path home: its home is inside zone base'
+            in health_warnings(desk.world, ''))
     put(desk)
     assert desk.lists['a'].returns
-    assert desk.notes.count('a has a safe way home again') == 1
-    assert worries(desk.world, '') == []
+    assert desk.notes.count('a has a safe path home again') == 1
+    assert health_warnings(desk.world, '') == []
 
 
 def test_finding_19_zones_that_close_a_home_off_end_the_list_with_hold():
@@ -95,7 +94,7 @@ def test_finding_19_zones_that_close_a_home_off_end_the_list_with_hold():
                                        (60.0, 60.0), (60.0, -60.0), (-89.0, -89.5)))
     put(desk, ring)
     assert not desk.lists['a'].returns
-    assert any('a has no safe way home (zones close it off)' in note for note in desk.notes)
+    assert any('a has no safe path home (zones close it off)' in note for note in desk.notes)
 
 
 def test_finding_19_a_list_that_ends_with_hold_does_not_flap():
@@ -105,7 +104,7 @@ def test_finding_19_a_list_that_ends_with_hold_does_not_flap():
     desk.add(('t1', 600, 0))
     desk.settle()
     assert not desk.lists['a'].returns
-    assert not must_change(desk.world, 'a')
+    assert not desk.world.must_change('a')
     for k in range(5):
         desk.add((f'n{k}', 700 + k, 0))  # waits for the interval, as nothing is urgent
         desk.settle(wait=0.5)
@@ -142,7 +141,7 @@ def test_finding_19_a_home_that_is_told_late_is_looked_at():
 def test_finding_19_a_restarted_allocator_sends_nobody_into_a_zone(desk):
     put(desk, OVER)
     rows = desk.core.rows()
-    again = Desk(saved(rows), route_end='home')
+    again = Desk(restored_state(rows), route_end='home')
     again.uav('a', 500.0, 0.0, 50.0, home=HOME, list_revision=desk.lists['a'].revision)
     again.settle(wait=4.0)
     again.settle(wait=4.0)
@@ -154,7 +153,7 @@ def test_finding_19_a_journal_with_a_way_home_into_a_zone_is_put_right(desk):
     put(desk, OVER)
     rows = [row if row.kind != 'list' else row._replace(body={**row.body, 'returns': True})
             for row in desk.core.rows()]
-    again = Desk(saved(rows), route_end='home')
+    again = Desk(restored_state(rows), route_end='home')
     again.uav('a', 500.0, 0.0, 50.0, home=HOME)
     again.settle(wait=4.0)
     assert not again.lists['a'].returns
@@ -174,10 +173,10 @@ def test_finding_19_who_stands_inside_a_zone_gets_no_tasks(where, route_end):
     desk.settle()
     assert desk.route('b') == ('t2', 't1') or desk.route('b') == ('t1', 't2')
     assert 'a' not in desk.lists
-    text = ('a stands inside zone base' if where['position'][0] == 0.0 else
+    text = ('a is on the ground inside zone base' if where['position'][0] == 0.0 else
             'the home of a is inside zone base')
     assert f'{text}: it gets no tasks' in desk.notes
-    assert worries(desk.world, '')[0] == f'{text}: no tasks'
+    assert health_warnings(desk.world, '')[0] == f'{text}: no tasks'
 
 
 def test_finding_19_tasks_of_who_stands_inside_a_zone_say_so():
@@ -188,7 +187,8 @@ def test_finding_19_tasks_of_who_stands_inside_a_zone_say_so():
     assert desk.state('t1') == 'ASSIGNED'
     put(desk, OVER)
     assert desk.route('a') == ()
-    assert (desk.state('t1'), desk.reason('t1')) == ('UNASSIGNED', 'a stands inside zone base')
+    assert (desk.state('t1'), desk.reason('t1')) == (
+        'UNASSIGNED', 'a is on the ground inside zone base')
     put(desk)
     assert desk.route('a') == ('t1',)
 
@@ -201,7 +201,7 @@ def test_finding_19_who_else_could_fly_it_is_said_with_the_reason():
     desk.add(('t1', 600, 0))
     desk.settle()
     assert desk.reason('t1').startswith('beyond the range of every UAV: b')
-    assert desk.reason('t1').endswith('; a stands inside zone base')
+    assert desk.reason('t1').endswith('; a is on the ground inside zone base')
 
 
 def test_finding_19_a_position_that_wanders_at_the_rim_changes_nothing():
@@ -211,9 +211,9 @@ def test_finding_19_a_position_that_wanders_at_the_rim_changes_nothing():
     for k in range(12):
         desk.uav('a', 100.0 + (-1.0) ** (k + 1) * 1.5, 0.0, 0.0, home=(900.0, 0.0, 0.0),
                  standby=True)
-        desk.settle(wait=1.0, hear=False)
+        desk.settle(wait=1.0, report=False)
         solves.append(len(desk.solves))
-    assert desk.notes.count('a stands inside zone base: it gets no tasks') == 1
+    assert desk.notes.count('a is on the ground inside zone base: it gets no tasks') == 1
     assert solves[1:] == solves[1:2] * 11
 
 

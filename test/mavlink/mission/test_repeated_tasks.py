@@ -7,7 +7,7 @@ import pytest
 from findings_bench import BOTH, FindingsBench
 from flight_bench import places
 
-from uav_task_alloc.allocator.persistence.restore import saved
+from uav_task_alloc.allocator.persistence.restore import restored_state
 from uav_task_alloc.allocator.records import UavReport
 from uav_task_alloc.mavlink.mission.items import MissionStop, TaskList
 from uav_task_alloc.model import Task
@@ -35,7 +35,7 @@ class Fleet:
 
     def start(self, rows=(), **params):
         """A new allocator, with the journal of the one before."""
-        self.desk = self.make_desk(saved(rows), **params)
+        self.desk = self.make_desk(restored_state(rows), **params)
         self.desk.now = 1000.0 + self.bench.now
         self.revision = self.desk.world.lists.get('uav_1').revision
 
@@ -52,10 +52,10 @@ class Fleet:
         bench.run(limit=0.25)
         desk.now = 1000.0 + bench.now
         state = bench.state()
-        desk.world.hear(UavReport('uav_1', state.position, list_revision=bench.onboard().revision),
-                        desk.now, desk.now)
+        report = UavReport('uav_1', state.position, list_revision=bench.onboard().revision)
+        desk.world.update_uav(report, desk.now, desk.now)
         self.tell_events()
-        desk.settle(hear=False)
+        desk.settle(report=False)
         told = desk.lists.get('uav_1')
         if told is not None and told.revision > self.revision:
             self.revision = told.revision

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The allocator's state in the journal, and back."""
+"""The state of the allocator in the journal, and back."""

@@ -1,16 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Keeps an allocator's world in the journal; without a disk the allocator runs on and says so.
+"""Saves the state of the allocator in the journal, and reads it at the start.
 
-What was accepted while a disk refused stays in memory, and is written when the disk is back. A
-damaged file is set aside under another name, and a new one begun with what can be read of it; one
-of a newer version, or of another process, is left alone; one of another origin ends the start.
+Without a disk the allocator runs on with a warning, and what it accepts meanwhile is written when
+the disk is back. A damaged file is renamed, and a new one begun with its readable rows; a file of
+a newer version, or of another process, is left unchanged; one of another origin ends the start.
 """
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
+from typing import Protocol
 
-from uav_task_alloc.allocator.core import Allocator
-from uav_task_alloc.allocator.persistence.restore import Saved, origin_row, saved
+from uav_task_alloc.allocator.persistence.restore import origin_row, restored_state
+from uav_task_alloc.allocator.records import SavedState
 from uav_task_alloc.errors import (
     JournalCorrupt,
     JournalError,
@@ -19,44 +20,68 @@ from uav_task_alloc.errors import (
     OriginMismatch,
 )
 from uav_task_alloc.geometry.frames import Origin
-from uav_task_alloc.journal import WAIT, Journal, JournalRow, read_copy, rescued, set_aside
+from uav_task_alloc.journal import WAIT, Journal, JournalRow, read_copy, recover_rows, set_aside
 
-_RETRY = 1.0  # [s] between two tries on a disk that refused
-SAME_ANGLE, SAME_ALTITUDE = 1e-7, 0.01  # [deg], [m] an origin is the same within 1 cm
-GIVEN_UP = 'nothing is kept until a restart'
+_RETRY = 1.0  # [s] between two attempts on a disk that failed
+_SAME_ANGLE, _SAME_ALTITUDE = 1e-7, 0.01  # [deg], [m]: origins within 1 cm are equal
+_GIVEN_UP = 'nothing is kept until a restart'
+
+
+class Saveable(Protocol):
+    """What is saved: rows, and the confirmation that they are on disk."""
+
+    def rows(self, most: int | None = None) -> list[JournalRow]:
+        """Return what is not on disk, at most `most` tasks of it."""
+
+    def written(self, rows: Iterable[JournalRow] | None = None) -> bool:
+        """Confirm rows that are on disk, None: all; returns whether nothing is left to save."""
+
+    def nothing_written(self) -> None:
+        """Make `rows` return everything."""
+
+    def knows_task(self, task_id: str) -> bool:
+        """Return whether a task was accepted, and is not forgotten."""
 
 
 class Persistence:
-    """`trouble` is what is wrong with the journal, '' while all is well.
+    """Opens the journal, restores `saved` from it, and writes with `save`.
 
-    state_dir: folder of the journal, '' for none. origin: of all coordinates; None: not checked.
-    wait: [s] at the start for another process that has the journal.
-    Raises OriginMismatch where the journal is of another origin.
+    `in_use`: the error of a journal that another process had at the start, else ''.
+
+    Args:
+        state_dir: folder of the journal, '' for none.
+        log_error: called with each new error text.
+        origin: of all coordinates; None: not checked.
+        wait: [s] at the start for another process that has the journal.
+
+    Raises:
+        OriginMismatch: the journal is of another origin.
     """
 
-    def __init__(self, state_dir: str, complain: Callable[[str], object],
+    def __init__(self, state_dir: str, log_error: Callable[[str], object],
                  origin: Origin | None = None, wait: float = WAIT) -> None:
-        self._dir, self._complain, self._origin = state_dir, complain, origin
+        self._dir, self._log_error, self._origin = state_dir, log_error, origin
         self._wait = wait
         self._journal: Journal | None = None
         self._has_origin = origin is None  # the journal names it
-        self._now_wrong = ''  # until it is mended
-        self._lost = ''  # what the last life left that cannot be read: told until the next one
+        self._present_error = ''
+        self._lost = ''  # what could not be read at the start
         self._given_up = not state_dir
         self._retry = 0.0  # [s]
-        self.in_use = ''  # another process had the journal at the start: the error
-        self.saved = self._begin() if state_dir else Saved()
-        if self.saved.bad:
-            self._lose('; '.join(filter(None, (self._lost, (
-                f'{len(self.saved.bad)} left out: {self.saved.bad[0]}')))))
+        self.in_use = ''
+        self.saved = self._begin() if state_dir else SavedState()
+        unreadable = self.saved.unreadable
+        if unreadable:
+            self._set_lost('; '.join(filter(None, (self._lost, (
+                f'{len(unreadable)} left out: {unreadable[0]}')))))
 
     @property
-    def trouble(self) -> str:
-        """Everything an operator should know of the journal."""
-        return '; '.join(filter(None, (self._now_wrong, self._lost)))
+    def error(self) -> str:
+        """What is wrong with the journal; '' if nothing is."""
+        return '; '.join(filter(None, (self._present_error, self._lost)))
 
-    def _begin(self) -> Saved:
-        """Open the journal, or at least read it."""
+    def _begin(self) -> SavedState:
+        """Open the journal, or read a copy of it."""
         try:
             return self._checked(self._open())
         except OriginMismatch:
@@ -66,28 +91,29 @@ class Persistence:
             self.in_use = str(error) if isinstance(error, JournalInUse) else ''
             self._give_up(str(error))
         except JournalError as error:
-            self._say(f'{error}; tried again every {_RETRY:g} s')
+            self._set_error(f'{error}; tried again every {_RETRY:g} s')
             try:
                 return self._checked(read_copy(self._dir))
             except OriginMismatch:
                 raise
             except JournalError as worse:
-                self._lose(str(worse))
-        return Saved()
+                self._set_lost(str(worse))
+        return SavedState()
 
-    def _checked(self, rows: list[JournalRow]) -> Saved:
-        """The world of these rows. Raises OriginMismatch."""
-        found = saved(rows)
-        held, mine = found.origin, self._origin
+    def _checked(self, rows: list[JournalRow]) -> SavedState:
+        """The state of these rows. Raises OriginMismatch."""
+        state = restored_state(rows)
+        held, mine = state.origin, self._origin
         self._has_origin = mine is None or held is not None
         if held is not None and mine is not None and not _same_place(held, mine):
             raise OriginMismatch(
-                f'the journal in {self._dir} is of {_named(held)}: expected that of the '
-                f'parameters, {_named(mine)}: all tasks and zones would move; set the origin '
-                'that the journal has, or another state_dir')
+                f'the journal in {self._dir} is of {_origin_text(held)}: expected that of the '
+                f'parameters, {_origin_text(mine)}: all tasks and zones would move; set the '
+                'origin that the journal has, or another state_dir')
         if rows and not self._has_origin and mine is not None:
-            self._complain(f'the journal in {self._dir} names no origin: taken for {_named(mine)}')
-        return found
+            self._log_error(f'the journal in {self._dir} names no origin: assumed '
+                            f'{_origin_text(mine)}')
+        return state
 
     def _open(self) -> list[JournalRow]:
         try:
@@ -96,28 +122,35 @@ class Persistence:
             return self._journal.load()
         except JournalCorrupt as error:
             self.close()
-            return self._begin_anew(error)
+            return self._replace_damaged(error)
 
-    def _begin_anew(self, error: JournalCorrupt) -> list[JournalRow]:
-        """Set the damaged file aside; what can be read of it begins the new one."""
+    def _replace_damaged(self, error: JournalCorrupt) -> list[JournalRow]:
+        """Rename the damaged file, and begin a new one with its readable rows."""
         aside = set_aside(self._dir)
         try:
-            rows = rescued(aside)
+            rows = recover_rows(aside)
         except JournalError:
             rows = []
-        self._lose(f'{error}; set aside as {aside.name}, a new one is kept with the {len(rows)} '
-                   'rows that can be read')
+        self._set_lost(f'{error}; set aside as {aside.name}, a new one is kept with the '
+                       f'{len(rows)} rows that can be read')
         self._journal = Journal(self._dir)
         self._journal.put(row for row in rows if not isinstance(row.body, bytes))
         return rows
 
-    def save(self, allocator: Allocator, now: float, most: int | None = None) -> bool:
-        """Everything new, or `most` tasks of it, is on disk when this returns, or `trouble`
-        says why not; False: there is more to save before anything is told.
+    def save(self, allocator: Saveable, now: float, most: int | None = None) -> bool:
+        """Write what is new; afterwards it is on disk, or `error` says why not.
+
+        Args:
+            allocator: whose rows are written.
+            now: [s] steady clock.
+            most: tasks at once; None: all.
+
+        Returns:
+            False if there is more to save before anything may be published.
         """
         if self._given_up:
             return allocator.written()
-        if self._now_wrong and now < self._retry:
+        if self._present_error and now < self._retry:
             return True
         rows = allocator.rows(most)
         if not rows:
@@ -128,16 +161,16 @@ class Persistence:
             self._give_up(str(error))
         except JournalError as error:
             self._retry = now + _RETRY
-            self._say(f'{error}; tried again every {_RETRY:g} s')
+            self._set_error(f'{error}; tried again every {_RETRY:g} s')
         else:
-            self._say('')
+            self._set_error('')
             return allocator.written(rows)
         return True
 
-    def _write(self, rows: list[JournalRow], allocator: Allocator) -> list[JournalRow]:
-        """Returns what is on disk now: these rows, or the whole world where nothing was."""
+    def _write(self, rows: list[JournalRow], allocator: Saveable) -> list[JournalRow]:
+        """Write rows, or the whole world where nothing is on disk; returns what was written."""
         if self._journal is None:
-            self._take_late(self._open(), allocator)
+            self._check_late(self._open(), allocator)
             allocator.nothing_written()
             rows = allocator.rows()
         if not self._has_origin and self._origin is not None:
@@ -146,48 +179,48 @@ class Persistence:
         try:
             self._journal.put(rows)
         except JournalError as error:
-            if isinstance(error, JournalCorrupt) or not self._journal.in_place():
-                self.close()  # it is opened anew
+            if isinstance(error, JournalCorrupt) or not self._journal.is_in_place():
+                self.close()  # it is opened again
             raise
         self._has_origin = True
         return rows
 
-    def _take_late(self, held: list[JournalRow], allocator: Allocator) -> None:
-        """A journal that can be opened only now must not hold what this world knows nothing of."""
+    def _check_late(self, held: list[JournalRow], allocator: Saveable) -> None:
+        """Refuse a journal that could not be opened at the start, and has tasks unknown here."""
         self._checked(held)
         unknown = [row.id for row in held
-                   if row.kind == 'task' and row.id not in allocator.world.tasks.records]
+                   if row.kind == 'task' and not allocator.knows_task(row.id)]
         if unknown:
             raise JournalForeign(f'the journal in {self._dir} has {len(unknown)} tasks that were '
                                  f'not read at the start, {unknown[0]} say')
 
     def close(self) -> None:
-        """Let go of the file."""
+        """Close the file."""
         if self._journal is not None:
             self._journal.close()
             self._journal = None
 
-    def _give_up(self, trouble: str) -> None:
+    def _give_up(self, error: str) -> None:
         self.close()
         self._given_up = True
-        self._say(f'{trouble}; {GIVEN_UP}')
+        self._set_error(f'{error}; {_GIVEN_UP}')
 
-    def _lose(self, what: str) -> None:
+    def _set_lost(self, what: str) -> None:
         self._lost = what
-        self._complain(what)
+        self._log_error(what)
 
-    def _say(self, trouble: str) -> None:
-        if trouble and trouble != self._now_wrong:
-            self._complain(trouble)
-        self._now_wrong = trouble
+    def _set_error(self, error: str) -> None:
+        if error and error != self._present_error:
+            self._log_error(error)
+        self._present_error = error
 
 
 def _same_place(one: Origin, other: Origin) -> bool:
-    return (abs(one.latitude - other.latitude) <= SAME_ANGLE
-            and abs(one.longitude - other.longitude) <= SAME_ANGLE
-            and abs(one.altitude_amsl - other.altitude_amsl) <= SAME_ALTITUDE)
+    return (abs(one.latitude - other.latitude) <= _SAME_ANGLE
+            and abs(one.longitude - other.longitude) <= _SAME_ANGLE
+            and abs(one.altitude_amsl - other.altitude_amsl) <= _SAME_ALTITUDE)
 
 
-def _named(origin: Origin) -> str:
+def _origin_text(origin: Origin) -> str:
     return (f'origin latitude {origin.latitude}, longitude {origin.longitude} deg, '
             f'altitude_amsl {origin.altitude_amsl} m')

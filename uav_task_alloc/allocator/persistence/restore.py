@@ -1,15 +1,21 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The world as rows of the journal and back."""
+"""The state of the allocator as rows of the journal, and back."""
 from __future__ import annotations
 
 import json
 import sys
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import fields, replace
 from enum import Enum
 from typing import Any, TypeVar
 
-from uav_task_alloc.allocator.records import ListStop, TaskRecord, TaskState, UavList
+from uav_task_alloc.allocator.records import (
+    ListStop,
+    SavedState,
+    TaskRecord,
+    TaskState,
+    UavList,
+)
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.geometry.frames import Origin
 from uav_task_alloc.journal import JournalRow
@@ -26,102 +32,94 @@ from uav_task_alloc.model import (
 )
 from uav_task_alloc.zone_codec import JOURNAL_ZONE, decode_zone, encode_zone
 
-Thing = TypeVar('Thing')
+_Value = TypeVar('_Value')
 _KINDS = frozenset({'task', 'list', 'zones', 'off', 'revision', 'learner', 'origin'})
-UNREADABLE = (LookupError, TypeError, ValueError, AttributeError, OverflowError)
-LAST = 2.0**31 - 1.0  # [s] the last stamp, and the last revision, that a message can hold
-
-
-@dataclass(slots=True)
-class Saved:
-    """What survives a restart."""
-
-    tasks: list[TaskRecord] = field(default_factory=list)
-    lists: list[UavList] = field(default_factory=list)
-    zones: list[ThreatZone] = field(default_factory=list)
-    off: list[str] = field(default_factory=list)  # UAVs an operator switched off
-    revision: int = 0  # of the allocation
-    learnt: Any = None  # by the bees: the body of their row
-    origin: Origin | None = None  # of all coordinates; None: the journal does not say
-    bad: list[str] = field(default_factory=list)  # rows that are left out, and why
+_UNREADABLE = (LookupError, TypeError, ValueError, AttributeError, OverflowError)
+_MAX = 2.0**31 - 1.0  # [s] of a stamp, and the last revision, that a message can hold
 
 
 def task_row(record: TaskRecord) -> JournalRow:
-    """A task and its fate."""
+    """Return the row of a task and its state."""
     body = {spec.name: _plain(getattr(record, spec.name)) for spec in fields(record)
             if spec.name != 'announced' or record.announced is not record.task}
     return JournalRow('task', record.task.id, body)
 
 
 def list_row(uav_list: UavList) -> JournalRow:
-    """What a UAV was told last."""
+    """Return the row of the list published last for a UAV."""
     return JournalRow('list', uav_list.uav, _plain(uav_list))
 
 
 def zones_row(zones: Iterable[ThreatZone]) -> JournalRow:
-    """All zones, a whole picture."""
+    """Return the row of all zones."""
     return JournalRow('zones', '', [encode_zone(zone, JOURNAL_ZONE) for zone in zones])
 
 
 def off_row(off: Iterable[str]) -> JournalRow:
-    """The UAVs that an operator switched off."""
+    """Return the row of the UAVs that an operator switched off."""
     return JournalRow('off', '', sorted(off))
 
 
 def revision_row(revision: int) -> JournalRow:
-    """The revision of the allocation."""
+    """Return the row of the revision of the allocation."""
     return JournalRow('revision', '', revision)
 
 
 def origin_row(origin: Origin) -> JournalRow:
-    """Where ENU (0, 0, 0) is."""
+    """Return the row of the origin of all coordinates."""
     return JournalRow('origin', '', [origin.latitude, origin.longitude, origin.altitude_amsl])
 
 
-def saved(rows: Iterable[JournalRow]) -> Saved:
-    """The world of these rows; one that is not as it was written is left out, and told."""
-    found = Saved()
+def restored_state(rows: Iterable[JournalRow]) -> SavedState:
+    """Return the state of these rows.
+
+    An unreadable row or zone is left out, and named in `unreadable`; so are tasks of a list
+    whose row is missing.
+    """
+    state = SavedState()
     for row in rows:
         try:
-            _take(found, row)
-        except UNREADABLE as error:
-            found.bad.append(f'journal row {row.kind} {row.id!r} cannot be read: {error!r}')
-    known = {record.task.id for record in found.tasks}
-    found.lists = [replace(each, stops=tuple(s for s in each.stops if s.task.id in known))
-                   for each in found.lists]
-    return found
+            _restore(state, row)
+        except _UNREADABLE as error:
+            state.unreadable.append(
+                f'journal row {row.kind} {row.id!r} cannot be read: {error!r}')
+    known = {record.task.id for record in state.tasks}
+    state.lists = [replace(each, stops=tuple(s for s in each.stops if s.task.id in known))
+                   for each in state.lists]
+    return state
 
 
-def _take(found: Saved, row: JournalRow) -> None:
+def _restore(state: SavedState, row: JournalRow) -> None:
     if row.kind not in _KINDS:
         raise ValueError(f'unknown kind {row.kind!r}')
     if isinstance(row.body, (bytes, str)):
         raise ValueError('body: expected JSON')
-    json.dumps(row.body, ensure_ascii=False).encode()  # no message holds half a character
+    json.dumps(row.body, ensure_ascii=False).encode()  # no message can hold a lone surrogate
     if row.kind == 'task':
-        found.tasks.append(_task_record(row.id, row.body))
+        state.tasks.append(_task_record(row.id, row.body))
     elif row.kind == 'list':
-        found.lists.append(_list(row.id, row.body))
+        state.lists.append(_uav_list(row.id, row.body))
     elif row.kind == 'zones':
-        found.zones = _each(found, 'zone', row.body, decode_zone)
+        state.zones = _each(state, 'zone', row.body, decode_zone)
     elif row.kind == 'off':
-        found.off = _each(found, 'UAV switched off', row.body, _uav_id)
+        state.switched_off = _each(state, 'UAV switched off', row.body, _uav_id)
     elif row.kind == 'revision':
-        found.revision = _whole('revision', row.body)
+        state.revision = _whole_number('revision', row.body)
     elif row.kind == 'learner':
-        found.learnt = row.body
+        state.learned = row.body
     else:
-        found.origin = Origin(*row.body)
+        state.origin = Origin(*row.body)
 
 
-def _each(found: Saved, what: str, bodies: Any, read: Callable[[Any], Thing]) -> list[Thing]:
-    """Those of a row that can be read; of the others it is told."""
+def _each(state: SavedState, what: str, bodies: Any,
+          read: Callable[[Any], _Value]) -> list[_Value]:
+    """The readable values of a row; the others are named in `unreadable`."""
     good = []
     for body in _list_of(what, bodies):
         try:
             good.append(read(body))
-        except UNREADABLE as error:
-            found.bad.append(f'journal: {what} cannot be read: {error!r}')
+        except _UNREADABLE as error:
+            state.unreadable.append(f'journal: {what} cannot be read: {error!r}')
     return good
 
 
@@ -152,44 +150,45 @@ def _task_record(task_id: str, body: dict[str, Any]) -> TaskRecord:
                            'state': TaskState(body['state']),
                            'failed_on': tuple(_list_of('failed_on', body['failed_on']))})
     check_names('failed_on', record.failed_on)
-    _same('task id', record.task.id, task_id)
+    _check_same('task id', record.task.id, task_id)
     for name, text in (('uav', record.uav), ('reason', record.reason)):
         if not isinstance(text, str):
             raise InvalidValue(name, text, 'a string')
-    check_number('stamp', record.stamp, -LAST, LAST)
+    check_number('stamp', record.stamp, -_MAX, _MAX)
     return record
 
 
-def _list(uav_id: str, body: dict[str, Any]) -> UavList:
-    stops = tuple(ListStop(_task(stop['task']), _leg(stop['leg']), _metres('eta', stop['eta']))
+def _uav_list(uav_id: str, body: dict[str, Any]) -> UavList:
+    stops = tuple(ListStop(_task(stop['task']), _leg(stop['leg']),
+                           _non_negative('eta', stop['eta']))
                   for stop in _list_of('stops', body['stops']))
-    found = UavList(**{**body, 'stops': stops, 'end_via': _points('end_via', body['end_via']),
-                       'revision': _whole('revision', body['revision']),
-                       'distance': _metres('distance', body['distance']),
-                       'stamp': check_number('stamp', body['stamp'], -LAST, LAST)})
-    _same('uav', _uav_id(found.uav), uav_id)
-    if not isinstance(found.returns, bool):
-        raise InvalidValue('returns', found.returns, 'true or false')
-    return found
+    uav_list = UavList(**{**body, 'stops': stops, 'end_via': _points('end_via', body['end_via']),
+                           'revision': _whole_number('revision', body['revision']),
+                           'distance': _non_negative('distance', body['distance']),
+                           'stamp': check_number('stamp', body['stamp'], -_MAX, _MAX)})
+    _check_same('uav', _uav_id(uav_list.uav), uav_id)
+    if not isinstance(uav_list.returns, bool):
+        raise InvalidValue('returns', uav_list.returns, 'true or false')
+    return uav_list
 
 
 def _leg(body: dict[str, Any]) -> Leg:
-    return Leg(_points('via', body['via']), _metres('length', body['length']))
+    return Leg(_points('via', body['via']), _non_negative('length', body['length']))
 
 
 def _points(place: str, body: Any) -> tuple[Point, ...]:
     return tuple(check_point(place, point) for point in _list_of(place, body))
 
 
-def _metres(place: str, body: Any) -> float:
-    """A length [m] or a time span [s]."""
+def _non_negative(place: str, body: Any) -> float:
+    """A length [m] or a duration [s]."""
     return check_number(place, body, 0.0, sys.float_info.max)
 
 
-def _whole(place: str, body: Any) -> int:
+def _whole_number(place: str, body: Any) -> int:
     if not isinstance(body, int):
         raise InvalidValue(place, body, 'a whole number')
-    return int(check_number(place, body, 0.0, LAST))
+    return int(check_number(place, body, 0.0, _MAX))
 
 
 def _list_of(place: str, body: Any) -> list[Any]:
@@ -198,6 +197,6 @@ def _list_of(place: str, body: Any) -> list[Any]:
     return body
 
 
-def _same(place: str, value: str, expected: str) -> None:
+def _check_same(place: str, value: str, expected: str) -> None:
     if value != expected:
         raise InvalidValue(place, value, f'{expected!r} as the row has it')

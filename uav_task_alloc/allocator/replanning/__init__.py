@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""When and how the allocator plans anew, and what it takes of an answer."""
+"""When and how the allocator plans again, and which changes of a plan it accepts."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the bees have learnt as a row of the journal, bounded in size, and back."""
+"""The learned state of the solver as a row of the journal, bounded in size, and back."""
 from __future__ import annotations
 
 import base64
@@ -10,30 +10,32 @@ import numpy as np
 
 from uav_task_alloc.journal import JournalRow
 
-if TYPE_CHECKING:  # it brings the compiler along, which a start must not wait for
+if TYPE_CHECKING:  # imports the compiler, which would delay the start
     from uav_task_alloc.solver.warm import WarmState
 
-_MOST = 200_000  # entries kept of a table; 5000 tasks with 24 neighbours are 120 000
+_MAX_ENTRIES = 200_000  # of a table; 5000 tasks with 24 neighbours are 120 000
 
 
-def learner_row(state: object) -> JournalRow:
-    """The tables of a plan's state, up to MOST entries each; the starts of UAVs are left out
-    where they are more.
+def learned_row(state: object) -> JournalRow:
+    """Return the learned tables of a plan's state as a row.
+
+    The table of UAVs is left out where it has more than 200 000 entries; without a body where
+    the table of tasks has.
     """
     from uav_task_alloc.solver.tables import Learnt
     learnt = getattr(state, 'learnt', None)
-    if not isinstance(learnt, Learnt) or learnt.near.size > _MOST:
+    if not isinstance(learnt, Learnt) or learnt.near.size > _MAX_ENTRIES:
         return JournalRow('learner', '', None)
-    starts, near = learnt.tables.start, learnt.near - len(learnt.uavs)  # places of tasks from 0
-    uavs = sorted(learnt.uavs, key=learnt.uavs.__getitem__) if starts.size <= _MOST else []
+    starts, near = learnt.tables.start, learnt.near - len(learnt.uavs)  # indices of tasks from 0
+    uavs = sorted(learnt.uavs, key=learnt.uavs.__getitem__) if starts.size <= _MAX_ENTRIES else []
     return JournalRow('learner', '', {
         'uavs': uavs, 'tasks': sorted(learnt.tasks, key=learnt.tasks.__getitem__),
         'near': _packed(near, '<i4'), 'task': _packed(learnt.tables.task, '<f4'),
         'start': _packed(starts[:len(uavs)], '<f4')})
 
 
-def learner(body: Any) -> WarmState:
-    """The state of a row; an empty one where it is none: then the bees learn anew."""
+def learned_state(body: Any) -> WarmState:
+    """Return the state of a row; an empty one where the row is missing or invalid."""
     from uav_task_alloc.solver.warm import WarmState
     try:
         return WarmState(learnt=_tables(body))
@@ -48,7 +50,7 @@ def _tables(body: Any) -> object:
     n, m = len(tasks), len(uavs)
     near = _unpacked(body['near'], '<i4').reshape(n, -1).astype(np.int64)
     if near.size and not 0 <= near.min() <= near.max() < n:
-        raise ValueError(f'learner: near up to {near.max()}: expected places of {n} tasks')
+        raise ValueError(f'learner: near up to {near.max()}: expected indices of {n} tasks')
     tables = Tables(_unpacked(body['task'], '<f4').reshape(near.shape).astype(float),
                     _unpacked(body['start'], '<f4').reshape(m, n).astype(float))
     if not (np.isfinite(tables.task).all() and np.isfinite(tables.start).all()):

@@ -1,210 +1,141 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The world as a problem, and an answer as lists: what `solver` is asked and what is taken."""
+"""The world as a problem for the solver, and a plan as task lists; changes nothing itself."""
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 
-from uav_task_alloc.allocator.records import (
-    ReplanAnswer,
-    ReplanProblem,
-    TaskRecord,
-    UavList,
-)
+from uav_task_alloc.allocator.records import ReplanAnswer, ReplanProblem, UavList
 from uav_task_alloc.allocator.replanning.plan_acceptance import TaskIdsByUav, repaired_routes
-from uav_task_alloc.allocator.replanning.task_lists import lay, planned_legs
-from uav_task_alloc.allocator.state.fleet import may_fly
-from uav_task_alloc.allocator.state.task_state_machine import TaskTransition
+from uav_task_alloc.allocator.replanning.task_lists import LegKey, build_task_list, planned_legs
+from uav_task_alloc.allocator.state.published_lists import PublishedLists
+from uav_task_alloc.allocator.state.safe_paths import SafePaths
+from uav_task_alloc.allocator.state.tasks import TaskRegistry
 from uav_task_alloc.allocator.state.world import World
-from uav_task_alloc.allocator.state.zone_checks import note_way_home, standing
-from uav_task_alloc.model import Leg, Plan, Task, Uav
+from uav_task_alloc.model import Leg, Plan, Point, Task
 from uav_task_alloc.objective import fit
 from uav_task_alloc.params import AllocatorParams
 
 
-def problem(world: World, best: Plan, trigger: str, background: bool) -> ReplanProblem:
-    """What a worker is to solve; the lists that are out are the incumbent."""
-    params = world.params
-    uavs = tuple(_uav(world, uav_id) for uav_id in world.fleet.records
-                 if world.fleet.usable(uav_id))
-    ids = frozenset(uav.id for uav in uavs)
-    kept = _kept(world)
-    tasks = tuple(_restricted(record, ids) for record in world.tasks.open()
-                  if record.task.id not in kept)
-    held = {uav.id: world.lists.get(uav.id).task_ids for uav in uavs}
-    legs = {uav.id: tuple(stop.leg for stop in world.lists.get(uav.id).stops) for uav in uavs}
+@dataclass(slots=True)
+class BuiltLists:
+    """The lists of a plan, and what the world has to know of them."""
+
+    lists: dict[str, UavList] = field(default_factory=dict)
+    left_out: dict[str, str] = field(default_factory=dict)  # task id -> reason
+    # UAV -> paths and home that its list was built for
+    zones_when_built: dict[str, tuple[SafePaths, Point]] = field(default_factory=dict)
+    # UAV -> whether it has a safe path home, and from where [m]
+    paths_home: dict[str, tuple[bool, Point]] = field(default_factory=dict)
+
+
+def make_problem(world: World, best: Plan, trigger: str, background: bool) -> ReplanProblem:
+    """Return the problem for the worker; the published lists are the incumbent.
+
+    Args:
+        world: is copied from.
+        best: plan with which the search continues.
+        trigger: what requires the plan.
+        background: nothing does; a better plan is sought with `background_budget`.
+    """
+    params, uavs = world.params, world.usable_uavs()
+    published = {uav.id: world.list_of(uav.id) for uav in uavs}
+    routes = {uav_id: each.task_ids for uav_id, each in published.items()}
+    legs = {uav_id: tuple(stop.leg for stop in each.stops) for uav_id, each in published.items()}
     return ReplanProblem(
         world.version, trigger, background,
-        params.background_budget if background else params.solve_budget, uavs, tasks,
-        tuple(world.zones.values()), world.locked(), held=replace(best, routes=held, legs=legs),
-        warm=best)
+        params.background_budget if background else params.solve_budget, uavs,
+        world.tasks_to_plan(), tuple(world.zones.values()), world.locked_tasks(),
+        published=replace(best, routes=routes, legs=legs), warm=best)
 
 
-def _kept(world: World) -> frozenset[str]:
-    """Tasks that nobody gets: shortly after a restart those of UAVs that get no more tasks.
+def solve_problem(plan: Callable[..., Plan], problem: ReplanProblem, params: AllocatorParams,
+                  stop: Callable[[], bool]) -> ReplanAnswer:
+    """Repair the published lists by insertion, then search for the best plan within the budget.
 
-    They may have been flown while nobody listened, which is told again where they are listed.
+    Args:
+        plan: `solver.solve.plan`, or a function like it.
+        problem: see `make_problem`.
+        params: of the allocator.
+        stop: polled; the search ends early when it returns true.
     """
-    if not world.cautious:
-        return frozenset()
-    return frozenset(task_id for uav_id, each in world.lists.lists.items()
-                     if not world.fleet.usable(uav_id) for task_id in each.task_ids)
+    def call(warm: Plan, max_iterations: int | None) -> Plan:
+        return plan(problem.uavs, problem.tasks, problem.zones, budget=problem.budget,
+                    seed=params.seed, warm=warm, route_end=params.route_end,
+                    locked=problem.locked, clearance=params.clearance,
+                    altitude_min=params.altitude_min, altitude_max=params.altitude_max,
+                    threads=params.threads, stop=stop, max_iterations=max_iterations)
+
+    repaired = call(problem.published, 0)
+    best = call(problem.warm if problem.background else repaired, None)
+    return ReplanAnswer(problem, repaired, best)
 
 
-def solve_problem(plan: Callable[..., Plan], asked: ReplanProblem, params: AllocatorParams,
-          stop: Callable[[], bool]) -> ReplanAnswer:
-    """The lists repaired by `plan`, at once; then the best plan within the budget."""
-    def call(warm: Plan, budget: float, max_iterations: int | None) -> Plan:
-        return plan(asked.uavs, asked.tasks, asked.zones, budget=budget, seed=params.seed,
-                    warm=warm, route_end=params.route_end, locked=asked.locked,
-                    clearance=params.clearance, altitude_min=params.altitude_min,
-                    altitude_max=params.altitude_max, threads=params.threads, stop=stop,
-                    max_iterations=max_iterations)
+def build_lists(world: World, chosen: Plan) -> BuiltLists:
+    """Build the lists of a plan for the world as it is now; the world is not changed.
 
-    base = call(asked.held, asked.budget, 0)
-    return ReplanAnswer(asked, base, call(asked.warm if asked.background else base, asked.budget,
-                                    None))
-
-
-def lists_of(world: World, chosen: Plan) -> tuple[dict[str, UavList], dict[str, str]]:
-    """The lists of a plan in the world as it is now, and why tasks are left out."""
-    routes = _routes_now(world, chosen)
-    legs, ways, returns = planned_legs(chosen), world.ways(), world.params.route_end == 'home'
-    lists, left = {}, dict(chosen.unassigned)
-    for uav_id, task_ids in routes.items():
-        tasks = [world.tasks.records[task_id].task for task_id in task_ids]
-        if world.stands(uav_id, tasks):
-            lists[uav_id] = world.lists.get(uav_id)
+    A list that is still valid is kept. UAVs that the plan does not use get an empty list, but
+    not while tasks are held after a restart.
+    """
+    built = BuiltLists(left_out=dict(chosen.unassigned))
+    legs, returns = planned_legs(chosen), world.params.route_end == 'home'
+    for uav_id, task_ids in _present_routes(world, chosen).items():
+        tasks = [world.task(task_id) for task_id in task_ids]
+        if world.is_current(uav_id, tasks):
+            built.lists[uav_id] = world.list_of(uav_id)
             continue
-        lists[uav_id], lost = _lay(world, uav_id, tasks, returns, legs)
-        left.update((task_id, f'no safe way for {uav_id}') for task_id in lost)
-        world.laid[uav_id] = ways, world.fleet.records[uav_id].home
-    for uav_id, held in world.lists.lists.items():
-        # gone: what it does not have it cannot fly when it is back
-        if uav_id not in lists and not world.cautious:
-            lists[uav_id] = _without(world, uav_id, held)
-    return lists, left
+        unreachable = _build(world, built, uav_id, tasks, returns, legs)
+        built.left_out.update((task_id, f'no safe path for {uav_id}') for task_id in unreachable)
+        built.zones_when_built[uav_id] = world.paths(), world.home_of(uav_id)
+    # unknown UAVs, too: one that returns must not fly what others have
+    for uav_id in world.listed_uavs():
+        if uav_id not in built.lists and not world.restart_hold:
+            _build_empty(world, built, uav_id)
+    return built
 
 
-def _lay(world: World, uav_id: str, tasks: Sequence[Task], returns: bool,
-         legs: Mapping[tuple[str, str, str], Leg]) -> tuple[UavList, list[str]]:
-    """As `lay`; a way home that is not safe is noted."""
-    made, lost = lay(_uav(world, uav_id), tasks, returns, legs, world.lists.get(uav_id),
-                     world.ways())
-    place = made.stops[-1].task.position if made.stops else (
-        world.fleet.records[uav_id].report.position)
-    note_way_home(world, uav_id, made.returns or not returns, place)
-    return made, lost
+def _build(world: World, built: BuiltLists, uav_id: str, tasks: Sequence[Task], returns: bool,
+           legs: Mapping[LegKey, Leg]) -> list[str]:
+    """Build the list of a known UAV; returns the tasks that it cannot reach."""
+    uav = world.uav(uav_id)
+    new, unreachable = build_task_list(uav, tasks, returns, legs, world.list_of(uav_id),
+                                       world.paths())
+    end = new.stops[-1].task.position if new.stops else uav.position
+    built.lists[uav_id] = new
+    built.paths_home[uav_id] = new.returns or not returns, end
+    return unreachable
 
 
-def _without(world: World, uav_id: str, held: UavList) -> UavList:
-    """The empty list; one whose battery is low is sent home, the others stay as they were.
+def _build_empty(world: World, built: BuiltLists, uav_id: str) -> None:
+    """Build an empty list: with a low battery the UAV returns home, else its end is kept.
 
-    Nobody is sent home where there is no safe way.
+    Without a safe path home it ends with HOLD.
     """
-    record, empty = world.fleet.records.get(uav_id), replace(held, stops=(), distance=0.0)
-    if record is None:
-        return empty
-    if record.low:
-        return _lay(world, uav_id, (), True, {})[0]
-    position = record.report.position
-    if not held.returns or world.ways().leg(position, record.home) is not None:
-        return empty
-    if not record.standing:
-        note_way_home(world, uav_id, False, position)
-    return replace(empty, returns=False, end_via=())
+    record, published = world.uav_record(uav_id), world.list_of(uav_id)
+    if record is not None and record.low:
+        _build(world, built, uav_id, (), True, {})
+        return
+    empty = replace(published, stops=(), distance=0.0)
+    if record is not None and published.returns and world.paths().leg(
+            record.report.position, record.home) is None:
+        empty = replace(empty, returns=False, end_via=())
+        if not record.blocked_on_ground:
+            built.paths_home[uav_id] = False, record.report.position
+    built.lists[uav_id] = empty
 
 
-def must_change(world: World, uav_id: str) -> bool:
-    """What the UAV was told last it cannot or may not fly, or it has nothing to do."""
-    held, record = world.lists.get(uav_id), world.fleet.records.get(uav_id)
-    if not held.stops or record is None or not world.fleet.usable(uav_id):
-        return True
-    for stop in held.stops:
-        known = world.tasks.records.get(stop.task.id)
-        if (known is None or not known.open or known.task != stop.task
-                or not may_fly(known.task, known.failed_on, record.report)):
-            return True
-    ways, places = world.ways(), [stop.task.position for stop in held.stops]
-    returns = world.params.route_end == 'home' and uav_id not in world.stranded
-    return (held.returns != returns
-            or ways.rest(record.report.position, held.stops[0].leg, places[0]) is None
-            or not all(ways.clear(place, *stop.leg.via, stop.task.position)
-                       for place, stop in zip(places, held.stops[1:], strict=False)))
+def _present_routes(world: World, chosen: Plan) -> TaskIdsByUav:
+    routes = {uav_id: tasks for uav_id, tasks in chosen.routes.items() if world.usable(uav_id)}
+    return repaired_routes(routes, world.locked_tasks(), world.can_fly)
 
 
-def _routes_now(world: World, chosen: Plan) -> TaskIdsByUav:
-    reports = {uav_id: known.report for uav_id, known in world.fleet.records.items()
-               if world.fleet.usable(uav_id)}
-
-    def allowed(uav_id: str, task_id: str) -> bool:
-        record = world.tasks.records.get(task_id)
-        return (record is not None and record.open
-                and may_fly(record.task, record.failed_on, reports[uav_id]))
-
-    usable = {uav_id: tasks for uav_id, tasks in chosen.routes.items() if uav_id in reports}
-    return repaired_routes(usable, world.locked(), allowed)
-
-
-def explain(world: World, left: Mapping[str, str], stamp: float) -> None:
-    """The state and the reason of every open task, from the lists and what is left out."""
-    owners = world.lists.owners()
-    usable = frozenset(u for u in world.fleet.records if world.fleet.usable(u))
-    for record in world.tasks.open():
-        uav_id = owners.get(record.task.id, '')
-        if uav_id:
-            active = world.fleet.active.get(uav_id) == record.task.id
-            world.tasks.step(
-                record.task.id,
-                TaskTransition.START if active else TaskTransition.LIST,
-                stamp,
-                uav_id,
-            )
-        else:
-            event, why = _why_left(world, record, usable, left)
-            world.tasks.step(record.task.id, event, stamp, why=why)
-
-
-def _why_left(world: World, record: TaskRecord, usable: frozenset[str],
-              left: Mapping[str, str]) -> tuple[TaskTransition, str]:
-    heard, allowed = world.fleet.records, record.task.allowed_uavs
-    if not heard:
-        return TaskTransition.WAIT, 'no UAV heard yet'
-    if allowed is not None and not any(uav_id in heard for uav_id in allowed):
-        return TaskTransition.LEAVE, (f'allowed for {", ".join(sorted(allowed))} only: '
-                                      'not heard yet')
-    stands = standing(known for known in world.fleet.standing()
-                      if may_fly(record.task, record.failed_on, known.report))
-    if not usable:
-        return TaskTransition.LEAVE, stands or 'no UAV available'
-    others = _restricted(record, usable).allowed_uavs
-    if record.failed_on and others is not None and others.isdisjoint(usable):
-        why = f'failed on {", ".join(record.failed_on)}; no other UAV that may fly it is available'
-        return TaskTransition.LEAVE, '; '.join(filter(None, (why, stands)))
-    if record.task.id in left:
-        return TaskTransition.LEAVE, '; '.join(filter(None, (left[record.task.id], stands)))
-    return TaskTransition.WAIT, record.reason or 'waits for the next plan'
-
-
-def _uav(world: World, uav_id: str) -> Uav:
-    return world.fleet.uav(uav_id, world.params.default_range, world.params.default_cruise_speed)
-
-
-def _restricted(record: TaskRecord, usable: frozenset[str]) -> Task:
-    """The task, kept from the UAVs that failed at it."""
-    if not record.failed_on:
-        return record.task
-    allowed = usable if record.task.allowed_uavs is None else record.task.allowed_uavs
-    return replace(record.task, allowed_uavs=allowed - frozenset(record.failed_on))
-
-
-def held_plan(world: World, left: Mapping[str, str], like: Plan) -> Plan:
-    """The lists in force as a plan, found as `like` was; its figures are those of the lists."""
-    lists = world.lists.lists
-    routes = {uav_id: each.task_ids for uav_id, each in lists.items()}
-    value = math.fsum(world.tasks.records[task_id].task.value
+def plan_in_force(lists: PublishedLists, tasks: TaskRegistry, left_out: Mapping[str, str],
+                  like: Plan) -> Plan:
+    """Return the lists in force as a plan, with their figures; the rest is that of `like`."""
+    routes = {uav_id: each.task_ids for uav_id, each in lists.lists.items()}
+    value = math.fsum(tasks.records[task_id].task.value
                       for task_ids in routes.values() for task_id in task_ids)
-    distance = math.fsum(each.distance for each in lists.values())
-    return replace(like, routes=routes, unassigned=dict(left), value=value, distance=distance,
-                   fit=fit(distance, value, like.penalty))
+    distance = math.fsum(each.distance for each in lists.lists.values())
+    return replace(like, routes=routes, unassigned=dict(left_out), value=value,
+                   distance=distance, fit=fit(distance, value, like.penalty))

@@ -1,103 +1,113 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Lists out of routes: ways that stay as published while they are safe, arrival times, length."""
+"""Task lists from routes: published legs are kept while safe; arrival times, length."""
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
 from uav_task_alloc.allocator.records import ListStop, UavList
+from uav_task_alloc.allocator.state.safe_paths import SafePaths
 from uav_task_alloc.geometry.polyline import polyline_length
 from uav_task_alloc.model import Leg, Plan, Point, Task, Uav
 
-if TYPE_CHECKING:  # it brings the compiler along, which a start must not wait for
-    from uav_task_alloc.allocator.replanning.safe_paths import SafePaths
-
-START, HOME = '', '~'  # neither is a task id
-WORTH = 1.0  # [m] a way at least so much shorter replaces a published one
+_START, _HOME = '', '~'  # neither is a task id
+_WORTH = 1.0  # [m] that a path must be shorter, at least, to replace a published one
+LegKey = tuple[str, str, str]  # UAV (if it starts or returns home there), stop before, stop
 
 
-def planned_legs(plan: Plan) -> dict[tuple[str, str, str], Leg]:
-    """The legs of a plan by (UAV where it starts there, stop before, stop)."""
-    found = {}
+def planned_legs(plan: Plan) -> dict[LegKey, Leg]:
+    """Return the legs of a plan by the stops they connect."""
+    legs = {}
     for uav_id, tasks in plan.routes.items():
-        stops = (START, *tasks, *((HOME,) if plan.returns and tasks else ()))
+        stops = (_START, *tasks, *((_HOME,) if plan.returns and tasks else ()))
         for (before, after), leg in zip(pairwise(stops), plan.legs.get(uav_id, ()),
                                         strict=False):
-            found[_key(uav_id, before, after)] = leg
-    return found
+            legs[_leg_key(uav_id, before, after)] = leg
+    return legs
 
 
-def lay(uav: Uav, tasks: Sequence[Task], returns: bool, legs: Mapping[tuple[str, str, str], Leg],
-        held: UavList, ways: SafePaths) -> tuple[UavList, list[str]]:
-    """The list of a route in the world as it is now, and the ids that cannot be reached.
+def build_task_list(uav: Uav, tasks: Sequence[Task], returns: bool,
+                    legs: Mapping[LegKey, Leg], published: UavList,
+                    paths: SafePaths) -> tuple[UavList, list[str]]:
+    """Build the list of a route from the present position of a UAV.
 
-    It ends with HOLD where it shall not return, and where there is no safe way home.
+    Args:
+        uav: at its position.
+        tasks: in the order flown.
+        returns: whether the list should end with a return home; without a safe path home it ends
+            with HOLD.
+        legs: of the plan, see `planned_legs`.
+        published: list in force, whose legs are kept while they are safe.
+        paths: around the present zones.
+
+    Returns:
+        The list, and the ids of the tasks that no safe path leads to.
     """
     stops: list[ListStop] = []
-    lost: list[str] = []
-    before, place, clock = START, uav.position, 0.0
+    unreachable: list[str] = []
+    before, place, clock = _START, uav.position, 0.0
     for task in tasks:
-        leg = _steady(held, before, task, place, ways,
-                      _planned(legs, _key(uav.id, before, task.id), place, task.position, ways))
+        leg = _steady_leg(published, before, task, place, paths, _planned_leg(
+            legs, _leg_key(uav.id, before, task.id), place, task.position, paths))
         if leg is None:
-            lost.append(task.id)
+            unreachable.append(task.id)
             continue
         clock += leg.length / uav.cruise_speed
         stops.append(ListStop(task, leg, clock))
         clock += task.service_time
         before, place = task.id, task.position
     distance = math.fsum(stop.leg.length for stop in stops)
-    home = _way_home(uav, before, place, legs, held, ways) if returns else None
-    return replace(held, stops=tuple(stops), returns=home is not None,
+    home = _leg_home(uav, before, place, legs, published, paths) if returns else None
+    return replace(published, stops=tuple(stops), returns=home is not None,
                    end_via=home.via if home else (),
-                   distance=distance + (home.length if home and stops else 0.0)), lost
+                   distance=distance + (home.length if home and stops else 0.0)), unreachable
 
 
-def _way_home(uav: Uav, before: str, place: Point, legs: Mapping[tuple[str, str, str], Leg],
-              held: UavList, ways: SafePaths) -> Leg | None:
+def _leg_home(uav: Uav, before: str, place: Point, legs: Mapping[LegKey, Leg],
+              published: UavList, paths: SafePaths) -> Leg | None:
     goal = uav.home or uav.position
-    if before == START and held.returns and not held.stops:  # perhaps on this way already
-        metres = ways.rest(place, Leg(held.end_via, 0.0), goal)
+    if before == _START and published.returns and not published.stops:  # perhaps under way
+        metres = paths.rest(place, Leg(published.end_via, 0.0), goal)
         if metres is not None:
-            return Leg(held.end_via, metres)
-    return _planned(legs, _key(uav.id, before, HOME), place, goal, ways)
+            return Leg(published.end_via, metres)
+    return _planned_leg(legs, _leg_key(uav.id, before, _HOME), place, goal, paths)
 
 
-def _key(uav_id: str, before: str, after: str) -> tuple[str, str, str]:
-    return uav_id if before == START or after == HOME else '', before, after
+def _leg_key(uav_id: str, before: str, after: str) -> LegKey:
+    return uav_id if before == _START or after == _HOME else '', before, after
 
 
-def _planned(legs: Mapping[tuple[str, str, str], Leg], key: tuple[str, str, str], a: Point,
-             b: Point, ways: SafePaths) -> Leg | None:
+def _planned_leg(legs: Mapping[LegKey, Leg], key: LegKey, a: Point, b: Point,
+                 paths: SafePaths) -> Leg | None:
+    """The leg of the plan while it is safe, else a new one."""
     leg = legs.get(key)
-    if leg is not None and ways.clear(a, *leg.via, b):
+    if leg is not None and paths.clear(a, *leg.via, b):
         return Leg(leg.via, polyline_length((a, *leg.via, b)))
-    return ways.leg(a, b)
+    return paths.leg(a, b)
 
 
-def _steady(held: UavList, before: str, task: Task, place: Point, ways: SafePaths,
-            fresh: Leg | None) -> Leg | None:
-    """The published way while it is safe and no worse than the margin; else the fresh one."""
-    published = _published(held, before, task)
-    if published is None:
+def _steady_leg(published: UavList, before: str, task: Task, place: Point, paths: SafePaths,
+                fresh: Leg | None) -> Leg | None:
+    """The published leg while it is safe and not longer by the margin; else the fresh one."""
+    old = _published_leg(published, before, task)
+    if old is None:
         return fresh
-    if before == START:
-        metres = ways.rest(place, published, task.position)
+    if before == _START:
+        metres = paths.rest(place, old, task.position)
     else:
-        metres = published.length if ways.clear(place, *published.via, task.position) else None
+        metres = old.length if paths.clear(place, *old.via, task.position) else None
     if metres is None:
         return fresh
-    if fresh is not None and fresh.length + WORTH < metres * (1.0 - ways.margin):
+    if fresh is not None and fresh.length + _WORTH < metres * (1.0 - paths.margin):
         return fresh
-    return Leg(published.via, metres)
+    return Leg(old.via, metres)
 
 
-def _published(held: UavList, before: str, task: Task) -> Leg | None:
-    previous = START
-    for stop in held.stops:
+def _published_leg(published: UavList, before: str, task: Task) -> Leg | None:
+    previous = _START
+    for stop in published.stops:
         if stop.task.id == task.id:
             same = previous == before and stop.task.position == task.position
             return stop.leg if same else None

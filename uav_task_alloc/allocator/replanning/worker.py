@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""One thread that solves one problem at a time, so that whoever asks never waits."""
+"""A thread that solves one problem at a time, so that callbacks never wait for the solver."""
 from __future__ import annotations
 
 import threading
@@ -13,16 +13,20 @@ SolveFunction = Callable[[ReplanProblem, Callable[[], bool]], ReplanAnswer]
 
 
 class Worker:
-    """`solve(problem, stop)` in a thread of its own; `deliver(answer)` is called in it, too.
+    """Runs `solve(problem, stop)` in a thread of its own.
 
-    `fail(error)` is called with what `prepare` or `solve` raised: the thread goes on.
+    Args:
+        prepare: called first, for instance to compile.
+        solve: returns the answer; ends early when stop() is true.
+        deliver: called in the thread with each answer, None after `prepare` or a failure.
+        fail: called in the thread with the exception of `prepare` or `solve`; it continues.
     """
 
     def __init__(self, prepare: Callable[[], object], solve: SolveFunction,
                  deliver: Callable[[ReplanAnswer | None], None],
                  fail: Callable[[Exception], None]) -> None:
         self._solve, self._deliver, self._fail = solve, deliver, fail
-        self._asked: SimpleQueue[ReplanProblem | None] = SimpleQueue()
+        self._problems: SimpleQueue[ReplanProblem | None] = SimpleQueue()
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._run, args=(prepare,), daemon=True,
                                         name='solver')
@@ -31,25 +35,25 @@ class Worker:
         """Prepare (compile), deliver None, then wait for problems."""
         self._thread.start()
 
-    def ask(self, problem: ReplanProblem) -> None:
-        """Solve this next."""
+    def submit(self, problem: ReplanProblem) -> None:
+        """Solve a problem next."""
         self._stop.clear()
-        self._asked.put(problem)
+        self._problems.put(problem)
 
-    def hurry(self) -> None:
-        """Answer now with what is found so far."""
+    def stop_early(self) -> None:
+        """End the running solve with the best plan found so far."""
         self._stop.set()
 
     def close(self) -> None:
-        """End the thread."""
+        """End the thread; waits at most 5 s for it."""
         self._stop.set()
-        self._asked.put(None)
+        self._problems.put(None)
         self._thread.join(timeout=5.0)
 
     def _run(self, prepare: Callable[[], object]) -> None:
         self._guarded(prepare)
         self._deliver(None)
-        while (problem := self._asked.get()) is not None:
+        while (problem := self._problems.get()) is not None:
             answer = self._guarded(partial(self._solve, problem, self._stop.is_set))
             self._deliver(answer if isinstance(answer, ReplanAnswer) else None)
 

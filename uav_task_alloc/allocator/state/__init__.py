@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the allocator knows: UAVs, tasks, zones, published lists."""
+"""State of the allocator: UAVs, tasks, zones, published lists."""

@@ -1,71 +1,75 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Which UAVs are known: new ones up to a limit; what was never proven to be one is forgotten.
+"""Which UAVs are known: new ones up to a limit; unconfirmed ones are forgotten after a silence.
 
-A UAV is proven once it says that it holds a list with tasks of ours, or what became of one. A
-proven one keeps its place, silent or not; a flood of made-up ids cannot push it out.
+A UAV is confirmed when it reports that it holds a list with tasks of this allocator, or the
+progress of one. A confirmed UAV is never removed, silent or not: a flood of invented ids cannot
+displace it.
 """
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Callable
 
-if TYPE_CHECKING:
-    from uav_task_alloc.allocator.records import UavReport
-    from uav_task_alloc.allocator.state.world import World
+from uav_task_alloc.allocator.records import UavReport
+from uav_task_alloc.allocator.state.callbacks import Note
+from uav_task_alloc.allocator.state.fleet import Fleet
+from uav_task_alloc.allocator.state.published_lists import PublishedLists
 
-MOST_UAVS = 1000  # a flood of made-up ids ends here
-FORGET = 300.0  # [s] of silence after which one that is not proven is forgotten
-LOOK = 10.0  # [s] between two looks for such
-
-
-def admit(world: World, uav_id: str) -> bool:
-    """Whether there is room for a UAV that is not known; the longest silent stranger goes."""
-    records = world.fleet.records
-    if len(records) < MOST_UAVS:
-        world.full = ''
-        return True
-    silent = [known for known, record in records.items()
-              if record.silent and _is_stranger(world, known)]
-    if silent:
-        forget(world, min(silent, key=lambda known: records[known].heard))
-        return True
-    if not world.full:
-        world.full = (f'UAVs = {MOST_UAVS}: expected fewer; a new one is refused until another '
-                      'is forgotten')
-        world.note(f'{uav_id}: {world.full}', warning=True)
-    return False
+MAX_UAVS = 1000  # known at once
+FORGET_AFTER = 300.0  # [s] of silence after which an unconfirmed UAV is forgotten
+CHECK_PERIOD = 10.0  # [s] between two checks for such
 
 
-def prove(world: World, report: UavReport) -> None:
-    """It holds a list with tasks that only we can have told it."""
-    held = world.lists.get(report.uav_id)
-    if held.stops and report.list_revision == held.revision:
-        world.fleet.proven.add(report.uav_id)
+class Admission:
+    """Decides which UAVs are known. `full`: why no UAV is admitted, '' while there is room.
 
+    `forget_uav(uav_id)` removes a UAV from the whole world.
+    """
 
-def forget_strangers(world: World, now: float) -> None:
-    """Those that are silent for long, and lists of the life before whose UAVs never came."""
-    if now < world.next_look:
-        return
-    first, world.next_look = world.next_look == 0.0, now + LOOK
-    if first:
-        world.began = now
-    records = world.fleet.records
-    for uav_id in {*records, *world.lists.lists}:
-        heard = records[uav_id].heard if uav_id in records else world.began
-        if now - heard > FORGET and _is_stranger(world, uav_id):
-            forget(world, uav_id)
+    def __init__(self, fleet: Fleet, lists: PublishedLists, note: Note,
+                 forget_uav: Callable[[str], None]) -> None:
+        self._fleet, self._lists = fleet, lists
+        self._note, self._forget_uav = note, forget_uav
+        self.full = ''
+        self._began = self._next_check = 0.0  # [s] of the first check, and of the next one
 
+    def admit(self, uav_id: str) -> str:
+        """Make room for a UAV that is not known; returns why there is none, '' if there is.
 
-def forget(world: World, uav_id: str) -> None:
-    """Nothing of it is kept, neither its list and row in the journal nor its publishers."""
-    world.fleet.forget(uav_id)
-    world.lists.forget_uav(uav_id)
-    world.again.discard(uav_id)
-    world.outbox.lists.pop(uav_id, None)
-    world.outbox.forgotten.add(uav_id)
-    for book in (world.laid, world.stranded, world.looked, world.answered):
-        book.pop(uav_id, None)
+        The unconfirmed UAV that is silent for longest is forgotten.
+        """
+        records = self._fleet.records
+        if len(records) < MAX_UAVS:
+            self.full = ''
+            return ''
+        silent = [known for known, record in records.items()
+                  if record.silent and self._is_unconfirmed(known)]
+        if silent:
+            self._forget_uav(min(silent, key=lambda known: records[known].received))
+            return ''
+        if not self.full:
+            self.full = (f'UAVs = {MAX_UAVS}: expected fewer; a new one is refused until another '
+                         'is forgotten')
+            self._note(f'{uav_id}: {self.full}', warning=True)
+        return f'uav_id = {uav_id!r}: expected one of the {MAX_UAVS} UAVs known already'
 
+    def confirm(self, report: UavReport) -> None:
+        """Confirm a UAV that holds the list in force, if that has tasks."""
+        published = self._lists.get(report.uav_id)
+        if published.stops and report.list_revision == published.revision:
+            self._fleet.confirmed.add(report.uav_id)
 
-def _is_stranger(world: World, uav_id: str) -> bool:
-    return uav_id not in world.fleet.proven and not world.lists.get(uav_id).stops
+    def forget_unconfirmed(self, now: float) -> None:
+        """Forget UAVs after a long silence, and lists of the journal whose UAVs never reported."""
+        if now < self._next_check:
+            return
+        first, self._next_check = self._next_check == 0.0, now + CHECK_PERIOD
+        if first:
+            self._began = now
+        records = self._fleet.records
+        for uav_id in {*records, *self._lists.lists}:
+            received = records[uav_id].received if uav_id in records else self._began
+            if now - received > FORGET_AFTER and self._is_unconfirmed(uav_id):
+                self._forget_uav(uav_id)
+
+    def _is_unconfirmed(self, uav_id: str) -> bool:
+        return uav_id not in self._fleet.confirmed and not self._lists.get(uav_id).stops

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The book of UAVs: what each said last, who is silent, who may be given tasks."""
+"""The known UAVs: the last report of each, which are silent, which may be given tasks."""
 from __future__ import annotations
 
 import math
@@ -9,52 +9,62 @@ from dataclasses import dataclass, replace
 from uav_task_alloc.allocator.records import UavReport
 from uav_task_alloc.model import Point, Task, Uav
 
-FASTEST = 10.0  # times the cruise speed: nobody flies so fast, not even in faster simulations
-RECHARGED = 0.1  # above the reserve: a battery that was low is good again
+_FASTEST = 10.0  # times the cruise speed: faster is a jump, in accelerated simulations too
+_RECHARGED = 0.1  # [0..1] above the reserve: a battery that was low is good again
 
 
 @dataclass(frozen=True, slots=True)
 class UavRecord:
-    """One UAV that was heard."""
+    """One UAV that has reported."""
 
     report: UavReport
-    heard: float  # [s] steady clock
-    home: Point  # [m] ENU: as reported, else where it was first heard
+    received: float  # [s] steady clock: of the last report
+    home: Point  # [m] ENU: as reported, else the position of the first report
     silent: bool = False
-    zone: str = ''  # that it is inside
-    home_zone: str = ''  # that its home is inside
-    standing: str = ''  # why it gets no tasks on the ground: who stands inside which zone
-    battery: float | None = None  # [0..1] last told
+    zone: str = ''  # id of the zone that it is inside
+    home_zone: str = ''  # id of the zone that its home is inside
+    blocked_on_ground: str = ''  # why it gets no tasks: it or its home is inside a zone
+    battery: float | None = None  # [0..1] last reported
     low: bool = False  # the battery was below the reserve and is not recharged
     jumped: float = -math.inf  # [s] steady clock: the position last jumped
 
     @property
-    def caught(self) -> bool:
-        """It is inside a zone."""
+    def inside_zone(self) -> bool:
+        """Whether it is inside a zone."""
         return bool(self.zone)
 
     @property
     def ready(self) -> bool:
-        """It speaks, has battery, and says that it may be given tasks."""
+        """Whether it reports, has battery, and is available for tasks."""
         return self.report.available and not self.silent and not self.low
 
     @property
     def usable(self) -> bool:
-        """It is ready, and does not stand inside a zone."""
-        return self.ready and not self.standing
+        """Whether it is ready, and not on the ground inside a zone."""
+        return self.ready and not self.blocked_on_ground
 
 
 class Fleet:
-    """UAVs by id; what an operator switched off stays off until he switches it on."""
+    """UAVs by id; what an operator switched off stays off until it is switched on."""
 
     def __init__(self, off: Iterable[str] = (), active: Mapping[str, str] | None = None) -> None:
+        """Begin with the UAVs switched off, and the task that each UAV is known to fly."""
         self.records: dict[str, UavRecord] = {}
-        self.off = set(off)
-        self.active = dict(active or {})  # UAV -> the task it is known to be flying
-        self.proven: set[str] = set()  # they hold lists of ours, or have told of a task
+        self.switched_off = set(off)
+        self.active = dict(active or {})  # UAV -> task it is known to be flying
+        self.confirmed: set[str] = set()  # held a list of ours, or reported progress of a task
 
-    def hear(self, report: UavReport, now: float, reserve: float = 0.0) -> UavRecord | None:
-        """Take a report in; returns what was known before. reserve: of the battery [0..1]."""
+    def update(self, report: UavReport, now: float, reserve: float = 0.0) -> UavRecord | None:
+        """Store a report.
+
+        Args:
+            report: of a UAV, known or not.
+            now: [s] steady clock.
+            reserve: battery [0..1] below which a UAV gets no tasks.
+
+        Returns:
+            The record before; None where the UAV was not known.
+        """
         uav_id, before = report.uav_id, self.records.get(report.uav_id)
         battery, low = _battery(before, report.battery, reserve)
         if report.active_task:
@@ -65,45 +75,50 @@ class Fleet:
         if before:
             self.records[uav_id] = replace(
                 self.records[uav_id], zone=before.zone, home_zone=before.home_zone,
-                standing=before.standing, jumped=before.jumped)
+                blocked_on_ground=before.blocked_on_ground, jumped=before.jumped)
         return before
 
     def forget(self, uav_id: str) -> None:
-        """It is not known any more; that it is switched off stays."""
+        """Remove a UAV; that it is switched off stays."""
         self.records.pop(uav_id, None)
         self.active.pop(uav_id, None)
-        self.proven.discard(uav_id)
+        self.confirmed.discard(uav_id)
 
-    def fall_silent(self, now: float, timeout: float) -> list[str]:
-        """Mark those not heard for `timeout` [s]; returns the newly silent."""
+    def mark_silent(self, now: float, timeout: float) -> list[str]:
+        """Mark UAVs without a report for `timeout` [s]; returns the newly silent ones."""
         lost = [uav_id for uav_id, record in self.records.items()
-                if not record.silent and now - record.heard > timeout]
+                if not record.silent and now - record.received > timeout]
         for uav_id in lost:
             self.records[uav_id] = replace(self.records[uav_id], silent=True)
             self.active.pop(uav_id, None)
         return lost
 
     def set_jumped(self, uav_id: str, now: float) -> None:
-        """Its position jumped."""
+        """Record that the position jumped."""
         self.records[uav_id] = replace(self.records[uav_id], jumped=now)
 
-    def set_zone(self, uav_id: str, zone: str, home_zone: str, standing: str) -> None:
-        """The zones that it and its home are inside, and why it gets no tasks for that."""
+    def set_zone(self, uav_id: str, zone: str, home_zone: str, blocked_on_ground: str) -> None:
+        """Record the zones that a UAV and its home are inside, and why it gets no tasks."""
         self.records[uav_id] = replace(self.records[uav_id], zone=zone, home_zone=home_zone,
-                                       standing=standing)
+                                       blocked_on_ground=blocked_on_ground)
 
     def usable(self, uav_id: str) -> bool:
-        """It is heard, available, does not stand inside a zone, and is not switched off."""
+        """Return whether a UAV may be given tasks: known, usable, and not switched off."""
         record = self.records.get(uav_id)
-        return record is not None and record.usable and uav_id not in self.off
+        return record is not None and record.usable and uav_id not in self.switched_off
 
-    def standing(self) -> list[UavRecord]:
-        """Those that would be usable, if they did not stand inside a zone."""
+    def usable_ids(self) -> list[str]:
+        """Return the UAVs that may be given tasks."""
+        return [uav_id for uav_id in self.records if self.usable(uav_id)]
+
+    def blocked_on_ground(self) -> list[UavRecord]:
+        """Return those that would be usable, were they or their homes not inside a zone."""
         return [record for uav_id, record in self.records.items()
-                if record.standing and record.ready and uav_id not in self.off]
+                if record.blocked_on_ground and record.ready
+                and uav_id not in self.switched_off]
 
     def uav(self, uav_id: str, default_range: float, default_cruise_speed: float) -> Uav:
-        """As the solver sees it; an unknown range [m] or speed [m/s] is the default."""
+        """Return a UAV for the solver; an unknown range [m] or speed [m/s] is the default."""
         record = self.records[uav_id]
         report = record.report
         return Uav(uav_id, report.position,
@@ -111,41 +126,53 @@ class Fleet:
                    cruise_speed=report.cruise_speed or default_cruise_speed,
                    capabilities=report.capabilities, home=record.home)
 
+    def may_fly(self, uav_id: str, task: Task, failed_on: Iterable[str]) -> bool:
+        """Return whether a known UAV may be given a task, see `may_fly`."""
+        return may_fly(task, failed_on, self.records[uav_id].report)
 
-def _battery(before: UavRecord | None, told: float | None,
+
+def _battery(before: UavRecord | None, reported: float | None,
              reserve: float) -> tuple[float | None, bool]:
-    """What is left, and whether that is too little; a UAV that tells nothing stays as it was."""
+    """The charge, and whether it is too low; without a reported one they stay as they were."""
     known, was_low = (before.battery, before.low) if before else (None, False)
-    if told is None or (told == 0.0 and known is None):  # 0: a field that nobody has set
+    if reported is None or (reported == 0.0 and known is None):  # 0: a field that was never set
         return known, was_low
-    return told, told < reserve + (RECHARGED if was_low else 0.0)
+    return reported, reported < reserve + (_RECHARGED if was_low else 0.0)
 
 
 def may_fly(task: Task, failed_on: Iterable[str], uav: UavReport) -> bool:
-    """The UAV is allowed to, able to, and has not failed at it before."""
+    """Return whether a UAV is allowed and able to fly a task, and has not failed at it before."""
     return ((task.allowed_uavs is None or uav.uav_id in task.allowed_uavs)
             and task.required_capabilities <= uav.capabilities and uav.uav_id not in failed_on)
 
 
-def news_of(before: UavRecord | None, after: UavRecord) -> list[str]:
-    """What in a report asks for a new plan."""
-    report, found = after.report, []
+def replan_reasons(before: UavRecord | None, after: UavRecord) -> list[str]:
+    """Return what in a new report requires a plan."""
+    report, reasons = after.report, []
     if before is None or before.silent:
-        found += ['heard again' if before else 'heard'] if report.available else []
+        reasons += ['reports again' if before else 'reports'] if report.available else []
     elif before.report.available != report.available:
-        found += ['available' if report.available else 'not available']
+        reasons += ['available' if report.available else 'not available']
     elif before.report.capabilities != report.capabilities:
-        found += ['has other capabilities']
+        reasons += ['has other capabilities']
     if after.low != (before is not None and before.low):
-        found += [f'battery {100.0 * (after.battery or 0.0):.0f} %: ' + (
-            'below the reserve, it goes home' if after.low else 'above the reserve again')]
-    return found
+        reasons += [f'battery {100.0 * (after.battery or 0.0):.0f} %: ' + (
+            'below the reserve, it returns home' if after.low else 'above the reserve again')]
+    return reasons
 
 
-def jump(before: UavRecord | None, report: UavReport, now: float, speed: float,
-         most: float) -> float:
-    """Metres since the last report, where they are `most` more than it can have flown; else 0."""
+def jump_distance(before: UavRecord | None, report: UavReport, now: float, speed: float,
+                  most: float) -> float:
+    """Return how far a position jumped [m]; 0.0 where the UAV can have flown there.
+
+    Args:
+        before: record of the last report.
+        report: the new one.
+        now: [s] steady clock.
+        speed: cruise speed [m/s]; ten times as fast is no jump.
+        most: [m] beyond that flight which are no jump.
+    """
     if before is None or before.silent:
         return 0.0
     metres = math.dist(before.report.position, report.position)
-    return metres if metres > most + FASTEST * speed * (now - before.heard) else 0.0
+    return metres if metres > most + _FASTEST * speed * (now - before.received) else 0.0

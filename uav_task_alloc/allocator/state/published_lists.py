@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The book of lists: what each UAV was told last, and which task was in which revision."""
+"""The task list published last for each UAV, and which revisions contained which task."""
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable
@@ -9,108 +9,126 @@ from uav_task_alloc.allocator.records import UavList
 
 
 class PublishedLists:
-    """Lists by UAV; a revision is never used twice, not even over a restart."""
+    """Lists by UAV; a revision is never used twice, not even across a restart."""
 
     def __init__(self, lists: Iterable[UavList] = (), tasks: Iterable[str] = ()) -> None:
-        """lists: those of the life before. tasks: ids of all that it knew in the end."""
+        """Begin with the lists of the previous run, and the ids of all tasks it knew."""
         self.lists = {each.uav: each for each in lists}
-        self.dirty: set[str] = set()  # not yet on disk
-        self.strange = False  # a UAV had a list that is not of this book
-        # revisions of the life before, and of another allocator: nobody knows what they had
-        self._old = {each.uav: each.revision for each in self.lists.values()}
-        self._learned: dict[str, int] = {}
-        self._known = set(tasks)
-        self._served: set[str] = set()  # UAVs that had tasks
-        self._above = 0  # new UAVs begin above: a forgotten one may come back with its list
-        self._carried: dict[tuple[str, str], tuple[int, int]] = {}
+        self.unsaved: set[str] = set()  # not yet on disk
+        self.foreign = False  # a UAV had a list that this allocator did not publish
+        # revisions of the previous run, and of another allocator: their tasks are unknown
+        self._previous = {each.uav: each.revision for each in self.lists.values()}
+        self._foreign_revisions: dict[str, int] = {}
+        self._known_tasks = set(tasks)
+        self._had_tasks: set[str] = set()  # UAVs
+        # new UAVs begin above this revision: a forgotten one may return with its list
+        self._revision_floor = 0
+        # (UAV, task) -> first and last revision that contained the task
+        self._contained: dict[tuple[str, str], tuple[int, int]] = {}
 
     def get(self, uav_id: str) -> UavList:
-        """The list in force; one of revision 0 where none was ever published."""
+        """Return the list in force; one of revision 0 where none was ever published."""
         return self.lists.get(uav_id) or UavList(uav_id, 0)
 
-    def publish(self, new: UavList, stamp: float, again: bool = False) -> UavList | None:
-        """Put a list in force under the next revision; None: it says nothing new."""
-        held = self.get(new.uav)
-        if not again and (new is held or new.flies_as(held)):
-            return None
-        if not new.stops and held.revision == 0 and not again:
-            return None
-        made = replace(new, revision=(held.revision or self._above) + 1, stamp=stamp)
-        self.lists[new.uav] = made
-        self.dirty.add(new.uav)
-        if made.stops:
-            self._served.add(new.uav)
-        for task_id in made.task_ids:
-            first, _ = self._carried.get((new.uav, task_id), (made.revision, 0))
-            self._carried[new.uav, task_id] = (first, made.revision)
-        return made
+    def publish(self, new: UavList, stamp: float, resend: bool = False) -> UavList | None:
+        """Put a list in force under the next revision.
 
-    def learn(self, uav_id: str, revision: int) -> bool:
-        """A UAV holds a list of an earlier life of the allocator: count on from there."""
-        held = self.get(uav_id)
-        if revision <= held.revision:
+        Args:
+            new: the list.
+            stamp: [s].
+            resend: also if it equals the list in force.
+
+        Returns:
+            The list with its revision; None where nothing changed.
+        """
+        published = self.get(new.uav)
+        if not resend and (new is published or new.same_route(published)):
+            return None
+        if not new.stops and published.revision == 0 and not resend:
+            return None
+        revised = replace(new, revision=(published.revision or self._revision_floor) + 1,
+                          stamp=stamp)
+        self.lists[new.uav] = revised
+        self.unsaved.add(new.uav)
+        if revised.stops:
+            self._had_tasks.add(new.uav)
+        for task_id in revised.task_ids:
+            first, _ = self._contained.get((new.uav, task_id), (revised.revision, 0))
+            self._contained[new.uav, task_id] = (first, revised.revision)
+        return revised
+
+    def raise_revision(self, uav_id: str, revision: int) -> bool:
+        """Continue from the revision that a UAV holds; returns whether it is above the known one.
+
+        Such a list is of a previous run, or of another allocator.
+        """
+        published = self.get(uav_id)
+        if revision <= published.revision:
             return False
-        self.strange = True
-        self.lists[uav_id] = replace(held, revision=revision)
-        self._learned[uav_id] = revision
+        self.foreign = True
+        self.lists[uav_id] = replace(published, revision=revision)
+        self._foreign_revisions[uav_id] = revision
         return True
 
-    def carried(self, uav_id: str, task_id: str, revision: int) -> bool:
-        """Whether that revision of the UAV's list had the task, as far as is remembered."""
+    def contained(self, uav_id: str, task_id: str, revision: int) -> bool:
+        """Return whether that revision of a UAV's list contained a task, as far as is known."""
         if revision == 0:
             return task_id in self.get(uav_id).task_ids
-        if revision <= self._learned.get(uav_id, 0):
+        if revision <= self._foreign_revisions.get(uav_id, 0):
             return True
-        if revision <= self._old.get(uav_id, 0) and task_id in self._known:
+        if revision <= self._previous.get(uav_id, 0) and task_id in self._known_tasks:
             return True
-        first, last = self._carried.get((uav_id, task_id), (1, 0))
+        first, last = self._contained.get((uav_id, task_id), (1, 0))
         return first <= revision <= last
 
     def owners(self) -> dict[str, str]:
-        """Who has each listed task."""
+        """Return the UAV of each listed task."""
         return {task_id: each.uav for each in self.lists.values() for task_id in each.task_ids}
 
-    def aged(self, uav_id: str, stamp: float) -> UavList:
-        """The list in force with its arrival times counted from `stamp`."""
-        held = self.get(uav_id)
-        age = max(0.0, stamp - held.stamp)
-        stops = tuple(replace(stop, eta=max(0.0, stop.eta - age)) for stop in held.stops)
-        return replace(held, stops=stops)
+    def restamped(self, uav_id: str, stamp: float) -> UavList:
+        """Return the list in force with its arrival times counted from `stamp` [s]."""
+        published = self.get(uav_id)
+        age = max(0.0, stamp - published.stamp)
+        stops = tuple(replace(stop, eta=max(0.0, stop.eta - age)) for stop in published.stops)
+        return replace(published, stops=stops)
 
-    def without_flown(self, uav_id: str, done: Callable[[str], bool],
+    def without_ended(self, uav_id: str, ended: Callable[[str], bool],
                       stamp: float) -> UavList | None:
-        """The list without the ended tasks at its front; None: there are none, or others too.
+        """Return the list without the ended tasks at its front.
 
-        An ended task further back changes legs: that list is the next plan's business.
+        None where there are none, or where a later task has ended, too: that changes legs, and
+        is left to the next plan.
         """
         stops = self.get(uav_id).stops
-        if not stops or not done(stops[0].task.id):
+        if not stops or not ended(stops[0].task.id):
             return None
-        held = self.aged(uav_id, stamp)
-        stops = held.stops
-        while stops and done(stops[0].task.id):
+        published = self.restamped(uav_id, stamp)
+        stops = published.stops
+        while stops and ended(stops[0].task.id):
             stops = stops[1:]
-        if any(done(stop.task.id) for stop in stops):
+        if any(ended(stop.task.id) for stop in stops):
             return None
-        flown = sum(stop.leg.length for stop in held.stops[:len(held.stops) - len(stops)])
-        return replace(held, stops=stops, distance=held.distance - flown if stops else 0.0)
+        flown = sum(stop.leg.length
+                    for stop in published.stops[:len(published.stops) - len(stops)])
+        return replace(published, stops=stops,
+                       distance=published.distance - flown if stops else 0.0)
 
     def forget_uav(self, uav_id: str) -> None:
-        """Nobody flies by that id; where it comes back its revisions rise all the same."""
-        held = self.lists.pop(uav_id, None)
-        if held is None:
+        """Remove a UAV; if it reports again its revisions still increase."""
+        published = self.lists.pop(uav_id, None)
+        if published is None:
             return
-        self.dirty.add(uav_id)
-        if uav_id in self._served:
-            self._served.remove(uav_id)
-            self._above = max(self._above, held.revision)
-            self._carried = {key: span for key, span in self._carried.items()
-                             if key[0] != uav_id}
-        self._old.pop(uav_id, None)
-        self._learned.pop(uav_id, None)
+        self.unsaved.add(uav_id)
+        if uav_id in self._had_tasks:
+            self._had_tasks.remove(uav_id)
+            self._revision_floor = max(self._revision_floor, published.revision)
+            self._contained = {key: span for key, span in self._contained.items()
+                               if key[0] != uav_id}
+        self._previous.pop(uav_id, None)
+        self._foreign_revisions.pop(uav_id, None)
 
-    def forget(self, task_ids: Collection[str]) -> None:
-        """These tasks are of the past; nobody will ask which revision had them."""
-        self._carried = {key: span for key, span in self._carried.items()
-                         if key[1] not in task_ids}
-        self._known.difference_update(task_ids)
+    def forget_tasks(self, task_ids: Collection[str]) -> None:
+        """Remove tasks that ended long ago: no event of them is accepted any more."""
+        self._contained = {key: span for key, span in self._contained.items()
+                           if key[1] not in task_ids}
+        self._known_tasks.difference_update(task_ids)

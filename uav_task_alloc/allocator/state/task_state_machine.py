@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The life of a task: what each event makes of each state, and why; one table, no code beside it.
+"""Task state machine: one table of the next state, and the reason, for each state and event.
 
-docs/task_states.md is drawn from it.
+docs/task_states.md is generated from it.
 """
 from __future__ import annotations
 
@@ -9,16 +9,16 @@ from collections.abc import Iterable
 from enum import Enum
 from typing import NamedTuple
 
-from uav_task_alloc.allocator.records import ENDED, OPEN, TaskState
+from uav_task_alloc.allocator.records import ENDED_STATES, OPEN_STATES, TaskState
 
 
 class TaskTransition(Enum):
-    """What may happen to a task, in words."""
+    """Events of a task; the value is the text in the documentation."""
 
     ADD = 'announced'
     UPDATE = 'announced with new content'
     CANCEL = 'withdrawn'
-    WAIT = 'no plan has judged it yet'
+    WAIT = 'no plan has considered it yet'
     LIST = 'in the list of a UAV'
     LEAVE = 'left out by a plan'
     START = 'STARTED by the UAV that has it'
@@ -31,89 +31,100 @@ class TaskTransition(Enum):
 
 
 class Rule(NamedTuple):
-    """What follows from an event: the next state, or None where the event changes nothing."""
+    """Effect of an event: the next state, or None where the event changes nothing."""
 
     state: TaskState | None
-    reason: str  # of the state, or why nothing changes; {uav}, {why} are those of the event
+    reason: str  # of the state, or why nothing changes; {uav} and {why} are of the event
+
+
+class TaskStep(NamedTuple):
+    """An event for a task."""
+
+    task_id: str
+    event: TaskTransition
+    uav: str = ''
+    why: str = ''
 
 
 TransitionRow = dict[TaskState, Rule]
-PENDING, ASSIGNED, ACTIVE, COMPLETED, FAILED, CANCELLED, REJECTED, UNASSIGNED = TaskState
+_S, _E = TaskState, TaskTransition
 
 
 def _on(states: Iterable[TaskState], state: TaskState | None, reason: str) -> TransitionRow:
     return dict.fromkeys(states, Rule(state, reason))
 
 
-def _stay(states: Iterable[TaskState], reason: str) -> TransitionRow:
-    return {state: Rule(state, reason) for state in states}
+def _on_open(state: TaskState | None, reason: str) -> TransitionRow:
+    """Of an event that only an open task allows."""
+    return {_S.COMPLETED: Rule(None, 'it is COMPLETED already'),
+            _S.FAILED: Rule(None, 'it is FAILED already'),
+            _S.CANCELLED: Rule(None, 'it was cancelled'),
+            _S.REJECTED: Rule(None, _UNKNOWN), **_on(OPEN_STATES, state, reason)}
 
 
-def _over(what: str) -> TransitionRow:
-    """An event that comes too late, or for a task that was never accepted."""
-    return {COMPLETED: Rule(None, 'it is COMPLETED already'),
-            FAILED: Rule(None, 'it is FAILED already'),
-            CANCELLED: Rule(None, 'it was cancelled'), REJECTED: Rule(None, what)}
+def _on_open_or_failed(state: TaskState, reason: str) -> TransitionRow:
+    return {**_on_open(state, reason), _S.FAILED: Rule(state, reason)}
 
 
-UNKNOWN, MOVED = 'unknown task', '{uav} does not have it any more'
-TABLE: dict[TaskTransition, TransitionRow] = {
-    TaskTransition.ADD: {
-        **_on(OPEN, None, 'announced before'),
-        **_on(ENDED, None, 'announced before'),
-        REJECTED: Rule(PENDING, 'waits for the next plan'),
+_UNKNOWN, _MOVED = 'unknown task', '{uav} does not have it any more'
+TRANSITIONS: dict[TaskTransition, TransitionRow] = {
+    _E.ADD: {
+        **_on({*OPEN_STATES, *ENDED_STATES}, None, 'announced before'),
+        _S.REJECTED: Rule(_S.PENDING, 'waits for the next plan'),
     },
-    TaskTransition.UPDATE: {
-        **_stay(OPEN, '{why}'),
-        FAILED: Rule(PENDING, 'changed: tried again'),
-        COMPLETED: Rule(None, 'is COMPLETED: nothing to update'),
-        CANCELLED: Rule(None, 'is CANCELLED: nothing to update'),
-        REJECTED: Rule(None, f'{UNKNOWN}: nothing to update'),
+    _E.UPDATE: {
+        **{state: Rule(state, '{why}') for state in OPEN_STATES},
+        _S.FAILED: Rule(_S.PENDING, 'changed: tried again'),
+        _S.COMPLETED: Rule(None, 'is COMPLETED: nothing to update'),
+        _S.CANCELLED: Rule(None, 'is CANCELLED: nothing to update'),
+        _S.REJECTED: Rule(None, f'{_UNKNOWN}: nothing to update'),
     },
-    TaskTransition.CANCEL: {
-        **_on({*OPEN, FAILED}, CANCELLED, 'cancelled'),
-        COMPLETED: Rule(None, 'is COMPLETED: nothing to cancel'),
-        CANCELLED: Rule(None, 'cancelled before'),
-        REJECTED: Rule(None, f'{UNKNOWN}: nothing to cancel'),
+    _E.CANCEL: {
+        **_on({*OPEN_STATES, _S.FAILED}, _S.CANCELLED, 'cancelled'),
+        _S.COMPLETED: Rule(None, 'is COMPLETED: nothing to cancel'),
+        _S.CANCELLED: Rule(None, 'cancelled before'),
+        _S.REJECTED: Rule(None, f'{_UNKNOWN}: nothing to cancel'),
     },
-    TaskTransition.WAIT: {**_over(UNKNOWN), **_on(OPEN, PENDING, '{why}')},
-    TaskTransition.LIST: {**_over(UNKNOWN), **_on(OPEN, ASSIGNED, '')},
-    TaskTransition.LEAVE: {**_over(UNKNOWN), **_on(OPEN, UNASSIGNED, '{why}')},
-    TaskTransition.START: {**_over(UNKNOWN), **_on(OPEN, ACTIVE, '')},
-    TaskTransition.START_MOVED: {**_over(UNKNOWN), **_on(OPEN, None, MOVED)},
-    # a fact, whoever the task was given to meanwhile: it must not be flown twice
-    TaskTransition.COMPLETE: {**_over(UNKNOWN), **_on({*OPEN, FAILED}, COMPLETED, '{why}')},
-    TaskTransition.COMPLETE_MOVED: {
-        **_over(UNKNOWN),
-        **_on({*OPEN, FAILED}, COMPLETED, 'completed after it was moved'),
-    },
-    TaskTransition.FAIL: {**_over(UNKNOWN), **_on(OPEN, PENDING, 'failed on {uav}: {why}')},
-    TaskTransition.FAIL_LAST: {**_over(UNKNOWN), **_on(OPEN, FAILED, 'failed on {uav}: {why}')},
-    TaskTransition.FAIL_MOVED: {**_over(UNKNOWN), **_on(OPEN, None, MOVED)},
+    _E.WAIT: _on_open(_S.PENDING, '{why}'),
+    _E.LIST: _on_open(_S.ASSIGNED, ''),
+    _E.LEAVE: _on_open(_S.UNASSIGNED, '{why}'),
+    _E.START: _on_open(_S.ACTIVE, ''),
+    _E.START_MOVED: _on_open(None, _MOVED),
+    # accepted from any UAV, so that the task is not flown twice
+    _E.COMPLETE: _on_open_or_failed(_S.COMPLETED, '{why}'),
+    _E.COMPLETE_MOVED: _on_open_or_failed(_S.COMPLETED, 'completed after it was moved'),
+    _E.FAIL: _on_open(_S.PENDING, 'failed on {uav}: {why}'),
+    _E.FAIL_LAST: _on_open(_S.FAILED, 'failed on {uav}: {why}'),
+    _E.FAIL_MOVED: _on_open(None, _MOVED),
 }
 
 
-def after(state: TaskState, event: TaskTransition, uav: str = '', why: str = '') -> Rule:
-    """What the event makes of a task in that state, with the reason filled in.
+def rule_for(state: TaskState, event: TaskTransition, uav: str = '', why: str = '') -> Rule:
+    """Return the effect of an event on a task, with the reason filled in.
 
-    A task that was never accepted is REJECTED.
+    Args:
+        state: of the task; REJECTED for one that was never accepted.
+        event: what happened.
+        uav: that the event is about.
+        why: reason of the event.
     """
-    rule = TABLE[event][state]
-    # not str.format: what a message says may hold braces
+    rule = TRANSITIONS[event][state]
+    # not str.format: the reason of a message may contain braces
     return rule._replace(reason=rule.reason.replace('{uav}', uav).replace('{why}', why))
 
 
-def markdown_text() -> str:
-    """docs/task_states.md: the table and the picture."""
-    parts = ['# Task states\n\nDrawn from `uav_task_alloc/allocator/state/task_state_machine.py`. '
-             'A cell has the next state; in brackets: the event changes nothing, and why.\n\n']
+def task_states_markdown() -> str:
+    """Return docs/task_states.md: the table and a diagram."""
+    parts = ['# Task states\n\nGenerated from '
+             '`uav_task_alloc/allocator/state/task_state_machine.py`. A cell has '
+             'the next state, or in brackets why the event changes nothing.\n\n']
     parts += [f'| event | {" | ".join(state.name for state in TaskState)} |\n',
               '|---' * (len(TaskState) + 1) + '|\n']
-    for event, row in TABLE.items():
+    for event, row in TRANSITIONS.items():
         cells = [rule.state.name if rule.state else f'({rule.reason})'
                  for rule in map(row.__getitem__, TaskState)]
         parts.append(f'| {event.value} | {" | ".join(cells)} |\n')
-    arrows = {(state.name, rule.state.name) for row in TABLE.values()
+    arrows = {(state.name, rule.state.name) for row in TRANSITIONS.values()
               for state, rule in row.items() if rule.state and rule.state is not state}
     lines = ''.join(f'  {a} --> {b}\n' for a, b in sorted(arrows))
     return ''.join(parts) + f'\n```mermaid\nstateDiagram-v2\n{lines}```\n'

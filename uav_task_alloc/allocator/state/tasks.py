@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The book of tasks: what is accepted, what is refused and why, and how each task ended."""
+"""The task registry: accepted tasks with their states, and refused ones with the reason."""
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable
@@ -7,37 +7,43 @@ from dataclasses import replace
 from typing import Any
 
 from uav_task_alloc.allocator.records import TaskRecord, TaskState, TaskVerdict
-from uav_task_alloc.allocator.state.task_state_machine import TaskTransition, after
+from uav_task_alloc.allocator.state.task_state_machine import TaskTransition, rule_for
 from uav_task_alloc.model import Task
 
-MOST_OPEN = 20_000  # tasks still to be done; more are refused
-MOST_REJECTED = 1000  # refusals remembered, the newest
+MAX_OPEN = 20_000  # open tasks; more are refused
+_MAX_REJECTED = 1000  # refusals kept, the newest
 UNCHANGED = 'duplicate: announced before, unchanged'
-OWNED = frozenset({TaskState.ASSIGNED, TaskState.ACTIVE, TaskState.COMPLETED, TaskState.FAILED})
+_HAS_UAV = frozenset({TaskState.ASSIGNED, TaskState.ACTIVE, TaskState.COMPLETED,
+                      TaskState.FAILED})
 
 
-class TaskBook:
-    """Accepted tasks by id, and the refusals that no accepted task stands behind."""
+class TaskRegistry:
+    """Accepted tasks by id, and refused ids that no accepted task has."""
 
     def __init__(self, records: Iterable[TaskRecord] = ()) -> None:
         self.records = {record.task.id: record for record in records}
         self.rejected: dict[str, tuple[str, float]] = {}  # id -> reason, stamp [s]
-        self.dirty: set[str] = set()  # not yet on disk
-        # in the order in which they ended, as far as a journal tells
+        self.unsaved: set[str] = set()  # not yet on disk
+        # in the order in which they ended; after a restart by the stamp of their state
         self.ended = {record.task.id: None for record in sorted(
             self.records.values(), key=lambda record: record.stamp) if not record.open}
 
+    def is_open(self, task_id: str) -> bool:
+        """Return whether a task is accepted and still to be done."""
+        record = self.records.get(task_id)
+        return record is not None and record.open
+
     def open(self) -> list[TaskRecord]:
-        """Those still to be done."""
+        """Return the tasks still to be done."""
         return [record for record in self.records.values() if record.open]
 
     def add(self, task: Task, stamp: float) -> TaskVerdict:
-        """A new task. A replay of what is known changes nothing; a known id is no new task."""
+        """Accept a new task; a replay changes nothing, another task with a known id is refused."""
         known = self.records.get(task.id)
-        if known is None and len(self.records) - len(self.ended) >= MOST_OPEN:
-            return self.reject(task.id, f'open tasks = {MOST_OPEN}: expected fewer', stamp)
+        if known is None and len(self.records) - len(self.ended) >= MAX_OPEN:
+            return self.reject(task.id, f'open tasks = {MAX_OPEN}: expected fewer', stamp)
         if known is None:
-            rule = after(TaskState.REJECTED, TaskTransition.ADD)
+            rule = rule_for(TaskState.REJECTED, TaskTransition.ADD)
             self.rejected.pop(task.id, None)
             self._put(TaskRecord(task, task, stamp=stamp, reason=rule.reason))
             return TaskVerdict(task.id, True)
@@ -48,7 +54,7 @@ class TaskBook:
                        f'duplicate id: another task was announced under it{ended}')
 
     def update(self, task: Task, stamp: float) -> TaskVerdict:
-        """New content for an open task; a failed one gets another chance."""
+        """Replace the content of an open task, or of a failed one, which is tried again."""
         known = self.records.get(task.id)
         if known is not None and task == known.task and known.open:
             return TaskVerdict(task.id, True, UNCHANGED)
@@ -57,7 +63,7 @@ class TaskBook:
         return self._verdict(task.id, why, stamp)
 
     def cancel(self, task_id: str, stamp: float) -> TaskVerdict:
-        """Withdraw an open task; once more is harmless."""
+        """Withdraw an open task; a repeated withdrawal is accepted."""
         known = self.records.get(task_id)
         if known is not None and known.state is TaskState.CANCELLED:
             return TaskVerdict(task_id, True, UNCHANGED)
@@ -68,40 +74,70 @@ class TaskBook:
 
     def step(self, task_id: str, event: TaskTransition, stamp: float, uav: str = '', why: str = '',
              **changes: Any) -> str:
-        """What the event makes of a task, by the table; returns why nothing, '' if it counts.
+        """Apply an event to a task by the table of `task_state_machine`.
 
-        `changes` are more fields of its record. The stamp moves only where something is new.
+        Args:
+            task_id: of the task; an unknown one is REJECTED.
+            event: what happened.
+            stamp: [s]; stored if the record changes.
+            uav: that the event is about.
+            why: reason of the event.
+            changes: more fields of the record.
+
+        Returns:
+            Why the event changes nothing; '' if it was applied.
         """
         known = self.records.get(task_id)
-        rule = after(known.state if known else TaskState.REJECTED, event, uav, why)
+        rule = rule_for(known.state if known else TaskState.REJECTED, event, uav, why)
         if rule.state is None or known is None:
             return rule.reason
         changes |= {'state': rule.state, 'reason': rule.reason,
-                    'uav': uav if rule.state in OWNED else ''}
+                    'uav': uav if rule.state in _HAS_UAV else ''}
         if any(getattr(known, name) != value for name, value in changes.items()):
             self._put(replace(known, stamp=stamp, **changes))
         return ''
 
     def reject(self, task_id: str, reason: str, stamp: float) -> TaskVerdict:
-        """Refuse; the status says so unless an accepted task has that id."""
+        """Refuse a task; its status is REJECTED unless an accepted task has that id."""
         if task_id not in self.records:
             self.rejected.pop(task_id, None)
             self.rejected[task_id] = (reason, stamp)
-            while len(self.rejected) > MOST_REJECTED:
+            while len(self.rejected) > _MAX_REJECTED:
                 del self.rejected[next(iter(self.rejected))]
         return TaskVerdict(task_id, False, reason)
 
     def _put(self, record: TaskRecord) -> None:
         self.records[record.task.id] = record
-        self.dirty.add(record.task.id)
+        self.unsaved.add(record.task.id)
         self.ended.pop(record.task.id, None)
         if not record.open:
             self.ended[record.task.id] = None
 
-    def forget(self, keep: int, listed: Collection[str]) -> set[str]:
-        """Of the ended tasks only the newest `keep` stay, and those that are in a list still."""
+    def forget_ended(self, keep: int, listed: Collection[str]) -> set[str]:
+        """Remove the oldest ended tasks.
+
+        Args:
+            keep: ended tasks that stay, the newest.
+            listed: tasks that are still in a list, which stay, too.
+
+        Returns:
+            The ids removed.
+        """
         old = set(list(self.ended)[:max(0, len(self.ended) - keep)]) - set(listed)
         for task_id in old:
             del self.records[task_id], self.ended[task_id]
-        self.dirty |= old
+        self.unsaved |= old
         return old
+
+
+def without_failed(record: TaskRecord, usable: frozenset[str]) -> Task:
+    """Return a task that the UAVs which failed at it may not fly.
+
+    Args:
+        record: of the task.
+        usable: UAVs that are left where the task allows all.
+    """
+    if not record.failed_on:
+        return record.task
+    allowed = usable if record.task.allowed_uavs is None else record.task.allowed_uavs
+    return replace(record.task, allowed_uavs=allowed - frozenset(record.failed_on))

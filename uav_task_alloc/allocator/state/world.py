@@ -1,304 +1,367 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The world as it is heard of: events in, refusals back, and what asks for a new plan noted.
+"""The state of the allocator: applies announcements, reports, events and zones; requests plans.
 
-`now` is [s] of a steady clock, for silence and settling; `stamp` is [s] of the clock that
-people read, for what is published.
+`now` is [s] of a steady clock, for timeouts; `stamp` is [s] of the published clock.
 """
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Collection, Iterable, Mapping, Sequence
 
-from uav_task_alloc.allocator.persistence.restore import Saved
 from uav_task_alloc.allocator.records import (
     AnnouncementAction,
     LogNote,
     Outbox,
+    SavedState,
     TaskEvent,
-    TaskEventKind,
     TaskState,
     TaskVerdict,
+    UavList,
     UavReport,
 )
-from uav_task_alloc.allocator.replanning.schedule import Schedule
-from uav_task_alloc.allocator.state import admission, zone_checks as zone_watch
-from uav_task_alloc.allocator.state.fleet import Fleet, UavRecord, jump, may_fly, news_of
+from uav_task_alloc.allocator.state.admission import Admission
+from uav_task_alloc.allocator.state.callbacks import RequestReplan
+from uav_task_alloc.allocator.state.fleet import (
+    Fleet,
+    UavRecord,
+    jump_distance,
+    replan_reasons,
+)
+from uav_task_alloc.allocator.state.list_validity import ListValidity, ZonesWhenBuilt
+from uav_task_alloc.allocator.state.locked_tasks import can_fly, locked_tasks
+from uav_task_alloc.allocator.state.missed_completions import MissedCompletions
+from uav_task_alloc.allocator.state.name_list import first_names
 from uav_task_alloc.allocator.state.published_lists import PublishedLists
-from uav_task_alloc.allocator.state.task_state_machine import TaskTransition as Life
-from uav_task_alloc.allocator.state.tasks import UNCHANGED, TaskBook
+from uav_task_alloc.allocator.state.safe_paths import MakeSafePaths, SafePaths
+from uav_task_alloc.allocator.state.task_events import TaskEvents
+from uav_task_alloc.allocator.state.task_state_machine import TaskStep
+from uav_task_alloc.allocator.state.tasks import UNCHANGED, TaskRegistry, without_failed
+from uav_task_alloc.allocator.state.zone_checks import ZoneChecks
 from uav_task_alloc.errors import InvalidValue
-from uav_task_alloc.model import Point, Task, ThreatZone
+from uav_task_alloc.model import Point, Task, ThreatZone, Uav
 from uav_task_alloc.params import AllocatorParams
 
-if TYPE_CHECKING:  # it brings the compiler along, which a start must not wait for
-    from uav_task_alloc.allocator.replanning.safe_paths import SafePaths
-
-MOST_NOTES = 10_000  # lines that wait for the log
-ANSWER = 1.0  # [s] between two lists told again for old events
-_LOOK = 0.5  # [s] between two looks at the way ahead of a UAV
+_MAX_NOTES = 10_000  # log lines not yet collected
 
 
 class World:
-    """Tasks, UAVs, zones and published lists, and the schedule of what happened."""
+    """Tasks, UAVs, zones and published lists, and what is to be published or saved of them.
 
-    def __init__(self, params: AllocatorParams, saved: Saved) -> None:
-        self.params = params
-        self.tasks = TaskBook(saved.tasks)
-        self.fleet = Fleet(saved.off, {
+    Args:
+        params: of the allocator.
+        saved: what the journal restored.
+        make_safe_paths: makes the paths around zones; called when they are first needed.
+        on_change: called with (trigger, now) when a plan is required.
+    """
+
+    def __init__(self, params: AllocatorParams, saved: SavedState,
+                 make_safe_paths: MakeSafePaths, on_change: RequestReplan) -> None:
+        self.params, self._make_safe_paths, self._on_change = params, make_safe_paths, on_change
+        self.version = 0
+        self.revision = saved.revision  # of the allocation
+        self.outbox = Outbox()
+        self.zones = {zone.id: zone for zone in saved.zones}
+        self.restart_hold = any(each.stops for each in saved.lists)  # no task changes its UAV
+        self.kernels_ready = False  # compiled: checks of zones are fast
+        self._paths: SafePaths | None = None
+        self._paths_params = params
+        self._resend = {each.uav for each in saved.lists}  # UAVs whose lists are resent
+        self._unsaved: set[str] = set()  # rows not yet on disk: 'zones', 'off', ...
+        self.tasks = TaskRegistry(saved.tasks)
+        self.fleet = Fleet(saved.switched_off, {
             record.uav: record.task.id for record in saved.tasks
             if record.state is TaskState.ACTIVE})
         self.lists = PublishedLists(saved.lists, (record.task.id for record in saved.tasks))
-        self.zones = {zone.id: zone for zone in saved.zones}
-        self.revision = saved.revision
-        self.dirty: set[str] = set()  # rows that are not yet on disk: 'zones', 'off', ...
-        self.schedule = Schedule()
-        self.version = 0
-        self.outbox = Outbox()
-        self.again: set[str] = set()  # UAVs to be told their lists once more
-        self.cautious = False  # shortly after a restart: tasks stay where they are
-        self.awake = False  # the kernels are compiled: looking at zones is quick
-        self._ways: SafePaths | None = None
-        self.looked: dict[str, float] = {}
-        self.answered: dict[str, float] = {}  # [s] when a list was told again for an old event
-        # the zones and the home as they were when a UAV's list was laid
-        self.laid: dict[str, tuple[SafePaths, Point]] = {}
-        self.looked_at_all = True  # no zone is new
-        self.stranded: dict[str, str] = {}  # why a UAV has no safe way home
-        self.full = ''  # why no UAV is admitted
-        self.began = self.next_look = 0.0  # [s] first look for UAVs to forget; the next one
-        self._old = {each.uav: each for each in saved.lists if each.stops}
+        self._validity = ListValidity(self.tasks, self.fleet, self.lists, self.paths)
+        self.zone_checks = ZoneChecks(self.fleet, self.lists, self.paths, self.note,
+                                      self.request_replan)
+        self.admission = Admission(self.fleet, self.lists, self.note, self.forget_uav)
+        self._events = TaskEvents(self.tasks, self.fleet, self.lists, self.request_replan,
+                                  self._resend.add)
+        self._missed = MissedCompletions(saved.lists, self.tasks, self.note)
+
+    # inputs
 
     def announce(self, action: AnnouncementAction, tasks: Iterable[Task], stamp: float,
                  now: float) -> list[TaskVerdict]:
-        """ADD or UPDATE tasks."""
-        take = self.tasks.add if action is AnnouncementAction.ADD else self.tasks.update
-        return self._judged(action, [take(task, stamp) for task in tasks], now)
+        """ADD or UPDATE tasks; returns a verdict for each."""
+        apply = self.tasks.add if action is AnnouncementAction.ADD else self.tasks.update
+        return self._announced(action, [apply(task, stamp) for task in tasks], now)
 
     def cancel(self, task_ids: Iterable[str], stamp: float, now: float) -> list[TaskVerdict]:
-        """Withdraw tasks."""
-        return self._judged(AnnouncementAction.CANCEL,
-                            [self.tasks.cancel(task_id, stamp) for task_id in task_ids], now)
+        """Withdraw tasks; returns a verdict for each."""
+        return self._announced(AnnouncementAction.CANCEL,
+                               [self.tasks.cancel(task_id, stamp) for task_id in task_ids], now)
 
     def refuse(self, task_id: str, reason: str, stamp: float) -> TaskVerdict:
-        """A task that is none: its status says so unless an accepted one has that id."""
+        """Refuse an invalid task; its status is REJECTED unless an accepted task has that id."""
         verdict = self.tasks.reject(task_id, reason, stamp)
         self.outbox.statuses = True
         self.note(f'task {task_id!r} REJECTED: {reason}', warning=True)
         return verdict
 
-    def _judged(
+    def _announced(
         self, action: AnnouncementAction, verdicts: list[TaskVerdict], now: float
     ) -> list[TaskVerdict]:
         repeated = [v.task_id for v in verdicts if v.unchanged]
         if repeated:
-            self.note(f'{action.name} of {_some(repeated)} ignored: {UNCHANGED}')
+            self.note(f'{action.name} of {first_names(repeated)} ignored: {UNCHANGED}')
         for verdict in verdicts:
             if not verdict.accepted:
                 self.note(f'{action.name} of task {verdict.task_id!r} REJECTED: '
                           f'{verdict.reason}', warning=True)
             elif not verdict.unchanged:
-                self.touch(f'{action.name} {verdict.task_id}', now)
+                self.request_replan(f'{action.name} {verdict.task_id}', now)
         self.outbox.statuses = True
         return verdicts
 
-    def hear(self, report: UavReport, now: float, stamp: float) -> str:
-        """A UAV says how it is; returns why that is refused, '' when it is not."""
+    def update_uav(self, report: UavReport, now: float, stamp: float) -> str:
+        """Apply the report of a UAV; returns why it is refused, '' if it is not."""
         uav_id = report.uav_id
-        if uav_id not in self.fleet.records and not admission.admit(self, uav_id):
-            return (f'uav_id = {uav_id!r}: expected one of the {admission.MOST_UAVS} UAVs known '
-                    'already')
+        if uav_id not in self.fleet.records and (refusal := self.admission.admit(uav_id)):
+            return refusal
         active = self.fleet.active.get(uav_id)
-        before = self.fleet.hear(report, now, self.params.battery_reserve)
-        self._catch_up(report, stamp)
-        for news in news_of(before, self.fleet.records[uav_id]):
-            self.note(f'{uav_id} {news}')
-            self.touch(f'{uav_id} {news}', now)
-        self._look_for_jumps(before, report, now)
+        before = self.fleet.update(report, now, self.params.battery_reserve)
+        self._missed.complete(report, stamp)
+        for reason in replan_reasons(before, self.fleet.records[uav_id]):
+            self.note(f'{uav_id} {reason}')
+            self.request_replan(f'{uav_id} {reason}', now)
+        self._check_jump(before, report, now)
         if before is None or active != self.fleet.active.get(uav_id):
             self.outbox.statuses = True
-        admission.prove(self, report)
-        if self.lists.learn(uav_id, report.list_revision):
-            self.again.add(uav_id)
-        if self.awake and now - self.looked.get(uav_id, -_LOOK) >= _LOOK:
-            self.looked[uav_id] = now
-            zone_watch.look_ahead(self, uav_id, now)
+        self.admission.confirm(report)
+        if self.lists.raise_revision(uav_id, report.list_revision):
+            self._resend.add(uav_id)
+        if self.kernels_ready:
+            self.zone_checks.check_reported(uav_id, now)
         return ''
 
-    def _look_for_jumps(self, before: UavRecord | None, report: UavReport, now: float) -> None:
-        """A position that cannot have been flown to is believed, told once, and planned for."""
+    def _check_jump(self, before: UavRecord | None, report: UavReport, now: float) -> None:
+        """A position that cannot have been flown to is accepted, logged once, and planned for."""
         speed = report.cruise_speed or self.params.default_cruise_speed
-        metres = jump(before, report, now, speed, self.params.position_jump)
+        metres = jump_distance(before, report, now, speed, self.params.position_jump)
         if before is None or not metres:
             return
         if now - before.jumped > self.params.uav_timeout:
             self.note(f'{report.uav_id} jumped by {metres:.0f} m', warning=True)
         self.fleet.set_jumped(report.uav_id, now)
-        self.touch(f'{report.uav_id} jumped', now)
-
-    def _catch_up(self, report: UavReport, stamp: float) -> None:
-        """After a restart: what comes before the task it flies was flown while nobody heard."""
-        old = self._old.pop(report.uav_id, None)
-        # told again it has the next revision, which the UAV may know already
-        if (old is None or report.list_revision - old.revision not in (0, 1)
-                or report.active_task not in old.task_ids):
-            return
-        for task_id in old.task_ids[:old.task_ids.index(report.active_task)]:
-            record = self.tasks.records.get(task_id)
-            if record is not None and record.open:
-                self.tasks.step(task_id, Life.COMPLETE, stamp, report.uav_id,
-                                'passed while nobody listened')
-                self.note(f'{task_id} COMPLETED while nobody listened: {report.uav_id} flies '
-                          f'{report.active_task}')
+        self.request_replan(f'{report.uav_id} jumped', now)
 
     def event(self, event: TaskEvent, stamp: float, now: float) -> str:
-        """What became of a task; returns why that is refused, '' when it is not."""
-        place = f'event {event.kind.name} of task {event.task_id!r}'
-        why = self._why_not(event, now) or self._take_event(event, stamp)
-        if why:
-            return f'{place}: {why}'
-        self.fleet.proven.add(event.uav_id)
-        if event.kind is TaskEventKind.STARTED:
-            self.fleet.active[event.uav_id] = event.task_id
-        elif event.task_id not in self.lists.get(event.uav_id).task_ids[:1]:
-            self.touch(f'{event.task_id} {event.kind.name} out of turn', now)
-        elif event.kind is TaskEventKind.FAILED:
-            self.touch(f'{event.task_id} FAILED', now)
-        self.outbox.statuses = True
-        return ''
-
-    def _answer(self, event: TaskEvent, now: float) -> None:
-        """A UAV has flown an earlier task of that id: the list once more says that this is new."""
-        held = self.lists.get(event.uav_id)
-        if (event.kind is TaskEventKind.COMPLETED and event.revision < held.revision
-                and event.task_id in held.task_ids
-                and now - self.answered.get(event.uav_id, -ANSWER) >= ANSWER):
-            self.answered[event.uav_id] = now
-            self.again.add(event.uav_id)
-
-    def _why_not(self, event: TaskEvent, now: float) -> str:
-        if event.task_id not in self.tasks.records:
-            return 'unknown task'
-        if event.uav_id not in self.fleet.records and event.uav_id not in self.lists.lists:
-            return f'unknown UAV {event.uav_id!r}'
-        if not self.lists.carried(event.uav_id, event.task_id, event.revision):
-            self._answer(event, now)
-            return f'revision {event.revision} of the list of {event.uav_id} did not have it'
-        return ''
-
-    def _take_event(self, event: TaskEvent, stamp: float) -> str:
-        """By the table of `life`."""
-        has_it = event.task_id in self.lists.get(event.uav_id).task_ids
-        if event.kind is TaskEventKind.FAILED and has_it:
-            return self._failed(event, stamp)
-        life = {
-            TaskEventKind.STARTED: (Life.START_MOVED, Life.START),
-            TaskEventKind.FAILED: (Life.FAIL_MOVED,),
-            TaskEventKind.COMPLETED: (Life.COMPLETE_MOVED, Life.COMPLETE),
-        }[event.kind][has_it]
-        return self.tasks.step(event.task_id, life, stamp, event.uav_id)
-
-    def _failed(self, event: TaskEvent, stamp: float) -> str:
-        """Another UAV may try, until nobody is left or it was tried often enough."""
-        record, why = self.tasks.records[event.task_id], event.reason or 'no reason given'
-        failed_on = tuple(dict.fromkeys((*record.failed_on, event.uav_id)))
-        if not any(may_fly(record.task, failed_on, known.report)
-                   for known in self.fleet.records.values()):
-            life, why = Life.FAIL_LAST, f'{why}; no other UAV can'
-        elif len(failed_on) >= self.params.max_attempts:
-            life, why = Life.FAIL_LAST, f'{why}; tried often enough'
-        else:
-            life = Life.FAIL
-        return self.tasks.step(event.task_id, life, stamp, event.uav_id, why,
-                               failed_on=failed_on)
+        """Apply the progress of a task; returns why it is refused, '' if it is not."""
+        refusal = self._events.apply(event, stamp, now, self.params.max_attempts)
+        self.outbox.statuses |= not refusal
+        return refusal
 
     def set_zones(self, zones: Sequence[ThreatZone], bad: Collection[str], now: float) -> None:
-        """The whole picture; a zone whose new form is bad stays as it was."""
+        """Replace all zones; those whose ids are in `bad` (refused) stay as they were."""
         new = {zone_id: zone for zone_id, zone in self.zones.items() if zone_id in bad}
         new.update((zone.id, zone) for zone in zones)
         if new == self.zones:
             return
         changed = [i for i in {**self.zones, **new} if self.zones.get(i) != new.get(i)]
-        self.zones, self._ways = new, None
-        self.dirty.add('zones')
-        self.looked_at_all = False
-        self.note(f'zones changed: {_some(changed)}')
-        self.touch(f'zones {_some(changed)}', now)
+        self.zones, self._paths = new, None
+        self.mark_unsaved('zones')
+        self.zone_checks.zones_changed()
+        self.note(f'zones changed: {first_names(changed)}')
+        self.request_replan(f'zones {first_names(changed)}', now)
 
     def set_available(self, uav_id: str, available: bool, now: float) -> str:
-        """An operator's word, which stands until he takes it back; '' or why not."""
+        """Switch a UAV on or off; persists until changed. Returns an error text, '' on success."""
         if uav_id not in self.fleet.records and uav_id not in self.lists.lists:
-            return str(InvalidValue('uav_id', uav_id, 'a UAV that was heard'))
-        if available == (uav_id not in self.fleet.off):
+            return str(InvalidValue('uav_id', uav_id, 'a known UAV'))
+        off = self.fleet.switched_off
+        if available == (uav_id not in off):
             return ''
-        (self.fleet.off.discard if available else self.fleet.off.add)(uav_id)
-        self.dirty.add('off')
-        self.touch(f'{uav_id} {"available" if available else "not available"}', now)
+        (off.discard if available else off.add)(uav_id)
+        self.mark_unsaved('off')
+        self.request_replan(f'{uav_id} {"available" if available else "not available"}', now)
         return ''
 
-    def look_for_silence(self, now: float) -> None:
-        """Those not heard for `uav_timeout` lose their tasks to the others."""
-        for uav_id in self.fleet.fall_silent(now, self.params.uav_timeout):
+    def set_params(self, params: AllocatorParams, now: float) -> None:
+        """Use other parameters."""
+        if params is not self.params:
+            self.params = params
+            self.request_replan('parameters changed', now)
+
+    def tick(self, now: float) -> None:
+        """Apply what follows from time alone: UAVs become silent, or are forgotten."""
+        for uav_id in self.fleet.mark_silent(now, self.params.uav_timeout):
             if self.fleet.records[uav_id].report.available:
                 self.note(f'{uav_id} silent for {self.params.uav_timeout:g} s: '
                           'its tasks go to the others', warning=True)
-                self.touch(f'{uav_id} silent', now)
+                self.request_replan(f'{uav_id} silent', now)
+        self.admission.forget_unconfirmed(now)
+        if self.kernels_ready:
+            self.zone_checks.check_all(now)
 
-    def touch(self, trigger: str, now: float) -> None:
-        """The plan is not for this world any more."""
+    def release_hold(self, now: float) -> None:
+        """End the hold after a restart: tasks may go to other UAVs."""
+        self.restart_hold = False
+        self.request_replan('some time after a restart', now)
+
+    def request_replan(self, trigger: str, now: float) -> None:
+        """Invalidate the present plan."""
         self.version += 1
-        self.schedule.touch(trigger, now)
+        self._on_change(trigger, now)
 
     def note(self, text: str, warning: bool = False) -> None:
-        """A line for the log."""
-        if len(self.outbox.notes) >= MOST_NOTES:
-            return
-        self.outbox.notes.append(LogNote(warning, text))
+        """Put a line into the log."""
+        if len(self.outbox.notes) < _MAX_NOTES:
+            self.outbox.notes.append(LogNote(warning, text))
 
-    def ways(self) -> SafePaths:
-        """The ways around the zones as they are now."""
-        from uav_task_alloc.allocator.replanning.safe_paths import SafePaths
-        if self._ways is None or self._ways.params is not self.params:
-            self._ways = SafePaths(tuple(self.zones.values()), self.params)
-        return self._ways
+    def forget_uav(self, uav_id: str) -> None:
+        """Remove a UAV with its list, its row in the journal and its publishers."""
+        self._resend.discard(uav_id)
+        self.outbox.lists.pop(uav_id, None)
+        self.outbox.forgotten.add(uav_id)
+        self.fleet.forget(uav_id)
+        self.lists.forget_uav(uav_id)
+        self.zone_checks.forget(uav_id)
+        self._events.forget(uav_id)
+        self._validity.forget(uav_id)
 
-    def stands(self, uav_id: str, tasks: Sequence[Task]) -> bool:
-        """The list in force is this route, and its ways are as good as when they were laid."""
-        stops, ways = self.lists.get(uav_id).stops, self.ways()
-        record = self.fleet.records[uav_id]
-        return (bool(stops) and self.laid.get(uav_id) == (ways, record.home)
-                and not record.caught
-                and [stop.task for stop in stops] == tasks
-                and ways.rest(record.report.position, stops[0].leg,
-                              stops[0].task.position) is not None)
+    def forget_ended(self) -> None:
+        """Remove ended tasks beyond `keep_ended`."""
+        if len(self.tasks.ended) > self.params.keep_ended:
+            self.lists.forget_tasks(
+                self.tasks.forget_ended(self.params.keep_ended, self.lists.owners()))
 
-    def locked(self) -> dict[str, tuple[str, ...]]:
-        """What is being flown, and what comes next as far as committed: it stays as it is."""
-        owners, found = self.lists.owners(), dict[str, tuple[str, ...]]()
-        seen: set[str] = set()
-        for uav_id in filter(self.fleet.usable, self.fleet.records):
-            first = self.fleet.active.get(uav_id, '')
-            if first in seen or owners.get(first, uav_id) != uav_id:
-                first = ''  # another one has it
-            kept = tuple(t for t in self._committed(uav_id, first) if self._can(uav_id, t))
-            seen.update(kept)
-            found[uav_id] = kept
-        return {uav_id: kept for uav_id, kept in found.items() if kept}
+    # questions of the planner
 
-    def _committed(self, uav_id: str, first: str) -> tuple[str, ...]:
-        """The tasks that stay with a UAV, the one it flies first; all shortly after a restart."""
-        held = self.lists.get(uav_id).task_ids
-        if self.cautious:
-            return (*filter(None, (first,)), *(t for t in held if t != first))
-        if not first or not self._can(uav_id, first):
-            return ()
-        after = held[held.index(first) + 1:] if first in held else ()
-        return (first, *(t for t in after if self._can(uav_id, t)))[:self.params.locked_tasks]
+    def paths(self) -> SafePaths:
+        """Return the paths around the present zones."""
+        if self._paths is None or self._paths_params is not self.params:
+            self._paths_params = self.params
+            self._paths = self._make_safe_paths(tuple(self.zones.values()), self.params)
+        return self._paths
 
-    def _can(self, uav_id: str, task_id: str) -> bool:
-        record = self.tasks.records.get(task_id)
-        return record is not None and record.open and may_fly(
-            record.task, record.failed_on, self.fleet.records[uav_id].report)
+    def task(self, task_id: str) -> Task:
+        """Return an accepted task."""
+        return self.tasks.records[task_id].task
 
+    def list_of(self, uav_id: str) -> UavList:
+        """Return the list in force of a UAV; one of revision 0 where none was published."""
+        return self.lists.get(uav_id)
 
-def _some(names: Sequence[str]) -> str:
-    return ', '.join(names[:5]) + (f' and {len(names) - 5} more' if len(names) > 5 else '')
+    def listed_uavs(self) -> list[str]:
+        """Return the UAVs for which a list is in force, known or not."""
+        return list(self.lists.lists)
+
+    def uav_record(self, uav_id: str) -> UavRecord | None:
+        """Return what is known of a UAV; None where it is not known."""
+        return self.fleet.records.get(uav_id)
+
+    def usable(self, uav_id: str) -> bool:
+        """Return whether a UAV may be given tasks."""
+        return self.fleet.usable(uav_id)
+
+    def any_usable(self) -> bool:
+        """Return whether a UAV may be given tasks."""
+        return any(map(self.fleet.usable, self.fleet.records))
+
+    def any_open(self) -> bool:
+        """Return whether a task is still to be done."""
+        return any(record.open for record in self.tasks.records.values())
+
+    def home_of(self, uav_id: str) -> Point:
+        """Return the home of a known UAV [m]."""
+        return self.fleet.records[uav_id].home
+
+    def uav(self, uav_id: str) -> Uav:
+        """Return a known UAV for the solver."""
+        return self.fleet.uav(uav_id, self.params.default_range,
+                              self.params.default_cruise_speed)
+
+    def usable_uavs(self) -> tuple[Uav, ...]:
+        """Return the UAVs that may be given tasks."""
+        return tuple(map(self.uav, self.fleet.usable_ids()))
+
+    def tasks_to_plan(self) -> tuple[Task, ...]:
+        """Return the open tasks, less those that stay with unusable UAVs after a restart.
+
+        Those may have been flown while the allocator was down; the bridge repeats the event when
+        they are listed.
+        """
+        usable = frozenset(self.fleet.usable_ids())
+        held = self.lists.lists if self.restart_hold else {}
+        kept = {task_id for uav_id, each in held.items() if uav_id not in usable
+                for task_id in each.task_ids}
+        return tuple(without_failed(record, usable) for record in self.tasks.open()
+                     if record.task.id not in kept)
+
+    def locked_tasks(self) -> dict[str, tuple[str, ...]]:
+        """Return the tasks of each UAV that a plan may not move, in the order flown."""
+        return locked_tasks(self.tasks, self.fleet, self.lists, self.params.locked_tasks,
+                            self.restart_hold)
+
+    def can_fly(self, uav_id: str, task_id: str) -> bool:
+        """Return whether a task is open and a known UAV may fly it."""
+        return can_fly(self.tasks, self.fleet, uav_id, task_id)
+
+    def is_current(self, uav_id: str, tasks: Sequence[Task]) -> bool:
+        """Return whether the list in force of a UAV has these tasks, and fits the zones."""
+        return self._validity.is_current(uav_id, tasks)
+
+    def must_change(self, uav_id: str) -> bool:
+        """Return whether the list in force of a UAV cannot or may not be flown."""
+        return self._validity.must_change(
+            uav_id, self.params.route_end == 'home' and uav_id not in self.zone_checks.stranded)
+
+    # results of the planner
+
+    def set_built(self, zones_when_built: ZonesWhenBuilt,
+                  paths_home: Mapping[str, tuple[bool, Point]]) -> None:
+        """Record what lists were built for.
+
+        Args:
+            zones_when_built: the paths, and the home [m], by UAV.
+            paths_home: whether there is a safe path home, and from where [m], by UAV.
+        """
+        self._validity.zones_when_built.update(zones_when_built)
+        for uav_id, (exists, start) in paths_home.items():
+            self.zone_checks.set_path_home(uav_id, exists, start)
+
+    def step_tasks(self, steps: Iterable[TaskStep], stamp: float) -> None:
+        """Apply what a plan makes of open tasks."""
+        for step in steps:
+            self.tasks.step(step.task_id, step.event, stamp, step.uav, step.why)
+
+    def publish(self, lists: Mapping[str, UavList], stamp: float,
+                resend: bool = False) -> list[str]:
+        """Put lists in force; returns the UAVs whose lists changed, with `resend` all of them."""
+        revised = [self.lists.publish(each, stamp, resend) for each in lists.values()]
+        published = {each.uav: each for each in revised if each}
+        self.outbox.lists.update(published)
+        self._resend.difference_update(published)
+        return list(published)
+
+    def shortened_lists(self, stamp: float) -> dict[str, UavList]:
+        """Return the lists with ended tasks at their front, without those."""
+        shorter = {uav_id: self.lists.without_ended(uav_id, self._ended, stamp)
+                   for uav_id in self.lists.lists}
+        return {uav_id: each for uav_id, each in shorter.items() if each is not None}
+
+    def lists_to_resend(self, stamp: float) -> dict[str, UavList]:
+        """Return the lists in force that are to be published again.
+
+        One with an ended task after the first waits for the plan: its legs are not valid.
+        """
+        return {uav_id: self.lists.restamped(uav_id, stamp) for uav_id in sorted(self._resend)
+                if not any(map(self._ended, self.lists.get(uav_id).task_ids))}
+
+    def _ended(self, task_id: str) -> bool:
+        return not self.tasks.is_open(task_id)
+
+    def next_revision(self) -> int:
+        """Return the revision of the next allocation."""
+        self.revision += 1
+        self.mark_unsaved('revision')
+        return self.revision
+
+    def mark_unsaved(self, kind: str) -> None:
+        """Have a row without an id written: 'zones', 'off', 'revision' or 'learner'."""
+        self._unsaved.add(kind)
+
+    def unsaved(self) -> dict[str, set[str]]:
+        """Return what is not on disk: ids of 'task' and 'list' rows, kinds of the rows of ''."""
+        return {'task': self.tasks.unsaved, 'list': self.lists.unsaved, '': self._unsaved}

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The zones as they are now, packed once, and asked often: is this way clear, how long is it?"""
+"""Safe paths around zones: the obstacles are packed once for many questions.
+
+Importing this module loads the compiled kernels.
+"""
 from __future__ import annotations
 
 import math
@@ -15,15 +18,18 @@ from uav_task_alloc.geometry.search_budget import SearchBudget
 from uav_task_alloc.model import Leg, Point, ThreatZone
 from uav_task_alloc.params import AllocatorParams
 
-MOST_WORK = 20_000_000  # units in one search for a way, some 50 ms
+_MAX_WORK = 20_000_000  # units in one search for a path, some 50 ms
 
 
-class SafePaths:
-    """Ways around `zones`; half the clearance is left to wind and GPS once a way is flown."""
+class ZonePaths:
+    """The `SafePaths` around `zones`.
+
+    Paths are planned with the clearance; in flight half of it is left for wind and GPS error.
+    """
 
     def __init__(self, zones: Sequence[ThreatZone], params: AllocatorParams) -> None:
         self.zones, self.params = tuple(zones), params
-        self.margin = params.replan_margin  # share that a way must be shorter to replace one
+        self.margin = params.replan_margin
         self._bare = pack(self.zones)
         self._wide = pack(self.zones, 0.5 * params.clearance)
         self._planned = pack(self.zones, params.clearance)
@@ -32,27 +38,27 @@ class SafePaths:
         self._high = np.stack([rows['x1'], rows['y1'], rows['z1']], axis=1)
 
     def leg(self, a: Point, b: Point) -> Leg | None:
-        """The shortest safe way from a to b; None where there is none, or it takes too long."""
+        """Return the shortest safe leg from a to b; None if none was found in the budget."""
         found = self._find(a, b)
         return None if math.isinf(found.length) else Leg(found.points, found.length)
 
     def why_none(self, a: Point, b: Point) -> str:
-        """Why there is no safe way from a to the home b, in words."""
+        """Return why there is no safe path from a to the home b."""
         found = self._find(a, b)
         if found.goal_inside:
             return f'its home is inside zone {", ".join(found.goal_inside)}'
         return 'none was found in the time' if found.given_up else 'zones close it off'
 
     def _find(self, a: Point, b: Point) -> Detour:
-        """By whoever also hears and tells: a search must not keep it for long."""
+        """Search with a bounded budget, as this runs in the thread of the callbacks."""
         params, budget = self.params, SearchBudget()
-        budget.start_stage(MOST_WORK)
+        budget.start_stage(_MAX_WORK)
         return find_detour(a, b, self.zones, clearance=params.clearance,
                            altitude_min=params.altitude_min, altitude_max=params.altitude_max,
                            budget=budget, obstacles=self._planned)
 
     def around(self, point: Point, up: float = 0.0, wide: bool = False) -> str:
-        """The first zone that the point, or a point less than `up` [m] above it, is in.
+        """Return the first zone that contains a point, or one less than `up` above it.
 
         Args:
             point: [m] ENU.
@@ -60,7 +66,7 @@ class SafePaths:
             wide: with half the clearance, not the margin alone.
 
         Returns:
-            Its id, '' where there is none.
+            Its id, '' where there is none. O(zones).
         """
         rows, top = (self._wide if wide else self._bare).rows, (*point[:2], point[2] + up)
         near = ((top >= self._low) & (point <= self._high)).all(axis=1)
@@ -68,7 +74,7 @@ class SafePaths:
                      if blocked(rows[k], *point, *top, -np.inf, True)), '')
 
     def clear(self, *points: Point) -> bool:
-        """The polyline enters no zone. O(zones) a segment, most of them by their boxes"""
+        """Return whether a polyline enters no zone. O(zones) a segment, mostly box tests."""
         return not self.zones or not any(self._cut(a, b) for a, b in pairwise(points))
 
     def _cut(self, a: Point, b: Point) -> bool:
@@ -77,7 +83,7 @@ class SafePaths:
         return any(blocked(rows[k], *a, *b, -np.inf, True) for k in np.flatnonzero(near))
 
     def rest(self, position: Point, leg: Leg, goal: Point) -> float | None:
-        """Metres still to fly on a leg under way, by the via points ahead; None: it is cut."""
+        """Return the length [m] still to fly of a leg under way; None if a zone cuts it."""
         ahead = len(leg.via) - points_passed(position, (*leg.via, goal))
         for left in (ahead, *range(ahead - 1, -1, -1), *range(ahead + 1, len(leg.via) + 1)):
             points = (position, *leg.via[len(leg.via) - left:], goal)

@@ -1,0 +1,54 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What of the world is not on disk, as rows of the journal."""
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from uav_task_alloc.allocator.persistence.restore import (
+    list_row,
+    off_row,
+    revision_row,
+    task_row,
+    zones_row,
+)
+from uav_task_alloc.allocator.replanning.learned_state import learned_row
+from uav_task_alloc.allocator.state.world import World
+from uav_task_alloc.journal import JournalRow
+
+
+def rows(world: World, state: object, most: int | None = None) -> list[JournalRow]:
+    """Return the rows to write; a row without a body deletes one.
+
+    Args:
+        world: of the allocator.
+        state: learned state of the best plan.
+        most: tasks at once; None: all.
+    """
+    unsaved, tasks, lists = world.unsaved(), world.tasks.records, world.lists.lists
+    changed = [task_row(tasks[task_id]) if task_id in tasks else JournalRow('task', task_id, None)
+               for task_id in sorted(unsaved['task'])[:most]]
+    changed += [list_row(lists[uav_id]) if uav_id in lists else JournalRow('list', uav_id, None)
+                for uav_id in sorted(unsaved['list'])]
+    make = {'zones': lambda: zones_row(world.zones.values()),
+            'off': lambda: off_row(world.fleet.switched_off),
+            'revision': lambda: revision_row(world.revision),
+            'learner': lambda: learned_row(state)}
+    return changed + [make[kind]() for kind in sorted(unsaved[''])]
+
+
+def mark_all(world: World) -> None:
+    """Mark the whole world as not written."""
+    unsaved = world.unsaved()
+    unsaved['task'].update(world.tasks.records)
+    unsaved['list'].update(world.lists.lists)
+    unsaved[''].update(('zones', 'off', 'revision', 'learner'))
+
+
+def mark_written(world: World, written: Iterable[JournalRow] | None) -> bool:
+    """Mark rows as written, None: everything; returns whether nothing is left to write."""
+    unsaved = world.unsaved()
+    for row in written or ():
+        unsaved.get(row.kind, unsaved['']).discard(row.id or row.kind)
+    for ids in unsaved.values() if written is None else ():
+        ids.clear()
+    return not any(unsaved.values())

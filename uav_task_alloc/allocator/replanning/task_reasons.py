@@ -1,0 +1,57 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a plan makes of each open task: its UAV, or the reason why it has none."""
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from uav_task_alloc.allocator.records import TaskRecord
+from uav_task_alloc.allocator.state.fleet import Fleet, may_fly
+from uav_task_alloc.allocator.state.published_lists import PublishedLists
+from uav_task_alloc.allocator.state.task_state_machine import TaskStep, TaskTransition
+from uav_task_alloc.allocator.state.tasks import TaskRegistry, without_failed
+from uav_task_alloc.allocator.state.zone_checks import blocked_text
+
+
+def task_steps(tasks: TaskRegistry, fleet: Fleet, lists: PublishedLists,
+               left_out: Mapping[str, str]) -> list[TaskStep]:
+    """Return an event for each open task.
+
+    Args:
+        tasks, fleet, lists: the present state.
+        left_out: reason by task id, of the plan in force.
+    """
+    owners, usable = lists.owners(), frozenset(fleet.usable_ids())
+    steps = []
+    for record in tasks.open():
+        task_id = record.task.id
+        uav_id = owners.get(task_id, '')
+        if not uav_id:
+            steps.append(_unlisted(record, fleet, usable, left_out))
+        elif fleet.active.get(uav_id) == task_id:
+            steps.append(TaskStep(task_id, TaskTransition.START, uav_id))
+        else:
+            steps.append(TaskStep(task_id, TaskTransition.LIST, uav_id))
+    return steps
+
+
+def _unlisted(record: TaskRecord, fleet: Fleet, usable: frozenset[str],
+              left_out: Mapping[str, str]) -> TaskStep:
+    task, known = record.task, fleet.records
+    if not known:
+        return TaskStep(task.id, TaskTransition.WAIT, why='no UAV known yet')
+    if task.allowed_uavs is not None and known.keys().isdisjoint(task.allowed_uavs):
+        why = f'allowed for {", ".join(sorted(task.allowed_uavs))} only: not known yet'
+        return TaskStep(task.id, TaskTransition.LEAVE, why=why)
+    blocked = blocked_text(uav for uav in fleet.blocked_on_ground()
+                           if may_fly(task, record.failed_on, uav.report))
+    if not usable:
+        return TaskStep(task.id, TaskTransition.LEAVE, why=blocked or 'no UAV available')
+    others = without_failed(record, usable).allowed_uavs
+    if record.failed_on and others is not None and others.isdisjoint(usable):
+        why = f'failed on {", ".join(record.failed_on)}; no other UAV that may fly it is available'
+    elif task.id in left_out:
+        why = left_out[task.id]
+    else:
+        why = record.reason or 'waits for the next plan'
+        return TaskStep(task.id, TaskTransition.WAIT, why=why)
+    return TaskStep(task.id, TaskTransition.LEAVE, why='; '.join(filter(None, (why, blocked))))

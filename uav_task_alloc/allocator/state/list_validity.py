@@ -1,0 +1,61 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Whether the list in force of a UAV can stay as it is, or has to be replaced."""
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from itertools import pairwise
+
+from uav_task_alloc.allocator.state.fleet import Fleet
+from uav_task_alloc.allocator.state.published_lists import PublishedLists
+from uav_task_alloc.allocator.state.safe_paths import GetSafePaths, SafePaths
+from uav_task_alloc.allocator.state.tasks import TaskRegistry
+from uav_task_alloc.model import Point, Task
+
+ZonesWhenBuilt = Mapping[str, tuple[SafePaths, Point]]  # UAV -> paths, and its home [m]
+
+
+class ListValidity:
+    """Compares the lists in force with the present tasks, UAVs and zones."""
+
+    def __init__(self, tasks: TaskRegistry, fleet: Fleet, lists: PublishedLists,
+                 paths: GetSafePaths) -> None:
+        self._tasks, self._fleet, self._lists, self._paths = tasks, fleet, lists, paths
+        self.zones_when_built: dict[str, tuple[SafePaths, Point]] = {}
+
+    def is_current(self, uav_id: str, tasks: Sequence[Task]) -> bool:
+        """Return whether the list in force has these tasks, and was built for present zones.
+
+        A list whose leg under way is cut, or whose UAV is inside a zone, is not.
+        """
+        stops, paths = self._lists.get(uav_id).stops, self._paths()
+        record = self._fleet.records[uav_id]
+        return (bool(stops) and self.zones_when_built.get(uav_id) == (paths, record.home)
+                and not record.inside_zone
+                and [stop.task for stop in stops] == tasks
+                and paths.rest(record.report.position, stops[0].leg,
+                               stops[0].task.position) is not None)
+
+    def must_change(self, uav_id: str, returns: bool) -> bool:
+        """Return whether the list in force cannot or may not be flown, or has no tasks.
+
+        Args:
+            uav_id: a UAV.
+            returns: whether its list should end with a return home.
+        """
+        published, record = self._lists.get(uav_id), self._fleet.records.get(uav_id)
+        if not published.stops or record is None or not self._fleet.usable(uav_id):
+            return True
+        for stop in published.stops:
+            known = self._tasks.records.get(stop.task.id)
+            if (known is None or not known.open or known.task != stop.task
+                    or not self._fleet.may_fly(uav_id, known.task, known.failed_on)):
+                return True
+        paths, first = self._paths(), published.stops[0]
+        return (published.returns != returns
+                or paths.rest(record.report.position, first.leg, first.task.position) is None
+                or not all(paths.clear(before.task.position, *stop.leg.via, stop.task.position)
+                           for before, stop in pairwise(published.stops)))
+
+    def forget(self, uav_id: str) -> None:
+        """Drop what is kept of a UAV."""
+        self.zones_when_built.pop(uav_id, None)

@@ -1,0 +1,37 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What the allocator asks of the zones; `replanning.zone_paths` answers it, a test may fake it."""
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Protocol
+
+from uav_task_alloc.model import Leg, Point, ThreatZone
+from uav_task_alloc.params import AllocatorParams
+
+
+class SafePaths(Protocol):
+    """Paths around one set of zones; all points are [m] ENU. Two are equal if identical."""
+
+    margin: float  # share of its length that a path must be shorter to replace a published one
+
+    def leg(self, a: Point, b: Point) -> Leg | None:
+        """Return the shortest safe leg from a to b; None if none was found."""
+
+    def why_none(self, a: Point, b: Point) -> str:
+        """Return why there is no safe path from a to the home b."""
+
+    def around(self, point: Point, up: float = 0.0, wide: bool = False) -> str:
+        """Return the id of the first zone around a point, or around one at most `up` [m] above.
+
+        `wide`: the zone with half the clearance. '' if there is none.
+        """
+
+    def clear(self, *points: Point) -> bool:
+        """Return whether a polyline enters no zone."""
+
+    def rest(self, position: Point, leg: Leg, goal: Point) -> float | None:
+        """Return the length [m] still to fly of a leg under way; None if a zone cuts it."""
+
+
+MakeSafePaths = Callable[[Sequence[ThreatZone], AllocatorParams], SafePaths]
+GetSafePaths = Callable[[], SafePaths]  # those around the present zones
