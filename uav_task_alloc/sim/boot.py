@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How far an autopilot has come since power-up: booting, without a position, settling, ready."""
+"""Boot phases of an autopilot: booting, without a position, settling estimate, ready."""
 from __future__ import annotations
 
 from typing import NamedTuple
@@ -8,7 +8,7 @@ from uav_task_alloc.sim.config import VehicleConfig
 
 
 class BootTimes(NamedTuple):
-    """How long the real autopilot takes."""
+    """Boot times of the real autopilot."""
 
     boot: float  # [s] until it is initialised
     position: float  # [s] from power-up to a position estimate
@@ -16,12 +16,17 @@ class BootTimes(NamedTuple):
 
 
 class Boot:
-    """The times of one vehicle; those that are not configured are at most its arming delay."""
+    """Boot phase of one vehicle.
+
+    Args:
+        config: boot times; those that are None are the real ones, at most the arming delay.
+        real: times of the real autopilot.
+    """
 
     def __init__(self, config: VehicleConfig, real: BootTimes) -> None:
         position = real.position if config.arming_delay is None else config.arming_delay
-        given, settling = config.boot_delay, config.settling_time
-        boot = min(real.boot, position) if given is None else given
+        delay, settling = config.boot_delay, config.settling_time
+        boot = min(real.boot, position) if delay is None else delay
         self.times = BootTimes(
             boot, max(boot, position), min(real.settling, position) if settling is None
             else settling)
@@ -29,12 +34,12 @@ class Boot:
 
     @property
     def initialising(self) -> bool:
-        """The first half of the boot: nothing is calibrated."""
+        """Whether it is in the first half of the boot: nothing is calibrated."""
         return self.elapsed < self.times.boot / 2.0
 
     @property
     def booting(self) -> bool:
-        """Whether it still boots."""
+        """Whether it is booting."""
         return self.elapsed < self.times.boot
 
     @property
@@ -44,5 +49,5 @@ class Boot:
 
     @property
     def settling(self) -> bool:
-        """Whether there is an estimate, but one that jumps."""
+        """Whether there is an estimate that still jumps."""
         return self.positioned and self.elapsed < self.times.position + self.times.settling

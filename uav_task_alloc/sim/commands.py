@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""COMMAND_LONG and COMMAND_INT as a simulated autopilot carries them out, with their result."""
+"""COMMAND_LONG and COMMAND_INT as a simulated autopilot executes them, with their result."""
 from __future__ import annotations
 
 import math
@@ -31,14 +31,14 @@ _PLAIN_COMMANDS = {
 
 
 class Commands:
-    """One handler a command; `refused` is what this autopilot answers where it may not."""
+    """One handler per command; `refused` is the MAV_RESULT of a command not possible now."""
 
     refused = _FAILED
 
     def __init__(self, flight: VehicleFlight, streams: Streams) -> None:
         self.flight = flight
         self.streams = streams
-        self.out: list[Message] = []  # what REQUEST_MESSAGE asks for
+        self.out: list[Message] = []  # answers to REQUEST_MESSAGE
         self.handlers: dict[int, Callable[[CommandParams], int]] = {
             dialect.MAV_CMD_COMPONENT_ARM_DISARM: self._arm_disarm,
             dialect.MAV_CMD_NAV_TAKEOFF: self._takeoff,
@@ -52,17 +52,17 @@ class Commands:
             self.handlers[command] = partial(self._enter, mode)
 
     def run(self, command: int, params: CommandParams) -> int:
-        """The MAV_RESULT of a command."""
+        """Execute a command; returns its MAV_RESULT."""
         handler = self.handlers.get(command)
         return _UNSUPPORTED if handler is None else handler(params)
 
     def note(self, command: int, params: CommandParams, station: str) -> None:
-        """Note a command about mode, arming, take-off or the mission in the ground truth."""
+        """Record a command about mode, arming, take-off or mission in the ground truth."""
         flight, modes = self.flight, self.flight.custom_modes
         if command == dialect.MAV_CMD_COMPONENT_ARM_DISARM:
             forced = 'forced ' if params[1] == _FORCE else ''
-            word = forced + ('arm' if params[0] == 1.0 else 'disarm')
-            flight.note('command', command=word, cause=station)
+            name = forced + ('arm' if params[0] == 1.0 else 'disarm')
+            flight.note('command', command=name, cause=station)
         elif command == dialect.MAV_CMD_DO_SET_MODE:
             flight.note('command', command='mode', mode=self.custom_mode(params), cause=station)
         elif command in _MODE_COMMANDS:
@@ -74,7 +74,7 @@ class Commands:
             flight.note('command', command=_PLAIN_COMMANDS[command], cause=station)
 
     def custom_mode(self, params: CommandParams) -> int:
-        """The custom mode that DO_SET_MODE asks for."""
+        """The custom mode that DO_SET_MODE commands."""
         raise NotImplementedError
 
     def _result(self, done: bool) -> int:
@@ -111,7 +111,7 @@ class Commands:
 
 
 class ArduPilotCommands(Commands):
-    """Refuses with FAILED; takes 224; take-off height is above home."""
+    """Refuses with FAILED; supports DO_SET_MISSION_CURRENT; take-off height is above home."""
 
     def __init__(self, flight: VehicleFlight, streams: Streams) -> None:
         super().__init__(flight, streams)
@@ -126,7 +126,7 @@ class ArduPilotCommands(Commands):
 
 
 class Px4Commands(Commands):
-    """Refuses with TEMPORARILY_REJECTED; 224 is unsupported; take-off height is AMSL."""
+    """Refuses with TEMPORARILY_REJECTED; no DO_SET_MISSION_CURRENT; take-off height is AMSL."""
 
     refused = _REJECTED
 

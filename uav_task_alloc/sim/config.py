@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a simulated vehicle is given, and the flight modes both autopilots have in common."""
+"""Configuration of a simulated vehicle, its flight modes and its ground-truth events."""
 from __future__ import annotations
 
 import math
@@ -12,7 +12,7 @@ from uav_task_alloc.model import Point
 
 @dataclass(frozen=True, slots=True)
 class VehicleConfig:
-    """One airframe; None means: as the real autopilot has it."""
+    """Configuration of one vehicle; None is the value of the real autopilot."""
 
     uav: str
     system_id: int  # 1..255
@@ -34,7 +34,7 @@ class VehicleConfig:
 
 
 class FlightMode(Enum):
-    """What the vehicle does; `vehicle_modes` has the custom modes of each autopilot.
+    """What the vehicle does; `modes` maps the custom modes of each autopilot to these.
 
     MANUAL is flown by the pilot's stick, and so is HOLD on ArduCopter (LOITER).
     """
@@ -47,21 +47,21 @@ class FlightMode(Enum):
     TAKEOFF = 'takeoff'
     RETURN = 'return'
     LAND = 'land'
-    OTHER = 'other'  # any that stops and stays, as CIRCLE or OFFBOARD do here
+    OTHER = 'other'  # any that hovers here, such as CIRCLE or OFFBOARD
 
 
 class StorageChange(Enum):
-    """What happened to the stored mission, for the flight that may be using it."""
+    """Change of the stored mission, reported to the flight that uses it."""
 
     TRUNCATED = 'truncated'
     WRITTEN = 'written'
-    REPLACED = 'swapped'
+    REPLACED = 'replaced'
     CLEARED = 'cleared'
 
 
 @dataclass(frozen=True, slots=True)
 class TruthEvent:
-    """Something that happened on board, for the ground-truth log.
+    """An event on board, for the ground-truth log.
 
     Names: armed, disarmed, takeoff, item_reached, mission_end, died, mode, command, crashed,
     reboot, failsafe, failsafe_over, kill_switch, kill_switch_off, glitch. Causes: `station

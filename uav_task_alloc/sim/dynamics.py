@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How a simulated copter moves and drains: a point mass with limits, and a track to follow."""
+"""Motion and battery of a simulated copter: a point mass with limits, and a track to follow."""
 from __future__ import annotations
 
 import math
@@ -11,13 +11,13 @@ from uav_task_alloc.geometry.frames import Origin, to_geodetic_batch
 from uav_task_alloc.model import Point
 from uav_task_alloc.sim.config import VehicleConfig
 
-_CORNER = 1.0  # [m] a turn may swing out
-_HOVER = 0.25  # a hovering copter drains as one at this share of its cruise speed
-_BRAKING = 0.7  # share of the acceleration that braking is planned with
+_CORNER = 1.0  # [m] largest overshoot of a turn
+_HOVER = 0.25  # share of cruise speed whose battery drain equals that of hovering
+_BRAKING = 0.7  # share of the acceleration used to plan braking
 
 
 class PointMass:
-    """Position, velocity and battery in ENU; `step` moves it towards a point."""
+    """Position, velocity (ENU) and battery of one vehicle; `step` moves it towards a point."""
 
     def __init__(self, config: VehicleConfig) -> None:
         self._config = config
@@ -26,15 +26,22 @@ class PointMass:
         self.heading = 0.0  # [rad] from east, counter-clockwise
         self.flown = 0.0  # [m]
         self.battery = 1.0  # [0..1]
-        self._near = _NearGeodetic(config.origin)
+        self._geodetic = _LinearGeodetic(config.origin)
 
     def step(self, dt: float, target: Point | None, speed: float, exit_speed: float) -> None:
-        """Fly `dt` [s] towards the target, to pass it at `exit_speed`; None: stop."""
+        """Fly for `dt` [s] towards a target.
+
+        Args:
+            dt: [s].
+            target: ENU [m]; None: stop.
+            speed: largest speed [m/s].
+            exit_speed: speed at the target [m/s].
+        """
         self.steer(dt, (0.0, 0.0, 0.0) if target is None
-                   else self._wish(dt, target, speed, exit_speed))
+                   else self._desired_velocity(dt, target, speed, exit_speed))
 
     def steer(self, dt: float, velocity: Point) -> None:
-        """Fly `dt` [s] towards a velocity [m/s], within the acceleration."""
+        """Change towards a velocity [m/s] within the acceleration, and fly for `dt` [s]."""
         change = _minus(velocity, self.velocity)
         most = self._config.acceleration * dt
         share = min(1.0, most / max(_norm(change), 1e-9))
@@ -48,11 +55,12 @@ class PointMass:
         self.battery = max(0.0, self.battery - drain)
 
     def fall(self, dt: float, speed: float) -> None:
-        """Fall straight down for `dt` [s], without motors."""
+        """Fall straight down for `dt` [s] at `speed` [m/s], motors off."""
         self.velocity = (0.0, 0.0, -speed)
         self.position = _plus(self.position, self.velocity, dt)
 
-    def _wish(self, dt: float, target: Point, speed: float, exit_speed: float) -> Point:
+    def _desired_velocity(self, dt: float, target: Point, speed: float,
+                          exit_speed: float) -> Point:
         gap = _minus(target, self.position)
         distance = _norm(gap)
         if distance < 1e-6:
@@ -61,7 +69,7 @@ class PointMass:
         limit = min(speed, math.sqrt(exit_speed**2 + 2.0 * braking * distance))
         if exit_speed == 0.0:
             limit = min(limit, distance / dt)
-        # what is left of the acceleration goes into ending the motion across the way
+        # the rest of the acceleration ends the motion across the path
         along = sum(v * g for v, g in zip(self.velocity, gap, strict=True)) / distance
         limit = min(limit, max(0.0, along) + self._config.acceleration * dt)
         steep = abs(gap[2]) / distance
@@ -70,17 +78,17 @@ class PointMass:
         return gap[0] / distance * limit, gap[1] / distance * limit, gap[2] / distance * limit
 
     def land_at(self, height: float) -> None:
-        """Touch the ground, and stay there."""
+        """Come to rest on the ground at `height` [m] ENU."""
         self.position = (self.position[0], self.position[1], height)
         self.velocity = (0.0, 0.0, 0.0)
 
     def geodetic(self, offset: Point = (0.0, 0.0, 0.0)) -> tuple[float, float, float]:
         """Latitude [deg], longitude [deg], altitude AMSL [m] of the position, `offset` [m] off."""
-        return self._near.place(_plus(self.position, offset, 1.0))
+        return self._geodetic.convert(_plus(self.position, offset, 1.0))
 
 
-class _NearGeodetic:
-    """ENU to WGS84 by a linear map that is made anew every 50 m: below 1 mm off, and cheap."""
+class _LinearGeodetic:
+    """ENU to WGS84 by a linear map, rebuilt every 50 m: cheap, error below 1 mm."""
 
     def __init__(self, origin: Origin) -> None:
         self._origin = origin
@@ -88,7 +96,7 @@ class _NearGeodetic:
         self._base: list[float] = []
         self._slope: list[list[float]] = []
 
-    def place(self, point: Point) -> tuple[float, float, float]:
+    def convert(self, point: Point) -> tuple[float, float, float]:
         if self._around is None or metres_between(point, self._around) > 50.0:
             x, y, z = self._around = point
             rows = to_geodetic_batch(self._origin, [
@@ -103,24 +111,37 @@ class _NearGeodetic:
 
 
 class Track:
-    """Points to pass one after the other, then a time to stay at the last."""
+    """Points to pass in order, and a hold at the last.
+
+    Args:
+        points: ENU [m].
+        radius: distance at which a point is passed [m].
+        hold: time to stay at the last point [s].
+        lands: whether it ends on the ground.
+    """
 
     def __init__(self, points: Sequence[Point], radius: float, hold: float = 0.0,
                  lands: bool = False) -> None:
         self.points = tuple(points)
-        self.radius = radius  # [m] near enough to have passed a point
-        self.hold = hold  # [s]
-        self.lands = lands  # it ends on the ground
+        self.radius = radius
+        self.hold = hold
+        self.lands = lands
         self._next = 0
         self._arrived: float | None = None
 
     @property
     def target(self) -> Point | None:
-        """Where to fly now; the last point while holding, None where there is none."""
+        """The point to fly to; the last one while holding, None where there is none."""
         return self.points[min(self._next, len(self.points) - 1)] if self.points else None
 
     def exit_speed(self, position: Point, then: Point | None, acceleration: float) -> float:
-        """Speed [m/s] at which the target may be passed, so that the turn stays tight."""
+        """Speed [m/s] at which the target may be passed for a turn within _CORNER.
+
+        Args:
+            position: ENU [m].
+            then: the point after the track, ENU [m]; None: there is none.
+            acceleration: [m/s2].
+        """
         if self._next < len(self.points) - 1:
             then = self.points[self._next + 1]
         elif self.hold > 0.0 or self.lands:
@@ -135,7 +156,7 @@ class Track:
         return math.sqrt(2.0 * acceleration * _CORNER) / max(sine, 1e-3)
 
     def finished(self, position: Point, now: float) -> bool:
-        """Note what is passed by now [s]; True once the last point was held long enough."""
+        """Mark the points passed at `now` [s]; True once the last point was held long enough."""
         while (self._next < len(self.points)
                and metres_between(position, self.points[self._next]) <= self.radius):
             self._next += 1
@@ -147,7 +168,7 @@ class Track:
 
 
 def metres_between(a: Point, b: Point) -> float:
-    """[m] between two points."""
+    """Distance between two points [m]."""
     return _norm(_minus(a, b))
 
 

@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What pilots and failsafes do to a simulated vehicle by themselves, not by MAVLink."""
+"""Interventions in a simulated vehicle without MAVLink: the pilot, failsafes, satellites."""
 from __future__ import annotations
 
 from typing import NamedTuple
+
+from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.model import Point
@@ -12,7 +14,7 @@ from uav_task_alloc.sim.flight import CRITICAL, INFO, WARNING, VehicleFlight
 from uav_task_alloc.sim.modes import AVOID_ADSB
 
 FAILSAFE_KINDS = ('radio', 'gcs', 'battery', 'ekf', 'fence')
-_ALERT = 1  # MAV_SEVERITY
+_ALERT = dialect.MAV_SEVERITY_ALERT
 _ADSB = 'adsb'  # an avoidance sets CRITICAL too
 
 
@@ -43,7 +45,7 @@ _ARDUPILOT = FailsafeTexts(
         'fence': (WARNING, 'Fence Failsafe Cleared'),
     },
     kill=(INFO, 'RC7: MotorEStop HIGH'), kill_cleared=(INFO, 'RC7: MotorEStop LOW'))
-_ACTIVATED = (CRITICAL, 'Failsafe activated')  # PX4 tells the reason in an EVENT only
+_ACTIVATED = (CRITICAL, 'Failsafe activated')  # PX4 sends the reason in an EVENT only
 _PX4 = FailsafeTexts(
     begin={
         'radio': ((CRITICAL, 'Manual control lost'), _ACTIVATED),
@@ -82,11 +84,19 @@ class Interventions:
             return self.flight.arm(force) if armed else self.flight.disarm(force)
 
     def rc_stick(self, velocity: Point | None) -> None:
-        """The pilot's sticks ask for a velocity [m/s] ENU in stick modes; None: centred."""
+        """The pilot's sticks command a velocity ENU [m/s] in stick modes; None: centred."""
         self.flight.stick = velocity
 
     def failsafe(self, kind: str, mode: int | None) -> None:
-        """A failsafe of one of `KINDS` begins: CRITICAL, and a custom mode unless None."""
+        """Begin a failsafe.
+
+        Args:
+            kind: one of FAILSAFE_KINDS.
+            mode: the custom mode that it enters; None: the mode stays.
+
+        Raises:
+            InvalidValue: `kind` is unknown.
+        """
         if kind not in FAILSAFE_KINDS:
             raise InvalidValue('kind', kind, f'one of {", ".join(FAILSAFE_KINDS)}')
         flight = self.flight
@@ -100,7 +110,7 @@ class Interventions:
                 flight.set_custom_mode(mode)
 
     def failsafe_over(self) -> None:
-        """All failsafes end; the mode stays."""
+        """End all failsafes; the mode stays."""
         flight = self.flight
         for kind in [kind for kind in flight.failsafes if kind in FAILSAFE_KINDS]:
             del flight.failsafes[kind]
@@ -108,7 +118,7 @@ class Interventions:
             flight.note('failsafe_over', cause=kind)
 
     def kill_switch(self) -> None:
-        """The pilot stops the motors at once, wherever it is; it stays disarmed until `_off`."""
+        """The pilot stops the motors, also in the air; disarmed until `kill_switch_off`."""
         flight = self.flight
         flight.terminated = True
         flight.texts.append(self._texts.kill)
@@ -117,13 +127,13 @@ class Interventions:
             flight.disarm(force=True)
 
     def kill_switch_off(self) -> None:
-        """The pilot lets the motors run again; nothing arms by itself."""
+        """The pilot releases the kill switch; nothing arms by itself."""
         self.flight.terminated = False
         self.flight.texts.append(self._texts.kill_cleared)
         self.flight.note('kill_switch_off', cause='pilot')
 
     def avoid(self, active: bool) -> None:
-        """ArduPilot enters AVOID_ADSB, and later the mode before, unless somebody changed it."""
+        """Begin or end an avoidance (ArduPilot): AVOID_ADSB, then the mode before if unchanged."""
         flight = self.flight
         if not self._is_ardupilot or active is (_ADSB in flight.failsafes):
             return
@@ -140,6 +150,6 @@ class Interventions:
                 flight.set_custom_mode(self._before_avoid)
 
     def glitch(self, offset: Point, seconds: float) -> None:
-        """Let the reported position, not the real one, be `offset` [m] ENU off for a time."""
+        """Shift the reported, not the true position by `offset` [m] ENU for some `seconds`."""
         self.estimate.glitch(offset, seconds)
         self.flight.note('glitch')

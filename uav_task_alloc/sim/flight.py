@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How a simulated autopilot flies: modes, arming, and the mission as it stands in storage."""
+"""Flight of a simulated autopilot: modes, arming, and the mission read from its storage."""
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
@@ -16,17 +16,19 @@ from uav_task_alloc.sim.modes import CustomMode
 from uav_task_alloc.sim.navigation import Navigation
 from uav_task_alloc.sim.stored_item import StoredItem
 
-_STEP = 0.1  # [s] longest step of the body
-_STRIDE = 1.0  # [m] longest step of the body: well inside the acceptance radius
+_MAX_STEP = 0.1  # [s] of the body
+_MAX_STRIDE = 1.0  # [m] of the body in one step: well inside the acceptance radius
 _GROUND_IDLE = 10.0  # [s] armed on the ground until it disarms itself
-_FALL = 1.5  # [s] from any height to the ground without motors
-CRITICAL, WARNING, INFO = 2, 4, 6  # MAV_SEVERITY
+_FALL = 1.5  # [s] from any height to the ground, motors off
+CRITICAL = dialect.MAV_SEVERITY_CRITICAL
+WARNING = dialect.MAV_SEVERITY_WARNING
+INFO = dialect.MAV_SEVERITY_INFO
 
 
 class VehicleFlight(Navigation):
-    """What both autopilots share; subclasses decide what a mission change or its end means.
+    """Behaviour of both autopilots; subclasses handle a changed mission and its end.
 
-    `reached` and `texts` fill for the owner to send and empty; `events` are the ground truth.
+    The owner sends and clears `reached` and `texts`; `events` are the ground truth.
     """
 
     modes: ClassVar[dict[int, CustomMode]]  # by custom_mode
@@ -42,9 +44,9 @@ class VehicleFlight(Navigation):
         self.reached: list[int] = []
         self.texts: list[tuple[int, str]] = []
         self.events: list[TruthEvent] = []
-        self.arming_fault = ''  # why it refuses to arm; '': no reason of this kind
+        self.arming_fault = ''  # an injected reason to refuse arming; '': none
         self.terminated = False  # the kill switch is on
-        self.stick: Point | None = None  # [m/s] ENU that the pilot asks for
+        self.stick: Point | None = None  # [m/s] ENU commanded by the pilot
         self.now = 0.0  # [s]
         self.custom_mode = self.custom_modes[self.start_mode]
         self.armed, self.landed = False, True
@@ -52,7 +54,7 @@ class VehicleFlight(Navigation):
         self.reboot(0.0)
 
     def reboot(self, now: float) -> None:
-        """As after power-up: disarmed, at the start of the mission; in the air it falls."""
+        """Reset to power-up: disarmed, at the start of the mission; in the air it falls."""
         self.now = self.booted = now
         self.boot.elapsed = 0.0
         self.note('reboot')
@@ -70,7 +72,7 @@ class VehicleFlight(Navigation):
 
     @property
     def mode(self) -> FlightMode:
-        """What the custom mode makes it do."""
+        """The flight mode of the custom mode."""
         return self.modes[self.custom_mode].mode
 
     @property
@@ -91,7 +93,7 @@ class VehicleFlight(Navigation):
 
     @contextmanager
     def caused_by(self, cause: str) -> Iterator[None]:
-        """Events within are noted as caused by somebody else than the autopilot."""
+        """Record events within the context with this cause instead of `self`."""
         before, self._cause = self._cause, cause
         try:
             yield
@@ -101,7 +103,7 @@ class VehicleFlight(Navigation):
     # commands
 
     def arm(self, force: bool = False) -> bool:
-        """False, and what the autopilot says about it, where it may not."""
+        """Arm; False where it is refused, with the autopilot's report of the reason."""
         refusal = self._never_arms() if force else self.arming_refusal()
         if refusal:
             self.report_refusal(refusal)
@@ -112,7 +114,7 @@ class VehicleFlight(Navigation):
         return True
 
     def _never_arms(self) -> str:
-        """Why it does not arm even when forced."""
+        """Reason not to arm even when forced; '' where there is none."""
         if self.boot.booting:
             return 'System not initialised'
         if self.terminated:
@@ -120,7 +122,7 @@ class VehicleFlight(Navigation):
         return 'Leaning' if self._fall_speed > 0.0 else ''
 
     def prearm_refusal(self) -> str:
-        """Why it does not arm in any mode; empty where it does."""
+        """Reason not to arm in any mode; '' where there is none."""
         reason = self._never_arms() or self.arming_fault
         if reason:
             return reason
@@ -129,14 +131,14 @@ class VehicleFlight(Navigation):
         return 'Battery low' if self.body.battery < 0.05 else ''
 
     def arming_refusal(self) -> str:
-        """Why it does not arm now; empty where it does."""
+        """Reason not to arm now; '' where there is none."""
         return self.prearm_refusal()
 
     def report_refusal(self, reason: str) -> None:
-        """Tell the stations why it does not arm."""
+        """Send the reason why it does not arm."""
 
     def disarm(self, force: bool = False) -> bool:
-        """Motors off; refused in the air unless forced: then it falls."""
+        """Disarm; refused in the air unless forced: then it falls."""
         if not self.landed and not force:
             return False
         self._stop_motors()
@@ -180,7 +182,7 @@ class VehicleFlight(Navigation):
             self.note('mode', mode=number, cause=self._cause)
 
     def can_fly_mission(self) -> bool:
-        """Whether the mission mode is open now; a text says why not."""
+        """Whether the mission mode can be entered now; a text reports why not."""
         raise NotImplementedError
 
     def start_mission(self) -> bool:
@@ -192,14 +194,14 @@ class VehicleFlight(Navigation):
         raise NotImplementedError
 
     def storage_changed(self, change: StorageChange, flagged: int | None) -> None:
-        """The storage has changed; `flagged`: the seq that the station marked as current."""
+        """Handle a changed mission; `flagged`: the seq that was uploaded with current=1."""
         raise NotImplementedError
 
     def leave(self, mode: FlightMode) -> None:
-        """About to leave a mode."""
+        """Called before a mode is left."""
 
     def enter(self, mode: FlightMode) -> None:
-        """Entered a mode."""
+        """Called after a mode was entered."""
         if mode in (FlightMode.RETURN, FlightMode.LAND) and self.landed:
             self.disarm()
         elif mode is FlightMode.RETURN:
@@ -210,9 +212,9 @@ class VehicleFlight(Navigation):
     # motion
 
     def step(self, now: float) -> None:
-        """Fly until `now` [s], in steps short enough to pass no point unseen."""
+        """Fly until `now` [s], in steps short enough that no point is missed."""
         while self.now < now - 1e-9 and (self.armed or not self.landed):
-            dt = min(_STEP, _STRIDE / self.speed, now - self.now)
+            dt = min(_MAX_STEP, _MAX_STRIDE / self.speed, now - self.now)
             self._set_time(self.now + dt)
             if self.armed:
                 self._move(dt)
@@ -231,7 +233,7 @@ class VehicleFlight(Navigation):
             self.note('crashed', cause=self._fall_cause)
 
     def settle_on_ground(self) -> None:
-        """On the ground below, whatever it did."""
+        """Put it on the ground below its position."""
         if not self.landed:
             self._touch_down()
 
@@ -292,7 +294,7 @@ class VehicleFlight(Navigation):
     # mission
 
     def next_item(self) -> None:
-        """Begin the item whose turn it is, or end the mission."""
+        """Begin the next item, or end the mission."""
         raise NotImplementedError
 
     def item_done(self) -> None:
@@ -300,13 +302,13 @@ class VehicleFlight(Navigation):
         raise NotImplementedError
 
     def report_reached(self, seq: int, point: Point) -> None:
-        """MISSION_ITEM_REACHED, and the ground truth of it."""
+        """Send MISSION_ITEM_REACHED, and record it in the ground truth."""
         self.reached.append(seq)
         self.events.append(TruthEvent(self.now, 'item_reached', point, seq))
 
     def note(self, name: str, *, seq: int | None = None, mode: int | None = None,
              cause: str = '', command: str = '') -> None:
-        """An event for the ground truth, where the vehicle is now."""
+        """Record an event at the present position in the ground truth."""
         self.events.append(
             TruthEvent(self.now, name, self.body.position, seq, mode, cause, command)
         )

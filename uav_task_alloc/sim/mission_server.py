@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The mission service of a simulated autopilot: what both kinds share, without their quirks."""
+"""Mission server of a simulated autopilot: the part common to both autopilots."""
 from __future__ import annotations
 
 from collections.abc import Callable
@@ -17,7 +17,7 @@ AUTOPILOT_COMPONENT = dialect.MAV_COMP_ID_AUTOPILOT1
 
 
 class MissionServer:
-    """Items in storage and the transfer that may be under way; replies go to `out`."""
+    """Stored items and the running transfer; messages to send are appended to `out`."""
 
     flight: VehicleFlight
 
@@ -37,18 +37,18 @@ class MissionServer:
         }
 
     def attach(self, flight: VehicleFlight) -> None:
-        """Tell this flight, which flies from `items`, about every change."""
+        """Report every change of `items` to this flight, which flies them."""
         self.flight = flight
 
     def progress(self) -> tuple[int, int, int]:
-        """total, mission_state and mission_mode of MISSION_CURRENT."""
+        """Fields total, mission_state and mission_mode of MISSION_CURRENT."""
         raise NotImplementedError
 
     def _changed(self, change: StorageChange, flagged: int | None = None) -> None:
         self.flight.storage_changed(change, flagged)
 
     def handle(self, message: Message, now: float) -> bool:
-        """Take a message of the mission protocol; False where it is none or for another."""
+        """Handle a message of the mission protocol; False where it is none or not for us."""
         self.load()
         handler = self._handlers.get(message.get_type())
         if handler is None or not self._for_us(message):
@@ -57,23 +57,23 @@ class MissionServer:
         return True
 
     def step(self, now: float) -> None:
-        """Repeat requests and give up, as the autopilot does."""
+        """Repeat requests and give up a transfer as of `now` [s]."""
         raise NotImplementedError
 
     def reboot(self) -> None:
-        """Forget the transfer; the items stay."""
+        """Drop the transfer; the items stay."""
         raise NotImplementedError
 
     def load(self) -> None:
-        """Bring the items back once the boot is over."""
+        """Load the items once the boot is over."""
 
     @property
     def mission_id(self) -> int | None:
-        """The autopilot's own id of what is stored; None where it has none."""
+        """The autopilot's id of the stored mission; None where it has none."""
         return None
 
     def read(self, seq: int) -> StoredItem:
-        """An item as a ground station reads it back."""
+        """An item as a ground station downloads it."""
         return self.items[seq]
 
     def _for_us(self, message: Message) -> bool:

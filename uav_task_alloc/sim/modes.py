@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The custom modes of ArduCopter and PX4: number, name, and what the simulated vehicle does."""
+"""The custom modes of ArduCopter and PX4: number, name, and the simulated flight mode."""
 from __future__ import annotations
 
 from typing import NamedTuple
@@ -10,7 +10,7 @@ from uav_task_alloc.sim.config import FlightMode
 class CustomMode(NamedTuple):
     """One custom mode of an autopilot."""
 
-    name: str  # as the autopilot writes it
+    name: str  # as the autopilot spells it
     mode: FlightMode
     stick: bool = False  # the pilot's stick flies it
 

@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How a simulated autopilot turns a mission item, a landing or the way home into a track."""
+"""Turns mission items, landings and returns into tracks for a simulated autopilot."""
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+
+from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from uav_task_alloc.geometry.frames import to_enu, to_geodetic
 from uav_task_alloc.model import Point
@@ -16,7 +18,12 @@ _NEAR = 0.3  # [m] end of a climb, of a landing
 
 
 class Navigation:
-    """The body, its home and the stored items; subclasses override how an item is flown."""
+    """The body, its home and the stored items; subclasses override how an item is flown.
+
+    Args:
+        config: of the vehicle.
+        items: the storage, shared with the mission server.
+    """
 
     return_height: float  # [m] above home
     default_radius: float  # [m] WPNAV_RADIUS or NAV_ACC_RAD, unless configured
@@ -24,19 +31,19 @@ class Navigation:
     def __init__(self, config: VehicleConfig, items: Sequence[StoredItem]) -> None:
         self.config = config
         self.items = items
-        given = config.acceptance_radius
-        self.acceptance_radius = self.default_radius if given is None else given  # [m]
+        radius = config.acceptance_radius
+        self.acceptance_radius = self.default_radius if radius is None else radius  # [m]
         self.body = PointMass(config)
         self.home: Point = config.position if config.home is None else config.home
         self.home_amsl = to_geodetic(config.origin, self.home)[2]  # [m]
-        self.seq = 0  # current item, as MISSION_CURRENT says
+        self.seq = 0  # of MISSION_CURRENT
         self.track: Track | None = None
         self.target: Point = self.body.position  # [m] of the item being flown
-        self.next_point: Point | None = None  # where the next item is
+        self.next_point: Point | None = None  # of the next item
         self.speed = config.cruise_speed  # [m/s]
 
     def begin_item(self, seq: int) -> None:
-        """Copy an item out of the storage and fly it, whatever happens to the storage."""
+        """Copy an item out of the storage and fly that copy."""
         self.seq = seq
         item = self.items[seq]
         self.track = self.make_track(item)
@@ -46,12 +53,12 @@ class Navigation:
         self.next_point = None if following is None else self.point(following)
 
     def execute(self, item: StoredItem) -> None:
-        """Carry out an item that is not flown."""
+        """Execute an item that is not flown."""
         if item.command == item_.CHANGE_SPEED and item.p2 > 0.0:
             self.speed = item.p2
 
     def make_track(self, item: StoredItem) -> Track:
-        """How an item is flown from here."""
+        """The track of an item from the present position."""
         if item.command == item_.RETURN:
             return self.path_home()
         if item.command == item_.DELAY:
@@ -66,16 +73,16 @@ class Navigation:
         return Track((target,), self.radius(item), hold)
 
     def climb(self, target: Point) -> Track:
-        """How NAV_TAKEOFF is flown: straight up."""
+        """The track of NAV_TAKEOFF: straight up."""
         x, y, z = self.body.position
         return Track(((x, y, max(z, target[2])),), _NEAR)
 
     def radius(self, item: StoredItem) -> float:
-        """[m] at which an item counts as reached."""
+        """Acceptance radius of an item [m]."""
         return self.acceptance_radius
 
     def point(self, item: StoredItem) -> Point:
-        """ENU of an item's place; without one it is here."""
+        """Position of an item, ENU [m]; the present one where it has none."""
         base = self.home_amsl if item.frame in item_.RELATIVE_FRAMES else 0.0
         if item.x == 0 and item.y == 0:
             x, y, _ = self.body.position
@@ -83,18 +90,18 @@ class Navigation:
         return to_enu(self.config.origin, item.x * 1e-7, item.y * 1e-7, base + item.z)
 
     def home_item(self) -> StoredItem:
-        """Home as an item: what HOME_POSITION says, and ArduPilot's seq 0."""
+        """Home as an item: as in HOME_POSITION, and ArduPilot's seq 0."""
         latitude, longitude, altitude = to_geodetic(self.config.origin, self.home)
-        return StoredItem(0, item_.WAYPOINT, 0.0, 0.0, 0.0, 0.0, round(latitude * 1e7),
-                          round(longitude * 1e7), round(altitude, 2))
+        return StoredItem(dialect.MAV_FRAME_GLOBAL, item_.WAYPOINT, 0.0, 0.0, 0.0, 0.0,
+                          round(latitude * 1e7), round(longitude * 1e7), round(altitude, 2))
 
     def path_home(self) -> Track:
-        """Up, over home, down."""
+        """The track of a return: up, over home, down."""
         x, y, z = self.body.position
         top = max(z, self.home[2] + self.return_height)
         hx, hy, hz = self.home
         return Track(((x, y, top), (hx, hy, top), (hx, hy, hz)), _NEAR, lands=True)
 
     def descent(self, point: Point) -> Track:
-        """Straight down."""
+        """The track of a landing: straight down."""
         return Track(((point[0], point[1], self.home[2]),), _NEAR, lands=True)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A mission item as each autopilot stores it: what it refuses, and what it silently changes."""
+"""A mission item as each autopilot stores it: which it refuses, and which fields it changes."""
 from __future__ import annotations
 
 import math
@@ -24,9 +24,27 @@ POSITIONAL = {WAYPOINT, LOITER_UNLIMITED, _LOITER_TIME, LAND, TAKEOFF}
 _KNOWN = POSITIONAL | {RETURN, DELAY, CHANGE_SPEED}
 
 _NAN_ALLOWED = {WAYPOINT, LAND, TAKEOFF}  # ArduPilot, in param4
-_ARDUPILOT_FRAMES = {0: 0, 2: 0, 3: 3, 5: 0, 6: 3, 10: 10, 11: 10}  # sent -> read back
-_PX4_FRAMES = {0, 3, 5, 6}
-RELATIVE_FRAMES = {3, 6, 10, 11}  # height above home; 10 and 11: above the (flat) terrain
+_ARDUPILOT_FRAMES = {  # sent -> read back
+    dialect.MAV_FRAME_GLOBAL: dialect.MAV_FRAME_GLOBAL,
+    dialect.MAV_FRAME_MISSION: dialect.MAV_FRAME_GLOBAL,
+    dialect.MAV_FRAME_GLOBAL_INT: dialect.MAV_FRAME_GLOBAL,
+    dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT: dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT,
+    dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT: dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT,
+    dialect.MAV_FRAME_GLOBAL_TERRAIN_ALT: dialect.MAV_FRAME_GLOBAL_TERRAIN_ALT,
+    dialect.MAV_FRAME_GLOBAL_TERRAIN_ALT_INT: dialect.MAV_FRAME_GLOBAL_TERRAIN_ALT,
+}
+_PX4_FRAMES = {
+    dialect.MAV_FRAME_GLOBAL,
+    dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT,
+    dialect.MAV_FRAME_GLOBAL_INT,
+    dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT,
+}
+RELATIVE_FRAMES = {  # height above home, or above the terrain, which is flat here
+    dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT,
+    dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT,
+    dialect.MAV_FRAME_GLOBAL_TERRAIN_ALT,
+    dialect.MAV_FRAME_GLOBAL_TERRAIN_ALT_INT,
+}
 
 
 class StoredItem(NamedTuple):
@@ -45,13 +63,13 @@ class StoredItem(NamedTuple):
 
 
 class Refusal(NamedTuple):
-    """An item that is not stored, and the MISSION_ACK type that says so."""
+    """The refusal of an item."""
 
-    result: int
+    result: int  # MAV_MISSION_RESULT of the MISSION_ACK
 
 
 def from_message(m: Message) -> StoredItem:
-    """What a MISSION_ITEM_INT carries."""
+    """The stored fields of a MISSION_ITEM_INT."""
     return StoredItem(m.frame, m.command, m.param1, m.param2, m.param3, m.param4, m.x, m.y, m.z,
                       m.autocontinue)
 
@@ -64,7 +82,7 @@ def to_message(item: StoredItem, seq: int, current: bool, peer: tuple[int, int])
 
 
 def to_float_message(item: StoredItem, seq: int, current: bool, peer: tuple[int, int]) -> Message:
-    """The MISSION_ITEM that answers an old MISSION_REQUEST: float32 degrees, metres are lost."""
+    """The MISSION_ITEM that answers an old MISSION_REQUEST: float32 degrees, so metres off."""
     scale = 1e-7 if item.command in POSITIONAL else 1.0
     return dialect.MAVLink_mission_item_message(
         *peer, seq, item.frame, item.command, int(current), item.autocontinue, item.p1, item.p2,
@@ -81,7 +99,7 @@ def stored_by_ardupilot(item: StoredItem) -> StoredItem | Refusal:
     if item.command not in POSITIONAL:
         p1 = item.p1 if item.command in (CHANGE_SPEED, DELAY) else 0.0
         p2, p3 = (item.p2, item.p3) if item.command == CHANGE_SPEED else (0.0, 0.0)
-        return StoredItem(0, item.command, p1, p2, p3, 0.0, 0, 0, 0.0)
+        return StoredItem(dialect.MAV_FRAME_GLOBAL, item.command, p1, p2, p3, 0.0, 0, 0, 0.0)
     if item.frame not in _ARDUPILOT_FRAMES:
         return Refusal(dialect.MAV_MISSION_UNSUPPORTED_FRAME)
     if abs(item.x) > 90 * 10**7:
@@ -94,7 +112,7 @@ def stored_by_ardupilot(item: StoredItem) -> StoredItem | Refusal:
 
 
 def _ardupilot_nan(item: StoredItem) -> int:
-    """The MISSION_ACK type that names the first NaN ArduPilot does not take; 0: none."""
+    """The MAV_MISSION_RESULT that names the first NaN ArduPilot refuses; 0: none."""
     for number, value in enumerate((item.p1, item.p2, item.p3, item.p4), start=1):
         if math.isnan(value) and not (number == 4 and item.command in _NAN_ALLOWED):
             return int(dialect.MAV_MISSION_INVALID_PARAM1) + number - 1
@@ -118,5 +136,5 @@ def px4_crc(items: Iterable[StoredItem]) -> int:
     for item in items:
         raw = struct.pack('<BHB4fiif', item.frame, item.command, item.autocontinue, item.p1,
                           item.p2, item.p3, item.p4, item.x, item.y, item.z)
-        crc = zlib.crc32(raw, crc ^ 0xFFFFFFFF) ^ 0xFFFFFFFF  # no inversion at either end
+        crc = zlib.crc32(raw, crc ^ 0xFFFFFFFF) ^ 0xFFFFFFFF  # no inversion at start and end
     return crc

@@ -1,17 +1,22 @@
 # SPDX-License-Identifier: Apache-2.0
-"""When a simulated vehicle sends which telemetry message: unasked, at a rate, on request."""
+"""Telemetry streams of a simulated vehicle: default rates, requested rates, single requests."""
 from __future__ import annotations
 
 from collections.abc import Callable
 
 from uav_task_alloc.mavlink.transport.codec import Message
 
-Maker = Callable[[], list[Message]]  # none where there is nothing to tell yet
-_FASTEST = 0.005  # [s] no stream is faster
+Maker = Callable[[], list[Message]]  # no message where its data are not known yet
+_MIN_INTERVAL = 0.005  # [s]
 
 
 class Streams:
-    """Sends each message at its interval; `rates` [Hz] by message id are those of the start."""
+    """Sends each message at its interval.
+
+    Args:
+        makers: build the messages, by message id.
+        rates: default rates after boot [Hz], by message id.
+    """
 
     def __init__(self, makers: dict[int, Maker], rates: dict[int, float]) -> None:
         self._makers = makers
@@ -20,12 +25,12 @@ class Streams:
         self._due: dict[int, float] = {}  # [s]
 
     def reboot(self, now: float) -> None:
-        """Back to the rates of the start."""
+        """Reset to the default rates."""
         self._interval = {number: 1.0 / rate for number, rate in self._rates.items()}
         self._due = dict.fromkeys(self._interval, now)
 
     def set_interval(self, number: int, microseconds: float, now: float) -> bool:
-        """SET_MESSAGE_INTERVAL: -1 stops, 0 is the rate of the start; False where unknown."""
+        """SET_MESSAGE_INTERVAL: -1 stops, 0 is the default rate; False where it is unknown."""
         if number not in self._makers:
             return False
         seconds = microseconds * 1e-6
@@ -35,16 +40,16 @@ class Streams:
             self._interval.pop(number, None)
             self._due.pop(number, None)
             return True
-        self._interval[number], self._due[number] = max(seconds, _FASTEST), now
+        self._interval[number], self._due[number] = max(seconds, _MIN_INTERVAL), now
         return True
 
     def make(self, number: int) -> list[Message]:
-        """The messages as they would be now; none where it is unknown."""
+        """Build the messages of an id now; none where the id is unknown."""
         maker = self._makers.get(number)
         return [] if maker is None else maker()
 
     def step(self, now: float) -> list[Message]:
-        """What is due by now [s]."""
+        """The messages that are due by `now` [s]."""
         out: list[Message] = []
         for number, due in self._due.items():
             while due <= now:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a simulated vehicle tells of itself: its telemetry messages, made from its state."""
+"""Telemetry messages of a simulated vehicle, built from its state."""
 from __future__ import annotations
 
 import math
@@ -21,7 +21,7 @@ _UNKNOWN = 65535
 
 
 class TelemetryMessages:
-    """Makes each message from the state of the flight; None where it is not sent yet."""
+    """Builds each message from the state of the flight; None where it is not sent yet."""
 
     def __init__(self, flight: VehicleFlight, estimate: Estimate, autopilot: int,
                  system_id: int) -> None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A simulated autopilot: messages and time in, messages out; it flies what its storage holds."""
+"""A simulated autopilot without I/O: messages and time in, messages out."""
 from __future__ import annotations
 
 from collections.abc import Callable
@@ -26,7 +26,7 @@ _CURRENT = dialect.MAVLINK_MSG_ID_MISSION_CURRENT
 
 @dataclass(frozen=True, slots=True)
 class Autopilot:
-    """One row of what differs: classes and figures of a kind of autopilot."""
+    """The classes and figures in which the autopilots differ."""
 
     name: str
     number: int  # MAV_AUTOPILOT
@@ -34,8 +34,8 @@ class Autopilot:
     mission: type[MissionServer]
     commands: type[Commands]
     capacity: int  # items
-    rates: dict[int, float]  # [Hz] by message id, unasked
-    streams_current: bool  # MISSION_CURRENT is a stream; else it comes at 1 Hz by itself
+    rates: dict[int, float]  # [Hz] by message id, without a request
+    streams_current: bool  # MISSION_CURRENT is a stream; else it is sent at 1 Hz anyway
 
 
 _ARDUPILOT = Autopilot(
@@ -59,7 +59,13 @@ AUTOPILOTS = {row.name: row for row in (_ARDUPILOT, _PX4)}
 
 
 class Vehicle(Interventions):
-    """Flight, mission service, commands and telemetry of one system; time is vehicle seconds."""
+    """One simulated system: flight, mission server, commands and telemetry.
+
+    Args:
+        config: of the vehicle.
+        autopilot: one of AUTOPILOTS.
+        now: vehicle time of power-up [s].
+    """
 
     def __init__(self, config: VehicleConfig, autopilot: Autopilot, now: float = 0.0) -> None:
         self.config, self.autopilot = config, autopilot
@@ -87,7 +93,7 @@ class Vehicle(Interventions):
         self.flight.events.clear()
 
     def reboot(self, now: float) -> None:
-        """Power off and on: boot time, rates and transfers are lost, the stored mission is not.
+        """Power-cycle: boot time, rates and transfers are lost, the stored mission is not.
 
         In the air it falls.
         """
@@ -95,33 +101,33 @@ class Vehicle(Interventions):
         self.estimate.reboot()
         self.mission.reboot()
         self._streams.reboot(now)
-        self._told: tuple[int, int] = (self.flight.seq, 0)
-        self._tell_current_at = now
+        self._reported: tuple[int, int] = (self.flight.seq, 0)  # current item, item count
+        self._report_current_at = now
 
     def kill(self) -> None:
-        """End radio and motion for good."""
+        """Stop all messages and motion."""
         if self.alive:
             self.alive = False
             self.flight.note('died')
 
     def revive(self, now: float) -> None:
-        """Boot again on the ground below where it died."""
+        """Boot on the ground below the position where it died."""
         self.alive = True
         self.flight.settle_on_ground()
         self.reboot(now)
 
     @property
     def mode(self) -> FlightMode:
-        """What it does now."""
+        """The flight mode."""
         return self.flight.mode
 
     def take_events(self) -> list[TruthEvent]:
-        """What happened since the last call."""
+        """Return the events since the last call, and clear them."""
         events, self.flight.events = self.flight.events, []
         return events
 
     def receive(self, message: Message, now: float) -> list[Message]:
-        """What it answers to a message at time now [s]."""
+        """Handle a message at vehicle time `now` [s]; returns the messages to send."""
         if not self.alive:
             return []
         self.flight.step(now)
@@ -136,14 +142,14 @@ class Vehicle(Interventions):
         return answers + self._drain()
 
     def step(self, now: float) -> list[Message]:
-        """Fly and stream until now [s]."""
+        """Fly until vehicle time `now` [s]; returns the messages to send."""
         if not self.alive:
             return []
         self.flight.step(now)
         self.mission.step(now)
         out = self._drain()
-        if not self.autopilot.streams_current and now >= self._tell_current_at:
-            self._tell_current_at = now + 1.0
+        if not self.autopilot.streams_current and now >= self._report_current_at:
+            self._report_current_at = now + 1.0
             out.append(self._mission_current())
         return out + self._streams.step(now)
 
@@ -152,9 +158,9 @@ class Vehicle(Interventions):
         out = [dialect.MAVLink_statustext_message(severity, text[:50].encode())
                for severity, text in flight.texts]
         out += [dialect.MAVLink_mission_item_reached_message(seq) for seq in flight.reached]
-        told = (flight.seq, len(self.mission.items))
-        if told != self._told:
-            self._told = told
+        current = (flight.seq, len(self.mission.items))
+        if current != self._reported:
+            self._reported = current
             if not self.autopilot.streams_current:
                 out.append(self._mission_current())
         out += self.mission.out
@@ -183,10 +189,10 @@ class Vehicle(Interventions):
         result = self._commands.run(m.command, params)  # type: ignore[arg-type]
         ack = dialect.MAVLink_command_ack_message(
             m.command, result, 0, 0, m.get_srcSystem(), m.get_srcComponent())
-        asked, self._commands.out = self._commands.out, []
+        requested, self._commands.out = self._commands.out, []
         if m.command == dialect.MAV_CMD_DO_SET_MISSION_CURRENT and result == 0:
-            asked.append(self._mission_current())
-        return [ack, *asked]
+            requested.append(self._mission_current())
+        return [ack, *requested]
 
     def _set_mode(self, m: Message) -> list[Message]:
         self.flight.note('command', command='mode', mode=m.custom_mode, cause=_station(m))

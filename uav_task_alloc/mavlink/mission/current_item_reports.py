@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tells MISSION_CURRENT sent before our set-current command from those sent after it."""
+"""Separates MISSION_CURRENT sent before our set-current command from those sent after it."""
 from __future__ import annotations
 
 from uav_task_alloc.mavlink.mission.position_history import MAX_MESSAGE_DELAY

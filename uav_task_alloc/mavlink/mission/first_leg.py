@@ -43,6 +43,7 @@ class FirstLeg:
         plane: whether the vehicle turns as wide as a plane.
         farthest: largest distance from home to the first item that the autopilot takes [m].
     """
+
     def __init__(self, plane: bool = False, farthest: float = math.inf) -> None:
         self.locate: Callable[[], LegStart | None] = lambda: None  # None: not known
         self.version = 0  # of the start of the first leg

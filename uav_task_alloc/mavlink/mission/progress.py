@@ -47,6 +47,7 @@ class ProgressTable:
         frames: numbers of the frames received from the vehicle.
         repeats: whether the autopilot repeats MISSION_ITEM_REACHED (PX4: 10 times at 1 Hz).
     """
+
     def __init__(self, frames: FrameLog | None = None, repeats: bool = False) -> None:
         self._positions = PositionHistory()
         self._passed = PassedItems(frames or FrameLog(), self._positions)

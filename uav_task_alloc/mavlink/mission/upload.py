@@ -108,6 +108,7 @@ class Upload:
         idle_after: time [s] after which the vehicle has given up a transfer.
         rng: draws the back-off times.
     """
+
     def __init__(self, peer: Peer, *, idle_after: float, rng: random.Random) -> None:
         self._peer, self._idle_after, self._rng = peer, idle_after, rng
         self.state = UploadState.IDLE

@@ -31,6 +31,7 @@ class VerifiedMission:
         own: number of leading items that the vehicle sets itself: home.
         atomic: whether a failed upload leaves the old mission (PX4).
     """
+
     def __init__(self, own: int, atomic: bool) -> None:
         self._own, self._atomic = own, atomic
         self.items: tuple[Item, ...] | None = None  # None: to be downloaded

@@ -41,6 +41,7 @@ class WantedMission:
         origin: of the ENU frame.
         progress: the completed tasks of this vehicle.
     """
+
     def __init__(self, profile: Profile, origin: Origin, progress: ProgressTable) -> None:
         self.tasks: TaskList | None = None
         self.horizon = Horizon()

@@ -15,12 +15,12 @@ from uav_task_alloc.sim.flight import CRITICAL, WARNING, VehicleFlight
 from uav_task_alloc.sim.modes import COPTER_MODES, COPTER_NOT_ARMABLE
 from uav_task_alloc.sim.stored_item import StoredItem
 
-_GUIDED = {4, 20}  # GUIDED, GUIDED_NOGPS
+_GUIDED = {dialect.COPTER_MODE_GUIDED, dialect.COPTER_MODE_GUIDED_NOGPS}
 _FIRST_PREARM, _PREARM_PERIOD = 15.0, 30.0  # [s] after power-up; between texts
 
 
 class MissionRunState(Enum):
-    """State of the mission; the values are those of MISSION_CURRENT.mission_state."""
+    """State of the mission, with the values of MISSION_CURRENT.mission_state."""
 
     NOT_STARTED = 2
     ACTIVE = 3
@@ -29,7 +29,7 @@ class MissionRunState(Enum):
 
 
 class ArduPilotFlight(VehicleFlight):
-    """Flies from seq 1 on; what it flies now is a copy that a changed storage restarts."""
+    """Flies from seq 1 on; the current item is a copy, which a changed storage restarts."""
 
     modes = COPTER_MODES
     custom_modes: ClassVar[dict[FlightMode, int]] = {
@@ -112,7 +112,7 @@ class ArduPilotFlight(VehicleFlight):
 
     def _resume(self) -> None:
         if self.run in (MissionRunState.COMPLETE, MissionRunState.NOT_STARTED):
-            self._upcoming = 1  # a completed mission begins anew
+            self._upcoming = 1  # a completed mission starts again
         self.run = MissionRunState.ACTIVE
 
     def set_current(self, seq: int) -> bool:
@@ -169,10 +169,10 @@ class ArduPilotFlight(VehicleFlight):
         super().begin_item(seq)
 
     def item_done(self) -> None:
-        if not self._landing:  # it disarms before it could tell
+        if not self._landing:  # it disarms before REACHED would be sent
             self.report_reached(self.seq, self.target)
         self._upcoming = self.seq + 1
         self.next_item()
 
     def radius(self, item: StoredItem) -> float:
-        return self.acceptance_radius  # WPNAV_RADIUS, whatever param2 said
+        return self.acceptance_radius  # WPNAV_RADIUS; param2 is ignored

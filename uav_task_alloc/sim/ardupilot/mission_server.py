@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""ArduCopter's mission service: each item overwrites the storage at once; nothing is atomic."""
+"""ArduCopter's mission server: each item overwrites the storage at once; nothing is atomic."""
 from __future__ import annotations
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
@@ -30,12 +30,12 @@ class ArduPilotMissionServer(MissionServer):
 
     def __init__(self, system_id: int, capacity: int) -> None:
         super().__init__(system_id, capacity)
-        self._peer: RemoteIds | None = None  # who is uploading
-        self._wanted = 0
-        self._expected = 0
-        self._heard = 0.0  # [s]
-        self._asked = 0.0  # [s]
-        self._unloaded: list[StoredItem] | None = None  # the storage, not read yet
+        self._peer: RemoteIds | None = None  # the uploading station
+        self._wanted = 0  # seq of the next item
+        self._expected = 0  # items of the upload
+        self._received_at = 0.0  # [s]
+        self._requested_at = 0.0  # [s]
+        self._unloaded: list[StoredItem] | None = None  # the storage, before it is loaded
 
     def reboot(self) -> None:
         self._peer = None
@@ -66,15 +66,15 @@ class ArduPilotMissionServer(MissionServer):
         self.load()
         if self._peer is None:
             return
-        if now - self._heard > _GIVE_UP:
+        if now - self._received_at > _GIVE_UP:
             self._send_ack(self._peer, dialect.MAV_MISSION_OPERATION_CANCELLED)
             self._peer = None
-        elif now - self._asked > _RETRY:
+        elif now - self._requested_at > _RETRY:
             self._ask(now)
 
     def _ask(self, now: float) -> None:
         assert self._peer is not None
-        self._asked = now
+        self._requested_at = now
         self.out.append(dialect.MAVLink_mission_request_message(
             *self._peer, self._wanted, MISSION_TYPE))
 
@@ -99,7 +99,7 @@ class ArduPilotMissionServer(MissionServer):
             self._send_ack(peer, dialect.MAV_MISSION_ACCEPTED)
             return
         self._peer, self._wanted, self._expected = peer, 0, message.count
-        self._heard = now
+        self._received_at = now
         self._ask(now)
 
     def _item(self, message: Message, peer: RemoteIds, now: float) -> None:
@@ -123,7 +123,7 @@ class ArduPilotMissionServer(MissionServer):
             return
         self.items[message.seq:message.seq + 1] = [stored]
         self._changed(StorageChange.WRITTEN)
-        self._heard = now
+        self._received_at = now
         self._wanted += 1
         if self._wanted == self._expected:
             self._peer = None
@@ -144,7 +144,7 @@ class ArduPilotMissionServer(MissionServer):
         elif message.mission_type != MISSION_TYPE:
             self._send_ack(peer, dialect.MAV_MISSION_ERROR, message.mission_type)
         elif message.seq != 0 and message.seq >= len(self.items):
-            self._request_list(message, peer, now)  # it tells the station how many there are
+            self._request_list(message, peer, now)  # for the count
             self._send_ack(peer, dialect.MAV_MISSION_ERROR)
         else:
             make = to_message if message.get_type().endswith('_INT') else to_float_message
@@ -154,7 +154,8 @@ class ArduPilotMissionServer(MissionServer):
     def _clear(self, message: Message, peer: RemoteIds, now: float) -> None:
         if self._peer is not None:
             self._send_ack(peer, dialect.MAV_MISSION_DENIED, message.mission_type)
-        elif message.mission_type in (MISSION_TYPE, _ALL) and self.flight.run is MissionRunState.ACTIVE:
+        elif (message.mission_type in (MISSION_TYPE, _ALL)
+              and self.flight.run is MissionRunState.ACTIVE):
             self._send_ack(peer, dialect.MAV_MISSION_ERROR, message.mission_type)
         else:
             if message.mission_type in (MISSION_TYPE, _ALL):
@@ -165,4 +166,4 @@ class ArduPilotMissionServer(MissionServer):
             self._send_ack(peer, dialect.MAV_MISSION_ACCEPTED, message.mission_type)
 
     def _ack(self, message: Message, peer: RemoteIds, now: float) -> None:
-        """Ignored whatever it says: a cancel too."""
+        """Ignored, even a cancel."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""PX4 in flight: a mission that is checked as a whole, swapped as a whole, and ends in Hold."""
+"""PX4 in flight: a mission is checked and replaced as a whole, and ends in Hold."""
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -17,21 +17,21 @@ from uav_task_alloc.sim.flight import CRITICAL, VehicleFlight
 from uav_task_alloc.sim.modes import PX4_MODES, px4_mode
 from uav_task_alloc.sim.stored_item import StoredItem
 
-_FARTHEST = 10_000.0  # [m] MIS_DIST_1WP and MIS_DIST_WPS
-_REPEATS = 10  # times REACHED is sent again
+_MAX_DISTANCE = 10_000.0  # [m] MIS_DIST_1WP and MIS_DIST_WPS
+_REPEATS = 10  # repetitions of REACHED
 _REPEAT_PERIOD = 1.0  # [s]
 
 
 @dataclass(slots=True)
 class NavigatorResult:
-    """What the navigator says of its last mission, take-off or landing."""
+    """The navigator's result of the last mission, take-off or landing."""
 
     finished: bool = False
     reached: bool = False  # an item of the mission on board
 
 
 class Px4Flight(VehicleFlight):
-    """Flies the item at `seq`; a swap goes to the flagged one at once."""
+    """Flies the item at `seq`; a new mission begins at the flagged item at once."""
 
     modes = PX4_MODES
     custom_modes: ClassVar[dict[FlightMode, int]] = {
@@ -88,9 +88,9 @@ class Px4Flight(VehicleFlight):
                                if i.command in item_.POSITIONAL)]
         for number, (a, b) in enumerate(pairwise(points)):
             gap = metres_between(a, b)
-            if gap > _FARTHEST:
+            if gap > _MAX_DISTANCE:
                 what = 'First waypoint' if number == 0 else 'Distance between waypoints'
-                return f'{what} too far: {gap:.0f} m, {_FARTHEST:.0f} max'
+                return f'{what} too far: {gap:.0f} m, {_MAX_DISTANCE:.0f} max'
         return ''
 
     def enter(self, mode: FlightMode) -> None:
@@ -136,7 +136,7 @@ class Px4Flight(VehicleFlight):
             self.execute(item)
             self._advance(self.body.position)
         elif item.command == item_.RETURN:
-            self.set_mode(FlightMode.RETURN)  # which is never told as reached
+            self.set_mode(FlightMode.RETURN)  # for which no REACHED is sent
         else:
             self.begin_item(self.seq)
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""PX4's mission service: a second storage is filled and swapped in when the last item is there."""
+"""PX4's mission server: a second storage is filled, and replaces the first at the last item."""
 from __future__ import annotations
 
 import math
@@ -22,7 +22,7 @@ from uav_task_alloc.sim.stored_item import (
 )
 
 _RETRY = 0.25  # [s] between requests for the same item
-_GIVE_UP = 5.0  # [s] without a word
+_GIVE_UP = 5.0  # [s] without a message
 _ALL = dialect.MAV_MISSION_TYPE_ALL
 
 
@@ -40,7 +40,7 @@ class Px4MissionServer(MissionServer):
     def __init__(self, system_id: int, capacity: int) -> None:
         super().__init__(system_id, capacity)
         self._id = 0
-        self._told = 0  # mission_state; stays where no rule has another
+        self._mission_state = 0  # MISSION_STATE; kept where no rule applies
         self.reboot()
 
     def reboot(self) -> None:
@@ -51,8 +51,8 @@ class Px4MissionServer(MissionServer):
         self._incoming: list[StoredItem] = []
         self._flagged: int | None = None
         self._int = False  # until the first MISSION_ITEM_INT
-        self._heard = -math.inf  # [s]
-        self._asked = -math.inf  # [s]
+        self._received_at = -math.inf  # [s]
+        self._requested_at = -math.inf  # [s]
 
     @property
     def mission_id(self) -> int:
@@ -60,44 +60,44 @@ class Px4MissionServer(MissionServer):
 
     def progress(self) -> tuple[int, int, int]:
         runs = self.flight.mode in (FlightMode.MISSION, FlightMode.TAKEOFF, FlightMode.LAND)
-        return len(self.items) or 65535, self._state_of_mission(runs), 1 if runs else 2
+        return len(self.items) or 65535, self._update_mission_state(runs), 1 if runs else 2
 
-    def _state_of_mission(self, runs: bool) -> int:
-        """As PX4 has it: a take-off and a landing end as a mission does."""
+    def _update_mission_state(self, runs: bool) -> int:
+        """MISSION_STATE as PX4 sends it: also complete after a take-off or a landing."""
         result = self.flight.result
         if not self.items or not self.flight.feasible:
-            self._told = dialect.MISSION_STATE_NO_MISSION
+            self._mission_state = dialect.MISSION_STATE_NO_MISSION
         elif result.finished:
-            self._told = dialect.MISSION_STATE_COMPLETE
+            self._mission_state = dialect.MISSION_STATE_COMPLETE
         elif runs:
-            self._told = dialect.MISSION_STATE_ACTIVE
+            self._mission_state = dialect.MISSION_STATE_ACTIVE
         elif result.reached:
-            self._told = dialect.MISSION_STATE_PAUSED
+            self._mission_state = dialect.MISSION_STATE_PAUSED
         elif self.flight.seq < 1:
-            self._told = dialect.MISSION_STATE_NOT_STARTED
-        return self._told
+            self._mission_state = dialect.MISSION_STATE_NOT_STARTED
+        return self._mission_state
 
     def step(self, now: float) -> None:
         if self._state is _State.IDLE:
             return
-        if now - self._heard > _GIVE_UP:
+        if now - self._received_at > _GIVE_UP:
             self._state = _State.IDLE
-        elif self._state is _State.GETLIST and now - self._asked > _RETRY:
+        elif self._state is _State.GETLIST and now - self._requested_at > _RETRY:
             self._ask(now)
 
     def _ask(self, now: float) -> None:
-        self._asked = now
+        self._requested_at = now
         kind = (dialect.MAVLink_mission_request_int_message if self._int
                 else dialect.MAVLink_mission_request_message)
         self.out.append(kind(*self._peer, self._seq, MISSION_TYPE))
 
     def _count(self, message: Message, peer: RemoteIds, now: float) -> None:
-        self._heard = now
+        self._received_at = now
         if self._state is _State.IDLE:
             self._begin(message, peer, now)
         elif self._state is _State.GETLIST and self._seq == 0:
-            self._ask(now)  # our request must have been lost
-        else:  # to the partner, whoever sent it; the transfer goes on
+            self._ask(now)  # our request was probably lost
+        else:  # to the station that uploads, from whichever it came; the transfer goes on
             self._send_ack(self._peer, dialect.MAV_MISSION_ERROR)
 
     def _begin(self, message: Message, peer: RemoteIds, now: float) -> None:
@@ -122,11 +122,11 @@ class Px4MissionServer(MissionServer):
         if peer != self._peer:
             return
         if self._state is _State.GETLIST:
-            self._heard = now
+            self._received_at = now
             if message.seq == self._seq:
                 self._take(message, now)
         elif self._state is _State.IDLE and message.seq + 1 == self._seq:
-            self._accept()  # the last item again: our ACK must have been lost
+            self._accept()  # a repeated last item: our ACK was probably lost
         else:
             self._send_ack(peer, dialect.MAV_MISSION_ERROR)
 
@@ -159,12 +159,12 @@ class Px4MissionServer(MissionServer):
     def _request_list(self, message: Message, peer: RemoteIds, now: float) -> None:
         if self._seq == len(self.items):  # all was sent: the station's ACK may be lost
             self._state = _State.IDLE
-        again = self._state is _State.SENDLIST and peer == self._peer
-        if self._state is not _State.IDLE and not again:
+        repeated = self._state is _State.SENDLIST and peer == self._peer
+        if self._state is not _State.IDLE and not repeated:
             return
         count = len(self.items) if message.mission_type == MISSION_TYPE else 0
         if message.mission_type == MISSION_TYPE:
-            self._state, self._peer, self._seq, self._heard = _State.SENDLIST, peer, 0, now
+            self._state, self._peer, self._seq, self._received_at = _State.SENDLIST, peer, 0, now
         self.out.append(with_plan_id(dialect.MAVLink_mission_count_message(
             *peer, count, message.mission_type), self._id if count else 0))
 
@@ -172,7 +172,7 @@ class Px4MissionServer(MissionServer):
         self._int = message.get_type().endswith('_INT')
         if peer != self._peer or self._state is not _State.SENDLIST:
             return
-        self._heard = now
+        self._received_at = now
         if message.seq == self._seq < len(self.items):
             self._seq += 1
         elif message.seq != self._seq - 1 or message.seq >= len(self.items):
