@@ -1,0 +1,5 @@
+# SPDX-License-Identifier: Apache-2.0
+from enum import Enum
+
+class SignalHandlerOptions(Enum):
+    NO = 0
