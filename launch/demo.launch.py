@@ -1,29 +1,35 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A scenario in the air: allocator, bridge, simulated fleet, player and live view."""
+"""Simulates a scenario: allocator, bridge, simulated fleet, player and live view."""
 from launch.actions import DeclareLaunchArgument, OpaqueFunction
 from launch.substitutions import PathJoinSubstitution
 from launch_ros.substitutions import FindPackageShare
 
 from launch import LaunchDescription
 from uav_task_alloc.nodes.ros.launch_arguments import (
-    BRIDGE_END,
-    Lasting,
+    BRIDGE_SIGTERM_TIMEOUT,
+    RespawnedNode,
     argument,
     flag,
-    node,
-    number,
-    on_this_machine,
+    localhost_only,
+    node_action,
+    optional_number,
     record_file,
-    rviz,
+    rviz_action,
 )
 from uav_task_alloc.nodes.ros.udp_ports import free_port
 from uav_task_alloc.scenario import load, simulation_parameters
 
 
 def generate_launch_description() -> LaunchDescription:
-    """Arguments: scenario (a YAML file), speedup (empty: the scenario's), rviz (true: show it
-    there too), record (an MCAP file for all topics), bridge_state_dir (a folder that keeps over a
-    restart who has each aircraft; empty: nothing is kept).
+    """Declare the arguments.
+
+    Arguments:
+        scenario: YAML file.
+        speedup: times real time; empty: the scenario's.
+        rviz: true: start RViz as well.
+        record: MCAP file for all topics; empty: none.
+        bridge_state_dir: folder in which the bridge saves which vehicles it has authority over,
+            for a restart; empty: not saved.
     """
     return LaunchDescription([
         DeclareLaunchArgument('scenario', default_value=PathJoinSubstitution(
@@ -37,22 +43,23 @@ def generate_launch_description() -> LaunchDescription:
 
 
 def start(context: object) -> list:
-    """All nodes, with the scenario's values, on loopback and for its vehicles alone.
+    """All nodes, with the parameters of the scenario, on loopback and for its vehicles only.
 
-    Whatever is wrong with an argument is raised before anything is started.
+    Raises:
+        ValueError, ScenarioError: an argument is invalid; nothing has been started then.
     """
     path, record = argument(context, 'scenario'), record_file(context)
-    shown = [rviz(context)] if flag(context, 'rviz') else []
-    given = simulation_parameters(load(path), path, free_port(), number(context, 'speedup'))
+    viewers = [rviz_action(context)] if flag(context, 'rviz') else []
+    parameters = simulation_parameters(load(path), path, free_port(),
+                                       optional_number(context, 'speedup'))
     return [
-        *on_this_machine(),
-        *Lasting('allocator', given['allocator']).start(),
-        *Lasting('mavlink_bridge', given['mavlink_bridge'],
-                 {'state_dir': argument(context, 'bridge_state_dir')},
-                 sigterm_timeout=BRIDGE_END).start(),
-        node('fleet_sim', given['fleet_sim']),
-        node('scenario_player', given['scenario_player']),
-        node('live_view', given['live_view'],
-             {'record': record, 'stay': True}),
-        *shown,
+        *localhost_only(),
+        *RespawnedNode('allocator', parameters['allocator']).start(),
+        *RespawnedNode('mavlink_bridge', parameters['mavlink_bridge'],
+                       {'state_dir': argument(context, 'bridge_state_dir')},
+                       sigterm_timeout=BRIDGE_SIGTERM_TIMEOUT).start(),
+        node_action('fleet_sim', parameters['fleet_sim']),
+        node_action('scenario_player', parameters['scenario_player']),
+        node_action('live_view', parameters['live_view'], {'record': record, 'stay': True}),
+        *viewers,
     ]

@@ -9,7 +9,7 @@ import pytest
 import yaml
 
 from uav_task_alloc import params
-from uav_task_alloc.nodes.ros import bridge_shutdown as bridge_end
+from uav_task_alloc.nodes.ros.bridge_shutdown import UPLOAD_TIMEOUT
 from uav_task_alloc.nodes.ros.restart_policy import RestartPolicy, RestartVerdict
 
 ROOT = Path(__file__).parent.parent
@@ -53,7 +53,7 @@ def moved(tmp_path):
     return str(path)
 
 
-def test_finding_35_the_demo_listens_on_loopback_to_the_vehicles_of_its_scenario_alone(moved):
+def test_finding_35_the_demo_serves_the_vehicles_of_its_scenario_only_on_loopback(moved):
     nodes = started('demo', scenario=moved)
     bridge = values(nodes['mavlink_bridge'])
     [connection] = bridge['connections']
@@ -70,7 +70,7 @@ def test_finding_35_two_demos_do_not_share_a_port():
     assert len(ports) > 1
 
 
-def test_the_nodes_of_a_demo_stay_on_this_machine_unless_told(monkeypatch):
+def test_the_nodes_of_a_demo_use_loopback_unless_a_discovery_range_is_set(monkeypatch):
     monkeypatch.delenv('ROS_AUTOMATIC_DISCOVERY_RANGE', raising=False)
     assert {words.env.get('ROS_AUTOMATIC_DISCOVERY_RANGE')
             for words in started('demo').values()} == {'LOCALHOST'}
@@ -79,7 +79,7 @@ def test_the_nodes_of_a_demo_stay_on_this_machine_unless_told(monkeypatch):
 
 
 @pytest.mark.parametrize('name', ['demo', 'fleet'])
-def test_finding_37_allocator_and_bridge_have_the_values_of_the_scenario(name, moved):
+def test_finding_37_allocator_and_bridge_get_the_values_of_the_scenario(name, moved):
     nodes = started(name, scenario=moved)
     allocator, bridge = values(nodes['allocator']), values(nodes['mavlink_bridge'])
     for node in (allocator, bridge):
@@ -97,12 +97,12 @@ def test_finding_38_the_ranges_of_a_scenario_reach_the_nodes(name, moved):
     nodes = started(name, scenario=moved)
     assert values(nodes['mavlink_bridge'])['full_ranges'] == [
         'drone_7:3000.0', 'drone_9:5000.0', 'drone_11:10000000.0']
-    # until a battery was heard; nobody has less
+    # until a UAV reports its battery; none has less
     assert values(nodes['allocator'])['default_range'] == 3000.0
 
 
 @pytest.mark.parametrize(('given', 'speedup'), [({}, 20), ({'speedup': '3'}, 3)])
-def test_finding_37_a_demo_is_as_fast_as_its_scenario_says_unless_told(moved, given, speedup):
+def test_finding_37_a_demo_has_the_speedup_of_its_scenario_or_of_the_argument(moved, given, speedup):
     nodes = started('demo', scenario=moved, **given)
     assert {values(nodes[name])['speedup']
             for name in ('fleet_sim', 'scenario_player', 'live_view')} == {speedup}
@@ -116,14 +116,14 @@ def test_without_a_scenario_a_fleet_has_the_values_of_its_files(tmp_path):
 
 
 @pytest.mark.parametrize('name', ['demo', 'fleet'])
-def test_every_parameter_that_a_launch_file_gives_is_one(name, moved):
+def test_every_parameter_that_a_launch_file_sets_exists(name, moved):
     for executable, words in started(name, scenario=moved).items():
         kind = params.NODES[executable]
         kind(**{key.replace('.', '__'): value for key, value in values(words).items()})
 
 
 @pytest.mark.parametrize('name', ['demo', 'fleet'])
-def test_a_launched_bridge_is_started_again_and_keeps_who_has_each_aircraft(name):
+def test_a_launched_bridge_saves_its_authority_where_the_argument_says(name):
     for given, state_dir in (({}, ''), ({'bridge_state_dir': 'kept'}, 'kept')):
         bridge = started(name, **given)['mavlink_bridge']
         assert values(bridge)['state_dir'] == state_dir
@@ -150,41 +150,42 @@ def test_rviz_comes_with_the_nodes_when_it_is_asked_for(name, monkeypatch):
     ('fleet', {'bridge_params': '/none.yaml'}, 'bridge_params:=/none.yaml: expected a parameter'),
     ('fleet', {'allocator_params': '/none.yaml'}, 'allocator_params:=/none.yaml: expected a para'),
     ('fleet', {'bridge_params': str(ROOT / 'README.md')}, 'expected a parameter file'),
-    ('demo', {'record': '/none/x.mcap'}, 'record:=/none/x.mcap: expected a file that is not'),
-    ('fleet', {'record': str(ROOT / 'README.md')}, 'expected a file that is not there yet'),
+    ('demo', {'record': '/none/x.mcap'}, 'record:=/none/x.mcap: expected a file that does'),
+    ('fleet', {'record': str(ROOT / 'README.md')}, 'expected a file that does not exist'),
 ])
-def test_finding_36_nothing_is_started_before_all_arguments_are_good(
+def test_finding_36_nothing_is_started_before_all_arguments_are_valid(
         name, given, refusal, monkeypatch):
-    asked = []
-    monkeypatch.setattr(launch_stand_in.Node, 'starts', lambda *_: asked.append(1) or [])
+    started_nodes = []
+    monkeypatch.setattr(launch_stand_in.Node, 'starts',
+                        lambda *_: started_nodes.append(1) or [])
     with pytest.raises(ValueError) as refused:
         launch_stand_in.commands(ROOT / f'launch/{name}.launch.py', given)
     assert refusal in str(refused.value)
-    assert not asked
+    assert not started_nodes
 
 
-def died(words, status):
-    """What a launch file does about the end of a node."""
+def actions_after(words, status):
+    """What a launch file does after a node has exited."""
     event = types.SimpleNamespace(returncode=status)
     return words.on_exit(event, launch_stand_in.Context(words.given))
 
 
 @pytest.mark.parametrize('name', ['demo', 'fleet'])
 @pytest.mark.parametrize('executable', ['allocator', 'mavlink_bridge'])
-def test_finding_36_a_node_that_dies_is_started_again_with_its_parameters(name, executable):
+def test_finding_36_a_node_that_dies_is_restarted_with_its_parameters(name, executable):
     words = started(name)[executable]
     for status in (-9, 70, 0, 1, 1):
-        said, later = died(words, status)
-        assert said.msg == f'{executable} has ended with status {status}: again in ' \
-            f'{later.period:g} s'
-        [again] = [again for action in later.actions for again in action.starts(words.given)]
-        assert again == words
+        log, timer = actions_after(words, status)
+        assert log.msg == f'{executable} has exited with status {status}: restarted in ' \
+            f'{timer.period:g} s'
+        [restarted] = [each for action in timer.actions for each in action.starts(words.given)]
+        assert restarted == words
 
 
 @pytest.mark.parametrize('name', ['demo', 'fleet'])
-def test_finding_36_a_bad_parameter_ends_the_launch_and_is_not_tried_again(name):
-    [end] = died(started(name)['mavlink_bridge'], 1)
-    assert end.reason == 'mavlink_bridge refuses what it is given, as it says above'
+def test_finding_36_a_bad_parameter_ends_the_launch_without_a_restart(name):
+    [end] = actions_after(started(name)['mavlink_bridge'], 1)
+    assert end.reason == 'mavlink_bridge refuses its parameters, see its error above'
 
 
 @pytest.mark.parametrize('name', ['demo', 'fleet'])
@@ -196,21 +197,21 @@ def test_finding_36_the_end_of_a_viewer_ends_nothing(name, tmp_path, monkeypatch
         assert nodes[viewer].on_exit is None
 
 
-def test_a_bridge_has_time_to_end_after_its_swap():
-    assert started('fleet')['mavlink_bridge'].patience > bridge_end.LONGEST
+def test_a_bridge_has_time_to_complete_an_upload_before_sigterm():
+    assert started('fleet')['mavlink_bridge'].patience > UPLOAD_TIMEOUT
 
 
-def test_lives_that_are_short_make_the_next_one_wait_longer():
-    restarts = RestartPolicy()
+def test_short_runs_double_the_delay_of_the_next_restart():
+    policy = RestartPolicy()
     delays = []
-    for lived in (5.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 100.0, 1.0):
-        assert restarts.died(70, lived) is RestartVerdict.AGAIN
-        delays.append(restarts.delay)
+    for duration in (5.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 100.0, 1.0):
+        assert policy.on_exit(70, duration) is RestartVerdict.RESTART
+        delays.append(policy.delay)
     assert delays == [1.0, 2.0, 4.0, 8.0, 16.0, 30.0, 30.0, 1.0, 2.0]
 
 
-def test_finding_36_a_node_that_refuses_again_and_again_is_given_up():
-    restarts = RestartPolicy()
-    verdicts = [restarts.died(status, 1.0) for status in (-9, 1, 1, 70, *[1] * 5)]
-    assert verdicts == [RestartVerdict.AGAIN] * 8 + [RestartVerdict.GIVE_UP]
-    assert RestartPolicy().died(1, 1.0) is RestartVerdict.END_ALL
+def test_finding_36_a_node_that_refuses_its_parameters_five_times_is_given_up():
+    policy = RestartPolicy()
+    verdicts = [policy.on_exit(status, 1.0) for status in (-9, 1, 1, 70, *[1] * 5)]
+    assert verdicts == [RestartVerdict.RESTART] * 8 + [RestartVerdict.GIVE_UP]
+    assert RestartPolicy().on_exit(1, 1.0) is RestartVerdict.END_ALL

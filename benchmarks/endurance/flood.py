@@ -27,7 +27,7 @@ from uav_task_alloc_msgs import msg as m
 from uav_task_alloc.model import Task
 from uav_task_alloc.nodes.allocator import AllocatorNode
 from uav_task_alloc.nodes.conversions.messages import (
-    HEARD_ANNOUNCEMENTS,
+    INPUT_ANNOUNCEMENTS,
     LATCHED,
     STATES,
     PointMsg,
@@ -39,8 +39,8 @@ from uav_task_alloc.nodes.ros.run import run
 
 UAVS, RATE, SIDE, TICK = 200, 1000, 10_000.0, 0.02  # states/s, [m], [s]
 REST = 5.0  # [s] of states before the flood and after the last task is answered
-TIMED = ('on_state', 'on_tasks', 'on_zones', 'on_event', 'on_submit', 'on_tick', 'on_answer',
-         'on_second')
+TIMED = ('on_state', 'on_tasks', 'on_zones', 'on_event', 'on_submit', 'on_step', 'on_results',
+         'publish_diagnostics')
 
 
 class Watched(AllocatorNode):
@@ -103,7 +103,7 @@ class Watch:
                                       LATCHED)
         # a writer keeps what is not acknowledged yet, so this one's depth is the whole flood
         self.tasks = self.node.create_publisher(m.TaskAnnouncement, 'task_announcements',
-                                                HEARD_ANNOUNCEMENTS)
+                                                INPUT_ANNOUNCEMENTS)
 
     def on_statuses(self, msg: m.TaskStatusArray) -> None:
         self.heard.append(time.monotonic())

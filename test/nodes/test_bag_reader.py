@@ -71,7 +71,7 @@ def test_a_bag_comes_back_as_lines_whatever_the_namespace(whole):
     assert (plan['trigger'], len(states)) == ('ADD t1', 5)
     assert states[4]['position'] == [40.0, 0.0, 50.0]
     assert states[4]['battery'] is None
-    assert (reader.trouble, reader.unread) == ('', {})
+    assert (reader.damage, reader.undecodable) == ('', {})
 
 
 @pytest.mark.parametrize(('about', 'count'), [
@@ -102,7 +102,7 @@ def test_of_a_bag_cut_short_anywhere_all_whole_chunks_are_read(whole, tmp_path):
         (tmp_path / 'cut.mcap').write_bytes(data[:length])
         reader = BagReader(tmp_path / 'cut.mcap')
         count = len(list(reader))
-        assert reader.trouble
+        assert reader.damage
         assert count >= most
         most = count
     assert most == len(MESSAGES) + 1
@@ -139,7 +139,7 @@ def test_a_message_that_is_not_of_its_type_is_counted_and_left_out(tmp_path):
             bag.add(topic, b'\0\1\0\0\xff\xff', 1, 1)
     reader = BagReader(tmp_path / 'x.mcap')
     assert [line['kind'] for line in reader] == ['run']
-    assert reader.unread == {'/task_statuses': 1, '/uav_states': 1}
+    assert reader.undecodable == {'/task_statuses': 1, '/uav_states': 1}
 
 
 def test_what_is_no_record_of_a_flight_is_refused_in_words(tmp_path):

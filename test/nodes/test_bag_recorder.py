@@ -155,7 +155,7 @@ def test_a_disk_that_fails_ends_the_recording_and_nothing_else(probe, tmp_path, 
 
 def test_a_definition_holds_all_a_message_is_made_of():
     text = definitions.definition('uav_task_alloc_msgs/msg/TaskList')
-    parts = text.split(definitions.RULE + '\nMSG: ')
+    parts = text.split(definitions.SEPARATOR + '\nMSG: ')
     assert [part.split()[0] for part in parts[1:]] == [
         'std_msgs/Header', 'uav_task_alloc_msgs/PlannedTask', 'geometry_msgs/Point',
         'builtin_interfaces/Time', 'uav_task_alloc_msgs/Task', 'builtin_interfaces/Duration']
@@ -166,7 +166,7 @@ def test_a_definition_holds_all_a_message_is_made_of():
     ('# Task task', []), ('geometry_msgs/Point[3] p', ['geometry_msgs/msg/Point']),
     ('float64[<=3] x', []), ('Task task', ['p/msg/Task']), ('', [])])
 def test_the_types_of_fields_are_found(line, types):
-    assert definitions.used(line, 'p') == types
+    assert definitions.dependencies(line, 'p') == types
 
 
 @pytest.mark.parametrize(('argv', 'ros'), [

@@ -7,7 +7,7 @@ import pytest
 from test_mavlink_bridge import Sky
 from uav_task_alloc_msgs import msg as m
 
-from uav_task_alloc.nodes.ros.bridge_shutdown import LONGEST, BridgeShutdown
+from uav_task_alloc.nodes.ros.bridge_shutdown import UPLOAD_TIMEOUT, BridgeShutdown
 
 pytestmark = pytest.mark.ros
 MANY = 150  # tasks, whose upload takes a while
@@ -34,8 +34,8 @@ def test_finding_36_a_bridge_ends_after_the_swap_under_way(sky, probe):
     hold_for_a_swap(sky, probe)
     code, said = sky.bridge.stop(signal.SIGINT, 30)
     assert code == 0, said
-    assert 'ends after the swap of uav_1' in said
-    assert 'ends while airborne: uav_1' in said
+    assert 'exits after the upload to uav_1' in said
+    assert 'exits while airborne: uav_1' in said
     assert 'held in the air' not in said
     # it flies the new list without a bridge
     before = len(sky.flown(1))
@@ -48,13 +48,13 @@ def test_finding_36_a_swap_that_does_not_end_is_not_waited_for_without_end(sky, 
     sky.fleet.set_alive('uav_1', False)
     code, said = sky.bridge.stop(signal.SIGINT, 60)
     assert code == 0, said
-    assert 'ends while held in the air for a new list: uav_1' in said
+    assert 'exits while held in the air for a new list: uav_1' in said
 
 
 def test_a_bridge_takes_no_list_and_lets_nobody_take_off_once_it_is_to_end(sky, probe):
     hold_for_a_swap(sky, probe)
     sky.bridge.popen.send_signal(signal.SIGINT)
-    probe.until(lambda: 'ends after the swap' in sky.bridge.output())
+    probe.until(lambda: 'exits after the upload' in sky.bridge.output())
     sky.send(2, 1, [0])
     assert sky.bridge.popen.wait(30) == 0
     assert sky.states['uav_2'].mode == m.UavState.STANDBY
@@ -72,14 +72,14 @@ def test_a_swap_is_waited_for_as_long_as_it_lasts_and_no_longer_than_said():
     assert not BridgeShutdown().waits(fleet[:1], 5.0)
     end = BridgeShutdown()
     assert end.waits(fleet, 100.0)
-    assert end.waits(fleet, 100.0 + 0.9 * LONGEST)
-    assert not end.waits(fleet, 100.0 + LONGEST)
+    assert end.waits(fleet, 100.0 + 0.9 * UPLOAD_TIMEOUT)
+    assert not end.waits(fleet, 100.0 + UPLOAD_TIMEOUT)
 
 
 def test_everybody_in_the_air_is_named():
     fleet = [session('a', True, None), session('b', True, 5.0), session('c', False, None),
              session('d', True, None)]
-    flying, held = BridgeShutdown.words(fleet)
-    assert flying.startswith('ends while airborne: a, d; ')
-    assert held.startswith('ends while held in the air for a new list: b; ')
-    assert BridgeShutdown.words(fleet[2:3]) == []
+    flying, held = BridgeShutdown.warnings(fleet)
+    assert flying.startswith('exits while airborne: a, d; ')
+    assert held.startswith('exits while held in the air for a new list: b; ')
+    assert BridgeShutdown.warnings(fleet[2:3]) == []

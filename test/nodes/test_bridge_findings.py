@@ -25,8 +25,8 @@ class Bridge:
 
     def __init__(self):
         self.node = MavlinkBridge()
-        self.log = {level: [] for level in self.node.log}
-        self.node.log.update({level: lines.append for level, lines in self.log.items()})
+        self.log = {level: [] for level in self.node.log.levels}
+        self.node.log.levels.update({level: lines.append for level, lines in self.log.items()})
         self.executor = SingleThreadedExecutor()
         self.executor.add_node(self.node)
         self.far = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
@@ -141,12 +141,12 @@ def test_finding_13_a_timestamp_that_cannot_be_written_is_a_warning_in_flight(
 def test_finding_24_a_list_of_66000_points_is_refused_and_the_one_before_stays(bridge):
     one = bridge()
     one.say(HEARTBEAT)
-    one.until(lambda: 'uav_1' in one.node.lists)
+    one.until(lambda: 'uav_1' in one.node.lists.known)
     short = planned_task(Task('t', (60.0, 0.0, 50.0)), Leg((), 60.0), 0.0)
     way = Leg(((9.0, 9.0, 50.0),) * 65_998, 60.0)
     far = planned_task(Task('far', (60.0, 0.0, 50.0)), way, 0.0)
-    one.node.on_list('uav_1', m.TaskList(uav_id='uav_1', revision=1, tasks=[short]))
-    one.node.on_list('uav_1', m.TaskList(uav_id='uav_1', revision=2, tasks=[short, far]))
+    one.node.lists.on_list('uav_1', m.TaskList(uav_id='uav_1', revision=1, tasks=[short]))
+    one.node.lists.on_list('uav_1', m.TaskList(uav_id='uav_1', revision=2, tasks=[short, far]))
     assert one.log['warning'] == [
         'uav_1/task_list: task_list of uav_1: points = 66000: expected at most 65533: ignored']
     onboard = one.node.ground_station.sessions[1].executor.onboard
@@ -159,7 +159,7 @@ def test_finding_24_a_flood_of_strangers_leaves_the_known_vehicle(bridge):
     one = bridge()
     link, = one.node.connections.links
     one.say(HEARTBEAT)
-    one.until(lambda: 'uav_1' in one.node.lists)
+    one.until(lambda: 'uav_1' in one.node.lists.known)
     for _ in range(200):
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as stranger:
             stranger.bind(('127.0.0.1', 0))

@@ -8,7 +8,7 @@ from uav_task_alloc_msgs import msg as m
 
 from uav_task_alloc.geometry.frames import Origin
 from uav_task_alloc.nodes.conversions.messages import LATCHED
-from uav_task_alloc.nodes.ros.origin_check import MOST, PATIENCE, OriginReports
+from uav_task_alloc.nodes.ros.origin_check import MOST_ORIGINS, ORIGIN_TIMEOUT, OriginReports
 
 pytestmark = pytest.mark.ros
 HERE = Origin(47.397742, 8.545594, 488.0)
@@ -122,24 +122,24 @@ def test_the_same_origin_and_one_that_is_none_change_nothing(sky, probe):
 
 def test_origins_a_millimetre_apart_are_the_same():
     origins = OriginReports(HERE)
-    origins.hear(Origin(47.39774201, 8.54559401, 488.001))
+    origins.add(Origin(47.39774201, 8.54559401, 488.001))
     assert origins.conflict(0.0) == ''
-    origins.hear(Origin(47.397742, 8.545594, 488.1))
+    origins.add(Origin(47.397742, 8.545594, 488.1))
     assert '0.1 m from origin.*' in origins.conflict(0.0)
 
 
 def test_a_conflict_lasts_until_all_who_are_left_could_tell_again():
     origins = OriginReports(HERE)
-    origins.hear(Origin(47.4, 8.5, 488.0))
-    origins.left(10.0)
-    assert origins.conflict(10.0 + 0.9 * PATIENCE)
-    assert origins.conflict(10.0 + PATIENCE) == ''
-    origins.hear(Origin(47.4, 8.5, 488.0))
-    assert origins.conflict(11.0 + PATIENCE)
+    origins.add(Origin(47.4, 8.5, 488.0))
+    origins.on_node_left(10.0)
+    assert origins.conflict(10.0 + 0.9 * ORIGIN_TIMEOUT)
+    assert origins.conflict(10.0 + ORIGIN_TIMEOUT) == ''
+    origins.add(Origin(47.4, 8.5, 488.0))
+    assert origins.conflict(11.0 + ORIGIN_TIMEOUT)
 
 
 def test_a_flood_of_origins_is_bounded():
     origins = OriginReports(HERE)
-    for k in range(10 * MOST):
-        origins.hear(Origin(float(k % 90), 8.5, float(k)))
-    assert len(origins._differing) == MOST
+    for k in range(10 * MOST_ORIGINS):
+        origins.add(Origin(float(k % 90), 8.5, float(k)))
+    assert len(origins._differing) == MOST_ORIGINS

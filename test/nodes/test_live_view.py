@@ -131,7 +131,7 @@ def test_without_a_scenario_it_goes_on_until_it_is_stopped(start, probe):
 
 
 def test_what_a_message_does_not_know_is_null_in_json():
-    line = lines.state(state(speed=math.nan))
+    line = lines.state_record(state(speed=math.nan))
     assert (line['battery'], line['velocity']) == (None, [None, 0.0, 0.0])
     json.dumps(line, allow_nan=False)
 
@@ -140,7 +140,7 @@ def test_zones_come_back_from_the_record_as_they_were():
     zones = [ThreatZone.hemisphere('a', (1.0, 2.0, 3.0), 4.0, 5.0),
              ThreatZone.cylinder('b', (1.0, 2.0), 3.0),
              ThreatZone.polygon('c', [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)], 0.0, 9.0)]
-    text = json.dumps(lines.announced_zones(from_zones(zones, 0.0)), allow_nan=False)
+    text = json.dumps(lines.zones_record(from_zones(zones, 0.0)), allow_nan=False)
     assert [decode_zone(row) for row in json.loads(text)['zones']] == zones
 
 
@@ -148,7 +148,7 @@ def test_a_bad_task_of_an_announcement_is_left_out():
     bad = announcement(m.TaskAnnouncement.ADD, [Task('t2', (1.0, 2.0, 3.0))], 0.0)
     bad.tasks[0].position = Point(x=math.nan)
     bad.tasks += ADD.tasks
-    assert [task['id'] for task in lines.announced_tasks(bad, ORIGIN)['tasks']] == ['t1']
+    assert [task['id'] for task in lines.announcement_record(bad, ORIGIN)['tasks']] == ['t1']
 
 
 def test_uploads_and_health_are_taken_from_the_diagnostics():
@@ -157,7 +157,7 @@ def test_uploads_and_health_are_taken_from_the_diagnostics():
         values=[KeyValue(key=key, value=value) for key, value in (
             ('uploads', '4'), ('rate', '10'), ('authority', 'LOST'), ('authority_why', 'why'),
             ('authority_for', '12 s'), ('given_back_by', '~/hand_over'))])
-    assert lines.uploads(DiagnosticArray(status=[status])) == {
+    assert lines.uploads_record(DiagnosticArray(status=[status])) == {
         'kind': 'uploads', 'uploads': {'mavlink_bridge: uav_1': 4},
         'health': {'uav_1': [1, 'link stale']},
         'authority': {'uav_1': {'state': 'LOST', 'why': 'why', 'for': 12.0,
@@ -170,19 +170,19 @@ def test_for_how_long_is_a_number_or_unknown(given, seconds):
     status = DiagnosticStatus(hardware_id='u', values=[
         KeyValue(key='authority', value='HELD'), KeyValue(key='authority_for', value=given),
         KeyValue(key='given_back_by', value='nothing is needed')])
-    said = lines.uploads(DiagnosticArray(status=[status]))['authority']['u']
+    said = lines.uploads_record(DiagnosticArray(status=[status]))['authority']['u']
     assert (said['for'], said['back']) == (seconds, '')
 
 
 def test_a_state_carries_who_has_the_uav():
-    line = lines.state(m.UavState(authority=m.UavState.LOST, reason='why'))
+    line = lines.state_record(m.UavState(authority=m.UavState.LOST, reason='why'))
     assert (line['authority'], line['reason']) == ('LOST', 'why')
 
 
 @pytest.mark.parametrize('value', ['\u00b2', '\u0663', '-1', '', '9' * 5000, '1e3'])
 def test_finding_31_a_count_of_uploads_is_plain_digits(value):
     status = DiagnosticStatus(name='b', values=[KeyValue(key='uploads', value=value)])
-    assert lines.uploads(DiagnosticArray(status=[status]))['uploads'] == {}
+    assert lines.uploads_record(DiagnosticArray(status=[status]))['uploads'] == {}
 
 
 def test_finding_31_via_points_that_are_no_places_are_left_out():

@@ -3,7 +3,7 @@
 import math
 
 import pytest
-from allocation import Desk
+from allocation import AllocatorDriver
 from geometry_msgs.msg import Point
 from hypothesis import given, settings, strategies as st
 from nav_msgs.msg import Path
@@ -29,9 +29,9 @@ from uav_task_alloc.nodes.conversions.messages import (
     announcement,
     from_zones,
 )
-from uav_task_alloc.nodes.conversions.path_messages import path
-from uav_task_alloc.nodes.rviz import marker_publisher as painter, zone_markers as zone_bodies
-from uav_task_alloc.nodes.rviz.markers import MOST_STOPS, MOST_TEXTS, Picture, markers
+from uav_task_alloc.nodes.conversions.path_messages import path_message
+from uav_task_alloc.nodes.rviz import marker_publisher, zone_markers
+from uav_task_alloc.nodes.rviz.markers import MOST_STOPS, MOST_TEXTS, MarkerScene, markers
 
 AT = 5.0
 NOTCHED = ThreatZone.polygon('p', [(0, 0), (90, 0), (90, 90), (45, 20), (0, 90)], 5.0, 60.0, 4.0)
@@ -75,18 +75,18 @@ uavs = st.just({}) | st.builds(lambda p, silent: {'u1': uav('u1', *p, silent=sil
        st.sets(st.sampled_from(['t0', 't1', 't2'])))
 @settings(max_examples=150, deadline=None)
 def test_whatever_the_world_is_its_markers_are_sound(zones, tasks, one, uavs, changed):
-    check_markers(markers(Picture(AT, [one], tasks, uavs, zones, frozenset(changed), 'x' * 99)))
-    check_path(path(one, uavs.get('u1')))
+    check_markers(markers(MarkerScene(AT, [one], tasks, uavs, zones, frozenset(changed), 'x' * 99)))
+    check_path(path_message(one, uavs.get('u1')))
 
 
 def test_an_empty_world_only_deletes():
-    assert check_markers(markers(Picture(AT))) == {}
+    assert check_markers(markers(MarkerScene(AT))) == {}
 
 
 def test_a_route_shows_its_order_its_arrows_its_detours_and_the_way_home():
     one = UavList('u1', 3, (stop('a', 100.0, 0.0, 5.0, via=((50.0, 20.0, 5.0),)),
                             stop('b', 200.0, 0.0, 5.0)), returns=True)
-    left = check_markers(markers(Picture(AT, [one], uavs={'u1': uav('u1', 0.0, 0.0, 5.0)})))
+    left = check_markers(markers(MarkerScene(AT, [one], uavs={'u1': uav('u1', 0.0, 0.0, 5.0)})))
     assert texts(left, 'order') == ['1: a', '2: b']
     assert texts(left, 'uav_labels') == ['u1']
     assert points(left, 'routes') == [(0, 0, 5), (50, 20, 5), (100, 0, 5), (200, 0, 5), (0, 0, 0)]
@@ -95,7 +95,7 @@ def test_a_route_shows_its_order_its_arrows_its_detours_and_the_way_home():
 
 
 def test_tasks_are_coloured_by_state_and_sized_by_value():
-    left = check_markers(markers(Picture(AT, tasks=[
+    left = check_markers(markers(MarkerScene(AT, tasks=[
         record('a', 1.0, 0.0, 0.0, value=10.0), record('b', 2.0, 0.0, 0.0, value=1.0),
         record('c', 3.0, 0.0, 0.0, value=1.0, state=TaskState.UNASSIGNED),
         record('d', 4.0, 0.0, 0.0, value=1.0, state=TaskState.COMPLETED),
@@ -109,8 +109,8 @@ def test_tasks_are_coloured_by_state_and_sized_by_value():
 
 def test_what_the_last_replan_changed_is_set_off():
     one = UavList('u1', 3, (stop('a', 100.0, 0.0, 5.0), stop('b', 200.0, 0.0, 5.0)))
-    picture = Picture(AT, [one], changed=frozenset({'b'}), trigger='ADD b')
-    left = check_markers(markers(picture))
+    scene = MarkerScene(AT, [one], changed=frozenset({'b'}), trigger='ADD b')
+    left = check_markers(markers(scene))
     halo, leg = (each for (ns, _), each in left.items() if ns == 'replan')
     assert [p.x for p in halo.points] == [200.0]
     assert [p.x for p in leg.points] == [100.0, 200.0]
@@ -118,7 +118,7 @@ def test_what_the_last_replan_changed_is_set_off():
 
 
 def test_a_silent_uav_says_so_and_loses_its_colour():
-    left = check_markers(markers(Picture(AT, uavs={
+    left = check_markers(markers(MarkerScene(AT, uavs={
         'u1': uav('u1', 0.0, 0.0, 0.0), 'u2': uav('u2', 9.0, 0.0, 0.0, silent=True)})))
     assert texts(left, 'uav_labels') == ['u1', 'u2 silent']
     assert left['uavs', 0].color != left['uavs', 1].color
@@ -127,7 +127,7 @@ def test_a_silent_uav_says_so_and_loses_its_colour():
 def test_the_number_of_markers_is_bounded_for_thousands_of_tasks():
     tasks = [record(f't{k}', float(k), 0.0, 0.0, state=TaskState.UNASSIGNED) for k in range(3000)]
     one = UavList('u1', 1, tuple(stop(f's{k}', float(k), 9.0, 0.0) for k in range(2000)))
-    left = check_markers(markers(Picture(AT, [one], tasks)))
+    left = check_markers(markers(MarkerScene(AT, [one], tasks)))
     assert len(points(left, 'tasks')) == 3000
     assert len(points(left, 'routes')) == 2000
     assert len(texts(left, 'order')) == MOST_STOPS
@@ -136,7 +136,7 @@ def test_the_number_of_markers_is_bounded_for_thousands_of_tasks():
 
 def test_a_dome_is_half_a_ball_with_its_margin():
     marker = Marker()
-    zone_bodies.shape(marker, ThreatZone.hemisphere('z', (7.0, 8.0, 9.0), 20.0, 5.0))
+    zone_markers.set_volume(marker, ThreatZone.hemisphere('z', (7.0, 8.0, 9.0), 20.0, 5.0))
     assert marker.scale.x == marker.scale.y == marker.scale.z == 25.0
     assert (marker.pose.position.x, marker.pose.position.z) == (7.0, 9.0)
     assert all(p.z >= 0.0 and math.isclose(math.hypot(p.x, p.y, p.z), 1.0)
@@ -146,8 +146,8 @@ def test_a_dome_is_half_a_ball_with_its_margin():
 @pytest.mark.parametrize('zone', [
     NOTCHED, ThreatZone.polygon('q', [(0, 0), (0, 9), (9, 9), (9, 0)], margin=1.0)])
 def test_a_prism_is_closed_to_its_top_and_covers_the_polygon_once(zone):
-    marker = zone_bodies.shape(Marker(), zone)
-    low, high = zone_bodies.height_span(zone)
+    marker = zone_markers.set_volume(Marker(), zone)
+    low, high = zone_markers.height_span(zone)
     at = marker.pose.position
     corners = [(at.x + p.x, at.y + p.y, at.z + p.z) for p in marker.points]
     assert {z for _, _, z in corners} == {low, high}
@@ -164,34 +164,34 @@ def test_a_prism_is_closed_to_its_top_and_covers_the_polygon_once(zone):
 
 
 @pytest.mark.ros
-def test_nothing_is_drawn_while_nobody_looks_or_nothing_is_new(probe, monkeypatch):
+def test_nothing_is_published_without_subscribers_or_changes(probe, monkeypatch):
     drawn = []
-    monkeypatch.setattr(painter, 'markers', lambda picture: drawn.append(picture) or markers(
-        picture))
-    monkeypatch.setattr(painter, 'REST', 0.0)
-    desk = Desk()
-    artist = painter.MarkerPublisher(probe.node, desk.world)
-    desk.uav('u1', 0.0, 0.0, 50.0)
-    desk.add(('t1', 100.0, 0.0))
-    artist.note(Outbox(statuses=True))
-    artist.on_look()
+    monkeypatch.setattr(marker_publisher, 'markers', lambda scene: drawn.append(scene) or markers(
+        scene))
+    monkeypatch.setattr(marker_publisher, '_PAUSE_FACTOR', 0.0)
+    driver = AllocatorDriver()
+    publisher = marker_publisher.MarkerPublisher(probe.node, driver.world)
+    driver.uav('u1', 0.0, 0.0, 50.0)
+    driver.add(('t1', 100.0, 0.0))
+    publisher.update(Outbox(statuses=True))
+    publisher.on_timer()
     assert drawn == []
     probe.collect(MarkerArray, 'allocation_markers', LATCHED)
-    probe.until(lambda: artist.publisher.get_subscription_count())
-    artist.on_look()
-    artist.on_look()
-    assert [len(picture.tasks) for picture in drawn] == [1]
-    desk.uav('u1', 9.0, 0.0, 50.0)
-    artist.on_look()
-    assert len(drawn) == 1  # it moved, but the picture is not a second old
-    artist.drawn -= painter.MOVED
-    artist.on_look()
-    artist.drawn -= painter.MOVED
-    artist.on_look()
+    probe.until(lambda: publisher.publisher.get_subscription_count())
+    publisher.on_timer()
+    publisher.on_timer()
+    assert [len(scene.tasks) for scene in drawn] == [1]
+    driver.uav('u1', 9.0, 0.0, 50.0)
+    publisher.on_timer()
+    assert len(drawn) == 1  # it moved, but the markers are less than a second old
+    publisher.published_at -= marker_publisher.POSITION_PERIOD
+    publisher.on_timer()
+    publisher.published_at -= marker_publisher.POSITION_PERIOD
+    publisher.on_timer()
     assert len(drawn) == 2  # and then it did not move
-    desk.world.set_zones([NOTCHED], {}, desk.now)
-    artist.on_look()
-    assert [len(picture.zones) for picture in drawn] == [0, 0, 1]
+    driver.world.set_zones([NOTCHED], {}, driver.now)
+    publisher.on_timer()
+    assert [len(scene.zones) for scene in drawn] == [0, 0, 1]
 
 
 @pytest.mark.ros

@@ -77,7 +77,7 @@ def test_help_and_strange_arguments_are_answered_without_starting():
 
     code, out = ask('--help', '--ros-args', '-p', 'seed:=1')
     assert (code, 'docs/parameters.md' in out) == (0, True)
-    assert ask('--bogus') == (2, "'--bogus': expected --ros-args and what belongs to it\n")
+    assert ask('--bogus') == (2, "'--bogus': expected --ros-args and its arguments\n")
 
 
 @pytest.mark.parametrize(('chosen', 'used'), [(None, 'UDPv4'), ('SHM', 'SHM')])

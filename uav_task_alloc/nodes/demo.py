@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Flies a scenario from start to end in real nodes, watches them, and judges the result."""
+"""Flies a scenario in real nodes as processes, monitors them, and checks the result."""
 from __future__ import annotations
 
 import argparse
@@ -9,6 +9,7 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -18,26 +19,34 @@ from uav_task_alloc import plots
 from uav_task_alloc.cli import report
 from uav_task_alloc.errors import AllocError
 from uav_task_alloc.nodes.ros.udp_ports import free_port
-from uav_task_alloc.record import ground_truth as truth, run_folder
+from uav_task_alloc.record import ground_truth, run_folder
 from uav_task_alloc.scenario import load, simulation_parameters
 from uav_task_alloc.scenario.node_parameters import Parameters
 
 _PACKAGE = 'uav_task_alloc'
-_PATIENCE = 15.0  # [s], of which the bridge takes 10 at most for a swap under way
-FAULTS = ('tasks_lost', 'tasks_flown_twice', 'zone_violations')
+_EXIT_TIMEOUT = 15.0  # [s]; the bridge waits up to 10 s for a running upload
+_FAULTS = ('tasks_lost', 'tasks_flown_twice', 'zone_violations')
 
 
 @dataclass
-class Child:
-    """One node as a process, its output in a file."""
+class NodeProcess:
+    """One node as a process, with its output in a file."""
 
     name: str
     process: subprocess.Popen[bytes]
     log: Path
 
     @classmethod
-    def start(cls, name: str, out: Path, parameters: Parameters, show: bool = False) -> Child:
-        """Start an installed executable; `show`: in this terminal, else into out/NAME.log."""
+    def start(cls, name: str, out: Path, parameters: Parameters,
+              show: bool = False) -> NodeProcess:
+        """Start an installed executable.
+
+        Args:
+            name: of the executable.
+            out: folder of its log, NAME.log.
+            parameters: by ROS name.
+            show: its output goes to this terminal instead.
+        """
         command = [f'{get_package_prefix(_PACKAGE)}/lib/{_PACKAGE}/{name}', '--ros-args']
         for key, value in parameters.items():
             command += ['-p', f'{key}:={json.dumps(value)}']
@@ -48,89 +57,107 @@ class Child:
         return cls(name, process, log)
 
     def stop(self) -> int:
-        """Ask it to end, wait, end it for good after PATIENCE; its exit status."""
+        """Interrupt it, kill it after a timeout; return its exit status."""
         if self.process.poll() is None:
             self.process.send_signal(signal.SIGINT)
         try:
-            return self.process.wait(_PATIENCE)
+            return self.process.wait(_EXIT_TIMEOUT)
         except subprocess.TimeoutExpired:
             self.process.kill()
             return self.process.wait()
 
 
-def start_nodes(args: argparse.Namespace, out: Path) -> list[Child]:
-    """All nodes of the scenario; the last one is the live view, which ends when all is done."""
-    given = simulation_parameters(load(args.scenario), args.scenario, free_port(), args.speedup)
+def start_nodes(args: argparse.Namespace, out: Path) -> list[NodeProcess]:
+    """Start all nodes of the scenario; the last one is the live view, which ends with it."""
+    parameters = simulation_parameters(load(args.scenario), args.scenario, free_port(),
+                                       args.speedup)
     state = str(out / run_folder.STATE)
     for node, more in {
             'allocator': {'state_dir': state}, 'mavlink_bridge': {'state_dir': state},
-            'fleet_sim': {'log_file': str(out / truth.FILE)},
+            'fleet_sim': {'log_file': str(out / ground_truth.TRUTH_FILE)},
             'live_view': {'out_dir': str(out), 'record': str(args.record or '')}}.items():
-        given[node].update(more)
-    return [Child.start(node, out, parameters, show=node == 'live_view')
-            for node, parameters in given.items()]
+        parameters[node].update(more)
+    return [NodeProcess.start(node, out, values, show=node == 'live_view')
+            for node, values in parameters.items()]
 
 
-def watch(children: list[Child], limit: float) -> list[str]:
-    """Wait for the live view to end; what went wrong meanwhile."""
-    *nodes, view = children
+def wait_for_end(processes: list[NodeProcess], limit: float) -> list[str]:
+    """Wait for the live view to exit.
+
+    Args:
+        processes: of all nodes, the live view last.
+        limit: of wall time [s].
+
+    Returns:
+        What went wrong: nodes that have died, or the timeout.
+    """
+    *nodes, view = processes
     end = time.monotonic() + limit
     while time.monotonic() < end:
         try:
             view.process.wait(0.2)
             return []
         except subprocess.TimeoutExpired:
-            dead = [n for n in nodes if n.process.poll() is not None
-                    and (n.name != 'scenario_player' or n.process.returncode)]
+            dead = [node for node in nodes if node.process.poll() is not None
+                    and (node.name != 'scenario_player' or node.process.returncode)]
         if dead:
-            return [f'{n.name} died with status {n.process.returncode}, see {n.log}'
-                    for n in dead]
+            return [f'{node.name} died with status {node.process.returncode}, see {node.log}'
+                    for node in dead]
     return [f'not finished after {limit:g} s']
 
 
-def find_faults(summary: dict[str, object]) -> list[str]:
-    """The faults that a summary tells of."""
-    return [f'{name} = {summary[name]}' for name in FAULTS if summary[name]]
+def find_faults(summary: Mapping[str, object]) -> list[str]:
+    """The figures of a summary that must be zero and are not."""
+    return [f'{name} = {summary[name]}' for name in _FAULTS if summary[name]]
 
 
 def fly_scenario(args: argparse.Namespace) -> int:
-    """Run the scenario into args.out; 0 when no task was lost or flown twice, no zone entered."""
-    begin = time.monotonic()
+    """Fly a scenario and write its results into args.out.
+
+    Returns:
+        0 when no task was lost or flown twice, no zone entered, and every node exited in order.
+    """
+    started_at = time.monotonic()
     out = args.out
-    load(args.scenario)  # a bad one costs no results of before
+    load(args.scenario)  # an invalid one must not cost earlier results
     run_folder.prepare(out)
-    children = start_nodes(args, out)
+    processes = start_nodes(args, out)
     try:
-        faults = watch(children, args.limit)
+        faults = wait_for_end(processes, args.limit)
     finally:
-        codes = {child.name: child.stop() for child in reversed(children)}
+        codes = {process.name: process.stop() for process in reversed(processes)}
     faults += [f'{name} ended with status {code}' for name, code in codes.items()
                if code and not any(name in fault for fault in faults)]
-    summary = report.summarise(out)
-    summary['wall_s'] = round(time.monotonic() - begin, 1)
-    (out / run_folder.SUMMARY).write_text(json.dumps(summary, indent=2) + '\n')
-    print(report.summary_table(summary))
-    plots.draw_flight(out, out / run_folder.MAP)
-    print(f'Details: {out / run_folder.SUMMARY}   Map: {out / run_folder.MAP}')
-    faults += find_faults(summary)
+    faults += write_results(out, time.monotonic() - started_at)
     for fault in faults:
         print(f'FAULT: {fault}', file=sys.stderr)
     return 1 if faults else 0
 
 
+def write_results(out: Path, duration: float) -> list[str]:
+    """Write summary and map of a run of `duration` [s] into a folder; return its faults."""
+    summary = report.summarise(out)
+    summary['wall_s'] = round(duration, 1)
+    (out / run_folder.SUMMARY).write_text(json.dumps(summary, indent=2) + '\n')
+    print(report.summary_table(summary))
+    plots.draw_flight(out, out / run_folder.MAP)
+    print(f'Details: {out / run_folder.SUMMARY}   Map: {out / run_folder.MAP}')
+    return find_faults(summary)
+
+
 def main(argv: list[str] | None = None) -> int:
-    """Command line of the demo; its exit status."""
+    """Command line of the demo; returns the exit status."""
     share = Path(get_package_share_directory(_PACKAGE))
     parser = argparse.ArgumentParser(prog='demo', description=__doc__)
     parser.add_argument('--scenario', type=Path, default=share / 'config/scenarios/demo.yaml')
     parser.add_argument('--speedup', type=float, help="(the scenario's)")
     parser.add_argument('--out', type=Path, default=Path('out/demo'), metavar='DIR',
-                        help='results; what an earlier demo left there is removed (%(default)s)')
+                        help='results; those of an earlier demo are removed (%(default)s)')
     parser.add_argument('--limit', type=float, default=80.0, help='[s] of wall time')
     parser.add_argument('--record', type=Path, metavar='FILE',
                         help='MCAP file for all topics; `report FILE` draws the mission from it')
     args = parser.parse_args(argv)
-    # fleets of several demos on one machine, or on the network, must not hear each other
+    # several demos on one machine, or in one network, must not exchange messages
     os.environ.setdefault('ROS_DOMAIN_ID', str(1 + os.getpid() % 100))
     os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
     try:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Shows a fleet in the terminal and in the browser, records it, ends when a scenario is over."""
+"""Shows a fleet in the terminal and in the browser, records it, and ends with its scenario."""
 from __future__ import annotations
 
 import json
@@ -9,10 +9,11 @@ import time
 from collections.abc import Callable
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, TextIO, TypeVar
 
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.node import Node
+from rclpy.qos import QoSProfile
 from uav_task_alloc_msgs import msg as m
 
 from uav_task_alloc import scenario
@@ -26,162 +27,186 @@ from uav_task_alloc.nodes.ros.parameters import declare
 from uav_task_alloc.nodes.ros.run import run, with_flags
 from uav_task_alloc.nodes.ros.topic_names import TASK_LIST, check_topic
 from uav_task_alloc.params import LiveViewParams
-from uav_task_alloc.record import message_records as lines
-from uav_task_alloc.record.progress import fleet, headline, is_over
-from uav_task_alloc.record.run_state import FILE, RunState
+from uav_task_alloc.record import message_records
+from uav_task_alloc.record.message_records import RecordBody
+from uav_task_alloc.record.progress import fleet_lines, headline, run_is_over
+from uav_task_alloc.record.run_state import RECORD_FILE, RunState
 
-REFRESH = 0.5  # [s] in a terminal
-PLAIN_EVERY = 4  # refreshes between two lines where the output is no terminal
-MOST_REFUSED = 200  # lines of the log
-UP_AND_CLEAR = '\x1b[{}F\x1b[J'
+if TYPE_CHECKING:
+    from uav_task_alloc.live.server import PageServer
+    from uav_task_alloc.nodes.ros.bag_recorder import BagRecorder
+
+_Message = TypeVar('_Message')
+_PERIOD = 0.5  # [s] between updates of terminal and page
+_PLAIN_PERIODS = 4  # between two lines where the output is no terminal
+_MOST_REFUSALS = 200  # lines of the log
+_UP_AND_CLEAR = '\x1b[{}F\x1b[J'
+_STATE_FIELDS = ('mode', 'mission_state', 'active', 'list_revision', 'available', 'authority',
+                 'reason')  # a change of one is recorded at once
+
+
+class TerminalStatus:
+    """The state of a run on stdout; a terminal is rewritten, a file gets a line at times."""
+
+    def __init__(self) -> None:
+        self._lines = 0  # printed last
+        self._updates = 0
+
+    def update(self, state: RunState, clock: float, last: bool) -> None:
+        """Print the state at `clock` [s] of the scenario; `last`: in any case."""
+        self._updates += 1
+        lines = [headline(state, clock)]
+        if sys.stdout.isatty():
+            lines += fleet_lines(state, time.time())
+            width = shutil.get_terminal_size().columns - 1  # a wrapped line cannot be rewritten
+            lines = [line[:width] for line in lines]
+            sys.stdout.write(_UP_AND_CLEAR.format(self._lines) if self._lines else '')
+            self._lines = len(lines)
+        elif self._updates % _PLAIN_PERIODS and not last:
+            return
+        print('\n'.join(lines), flush=True)
 
 
 class LiveView(Node):
-    """Listens to everything, says nothing on any topic. `--record FILE`: all of it as MCAP."""
+    """Shows and records a fleet. `--record FILE`: all topics as MCAP.
+
+    Subscribes to:
+        `uav_states` (UavState), `task_announcements` (TaskAnnouncement), `threat_zones`
+        (ThreatZoneArray), `task_statuses` (TaskStatusArray), `allocation` (Allocation),
+        `<uav_id>/task_list` (TaskList), `/diagnostics` (DiagnosticArray).
+    Parameters:
+        LiveViewParams, see docs/parameters.md.
+    """
 
     def __init__(self) -> None:
         super().__init__('live_view')
         self.params = declare(self, LiveViewParams).now
         self.played = scenario.load(self.params.scenario) if self.params.scenario else None
         self.origin = self.played.origin if self.played else scenario.values.DEFAULT_ORIGIN
-        self.heard = RunState()
-        self.refused: set[tuple[str, str]] = set()  # topic and why, as logged
-        self.scene, self.board = Scene(self.heard), SnapshotStore()
-        self.file = self._open()
-        self.recorder = self._record()
+        self.state = RunState()
+        self.logged_refusals: set[tuple[str, str]] = set()  # topic and reason
+        self.scene, self.snapshots = Scene(self.state), SnapshotStore()
+        self.terminal = TerminalStatus()
+        self.file = self._open_record()
+        self.recorder = self._start_recorder()
         self.finished = False
-        self.quiet_since: float | None = None  # [s] of the scenario
-        self.shown = 0  # lines to write over
-        self.refreshes = 0
-        self.take({'wall': time.time(), 'kind': 'run', 'speedup': self.params.speedup})
-        self.server = self._serve()
-        self.listen()
-        self.create_timer(REFRESH, self.refresh)
+        self.over_since: float | None = None  # [s] of the scenario
+        self.apply({'wall': time.time(), 'kind': 'run', 'speedup': self.params.speedup})
+        self.server = self._start_server()
+        self._create_subscriptions()
+        self.create_timer(_PERIOD, self.on_timer)
 
-    def listen(self) -> None:
-        """Subscribe to what is recorded; lists follow as UAVs become known."""
-        for kind, topic, qos, read in (
-            (m.TaskAnnouncement, 'task_announcements', ANNOUNCEMENTS,
-             lambda msg: lines.announced_tasks(msg, self.origin)),
-            (m.ThreatZoneArray, 'threat_zones', LATCHED, lines.announced_zones),
-            (m.TaskStatusArray, 'task_statuses', LATCHED, lines.statuses),
-            (m.Allocation, 'allocation', ANNOUNCEMENTS, lines.allocation_record),
-            (DiagnosticArray, '/diagnostics', 10, lines.uploads),
-        ):
-            self.create_subscription(kind, topic, self.taking(topic, read), qos)
+    def _create_subscriptions(self) -> None:
+        """Subscribe to all topics of a fleet; the lists of other UAVs follow their states."""
+        self._subscribe(m.TaskAnnouncement, 'task_announcements', ANNOUNCEMENTS,
+                        lambda msg: message_records.announcement_record(msg, self.origin))
+        self._subscribe(m.ThreatZoneArray, 'threat_zones', LATCHED, message_records.zones_record)
+        self._subscribe(m.TaskStatusArray, 'task_statuses', LATCHED,
+                        message_records.statuses_record)
+        self._subscribe(m.Allocation, 'allocation', ANNOUNCEMENTS,
+                        message_records.allocation_record)
+        self._subscribe(DiagnosticArray, '/diagnostics', 10, message_records.uploads_record)
         self.create_subscription(m.UavState, 'uav_states', self.on_state, STATES)
         for uav in self.played.uavs if self.played else ():
-            self.follow(uav.id)
+            self.subscribe_list(uav.id)
 
-    def follow(self, uav: str) -> None:
-        """Listen to the task lists of one UAV."""
-        self.heard.lists[uav] = {'tasks': [], 'distance': 0.0}
+    def _subscribe(self, msg_type: type[_Message], topic: str, qos: QoSProfile | int,
+                   to_record: Callable[[_Message], RecordBody]) -> None:
+        """Record every message of a topic as `to_record` converts it."""
+        def on_message(msg: _Message) -> None:
+            self._guard(topic, lambda: self.apply({'wall': time.time(), **to_record(msg)}))
+        self.create_subscription(msg_type, topic, on_message, qos)
+
+    def subscribe_list(self, uav_id: str) -> None:
+        """Subscribe to the task lists of a UAV."""
+        self.state.lists[uav_id] = {'tasks': [], 'distance': 0.0}
         try:
-            topic = check_topic(self, TASK_LIST, uav)
-        except InvalidValue as error:  # the rest of what it says is shown all the same
-            return self.refuse('task_list', error)
-        self.create_subscription(
-            m.TaskList, topic, self.taking(topic, lines.task_list_record), LATCHED
-        )
+            topic = check_topic(self, TASK_LIST, uav_id)
+        except InvalidValue as error:  # its state is shown nevertheless
+            return self.log_refusal('task_list', error)
+        self._subscribe(m.TaskList, topic, LATCHED, message_records.task_list_record)
 
     def on_state(self, msg: m.UavState) -> None:
-        """As `take_state`, whatever the message brings."""
-        self.guarded('uav_states', lambda: self.take_state(msg))
+        """Record the state of a UAV."""
+        self._guard('uav_states', lambda: self.apply_state(msg))
 
-    def take_state(self, msg: m.UavState) -> None:
-        """Record a state where something but the position is new, else twice a second."""
+    def apply_state(self, msg: m.UavState) -> None:
+        """Record a state that differs in more than its position at once, others twice a second."""
         if not is_ros_name(msg.uav_id):
-            return  # has no topic of lists; the allocator says what is wrong with it
-        if msg.uav_id not in self.heard.lists:
-            self.follow(msg.uav_id)
-        line = {'wall': time.time(), **lines.state(msg)}
-        old = self.heard.uavs.get(msg.uav_id)
-        what = ('mode', 'mission_state', 'active', 'list_revision', 'available', 'authority',
-                'reason')
-        if old is None or line['wall'] - old['wall'] >= REFRESH or any(
-                line[key] != old[key] for key in what):
-            self.take(line)
+            return  # the allocator reports it
+        if msg.uav_id not in self.state.lists:
+            self.subscribe_list(msg.uav_id)
+        line = {'wall': time.time(), **message_records.state_record(msg)}
+        last = self.state.uavs.get(msg.uav_id)
+        if last is None or line['wall'] - last['wall'] >= _PERIOD or any(
+                line[key] != last[key] for key in _STATE_FIELDS):
+            self.apply(line)
 
-    def taking(self, topic: str, read: Callable[[Any], lines.RecordBody]) -> Callable[[Any], None]:
-        """A callback that records what `read` makes of a message."""
-        return lambda msg: self.guarded(
-            topic, lambda: self.take({'wall': time.time(), **read(msg)}))
-
-    def guarded(self, topic: str, take: Callable[[], None]) -> None:
-        """Take one message; one that is bad is refused, and no more."""
+    def _guard(self, topic: str, handle: Callable[[], None]) -> None:
+        """Handle a message; whatever it raises is logged as its refusal."""
         try:
-            take()
+            handle()
         except Exception as error:
-            self.refuse(topic, error)
+            self.log_refusal(topic, error)
 
-    def refuse(self, topic: str, error: Exception) -> None:
-        """Log what is wrong with a message, each fault of a topic once."""
-        why = str(error) if isinstance(error, InvalidValue) else cut(
+    def log_refusal(self, topic: str, error: Exception) -> None:
+        """Log why a message is refused, each reason of a topic once."""
+        reason = str(error) if isinstance(error, InvalidValue) else cut(
             f'{type(error).__name__}: {error}')
-        if len(self.refused) < MOST_REFUSED and (topic, why) not in self.refused:
-            self.refused.add((topic, why))
-            self.get_logger().warning(f'{topic}: {why}: ignored; said once')
+        refusal = topic, reason
+        if len(self.logged_refusals) < _MOST_REFUSALS and refusal not in self.logged_refusals:
+            self.logged_refusals.add(refusal)
+            self.get_logger().warning(f'{topic}: {reason}: ignored; logged once')
 
-    def take(self, line: lines.RecordBody) -> None:
-        """Fold a line into what is known, and write it down."""
-        self.scene.take(line)
+    def apply(self, line: RecordBody) -> None:
+        """Apply a line to the state of the run, and write it to the record."""
+        self.scene.apply(line)
         if self.file:
             self.file.write(json.dumps(line) + '\n')
 
-    def refresh(self) -> None:
-        """Show where things are; note when they have been over for long enough."""
+    def on_timer(self) -> None:
+        """Update terminal and page, and finish some time after the scenario is over."""
         clock = self.clock()
-        if self.played is None or not is_over(self.heard, self.played, clock):
-            self.quiet_since = None
-        else:
-            self.quiet_since = clock if self.quiet_since is None else self.quiet_since
-            self.finished = (not self.params.stay
-                             and clock - self.quiet_since >= self.params.settle)
-        self.show(clock)
-        self.post()
+        self.finished = self.is_finished(clock)
+        self.terminal.update(self.state, clock, self.finished)
+        self.update_page()
         if self.file:
             self.file.flush()
 
-    def post(self) -> None:
-        """Put what is new on the page."""
+    def is_finished(self, clock: float) -> bool:
+        """Whether the scenario has been over for the parameter `settle` [s]."""
+        if self.played is None or not run_is_over(self.state, self.played, clock):
+            self.over_since = None
+            return False
+        self.over_since = clock if self.over_since is None else self.over_since
+        return not self.params.stay and clock - self.over_since >= self.params.settle
+
+    def update_page(self) -> None:
+        """Store what has changed for the page."""
         wall = time.time()
-        news = self.scene.news(wall)
+        updates = self.scene.updates(wall)
         if self.server:
-            self.board.put(wall, {'start': self.heard.start(), 'live': True,
-                                  'speedup': self.heard.speedup}, *news)
+            self.snapshots.put(wall, {'start': self.state.start(), 'live': True,
+                                      'speedup': self.state.speedup}, *updates)
 
     def clock(self) -> float:
         """Scenario time [s]: since the first task was announced."""
-        return self.heard.clock(time.time()) if self.heard.tasks else 0.0
+        return self.state.clock(time.time()) if self.state.tasks else 0.0
 
-    def show(self, clock: float) -> None:
-        """Write over the lines of last time; in a file, one line now and then."""
-        self.refreshes += 1
-        lines = [headline(self.heard, clock)]
-        if sys.stdout.isatty():
-            lines += fleet(self.heard, time.time())
-            width = shutil.get_terminal_size().columns - 1  # a line that wraps cannot be undone
-            lines = [line[:width] for line in lines]
-            sys.stdout.write(UP_AND_CLEAR.format(self.shown) if self.shown else '')
-            self.shown = len(lines)
-        elif self.refreshes % PLAIN_EVERY and not self.finished:
-            return
-        print('\n'.join(lines), flush=True)
-
-    def _open(self) -> Any:
+    def _open_record(self) -> TextIO | None:
         if not self.params.out_dir:
             return None
         folder = Path(self.params.out_dir)
         folder.mkdir(parents=True, exist_ok=True)
-        return (folder / FILE).open('w', encoding='utf-8')
+        return (folder / RECORD_FILE).open('w', encoding='utf-8')
 
-    def _serve(self) -> Any:
-        """The page in the browser; None, and a word why, where there can be none."""
+    def _start_server(self) -> PageServer | None:
+        """Serve the page; None, with the reason in the log, where that is not possible."""
         if not self.params.page:
             return None
         try:
-            from uav_task_alloc.live.server import Server
-            server = Server(self.board, self.params.host, self.params.port)
+            from uav_task_alloc.live.server import PageServer
+            server = PageServer(self.snapshots, self.params.host, self.params.port)
         except (OSError, ImportError) as error:
             self.get_logger().warning(
                 f'no live page: host = {self.params.host}, port = {self.params.port}: {error}')
@@ -190,16 +215,16 @@ class LiveView(Node):
         print(f'Live page: {server.address}', flush=True)
         return server
 
-    def _record(self) -> Any:
-        """Everything into an MCAP file, where one is named."""
+    def _start_recorder(self) -> BagRecorder | None:
+        """Record all topics, where the parameter `record` names a file."""
         if not self.params.record:
             return None
+        origin = asdict(self.played.origin) if self.played else {}
         try:
             from uav_task_alloc.nodes.ros.bag_recorder import BagRecorder
             recorder = BagRecorder(Path(self.params.record), self.get_namespace(), {
                 'speedup': str(self.params.speedup),
-                **({f'origin.{name}': str(value) for name, value in asdict(
-                    self.played.origin).items()} if self.played else {})})
+                **{f'origin.{name}': str(value) for name, value in origin.items()}})
         except (OSError, ImportError) as error:
             raise InvalidValue('record', self.params.record,
                                f'a file that can be written ({error})') from None
@@ -207,7 +232,7 @@ class LiveView(Node):
         return recorder
 
     def destroy_node(self) -> None:
-        """End the page, close the records."""
+        """Stop the server and the recorder, close the record."""
         if self.server:
             self.server.stop()
         if self.recorder:
@@ -219,5 +244,5 @@ class LiveView(Node):
 
 
 def main(args: list[str] | None = None) -> None:
-    """Run the node."""
+    """Entry point of `ros2 run uav_task_alloc live_view`."""
     run(LiveView, with_flags(args or sys.argv, 'record'))

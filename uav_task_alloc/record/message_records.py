@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Messages as the lines of a record: plain values that JSON can carry, unknown as null.
+"""Conversion of messages into the lines of a record: JSON values, unknown numbers as null.
 
-A message is whatever has the fields of its type: one of rclpy, or one read from a file.
+A message is any object with the fields of its type: of rclpy, or decoded from an MCAP file.
 """
 from __future__ import annotations
 
@@ -18,71 +18,76 @@ from uav_task_alloc.zone_codec import JSON_ZONE, decode_zone_array, encode_zone
 RecordBody = dict[str, Any]  # a line without its wall time
 _Message = Any
 
-# constants of the messages, by value
+# names of the messages' constants, by value
 ACTIONS = ('ADD', 'UPDATE', 'CANCEL')
 _STATES = ('PENDING', 'ASSIGNED', 'ACTIVE', 'COMPLETED', 'FAILED', 'CANCELLED', 'REJECTED',
           'UNASSIGNED')
 MODES = ('UNKNOWN', 'STANDBY', 'TAKEOFF', 'ON_MISSION', 'HOLD', 'RETURNING', 'LANDING', 'FAULT')
 MISSIONS = ('UNKNOWN', 'UPLOADING', 'VERIFIED', 'MIXED', 'FOREIGN')
 AUTHORITIES = ('UNKNOWN', 'NONE', 'HELD', 'SUSPENDED', 'LOST')
-_COUNT = re.compile('[0-9]{1,18}')  # what isdigit() takes int() may not
-NOTHING = 'nothing is needed'  # gives back what the bridge has
-LOCAL = 0  # frame of a task
+_COUNT = re.compile('[0-9]{1,18}')  # int() refuses some strings for which isdigit() is true
+NOTHING = 'nothing is needed'  # value of `given_back_by` while the bridge has authority
+_FRAME_LOCAL, _FRAME_WGS84 = 0, 1  # of a Task message
 
 
-def word(words: tuple[str, ...], value: int) -> str:
-    """The name of a constant; '' where it has none."""
-    return words[value] if value < len(words) else ''
+def constant_name(names: tuple[str, ...], value: int) -> str:
+    """The name of a constant by its value; '' for an unknown value."""
+    return names[value] if value < len(names) else ''
 
 
-def announced_tasks(msg: _Message, origin: Origin | None) -> RecordBody:
-    """The tasks that are good; the allocator says what is wrong with the others.
+def announcement_record(msg: _Message, origin: Origin | None) -> RecordBody:
+    """The valid tasks of a TaskAnnouncement; the allocator reports the others.
 
-    Without an origin, those in degrees have no place and are left out.
+    Args:
+        msg: TaskAnnouncement.
+        origin: of the ENU frame; None: tasks in WGS84 are left out.
     """
     tasks = []
     for task in msg.tasks:
-        if word(ACTIONS, msg.action) == 'CANCEL':
+        if constant_name(ACTIONS, msg.action) == 'CANCEL':
             tasks.append({'id': task.task_id})
             continue
         try:
-            position = task_place(task, origin)
+            position = task_position(task, origin)
         except InvalidValue:
             continue
         if position is not None:
             tasks.append(
                 {'id': task.task_id, 'position': position, 'value': finite_or_none(task.value)}
             )
-    return {'kind': 'announcement', 'action': word(ACTIONS, msg.action), 'tasks': tasks}
+    return {'kind': 'announcement', 'action': constant_name(ACTIONS, msg.action), 'tasks': tasks}
 
 
-def task_place(task: _Message, origin: Origin | None) -> Point | None:
-    """Where a Task message is [m]; None where that takes an origin. Raises InvalidValue."""
-    if task.frame == LOCAL:
-        return check_point('position', _xyz(task.position))
+def task_position(task: _Message, origin: Origin | None) -> Point | None:
+    """The position [m] of a Task message; None in WGS84 without origin. Raises InvalidValue."""
+    place = f'task {task.task_id}: '
+    if task.frame == _FRAME_LOCAL:
+        return check_point(place + 'position', _xyz(task.position))
+    if task.frame != _FRAME_WGS84:
+        raise InvalidValue(place + 'frame', task.frame, 'LOCAL (0) or WGS84 (1)')
     if origin is None:
         return None
-    check_number('altitude', task.altitude, -1e5, 1e5)
-    return to_enu(origin, check_number('latitude', task.latitude, -90.0, 90.0),
-                  check_number('longitude', task.longitude, -180.0, 180.0),
-                  origin.altitude_amsl + task.altitude)
+    check_number(place + 'latitude', task.latitude, -90.0, 90.0)
+    check_number(place + 'longitude', task.longitude, -180.0, 180.0)
+    check_number(place + 'altitude', task.altitude, -1e5, 1e5)
+    return to_enu(origin, task.latitude, task.longitude, origin.altitude_amsl + task.altitude)
 
 
-def announced_zones(msg: _Message) -> RecordBody:
+def zones_record(msg: _Message) -> RecordBody:
     """The valid zones; the allocator reports the others. Raises InvalidValue for too many."""
     valid, _ = decode_zone_array(msg)
     return {'kind': 'zones', 'zones': [encode_zone(zone, JSON_ZONE) for zone in valid]}
 
 
-def statuses(msg: _Message) -> RecordBody:
-    """Where every task stands."""
+def statuses_record(msg: _Message) -> RecordBody:
+    """The statuses of a TaskStatusArray."""
     return {'kind': 'statuses', 'statuses': [
-        {'task': row.task_id, 'state': word(_STATES, row.state), 'uav': row.uav_id,
+        {'task': row.task_id, 'state': constant_name(_STATES, row.state), 'uav': row.uav_id,
          'reason': row.reason} for row in msg.statuses]}
 
 
 def allocation_record(msg: _Message) -> RecordBody:
-    """A plan in figures."""
+    """The lists and figures of an Allocation."""
     return {
         'kind': 'allocation',
         'revision': msg.revision,
@@ -97,7 +102,7 @@ def allocation_record(msg: _Message) -> RecordBody:
 
 
 def task_list_record(msg: _Message) -> RecordBody:
-    """What a UAV has still to fly; `eta` [s] from `stamp` [unix s]. Via points are places."""
+    """The remaining tasks of a TaskList; `eta` [s] counts from `stamp` [unix s]."""
     return {'kind': 'list', 'uav': msg.uav_id, 'revision': msg.revision, 'end': msg.end,
             'stamp': seconds(msg.header.stamp),
             'distance': finite_or_none(msg.distance), 'tasks': [
@@ -108,33 +113,35 @@ def task_list_record(msg: _Message) -> RecordBody:
                 for row in msg.tasks]}
 
 
-def state(msg: _Message) -> RecordBody:
-    """What a UAV does."""
-    return {'kind': 'state', 'uav': msg.uav_id, 'mode': word(MODES, msg.mode),
-            'mission_state': word(MISSIONS, msg.mission_state), 'active': msg.active_task_id,
+def state_record(msg: _Message) -> RecordBody:
+    """The values of a UavState."""
+    return {'kind': 'state', 'uav': msg.uav_id, 'mode': constant_name(MODES, msg.mode),
+            'mission_state': constant_name(MISSIONS, msg.mission_state),
+            'active': msg.active_task_id,
             'list_revision': msg.list_revision, 'battery': finite_or_none(msg.battery),
             'position': [finite_or_none(v) for v in _xyz(msg.position)],
             'velocity': [finite_or_none(v) for v in _xyz(msg.velocity)],
             'range_remaining': finite_or_none(msg.range_remaining), 'available': msg.available,
-            # recordings of earlier versions have neither
-            'authority': word(AUTHORITIES, getattr(msg, 'authority', 0)),
+            # missing in recordings of earlier versions
+            'authority': constant_name(AUTHORITIES, getattr(msg, 'authority', 0)),
             'reason': getattr(msg, 'reason', '')}
 
 
-def uploads(msg: _Message) -> RecordBody:
-    """The upload counters a bridge puts into its diagnostics, by name of the status.
+def uploads_record(msg: _Message) -> RecordBody:
+    """The bridge's values of a DiagnosticArray.
 
-    `health`: [level, sentence] by what it is about, a UAV where the bridge speaks; `authority`:
-    who has each UAV.
+    Returns:
+        `uploads`: counts by name of the status; `health`: [level, text] by hardware id, which is
+        the UAV in statuses of a bridge; `authority`: by UAV.
     """
-    return {'kind': 'uploads', 'uploads': dict(_uploads(msg)), 'authority': dict(
+    return {'kind': 'uploads', 'uploads': dict(_upload_counts(msg)), 'authority': dict(
         _authority(msg)), 'health': {
         status.hardware_id or status.name: [
             status.level if isinstance(status.level, int) else ord(status.level), status.message]
         for status in msg.status}}
 
 
-def _uploads(msg: _Message) -> Iterable[tuple[str, int]]:
+def _upload_counts(msg: _Message) -> Iterable[tuple[str, int]]:
     for status in msg.status:
         for pair in status.values:
             if pair.key == 'uploads' and _COUNT.fullmatch(pair.value):
@@ -142,19 +149,19 @@ def _uploads(msg: _Message) -> Iterable[tuple[str, int]]:
 
 
 def _authority(msg: _Message) -> Iterable[tuple[str, RecordBody]]:
-    """By UAV: the state, why, for how long [s; None: unknown], and what gives it back."""
+    """By UAV: state, reason (`why`), duration (`for`) [s] or None, and what gives it `back`."""
     for status in msg.status:
-        said = {pair.key: pair.value for pair in status.values}
-        if 'authority' in said:
-            back = said.get('given_back_by', '')
+        values = {pair.key: pair.value for pair in status.values}
+        if 'authority' in values:
+            back = values.get('given_back_by', '')
             yield status.hardware_id, {
-                'state': said['authority'], 'why': said.get('authority_why', ''),
-                'for': _number(said.get('authority_for', '')),
+                'state': values['authority'], 'why': values.get('authority_why', ''),
+                'for': _seconds_or_none(values.get('authority_for', '')),
                 'back': '' if back == NOTHING else back}
 
 
-def _number(text: str) -> float | None:
-    """Of `12 s`; None where it is none."""
+def _seconds_or_none(text: str) -> float | None:
+    """The number of `12 s`; None for any other text."""
     try:
         return finite_or_none(float(text.removesuffix(' s')))
     except ValueError:
@@ -162,7 +169,7 @@ def _number(text: str) -> float | None:
 
 
 def finite_or_none(value: float) -> float | None:
-    """None for NaN and the infinities, which JSON does not know."""
+    """None for NaN and the infinities, which JSON cannot represent."""
     return float(value) if math.isfinite(value) else None
 
 

@@ -1,10 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the allocator tells, as messages: lists, statuses, the allocation, its health."""
+"""Messages that the allocator publishes: lists, statuses and the allocation."""
 from __future__ import annotations
 
 from collections.abc import Iterable
 
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from uav_task_alloc_msgs import msg as m
 
 from uav_task_alloc.allocator.records import Allocation, UavList
@@ -17,7 +16,7 @@ from uav_task_alloc.nodes.conversions.messages import (
     to_stamp,
 )
 
-_LEFT_OUT = (m.TaskStatus.PENDING, m.TaskStatus.UNASSIGNED)
+_UNASSIGNED = (m.TaskStatus.PENDING, m.TaskStatus.UNASSIGNED)
 
 
 def from_list(uav_list: UavList) -> m.TaskList:
@@ -31,35 +30,30 @@ def from_list(uav_list: UavList) -> m.TaskList:
 
 
 def from_statuses(statuses: list[m.TaskStatus], now: float) -> m.TaskStatusArray:
-    """Where every task stands."""
+    """The statuses of all tasks; `now` [s] is the stamp."""
     return m.TaskStatusArray(header=header(now), statuses=statuses)
 
 
 def from_task_status(status: TaskStatus) -> m.TaskStatus:
-    """Where one task stands."""
+    """The status of one task."""
     return m.TaskStatus(task_id=status.task_id, state=status.state.value, uav_id=status.uav,
                         reason=status.reason, stamp=to_stamp(status.stamp))
 
 
 def from_allocation(allocation: Allocation, lists: list[m.TaskList],
                     statuses: Iterable[m.TaskStatus]) -> m.Allocation:
-    """The plan in force and what it leaves out."""
+    """The plan in force.
+
+    Args:
+        allocation: the plan with its revision and trigger.
+        lists: its lists as messages, one for each UAV.
+        statuses: of all tasks; those without a UAV are in the message.
+    """
     plan = allocation.plan
     return m.Allocation(
         header=header(allocation.stamp), revision=allocation.revision,
-        lists=lists, unassigned=[s for s in statuses if s.state in _LEFT_OUT],
+        lists=lists, unassigned=[s for s in statuses if s.state in _UNASSIGNED],
         fit=float(plan.fit), distance=float(plan.distance), value=float(plan.value),
         penalty=float(plan.penalty),
         solve_time=to_duration(plan.solve_time), iterations=int(plan.iterations),
         warm_started=plan.warm_started, trigger=allocation.trigger)
-
-
-def from_health(name: str, worries: list[str], facts: dict[str, object],
-                now: float, stopped: bool = False) -> DiagnosticArray:
-    """What an operator asks first. stopped: the worries are why it does nothing."""
-    level = DiagnosticStatus.WARN if worries else DiagnosticStatus.OK
-    level = DiagnosticStatus.ERROR if stopped else level
-    values = [KeyValue(key=key, value=str(value)) for key, value in facts.items()]
-    status = DiagnosticStatus(level=level, name=f'{name}: allocation', hardware_id='',
-                              message='; '.join(worries) or 'running', values=values)
-    return DiagnosticArray(header=header(now), status=[status])

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Announcements taken apart: good tasks and zones to the world, bad ones refused by name."""
+"""TaskAnnouncement messages: valid tasks go to the world, invalid ones are refused by name."""
 from __future__ import annotations
 
 from uav_task_alloc_msgs import msg as m
@@ -9,47 +9,59 @@ from uav_task_alloc.allocator.records import AnnouncementAction, TaskVerdict
 from uav_task_alloc.allocator.state.world import World
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.geometry.frames import Origin
-from uav_task_alloc.model import check_count, check_ros_name
-from uav_task_alloc.nodes.conversions.message_limits import (
-    MOST_TASKS,
-    cut,
-)
+from uav_task_alloc.model import Task, check_count, check_ros_name
+from uav_task_alloc.nodes.conversions.message_limits import MOST_TASKS, cut
 from uav_task_alloc.nodes.conversions.messages import to_task
 
 
-def take(world: World, msg: m.TaskAnnouncement, origin: Origin, stamp: float,
-         now: float) -> list[TaskVerdict]:
-    """Tell the world of every task; a verdict for each."""
+def announce(world: World, msg: m.TaskAnnouncement, origin: Origin, stamp: float,
+             now: float) -> list[TaskVerdict]:
+    """Add, update or cancel the tasks of a message.
+
+    Args:
+        world: which takes the valid ones.
+        msg: the announcement.
+        origin: of the ENU frame, for tasks in WGS84.
+        stamp: the published clock [s].
+        now: the steady clock [s].
+
+    Returns:
+        A verdict for each task; for the first MOST_TASKS of a message with more than that.
+    """
     try:
-        action = AnnouncementAction(msg.action)
-        check_count('tasks', msg.tasks, MOST_TASKS)
+        action = to_action(msg)
     except InvalidValue as error:
-        return _refuse_all(world, msg, str(error), stamp)
-    except ValueError:
-        reason = f'action = {msg.action}: expected ADD (0), UPDATE (1) or CANCEL (2)'
-        return _refuse_all(world, msg, reason, stamp)
-    good, verdicts = [], []
+        return [world.refuse(cut(task.task_id), str(error), stamp)
+                for task in msg.tasks[:MOST_TASKS]]
+    tasks: list[Task] = []
+    task_ids: list[str] = []
+    refused: list[TaskVerdict] = []
     for task in msg.tasks:
         try:
-            good.append(
-                check_ros_name('task_id', task.task_id)
-                if action is AnnouncementAction.CANCEL
-                else to_task(task, origin)
-            )
+            if action is AnnouncementAction.CANCEL:
+                task_ids.append(check_ros_name('task_id', task.task_id))
+            else:
+                tasks.append(to_task(task, origin))
         except InvalidValue as error:
-            verdicts.append(world.refuse(cut(task.task_id), str(error), stamp))
+            refused.append(world.refuse(cut(task.task_id), str(error), stamp))
     if action is AnnouncementAction.CANCEL:
-        return world.cancel(good, stamp, now) + verdicts
-    return world.announce(action, good, stamp, now) + verdicts
+        return world.cancel(task_ids, stamp, now) + refused
+    return world.announce(action, tasks, stamp, now) + refused
 
 
-def _refuse_all(world: World, msg: m.TaskAnnouncement, reason: str,
-                stamp: float) -> list[TaskVerdict]:
-    return [world.refuse(cut(task.task_id), reason, stamp) for task in msg.tasks[:MOST_TASKS]]
+def to_action(msg: m.TaskAnnouncement) -> AnnouncementAction:
+    """Raise InvalidValue for an unknown action, or for more than MOST_TASKS tasks."""
+    try:
+        action = AnnouncementAction(msg.action)
+    except ValueError:
+        raise InvalidValue('action', msg.action, 'ADD (0), UPDATE (1) or CANCEL (2)') from None
+    check_count('tasks', msg.tasks, MOST_TASKS)
+    return action
 
 
-def answer(verdicts: list[TaskVerdict], response: SubmitTasks.Response) -> SubmitTasks.Response:
-    """Verdicts as a service tells them. A caller who repeats himself is told so."""
+def from_verdicts(verdicts: list[TaskVerdict],
+                  response: SubmitTasks.Response) -> SubmitTasks.Response:
+    """Fill the response of `~/submit_tasks`; a task that is repeated unchanged is rejected."""
     for verdict in verdicts:
         if verdict.accepted and not verdict.unchanged:
             response.accepted.append(verdict.task_id)

@@ -1,12 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Messages of the bridge to its core and back."""
+"""Messages of the bridge to the values of its core and back."""
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable
 from dataclasses import replace
 
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from geometry_msgs.msg import Vector3
 from uav_task_alloc_msgs import msg as m
 
@@ -17,66 +16,71 @@ from uav_task_alloc.mavlink.mission.items import MissionStop, TaskList
 from uav_task_alloc.mavlink.mission.task_progress import TaskProgress
 from uav_task_alloc.model import Task, ThreatZone, check_point
 from uav_task_alloc.nodes.conversions.message_limits import MOST_POINTS
-from uav_task_alloc.nodes.conversions.messages import (
-    from_point,
-    header,
-    to_point,
-    to_task,
-)
-from uav_task_alloc.params import MOST_RANGE
+from uav_task_alloc.nodes.conversions.messages import from_point, header, to_point, to_task
 from uav_task_alloc.zone_codec import decode_zone_array
 
-NOWHERE = (math.nan, math.nan, math.nan)
-EVENT = {'STARTED': m.TaskEvent.STARTED, 'COMPLETED': m.TaskEvent.COMPLETED,
-         'FAILED': m.TaskEvent.FAILED}
+_UNKNOWN_POINT = (math.nan, math.nan, math.nan)
+_EVENTS = {'STARTED': m.TaskEvent.STARTED, 'COMPLETED': m.TaskEvent.COMPLETED,
+           'FAILED': m.TaskEvent.FAILED}
 
 
 def to_list(msg: m.TaskList, uav_id: str, origin: Origin, radius: float) -> TaskList:
-    """Tasks that tell no acceptance radius get `radius` [m]; 0: the autopilot's own.
+    """The list that a UAV is to fly.
 
-    Raise InvalidValue, naming the field, where the message is no good list of that UAV.
+    Args:
+        msg: the message.
+        uav_id: of the topic it came on.
+        origin: of the ENU frame.
+        radius: acceptance radius [m] of tasks without one; 0: that of the autopilot.
+
+    Raises:
+        InvalidValue: a field, which it names, is invalid.
     """
     if msg.uav_id not in ('', uav_id):
         raise InvalidValue('uav_id', msg.uav_id, uav_id)
+    place = f'task_list of {uav_id}: '
     points = len(msg.tasks) + sum(len(planned.via) for planned in msg.tasks) + len(msg.end_via)
     if points > MOST_POINTS:
-        raise InvalidValue(f'task_list of {uav_id}: points', points, f'at most {MOST_POINTS}')
-    stops = tuple(MissionStop(_accepted(to_task(planned.task, origin), radius), tuple(
-        check_point(f'task {planned.task.task_id}: via', from_point(p)) for p in planned.via))
-        for planned in msg.tasks)
+        raise InvalidValue(place + 'points', points, f'at most {MOST_POINTS}')
+    stops = tuple(_to_stop(planned, origin, radius) for planned in msg.tasks)
     names = [stop.task.id for stop in stops]
     if len(set(names)) != len(names):
-        raise InvalidValue(f'task_list of {msg.uav_id}: task ids', names, 'each once')
+        raise InvalidValue(place + 'task ids', names, 'each once')
     if msg.end not in (m.TaskList.HOLD, m.TaskList.RETURN_HOME):
-        raise InvalidValue(f'task_list of {msg.uav_id}: end', msg.end,
-                           'HOLD (0) or RETURN_HOME (1)')
-    end_via = tuple(check_point(f'task_list of {msg.uav_id}: end_via', from_point(p))
-                    for p in msg.end_via)
+        raise InvalidValue(place + 'end', msg.end, 'HOLD (0) or RETURN_HOME (1)')
+    end_via = tuple(check_point(place + 'end_via', from_point(point)) for point in msg.end_via)
     return TaskList(msg.revision, stops, msg.end == m.TaskList.RETURN_HOME, end_via)
 
 
-def to_zones(msg: m.ThreatZoneArray, before: Iterable[ThreatZone],
+def _to_stop(planned: m.PlannedTask, origin: Origin, radius: float) -> MissionStop:
+    task: Task = to_task(planned.task, origin)
+    return MissionStop(
+        replace(task, acceptance_radius=task.acceptance_radius or radius or None),
+        tuple(check_point(f'task {task.id}: via', from_point(point)) for point in planned.via))
+
+
+def to_zones(msg: m.ThreatZoneArray, previous: Iterable[ThreatZone],
              ) -> tuple[tuple[ThreatZone, ...], str]:
-    """The picture, and what is bad in it, '' where nothing is; a bad zone stays as `before`.
+    """The zones of a message; one that is invalid stays as it was in `previous`.
 
-    Raise InvalidValue where there is too much of it to be judged zone by zone.
+    Returns:
+        The zones, and why the first invalid one is refused; '' where all are valid.
+
+    Raises:
+        InvalidValue: the message holds too much to check it zone by zone.
     """
-    zones, bad = decode_zone_array(msg)
-    found = {zone.id: zone for zone in before if zone.id in bad}
-    found.update((zone.id, zone) for zone in zones)
-    return tuple(found.values()), next(iter(bad.values()), '')
+    valid, invalid = decode_zone_array(msg)
+    zones = {zone.id: zone for zone in previous if zone.id in invalid}
+    zones.update((zone.id, zone) for zone in valid)
+    return tuple(zones.values()), next(iter(invalid.values()), '')
 
 
-def _accepted(task: Task, radius: float) -> Task:
-    return replace(task, acceptance_radius=task.acceptance_radius or radius or None)
-
-
-def from_uav_status(status: UavStatus, capabilities: Iterable[str], now: float) -> m.UavState:
-    """The message of one UAV."""
+def from_uav_status(status: UavStatus, capabilities: Iterable[str], stamp: float) -> m.UavState:
+    """The state of one UAV, measured at `stamp` [s]."""
     return m.UavState(
-        header=header(now), uav_id=status.uav_id, position=to_point(status.position),
+        header=header(stamp), uav_id=status.uav_id, position=to_point(status.position),
         velocity=Vector3(x=status.velocity[0], y=status.velocity[1], z=status.velocity[2]),
-        home=to_point(status.home or NOWHERE), battery=status.battery,
+        home=to_point(status.home or _UNKNOWN_POINT), battery=status.battery,
         range_remaining=status.range_remaining, cruise_speed=math.nan,
         capabilities=list(capabilities), available=status.available, mode=status.mode.value,
         mission_state=status.mission_state.value, active_task_id=status.active_task,
@@ -84,44 +88,8 @@ def from_uav_status(status: UavStatus, capabilities: Iterable[str], now: float) 
         reason=status.reason)
 
 
-def from_progress(uav_id: str, made: TaskProgress, now: float) -> m.TaskEvent:
-    """The message of a task begun, completed or failed."""
-    return m.TaskEvent(header=header(now), task_id=made.task, uav_id=uav_id,
-                       revision=made.revision, event=EVENT[made.event], reason=made.reason)
-
-
-def diagnostics(facts: Iterable[tuple[str, int, str, dict[str, str]]],
-                now: float) -> DiagnosticArray:
-    """One status for each (name, level, line, details)."""
-    return DiagnosticArray(header=header(now), status=[
-        DiagnosticStatus(level=bytes([level]), name=f'mavlink_bridge: {name}', message=line,
-                         hardware_id=name,
-                         values=[KeyValue(key=k, value=v) for k, v in details.items()])
-        for name, level, line, details in facts])
-
-
-def to_capabilities(entries: Iterable[str]) -> dict[str, tuple[str, ...]]:
-    """`uav_1:camera,thermal` each; raise InvalidValue otherwise."""
-    found = {}
-    for entry in entries:
-        uav_id, colon, words = entry.partition(':')
-        if not colon or not uav_id:
-            raise InvalidValue('capabilities', entry, '`UAV_ID:WORD,WORD`')
-        found[uav_id] = tuple(w.strip() for w in words.split(',') if w.strip())
-    return found
-
-
-def to_full_ranges(entries: Iterable[str]) -> dict[str, float]:
-    """Ranges [m] of full batteries from `uav_1:6000` each; raise InvalidValue otherwise."""
-    found: dict[str, float] = {}
-    for entry in entries:
-        uav_id, _, number = entry.rpartition(':')
-        try:
-            value = float(number)
-        except ValueError:
-            value = math.nan
-        if not (uav_id and 0.0 <= value <= MOST_RANGE) or uav_id in found:
-            raise InvalidValue('full_ranges', entry,
-                               f'`UAV_ID:METRES` with metres in [0, {MOST_RANGE:g}], a UAV once')
-        found[uav_id] = value
-    return found
+def from_progress(uav_id: str, progress: TaskProgress, stamp: float) -> m.TaskEvent:
+    """The event of a task that was started or completed, or has failed, at `stamp` [s]."""
+    return m.TaskEvent(header=header(stamp), task_id=progress.task, uav_id=uav_id,
+                       revision=progress.revision, event=_EVENTS[progress.event],
+                       reason=progress.reason)

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How much of anything one message may bring: whoever sends may be hostile, or broken."""
+"""How much one message may hold, so that a faulty or hostile publisher cannot exhaust a node.
+
+The limits of zones are in zone_codec.py, where recordings are read as well.
+"""
 from __future__ import annotations
 
 from collections.abc import Sequence
@@ -10,31 +13,39 @@ from uav_task_alloc.model import check_count, check_ros_name
 
 MOST_TASKS = 10_000  # of an announcement
 MOST_POINTS = MOST_ITEMS - 2  # of a list, tasks and detour points; home and return are items too
-_MOST_NAMES = 100  # capabilities, and UAVs allowed, of one task or UAV
-LONGEST_TEXT = 200  # characters of a word or a reason
-MOST_VALUE = 1e12  # of a task; sums of them stay numbers
+MOST_VALUE = 1e12  # of a task; sums of them stay exact enough
+_MOST_NAMES = 100  # capabilities, and allowed UAVs, of one task or UAV
+_LONGEST_TEXT = 200  # characters of a capability or a reason
 
 
 def check_words(place: str, words: Sequence[str]) -> frozenset[str]:
-    """Free words as a set: not too many, and none too long, blank or unprintable."""
+    """Capabilities as a set.
+
+    Raises:
+        InvalidValue: there are too many, or one is blank, too long or not printable.
+    """
     check_count(place, words, _MOST_NAMES)
     for word in words:
-        if not word.strip() or len(word) > LONGEST_TEXT or not word.isprintable():
-            raise InvalidValue(place, word, f'1 to {LONGEST_TEXT} printable characters')
+        if not word.strip() or len(word) > _LONGEST_TEXT or not word.isprintable():
+            raise InvalidValue(place, word, f'1 to {_LONGEST_TEXT} printable characters')
     return frozenset(words)
 
 
 def check_ros_names(place: str, names: Sequence[str]) -> frozenset[str]:
-    """ROS names as a set, not too many."""
+    """ROS names as a set.
+
+    Raises:
+        InvalidValue: there are too many, or one is no ROS name.
+    """
     check_count(place, names, _MOST_NAMES)
     return frozenset(check_ros_name(place, name) for name in names)
 
 
 def printable(text: str) -> str:
-    """Free text as one line for people; what cannot be printed is a question mark."""
+    """A text in one line; each character that is not printable becomes a question mark."""
     return ''.join(c if c.isprintable() else '?' for c in text)
 
 
 def cut(text: str) -> str:
-    """Free text as one short line for people."""
-    return printable(text[:LONGEST_TEXT]) + ('...' if len(text) > LONGEST_TEXT else '')
+    """A text in one line of at most 200 characters, for logs and reasons."""
+    return printable(text[:_LONGEST_TEXT]) + ('...' if len(text) > _LONGEST_TEXT else '')

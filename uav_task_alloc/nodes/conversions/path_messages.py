@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The way a UAV has still to fly: as points, and as a nav_msgs/Path."""
+"""The remaining path of a UAV: as points, and as a nav_msgs/Path."""
 from __future__ import annotations
 
 import math
@@ -15,30 +15,38 @@ from uav_task_alloc.model import Point
 from uav_task_alloc.nodes.conversions.messages import header, to_point
 
 
-def way(uav_list: UavList, uav: UavRecord | None) -> list[Point]:
-    """Where it is (where that is known), detour points and tasks in order, and home [m]."""
+def remaining_path(uav_list: UavList, uav: UavRecord | None) -> list[Point]:
+    """The points that a UAV has still to fly.
+
+    Args:
+        uav_list: the list that was published for it.
+        uav: its last report; None where there was none.
+
+    Returns:
+        [m] ENU: its position where that is known, detour points and tasks in order, and home
+        where the list returns.
+    """
     points: list[Point] = []
     for k, stop in enumerate(uav_list.stops):
         leg = [*stop.leg.via, stop.task.position]
-        passed = points_passed(uav.report.position, leg) if uav and k == 0 else 0
-        points += leg[passed:]
+        points += leg[points_passed(uav.report.position, leg):] if uav and k == 0 else leg
     if uav is None or not points:
         return points
     end = [*uav_list.end_via, uav.home] if uav_list.returns else []
     return [uav.report.position, *points, *end]
 
 
-def path(uav_list: UavList, uav: UavRecord | None) -> Path:
-    """The way as a message; each pose looks to the next, the last as the one before it."""
-    made = Path(header=header(uav_list.stamp))
-    points = way(uav_list, uav)
+def path_message(uav_list: UavList, uav: UavRecord | None) -> Path:
+    """The remaining path; each pose faces the next one, the last keeps its heading."""
+    path = Path(header=header(uav_list.stamp))
+    points = remaining_path(uav_list, uav)
     yaw = 0.0
     for a, b in pairwise([*points, *points[-1:]]):
         east, north = b[0] - a[0], b[1] - a[1]
         yaw = math.atan2(north, east) if east or north else yaw
-        pose = PoseStamped(header=made.header)
+        pose = PoseStamped(header=path.header)
         pose.pose.position = to_point(a)
         pose.pose.orientation.z = math.sin(yaw / 2.0)
         pose.pose.orientation.w = math.cos(yaw / 2.0)
-        made.poses.append(pose)
-    return made
+        path.poses.append(pose)
+    return path

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tells lists, statuses and the allocation: a slice at a time, so that nobody is kept waiting."""
+"""Publishes lists, statuses and the allocation in time slices, so that callbacks are not delayed.
+"""
 from __future__ import annotations
 
 import time
@@ -9,115 +10,136 @@ from rclpy.node import Node
 from rclpy.publisher import Publisher
 from uav_task_alloc_msgs import msg as m
 
-from uav_task_alloc.allocator.records import Allocation, Outbox, UavList
+from uav_task_alloc.allocator.records import Allocation, Outbox, TaskRecord, UavList
 from uav_task_alloc.allocator.state.world import World
 from uav_task_alloc.allocator.status import status_of
 from uav_task_alloc.errors import InvalidValue
-from uav_task_alloc.nodes.conversions import allocation_messages as told
+from uav_task_alloc.nodes.conversions import allocation_messages
 from uav_task_alloc.nodes.conversions.messages import LATCHED
 from uav_task_alloc.nodes.ros.topic_names import TASK_LIST, check_topic
 
-SLICE = 0.02  # [s] of lists at once
-_REST = 5.0  # times as long as a whole picture took none follows: a sixth of a core at most
+_SLICE = 0.02  # [s] of lists per call
+_PAUSE_FACTOR = 5.0  # times the duration of the large messages: a sixth of a core at most
+_StatusSource = TaskRecord | tuple[str, float]  # what a status is made from
 
 
 class AllocationPublisher:
-    """What is out of date waits here, the newest of each kind; `tell` publishes some of it."""
+    """A queue that holds the newest message of each kind; `publish_some` publishes from it.
+
+    Publishes:
+        `<uav_id>/task_list` (TaskList), `task_statuses` (TaskStatusArray),
+        `allocation` (Allocation); all latched.
+    """
 
     def __init__(self, node: Node, world: World) -> None:
         self.node, self.world = node, world
-        self.publishers: dict[str, Publisher] = {}
-        self.unnamed: set[str] = set()  # UAVs of a journal that no topic can be named after here
+        self.publishers: dict[str, Publisher[m.TaskList]] = {}
+        self.unpublishable: set[str] = set()  # UAVs whose ids are too long for a topic name
         self.statuses = node.create_publisher(m.TaskStatusArray, 'task_statuses', LATCHED)
         self.allocation = node.create_publisher(m.Allocation, 'allocation', LATCHED)
-        self.lists: dict[str, UavList] = {}  # not told yet, as the two below
-        self.stale = False
-        self.plan: Allocation | None = None
-        self.rested = 0.0  # [s] steady clock
-        # messages as made last, and what they were made from: most are as they were
-        self._lists: dict[str, tuple[UavList, m.TaskList]] = {}
-        self._statuses: dict[str, tuple[object, m.TaskStatus]] = {}
+        self.pending_lists: dict[str, UavList] = {}
+        self.statuses_pending = False
+        self.pending_allocation: Allocation | None = None
+        self.pause_until = 0.0  # [s] steady clock
+        # messages as converted last, with their sources: most have not changed
+        self._list_messages: dict[str, tuple[UavList, m.TaskList]] = {}
+        self._status_messages: dict[str, tuple[_StatusSource, m.TaskStatus]] = {}
 
     def prepare(self, uav_ids: Iterable[str]) -> None:
-        """Lists of these UAVs follow: whoever wants to hear them may come."""
+        """Create the publishers of these UAVs, so that subscribers are matched early."""
         for uav_id in uav_ids:
             self._publisher(uav_id)
 
     def close(self) -> None:
-        """Publish nothing any more; what was published is not told to later listeners."""
-        for made in (*self.publishers.values(), self.statuses, self.allocation):
-            self.node.destroy_publisher(made)
+        """Destroy all publishers; late subscribers receive nothing of what was latched."""
+        for publisher in self.publishers.values():
+            self.node.destroy_publisher(publisher)
+        self.node.destroy_publisher(self.statuses)
+        self.node.destroy_publisher(self.allocation)
 
-    def is_heard(self) -> bool:
-        """Nobody is missing who might want to hear the lists that follow."""
-        return all(made.get_subscription_count() for made in self.publishers.values())
+    def all_subscribed(self) -> bool:
+        """Whether every list topic has a subscriber."""
+        return all(each.get_subscription_count() for each in self.publishers.values())
 
-    def take(self, out: Outbox) -> None:
-        """All of this is to be told."""
-        for uav_id in out.forgotten:
-            self.forget(uav_id)
-        self.lists.update(out.lists)
-        self.stale |= out.statuses
-        self.plan = out.allocation or self.plan
+    def enqueue(self, outbox: Outbox) -> None:
+        """Queue everything of an outbox; it replaces what is queued already."""
+        for uav_id in outbox.forgotten:
+            self.remove(uav_id)
+        self.pending_lists.update(outbox.lists)
+        self.statuses_pending |= outbox.statuses
+        self.pending_allocation = outbox.allocation or self.pending_allocation
 
-    def forget(self, uav_id: str) -> None:
-        """Nobody will hear lists by that id."""
-        self.lists.pop(uav_id, None)
-        self._lists.pop(uav_id, None)
+    def remove(self, uav_id: str) -> None:
+        """Drop the list and the topic of a UAV."""
+        self.pending_lists.pop(uav_id, None)
+        self._list_messages.pop(uav_id, None)
         if uav_id in self.publishers:
             self.node.destroy_publisher(self.publishers.pop(uav_id))
 
-    def tell(self, stamp: float) -> bool:
-        """Lists first, as many as a slice has time for; returns whether some are left."""
-        until = time.monotonic() + SLICE
-        while self.lists and time.monotonic() < until:
-            uav_id = next(iter(self.lists))
-            uav_list = self.lists.pop(uav_id)
+    def publish_some(self, stamp: float) -> bool:
+        """Publish queued lists for one time slice, then what is due of the rest.
+
+        Args:
+            stamp: the published clock [s].
+
+        Returns:
+            Whether lists are still queued.
+        """
+        end = time.monotonic() + _SLICE
+        while self.pending_lists and time.monotonic() < end:
+            uav_id = next(iter(self.pending_lists))
+            uav_list = self.pending_lists.pop(uav_id)
             if publisher := self._publisher(uav_id):
-                publisher.publish(self._list(uav_list))
-        if time.monotonic() >= self.rested:
-            self._tell_all(stamp)
-        return bool(self.lists)
+                publisher.publish(self._list_message(uav_list))
+        if time.monotonic() >= self.pause_until:
+            self._publish_large(stamp)
+        return bool(self.pending_lists)
 
-    def _tell_all(self, stamp: float) -> None:
-        """The whole picture, and the plan when all its lists are out."""
-        began = time.monotonic()
-        if self.stale:
-            self.stale = False
-            self.statuses.publish(told.from_statuses(self._all_statuses(), stamp))
-        if self.plan is not None and not self.lists:
-            plan, self.plan = self.plan, None
-            lists = [self._list(each) for each in plan.lists]
-            self.allocation.publish(told.from_allocation(plan, lists, self._all_statuses()))
+    def _publish_large(self, stamp: float) -> None:
+        """Publish all statuses, and the allocation once all its lists are published."""
+        start = time.monotonic()
+        if self.statuses_pending:
+            self.statuses_pending = False
+            self.statuses.publish(
+                allocation_messages.from_statuses(self._statuses(), stamp))
+        if self.pending_allocation is not None and not self.pending_lists:
+            plan, self.pending_allocation = self.pending_allocation, None
+            lists = [self._list_message(uav_list) for uav_list in plan.lists]
+            self.allocation.publish(
+                allocation_messages.from_allocation(plan, lists, self._statuses()))
         now = time.monotonic()
-        self.rested = now + _REST * (now - began)
+        self.pause_until = now + _PAUSE_FACTOR * (now - start)
 
-    def _publisher(self, uav_id: str) -> Publisher | None:
-        """None, and a word why, where there can be no such topic."""
-        if uav_id in self.unnamed:
+    def _publisher(self, uav_id: str) -> Publisher[m.TaskList] | None:
+        """The publisher of a UAV; None, logged once, where its topic name is too long."""
+        if uav_id in self.unpublishable:
             return None
         if uav_id not in self.publishers:
             try:
                 topic = check_topic(self.node, TASK_LIST, uav_id)
             except InvalidValue as error:
-                self.unnamed.add(uav_id)
+                self.unpublishable.add(uav_id)
                 self.node.get_logger().error(f'its task list is not published: {error}')
                 return None
             self.publishers[uav_id] = self.node.create_publisher(m.TaskList, topic, LATCHED)
         return self.publishers[uav_id]
 
-    def _list(self, uav_list: UavList) -> m.TaskList:
-        source, message = self._lists.get(uav_list.uav, (None, None))
-        if source is not uav_list:
-            message = told.from_list(uav_list)
-            self._lists[uav_list.uav] = (uav_list, message)
-        return message
+    def _list_message(self, uav_list: UavList) -> m.TaskList:
+        cached = self._list_messages.get(uav_list.uav)
+        if cached is None or cached[0] is not uav_list:
+            cached = uav_list, allocation_messages.from_list(uav_list)
+            self._list_messages[uav_list.uav] = cached
+        return cached[1]
 
-    def _all_statuses(self) -> list[m.TaskStatus]:
-        before, self._statuses = self._statuses, {}
-        for task_id, known in {**self.world.tasks.records, **self.world.tasks.rejected}.items():
-            source, message = before.get(task_id, (None, None))
-            if source is not known:
-                message = told.from_task_status(status_of(task_id, known))
-            self._statuses[task_id] = (known, message)
-        return [message for _, message in self._statuses.values()]
+    def _statuses(self) -> list[m.TaskStatus]:
+        """A message for every task; converts only those that have changed. O(tasks)."""
+        cache, self._status_messages = self._status_messages, {}
+        sources: dict[str, _StatusSource] = {
+            **self.world.tasks.records, **self.world.tasks.rejected}
+        for task_id, source in sources.items():
+            cached = cache.get(task_id)
+            if cached is None or cached[0] is not source:
+                status = status_of(task_id, source)
+                cached = source, allocation_messages.from_task_status(status)
+            self._status_messages[task_id] = cached
+        return [message for _, message in self._status_messages.values()]

@@ -1,30 +1,46 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Hears a topic in gulps: a round of the executor costs more than a message, and takes one."""
+"""Subscribes to a topic and drains all queued messages per executor wake-up.
+
+rclpy takes one message per wake-up, and a wake-up costs more than a small message.
+"""
 from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from typing import Any
+from typing import TypeVar
 
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from rclpy.subscription import Subscription
 
-GULP = 0.005  # [s] of one topic before the others have their turn
+_Message = TypeVar('_Message')
+_BATCH_TIME = 0.005  # [s] of one topic before the callbacks of the others run
 
 
-def subscribe_batched(node: Node, kind: type, topic: str, take: Callable[[Any], object],
-         qos: QoSProfile) -> Subscription:
-    """Call `take` with every message of a topic, those that wait already at once."""
-    def gulp(message: Any) -> None:
-        until = time.monotonic() + GULP
-        take(message)
-        while time.monotonic() < until:
+def subscribe_batched(node: Node, msg_type: type[_Message], topic: str,
+                      callback: Callable[[_Message], object],
+                      qos: QoSProfile) -> Subscription[_Message]:
+    """Call `callback` with every message of a topic, in order, up to 5 ms per wake-up.
+
+    Args:
+        node: which subscribes.
+        msg_type: the message class.
+        topic: its name, relative to the node's namespace.
+        callback: called once for each message.
+        qos: its depth is the longest batch.
+
+    Returns:
+        The subscription, for `node.destroy_subscription`.
+    """
+    def on_message(message: _Message) -> None:
+        end = time.monotonic() + _BATCH_TIME
+        callback(message)
+        while time.monotonic() < end:
             with subscription.handle:
-                waiting = subscription.handle.take_message(subscription.msg_type, False)
-            if waiting is None:
+                queued = subscription.handle.take_message(subscription.msg_type, False)
+            if queued is None:
                 return
-            take(waiting[0])
+            callback(queued[0])
 
-    subscription: Subscription = node.create_subscription(kind, topic, gulp, qos)
+    subscription = node.create_subscription(msg_type, topic, on_message, qos)
     return subscription

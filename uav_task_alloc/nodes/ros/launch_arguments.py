@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the launch files share: arguments are resolved in full before any node is started."""
+"""What the launch files share: all arguments are checked before any node is started."""
 from __future__ import annotations
 
 import os
@@ -27,104 +27,119 @@ from uav_task_alloc.nodes.ros.restart_policy import RestartPolicy, RestartVerdic
 from uav_task_alloc.scenario.node_parameters import Value
 
 _PACKAGE = 'uav_task_alloc'
-BRIDGE_END = '15'  # [s] from Ctrl-C to SIGTERM, as the bridge ends after a swap under way
+# [s] from SIGINT to SIGTERM; the bridge completes a running upload first
+BRIDGE_SIGTERM_TIMEOUT = '15'
 
 
 def argument(context: Any, name: str) -> str:
-    """A launch argument as it was given."""
+    """The text of a launch argument."""
     return str(LaunchConfiguration(name).perform(context)).strip()
 
 
 def flag(context: Any, name: str) -> bool:
     """A launch argument that is true or false; ValueError otherwise."""
-    given = argument(context, name).lower()
-    if given not in ('true', '1', 'false', '0'):
-        raise ValueError(f'{name}:={given}: expected true or false')
-    return given in ('true', '1')
+    text = argument(context, name).lower()
+    if text not in ('true', '1', 'false', '0'):
+        raise ValueError(f'{name}:={text}: expected true or false')
+    return text in ('true', '1')
 
 
-def number(context: Any, name: str) -> float | None:
+def optional_number(context: Any, name: str) -> float | None:
     """A launch argument that is a number, None where it is empty; ValueError otherwise."""
-    given = argument(context, name)
+    text = argument(context, name)
     try:
-        return float(given) if given else None
+        return float(text) if text else None
     except ValueError:
-        raise ValueError(f'{name}:={given}: expected a number') from None
+        raise ValueError(f'{name}:={text}: expected a number') from None
 
 
-def node(executable: str, *parameters: str | Mapping[str, Value], **more: Any) -> Node:
-    """One of this package's executables; parameters are files or values, the last one counts."""
+def node_action(executable: str, *parameters: str | Mapping[str, Value], **options: Any) -> Node:
+    """The launch action of one of this package's executables.
+
+    Args:
+        executable: its name.
+        parameters: files or values; of several values for a name the last one counts.
+        options: further arguments of launch_ros.actions.Node.
+    """
     return Node(package=_PACKAGE, executable=executable, output='screen',
                 parameters=[each if isinstance(each, str) else typed(each)
-                            for each in parameters if each], **more)
+                            for each in parameters if each], **options)
 
 
-class Lasting:
-    """A node that is started again when it dies; in a fresh life it has the same parameters."""
+class RespawnedNode:
+    """A node that is restarted with the same parameters after it has exited.
+
+    Args:
+        executable, parameters, options: as of `node_action`.
+    """
 
     def __init__(self, executable: str, *parameters: str | Mapping[str, Value],
-                 **more: Any) -> None:
-        self.executable, self.parameters, self.more = executable, parameters, more
-        self.restarts, self.began = RestartPolicy(), 0.0
+                 **options: Any) -> None:
+        self.executable, self.parameters, self.options = executable, parameters, options
+        self.policy, self.started_at = RestartPolicy(), 0.0
 
     def start(self, _: Any = None) -> list[Node]:
-        """The action of one life."""
-        self.began = time.monotonic()
-        return [node(self.executable, *self.parameters, on_exit=self.died, **self.more)]
+        """The action of one run."""
+        self.started_at = time.monotonic()
+        return [node_action(self.executable, *self.parameters, on_exit=self.on_exit,
+                            **self.options)]
 
-    def died(self, event: Any, context: Any) -> list[Any]:
-        """What follows on its end."""
+    def on_exit(self, event: Any, context: Any) -> list[Any]:
+        """The actions after a run, unless launch shuts down."""
         if context.is_shutdown:
             return []
-        verdict = self.restarts.died(event.returncode, time.monotonic() - self.began)
         name, status = self.executable, event.returncode
+        verdict = self.policy.on_exit(status, time.monotonic() - self.started_at)
         if verdict is RestartVerdict.END_ALL:
-            return [Shutdown(reason=f'{name} refuses what it is given, as it says above')]
+            return [Shutdown(reason=f'{name} refuses its parameters, see its error above')]
         if verdict is RestartVerdict.GIVE_UP:
-            return [LogInfo(msg=f'{name} refuses to start, as it says above: not tried again; '
-                            'the others go on')]
-        delay = self.restarts.delay
-        return [LogInfo(msg=f'{name} has ended with status {status}: again in {delay:g} s'),
+            return [LogInfo(msg=f'{name} refuses to start, see its error above: not restarted; '
+                            'the other nodes go on')]
+        delay = self.policy.delay
+        return [LogInfo(msg=f'{name} has exited with status {status}: restarted in {delay:g} s'),
                 TimerAction(period=delay, actions=[OpaqueFunction(function=self.start)])]
 
 
 def typed(values: Mapping[str, Value]) -> dict[str, ParameterValue]:
-    """Values with their types, which launch would else guess from their texts."""
+    """Values with their types, which launch would otherwise guess from their texts."""
     return {name: ParameterValue(value, value_type=_type_of(value))
             for name, value in values.items()}
 
 
 def _type_of(value: Value) -> Any:
-    return List[type(value[0])] if isinstance(value, list) else type(value)  # noqa: UP006
+    if not isinstance(value, list):
+        return type(value)
+    item: Any = type(value[0])
+    return List[item]  # noqa: UP006
 
 
 def parameter_file(context: Any, name: str) -> str:
-    """A launch argument that names a parameter file; ValueError where it is none."""
-    given = argument(context, name)
+    """A launch argument that names a parameter file; ValueError otherwise."""
+    path = argument(context, name)
     try:
-        content = yaml.safe_load(Path(given).read_text(encoding='utf-8'))
+        content = yaml.safe_load(Path(path).read_text(encoding='utf-8'))
     except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
-        raise ValueError(f'{name}:={given}: expected a parameter file: {error}') from None
+        raise ValueError(f'{name}:={path}: expected a parameter file: {error}') from None
     if not isinstance(content, dict):
-        raise ValueError(f'{name}:={given}: expected a parameter file with `ros__parameters`')
-    return given
+        raise ValueError(f'{name}:={path}: expected a parameter file with `ros__parameters`')
+    return path
 
 
 def record_file(context: Any) -> str:
-    """The argument `record`; ValueError where that file cannot be begun."""
-    given = argument(context, 'record')
-    if given and (Path(given).exists() or not Path(given).absolute().parent.is_dir()):
-        raise ValueError(f'record:={given}: expected a file that is not there yet, in a folder '
-                         'that is')
-    return given
+    """The launch argument `record`; ValueError where that file cannot be created."""
+    path = argument(context, 'record')
+    if path and (Path(path).exists() or not Path(path).absolute().parent.is_dir()):
+        raise ValueError(f'record:={path}: expected a file that does not exist, in a folder that '
+                         'does')
+    return path
 
 
-def rviz(context: Any, namespace: str = '') -> IncludeLaunchDescription:
-    """launch/rviz.launch.py; ValueError where RViz is not installed."""
+def rviz_action(context: Any, namespace: str = '') -> IncludeLaunchDescription:
+    """launch/rviz.launch.py for a fleet; ValueError where RViz is not installed."""
     for package, executable in (('rviz2', 'rviz2'), ('tf2_ros', 'static_transform_publisher')):
         try:
             ExecutableInPackage(executable=executable, package=package).perform(context)
-        except Exception as error:  # of a package or of a program, and of two libraries
+        except Exception as error:  # launch and ament raise different ones
             raise ValueError(f'rviz:=true: expected {package} to be installed: {error}') from None
     return IncludeLaunchDescription(
         PythonLaunchDescriptionSource(PathJoinSubstitution(
@@ -132,7 +147,7 @@ def rviz(context: Any, namespace: str = '') -> IncludeLaunchDescription:
         launch_arguments={'namespace': namespace}.items())
 
 
-def on_this_machine() -> list[SetEnvironmentVariable]:
-    """Keep simulated UAVs out of the network, unless a range of discovery is set already."""
+def localhost_only() -> list[SetEnvironmentVariable]:
+    """Keep simulated UAVs off the network, unless a discovery range is set already."""
     name = 'ROS_AUTOMATIC_DISCOVERY_RANGE'
     return [] if os.environ.get(name) else [SetEnvironmentVariable(name, 'LOCALHOST')]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tells the origin of a node on `fleet_origin`; those of all nodes of a fleet must agree."""
+"""Publishes a node's ENU origin on `fleet_origin` and compares it with those of other nodes."""
 from __future__ import annotations
 
 import math
@@ -13,10 +13,10 @@ from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.geometry.frames import Origin, to_enu
 from uav_task_alloc.nodes.conversions.messages import LATCHED
 
-TOPIC = 'fleet_origin'
-_SAME = 0.01  # [m] that origins of the same place may differ
-MOST = 10  # differing origins that are remembered
-PATIENCE = 3.0  # [s] for the origin of a node that is known but was not heard
+_TOPIC = 'fleet_origin'
+_TOLERANCE = 0.01  # [m] between origins of the same place
+MOST_ORIGINS = 10  # differing origins that are remembered
+ORIGIN_TIMEOUT = 3.0  # [s] for the origin of a node that was discovered but has not published
 
 
 class OriginReports:
@@ -25,86 +25,97 @@ class OriginReports:
     def __init__(self, own: Origin) -> None:
         self.own = own
         self._differing: list[Origin] = []
-        self._before: list[Origin] = []  # heard before somebody left, until all are heard again
-        self._again_until = -math.inf  # [s]
+        self._previous: list[Origin] = []  # before a node left, until all have published again
+        self._republished_by = -math.inf  # [s]
 
-    def hear(self, other: Origin) -> None:
-        """Another node, or oneself, has told its origin."""
-        apart = self._apart(other)
-        if apart > _SAME and other not in self._differing and len(self._differing) < MOST:
-            self._differing.append(other)
+    def add(self, origin: Origin) -> None:
+        """Take the origin that a node, possibly this one, has published."""
+        differs = self._distance(origin) > _TOLERANCE
+        if differs and origin not in self._differing and len(self._differing) < MOST_ORIGINS:
+            self._differing.append(origin)
 
-    def left(self, now: float) -> None:
-        """Some node is gone: who is still there tells its origin again within PATIENCE."""
-        self._before = self._differing or self._before
-        self._differing, self._again_until = [], now + PATIENCE
+    def on_node_left(self, now: float) -> None:
+        """Start again: the nodes that remain publish their origins within ORIGIN_TIMEOUT."""
+        self._previous = self._differing or self._previous
+        self._differing, self._republished_by = [], now + ORIGIN_TIMEOUT
 
     def conflict(self, now: float) -> str:
-        """Why this node must not fly; '' where all agree."""
-        found = self._differing or (self._before if now < self._again_until else [])
-        if not found:
-            return ''
-        return (f'fleet_origin of another node is {_shown(found[0])}, '
-                f'{self._apart(found[0]):.6g} m from origin.* = {_shown(self.own)} of this one: '
-                'expected the same')
+        """Why this node must not fly; '' where all origins agree.
 
-    def _apart(self, other: Origin) -> float:
+        Args:
+            now: steady clock [s].
+        """
+        differing = self._differing or (self._previous if now < self._republished_by else [])
+        if not differing:
+            return ''
+        return (f'fleet_origin of another node is {_text(differing[0])}, '
+                f'{self._distance(differing[0]):.6g} m from origin.* = {_text(self.own)} of this '
+                'one: expected the same')
+
+    def _distance(self, other: Origin) -> float:
         return math.hypot(*to_enu(self.own, other.latitude, other.longitude,
                                   other.altitude_amsl))
 
 
-def _shown(origin: Origin) -> str:
+def _text(origin: Origin) -> str:
     return f'({origin.latitude:.7f}, {origin.longitude:.7f}, {origin.altitude_amsl:g} m)'
 
 
 class OriginCheck:
-    """The topic of one node; `check` is to be called about once a second."""
+    """The topic `fleet_origin` of one node; `check` is to be called about once a second.
 
-    def __init__(self, node: Node, origin: Origin, complain: Callable[[str], object]) -> None:
-        self._node, self._complain = node, complain
-        self._origins = OriginReports(origin)
-        self._others: set[bytes] = set()  # who publishes, as seen last
-        self._heard = 0  # messages since the last subscription
-        self._asked = time.monotonic()  # since when they are waited for
-        self._publisher = node.create_publisher(m.FleetOrigin, TOPIC, LATCHED)
+    Args:
+        node: which publishes and subscribes.
+        origin: its own.
+        log_refusal: called with the reason why a received origin is invalid.
+    """
+
+    def __init__(self, node: Node, origin: Origin, log_refusal: Callable[[str], object]) -> None:
+        self._node, self._log_refusal = node, log_refusal
+        self._reports = OriginReports(origin)
+        self._known_publishers: set[bytes] = set()  # endpoint ids
+        self._received = 0  # messages since the last subscription
+        self._waiting_since = time.monotonic()  # for origins of the publishers
+        self._publisher = node.create_publisher(m.FleetOrigin, _TOPIC, LATCHED)
         self._publisher.publish(m.FleetOrigin(
             latitude=origin.latitude, longitude=origin.longitude,
             altitude_amsl=origin.altitude_amsl))
         self._subscribe()
 
     def conflict(self) -> str:
-        """Why this node must not fly; '' where all agree."""
-        return self._origins.conflict(time.monotonic())
+        """Why this node must not fly; '' where all origins agree."""
+        return self._reports.conflict(time.monotonic())
 
     def settled(self) -> bool:
-        """Whether all who publish an origin were heard, or waited for long enough."""
-        now, there = time.monotonic(), self._publishers()
-        if there - self._others:
-            self._others |= there
-            self._asked = now
-        return self._heard >= len(there) or now > self._asked + PATIENCE
+        """Whether every publisher's origin was received, or ORIGIN_TIMEOUT is over."""
+        now, publishers = time.monotonic(), self._publishers()
+        if publishers - self._known_publishers:
+            self._known_publishers |= publishers
+            self._waiting_since = now
+        return (self._received >= len(publishers)
+                or now > self._waiting_since + ORIGIN_TIMEOUT)
 
     def check(self) -> None:
-        """Where a node is gone, hear the rest again: a latched origin outlives its publisher."""
-        there = self._publishers()
-        if self._others - there:
+        """Subscribe again after a node has left: a latched origin outlives its publisher."""
+        publishers = self._publishers()
+        if self._known_publishers - publishers:
             self._node.destroy_subscription(self._subscription)
-            self._origins.left(time.monotonic())
-            self._heard, self._asked = 0, time.monotonic()
+            self._reports.on_node_left(time.monotonic())
+            self._received, self._waiting_since = 0, time.monotonic()
             self._subscribe()
-        self._others = there
+        self._known_publishers = publishers
 
     def _subscribe(self) -> None:
         self._subscription = self._node.create_subscription(
-            m.FleetOrigin, TOPIC, self._on_origin, LATCHED)
+            m.FleetOrigin, _TOPIC, self._on_origin, LATCHED)
 
     def _on_origin(self, msg: m.FleetOrigin) -> None:
-        self._heard += 1
+        self._received += 1
         try:
-            self._origins.hear(Origin(msg.latitude, msg.longitude, msg.altitude_amsl))
+            self._reports.add(Origin(msg.latitude, msg.longitude, msg.altitude_amsl))
         except InvalidValue as error:
-            self._complain(str(error))
+            self._log_refusal(str(error))
 
     def _publishers(self) -> set[bytes]:
-        return {bytes(each.endpoint_gid)
-                for each in self._node.get_publishers_info_by_topic(TOPIC)}
+        return {bytes(info.endpoint_gid)
+                for info in self._node.get_publishers_info_by_topic(_TOPIC)}

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Declares the parameters of params.py on a node, and keeps them checked."""
+"""Declares the parameters of params.py on a node, and checks every later change."""
 from __future__ import annotations
 
-from dataclasses import fields, replace
-from typing import Any, TypeVar
+from dataclasses import Field, fields, replace
+from typing import Any, Generic, TypeVar
 
 from rcl_interfaces.msg import (
     FloatingPointRange,
@@ -18,52 +18,32 @@ from rclpy.parameter import Parameter
 from uav_task_alloc import params
 from uav_task_alloc.errors import InvalidValue
 
-_P = TypeVar('_P', bound=params.Checked)
-_BIG = 1.7e308
-_TYPES = {bool: Parameter.Type.BOOL, int: Parameter.Type.INTEGER, float: Parameter.Type.DOUBLE,
-          str: Parameter.Type.STRING}
+_Params = TypeVar('_Params', bound=params.Checked)
+_BIG = 1.7e308  # a ROS range has no infinity
 
 
-class LiveParameters:
+class LiveParameters(Generic[_Params]):
     """The parameters of a node as they are now: `live.now.solve_budget`."""
 
-    def __init__(self, now: Any) -> None:
+    def __init__(self, now: _Params) -> None:
         self.now = now
 
 
-def descriptor(spec: Any) -> ParameterDescriptor:
-    """The ROS descriptor of a declared field."""
-    meta, described = spec.metadata, ParameterDescriptor()
-    described.description = f'{meta["text"]} Expected: {params.expectation(spec)}.'
-    described.description += ' Read at the start only.' if meta['fixed'] else ''
-    described.additional_constraints = ', '.join(meta['choices'])
-    if isinstance(spec.default, tuple):
-        described.dynamic_typing = True  # an empty list has no type of its own
-    low, high = meta['low'], meta['high']
-    if type(spec.default) is float and (low is not None or high is not None):
-        described.floating_point_range = [FloatingPointRange(
-            from_value=-_BIG if low is None else low, to_value=_BIG if high is None else high)]
-    if type(spec.default) is int and (low is not None or high is not None):
-        described.integer_range = [IntegerRange(
-            from_value=-2**63 if low is None else low,
-            to_value=2**63 - 1 if high is None else high, step=1)]
-    return described
+def declare(node: Node, kind: type[_Params]) -> LiveParameters[_Params]:
+    """Declare every field of a parameter class on a node.
 
+    Args:
+        node: whose overrides (`-p NAME:=VALUE`, --params-file) are the start values.
+        kind: AllocatorParams or the like.
 
-def declare(node: Node, kind: type[_P]) -> LiveParameters:
-    """Declare every field of `kind` on `node`; raise InvalidValue for a bad start value."""
-    values = {}
-    for spec in fields(kind):
-        name = params.ros_name(spec)
-        default = list(spec.default) if isinstance(spec.default, tuple) else spec.default
-        _accept_whole(node, spec)
-        try:
-            value = node.declare_parameter(name, default, descriptor(spec)).value
-        except (InvalidParameterTypeException, InvalidParameterValueException):
-            given = node._parameter_overrides[name].value
-            raise InvalidValue(name, given, params.expectation(spec)) from None
-        values[spec.name] = () if value is None else value
-    for name in sorted({*node._parameter_overrides} - {*map(params.ros_name, fields(kind))}):
+    Returns:
+        The values, which follow every later change that is valid.
+
+    Raises:
+        InvalidValue: a start value has another type or is outside its range.
+    """
+    values = {spec.name: _declare_one(node, spec) for spec in _specs(kind)}
+    for name in sorted({*node._parameter_overrides} - {*map(params.ros_name, _specs(kind))}):
         if not node.has_parameter(name) and not name.startswith('qos_overrides.'):
             node.get_logger().warning(f'parameter {name} is unknown: ignored')
     live = LiveParameters(kind(**values))
@@ -71,7 +51,24 @@ def declare(node: Node, kind: type[_P]) -> LiveParameters:
     return live
 
 
-def _accept_whole(node: Node, spec: Any) -> None:
+def _specs(kind: type[params.Checked]) -> tuple[Field[Any], ...]:
+    return fields(kind)  # type: ignore[arg-type]  # every subclass is a dataclass
+
+
+def _declare_one(node: Node, spec: Field[Any]) -> Any:
+    """Declare one parameter; return its start value."""
+    name = params.ros_name(spec)
+    default = list(spec.default) if isinstance(spec.default, tuple) else spec.default
+    _accept_whole_number(node, spec)
+    try:
+        value = node.declare_parameter(name, default, descriptor(spec)).value
+    except (InvalidParameterTypeException, InvalidParameterValueException):
+        given = node._parameter_overrides[name].value
+        raise InvalidValue(name, given, params.expectation(spec)) from None
+    return () if value is None else value
+
+
+def _accept_whole_number(node: Node, spec: Field[Any]) -> None:
     """`-p solve_budget:=1` means 1.0."""
     name = params.ros_name(spec)
     given = node._parameter_overrides.get(name)
@@ -79,19 +76,39 @@ def _accept_whole(node: Node, spec: Any) -> None:
         node._parameter_overrides[name] = Parameter(name, value=float(given.value))
 
 
-def _change(live: LiveParameters, changed: list[Parameter]) -> SetParametersResult:
-    specs = {params.ros_name(spec): spec for spec in fields(live.now)}
-    new = {}
+def descriptor(spec: Field[Any]) -> ParameterDescriptor:
+    """The ROS descriptor of a declared field: text, range, choices."""
+    meta, result = spec.metadata, ParameterDescriptor()
+    result.description = f'{meta["text"]} Expected: {params.expectation(spec)}.'
+    result.description += ' Read at the start only.' if meta['fixed'] else ''
+    result.additional_constraints = ', '.join(meta['choices'])
+    if isinstance(spec.default, tuple):
+        result.dynamic_typing = True  # an empty list has no type of its own
+    low, high = meta['low'], meta['high']
+    if type(spec.default) is float and (low is not None or high is not None):
+        result.floating_point_range = [FloatingPointRange(
+            from_value=-_BIG if low is None else low, to_value=_BIG if high is None else high)]
+    if type(spec.default) is int and (low is not None or high is not None):
+        result.integer_range = [IntegerRange(
+            from_value=-2**63 if low is None else low,
+            to_value=2**63 - 1 if high is None else high, step=1)]
+    return result
+
+
+def _change(live: LiveParameters[_Params], changed: list[Parameter]) -> SetParametersResult:
+    """Apply all changes or, where one is invalid, none."""
+    specs = {params.ros_name(spec): spec for spec in _specs(type(live.now))}
+    values = {}
     for parameter in changed:
         spec = specs.get(parameter.name)
-        if spec is None:  # another library's, use_sim_time say
+        if spec is None:  # of rclpy itself: use_sim_time
             continue
         if spec.metadata['fixed']:
             return SetParametersResult(
                 successful=False, reason=f'{parameter.name} is read at the start only')
-        new[spec.name] = parameter.value
+        values[spec.name] = parameter.value
     try:
-        live.now = replace(live.now, **new)
+        live.now = replace(live.now, **values)  # type: ignore[type-var]
     except InvalidValue as error:
         return SetParametersResult(successful=False, reason=str(error))
     return SetParametersResult(successful=True)

@@ -1,30 +1,36 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What was wrong with messages: logged once for each sender, however often it is repeated."""
+"""Logs why messages are refused: once for each sender and reason, however often they repeat."""
 from __future__ import annotations
 
 from collections.abc import Callable
 
 from uav_task_alloc.nodes.conversions.message_limits import cut
 
-MOST_NAMES, MOST_REASONS = 1000, 20  # names, and reasons for each, remembered as logged
+_MOST_NAMES, _MOST_REASONS = 1000, 20  # names, and reasons for each, remembered as logged
 
 
 class RefusalLog:
-    """Log what is wrong with a message, once until `name` sends a good one."""
+    """Logs each reason once until `name` sends a valid message. O(1) memory for any flood."""
 
     def __init__(self, log: Callable[[str], object]) -> None:
         self._log = log
-        self._said: dict[tuple[str, str], set[str]] = {}  # (topic, name): reasons
+        self._logged: dict[tuple[str, str], set[str]] = {}  # (topic, name): reasons
 
-    def say(self, topic: str, name: str, reason: str) -> None:
-        """reason: what is wrong, '' for a good message."""
+    def report(self, topic: str, name: str, reason: str) -> None:
+        """Log why a message was refused, or note that a valid one came.
+
+        Args:
+            topic: which the message came on.
+            name: the id in it of a UAV, task or zone; '' where there is none.
+            reason: why it is refused; '' for a valid message.
+        """
         name = cut(name)
         if not reason:
-            self._said.pop((topic, name), None)
+            self._logged.pop((topic, name), None)
             return
-        said = self._said.setdefault((topic, name), set())
-        if reason not in said and len(said) < MOST_REASONS:
-            said.add(reason)
-            self._log(f'{topic}: {reason}: ignored; said once')
-        while len(self._said) > MOST_NAMES:
-            del self._said[next(iter(self._said))]
+        logged = self._logged.setdefault((topic, name), set())
+        if reason not in logged and len(logged) < _MOST_REASONS:
+            logged.add(reason)
+            self._log(f'{topic}: {reason}: ignored; logged once')
+        while len(self._logged) > _MOST_NAMES:
+            del self._logged[next(iter(self._logged))]

@@ -1,40 +1,45 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Whether a node that has died is started again, and when; no launch in it."""
+"""Decides whether a node that has exited is restarted, and when; imports no launch."""
 from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import Enum, auto
 
-REFUSED = 1  # exit status of a node that refuses its parameters, see run.py
-SHORT = 30.0  # [s] a life that ends earlier makes the next one wait longer
-FIRST, LONGEST = 1.0, 30.0  # [s] before it is started again
-MOST_REFUSALS = 5  # in a row, after it had run
+_REFUSED = 1  # exit status of a node that refuses its parameters, see run.py
+_SHORT_RUN = 30.0  # [s]; a shorter run doubles the delay
+_FIRST_DELAY, _LONGEST_DELAY = 1.0, 30.0  # [s] before a restart
+_MOST_REFUSALS = 5  # in a row, after a run without
 
 
 class RestartVerdict(Enum):
-    """What becomes of a node that has died."""
+    """What is done about a node that has exited."""
 
-    AGAIN = auto()  # started again after `Restarts.delay`
-    END_ALL = auto()  # it never ran: its parameters are wrong, and nobody flies yet
-    GIVE_UP = auto()  # it refuses its parameters again and again; the others go on
+    RESTART = auto()  # after `RestartPolicy.delay`
+    END_ALL = auto()  # its first run refused the parameters, and nothing flies yet
+    GIVE_UP = auto()  # it refuses its parameters repeatedly; the other nodes go on
 
 
 @dataclass
 class RestartPolicy:
-    """The lives of one node."""
+    """Counts the runs of one node."""
 
-    delay: float = FIRST  # [s]
-    lives: int = 0
+    delay: float = _FIRST_DELAY  # [s]
+    runs: int = 0
     refusals: int = 0  # in a row
 
-    def died(self, status: int, lived: float) -> RestartVerdict:
-        """It has ended with an exit status after a life of so many seconds."""
-        self.lives += 1
-        self.refusals = self.refusals + 1 if status == REFUSED else 0
-        if status == REFUSED and self.lives == 1:
+    def on_exit(self, status: int, duration: float) -> RestartVerdict:
+        """Decide about a node that has exited.
+
+        Args:
+            status: exit status of the process.
+            duration: of the run [s].
+        """
+        self.runs += 1
+        self.refusals = self.refusals + 1 if status == _REFUSED else 0
+        if status == _REFUSED and self.runs == 1:
             return RestartVerdict.END_ALL
-        if self.refusals >= MOST_REFUSALS:
+        if self.refusals >= _MOST_REFUSALS:
             return RestartVerdict.GIVE_UP
-        short = lived < SHORT and self.lives > 1
-        self.delay = min(2.0 * self.delay, LONGEST) if short else FIRST
-        return RestartVerdict.AGAIN
+        short = duration < _SHORT_RUN and self.runs > 1
+        self.delay = min(2.0 * self.delay, _LONGEST_DELAY) if short else _FIRST_DELAY
+        return RestartVerdict.RESTART

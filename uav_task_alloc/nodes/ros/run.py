@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Runs a node until SIGINT or SIGTERM, and stops it in good order with status 0."""
+"""Runs a node until SIGINT or SIGTERM, and shuts it down in order with exit status 0."""
 from __future__ import annotations
 
 import json
@@ -17,54 +17,63 @@ from rclpy.utilities import remove_ros_args
 
 from uav_task_alloc.errors import AllocError
 
-CRASHED = 70  # exit status, EX_SOFTWARE of sysexits.h: started again by the launch files
+CRASHED = 70  # exit status, EX_SOFTWARE of sysexits.h: the launch files restart the node
 
 
 def with_flags(argv: list[str], *names: str) -> list[str]:
-    """`--record FILE` as `--ros-args -p record:=FILE`; for parameters that are text."""
-    head, given = list(argv), []
+    """Rewrite `--record FILE` as `--ros-args -p record:=FILE`.
+
+    Args:
+        argv: the command line.
+        names: parameters of type string that may be given as flags.
+    """
+    remaining, parameters = list(argv), []
     for name in names:
-        while f'--{name}' in head[:-1]:
-            k = head.index(f'--{name}')
-            given += ['-p', f'{name}:={json.dumps(head[k + 1])}']
-            del head[k:k + 2]
-    return [*head, '--ros-args', *given, '--'] if given else head
+        while f'--{name}' in remaining[:-1]:
+            k = remaining.index(f'--{name}')
+            parameters += ['-p', f'{name}:={json.dumps(remaining[k + 1])}']
+            del remaining[k:k + 2]
+    return [*remaining, '--ros-args', *parameters, '--'] if parameters else remaining
 
 
 def run(make_node: Callable[[], Node], args: list[str] | None = None, threads: int = 1) -> None:
-    """Spin `make_node()` until SIGINT or SIGTERM, or until it has `finished`.
+    """Spin `make_node()` until SIGINT or SIGTERM, or until its attribute `finished` is true.
 
-    A node with a method `waits_to_end` goes on while that returns True.
+    A node with a method `delays_exit` is spun on after a signal while that returns True.
+    Exit status: 0 in order; 1 and one line where `make_node` refuses a parameter; CRASHED where
+    a callback raises.
 
-    Exit status: 0 in good order; 1 and one clear line where `make_node` refuses a parameter;
-    CRASHED where a callback raises.
+    Args:
+        make_node: the node's class; its docstring is the text of `--help`.
+        args: the command line; None: sys.argv.
+        threads: of the executor.
     """
     _check_arguments(remove_ros_args(args or sys.argv)[1:], make_node.__doc__)
-    # rclpy's own handlers invalidate the context from another thread: a callback under way then
-    # raises RCLError. Here the context lives until the node is gone.
-    stop: list[int] = []
+    # rclpy's own handlers invalidate the context from another thread, and a running callback
+    # then raises RCLError. Here the context is valid until the node is destroyed.
+    signals: list[int] = []
     for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda *_: stop.append(1))
-    # through shared memory a node that was killed and started again hears nothing for 3 s
+        signal.signal(number, lambda *_: signals.append(1))
+    # through shared memory a node that was killed and restarted receives nothing for 3 s
     os.environ.setdefault('FASTDDS_BUILTIN_TRANSPORTS', 'UDPv4')
     rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
     try:
-        _spin(make_node(), threads, stop)
+        _spin(make_node(), threads, signals)
     except AllocError as error:
         sys.exit(str(error))
     finally:
-        for number in (signal.SIGINT, signal.SIGTERM):  # a second Ctrl-C cannot hurry the end
+        for number in (signal.SIGINT, signal.SIGTERM):  # a second Ctrl-C must not cut this short
             signal.signal(number, signal.SIG_IGN)
         rclpy.try_shutdown()
 
 
-def _spin(node: Node, threads: int, stop: list[int]) -> None:
-    """Until `stop` holds something; SystemExit CRASHED where a callback raises."""
+def _spin(node: Node, threads: int, signals: list[int]) -> None:
+    """Spin until `signals` is not empty; raise SystemExit CRASHED where a callback raises."""
     executor = SingleThreadedExecutor() if threads == 1 else MultiThreadedExecutor(threads)
     executor.add_node(node)
-    waits = getattr(node, 'waits_to_end', lambda: False)
+    delays_exit = getattr(node, 'delays_exit', lambda: False)
     try:
-        while not getattr(node, 'finished', False) and not (stop and not waits()):
+        while not getattr(node, 'finished', False) and not (signals and not delays_exit()):
             executor.spin_once(timeout_sec=0.2)
     except Exception:
         traceback.print_exc()
@@ -73,12 +82,12 @@ def _spin(node: Node, threads: int, stop: list[int]) -> None:
     node.destroy_node()
 
 
-def _check_arguments(rest: list[str], text: str | None) -> None:
-    """What is left when ROS has taken its own."""
-    if '-h' in rest or '--help' in rest:
+def _check_arguments(remaining: list[str], text: str | None) -> None:
+    """Answer --help, and refuse arguments that are not ROS's."""
+    if '-h' in remaining or '--help' in remaining:
         print(f'{text}\n\nParameters: --ros-args -p NAME:=VALUE, see docs/parameters.md, or '
               '`ros2 param describe` while it runs.')
         sys.exit(0)
-    if rest:
-        print(f'{rest[0]!r}: expected --ros-args and what belongs to it', file=sys.stderr)
+    if remaining:
+        print(f'{remaining[0]!r}: expected --ros-args and its arguments', file=sys.stderr)
         sys.exit(2)

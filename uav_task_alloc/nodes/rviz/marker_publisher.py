@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Publishes the picture of the world for RViz: only while somebody looks, and never for long."""
+"""Publishes the world for RViz: only while subscribed, and at 5 % of a core at most."""
 from __future__ import annotations
 
 import time
@@ -13,92 +13,99 @@ from uav_task_alloc.allocator.records import Outbox, UavList
 from uav_task_alloc.allocator.replanning.plan_diff import changed_tasks
 from uav_task_alloc.allocator.state.world import World
 from uav_task_alloc.errors import InvalidValue
-from uav_task_alloc.model import Point
+from uav_task_alloc.model import Point, ThreatZone
 from uav_task_alloc.nodes.conversions.messages import LATCHED
-from uav_task_alloc.nodes.conversions.path_messages import path
+from uav_task_alloc.nodes.conversions.path_messages import path_message
 from uav_task_alloc.nodes.ros.topic_names import PATH, check_topic
-from uav_task_alloc.nodes.rviz.markers import Picture, markers
+from uav_task_alloc.nodes.rviz.markers import MarkerScene, markers
 
-_LOOK = 0.2  # [s] between two looks at what is new
-MOVED = 1.0  # [s] between two pictures where only UAVs moved
-REST = 20.0  # times as long as a picture took nothing is drawn after it: 5 % of a core at most
+_PERIOD = 0.2  # [s] between two checks for changes
+POSITION_PERIOD = 1.0  # [s] between two publications where only positions have changed
+_PAUSE_FACTOR = 20.0  # times the duration of a publication
 
 
 class MarkerPublisher:
-    """Markers on `allocation_markers`, and a nav_msgs/Path on `<uav_id>/path` for each list."""
+    """Publishes what RViz draws of the world.
+
+    Publishes:
+        `allocation_markers` (MarkerArray) and `<uav_id>/path` (nav_msgs/Path); latched.
+    """
 
     def __init__(self, node: Node, world: World) -> None:
         self.node, self.world = node, world
         self.publisher = node.create_publisher(MarkerArray, 'allocation_markers', LATCHED)
-        self.paths: dict[str, Publisher] = {}
-        self.untold: set[str] = set()  # UAVs whose path nobody has seen yet
-        self.before: tuple[UavList, ...] = ()  # of the plan before the last
-        self.after: tuple[UavList, ...] = ()  # of the last plan
-        self.trigger = ''
-        self.new = True  # more than positions
-        self.zones: list[object] = []
-        self.places: dict[str, Point] = {}  # of UAVs as drawn
-        self.drawn = self.rested = 0.0  # [s] steady clock
-        self.timer = node.create_timer(_LOOK, self.on_look)
+        self.paths: dict[str, Publisher[Path]] = {}
+        self.unpublished_paths: set[str] = set()  # UAVs
+        self.previous_lists: tuple[UavList, ...] = ()  # of the plan before the last
+        self.last_lists: tuple[UavList, ...] = ()  # of the last plan
+        self.trigger = ''  # of the last plan
+        self.changed = True  # more than positions
+        self.published_zones: list[ThreatZone] = []
+        self.published_positions: dict[str, Point] = {}  # [m] of UAVs
+        self.published_at = self.pause_until = 0.0  # [s] steady clock
+        self.timer = node.create_timer(_PERIOD, self.on_timer)
 
     def close(self) -> None:
-        """Draw nothing any more."""
+        """Destroy the timer and all publishers."""
         self.node.destroy_timer(self.timer)
-        for made in (*self.paths.values(), self.publisher):
-            self.node.destroy_publisher(made)
+        for publisher in self.paths.values():
+            self.node.destroy_publisher(publisher)
+        self.node.destroy_publisher(self.publisher)
 
-    def note(self, out: Outbox) -> None:
-        """What the allocator told; it costs next to nothing."""
-        for uav_id in out.forgotten & self.paths.keys():
-            self.untold.discard(uav_id)
+    def update(self, outbox: Outbox) -> None:
+        """Take what the allocator publishes; nothing is converted here. O(lists)."""
+        for uav_id in outbox.forgotten & self.paths.keys():
+            self.unpublished_paths.discard(uav_id)
             self.node.destroy_publisher(self.paths.pop(uav_id))
-        for uav_id in out.lists:
+        for uav_id in outbox.lists:
             if uav_id not in self.paths:
                 try:
                     topic = check_topic(self.node, PATH, uav_id)
                 except InvalidValue:
-                    continue  # whoever publishes its list says so
+                    continue  # the publisher of its list has logged that
                 self.paths[uav_id] = self.node.create_publisher(Path, topic, LATCHED)
-            self.untold.add(uav_id)
-        if out.allocation is not None:
-            self.before, self.after = self.after, out.allocation.lists
-            self.trigger = out.allocation.trigger
-        self.new |= bool(out.lists or out.statuses or out.allocation)
+            self.unpublished_paths.add(uav_id)
+        if outbox.allocation is not None:
+            self.previous_lists, self.last_lists = self.last_lists, outbox.allocation.lists
+            self.trigger = outbox.allocation.trigger
+        self.changed |= bool(outbox.lists or outbox.statuses or outbox.allocation)
 
-    def on_look(self) -> None:
-        """Draw what is new where somebody looks."""
+    def on_timer(self) -> None:
+        """Publish changes where there are subscribers."""
         now = time.monotonic()
-        if now < self.rested:
+        if now < self.pause_until:
             return
-        self.tell_paths()
+        self.publish_paths()
         if self.publisher.get_subscription_count() and self.is_due(now):
-            self.draw(now)
-        self.rested = now + REST * (time.monotonic() - now)
+            self.publish_markers(now)
+        self.pause_until = now + _PAUSE_FACTOR * (time.monotonic() - now)
 
-    def tell_paths(self) -> None:
-        """Publish the paths that changed; a later listener gets the last one all the same."""
-        for uav_id in [u for u in self.untold if self.paths[u].get_subscription_count()]:
-            self.untold.remove(uav_id)
-            self.paths[uav_id].publish(path(self.world.lists.get(uav_id),
-                                            self.world.fleet.records.get(uav_id)))
+    def publish_paths(self) -> None:
+        """Publish the paths that changed and are subscribed; the others wait for a subscriber."""
+        for uav_id in [uav_id for uav_id in self.unpublished_paths
+                       if self.paths[uav_id].get_subscription_count()]:
+            self.unpublished_paths.remove(uav_id)
+            self.paths[uav_id].publish(path_message(self.world.lists.get(uav_id),
+                                                    self.world.fleet.records.get(uav_id)))
 
     def is_due(self, now: float) -> bool:
-        """Whether the picture that is out is no longer true."""
-        zones = list(self.world.zones.values())
-        return (self.new or zones != self.zones
-                or (now - self.drawn >= MOVED and self.places != self.positions()))
+        """Whether the published markers are out of date."""
+        moved = (now - self.published_at >= POSITION_PERIOD
+                 and self.published_positions != self.positions())
+        return self.changed or moved or list(self.world.zones.values()) != self.published_zones
 
     def positions(self) -> dict[str, Point]:
-        """Where the UAVs are [m]."""
+        """Last reported positions of the UAVs [m]."""
         return {uav_id: record.report.position
                 for uav_id, record in self.world.fleet.records.items()}
 
-    def draw(self, now: float) -> None:
-        """Publish the whole picture."""
+    def publish_markers(self, now: float) -> None:
+        """Publish all markers."""
         world = self.world
-        self.new, self.drawn = False, now
-        self.zones, self.places = list(world.zones.values()), self.positions()
-        self.publisher.publish(markers(Picture(
+        self.changed, self.published_at = False, now
+        self.published_zones = list(world.zones.values())
+        self.published_positions = self.positions()
+        self.publisher.publish(markers(MarkerScene(
             self.node.get_clock().now().nanoseconds * 1e-9, list(world.lists.lists.values()),
-            list(world.tasks.records.values()), world.fleet.records, list(world.zones.values()),
-            changed_tasks(self.before, self.after), self.trigger)))
+            list(world.tasks.records.values()), world.fleet.records, self.published_zones,
+            changed_tasks(self.previous_lists, self.last_lists), self.trigger)))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The allocation as markers: routes, tasks, zones, UAVs, and what the last re-plan changed."""
+"""The allocation as RViz markers: routes, tasks, zones, UAVs, and what the last plan changed."""
 from __future__ import annotations
 
 import heapq
@@ -16,186 +16,189 @@ from uav_task_alloc.allocator.records import TaskRecord, TaskState, UavList
 from uav_task_alloc.allocator.state.fleet import UavRecord
 from uav_task_alloc.model import Point, ThreatZone
 from uav_task_alloc.nodes.conversions.messages import header, to_point
-from uav_task_alloc.nodes.conversions.path_messages import way
-from uav_task_alloc.nodes.rviz import zone_markers as zone_bodies
+from uav_task_alloc.nodes.conversions.path_messages import remaining_path
+from uav_task_alloc.nodes.rviz import zone_markers
 
-Colour = tuple[float, float, float]
-# readable side by side on RViz's dark ground, also for the colour-blind
-_COLOURS: tuple[Colour, ...] = (
+_Colour = tuple[float, float, float]
+# distinct on a dark background, also for colour-blind people
+_UAV_COLOURS: tuple[_Colour, ...] = (
     (0.0, 0.45, 0.7), (0.9, 0.6, 0.0), (0.0, 0.62, 0.45), (0.8, 0.4, 0.7), (0.35, 0.7, 0.9),
     (0.84, 0.37, 0.0))
-_STATES: dict[TaskState, Colour] = {  # withdrawn and refused tasks are not drawn
+_STATE_COLOURS: dict[TaskState, _Colour] = {  # cancelled and rejected tasks have none
     TaskState.PENDING: (0.7, 0.7, 0.7), TaskState.ASSIGNED: (0.35, 0.7, 0.9),
     TaskState.ACTIVE: (0.95, 0.9, 0.25), TaskState.UNASSIGNED: (0.8, 0.4, 0.7),
     TaskState.FAILED: (0.84, 0.37, 0.0), TaskState.COMPLETED: (0.0, 0.62, 0.45)}
-DANGER, NEWS, LOST, WHITE = (0.8, 0.1, 0.1), (1.0, 0.2, 0.8), (0.45, 0.45, 0.45), (1.0, 1.0, 1.0)
-SIZES = (0.7, 1.0, 1.4, 2.0)  # of a task by its value, in units
-MOST_DONE = 500  # completed tasks drawn, the newest
-MOST_STOPS = 200  # arrows and numbers in all: the next ones of each UAV
-MOST_TEXTS = 200  # labels of tasks left out, and of zones
-_LONGEST = 80  # letters of a label
+_ZONE, _CHANGED = (0.8, 0.1, 0.1), (1.0, 0.2, 0.8)
+_UNAVAILABLE, _WHITE = (0.45, 0.45, 0.45), (1.0, 1.0, 1.0)
+_TASK_SIZES = (0.7, 1.0, 1.4, 2.0)  # by value, in units
+_MOST_COMPLETED = 500  # tasks, the latest
+MOST_STOPS = 200  # with arrow and number, over all UAVs: the next of each
+MOST_TEXTS = 200  # labels of unassigned tasks, and of zones
+_LONGEST_LABEL = 80  # characters
 
 
 @dataclass(frozen=True, slots=True)
-class Picture:
-    """What is drawn."""
+class MarkerScene:
+    """What is drawn: lists, tasks, UAVs and zones at one moment."""
 
-    stamp: float  # [s]
+    stamp: float  # [s] published clock
     lists: Sequence[UavList] = ()
     tasks: Sequence[TaskRecord] = ()
     uavs: Mapping[str, UavRecord] | None = None
     zones: Sequence[ThreatZone] = ()
-    changed: frozenset[str] = frozenset()  # task ids, by the last re-plan
-    trigger: str = ''  # of the last re-plan
+    changed: frozenset[str] = frozenset()  # task ids, by the last plan
+    trigger: str = ''  # of the last plan
 
 
-class Sheet:
-    """Markers under one header; `unit` [m] is what sizes are counted in."""
+class MarkerList:
+    """Markers with one header; sizes are multiples of `unit` [m]."""
 
     def __init__(self, stamp: float, unit: float) -> None:
         self.header, self.unit = header(stamp), unit
-        # everything anew: nothing that is gone can stay, whatever message was missed
-        self.made = [Marker(header=self.header, action=Marker.DELETEALL)]
+        # nothing that was removed can stay, whichever message a subscriber missed
+        self.markers = [Marker(header=self.header, action=Marker.DELETEALL)]
         self.count: dict[str, int] = {}
 
-    def add(self, space: str, kind: int, colour: Colour, size: float, *, alpha: float = 1.0,
-            points: Iterable[Point] = (), at: Point | None = None, text: str = '') -> Marker:
-        """One more marker in a namespace; `size` in units."""
-        number = self.count[space] = self.count.get(space, -1) + 1
+    def add(self, namespace: str, kind: int, colour: _Colour, size: float, *, alpha: float = 1.0,
+            points: Iterable[Point] = (), position: Point | None = None, text: str = '') -> Marker:
+        """Append a marker; `size` in units, points and position in [m] ENU."""
+        number = self.count[namespace] = self.count.get(namespace, -1) + 1
         red, green, blue = colour
         size *= self.unit
-        marker = Marker(header=self.header, ns=space, id=number, type=kind, action=Marker.ADD,
+        marker = Marker(header=self.header, ns=namespace, id=number, type=kind, action=Marker.ADD,
                         color=ColorRGBA(r=red, g=green, b=blue, a=alpha),
                         scale=Vector3(x=size, y=size, z=size),
-                        points=[to_point(point) for point in points], text=text[:_LONGEST])
+                        points=[to_point(point) for point in points], text=text[:_LONGEST_LABEL])
         marker.pose.orientation.w = 1.0
-        if at is not None:
-            marker.pose.position = to_point(at)
-        self.made.append(marker)
+        if position is not None:
+            marker.pose.position = to_point(position)
+        self.markers.append(marker)
         return marker
 
-    def label(self, space: str, text: str, at: Point, colour: Colour = WHITE,
+    def label(self, namespace: str, text: str, position: Point, colour: _Colour = _WHITE,
               up: float = 2.5) -> None:
-        """A text `up` units above a place."""
-        self.add(space, Marker.TEXT_VIEW_FACING, colour, 2.2,
-                 at=(at[0], at[1], at[2] + up * self.unit), text=text)
+        """Append a text `up` units above a position [m]."""
+        self.add(namespace, Marker.TEXT_VIEW_FACING, colour, 2.2,
+                 position=(position[0], position[1], position[2] + up * self.unit), text=text)
 
 
-def markers(picture: Picture) -> MarkerArray:
-    """Everything anew: the first marker deletes what was there.
+def markers(scene: MarkerScene) -> MarkerArray:
+    """Draw everything; the first marker deletes what was drawn before.
 
-    O(tasks + UAVs + zones); the number of markers does not grow with the number of tasks.
+    O(tasks + UAVs + zones); the number of markers is bounded.
     """
-    sheet = Sheet(picture.stamp, _unit(picture))
-    for k, zone in enumerate(picture.zones):
-        _zone(sheet, zone, labelled=k < MOST_TEXTS)
-    _tasks(sheet, picture.tasks)
-    lists = sorted(picture.lists, key=lambda each: each.uav)
-    uavs = picture.uavs or {}
-    stops = max(1, MOST_STOPS // max(1, sum(bool(each.stops) for each in lists)))
-    colours = {uav_id: _COLOURS[k % len(_COLOURS)] for k, uav_id in enumerate(
-        sorted({*uavs, *(each.uav for each in lists)}))}
-    for each in lists:
-        _route(sheet, each, uavs.get(each.uav), colours[each.uav], stops)
+    out = MarkerList(scene.stamp, _unit(scene))
+    for k, zone in enumerate(scene.zones):
+        _zone(out, zone, labelled=k < MOST_TEXTS)
+    _tasks(out, scene.tasks)
+    lists = sorted(scene.lists, key=lambda uav_list: uav_list.uav)
+    uavs = scene.uavs or {}
+    stops = max(1, MOST_STOPS // max(1, sum(bool(uav_list.stops) for uav_list in lists)))
+    colours = {uav_id: _UAV_COLOURS[k % len(_UAV_COLOURS)] for k, uav_id in enumerate(
+        sorted({*uavs, *(uav_list.uav for uav_list in lists)}))}
+    for uav_list in lists:
+        _route(out, uav_list, uavs.get(uav_list.uav), colours[uav_list.uav], stops)
     for uav_id, record in uavs.items():
-        _uav(sheet, uav_id, record, colours[uav_id])
-    _detours(sheet, lists)
-    _news(sheet, picture, lists)
-    return MarkerArray(markers=sheet.made)
+        _uav(out, uav_id, record, colours[uav_id])
+    _detours(out, lists)
+    _changes(out, scene, lists)
+    return MarkerArray(markers=out.markers)
 
 
-def _zone(sheet: Sheet, zone: ThreatZone, labelled: bool) -> None:
-    zone_bodies.shape(sheet.add('zones', Marker.CYLINDER, DANGER, 1.0, alpha=0.3), zone)
+def _zone(out: MarkerList, zone: ThreatZone, labelled: bool) -> None:
+    zone_markers.set_volume(out.add('zones', Marker.CYLINDER, _ZONE, 1.0, alpha=0.3), zone)
     if labelled:
-        sheet.label('zone_labels', zone.id,
-                    (*zone_bodies.middle(zone), zone_bodies.height_span(zone)[1]), up=1.0)
+        _, top = zone_markers.height_span(zone)
+        out.label('zone_labels', zone.id, (*zone_markers.label_position(zone), top), up=1.0)
 
 
-def _tasks(sheet: Sheet, records: Sequence[TaskRecord]) -> None:
-    """A list of balls for each state and size; a label for what is left out."""
-    open_ones = [record for record in records if record.state is not TaskState.COMPLETED]
-    done = heapq.nlargest(MOST_DONE, (record for record in records if record.state is
-                                      TaskState.COMPLETED), key=lambda record: record.stamp)
-    most = max((record.task.value for record in open_ones + done), default=1.0)
+def _tasks(out: MarkerList, records: Sequence[TaskRecord]) -> None:
+    """Spheres, one marker for each state and size; a label for each unassigned task."""
+    drawn = [record for record in records if record.state is not TaskState.COMPLETED]
+    unassigned = [record for record in drawn if record.state is TaskState.UNASSIGNED]
+    drawn += heapq.nlargest(
+        _MOST_COMPLETED, (record for record in records if record.state is TaskState.COMPLETED),
+        key=lambda record: record.stamp)
+    most = max((record.task.value for record in drawn), default=1.0)
     groups: dict[tuple[TaskState, int], list[Point]] = {}
-    for record in open_ones + done:
-        size = min(len(SIZES) - 1, int(len(SIZES) * (record.task.value / most)))
+    for record in drawn:
+        size = min(len(_TASK_SIZES) - 1, int(len(_TASK_SIZES) * (record.task.value / most)))
         groups.setdefault((record.state, size), []).append(record.task.position)
     for (state, size), points in groups.items():
-        if state in _STATES:
-            sheet.add('tasks', Marker.SPHERE_LIST, _STATES[state], SIZES[size], points=points,
-                      alpha=0.4 if state is TaskState.COMPLETED else 1.0)
-    left = [record for record in open_ones if record.state is TaskState.UNASSIGNED]
-    for record in left[:MOST_TEXTS]:
-        sheet.label('left_out', f'{record.task.id}: {record.reason}', record.task.position,
-                    _STATES[TaskState.UNASSIGNED])
+        if state in _STATE_COLOURS:
+            out.add('tasks', Marker.SPHERE_LIST, _STATE_COLOURS[state], _TASK_SIZES[size],
+                    points=points, alpha=0.4 if state is TaskState.COMPLETED else 1.0)
+    for record in unassigned[:MOST_TEXTS]:
+        out.label('left_out', f'{record.task.id}: {record.reason}', record.task.position,
+                  _STATE_COLOURS[TaskState.UNASSIGNED])
 
 
-def _route(sheet: Sheet, uav_list: UavList, uav: UavRecord | None, colour: Colour,
+def _route(out: MarkerList, uav_list: UavList, uav: UavRecord | None, colour: _Colour,
            most: int) -> None:
-    """The way as a line; arrows and numbers at the next stops."""
-    points = way(uav_list, uav)
+    """The remaining path as a line; arrows and numbers at the next `most` stops."""
+    points = remaining_path(uav_list, uav)
     if len(points) > 1:
-        sheet.add('routes', Marker.LINE_STRIP, colour, 0.3, alpha=0.9, points=points)
+        out.add('routes', Marker.LINE_STRIP, colour, 0.3, alpha=0.9, points=points)
     last = points[0] if uav and points else None
     for order, stop in enumerate(uav_list.stops[:most], 1):
         goal = stop.task.position
-        _arrow(sheet, 'arrows', stop.leg.via[-1] if stop.leg.via else last, goal, colour)
-        sheet.label('order', f'{order}: {stop.task.id}', goal, colour)
+        _arrow(out, stop.leg.via[-1] if stop.leg.via else last, goal, colour)
+        out.label('order', f'{order}: {stop.task.id}', goal, colour)
         last = goal
 
 
-def _arrow(sheet: Sheet, space: str, start: Point | None, goal: Point, colour: Colour) -> None:
+def _arrow(out: MarkerList, start: Point | None, goal: Point, colour: _Colour) -> None:
     length = math.dist(start, goal) if start else 0.0
-    if start and length > 1e-3 * sheet.unit:
-        arrow = sheet.add(space, Marker.ARROW, colour, 0.5, points=(start, goal))
-        arrow.scale.y = 1.5 * sheet.unit
-        arrow.scale.z = min(3.0 * sheet.unit, 0.5 * length)
+    if start and length > 1e-3 * out.unit:
+        arrow = out.add('arrows', Marker.ARROW, colour, 0.5, points=(start, goal))
+        arrow.scale.y = 1.5 * out.unit
+        arrow.scale.z = min(3.0 * out.unit, 0.5 * length)
 
 
-def _uav(sheet: Sheet, uav_id: str, record: UavRecord, colour: Colour) -> None:
-    body = sheet.add('uavs', Marker.CYLINDER, colour if record.usable else LOST, 2.5,
-                     at=record.report.position)
-    body.scale.z = sheet.unit
+def _uav(out: MarkerList, uav_id: str, record: UavRecord, colour: _Colour) -> None:
+    body = out.add('uavs', Marker.CYLINDER, colour if record.usable else _UNAVAILABLE, 2.5,
+                   position=record.report.position)
+    body.scale.z = out.unit
     state = '' if record.usable else ' silent' if record.silent else ' not available'
-    sheet.label('uav_labels', uav_id + state, record.report.position)
+    out.label('uav_labels', uav_id + state, record.report.position)
 
 
-def _detours(sheet: Sheet, lists: Iterable[UavList]) -> None:
-    points = [point for each in lists for points in (
-        *(stop.leg.via for stop in each.stops), each.end_via) for point in points]
+def _detours(out: MarkerList, lists: Iterable[UavList]) -> None:
+    points = [point for uav_list in lists for points in (
+        *(stop.leg.via for stop in uav_list.stops), uav_list.end_via) for point in points]
     if points:
-        sheet.add('detour_points', Marker.CUBE_LIST, (0.95, 0.9, 0.25), 0.7, points=points)
+        out.add('detour_points', Marker.CUBE_LIST, (0.95, 0.9, 0.25), 0.7, points=points)
 
 
-def _news(sheet: Sheet, picture: Picture, lists: Iterable[UavList]) -> None:
-    """A halo around each task that the last re-plan gave to another place, and the way there."""
+def _changes(out: MarkerList, scene: MarkerScene, lists: Iterable[UavList]) -> None:
+    """A halo around each task that the last plan moved, and the leg to it."""
     goals: list[Point] = []
     legs: list[Point] = []
-    for each in lists:
+    for uav_list in lists:
         last: tuple[Point, ...] = ()
-        for stop in each.stops:
-            if stop.task.id in picture.changed:
+        for stop in uav_list.stops:
+            if stop.task.id in scene.changed:
                 goals.append(stop.task.position)
                 for pair in pairwise((*last, *stop.leg.via, stop.task.position)):
                     legs += pair
             last = (stop.task.position,)
     if goals:
-        sheet.add('replan', Marker.SPHERE_LIST, NEWS, 3.0, alpha=0.35, points=goals)
+        out.add('replan', Marker.SPHERE_LIST, _CHANGED, 3.0, alpha=0.35, points=goals)
         x, y, z = (sum(values) / len(goals) for values in zip(*goals, strict=True))
-        sheet.label('replan_label', f'{picture.trigger or "re-plan"}: {len(goals)} changed',
-                    (x, y, z), NEWS, up=8.0)
+        out.label('replan_label', f'{scene.trigger or "re-plan"}: {len(goals)} changed',
+                  (x, y, z), _CHANGED, up=8.0)
     if legs:
-        sheet.add('replan', Marker.LINE_LIST, NEWS, 0.6, alpha=0.5, points=legs)
+        out.add('replan', Marker.LINE_LIST, _CHANGED, 0.6, alpha=0.5, points=legs)
 
 
-def _unit(picture: Picture) -> float:
-    """What sizes are counted in [m]: 1, 2 or 5 times a power of ten, steady while things move."""
-    places = [record.task.position for record in picture.tasks if record.open]
-    places += [record.report.position for record in (picture.uavs or {}).values()]
-    places += [zone_bodies.middle(zone) for zone in picture.zones]
+def _unit(scene: MarkerScene) -> float:
+    """The unit of sizes [m]: 1, 2 or 5 times a power of ten, constant for small movements."""
+    positions: list[Sequence[float]] = [
+        record.task.position for record in scene.tasks if record.open]
+    positions += [record.report.position for record in (scene.uavs or {}).values()]
+    positions += [zone_markers.label_position(zone) for zone in scene.zones]
     extent = max((max(values) - min(values) for values in zip(
-        *(place[:2] for place in places), strict=True)), default=0.0)
+        *(position[:2] for position in positions), strict=True)), default=0.0)
     goal = min(max(extent / 100.0, 0.2), 1e6)
     power = 10.0 ** math.floor(math.log10(goal))
     return max(factor * power for factor in (1.0, 2.0, 5.0) if factor * power <= goal * 1.000001)

@@ -1,0 +1,85 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Parameters of the bridge as the values that its core takes."""
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+
+from uav_task_alloc.errors import InvalidValue
+from uav_task_alloc.geometry.frames import Origin
+from uav_task_alloc.mavlink.gcs.ground_station import GcsConfig
+from uav_task_alloc.mavlink.gcs.policy import Policy
+from uav_task_alloc.model import ThreatZone, check_number, check_ros_name
+from uav_task_alloc.params import MOST_RANGE, BridgeParams
+
+
+def to_policy(params: BridgeParams, zones: tuple[ThreatZone, ...] = (),
+              grounded: str = '') -> Policy:
+    """What a mission executor may do now.
+
+    Args:
+        params: as they are now.
+        zones: around which it returns.
+        grounded: what has to be different before a UAV takes off; '' where it may.
+    """
+    return Policy(params.takeoff, params.cruise_altitude, params.when_empty, params.when_foreign,
+                  params.relaunch, zones, grounded)
+
+
+def to_gcs_config(params: BridgeParams) -> GcsConfig:
+    """The configuration of the ground station.
+
+    Raises:
+        InvalidValue: `uav_id_pattern` makes no ROS names, there is no connection, or a system id
+            is outside [1, 255].
+    """
+    try:
+        names = {params.uav_id_pattern.format(sysid=number) for number in (1, 2)}
+    except (KeyError, IndexError, ValueError):
+        names = set()
+    if len(names) != 2:
+        raise InvalidValue('uav_id_pattern', params.uav_id_pattern, 'a text with {sysid}')
+    check_ros_name('uav_id_pattern', names.pop())
+    if not params.connections:
+        raise InvalidValue('connections', [], 'at least one')
+    for number in params.system_ids:
+        check_number('system_ids', number, 1, 255)
+    origin = Origin(params.origin__latitude, params.origin__longitude,
+                    params.origin__altitude_amsl)
+    return GcsConfig(params.system_id, params.component_id, params.system_ids,
+                     params.uav_id_pattern, params.autopilot, origin, to_policy(params))
+
+
+def to_capabilities(entries: Iterable[str]) -> dict[str, tuple[str, ...]]:
+    """Capabilities by UAV, from entries like `uav_1:camera,thermal`.
+
+    Raises:
+        InvalidValue: an entry has another form.
+    """
+    capabilities = {}
+    for entry in entries:
+        uav_id, colon, words = entry.partition(':')
+        if not colon or not uav_id:
+            raise InvalidValue('capabilities', entry, '`UAV_ID:WORD,WORD`')
+        capabilities[uav_id] = tuple(word.strip() for word in words.split(',') if word.strip())
+    return capabilities
+
+
+def to_full_ranges(entries: Iterable[str]) -> dict[str, float]:
+    """Ranges with a full battery [m] by UAV, from entries like `uav_1:6000`.
+
+    Raises:
+        InvalidValue: an entry has another form, or a UAV has two.
+    """
+    ranges: dict[str, float] = {}
+    for entry in entries:
+        uav_id, _, number = entry.rpartition(':')
+        try:
+            value = float(number)
+        except ValueError:
+            value = math.nan
+        if not (uav_id and 0.0 <= value <= MOST_RANGE) or uav_id in ranges:
+            raise InvalidValue('full_ranges', entry,
+                               f'`UAV_ID:METRES` with metres in [0, {MOST_RANGE:g}], a UAV once')
+        ranges[uav_id] = value
+    return ranges

@@ -1,0 +1,81 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Diagnostics of the bridge: a row for each UAV, link, and part of the bridge that can fail."""
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import asdict
+
+from uav_task_alloc.mavlink.gcs.ground_station import GroundStation
+from uav_task_alloc.mavlink.gcs.vehicle_diagnostics import diagnostics_of
+from uav_task_alloc.mavlink.transport.connections import Connections
+from uav_task_alloc.mavlink.transport.heartbeat import Heartbeat
+from uav_task_alloc.nodes.conversions.diagnostics import (
+    DiagnosticLevel,
+    DiagnosticRow,
+    bridge_row,
+)
+from uav_task_alloc.nodes.conversions.message_limits import printable
+from uav_task_alloc.nodes.ros.leveled_log import LeveledLog
+
+_OK, _WARN, _ERROR = DiagnosticLevel.OK, DiagnosticLevel.WARN, DiagnosticLevel.ERROR
+
+
+class BridgeDiagnostics:
+    """Reads the state of a bridge's parts; troubles that begin or end are logged as well."""
+
+    def __init__(self, ground_station: GroundStation, connections: Connections,
+                 heartbeat: Heartbeat, log: LeveledLog) -> None:
+        self._ground_station, self._connections = ground_station, connections
+        self._heartbeat, self._log = heartbeat, log
+        self._refusals = (ground_station.refusals, connections.refusals)
+        self._refused = 0  # messages until the last call
+
+    def log_refusals(self) -> None:
+        """Log which messages of vehicles were dropped."""
+        for refusals in self._refusals:
+            while refusals.notes:
+                note = refusals.notes.popleft()
+                self._log.write(note.level, note.text)
+
+    def vehicle_rows(self, now: float) -> list[DiagnosticRow]:
+        """A row for each UAV; to be called with the lock of the ground station."""
+        rows = [(session.uav_id, diagnostics_of(session, now))
+                 for session in self._ground_station.sessions.values()]
+        return [bridge_row(uav_id, each.level, each.summary, asdict(each.facts))
+                for uav_id, each in rows]
+
+    def part_rows(self, conflict: str) -> Iterator[DiagnosticRow]:
+        """A row for each link and other part.
+
+        Args:
+            conflict: why the origins of the nodes differ; '' where they agree.
+        """
+        refusal = conflict and f'refuses to fly new lists: {conflict}'
+        self._log.report_trouble('fleet_origin', refusal)
+        if refusal:
+            yield bridge_row('fleet_origin', _ERROR, refusal)
+        for link in self._connections.links:
+            self._log.report_trouble(link.name, link.trouble)
+            yield bridge_row(link.name, _ERROR if link.trouble else _OK, link.trouble or 'open')
+        if self._connections.signing is not None:
+            trouble = self._connections.signing.trouble
+            self._log.report_trouble('signing', trouble, 'warning')
+            yield bridge_row('signing', _WARN if trouble else _OK, trouble or 'timestamp kept')
+        yield self._heartbeat_row()
+        yield self._messages_row()
+
+    def _heartbeat_row(self) -> DiagnosticRow:
+        beat = self._heartbeat
+        return bridge_row('heartbeat', _ERROR if beat.trouble else _OK,
+                          beat.trouble or f'{beat.sent} sent',
+                          {'thread_restarts': beat.restarts})
+
+    def _messages_row(self) -> DiagnosticRow:
+        """Counts of refused messages; a warning where there are more than at the last call."""
+        count, before = sum(refusals.count for refusals in self._refusals), self._refused
+        self._refused = count
+        return bridge_row(
+            'messages', _WARN if count > before else _OK, f'{count} messages refused', {
+                'messages_refused': count, 'frames_refused': self._connections.errors(),
+                'last_refused': '; '.join(printable(refusals.last) for refusals in self._refusals
+                                          if refusals.last)})

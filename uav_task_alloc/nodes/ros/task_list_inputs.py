@@ -1,0 +1,62 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Subscriptions to the task lists of a bridge's UAVs; valid lists wait until they may be flown."""
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from rclpy.node import Node
+from uav_task_alloc_msgs import msg as m
+
+from uav_task_alloc.errors import InvalidValue
+from uav_task_alloc.mavlink.mission.items import TaskList
+from uav_task_alloc.nodes.conversions.messages import LATCHED
+from uav_task_alloc.nodes.ros.leveled_log import LeveledLog
+from uav_task_alloc.nodes.ros.topic_names import TASK_LIST, check_topic
+
+
+class TaskListInputs:
+    """The topics `<uav_id>/task_list`, and the newest valid list of each UAV.
+
+    Args:
+        node: which subscribes.
+        log: of refused lists.
+        convert: makes the list of a message for a UAV; raises InvalidValue.
+        on_change: called after each message.
+    """
+
+    def __init__(self, node: Node, log: LeveledLog,
+                 convert: Callable[[m.TaskList, str], TaskList],
+                 on_change: Callable[[], None]) -> None:
+        self._node, self._log = node, log
+        self._convert, self._on_change = convert, on_change
+        self.known: set[str] = set()  # UAVs
+        self.pending: dict[str, TaskList] = {}
+
+    def subscribe(self, uav_id: str) -> None:
+        """Subscribe to the lists of a UAV, once; an id that is too long for a topic is logged."""
+        if uav_id in self.known:
+            return
+        self.known.add(uav_id)
+        try:
+            topic = check_topic(self._node, TASK_LIST, uav_id)
+        except InvalidValue as error:
+            self._log.write('error', f'it gets no task lists: {error}')
+            return
+
+        def on_message(msg: m.TaskList) -> None:
+            self.on_list(uav_id, msg)
+
+        self._node.create_subscription(m.TaskList, topic, on_message, LATCHED)
+
+    def on_list(self, uav_id: str, msg: m.TaskList) -> None:
+        """Take the newest list of a UAV; an invalid one is logged and changes nothing."""
+        try:
+            self.pending[uav_id] = self._convert(msg, uav_id)
+        except InvalidValue as error:
+            self._log.write('warning', f'{uav_id}/task_list: {error}: ignored')
+        self._on_change()
+
+    def take(self) -> dict[str, TaskList]:
+        """Return the waiting lists by UAV, and forget them."""
+        pending, self.pending = self.pending, {}
+        return pending
