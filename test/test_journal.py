@@ -9,7 +9,7 @@ import sys
 import pytest
 
 from uav_task_alloc.errors import JournalCorrupt, JournalError, JournalForeign, JournalInUse
-from uav_task_alloc.journal import FILE_NAME, VERSION, Journal, JournalRow, rescued, set_aside
+from uav_task_alloc.journal import FILE_NAME, VERSION, Journal, JournalRow, recover_rows, set_aside
 
 WRITER = """
 import sys
@@ -149,7 +149,7 @@ def test_finding_23_a_creation_that_broke_off_leaves_no_empty_journal(tmp_path, 
     def kill(*_):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr('uav_task_alloc.journal._put_in_place', kill)
+    monkeypatch.setattr('uav_task_alloc.journal._move_into_place', kill)
     with pytest.raises(KeyboardInterrupt):
         Journal(str(tmp_path))
     monkeypatch.undo()
@@ -187,7 +187,7 @@ def test_finding_23_the_rows_before_a_cut_are_rescued(tmp_path, pages):
         Journal(str(tmp_path))
     held = file.read_bytes()
     aside = set_aside(str(tmp_path))
-    found = rescued(aside)
+    found = recover_rows(aside)
     assert aside.read_bytes() == held
     assert {row.body for row in found} <= {'x' * 50}
     assert len(found) >= 30 * (pages - 2)
@@ -201,6 +201,6 @@ def test_finding_23_the_rows_on_both_sides_of_a_bad_page_are_rescued(tmp_path):
     held = bytearray(file.read_bytes())
     held[4 * 4096:5 * 4096] = bytes(range(256)) * 16
     file.write_bytes(held)
-    found = {row.id for row in rescued(set_aside(str(tmp_path)))}
+    found = {row.id for row in recover_rows(set_aside(str(tmp_path)))}
     assert {'000', '299'} <= found
     assert 200 <= len(found) < 300

@@ -1,15 +1,23 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The errors a caller may handle; what can be expected is returned, not raised."""
+"""The errors that a caller may handle; expected failures are returned, not raised."""
 
-_LONGEST = 200  # characters of a value that are shown
+from collections.abc import Iterable
+
+_MAX_SHOWN = 200  # characters of a value that are shown
 
 
 class AllocError(Exception):
-    """Any error of this package."""
+    """Base of all errors of this package."""
 
 
 class InvalidValue(AllocError, ValueError):
-    """A value is outside what it may be; the text names value, expectation and place."""
+    """A value is out of range or of the wrong type; the text names place, value and expectation.
+
+    Args:
+        place: name of the value: 'task t1: position'.
+        value: shortened where it is long.
+        expected: what it must be: 'three finite coordinates [m]'.
+    """
 
     def __init__(self, place: str, value: object, expected: str) -> None:
         super().__init__(f'{place} = {shown(value)}: expected {expected}')
@@ -17,13 +25,27 @@ class InvalidValue(AllocError, ValueError):
 
 
 def shown(value: object) -> str:
-    """A value as a line of text, cut where it is long: whoever sent it may be hostile."""
+    """A value as one line of text, shortened where it is long: input may be hostile."""
     text = repr(value)
-    return text if len(text) <= _LONGEST else f'{text[:_LONGEST]}... ({len(text)} characters)'
+    return text if len(text) <= _MAX_SHOWN else f'{text[:_MAX_SHOWN]}... ({len(text)} characters)'
+
+
+def first_of(texts: Iterable[str], most: int, separator: str = ', ', kind: str = '') -> str:
+    """The first texts of a list, and how many more there are: `a, b, c and 4 more`.
+
+    Args:
+        texts: of the whole list.
+        most: how many are shown.
+        separator: between two.
+        kind: follows the number: `and 4 more UAVs` for ' UAVs'.
+    """
+    listed = list(texts)
+    more = len(listed) - most
+    return separator.join(listed[:most]) + (f' and {more} more{kind}' if more > 0 else '')
 
 
 class UnknownName(AllocError, KeyError):
-    """A name (solver, UAV, task, parameter) that nobody has declared."""
+    """A name of a solver, UAV, task or parameter that is not declared."""
 
     def __init__(self, kind: str, name: object, known: object) -> None:
         super().__init__(f'{kind} {name!r}: expected one of {", ".join(map(str, known))}'  # type: ignore[call-overload]
@@ -34,19 +56,19 @@ class UnknownName(AllocError, KeyError):
 
 
 class ScenarioError(AllocError, ValueError):
-    """A scenario file is not as its schema says; the text names file, line and reason."""
+    """A scenario file violates its schema; the text names file, line and reason."""
 
 
 class JournalError(AllocError):
-    """The journal on disk could not be written or read."""
+    """The journal on disk cannot be written or read."""
 
 
 class JournalCorrupt(JournalError):
-    """The file of the journal is damaged, or is none."""
+    """The journal file is corrupt or not a journal."""
 
 
 class JournalForeign(JournalError):
-    """The journal is not ours to touch: a newer version wrote it, or another process has it."""
+    """The journal must not be changed: a newer version or another program wrote it."""
 
 
 class JournalInUse(JournalForeign):
@@ -54,11 +76,16 @@ class JournalInUse(JournalForeign):
 
 
 class OriginMismatch(JournalForeign):
-    """The journal is of another origin: its coordinates mean other places."""
+    """The journal has another origin: its coordinates are other positions."""
 
 
 class MissionError(AllocError, ValueError):
-    """A route cannot be expressed as mission items for a profile; `task` is the one at fault."""
+    """A route cannot be expressed as mission items for an autopilot.
+
+    Args:
+        text: the reason.
+        task: id of the task at fault; '' for none.
+    """
 
     def __init__(self, text: str, task: str = '') -> None:
         super().__init__(text)

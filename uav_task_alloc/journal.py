@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The world on disk: rows by kind and id in SQLite, safe before they are acknowledged."""
+"""State on disk: rows by kind and id in SQLite, committed to disk before they are acknowledged."""
 from __future__ import annotations
 
 import json
@@ -15,37 +15,40 @@ from typing import Any, NamedTuple
 from uav_task_alloc.errors import JournalCorrupt, JournalError, JournalForeign, JournalInUse
 
 FILE_NAME = 'journal.sqlite3'
-SIDE_FILES = ('', '-wal', '-shm')
-VERSION = 1  # of the layout; a file of a newer one is refused
-WAIT = 0.5  # [s] for another process that has the file
-SHORTEST = 16  # [bytes] the header of SQLite; it takes a shorter file for a new database
-_LONGEST = 2**30  # [bytes] a damaged header may ask for any length
+_SUFFIXES = ('', '-wal', '-shm')
+VERSION = 1  # of the table layout; a file with a newer one is refused
+WAIT = 0.5  # [s] for the lock of another process
+_MIN_SIZE = 16  # [bytes] header of SQLite, which takes a shorter file for a new database
+_MAX_SIZE = 2**30  # [bytes] a corrupt header may declare any length
 _COLUMNS = ['kind', 'id', 'body']
-IN_USE = frozenset({sqlite3.SQLITE_BUSY, sqlite3.SQLITE_LOCKED})
-DAMAGED = frozenset({sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB})
-
-
-SELECT = 'SELECT kind, id, body FROM world'
+_IN_USE = frozenset({sqlite3.SQLITE_BUSY, sqlite3.SQLITE_LOCKED})
+_DAMAGED = frozenset({sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB})
+_SELECT = 'SELECT kind, id, body FROM world'
 
 
 class JournalRow(NamedTuple):
-    """One thing of the world; a body of None takes it out."""
+    """One record; a body of None deletes it."""
 
     kind: str
     id: str
-    body: Any  # JSON; loaded text that is no JSON: its bytes
+    body: Any  # JSON; bytes where the text on disk is not JSON
 
 
 class Journal:
-    """A file in `state_dir`.
+    """A journal file in a folder, locked by this process until `close`.
 
-    Raises JournalError, which names the file and the reason: JournalCorrupt where the file is
-    damaged, empty or no journal, JournalForeign where it is not ours, JournalInUse where another
-    process has it.
+    Args:
+        state_dir: the folder; created where missing.
+        wait: [s] for the lock of another process.
+
+    Raises:
+        JournalCorrupt: the file is corrupt, empty or not a journal.
+        JournalInUse: another process has it open.
+        JournalForeign: a newer version or another program wrote it.
+        JournalError: it cannot be opened. Each text names the file and the reason.
     """
 
     def __init__(self, state_dir: str, wait: float = WAIT) -> None:
-        """wait: [s] for another process that has it."""
         self.path = Path(state_dir).expanduser() / FILE_NAME
         self._db: Any = None
         try:
@@ -53,7 +56,7 @@ class Journal:
             if not self.path.exists():
                 _create(self.path)
             _check_length(self.path)
-            # one process owns it: a second allocator would hand out the same revisions
+            # exclusive: a second allocator would publish the same revisions
             self._db = _connect(self.path, wait)
             self._prepare()
             self._inode = self.path.stat().st_ino
@@ -73,7 +76,7 @@ class Journal:
             raise JournalForeign(f'{self.path}: layout version = {version}: expected at most '
                                  f'{VERSION}, a newer uav_task_alloc wrote it')
         self._check_layout(version)
-        self._db.execute('BEGIN IMMEDIATE')  # nobody else has it
+        self._db.execute('BEGIN IMMEDIATE')  # fails unless the lock is ours
         self._db.execute('COMMIT')
 
     def _check_layout(self, version: int) -> None:
@@ -87,16 +90,27 @@ class Journal:
         raise JournalCorrupt(f'{text}; it is empty')
 
     def load(self) -> list[JournalRow]:
-        """Everything that was put and not taken out; a body that is no JSON as its bytes."""
+        """Read all rows.
+
+        Returns:
+            By kind and id; a body that is not JSON as its bytes.
+
+        Raises:
+            JournalError: the file cannot be read.
+        """
         try:
-            return [_row(*row) for row in self._db.execute(f'{SELECT} ORDER BY kind, id')]
+            return [_row(*row) for row in self._db.execute(f'{_SELECT} ORDER BY kind, id')]
         except sqlite3.Error as error:
             raise self._error('read', error) from error
 
     def put(self, rows: Iterable[JournalRow]) -> None:
-        """All rows or none; they are on disk when this returns."""
+        """Store or delete rows in one transaction; they are on disk when this returns.
+
+        Raises:
+            JournalError: nothing was stored.
+        """
         try:
-            if not self.in_place():
+            if not self.is_in_place():
                 raise FileNotFoundError('it was removed or replaced')
             self._db.execute('BEGIN IMMEDIATE')
             for row in rows:
@@ -111,15 +125,15 @@ class Journal:
                 self._db.execute('ROLLBACK')
             raise self._error('written', error) from error
 
-    def in_place(self) -> bool:
-        """The file is still where it was opened; one that was removed takes rows for nobody."""
+    def is_in_place(self) -> bool:
+        """Whether the file still exists; rows put into a removed one would be lost."""
         try:
             return self.path.stat().st_ino == self._inode
         except OSError:
             return False
 
     def close(self) -> None:
-        """Let go of the file."""
+        """Close the file and release its lock."""
         if self._db is not None:
             self._db.close()
 
@@ -127,25 +141,25 @@ class Journal:
         # the low byte is the primary code; errors of the Python module itself have none
         code = getattr(error, 'sqlite_errorcode', 0) & 0xff
         kind = JournalError
-        if code in IN_USE:
+        if code in _IN_USE:
             kind = JournalInUse
-        elif code in DAMAGED:
+        elif code in _DAMAGED:
             kind = JournalCorrupt
         return kind(f'{self.path} cannot be {what}: {error}')
 
 
 def _connect(path: Path, wait: float = WAIT) -> Any:
-    made = sqlite3.connect(path, timeout=wait, isolation_level=None, check_same_thread=False)
-    made.text_factory = bytes  # damaged text is the matter of its row
-    return made
+    db = sqlite3.connect(path, timeout=wait, isolation_level=None, check_same_thread=False)
+    db.text_factory = bytes  # corrupt text must fail in its own row only
+    return db
 
 
 def _create(path: Path) -> None:
-    """Make a journal without rows; it appears as a whole, so that an empty file is damage."""
-    made = path.with_name(f'{path.name}.new-{os.getpid()}')
+    """Create a journal without rows, atomically, so that an empty file is always damage."""
+    temporary = path.with_name(f'{path.name}.new-{os.getpid()}')
     try:
-        made.unlink(missing_ok=True)
-        db = _connect(made)
+        temporary.unlink(missing_ok=True)
+        db = _connect(temporary)
         try:
             db.execute('BEGIN IMMEDIATE')
             db.execute('CREATE TABLE world (kind TEXT, id TEXT, body TEXT NOT NULL, '
@@ -154,19 +168,19 @@ def _create(path: Path) -> None:
             db.execute('COMMIT')
         finally:
             db.close()
-        _put_in_place(made, path)
+        _move_into_place(temporary, path)
     finally:
-        made.unlink(missing_ok=True)
+        temporary.unlink(missing_ok=True)
 
 
-def _put_in_place(made: Path, path: Path) -> None:
-    """Give the file its name, unless another process was first; on disk when this returns."""
+def _move_into_place(temporary: Path, path: Path) -> None:
+    """Rename the file unless another process was first; on disk when this returns."""
     try:
-        os.link(made, path)
+        os.link(temporary, path)
     except FileExistsError:
         return
-    except OSError:  # a file system without links
-        made.rename(path)
+    except OSError:  # a file system without hard links
+        temporary.rename(path)
     folder = os.open(path.parent, os.O_RDONLY)
     try:
         os.fsync(folder)
@@ -177,9 +191,9 @@ def _put_in_place(made: Path, path: Path) -> None:
 def _check_length(path: Path) -> None:
     """Raise JournalCorrupt for a file that SQLite would take for a new database."""
     size = path.stat().st_size
-    if size < SHORTEST:
+    if size < _MIN_SIZE:
         raise JournalCorrupt(f'{path} cannot be opened: size = {size} bytes: expected at least '
-                             f'{SHORTEST}, it was emptied or cut short')
+                             f'{_MIN_SIZE}, it was emptied or cut short')
 
 
 def _row(kind: Any, id: Any, text: Any) -> JournalRow:
@@ -198,23 +212,34 @@ def _body(text: Any) -> Any:
 
 
 def set_aside(state_dir: str) -> Path:
-    """Rename the journal, so that a new one can begin; returns the name. Raises JournalError."""
+    """Rename the journal, so that a new one can be created.
+
+    Returns:
+        The new name.
+
+    Raises:
+        JournalError: it cannot be renamed.
+    """
     path = Path(state_dir).expanduser() / FILE_NAME
     aside = next(name for k in count(1)
                  if not (name := path.with_name(f'{FILE_NAME}.damaged-{k}')).exists())
     try:
-        for end in SIDE_FILES:
-            if Path(f'{path}{end}').exists():
-                Path(f'{path}{end}').rename(f'{aside}{end}')
+        for suffix in _SUFFIXES:
+            if Path(f'{path}{suffix}').exists():
+                Path(f'{path}{suffix}').rename(f'{aside}{suffix}')
     except OSError as error:
         raise JournalError(f'{path} cannot be renamed: {error}') from error
     return aside
 
 
 def read_copy(state_dir: str) -> list[JournalRow]:
-    """What a journal holds that cannot be opened in its place, as on a read-only disk.
+    """Read a journal that cannot be opened in its place, as on a read-only disk.
 
-    Raises JournalError.
+    Returns:
+        Its rows, from a temporary copy.
+
+    Raises:
+        JournalError: it cannot be copied or read.
     """
     with tempfile.TemporaryDirectory() as folder:
         _copy(Path(state_dir).expanduser() / FILE_NAME, folder)
@@ -225,11 +250,14 @@ def read_copy(state_dir: str) -> list[JournalRow]:
             journal.close()
 
 
-def rescued(path: Path) -> list[JournalRow]:
-    """The rows of a damaged file that can still be read; the file itself is not touched.
+def recover_rows(path: Path) -> list[JournalRow]:
+    """Read what is readable of a corrupt file, from both ends up to the first error.
 
-    They are read from both ends, each as far as it goes. Raises JournalError where the file
-    cannot be copied.
+    Args:
+        path: the file, which is not changed.
+
+    Raises:
+        JournalError: it cannot be copied.
     """
     with tempfile.TemporaryDirectory() as folder:
         _copy(path, folder)
@@ -238,18 +266,18 @@ def rescued(path: Path) -> list[JournalRow]:
         found: dict[tuple[str, str], JournalRow] = {}
         try:
             for order in ('ASC', 'DESC'):
-                _read_on(db, f'{SELECT} ORDER BY kind {order}, id {order}', found)
+                _read_on(db, f'{_SELECT} ORDER BY kind {order}, id {order}', found)
         finally:
             db.close()
     return list(found.values())
 
 
 def _pad(path: Path) -> None:
-    """Fill a file that was cut short with zeros: SQLite reads no page of a shorter one."""
+    """Extend a truncated file with zeros: SQLite reads no page of a shorter one."""
     with path.open('r+b') as file:
         header = file.read(32)
         page = int.from_bytes(header[16:18], 'big')
-        length = min(page * int.from_bytes(header[28:32], 'big'), _LONGEST)
+        length = min(page * int.from_bytes(header[28:32], 'big'), _MAX_SIZE)
         if path.stat().st_size < length:
             file.truncate(length)
 
@@ -267,8 +295,8 @@ def _read_on(db: Any, query: str, found: dict[tuple[str, str], JournalRow]) -> N
 def _copy(path: Path, folder: str) -> None:
     """Copy the files of a journal under its usual name. Raises JournalError."""
     try:
-        for end in SIDE_FILES[:2]:
-            if Path(f'{path}{end}').exists():
-                shutil.copyfile(f'{path}{end}', Path(folder, FILE_NAME + end))
+        for suffix in _SUFFIXES[:2]:
+            if Path(f'{path}{suffix}').exists():
+                shutil.copyfile(f'{path}{suffix}', Path(folder, FILE_NAME + suffix))
     except OSError as error:
         raise JournalError(f'{path} cannot be read: {error}') from error

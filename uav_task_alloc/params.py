@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Every parameter, declared once; ROS descriptors, YAML files and docs are made from it."""
+"""All parameters, declared once; ROS descriptors, YAML files and docs are generated from them."""
 from __future__ import annotations
 
 import math
@@ -8,14 +8,24 @@ from typing import Any, TypeVar
 
 from uav_task_alloc.errors import InvalidValue
 
-MOST_RANGE = 1e7  # [m]
+MAX_RANGE = 1e7  # [m]
 
 
 def param(default: Any, text: str, *, low: float | None = None, high: float | None = None,
           choices: tuple[str, ...] = (), unit: str = '', fixed: bool = False) -> Any:
-    """A field with its default, range [low, high] or choices, unit and one-line text.
+    """Declare a parameter as a dataclass field.
 
-    fixed: read at the start only; a later change is refused.
+    Args:
+        default: its type is that of the parameter; a list is stored as a tuple.
+        text: one line for the docs.
+        low: lowest value; None: unbounded.
+        high: highest value; None: unbounded.
+        choices: values allowed; empty: any.
+        unit: of the value, SI.
+        fixed: read at the start only; a later change is refused.
+
+    Returns:
+        The field, with all but the default in its metadata.
     """
     what = {'text': text, 'low': low, 'high': high, 'choices': choices, 'unit': unit,
             'fixed': fixed}
@@ -30,7 +40,7 @@ def ros_name(spec: Field[Any]) -> str:
 
 
 def expectation(spec: Field[Any]) -> str:
-    """What a value must be, in words: `one of hold, home`, `[0, 1] m`, `text`."""
+    """What a value must be, in words: `one of hold, home`, `float in [0, 1] m`, `text`."""
     meta, kind = spec.metadata, type(spec.default).__name__
     if meta['choices']:
         return 'one of ' + ', '.join(meta['choices'])
@@ -43,7 +53,18 @@ def expectation(spec: Field[Any]) -> str:
 
 
 def check(spec: Field[Any], value: Any) -> Any:
-    """`value` as the declared type; raise InvalidValue where it is outside."""
+    """Convert a value to the declared type of its parameter.
+
+    Args:
+        spec: the field of the parameter.
+        value: an int is accepted for a float, any iterable but a string for a tuple.
+
+    Returns:
+        The value.
+
+    Raises:
+        InvalidValue: it is of another type, out of range, or none of the choices.
+    """
     meta, kind = spec.metadata, type(spec.default)
     if kind is float and isinstance(value, int) and not isinstance(value, bool):
         value = float(value)
@@ -59,20 +80,20 @@ def check(spec: Field[Any], value: Any) -> Any:
     return value
 
 
-class Checked:
-    """Base of the parameter classes: every field is checked when made."""
+class CheckedParams:
+    """Base of the parameter classes: each field is checked when an object is created."""
 
     def __post_init__(self) -> None:
         for spec in fields(self):  # type: ignore[arg-type]
             object.__setattr__(self, spec.name, check(spec, getattr(self, spec.name)))
 
 
-_P = TypeVar('_P', bound=Checked)
+_P = TypeVar('_P', bound=CheckedParams)
 
 
 @dataclass(frozen=True)
-class Framed(Checked):
-    """Where the ENU frame is; the same for all nodes of a fleet."""
+class FrameParams(CheckedParams):
+    """The origin of the ENU frame; the same for all nodes of a fleet."""
 
     origin__latitude: float = param(47.397742, 'Origin of the ENU frame.', low=-90.0, high=90.0,
                                     unit='deg', fixed=True)
@@ -83,17 +104,17 @@ class Framed(Checked):
 
 
 @dataclass(frozen=True)
-class AllocatorParams(Framed):
-    """allocator: hears UAVs, tasks and zones, publishes a task list for each UAV."""
+class AllocatorParams(FrameParams):
+    """allocator: plans for the UAVs, tasks and zones reported, publishes a list for each UAV."""
 
-    solve_budget: float = param(0.1, 'Time a re-solve may take.', low=0.001, high=60.0, unit='s')
+    solve_budget: float = param(0.1, 'Solve time of one replan.', low=0.001, high=60.0, unit='s')
     route_end: str = param('home', 'What a UAV does after its last task.',
                            choices=('hold', 'home'))
     uav_timeout: float = param(5.0, 'Silence after which the tasks of a UAV go to the others.',
                                low=0.1, high=3600.0, unit='s')
-    default_range: float = param(20000.0, 'Range of a UAV that does not tell its own.', low=0.0,
-                                 high=MOST_RANGE, unit='m')
-    default_cruise_speed: float = param(15.0, 'Speed of a UAV that does not tell its own.',
+    default_range: float = param(20000.0, 'Range of a UAV that does not report its own.', low=0.0,
+                                 high=MAX_RANGE, unit='m')
+    default_cruise_speed: float = param(15.0, 'Speed of a UAV that does not report its own.',
                                         low=0.1, high=1000.0, unit='m/s')
     clearance: float = param(10.0, 'Distance kept from zones beyond their margins.', low=0.0,
                              high=10000.0, unit='m')
@@ -101,84 +122,84 @@ class AllocatorParams(Framed):
                                 unit='m')
     altitude_max: float = param(1e5, 'Highest detour, above the origin.', low=-1e5, high=1e5,
                                 unit='m')
-    settle: float = param(0.05, 'Quiet time that ends a burst of events; one solve for each.',
+    settle: float = param(0.05, 'Quiet time that ends a burst of events; one solve a burst.',
                           low=0.0, high=10.0, unit='s')
     replan_margin: float = param(0.01, 'Share by which a plan must be shorter to replace the '
                                  'one that is flown.', low=0.0, high=1.0)
     background_budget: float = param(0.05, 'Time of one search between events; 0: none.',
                                      low=0.0, high=10.0, unit='s')
-    background_period: float = param(0.5, 'Rest between two such searches.', low=0.05,
+    background_period: float = param(0.5, 'Pause between two such searches.', low=0.05,
                                      high=3600.0, unit='s')
-    list_interval: float = param(0.25, 'Least time between two lists for one UAV, unless it '
+    list_interval: float = param(0.25, 'Minimum time between two lists for one UAV, unless it '
                                  'cannot fly the first.', low=0.0, high=3600.0, unit='s')
-    locked_tasks: int = param(1, 'Tasks of a list that stay with a UAV in flight: the one being '
-                              'flown, and those after it.', low=0, high=1000)
+    locked_tasks: int = param(1, 'Tasks of a list that stay with a UAV in flight: the active '
+                              'one, and those after it.', low=0, high=1000)
     battery_reserve: float = param(0.2, 'Battery below which a UAV goes home and its tasks go to '
                                    'the others.', low=0.0, high=0.9)
-    position_jump: float = param(200.0, 'Between two reports: farther is told and planned for.',
-                                 low=1.0, high=1e7, unit='m')
+    position_jump: float = param(200.0, 'Distance between two reports above which the jump is '
+                                 'logged and replanned for.', low=1.0, high=1e7, unit='m')
     max_attempts: int = param(3, 'UAVs that may fail at a task before it is FAILED.', low=1,
                               high=1000)
-    keep_ended: int = param(10_000, 'Ended tasks that are remembered, the newest: who announces '
-                            'an older one again announces a new task.', low=0, high=1_000_000)
-    state_dir: str = param('', 'Folder of the journal; empty: nothing is kept.', fixed=True)
-    threads: int = param(1, 'Colonies of bees, each on a core of its own.', low=1, high=64)
+    keep_ended: int = param(10_000, 'Ended tasks that are kept, the newest; an older one that is '
+                            'announced again is a new task.', low=0, high=1_000_000)
+    state_dir: str = param('', 'Folder of the journal; empty: nothing is stored.', fixed=True)
+    threads: int = param(1, 'Colonies of bees, each in its own thread.', low=1, high=64)
     seed: int = param(0, 'Seed of the bees.', low=0, high=2**31 - 1, fixed=True)
 
     def __post_init__(self) -> None:
-        Framed.__post_init__(self)
+        FrameParams.__post_init__(self)
         if self.altitude_min >= self.altitude_max:
             raise InvalidValue('altitude_min', self.altitude_min,
                                f'less than altitude_max = {self.altitude_max:g}')
 
 
 @dataclass(frozen=True)
-class BridgeParams(Framed):
+class BridgeParams(FrameParams):
     """mavlink_bridge: flies the task lists on ArduPilot and PX4 and reports progress."""
 
     connections: tuple[str, ...] = param(
         ('udpin:0.0.0.0:14550',), 'udpin:HOST:PORT, udpout:HOST:PORT, tcp:HOST:PORT or '
         '/dev/tty...:BAUD each.', fixed=True)
-    system_ids: tuple[int, ...] = param((), 'Systems to bridge; empty: all that are heard.',
+    system_ids: tuple[int, ...] = param((), 'Systems to bridge; empty: all that send heartbeats.',
                                         fixed=True)
     uav_id_pattern: str = param('uav_{sysid}', 'The uav_id of a system.', fixed=True)
-    autopilot: str = param('auto', 'What flies; auto: as the heartbeat says.',
+    autopilot: str = param('auto', 'Type of the autopilot; auto: from its heartbeat.',
                            choices=('auto', 'ardupilot', 'px4', 'generic'), fixed=True)
     cruise_altitude: float = param(50.0, 'Height above home to take off to.', low=1.0,
                                    high=5000.0, unit='m')
-    acceptance_radius: float = param(0.0, 'Of a task that does not tell its own; 0: 2 m on '
+    acceptance_radius: float = param(0.0, 'Of a task that has none of its own; 0: 2 m on '
                                      'PX4 copters, else the autopilot decides.',
                                      low=0.0, high=1000.0, unit='m')
-    takeoff: bool = param(False, 'Arm and take off by itself.')
+    takeoff: bool = param(False, 'Arm and take off automatically.')
     signing_key_file: str = param('', 'File with the signing key; empty: unsigned.', fixed=True)
     system_id: int = param(245, 'MAVLink system id of the bridge; not that of the ground '
-                           'station of a human.', low=1, high=255, fixed=True)
+                           'station of a pilot.', low=1, high=255, fixed=True)
     component_id: int = param(190, 'MAVLink component id of the bridge.', low=1, high=255,
                               fixed=True)
     when_empty: str = param('hold', 'What a UAV in flight does with an empty list.',
                             choices=('hold', 'return'))
-    when_foreign: str = param('yield', 'What to do about a mission that somebody else put on '
-                              'board: leave it, or put ours back.',
+    when_foreign: str = param('yield', 'What to do about a mission that another ground station '
+                              'uploaded: leave it, or upload ours again.',
                               choices=('yield', 'reassert'))
     relaunch: str = param('operator', 'Who starts a UAV again after a landing at the end of its '
                           'list or on a low battery: the operator by `~/hand_over`, or the bridge '
-                          'by itself.', choices=('operator', 'automatic'))
-    state_dir: str = param('', 'Folder that keeps over a restart who has each aircraft; empty: '
-                           'nothing is kept.', fixed=True)
+                          'automatically.', choices=('operator', 'automatic'))
+    state_dir: str = param('', 'Folder that stores across restarts who controls each aircraft; '
+                           'empty: nothing is stored.', fixed=True)
     capabilities: tuple[str, ...] = param(
         (), 'What UAVs can do, `uav_1:camera,thermal` each.', fixed=True)
     full_range: float = param(0.0, 'Range of a full battery; 0: unknown, range_remaining is NaN.',
-                              low=0.0, high=MOST_RANGE, unit='m')
+                              low=0.0, high=MAX_RANGE, unit='m')
     full_ranges: tuple[str, ...] = param(
-        (), 'The same of single UAVs, where full_range is not theirs, `uav_1:6000` each.',
+        (), 'The same for single UAVs that differ from full_range, `uav_1:6000` each.',
         fixed=True)
-    state_rate: float = param(10.0, 'States of one UAV published at most.', low=0.5, high=100.0,
+    state_rate: float = param(10.0, 'Maximum rate of the states of one UAV.', low=0.5, high=100.0,
                               unit='Hz')
     tlog: str = param('', 'File to record all frames into, as .tlog; empty: none.', fixed=True)
 
 
 @dataclass(frozen=True)
-class FleetSimParams(Checked):
+class FleetSimParams(CheckedParams):
     """fleet_sim: simulated ArduPilot and PX4 vehicles that speak MAVLink over UDP."""
 
     scenario: str = param('', 'Scenario file with the origin and the UAVs.', fixed=True)
@@ -187,25 +208,25 @@ class FleetSimParams(Checked):
     target: str = param('127.0.0.1:14550', 'HOST:PORT of the bridge, UDP.', fixed=True)
     log_file: str = param('', 'File for the ground truth, a JSON object a line; empty: none.',
                           fixed=True)
-    arming_delay: float = param(-1.0, 'Time from boot to a position estimate; negative: as the '
-                                'real autopilots have it.', low=-1.0, high=3600.0, unit='s',
+    arming_delay: float = param(-1.0, 'Time from boot to a position estimate; negative: that of '
+                                'the real autopilots.', low=-1.0, high=3600.0, unit='s',
                                 fixed=True)
 
 
 @dataclass(frozen=True)
-class PlayerParams(Checked):
+class PlayerParams(CheckedParams):
     """scenario_player: announces the tasks and zones of a scenario file at their times."""
 
     scenario: str = param('', 'Scenario file to play.', fixed=True)
     speedup: float = param(1.0, 'How many times faster than real time.', low=0.1, high=100.0,
                            fixed=True)
-    wait_for_plan: bool = param(False, 'Begin only when an allocator has made a first plan: it is '
-                                'compiled, and UAVs are there.', fixed=True)
+    wait_for_plan: bool = param(False, 'Start when an allocator has published a first plan: its '
+                                'kernels are compiled, and UAVs report.', fixed=True)
 
 
 @dataclass(frozen=True)
-class LiveViewParams(Checked):
-    """live_view: shows a fleet in the terminal and the browser, records it, ends with it."""
+class LiveViewParams(CheckedParams):
+    """live_view: shows a fleet in the terminal and the browser, and records it."""
 
     scenario: str = param('', 'Scenario that is played; empty: unknown, and no end.', fixed=True)
     speedup: float = param(1.0, 'How many times faster than real time.', low=0.1, high=100.0,
@@ -213,17 +234,17 @@ class LiveViewParams(Checked):
     out_dir: str = param('', 'Folder to record into; empty: nothing is recorded.', fixed=True)
     record: str = param('', 'MCAP file for every topic of the fleet, also as `--record FILE`; '
                         'empty: none.', fixed=True)
-    settle: float = param(10.0, 'Quiet time of the scenario after which a fleet is done.',
+    settle: float = param(10.0, 'Quiet time after the end of the scenario before the node exits.',
                           low=0.0, high=3600.0, unit='s', fixed=True)
-    stay: bool = param(False, 'Whether it stays when a scenario is over.', fixed=True)
-    page: bool = param(True, 'Whether there is a page in the browser.', fixed=True)
+    stay: bool = param(False, 'Keep running when the scenario is over.', fixed=True)
+    page: bool = param(True, 'Serve a page for the browser.', fixed=True)
     host: str = param('127.0.0.1', 'Address the page is served on; 0.0.0.0: to the whole network, '
                       'without password.', fixed=True)
-    port: int = param(8088, 'Port of the page; 0: any free one, told at the start.', low=0,
+    port: int = param(8088, 'Port of the page; 0: any free one, logged at the start.', low=0,
                       high=65535, fixed=True)
 
 
-NODES: dict[str, type[Checked]] = {
+NODES: dict[str, type[CheckedParams]] = {
     'allocator': AllocatorParams, 'mavlink_bridge': BridgeParams, 'fleet_sim': FleetSimParams,
     'scenario_player': PlayerParams, 'live_view': LiveViewParams,
 }
@@ -238,8 +259,8 @@ def _literal(value: Any) -> str:
 
 
 def yaml_text(node: str) -> str:
-    """The parameter file of one node with its defaults, a comment each."""
-    lines = [f'# Made by `python -m uav_task_alloc params --write`: the defaults of {node}.',
+    """The parameter file of a node with its defaults, a comment for each parameter."""
+    lines = [f'# Generated by `python -m uav_task_alloc params --write`: the defaults of {node}.',
              f'/**/{node}:', '  ros__parameters:']
     for spec in fields(NODES[node]):  # type: ignore[arg-type]
         lines.append(f'    # {spec.metadata["text"]} {expectation(spec)}')
@@ -250,8 +271,8 @@ def yaml_text(node: str) -> str:
 
 
 def markdown_text() -> str:
-    """docs/parameters.md: one table a node."""
-    parts = ['# Parameters\n\nMade by `python -m uav_task_alloc params --write` from '
+    """The text of docs/parameters.md: one table for each node."""
+    parts = ['# Parameters\n\nGenerated by `python -m uav_task_alloc params --write` from '
              '`uav_task_alloc/params.py`. Those marked * are read at the start only.\n']
     for node, kind in NODES.items():
         parts.append(f'\n## {node}\n\n{(kind.__doc__ or "").split(":", 1)[1].strip()}\n\n'

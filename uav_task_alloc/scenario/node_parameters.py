@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from uav_task_alloc.errors import InvalidValue
-from uav_task_alloc.params import MOST_RANGE, BridgeParams, PlayerParams
+from uav_task_alloc.params import MAX_RANGE, BridgeParams, PlayerParams
 from uav_task_alloc.scenario.values import Scenario, ScenarioUav
 
 Value = bool | int | float | str | list[str] | list[int]
@@ -91,7 +91,7 @@ def _patterns(uav: ScenarioUav) -> set[str]:
 
 def _range(uav: ScenarioUav) -> float:
     """What it can fly with a full battery [m], as a parameter can hold it."""
-    return min(uav.range, MOST_RANGE)
+    return min(uav.range, MAX_RANGE)
 
 
 def _words(uav: ScenarioUav) -> str:

@@ -10,7 +10,7 @@ from uav_task_alloc.geometry.frames import Origin
 from uav_task_alloc.mavlink.gcs.ground_station import GcsConfig
 from uav_task_alloc.mavlink.gcs.policy import Policy
 from uav_task_alloc.model import ThreatZone, check_number, check_ros_name
-from uav_task_alloc.params import MOST_RANGE, BridgeParams
+from uav_task_alloc.params import MAX_RANGE, BridgeParams
 
 
 def to_policy(params: BridgeParams, zones: tuple[ThreatZone, ...] = (),
@@ -78,8 +78,8 @@ def to_full_ranges(entries: Iterable[str]) -> dict[str, float]:
             value = float(number)
         except ValueError:
             value = math.nan
-        if not (uav_id and 0.0 <= value <= MOST_RANGE) or uav_id in ranges:
+        if not (uav_id and 0.0 <= value <= MAX_RANGE) or uav_id in ranges:
             raise InvalidValue('full_ranges', entry,
-                               f'`UAV_ID:METRES` with metres in [0, {MOST_RANGE:g}], a UAV once')
+                               f'`UAV_ID:METRES` with metres in [0, {MAX_RANGE:g}], a UAV once')
         ranges[uav_id] = value
     return ranges

@@ -18,7 +18,7 @@ from rclpy.parameter import Parameter
 from uav_task_alloc import params
 from uav_task_alloc.errors import InvalidValue
 
-_Params = TypeVar('_Params', bound=params.Checked)
+_Params = TypeVar('_Params', bound=params.CheckedParams)
 _BIG = 1.7e308  # a ROS range has no infinity
 
 
@@ -51,7 +51,7 @@ def declare(node: Node, kind: type[_Params]) -> LiveParameters[_Params]:
     return live
 
 
-def _specs(kind: type[params.Checked]) -> tuple[Field[Any], ...]:
+def _specs(kind: type[params.CheckedParams]) -> tuple[Field[Any], ...]:
     return fields(kind)  # type: ignore[arg-type]  # every subclass is a dataclass
 
 
