@@ -93,7 +93,7 @@ def test_each_mode_that_the_bridge_commands_has_the_class_of_its_function(profil
 
 
 def test_the_docs_contain_the_generated_table():
-    section = DOCS.read_text('utf-8').split('## Who has the aircraft\n')[1].split('\n## ')[0]
+    section = DOCS.read_text('utf-8').split('## Authority\n')[1].split('\n## ')[0]
     rows = [line for line in section.splitlines() if line.startswith('|')]
     expected = [line for line in table_text().splitlines() if line]
     assert rows == expected, 'paste authority.table_text() into docs/mavlink.md'

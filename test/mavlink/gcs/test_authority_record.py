@@ -83,7 +83,7 @@ def test_without_a_record_the_authority_is_unknown_until_it_reports_its_position
     bench.run(limit=20.0)
     status = bench.state()
     assert status.authority.name == 'UNKNOWN'
-    assert status.reason == 'not known yet who has it'
+    assert status.reason == 'its authority is not known yet'
     assert {action for _, action, _ in bench.sent[start:]} <= {'read'}
 
 

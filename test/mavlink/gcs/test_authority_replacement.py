@@ -169,8 +169,8 @@ def test_held_for_30_seconds_with_a_zone_on_the_return_path_it_stays_with_an_ala
     bench.run(limit=60.0)
     assert COPTER.rtl not in bench.modes(start)
     assert bench.vehicles[1].flight.custom_mode == COPTER.hold
-    assert bench.state().reason == ('held for an upload that does not end, and zone Z1 is on its '
-                                    'path home: stays')
+    assert bench.state().reason == ('held for an upload that does not end, and zone Z1 is across '
+                                    'its path home: stays')
     assert not bench.state().available
     bench.line.tampers.clear()
     assert bench.run(lambda: bench.completed() == list(NEW), 400.0)

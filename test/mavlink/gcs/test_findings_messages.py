@@ -9,7 +9,7 @@ from link_bench import heartbeat, receive
 from mission_bench import task_list
 from pymavlink.dialects.v20 import ardupilotmega as d
 
-from uav_task_alloc.mavlink.gcs.status import facts_of
+from uav_task_alloc.mavlink.gcs.vehicle_diagnostics import diagnostics_of
 from uav_task_alloc.mavlink.mission.download import DownloadState
 from uav_task_alloc.mavlink.mission.items import Item, MissionStop, TaskList, all_alike
 from uav_task_alloc.model import Task
@@ -119,7 +119,7 @@ def test_finding_10_a_vehicle_that_cannot_be_served_is_not_available_while_that_
     else:
         bench.assign(task_list('AB'), 1)
     assert "KeyError: 'x'" in bench.state(1).reason
-    assert facts_of(bench.ground_station.sessions[1], bench.now)[0] == 2
+    assert diagnostics_of(bench.ground_station.sessions[1], bench.now).level == 2
     assert [note.level for note in bench.ground_station.refusals.notes] == ['error']
     monkeypatch.setattr(bench.executor(1), what, good)
     bench.assign(task_list('AB'), 2)

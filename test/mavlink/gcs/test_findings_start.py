@@ -18,7 +18,7 @@ from mission_bench import task_list
 from pymavlink.dialects.v20 import ardupilotmega as d
 
 from uav_task_alloc.mavlink.gcs.onboard_mission import MissionState
-from uav_task_alloc.mavlink.gcs.status import facts_of
+from uav_task_alloc.mavlink.gcs.vehicle_diagnostics import diagnostics_of
 
 REAL = {'arming_delay': None, 'boot_delay': None, 'settling_time': None}  # as the real ones boot
 FLOOD = 'Auto mission changed, restarted command'
@@ -31,7 +31,7 @@ def powered_on(kind, **kwargs):
 
 def line_of(bench):
     """The status line of the diagnostics."""
-    return facts_of(bench.ground_station.sessions[1], bench.now)[1]
+    return diagnostics_of(bench.ground_station.sessions[1], bench.now).summary
 
 
 # 9: unlimited retries
@@ -48,7 +48,8 @@ def test_finding_09_after_many_failures_it_is_not_available_and_retries(kind):
     assert bench.run(lambda: bench.state().mission_state is not MissionState.UPLOADING, 60.0)
     state = MissionState.MIXED if kind == 'ardupilot' else MissionState.UNKNOWN
     assert bench.state().mission_state is state
-    assert bench.state().reason == f'what is tried fails again and again: mission {state.name}'
+    assert bench.state().reason == (
+        f'its commands or uploads fail repeatedly: mission {state.name}')
     tries = len(bench.line.sent('MISSION_COUNT'))
     bench.run(limit=200.0)
     assert 0 < len(bench.line.sent('MISSION_COUNT')) - tries <= 20

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What is told of a vehicle, and when."""
+"""The published status of a vehicle, and when it is published."""
 import dataclasses
 
 import pytest
@@ -7,20 +7,21 @@ from flight_bench import FlightBench, flying
 from mission_bench import task_list
 
 from uav_task_alloc.mavlink.gcs.onboard_mission import MissionState
-from uav_task_alloc.mavlink.gcs.status import PublishedStates, UavMode, facts_of
+from uav_task_alloc.mavlink.gcs.status import PublishedStates, UavMode
+from uav_task_alloc.mavlink.gcs.vehicle_diagnostics import diagnostics_of
 
 BOTH = pytest.mark.parametrize('kind', ['ardupilot', 'px4'])
 
 
 def watch(bench, seconds):
-    """What is told within some time, as (available, position, mission state, active task)."""
-    told, out = PublishedStates(), []
+    """The statuses published within some time."""
+    published, out = PublishedStates(), []
 
-    def look():
+    def check():
         status = bench.state()
-        if told.is_due(status, bench.executor().telemetry.position_at, bench.now, 10.0):
+        if published.is_due(status, bench.executor().telemetry.position_at, bench.now, 10.0):
             out.append(status)
-    bench.run(look, seconds)
+    bench.run(check, seconds)
     return out
 
 
@@ -43,35 +44,35 @@ def test_a_task_withdrawn_is_not_active_while_the_vehicle_holds(kind):
 
 
 @BOTH
-def test_a_silent_vehicle_is_told_of_once_as_unavailable_and_then_no_more(kind):
+def test_a_silent_vehicle_is_published_once_as_unavailable_and_then_no_more(kind):
     bench = flying(kind, 'ABC')
-    told = PublishedStates()
-    assert told.is_due(bench.state(), bench.executor().telemetry.position_at, bench.now, 10.0)
+    published = PublishedStates()
+    assert published.is_due(bench.state(), bench.executor().telemetry.position_at, bench.now, 10.0)
     bench.line.cut = True
     bench.assign(task_list('CB', 2))  # an upload, which will fail
     seen = bench.executor().telemetry.position_at
-    news = []
+    statuses = []
 
-    def look():
-        if bench.now - seen > 3.1 and told.is_due(
+    def check():
+        if bench.now - seen > 3.1 and published.is_due(
                 bench.state(), bench.executor().telemetry.position_at, bench.now, 10.0):
-            news.append(bench.state())
-    bench.run(look, 60.0)
-    assert [status.available for status in news] == [False]
+            statuses.append(bench.state())
+    bench.run(check, 60.0)
+    assert [status.available for status in statuses] == [False]
     assert bench.onboard().state is not MissionState.UPLOADING  # it has failed meanwhile
     bench.line.cut = False
-    assert bench.run(lambda: look() or news[-1].available, 10.0)
+    assert bench.run(lambda: check() or statuses[-1].available, 10.0)
 
 
-def test_positions_are_told_at_most_at_the_rate_and_changes_at_once():
+def test_positions_are_published_at_most_at_the_rate_and_changes_at_once():
     bench = FlightBench('px4', takeoff=False).discover()
     bench.run(limit=5.0)
-    told, status = PublishedStates(), bench.state()
-    assert told.is_due(status, 10.0, 10.0, 5.0)
-    assert not told.is_due(status, 10.1, 10.1, 5.0)
-    assert told.is_due(dataclasses.replace(status, list_revision=7), 10.1, 10.1, 5.0)
-    assert not told.is_due(dataclasses.replace(status, list_revision=7), 10.2, 10.2, 5.0)
-    assert told.is_due(dataclasses.replace(status, list_revision=7), 10.4, 10.4, 5.0)
+    published, status = PublishedStates(), bench.state()
+    assert published.is_due(status, 10.0, 10.0, 5.0)
+    assert not published.is_due(status, 10.1, 10.1, 5.0)
+    assert published.is_due(dataclasses.replace(status, list_revision=7), 10.1, 10.1, 5.0)
+    assert not published.is_due(dataclasses.replace(status, list_revision=7), 10.2, 10.2, 5.0)
+    assert published.is_due(dataclasses.replace(status, list_revision=7), 10.4, 10.4, 5.0)
 
 
 @BOTH
@@ -79,33 +80,35 @@ def test_a_link_is_stale_after_three_seconds_lost_after_ten_and_back(kind):
     bench = flying(kind, 'ABC')
     levels = []
 
-    def look():
-        level, line, _ = facts_of(bench.ground_station.sessions[1], bench.now)
-        if not levels or levels[-1] != (level, line.partition(',')[0]):
-            levels.append((level, line.partition(',')[0]))
-    bench.run(look, 1.0)
+    def check():
+        now = diagnostics_of(bench.ground_station.sessions[1], bench.now)
+        level = now.level, now.summary.partition(',')[0]
+        if not levels or levels[-1] != level:
+            levels.append(level)
+    bench.run(check, 1.0)
     bench.line.cut = True
-    bench.run(look, 11.0)
+    bench.run(check, 11.0)
     bench.line.cut = False
-    bench.run(look, 3.0)
+    bench.run(check, 3.0)
     assert levels == [(0, 'mission VERIFIED'), (1, 'link stale'), (3, 'link lost'),
                       (0, 'mission VERIFIED')]
 
 
 @BOTH
-def test_an_upload_tells_how_far_it_is_and_about_when_it_ends(kind):
+def test_an_upload_reports_its_progress_and_remaining_time(kind):
     bench = FlightBench(kind, takeoff=False, delay=(0.1, 0.1), tick=0.05).discover()
     assert bench.run(lambda: bench.onboard().held is not None)
     bench.assign(task_list('ABCDEFGHIJKLMNOPQRST'))
     seen = []
 
-    def look():
-        _, line, facts = facts_of(bench.ground_station.sessions[1], bench.now)
-        assert facts['upload'] == 'none' or facts['upload'] in line
-        if not seen or seen[-1][1] != facts['upload']:
-            seen.append((bench.now, facts['upload']))
+    def check():
+        now = diagnostics_of(bench.ground_station.sessions[1], bench.now)
+        upload = now.facts.upload
+        assert upload == 'none' or upload in now.summary
+        if not seen or seen[-1][1] != upload:
+            seen.append((bench.now, upload))
         return bench.state().mission_state is MissionState.VERIFIED
-    assert bench.run(look)
+    assert bench.run(check)
     count = 20 + bench.onboard().own
     steps = [text.partition(',')[0] for _, text in seen]
     assert steps[-1] == 'none'

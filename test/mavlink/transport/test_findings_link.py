@@ -344,12 +344,12 @@ def test_finding_24_a_simulated_vehicle_sends_to_its_target_and_the_latest_stati
     fleet = UdpFleet([(VehicleConfig('uav_1', 1, ORIGIN, (0.0, 0.0, 0.0)), 'px4')],
                   ('127.0.0.1', 9))
     to = ('127.0.0.1', fleet.ports['uav_1'])
-    vehicle = fleet._stations['uav_1']
+    endpoint = fleet._endpoints['uav_1']
     for _ in range(100):
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
             sender.bind(('127.0.0.1', 0))
             sender.sendto(b'x', to)
-            vehicle.hear(0.0)
+            endpoint.receive(0.0)
     fleet.close()
-    assert len(vehicle._parsers) == 17
-    assert ('127.0.0.1', 9) in vehicle._parsers
+    assert len(endpoint._parsers) == 17
+    assert ('127.0.0.1', 9) in endpoint._parsers

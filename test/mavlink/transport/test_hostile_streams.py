@@ -13,8 +13,9 @@ from pymavlink.dialects.v20 import ardupilotmega as d
 
 from uav_task_alloc.mavlink.gcs.ground_station import GcsConfig, GroundStation
 from uav_task_alloc.mavlink.gcs.policy import Policy
-from uav_task_alloc.mavlink.gcs.status import PublishedStates, facts_of, state_of
+from uav_task_alloc.mavlink.gcs.status import PublishedStates, state_of
 from uav_task_alloc.mavlink.gcs.telemetry import WANTED
+from uav_task_alloc.mavlink.gcs.vehicle_diagnostics import diagnostics_of
 from uav_task_alloc.mavlink.mission.items import MissionStop, TaskList
 from uav_task_alloc.mavlink.transport.codec import Codec, make_signing
 from uav_task_alloc.mavlink.transport.connections import Connections
@@ -86,7 +87,7 @@ class Bridge:
         for session in self.ground_station.sessions.values():
             status = state_of(session, self.now, 20_000.0)
             self.published.is_due(status, session.executor.telemetry.position_at, self.now, 5.0)
-            facts_of(session, self.now)
+            diagnostics_of(session, self.now)
             self.states |= {status.mission_state.name, status.authority.name}
             session.executor.notes.clear()
             session.executor.events.clear()

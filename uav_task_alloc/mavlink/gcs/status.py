@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How a vehicle stands, for programs (`state_of`) and for people (`facts_of`)."""
+"""The status of one vehicle, as published in UavState, and when it is published."""
 from __future__ import annotations
 
 import math
@@ -9,7 +9,7 @@ from enum import Enum
 from pymavlink.dialects.v20 import ardupilotmega as d
 
 from uav_task_alloc.mavlink.autopilots import ModeFunction
-from uav_task_alloc.mavlink.gcs.authority import AuthorityState, Suspension
+from uav_task_alloc.mavlink.gcs.authority import AuthorityState
 from uav_task_alloc.mavlink.gcs.ground_station import VehicleSession
 from uav_task_alloc.mavlink.gcs.mission_executor import MissionExecutor
 from uav_task_alloc.mavlink.gcs.telemetry import STALE
@@ -18,7 +18,7 @@ from uav_task_alloc.model import Point
 
 
 class UavMode(Enum):
-    """What a vehicle does; numbers as in UavState."""
+    """Flight mode of a vehicle; numbers as in UavState."""
 
     UNKNOWN = 0
     STANDBY = 1
@@ -30,7 +30,7 @@ class UavMode(Enum):
     FAULT = 7
 
 
-_BY_FLIGHT = {
+_BY_MODE_FUNCTION = {
     ModeFunction.HOLD: UavMode.HOLD,
     ModeFunction.RETURN: UavMode.RETURNING,
     ModeFunction.LAND: UavMode.LANDING,
@@ -44,7 +44,7 @@ _BY_LANDED = {
 
 @dataclass(frozen=True, slots=True)
 class UavStatus:
-    """What UavState carries; NaN where unknown."""
+    """The fields of UavState; NaN where unknown."""
 
     uav_id: str
     position: Point  # [m] ENU
@@ -58,17 +58,17 @@ class UavStatus:
     active_task: str
     list_revision: int
     authority: AuthorityState
-    reason: str  # why it is not available; '': it is
+    reason: str  # why it is not available; '': it is available
 
     @property
-    def news(self) -> tuple[object, ...]:
-        """What is told at once when it changes, not at the next position."""
+    def urgent(self) -> tuple[object, ...]:
+        """The fields whose change is published at once, not with the next position."""
         return (self.available, self.mode, self.mission_state, self.active_task,
                 self.list_revision, self.authority, self.reason)
 
 
 def mode_of(executor: MissionExecutor) -> UavMode:
-    """The mode that people and the allocator understand."""
+    """The flight mode of a vehicle as published."""
     telemetry, progress = executor.telemetry, executor.onboard.progress
     if telemetry.faulty:
         return UavMode.FAULT
@@ -82,11 +82,11 @@ def mode_of(executor: MissionExecutor) -> UavMode:
         if returns or executor.going_home:
             return UavMode.RETURNING
         return UavMode.HOLD if progress.finished else UavMode.ON_MISSION
-    return _BY_FLIGHT.get(telemetry.mode, _BY_LANDED.get(telemetry.landed, UavMode.UNKNOWN))
+    return _BY_MODE_FUNCTION.get(telemetry.mode, _BY_LANDED.get(telemetry.landed, UavMode.UNKNOWN))
 
 
 def active_task(executor: MissionExecutor) -> str:
-    """The task whose leg or hold is being flown; one that waits must be on the list as well."""
+    """The task being flown or served; '': none. In HOLD or TAKEOFF it must be on the list too."""
     onboard, mode = executor.onboard, mode_of(executor)
     item = onboard.progress.active
     if onboard.tasks is None or item is None or item.task in onboard.progress.completed:
@@ -97,17 +97,17 @@ def active_task(executor: MissionExecutor) -> str:
 
 
 def why_not_available(executor: MissionExecutor, now: float) -> str:
-    """Why a UAV may not be given tasks, and what would change that; '' where it may."""
+    """Why a UAV is not available for tasks, and what would change that; '': it is available."""
     telemetry, authority = executor.telemetry, executor.authority
     if telemetry.stale(now):
         return 'its link is stale'
     if authority.undecided:
-        return 'not known yet who has it'
+        return 'its authority is not known yet'
     if authority.state in (AuthorityState.LOST, AuthorityState.SUSPENDED) or authority.landed:
         return (f'authority {authority.state.name}: {authority.why}; given back by '
                 f'{authority.given_back_by}')
     if mode_of(executor) is UavMode.FAULT:
-        return 'it says that it is in a critical state'
+        return 'it reports a critical state'
     if not telemetry.past_boot:
         return 'the autopilot is starting'
     if not telemetry.has_position:
@@ -115,12 +115,18 @@ def why_not_available(executor: MissionExecutor, now: float) -> str:
     if executor.alarm:
         return executor.alarm
     if executor.sender.failing:
-        return f'what is tried fails again and again: mission {executor.onboard.stored.name}'
+        return f'its commands or uploads fail repeatedly: mission {executor.onboard.stored.name}'
     return ''
 
 
 def state_of(session: VehicleSession, now: float, full_range: float = 0.0) -> UavStatus:
-    """All of it at one moment; `full_range` [m] of a full battery, 0: unknown."""
+    """The status of a vehicle.
+
+    Args:
+        session: the vehicle.
+        now: steady time [s].
+        full_range: [m] with a full battery; 0: unknown.
+    """
     executor = session.executor
     telemetry, onboard, mode = executor.telemetry, executor.onboard, mode_of(executor)
     reason = session.fault or why_not_available(executor, now)
@@ -133,67 +139,31 @@ def state_of(session: VehicleSession, now: float, full_range: float = 0.0) -> Ua
 
 
 class PublishedStates:
-    """What was told of each UAV last, and what is worth telling now."""
+    """The status of each UAV published last; decides when the next one is due."""
 
     def __init__(self) -> None:
-        self._told: dict[str, tuple[UavStatus, float]] = {}  # and the time of its position [s]
+        self._published: dict[str, tuple[UavStatus, float]] = {}  # and time of its position [s]
 
     def is_due(self, status: UavStatus, position_at: float, now: float, rate: float) -> bool:
-        """A new position, at most `rate` [Hz], or something that cannot wait; then it is told.
+        """Whether to publish a status, which then counts as published.
 
-        A UAV that is silent is told of once, as no longer available: whatever else happens to
-        it here would look like a sign of life.
+        A silent UAV is published once, as unavailable: a later message about it would look as
+        if it were connected.
+
+        Args:
+            status: the present one.
+            position_at: steady time [s] of its position; < 0: none was received.
+            now: steady time [s].
+            rate: [Hz] of positions; a change of `UavStatus.urgent` is due at once.
         """
         if position_at < 0.0:
             return False
-        before, when = self._told.get(status.uav_id, (None, -math.inf))
-        quiet = now - position_at > STALE
-        if quiet and (before is None or not before.available or status.available):
+        before, published_at = self._published.get(status.uav_id, (None, -math.inf))
+        silent = now - position_at > STALE
+        if silent and (before is None or not before.available or status.available):
             return False
-        urgent = before is None or before.news != status.news
-        if not urgent and position_at < when + 1.0 / rate:
+        urgent = before is None or before.urgent != status.urgent
+        if not urgent and position_at < published_at + 1.0 / rate:
             return False
-        self._told[status.uav_id] = status, position_at
+        self._published[status.uav_id] = status, position_at
         return True
-
-
-def facts_of(session: VehicleSession, now: float) -> tuple[int, str, dict[str, str]]:
-    """Level (0 ok, 1 warning, 2 error, 3 stale), one line, and details."""
-    executor = session.executor
-    telemetry, onboard = executor.telemetry, executor.onboard
-    state = onboard.state
-    link = executor.authority.suspended_by(Suspension.LINK)
-    if telemetry.lost(now) or (link and executor.watch.was_lost):
-        level, line = 3, 'link lost'
-    elif telemetry.stale(now) or link:
-        level, line = 1, 'link stale'
-    elif session.fault:
-        level, line = 2, session.fault
-    elif mode_of(executor) is UavMode.FAULT or state is MissionState.MIXED:
-        level, line = 2, f'mission {state.name}' if state is MissionState.MIXED else 'fault'
-    elif executor.alarm:
-        level, line = 2, executor.alarm
-    elif executor.authority.state in (AuthorityState.LOST, AuthorityState.SUSPENDED):
-        level, line = 1, f'authority {executor.authority.state.name}: {executor.authority.why}'
-    elif state is MissionState.FOREIGN:
-        level, line = 1, 'mission FOREIGN'
-    else:
-        level, line = 0, f'mission {state.name}'
-    progress = onboard.upload_progress(now)
-    if progress and level < 3:
-        line += f', {progress}'
-    if executor.sender.waits_for and level < 3:
-        line += f', waits for {executor.sender.waits_for}'
-    authority, reason = executor.authority, session.fault or why_not_available(executor, now)
-    return level, line, {
-        'authority': AuthorityState.UNKNOWN.name if authority.undecided else authority.state.name,
-        'authority_why': authority.why, 'authority_for': f'{now - authority.since:.0f} s',
-        'given_back_by': authority.given_back_by or 'nothing is needed',
-        'not_available': reason or 'it is available',
-        'autopilot': executor.profile.name, 'address': str(session.address),
-        'mode': mode_of(executor).name, 'mission': state.name,
-        'list_revision': str(onboard.revision), 'epoch': str(onboard.progress.epoch),
-        'item': f'{onboard.progress.current} of {len(onboard.progress.items)}',
-        'upload': progress or 'none', 'uploads': str(onboard.upload.uploads),
-        'restarts': str(telemetry.restarts),
-        'silent_for': f'{now - telemetry.received_at:.1f} s', 'strays': str(session.strays)}

@@ -1,0 +1,95 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Diagnostics of one vehicle for operators: a level, a summary, and named facts."""
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from uav_task_alloc.mavlink.gcs.authority import AuthorityState, Suspension
+from uav_task_alloc.mavlink.gcs.ground_station import VehicleSession
+from uav_task_alloc.mavlink.gcs.status import UavMode, mode_of, why_not_available
+from uav_task_alloc.mavlink.mission.verified_mission import MissionState
+
+_OK, _WARN, _ERROR, _STALE = range(4)  # as in DiagnosticStatus
+
+
+@dataclass(frozen=True, slots=True)
+class VehicleFacts:
+    """Details of a vehicle; the field names are the keys in /diagnostics."""
+
+    authority: str
+    authority_why: str
+    authority_for: str  # time since its last change
+    given_back_by: str
+    not_available: str
+    autopilot: str
+    address: str
+    mode: str
+    mission: str
+    list_revision: int
+    epoch: int
+    item: str  # current item and number of items
+    upload: str
+    uploads: int  # number of uploads
+    restarts: int  # number of restarts of the vehicle
+    silent_for: str  # time since its last message
+    strays: int  # number of frames from other addresses
+
+
+@dataclass(frozen=True, slots=True)
+class VehicleDiagnostics:
+    """One row of /diagnostics."""
+
+    level: int  # as in DiagnosticStatus: 0 ok, 1 warning, 2 error, 3 stale
+    summary: str  # on one line
+    facts: VehicleFacts
+
+
+def diagnostics_of(session: VehicleSession, now: float) -> VehicleDiagnostics:
+    """The diagnostics of a vehicle; `now` is the steady time [s]."""
+    level, summary = _level_of(session, now)
+    progress = session.executor.onboard.upload_progress(now)
+    waits_for = session.executor.sender.waits_for
+    if level < _STALE:
+        summary += f', {progress}' if progress else ''
+        summary += f', waits for {waits_for}' if waits_for else ''
+    return VehicleDiagnostics(level, summary, _facts_of(session, now))
+
+
+def _level_of(session: VehicleSession, now: float) -> tuple[int, str]:
+    executor, telemetry = session.executor, session.executor.telemetry
+    authority, state = executor.authority, executor.onboard.state
+    link = authority.suspended_by(Suspension.LINK)
+    if telemetry.lost(now) or (link and executor.watch.was_lost):
+        return _STALE, 'link lost'
+    if telemetry.stale(now) or link:
+        return _WARN, 'link stale'
+    if session.fault:
+        return _ERROR, session.fault
+    if state is MissionState.MIXED:
+        return _ERROR, f'mission {state.name}'
+    if mode_of(executor) is UavMode.FAULT:
+        return _ERROR, 'fault'
+    if executor.alarm:
+        return _ERROR, executor.alarm
+    if authority.state in (AuthorityState.LOST, AuthorityState.SUSPENDED):
+        return _WARN, f'authority {authority.state.name}: {authority.why}'
+    return _WARN if state is MissionState.FOREIGN else _OK, f'mission {state.name}'
+
+
+def _facts_of(session: VehicleSession, now: float) -> VehicleFacts:
+    executor = session.executor
+    authority, onboard, telemetry = executor.authority, executor.onboard, executor.telemetry
+    owner = AuthorityState.UNKNOWN if authority.undecided else authority.state
+    reason = session.fault or why_not_available(executor, now)
+    return VehicleFacts(
+        authority=owner.name, authority_why=authority.why,
+        authority_for=f'{now - authority.since:.0f} s',
+        given_back_by=authority.given_back_by or 'nothing is needed',
+        not_available=reason or 'it is available',
+        autopilot=executor.profile.name, address=str(session.address),
+        mode=mode_of(executor).name, mission=onboard.state.name,
+        list_revision=onboard.revision, epoch=onboard.progress.epoch,
+        item=f'{onboard.progress.current} of {len(onboard.progress.items)}',
+        upload=onboard.upload_progress(now) or 'none', uploads=onboard.upload.uploads,
+        restarts=telemetry.restarts, silent_for=f'{now - telemetry.received_at:.1f} s',
+        strays=session.strays)
