@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What is allocated, to whom, around what, and the answer: frozen values, SI units, ENU."""
+"""Tasks, UAVs, threat zones, routes and plans: frozen, checked values in SI units and ENU."""
 from __future__ import annotations
 
 import math
@@ -13,12 +13,23 @@ from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.geometry.polygon import is_simple, signed_area
 
 Point = tuple[float, float, float]  # [m] ENU
-FAR = 1e8  # [m] no coordinate is beyond
+FAR = 1e8  # [m] bound of all coordinates
 _ROS_NAME = re.compile(r'[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*')
 
 
 def check_point(place: str, value: Iterable[float]) -> Point:
-    """Three coordinates [m] as floats, none beyond FAR; raise InvalidValue otherwise."""
+    """Check three coordinates.
+
+    Args:
+        place: name of the value in the error text.
+        value: [m] ENU.
+
+    Returns:
+        Three floats.
+
+    Raises:
+        InvalidValue: it has not three coordinates, or one is not finite or beyond FAR.
+    """
     try:
         x, y, z = (float(v) for v in value)
     except (TypeError, ValueError):
@@ -32,7 +43,21 @@ def check_point(place: str, value: Iterable[float]) -> Point:
 
 def check_number(place: str, value: float, low: float, high: float = math.inf,
                  open_low: bool = False) -> float:
-    """A number in [low, high], or (low, high] where open_low; raise InvalidValue otherwise."""
+    """Check that a number is in [low, high], or in (low, high].
+
+    Args:
+        place: name of the value in the error text.
+        value: the number.
+        low: lower bound.
+        high: upper bound, inclusive.
+        open_low: the lower bound is exclusive.
+
+    Returns:
+        The number as a float.
+
+    Raises:
+        InvalidValue: it is outside, NaN or not a number.
+    """
     interval = f'{"(" if open_low else "["}{low:g}, {high:g}]'
     if isinstance(value, bool) or (not isinstance(value, (int, float)) and not hasattr(
             value, '__float__')):
@@ -50,26 +75,26 @@ def check_count(place: str, many: Sized, most: int) -> None:
 
 
 def check_id(place: str, value: object) -> str:
-    """A non-empty string; raise InvalidValue otherwise."""
+    """The value if it is a non-empty string; raise InvalidValue otherwise."""
     if not isinstance(value, str) or not value.strip():
         raise InvalidValue(place, value, 'a non-empty string')
     return value
 
 
 def check_ros_name(place: str, value: str) -> str:
-    """A string that can be part of a topic's name; raise InvalidValue otherwise."""
+    """The value if it can be part of a topic name; raise InvalidValue otherwise."""
     if not is_ros_name(value):
         raise InvalidValue(place, value, 'a ROS name (letters, digits, _ and /; no digit first)')
     return value
 
 
 def is_ros_name(value: str) -> bool:
-    """Tokens of letters, digits and single _ that begin with no digit, joined by /."""
+    """Whether a string is tokens of letters, digits and single _, no digit first, joined by /."""
     return len(value) <= 200 and '__' not in value and _ROS_NAME.fullmatch(value) is not None
 
 
 def check_names(place: str, value: Iterable[str]) -> frozenset[str]:
-    """A set of strings; a bare string is refused, as it would fall into letters."""
+    """The value as a set of strings; raise InvalidValue for others, also for a bare string."""
     if isinstance(value, str) or not isinstance(value, Iterable) or not all(
             isinstance(v, str) and v.strip() for v in value):
         raise InvalidValue(place, value, 'a set of non-empty strings')
@@ -78,15 +103,28 @@ def check_names(place: str, value: Iterable[str]) -> frozenset[str]:
 
 @dataclass(frozen=True, slots=True)
 class Task:
-    """A place that one UAV visits once. Raises InvalidValue."""
+    """A position that one UAV visits once.
+
+    Attributes:
+        id: unique.
+        position: [m] ENU.
+        value: > 0; the sum over the tasks served is R of eq 2.12.
+        service_time: [s] spent at the position.
+        required_capabilities: a UAV needs all of them.
+        allowed_uavs: ids of UAVs; None: any.
+        acceptance_radius: [m]; None: that of the parameters.
+
+    Raises:
+        InvalidValue: a value is out of range.
+    """
 
     id: str
     position: Point  # [m] ENU
-    value: float = 1.0  # > 0, what 2.12 calls R sums it
-    service_time: float = 0.0  # [s] spent there
+    value: float = 1.0
+    service_time: float = 0.0  # [s]
     required_capabilities: frozenset[str] = frozenset()
-    allowed_uavs: frozenset[str] | None = None  # None: any
-    acceptance_radius: float | None = None  # [m]; None: the parameter's
+    allowed_uavs: frozenset[str] | None = None
+    acceptance_radius: float | None = None  # [m]
 
     def __post_init__(self) -> None:
         check_id('task id', self.id)
@@ -109,14 +147,26 @@ class Task:
 
 @dataclass(frozen=True, slots=True)
 class Uav:
-    """A vehicle as the solver sees it at one moment. Raises InvalidValue."""
+    """A vehicle as the solver sees it at one moment.
+
+    Attributes:
+        id: unique.
+        position: [m] ENU, the present one.
+        range: [m] that it can still fly.
+        cruise_speed: [m/s].
+        capabilities: that tasks may require.
+        home: [m] ENU; None: its position.
+
+    Raises:
+        InvalidValue: a value is out of range.
+    """
 
     id: str
-    position: Point  # [m] ENU, where it is now
-    range: float = math.inf  # [m] it can still fly
+    position: Point  # [m] ENU
+    range: float = math.inf  # [m]
     cruise_speed: float = 15.0  # [m/s]
     capabilities: frozenset[str] = frozenset()
-    home: Point | None = None  # [m] ENU; None: its position
+    home: Point | None = None  # [m] ENU
 
     def __post_init__(self) -> None:
         check_id('uav id', self.id)
@@ -132,7 +182,7 @@ class Uav:
 
 
 class Shape(Enum):
-    """What a threat zone looks like."""
+    """The shape of a threat zone; the values are those of ThreatZone messages."""
 
     HEMISPHERE = 0
     CYLINDER = 1
@@ -141,10 +191,23 @@ class Shape(Enum):
 
 @dataclass(frozen=True, slots=True)
 class ThreatZone:
-    """A volume no route may enter; `margin` [m] is added all around it. Raises InvalidValue.
+    """A volume that no route may enter.
 
-    HEMISPHERE: the half z >= center z of a ball (eq 2.3). CYLINDER: upright, z_min..z_max [m].
-    POLYGON: the prism z_min..z_max over a simple polygon of `vertices` (x, y) [m].
+    HEMISPHERE: the half z >= center z of a ball (eq 2.3). CYLINDER: upright, z_min..z_max.
+    POLYGON: the prism z_min..z_max over a simple polygon.
+
+    Attributes:
+        id: unique.
+        shape: which of the other attributes count.
+        center: [m] ENU; of a CYLINDER x and y.
+        radius: [m], HEMISPHERE and CYLINDER.
+        z_min: [m], CYLINDER and POLYGON.
+        z_max: [m], CYLINDER and POLYGON.
+        vertices: (x, y) [m], POLYGON; empty for the others.
+        margin: [m], added all around.
+
+    Raises:
+        InvalidValue: a value is out of range, or the polygon is not simple.
     """
 
     id: str
@@ -153,7 +216,7 @@ class ThreatZone:
     radius: float = 0.0  # [m]
     z_min: float = -math.inf  # [m]
     z_max: float = math.inf  # [m]
-    vertices: tuple[tuple[float, float], ...] = ()  # [m], POLYGON only
+    vertices: tuple[tuple[float, float], ...] = ()  # [m]
     margin: float = 0.0  # [m]
 
     def __post_init__(self) -> None:
@@ -169,27 +232,27 @@ class ThreatZone:
                                              open_low=True))
         if self.shape is not Shape.HEMISPHERE and not self.z_min < self.z_max:
             raise InvalidValue(place + 'z_min, z_max', (self.z_min, self.z_max), 'z_min < z_max')
-        # other shapes have none: what a message carries there is never looked at
+        # of other shapes they are not checked: messages may carry anything there
         put(self, 'vertices', check_polygon(place + 'vertices', self.vertices)
             if self.shape is Shape.POLYGON else ())
 
     @classmethod
     def hemisphere(cls, id: str, center: Point, radius: float,
                    margin: float = 0.0) -> ThreatZone:
-        """A dome on the plane z = center z [m]."""
+        """A dome on the plane z = center z [m]. Raises InvalidValue."""
         return cls(id, Shape.HEMISPHERE, center, radius, margin=margin)
 
     @classmethod
     def cylinder(cls, id: str, center: Iterable[float], radius: float, z_min: float = -math.inf,
                  z_max: float = math.inf, margin: float = 0.0) -> ThreatZone:
-        """An upright cylinder around (x, y) of `center`, from z_min to z_max [m]."""
+        """An upright cylinder around x, y of `center`, z_min..z_max [m]. Raises InvalidValue."""
         x, y = tuple(center)[:2]
         return cls(id, Shape.CYLINDER, (x, y, 0.0), radius, z_min, z_max, margin=margin)
 
     @classmethod
     def polygon(cls, id: str, vertices: Iterable[Iterable[float]], z_min: float = -math.inf,
                 z_max: float = math.inf, margin: float = 0.0) -> ThreatZone:
-        """A prism over a simple polygon, given either way round [m]."""
+        """A prism over a simple polygon in either orientation [m]. Raises InvalidValue."""
         corners = tuple(tuple(v)[:2] for v in vertices)
         return cls(id, Shape.POLYGON, (0.0, 0.0, 0.0), 0.0, z_min, z_max,
                    corners, margin)  # type: ignore[arg-type]
@@ -197,7 +260,19 @@ class ThreatZone:
 
 def check_polygon(place: str, vertices: Iterable[Iterable[float]]) -> tuple[
         tuple[float, float], ...]:
-    """At least three corners [m], no two edges crossing or touching, some area."""
+    """Check the corners of a polygon.
+
+    Args:
+        place: name of the value in the error text.
+        vertices: (x, y) [m]; a last corner equal to the first is dropped.
+
+    Returns:
+        The corners as floats.
+
+    Raises:
+        InvalidValue: there are less than three, one is not finite or beyond FAR, edges cross or
+            touch, or there is no area.
+    """
     corners = []
     for corner in vertices:
         x, y = (float(v) for v in tuple(corner)[:2])
@@ -219,7 +294,7 @@ def check_polygon(place: str, vertices: Iterable[Iterable[float]]) -> tuple[
 
 @dataclass(frozen=True, slots=True)
 class Leg:
-    """One flight from a stop to the next: detour points and the length of that polyline."""
+    """A flight from one stop to the next: its detour points, and the length of the polyline."""
 
     via: tuple[Point, ...]  # [m] ENU, without both ends
     length: float  # [m]
@@ -227,7 +302,7 @@ class Leg:
 
 @dataclass(frozen=True, slots=True)
 class Route:
-    """What one UAV flies: task ids in order, a leg before each, and the way home where asked."""
+    """The flight of one UAV: task ids in order, and the legs between them and perhaps home."""
 
     uav: str
     tasks: tuple[str, ...] = ()
@@ -242,17 +317,34 @@ class Route:
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """An answer: who flies what in which order, what is left out and why, and how good it is."""
+    """The result of a solve: routes, unassigned tasks with reasons, terms of the objective.
 
-    routes: dict[str, tuple[str, ...]]  # every UAV is here, also with ()
-    unassigned: dict[str, str] = field(default_factory=dict)  # task id -> reason
-    distance: float = 0.0  # [m] D of eq 2.12
-    value: float = 0.0  # R of eq 2.12
-    penalty: float = 0.0  # [m] P of eq 2.12: metres beyond range
-    fit: float = 0.0  # eq 2.12, smaller is better
-    history: tuple[tuple[float, float], ...] = ()  # ([s], fit) of the incumbent
-    state: Any = None  # what the next warm start wants; opaque
-    legs: Mapping[str, tuple[Leg, ...]] = field(default_factory=dict)  # as in Route
+    Attributes:
+        routes: task ids in order by UAV id; each UAV is a key, also one without tasks.
+        unassigned: reason by task id.
+        distance: [m], D of eq 2.12.
+        value: R of eq 2.12.
+        penalty: [m] beyond range, P of eq 2.12.
+        fit: of eq 2.12, smaller is better.
+        history: ([s], fit) of the incumbent.
+        state: for the next warm start; opaque.
+        legs: by UAV id, as in Route.
+        returns: routes end at home.
+        solver: name of the solver.
+        solve_time: [s].
+        iterations: of the solver.
+        warm_started: it started from a previous plan.
+    """
+
+    routes: dict[str, tuple[str, ...]]
+    unassigned: dict[str, str] = field(default_factory=dict)
+    distance: float = 0.0  # [m]
+    value: float = 0.0
+    penalty: float = 0.0  # [m]
+    fit: float = 0.0
+    history: tuple[tuple[float, float], ...] = ()  # ([s], fit)
+    state: Any = None
+    legs: Mapping[str, tuple[Leg, ...]] = field(default_factory=dict)
     returns: bool = False
     solver: str = ''
     solve_time: float = 0.0  # [s]
@@ -260,5 +352,5 @@ class Plan:
     warm_started: bool = False
 
     def route(self, uav: str) -> Route:
-        """The route of one UAV with its legs; KeyError when the plan does not know it."""
+        """The route of one UAV with its legs; KeyError where the plan has no such UAV."""
         return Route(uav, self.routes[uav], tuple(self.legs.get(uav, ())), self.returns)
