@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""An allocator over virtual time, with a greedy stand-in for the solver."""
+"""An allocator over virtual time, with a greedy replacement of the solver."""
 import math
 from itertools import pairwise
 
@@ -44,7 +44,7 @@ def greedy(uavs, tasks, zones=(), *, warm=None, locked=None, route_end='hold', *
         able = [u for u in uavs if can(u, task)
                 and math.isfinite(detour(end(u.id), task.position, zones)[0])]
         if not able:
-            unassigned[task.id] = 'nobody can'
+            unassigned[task.id] = 'no UAV can'
             continue
         best = min(able, key=lambda u: math.dist(end(u.id), task.position))
         routes[best.id].append(task.id)
@@ -58,17 +58,17 @@ def as_plan(uavs, place, zones, routes, unassigned=None, route_end='hold', warm=
         stops = [uav.position, *(place[t].position for t in routes[uav.id])]
         if route_end == 'home' and len(stops) > 1:
             stops.append(uav.home or uav.position)
-        ways = [detour(a, b, zones) for a, b in pairwise(stops)]
-        legs[uav.id] = tuple(Leg(tuple(via), length) for length, via in ways)
-    distance = sum(leg.length for way in legs.values() for leg in way)
+        detours = [detour(a, b, zones) for a, b in pairwise(stops)]
+        legs[uav.id] = tuple(Leg(tuple(via), length) for length, via in detours)
+    distance = sum(leg.length for route_legs in legs.values() for leg in route_legs)
     value = sum(place[t].value for route in routes.values() for t in route)
     return Plan({u: tuple(r) for u, r in routes.items()}, unassigned or {}, distance, value,
                 fit=distance, legs=legs, returns=route_end == 'home',
                 warm_started=warm is not None)
 
 
-class Desk:
-    """Drives an allocator: every method moves the virtual clock by itself."""
+class AllocatorDriver:
+    """Drives an allocator over virtual time: methods that wait move the clock."""
 
     def __init__(self, saved=None, plan=greedy, **params):
         params.setdefault('background_budget', 0.0)
@@ -97,7 +97,7 @@ class Desk:
                                 self.now, self.now)
 
     def begin(self):
-        """Let the burst settle; the problem that is due."""
+        """Let the burst settle; returns the problem that is due."""
         self.now += 1.01 * self.world.params.settle
         self.core.tick(self.now, self.now)
         problem = self.core.due(self.now, self.now)
@@ -113,7 +113,7 @@ class Desk:
         self.take()
 
     def settle(self, wait=0.0, report=True):
-        """Solve until nothing is due; UAVs keep talking meanwhile."""
+        """Solve until nothing is due; with `report` UAVs repeat their reports."""
         self.now += wait
         if report:
             for record in list(self.world.fleet.records.values()):

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Restart: the world comes back from the journal, revisions rise, nothing is taken too early."""
+"""Restart: the state is restored, revisions increase, no task changes its UAV too early."""
 import numpy as np
 import pytest
-from allocation import Desk
+from allocation import AllocatorDriver
 
 from uav_task_alloc import plan
 from uav_task_alloc.allocator.persistence.restore import restored_state
@@ -19,23 +19,23 @@ ZONES = (ThreatZone.hemisphere('z1', (500.0, 5.0, 0.0), 100.0),
 
 @pytest.fixture
 def rows():
-    desk = Desk()
-    desk.uav('a', 0.0, 0.0, 50.0)
-    desk.uav('b', 0.0, 500.0, 50.0)
-    desk.world.set_zones(ZONES, (), desk.now)
-    desk.add(('t1', 100, 0), ('t2', 1000, 0), ('t3', 100, 500), ('t5', 300, 500),
+    driver = AllocatorDriver()
+    driver.uav('a', 0.0, 0.0, 50.0)
+    driver.uav('b', 0.0, 500.0, 50.0)
+    driver.world.set_zones(ZONES, (), driver.now)
+    driver.add(('t1', 100, 0), ('t2', 1000, 0), ('t3', 100, 500), ('t5', 300, 500),
              Task('t4', (0.0, 1.0, 2.0), 2.0, 3.0, frozenset({'camera'}), frozenset({'b'}), 4.0))
-    desk.settle()
-    desk.event('COMPLETED', 't1', 'a')
-    desk.event('FAILED', 't5', desk.world.tasks.records['t5'].uav, reason='no')
-    desk.cancel('t3')
-    desk.world.set_available('b', False, desk.now)
-    desk.settle(wait=1.0)
-    return desk.core.rows()
+    driver.settle()
+    driver.event('COMPLETED', 't1', 'a')
+    driver.event('FAILED', 't5', driver.world.tasks.records['t5'].uav, reason='no')
+    driver.cancel('t3')
+    driver.world.set_available('b', False, driver.now)
+    driver.settle(wait=1.0)
+    return driver.core.rows()
 
 
 def test_the_world_is_the_same_after_a_restart(rows):
-    before, after = restored_state(rows), Desk(restored_state(rows))
+    before, after = restored_state(rows), AllocatorDriver(restored_state(rows))
     assert list(after.world.tasks.records.values()) == before.tasks
     assert {t.task.id: t.state.name for t in before.tasks} == {
         't1': 'COMPLETED', 't2': 'ASSIGNED', 't3': 'CANCELLED', 't4': 'UNASSIGNED',
@@ -45,93 +45,95 @@ def test_the_world_is_the_same_after_a_restart(rows):
     assert after.core.rows() == []
 
 
-def test_lists_are_told_again_under_a_higher_revision(rows):
+def test_lists_are_resent_under_a_higher_revision(rows):
     revisions = {each.uav: each.revision for each in restored_state(rows).lists}
-    desk = Desk(restored_state(rows))
-    desk.core.tick(desk.now, desk.now)
-    desk.take()
-    assert {u: each.revision for u, each in desk.lists.items()} == {
+    driver = AllocatorDriver(restored_state(rows))
+    driver.core.tick(driver.now, driver.now)
+    driver.take()
+    assert {u: each.revision for u, each in driver.lists.items()} == {
         u: revision + 1 for u, revision in revisions.items()}
-    assert set(desk.route('a')) == {'t2', 't5'}
-    assert desk.lists['a'].stops[0].leg.via == next(
+    assert set(driver.route('a')) == {'t2', 't5'}
+    assert driver.lists['a'].stops[0].leg.via == next(
         each for each in restored_state(rows).lists if each.uav == 'a').stops[0].leg.via
 
 
-def test_nothing_is_withdrawn_before_the_uavs_had_time_to_be_heard(rows):
-    desk = Desk(restored_state(rows), uav_timeout=5.0)
-    desk.add(('t9', 1, 1))
-    desk.settle()
-    assert desk.solves == []
-    desk.uav('a', 50.0, 0.0, 50.0, active_task='t2', list_revision=3)
-    desk.settle()
-    assert desk.route('a')[0] == 't2'
-    assert 't9' in desk.route('a')
-    assert [each.revision for each in desk.allocations] == [
+def test_nothing_is_withdrawn_before_the_uavs_had_time_to_report(rows):
+    driver = AllocatorDriver(restored_state(rows), uav_timeout=5.0)
+    driver.add(('t9', 1, 1))
+    driver.settle()
+    assert driver.solves == []
+    driver.uav('a', 50.0, 0.0, 50.0, active_task='t2', list_revision=3)
+    driver.settle()
+    assert driver.route('a')[0] == 't2'
+    assert 't9' in driver.route('a')
+    assert [each.revision for each in driver.allocations] == [
         restored_state(rows).revision + 1, restored_state(rows).revision + 2]
 
 
-def test_a_uav_that_is_not_heard_after_a_restart_loses_its_tasks(rows):
-    desk = Desk(restored_state(rows), uav_timeout=5.0)
-    desk.uav('c', 0.0, 0.0, 50.0)
-    desk.settle()
-    assert desk.solves == []
-    desk.settle(wait=5.0)
-    assert desk.route('a') == ()
-    assert set(desk.route('c')) == {'t2', 't5'}
+def test_a_uav_without_a_report_after_a_restart_loses_its_tasks(rows):
+    driver = AllocatorDriver(restored_state(rows), uav_timeout=5.0)
+    driver.uav('c', 0.0, 0.0, 50.0)
+    driver.settle()
+    assert driver.solves == []
+    driver.settle(wait=5.0)
+    assert driver.route('a') == ()
+    assert set(driver.route('c')) == {'t2', 't5'}
 
 
-def test_what_was_flown_while_nobody_listened_counts_when_it_is_told(rows):
-    desk = Desk(restored_state(rows))
-    assert desk.event('COMPLETED', 't2', 'a', revision=1) == ''
-    assert desk.state('t2') == 'COMPLETED'
-    desk.core.tick(desk.now, desk.now)
+def test_an_event_of_the_time_the_allocator_was_down_counts_when_it_is_repeated(rows):
+    driver = AllocatorDriver(restored_state(rows))
+    assert driver.event('COMPLETED', 't2', 'a', revision=1) == ''
+    assert driver.state('t2') == 'COMPLETED'
+    driver.core.tick(driver.now, driver.now)
 
 
-def test_a_uav_that_is_past_a_task_flew_it_while_nobody_listened(rows):
+def test_a_uav_that_has_passed_a_task_flew_it_while_the_allocator_was_down(rows):
     before, = (each for each in restored_state(rows).lists if each.uav == 'a')
     first, second = before.task_ids
     for revision, state in ((before.revision - 1, 'ASSIGNED'), (before.revision, 'COMPLETED')):
-        desk = Desk(restored_state(rows))
-        desk.uav('a', 0.0, 0.0, 50.0, active_task=second, list_revision=revision)
-        assert desk.state(first) == state
-    desk.settle()
-    assert desk.route('a') == (second,)
+        driver = AllocatorDriver(restored_state(rows))
+        driver.uav('a', 0.0, 0.0, 50.0, active_task=second, list_revision=revision)
+        assert driver.state(first) == state
+    driver.settle()
+    assert driver.route('a') == (second,)
 
 
-def test_a_row_that_nobody_wrote_is_left_out_and_told(rows):
+def test_an_unreadable_row_is_left_out_and_named(rows):
     found = restored_state([
         *rows, JournalRow('task', 't9', {'id': 't9'}), JournalRow('mood', '', 'good'),
         JournalRow('learner', '', {'uavs': ['a'], 'tasks': [], 'near': '!', 'task': '',
                                    'start': ''})])
     assert found.tasks == restored_state(rows).tasks
     assert len(found.unreadable) == 2
-    assert Desk(found).core._best.state == WarmState()
+    assert AllocatorDriver(found).core._best.state == WarmState()
     assert found.unreadable[0].startswith("journal row task 't9' cannot be read: KeyError")
     assert "unknown kind 'mood'" in found.unreadable[1]
 
 
-def test_a_list_forgets_a_task_whose_row_is_gone(rows):
+def test_a_task_whose_row_is_missing_is_removed_from_its_list(rows):
     found = restored_state([row for row in rows if row.id != 't2'])
     assert all('t2' not in each.task_ids for each in found.lists)
 
 
-def test_the_plan_of_the_last_life_is_told_before_any_other(rows):
-    desk = Desk(restored_state(rows))
-    desk.core.tick(desk.now, desk.now)
-    desk.take()
-    told, = desk.allocations
-    assert (told.trigger, told.revision) == ('restart', restored_state(rows).revision + 1)
-    assert told.plan.routes == {each.uav: each.task_ids for each in restored_state(rows).lists}
-    assert told.plan.distance == pytest.approx(sum(each.distance for each in told.lists))
+def test_the_plan_of_the_previous_run_is_published_before_any_other(rows):
+    before = restored_state(rows)
+    driver = AllocatorDriver(restored_state(rows))
+    driver.core.tick(driver.now, driver.now)
+    driver.take()
+    allocation, = driver.allocations
+    assert (allocation.trigger, allocation.revision) == ('restart', before.revision + 1)
+    assert allocation.plan.routes == {each.uav: each.task_ids for each in before.lists}
+    assert allocation.plan.distance == pytest.approx(
+        sum(each.distance for each in allocation.lists))
 
 
-def test_what_was_being_flown_is_known_before_its_uav_is_heard():
-    desk = Desk()
-    desk.uav('a', 0.0, 0.0, 50.0)
-    desk.add(('t1', 100, 0), ('t2', 200, 0))
-    desk.settle()
-    desk.event('STARTED', 't2', 'a')
-    after = Desk(restored_state(desk.core.rows()))
+def test_the_task_under_way_is_known_before_the_first_report():
+    driver = AllocatorDriver()
+    driver.uav('a', 0.0, 0.0, 50.0)
+    driver.add(('t1', 100, 0), ('t2', 200, 0))
+    driver.settle()
+    driver.event('STARTED', 't2', 'a')
+    after = AllocatorDriver(restored_state(driver.core.rows()))
     assert after.state('t2') == 'ACTIVE'
     assert after.event('STARTED', 't1', 'a', revision=1) == ''
     after.event('STARTED', 't2', 'a', revision=1)
@@ -140,19 +142,19 @@ def test_what_was_being_flown_is_known_before_its_uav_is_heard():
     assert after.route('a') == ('t1', 't2')
 
 
-@pytest.mark.parametrize('heard', [0.0, 4.0])  # [s] after the restart
+@pytest.mark.parametrize('first_report', [0.0, 4.0])  # [s] after the restart
 @pytest.mark.parametrize('seconds', [0.5, 3.5])
-def test_shortly_after_a_restart_no_task_changes_hands(seconds, heard):
-    desk = Desk()
-    desk.uav('a', 0.0, 0.0, 50.0)
-    desk.add(('t1', 100, 0), ('t2', 200, 0))
-    desk.settle()
-    after = Desk(restored_state(desk.core.rows()))
-    after.settle(wait=heard)
+def test_shortly_after_a_restart_no_task_changes_hands(seconds, first_report):
+    driver = AllocatorDriver()
+    driver.uav('a', 0.0, 0.0, 50.0)
+    driver.add(('t1', 100, 0), ('t2', 200, 0))
+    driver.settle()
+    after = AllocatorDriver(restored_state(driver.core.rows()))
+    after.settle(wait=first_report)
     after.uav('a', 0.0, 0.0, 50.0)
     after.uav('b', 150.0, 0.0, 50.0)
     after.settle(wait=seconds)
-    after.world.set_available('a', False, after.now)  # it may have flown t1 while nobody listened
+    after.world.set_available('a', False, after.now)  # it may have flown t1 meanwhile
     after.settle()
     later = seconds > 3.0
     assert after.route('a') == (() if later else ('t1', 't2'))
@@ -162,12 +164,12 @@ def test_shortly_after_a_restart_no_task_changes_hands(seconds, heard):
     assert after.route('b') == ('t2',)
 
 
-def test_a_list_told_again_is_known_to_be_flown_in_its_order():
-    desk = Desk()
-    desk.uav('a', 0.0, 0.0, 50.0)
-    desk.add(('t1', 100, 0), ('t2', 200, 0))
-    desk.settle()
-    after = Desk(restored_state(desk.core.rows()))
+def test_a_list_that_was_resent_is_flown_in_its_order():
+    driver = AllocatorDriver()
+    driver.uav('a', 0.0, 0.0, 50.0)
+    driver.add(('t1', 100, 0), ('t2', 200, 0))
+    driver.settle()
+    after = AllocatorDriver(restored_state(driver.core.rows()))
     after.core.tick(after.now, after.now)
     after.take()
     assert after.lists['a'].revision == 2
@@ -176,13 +178,13 @@ def test_a_list_told_again_is_known_to_be_flown_in_its_order():
         'COMPLETED', 'passed while the allocator was down')
 
 
-def test_no_list_is_told_again_with_what_was_completed_out_of_turn():
-    desk = Desk()
-    desk.uav('a', 0.0, 0.0, 50.0)
-    desk.add(('t1', 100, 0), ('t2', 200, 0), ('t3', 300, 0))
-    desk.settle()
-    desk.event('COMPLETED', 't2', 'a')
-    after = Desk(restored_state(desk.core.rows()))
+def test_no_list_is_resent_with_a_task_completed_out_of_turn():
+    driver = AllocatorDriver()
+    driver.uav('a', 0.0, 0.0, 50.0)
+    driver.add(('t1', 100, 0), ('t2', 200, 0), ('t3', 300, 0))
+    driver.settle()
+    driver.event('COMPLETED', 't2', 'a')
+    after = AllocatorDriver(restored_state(driver.core.rows()))
     after.core.tick(after.now, after.now)
     after.take()
     assert after.history == []
@@ -191,21 +193,21 @@ def test_no_list_is_told_again_with_what_was_completed_out_of_turn():
     assert after.route('a') == ('t1', 't3')
 
 
-def patient(*world, max_iterations, **more):
-    """`plan` with as many bees on any machine."""
+def fixed_rounds(*world, max_iterations, **more):
+    """`plan` with the same number of iterations on any machine."""
     rounds = 3000 if max_iterations is None else max_iterations
     return plan(*world, **{**more, 'budget': 60.0, 'max_iterations': rounds})
 
 
-def test_what_the_bees_learnt_survives():
-    desk = Desk(plan=patient)
-    desk.uav('a', 0.0, 0.0, 50.0)
-    desk.uav('b', 900.0, 0.0, 50.0)
+def test_the_learned_state_survives():
+    driver = AllocatorDriver(plan=fixed_rounds)
+    driver.uav('a', 0.0, 0.0, 50.0)
+    driver.uav('b', 900.0, 0.0, 50.0)
     for k in range(3):
-        desk.add(*((f't{k}_{i}', 37 * i % 400, 91 * i % 300) for i in range(10)))
-        desk.settle(wait=6.0)
-    before = desk.core._best.state.learnt
-    after = Desk(restored_state(desk.core.rows()), plan=patient)
+        driver.add(*((f't{k}_{i}', 37 * i % 400, 91 * i % 300) for i in range(10)))
+        driver.settle(wait=6.0)
+    before = driver.core._best.state.learnt
+    after = AllocatorDriver(restored_state(driver.core.rows()), plan=fixed_rounds)
     kept = after.core._best.state.learnt
     assert (kept.uavs, kept.tasks) == (before.uavs, before.tasks)
     assert np.allclose(kept.tables.task, before.tables.task)
@@ -217,7 +219,7 @@ def test_what_the_bees_learnt_survives():
     assert sum(len(each.stops) for each in after.lists.values()) == 30
 
 
-def test_what_was_learnt_is_bounded(monkeypatch):
+def test_the_row_of_the_learned_state_is_bounded(monkeypatch):
     tables = Tables(np.full((40, 4), 0.25), np.full((3, 40), 0.75))
     near = np.tile(np.arange(3, 7), (40, 1))
     learnt = Learnt(tables, near, {'a': 0, 'b': 1, 'c': 2}, {f't{k}': k for k in range(40)})

@@ -1,19 +1,19 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Damaged rows of a journal: each costs itself only, is told, and ends no start."""
+"""Damaged rows of a journal: only that row is lost and named; the start continues."""
 import json
 import math
 import random
 import sqlite3
 
 import pytest
-from allocation import Desk
+from allocation import AllocatorDriver
 
 from uav_task_alloc.allocator.persistence.persistence import Persistence
 from uav_task_alloc.allocator.persistence.restore import restored_state
 from uav_task_alloc.journal import FILE_NAME, JournalRow
 from uav_task_alloc.model import ThreatZone
 
-EVIL = (None, True, -1, 0, 1.5, 10**400, 1e308, math.nan, math.inf, -math.inf, '', 'x', 'a b',
+HOSTILE = (None, True, -1, 0, 1.5, 10**400, 1e308, math.nan, math.inf, -math.inf, '', 'x', 'a b',
         '\ud800', [], [[]], {}, {'id': 'x'}, [1.0, 2.0, math.nan], [None] * 3)
 ZONES = (ThreatZone.hemisphere('z1', (500.0, 900.0, 0.0), 100.0),
          ThreatZone.polygon('z2', ((0.0, 800.0), (9.0, 800.0), (9.0, 820.0)), -5.0, 70.0, 2.0))
@@ -22,31 +22,31 @@ BODIES = {'invalid UTF-8': b'{"a": "\xff"}', 'half an object': b'{"task": ', 'a 
 
 
 def filled(folder):
-    """A keeper with tasks t1, t2, t3, lists, zones and a UAV that is switched off."""
-    keeper = Persistence(str(folder), print)
-    desk = Desk(keeper.saved)
-    desk.uav('a', 0.0, 0.0, 50.0)
-    desk.uav('b', 0.0, 500.0, 50.0)
-    desk.world.set_zones(ZONES, (), desk.now)
-    desk.add(('t1', 100, 0), ('t2', 1000, 0), ('t3', 100, 500))
-    desk.settle()
-    desk.event('COMPLETED', 't1', 'a')
-    desk.world.set_available('b', False, desk.now)
-    desk.settle()
-    keeper.save(desk.core, desk.now)
-    return keeper
+    """A journal with tasks t1, t2, t3, lists, zones and a UAV that is switched off."""
+    persistence = Persistence(str(folder), print)
+    driver = AllocatorDriver(persistence.saved)
+    driver.uav('a', 0.0, 0.0, 50.0)
+    driver.uav('b', 0.0, 500.0, 50.0)
+    driver.world.set_zones(ZONES, (), driver.now)
+    driver.add(('t1', 100, 0), ('t2', 1000, 0), ('t3', 100, 500))
+    driver.settle()
+    driver.event('COMPLETED', 't1', 'a')
+    driver.world.set_available('b', False, driver.now)
+    driver.settle()
+    persistence.save(driver.core, driver.now)
+    return persistence
 
 
 @pytest.fixture
 def rows(tmp_path):
-    keeper = filled(tmp_path)
-    held = keeper._journal.load()
-    keeper.close()
+    persistence = filled(tmp_path)
+    held = persistence._journal.load()
+    persistence.close()
     return held
 
 
 def paths(body, path=()):
-    """The way to every value of a JSON body."""
+    """The path to every value of a JSON body."""
     yield path
     items = body.items() if isinstance(body, dict) else enumerate(body) if isinstance(
         body, list) else ()
@@ -66,7 +66,7 @@ def with_value(body, path, value):
 
 
 @pytest.mark.parametrize('name', BODIES)
-def test_finding_23_a_damaged_row_is_left_out_and_told_and_the_rest_kept(tmp_path, name):
+def test_finding_23_a_damaged_row_is_left_out_and_named_and_the_others_kept(tmp_path, name):
     filled(tmp_path).close()
     database = sqlite3.connect(tmp_path / FILE_NAME)
     body = BODIES[name]
@@ -76,17 +76,17 @@ def test_finding_23_a_damaged_row_is_left_out_and_told_and_the_rest_kept(tmp_pat
     database.commit()
     database.close()
     for _ in range(2):
-        said = []
-        keeper = Persistence(str(tmp_path), said.append)
-        assert [record.task.id for record in keeper.saved.tasks][:2] == ['t1', 't3']
-        assert 't2' not in Desk(keeper.saved).world.tasks.records
-        assert "1 left out: journal row task 't2' cannot be read" in keeper.error
-        assert said == [keeper.error]
-        desk = Desk(keeper.saved)
-        desk.add(('t4', 0, 0))
-        keeper.save(desk.core, desk.now)
-        assert 'tried again' not in keeper.error
-        keeper.close()
+        errors = []
+        persistence = Persistence(str(tmp_path), errors.append)
+        assert [record.task.id for record in persistence.saved.tasks][:2] == ['t1', 't3']
+        assert 't2' not in AllocatorDriver(persistence.saved).world.tasks.records
+        assert "1 left out: journal row task 't2' cannot be read" in persistence.error
+        assert errors == [persistence.error]
+        driver = AllocatorDriver(persistence.saved)
+        driver.add(('t4', 0, 0))
+        persistence.save(driver.core, driver.now)
+        assert 'tried again' not in persistence.error
+        persistence.close()
     assert {'t1', 't3', 't4'} == {record.task.id for record in Persistence(
         str(tmp_path), print).saved.tasks}
 
@@ -98,24 +98,24 @@ def test_finding_23_a_row_whose_id_is_no_text_costs_that_row_only(tmp_path):
     database.execute("INSERT INTO world VALUES (7, x'00', '1')")
     database.commit()
     database.close()
-    keeper = Persistence(str(tmp_path), print)
-    assert len(keeper.saved.tasks) == 3
-    assert len(keeper.saved.unreadable) == 2
+    persistence = Persistence(str(tmp_path), print)
+    assert len(persistence.saved.tasks) == 3
+    assert len(persistence.saved.unreadable) == 2
 
 
 def test_finding_23_no_value_of_a_row_ends_a_start(rows):
-    """Every value of every row replaced by every evil one; the allocator starts and plans."""
+    """Every value of every row replaced by hostile ones; the allocator starts and plans."""
     rng = random.Random(23)
     print('seed 23')
     for k, row in enumerate(rows):
         for path in paths(row.body):
-            for value in rng.sample(EVIL, 5):
+            for value in rng.sample(HOSTILE, 5):
                 bad = JournalRow(row.kind, row.id, with_value(row.body, path, value))
                 found = restored_state([*rows[:k], bad, *rows[k + 1:]])
-                desk = Desk(found)
-                desk.uav('a', 0.0, 0.0, 50.0)
-                desk.settle()
-                json.dumps([each.body for each in desk.core.rows()])
+                driver = AllocatorDriver(found)
+                driver.uav('a', 0.0, 0.0, 50.0)
+                driver.settle()
+                json.dumps([each.body for each in driver.core.rows()])
                 assert 2 <= len(found.tasks) <= 3
                 assert found.unreadable or len(found.tasks) == 3
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Disks that are full, read-only, damaged or gone: told, lived with, and made up for."""
+"""Disks that are full, read-only, damaged or removed: logged, survived, and written later."""
 import os
 import shutil
 import sqlite3
@@ -7,7 +7,7 @@ import subprocess
 import sys
 
 import pytest
-from allocation import Desk
+from allocation import AllocatorDriver
 
 from uav_task_alloc.allocator.persistence.persistence import Persistence
 from uav_task_alloc.allocator.records import SavedState
@@ -17,44 +17,44 @@ from uav_task_alloc.journal import FILE_NAME, VERSION, Journal, JournalRow
 
 FULL = """
 import resource, sys
-from allocation import Desk
+from allocation import AllocatorDriver
 from uav_task_alloc.allocator.persistence.persistence import Persistence
-said = []
-desk, keeper = Desk(), Persistence(sys.argv[1], said.append)
+errors = []
+driver, persistence = AllocatorDriver(), Persistence(sys.argv[1], errors.append)
 resource.setrlimit(resource.RLIMIT_FSIZE, (60_000, resource.RLIM_INFINITY))
 for k in range(200):
-    desk.add((f't{k}', 100, 0))
-    keeper.save(desk.core, desk.now + k)
-print(len(said), keeper.error)
+    driver.add((f't{k}', 100, 0))
+    persistence.save(driver.core, driver.now + k)
+print(len(errors), persistence.error)
 resource.setrlimit(resource.RLIMIT_FSIZE, (resource.RLIM_INFINITY,) * 2)
-keeper.save(desk.core, desk.now + 1000.0)
-print(repr(keeper.error))
+persistence.save(driver.core, driver.now + 1000.0)
+print(repr(persistence.error))
 """
 
 
 class Disk:
-    """A keeper on a folder, with an allocator and what was complained of."""
+    """Persistence in a folder, with an allocator and the errors logged."""
 
     def __init__(self, folder, origin=None):
-        self.folder, self.said = folder, []
-        self.keeper = Persistence(str(folder), self.said.append, origin)
-        self.desk = Desk(self.keeper.saved)
+        self.folder, self.errors = folder, []
+        self.persistence = Persistence(str(folder), self.errors.append, origin)
+        self.driver = AllocatorDriver(self.persistence.saved)
 
     def add(self, *ids):
         """Announce tasks and save, after any rest between two tries."""
-        self.desk.now += 10.0
-        self.desk.add(*((task_id, 100, 0) for task_id in ids))
+        self.driver.now += 10.0
+        self.driver.add(*((task_id, 100, 0) for task_id in ids))
         self.save()
 
     def save(self):
-        self.keeper.save(self.desk.core, self.desk.now)
+        self.persistence.save(self.driver.core, self.driver.now)
 
     def again(self):
-        """The tasks that the next life knows."""
-        self.keeper.close()
-        keeper = Persistence(str(self.folder), self.said.append)
-        keeper.close()
-        return {record.task.id for record in keeper.saved.tasks}
+        """The tasks that the next run restores."""
+        self.persistence.close()
+        persistence = Persistence(str(self.folder), self.errors.append)
+        persistence.close()
+        return {record.task.id for record in persistence.saved.tasks}
 
 
 @pytest.fixture
@@ -62,50 +62,50 @@ def disk(tmp_path):
     return Disk(tmp_path)
 
 
-def test_a_keeper_brings_back_what_it_saved(disk):
+def test_saved_tasks_are_restored(disk):
     disk.add('t1')
-    assert disk.desk.core.rows() == []
+    assert disk.driver.core.rows() == []
     assert disk.again() == {'t1'}
     assert Persistence('', print).saved == SavedState()
 
 
-def test_a_full_disk_is_told_once_and_made_up_for_when_there_is_room(disk):
-    database = disk.keeper._journal._db
+def test_a_full_disk_is_logged_once_and_written_to_when_there_is_room(disk):
+    database = disk.persistence._journal._db
     database.execute('PRAGMA max_page_count = 3')
     for k in range(300):
         disk.add(f't{k}')
-    assert len(disk.said) == 1
-    assert disk.keeper.error.endswith('database or disk is full; tried again every 1 s')
+    assert len(disk.errors) == 1
+    assert disk.persistence.error.endswith('database or disk is full; tried again every 1 s')
     database.execute('PRAGMA max_page_count = 1000000')
     disk.add('last')
-    assert disk.keeper.error == ''
+    assert disk.persistence.error == ''
     assert len(disk.again()) == 301
 
 
-def test_files_that_may_not_grow_are_told_once_and_made_up_for(tmp_path):
+def test_files_that_may_not_grow_are_logged_once_and_written_later(tmp_path):
     done = subprocess.run([sys.executable, '-c', FULL, str(tmp_path)], text=True, check=True,
                           stdout=subprocess.PIPE, env={
                               **os.environ, 'PYTHONPATH': os.pathsep.join(sys.path)})
-    told, mended = done.stdout.splitlines()
-    assert told.startswith(f'1 {tmp_path / FILE_NAME} cannot be written: ')
-    assert mended == "''"
+    first, last = done.stdout.splitlines()
+    assert first.startswith(f'1 {tmp_path / FILE_NAME} cannot be written: ')
+    assert last == "''"
     assert len(Persistence(str(tmp_path), print).saved.tasks) == 200
 
 
 def read_only(disk):
     """As a disk that was remounted read-only; file modes would not stop an administrator."""
-    disk.keeper._journal._db.execute('PRAGMA query_only = ON')
+    disk.persistence._journal._db.execute('PRAGMA query_only = ON')
 
 
-def test_a_disk_that_becomes_read_only_is_told_and_made_up_for(disk):
+def test_a_disk_that_becomes_read_only_is_logged_and_written_later(disk):
     read_only(disk)
     disk.add('t1')
-    assert disk.keeper.error == (
+    assert disk.persistence.error == (
         f'{disk.folder / FILE_NAME} cannot be written: attempt to write a readonly database; '
         'tried again every 1 s')
-    disk.keeper._journal._db.execute('PRAGMA query_only = OFF')
+    disk.persistence._journal._db.execute('PRAGMA query_only = OFF')
     disk.add('t2')
-    assert (disk.keeper.error, disk.again()) == ('', {'t1', 't2'})
+    assert (disk.persistence.error, disk.again()) == ('', {'t1', 't2'})
 
 
 @pytest.fixture
@@ -123,27 +123,27 @@ def unopenable(monkeypatch):
 
 def test_a_journal_on_a_read_only_disk_is_read_and_written_later(disk, unopenable):
     disk.add('t1')
-    disk.keeper.close()
+    disk.persistence.close()
     later = Disk(disk.folder)
-    assert [record.task.id for record in later.keeper.saved.tasks] == ['t1']
+    assert [record.task.id for record in later.persistence.saved.tasks] == ['t1']
     later.add('t2')
-    assert 'readonly database; tried again' in later.keeper.error
+    assert 'readonly database; tried again' in later.persistence.error
     unopenable()
     later.add('t3')
-    assert (later.keeper.error, later.again()) == ('', {'t1', 't2', 't3'})
+    assert (later.persistence.error, later.again()) == ('', {'t1', 't2', 't3'})
 
 
 def test_a_disk_that_comes_late_with_another_world_is_left_alone(disk, unopenable, tmp_path):
     late = Disk(tmp_path / 'mount')
     late.add('mine')
     disk.add('theirs')
-    disk.keeper.close()
+    disk.persistence.close()
     unopenable()
     (tmp_path / 'mount').mkdir()
     shutil.copy(disk.folder / FILE_NAME, tmp_path / 'mount' / FILE_NAME)
     late.add('more')
     assert 'has 1 tasks that were not read at the start, theirs say; nothing is kept' in (
-        late.keeper.error)
+        late.persistence.error)
     assert late.again() == {'theirs'}
 
 
@@ -151,19 +151,19 @@ def test_a_folder_that_cannot_be_made_is_tried_again(tmp_path):
     (tmp_path / 'file').touch()
     disk = Disk(tmp_path / 'file' / 'state')
     disk.add('t1')
-    assert 'cannot be opened' in disk.keeper.error
+    assert 'cannot be opened' in disk.persistence.error
     (tmp_path / 'file').unlink()
     disk.add('t2')
-    assert (disk.keeper.error, disk.again()) == ('', {'t1', 't2'})
+    assert (disk.persistence.error, disk.again()) == ('', {'t1', 't2'})
 
 
 def test_a_folder_that_was_removed_gets_the_whole_world_again(disk):
     disk.add('t1')
     shutil.rmtree(disk.folder)
     disk.add('t2')
-    assert 'it was removed or replaced' in disk.keeper.error
+    assert 'it was removed or replaced' in disk.persistence.error
     disk.add('t3')
-    assert (disk.keeper.error, disk.again()) == ('', {'t1', 't2', 't3'})
+    assert (disk.persistence.error, disk.again()) == ('', {'t1', 't2', 't3'})
 
 
 def test_a_damaged_file_is_set_aside_and_a_new_one_kept(tmp_path):
@@ -172,32 +172,32 @@ def test_a_damaged_file_is_set_aside_and_a_new_one_kept(tmp_path):
         (tmp_path / FILE_NAME).write_bytes(damaged)
         disk = Disk(tmp_path)
         disk.add(f't{k}')
-        assert disk.said == [disk.keeper.error]
-        assert f'file is not a database; set aside as {FILE_NAME}.damaged-{k}' in disk.said[0]
+        assert disk.errors == [disk.persistence.error]
+        assert f'file is not a database; set aside as {FILE_NAME}.damaged-{k}' in disk.errors[0]
         assert (tmp_path / f'{FILE_NAME}.damaged-{k}').read_bytes() == damaged
         assert disk.again() == {f't{k}'}
 
 
 def test_a_page_that_was_overwritten_is_noticed(disk):
     disk.add(*(f't{k}' for k in range(50)))
-    disk.keeper.close()
+    disk.persistence.close()
     held = bytearray((disk.folder / FILE_NAME).read_bytes())
     held[4096:] = b'x' * (len(held) - 4096)
     (disk.folder / FILE_NAME).write_bytes(held)
     later = Disk(disk.folder)
-    assert 'malformed; set aside as' in later.keeper.error
+    assert 'malformed; set aside as' in later.persistence.error
     later.add('t99')
     assert later.again() == {'t99'}
 
 
 def test_one_bad_row_costs_that_row_only(disk):
     disk.add('t1', 't2')
-    disk.keeper._journal.put([JournalRow('task', 't1', {'state': 'odd'})])
-    disk.keeper._journal._db.execute("UPDATE world SET body = '{' WHERE kind = 'revision'")
-    disk.keeper.close()
+    disk.persistence._journal.put([JournalRow('task', 't1', {'state': 'odd'})])
+    disk.persistence._journal._db.execute("UPDATE world SET body = '{' WHERE kind = 'revision'")
+    disk.persistence.close()
     later = Disk(disk.folder)
-    assert [record.task.id for record in later.keeper.saved.tasks] == ['t2']
-    assert 'left out: journal row ' in later.keeper.error
+    assert [record.task.id for record in later.persistence.saved.tasks] == ['t2']
+    assert 'left out: journal row ' in later.persistence.error
 
 
 def test_a_journal_of_a_newer_version_is_left_alone(tmp_path):
@@ -208,9 +208,9 @@ def test_a_journal_of_a_newer_version_is_left_alone(tmp_path):
     before = (tmp_path / FILE_NAME).read_bytes()
     disk = Disk(tmp_path)
     disk.add('t1')
-    assert disk.said == [disk.keeper.error]
-    assert disk.keeper.error.endswith('a newer uav_task_alloc wrote it; nothing is kept until '
-                                        'a restart')
+    assert disk.errors == [disk.persistence.error]
+    assert disk.persistence.error.endswith(
+        'a newer uav_task_alloc wrote it; nothing is kept until a restart')
     assert (tmp_path / FILE_NAME).read_bytes() == before
 
 
@@ -218,34 +218,34 @@ def test_a_journal_that_another_allocator_has_is_left_to_it(disk):
     disk.add('t1')
     second = Disk(disk.folder)
     second.add('t2')
-    assert 'database is locked; nothing is kept' in second.keeper.error
+    assert 'database is locked; nothing is kept' in second.persistence.error
     assert disk.again() == {'t1'}
 
 
 ZURICH, BERN = Origin(47.397742, 8.545594, 488.0), Origin(46.948, 7.4474, 540.0)
 
 
-def test_finding_23_an_emptied_journal_is_told_and_set_aside(disk):
+def test_finding_23_an_emptied_journal_is_logged_and_set_aside(disk):
     disk.add('t1')
-    disk.keeper.close()
+    disk.persistence.close()
     (disk.folder / FILE_NAME).write_bytes(b'')
     later = Disk(disk.folder)
-    assert later.said == [later.keeper.error]
-    assert 'size = 0 bytes: expected at least 16' in later.keeper.error
-    assert f'set aside as {FILE_NAME}.damaged-1' in later.keeper.error
+    assert later.errors == [later.persistence.error]
+    assert 'size = 0 bytes: expected at least 16' in later.persistence.error
+    assert f'set aside as {FILE_NAME}.damaged-1' in later.persistence.error
     later.add('t2')
     assert later.again() == {'t2'}
 
 
 def test_finding_23_what_can_be_read_of_a_cut_journal_is_kept(disk):
     disk.add(*(f't{k}' for k in range(50)))
-    disk.keeper.close()
+    disk.persistence.close()
     held = (disk.folder / FILE_NAME).read_bytes()
     (disk.folder / FILE_NAME).write_bytes(held[:-3 * 4096])
     later = Disk(disk.folder)
-    some = len(later.keeper.saved.tasks)
+    some = len(later.persistence.saved.tasks)
     assert 0 < some < 50
-    assert 'malformed; set aside as' in later.keeper.error
+    assert 'malformed; set aside as' in later.persistence.error
     later.add('t99')
     assert len(later.again()) == some + 1
 
@@ -254,33 +254,33 @@ def test_finding_23_locked_in_the_path_is_tried_again(tmp_path):
     (tmp_path / 'locked').touch()
     disk = Disk(tmp_path / 'locked' / 'state')
     disk.add('t1')
-    assert 'tried again' in disk.keeper.error
+    assert 'tried again' in disk.persistence.error
     (tmp_path / 'locked').unlink()
     disk.add('t2')
-    assert (disk.keeper.error, disk.again()) == ('', {'t1', 't2'})
+    assert (disk.persistence.error, disk.again()) == ('', {'t1', 't2'})
 
 
 def test_finding_23_a_journal_of_another_origin_is_refused(tmp_path):
     disk = Disk(tmp_path, ZURICH)
     disk.add('t1')
-    disk.keeper.close()
+    disk.persistence.close()
     before = (tmp_path / FILE_NAME).read_bytes()
     with pytest.raises(OriginMismatch) as caught:
         Disk(tmp_path, BERN)
     for number in ('47.397742', '8.545594', '488.0', '46.948', '7.4474', '540.0'):
         assert number in str(caught.value)
     assert (tmp_path / FILE_NAME).read_bytes() == before
-    same = Disk(tmp_path, Origin(47.397742, 8.545594 + 1e-9, 488.0))  # and nobody holds the file
-    assert (same.said, len(same.keeper.saved.tasks)) == ([], 1)
+    same = Disk(tmp_path, Origin(47.397742, 8.545594 + 1e-9, 488.0))  # and the file is not in use
+    assert (same.errors, len(same.persistence.saved.tasks)) == ([], 1)
 
 
-def test_finding_23_a_journal_without_origin_gets_one_and_says_so(disk):
+def test_finding_23_a_journal_without_origin_gets_one_with_a_warning(disk):
     disk.add('t1')
-    disk.keeper.close()
+    disk.persistence.close()
     later = Disk(disk.folder, ZURICH)
-    assert 'names no origin: assumed origin latitude 47.397742' in later.said[0]
+    assert 'names no origin: assumed origin latitude 47.397742' in later.errors[0]
     later.add('t2')
-    later.keeper.close()
+    later.persistence.close()
     with pytest.raises(OriginMismatch):
         Disk(disk.folder, BERN)
 
@@ -292,9 +292,9 @@ def test_finding_23_a_disk_that_comes_late_with_another_origin_is_left_alone(
     theirs = Disk(tmp_path / 'other', ZURICH)
     unopenable()
     theirs.add('mine')
-    theirs.keeper.close()
+    theirs.persistence.close()
     (tmp_path / 'mount').mkdir(exist_ok=True)
     shutil.copy(tmp_path / 'other' / FILE_NAME, tmp_path / 'mount' / FILE_NAME)
     late.add('more')
-    assert '47.397742' in late.keeper.error
-    assert late.keeper.error.endswith('nothing is kept until a restart')
+    assert '47.397742' in late.persistence.error
+    assert late.persistence.error.endswith('nothing is kept until a restart')

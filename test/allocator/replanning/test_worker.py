@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The worker's thread and the rehearsal: nobody waits, nothing kills it."""
+"""The thread of the worker, and the warm-up: callers never wait, exceptions do not end it."""
 from queue import Queue
 
 from allocation import greedy
@@ -18,7 +18,8 @@ def problem(trigger):
 def test_problems_are_answered_in_turn_after_the_preparation():
     got, prepared = Queue(), []
     worker = Worker(lambda: prepared.append(1),
-                    lambda asked, stop: ReplanAnswer(asked, Plan({}), Plan({})), got.put, got.put)
+                    lambda problem, stop: ReplanAnswer(problem, Plan({}), Plan({})),
+                    got.put, got.put)
     worker.start()
     assert got.get(timeout=10) is None
     assert prepared == [1]
@@ -28,14 +29,14 @@ def test_problems_are_answered_in_turn_after_the_preparation():
     worker.close()
 
 
-def test_a_running_solve_hurries_when_asked():
+def test_a_running_solve_can_be_stopped_early():
     got, began = Queue(), Queue()
 
-    def solve(asked, stop):
+    def solve(problem, stop):
         began.put(1)
         while not stop():
             pass
-        return ReplanAnswer(asked, Plan({}), Plan({}))
+        return ReplanAnswer(problem, Plan({}), Plan({}))
 
     worker = Worker(lambda: None, solve, got.put, got.put)
     worker.start()
@@ -47,13 +48,13 @@ def test_a_running_solve_hurries_when_asked():
     worker.close()
 
 
-def test_a_solver_that_fails_is_told_and_the_next_problem_is_solved():
+def test_a_failed_solve_is_reported_and_the_next_problem_is_solved():
     got, failed = Queue(), Queue()
 
-    def solve(asked, stop):
-        if asked.trigger == 'bad':
+    def solve(problem, stop):
+        if problem.trigger == 'bad':
             raise RuntimeError('out of bees')
-        return ReplanAnswer(asked, Plan({}), Plan({}))
+        return ReplanAnswer(problem, Plan({}), Plan({}))
 
     worker = Worker(lambda: None, solve, got.put, failed.put)
     worker.start()
@@ -66,5 +67,5 @@ def test_a_solver_that_fails_is_told_and_the_next_problem_is_solved():
     worker.close()
 
 
-def test_a_rehearsal_goes_all_the_way_to_lists():
+def test_the_warm_up_ends_with_lists():
     assert compile_kernels(greedy, AllocatorParams()) > 0

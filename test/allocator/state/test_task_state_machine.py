@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The life of a task: the whole table, and events that come late, twice or out of order."""
+"""Task state machine: the whole table, and events that are late, repeated or out of order."""
 from pathlib import Path
 
 import pytest
-from allocation import Desk
+from allocation import AllocatorDriver
 
 from uav_task_alloc.allocator.records import ENDED_STATES, OPEN_STATES, TaskState
 from uav_task_alloc.allocator.state import task_state_machine
@@ -20,7 +20,7 @@ def test_every_event_has_an_answer_in_every_state():
 
 @pytest.mark.parametrize('event', TaskTransition)
 @pytest.mark.parametrize('state', S)
-def test_what_nothing_follows_from_says_why(state, event):
+def test_an_event_without_effect_has_a_reason(state, event):
     rule = rule_for(state, event, 'a', 'because')
     assert rule.state is not None or rule.reason
     assert '{' not in rule.reason
@@ -60,27 +60,27 @@ def test_braces_of_a_reason_are_text():
     assert rule.reason == 'failed on a: {uav} {0}'
 
 
-def test_the_picture_in_the_docs_is_that_of_the_table():
+def test_the_documentation_is_generated_from_the_table():
     path = Path(__file__).parents[3] / 'docs/task_states.md'
     assert path.read_text() == task_state_machine.task_states_markdown()
 
 
 @pytest.fixture
-def desk():
-    desk = Desk(uav_timeout=5.0)
-    desk.uav('a', 0.0, 0.0, 50.0)
-    desk.uav('b', 1000.0, 0.0, 50.0)
-    desk.add(('t1', 100, 0), ('t2', 900, 0))
-    desk.settle()
-    return desk
+def driver():
+    driver = AllocatorDriver(uav_timeout=5.0)
+    driver.uav('a', 0.0, 0.0, 50.0)
+    driver.uav('b', 1000.0, 0.0, 50.0)
+    driver.add(('t1', 100, 0), ('t2', 900, 0))
+    driver.settle()
+    return driver
 
 
-def moved(desk):
+def moved(driver):
     """b has t1 of a, which is believed lost."""
-    desk.now += 6.0
-    desk.uav('b', 1000.0, 0.0, 50.0)
-    desk.settle(report=False)
-    assert 't1' in desk.route('b')
+    driver.now += 6.0
+    driver.uav('b', 1000.0, 0.0, 50.0)
+    driver.settle(report=False)
+    assert 't1' in driver.route('b')
 
 
 @pytest.mark.parametrize(('first', 'then', 'why', 'state'), [
@@ -92,53 +92,54 @@ def moved(desk):
     ('FAILED', 'COMPLETED', '', 'COMPLETED'),
     ('FAILED', 'STARTED', '', 'ACTIVE'),  # it is in the list of a until the next plan
 ])
-def test_events_out_of_order_land_right(desk, first, then, why, state):
-    assert desk.event(first, 't1', 'a', revision=1) == ''
-    said = desk.event(then, 't1', 'a', revision=1)
-    assert said.endswith(why) if why else said == ''
-    assert desk.state('t1') == state
+def test_events_out_of_order_end_in_the_right_state(driver, first, then, why, state):
+    assert driver.event(first, 't1', 'a', revision=1) == ''
+    refusal = driver.event(then, 't1', 'a', revision=1)
+    assert refusal.endswith(why) if why else refusal == ''
+    assert driver.state('t1') == state
 
 
 @pytest.mark.parametrize('kind', ['STARTED', 'COMPLETED', 'FAILED'])
-def test_a_cancelled_task_stays_cancelled(desk, kind):
-    desk.cancel('t1')
-    assert desk.event(kind, 't1', 'a', revision=1).endswith('it was cancelled')
-    assert desk.state('t1') == 'CANCELLED'
+def test_a_cancelled_task_stays_cancelled(driver, kind):
+    driver.cancel('t1')
+    assert driver.event(kind, 't1', 'a', revision=1).endswith('it was cancelled')
+    assert driver.state('t1') == 'CANCELLED'
 
 
 @pytest.mark.parametrize(('kind', 'state'), [
     ('STARTED', 'ASSIGNED'), ('FAILED', 'ASSIGNED'), ('COMPLETED', 'COMPLETED')])
-def test_a_uav_believed_lost_may_complete_what_was_moved_but_not_take_it_back(desk, kind, state):
-    moved(desk)
-    desk.event(kind, 't1', 'a', revision=1)
-    desk.core.tick(desk.now, desk.now)
-    assert desk.state('t1') == state
-    record = desk.world.tasks.records['t1']
+def test_a_uav_believed_lost_may_complete_what_was_moved_but_not_take_it_back(driver, kind, state):
+    moved(driver)
+    driver.event(kind, 't1', 'a', revision=1)
+    driver.core.tick(driver.now, driver.now)
+    assert driver.state('t1') == state
+    record = driver.world.tasks.records['t1']
     assert record.failed_on == ()
     assert record.uav == ('a' if state == 'COMPLETED' else 'b')
-    desk.uav('b', 1000.0, 0.0, 50.0)
-    desk.settle(report=False)
-    assert ('t1' in desk.route('b')) == (state != 'COMPLETED')
+    driver.uav('b', 1000.0, 0.0, 50.0)
+    driver.settle(report=False)
+    assert ('t1' in driver.route('b')) == (state != 'COMPLETED')
 
 
-def test_a_task_both_have_flown_is_completed_once(desk):
-    moved(desk)
-    assert desk.event('COMPLETED', 't1', 'b') == ''
-    assert desk.event('COMPLETED', 't1', 'a', revision=1).endswith('it is COMPLETED already')
-    assert desk.world.tasks.records['t1'].uav == 'b'
+def test_a_task_both_have_flown_is_completed_once(driver):
+    moved(driver)
+    assert driver.event('COMPLETED', 't1', 'b') == ''
+    assert driver.event('COMPLETED', 't1', 'a', revision=1).endswith('it is COMPLETED already')
+    assert driver.world.tasks.records['t1'].uav == 'b'
 
 
-def test_a_task_that_failed_for_good_and_was_flown_all_the_same_is_completed(desk):
+def test_a_task_that_failed_for_good_and_was_flown_all_the_same_is_completed(driver):
     for uav_id in ('a', 'b'):
-        desk.settle()
-        desk.event('FAILED', 't1', uav_id)
-    assert desk.state('t1') == 'FAILED'
-    desk.settle()
-    assert desk.event('COMPLETED', 't1', 'a', revision=1) == ''
-    assert (desk.state('t1'), desk.reason('t1')) == ('COMPLETED', 'completed after it was moved')
+        driver.settle()
+        driver.event('FAILED', 't1', uav_id)
+    assert driver.state('t1') == 'FAILED'
+    driver.settle()
+    assert driver.event('COMPLETED', 't1', 'a', revision=1) == ''
+    assert (driver.state('t1'), driver.reason('t1')) == (
+        'COMPLETED', 'completed after it was moved')
 
 
-def test_an_event_of_a_uav_that_was_never_heard_since_the_restart_is_no_surprise(desk):
-    del desk.world.fleet.records['a']
-    assert desk.event('STARTED', 't1', 'a') == ''
-    assert desk.state('t1') == 'ACTIVE'
+def test_an_event_of_a_uav_without_a_report_since_the_restart_is_applied(driver):
+    del driver.world.fleet.records['a']
+    assert driver.event('STARTED', 't1', 'a') == ''
+    assert driver.state('t1') == 'ACTIVE'

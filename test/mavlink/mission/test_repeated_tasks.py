@@ -15,29 +15,29 @@ from uav_task_alloc.model import Task
 PLACES = {'A': (0.0, 100.0, 50.0), 'B': (100.0, 100.0, 50.0), 'C': (200.0, 100.0, 50.0)}
 
 
-def load_desk():
+def load_driver():
     """The virtual allocator of the tests one folder up, which is not on the path of these."""
     file = Path(__file__).parents[2] / 'allocation.py'
     spec = importlib.util.spec_from_file_location('allocation', file)
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
-    return module.Desk
+    return module.AllocatorDriver
 
 
 class Fleet:
     """One UAV in flight, a bridge, and an allocator that hears what the bridge says."""
 
     def __init__(self, kind, **params):
-        self.make_desk = load_desk()
+        self.make_driver = load_driver()
         self.bench = FindingsBench(kind).discover()
         self.deaf = False  # nobody hears the events of the bridge
         self.start(**params)
 
     def start(self, rows=(), **params):
         """A new allocator, with the journal of the one before."""
-        self.desk = self.make_desk(restored_state(rows), **params)
-        self.desk.now = 1000.0 + self.bench.now
-        self.revision = self.desk.world.lists.get('uav_1').revision
+        self.driver = self.make_driver(restored_state(rows), **params)
+        self.driver.now = 1000.0 + self.bench.now
+        self.revision = self.driver.world.lists.get('uav_1').revision
 
     def run(self, until, limit=120.0):
         """Let time pass until the condition holds; True where it did."""
@@ -48,15 +48,15 @@ class Fleet:
 
     def step(self):
         """A quarter of a second."""
-        bench, desk = self.bench, self.desk
+        bench, driver = self.bench, self.driver
         bench.run(limit=0.25)
-        desk.now = 1000.0 + bench.now
+        driver.now = 1000.0 + bench.now
         state = bench.state()
         report = UavReport('uav_1', state.position, list_revision=bench.onboard().revision)
-        desk.world.update_uav(report, desk.now, desk.now)
+        driver.world.update_uav(report, driver.now, driver.now)
         self.tell_events()
-        desk.settle(report=False)
-        told = desk.lists.get('uav_1')
+        driver.settle(report=False)
+        told = driver.lists.get('uav_1')
         if told is not None and told.revision > self.revision:
             self.revision = told.revision
             bench.assign(TaskList(told.revision, tuple(
@@ -67,13 +67,13 @@ class Fleet:
         events, self.bench.events = self.bench.events, []
         for _, event in events:
             if not self.deaf:
-                self.desk.event(event.event, event.task, 'uav_1', event.revision)
+                self.driver.event(event.event, event.task, 'uav_1', event.revision)
 
     def add(self, names):
-        self.desk.add(*(Task(name, PLACES[name]) for name in names))
+        self.driver.add(*(Task(name, PLACES[name]) for name in names))
 
     def state(self, name):
-        known = self.desk.world.tasks.records.get(name)
+        known = self.driver.world.tasks.records.get(name)
         return known.state.name if known else ''
 
     def flown(self, name):
@@ -84,10 +84,10 @@ class Fleet:
 def test_finding_33_a_task_announced_anew_at_the_same_place_is_flown(kind):
     fleet = Fleet(kind, keep_ended=0)
     fleet.add('ABC')
-    assert fleet.run(lambda: not fleet.desk.world.tasks.records)  # all ended and forgotten
+    assert fleet.run(lambda: not fleet.driver.world.tasks.records)  # all ended and forgotten
     assert [fleet.flown(name) for name in 'ABC'] == [1, 1, 1]
     fleet.add('AC')
-    assert fleet.run(lambda: not fleet.desk.world.tasks.records)
+    assert fleet.run(lambda: not fleet.driver.world.tasks.records)
     assert [fleet.flown(name) for name in 'ABC'] == [2, 1, 2]
 
 
@@ -95,9 +95,9 @@ def test_finding_33_a_task_announced_anew_at_the_same_place_is_flown(kind):
 def test_finding_33_a_task_announced_anew_while_others_are_flown_is_flown(kind):
     fleet = Fleet(kind, keep_ended=0)
     fleet.add('ABC')
-    assert fleet.run(lambda: fleet.flown('A') == 1 and 'A' not in fleet.desk.world.tasks.records)
+    assert fleet.run(lambda: fleet.flown('A') == 1 and 'A' not in fleet.driver.world.tasks.records)
     fleet.add('A')
-    assert fleet.run(lambda: not fleet.desk.world.tasks.records)
+    assert fleet.run(lambda: not fleet.driver.world.tasks.records)
     assert [fleet.flown(name) for name in 'ABC'] == [2, 1, 1]
 
 
@@ -110,9 +110,9 @@ def test_finding_33_what_was_flown_while_the_allocator_was_deaf_is_flown_once(ki
     fleet.deaf = True
     assert fleet.run(lambda: fleet.flown('B') == 1)
     if away:
-        fleet.desk.world.set_available('uav_1', False, fleet.desk.now)
-        assert fleet.run(lambda: fleet.desk.route('uav_1') == ())
-        fleet.desk.world.set_available('uav_1', True, fleet.desk.now)
+        fleet.driver.world.set_available('uav_1', False, fleet.driver.now)
+        assert fleet.run(lambda: fleet.driver.route('uav_1') == ())
+        fleet.driver.world.set_available('uav_1', True, fleet.driver.now)
     fleet.deaf = False
     assert fleet.run(lambda: [fleet.state(name) for name in 'ABC'] == ['COMPLETED'] * 3)
     assert [fleet.flown(name) for name in 'ABC'] == [1, 1, 1]
@@ -122,11 +122,11 @@ def test_finding_33_what_was_flown_while_the_allocator_was_deaf_is_flown_once(ki
 def test_finding_33_a_restart_with_a_journal_does_not_hide_what_is_new(kind):
     fleet = Fleet(kind, keep_ended=0)
     fleet.add('ABC')
-    assert fleet.run(lambda: not fleet.desk.world.tasks.records)
-    fleet.desk.core.nothing_written()
-    fleet.start(fleet.desk.core.rows(), keep_ended=0)
+    assert fleet.run(lambda: not fleet.driver.world.tasks.records)
+    fleet.driver.core.nothing_written()
+    fleet.start(fleet.driver.core.rows(), keep_ended=0)
     fleet.add('B')
-    assert fleet.run(lambda: not fleet.desk.world.tasks.records)
+    assert fleet.run(lambda: not fleet.driver.world.tasks.records)
     assert [fleet.flown(name) for name in 'ABC'] == [1, 2, 1]
 
 
