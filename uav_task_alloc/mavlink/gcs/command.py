@@ -31,7 +31,7 @@ class CommandResult(Enum):
 class Command:
     """A command that is sent every second until acknowledged or executed, with a fallback.
 
-    `result` is OPEN until then; `reason` tells why an attempt was refused.
+    `result` is OPEN until then; `reason` is that of a refused attempt.
     """
 
     name: str

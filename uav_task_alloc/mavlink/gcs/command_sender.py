@@ -18,12 +18,12 @@ from uav_task_alloc.mavlink.mission.peer import Peer
 from uav_task_alloc.mavlink.transport.codec import Message
 from uav_task_alloc.mavlink.transport.notes import OperatorNote
 
-ARM = 'arm'
-ARM_ATTEMPTS = 120  # one per second: a position estimate may take that long
+_ARM = 'arm'
+_ARM_ATTEMPTS = 120  # one per second: a position estimate may take that long
 _CLIMB_LIMIT = 120.0  # [s] for a take-off
 _REACHED_HEIGHT = 0.9  # fraction of the commanded height
-RETRY, RETRIES = 10.0, 5  # [s] after a failure that may be temporary
-SLOW_RETRY = 60.0  # [s] after more failures, without limit
+_RETRY, _RETRIES = 10.0, 5  # [s] after a failure that may be temporary
+_SLOW_RETRY = 60.0  # [s] after more failures, without limit
 _REFUSAL_DELAY = 5.0  # [s] of arming attempts before a refusal is logged: the reason may follow
 
 _Completion = Callable[[float], None]
@@ -63,8 +63,8 @@ class CommandSender:
 
     @property
     def failing(self) -> bool:
-        """More than RETRIES failures in a row."""
-        return self._retries > RETRIES
+        """More than _RETRIES failures in a row."""
+        return self._retries > _RETRIES
 
     def drop(self) -> None:
         """Drop the open command and its state: another party controls the vehicle."""
@@ -82,9 +82,9 @@ class CommandSender:
         self._retry_at, self._retries = now, 0
 
     def fail(self, now: float) -> None:
-        """Start the back-off after a failure, a longer one after RETRIES failures."""
+        """Start the back-off after a failure, a longer one after _RETRIES failures."""
         self._retries += 1
-        self._retry_at = now + (RETRY if self._retries <= RETRIES else SLOW_RETRY)
+        self._retry_at = now + (_RETRY if self._retries <= _RETRIES else _SLOW_RETRY)
 
     def backing_off(self, now: float) -> bool:
         """Whether the back-off after a failure lasts."""
@@ -131,7 +131,7 @@ class CommandSender:
             self.waits_for = command.name + self._log_arming_refusal(command, now)
             return out
         self._command, completion = None, self._completion
-        if command.name == ARM and command.result is not CommandResult.FAILED:
+        if command.name == _ARM and command.result is not CommandResult.FAILED:
             self._arming_since = None
         if command.result is CommandResult.DONE and completion:
             self._logged.pop(command.name, None)
@@ -145,7 +145,7 @@ class CommandSender:
 
     def _log_failure(self, command: Command) -> None:
         """Log a reason once until it changes; a refusal to arm is logged before."""
-        if command.name == ARM and ARM in self._logged:
+        if command.name == _ARM and _ARM in self._logged:
             return
         if self._logged.get(command.name) != command.reason:
             self.notes.append(OperatorNote('error', f'{command.name}: {command.reason}'))
@@ -154,13 +154,13 @@ class CommandSender:
     def _log_arming_refusal(self, command: Command, now: float) -> str:
         """Text on why and for how long arming is refused, logged once until the reason changes."""
         tried = now - (now if self._arming_since is None else self._arming_since)
-        if command.name != ARM or not command.reason or tried < _REFUSAL_DELAY:
+        if command.name != _ARM or not command.reason or tried < _REFUSAL_DELAY:
             return ''
         reason = self.arming_refusal or self._telemetry.unhealthy or command.reason
         text = f': refused for {tried:.0f} s: {reason}'
-        if self._logged.get(ARM) != reason:
-            self._logged[ARM] = reason
-            self.notes.append(OperatorNote('warning', ARM + text))
+        if self._logged.get(_ARM) != reason:
+            self._logged[_ARM] = reason
+            self.notes.append(OperatorNote('warning', _ARM + text))
         return text
 
     def start(self, command: Command, now: float, completion: _Completion) -> list[Message]:
@@ -229,7 +229,7 @@ class CommandSender:
             arm = self._peer.command(d.MAV_CMD_COMPONENT_ARM_DISARM, 1.0)
             if self._arming_since is None:
                 self._arming_since, self.arming_refusal = now, ''
-            return self.start(Command(ARM, arm, lambda: telemetry.armed, attempts=ARM_ATTEMPTS,
+            return self.start(Command(_ARM, arm, lambda: telemetry.armed, attempts=_ARM_ATTEMPTS,
                                       retry_refused=True, wanted=wanted), now, self._armed)
         if not self.armed_here:
             return self.wait_for('it to disarm: it was armed by another party, or has just landed')

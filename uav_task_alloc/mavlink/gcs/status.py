@@ -147,8 +147,8 @@ class PublishedStates:
     def is_due(self, status: UavStatus, position_at: float, now: float, rate: float) -> bool:
         """Whether to publish a status, which then counts as published.
 
-        A silent UAV is published once, as unavailable: a later message about it would look as
-        if it were connected.
+        A silent UAV is published once, as unavailable: a later message about it would
+        suggest that it is connected.
 
         Args:
             status: the present one.
