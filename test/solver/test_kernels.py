@@ -140,7 +140,7 @@ def loaded():
 zones = [ThreatZone.hemisphere('dome', (30.0, 5.0, 0.0), 9.0),
          ThreatZone.polygon('prism', [(60.0, -9.0), (70.0, -9.0), (65.0, 30.0)], z_max=90.0)]
 for given in ([], zones):
-    solve.warm_up('chain_q', bool(given))
+    solve.load_kernels('chain_q', bool(given))
     before = loaded()
     solve.plan([Uav('u', (0.0, 0.0, 0.0), 900.0), Uav('v', (50.0, 0.0, 0.0), 900.0)],
                [Task(f't{i}', (10.0 * i, 9.0 * (i % 2), 4.0)) for i in range(12)], given,

@@ -9,7 +9,7 @@ import sys
 from numba.core.registry import CPUDispatcher
 
 from uav_task_alloc import Task, ThreatZone, Uav, plan
-from uav_task_alloc.solver.solve import warm_up
+from uav_task_alloc.solver.solve import load_kernels
 
 
 def loaded():
@@ -18,13 +18,13 @@ def loaded():
             if isinstance(kernel, CPUDispatcher) for each in kernel.signatures}
 
 
-warm_up()
+load_kernels()
 before = loaded()
 uavs = [Uav(f'u{i}', (100.0 * i, 0.0, 0.0), 150.0) for i in range(4)]
 tasks = [Task(f't{i}', (10.0 * i, 40.0 + 7.0 * (i % 5), 0.0), value=1.0 + i % 3,
               allowed_uavs=frozenset({'u1'}) if i % 9 == 0 else None) for i in range(40)]
 dome = ThreatZone.hemisphere('dome', (150.0, 40.0, 0.0), 20.0)
-warm_up(zones=True)
+load_kernels(zones=True)
 before |= loaded()
 for zones, end, hard in (((), 'hold', True), ((dome,), 'home', True), ((), 'home', False)):
     known = plan(uavs, tasks[:-5], zones, route_end=end, hard_range=hard, max_iterations=2000)
