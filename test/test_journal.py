@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The journal: on disk when put returns, whole or not at all, honest about trouble."""
+"""The journal: on disk when put returns, all rows or none, errors with file and reason."""
 import os
 import signal
 import sqlite3
@@ -22,7 +22,7 @@ for k in count():
 """
 
 
-def test_what_was_put_is_there_after_a_restart(tmp_path):
+def test_rows_that_were_put_are_loaded_after_a_restart(tmp_path):
     journal = Journal(str(tmp_path / 'new' / 'folder'))
     journal.put([JournalRow('task', 't1', {'x': 1.5}), JournalRow('task', 't2', [1, 2])])
     journal.put([JournalRow('task', 't1', {'x': float('inf')}), JournalRow('task', 't2', None)])
@@ -44,11 +44,11 @@ def test_a_killed_writer_loses_nothing_it_acknowledged(tmp_path):
     writer.stdout.close()
     rows = Journal(str(tmp_path)).load()
     put = {kind: {row.body for row in rows if row.kind == kind} for kind in 'ab'}
-    assert put['a'] == put['b']  # whole or not at all
+    assert put['a'] == put['b']  # all rows or none
     assert put['a'] >= set(range(int(acknowledged) + 1))
 
 
-def test_a_torn_end_of_the_log_is_left_out(tmp_path):
+def test_a_torn_end_of_the_log_is_ignored(tmp_path):
     journal = Journal(str(tmp_path))
     journal.put([JournalRow('a', '1', 1)])
     log = tmp_path / (FILE_NAME + '-wal')
@@ -70,7 +70,7 @@ def test_a_second_allocator_on_the_same_folder_is_refused(tmp_path):
         Journal(str(tmp_path))
 
 
-def test_a_file_that_is_no_journal_is_refused_and_left_alone(tmp_path):
+def test_a_file_that_is_not_a_journal_is_refused_and_unchanged(tmp_path):
     (tmp_path / FILE_NAME).write_bytes(b'something else entirely ' * 100)
     with pytest.raises(JournalError, match='cannot be opened: file is not a database'):
         Journal(str(tmp_path))
@@ -86,7 +86,7 @@ def test_a_journal_of_a_newer_version_is_refused(tmp_path):
         Journal(str(tmp_path))
 
 
-def test_a_folder_that_cannot_be_made_is_refused(tmp_path):
+def test_a_folder_that_cannot_be_created_is_refused(tmp_path):
     (tmp_path / 'file').touch()
     with pytest.raises(JournalError, match=r'file/state.*cannot be opened: \[Errno'):
         Journal(str(tmp_path / 'file' / 'state'))
@@ -106,7 +106,7 @@ def test_a_full_disk_is_reported_and_changes_nothing(tmp_path):
 
 
 @pytest.mark.parametrize('size', [0, 1, 15])
-def test_finding_23_an_emptied_file_is_no_new_journal(tmp_path, size):
+def test_finding_23_an_emptied_file_is_not_a_new_journal(tmp_path, size):
     Journal(str(tmp_path)).close()
     with (tmp_path / FILE_NAME).open('r+b') as file:
         file.truncate(size)
@@ -137,7 +137,7 @@ def test_finding_23_a_database_without_the_table_is_empty(tmp_path):
         Journal(str(tmp_path))
 
 
-def test_finding_23_a_database_of_another_program_is_left_alone(tmp_path):
+def test_finding_23_a_database_of_another_program_is_unchanged(tmp_path):
     database = sqlite3.connect(tmp_path / FILE_NAME)
     database.execute('CREATE TABLE birds (name TEXT)')
     database.close()
@@ -145,7 +145,7 @@ def test_finding_23_a_database_of_another_program_is_left_alone(tmp_path):
         Journal(str(tmp_path))
 
 
-def test_finding_23_a_creation_that_broke_off_leaves_no_empty_journal(tmp_path, monkeypatch):
+def test_finding_23_an_interrupted_creation_leaves_no_empty_journal(tmp_path, monkeypatch):
     def kill(*_):
         raise KeyboardInterrupt
 
@@ -169,7 +169,7 @@ def test_finding_23_a_file_system_without_links_gets_a_journal(tmp_path, monkeyp
     assert Journal(str(tmp_path)).load() == [JournalRow('a', '1', 1)]
 
 
-def test_finding_23_locked_in_the_path_is_no_foreign_lock(tmp_path):
+def test_finding_23_locked_in_the_path_is_not_a_foreign_lock(tmp_path):
     (tmp_path / 'locked').touch()
     with pytest.raises(JournalError, match='cannot be opened') as caught:
         Journal(str(tmp_path / 'locked' / 'state'))
@@ -177,7 +177,7 @@ def test_finding_23_locked_in_the_path_is_no_foreign_lock(tmp_path):
 
 
 @pytest.mark.parametrize('pages', [2, 4, 6])
-def test_finding_23_the_rows_before_a_cut_are_rescued(tmp_path, pages):
+def test_finding_23_the_rows_before_a_truncation_are_recovered(tmp_path, pages):
     journal = Journal(str(tmp_path))
     journal.put([JournalRow('a', f'{k:03}', 'x' * 50) for k in range(300)])
     journal.close()
@@ -187,13 +187,13 @@ def test_finding_23_the_rows_before_a_cut_are_rescued(tmp_path, pages):
         Journal(str(tmp_path))
     held = file.read_bytes()
     aside = set_aside(str(tmp_path))
-    found = recover_rows(aside)
+    recovered = recover_rows(aside)
     assert aside.read_bytes() == held
-    assert {row.body for row in found} <= {'x' * 50}
-    assert len(found) >= 30 * (pages - 2)
+    assert {row.body for row in recovered} <= {'x' * 50}
+    assert len(recovered) >= 30 * (pages - 2)
 
 
-def test_finding_23_the_rows_on_both_sides_of_a_bad_page_are_rescued(tmp_path):
+def test_finding_23_the_rows_on_both_sides_of_a_corrupt_page_are_recovered(tmp_path):
     journal = Journal(str(tmp_path))
     journal.put([JournalRow('a', f'{k:03}', 'x' * 50) for k in range(300)])
     journal.close()
@@ -201,6 +201,6 @@ def test_finding_23_the_rows_on_both_sides_of_a_bad_page_are_rescued(tmp_path):
     held = bytearray(file.read_bytes())
     held[4 * 4096:5 * 4096] = bytes(range(256)) * 16
     file.write_bytes(held)
-    found = {row.id for row in recover_rows(set_aside(str(tmp_path)))}
-    assert {'000', '299'} <= found
-    assert 200 <= len(found) < 300
+    recovered = {row.id for row in recover_rows(set_aside(str(tmp_path)))}
+    assert {'000', '299'} <= recovered
+    assert 200 <= len(recovered) < 300

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The values of the model refuse what makes no sense, in words."""
+"""Values of the model are checked; errors name place, value and expectation."""
 import math
 
 import pytest
@@ -47,7 +47,7 @@ SQUARE = [(0, 0), (10, 0), (10, 10), (0, 10)]
     (lambda: ThreatZone.polygon('z1', [(0, 0), (1, 1)]),
      'zone z1: vertices = ((0.0, 0.0), (1.0, 1.0)): expected at least 3 corners'),
 ])
-def test_a_bad_value_is_refused_in_words(make, text):
+def test_a_bad_value_is_refused_with_place_and_expectation(make, text):
     with pytest.raises(InvalidValue) as refused:
         make()
     assert str(refused.value) == text
@@ -61,14 +61,14 @@ def test_a_bad_value_is_refused_in_words(make, text):
     [(0, 0), (5, 5), (10, 10)],                    # no area
     [(0, 0), (10, NAN), (10, 10)],
 ])
-def test_a_polygon_that_is_none_is_refused(corners):
+def test_a_polygon_that_is_not_simple_is_refused(corners):
     with pytest.raises(InvalidValue, match='zone z1: vertices'):
         ThreatZone.polygon('z1', corners)
 
 
 @pytest.mark.parametrize('corners', [SQUARE, SQUARE[::-1], [*SQUARE, SQUARE[0]],
                                      [(0, 0), (10, 0), (10, 10), (5, 2), (0, 10)]])
-def test_a_simple_polygon_is_taken_either_way_round(corners):
+def test_a_simple_polygon_is_accepted_in_either_orientation(corners):
     zone = ThreatZone.polygon('z1', corners, 0.0, 50.0)
     assert len(zone.vertices) in (4, 5)
     assert (0.0, 0.0) in zone.vertices

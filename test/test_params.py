@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""One declaration a parameter: files made from it are fresh, values are checked."""
+"""Each parameter is declared once: generated files are up to date, values are checked."""
 from dataclasses import fields
 from pathlib import Path
 
@@ -13,11 +13,11 @@ ROOT = Path(__file__).parent.parent
 
 
 @pytest.mark.parametrize('node', params.NODES)
-def test_the_yaml_file_of_a_node_is_fresh(node):
+def test_the_yaml_file_of_a_node_is_up_to_date(node):
     assert (ROOT / f'config/{node}.yaml').read_text() == params.yaml_text(node)
 
 
-def test_the_table_in_docs_is_fresh():
+def test_the_table_in_docs_is_up_to_date():
     assert (ROOT / 'docs/parameters.md').read_text() == params.markdown_text()
 
 
@@ -49,11 +49,11 @@ def test_contract_names_are_declared():
     ({'state_dir': 3}, 'state_dir = 3: expected text'),
     ({'origin__latitude': 91.0}, 'origin.latitude = 91.0: expected float in [-90, 90] deg'),
 ])
-def test_a_bad_value_is_refused_in_words(given, text):
+def test_a_bad_value_is_refused_with_its_range(given, text):
     with pytest.raises(InvalidValue) as refused:
         params.AllocatorParams(**given)
     assert str(refused.value) == text
 
 
-def test_an_integer_serves_as_a_float():
+def test_an_integer_is_accepted_as_a_float():
     assert params.AllocatorParams(uav_timeout=3).uav_timeout == 3.0

@@ -2,10 +2,10 @@
 """The dense reference: Dijkstra over a visibility graph of many corners around every zone met.
 
 Each zone has rings of `ring` corners around it, on circumscribed polygons, at many heights, the
-other zones' tops and bottoms among them; prisms also along their edges. What it finds is a way, so
+other zones' tops and bottoms among them; prisms also along their edges. Its paths are feasible, so
 never too short. Around a zone it is too long by at most 1 / cos(pi / ring) - 1 of the arc (0.4 %
-for 36), besides what heights in between would gain; a test sees that a denser graph gains less
-than that. Only zones that are met take part, as a way past fewer zones is never longer.
+for 36), besides what heights in between would gain; a test checks that a denser graph gains less
+than that. Only zones that are met take part, as a path past fewer zones is never longer.
 """
 import math
 from itertools import pairwise
@@ -17,17 +17,17 @@ from scipy.sparse.csgraph import dijkstra
 
 from uav_task_alloc.model import Shape
 
-OUT = 1e-3  # [m] corners stand so far off
+OUT = 1e-3  # [m] corners keep this distance
 
 
 @numba.njit(cache=True, nogil=True)
-def _cuts(row, corners, p, q, digs):
-    """Whether the open segment pq meets the zone of a row; formulas of its own on purpose."""
+def _cuts(row, corners, p, q, under):
+    """Whether the open segment pq meets the zone of a row; independent formulas on purpose."""
     kind, cx, cy, cz, radius, low, high, grow = row
     s, t = 0.0, 1.0
     d = q - p
     if kind == 0:
-        low = cz - 1e-6 if not digs else low
+        low = cz - 1e-6 if not under else low
         high = np.inf
     if d[2] == 0.0:
         if p[2] <= low or p[2] >= high:
@@ -35,7 +35,7 @@ def _cuts(row, corners, p, q, digs):
     else:
         u, v = (low - p[2]) / d[2], (high - p[2]) / d[2]
         s, t = max(0.0, min(u, v)), min(1.0, max(u, v))
-    if kind == 0 and not digs and (p[2] < cz or q[2] < cz):
+    if kind == 0 and not under and (p[2] < cz or q[2] < cz):
         return True  # the reference never goes beneath a dome's base
     if s >= t:
         return False
@@ -90,14 +90,14 @@ def _aside(box, p, q):
 
 
 @numba.njit(cache=True, nogil=True)
-def _edges(x, rows, corners, first, count, digs, boxes):
+def _edges(x, rows, corners, first, count, under, boxes):
     n = len(x)
     i_of, j_of, metres = [0], [0], [0.0]
     for i in range(n):
         for j in range(i + 1, n):
             for k in range(len(rows)):
                 if not _aside(boxes[k], x[i], x[j]) and _cuts(
-                        rows[k], corners[first[k]:first[k] + count[k]], x[i], x[j], digs[k]):
+                        rows[k], corners[first[k]:first[k] + count[k]], x[i], x[j], under[k]):
                     break
             else:
                 i_of.append(i)
@@ -116,7 +116,7 @@ def _row(zone, clearance):
 
 
 class Dense:
-    """Shortest ways by brute force, for both ends outside all zones."""
+    """Shortest paths by brute force, for both ends outside all zones."""
 
     def __init__(self, zones, clearance=0.0, low=-np.inf, high=np.inf, ring=36, tiers=7):
         self.rows = np.array([_row(zone, clearance) for zone in zones]).reshape(-1, 8)
@@ -128,7 +128,7 @@ class Dense:
         self.boxes = np.array([self._box(k) for k in range(len(zones))]).reshape(-1, 4)
 
     def length(self, a, b):
-        """Length [m] of the shortest way over the corners; inf: none."""
+        """Length [m] of the shortest path over the corners; inf: none."""
         a, b = np.asarray(a, float), np.asarray(b, float)
         met = self._met(a, b, np.zeros(len(self.rows), bool), a, b)
         while True:
@@ -143,19 +143,19 @@ class Dense:
             if met.sum() == known:
                 return total
 
-    def _digs(self, a, b):
+    def _may_pass_under(self, a, b):
         return (self.rows[:, 0] == 0) & (min(a[2], b[2]) < self.rows[:, 5])
 
     def _met(self, p, q, met, a, b):
-        digs = self._digs(a, b)
+        under = self._may_pass_under(a, b)
         return met | np.array([
             _cuts(row, self.corners[f:f + c], p, q, d)
-            for row, f, c, d in zip(self.rows, self.first, self.count, digs, strict=True)], bool)
+            for row, f, c, d in zip(self.rows, self.first, self.count, under, strict=True)], bool)
 
     def _dijkstra(self, x, met, a, b):
         keep = np.flatnonzero(met)
         i, j, metres = _edges(x, self.rows[keep], self.corners, self.first[keep],
-                              self.count[keep], self._digs(a, b)[keep], self.boxes[keep])
+                              self.count[keep], self._may_pass_under(a, b)[keep], self.boxes[keep])
         graph = csr_array((metres, (i, j)), shape=(len(x), len(x)))
         cost, parent = dijkstra(graph, directed=False, indices=0, return_predecessors=True)
         path = [1]

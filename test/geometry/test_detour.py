@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Single zones against their closed forms, and the odd cases of starts, goals and pockets."""
+"""Single zones against their closed forms, and special starts, goals and pockets."""
 import math
 
 import pytest
@@ -21,7 +21,7 @@ def arc(d, r):
     return 2 * math.sqrt(d * d - r * r) + r * (math.pi - 2 * math.acos(r / d))
 
 
-def test_without_zones_the_way_is_straight():
+def test_without_zones_the_path_is_straight():
     assert detour((0, 0, 0), (3, 4, 12), []) == (13.0, ())
 
 
@@ -30,11 +30,11 @@ def test_a_zone_aside_changes_nothing():
     assert detour((-300, 0, 10), (300, 0, 10), [zone]) == (600.0, ())
 
 
-def test_the_same_place_is_no_way_at_all():
+def test_a_path_to_the_start_itself_has_no_length():
     assert detour((1, 2, 3), (1, 2, 3), [ThreatZone.cylinder('z', (50, 0), 10)]) == (0.0, ())
 
 
-def test_level_ways_pass_a_dome_like_a_circle():
+def test_level_paths_pass_a_dome_like_a_circle():
     zone = ThreatZone.hemisphere('z', (0, 0, 0), 80)
     length, points = detour((-250, 0, 0), (250, 0, 0), [zone])
     assert length == pytest.approx(arc(250, 80), rel=2e-3)
@@ -51,7 +51,7 @@ def test_over_the_dome_is_taken_where_it_is_shorter():
     assert length == pytest.approx(over, rel=2e-3)
 
 
-def test_nobody_digs_under_a_dome_unless_an_end_is_down_there():
+def test_no_path_leads_under_a_dome_unless_an_end_is_below_its_base():
     zone = ThreatZone.hemisphere('z', (0, 0, 0), 80)
     _, points = detour((-100, 0, 5), (100, 0, 5), [zone])
     assert min(z for _, _, z in points) >= 0
@@ -81,7 +81,7 @@ def test_a_prism_is_passed_at_its_nearer_corners():
     assert all(y > 90 for _, y, _ in points)
 
 
-def test_a_dent_can_be_flown_into_and_out_of():
+def test_a_notch_can_be_flown_into_and_out_of():
     zone = ThreatZone.polygon('z', [(0, 0), (300, 0), (300, 300), (200, 300), (200, 100),
                                     (100, 100), (100, 300), (0, 300)])
     length, points = detour((150, 150, 10), (-100, 150, 10), [zone])
@@ -89,7 +89,7 @@ def test_a_dent_can_be_flown_into_and_out_of():
     assert violations([(150, 150, 10), *points, (-100, 150, 10)], [zone], 0.0) == 0
 
 
-def test_the_altitude_limit_forces_the_way_around():
+def test_the_altitude_limit_forces_a_path_around():
     zone = ThreatZone.cylinder('z', (0, 0), 80, -1000.0, 60.0)
     length, points = detour((-250, 0, 50), (250, 0, 50), [zone], altitude_max=55)
     assert length == pytest.approx(arc(250, 80), rel=2e-3)
@@ -105,7 +105,7 @@ def test_a_dome_under_a_low_ceiling_is_passed_at_the_ceiling():
     assert violations([(-300, 10, 60), *points, (300, 10, 60)], [zone], 0.0) == 0
 
 
-def test_from_just_beside_a_hanging_cylinder_the_way_beneath_is_found():
+def test_from_just_beside_a_hanging_cylinder_the_path_beneath_is_found():
     zone = ThreatZone.cylinder('z', (0, 0), 230, 40.0, margin=5.0)
     a, b = (235.5, 0.0, 45.0), (-400.0, 50.0, 45.0)
     length, points = detour(a, b, [zone])
@@ -114,7 +114,7 @@ def test_from_just_beside_a_hanging_cylinder_the_way_beneath_is_found():
     assert violations([a, *points, b], [zone], 0.0) == 0
 
 
-def test_beneath_a_lower_zone_the_way_keeps_low_around_the_next():
+def test_beneath_a_lower_zone_the_path_stays_low_around_the_next():
     walls = [ThreatZone.cylinder('wall', (300, 0), 100),
              ThreatZone.cylinder('left', (300, 400), 380, 40.0),
              ThreatZone.cylinder('right', (300, -400), 380, 40.0)]
@@ -144,34 +144,34 @@ def test_margin_and_clearance_are_kept():
     assert violations([a, *points, b], [zone], 5.0) == 0
 
 
-def test_a_start_inside_leaves_by_the_shortest_way_and_says_so():
+def test_a_start_inside_is_left_by_the_shortest_path_and_reported():
     zone = ThreatZone.polygon('z', [(200, -100), (300, -100), (300, 90), (200, 90)])
-    found = find_detour((290, 0, 50), (0, 0, 50), [zone])
-    assert found.start_inside == ('z',)
-    assert 'start is inside zone z' in found.reason
-    assert math.dist((290, 0, 50), found.points[0]) == pytest.approx(10, abs=0.1)
-    assert not inside(found.points[0], zone)
+    result = find_detour((290, 0, 50), (0, 0, 50), [zone])
+    assert result.start_inside == ('z',)
+    assert 'start is inside zone z' in result.reason
+    assert math.dist((290, 0, 50), result.points[0]) == pytest.approx(10, abs=0.1)
+    assert not inside(result.points[0], zone)
 
 
 def test_a_start_inside_two_zones_leaves_both():
     zones = [ThreatZone.cylinder('a', (0, 0), 100), ThreatZone.cylinder('b', (120, 0), 100)]
-    found = find_detour((60, 0, 50), (60, 400, 50), zones)
-    assert found.start_inside == ('a', 'b')
-    assert math.dist((60, 0, 50), found.points[0]) == pytest.approx(80, rel=0.01)
-    assert not any(inside(found.points[0], zone) for zone in zones)
+    result = find_detour((60, 0, 50), (60, 400, 50), zones)
+    assert result.start_inside == ('a', 'b')
+    assert math.dist((60, 0, 50), result.points[0]) == pytest.approx(80, rel=0.01)
+    assert not any(inside(result.points[0], zone) for zone in zones)
 
 
-def test_a_goal_inside_is_unreachable_and_says_so():
-    found = find_detour((-500, 0, 50), (0, 0, 50), [ThreatZone.hemisphere('z', (0, 0, 0), 100)])
-    assert (found.length, found.points, found.goal_inside) == (math.inf, (), ('z',))
-    assert found.reason == 'the goal is inside zone z'
+def test_a_goal_inside_is_unreachable_and_reported():
+    result = find_detour((-500, 0, 50), (0, 0, 50), [ThreatZone.hemisphere('z', (0, 0, 0), 100)])
+    assert (result.length, result.points, result.goal_inside) == (math.inf, (), ('z',))
+    assert result.reason == 'the goal is inside zone z'
     assert detour((-500, 0, 50), (0, 0, 50), [ThreatZone.cylinder('z', (0, 0), 9)])[1] == ()
 
 
-def test_a_closed_pocket_is_unreachable_and_says_so():
-    found = find_detour((0, 0, 50), (600, 0, 50), FENCE)
-    assert (found.length, found.points, found.closed_off) == (math.inf, (), True)
-    assert found.reason == 'closed off by zones'
+def test_a_closed_pocket_is_unreachable_and_reported():
+    result = find_detour((0, 0, 50), (600, 0, 50), FENCE)
+    assert (result.length, result.points, result.closed_off) == (math.inf, (), True)
+    assert result.reason == 'closed off by zones'
 
 
 def test_a_pocket_with_a_gap_is_left_by_the_gap():

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What must hold for any ways among any zones: symmetry, triangle, more zones, scale, rotation."""
+"""Invariants of paths: symmetry, triangle inequality, more zones, scale, rotation."""
 import math
 from itertools import pairwise
 
@@ -12,7 +12,7 @@ from uav_task_alloc.geometry.detour import detour, find_detour
 from uav_task_alloc.model import Shape, ThreatZone
 
 RUNS = settings(derandomize=True, deadline=None, max_examples=40)
-TOLERANCE = 0.02  # ways are that near to the shortest; the sweep in benchmarks/ has the figures
+TOLERANCE = 0.02  # of the length; benchmarks/detours.py measures what it is
 
 
 @st.composite
@@ -23,23 +23,23 @@ def scenes(draw, points=2):
     return zones, [random_point(rng, zones, 900.0) for _ in range(points)]
 
 
-def way(a, b, zones, **more):
+def safe_path(a, b, zones, **more):
     return detour(a, b, zones, clearance=CLEARANCE, **more)
 
 
 @RUNS
 @given(scenes())
-def test_there_and_back_is_the_same_way(scene):
+def test_there_and_back_is_the_same_path(scene):
     zones, (a, b) = scene
-    there, back = way(a, b, zones), way(b, a, zones)
+    there, back = safe_path(a, b, zones), safe_path(b, a, zones)
     assert there == (back[0], tuple(reversed(back[1])))
 
 
 @RUNS
 @given(scenes())
-def test_a_way_is_never_inside_an_enlarged_zone_and_its_length_is_that_of_the_polyline(scene):
+def test_a_path_is_never_inside_an_enlarged_zone_and_its_length_is_that_of_the_polyline(scene):
     zones, (a, b) = scene
-    length, points = way(a, b, zones)
+    length, points = safe_path(a, b, zones)
     if math.isinf(length):
         return
     assert violations([a, *points, b], zones) == 0
@@ -49,23 +49,23 @@ def test_a_way_is_never_inside_an_enlarged_zone_and_its_length_is_that_of_the_po
 
 @RUNS
 @given(scenes(points=3))
-def test_a_stop_on_the_way_never_makes_it_shorter(scene):
+def test_a_stop_in_between_never_makes_a_path_shorter(scene):
     zones, (a, b, c) = scene
-    straight, first, second = (way(*ends, zones)[0] for ends in ((a, c), (a, b), (b, c)))
+    straight, first, second = (safe_path(*ends, zones)[0] for ends in ((a, c), (a, b), (b, c)))
     assert straight <= (first + second) * (1 + TOLERANCE)
 
 
 @RUNS
 @given(scenes())
-def test_more_zones_never_make_it_shorter(scene):
+def test_more_zones_never_make_a_path_shorter(scene):
     zones, (a, b) = scene
-    lengths = [way(a, b, zones[:count])[0] for count in range(len(zones) + 1)]
+    lengths = [safe_path(a, b, zones[:count])[0] for count in range(len(zones) + 1)]
     for fewer, more in pairwise(lengths):
         assert more >= fewer * (1 - TOLERANCE)
 
 
 @st.composite
-def odd_scenes(draw):
+def special_scenes(draw):
     """Zones that touch, nest, hang and are tiny, also far away; ends anywhere, also inside."""
     rng = np.random.default_rng(draw(st.integers(0, 10_000)))
     east, north = draw(st.sampled_from([(0.0, 0.0), (1e5, -7e4)]))
@@ -78,7 +78,7 @@ def odd_scenes(draw):
             ThreatZone.cylinder(f'c{k}', (x, y), r, 30.0, 60.0, margin),
             ThreatZone.cylinder(f'touching{k}', (x + 2 * r + 2 * margin, y), r, margin=margin),
             ThreatZone.hemisphere(f'nested{k}', (x, y, 20.0), 0.5 * r, margin),
-            ThreatZone.polygon(f'dented{k}', [(x, y), (x + r, y - r), (x + r, y + r),
+            ThreatZone.polygon(f'concave{k}', [(x, y), (x + r, y - r), (x + r, y + r),
                                               (x + 0.8 * r, y)], -math.inf, 50.0, margin)]
     ends = [(float(rng.uniform(-50, 550) + east), float(rng.uniform(-50, 550) + north),
              float(rng.uniform(5, 90))) for _ in range(2)]
@@ -86,24 +86,24 @@ def odd_scenes(draw):
 
 
 @RUNS
-@given(odd_scenes())
-def test_whatever_the_scene_a_path_is_clear_once_it_is_outside_and_keeps_the_limits(scene):
+@given(special_scenes())
+def test_a_path_in_any_scene_is_clear_once_outside_and_keeps_the_limits(scene):
     zones, (a, b), low, high = scene
-    found = find_detour(a, b, zones, altitude_min=low, altitude_max=high)
-    if math.isinf(found.length):
-        assert found.goal_inside or found.closed_off
+    result = find_detour(a, b, zones, altitude_min=low, altitude_max=high)
+    if math.isinf(result.length):
+        assert result.goal_inside or result.closed_off
         return
-    line = [*found.points, b] if found.start_inside else [a, *found.points, b]
+    line = [*result.points, b] if result.start_inside else [a, *result.points, b]
     assert violations(line, zones, 0.0) == 0
-    assert all(low <= z <= high for _, _, z in found.points)
-    assert found.length >= math.dist(a, b) * (1 - 1e-9)
+    assert all(low <= z <= high for _, _, z in result.points)
+    assert result.length >= math.dist(a, b) * (1 - 1e-9)
 
 
 @RUNS
 @given(scenes())
-def test_the_same_place_twice_is_no_way_at_all(scene):
+def test_a_path_to_the_start_itself_has_no_length(scene):
     zones, (a, _) = scene
-    assert way(a, a, zones) == (0.0, ())
+    assert safe_path(a, a, zones) == (0.0, ())
 
 
 def changed(zone, scale=1.0, turn=0.0):
@@ -123,9 +123,9 @@ def changed(zone, scale=1.0, turn=0.0):
 
 @RUNS
 @given(scenes(), st.floats(0.1, 10.0), st.floats(-3.0, 3.0))
-def test_scale_and_rotation_change_nothing_but_the_measure(scene, scale, turn):
+def test_scale_and_rotation_only_scale_the_length(scene, scale, turn):
     zones, ends = scene
-    here = way(*ends, zones)[0]
+    here = safe_path(*ends, zones)[0]
     moved = [changed(ThreatZone.hemisphere('p', p, 1.0), scale, turn).center for p in ends]
     there = detour(*moved, [changed(zone, scale, turn) for zone in zones],
                    clearance=scale * CLEARANCE)[0]

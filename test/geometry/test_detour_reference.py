@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A sample of ways against the dense reference; benchmarks/detours.py has the full sweep."""
+"""A sample of paths against the dense reference; benchmarks/detours.py has the full sweep."""
 import math
 
 import numpy as np
@@ -12,7 +12,7 @@ from uav_task_alloc.model import ThreatZone
 
 
 def longer(zones, pairs, rng, side):
-    """How much longer than the reference the bent ways of `pairs` random pairs are [%]."""
+    """How much longer than the reference the bent paths of `pairs` random pairs are [%]."""
     dense, excess = Dense(zones, CLEARANCE, low=0.0, ring=24, tiers=5), []
     while len(excess) < pairs:
         a, b = random_point(rng, zones, side), random_point(rng, zones, side)
@@ -30,7 +30,7 @@ def longer(zones, pairs, rng, side):
 @pytest.mark.parametrize(('count', 'apart', 'side', 'worst'), [
     (1, True, 900.0, 2.0), (5, True, 1500.0, 2.0), (5, False, 1200.0, 5.0),
     (12, False, 2500.0, 5.0)])
-def test_ways_are_hardly_longer_than_the_reference(count, apart, side, worst):
+def test_paths_are_hardly_longer_than_the_reference(count, apart, side, worst):
     rng = np.random.default_rng(count + apart)
     excess = np.concatenate([
         longer(random_zones(rng, count, apart, side), 3, rng, side) for _ in range(4)])
@@ -38,7 +38,7 @@ def test_ways_are_hardly_longer_than_the_reference(count, apart, side, worst):
     assert excess.max() <= worst
 
 
-def test_the_reference_knows_the_circle():
+def test_the_reference_is_right_around_a_circle():
     zone = ThreatZone.cylinder('z', (0, 0), 80)
     exact = 2 * math.sqrt(250 ** 2 - 80 ** 2) + 160 * math.asin(80 / 250)
     assert Dense([zone]).length((-250, 0, 5), (250, 0, 5)) == pytest.approx(exact, rel=4e-3)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Lengths on demand, from kernels, and after points and zones came, moved or vanished."""
+"""Lengths on demand, from kernels, and after points and zones were added, moved or removed."""
 import math
 
 import numba
@@ -30,7 +30,7 @@ def scene():
     return zones, np.array([random_point(rng, zones, 1500.0) for _ in range(30)])
 
 
-def around(points, zones):
+def distances_among(points, zones):
     return Distances(points, zones, clearance=CLEARANCE)
 
 
@@ -42,18 +42,18 @@ def test_without_zones_lengths_are_straight(scene):
     assert found.leg(0, 1).via == ()
 
 
-def test_a_kernel_gets_what_detour_gives(scene):
+def test_a_kernel_gets_the_lengths_of_detour(scene):
     zones, points = scene
-    found = square(around(points, zones).pairs, 30)
+    found = square(distances_among(points, zones).pairs, 30)
     for i, j in ((0, 1), (4, 7), (9, 2), (20, 21)):
         assert found[i, j] == detour(points[i], points[j], zones, clearance=CLEARANCE)[0]
     assert np.array_equal(found, found.T)
     assert np.all(np.diag(found) == 0)
 
 
-def test_a_leg_has_the_length_that_the_kernel_knows(scene):
+def test_a_leg_has_the_length_that_kernels_get(scene):
     zones, points = scene
-    found = around(points, zones)
+    found = distances_among(points, zones)
     for i in range(10):
         leg = found.leg(i, 29 - i)
         assert leg.length == found.length(i, 29 - i)
@@ -71,9 +71,9 @@ def test_a_point_inside_a_zone_can_be_left_but_not_reached():
     assert (found.zones_around(0), found.zones_around(1)) == (('z',), ())
 
 
-def test_new_moved_and_vanished_zones_touch_only_the_ways_they_cut(scene):
+def test_changed_zones_invalidate_only_the_paths_they_cut(scene):
     zones, points = scene
-    before = around(points, zones)
+    before = distances_among(points, zones)
     square(before.pairs, 30)
     other = random_zones(np.random.default_rng(8), 2, False, 1500.0)
     for change in ([*zones, other[0]], zones[1:], [other[1], *zones[2:]]):
@@ -81,14 +81,14 @@ def test_new_moved_and_vanished_zones_touch_only_the_ways_they_cut(scene):
         kept = np.isfinite(after._table.cells).sum()
         assert 0 < kept < 900
         assert square(after.pairs, 30) == pytest.approx(
-            square(around(points, change).pairs, 30), rel=1e-9)
+            square(distances_among(points, change).pairs, 30), rel=1e-9)
     assert square(before.pairs, 30) == pytest.approx(
-        square(around(points, zones).pairs, 30))
+        square(distances_among(points, zones).pairs, 30))
 
 
-def test_new_points_in_any_order_keep_what_is_known(scene):
+def test_new_points_in_any_order_keep_known_lengths(scene):
     zones, points = scene
-    before = around(points, zones)
+    before = distances_among(points, zones)
     known = square(before.pairs, 30)
     rng = np.random.default_rng(5)
     fresh = np.array([random_point(rng, zones, 1500.0) for _ in range(200)])
@@ -96,36 +96,36 @@ def test_new_points_in_any_order_keep_what_is_known(scene):
         after = before.updated(points=np.vstack([points[20:], more, points[:10]]))
         tail = len(after.points) - 10
         assert after.length(0, tail) == known[20, 0]
-        assert after.length(10, 0) == around(np.vstack([more, points[20:21]]), zones).length(
-            0, len(more))
+        fewer = distances_among(np.vstack([more, points[20:21]]), zones)
+        assert after.length(10, 0) == fewer.length(0, len(more))
     assert np.array_equal(square(before.pairs, 30), known)
 
 
-def test_zones_may_come_to_none_and_go_to_none(scene):
+def test_zones_may_be_added_to_none_and_all_removed(scene):
     zones, points = scene
     empty = Distances(points, clearance=CLEARANCE)
     assert np.array_equal(square(empty.updated(zones=zones).pairs, 30),
-                          square(around(points, zones).pairs, 30))
-    assert np.array_equal(square(around(points, zones).updated(zones=()).pairs, 30),
+                          square(distances_among(points, zones).pairs, 30))
+    assert np.array_equal(square(distances_among(points, zones).updated(zones=()).pairs, 30),
                           square(empty.pairs, 30))
 
 
-def test_beyond_the_table_a_cache_answers_the_same(scene, monkeypatch):
+def test_beyond_the_table_a_cache_gives_the_same_lengths(scene, monkeypatch):
     zones, points = scene
-    dense = square(around(points, zones).pairs, 30)
+    dense = square(distances_among(points, zones).pairs, 30)
     monkeypatch.setattr(distances, 'DENSE_MAX', 10)
-    cached = around(points, zones)
+    cached = distances_among(points, zones)
     assert np.array_equal(square(cached.pairs, 30), dense)
     assert np.array_equal(square(cached.pairs, 30), dense)
 
 
 def test_ensured_pairs_are_known_at_once(scene):
     zones, points = scene
-    found = around(points, zones)
+    found = distances_among(points, zones)
     found.ensure([0, 1], [5, 6])
     assert np.isfinite(found._table.cells).sum() == 4
 
 
-def test_a_point_that_is_no_number_is_refused():
+def test_a_point_that_is_not_finite_is_refused():
     with pytest.raises(InvalidValue, match=r'points = .*expected finite coordinates'):
         Distances([(0, 0, math.nan)])

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""WGS84 and ENU agree both ways, also over the earth's curve."""
+"""WGS84 to ENU and back, also over the earth's curvature."""
 import numpy as np
 import pytest
 
@@ -19,7 +19,7 @@ def test_the_origin_is_zero():
     assert to_enu(ZURICH, 47.397742, 8.545594, 488.0) == pytest.approx((0, 0, 0), abs=1e-6)
 
 
-def test_there_and_back_is_the_same_place():
+def test_there_and_back_is_the_same_position():
     point = (4321.0, -1234.0, 87.0)
     assert to_enu(ZURICH, *to_geodetic(ZURICH, point)) == pytest.approx(point, abs=1e-6)
 
@@ -29,14 +29,14 @@ def test_level_in_enu_climbs_above_ground_with_distance():
     assert altitude - 488.0 == pytest.approx(1.96, abs=0.05)
 
 
-def test_a_batch_gives_what_one_by_one_gives():
+def test_a_batch_converts_as_single_positions_do():
     points = np.array([(0.0, 0.0, 0.0), (100.0, 200.0, 30.0), (-3000.0, 50.0, 120.0)])
     places = to_geodetic_batch(ZURICH, points)
     assert places[1] == pytest.approx(to_geodetic(ZURICH, (100.0, 200.0, 30.0)))
     assert to_enu_batch(ZURICH, places) == pytest.approx(points, abs=1e-6)
 
 
-def test_no_points_are_no_rows():
+def test_no_points_give_no_rows():
     assert to_enu_batch(ZURICH, []).shape == (0, 3)
 
 

@@ -24,7 +24,7 @@ from uav_task_alloc.geometry.zones import outline
 from uav_task_alloc.model import ThreatZone
 
 SQUARE = [(0.0, 0.0), (10.0, 0.0), (10.0, 10.0), (0.0, 10.0)]
-DENTED = [(0.0, 0.0), (10.0, 0.0), (10.0, 10.0), (5.0, 2.0), (0.0, 10.0)]
+CONCAVE = [(0.0, 0.0), (10.0, 0.0), (10.0, 10.0), (5.0, 2.0), (0.0, 10.0)]
 grid = st.integers(-3, 3).map(float)
 corner_lists = st.lists(st.tuples(grid, grid), min_size=3, max_size=7)
 
@@ -44,7 +44,7 @@ def test_segments_that_only_touch_do_not_cross():
 def test_the_area_is_negative_clockwise():
     assert signed_area(SQUARE) == 100.0
     assert signed_area(SQUARE[::-1]) == -100.0
-    assert signed_area(DENTED) == 60.0
+    assert signed_area(CONCAVE) == 60.0
 
 
 @pytest.mark.parametrize('away', [1e3, 1e7, 9e7])
@@ -103,9 +103,9 @@ def test_kernels_and_python_agree_on_what_is_inside(corners, x, y):
 
 
 def test_a_notch_is_outside():
-    assert contains_point(DENTED, (1.0, 5.0))
-    assert not contains_point(DENTED, (5.0, 5.0))
-    assert not contains_point(DENTED, (11.0, 5.0))
+    assert contains_point(CONCAVE, (1.0, 5.0))
+    assert not contains_point(CONCAVE, (5.0, 5.0))
+    assert not contains_point(CONCAVE, (11.0, 5.0))
 
 
 def test_finding_31_edges_far_apart_are_not_compared(monkeypatch):
@@ -121,7 +121,7 @@ def test_finding_31_edges_far_apart_are_not_compared(monkeypatch):
 @pytest.mark.parametrize('corners', [
     [(0, 0), (10, 0), (10, 10), (5, -1)], [(0, 0), (10, 0), (10, 10), (5, 0)],
     [(0, 0), (10, 0), (4, 0), (4, 9)], [(5, 5), (0, 0), (9, 0), (5, 5), (5, 9)]])
-def test_finding_31_polygons_that_touch_themselves_are_refused_as_ever(corners):
+def test_finding_31_polygons_that_touch_themselves_are_refused(corners):
     for k in range(len(corners)):
         for turned in (corners[k:] + corners[:k], (corners[k:] + corners[:k])[::-1]):
             with pytest.raises(InvalidValue, match='edges that do not cross or touch'):

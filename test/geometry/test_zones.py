@@ -17,7 +17,7 @@ from uav_task_alloc.model import ThreatZone
 DOME = ThreatZone.hemisphere('dome', (0.0, 0.0, 10.0), 50.0, margin=5.0)
 TOWER = ThreatZone.cylinder('tower', (0.0, 0.0), 20.0, 30.0, 60.0)
 BLOCK = ThreatZone.polygon('block', [(0, 0), (10, 0), (10, 10), (0, 10)], 0.0, 20.0)
-DENTED = ThreatZone.polygon('dented', [(0, 0), (40, 0), (40, 40), (20, 10), (0, 40)])
+CONCAVE = ThreatZone.polygon('concave', [(0, 0), (40, 0), (40, 40), (20, 10), (0, 40)])
 
 
 @pytest.mark.parametrize(('point', 'zone', 'clearance', 'expected'), [
@@ -34,8 +34,8 @@ DENTED = ThreatZone.polygon('dented', [(0, 0), (40, 0), (40, 40), (20, 10), (0, 
     ((5, 5, 20.5), BLOCK, 0, False),
     ((10.5, 5, 5), BLOCK, 0, False),
     ((10.5, 5, 5), BLOCK, 1, True),
-    ((20, 30, 5), DENTED, 0, False),
-    ((20, 5, 5), DENTED, 0, True),
+    ((20, 30, 5), CONCAVE, 0, False),
+    ((20, 5, 5), CONCAVE, 0, True),
 ])
 def test_a_point_is_inside_the_zone_enlarged_by_margin_and_clearance(
         point, zone, clearance, expected):
@@ -51,9 +51,9 @@ def test_a_point_is_inside_the_zone_enlarged_by_margin_and_clearance(
     ((0, 0, 20), TOWER, 10.0),
     ((13, 14, 5), BLOCK, 5.0),
     ((5, 5, 25), BLOCK, 5.0),
-    ((20, 30, 0), DENTED, 20 * 20 / math.hypot(20, 30)),
+    ((20, 30, 0), CONCAVE, 20 * 20 / math.hypot(20, 30)),
 ])
-def test_the_distance_is_to_the_zone_as_it_is(point, zone, expected):
+def test_the_distance_is_to_the_zone_without_margin(point, zone, expected):
     assert distance(point, zone) == pytest.approx(expected)
 
 
@@ -62,9 +62,9 @@ def test_a_segment_beneath_the_base_of_a_dome_is_clear():
     assert not is_clear((-100, 0, 10), (100, 0, 10), [DOME])
 
 
-def test_a_segment_through_a_dent_is_clear_though_its_hull_is_not():
-    assert is_clear((20, 60, 5), (20, 15, 5), [DENTED])
-    assert not is_clear((20, 60, 5), (20, 5, 5), [DENTED])
+def test_a_segment_through_a_notch_is_clear_though_its_hull_is_not():
+    assert is_clear((20, 60, 5), (20, 15, 5), [CONCAVE])
+    assert not is_clear((20, 60, 5), (20, 5, 5), [CONCAVE])
 
 
 def test_a_segment_that_slopes_over_the_top_is_clear():
