@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A map that is being drawn: zones, ways and marks go on at once, names when all is there."""
+"""A map built step by step: shapes are added at once, labels placed when all shapes are known."""
 from __future__ import annotations
 
 import math
@@ -12,24 +12,29 @@ from typing import Any
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Polygon
 
+import uav_task_alloc.plots.style as style
 from uav_task_alloc.model import Point, Shape, ThreatZone
-from uav_task_alloc.plots import style
+from uav_task_alloc.palette import DARK_RED, RED, uav_colour
 from uav_task_alloc.plots.labels import Label, place_labels
-from uav_task_alloc.plots.style import RED, ROUTE, SMALL
+from uav_task_alloc.plots.style import ROUTE, SMALL
 
 
-class Map:
-    """East to the right, north up, in metres."""
+class MapFigure:
+    """A map of zones, routes and tasks: east to the right, north up, in metres.
+
+    Args:
+        points: of the tasks [m]; rings show hemispheres at their median height.
+        tasks: how many will be drawn.
+    """
 
     def __init__(self, points: Iterable[Point], tasks: int) -> None:
-        """`points` [m] are those that most is flown at; `tasks` how many there will be."""
         self.figure = Figure(figsize=style.SIZE, dpi=style.DPI, layout='constrained')
         self.axes = self.figure.add_subplot()
         self.height = median([point[2] for point in points] or [0.0])
-        self.names = tasks <= style.CROWD
+        self.shows_names = tasks <= style.MAX_NAMED_TASKS
         self._labels: list[Label] = []
-        self._ways: list[list[tuple[float, float]]] = []
-        self._domes = 0
+        self._routes: list[list[tuple[float, float]]] = []
+        self._rings = 0
         self._zones = 0
         axes = self.axes
         axes.set_aspect('equal', adjustable='datalim')
@@ -42,11 +47,12 @@ class Map:
             axes.spines[side].set_visible(False)
 
     def zone(self, zone: ThreatZone, note: str = '', late: bool = False) -> None:
-        """The footprint, dashed where it came late; round ones with their margin (dotted)."""
+        """Add the footprint of a zone, dashed where `late`; dotted: the margin of a round one."""
         self._zones += 1
-        for look in ({'fill': False, 'lw': 0.0, 'hatch': '///', 'ec': (*style.ZONE[:3], 0.3)},
-                     {'fc': style.ZONE, 'ec': RED, 'lw': 2.0, 'ls': '--' if late else '-'}):
-            self.axes.add_patch(_footprint(zone, **look))
+        hatch = {'fill': False, 'lw': 0.0, 'hatch': '///', 'ec': (*style.ZONE_FILL[:3], 0.3)}
+        area = {'fc': style.ZONE_FILL, 'ec': RED, 'lw': 2.0, 'ls': '--' if late else '-'}
+        for options in (hatch, area):
+            self.axes.add_patch(_footprint(zone, **options))
         if zone.shape is Shape.POLYGON:
             x, y = (sum(values) / len(values) for values in zip(*zone.vertices, strict=True))
         else:
@@ -54,74 +60,74 @@ class Map:
             self.axes.add_patch(Circle((x, y), zone.radius + zone.margin, fill=False, ec=RED,
                                        lw=1.0, ls=':', zorder=2))
             self._ring(zone)
-        text = '\n'.join(filter(None, (zone.id, style.heights(zone), note)))
-        self._labels.append(Label(text, x, y, SMALL, 12.0, style.DARK_RED, bold=True, within=True))
+        text = '\n'.join(filter(None, (zone.id, style.height_text(zone), note)))
+        self._labels.append(Label(text, x, y, SMALL, 12.0, DARK_RED, bold=True, within=True))
 
     def _ring(self, zone: ThreatZone) -> None:
-        """Where a dome is at the height that most is flown at."""
+        """The section of a hemisphere at the median height of the tasks."""
         above = self.height - zone.center[2]
         if zone.shape is Shape.HEMISPHERE and 0.0 < above < zone.radius:
-            self._domes += 1
+            self._rings += 1
             self.axes.add_patch(Circle(zone.center[:2], math.sqrt(zone.radius ** 2 - above ** 2),
-                                       fc=style.ZONE, ec=RED, lw=1.0, zorder=2))
+                                       fc=style.ZONE_FILL, ec=RED, lw=1.0, zorder=2))
 
-    def way(self, points: Sequence[Point], index: int, arrows: bool = False) -> None:
-        """What a UAV flies; arrows show where to."""
+    def route(self, points: Sequence[Point], index: int, arrows: bool = False) -> None:
+        """Add the route or track of a UAV, with arrows in flight direction if asked for."""
         flat = [(point[0], point[1]) for point in points]
-        self._ways.append(flat)
-        width = ROUTE if self.names else 0.6 * ROUTE
+        self._routes.append(flat)
+        width = ROUTE if self.shows_names else 0.6 * ROUTE
         xs, ys = zip(*flat, strict=True)
         self.axes.plot(xs, ys, color='white', lw=width + 2.0, zorder=4, solid_capstyle='round')
-        self.axes.plot(xs, ys, color=style.colour(index), ls=style.line(index), lw=width,
+        self.axes.plot(xs, ys, color=uav_colour(index), ls=style.line_style(index), lw=width,
                        zorder=4.1, solid_capstyle='round')
         for (x0, y0), (x1, y1) in pairwise(flat) if arrows else ():
             self.axes.annotate('', (0.4 * x0 + 0.6 * x1, 0.4 * y0 + 0.6 * y1),
                                (0.45 * x0 + 0.55 * x1, 0.45 * y0 + 0.55 * y1), zorder=4.2,
                                arrowprops={'arrowstyle': '-|>', 'mutation_scale': 24.0, 'lw': 0.0,
-                                           'color': style.colour(index)})
+                                           'color': uav_colour(index)})
 
     def home(self, point: Point, name: str, index: int) -> None:
-        """Where a UAV starts."""
-        self.axes.plot(point[0], point[1], 's', ms=14, color=style.colour(index), mec='black',
+        """Add the start of a UAV."""
+        self.axes.plot(point[0], point[1], 's', ms=14, color=uav_colour(index), mec='black',
                        mew=1.4, zorder=7)
         self._labels.append(Label(name, point[0], point[1], style.PLAIN, 11.0, bold=True))
 
     def task(self, point: Point, fill: str, name: str, marker: str = 'o', edge: str = 'black',
              number: int | None = None) -> None:
-        """A task, with its number in the order where it has one."""
-        missed = edge == RED
-        size = (17.0 if number is not None else 12.0) if self.names else 5.0
+        """Add a task, with its position in the route if it has one."""
+        is_missed = edge == RED
+        size = (17.0 if number is not None else 12.0) if self.shows_names else 5.0
         self.axes.plot(point[0], point[1], marker, ms=size, color=fill, mec=edge,
-                       mew=2.6 if missed else 1.0, zorder=6)
-        if not self.names:
+                       mew=2.6 if is_missed else 1.0, zorder=6)
+        if not self.shows_names:
             return
         if number is not None:
             self.axes.annotate(str(number), point[:2], ha='center', va='center_baseline',
                                fontsize=SMALL, fontweight='bold', color=style.ink(fill), zorder=8)
         self._labels.append(Label(name, point[0], point[1], SMALL, size / 2.0 + 3.0,
-                                  RED if missed else 'black'))
+                                  RED if is_missed else 'black'))
 
     def lost(self, point: Point, text: str) -> None:
-        """Where a UAV fell silent."""
+        """Add the position at which a UAV was lost."""
         self.axes.plot(point[0], point[1], 'X', ms=18, color='black', mec='white', mew=1.4,
                        zorder=9)
         self._labels.append(Label(text, point[0], point[1], style.PLAIN, 13.0, bold=True))
 
     def finish(self, title: str, handles: Sequence[Any], png: str | Path) -> None:
-        """Title, legend, names, scale bar, file."""
-        zone = 'no-fly zone' + f'\n(inner ring: at {self.height:.0f} m)' * bool(self._domes)
+        """Add title, legend, labels and scale bar, save. Raises OSError."""
+        zone = 'no-fly zone' + f'\n(inner ring: at {self.height:.0f} m)' * bool(self._rings)
         self.axes.set_title(title, loc='left', fontsize=style.LARGE, fontweight='bold', pad=12)
         style.legend(self.figure, [*handles, *[style.zone_handle(zone)] * bool(self._zones)])
         self.axes.margins(0.07)
-        self.figure.draw_without_rendering()  # only now the limits are what they will be
+        self.figure.draw_without_rendering()  # makes the limits final
         low, high = self.axes.get_xlim()
-        place_labels(self.axes, self._labels, self._ways)
+        place_labels(self.axes, self._labels, self._routes)
         if handles:
             self._scale_bar(high - low)
         self.figure.savefig(png)
 
     def _scale_bar(self, width: float) -> None:
-        """Beneath the legend, where nothing else is; `width` [m] of the map."""
+        """Below the legend; `width` [m] of the map."""
         metres = max(factor * 10.0 ** power for power in range(-3, 9) for factor in (1, 2, 5)
                      if factor * 10.0 ** power <= width / 6.0)
         left, share = 1.03, metres / width
@@ -131,10 +137,10 @@ class Map:
             f'{metres:g} m', (left + share / 2.0, 0.015), ha='center', va='bottom',
             xycoords='axes fraction', fontsize=style.PLAIN, annotation_clip=False)
         for each in (bar, text):
-            each.set_in_layout(False)  # it stands where there is room
+            each.set_in_layout(False)  # outside the axes on purpose
 
 
-def _footprint(zone: ThreatZone, **look: Any) -> Polygon | Circle:
+def _footprint(zone: ThreatZone, **options: Any) -> Polygon | Circle:
     if zone.shape is Shape.POLYGON:
-        return Polygon(zone.vertices, zorder=2, **look)
-    return Circle(zone.center[:2], zone.radius, zorder=2, **look)
+        return Polygon(zone.vertices, zorder=2, **options)
+    return Circle(zone.center[:2], zone.radius, zorder=2, **options)
