@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The browser of the tests: where it is, how it is started, how long it is waited for."""
+"""The browser of the tests: found, started, waited for."""
 import subprocess
 from contextlib import contextmanager
 from pathlib import Path
@@ -12,14 +12,14 @@ ARGS = [
 
 
 def find():
-    """Its path; '' where there is none."""
-    found = subprocess.run([FINDER, '--find'], capture_output=True, text=True)
-    return found.stdout.strip()
+    """The path of Chromium; '' where there is none."""
+    process = subprocess.run([FINDER, '--find'], capture_output=True, text=True)
+    return process.stdout.strip()
 
 
 @contextmanager
 def started(path):
-    """A browser while it is needed; ImportError without playwright."""
+    """A running browser, closed at the end. Raises ImportError without playwright."""
     from playwright.sync_api import sync_playwright
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=path, headless=True, args=ARGS)
@@ -28,13 +28,13 @@ def started(path):
 
 
 def open_page(page, address):
-    """Go there and wait until it is drawn."""
+    """Open an address and wait until the map is drawn."""
     page.goto(address)
     page.wait_for_selector('#map .main-svg', timeout=WAIT)
 
 
 def wait(page, where, expected):
-    """Until the text of a node holds `expected`."""
+    """Wait until the text of a node contains `expected`."""
     page.wait_for_function(
         '([where, text]) => document.querySelector(where).innerText.includes(text)',
         arg=[where, expected], timeout=WAIT)

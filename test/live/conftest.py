@@ -1,24 +1,24 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A page served from a small run, and a real browser to look at it."""
+"""A page served from a small run, and a real browser."""
 import os
 
 import chromium
 import pytest
 from small_run import FIRST, LATER, Run
 
-from uav_task_alloc.live.server import Server
+from uav_task_alloc.live.server import PageServer
 
 
 @pytest.fixture
 def run():
-    return Run().hear(*FIRST).hear(*LATER)
+    return Run().add(*FIRST).add(*LATER)
 
 
 @pytest.fixture
 def serve():
-    """serve(board, port=0) -> a Server that has started; stopped at the end."""
-    def serve(board, port=0, host='127.0.0.1'):
-        serve.servers.append(Server(board, host, port))
+    """serve(snapshots, port=0) -> a PageServer that has started; stopped at the end."""
+    def serve(snapshots, port=0, host='127.0.0.1'):
+        serve.servers.append(PageServer(snapshots, host, port))
         serve.servers[-1].start()
         return serve.servers[-1]
 
@@ -43,7 +43,7 @@ def browser():
 @pytest.fixture(scope='module')
 def window(browser):
     """(tab, server) for one page after another: a tab has to read plotly.js only once."""
-    server = Server(Run().board, '127.0.0.1', 0)
+    server = PageServer(Run().snapshots, '127.0.0.1', 0)
     server.start()
     context = browser.new_context()
     yield context.new_page(), server
@@ -53,19 +53,19 @@ def window(browser):
 
 @pytest.fixture
 def view(window):
-    """view(board) -> a page of it, drawn; fails on any error that the page reports."""
+    """view(snapshots) -> a page of it, drawn; fails on any error that the page reports."""
     page, server = window
     errors = []
 
     def on_error(error):
         errors.append(str(error))
 
-    def on_console(said):
-        if said.type == 'error' and 'ERR_' not in said.text:  # net::ERR_...: a lost server
-            errors.append(said.text)
+    def on_console(message):
+        if message.type == 'error' and 'ERR_' not in message.text:  # net::ERR_: no server
+            errors.append(message.text)
 
-    def view(board, scheme='light'):
-        server.board = board
+    def view(snapshots, scheme='light'):
+        server.snapshots = snapshots
         page.set_viewport_size({'width': 1600, 'height': 900})
         page.emulate_media(color_scheme=scheme)
         chromium.open_page(page, server.address)

@@ -50,7 +50,7 @@ def zones(wall, *rows):
 
 
 def held(wall, uav, state, why, seconds, back=''):
-    """What the diagnostics of a bridge say of who has a UAV."""
+    """The diagnostics of a bridge on the authority over a UAV."""
     return {'kind': 'uploads', 'wall': wall, 'uploads': {}, 'health': {}, 'authority': {
         uav: {'state': state, 'why': why, 'for': seconds, 'back': back}}}
 
@@ -59,12 +59,12 @@ def uavs(wall):
     return [state(wall, 'u1', (100.0, 100.0)), state(wall, 'u2', (500.0, 100.0))]
 
 
-FIRST = [  # what is heard in the first second
+FIRST = [  # the first second
     announced(BEGIN, ['t1', 't2', 't3']), *uavs(BEGIN),
     listed(BEGIN, 'u1', 1, ['t1', 't2']), listed(BEGIN, 'u2', 1, ['t3']),
     planned(BEGIN, 1, 'ADD t1, ADD t2, ADD t3', u1=['t1', 't2'], u2=['t3']),
     statuses(BEGIN, t1='ACTIVE u1', t2='ASSIGNED u1', t3='ACTIVE u2')]
-LATER = [  # twenty seconds on: t1 is done, two tasks come, a zone lies on one of them
+LATER = [  # twenty seconds later: t1 is done, two tasks are new, one of them inside a zone
     *uavs(BEGIN + 20), zones(BEGIN + 20, ('z1', 300.0, 420.0, 60.0)),
     announced(BEGIN + 20, ['t4', 't5']),
     listed(BEGIN + 20, 'u1', 2, []), listed(BEGIN + 20, 'u2', 2, ['t3', 't4', 't2']),
@@ -74,16 +74,16 @@ LATER = [  # twenty seconds on: t1 is done, two tasks come, a zone lies on one o
 
 
 class Run:
-    """A scene and its board, fed by hand."""
+    """A scene and its snapshot store, without any node."""
 
     def __init__(self):
-        self.scene, self.board = Scene(RunState()), SnapshotStore()
+        self.scene, self.snapshots = Scene(RunState()), SnapshotStore()
 
-    def hear(self, *lines):
-        """Take lines of one moment, and put what is new on the board."""
+    def add(self, *lines):
+        """Apply lines of one moment and store the changes."""
         for line in lines:
-            self.scene.take(line)
-        wall, heard = lines[-1]['wall'], self.scene.heard
-        self.board.put(wall, {'start': heard.start(), 'speedup': 1.0, 'live': True},
-                       *self.scene.news(wall))
+            self.scene.apply(line)
+        wall, run = lines[-1]['wall'], self.scene.run
+        self.snapshots.put(wall, {'start': run.start(), 'speedup': 1.0, 'live': True},
+                       *self.scene.updates(wall))
         return self

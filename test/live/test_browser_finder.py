@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""tools/browser.sh on a machine that is made up: a PATH with nothing but what the script needs."""
+"""tools/browser.sh with a PATH of only the programs that it needs."""
 import shutil
 import subprocess
 
@@ -26,19 +26,19 @@ def program(path, status=0):
     return str(path)
 
 
-def test_one_that_is_named_comes_first(find, tmp_path):
+def test_a_browser_named_by_chromium_comes_first(find, tmp_path):
     program(tmp_path / 'chromium')
     named = program(tmp_path / 'mine')
     assert find(CHROMIUM=named).stdout == named + '\n'
 
 
-def test_one_that_does_not_run_is_passed_over(find, tmp_path):
+def test_a_browser_that_does_not_start_is_skipped(find, tmp_path):
     program(tmp_path / 'chromium', status=1)
     found = program(tmp_path / 'google-chrome')
     assert find(CHROMIUM='no such').stdout == found + '\n'
 
 
-def test_without_any_nothing_is_printed_and_only_who_requires_one_fails(find):
+def test_without_a_browser_it_fails_only_where_one_is_required(find):
     found, required = find(), find(REQUIRE_BROWSER='1')
     assert (found.stdout, found.returncode) == ('', 0)
     assert (required.stdout, required.returncode) == ('', 1)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The live page in a real browser: what a person looks for, and what the picture shows."""
+"""The live page in a real browser: answers, panels and the pixels of the map."""
 import io
 import re
 
@@ -22,18 +22,18 @@ def find(page, task, expected):
 
 
 def pixels(page, where):
-    """(height, width, 3) in 0..1 of what is seen of a node."""
+    """(height, width, 3) in 0..1 of the visible part of a node."""
     return matplotlib.image.imread(io.BytesIO(page.locator(where).screenshot()))[..., :3]
 
 
 def share(image, colour, near=0.06):
-    """How much of an image has a colour #rrggbb."""
+    """The share of an image that has a colour #rrggbb."""
     wanted = np.array([int(colour[k:k + 2], 16) / 255 for k in (1, 3, 5)])
     return float(np.mean(np.abs(image - wanted).max(axis=2) < near))
 
 
 def test_which_uav_serves_a_task_next(view, run):
-    page = view(run.board)
+    page = view(run.snapshots)
     assert find(page, 't3', 'u2 flies t3 next; it gets there in about 0:10 min.')
     assert find(page, 't2', 'u2 flies t2 as number 3 of its list, after t3, t4;')
     assert find(page, 't1', 't1 is done: u1 completed it.')
@@ -46,47 +46,47 @@ def test_which_uav_serves_a_task_next(view, run):
     wait(page, '#answer', 'u2 flies t3 next')
 
 
-def test_who_has_a_uav_since_when_why_and_what_gives_it_back(view):
+def test_authority_is_shown_with_its_time_its_reason_and_what_gives_it_back(view):
     why = f'AUTO -> LOITER {HOSTILE}'
-    run = Run().hear(
+    run = Run().add(
         state(BEGIN, 'u1', (0.0, 0.0), authority='LOST', available=False,
               reason=f'authority LOST: {why}; given back by ~/hand_over'),
         state(BEGIN, 'u2', (0.0, 0.0), authority='HELD', available=False, reason='no position'),
         held(BEGIN, 'u1', 'LOST', why, 65.0, '~/hand_over'),
         held(BEGIN, 'u2', 'HELD', 'takeoff is true', 5.0))
-    page = view(run.board)
+    page = view(run.snapshots)
     wait(page, '#uavs', 'Authority LOST since')
-    said = text(page, '#uavs details:nth-child(1) .holder')
-    assert said.endswith(f'(1:05): {why}. Given back by ~/hand_over.')
-    assert text(page, '#uavs details:nth-child(2) .holder').endswith(
+    shown = text(page, '#uavs details:nth-child(1) .authority')
+    assert shown.endswith(f'(1:05): {why}. Given back by ~/hand_over.')
+    assert text(page, '#uavs details:nth-child(2) .authority').endswith(
         '(0:05): takeoff is true. Not available: no position.')
     assert page.locator('img').count() == 0
     assert page.evaluate('window.hacked') is None
 
 
 def test_why_a_task_is_unassigned(view, run):
-    page = view(run.board)
+    page = view(run.snapshots)
     assert text(page, '#left') == 't5: inside zone z1'
     assert find(page, 't5', 'Nobody flies t5: it is left out. Why: inside zone z1.')
 
 
 def test_what_the_last_replan_changed(view, run):
-    page = view(run.board)
-    said = text(page, '#replan')
-    assert 'Plan 2, 0:20, solved in 22 ms. Because: new task t4.' in said
-    assert 'u1: − t2 (now u2)' in said
-    assert 'u2: + t4 (new in the plan), + t2 (from u1)' in said
-    run.hear(*uavs(BEGIN + 25), planned(BEGIN + 25, 3, 'background', u1=[],
+    page = view(run.snapshots)
+    shown = text(page, '#replan')
+    assert 'Plan 2, 0:20, solved in 22 ms. Because: new task t4.' in shown
+    assert 'u1: − t2 (now u2)' in shown
+    assert 'u2: + t4 (new in the plan), + t2 (from u1)' in shown
+    run.add(*uavs(BEGIN + 25), planned(BEGIN + 25, 3, 'background', u1=[],
                                         u2=['t2', 't4', 't3']))
     wait(page, '#replan', 'u2: ↻ order changed')
-    run.hear(*uavs(BEGIN + 30), planned(BEGIN + 30, 4, 'u1 silent', u1=[],
+    run.add(*uavs(BEGIN + 30), planned(BEGIN + 30, 4, 'u1 silent', u1=[],
                                         u2=['t2', 't4', 't3']))
     wait(page, '#replan', 'Nothing changed for any UAV.')
     assert 'The last that changed something\nPlan 3' in re.sub('\n+', '\n', text(page, '#replan'))
 
 
-def test_the_picture_shows_zones_routes_and_tasks(view, run):
-    page = view(run.board)
+def test_the_map_shows_zones_routes_and_tasks(view, run):
+    page = view(run.snapshots)
     wait(page, '#map', 'z1')
     image = pixels(page, '#map')
     # the fill of a zone is a quarter of its colour on white
@@ -101,7 +101,7 @@ def test_the_picture_shows_zones_routes_and_tasks(view, run):
 
 
 def test_it_fits_on_a_phone_and_on_a_projector(view, run):
-    page = view(run.board, scheme='dark')
+    page = view(run.snapshots, scheme='dark')
     for width, height in ((390, 844), (1024, 768), (1920, 1080)):
         page.set_viewport_size({'width': width, 'height': height})
         page.wait_for_function(  # nothing is wider than the screen, once plotly has followed
@@ -113,15 +113,15 @@ def test_it_fits_on_a_phone_and_on_a_projector(view, run):
     assert share(pixels(page, '#map'), '#191f25') > 0.5
 
 
-def test_the_past_is_shown_again_and_now_after_that(view, run):
-    page = view(run.board)
+def test_a_moment_of_the_past_is_shown_and_then_the_present_again(view, run):
+    page = view(run.snapshots)
     page.locator('#scrub').fill(str(BEGIN + 10))
     wait(page, '#moment', '0:10, 0:10 ago')
     wait(page, '#counts', '0 of 3 tasks done')
     assert find(page, 't2', 'u1 flies t2 as number 2 of its list, after t1')
     assert 'Plan 1' in text(page, '#replan')
     assert 'z1' not in text(page, '#map')
-    run.hear(statuses(BEGIN + 21, t1='COMPLETED u1', t2='COMPLETED u2'), *uavs(BEGIN + 21))
+    run.add(statuses(BEGIN + 21, t1='COMPLETED u1', t2='COMPLETED u2'), *uavs(BEGIN + 21))
     wait(page, '#moment', '0:10, 0:11 ago')
     assert 'u1 flies t2' in text(page, '#answer')
     page.click('#live')
@@ -129,34 +129,34 @@ def test_the_past_is_shown_again_and_now_after_that(view, run):
     wait(page, '#counts', '2 of 5 tasks done')
 
 
-def test_a_silent_uav_is_told_so(view, run):
-    page = view(run.board)
+def test_a_silent_uav_is_marked(view, run):
+    page = view(run.snapshots)
     assert 'link good' in text(page, '#uavs')
-    run.hear(uavs(BEGIN + 30)[0])
+    run.add(uavs(BEGIN + 30)[0])
     wait(page, '#counts', '2 UAVs, 1 silent')
     assert 'silent for 0:10' in text(page, '#uavs details:nth-child(2)')
 
 
-def test_a_page_says_that_it_is_stale_and_comes_back_by_itself(view, run, serve):
-    page, server = view(run.board), serve(run.board)
+def test_a_page_says_that_it_is_stale_and_reconnects_by_itself(view, run, serve):
+    page, server = view(run.snapshots), serve(run.snapshots)
     page.goto(server.address)
     wait(page, '#counts', '1 of 5 tasks done')
     assert page.is_hidden('#banner')
     server.stop()
-    wait(page, 'body', 'No word from live_view for 0:0')
+    wait(page, 'body', 'No data from live_view for 0:0')
     assert 'u2' in text(page, '#uavs')  # the last that was known
-    serve(Run().hear(*FIRST).board, server.port)
+    serve(Run().add(*FIRST).snapshots, server.port)
     page.wait_for_selector('#banner', state='hidden', timeout=WAIT)
     wait(page, '#counts', '0 of 3 tasks done')
 
 
 def test_a_hostile_name_is_only_text(view):
-    run = Run().hear(
+    run = Run().add(
         *uavs(BEGIN), announced(BEGIN, [HOSTILE, '__proto__', 'constructor']),
         listed(BEGIN, 'u1', 1, [HOSTILE, 'constructor']),
         planned(BEGIN, 1, f'ADD {HOSTILE}', u1=[HOSTILE, 'constructor']),
         statuses(BEGIN, **{HOSTILE: 'ASSIGNED u1', '__proto__': f'UNASSIGNED  {HOSTILE}'}))
-    page = view(run.board)
+    page = view(run.snapshots)
     wait(page, '#map', HOSTILE)
     assert find(page, HOSTILE, f'u1 flies {HOSTILE} next')
     assert find(page, '__proto__', f'Why: {HOSTILE}.')
@@ -167,14 +167,14 @@ def test_a_hostile_name_is_only_text(view):
 
 
 def test_the_page_sends_nothing_but_get(view, run):
-    asked = []
-    page = view(run.board)
-    page.on('request', lambda request: asked.append((request.method, request.url)))
+    requests = []
+    page = view(run.snapshots)
+    page.on('request', lambda request: requests.append((request.method, request.url)))
     page.reload()
     page.wait_for_selector('#map .main-svg', timeout=WAIT)
     for button in page.locator('button:visible').all():
         button.click()
     page.locator('#scrub').fill(str(BEGIN + 10))
     wait(page, '#moment', 'ago')
-    assert {method for method, _ in asked} == {'GET'}
-    assert all(url.startswith((view.server.address, 'data:')) for _, url in asked)
+    assert {method for method, _ in requests} == {'GET'}
+    assert all(url.startswith((view.server.address, 'data:')) for _, url in requests)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the folder of a demo loses when the next demo begins, and what is never removed."""
+"""The output folder of a demo: its own files are removed, others never."""
 import re
 
 import pytest
@@ -18,7 +18,7 @@ def everything(folder):
 
 @pytest.fixture
 def flown(tmp_path):
-    """The folder of a demo that was flown."""
+    """The output folder of a finished demo."""
     folder = tmp_path / 'parent' / 'out'
     run_folder.prepare(folder)
     for name in OWN:
@@ -33,7 +33,7 @@ def test_finding_34_files_of_an_earlier_demo_are_removed(flown):
 
 @pytest.mark.parametrize('name', ['notes.txt', 'state/notes.txt', 'flight.mcap', 'sub/map.png',
                                   '.git'])
-def test_finding_34_one_strange_file_keeps_all_of_them(flown, name):
+def test_finding_34_one_foreign_file_keeps_all_of_them(flown, name):
     (flown / name).parent.mkdir(exist_ok=True)
     (flown / name).write_text('mine')
     before = everything(flown)
@@ -52,7 +52,7 @@ def test_finding_34_files_that_only_have_the_names_of_a_demo_are_kept(flown):
     assert everything(flown) == before
 
 
-def test_a_folder_of_a_demo_before_there_were_markers_is_known_by_its_logs(flown):
+def test_the_folder_of_a_version_without_marker_is_identified_by_its_logs(flown):
     (flown / run_folder.MARKER).unlink()
     for name in run_folder.LOGS:
         (flown / name).write_text('x')

@@ -222,11 +222,11 @@ cancels: [{task: t1, at: 3}]
 
 
 def test_the_page_in_docs_is_fresh():
-    assert (ROOT / 'docs/scenarios.md').read_text() == document.markdown_text()
+    assert (ROOT / 'docs/scenarios.md').read_text() == document.scenario_page()
 
 
 def test_the_example_of_the_page_is_read():
-    text = document.markdown_text().split('```yaml\n')[1].split('```')[0]
+    text = document.scenario_page().split('```yaml\n')[1].split('```')[0]
     assert len(scenario.parse(text).tasks) == 2
 
 

@@ -6,7 +6,7 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as d
 from vehicle_bench import ORIGIN, Bench, waypoint
 
-from uav_task_alloc.record.ground_truth import Truth
+from uav_task_alloc.record.ground_truth import GroundTruth
 from uav_task_alloc.sim.config import FlightMode, VehicleConfig
 from uav_task_alloc.sim.modes import px4_mode
 from uav_task_alloc.sim.udp_fleet import UdpFleet
@@ -139,7 +139,7 @@ def test_the_log_tells_only_what_applies_and_the_record_reads_it(tmp_path):
         'mode': {'mode': 16, 'cause': 'pilot'}, 'armed': {'cause': 'pilot'},
         'failsafe': {'cause': 'fence'}, 'kill_switch': {'cause': 'pilot'},
         'disarmed': {'cause': 'pilot'}}
-    truth = Truth()
+    truth = GroundTruth()
     for line in lines:
-        truth.take(line)
+        truth.apply(line)
     assert len(truth.tracks['uav_1']) == 1

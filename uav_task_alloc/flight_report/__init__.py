@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The report of a recorded flight: what it tells (story), drawn (figures), as HTML (page)."""
+"""The report of a recorded flight: data (flight_history), figures (figures), HTML (page)."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A flight as one HTML file that needs no network: figures that can be zoomed, and tables."""
+"""The report as one HTML file without network access: interactive figures and tables."""
 from __future__ import annotations
 
 from collections import Counter
@@ -13,10 +13,10 @@ from plotly.offline import get_plotlyjs
 
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.flight_report.figures import all_figures
-from uav_task_alloc.flight_report.story import Span, Story, fold
+from uav_task_alloc.flight_report.flight_history import FlightHistory, StateSpan, read_history
 from uav_task_alloc.record.bag_reader import BagReader
 
-# what a task or UAV is called comes from the network: no more may be run than is written here
+# names of tasks and UAVs come from the network: no other script may run, nothing is loaded
 POLICY = ("default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; "
           "img-src data: blob:")
 STYLE = """body { font: 15px/1.45 sans-serif; margin: 1.5em auto; max-width: 1300px;
@@ -24,131 +24,147 @@ STYLE = """body { font: 15px/1.45 sans-serif; margin: 1.5em auto; max-width: 130
 table { border-collapse: collapse; margin: 0.5em 0 2em }
 th, td { border-bottom: 1px solid #ddd; padding: 3px 10px; text-align: left; vertical-align: top }
 th { background: #f4f6f8 } td.n { text-align: right; font-variant-numeric: tabular-nums }
-.trouble { background: #fff3cd; border-left: 5px solid #e69f00; padding: 0.6em 1em }
+.warning { background: #fff3cd; border-left: 5px solid #e69f00; padding: 0.6em 1em }
 details { margin: 1em 0 } summary { cursor: pointer; font-size: 1.3em; font-weight: bold }"""
 CONFIG = {'displaylogo': False, 'responsive': True,
-          'showSendToCloud': False}  # plotly's bar has a button for that otherwise
+          'showSendToCloud': False}  # a default button of plotly's toolbar
 Cell = str | float | int | None
 
 
-def write_report(bag: Path, html: Path) -> tuple[Story, list[str]]:
-    """Draw the report of an MCAP file from it alone; the story, and what could not be read.
+def write_report(bag: Path, html: Path) -> tuple[FlightHistory, list[str]]:
+    """Write the report of an MCAP file.
 
-    Raises OSError where a file cannot be opened, InvalidValue where it tells of no flight.
+    Args:
+        bag: the MCAP file.
+        html: the report.
+
+    Returns:
+        The flight, and warnings on damage and undecodable messages.
+
+    Raises:
+        OSError: a file cannot be read or written.
+        InvalidValue: the MCAP file has no messages of a fleet.
     """
     reader = BagReader(bag)
-    story = fold(reader)
-    trouble = [f'{bag.name}: {reader.trouble}; here is what came before'] * bool(reader.trouble)
-    trouble += [f'{count} messages of {topic} could not be decoded'
-                for topic, count in reader.unread.items()]
-    if not story.tasks() and not story.tracks:
+    history = read_history(reader)
+    warnings = [f'{bag.name}: {reader.damage}; the report covers what is before'] * bool(
+        reader.damage)
+    warnings += [f'{count} messages of {topic} could not be decoded'
+                for topic, count in reader.undecodable.items()]
+    if not history.tasks() and not history.tracks:
         raise InvalidValue('file', str(bag), 'messages of a fleet in it, found '
                            f'{reader.counted.total()} of {len(reader.counted)} topics'
-                           + f' ({reader.trouble})' * bool(reader.trouble))
-    html.write_text(page(story, bag.name, trouble), encoding='utf-8')
-    return story, trouble
+                           + f' ({reader.damage})' * bool(reader.damage))
+    html.write_text(report_page(history, bag.name, warnings), encoding='utf-8')
+    return history, warnings
 
 
-def page(story: Story, name: str, trouble: Iterable[str] = ()) -> str:
-    """The whole file."""
+def report_page(history: FlightHistory, name: str, warnings: Iterable[str] = ()) -> str:
+    """The report as HTML.
+
+    Args:
+        history: of the flight.
+        name: of the MCAP file.
+        warnings: shown above the tables.
+    """
     figures = ''.join(
         figure.to_html(full_html=False, include_plotlyjs=False, div_id=div, config=CONFIG)
-        for div, figure in all_figures(story))
-    head = f'Flight of {began(story)}'
+        for div, figure in all_figures(history))
+    head = f'Flight of {start_time(history)}'
     parts = [
         '<!DOCTYPE html><html lang="en"><head><meta charset="utf-8">',
         f'<meta http-equiv="Content-Security-Policy" content="{POLICY}">',
         f'<title>{escape(head)}</title><style>{STYLE}</style>',
         f'<script>{get_plotlyjs()}</script></head><body><h1>{escape(head)}</h1>',
-        *(f'<p class="trouble">{escape(text)}</p>' for text in trouble),
-        html_table('Key figures', (f'of {name}', ''), key_figures(story)),
-        figures, tables(story), '</body></html>']
+        *(f'<p class="warning">{escape(text)}</p>' for text in warnings),
+        html_table('Key figures', (f'of {name}', ''), key_figures(history)),
+        figures, tables(history), '</body></html>']
     return '\n'.join(parts)
 
 
-def began(story: Story) -> str:
-    """Date and time of the first line."""
+def start_time(history: FlightHistory) -> str:
+    """Date and time of the first line, as text."""
     try:
-        return datetime.fromtimestamp(story.heard.first, timezone.utc).strftime('%F %T UTC')
+        return datetime.fromtimestamp(history.run.first, timezone.utc).strftime('%F %T UTC')
     except (OverflowError, ValueError, OSError):
-        return 'an unknown day'
+        return 'unknown date'
 
 
-def key_figures(story: Story) -> list[tuple[Cell, ...]]:
-    """What an operator asks first."""
-    counts = Counter(story.status(task).state for task in story.tasks())
-    times = [plan.milliseconds for plan in story.replans]
-    flown = sum(story.metres(uav) for uav in story.tracks)
-    planned = sum(story.metres_planned(uav) for uav in story.tracks)
+def key_figures(history: FlightHistory) -> list[tuple[Cell, ...]]:
+    """The rows of the table of key figures."""
+    counts = Counter(history.status(task).state for task in history.tasks())
+    times = [plan.milliseconds for plan in history.replans]
+    flown = sum(history.metres(uav) for uav in history.tracks)
+    planned = sum(history.metres_planned(uav) for uav in history.tracks)
     return [
-        ('tasks', len(story.tasks())),
+        ('tasks', len(history.tasks())),
         *((f'tasks {state.lower()}', count) for state, count in sorted(counts.items())),
-        ('UAVs', len(story.tracks)), ('metres flown', round(flown)),
+        ('UAVs', len(history.tracks)), ('metres flown', round(flown)),
         ('metres planned, of the legs that were begun', round(planned)),
         ('re-plans', max(0, len(times) - 1)),
         ('solve time, median [ms]', round(median(times), 1) if times else None),
         ('solve time, longest [ms]', round(max(times), 1) if times else None),
-        ('gaps in what was heard', len(story.gaps)),
-        ('recorded [s]', round(story.heard.last - story.heard.first, 1))]
+        ('gaps in reception', len(history.gaps)),
+        ('recorded [s]', round(history.run.last - history.run.first, 1))]
 
 
-def tables(story: Story) -> str:
-    """Everything that is told in words."""
+def tables(history: FlightHistory) -> str:
+    """The tables of tasks, UAVs, re-plans, gaps and events."""
     def at(wall: float) -> float:
-        return round(story.clock(wall), 1)
+        return round(history.clock(wall), 1)
 
     return ''.join((
         html_table('Tasks', ('task', 'state', 'UAV', 'value', 'announced [s]', 'begun [s]',
-                        'ended [s]', 'reason'),
-              (_task(story, task) for task in story.tasks())),
+                             'ended [s]', 'reason'),
+                   (_task_row(history, task) for task in history.tasks())),
         html_table('UAVs', ('UAV', 'tasks completed', 'metres flown', 'metres planned', 'battery',
-                       'last mode', 'not heard [s]'),
-              (_uav(story, uav) for uav in sorted(story.tracks))),
-        html_table('Re-plans', ('at [s]', 'plan', 'because of', 'what changed', 'solved in [ms]',
-                           'fit', 'metres'),
-              ((at(plan.wall), plan.revision, plan.trigger, plan.changed or 'nothing',
-                round(plan.milliseconds, 1), plan.fit and round(plan.fit, 4),
-                plan.distance and round(plan.distance)) for plan in story.replans)),
+                            'last mode', 'silent [s]'),
+                   (_uav_row(history, uav) for uav in sorted(history.tracks))),
+        html_table('Re-plans', ('at [s]', 'plan', 'trigger', 'changes', 'solve time [ms]', 'fit',
+                                'metres'),
+                   ((at(plan.wall), plan.revision, plan.trigger, plan.changed or 'none',
+                     round(plan.milliseconds, 1), plan.fit and round(plan.fit, 4),
+                     plan.distance and round(plan.distance)) for plan in history.replans)),
         html_table('Gaps', ('UAV', 'from [s]', 'to [s]', 'wall time [s]'),
-              ((gap.uav or 'nobody was heard', at(gap.since), at(gap.until),
-                round(gap.until - gap.since, 1)) for gap in story.gaps)),
-        html_table('Events', ('at [s]', 'what'),
-              ((at(wall), text) for wall, _, text in story.events))))
+                   ((gap.uav or 'all', at(gap.since), at(gap.until),
+                     round(gap.until - gap.since, 1)) for gap in history.gaps)),
+        html_table('Events', ('at [s]', 'event'),
+                   ((at(wall), text) for wall, _, text in history.events))))
 
 
-def _task(story: Story, task: str) -> tuple[Cell, ...]:
-    status = story.status(task)
-    known = story.heard.tasks.get(task)
-    spans = story.spans.get(task, [])
+def _task_row(history: FlightHistory, task: str) -> tuple[Cell, ...]:
+    status = history.status(task)
+    known = history.run.tasks.get(task)
+    spans = history.spans.get(task, [])
 
     def first(*states: str) -> Cell:
-        found: Span | None = next((span for span in spans if span.state in states), None)
-        return None if found is None else round(story.clock(found.since), 1)
+        span: StateSpan | None = next((span for span in spans if span.state in states), None)
+        return None if span is None else round(history.clock(span.since), 1)
 
-    return (task, status.state.lower(), status.uav, story.values.get(task),
-            round(story.clock(known.wall), 1) if known else None, first('ACTIVE'),
+    return (task, status.state.lower(), status.uav, history.values.get(task),
+            round(history.clock(known.wall), 1) if known else None, first('ACTIVE'),
             first('COMPLETED', 'FAILED', 'CANCELLED', 'REJECTED'), status.reason)
 
 
-def _uav(story: Story, uav: str) -> tuple[Cell, ...]:
-    state = story.heard.uavs[uav]
+def _uav_row(history: FlightHistory, uav: str) -> tuple[Cell, ...]:
+    state = history.run.uavs[uav]
     done = sum(status.uav == uav and status.state == 'COMPLETED'
-               for status in story.heard.statuses.values())
-    silent = sum(gap.until - gap.since for gap in story.gaps if gap.uav == uav)
+               for status in history.run.statuses.values())
+    silent = sum(gap.until - gap.since for gap in history.gaps if gap.uav == uav)
     battery = state['battery']
-    return (uav, done, round(story.metres(uav)), round(story.metres_planned(uav)),
+    return (uav, done, round(history.metres(uav)), round(history.metres_planned(uav)),
             None if battery is None else f'{100.0 * battery:.0f} %', state['mode'].lower(),
             round(silent, 1))
 
 
 def html_table(title: str, heads: Sequence[str], rows: Iterable[Sequence[Cell]]) -> str:
-    """A table of a page; numbers to the right, nothing for None."""
-    body = ''.join(f'<tr>{"".join(map(_cell, row))}</tr>\n' for row in rows)
+    """A collapsible table; numbers are right-aligned, cells of None empty."""
+    body = ''.join(f'<tr>{"".join(map(_html_cell, row))}</tr>\n' for row in rows)
     head = ''.join(f'<th>{escape(text)}</th>' for text in heads)
     return (f'<details open id="{title.lower().replace(" ", "_")}"><summary>{title}</summary>'
             f'<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table></details>\n')
 
 
-def _cell(value: Cell) -> str:
+def _html_cell(value: Cell) -> str:
     kind = '' if isinstance(value, str) else ' class="n"'
     return f'<td{kind}>{"" if value is None else escape(str(value))}</td>'

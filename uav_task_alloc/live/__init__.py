@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The live page in the browser: what is shown (scene), since when (board), and how (server)."""
+"""The live page: content (scene), its history (snapshot_store), HTTP server (server)."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Shows a recorded run on the live page: `python -m uav_task_alloc.live out/demo`."""
+"""Show a recorded run on the live page: `python -m uav_task_alloc.live out/demo`."""
 from __future__ import annotations
 
 import argparse
@@ -7,30 +7,39 @@ import math
 from pathlib import Path
 
 from uav_task_alloc.live.scene import Scene
-from uav_task_alloc.live.server import TICK, Server
+from uav_task_alloc.live.server import UPDATE_PERIOD, PageServer
 from uav_task_alloc.live.snapshot_store import SnapshotStore
-from uav_task_alloc.record import run_state as heard
+from uav_task_alloc.record.run_state import RECORD_FILE, RunState, read_lines
 
 
 def play(out_dir: Path, until: float = math.inf) -> SnapshotStore:
-    """The board as it stood at the end of a record, or `until` [s] after its first task."""
-    board, said = SnapshotStore(), heard.RunState()
-    scene, put = Scene(said), -math.inf
+    """The snapshots of a record.
 
-    def post() -> None:
-        board.put(said.last, {'start': said.start(), 'speedup': said.speedup, 'live': False},
-                  *scene.news(said.last))
+    Args:
+        out_dir: folder with record.jsonl.
+        until: scenario time [s] at which to stop.
 
-    for line in heard.read_lines(out_dir / heard.FILE):
-        if said.tasks and said.clock(line['wall']) > until:
+    Raises:
+        OSError: the record cannot be read.
+    """
+    snapshots, state = SnapshotStore(), RunState()
+    scene, stored_at = Scene(state), -math.inf  # [unix s]
+
+    def store() -> None:
+        snapshots.put(state.last,
+                      {'start': state.start(), 'speedup': state.speedup, 'live': False},
+                      *scene.updates(state.last))
+
+    for line in read_lines(out_dir / RECORD_FILE):
+        if state.tasks and state.clock(line['wall']) > until:
             break
-        if line['wall'] >= put + TICK:
-            put = line['wall']
-            if said.last > -math.inf:
-                post()
-        scene.take(line)
-    post()
-    return board
+        if line['wall'] >= stored_at + UPDATE_PERIOD:
+            stored_at = line['wall']
+            if state.last > -math.inf:
+                store()
+        scene.apply(line)
+    store()
+    return snapshots
 
 
 def main(argv: list[str] | None = None) -> None:
@@ -40,7 +49,7 @@ def main(argv: list[str] | None = None) -> None:
     parser.add_argument('--host', default='127.0.0.1')
     parser.add_argument('--port', type=int, default=0, help='0: any free one')
     args = parser.parse_args(argv)
-    server = Server(play(args.out_dir), args.host, args.port)
+    server = PageServer(play(args.out_dir), args.host, args.port)
     server.start()
     print(f'Page of {args.out_dir}: {server.address}   (Ctrl-C ends it)', flush=True)
     try:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Serves the live page from a board: GET only, one stream of server-sent events a page."""
+"""HTTP server of the live page: GET only, a stream of server-sent events for each page."""
 from __future__ import annotations
 
 import asyncio
@@ -18,14 +18,14 @@ from plotly.offline import get_plotlyjs
 
 from uav_task_alloc.live.snapshot_store import SnapshotStore
 
-TICK = 0.5  # [s] between two messages to a page
-MOST_PAGES = 32  # streams at once
-PAGE = {'/': ('index.html', 'text/html'), '/live.css': ('live.css', 'text/css'),
+UPDATE_PERIOD = 0.5  # [s] between two events of a stream
+MAX_STREAMS = 32
+PAGE_FILES = {'/': ('index.html', 'text/html'), '/live.css': ('live.css', 'text/css'),
         **{f'/{name}.js': (f'{name}.js', 'text/javascript')
-           for name in ('live', 'panels', 'map', 'picture')}}
+           for name in ('live', 'panels', 'map', 'model')}}
 LOOPBACK = ('127.0.0.1', 'localhost', '::1')
 HEADERS: Final = {
-    # plotly writes its own style element; no script but the files of this server is run
+    # plotly adds a style element; scripts are those of this server only
     'Content-Security-Policy': (
         "default-src 'none'; script-src 'self'; connect-src 'self'; img-src 'self' data:; "
         "style-src 'self' 'unsafe-inline'; base-uri 'none'; form-action 'none'; "
@@ -35,14 +35,14 @@ HEADERS: Final = {
 Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
 
 
-def name_of(host: str) -> str:
+def host_name(host: str) -> str:
     """`localhost` of `localhost:8088`, `::1` of `[::1]:8088`."""
     name = host.rsplit(':', 1)[0] if host.rpartition(':')[2].isdigit() else host
     return name.strip('[]').lower()
 
 
-def is_address(name: str) -> bool:
-    """Whether it is an IP address, which no foreign name server can give out as its own."""
+def is_ip_address(name: str) -> bool:
+    """Whether a host name is an IP address."""
     try:
         ipaddress.ip_address(name)
     except ValueError:
@@ -50,54 +50,60 @@ def is_address(name: str) -> bool:
     return True
 
 
-class Server:
-    """The page of one board on (host, port), in a thread of its own from `start` to `stop`.
+class PageServer:
+    """Serves the page of one snapshot store in a thread of its own, from `start` to `stop`.
 
-    Raises OSError where the port is taken or the host is not of this machine.
+    Args:
+        snapshots: of the page.
+        host: address of this machine to listen on.
+        port: 0: any free one.
+
+    Raises:
+        OSError: the port is in use, or the host is not an address of this machine.
     """
 
-    def __init__(self, board: SnapshotStore, host: str, port: int) -> None:
-        self.board = board
+    def __init__(self, snapshots: SnapshotStore, host: str, port: int) -> None:
+        self.snapshots = snapshots
         self.host = host
         family = socket.AF_INET6 if ':' in host else socket.AF_INET
         self.socket = socket.create_server((host, port), family=family)
         self.port: int = self.socket.getsockname()[1]
-        self.pages = 0
-        self.plotly = b''  # compressed, from the first time it is asked for
+        self.streams = 0
+        self.plotly = b''  # compressed at the first request
         self.loop = asyncio.new_event_loop()
-        self.ending = asyncio.Event()
+        self.stopping = asyncio.Event()
         self.thread = threading.Thread(target=self.run, name='live page', daemon=True)
 
     @property
     def address(self) -> str:
-        """What to type into a browser."""
+        """The URL of the page."""
         host = {'0.0.0.0': socket.gethostname(), '::': socket.gethostname()}.get(
             self.host, self.host)
         return f'http://{f"[{host}]" if ":" in host else host}:{self.port}/'
 
     def start(self) -> None:
-        """Serve from now on."""
+        """Start the thread."""
         self.thread.start()
 
     def stop(self) -> None:
         """End all streams and the thread."""
         if self.loop.is_closed():
             return
-        self.loop.call_soon_threadsafe(self.ending.set)
+        self.loop.call_soon_threadsafe(self.stopping.set)
         self.thread.join(5.0)
 
     def run(self) -> None:
-        """The thread."""
+        """The thread's function."""
         try:
             self.loop.run_until_complete(self.serve())
         finally:
             self.loop.close()
 
     async def serve(self) -> None:
-        """Until `stop`."""
+        """Serve until `stop`."""
         app = web.Application(middlewares=[self.guard])
         app.on_response_prepare.append(add_headers)
-        for path in PAGE:
+        for path in PAGE_FILES:
             app.router.add_get(path, self.file)
         app.router.add_get('/plotly.js', self.library)
         app.router.add_get('/stream', self.stream, allow_head=False)
@@ -105,36 +111,37 @@ class Server:
         runner = web.AppRunner(app, access_log=None, shutdown_timeout=1.0)
         await runner.setup()
         await web.SockSite(runner, self.socket).start()
-        await self.ending.wait()
+        await self.stopping.wait()
         await runner.cleanup()
 
     @web.middleware
     async def guard(self, request: web.Request, handler: Handler) -> web.StreamResponse:
-        """Nothing but reading, and only under a name that is ours."""
+        """Refuse all but GET and HEAD, and foreign Host headers (DNS rebinding)."""
         if request.method not in ('GET', 'HEAD'):
             raise web.HTTPMethodNotAllowed(request.method, ('GET', 'HEAD'))
-        if not self.is_ours(name_of(request.host)):
+        if not self.is_own_host(host_name(request.host)):
             raise web.HTTPForbidden(text=f'host {request.host!r}: expected {self.host}\n')
         return await handler(request)
 
-    def is_ours(self, name: str) -> bool:
-        """Whether a Host header cannot be a foreign name that was made to point here.
+    def is_own_host(self, name: str) -> bool:
+        """Whether a Host header names this machine, not a foreign name that resolves to it.
 
-        On loopback only its own names; elsewhere any address, and the name of this machine.
+        On loopback: its own names; otherwise any IP address, and the name of this machine.
         """
-        mine = socket.gethostname().lower()
+        machine = socket.gethostname().lower()
         if name in (*LOOPBACK, self.host):
             return True
-        return self.host not in LOOPBACK and (is_address(name) or name in (mine, f'{mine}.local'))
+        return self.host not in LOOPBACK and (
+            is_ip_address(name) or name in (machine, f'{machine}.local'))
 
     async def file(self, request: web.Request) -> web.Response:
-        """A file of the page; read each time, so that a change shows after a reload."""
-        name, kind = PAGE[request.path]
+        """A file of the page; read at each request, so that a reload shows a change."""
+        name, kind = PAGE_FILES[request.path]
         text = files('uav_task_alloc.live').joinpath('page', name).read_text('utf-8')
         return web.Response(text=text, content_type=kind, headers={'Cache-Control': 'no-cache'})
 
     async def library(self, _: web.Request) -> web.Response:
-        """plotly.js out of the Python package."""
+        """plotly.js from the Python package plotly."""
         if not self.plotly:
             self.plotly = await asyncio.to_thread(gzip.compress, get_plotlyjs().encode(), 6)
         return web.Response(body=self.plotly, content_type='text/javascript', charset='utf-8',
@@ -142,7 +149,7 @@ class Server:
                                      'Cache-Control': 'max-age=86400'})
 
     async def at(self, request: web.Request) -> web.Response:
-        """Everything as it was at `wall` [unix s]."""
+        """All parts as they were at the query's `wall` [unix s]."""
         try:
             wall = float(request.query.get('wall', ''))
         except ValueError:
@@ -150,31 +157,31 @@ class Server:
         if math.isnan(wall):
             raise web.HTTPBadRequest(text=f'wall = {request.query.get("wall")!r}: expected '
                                           'unix seconds\n')
-        return web.Response(text=self.board.at(wall), content_type='application/json')
+        return web.Response(text=self.snapshots.at(wall), content_type='application/json')
 
     async def stream(self, request: web.Request) -> web.StreamResponse:
-        """Everything, then twice a second what is new; a slow page is sent fewer, larger news."""
-        if self.pages >= MOST_PAGES:
-            raise web.HTTPServiceUnavailable(text=f'{MOST_PAGES} pages are open already\n')
+        """All parts, then the changes twice a second; a slow page gets fewer, larger ones."""
+        if self.streams >= MAX_STREAMS:
+            raise web.HTTPServiceUnavailable(text=f'{MAX_STREAMS} pages are open already\n')
         response = web.StreamResponse(headers={
             'Content-Type': 'text/event-stream', 'Cache-Control': 'no-store'})
         await response.prepare(request)
-        self.pages += 1
+        self.streams += 1
         try:
             await response.write(b'retry: 1000\n\n')
             version = 0
-            while not self.ending.is_set():
-                version, text = self.board.news(version)
+            while not self.stopping.is_set():
+                version, text = self.snapshots.updates_since(version)
                 await response.write(f'data: {text}\n\n'.encode())
                 with suppress(asyncio.TimeoutError):
-                    await asyncio.wait_for(self.ending.wait(), TICK)
+                    await asyncio.wait_for(self.stopping.wait(), UPDATE_PERIOD)
         except ConnectionError:
             pass  # the page was closed
         finally:
-            self.pages -= 1
+            self.streams -= 1
         return response
 
 
 async def add_headers(_: web.Request, response: web.StreamResponse) -> None:
-    """To every answer, errors too."""
+    """Add the security headers to every response, errors included."""
     response.headers.update(HEADERS)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The newest of each part of the page, and each part's past up to a limit; for two threads."""
+"""Current and past values of the page's parts, up to a memory limit; for two threads."""
 from __future__ import annotations
 
 import json
@@ -10,90 +10,100 @@ from collections.abc import Iterable, Mapping
 from itertools import islice
 from typing import Any
 
-LIMIT = 64 * 2**20  # [bytes] of compressed past; the oldest goes first
-ENTRIES = 1000  # of each log
+HISTORY_LIMIT = 64 * 2**20  # [bytes] of compressed past values; the oldest are dropped first
+MAX_LOG_ENTRIES = 1000  # of each log
 _FAST = 1  # zlib level
 
 
-def dump(value: Any) -> str:
-    """Strict JSON without blanks; ValueError for NaN and the infinities."""
+def to_json(value: Any) -> str:
+    """Compact JSON. Raises ValueError for NaN and the infinities."""
     return json.dumps(value, separators=(',', ':'), allow_nan=False)
 
 
 class SnapshotStore:
-    """One thread puts, others ask; every answer is JSON text of the same shape.
+    """Snapshots as JSON text; one thread writes, others read.
 
-    {version, all, clock, parts: {name: value}, events: [...], plans: [...]}: `all` where it is
-    everything, else only what is new.
+    Each text is {version, all, clock, parts: {name: value}, events: [...], plans: [...]}; `all`
+    says whether it holds all parts and entries or only changes.
+
+    Args:
+        limit: [bytes] of compressed past values.
     """
 
-    def __init__(self, limit: int = LIMIT) -> None:
+    def __init__(self, limit: int = HISTORY_LIMIT) -> None:
         self.limit = limit
         self.lock = threading.Lock()
         self.version = 0
         self.clock: dict[str, Any] = {}
         self.parts: dict[str, tuple[int, str]] = {}  # (version, JSON)
         self.logs: dict[str, deque[tuple[int, str]]] = {
-            'events': deque(maxlen=ENTRIES), 'plans': deque(maxlen=ENTRIES)}
-        self.past: deque[tuple[float, str, bytes]] = deque()  # (wall, part, JSON compressed)
-        self.before: dict[str, bytes] = {}  # parts as they were when the past begins
-        self.begin: float | None = None  # [unix s] of the past
-        self.size = 0  # [bytes] of the past
+            'events': deque(maxlen=MAX_LOG_ENTRIES), 'plans': deque(maxlen=MAX_LOG_ENTRIES)}
+        self.past: deque[tuple[float, str, bytes]] = deque()  # (wall, part, compressed JSON)
+        self.before: dict[str, bytes] = {}  # parts as they were at `begin`
+        self.begin: float | None = None  # [unix s] of the oldest past value
+        self.size = 0  # [bytes] of `past`
 
     def put(self, wall: float, clock: Mapping[str, Any], parts: Mapping[str, Any],
             events: Iterable[Any] = (), plans: Iterable[Any] = ()) -> None:
-        """What is new at `wall` [unix s], which never falls."""
-        texts = {name: dump(value) for name, value in parts.items()}
+        """Store changes.
+
+        Args:
+            wall: [unix s], not before that of the last call.
+            clock: values of the page's clock.
+            parts: new values by name.
+            events, plans: new entries of the logs.
+        """
+        texts = {name: to_json(value) for name, value in parts.items()}
         packed = {name: zlib.compress(text.encode(), _FAST) for name, text in texts.items()}
         with self.lock:
             self.version += 1
             self.parts.update((name, (self.version, text)) for name, text in texts.items())
             for name, entries in (('events', events), ('plans', plans)):
-                self.logs[name].extend((self.version, dump(entry)) for entry in entries)
+                self.logs[name].extend((self.version, to_json(entry)) for entry in entries)
             self.past.extend((wall, name, data) for name, data in packed.items())
             self.size += sum(map(len, packed.values()))
             self.begin = wall if self.begin is None else self.begin
-            self.forget()
+            self.drop_oldest()
             self.clock = {**clock, 'wall': wall, 'begin': self.begin}
 
-    def forget(self) -> None:
-        """Give up the oldest past beyond the limit; the values then in force are kept."""
+    def drop_oldest(self) -> None:
+        """Drop the oldest past values beyond the limit; the value at `begin` is kept."""
         while self.size > self.limit and len(self.past) > 1:
             wall, name, data = self.past.popleft()
             self.before[name] = data
             self.size -= len(data)
             self.begin = wall
 
-    def news(self, since: int) -> tuple[int, str]:
-        """(version, what is newer than version `since`); 0 or one of the future: everything."""
+    def updates_since(self, since: int) -> tuple[int, str]:
+        """The version, and the changes after version `since`; all for 0 or an unknown one."""
         with self.lock:
             since = since if since <= self.version else 0
             parts = {name: text for name, (version, text) in self.parts.items()
                      if version > since}
-            logs = {name: newer(log, since) for name, log in self.logs.items()}
+            logs = {name: entries_after(log, since) for name, log in self.logs.items()}
             return self.version, self.text(since == 0, parts, logs)
 
     def at(self, wall: float) -> str:
         """All parts as they were at `wall` [unix s], without logs."""
         with self.lock:
-            past, found = list(self.past), dict(self.before)
+            past, values = list(self.past), dict(self.before)
         for when, name, data in past:
             if when > wall:
                 break
-            found[name] = data
-        parts = {name: zlib.decompress(data).decode() for name, data in found.items()}
+            values[name] = data
+        parts = {name: zlib.decompress(data).decode() for name, data in values.items()}
         return self.text(True, parts, {})
 
     def text(self, everything: bool, parts: Mapping[str, str],
              logs: Mapping[str, Iterable[str]]) -> str:
-        """The answer around texts that are JSON already."""
-        inner = ','.join(f'{dump(name)}:{text}' for name, text in parts.items())
+        """Compose a text from parts and entries that are JSON already."""
+        inner = ','.join(f'{to_json(name)}:{text}' for name, text in parts.items())
         lists = ''.join(f',"{name}":[{",".join(log)}]' for name, log in logs.items())
-        return (f'{{"version":{self.version},"all":{dump(everything)},'
-                f'"clock":{dump(self.clock)},"parts":{{{inner}}}{lists}}}')
+        return (f'{{"version":{self.version},"all":{to_json(everything)},'
+                f'"clock":{to_json(self.clock)},"parts":{{{inner}}}{lists}}}')
 
 
-def newer(log: deque[tuple[int, str]], since: int) -> list[str]:
+def entries_after(log: deque[tuple[int, str]], since: int) -> list[str]:
     """The entries of a log after a version, oldest first."""
     count = 0
     for version, _ in reversed(log):

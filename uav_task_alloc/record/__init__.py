@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a run leaves on disk: what the nodes said (heard) and where the vehicles were (truth)."""
+"""Records of a run: messages of the nodes (run_state, bag) and true tracks (ground_truth)."""

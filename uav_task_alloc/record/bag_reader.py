@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Reads an MCAP file of a fleet as the lines of a record, as far as the file goes."""
+"""Reader of an MCAP file as the lines of a record, up to the first damage."""
 from __future__ import annotations
 
 import struct
@@ -17,30 +17,38 @@ from zstandard import ZstdError
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.geometry.frames import Origin
 from uav_task_alloc.model import check_number
-from uav_task_alloc.record import message_records as lines
-from uav_task_alloc.record.bag import ABOUT
+from uav_task_alloc.record import message_records
+from uav_task_alloc.record.bag import METADATA_NAME
 from uav_task_alloc.record.run_state import Line
 
-_OURS = 'uav_task_alloc_msgs/msg/'
-_LONGEST = 2**30  # [bytes] of a record that is believed in
-# by type, so that the namespace of a fleet does not matter
-READ: dict[str, Callable[[Any], lines.RecordBody]] = {
-    _OURS + 'ThreatZoneArray': lines.announced_zones, _OURS + 'TaskStatusArray': lines.statuses,
-    _OURS + 'Allocation': lines.allocation_record, _OURS + 'TaskList': lines.task_list_record,
-    _OURS + 'UavState': lines.state, 'diagnostic_msgs/msg/DiagnosticArray': lines.uploads}
-TASKS = _OURS + 'TaskAnnouncement'
+_PACKAGE = 'uav_task_alloc_msgs/msg/'
+_MAX_RECORD_SIZE = 2**30  # [bytes]; a larger size is damage
+# by type, so that the namespace of the topics does not matter
+_BUILDERS: dict[str, Callable[[Any], message_records.RecordBody]] = {
+    _PACKAGE + 'ThreatZoneArray': message_records.zones_record,
+    _PACKAGE + 'TaskStatusArray': message_records.statuses_record,
+    _PACKAGE + 'Allocation': message_records.allocation_record,
+    _PACKAGE + 'TaskList': message_records.task_list_record,
+    _PACKAGE + 'UavState': message_records.state_record,
+    'diagnostic_msgs/msg/DiagnosticArray': message_records.uploads_record}
+_ANNOUNCEMENT = _PACKAGE + 'TaskAnnouncement'
 
 
 class BagReader:
-    """Iterate once for the lines; afterwards `trouble` says what could not be read, if anything.
+    """The lines of an MCAP file; iterate once.
 
-    Raises OSError where there is no file, InvalidValue where it is no MCAP file.
+    Afterwards `damage` is a text on the damage that ended the iteration, or '', and `undecodable`
+    has the number of undecodable messages by topic.
+
+    Raises:
+        OSError: while iterating; the file cannot be read.
+        InvalidValue: while iterating; it is no MCAP file.
     """
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        self.trouble = ''
-        self.unread: Counter[str] = Counter()  # messages by topic that make no sense
+        self.damage = ''
+        self.undecodable: Counter[str] = Counter()  # messages by topic
         self.counted: Counter[str] = Counter()  # messages by topic
         self.origin: Origin | None = None
         self.schemas: dict[int, Schema] = {}
@@ -54,54 +62,55 @@ class BagReader:
             except InvalidMagic:
                 if file.tell() <= 8:
                     raise InvalidValue('file', str(self.path), 'an MCAP file') from None
-                self.trouble = 'its last bytes are not those of an MCAP file'
+                self.damage = 'its end is not that of an MCAP file'
             except EndOfFile:
                 if not self.counted and file.seek(0, 2) < 8:
                     raise InvalidValue('file', str(self.path), 'an MCAP file') from None
-                self.trouble = 'it was not closed: the recorder was killed, or it still records'
+                self.damage = 'it was not closed: the recorder was killed, or is still recording'
             except (McapError, ZstdError, struct.error, ValueError, MemoryError) as error:
-                self.trouble = f'it is damaged after {self.counted.total()} messages: {error}'
+                self.damage = f'it is damaged after {self.counted.total()} messages: {error}'
 
     def records(self, file: IO[bytes]) -> Iterator[Line]:
-        """The lines, until the end or the first fault."""
-        for record in StreamReader(file, record_size_limit=_LONGEST, validate_crcs=True).records:
+        """The lines, up to the end of the file; raises errors of mcap at damage."""
+        reader = StreamReader(file, record_size_limit=_MAX_RECORD_SIZE, validate_crcs=True)
+        for record in reader.records:
             if isinstance(record, Schema):
                 self.schemas[record.id] = record
             elif isinstance(record, Channel):
                 self.channels[record.id] = record
-            elif isinstance(record, Metadata) and record.name == ABOUT:
+            elif isinstance(record, Metadata) and record.name == METADATA_NAME:
                 yield from self.about(record.metadata)
             elif isinstance(record, Message):
                 yield from self.line(record)
 
-    def about(self, told: dict[str, str]) -> Iterator[Line]:
-        """What the recorder knew of the run."""
+    def about(self, metadata: dict[str, str]) -> Iterator[Line]:
+        """The line `run` from the metadata, which also has the origin."""
         try:
-            if 'origin.latitude' in told:
-                self.origin = Origin(*(float(told[f'origin.{name}']) for name in (
+            if 'origin.latitude' in metadata:
+                self.origin = Origin(*(float(metadata[f'origin.{name}']) for name in (
                     'latitude', 'longitude', 'altitude_amsl')))
             yield {'kind': 'run', 'speedup': check_number(
-                'speedup', float(told.get('speedup', 1.0)), 0.0, 1e6, open_low=True)}
+                'speedup', float(metadata.get('speedup', 1.0)), 0.0, 1e6, open_low=True)}
         except (KeyError, ValueError):
-            self.unread['about'] += 1
+            self.undecodable['about'] += 1
 
     def line(self, message: Message) -> Iterator[Line]:
-        """A message of a type that a report wants."""
+        """The line of a message, if its type is recorded."""
         channel = self.channels[message.channel_id]
         schema = self.schemas.get(channel.schema_id)
         self.counted[channel.topic] += 1
-        if schema is None or (schema.name not in READ and schema.name != TASKS):
+        if schema is None or (schema.name not in _BUILDERS and schema.name != _ANNOUNCEMENT):
             return
         try:
             decode = self.decoders.decoder_for(channel.message_encoding, schema)
             if decode is None:
                 raise ValueError(f'{channel.message_encoding}: expected cdr')
             body = (
-                lines.announced_tasks(decode(message.data), self.origin)
-                if schema.name == TASKS
-                else READ[schema.name](decode(message.data))
+                message_records.announcement_record(decode(message.data), self.origin)
+                if schema.name == _ANNOUNCEMENT
+                else _BUILDERS[schema.name](decode(message.data))
             )
-        except Exception:  # whatever a decoder makes of bytes that are none of its type
-            self.unread[channel.topic] += 1
+        except Exception:  # the decoder raises anything for bytes of another type
+            self.undecodable[channel.topic] += 1
             return
         yield {'wall': message.log_time * 1e-9, **body}

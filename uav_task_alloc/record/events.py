@@ -1,14 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Lines of a record as sentences: what a line tells that was not known before it."""
+"""Events of a run as sentences: the changes that a line of the record brings."""
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 
+from uav_task_alloc.errors import first_of
 from uav_task_alloc.record.run_state import Line, RunState
 
-_NAMED = 3  # ids in one sentence
+_MAX_NAMED = 3  # ids in one sentence
 Sentence = tuple[str, str]  # (kind: task, good, fault, zone, uav or plan; sentence)
-SAID = {  # state of a task: (kind of event, sentence)
+STATE_SENTENCES = {  # by state of a task: (kind of event, sentence)
     'ACTIVE': ('uav', '{uav} flies to {tasks}'),
     'COMPLETED': ('good', '{tasks} completed by {uav}'),
     'FAILED': ('fault', '{tasks} failed: {reason}'),
@@ -16,76 +17,78 @@ SAID = {  # state of a task: (kind of event, sentence)
     'REJECTED': ('fault', '{tasks} refused: {reason}'),
     'UNASSIGNED': ('fault', '{tasks} left out: {reason}'),
 }
-ANNOUNCED = {'ADD': 'announced: {}', 'UPDATE': 'changed: {}', 'CANCEL': 'to be withdrawn: {}'}
+ACTION_TEXTS = {'ADD': 'announced: {}', 'UPDATE': 'changed: {}', 'CANCEL': 'to be withdrawn: {}'}
 
 
-def some(names: Iterable[str]) -> str:
-    """`t1, t2, t3 and 4 more`."""
-    given = list(names)
-    more = len(given) - _NAMED
-    return ', '.join(given[:_NAMED]) + (f' and {more} more' if more > 0 else '')
+def sentences(state: RunState, line: Line) -> Iterator[Sentence]:
+    """The events in a line of a record.
 
-
-def sentences(heard: RunState, line: Line) -> Iterator[Sentence]:
-    """What `line` tells; `heard` has not taken it yet."""
-    teller = TELLERS.get(line['kind'])
-    return teller(heard, line) if teller else iter(())
+    Args:
+        state: of the run before `line`.
+        line: of the record.
+    """
+    build = SENTENCE_BUILDERS.get(line['kind'])
+    return build(state, line) if build else iter(())
 
 
 def announcement_sentences(_: RunState, line: Line) -> Iterator[Sentence]:
-    """Tasks that came, changed or went."""
-    if line['tasks'] and line['action'] in ANNOUNCED:
-        yield 'task', ANNOUNCED[line['action']].format(some(row['id'] for row in line['tasks']))
+    """Announced, changed and withdrawn tasks."""
+    if line['tasks'] and line['action'] in ACTION_TEXTS:
+        yield 'task', ACTION_TEXTS[line['action']].format(_ids(row['id'] for row in line['tasks']))
 
 
-def moved(heard: RunState, line: Line) -> Iterator[Sentence]:
-    """Tasks whose state is new, those that share it in one sentence."""
+def status_sentences(state: RunState, line: Line) -> Iterator[Sentence]:
+    """Tasks in a new state; tasks of the same state, UAV and reason share a sentence."""
     groups: dict[tuple[str, str, str], list[str]] = {}
     for row in line['statuses']:
-        old = heard.statuses.get(row['task'])
-        if row['state'] in SAID and (
+        old = state.statuses.get(row['task'])
+        if row['state'] in STATE_SENTENCES and (
                 old is None or (old.state, old.reason) != (row['state'], row['reason'])):
             groups.setdefault((row['state'], row['uav'], row['reason']), []).append(row['task'])
-    for (state, uav, reason), tasks in groups.items():
-        kind, text = SAID[state]
-        yield kind, text.format(tasks=some(tasks), uav=uav or 'nobody',
-                                reason=reason or 'no reason was told')
+    for (name, uav, reason), tasks in groups.items():
+        kind, text = STATE_SENTENCES[name]
+        yield kind, text.format(tasks=_ids(tasks), uav=uav or 'no UAV',
+                                reason=reason or 'no reason given')
 
 
-def zone_sentences(heard: RunState, line: Line) -> Iterator[Sentence]:
-    """Zones that came, changed or went."""
-    old = {zone.id for zone in heard.zones_now()}
+def zone_sentences(state: RunState, line: Line) -> Iterator[Sentence]:
+    """Zones that are new or removed."""
+    old = {zone.id for zone in state.zones_now()}
     new = {row['id'] for row in line['zones']}
-    for names, text in ((new - old, 'new zone {}'), (old - new, 'zone {} is gone')):
+    for names, text in ((new - old, 'new zone {}'), (old - new, 'zone {} removed')):
         if names:
-            yield 'zone', text.format(some(sorted(names)))
+            yield 'zone', text.format(_ids(sorted(names)))
 
 
-def flown(heard: RunState, line: Line) -> Iterator[Sentence]:
-    """A UAV that was not known, or does something else, or carries another list."""
-    uav, old = line['uav'], heard.uavs.get(line['uav'])
+def state_sentences(state: RunState, line: Line) -> Iterator[Sentence]:
+    """A new UAV, or a change of its mode, availability, authority or mission on board."""
+    uav, old = line['uav'], state.uavs.get(line['uav'])
     if old is None:
-        yield 'uav', f'{uav} heard for the first time'
+        yield 'uav', f'{uav} reports for the first time'
         return
     if line['mode'] != old['mode']:
         kind = 'fault' if line['mode'] == 'FAULT' else 'uav'
         yield kind, f'{uav}: {line["mode"].lower().replace("_", " ")}'
     reason, authority = line.get('reason', ''), line.get('authority', '')
     if line['available'] != old['available']:
-        word = 'available' if line['available'] else 'not available'
-        yield 'fault', ': '.join(filter(None, (uav, word, reason)))
+        text = 'available' if line['available'] else 'not available'
+        yield 'fault', ': '.join(filter(None, (uav, text, reason)))
     if authority != old.get('authority', authority) and 'authority' not in reason:
         yield 'uav', f'{uav}: authority {authority}'
     if line['mission_state'] != old['mission_state'] and line['mission_state'] in (
             'MIXED', 'FOREIGN'):
         yield 'fault', f'{uav}: the mission on board is {line["mission_state"].lower()}'
     if line['list_revision'] > old['list_revision']:
-        yield 'uav', f'{uav} has list {line["list_revision"]} on board, read back'
+        yield 'uav', f'{uav} has list {line["list_revision"]} verified on board'
 
 
-TELLERS: dict[str, Callable[[RunState, Line], Iterator[Sentence]]] = {
+def _ids(names: Iterable[str]) -> str:
+    return first_of(names, _MAX_NAMED)
+
+
+SENTENCE_BUILDERS: dict[str, Callable[[RunState, Line], Iterator[Sentence]]] = {
     'announcement': announcement_sentences,
-    'statuses': moved,
+    'statuses': status_sentences,
     'zones': zone_sentences,
-    'state': flown,
+    'state': state_sentences,
 }

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Where the simulated vehicles really were: the judge of a run, apart from what any node says."""
+"""The log of the simulator: true tracks, by which a run is judged independently of the nodes."""
 from __future__ import annotations
 
 import math
@@ -11,16 +11,16 @@ from pathlib import Path
 from uav_task_alloc.geometry.polyline import polyline_length
 from uav_task_alloc.geometry.zones import distance
 from uav_task_alloc.model import Point
-from uav_task_alloc.record.run_state import Line, SeenZone, read_lines
+from uav_task_alloc.record.run_state import Line, ZoneInterval, read_lines
 
-FILE = 'flight.jsonl'
-SAME_PLACE = 1.5  # [m] between a task and an item that flies it
-_STEP = 1.0  # [m] between points of a track that are held against the zones
+TRUTH_FILE = 'flight.jsonl'
+_VISIT_RADIUS = 1.5  # [m] between a task and the mission item of its visit
+_STEP = 1.0  # [m] between the points of a track that are tested against the zones
 
 
 @dataclass(frozen=True, slots=True)
 class TrueSample:
-    """A vehicle at one moment."""
+    """The position of a vehicle at one time."""
 
     wall: float  # [unix s]
     point: Point  # [m]
@@ -28,7 +28,7 @@ class TrueSample:
 
 @dataclass(frozen=True, slots=True)
 class Reached:
-    """A mission item was reached; `point` is its target as stored on board."""
+    """A mission item was reached; `point` is the target stored on board."""
 
     uav: str
     wall: float  # [unix s]
@@ -46,15 +46,15 @@ class ZoneEntry:
 
 
 @dataclass
-class Truth:
-    """Tracks and events of all vehicles."""
+class GroundTruth:
+    """Tracks and events of all simulated vehicles."""
 
     tracks: dict[str, list[TrueSample]] = field(default_factory=dict)
     reached: list[Reached] = field(default_factory=list)
     died: dict[str, TrueSample] = field(default_factory=dict)
 
-    def take(self, line: Line) -> None:
-        """Fold in one line of the simulator's log."""
+    def apply(self, line: Line) -> None:
+        """Apply one line of the simulator's log."""
         uav, wall = line['uav'], line['wall']
         event = line.get('event')
         if event is None and line.get('alive', True):
@@ -71,47 +71,55 @@ class Truth:
                          for track in self.tracks.values())
 
 
-def read_truth(out_dir: Path) -> Truth:
-    """The simulator's log of a run."""
-    truth = Truth()
-    for line in read_lines(out_dir / FILE):
-        truth.take(line)
+def read_truth(out_dir: Path) -> GroundTruth:
+    """Read the simulator's log of a run. Raises OSError."""
+    truth = GroundTruth()
+    for line in read_lines(out_dir / TRUTH_FILE):
+        truth.apply(line)
     return truth
 
 
-def visits(truth: Truth, tasks: Mapping[str, Point]) -> dict[str, list[Reached]]:
-    """Which items were reached at each task; an item counts for the task nearest to it."""
-    found: dict[str, list[Reached]] = {name: [] for name in tasks}
-    for reached in truth.reached:
-        near = min(tasks, key=lambda name: math.dist(tasks[name], reached.point), default=None)
-        if near is not None and math.dist(tasks[near], reached.point) <= SAME_PLACE:
-            found[near].append(reached)
-    return found
+def visits(truth: GroundTruth, tasks: Mapping[str, Point]) -> dict[str, list[Reached]]:
+    """The mission items reached at each task.
 
+    Args:
+        truth: of the run.
+        tasks: positions [m] by id.
 
-def entries(truth: Truth, zones: Sequence[SeenZone]) -> list[ZoneEntry]:
-    """Every flight from outside into a zone as it is, without margin, while it was there.
-
-    A zone that appears around a vehicle is not entered by it.
+    Returns:
+        By task id; an item counts for the nearest task, if that is within 1.5 m.
     """
-    return [entry for uav, track in truth.tracks.items() for seen in zones
-            for entry in _entries(uav, track, seen)]
+    visited: dict[str, list[Reached]] = {name: [] for name in tasks}
+    for reached in truth.reached:
+        nearest = min(tasks, key=lambda name: math.dist(tasks[name], reached.point), default=None)
+        if nearest is not None and math.dist(tasks[nearest], reached.point) <= _VISIT_RADIUS:
+            visited[nearest].append(reached)
+    return visited
 
 
-def _entries(uav: str, track: Sequence[TrueSample], seen: SeenZone) -> Iterator[ZoneEntry]:
-    outside = False  # known to be outside while the zone is there
-    for wall, point in fine(track):
-        if not seen.since <= wall < seen.until:
-            outside = False
+def zone_entries(truth: GroundTruth, zones: Sequence[ZoneInterval]) -> list[ZoneEntry]:
+    """Every entry of a vehicle into a zone in force, without its margin.
+
+    A vehicle around which a zone appears does not enter it.
+    """
+    return [entry for uav, track in truth.tracks.items() for interval in zones
+            for entry in _entries(uav, track, interval)]
+
+
+def _entries(uav: str, track: Sequence[TrueSample], interval: ZoneInterval) -> Iterator[ZoneEntry]:
+    was_outside = False  # at the point before, while the zone was in force
+    for wall, point in _resampled(track):
+        if not interval.since <= wall < interval.until:
+            was_outside = False
             continue
-        within = distance(point, seen.zone) <= 0.0
-        if within and outside:
-            yield ZoneEntry(uav, seen.zone.id, wall, point)
-        outside = not within
+        is_inside = distance(point, interval.zone) <= 0.0
+        if is_inside and was_outside:
+            yield ZoneEntry(uav, interval.zone.id, wall, point)
+        was_outside = not is_inside
 
 
-def fine(track: Sequence[TrueSample]) -> Iterable[tuple[float, Point]]:
-    """(wall [unix s], point [m]) along a track, at most STEP apart."""
+def _resampled(track: Sequence[TrueSample]) -> Iterable[tuple[float, Point]]:
+    """(wall [unix s], point [m]) along a track, at most _STEP apart."""
     for a, b in pairwise(track):
         steps = max(1, math.ceil(math.dist(a.point, b.point) / _STEP))
         for k in range(steps):

@@ -1,66 +1,72 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How far a run is: the lines a person reads meanwhile, and whether it is over."""
+"""Progress of a run: status lines for the terminal, and whether the run is over."""
 from __future__ import annotations
 
 import math
 
-from uav_task_alloc.record.run_state import FINAL, Line, RunState
+from uav_task_alloc.record.run_state import FINAL_STATES, Line, RunState
 from uav_task_alloc.scenario import Scenario
 
-AT_REST = 0.5  # [m/s]
-SILENT = 2.0  # [s] wall time after which a UAV is shown as silent
+_AT_REST = 0.5  # [m/s]
+SILENT_AFTER = 2.0  # [s] of wall time without a state: the UAV is shown as silent
 
 
-def headline(heard: RunState, clock: float) -> str:
-    """One line: tasks by state, re-plans, zones; `clock` [s] of the scenario."""
-    counts = ''.join(f', {heard.count(state)} {state.lower()}' for state in (
+def headline(run: RunState, clock: float) -> str:
+    """One line: tasks by state, zones, re-plans; `clock`: scenario time [s]."""
+    counts = ''.join(f', {run.count(state)} {state.lower()}' for state in (
         'ACTIVE', 'ASSIGNED', 'PENDING', 'UNASSIGNED', 'REJECTED', 'FAILED', 'CANCELLED')
-        if heard.count(state))
-    text = (f'{clock:5.0f} s  {heard.count("COMPLETED")} of {len(heard.tasks)} tasks completed'
-            f'{counts}; {len(heard.zones_now())} zones')
-    if heard.solves:
-        last = heard.solves[-1]
-        text += (f'; {len(heard.solves) - 1} re-plans, last {last.milliseconds:.0f} ms'
+        if run.count(state))
+    text = (f'{clock:5.0f} s  {run.count("COMPLETED")} of {len(run.tasks)} tasks completed'
+            f'{counts}; {len(run.zones_now())} zones')
+    if run.solves:
+        last = run.solves[-1]
+        text += (f'; {len(run.solves) - 1} re-plans, last {last.milliseconds:.0f} ms'
                  + f' ({last.trigger})' * bool(last.trigger))
     return text
 
 
-def fleet(heard: RunState, now: float) -> list[str]:
-    """One line for each UAV; `now` [unix s]."""
+def fleet_lines(run: RunState, now: float) -> list[str]:
+    """One line for each UAV; `now`: [unix s]."""
     lines = []
-    for uav, state in sorted(heard.uavs.items()):
-        todo = heard.lists.get(uav, {'tasks': []})['tasks']
-        doing = 'silent' if now - state['wall'] > SILENT else state['mode'].lower()
+    for uav, state in sorted(run.uavs.items()):
+        remaining = run.lists.get(uav, {'tasks': []})['tasks']
+        activity = 'silent' if now - state['wall'] > SILENT_AFTER else state['mode'].lower()
         battery = state['battery']
         lines.append(
-            f'  {uav:8} {doing:10} {state["active"] or "-":8} {len(todo):3} to fly  '
+            f'  {uav:8} {activity:10} {state["active"] or "-":8} {len(remaining):3} to fly  '
             f'mission {state["mission_state"].lower():9} '
             + ('' if battery is None else f'battery {100.0 * battery:3.0f} %  ')
-            + authority(heard, uav, now))
+            + authority_text(run, uav, now))
     return lines
 
 
-def authority(heard: RunState, uav: str, now: float) -> str:
-    """Who has a UAV, since when, why, and what gives it back; why it is not available."""
-    state, said = heard.uavs[uav], heard.authority.get(uav)
+def authority_text(run: RunState, uav: str, now: float) -> str:
+    """Authority over a UAV: state, duration, reason, what gives it back; why not available."""
+    state, reported = run.uavs[uav], run.authority.get(uav)
     name, reason = state.get('authority', ''), state.get('reason', '')
-    if said is None or said.state != name:
+    if reported is None or reported.state != name:
         known = f'authority {name.lower()}' if name not in ('', 'UNKNOWN') else ''
         return ': '.join(filter(None, (known, reason)))
-    age = '' if said.since is None else f' for {max(0.0, now - said.since):.0f} s'
-    text = f'authority {name.lower()}{age}: {said.why}'
-    text += f'; given back by {said.back}' if said.back else ''
-    return text if not reason or said.why in reason else f'{text}; not available: {reason}'
+    age = '' if reported.since is None else f' for {max(0.0, now - reported.since):.0f} s'
+    text = f'authority {name.lower()}{age}: {reported.reason}'
+    text += f'; given back by {reported.given_back_by}' if reported.given_back_by else ''
+    return text if not reason or reported.reason in reason else f'{text}; not available: {reason}'
 
 
-def is_over(heard: RunState, scenario: Scenario, clock: float) -> bool:
-    """Whether all of a scenario was announced and settled, and its living UAVs are at rest."""
+def run_is_over(run: RunState, scenario: Scenario, clock: float) -> bool:
+    """Whether all tasks of a scenario are in a final state and all UAVs not lost are at rest.
+
+    Args:
+        run: its state.
+        scenario: that is flown.
+        clock: scenario time [s].
+    """
     dead = {uav.id for uav in scenario.uavs if uav.dies_at is not None}
     return (clock > scenario.duration
-            and heard.tasks.keys() >= {timed.task.id for timed in scenario.tasks}
-            and all(name in heard.statuses and heard.statuses[name].state in FINAL
-                    for name in heard.tasks)
-            and all(uav.id in dead or _at_rest(heard.uavs.get(uav.id))
+            and run.tasks.keys() >= {timed.task.id for timed in scenario.tasks}
+            and all(name in run.statuses and run.statuses[name].state in FINAL_STATES
+                    for name in run.tasks)
+            and all(uav.id in dead or _at_rest(run.uavs.get(uav.id))
                     for uav in scenario.uavs))
 
 
@@ -68,4 +74,4 @@ def _at_rest(state: Line | None) -> bool:
     if state is None:
         return False
     speed = math.hypot(*(v or 0.0 for v in state['velocity']))
-    return speed < AT_REST and state['mode'] in ('STANDBY', 'HOLD', 'FAULT')
+    return speed < _AT_REST and state['mode'] in ('STANDBY', 'HOLD', 'FAULT')

@@ -1,36 +1,38 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The folder of a demo: cleared of what an earlier demo left in it, and of nothing else."""
+"""The output folder of a demo: files of an earlier demo are removed, others never."""
 from __future__ import annotations
 
 import os
 from fnmatch import fnmatchcase
 from pathlib import Path
 
-from uav_task_alloc.errors import InvalidValue
+from uav_task_alloc.errors import InvalidValue, first_of
 from uav_task_alloc.params import NODES
-from uav_task_alloc.record import ground_truth as truth, run_state as heard
+from uav_task_alloc.record.ground_truth import TRUTH_FILE
+from uav_task_alloc.record.run_state import RECORD_FILE
 
-MARKER = '.uav_task_alloc_demo'  # a folder with it was made, or found empty, by a demo
-STATE = 'state'  # of allocator and bridge
+MARKER = '.uav_task_alloc_demo'  # marks a folder that a demo created or found empty
+STATE = 'state'  # folder of allocator and bridge
 SUMMARY, MAP = 'summary.json', 'map.png'
-FILES = (MARKER, SUMMARY, MAP, heard.FILE, truth.FILE, *(f'{node}.log' for node in NODES))
+FILES = (MARKER, SUMMARY, MAP, RECORD_FILE, TRUTH_FILE, *(f'{node}.log' for node in NODES))
 STATE_FILES = ('journal.*', 'authority_*.json', 'authority_*.tmp')  # patterns
-LOGS = ('allocator.log', 'mavlink_bridge.log', 'fleet_sim.log')  # mark those of versions before
-_NAMED = 5  # strange entries that a refusal names
+# identify the folder of a version that wrote no marker
+LOGS = ('allocator.log', 'mavlink_bridge.log', 'fleet_sim.log')
+_MAX_NAMED = 5  # foreign entries in an error
 
 
 def prepare(folder: Path) -> None:
-    """Make an empty folder of a demo, with its marker and `state/`.
+    """Create an empty output folder with its marker and `state/`.
 
     Files of an earlier demo are removed, by their names and only where the marker is. Links are
     never followed. Nothing is removed from a folder that is refused.
 
     Args:
-        folder: is created where it is missing, with its parents.
+        folder: created where it is missing, with its parents.
 
     Raises:
-        InvalidValue: something else is in the folder; the text names it.
-        OSError: it cannot be read or written.
+        InvalidValue: the folder holds other files; the text names them.
+        OSError: the folder cannot be read or written.
     """
     if folder.exists():
         for path in _own_files(folder):
@@ -40,28 +42,28 @@ def prepare(folder: Path) -> None:
 
 
 def _own_files(folder: Path) -> list[Path]:
-    """All files in a folder of a demo, the marker last; InvalidValue where others are there."""
+    """All files in a folder of a demo, the marker last. Raises InvalidValue for other files."""
     if not folder.is_dir():
         raise InvalidValue('out', str(folder), 'a folder')
-    found: list[Path] = []
-    strange: list[Path] = []
+    own: list[Path] = []
+    foreign: list[Path] = []
     entries = sorted(folder.iterdir())
     names = {path.name for path in entries}
     marked = MARKER in names or names.issuperset(LOGS)
     for path in entries:
         if path.name == STATE and _is_folder(path):
             for inner in sorted(path.iterdir()):
-                own = any(fnmatchcase(inner.name, pattern) for pattern in STATE_FILES)
-                (found if own and _is_file(inner) else strange).append(inner)
+                is_own = any(fnmatchcase(inner.name, pattern) for pattern in STATE_FILES)
+                (own if is_own and _is_file(inner) else foreign).append(inner)
         else:
-            (found if path.name in FILES and _is_file(path) else strange).append(path)
+            (own if path.name in FILES and _is_file(path) else foreign).append(path)
     if entries and not marked:
         raise InvalidValue('out', str(folder), 'a folder that is missing, empty or of an earlier '
                            f'demo; it has no {MARKER}, but {_names(entries, folder)}')
-    if strange:
+    if foreign:
         raise InvalidValue('out', str(folder), 'only files of an earlier demo in it; others are '
-                           f'{_names(strange, folder)}')
-    return sorted(found, key=lambda path: path.name == MARKER)
+                           f'{_names(foreign, folder)}')
+    return sorted(own, key=lambda path: path.name == MARKER)
 
 
 def _is_file(path: Path) -> bool:
@@ -73,5 +75,4 @@ def _is_folder(path: Path) -> bool:
 
 
 def _names(paths: list[Path], folder: Path) -> str:
-    more = f' and {len(paths) - _NAMED} more' if len(paths) > _NAMED else ''
-    return ', '.join(os.fspath(path.relative_to(folder)) for path in paths[:_NAMED]) + more
+    return first_of((os.fspath(path.relative_to(folder)) for path in paths), _MAX_NAMED)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the nodes of a run said, folded line by line from record.jsonl or as it comes."""
+"""The state of a run as its nodes report it, from the lines of record.jsonl or live messages."""
 from __future__ import annotations
 
 import json
@@ -12,14 +12,14 @@ from typing import Any
 from uav_task_alloc.model import Point, ThreatZone
 from uav_task_alloc.zone_codec import decode_zone
 
-FILE = 'record.jsonl'
-FINAL = ('COMPLETED', 'FAILED', 'CANCELLED', 'REJECTED', 'UNASSIGNED')
-ROUNDED = 3.0  # [s] by which a time since then may differ: whole seconds, and the way here
-Line = Mapping[str, Any]  # wall [unix s], kind, and what Heard.on_<kind> reads
+RECORD_FILE = 'record.jsonl'
+FINAL_STATES = ('COMPLETED', 'FAILED', 'CANCELLED', 'REJECTED', 'UNASSIGNED')
+SINCE_TOLERANCE = 3.0  # [s] of a start time: reports are in whole seconds and arrive late
+Line = Mapping[str, Any]  # `wall` [unix s], `kind`, and the values that RunState.on_KIND reads
 
 
 @dataclass(frozen=True, slots=True)
-class Announced:
+class AnnouncedTask:
     """A task as it was announced."""
 
     position: Point  # [m]
@@ -28,7 +28,7 @@ class Announced:
 
 @dataclass(frozen=True, slots=True)
 class ReportedStatus:
-    """Where the allocator says a task stands."""
+    """The state of a task as the allocator reports it."""
 
     state: str
     uav: str
@@ -37,7 +37,7 @@ class ReportedStatus:
 
 @dataclass(frozen=True, slots=True)
 class SolveRecord:
-    """One solve of the allocator."""
+    """One published plan: when, solve time, and what triggered it."""
 
     wall: float  # [unix s]
     milliseconds: float
@@ -45,8 +45,8 @@ class SolveRecord:
 
 
 @dataclass(frozen=True, slots=True)
-class SeenZone:
-    """A zone and when it was there."""
+class ZoneInterval:
+    """A zone and the time during which it was in force."""
 
     zone: ThreatZone
     since: float  # [unix s]
@@ -55,41 +55,41 @@ class SeenZone:
 
 @dataclass(frozen=True, slots=True)
 class ReportedAuthority:
-    """Who has a UAV, as its bridge says."""
+    """Who may command a UAV, as its bridge reports it."""
 
     state: str
-    why: str
+    reason: str
     since: float | None  # [unix s]
-    back: str  # what gives it back to the bridge; '': the bridge has it
+    given_back_by: str  # what returns the UAV to the bridge; '': nothing is needed
 
 
 @dataclass
 class RunState:
-    """The state of a run; `take` folds one more line into it."""
+    """The state of a run after the lines given to `apply`."""
 
-    tasks: dict[str, Announced] = field(default_factory=dict)
+    tasks: dict[str, AnnouncedTask] = field(default_factory=dict)
     cancelled: set[str] = field(default_factory=set)
     statuses: dict[str, ReportedStatus] = field(default_factory=dict)
     solves: list[SolveRecord] = field(default_factory=list)
-    zones: list[SeenZone] = field(default_factory=list)
+    zones: list[ZoneInterval] = field(default_factory=list)
     lists: dict[str, Line] = field(default_factory=dict)  # the newest of each UAV
-    legs: dict[tuple[str, str], float] = field(default_factory=dict)  # (UAV, task): see on_list
+    legs: dict[tuple[str, str], float] = field(default_factory=dict)  # [m], see on_list
     uavs: dict[str, Line] = field(default_factory=dict)  # the newest state of each
-    verified: dict[str, set[int]] = field(default_factory=dict)  # revisions seen on board
-    counted: dict[str, int] = field(default_factory=dict)  # uploads as a bridge counts them
-    health: dict[str, tuple[int, str]] = field(default_factory=dict)  # level, text of each UAV
+    verified: dict[str, set[int]] = field(default_factory=dict)  # list revisions on board, by UAV
+    upload_counts: dict[str, int] = field(default_factory=dict)  # by UAV, from diagnostics
+    health: dict[str, tuple[int, str]] = field(default_factory=dict)  # level, text by UAV
     authority: dict[str, ReportedAuthority] = field(default_factory=dict)  # by UAV
-    speedup: float = 1.0  # scenario seconds in one of the wall
-    first: float = math.inf  # [unix s]
-    last: float = -math.inf  # [unix s]
+    speedup: float = 1.0  # scenario seconds in a second of wall time
+    first: float = math.inf  # [unix s] of the first line
+    last: float = -math.inf  # [unix s] of the last line
 
-    def take(self, line: Line) -> None:
-        """Fold in one line."""
+    def apply(self, line: Line) -> None:
+        """Update the state by one line of the record."""
         self.first, self.last = min(self.first, line['wall']), max(self.last, line['wall'])
         getattr(self, 'on_' + line['kind'])(line)
 
     def on_run(self, line: Line) -> None:
-        """How the run was started."""
+        """Parameters of the run."""
         self.speedup = line['speedup']
 
     def on_announcement(self, line: Line) -> None:
@@ -99,33 +99,34 @@ class RunState:
                 self.cancelled.add(task['id'])
             else:
                 known = self.tasks.get(task['id'])
-                self.tasks[task['id']] = Announced(
+                self.tasks[task['id']] = AnnouncedTask(
                     tuple(task['position']), known.wall if known else line['wall'])
 
     def on_statuses(self, line: Line) -> None:
-        """The whole picture of tasks."""
+        """The statuses of all tasks."""
         self.statuses = {row['task']: ReportedStatus(row['state'], row['uav'], row['reason'])
                          for row in line['statuses']}
 
     def on_allocation(self, line: Line) -> None:
-        """A plan was made."""
+        """A plan was published."""
         self.solves.append(SolveRecord(line['wall'], line['solve_ms'], line['trigger']))
 
     def on_zones(self, line: Line) -> None:
-        """The whole picture of zones: what is missing from it has gone, what is new has come."""
-        now = dict.fromkeys(decode_zone(row) for row in line['zones'])  # in order
-        self.zones = [seen if seen.until < math.inf or seen.zone in now
-                      else SeenZone(seen.zone, seen.since, line['wall']) for seen in self.zones]
-        there = {seen.zone for seen in self.zones if seen.until == math.inf}
-        self.zones += [SeenZone(zone, line['wall']) for zone in now if zone not in there]
+        """The set of all zones: a missing zone has ended, a new one begins."""
+        current = dict.fromkeys(decode_zone(row) for row in line['zones'])  # in order
+        self.zones = [old if old.until < math.inf or old.zone in current
+                      else ZoneInterval(old.zone, old.since, line['wall']) for old in self.zones]
+        in_force = set(self.zones_now())
+        self.zones += [ZoneInterval(zone, line['wall']) for zone in current
+                       if zone not in in_force]
 
     def on_list(self, line: Line) -> None:
-        """A task list; the leg to its first task counts as planned when that became the first."""
+        """A task list; the leg to a task is taken from the list in which it became the first."""
         before = self.lists.get(line['uav'])
         old = before['tasks'][0]['id'] if before and before['tasks'] else None
         if line['tasks'] and line['tasks'][0]['id'] != old:
-            head = line['tasks'][0]
-            self.legs[line['uav'], head['id']] = head['leg_distance']
+            first = line['tasks'][0]
+            self.legs[line['uav'], first['id']] = first['leg_distance']
         self.lists[line['uav']] = line
 
     def on_state(self, line: Line) -> None:
@@ -135,33 +136,31 @@ class RunState:
             self.verified.setdefault(line['uav'], set()).add(line['list_revision'])
 
     def on_uploads(self, line: Line) -> None:
-        """Counters of the bridge, and how its UAVs are."""
-        self.counted.update(line['uploads'])
+        """Diagnostics of the bridge: upload counts, health and authority of its UAVs."""
+        self.upload_counts.update(line['uploads'])
         self.health.update((uav, (level, text))
                            for uav, (level, text) in line.get('health', {}).items())
-        for uav, said in line.get('authority', {}).items():
-            since = None if said['for'] is None else line['wall'] - said['for']
+        for uav, row in line.get('authority', {}).items():
+            since = None if row['for'] is None else line['wall'] - row['for']
             old = self.authority.get(uav)
-            if (old and since is not None and old.since is not None and old.state == said['state']
-                    and abs(since - old.since) < ROUNDED):
+            if (old and since is not None and old.since is not None and old.state == row['state']
+                    and abs(since - old.since) < SINCE_TOLERANCE):
                 since = old.since
-            self.authority[uav] = ReportedAuthority(
-                said['state'], said['why'], since, said['back']
-            )
+            self.authority[uav] = ReportedAuthority(row['state'], row['why'], since, row['back'])
 
     @property
     def uploads(self) -> int:
-        """Verified uploads: the bridge's count, or the revisions that were seen on board."""
-        if self.counted:
-            return sum(self.counted.values())
+        """Number of verified uploads: the bridge's count, or the list revisions seen on board."""
+        if self.upload_counts:
+            return sum(self.upload_counts.values())
         return sum(len(revisions) for revisions in self.verified.values())
 
     def count(self, *states: str) -> int:
-        """How many tasks are in one of these states."""
+        """Number of tasks in one of these states."""
         return sum(status.state in states for status in self.statuses.values())
 
     def start(self) -> float:
-        """When the first task was announced [unix s]; the first line of all where none was."""
+        """Time of the first announced task [unix s]; of the first line where there is none."""
         return min((task.wall for task in self.tasks.values()), default=self.first)
 
     def clock(self, wall: float) -> float:
@@ -169,20 +168,27 @@ class RunState:
         return (wall - self.start()) * self.speedup
 
     def zones_now(self) -> list[ThreatZone]:
-        """The zones that are there after the last line."""
-        return [seen.zone for seen in self.zones if seen.until == math.inf]
+        """The zones in force after the last line."""
+        return [interval.zone for interval in self.zones if interval.until == math.inf]
 
 
 def read_record(out_dir: Path) -> RunState:
-    """The record of a run; a last line cut short by the end of the recorder is left out."""
-    heard = RunState()
-    for line in read_lines(out_dir / FILE):
-        heard.take(line)
-    return heard
+    """Read the record of a run; an unfinished last line is ignored.
+
+    Args:
+        out_dir: folder with record.jsonl.
+
+    Raises:
+        OSError: the file cannot be read.
+    """
+    state = RunState()
+    for line in read_lines(out_dir / RECORD_FILE):
+        state.apply(line)
+    return state
 
 
 def read_lines(path: Path) -> Iterable[Line]:
-    """The JSON objects of a file, one a line; OSError where there is none."""
+    """The JSON objects of a file of JSON lines. Raises OSError."""
     with path.open(encoding='utf-8') as file:
         for text in file:
             if text.endswith('\n'):

@@ -40,7 +40,7 @@ demo.yaml:14: scenario.tasks[0]: unknown key 'positon': expected one of ...; nea
 """
 
 
-def markdown_text() -> str:
+def scenario_page() -> str:
     """The whole page."""
     parts = [INTRO]
     for name, table in TABLES.items():

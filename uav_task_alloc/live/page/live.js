@@ -1,95 +1,95 @@
 // SPDX-License-Identifier: Apache-2.0
-// The live page: folds what the server streams, shows the newest or a moment of the past.
-// It only reads: nothing here sends anything but GET.
+// The live page: applies the updates of the stream, shows the present or a moment of the past.
+// It only reads: all requests are GET.
 import {drawChart, drawMap} from './map.js';
 import {$, fill, make, pick, put, showAnswer, showEvents, showHead, showLeft, showPlans, showUavs}
   from './panels.js';
-import {answer, kindOf, live, picture, seconds, span} from './picture.js';
+import {answer, kindOf, live, readModel, seconds, span} from './model.js';
 
-const STALE = 3;     // [s] without a word from the server
-const KEPT = 1000;   // entries of each log, as the server keeps
-let past = null;     // {wall, parts}: the moment that is shown instead of now
-let heardAt = performance.now();
-let asked = 0;       // moments of the past asked for
+const STALE = 3;     // [s] without an update from the server
+const KEPT = 1000;   // entries of each log, as on the server
+let past = null;     // {wall, parts}: the moment shown instead of the present
+let receivedAt = performance.now();
+let requests = 0;    // of moments of the past
 let due = 0, cost = 0, charted = '';
 
-function showMap(seen, picked) {
-  const at = id => seen.where.get(id);
-  const last = seen.plans.findLast(plan => plan.changes.length && !plan.first);
+function showMap(model, picked) {
+  const at = id => model.where.get(id);
+  const last = model.plans.findLast(plan => plan.changes.length && !plan.first);
   const given = last ? last.changes.flatMap(row => row.added.map(([task]) => task)) : [];
-  const tasks = [...seen.where].map(([id, position]) => ({...seen.turns.get(id), id, position,
-    kind: kindOf(id, seen), words: answer(id, seen).text}));
-  const routes = seen.uavs.filter(uav => seen.lists.get(uav.id).length).map(uav => ({
-    index: uav.index, points: [uav.position, ...seen.lists.get(uav.id).flatMap(
+  const tasks = [...model.where].map(([id, position]) => ({...model.turns.get(id), id, position,
+    kind: kindOf(id, model), words: answer(id, model).text}));
+  const routes = model.uavs.filter(uav => model.lists.get(uav.id).length).map(uav => ({
+    index: uav.index, points: [uav.position, ...model.lists.get(uav.id).flatMap(
       task => [...task.via, at(task.id)])].filter(point => point && point[0] !== null)}));
-  drawMap($('map'), {zones: seen.zones, routes, tasks, uavs: seen.uavs,
-    changed: given.filter(id => at(id) && seen.turns.has(id)).map(at),
-    pickedIndex: seen.turns.get(picked)?.index, picked: at(picked) ? [at(picked)] : []}, pick);
+  drawMap($('map'), {zones: model.zones, routes, tasks, uavs: model.uavs,
+    changed: given.filter(id => at(id) && model.turns.has(id)).map(at),
+    pickedIndex: model.turns.get(picked)?.index, picked: at(picked) ? [at(picked)] : []}, pick);
 }
 
-function showChart(seen) {
-  const key = `${seen.plans.length} ${seen.plans.at(-1)?.wall} ${live.clock.start} ${theme()}`;
+function showChart(model) {
+  const key = `${model.plans.length} ${model.plans.at(-1)?.wall} ${live.clock.start} ${theme()}`;
   if (key === charted) return;
   charted = key;
-  drawChart($('chart'), seen.plans.filter(plan => plan.fit !== null), seconds);
+  drawChart($('chart'), model.plans.filter(plan => plan.fit !== null), seconds);
 }
 
 function show() {
-  const begun = performance.now(), seen = picture(past);
+  const begun = performance.now(), model = readModel(past);
   due = 0;
-  showHead(seen, past);
-  const picked = showAnswer(seen);
-  for (const panel of [showPlans, showLeft, showUavs, showEvents, showChart]) panel(seen);
-  showMap(seen, picked);
+  showHead(model, past);
+  const picked = showAnswer(model);
+  for (const panel of [showPlans, showLeft, showUavs, showEvents, showChart]) panel(model);
+  showMap(model, picked);
   cost = performance.now() - begun;
   document.body.dataset.cost = cost.toFixed(0);  // [ms]
 }
 
-// Drawing takes at most a third of the time, so that a big fleet leaves the page usable.
+// Drawing takes at most a third of the time, so that the page stays usable with a big fleet.
 function draw() {
   if (!due && live.clock.wall !== undefined) due = setTimeout(show, 2 * cost);
 }
 
-function take(news) {
-  heardAt = performance.now();
-  if (news.all) Object.assign(live, {parts: {}, events: [], plans: []});
-  live.clock = news.clock;
-  Object.assign(live.parts, news.parts);
-  for (const log of ['events', 'plans']) live[log] = [...live[log], ...news[log]].slice(-KEPT);
-  if (news.parts.tasks) {
-    const names = Object.keys(news.parts.tasks);
+function apply(update) {
+  receivedAt = performance.now();
+  if (update.all) Object.assign(live, {parts: {}, events: [], plans: []});
+  live.clock = update.clock;
+  Object.assign(live.parts, update.parts);
+  for (const log of ['events', 'plans']) live[log] = [...live[log], ...update[log]].slice(-KEPT);
+  if (update.parts.tasks) {
+    const names = Object.keys(update.parts.tasks);
     fill($('names'), String(names.length), () => names.slice(0, KEPT).map(
       name => Object.assign(make('option'), {value: name})));
   }
-  if (past) showHead(picture(past), past);
+  if (past) showHead(readModel(past), past);
   else draw();
 }
 
 function connect() {
-  const source = new EventSource('stream');  // tries again by itself unless it was refused
-  source.onmessage = message => take(JSON.parse(message.data));
+  const source = new EventSource('stream');  // reconnects by itself unless it was refused
+  source.onmessage = message => apply(JSON.parse(message.data));
   source.onerror = () => {
     if (source.readyState === EventSource.CLOSED) setTimeout(connect, 2000);
   };
 }
 
 setInterval(() => {
-  const age = (performance.now() - heardAt) / 1000;
+  const age = (performance.now() - receivedAt) / 1000;
   $('banner').hidden = age <= STALE;
-  if (age > STALE) put($('banner'), `No word from live_view for ${span(age)} min. `
+  if (age > STALE) put($('banner'), `No data from live_view for ${span(age)} min. `
     + 'What you see is old. Trying again…');
 }, 500);
 
 async function goTo(wall) {
-  const mine = ++asked, got = await fetch(`at?wall=${wall}`).catch(() => null);
-  const then = got && got.ok ? await got.json() : null;
-  if (!then || mine !== asked) return;
+  const mine = ++requests, response = await fetch(`at?wall=${wall}`).catch(() => null);
+  const then = response && response.ok ? await response.json() : null;
+  if (!then || mine !== requests) return;
   past = {wall, parts: then.parts};
   draw();
 }
 
 function goLive() {
-  asked++;
+  requests++;
   past = null;
   draw();
 }

@@ -1,16 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
-// Draws the map and the solver's chart with plotly.js; knows what to draw, not where it came from.
+// Draws the map and the chart of solves with plotly.js.
 const Plotly = globalThis.Plotly;
-const LABELS = 90;  // tasks to fly up to which each is labelled
+const LABELS = 90;  // tasks; with more none is labelled
 const COLOURS = 5, DASHES = ['solid', 'dash', 'dot', 'dashdot'];
 const CONFIG = {responsive: true, displaylogo: false, scrollZoom: true,
-  showSendToCloud: false,  // plotly's bar has a button for that otherwise
+  showSendToCloud: false,  // a default button of plotly's toolbar
   modeBarButtons: [['zoomIn2d', 'zoomOut2d', 'resetScale2d']]};
 const TURN = Array.from({length: 49}, (_, k) => k * Math.PI / 24);
 
 export const colour = index => css(`--uav${index % COLOURS}`);
 const css = name => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
-// plotly reads a little HTML in its texts
+// plotly interprets some HTML in texts
 const plain = text => text.replace(/&/g, '&amp;').replace(/</g, '&lt;').replace(/>/g, '&gt;');
 
 function outline(zone, margin) {
@@ -52,7 +52,7 @@ function zoneTraces(zones) {
       hovertext: zones.map(zone => `zone ${plain(zone.id)}: ${size(zone)}`)}];
 }
 
-// One line a UAV; beyond 20 those of a colour share one, which is much faster to draw.
+// One trace for each UAV; beyond 20 UAVs one for each colour, which is much faster to draw.
 function routeTraces(view) {
   const groups = new Map(), heads = {x: [], y: [], angle: [], color: []};
   const many = view.routes.length > COLOURS * DASHES.length;
@@ -114,14 +114,14 @@ function rings(points, name, colour_, size_) {
 }
 
 function uavTrace(view) {
-  const seen = view.uavs.filter(uav => uav.position[0] !== null && uav.position[1] !== null);
-  return {x: seen.map(u => u.position[0]), y: seen.map(u => u.position[1]), name: 'UAV',
+  const shown = view.uavs.filter(uav => uav.position[0] !== null && uav.position[1] !== null);
+  return {x: shown.map(u => u.position[0]), y: shown.map(u => u.position[1]), name: 'UAV',
     mode: view.uavs.length <= 60 ? 'markers+text' : 'markers', textposition: 'bottom center',
-    text: seen.map(u => `<b>${plain(u.id)}</b>${u.silent ? ' silent' : ''}`),
+    text: shown.map(u => `<b>${plain(u.id)}</b>${u.silent ? ' silent' : ''}`),
     textfont: {size: 14, color: css('--ink')}, hoverinfo: 'text',
-    hovertext: seen.map(u => `${plain(u.id)}: ${plain(u.words)}`),
-    marker: {symbol: seen.map(u => u.silent ? 'star-triangle-up-open' : 'star-triangle-up'),
-      size: view.uavs.length <= 60 ? 17 : 10, color: seen.map(u => colour(u.index)),
+    hovertext: shown.map(u => `${plain(u.id)}: ${plain(u.words)}`),
+    marker: {symbol: shown.map(u => u.silent ? 'star-triangle-up-open' : 'star-triangle-up'),
+      size: view.uavs.length <= 60 ? 17 : 10, color: shown.map(u => colour(u.index)),
       line: {color: css('--ink'), width: 1.5}}};
 }
 

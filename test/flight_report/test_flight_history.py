@@ -1,15 +1,18 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the lines of a record tell of a flight, and the page that is made of it."""
+"""The history of a flight from the lines of a record, and its report."""
 import json
 import re
 from html import escape
 
 import pytest
 
-from uav_task_alloc import plots
-from uav_task_alloc.flight_report import figures
-from uav_task_alloc.flight_report.page import page
-from uav_task_alloc.flight_report.story import Gap, Replan, Span, fold
+from uav_task_alloc.flight_report.flight_history import (
+    ReceptionGap,
+    ReplanRecord,
+    StateSpan,
+    read_history,
+)
+from uav_task_alloc.flight_report.page import report_page
 from uav_task_alloc.model import ThreatZone
 from uav_task_alloc.zone_codec import JSON_ZONE, encode_zone
 
@@ -60,42 +63,43 @@ FLIGHT = [
 
 
 def test_a_task_has_a_span_for_each_state_it_was_in():
-    assert fold(FLIGHT).spans['a'] == [
-        Span(1001.0, 'PENDING', ''), Span(1001.2, 'ASSIGNED', ''), Span(1002.5, 'ACTIVE', 'u1'),
-        Span(1004.0, 'COMPLETED', 'u1')]
+    assert read_history(FLIGHT).spans['a'] == [
+        StateSpan(1001.0, 'PENDING', ''), StateSpan(1001.2, 'ASSIGNED', ''),
+        StateSpan(1002.5, 'ACTIVE', 'u1'), StateSpan(1004.0, 'COMPLETED', 'u1')]
 
 
-def test_a_leg_is_planned_from_where_the_uav_was_when_it_became_the_next():
-    story = fold(FLIGHT)
-    assert story.planned == {'u1': [[(0.0, 0.0, 50.0), (50.0, 20.0, 50.0), (100.0, 0.0, 50.0)],
-                                    [(50.0, 0.0, 50.0), (200.0, 0.0, 50.0)]]}
-    assert story.rest('u1') == [(100.0, 0.0, 50.0), (200.0, 0.0, 50.0)]
-    assert (story.metres('u1'), round(story.metres_planned('u1'), 1)) == (100.0, 257.7)
+def test_a_planned_leg_begins_where_the_uav_was_when_its_task_became_the_next():
+    history = read_history(FLIGHT)
+    assert history.planned == {'u1': [[(0.0, 0.0, 50.0), (50.0, 20.0, 50.0), (100.0, 0.0, 50.0)],
+                                      [(50.0, 0.0, 50.0), (200.0, 0.0, 50.0)]]}
+    assert history.remaining('u1') == [(100.0, 0.0, 50.0), (200.0, 0.0, 50.0)]
+    assert (history.metres('u1'), round(history.metres_planned('u1'), 1)) == (100.0, 257.7)
 
 
-def test_each_plan_says_what_it_changed_and_why():
-    first, second = fold(FLIGHT).replans
-    assert first == Replan(1001.1, 2, 'new task a', 'u1 +a', 20.0, 5.0, 100.0, 1)
+def test_each_plan_has_its_changes_and_its_trigger():
+    first, second = read_history(FLIGHT).replans
+    assert first == ReplanRecord(1001.1, 2, 'new task a', 'u1 +a', 20.0, 5.0, 100.0, 1)
     assert (second.trigger, second.changed, second.listed) == ('new task b', 'u1 +b', 2)
 
 
-def test_a_uav_that_is_not_heard_leaves_a_gap_also_at_the_end():
-    story = fold([*FLIGHT, state(9.6, 0.0, 'u2'), state(13.0, 0.0, 'u2')])
-    assert story.gaps == [
-        Gap('', 1004.0, 1009.0), Gap('u1', 1003.0, 1009.0), Gap('', 1009.6, 1013.0),
-        Gap('u2', 1009.6, 1013.0), Gap('u1', 1009.0, 1013.0)]
+def test_a_silent_uav_leaves_a_gap_also_at_the_end():
+    history = read_history([*FLIGHT, state(9.6, 0.0, 'u2'), state(13.0, 0.0, 'u2')])
+    assert history.gaps == [
+        ReceptionGap('', 1004.0, 1009.0), ReceptionGap('u1', 1003.0, 1009.0),
+        ReceptionGap('', 1009.6, 1013.0), ReceptionGap('u2', 1009.6, 1013.0),
+        ReceptionGap('u1', 1009.0, 1013.0)]
 
 
 def figure(text, name):
-    """The traces and the layout of a figure, as they are in the page."""
-    found = re.search(rf'Plotly\.newPlot\(\s*"{name}",\s*(\[.*?\]),\s*(\{{.*?\}}),\s*'
+    """The traces and the layout of a figure in the report."""
+    match = re.search(rf'Plotly\.newPlot\(\s*"{name}",\s*(\[.*?\]),\s*(\{{.*?\}}),\s*'
                       r'\{"displaylogo', text, re.DOTALL)
-    return json.loads(found[1]), json.loads(found[2])
+    return json.loads(match[1]), json.loads(match[2])
 
 
-def test_the_page_holds_each_task_with_its_reason_and_a_row_in_the_timeline():
+def test_the_report_has_each_task_with_its_reason_and_a_row_in_the_timeline():
     zone = ThreatZone.polygon('z', [(0, 0), (9, 0), (9, 9)], margin=2.0)
-    text = page(fold([*FLIGHT, {'kind': 'zones', 'wall': 1009.5,
+    text = report_page(read_history([*FLIGHT, {'kind': 'zones', 'wall': 1009.5,
                                 'zones': [encode_zone(zone, JSON_ZONE)]}]), 'x.mcap')
     assert '<td>b</td><td>unassigned</td>' in text
     assert '<td>inside zone &lt;z&gt;</td>' in text
@@ -113,25 +117,21 @@ def test_the_page_holds_each_task_with_its_reason_and_a_row_in_the_timeline():
     assert {'map', 'timeline', 'solving', 'gaps'} <= set(re.findall(r'id="(\w+)"', text))
 
 
-def test_the_page_asks_for_nothing_outside_of_itself():
-    text = page(fold(FLIGHT), 'x.mcap')
+def test_the_report_loads_nothing_from_elsewhere():
+    text = report_page(read_history(FLIGHT), 'x.mcap')
     assert not re.search(r'<(script|link|img|iframe)[^>]+(src|href)=', text)
     assert "default-src 'none'" in text
 
 
-def test_names_from_the_network_are_text_and_nothing_more():
-    text = page(fold([announced(0.0, **{HOSTILE: [0.0, 0.0, 0.0]}),
+def test_names_from_the_network_are_only_text():
+    text = report_page(read_history([announced(0.0, **{HOSTILE: [0.0, 0.0, 0.0]}),
                       statuses(0.5, **{HOSTILE: 'ACTIVE'}), {**state(1.0, 0.0), 'uav': HOSTILE}]),
                 HOSTILE, [HOSTILE])
     assert HOSTILE not in text
     assert f'<td>{escape(HOSTILE)}</td>' in text
-    assert text.count('<script') == page(fold(FLIGHT), 'x.mcap').count('<script')
+    assert text.count('<script') == report_page(read_history(FLIGHT), 'x.mcap').count('<script')
 
 
 @pytest.mark.parametrize('count', range(len(FLIGHT)))
-def test_a_flight_that_has_only_begun_makes_a_page_too(count):
-    assert 'Key figures' in page(fold(FLIGHT[:count]), 'x.mcap')
-
-
-def test_the_colours_are_those_of_the_pictures():
-    assert figures.COLOURS == plots.COLOURS
+def test_a_report_is_made_at_any_point_of_a_flight(count):
+    assert 'Key figures' in report_page(read_history(FLIGHT[:count]), 'x.mcap')

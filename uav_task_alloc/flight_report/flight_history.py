@@ -1,0 +1,194 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The history of a flight from the lines of its record: tracks, states, re-plans, gaps."""
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from uav_task_alloc.geometry.polyline import polyline_length
+from uav_task_alloc.model import Point
+from uav_task_alloc.record.events import sentences
+from uav_task_alloc.record.ground_truth import TrueSample
+from uav_task_alloc.record.plan_diff import (
+    DONE_STATES,
+    changes_text,
+    route_changes,
+    route_lists,
+    trigger_text,
+)
+from uav_task_alloc.record.progress import SILENT_AFTER
+from uav_task_alloc.record.run_state import Line, ReportedStatus, RunState
+
+_SAMPLE_PERIOD = 0.2  # [s] between the samples of a track
+MAX_EVENTS = 5000  # later ones are dropped
+END_STATES = ('COMPLETED', 'FAILED', 'CANCELLED', 'REJECTED')
+
+
+@dataclass(frozen=True, slots=True)
+class StateSpan:
+    """A task is in one state, until the next span of the task."""
+
+    since: float  # [unix s]
+    state: str
+    uav: str
+
+
+@dataclass(frozen=True, slots=True)
+class ReplanRecord:
+    """A plan of the allocator, and its changes to the one before."""
+
+    wall: float  # [unix s]
+    revision: int
+    trigger: str
+    changed: str  # as text
+    milliseconds: float
+    fit: float | None
+    distance: float | None  # [m]
+    listed: int  # tasks in all lists
+
+
+@dataclass(frozen=True, slots=True)
+class ReceptionGap:
+    """No state of a UAV was received; no message of any node where `uav` is empty."""
+
+    uav: str
+    since: float  # [unix s]
+    until: float  # [unix s]
+
+
+@dataclass
+class FlightHistory:
+    """A flight up to the last line given to `apply`; `close` ends it."""
+
+    run: RunState = field(default_factory=RunState)
+    tracks: dict[str, list[TrueSample]] = field(default_factory=dict)
+    last_state: dict[str, float] = field(default_factory=dict)  # [unix s] of each UAV
+    planned: dict[str, list[list[Point]]] = field(default_factory=dict)  # legs as planned
+    positions: dict[str, Point] = field(default_factory=dict)  # of tasks, as planned [m]
+    values: dict[str, float] = field(default_factory=dict)
+    spans: dict[str, list[StateSpan]] = field(default_factory=dict)
+    replans: list[ReplanRecord] = field(default_factory=list)
+    gaps: list[ReceptionGap] = field(default_factory=list)
+    events: list[tuple[float, str, str]] = field(default_factory=list)  # [unix s], kind, text
+    last_plan: Line | None = None  # not compared yet
+    routes: dict[str, list[str]] = field(default_factory=dict)  # of the plan before it
+
+    def apply(self, line: Line) -> None:
+        """Add one line of the record."""
+        if line['kind'] == 'run':
+            self.run.speedup = line['speedup']
+            return
+        if 0.0 < self.run.last < line['wall'] - SILENT_AFTER:
+            self.gaps.append(ReceptionGap('', self.run.last, line['wall']))
+        if len(self.events) < MAX_EVENTS:
+            self.events += [(line['wall'], *event) for event in sentences(self.run, line)]
+        handler = getattr(self, 'on_' + line['kind'], None)
+        if handler is not None:
+            handler(line)
+        self.run.apply(line)
+
+    def on_announcement(self, line: Line) -> None:
+        """Record the values of tasks."""
+        self.values.update((task['id'], task['value']) for task in line['tasks']
+                           if task.get('value') is not None)
+
+    def on_statuses(self, line: Line) -> None:
+        """Begin a span where the state of a task or its UAV changes."""
+        for row in line['statuses']:
+            spans = self.spans.setdefault(row['task'], [])
+            if not spans or (spans[-1].state, spans[-1].uav) != (row['state'], row['uav']):
+                spans.append(StateSpan(line['wall'], row['state'], row['uav']))
+
+    def on_state(self, line: Line) -> None:
+        """Add a sample to the track, and a gap that has ended."""
+        uav, wall = line['uav'], line['wall']
+        if wall - self.last_state.get(uav, wall) > SILENT_AFTER:
+            self.gaps.append(ReceptionGap(uav, self.last_state[uav], wall))
+        self.last_state[uav] = wall
+        track = self.tracks.setdefault(uav, [])
+        if None not in line['position'] and (not track or wall - track[-1].wall >= _SAMPLE_PERIOD):
+            track.append(TrueSample(wall, tuple(line['position'])))
+
+    def on_list(self, line: Line) -> None:
+        """Record the leg to a task that has become the next, from the position of the UAV."""
+        uav, tasks = line['uav'], line['tasks']
+        for row in tasks:
+            if None not in row.get('position', (None,)):
+                self.positions[row['id']] = tuple(row['position'])
+        before = self.run.lists.get(uav)
+        old = before['tasks'][0]['id'] if before and before['tasks'] else None
+        if tasks and tasks[0]['id'] != old and self.tracks.get(uav):
+            leg = [self.tracks[uav][-1].point, *self.points(tasks[:1])]
+            self.planned.setdefault(uav, []).append(leg)
+
+    def on_allocation(self, line: Line) -> None:
+        """Compare the plan before this one: by now its completed tasks are known."""
+        self.compare()
+        self.last_plan = line
+
+    def compare(self) -> None:
+        """Record the last plan with its changes to the one before."""
+        line, self.last_plan = self.last_plan, None
+        if line is None:
+            return
+        done = {task for task, status in self.run.statuses.items()
+                if status.state in DONE_STATES}
+        after = route_lists(line)
+        changed = changes_text(route_changes(self.routes, after, done))
+        self.routes = after
+        self.replans.append(ReplanRecord(
+            line['wall'], line['revision'], trigger_text(line['trigger']), changed,
+            line['solve_ms'], line['fit'], line.get('distance'), sum(map(len, after.values()))))
+
+    def close(self) -> None:
+        """End the flight: compare the last plan, close the gaps."""
+        self.compare()
+        end = self.run.last
+        self.gaps += [ReceptionGap(uav, wall, end) for uav, wall in sorted(self.last_state.items())
+                      if end - wall > SILENT_AFTER]
+
+    def points(self, rows: Iterable[Mapping[str, Any]]) -> Iterator[Point]:
+        """Detour points and task positions [m] of rows of a list."""
+        for row in rows:
+            yield from (tuple(point) for point in row['via'])
+            if row['id'] in self.positions:
+                yield self.positions[row['id']]
+
+    def remaining(self, uav: str) -> list[Point]:
+        """The route [m] that a UAV had left at the end, from its last position."""
+        line, track = self.run.lists.get(uav), self.tracks.get(uav)
+        points = list(self.points(line['tasks'])) if line else []
+        return [track[-1].point, *points] if track and points else points
+
+    def tasks(self) -> dict[str, Point | None]:
+        """All tasks announced or with a status, and their positions [m] where known."""
+        names = {**dict.fromkeys(self.run.tasks), **dict.fromkeys(self.run.statuses)}
+        announced = {name: task.position for name, task in self.run.tasks.items()}
+        return {name: self.positions.get(name) or announced.get(name) for name in names}
+
+    def status(self, task: str) -> ReportedStatus:
+        """The last status of a task."""
+        return self.run.statuses.get(task) or ReportedStatus('PENDING', '', 'no status received')
+
+    def metres(self, uav: str) -> float:
+        """Length of a track [m]."""
+        return polyline_length([sample.point for sample in self.tracks[uav]])
+
+    def metres_planned(self, uav: str) -> float:
+        """Length [m] of the legs that were begun, as planned at their begin."""
+        return math.fsum(map(polyline_length, self.planned.get(uav, ())))
+
+    def clock(self, wall: float) -> float:
+        """Scenario time [s] since the first task was announced, of a wall time [unix s]."""
+        return self.run.clock(wall)
+
+
+def read_history(lines: Iterable[Line]) -> FlightHistory:
+    """The history of a whole record."""
+    history = FlightHistory()
+    for line in lines:
+        history.apply(line)
+    history.close()
+    return history
