@@ -3,90 +3,50 @@
 from __future__ import annotations
 
 import argparse
+import importlib
 import sys
-from collections.abc import Callable, Sequence
-from pathlib import Path
+from collections.abc import Sequence
 
-from uav_task_alloc import params
-from uav_task_alloc.allocator.state import task_state_machine as life
 from uav_task_alloc.errors import AllocError
-from uav_task_alloc.scenario.document import markdown_text
 
-
-def plan_command(argv: Sequence[str]) -> int:
-    """plan the tasks of a scenario file"""
-    from uav_task_alloc.cli.plan import main as run
-    return run(argv)
-
-
-def study_command(argv: Sequence[str]) -> int:
-    """make the paper's figures and tables anew, or run an experiment"""
-    from uav_task_alloc.cli.study import main as run
-    return run(list(argv))
-
-
-def bench_command(argv: Sequence[str]) -> int:
-    """measure the solvers"""
-    from uav_task_alloc.study.bench import main as run
-    return run(list(argv))
-
-
-def report_command(argv: Sequence[str]) -> int:
-    """print the table of a recorded run and draw its map again"""
-    from uav_task_alloc.cli.report import main as run
-    return run(argv)
-
-
-def params_command(argv: Sequence[str]) -> int:
-    """print the tables of parameters and scenario keys; --write: into config/ and docs/"""
-    if list(argv) not in ([], ['--write']):
-        raise SystemExit('usage: python -m uav_task_alloc params [--write]')
-    files = {Path('docs/parameters.md'): params.markdown_text(),
-             Path('docs/scenarios.md'): markdown_text(),
-             Path('docs/task_states.md'): life.markdown_text()}
-    if not argv:
-        print('\n'.join(files.values()))
-        return 0
-    files |= {Path(f'config/{node}.yaml'): params.yaml_text(node) for node in params.NODES}
-    for path, text in files.items():
-        path.parent.mkdir(exist_ok=True)
-        path.write_text(text)
-    return 0
-
-
-def compile_command(argv: Sequence[str]) -> int:
-    """compile the kernels ahead; they are kept on disk"""
-    if argv:
-        raise SystemExit('usage: python -m uav_task_alloc compile')
-    from uav_task_alloc.allocator.replanning.warm_up import warm_up
-    from uav_task_alloc.solver.solve import plan
-    warm_up(plan, params.AllocatorParams())
-    return 0
-
-
-COMMANDS: dict[str, Callable[[Sequence[str]], int]] = {
-    'plan': plan_command, 'study': study_command, 'bench': bench_command,
-    'report': report_command, 'params': params_command, 'compile': compile_command,
+# The command NAME is the function `main(argv)` of the module uav_task_alloc.cli.NAME, which is
+# imported only when the command is run: numba and matplotlib take seconds to load.
+COMMANDS = {
+    'plan': 'plan the tasks of a scenario file',
+    'study': "regenerate the paper's figures and tables, or run an experiment",
+    'bench': 'compare the solvers on benchmark instances',
+    'report': 'print the table of a recorded run and draw its map again',
+    'params': 'print the tables of parameters and scenario keys; --write: into config/ and docs/',
+    'compile': 'compile the kernels ahead of time into the cache on disk',
 }
+_INTERRUPTED = 130  # exit status of a shell after Ctrl-C
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run one command; its exit status."""
+    """Run one command.
+
+    Args:
+        argv: the command and its arguments; None: those of the process.
+
+    Returns:
+        The exit status: that of the command, 1 after an error of the package or the operating
+        system, which is printed to stderr, 130 after Ctrl-C.
+    """
     parser = argparse.ArgumentParser(
         prog='python -m uav_task_alloc', formatter_class=argparse.RawDescriptionHelpFormatter,
         epilog='commands:\n' + '\n'.join(
-            f'  {name:8} {command.__doc__}' for name, command in COMMANDS.items()))
+            f'  {name:8} {text}' for name, text in COMMANDS.items()))
     parser.add_argument('command', choices=COMMANDS, metavar='COMMAND')
     parser.add_argument('rest', nargs=argparse.REMAINDER, metavar='...',
                         help="the command's own arguments; -h after it lists them")
     args = parser.parse_args(argv)
     try:
-        return COMMANDS[args.command](args.rest)
+        return int(importlib.import_module(f'uav_task_alloc.cli.{args.command}').main(args.rest))
     except (AllocError, OSError) as error:
         print(error, file=sys.stderr)
         return 1
     except KeyboardInterrupt:
-        return 130  # what a shell expects after Ctrl-C
+        return _INTERRUPTED
 
 
 if __name__ == '__main__':

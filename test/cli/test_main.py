@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The command line as a user meets it."""
+"""The command line from its arguments to its output and exit status."""
 import json
 import subprocess
 import sys
@@ -14,19 +14,19 @@ FILE = str(ROOT / 'config/scenarios/plan_only.yaml')
 
 
 def test_plan_prints_writes_and_draws_a_plan(tmp_path, capsys):
-    out, png, deep = (tmp_path / name for name in ('plan.json', 'plan.png', 'deep.png'))
+    out, png, png_3d = (tmp_path / name for name in ('plan.json', 'plan.png', 'plan_3d.png'))
     assert cli.main(['plan', FILE, '--budget', '0.05', '--seed', '3', '--json', str(out), '--plot',
-                     str(png), '--plot-3d', str(deep), '--missions', str(tmp_path / 'm')]) == 0
-    made = json.loads(out.read_text())
-    assert set(made['routes']) == {'scout', 'lifter', 'relay'}
-    assert sorted(name for route in made['routes'].values() for name in route) == [
+                     str(png), '--plot-3d', str(png_3d), '--missions', str(tmp_path / 'm')]) == 0
+    result = json.loads(out.read_text())
+    assert set(result['routes']) == {'scout', 'lifter', 'relay'}
+    assert sorted(name for route in result['routes'].values() for name in route) == [
         'bridge', 'parcel', 'quay', 'roof', 'yard']
-    assert 'fenced' in made['unassigned']
-    assert made['distance'] == pytest.approx(sum(
-        leg['length'] for legs in made['legs'].values() for leg in legs))
-    assert all(path.read_bytes().startswith(b'\x89PNG') for path in (png, deep))
+    assert 'fenced' in result['unassigned']
+    assert result['distance'] == pytest.approx(sum(
+        leg['length'] for legs in result['legs'].values() for leg in legs))
+    assert all(path.read_bytes().startswith(b'\x89PNG') for path in (png, png_3d))
     assert {path.name for path in (tmp_path / 'm').iterdir()} == {
-        f'{uav}.{kind}' for uav in made['routes'] for kind in ('plan', 'waypoints')}
+        f'{uav}.{kind}' for uav in result['routes'] for kind in ('plan', 'waypoints')}
     printed = capsys.readouterr().out
     assert '5 tasks planned, 1 unassigned' in printed
     assert 'unassigned fenced: ' in printed
@@ -37,9 +37,9 @@ def test_a_cancelled_task_is_not_planned(tmp_path):
     out = tmp_path / 'plan.json'
     small = str(ROOT / 'config/scenarios/small.yaml')
     assert cli.main(['plan', small, '--budget', '0.02', '--json', str(out)]) == 0
-    made = json.loads(out.read_text())
-    assert 'never' not in made['unassigned']
-    assert sorted(name for route in made['routes'].values() for name in route) == [
+    result = json.loads(out.read_text())
+    assert 'never' not in result['unassigned']
+    assert sorted(name for route in result['routes'].values() for name in route) == [
         'behind', 'east', 'late', 'north']
 
 
@@ -52,17 +52,17 @@ def test_a_cancelled_task_is_not_planned(tmp_path):
      "--plot-3d = 'plan.txt': expected a name that ends with .png or .pdf or .svg"),
     (['plan', FILE, '--budget', '0.01', '--missions', FILE + '/m'], 'plan_only.yaml'),
 ])
-def test_what_cannot_be_done_ends_with_one_line_and_status_1(arguments, text, capsys):
+def test_an_error_is_one_line_and_status_1(arguments, text, capsys):
     assert cli.main(arguments) == 1
     refusal = capsys.readouterr().err
     assert text in refusal
     assert refusal.count('\n') == 1
 
 
-def test_ctrl_c_before_the_solving_ends_without_a_word(monkeypatch, capsys):
+def test_ctrl_c_before_the_solving_ends_silently(monkeypatch, capsys):
     def interrupted(argv):
         raise KeyboardInterrupt
-    monkeypatch.setitem(cli.COMMANDS, 'plan', interrupted)
+    monkeypatch.setattr('uav_task_alloc.cli.plan.main', interrupted)
     assert cli.main(['plan', FILE]) == 130
     assert capsys.readouterr() == ('', '')
 
@@ -82,14 +82,14 @@ def test_params_prints_the_tables(capsys):
     assert '# Scenario files' in printed
 
 
-def test_params_writes_every_made_file(tmp_path, monkeypatch):
+def test_params_writes_every_generated_file(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert cli.main(['params', '--write']) == 0
-    made = {path.relative_to(tmp_path).as_posix() for path in tmp_path.rglob('*.*')}
-    assert {'docs/parameters.md', 'docs/scenarios.md', 'config/allocator.yaml'} <= made
+    result = {path.relative_to(tmp_path).as_posix() for path in tmp_path.rglob('*.*')}
+    assert {'docs/parameters.md', 'docs/scenarios.md', 'config/allocator.yaml'} <= result
 
 
-def test_params_refuses_other_words():
+def test_params_refuses_other_arguments():
     with pytest.raises(SystemExit, match='usage'):
         cli.main(['params', '--wirte'])
 

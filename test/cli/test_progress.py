@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Progress on a terminal, silence in a pipe, and Ctrl-C, over virtual time and for real."""
+"""The progress line on a terminal, none in a pipe, and Ctrl-C; virtual time, and one process."""
 import io
 import json
 import os
@@ -20,19 +20,19 @@ FILE = str(ROOT / 'config/scenarios/plan_only.yaml')
 
 
 class Terminal(io.StringIO):
-    """A stream that says it is one."""
+    """A stream that says it is a terminal."""
 
     def isatty(self):
         return True
 
 
 def run(stream, times):
-    """Ask at each time [s]; a plan of fit 60.5 is found at the first."""
+    """Poll at each time [s]; a plan of fit 60.5 is found at the first."""
     now = [times[0]]
     with SolveProgress(10.0, stream, lambda: now[0]) as progress:
         for now[0] in times:
             assert not progress.stop()
-            progress.heard(100, 60.5)
+            progress.on_iteration(100, 60.5)
     return stream.getvalue()
 
 
@@ -40,12 +40,13 @@ def test_nothing_is_shown_in_the_first_second():
     assert run(Terminal(), [100.0, 100.5, 101.0]) == ''
 
 
-def test_then_the_best_fit_and_the_time_left_are_and_in_the_end_the_line_is_wiped():
+def test_then_the_best_fit_and_the_time_left_are_shown_and_erased_at_the_end():
     assert run(Terminal(), [100.0, 104.1]) == (
-        f'{WIPE}solving: 4 s, 6 s left; fit 60.5, better 4 s ago; Ctrl-C takes it{WIPE}')
+        f'{WIPE}solving: 4 s, 6 s left; fit 60.5, improved 4 s ago; '
+        f'Ctrl-C stops and keeps it{WIPE}')
 
 
-def test_the_line_is_renewed_five_times_a_second_at_most():
+def test_the_line_is_updated_at_most_five_times_a_second():
     shown = run(Terminal(), [0.0, *(2.0 + 0.01 * i for i in range(100))])
     assert shown.count('solving') == 5
 
@@ -54,7 +55,7 @@ def test_nothing_is_shown_in_a_pipe():
     assert run(io.StringIO(), [100.0, 104.0, 109.0]) == ''
 
 
-def test_the_first_ctrl_c_is_a_wish_and_the_second_an_end():
+def test_the_first_ctrl_c_stops_the_solver_and_the_second_interrupts():
     before = signal.getsignal(signal.SIGINT)
     progress = SolveProgress(10.0, Terminal(), lambda: 0.0)
     with progress:

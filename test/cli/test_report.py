@@ -1,12 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The figures of a run: what was said is believed only where the vehicles were there too."""
+"""The key figures of a run: a completed task counts only if a vehicle was there."""
 import json
 
 import pytest
 
 from uav_task_alloc.cli import report
 from uav_task_alloc.model import ThreatZone
-from uav_task_alloc.record import ground_truth as truth, run_state as heard
+from uav_task_alloc.record.ground_truth import TRUTH_FILE
+from uav_task_alloc.record.run_state import RECORD_FILE
 from uav_task_alloc.zone_codec import JSON_ZONE, encode_zone
 
 HUT = ThreatZone.cylinder('hut', (50.0, 0.0), 5.0)
@@ -30,12 +31,12 @@ def write_run(out, statuses, reached=PLACES, zones=(), solves=(100.0, 20.0, 30.0
     lines += [{'kind': 'list', 'uav': 'u1', 'distance': 130.0, 'tasks': [
                    {'id': 'a', 'leg_distance': 60.0}] if first else []} for first in (1, 0)]
     lines.append({'kind': 'statuses', 'statuses': statuses})
-    _jsonl(out / heard.FILE, [{'wall': 0.5, **line} for line in lines])
+    _jsonl(out / RECORD_FILE, [{'wall': 0.5, **line} for line in lines])
     flight = [{'t': float(k), 'wall': float(k), 'uav': 'u1', 'x': 100.0 * k, 'y': 0.0,
                'z': 50.0, 'alive': True} for k in range(5)]
     flight += [{'t': 9.0, 'wall': 9.0, 'uav': 'u1', 'event': 'item_reached', 'seq': 1,
                 'x': PLACES[name][0] + 0.01, 'y': 0.0, 'z': 50.0} for name in reached]
-    _jsonl(out / truth.FILE, flight)
+    _jsonl(out / TRUTH_FILE, flight)
 
 
 def _jsonl(path, lines):
@@ -53,7 +54,7 @@ def run(tmp_path):
 ALL_DONE = [status(name, 'COMPLETED') for name in PLACES]
 
 
-def test_a_run_in_which_all_went_well(run):
+def test_a_run_without_faults(run):
     summary = run(ALL_DONE)
     assert summary.keys() >= KEYS
     assert (summary['tasks_announced'], summary['tasks_completed']) == (5, 5)
@@ -72,7 +73,7 @@ def test_each_task_has_one_fate(run):
     assert (summary['tasks_completed'], summary['tasks_unassigned']) == (1, 1)
     assert summary['unassigned'] == {'b': 'inside zone hut'}
     assert summary['lost'] == {
-        'c': 'last seen UNASSIGNED', 'd': 'said to be completed, but no vehicle was there',
+        'c': 'last seen UNASSIGNED', 'd': 'reported as completed, but no vehicle was there',
         'e': 'last seen ACTIVE'}
     assert summary['tasks_lost'] == 3
 
@@ -81,14 +82,14 @@ def test_a_task_without_any_status_is_lost(run):
     assert run(ALL_DONE[:4])['lost'] == {'e': 'no status'}
 
 
-def test_a_task_that_was_flown_twice_is_told(run):
+def test_a_task_flown_twice_is_listed(run):
     summary = run(ALL_DONE, reached=[*PLACES, 'b'])
     assert (summary['tasks_flown_twice'], summary['flown_twice']) == (1, ['b'])
 
 
-def test_a_flight_into_a_zone_is_told_with_its_place(run):
+def test_an_entry_into_a_zone_is_listed_with_its_position(run):
     summary = run(ALL_DONE, zones=[HUT])
-    assert summary['zone_violations'] == 0  # seen from 0.5 s on: it came around the vehicle
+    assert summary['zone_violations'] == 0  # from 0.5 s on: appeared around the vehicle
     summary = run(ALL_DONE, zones=[ThreatZone.cylinder('hut', (250.0, 0.0), 5.0)])
     assert summary['entries'] == ['u1 into hut at (245.0, 0.0, 50.0)']
 
@@ -99,7 +100,7 @@ def test_a_run_without_any_plan_has_figures_too(run):
     assert 'tasks announced' in report.summary_table(summary)
 
 
-def test_the_table_names_every_figure_a_person_asks_for(run):
+def test_the_table_has_every_key_figure(run):
     text = report.summary_table(run([*ALL_DONE[:4], status('e', 'UNASSIGNED', 'inside zone hut')]))
     for words in ('tasks announced            5', 'completed                4',
                   'unassigned               1  e: inside zone hut', 'lost                     0',
@@ -115,7 +116,7 @@ def test_the_report_command_prints_the_table_and_draws_the_map(run, tmp_path, ca
     assert (tmp_path / 'map.png').stat().st_size > 10_000
 
 
-def test_the_report_command_refuses_what_is_no_run(tmp_path):
+def test_the_report_command_refuses_a_folder_without_a_run(tmp_path):
     with pytest.raises(SystemExit, match=r'record\.jsonl: No such file .*expected a recorded run'):
         report.main([str(tmp_path)])
     with pytest.raises(SystemExit, match='2'):

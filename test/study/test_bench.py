@@ -1,11 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The bench tells gaps to the best known, as a table, as JSON and as a picture."""
+"""The benchmark reports gaps to the best known: as a table, as JSON and as a plot."""
 import json
 
 import pytest
 
+from uav_task_alloc.cli import bench
 from uav_task_alloc.errors import InvalidValue, UnknownName
-from uav_task_alloc.study import bench, reference_solvers as rivals
+from uav_task_alloc.study import reference_solvers
+from uav_task_alloc.study.bench import measure
 from uav_task_alloc.study.gap_plot import draw_gaps
 from uav_task_alloc.study.gaps import InstanceRuns, gap_table
 
@@ -13,57 +15,57 @@ SMALL = ['--sizes', '2x6', '--seeds', '2', '--first', '3', '--budgets', '0.02,0.
 CHAO = 'n 4\nm 1\ntmax 9\n0\t0\t0\n1\t1\t10\n90\t1\t20\n4\t4\t0\n'
 
 
-def run(scores, collects=False, known=None, group='s-2-6'):
-    made = InstanceRuns(group, collects, known)
+def runs_of(scores, collects=False, known=None, group='s-2-6'):
+    runs = InstanceRuns(group, collects, known)
     for name, score in scores.items():
-        made.found[name] = [{'budget': 1.0, 'score': score}]
-    return made
+        runs.found[name] = [{'budget': 1.0, 'score': score}]
+    return runs
 
 
-def test_gaps_of_ours_are_printed_and_kept_as_json(tmp_path, capsys, monkeypatch):
-    monkeypatch.setattr(rivals, 'installed', lambda: [])
+def test_gaps_are_printed_and_written_as_json(tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr(reference_solvers, 'installed', lambda: [])
     out = tmp_path / 'runs.json'
     assert bench.main([*SMALL, '--solvers', 'chain_q,nearest', '--json', str(out)]) == 0
-    said = capsys.readouterr()
-    assert 'not installed, so left out: ortools, pyvrp' in said.err
+    printed = capsys.readouterr()
+    assert 'not installed, so left out: ortools, pyvrp' in printed.err
     columns = 'chain_q@0.01 | chain_q@0.02 | nearest@0.01 | nearest@0.02'
-    assert said.out.startswith(f'| instances | {columns} |\n')
+    assert printed.out.startswith(f'| instances | {columns} |\n')
     stored = json.loads(out.read_text())
     assert list(stored) == ['spread-2-6-3', 'spread-2-6-4', 'base-2-6-3', 'base-2-6-4']
     assert stored['base-2-6-3']['gap_percent']['chain_q@0.02'] == 0.0
 
 
-def test_a_rival_is_asked_once_for_the_longest_budget(monkeypatch):
-    asked = []
+def test_a_reference_solver_runs_once_for_the_longest_budget(monkeypatch):
+    calls = []
 
     def slow(instance, seconds):
-        asked.append((instance.name, seconds))
+        calls.append((instance.name, seconds))
         names = [task.id for task in instance.tasks]
         uav = instance.uavs[0].id
         return [(0.015, {uav: names}), (0.5, {uav: []})]
 
-    monkeypatch.setitem(rivals.REFERENCE_SOLVERS, 'pyvrp', slow)
+    monkeypatch.setitem(reference_solvers.REFERENCE_SOLVERS, 'pyvrp', slow)
     source = {'uavs': 1, 'tasks': 3, 'seed': 1, 'slack': 9.0}
-    found = bench.measure(source, 'pyvrp', (0.01, 0.02, 1.0))['found']
-    assert asked == [('spread*9-1-3-1', 1.0)]
-    assert [each['score'] is None for each in found] == [True, False, True]
-    assert [each['missing'] for each in found] == [3, 0, 3]
+    rows = measure(source, 'pyvrp', (0.01, 0.02, 1.0))['found']
+    assert calls == [('spread*9-1-3-1', 1.0)]
+    assert [each['score'] is None for each in rows] == [True, False, True]
+    assert [each['missing'] for each in rows] == [3, 0, 3]
 
 
-def test_public_instances_are_told_apart_by_their_table(tmp_path, capsys):
+def test_public_instances_are_grouped_and_compared_with_their_best_known_values(tmp_path, capsys):
     (tmp_path / 'p1.2.a.txt').write_text(CHAO)
     (tmp_path / 'best_known.txt').write_text('p1.2.a.txt 20\n')
     (tmp_path / 'notes.md').write_text('words')
-    picture = tmp_path / 'gap.png'
+    plot = tmp_path / 'gap.png'
     assert bench.main(['--folder', str(tmp_path), '--budgets', '0.01', '--against', 'none',
-                       '--plot', str(picture)]) == 0
-    said = capsys.readouterr()
-    assert "notes.md left out: notes.md = 'words': expected an instance" in said.err
-    assert said.out.splitlines()[-2:] == ['| p1 | 50.00 |', '| best reached | 0/1 |']
-    assert picture.read_bytes().startswith(b'\x89PNG')
+                       '--plot', str(plot)]) == 0
+    printed = capsys.readouterr()
+    assert "notes.md left out: notes.md = 'words': expected an instance" in printed.err
+    assert printed.out.splitlines()[-2:] == ['| p1 | 50.00 |', '| best reached | 0/1 |']
+    assert plot.read_bytes().startswith(b'\x89PNG')
 
 
-def test_kept_results_are_not_run_again(tmp_path, capsys):
+def test_kept_results_are_not_computed_again(tmp_path, capsys):
     given = [*SMALL, '--against', 'none', '--keep', str(tmp_path / 'kept')]
     assert bench.main(given) == 0
     first = capsys.readouterr()
@@ -74,27 +76,29 @@ def test_kept_results_are_not_run_again(tmp_path, capsys):
 
 @pytest.mark.parametrize(('given', 'error', 'text'), [
     (['--solvers', 'best'], UnknownName, "solver 'best': expected one of chain_q"),
-    (['--against', 'gurobi'], UnknownName, "rival 'gurobi': expected one of pyvrp, ortools"),
+    (['--against', 'gurobi'], UnknownName,
+     "reference solver 'gurobi': expected one of pyvrp, ortools"),
     (['--folder', '.', '--match', 'no*'], InvalidValue, 'expected instances named no*'),
 ])
-def test_what_cannot_be_run_is_refused(given, error, text):
+def test_an_unknown_solver_or_an_empty_folder_is_refused(given, error, text):
     with pytest.raises(error) as caught:
         bench.main(given)
     assert text in str(caught.value)
 
 
-def test_a_plan_that_leaves_tasks_out_is_counted_apart():
-    text = gap_table({'1': run({'a': 100.0, 'b': None}), '2': run({'a': 103.0, 'b': 100.0})})
+def test_the_table_says_how_many_instances_a_solver_solved():
+    text = gap_table({'1': runs_of({'a': 100.0, 'b': None}),
+                      '2': runs_of({'a': 103.0, 'b': 100.0})})
     assert text.splitlines()[2:] == ['| s-2-6 | 1.50 | 0.00 (1/2) |',
                                      '| best reached | 1/2 | 1/2 |']
 
 
 def test_a_value_falls_short_of_the_published_one_a_length_exceeds_it():
-    assert run({'a': 90.0}, collects=True, known=100.0).gaps()['a@1'] == pytest.approx(10.0)
-    assert run({'a': 110.0}, known=100.0).gaps()['a@1'] == pytest.approx(10.0)
-    assert run({'a': 0.0}, collects=True, known=0.0).gaps()['a@1'] == 0.0
+    assert runs_of({'a': 90.0}, collects=True, known=100.0).gaps()['a@1'] == pytest.approx(10.0)
+    assert runs_of({'a': 110.0}, known=100.0).gaps()['a@1'] == pytest.approx(10.0)
+    assert runs_of({'a': 0.0}, collects=True, known=0.0).gaps()['a@1'] == 0.0
 
 
-def test_a_picture_of_nobody_answering_is_drawn(tmp_path):
-    draw_gaps({'1': run({'a': None})}, tmp_path / 'gap.svg')
+def test_a_plot_without_any_valid_plan_is_drawn(tmp_path):
+    draw_gaps({'1': runs_of({'a': None})}, tmp_path / 'gap.svg')
     assert '<svg' in (tmp_path / 'gap.svg').read_text()

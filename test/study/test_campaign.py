@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A campaign loses nothing: not to interrupts, not to killed workers, here or on a cluster."""
+"""A campaign loses no result to interrupts or killed workers, on one machine or a cluster."""
 import argparse
 import itertools
 import json
@@ -13,7 +13,7 @@ import pytest
 
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.study import executors
-from uav_task_alloc.study.campaign import LIVES, Job, kept, run_campaign
+from uav_task_alloc.study.campaign import MAX_BROKEN_EXECUTORS, Job, load_results, run_campaign
 
 distributed = pytest.importorskip('distributed')
 
@@ -52,92 +52,92 @@ def squares(count):
     return {f'square-{i}': {'x': i, 'square': i * i} for i in range(count)}
 
 
-def silent(text):
+def no_log(text):
     pass
 
 
 def test_results_come_back_and_are_kept_as_files(tmp_path):
-    outcome = run_campaign(jobs(3), tmp_path, threads, silent, lambda: 0.0)
-    assert outcome.results == squares(3) == kept(jobs(3), tmp_path).results
+    outcome = run_campaign(jobs(3), tmp_path, threads, no_log, lambda: 0.0)
+    assert outcome.results == squares(3) == load_results(jobs(3), tmp_path).results
     assert sorted(p.name for p in tmp_path.iterdir()) == [f'square-{i}.json' for i in range(3)]
 
 
-def test_a_second_run_does_only_what_is_missing(tmp_path):
-    run_campaign(jobs(2), tmp_path, threads, silent, lambda: 0.0)
-    said = []
-    run_campaign(jobs(3), tmp_path, threads, said.append, lambda: 0.0)
-    assert said == ['2 of 3 results were there', '[3/3] square-2; about 0 s left']
+def test_a_second_run_runs_only_the_missing_jobs(tmp_path):
+    run_campaign(jobs(2), tmp_path, threads, no_log, lambda: 0.0)
+    log = []
+    run_campaign(jobs(3), tmp_path, threads, log.append, lambda: 0.0)
+    assert log == ['2 of 3 results were there', '[3/3] square-2; about 0 s left']
 
 
-def test_a_result_of_other_settings_is_made_anew(tmp_path):
-    run_campaign([Job('same', square, {'x': 2})], tmp_path, threads, silent, lambda: 0.0)
-    outcome = run_campaign([Job('same', square, {'x': 3})], tmp_path, threads, silent, lambda: 0.0)
+def test_a_result_of_other_settings_is_computed_again(tmp_path):
+    run_campaign([Job('same', square, {'x': 2})], tmp_path, threads, no_log, lambda: 0.0)
+    outcome = run_campaign([Job('same', square, {'x': 3})], tmp_path, threads, no_log, lambda: 0.0)
     assert outcome.results['same']['square'] == 9
 
 
-def test_a_file_that_was_cut_off_is_made_anew(tmp_path):
-    run_campaign(jobs(1), tmp_path, threads, silent, lambda: 0.0)
+def test_a_truncated_result_file_is_computed_again(tmp_path):
+    run_campaign(jobs(1), tmp_path, threads, no_log, lambda: 0.0)
     (tmp_path / 'square-0.json').write_text('{"key": ')
-    assert run_campaign(jobs(1), tmp_path, threads, silent, lambda: 0.0).results == squares(1)
+    assert run_campaign(jobs(1), tmp_path, threads, no_log, lambda: 0.0).results == squares(1)
 
 
-def test_the_rest_is_estimated_by_weight(tmp_path):
-    said, clock = [], itertools.count(0, 10)
+def test_the_time_left_is_estimated_by_weight(tmp_path):
+    log, clock = [], itertools.count(0, 10)
     work = [Job('long', square, {'x': 1}, weight=3.0), Job('short', square, {'x': 2})]
-    run_campaign(work, tmp_path, threads, said.append, lambda: float(next(clock)))
-    assert {'[1/2] long; about 3 s left', '[1/2] short; about 30 s left'} & set(said)
-    assert len(said) == 2
+    run_campaign(work, tmp_path, threads, log.append, lambda: float(next(clock)))
+    assert {'[1/2] long; about 3 s left', '[1/2] short; about 30 s left'} & set(log)
+    assert len(log) == 2
 
 
-def test_a_job_that_raises_is_told_of_and_tried_again_next_time(tmp_path):
-    outcome = run_campaign(jobs(2) + jobs(1, refuse), tmp_path, threads, silent, lambda: 0.0)
+def test_a_job_that_raises_is_reported_and_tried_again_by_the_next_run(tmp_path):
+    outcome = run_campaign(jobs(2) + jobs(1, refuse), tmp_path, threads, no_log, lambda: 0.0)
     assert outcome.results == squares(2)
     assert outcome.failed == {'refuse-0': 'ValueError: 0 is refused'}
-    assert 'refuse-0' not in kept(jobs(1, refuse), tmp_path).results
+    assert 'refuse-0' not in load_results(jobs(1, refuse), tmp_path).results
 
 
-def test_an_interrupt_keeps_what_was_done(tmp_path):
+def test_an_interrupt_keeps_the_finished_results(tmp_path):
     def interrupt(text):
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
         run_campaign(jobs(5), tmp_path, threads, interrupt, lambda: 0.0)
-    assert len(kept(jobs(5), tmp_path).results) == 1
+    assert len(load_results(jobs(5), tmp_path).results) == 1
 
 
-def test_a_killed_process_loses_nothing(tmp_path):
+def test_a_killed_process_loses_no_result(tmp_path):
     killer = Job('killer', die_once, {'x': 7, 'mark': str(tmp_path / 'mark')}, weight=2.0)
     outcome = run_campaign(
-        [*jobs(6), killer], tmp_path / 'kept', lambda: executors.processes(1), silent, lambda: 0.0
+        [*jobs(6), killer], tmp_path / 'kept', lambda: executors.processes(1), no_log, lambda: 0.0
     )
     assert outcome.results == squares(6) | {'killer': square(7)}
     assert not outcome.failed
 
 
-def test_a_job_that_always_kills_its_process_is_given_up_in_the_end(tmp_path):
-    said = []
-    outcome = run_campaign(jobs(1, die), tmp_path, lambda: executors.processes(1), said.append,
+def test_a_job_that_always_kills_its_process_is_given_up(tmp_path):
+    log = []
+    outcome = run_campaign(jobs(1, die), tmp_path, lambda: executors.processes(1), log.append,
                   lambda: 0.0)
     assert list(outcome.failed) == ['die-0']
-    assert len(said) == LIVES
-    assert said[-1].endswith('given up')
+    assert len(log) == MAX_BROKEN_EXECUTORS
+    assert log[-1].endswith('given up')
 
 
 @pytest.fixture
 def cluster(monkeypatch):
-    """Two workers that find this file."""
+    """Two workers that can import this file."""
     here = str(Path(__file__).parent)
     monkeypatch.setenv('PYTHONPATH', os.pathsep.join([here, os.environ.get('PYTHONPATH', '')]))
     with distributed.LocalCluster(n_workers=2, processes=True, threads_per_worker=1,
-                                  dashboard_address=None) as made:
-        yield made
+                                  dashboard_address=None) as running:
+        yield running
 
 
-@pytest.mark.filterwarnings('default')  # the library's own at its end
-def test_a_cluster_worker_killed_in_the_middle_loses_nothing(tmp_path, cluster):
+@pytest.mark.filterwarnings('default')  # of the library, when it ends
+def test_a_killed_cluster_worker_loses_no_result(tmp_path, cluster):
     killer = Job('killer', die_once, {'x': 7, 'mark': str(tmp_path / 'mark')}, weight=0.5)
     outcome = run_campaign([*jobs(20), killer], tmp_path / 'kept',
-                  lambda: executors.dask(cluster.scheduler_address), silent, lambda: 0.0)
+                  lambda: executors.dask(cluster.scheduler_address), no_log, lambda: 0.0)
     assert outcome.results == squares(20) | {'killer': square(7)}
     assert (tmp_path / 'mark').exists()
     assert len(list((tmp_path / 'kept').iterdir())) == 21

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The judge sees what is wrong with routes, and measures what is not."""
+"""The evaluator names the faults of routes, and measures their length and value."""
 import pytest
 
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.model import Task, ThreatZone, Uav
-from uav_task_alloc.study.evaluator import judge
+from uav_task_alloc.study.evaluator import evaluate
 from uav_task_alloc.study.instances import Instance
 
 UAVS = (Uav('a', (0.0, 0.0, 0.0), 10.0), Uav('b', (0.0, 0.0, 0.0), 20.0, home=(3.0, 0.0, 0.0)))
@@ -14,16 +14,16 @@ HOME = Instance('home', UAVS, TASKS, route_end='home', collects=True)
 
 
 def test_open_routes_end_at_their_last_task():
-    found = judge(OPEN, {'a': ['near'], 'b': ['far']})
-    assert (found.length, found.value, found.missing, found.faults) == (5.0 + 13.0, 7.0, 0, ())
-    assert found.counts(collects=False)
+    result = evaluate(OPEN, {'a': ['near'], 'b': ['far']})
+    assert (result.length, result.value, result.missing, result.faults) == (5.0 + 13.0, 7.0, 0, ())
+    assert result.is_valid(collects=False)
 
 
 def test_returning_routes_end_at_home_and_an_idle_uav_flies_nothing():
-    found = judge(HOME, {'a': [], 'b': ['near']})
-    assert (found.length, found.value, found.missing) == (5.0 + 4.0, 2.0, 1)
-    assert found.counts(collects=True)
-    assert not found.counts(collects=False)
+    result = evaluate(HOME, {'a': [], 'b': ['near']})
+    assert (result.length, result.value, result.missing) == (5.0 + 4.0, 2.0, 1)
+    assert result.is_valid(collects=True)
+    assert not result.is_valid(collects=False)
 
 
 @pytest.mark.parametrize(('routes', 'fault'), [
@@ -33,13 +33,13 @@ def test_returning_routes_end_at_home_and_an_idle_uav_flies_nothing():
     ({'b': ['gone']}, 'b serves gone, which is no task'),
     ({'c': ['near']}, 'c is no UAV'),
 ])
-def test_a_fault_is_named_and_the_routes_do_not_count(routes, fault):
-    found = judge(OPEN, routes)
-    assert found.faults == (fault,)
-    assert not found.counts(collects=True)
+def test_a_fault_is_named_and_the_routes_are_invalid(routes, fault):
+    result = evaluate(OPEN, routes)
+    assert result.faults == (fault,)
+    assert not result.is_valid(collects=True)
 
 
 def test_zones_are_refused():
     zone = ThreatZone.hemisphere('z', (9.0, 9.0, 0.0), 1.0)
     with pytest.raises(InvalidValue, match='expected none: legs are straight here'):
-        judge(Instance('zones', UAVS, TASKS, (zone,)), {})
+        evaluate(Instance('zones', UAVS, TASKS, (zone,)), {})

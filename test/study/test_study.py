@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The experiments run and print their figures; their instances are the same each time."""
+"""The experiments run and print their figures; their instances are reproducible."""
 import math
 
 import pytest
@@ -9,7 +9,7 @@ from uav_task_alloc.study.instances import CLEAR, make_dome_scene, make_instance
 from uav_task_alloc.study.learning import confidence
 
 
-def test_an_instance_is_the_same_again_and_within_reach():
+def test_an_instance_is_reproducible_and_its_tasks_are_within_range():
     first, second = make_instance(4, 20, 3), make_instance(4, 20, 3)
     assert first == second != make_instance(4, 20, 4)
     base = make_instance(4, 20, 3, one_base=True)
@@ -18,7 +18,7 @@ def test_an_instance_is_the_same_again_and_within_reach():
                for task in base.tasks)
 
 
-def test_a_scene_is_the_same_again_and_its_domes_hold_nothing():
+def test_a_scene_is_reproducible_and_its_domes_contain_no_task_or_start():
     scene = make_dome_scene(3, 40, 8, 2)
     assert scene == make_dome_scene(3, 40, 8, 2) != make_dome_scene(3, 40, 8, 3)
     assert all(math.dist(each.position, zone.center) > zone.radius + CLEAR
@@ -31,7 +31,7 @@ def test_an_experiment_prints_its_figures(name, capsys):
     assert '%' in capsys.readouterr().out
 
 
-def test_an_interval_is_half_a_student_interval():
+def test_a_confidence_interval_is_that_of_student():
     mean, half = confidence([1.0, 2.0, 3.0])
     assert mean == 2.0
     assert half == pytest.approx(4.303 / math.sqrt(3.0), rel=1e-3)

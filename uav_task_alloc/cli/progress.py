@@ -1,70 +1,82 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A long solve on a terminal: how good the best is, how long it still takes, Ctrl-C ends it."""
+"""Progress of long runs on stderr: the line of a solve that Ctrl-C ends, and plain log lines."""
 from __future__ import annotations
 
 import signal
+import sys
 from collections.abc import Callable
 from types import FrameType, TracebackType
 from typing import TextIO
 
-_PATIENCE = 1.0  # [s] of solving before anything is shown
-_PERIOD = 0.2  # [s] between two lines
-WIPE = '\r\x1b[K'  # back to the start of the line, and empty it
+_SHOWN_AFTER = 1.0  # [s] of solving before the line appears
+_PERIOD = 0.2  # [s] between two updates of the line
+WIPE = '\r\x1b[K'  # carriage return, erase to the end of the line
+
+
+def log_line(text: str) -> None:
+    """Print one line to stderr and flush it."""
+    print(text, file=sys.stderr, flush=True)
 
 
 class SolveProgress:
-    """Give `plan` its `heard` and `stop`, within `with`: there the first Ctrl-C is a wish to stop.
+    """The callbacks `stop` and `on_iteration` of `plan`, used as a context manager.
 
-    The second one raises KeyboardInterrupt. Nothing is shown where the stream is no terminal.
+    Within `with`, the first Ctrl-C makes `stop` return True, the second raises KeyboardInterrupt.
+
+    Args:
+        budget: [s] of solving, for the time left.
+        stream: where the line is shown; nothing is shown where it is no terminal.
+        clock: [s], monotonic.
     """
 
     def __init__(self, budget: float, stream: TextIO, clock: Callable[[], float]) -> None:
         self.interrupted = False
         self._budget, self._stream, self._clock = budget, stream, clock
-        self._shows = stream.isatty()
-        self._began = self._shown_at = -1.0  # [s] on that clock; the kernels are loaded before it
-        self._best: tuple[float, float] | None = None  # fit, when it was found [s]
-        self._before: object = None
+        self._is_terminal = stream.isatty()
+        self._started = -1.0  # [s] when `stop` was first called: after the kernels were loaded
+        self._shown_at = -1.0  # [s]
+        self._best: tuple[float, float] | None = None  # fit, and when it was found [s]
+        self._previous_handler: object = None
 
     def __enter__(self) -> SolveProgress:
-        self._before = signal.signal(signal.SIGINT, self._wish)
+        self._previous_handler = signal.signal(signal.SIGINT, self._on_sigint)
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
                  trace: TracebackType | None) -> None:
-        signal.signal(signal.SIGINT, self._before)  # type: ignore[arg-type]
+        signal.signal(signal.SIGINT, self._previous_handler)  # type: ignore[arg-type]
         if self._shown_at >= 0.0:
             self._write(WIPE)
 
-    def heard(self, iterations: int, fit: float) -> None:
-        """So many iterations were made, and the best plan so far has this fit."""
+    def on_iteration(self, iterations: int, fit: float) -> None:
+        """Record the fit of the best plan after so many iterations."""
         if self._best is None or fit < self._best[0]:
             self._best = fit, self._clock()
 
     def stop(self) -> bool:
-        """Whether to answer now; asked all the time, which is what moves the line."""
+        """Whether Ctrl-C was pressed. The solver polls this, which also updates the line."""
         now = self._clock()
-        if self._began < 0.0:
-            self._began = now
-        passed = now - self._began
-        if self._shows and passed > _PATIENCE and now - self._shown_at >= _PERIOD:
+        if self._started < 0.0:
+            self._started = now
+        elapsed = now - self._started
+        if self._is_terminal and elapsed > _SHOWN_AFTER and now - self._shown_at >= _PERIOD:
             self._shown_at = now
             self._write(WIPE + self._line(now))
         return self.interrupted
 
     def _line(self, now: float) -> str:
-        passed = now - self._began
-        text = f'solving: {passed:.0f} s, {max(0.0, self._budget - passed):.0f} s left'
+        elapsed = now - self._started
+        text = f'solving: {elapsed:.0f} s, {max(0.0, self._budget - elapsed):.0f} s left'
         if self._best is not None:
-            text += f'; fit {self._best[0]:.4g}, better {now - self._best[1]:.0f} s ago'
-        return text + '; Ctrl-C takes it'
+            text += f'; fit {self._best[0]:.4g}, improved {now - self._best[1]:.0f} s ago'
+        return text + '; Ctrl-C stops and keeps it'
 
-    def _wish(self, number: int, frame: FrameType | None) -> None:
+    def _on_sigint(self, number: int, frame: FrameType | None) -> None:
         if self.interrupted:
             raise KeyboardInterrupt
         self.interrupted = True
-        if self._shows:
-            self._write(f'{WIPE}stopping; Ctrl-C again gives up\n')
+        if self._is_terminal:
+            self._write(f'{WIPE}stopping; Ctrl-C again discards the plan\n')
 
     def _write(self, text: str) -> None:
         self._stream.write(text)

@@ -1,42 +1,48 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The figures of a recorded run: what was said is held against where the vehicles really were."""
+"""The command `report`: a page of a recorded flight, or the key figures of a demo and its map."""
 from __future__ import annotations
 
 import argparse
 import json
 import math
-import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from uav_task_alloc.record import ground_truth as truth, run_state as heard
-from uav_task_alloc.record.ground_truth import Truth
-from uav_task_alloc.record.run_state import RunState
+from uav_task_alloc.cli.progress import log_line
+from uav_task_alloc.record.ground_truth import GroundTruth, read_truth, visits, zone_entries
+from uav_task_alloc.record.run_state import RunState, read_record
 
 Summary = dict[str, Any]
-EXPLAINED = ('UNASSIGNED', 'REJECTED')
+_LEFT_OUT = ('UNASSIGNED', 'REJECTED')
 
 
 def summarise(out_dir: str | Path) -> Summary:
-    """The figures of the run that was recorded into a folder; OSError when there is none."""
+    """The key figures of a recorded run.
+
+    Args:
+        out_dir: folder with record.jsonl and flight.jsonl.
+
+    Raises:
+        OSError: a file cannot be read.
+    """
     out = Path(out_dir)
-    return figures(heard.read_record(out), truth.read_truth(out))
+    return key_figures(read_record(out), read_truth(out))
 
 
-def figures(said: RunState, flown: Truth) -> Summary:
-    """The figures of a run; a task that was only said to be completed is lost."""
-    visits = truth.visits(flown, {name: task.position for name, task in said.tasks.items()})
-    fates = {name: fate(name, said, bool(visits[name])) for name in said.tasks}
-    names = {kind: sorted(name for name, its in fates.items() if its == kind)
+def key_figures(state: RunState, truth: GroundTruth) -> Summary:
+    """The key figures of a run; a task counts as completed only if a vehicle was there."""
+    reached = visits(truth, {name: task.position for name, task in state.tasks.items()})
+    fates = {name: fate(name, state, bool(reached[name])) for name in state.tasks}
+    names = {kind: sorted(name for name, its_fate in fates.items() if its_fate == kind)
              for kind in ('completed', 'unassigned', 'cancelled', 'lost')}
-    twice = sorted(name for name, reached in visits.items() if len(reached) > 1)
-    entries = truth.entries(flown, said.zones)
-    times = [solve.milliseconds for solve in said.solves[1:]]  # the first is no re-solve
+    twice = sorted(name for name, items in reached.items() if len(items) > 1)
+    entries = zone_entries(truth, state.zones)
+    times = [solve.milliseconds for solve in state.solves[1:]]  # the first plan is no re-plan
     return {
-        'tasks_announced': len(said.tasks),
+        'tasks_announced': len(state.tasks),
         'tasks_completed': len(names['completed']),
         'tasks_unassigned': len(names['unassigned']),
         'tasks_cancelled': len(names['cancelled']),
@@ -46,67 +52,67 @@ def figures(said: RunState, flown: Truth) -> Summary:
         'replans': len(times),
         'resolve_ms_median': percentile(times, 50.0),
         'resolve_ms_p99': percentile(times, 99.0),
-        'uploads': said.uploads,
-        'metres_flown': round(flown.metres(), 1),
-        'metres_planned': round(planned(said, names['completed']), 1),
-        'uavs_lost': len(flown.died),
-        'wall_s': round(max(0.0, said.last - said.first), 1) if said.solves else 0.0,
-        'unassigned': {name: said.statuses[name].reason for name in names['unassigned']},
-        'lost': {name: why_lost(name, said) for name in names['lost']},
+        'uploads': state.uploads,
+        'metres_flown': round(truth.metres(), 1),
+        'metres_planned': round(planned_length(state, names['completed']), 1),
+        'uavs_lost': len(truth.died),
+        'wall_s': round(max(0.0, state.last - state.first), 1) if state.solves else 0.0,
+        'unassigned': {name: state.statuses[name].reason for name in names['unassigned']},
+        'lost': {name: why_lost(name, state) for name in names['lost']},
         'flown_twice': twice,
         'entries': [f'{entry.uav} into {entry.zone} at '
                     f'({", ".join(f"{v:.1f}" for v in entry.point)})' for entry in entries],
     }
 
 
-def fate(name: str, said: RunState, reached: bool) -> str:
-    """completed, unassigned, cancelled or lost."""
-    status = said.statuses.get(name)
+def fate(name: str, state: RunState, reached: bool) -> str:
+    """`completed`, `unassigned`, `cancelled` or `lost`; `reached`: a vehicle was at the task."""
+    status = state.statuses.get(name)
     if status is not None and status.state == 'COMPLETED' and reached:
         return 'completed'
-    if status is not None and status.state in EXPLAINED and status.reason:
+    if status is not None and status.state in _LEFT_OUT and status.reason:
         return 'unassigned'
-    if name in said.cancelled:
+    if name in state.cancelled:
         return 'cancelled'
     return 'lost'
 
 
-def why_lost(name: str, said: RunState) -> str:
-    """What is known of a lost task."""
-    status = said.statuses.get(name)
+def why_lost(name: str, state: RunState) -> str:
+    """The last status of a lost task."""
+    status = state.statuses.get(name)
     if status is None:
         return 'no status'
     if status.state == 'COMPLETED':
-        return 'said to be completed, but no vehicle was there'
+        return 'reported as completed, but no vehicle was there'
     return f'last seen {status.state}' + f': {status.reason}' * bool(status.reason)
 
 
-def planned(said: RunState, completed: Sequence[str]) -> float:
-    """Metres of the legs to completed tasks and home, as planned when each became the next."""
-    legs = [said.legs.get((said.statuses[name].uav, name), 0.0) for name in completed]
-    home = [line['distance'] or 0.0 for line in said.lists.values() if not line['tasks']]
+def planned_length(state: RunState, completed: Sequence[str]) -> float:
+    """Length [m] of the legs to completed tasks and home, as planned when each became next."""
+    legs = [state.legs.get((state.statuses[name].uav, name), 0.0) for name in completed]
+    home = [line['distance'] or 0.0 for line in state.lists.values() if not line['tasks']]
     return math.fsum(legs) + math.fsum(home)
 
 
 def percentile(values: Sequence[float], share: float) -> float:
-    """A percentile to 0.1; 0 of nothing."""
+    """A percentile rounded to 0.1; 0 without values."""
     return round(float(np.percentile(values, share)), 1) if values else 0.0
 
 
 def summary_table(summary: Mapping[str, Any]) -> str:
-    """The figures as lines for a person."""
+    """The key figures as a table of text."""
     of = summary.__getitem__
-    more = 100.0 * (of('metres_flown') / of('metres_planned') - 1.0) if of('metres_planned') else 0
+    flown, planned = of('metres_flown'), of('metres_planned')
+    excess = 100.0 * (flown / planned - 1.0) if planned else 0
     rows = [
         ('tasks announced', of('tasks_announced'), ''),
         ('  completed', of('tasks_completed'), ''),
-        ('  unassigned', of('tasks_unassigned'), _named(of('unassigned'))),
+        ('  unassigned', of('tasks_unassigned'), _with_reasons(of('unassigned'))),
         ('  cancelled', summary.get('tasks_cancelled', 0), ''),
-        ('  lost', of('tasks_lost'), _named(of('lost'))),
+        ('  lost', of('tasks_lost'), _with_reasons(of('lost'))),
         ('  flown twice', of('tasks_flown_twice'), ', '.join(of('flown_twice'))),
         ('zone violations', of('zone_violations'), '; '.join(of('entries'))),
-        ('metres flown', f'{of("metres_flown"):.0f}',
-         f'planned {of("metres_planned"):.0f} ({more:+.1f} %)'),
+        ('metres flown', f'{flown:.0f}', f'planned {planned:.0f} ({excess:+.1f} %)'),
         ('re-plans', of('replans'), ''),
         ('re-solve time', f'{of("resolve_ms_median"):.0f} ms',
          f'p99 {of("resolve_ms_p99"):.0f} ms'),
@@ -119,37 +125,50 @@ def summary_table(summary: Mapping[str, Any]) -> str:
     return '\n'.join([rule, *lines, rule])
 
 
-def _named(reasons: Mapping[str, str]) -> str:
+def _with_reasons(reasons: Mapping[str, str]) -> str:
     return '; '.join(f'{name}: {reason}' for name, reason in reasons.items())
 
 
 def flight_page(bag: Path, html: Path) -> int:
-    """Write the page of a flight and say so."""
+    """Write the report of an MCAP file and print its key figures.
+
+    Raises:
+        InvalidValue: the file has no messages of a fleet.
+        SystemExit: a package is not installed, or a file cannot be read or written.
+    """
     try:
-        from uav_task_alloc.flight_report import page  # plotly and mcap are wanted here only
+        from uav_task_alloc.flight_report import page  # imports plotly and mcap
     except ModuleNotFoundError as error:
         raise SystemExit(f'report: {error}: expected plotly, mcap and mcap-ros2-support') from None
     try:
-        story, trouble = page.write_report(bag, html)
+        history, warnings = page.write_report(bag, html)
     except OSError as error:
         raise SystemExit(f'{error.filename}: {error.strerror}: expected a recorded run') from None
-    for name, value in page.key_figures(story):
+    for name, value in page.key_figures(history):
         print(f'{name:<45}{"" if value is None else value!s:>12}')
-    for text in trouble:
-        print(f'Warning: {text}', file=sys.stderr)
+    for text in warnings:
+        log_line(f'Warning: {text}')
     print(f'Report: {html}')
     return 0
 
 
 def main(argv: Sequence[str]) -> int:
-    """`report FILE.mcap`: a page of the flight. `report OUT_DIR | SUMMARY.json`: table and map."""
+    """Run `report FILE.mcap`: write the page; `report OUT_DIR | SUMMARY.json`: table and map.
+
+    Returns:
+        The exit status 0.
+
+    Raises:
+        AllocError: the file is no recording of a fleet.
+        SystemExit: there is no recorded run.
+    """
     parser = argparse.ArgumentParser(
         prog='python -m uav_task_alloc report',
         description='Draw a flight recorded as MCAP as one HTML file; or print the table of the '
                     'folder of a demo again, and draw its map again.')
     parser.add_argument('place', type=Path, metavar='FILE.mcap | OUT_DIR | SUMMARY.json')
     parser.add_argument('--html', type=Path, metavar='OUT.html',
-                        help='where the page goes (FILE.html)')
+                        help='the page (FILE.html)')
     args = parser.parse_args(argv)
     place = args.place
     if not place.is_dir() and place.suffix != '.json':
@@ -159,7 +178,7 @@ def main(argv: Sequence[str]) -> int:
     try:
         summary = summarise(out) if place.is_dir() else json.loads(place.read_text())
         print(summary_table(summary))
-        from uav_task_alloc.plots import draw_flight  # matplotlib is wanted here only
+        from uav_task_alloc.plots import draw_flight  # imports matplotlib
         draw_flight(out, out / 'map.png')
     except OSError as error:
         raise SystemExit(f'{error.filename}: {error.strerror}: expected a recorded run') from None

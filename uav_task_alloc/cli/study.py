@@ -1,41 +1,50 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`python -m uav_task_alloc study`: the paper's figures and tables anew, or one experiment."""
+"""The command `study`: regenerate the paper's figures and tables, or run one experiment."""
 from __future__ import annotations
 
 import argparse
 import importlib.util
 import json
 import os
-import sys
 import time
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 
-from uav_task_alloc.study import campaign, executors, experiments as program, tables
+from uav_task_alloc.cli.progress import log_line
+from uav_task_alloc.study import campaign, executors, experiments, tables
 from uav_task_alloc.study.campaign import CampaignOutcome
 from uav_task_alloc.study.experiments import Experiments
 
 EXPERIMENTS = {
-    'scouts': 'learnt against frozen Q in the constructing bees alone',
+    'scouts': 'learnt against frozen Q tables in the scouts alone',
     'whole': 'forms of learning in the whole solver, paired, at equal time',
-    'warm': 'events in a row: new tasks arrive, UAVs move on',
+    'warm': 'a sequence of events: new tasks arrive, UAVs move on',
 }
-INTERRUPTED = 130  # exit status, as shells have it
+INTERRUPTED = 130  # exit status of a shell after Ctrl-C
 
 
 def main(argv: Sequence[str]) -> int:
-    """The whole study, or the experiment that is named; returns the exit status."""
+    """Run the whole study, or the experiment that the first argument names.
+
+    Returns:
+        The exit status: 1 where a job failed, 130 after Ctrl-C.
+
+    Raises:
+        AllocError: an option is invalid.
+        SystemExit: matplotlib is not installed.
+    """
     if argv and argv[0] in EXPERIMENTS:
-        return _experiment(argv[0], argv[1:])
-    asked = _parser().parse_args(argv)
-    if importlib.util.find_spec('matplotlib') is None:  # better now than when all was run
+        return _run_experiment(argv[0], argv[1:])
+    args = make_parser().parse_args(argv)
+    if importlib.util.find_spec('matplotlib') is None:  # checked before hours of computing
         raise SystemExit("study: no matplotlib: expected pip install '.[study,plot]'")
-    made = program.quick(asked.seed) if asked.quick else Experiments(asked.seed)
-    return regenerate(made, asked.out, executors.chosen(asked))
+    settings = experiments.quick(args.seed) if args.quick else Experiments(args.seed)
+    return regenerate(settings, args.out, executors.chosen(args))
 
 
-def _parser() -> argparse.ArgumentParser:
+def make_parser() -> argparse.ArgumentParser:
+    """The arguments of `study` without the name of an experiment."""
     parser = argparse.ArgumentParser(
         prog='python -m uav_task_alloc study', description=__doc__,
         formatter_class=argparse.RawDescriptionHelpFormatter,
@@ -43,75 +52,76 @@ def _parser() -> argparse.ArgumentParser:
             f'  {name:8} {text}' for name, text in EXPERIMENTS.items()))
     add = parser.add_argument
     add('--out', type=Path, required=True, metavar='DIR',
-        help='figures and tables; what it holds already is not run again')
+        help='figures and tables; a run whose result is in DIR is not repeated')
     add('--quick', action='store_true', help='minutes instead of half an hour')
     add('--seed', type=int, default=1, help='of all instances and solvers (%(default)s)')
     executors.add_arguments(parser, jobs=os.cpu_count() or 1)
     return parser
 
 
-def regenerate(made: Experiments, out: Path, opened: campaign.Opened) -> int:
-    """Run what `out` lacks, then write all that there are results for."""
-    jobs = program.jobs(made)
+def regenerate(settings: Experiments, out: Path, open_executor: campaign.ExecutorFactory) -> int:
+    """Run the jobs that have no result in `out`, then write all figures and tables.
+
+    Returns:
+        The exit status: 1 where a job failed, 130 after Ctrl-C.
+    """
+    jobs = experiments.jobs(settings)
     folder = out / 'jobs'
     try:
-        outcome, status = campaign.run_campaign(jobs, folder, opened, _say, time.monotonic), 0
+        outcome = campaign.run_campaign(jobs, folder, open_executor, log_line, time.monotonic)
+        status = 0
     except KeyboardInterrupt:
-        outcome, status = campaign.kept(jobs, folder), INTERRUPTED
-        _say(f'interrupted with {len(outcome.results)} of {len(jobs)} results; '
-             'the same command goes on from here')
-    return write_study(made, outcome, out) or status
+        outcome, status = campaign.load_results(jobs, folder), INTERRUPTED
+        log_line(f'interrupted with {len(outcome.results)} of {len(jobs)} results; '
+                 'the same command continues from here')
+    return write_study(settings, outcome, out) or status
 
 
-def write_study(made: Experiments, outcome: CampaignOutcome, out: Path) -> int:
-    """Figures and tables; 1 where something is missing because a job failed."""
-    from uav_task_alloc.study import figures  # needs matplotlib
-    figures.draw_figures(made, outcome.results, out)
-    parts = {'sizes': tables.sizes(made, outcome.results),
-             'dynamic': tables.events_table(made, outcome.results)}
-    for name, (same, timed) in parts.items():
-        tables.write_csv(out / f'table_{name}.csv', same)
-        tables.write_csv(out / f'table_{name}_timing.csv', timed)
-    (out / 'settings.json').write_text(json.dumps(asdict(made), indent=1) + '\n')
-    for which, head in enumerate((_SAME, TIMED)):
-        (out / ('tables.md', 'timing.md')[which]).write_text(head + ''.join(
-            f'\n## {title}\n\n{tables.markdown(parts[name][which])}\n'
-            for name, title in TITLES.items()))
-    for name, why in outcome.failed.items():
-        _say(f'{name} failed: {why}')
-    _say(f'figures and tables: {out}')
+def write_study(settings: Experiments, outcome: CampaignOutcome, out: Path) -> int:
+    """Write the figures and tables that have results; returns 1 where a job failed."""
+    from uav_task_alloc.study import figures  # imports matplotlib
+    figures.draw_figures(settings, outcome.results, out)
+    pairs = {'sizes': tables.sizes_table(settings, outcome.results),
+             'dynamic': tables.events_table(settings, outcome.results)}
+    for name, (quality, timing) in pairs.items():
+        tables.write_csv(out / f'table_{name}.csv', quality)
+        tables.write_csv(out / f'table_{name}_timing.csv', timing)
+    (out / 'settings.json').write_text(json.dumps(asdict(settings), indent=1) + '\n')
+    for i, (file_name, head) in enumerate((('tables.md', _TABLES_HEAD),
+                                           ('timing.md', _TIMING_HEAD))):
+        (out / file_name).write_text(head + ''.join(
+            f'\n## {title}\n\n{tables.markdown(pairs[name][i])}\n'
+            for name, title in _TITLES.items()))
+    for name, reason in outcome.failed.items():
+        log_line(f'{name} failed: {reason}')
+    log_line(f'figures and tables: {out}')
     return int(bool(outcome.failed))
 
 
-TITLES = {'sizes': 'Solvers by size', 'dynamic': 'Random arrivals, warm against cold'}
-_SAME = """# The study: tables
+_TITLES = {'sizes': 'Solvers by size', 'dynamic': 'Random arrivals, warm against cold'}
+_TABLES_HEAD = """# The study: tables
 
-Budgets are iterations, so the same seed gives the same tables however fast the machine is; what
-took how long is in timing.md. Settings: settings.json. Solvers by size: ranges are soft (eq 2.12),
-so every task is assigned, and a metre beyond range costs as much as 100 m of way; gaps are in fit
-to the best that any run found. `paper_chain_q` holds no more than 200 tasks. Random arrivals:
-ranges are hard, a gap is in length, a task left out counts as 100 %.
+Budgets are iterations, so the same seed gives the same tables on every machine; CPU times are in
+timing.md. Settings: settings.json. Solvers by size: ranges are soft (eq 2.12), so every task is
+assigned, and a metre beyond range costs as much as 100 m of distance; gaps are in fit to the best
+of all runs. `paper_chain_q` solves at most 200 tasks. Random arrivals: ranges are hard, a gap is
+in length, a task left out counts as 100 %.
 """
-TIMED = """# The study: CPU seconds
+_TIMING_HEAD = """# The study: CPU seconds
 
 Measured, so they differ from run to run; the same runs as in tables.md.
 """
 
 
-def _experiment(name: str, argv: Sequence[str]) -> int:
-    from uav_task_alloc.study import learning, warm
+def _run_experiment(name: str, argv: Sequence[str]) -> int:
+    from uav_task_alloc.study import learning, warm  # import numba and scipy
     parser = argparse.ArgumentParser(prog=f'python -m uav_task_alloc study {name}',
                                      description=EXPERIMENTS[name])
-    parser.add_argument('--budget', type=float, help='[s] of CPU time a run')
-    parser.add_argument('--runs', type=int, help='instances')
+    parser.add_argument('--budget', type=float, help='[s] of CPU time of each run')
+    parser.add_argument('--runs', type=int, help='number of instances or events')
     parser.add_argument('--size', help='UAVs x tasks')
-    asked = vars(parser.parse_args(argv))
-    done = {'scouts': learning.scouts, 'whole': learning.whole_solver, 'warm': warm.run_events}[
-        name
-    ]
-    done(**{key: value for key, value in asked.items() if value is not None})
+    options = vars(parser.parse_args(argv))
+    experiment = {'scouts': learning.scouts, 'whole': learning.whole_solver,
+                  'warm': warm.run_events}[name]
+    experiment(**{key: value for key, value in options.items() if value is not None})
     return 0
-
-
-def _say(text: str) -> None:
-    print(text, file=sys.stderr, flush=True)

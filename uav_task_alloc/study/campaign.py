@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A campaign: many independent jobs on any executor, each result kept as a file when it comes."""
+"""A campaign: independent jobs on any executor, each result written to a file at once."""
 from __future__ import annotations
 
 import json
@@ -11,127 +11,136 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-LIVES = 3  # executors in a row that may break without a single result
-Opened = Callable[[], AbstractContextManager[Executor]]
+MAX_BROKEN_EXECUTORS = 3  # in a row, without a single result
+ExecutorFactory = Callable[[], AbstractContextManager[Executor]]
 
 
 @dataclass(frozen=True, slots=True)
 class Job:
-    """A call whose arguments and result are plain data, as JSON knows it."""
+    """A function call whose arguments and result are JSON values."""
 
-    name: str  # of its file, too
-    work: Callable[..., Any]  # of a module, so that other processes find it
-    settings: Mapping[str, Any]
-    weight: float = 1.0  # about how long it takes; only the proportions matter
+    name: str  # also of its file
+    work: Callable[..., Any]  # a function of a module, so that other processes can import it
+    settings: Mapping[str, Any]  # keyword arguments
+    weight: float = 1.0  # expected run time in any unit: only the proportions matter
 
     def key(self) -> str:
-        """What a kept result must have been made from."""
+        """Identity of a result: function and arguments; a stored one of another key is stale."""
         return json.dumps([f'{self.work.__module__}.{self.work.__qualname__}',
                            dict(self.settings)], sort_keys=True)
 
 
 @dataclass(slots=True)
 class CampaignOutcome:
-    """What came of a campaign, by job."""
+    """Results and failures of a campaign, by job name."""
 
     results: dict[str, Any] = field(default_factory=dict)
-    failed: dict[str, str] = field(default_factory=dict)  # why
+    failed: dict[str, str] = field(default_factory=dict)  # reason
 
 
-def kept(jobs: Sequence[Job], folder: Path) -> CampaignOutcome:
-    """The results that an earlier run left in the folder for the same settings."""
-    found = CampaignOutcome()
+def load_results(jobs: Sequence[Job], folder: Path) -> CampaignOutcome:
+    """The results that earlier runs stored in a folder for the same functions and arguments."""
+    outcome = CampaignOutcome()
     for job in jobs:
         try:
             stored = json.loads((folder / f'{job.name}.json').read_text())
-        except (FileNotFoundError, ValueError):  # never run, or cut off while copied
+        except (FileNotFoundError, ValueError):  # never run, or the copy of a file was cut short
             continue
         if isinstance(stored, dict) and stored.get('key') == job.key():
-            found.results[job.name] = stored['result']
-    return found
+            outcome.results[job.name] = stored['result']
+    return outcome
 
 
-def run_campaign(jobs: Sequence[Job], folder: Path, opened: Opened, say: Callable[[str], None],
-        clock: Callable[[], float]) -> CampaignOutcome:
-    """Do what the folder does not hold yet; `clock` [s] is for the estimate of what is left.
+def run_campaign(jobs: Sequence[Job], folder: Path, open_executor: ExecutorFactory,
+                 log: Callable[[str], None], clock: Callable[[], float]) -> CampaignOutcome:
+    """Run the jobs whose results are not in the folder yet.
 
-    `opened` opens an executor; one that breaks (a worker was killed) is opened again for what it
-    left. A job that raises is told of in the outcome and tried again by the next run.
+    Args:
+        jobs: with distinct names.
+        folder: of the results, one JSON file each; created where it is missing.
+        open_executor: opens an executor; called again for the remaining jobs after one broke
+            because a worker process was killed.
+        log: takes one line of progress.
+        clock: [s], for the estimate of the time left.
+
+    Returns:
+        Results and failures. A job that raised is a failure; the next run tries it again.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    outcome = kept(jobs, folder)
+    outcome = load_results(jobs, folder)
     if outcome.results:
-        say(f'{len(outcome.results)} of {len(jobs)} results were there')
-    progress = CampaignProgress(jobs, outcome, say, clock)
-    lives = LIVES
-    while left := [job for job in jobs if job.name not in progress.told()]:
-        before = len(progress.told())
+        log(f'{len(outcome.results)} of {len(jobs)} results were there')
+    progress = CampaignProgress(jobs, outcome, log, clock)
+    attempts = MAX_BROKEN_EXECUTORS
+    while remaining := [job for job in jobs if job.name not in progress.finished()]:
+        before = len(progress.finished())
         try:
-            with opened() as executor:
-                for job, result, well in _done(executor, left):
-                    if well:
-                        outcome.results[job.name] = _keep(folder, job, result)
+            with open_executor() as executor:
+                for job, result, succeeded in _run(executor, remaining):
+                    if succeeded:
+                        outcome.results[job.name] = _store(folder, job, result)
                     else:
                         outcome.failed[job.name] = f'{type(result).__name__}: {result}'
-                    progress.tell(job)
+                    progress.count(job)
         except BrokenExecutor as error:
-            lives = LIVES if len(progress.told()) > before else lives - 1
-            say(f'{error}; {"going on with what is left" if lives else "given up"}')
-            if not lives:
-                rest = [job for job in jobs if job.name not in progress.told()]
+            attempts = (MAX_BROKEN_EXECUTORS if len(progress.finished()) > before
+                        else attempts - 1)
+            log(f'{error}; {"continuing with the remaining jobs" if attempts else "given up"}')
+            if not attempts:
+                rest = [job for job in jobs if job.name not in progress.finished()]
                 outcome.failed |= {job.name: str(error) for job in rest}
     return outcome
 
 
-def _done(executor: Executor, jobs: Sequence[Job]) -> Iterator[tuple[Job, Any, bool]]:
-    """Each job, what it returned or raised, and which; the longest begin first."""
-    asked = {executor.submit(job.work, **job.settings): job
-             for job in sorted(jobs, key=lambda job: -job.weight)}
+def _run(executor: Executor, jobs: Sequence[Job]) -> Iterator[tuple[Job, Any, bool]]:
+    """Each job, its result or exception, and whether it succeeded; the longest are first."""
+    submitted = {executor.submit(job.work, **job.settings): job
+                 for job in sorted(jobs, key=lambda job: -job.weight)}
     broken: BaseException | None = None
-    for future in as_completed(asked):
-        error = CancelledError('taken back') if future.cancelled() else future.exception()
+    for future in as_completed(submitted):
+        error = CancelledError('cancelled') if future.cancelled() else future.exception()
         if isinstance(error, (BrokenExecutor, CancelledError)):
-            broken = error  # others may have come through
+            broken = error  # other futures may hold results
         else:
-            yield asked[future], error or future.result(), error is None
+            yield submitted[future], error or future.result(), error is None
     if broken:
         raise BrokenExecutor(str(broken))
 
 
-def _keep(folder: Path, job: Job, result: Any) -> Any:
-    """Write a result, whole or not at all; returns it as the next run will read it."""
+def _store(folder: Path, job: Job, result: Any) -> Any:
+    """Write a result atomically; returns it as a later run will read it."""
     text = json.dumps({'key': job.key(), 'result': result}, indent=1)
     path = folder / f'{job.name}.json'
-    half = path.with_suffix('.half')
-    half.write_text(text + '\n')
-    os.replace(half, path)
+    unfinished = path.with_suffix('.half')
+    unfinished.write_text(text + '\n')
+    os.replace(unfinished, path)
     return json.loads(text)['result']
 
 
 @dataclass(slots=True)
 class CampaignProgress:
-    """Says how far a campaign is, and about how long the rest will take."""
+    """Logs how many jobs are finished, and an estimate of the time left."""
 
     jobs: Sequence[Job]
     outcome: CampaignOutcome
-    say: Callable[[str], None]
+    log: Callable[[str], None]
     clock: Callable[[], float]  # [s]
-    began: float = field(init=False)
-    done: float = 0.0  # weight of what was done since it began
+    started: float = field(init=False)
+    done: float = 0.0  # weight of the jobs finished since `started`
 
     def __post_init__(self) -> None:
-        self.began = self.clock()
+        self.started = self.clock()
 
-    def told(self) -> set[str]:
-        """The jobs that something came of."""
+    def finished(self) -> set[str]:
+        """Names of the jobs with a result or a failure."""
         return {*self.outcome.results, *self.outcome.failed}
 
-    def tell(self, job: Job) -> None:
-        """One more is done."""
-        told = self.told()
+    def count(self, job: Job) -> None:
+        """Log that one more job is finished."""
+        finished = self.finished()
         self.done += job.weight
-        rest = sum(each.weight for each in self.jobs if each.name not in told)
-        seconds = (self.clock() - self.began) * rest / self.done
+        remaining = sum(each.weight for each in self.jobs if each.name not in finished)
+        seconds = (self.clock() - self.started) * remaining / self.done
         error = self.outcome.failed.get(job.name)
-        self.say(f'[{len(told)}/{len(self.jobs)}] {job.name}'
+        self.log(f'[{len(finished)}/{len(self.jobs)}] {job.name}'
                  f'{f" failed: {error}" if error else ""}; about {seconds:.0f} s left')

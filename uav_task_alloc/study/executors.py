@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Where a campaign's jobs run: processes of this machine, or a Dask cluster by its address."""
+"""The executors of a campaign: processes of this machine, or the workers of a Dask cluster."""
 from __future__ import annotations
 
 import argparse
@@ -14,33 +14,33 @@ from importlib import import_module
 from multiprocessing.connection import wait
 
 from uav_task_alloc.errors import InvalidValue
-from uav_task_alloc.study.campaign import Opened
+from uav_task_alloc.study.campaign import ExecutorFactory
 
-_PATIENCE = 10.0  # [s] that a scheduler may take to answer
+_CONNECT_TIMEOUT = 10.0  # [s]
 
 
 @contextmanager
 def processes(count: int) -> Iterator[Executor]:
-    """So many processes of this machine; none outlives the campaign, however that ends."""
-    pool = ProcessPoolExecutor(count, multiprocessing.get_context('spawn'), _enter)
+    """An executor of `count` processes; none outlives the campaign, however that ends."""
+    pool = ProcessPoolExecutor(count, multiprocessing.get_context('spawn'), _init_worker)
     before = set(multiprocessing.active_children())
     try:
         yield pool
     except BaseException:
         for child in set(multiprocessing.active_children()) - before:
-            child.terminate()  # what they were at is not worth waiting for
+            child.terminate()  # unfinished jobs are run again
         raise
     finally:
         pool.shutdown(cancel_futures=True)
 
 
-def _enter() -> None:
-    """In a worker: Ctrl-C is the campaign's business, and its end is the worker's."""
+def _init_worker() -> None:
+    """In a worker process: leave Ctrl-C to the campaign, exit when the campaign's process ends."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    threading.Thread(target=_end_with_parent, daemon=True).start()
+    threading.Thread(target=_exit_with_parent, daemon=True).start()
 
 
-def _end_with_parent() -> None:
+def _exit_with_parent() -> None:
     parent = multiprocessing.parent_process()
     if parent is not None:
         wait([parent.sentinel])
@@ -49,28 +49,33 @@ def _end_with_parent() -> None:
 
 @contextmanager
 def dask(address: str) -> Iterator[Executor]:
-    """The workers of a Dask scheduler; jobs of workers that die move on. OSError: none there."""
+    """An executor on the workers of a Dask scheduler; jobs of dead workers are moved to others.
+
+    Raises:
+        InvalidValue: dask.distributed is not installed.
+        OSError: no scheduler answers at the address.
+    """
     try:
         distributed = import_module('distributed')
     except ModuleNotFoundError as error:
         raise InvalidValue('--dask', address, f"dask.distributed to be installed ({error}); "
                            "pip install '.[study]'") from None
-    with distributed.Client(address, timeout=_PATIENCE, set_as_default=False) as client:
+    with distributed.Client(address, timeout=_CONNECT_TIMEOUT, set_as_default=False) as client:
         yield client.get_executor(pure=False)
 
 
 def add_arguments(parser: argparse.ArgumentParser, jobs: int) -> None:
-    """--jobs and --dask."""
+    """Add the options --jobs (with this default) and --dask."""
     parser.add_argument('--jobs', type=int, default=jobs,
                         help='processes of this machine (%(default)s)')
     parser.add_argument('--dask', metavar='tcp://HOST:PORT',
                         help='run on the workers of this Dask scheduler instead')
 
 
-def chosen(asked: argparse.Namespace) -> Opened:
-    """The executor that the arguments ask for. Raises InvalidValue."""
-    if asked.dask:
-        return lambda: dask(asked.dask)
-    if asked.jobs < 1:
-        raise InvalidValue('--jobs', asked.jobs, 'an integer in [1, inf)')
-    return lambda: processes(asked.jobs)
+def chosen(args: argparse.Namespace) -> ExecutorFactory:
+    """The executor that --jobs and --dask select. Raises InvalidValue."""
+    if args.dask:
+        return lambda: dask(args.dask)
+    if args.jobs < 1:
+        raise InvalidValue('--jobs', args.jobs, 'an integer in [1, inf)')
+    return lambda: processes(args.jobs)

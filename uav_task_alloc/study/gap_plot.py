@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Gap over CPU time, a panel a group of instances."""
+"""Plot of the mean gap over CPU time, a panel for each group of instances."""
 from __future__ import annotations
 
 import math
@@ -11,26 +11,30 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter
 
-from uav_task_alloc.plots import COLOURS
-from uav_task_alloc.study.gaps import InstanceRuns, Means, groups, means
+from uav_task_alloc.plots import uav_colour
+from uav_task_alloc.study.gaps import InstanceRuns, MeanGaps, groups, mean_gaps
 
-_MARKS = 'osD^vP*X'
-ACROSS = 4  # panels
+_MARKERS = 'osD^vP*X'
+_COLUMNS = 4  # panels side by side
 
 
 def draw_gaps(runs: Mapping[str, InstanceRuns], out: Path) -> None:
-    """One line a solver, one mark a budget; hollow where not every instance was answered."""
+    """Draw a line for each solver with a marker for each budget.
+
+    A marker is hollow where not every instance was solved. Raises OSError.
+    """
     names = groups(runs)
-    down, across = max(1, math.ceil(len(names) / ACROSS)), max(1, min(ACROSS, len(names)))
-    figure = Figure(figsize=(1.0 + 3.2 * across, 1.2 + 2.8 * down), layout='constrained')
-    panels = figure.subplots(down, across, squeeze=False).ravel()
+    rows = max(1, math.ceil(len(names) / _COLUMNS))
+    columns = max(1, min(_COLUMNS, len(names)))
+    figure = Figure(figsize=(1.0 + 3.2 * columns, 1.2 + 2.8 * rows), layout='constrained')
+    panels = figure.subplots(rows, columns, squeeze=False).ravel()
     solvers = list(dict.fromkeys(name for run in runs.values() for name in run.found))
     for axes, group in zip(panels, names, strict=False):
-        _panel(axes, means(runs, group), solvers)
+        _draw_panel(axes, mean_gaps(runs, group), solvers)
         axes.set_title(group)
     for axes in panels[len(names):]:
         axes.set_visible(False)
-    figure.suptitle('Gap to the best known; hollow: not all instances answered', x=0.01,
+    figure.suptitle('Gap to the best known; hollow: not all instances solved', x=0.01,
                     ha='left', fontweight='bold')
     if solvers:
         figure.legend(*panels[0].get_legend_handles_labels(), loc='outside lower center',
@@ -38,26 +42,31 @@ def draw_gaps(runs: Mapping[str, InstanceRuns], out: Path) -> None:
     figure.savefig(out, dpi=120)
 
 
-def _panel(axes: Axes, found: Means, solvers: Sequence[str]) -> None:
+def _draw_panel(axes: Axes, means: MeanGaps, solvers: Sequence[str]) -> None:
     for i, name in enumerate(solvers):
-        rows = [(float(column.rpartition('@')[2]), gap, there == asked)
-                for column, (gap, there, asked) in found.items()
-                if column.rpartition('@')[0] == name and gap is not None]
-        style: dict[str, Any] = {'color': COLOURS[i % len(COLOURS)], 'ms': 8, 'mew': 1.6}
-        mark = _MARKS[i % len(_MARKS)]
-        axes.plot([row[0] for row in rows], [row[1] for row in rows], mark + '-', label=name,
-                  fillstyle='none', **style)
-        for budget, gap, whole in rows:
-            if whole:
-                axes.plot(budget, gap, mark, **style)
+        points = [(_budget(column), mean.gap, mean.solved == mean.instances)
+                  for column, mean in means.items()
+                  if column.rpartition('@')[0] == name and mean.gap is not None]
+        style: dict[str, Any] = {'color': uav_colour(i), 'ms': 8, 'mew': 1.6}
+        marker = _MARKERS[i % len(_MARKERS)]
+        axes.plot([point[0] for point in points], [point[1] for point in points], marker + '-',
+                  label=name, fillstyle='none', **style)
+        for budget, gap, all_solved in points:
+            if all_solved:
+                axes.plot(budget, gap, marker, **style)
     axes.set(xscale='log', xlabel='CPU time [s]', ylabel='mean gap [%]')
-    axes.set_xticks(sorted({float(column.rpartition('@')[2]) for column in found}))
+    axes.set_xticks(sorted({_budget(column) for column in means}))
     plain_log(axes.xaxis)
     axes.set_ylim(bottom=0.0)
     axes.grid(color='#e8e8e8', lw=0.7)
 
 
+def _budget(column: str) -> float:
+    """[s] of a column 'solver@budget'."""
+    return float(column.rpartition('@')[2])
+
+
 def plain_log(axis: Any) -> None:
-    """Ticks of a logarithmic axis as plain numbers."""
+    """Label the ticks of a logarithmic axis with plain numbers."""
     axis.set_major_formatter('{x:g}')
     axis.set_minor_formatter(NullFormatter())

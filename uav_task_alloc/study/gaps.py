@@ -1,91 +1,106 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Gaps to the best that is known of each instance, and their table."""
+"""Gaps to the best known score of each instance, and their table."""
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-_SAME = 1e-4  # [%] from the best that is but rounding
-Means = dict[str, tuple[float | None, int, int]]  # 'solver@budget' -> mean gap [%], of, asked
+from uav_task_alloc.study.tables import markdown_rows
+
+_TOLERANCE = 1e-4  # [%] gap that counts as none: rounding
+
+
+@dataclass(frozen=True, slots=True)
+class MeanGap:
+    """The mean gap of a solver with one budget over a group of instances."""
+
+    gap: float | None  # [%] over the instances solved; None: none was
+    solved: int  # instances with a valid plan
+    instances: int
+
+
+MeanGaps = dict[str, MeanGap]  # by column: 'solver@budget'
 
 
 @dataclass(slots=True)
 class InstanceRuns:
-    """One instance: what each solver had after each budget."""
+    """The results of all solvers and budgets on one instance."""
 
     group: str
-    collects: bool  # the score is a value, the more the better; else a length
+    collects: bool  # the score is a value, more is better; else a length, less is better
     known: float | None = None  # best published score
-    found: dict[str, list[dict[str, Any]]] = field(default_factory=dict)
+    found: dict[str, list[dict[str, Any]]] = field(default_factory=dict)  # by solver: see measure
 
     def best(self) -> float | None:
-        """The best score that anybody has, published ones included."""
-        scores = [each['score'] for row in self.found.values() for each in row
-                  if each['score'] is not None]
+        """The best score of all runs and of `known`; None where there is none."""
+        scores = [row['score'] for rows in self.found.values() for row in rows
+                  if row['score'] is not None]
         scores += [self.known] * (self.known is not None)
         return (max if self.collects else min)(scores) if scores else None
 
     def gaps(self) -> dict[str, float | None]:
-        """Percent worse than the best, by 'solver@budget'; None: no answer."""
-        return {f'{name}@{each["budget"]:g}': self.gap(each['score'])
-                for name, row in self.found.items() for each in row}
+        """[%] worse than the best, by 'solver@budget'; None: no valid plan."""
+        return {f'{name}@{row["budget"]:g}': self.gap(row['score'])
+                for name, rows in self.found.items() for row in rows}
 
     def gap(self, score: float | None) -> float | None:
-        """Percent worse than the best."""
+        """[%] by which a score is worse than the best; None: no valid plan."""
         best = self.best()
         if score is None or best is None:
             return None
         if not best:
-            return 0.0  # nothing is within reach
+            return 0.0  # no task is within range
         return 100.0 * (1.0 - score / best if self.collects else score / best - 1.0)
 
     def plain(self) -> dict[str, Any]:
-        """For JSON."""
+        """The runs and their gaps as JSON values."""
         return {'group': self.group, 'measure': 'value' if self.collects else 'length',
                 'known': self.known, 'best': self.best(), 'found': self.found,
                 'gap_percent': self.gaps()}
 
 
-def means(runs: Mapping[str, InstanceRuns], group: str) -> Means:
-    """Mean gap of a group by column, over the instances with an answer, and how many those are."""
+def mean_gaps(runs: Mapping[str, InstanceRuns], group: str) -> MeanGaps:
+    """Mean gaps of one group of instances, by column."""
     rows = [run.gaps() for run in runs.values() if run.group == group]
-    made: Means = {}
+    means: MeanGaps = {}
     for column in dict.fromkeys(name for row in rows for name in row):
         gaps = [row[column] for row in rows if column in row]
-        there = [gap for gap in gaps if gap is not None]
-        made[column] = (sum(there) / len(there) if there else None, len(there), len(gaps))
-    return made
+        solved = [gap for gap in gaps if gap is not None]
+        means[column] = MeanGap(sum(solved) / len(solved) if solved else None, len(solved),
+                                len(gaps))
+    return means
 
 
 def groups(runs: Mapping[str, InstanceRuns]) -> list[str]:
-    """In the order in which they come."""
+    """The groups of the instances, in order of appearance."""
     return list(dict.fromkeys(run.group for run in runs.values()))
 
 
 def gap_table(runs: Mapping[str, InstanceRuns]) -> str:
-    """Mean gap [%] to the best of each instance by group, and how many were answered.
+    """A Markdown table of mean gaps [%], a row for each group of instances.
 
-    The last row: on how many instances the best was reached.
+    `1.50 (3/5)`: 3 of 5 instances were solved. The last row: on how many instances the best
+    score was reached.
     """
-    rows = {group: means(runs, group) for group in groups(runs)}
+    rows = {group: mean_gaps(runs, group) for group in groups(runs)}
     columns = list(dict.fromkeys(name for row in rows.values() for name in row))
-    lines = [['instances', *columns], ['---'] * (len(columns) + 1)]
-    lines += [[group, *(_cell(row.get(column)) for column in columns)]
-              for group, row in rows.items()]
-    lines.append(['best reached', *(_reached(runs, column) for column in columns)])
-    return '\n'.join(f'| {" | ".join(line)} |' for line in lines)
+    return markdown_rows(
+        ['instances', *columns],
+        [*([group, *(_gap_cell(row.get(column)) for column in columns)]
+           for group, row in rows.items()),
+         ['best reached', *(_best_reached(runs, column) for column in columns)]])
 
 
-def _reached(runs: Mapping[str, InstanceRuns], column: str) -> str:
+def _best_reached(runs: Mapping[str, InstanceRuns], column: str) -> str:
     gaps = [run.gaps()[column] for run in runs.values() if column in run.gaps()]
-    return f'{sum(gap is not None and gap < _SAME for gap in gaps)}/{len(gaps)}'
+    return f'{sum(gap is not None and gap < _TOLERANCE for gap in gaps)}/{len(gaps)}'
 
 
-def _cell(mean: Sequence[Any] | None) -> str:
+def _gap_cell(mean: MeanGap | None) -> str:
     if mean is None:
         return ''
-    gap, there, asked = mean
-    if gap is None:
+    if mean.gap is None:
         return 'none'
-    return f'{gap:.2f}' if there == asked else f'{gap:.2f} ({there}/{asked})'
+    solved = '' if mean.solved == mean.instances else f' ({mean.solved}/{mean.instances})'
+    return f'{mean.gap:.2f}{solved}'

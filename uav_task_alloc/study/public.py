@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Public instances by the text of their files: team orienteering, its multi-source form, MDVRP.
+"""Parser of public instances: team orienteering, multi-source team orienteering, MDVRP.
 
-Chao's team orienteering: `n`, `m`, `tmax`, then x, y, score a line; the first point is every
-vehicle's start, the last its end. Multi-source (MSTOP): two columns more, whether a point is a
-start and how many vehicles start there; the end is the last point (or the one whose second flag
-alone is set). Cordeau's MDVRP: loads are left out, since UAVs carry none here; so are instances
-whose durations hold service times, which ranges do not.
+Team orienteering (Chao, Golden and Wasil): `n`, `m`, `tmax`, then a line x, y, score for each
+point; all vehicles start at the first point and end at the last. Multi-source (MSTOP): two more
+columns, whether a point is a start and how many vehicles start there; the end is the last point,
+or the one of which only the second flag is set. Multi-depot vehicle routing (Cordeau): loads are
+ignored, since UAVs carry none here; instances with service times in limited durations are
+refused, since a range does not include them.
 """
 from __future__ import annotations
 
@@ -18,35 +19,51 @@ from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.model import Task, Uav
 from uav_task_alloc.study.instances import Instance
 
-TABLE = 'best_known.txt'  # in a folder: a file's name and its best value or length a line
-Numbers = list[list[float]]
+BEST_KNOWN_FILE = 'best_known.txt'  # lines: name of an instance file, best known value or length
 
 
 def read_folder(folder: Path, pattern: str = '*') -> tuple[dict[str, str], dict[str, str]]:
-    """Texts of the instances whose names match, and why others are left out; by file name."""
-    texts, left = {}, {}
+    """Read all instance files of a folder.
+
+    Args:
+        folder: may also hold BEST_KNOWN_FILE.
+        pattern: glob of file names.
+
+    Returns:
+        Texts of the instances, and the reasons why other files are skipped; by file name.
+    """
+    texts, skipped = {}, {}
     for path in sorted(folder.glob(pattern)):
-        if not path.is_file() or path.name == TABLE:
+        if not path.is_file() or path.name == BEST_KNOWN_FILE:
             continue
         try:
             texts[path.name] = path.read_text()
             parse_instance(path.name, texts[path.name])
         except (InvalidValue, UnicodeDecodeError) as error:
             texts.pop(path.name, None)
-            left[path.name] = str(error)
-    return texts, left
+            skipped[path.name] = str(error)
+    return texts, skipped
 
 
 def best_known(folder: Path) -> dict[str, float]:
-    """The folder's table of best values, where it has one."""
-    path = folder / TABLE
+    """Best known values or lengths by file name; empty where the folder has no table of them."""
+    path = folder / BEST_KNOWN_FILE
     lines = path.read_text().splitlines() if path.exists() else []
     rows = [line.split() for line in lines if line.strip() and not line.startswith('#')]
     return {row[0]: float(row[1]) for row in rows}
 
 
 def parse_instance(name: str, text: str, known: float = math.nan) -> Instance:
-    """The instance a file's text describes. Raises InvalidValue."""
+    """Parse the text of an instance file.
+
+    Args:
+        name: of the file.
+        text: of the file.
+        known: best known value (team orienteering) or length (MDVRP).
+
+    Raises:
+        InvalidValue: the text is no instance of a supported format.
+    """
     lines = [line.split() for line in text.splitlines() if line.strip()]
     try:
         if lines and lines[0][0] == 'n':
@@ -70,34 +87,35 @@ def _orienteering(name: str, lines: Sequence[Sequence[str]], known: float) -> In
     if not starts or len(ends) > 1:
         raise InvalidValue(f'{name}: starts, ends', (len(starts), len(ends)), 'a start, one end')
     vehicles = int(head['m'])
-    crews = [i for i in starts for _ in range(int(points[i][4]))] if flagged else []
-    if len(crews) != vehicles:  # the flag only says that vehicles may start there
-        crews = list(islice(cycle(starts), vehicles))
-    home = _place(points[end])
-    uavs = tuple(Uav(f'u{i}', _place(points[crew]), head['tmax'], home=home)
-                 for i, crew in enumerate(crews))
-    tasks = tuple(Task(f't{i}', _place(p), value=p[2]) for i, p in enumerate(points)
+    start_of = [i for i in starts for _ in range(int(points[i][4]))] if flagged else []
+    if len(start_of) != vehicles:  # the column is a flag: vehicles may start there
+        start_of = list(islice(cycle(starts), vehicles))
+    home = _position(points[end])
+    uavs = tuple(Uav(f'u{i}', _position(points[start]), head['tmax'], home=home)
+                 for i, start in enumerate(start_of))
+    tasks = tuple(Task(f't{i}', _position(p), value=p[2]) for i, p in enumerate(points)
                   if i not in starts and i != end and p[2] > 0.0)
     return Instance(name, uavs, tasks, (), 'home', True, known)
 
 
-def _mdvrp(name: str, rows: Numbers, known: float) -> Instance:
+def _mdvrp(name: str, rows: Sequence[Sequence[float]], known: float) -> Instance:
     kind, vehicles, customers, depots = (int(each) for each in rows[0][:4])
     if kind != 2 or len(rows) != 1 + 2 * depots + customers:
         raise InvalidValue(f'{name}: type, lines', (kind, len(rows)),
-                           'type 2, a line a depot, a customer and a depot again')
-    limits, served = rows[1:1 + depots], rows[1 + depots:1 + depots + customers]
-    if any(limit[0] for limit in limits) and any(row[3] for row in served):
-        raise InvalidValue(f'{name}: service times', max(row[3] for row in served),
+                           'type 2, a line for each depot, customer and depot')
+    limits, customer_rows = rows[1:1 + depots], rows[1 + depots:1 + depots + customers]
+    if any(limit[0] for limit in limits) and any(row[3] for row in customer_rows):
+        raise InvalidValue(f'{name}: service times', max(row[3] for row in customer_rows),
                            '0 where durations are limited: ranges hold no service time')
     uavs = [Uav(f'u{d}_{i}', (row[1], row[2], 0.0), limit[0] or math.inf)
             for d, (row, limit) in enumerate(zip(rows[-depots:], limits, strict=True))
             for i in range(vehicles)]
-    tasks = [Task(f't{row[0]:g}', (row[1], row[2], 0.0)) for row in served]
-    bound = any(0.0 < limit[1] < sum(row[4] for row in served) for limit in limits)
+    tasks = [Task(f't{row[0]:g}', (row[1], row[2], 0.0)) for row in customer_rows]
+    demand = sum(row[4] for row in customer_rows)
+    is_load_limited = any(0.0 < limit[1] < demand for limit in limits)
     return Instance(name, tuple(uavs), tuple(tasks), (), 'home', False,
-                    math.nan if bound else known)  # published with loads: another problem
+                    math.nan if is_load_limited else known)  # published with loads
 
 
-def _place(point: Sequence[float]) -> tuple[float, float, float]:
+def _position(point: Sequence[float]) -> tuple[float, float, float]:
     return point[0], point[1], 0.0

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The same instances for PyVRP and OR-Tools, and the routes they find in CPU time."""
+"""Adapters to PyVRP and OR-Tools: the same instances, and the routes they find in CPU time."""
 from __future__ import annotations
 
 import importlib.util
@@ -18,149 +18,163 @@ from uav_task_alloc.model import Uav
 from uav_task_alloc.study.evaluator import RoutesByUav
 from uav_task_alloc.study.instances import Instance
 
-COUNTS = 1e6  # both count in integers: the longest leg is so many
-_UNLIMITED = 2 ** 40
-WAITING = 20.0  # times the CPU seconds that OR-Tools may take by the wall
-Found = list[tuple[float, RoutesByUav]]  # CPU [s] and routes, whenever better ones were found
+_LONGEST_LEG = 1e6  # integer length of the longest leg: both solvers compute in integers
+_UNLIMITED = 2 ** 40  # integer length
+_WALL_TIME_FACTOR = 20.0  # wall time limit of OR-Tools over its CPU time
+Incumbents = list[tuple[float, RoutesByUav]]  # CPU [s] and routes, one for each improvement
 
 
 @dataclass(frozen=True, slots=True)
-class Model:
-    """Nodes: a start a crew, their ends (one that costs nothing where routes stay open), tasks."""
+class IntegerModel:
+    """An instance in integer lengths.
 
-    crews: Sequence[Sequence[Uav]]  # UAVs that are alike
-    ends: Sequence[int]  # node by crew
-    tasks: int  # first node
-    unit: float  # counts a metre
-    ways: NDArray[np.int64]  # rounded up, so that what is within range here is so there
-    prizes: Sequence[int]  # what leaving a task out costs; empty: none may be
+    Nodes: the start of each vehicle type; the end of each (one for all, at length 0 from every
+    node, where routes are open); the tasks.
+    """
 
-    def reach(self, crew: int) -> int:
-        """Range of a UAV of this crew."""
-        metres = self.crews[crew][0].range
+    vehicle_types: Sequence[Sequence[Uav]]  # UAVs with the same start, home and range
+    ends: Sequence[int]  # end node by vehicle type
+    first_task: int  # node
+    unit: float  # integer length of a metre
+    lengths: NDArray[np.int64]  # (nodes, nodes), rounded up so that no range is exceeded in [m]
+    prizes: Sequence[int]  # cost of leaving a task out; empty: all tasks must be served
+
+    def max_length(self, vehicle_type: int) -> int:
+        """Range of a UAV of this type as an integer length."""
+        metres = self.vehicle_types[vehicle_type][0].range
         return int(self.unit * metres) if metres < math.inf else _UNLIMITED
 
 
-def model(instance: Instance) -> Model:
-    """The instance in integers."""
-    alike: dict[object, list[Uav]] = {}
+def integer_model(instance: Instance) -> IntegerModel:
+    """Convert an instance without zones to integer lengths. O((UAVs + tasks)^2)."""
+    types: dict[object, list[Uav]] = {}
     for uav in instance.uavs:
-        alike.setdefault((uav.position, uav.home, uav.range), []).append(uav)
-    crews = list(alike.values())
-    starts = [crew[0].position for crew in crews]
+        types.setdefault((uav.position, uav.home, uav.range), []).append(uav)
+    vehicle_types = list(types.values())
+    samples = [uavs[0] for uavs in vehicle_types]
+    starts = [uav.position for uav in samples]
     returns = instance.route_end == 'home'
-    homes = [crew[0].home or crew[0].position for crew in crews] if returns else starts[:1]
+    homes = [uav.home or uav.position for uav in samples] if returns else starts[:1]
     points = np.array([*starts, *homes, *(task.position for task in instance.tasks)])
     metres = np.sqrt(((points[:, None] - points[None]) ** 2).sum(axis=2))
-    first = len(crews)
+    first_end = len(vehicle_types)
     if not returns:
-        metres[:, first] = metres[first, :] = 0.0
-    unit = COUNTS / max(float(metres.max()), 1e-9)
-    ways: NDArray[np.int64] = np.ceil(unit * metres - 1e-6).astype(np.int64)
+        metres[:, first_end] = metres[first_end, :] = 0.0
+    unit = _LONGEST_LEG / max(float(metres.max()), 1e-9)
+    lengths: NDArray[np.int64] = np.ceil(unit * metres - 1e-6).astype(np.int64)
     prizes: list[int] = []
-    if instance.collects:  # a unit of value outweighs all the way that there can be
-        way = math.ceil(unit * sum(uav.range for uav in instance.uavs)) + 1
-        prizes = [round(task.value * way) for task in instance.tasks]
-    ends = [first + i if returns else first for i in range(len(crews))]
-    return Model(crews, ends, first + len(homes), unit, ways, prizes)
+    if instance.collects:  # a unit of value outweighs the length of all routes
+        total = math.ceil(unit * sum(uav.range for uav in instance.uavs)) + 1
+        prizes = [round(task.value * total) for task in instance.tasks]
+    ends = [first_end + i if returns else first_end for i in range(len(vehicle_types))]
+    return IntegerModel(vehicle_types, ends, first_end + len(homes), unit, lengths, prizes)
 
 
-def pyvrp(instance: Instance, seconds: float) -> Found:
-    """What PyVRP finds within `seconds` of CPU time, which begins with the model at hand."""
-    rival, search = import_module('pyvrp'), import_module('pyvrp.solve')
-    m = model(instance)
-    data = rival.ProblemData(
-        [rival.Location(0, 0) for _ in m.ways],
-        [rival.Client(m.tasks + i, prize=m.prizes[i] if m.prizes else 0, required=not m.prizes)
-         for i in range(len(instance.tasks))],
-        [rival.Depot(node) for node in range(m.tasks)],
-        [rival.VehicleType(len(crew), start_depot=c, end_depot=m.ends[c],
-                           max_distance=m.reach(c)) for c, crew in enumerate(m.crews)],
-        [m.ways], [np.zeros_like(m.ways)])
-    watch = Watch(seconds, time.thread_time())
+def pyvrp(instance: Instance, seconds: float) -> Incumbents:
+    """Solve an instance with PyVRP.
+
+    Args:
+        instance: without zones.
+        seconds: [s] of CPU time from when its model is built.
+
+    Returns:
+        The feasible routes of each improvement.
+    """
+    library, search = import_module('pyvrp'), import_module('pyvrp.solve')
+    model = integer_model(instance)
+    data = library.ProblemData(
+        [library.Location(0, 0) for _ in model.lengths],
+        [library.Client(model.first_task + i, prize=model.prizes[i] if model.prizes else 0,
+                        required=not model.prizes) for i in range(len(instance.tasks))],
+        [library.Depot(node) for node in range(model.first_task)],
+        [library.VehicleType(len(uavs), start_depot=k, end_depot=model.ends[k],
+                             max_distance=model.max_length(k))
+         for k, uavs in enumerate(model.vehicle_types)],
+        [model.lengths], [np.zeros_like(model.lengths)])
+    callbacks = PyvrpCallbacks(seconds, time.thread_time())
     with warnings.catch_warnings():
-        warnings.simplefilter('ignore')  # of prizes that outweigh the price of excess
-        rival.solve(data, stop=watch.over, seed=0, collect_stats=False, display=False,
-                    params=search.SolveParams(
-                        ils=rival.IteratedLocalSearchParams(callbacks=watch)))
-    return [(when, _pyvrp_routes(m, instance, best)) for when, best in watch.better]
+        warnings.simplefilter('ignore')  # prizes that outweigh the penalty of excess length
+        library.solve(data, stop=callbacks.is_over, seed=0, collect_stats=False, display=False,
+                      params=search.SolveParams(
+                          ils=library.IteratedLocalSearchParams(callbacks=callbacks)))
+    return [(when, _pyvrp_routes(model, instance, best)) for when, best in callbacks.better]
 
 
 @dataclass(slots=True)
-class Watch:
-    """What PyVRP calls back; keeps each better plan, to be read when all is over."""
+class PyvrpCallbacks:
+    """Callbacks of PyVRP, named as it calls them: keep improvements, stop after the budget."""
 
     seconds: float  # [s] of CPU
-    began: float  # [s]
-    better: list[tuple[float, Any]] = field(default_factory=list)
+    started: float  # [s]
+    better: list[tuple[float, Any]] = field(default_factory=list)  # CPU [s], solution
 
-    def over(self, cost: float) -> bool:
-        """Whether its time is up."""
-        return time.thread_time() - self.began >= self.seconds
+    def is_over(self, cost: float) -> bool:
+        """Whether the budget is used up."""
+        return time.thread_time() - self.started >= self.seconds
 
     def on_best(self, best: Any) -> None:
-        """It found a better plan, which may still be beyond range."""
+        """Keep an improved solution that is within all ranges."""
         if best.is_feasible():
-            self.better.append((time.thread_time() - self.began, best))
+            self.better.append((time.thread_time() - self.started, best))
 
     def on_start(self, search: Any) -> None:
-        """It has a first plan."""
+        """Keep the initial solution."""
         self.on_best(search.initial_solution)
 
     def on_iteration(self, *search: Any) -> None:
-        """Nothing better."""
+        """Ignore an iteration."""
 
     on_restart = on_end = on_iteration
 
 
-def _pyvrp_routes(m: Model, instance: Instance, solution: Any) -> RoutesByUav:
-    free = [iter(crew) for crew in m.crews]
-    return {next(free[route.vehicle_type()]).id: [
+def _pyvrp_routes(model: IntegerModel, instance: Instance, solution: Any) -> RoutesByUav:
+    unused = [iter(uavs) for uavs in model.vehicle_types]
+    return {next(unused[route.vehicle_type()]).id: [
         instance.tasks[stop.idx].id for stop in route if stop.is_client()]
         for route in solution.routes()}
 
 
-def ortools(instance: Instance, seconds: float) -> Found:
-    """What OR-Tools' guided local search finds within `seconds` of CPU time."""
+def ortools(instance: Instance, seconds: float) -> Incumbents:
+    """Solve an instance with the guided local search of OR-Tools; parameters as for `pyvrp`."""
     solver = import_module('ortools.constraint_solver.pywrapcp')
-    m = model(instance)
-    fleet = [(c, uav) for c, crew in enumerate(m.crews) for uav in crew]
-    index, routing = _routing(solver, m, [c for c, _ in fleet])
-    found: Found = []
+    model = integer_model(instance)
+    fleet = [(k, uav) for k, uavs in enumerate(model.vehicle_types) for uav in uavs]
+    index, routing = _routing_model(solver, model, [k for k, _ in fleet])
+    incumbents: Incumbents = []
     costs: list[int] = []
-    began = time.thread_time()
+    started = time.thread_time()
 
-    def note() -> None:
-        cost, spent = routing.CostVar().Max(), time.thread_time() - began
+    def on_solution() -> None:
+        cost, elapsed = routing.CostVar().Max(), time.thread_time() - started
         if not costs or cost < costs[-1]:
             costs.append(cost)
-            found.append((spent, {uav.id: [
-                instance.tasks[node - m.tasks].id for node in _ortools_route(routing, index, v)]
-                for v, (_, uav) in enumerate(fleet)}))
-        if spent >= seconds:
+            incumbents.append((elapsed, {uav.id: [
+                instance.tasks[node - model.first_task].id
+                for node in _task_nodes(routing, index, v)] for v, (_, uav) in enumerate(fleet)}))
+        if elapsed >= seconds:
             routing.solver().FinishCurrentSearch()
 
-    routing.AddAtSolutionCallback(note)
-    routing.SolveWithParameters(_guided(solver, WAITING * seconds))
-    return found
+    routing.AddAtSolutionCallback(on_solution)
+    routing.SolveWithParameters(_search_parameters(solver, _WALL_TIME_FACTOR * seconds))
+    return incumbents
 
 
-def _routing(solver: Any, m: Model, crews: Sequence[int]) -> tuple[Any, Any]:
-    """Its index and model; `crews` has the crew of each vehicle."""
-    index = solver.RoutingIndexManager(len(m.ways), len(crews), list(crews),
-                                       [m.ends[crew] for crew in crews])
+def _routing_model(solver: Any, model: IntegerModel, types: Sequence[int]) -> tuple[Any, Any]:
+    """Index manager and routing model of OR-Tools; `types`: vehicle type by vehicle."""
+    index = solver.RoutingIndexManager(len(model.lengths), len(types), list(types),
+                                       [model.ends[k] for k in types])
     routing = solver.RoutingModel(index)
-    transit = routing.RegisterTransitMatrix(m.ways.tolist())
+    transit = routing.RegisterTransitMatrix(model.lengths.tolist())
     routing.SetArcCostEvaluatorOfAllVehicles(transit)
-    routing.AddDimensionWithVehicleCapacity(transit, 0, [m.reach(crew) for crew in crews], True,
-                                            'distance')
-    for i, prize in enumerate(m.prizes):
-        routing.AddDisjunction([index.NodeToIndex(m.tasks + i)], prize)
+    routing.AddDimensionWithVehicleCapacity(
+        transit, 0, [model.max_length(k) for k in types], True, 'distance')
+    for i, prize in enumerate(model.prizes):
+        routing.AddDisjunction([index.NodeToIndex(model.first_task + i)], prize)
     return index, routing
 
 
-def _ortools_route(routing: Any, index: Any, vehicle: int) -> list[int]:
-    """Task nodes of a vehicle in the solution at hand."""
+def _task_nodes(routing: Any, index: Any, vehicle: int) -> list[int]:
+    """Task nodes of a vehicle in the current solution, in order."""
     nodes, at = [], routing.NextVar(routing.Start(vehicle)).Value()
     while not routing.IsEnd(at):
         nodes.append(index.IndexToNode(at))
@@ -168,7 +182,7 @@ def _ortools_route(routing: Any, index: Any, vehicle: int) -> list[int]:
     return nodes
 
 
-def _guided(solver: Any, seconds: float) -> Any:
+def _search_parameters(solver: Any, seconds: float) -> Any:
     enums = import_module('ortools.constraint_solver.routing_enums_pb2')
     options = solver.DefaultRoutingSearchParameters()
     options.first_solution_strategy = enums.FirstSolutionStrategy.PARALLEL_CHEAPEST_INSERTION
@@ -177,18 +191,18 @@ def _guided(solver: Any, seconds: float) -> Any:
     return options
 
 
-REFERENCE_SOLVERS: Mapping[str, Callable[[Instance, float], Found]] = {
+REFERENCE_SOLVERS: Mapping[str, Callable[[Instance, float], Incumbents]] = {
     'pyvrp': pyvrp,
     'ortools': ortools,
 }
 
 
 def installed() -> list[str]:
-    """The rivals that are here to be compared with."""
+    """Names of the reference solvers whose packages are installed."""
     return [name for name in REFERENCE_SOLVERS if importlib.util.find_spec(name)]
 
 
-def at(found: Found, seconds: float) -> RoutesByUav | None:
-    """The best routes that were known after so many seconds."""
-    known = [routes for when, routes in found if when <= seconds]
+def best_at(incumbents: Incumbents, seconds: float) -> RoutesByUav | None:
+    """The last routes found within so many CPU seconds; None where there were none."""
+    known = [routes for when, routes in incumbents if when <= seconds]
     return known[-1] if known else None

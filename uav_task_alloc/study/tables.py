@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The tables of the study from its results; what depends on the machine stands in its own."""
+"""The tables of the study from its results; machine-dependent times are in tables of their own."""
 from __future__ import annotations
 
 import csv
@@ -9,15 +9,16 @@ from pathlib import Path
 from statistics import fmean, median
 from typing import Any
 
-from uav_task_alloc.study import experiments as program
+from uav_task_alloc.study import experiments
 from uav_task_alloc.study.experiments import Experiments
 
-ResultRow = dict[str, Any]
-_NEAR = 5, 1  # [%] above the best: what "time to" and "success" are told for
+ResultRow = dict[str, Any]  # cells by column
+TablePair = tuple[list[ResultRow], list[ResultRow]]  # the same on each machine, and CPU seconds
+_PERCENTS = 5, 1  # above the best: the targets of the columns "within" and "iterations to"
 
 
 def write_csv(path: Path, rows: Sequence[ResultRow]) -> None:
-    """A CSV file, numbers to six digits."""
+    """Write a CSV file with a header line, numbers to six digits. Raises OSError."""
     with path.open('w', newline='') as file:
         out = csv.writer(file, lineterminator='\n')
         out.writerow(rows[0] if rows else [])
@@ -25,91 +26,102 @@ def write_csv(path: Path, rows: Sequence[ResultRow]) -> None:
 
 
 def markdown(rows: Sequence[ResultRow]) -> str:
-    """The same for reading."""
+    """The rows as a Markdown table, numbers to four digits."""
     if not rows:
         return 'no results yet'
-    lines = [list(rows[0]), ['---'] * len(rows[0]),
-             *([cell_text(value, 4) for value in row.values()] for row in rows)]
-    return '\n'.join(f'| {" | ".join(line)} |' for line in lines)
+    return markdown_rows(list(rows[0]), [[cell_text(value, 4) for value in row.values()]
+                                         for row in rows])
+
+
+def markdown_rows(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    """A Markdown table of texts."""
+    return '\n'.join(f'| {" | ".join(row)} |' for row in (head, ['---'] * len(head), *rows))
 
 
 def cell_text(value: Any, digits: int = 6) -> str:
-    """A cell; nothing where there is no number."""
+    """The text of a cell; empty for NaN and the infinities."""
     if isinstance(value, float):
         return f'{value:.{digits}g}' if math.isfinite(value) else ''
     return str(value)
 
 
-def sizes(
-    asked: Experiments, results: Mapping[str, Any]
-) -> tuple[list[ResultRow], list[ResultRow]]:
-    """Fit, iterations to 5 and 1 % and success by size and solver; CPU seconds apart from it."""
-    jobs = program.size_jobs(asked)
-    groups: dict[tuple[int, int, str], list[tuple[Any, float]]] = {}
-    for (uavs, tasks, nth, solver), job in jobs.items():
-        names = [jobs[key].name for key in jobs if key[:3] == (uavs, tasks, nth)]
+def sizes_table(settings: Experiments, results: Mapping[str, Any]) -> TablePair:
+    """Fit, iterations to 5 and 1 % and success, by size and solver.
+
+    Args:
+        settings: of the study.
+        results: by job name; an instance counts once all its jobs have one.
+    """
+    jobs = experiments.size_jobs(settings)
+    groups: dict[tuple[int, int, str], list[tuple[Any, float]]] = {}  # (result, best fit)
+    for (uavs, tasks, instance, solver), job in jobs.items():
+        names = [jobs[key].name for key in jobs if key[:3] == (uavs, tasks, instance)]
         if solver and all(name in results for name in names):
             groups.setdefault((uavs, tasks, solver), []).append(
                 (results[job.name], min(results[name]['fit'] for name in names)))
-    same, timed = [], []
-    for (uavs, tasks, solver), found in groups.items():
-        head = {'UAVs': uavs, 'tasks': tasks, 'solver': solver, 'instances': len(found)}
-        same.append(head | _quality(found))
-        timed.append(head | _timing(found))
-    return same, timed
+    quality, timing = [], []
+    for (uavs, tasks, solver), runs in groups.items():
+        head = {'UAVs': uavs, 'tasks': tasks, 'solver': solver, 'instances': len(runs)}
+        quality.append(head | _quality(runs))
+        timing.append(head | _timing(runs))
+    return quality, timing
 
 
-def _quality(found: Sequence[tuple[Any, float]]) -> ResultRow:
+def _quality(runs: Sequence[tuple[Any, float]]) -> ResultRow:
     row: ResultRow = {
-        'fit': fmean(result['fit'] for result, _ in found),
+        'fit': fmean(result['fit'] for result, _ in runs),
         'gap [%]': round(fmean(100.0 * (result['fit'] / best - 1.0)
-                               for result, best in found), 6),
-        'distance [km]': 1e-3 * fmean(result['distance'] for result, _ in found),
-        'beyond range [m]': fmean(result['penalty'] for result, _ in found)}
-    for percent in _NEAR:
+                               for result, best in runs), 6),
+        'distance [km]': 1e-3 * fmean(result['distance'] for result, _ in runs),
+        'beyond range [m]': fmean(result['penalty'] for result, _ in runs)}
+    for percent in _PERCENTS:
         row[f'within {percent} % [% of instances]'] = 100.0 * fmean(
-            when(result, best, percent)[0] < math.inf for result, best in found)
-    for percent in _NEAR:
+            time_to_target(result, best, percent)[0] < math.inf for result, best in runs)
+    for percent in _PERCENTS:
         row[f'iterations to {percent} %'] = _median(
-            when(result, best, percent)[0] for result, best in found)
-    return row | {'iterations': round(fmean(result['iterations'] for result, _ in found))}
+            time_to_target(result, best, percent)[0] for result, best in runs)
+    return row | {'iterations': round(fmean(result['iterations'] for result, _ in runs))}
 
 
-def _timing(found: Sequence[tuple[Any, float]]) -> ResultRow:
+def _timing(runs: Sequence[tuple[Any, float]]) -> ResultRow:
     row: ResultRow = {f'to {percent} % [s]': _median(
-        when(result, best, percent)[1] for result, best in found) for percent in _NEAR}
-    return row | {'in all [s]': fmean(result['seconds'] for result, _ in found)}
+        time_to_target(result, best, percent)[1] for result, best in runs)
+        for percent in _PERCENTS}
+    return row | {'in all [s]': fmean(result['seconds'] for result, _ in runs)}
 
 
-def when(result: Mapping[str, Any], best: float, percent: float) -> tuple[float, float]:
-    """Iteration and CPU seconds at which a run was so near to the best; inf: never."""
-    bound = best * (1.0 + percent / 100.0)
-    near = ((step, seconds) for step, seconds, fit in result['steps'] if fit <= bound)
-    return next(near, (math.inf, math.inf))
+def time_to_target(result: Mapping[str, Any], best: float,
+                   percent: float) -> tuple[float, float]:
+    """Iteration and CPU seconds at which a run first was within `percent` of the best fit.
+
+    Both are inf where it never was.
+    """
+    target = best * (1.0 + percent / 100.0)
+    reached = ((step, seconds) for step, seconds, fit in result['steps'] if fit <= target)
+    return next(reached, (math.inf, math.inf))
 
 
 def _median(values: Iterable[float]) -> float:
-    """Over all runs; inf where half of them never came there."""
+    """Over all runs; inf where half of them never reached the target."""
     return float(median(values))
 
 
-def events_table(
-    asked: Experiments, results: Mapping[str, Any]
-) -> tuple[list[ResultRow], list[ResultRow]]:
-    """Warm against cold by size and kind; CPU seconds apart from it."""
-    same, timed = [], []
-    for (uavs, tasks, kind), job in program.event_jobs(asked).items():
+def events_table(settings: Experiments, results: Mapping[str, Any]) -> TablePair:
+    """Warm against cold starts by size and kind of instance."""
+    quality, timing = [], []
+    for (uavs, tasks, kind), job in experiments.event_jobs(settings).items():
         rows = results.get(job.name)
         if not rows:
             continue
         head = {'UAVs': uavs, 'tasks': tasks, 'starts': kind, 'events': len(rows)}
-        same.append(head | {
-            f'{way} gap, {name} [%]': of(row[f'{way}_gap'] for row in rows)
-            for way in ('warm', 'cold') for name, of in (('median', median), ('worst', max))} | {
+        quality.append(head | {
+            f'{start} gap, {name} [%]': aggregate(row[f'{start}_gap'] for row in rows)
+            for start in ('warm', 'cold')
+            for name, aggregate in (('median', median), ('worst', max))} | {
             'warm as good or better [% of events]': 100.0 * fmean(
                 row['warm_gap'] <= row['cold_gap'] for row in rows)})
-        timed.append(head | {
-            f'{way}, {name} [ms]': 1e3 * median(row[f'{way}_{key}'] for row in rows)
-            for way in ('warm', 'cold') for name, key in (('first plan', 'first_s'),
-                                                          ('whole', 's'))})
-    return same, timed
+        timing.append(head | {
+            f'{start}, {name} [ms]': 1e3 * median(row[f'{start}_{key}'] for row in rows)
+            for start in ('warm', 'cold') for name, key in (('first plan', 'first_s'),
+                                                            ('whole', 's'))})
+    return quality, timing

@@ -1,0 +1,32 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The command `params`: the generated reference pages, and the parameter files of the nodes."""
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from uav_task_alloc import params
+from uav_task_alloc.allocator.state import task_state_machine
+from uav_task_alloc.scenario import document
+
+
+def main(argv: Sequence[str]) -> int:
+    """Print the pages, or with `--write` write them and config/*.yaml into the working directory.
+
+    Raises:
+        SystemExit: other arguments are given.
+        OSError: a file cannot be written.
+    """
+    if list(argv) not in ([], ['--write']):
+        raise SystemExit('usage: python -m uav_task_alloc params [--write]')
+    pages = {Path('docs/parameters.md'): params.markdown_text(),
+             Path('docs/scenarios.md'): document.scenario_page(),
+             Path('docs/task_states.md'): task_state_machine.task_states_markdown()}
+    if not argv:
+        print('\n'.join(pages.values()))
+        return 0
+    configs = {Path(f'config/{node}.yaml'): params.yaml_text(node) for node in params.NODES}
+    for path, text in {**pages, **configs}.items():
+        path.parent.mkdir(exist_ok=True)
+        path.write_text(text)
+    return 0
