@@ -10,25 +10,25 @@ from uav_task_alloc.mavlink.transport.link import open_link
 @pytest.fixture
 def make_connections():
     """make_connections(*names, **kwargs) -> Connections; one udpin link by default."""
-    made = []
+    opened = []
 
     def make(*names, **kwargs):
-        made.append(Connections(map(open_link, names or ['udpin:127.0.0.1:0']), 245, 190,
+        opened.append(Connections(map(open_link, names or ['udpin:127.0.0.1:0']), 245, 190,
                           wall=lambda: WALL, **kwargs))
-        return made[-1]
+        return opened[-1]
     yield make
-    for one in made:
+    for one in opened:
         one.close()
 
 
 @pytest.fixture
 def make_remote():
     """make_remote(connections, system) -> Remote."""
-    made = []
+    opened = []
 
     def make(*args):
-        made.append(Remote(*args))
-        return made[-1]
+        opened.append(Remote(*args))
+        return opened[-1]
     yield make
-    for one in made:
+    for one in opened:
         one.socket.close()

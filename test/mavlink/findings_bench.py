@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the tests of the findings share: pilots, second stations, lost messages, the truth."""
+"""Shared by the tests of findings: pilots, second stations, lost messages, simulator events."""
 import math
 
 import pytest
@@ -14,7 +14,7 @@ from uav_task_alloc.sim.modes import px4_mode
 BOTH = pytest.mark.parametrize('kind', ['ardupilot', 'px4'])
 KINDS = ('ardupilot', 'px4')
 US = 'station 245/190'
-# custom_mode by autopilot; PAUSE is how a station holds it, LOITER how a pilot does
+# custom_mode by autopilot; PAUSE is a hold by a station, LOITER by a pilot
 MODES = {
     'ardupilot': {'RTL': 6, 'LAND': 9, 'PAUSE': 4, 'LOITER': 5, 'BRAKE': 17, 'AUTO': 3},
     'px4': {'RTL': px4_mode(4, 5), 'LAND': px4_mode(4, 6), 'PAUSE': px4_mode(4, 3),
@@ -22,7 +22,7 @@ MODES = {
 
 
 class FindingsBench(FlightBench):
-    """A bench that keeps how serious each note is."""
+    """A bench that records the level of each note."""
 
     def __init__(self, *kinds, **kwargs):
         self.levels = []  # (level, text)
@@ -40,7 +40,7 @@ class FindingsBench(FlightBench):
 
 
 def flying(kind, names='ABC', **kwargs):
-    """A vehicle on its way to the first of some tasks."""
+    """A vehicle flying to the first of some tasks."""
     lists = {key: kwargs.pop(key) for key in ('service', 'side', 'returns') if key in kwargs}
     bench = FindingsBench(kind, **kwargs).discover()
     bench.assign(task_list(names, **lists))
@@ -49,17 +49,17 @@ def flying(kind, names='ABC', **kwargs):
 
 
 def listed(revision, **stops):
-    """A list of tasks by name, each at a place (x, y) [m], 50 m high."""
+    """A list of tasks by name, each at a position (x, y) [m], 50 m high."""
     return TaskList(revision, tuple(MissionStop(Task(name, (*place, 50.0)))
                                     for name, place in stops.items()))
 
 
-def take(bench, mode, who='station', n=1):
-    """Somebody else changes the mode: a second station, a pilot or a failsafe."""
+def take(bench, mode, by='station', n=1):
+    """Change the mode as a second station, a pilot or a failsafe."""
     number, vehicle = MODES[bench.kind][mode], bench.vehicles[n]
-    if who == 'pilot':
+    if by == 'pilot':
         vehicle.rc_mode(number)
-    elif who == 'failsafe':
+    elif by == 'failsafe':
         vehicle.failsafe('radio', number)
     else:
         main, sub = (number >> 16 & 0xff, number >> 24) if number > 0xffff else (number, 0)
@@ -69,25 +69,25 @@ def take(bench, mode, who='station', n=1):
 
 
 def commanded(bench, n=1):
-    """Modes, arming, take-offs, current items that came from the bridge, by the truth."""
+    """Commands that came from the bridge, by the simulator events."""
     return [e.command for e in bench.truth[n] if e.name == 'command' and e.cause == US]
 
 
 def left_alone(bench, seconds=40.0, n=1):
-    """The bridge has seen what happened, and commands nothing for a while."""
+    """Check that the bridge commands nothing for a while."""
     before = len(commanded(bench, n))
     bench.run(limit=seconds)
     assert commanded(bench, n)[before:] == []
 
 
 def arms(bench):
-    """Tries to arm that were sent."""
+    """Arming commands that were sent."""
     return [m for m in bench.line.sent('COMMAND_LONG')
             if m.command == d.MAV_CMD_COMPONENT_ARM_DISARM and m.param1 == 1.0]
 
 
 def truthful(bench, until, limit=300.0):
-    """Run; at no moment a task is COMPLETED that the vehicle has not reached."""
+    """Run, and check that no task is COMPLETED that the vehicle has not reached."""
     def checked():
         assert set(bench.completed()) <= set(places(bench)), (bench.completed(), places(bench))
         return until()
@@ -95,7 +95,7 @@ def truthful(bench, until, limit=300.0):
 
 
 def flown_once_each(bench, names, limit=400.0):
-    """All tasks are flown and told, each once, none before it was."""
+    """Check that all tasks are flown and reported once, none before it is flown."""
     assert truthful(bench, lambda: len(bench.completed()) >= len(names), limit), (
         bench.completed(), places(bench))
     bench.run(limit=20.0)
@@ -103,22 +103,22 @@ def flown_once_each(bench, names, limit=400.0):
 
 
 def set_current(bench, index, n=1):
-    """A second station sets the current item."""
+    """Set the current item as a second station."""
     seq = bench.onboard(n).own + index
     bench.from_station(d.MAVLink_mission_set_current_message(n, 1, seq), n)
 
 
-def swallow(bench, way, kind, when):
+def drop_messages(bench, lost_direction, kind, when):
     """The line loses messages of a type while `when(message)` holds."""
     bench.line.tampers.append(lambda direction, m, now: [] if (
-        direction == way and m.get_type() == kind and when(m)) else None)
+        direction == lost_direction and m.get_type() == kind and when(m)) else None)
 
 
 def distance(bench, place, n=1):
-    """[m] of the real vehicle from a place."""
+    """Distance [m] of the simulated vehicle from a position."""
     return math.dist(bench.vehicles[n].flight.body.position, place)
 
 
 def happened(bench, name, n=1):
-    """Whether the truth has an event of that name."""
+    """Whether the simulator has an event of that name."""
     return any(e.name == name for e in bench.truth[n])

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Joins a ground station to simulated vehicles by bytes over virtual time."""
+"""Connects a ground station to simulated vehicles by frames in virtual time."""
 import random
 
 from mission_bench import ORIGIN, OURS, Line, make_vehicle, task_list
@@ -11,7 +11,7 @@ from uav_task_alloc.mavlink.transport.codec import Codec
 
 
 class FlightBench:
-    """A ground station with simulated vehicles, each on a line of its own to it."""
+    """A ground station with simulated vehicles, each on a line of its own."""
 
     def __init__(self, *kinds, seed=0, loss=0.0, delay=(0.0, 0.0), takeoff=True, configs=None,
                  tick=0.1, store=None, **policy):
@@ -23,11 +23,11 @@ class FlightBench:
         self.line = Line(seed, loss, delay)
         self.codecs = {('down', n): Codec(n, 1) for n in self.vehicles}
         self.decoders = {('up', n): Codec(*OURS) for n in self.vehicles}
-        self.truth = {n: [] for n in self.vehicles}  # events on board
+        self.truth = {n: [] for n in self.vehicles}  # events of the simulator
         self.start()
 
     def start(self):
-        """A new bridge, as after kill -9: it knows what its `store` kept, nothing without one."""
+        """A new ground station, as after kill -9, with what the `store` holds."""
         self.ground_station = GroundStation(GcsConfig(origin=ORIGIN, policy=self.policy),
                              random.Random(self.seed), self.store)
         for n in self.vehicles:
@@ -47,18 +47,18 @@ class FlightBench:
         self._up(self.ground_station.assign(f'uav_{n}', tasks, self.now))
 
     def from_vehicle(self, message, n=1):
-        """Something that comes from a vehicle without it."""
+        """Receive a message as from a vehicle."""
         self._up(self.ground_station.receive(n, self.decoders['down', n].parse(
             self.codecs['down', n].pack(message))[0], self.now))
         self._collect()
 
     def from_station(self, message, n=1, system=255):
-        """Something another ground station sends to a vehicle."""
+        """Send a message to a vehicle from another ground station."""
         for m in self.decoders['up', n].parse(Codec(system, 190).pack(message)):
             self._down(n, self.vehicles[n].receive(m, self.now))
 
     def run(self, until=lambda: False, limit=300.0):
-        """Let time pass until the condition holds; True where it did."""
+        """Advance time until the condition holds; whether it did."""
         end = self.now + limit
         while self.now < end:
             self._move()
@@ -68,7 +68,7 @@ class FlightBench:
         return bool(until())
 
     def discover(self):
-        """Until all vehicles are known."""
+        """Run until all vehicles are discovered."""
         assert self.run(lambda: len(self.ground_station.sessions) == len(self.vehicles), 30.0)
         return self
 
@@ -82,7 +82,7 @@ class FlightBench:
         return [e.task for u, e in self.events if u == f'uav_{n}' and e.event == 'FAILED']
 
     def hand_over(self, n=1):
-        """An operator does; returns why it is refused."""
+        """Hand over as an operator; returns why it is refused."""
         return self.ground_station.hand_over(f'uav_{n}', 'test', self.now)
 
     def authority(self, n=1):
@@ -92,7 +92,7 @@ class FlightBench:
         return state_of(self.ground_station.sessions[n], self.now)
 
     def flown(self, n=1, radius=3.0):
-        """Places [m] where the vehicle really reached an item, in order."""
+        """Positions [m] at which the vehicle reached an item in the simulator, in order."""
         return [tuple(round(c) for c in e.point) for e in self.truth[n]
                 if e.name == 'item_reached']
 
@@ -131,7 +131,7 @@ class FlightBench:
 
 
 def flying(kind, names='ABC', **kwargs):
-    """A vehicle on its way to the first of some tasks."""
+    """A vehicle flying to the first of some tasks."""
     service = kwargs.pop('service', 0.0)
     bench = FlightBench(kind, **kwargs).discover()
     bench.assign(task_list(names, service=service))
@@ -140,7 +140,7 @@ def flying(kind, names='ABC', **kwargs):
 
 
 def places(bench, n=1):
-    """Tasks by the places that were really reached, letters of the grid."""
+    """Tasks by the positions reached in the simulator, as letters of the grid."""
     return [to_letter(p) for p in bench.flown(n)]
 
 
@@ -149,7 +149,7 @@ def to_letter(p):
 
 
 class Store:
-    """What a bridge keeps on disk, in memory."""
+    """An AuthorityStore in memory."""
 
     def __init__(self):
         self.records, self.saved = {}, 0

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""MAVSDK as autopilots in a process of its own: commands on stdin, what happens on stdout.
+"""MAVSDK as autopilots in a process of its own: commands on stdin, reports on stdout.
 
-A crash of the library then fails one test and not the run. The arguments are the UDP port to
-speak to and system ids; stdin takes `reach ID`, `move ID LAT LON ALT`, `reboot ID` and `quit`.
+A crash of the library then fails one test and not the run. The arguments are the UDP port of the
+bridge and system ids; stdin takes `reach ID`, `move ID LAT LON ALT`, `reboot ID` and `quit`.
 """
 import ctypes
 import json
@@ -32,14 +32,14 @@ from mavsdk.plugins.telemetry_server.telemetry_server import (
 QUADROTOR = 2
 
 
-def tell(**what):
-    """One line to the test."""
-    sys.stdout.write(json.dumps(what) + '\n')
+def report(**fields):
+    """Write one line to the test."""
+    sys.stdout.write(json.dumps(fields) + '\n')
     sys.stdout.flush()
 
 
 class Autopilot:
-    """One system, in the air and in Hold."""
+    """One system, airborne in Hold."""
 
     def __init__(self, port, system):
         self.port, self.system = port, system
@@ -70,15 +70,15 @@ class Autopilot:
         self.begin()
 
     def on_mission(self, result, plan, _):
-        tell(system=self.system, what='mission', result=int(result), items=[
+        report(system=self.system, what='mission', result=int(result), items=[
             [i.command, i.frame, i.x, i.y, i.z, i.param1, i.param2, i.current]
             for i in plan.mission_items])
 
     def on_current(self, item, _):
-        tell(system=self.system, what='current', seq=item.seq)
+        report(system=self.system, what='current', seq=item.seq)
 
     def on_mode(self, result, mode, _):
-        tell(system=self.system, what='mode', mode=int(mode))
+        report(system=self.system, what='mode', mode=int(mode))
 
     def publish(self):
         latitude, longitude, altitude = self.place
@@ -93,7 +93,7 @@ class Autopilot:
 
 
 def main():
-    """Serve until told to quit."""
+    """Serve until `quit`."""
     port, *systems = map(int, sys.argv[1:])
     autopilots = {system: Autopilot(port, system) for system in systems}
     stop = threading.Event()
@@ -102,25 +102,25 @@ def main():
     def stream():
         while not stop.wait(0.1):
             with lock:
-                for one in autopilots.values():
-                    one.publish()
+                for autopilot in autopilots.values():
+                    autopilot.publish()
     threading.Thread(target=stream, daemon=True).start()
     for line in sys.stdin:
         word, *rest = line.split()
         if word == 'quit':
             break
-        one = autopilots[int(rest[0])]
+        autopilot = autopilots[int(rest[0])]
         with lock:
             if word == 'reach':
-                one.mission.set_current_item_complete()
+                autopilot.mission.set_current_item_complete()
             elif word == 'move':
-                one.place = [float(v) for v in rest[1:]]
+                autopilot.place = [float(v) for v in rest[1:]]
             elif word == 'reboot':
-                one.reboot()
+                autopilot.reboot()
     stop.set()
     time.sleep(0.2)
-    for one in autopilots.values():
-        one.mavsdk.destroy()
+    for autopilot in autopilots.values():
+        autopilot.mavsdk.destroy()
 
 
 if __name__ == '__main__':

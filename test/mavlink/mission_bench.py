@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Joins an upload to a simulated autopilot by bytes over virtual time, on a line that may fail."""
+"""Connects an upload to a simulated autopilot by frames in virtual time, over a lossy line."""
 import heapq
 import itertools
 import random
@@ -23,12 +23,12 @@ PROFILES = {'ardupilot': ARDUPILOT, 'px4': PX4}
 
 
 def square(n, side=100.0, z=50.0):
-    """n places, far enough from each other not to be taken for one another."""
+    """n positions [m] ENU, far enough apart not to be confused."""
     return [(side * (k % 5), side * (1 + k // 5), z) for k in range(n)]
 
 
 def task_list(names, revision=1, *, side=100.0, service=0.0, returns=False, via=None, shift=0):
-    """A list of tasks named by letters or words, each at the place of its name."""
+    """A list of tasks named by letters or words, each at the position of its name."""
     names = list(names)
     places = dict(zip('ABCDEFGHIJKLMNOPQRSTUVWXYZ', square(26, side), strict=True))
     stops = []
@@ -40,17 +40,17 @@ def task_list(names, revision=1, *, side=100.0, service=0.0, returns=False, via=
 
 
 def make_vehicle(kind, system, **config):
-    """A simulated vehicle that is ready to arm at once and does not flood."""
+    """A simulated vehicle that can arm at once and streams only requested messages."""
     config = {'arming_delay': 0.0, 'boot_delay': 0.0, 'settling_time': 0.0, 'floods': False,
               'position': (0.0, 10.0 * system, 0.0), **config}
     return Vehicle(VehicleConfig(f'uav_{system}', system, ORIGIN, **config), AUTOPILOTS[kind])
 
 
 class Line:
-    """Carries frames both ways with loss and delay; `tampers` see each message first.
+    """Carries frames in both directions with loss and delay; `tampers` get each message first.
 
-    A tamper takes (direction 'up' or 'down', message, now) and returns None to let it pass, or a
-    list of (delay, message) to carry in its place.
+    A tamper takes (direction 'up' or 'down', message, now) and returns None to pass it, or a list
+    of (delay, message) to carry in its place.
     """
 
     def __init__(self, seed=0, loss=0.0, delay=(0.0, 0.0)):
@@ -72,7 +72,7 @@ class Line:
         if not carried:
             codec.pack(message)
         for delay, m in carried:
-            frame = codec.pack(m) if not isinstance(m, bytes) else m  # lost frames count as well
+            frame = codec.pack(m) if not isinstance(m, bytes) else m  # lost frames have a seq too
             if not self.cut and self.rng.random() >= self.loss:
                 heapq.heappush(self._flying, (now + delay, next(self._number), direction, key,
                                               frame))
@@ -82,12 +82,12 @@ class Line:
             yield heapq.heappop(self._flying)[2:]
 
     def sent(self, kind, direction='up'):
-        """Messages of a type that were given to the line."""
+        """Messages of a type that were sent over the line, lost ones included."""
         return [m for _, d, m in self.log if d == direction and m.get_type() == kind]
 
 
 class UploadBench:
-    """One upload machine and the mission service of one simulated autopilot."""
+    """An `Upload` and the mission protocol of one simulated autopilot."""
 
     def __init__(self, kind, *, seed=0, loss=0.0, delay=(0.0, 0.0), capacity=500):
         self.profile = PROFILES[kind]
@@ -112,13 +112,13 @@ class UploadBench:
         return mission
 
     def from_vehicle(self, message, system=1, component=1):
-        """Something a vehicle says that its service did not."""
+        """Receive a message as from the vehicle."""
         codec = Codec(system, component)
         for m in self.decoders['down'].parse(codec.pack(message)):
             self._up(self.upload.receive(m, self.now))
 
     def run(self, until=lambda: False, limit=120.0):
-        """Let time pass until the condition holds; True where it did."""
+        """Advance time until the condition holds; whether it did."""
         end = self.now + limit
         while self.now < end:
             self._move()
@@ -128,7 +128,7 @@ class UploadBench:
         return until()
 
     def settle(self, limit=300.0):
-        """Until the upload has ended one way or the other."""
+        """Run until the upload has ended; returns its last event."""
         assert self.run(lambda: not self.upload.busy, limit)
         return self.events[-1]
 
@@ -157,7 +157,7 @@ class UploadBench:
             self.line.send('down', None, self.codecs['down'], m, self.now)
 
     def holds(self, mission):
-        """Whether the vehicle's own memory has exactly this mission."""
+        """Whether the vehicle stores exactly this mission."""
         held = [(i.command, i.x, i.y, round(i.z, 2)) for i in self.vehicle.mission.items]
         sent = [(i.command, i.x, i.y, round(i.z, 2)) for i in mission.items]
         own = mission.own
@@ -167,11 +167,11 @@ class UploadBench:
 
 
 def drop(kinds, times, direction=None):
-    """A tamper that swallows the first `times` messages of some types."""
+    """A tamper that drops the first `times` messages of some types."""
     left = [times]
 
-    def tamper(way, message, now):
-        if message.get_type() in kinds and direction in (None, way) and left[0]:
+    def tamper(sent_direction, message, now):
+        if message.get_type() in kinds and direction in (None, sent_direction) and left[0]:
             left[0] -= 1
             return []
         return None

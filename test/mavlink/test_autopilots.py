@@ -64,19 +64,20 @@ def test_the_return_is_sent_in_the_frame_that_the_store_takes(profile):
 
 
 @ALL
-@pytest.mark.parametrize('flight', [ModeFunction.MISSION, ModeFunction.HOLD, ModeFunction.RETURN])
-def test_every_profile_can_fly_its_mission_hold_and_return(profile, flight):
-    message = profile.mode_command(Peer(1), flight)
+@pytest.mark.parametrize('function', [
+    ModeFunction.MISSION, ModeFunction.HOLD, ModeFunction.RETURN])
+def test_every_profile_can_fly_its_mission_hold_and_return(profile, function):
+    message = profile.mode_command(Peer(1), function)
     assert message.target_system == 1
-    if flight in profile.set_mode:
+    if function in profile.set_mode:
         assert message.command == d.MAV_CMD_DO_SET_MODE
-        assert profile.mode_function(profile.set_mode[flight]) is flight
+        assert profile.mode_function(profile.set_mode[function]) is function
 
 
-def test_a_px4_copter_is_told_how_near_is_there_where_the_task_does_not_say():
+def test_a_px4_copter_gets_an_acceptance_radius_where_the_task_has_none():
     for profile, radius in ((profiles.PX4, 2.0), (profiles.PX4_PLANE, 0.0),
                             (profiles.ARDUPILOT, 0.0)):
         tasks = task_list('A', via={'A': [(50.0, 50.0, 50.0)]})
-        made = mission_items(tasks, profile.rules, ORIGIN)
-        assert [item.params[1] for item in made] == [radius, radius]
-        assert [item.radius for item in made] == [radius, radius]
+        items = mission_items(tasks, profile.rules, ORIGIN)
+        assert [item.params[1] for item in items] == [radius, radius]
+        assert [item.radius for item in items] == [radius, radius]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The bridge against autopilots that nobody here wrote: MAVSDK, in a process of its own."""
+"""The bridge with independent autopilots: MAVSDK, in a process of its own."""
 import importlib.util
 import json
 import random
@@ -32,17 +32,17 @@ MISSION = {*range(39, 52), 73}  # ids of the messages of a transfer
 
 
 class Proxy:
-    """A UDP proxy that loses a share of the datagrams, both ways.
+    """A UDP proxy that loses a share of the datagrams in both directions.
 
-    The dice for missions are their own: how much telemetry comes in between, which the load of
-    the machine decides, does not change which of them are lost.
+    Missions have a random generator of their own: the amount of telemetry in between, which
+    depends on the load of the machine, does not change which mission messages are lost.
     """
 
     def __init__(self, port, loss):
         self.loss, self.to = loss, ('127.0.0.1', port)
         self.dice = {True: random.Random(1), False: random.Random(2)}
         self.front = self.socket()
-        self.back, self.ends = {}, {}  # a socket towards the bridge for each far end
+        self.back, self.remotes = {}, {}  # a socket towards the bridge for each remote
         self.lost = 0
 
     @staticmethod
@@ -53,26 +53,26 @@ class Proxy:
         return one
 
     def step(self):
-        for one in select.select([self.front, *self.ends], [], [], 0.0)[0]:
+        for one in select.select([self.front, *self.remotes], [], [], 0.0)[0]:
             data, address = one.recvfrom(65536)
             if one is self.front and address not in self.back:
                 self.back[address] = self.socket()
-                self.ends[self.back[address]] = address
+                self.remotes[self.back[address]] = address
             of_mission = int.from_bytes(data[7:10], 'little') in MISSION
             if self.dice[of_mission].random() < self.loss:
                 self.lost += 1
             elif one is self.front:
                 self.back[address].sendto(data, self.to)
             else:
-                self.front.sendto(data, self.ends[one])
+                self.front.sendto(data, self.remotes[one])
 
     def close(self):
-        for one in (self.front, *self.ends):
+        for one in (self.front, *self.remotes):
             one.close()
 
 
 class Peers:
-    """A ground station on a real socket, and MAVSDK at the other end of it."""
+    """A ground station on a real socket, with MAVSDK as the remote."""
 
     def __init__(self, *systems, loss=0.0):
         self.connections = Connections([open_link('udpin:127.0.0.1:0')], 245, 190, wall=time.time)
@@ -80,7 +80,7 @@ class Peers:
         self.proxy = Proxy(port, loss) if loss else None
         self.ground_station = GroundStation(GcsConfig(origin=ORIGIN, autopilot='px4'),
                                             random.Random(1))
-        self.events, self.told, self._half = [], [], ''
+        self.events, self.reports, self._half = [], [], ''
         self.process = subprocess.Popen(
             [sys.executable, str(SCRIPT), str(
                 self.proxy.front.getsockname()[1] if self.proxy else port), *map(str, systems)],
@@ -97,7 +97,7 @@ class Peers:
             self.serve()
 
     def hand_over(self):
-        """They are in the air, in Hold, when the bridge starts: they are somebody else's."""
+        """Hand over: airborne in Hold at the start, they belong to another party."""
         for session in self.ground_station.sessions.values():
             self.until(lambda session=session: session.executor.telemetry.airborne)
             assert session.executor.authority.state is not AuthorityState.HELD
@@ -114,17 +114,17 @@ class Peers:
         for session in self.ground_station.sessions.values():
             while session.executor.events:
                 self.events.append((session.uav_id, session.executor.events.popleft()))
-        self.listen()
+        self.read_reports()
 
-    def listen(self):
+    def read_reports(self):
         while select.select([self.process.stdout], [], [], 0.0)[0]:
             *lines, self._half = (self._half + self.process.stdout.read1(65536).decode()
                                   ).split('\n')
-            self.told += [json.loads(line) for line in lines if line.startswith('{')]
+            self.reports += [json.loads(line) for line in lines if line.startswith('{')]
             if self.process.poll() is not None:
                 break
 
-    def tell(self, *words):
+    def command(self, *words):
         self.process.stdin.write((' '.join(map(str, words)) + '\n').encode())
         self.process.stdin.flush()
 
@@ -138,23 +138,24 @@ class Peers:
         return state_of(self.ground_station.sessions[system], time.monotonic())
 
     def missions(self, system):
-        """Item lists as MAVSDK stored them."""
-        return [t['items'] for t in self.told if t['what'] == 'mission' and t['system'] == system]
+        """Item lists stored by MAVSDK."""
+        return [report['items'] for report in self.reports
+                if report['what'] == 'mission' and report['system'] == system]
 
     def completed(self, system):
         return [e.task for u, e in self.events
                 if u == f'uav_{system}' and e.event == 'COMPLETED']
 
     def fly(self, system, place):
-        """Move there, and have the current item reached once the bridge has seen it."""
-        self.tell('move', system, *to_geodetic(ORIGIN, place))
+        """Move to a position, and report the current item as reached once the bridge knows it."""
+        self.command('move', system, *to_geodetic(ORIGIN, place))
         self.until(lambda: max(abs(a - b) for a, b in zip(
             self.state(system).position, place, strict=True)) < 1.0)
-        self.tell('reach', system)
+        self.command('reach', system)
 
     def close(self):
         if self.process.poll() is None:
-            self.tell('quit')
+            self.command('quit')
             try:
                 self.process.wait(10)
             except subprocess.TimeoutExpired:
@@ -169,18 +170,18 @@ class Peers:
 
 @pytest.fixture
 def mavsdk():
-    made = []
+    started = []
 
     def make(*systems, **kwargs):
-        made.append(Peers(*systems, **kwargs))
-        return made[-1]
+        started.append(Peers(*systems, **kwargs))
+        return started[-1]
     yield make
-    for one in made:
+    for one in started:
         one.close()
 
 
 def items(tasks):
-    """What PX4 is to be sent for a list."""
+    """The items to be sent to PX4 for a list."""
     return [(i.command, i.frame, i.x, i.y, i.params[0], i.params[1])
             for i in mission_items(tasks, PX4.rules, ORIGIN)]
 
@@ -216,7 +217,7 @@ def test_mavsdk_a_list_is_replaced_while_flying(mavsdk):
     peers.until(lambda: len(peers.missions(1)) == 2)
     assert stored(peers.missions(1)[-1]) == items(replaced)
     assert [i[-1] for i in peers.missions(1)[-1]] == [1, 0, 0]
-    modes = [t['mode'] for t in peers.told if t['what'] == 'mode']
+    modes = [report['mode'] for report in peers.reports if report['what'] == 'mode']
     assert modes == [3, 4]  # it was never held
 
 
@@ -237,7 +238,7 @@ def test_mavsdk_progress_and_telemetry_are_right(mavsdk):
         ('A', 'STARTED'), ('A', 'COMPLETED'), ('B', 'STARTED'), ('B', 'COMPLETED')]
 
 
-def test_mavsdk_a_proxy_that_loses_a_fifth_delays_and_changes_nothing(mavsdk):
+def test_mavsdk_a_loss_of_a_fifth_delays_and_changes_nothing(mavsdk):
     peers = mavsdk(1, loss=0.2)
     for revision, names in enumerate(['ABCDE', 'EDCBA'], 1):
         peers.assign(1, task_list(names, revision))
@@ -247,11 +248,11 @@ def test_mavsdk_a_proxy_that_loses_a_fifth_delays_and_changes_nothing(mavsdk):
     assert peers.proxy.lost > 20
 
 
-def test_mavsdk_a_reboot_gets_its_mission_again(mavsdk):
+def test_mavsdk_after_a_reboot_the_mission_is_uploaded_again(mavsdk):
     peers = mavsdk(1)
     peers.assign(1, task_list('AB'))
     flying(peers, 1)
-    peers.tell('reboot', 1)
+    peers.command('reboot', 1)
     peers.until(lambda: peers.ground_station.sessions[1].executor.telemetry.restarts == 1)
     peers.until(lambda: len(peers.missions(1)) == 2)
     flying(peers, 1)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The bridge's core on the links of a world, a second ground station, and what both see."""
+"""The bridge without ROS on the links of a world, and a second ground station."""
 import math
 import random
 import time
@@ -18,24 +18,24 @@ CHANGES = {'MISSION_COUNT', 'MISSION_ITEM', 'MISSION_ITEM_INT', 'MISSION_CLEAR_A
 
 
 class Visits:
-    """Where a vehicle came to rest, by its own positions: what a service looks like from afar."""
+    """The places at which a vehicle came to rest, by its own positions: where it serves tasks."""
 
     def __init__(self, places):
-        self.places, self.made, self._at = places, [], None
+        self.places, self.visited, self._at = places, [], None
 
-    def see(self, position, velocity):
+    def update(self, position, velocity):
         if self._at is not None and math.dist(position, self.places[self._at]) > 10.0:
             self._at = None
         if math.hypot(*velocity) > 1.0:
             return
         for name, place in self.places.items():
             if name != self._at and math.dist(position, place) < 5.0:
-                self.made.append(name)
+                self.visited.append(name)
                 self._at = name
 
 
 class Bridge:
-    """Serves the vehicles of a world; a course has `visits` and the tasks `done`, in order."""
+    """Serves the vehicles of a world; a course has `visits`, and the completed tasks in order."""
 
     def __init__(self, world, courses):
         self.limit, self.courses = world.limit, courses
@@ -52,32 +52,32 @@ class Bridge:
     def now():
         return time.monotonic()
 
-    def hear(self, message, now):
-        """Before the bridge takes a message of a vehicle."""
+    def before_receive(self, message, now):
+        """Hook: called before the bridge processes a message of a vehicle."""
 
     def send(self, out):
         self.connections.send(out)
 
     def serve(self):
-        """Take what comes, and let time pass."""
+        """Receive messages, and advance time."""
         now = self.now()
         for address, message in self.connections.receive(0.01):
-            self.hear(message, now)
+            self.before_receive(message, now)
             self.send(self.ground_station.receive(address, message, now))
             if message.get_type() == 'GLOBAL_POSITION_INT':
-                self.see(message.get_srcSystem())
+                self.update_visits(message.get_srcSystem())
         self.send(self.ground_station.step(now))
         self.connections.step(now)
         for system, session in self.ground_station.sessions.items():
-            self.note(system, session)
+            self.collect(system, session)
 
-    def see(self, system):
+    def update_visits(self, system):
         session = self.ground_station.sessions.get(system)
         if session and session.executor.telemetry.airborne:
             telemetry = session.executor.telemetry
-            self.courses[system].visits.see(telemetry.position, telemetry.velocity)
+            self.courses[system].visits.update(telemetry.position, telemetry.velocity)
 
-    def note(self, system, session):
+    def collect(self, system, session):
         while session.executor.events:
             event = session.executor.events.popleft()
             self.events.append((system, event))
@@ -108,12 +108,12 @@ class SecondStation:
     def __init__(self, world):
         self.connections = Connections(world.second_links(), 255, 190, wall=time.time)
         self.heartbeat = Heartbeat(self.connections.send_to_all)
-        self.sticks_of = set()  # systems whose sticks it holds in the middle
+        self.sticks_of = set()  # systems whose sticks it keeps centred
         self._at = 0.0
         self.heartbeat.start()
 
     def serve(self):
-        """Drop what comes; a radio control that stops is a failsafe, so it goes on."""
+        """Drop received messages; repeat the sticks, as their end would trigger a failsafe."""
         now = time.monotonic()
         self.connections.receive(0.0)
         self.connections.step(now)
@@ -140,7 +140,7 @@ class SecondStation:
 
 
 def interferes(message):
-    """Whether a message does more to a vehicle than read from it."""
+    """Whether a message changes anything on a vehicle."""
     kind = message.get_type()
     return kind in CHANGES or (
         kind in COMMANDS and getattr(message, 'command', None) not in READS)

@@ -56,8 +56,8 @@ class Course:
 class Replacing(Bridge):
     """Hands out lists that are due."""
 
-    def note(self, system, session):
-        super().note(system, session)
+    def collect(self, system, session):
+        super().collect(system, session)
         now, course = time.monotonic(), self.courses[system]
         if course.is_due(state_of(session, now).mode):
             self.send(self.ground_station.assign(session.uav_id, course.next(), now))
@@ -74,9 +74,9 @@ def test_each_task_is_reached_once_and_none_that_was_withdrawn(world):
     for system, course in bridge.courses.items():
         assert course.revision == REPLACED + 1
         assert len(course.withdrawn) >= REPLACED // 3
-        assert Counter(course.done) == Counter(set(course.done)), f'{system}: told twice'
-        assert not course.withdrawn & {*course.done, *course.visits.made}
-        assert course.visits.made == course.done, f'{system}: told is not flown'
+        assert Counter(course.done) == Counter(set(course.done)), f'{system}: reported twice'
+        assert not course.withdrawn & {*course.done, *course.visits.visited}
+        assert course.visits.visited == course.done, f'{system}: reported is not flown'
         really = world.reached(system)
         if really is not None:
             at = [min(course.places, key=lambda n, p=p, c=course: math.dist(c.places[n], p))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Four vehicles in the air: fleet_sim's own, or SITL binaries that environment variables name."""
+"""Four vehicles: simulated ones, or SITL binaries named by environment variables."""
 import os
 import subprocess
 
@@ -14,7 +14,7 @@ HOMES = {n: (400.0 * n, 0.0, 0.0) for n in SYSTEMS}  # [m] ENU
 SPEED = float(os.environ.get('SITL_SPEED', '3'))  # of SITL, times real time
 LIMIT = float(os.environ.get('SITL_LIMIT', '900'))  # [s] wall, for each phase of a SITL flight
 FIRST = int(os.environ.get('SITL_FIRST_INSTANCE', '0'))
-# What a bare binary lacks to arm without a radio control and a human: ArduCopter 4.5 and later.
+# Parameters with which a plain binary arms without a radio control: ArduCopter 4.5 and later.
 COPTER_DEFAULTS = """
 BATT_CAPACITY 1000000
 SIM_BATT_CAP_AH 0
@@ -108,7 +108,7 @@ class Sitl:
         return [open_link(self.second_address(self.instance(n))) for n in SYSTEMS]
 
     def reached(self, system):
-        """Unknown: only what it tells."""
+        """None: the true positions are unknown."""
         return None
 
     def environment(self, system):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What users of other tools complain about, by project and number, does not happen here."""
+"""Problems that users of other tools have reported, by project and number, do not occur."""
 import pytest
 from flight_bench import FlightBench, flying, places
 from mission_bench import ORIGIN, UploadBench, task_list, verified
@@ -31,7 +31,7 @@ def test_ardupilot_2445_6307_no_old_command_and_no_phantom_item_is_left():
     assert places(bench) == ['E', 'D']
 
 
-def test_px4_14981_the_old_waypoint_is_not_flown_to_after_a_swap():
+def test_px4_14981_the_old_waypoint_is_not_flown_to_after_a_replacement():
     bench = flying('px4', 'ABC')
     bench.run(limit=3.0)
     bench.assign(task_list('CB', 2))
@@ -84,15 +84,16 @@ def test_mavros_1375_no_digit_is_cut_off(kind):
 
 
 @BOTH
-def test_mavros_1867_an_upload_always_ends_with_an_answer(kind):
+def test_mavros_1867_an_upload_always_ends_with_a_result(kind):
     bench = UploadBench(kind)
     bench.replace(bench.mission('ABC'))
-    bench.line.tampers.append(lambda way, m, now: [] if now > 0.0 or way == 'down' else None)
+    bench.line.tampers.append(
+        lambda direction, m, now: [] if now > 0.0 or direction == 'down' else None)
     assert isinstance(bench.settle(60.0), Failed)
 
 
 @BOTH
-def test_what_a_vehicle_says_in_words_reaches_the_log_once(kind):
+def test_a_status_text_is_logged_once(kind):
     bench = flying(kind, 'AB')
     for _ in range(3):
         bench.from_vehicle(d.MAVLink_statustext_message(

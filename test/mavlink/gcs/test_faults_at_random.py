@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Two hundred mixtures of faults: each upload ends VERIFIED and true, or says that it failed."""
+"""Random faults: each upload ends VERIFIED and correct, or reports its failure."""
 import random
 
 import pytest
@@ -15,18 +15,18 @@ BOTH = pytest.mark.parametrize('kind', ['ardupilot', 'px4'])
 
 
 class Faults:
-    """A line that loses, delays, doubles, cuts and lies, all of it by a seed."""
+    """A tamper that loses, delays, repeats, cuts and forges messages, by a seed."""
 
     def __init__(self, bench, rng):
         self.bench, self.rng = bench, rng
         self.loss, self.delay = rng.uniform(0.0, 0.4), rng.uniform(0.0, 1.0)
-        self.double, self.lie = rng.uniform(0.0, 0.2), rng.uniform(0.0, 0.05)
+        self.repeat, self.forge = rng.uniform(0.0, 0.2), rng.uniform(0.0, 0.05)
         begin = rng.uniform(0.0, 10.0)
         self.cut = (begin, begin + rng.choice([0.0, 2.0, 6.0, 15.0]))
         self.reboot_at = rng.choice([None, None, rng.uniform(0.0, 8.0)])
         bench.line.tampers.append(self)
 
-    def __call__(self, way, message, now):
+    def __call__(self, direction, message, now):
         rng = self.rng
         if self.reboot_at is not None and now >= self.reboot_at:
             self.reboot_at = None
@@ -34,9 +34,9 @@ class Faults:
         if self.cut[0] <= now < self.cut[1]:
             return []
         carried = [(rng.uniform(0.0, self.delay), message)
-                   for _ in range(1 + (rng.random() < self.double)) if rng.random() >= self.loss]
-        if way == 'down' and message.get_type().startswith('MISSION_') and (
-                rng.random() < self.lie):
+                   for _ in range(1 + (rng.random() < self.repeat)) if rng.random() >= self.loss]
+        if direction == 'down' and message.get_type().startswith('MISSION_') and (
+                rng.random() < self.forge):
             result = rng.choice([0, 0, 1, 13, 14, 15])
             carried.append((0.0, d.MAVLink_mission_ack_message(245, 190, result, 0)))
         return carried
@@ -73,7 +73,7 @@ def test_lists_replaced_over_a_line_of_faults_complete_what_was_flown_and_no_mor
     assert bench.run(lambda: len(bench.completed()) == 8, 1500.0), f'seed {seed}'
     assert sorted(bench.completed()) == list('ABCDEFGH')
     real = [(round(p[0] / 100.0), round(p[1] / 100.0)) for p in bench.flown()]
-    assert len(set(real)) == 8, f'seed {seed}: a task was told that was not flown'
+    assert len(set(real)) == 8, f'seed {seed}: a task was reported that was not flown'
     assert len(real) == 8, f'seed {seed}: a task was flown twice'
     assert bench.run(lambda: bench.onboard().state is MissionState.VERIFIED)
 

@@ -9,10 +9,10 @@ from findings_bench import (
     FindingsBench,
     arms,
     commanded,
+    drop_messages,
     flying,
     happened,
     left_alone,
-    swallow,
     take,
 )
 from flight_bench import places
@@ -190,7 +190,7 @@ def test_a_vehicle_armed_while_takeoff_is_withdrawn_does_not_take_off(kind, chan
 @BOTH
 def test_finding_15_an_acknowledgement_to_another_station_is_ignored(kind):
     bench = FindingsBench(kind).discover()
-    swallow(bench, 'up', 'COMMAND_LONG',
+    drop_messages(bench, 'up', 'COMMAND_LONG',
             lambda m: m.command == d.MAV_CMD_COMPONENT_ARM_DISARM and len(arms(bench)) < 9)
     bench.assign(task_list('AB'))
     assert bench.run(lambda: arms(bench), 30.0)
@@ -250,7 +250,7 @@ def test_finding_25_a_bridge_restarted_without_positions_does_not_take_off(kind,
     bench.run(limit=2.0)
     silent = [True]
     for message in ('GLOBAL_POSITION_INT', 'EXTENDED_SYS_STATE'):
-        swallow(bench, 'down', message, lambda m: silent[0])
+        drop_messages(bench, 'down', message, lambda m: silent[0])
     bench.store = bench.store if file else type(bench.store)()
     bench.start()
     bench.discover()

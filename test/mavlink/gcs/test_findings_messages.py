@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Findings 10 and 24: no message ends the bridge, none is too long, none is told too often."""
+"""Findings 10 and 24: no message ends the bridge, is too long, or is logged too often."""
 import math
 
 import pytest
@@ -18,7 +18,7 @@ NAN, INF = math.nan, math.inf
 
 
 def read_back(kind):
-    """A bench whose vehicle is asked for an item of its mission at this moment."""
+    """A bench during a readback, and the seq of the requested item."""
     bench = FlightBench(kind, delay=(0.15, 0.15)).discover()
     bench.assign(task_list('ABC'))
     upload = bench.onboard().upload
@@ -47,7 +47,7 @@ def new_item(seq, z, param1=0.0):
     (lambda n: new_item(n, INF), 'z = inf: expected a finite number'),
     (lambda n: new_item(n, 500.0, -INF), 'param1 = -inf: expected a finite number'),
 ], ids=['x nan', 'x inf', 'y', 'z nan', 'param1', 'int z', 'int param1'])
-def test_finding_10_an_item_that_is_no_place_is_dropped_and_told_once(kind, make, words):
+def test_finding_10_an_item_without_a_valid_position_is_dropped_and_logged_once(kind, make, words):
     bench, seq = read_back(kind)
     for _ in range(3):
         bench.from_vehicle(make(seq))
@@ -68,7 +68,7 @@ def test_finding_10_an_item_that_is_no_place_is_dropped_and_told_once(kind, make
     (d.MAVLink_sys_status_message(0, 0, 0, 0, 0, 0, 127, 0, 0, 0, 0, 0, 0),
      'battery_remaining = 127: expected a number in [-128, 100]'),
 ], ids=['latitude', 'longitude', 'battery'])
-def test_finding_10_a_field_that_no_vehicle_means_changes_nothing(message, words):
+def test_finding_10_a_field_out_of_range_changes_nothing(message, words):
     bench = FlightBench('px4').discover()
     bench.run(limit=10.0)
     before = bench.state()
@@ -79,27 +79,27 @@ def test_finding_10_a_field_that_no_vehicle_means_changes_nothing(message, words
     assert words in bench.ground_station.refusals.last
 
 
-def test_finding_10_an_infinite_hold_on_board_is_unlike_any_other():
+def test_finding_10_an_infinite_hold_on_board_equals_no_other():
     sent, held = (Item(16, params=(hold, 0.0, 0.0, 0.0)) for hold in (INF, 3.0))
     assert not all_alike((sent,), (held,))
     assert not all_alike((held,), (sent,))
 
 
-def test_finding_10_an_error_that_nobody_expected_drops_the_message_only(monkeypatch):
+def test_finding_10_an_unexpected_error_drops_the_message_only(monkeypatch):
     bench = FlightBench('px4', 'px4').discover()
     bench.assign(task_list('AB'), 2)
-    good = bench.executor(1).receive
+    original = bench.executor(1).receive
 
-    def bad(message, now):
+    def failing(message, now):
         raise ValueError('never\nseen')
-    monkeypatch.setattr(bench.executor(1), 'receive', bad)
+    monkeypatch.setattr(bench.executor(1), 'receive', failing)
     assert bench.run(lambda: bench.completed(2) == list('AB'))
     refusals = bench.ground_station.refusals
     assert refusals.count > 10
     assert 'ValueError: never seen (at test_findings_messages.py:' in refusals.last
     texts = [note.text for note in refusals.notes]
     assert len({text.split(':')[0] for text in texts}) == len(texts)
-    monkeypatch.setattr(bench.executor(1), 'receive', good)
+    monkeypatch.setattr(bench.executor(1), 'receive', original)
     bench.assign(task_list('AB'), 1)
     assert bench.run(lambda: bench.completed(1) == list('AB'))
 
@@ -110,10 +110,10 @@ def test_finding_10_a_vehicle_that_cannot_be_served_is_not_available_while_that_
     bench = FlightBench('px4', 'px4').discover()
     assert bench.run(lambda: bench.state(1).available)
 
-    def bad(*_):
+    def failing(*_):
         raise KeyError('x')
-    good = getattr(bench.executor(1), what)
-    monkeypatch.setattr(bench.executor(1), what, bad)
+    original = getattr(bench.executor(1), what)
+    monkeypatch.setattr(bench.executor(1), what, failing)
     if what == 'step':
         bench.run(limit=1.0)
     else:
@@ -121,7 +121,7 @@ def test_finding_10_a_vehicle_that_cannot_be_served_is_not_available_while_that_
     assert "KeyError: 'x'" in bench.state(1).reason
     assert diagnostics_of(bench.ground_station.sessions[1], bench.now).level == 2
     assert [note.level for note in bench.ground_station.refusals.notes] == ['error']
-    monkeypatch.setattr(bench.executor(1), what, good)
+    monkeypatch.setattr(bench.executor(1), what, original)
     bench.assign(task_list('AB'), 2)
     assert bench.run(lambda: bench.completed(2) == list('AB'))
     assert bench.state(1).available
@@ -143,12 +143,12 @@ def test_finding_10_bytes_that_cannot_be_decoded_drop_one_datagram(
     remote.send(heartbeat())
     assert len(receive(connections)) == 1
     parser, = connections._parsers.values()
-    good = parser.parse
+    original = parser.parse
 
-    def bad(data):
-        monkeypatch.setattr(parser, 'parse', good)
+    def failing(data):
+        monkeypatch.setattr(parser, 'parse', original)
         raise IndexError('x')
-    monkeypatch.setattr(parser, 'parse', bad)
+    monkeypatch.setattr(parser, 'parse', failing)
     remote.send(heartbeat())
     remote.send(heartbeat())
     assert len(receive(connections)) == 1
@@ -168,15 +168,15 @@ def test_finding_10_a_message_that_cannot_be_encoded_leaves_the_others(
     assert connections.refusals.notes[0].text.startswith('MISSION_COUNT (to ')
 
 
-def far_places(count):
-    """As many places, 60 m from each other, none more than 5 km from the next or the origin."""
+def distant_positions(count):
+    """`count` positions [m], 60 m apart, none more than 5 km from the next or the origin."""
     return [(60.0 * (n % 50), 60.0 * (n // 50 % 50), 50.0 + n // 2500) for n in range(count)]
 
 
 @BOTH
 def test_finding_24_of_more_items_than_a_mission_holds_the_first_tasks_are_flown(kind):
     bench = FlightBench(kind).discover()
-    places, room = far_places(66_000), 65535 - (kind == 'ardupilot')
+    places, room = distant_positions(66_000), 65535 - (kind == 'ardupilot')
     bench.assign(TaskList(1, tuple(
         MissionStop(Task(f't{n}', places[1000 * n + 999]), tuple(places[1000 * n:1000 * n + 999]))
         for n in range(66))))
@@ -189,10 +189,10 @@ def test_finding_24_of_more_items_than_a_mission_holds_the_first_tasks_are_flown
 
 
 @BOTH
-def test_finding_24_a_task_behind_more_points_than_a_mission_holds_fails_in_words(kind):
+def test_finding_24_a_task_after_more_points_than_a_mission_holds_fails_in_words(kind):
     bench = FlightBench(kind).discover()
     room = 65535 - (kind == 'ardupilot')
-    long = MissionStop(Task('long', (0.0, 90.0, 50.0)), tuple(far_places(66_000)))
+    long = MissionStop(Task('long', (0.0, 90.0, 50.0)), tuple(distant_positions(66_000)))
     bench.assign(TaskList(1, (long, *task_list('AB').stops)))
     assert bench.run(lambda: bench.completed() == ['A', 'B'])
     failed, = (event for _, event in bench.events if event.event == 'FAILED')

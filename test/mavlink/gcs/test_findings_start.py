@@ -9,9 +9,9 @@ from findings_bench import (
     BOTH,
     FindingsBench,
     distance,
+    drop_messages,
     flown_once_each,
     flying,
-    swallow,
 )
 from flight_bench import places
 from mission_bench import task_list
@@ -41,7 +41,7 @@ def line_of(bench):
 def test_finding_09_after_many_failures_it_is_not_available_and_retries(kind):
     bench = FindingsBench(kind).discover()
     broken = [True]
-    swallow(bench, 'up', 'MISSION_ITEM_INT', lambda m: broken[0] and m.seq == 2)
+    drop_messages(bench, 'up', 'MISSION_ITEM_INT', lambda m: broken[0] and m.seq == 2)
     bench.assign(task_list('ABC'))
     bench.run(limit=400.0)
     assert not bench.state().available
@@ -75,8 +75,8 @@ def test_finding_18_of_two_batteries_the_one_with_least_remaining_decides(kind):
 @BOTH
 def test_finding_18_a_fluctuating_reading_changes_nothing(kind):
     bench = FindingsBench(kind, takeoff=False).discover()
-    swallow(bench, 'down', 'SYS_STATUS', lambda m: True)
-    swallow(bench, 'down', 'BATTERY_STATUS', lambda m: True)
+    drop_messages(bench, 'down', 'SYS_STATUS', lambda m: True)
+    drop_messages(bench, 'down', 'BATTERY_STATUS', lambda m: True)
     bench.run(limit=12.0)
     readings = set()
     for n in range(20):
@@ -94,7 +94,7 @@ def test_a_battery_without_messages_no_longer_decides():
     bench = FindingsBench('px4', takeoff=False, configs={1: {'batteries': 2}}).discover()
     bench.run(limit=5.0)
     assert bench.state().battery == pytest.approx(0.7)
-    swallow(bench, 'down', 'BATTERY_STATUS', lambda m: m.id == 1)
+    drop_messages(bench, 'down', 'BATTERY_STATUS', lambda m: m.id == 1)
     bench.run(limit=15.0)
     assert bench.state().battery == 1.0
 
@@ -186,10 +186,10 @@ def test_finding_27_a_position_without_a_fix_or_estimator_is_not_published(kind,
     bench.run(limit=5.0)
     assert bench.state().available
     estimator = 'EKF_STATUS_REPORT' if kind == 'ardupilot' else 'ESTIMATOR_STATUS'
-    swallow(bench, 'down', estimator if lost == 'estimator' else lost, lambda m: True)
+    drop_messages(bench, 'down', estimator if lost == 'estimator' else lost, lambda m: True)
     bench.vehicles[1].failsafe('ekf', None)  # the estimator has no absolute position
     if lost == 'estimator':
-        swallow(bench, 'down', 'GPS_RAW_INT', lambda m: True)
+        drop_messages(bench, 'down', 'GPS_RAW_INT', lambda m: True)
     bench.start()
     bench.discover()
     if lost == 'estimator':

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Messages are asked for at their rates, again where they stay away, and not for ever."""
+"""Messages are requested at their rates, again when missing, a bounded number of times."""
 import pytest
 from flight_bench import FlightBench
 from pymavlink.dialects.v20 import ardupilotmega as d
@@ -11,58 +11,58 @@ SPEC = {'GLOBAL_POSITION_INT': 5.0, 'MISSION_CURRENT': 2.0, 'BATTERY_STATUS': 1.
         'SYS_STATUS': 1.0, 'EXTENDED_SYS_STATE': 1.0, 'HOME_POSITION': 0.2}
 
 
-def asked(bench, kind):
-    """Rates [Hz] that were asked for, of one message."""
+def requested_rates(bench, kind):
+    """Rates [Hz] requested for one message."""
     number = getattr(d, 'MAVLINK_MSG_ID_' + kind)
     return [round(1e6 / m.param2, 3) for m in bench.line.sent('COMMAND_LONG')
             if m.command == d.MAV_CMD_SET_MESSAGE_INTERVAL and m.param1 == number]
 
 
 @BOTH
-def test_each_message_is_asked_for_at_its_rate_and_comes_at_it(kind):
+def test_each_message_is_requested_and_received_at_its_rate(kind):
     bench = FlightBench(kind, takeoff=False).discover()
     bench.run(limit=2.0)
-    assert {name: asked(bench, name)[0] for name in SPEC} == SPEC
+    assert {name: requested_rates(bench, name)[0] for name in SPEC} == SPEC
     before = {name: len(bench.line.sent(name, 'down')) for name in SPEC}
     bench.run(limit=30.0)
     for name, rate in SPEC.items():
-        came = (len(bench.line.sent(name, 'down')) - before[name]) / 30.0
-        # PX4 tells the current item at its own 1 Hz
+        received = (len(bench.line.sent(name, 'down')) - before[name]) / 30.0
+        # PX4 sends MISSION_CURRENT at its own 1 Hz
         own = kind == 'px4' and name == 'MISSION_CURRENT'
-        assert came == pytest.approx(1.0 if own else rate, rel=0.15), name
+        assert received == pytest.approx(1.0 if own else rate, rel=0.15), name
 
 
 @BOTH
-def test_a_message_that_stays_away_is_asked_for_again_and_given_up_in_the_end(kind):
+def test_a_missing_message_is_requested_again_and_given_up_in_the_end(kind):
     bench = FlightBench(kind, takeoff=False)
-    bench.line.tampers.append(lambda way, m, now: [] if (
+    bench.line.tampers.append(lambda direction, m, now: [] if (
         m.get_type() == 'BATTERY_STATUS') else None)
     bench.discover()
     bench.run(limit=60.0)
-    assert len(asked(bench, 'BATTERY_STATUS')) == MAX_REQUESTS
-    assert len(asked(bench, 'GLOBAL_POSITION_INT')) == 1
+    assert len(requested_rates(bench, 'BATTERY_STATUS')) == MAX_REQUESTS
+    assert len(requested_rates(bench, 'GLOBAL_POSITION_INT')) == 1
 
 
 @BOTH
-def test_a_stream_that_ceases_is_asked_for_again(kind):
+def test_a_stream_that_stops_is_requested_again(kind):
     bench = FlightBench(kind, takeoff=False).discover()
     bench.run(limit=10.0)
-    assert len(asked(bench, 'EXTENDED_SYS_STATE')) == 1
-    bench.line.tampers.append(lambda way, m, now: [] if (
+    assert len(requested_rates(bench, 'EXTENDED_SYS_STATE')) == 1
+    bench.line.tampers.append(lambda direction, m, now: [] if (
         m.get_type() == 'EXTENDED_SYS_STATE') else None)
     bench.run(limit=60.0)
-    assert len(asked(bench, 'EXTENDED_SYS_STATE')) == 1 + MAX_REQUESTS
+    assert len(requested_rates(bench, 'EXTENDED_SYS_STATE')) == 1 + MAX_REQUESTS
     bench.line.tampers.clear()
     bench.run(limit=30.0)
-    assert len(asked(bench, 'EXTENDED_SYS_STATE')) == 1 + MAX_REQUESTS
+    assert len(requested_rates(bench, 'EXTENDED_SYS_STATE')) == 1 + MAX_REQUESTS
 
 
 @BOTH
-def test_positions_that_cease_are_asked_for_again(kind):
+def test_positions_that_stop_are_requested_again(kind):
     bench = FlightBench(kind, takeoff=False).discover()
     bench.run(limit=10.0)
-    before = len(asked(bench, 'GLOBAL_POSITION_INT'))
-    bench.line.tampers.append(lambda way, m, now: [] if (
+    before = len(requested_rates(bench, 'GLOBAL_POSITION_INT'))
+    bench.line.tampers.append(lambda direction, m, now: [] if (
         m.get_type() == 'GLOBAL_POSITION_INT') else None)
     bench.run(limit=5.0)
-    assert len(asked(bench, 'GLOBAL_POSITION_INT')) > before
+    assert len(requested_rates(bench, 'GLOBAL_POSITION_INT')) > before

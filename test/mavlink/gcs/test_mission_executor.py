@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The pilot on both simulated autopilots: lists flown, replaced, emptied."""
+"""The mission executor on both simulated autopilots: lists flown, replaced, emptied."""
 import dataclasses
 
 import pytest
@@ -15,7 +15,7 @@ BOTH = pytest.mark.parametrize('kind', ['ardupilot', 'px4'])
 
 
 @BOTH
-def test_a_list_is_flown_and_each_task_told_once(kind):
+def test_a_list_is_flown_and_each_task_reported_once(kind):
     bench = flying(kind)
     assert bench.run(lambda: len(bench.completed()) == 3)
     assert bench.completed() == bench.started() == ['A', 'B', 'C']
@@ -25,7 +25,7 @@ def test_a_list_is_flown_and_each_task_told_once(kind):
 
 
 @BOTH
-def test_without_takeoff_the_bridge_waits_for_a_pilot_and_says_so_once(kind):
+def test_without_takeoff_the_bridge_waits_for_a_pilot_and_logs_it_once(kind):
     bench = FlightBench(kind, takeoff=False).discover()
     bench.assign(task_list('AB'))
     bench.run(limit=30.0)
@@ -91,7 +91,7 @@ def test_ardupilot_is_held_while_its_mission_is_mixed_and_appended_hot():
     assert modes == [4, 3, 4, 3]
 
 
-def test_px4_is_swapped_at_once_with_the_item_to_fly_flagged():
+def test_a_px4_mission_is_replaced_at_once_with_the_current_item_flagged():
     bench = flying('px4', 'ABC')
     bench.assign(task_list('CA', 2))
     assert bench.run(lambda: bench.onboard().revision == 2)
@@ -101,7 +101,7 @@ def test_px4_is_swapped_at_once_with_the_item_to_fly_flagged():
 
 
 @BOTH
-def test_a_swap_waits_for_the_end_of_a_service(kind):
+def test_a_replacement_waits_for_the_end_of_a_service(kind):
     bench = flying(kind, 'AB', service=8.0)
     place = (0.0, 100.0, 50.0)
     assert bench.run(lambda: sum((a - b) ** 2 for a, b in zip(
@@ -137,19 +137,21 @@ def test_a_pilot_who_takes_over_is_not_fought(kind):
     bench = flying(kind, 'ABC')
     bench.run(limit=5.0)
     mode = (5, 0) if kind == 'ardupilot' else (4, 3)
-    bench.from_station(d.MAVLink_command_long_message(1, 1, 176, 0, 1, *mode, 0, 0, 0, 0))
+    bench.from_station(d.MAVLink_command_long_message(
+        1, 1, d.MAV_CMD_DO_SET_MODE, 0, 1, *mode, 0, 0, 0, 0))
     bench.run(limit=10.0)
     bench.assign(task_list('CB', 2))
     bench.run(limit=20.0)
     assert bench.vehicles[1].mode.name == 'HOLD'
     assert 'waits for the pilot to give it back' in bench.notes
     mode = (3, 0) if kind == 'ardupilot' else (4, 4)
-    bench.from_station(d.MAVLink_command_long_message(1, 1, 176, 0, 1, *mode, 0, 0, 0, 0))
+    bench.from_station(d.MAVLink_command_long_message(
+        1, 1, d.MAV_CMD_DO_SET_MODE, 0, 1, *mode, 0, 0, 0, 0))
     assert bench.run(lambda: bench.completed() == ['C', 'B'])
 
 
 @BOTH
-def test_a_vehicle_that_holds_after_its_last_task_returns_when_told(kind):
+def test_a_vehicle_that_holds_after_its_last_task_returns_by_a_later_list(kind):
     bench = flying(kind, 'AB')
     assert bench.run(lambda: bench.completed() == ['A', 'B'])
     bench.assign(task_list('', 2))
@@ -173,10 +175,10 @@ def test_a_list_that_returns_ends_at_home_and_a_new_one_flies_again(kind):
 
 
 @BOTH
-def test_a_way_home_around_a_zone_is_flown_where_the_tasks_are_withdrawn(kind):
+def test_a_path_home_around_a_zone_is_flown_when_the_tasks_are_withdrawn(kind):
     bench = flying(kind, 'ABC')
-    way = ((-80.0, 60.0, 50.0), (-40.0, 20.0, 50.0))
-    bench.assign(dataclasses.replace(task_list('', 2, returns=True), end_via=way))
+    path = ((-80.0, 60.0, 50.0), (-40.0, 20.0, 50.0))
+    bench.assign(dataclasses.replace(task_list('', 2, returns=True), end_via=path))
     assert bench.run(lambda: bench.state().mode is UavMode.RETURNING, 10.0)
     assert bench.run(lambda: bench.state().mode is UavMode.STANDBY)
     assert bench.flown()[:2] == [(-80, 60, 50), (-40, 20, 50)]
@@ -184,7 +186,7 @@ def test_a_way_home_around_a_zone_is_flown_where_the_tasks_are_withdrawn(kind):
 
 
 @BOTH
-def test_a_link_that_is_silent_is_stale_and_the_list_goes_on_later(kind):
+def test_a_silent_link_is_stale_and_the_list_continues_later(kind):
     bench = flying(kind, 'ABC')
     bench.line.cut = True
     bench.run(limit=4.0)
@@ -198,7 +200,7 @@ def test_a_link_that_is_silent_is_stale_and_the_list_goes_on_later(kind):
 @BOTH
 @pytest.mark.parametrize('loss', [0.2])
 @pytest.mark.parametrize('seed', range(5))
-def test_lists_replaced_over_a_bad_line_are_flown_once_each(kind, seed, loss):
+def test_lists_replaced_over_a_lossy_line_are_flown_once_each(kind, seed, loss):
     bench = FlightBench(kind, seed=seed, loss=loss, delay=(0.0, 0.3)).discover()
     bench.assign(task_list('ABC'))
     bench.run(limit=40.0)

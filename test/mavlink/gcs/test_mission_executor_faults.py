@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The faults that concern a flight, on both simulated autopilots."""
+"""Faults during a flight, on both simulated autopilots."""
 import dataclasses
 
 import pytest
@@ -27,22 +27,23 @@ def test_fault_11_two_systems_do_not_mix_up(kind):
 
 
 @BOTH
-def test_fault_17_a_reboot_in_mid_upload_starts_over(kind):
+def test_fault_17_a_reboot_during_an_upload_starts_over(kind):
     bench = FlightBench(kind, delay=(0.1, 0.1), takeoff=False).discover()
     bench.run(limit=10.0)
     bench.assign(task_list('ABCDE'))
     bench.run(limit=0.5)
     assert bench.onboard().state is MissionState.UPLOADING
-    asked = len(bench.line.sent('COMMAND_LONG'))
+    requests_before = len(bench.line.sent('COMMAND_LONG'))
     bench.vehicles[1].reboot(bench.now)
     assert bench.run(lambda: 'was restarted' in bench.notes, 30.0)
     assert bench.onboard().state is not MissionState.VERIFIED
     assert bench.run(lambda: bench.onboard().state is MissionState.VERIFIED, 60.0)
-    again = bench.line.sent('COMMAND_LONG')[asked:]
-    assert {m.param1 for m in again if m.command == d.MAV_CMD_SET_MESSAGE_INTERVAL} >= {33.0, 42.0}
+    requests = bench.line.sent('COMMAND_LONG')[requests_before:]
+    assert {m.param1 for m in requests if m.command == d.MAV_CMD_SET_MESSAGE_INTERVAL} >= {
+        d.MAVLINK_MSG_ID_GLOBAL_POSITION_INT, d.MAVLINK_MSG_ID_MISSION_CURRENT}
 
 
-def test_fault_18_a_link_cut_in_mid_upload_leaves_the_vehicle_held_and_says_mixed():
+def test_fault_18_a_link_cut_during_an_upload_leaves_the_vehicle_held_and_mixed():
     bench = flying('ardupilot', 'ABC', delay=(0.1, 0.1))
     bench.assign(task_list('CDEFGH', 2))
     assert bench.run(lambda: len(bench.line.sent('MISSION_ITEM_INT')) == 7, 20.0)
@@ -84,14 +85,14 @@ def test_fault_21_a_repeated_reached_completes_once(kind):
 @BOTH
 def test_fault_21_a_lost_reached_is_inferred_from_current_moving_on(kind):
     bench = flying(kind, 'ABC')
-    bench.line.tampers.append(lambda way, m, now: [] if (
+    bench.line.tampers.append(lambda direction, m, now: [] if (
         m.get_type() == 'MISSION_ITEM_REACHED') else None)
     assert bench.run(lambda: 'B' in bench.completed())
     assert bench.completed() == ['A', 'B']
 
 
 @BOTH
-def test_fault_21_what_we_jump_over_is_not_completed(kind):
+def test_fault_21_tasks_skipped_by_set_current_are_not_completed(kind):
     bench = flying(kind, 'ABC')
     bench.assign(task_list('C', 2))
     assert bench.run(lambda: bench.completed())
@@ -117,8 +118,8 @@ def test_fault_22_the_same_list_from_another_item_on_needs_set_current_only(kind
 def test_fault_23_accepted_and_then_no_mission_is_infeasible(kind):
     bench = FlightBench(kind).discover()
 
-    def vanish(way, message, now):
-        if way == 'down' and message.get_type() == 'MISSION_ACK':
+    def vanish(direction, message, now):
+        if direction == 'down' and message.get_type() == 'MISSION_ACK':
             del bench.vehicles[1].mission.items[1 if kind == 'ardupilot' else 0:]
         return None
     bench.line.tampers.append(vanish)
@@ -170,8 +171,9 @@ def refusing(name, before):
     bench.assign(task_list('Z'))
     assert bench.run(lambda: bench.completed() == ['Z'])
 
-    def refuse(way, message, now):
-        bad = way == 'up' and message.get_type() == 'MISSION_ITEM_INT' and message.x == item.x
+    def refuse(direction, message, now):
+        bad = (direction == 'up' and message.get_type() == 'MISSION_ITEM_INT'
+               and message.x == item.x)
         if bad:
             before(bench)
             bench.from_vehicle(d.MAVLink_mission_ack_message(
@@ -190,13 +192,13 @@ def test_a_refusal_counts_for_the_list_that_was_refused_and_not_for_a_changed_ta
     assert bench.flown()[-1] == (300, 300, 50)
 
 
-def test_a_refusal_is_told_under_the_revision_that_asked_for_the_task():
+def test_a_refusal_is_reported_with_the_revision_that_contained_the_task():
     bench = refusing('A', lambda bench: None)
     assert bench.run(bench.failed, 60.0)
     assert bench.events[-1][1].revision == 2
 
 
-def test_a_list_that_still_has_what_was_refused_is_told_so_again(refused):
+def test_a_list_that_still_contains_a_refused_task_is_refused_again(refused):
     first = refused.events[-1][1]
     refused.assign(single('far', FAR, 7))
     assert refused.run(lambda: refused.failed() == ['far', 'far'], 3.0)
@@ -204,14 +206,14 @@ def test_a_list_that_still_has_what_was_refused_is_told_so_again(refused):
     assert refused.onboard().upload.uploads == 1
 
 
-def test_what_was_refused_is_tried_again_where_it_has_changed(refused):
+def test_a_refused_task_is_uploaded_again_after_a_change(refused):
     refused.assign(single('far', (0.0, 300.0, 50.0), 2))
     assert refused.run(lambda: refused.completed() == ['far'])
     assert refused.failed() == ['far']
 
 
 @BOTH
-def test_a_task_that_comes_back_at_another_place_is_flown_there(kind):
+def test_a_task_announced_again_at_another_position_is_flown_there(kind):
     bench = flying(kind, 'A')
     assert bench.run(lambda: bench.completed() == ['A'])
     bench.assign(single('A', (150.0, 100.0, 50.0), 2))
@@ -221,7 +223,7 @@ def test_a_task_that_comes_back_at_another_place_is_flown_there(kind):
 
 
 @BOTH
-def test_a_task_that_comes_back_as_it_was_is_told_and_not_flown(kind):
+def test_a_task_announced_again_unchanged_is_reported_and_not_flown(kind):
     bench = flying(kind, 'A')
     assert bench.run(lambda: bench.completed() == ['A'])
     bench.assign(task_list('A', 2))
@@ -234,7 +236,7 @@ def test_a_task_that_comes_back_as_it_was_is_told_and_not_flown(kind):
 
 
 @BOTH
-def test_lists_that_change_all_the_time_put_nothing_off(kind):
+def test_lists_that_change_all_the_time_do_not_delay_a_repeated_event(kind):
     bench = flying(kind, 'AZ')
     assert bench.run(lambda: bench.completed() == ['A'])
     for revision in range(2, 12):
@@ -244,7 +246,7 @@ def test_lists_that_change_all_the_time_put_nothing_off(kind):
 
 
 def upload_by_another(bench, n=1):
-    """A human's ground station puts a mission of one item on board."""
+    """Upload a mission of one item as another ground station."""
     own = bench.onboard(n).own
     bench.from_station(d.MAVLink_mission_count_message(n, 1, 1 + own, 0), n)
     for seq in range(1 + own):
@@ -277,12 +279,12 @@ def test_fault_24_a_foreign_mission_is_replaced_where_the_policy_says_reassert(k
 
 @BOTH
 @pytest.mark.parametrize(
-    ('policy', 'flight'), [('hold', ModeFunction.HOLD), ('return', ModeFunction.RETURN)]
+    ('policy', 'mode'), [('hold', ModeFunction.HOLD), ('return', ModeFunction.RETURN)]
 )
-def test_fault_25_an_empty_list_holds_or_returns_and_never_clears(kind, policy, flight):
+def test_fault_25_an_empty_list_holds_or_returns_and_never_clears(kind, policy, mode):
     bench = flying(kind, 'ABC', when_empty=policy)
     bench.assign(task_list('', 2))
-    assert bench.run(lambda: bench.executor().telemetry.mode is flight, 5.0)
+    assert bench.run(lambda: bench.executor().telemetry.mode is mode, 5.0)
     bench.run(limit=10.0)
     assert bench.completed() == []
     assert bench.onboard().revision == 2
@@ -292,14 +294,14 @@ def test_fault_25_an_empty_list_holds_or_returns_and_never_clears(kind, policy, 
 
 @BOTH
 @pytest.mark.parametrize('answer', ['none', 'unsupported'])
-def test_fault_28_set_current_falls_back_to_the_old_way(kind, answer):
+def test_fault_28_set_current_falls_back_to_the_message(kind, answer):
     bench = FlightBench(kind).discover()
 
-    def refuse(way, m, now):
+    def refuse(direction, m, now):
         if m.get_type() != 'COMMAND_LONG' or m.command != d.MAV_CMD_DO_SET_MISSION_CURRENT:
             return None
         if answer == 'unsupported':
-            bench.from_vehicle(d.MAVLink_command_ack_message(m.command, 3))
+            bench.from_vehicle(d.MAVLink_command_ack_message(m.command, d.MAV_RESULT_UNSUPPORTED))
         return []
     bench.line.tampers.append(refuse)
     bench.assign(task_list('ABC'))
@@ -308,7 +310,7 @@ def test_fault_28_set_current_falls_back_to_the_old_way(kind, answer):
 
 
 @BOTH
-def test_fault_29_a_current_at_or_beyond_the_end_harms_nothing(kind):
+def test_fault_29_a_current_at_or_beyond_the_end_is_ignored(kind):
     bench = flying(kind, 'AB')
     bench.run(limit=4.0)
     count = len(bench.vehicles[1].mission.items)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""PX4 calls its mission complete after a take-off and a landing: that completes no task."""
+"""PX4 reports its mission as complete after a take-off and a landing: that completes no task."""
 from flight_bench import FlightBench, flying, places
 from mission_bench import task_list
 from pymavlink.dialects.v20 import ardupilotmega as d
@@ -19,7 +19,7 @@ def taken_off(names):
     return bench
 
 
-def test_a_bridge_started_again_after_a_take_off_takes_no_task_for_flown():
+def test_a_restarted_bridge_after_a_take_off_completes_no_task():
     bench = taken_off('ABC')
     bench.start()
     bench.discover()
@@ -28,7 +28,7 @@ def test_a_bridge_started_again_after_a_take_off_takes_no_task_for_flown():
     assert bench.completed() == []
 
 
-def test_a_bridge_started_again_after_a_landing_takes_no_task_for_flown():
+def test_a_restarted_bridge_after_a_landing_completes_no_task():
     bench = flying('px4', 'ABC')
     vehicle = bench.vehicles[1]
     assert bench.run(lambda: bench.completed() == ['A'])
@@ -45,9 +45,9 @@ def test_a_bridge_started_again_after_a_landing_takes_no_task_for_flown():
 def test_complete_left_over_from_the_take_off_ends_no_list_of_one_task():
     bench = taken_off('A')
 
-    def late(way, message, now):
-        """What PX4 told before it was in mission mode comes after that."""
-        if way == 'down' and message.get_type() == 'MISSION_CURRENT':
+    def late(direction, message, now):
+        """Deliver an older MISSION_CURRENT after the change to mission mode."""
+        if direction == 'down' and message.get_type() == 'MISSION_CURRENT':
             message.mission_state = d.MISSION_STATE_COMPLETE
         return None
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A second station that sets the current item at random: nothing false, nothing flown twice.
+"""A second station sets the current item at random: no false event, nothing flown twice.
 
 The line loses up to a fifth, delays up to 5 s and reorders; lists change meanwhile.
 """
@@ -20,8 +20,8 @@ def fly(kind, seed, *, loss, delay, late, lists):
     """
     rng = random.Random(seed)
     bench = FlightBench(kind, seed=seed, loss=loss, delay=(0.0, delay),
-                        relaunch='automatic').discover()  # a swap that takes too long ends at home
-    bench.line.tampers.append(lambda way, m, now: [(rng.uniform(0.0, 5.0), m)] if (
+                        relaunch='automatic').discover()  # a too long replacement ends at home
+    bench.line.tampers.append(lambda direction, m, now: [(rng.uniform(0.0, 5.0), m)] if (
         rng.random() < late) else None)
     given = list(NAMES)
     bench.assign(task_list(given, service=rng.choice([0.0, 0.0, 2.0])))

@@ -5,12 +5,12 @@ from findings_bench import (
     BOTH,
     FindingsBench,
     distance,
+    drop_messages,
     flown_once_each,
     flying,
     happened,
     listed,
     set_current,
-    swallow,
     truthful,
 )
 from flight_bench import FlightBench, places
@@ -29,10 +29,10 @@ def appended(lost=(), **kwargs):
     bench = flying('ardupilot', 'ABC', **kwargs)
     assert truthful(bench, lambda: bench.completed() == ['A', 'B'])
     bench.run(lambda: distance(bench, C) < 40.0)
-    swallow(bench, 'up', 'MISSION_ITEM_INT',
+    drop_messages(bench, 'up', 'MISSION_ITEM_INT',
             lambda m: m.seq > 3 and not happened(bench, 'mission_end'))
     for message in lost:
-        swallow(bench, 'down', message, lambda m: bench.now < lost_until[0])
+        drop_messages(bench, 'down', message, lambda m: bench.now < lost_until[0])
     lost_until = [bench.now + 6.0]
     bench.assign(task_list('CDEF', 2))
     assert truthful(bench, lambda: happened(bench, 'mission_end'), 30.0)
@@ -77,7 +77,7 @@ def test_finding_05_also_on_a_line_that_loses_what_would_tell(kind, lost):
     bench = flying(kind, 'ABCDE')
     truthful(bench, lambda: False, 3.0)
     begin = bench.now
-    swallow(bench, 'down', lost, lambda m: begin < bench.now < begin + 4.0)
+    drop_messages(bench, 'down', lost, lambda m: begin < bench.now < begin + 4.0)
     set_current(bench, 3)
     flown_once_each(bench, 'ABCDE')
     assert places(bench)[0] == 'D'
@@ -101,7 +101,7 @@ def swapped_beside(second, lost):
     """
     bench = FlightBench('px4', tick=0.05).discover()
     bench.assign(listed(1, P=(0.0, 100.0), Q=(0.0, 400.0)))
-    swallow(bench, 'down', 'MISSION_ITEM_REACHED', lambda m: not reached or (
+    drop_messages(bench, 'down', 'MISSION_ITEM_REACHED', lambda m: not reached or (
         bench.now < reached[0] + lost))
     reached = []
     assert bench.run(lambda: bench.flown())
@@ -133,7 +133,7 @@ def test_finding_07_reached_of_a_new_list_is_not_credited_to_the_old_one():
     assert bench.run(lambda: distance(bench, (0.0, 200.0, 50.0)) < 100.0)
     lost = [True]
     for message in ('MISSION_ACK', 'MISSION_COUNT'):
-        swallow(bench, 'down', message, lambda m: lost[0])
+        drop_messages(bench, 'down', message, lambda m: lost[0])
     bench.assign(listed(2, S=(0.0, 170.0), P=(0.0, 200.0), Q=(0.0, 400.0)))
 
     def honest():
@@ -161,8 +161,8 @@ def test_finding_07_a_first_try_that_was_taken_is_not_forgotten_in_the_second():
             m.z += 1.0
         return None
     bench.line.tampers.append(another)
-    swallow(bench, 'down', 'MISSION_ACK', lambda m: lost[0])
-    swallow(bench, 'up', 'MISSION_COUNT', lambda m: (
+    drop_messages(bench, 'down', 'MISSION_ACK', lambda m: lost[0])
+    drop_messages(bench, 'up', 'MISSION_COUNT', lambda m: (
         lost[0] and bench.onboard().upload.uploads > 2))
     bench.assign(listed(2, S=(0.0, 170.0), P=(0.0, 200.0), Q=(0.0, 400.0)))
 
@@ -185,7 +185,7 @@ def test_finding_07_a_try_that_was_taken_is_not_forgotten_for_a_newer_list():
     bench.assign(listed(1, P=(0.0, 200.0), Q=(0.0, 400.0)))
     assert bench.run(lambda: distance(bench, (0.0, 200.0, 50.0)) < 60.0)
     lost = [True]
-    swallow(bench, 'down', 'MISSION_ACK', lambda m: lost[0] and m.type == 0)
+    drop_messages(bench, 'down', 'MISSION_ACK', lambda m: lost[0] and m.type == 0)
     bench.assign(listed(2, S=(0.0, 170.0), P=(0.0, 200.0), Q=(0.0, 400.0)))
     assert bench.run(lambda: bench.onboard().upload.sent_all, 10.0)
     bench.from_vehicle(d.MAVLink_mission_ack_message(*OURS, d.MAV_MISSION_ERROR))
@@ -202,7 +202,7 @@ def test_finding_07_reached_of_the_old_list_is_not_credited_to_the_new_one():
     bench = FlightBench('px4', tick=0.05).discover()
     bench.assign(listed(1, P=(0.0, 200.0), Q=(0.0, 400.0)))
     assert bench.run(lambda: distance(bench, (0.0, 200.0, 50.0)) < 25.0)
-    swallow(bench, 'up', 'MISSION_ITEM_INT', lambda m: m.seq == 2 and not bench.flown())
+    drop_messages(bench, 'up', 'MISSION_ITEM_INT', lambda m: m.seq == 2 and not bench.flown())
     bench.assign(listed(2, S=(20.0, 220.0), P=(0.0, 200.0), Q=(0.0, 400.0)))
 
     def done():
@@ -218,7 +218,7 @@ def test_what_is_appended_and_reached_before_the_answer_is_completed_once():
     assert truthful(bench, lambda: distance(bench, (100.0, 100.0, 50.0)) < 25.0)
     lost = [True]
     for message in ('MISSION_ACK', 'MISSION_COUNT'):
-        swallow(bench, 'down', message, lambda m: lost[0])
+        drop_messages(bench, 'down', message, lambda m: lost[0])
     bench.assign(task_list('BCD', 2))
     assert truthful(bench, lambda: places(bench) == ['A', 'B', 'C'])
     lost[0] = False
@@ -276,7 +276,7 @@ def test_finding_17_a_late_current_completes_nothing_while_it_is_held(index):
     bench = flying('ardupilot', 'ABC')
     assert truthful(bench, lambda: bench.completed() == ['A'])
     held = [True]
-    swallow(bench, 'up', 'COMMAND_LONG', lambda m: held[0] and (
+    drop_messages(bench, 'up', 'COMMAND_LONG', lambda m: held[0] and (
         m.command == d.MAV_CMD_DO_SET_MODE and m.param2 == MISSION))
     bench.assign(task_list('XYZ', 2))
     assert bench.run(lambda: bench.line.sent('COMMAND_LONG')[-1].param2 == MISSION

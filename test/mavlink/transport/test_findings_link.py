@@ -20,13 +20,13 @@ from uav_task_alloc.sim.udp_fleet import UdpFleet
 @pytest.fixture
 def servers():
     """Two TCP servers; the first one does not listen yet."""
-    made = [socket.socket(), socket.socket()]
-    for one in made:
+    sockets = [socket.socket(), socket.socket()]
+    for one in sockets:
         one.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         one.bind(('127.0.0.1', 0))
         one.settimeout(5.0)
-    yield made
-    for one in made:
+    yield sockets
+    for one in sockets:
         one.close()
 
 
