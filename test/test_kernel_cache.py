@@ -34,6 +34,9 @@ def caller(x):
     return callee(x)
 """
 CALL = 'from uav_task_alloc.solver.caller import caller; print(caller(1.0))'
+LOAD = 'from uav_task_alloc.solver import solve; solve.load_kernels()'
+PLAN = "from uav_task_alloc import __main__ as cli; cli.main(['plan', 'one.yaml'])"
+SCENARIO = 'uavs: [{id: u, position: [0, 0, 50]}]\ntasks: [{id: t, position: [90, 0, 50]}]\n'
 NOTICE = 'compiling kernels (once, about '
 
 
@@ -82,9 +85,9 @@ def test_folders_of_other_sources_are_removed_when_a_kernel_is_written(package):
     assert not list(cache.glob('*.nb*'))
 
 
-@pytest.mark.parametrize('written', [0, 4])
-def test_ctrl_c_ends_a_compilation_at_once(package, written):
-    code = 'from uav_task_alloc.solver import solve; solve.load_kernels()'
+@pytest.mark.parametrize(('written', 'code'), [(0, LOAD), (4, LOAD), (2, PLAN)])
+def test_ctrl_c_ends_a_compilation_at_once(package, written, code):
+    (package.parent / 'one.yaml').write_text(SCENARIO)
     with start(package, code) as process:
         assert process.stderr.readline().startswith(NOTICE)
         while len(list(package.rglob('*.nbc'))) < written:

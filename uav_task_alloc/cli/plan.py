@@ -37,6 +37,8 @@ def main(argv: Sequence[str]) -> int:
     plotters = {path: plotter(option, path) for option, path in (
         ('--plot', args.plot), ('--plot-3d', args.plot_3d)) if path}
     loaded = with_options(without_cancelled(scenario.load(args.scenario)), args)
+    from uav_task_alloc.solver.solve import load_kernels  # imports numba
+    load_kernels(args.solver, bool(loaded.zones))  # Ctrl-C ends a compilation: no plan yet
     with SolveProgress(args.budget, sys.stderr, time.monotonic) as progress:
         result = solve_scenario(loaded, args, progress)
     print(plan_text(result))

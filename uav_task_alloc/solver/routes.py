@@ -13,10 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uav_task_alloc.geometry.distances import Pairs, length, length_via
+from uav_task_alloc.geometry.outline import Floats as Floats, Ints as Ints
 from uav_task_alloc.kernel import inline_kernel, kernel
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 Nodes = NDArray[np.uint32]  # unsigned: numba omits the check for negative indices
 NODE: Any = np.uint32
 SIGNED: Any = np.int64  # to int64: in kernels int() of an unsigned number is unsigned

@@ -69,8 +69,7 @@ def plan(uavs: Iterable[Uav], tasks: Iterable[Task], zones: Iterable[ThreatZone]
         InvalidValue: an argument is out of range, or an id is used twice.
         UnknownName: there is no such solver.
     """
-    if not isinstance(solver, str) or solver not in SOLVERS:
-        raise UnknownName('solver', solver, list(SOLVERS))
+    _check_solver(solver)
     check_options(budget, seed, route_end, threads, max_iterations)
     if not isinstance(warm, (Plan, WarmState, type(None))):
         raise InvalidValue('warm', type(warm).__name__, 'a Plan, its state or None')
@@ -106,6 +105,12 @@ def _locked_sums(problem: Problem) -> tuple[float, float]:
     return length, value
 
 
+def _check_solver(solver: str) -> None:
+    """Raise UnknownName where there is no such solver."""
+    if not isinstance(solver, str) or solver not in SOLVERS:
+        raise UnknownName('solver', solver, list(SOLVERS))
+
+
 @functools.cache
 def load_kernels(solver: str = 'chain_q', zones: bool = False) -> None:
     """Load a solver's kernels, compile those not on disk yet; further calls do nothing.
@@ -113,7 +118,11 @@ def load_kernels(solver: str = 'chain_q', zones: bool = False) -> None:
     Args:
         solver: a name in SOLVERS.
         zones: whether to load the kernels that find paths around zones, too.
+
+    Raises:
+        UnknownName: there is no such solver.
     """
+    _check_solver(solver)
     uavs = (Uav('u', (0.0, 0.0, 0.0)), Uav('v', (9.0, 0.0, 0.0), 30.0))
     tasks = tuple(Task(f't{i}', (float(i), 1.0, 0.0)) for i in range(5))
     between = (*(ThreatZone.cylinder(f'z{x}', (x, 1.0), 0.3) for x in (1.5, 2.5, 4.0)),

@@ -28,6 +28,7 @@ class Worker:
         self._solve, self._deliver, self._fail = solve, deliver, fail
         self._problems: SimpleQueue[ReplanProblem | None] = SimpleQueue()
         self._stop = threading.Event()
+        self._prepared = threading.Event()
         self._thread = threading.Thread(target=self._run, args=(prepare,), daemon=True,
                                         name='solver')
 
@@ -45,13 +46,15 @@ class Worker:
         self._stop.set()
 
     def close(self) -> None:
-        """End the thread; waits at most 5 s for it."""
+        """End the thread; waits at most 5 s for it, and not for kernels that are compiled."""
         self._stop.set()
         self._problems.put(None)
-        self._thread.join(timeout=5.0)
+        if self._prepared.is_set():
+            self._thread.join(timeout=5.0)
 
     def _run(self, prepare: Callable[[], object]) -> None:
         self._guarded(prepare)
+        self._prepared.set()
         self._deliver(None)
         while (problem := self._problems.get()) is not None:
             answer = self._guarded(partial(self._solve, problem, self._stop.is_set))
