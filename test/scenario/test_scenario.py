@@ -26,7 +26,7 @@ def test_every_file_that_comes_with_the_package_is_read(path):
     assert read.uavs
 
 
-def test_the_demo_is_what_was_asked_for():
+def test_the_demo_has_the_announced_size():
     demo = scenario.load(ROOT / 'config/scenarios/demo.yaml')
     assert [uav.autopilot for uav in demo.uavs].count('px4') == 2
     assert [uav.system_id for uav in demo.uavs] == [1, 2, 3, 4]
@@ -37,7 +37,7 @@ def test_the_demo_is_what_was_asked_for():
     assert sum(timed.appears > 0.0 for timed in demo.zones) == 1
 
 
-def test_what_is_left_out_has_its_default():
+def test_a_missing_key_has_its_default():
     read = scenario.parse(UAV, 'some/name.yaml')
     uav, = read.uavs
     assert (read.name, read.seed, read.origin.latitude) == ('name', 0, 47.397742)
@@ -71,7 +71,7 @@ def test_each_shape_of_zone_is_read():
     assert (zones[1].appears, zones[1].vanishes) == (7.0, 8.0)
 
 
-def test_arrivals_are_the_same_each_time_sorted_and_clear_of_zones():
+def test_arrivals_are_reproducible_sorted_and_outside_zones():
     text = UAV + """seed: 5
 zones: [{id: z, shape: cylinder, center: [50, 50], radius: 30, appears: 60}]
 arrivals: {count: 30, between: [10, 20], area: [[0, 0, 40], [100, 100, 60]], service_time: 2}
@@ -144,7 +144,7 @@ REFUSED = {
         ':3: scenario.arrivals.between = [2, 1]: expected the first time not after the last',
     UAV + 'tasks: [{id: a01, position: [1, 1, 1]}]\n'
           'arrivals: {count: 1, between: [1, 2], area: [[0, 0, 0], [1, 1, 1]]}\n':
-        ':4: scenario.arrivals.prefix is missing: expected one that makes no id again',
+        ':4: scenario.arrivals.prefix is missing: expected one that gives no id twice',
     UAV + 'zones: [{id: z, shape: cylinder, center: [0, 0], radius: 9}]\n'
           'arrivals: {count: 1, between: [1, 2], area: [[0, 0, 0], [1, 1, 1]]}\n':
         ':4: scenario.arrivals.area = [[0, 0, 0], [1, 1, 1]]: expected a box with room outside',
@@ -169,17 +169,17 @@ def test_a_bad_file_is_refused_with_file_line_value_and_expectation(text, tmp_pa
     assert '\n' not in str(refusal.value)
 
 
-def test_a_file_that_is_not_there_is_refused(tmp_path):
+def test_a_missing_file_is_refused(tmp_path):
     with pytest.raises(ScenarioError, match=r'none\.yaml: No such file or directory: expected'):
         scenario.load(tmp_path / 'none.yaml')
 
 
-def test_no_file_at_all_is_refused():
+def test_an_empty_path_is_refused():
     with pytest.raises(ScenarioError, match=r"^'': Is a directory: expected a scenario file"):
         scenario.load('')
 
 
-def test_bytes_that_are_no_text_are_refused_with_their_line(tmp_path):
+def test_invalid_utf8_is_refused_with_its_line(tmp_path):
     (tmp_path / 'bad.yaml').write_bytes(b'name: x\nseed: \xff\n')
     with pytest.raises(ScenarioError, match=r'bad.yaml:2: byte 0xff: expected UTF-8 text'):
         scenario.load(tmp_path / 'bad.yaml')
@@ -187,13 +187,13 @@ def test_bytes_that_are_no_text_are_refused_with_their_line(tmp_path):
 
 @given(text=st.text(max_size=60))
 @settings(max_examples=200, deadline=None)
-def test_any_text_is_read_or_refused_in_one_way(text):
+def test_any_text_is_read_or_refused_with_its_line(text):
     with pytest.raises(ScenarioError, match=r'^f\.yaml:\d+: (?s:.*)expected'):
         scenario.parse(text, 'f.yaml')
 
 
 @pytest.mark.parametrize('seed', range(3))
-def test_what_is_generated_is_written_and_read_back_the_same(seed):
+def test_a_generated_scenario_is_written_and_read_back_the_same(seed):
     made = scenario.generate(seed, uavs=3, tasks=12, arrivals=4, base=seed == 1)
     assert scenario.parse(scenario.to_yaml(made)) == made
     assert (len(made.uavs), len(made.tasks), len(made.zones)) == (3, 16, 3)
@@ -205,7 +205,7 @@ def test_the_demo_is_written_and_read_back_the_same():
     assert scenario.parse(scenario.to_yaml(demo)) == demo
 
 
-def test_the_timeline_tells_each_moment_once_in_order():
+def test_the_timeline_has_each_moment_once_in_order():
     moments = scenario.timeline(scenario.parse("""uavs:
   - {id: u1, position: [0, 0, 0], dies_at: 4}
 tasks:
@@ -221,7 +221,7 @@ cancels: [{task: t1, at: 3}]
                     (4.0, 0, ['t2'], [], ('u1',))]
 
 
-def test_the_page_in_docs_is_fresh():
+def test_the_page_in_docs_is_up_to_date():
     assert (ROOT / 'docs/scenarios.md').read_text() == document.scenario_page()
 
 
@@ -230,7 +230,7 @@ def test_the_example_of_the_page_is_read():
     assert len(scenario.parse(text).tasks) == 2
 
 
-def test_every_key_says_what_it_is():
+def test_every_key_has_a_description():
     for table in TABLES.values():
         for entry in table.values():
             assert entry.text
@@ -250,7 +250,7 @@ def test_a_refusal_shows_a_value_as_it_was_written(text, shown):
     ([('u1_1', 1)], 'u1_{sysid}'),
     ([('u1_1', 1), ('u1_2', 2)], 'u1_{sysid}'),
 ])
-def test_the_bridge_names_the_uavs_as_the_scenario_does(ids, pattern):
+def test_the_id_pattern_of_the_bridge_gives_the_ids_of_the_scenario(ids, pattern):
     rows = ''.join(f'  - {{id: {name}, system_id: {number}, position: [0, 0, 0]}}\n'
                    for name, number in ids)
     played = scenario.parse(f'uavs:\n{rows}')
@@ -259,10 +259,10 @@ def test_the_bridge_names_the_uavs_as_the_scenario_does(ids, pattern):
     assert [pattern.format(sysid=number) for _, number in ids] == [name for name, _ in ids]
 
 
-def test_names_that_the_bridge_cannot_make_are_refused():
+def test_ids_that_no_pattern_gives_are_refused():
     played = scenario.load(ROOT / 'config/scenarios/plan_only.yaml')
     with pytest.raises(InvalidValue) as refused:
         scenario.fleet_parameters(played)
     assert str(refused.value) == (
-        "scenario plan_only: id of system_id 1 = 'scout': expected ids that one pattern makes of "
-        "system ids, 'uav_1' say: the bridge names UAVs by it")
+        "scenario plan_only: id of system_id 1 = 'scout': expected ids that one "
+        "uav_id_pattern gives for all system ids, such as 'uav_1'")

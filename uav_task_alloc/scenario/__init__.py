@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Scenario files: read, checked, written and generated."""
+"""Scenario files: read and validated, written, generated."""
 from uav_task_alloc.scenario.generate import generate
 from uav_task_alloc.scenario.node_parameters import fleet_parameters, simulation_parameters
 from uav_task_alloc.scenario.read import load, parse

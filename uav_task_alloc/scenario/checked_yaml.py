@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""YAML read against declared tables: a refusal names file, line, value and expectation."""
+"""YAML read against declared tables of keys; errors name file, line, value and expectation."""
 from __future__ import annotations
 
 import math
@@ -18,7 +18,7 @@ INFINITE = {'.inf': math.inf, '+.inf': math.inf, '-.inf': -math.inf}  # YAML's s
 
 @dataclass(frozen=True, slots=True)
 class ValueKind:
-    """What a value may be: in words, for the docs and for refusals, and how it is read."""
+    """The kind of a value: its description, for the docs and for errors, and its reader."""
 
     words: str
     read: Callable[[str, yaml.Node], Any]  # (place, node); raises ScenarioError
@@ -38,7 +38,7 @@ KeyTable = Mapping[str, Key]
 
 @dataclass(frozen=True, slots=True)
 class YamlRow:
-    """What a mapping held, by key, and where in the file it stands."""
+    """The values of a mapping by key, and their nodes in the file."""
 
     place: str
     node: yaml.Node
@@ -62,7 +62,7 @@ def refusal(node: yaml.Node, reason: str) -> ScenarioError:
 
 
 def shown_yaml(node: yaml.Node) -> str:
-    """A value as a refusal names it, never longer than half a line."""
+    """A value as errors show it, at most 45 characters."""
     if isinstance(node, yaml.MappingNode):
         return 'a mapping'
     if isinstance(node, yaml.SequenceNode):
@@ -72,7 +72,7 @@ def shown_yaml(node: yaml.Node) -> str:
 
 
 def compose(text: str, name: str) -> yaml.Node:
-    """The document as nodes that know their line; ScenarioError when it is no YAML."""
+    """Parse a document into nodes with line numbers. Raises ScenarioError where it is no YAML."""
     try:
         loader = yaml.SafeLoader(text)
         loader.name = name
@@ -89,23 +89,32 @@ def compose(text: str, name: str) -> yaml.Node:
         raise ScenarioError(f'{name}:1: nested too deep: expected a scenario') from None
     if node is None:
         raise ScenarioError(f'{name}:1: the file is empty: expected a scenario')
-    _refuse_circles(node, (), set())
+    _refuse_cycles(node, (), set())
     return node
 
 
-def _refuse_circles(node: yaml.Node, above: tuple[int, ...], done: set[int]) -> None:
+def _refuse_cycles(node: yaml.Node, above: tuple[int, ...], done: set[int]) -> None:
     if id(node) in above:
         raise refusal(node, 'a value contains itself: expected a scenario')
     if isinstance(node, yaml.ScalarNode) or id(node) in done:
         return
     for child in node.value:
         for each in child if isinstance(child, tuple) else (child,):
-            _refuse_circles(each, (*above, id(node)), done)
+            _refuse_cycles(each, (*above, id(node)), done)
     done.add(id(node))
 
 
 def read_row(table: KeyTable, place: str, node: yaml.Node) -> YamlRow:
-    """One mapping read key by key; unknown, repeated and missing keys are refused."""
+    """Read a mapping by a table of keys.
+
+    Args:
+        table: of the keys.
+        place: of the mapping in the document, for errors.
+        node: of the mapping.
+
+    Raises:
+        ScenarioError: a key is unknown, repeated or missing, or a value is invalid.
+    """
     if not isinstance(node, yaml.MappingNode):
         raise refusal(node, f'{place} = {shown_yaml(node)}: expected a mapping with '
                             f'{", ".join(table)}')
@@ -137,12 +146,12 @@ def _children(table: KeyTable, place: str, node: yaml.MappingNode) -> dict[str, 
 
 
 def is_null(node: yaml.Node) -> bool:
-    """Written as null, ~ or nothing."""
+    """Whether a value is null, ~ or empty."""
     return bool(node.tag == 'tag:yaml.org,2002:null')
 
 
 def scalar(words: str, convert: Callable[[str], Any]) -> ValueKind:
-    """A single value; `convert` raises ValueError for what is not meant."""
+    """A scalar; `convert` raises ValueError for an invalid text."""
     def read(place: str, node: yaml.Node) -> Any:
         try:
             if not isinstance(node, yaml.ScalarNode):
@@ -153,9 +162,9 @@ def scalar(words: str, convert: Callable[[str], Any]) -> ValueKind:
     return ValueKind(words, read)
 
 
-def number(low: float = -math.inf, high: float = math.inf, *, open_low: bool = False,
+def number_value(low: float = -math.inf, high: float = math.inf, *, open_low: bool = False,
            infinite: bool = False) -> ValueKind:
-    """A number in [low, high], or (low, high] where open_low; infinite only where it may."""
+    """A number in [low, high], or in (low, high] with `open_low`; inf only with `infinite`."""
     def convert(text: str) -> float:
         value = INFINITE.get(text.lower())
         value = float(text) if value is None else value
@@ -182,7 +191,7 @@ def whole_number(low: int, high: int) -> ValueKind:
 
 
 def choice(*names: str) -> ValueKind:
-    """One of some words."""
+    """One of these names."""
     def convert(text: str) -> str:
         if text not in names:
             raise ValueError
@@ -191,7 +200,7 @@ def choice(*names: str) -> ValueKind:
 
 
 def text_value(words: str, accepts: Callable[[str], object] = str.strip) -> ValueKind:
-    """A string that `accepts` takes."""
+    """A string for which `accepts` is true."""
     def convert(value: str) -> str:
         if not accepts(value):
             raise ValueError
@@ -199,7 +208,7 @@ def text_value(words: str, accepts: Callable[[str], object] = str.strip) -> Valu
     return scalar(words, convert)
 
 
-def many(kind: ValueKind, words: str, least: int = 0, most: float = math.inf) -> ValueKind:
+def list_of(kind: ValueKind, words: str, least: int = 0, most: float = math.inf) -> ValueKind:
     """A list of values of one kind, read as a tuple."""
     def read(place: str, node: yaml.Node) -> tuple[Any, ...]:
         if not isinstance(node, yaml.SequenceNode) or not least <= len(node.value) <= most:
@@ -209,5 +218,5 @@ def many(kind: ValueKind, words: str, least: int = 0, most: float = math.inf) ->
 
 
 def mapping(table: KeyTable, words: str) -> ValueKind:
-    """A nested mapping, read as a Row."""
+    """A nested mapping, read as a YamlRow."""
     return ValueKind(words, lambda place, node: read_row(table, place, node))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Random scenarios from a seed, for tests and benchmarks; and random points clear of zones."""
+"""Random scenarios from a seed, for tests and benchmarks, and random points outside zones."""
 from __future__ import annotations
 
 import math
@@ -17,19 +17,29 @@ from uav_task_alloc.scenario.values import (
     TimedZone,
 )
 
-_TRIES = 1000  # per point, before a box counts as full
-KEEP_OFF = 10.0  # [m] between a drawn point and a zone with its margin
+_TRIES = 1000  # per point
+_DISTANCE = 10.0  # [m] between a point and a zone with its margin
 
 
 def draw_points(rng: np.random.Generator, count: int, low: Point, high: Point,
                 zones: Sequence[ThreatZone]) -> list[Point]:
-    """Points [m] of a box clear of every zone, in 0.1 m; fewer when there is no room."""
+    """Draw points outside all zones.
+
+    Args:
+        rng: advanced by the draws.
+        count: number of points.
+        low, high: corners of the box [m].
+        zones: kept clear of by 10 m beyond their margins.
+
+    Returns:
+        Points [m] rounded to 0.1 m; fewer than `count` where there is no room.
+    """
     points: list[Point] = []
     for _ in range(count * _TRIES):
         if len(points) == count:
             break
         x, y, z = (round(float(v), 1) for v in rng.uniform(low, high))
-        if not zones_around((x, y, z), zones, KEEP_OFF):
+        if not zones_around((x, y, z), zones, _DISTANCE):
             points.append((x, y, z))
     return points
 
@@ -37,9 +47,16 @@ def draw_points(rng: np.random.Generator, count: int, low: Point, high: Point,
 def generate(seed: int, *, uavs: int = 4, tasks: int = 20, arrivals: int = 0, zones: int = 3,
              size: float = 2000.0, base: bool = False, uav_range: float = math.inf,
              between: tuple[float, float] = (20.0, 120.0)) -> Scenario:
-    """A square of `size` [m] with a fleet along its south edge, or at one base.
+    """Generate a scenario in a square, with the fleet along its south edge or at one base.
 
-    `arrivals` more tasks come at random times of `between` [s]; zones are there from the start.
+    Args:
+        seed: of all random values.
+        uavs, tasks, zones: how many are there from the start.
+        arrivals: number of later tasks.
+        size: side of the square [m].
+        base: all UAVs start at one point.
+        uav_range: of each UAV [m].
+        between: first and last time of arrivals [s].
     """
     rng = np.random.default_rng(seed)
     volumes = [_draw_zone(rng, f'z{i + 1}', i % 3, size) for i in range(zones)]
@@ -58,7 +75,7 @@ def generate(seed: int, *, uavs: int = 4, tasks: int = 20, arrivals: int = 0, zo
 
 
 def _draw_zone(rng: np.random.Generator, name: str, shape: int, size: float) -> ThreatZone:
-    """A zone well inside the square, clear of the south edge where the fleet starts."""
+    """A zone inside the square, away from the south edge where the fleet starts."""
     radius = round(float(rng.uniform(0.03, 0.07)) * size, 1)
     x, y = (round(float(v), 1) for v in rng.uniform((0.2 * size, 0.25 * size), 0.8 * size))
     if shape == 0:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The parameters that a scenario gives to each node: the one place, for demo and launch files."""
+"""The parameters of each node that follow from a scenario, for the demo and launch files."""
 from __future__ import annotations
 
 from pathlib import Path
@@ -11,20 +11,26 @@ from uav_task_alloc.scenario.values import Scenario, ScenarioUav
 Value = bool | int | float | str | list[str] | list[int]
 Parameters = dict[str, Value]  # by ROS name; lists are never empty, which would have no type
 
-UAV_TIMEOUT = 2.0  # [s] of the machine, in which a sped up UAV flies far
-SEEDS = 2**31  # that a parameter can hold; a scenario may have greater ones
+UAV_TIMEOUT = 2.0  # [s] of wall time, short as simulated UAVs fly faster than real time
+SEEDS = 2**31  # a parameter holds smaller ones only, a scenario also greater ones
 
 
 def fleet_parameters(played: Scenario) -> dict[str, Parameters]:
-    """What allocator and bridge take from a scenario, whoever flies it.
+    """The parameters of allocator and bridge for any fleet of a scenario.
+
+    Args:
+        played: the scenario.
+
+    Returns:
+        Parameters by node.
 
     Raises:
-        InvalidValue: the bridge cannot have UAVs of these names.
+        InvalidValue: no `uav_id_pattern` of the bridge gives these ids.
     """
     origin: Parameters = {'origin.latitude': played.origin.latitude,
                           'origin.longitude': played.origin.longitude,
                           'origin.altitude_amsl': played.origin.altitude_amsl}
-    capable = [f'{uav.id}:{_words(uav)}' for uav in played.uavs if uav.capabilities]
+    capable = [f'{uav.id}:{_capabilities(uav)}' for uav in played.uavs if uav.capabilities]
     return {
         'allocator': {**origin, 'route_end': played.route_end, 'seed': played.seed % SEEDS,
                       'clearance': played.clearance, 'altitude_min': played.altitude_min,
@@ -39,18 +45,19 @@ def fleet_parameters(played: Scenario) -> dict[str, Parameters]:
 
 def simulation_parameters(played: Scenario, path: str | Path, port: int,
                           speedup: float | None = None) -> dict[str, Parameters]:
-    """What all nodes take from a scenario that a simulated fleet flies on this machine.
+    """The parameters of all nodes for a simulated fleet on this machine.
 
     Args:
+        played: the scenario.
         path: the file of the scenario.
         port: UDP port on loopback that is free.
-        speedup: None: the scenario's.
+        speedup: factor on real time; None: that of the scenario.
 
     Returns:
         Parameters of each node of `params.NODES`.
 
     Raises:
-        InvalidValue: the bridge cannot have UAVs of these names, or no such speed-up.
+        InvalidValue: no `uav_id_pattern` gives these ids, or the speedup is out of range.
     """
     fleet = fleet_parameters(played)
     flown: Parameters = {'scenario': str(path), 'speedup': PlayerParams(
@@ -65,36 +72,36 @@ def simulation_parameters(played: Scenario, path: str | Path, port: int,
 
 
 def id_pattern(played: Scenario) -> str:
-    """The bridge's `uav_id_pattern` that makes these ids of these system ids.
+    """The `uav_id_pattern` of the bridge that gives all ids from their system ids.
 
     Raises:
-        InvalidValue: no pattern does.
+        InvalidValue: there is none.
     """
     common = set.intersection(*(_patterns(uav) for uav in played.uavs))
     if not common:
         default = BridgeParams.uav_id_pattern
-        wrong = next((uav for uav in played.uavs if default not in _patterns(uav)),
+        mismatch = next((uav for uav in played.uavs if default not in _patterns(uav)),
                      played.uavs[0])
         raise InvalidValue(
-            f'scenario {played.name}: id of system_id {wrong.system_id}', wrong.id,
-            f'ids that one pattern makes of system ids, {default.format(sysid=wrong.system_id)!r} '
-            'say: the bridge names UAVs by it')
+            f'scenario {played.name}: id of system_id {mismatch.system_id}', mismatch.id,
+            'ids that one uav_id_pattern gives for all system ids, such as '
+            f'{default.format(sysid=mismatch.system_id)!r}')
     return max(sorted(common), key=lambda pattern: pattern == BridgeParams.uav_id_pattern)
 
 
 def _patterns(uav: ScenarioUav) -> set[str]:
-    """All patterns that make the id of this UAV."""
+    """All patterns that give the id of this UAV from its system id."""
     number = str(uav.system_id)
     return {uav.id[:at] + '{sysid}' + uav.id[at + len(number):]
             for at in range(len(uav.id)) if uav.id.startswith(number, at)}
 
 
 def _range(uav: ScenarioUav) -> float:
-    """What it can fly with a full battery [m], as a parameter can hold it."""
+    """The range with a full battery [m], at most what the parameter allows."""
     return min(uav.range, MAX_RANGE)
 
 
-def _words(uav: ScenarioUav) -> str:
+def _capabilities(uav: ScenarioUav) -> str:
     for word in uav.capabilities:
         if ',' in word:
             raise InvalidValue(f'capabilities of {uav.id}', word, 'words without a comma')

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A scenario file to a Scenario: everything checked, each refusal with file, line and reason."""
+"""Reader of scenario files; every error has file, line and reason."""
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
@@ -25,11 +25,18 @@ from uav_task_alloc.scenario.values import (
 )
 from uav_task_alloc.zone_codec import USED_KEYS, decode_zone
 
-_Made = TypeVar('_Made')
+_Value = TypeVar('_Value')
 
 
 def load(path: str | Path) -> Scenario:
-    """The scenario of a YAML file; ScenarioError `file:line: reason` when it is not one."""
+    """Read a scenario file.
+
+    Args:
+        path: of a YAML file.
+
+    Raises:
+        ScenarioError: `file:line: reason`; the file cannot be read or is no scenario.
+    """
     try:
         text = Path(path).read_text(encoding='utf-8')
     except OSError as error:
@@ -43,7 +50,15 @@ def load(path: str | Path) -> Scenario:
 
 
 def parse(text: str, name: str = 'scenario') -> Scenario:
-    """The scenario of a YAML text; `name` is what refusals call the file."""
+    """Read the text of a scenario file.
+
+    Args:
+        text: YAML.
+        name: of the file, for errors.
+
+    Raises:
+        ScenarioError: `name:line: reason`.
+    """
     root = read_row(SCENARIO, 'scenario', compose(text, name))
     origin = _origin(root['origin'])
     uavs = tuple(_uav(row, i + 1) for i, row in enumerate(root['uavs']))
@@ -74,9 +89,9 @@ def _origin(row: YamlRow | None) -> Origin:
     return Origin(row['latitude'], row['longitude'], row['altitude_amsl'])
 
 
-def _uav(row: YamlRow, place: int) -> ScenarioUav:
+def _uav(row: YamlRow, position: int) -> ScenarioUav:
     uav = ScenarioUav(
-        row['id'], row['system_id'] or place, row['autopilot'], row['position'],
+        row['id'], row['system_id'] or position, row['autopilot'], row['position'],
         row['home'] or row['position'], row['cruise_speed'], row['range'],
         frozenset(row['capabilities']), row['dies_at'])
     if uav.system_id > 255:
@@ -88,7 +103,7 @@ def _task(row: YamlRow, origin: Origin, uavs: list[str]) -> TimedTask:
     allowed = row['allowed_uavs']
     for name in allowed or ():
         if name not in uavs:
-            raise row.refuse('allowed_uavs', _known('UAVs', name, uavs))
+            raise row.refuse('allowed_uavs', _one_of('UAVs', name, uavs))
     return TimedTask(row['at'], _valid(row, lambda: Task(
         row['id'], _position(row, origin), row['value'], row['service_time'],
         frozenset(row['required_capabilities']), None if allowed is None else frozenset(allowed),
@@ -128,7 +143,7 @@ def _zone(row: YamlRow) -> TimedZone:
 
 def _cancel(row: YamlRow, times: dict[str, float]) -> Cancel:
     if row['task'] not in times:
-        raise row.refuse('task', _known('tasks', row['task'], times))
+        raise row.refuse('task', _one_of('tasks', row['task'], times))
     if row['at'] < times[row['task']]:
         raise row.refuse('at', f'not before it is announced at {times[row["task"]]:g}')
     return Cancel(row['at'], row['task'])
@@ -150,14 +165,14 @@ def _arrivals(row: YamlRow, zones: Iterable[TimedZone], tasks: list[TimedTask],
     ids = [f'{row["prefix"]}{i:02d}' for i in range(1, row['count'] + 1)]
     taken = {timed.task.id for timed in tasks}.intersection(ids)
     if taken:
-        raise row.refuse('prefix', f'one that makes no id again; {min(taken)!r} is a task')
+        raise row.refuse('prefix', f'one that gives no id twice; {min(taken)!r} is a task')
     return [TimedTask(at, Task(name, point, row['value'], row['service_time']))
             for at, name, point in zip(times, ids, points, strict=True)]
 
 
-def _known(kind: str, name: str, known: Iterable[str]) -> str:
-    near = get_close_matches(name, list(known), 1, 0.0)
-    return f'one of the {kind} of this file' + (f'; nearest is {near[0]!r}' if near else '')
+def _one_of(kind: str, name: str, known: Iterable[str]) -> str:
+    nearest = get_close_matches(name, list(known), 1, 0.0)
+    return f'one of the {kind} of this file' + (f'; nearest is {nearest[0]!r}' if nearest else '')
 
 
 def _unique(rows: Iterable[YamlRow], key: str, values: Iterable[Any]) -> None:
@@ -171,10 +186,10 @@ def _unique(rows: Iterable[YamlRow], key: str, values: Iterable[Any]) -> None:
         seen[value] = row
 
 
-def _valid(row: YamlRow, make: Callable[[], _Made]) -> _Made:
-    """What `make` makes; its InvalidValue gets the line of the row."""
+def _valid(row: YamlRow, build: Callable[[], _Value]) -> _Value:
+    """The result of `build`; its InvalidValue becomes a ScenarioError with the line of the row."""
     try:
-        return make()
+        return build()
     except InvalidValue as error:
         key = error.place.rpartition(' ')[2]
         raise refusal(row.nodes.get(key, row.node), f'{row.place}: {error}') from None

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A scenario as a list of moments, each with all that happens in it."""
+"""The events of a scenario, grouped by time."""
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -10,17 +10,17 @@ from uav_task_alloc.scenario.values import Scenario
 
 @dataclass(frozen=True, slots=True)
 class Moment:
-    """What happens at one time, in this order."""
+    """The events at one time, in the order of the fields."""
 
     at: float  # [s] of the scenario
-    zones: tuple[ThreatZone, ...] | None = None  # the whole picture; None: as before
+    zones: tuple[ThreatZone, ...] | None = None  # all zones in force; None: unchanged
     tasks: tuple[Task, ...] = ()
     cancels: tuple[Task, ...] = ()
-    deaths: tuple[str, ...] = ()  # ids of UAVs
+    deaths: tuple[str, ...] = ()  # ids of lost UAVs
 
 
 def timeline(scenario: Scenario) -> tuple[Moment, ...]:
-    """The moments in rising order; the first is at 0 and shows all zones of the start."""
+    """The moments in order of time; the first is at 0 and has the zones of the start."""
     changes = scenario.zone_changes()
     deaths = {uav.id: uav.dies_at for uav in scenario.uavs if uav.dies_at is not None}
     by_id = {timed.task.id: timed.task for timed in scenario.tasks}

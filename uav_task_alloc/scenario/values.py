@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A scenario as values: a fleet, and which tasks and zones come and go at which second."""
+"""A scenario: a fleet, and tasks and zones with the times at which they appear and disappear."""
 from __future__ import annotations
 
 import math
@@ -16,7 +16,7 @@ DEFAULT_SPEEDUP = 8.0  # times faster than real time
 
 @dataclass(frozen=True, slots=True)
 class ScenarioUav:
-    """One vehicle of the fleet, as the simulator builds it."""
+    """One simulated vehicle of the fleet."""
 
     id: str
     system_id: int  # MAVLink, 1..255
@@ -30,14 +30,14 @@ class ScenarioUav:
 
     @property
     def uav(self) -> Uav:
-        """As the solver sees it at the start."""
+        """The UAV at the start, for the solver."""
         return Uav(self.id, self.position, self.range, self.cruise_speed, self.capabilities,
                    self.home)
 
 
 @dataclass(frozen=True, slots=True)
 class TimedTask:
-    """A task, and when it is announced."""
+    """A task and the time of its announcement."""
 
     at: float  # [s]
     task: Task
@@ -45,20 +45,20 @@ class TimedTask:
 
 @dataclass(frozen=True, slots=True)
 class TimedZone:
-    """A zone, and the seconds between which it is there."""
+    """A zone and the time during which it is in force."""
 
     zone: ThreatZone
     appears: float = 0.0  # [s]
     vanishes: float = math.inf  # [s]
 
-    def there(self, at: float) -> bool:
-        """Whether the zone exists at a time [s]."""
+    def in_force(self, at: float) -> bool:
+        """Whether the zone is in force at a time [s]."""
         return self.appears <= at < self.vanishes
 
 
 @dataclass(frozen=True, slots=True)
 class Cancel:
-    """A task is taken back."""
+    """The withdrawal of a task."""
 
     at: float  # [s]
     task: str
@@ -66,7 +66,7 @@ class Cancel:
 
 @dataclass(frozen=True, slots=True)
 class Scenario:
-    """Everything a file says, the random arrivals drawn; times in scenario seconds."""
+    """The content of a file, with the random arrivals drawn; times in scenario seconds."""
 
     name: str
     seed: int
@@ -83,7 +83,7 @@ class Scenario:
 
     @property
     def duration(self) -> float:
-        """When the last event of the file has happened [s]; the flights take longer."""
+        """The time of the last event [s]; the flights take longer."""
         times = [timed.at for timed in self.tasks] + [cancel.at for cancel in self.cancels]
         times += [uav.dies_at for uav in self.uavs if uav.dies_at is not None]
         times += [t for timed in self.zones for t in (timed.appears, timed.vanishes)
@@ -91,10 +91,10 @@ class Scenario:
         return max(times, default=0.0)
 
     def zones_at(self, at: float) -> tuple[ThreatZone, ...]:
-        """The whole picture of zones at a time [s]."""
-        return tuple(timed.zone for timed in self.zones if timed.there(at))
+        """All zones in force at a time [s]."""
+        return tuple(timed.zone for timed in self.zones if timed.in_force(at))
 
     def zone_changes(self) -> Sequence[float]:
-        """The times at which the picture of zones changes [s], rising; 0 is always one."""
+        """The times at which the set of zones changes [s], in order; 0 is one of them."""
         times = {t for timed in self.zones for t in (timed.appears, timed.vanishes)}
         return sorted({0.0} | {t for t in times if math.isfinite(t)})

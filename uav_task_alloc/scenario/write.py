@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A Scenario to the YAML text that reads back as the same scenario."""
+"""Writer of scenario files: the text reads back as the same scenario."""
 from __future__ import annotations
 
 import math
@@ -14,7 +14,7 @@ from uav_task_alloc.zone_codec import SCENARIO_ZONE, encode_zone
 
 
 def to_yaml(scenario: Scenario) -> str:
-    """The file's text; arrivals are written as the tasks they became."""
+    """The YAML text of a scenario; arrivals are written as the tasks drawn."""
     document = {
         'name': scenario.name,
         'seed': scenario.seed,
