@@ -56,59 +56,59 @@ def cpu(pid: int) -> float:
     return (int(fields[11]) + int(fields[12])) / os.sysconf('SC_CLK_TCK')
 
 
-class Spy:
-    """A far end that hears the heartbeats of the bridge."""
+class HeartbeatListener:
+    """A remote that receives the heartbeats of the bridge."""
 
     def __init__(self) -> None:
         self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self.codec, self.times = Codec(99, 1), []
-        self.call()
+        self.send_heartbeat()
 
-    def call(self) -> None:
+    def send_heartbeat(self) -> None:
         self.socket.sendto(self.codec.pack(d.MAVLink_heartbeat_message(
             d.MAV_TYPE_GCS, d.MAV_AUTOPILOT_INVALID, 0, 0, 4, 3)), ('127.0.0.1', PORT))
 
-    def hear(self) -> None:
+    def receive(self) -> None:
         while select.select([self.socket], [], [], 0.0)[0]:
-            got = self.codec.parse(self.socket.recv(65536))
-            self.times += [time.monotonic()] * sum(x.get_type() == 'HEARTBEAT' for x in got)
+            messages = self.codec.parse(self.socket.recv(65536))
+            self.times += [time.monotonic()] * sum(x.get_type() == 'HEARTBEAT' for x in messages)
 
 
 class Watch:
-    """Spins the probe and the spy."""
+    """Receives the states, and the heartbeats by the listener."""
 
     def __init__(self) -> None:
         self.node = rclpy.create_node('load')
         self.executor = SingleThreadedExecutor()
         self.executor.add_node(self.node)
         self.states: dict[str, m.UavState] = {}
-        self.heard: Counter[str] = Counter()
+        self.received: Counter[str] = Counter()
         self.node.create_subscription(m.UavState, 'uav_states', self.on_state, STATES)
-        self.spy = Spy()
+        self.listener = HeartbeatListener()
 
     def on_state(self, msg: m.UavState) -> None:
         self.states[msg.uav_id] = msg
-        self.heard[msg.uav_id] += 1
+        self.received[msg.uav_id] += 1
 
     def until(self, condition, limit: float) -> float:
         """How long [s] it took until the condition held, at most `limit`."""
         begin = time.monotonic()
         while not condition() and time.monotonic() < begin + limit:
             self.executor.spin_once(timeout_sec=0.02)
-            self.spy.hear()
+            self.listener.receive()
         return time.monotonic() - begin
 
 
 def measure(watch: Watch, pid: int) -> dict[str, float]:
     """The figures."""
     watch.until(lambda: len(watch.states) == UAVS, 30.0)
-    watch.spy.call()
+    watch.listener.send_heartbeat()
     watch.until(lambda: False, 3.0)
-    watch.heard.clear()
+    watch.received.clear()
     before, begin = cpu(pid), time.monotonic()
     watch.until(lambda: False, WATCHED)
     idle, span = cpu(pid) - before, time.monotonic() - begin
-    rate = min(watch.heard[f'uav_{n}'] for n in range(1, UAVS + 1)) / span
+    rate = min(watch.received[f'uav_{n}'] for n in range(1, UAVS + 1)) / span
     publishers = [watch.node.create_publisher(m.TaskList, f'uav_{n}/task_list', LATCHED)
                   for n in range(1, UAVS + 1)]
     watch.until(lambda: all(p.get_subscription_count() for p in publishers), 10.0)
@@ -117,7 +117,7 @@ def measure(watch: Watch, pid: int) -> dict[str, float]:
     for publisher, tasks in zip(publishers, lists, strict=True):
         publisher.publish(tasks)
     took = watch.until(lambda: all(s.list_revision == 1 for s in watch.states.values()), 60.0)
-    gaps = [b - a for a, b in zip(watch.spy.times, watch.spy.times[1:], strict=False)]
+    gaps = [b - a for a, b in zip(watch.listener.times, watch.listener.times[1:], strict=False)]
     return {'uavs': len(watch.states), 'state_hz_least': rate, 'cpu_percent': 100 * idle / span,
             'upload_s': took, 'upload_cpu_s': cpu(pid) - before,
             'heartbeat_gap_s_most': max(gaps, default=99.0)}

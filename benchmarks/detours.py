@@ -24,7 +24,7 @@ from uav_task_alloc.geometry.distances import Distances  # noqa: E402
 
 
 def compare(count: int, apart: bool, pairs: int, ring: int, seed: int) -> None:
-    """Print how ways among `count` zones compare with the reference, blocked pairs only."""
+    """Print how paths among `count` zones compare with the reference, blocked pairs only."""
     rng = np.random.default_rng(seed)
     side = 1500.0 if count < 20 else 4000.0
     longer, corners, missed, entered, closed, done = [], [], 0, 0, 0, 0
@@ -34,20 +34,20 @@ def compare(count: int, apart: bool, pairs: int, ring: int, seed: int) -> None:
         dense = Dense(zones, CLEARANCE, low=0.0, high=high, ring=ring)
         for _ in range(min(20, pairs - done)):
             a, b = random_point(rng, zones, side), random_point(rng, zones, side)
-            found = find_detour(a, b, zones, clearance=CLEARANCE, altitude_min=0.0,
+            detour = find_detour(a, b, zones, clearance=CLEARANCE, altitude_min=0.0,
                                 altitude_max=high)
-            if found.length <= math.dist(a, b) * (1 + 1e-9):
+            if detour.length <= math.dist(a, b) * (1 + 1e-9):
                 continue
             done += 1
             reference = dense.length(a, b)
-            if math.isinf(found.length):
+            if math.isinf(detour.length):
                 missed += math.isfinite(reference)
                 closed += math.isinf(reference)
                 continue
-            entered += violations([a, *found.points, b], zones)
-            corners.append(len(found.points))
+            entered += violations([a, *detour.points, b], zones)
+            corners.append(len(detour.points))
             if math.isfinite(reference):  # else a finer search than the reference's found it
-                longer.append(100 * (found.length / reference - 1))
+                longer.append(100 * (detour.length / reference - 1))
     print(f'K = {count:2d} {"disjoint   " if apart else "overlapping"} n = {done:4d}: longer by '
           f'median {np.median(longer):+.2f} %, p99 {np.percentile(longer, 99):+.2f} %, '
           f'worst {max(longer):+.2f} %; missed {missed}, both closed {closed}; samples inside '
@@ -73,7 +73,7 @@ def speed(shapes: str = 'hcp', apart: bool = True, seed: int = 1) -> None:
     def timed(name: str, start: float) -> None:
         figures.setdefault(name, []).append(1e3 * (time.thread_time() - start))
 
-    for _ in range(9):  # what else the machine does only adds, so the best tells most
+    for _ in range(9):  # other load only adds time, so the best counts
         distances = Distances(points[:1000], zones[:50], clearance=CLEARANCE)
         start = time.thread_time()
         distances.ensure(origins, goals)

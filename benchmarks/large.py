@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Large fleets: tasks left out, length, time to the first answer and memory, a line a plan.
+"""Large fleets: tasks left out, length, time to the first plan and memory, a line per plan.
 
     python benchmarks/large.py [--size 200x5000] [--budgets 1,10] [--seeds 1] [--rival 60]
 
@@ -9,7 +9,11 @@ from __future__ import annotations
 
 import argparse
 import resource
+import sys
 import time
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from uav_task_alloc import plan
 from uav_task_alloc.solver.solve import load_kernels
@@ -19,11 +23,12 @@ from uav_task_alloc.study.reference_solvers import pyvrp
 
 
 def ours(instance: Instance, budget: float) -> None:
-    """Print what `plan` makes of it within `budget` [s] of CPU time."""
-    made = plan(instance.uavs, instance.tasks, budget=budget, clock=time.process_time)
+    """Print the plan of `plan` within `budget` [s] of CPU time."""
+    result = plan(instance.uavs, instance.tasks, budget=budget, clock=time.process_time)
     memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
-    print(f'{instance.name}: {budget:g} s: {len(made.unassigned)} left out, '
-          f'{made.distance / 1000:.1f} km, first answer after {1000 * made.history[0][0]:.0f} ms, '
+    print(f'{instance.name}: {budget:g} s: {len(result.unassigned)} left out, '
+          f'{result.distance / 1000:.1f} km, '
+          f'first plan after {1000 * result.history[0][0]:.0f} ms, '
           f'{memory:.0f} MB resident', flush=True)
 
 
@@ -43,17 +48,17 @@ def main() -> None:
     parser.add_argument('--budgets', default='1,10', help='[s] of CPU time, ...')
     parser.add_argument('--seeds', type=int, default=1, help='instances of each kind')
     parser.add_argument('--slack', type=float, default=SLACK, help='ranges over a fair share')
-    parser.add_argument('--rival', type=float, default=0.0, help='[s] for PyVRP; 0: not asked')
-    asked = parser.parse_args()
-    uavs, tasks = (int(each) for each in asked.size.split('x'))
-    instances = [make_instance(uavs, tasks, 11 + seed, one_base, asked.slack)
-                 for seed in range(asked.seeds) for one_base in (False, True)]
+    parser.add_argument('--rival', type=float, default=0.0, help='[s] for PyVRP; 0: not run')
+    args = parser.parse_args()
+    uavs, tasks = (int(each) for each in args.size.split('x'))
+    instances = [make_instance(uavs, tasks, 11 + seed, one_base, args.slack)
+                 for seed in range(args.seeds) for one_base in (False, True)]
     load_kernels()
     for instance in instances:
-        for budget in asked.budgets.split(','):
+        for budget in args.budgets.split(','):
             ours(instance, float(budget))
-    for instance in instances if asked.rival > 0.0 else []:
-        rival(instance, asked.rival)
+    for instance in instances if args.rival > 0.0 else []:
+        rival(instance, args.rival)
 
 
 if __name__ == '__main__':

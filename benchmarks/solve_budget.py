@@ -52,17 +52,17 @@ def random_scene(rng: np.random.Generator) -> tuple[list[Uav], list[Task], list[
     return uavs, tasks, zones
 
 
-def faults(uavs: list[Uav], tasks: list[Task], zones: list[ThreatZone], made: Plan) -> list[str]:
+def faults(uavs: list[Uav], tasks: list[Task], zones: list[ThreatZone], result: Plan) -> list[str]:
     """What is wrong with a plan, by samples on its legs and by counting its tasks."""
     rows = pack(zones, CLEARANCE).rows
     low, high = (np.stack([rows[k + end] for k in 'xy'], axis=1) for end in '01')
     places = {task.id: task.position for task in tasks}
-    served = [name for row in made.routes.values() for name in row]
-    found = [] if sorted([*served, *made.unassigned]) == sorted(places) else ['tasks lost']
-    found += [f'{name}: no reason' for name, why in made.unassigned.items() if not why]
+    served = [name for row in result.routes.values() for name in row]
+    errors = [] if sorted([*served, *result.unassigned]) == sorted(places) else ['tasks lost']
+    errors += [f'{name}: no reason' for name, why in result.unassigned.items() if not why]
     for uav in uavs:
         here, first = uav.position, True
-        for name, leg in zip(made.routes[uav.id], made.legs[uav.id], strict=False):
+        for name, leg in zip(result.routes[uav.id], result.legs[uav.id], strict=False):
             points = [here, *leg.via, places[name]]
             if first and starts_inside(here, zones, rows):
                 points = points[1:]
@@ -70,13 +70,13 @@ def faults(uavs: list[Uav], tasks: list[Task], zones: list[ThreatZone], made: Pl
             near = ((line.max(0) >= low) & (line.min(0) <= high)).all(axis=1)
             some = [zones[k] for k in np.flatnonzero(near)]
             if not math.isfinite(leg.length) or (some and violations(points, some)):
-                found.append(f'{uav.id}: the leg to {name} enters a zone')
+                errors.append(f'{uav.id}: the leg to {name} enters a zone')
             here, first = places[name], False
-    return found
+    return errors
 
 
 def starts_inside(place: tuple[float, float, float], zones: list[ThreatZone], rows: Any) -> bool:
-    """Whether a way has to leave a zone first, to its first waypoint."""
+    """Whether a path has to leave a zone first, to its first waypoint."""
     x, y, _ = place
     near = np.flatnonzero((rows['x0'] <= x) & (rows['x1'] >= x) & (rows['y0'] <= y)
                           & (rows['y1'] >= y))
@@ -92,27 +92,27 @@ def main() -> int:
     parser.add_argument('--budget', type=float, default=0.1, help='[s] (%(default)s)')
     parser.add_argument('--cpu', action='store_true',
                         help='budget and time are CPU time: for a machine with other work')
-    asked = parser.parse_args()
-    clock = time.process_time if asked.cpu else time.perf_counter
+    args = parser.parse_args()
+    clock = time.process_time if args.cpu else time.perf_counter
     load_kernels('chain_q', True)
     rows, wrong = [], []
-    for k in range(asked.scenes):
-        uavs, tasks, zones = random_scene(np.random.default_rng((asked.seed, k)))
+    for k in range(args.scenes):
+        uavs, tasks, zones = random_scene(np.random.default_rng((args.seed, k)))
         began = clock()
-        made = plan(uavs, tasks, zones, budget=asked.budget, clock=clock, clearance=CLEARANCE)
+        result = plan(uavs, tasks, zones, budget=args.budget, clock=clock, clearance=CLEARANCE)
         took = clock() - began
-        bad = faults(uavs, tasks, zones, made)
+        bad = faults(uavs, tasks, zones, result)
         wrong += [f'scene {k}: {each}' for each in bad]
-        deferred = sum('in the time' in why for why in made.unassigned.values())
+        deferred = sum('in the time' in why for why in result.unassigned.values())
         rows.append({'scene': k, 'zones': len(zones), 'tasks': len(tasks), 'uavs': len(uavs),
-                     'seconds': round(took, 4), 'unassigned': len(made.unassigned),
+                     'seconds': round(took, 4), 'unassigned': len(result.unassigned),
                      'deferred': deferred, 'faults': len(bad)})
-        print(f'{k + 1}/{asked.scenes}: {len(zones)} zones, {len(tasks)} tasks: {took:.3f} s, '
+        print(f'{k + 1}/{args.scenes}: {len(zones)} zones, {len(tasks)} tasks: {took:.3f} s, '
               f'{deferred} deferred{"; INVALID" if bad else ""}', file=sys.stderr, flush=True)
-    ratios = np.array([row['seconds'] for row in rows]) / asked.budget
+    ratios = np.array([row['seconds'] for row in rows]) / args.budget
     late = int((ratios > TIMES).sum())
     print(json.dumps({
-        'seed': asked.seed, 'budget': asked.budget, 'clock': 'cpu' if asked.cpu else 'wall',
+        'seed': args.seed, 'budget': args.budget, 'clock': 'cpu' if args.cpu else 'wall',
         'scenes': len(rows), 'late': late, 'faults': wrong,
         'ratio': {'median': float(np.median(ratios)), 'p99': float(np.percentile(ratios, 99)),
                   'worst': float(ratios.max())}, 'rows': rows}, indent=1))

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Crashes: the allocator is killed at random moments of a busy run; nothing may be lost.
+"""Crash test: the allocator is killed at random moments of a busy run; nothing may be lost.
 
     python benchmarks/endurance/crash.py [--kills 200] [--seed 1] [--json]
 
-Run after `colcon build`, in a sourced shell. A made-up fleet here flies the lists, submits tasks
-by service and by topic, withdraws some, switches UAVs off; kill -9 ends the allocator, one kill
-in eight while it still starts. After each restart all that was acknowledged must be there.
+Run after `colcon build`, in a sourced shell. A fleet without vehicles flies the lists, submits
+tasks by service and by topic, withdraws some, switches UAVs off; kill -9 ends the allocator, one
+kill in eight while it still starts. Each restart must restore all that was acknowledged.
 --json: the last line is one object, with `kills`, `tasks_lost`, `tasks_done_twice` and
 `recovery_s_p99`, from the start of the process to its first list or allocation. Ends with 1
 where something was lost or p99 is 2 s or more.
@@ -40,10 +40,10 @@ UAVS, SIDE = 5, 400.0  # number, [m]
 MOST_OPEN = 30  # tasks at once
 STARTING = 1.0 / 8.0  # share of kills before the allocator is up
 LIMIT = 20.0  # [s] for a restart
-# UDP on the loopback only: a killed process leaves shared memory behind, through which its
-# successor hears nothing for 3 s, and the discovery range LOCALHOST always adds that. Announced
-# often: else a known process answers a new one once, perhaps before that listens, and then after
-# 3 s
+# UDP on the loopback only: a killed process leaves shared memory, through which its successor
+# receives nothing for 3 s, and the discovery range LOCALHOST always adds that transport. Frequent
+# announcements: else a known process answers a new one once, perhaps before that one listens, and
+# then after 3 s
 NETWORK = """<dds xmlns="http://www.eprosima.com/XMLSchemas/fastRTPS_Profiles"><profiles>
 <transport_descriptors><transport_descriptor><transport_id>loopback</transport_id>
 <type>UDPv4</type><interfaceWhiteList><address>127.0.0.1</address></interfaceWhiteList>
@@ -53,7 +53,7 @@ NETWORK = """<dds xmlns="http://www.eprosima.com/XMLSchemas/fastRTPS_Profiles"><
 <useBuiltinTransports>false</useBuiltinTransports><builtin><discovery_config>
 <leaseAnnouncement><sec>0</sec><nanosec>100000000</nanosec></leaseAnnouncement>
 </discovery_config></builtin></rtps></participant></profiles></dds>"""
-# nothing is replayed to a new allocator but the last message: it must have the rest on disk
+# only the last message is replayed to a new allocator: it must have the rest on disk
 LAST_ONLY = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE,
                        durability=DurabilityPolicy.TRANSIENT_LOCAL)
 S, A = m.TaskStatus, m.TaskAnnouncement
@@ -63,7 +63,8 @@ class World:
     """The node around the fleet and the ledger: topics, services, and random demands."""
 
     def __init__(self, rng: random.Random) -> None:
-        self.rng, self.ledger, self.heard, self.whole = rng, Ledger(), 0.0, False
+        self.rng, self.ledger = rng, Ledger()
+        self.published_at, self.has_statuses = 0.0, False  # of this run of the allocator
         self.node = rclpy.create_node('crash')
         self.executor = SingleThreadedExecutor()
         self.executor.add_node(self.node)
@@ -72,30 +73,30 @@ class World:
             m.TaskEvent, 'task_events', EVENTS)
         self.tasks = make(A, 'task_announcements', LAST_ONLY)
         self.zones = make(m.ThreatZoneArray, 'threat_zones', LATCHED)
-        hear = self.node.create_subscription
-        hear(m.TaskStatusArray, 'task_statuses', self.on_statuses, LATCHED)
-        hear(m.Allocation, 'allocation', self.on_allocation, LATCHED)
+        subscribe = self.node.create_subscription
+        subscribe(m.TaskStatusArray, 'task_statuses', self.on_statuses, LATCHED)
+        subscribe(m.Allocation, 'allocation', self.on_allocation, LATCHED)
         self.submit = self.node.create_client(SubmitTasks, 'allocator/submit_tasks')
         self.switch = self.node.create_client(SetAvailability, 'allocator/set_availability')
         self.flyers = {f'u{k}': Flyer(f'u{k}', (SIDE / UAVS * k, 0.0), self.events.publish,
                                       self.ledger, rng) for k in range(UAVS)}
         for uav_id in self.flyers:
-            hear(m.TaskList, f'{uav_id}/task_list', self.on_list, LATCHED)
-        self.made, self._next, self.demanding = 0, dict.fromkeys('sda', 0.0), True
-        self.asked: Counter[str] = Counter()  # times that a UAV was switched
+            subscribe(m.TaskList, f'{uav_id}/task_list', self.on_list, LATCHED)
+        self.announced, self._next, self.demanding = 0, dict.fromkeys('sda', 0.0), True
+        self.switched: Counter[str] = Counter()  # times that a UAV was switched
 
     def on_statuses(self, msg: m.TaskStatusArray) -> None:
-        self.whole = True
+        self.has_statuses = True
         self.ledger.statuses(msg)
 
     def on_allocation(self, msg: m.Allocation) -> None:
-        self.heard = self.heard or time.monotonic()
+        self.published_at = self.published_at or time.monotonic()
         self.ledger.rises('allocation', msg.revision)
 
     def on_list(self, msg: m.TaskList) -> None:
-        self.heard = self.heard or time.monotonic()
+        self.published_at = self.published_at or time.monotonic()
         self.ledger.listed(msg)
-        self.flyers[msg.uav_id].told(msg, time.monotonic())
+        self.flyers[msg.uav_id].assign(msg, time.monotonic())
 
     def due(self, what: str, period: float, now: float) -> bool:
         if now < self._next[what]:
@@ -104,7 +105,7 @@ class World:
         return True
 
     def spin(self) -> None:
-        """A moment of the run."""
+        """One step of the run."""
         self.executor.spin_once(timeout_sec=0.01)
         now = time.monotonic()
         for flyer in self.flyers.values():
@@ -119,26 +120,27 @@ class World:
                                not self.demanding or self.rng.random() < 0.7)
 
     def demand(self) -> None:
-        """One random wish."""
+        """One random announcement: a withdrawal, a zone, or tasks."""
         waiting = sorted(self.ledger.accepted - set(self.ledger.ended))
-        wish = self.rng.random()
-        if wish < 0.1 and waiting:
-            self.ask(A(action=A.CANCEL, tasks=[m.Task(task_id=self.rng.choice(waiting))]))
-        elif wish < 0.15:
+        choice = self.rng.random()
+        if choice < 0.1 and waiting:
+            self.announce(A(action=A.CANCEL, tasks=[m.Task(task_id=self.rng.choice(waiting))]))
+        elif choice < 0.15:
             self.zones.publish(m.ThreatZoneArray(zones=[m.ThreatZone(
                 zone_id='z', center=Point(x=self.rng.uniform(0.0, SIDE), y=0.5 * SIDE),
                 radius=60.0)]))
         elif len(waiting) < MOST_OPEN:
-            self.ask(A(action=A.ADD, tasks=[self.task() for _ in range(self.rng.randint(1, 3))]))
+            tasks = [self.task() for _ in range(self.rng.randint(1, 3))]
+            self.announce(A(action=A.ADD, tasks=tasks))
 
     def task(self) -> m.Task:
-        self.made += 1
+        self.announced += 1
         x, y = self.rng.uniform(0.0, SIDE), self.rng.uniform(0.0, SIDE)
-        return m.Task(task_id=f't{self.made}', value=1.0, acceptance_radius=math.nan,
+        return m.Task(task_id=f't{self.announced}', value=1.0, acceptance_radius=math.nan,
                       position=Point(x=x, y=y, z=HEIGHT + 100.0))
 
-    def ask(self, announcement: A) -> None:
-        """By topic or by service."""
+    def announce(self, announcement: A) -> None:
+        """Announce by topic or by service."""
         if self.rng.random() < 0.5 or not self.submit.service_is_ready():
             self.tasks.publish(announcement)
             return
@@ -152,14 +154,14 @@ class World:
             answered)
 
     def set_available(self, uav_id: str, available: bool) -> None:
-        """An operator's word; while the last one is not answered nothing is known."""
+        """Set operator availability; unknown to the ledger until the service responds."""
         if not self.switch.service_is_ready():
             return
         self.ledger.off.pop(uav_id, None)
-        self.asked[uav_id] += 1
-        asked = self.asked[uav_id]
+        self.switched[uav_id] += 1
+        number = self.switched[uav_id]
         def answered(future) -> None:
-            if future.result().success and not available and asked == self.asked[uav_id]:
+            if future.result().success and not available and number == self.switched[uav_id]:
                 self.ledger.switched_off(uav_id)
         self.switch.call_async(SetAvailability.Request(
             uav_id=uav_id, available=available)).add_done_callback(answered)
@@ -172,7 +174,7 @@ class World:
 
 
 class Process:
-    """The allocator; it dies and comes back."""
+    """The allocator process, which is killed and restarted."""
 
     def __init__(self, folder: str) -> None:
         path = Path(get_package_prefix('uav_task_alloc'), 'lib/uav_task_alloc/allocator')
@@ -201,39 +203,40 @@ class Process:
             self._popen.wait()
 
 
-def life(world: World, process: Process, rng: random.Random,
-         last: bool) -> tuple[float, float] | None:
-    """Start, be busy, be killed.
+def run_once(world: World, process: Process, rng: random.Random,
+             last: bool) -> tuple[float, float] | None:
+    """Start the allocator, keep it busy, kill it.
 
-    Returns time and CPU time [s] until the first list, None where it was killed before.
+    Returns:
+        Time and CPU time [s] until the first list, None where it was killed before.
     """
-    world.heard, world.whole, cpu = 0.0, False, math.nan
+    world.published_at, world.has_statuses, cpu = 0.0, False, math.nan
     began = process.start()
     if not last and rng.random() < STARTING:
         world.until(lambda: False, rng.uniform(0.0, 1.0))
     else:
-        if world.until(lambda: world.heard, LIMIT):
+        if world.until(lambda: world.published_at, LIMIT):
             cpu = process.cpu()
-        if not world.until(lambda: world.heard and world.whole, LIMIT):
-            sys.exit(f'no sign of life in {LIMIT:g} s:\n{process.log.read_text()[-2000:]}')
+        if not world.until(lambda: world.published_at and world.has_statuses, LIMIT):
+            sys.exit(f'no message in {LIMIT:g} s:\n{process.log.read_text()[-2000:]}')
         world.until(lambda: False, 0.0 if last else rng.uniform(0.02, 2.5))
     if not last:
         world.ledger.killed()
         process.kill()
-    return (world.heard - began, cpu) if cpu == cpu else None
+    return (world.published_at - began, cpu) if cpu == cpu else None
 
 
 def crash(kills: int, seed: int, process: Process) -> dict[str, object]:
-    """All lives and the figures."""
+    """All runs and the figures."""
     rng, recoveries = random.Random(seed), []
     world, began = World(rng), time.monotonic()
     for k in range(kills):
-        took = life(world, process, rng, last=False)
+        took = run_once(world, process, rng, last=False)
         recoveries += [] if took is None or k == 0 else [took]
         spent = time.monotonic() - began
         print(f'\r{k + 1}/{kills} kills, {len(world.ledger.accepted)} tasks, '
               f'{spent * (kills - k - 1) / (k + 1):.0f} s to go  ', end='', file=sys.stderr)
-    recoveries += filter(None, [life(world, process, rng, last=True)])
+    recoveries += filter(None, [run_once(world, process, rng, last=True)])
     world.demanding = False
     over = world.until(lambda: world.ledger.accepted <= set(world.ledger.ended), 60.0)
     print(file=sys.stderr)
@@ -258,10 +261,10 @@ def figures(world: World, kills: int, recoveries: list[tuple[float, float]], see
         'revisions_fallen': len(ledger.faults['revisions']),
         'availability_lost': len(ledger.faults['off']),
         'tasks_acknowledged': len(ledger.accepted),
-        'tasks_never_acknowledged': world.made - len(ledger.accepted),
+        'tasks_never_acknowledged': world.announced - len(ledger.accepted),
         'tasks_completed': states[S.COMPLETED], 'tasks_cancelled': states[S.CANCELLED],
         'tasks_failed': states[S.FAILED], 'all_ended': over, 'seed': seed,
-        'faults': {name: sorted(set(found))[:5] for name, found in ledger.faults.items() if found},
+        'faults': {name: sorted(set(ids))[:5] for name, ids in ledger.faults.items() if ids},
     }
 
 
@@ -271,7 +274,7 @@ def main() -> int:
     parser.add_argument('--kills', type=int, default=200)
     parser.add_argument('--seed', type=int, default=1)
     parser.add_argument('--json', action='store_true')
-    given = parser.parse_args()
+    args = parser.parse_args()
     with domain_coordinator.domain_id() as domain, tempfile.TemporaryDirectory() as folder:
         os.environ['ROS_DOMAIN_ID'] = str(domain)
         profile = Path(folder, 'network.xml')
@@ -281,16 +284,16 @@ def main() -> int:
         rclpy.init()
         process = Process(folder)
         try:
-            found = crash(given.kills, given.seed, process)
+            result = crash(args.kills, args.seed, process)
         finally:
             process.kill()
             rclpy.shutdown()
-    for name, value in found.items():
-        print(f'{name:26} {value}', file=sys.stderr if given.json else sys.stdout)
-    if given.json:
-        print(json.dumps(found))
+    for name, value in result.items():
+        print(f'{name:26} {value}', file=sys.stderr if args.json else sys.stdout)
+    if args.json:
+        print(json.dumps(result))
     wrong = ('tasks_lost', 'tasks_done_twice', 'revisions_fallen', 'availability_lost')
-    return int(any(found[name] for name in wrong) or found['recovery_s_p99'] >= 2.0)
+    return int(any(result[name] for name in wrong) or result['recovery_s_p99'] >= 2.0)
 
 
 if __name__ == '__main__':

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A made-up fleet for crash.py, and the ledger of what an allocator has acknowledged to it."""
+"""A fleet for crash.py without vehicles, and the ledger of what an allocator has acknowledged."""
 from __future__ import annotations
 
 import math
@@ -18,7 +18,7 @@ from uav_task_alloc.nodes.conversions.messages import from_stamp
 HEIGHT = 50.0  # [m]
 FLOWN_IN = (0.1, 0.5)  # [s] a task takes
 FAILS = 0.03  # share of tasks
-HEARD = 1.0  # [s] in which a list that is under way is heard
+DELIVERED = 1.0  # [s] in which a published list is received
 S, E = m.TaskStatus, m.TaskEvent
 ENDED = (S.COMPLETED, S.CANCELLED, S.FAILED)
 
@@ -29,9 +29,9 @@ class Ledger:
     def __init__(self) -> None:
         self.accepted: set[str] = set()  # by the service, or in a status
         self.ended: dict[str, tuple[int, float]] = {}  # state, stamp [s], as published
-        # UAVs switched off: when [s] the service had answered, and what they had been told to fly
+        # UAVs switched off: time [s] of the service's response, and the tasks listed until then
         self.off: dict[str, tuple[float, set[str]]] = {}
-        self._told: dict[str, set[str]] = {}
+        self._listed: dict[str, set[str]] = {}
         self.flown: Counter[str] = Counter()
         self.revisions: dict[str, int] = {}
         self.faults: dict[str, list[str]] = {
@@ -40,83 +40,83 @@ class Ledger:
         self._must: tuple[set[str], dict[str, tuple[int, float]]] = (set(), {})
 
     def killed(self) -> None:
-        """What is acknowledged by now has to be there from now on."""
+        """Note a kill: what is acknowledged by now must be restored."""
         self._must = set(self.accepted), dict(self.ended)
 
     def statuses(self, msg: m.TaskStatusArray) -> None:
-        """Take the acknowledgements in, look for those of before the kill."""
-        found = {s.task_id: s for s in msg.statuses if s.state != S.REJECTED}
+        """Take the acknowledgements, and check for those from before the kill."""
+        known = {s.task_id: s for s in msg.statuses if s.state != S.REJECTED}
         accepted, ended = self._must
-        self.faults['lost'] += sorted(accepted - set(found))
+        self.faults['lost'] += sorted(accepted - set(known))
         self.faults['reopened'] += [
             task_id for task_id, (state, _) in ended.items()
-            if task_id in found and found[task_id].state != state]
-        self.accepted |= set(found)
+            if task_id in known and known[task_id].state != state]
+        self.accepted |= set(known)
         self.ended.update((s.task_id, (s.state, from_stamp(s.stamp)))
-                          for s in found.values() if s.state in ENDED)
+                          for s in known.values() if s.state in ENDED)
 
     def rises(self, name: str, revision: int) -> None:
-        """Revisions are never used twice."""
+        """Check that a revision is not used twice."""
         if revision <= self.revisions.get(name, 0):
             self.faults['revisions'].append(f'{name}: {self.revisions[name]}, {revision}')
         self.revisions[name] = max(revision, self.revisions.get(name, 0))
 
     def listed(self, msg: m.TaskList) -> None:
-        """No list has what ended before it was made, nor more for a UAV that was switched off."""
+        """Check that a list has no ended task, nor a new one for a UAV switched off."""
         self.rises(msg.uav_id, msg.revision)
-        made = from_stamp(msg.header.stamp)
+        published = from_stamp(msg.header.stamp)
         ids = [planned.task.task_id for planned in msg.tasks]
         self.faults['listed_again'] += [
-            t for t in ids if t in self.ended and self.ended[t][1] < made]
-        self._told[msg.uav_id] = set(ids)
+            t for t in ids if t in self.ended and self.ended[t][1] < published]
+        self._listed[msg.uav_id] = set(ids)
         when, had = self.off.get(msg.uav_id, (math.inf, set()))
-        if made <= when:
+        if published <= when:
             had.update(ids)
         elif not had.issuperset(ids):
             self.faults['off'].append(msg.uav_id)
 
     def switched_off(self, uav_id: str) -> None:
-        """The service has answered."""
-        self.off[uav_id] = time.time(), set(self._told.get(uav_id, ()))
+        """Note that the service has switched a UAV off."""
+        self.off[uav_id] = time.time(), set(self._listed.get(uav_id, ()))
 
     def done_twice(self) -> set[str]:
-        """Flown twice, heard of or not; asked for or begun again after the end was published."""
+        """Tasks flown twice, or listed or started again after their end was published."""
         return {t for t, n in self.flown.items() if n > 1} | {
             *self.faults['listed_again'], *self.faults['reopened'], *self.faults['begun_again']}
 
-    def begins(self, task_id: str) -> None:
-        """A UAV begins to fly it; that it was withdrawn in a crash it cannot know."""
+    def starts(self, task_id: str) -> None:
+        """Note that a UAV starts a task; it cannot know of a withdrawal during a crash."""
         state, when = self.ended.get(task_id, (S.CANCELLED, math.inf))
-        if state == S.COMPLETED and when < time.time() - HEARD:
+        if state == S.COMPLETED and when < time.time() - DELIVERED:
             self.faults['begun_again'].append(task_id)
 
 
 class Flyer:
-    """One UAV that flies its list, and tells; as the bridge, it remembers what it has flown."""
+    """One UAV that flies its list and publishes events; as the bridge, it keeps what is flown."""
 
     def __init__(self, uav_id: str, place: tuple[float, float],
-                 tell: Callable[[E], None], ledger: Ledger, rng: random.Random) -> None:
-        self.uav_id, self.place, self.tell, self.ledger, self.rng = (
-            uav_id, place, tell, ledger, rng)
+                 publish: Callable[[E], None], ledger: Ledger, rng: random.Random) -> None:
+        self.uav_id, self.place, self.publish, self.ledger, self.rng = (
+            uav_id, place, publish, ledger, rng)
         self.list = m.TaskList(uav_id=uav_id)
         self.flown: set[str] = set()
-        self.active, self._until, self._reminder = '', 0.0, EventRetry()
+        self.active, self._until, self._retry = '', 0.0, EventRetry()
 
-    def told(self, msg: m.TaskList, now: float) -> None:
+    def assign(self, msg: m.TaskList, now: float) -> None:
         self.list, ids = msg, [planned.task.task_id for planned in msg.tasks]
-        self._reminder.listed([TaskProgress(task_id, 'COMPLETED', msg.revision)
+        self._retry.set_ended([TaskProgress(task_id, 'COMPLETED', msg.revision)
                                for task_id in ids if task_id in self.flown], now)
         if self.active not in ids:
             self.active = ''
 
     def step(self, now: float) -> None:
         tasks = [p.task for p in self.list.tasks]
-        for again in self._reminder.step(now):
-            self.event(E.COMPLETED, again.task)
+        for retry in self._retry.step(now):
+            self.event(E.COMPLETED, retry.task)
         left = [task for task in tasks if task.task_id not in self.flown]
         if not self.active and left:
             self.active, self._until = left[0].task_id, now + self.rng.uniform(*FLOWN_IN)
-            self.ledger.begins(self.active)
+            self.ledger.starts(self.active)
             self.event(E.STARTED, self.active)
         elif self.active and now >= self._until:
             self._arrive(next(task for task in left if task.task_id == self.active))
@@ -124,7 +124,7 @@ class Flyer:
     def _arrive(self, task: m.Task) -> None:
         self.place, self.active = (task.position.x, task.position.y), ''
         if self.rng.random() < FAILS:
-            self.event(E.FAILED, task.task_id, 'made up')
+            self.event(E.FAILED, task.task_id, 'random failure')
             self.list = m.TaskList(uav_id=self.uav_id, revision=self.list.revision)
             return
         self.flown.add(task.task_id)
@@ -132,8 +132,8 @@ class Flyer:
         self.event(E.COMPLETED, task.task_id)
 
     def event(self, kind: int, task_id: str, reason: str = '') -> None:
-        self.tell(E(event=kind, task_id=task_id, uav_id=self.uav_id, reason=reason,
-                    revision=self.list.revision))
+        self.publish(E(event=kind, task_id=task_id, uav_id=self.uav_id, reason=reason,
+                       revision=self.list.revision))
 
     def state(self) -> m.UavState:
         return m.UavState(

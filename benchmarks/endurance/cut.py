@@ -2,8 +2,9 @@
 """Two machines and a wire: the allocator in one network namespace, UAV and tasks in another.
 
 Run as root in a sourced shell: `python benchmarks/endurance/cut.py --seconds 30`. The wire is cut
-for so long while tasks are announced; the last line is JSON, the status 1 where a task of before or of
-the cut is not in the UAV's list after it. Without the right to make namespaces it says `skipped`.
+for so long while tasks are announced; the last line is JSON, the status 1 where a task announced
+before or during the cut is not in the UAV's list after it. Without permission to create
+namespaces the result is `skipped`.
 """
 from __future__ import annotations
 
@@ -27,12 +28,12 @@ from uav_task_alloc.model import Task
 from uav_task_alloc.nodes.conversions.messages import ANNOUNCEMENTS, LATCHED, STATES, announcement
 
 LIMIT = 60.0  # [s]
-DOMAIN = '97'  # nobody else is on this wire
+DOMAIN = '97'  # used on this wire only
 PLACES = ('allocator', 'field')
 
 
 def ip(*words: str) -> None:
-    """Run `ip`; raise CalledProcessError with what it said."""
+    """Run `ip`; raise CalledProcessError with its output."""
     subprocess.run(['ip', *words], check=True, capture_output=True, text=True)
 
 
@@ -60,27 +61,27 @@ class Wire:
             subprocess.run(['ip', 'netns', 'del', space], capture_output=True)
 
     def start(self, place: str, *command: str, **more) -> subprocess.Popen:
-        """A process at a place, which sees the other only over the wire."""
+        """Start a process in a namespace, which reaches the other one only by the wire."""
         env = {**os.environ, 'ROS_DOMAIN_ID': DOMAIN, 'ROS_AUTOMATIC_DISCOVERY_RANGE': 'SUBNET',
-               'FASTDDS_BUILTIN_TRANSPORTS': 'UDPv4'}  # no shared memory: they are far apart
+               'FASTDDS_BUILTIN_TRANSPORTS': 'UDPv4'}  # no shared memory, as between machines
         env.pop('FASTRTPS_DEFAULT_PROFILES_FILE', None)
         return subprocess.Popen(['ip', 'netns', 'exec', self.spaces[place], sys.executable,
                                  *command], env=env, **more)
 
 
 def plug(space: str) -> None:
-    """The wire is whole."""
+    """Connect the wire."""
     ip('-n', space, 'link', 'set', 'wire', 'up')
     ip('-n', space, 'route', 'replace', '224.0.0.0/4', 'dev', 'wire')
 
 
 def unplug(space: str) -> None:
-    """The wire is cut."""
+    """Cut the wire."""
     ip('-n', space, 'link', 'set', 'wire', 'down')
 
 
 class Field:
-    """A UAV that reports, and somebody who announces."""
+    """A UAV that publishes its state, and a source of tasks."""
 
     def __init__(self) -> None:
         rclpy.init()
@@ -92,12 +93,12 @@ class Field:
         self.states = self.node.create_publisher(m.UavState, 'uav_states', STATES)
         self.list = m.TaskList()
         self.node.create_subscription(m.TaskList, 'uav/task_list', self.on_list, LATCHED)
-        self.node.create_timer(0.2, self.speak)
+        self.node.create_timer(0.2, self.publish_state)
 
     def on_list(self, msg: m.TaskList) -> None:
         self.list = msg
 
-    def speak(self) -> None:
+    def publish_state(self) -> None:
         self.states.publish(m.UavState(
             uav_id='uav', position=Point(z=50.0), home=Point(x=math.nan), battery=1.0,
             range_remaining=math.nan, cruise_speed=math.nan, available=True,
@@ -119,7 +120,7 @@ class Field:
 
 
 def in_the_field(space: str, seconds: float) -> dict[str, object]:
-    """Meet the allocator, cut the wire, announce, plug it in again."""
+    """Wait for the allocator, cut the wire, announce tasks, reconnect it."""
     field = Field()
     field.add('before')
     met = field.until(lambda: field.has('before'))
@@ -127,13 +128,13 @@ def in_the_field(space: str, seconds: float) -> dict[str, object]:
     unplug(space)
     field.until(lambda: False, seconds / 2)
     field.add('amid_1', 'amid_2')
-    heard = field.list.revision > revision
+    listed = field.list.revision > revision
     field.until(lambda: False, seconds / 2)
     plug(space)
     back = field.until(lambda: field.has('before', 'amid_1', 'amid_2'))
     field.add('after')
     then = field.until(lambda: field.has('after'))
-    return {'cut_s': seconds, 'met_s': round(met, 2), 'heard_amid': heard,
+    return {'cut_s': seconds, 'met_s': round(met, 2), 'heard_amid': listed,
             'back_s': round(back, 2), 'next_task_s': round(then, 2),
             'revisions': [revision, field.list.revision],
             'all_tasks': field.has('before', 'amid_1', 'amid_2', 'after')}
@@ -151,14 +152,14 @@ def measure(seconds: float) -> dict[str, object]:
             field = wire.start('field', __file__, '--space', wire.spaces['field'], '--seconds',
                                str(seconds), stdout=subprocess.PIPE, text=True)
             try:
-                told, _ = field.communicate(timeout=3 * LIMIT + seconds)
+                output, _ = field.communicate(timeout=3 * LIMIT + seconds)
             finally:
                 field.kill()
                 node.send_signal(signal.SIGTERM)
                 status = node.wait(30)
     except subprocess.CalledProcessError as error:
         return {'skipped': f'no network namespaces here: {error.stderr.strip()}'}
-    return {**json.loads(told.splitlines()[-1]), 'allocator_status': status}
+    return {**json.loads(output.splitlines()[-1]), 'allocator_status': status}
 
 
 def main() -> int:
@@ -166,9 +167,8 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument('--seconds', type=float, default=30.0, help='how long the wire is cut')
     parser.add_argument('--space', help=argparse.SUPPRESS)
-    given = parser.parse_args()
-    figures = (in_the_field(given.space, given.seconds) if given.space
-               else measure(given.seconds))
+    args = parser.parse_args()
+    figures = in_the_field(args.space, args.seconds) if args.space else measure(args.seconds)
     print(json.dumps(figures))
     return int('skipped' not in figures and not figures['all_tasks'])
 

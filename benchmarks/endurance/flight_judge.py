@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Judges a flight by what the simulator and the link recorded, never by what the bridge says."""
+"""Judges a flight by the records of the simulator and the link, not by the bridge's reports."""
 from __future__ import annotations
 
 import math
@@ -16,12 +16,12 @@ OURS = f'station {BRIDGE[0]}/{BRIDGE[1]}'
 ACTS = {d.MAV_CMD_DO_SET_MODE, d.MAV_CMD_COMPONENT_ARM_DISARM, d.MAV_CMD_NAV_TAKEOFF,
         d.MAV_CMD_DO_SET_MISSION_CURRENT, d.MAV_CMD_MISSION_START, d.MAV_CMD_DO_PAUSE_CONTINUE,
         d.MAV_CMD_NAV_RETURN_TO_LAUNCH, d.MAV_CMD_NAV_LAND, d.MAV_CMD_NAV_LOITER_UNLIM}
-SAME = 12.0  # [s] a mode that the bridge itself had asked for looks alike, whoever set it
-NEAR = 2.0  # [m] from a task's place: its item
+SAME = 12.0  # [s] after a mode command of the bridge the same mode may be set by either
+NEAR = 2.0  # [m] from a task: its item
 LEFT = 15.0  # [m] from a task: it has left
 STUCK = 60.0  # [s]
 PASSED = 1.5  # [s] around a set-current by another: what it crosses then may have been flown
-BEAT = 1.0  # [s] between heartbeats: a mode that ends before is not seen
+BEAT = 1.0  # [s] between heartbeats: a shorter mode is not reported
 DOUBT = 5.0  # [s] in which a change of mode on the ground may still turn out to be a restart
 
 
@@ -39,8 +39,8 @@ class Judge:
                  ) -> None:
         self.world, self.places = world, places
         self.family = 'copter' if kind == 'ardupilot' else kind
-        self.taken_at: float | None = None  # [s] somebody else has the aircraft
-        self.told_at: float | None = None  # [s] news of it has reached the bridge
+        self.taken_at: float | None = None  # [s] another has taken the aircraft
+        self.known_at: float | None = None  # [s] the bridge could know of it
         self.failing = False
         self.stubborn = False  # the operator's last hand-over was by the sticks
         self.faults: list[str] = []
@@ -50,34 +50,34 @@ class Judge:
         self._mode = self._shown = world.vehicle.flight.custom_mode
         self._mode_at = -math.inf  # [s]
         self._armed = False  # ever
-        self._asked: dict[int, float] = {}  # modes that the bridge asked for, when [s]
-        self._asked_arm, self._taken_by_arm = -math.inf, False
+        self._commanded: dict[int, float] = {}  # modes commanded by the bridge, at [s]
+        self._commanded_arm, self._taken_by_arm = -math.inf, False
         self._events = 0
         self._forgot = False  # the bridge, until its first heartbeat
-        self._set_at = -math.inf  # [s] somebody else has set the current item
+        self._set_at = -math.inf  # [s] another station has set the current item
         self._crossed: set[str] = set()  # tasks whose places it crossed at such a moment
         self._at = ''  # the task that it has reached, until it leaves: one visit
         self._stuck_since = self._moved_at = 0.0
         self._listed = world.tasks  # a new list begins a new transfer
 
     def handed_back(self) -> None:
-        """By the service, or by a pilot."""
-        self.taken_at = self.told_at = None
+        """Note a hand-over by the service or by a pilot."""
+        self.taken_at = self.known_at = None
         self.stubborn = False
         self.counts['handed_back'] += 1
 
     def rebooted(self) -> None:
-        """The vehicle: it is on the ground; where it was never armed, nobody has taken it."""
+        """Note a reboot: on the ground; an aircraft never armed is taken by no one."""
         self.failing = False
-        if not self._armed and (self.told_at is None or self.world.now - self.told_at < DOUBT):
-            self.taken_at = self.told_at = None
+        if not self._armed and (self.known_at is None or self.world.now - self.known_at < DOUBT):
+            self.taken_at = self.known_at = None
 
     def forgotten(self) -> None:
-        """The bridge was restarted without a file: on the ground it knows of nobody."""
+        """Note a restart of the bridge without a file: on the ground it forgets who took it."""
         self._forgot = True
 
     def step(self) -> None:
-        """After each tick of the world."""
+        """Judge one tick of the world."""
         if self._at and math.dist(self.places[self._at],
                                   self.world.vehicle.flight.body.position) > LEFT:
             self._at = ''
@@ -89,10 +89,10 @@ class Judge:
         if self._forgot and self.world.arrivals:  # what the first heartbeat shows
             self._forgot = False
             if self.world.vehicle.flight.landed:
-                self.taken_at = self.told_at = None
+                self.taken_at = self.known_at = None
         for sent in self.world.arrivals:
-            if self.told_at is None and self.taken_at is not None and sent > self.taken_at + 1e-6:
-                self.told_at = self.world.now
+            if self.known_at is None and self.taken_at is not None and sent > self.taken_at + 1e-6:
+                self.known_at = self.world.now
         for now, message in self.world.sent:
             self._sent(now, message)
         self._tasks()
@@ -116,12 +116,12 @@ class Judge:
             before, self._mode_at = self._shown, event.t
             if event.cause not in (OURS, 'self'):
                 self._mode_set(before, event)
-            elif event.cause == OURS and self.told_at is None:
-                self.taken_at = None  # what was sent before the news has come after it
+            elif event.cause == OURS and self.known_at is None:
+                self.taken_at = None  # a command sent before has arrived after it
         elif event.name == 'kill_switch' or (
                 event.name in ('armed', 'disarmed') and event.cause not in (OURS, 'self')):
             self._armed = True
-            if event.name != 'armed' or event.t - self._asked_arm > SAME:
+            if event.name != 'armed' or event.t - self._commanded_arm > SAME:
                 self._take(event.t)
                 self._taken_by_arm = event.name == 'armed'
         elif event.name == 'command' and event.command == 'set current' and event.cause != OURS:
@@ -144,29 +144,30 @@ class Judge:
             if airborne and self.taken_at is not None and not self.failing:
                 self.handed_back()  # the bridge has to wait before it believes that
         elif (new is not ModeClass.HOLD or was is ModeClass.MISSION) and (
-                event.t - self._asked.get(event.mode, -math.inf) > SAME) and (
+                event.t - self._commanded.get(event.mode, -math.inf) > SAME) and (
                 event.cause != 'failsafe' or airborne or self.world.vehicle.flight.armed):
             self._take(event.t)
 
     def _take(self, when: float) -> None:
         if self.world.vehicle.flight.system_status < d.MAV_STATE_STANDBY:
-            return  # it starts: a mode is not news, nobody has it yet
+            return  # booting: a mode is no intervention
         if self.taken_at is None:
-            self.taken_at, self.told_at = when, None
+            self.taken_at, self.known_at = when, None
 
     def _sent(self, now: float, message: Message) -> None:
         if not acts(message):
             return
-        if self.told_at is not None and now > self.told_at:
-            self._fault('overridden', f'{message} sent {now - self.told_at:.1f} s after the news')
+        if self.known_at is not None and now > self.known_at:
+            late = now - self.known_at
+            self._fault('overridden', f'{message} sent {late:.1f} s after the bridge could know')
         if message.get_type() == 'COMMAND_LONG' and (
                 message.command == d.MAV_CMD_COMPONENT_ARM_DISARM):
-            self._asked_arm = now
-            if self._taken_by_arm and self.told_at is None:
-                self.taken_at = None  # both have armed it: who was first cannot be seen
+            self._commanded_arm = now
+            if self._taken_by_arm and self.known_at is None:
+                self.taken_at = None  # both have armed it, in unknown order
         if message.get_type() == 'COMMAND_LONG' and message.command == d.MAV_CMD_DO_SET_MODE:
             main, sub = int(message.param2), int(message.param3)
-            self._asked[main << 16 | sub << 24 if self.family == 'px4' else main] = now
+            self._commanded[main << 16 | sub << 24 if self.family == 'px4' else main] = now
 
     def _tasks(self) -> None:
         events = self.world.events
@@ -179,7 +180,7 @@ class Judge:
                     self._fault('false_completed', f'{event.task} was never reached')
 
     def _progress(self) -> None:
-        """Stuck: the bridge says that it has the aircraft, the link is good, nothing happens."""
+        """Stuck: HELD by the bridge, the link is good, and the vehicle does not move."""
         world, state = self.world, self.world.state
         flight = world.vehicle.flight
         if math.hypot(*flight.body.velocity) > 0.3 or (

@@ -36,8 +36,8 @@ class Link:
         self._frames: list[tuple[float, int, str, float, bytes]] = []
         self._number = itertools.count()
 
-    def send(self, way: str, frame: bytes, now: float) -> None:
-        """Take a frame; an ordered link keeps the order, a lossy one does not."""
+    def send(self, direction: str, frame: bytes, now: float) -> None:
+        """Send a frame; an ordered link keeps the order, a lossy one does not."""
         if now < self.cut_until or self._rng.random() < self.loss:
             return
         delay = self.delay
@@ -45,13 +45,13 @@ class Link:
             delay *= self._rng.random()
             if self._rng.random() < LATE:
                 delay = self._rng.uniform(0.0, LATEST)
-        heapq.heappush(self._frames, (now + delay, next(self._number), way, now, frame))
+        heapq.heappush(self._frames, (now + delay, next(self._number), direction, now, frame))
 
     def due(self, now: float) -> Iterator[tuple[str, float, bytes]]:
-        """Way, time of sending [s] and frame of what arrives by now."""
+        """Direction, time of sending [s] and frame of each frame that arrives by `now`."""
         while self._frames and self._frames[0][0] <= now + 1e-9:
-            _, _, way, sent, frame = heapq.heappop(self._frames)
-            yield way, sent, frame
+            _, _, direction, sent, frame = heapq.heappop(self._frames)
+            yield direction, sent, frame
 
 
 class Store:
@@ -68,7 +68,7 @@ class Store:
 
 
 class World:
-    """Moves everything by a tick; `arrivals` and `sent` are what the judge looks at."""
+    """Moves everything by a tick; the judge reads `arrivals` and `sent`."""
 
     def __init__(self, kind: str, rng: random.Random, lossy: bool, policy: Policy,
                  **config: object) -> None:
@@ -97,7 +97,7 @@ class World:
 
     @property
     def state(self) -> UavStatus | None:
-        """What the bridge tells of the UAV; None where it has not found it."""
+        """The published state of the UAV; None before the bridge has found it."""
         session = self.ground_station.sessions.get(1)
         return None if session is None else state_of(session, self.now)
 
@@ -106,7 +106,7 @@ class World:
         self.tasks, self._assigned = tasks, False
 
     def hand_over(self) -> str:
-        """An operator calls the service; returns why it is refused."""
+        """Call the hand-over service; returns an error text, '' on success."""
         if 1 not in self.ground_station.sessions:
             return 'not found'
         return self.ground_station.hand_over('uav_1', 'operator', self.now)
@@ -117,7 +117,7 @@ class World:
             self._send_down(self.vehicle.receive(m, self.now))
 
     def step(self) -> None:
-        """Let a tick pass."""
+        """Step the world by one TICK."""
         self.now += TICK
         self.arrivals, self.sent = [], []
         self._send_down(self.vehicle.step(self.now))
@@ -125,8 +125,8 @@ class World:
         if self.tasks is not None and not self._assigned and 1 in self.ground_station.sessions:
             self._assigned = True
             self._send_up(self.ground_station.assign('uav_1', self.tasks, self.now))
-        for way, sent, frame in self.link.due(self.now):
-            if way == 'up':
+        for direction, sent, frame in self.link.due(self.now):
+            if direction == 'up':
                 for m in self._vehicle_ear.parse(frame):
                     self._send_down(self.vehicle.receive(m, self.now))
             else:

@@ -1,14 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Flights with pilots, failsafes, reboots, second stations, restarts and new lists at random.
+"""Random flights with pilots, failsafes, reboots, second stations, restarts and new lists.
 
     python benchmarks/endurance/flights.py --flights 2000 --seed 1 [--lossy] [--json]
 
 Each flight is one simulated ArduCopter or PX4 and one bridge over a link in virtual time; --lossy
-loses up to 20 % of the frames and delays some by up to 5 s, out of order. Judged by what the
-simulator and the link recorded. `flyable` counts the tasks of flights in which the aircraft is the
-bridge's in the end, `completed` those of them that it reported. --without-authority switches the
-table off, to show that the check can fail. --json: the last line is one object. Ends with 1 where
-something is wrong.
+loses up to 20 % of the frames and delays some by up to 5 s, out of order. Judged by the records
+of the simulator and the link. `flyable` counts the tasks of flights at whose end the bridge
+controls the aircraft, `completed` those of them that it reported. --without-authority disables
+the table, to show that the check can fail. --json: the last line is one object. The status is 1
+where a flight has a fault.
 """
 from __future__ import annotations
 
@@ -36,9 +36,9 @@ from uav_task_alloc.model import Task
 from uav_task_alloc.sim.modes import px4_mode
 
 LIMIT = 600.0  # [s] of a flight
-QUIET = 150.0  # [s] nothing is thrown at it from then on
+QUIET = 150.0  # [s] no random events from then on
 SIDE = 70.0  # [m] of the grid of tasks
-GIVEN_BACK = 0.85  # share of flights in which an operator gives the aircraft back
+GIVEN_BACK = 0.85  # share of flights in which an operator hands the aircraft back
 WRONG = ('false_completed', 'flown_twice', 'overridden', 'held_forever')
 HOLD = {'ardupilot': 4, 'px4': px4_mode(4, 3)}
 MISSION = {'ardupilot': 3, 'px4': px4_mode(4, 4)}
@@ -49,7 +49,7 @@ OWN = {'ardupilot': (6, 7, 9, 17, 21, 23), 'px4': (px4_mode(4, 5), px4_mode(4, 6
 
 
 class Flight:
-    """One flight: what is thrown at it, and the operator who gives it back."""
+    """One flight, its random events, and the operator who hands the aircraft back."""
 
     def __init__(self, seed: int, number: int, lossy: bool) -> None:
         self.rng = rng = random.Random(f'{seed}/{number}/{lossy}')
@@ -97,13 +97,13 @@ class Flight:
     def airborne(self) -> bool:
         return not self.vehicle.flight.landed
 
-    # what is thrown at it
+    # random events
 
     def _back_later(self) -> None:
         self.back_at = self.world.now + self.rng.uniform(5.0, 30.0)
 
     def pilot(self) -> None:
-        """Takes it over by radio control."""
+        """The pilot takes over by radio control."""
         self.counts['takeovers'] += 1
         if not self.airborne and self.rng.random() < 0.3:
             self.vehicle.rc_arm(not self.vehicle.flight.armed)
@@ -155,10 +155,10 @@ class Flight:
                      lambda: self.vehicle.avoid(False))
 
     def reboot(self) -> None:
-        """Of the vehicle; in the air only now and then."""
+        """Reboot the vehicle; in the air rarely."""
         cut = self.world.link.cut_until > self.world.now - 8.0
         if cut or (self.airborne and self.world.now < QUIET and self.rng.random() < 0.9):
-            # never right after a cut: nobody can know what it flew then
+            # never right after a cut: what it flew then is unknown
             self._at(self.world.now + 5.0, self.reboot)
             return
         self.counts['reboots'] += 1
@@ -167,9 +167,9 @@ class Flight:
         self._back_later()
 
     def restart(self) -> None:
-        """Of the bridge, most often with its state_dir."""
+        """Restart the bridge, mostly with its state_dir."""
         self.counts['restarts'] += 1
-        # without a file nobody can know what another station has passed over
+        # without a file the tasks skipped by another station are unknown
         keep = self.rng.random() < 0.8 or self.counts['skips'] > 0
         self.world.start(keep)
         if not keep:
@@ -188,7 +188,7 @@ class Flight:
     # the allocator and the operator
 
     def new_list(self) -> None:
-        """The tasks left in another order, less one that is not next, and with new ones."""
+        """List the open tasks in another order, less one that is not next, and new ones."""
         left = [name for name in self.listed if name not in self.judge.completed]
         if len(left) > 3 and self.rng.random() < 0.4:
             left.remove(self.rng.choice(left[2:]))
@@ -210,14 +210,14 @@ class Flight:
         )
 
     def shorten(self) -> None:
-        """What is completed is taken off the list, as an allocator does."""
+        """Remove the completed tasks from the list, as an allocator does."""
         left = [name for name in self.listed if name not in self.judge.completed]
         if len(left) < len(self.listed) and self.world.now >= self.shorten_at:
             self.shorten_at = self.world.now + 1.0
             self._assign(left)
 
     def operate(self) -> None:
-        """Give the aircraft back where the bridge says that it has not got it."""
+        """Hand the aircraft back where the bridge reports that it does not hold it."""
         world, state = self.world, self.world.state
         if not self.gives_back or state is None or world.now < max(
                 min(self.back_at, QUIET + 20.0), world.link.cut_until + 4.0):
@@ -229,11 +229,11 @@ class Flight:
             or state.available
         ):
             return
-        flight, way = self.vehicle.flight, self.rng.random()
-        if not self.airborne or way < 0.6 or flight.failsafes or self.judge.stubborn:
+        flight, choice = self.vehicle.flight, self.rng.random()
+        if not self.airborne or choice < 0.6 or flight.failsafes or self.judge.stubborn:
             if world.hand_over() == '':
                 self.judge.handed_back()
-        elif way < 0.8:
+        elif choice < 0.8:
             self.vehicle.rc_mode(MISSION[self.kind])
             self.judge.stubborn = True  # the next try is by the service
         else:
@@ -243,12 +243,12 @@ class Flight:
             self.judge.stubborn = True
 
     def _hold(self) -> None:
-        """From the sticks to HOLD, where nobody came in between."""
+        """From a stick mode to HOLD, unless the mode was changed since."""
         if self.vehicle.flight.custom_mode == STICK[self.kind][-1]:
             self.vehicle.rc_mode(HOLD[self.kind])
 
     def fly(self) -> None:
-        """To its end: all is flown, or time is up."""
+        """Fly until all is completed, or LIMIT."""
         world = self.world
         self.new_list()
         while world.now < LIMIT:
@@ -273,7 +273,7 @@ class Flight:
 
 
 def switch_authority_off() -> None:
-    """What the bridge would do without the table."""
+    """Disable the authority table of the bridge."""
     Authority.allows = lambda self, action: True  # type: ignore[method-assign]
     Authority.held = property(lambda self: True)  # type: ignore[assignment, method-assign]
 
@@ -303,28 +303,28 @@ def main() -> int:
     parser.add_argument('--processes', type=int, default=os.cpu_count() or 1)
     parser.add_argument('--verbose', action='store_true', help='notes of flights with faults')
     parser.add_argument('--json', action='store_true')
-    given = parser.parse_args()
-    jobs = [(given.seed, number, given.lossy, given.without_authority)
-            for number in range(given.first, given.first + given.flights)]
+    args = parser.parse_args()
+    jobs = [(args.seed, number, args.lossy, args.without_authority)
+            for number in range(args.first, args.first + args.flights)]
     total: Counter[str] = Counter()
-    with multiprocessing.Pool(given.processes) as pool:
+    with multiprocessing.Pool(args.processes) as pool:
         for done, (number, counts, faults, notes) in enumerate(
                 pool.imap_unordered(fly, jobs, chunksize=4), 1):
             total += counts
             for fault in faults:
-                print(f'\nflight {number} of seed {given.seed}: {fault}', file=sys.stderr)
-            if given.verbose and notes:
+                print(f'\nflight {number} of seed {args.seed}: {fault}', file=sys.stderr)
+            if args.verbose and notes:
                 print(f'\nflight {number}:\n  ' + '\n  '.join(notes), file=sys.stderr)
-            print(f'\r{done}/{given.flights} flights ', end='', file=sys.stderr)
+            print(f'\r{done}/{args.flights} flights ', end='', file=sys.stderr)
     print(file=sys.stderr)
     names = ('flights', 'takeovers', 'failsafes', 'reboots', 'restarts', 'handed_back',
              'completed', 'flyable', *WRONG)
-    found = {name: total[name] for name in (*names, *sorted(set(total) - set(names)))}
-    found |= {'seed': given.seed, 'lossy': given.lossy}
-    for name, value in found.items():
-        print(f'{name:20} {value}', file=sys.stderr if given.json else sys.stdout)
-    if given.json:
-        print(json.dumps(found))
+    result = {name: total[name] for name in (*names, *sorted(set(total) - set(names)))}
+    result |= {'seed': args.seed, 'lossy': args.lossy}
+    for name, value in result.items():
+        print(f'{name:20} {value}', file=sys.stderr if args.json else sys.stdout)
+    if args.json:
+        print(json.dumps(result))
     return int(any(total[name] for name in WRONG)
                or total['completed'] < 0.95 * total['flyable'])
 

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Load of the allocator: 10 000 tasks in one second, 1000 states a second from 200 UAVs.
 
-Run in a sourced shell: `python benchmarks/endurance/flood.py`. The node runs with a journal; its callbacks
-are timed from within, all else is seen from outside. The last line is JSON; the status is 1 where
-one is missed: p99 of the callbacks 50 ms, states 1 s old, every task acknowledged or refused.
+Run in a sourced shell: `python benchmarks/endurance/flood.py`. The node runs with a journal; its
+callbacks are timed in the node, all else is measured from outside. The last line is JSON; the
+status is 1 where one is missed: p99 of the callbacks 50 ms, states 1 s old, every task
+acknowledged or refused.
 """
 from __future__ import annotations
 
@@ -43,8 +44,8 @@ TIMED = ('on_state', 'on_tasks', 'on_zones', 'on_event', 'on_submit', 'on_step',
          'publish_diagnostics')
 
 
-class Watched(AllocatorNode):
-    """The allocator with a clock at every callback, and an eye on the age of states."""
+class TimedAllocator(AllocatorNode):
+    """The allocator with every callback timed, and the ages of the states recorded."""
 
     def __init__(self) -> None:
         self.took: list[tuple[str, float]] = []  # callback, [s]
@@ -65,14 +66,14 @@ class Watched(AllocatorNode):
         return timed
 
     def destroy_node(self) -> None:
-        """Write what was seen, too."""
+        """Write the measurements, too."""
         Path(os.environ['FLOOD_OUT']).write_text(json.dumps(
             {'took': self.took, 'ages': self.ages}))
         super().destroy_node()
 
 
-def speak() -> None:
-    """200 UAVs that say 5 times a second where they are, until SIGTERM."""
+def publish_states() -> None:
+    """200 UAVs that publish their states 5 times a second, until SIGTERM."""
     rclpy.init()
     node = rclpy.create_node('uavs')
     publisher = node.create_publisher(m.UavState, 'uav_states', STATES)
@@ -91,14 +92,14 @@ def speak() -> None:
 
 
 class Watch:
-    """Announces, and hears what becomes of the tasks."""
+    """Announces tasks, and receives their statuses."""
 
     def __init__(self) -> None:
         self.node = rclpy.create_node('flood')
         self.executor = SingleThreadedExecutor()
         self.executor.add_node(self.node)
         self.states: dict[str, int] = {}
-        self.heard: list[float] = []  # [s] when statuses came
+        self.received: list[float] = []  # [s] times of the statuses
         self.node.create_subscription(m.TaskStatusArray, 'task_statuses', self.on_statuses,
                                       LATCHED)
         # a writer keeps what is not acknowledged yet, so this one's depth is the whole flood
@@ -106,7 +107,7 @@ class Watch:
                                                 INPUT_ANNOUNCEMENTS)
 
     def on_statuses(self, msg: m.TaskStatusArray) -> None:
-        self.heard.append(time.monotonic())
+        self.received.append(time.monotonic())
         self.states = {status.task_id: status.state for status in msg.statuses}
 
     def until(self, condition, limit: float) -> float:
@@ -131,17 +132,17 @@ class Watch:
 
 
 def measure(watch: Watch, count: int, size: int) -> dict[str, object]:
-    """What is seen from outside."""
+    """The figures measured from outside."""
     watch.until(watch.tasks.get_subscription_count, 30.0)
     watch.until(lambda: False, REST)
-    watch.heard.clear()
+    watch.received.clear()
     spent = watch.flood(count, size)
     answered = spent + watch.until(lambda: len(watch.states) >= count, 60.0)
     planned = answered + watch.until(
         lambda: m.TaskStatus.PENDING not in watch.states.values(), 60.0)
     watch.until(lambda: False, REST)
     states = Counter(watch.states.values())
-    gaps = [b - a for a, b in zip(watch.heard, watch.heard[1:], strict=False)]
+    gaps = [b - a for a, b in zip(watch.received, watch.received[1:], strict=False)]
     return {'tasks': count, 'tasks_a_message': size, 'flood_s': spent,
             'answered_s': answered, 'planned_s': planned,
             'unanswered': count - len(watch.states),
@@ -151,23 +152,23 @@ def measure(watch: Watch, count: int, size: int) -> dict[str, object]:
             'rejected': states[m.TaskStatus.REJECTED], 'statuses_gap_s_most': max(gaps)}
 
 
-def from_within(path: Path) -> dict[str, object]:
-    """What the node itself saw."""
-    seen = json.loads(path.read_text())
-    times = sorted(seconds for _, seconds in seen['took'])
+def from_node(path: Path) -> dict[str, object]:
+    """The figures measured in the node."""
+    measured = json.loads(path.read_text())
+    times = sorted(seconds for _, seconds in measured['took'])
     calls: dict[str, list[float]] = {}
-    for name, seconds in seen['took']:
+    for name, seconds in measured['took']:
         calls.setdefault(name, []).append(seconds)
     worst = {name: {'calls': len(each), 'total_s': round(sum(each), 2),
                     'worst_ms': round(1e3 * max(each), 1)} for name, each in calls.items()}
-    ages = sorted(seen['ages'])
+    ages = sorted(measured['ages'])
     return {'callbacks': len(times), 'callback_ms_p99': 1e3 * times[int(0.99 * len(times))],
             'by_callback': worst, 'states': len(ages),
             'state_age_s_p99': ages[int(0.99 * len(ages))], 'state_age_s_max': ages[-1]}
 
 
 def start(role: str, *more: str) -> subprocess.Popen:
-    """This file again, as another process."""
+    """Run this file in another process, in a role."""
     return subprocess.Popen([sys.executable, __file__, '--role', role, *more])
 
 
@@ -177,9 +178,10 @@ def main() -> int:
     parser.add_argument('--tasks', type=int, default=10_000)
     parser.add_argument('--size', type=int, default=1, help='tasks in one announcement')
     parser.add_argument('--role', choices=('node', 'uavs'), help=argparse.SUPPRESS)
-    given, rest = parser.parse_known_args()
-    if given.role:
-        return (run(Watched, [sys.argv[0], *rest]) if given.role == 'node' else speak()) or 0
+    args, rest = parser.parse_known_args()
+    if args.role:
+        return (run(TimedAllocator, [sys.argv[0], *rest]) if args.role == 'node'
+                else publish_states()) or 0
     os.environ.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
     with tempfile.TemporaryDirectory() as folder:
         os.environ['FLOOD_OUT'] = f'{folder}/seen.json'
@@ -188,12 +190,12 @@ def main() -> int:
         uavs = start('uavs')
         rclpy.init()
         try:
-            figures = measure(Watch(), given.tasks, given.size)
+            figures = measure(Watch(), args.tasks, args.size)
         finally:
             uavs.terminate()
             node.send_signal(signal.SIGTERM)
             status = node.wait(30)
-        figures |= {'status': status, **from_within(Path(os.environ['FLOOD_OUT']))}
+        figures |= {'status': status, **from_node(Path(os.environ['FLOOD_OUT']))}
     print(json.dumps(figures))
     return int(not (figures['callback_ms_p99'] < 50.0 and figures['state_age_s_max'] < 1.0
                     and figures['unanswered'] == 0 and status == 0))

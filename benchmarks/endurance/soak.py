@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Hours of service over virtual time: tasks arrive, UAVs are lost and return, zones come and go.
 
-Run: `python benchmarks/endurance/soak.py --hours 8`. The allocator is the real one with solver and journal,
-only its clock is virtual; the UAVs fly straight and honestly. The last line is JSON; the status is
-1 where memory grew by more than 5 % (second half against first, after the warm-up), a task has
-neither end nor reason, or a list went back to what it was within 10 s without an event.
+Run: `python benchmarks/endurance/soak.py --hours 8`. The allocator is the real one with solver and
+journal, only its clock is virtual; the UAVs fly straight and without faults. The last line is
+JSON; the status is 1 where memory grew by more than 5 % (second half against first, after the
+warm-up), a task has neither end nor reason, or a list changed back within 10 s without an event.
 """
 from __future__ import annotations
 
@@ -16,8 +16,11 @@ import random
 import sys
 import tempfile
 import time
+from pathlib import Path
 
 import psutil
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from uav_task_alloc.allocator import Allocator
 from uav_task_alloc.allocator.persistence.persistence import Persistence
@@ -41,29 +44,29 @@ DRAIN = 3600.0  # [s] without new tasks at the end
 
 
 def solve(*world, max_iterations: int | None, **how) -> Plan:
-    """A solve that ends by rounds, not by a clock."""
+    """Solve for a number of iterations, not until a time."""
     return plan(*world, max_iterations=ROUNDS if max_iterations is None else max_iterations,
                 **{**how, 'budget': 60.0})
 
 
 class Flight:
-    """One UAV: flies what it was told last, straight from point to point, and says so."""
+    """One UAV: flies its last list, straight from point to point, and publishes events."""
 
     def __init__(self, name: str, place: tuple[float, float, float]) -> None:
         self.name, self.place, self.home = name, place, place
         self.list = UavList(name, 0)
         self.silent_until, self.busy_until = 0.0, 0.0  # [s]
-        self.via = 0  # detour points of the first leg behind it
+        self.via = 0  # detour points passed on the first leg
         self.started = ''
 
-    def told(self, new: UavList) -> None:
-        """A new list; the first leg goes on where its way is the same."""
+    def assign(self, new: UavList) -> None:
+        """Take a new list; the first leg continues where its path is the same."""
         old, self.list = self.list, new
         if [s.leg.via for s in old.stops[:1]] != [s.leg.via for s in new.stops[:1]]:
             self.via = 0
 
     def fly(self, now: float) -> list[TaskEvent]:
-        """One STEP on; what happened to tasks."""
+        """Fly for one STEP; returns the events of tasks."""
         if not self.list.stops:
             self._towards(self.home)
             return []
@@ -96,32 +99,32 @@ class Flight:
 
 
 class Soak:
-    """The world around an allocator, and what is counted of it."""
+    """The world around an allocator, and its figures."""
 
     def __init__(self, folder: str, seed: int) -> None:
         self.rng = random.Random(seed)
         self.params = AllocatorParams(route_end='home', keep_ended=KEEP, background_period=60.0)
-        self.keeper = Persistence(folder, print)
+        self.persistence = Persistence(folder, print)
         self.core = Allocator(self.params, 0.0)
         self.core.set_kernels_ready()
         self.world = self.core.world
         self.fleet = [Flight(f'uav_{k}', (SIDE * k / UAVS, 0.0, 50.0)) for k in range(UAVS)]
         self.open: set[str] = set()  # accepted, and not ended yet
-        self.events = 0.0  # [s] of the last thing that may change lists
+        self.events = 0.0  # [s] of the last event that may change lists
         self.before: dict[str, list[tuple[tuple[str, ...], float]]] = {}
         self.memory: list[tuple[float, int]] = []  # [s], bytes
         self.figures = dict.fromkeys(('tasks', 'completed', 'losses', 'zones', 'lists', 'solves',
                                       'flaps'), 0)
 
     def happens(self, mean: float) -> bool:
-        """Whether a thing that comes every `mean` [s] comes in this step."""
+        """Whether an event with a mean interval of `mean` [s] happens in this step."""
         return self.rng.random() < STEP / mean
 
     def place(self) -> tuple[float, float, float]:
         return self.rng.uniform(0.0, SIDE), self.rng.uniform(0.0, SIDE), 50.0
 
     def step(self, now: float, arrivals: bool) -> None:
-        """STEP of the world."""
+        """Step the world by STEP."""
         if arrivals and self.happens(ARRIVAL):
             self.figures['tasks'] += 1
             task = Task(f't{self.figures["tasks"]}', self.place(), service_time=2.0)
@@ -136,11 +139,11 @@ class Soak:
             self.figures['losses'] += 1
         for uav in self.fleet:
             if now >= uav.silent_until:
-                self.speak(uav, now)
+                self.fly(uav, now)
         self.allocate(now)
 
     def change_zones(self, now: float) -> None:
-        """One zone more, or one less."""
+        """Add or remove one zone."""
         zones = list(self.world.zones.values())
         self.figures['zones'] += 1
         if len(zones) >= MOST_ZONES or (zones and self.rng.random() < 0.5):
@@ -151,8 +154,8 @@ class Soak:
         self.world.set_zones(zones, (), now)
         self.events = now
 
-    def speak(self, uav: Flight, now: float) -> None:
-        """One UAV flies, reports, and tells what it did."""
+    def fly(self, uav: Flight, now: float) -> None:
+        """Let one UAV fly, and report its events and its state."""
         known = self.world.fleet.records.get(uav.name)
         if known is None or known.silent:
             self.events = now
@@ -178,12 +181,12 @@ class Soak:
             self.core.adopt(
                 planning.solve_problem(solve, problem, self.params, lambda: False), now, now
             )
-        self.keeper.save(self.core, now)
+        self.persistence.save(self.core, now)
         for uav_list in self.core.collect().lists.values():
-            self.listen(uav_list, now)
+            self.publish(uav_list, now)
 
-    def listen(self, uav_list: UavList, now: float) -> None:
-        """A list goes out; it flaps where it is what it was shortly before, without cause."""
+    def publish(self, uav_list: UavList, now: float) -> None:
+        """Deliver a list; it flaps where it returns to a recent one without an event."""
         self.figures['lists'] += 1
         past = self.before.setdefault(uav_list.uav, [])
         ids = uav_list.task_ids
@@ -192,10 +195,10 @@ class Soak:
         self.before[uav_list.uav] = [*past, (ids, now)][-2:]
         for uav in self.fleet:
             if uav.name == uav_list.uav:
-                uav.told(uav_list)
+                uav.assign(uav_list)
 
     def without_end_or_reason(self) -> list[str]:
-        """Tasks of which nobody can say what became of them."""
+        """Tasks without an end, a UAV or a reason."""
         records = self.world.tasks.records
         return [task_id for task_id in sorted(self.open)
                 if task_id not in records or not (records[task_id].uav or records[task_id].reason)]
@@ -206,22 +209,22 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument('--hours', type=float, default=8.0)
     parser.add_argument('--seed', type=int, default=1)
-    given = parser.parse_args()
-    end, warm = 3600.0 * given.hours, 0.25 * 3600.0 * given.hours
+    args = parser.parse_args()
+    end, warm = 3600.0 * args.hours, 0.25 * 3600.0 * args.hours
     began, process = time.process_time(), psutil.Process()
     with tempfile.TemporaryDirectory() as folder:
-        soak = Soak(folder, given.seed)
+        soak = Soak(folder, args.seed)
         for k in range(int((end + DRAIN) / STEP)):
             soak.step(k * STEP, arrivals=k * STEP < end)
             if k * STEP % 60.0 == 0.0 and warm <= k * STEP < end:
                 gc.collect()
                 soak.memory.append((k * STEP, process.memory_info().rss))
-        soak.keeper.close()
+        soak.persistence.close()
     middle = len(soak.memory) // 2
     first, second = (sum(rss for _, rss in part) / len(part) / 2**20
                      for part in (soak.memory[:middle], soak.memory[middle:]))
     lost = soak.without_end_or_reason()
-    figures = {'hours': given.hours, 'seed': given.seed, **soak.figures,
+    figures = {'hours': args.hours, 'seed': args.seed, **soak.figures,
                'still_open': len(soak.open),
                'without_end_or_reason': len(lost), 'memory_mb_first_half': round(first, 1),
                'memory_mb_second_half': round(second, 1),
