@@ -21,8 +21,8 @@ from uav_task_alloc.allocator.replanning.list_rate_limiter import ListRateLimite
 from uav_task_alloc.allocator.replanning.plan_acceptance import accepted_plan
 from uav_task_alloc.allocator.replanning.planning import (
     build_lists,
-    make_problem,
     plan_in_force,
+    replan_problem,
 )
 from uav_task_alloc.allocator.replanning.schedule import Schedule
 from uav_task_alloc.allocator.replanning.task_reasons import task_steps
@@ -99,13 +99,13 @@ class Allocator:
         if schedule.settled(now, params.settle):
             trigger = schedule.begin(now)
             if world.any_usable():
-                return make_problem(world, self._best, trigger, background=False)
+                return replan_problem(world, self._best, trigger, background=False)
             self._apply(Plan({}), trigger, True, now, stamp)
             schedule.end(now)
         elif (params.background_budget > 0.0 and schedule.rested(now, params.background_period)
               and world.any_usable() and world.any_open()):
             schedule.begin(now)
-            return make_problem(world, self._best, 'background', background=True)
+            return replan_problem(world, self._best, 'background', background=True)
         return None
 
     def _waiting(self, now: float) -> bool:
@@ -140,8 +140,8 @@ class Allocator:
         built = build_lists(world, chosen)
         world.set_built(built.zones_when_built, built.paths_home)
         self._left_out = built.left_out
-        lists = self._limiter.permitted(world.lists.lists, built.lists, world.must_change, now,
-                                        world.params.list_interval)
+        lists = self._limiter.permitted(world.lists_in_force(), built.lists, world.must_change,
+                                        now, world.params.list_interval)
         published = world.publish(lists, stamp)
         self._limiter.published(published, now)
         self._step_tasks(stamp)
@@ -159,7 +159,7 @@ class Allocator:
         world = self.world
         plan = plan_in_force(world.lists, world.tasks, self._left_out, chosen)
         world.outbox.allocation = Allocation(
-            world.next_revision(), tuple(world.lists.lists.values()), plan, trigger, stamp)
+            world.next_revision(), tuple(world.lists_in_force().values()), plan, trigger, stamp)
 
     def collect(self) -> Outbox:
         """Return what is to be published since the last call; save `rows` before it is."""
@@ -180,7 +180,7 @@ class Allocator:
 
     def knows_task(self, task_id: str) -> bool:
         """Return whether a task was accepted, and is not forgotten."""
-        return task_id in self.world.tasks.records
+        return task_id in self.world.task_records()
 
 
 def make_safe_paths(zones: Sequence[ThreatZone], params: AllocatorParams) -> SafePaths:

@@ -65,8 +65,8 @@ def _uav_warnings(fleet: Fleet) -> list[str]:
 
 def health_values(world: World, solving: bool) -> dict[str, object]:
     """Return numbers of UAVs, tasks and zones, and the revision in force, by name."""
-    states = Counter(record.state for record in world.tasks.records.values())
-    return {'UAVs known': len(world.fleet.records),
+    states = Counter(record.state for record in world.task_records().values())
+    return {'UAVs known': len(world.uav_records()),
             'UAVs available': len(world.fleet.usable_ids()),
             'zones': len(world.zones), 'revision': world.revision,
             **{f'tasks {state.name}': states[state] for state in TaskState

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from uav_task_alloc.allocator.core import Allocator
 from uav_task_alloc.allocator.records import AnnouncementAction, UavReport
-from uav_task_alloc.allocator.replanning.planning import make_problem, solve_problem
+from uav_task_alloc.allocator.replanning.planning import replan_problem, solve_problem
 from uav_task_alloc.geometry.detour import find_detour
 from uav_task_alloc.geometry.distances import Distances
 from uav_task_alloc.geometry.search_budget import SearchBudget
@@ -54,7 +54,7 @@ def _solve(allocator: Allocator, plan: Callable[..., Plan], zones: tuple[ThreatZ
     world.update_uav(UavReport('b', (0.0, 90.0, 20.0)), now=0.0, stamp=0.0)
     tasks = [Task(f't{len(zones)}_{k}', (400.0 * (k % 2), 30.0 * k, 20.0)) for k in range(4)]
     world.announce(AnnouncementAction.ADD, tasks, stamp=0.0, now=0.0)
-    problem = make_problem(world, before, 'warm-up', background=False)
+    problem = replan_problem(world, before, 'warm-up', background=False)
     allocator.schedule.begin(0.0)
     answer = solve_problem(plan, problem, world.params, stop=lambda: False)
     allocator.adopt(answer, now=_BUDGET, stamp=0.0)

@@ -102,7 +102,7 @@ class AllocatorNode(Node):
 
     def _create_topics(self) -> None:
         self.publisher = AllocationPublisher(self, self.world)
-        self.publisher.prepare(self.world.lists.lists)
+        self.publisher.prepare(self.world.lists_in_force())
         self.markers = MarkerPublisher(self, self.world)
         self.diagnostics = self.create_publisher(DiagnosticArray, '/diagnostics', 10)
         self.inputs: list[Subscription[Any]] = [

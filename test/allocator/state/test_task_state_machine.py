@@ -7,14 +7,18 @@ from allocation import AllocatorDriver
 
 from uav_task_alloc.allocator.records import ENDED_STATES, OPEN_STATES, TaskState
 from uav_task_alloc.allocator.state import task_state_machine
-from uav_task_alloc.allocator.state.task_state_machine import TRANSITIONS, TaskTransition, rule_for
+from uav_task_alloc.allocator.state.task_state_machine import (
+    TASK_TRANSITIONS,
+    TaskTransition,
+    rule_for,
+)
 
 S = TaskState
 
 
 def test_every_event_has_an_answer_in_every_state():
-    assert set(TRANSITIONS) == set(TaskTransition)
-    for row in TRANSITIONS.values():
+    assert set(TASK_TRANSITIONS) == set(TaskTransition)
+    for row in TASK_TRANSITIONS.values():
         assert set(row) == set(S)
 
 

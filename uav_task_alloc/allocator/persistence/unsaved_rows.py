@@ -24,7 +24,7 @@ def rows(world: World, state: object, most: int | None = None) -> list[JournalRo
         state: learned state of the best plan.
         most: tasks at once; None: all.
     """
-    unsaved, tasks, lists = world.unsaved(), world.tasks.records, world.lists.lists
+    unsaved, tasks, lists = world.unsaved(), world.task_records(), world.lists_in_force()
     changed = [task_row(tasks[task_id]) if task_id in tasks else JournalRow('task', task_id, None)
                for task_id in sorted(unsaved['task'])[:most]]
     changed += [list_row(lists[uav_id]) if uav_id in lists else JournalRow('list', uav_id, None)
@@ -39,8 +39,8 @@ def rows(world: World, state: object, most: int | None = None) -> list[JournalRo
 def mark_all(world: World) -> None:
     """Mark the whole world as not written."""
     unsaved = world.unsaved()
-    unsaved['task'].update(world.tasks.records)
-    unsaved['list'].update(world.lists.lists)
+    unsaved['task'].update(world.task_records())
+    unsaved['list'].update(world.lists_in_force())
     unsaved[''].update(('zones', 'off', 'revision', 'learner'))
 
 

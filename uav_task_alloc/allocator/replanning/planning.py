@@ -30,7 +30,7 @@ class BuiltLists:
     paths_home: dict[str, tuple[bool, Point]] = field(default_factory=dict)
 
 
-def make_problem(world: World, best: Plan, trigger: str, background: bool) -> ReplanProblem:
+def replan_problem(world: World, best: Plan, trigger: str, background: bool) -> ReplanProblem:
     """Return the problem for the worker; the published lists are the incumbent.
 
     Args:
@@ -56,7 +56,7 @@ def solve_problem(plan: Callable[..., Plan], problem: ReplanProblem, params: All
 
     Args:
         plan: `solver.solve.plan`, or a function like it.
-        problem: see `make_problem`.
+        problem: see `replan_problem`.
         params: of the allocator.
         stop: polled; the search ends early when it returns true.
     """
@@ -81,7 +81,7 @@ def build_lists(world: World, chosen: Plan) -> BuiltLists:
     built = BuiltLists(left_out=dict(chosen.unassigned))
     legs, returns = planned_legs(chosen), world.params.route_end == 'home'
     for uav_id, task_ids in _present_routes(world, chosen).items():
-        tasks = [world.task(task_id) for task_id in task_ids]
+        tasks = [world.task_records()[task_id].task for task_id in task_ids]
         if world.is_current(uav_id, tasks):
             built.lists[uav_id] = world.list_of(uav_id)
             continue
@@ -89,7 +89,7 @@ def build_lists(world: World, chosen: Plan) -> BuiltLists:
         built.left_out.update((task_id, f'no safe path for {uav_id}') for task_id in unreachable)
         built.zones_when_built[uav_id] = world.paths(), world.home_of(uav_id)
     # unknown UAVs, too: one that returns must not fly what others have
-    for uav_id in world.listed_uavs():
+    for uav_id in world.lists_in_force():
         if uav_id not in built.lists and not world.restart_hold:
             _build_empty(world, built, uav_id)
     return built

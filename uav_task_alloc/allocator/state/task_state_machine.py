@@ -67,7 +67,7 @@ def _on_open_or_failed(state: TaskState, reason: str) -> TransitionRow:
 
 
 _UNKNOWN, _MOVED = 'unknown task', '{uav} does not have it any more'
-TRANSITIONS: dict[TaskTransition, TransitionRow] = {
+TASK_TRANSITIONS: dict[TaskTransition, TransitionRow] = {
     _E.ADD: {
         **_on({*OPEN_STATES, *ENDED_STATES}, None, 'announced before'),
         _S.REJECTED: Rule(_S.PENDING, 'waits for the next plan'),
@@ -108,7 +108,7 @@ def rule_for(state: TaskState, event: TaskTransition, uav: str = '', why: str = 
         uav: that the event is about.
         why: reason of the event.
     """
-    rule = TRANSITIONS[event][state]
+    rule = TASK_TRANSITIONS[event][state]
     # not str.format: the reason of a message may contain braces
     return rule._replace(reason=rule.reason.replace('{uav}', uav).replace('{why}', why))
 
@@ -120,11 +120,11 @@ def task_states_markdown() -> str:
              'the next state, or in brackets why the event changes nothing.\n\n']
     parts += [f'| event | {" | ".join(state.name for state in TaskState)} |\n',
               '|---' * (len(TaskState) + 1) + '|\n']
-    for event, row in TRANSITIONS.items():
+    for event, row in TASK_TRANSITIONS.items():
         cells = [rule.state.name if rule.state else f'({rule.reason})'
                  for rule in map(row.__getitem__, TaskState)]
         parts.append(f'| {event.value} | {" | ".join(cells)} |\n')
-    arrows = {(state.name, rule.state.name) for row in TRANSITIONS.values()
+    arrows = {(state.name, rule.state.name) for row in TASK_TRANSITIONS.values()
               for state, rule in row.items() if rule.state and rule.state is not state}
     lines = ''.join(f'  {a} --> {b}\n' for a, b in sorted(arrows))
     return ''.join(parts) + f'\n```mermaid\nstateDiagram-v2\n{lines}```\n'

@@ -13,6 +13,7 @@ from uav_task_alloc.allocator.records import (
     Outbox,
     SavedState,
     TaskEvent,
+    TaskRecord,
     TaskState,
     TaskVerdict,
     UavList,
@@ -235,17 +236,21 @@ class World:
             self._paths = self._make_safe_paths(tuple(self.zones.values()), self.params)
         return self._paths
 
-    def task(self, task_id: str) -> Task:
-        """Return an accepted task."""
-        return self.tasks.records[task_id].task
+    def task_records(self) -> Mapping[str, TaskRecord]:
+        """Return the accepted tasks, by id."""
+        return self.tasks.records
+
+    def uav_records(self) -> Mapping[str, UavRecord]:
+        """Return the known UAVs, by id."""
+        return self.fleet.records
+
+    def lists_in_force(self) -> Mapping[str, UavList]:
+        """Return the list published last for each UAV, known or not."""
+        return self.lists.lists
 
     def list_of(self, uav_id: str) -> UavList:
         """Return the list in force of a UAV; one of revision 0 where none was published."""
         return self.lists.get(uav_id)
-
-    def listed_uavs(self) -> list[str]:
-        """Return the UAVs for which a list is in force, known or not."""
-        return list(self.lists.lists)
 
     def uav_record(self, uav_id: str) -> UavRecord | None:
         """Return what is known of a UAV; None where it is not known."""

@@ -135,7 +135,7 @@ class AllocationPublisher:
         """A message for every task; converts only those that have changed. O(tasks)."""
         cache, self._status_messages = self._status_messages, {}
         sources: dict[str, _StatusSource] = {
-            **self.world.tasks.records, **self.world.tasks.rejected}
+            **self.world.task_records(), **self.world.tasks.rejected}
         for task_id, source in sources.items():
             cached = cache.get(task_id)
             if cached is None or cached[0] is not source:

@@ -85,8 +85,8 @@ class MarkerPublisher:
         for uav_id in [uav_id for uav_id in self.unpublished_paths
                        if self.paths[uav_id].get_subscription_count()]:
             self.unpublished_paths.remove(uav_id)
-            self.paths[uav_id].publish(path_message(self.world.lists.get(uav_id),
-                                                    self.world.fleet.records.get(uav_id)))
+            self.paths[uav_id].publish(path_message(self.world.list_of(uav_id),
+                                                    self.world.uav_record(uav_id)))
 
     def is_due(self, now: float) -> bool:
         """Whether the published markers are out of date."""
@@ -97,7 +97,7 @@ class MarkerPublisher:
     def positions(self) -> dict[str, Point]:
         """Last reported positions of the UAVs [m]."""
         return {uav_id: record.report.position
-                for uav_id, record in self.world.fleet.records.items()}
+                for uav_id, record in self.world.uav_records().items()}
 
     def publish_markers(self, now: float) -> None:
         """Publish all markers."""
@@ -106,6 +106,6 @@ class MarkerPublisher:
         self.published_zones = list(world.zones.values())
         self.published_positions = self.positions()
         self.publisher.publish(markers(MarkerScene(
-            self.node.get_clock().now().nanoseconds * 1e-9, list(world.lists.lists.values()),
-            list(world.tasks.records.values()), world.fleet.records, self.published_zones,
+            self.node.get_clock().now().nanoseconds * 1e-9, list(world.lists_in_force().values()),
+            list(world.task_records().values()), world.uav_records(), self.published_zones,
             changed_tasks(self.previous_lists, self.last_lists), self.trigger)))
