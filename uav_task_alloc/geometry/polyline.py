@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Polylines in plain Python: length, projection, and which of the points a vehicle has passed.
 
-Imports nothing heavy (no numba, no numpy), so that a start need not wait for it.
+Imports only the standard library, so that nodes start fast.
 """
 from __future__ import annotations
 
