@@ -8,7 +8,7 @@ from collections import Counter
 from flight_world import BRIDGE, World
 from pymavlink.dialects.v20 import ardupilotmega as d
 
-from uav_task_alloc.mavlink.gcs.flight_modes import ModeClass, mode_class
+from uav_task_alloc.mavlink.gcs.flight_modes import ModeClass, avoids_traffic, mode_class
 from uav_task_alloc.mavlink.transport.codec import Message
 from uav_task_alloc.sim.config import TruthEvent
 
@@ -57,6 +57,7 @@ class Judge:
         self._set_at = -math.inf  # [s] another station has set the current item
         self._crossed: set[str] = set()  # tasks whose places it crossed at such a moment
         self._at = ''  # the task that it has reached, until it leaves: one visit
+        self._avoids = False  # it avoids other traffic by itself
         self._stuck_since = self._moved_at = 0.0
         self._listed = world.tasks  # a new list begins a new transfer
 
@@ -137,8 +138,10 @@ class Judge:
         assert event.mode is not None
         was, new = self._class(before), self._class(event.mode)
         airborne = not self.world.vehicle.flight.landed
+        avoided, self._avoids = self._avoids, avoids_traffic(self.family, event.mode)
         if new is ModeClass.MISSION:
-            if airborne and self.taken_at is not None and not self.failing:
+            # after an avoidance, a failsafe that has not changed the mode only suspends
+            if airborne and self.taken_at is not None and (avoided or not self.failing):
                 self.handed_back()
         elif new is ModeClass.HOLD and was is ModeClass.STICK:
             if airborne and self.taken_at is not None and not self.failing:

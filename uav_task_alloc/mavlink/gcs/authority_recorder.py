@@ -35,6 +35,7 @@ class AuthorityRecorder:
     ) -> None:
         self._state, self._evidence = state, evidence
         self._save, self._saved = save, record
+        self._mode = record.mode if record else None  # the last mode with a known reason
         self.marks: dict[str, TaskMark] = {m.task: m for m in record.marks} if record else {}
 
     def mark_task(self, task: str, position: Point | None, flown: bool, now: float) -> None:
@@ -51,9 +52,11 @@ class AuthorityRecorder:
         state, authority, sent = self._state, self._state.authority, self._state.sent
         if authority.undecided or authority.suspended_by(Suspension.RESTART):
             return
+        if state.unexplained is None:  # else a restarted bridge would accept the new mode
+            self._mode = state.mode
         record = AuthorityRecord(
             authority.state, authority.why, authority.since, authority.killed, authority.landed,
-            authority.until_landing, state.flown, state.mode, state.armed,
+            authority.until_landing, state.flown, self._mode, state.armed,
             tuple(dict.fromkeys(mode for mode, _ in sent.modes)),
             sent.arm_until > -math.inf and not state.armed and authority.held,
             state.replacing_since, sent.climb, tuple(self.marks.values()),

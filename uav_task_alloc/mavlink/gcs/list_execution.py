@@ -13,6 +13,7 @@ from uav_task_alloc.mavlink.gcs.status_text_log import StatusTextLog
 from uav_task_alloc.mavlink.gcs.telemetry import Telemetry
 from uav_task_alloc.mavlink.gcs.upload_hold import UploadHold
 from uav_task_alloc.mavlink.mission.diff import DiffKind, MissionDiff
+from uav_task_alloc.mavlink.mission.items import TaskList
 
 
 class ListExecution:
@@ -33,9 +34,10 @@ class ListExecution:
         self._status_text_log = status_text_log
         self._upload_hold = UploadHold(onboard, telemetry, profile)
         self._current_set = False  # the bridge has set the current item since the last flight
+        self._refused_list: TaskList | None = None  # with which mission mode was refused last
 
     def update_mission(self, now: float) -> NextMessages:
-        """Change the onboard mission to the list by the smallest transfer; None: it is."""
+        """Change the onboard mission to the list by the smallest transfer; None: no change."""
         onboard, telemetry, sender = self._onboard, self._telemetry, self._sender
         diff = onboard.diff()
         if diff.kind is DiffKind.KEEP:
@@ -97,12 +99,16 @@ class ListExecution:
             # in mission mode it would start again at the first item
             return sender.set_mode(ModeFunction.HOLD, now)
         if flying and onboard.set_current_to is None:
+            self._refused_list = None
             onboard.progress.note_mission_mode()
             self._end_of_list.end_hold()
             return sender.satisfied()
         if sender.mission_refused and not in_mission:
-            onboard.list.infeasible(self._status_text_log.last or sender.mission_refused)
+            reason = self._status_text_log.last or sender.mission_refused
             sender.mission_refused = ''
+            if self._refused_list is onboard.tasks and self._telemetry.airborne:
+                onboard.list.infeasible(reason)
+            self._refused_list = onboard.tasks  # one refusal may be of a vehicle that restarts
             return []
         if sender.backing_off(now):
             return []

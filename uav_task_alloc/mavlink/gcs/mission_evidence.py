@@ -66,7 +66,7 @@ class MissionEvidence:
             return None, None
         if self._checksum is None or self._checksum[0] is not held:
             self._checksum = held, checksum(held)
-        pending = progress.pending
+        passed = progress.passed_in_order  # credited by a restarted bridge
         return self._checksum[1], next((n for n, item in enumerate(
-            progress.items[:progress.current]) if item.task in pending),
-            progress.current) if pending else progress.current
+            progress.items[:progress.current]) if item.task in passed),
+            progress.current) if passed else progress.current

@@ -101,6 +101,7 @@ class MissionExecutor:
         resume = self.onboard.resume
         if record is not None:
             resume.recorded = record.mission, record.current
+            resume.was_disarmed = not record.armed
             # the current item may be of the replaced mission, or set by another party
             resume.current_unreliable = (
                 record.replacing_since is not None and not self.profile.atomic) or (
@@ -237,9 +238,10 @@ class MissionExecutor:
         if kind == 'GLOBAL_POSITION_INT':
             self._position(message, newest, now)
         elif kind == 'MISSION_ITEM_REACHED':
-            self.onboard.reached(message.seq - own, now)
+            self.onboard.reached(message.seq - own, now, self.telemetry.frame)
         elif kind == 'MISSION_CURRENT' and newest and self.onboard.is_of_known_mission(message):
             seq = max(0, message.seq - own)
+            self.onboard.resume.note_current(seq)
             if self.onboard.set_current_to is None:  # else seq is of the previous mission
                 progress.note_current(seq, now, flying, self.telemetry.frame)
             if (message.mission_state == d.MISSION_STATE_COMPLETE and flying

@@ -51,7 +51,7 @@ class OnboardMission:
         self.set_current_to: int | None = None  # seq to set, unless the upload has set it
         self._profile, self._origin, self._telemetry = profile, origin, telemetry
         self._done_at_start: frozenset[str] = frozenset()  # at the start of the upload
-        self._ambiguous = ReachedDuringUpload(self.progress)  # REACHED of this epoch or the next
+        self._ambiguous = ReachedDuringUpload(self.progress, origin)  # of this epoch or the next
         self._mission = VerifiedMission(self.own, profile.atomic)
         self._failures = UploadFailures(self.list, self.own, self.notes)
         self._uploading: tuple[MissionDiff, TaskList] | None = None  # with its list
@@ -186,13 +186,13 @@ class OnboardMission:
     def _done(self) -> frozenset[str]:
         return self.progress.pending.union(self.progress.completed)
 
-    def _starts_at_flown(self) -> bool:
-        """Whether an atomic replacement starts at a task that was flown in the meantime."""
+    def _repeats_flown(self) -> bool:
+        """Whether an atomic replacement has a task that was flown in the meantime."""
         if self._uploading is None or self._taken or not self._profile.atomic:
             return False
         diff = self._uploading[0]
-        first = next((item for item in diff.items[diff.start:] if item.completes), None)
-        return first is not None and first.task in self.progress.completed
+        return any(item.completes and item.task in self.progress.completed
+                   for item in diff.items[diff.start:])
 
     def next_unflown(self) -> int | None:
         """Seq to continue at during the readback of a replacement that starts at a flown task."""
@@ -223,17 +223,19 @@ class OnboardMission:
     def step(self, now: float) -> list[Message]:
         """Advance time; returns the messages to send."""
         out = self.upload.step(now)
-        if self._starts_at_flown() and not self.upload.sent_all:
+        if self._repeats_flown() and not self.upload.sent_all:
             out += self.upload.cancel(now)
         self._settle(now)
         return out
 
-    def reached(self, seq: int, now: float) -> None:
+    def reached(self, seq: int, now: float, frame: int | None = None) -> None:
         """Process MISSION_ITEM_REACHED; after all items are sent it may be of either mission."""
+        if self.held is None:
+            self.resume.note_reached(seq)
         if self._unconfirmed is not None or (self.open and self.upload.may_be_stored):
             self._ambiguous.add(seq, now)
         else:
-            self.progress.note_reached(seq, now)
+            self.progress.note_reached(seq, now, frame=frame)
 
     def is_of_known_mission(self, message: Message) -> bool:
         """Whether a MISSION_CURRENT refers to the known mission, not to one being uploaded."""

@@ -15,11 +15,21 @@ from pymavlink.dialects.v20 import ardupilotmega as d
 from uav_task_alloc.geometry.frames import Origin, to_enu
 from uav_task_alloc.mavlink.autopilots import ModeFunction, Profile
 from uav_task_alloc.mavlink.gcs.telemetry import Telemetry
-from uav_task_alloc.mavlink.mission.items import Item, MissionStop, TaskList, alike, mission_items
+from uav_task_alloc.mavlink.mission.flown_path import Visit
+from uav_task_alloc.mavlink.mission.items import (
+    Item,
+    MissionStop,
+    TaskList,
+    alike,
+    mission_items,
+    with_position,
+)
+from uav_task_alloc.mavlink.mission.position_history import LOOSE_RADIUS
 from uav_task_alloc.mavlink.mission.progress import ProgressTable
 from uav_task_alloc.model import Point, Task
 
 _NEAR = 15.0  # [m] from the last item that counts as reached
+_MAX_UNREAD = 32  # REACHED kept until the mission is read
 MAX_AGE = 60.0  # [s] after the restart; a later task at the same position is a new one
 
 
@@ -46,8 +56,11 @@ class Resume:
         self.reported: set[str] = set()  # flown and reported by the previous run
         # checksum of the mission and current item, as recorded by the previous run
         self.recorded: tuple[int | None, int | None] = None, None
+        self.was_disarmed = True  # in the last record; or there is none
         self.current_unreliable = False  # items before the current one may be unflown
         self._rebooted = False
+        # REACHED before the mission was read: seq, ENU [m] of the vehicle, None: not known
+        self._unread: list[tuple[int, Point | None]] = []
         self.reset()
 
     def rebooted(self) -> None:
@@ -58,10 +71,44 @@ class Resume:
     def reset(self) -> None:
         """Forget the location: the vehicle was restarted, or is another one."""
         self.located = False
+        self._first: int | None = None  # the current item, by the first message
+        self._skipped: frozenset[int] = frozenset()  # earlier items that were not flown
         self._old: tuple[Item, ...] = ()  # flown in the previous run
         self._epoch, self._located_at = -1, 0  # epoch and seq of the location
         self._until = -math.inf  # [s]
+        self._reached: tuple[Item, ...] = ()  # those of `_flown` with a REACHED
+        self._known_reached = 0  # how many had one at the last call of `flown_items`
         self._flown: tuple[Item, ...] = ()  # of missions that were replaced
+
+    def note_current(self, seq: int) -> None:
+        """Take a MISSION_CURRENT, home not counted; the first one tells what came before us."""
+        if not self.located and self._first is None:
+            self._first = seq
+
+    def note_reached(self, seq: int) -> None:
+        """Take a MISSION_ITEM_REACHED of a mission that is not read yet."""
+        if len(self._unread) < _MAX_UNREAD and seq not in (known for known, _ in self._unread):
+            known = self._telemetry.has_position
+            self._unread.append((seq, self._telemetry.position if known else None))
+
+    def _credit_unread(self, held: tuple[Item, ...], now: float) -> None:
+        """Credit each REACHED received before the mission was read, by the positions."""
+        reached = tuple(held[n] for n, place in self._unread if n < len(held) and self._was_near(
+            with_position(held[n], self._origin), place))
+        self._unread.clear()
+        if reached:
+            self._flown += reached
+            self._reached += reached
+            self._until = now + MAX_AGE
+
+    def _was_near(self, item: Item, place: Point | None) -> bool:
+        """Whether an item is near a position; None: near any position received so far."""
+        if item.position is None:
+            return False
+        if place is None:
+            return self._progress.path.visited_at(
+                item.position, item.radius + LOOSE_RADIUS, -math.inf) is not None
+        return math.dist(item.position, place) <= item.radius + LOOSE_RADIUS
 
     def locate(self, held: tuple[Item, ...], tasks: TaskList, now: float) -> None:
         """Locate the vehicle in its onboard mission, once.
@@ -76,18 +123,23 @@ class Resume:
             self.located = self.located or not held
             return
         self.located = True
-        if self.current_unreliable or (
+        self._credit_unread(held, now)
+        if self.current_unreliable or (self.was_disarmed and not telemetry.airborne) or (
                 not self._profile.atomic and telemetry.mode is not ModeFunction.MISSION):
             self._progress.begin(held, None, now)  # the current item may be of the old mission
+            self._epoch, self._located_at = self._progress.epoch, 0
             return
         # not by REACHED: PX4 repeats that of the previous mission for some seconds
         current = min(max(0, telemetry.current - self._profile.rules.home_first), len(held))
         if not self._profile.atomic and self._progress.items:  # REACHED was received first
             current = max(current, self._progress.current or 0)
         flown = len(held) if self._ended(held, current) else current
+        first = flown if self._first is None else min(self._first, flown)
+        self._skipped = frozenset(
+            n for n in range(first, flown) if self._was_elsewhere(held[n]))
         self._progress.begin(held, flown, now, read=True)
         self._epoch, self._located_at = self._progress.epoch, flown
-        # the previous run has reported the items before that, or knew that they were skipped
+        # the previous run has reported earlier items, or recorded that they were skipped
         same = self.recorded[0] == checksum(held)
         self._old = held[:self.recorded[1] or 0] if same else ()
         # on the ground with the first list: the onboard mission is of an earlier flight
@@ -97,9 +149,14 @@ class Resume:
     def keep_flown(self) -> None:
         """Keep the flown items of this mission before it is replaced."""
         self._flown += self._flown_here()
+        self._reached += self._reached_here()
 
     def flown_items(self, now: float) -> tuple[Item, ...]:
         """Flown items that were not reported; none after MAX_AGE."""
+        reached = len(self._reached) + len(self._reached_here())
+        if reached > self._known_reached:
+            self._until = now + MAX_AGE
+        self._known_reached = reached
         return (*self._flown, *self._flown_here()) if now < self._until else ()
 
     def flown_tasks(self, tasks: Iterable[Task], now: float) -> tuple[Task, ...]:
@@ -110,9 +167,27 @@ class Resume:
         stops = tuple(MissionStop(task) for task in tasks)
         items = mission_items(TaskList(0, stops), self._profile.rules, self._origin)
         return tuple(stop.task for stop, item in zip(stops, items, strict=True)
-                     if any(alike(item, other) and (stop.task.id in self.reported or not any(
-                         other is old for old in self._old)) for other in flown)
-                     and self.unflown.get(stop.task.id) != stop.task.position)
+                     if any(alike(item, other) and self._is_flown(stop.task, other)
+                            for other in flown))
+
+    def _is_flown(self, task: Task, item: Item) -> bool:
+        """Whether an item at a task's position was reached, or passed and not skipped."""
+        if any(item is reached for reached in (*self._reached, *self._reached_here())):
+            return True
+        return self.unflown.get(task.id) != task.position and (
+            task.id in self.reported or not any(item is old for old in self._old))
+
+    def _reached_here(self) -> tuple[Item, ...]:
+        """Those of the flown items on board of which a REACHED was received."""
+        items = self._progress.items
+        return tuple(item for item in self._flown_here() if any(
+            item is items[n] for n in self._progress.reached_seqs if n < len(items)))
+
+    def _was_elsewhere(self, item: Item) -> bool:
+        """Whether the positions since the start of this bridge show that it skipped an item."""
+        item = with_position(item, self._origin)
+        return item.position is not None and self._progress.path.visited(
+            item.position, item.radius, item.params[0], -math.inf) is Visit.NO
 
     def _flown_here(self) -> tuple[Item, ...]:
         """Flown items of the onboard mission that belong to no task of the list."""
@@ -120,7 +195,7 @@ class Resume:
         if progress.epoch != self._epoch:
             return ()  # read again: earlier items may be of an interrupted transfer
         return tuple(item for n, item in enumerate(progress.items[:progress.current or 0])
-                     if not item.task and item.position is None
+                     if not item.task and item.position is None and n not in self._skipped
                      and (n < self._located_at or n in progress.reached_seqs))
 
     def _ended(self, held: tuple[Item, ...], current: int) -> bool:

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from uav_task_alloc.errors import MissionError
-from uav_task_alloc.geometry.frames import Origin, to_geodetic_batch
+from uav_task_alloc.geometry.frames import Origin, to_enu, to_geodetic_batch
 from uav_task_alloc.mavlink.autopilots import ItemRules
 from uav_task_alloc.model import Point, Task
 
@@ -122,6 +122,21 @@ def home_item(home: Point | None, origin: Origin, rules: ItemRules) -> Item:
     """
     point = home or (0.0, 0.0, 0.0)
     return _waypoint(point, to_geodetic_batch(origin, [point]).tolist()[0], rules, '')
+
+
+def with_position(item: Item, origin: Origin) -> Item:
+    """Return an item as read from a vehicle with its position; unchanged where it has none.
+
+    Args:
+        item: without a position, as a readback gives it.
+        origin: of the ENU frame.
+    """
+    frame = _FRAME_READ_BACK.get(item.frame, item.frame)
+    if item.position is not None or frame != dialect.MAV_FRAME_GLOBAL or item.command not in (
+            dialect.MAV_CMD_NAV_WAYPOINT, dialect.MAV_CMD_NAV_LOITER_TIME):
+        return item
+    return replace(item, position=to_enu(origin, item.x * 1e-7, item.y * 1e-7, item.z),
+                   radius=item.params[1])
 
 
 def _waypoint(point: Point, geodetic: Sequence[float], rules: ItemRules, task: str) -> Item:

@@ -7,7 +7,7 @@ completed at which the vehicle's own positions were.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 from uav_task_alloc.mavlink.mission.flown_path import CLOSE, Visit
@@ -61,6 +61,16 @@ class PassedItems:
     def add(self, claim: Claim) -> None:
         """Add a claim, to be judged."""
         self._claims.append(claim)
+
+    def note_reached(self, item: Item) -> None:
+        """Note a REACHED that may be of an item: the lack of one proves nothing any more."""
+        self._claims = [replace(claim, frames=None) if any(item is one for one in claim.items)
+                        else claim for claim in self._claims]
+
+    def seen(self) -> tuple[Item, ...]:
+        """Items of open claims at which the vehicle was seen, where nothing more will come."""
+        return tuple(item for claim in self._claims for item in claim.items
+                     if self._visit(item, claim) is Visit.YES)
 
     def clear(self) -> None:
         """Drop all claims: the mission on board is unknown."""
@@ -131,7 +141,8 @@ class PassedItems:
         if claim.frame is None:
             return claim.until
         # a place passed after another station had set the current item does not count
-        return self._positions.sent_before(claim.frame, claim.until, earliest=claim.skips)
+        return min(claim.until, self._positions.sent_before(
+            claim.frame, claim.until, earliest=claim.skips))
 
 
 def flown_nearby(items: tuple[Item, ...], flown: Item) -> tuple[Item, ...]:

@@ -5,7 +5,13 @@ from __future__ import annotations
 import math
 from collections import deque
 
-from uav_task_alloc.mavlink.mission.flown_path import GAP, FlownPath, PositionSample, Visit
+from uav_task_alloc.mavlink.mission.flown_path import (
+    CLOSE,
+    GAP,
+    FlownPath,
+    PositionSample,
+    Visit,
+)
 from uav_task_alloc.mavlink.mission.items import Item
 from uav_task_alloc.model import Point
 
@@ -64,10 +70,18 @@ class PositionHistory:
         """Vehicle time [s], `since` or later, from which positions may be newer than a message."""
         return max(since, self.path.newest - MAX_MESSAGE_DELAY)
 
-    def was_at(self, item: Item, since: float, until: float = math.inf) -> bool:
-        """Whether the positions show that the vehicle has reached an item."""
+    def was_at(self, item: Item, since: float, until: float = math.inf,
+               close: float = CLOSE) -> bool:
+        """Whether the positions show that the vehicle has reached an item.
+
+        Args:
+            item: with a position, else it was not reached.
+            since: vehicle time [s].
+            until: vehicle time [s].
+            close: [m] tolerance beyond the acceptance radius.
+        """
         return item.position is not None and self.path.visited(
-            item.position, item.radius, item.params[0], since, until) is Visit.YES
+            item.position, item.radius, item.params[0], since, until, close) is Visit.YES
 
     def not_seen_at(self, item: Item, since: float) -> bool:
         """Whether it was not seen at an item, but not seen elsewhere all the time either."""
@@ -88,9 +102,13 @@ class PositionHistory:
             item.position, item.radius + LOOSE_RADIUS,
             until - MAX_MESSAGE_DELAY, until) is not None
 
+    def invalid(self, now: float) -> bool:
+        """Whether the estimate has jumped, so that the positions prove nothing."""
+        return now < self._invalid_until
+
     def can_have_reached(self, item: Item, now: float) -> bool:
         """Whether the newest position allows that an item was reached, or is not usable."""
-        if self.place is None or now - self.place[1] > _FRESH or now < self._invalid_until:
+        if self.place is None or now - self.place[1] > _FRESH or self.invalid(now):
             return True
         distance = self.distance(item)
         return math.isinf(distance) or distance <= item.radius + _REACH
@@ -105,9 +123,20 @@ class PositionHistory:
         """Whether two frames were sent within _AT_ONCE, by their order among the positions."""
         if second is None or first is None:
             return False
-        before = [t for f, t in self._stamps if f <= first]
-        return bool(before) and max(
-            t for f, t in self._stamps if f <= second) - max(before) < _AT_ONCE
+        if not any(f <= first for f, _ in self._stamps):
+            return False
+        return self._sent_at(second) - self._sent_at(first) < _AT_ONCE
+
+    def _sent_at(self, frame: int) -> float:
+        """Vehicle time [s] at which a frame was sent.
+
+        It is that of the position before it; where frames are missing since, at their mean rate.
+        """
+        before, at = max(stamp for stamp in self._stamps if stamp[0] <= frame)
+        (first, begin), (last, end) = min(self._stamps), max(self._stamps)
+        rate = (end - begin) / (last - first) if last > first else 0.0
+        missing = (frame - before) * rate
+        return at + (missing if missing > GAP else 0.0)
 
     def sent_before(self, frame: int, otherwise: float, earliest: bool) -> float:
         """Latest time at which a frame was sent, by its order among the positions.

@@ -50,8 +50,9 @@ class ProgressTable:
 
     def __init__(self, frames: FrameLog | None = None, repeats: bool = False) -> None:
         self._positions = PositionHistory()
-        self._passed = PassedItems(frames or FrameLog(), self._positions)
-        self._epochs = ReachedEpoch(self._positions, repeats)
+        self._frames, self._repeats = frames or FrameLog(), repeats
+        self._passed = PassedItems(self._frames, self._positions)
+        self._epochs = ReachedEpoch(self._positions, repeats, self._frames)
         self._currents = CurrentItemReports()
         self.path = self._positions.path
         self.epoch = 0
@@ -65,10 +66,13 @@ class ProgressTable:
         self.passed_over: deque[Item] = deque()  # passed, and not known to be flown
         self.set_by_other: int | None = None  # the current item, where another station set it
         self._started: str | None = None
+        self._left_at = -math.inf  # vehicle time [s] at which it left mission mode
         self._reached: int | None = None  # the last REACHED of this epoch
         self._after_skipped: int | None = None  # the item after those that were skipped
         self._since = -math.inf  # vehicle time [s] from which the current item is flown
         self._since_begin = -math.inf  # vehicle time [s] at which this epoch began
+        self._taken = -math.inf  # vehicle time [s] before which it was not on board
+        self._taken_frame = math.inf  # number of the last frame before it was on board
         self._end_at = -math.inf  # [s] REACHED of the last item was received
 
     @property
@@ -87,6 +91,12 @@ class ProgressTable:
     def pending(self) -> frozenset[str]:
         """Tasks that may be completed: the evidence may still arrive."""
         return frozenset(item.task for claim in self._passed.claims for item in claim.items)
+
+    @property
+    def passed_in_order(self) -> frozenset[str]:
+        """The pending tasks that were passed one by one, as a mission is flown."""
+        return frozenset(item.task for claim in self._passed.claims if not claim.skips
+                         for item in claim.items)
 
     @property
     def last_flown(self) -> int:
@@ -123,12 +133,15 @@ class ProgressTable:
         if (self.items or read) and not all_alike(self.items, items):
             self._epochs.begin(PreviousEpoch(
                 self.items, self._since, self._positions.vehicle_time(now), self.may_end(now),
-                now + REPEAT_WINDOW))
+                now + REPEAT_WINDOW, self._taken))
         self.items, self.current, self._reached = items, start, None
         self.reached_seqs.clear()
         self._currents.begin(start, now)
         self.set_by_other = None
-        self._since = self._since_begin = self.path.newest if since is None else since
+        known_since = self.path.newest if since is None else since
+        self._since = self._since_begin = -math.inf if read else known_since
+        self._taken = -math.inf if since is None else since
+        self._taken_frame = math.inf if since is None else self._frames.newest
 
     def extend(self, items: tuple[Item, ...]) -> None:
         """Begin a new epoch whose first items are those of the last one; the vehicle flies on."""
@@ -137,6 +150,8 @@ class ProgressTable:
 
     def invalidate(self) -> None:
         """End the epoch: the mission on board is unknown."""
+        for item in self._passed.seen():
+            self._complete(item.task, item.position)
         self.items, self.current, self._reached = (), None, None
         self._epochs.clear()
         self._currents.clear()
@@ -173,27 +188,39 @@ class ProgressTable:
 
     def note_mission_left(self) -> None:
         """Note that the vehicle has left the list: a task resumed later starts again."""
+        if self._started is not None:
+            self._left_at = self.path.newest
         self._started = self.set_by_other = None
 
-    def note_reached(self, seq: int, now: float, proven: bool = False) -> None:
+    def note_reached(self, seq: int, now: float, proven: bool = False,
+                     frame: int | None = None) -> None:
         """Take a MISSION_ITEM_REACHED, which may be a repetition.
 
         Args:
             seq: index without home.
             now: steady time [s] at which it was received.
             proven: whether it is known to be of this epoch.
+            frame: its number. What is sent once, after the mission was taken, is of it.
         """
+        proven = proven or (
+            frame is not None and not self._repeats and frame > self._taken_frame)
+        when = self._epochs.first_at(seq, now)
         repetition = self._epochs.note_reached(seq, now)
         if (proven or now >= self._epochs.before.until) and self.items:
             if 0 <= seq < len(self.items) and (
                     proven or self._positions.can_have_reached(self.items[seq], now)):
                 self._accept(seq, now)
-        elif not self._prove(seq, now, now, repetition) and not repetition:
-            self._epochs.unproven[seq] = now + MAX_MESSAGE_DELAY  # for a position still to arrive
+        elif not self._prove(seq, now, when, repetition) and not repetition:
+            # a position that shows it may still arrive
+            self._epochs.unproven[seq] = now + MAX_MESSAGE_DELAY, when
 
     def note_repeated(self, seq: int, now: float) -> None:
         """Note that the last REACHED was repeated, also while its epoch was unknown."""
         self._epochs.note_repeated(seq, now)
+
+    def reached_first_at(self, seq: int, now: float) -> float:
+        """See `ReachedEpoch.first_at`."""
+        return self._epochs.first_at(seq, now)
 
     def _prove(self, seq: int, now: float, when: float, repetition: bool = False) -> bool:
         """Credit a REACHED received at `when` [s] to the epoch at whose item the vehicle was.
@@ -201,8 +228,9 @@ class ProgressTable:
         Returns:
             False where the epoch is not known yet.
         """
-        epoch = CurrentEpoch(self.items, self._currents.reported, self._since, self._since_begin)
-        if 0 <= seq < len(self.items) and self._epochs.is_of_current(seq, epoch, now):
+        epoch = CurrentEpoch(self.items, self._currents.reported, self._since,
+                             self._since_begin, self._taken)
+        if 0 <= seq < len(self.items) and self._epochs.is_of_current(seq, epoch, now, when):
             self._accept(seq, now)
             return True
         item = None if repetition else self._epochs.previous_item(seq, self.items, when)
@@ -236,6 +264,8 @@ class ProgressTable:
         """Note a REACHED of this epoch or the next: the mission may have ended."""
         if seq == self.last_flown:
             self._end_at = now
+        if 0 <= seq < len(self.items):
+            self._passed.note_reached(self.items[seq])
 
     def note_current(self, seq: int, now: float, flying: bool, frame: int | None = None) -> None:
         """Take a MISSION_CURRENT; items before it are claimed to be flown.
@@ -282,8 +312,8 @@ class ProgressTable:
     def step(self, now: float) -> None:
         """Judge the open claims, and each REACHED of unknown epoch."""
         unproven = self._epochs.unproven
-        for seq, until in list(unproven.items()):
-            if self._prove(seq, now, until - MAX_MESSAGE_DELAY):
+        for seq, (until, when) in list(unproven.items()):
+            if self._prove(seq, now, when):
                 unproven.pop(seq, None)
             elif now >= until:
                 del unproven[seq]
@@ -335,6 +365,11 @@ class ProgressTable:
         """Whether an item was reached before a message received at `when` [s]."""
         return self.was_at(item, until=self._positions.vehicle_time(when))
 
+    def was_exactly_at(self, item: Item, when: float) -> bool:
+        """Whether it was within the radius of an item before a message at `when` [s]."""
+        return self._positions.was_at(
+            item, self._since, self._positions.vehicle_time(when), close=0.0)
+
     def near_one(self, item: Item, other: Item | None, when: float) -> bool:
         """Whether it was near one item, but not another, before a message at `when` [s]."""
         return self._positions.near_one(item, other, when)
@@ -348,8 +383,11 @@ class ProgressTable:
             items = self._skip_others(items, flown_nearby(items, self.items[begin]), end)
         if items:
             route = tuple(item for item in self.items[begin:] if item.position is not None)
+            until = self._positions.vehicle_time(now)
+            if self._started is None:  # positions after it left mission mode prove nothing
+                until = min(until, max(self._since, self._left_at))
             self._passed.add(Claim(
-                items, route, self._since, self._positions.vehicle_time(now),
+                items, route, self._since, until,
                 now + MAX_MESSAGE_DELAY, self.epoch,
                 self._frames_of_reached(begin, end, now, frame), frame, end - begin > 1,
                 in_flight))

@@ -14,8 +14,11 @@ from uav_task_alloc.mavlink.mission.position_history import (
     MAX_MESSAGE_DELAY,
     PositionHistory,
 )
+from uav_task_alloc.mavlink.transport.frame_log import FrameLog
 from uav_task_alloc.model import Point
 
+_MIN_PERIOD = 0.95  # [s] between two repetitions (PX4: 1 s); an earlier REACHED is a new one
+_MAX_PERIOD = 2.0  # [s] the same, where no frame is lost
 REPEAT_WINDOW = 15.0  # [s] after an upload in which a REACHED may be of the previous epoch
 
 
@@ -28,6 +31,7 @@ class PreviousEpoch:
     end: float  # vehicle time [s] at which it ended
     may_end: bool  # it was at its last item
     until: float  # [s] until when a REACHED may be of it
+    taken: float = -math.inf  # vehicle time [s] before which it was not on board
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,6 +42,7 @@ class CurrentEpoch:
     current: int | None  # the current item last reported
     since: float  # vehicle time [s] from which the current item is flown
     begin: float  # vehicle time [s] at which this epoch began
+    taken: float = -math.inf  # vehicle time [s] before which it was not on board
 
 
 _NO_EPOCH = PreviousEpoch((), -math.inf, -math.inf, False, -math.inf)
@@ -49,14 +54,19 @@ class ReachedEpoch:
     Args:
         positions: of the vehicle.
         repeats: whether the autopilot repeats REACHED (PX4).
+        frames: numbers of the frames received.
     """
 
-    def __init__(self, positions: PositionHistory, repeats: bool) -> None:
+    def __init__(self, positions: PositionHistory, repeats: bool,
+                 frames: FrameLog | None = None) -> None:
         self._positions, self._repeats = positions, repeats
+        self._frames, self._last_frame = frames or FrameLog(), 0
         self.before = _NO_EPOCH
         self.credited: int | None = None  # seq of the last REACHED, once it has completed an item
-        self.unproven: dict[int, float] = {}  # seq -> [s] until when evidence is awaited
+        # seq -> [s] until when evidence is awaited, [s] at which it was received first
+        self.unproven: dict[int, tuple[float, float]] = {}
         self._last: tuple[int, float] | None = None  # seq, received at [s], of any epoch
+        self._series_began = -math.inf  # [s] the first of the last series was received
         self._is_first = False  # the last series of repetitions was received from its start
 
     def begin(self, before: PreviousEpoch) -> None:
@@ -74,17 +84,37 @@ class ReachedEpoch:
         """Note a REACHED; returns whether it repeats the last one, which was credited (PX4)."""
         if not self._repeats:
             return False
-        repetition = (self._last is not None and self._last[0] == seq
-                      and now - self._last[1] < MAX_MESSAGE_DELAY)
+        repetition, self._series_began = self._repeats_last(seq, now), self.first_at(seq, now)
         if not repetition:  # after another one: no repetition from an earlier mission
             self.credited, self._is_first = None, self._last is not None
-        self._last = seq, now
+        elif self._series_began == now:  # too early for a repetition
+            self.credited = None
+        self._last, self._last_frame = (seq, now), self._frames.newest
         return self.credited == seq
+
+    def _repeats_last(self, seq: int, now: float) -> bool:
+        if self._last is None or self._last[0] != seq or now - self._last[1] >= MAX_MESSAGE_DELAY:
+            return False
+        # a series with a pause has ended, unless frames were lost
+        return now - self._last[1] <= _MAX_PERIOD or not self._frames.whole(
+            self._last_frame, self._frames.newest)
+
+    def first_at(self, seq: int, now: float) -> float:
+        """When [s] the first of the series was received that a REACHED continues, of any epoch.
+
+        Args:
+            seq: index without home.
+            now: steady time [s] at which it is received.
+        """
+        if self._last is None or not self._repeats or now - self._last[1] < _MIN_PERIOD:
+            return now
+        return self._series_began if self._repeats_last(seq, now) else now
 
     def note_repeated(self, seq: int, now: float) -> None:
         """Note that the last REACHED was repeated, also while its epoch was unknown."""
         if self._last is not None and self._last[0] == seq:
-            self._last = seq, now
+            self._last = seq, max(now, self._last[1])
+            self._last_frame = self._frames.newest
 
     def reached_recently(self, begin: int, end: int, now: float) -> bool:
         """Whether the last REACHED named an item in [begin, end), perhaps as a repetition."""
@@ -95,9 +125,18 @@ class ReachedEpoch:
         """Whether the previous epoch was at its last item, and has just ended."""
         return self.before.may_end and now < self.before.until - REPEAT_WINDOW + MAX_MESSAGE_DELAY
 
-    def is_of_current(self, seq: int, epoch: CurrentEpoch, now: float) -> bool:
-        """Whether a REACHED that may be of the previous epoch is of the current one."""
+    def is_of_current(self, seq: int, epoch: CurrentEpoch, now: float, when: float) -> bool:
+        """Whether a REACHED that may be of the previous epoch is of the current one.
+
+        Args:
+            seq: named by REACHED.
+            epoch: the current one.
+            now: steady time [s].
+            when: steady time [s] at which the first of its series was received.
+        """
         item, before, positions = epoch.items[seq], self.before, self._positions
+        if positions.vehicle_time(when) < epoch.taken:  # a repetition, or hidden among such
+            return positions.was_at(item, max(epoch.since, epoch.taken), close=0.0)
         if not self._repeats:  # sent once, where the vehicle is
             near = positions.can_have_reached(item, now) if not before.items else (
                 positions.distance(item) <= LOOSE_RADIUS + item.radius)
@@ -105,8 +144,9 @@ class ReachedEpoch:
         # a repetition continues while the current item stays the same
         if epoch.current is not None and epoch.current > seq:
             return positions.can_have_reached(item, now) if not before.items else (
-                item.position is not None and positions.path.visited_at(
-                    item.position, item.radius + LOOSE_RADIUS, epoch.begin) is not None)
+                positions.invalid(now) or (item.position is not None
+                and positions.path.visited_at(
+                    item.position, item.radius + LOOSE_RADIUS, epoch.begin) is not None))
         return seq == len(epoch.items) - 1 and epoch.current == seq and (
             positions.was_at(item, epoch.since) or (
                 item.position is None and self._is_first))
@@ -117,13 +157,13 @@ class ReachedEpoch:
         Args:
             seq: named by REACHED.
             items: of the current epoch.
-            when: steady time [s] at which it was received.
+            when: steady time [s] at which the first of its series was received.
 
         Returns:
             None where its epoch is unknown, or is the current one.
         """
         before, positions = self.before, self._positions
-        if not 0 <= seq < len(before.items):
+        if not 0 <= seq < len(before.items) or positions.vehicle_time(when) < before.taken:
             return None
         item = before.items[seq]
         after = items[seq] if 0 <= seq < len(items) else None
