@@ -1,0 +1,184 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What is evidence that a task was flown, and what is not; found by flights at random."""
+import pytest
+from authority_bench import BOTH, MODES, PX4, H, L, S, flying, sends_no_command, status_is
+from findings_bench import distance, drop_messages, flown_once_each, set_current
+from flight_bench import places
+from mission_bench import ORIGIN, task_list
+
+from uav_task_alloc.mavlink.autopilots import PX4 as PX4_PROFILE
+from uav_task_alloc.mavlink.mission.flown_path import PositionSample
+from uav_task_alloc.mavlink.mission.items import (
+    MissionStop,
+    TaskList,
+    mission_items,
+    with_position,
+)
+from uav_task_alloc.mavlink.mission.position_history import PositionHistory
+from uav_task_alloc.mavlink.mission.progress import ProgressTable
+from uav_task_alloc.mavlink.transport.frame_log import FrameLog
+from uav_task_alloc.model import Task
+
+SPEED = 10.0  # [m/s]
+
+
+class Flight:
+    """A progress table, fed with positions at 5 Hz along x, 50 m high."""
+
+    def __init__(self, repeats=True):
+        self.frames, self.now, self.x = FrameLog(), 0.0, 0.0
+        self.table = ProgressTable(self.frames, repeats=repeats)
+        self.stay(0.0)
+
+    def stay(self, seconds, speed=0.0):
+        for _ in range(round(5 * seconds) or 1):
+            self.now += 0.2
+            self.x += 0.2 * speed
+            self.table.add_position(PositionSample(
+                self.now, (self.x, 0.0, 50.0), (speed, 0.0, 0.0)), True, self.now)
+            self.table.step(self.now)
+
+    def fly_to(self, x):
+        self.stay(abs(x - self.x) / SPEED, SPEED if x > self.x else -SPEED)
+
+    def begin(self, **tasks):
+        """Another mission is taken by the vehicle now: tasks by name, at x [m]."""
+        stops = tuple(MissionStop(Task(name, (x, 0.0, 50.0))) for name, x in tasks.items())
+        self.table.begin(mission_items(TaskList(1, stops), PX4_PROFILE.rules, ORIGIN), 0,
+                         self.now, since=self.now)
+        self.table.note_mission_mode()
+
+
+def repeated_over_two_uploads():
+    """PX4 repeats REACHED of A while two more missions come; 8 m from B it turns to C."""
+    flight = Flight()
+    flight.begin(A=100.0, X=900.0)
+    flight.fly_to(100.0)
+    flight.table.note_reached(0, flight.now)
+    flight.begin(B=128.0, X=900.0)
+    for _ in range(2):
+        flight.stay(1.0, SPEED)
+        flight.table.note_reached(0, flight.now)
+    flight.begin(C=500.0, X=900.0)
+    flight.stay(1.0)
+    flight.table.note_reached(0, flight.now)
+    return flight
+
+
+def test_a_repetition_over_two_uploads_completes_nothing_of_the_second():
+    assert list(repeated_over_two_uploads().table.completed) == ['A']
+
+
+def test_a_reached_after_the_end_of_the_repetitions_counts():
+    flight = repeated_over_two_uploads()
+    flight.fly_to(500.0)
+    flight.table.note_reached(0, flight.now)
+    flight.table.note_current(1, flight.now, True)
+    flight.stay(1.0)
+    assert list(flight.table.completed) == ['A', 'C']
+
+
+def test_a_reboot_does_not_lose_what_the_positions_have_shown():
+    flight = Flight()
+    flight.begin(A=100.0, B=500.0)
+    flight.fly_to(100.0)
+    flight.table.note_current(1, flight.now, True)
+    flight.fly_to(110.0)
+    flight.table.invalidate()
+    assert list(flight.table.completed) == ['A']
+
+
+def test_where_it_flies_after_it_has_left_the_mission_is_no_evidence():
+    flight = Flight()
+    flight.begin(A=100.0, B=500.0, C=900.0)
+    flight.fly_to(50.0)
+    flight.table.note_mission_left()
+    flight.fly_to(150.0)  # over A, on its way home
+    flight.table.note_current(2, flight.now, False)
+    flight.stay(10.0)
+    assert list(flight.table.completed) == []
+
+
+@pytest.mark.parametrize(('frame', 'completed'), [(0, []), (1, ['B'])])
+def test_a_reached_sent_after_the_mission_was_taken_needs_no_position(frame, completed):
+    flight = Flight(repeats=False)
+    flight.begin(A=100.0)
+    taken = flight.frames.note(9, flight.now)
+    flight.begin(B=600.0)
+    flight.table.note_reached(0, flight.now, frame=taken + frame)
+    flight.stay(10.0)
+    assert list(flight.table.completed) == completed
+
+
+def test_frames_that_are_missing_are_not_sent_at_once():
+    positions = PositionHistory()
+    for n in range(50):
+        positions.add(PositionSample(0.2 * n, (0.0, 0.0, 50.0), (0.0, 0.0, 0.0)), True, 0.2 * n,
+                      4 * n)
+    assert positions.at_once(196, 200)
+    assert not positions.at_once(196, 500)
+
+
+def test_an_item_that_was_read_has_the_position_that_it_was_sent_with():
+    sent, = mission_items(TaskList(1, (MissionStop(Task('A', (300.0, 400.0, 50.0))),)),
+                          PX4_PROFILE.rules, ORIGIN)
+    read = type(sent)(sent.command, sent.frame, sent.x, sent.y, sent.z, sent.params)
+    assert with_position(read, ORIGIN).position == pytest.approx((300.0, 400.0, 50.0), abs=0.05)
+
+
+@BOTH
+def test_a_current_item_set_on_the_ground_while_no_bridge_ran_completes_nothing(kind):
+    bench = flying(kind, 'ABCD')
+    flown_once_each(bench, 'ABCD')
+    bench.vehicles[1].rc_mode(MODES[kind].rtl)
+    assert bench.run(lambda: bench.vehicles[1].flight.landed
+                     and not bench.vehicles[1].flight.armed, 200.0)
+    assert bench.hand_over() == ''
+    bench.policy = bench.executor().policy = type(bench.policy)(takeoff=False)
+    bench.assign(task_list('EFGH', 2))
+    bench.run(limit=10.0)
+    set_current(bench, 3)
+    bench.kill_and_restart(2.0)
+    bench.assign(task_list('EFGH', 3))
+    bench.run(limit=20.0)
+    assert bench.completed() == []
+
+
+@BOTH
+def test_an_item_skipped_before_the_mission_is_read_is_flown_later(kind):
+    bench = flying(kind, 'ABCDE')
+    bench.kill_and_restart(0.5)
+    begin = bench.now
+    drop_messages(bench, 'down', 'MISSION_COUNT', lambda m: bench.now < begin + 4.0)
+    bench.assign(task_list('ABCDE', 2))
+    bench.run(limit=2.0)
+    assert places(bench) == []
+    set_current(bench, 3)
+    flown_once_each(bench, 'ABCDE')
+
+
+@BOTH
+def test_a_reached_before_the_mission_is_read_counts_when_the_vehicle_reboots_then(kind):
+    bench = flying(kind, 'ABC')
+    bench.run(lambda: distance(bench, (0.0, 100.0, 50.0)) < 25.0)
+    bench.kill_and_restart(0.0)
+    begin = bench.now
+    drop_messages(bench, 'down', 'MISSION_COUNT', lambda m: bench.now < begin + 12.0)
+    bench.assign(task_list('ABC', 2))
+    assert bench.run(lambda: places(bench) == ['A'], 11.0)
+    bench.run(limit=0.5)
+    bench.vehicles[1].reboot(bench.now)
+    assert bench.run(lambda: bench.completed() == ['A'], 60.0)
+
+
+@PX4
+@pytest.mark.parametrize('seconds', [0.0, 2.0])
+def test_a_mode_that_nothing_has_explained_is_not_accepted_by_a_restarted_bridge(kind, seconds):
+    bench = flying(kind, 'A')
+    bench.vehicles[1].rc_mode(MODES[kind].rtl)
+    assert bench.run(lambda: bench.authority() is not H, 3.0)
+    assert bench.authority() is S
+    bench.kill_and_restart(seconds)
+    bench.run(limit=1.0)
+    assert status_is(bench, L)
+    assert sends_no_command(bench, names='ABC')
