@@ -12,6 +12,7 @@ from geometry_msgs.msg import Vector3
 from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker, MarkerArray
 
+from uav_task_alloc import palette
 from uav_task_alloc.allocator.records import TaskRecord, TaskState, UavList
 from uav_task_alloc.allocator.state.fleet import UavRecord
 from uav_task_alloc.model import Point, ThreatZone
@@ -20,14 +21,10 @@ from uav_task_alloc.nodes.conversions.path_messages import remaining_path
 from uav_task_alloc.nodes.rviz import zone_markers
 
 _Colour = tuple[float, float, float]
-# distinct on a dark background, also for colour-blind people
-_UAV_COLOURS: tuple[_Colour, ...] = (
-    (0.0, 0.45, 0.7), (0.9, 0.6, 0.0), (0.0, 0.62, 0.45), (0.8, 0.4, 0.7), (0.35, 0.7, 0.9),
-    (0.84, 0.37, 0.0))
-_STATE_COLOURS: dict[TaskState, _Colour] = {  # cancelled and rejected tasks have none
-    TaskState.PENDING: (0.7, 0.7, 0.7), TaskState.ASSIGNED: (0.35, 0.7, 0.9),
-    TaskState.ACTIVE: (0.95, 0.9, 0.25), TaskState.UNASSIGNED: (0.8, 0.4, 0.7),
-    TaskState.FAILED: (0.84, 0.37, 0.0), TaskState.COMPLETED: (0.0, 0.62, 0.45)}
+_UAV_COLOURS = tuple(map(palette.rgb, palette.UAV_COLOURS_ON_DARK))
+_STATE_COLOURS: dict[TaskState, _Colour] = {  # cancelled and rejected tasks are not drawn
+    state: palette.rgb(colour) for state in TaskState
+    if (colour := palette.STATE_COLOURS_ON_DARK.get(state.name))}
 _ZONE, _CHANGED = (0.8, 0.1, 0.1), (1.0, 0.2, 0.8)
 _UNAVAILABLE, _WHITE = (0.45, 0.45, 0.45), (1.0, 1.0, 1.0)
 _TASK_SIZES = (0.7, 1.0, 1.4, 2.0)  # by value, in units
