@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Commands of the docs looked over: are the program, its parameters and its options there?"""
+"""Check of commands in the docs: whether the program, its parameters and its options exist."""
 import contextlib
 import importlib.util
 import io
@@ -17,13 +17,13 @@ import yaml
 from uav_task_alloc import __main__ as cli, params
 
 ROOT = Path(__file__).parent.parent
-# those of others, which a page may name where it says what it needs
+# programs of other packages
 FOREIGN = {'.', 'cd', 'source', 'export', 'git', 'pip', 'rosdep', 'colcon', 'mkdir', 'ls', 'cat',
            'sim_vehicle.py', 'px4', 'arducopter', 'rviz2', 'xdg-open', 'pytest', 'dask', 'sudo'}
 
 
 def commands(text):
-    """The commands of a block as lists of words; settings before them are left out."""
+    """The commands of a block as lists of words, without variables set before them."""
     for line in text.replace('\\\n', ' ').splitlines():
         words = shlex.split(line, comments=True)
         for part in _parts(words):
@@ -43,8 +43,8 @@ def _parts(words):
             part.append(word)
 
 
-def complaint(words):
-    """What is wrong with a command; '' where nothing is."""
+def error_in(words):
+    """The error in a command; '' where there is none."""
     name, *rest = words
     if name == 'make':
         return _make(rest)
@@ -52,7 +52,7 @@ def complaint(words):
         return _python(rest)
     if name == 'ros2':
         return _ros2(rest)
-    return '' if Path(name).name in FOREIGN else f'{name}: expected a program that is known'
+    return '' if Path(name).name in FOREIGN else f'{name}: expected a known program'
 
 
 def _make(rest):
@@ -83,7 +83,7 @@ def _command(rest):
 
 @cache
 def help_of(*words):
-    """What `-h` behind these words prints."""
+    """The output of these words followed by `-h`."""
     out = io.StringIO()
     if words[0] in ('params', 'compile'):
         return '--write'
@@ -126,5 +126,5 @@ def _launch(name, rest):
             nodes = launch_stand_in.commands(path, dict(word.split(':=', 1) for word in rest))
     except KeyError as error:
         return str(error.args[0])
-    found = [_run(node[1], node[2:]) for node in nodes if node[0] == 'uav_task_alloc']
-    return next(filter(None, found), '')
+    errors = [_run(node[1], node[2:]) for node in nodes if node[0] == 'uav_task_alloc']
+    return next(filter(None, errors), '')

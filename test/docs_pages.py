@@ -1,15 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Pages of the docs taken apart into blocks, with what their marks say about how to test them.
+"""Parser of the docs: the blocks of a page, and the marks that say how to test them.
 
-A mark is a comment on the line before a block, which a reader of the page does not see:
+A mark is a comment on the line before a block, invisible to readers of the page:
 
-    <!-- file: NAME -->    the block is written to NAME, in the folder that its page runs in
-    <!-- until: TEXT -->   the commands run on in the background, once they have printed TEXT
-    <!-- fails: TEXT -->   the commands end with an error that holds TEXT
-    <!-- needs: WHAT -->   WHAT is not here: the commands are only looked over
-    <!-- says: WHAT -->    not to be run: what commands, files or people say
+    <!-- file: NAME -->    the block is written to NAME, in the working directory of its page
+    <!-- until: TEXT -->   the commands stay in the background once they have printed TEXT
+    <!-- fails: TEXT -->   the commands end with an error that contains TEXT
+    <!-- needs: WHAT -->   WHAT is not available: only names and options are checked
+    <!-- says: WHAT -->    an example of output or of a file: not run
 
-Without one, `bash` and `python` blocks run, in order, and `yaml` and `json` blocks are read.
+Without a mark, `bash` and `python` blocks run, in order, and `yaml` and `json` blocks are parsed.
 """
 import re
 from dataclasses import dataclass
@@ -25,7 +25,7 @@ _FENCE = re.compile(r'```(\w*)$')
 
 @dataclass(frozen=True)
 class Block:
-    """What stands between two fences."""
+    """The text between two fences."""
 
     page: Path
     line: int  # of the first fence
@@ -39,8 +39,8 @@ class Block:
 
 
 def blocks(page):
-    """The blocks of a page in order; AssertionError where a fence stays open."""
-    found, mark, opened = [], ('', ''), None
+    """The blocks of a page in order. Raises AssertionError for an open fence."""
+    parsed, mark, opened = [], ('', ''), None
     lines = page.read_text().splitlines()
     for number, line in enumerate(lines, 1):
         fence = _FENCE.match(line)
@@ -48,13 +48,13 @@ def blocks(page):
             opened = number, fence[1]
         elif opened is not None and line == '```':
             text = '\n'.join(lines[opened[0]:number - 1]) + '\n'
-            found.append(Block(page, *opened, text, *mark))
+            parsed.append(Block(page, *opened, text, *mark))
             opened, mark = None, ('', '')
         elif opened is None and line:
             match = _MARK.fullmatch(line)
             mark = match.groups() if match else ('', '')
     assert opened is None, f'{page}:{opened[0]}: expected a closing fence'
-    return found
+    return parsed
 
 
 def prose(page):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Every command, snippet, link and quoted error of the docs is tried; docs_pages.py says how."""
+"""Every command, snippet, link and quoted error of the docs is tested; see docs_pages.py."""
 import ast
 import importlib.util
 import json
@@ -23,7 +23,7 @@ from uav_task_alloc import scenario
 
 BLOCKS = [block for page in PAGES for block in blocks(page)]
 NO_ROS = importlib.util.find_spec('rclpy') is None
-PATIENCE = 120.0  # [s] for one block, which takes one or two on a machine at rest
+TIMEOUT = 120.0  # [s] of one block, which takes one or two on an idle machine
 
 
 def by_name(page):
@@ -40,10 +40,10 @@ def free_port(kind):
         return probe.getsockname()[1]
 
 
-class Place:
-    """A folder like the repository in which what a page says is done; it is thrown away.
+class Sandbox:
+    """A temporary folder like the repository, in which the blocks of a page are run.
 
-    Ports that a page names are replaced by free ones, so that two runs do not meet.
+    The ports that a page names are replaced by free ones, so that runs do not interfere.
     """
 
     def __init__(self, folder, stack):
@@ -76,8 +76,8 @@ class Place:
         kind = socket.SOCK_STREAM if match[1] == 'port:=' else socket.SOCK_DGRAM
         return match[1] + str(self.ports.setdefault(match[2], free_port(kind)))
 
-    def do(self, block):
-        """What the mark and the language of a block ask for."""
+    def apply(self, block):
+        """Run, write or skip a block, by its mark and language."""
         if block.mark == 'file':
             path = self.folder / block.what
             assert not path.exists(), f'{block}: {block.what} is there already'
@@ -95,9 +95,9 @@ class Place:
             (self.start if block.mark == 'until' else self.run)(block, words)
 
     def run(self, block, words):
-        """To the end, which must be good unless it is said to fail."""
+        """Run to the end: the status must be 0 unless the mark is `fails`."""
         done = subprocess.run(words, cwd=self.folder, env=self.env, stdout=subprocess.PIPE,
-                              stderr=subprocess.STDOUT, text=True, timeout=PATIENCE, check=False)
+                              stderr=subprocess.STDOUT, text=True, timeout=TIMEOUT, check=False)
         if block.mark == 'fails':
             assert done.returncode != 0, f'{block}: expected it to fail\n{done.stdout}'
             assert block.what in done.stdout, f'{block}:\n{done.stdout}'
@@ -105,24 +105,24 @@ class Place:
             assert done.returncode == 0, f'{block}: status {done.returncode}\n{done.stdout}'
 
     def start(self, block, words):
-        """In the background, until the page is done; it must print what is said."""
+        """Run in the background to the end of the page; it must print the text of the mark."""
         log = self.folder / f'.log_{block.line}'
         with open(log, 'w') as file:
             process = subprocess.Popen(words, cwd=self.folder, env=self.env, stdout=file,
                                        stderr=subprocess.STDOUT, start_new_session=True)
         self.stack.callback(self.stop, block, process, log)
-        end = time.monotonic() + PATIENCE
+        end = time.monotonic() + TIMEOUT
         while block.what not in log.read_text():
             assert process.poll() is None, f'{block}: has ended\n{log.read_text()}'
             assert time.monotonic() < end, f'{block}: timed out\n{log.read_text()}'
-            time.sleep(0.05)  # between two looks at a file that somebody else writes
+            time.sleep(0.05)  # polling a file that another process writes
 
     def stop(self, block, process, log):
-        """Ctrl-C, as a reader would; the group is the process's own."""
+        """Stop with Ctrl-C; the process has its own group."""
         if process.poll() is None:
             os.killpg(process.pid, signal.SIGINT)
         try:
-            process.wait(PATIENCE)
+            process.wait(TIMEOUT)
         except subprocess.TimeoutExpired:
             os.killpg(process.pid, signal.SIGKILL)
             process.wait()
@@ -131,19 +131,19 @@ class Place:
 
 
 @pytest.mark.parametrize('page', PAGES, ids=by_name)
-def test_what_a_page_tells_to_do_works(page, tmp_path):
+def test_the_commands_of_a_page_work(page, tmp_path):
     with ExitStack() as stack:
-        place = Place(tmp_path, stack)
+        sandbox = Sandbox(tmp_path, stack)
         for block in blocks(page):
-            place.do(block)
+            sandbox.apply(block)
 
 
 @pytest.mark.parametrize('block', [b for b in BLOCKS if b.language == 'bash'], ids=str)
-def test_the_programs_and_options_of_a_command_are_there(block):
+def test_the_programs_and_options_of_a_command_exist(block):
     if block.mark == 'fails':
         return
     for words in docs_commands.commands(block.text):
-        assert docs_commands.complaint(words) == '', ' '.join(words)
+        assert docs_commands.error_in(words) == '', ' '.join(words)
 
 
 @pytest.mark.parametrize('block', [b for b in BLOCKS if b.language == 'python'], ids=str)
@@ -152,7 +152,7 @@ def test_a_snippet_is_python(block):
 
 
 @pytest.mark.parametrize('block', [b for b in BLOCKS if b.language in ('yaml', 'json')], ids=str)
-def test_a_file_that_is_shown_can_be_read(block, tmp_path):
+def test_a_file_shown_in_a_page_can_be_read(block, tmp_path):
     read = yaml.safe_load(block.text) if block.language == 'yaml' else json.loads(block.text)
     if 'uavs' in read and not block.mark:
         (tmp_path / 'shown.yaml').write_text(block.text)
@@ -160,12 +160,12 @@ def test_a_file_that_is_shown_can_be_read(block, tmp_path):
 
 
 @pytest.mark.parametrize('block', BLOCKS, ids=str)
-def test_a_block_says_its_language(block):
-    assert block.language in LANGUAGES, f'{block}: expected one of {LANGUAGES} behind ```'
+def test_a_block_has_a_language(block):
+    assert block.language in LANGUAGES, f'{block}: expected one of {LANGUAGES} after ```'
 
 
 @pytest.mark.parametrize('page', PAGES, ids=by_name)
-def test_no_command_hides_outside_a_block(page):
+def test_no_command_is_outside_a_block(page):
     hidden = re.compile(r'( {4,}|\t)(make|python3?|pip|ros2|colcon|git|sudo|sim_vehicle\.py) ')
     assert [f'{number}: {line}' for number, line in prose(page) if hidden.match(line)] == []
     marks = re.compile(rf'<!-- (?!({"|".join(MARKS)}): )')
@@ -173,7 +173,7 @@ def test_no_command_hides_outside_a_block(page):
 
 
 @pytest.mark.parametrize('page', PAGES, ids=by_name)
-def test_links_lead_somewhere(page):
+def test_links_have_a_target(page):
     for number, line in prose(page):
         for target in re.findall(r'\]\(([^)]+)\)', line):
             if not re.match(r'https?:|#', target):
@@ -181,38 +181,38 @@ def test_links_lead_somewhere(page):
                 assert path.exists(), f'{page.name}:{number}: {target}'
 
 
-def words_of_the_sources():
-    """All texts of the package; what is put into them at run time is a gap."""
-    found = []
+def texts_of_the_sources():
+    """All string literals of the package; formatted values are replaced by NUL."""
+    texts = []
     for path in sorted((ROOT / 'uav_task_alloc').rglob('*.py')):
         for node in ast.walk(ast.parse(path.read_text())):
             if isinstance(node, ast.JoinedStr):
-                found.append('\0'.join(part.value for part in node.values
+                texts.append('\0'.join(part.value for part in node.values
                                        if isinstance(part, ast.Constant)))
             elif isinstance(node, ast.Constant) and isinstance(node.value, str):
-                found.append(node.value)
-    return '\n'.join(found)
+                texts.append(node.value)
+    return '\n'.join(texts)
 
 
 def quoted_errors():
-    """The headings of the faq that quote an error: pieces between what varies."""
+    """The errors quoted in headings of the faq."""
     for line in (ROOT / 'docs/faq.md').read_text().splitlines():
         match = re.fullmatch(r'### `(.+)`', line)
         if match:
             yield match[1]
 
 
-def test_every_error_that_the_faq_quotes_is_one_of_ours():
-    ours, errors = words_of_the_sources(), list(quoted_errors())
+def test_every_error_quoted_in_the_faq_is_in_the_sources():
+    ours, errors = texts_of_the_sources(), list(quoted_errors())
     assert len(errors) >= 15
     for error in errors:
         pieces = re.split(r'\.\.\.|: expected|expected |waits for | = ', error)
-        assert any(len(piece) > 8 for piece in pieces), f'{error}: nothing to look for'
+        assert any(len(piece) > 8 for piece in pieces), f'{error}: no text to search for'
         for piece in pieces:
-            assert piece.strip() in ours, f'{error}: {piece!r} is said nowhere'
+            assert piece.strip() in ours, f'{error}: {piece!r} is in no source'
 
 
-def test_the_readme_counts_what_the_demo_has():
+def test_the_numbers_in_the_readme_are_those_of_the_demo():
     demo = scenario.load(ROOT / 'config/scenarios/demo.yaml')
     text = (ROOT / 'README.md').read_text()
     late = sum(timed.at > 0.0 for timed in demo.tasks)
@@ -221,7 +221,7 @@ def test_the_readme_counts_what_the_demo_has():
     assert f'{late} arrive in flight' in text
 
 
-def test_a_mark_or_a_fence_gone_wrong_is_seen(tmp_path, monkeypatch):
+def test_a_wrong_mark_or_fence_is_detected(tmp_path, monkeypatch):
     page = tmp_path / 'page.md'
     page.write_text('<!-- until: ready -->\n```bash\nmake demo\n```\ntext\n```\nopen\n')
     with pytest.raises(AssertionError, match='expected a closing fence'):
@@ -233,12 +233,12 @@ def test_a_mark_or_a_fence_gone_wrong_is_seen(tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize('path', sorted(ROOT.glob('launch/*.py')), ids=lambda path: path.name)
-def test_a_launch_file_starts_what_is_there(path):
-    assert docs_commands.complaint(['ros2', 'launch', 'uav_task_alloc', path.name]) == ''
+def test_a_launch_file_starts_existing_programs(path):
+    assert docs_commands.error_in(['ros2', 'launch', 'uav_task_alloc', path.name]) == ''
     assert launch_stand_in.commands(path, {})
 
 
-@pytest.mark.parametrize(('line', 'told'), [
+@pytest.mark.parametrize(('line', 'error'), [
     ('make demmo', 'demmo'),
     ('python -m uav_task_alloc plan x.yaml --plott x.png', 'no option --plott'),
     ('python -m uav_task_alloc plann', 'plann'),
@@ -248,8 +248,8 @@ def test_a_launch_file_starts_what_is_there(path):
     ('cd x && flyto moon', 'flyto'),
     ('python benchmarks/none.py', 'no such file'),
 ])
-def test_a_wrong_command_is_seen(line, told):
-    assert any(told in docs_commands.complaint(words) for words in docs_commands.commands(line))
+def test_a_wrong_command_is_detected(line, error):
+    assert any(error in docs_commands.error_in(words) for words in docs_commands.commands(line))
 
 
 @pytest.mark.parametrize('line', [
@@ -257,5 +257,5 @@ def test_a_wrong_command_is_seen(line, told):
     'X=1 ros2 run uav_task_alloc allocator --ros-args -p solve_budget:=0.2',
     "ros2 run uav_task_alloc mavlink_bridge --ros-args -p connections:=\"['tcp:127.0.0.1:5760']\"",
 ])
-def test_a_right_command_is_let_pass(line):
-    assert all(docs_commands.complaint(words) == '' for words in docs_commands.commands(line))
+def test_a_correct_command_passes(line):
+    assert all(docs_commands.error_in(words) == '' for words in docs_commands.commands(line))

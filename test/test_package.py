@@ -18,7 +18,7 @@ def test_the_public_names_are_these():
 
 
 @pytest.mark.parametrize('path', sorted(ROOT.glob('launch/*.launch.py')), ids=lambda p: p.name)
-def test_a_launch_file_compiles_and_builds_where_launch_is_there(path):
+def test_a_launch_file_compiles_and_builds_where_launch_is_installed(path):
     scope = {}
     code = compile(path.read_text(), str(path), 'exec')
     try:
@@ -56,8 +56,8 @@ def test_every_field_of_a_message_carries_a_comment(path):
 
 @pytest.mark.parametrize('path', sorted(ROOT.glob('msg_defs/*/*')), ids=lambda p: p.name)
 def test_every_interface_is_generated(path):
-    made = (ROOT / 'msg_defs/CMakeLists.txt').read_text()
-    assert f'"{path.parent.name}/{path.name}"' in made
+    cmake = (ROOT / 'msg_defs/CMakeLists.txt').read_text()
+    assert f'"{path.parent.name}/{path.name}"' in cmake
 
 
 def test_the_version_is_the_same_everywhere():

@@ -194,10 +194,10 @@ def test_any_text_is_read_or_refused_with_its_line(text):
 
 @pytest.mark.parametrize('seed', range(3))
 def test_a_generated_scenario_is_written_and_read_back_the_same(seed):
-    made = scenario.generate(seed, uavs=3, tasks=12, arrivals=4, base=seed == 1)
-    assert scenario.parse(scenario.to_yaml(made)) == made
-    assert (len(made.uavs), len(made.tasks), len(made.zones)) == (3, 16, 3)
-    assert scenario.generate(seed, uavs=3, tasks=12, arrivals=4, base=seed == 1) == made
+    generated = scenario.generate(seed, uavs=3, tasks=12, arrivals=4, base=seed == 1)
+    assert scenario.parse(scenario.to_yaml(generated)) == generated
+    assert (len(generated.uavs), len(generated.tasks), len(generated.zones)) == (3, 16, 3)
+    assert scenario.generate(seed, uavs=3, tasks=12, arrivals=4, base=seed == 1) == generated
 
 
 def test_the_demo_is_written_and_read_back_the_same():

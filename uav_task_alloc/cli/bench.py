@@ -38,7 +38,7 @@ def main(argv: Sequence[str]) -> int:
         AllocError: an option is invalid.
         SystemExit: a plot is requested and matplotlib is not installed.
     """
-    args = make_parser().parse_args(argv)
+    args = _make_parser().parse_args(argv)
     if args.plot and importlib.util.find_spec('matplotlib') is None:
         raise SystemExit("--plot: no matplotlib: expected pip install '.[plot]'")
     jobs = _jobs(args)
@@ -58,7 +58,7 @@ def main(argv: Sequence[str]) -> int:
     return int(bool(outcome.failed))
 
 
-def make_parser() -> argparse.ArgumentParser:
+def _make_parser() -> argparse.ArgumentParser:
     """The arguments of `bench`."""
     parser = argparse.ArgumentParser(prog='python -m uav_task_alloc bench', description=__doc__)
     add = parser.add_argument

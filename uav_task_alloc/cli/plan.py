@@ -33,7 +33,7 @@ def main(argv: Sequence[str]) -> int:
         AllocError: the scenario or an option is invalid.
         OSError: a file cannot be read or written.
     """
-    args = make_parser().parse_args(argv)
+    args = _make_parser().parse_args(argv)
     plotters = {path: plotter(option, path) for option, path in (
         ('--plot', args.plot), ('--plot-3d', args.plot_3d)) if path}
     loaded = with_options(without_cancelled(scenario.load(args.scenario)), args)
@@ -55,7 +55,7 @@ def main(argv: Sequence[str]) -> int:
     return _INTERRUPTED if progress.interrupted else 0
 
 
-def make_parser() -> argparse.ArgumentParser:
+def _make_parser() -> argparse.ArgumentParser:
     """The arguments of `plan`."""
     parser = argparse.ArgumentParser(
         prog='python -m uav_task_alloc plan',

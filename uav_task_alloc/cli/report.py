@@ -29,10 +29,10 @@ def summarise(out_dir: str | Path) -> Summary:
         OSError: a file cannot be read.
     """
     out = Path(out_dir)
-    return key_figures(read_record(out), read_truth(out))
+    return run_summary(read_record(out), read_truth(out))
 
 
-def key_figures(state: RunState, truth: GroundTruth) -> Summary:
+def run_summary(state: RunState, truth: GroundTruth) -> Summary:
     """The key figures of a run; a task counts as completed only if a vehicle was there."""
     reached = visits(truth, {name: task.position for name, task in state.tasks.items()})
     fates = {name: fate(name, state, bool(reached[name])) for name in state.tasks}

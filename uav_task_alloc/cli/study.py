@@ -36,14 +36,14 @@ def main(argv: Sequence[str]) -> int:
     """
     if argv and argv[0] in EXPERIMENTS:
         return _run_experiment(argv[0], argv[1:])
-    args = make_parser().parse_args(argv)
+    args = _make_parser().parse_args(argv)
     if importlib.util.find_spec('matplotlib') is None:  # checked before hours of computing
         raise SystemExit("study: no matplotlib: expected pip install '.[study,plot]'")
     settings = experiments.quick(args.seed) if args.quick else Experiments(args.seed)
     return regenerate(settings, args.out, executors.chosen(args))
 
 
-def make_parser() -> argparse.ArgumentParser:
+def _make_parser() -> argparse.ArgumentParser:
     """The arguments of `study` without the name of an experiment."""
     parser = argparse.ArgumentParser(
         prog='python -m uav_task_alloc study', description=__doc__,

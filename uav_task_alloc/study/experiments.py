@@ -91,7 +91,7 @@ def convergence_jobs(settings: Experiments) -> dict[tuple[str, int], Job]:
 def allocation_jobs(settings: Experiments) -> dict[str, Job]:
     """Jobs of figure 3, by solver."""
     scene = settings.figure_scene()
-    return {solver: Job(f'allocation-{solver}', trials.allocate, {
+    return {solver: Job(f'allocation-{solver}', trials.solve_scene, {
         'scene': scene, 'solver': solver, 'seed': settings.seed,
         'iterations': iterations(solver, scene['tasks'], settings.effort)}, settings.effort)
         for solver in ('paper_chain_q', 'chain_q')}

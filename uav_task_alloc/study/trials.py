@@ -72,7 +72,7 @@ def converge(scene: SceneSpec, solver: str, seed: int, iterations: int,
             'iterations': recorder.iterations, 'seconds': recorder.elapsed()}
 
 
-def allocate(scene: SceneSpec, solver: str, seed: int, iterations: int) -> dict[str, Any]:
+def solve_scene(scene: SceneSpec, solver: str, seed: int, iterations: int) -> dict[str, Any]:
     """Solve an instance among domes; returns what `plan_from_result` makes a Plan of."""
     instance = instance_of(scene)
     result = plan(instance.uavs, instance.tasks, instance.zones, solver=solver, seed=seed,
@@ -83,7 +83,7 @@ def allocate(scene: SceneSpec, solver: str, seed: int, iterations: int) -> dict[
 
 
 def plan_from_result(result: Mapping[str, Any]) -> Plan:
-    """The plan whose JSON values `allocate` returned."""
+    """The plan whose JSON values `solve_scene` returned."""
     legs = {uav: tuple(Leg(tuple(map(tuple, leg['via'])), leg['length']) for leg in row)
             for uav, row in result['legs'].items()}
     return Plan({uav: tuple(row) for uav, row in result['routes'].items()}, legs=legs,

@@ -85,7 +85,7 @@ export const until = (wall, model) => (wall - model.wall) * live.clock.speedup;
 export function answer(id, model) {
   const [state, uav, reason] = stateOf(id, model), turn = model.turns.get(id);
   if (turn) return {text: turnText(id, turn, model)};
-  if (state === 'COMPLETED') return {text: `${id} is done: ${uav || 'somebody'} completed it.`};
+  if (state === 'COMPLETED') return {text: `${id} is done: ${uav || 'a UAV'} completed it.`};
   if (state === 'CANCELLED') return {text: `${id} was withdrawn. Nobody flies it.`};
   if (LEFT.includes(state) || reason) {
     const what = {FAILED: 'it failed', REJECTED: 'it was refused'}[state] || 'it is left out';
