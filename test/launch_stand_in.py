@@ -131,7 +131,7 @@ class Include:
 
 
 class Context:
-    """What a function of a launch file is given."""
+    """The argument of a launch file's functions."""
 
     is_shutdown = False
 
@@ -139,15 +139,15 @@ class Context:
         self.launch_configurations = given
 
 
-class Said:
-    """Something for the log."""
+class Log:
+    """A line of the log."""
 
     def __init__(self, *, msg):
         self.msg = msg
 
 
 class End:
-    """All is to end."""
+    """The launch ends."""
 
     def __init__(self, *, reason):
         self.reason = reason
@@ -221,7 +221,7 @@ class Words(list):
 MODULES = {
     'launch': {'LaunchDescription': list},
     'launch.actions': {'DeclareLaunchArgument': Declared, 'IncludeLaunchDescription': Include,
-                       'LogInfo': Said, 'OpaqueFunction': Function,
+                       'LogInfo': Log, 'OpaqueFunction': Function,
                        'SetEnvironmentVariable': Environment, 'Shutdown': End,
                        'TimerAction': Later},
     'launch.conditions': {'IfCondition': Condition, 'UnlessCondition': NotCondition},

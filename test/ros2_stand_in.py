@@ -2,7 +2,7 @@
 """`ros2` for test_docs.py where it is not installed: what the docs use of it, and no more.
 
 run, launch, topic pub, topic echo, service call. Quality of service is as Jazzy's own command
-line has it: a publisher is volatile unless told, a listener takes what publishers offer.
+line has it: a publisher is volatile by default, a subscriber takes what publishers offer.
 """
 import argparse
 import array
@@ -16,7 +16,7 @@ import types
 from pathlib import Path
 
 import yaml
-from launch_stand_in import SHARE, Context, End, Later, Said, commands
+from launch_stand_in import SHARE, Context, End, Later, Log, commands
 
 
 def program(package, name):
@@ -47,7 +47,7 @@ class Launch:
         self.children.append((process, node))
 
     def step(self):
-        """Look once who has ended, and what is due."""
+        """Handle nodes that have exited, and actions that are due."""
         time.sleep(0.05)  # a signal ends it at once
         for process, node in [each for each in self.children if each[0].poll() is not None]:
             self.children.remove((process, node))
@@ -61,7 +61,7 @@ class Launch:
                     self.start(words)
 
     def act(self, action, given):
-        if isinstance(action, Said):
+        if isinstance(action, Log):
             print(f'[INFO] [launch.user]: {action.msg}', flush=True)
         elif isinstance(action, End):
             print(f'[INFO] [launch]: {action.reason}', flush=True)
@@ -71,10 +71,10 @@ class Launch:
         else:
             raise TypeError(action)
 
-    def end(self, told):
-        """`told`: the terminal has sent SIGINT to all. What does not end is made to, as there."""
+    def end(self, interrupted):
+        """End all nodes as launch does; `interrupted`: the terminal has sent SIGINT to them."""
         for process, _ in self.children:
-            if not told:
+            if not interrupted:
                 process.send_signal(signal.SIGINT)
         began, worst = time.monotonic(), 0
         for process, node in self.children:
@@ -104,7 +104,7 @@ def launch(words):
     return launched.end(signal.SIGINT in signals)
 
 
-# What is said and heard.
+# topics and services
 
 def interface(name):
     """The class of `package/kind/Name`."""
@@ -191,10 +191,10 @@ def topic(words):
             durability=DurabilityPolicy.TRANSIENT_LOCAL if all(
                 each.durability == DurabilityPolicy.TRANSIENT_LOCAL for each in every)
             else DurabilityPolicy.VOLATILE)
-        heard = []
+        received = []
         node.create_subscription(interface(args.type or offers[0].topic_type), args.name,
-                                 lambda message: (heard.append(1), show(message)), qos)
-        while not (args.once and heard):
+                                 lambda message: (received.append(1), show(message)), qos)
+        while not (args.once and received):
             spin()
 
     return with_node({'pub': pub, 'echo': echo}[args.verb])

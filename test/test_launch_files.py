@@ -102,7 +102,7 @@ def test_finding_38_the_ranges_of_a_scenario_reach_the_nodes(name, moved):
 
 
 @pytest.mark.parametrize(('given', 'speedup'), [({}, 20), ({'speedup': '3'}, 3)])
-def test_finding_37_a_demo_has_the_speedup_of_its_scenario_or_of_the_argument(moved, given, speedup):
+def test_finding_37_a_demo_has_the_speedup_of_its_scenario_or_argument(moved, given, speedup):
     nodes = started('demo', scenario=moved, **given)
     assert {values(nodes[name])['speedup']
             for name in ('fleet_sim', 'scenario_player', 'live_view')} == {speedup}

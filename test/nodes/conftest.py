@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Real nodes as processes, a domain of their own for each run, and a probe to talk to them."""
+"""Real nodes as processes, a DDS domain for each session, and a probe node to test them with."""
 import os
 import signal
 import subprocess
@@ -16,11 +16,11 @@ PACKAGE = 'uav_task_alloc'
 
 @pytest.fixture(scope='session', autouse=True)
 def domain():
-    """Keep this run apart from every other on the machine."""
+    """A domain that no other session on this machine uses, also under pytest-xdist."""
     with domain_coordinator.domain_id() as number:
         os.environ['ROS_DOMAIN_ID'] = str(number)
         os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
-        # a late process may else wait for up to 3 s to be seen
+        # otherwise a late process may be discovered only after 3 s
         os.environ['FASTRTPS_DEFAULT_PROFILES_FILE'] = os.path.join(
             os.path.dirname(__file__), 'quick_discovery.xml')
         yield number
@@ -49,7 +49,7 @@ class Process:
 
 @pytest.fixture
 def start(domain, tmp_path):
-    """start('allocator', '-p', 'seed:=1') -> Process; what is left at the end is ended."""
+    """start('allocator', '-p', 'seed:=1') -> Process; processes still running are ended."""
     started = []
 
     def start(executable, *ros_args, env=None):
@@ -58,7 +58,7 @@ def start(domain, tmp_path):
         return started[-1]
 
     yield start
-    for process in started:  # what is killed leaves shared memory in the way of the next
+    for process in started:  # a killed process leaves shared memory that delays the next
         if process.popen.poll() is None:
             process.popen.terminate()
     for process in started:
@@ -70,7 +70,7 @@ def start(domain, tmp_path):
 
 
 class Probe:
-    """A node of the test's own, in a context of its own."""
+    """A node of the test, in a context of its own."""
 
     def __init__(self, name='probe', **kwargs):
         self.context = rclpy.Context()
@@ -89,15 +89,15 @@ class Probe:
 
     def collect(self, kind, topic, qos):
         """A list that fills with the messages of a topic."""
-        got = []
-        self.node.create_subscription(kind, topic, got.append, qos)
-        return got
+        messages = []
+        self.node.create_subscription(kind, topic, messages.append, qos)
+        return messages
 
     def publisher(self, kind, topic, qos):
-        """A publisher that somebody already listens to."""
-        made = self.node.create_publisher(kind, topic, qos)
-        self.until(lambda: made.get_subscription_count() > 0)
-        return made
+        """A publisher that has a subscriber."""
+        publisher = self.node.create_publisher(kind, topic, qos)
+        self.until(lambda: publisher.get_subscription_count() > 0)
+        return publisher
 
     def call(self, kind, name, request, timeout=20.0):
         client = self.node.create_client(kind, name)

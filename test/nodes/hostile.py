@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Messages as somebody would send them who wants the allocator to fall over."""
+"""Hypothesis strategies of hostile messages, meant to make the allocator fail."""
 from builtin_interfaces.msg import Duration, Time
 from geometry_msgs.msg import Point
 from hypothesis import strategies as st
@@ -9,7 +9,7 @@ from uav_task_alloc_msgs.srv import SetAvailability, SubmitTasks
 
 NASTY = ('', ' ', '%s%n', '{}', '{0.__class__}', '../../etc/passwd', 'a\nb', '\x07\x1b[2J', 'a__b',
          '/', '9lives', '\ufffd', 'x' * 300, "'; DROP TABLE world; --", '~', 'null', 'task id')
-NAMES = tuple(f'n{k}' for k in range(12))  # few, so that messages meet each other
+NAMES = tuple(f'n{k}' for k in range(12))  # few, so that messages refer to the same ids
 HUGE = (float('nan'), float('inf'), -float('inf'), 1e308, -1e308, 1e-308, -1.0, -0.0, 0.0, 1e12)
 HUGE_32 = (*HUGE[:3], 3e38, -3e38, 1e-38, *HUGE[6:])
 
@@ -38,7 +38,7 @@ task = st.builds(
     longitude=small | wide, altitude=small | wide, value=st.just(1.0) | wide,
     service_time=st.just(Duration(sec=1)) | span, acceptance_radius=narrow,
     required_capabilities=some(word), allowed_uavs=some(word))
-plain_task = st.builds(  # nothing is wrong with it but perhaps one field
+plain_task = st.builds(  # valid but for at most one field
     m.Task, task_id=st.sampled_from(NAMES), position=points(small), value=st.just(1.0) | wide)
 zone = st.builds(
     m.ThreatZone, zone_id=word, shape=byte, center=point, radius=small | narrow,
@@ -52,9 +52,9 @@ state = st.builds(
     mode=byte, mission_state=byte, active_task_id=word, list_revision=st.integers(0, 3) | count)
 event = st.builds(m.TaskEvent, header=header, task_id=word, uav_id=word,
                   revision=st.integers(0, 3) | count, event=byte, reason=word)
-picture = st.builds(m.ThreatZoneArray, header=header, zones=some(zone))
+zone_array = st.builds(m.ThreatZoneArray, header=header, zones=some(zone))
 message = st.one_of(
-    announcement, state, event, picture,
+    announcement, state, event, zone_array,
     st.builds(SubmitTasks.Request, announcement=announcement),
     st.builds(SetAvailability.Request, uav_id=word, available=st.booleans()))
 

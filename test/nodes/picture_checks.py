@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What RViz and every other viewer expects of a MarkerArray and of a Path."""
+"""What RViz expects of a MarkerArray and of a Path."""
 import math
 
 from visualization_msgs.msg import Marker
@@ -9,7 +9,7 @@ OF_POINTS = (*LINES, Marker.SPHERE_LIST, Marker.CUBE_LIST, Marker.TRIANGLE_LIST)
 
 
 def check_markers(array):
-    """Assert that a MarkerArray is sound; the markers it leaves on the screen, by (ns, id)."""
+    """Assert that a MarkerArray is valid; return the markers that are shown, by (ns, id)."""
     first, *rest = array.markers
     assert first.action == Marker.DELETEALL
     left = {(each.ns, each.id): each for each in rest}

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """All nodes together: tasks in, flown missions out, judged by where the vehicles really were."""
 import json
-import socket
 from dataclasses import replace
 
 import pytest
@@ -17,6 +16,7 @@ from uav_task_alloc.nodes.conversions.messages import (
     announcement,
     from_zones,
 )
+from uav_task_alloc.nodes.ros.udp_ports import free_port
 
 pytestmark = pytest.mark.ros
 SCENARIO = """
@@ -34,14 +34,8 @@ BOTH = [replace(NEAR[0], allowed_uavs={'uav_1'}), *NEAR[1:4],
 LATE = [Task('late_1', (50.0, 300.0, 50.0)), Task('late_2', (350.0, 300.0, 50.0))]
 
 
-def free_port():
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        probe.bind(('127.0.0.1', 0))
-        return probe.getsockname()[1]
-
-
 class Fleet:
-    """The nodes of a small fleet, and what the probe hears of them."""
+    """The nodes of a small fleet, and what the probe receives."""
 
     def __init__(self, start, probe, folder):
         (folder / 'pair.yaml').write_text(SCENARIO)
@@ -50,7 +44,7 @@ class Fleet:
         self.flight = folder / 'flight.jsonl'
         self.states = probe.collect(m.UavState, 'uav_states', STATES)
         self.events = probe.collect(m.TaskEvent, 'task_events', EVENTS)
-        self.told = probe.collect(m.TaskStatusArray, 'task_statuses', LATCHED)
+        self.statuses = probe.collect(m.TaskStatusArray, 'task_statuses', LATCHED)
         self.allocator = start('allocator', '-p', 'uav_timeout:=2.0', '-p', 'route_end:=hold',
                                '-p', f'state_dir:={folder / "state"}')
         self.bridge = self.start_bridge()
@@ -68,7 +62,7 @@ class Fleet:
         self.announce.publish(announcement(m.TaskAnnouncement.ADD, tasks, 1.0))
 
     def state_of(self, task):
-        rows = self.told[-1].statuses if self.told else []
+        rows = self.statuses[-1].statuses if self.statuses else []
         return next((row.state for row in rows if row.task_id == task.id), None)
 
     def wait_for(self, tasks, state=m.TaskStatus.COMPLETED, timeout=60.0):
@@ -139,6 +133,6 @@ def test_a_task_inside_a_zone_is_left_out_with_the_reason(fleet):
     fleet.add(NEAR)
     fleet.wait_for(NEAR[2:3], m.TaskStatus.UNASSIGNED)
     fleet.wait_for(NEAR[:2] + NEAR[3:])
-    reason = next(row.reason for row in fleet.told[-1].statuses if row.task_id == 't2')
+    reason = next(row.reason for row in fleet.statuses[-1].statuses if row.task_id == 't2')
     assert 'dome' in reason
     assert fleet.visits(NEAR[2]) == 0

@@ -31,7 +31,7 @@ def add(*tasks, action=m.TaskAnnouncement.ADD):
 
 
 class Fleet:
-    """UAVs that say all the time where they are, and what the allocator tells them."""
+    """UAVs that publish their states, and what the allocator publishes."""
 
     def __init__(self, probe):
         self.probe, self.states = probe, {}
@@ -42,23 +42,23 @@ class Fleet:
         self.events = probe.node.create_publisher(m.TaskEvent, 'task_events', EVENTS)
         self.state = probe.node.create_publisher(m.UavState, 'uav_states', STATES)
         self.allocations = probe.collect(m.Allocation, 'allocation', LATCHED)
-        self.seen = probe.collect(m.TaskStatusArray, 'task_statuses', LATCHED)
-        probe.node.create_timer(0.1, self.speak)
+        self.statuses = probe.collect(m.TaskStatusArray, 'task_statuses', LATCHED)
+        probe.node.create_timer(0.1, self.publish_states)
 
     def uav(self, uav_id, x, y=0.0, **more):
         more = {'range_remaining': math.nan, 'cruise_speed': math.nan,
                 'home': Point(x=math.nan), 'available': True, **more}
         if uav_id not in self.lists:
             self.lists[uav_id], self.revisions[uav_id] = None, []
-            self.probe.node.create_subscription(m.TaskList, f'{uav_id}/task_list', self.told,
+            self.probe.node.create_subscription(m.TaskList, f'{uav_id}/task_list', self.on_list,
                                                 LATCHED)
         self.states[uav_id] = m.UavState(uav_id=uav_id, position=Point(x=x, y=y, z=50.0), **more)
 
-    def speak(self):
+    def publish_states(self):
         for state in self.states.values():
             self.state.publish(state)
 
-    def told(self, msg):
+    def on_list(self, msg):
         self.lists[msg.uav_id] = msg
         self.revisions[msg.uav_id].append(msg.revision)
 
@@ -67,13 +67,13 @@ class Fleet:
         self.events.publish(m.TaskEvent(event=kind, task_id=task_id, uav_id=uav_id, **more))
 
     def route(self, uav_id):
-        told = self.lists.get(uav_id)
-        return None if told is None else [planned.task.task_id for planned in told.tasks]
+        msg = self.lists.get(uav_id)
+        return None if msg is None else [planned.task.task_id for planned in msg.tasks]
 
     def status(self, task_id):
-        latest = self.seen[-1].statuses if self.seen else ()
-        found = [status for status in latest if status.task_id == task_id]
-        return found[0] if found else S(state=255)
+        latest = self.statuses[-1].statuses if self.statuses else ()
+        matching = [status for status in latest if status.task_id == task_id]
+        return matching[0] if matching else S(state=255)
 
     def until_state(self, task_id, state):
         self.probe.until(lambda: self.status(task_id).state == state)
@@ -96,7 +96,7 @@ def begin(start, fleet, *more):
     return process
 
 
-def test_a_burst_is_answered_by_one_plan_and_only_changed_lists_follow(start, probe, fleet):
+def test_a_burst_causes_one_plan_and_only_changed_lists_are_published(start, probe, fleet):
     node = begin(start, fleet)
     markers = probe.collect(MarkerArray, 'allocation_markers', LATCHED)
     health = probe.collect(DiagnosticArray, '/diagnostics', 10)
@@ -119,11 +119,11 @@ def test_a_burst_is_answered_by_one_plan_and_only_changed_lists_follow(start, pr
     assert first.eta == Duration(nanosec=500_000_000)
     assert second.eta.sec == 2
     assert fleet.revisions['a'] == [1]
-    told = fleet.allocations[-1]
-    assert [each.uav_id for each in told.lists] == ['a', 'b']
-    assert told.distance == pytest.approx(129.0)
-    assert told.value == pytest.approx(21.0)
-    assert 'ADD t1' in told.trigger
+    allocation = fleet.allocations[-1]
+    assert [each.uav_id for each in allocation.lists] == ['a', 'b']
+    assert allocation.distance == pytest.approx(129.0)
+    assert allocation.value == pytest.approx(21.0)
+    assert 'ADD t1' in allocation.trigger
     probe.until(lambda: markers and health)
     assert any(pair.key == 'UAVs known' for pair in health[-1].status[0].values)
     code, out = node.stop()
@@ -169,7 +169,7 @@ BAD = [
 ]
 
 
-def test_bad_messages_are_refused_in_words_and_change_nothing_else(start, probe, fleet):
+def test_bad_messages_are_refused_with_a_reason_and_change_nothing_else(start, probe, fleet):
     node = begin(start, fleet)
     fleet.uav('a', 0.0)
     fleet.tasks.publish(add(task('t1', 100)))
@@ -200,18 +200,18 @@ def test_bad_messages_are_refused_in_words_and_change_nothing_else(start, probe,
     assert fleet.revisions['a'] == [1]
 
 
-def test_every_new_fault_of_a_zone_is_told_and_the_last_good_form_stays(start, probe, fleet):
+def test_every_new_fault_of_a_zone_is_logged_and_its_last_valid_form_stays(start, probe, fleet):
     node = begin(start, fleet)
     for radius, words in ((50.0, 'zones changed: z'), (-1.0, 'zone z: radius = -1.0'),
                           (math.nan, 'zone z: radius = nan'), (60.0, 'zones changed: z'),
                           (-1.0, 'zone z: radius = -1.0')):
-        said = node.output().count(words)
+        count = node.output().count(words)
         fleet.zones.publish(m.ThreatZoneArray(zones=[m.ThreatZone(zone_id='z', radius=radius)]))
-        probe.until(lambda words=words, said=said: node.output().count(words) > said)
+        probe.until(lambda words=words, count=count: node.output().count(words) > count)
     assert node.output().count('zones changed') == 2
 
 
-def test_the_end_of_routes_is_told_anew_when_the_parameter_changes(start, probe, fleet):
+def test_lists_are_published_again_when_the_route_end_changes(start, probe, fleet):
     begin(start, fleet, '-p', 'route_end:=hold')
     fleet.uav('a', 0.0)
     fleet.tasks.publish(add(task('t1', 100)))
@@ -224,7 +224,7 @@ def test_the_end_of_routes_is_told_anew_when_the_parameter_changes(start, probe,
     probe.until(lambda: fleet.lists['a'].end == m.TaskList.RETURN_HOME)
 
 
-def test_services_answer(start, probe, fleet):
+def test_services_respond(start, probe, fleet):
     begin(start, fleet)
     fleet.uav('a', 0.0)
     fleet.uav('b', 50.0)
@@ -255,7 +255,7 @@ def test_services_answer(start, probe, fleet):
     probe.until(lambda: fleet.allocations[-1].trigger == 'replan service')
 
 
-def test_the_tasks_of_a_uav_that_its_pilot_took_go_to_the_others_at_once(start, probe, fleet):
+def test_the_tasks_of_a_uav_that_its_pilot_took_over_go_to_the_others_at_once(start, probe, fleet):
     begin(start, fleet, '-p', 'list_interval:=60.0', '-p', 'uav_timeout:=60.0')
     fleet.uav('a', 0.0, authority=m.UavState.HELD)
     fleet.uav('b', 5000.0, authority=m.UavState.HELD)
@@ -267,7 +267,7 @@ def test_the_tasks_of_a_uav_that_its_pilot_took_go_to_the_others_at_once(start, 
     probe.until(lambda: sorted(fleet.route('b') or ()) == ['t1', 't2'], 5.0)
 
 
-def test_finding_19_the_operator_reads_who_has_no_safe_way_home(start, probe, fleet):
+def test_finding_19_diagnostics_name_uavs_without_a_safe_path_home(start, probe, fleet):
     health = probe.collect(DiagnosticArray, '/diagnostics', 10)
     node = start('allocator', '-p', 'route_end:=home')
     fleet.connected()
@@ -288,7 +288,7 @@ def test_finding_19_the_operator_reads_who_has_no_safe_way_home(start, probe, fl
     assert node.output().count(words) == 1
 
 
-def test_a_killed_allocator_comes_back_with_its_world(start, probe, fleet, tmp_path):
+def test_a_killed_allocator_restores_its_world(start, probe, fleet, tmp_path):
     state = ('-p', f'state_dir:={tmp_path}/state')
     node = begin(start, fleet, *state)
     fleet.uav('a', 0.0)
@@ -311,7 +311,7 @@ def test_a_killed_allocator_comes_back_with_its_world(start, probe, fleet, tmp_p
     assert fleet.revisions['a'] == sorted(set(fleet.revisions['a']))
 
 
-def test_an_allocator_without_its_disk_runs_on_and_says_so(start, probe, fleet, tmp_path):
+def test_an_allocator_without_its_disk_goes_on_and_reports_it(start, probe, fleet, tmp_path):
     (tmp_path / 'file').touch()
     health = probe.collect(DiagnosticArray, '/diagnostics', 10)
     node = begin(start, fleet, '-p', f'state_dir:={tmp_path}/file/state')
@@ -332,7 +332,7 @@ def test_simulated_time_is_in_the_stamps_and_stops_nothing(start, probe, fleet):
     clock.publish(Clock(clock=Time(sec=5000)))
     fleet.tasks.publish(add(task('t2', 200)))
     probe.until(lambda: fleet.route('a') == ['t1', 't2'])
-    clock.publish(Clock(clock=Time(sec=70)))  # the simulation begins anew
+    clock.publish(Clock(clock=Time(sec=70)))  # the simulation is restarted
     probe.until(lambda: fleet.seen[-1].header.stamp.sec in (70, 5000))
     fleet.event(m.TaskEvent.COMPLETED, 't1', 'a')
     probe.until(lambda: fleet.route('a') == ['t2'])
@@ -342,7 +342,7 @@ def test_simulated_time_is_in_the_stamps_and_stops_nothing(start, probe, fleet):
     probe.until(lambda: fleet.route('b') == ['t2'])
 
 
-def test_a_damaged_journal_is_set_aside_and_told_of(start, probe, fleet, tmp_path):
+def test_a_corrupt_journal_is_set_aside_and_reported(start, probe, fleet, tmp_path):
     (tmp_path / 'journal.sqlite3').write_bytes(b'no database at all ' * 50)
     health = probe.collect(DiagnosticArray, '/diagnostics', 10)
     begin(start, fleet, '-p', f'state_dir:={tmp_path}')

@@ -54,6 +54,7 @@ def test_finding_24_the_publishers_of_a_forgotten_uav_are_destroyed(probe):
     publish(world.outbox)
     probe.until(lambda: publishers('ghost') == [0, 0])
     assert publishers('real') == [1, 1]
-    publish(Outbox(forgotten={'real'}, lists={'real': lists['real']}))  # and reported again at once
+    # reported again at once
+    publish(Outbox(forgotten={'real'}, lists={'real': lists['real']}))
     probe.until(lambda: publishers('real') == [1, 1])
     marker_publisher.on_timer()

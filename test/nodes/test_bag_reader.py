@@ -59,7 +59,7 @@ def whole(tmp_path_factory):
     return write(tmp_path_factory.mktemp('bag') / 'whole.mcap', MESSAGES)
 
 
-def test_a_bag_comes_back_as_lines_whatever_the_namespace(whole):
+def test_a_bag_is_read_as_lines_in_any_namespace(whole):
     reader = BagReader(whole)
     run, tasks, zones, statuses, plan, *states = reader
     assert run == {'kind': 'run', 'speedup': 2.0}
@@ -77,14 +77,14 @@ def test_a_bag_comes_back_as_lines_whatever_the_namespace(whole):
 @pytest.mark.parametrize(('about', 'count'), [
     ({}, 0), ({'origin.latitude': '47.0', 'origin.longitude': '8.0',
                'origin.altitude_amsl': '400.0'}, 1)])
-def test_a_task_in_degrees_has_a_place_where_the_bag_tells_the_origin(tmp_path, about, count):
+def test_a_task_in_degrees_has_a_position_where_the_bag_has_the_origin(tmp_path, about, count):
     *_, tasks = BagReader(write(tmp_path / 'w.mcap', [('/task_announcements', WGS)], about))
     assert len(tasks['tasks']) == count
     for task in tasks['tasks']:
         assert task['position'] == pytest.approx((0.0, 1111.8, 19.9), abs=0.3)
 
 
-def test_the_report_says_where_it_is_and_what_it_found(whole, tmp_path, capsys):
+def test_the_report_prints_its_path_and_its_figures(whole, tmp_path, capsys):
     html = tmp_path / 'flight.html'
     assert report.main([str(whole), '--html', str(html)]) == 0
     out, err = capsys.readouterr()
@@ -119,7 +119,7 @@ def test_the_report_of_a_cut_bag_says_that_it_is_cut(whole, tmp_path, capsys):
 @given(st.data())
 @settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.data_too_large,
           HealthCheck.function_scoped_fixture])
-def test_a_damaged_bag_is_read_as_far_as_it_goes_or_refused_in_words(whole, tmp_path, data):
+def test_a_corrupt_bag_is_read_up_to_its_fault_or_refused_with_a_reason(whole, tmp_path, data):
     damaged = bytearray(whole.read_bytes())
     for _ in range(data.draw(st.integers(1, 4))):
         damaged[data.draw(st.integers(0, len(damaged) - 1))] = data.draw(st.integers(0, 255))
@@ -131,7 +131,7 @@ def test_a_damaged_bag_is_read_as_far_as_it_goes_or_refused_in_words(whole, tmp_
     assert len(lines) <= len(MESSAGES) + 1
 
 
-def test_a_message_that_is_not_of_its_type_is_counted_and_left_out(tmp_path):
+def test_a_message_of_another_type_is_counted_and_left_out(tmp_path):
     with Bag(tmp_path / 'x.mcap', {}) as bag:
         bag.open('/task_statuses', OURS + 'TaskStatusArray', definition(OURS + 'TaskStatusArray'))
         bag.open('/uav_states', OURS + 'UavState', 'Nonsense[ x')
@@ -142,7 +142,7 @@ def test_a_message_that_is_not_of_its_type_is_counted_and_left_out(tmp_path):
     assert reader.undecodable == {'/task_statuses': 1, '/uav_states': 1}
 
 
-def test_what_is_no_record_of_a_flight_is_refused_in_words(tmp_path):
+def test_a_file_that_is_no_recording_is_refused_with_a_reason(tmp_path):
     for name, data, text in (('empty.mcap', b'', 'expected an MCAP file'),
                              ('text.mcap', b'hello, this is no bag', 'expected an MCAP file')):
         (tmp_path / name).write_bytes(data)

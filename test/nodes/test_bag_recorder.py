@@ -34,7 +34,7 @@ LIST = m.TaskList(header=header(7.0), uav_id='uav_1', revision=3)
 
 
 def fleet(probe):
-    """Latched topics before the recorder is there, and others; publishes as long as asked."""
+    """Publishers of latched topics, before the recorder starts, and of states."""
     latched = [(probe.node.create_publisher(m.TaskAnnouncement, 'task_announcements',
                                             ANNOUNCEMENTS), ADD),
                (probe.node.create_publisher(m.TaskList, 'uav_1/task_list', LATCHED), LIST),
@@ -56,7 +56,7 @@ def on_disk(path):
 
 def test_every_topic_is_recorded_with_its_type_and_times(start, probe, tmp_path):
     states, path = fleet(probe), tmp_path / 'run.mcap'
-    view = start('live_view', '-p', f'record:={path}', '-p', 'speedup:=4.0')
+    view = start('live_view', '-p', f'record:={path}', '-p', 'speedup:=4.0', '-p', 'port:=0')
     events = probe.publisher(m.TaskEvent, 'task_events', EVENTS)
     events.publish(m.TaskEvent(header=header(8.0), task_id='t1', uav_id='uav_1', revision=3))
     probe.until(lambda: len(probe.node.get_subscriptions_info_by_topic('/uav_1/path')) == 1)
@@ -78,20 +78,20 @@ def test_every_topic_is_recorded_with_its_type_and_times(start, probe, tmp_path)
         assert 0 < row.message.publish_time <= row.message.log_time
         assert row.message.log_time < row.message.publish_time + 60e9
         assert row.channel.message_encoding == 'cdr'
-    said = {row.channel.topic: row.decoded_message for row in rows}
+    messages = {row.channel.topic: row.decoded_message for row in rows}
     assert {'/task_announcements', '/uav_1/task_list', '/uav_1/path', '/task_events',
-            '/uav_states'} <= said.keys()
-    task, = said['/task_announcements'].tasks
+            '/uav_states'} <= messages.keys()
+    task, = messages['/task_announcements'].tasks
     assert (task.task_id, task.position.y, task.value) == ('t1', 20.0, 4.0)
-    assert said['/uav_1/task_list'].revision == 3
-    assert said['/uav_states'].header.stamp.sec == 11
-    assert said['/task_events'].uav_id == 'uav_1'
+    assert messages['/uav_1/task_list'].revision == 3
+    assert messages['/uav_states'].header.stamp.sec == 11
+    assert messages['/task_events'].uav_id == 'uav_1'
 
 
-def test_what_a_killed_recorder_had_on_disk_can_be_read(start, probe, tmp_path):
+def test_what_a_killed_recorder_had_written_can_be_read(start, probe, tmp_path):
     fleet(probe)
     path = tmp_path / 'run.mcap'
-    view = start('live_view', '-p', f'record:={path}')
+    view = start('live_view', '-p', f'record:={path}', '-p', 'port:=0')
     probe.until(lambda: '/task_announcements' in on_disk(path))
     view.stop(signal.SIGKILL)
     assert '/task_announcements' in on_disk(path)
@@ -101,7 +101,7 @@ def test_the_report_of_a_run_is_drawn_from_its_recording_alone(start, probe, tmp
     path = tmp_path / 'run.mcap'
     allocator = start('allocator', '-p', 'route_end:=hold')
     view = start('live_view', '-p', f'record:={path}', '-p', 'port:=0')
-    told = probe.collect(m.TaskStatusArray, 'task_statuses', LATCHED)
+    statuses = probe.collect(m.TaskStatusArray, 'task_statuses', LATCHED)
     states = probe.publisher(m.UavState, 'uav_states', STATES)
     tasks = probe.publisher(m.TaskAnnouncement, 'task_announcements', ANNOUNCEMENTS)
     tasks.publish(announcement(m.TaskAnnouncement.ADD, [
@@ -111,10 +111,10 @@ def test_the_report_of_a_run_is_drawn_from_its_recording_alone(start, probe, tmp
         states.publish(m.UavState(
             header=header(1.0), uav_id='uav_1', available=True, battery=0.5,
             home=Point(x=math.nan), range_remaining=5000.0, cruise_speed=math.nan))
-        return told and [row.state for row in told[-1].statuses] == [
+        return statuses and [row.state for row in statuses[-1].statuses] == [
             m.TaskStatus.ASSIGNED, m.TaskStatus.UNASSIGNED]
     probe.until(settled)
-    reason = told[-1].statuses[1].reason
+    reason = statuses[-1].statuses[1].reason
     size = path.stat().st_size
     probe.until(lambda: path.stat().st_size > size)
     view.stop()
@@ -127,7 +127,7 @@ def test_the_report_of_a_run_is_drawn_from_its_recording_alone(start, probe, tmp
     assert 'new task t1' in text
 
 
-def test_a_file_that_is_there_or_cannot_be_is_refused_in_words(start, tmp_path):
+def test_a_file_that_exists_or_cannot_be_created_is_refused_with_a_reason(start, tmp_path):
     (tmp_path / 'old.mcap').write_text('flight of yesterday')
     for name, text in (('old.mcap', 'a file that is not there yet'),
                        ('old.mcap/x', 'a file that can be written (')):

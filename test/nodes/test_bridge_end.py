@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a bridge does before it ends: a swap under way first, and who is airborne is named."""
+"""A bridge that exits completes a running upload first, and names the airborne UAVs."""
 import signal
 from types import SimpleNamespace
 
@@ -21,8 +21,8 @@ def sky(start, probe, tmp_path):
         made.land()
 
 
-def hold_for_a_swap(sky, probe):
-    """Bring the ArduPilot vehicle into the midst of a swap: it holds, its mission comes."""
+def hold_for_an_upload(sky, probe):
+    """Let the ArduPilot vehicle hold while its mission is replaced."""
     sky.send(1, 1, [0, 1, 2, 3])
     probe.until(lambda: sky.completed(1))
     sky.send(1, 2, [*range(4, MANY), 2])
@@ -30,29 +30,29 @@ def hold_for_a_swap(sky, probe):
                 and sky.states['uav_1'].mission_state == m.UavState.UPLOADING)
 
 
-def test_finding_36_a_bridge_ends_after_the_swap_under_way(sky, probe):
-    hold_for_a_swap(sky, probe)
-    code, said = sky.bridge.stop(signal.SIGINT, 30)
-    assert code == 0, said
-    assert 'exits after the upload to uav_1' in said
-    assert 'exits while airborne: uav_1' in said
-    assert 'held in the air' not in said
+def test_finding_36_a_bridge_exits_after_a_running_upload(sky, probe):
+    hold_for_an_upload(sky, probe)
+    code, output = sky.bridge.stop(signal.SIGINT, 30)
+    assert code == 0, output
+    assert 'exits after the upload to uav_1' in output
+    assert 'exits while airborne: uav_1' in output
+    assert 'held in the air' not in output
     # it flies the new list without a bridge
     before = len(sky.flown(1))
     probe.until(lambda: len(sky.flown(1)) > before)
     assert sky.flown(1)[before] == 'u1_4'
 
 
-def test_finding_36_a_swap_that_does_not_end_is_not_waited_for_without_end(sky, probe):
-    hold_for_a_swap(sky, probe)
+def test_finding_36_an_upload_that_never_completes_delays_the_exit_for_a_limited_time(sky, probe):
+    hold_for_an_upload(sky, probe)
     sky.fleet.set_alive('uav_1', False)
-    code, said = sky.bridge.stop(signal.SIGINT, 60)
-    assert code == 0, said
-    assert 'exits while held in the air for a new list: uav_1' in said
+    code, output = sky.bridge.stop(signal.SIGINT, 60)
+    assert code == 0, output
+    assert 'exits while held in the air for a new list: uav_1' in output
 
 
-def test_a_bridge_takes_no_list_and_lets_nobody_take_off_once_it_is_to_end(sky, probe):
-    hold_for_a_swap(sky, probe)
+def test_a_bridge_that_exits_takes_no_list_and_starts_no_take_off(sky, probe):
+    hold_for_an_upload(sky, probe)
     sky.bridge.popen.send_signal(signal.SIGINT)
     probe.until(lambda: 'exits after the upload' in sky.bridge.output())
     sky.send(2, 1, [0])
@@ -67,16 +67,16 @@ def session(uav_id, airborne, replacing_since):
         watch=SimpleNamespace(replacing_since=replacing_since)))
 
 
-def test_a_swap_is_waited_for_as_long_as_it_lasts_and_no_longer_than_said():
+def test_an_upload_delays_the_exit_for_at_most_its_timeout():
     fleet = [session('a', True, None), session('b', True, 5.0)]
     assert not BridgeShutdown().waits(fleet[:1], 5.0)
-    end = BridgeShutdown()
-    assert end.waits(fleet, 100.0)
-    assert end.waits(fleet, 100.0 + 0.9 * UPLOAD_TIMEOUT)
-    assert not end.waits(fleet, 100.0 + UPLOAD_TIMEOUT)
+    shutdown = BridgeShutdown()
+    assert shutdown.waits(fleet, 100.0)
+    assert shutdown.waits(fleet, 100.0 + 0.9 * UPLOAD_TIMEOUT)
+    assert not shutdown.waits(fleet, 100.0 + UPLOAD_TIMEOUT)
 
 
-def test_everybody_in_the_air_is_named():
+def test_every_airborne_uav_is_named():
     fleet = [session('a', True, None), session('b', True, 5.0), session('c', False, None),
              session('d', True, None)]
     flying, held = BridgeShutdown.warnings(fleet)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The bridge in this process: what ends its threads, and what it hears that nobody should send."""
+"""The bridge in this process: failures of its threads, and hostile messages."""
 import socket
 
 import pytest
@@ -21,7 +21,7 @@ HEARTBEAT = d.MAVLink_heartbeat_message(d.MAV_TYPE_QUADROTOR, d.MAV_AUTOPILOT_PX
 
 
 class Bridge:
-    """A bridge with its log in lists, and one far end that it knows."""
+    """A bridge with its log in lists, and one remote that it knows."""
 
     def __init__(self):
         self.node = MavlinkBridge()
@@ -29,20 +29,20 @@ class Bridge:
         self.node.log.levels.update({level: lines.append for level, lines in self.log.items()})
         self.executor = SingleThreadedExecutor()
         self.executor.add_node(self.node)
-        self.far = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        self.far.bind(('127.0.0.1', 0))
-        self.far.settimeout(10.0)
+        self.remote = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self.remote.bind(('127.0.0.1', 0))
+        self.remote.settimeout(10.0)
         self.codec = Codec(1, 1)
 
-    def say(self, *messages):
+    def send(self, *messages):
         for message in messages:
-            self.far.sendto(self.codec.pack(message),
+            self.remote.sendto(self.codec.pack(message),
                             ('127.0.0.1', self.node.connections.links[0].port))
 
-    def heard(self, kind):
-        """The next message of a type that it sends to the far end."""
+    def received(self, kind):
+        """The next message of a type that it sends to the remote."""
         while True:
-            for message in self.codec.parse(self.far.recv(65536)):
+            for message in self.codec.parse(self.remote.recv(65536)):
                 if message.get_type() == kind:
                     return message
 
@@ -56,7 +56,7 @@ class Bridge:
     def close(self):
         self.executor.shutdown()
         self.node.destroy_node()
-        self.far.close()
+        self.remote.close()
 
 
 @pytest.fixture
@@ -80,7 +80,7 @@ def fact(health, name):
                  for array in health[-1:] for s in array.status if s.hardware_id == name), None)
 
 
-def test_finding_12_the_end_of_the_heartbeat_thread_is_told_and_mended(bridge, probe):
+def test_finding_12_a_heartbeat_thread_that_ends_is_reported_and_restarted(bridge, probe):
     health = probe.collect(DiagnosticArray, '/diagnostics', 10)
     one = bridge()
     heart = one.node.heartbeat
@@ -90,9 +90,9 @@ def test_finding_12_the_end_of_the_heartbeat_thread_is_told_and_mended(bridge, p
         heart._send = good
         raise BufferError('Existing exports of data')
     heart._send = bad
-    one.say(HEARTBEAT)
+    one.send(HEARTBEAT)
     one.until(lambda: heart.restarts == 1)
-    assert one.heard('HEARTBEAT').get_srcSystem() == 245
+    assert one.received('HEARTBEAT').get_srcSystem() == 245
     one.until(lambda: 'heartbeat: works' in one.log['info'])
     line, = one.log['error']
     assert line.startswith('heartbeat: its thread has ended: BufferError: Existing exports of')
@@ -105,11 +105,11 @@ def test_finding_10_a_bad_message_is_in_the_log_once_and_in_diagnostics(bridge, 
     one = bridge()
     item = d.MAVLink_mission_item_message(245, 190, 0, 3, 16, 0, 1, 0, 0, 0, 0, float('nan'),
                                           8.5, 500.0, 0)
-    one.say(HEARTBEAT)
-    one.heard('MISSION_REQUEST_LIST')
-    one.say(d.MAVLink_mission_count_message(245, 190, 1, 0))
-    one.heard('MISSION_REQUEST_INT')
-    one.say(item, item, d.MAVLink_statustext_message(6, b'\x1b[2Jready'))
+    one.send(HEARTBEAT)
+    one.received('MISSION_REQUEST_LIST')
+    one.send(d.MAVLink_mission_count_message(245, 190, 1, 0))
+    one.received('MISSION_REQUEST_INT')
+    one.send(item, item, d.MAVLink_statustext_message(6, b'\x1b[2Jready'))
     one.until(lambda: any('?[2Jready' in line for line in one.log['info']))
     one.until(lambda: not probe.executor.spin_once(timeout_sec=0.0) and (
         fact(health, 'messages') or [0, 0, {}])[2].get('messages_refused') == '2')
@@ -138,9 +138,9 @@ def test_finding_13_a_timestamp_that_cannot_be_written_is_a_warning_in_flight(
     assert one.node.receiver.is_alive()
 
 
-def test_finding_24_a_list_of_66000_points_is_refused_and_the_one_before_stays(bridge):
+def test_finding_24_a_list_of_66000_points_is_refused_and_the_previous_one_stays(bridge):
     one = bridge()
-    one.say(HEARTBEAT)
+    one.send(HEARTBEAT)
     one.until(lambda: 'uav_1' in one.node.lists.known)
     short = planned_task(Task('t', (60.0, 0.0, 50.0)), Leg((), 60.0), 0.0)
     way = Leg(((9.0, 9.0, 50.0),) * 65_998, 60.0)
@@ -155,19 +155,19 @@ def test_finding_24_a_list_of_66000_points_is_refused_and_the_one_before_stays(b
     assert one.node.receiver.is_alive()
 
 
-def test_finding_24_a_flood_of_strangers_leaves_the_known_vehicle(bridge):
+def test_finding_24_a_flood_of_unknown_senders_does_not_remove_a_known_vehicle(bridge):
     one = bridge()
     link, = one.node.connections.links
-    one.say(HEARTBEAT)
+    one.send(HEARTBEAT)
     one.until(lambda: 'uav_1' in one.node.lists.known)
     for _ in range(200):
-        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as stranger:
-            stranger.bind(('127.0.0.1', 0))
-            stranger.sendto(b'x', ('127.0.0.1', link.port))
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
+            sender.bind(('127.0.0.1', 0))
+            sender.sendto(b'x', ('127.0.0.1', link.port))
     one.until(lambda: one.node.connections.errors() == 200)
-    assert one.far.getsockname() in link.remotes()
+    assert one.remote.getsockname() in link.remotes()
     assert len(link.remotes()) == 1 + MAX_UNCONFIRMED
-    assert one.heard('HEARTBEAT').get_srcSystem() == 245
+    assert one.received('HEARTBEAT').get_srcSystem() == 245
 
 
 def test_no_mavlink_stream_ends_a_running_bridge(bridge, request):
@@ -181,8 +181,8 @@ def test_no_mavlink_stream_ends_a_running_bridge(bridge, request):
         one.executor.spin_once(timeout_sec=0.0)
     for end in ends:
         end.close()
-    one.say(HEARTBEAT)
-    one.heard('HEARTBEAT')
+    one.send(HEARTBEAT)
+    one.received('HEARTBEAT')
     one.until(lambda: any(line.startswith('found uav_') for line in one.log['info']))
     assert [line for level in one.log.values() for line in level if 'Error: ' in line] == []
     assert one.node.receiver.is_alive()

@@ -32,9 +32,9 @@ def test_the_policy_allows_what_a_node_does_and_no_more(start, probe, name, give
     start(name, *given)
     probe.until(lambda: name in probe.node.get_node_names())
     if name == 'allocator':
-        told = probe.node.create_publisher(m.UavState, 'uav_states', STATES)
+        states = probe.node.create_publisher(m.UavState, 'uav_states', STATES)
         work = probe.publisher(m.TaskAnnouncement, 'task_announcements', ANNOUNCEMENTS)
-        probe.node.create_timer(0.1, lambda: told.publish(uav()))
+        probe.node.create_timer(0.1, lambda: states.publish(uav()))
         work.publish(tasks('t', 2))
     graph = probe.node
     for what, right, look in (
@@ -65,41 +65,41 @@ def tasks(prefix, number):
                value=1.0) for k in range(number)])
 
 
-def test_two_fleets_in_one_domain_do_not_hear_each_other(start, probe):
-    heard = {}
+def test_two_fleets_in_one_domain_do_not_exchange_messages(start, probe):
+    allocations = {}
     for side in 'ab':
         start('allocator', '-r', f'__ns:=/{side}')
         states = probe.publisher(m.UavState, f'{side}/uav_states', STATES)
         work = probe.publisher(m.TaskAnnouncement, f'{side}/task_announcements', ANNOUNCEMENTS)
         probe.node.create_timer(0.1, lambda to=states, side=side: to.publish(uav(f'u_{side}')))
         work.publish(tasks(side, 2))
-        heard[side] = probe.collect(m.Allocation, f'{side}/allocation', LATCHED)
+        allocations[side] = probe.collect(m.Allocation, f'{side}/allocation', LATCHED)
     for side in 'ab':
-        probe.until(lambda side=side: heard[side] and heard[side][-1].value == 2.0)
+        probe.until(lambda side=side: allocations[side] and allocations[side][-1].value == 2.0)
     for side in 'ab':
-        lists = heard[side][-1].lists
+        lists = allocations[side][-1].lists
         assert [each.uav_id for each in lists] == [f'u_{side}']
         assert sorted(p.task.task_id for p in lists[0].tasks) == [f'{side}0', f'{side}1']
 
 
-def test_a_remapped_topic_is_heard(start, probe):
+def test_a_remapped_topic_is_received(start, probe):
     start('allocator', '-r', 'task_announcements:=orders')
     orders = probe.publisher(m.TaskAnnouncement, 'orders', ANNOUNCEMENTS)
-    told = probe.collect(m.TaskStatusArray, 'task_statuses', LATCHED)
+    statuses = probe.collect(m.TaskStatusArray, 'task_statuses', LATCHED)
     orders.publish(tasks('t', 1))
-    probe.until(lambda: told and told[-1].statuses[0].task_id == 't0')
+    probe.until(lambda: statuses and statuses[-1].statuses[0].task_id == 't0')
 
 
 @pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM], ids=lambda n: n.name)
-def test_an_allocator_stops_in_good_order_amid_a_solve(start, probe, number, tmp_path):
+def test_an_allocator_exits_in_order_during_a_solve(start, probe, number, tmp_path):
     process = start('allocator', '-p', 'solve_budget:=60.0', '-p', f'state_dir:={tmp_path}')
     states = probe.publisher(m.UavState, 'uav_states', STATES)
     work = probe.publisher(m.TaskAnnouncement, 'task_announcements', ANNOUNCEMENTS)
-    told = probe.collect(m.TaskStatusArray, 'task_statuses', LATCHED)
+    statuses = probe.collect(m.TaskStatusArray, 'task_statuses', LATCHED)
     probe.until(lambda: 'ready' in process.output())
     work.publish(tasks('t', 100))
-    probe.until(lambda: told)
+    probe.until(lambda: statuses)
     states.publish(uav())
-    probe.until(lambda: 'u heard' in process.output())
+    probe.until(lambda: 'u reports' in process.output())
     code, out = process.stop(number)
     assert (code, 'Traceback' in out) == (0, False)

@@ -37,7 +37,7 @@ def test_finding_34_a_bad_scenario_costs_no_earlier_results(tmp_path, capsys):
     assert summary.exists()
 
 
-def test_finding_34_the_results_of_the_last_demo_make_room(tmp_path):
+def test_finding_34_the_results_of_the_last_demo_are_removed(tmp_path):
     out = tmp_path / 'out'
     for _ in range(2):
         with pytest.raises(Started):

@@ -20,17 +20,17 @@ WHY = ('fleet_origin of another node is (47.4000000, 8.5455940, 488 m), 251.061 
 
 @pytest.fixture
 def sky(start, probe, tmp_path):
-    made = Sky(start, probe, tmp_path / 'flight.jsonl')
-    yield made
-    if made.thread.is_alive():
-        made.land()
+    sky = Sky(start, probe, tmp_path / 'flight.jsonl')
+    yield sky
+    if sky.thread.is_alive():
+        sky.land()
 
 
-def told(probe, origin):
-    """A node that has this origin."""
-    made = probe.publisher(m.FleetOrigin, 'fleet_origin', LATCHED)
-    made.publish(origin)
-    return made
+def publish_origin(probe, origin):
+    """Publish this origin, as another node would."""
+    publisher = probe.publisher(m.FleetOrigin, 'fleet_origin', LATCHED)
+    publisher.publish(origin)
+    return publisher
 
 
 def messages(health):
@@ -38,17 +38,17 @@ def messages(health):
 
 
 @pytest.mark.parametrize('executable', ['allocator', 'mavlink_bridge'])
-def test_finding_37_both_nodes_tell_their_origin(start, probe, executable):
-    heard = probe.collect(m.FleetOrigin, 'fleet_origin', LATCHED)
+def test_finding_37_both_nodes_publish_their_origin(start, probe, executable):
+    origins = probe.collect(m.FleetOrigin, 'fleet_origin', LATCHED)
     start(executable, '-p', 'origin.latitude:=-33.9', '-p', 'origin.longitude:=151.2', '-p',
           'origin.altitude_amsl:=40.0', *(
               ['-p', "connections:=['udpin:127.0.0.1:0']"] * (executable == 'mavlink_bridge')))
-    probe.until(lambda: heard)
-    assert heard[0] == m.FleetOrigin(latitude=-33.9, longitude=151.2, altitude_amsl=40.0)
+    probe.until(lambda: origins)
+    assert origins[0] == m.FleetOrigin(latitude=-33.9, longitude=151.2, altitude_amsl=40.0)
 
 
-def test_finding_37_a_bridge_flies_no_list_of_another_origin_until_it_is_gone(sky, probe):
-    other = told(probe, OTHER)
+def test_finding_37_a_bridge_flies_no_list_while_a_node_has_another_origin(sky, probe):
+    other = publish_origin(probe, OTHER)
     probe.until(lambda: sky.states['uav_1'].reason == WHY)
     for n in (1, 2):
         sky.send(n, 1, [0])
@@ -61,10 +61,10 @@ def test_finding_37_a_bridge_flies_no_list_of_another_origin_until_it_is_gone(sk
     assert sky.states['uav_1'].reason == ''
 
 
-def test_finding_37_a_vehicle_on_the_ground_stays_there_when_another_origin_turns_up(sky, probe):
+def test_finding_37_a_vehicle_on_the_ground_stays_there_when_another_origin_appears(sky, probe):
     sky.send(1, 1, [0, 1, 2])
     probe.until(lambda: sky.states['uav_1'].mode == m.UavState.ON_MISSION)
-    other = told(probe, OTHER)
+    other = publish_origin(probe, OTHER)
     sky.send(2, 1, [0])
     probe.until(lambda: sky.states['uav_2'].reason == WHY)
     # who flies already flies on
@@ -91,9 +91,9 @@ def test_finding_37_an_allocator_of_another_origin_is_not_flown(sky, start, prob
     fleet.until_state('t1', S.COMPLETED)
 
 
-def test_finding_37_an_allocator_plans_again_when_the_other_origin_is_gone(start, probe):
+def test_finding_37_an_allocator_resumes_planning_when_the_other_origin_disappears(start, probe):
     fleet = Fleet(probe)
-    other = told_first(probe)
+    other = publish_origin_first(probe)
     node = begin(start, fleet)
     probe.until(lambda: 'refuses to plan: fleet_origin' in node.output())
     fleet.uav('a', 0.0)
@@ -105,16 +105,16 @@ def test_finding_37_an_allocator_plans_again_when_the_other_origin_is_gone(start
     probe.until(lambda: fleet.route('a') == ['t0'])
 
 
-def told_first(probe):
-    """Another origin, told before anybody listens."""
-    made = probe.node.create_publisher(m.FleetOrigin, 'fleet_origin', LATCHED)
-    made.publish(OTHER)
-    return made
+def publish_origin_first(probe):
+    """Publish another origin before there is a subscriber."""
+    publisher = probe.node.create_publisher(m.FleetOrigin, 'fleet_origin', LATCHED)
+    publisher.publish(OTHER)
+    return publisher
 
 
-def test_the_same_origin_and_one_that_is_none_change_nothing(sky, probe):
-    told(probe, SAME)
-    told(probe, m.FleetOrigin(latitude=float('nan')))
+def test_the_same_origin_and_an_invalid_one_change_nothing(sky, probe):
+    publish_origin(probe, SAME)
+    publish_origin(probe, m.FleetOrigin(latitude=float('nan')))
     sky.send(1, 1, [0])
     probe.until(lambda: sky.completed(1) == ['u1_0'])
     probe.until(lambda: 'fleet_origin: origin latitude = nan' in sky.bridge.output())
@@ -128,7 +128,7 @@ def test_origins_a_millimetre_apart_are_the_same():
     assert '0.1 m from origin.*' in origins.conflict(0.0)
 
 
-def test_a_conflict_lasts_until_all_who_are_left_could_tell_again():
+def test_a_conflict_lasts_until_the_remaining_nodes_could_publish_again():
     origins = OriginReports(HERE)
     origins.add(Origin(47.4, 8.5, 488.0))
     origins.on_node_left(10.0)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""fleet_sim as a process: it speaks MAVLink for a scenario, and lets a UAV die when told."""
+"""fleet_sim as a process: MAVLink of a scenario, and UAVs that are switched off."""
 import json
 import socket
 import time
@@ -20,7 +20,7 @@ uavs:
 
 @pytest.fixture
 def bridge():
-    """The bridge's end: a bound socket, and who is heard there."""
+    """A bound socket in place of the bridge."""
     made = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     made.bind(('127.0.0.1', 0))
     made.settimeout(0.2)
@@ -37,26 +37,26 @@ def sim(start, bridge, tmp_path):
                  '-p', f'log_file:={tmp_path / "truth.jsonl"}')
 
 
-def heard_systems(bridge, wanted, limit=20.0):
-    """Listen until all of `wanted` were heard."""
-    codec, heard, end = Codec(255, 190), set(), time.monotonic() + limit
-    while not wanted <= heard:
-        assert time.monotonic() < end, f'heard only {heard}'
+def receive_systems(bridge, wanted, limit=20.0):
+    """Receive until all system ids in `wanted` have sent."""
+    codec, senders, end = Codec(255, 190), set(), time.monotonic() + limit
+    while not wanted <= senders:
+        assert time.monotonic() < end, f'received only from {senders}'
         try:
-            heard |= {m.get_srcSystem() for m in codec.parse(bridge.recv(4096))}
+            senders |= {m.get_srcSystem() for m in codec.parse(bridge.recv(4096))}
         except TimeoutError:
             continue
-    return heard
+    return senders
 
 
-def test_every_uav_of_the_scenario_speaks(sim, bridge):
-    assert heard_systems(bridge, {1, 2}) == {1, 2}
+def test_every_uav_of_the_scenario_sends_heartbeats(sim, bridge):
+    assert receive_systems(bridge, {1, 2}) == {1, 2}
     status, output = sim.stop()
     assert status == 0, output
 
 
-def test_a_uav_dies_when_told(sim, bridge, probe, tmp_path):
-    heard_systems(bridge, {1, 2})
+def test_a_uav_is_switched_off_by_the_service(sim, bridge, probe, tmp_path):
+    receive_systems(bridge, {1, 2})
     request = SetAvailability.Request(uav_id='uav_2', available=False)
     assert probe.call(SetAvailability, 'fleet_sim/set_alive', request).success
     sim.stop()
@@ -65,10 +65,10 @@ def test_a_uav_dies_when_told(sim, bridge, probe, tmp_path):
 
 
 def test_an_unknown_uav_is_refused_with_the_reason(sim, probe):
-    request = SetAvailability.Request(uav_id='nobody', available=False)
+    request = SetAvailability.Request(uav_id='no_such_uav', available=False)
     answer = probe.call(SetAvailability, 'fleet_sim/set_alive', request)
     assert not answer.success
-    assert "uav 'nobody' is unknown" in answer.message
+    assert "uav 'no_such_uav' is unknown" in answer.message
 
 
 def test_a_bad_target_ends_it_with_one_clear_line(start, tmp_path):

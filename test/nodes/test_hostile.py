@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Whatever a topic or a service carries, the allocator lives, says what is wrong, and plans on.
+"""Hostile messages are refused with a reason, and the allocator goes on planning.
 
-`pytest test/nodes/test_hostile.py --hostile 20000` sends as many messages; the seeds stay.
+`pytest test/nodes/test_hostile.py --hostile 20000` sends that many; the seeds are fixed.
 """
 import math
 
@@ -43,12 +43,12 @@ def bombard(test, count):
 
 
 @pytest.mark.parametrize('what', GOOD)
-def test_the_messages_that_are_spoiled_are_good_ones(what):
+def test_the_messages_are_valid_before_a_field_is_spoiled(what):
     make, convert = GOOD[what]
     assert convert(make())
 
 
-def test_a_value_of_a_megabyte_is_shown_cut():
+def test_a_value_of_a_megabyte_is_truncated_in_the_error():
     with pytest.raises(InvalidValue) as refused:
         messages.to_task(m.Task(task_id='x' * 1_000_000), ORIGIN)
     assert '(1000002 characters)' in str(refused.value)
@@ -84,7 +84,7 @@ def test_a_spoiled_field_is_refused_by_name_and_value_in_a_short_line(number):
 
 
 class Good:
-    """The tasks of somebody who means well, and a UAV that can fly them all."""
+    """Valid tasks, and a UAV that can fly them all."""
 
     def __init__(self):
         self.ids = []
@@ -113,8 +113,8 @@ def node(domain):
     rclpy.shutdown()
 
 
-def doors(node):
-    """What hears a message of each type."""
+def callbacks_of(node):
+    """The callback for each message type."""
     return {m.UavState: node.on_state, m.TaskAnnouncement: node.on_tasks,
             m.ThreatZoneArray: node.on_zones, m.TaskEvent: node.on_event,
             SubmitTasks.Request: lambda msg: node.on_submit(msg, SubmitTasks.Response()),
@@ -122,13 +122,13 @@ def doors(node):
                 msg, SetAvailability.Response())}
 
 
-def test_a_node_that_hears_hostile_messages_plans_all_good_ones(node, number):
+def test_a_node_that_receives_hostile_messages_plans_all_valid_tasks(node, number):
     node, executor = node
-    good, hear = Good(), doors(node)
+    good, callbacks = Good(), callbacks_of(node)
 
     def round_of(batch):
         for message in batch:
-            hear[type(message)](message)
+            callbacks[type(message)](message)
         node.on_state(good.state())
         node.on_tasks(good.task())
         executor.spin_once(timeout_sec=0.0)
@@ -144,14 +144,14 @@ def test_a_node_that_hears_hostile_messages_plans_all_good_ones(node, number):
     assert [i for i in good.ids if records[i].uav != 'good'] == []
 
 
-def test_a_running_node_is_not_brought_down_over_its_topics(start, probe):
+def test_hostile_topics_do_not_end_a_running_node(start, probe):
     process = start('allocator')
     good = Good()
     out = {kind: probe.publisher(kind, topic, qos) for kind, topic, qos in (
         (m.UavState, 'uav_states', STATES), (m.TaskEvent, 'task_events', EVENTS),
         (m.TaskAnnouncement, 'task_announcements', ANNOUNCEMENTS),
         (m.ThreatZoneArray, 'threat_zones', LATCHED))}
-    told = probe.collect(m.TaskStatusArray, 'task_statuses', LATCHED)
+    arrays = probe.collect(m.TaskStatusArray, 'task_statuses', LATCHED)
 
     def round_of(batch):
         for message in batch:
@@ -162,10 +162,10 @@ def test_a_running_node_is_not_brought_down_over_its_topics(start, probe):
     bombard(round_of, 300)
     out[m.ThreatZoneArray].publish(m.ThreatZoneArray())
     probe.node.create_timer(0.1, lambda: out[m.UavState].publish(good.state()))
-    probe.until(lambda: told and {s.task_id for s in told[-1].statuses if s.uav_id == 'good'}
+    probe.until(lambda: arrays and {s.task_id for s in arrays[-1].statuses if s.uav_id == 'good'}
                 == set(good.ids), 60.0,
                 lambda: (len(good.ids), [(each.task_id, each.state, each.uav_id, each.reason)
-                                         for last in told[-1:] for each in last.statuses
+                                         for last in arrays[-1:] for each in last.statuses
                                          if each.task_id.startswith('good')],
                          process.output()[-2000:]))
     code, text = process.stop()

@@ -90,7 +90,7 @@ def moved(tmp_path):
 
 
 def parameters(probe, node, *names):
-    """Values of a running node; asked again, as a call is lost that goes to a killed one."""
+    """Values of a running node; repeated, as a call to a killed node is lost."""
     client = probe.node.create_client(GetParameters, f'/{node}/get_parameters')
     calls = []  # (when [s], future)
 
@@ -108,7 +108,7 @@ def parameters(probe, node, *names):
 def flies_to_its_end(probe, path):
     """Every task of the scenario is flown, but one that comes to lie in a zone; then all hold."""
     played = scenario.load(path)
-    told = probe.collect(m.TaskStatusArray, 'task_statuses', LATCHED)
+    arrays = probe.collect(m.TaskStatusArray, 'task_statuses', LATCHED)
     states = {}
     probe.node.create_subscription(
         m.UavState, 'uav_states', lambda msg: states.update({msg.uav_id: msg}), STATES)
@@ -118,7 +118,7 @@ def flies_to_its_end(probe, path):
     wanted = {timed.task.id for timed in played.tasks} - {'t20'}
 
     def statuses():
-        return {row.task_id: row for row in told[-1].statuses} if told else {}
+        return {row.task_id: row for row in arrays[-1].statuses} if arrays else {}
 
     def flown():
         rows = statuses()
@@ -133,7 +133,7 @@ def flies_to_its_end(probe, path):
         assert 0.0 < states[uav.id].range_remaining < uav.range
         assert states[uav.id].range_remaining == pytest.approx(
             uav.range * states[uav.id].battery, rel=1e-5)
-    modes = {m.UavState.HOLD, m.UavState.STANDBY}  # one that never flew stands where it was
+    modes = {m.UavState.HOLD, m.UavState.STANDBY}  # one that never flew is on the ground
     probe.until(lambda: {state.mode for name, state in states.items() if name != 'uav_3'}
                 <= modes, END)
     assert any(state.mode == m.UavState.HOLD for state in states.values())
@@ -180,7 +180,7 @@ def quiet(tmp_path):
     ('demo', {'scenario': '/none.yaml'}), ('fleet', {'scenario': '/none.yaml'}),
     ('fleet', {'bridge_params': '/none.yaml'}), ('demo', {'speedup': '0'}),
     *([] if shutil.which('rviz2') else [('demo', {'rviz': 'true'}), ('fleet', {'rviz': 'true'})])])
-def test_finding_36_a_bad_argument_leaves_no_node_behind(launch, name, given):
+def test_finding_36_a_bad_argument_leaves_no_node_running(launch, name, given):
     launched = launch(name, **given)
     assert launched.popen.wait(60) != 0
     assert not launched.alive(), launched.output()
@@ -188,7 +188,7 @@ def test_finding_36_a_bad_argument_leaves_no_node_behind(launch, name, given):
     assert 'expected' in launched.output()
 
 
-def test_finding_36_a_bad_parameter_ends_all_and_is_not_tried_again(launch, tmp_path):
+def test_finding_36_a_bad_parameter_ends_the_launch_without_a_restart(launch, tmp_path):
     bad = tmp_path / 'bad.yaml'
     bad.write_text(yaml.safe_dump({'/**/mavlink_bridge': {'ros__parameters': {
         'autopilot': 'cleanflight', 'connections': ['udpin:127.0.0.1:0']}}}))
@@ -200,7 +200,7 @@ def test_finding_36_a_bad_parameter_ends_all_and_is_not_tried_again(launch, tmp_
 
 
 @pytest.mark.parametrize('name', ['allocator', 'mavlink_bridge'])
-def test_finding_36_a_killed_node_comes_back_with_its_parameters(launch, probe, tmp_path, name):
+def test_finding_36_a_killed_node_is_restarted_with_its_parameters(launch, probe, tmp_path, name):
     launched = launch('fleet', bridge_params=quiet(tmp_path))
     probe.until(lambda: name in probe.node.get_node_names())
     os.kill(launched.pids(name)[0], signal.SIGKILL)

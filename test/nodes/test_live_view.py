@@ -21,7 +21,7 @@ from uav_task_alloc.nodes.conversions.messages import (
     announcement,
     from_zones,
 )
-from uav_task_alloc.record import message_records as lines, run_state as heard
+from uav_task_alloc.record import message_records, run_state
 from uav_task_alloc.zone_codec import decode_zone
 
 TEXT = """uavs:
@@ -54,17 +54,17 @@ def test_it_shows_records_and_ends_when_all_is_settled(start, probe, tmp_path):
     view = start('live_view', '-p', f'scenario:={path}', '-p', f'out_dir:={tmp_path}/out',
                  '-p', 'speedup:=10.0', '-p', 'settle:=5.0', '-p', 'port:=0')
     tasks = probe.publisher(m.TaskAnnouncement, 'task_announcements', ANNOUNCEMENTS)
-    told = probe.publisher(m.TaskStatusArray, 'task_statuses', LATCHED)
+    task_statuses = probe.publisher(m.TaskStatusArray, 'task_statuses', LATCHED)
     states = probe.publisher(m.UavState, 'uav_states', STATES)
     plans = probe.publisher(m.Allocation, 'allocation', LATCHED)
     tasks.publish(ADD)
     plans.publish(m.Allocation(revision=1, trigger='1 new task',
                                solve_time=Duration(nanosec=100_000_000)))
-    told.publish(statuses(m.TaskStatus.ACTIVE))
+    task_statuses.publish(statuses(m.TaskStatus.ACTIVE))
     states.publish(state(m.UavState.ON_MISSION, 15.0))
     probe.until(lambda: '1 active' in view.output())
     assert view.popen.poll() is None
-    told.publish(statuses(m.TaskStatus.COMPLETED))
+    task_statuses.publish(statuses(m.TaskStatus.COMPLETED))
 
     def over():
         states.publish(state())
@@ -72,24 +72,24 @@ def test_it_shows_records_and_ends_when_all_is_settled(start, probe, tmp_path):
     probe.until(over)
     assert view.popen.returncode == 0
     assert '1 of 1 tasks completed; 0 zones' in view.output()
-    said = heard.read_record(tmp_path / 'out')
-    assert said.tasks['t1'].position == (10.0, 20.0, 30.0)
-    assert said.statuses['t1'] == heard.ReportedStatus('COMPLETED', 'uav_1', '')
-    assert [(solve.milliseconds, solve.trigger) for solve in said.solves] == [
+    state_of_run = run_state.read_record(tmp_path / 'out')
+    assert state_of_run.tasks['t1'].position == (10.0, 20.0, 30.0)
+    assert state_of_run.statuses['t1'] == run_state.ReportedStatus('COMPLETED', 'uav_1', '')
+    assert [(solve.milliseconds, solve.trigger) for solve in state_of_run.solves] == [
         (pytest.approx(100.0), '1 new task')]
-    assert said.uavs['uav_1']['mode'] == 'STANDBY'
-    assert said.uploads == 1
+    assert state_of_run.uavs['uav_1']['mode'] == 'STANDBY'
+    assert state_of_run.uploads == 1
 
 
-def test_the_page_shows_what_the_node_hears(start, probe):
+def test_the_page_shows_what_the_node_receives(start, probe):
     view = start('live_view', '-p', 'port:=0')
     tasks = probe.publisher(m.TaskAnnouncement, 'task_announcements', ANNOUNCEMENTS)
     states = probe.publisher(m.UavState, 'uav_states', STATES)
-    told = probe.publisher(m.ThreatZoneArray, 'threat_zones', LATCHED)
+    zones = probe.publisher(m.ThreatZoneArray, 'threat_zones', LATCHED)
     bad = m.ThreatZoneArray(zones=[m.ThreatZone(zone_id='no zone')])
     bad.zones += from_zones([ThreatZone.hemisphere('z1', (1.0, 2.0, 3.0), 4.0)], 0.0).zones
     tasks.publish(ADD)
-    told.publish(bad)
+    zones.publish(bad)
     address = re.search(r'Live page: (http://127\.0\.0\.1:\d+/)', view.output()).group(1)
     def parts():
         states.publish(state())
@@ -109,7 +109,7 @@ def test_the_page_shows_what_the_node_hears(start, probe):
     assert view.stop()[0] == 0
 
 
-def test_a_port_in_use_is_told_and_the_node_goes_on(start, probe):
+def test_a_port_in_use_is_logged_and_the_node_goes_on(start, probe):
     with socket.create_server(('127.0.0.1', 0)) as taken:
         port = taken.getsockname()[1]
         view = start('live_view', '-p', f'port:={port}')
@@ -118,7 +118,7 @@ def test_a_port_in_use_is_told_and_the_node_goes_on(start, probe):
     assert view.stop()[0] == 0
 
 
-def test_without_a_scenario_it_goes_on_until_it_is_stopped(start, probe):
+def test_without_a_scenario_it_runs_until_it_is_stopped(start, probe):
     view = start('live_view', '-p', 'page:=false')
     states = probe.publisher(m.UavState, 'uav_states', STATES)
 
@@ -130,17 +130,17 @@ def test_without_a_scenario_it_goes_on_until_it_is_stopped(start, probe):
     assert view.stop()[0] == 0
 
 
-def test_what_a_message_does_not_know_is_null_in_json():
-    line = lines.state_record(state(speed=math.nan))
+def test_unknown_values_of_a_message_are_null_in_json():
+    line = message_records.state_record(state(speed=math.nan))
     assert (line['battery'], line['velocity']) == (None, [None, 0.0, 0.0])
     json.dumps(line, allow_nan=False)
 
 
-def test_zones_come_back_from_the_record_as_they_were():
+def test_zones_survive_the_record():
     zones = [ThreatZone.hemisphere('a', (1.0, 2.0, 3.0), 4.0, 5.0),
              ThreatZone.cylinder('b', (1.0, 2.0), 3.0),
              ThreatZone.polygon('c', [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)], 0.0, 9.0)]
-    text = json.dumps(lines.zones_record(from_zones(zones, 0.0)), allow_nan=False)
+    text = json.dumps(message_records.zones_record(from_zones(zones, 0.0)), allow_nan=False)
     assert [decode_zone(row) for row in json.loads(text)['zones']] == zones
 
 
@@ -148,7 +148,8 @@ def test_a_bad_task_of_an_announcement_is_left_out():
     bad = announcement(m.TaskAnnouncement.ADD, [Task('t2', (1.0, 2.0, 3.0))], 0.0)
     bad.tasks[0].position = Point(x=math.nan)
     bad.tasks += ADD.tasks
-    assert [task['id'] for task in lines.announcement_record(bad, ORIGIN)['tasks']] == ['t1']
+    tasks = message_records.announcement_record(bad, ORIGIN)['tasks']
+    assert [task['id'] for task in tasks] == ['t1']
 
 
 def test_uploads_and_health_are_taken_from_the_diagnostics():
@@ -157,7 +158,7 @@ def test_uploads_and_health_are_taken_from_the_diagnostics():
         values=[KeyValue(key=key, value=value) for key, value in (
             ('uploads', '4'), ('rate', '10'), ('authority', 'LOST'), ('authority_why', 'why'),
             ('authority_for', '12 s'), ('given_back_by', '~/hand_over'))])
-    assert lines.uploads_record(DiagnosticArray(status=[status])) == {
+    assert message_records.uploads_record(DiagnosticArray(status=[status])) == {
         'kind': 'uploads', 'uploads': {'mavlink_bridge: uav_1': 4},
         'health': {'uav_1': [1, 'link stale']},
         'authority': {'uav_1': {'state': 'LOST', 'why': 'why', 'for': 12.0,
@@ -166,27 +167,28 @@ def test_uploads_and_health_are_taken_from_the_diagnostics():
 
 @pytest.mark.parametrize(('given', 'seconds'), [('0 s', 0.0), ('nan s', None), ('', None),
                                                 ('long', None)])
-def test_for_how_long_is_a_number_or_unknown(given, seconds):
+def test_the_duration_of_authority_is_a_number_or_unknown(given, seconds):
     status = DiagnosticStatus(hardware_id='u', values=[
         KeyValue(key='authority', value='HELD'), KeyValue(key='authority_for', value=given),
         KeyValue(key='given_back_by', value='nothing is needed')])
-    said = lines.uploads_record(DiagnosticArray(status=[status]))['authority']['u']
-    assert (said['for'], said['back']) == (seconds, '')
+    line = message_records.uploads_record(DiagnosticArray(status=[status]))
+    authority = line['authority']['u']
+    assert (authority['for'], authority['back']) == (seconds, '')
 
 
-def test_a_state_carries_who_has_the_uav():
-    line = lines.state_record(m.UavState(authority=m.UavState.LOST, reason='why'))
+def test_a_state_record_has_the_authority():
+    line = message_records.state_record(m.UavState(authority=m.UavState.LOST, reason='why'))
     assert (line['authority'], line['reason']) == ('LOST', 'why')
 
 
 @pytest.mark.parametrize('value', ['\u00b2', '\u0663', '-1', '', '9' * 5000, '1e3'])
 def test_finding_31_a_count_of_uploads_is_plain_digits(value):
     status = DiagnosticStatus(name='b', values=[KeyValue(key='uploads', value=value)])
-    assert lines.uploads_record(DiagnosticArray(status=[status]))['uploads'] == {}
+    assert message_records.uploads_record(DiagnosticArray(status=[status]))['uploads'] == {}
 
 
-def test_finding_31_via_points_that_are_no_places_are_left_out():
-    line = lines.task_list_record(broken_list())
+def test_finding_31_via_points_that_are_not_finite_are_left_out():
+    line = message_records.task_list_record(broken_list())
     assert line['tasks'][0]['via'] == [(1.0, 2.0, 3.0)]
     json.dumps(line, allow_nan=False)
 

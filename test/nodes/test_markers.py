@@ -74,8 +74,9 @@ uavs = st.just({}) | st.builds(lambda p, silent: {'u1': uav('u1', *p, silent=sil
 @given(st.lists(zones, max_size=3), st.lists(records, max_size=5), lists, uavs,
        st.sets(st.sampled_from(['t0', 't1', 't2'])))
 @settings(max_examples=150, deadline=None)
-def test_whatever_the_world_is_its_markers_are_sound(zones, tasks, one, uavs, changed):
-    check_markers(markers(MarkerScene(AT, [one], tasks, uavs, zones, frozenset(changed), 'x' * 99)))
+def test_the_markers_of_any_world_are_valid(zones, tasks, one, uavs, changed):
+    check_markers(markers(MarkerScene(
+        AT, [one], tasks, uavs, zones, frozenset(changed), 'x' * 99)))
     check_path(path_message(one, uavs.get('u1')))
 
 
@@ -107,7 +108,7 @@ def test_tasks_are_coloured_by_state_and_sized_by_value():
     assert texts(left, 'left_out') == ['c: because']
 
 
-def test_what_the_last_replan_changed_is_set_off():
+def test_what_the_last_plan_changed_is_highlighted():
     one = UavList('u1', 3, (stop('a', 100.0, 0.0, 5.0), stop('b', 200.0, 0.0, 5.0)))
     scene = MarkerScene(AT, [one], changed=frozenset({'b'}), trigger='ADD b')
     left = check_markers(markers(scene))
@@ -117,7 +118,7 @@ def test_what_the_last_replan_changed_is_set_off():
     assert texts(left, 'replan_label') == ['ADD b: 1 changed']
 
 
-def test_a_silent_uav_says_so_and_loses_its_colour():
+def test_a_silent_uav_is_labelled_and_grey():
     left = check_markers(markers(MarkerScene(AT, uavs={
         'u1': uav('u1', 0.0, 0.0, 0.0), 'u2': uav('u2', 9.0, 0.0, 0.0, silent=True)})))
     assert texts(left, 'uav_labels') == ['u1', 'u2 silent']
@@ -195,7 +196,7 @@ def test_nothing_is_published_without_subscribers_or_changes(probe, monkeypatch)
 
 
 @pytest.mark.ros
-def test_a_running_allocator_draws_what_is_there_and_deletes_what_is_gone(start, probe):
+def test_a_running_allocator_draws_what_exists_and_deletes_what_was_removed(start, probe):
     start('allocator', '-p', 'route_end:=hold')
     pictures = probe.collect(MarkerArray, 'allocation_markers', LATCHED)
     paths = probe.collect(Path, 'u1/path', LATCHED)

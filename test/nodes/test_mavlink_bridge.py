@@ -108,7 +108,7 @@ def sky(start, probe, tmp_path):
             one.land()
 
 
-def test_lists_are_flown_and_replaced_in_flight_and_every_task_is_told_once(sky, probe):
+def test_lists_are_flown_and_replaced_in_flight_and_every_task_is_reported_once(sky, probe):
     world = sky()
     for n in KINDS:
         world.send(n, 1, [0, 1, 2, 3])
@@ -127,7 +127,7 @@ def test_lists_are_flown_and_replaced_in_flight_and_every_task_is_told_once(sky,
 
 
 @pytest.mark.parametrize('moment', ['upload', 'flight'])
-def test_a_bridge_killed_and_started_again_flies_no_task_twice(sky, probe, moment, tmp_path):
+def test_a_bridge_killed_and_restarted_flies_no_task_twice(sky, probe, moment, tmp_path):
     world = sky('-p', f'state_dir:={tmp_path}/state')
     for n in KINDS:
         world.send(n, 1, [0, 1, 2, 3, 4])
@@ -147,8 +147,8 @@ def test_a_bridge_killed_and_started_again_flies_no_task_twice(sky, probe, momen
     world.land()
     for n in KINDS:
         assert sorted(world.flown(n)) == [f'u{n}_{k}' for k in range(5)]
-        told = [t for t in world.completed(n) if world.completed(n).count(t) == 1]
-        assert set(told) >= {f'u{n}_{k}' for k in range(5)} - before[n]
+        completed = [t for t in world.completed(n) if world.completed(n).count(t) == 1]
+        assert set(completed) >= {f'u{n}_{k}' for k in range(5)} - before[n]
 
 
 def test_what_was_flown_while_the_bridge_was_dead_is_not_flown_again(sky, probe, tmp_path):
@@ -159,11 +159,11 @@ def test_what_was_flown_while_the_bridge_was_dead_is_not_flown_again(sky, probe,
     world.bridge.stop(signal.SIGKILL)
     probe.until(lambda: all(len(world.flown(n)) == 3 for n in KINDS))
     for n in KINDS:
-        world.send(n, 2, [])  # an allocator that heard nothing gives them up
+        world.send(n, 2, [])  # an allocator that received nothing gives them up
     world.again()
     for n in KINDS:
         world.send(n, 3, [2, 3, 1])
-    # it holds, nobody saw why: an operator may know
+    # it holds for a reason that the bridge did not see
     probe.until(lambda: world.states['uav_2'].authority == m.UavState.LOST)
     probe.until(lambda: hand_over(probe, 'uav_2')[0])
     probe.until(lambda: all({f'u{n}_{k}' for k in range(4)} == set(world.completed(n))
@@ -223,7 +223,7 @@ def test_a_pilot_takes_a_uav_and_the_other_gets_its_tasks(sky, probe, start):
     assert '-> LOITER' in world.bridge.output()
 
 
-def test_who_has_each_uav_is_kept_over_a_restart_of_the_bridge(sky, probe, tmp_path):
+def test_authority_persists_over_a_restart_of_the_bridge(sky, probe, tmp_path):
     world = sky('-p', f'state_dir:={tmp_path}/state')
     world.send(1, 1, [0, 1], end=m.TaskList.RETURN_HOME)
     probe.until(lambda: world.states['uav_1'].authority == m.UavState.NONE, 90.0)
@@ -236,7 +236,7 @@ def test_who_has_each_uav_is_kept_over_a_restart_of_the_bridge(sky, probe, tmp_p
     assert world.fact(1, 'authority_why') == 'landed'
 
 
-def test_a_file_of_authority_that_is_damaged_is_reported(sky, probe, tmp_path):
+def test_a_corrupt_authority_file_is_reported(sky, probe, tmp_path):
     path = tmp_path / 'authority_uav_1.json'
     path.write_text('{')
     world = sky('-p', f'state_dir:={tmp_path}')
@@ -244,14 +244,14 @@ def test_a_file_of_authority_that_is_damaged_is_reported(sky, probe, tmp_path):
     probe.until(lambda: world.states['uav_1'].authority == m.UavState.HELD)
 
 
-def test_a_bad_zone_is_refused_with_a_warning_and_said_once(sky, probe):
+def test_a_bad_zone_is_refused_with_one_warning(sky, probe):
     world = sky()
     zones = probe.publisher(m.ThreatZoneArray, 'threat_zones', LATCHED)
-    picture = from_zones([ThreatZone.cylinder('z', (9e3, 9e3), 10.0)], 0.0)
-    zones.publish(picture)
-    picture.zones[0].radius = -1.0
+    array = from_zones([ThreatZone.cylinder('z', (9e3, 9e3), 10.0)], 0.0)
+    zones.publish(array)
+    array.zones[0].radius = -1.0
     for _ in range(3):
-        zones.publish(picture)
+        zones.publish(array)
     probe.until(lambda: 'threat_zones: zone z: radius = -1.0' in world.bridge.output())
     world.send(1, 1, [0])
     probe.until(lambda: world.completed(1) == ['u1_0'])
@@ -268,7 +268,7 @@ def test_finding_38_each_uav_has_its_own_range(sky, probe):
 
 @pytest.mark.parametrize('entry', ['uav_1', 'uav_1:', ':5', 'uav_1:far', 'uav_1:-1', 'uav_1:nan',
                                    'uav_1:1e8'])
-def test_a_bad_range_ends_the_bridge_in_words(start, entry):
+def test_a_bad_range_ends_the_bridge_with_a_reason(start, entry):
     bridge = start('mavlink_bridge', '-p', f"full_ranges:=['{entry}']", '-p',
                    "connections:=['udpin:127.0.0.1:0']")
     bridge.popen.wait(20)
@@ -289,7 +289,7 @@ def test_states_carry_what_the_allocator_plans_with(sky, probe):
     assert one.cruise_speed != one.cruise_speed
 
 
-def test_a_bad_list_is_refused_in_words_and_changes_nothing(sky, probe):
+def test_a_bad_list_is_refused_with_a_reason_and_changes_nothing(sky, probe):
     world = sky()
     world.send(1, 1, [0, 1])
     probe.until(lambda: world.states['uav_1'].list_revision == 1)
@@ -305,17 +305,17 @@ def test_a_bad_list_is_refused_in_words_and_changes_nothing(sky, probe):
 
 def test_diagnostics_name_each_uav_and_its_mission(sky, probe):
     world = sky()
-    heard = world.health
+    arrays = world.health
     world.send(2, 1, [0, 1])
     probe.until(lambda: any(s.hardware_id == 'uav_2' and 'VERIFIED' in s.message
-                            for array in heard for s in array.status))
-    details = {v.key: v.value for s in heard[-1].status if s.hardware_id == 'uav_2'
+                            for array in arrays for s in array.status))
+    details = {v.key: v.value for s in arrays[-1].status if s.hardware_id == 'uav_2'
                for v in s.values}
     assert details['autopilot'] == 'px4'
     assert details['mission'] == 'VERIFIED'
 
 
-def test_finding_13_a_damaged_signing_timestamp_ends_the_start_in_words(start, tmp_path):
+def test_finding_13_a_corrupt_signing_timestamp_ends_the_start_with_a_reason(start, tmp_path):
     tmp_path.joinpath('key').write_bytes(bytes(32))
     tmp_path.joinpath('key.timestamp').write_text('soon')
     process = start('mavlink_bridge', '-p', "connections:=['udpin:127.0.0.1:0']", '-p',
@@ -338,7 +338,7 @@ def test_finding_13_a_damaged_signing_timestamp_ends_the_start_in_words(start, t
     ('relaunch:=never', "relaunch = 'never': expected one of operator, automatic"),
     ("capabilities:=['camera']", "capabilities = 'camera': expected `UAV_ID:WORD,WORD`"),
 ])
-def test_a_bad_parameter_is_refused_in_words(start, given, text):
+def test_a_bad_parameter_is_refused_with_a_reason(start, given, text):
     process = start('mavlink_bridge', '-p', "connections:=['udpin:127.0.0.1:0']", '-p', given)
     process.popen.wait(20)
     code, out = process.stop()
@@ -347,7 +347,7 @@ def test_a_bad_parameter_is_refused_in_words(start, given, text):
     assert 'Traceback' not in out
 
 
-def test_a_link_that_cannot_be_opened_is_told_once_and_in_diagnostics(start, probe):
+def test_a_link_that_cannot_be_opened_is_logged_once_and_in_diagnostics(start, probe):
     health = probe.collect(DiagnosticArray, '/diagnostics', 10)
     bridge = start('mavlink_bridge', '-p', "connections:=['/dev/ttyNOPE:57600']")
     words = '/dev/ttyNOPE:57600: No such file or directory'

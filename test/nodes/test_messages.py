@@ -21,7 +21,7 @@ def task_message(**changed):
     return base
 
 
-def test_a_task_comes_back_as_it_went():
+def test_a_task_survives_its_message():
     task = Task('t1', (10.0, 20.0, 30.0), 2.0, 3.5, frozenset({'camera'}), frozenset({'u1'}), 4.0)
     assert messages.to_task(messages.from_task(task), ORIGIN) == task
 
@@ -85,7 +85,7 @@ def test_a_bad_state_is_refused_by_the_name_of_its_field(changed, text):
     ThreatZone.cylinder('z1', (1.0, 2.0), 80.0),
     ThreatZone.polygon('z1', [(0.0, 0.0), (10.0, 0.0), (0.0, 10.0)], 0.0, 50.0, margin=2.0),
 ])
-def test_a_zone_comes_back_as_it_went(zone):
+def test_a_zone_survives_its_message(zone):
     assert decode_zone_message(messages.from_zone(zone)) == zone
 
 
@@ -100,13 +100,13 @@ def test_a_bad_zone_is_refused_by_the_name_of_its_field():
 
 
 @pytest.mark.parametrize('seconds', [0.0, 1.5, -1.5, 1_800_000_000.123456, 0.9999999999])
-def test_times_survive_the_way_through_a_message(seconds):
+def test_times_survive_a_message(seconds):
     assert messages.from_stamp(messages.to_stamp(seconds)) == pytest.approx(seconds, abs=1e-6)
     assert messages.from_stamp(messages.to_duration(min(seconds, 1e6))) == pytest.approx(
         min(seconds, 1e6), abs=1e-6)
 
 
-def test_a_planned_task_carries_its_way():
+def test_a_planned_task_contains_its_leg():
     msg = messages.planned_task(Task('t1', (1.0, 2.0, 3.0)), Leg(((0.5, 0.5, 0.5),), 4.0), 2.5)
     assert (msg.leg_distance, msg.via[0].x, msg.eta.sec, msg.eta.nanosec) == (
         4.0, 0.5, 2, 500_000_000)
@@ -121,20 +121,20 @@ def test_a_task_without_a_radius_gets_that_of_the_parameter():
         assert [stop.task.acceptance_radius for stop in made.stops] == expected
 
 
-def test_a_bad_zone_of_a_picture_stays_as_it_was_and_the_others_are_taken():
+def test_a_bad_zone_of_a_message_stays_as_it_was_and_the_others_are_taken():
     a, b = (ThreatZone.cylinder(name, (0.0, 0.0), 10.0) for name in 'ab')
     first, trouble = bridge_messages.to_zones(messages.from_zones([a], 0.0), ())
     assert (first, trouble) == ((a,), '')
-    picture = messages.from_zones([a, b], 0.0)
-    picture.zones[0].radius = -1.0
-    found, trouble = bridge_messages.to_zones(picture, first)
-    assert set(found) == {a, b}
+    array = messages.from_zones([a, b], 0.0)
+    array.zones[0].radius = -1.0
+    zones, trouble = bridge_messages.to_zones(array, first)
+    assert set(zones) == {a, b}
     assert 'zone a: radius = -1.0' in trouble
-    assert bridge_messages.to_zones(messages.from_zones([], 0.0), found) == ((), '')
+    assert bridge_messages.to_zones(messages.from_zones([], 0.0), zones) == ((), '')
     with pytest.raises(InvalidValue, match='zones: number'):
-        bridge_messages.to_zones(m.ThreatZoneArray(zones=[m.ThreatZone()] * 1001), found)
+        bridge_messages.to_zones(m.ThreatZoneArray(zones=[m.ThreatZone()] * 1001), zones)
 
 
-def test_a_uav_in_standby_stands_on_the_ground():
+def test_a_uav_in_standby_is_on_the_ground():
     assert [messages.to_report(m.UavState(uav_id='a', mode=mode)).standby for mode in
             (m.UavState.STANDBY, m.UavState.UNKNOWN, m.UavState.HOLD)] == [True, False, False]

@@ -30,7 +30,7 @@ def test_an_executable_is_where_ros2_run_looks(name):
 
 @pytest.mark.parametrize('name', params.NODES)
 @pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM], ids=lambda n: n.name)
-def test_a_node_stops_in_good_order(start, probe, name, number):
+def test_a_node_exits_in_order_on_a_signal(start, probe, name, number):
     process = start(name, *NEEDS.get(name, []))
     probe.until(lambda: name in probe.node.get_node_names())
     code, out = process.stop(number)
@@ -46,7 +46,7 @@ def test_a_node_stops_in_good_order(start, probe, name, number):
     ('fleet_sim', 'scenario:=/nowhere.yaml', '/nowhere.yaml'),
     ('scenario_player', 'speedup:=0.0', 'speedup = 0.0: expected float in [0.1, 100]'),
 ])
-def test_a_bad_start_parameter_ends_the_node_in_words(start, name, given, text):
+def test_a_bad_start_parameter_ends_the_node_with_a_reason(start, name, given, text):
     process = start(name, *NEEDS.get(name, []), '-p', given)
     process.popen.wait(20)
     code, out = process.stop()
@@ -69,7 +69,7 @@ def test_a_node_whose_callback_raises_ends_with_a_status_of_its_own(domain):
     assert 'ZeroDivisionError' in done.stderr
 
 
-def test_help_and_strange_arguments_are_answered_without_starting():
+def test_help_and_unknown_arguments_do_not_start_the_node():
     def ask(*arguments):
         path = Path(get_package_prefix('uav_task_alloc'), 'lib/uav_task_alloc/allocator')
         done = subprocess.run([path, *arguments], capture_output=True, text=True, timeout=30)
@@ -81,7 +81,7 @@ def test_help_and_strange_arguments_are_answered_without_starting():
 
 
 @pytest.mark.parametrize(('chosen', 'used'), [(None, 'UDPv4'), ('SHM', 'SHM')])
-def test_what_a_killed_node_left_in_shared_memory_is_not_in_the_way(monkeypatch, chosen, used):
+def test_nodes_use_udp_unless_another_transport_is_chosen(monkeypatch, chosen, used):
     def init(**_):
         raise SystemExit(os.environ['FASTDDS_BUILTIN_TRANSPORTS'])
     monkeypatch.setattr(nodes_run.rclpy, 'init', init)
@@ -95,7 +95,7 @@ def test_what_a_killed_node_left_in_shared_memory_is_not_in_the_way(monkeypatch,
     assert raised.value.code == used
 
 
-def test_a_whole_number_will_do_for_a_real_one_and_an_unknown_parameter_is_named(start, probe):
+def test_a_whole_number_is_accepted_for_a_real_one_and_an_unknown_parameter_is_named(start, probe):
     process = start('allocator', '-p', 'solve_budget:=1', '-p', 'solve_buget:=1.0')
     got = probe.call(GetParameters, '/allocator/get_parameters',
                      GetParameters.Request(names=['solve_budget'])).values[0]

@@ -70,7 +70,7 @@ def test_the_clock_waits_for_an_allocator(start, probe, file):
     assert player.stop()[0] == 0
 
 
-def test_the_clock_waits_for_a_first_plan_where_that_is_asked(start, probe, file):
+def test_the_clock_waits_for_a_first_plan_where_the_parameter_says_so(start, probe, file):
     tasks = probe.collect(m.TaskAnnouncement, 'task_announcements', ANNOUNCEMENTS)
     zones = probe.collect(m.ThreatZoneArray, 'threat_zones', LATCHED)
     start('scenario_player', '-p', f'scenario:={file}', '-p', 'speedup:=50.0',
@@ -82,7 +82,7 @@ def test_the_clock_waits_for_a_first_plan_where_that_is_asked(start, probe, file
     probe.until(lambda: len(tasks) == 3)
 
 
-def test_one_that_comes_late_still_hears_all_tasks_and_the_zones_as_they_are(start, probe, file):
+def test_a_late_subscriber_receives_all_tasks_and_the_latest_zones(start, probe, file):
     probe.collect(m.ThreatZoneArray, 'threat_zones', LATCHED)
     tasks = probe.collect(m.TaskAnnouncement, 'task_announcements', ANNOUNCEMENTS)
     start('scenario_player', '-p', f'scenario:={file}', '-p', 'speedup:=100.0')

@@ -30,19 +30,19 @@ def test_finding_31_an_id_too_long_for_its_namespace_is_refused_and_the_allocato
     probe.publisher(m.TaskAnnouncement, f'{SPACE}/task_announcements', ANNOUNCEMENTS).publish(
         task('t1'))
 
-    def heard(uav_id, words):
+    def reported(uav_id, words):
         states.publish(state(uav_id))
         return words in node.output()
 
-    probe.until(lambda: heard(LONG, f"uav_states: uav_id = '{LONG[:20]}"), 20.0, node.output)
+    probe.until(lambda: reported(LONG, f"uav_states: uav_id = '{LONG[:20]}"), 20.0, node.output)
     assert REFUSED in node.output()
     lists = probe.collect(m.TaskList, f'{SPACE}/good/task_list', LATCHED)
-    probe.until(lambda: heard('good', '') and lists, 60.0, node.output)
+    probe.until(lambda: reported('good', '') and lists, 60.0, node.output)
     assert [planned.task.task_id for planned in lists[-1].tasks] == ['t1']
     assert node.stop()[0] == 0
 
 
-def test_finding_31_lists_of_a_journal_that_no_topic_can_carry_any_more_are_named(
+def test_finding_31_restored_lists_whose_topic_name_is_too_long_are_named(
         start, probe, tmp_path):
     before = start('allocator', '-p', f'state_dir:={tmp_path}')
     states = probe.publisher(m.UavState, 'uav_states', STATES)

@@ -56,7 +56,7 @@ def publishers(probe):
 
 
 @pytest.mark.parametrize('more', [(), ('-p', 'use_sim_time:=true')], ids=['wall', 'simulated'])
-def test_finding_22_the_second_allocator_publishes_nothing_and_says_so(
+def test_finding_22_the_second_allocator_publishes_nothing_and_reports_it(
         start, probe, fleet, health, more):
     clock = probe.node.create_publisher(Clock, 'clock', LATCHED)
     clock.publish(Clock(clock=Time(sec=70)))
@@ -93,7 +93,7 @@ def test_finding_22_an_allocator_whose_journal_is_in_use_publishes_nothing(
     assert second.stop()[0] == 0
 
 
-def test_finding_22_a_killed_allocator_is_not_refused_by_its_own_past(
+def test_finding_22_a_killed_allocator_leads_again_after_its_restart(
         start, probe, fleet, health, tmp_path):
     state = ('-p', f'state_dir:={tmp_path}/state')
     first = working(start, probe, fleet, *state)

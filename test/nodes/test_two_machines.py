@@ -11,13 +11,13 @@ pytestmark = pytest.mark.ros
 CUT = Path(__file__).parents[2] / 'benchmarks/endurance/cut.py'
 
 
-def test_two_machines_meet_again_after_a_cut_and_nothing_is_lost():
+def test_two_machines_reconnect_after_a_cut_and_nothing_is_lost():
     done = subprocess.run([sys.executable, CUT, '--seconds', '2'], capture_output=True, text=True)
     assert done.returncode == 0, done.stdout + done.stderr
-    told = json.loads(done.stdout.splitlines()[-1])
-    if 'skipped' in told:
-        pytest.skip(told['skipped'])
-    assert not told['heard_amid'], 'the wire was never cut'
-    assert told['all_tasks']
-    assert told['revisions'] == sorted(set(told['revisions']))
-    assert told['allocator_status'] == 0
+    result = json.loads(done.stdout.splitlines()[-1])
+    if 'skipped' in result:
+        pytest.skip(result['skipped'])
+    assert not result['heard_amid'], 'the wire was never cut'
+    assert result['all_tasks']
+    assert result['revisions'] == sorted(set(result['revisions']))
+    assert result['allocator_status'] == 0
