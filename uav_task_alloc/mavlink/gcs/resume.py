@@ -187,7 +187,7 @@ class Resume:
         """Whether the positions since the start of this bridge show that it skipped an item."""
         item = with_position(item, self._origin)
         return item.position is not None and self._progress.path.visited(
-            item.position, item.radius, item.params[0], -math.inf) is Visit.NO
+            item.position, item.radius, 0.0, -math.inf) is Visit.NO
 
     def _flown_here(self) -> tuple[Item, ...]:
         """Flown items of the onboard mission that belong to no task of the list."""
