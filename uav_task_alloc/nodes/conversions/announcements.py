@@ -20,19 +20,19 @@ def announce(world: World, msg: m.TaskAnnouncement, origin: Origin, stamp: float
 
     Args:
         world: which takes the valid ones.
-        msg: the announcement.
         origin: of the ENU frame, for tasks in WGS84.
-        stamp: the published clock [s].
-        now: the steady clock [s].
+        stamp, now: the published and the steady clock [s].
 
     Returns:
         A verdict for each task; for the first MOST_TASKS of a message with more than that.
     """
+    def refuse(task: m.Task, error: InvalidValue) -> TaskVerdict:
+        return world.refuse(cut(task.task_id), str(error), stamp)
+
     try:
         action = to_action(msg)
     except InvalidValue as error:
-        return [world.refuse(cut(task.task_id), str(error), stamp)
-                for task in msg.tasks[:MOST_TASKS]]
+        return [refuse(task, error) for task in msg.tasks[:MOST_TASKS]]
     tasks: list[Task] = []
     task_ids: list[str] = []
     refused: list[TaskVerdict] = []
@@ -43,7 +43,7 @@ def announce(world: World, msg: m.TaskAnnouncement, origin: Origin, stamp: float
             else:
                 tasks.append(to_task(task, origin))
         except InvalidValue as error:
-            refused.append(world.refuse(cut(task.task_id), str(error), stamp))
+            refused.append(refuse(task, error))
     if action is AnnouncementAction.CANCEL:
         return world.cancel(task_ids, stamp, now) + refused
     return world.announce(action, tasks, stamp, now) + refused
