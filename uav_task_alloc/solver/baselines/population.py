@@ -61,7 +61,8 @@ class Coding:
         length = np.bincount(slot.ravel(), legs.ravel(), p * m).reshape(p, m)
         used = np.bincount(slot.ravel(), minlength=p * m).reshape(p, m) > 0
         length += np.where(used, 0.0, a.empty_route_length)
-        excess = np.maximum(0.0, length - a.range_left).sum(axis=1)
+        most = np.minimum(a.range_left, 1e300)  # a route without a path is infinite: no inf - inf
+        excess = np.maximum(0.0, length - most).sum(axis=1)
         value = self.problem.arrays.value[self.tasks].sum()
         fits: Floats = (weights.distance * length.sum(axis=1) + weights.value / value
                         + weights.penalty * excess)  # eq 2.12
