@@ -19,14 +19,14 @@ def bench():
 
 def mission_current(bench):
     bench.command(d.MAV_CMD_REQUEST_MESSAGE, d.MAVLINK_MSG_ID_MISSION_CURRENT)
-    return of(bench.heard, 'MISSION_CURRENT')[-1]
+    return of(bench.received, 'MISSION_CURRENT')[-1]
 
 
 def texts(messages):
     return [m.text for m in of(messages, 'STATUSTEXT')]
 
 
-def test_after_start_it_tells_nothing_but_heartbeats(bench):
+def test_after_start_it_sends_nothing_but_heartbeats(bench):
     assert {m.get_type() for m in bench.pass_time(10.0)} == {'HEARTBEAT'}
 
 
@@ -79,41 +79,41 @@ def test_an_upload_in_flight_restarts_the_command_after_each_item(bench):
     bench.fly(waypoint(A, p1=10.0))
     bench.until(lambda: metres_between(bench.flight.body.position, A) < 1.0)
     bench.pass_time(8.0)
-    bench.heard.clear()
+    bench.received.clear()
     bench.load(waypoint(A, p1=10.0), waypoint(B))
-    assert texts(bench.heard) == ['Auto mission changed, restarted command'] * 3
-    assert not reached(bench.pass_time(9.0))  # the hold began anew
+    assert texts(bench.received) == ['Auto mission changed, restarted command'] * 3
+    assert not reached(bench.pass_time(9.0))  # the hold was restarted
     assert reached(bench.pass_time(2.0)) == [1]
 
 
 def test_a_shorter_list_in_flight_leaves_current_beyond_its_end(bench):
     bench.fly(waypoint(A), waypoint(B), waypoint(FAR))
     bench.reach(1)
-    bench.heard.clear()
+    bench.received.clear()
     bench.load(waypoint(C))
-    assert 'Auto mission changed but failed to restart command' in texts(bench.heard)
+    assert 'Auto mission changed but failed to restart command' in texts(bench.received)
     current = mission_current(bench)
     assert current.seq > current.total
     bench.until(lambda: metres_between(bench.flight.body.position, FAR) < 2.5)  # the old item
 
 
-def test_reached_is_told_once_for_each_item(bench):
+def test_reached_is_sent_once_for_each_item(bench):
     bench.fly(waypoint(A), waypoint(B))
     bench.pass_time(60.0)
-    assert reached(bench.heard) == [1, 2]
+    assert reached(bench.received) == [1, 2]
 
 
-def test_reached_is_told_for_a_return_item(bench):
+def test_reached_is_sent_for_a_return_item(bench):
     bench.fly(waypoint(A), item(d.MAV_CMD_NAV_RETURN_TO_LAUNCH))
     bench.until(lambda: not bench.flight.armed)
-    assert reached(bench.heard) == [1, 2]
+    assert reached(bench.received) == [1, 2]
 
 
-def test_reached_is_not_told_for_a_landing(bench):
+def test_reached_is_not_sent_for_a_landing(bench):
     bench.fly(waypoint(A), item(d.MAV_CMD_NAV_LAND, (100.0, 0.0, 0.0)))
     bench.until(lambda: not bench.flight.armed)
     bench.pass_time(5.0)
-    assert reached(bench.heard) == [1]
+    assert reached(bench.received) == [1]
 
 
 def test_at_the_end_it_stays_in_auto_with_mission_state_5(bench):
@@ -142,7 +142,7 @@ def test_a_resumed_mission_goes_on_at_the_item_it_flew(bench):
     bench.pass_time(10.0)
     bench.set_mode(FlightMode.MISSION)
     bench.reach(1)
-    assert reached(bench.heard) == [1, 2]
+    assert reached(bench.received) == [1, 2]
 
 
 def test_set_current_while_held_chooses_where_auto_goes_on(bench):
@@ -151,7 +151,7 @@ def test_set_current_while_held_chooses_where_auto_goes_on(bench):
     bench.set_current(3)
     bench.set_mode(FlightMode.MISSION)
     bench.reach(2)
-    assert reached(bench.heard) == [3]
+    assert reached(bench.received) == [3]
 
 
 def test_auto_on_the_ground_needs_a_takeoff_item(bench):
@@ -159,7 +159,7 @@ def test_auto_on_the_ground_needs_a_takeoff_item(bench):
     bench.set_mode(FlightMode.GUIDED)
     bench.command(d.MAV_CMD_COMPONENT_ARM_DISARM, 1)
     assert bench.set_mode(FlightMode.MISSION) == d.MAV_RESULT_FAILED
-    assert 'Auto: Missing Takeoff Cmd' in texts(bench.heard)
+    assert 'Auto: Missing Takeoff Cmd' in texts(bench.received)
 
 
 def test_auto_needs_a_mission(bench):

@@ -35,14 +35,14 @@ def test_seq_0_is_replaced_by_the_real_home(bench):
 def test_total_excludes_home(bench):
     bench.load(waypoint(A), waypoint(B))
     bench.command(d.MAV_CMD_REQUEST_MESSAGE, d.MAVLINK_MSG_ID_MISSION_CURRENT)
-    assert of(bench.heard, 'MISSION_CURRENT')[-1].total == 2
+    assert of(bench.received, 'MISSION_CURRENT')[-1].total == 2
 
 
 def test_it_always_asks_with_mission_request(bench):
     for _ in range(2):
         bench.load(waypoint(A))
-    assert not of(bench.heard, 'MISSION_REQUEST_INT')
-    assert len(of(bench.heard, 'MISSION_REQUEST')) == 4
+    assert not of(bench.received, 'MISSION_REQUEST_INT')
+    assert len(of(bench.received, 'MISSION_REQUEST')) == 4
 
 
 def test_count_truncates_the_old_mission_at_once(bench):
@@ -139,17 +139,17 @@ def test_a_readback_is_denied_during_an_upload(bench):
     assert denied.type == d.MAV_MISSION_DENIED
 
 
-def test_a_second_count_of_the_same_station_starts_anew(bench):
+def test_a_second_count_of_the_same_station_restarts_the_upload(bench):
     bench.count(3)
     bench.send(HOME)
     assert of(bench.count(2), 'MISSION_REQUEST')[-1].seq == 0
 
 
-def test_it_asks_again_every_second_and_cancels_after_eight(bench):
+def test_it_repeats_the_request_every_second_and_cancels_after_eight(bench):
     bench.count(2)
-    told = bench.pass_time(9.0)
-    assert len(of(told, 'MISSION_REQUEST')) in (7, 8)
-    ack, = of(told, 'MISSION_ACK')
+    report = bench.pass_time(9.0)
+    assert len(of(report, 'MISSION_REQUEST')) in (7, 8)
+    ack, = of(report, 'MISSION_ACK')
     assert ack.type == d.MAV_MISSION_OPERATION_CANCELLED
     assert not of(bench.pass_time(5.0), 'MISSION_REQUEST', 'MISSION_ACK')
 
@@ -175,7 +175,7 @@ def test_the_capacity_is_650_items(bench):
 
 def test_there_is_no_mission_id(bench):
     bench.load(waypoint(A))
-    assert plan_id(of(bench.heard, 'MISSION_ACK')[-1]) == 0
+    assert plan_id(of(bench.received, 'MISSION_ACK')[-1]) == 0
 
 
 def test_messages_for_another_system_are_ignored(bench):

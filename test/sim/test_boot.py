@@ -30,7 +30,7 @@ def states(messages):
 @pytest.mark.parametrize(('kind', 'expected'), [
     ('ardupilot', [d.MAV_STATE_BOOT, d.MAV_STATE_CALIBRATING, d.MAV_STATE_STANDBY]),
     ('px4', [d.MAV_STATE_UNINIT, d.MAV_STATE_BOOT, d.MAV_STATE_STANDBY])])
-def test_the_heartbeats_of_a_boot_say_so(kind, expected):
+def test_the_heartbeats_of_a_boot_have_its_state(kind, expected):
     bench = Bench(kind, ready=0.0)
     assert states(bench.pass_time(10.0)) == expected
 
@@ -56,7 +56,7 @@ def test_without_an_arming_delay_there_is_no_boot_unless_it_is_given(kind):
 
 def test_it_does_not_arm_during_the_boot(bench):
     bench.vehicle.reboot(bench.now)
-    bench.flight.arming_fault = 'Gyros inconsistent'  # which nobody has checked yet
+    bench.flight.arming_fault = 'Gyros inconsistent'  # not checked yet
     refused = d.MAV_RESULT_FAILED if bench.own else d.MAV_RESULT_TEMPORARILY_REJECTED
     assert bench.arm() == refused
     assert bench.command(d.MAV_CMD_COMPONENT_ARM_DISARM, 1, 21196) == refused
@@ -72,7 +72,7 @@ def test_the_booting_copter_has_no_space_for_a_mission(copter):
     assert not copter.download()
 
 
-def test_the_mission_of_the_copter_is_there_again_after_the_boot(copter):
+def test_the_mission_of_the_copter_is_restored_after_the_boot(copter):
     copter.load(waypoint(A), waypoint(B))
     before = [content(i) for i in copter.download()]
     copter.vehicle.reboot(copter.now)
@@ -132,7 +132,7 @@ def test_a_vehicle_that_is_revived_boots_on_the_ground():
 @pytest.mark.parametrize(('kind', 'result', 'texts'), [
     ('ardupilot', d.MAV_RESULT_FAILED, ['Arm: Gyros inconsistent']),
     ('px4', d.MAV_RESULT_TEMPORARILY_REJECTED, [])])
-def test_a_forced_refusal_is_told_as_the_autopilot_does(kind, result, texts):
+def test_a_forced_refusal_is_reported_as_by_the_autopilot(kind, result, texts):
     bench = Bench(kind)
     bench.flight.arming_fault = 'Gyros inconsistent'
     assert bench.arm() == result
@@ -141,11 +141,11 @@ def test_a_forced_refusal_is_told_as_the_autopilot_does(kind, result, texts):
     assert bench.arm() == d.MAV_RESULT_ACCEPTED
 
 
-def test_a_copter_that_cannot_arm_says_why_every_30_s(copter):
+def test_a_copter_that_cannot_arm_reports_why_every_30_s(copter):
     copter.flight.arming_fault = 'Gyros inconsistent'
     copter.pass_time(65.0)
     assert copter.texts() == ['PreArm: Gyros inconsistent'] * 2
-    assert of(copter.heard, 'STATUSTEXT')[0].severity == d.MAV_SEVERITY_CRITICAL
+    assert of(copter.received, 'STATUSTEXT')[0].severity == d.MAV_SEVERITY_CRITICAL
 
 
 def test_the_arming_text_names_the_mode_that_is_not_armable(copter):

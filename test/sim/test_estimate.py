@@ -29,11 +29,11 @@ def flags(bench):
 
 def test_the_copter_reports_zeros_before_it_has_a_position():
     bench = Bench('ardupilot', ready=20.0)
-    told, = bench.request('GLOBAL_POSITION_INT')
-    assert (told.lat, told.lon) == (0, 0)
+    report, = bench.request('GLOBAL_POSITION_INT')
+    assert (report.lat, report.lon) == (0, 0)
     bench.pass_time(22.0)
-    told, = bench.request('GLOBAL_POSITION_INT')
-    assert place(told) == pytest.approx((0.0, 0.0, 0.0), abs=0.02)
+    report, = bench.request('GLOBAL_POSITION_INT')
+    assert place(report) == pytest.approx((0.0, 0.0, 0.0), abs=0.02)
 
 
 def test_px4_reports_no_position_before_it_has_one():
@@ -58,7 +58,7 @@ def test_the_time_of_jumps_can_be_set():
     assert place(bench.request('GLOBAL_POSITION_INT')[0]) == pytest.approx((0, 0, 0), abs=0.02)
 
 
-def test_home_is_told_only_once_there_is_a_position(bench):
+def test_home_is_sent_only_once_there_is_a_position(bench):
     assert bench.request('HOME_POSITION')
     bench.vehicle.reboot(bench.now)
     bench.pass_time(10.0)
@@ -66,12 +66,12 @@ def test_home_is_told_only_once_there_is_a_position(bench):
 
 
 def test_the_satellite_fix_comes_with_the_position(bench):
-    told, = bench.request('GPS_RAW_INT')
-    assert told.fix_type == d.GPS_FIX_TYPE_3D_FIX
-    assert place(told) == pytest.approx((0.0, 0.0, 0.0), abs=0.02)
+    report, = bench.request('GPS_RAW_INT')
+    assert report.fix_type == d.GPS_FIX_TYPE_3D_FIX
+    assert place(report) == pytest.approx((0.0, 0.0, 0.0), abs=0.02)
     bench.vehicle.reboot(bench.now)
-    told, = bench.request('GPS_RAW_INT')
-    assert (told.fix_type, told.lat, told.lon) == (d.GPS_FIX_TYPE_NO_FIX, 0, 0)
+    report, = bench.request('GPS_RAW_INT')
+    assert (report.fix_type, report.lat, report.lon) == (d.GPS_FIX_TYPE_NO_FIX, 0, 0)
 
 
 def test_the_estimator_has_an_absolute_position_only_when_positioned(bench):
@@ -128,23 +128,23 @@ def test_the_estimator_notices_a_glitch(bench):
 # batteries
 
 
-def test_two_batteries_are_told_each_at_the_rate_asked_for(bench):
+def test_two_batteries_are_sent_each_at_the_requested_rate(bench):
     bench = Bench('ardupilot' if bench.own else 'px4', batteries=2)
     bench.command(d.MAV_CMD_SET_MESSAGE_INTERVAL, d.MAVLINK_MSG_ID_BATTERY_STATUS, 500_000)
-    told = [m.id for m in of(bench.pass_time(10.0), 'BATTERY_STATUS')]
-    assert len(told) in (40, 42)
-    assert told == [0, 1] * (len(told) // 2)
+    report = [m.id for m in of(bench.pass_time(10.0), 'BATTERY_STATUS')]
+    assert len(report) in (40, 42)
+    assert report == [0, 1] * (len(report) // 2)
 
 
-def test_the_second_battery_is_worse_and_sys_status_tells_the_first(bench):
+def test_the_second_battery_is_worse_and_sys_status_reports_the_first(bench):
     bench = Bench('ardupilot' if bench.own else 'px4', batteries=2, second_battery=0.5)
     bench.flight.body.battery = 0.8
     first, second = bench.request('BATTERY_STATUS')
     assert (first.battery_remaining, second.battery_remaining) == (80, 40)
     assert second.voltages[0] < first.voltages[0]
-    told, = bench.request('SYS_STATUS')
-    assert (told.battery_remaining, told.voltage_battery) == (80, first.voltages[0])
+    report, = bench.request('SYS_STATUS')
+    assert (report.battery_remaining, report.voltage_battery) == (80, first.voltages[0])
 
 
-def test_one_battery_is_told_as_number_0(bench):
+def test_one_battery_is_sent_as_number_0(bench):
     assert [m.id for m in bench.request('BATTERY_STATUS')] == [0]

@@ -16,12 +16,12 @@ TEXTS = {'radio': 'Radio Failsafe', 'gcs': 'GCS Failsafe', 'battery': 'Battery F
 
 @pytest.fixture(params=['ardupilot', 'px4'])
 def bench(request):
-    made = Bench(request.param)
-    made.fly(waypoint(FAR))
-    made.pass_time(5.0)
-    made.heard.clear()
-    made.vehicle.take_events()
-    return made
+    bench = Bench(request.param)
+    bench.fly(waypoint(FAR))
+    bench.pass_time(5.0)
+    bench.received.clear()
+    bench.vehicle.take_events()
+    return bench
 
 
 def heartbeat(bench):
@@ -33,7 +33,7 @@ def return_mode(bench):
 
 
 @pytest.mark.parametrize('kind', FAILSAFE_KINDS)
-def test_a_failsafe_that_changes_the_mode_is_critical_and_says_why(bench, kind):
+def test_a_failsafe_that_changes_the_mode_is_critical_and_reports_why(bench, kind):
     bench.vehicle.failsafe(kind, return_mode(bench))
     beat = heartbeat(bench)
     assert (beat.custom_mode, beat.system_status) == (return_mode(bench), d.MAV_STATE_CRITICAL)
@@ -55,7 +55,7 @@ def test_a_failsafe_that_keeps_the_mode_is_critical_until_it_is_over(bench, kind
 def test_two_failsafes_last_until_both_are_over(bench):
     bench.vehicle.failsafe('radio', return_mode(bench))
     bench.vehicle.failsafe('battery', None)
-    bench.heard.clear()
+    bench.received.clear()
     bench.vehicle.failsafe_over()
     assert heartbeat(bench).system_status == d.MAV_STATE_ACTIVE
     assert bench.flight.mode is FlightMode.RETURN
@@ -96,7 +96,7 @@ def test_the_kill_switch_stops_the_motors_and_it_falls(bench):
         ('kill_switch', 'pilot'), ('disarmed', 'pilot'), ('crashed', 'pilot')]
 
 
-def test_the_heartbeat_says_flight_termination_until_the_kill_switch_is_off(bench):
+def test_the_heartbeat_reports_flight_termination_until_the_kill_switch_is_off(bench):
     bench.vehicle.kill_switch()
     assert heartbeat(bench).system_status == d.MAV_STATE_FLIGHT_TERMINATION
     bench.pass_time(5.0)
@@ -125,7 +125,7 @@ def test_nothing_arms_while_it_falls(bench):
     assert bench.arm() == 0
 
 
-def test_a_fall_does_not_begin_the_way_home_again_when_it_is_armed_later(bench):
+def test_a_fall_does_not_begin_the_return_again_when_it_is_armed_later(bench):
     bench.vehicle.rc_mode(return_mode(bench))
     bench.vehicle.rc_arm(False, force=True)
     bench.pass_time(3.0)

@@ -60,10 +60,10 @@ def test_a_fast_vehicle_does_not_fly_past_its_waypoint():
     assert max(p[0] for p, _ in trace(bench, 10.0)) < 803.0
 
 
-def test_big_steps_of_time_fly_the_same_way(bench):
+def test_big_steps_of_time_fly_the_same_path(bench):
     bench.fly(waypoint(A), waypoint(B))
-    told = bench.pass_time(60.0, step=60.0)
-    assert 1 + bench.own in reached(told)
+    report = bench.pass_time(60.0, step=60.0)
+    assert 1 + bench.own in reached(report)
 
 
 def test_a_hold_keeps_it_at_the_waypoint(bench):
@@ -109,10 +109,10 @@ def test_it_does_not_arm_without_a_position_estimate(kind, delay):
     bench.vehicle.reboot(bench.now)
     bench.set_mode(FlightMode.GUIDED if bench.own else FlightMode.HOLD)
     bench.pass_time(delay - 1.0)
-    bench.heard.clear()
+    bench.received.clear()
     assert bench.command(d.MAV_CMD_COMPONENT_ARM_DISARM, 1) != 0
-    said = [m.text for m in of(bench.heard, 'STATUSTEXT')]
-    assert said == (['Arm: Need Position Estimate'] if bench.own else [])
+    texts = [m.text for m in of(bench.received, 'STATUSTEXT')]
+    assert texts == (['Arm: Need Position Estimate'] if bench.own else [])
     bench.pass_time(1.5)
     assert bench.command(d.MAV_CMD_COMPONENT_ARM_DISARM, 1) == 0
 
@@ -135,7 +135,7 @@ def test_it_does_not_disarm_in_the_air(bench):
     assert bench.flight.armed
 
 
-def test_the_battery_drains_with_the_way_flown():
+def test_the_battery_drains_with_the_distance_flown():
     bench = Bench('px4', range=2000.0)
     bench.fly(waypoint((500.0, 0.0, 30.0)))
     before = bench.flight.body.battery
@@ -164,13 +164,13 @@ def test_a_dead_vehicle_neither_speaks_nor_moves(bench):
 def test_a_reboot_sets_the_boot_time_to_zero(bench):
     bench.vehicle.reboot(bench.now)
     bench.command(d.MAV_CMD_REQUEST_MESSAGE, d.MAVLINK_MSG_ID_ATTITUDE)
-    assert of(bench.heard, 'ATTITUDE')[-1].time_boot_ms == 0
+    assert of(bench.received, 'ATTITUDE')[-1].time_boot_ms == 0
 
 
-def test_the_position_told_is_the_position_flown(bench):
+def test_the_position_sent_is_the_position_flown(bench):
     bench.rise()
     bench.command(d.MAV_CMD_REQUEST_MESSAGE, d.MAVLINK_MSG_ID_GLOBAL_POSITION_INT)
-    told = of(bench.heard, 'GLOBAL_POSITION_INT')[-1]
-    assert told.lat == pytest.approx(47.397742e7, abs=1)
-    assert told.relative_alt / 1000.0 == pytest.approx(bench.flight.body.position[2], abs=0.02)
-    assert told.alt / 1000.0 == pytest.approx(488.0 + bench.flight.body.position[2], abs=0.02)
+    report = of(bench.received, 'GLOBAL_POSITION_INT')[-1]
+    assert report.lat == pytest.approx(47.397742e7, abs=1)
+    assert report.relative_alt / 1000.0 == pytest.approx(bench.flight.body.position[2], abs=0.02)
+    assert report.alt / 1000.0 == pytest.approx(488.0 + bench.flight.body.position[2], abs=0.02)

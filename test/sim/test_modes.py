@@ -35,7 +35,7 @@ def ground_distance(a, b):
 
 
 @pytest.mark.parametrize(('kind', 'number'), NUMBERS)
-def test_every_mode_is_entered_by_a_station_and_told_in_the_heartbeat(kind, number):
+def test_every_mode_is_entered_by_a_station_and_reported_in_the_heartbeat(kind, number):
     bench = flying(kind)
     assert bench.set_mode(number) == d.MAV_RESULT_ACCEPTED
     assert told_mode(bench) == number

@@ -64,7 +64,7 @@ def test_an_upload_in_flight_jumps_to_the_flagged_item(bench):
     bench.load(waypoint(A), waypoint(B), waypoint(C, current=1))
     assert current(bench).seq == 2
     bench.reach(2)
-    assert reached(bench.heard)[0] == 2
+    assert reached(bench.received)[0] == 2
 
 
 def test_an_identical_upload_jumps_to_the_flagged_item_too(bench):
@@ -93,7 +93,7 @@ def test_reached_is_repeated_ten_times_at_1_hz(bench):
     bench.fly(waypoint(A))
     bench.reach(0)
     bench.pass_time(20.0)
-    assert reached(bench.heard) == [0] * 11
+    assert reached(bench.received) == [0] * 11
 
 
 def test_the_repetition_goes_on_across_a_new_upload(bench):
@@ -102,21 +102,21 @@ def test_the_repetition_goes_on_across_a_new_upload(bench):
     bench.pass_time(2.5)
     bench.load(waypoint(B), waypoint(C))
     bench.pass_time(20.0)
-    assert reached(bench.heard) == [0] * 11
+    assert reached(bench.received) == [0] * 11
 
 
 def test_the_next_item_reached_ends_the_repetition_of_the_one_before(bench):
     near = (105.0, 0.0, 30.0)
     bench.fly(waypoint(A), waypoint(near))
     bench.reach(1)
-    bench.heard.clear()
+    bench.received.clear()
     assert set(reached(bench.pass_time(20.0))) == {1}
 
 
-def test_reached_is_not_told_for_a_return_item(bench):
+def test_reached_is_not_sent_for_a_return_item(bench):
     bench.fly(waypoint(A), item(d.MAV_CMD_NAV_RETURN_TO_LAUNCH, frame=2))
     bench.until(lambda: not bench.flight.armed)
-    assert set(reached(bench.heard)) == {0}
+    assert set(reached(bench.received)) == {0}
 
 
 def test_at_the_end_it_goes_to_hold_with_mission_state_5(bench):
@@ -127,7 +127,7 @@ def test_at_the_end_it_goes_to_hold_with_mission_state_5(bench):
     assert current(bench).mission_state == d.MISSION_STATE_COMPLETE
 
 
-def test_after_a_take_off_it_says_that_its_mission_is_complete(bench):
+def test_after_a_take_off_it_reports_that_its_mission_is_complete(bench):
     bench.load(waypoint(A), waypoint(B))
     assert current(bench).mission_state == d.MISSION_STATE_NOT_STARTED
     bench.rise()
@@ -166,7 +166,7 @@ def test_without_a_mission_the_mission_mode_is_refused(bench):
 def test_an_infeasible_mission_is_accepted_and_not_flown(bench):
     bench.rise()
     bench.load(waypoint((12_000.0, 0.0, 30.0)))
-    assert 'First waypoint too far' in of(bench.heard, 'STATUSTEXT')[-1].text
+    assert 'First waypoint too far' in of(bench.received, 'STATUSTEXT')[-1].text
     assert bench.set_mode(FlightMode.MISSION) == d.MAV_RESULT_TEMPORARILY_REJECTED
 
 

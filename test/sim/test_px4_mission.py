@@ -27,13 +27,13 @@ def test_seq_0_is_the_first_real_item(bench):
 def test_total_is_65535_when_empty(bench):
     assert of(bench.pass_time(2.0), 'MISSION_CURRENT')[-1].total == 65535
     bench.load(waypoint(A), waypoint(B))
-    assert of(bench.heard, 'MISSION_CURRENT')[-1].total == 2
+    assert of(bench.received, 'MISSION_CURRENT')[-1].total == 2
 
 
 def test_only_the_first_request_of_the_first_upload_is_a_float_one(bench):
     bench.load(waypoint(A), waypoint(B))
     bench.load(waypoint(A), waypoint(B))
-    assert [(m.get_type(), m.seq) for m in of(bench.heard, *REQUESTS)] == [
+    assert [(m.get_type(), m.seq) for m in of(bench.received, *REQUESTS)] == [
         ('MISSION_REQUEST', 0), ('MISSION_REQUEST_INT', 1), ('MISSION_REQUEST_INT', 0),
         ('MISSION_REQUEST_INT', 1)]
 
@@ -110,21 +110,21 @@ def test_a_second_count_before_the_first_item_only_repeats_the_request(bench):
     assert [m.seq for m in of(bench.count(2), *REQUESTS, 'MISSION_ACK')] == [0]
 
 
-def test_it_asks_again_four_times_a_second_and_gives_up_silently_after_five(bench):
+def test_it_repeats_the_request_four_times_a_second_and_gives_up_silently_after_five(bench):
     bench.count(2)
-    told = bench.pass_time(4.9, step=0.02)
-    assert 16 <= len(of(told, *REQUESTS)) <= 20
+    report = bench.pass_time(4.9, step=0.02)
+    assert 16 <= len(of(report, *REQUESTS)) <= 20
     bench.pass_time(0.3)
     assert not of(bench.pass_time(5.0), *REQUESTS, 'MISSION_ACK', 'STATUSTEXT')
 
 
-def test_the_last_item_again_is_accepted_again(bench):
+def test_a_repeated_last_item_is_accepted_again(bench):
     bench.load(waypoint(A))
     ack, = bench.send(waypoint(A))
     assert ack.type == d.MAV_MISSION_ACCEPTED
 
 
-def test_the_crc_of_the_items_is_told_in_ack_count_and_current(bench):
+def test_the_crc_of_the_items_is_sent_in_ack_count_and_current(bench):
     bench.load(waypoint(A), waypoint(B))
     crc = 0
     for sent in (waypoint(A), waypoint(B)):
@@ -133,10 +133,10 @@ def test_the_crc_of_the_items_is_told_in_ack_count_and_current(bench):
     bench.download()
     bench.pass_time(2.0)
     for kind in ('MISSION_ACK', 'MISSION_COUNT', 'MISSION_CURRENT'):
-        assert plan_id(of(bench.heard, kind)[-1]) == crc
+        assert plan_id(of(bench.received, kind)[-1]) == crc
 
 
-def test_the_crc_tells_missions_apart(bench):
+def test_the_crc_differs_between_missions(bench):
     bench.load(waypoint(A))
     first = bench.vehicle.mission.mission_id
     bench.load(waypoint(B))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The ground truth of the simulated vehicles: who changed the mode, who armed, who commanded."""
+"""The ground truth of the simulated vehicles: causes of modes, arming and commands."""
 import json
 
 import pytest
@@ -17,9 +17,9 @@ OURS = {'station': (245, 190)}
 
 @pytest.fixture(params=['ardupilot', 'px4'])
 def bench(request):
-    made = Bench(request.param)
-    made.vehicle.take_events()
-    return made
+    bench = Bench(request.param)
+    bench.vehicle.take_events()
+    return bench
 
 
 def named(bench, *names):
@@ -73,7 +73,7 @@ def test_arming_is_noted_with_the_station(bench):
         ('armed', 'station 245/190'), ('disarmed', 'station 7/8')]
 
 
-def test_a_vehicle_that_disarms_itself_says_so(bench):
+def test_a_vehicle_that_disarms_itself_records_that(bench):
     bench.send(d.MAVLink_set_mode_message(1, 1, start_mode(bench)), **OURS)
     bench.command(d.MAV_CMD_COMPONENT_ARM_DISARM, 1)
     bench.pass_time(11.0)
@@ -120,7 +120,7 @@ def test_other_commands_are_not_noted(bench):
     assert not commands(bench)
 
 
-def test_the_log_tells_only_what_applies_and_the_record_reads_it(tmp_path):
+def test_the_log_has_only_the_fields_that_apply_and_the_record_reads_it(tmp_path):
     path = tmp_path / 'log.jsonl'
     config = VehicleConfig('uav_1', 1, ORIGIN, (0.0, 0.0, 0.0), arming_delay=0.0)
     fleet = UdpFleet([(config, 'ardupilot')], ('127.0.0.1', 9), log_file=path)
@@ -133,9 +133,9 @@ def test_the_log_tells_only_what_applies_and_the_record_reads_it(tmp_path):
     fleet.close()
     lines = [json.loads(line) for line in path.read_text().splitlines()]
     base = {'t', 'wall', 'uav', 'x', 'y', 'z'}
-    told = {line['event']: {k: line[k] for k in line.keys() - base - {'event'}}
+    report = {line['event']: {k: line[k] for k in line.keys() - base - {'event'}}
             for line in lines if 'event' in line}
-    assert told == {
+    assert report == {
         'mode': {'mode': 16, 'cause': 'pilot'}, 'armed': {'cause': 'pilot'},
         'failsafe': {'cause': 'fence'}, 'kill_switch': {'cause': 'pilot'},
         'disarmed': {'cause': 'pilot'}}

@@ -22,7 +22,7 @@ class Station:
         self.socket.bind(('127.0.0.1', 0))
         self.socket.settimeout(0.2)
         self.codec = Codec(255, 190)
-        self.peers, self.heard = {}, []
+        self.peers, self.received = {}, []
 
     @property
     def address(self):
@@ -30,7 +30,7 @@ class Station:
 
     def until(self, condition):
         end = time.monotonic() + 10.0
-        while not condition(self.heard):
+        while not condition(self.received):
             assert time.monotonic() < end, 'timed out'
             try:
                 data, address = self.socket.recvfrom(4096)
@@ -38,26 +38,26 @@ class Station:
                 continue
             for message in self.codec.parse(data):
                 self.peers[message.get_srcSystem()] = address
-                self.heard.append(message)
+                self.received.append(message)
 
 
 @pytest.fixture
 def station():
-    made = Station()
-    yield made
-    made.socket.close()
+    station = Station()
+    yield station
+    station.socket.close()
 
 
 @pytest.fixture
 def fleet(station, tmp_path):
-    made = UdpFleet([(VehicleConfig(f'uav_{n}', n, ORIGIN, (10.0 * n, 0.0, 0.0), floods=False),
+    fleet = UdpFleet([(VehicleConfig(f'uav_{n}', n, ORIGIN, (10.0 * n, 0.0, 0.0), floods=False),
                    ('ardupilot', 'px4')[n % 2]) for n in (1, 2, 3)],
                  station.address, speedup=10.0, log_file=tmp_path / 'log.jsonl')
-    thread = made.start()
-    yield made
-    made.stop()
+    thread = fleet.start()
+    yield fleet
+    fleet.stop()
     thread.join()
-    made.close()
+    fleet.close()
 
 
 def lines(path):
@@ -65,22 +65,22 @@ def lines(path):
 
 
 def test_every_vehicle_speaks_from_its_own_port(fleet, station):
-    station.until(lambda heard: len(station.peers) == 3)
+    station.until(lambda received: len(station.peers) == 3)
     assert len(set(station.peers.values())) == 3
 
 
-def test_a_vehicle_answers_whom_it_hears(fleet, station):
-    station.until(lambda heard: 2 in station.peers)
+def test_a_vehicle_answers_each_remote_that_sends(fleet, station):
+    station.until(lambda received: 2 in station.peers)
     ask = d.MAVLink_mission_request_list_message(2, 1, 0)
     station.socket.sendto(Codec(255, 190).pack(ask), station.peers[2])
-    station.until(lambda heard: any(m.get_type() == 'MISSION_COUNT' for m in heard))
+    station.until(lambda received: any(m.get_type() == 'MISSION_COUNT' for m in received))
 
 
 def test_damaged_bytes_do_not_end_it(fleet, station):
-    station.until(lambda heard: 1 in station.peers)
+    station.until(lambda received: 1 in station.peers)
     station.socket.sendto(b'\xfd\x00nonsense' * 20, station.peers[1])
-    station.heard.clear()
-    station.until(lambda heard: any(m.get_srcSystem() == 1 for m in heard))
+    station.received.clear()
+    station.until(lambda received: any(m.get_srcSystem() == 1 for m in received))
 
 
 def test_time_runs_at_the_speedup(fleet):
@@ -91,14 +91,14 @@ def test_time_runs_at_the_speedup(fleet):
 
 
 def test_a_dead_vehicle_is_silent_until_it_is_revived(fleet, station):
-    station.until(lambda heard: len(station.peers) == 3)
+    station.until(lambda received: len(station.peers) == 3)
     assert fleet.set_alive('uav_1', False) == ''
-    station.until(lambda heard: len([m for m in heard if m.get_srcSystem() == 2]) > 30)
-    station.heard.clear()
-    station.until(lambda heard: len([m for m in heard if m.get_srcSystem() == 2]) > 30)
-    assert not any(m.get_srcSystem() == 1 for m in station.heard)
+    station.until(lambda received: len([m for m in received if m.get_srcSystem() == 2]) > 30)
+    station.received.clear()
+    station.until(lambda received: len([m for m in received if m.get_srcSystem() == 2]) > 30)
+    assert not any(m.get_srcSystem() == 1 for m in station.received)
     assert fleet.set_alive('uav_1', True) == ''
-    station.until(lambda heard: any(m.get_srcSystem() == 1 for m in heard))
+    station.until(lambda received: any(m.get_srcSystem() == 1 for m in received))
 
 
 def test_an_unknown_vehicle_cannot_die(fleet):
@@ -109,7 +109,7 @@ def test_an_unknown_vehicle_cannot_die(fleet):
 def test_the_log_has_samples_and_events(fleet, station, tmp_path):
     path = tmp_path / 'log.jsonl'
     fleet.set_alive('uav_2', False)
-    station.until(lambda heard: len([r for r in lines(path) if r.get('event') == 'died']) == 1)
+    station.until(lambda received: len([r for r in lines(path) if r.get('event') == 'died']) == 1)
     sample = next(r for r in lines(path) if 'event' not in r)
     assert set(sample) == {'t', 'wall', 'uav', 'x', 'y', 'z', 'mode', 'alive'}
     died = next(r for r in lines(path) if r.get('event') == 'died')

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A ground station's end of one simulated vehicle: bytes both ways, virtual time, no socket."""
+"""A ground station for one simulated vehicle: bytes both ways, virtual time, no socket."""
 import math
 
 from pymavlink.dialects.v20 import ardupilotmega as d
@@ -15,7 +15,7 @@ NAN = math.nan
 
 
 class Bench:
-    """Sends and hears for as many stations as speak; `heard` keeps all since `clear`."""
+    """Sends for any number of stations; `received` keeps all messages since `clear`."""
 
     def __init__(self, autopilot, ready=READY, **config):
         config = {'position': (0.0, 0.0, 0.0), 'floods': False,
@@ -24,16 +24,16 @@ class Bench:
         self.flight = self.vehicle.flight
         self.own = 1 if autopilot == 'ardupilot' else 0  # items before the first one flown
         self.now = 0.0
-        self.heard = []
+        self.received = []
         self._vehicle_codec = Codec(1, 1)
         self._parser = Codec(255, 190)
         self._stations = {}
         if ready:
             self.pass_time(ready, step=ready)
-        self.heard.clear()
+        self.received.clear()
 
     def send(self, message, station=(255, 190)):
-        """Deliver a message; returns what is answered at once."""
+        """Deliver a message; returns the immediate answers."""
         codec = self._stations.setdefault(station, Codec(*station))
         out = []
         for one in codec.parse(codec.pack(message)):
@@ -41,7 +41,7 @@ class Bench:
         return out
 
     def pass_time(self, seconds, step=0.1):
-        """Let time pass; returns what is told meanwhile."""
+        """Let time pass; returns the messages sent meanwhile."""
         out, end = [], self.now + seconds
         while self.now < end - 1e-9:
             self.now = min(end, self.now + step)
@@ -52,7 +52,7 @@ class Bench:
         out = []
         for message in messages:
             out += self._parser.parse(self._vehicle_codec.pack(message))
-        self.heard += out
+        self.received += out
         return out
 
     def until(self, condition, limit=600.0):
@@ -63,13 +63,13 @@ class Bench:
             out += self.pass_time(0.1)
         return out
 
-    # the protocol, as a station speaks it
+    # the protocol, as a station uses it
 
     def count(self, number, **kw):
         return self.send(d.MAVLink_mission_count_message(1, 1, number, 0), **kw)
 
     def upload(self, items, **kw):
-        """Answer what is asked until it ends; returns the last answer."""
+        """Answer the requests of a transfer; returns the last answer."""
         answers = self.count(len(items), **kw)
         while answers and answers[-1].get_type().startswith('MISSION_REQUEST'):
             item = items[answers[-1].seq]
@@ -109,7 +109,7 @@ class Bench:
 
     def texts(self):
         """All STATUSTEXTs since `clear`."""
-        return [m.text for m in of(self.heard, 'STATUSTEXT')]
+        return [m.text for m in of(self.received, 'STATUSTEXT')]
 
     def arm(self):
         return self.command(d.MAV_CMD_COMPONENT_ARM_DISARM, 1)
@@ -143,7 +143,7 @@ class Bench:
     def reach(self, number):
         """Let the flown item number (from 0) be reached."""
         return self.until(lambda: any(
-            m.seq == number + self.own for m in of(self.heard, 'MISSION_ITEM_REACHED')))
+            m.seq == number + self.own for m in of(self.received, 'MISSION_ITEM_REACHED')))
 
 
 def of(messages, *kinds):
@@ -171,6 +171,6 @@ def waypoint(point, **kw):
 
 
 def content(message):
-    """What the two ends of a transfer should agree on."""
+    """The fields that both sides of a transfer should agree on."""
     return (message.frame, message.command, message.param1, message.param2, message.param3,
             message.param4, message.x, message.y, message.z)

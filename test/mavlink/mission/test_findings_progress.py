@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Findings 4-8, 16, 17: what nobody flew is not COMPLETED, and is flown later."""
+"""Findings 4-8, 16, 17: what no one flew is not COMPLETED, and is flown later."""
 import pytest
 from findings_bench import (
     BOTH,
@@ -25,7 +25,7 @@ MISSION = 3  # custom_mode of the copter
 
 
 def appended(lost=(), **kwargs):
-    """A copter that reaches its last item while more of them are under way to it."""
+    """A copter that reaches its last item while more of them are in transfer."""
     bench = flying('ardupilot', 'ABC', **kwargs)
     assert truthful(bench, lambda: bench.completed() == ['A', 'B'])
     bench.run(lambda: distance(bench, C) < 40.0)
@@ -73,7 +73,7 @@ def test_finding_05_what_another_station_skips_is_flown_later(kind, moment, inde
 
 @BOTH
 @pytest.mark.parametrize('lost', ['MISSION_ITEM_REACHED', 'GLOBAL_POSITION_INT'])
-def test_finding_05_also_on_a_line_that_loses_what_would_tell(kind, lost):
+def test_finding_05_also_on_a_line_that_loses_the_evidence(kind, lost):
     bench = flying(kind, 'ABCDE')
     truthful(bench, lambda: False, 3.0)
     begin = bench.now
@@ -156,8 +156,8 @@ def test_finding_07_a_first_try_that_was_taken_is_not_forgotten_in_the_second():
     assert bench.run(lambda: distance(bench, (0.0, 200.0, 50.0)) < 100.0)
     lost = [True]
 
-    def another(way, m, now):
-        if lost[0] and way == 'down' and m.get_type() == 'MISSION_ITEM_INT':
+    def another(direction, m, now):
+        if lost[0] and direction == 'down' and m.get_type() == 'MISSION_ITEM_INT':
             m.z += 1.0
         return None
     bench.line.tampers.append(another)
@@ -180,7 +180,7 @@ def test_finding_07_a_first_try_that_was_taken_is_not_forgotten_in_the_second():
 
 
 def test_finding_07_a_try_that_was_taken_is_not_forgotten_for_a_newer_list():
-    """The vehicle has taken a mission and says ERROR; before the next try comes another list."""
+    """The vehicle has stored a mission and sends ERROR; before the next try comes another list."""
     bench = FlightBench('px4', tick=0.05).discover()
     bench.assign(listed(1, P=(0.0, 200.0), Q=(0.0, 400.0)))
     assert bench.run(lambda: distance(bench, (0.0, 200.0, 50.0)) < 60.0)
@@ -225,31 +225,31 @@ def test_what_is_appended_and_reached_before_the_answer_is_completed_once():
     flown_once_each(bench, 'ABCD')
 
 
-@pytest.mark.parametrize(('slow', 'unheard'), [(3.0, False), (0.0, True), (3.0, True)])
-def test_finding_08_the_end_of_the_old_mission_during_a_swap_is_no_pilot(slow, unheard):
+@pytest.mark.parametrize(('slow', 'lost'), [(3.0, False), (0.0, True), (3.0, True)])
+def test_finding_08_the_end_of_the_old_mission_during_a_replacement_is_no_pilot(slow, lost):
     bench = flying('px4', 'C', tick=0.05)
     assert bench.run(lambda: distance(bench, C) < 30.0)
     ended = []
 
-    def tamper(way, m, now):
+    def tamper(direction, m, now):
         kind = m.get_type()
         if happened(bench, 'mission_end') and not ended:
             ended.append(now)
-        if way == 'up' and kind == 'MISSION_ITEM_INT' and m.seq == 1 and not ended:
+        if direction == 'up' and kind == 'MISSION_ITEM_INT' and m.seq == 1 and not ended:
             return []
-        if way == 'down' and ended:
+        if direction == 'down' and ended:
             if kind == 'MISSION_COUNT' and now < ended[0] + slow:
                 return []
-            if kind == 'MISSION_ITEM_REACHED' and unheard and now < ended[0] + 3.0:
+            if kind == 'MISSION_ITEM_REACHED' and lost and now < ended[0] + 3.0:
                 return []
-        return [] if kind == 'MISSION_ITEM_REACHED' and unheard and not ended else None
+        return [] if kind == 'MISSION_ITEM_REACHED' and lost and not ended else None
     bench.line.tampers.append(tamper)
     bench.assign(task_list('DE', 2))
     flown_once_each(bench, 'CDE')
 
 
 @BOTH
-def test_finding_16_verified_is_not_told_of_a_list_that_came_during_set_current(kind):
+def test_finding_16_verified_is_not_published_for_a_list_that_came_during_set_current(kind):
     bench = FindingsBench(kind, delay=(0.2, 0.2)).discover()
     bench.assign(task_list('AB', via={'A': ((-150.0, 50.0, 50.0),)}))
     assert bench.run(lambda: bench.started() == ['A'])
@@ -259,14 +259,14 @@ def test_finding_16_verified_is_not_told_of_a_list_that_came_during_set_current(
     bench.assign(task_list('XY', 3))
     own, seen = bench.onboard().own, set()
 
-    def told():
+    def all_completed():
         state, held = bench.state(), bench.vehicles[1].mission.items[own:]
         if state.mission_state is MissionState.VERIFIED:
             seen.add(state.list_revision)
         if state.list_revision == 3:
             assert len(held) == 2
         return bench.completed() == ['X', 'Y']
-    assert bench.run(told)
+    assert bench.run(all_completed)
     assert 3 in seen
     assert places(bench) == ['X', 'Y']
 
@@ -290,12 +290,12 @@ def test_finding_17_a_late_current_completes_nothing_while_it_is_held(index):
 
 
 @BOTH
-def test_a_late_current_after_a_swap_completes_nothing_in_flight(kind):
+def test_a_late_current_after_a_replacement_completes_nothing_in_flight(kind):
     bench = flying(kind, 'ABCDE')
     late = []
 
-    def tamper(way, m, now):
-        if way == 'down' and m.get_type() == 'MISSION_CURRENT' and late and now < late[0]:
+    def tamper(direction, m, now):
+        if direction == 'down' and m.get_type() == 'MISSION_CURRENT' and late and now < late[0]:
             return [(0.0, m), (4.5, m)]
         return None
     bench.line.tampers.append(tamper)

@@ -127,7 +127,7 @@ def test_finding_32_what_px4_refuses_as_too_far_it_refuses_still():
 
 
 @BOTH
-def test_finding_32_a_way_home_has_points_in_between(kind):
+def test_finding_32_a_leg_home_has_points_in_between(kind):
     bench = bench_of(kind)
     bench.assign(far_list('A', returns=True, end_via=((0.0, 12_300.0, 50.0),)))
     assert bench.run(lambda: is_verified(bench))
@@ -161,12 +161,12 @@ class Somewhere:
         return [point[0] for point in self.leg.points_ahead(END)]
 
 
-def test_finding_32_points_are_left_out_once_they_are_well_behind():
+def test_finding_32_points_are_left_out_once_they_are_well_passed():
     one = Somewhere()
     assert one.ahead() == [5_000.0, 10_000.0, 15_000.0]
     assert one.at(5_150.0, 20.0, 50.0).ahead() == [5_000.0, 10_000.0, 15_000.0]
     assert one.at(5_250.0, 20.0, 50.0).ahead() == [10_000.0, 15_000.0]
-    one.leg.locate = lambda: None  # for a moment nobody knows where it is
+    one.leg.locate = lambda: None  # its position is unknown for a moment
     assert one.ahead() == [10_000.0, 15_000.0]
     assert one.at(19_000.0, 20.0, 50.0).ahead() == []
 
@@ -184,7 +184,7 @@ def test_finding_32_a_vehicle_that_flies_its_mission_keeps_its_points():
     one = Somewhere()
     one.at(7_500.0, 900.0, 90.0)
     assert not one.leg.is_off
-    one.at(7_500.0, 900.0, 90.0, flying=False)  # a pilot has it
+    one.at(7_500.0, 900.0, 90.0, flying=False)  # flown by a pilot
     assert one.leg.is_off
     assert len(one.ahead()) == 2
     assert not one.leg.is_off

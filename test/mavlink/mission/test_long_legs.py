@@ -23,7 +23,7 @@ ORIGINS = {'equator': Origin(0.0, 0.0), 'zurich': Origin(47.4, 8.5, 488.0),
 
 
 def too_high(origin, points, start, end):
-    """By how much [m], at most, a flight over points is above or below the straight way.
+    """By how much [m], at most, a flight over points is above or below the straight line.
 
     As an autopilot flies: along a great circle, with an altitude that changes evenly.
     """
@@ -34,10 +34,10 @@ def too_high(origin, points, start, end):
         a, b = map(unit, (one, two))
         angle = math.acos(min(1.0, a @ b))
         share = np.linspace(0.0, 1.0, 41)
-        way = (np.outer(np.sin((1 - share) * angle), a) + np.outer(np.sin(share * angle), b)
+        path = (np.outer(np.sin((1 - share) * angle), a) + np.outer(np.sin(share * angle), b)
                ) / math.sin(angle)
         flown = to_enu_batch(origin, np.column_stack([
-            np.degrees(np.arcsin(way[:, 2])), np.degrees(np.arctan2(way[:, 1], way[:, 0])),
+            np.degrees(np.arcsin(path[:, 2])), np.degrees(np.arctan2(path[:, 1], path[:, 0])),
             one[2] + (two[2] - one[2]) * share]))
         ahead = (end - start)[:2]
         along = (flown - start)[:, :2] @ ahead / (ahead @ ahead)
@@ -71,10 +71,10 @@ def test_finding_32_a_first_item_that_is_too_far_stays_too_far(far):
     start, end = (0.0, 0.0, 50.0), (far, 0.0, 50.0)
     points = first_points(start, end, (0.0, 0.0, 0.0), 10_000.0)
     assert 10_050.0 < points[0][0] <= 11_100.0
-    way = [start, *points, end]
-    assert max(map(math.dist, way[1:], way[2:])) <= MAX_LEG_LENGTH
-    assert too_high(ORIGINS['zurich'], way, start, end) < 2.5
-    assert too_high(ORIGINS['zurich'], way[1:], start, end) < 0.5
+    path = [start, *points, end]
+    assert max(map(math.dist, path[1:], path[2:])) <= MAX_LEG_LENGTH
+    assert too_high(ORIGINS['zurich'], path, start, end) < 2.5
+    assert too_high(ORIGINS['zurich'], path[1:], start, end) < 0.5
     assert first_points(start, end, (0.0, 0.0, 0.0), math.inf) == points_between(start, end)
     assert first_points((20_000.0, 0.0, 50.0), end, (0.0, 0.0, 0.0), 10_000.0) == points_between(
         (20_000.0, 0.0, 50.0), end)
@@ -111,7 +111,7 @@ def test_finding_32_short_legs_stay_as_they_are():
     assert points_between((0.0, 0.0, 0.0), (0.0, 0.0, 0.0)) == ()
 
 
-def test_the_first_point_of_a_list_is_a_detour_point_a_task_or_the_way_home():
+def test_the_first_point_of_a_list_is_a_detour_point_a_task_or_the_leg_home():
     assert first_point(lists()) == (0.0, 0.0, 50.0)
     home = TaskList(1, (), True, ((9.0, 9.0, 9.0),))
     assert first_point(home) == (9.0, 9.0, 9.0)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Mission files, read back by readers that nobody here wrote: MAVSDK's and pymavlink's."""
+"""Mission files, read back by independent readers: MAVSDK's and pymavlink's."""
 import importlib.util
 import json
 import math
@@ -91,8 +91,9 @@ def test_pymavlink_reads_home_and_the_items_in_order_from_waypoints(world, folde
 
 @pytest.mark.parametrize('uav', ROUTES)
 def test_both_files_hold_what_the_bridge_would_upload(world, folder, uav):
-    who = next(each for each in world.uavs if each.id == uav)
-    sent = planned_mission(world, who, Plan(ROUTES, legs=LEGS, returns=True).route(uav)).items
+    scenario_uav = next(each for each in world.uavs if each.id == uav)
+    route = Plan(ROUTES, legs=LEGS, returns=True).route(uav)
+    sent = planned_mission(world, scenario_uav, route).items
     loader = mavwp.MAVWPLoader()
     loader.load(str(folder / f'{uav}.waypoints'))
     rows = json.loads((folder / f'{uav}.plan').read_text())['mission']['items']
@@ -124,7 +125,7 @@ REQUIRED = {'type': str, 'frame': int, 'command': int, 'params': list, 'autoCont
 
 
 @pytest.mark.parametrize('uav', ROUTES)
-def test_a_plan_is_as_the_published_format_says(world, folder, uav):
+def test_a_plan_has_the_published_format(world, folder, uav):
     """docs.qgroundcontrol.com, "Plan File Format"."""
     read = json.loads((folder / f'{uav}.plan').read_text(), parse_constant=pytest.fail)
     assert (read['fileType'], read['version']) == ('Plan', 1)
@@ -142,7 +143,7 @@ def test_a_plan_is_as_the_published_format_says(world, folder, uav):
     assert read['rallyPoints'] == {'version': 2, 'points': []}
 
 
-def test_a_zone_is_a_fence_unless_the_way_passes_over_it(folder, world):
+def test_a_zone_is_a_fence_unless_the_path_passes_over_it(folder, world):
     fences = {uav: json.loads((folder / f'{uav}.plan').read_text())['geoFence'] for uav in ROUTES}
     assert [len(fences[uav]['circles']) for uav in ('u_px4', 'u_ardu', 'idle')] == [1, 2, 2]
     mast, = fences['u_px4']['circles']
@@ -171,9 +172,9 @@ for path, autopilot in zip(sys.argv[1::2], map(int, sys.argv[2::2])):
                   for system in mavsdk.get_systems()):
         mavsdk.pass_received_raw_bytes(bytes(heartbeat.pack(d.MAVLink(None, 1, 1))))
     mission = MissionRaw(mavsdk.get_systems()[0])
-    made = mission.import_qgroundcontrol_mission(path)
+    imported = mission.import_qgroundcontrol_mission(path)
     read[path] = [[[i.seq, i.frame, i.command, i.x, i.y, i.z, i.param1] for i in items]
-                  for items in (made.mission_items, made.geofence_items)]
+                  for items in (imported.mission_items, imported.geofence_items)]
     mission.destroy()
     mavsdk.destroy()
 print('READ' + json.dumps(read), flush=True)

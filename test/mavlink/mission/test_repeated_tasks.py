@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Finding 33: allocator and bridge joined over virtual time; tasks anew under old ids."""
+"""Finding 33: allocator and bridge joined over virtual time; new tasks under old ids."""
 import importlib.util
 from pathlib import Path
 
@@ -25,16 +25,16 @@ def load_driver():
 
 
 class Fleet:
-    """One UAV in flight, a bridge, and an allocator that hears what the bridge says."""
+    """One UAV in flight, a bridge, and an allocator that receives the events of the bridge."""
 
     def __init__(self, kind, **params):
         self.make_driver = load_driver()
         self.bench = FindingsBench(kind).discover()
-        self.deaf = False  # nobody hears the events of the bridge
+        self.loses_events = False  # of the bridge
         self.start(**params)
 
     def start(self, rows=(), **params):
-        """A new allocator, with the journal of the one before."""
+        """Start an allocator with the journal of the previous one."""
         self.driver = self.make_driver(restored_state(rows), **params)
         self.driver.now = 1000.0 + self.bench.now
         self.revision = self.driver.world.lists.get('uav_1').revision
@@ -47,26 +47,26 @@ class Fleet:
         return until()
 
     def step(self):
-        """A quarter of a second."""
+        """Step by a quarter of a second."""
         bench, driver = self.bench, self.driver
         bench.run(limit=0.25)
         driver.now = 1000.0 + bench.now
         state = bench.state()
         report = UavReport('uav_1', state.position, list_revision=bench.onboard().revision)
         driver.world.update_uav(report, driver.now, driver.now)
-        self.tell_events()
+        self.deliver_events()
         driver.settle(report=False)
-        told = driver.lists.get('uav_1')
-        if told is not None and told.revision > self.revision:
-            self.revision = told.revision
-            bench.assign(TaskList(told.revision, tuple(
-                MissionStop(stop.task, stop.leg.via) for stop in told.stops), told.returns))
+        published = driver.lists.get('uav_1')
+        if published is not None and published.revision > self.revision:
+            self.revision = published.revision
+            stops = tuple(MissionStop(stop.task, stop.leg.via) for stop in published.stops)
+            bench.assign(TaskList(published.revision, stops, published.returns))
 
-    def tell_events(self):
-        """All that the bridge has said."""
+    def deliver_events(self):
+        """Deliver the events of the bridge, unless they are lost."""
         events, self.bench.events = self.bench.events, []
         for _, event in events:
-            if not self.deaf:
+            if not self.loses_events:
                 self.driver.event(event.event, event.task, 'uav_1', event.revision)
 
     def add(self, names):
@@ -81,7 +81,7 @@ class Fleet:
 
 
 @BOTH
-def test_finding_33_a_task_announced_anew_at_the_same_place_is_flown(kind):
+def test_finding_33_a_task_announced_again_at_the_same_place_is_flown(kind):
     fleet = Fleet(kind, keep_ended=0)
     fleet.add('ABC')
     assert fleet.run(lambda: not fleet.driver.world.tasks.records)  # all ended and forgotten
@@ -92,7 +92,7 @@ def test_finding_33_a_task_announced_anew_at_the_same_place_is_flown(kind):
 
 
 @BOTH
-def test_finding_33_a_task_announced_anew_while_others_are_flown_is_flown(kind):
+def test_finding_33_a_task_announced_again_while_others_are_flown_is_flown(kind):
     fleet = Fleet(kind, keep_ended=0)
     fleet.add('ABC')
     assert fleet.run(lambda: fleet.flown('A') == 1 and 'A' not in fleet.driver.world.tasks.records)
@@ -107,13 +107,13 @@ def test_finding_33_what_was_flown_while_the_allocator_was_deaf_is_flown_once(ki
     """away: a list without the tasks comes meanwhile, as for a UAV that seemed silent."""
     fleet = Fleet(kind)
     fleet.add('ABC')
-    fleet.deaf = True
+    fleet.loses_events = True
     assert fleet.run(lambda: fleet.flown('B') == 1)
     if away:
         fleet.driver.world.set_available('uav_1', False, fleet.driver.now)
         assert fleet.run(lambda: fleet.driver.route('uav_1') == ())
         fleet.driver.world.set_available('uav_1', True, fleet.driver.now)
-    fleet.deaf = False
+    fleet.loses_events = False
     assert fleet.run(lambda: [fleet.state(name) for name in 'ABC'] == ['COMPLETED'] * 3)
     assert [fleet.flown(name) for name in 'ABC'] == [1, 1, 1]
 
@@ -131,7 +131,7 @@ def test_finding_33_a_restart_with_a_journal_does_not_hide_what_is_new(kind):
 
 
 @BOTH
-def test_finding_33_announcements_told_again_to_an_allocator_without_journal_are_not_flown(kind):
+def test_finding_33_announcements_repeated_to_an_allocator_without_journal_are_not_flown(kind):
     fleet = Fleet(kind)
     fleet.add('ABC')
     assert fleet.run(lambda: fleet.state('C') == 'COMPLETED')

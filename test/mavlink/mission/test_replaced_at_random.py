@@ -17,17 +17,17 @@ def test_each_task_is_reached_once_and_none_that_was_withdrawn(kind, service, se
     bench = FlightBench(kind, seed=seed, loss=rng.choice([0.0, 0.1]), delay=(0.02, 0.1)).discover()
     fresh = list('ABCDEFGHIJKLMNOPQRSTUVWXY')
     rng.shuffle(fresh)
-    given, withdrawn = [fresh.pop() for _ in range(5)], set()
-    bench.assign(task_list(given, service=service))
+    listed, withdrawn = [fresh.pop() for _ in range(5)], set()
+    bench.assign(task_list(listed, service=service))
     for revision in range(2, 12):
         bench.run(limit=rng.uniform(0.5, 15.0))
-        given = [name for name in given if name not in bench.completed()]
-        if len(given) > 3:
-            withdrawn.add(given.pop())  # never the next, which may be under way
-        given.append(fresh.pop())
-        rng.shuffle(given)
-        bench.assign(task_list(given, revision, service=service))
-    assert bench.run(lambda: set(given) <= set(bench.completed()), 900.0), f'seed {seed}'
+        listed = [name for name in listed if name not in bench.completed()]
+        if len(listed) > 3:
+            withdrawn.add(listed.pop())  # never the next task, which may be flown already
+        listed.append(fresh.pop())
+        rng.shuffle(listed)
+        bench.assign(task_list(listed, revision, service=service))
+    assert bench.run(lambda: set(listed) <= set(bench.completed()), 900.0), f'seed {seed}'
     bench.run(limit=5.0)
     assert places(bench) == bench.completed(), f'seed {seed}'
     assert len(set(places(bench))) == len(places(bench)), f'seed {seed}'

@@ -30,14 +30,14 @@ def test_fault_01_a_count_dropped_twice_is_sent_again(kind):
 
 @BOTH
 @pytest.mark.parametrize('lost', ['MISSION_REQUEST', 'MISSION_REQUEST_INT', 'MISSION_ITEM_INT'])
-def test_fault_02_a_lost_request_or_item_is_asked_for_again_by_the_vehicle(kind, lost):
+def test_fault_02_a_lost_request_or_item_is_requested_again_by_the_vehicle(kind, lost):
     bench = UploadBench(kind)
     bench.line.tampers.append(drop({lost}, 2))
     verified(bench, bench.replace(bench.mission()))
     items = bench.line.sent('MISSION_ITEM_INT')
-    asked = (bench.line.sent('MISSION_REQUEST', 'down')
+    requested = (bench.line.sent('MISSION_REQUEST', 'down')
              + bench.line.sent('MISSION_REQUEST_INT', 'down'))
-    assert len(items) <= len(asked)
+    assert len(items) <= len(requested)
 
 
 @BOTH
@@ -52,8 +52,8 @@ def test_fault_03_a_lost_final_ack_is_replaced_by_the_readback(kind):
 def test_fault_04_a_request_twice_gets_the_same_item_and_an_ack_twice_nothing(kind):
     bench = UploadBench(kind)
 
-    def twice(way, message, now):
-        if way == 'down' and message.get_type() in ('MISSION_REQUEST', 'MISSION_REQUEST_INT',
+    def twice(direction, message, now):
+        if direction == 'down' and message.get_type() in ('MISSION_REQUEST', 'MISSION_REQUEST_INT',
                                                     'MISSION_ACK'):
             return [(0.0, message), (0.0, message)]
         return None
@@ -103,7 +103,7 @@ def test_fault_08_gaps_of_three_seconds_do_not_abort(kind):
     bench = UploadBench(kind)
     gaps = {0.0: 3.0}
 
-    def pause(way, message, now):
+    def pause(direction, message, now):
         cut_until = gaps.get('until', -1.0)
         if message.get_type() == 'MISSION_ITEM_INT' and message.seq == 2 and 'until' not in gaps:
             gaps['until'] = now + 3.0
@@ -137,11 +137,11 @@ def test_fault_26_no_nan_is_sent_but_as_the_yaw_of_a_waypoint_on_px4(kind):
 
 
 @BOTH
-def test_fault_27_an_item_altered_on_board_is_found_and_sent_again(kind):
+def test_fault_27_an_item_altered_on_board_is_detected_and_sent_again(kind):
     bench = UploadBench(kind)
 
-    def alter(way, message, now):
-        if way == 'down' and message.get_type() == 'MISSION_COUNT' and not altered:
+    def alter(direction, message, now):
+        if direction == 'down' and message.get_type() == 'MISSION_COUNT' and not altered:
             altered.append(1)
             items = bench.vehicle.mission.items
             items[-1] = items[-1]._replace(x=items[-1].x + 50)
@@ -153,14 +153,14 @@ def test_fault_27_an_item_altered_on_board_is_found_and_sent_again(kind):
 
 
 @BOTH
-def test_a_late_answer_that_nothing_is_on_board_is_asked_again(kind):
+def test_a_late_answer_that_nothing_is_on_board_is_requested_again(kind):
     """It answers a request from before the upload."""
     bench = UploadBench(kind)
     mission = bench.mission()
     late = [True]
 
-    def empty(way, message, now):
-        if way == 'down' and message.get_type() == 'MISSION_COUNT' and late:
+    def empty(direction, message, now):
+        if direction == 'down' and message.get_type() == 'MISSION_COUNT' and late:
             late.clear()
             message.count = mission.own
         return None
@@ -173,8 +173,8 @@ def test_a_late_answer_that_nothing_is_on_board_is_asked_again(kind):
 def test_an_upload_that_never_matches_ends_after_three_tries(kind):
     bench = UploadBench(kind)
 
-    def alter(way, message, now):
-        if way == 'down' and message.get_type() == 'MISSION_ITEM_INT':
+    def alter(direction, message, now):
+        if direction == 'down' and message.get_type() == 'MISSION_ITEM_INT':
             message.z += 1.0
         return None
     bench.line.tampers.append(alter)
@@ -191,7 +191,7 @@ def test_a_dead_line_ends_after_five_counts(kind):
     bench.line.cut = True
     bench.replace(bench.mission())
     assert bench.settle().reason == 'no answer to 5 MISSION_COUNT'
-    assert [round(t) for t, way, _ in bench.line.log if way == 'up'] == [0, 1, 2, 3, 4]
+    assert [round(t) for t, direction, _ in bench.line.log if direction == 'up'] == [0, 1, 2, 3, 4]
 
 
 def test_an_empty_mission_is_refused_as_a_uav_would_lose_what_it_flies():

@@ -61,12 +61,12 @@ NAKS = [*range(1, 13), 14, 15]
 @BOTH
 @pytest.mark.parametrize('when', ['start', 'middle', 'end'])
 @pytest.mark.parametrize('result', NAKS)
-def test_fault_14_each_nak_does_what_the_table_says(kind, result, when):
+def test_fault_14_each_nak_has_the_effect_of_the_table(kind, result, when):
     bench = UploadBench(kind)
     bench.line.tampers.append(drop({'MISSION_COUNT', 'MISSION_ITEM_INT'}, 9999, 'up'))
     mission = bench.replace(bench.mission('ABCDE'))
-    asked = {'start': 0, 'middle': 3, 'end': len(mission.items)}[when]
-    for seq in range(asked):
+    requested = {'start': 0, 'middle': 3, 'end': len(mission.items)}[when]
+    for seq in range(requested):
         bench.from_vehicle(request(seq))
     bench.from_vehicle(ack(result))
     bench.run(limit=0.1)
@@ -77,7 +77,7 @@ def test_fault_14_each_nak_does_what_the_table_says(kind, result, when):
     if expected is UploadState.IDLE:
         failed = bench.events[-1]
         assert failed.result == result
-        assert failed.seq == (asked - 1 if asked else None)
+        assert failed.seq == (requested - 1 if requested else None)
         assert len(bench.line.sent('MISSION_COUNT')) == 1
     else:
         bench.line.tampers.clear()
