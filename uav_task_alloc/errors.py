@@ -30,7 +30,7 @@ def shown(value: object) -> str:
     return text if len(text) <= _MAX_SHOWN else f'{text[:_MAX_SHOWN]}... ({len(text)} characters)'
 
 
-def first_of(texts: Iterable[str], most: int, separator: str = ', ', kind: str = '') -> str:
+def first_of(texts: Iterable[str], most: int = 5, separator: str = ', ', kind: str = '') -> str:
     """The first texts of a list, and how many more there are: `a, b, c and 4 more`.
 
     Args:

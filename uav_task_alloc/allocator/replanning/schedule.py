@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from uav_task_alloc.allocator.state.name_list import first_names
+from uav_task_alloc.errors import first_of
 
 _MAX_BURST = 5.0  # settle times that a burst of events waits at most
 _MAX_TRIGGERS = 1000  # of a burst that are kept
@@ -47,7 +47,7 @@ class Schedule:
 
     def begin(self, now: float) -> str:
         """Begin a solve; returns a text of its triggers."""
-        text = first_names(dict.fromkeys(self.triggers), most=3)
+        text = first_of(dict.fromkeys(self.triggers), most=3)
         self._solved, self.triggers = self.triggers, []
         self.busy, self._began = True, now
         return text

@@ -30,14 +30,13 @@ from uav_task_alloc.allocator.state.fleet import (
 from uav_task_alloc.allocator.state.list_validity import ListValidity, ZonesWhenBuilt
 from uav_task_alloc.allocator.state.locked_tasks import can_fly, locked_tasks
 from uav_task_alloc.allocator.state.missed_completions import MissedCompletions
-from uav_task_alloc.allocator.state.name_list import first_names
 from uav_task_alloc.allocator.state.published_lists import PublishedLists
 from uav_task_alloc.allocator.state.safe_paths import MakeSafePaths, SafePaths
 from uav_task_alloc.allocator.state.task_events import TaskEvents
 from uav_task_alloc.allocator.state.task_state_machine import TaskStep
 from uav_task_alloc.allocator.state.tasks import UNCHANGED, TaskRegistry, without_failed
 from uav_task_alloc.allocator.state.zone_checks import ZoneChecks
-from uav_task_alloc.errors import InvalidValue
+from uav_task_alloc.errors import InvalidValue, first_of
 from uav_task_alloc.model import Point, Task, ThreatZone, Uav
 from uav_task_alloc.params import AllocatorParams
 
@@ -105,7 +104,7 @@ class World:
     ) -> list[TaskVerdict]:
         repeated = [v.task_id for v in verdicts if v.unchanged]
         if repeated:
-            self.note(f'{action.name} of {first_names(repeated)} ignored: {UNCHANGED}')
+            self.note(f'{action.name} of {first_of(repeated)} ignored: {UNCHANGED}')
         for verdict in verdicts:
             if not verdict.accepted:
                 self.note(f'{action.name} of task {verdict.task_id!r} REJECTED: '
@@ -163,8 +162,8 @@ class World:
         self.zones, self._paths = new, None
         self.mark_unsaved('zones')
         self.zone_checks.zones_changed()
-        self.note(f'zones changed: {first_names(changed)}')
-        self.request_replan(f'zones {first_names(changed)}', now)
+        self.note(f'zones changed: {first_of(changed)}')
+        self.request_replan(f'zones {first_of(changed)}', now)
 
     def set_available(self, uav_id: str, available: bool, now: float) -> str:
         """Switch a UAV on or off; persists until changed. Returns an error text, '' on success."""

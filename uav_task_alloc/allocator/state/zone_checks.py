@@ -6,9 +6,9 @@ from collections.abc import Iterable
 
 from uav_task_alloc.allocator.state.callbacks import Note, RequestReplan
 from uav_task_alloc.allocator.state.fleet import Fleet, UavRecord
-from uav_task_alloc.allocator.state.name_list import first_names
 from uav_task_alloc.allocator.state.published_lists import PublishedLists
 from uav_task_alloc.allocator.state.safe_paths import GetSafePaths
+from uav_task_alloc.errors import first_of
 from uav_task_alloc.model import Point
 
 _CLIMB = 5.0  # [m] above the ground: the first climb of every UAV, and the error of heights
@@ -105,4 +105,4 @@ def _blocked_on_ground(uav_id: str, zone: str, home_zone: str) -> str:
 def blocked_text(records: Iterable[UavRecord]) -> str:
     """Return which UAVs are on the ground inside which zones; '' if there are none."""
     texts = sorted(record.blocked_on_ground for record in records if record.blocked_on_ground)
-    return first_names(texts, separator='; ')
+    return first_of(texts, separator='; ')
