@@ -99,7 +99,7 @@ def _next_branch(pool: Pool, reduced: Reduced, b: Branches, chosen: Choices, dep
                  spare: float) -> tuple[float, int]:
     """Choose the next column that fits, or none: (cost with it [m], columns tried).
 
-    The cost is inf where no choice is left.
+    The cost is inf where no choice is left. O(stops of the columns tried).
     """
     t, spent = b.tasks[chosen.task[depth]], chosen.spent[depth]
     begin, end = chosen.next_choice[depth], b.begin[t + 1]
@@ -145,7 +145,7 @@ def _store_choices(pool: Pool, group: Flags, b: Branches, chosen: Choices, depth
 @allocating_kernel
 def _branch_and_bound(pool: Pool, reduced: Reduced, group: Flags, b: Branches, spare: float,
                       limit: int, flown: Ints, uav_of: Ints) -> tuple[bool, int]:
-    """See `repartition`; `spare` [m] is the reduced cost of the current columns."""
+    """See `repartition`; `spare` [m] is the current reduced cost. O(limit stops)."""
     room = b.tasks.size
     chosen = Choices(np.empty(room, np.int64), np.empty(room, np.int64), np.empty(room, np.int64),
                      np.empty(room), np.zeros(reduced.unassigned.size, np.bool_),
@@ -184,8 +184,8 @@ def repartition(pool: Pool, reduced: Reduced, group: Flags, tasks: Ints, limit: 
     """Choose the cheapest columns for a group of UAVs and its tasks.
 
     group: (m) bool; tasks: int64 task nodes; flown: (m) column of each UAV, -1: none; uav_of:
-    (m + n) UAV by node, -1: unassigned. The last two are changed. Tries about `limit` columns.
-    Returns whether the cost fell, and how many columns were tried.
+    (m + n) UAV by node, -1: unassigned. The last two are changed. Tries about `limit` columns,
+    O(n) each. Returns whether the cost fell, and how many columns were tried.
     """
     spare = reduced.stay[group & (flown < 0)].sum()
     spare += reduced.unassigned[tasks[uav_of[tasks] < 0]].sum()

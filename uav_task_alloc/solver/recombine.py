@@ -61,7 +61,7 @@ def _tasks_of(a: Arrays, uav_of: Ints, group: Flags) -> Ints:
 
 @allocating_kernel
 def _improve(a: Arrays, pool: Pool, work: float, flown: Ints, uav_of: Ints) -> bool:
-    """Repartition the groups around each UAV while that lowers the cost; whether it did."""
+    """Repartition the groups around each UAV while the cost falls; whether it did. O(work)."""
     worth = 0.0
     for t in range(a.uavs, a.ends):
         worth += a.unassigned_cost[t - a.uavs] if uav_of[t] < 0 else 0.0
@@ -90,7 +90,7 @@ def _improve(a: Arrays, pool: Pool, work: float, flown: Ints, uav_of: Ints) -> b
 def recombine(a: Arrays, best: Routes, pool: Pool, work: float, into: Routes) -> bool:
     """Write to `into` a combination of columns that costs less than `best`; whether there is one.
 
-    Reads about `work` stops for a bound, and as many again in the search.
+    Reads about `work` stops for a bound, and as many again in the search. O(work).
     """
     collect(a, best, pool)
     flown, uav_of = np.full(a.uavs, -1, np.int64), np.full(a.ends, -1, np.int64)

@@ -17,7 +17,7 @@ def rng_state(seed: int) -> RngState:
 
 @inline_kernel
 def uniform(state: RngState) -> float:
-    """A float64 in [0, 1)."""
+    """A float64 in [0, 1). O(1)."""
     x = state[0]
     x ^= x << np.uint64(13)
     x ^= x >> np.uint64(7)
@@ -28,5 +28,5 @@ def uniform(state: RngState) -> float:
 
 @inline_kernel
 def below(state: RngState, n: int) -> int:
-    """An integer in 0..n-1, uniformly distributed."""
+    """An integer in 0..n-1, uniformly distributed. O(1)."""
     return int(uniform(state) * n)

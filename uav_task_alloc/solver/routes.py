@@ -156,7 +156,7 @@ total_cost_kernel, is_better_kernel = inline_kernel(total_cost), inline_kernel(i
 
 @inline_kernel
 def lengthening_cost(a: Arrays, r: Routes, u: int, delta: float) -> float:
-    """Cost [m] of making UAV u's route longer by delta [m]; inf if not allowed."""
+    """Cost [m] of making UAV u's route longer by delta [m]; inf if not allowed. O(1)."""
     if not delta < math.inf:
         return math.inf
     before = r.length[u] - a.range_left[u]
@@ -168,7 +168,7 @@ def lengthening_cost(a: Arrays, r: Routes, u: int, delta: float) -> float:
 
 @inline_kernel
 def add_length(a: Arrays, r: Routes, u: int, delta: float) -> None:
-    """Add delta [m] to the length of UAV u's route, and to the sums."""
+    """Add delta [m] to the length of UAV u's route, and to the sums. O(1)."""
     before = r.length[u]
     r.length[u] = before + delta
     r.sums[DISTANCE] += delta
@@ -179,7 +179,7 @@ def add_length(a: Arrays, r: Routes, u: int, delta: float) -> None:
 
 @inline_kernel
 def insert(a: Arrays, r: Routes, t: int, after: int) -> None:
-    """Insert the unassigned task node t after node `after`."""
+    """Insert the unassigned task node t after node `after`. O(1)."""
     u, then = r.uav_of[after], r.next[after]
     first, second = leg_length(a, after, t), leg_length(a, t, then)
     delta = first + second - r.leg[after]
@@ -194,14 +194,14 @@ def insert(a: Arrays, r: Routes, t: int, after: int) -> None:
 
 @inline_kernel
 def _length_over(a: Arrays, r: Routes, before: int, t: int, then: int) -> float:
-    """Length [m] of the path over t, which is stored with the known lengths."""
+    """Length [m] of the path over t, which is stored with the known lengths. O(1)."""
     length_known = float(length_via(a.pairs, SIGNED(before), SIGNED(t), SIGNED(then)))
     return length_known if length_known < math.inf else float(r.leg[before] + r.leg[t])
 
 
 @inline_kernel
 def remove(a: Arrays, r: Routes, t: int) -> None:
-    """Remove the task node t from its route."""
+    """Remove the task node t from its route. O(1)."""
     u, before, then = r.uav_of[t], r.prev[t], r.next[t]
     direct = leg_length(a, before, then)
     if direct == math.inf:  # no path is known: keep the one over t

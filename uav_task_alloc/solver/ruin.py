@@ -122,7 +122,7 @@ def list_unassigned_and_overrange(a: Arrays, r: Routes, log: RuinLog) -> None:
 
 @inline_kernel
 def _choose_seed(a: Arrays, r: Routes, log: RuinLog, rng: RngState) -> Any:
-    """The task to ruin around: any, often an unassigned one or one on a route beyond range."""
+    """The seed: any task, often an unassigned one or one of a route beyond range. O(tasks)."""
     if log.counts[2] > 0 and uniform(rng) < UNASSIGNED_SEED_RATE:
         t = log.unassigned[below(rng, log.counts[2])]
         if r.uav_of[t] < 0:
@@ -193,7 +193,7 @@ def _sort_removed(a: Arrays, log: RuinLog, rng: RngState) -> None:
 
 @inline_kernel
 def recreate(a: Arrays, r: Routes, log: RuinLog, rng: RngState) -> None:
-    """Insert removed tasks, each where it costs least, if that is less than not serving it."""
+    """Insert removed tasks where each costs least, if less than not serving it. O(removed k)."""
     _sort_removed(a, log, rng)
     for i in range(log.counts[1]):
         t = log.removed[i]

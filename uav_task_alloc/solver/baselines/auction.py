@@ -22,11 +22,11 @@ def solve(recorder: Recorder, seed: int, learnt: object = None) -> None:
     """
     problem = recorder.problem
     if problem.uavs and problem.tasks:
-        recorder.offer(routes_of(problem, allocate(recorder)))
+        recorder.offer(routes_of(problem, run_auction(recorder)))
     recorder.count()
 
 
-def allocate(recorder: Recorder) -> list[list[int]]:
+def run_auction(recorder: Recorder) -> list[list[int]]:
     """Run the auction; returns the tasks of each UAV in order. O(n (n m + n^2 / m))."""
     problem = recorder.problem
     legs, m = all_leg_lengths(problem), len(problem.uavs)
