@@ -2,7 +2,7 @@
 # make demo: four simulated UAVs fly what the allocator plans.   make test: every check.
 SHELL := /bin/bash
 .SHELLFLAGS := -eo pipefail -c
-.PHONY: demo test build docs clean
+.PHONY: demo test build docs site clean
 
 ENV := . .ros/setup.sh
 RUN := . install/setup.bash && export PATH="$(CURDIR)/.ros/bin:$$PATH"
@@ -38,9 +38,15 @@ install/.compiled: install/.built $(wildcard uav_task_alloc/*.py uav_task_alloc/
 	@$(RUN) && python3 -m uav_task_alloc compile
 	@touch $@
 
-# The generated files: config/*.yaml, docs/parameters.md
+# The generated files: config/*.yaml, docs/parameters.md, the index of docs/architecture.md
 docs: build
-	@$(RUN) && python3 -m uav_task_alloc params --write
+	@$(RUN) && python3 -m uav_task_alloc params --write && python3 tools/docs/file_index.py
+
+# The docs as a site in out/site; a broken link or a public name without a docstring fails
+site: build
+	@.ros/bin/python -m pip install -q 'sphinx>=8' 'myst-parser>=4'
+	@$(RUN) && PYTHONPATH=".:$$PYTHONPATH" python3 -m sphinx -W --keep-going -q -b html docs out/site
+	@echo '== open out/site/index.html'
 
 clean:
 	rm -rf .ros build install log out

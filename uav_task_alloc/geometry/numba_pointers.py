@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Arrays and functions behind plain addresses, for kernels that would otherwise wait for Python.
+"""Arrays and functions at plain addresses, for kernels that would otherwise wait for Python.
 
 Numba counts a reference for each array of a tuple that a call passes on: 100 ns for a lookup that
 takes 3. A function object in such a tuple makes numba resolve its type again: 130 us for a call
