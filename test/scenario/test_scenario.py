@@ -234,7 +234,7 @@ def test_every_key_has_a_description():
     for table in TABLES.values():
         for entry in table.values():
             assert entry.text
-            assert entry.kind.words
+            assert entry.kind.description
 
 
 @pytest.mark.parametrize(('text', 'shown'), [

@@ -19,8 +19,8 @@ from uav_task_alloc.model import Plan
 from uav_task_alloc.params import AllocatorParams
 from uav_task_alloc.scenario.values import Scenario
 
-PICTURES = ('.png', '.pdf', '.svg')
-_INTERRUPTED = 130  # what a shell expects after Ctrl-C
+FIGURE_SUFFIXES = ('.png', '.pdf', '.svg')
+_INTERRUPTED = 130  # exit status of a shell after Ctrl-C
 
 
 def main(argv: Sequence[str]) -> int:
@@ -169,11 +169,12 @@ def plotter(option: str, path: Path) -> Callable[..., None]:
     """The function that draws a plan into `path`; called before solving, to fail early.
 
     Raises:
-        InvalidValue: the suffix is none of PICTURES.
+        InvalidValue: the suffix is none of FIGURE_SUFFIXES.
         SystemExit: matplotlib is not installed.
     """
-    if path.suffix.lower() not in PICTURES:
-        raise InvalidValue(option, str(path), f'a name that ends with {" or ".join(PICTURES)}')
+    if path.suffix.lower() not in FIGURE_SUFFIXES:
+        raise InvalidValue(option, str(path),
+                           f'a name that ends with {" or ".join(FIGURE_SUFFIXES)}')
     try:
         from uav_task_alloc import plots
     except ModuleNotFoundError as error:

@@ -18,8 +18,9 @@ from uav_task_alloc.record.run_state import Line, RunState
 from uav_task_alloc.zone_codec import JSON_ZONE, encode_zone
 
 _MAX_STAMP_AGE = 86400.0  # [s]; an older stamp is of another clock
-PART_OF_KIND = {'announcement': 'tasks', 'statuses': 'statuses', 'zones': 'zones', 'state': 'uavs',
-         'uploads': 'uavs'}  # by kind of a line: the part of the page that it changes
+# by kind of a line: the part of the page that it changes
+_PART_OF_KIND = {'announcement': 'tasks', 'statuses': 'statuses', 'zones': 'zones',
+                 'state': 'uavs', 'uploads': 'uavs'}
 LogEntry = dict[str, Any]  # of a log: `wall` [unix s] and the values that the page shows
 
 
@@ -44,8 +45,8 @@ class Scene:
         self.events += [{'wall': line['wall'], 'kind': kind, 'text': text}
                         for kind, text in sentences(self.run, line)]
         kind = line['kind']
-        if kind in PART_OF_KIND:
-            self.dirty.add(PART_OF_KIND[kind])
+        if kind in _PART_OF_KIND:
+            self.dirty.add(_PART_OF_KIND[kind])
         elif kind == 'list':
             self.dirty.add(f'list {line["uav"]}')
         elif kind == 'allocation':

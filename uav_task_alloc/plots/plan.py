@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A plan from above: routes with their detours, tasks in order, zones, what is unassigned."""
+"""Map of a plan: routes with their detours, tasks in order, zones, unassigned tasks."""
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence

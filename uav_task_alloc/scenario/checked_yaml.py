@@ -20,7 +20,7 @@ INFINITE = {'.inf': math.inf, '+.inf': math.inf, '-.inf': -math.inf}  # YAML's s
 class ValueKind:
     """The kind of a value: its description, for the docs and for errors, and its reader."""
 
-    words: str
+    description: str
     read: Callable[[str, yaml.Node], Any]  # (place, node); raises ScenarioError
 
 
@@ -124,7 +124,7 @@ def read_row(table: KeyTable, place: str, node: yaml.Node) -> YamlRow:
         if given is not None and not is_null(given):
             row.values[key] = entry.kind.read(f'{place}.{key}', given)
         elif entry.default is REQUIRED:
-            raise row.refuse(key, entry.kind.words)
+            raise row.refuse(key, entry.kind.description)
         else:
             row.values[key] = entry.default
     return row
@@ -150,7 +150,7 @@ def is_null(node: yaml.Node) -> bool:
     return bool(node.tag == 'tag:yaml.org,2002:null')
 
 
-def scalar(words: str, convert: Callable[[str], Any]) -> ValueKind:
+def scalar(description: str, convert: Callable[[str], Any]) -> ValueKind:
     """A scalar; `convert` raises ValueError for an invalid text."""
     def read(place: str, node: yaml.Node) -> Any:
         try:
@@ -158,8 +158,8 @@ def scalar(words: str, convert: Callable[[str], Any]) -> ValueKind:
                 raise ValueError
             return convert(node.value)
         except ValueError:
-            raise refusal(node, f'{place} = {shown_yaml(node)}: expected {words}') from None
-    return ValueKind(words, read)
+            raise refusal(node, f'{place} = {shown_yaml(node)}: expected {description}') from None
+    return ValueKind(description, read)
 
 
 def number_value(low: float = -math.inf, high: float = math.inf, *, open_low: bool = False,
@@ -199,24 +199,25 @@ def choice(*names: str) -> ValueKind:
     return scalar(f'one of {", ".join(names)}', convert)
 
 
-def text_value(words: str, accepts: Callable[[str], object] = str.strip) -> ValueKind:
+def text_value(description: str, accepts: Callable[[str], object] = str.strip) -> ValueKind:
     """A string for which `accepts` is true."""
     def convert(value: str) -> str:
         if not accepts(value):
             raise ValueError
         return value
-    return scalar(words, convert)
+    return scalar(description, convert)
 
 
-def list_of(kind: ValueKind, words: str, least: int = 0, most: float = math.inf) -> ValueKind:
+def list_of(kind: ValueKind, description: str, least: int = 0,
+            most: float = math.inf) -> ValueKind:
     """A list of values of one kind, read as a tuple."""
     def read(place: str, node: yaml.Node) -> tuple[Any, ...]:
         if not isinstance(node, yaml.SequenceNode) or not least <= len(node.value) <= most:
-            raise refusal(node, f'{place} = {shown_yaml(node)}: expected {words}')
+            raise refusal(node, f'{place} = {shown_yaml(node)}: expected {description}')
         return tuple(kind.read(f'{place}[{i}]', child) for i, child in enumerate(node.value))
-    return ValueKind(words, read)
+    return ValueKind(description, read)
 
 
-def mapping(table: KeyTable, words: str) -> ValueKind:
+def mapping(table: KeyTable, description: str) -> ValueKind:
     """A nested mapping, read as a YamlRow."""
-    return ValueKind(words, lambda place, node: read_row(table, place, node))
+    return ValueKind(description, lambda place, node: read_row(table, place, node))

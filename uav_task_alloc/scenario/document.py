@@ -47,7 +47,7 @@ def scenario_page() -> str:
     for name, table in TABLES.items():
         parts.append(f'\n## {name}\n\n| key | default | expected | meaning |\n|---|---|---|---|\n')
         for key, entry in table.items():
-            parts.append(f'| `{key}` | {_default(entry.default)} | {entry.kind.words} | '
+            parts.append(f'| `{key}` | {_default(entry.default)} | {entry.kind.description} | '
                          f'{entry.text} |\n')
     return ''.join(parts)
 

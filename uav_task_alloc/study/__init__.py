@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Experiments that anyone can repeat: the paper's study, the bench against rivals, ablations."""
+"""Reproducible experiments: the paper's study, the benchmark, ablations."""
