@@ -105,9 +105,9 @@ def _unable(problem: Problem, task: Task) -> str:
         return f'not allowed: only {names or "no UAV"} may serve it'
     lacking = task.required_capabilities - frozenset().union(*(u.capabilities for u in allowed))
     names = ', '.join(sorted(lacking or task.required_capabilities))
-    whom = 'UAV' if len(allowed) == len(problem.uavs) else 'allowed UAV'
-    return f'no {whom} has the capabilities {names}' if lacking else (
-        f'no {whom} has all the capabilities {names}')
+    fleet = 'UAV' if len(allowed) == len(problem.uavs) else 'allowed UAV'
+    return f'no {fleet} has the capabilities {names}' if lacking else (
+        f'no {fleet} has all the capabilities {names}')
 
 
 def _need(problem: Problem, u: int, place: int) -> float:
