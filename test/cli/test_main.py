@@ -40,7 +40,7 @@ def test_a_cancelled_task_is_not_planned(tmp_path):
     result = json.loads(out.read_text())
     assert 'never' not in result['unassigned']
     assert sorted(name for route in result['routes'].values() for name in route) == [
-        'behind', 'east', 'late', 'north']
+        'beyond', 'east', 'late', 'north']
 
 
 @pytest.mark.parametrize(('arguments', 'text'), [
