@@ -120,3 +120,13 @@ def test_the_module_is_the_command():
                           cwd=ROOT, capture_output=True, text=True, check=False)
     assert done.returncode == 1
     assert done.stderr.startswith('none.yaml: ')
+
+
+@pytest.mark.parametrize('arguments', [['-h'], ['plan', '-h'], ['params']], ids=' '.join)
+def test_a_command_that_solves_nothing_imports_no_numba(arguments):
+    code = ('import contextlib, sys\nfrom uav_task_alloc.__main__ import main\n'
+            'with contextlib.suppress(SystemExit):\n    main(sys.argv[1:])\n'
+            'sys.exit("numba" in sys.modules or "matplotlib" in sys.modules)')
+    done = subprocess.run([sys.executable, '-c', code, *arguments], cwd=ROOT,
+                          capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr

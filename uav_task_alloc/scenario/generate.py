@@ -7,7 +7,6 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from uav_task_alloc.geometry.zones import zones_around
 from uav_task_alloc.model import Point, Task, ThreatZone
 from uav_task_alloc.scenario.values import (
     DEFAULT_ORIGIN,
@@ -34,6 +33,7 @@ def draw_points(rng: np.random.Generator, count: int, low: Point, high: Point,
     Returns:
         Points [m] rounded to 0.1 m; fewer than `count` where there is no room.
     """
+    from uav_task_alloc.geometry.zones import zones_around  # imports numba
     points: list[Point] = []
     for _ in range(count * _TRIES):
         if len(points) == count:
