@@ -186,13 +186,13 @@ class OnboardMission:
     def _done(self) -> frozenset[str]:
         return self.progress.pending.union(self.progress.completed)
 
-    def _repeats_flown(self) -> bool:
-        """Whether an atomic replacement has a task that was flown in the meantime."""
+    def _starts_at_flown(self) -> bool:
+        """Whether an atomic replacement starts at a task that was flown in the meantime."""
         if self._uploading is None or self._taken or not self._profile.atomic:
             return False
         diff = self._uploading[0]
-        return any(item.completes and item.task in self.progress.completed
-                   for item in diff.items[diff.start:])
+        first = next((item for item in diff.items[diff.start:] if item.completes), None)
+        return first is not None and first.task in self.progress.completed
 
     def next_unflown(self) -> int | None:
         """Seq to continue at during the readback of a replacement that starts at a flown task."""
@@ -223,7 +223,7 @@ class OnboardMission:
     def step(self, now: float) -> list[Message]:
         """Advance time; returns the messages to send."""
         out = self.upload.step(now)
-        if self._repeats_flown() and not self.upload.sent_all:
+        if self._starts_at_flown() and not self.upload.sent_all:
             out += self.upload.cancel(now)
         self._settle(now)
         return out

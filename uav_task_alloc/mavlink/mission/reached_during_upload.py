@@ -61,9 +61,11 @@ class ReachedDuringUpload:
                     progress.note_reached(seq, when)
             elif after is not None and progress.near_one(after, before, when):
                 of_new.append((seq, when))
-            elif after is not None and progress.was_exactly_at(after, last):
+            elif after is not None and seq == uploaded.start and (
+                    progress.was_exactly_at(after, last)):
                 of_new.append((seq, last))  # a new one among repetitions of an older one
-            elif before is not None and progress.was_exactly_at(before, last):
+            elif before is not None and seq == progress.current and (
+                    progress.was_exactly_at(before, last)):
                 progress.credit(before)
         self._reached.clear()
         return of_new

@@ -136,7 +136,8 @@ class ReachedEpoch:
         """
         item, before, positions = epoch.items[seq], self.before, self._positions
         if positions.vehicle_time(when) < epoch.taken:  # a repetition, or hidden among such
-            return positions.was_at(item, max(epoch.since, epoch.taken), close=0.0)
+            return epoch.current is not None and epoch.current >= seq and positions.was_at(
+                item, max(epoch.since, epoch.taken), close=0.0)
         if not self._repeats:  # sent once, where the vehicle is
             near = positions.can_have_reached(item, now) if not before.items else (
                 positions.distance(item) <= LOOSE_RADIUS + item.radius)
