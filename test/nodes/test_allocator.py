@@ -303,7 +303,7 @@ def test_a_killed_allocator_restores_its_world(start, probe, fleet, tmp_path):
     node.stop(signal.SIGKILL)
     revision, plans = fleet.lists['a'].revision, fleet.allocations[-1].revision
     fleet.uav('a', 150.0, active_task_id='t2', list_revision=revision)
-    fleet.seen.clear()
+    fleet.statuses.clear()
     begin(start, fleet, *state)
     probe.until(lambda: fleet.allocations[-1].revision > plans)
     probe.until(lambda: fleet.route('a') == ['t2', 't3', 't4'])
@@ -333,7 +333,7 @@ def test_simulated_time_is_in_the_stamps_and_stops_nothing(start, probe, fleet):
     fleet.tasks.publish(add(task('t2', 200)))
     probe.until(lambda: fleet.route('a') == ['t1', 't2'])
     clock.publish(Clock(clock=Time(sec=70)))  # the simulation is restarted
-    probe.until(lambda: fleet.seen[-1].header.stamp.sec in (70, 5000))
+    probe.until(lambda: fleet.statuses[-1].header.stamp.sec in (70, 5000))
     fleet.event(m.TaskEvent.COMPLETED, 't1', 'a')
     probe.until(lambda: fleet.route('a') == ['t2'])
     probe.until(lambda: fleet.status('t1').stamp.sec == 70)
