@@ -17,7 +17,7 @@ from uav_task_alloc.mavlink.mission.position_history import (
 from uav_task_alloc.mavlink.transport.frame_log import FrameLog
 from uav_task_alloc.model import Point
 
-_MIN_PERIOD = 0.95  # [s] between two repetitions (PX4: 1 s); an earlier REACHED is a new one
+_MIN_PERIOD = 0.7  # [s] two repetitions are further apart (PX4: 1 s); an earlier one is new
 _MAX_PERIOD = 2.0  # [s] the same, where no frame is lost
 REPEAT_WINDOW = 15.0  # [s] after an upload in which a REACHED may be of the previous epoch
 
@@ -61,6 +61,7 @@ class ReachedEpoch:
                  frames: FrameLog | None = None) -> None:
         self._positions, self._repeats = positions, repeats
         self._frames, self._last_frame = frames or FrameLog(), 0
+        self._last_newest = -math.inf  # vehicle time [s] of the newest position at the last one
         self.before = _NO_EPOCH
         self.credited: int | None = None  # seq of the last REACHED, once it has completed an item
         # seq -> [s] until when evidence is awaited, [s] at which it was received first
@@ -90,14 +91,19 @@ class ReachedEpoch:
         elif self._series_began == now:  # too early for a repetition
             self.credited = None
         self._last, self._last_frame = (seq, now), self._frames.newest
+        self._last_newest = self._positions.path.newest
         return self.credited == seq
 
     def _repeats_last(self, seq: int, now: float) -> bool:
         if self._last is None or self._last[0] != seq or now - self._last[1] >= MAX_MESSAGE_DELAY:
             return False
         # a series with a pause has ended, unless frames were lost
-        return now - self._last[1] <= _MAX_PERIOD or not self._frames.whole(
+        return self._vehicle_seconds() <= _MAX_PERIOD or not self._frames.whole(
             self._last_frame, self._frames.newest)
+
+    def _vehicle_seconds(self) -> float:
+        """Since the last one, by the vehicle's clock; a simulated one may be faster than ours."""
+        return self._positions.path.newest - self._last_newest
 
     def first_at(self, seq: int, now: float) -> float:
         """When [s] the first of the series was received that a REACHED continues, of any epoch.
@@ -106,15 +112,15 @@ class ReachedEpoch:
             seq: index without home.
             now: steady time [s] at which it is received.
         """
-        if self._last is None or not self._repeats or now - self._last[1] < _MIN_PERIOD:
+        if self._last is None or not self._repeats or 0.0 < self._vehicle_seconds() < _MIN_PERIOD:
             return now
         return self._series_began if self._repeats_last(seq, now) else now
 
     def note_repeated(self, seq: int, now: float) -> None:
         """Note that the last REACHED was repeated, also while its epoch was unknown."""
-        if self._last is not None and self._last[0] == seq:
-            self._last = seq, max(now, self._last[1])
-            self._last_frame = self._frames.newest
+        if self._last is not None and self._last[0] == seq and now > self._last[1]:
+            self._last, self._last_frame = (seq, now), self._frames.newest
+            self._last_newest = self._positions.path.newest
 
     def reached_recently(self, begin: int, end: int, now: float) -> bool:
         """Whether the last REACHED named an item in [begin, end), perhaps as a repetition."""
