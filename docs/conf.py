@@ -5,7 +5,7 @@ from sphinx.application import Sphinx
 from sphinx.util import logging
 
 project = 'uav_task_alloc'
-copyright = 'uav_task_alloc developers'  # noqa: A001 - the name that Sphinx reads
+copyright = 'uav_task_alloc developers'
 extensions = ['myst_parser', 'sphinx.ext.autodoc', 'sphinx.ext.napoleon', 'sphinx.ext.viewcode']
 source_suffix = {'.md': 'markdown', '.rst': 'restructuredtext'}
 myst_heading_anchors = 3
