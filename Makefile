@@ -51,7 +51,7 @@ docs: build
 
 # The docs as a site in out/site; a broken link or a public name without a docstring fails
 site: build
-	@.ros/bin/python -m pip install -q 'sphinx>=8' 'myst-parser>=4'
+	@.ros/bin/python -m pip install -q myst-parser sphinx
 	@$(RUN) && PYTHONPATH=".:$$PYTHONPATH" python3 -m sphinx -W --keep-going -q -b html docs out/site
 	@echo '== open out/site/index.html'
 

@@ -78,6 +78,7 @@ setup(
     install_requires=['numpy', 'numba', 'pymap3d', 'pymavlink', 'pyyaml', 'scipy'],
     extras_require={'plot': ['matplotlib'],
                     'study': ['distributed', 'ortools', 'pyvrp'],
+                    'site': ['myst-parser', 'sphinx'],
                     'view': ['aiohttp', 'mcap', 'mcap-ros2-support', 'plotly'],
                     'test': ['hypothesis', 'matplotlib', 'mypy', 'pytest', 'pytest-xdist',
                              'ruff']},
