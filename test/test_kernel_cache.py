@@ -50,10 +50,16 @@ def package(tmp_path):
     return copy
 
 
+def default_sigint():
+    """As in a terminal; a shell starts its background jobs with SIGINT ignored."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+
 def start(package, code):
     environment = {**os.environ, 'PYTHONPATH': str(package.parent), 'NUMBA_CACHE_DIR': ''}
     return subprocess.Popen([sys.executable, '-c', code], env=environment, cwd=package.parent,
-                            stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+                            stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+                            preexec_fn=default_sigint)
 
 
 def output(package, code=CALL):

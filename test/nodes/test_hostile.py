@@ -163,7 +163,7 @@ def test_hostile_topics_do_not_end_a_running_node(start, probe):
     out[m.ThreatZoneArray].publish(m.ThreatZoneArray())
     probe.node.create_timer(0.1, lambda: out[m.UavState].publish(good.state()))
     probe.until(lambda: arrays and {s.task_id for s in arrays[-1].statuses if s.uav_id == 'good'}
-                == set(good.ids), 60.0,
+                >= set(good.ids), 60.0,  # tasks among the hostile ones may be good as well
                 lambda: (len(good.ids), [(each.task_id, each.state, each.uav_id, each.reason)
                                          for last in arrays[-1:] for each in last.statuses
                                          if each.task_id.startswith('good')],

@@ -9,7 +9,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 PACKAGE, PAGE = ROOT / 'uav_task_alloc', ROOT / 'docs' / 'architecture.md'
-BEGIN, END = '<!-- index: begin -->\n', '<!-- index: end -->\n'
+HEADING = '## Rooms and files\n'  # the index is all below it
 # in the order of the layers
 ROOMS = ('.', 'geometry', 'solver', 'solver/baselines', 'scenario', 'mavlink',
          'mavlink/transport', 'mavlink/mission', 'mavlink/gcs', 'sim', 'sim/ardupilot',
@@ -46,8 +46,7 @@ def index_text():
 
 def page_text():
     """The page with a new index."""
-    before, rest = PAGE.read_text().split(BEGIN)
-    return before + BEGIN + '\n' + index_text() + '\n' + END + rest.split(END)[1]
+    return PAGE.read_text().partition(HEADING)[0] + HEADING + '\n' + index_text()
 
 
 if __name__ == '__main__':
