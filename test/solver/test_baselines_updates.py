@@ -138,7 +138,7 @@ def test_children_of_a_generation_serve_every_task_once_by_an_allowed_uav():
                                np.random.default_rng(1))
     best = population.fits.min()
     for _ in range(20):
-        population.breed()
+        population.advance()
         assert (np.sort(population.row, axis=1) == np.arange(5)).all()
         assert (population.uav_of[:, 4] == 1).all()
         assert population.fits.min() <= best  # the elite is kept

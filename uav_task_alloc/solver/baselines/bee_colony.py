@@ -14,9 +14,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from uav_task_alloc.solver.baselines.population import Coding
+from uav_task_alloc.solver.baselines.population import Coding, evolve
 from uav_task_alloc.solver.recorder import Recorder
-from uav_task_alloc.solver.routes import Floats, Ints
+from uav_task_alloc.solver.routes import Floats, Ints, Routes
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,10 +52,15 @@ class AbcColony:
         uav_of = self._coding.uav(tasks, sources)
         return self._coding.rows(np.argsort(sources, axis=1, kind='stable'), uav_of), uav_of
 
+    def routes(self, plan: int) -> Routes:
+        """The plan of one food source."""
+        row, uav_of = self.decoded(self.sources[plan:plan + 1])
+        return self._coding.routes(row[0], uav_of[0])
+
     def _judge(self, sources: Floats) -> Floats:
         return self._coding.fits(*self.decoded(sources))
 
-    def fly(self) -> None:
+    def advance(self) -> None:
         """A generation: employed bees, onlookers, a scout."""
         count = len(self.sources)
         self._visit(np.arange(count))
@@ -91,20 +96,5 @@ def solve(recorder: Recorder, seed: int, learnt: object = None,
     Raises:
         InvalidValue: there are too many tasks for a table of leg lengths.
     """
-    if not recorder.problem.uavs or not recorder.problem.tasks:
-        return
-    coding = Coding(recorder.problem)
-    if not len(coding.tasks):
-        return
-    colony = AbcColony(coding, settings or AbcSettings(), np.random.default_rng(seed))
-    offered = np.inf
-    while True:
-        best = int(np.argmin(colony.fits))
-        if colony.fits[best] < offered:
-            offered = colony.fits[best]
-            row, uav_of = colony.decoded(colony.sources[best:best + 1])
-            recorder.offer(coding.routes(row[0], uav_of[0]))
-        recorder.count()
-        if recorder.over():
-            return
-        colony.fly()
+    evolve(recorder, lambda coding: AbcColony(
+        coding, settings or AbcSettings(), np.random.default_rng(seed)))

@@ -12,9 +12,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from uav_task_alloc.solver.baselines.population import Coding
+from uav_task_alloc.solver.baselines.population import Coding, evolve
 from uav_task_alloc.solver.recorder import Recorder
-from uav_task_alloc.solver.routes import Ints
+from uav_task_alloc.solver.routes import Ints, Routes
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,7 +51,11 @@ class Population:
         self.row = coding.rows(rng.permuted(tasks, axis=1), self.uav_of)
         self.fits = coding.fits(self.row, self.uav_of)
 
-    def breed(self) -> None:
+    def routes(self, plan: int) -> Routes:
+        """One of the plans."""
+        return self._coding.routes(self.row[plan], self.uav_of[plan])
+
+    def advance(self) -> None:
         """Replace the plans by the next generation."""
         s, k = self._settings, self.row.shape[1]
         births = s.size - s.elite
@@ -104,19 +108,5 @@ def solve(recorder: Recorder, seed: int, learnt: object = None,
     Raises:
         InvalidValue: there are too many tasks for a table of leg lengths.
     """
-    if not recorder.problem.uavs or not recorder.problem.tasks:
-        return
-    coding = Coding(recorder.problem)
-    if not len(coding.tasks):
-        return
-    population = Population(coding, settings or GaSettings(), np.random.default_rng(seed))
-    offered: float = np.inf
-    while True:
-        best = int(np.argmin(population.fits))
-        if population.fits[best] < offered:
-            offered = population.fits[best]
-            recorder.offer(coding.routes(population.row[best], population.uav_of[best]))
-        recorder.count()
-        if recorder.over():
-            return
-        population.breed()
+    evolve(recorder, lambda coding: Population(
+        coding, settings or GaSettings(), np.random.default_rng(seed)))

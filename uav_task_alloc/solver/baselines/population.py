@@ -6,11 +6,15 @@ plans are trimmed to hard ranges before they are offered to the recorder.
 """
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Protocol
+
 import numpy as np
 from numpy.typing import NDArray
 
 from uav_task_alloc.solver.baselines.leg_lengths import all_leg_lengths, routes_of
 from uav_task_alloc.solver.problem import Problem
+from uav_task_alloc.solver.recorder import Recorder
 from uav_task_alloc.solver.routes import TINY, Floats, Ints, Routes
 
 
@@ -74,3 +78,42 @@ class Coding:
         for task in row:
             rows[uav_of[task]].append(int(self.tasks[task]))
         return routes_of(self.problem, rows)
+
+
+class Generations(Protocol):
+    """Plans that are replaced by better ones, generation by generation."""
+
+    fits: Floats  # (p) eq 2.12 of each plan
+
+    def routes(self, plan: int) -> Routes:
+        """One of the plans."""
+
+    def advance(self) -> None:
+        """The next generation."""
+
+
+def evolve(recorder: Recorder, make: Callable[[Coding], Generations]) -> None:
+    """Offer the best plan of each generation until the budget ends.
+
+    Args:
+        recorder: of the problem; nothing is offered where no task can be served.
+        make: the first generation of a problem.
+
+    Raises:
+        InvalidValue: there are too many tasks for a table of leg lengths.
+    """
+    if not recorder.problem.uavs or not recorder.problem.tasks:
+        return
+    coding = Coding(recorder.problem)
+    if not len(coding.tasks):
+        return
+    plans, offered = make(coding), np.inf
+    while True:
+        best = int(np.argmin(plans.fits))
+        if plans.fits[best] < offered:
+            offered = float(plans.fits[best])
+            recorder.offer(plans.routes(best))
+        recorder.count()
+        if recorder.over():
+            return
+        plans.advance()
