@@ -79,7 +79,7 @@ class Probe:
         self.executor = SingleThreadedExecutor(context=self.context)
         self.executor.add_node(self.node)
 
-    def until(self, condition, timeout=20.0, facts=lambda: ''):
+    def until(self, condition, timeout=60.0, facts=lambda: ''):
         """Spin until condition() is true; fail after `timeout` [s], and show facts()."""
         end = time.monotonic() + timeout
         while not condition():
