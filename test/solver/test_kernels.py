@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings, strategies as st
+from hypothesis import example, given, settings, strategies as st
 from plan_checks import make, random_problem
 
 from uav_task_alloc.model import Task, ThreatZone
@@ -34,6 +34,7 @@ def lengths(problem, routes):
 
 @settings(max_examples=25, deadline=None)
 @given(seed=st.integers(0, 2 ** 32), tasks=st.integers(1, 40), returns=st.booleans())
+@example(seed=785, tasks=30, returns=True)
 def test_sums_stay_consistent_and_undo_restores_the_routes(seed, tasks, returns):
     problem = random_problem(3, tasks, seed, returns=returns)
     routes, rng, log = empty_routes(problem.arrays), rng_state(seed), empty_log(problem.arrays)
@@ -49,7 +50,9 @@ def test_sums_stay_consistent_and_undo_restores_the_routes(seed, tasks, returns)
         assert routes.tasks.sum() == (routes.uav_of[nodes] >= 0).sum()
         if i % 2:
             undo(problem.arrays, routes, log)
-            assert (routes.next == before.next).all()
+            assert (routes.uav_of == before.uav_of).all()
+            flown = before.uav_of >= 0  # what is in no route has no next node
+            assert (routes.next == before.next)[flown].all()
             assert routes.length == pytest.approx(before.length, abs=1e-6)
 
 
