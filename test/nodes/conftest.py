@@ -102,8 +102,19 @@ class Probe:
     def call(self, kind, name, request, timeout=20.0):
         client = self.node.create_client(kind, name)
         self.until(client.service_is_ready, timeout)
-        future = client.call_async(request)
-        self.until(future.done, timeout)
+        # a server just discovered may not know this client yet: its response is lost
+        futures = [client.call_async(request)]
+        again = time.monotonic() + 5.0
+
+        def answered():
+            nonlocal again
+            if time.monotonic() > again:
+                again += 5.0
+                futures.append(client.call_async(request))
+            return any(future.done() for future in futures)
+
+        self.until(answered, max(timeout, 30.0))
+        future = next(future for future in futures if future.done())
         self.node.destroy_client(client)
         return future.result()
 
