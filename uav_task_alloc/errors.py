@@ -38,6 +38,9 @@ def first_of(texts: Iterable[str], most: int = 5, separator: str = ', ', kind: s
         most: how many are shown.
         separator: between two.
         kind: follows the number: `and 4 more UAVs` for ' UAVs'.
+
+    Returns:
+        One text; '' for no texts.
     """
     listed = list(texts)
     more = len(listed) - most
@@ -45,7 +48,13 @@ def first_of(texts: Iterable[str], most: int = 5, separator: str = ', ', kind: s
 
 
 class UnknownName(AllocError, KeyError):
-    """A name of a solver, UAV, task or parameter that is not declared."""
+    """A name of a solver, UAV, task or parameter that is not declared.
+
+    Args:
+        kind: of thing: 'solver'.
+        name: as given.
+        known: names that are declared; empty: they are not listed.
+    """
 
     def __init__(self, kind: str, name: object, known: object) -> None:
         super().__init__(f'{kind} {name!r}: expected one of {", ".join(map(str, known))}'  # type: ignore[call-overload]

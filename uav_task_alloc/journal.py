@@ -29,8 +29,8 @@ _SELECT = 'SELECT kind, id, body FROM world'
 class JournalRow(NamedTuple):
     """One record; a body of None deletes it."""
 
-    kind: str
-    id: str
+    kind: str  # 'task', 'list' and so on
+    id: str  # within its kind; '' where there is one row of a kind
     body: Any  # JSON; bytes where the text on disk is not JSON
 
 
@@ -214,6 +214,9 @@ def _body(text: Any) -> Any:
 def set_aside(state_dir: str) -> Path:
     """Rename the journal, so that a new one can be created.
 
+    Args:
+        state_dir: folder of the journal.
+
     Returns:
         The new name.
 
@@ -235,6 +238,9 @@ def set_aside(state_dir: str) -> Path:
 def read_copy(state_dir: str) -> list[JournalRow]:
     """Read a journal that cannot be opened in its place, as on a read-only disk.
 
+    Args:
+        state_dir: folder of the journal.
+
     Returns:
         Its rows, from a temporary copy.
 
@@ -255,6 +261,9 @@ def recover_rows(path: Path) -> list[JournalRow]:
 
     Args:
         path: the file, which is not changed.
+
+    Returns:
+        Each readable row once.
 
     Raises:
         JournalError: it cannot be copied.

@@ -20,18 +20,39 @@ install()
 
 
 def kernel(function: _Function) -> _Function:
-    """Compile a function that is called from Python and makes no arrays."""
+    """Compile a function that is called from Python and makes no arrays.
+
+    Args:
+        function: takes numbers and arrays.
+
+    Returns:
+        The compiled function; releases the GIL, is cached on disk.
+    """
     compiled: _Function = NJIT(cache=True, nogil=True, _nrt=False)(function)
     return compiled
 
 
 def inline_kernel(function: _Function) -> _Function:
-    """Compile a function that makes no arrays into each kernel that calls it."""
+    """Compile a function that makes no arrays into each kernel that calls it.
+
+    Args:
+        function: called by kernels only.
+
+    Returns:
+        The compiled function; releases the GIL, is cached on disk.
+    """
     compiled: _Function = NJIT(cache=True, nogil=True, _nrt=False, forceinline=True)(function)
     return compiled
 
 
 def allocating_kernel(function: _Function) -> _Function:
-    """Compile a function that may make arrays."""
+    """Compile a function that may make arrays.
+
+    Args:
+        function: takes numbers and arrays.
+
+    Returns:
+        The compiled function; releases the GIL, is cached on disk.
+    """
     compiled: _Function = NJIT(cache=True, nogil=True)(function)
     return compiled

@@ -69,32 +69,84 @@ def check_number(place: str, value: float, low: float, high: float = math.inf,
 
 
 def check_count(place: str, many: Sized, most: int) -> None:
-    """Raise InvalidValue where there are more than `most`."""
+    """Check how many values there are.
+
+    Args:
+        place: name of the values in the error text.
+        many: the values.
+        most: how many there may be.
+
+    Raises:
+        InvalidValue: there are more.
+    """
     if len(many) > most:
         raise InvalidValue(f'{place}: number', len(many), f'at most {most}')
 
 
 def check_id(place: str, value: object) -> str:
-    """The value if it is a non-empty string; raise InvalidValue otherwise."""
+    """Check an id.
+
+    Args:
+        place: name of the value in the error text.
+        value: the id.
+
+    Returns:
+        The id.
+
+    Raises:
+        InvalidValue: it is no string, empty or blank.
+    """
     if not isinstance(value, str) or not value.strip():
         raise InvalidValue(place, value, 'a non-empty string')
     return value
 
 
 def check_ros_name(place: str, value: str) -> str:
-    """The value if it can be part of a topic name; raise InvalidValue otherwise."""
+    """Check a name that becomes part of a topic name.
+
+    Args:
+        place: name of the value in the error text.
+        value: the name.
+
+    Returns:
+        The name.
+
+    Raises:
+        InvalidValue: it is no ROS name, see `is_ros_name`.
+    """
     if not is_ros_name(value):
         raise InvalidValue(place, value, 'a ROS name (letters, digits, _ and /; no digit first)')
     return value
 
 
 def is_ros_name(value: str) -> bool:
-    """Whether a string is tokens of letters, digits and single _, no digit first, joined by /."""
+    """Return whether a string can be part of a topic name.
+
+    Such a name has at most 200 characters: tokens of letters, digits and single _, no digit
+    first, joined by / (https://design.ros2.org/articles/topic_and_service_names.html).
+
+    Args:
+        value: the name.
+
+    Returns:
+        False for an empty string.
+    """
     return len(value) <= 200 and '__' not in value and _ROS_NAME.fullmatch(value) is not None
 
 
 def check_names(place: str, value: Iterable[str]) -> frozenset[str]:
-    """The value as a set of strings; raise InvalidValue for others, also for a bare string."""
+    """Check a set of names.
+
+    Args:
+        place: name of the value in the error text.
+        value: the names.
+
+    Returns:
+        Each name once.
+
+    Raises:
+        InvalidValue: it is a bare string, or holds anything but non-empty strings.
+    """
     if isinstance(value, str) or not isinstance(value, Iterable) or not all(
             isinstance(v, str) and v.strip() for v in value):
         raise InvalidValue(place, value, 'a set of non-empty strings')
@@ -304,10 +356,10 @@ class Leg:
 class Route:
     """The flight of one UAV: task ids in order, and the legs between them and perhaps home."""
 
-    uav: str
-    tasks: tuple[str, ...] = ()
+    uav: str  # id
+    tasks: tuple[str, ...] = ()  # ids in the order of flight
     legs: tuple[Leg, ...] = ()  # one a task, and one more home where `returns`
-    returns: bool = False
+    returns: bool = False  # flies home after the last task
 
     @property
     def distance(self) -> float:

@@ -34,8 +34,8 @@ class AllocatorInstance:
     """One run of an allocator; the smallest leads: the earliest start, then the smallest id."""
 
     started: int  # [ns] of the computer's clock, not of simulated time
-    id: str
-    node: str = field(compare=False)
+    id: str  # random, of the run
+    node: str = field(compare=False)  # full name, for texts
 
     @property
     def text(self) -> str:
@@ -109,7 +109,16 @@ class Leader:
 
 
 def status_values(me: AllocatorInstance, role: Role, topic: str) -> dict[str, object]:
-    """Return what the others have to know; `topic` is the full name of `allocation`."""
+    """Return what the other allocators of the fleet have to know, for a row of /diagnostics.
+
+    Args:
+        me: this instance.
+        role: leading or passive.
+        topic: full name of `allocation`.
+
+    Returns:
+        Values by key; `started` in ns.
+    """
     return {'allocation topic': topic, 'instance': me.id, 'started': me.started,
             'role': role.value}
 

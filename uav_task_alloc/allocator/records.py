@@ -60,11 +60,11 @@ class TaskEventKind(Enum):
 class TaskRecord:
     """One accepted task, its state, and the UAV that has it."""
 
-    task: Task
+    task: Task  # with its latest values
     announced: Task  # as first added, to recognise a replay of that announcement
-    state: TaskState = TaskState.PENDING
+    state: TaskState = TaskState.PENDING  # changed by task_state_machine only
     uav: str = ''  # that has it, or had it when it ended
-    reason: str = ''
+    reason: str = ''  # of the state, for users
     stamp: float = 0.0  # [s] of the last change of state
     failed_on: tuple[str, ...] = ()  # UAVs that could not do it
 
@@ -78,8 +78,8 @@ class TaskRecord:
 class TaskVerdict:
     """Whether one task of an announcement was accepted."""
 
-    task_id: str
-    accepted: bool
+    task_id: str  # as announced
+    accepted: bool  # or already known
     reason: str = ''  # why it was rejected; where accepted: that it changes nothing
 
     @property
@@ -92,11 +92,11 @@ class TaskVerdict:
 class TaskEvent:
     """Progress of a task as a UAV reports it."""
 
-    task_id: str
-    uav_id: str
+    task_id: str  # of an accepted task
+    uav_id: str  # that reports it
     revision: int  # of the list it was flown from; 0: unknown
-    kind: TaskEventKind
-    reason: str = ''
+    kind: TaskEventKind  # STARTED, COMPLETED or FAILED
+    reason: str = ''  # why it failed
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,12 +107,12 @@ class UavReport:
         InvalidValue: a field is out of bounds.
     """
 
-    uav_id: str
+    uav_id: str  # unique in the fleet
     position: Point  # [m] ENU
     home: Point | None = None  # [m] ENU
     range: float | None = None  # [m] remaining
     cruise_speed: float | None = None  # [m/s]
-    capabilities: frozenset[str] = frozenset()
+    capabilities: frozenset[str] = frozenset()  # that tasks may require
     battery: float | None = None  # [0..1]
     available: bool = True  # for tasks, and not in FAULT
     active_task: str = ''  # id of the task being flown
@@ -139,8 +139,8 @@ class UavReport:
 class ListStop:
     """A task in a list, the leg to it, and the estimated arrival."""
 
-    task: Task
-    leg: Leg
+    task: Task  # with its position and service time
+    leg: Leg  # from the stop before, with its detour points
     eta: float  # [s] from the stamp of the list to the arrival
 
 
@@ -148,9 +148,9 @@ class ListStop:
 class UavList:
     """The tasks one UAV has still to fly, in order."""
 
-    uav: str
+    uav: str  # id
     revision: int  # strictly increasing
-    stops: tuple[ListStop, ...] = ()
+    stops: tuple[ListStop, ...] = ()  # in the order of flight
     returns: bool = False  # returns home after the last task
     end_via: tuple[Point, ...] = ()  # [m] ENU, flown before the return home
     distance: float = 0.0  # [m] of all legs, including the leg home where it returns
@@ -172,14 +172,14 @@ class UavList:
 class ReplanProblem:
     """A snapshot of the world for the worker; the world goes on while it is solved."""
 
-    version: int
-    trigger: str
+    version: int  # of the world when it was copied
+    trigger: str  # what asked for the plan
     background: bool  # without an event: only what is better by the margin is published
     budget: float  # [s]
-    uavs: tuple[Uav, ...]
-    tasks: tuple[Task, ...]
-    zones: tuple[ThreatZone, ...]
-    locked: Mapping[str, tuple[str, ...]]
+    uavs: tuple[Uav, ...]  # usable
+    tasks: tuple[Task, ...]  # open
+    zones: tuple[ThreatZone, ...]  # in force
+    locked: Mapping[str, tuple[str, ...]]  # by UAV: first tasks of its route
     published: Plan  # the lists in force
     warm: Plan  # the best plan so far, from which the search continues
 
@@ -188,7 +188,7 @@ class ReplanProblem:
 class ReplanAnswer:
     """Result of the worker."""
 
-    problem: ReplanProblem
+    problem: ReplanProblem  # that was solved
     repaired: Plan  # the published lists, repaired by insertion
     best: Plan  # the best plan within the budget
 
@@ -198,9 +198,9 @@ class Allocation:
     """The plan in force, as it is published."""
 
     revision: int  # strictly increasing
-    lists: tuple[UavList, ...]
-    plan: Plan
-    trigger: str
+    lists: tuple[UavList, ...]  # one for each UAV
+    plan: Plan  # its sums and unassigned tasks
+    trigger: str  # what asked for the plan
     stamp: float  # [s]
 
 
@@ -208,28 +208,28 @@ class Allocation:
 class LogNote:
     """A line for the log."""
 
-    warning: bool
-    text: str
+    warning: bool  # else information
+    text: str  # a sentence
 
 
 @dataclass(slots=True)
 class Outbox:
     """What is to be published since it was last collected."""
 
-    lists: dict[str, UavList] = field(default_factory=dict)
+    lists: dict[str, UavList] = field(default_factory=dict)  # by UAV
     forgotten: set[str] = field(default_factory=set)  # UAVs; applied before the lists
-    allocation: Allocation | None = None
-    statuses: bool = False
-    notes: list[LogNote] = field(default_factory=list)
+    allocation: Allocation | None = None  # None: unchanged
+    statuses: bool = False  # they have changed
+    notes: list[LogNote] = field(default_factory=list)  # in the order of their events
 
 
 @dataclass(slots=True)
 class SavedState:
     """What the journal restores after a restart."""
 
-    tasks: list[TaskRecord] = field(default_factory=list)
-    lists: list[UavList] = field(default_factory=list)
-    zones: list[ThreatZone] = field(default_factory=list)
+    tasks: list[TaskRecord] = field(default_factory=list)  # accepted, also ended ones
+    lists: list[UavList] = field(default_factory=list)  # last published
+    zones: list[ThreatZone] = field(default_factory=list)  # in force
     switched_off: list[str] = field(default_factory=list)  # UAVs, by an operator
     revision: int = 0  # of the allocation
     learned: Any = None  # body of the row with the learned state

@@ -18,15 +18,23 @@ _MAX_STRANDED = 5  # warnings of UAVs without a safe path home
 class TaskStatus:
     """State of one task, for publication."""
 
-    task_id: str
-    state: TaskState
-    uav: str
-    reason: str
+    task_id: str  # accepted or refused
+    state: TaskState  # REJECTED where it was refused
+    uav: str  # that has it, or had it when it ended
+    reason: str  # of the state, for users
     stamp: float  # [s] of the last change
 
 
 def status_of(task_id: str, known: TaskRecord | tuple[str, float]) -> TaskStatus:
-    """Return the status of an accepted task, or of a refused one (reason, stamp [s])."""
+    """Return the status of a task for publication.
+
+    Args:
+        task_id: of the task.
+        known: record of an accepted task, or (reason, stamp [s]) of a refused one.
+
+    Returns:
+        REJECTED without a UAV where it was refused.
+    """
     if isinstance(known, TaskRecord):
         return TaskStatus(task_id, known.state, known.uav, known.reason, known.stamp)
     reason, stamp = known
@@ -39,6 +47,9 @@ def health_warnings(world: World, journal_error: str, solver_error: str = '') ->
     Args:
         world: of the allocator.
         journal_error, solver_error: '' where there is none.
+
+    Returns:
+        One sentence each; empty where all is well.
     """
     fleet, open_tasks = world.fleet, world.tasks.open()
     left_out = [record for record in open_tasks if record.state is TaskState.UNASSIGNED]
@@ -64,7 +75,15 @@ def _uav_warnings(fleet: Fleet) -> list[str]:
 
 
 def health_values(world: World, solving: bool) -> dict[str, object]:
-    """Return numbers of UAVs, tasks and zones, and the revision in force, by name."""
+    """Return numbers of UAVs, tasks and zones, and the revision in force, by name.
+
+    Args:
+        world: of the allocator.
+        solving: a plan is being computed.
+
+    Returns:
+        Counts of UAVs, zones and of tasks by state; the revision of the allocation.
+    """
     states = Counter(record.state for record in world.task_records().values())
     return {'UAVs known': len(world.uav_records()),
             'UAVs available': len(world.fleet.usable_ids()),

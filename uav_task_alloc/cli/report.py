@@ -20,10 +20,13 @@ _LEFT_OUT = ('UNASSIGNED', 'REJECTED')
 
 
 def summarise(out_dir: str | Path) -> Summary:
-    """The key figures of a recorded run.
+    """Return the key figures of a recorded run.
 
     Args:
         out_dir: folder with record.jsonl and flight.jsonl.
+
+    Returns:
+        Values by name: metres, milliseconds, counts and lists of ids.
 
     Raises:
         OSError: a file cannot be read.
@@ -100,7 +103,14 @@ def percentile(values: Sequence[float], share: float) -> float:
 
 
 def summary_table(summary: Mapping[str, Any]) -> str:
-    """The key figures as a table of text."""
+    """Return the key figures as a table of text.
+
+    Args:
+        summary: as `summarise` returns it.
+
+    Returns:
+        Lines of three columns: name, value, remark.
+    """
     of = summary.__getitem__
     flown, planned = of('metres_flown'), of('metres_planned')
     excess = 100.0 * (flown / planned - 1.0) if planned else 0

@@ -91,7 +91,14 @@ def start_time(history: FlightHistory) -> str:
 
 
 def key_figures(history: FlightHistory) -> list[tuple[Cell, ...]]:
-    """The rows of the table of key figures."""
+    """Return the rows of the table of key figures.
+
+    Args:
+        history: of the recorded flight.
+
+    Returns:
+        (name, value) each; None: there is no value. Units are in the names.
+    """
     counts = Counter(history.status(task).state for task in history.tasks())
     times = [plan.milliseconds for plan in history.replans]
     flown = sum(history.metres(uav) for uav in history.tracks)

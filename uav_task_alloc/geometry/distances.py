@@ -71,7 +71,16 @@ class Pairs(_Addresses):
 
 @allocating_kernel
 def length(pairs: Pairs, i: int, j: int) -> float:
-    """Length [m] of the shortest safe path from point i to point j; inf: none. O(1) once known."""
+    """Return the length of the shortest safe path between two points; O(1) once known.
+
+    Args:
+        pairs: arrays of `Distances`, of n points; found lengths are stored in them.
+        i: of the point to start from, in 0..n-1.
+        j: of the point to reach, in 0..n-1.
+
+    Returns:
+        [m]; inf: no path was found.
+    """
     if pairs.row > 0:
         slot = ints_at(pairs.slot)
         known = floats_at(pairs.table)[slot[i] * pairs.row + slot[j]]
@@ -169,10 +178,16 @@ def _store_length(pairs: Pairs, i: int, j: int, found: float) -> None:
 
 @allocating_kernel
 def length_via(pairs: Pairs, i: int, k: int, j: int) -> float:
-    """Length [m] of the path from i to j, or over point k where none is known.
+    """Return the length of the path from i to j, or over point k where none is known.
+
+    Args:
+        pairs: arrays of `Distances`, of n points; found lengths are stored in them.
+        i: of the point to start from, in 0..n-1.
+        k: of a point between, in 0..n-1.
+        j: of the point to reach, in 0..n-1.
 
     Returns:
-        inf: nor are the paths from i to k and from k to j known.
+        [m]; inf: nor are the paths from i to k and from k to j known.
     """
     found = length(pairs, i, j)
     if found < np.inf or pairs.zones == 0:

@@ -35,13 +35,31 @@ class Origin:
 
 
 def to_enu(origin: Origin, latitude: float, longitude: float, altitude_amsl: float) -> Point:
-    """ENU [m] of a position in degrees and metres AMSL."""
+    """Convert a geodetic position to ENU, as `to_enu_batch`.
+
+    Args:
+        origin: of the ENU frame.
+        latitude: [deg] WGS84.
+        longitude: [deg] WGS84.
+        altitude_amsl: [m].
+
+    Returns:
+        (east, north, up) [m].
+    """
     x, y, z = to_enu_batch(origin, [(latitude, longitude, altitude_amsl)])[0]
     return float(x), float(y), float(z)
 
 
 def to_geodetic(origin: Origin, point: Point) -> tuple[float, float, float]:
-    """Latitude [deg], longitude [deg] and altitude AMSL [m] of an ENU point."""
+    """Convert an ENU point to a geodetic position, as `to_geodetic_batch`.
+
+    Args:
+        origin: of the ENU frame.
+        point: (east, north, up) [m].
+
+    Returns:
+        Latitude [deg], longitude [deg], altitude AMSL [m].
+    """
     latitude, longitude, altitude = to_geodetic_batch(origin, [point])[0]
     return float(latitude), float(longitude), float(altitude)
 

@@ -247,7 +247,18 @@ def _meets_dome(zone: Zone, px: float, py: float, pz: float, qx: float, qy: floa
 @allocating_kernel
 def blocked(zone: Zone, px: float, py: float, pz: float, qx: float, qy: float,
             qz: float, floor: float, no_skin: bool) -> bool:
-    """Whether the segment pq enters a zone; O(corners), O(1) where the boxes are apart."""
+    """Return whether the segment pq enters a zone; O(corners), O(1) where the boxes are apart.
+
+    Args:
+        zone: row of an `Obstacles` table.
+        px, py, pz: [m] ENU, one end.
+        qx, qy, qz: [m] ENU, the other end.
+        floor: [m] z of the lower end of the whole path; -inf: the space beneath domes is open.
+        no_skin: up to the surface; otherwise 0.02 m around the zone count as inside.
+
+    Returns:
+        False where the segment is outside or only touches.
+    """
     if (min(px, qx) > zone.x1 or max(px, qx) < zone.x0
             or min(py, qy) > zone.y1 or max(py, qy) < zone.y0
             or min(pz, qz) > zone.z1 or max(pz, qz) < zone.z0):

@@ -13,17 +13,29 @@ XY = tuple[float, float]  # [m]
 
 
 def orientation(a: XY, b: XY, c: XY) -> float:
-    """Twice the signed area [m2] of the triangle abc.
+    """Return the orientation of three points. Compiled by kernels, too.
 
-    Positive where c lies to the left of the line from a to b, 0.0 on it. Compiled by kernels.
+    Args:
+        a, b, c: (x, y) [m].
+
+    Returns:
+        Twice the signed area [m2] of the triangle abc: positive where c lies to the left of the
+        line from a to b, 0.0 on it.
     """
     return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
 
 
 def segments_cross(a: XY, b: XY, c: XY, d: XY) -> bool:
-    """Whether the segments ab and cd cross in a point that is an end of neither.
+    """Return whether two segments cross in a point that is an end of neither.
 
-    Segments that touch or overlap do not cross. Compiled by kernels.
+    Compiled by kernels, too.
+
+    Args:
+        a, b: (x, y) [m], ends of one segment.
+        c, d: (x, y) [m], ends of the other.
+
+    Returns:
+        False where they only touch or overlap.
     """
     return (orientation(c, d, a) * orientation(c, d, b) < 0.0
             and orientation(a, b, c) * orientation(a, b, d) < 0.0)
@@ -39,7 +51,14 @@ def crosses_ray(point: XY, a: XY, b: XY) -> bool:
 
 
 def edges(corners: Sequence[XY]) -> Iterator[tuple[XY, XY]]:
-    """The edges of a closed polygon, the last one back to the first corner."""
+    """Return the edges of a closed polygon, the last one back to the first corner.
+
+    Args:
+        corners: (x, y) [m].
+
+    Returns:
+        (corner, next corner) each; none for no corners.
+    """
     return pairwise((*corners, *corners[:1]))
 
 
@@ -57,9 +76,15 @@ def contains_point(corners: Sequence[XY], point: XY) -> bool:
 
 
 def signed_area(corners: Sequence[XY]) -> float:
-    """Area [m2] of a simple polygon; negative where the corners are clockwise. O(corners).
+    """Return the signed area of a simple polygon; O(corners).
 
     Taken from the first corner, as products of large coordinates would swallow a small area.
+
+    Args:
+        corners: (x, y) [m], at least one.
+
+    Returns:
+        [m2]; negative where the corners are clockwise.
     """
     return 0.5 * sum(orientation(corners[0], a, b) for a, b in pairwise(corners[1:]))
 
@@ -71,7 +96,10 @@ def is_simple(corners: Sequence[XY]) -> bool:
     those that end before it begins. O(n log n + n k) for n corners, k edges above one another.
 
     Args:
-        corners: [m], at least 3.
+        corners: (x, y) [m], at least 3.
+
+    Returns:
+        True where it bounds one area without touching itself.
     """
     ring = list(edges(corners))
     last = len(ring) - 1

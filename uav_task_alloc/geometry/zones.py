@@ -39,6 +39,9 @@ def zones_around(point: Iterable[float], zones: Sequence[ThreatZone],
         zones: each is enlarged by its margin and `clearance`.
         clearance: [m].
 
+    Returns:
+        In the order of `zones`.
+
     Raises:
         InvalidValue: as `inside`.
     """
@@ -121,6 +124,9 @@ def path_is_clear(points: Sequence[Point], zones: Sequence[ThreatZone],
         points: [m] ENU.
         zones: each is enlarged by its margin and `clearance`.
         clearance: [m].
+
+    Returns:
+        True where it touches zones only.
     """
     return all(is_clear(a, b, zones, clearance) for a, b in pairwise(points))
 

@@ -52,8 +52,8 @@ class ItemRules:
 class Profile:
     """How one kind of autopilot is commanded, and how it stores missions."""
 
-    name: str
-    rules: ItemRules
+    name: str  # 'ardupilot', 'px4' or 'generic'
+    rules: ItemRules  # frames and commands of items
     atomic: bool  # an upload replaces the mission at its end; else item by item
     idle_after: float  # [s] until the autopilot drops a stale transfer
     modes: Mapping[int, ModeFunction]  # by custom_mode
@@ -121,7 +121,14 @@ def px4_custom_mode(main: int, sub: int = 0) -> int:
 
 
 def px4_mode_parts(custom_mode: int) -> tuple[int, int]:
-    """Split a custom_mode of PX4 into its main and sub mode."""
+    """Split a custom_mode of PX4 into its main and sub mode.
+
+    Args:
+        custom_mode: of a HEARTBEAT or DO_SET_MODE (px4_custom_mode.h).
+
+    Returns:
+        (main mode, sub mode).
+    """
     return custom_mode >> 16 & 0xff, custom_mode >> 24 & 0xff
 
 
@@ -193,6 +200,10 @@ def profile_of(heartbeat: Message, autopilot: str = 'auto') -> Profile:
     Args:
         heartbeat: HEARTBEAT of its autopilot.
         autopilot: 'ardupilot', 'px4' or 'generic'; 'auto': by the heartbeat.
+
+    Returns:
+        That of fixed wings where the heartbeat's type is one, and 'generic' for an autopilot that
+        is neither.
     """
     name = (_BY_NUMBER.get(heartbeat.autopilot, 'generic') if autopilot == 'auto'
             else autopilot)

@@ -17,12 +17,15 @@ from uav_task_alloc.journal import JournalRow
 
 
 def rows(world: World, state: object, most: int | None = None) -> list[JournalRow]:
-    """Return the rows to write; a row without a body deletes one.
+    """Return the journal rows of all that has changed since it was last written.
 
     Args:
         world: of the allocator.
         state: learned state of the best plan.
         most: tasks at once; None: all.
+
+    Returns:
+        Rows to write, those of tasks first; a row without a body deletes one.
     """
     unsaved, tasks, lists = world.unsaved(), world.task_records(), world.lists_in_force()
     changed = [task_row(tasks[task_id]) if task_id in tasks else JournalRow('task', task_id, None)
@@ -37,7 +40,11 @@ def rows(world: World, state: object, most: int | None = None) -> list[JournalRo
 
 
 def mark_all(world: World) -> None:
-    """Mark the whole world as not written."""
+    """Mark the whole world as not written.
+
+    Args:
+        world: of the allocator; its sets of unsaved ids are changed.
+    """
     unsaved = world.unsaved()
     unsaved['task'].update(world.task_records())
     unsaved['list'].update(world.lists_in_force())
@@ -45,7 +52,15 @@ def mark_all(world: World) -> None:
 
 
 def mark_written(world: World, written: Iterable[JournalRow] | None) -> bool:
-    """Mark rows as written, None: everything; returns whether nothing is left to write."""
+    """Mark rows as written.
+
+    Args:
+        world: of the allocator; its sets of unsaved ids are changed.
+        written: rows that are on disk; None: everything is.
+
+    Returns:
+        Whether nothing is left to write.
+    """
     unsaved = world.unsaved()
     for row in written or ():
         unsaved.get(row.kind, unsaved['']).discard(row.id or row.kind)

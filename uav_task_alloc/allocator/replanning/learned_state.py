@@ -21,6 +21,12 @@ def learned_row(state: object) -> JournalRow:
 
     The table of UAVs is left out where it has more than 200 000 entries; without a body where
     the table of tasks has.
+
+    Args:
+        state: `Plan.state`; anything but that of chain_q has no tables.
+
+    Returns:
+        Tables as base64 texts: indices int32, values float32, little endian.
     """
     from uav_task_alloc.solver.tables import Learnt
     learnt = getattr(state, 'learnt', None)
@@ -35,7 +41,14 @@ def learned_row(state: object) -> JournalRow:
 
 
 def learned_state(body: Any) -> WarmState:
-    """Return the state of a row; an empty one where the row is missing or invalid."""
+    """Return the state of a row; an empty one where the row is missing or invalid.
+
+    Args:
+        body: as `learned_row` makes it, after JSON.
+
+    Returns:
+        For a warm start of `plan`.
+    """
     from uav_task_alloc.solver.warm import WarmState
     try:
         return WarmState(learnt=_tables(body))

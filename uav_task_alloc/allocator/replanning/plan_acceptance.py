@@ -22,6 +22,9 @@ def accepted_plan(answer: ReplanAnswer, margin: float) -> Plan:
     Args:
         answer: of the worker.
         margin: share of a length.
+
+    Returns:
+        The plan to publish: repaired, best, or a combination of both.
     """
     repaired, best = answer.repaired, answer.best
     if best.penalty < repaired.penalty:

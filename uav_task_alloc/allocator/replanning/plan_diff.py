@@ -13,6 +13,13 @@ def changed_tasks(before: Iterable[UavList], after: Iterable[UavList]) -> frozen
     """Return the tasks that are new in a list, moved to another UAV, or follow another task.
 
     A task is not changed because tasks before it left the lists (flown, withdrawn, left out).
+
+    Args:
+        before: lists that were in force.
+        after: lists that replace them.
+
+    Returns:
+        Ids of tasks.
     """
     new = list(after)
     listed = {task_id for each in new for task_id in each.task_ids}

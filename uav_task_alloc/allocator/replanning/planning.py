@@ -38,6 +38,9 @@ def replan_problem(world: World, best: Plan, trigger: str, background: bool) -> 
         best: plan with which the search continues.
         trigger: what requires the plan.
         background: nothing does; a better plan is sought with `background_budget`.
+
+    Returns:
+        A copy, which the worker thread may read while the world changes.
     """
     params, uavs = world.params, world.usable_uavs()
     published = {uav.id: world.list_of(uav.id) for uav in uavs}
@@ -59,6 +62,9 @@ def solve_problem(plan: Callable[..., Plan], problem: ReplanProblem, params: All
         problem: see `replan_problem`.
         params: of the allocator.
         stop: polled; the search ends early when it returns true.
+
+    Returns:
+        Both plans; the best is the repaired one where nothing better was found.
     """
     def call(warm: Plan, max_iterations: int | None) -> Plan:
         return plan(problem.uavs, problem.tasks, problem.zones, budget=problem.budget,
@@ -77,6 +83,13 @@ def build_lists(world: World, chosen: Plan) -> BuiltLists:
 
     A list that is still valid is kept. UAVs that the plan does not use get an empty list, but
     not while tasks are held after a restart.
+
+    Args:
+        world: as it is now.
+        chosen: plan, made for this world or an earlier one.
+
+    Returns:
+        Lists by UAV, and the tasks that are in none with their reasons.
     """
     built = BuiltLists(left_out=dict(chosen.unassigned))
     legs, returns = planned_legs(chosen), world.params.route_end == 'home'
@@ -132,7 +145,17 @@ def _present_routes(world: World, chosen: Plan) -> TaskIdsByUav:
 
 def plan_in_force(lists: PublishedLists, tasks: TaskRegistry, left_out: Mapping[str, str],
                   like: Plan) -> Plan:
-    """Return the lists in force as a plan, with their figures; the rest is that of `like`."""
+    """Return the lists in force as a plan, with their figures; the rest is that of `like`.
+
+    Args:
+        lists: as published.
+        tasks: of the lists, at least.
+        left_out: reason by id of each task in no list.
+        like: plan with the figures that lists do not have: penalty, history, state.
+
+    Returns:
+        Distance [m] and value are sums over the lists, fit is eq 2.12.
+    """
     routes = {uav_id: each.task_ids for uav_id, each in lists.lists.items()}
     value = math.fsum(tasks.records[task_id].task.value
                       for task_ids in routes.values() for task_id in task_ids)

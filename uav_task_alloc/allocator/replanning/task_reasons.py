@@ -19,6 +19,9 @@ def task_steps(tasks: TaskRegistry, fleet: Fleet, lists: PublishedLists,
     Args:
         tasks, fleet, lists: the present state.
         left_out: reason by task id, of the plan in force.
+
+    Returns:
+        LIST or START for tasks in a list, else why there is no UAV for it.
     """
     owners, usable = lists.owners(), frozenset(fleet.usable_ids())
     steps = []

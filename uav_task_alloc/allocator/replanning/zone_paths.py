@@ -25,6 +25,10 @@ class ZonePaths:
     """The `SafePaths` around `zones`.
 
     Paths are planned with the clearance; in flight half of it is left for wind and GPS error.
+
+    Args:
+        zones: in force.
+        params: clearance [m], altitude limits [m] and `replan_margin` are used.
     """
 
     def __init__(self, zones: Sequence[ThreatZone], params: AllocatorParams) -> None:

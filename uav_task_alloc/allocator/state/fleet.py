@@ -17,10 +17,10 @@ _RECHARGED = 0.1  # [0..1] above the reserve: a battery that was low is good aga
 class UavRecord:
     """One UAV that has reported."""
 
-    report: UavReport
+    report: UavReport  # the last one
     received: float  # [s] steady clock: of the last report
     home: Point  # [m] ENU: as reported, else the position of the first report
-    silent: bool = False
+    silent: bool = False  # for longer than `uav_timeout`
     zone: str = ''  # id of the zone that it is inside
     home_zone: str = ''  # id of the zone that its home is inside
     blocked_on_ground: str = ''  # why it gets no tasks: it or its home is inside a zone
@@ -45,10 +45,14 @@ class UavRecord:
 
 
 class Fleet:
-    """UAVs by id; what an operator switched off stays off until it is switched on."""
+    """UAVs by id; what an operator switched off stays off until it is switched on.
+
+    Args:
+        off: ids of UAVs that an operator has switched off.
+        active: by UAV id the task that it is known to fly.
+    """
 
     def __init__(self, off: Iterable[str] = (), active: Mapping[str, str] | None = None) -> None:
-        """Begin with the UAVs switched off, and the task that each UAV is known to fly."""
         self.records: dict[str, UavRecord] = {}
         self.switched_off = set(off)
         self.active = dict(active or {})  # UAV -> task it is known to be flying
@@ -141,7 +145,16 @@ def _battery(before: UavRecord | None, reported: float | None,
 
 
 def may_fly(task: Task, failed_on: Iterable[str], uav: UavReport) -> bool:
-    """Return whether a UAV is allowed and able to fly a task, and has not failed at it before."""
+    """Return whether a UAV is allowed and able to fly a task, and has not failed at it before.
+
+    Args:
+        task: with its allowed UAVs and required capabilities.
+        failed_on: ids of the UAVs that failed at it.
+        uav: last report.
+
+    Returns:
+        Range and availability are not considered.
+    """
     return ((task.allowed_uavs is None or uav.uav_id in task.allowed_uavs)
             and task.required_capabilities <= uav.capabilities and uav.uav_id not in failed_on)
 

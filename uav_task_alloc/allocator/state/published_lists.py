@@ -9,10 +9,14 @@ from uav_task_alloc.allocator.records import UavList
 
 
 class PublishedLists:
-    """Lists by UAV; a revision is never used twice, not even across a restart."""
+    """Lists by UAV; a revision is never used twice, not even across a restart.
+
+    Args:
+        lists: of the previous run.
+        tasks: ids of all tasks that it knew.
+    """
 
     def __init__(self, lists: Iterable[UavList] = (), tasks: Iterable[str] = ()) -> None:
-        """Begin with the lists of the previous run, and the ids of all tasks it knew."""
         self.lists = {each.uav: each for each in lists}
         self.unsaved: set[str] = set()  # not yet on disk
         self.foreign = False  # a UAV had a list that this allocator did not publish

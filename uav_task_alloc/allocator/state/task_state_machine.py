@@ -40,10 +40,10 @@ class Rule(NamedTuple):
 class TaskStep(NamedTuple):
     """An event for a task."""
 
-    task_id: str
-    event: TaskTransition
-    uav: str = ''
-    why: str = ''
+    task_id: str  # of an accepted task
+    event: TaskTransition  # row of TASK_TRANSITIONS
+    uav: str = ''  # that has or had the task; '': none
+    why: str = ''  # reason of the new state
 
 
 TransitionRow = dict[TaskState, Rule]
@@ -114,7 +114,11 @@ def rule_for(state: TaskState, event: TaskTransition, uav: str = '', why: str = 
 
 
 def task_states_markdown() -> str:
-    """Return docs/task_states.md: the table and a diagram."""
+    """Return docs/task_states.md: the table and a diagram.
+
+    Returns:
+        Markdown with a mermaid state diagram.
+    """
     parts = ['# Task states\n\nGenerated from '
              '`uav_task_alloc/allocator/state/task_state_machine.py`. A cell has '
              'the next state, or in brackets why the event changes nothing.\n\n']

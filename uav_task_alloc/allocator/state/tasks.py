@@ -18,7 +18,11 @@ _HAS_UAV = frozenset({TaskState.ASSIGNED, TaskState.ACTIVE, TaskState.COMPLETED,
 
 
 class TaskRegistry:
-    """Accepted tasks by id, and refused ids that no accepted task has."""
+    """Accepted tasks by id, and refused ids that no accepted task has.
+
+    Args:
+        records: restored from the journal.
+    """
 
     def __init__(self, records: Iterable[TaskRecord] = ()) -> None:
         self.records = {record.task.id: record for record in records}
@@ -136,6 +140,9 @@ def without_failed(record: TaskRecord, usable: frozenset[str]) -> Task:
     Args:
         record: of the task.
         usable: UAVs that are left where the task allows all.
+
+    Returns:
+        The task itself where none has failed at it.
     """
     if not record.failed_on:
         return record.task

@@ -103,6 +103,13 @@ def _blocked_on_ground(uav_id: str, zone: str, home_zone: str) -> str:
 
 
 def blocked_text(records: Iterable[UavRecord]) -> str:
-    """Return which UAVs are on the ground inside which zones; '' if there are none."""
+    """Return which UAVs are on the ground inside which zones; '' if there are none.
+
+    Args:
+        records: of all UAVs.
+
+    Returns:
+        At most five UAVs by name, and how many more there are.
+    """
     texts = sorted(record.blocked_on_ground for record in records if record.blocked_on_ground)
     return first_of(texts, separator='; ')

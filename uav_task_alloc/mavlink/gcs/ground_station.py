@@ -40,22 +40,22 @@ class AuthorityStore(Protocol):
 class GcsConfig:
     """Identity of the ground station, and the vehicles it serves."""
 
-    system: int = 245
-    component: int = 190
+    system: int = 245  # MAVLink system id of the ground station
+    component: int = 190  # MAVLink component id of the ground station
     system_ids: Collection[int] = ()  # of vehicles to serve; empty: all
-    uav_id_pattern: str = 'uav_{sysid}'
-    autopilot: str = 'auto'
-    origin: Origin = field(default_factory=lambda: Origin(0.0, 0.0))
-    policy: Policy = field(default_factory=Policy)
+    uav_id_pattern: str = 'uav_{sysid}'  # `{sysid}` is replaced by the vehicle's system id
+    autopilot: str = 'auto'  # 'auto': by the heartbeat; else a name of `profile_of`
+    origin: Origin = field(default_factory=lambda: Origin(0.0, 0.0))  # of the ENU frame
+    policy: Policy = field(default_factory=Policy)  # what executors may do
 
 
 @dataclass(slots=True)
 class VehicleSession:
     """One vehicle, its address and its executor."""
 
-    uav_id: str
-    address: RemoteKey
-    executor: MissionExecutor
+    uav_id: str  # from the pattern of ids
+    address: RemoteKey  # link and remote address of its frames
+    executor: MissionExecutor  # flies its list
     strays: int = 0  # frames with its system id from other addresses
     fault: str = ''  # error of the latest call of the executor; '': none
 

@@ -46,18 +46,18 @@ _BY_LANDED = {
 class UavStatus:
     """The fields of UavState; NaN where unknown."""
 
-    uav_id: str
+    uav_id: str  # from the pattern of ids
     position: Point  # [m] ENU
     velocity: Point  # [m/s] ENU
     home: Point | None  # [m] ENU
     battery: float  # 0..1
     range_remaining: float  # [m]
-    available: bool
-    mode: UavMode
-    mission_state: MissionState
-    active_task: str
-    list_revision: int
-    authority: AuthorityState
+    available: bool  # may get tasks
+    mode: UavMode  # as UavState.mode
+    mission_state: MissionState  # of the onboard mission
+    active_task: str  # id of the task being flown; '': none
+    list_revision: int  # of the last list verified on board; 0: none
+    authority: AuthorityState  # who has the aircraft
     reason: str  # why it is not available; '': it is available
 
     @property
@@ -120,12 +120,15 @@ def why_not_available(executor: MissionExecutor, now: float) -> str:
 
 
 def state_of(session: VehicleSession, now: float, full_range: float = 0.0) -> UavStatus:
-    """The status of a vehicle.
+    """Return the status of a vehicle.
 
     Args:
         session: the vehicle.
         now: steady time [s].
         full_range: [m] with a full battery; 0: unknown.
+
+    Returns:
+        Values for UavState; the position is of the last valid report.
     """
     executor = session.executor
     telemetry, onboard, mode = executor.telemetry, executor.onboard, mode_of(executor)

@@ -45,7 +45,15 @@ class VehicleDiagnostics:
 
 
 def diagnostics_of(session: VehicleSession, now: float) -> VehicleDiagnostics:
-    """The diagnostics of a vehicle; `now` is the steady time [s]."""
+    """Return the diagnostics of a vehicle.
+
+    Args:
+        session: the vehicle.
+        now: steady time [s].
+
+    Returns:
+        Level, summary and facts, for a row of /diagnostics.
+    """
     level, summary = _level_of(session, now)
     progress = session.executor.onboard.upload_progress(now)
     waits_for = session.executor.sender.waits_for

@@ -22,9 +22,9 @@ class DiffKind(Enum):
 class MissionDiff:
     """The whole mission to have on board, and the item to fly now."""
 
-    kind: DiffKind
-    items: tuple[Item, ...]
-    start: int
+    kind: DiffKind  # how the mission on board changes
+    items: tuple[Item, ...]  # by seq
+    start: int  # seq
 
 
 def diff_missions(held: tuple[Item, ...], current: int | None, wanted: tuple[Item, ...], *,

@@ -112,7 +112,14 @@ def _with_points_between(uav: ScenarioUav, profile: Profile, tasks: TaskList) ->
 
 
 def file_name(uav_id: str) -> str:
-    """Quote an id as a file name for any file system: `team/uav 1` is team%2Fuav%201."""
+    """Quote an id as a file name for any file system: `team/uav 1` is team%2Fuav%201.
+
+    Args:
+        uav_id: any text.
+
+    Returns:
+        Percent-encoded UTF-8 without path separators or a leading dot.
+    """
     name = quote(uav_id, safe='')
     return '%2E' + name[1:] if name.startswith('.') else name
 

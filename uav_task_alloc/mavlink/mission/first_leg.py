@@ -31,8 +31,8 @@ _OFF_ALTITUDE = 30.0  # [m] vertically; not in mission mode, where the autopilot
 class LegStart:
     """Position and home of a vehicle, for a leg that starts there; ENU [m]."""
 
-    point: Point
-    home: Point
+    point: Point  # [m] ENU
+    home: Point  # [m] ENU
     on_mission: bool = False  # in mission mode
 
 

@@ -35,7 +35,7 @@ _LONGEST_HOLD = 65535.0  # [s] ArduPilot keeps 16 bits
 class MissionStop:
     """A task and the detour points flown before it, ENU [m]."""
 
-    task: Task
+    task: Task  # flown at its position
     via: tuple[Point, ...] = ()  # [m] ENU
 
 
@@ -43,8 +43,8 @@ class MissionStop:
 class TaskList:
     """The tasks that one UAV is to fly, in order; as published in TaskList."""
 
-    revision: int
-    stops: tuple[MissionStop, ...] = ()
+    revision: int  # strictly increasing for a UAV; 0: none
+    stops: tuple[MissionStop, ...] = ()  # in the order of flight
     returns: bool = False  # home after the last stop, else hold there
     end_via: tuple[Point, ...] = ()  # [m] ENU, flown before the return
 
@@ -71,11 +71,12 @@ class Item:
     Items compare by the fields that are sent.
     """
 
-    command: int
-    frame: int = dialect.MAV_FRAME_GLOBAL_INT
+    command: int  # MAV_CMD
+    frame: int = dialect.MAV_FRAME_GLOBAL_INT  # MAV_FRAME
     x: int = 0  # [1e-7 deg] latitude
     y: int = 0  # [1e-7 deg] longitude
     z: float = 0.0  # [m] AMSL
+    # param1 to param4 of the command
     params: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
     task: str = field(default='', compare=False)  # id of the task that it is flown for
     completes: bool = field(default=False, compare=False)  # the task, once reached
@@ -113,12 +114,17 @@ def mission_items(tasks: TaskList, rules: ItemRules, origin: Origin) -> tuple[It
 
 
 def home_item(home: Point | None, origin: Origin, rules: ItemRules) -> Item:
-    """The item sent as seq 0 where that is home (ArduPilot); the vehicle stores its own there.
+    """Return the item sent as seq 0 where that is home (ArduPilot).
+
+    The vehicle stores its own home there.
 
     Args:
         home: ENU [m]; None: not known.
         origin: of the ENU frame.
         rules: what the autopilot takes.
+
+    Returns:
+        A waypoint; at the origin where home is not known.
     """
     point = home or (0.0, 0.0, 0.0)
     return _waypoint(point, to_geodetic_batch(origin, [point]).tolist()[0], rules, '')
@@ -130,6 +136,9 @@ def with_position(item: Item, origin: Origin) -> Item:
     Args:
         item: without a position, as a readback gives it.
         origin: of the ENU frame.
+
+    Returns:
+        The item, with position and radius where it is a waypoint in a global frame (AMSL).
     """
     frame = _FRAME_READ_BACK.get(item.frame, item.frame)
     if item.position is not None or frame != dialect.MAV_FRAME_GLOBAL or item.command not in (
@@ -163,7 +172,15 @@ def _task_item(point: Point, geodetic: Sequence[float], rules: ItemRules, task: 
 
 
 def alike(sent: Item, held: Item) -> bool:
-    """Whether an item read back may be the item sent, given how autopilots round the fields."""
+    """Return whether an item read back may be the item sent: autopilots round some fields.
+
+    Args:
+        sent: item of the upload.
+        held: item of the readback.
+
+    Returns:
+        True where command, frame and parameters agree, and coordinates within rounding.
+    """
     if sent.command != held.command or not _params_alike(sent.params, held.params):
         return False
     if sent.command == dialect.MAV_CMD_NAV_RETURN_TO_LAUNCH:
@@ -181,5 +198,13 @@ def _params_alike(sent: Sequence[float], held: Sequence[float]) -> bool:
 
 
 def all_alike(sent: Sequence[Item], held: Sequence[Item]) -> bool:
-    """Whether two missions have the same number of items, all `alike`."""
+    """Return whether two missions have the same number of items, all `alike`.
+
+    Args:
+        sent: items of the upload, by seq.
+        held: items of the readback, by seq.
+
+    Returns:
+        False where one is longer.
+    """
     return len(sent) == len(held) and all(map(alike, sent, held))

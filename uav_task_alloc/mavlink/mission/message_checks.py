@@ -28,6 +28,9 @@ def defect(message: Message) -> str:
     A parameter of a mission item may be NaN, which leaves it to the autopilot; a coordinate in a
     global frame may not, and nothing may be infinite.
 
+    Args:
+        message: as decoded, of any type.
+
     Returns:
         Field, value and expectation; '' where all fields are valid.
     """

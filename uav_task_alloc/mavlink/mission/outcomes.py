@@ -12,7 +12,7 @@ from uav_task_alloc.mavlink.mission.items import Item
 class Mission:
     """Items as uploaded, and the one to fly now."""
 
-    items: tuple[Item, ...]
+    items: tuple[Item, ...]  # by seq
     start: int = 0  # seq
     flag_start: bool = False  # mark it with current=1, to which PX4 jumps
     own: int = 0  # leading items that the vehicle sets itself: home
@@ -27,15 +27,15 @@ class Mission:
 class Verified:
     """The readback matches: this mission is on board."""
 
-    mission: Mission
+    mission: Mission  # on board
 
 
 @dataclass(frozen=True, slots=True)
 class Failed:
     """The upload failed; only a readback shows the mission on board."""
 
-    mission: Mission
-    reason: str
+    mission: Mission  # that was uploaded
+    reason: str  # a text for users
     result: int | None = None  # MAV_MISSION_RESULT
     seq: int | None = None  # the item last requested, where the vehicle refused
 
@@ -44,14 +44,14 @@ class Failed:
 class Accepted:
     """The vehicle has accepted all items: MISSION_ITEM_REACHED refers to them from now on."""
 
-    mission: Mission
+    mission: Mission  # on board, not yet read back
 
 
 @dataclass(frozen=True, slots=True)
 class Downloaded:
     """The mission on board, read without an upload; None where the vehicle did not answer."""
 
-    items: tuple[Item, ...] | None
+    items: tuple[Item, ...] | None  # by seq
 
 
 Outcome = Verified | Failed | Accepted | Downloaded

@@ -14,11 +14,11 @@ from uav_task_alloc.mavlink.transport.codec import Message
 class Peer:
     """A vehicle's ids, and ours on its link; builds each message of the mission protocol."""
 
-    system: int
-    component: int = dialect.MAV_COMP_ID_AUTOPILOT1
-    our_system: int = 245
-    our_component: int = dialect.MAV_COMP_ID_MISSIONPLANNER
-    mission_type: int = dialect.MAV_MISSION_TYPE_MISSION
+    system: int  # id of the vehicle
+    component: int = dialect.MAV_COMP_ID_AUTOPILOT1  # id of its autopilot
+    our_system: int = 245  # id of the ground station
+    our_component: int = dialect.MAV_COMP_ID_MISSIONPLANNER  # id of the ground station
+    mission_type: int = dialect.MAV_MISSION_TYPE_MISSION  # MAV_MISSION_TYPE
     def is_from_vehicle(self, message: Message) -> bool:
         """Whether a message is sent by this vehicle to us or to all, of our mission type."""
         return (message.get_srcSystem() == self.system

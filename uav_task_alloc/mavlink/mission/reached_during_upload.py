@@ -11,7 +11,12 @@ _MAX_MESSAGES = 32
 
 
 class ReachedDuringUpload:
-    """Keeps each REACHED until the upload is decided; then credits it by the positions."""
+    """Keeps each REACHED until the upload is decided; then credits it by the positions.
+
+    Args:
+        progress: table of the missions before and after the upload.
+        origin: of the ENU frame.
+    """
 
     def __init__(self, progress: ProgressTable, origin: Origin) -> None:
         self._progress, self._origin = progress, origin

@@ -29,7 +29,7 @@ class TaskFailed:
     """A task that the autopilot of this vehicle refuses."""
 
     task: str  # id
-    reason: str
+    reason: str  # a text for users
     revision: int  # of the list with that task
 
 

@@ -121,7 +121,14 @@ def make_signing(key: bytes, timestamp: int, link_id: int = 0) -> Signing:
 
 
 def plan_id(message: Message) -> int:
-    """The id of the onboard mission in a COUNT, ACK or CURRENT (PX4); 0: none."""
+    """Return the id of the onboard mission (opaque_id), which PX4 sends.
+
+    Args:
+        message: MISSION_COUNT, MISSION_ACK or MISSION_CURRENT as received.
+
+    Returns:
+        uint32; 0: none.
+    """
     at = _PLAN_ID_AT[message.get_msgId()]
     frame = message.get_msgbuf()
     payload = bytes(frame[10:10 + frame[1]] if frame[:1] == b'\xfd' else b'')
@@ -129,6 +136,14 @@ def plan_id(message: Message) -> int:
 
 
 def with_plan_id(message: Message, value: int) -> Message:
-    """Set the mission id of a COUNT, ACK or CURRENT for `Codec.pack`; returns the message."""
+    """Set the id of the onboard mission (opaque_id) for `Codec.pack`.
+
+    Args:
+        message: MISSION_COUNT, MISSION_ACK or MISSION_CURRENT; is changed.
+        value: uint32.
+
+    Returns:
+        The same message.
+    """
     message.plan_id = value
     return message

@@ -237,6 +237,10 @@ def open_link(name: str) -> Link:
     Args:
         name: udpin:HOST:PORT, udpout:HOST:PORT, tcp:HOST:PORT or /dev/tty...:BAUD.
 
+    Returns:
+        An open UDP socket; a TCP or serial link connects while it is polled, and again when it is
+        lost.
+
     Raises:
         InvalidValue: the entry is malformed, or its UDP port is not free.
     """

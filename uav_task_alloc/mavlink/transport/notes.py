@@ -10,4 +10,4 @@ class OperatorNote:
     """One log line."""
 
     level: str  # 'info', 'warning', 'error'
-    text: str
+    text: str  # a sentence

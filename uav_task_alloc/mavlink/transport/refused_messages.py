@@ -41,7 +41,14 @@ class RefusedMessages:
 
 
 def failure(error: Exception) -> str:
-    """An unexpected error on one line: its type, its text, and where it was raised."""
+    """Return an unexpected error on one line.
+
+    Args:
+        error: as caught, with its traceback.
+
+    Returns:
+        Type, text, and file and line where it was raised.
+    """
     frame = traceback.extract_tb(error.__traceback__)[-1]
     text = ' '.join(str(error).split())
     return f'{type(error).__name__}: {text} (at {Path(frame.filename).name}:{frame.lineno})'
