@@ -1,0 +1,183 @@
+# SPDX-License-Identifier: Apache-2.0
+"""MISSION_CURRENT: which item is flown, and what its change claims about the items before it.
+
+A current item that has moved on is a claim that is judged by the vehicle's positions; an item
+that another station has set, or that we have set, is none.
+"""
+from __future__ import annotations
+
+import math
+from collections import deque
+
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+
+from uav_task_alloc.mavlink.mission.completed_tasks import CompletedTasks
+from uav_task_alloc.mavlink.mission.current_item_reports import CurrentItemReports
+from uav_task_alloc.mavlink.mission.epoch import Epoch
+from uav_task_alloc.mavlink.mission.items import Item
+from uav_task_alloc.mavlink.mission.passed_items import Claim, PassedItems, flown_nearby
+from uav_task_alloc.mavlink.mission.position_history import MAX_MESSAGE_DELAY, PositionHistory
+from uav_task_alloc.mavlink.mission.reached_epoch import ReachedEpoch
+from uav_task_alloc.mavlink.transport.frame_log import FrameLog
+
+
+class CurrentItem:
+    """Moves the current item of an epoch, and keeps the claims about the items passed.
+
+    Each `seq` is an index without home; `now` is steady time [s].
+
+    Args:
+        epoch: the mission on board.
+        tasks: of the vehicle.
+        positions: of the vehicle.
+        epochs: the REACHED of this epoch and of the previous one.
+        frames: numbers of the frames received.
+    """
+
+    def __init__(self, epoch: Epoch, tasks: CompletedTasks, positions: PositionHistory,
+                 epochs: ReachedEpoch, frames: FrameLog) -> None:
+        self._epoch, self._tasks, self._positions = epoch, tasks, positions
+        self._epochs = epochs
+        self.passed = PassedItems(frames, positions)
+        self.reports = CurrentItemReports()
+        self.skipped: deque[str] = deque()  # tasks skipped by another station
+        self.passed_over: deque[Item] = deque()  # passed, and not known to be flown
+        self.set_by_other: int | None = None  # the current item, where another station set it
+        self._left_at = -math.inf  # vehicle time [s] at which it left mission mode
+        self._after_skipped: int | None = None  # the item after those that were skipped
+
+    def begin(self, start: int | None, now: float) -> None:
+        """Begin an epoch at an item; None: its current item is not known."""
+        self.reports.begin(start, now)
+        self.set_by_other = None
+
+    def invalidate(self) -> None:
+        """End the epoch, and complete what the positions have shown so far."""
+        for item in self.passed.seen():
+            self._tasks.complete(item.task, item.position)
+        self.reports.clear()
+        self.passed.clear()
+        self.set_by_other = None
+
+    def note_set(self, seq: int, now: float) -> None:
+        """Note that we have set the current item: the items skipped by that were not flown."""
+        self.reports.note_set(seq, now)
+        self.set_by_other = None
+        self._epoch.current, self._epoch.since = seq, self._positions.path.newest
+
+    def note_mission_left(self) -> None:
+        """Note that the vehicle has left the list: a task resumed later starts again."""
+        if self._epoch.started is not None:
+            self._left_at = self._positions.path.newest
+        self._epoch.started = self.set_by_other = None
+
+    def note_report(self, seq: int, now: float, flying: bool, frame: int | None = None) -> None:
+        """Take a MISSION_CURRENT; items before it are claimed to be flown.
+
+        Args:
+            seq: index without home.
+            now: steady time [s].
+            flying: whether the vehicle is in mission mode in the air.
+            frame: number of its frame; None: not known.
+        """
+        reports, epoch = self.reports, self._epoch
+        reports.previous_frame = reports.last_frame
+        if not reports.is_old(seq, now):
+            self._move(seq, now, flying, frame)
+        reports.note(seq, frame)
+        if reports.was_set_back(seq, now, None if not flying or epoch.current is None else (
+                min(epoch.current, len(epoch.items) - 1))):
+            self._fly_from(seq)
+
+    def _fly_from(self, seq: int) -> None:
+        """Set the current item, which may be flown since before the message arrived."""
+        self._epoch.current, self._epoch.since = seq, self._positions.recent(self._epoch.since)
+
+    def _move(self, seq: int, now: float, flying: bool, frame: int | None) -> None:
+        epoch = self._epoch
+        if epoch.started is None or not flying:
+            if seq < len(epoch.items) and not (epoch.finished and seq == len(epoch.items) - 1):
+                if epoch.current is not None and epoch.current < seq:
+                    self.claim(epoch.current, seq, now, frame, in_flight=False)
+                epoch.current = seq  # set by another station; nothing is flown
+        elif epoch.current is not None and epoch.current < seq <= len(epoch.items):
+            self._after_skipped = None
+            self.claim(epoch.current, seq, now, frame)
+            self._fly_from(seq)
+            self.set_by_other = seq if self._after_skipped == seq else self.set_by_other
+
+    def note_mission_complete(self, seq: int, now: float, frame: int | None = None) -> None:
+        """Take the vehicle's report that its mission is complete up to item `seq`."""
+        epoch = self._epoch
+        end = min(seq + 1, len(epoch.items))
+        if (epoch.current is not None and not self.reports.awaits_set
+                and epoch.started is not None and epoch.current < end):
+            self.claim(epoch.current, end, now, frame)
+            self._fly_from(end)
+
+    def judge(self, now: float) -> None:
+        """Complete those passed items that the positions show to be flown."""
+        for claim in self.passed.claims:
+            judged = self.passed.judge(claim, tuple(
+                i for i in claim.items if i.task not in self._tasks), now)
+            for item in judged.flown:
+                self._tasks.complete(item.task, item.position)
+            self._pass_over(judged.passed_over, claim)
+
+    def _pass_over(self, items: tuple[Item, ...], claim: Claim) -> None:
+        self.passed_over.extend(items)
+        if not claim.in_flight:
+            return
+        self.skipped.extend(item.task for item in items)
+        if items and claim.epoch == self._epoch.number:
+            self.set_by_other = self._epoch.current
+
+    def claim(self, begin: int, end: int, now: float, frame: int | None = None,
+              in_flight: bool = True) -> None:
+        """Claim that the items in [begin, end) were flown.
+
+        Args:
+            begin: index of the first item.
+            end: index after the last item.
+            now: steady time [s].
+            frame: number of the frame that shows it; None: not known.
+            in_flight: whether the vehicle was in mission mode in the air.
+        """
+        epoch, positions = self._epoch, self._positions
+        items = tuple(item for item in epoch.items[begin:end]
+                      if item.completes and item.task not in self._tasks)
+        if in_flight and end - begin > 1 and self.reports.reported == begin and (
+                positions.at_once(self.reports.last_frame, frame)):
+            items = self._skip_others(items, flown_nearby(items, epoch.items[begin]), end)
+        if not items:
+            return
+        route = tuple(item for item in epoch.items[begin:] if item.position is not None)
+        until = positions.vehicle_time(now)
+        if epoch.started is None:  # positions after it left mission mode prove nothing
+            until = min(until, max(epoch.since, self._left_at))
+        self.passed.add(Claim(
+            items, route, epoch.since, until, now + MAX_MESSAGE_DELAY, epoch.number,
+            self._frames_of_reached(begin, end, now, frame), frame, end - begin > 1, in_flight))
+
+    def _frames_of_reached(self, begin: int, end: int, now: float,
+                           frame: int | None) -> tuple[int, int] | None:
+        """Frames between which a REACHED of the passed items would be; None: not known."""
+        previous = self.reports.previous_frame
+        if frame is None or previous is None:
+            return None
+        after = self._epoch.items[end:end + 1]
+        if after and after[0].command == dialect.MAV_CMD_NAV_RETURN_TO_LAUNCH:
+            return None  # PX4 sends no REACHED of the item before it
+        if self._epochs.reached_recently(begin, end, now):
+            return None  # one came, perhaps a repetition: only the positions decide
+        return previous, frame
+
+    def _skip_others(self, items: tuple[Item, ...], candidates: tuple[Item, ...],
+                     end: int) -> tuple[Item, ...]:
+        """Note all but the candidates as skipped by another station; returns the candidates."""
+        skipped = tuple(i for i in items if i not in candidates)
+        self.passed_over.extend(skipped)
+        self.skipped.extend(item.task for item in skipped)
+        if skipped:
+            self._after_skipped = end
+        return candidates

@@ -1,0 +1,56 @@
+# SPDX-License-Identifier: Apache-2.0
+"""One epoch of a mission: the items of a verified upload, and the item being flown."""
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+
+from uav_task_alloc.mavlink.mission.items import Item
+
+
+@dataclass(slots=True)
+class Epoch:
+    """The mission on board; each `seq` is an index without home, each time the vehicle's [s]."""
+
+    number: int = 0
+    items: tuple[Item, ...] = ()
+    current: int | None = None  # len(items): flown to the end; None: not known
+    since: float = -math.inf  # from which the current item is flown
+    begin: float = -math.inf  # at which this epoch began
+    taken: float = -math.inf  # before which it was not on board
+    taken_frame: float = math.inf  # number of the last frame before it was on board
+    started: str | None = None  # task of the item being flown in mission mode
+
+    @property
+    def active(self) -> Item | None:
+        """The item being flown."""
+        if self.current is None or self.current >= len(self.items):
+            return None
+        return self.items[self.current]
+
+    @property
+    def finished(self) -> bool:
+        """Whether the mission is flown to its end."""
+        return bool(self.items) and self.current == len(self.items)
+
+    @property
+    def returns(self) -> bool:
+        """Whether the mission ends with NAV_RETURN_TO_LAUNCH."""
+        return bool(self.items) and self.items[-1].command == dialect.MAV_CMD_NAV_RETURN_TO_LAUNCH
+
+    @property
+    def last_flown(self) -> int:
+        """The index of the last item with a position."""
+        return len(self.items) - 1 - int(self.returns)
+
+    @property
+    def at_end(self) -> bool:
+        """Whether the last item with a position is being flown, or is passed."""
+        return bool(self.items) and self.current is not None and self.current >= self.last_flown
+
+    def invalidate(self) -> None:
+        """Forget the items: the mission on board is unknown."""
+        self.items, self.current, self.started = (), None, None
+        self.since = -math.inf

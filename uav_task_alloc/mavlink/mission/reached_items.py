@@ -1,0 +1,123 @@
+# SPDX-License-Identifier: Apache-2.0
+"""MISSION_ITEM_REACHED completes the item it names, and no other.
+
+While one of the previous epoch may still arrive, it counts only where the vehicle was at that
+item (`reached_epoch`).
+"""
+from __future__ import annotations
+
+import math
+
+from uav_task_alloc.mavlink.mission.completed_tasks import CompletedTasks
+from uav_task_alloc.mavlink.mission.current_item import CurrentItem
+from uav_task_alloc.mavlink.mission.epoch import Epoch
+from uav_task_alloc.mavlink.mission.position_history import MAX_MESSAGE_DELAY, PositionHistory
+from uav_task_alloc.mavlink.mission.reached_epoch import CurrentEpoch, ReachedEpoch
+
+
+class ReachedItems:
+    """Takes each REACHED once its epoch is known.
+
+    Args:
+        epoch: the mission on board.
+        tasks: of the vehicle.
+        positions: of the vehicle.
+        epochs: to which a REACHED can belong.
+        moves: the current item of `epoch`.
+        repeats: whether the autopilot repeats REACHED (PX4).
+    """
+
+    def __init__(self, epoch: Epoch, tasks: CompletedTasks, positions: PositionHistory,
+                 epochs: ReachedEpoch, moves: CurrentItem, repeats: bool) -> None:
+        self._epoch, self._tasks, self._positions = epoch, tasks, positions
+        self._epochs, self._moves, self._repeats = epochs, moves, repeats
+        self.seqs: set[int] = set()  # reached in this epoch
+        self.last: int | None = None  # the last one of this epoch
+        self.end_at = -math.inf  # [s] REACHED of the last item was received
+
+    def begin(self) -> None:
+        """Begin an epoch."""
+        self.seqs.clear()
+        self.last = None
+
+    def note(self, seq: int, now: float, proven: bool, frame: int | None) -> None:
+        """Take one; see `ProgressTable.note_reached`."""
+        epoch, epochs, positions = self._epoch, self._epochs, self._positions
+        proven = proven or (
+            frame is not None and not self._repeats and frame > epoch.taken_frame)
+        when = epochs.first_at(seq, now)
+        repetition = epochs.note_reached(seq, now)
+        if (proven or now >= epochs.before.until) and epoch.items:
+            if 0 <= seq < len(epoch.items) and (
+                    proven or positions.can_have_reached(epoch.items[seq], now)):
+                self._accept(seq, now)
+        elif not self._prove(seq, now, when, repetition) and not repetition:
+            # a position that shows it may still arrive
+            epochs.unproven[seq] = now + MAX_MESSAGE_DELAY, when
+
+    def note_end(self, seq: int, now: float) -> None:
+        """Take one of this epoch or the next: the mission may have ended."""
+        epoch = self._epoch
+        if seq == epoch.last_flown:
+            self.end_at = now
+        if 0 <= seq < len(epoch.items):
+            self._moves.passed.note_reached(epoch.items[seq])
+
+    def step(self, now: float) -> None:
+        """Judge each REACHED of unknown epoch."""
+        unproven = self._epochs.unproven
+        for seq, (until, when) in list(unproven.items()):
+            if self._prove(seq, now, when):
+                unproven.pop(seq, None)
+            elif now >= until:
+                del unproven[seq]
+                if self._passed_unseen(seq):
+                    self._accept(seq, now)
+
+    def _prove(self, seq: int, now: float, when: float, repetition: bool = False) -> bool:
+        """Credit a REACHED received at `when` [s] to the epoch at whose item the vehicle was.
+
+        Returns:
+            False where the epoch is not known yet.
+        """
+        epoch = self._epoch
+        current = CurrentEpoch(epoch.items, self._moves.reports.reported, epoch.since,
+                               epoch.begin, epoch.taken)
+        if 0 <= seq < len(epoch.items) and self._epochs.is_of_current(seq, current, now, when):
+            self._accept(seq, now)
+            return True
+        item = None if repetition else self._epochs.previous_item(seq, epoch.items, when)
+        if item is None:
+            return False
+        if self._epochs.ends_previous(item):
+            self.end_at = now
+        self._tasks.credit(item)
+        self._epochs.credited = seq
+        return True
+
+    def _passed_unseen(self, seq: int) -> bool:
+        """Whether it flies a later item, and the positions have a gap since this one."""
+        epoch = self._epoch
+        return (0 <= seq < len(epoch.items) and epoch.current is not None and seq < epoch.current
+                and self._positions.not_seen_at(epoch.items[seq], epoch.since))
+
+    def _accept(self, seq: int, now: float) -> None:
+        epoch = self._epoch
+        if seq == epoch.last_flown and self.last != seq:
+            self.end_at = now
+        self.last = self._epochs.credited = seq
+        self.seqs.add(seq)
+        if epoch.current is None or seq >= epoch.current:
+            if epoch.current is not None and epoch.current < seq:
+                self._moves.claim(epoch.current, seq, now)
+            self._advance_after(seq)
+        self._tasks.credit(epoch.items[seq])
+
+    def _advance_after(self, seq: int) -> None:
+        """Make the item after `seq` current, flown since `seq` was reached."""
+        epoch, positions = self._epoch, self._positions
+        item, since = epoch.items[seq], positions.recent(epoch.since)
+        at = None if item.position is None else positions.path.visited_at(
+            item.position, item.radius, since)
+        epoch.current, self._moves.set_by_other = seq + 1, None
+        epoch.since = since if at is None else at
