@@ -91,7 +91,11 @@ class Telemetry:
         self._started = False  # it has finished booting
         self.has_position = False  # valid by its estimator or its GPS
         self._batteries: dict[int, tuple[float, float]] = {}  # remaining 0..1 and time [s] by id
-        self._handlers: dict[str, Callable[[Message, float], None]] = {
+        self._handlers = self._message_handlers()
+
+    def _message_handlers(self) -> dict[str, Callable[[Message, float], None]]:
+        """The methods that process a message, by its type."""
+        return {
             'HEARTBEAT': self._heartbeat, 'GLOBAL_POSITION_INT': self._global_position,
             'HOME_POSITION': self._home, 'BATTERY_STATUS': self._battery,
             'SYS_STATUS': self._sys_status, 'EXTENDED_SYS_STATE': self._extended,
