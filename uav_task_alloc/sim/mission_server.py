@@ -9,10 +9,11 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 from uav_task_alloc.mavlink.transport.codec import Message
 from uav_task_alloc.sim.config import StorageChange
 from uav_task_alloc.sim.flight import VehicleFlight
-from uav_task_alloc.sim.stored_item import StoredItem
+from uav_task_alloc.sim.stored_item import StoredItem, to_float_message, to_message
 
 RemoteIds = tuple[int, int]  # system, component
 MISSION_TYPE = dialect.MAV_MISSION_TYPE_MISSION
+CLEARED_TYPES = (MISSION_TYPE, dialect.MAV_MISSION_TYPE_ALL)  # of MISSION_CLEAR_ALL
 AUTOPILOT_COMPONENT = dialect.MAV_COMP_ID_AUTOPILOT1
 
 
@@ -79,6 +80,20 @@ class MissionServer:
     def _for_us(self, message: Message) -> bool:
         return (message.target_system == self._system_id
                 and message.target_component in (AUTOPILOT_COMPONENT, 0))
+
+    def _count_of(self, message: Message) -> int:
+        """Number of items of the mission type that a message names."""
+        return len(self.items) if message.mission_type == MISSION_TYPE else 0
+
+    def _takes_type(self, message: Message, peer: RemoteIds) -> bool:
+        """Whether an upload is of the mission type; the others are refused."""
+        if message.mission_type != MISSION_TYPE:
+            self._send_ack(peer, dialect.MAV_MISSION_UNSUPPORTED, message.mission_type)
+        return bool(message.mission_type == MISSION_TYPE)
+
+    def _send_item(self, seq: int, peer: RemoteIds, as_int: bool) -> None:
+        make = to_message if as_int else to_float_message
+        self.out.append(make(self.read(seq), seq, seq == self.flight.seq, peer))
 
     def _send_ack(self, peer: RemoteIds, result: int, mission_type: int = MISSION_TYPE) -> None:
         self.out.append(dialect.MAVLink_mission_ack_message(*peer, result, mission_type))

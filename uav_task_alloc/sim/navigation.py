@@ -74,8 +74,12 @@ class Navigation:
 
     def climb(self, target: Point) -> Track:
         """The track of NAV_TAKEOFF: straight up."""
-        x, y, z = self.body.position
-        return Track(((x, y, max(z, target[2])),), _NEAR)
+        return self.rise_to(max(self.body.position[2], target[2]))
+
+    def rise_to(self, height: float) -> Track:
+        """The track straight up to `height` [m] ENU."""
+        x, y, _ = self.body.position
+        return Track(((x, y, height),), _NEAR)
 
     def radius(self, item: StoredItem) -> float:
         """Acceptance radius of an item [m]."""

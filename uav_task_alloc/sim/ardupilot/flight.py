@@ -10,7 +10,6 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 from uav_task_alloc.sim import stored_item as item_
 from uav_task_alloc.sim.boot import BootTimes
 from uav_task_alloc.sim.config import FlightMode, StorageChange
-from uav_task_alloc.sim.dynamics import Track
 from uav_task_alloc.sim.flight import CRITICAL, WARNING, VehicleFlight
 from uav_task_alloc.sim.modes import COPTER_MODES, COPTER_NOT_ARMABLE
 from uav_task_alloc.sim.stored_item import StoredItem
@@ -74,10 +73,9 @@ class ArduPilotFlight(VehicleFlight):
     def takeoff(self, height: float) -> bool:
         if self.mode is not FlightMode.GUIDED or not self.armed or not self.landed:
             return False
-        x, y, z = self.body.position
-        if height <= z:
+        if height <= self.body.position[2]:
             return False
-        self.track = Track(((x, y, height),), 0.3)
+        self.track = self.rise_to(height)
         return True
 
     def can_fly_mission(self) -> bool:

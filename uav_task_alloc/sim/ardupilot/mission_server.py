@@ -8,19 +8,21 @@ from uav_task_alloc.mavlink.transport.codec import Message
 from uav_task_alloc.sim.ardupilot.flight import ArduPilotFlight, MissionRunState
 from uav_task_alloc.sim.config import FlightMode, StorageChange
 from uav_task_alloc.sim.flight import WARNING
-from uav_task_alloc.sim.mission_server import MISSION_TYPE, MissionServer, RemoteIds
+from uav_task_alloc.sim.mission_server import (
+    CLEARED_TYPES,
+    MISSION_TYPE,
+    MissionServer,
+    RemoteIds,
+)
 from uav_task_alloc.sim.stored_item import (
     Refusal,
     StoredItem,
     from_message,
     stored_by_ardupilot,
-    to_float_message,
-    to_message,
 )
 
 _RETRY = 1.0  # [s] between requests for the same item
 _GIVE_UP = 8.0  # [s] without an item
-_ALL = dialect.MAV_MISSION_TYPE_ALL
 
 
 class ArduPilotMissionServer(MissionServer):
@@ -79,8 +81,7 @@ class ArduPilotMissionServer(MissionServer):
             *self._peer, self._wanted, MISSION_TYPE))
 
     def _count(self, message: Message, peer: RemoteIds, now: float) -> None:
-        if message.mission_type != MISSION_TYPE:
-            self._send_ack(peer, dialect.MAV_MISSION_UNSUPPORTED, message.mission_type)
+        if not self._takes_type(message, peer):
             return
         if self._peer not in (None, peer):
             self._send_ack(peer, dialect.MAV_MISSION_DENIED)
@@ -103,9 +104,9 @@ class ArduPilotMissionServer(MissionServer):
         self._ask(now)
 
     def _item(self, message: Message, peer: RemoteIds, now: float) -> None:
-        if message.mission_type != MISSION_TYPE:
-            self._send_ack(peer, dialect.MAV_MISSION_UNSUPPORTED, message.mission_type)
-        elif self._peer is None:
+        if not self._takes_type(message, peer):
+            return
+        if self._peer is None:
             self._send_ack(peer, dialect.MAV_MISSION_ERROR)
         elif message.seq != self._wanted:
             self._send_ack(peer, dialect.MAV_MISSION_INVALID_SEQUENCE)
@@ -135,8 +136,8 @@ class ArduPilotMissionServer(MissionServer):
         if self._peer is not None:
             self._send_ack(peer, dialect.MAV_MISSION_DENIED, message.mission_type)
             return
-        count = len(self.items) if message.mission_type == MISSION_TYPE else 0
-        self.out.append(dialect.MAVLink_mission_count_message(*peer, count, message.mission_type))
+        self.out.append(dialect.MAVLink_mission_count_message(
+            *peer, self._count_of(message), message.mission_type))
 
     def _request(self, message: Message, peer: RemoteIds, now: float) -> None:
         if self._peer is not None:
@@ -147,18 +148,16 @@ class ArduPilotMissionServer(MissionServer):
             self._request_list(message, peer, now)  # for the count
             self._send_ack(peer, dialect.MAV_MISSION_ERROR)
         else:
-            make = to_message if message.get_type().endswith('_INT') else to_float_message
-            self.out.append(make(self.read(message.seq), message.seq,
-                                 message.seq == self.flight.seq, peer))
+            self._send_item(message.seq, peer, message.get_type().endswith('_INT'))
 
     def _clear(self, message: Message, peer: RemoteIds, now: float) -> None:
         if self._peer is not None:
             self._send_ack(peer, dialect.MAV_MISSION_DENIED, message.mission_type)
-        elif (message.mission_type in (MISSION_TYPE, _ALL)
+        elif (message.mission_type in CLEARED_TYPES
               and self.flight.run is MissionRunState.ACTIVE):
             self._send_ack(peer, dialect.MAV_MISSION_ERROR, message.mission_type)
         else:
-            if message.mission_type in (MISSION_TYPE, _ALL):
+            if message.mission_type in CLEARED_TYPES:
                 self.items.clear()
                 if self._unloaded is not None:
                     self._unloaded.clear()

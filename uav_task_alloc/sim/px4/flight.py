@@ -62,12 +62,8 @@ class Px4Flight(VehicleFlight):
         if not self.positioned or not self.landed:
             return False
         self.set_mode(FlightMode.TAKEOFF)
-        self.track = self._rise_to(height)
+        self.track = self.rise_to(height)
         return True
-
-    def _rise_to(self, height: float) -> Track:
-        x, y, _ = self.body.position
-        return Track(((x, y, height),), 0.3)
 
     def disarm(self, force: bool = False) -> bool:
         was_armed, done = self.armed, super().disarm(force)
@@ -98,8 +94,8 @@ class Px4Flight(VehicleFlight):
         if mode in (FlightMode.TAKEOFF, FlightMode.LAND, FlightMode.MISSION):
             self.result.finished = False
         if mode is FlightMode.TAKEOFF:
-            self.track = self._rise_to(max(self.body.position[2],
-                                           self.home[2] + self.takeoff_height))
+            self.track = self.rise_to(max(self.body.position[2],
+                                          self.home[2] + self.takeoff_height))
         if mode is FlightMode.MISSION and self._finished:
             self.seq, self._finished = 0, False
 

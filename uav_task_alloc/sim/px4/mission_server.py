@@ -9,7 +9,12 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from uav_task_alloc.mavlink.transport.codec import Message, with_plan_id
 from uav_task_alloc.sim.config import FlightMode, StorageChange
-from uav_task_alloc.sim.mission_server import MISSION_TYPE, MissionServer, RemoteIds
+from uav_task_alloc.sim.mission_server import (
+    CLEARED_TYPES,
+    MISSION_TYPE,
+    MissionServer,
+    RemoteIds,
+)
 from uav_task_alloc.sim.px4.flight import Px4Flight
 from uav_task_alloc.sim.stored_item import (
     Refusal,
@@ -17,13 +22,10 @@ from uav_task_alloc.sim.stored_item import (
     from_message,
     px4_crc,
     stored_by_px4,
-    to_float_message,
-    to_message,
 )
 
 _RETRY = 0.25  # [s] between requests for the same item
 _GIVE_UP = 5.0  # [s] without a message
-_ALL = dialect.MAV_MISSION_TYPE_ALL
 
 
 class _State(Enum):
@@ -101,8 +103,7 @@ class Px4MissionServer(MissionServer):
             self._send_ack(self._peer, dialect.MAV_MISSION_ERROR)
 
     def _begin(self, message: Message, peer: RemoteIds, now: float) -> None:
-        if message.mission_type != MISSION_TYPE:
-            self._send_ack(peer, dialect.MAV_MISSION_UNSUPPORTED, message.mission_type)
+        if not self._takes_type(message, peer):
             return
         self._peer = peer
         if message.count > self._capacity:
@@ -162,7 +163,7 @@ class Px4MissionServer(MissionServer):
         repeated = self._state is _State.SENDLIST and peer == self._peer
         if self._state is not _State.IDLE and not repeated:
             return
-        count = len(self.items) if message.mission_type == MISSION_TYPE else 0
+        count = self._count_of(message)
         if message.mission_type == MISSION_TYPE:
             self._state, self._peer, self._seq, self._received_at = _State.SENDLIST, peer, 0, now
         self.out.append(with_plan_id(dialect.MAVLink_mission_count_message(
@@ -179,14 +180,12 @@ class Px4MissionServer(MissionServer):
             self._state = _State.IDLE
             self._send_ack(peer, dialect.MAV_MISSION_ERROR)
             return
-        make = to_message if self._int else to_float_message
-        self.out.append(make(self.items[message.seq], message.seq,
-                             message.seq == self.flight.seq, peer))
+        self._send_item(message.seq, peer, self._int)
 
     def _clear(self, message: Message, peer: RemoteIds, now: float) -> None:
         if self._state is not _State.IDLE:
             return
-        if message.mission_type in (MISSION_TYPE, _ALL):
+        if message.mission_type in CLEARED_TYPES:
             self._incoming, self._flagged = [], None
             self._store(StorageChange.CLEARED)
         self._send_ack(peer, dialect.MAV_MISSION_ACCEPTED, message.mission_type)
