@@ -18,7 +18,7 @@ class Weights:
     """
 
     distance: float = 0.01  # [1/m]
-    value: float = 100.0
+    value: float = 100.0  # fit for one unit of task value
     penalty: float = 1.0  # [1/m]
 
     def __post_init__(self) -> None:
@@ -46,6 +46,14 @@ def fit(distance: float, value: float, penalty: float, weights: Weights | None =
 
 
 def excess(uavs: Iterable[Uav], lengths: Iterable[float]) -> float:
-    """Metres by which routes of these lengths [m] exceed the ranges of their UAVs: P of eq 2.2."""
+    """Return by how much routes exceed the ranges of their UAVs: P of eq 2.2.
+
+    Args:
+        uavs: with their ranges [m].
+        lengths: [m] of their routes, in the same order.
+
+    Returns:
+        [m], the sum over all UAVs.
+    """
     return math.fsum(max(0.0, length - uav.range)
                      for uav, length in zip(uavs, lengths, strict=True))

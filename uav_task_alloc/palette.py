@@ -19,11 +19,25 @@ STATE_COLOURS_ON_DARK = {
 
 
 def uav_colour(index: int) -> str:
-    """The colour of a UAV, `#rrggbb`, by its position in the fleet; they repeat."""
+    """Return the colour of a UAV; they repeat.
+
+    Args:
+        index: position in the fleet, from 0.
+
+    Returns:
+        `#rrggbb`.
+    """
     return UAV_COLOURS[index % len(UAV_COLOURS)]
 
 
 def rgb(colour: str) -> tuple[float, float, float]:
-    """Red, green and blue of `#rrggbb`, each in [0, 1]."""
+    """Split a colour into its components.
+
+    Args:
+        colour: `#rrggbb`.
+
+    Returns:
+        Red, green and blue, each in [0, 1].
+    """
     red, green, blue = (int(colour[i:i + 2], 16) / 255.0 for i in (1, 3, 5))
     return red, green, blue

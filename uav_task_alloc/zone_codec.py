@@ -69,13 +69,16 @@ def encode_zone(zone: ThreatZone, form: ZoneFormat) -> dict[str, Any]:
 
 
 def decode_zone(values: Mapping[str, Any]) -> ThreatZone:
-    """The zone of a mapping as `encode_zone` writes it in any format.
+    """Return the zone of a mapping as `encode_zone` writes it in any format.
 
     Values that the shape does not use may be missing and are ignored.
 
     Args:
         values: by the names of ThreatZone's fields. shape: its number, or its name in upper or
             lower case. z_min, z_max: None is unbounded. margin: missing or None is 0.
+
+    Returns:
+        Checked by ThreatZone.
 
     Raises:
         InvalidValue: the id is no ROS name, or a value is missing or outside its range.
@@ -104,7 +107,10 @@ def decode_zone_message(msg: Any) -> ThreatZone:
 
 
 def decode_zone_array(msg: Any) -> tuple[list[ThreatZone], dict[str, str]]:
-    """The zones of a ThreatZoneArray message, of rclpy or of a recording.
+    """Return the zones of a ThreatZoneArray message, of rclpy or of a recording.
+
+    Args:
+        msg: from any publisher, not yet checked.
 
     Returns:
         The valid zones, and for each invalid one its id and the reason.

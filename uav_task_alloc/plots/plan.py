@@ -42,7 +42,16 @@ def draw_plan(uavs: Sequence[Uav], tasks: Sequence[Task], zones: Sequence[Threat
 
 
 def route_points(uav: Uav, plan: Plan, positions: Mapping[str, Point]) -> list[Point]:
-    """All points of a UAV's route [m], from its start over detour points and tasks."""
+    """Return all points of a UAV's route, from its start over detour points and tasks.
+
+    Args:
+        uav: with its start and home.
+        plan: with routes and legs.
+        positions: [m] ENU by task id.
+
+    Returns:
+        [m] ENU; ends at home where the plan returns.
+    """
     names, legs = plan.routes.get(uav.id, ()), plan.legs.get(uav.id, ())
     stops = [*(positions[name] for name in names), uav.home or uav.position]
     points = [uav.position]

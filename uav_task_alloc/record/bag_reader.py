@@ -40,6 +40,9 @@ class BagReader:
     Afterwards `damage` is a text on the damage that ended the iteration, or '', and `undecodable`
     has the number of undecodable messages by topic.
 
+    Args:
+        path: of the MCAP file.
+
     Raises:
         OSError: while iterating; the file cannot be read.
         InvalidValue: while iterating; it is no MCAP file.

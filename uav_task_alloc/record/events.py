@@ -21,11 +21,14 @@ ACTION_TEXTS = {'ADD': 'announced: {}', 'UPDATE': 'changed: {}', 'CANCEL': 'to b
 
 
 def sentences(state: RunState, line: Line) -> Iterator[Sentence]:
-    """The events in a line of a record.
+    """Return the events in a line of a record.
 
     Args:
         state: of the run before `line`.
         line: of the record.
+
+    Returns:
+        (kind, sentence) each; none for lines without events.
     """
     build = SENTENCE_BUILDERS.get(line['kind'])
     return build(state, line) if build else iter(())

@@ -49,9 +49,10 @@ class ZoneEntry:
 class GroundTruth:
     """Tracks and events of all simulated vehicles."""
 
+    # samples by UAV, in order of time
     tracks: dict[str, list[TrueSample]] = field(default_factory=dict)
-    reached: list[Reached] = field(default_factory=list)
-    died: dict[str, TrueSample] = field(default_factory=dict)
+    reached: list[Reached] = field(default_factory=list)  # items reached, in order of time
+    died: dict[str, TrueSample] = field(default_factory=dict)  # last sample by UAV that was lost
 
     def apply(self, line: Line) -> None:
         """Apply one line of the simulator's log."""
@@ -72,7 +73,17 @@ class GroundTruth:
 
 
 def read_truth(out_dir: Path) -> GroundTruth:
-    """Read the simulator's log of a run. Raises OSError."""
+    """Read the simulator's log of a run.
+
+    Args:
+        out_dir: folder with flight.jsonl.
+
+    Returns:
+        Of all vehicles.
+
+    Raises:
+        OSError: the file cannot be read.
+    """
     truth = GroundTruth()
     for line in read_lines(out_dir / TRUTH_FILE):
         truth.apply(line)
@@ -98,9 +109,16 @@ def visits(truth: GroundTruth, tasks: Mapping[str, Point]) -> dict[str, list[Rea
 
 
 def zone_entries(truth: GroundTruth, zones: Sequence[ZoneInterval]) -> list[ZoneEntry]:
-    """Every entry of a vehicle into a zone in force, without its margin.
+    """Return every entry of a vehicle into a zone in force, without its margin.
 
     A vehicle around which a zone appears does not enter it.
+
+    Args:
+        truth: with all tracks.
+        zones: with the times in which they were in force.
+
+    Returns:
+        By UAV and zone, not by time.
     """
     return [entry for uav, track in truth.tracks.items() for interval in zones
             for entry in _entries(uav, track, interval)]

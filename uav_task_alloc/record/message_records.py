@@ -36,11 +36,14 @@ def constant_name(names: tuple[str, ...], value: int) -> str:
 
 
 def announcement_record(msg: _Message, origin: Origin | None) -> RecordBody:
-    """The valid tasks of a TaskAnnouncement; the allocator reports the others.
+    """Return the valid tasks of a TaskAnnouncement; the allocator reports the others.
 
     Args:
         msg: TaskAnnouncement.
         origin: of the ENU frame; None: tasks in WGS84 are left out.
+
+    Returns:
+        Kind `announcement`; positions in ENU [m], a cancelled task has its id only.
     """
     tasks = []
     for task in msg.tasks:
@@ -59,7 +62,18 @@ def announcement_record(msg: _Message, origin: Origin | None) -> RecordBody:
 
 
 def task_position(task: _Message, origin: Origin | None) -> Point | None:
-    """The position [m] of a Task message; None in WGS84 without origin. Raises InvalidValue."""
+    """Return the position of a Task message.
+
+    Args:
+        task: of any frame, not yet checked.
+        origin: of the ENU frame; None: unknown.
+
+    Returns:
+        [m] ENU; None for WGS84 without an origin.
+
+    Raises:
+        InvalidValue: frame or coordinates are invalid.
+    """
     place = f'task {task.task_id}: '
     if task.frame == _FRAME_LOCAL:
         return check_point(place + 'position', _xyz(task.position))
@@ -74,20 +88,44 @@ def task_position(task: _Message, origin: Origin | None) -> Point | None:
 
 
 def zones_record(msg: _Message) -> RecordBody:
-    """The valid zones; the allocator reports the others. Raises InvalidValue for too many."""
+    """Return the valid zones of a ThreatZoneArray; the allocator reports the others.
+
+    Args:
+        msg: ThreatZoneArray.
+
+    Returns:
+        Kind `zones`; each zone as JSON values.
+
+    Raises:
+        InvalidValue: there are too many zones or vertices.
+    """
     valid, _ = decode_zone_array(msg)
     return {'kind': 'zones', 'zones': [encode_zone(zone, JSON_ZONE) for zone in valid]}
 
 
 def statuses_record(msg: _Message) -> RecordBody:
-    """The statuses of a TaskStatusArray."""
+    """Return the statuses of a TaskStatusArray.
+
+    Args:
+        msg: TaskStatusArray.
+
+    Returns:
+        Kind `statuses`.
+    """
     return {'kind': 'statuses', 'statuses': [
         {'task': row.task_id, 'state': constant_name(_STATES, row.state), 'uav': row.uav_id,
          'reason': row.reason} for row in msg.statuses]}
 
 
 def allocation_record(msg: _Message) -> RecordBody:
-    """The lists and figures of an Allocation."""
+    """Return the lists and figures of an Allocation.
+
+    Args:
+        msg: Allocation.
+
+    Returns:
+        Kind `allocation`; `solve_ms` in milliseconds, lengths in m.
+    """
     return {
         'kind': 'allocation',
         'revision': msg.revision,
@@ -102,7 +140,14 @@ def allocation_record(msg: _Message) -> RecordBody:
 
 
 def task_list_record(msg: _Message) -> RecordBody:
-    """The remaining tasks of a TaskList; `eta` [s] counts from `stamp` [unix s]."""
+    """Return the remaining tasks of a TaskList.
+
+    Args:
+        msg: TaskList.
+
+    Returns:
+        Kind `list`; `stamp` [unix s], `eta` [s] from `stamp`, lengths in m.
+    """
     return {'kind': 'list', 'uav': msg.uav_id, 'revision': msg.revision, 'end': msg.end,
             'stamp': seconds(msg.header.stamp),
             'distance': finite_or_none(msg.distance), 'tasks': [
@@ -114,7 +159,14 @@ def task_list_record(msg: _Message) -> RecordBody:
 
 
 def state_record(msg: _Message) -> RecordBody:
-    """The values of a UavState."""
+    """Return the values of a UavState.
+
+    Args:
+        msg: UavState; recordings of earlier versions lack some fields.
+
+    Returns:
+        Kind `state`; unknown numbers are None.
+    """
     return {'kind': 'state', 'uav': msg.uav_id, 'mode': constant_name(MODES, msg.mode),
             'mission_state': constant_name(MISSIONS, msg.mission_state),
             'active': msg.active_task_id,
@@ -128,11 +180,14 @@ def state_record(msg: _Message) -> RecordBody:
 
 
 def uploads_record(msg: _Message) -> RecordBody:
-    """The bridge's values of a DiagnosticArray.
+    """Return the bridge's values of a DiagnosticArray.
+
+    Args:
+        msg: DiagnosticArray.
 
     Returns:
-        `uploads`: counts by name of the status; `health`: [level, text] by hardware id, which is
-        the UAV in statuses of a bridge; `authority`: by UAV.
+        Kind `uploads`. `uploads`: counts by name of the status; `health`: [level, text] by
+        hardware id, which is the UAV in statuses of a bridge; `authority`: by UAV.
     """
     return {'kind': 'uploads', 'uploads': dict(_upload_counts(msg)), 'authority': dict(
         _authority(msg)), 'health': {

@@ -15,7 +15,14 @@ _TRIGGER_TEXTS = {'ADD': 'new task', 'UPDATE': 'changed task', 'CANCEL': 'withdr
 
 
 def route_lists(line: Line) -> dict[str, list[str]]:
-    """The task ids of all lists of an allocation line."""
+    """Return the task ids of all lists of an allocation line.
+
+    Args:
+        line: of kind `allocation`.
+
+    Returns:
+        Ids in the order of flight, by UAV.
+    """
     return {row['uav']: [task['id'] for task in row['tasks']] for row in line.get('lists', ())}
 
 
@@ -48,7 +55,14 @@ def route_changes(before: RouteLists, after: RouteLists, done: set[str]) -> list
 
 
 def trigger_text(trigger: str) -> str:
-    """The trigger of a re-plan in words: `ADD a01` is `new task a01`."""
+    """Return the trigger of a re-plan in words: `ADD a01` is `new task a01`.
+
+    Args:
+        trigger: of an Allocation; several are separated by commas.
+
+    Returns:
+        Unknown triggers stay as they are.
+    """
     if trigger == 'background':
         return 'a better plan was found in the background'
     if trigger == 'replan service':
@@ -62,7 +76,15 @@ def trigger_text(trigger: str) -> str:
 
 
 def changes_text(rows: Sequence[Mapping[str, Any]], most: int = 4) -> str:
-    """The result of `route_changes` as a line: `uav_1 +a01, uav_2 -t03 reordered`."""
+    """Return the result of `route_changes` as a line: `uav_1 +a01, uav_2 -t03 reordered`.
+
+    Args:
+        rows: one a UAV.
+        most: UAVs, and tasks of each, that are shown.
+
+    Returns:
+        '' for no changes.
+    """
     texts = []
     for row in rows:
         signs = [f'+{task}' for task, _ in row['added']] + [f'-{t}' for t, _ in row['removed']]

@@ -12,7 +12,15 @@ SILENT_AFTER = 2.0  # [s] of wall time without a state: the UAV is shown as sile
 
 
 def headline(run: RunState, clock: float) -> str:
-    """One line: tasks by state, zones, re-plans; `clock`: scenario time [s]."""
+    """Return the progress of a run in one line: tasks by state, zones, re-plans.
+
+    Args:
+        run: its state.
+        clock: scenario time [s].
+
+    Returns:
+        Without a line break.
+    """
     counts = ''.join(f', {run.count(state)} {state.lower()}' for state in (
         'ACTIVE', 'ASSIGNED', 'PENDING', 'UNASSIGNED', 'REJECTED', 'FAILED', 'CANCELLED')
         if run.count(state))
@@ -26,7 +34,15 @@ def headline(run: RunState, clock: float) -> str:
 
 
 def fleet_lines(run: RunState, now: float) -> list[str]:
-    """One line for each UAV; `now`: [unix s]."""
+    """Return one line for each UAV.
+
+    Args:
+        run: its state.
+        now: [unix s].
+
+    Returns:
+        By UAV id.
+    """
     lines = []
     for uav, state in sorted(run.uavs.items()):
         remaining = run.lists.get(uav, {'tasks': []})['tasks']
@@ -54,12 +70,15 @@ def authority_text(run: RunState, uav: str, now: float) -> str:
 
 
 def run_is_over(run: RunState, scenario: Scenario, clock: float) -> bool:
-    """Whether all tasks of a scenario are in a final state and all UAVs not lost are at rest.
+    """Return whether all tasks of a scenario have ended, and all UAVs not lost are at rest.
 
     Args:
         run: its state.
         scenario: that is flown.
         clock: scenario time [s].
+
+    Returns:
+        False before the scenario's duration has passed.
     """
     dead = {uav.id for uav in scenario.uavs if uav.dies_at is not None}
     return (clock > scenario.duration

@@ -30,9 +30,9 @@ class AnnouncedTask:
 class ReportedStatus:
     """The state of a task as the allocator reports it."""
 
-    state: str
-    uav: str
-    reason: str
+    state: str  # name of a TaskStatus constant
+    uav: str  # that has it, or had it; '': none
+    reason: str  # of the state, for users
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,10 +67,11 @@ class ReportedAuthority:
 class RunState:
     """The state of a run after the lines given to `apply`."""
 
-    tasks: dict[str, AnnouncedTask] = field(default_factory=dict)
-    cancelled: set[str] = field(default_factory=set)
-    statuses: dict[str, ReportedStatus] = field(default_factory=dict)
-    solves: list[SolveRecord] = field(default_factory=list)
+    tasks: dict[str, AnnouncedTask] = field(default_factory=dict)  # announced, by id
+    cancelled: set[str] = field(default_factory=set)  # ids of tasks
+    statuses: dict[str, ReportedStatus] = field(default_factory=dict)  # by task id
+    solves: list[SolveRecord] = field(default_factory=list)  # in the order of publication
+    # with the times in which they were in force
     zones: list[ZoneInterval] = field(default_factory=list)
     lists: dict[str, Line] = field(default_factory=dict)  # the newest of each UAV
     legs: dict[tuple[str, str], float] = field(default_factory=dict)  # [m], see on_list
@@ -178,6 +179,9 @@ def read_record(out_dir: Path) -> RunState:
     Args:
         out_dir: folder with record.jsonl.
 
+    Returns:
+        After the last line.
+
     Raises:
         OSError: the file cannot be read.
     """
@@ -188,7 +192,17 @@ def read_record(out_dir: Path) -> RunState:
 
 
 def read_lines(path: Path) -> Iterable[Line]:
-    """The JSON objects of a file of JSON lines. Raises OSError."""
+    """Read the objects of a file of JSON lines; an unfinished last line is ignored.
+
+    Args:
+        path: of the file.
+
+    Returns:
+        One object a line, read as they are iterated.
+
+    Raises:
+        OSError: while iterating; the file cannot be read.
+    """
     with path.open(encoding='utf-8') as file:
         for text in file:
             if text.endswith('\n'):

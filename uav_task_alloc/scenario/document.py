@@ -42,7 +42,11 @@ same tasks.
 
 
 def scenario_page() -> str:
-    """The text of docs/scenarios.md."""
+    """Return the text of docs/scenarios.md.
+
+    Returns:
+        Markdown with a table for each kind of entry.
+    """
     parts = [INTRO]
     for name, table in TABLES.items():
         parts.append(f'\n## {name}\n\n| key | default | expected | meaning |\n|---|---|---|---|\n')

@@ -18,14 +18,14 @@ DEFAULT_SPEEDUP = 8.0  # times faster than real time
 class ScenarioUav:
     """One simulated vehicle of the fleet."""
 
-    id: str
+    id: str  # a ROS name
     system_id: int  # MAVLink, 1..255
     autopilot: str  # ardupilot | px4
     position: Point  # [m] ENU at the start
     home: Point  # [m] ENU
     cruise_speed: float = 15.0  # [m/s]
     range: float = math.inf  # [m]
-    capabilities: frozenset[str] = frozenset()
+    capabilities: frozenset[str] = frozenset()  # that tasks may require
     dies_at: float | None = None  # [s]
 
     @property
@@ -68,12 +68,12 @@ class Cancel:
 class Scenario:
     """The content of a file, with the random arrivals drawn; times in scenario seconds."""
 
-    name: str
-    seed: int
-    origin: Origin
-    uavs: tuple[ScenarioUav, ...]
+    name: str  # as in the file, else its name without suffix
+    seed: int  # of the random arrivals and the solver
+    origin: Origin  # of the ENU frame
+    uavs: tuple[ScenarioUav, ...]  # the fleet
     tasks: tuple[TimedTask, ...]  # by `at`
-    zones: tuple[TimedZone, ...] = ()
+    zones: tuple[TimedZone, ...] = ()  # in the order of the file
     cancels: tuple[Cancel, ...] = ()  # by `at`
     route_end: str = 'hold'  # hold | home
     speedup: float = DEFAULT_SPEEDUP  # of a simulated flight

@@ -14,9 +14,9 @@ from uav_task_alloc.model import Point
 class VehicleConfig:
     """Configuration of one vehicle; None is the value of the real autopilot."""
 
-    uav: str
+    uav: str  # id, in the ground truth
     system_id: int  # 1..255
-    origin: Origin
+    origin: Origin  # of the ENU frame
     position: Point  # [m] ENU on the ground, at the start
     home: Point | None = None  # [m] ENU; None: the position
     cruise_speed: float = 15.0  # [m/s]

@@ -168,7 +168,15 @@ class Track:
 
 
 def metres_between(a: Point, b: Point) -> float:
-    """Distance between two points [m]."""
+    """Return the distance between two points.
+
+    Args:
+        a: (x, y, z) [m].
+        b: (x, y, z) [m].
+
+    Returns:
+        [m].
+    """
     return _norm(_minus(a, b))
 
 

@@ -29,6 +29,10 @@ class VehicleFlight(Navigation):
     """Behaviour of both autopilots; subclasses handle a changed mission and its end.
 
     The owner sends and clears `reached` and `texts`; `events` are the ground truth.
+
+    Args:
+        config: of the vehicle.
+        items: mission storage, shared with the mission server.
     """
 
     modes: ClassVar[dict[int, CustomMode]]  # by custom_mode

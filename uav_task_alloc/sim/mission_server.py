@@ -18,7 +18,12 @@ AUTOPILOT_COMPONENT = dialect.MAV_COMP_ID_AUTOPILOT1
 
 
 class MissionServer:
-    """Stored items and the running transfer; messages to send are appended to `out`."""
+    """Stored items and the running transfer; messages to send are appended to `out`.
+
+    Args:
+        system_id: of the vehicle, 1..255.
+        capacity: items of the mission storage.
+    """
 
     flight: VehicleFlight
 

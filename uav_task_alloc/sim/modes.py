@@ -16,7 +16,15 @@ class CustomMode(NamedTuple):
 
 
 def px4_mode(main: int, sub: int = 0) -> int:
-    """The custom_mode of a main and a sub mode."""
+    """Return the custom_mode of PX4 (px4_custom_mode.h).
+
+    Args:
+        main: main mode.
+        sub: sub mode of AUTO; 0: none.
+
+    Returns:
+        As in HEARTBEAT.custom_mode.
+    """
     return sub << 24 | main << 16
 
 

@@ -50,16 +50,16 @@ RELATIVE_FRAMES = {  # height above home, or above the terrain, which is flat he
 class StoredItem(NamedTuple):
     """The fields of MISSION_ITEM_INT that a vehicle keeps."""
 
-    frame: int
-    command: int
-    p1: float
-    p2: float
-    p3: float
-    p4: float
+    frame: int  # MAV_FRAME
+    command: int  # MAV_CMD
+    p1: float  # param1 of the command
+    p2: float  # param2
+    p3: float  # param3
+    p4: float  # param4
     x: int  # [1e-7 deg]
     y: int  # [1e-7 deg]
     z: float  # [m]
-    autocontinue: int = 1
+    autocontinue: int = 1  # 0 or 1
 
 
 class Refusal(NamedTuple):
@@ -69,20 +69,47 @@ class Refusal(NamedTuple):
 
 
 def from_message(m: Message) -> StoredItem:
-    """The stored fields of a MISSION_ITEM_INT."""
+    """Return the stored fields of an item.
+
+    Args:
+        m: MISSION_ITEM_INT.
+
+    Returns:
+        As sent, not yet checked.
+    """
     return StoredItem(m.frame, m.command, m.param1, m.param2, m.param3, m.param4, m.x, m.y, m.z,
                       m.autocontinue)
 
 
 def to_message(item: StoredItem, seq: int, current: bool, peer: tuple[int, int]) -> Message:
-    """The MISSION_ITEM_INT of a stored item for a (system, component)."""
+    """Return a stored item as MISSION_ITEM_INT.
+
+    Args:
+        item: as stored.
+        seq: its place in the mission.
+        current: whether it is being flown.
+        peer: (system, component) that asks for it.
+
+    Returns:
+        Ready to be packed.
+    """
     return dialect.MAVLink_mission_item_int_message(
         *peer, seq, item.frame, item.command, int(current), item.autocontinue, item.p1, item.p2,
         item.p3, item.p4, item.x, item.y, item.z)
 
 
 def to_float_message(item: StoredItem, seq: int, current: bool, peer: tuple[int, int]) -> Message:
-    """The MISSION_ITEM that answers an old MISSION_REQUEST: float32 degrees, so metres off."""
+    """Return a stored item as MISSION_ITEM, which answers an old MISSION_REQUEST.
+
+    Args:
+        item: as stored.
+        seq: its place in the mission.
+        current: whether it is being flown.
+        peer: (system, component) that asks for it.
+
+    Returns:
+        Ready to be packed; degrees are float32, so metres off.
+    """
     scale = 1e-7 if item.command in POSITIONAL else 1.0
     return dialect.MAVLink_mission_item_message(
         *peer, seq, item.frame, item.command, int(current), item.autocontinue, item.p1, item.p2,
@@ -90,7 +117,14 @@ def to_float_message(item: StoredItem, seq: int, current: bool, peer: tuple[int,
 
 
 def stored_by_ardupilot(item: StoredItem) -> StoredItem | Refusal:
-    """The lossy copy ArduCopter keeps: whole seconds, centimetres, no yaw, three frames."""
+    """Return the lossy copy ArduCopter keeps: whole seconds, centimetres, no yaw, three frames.
+
+    Args:
+        item: as sent.
+
+    Returns:
+        The copy, or why it is refused.
+    """
     bad = _ardupilot_nan(item)
     if bad:
         return Refusal(bad)
@@ -120,7 +154,14 @@ def _ardupilot_nan(item: StoredItem) -> int:
 
 
 def stored_by_px4(item: StoredItem) -> StoredItem | Refusal:
-    """The exact copy PX4 keeps; the frame must fit the command."""
+    """Return the exact copy PX4 keeps; the frame must fit the command.
+
+    Args:
+        item: as sent.
+
+    Returns:
+        The copy, or why it is refused.
+    """
     if item.frame != dialect.MAV_FRAME_MISSION and item.frame not in _PX4_FRAMES:
         return Refusal(dialect.MAV_MISSION_UNSUPPORTED_FRAME)
     if item.command not in _KNOWN:
@@ -131,7 +172,14 @@ def stored_by_px4(item: StoredItem) -> StoredItem | Refusal:
 
 
 def px4_crc(items: Iterable[StoredItem]) -> int:
-    """PX4's id of a mission: NuttX's crc32part over the packed items, 0 for none."""
+    """Return PX4's id of a mission: NuttX's crc32part over the packed items.
+
+    Args:
+        items: by seq.
+
+    Returns:
+        uint32; 0 for no items.
+    """
     crc = 0
     for item in items:
         raw = struct.pack('<BHB4fiif', item.frame, item.command, item.autocontinue, item.p1,

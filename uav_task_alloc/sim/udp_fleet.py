@@ -27,6 +27,12 @@ _MAX_REMOTES = 16  # that a vehicle sends to besides its target; the latest are 
 def to_address(target: str) -> UdpAddress:
     """Parse `HOST:PORT` or `udpout:HOST:PORT`.
 
+    Args:
+        target: of a station.
+
+    Returns:
+        (host, port).
+
     Raises:
         InvalidValue: it is neither.
     """

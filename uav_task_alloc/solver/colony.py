@@ -32,14 +32,14 @@ WORK = 150.0  # stops of the pool read by `recombine` per round of the whole sea
 class ColonyParams:
     """Parameters of a colony; temperatures in mean leg lengths to the nearest neighbour."""
 
-    start_temperature: float = 3.0
-    end_temperature: float = 0.1
+    start_temperature: float = 3.0  # of the first cooling
+    end_temperature: float = 0.1  # of both coolings, and kept after them
     reheat_temperature: float = 1.0  # at the start of the second cooling
     employed_ruin: float = 10.0  # tasks that an employed bee removes in a round
     onlooker_ruin: float = 20.0  # tasks that an onlooker removes
     employed: float = 0.5  # least shares of the work
-    onlookers: float = 0.2
-    scouts: float = 0.01
+    onlookers: float = 0.2  # least share
+    scouts: float = 0.01  # least share
     range_penalty: float = 5.0  # [m/m] first cost of a metre beyond range
     learning: bool = True  # False: Q is frozen
     bidding: bool = True  # False: the shares of the work are fixed

@@ -96,9 +96,15 @@ def best_place(a: Arrays, r: Routes, t: int) -> tuple[int, float]:
 
 @allocating_kernel
 def place_all(a: Arrays, r: Routes, tasks: Ints) -> int:
-    """Insert task nodes in the given order, each where it costs least; returns how many failed.
+    """Insert task nodes in the given order, each where it costs least; O(len(tasks) n) at worst.
 
-    tasks: int64 task nodes; those in a route already are skipped. O(len(tasks) n) at worst.
+    Args:
+        a: arrays of the problem.
+        r: routes, which are changed.
+        tasks: int64 task nodes; those in a route already are skipped.
+
+    Returns:
+        How many could not be inserted.
     """
     missing, rng = 0, np.ones(1, np.uint64)
     for t in tasks:

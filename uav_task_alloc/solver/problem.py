@@ -28,7 +28,7 @@ MAX_COST_GROWTH = 300.0  # upper bound of that cost over the first
 class Limits:
     """Where UAVs may fly: threat zones and altitudes."""
 
-    zones: tuple[ThreatZone, ...] = ()
+    zones: tuple[ThreatZone, ...] = ()  # that every leg stays outside of
     clearance: float = 0.0  # [m] beyond the zones' margins
     altitude_min: float = -math.inf  # [m]
     altitude_max: float = math.inf  # [m]
@@ -44,7 +44,7 @@ class Rules:
 
     returns: bool = False  # routes end at home
     hard: bool = True  # ranges are hard constraints
-    weights: Weights = field(default_factory=Weights)
+    weights: Weights = field(default_factory=Weights)  # of eq 2.12
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,13 +56,13 @@ class Problem:
     tasks of each UAV that has any.
     """
 
-    uavs: tuple[Uav, ...]
+    uavs: tuple[Uav, ...]  # the fleet
     tasks: tuple[Task, ...]  # to be assigned
-    locked: Mapping[str, tuple[Task, ...]]
-    limits: Limits
-    rules: Rules
-    distances: Distances
-    arrays: Arrays
+    locked: Mapping[str, tuple[Task, ...]]  # by UAV id, in the order of flight
+    limits: Limits  # zones and altitudes
+    rules: Rules  # of routes and evaluation
+    distances: Distances  # between all points
+    arrays: Arrays  # for kernels
     scale: float  # [m] mean leg length to the nearest neighbour
     index: Mapping[str, int]  # task id -> index in tasks
 

@@ -24,19 +24,20 @@ from uav_task_alloc.solver.routes import (
 class Recorder:
     """Receives the routes that solvers find; thread-safe."""
 
-    problem: Problem
+    problem: Problem  # that is solved
     clock: Callable[[], float]  # [s]
     began: float  # [s] on that clock
     budget: float  # [s]
-    max_iterations: int | None = None
-    stop: Callable[[], bool] | None = None
-    threads: int = 1
+    max_iterations: int | None = None  # None: no limit
+    stop: Callable[[], bool] | None = None  # True ends the solve; None: nothing does
+    threads: int = 1  # that search
     warm: bool = False  # the first best is a repaired earlier plan
     locked_sums: tuple[float, float] = (0.0, 0.0)  # length [m] and value of the locked tasks
     on_iteration: Callable[[int, float], None] | None = None  # (iterations so far, best fit)
-    iterations: int = 0
+    iterations: int = 0  # of all threads
+    # (seconds since `began`, fit) of each best
     history: list[tuple[float, float]] = field(default_factory=list)
-    best: Routes = field(init=False)
+    best: Routes = field(init=False)  # routes; once one was offered
     _lock: threading.Lock = field(default_factory=threading.Lock)
 
     def __post_init__(self) -> None:

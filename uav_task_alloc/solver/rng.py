@@ -11,13 +11,27 @@ RngState = NDArray[np.uint64]  # (1) uint64, never 0
 
 
 def rng_state(seed: int) -> RngState:
-    """State of a generator from any integer; near seeds give uncorrelated sequences."""
+    """Return the state of a generator; near seeds give uncorrelated sequences.
+
+    Args:
+        seed: any integer, taken modulo 2^64.
+
+    Returns:
+        uint64 (1,), odd.
+    """
     return np.random.SeedSequence(seed % 2 ** 64).generate_state(1, np.uint64) | np.uint64(1)
 
 
 @inline_kernel
 def uniform(state: RngState) -> float:
-    """A float64 in [0, 1). O(1)."""
+    """Draw a random number by xorshift64 (Marsaglia 2003). O(1).
+
+    Args:
+        state: uint64 (1,), not 0; is changed.
+
+    Returns:
+        float64 in [0, 1).
+    """
     x = state[0]
     x ^= x << np.uint64(13)
     x ^= x >> np.uint64(7)

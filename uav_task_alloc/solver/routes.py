@@ -27,7 +27,7 @@ PENALTY_CAP = 1e9  # [m/m] in sums: an infinite range penalty times 0 m would gi
 class Arrays(NamedTuple):
     """A problem as kernels take it: m UAVs, n tasks, k neighbours and s starts for each task."""
 
-    uavs: int
+    uavs: int  # m
     ends: int  # first end node
     returns: bool  # routes end at home
     hard: bool  # ranges are hard constraints
@@ -63,7 +63,16 @@ class Routes(NamedTuple):
 
 @inline_kernel
 def leg_length(a: Arrays, i: int, j: int) -> float:
-    """Length [m] of the leg from node i to node j. O(1) where it is known."""
+    """Return the length of the leg between two nodes. O(1) where it is known.
+
+    Args:
+        a: arrays of the problem.
+        i: node that it begins at.
+        j: node that it ends at.
+
+    Returns:
+        [m]; 0 to an end node where routes do not return, inf where there is no path.
+    """
     if j >= a.ends:
         if i < a.uavs:
             return float(a.empty_route_length[i])
@@ -77,7 +86,12 @@ def leg_length(a: Arrays, i: int, j: int) -> float:
 
 @kernel
 def clear(a: Arrays, r: Routes) -> None:
-    """Make all routes empty. O(m + n)."""
+    """Make all routes empty. O(m + n).
+
+    Args:
+        a: arrays of the problem.
+        r: routes, which are changed.
+    """
     r.uav_of[:] = -1
     for u in range(a.uavs):
         end = a.ends + u
@@ -105,7 +119,14 @@ def update_sums(a: Arrays, r: Routes) -> None:
 
 
 def empty_routes(a: Arrays) -> Routes:
-    """New routes without tasks."""
+    """Make routes without tasks.
+
+    Args:
+        a: arrays of the problem.
+
+    Returns:
+        New arrays.
+    """
     nodes = a.ends + a.uavs
     routes = Routes(np.empty(nodes, NODE), np.empty(nodes, NODE),
                     np.empty(nodes, np.int64), np.zeros(nodes), np.empty(a.uavs),
@@ -132,7 +153,15 @@ def copy(r: Routes) -> Routes:
 
 
 def total_cost(a: Arrays, r: Routes) -> float:
-    """Objective of the search [m]: distance, cost of unassigned tasks, range penalty."""
+    """Return the objective of the search.
+
+    Args:
+        a: arrays of the problem.
+        r: routes with up-to-date sums.
+
+    Returns:
+        [m]: distance, cost of unassigned tasks and range penalty.
+    """
     return float(r.sums[DISTANCE] + r.sums[UNASSIGNED_COST] + r.sums[RANGE_PENALTY])
 
 
@@ -156,7 +185,17 @@ total_cost_kernel, is_better_kernel = inline_kernel(total_cost), inline_kernel(i
 
 @inline_kernel
 def lengthening_cost(a: Arrays, r: Routes, u: int, delta: float) -> float:
-    """Cost [m] of making UAV u's route longer by delta [m]; inf if not allowed. O(1)."""
+    """Return the cost of making a route longer. O(1).
+
+    Args:
+        a: arrays of the problem.
+        r: routes.
+        u: UAV of the route, in 0..m-1.
+        delta: [m]; negative: shorter.
+
+    Returns:
+        [m]; inf where it is not allowed.
+    """
     if not delta < math.inf:
         return math.inf
     before = r.length[u] - a.range_left[u]
@@ -179,7 +218,14 @@ def add_length(a: Arrays, r: Routes, u: int, delta: float) -> None:
 
 @inline_kernel
 def insert(a: Arrays, r: Routes, t: int, after: int) -> None:
-    """Insert the unassigned task node t after node `after`. O(1)."""
+    """Insert a task into a route. O(1).
+
+    Args:
+        a: arrays of the problem.
+        r: routes, which are changed.
+        t: node of an unassigned task.
+        after: start or task node of a route.
+    """
     u, then = r.uav_of[after], r.next[after]
     first, second = leg_length(a, after, t), leg_length(a, t, then)
     delta = first + second - r.leg[after]

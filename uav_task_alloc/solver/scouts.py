@@ -30,7 +30,15 @@ BEES = 8  # flights between two updates of the tables
 
 
 class Scouts:
-    """A swarm of scouts with their Q tables; `learning` False freezes Q."""
+    """A swarm of scouts with their Q tables.
+
+    Args:
+        problem: for the ids of learnt rows.
+        arrays: of the problem.
+        rng: state of the random numbers, uint64 (1,).
+        learnt: tables of an earlier solve; None: none.
+        learning: False freezes Q.
+    """
 
     def __init__(self, problem: Problem, arrays: Arrays, rng: RngState, learnt: object = None,
                  learning: bool = True) -> None:

@@ -37,10 +37,10 @@ class Tables(NamedTuple):
 class Learnt(NamedTuple):
     """Tables that outlive their problem: rows are identified by UAV and task ids."""
 
-    tables: Tables
-    near: Nodes
-    uavs: Mapping[str, int]
-    tasks: Mapping[str, int]
+    tables: Tables  # Q by rows
+    near: Nodes  # (n, k) task nodes that the columns of tables.task stand for
+    uavs: Mapping[str, int]  # row by UAV id
+    tasks: Mapping[str, int]  # row by task id
 
 
 def fresh_tables(problem: Problem, learnt: object = None) -> Tables:

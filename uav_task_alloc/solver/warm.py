@@ -72,9 +72,13 @@ def repair(problem: Problem, before: Mapping[str, tuple[str, ...]]) -> Routes:
 
 @kernel
 def replay(a: Arrays, r: Routes, nodes: Ints, bounds: Ints) -> None:
-    """Append nodes[bounds[u]:bounds[u + 1]] to the route of each UAV u, as far as allowed. O(n).
+    """Append tasks to the routes of their UAVs, as far as allowed. O(n).
 
-    nodes: int64 task nodes; bounds: (m + 1).
+    Args:
+        a: arrays of the problem.
+        r: routes, which are changed.
+        nodes: int64 task nodes, UAV by UAV.
+        bounds: int64 (m + 1); those of UAV u are nodes[bounds[u]:bounds[u + 1]].
     """
     for u in range(a.uavs):
         last = r.prev[a.ends + u]

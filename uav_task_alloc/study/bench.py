@@ -23,13 +23,16 @@ Source = dict[str, Any]  # arguments of make_instance, or of public.parse_instan
 
 def random_sources(kinds: Sequence[str], sizes: Sequence[str], seeds: Sequence[int],
                    slack: float) -> dict[str, Source]:
-    """The sources of random instances, by instance name.
+    """Return the sources of random instances.
 
     Args:
         kinds: 'spread' (starts anywhere) or 'base' (one start).
         sizes: UAVs x tasks, as '4x20'.
         seeds: one instance each, for each kind and size.
         slack: ranges over a fair share of a good tour.
+
+    Returns:
+        Arguments of `make_instance` by instance name.
     """
     sources = {}
     for kind, size, seed in product(kinds, sizes, seeds):
@@ -111,7 +114,15 @@ def _scored(instance: Instance, routes: RoutesByUav | None) -> dict[str, Any]:
 
 def instance_runs(jobs: Mapping[tuple[str, str], Job],
                   results: Mapping[str, Any]) -> dict[str, InstanceRuns]:
-    """The results of `measure`, by job name, grouped by instance name."""
+    """Group the results of `measure` by instance.
+
+    Args:
+        jobs: by (instance name, solver).
+        results: by job name; those still missing are skipped.
+
+    Returns:
+        By instance name.
+    """
     runs: dict[str, InstanceRuns] = {}
     for (key, solver), job in jobs.items():
         result = results.get(job.name)
@@ -123,7 +134,14 @@ def instance_runs(jobs: Mapping[tuple[str, str], Job],
 
 
 def faults(runs: Mapping[str, InstanceRuns]) -> Iterator[str]:
-    """A line for each fault of a plan that therefore does not count."""
+    """Describe the faults of plans, which therefore do not count.
+
+    Args:
+        runs: by instance name.
+
+    Returns:
+        A line for each fault.
+    """
     for key, run in runs.items():
         for solver, rows in run.found.items():
             for row in rows:

@@ -34,12 +34,20 @@ class Job:
 class CampaignOutcome:
     """Results and failures of a campaign, by job name."""
 
-    results: dict[str, Any] = field(default_factory=dict)
+    results: dict[str, Any] = field(default_factory=dict)  # JSON values
     failed: dict[str, str] = field(default_factory=dict)  # reason
 
 
 def load_results(jobs: Sequence[Job], folder: Path) -> CampaignOutcome:
-    """The results that earlier runs stored in a folder for the same functions and arguments."""
+    """Load the results that earlier runs stored for the same functions and arguments.
+
+    Args:
+        jobs: of the campaign.
+        folder: in which a run stores its results.
+
+    Returns:
+        Without failures; jobs that have no valid result are not in it.
+    """
     outcome = CampaignOutcome()
     for job in jobs:
         try:

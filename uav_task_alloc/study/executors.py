@@ -65,7 +65,12 @@ def dask(address: str) -> Iterator[Executor]:
 
 
 def add_arguments(parser: argparse.ArgumentParser, jobs: int) -> None:
-    """Add the options --jobs (with this default) and --dask."""
+    """Add the options --jobs and --dask to a command.
+
+    Args:
+        parser: is changed.
+        jobs: default of --jobs, in processes.
+    """
     parser.add_argument('--jobs', type=int, default=jobs,
                         help='processes of this machine (%(default)s)')
     parser.add_argument('--dask', metavar='tcp://HOST:PORT',
@@ -73,7 +78,17 @@ def add_arguments(parser: argparse.ArgumentParser, jobs: int) -> None:
 
 
 def chosen(args: argparse.Namespace) -> ExecutorFactory:
-    """The executor that --jobs and --dask select. Raises InvalidValue."""
+    """Return the executor that --jobs and --dask select.
+
+    Args:
+        args: with the options of `add_arguments`.
+
+    Returns:
+        Starts the executor when it is called.
+
+    Raises:
+        InvalidValue: --jobs is less than 1.
+    """
     if args.dask:
         return lambda: dask(args.dask)
     if args.jobs < 1:

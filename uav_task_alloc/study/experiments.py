@@ -26,16 +26,16 @@ _SPEED: Mapping[str, tuple[float, float]] = MappingProxyType({
 class Experiments:
     """The settings of a study, stored in its settings.json."""
 
-    seed: int
+    seed: int  # of all random numbers
     scene: tuple[int, int, int] = (4, 30, 6)  # UAVs, tasks, domes of all figures
     runs: int = 10  # averaged in a curve
     coefficients: tuple[float, ...] = (0.1, 0.3, 1.0, 3.0, 10.0, 30.0)  # k of figure 1
     effort: float = 3.0  # [s] of CPU, about: a run of a figure
     sizes: tuple[tuple[int, int], ...] = (
-        (4, 20), (8, 50), (8, 100), (20, 200), (50, 500), (100, 1000))
+        (4, 20), (8, 50), (8, 100), (20, 200), (50, 500), (100, 1000))  # UAVs, tasks of the tables
     instances: int = 5  # of each size
     table_effort: float = 1.5  # [s] of CPU, about: a run of a table
-    events: int = 25
+    events: int = 25  # in a row of the table of warm starts
     event_rounds: int = 2000  # iterations of chain_q, about 10 ms
 
     def figure_scene(self) -> dict[str, int]:
@@ -45,7 +45,14 @@ class Experiments:
 
 
 def quick(seed: int) -> Experiments:
-    """Settings for minutes instead of half an hour; the same figures and tables."""
+    """Return settings for minutes instead of half an hour; the same figures and tables.
+
+    Args:
+        seed: of all random numbers.
+
+    Returns:
+        Fewer runs, sizes and instances, each of less effort.
+    """
     return Experiments(seed, runs=10, coefficients=(0.1, 1.0, 10.0), effort=0.6,
                    sizes=((4, 20), (8, 50), (20, 200), (100, 1000)), instances=2,
                    table_effort=0.5, events=5)
@@ -63,7 +70,14 @@ def iterations(solver: str, tasks: int, seconds: float) -> int:
 
 
 def jobs(settings: Experiments) -> list[Job]:
-    """All jobs of the study."""
+    """Return all jobs of the study.
+
+    Args:
+        settings: of the study.
+
+    Returns:
+        In the order of figures and tables.
+    """
     return [*coefficient_jobs(settings).values(), *convergence_jobs(settings).values(),
             *allocation_jobs(settings).values(), *size_jobs(settings).values(),
             *event_jobs(settings).values()]

@@ -21,7 +21,14 @@ _COLUMNS = 4  # panels side by side
 def draw_gaps(runs: Mapping[str, InstanceRuns], out: Path) -> None:
     """Draw a line for each solver with a marker for each budget.
 
-    A marker is hollow where not every instance was solved. Raises OSError.
+    A marker is hollow where not every instance was solved.
+
+    Args:
+        runs: by instance name.
+        out: the file; its suffix selects the format.
+
+    Raises:
+        OSError: the file cannot be written.
     """
     names = groups(runs)
     rows = max(1, math.ceil(len(names) / _COLUMNS))

@@ -78,10 +78,16 @@ def groups(runs: Mapping[str, InstanceRuns]) -> list[str]:
 
 
 def gap_table(runs: Mapping[str, InstanceRuns]) -> str:
-    """A Markdown table of mean gaps [%], a row for each group of instances.
+    """Return mean gaps [%] as a Markdown table, a row for each group of instances.
 
-    `1.50 (3/5)`: 3 of 5 instances were solved. The last row: on how many instances the best
-    score was reached.
+    `1.50 (3/5)`: 3 of 5 instances were solved. The last row: on how many
+    instances the best score was reached.
+
+    Args:
+        runs: by instance name.
+
+    Returns:
+        A column for each solver and budget.
     """
     rows = {group: mean_gaps(runs, group) for group in groups(runs)}
     columns = list(dict.fromkeys(name for row in rows.values() for name in row))

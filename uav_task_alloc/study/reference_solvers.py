@@ -198,7 +198,11 @@ REFERENCE_SOLVERS: Mapping[str, Callable[[Instance, float], Incumbents]] = {
 
 
 def installed() -> list[str]:
-    """Names of the reference solvers whose packages are installed."""
+    """Return the reference solvers whose packages are installed.
+
+    Returns:
+        Names in REFERENCE_SOLVERS.
+    """
     return [name for name in REFERENCE_SOLVERS if importlib.util.find_spec(name)]
 
 

@@ -18,7 +18,15 @@ _PERCENTS = 5, 1  # above the best: the targets of the columns "within" and "ite
 
 
 def write_csv(path: Path, rows: Sequence[ResultRow]) -> None:
-    """Write a CSV file with a header line, numbers to six digits. Raises OSError."""
+    """Write a CSV file with a header line, numbers to six digits.
+
+    Args:
+        path: of the file.
+        rows: values by column; all with the same columns.
+
+    Raises:
+        OSError: the file cannot be written.
+    """
     with path.open('w', newline='') as file:
         out = csv.writer(file, lineterminator='\n')
         out.writerow(rows[0] if rows else [])
@@ -26,7 +34,14 @@ def write_csv(path: Path, rows: Sequence[ResultRow]) -> None:
 
 
 def markdown(rows: Sequence[ResultRow]) -> str:
-    """The rows as a Markdown table, numbers to four digits."""
+    """Return rows as a Markdown table, numbers to four digits.
+
+    Args:
+        rows: values by column; all with the same columns.
+
+    Returns:
+        `no results yet` for no rows.
+    """
     if not rows:
         return 'no results yet'
     return markdown_rows(list(rows[0]), [[cell_text(value, 4) for value in row.values()]
@@ -46,11 +61,14 @@ def cell_text(value: Any, digits: int = 6) -> str:
 
 
 def sizes_table(settings: Experiments, results: Mapping[str, Any]) -> TablePair:
-    """Fit, iterations to 5 and 1 % and success, by size and solver.
+    """Return fit, iterations to 5 and 1 % and success, by size and solver.
 
     Args:
         settings: of the study.
         results: by job name; an instance counts once all its jobs have one.
+
+    Returns:
+        Rows of quality, and rows of times, which depend on the machine.
     """
     jobs = experiments.size_jobs(settings)
     groups: dict[tuple[int, int, str], list[tuple[Any, float]]] = {}  # (result, best fit)
@@ -107,7 +125,15 @@ def _median(values: Iterable[float]) -> float:
 
 
 def events_table(settings: Experiments, results: Mapping[str, Any]) -> TablePair:
-    """Warm against cold starts by size and kind of instance."""
+    """Compare warm with cold starts by size and kind of instance.
+
+    Args:
+        settings: of the study.
+        results: by job name; those still missing are skipped.
+
+    Returns:
+        Rows of quality, and rows of times, which depend on the machine.
+    """
     quality, timing = [], []
     for (uavs, tasks, kind), job in experiments.event_jobs(settings).items():
         rows = results.get(job.name)

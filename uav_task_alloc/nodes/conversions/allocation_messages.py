@@ -20,7 +20,14 @@ _UNASSIGNED = (m.TaskStatus.PENDING, m.TaskStatus.UNASSIGNED)
 
 
 def from_list(uav_list: UavList) -> m.TaskList:
-    """The list of one UAV."""
+    """Return the list of one UAV as a message.
+
+    Args:
+        uav_list: with its stops; times in s, lengths in m.
+
+    Returns:
+        For the topic `<uav_id>/task_list`.
+    """
     return m.TaskList(
         header=header(uav_list.stamp), uav_id=uav_list.uav, revision=uav_list.revision,
         tasks=[planned_task(stop.task, stop.leg, stop.eta) for stop in uav_list.stops],
@@ -30,24 +37,42 @@ def from_list(uav_list: UavList) -> m.TaskList:
 
 
 def from_statuses(statuses: list[m.TaskStatus], now: float) -> m.TaskStatusArray:
-    """The statuses of all tasks; `now` [s] is the stamp."""
+    """Return the statuses of all tasks as one message.
+
+    Args:
+        statuses: of all tasks.
+        now: [s] for the stamp.
+
+    Returns:
+        For the topic `task_statuses`.
+    """
     return m.TaskStatusArray(header=header(now), statuses=statuses)
 
 
 def from_task_status(status: TaskStatus) -> m.TaskStatus:
-    """The status of one task."""
+    """Return the status of one task as a message.
+
+    Args:
+        status: of an accepted or refused task.
+
+    Returns:
+        An entry of TaskStatusArray or of Allocation.unassigned.
+    """
     return m.TaskStatus(task_id=status.task_id, state=status.state.value, uav_id=status.uav,
                         reason=status.reason, stamp=to_stamp(status.stamp))
 
 
 def from_allocation(allocation: Allocation, lists: list[m.TaskList],
                     statuses: Iterable[m.TaskStatus]) -> m.Allocation:
-    """The plan in force.
+    """Return the plan in force as a message.
 
     Args:
         allocation: the plan with its revision and trigger.
         lists: its lists as messages, one for each UAV.
         statuses: of all tasks; those without a UAV are in the message.
+
+    Returns:
+        For the topic `allocation`.
     """
     plan = allocation.plan
     return m.Allocation(

@@ -20,6 +20,7 @@ def announce(world: World, msg: m.TaskAnnouncement, origin: Origin, stamp: float
 
     Args:
         world: which takes the valid ones.
+        msg: from any publisher, not yet checked.
         origin: of the ENU frame, for tasks in WGS84.
         stamp, now: the published and the steady clock [s].
 
@@ -61,7 +62,15 @@ def to_action(msg: m.TaskAnnouncement) -> AnnouncementAction:
 
 def from_verdicts(verdicts: list[TaskVerdict],
                   response: SubmitTasks.Response) -> SubmitTasks.Response:
-    """Fill the response of `~/submit_tasks`; a task that is repeated unchanged is rejected."""
+    """Fill the response of `~/submit_tasks`; a task that is repeated unchanged is rejected.
+
+    Args:
+        verdicts: as `announce` returns them.
+        response: empty; is changed.
+
+    Returns:
+        The same response.
+    """
     for verdict in verdicts:
         if verdict.accepted and not verdict.unchanged:
             response.accepted.append(verdict.task_id)

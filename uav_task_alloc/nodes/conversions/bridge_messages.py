@@ -25,13 +25,16 @@ _EVENTS = {'STARTED': m.TaskEvent.STARTED, 'COMPLETED': m.TaskEvent.COMPLETED,
 
 
 def to_list(msg: m.TaskList, uav_id: str, origin: Origin, radius: float) -> TaskList:
-    """The list that a UAV is to fly.
+    """Return the list that a UAV is to fly.
 
     Args:
         msg: the message.
         uav_id: of the topic it came on.
         origin: of the ENU frame.
         radius: acceptance radius [m] of tasks without one; 0: that of the autopilot.
+
+    Returns:
+        Positions in ENU [m]; tasks in WGS84 are converted.
 
     Raises:
         InvalidValue: a field, which it names, is invalid.
@@ -61,7 +64,11 @@ def _to_stop(planned: m.PlannedTask, origin: Origin, radius: float) -> MissionSt
 
 def to_zones(msg: m.ThreatZoneArray, previous: Iterable[ThreatZone],
              ) -> tuple[tuple[ThreatZone, ...], str]:
-    """The zones of a message; one that is invalid stays as it was in `previous`.
+    """Return the zones of a message; one that is invalid stays as it was in `previous`.
+
+    Args:
+        msg: from any publisher, not yet checked.
+        previous: zones in force until now.
 
     Returns:
         The zones, and why the first invalid one is refused; '' where all are valid.
@@ -76,7 +83,16 @@ def to_zones(msg: m.ThreatZoneArray, previous: Iterable[ThreatZone],
 
 
 def from_uav_status(status: UavStatus, capabilities: Iterable[str], stamp: float) -> m.UavState:
-    """The state of one UAV, measured at `stamp` [s]."""
+    """Return the state of one UAV as a message.
+
+    Args:
+        status: of the vehicle.
+        capabilities: from the parameter of that name.
+        stamp: [s] of the position.
+
+    Returns:
+        For the topic `uav_states`; `cruise_speed` is NaN, not known to the bridge.
+    """
     return m.UavState(
         header=header(stamp), uav_id=status.uav_id, position=to_point(status.position),
         velocity=Vector3(x=status.velocity[0], y=status.velocity[1], z=status.velocity[2]),
@@ -89,7 +105,16 @@ def from_uav_status(status: UavStatus, capabilities: Iterable[str], stamp: float
 
 
 def from_progress(uav_id: str, progress: TaskProgress, stamp: float) -> m.TaskEvent:
-    """The event of a task that was started or completed, or has failed, at `stamp` [s]."""
+    """Return the event of a task that was started or completed, or has failed, as a message.
+
+    Args:
+        uav_id: of the vehicle.
+        progress: task, event, revision of its list.
+        stamp: [s] of the event.
+
+    Returns:
+        For the topic `task_events`.
+    """
     return m.TaskEvent(header=header(stamp), task_id=progress.task, uav_id=uav_id,
                        revision=progress.revision, event=_EVENTS[progress.event],
                        reason=progress.reason)

@@ -15,19 +15,28 @@ from uav_task_alloc.params import MAX_RANGE, BridgeParams
 
 def to_policy(params: BridgeParams, zones: tuple[ThreatZone, ...] = (),
               grounded: str = '') -> Policy:
-    """What a mission executor may do now.
+    """Return what a mission executor may do now.
 
     Args:
         params: as they are now.
         zones: around which it returns.
         grounded: what has to be different before a UAV takes off; '' where it may.
+
+    Returns:
+        For all executors of the bridge.
     """
     return Policy(params.takeoff, params.cruise_altitude, params.when_empty, params.when_foreign,
                   params.relaunch, zones, grounded)
 
 
 def to_gcs_config(params: BridgeParams) -> GcsConfig:
-    """The configuration of the ground station.
+    """Return the configuration of the ground station.
+
+    Args:
+        params: of the bridge, each in its range.
+
+    Returns:
+        With the policy of the same parameters.
 
     Raises:
         InvalidValue: `uav_id_pattern` makes no ROS names, there is no connection, or a system id
@@ -51,7 +60,13 @@ def to_gcs_config(params: BridgeParams) -> GcsConfig:
 
 
 def to_capabilities(entries: Iterable[str]) -> dict[str, tuple[str, ...]]:
-    """Capabilities by UAV, from entries like `uav_1:camera,thermal`.
+    """Return the capabilities of each UAV.
+
+    Args:
+        entries: like `uav_1:camera,thermal`.
+
+    Returns:
+        Words by UAV id; the last entry of a UAV counts.
 
     Raises:
         InvalidValue: an entry has another form.
@@ -66,7 +81,13 @@ def to_capabilities(entries: Iterable[str]) -> dict[str, tuple[str, ...]]:
 
 
 def to_full_ranges(entries: Iterable[str]) -> dict[str, float]:
-    """Ranges with a full battery [m] by UAV, from entries like `uav_1:6000`.
+    """Return the range of each UAV with a full battery.
+
+    Args:
+        entries: like `uav_1:6000`.
+
+    Returns:
+        [m] by UAV id.
 
     Raises:
         InvalidValue: an entry has another form, or a UAV has two.

@@ -24,15 +24,23 @@ class DiagnosticLevel(IntEnum):
 class DiagnosticRow:
     """One DiagnosticStatus: what it is about, its level, a sentence and details."""
 
-    name: str
+    name: str  # starts with the node's name
     level: int  # DiagnosticLevel
-    message: str
-    values: Mapping[str, object] = field(default_factory=dict)
-    hardware_id: str = ''
+    message: str  # on one line
+    values: Mapping[str, object] = field(default_factory=dict)  # details by key
+    hardware_id: str = ''  # UAV, link or part; '': the node
 
 
 def from_diagnostics(rows: Iterable[DiagnosticRow], now: float) -> DiagnosticArray:
-    """The message of some rows; `now` [s] is its stamp."""
+    """Return some rows as a message.
+
+    Args:
+        rows: one a DiagnosticStatus.
+        now: [s] for the stamp.
+
+    Returns:
+        For the topic `/diagnostics`.
+    """
     return DiagnosticArray(header=header(now), status=[
         DiagnosticStatus(level=bytes([row.level]), name=row.name, message=row.message,
                          hardware_id=row.hardware_id, values=[
@@ -43,13 +51,16 @@ def from_diagnostics(rows: Iterable[DiagnosticRow], now: float) -> DiagnosticArr
 
 def allocator_row(node_name: str, warnings: Sequence[str], values: Mapping[str, object],
                   stopped: bool) -> DiagnosticRow:
-    """The row of an allocator.
+    """Return the row of an allocator.
 
     Args:
         node_name: fully qualified; other allocators find it by that.
         warnings: what an operator should know; empty: nothing.
         values: figures by name.
         stopped: whether the warnings are the reasons why it publishes nothing.
+
+    Returns:
+        Level ERROR where it is stopped, WARN where there are warnings, else OK.
     """
     level = DiagnosticLevel.WARN if warnings else DiagnosticLevel.OK
     return DiagnosticRow(f'{node_name}: allocation', DiagnosticLevel.ERROR if stopped else level,
@@ -58,5 +69,15 @@ def allocator_row(node_name: str, warnings: Sequence[str], values: Mapping[str, 
 
 def bridge_row(name: str, level: int, message: str,
                values: Mapping[str, object] | None = None) -> DiagnosticRow:
-    """A row of the bridge: of a UAV, a link, or a part of the bridge itself."""
+    """Return a row of the bridge: of a UAV, a link, or a part of the bridge itself.
+
+    Args:
+        name: of the UAV, link or part.
+        level: DiagnosticLevel.
+        message: on one line.
+        values: details by key.
+
+    Returns:
+        Named `mavlink_bridge: NAME`.
+    """
     return DiagnosticRow(f'mavlink_bridge: {name}', level, message, values or {}, name)

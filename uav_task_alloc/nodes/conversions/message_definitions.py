@@ -15,7 +15,13 @@ _PRIMITIVE = re.compile(r'bool|byte|char|u?int(8|16|32|64)|float(32|64)|w?string
 
 @cache
 def definition(type_name: str) -> str:
-    """The text of `package/msg/Type`, followed by those of the types of its fields.
+    """Return the text of a message's definition, followed by those of the types of its fields.
+
+    Args:
+        type_name: `package/msg/Type`.
+
+    Returns:
+        As MCAP stores a schema of encoding `ros2msg` (https://mcap.dev/spec/registry).
 
     Raises:
         PackageNotFoundError, OSError: a definition is not installed.

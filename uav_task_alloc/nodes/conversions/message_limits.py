@@ -42,10 +42,24 @@ def check_ros_names(place: str, names: Sequence[str]) -> frozenset[str]:
 
 
 def printable(text: str) -> str:
-    """A text in one line; each character that is not printable becomes a question mark."""
+    """Return a text in one line; each character that is not printable becomes a question mark.
+
+    Args:
+        text: from any sender.
+
+    Returns:
+        Of the same length.
+    """
     return ''.join(c if c.isprintable() else '?' for c in text)
 
 
 def cut(text: str) -> str:
-    """A text in one line of at most 200 characters, for logs and reasons."""
+    """Return a text in one line, short enough for logs and reasons.
+
+    Args:
+        text: from any sender.
+
+    Returns:
+        The printable text; after 200 characters it ends with `...`.
+    """
     return printable(text[:_LONGEST_TEXT]) + ('...' if len(text) > _LONGEST_TEXT else '')

@@ -66,12 +66,26 @@ def to_duration(seconds: float) -> Duration:
 
 
 def header(now: float) -> Header:
-    """A header in the ENU frame with stamp `now` [s]."""
+    """Return a header in the ENU frame.
+
+    Args:
+        now: [s] for the stamp.
+
+    Returns:
+        Its frame_id is FRAME_ID.
+    """
     return Header(stamp=to_stamp(now), frame_id=FRAME_ID)
 
 
 def to_point(point: Sequence[float]) -> PointMsg:
-    """Three coordinates [m] ENU as a message."""
+    """Return three coordinates as a message.
+
+    Args:
+        point: (x, y, z) [m] ENU.
+
+    Returns:
+        With the same coordinates.
+    """
     return PointMsg(x=point[0], y=point[1], z=point[2])
 
 
@@ -120,7 +134,17 @@ def from_task(task: Task) -> m.Task:
 
 
 def to_report(msg: m.UavState) -> UavReport:
-    """The report of a UAV; raise InvalidValue, which names the field, for an invalid message."""
+    """Return the report of a UAV.
+
+    Args:
+        msg: from any publisher, not yet checked.
+
+    Returns:
+        None where the message has NaN; not available in FAULT.
+
+    Raises:
+        InvalidValue: a field, which it names, is invalid.
+    """
     check_ros_name('uav_id', msg.uav_id)
     place = f'uav {msg.uav_id}: '
     check_number(place + 'mode', msg.mode, m.UavState.UNKNOWN, m.UavState.FAULT)
@@ -141,7 +165,17 @@ def to_report(msg: m.UavState) -> UavReport:
 
 
 def to_event(msg: m.TaskEvent) -> TaskEvent:
-    """The event of a task; raise InvalidValue, which names the field, for an invalid message."""
+    """Return the event of a task.
+
+    Args:
+        msg: from any publisher, not yet checked.
+
+    Returns:
+        With its reason cut to one line.
+
+    Raises:
+        InvalidValue: a field, which it names, is invalid.
+    """
     check_ros_name('task_id', msg.task_id)
     check_ros_name(f'event of task {msg.task_id}: uav_id', msg.uav_id)
     try:
@@ -161,7 +195,15 @@ def from_zone(zone: ThreatZone) -> m.ThreatZone:
 
 
 def from_zones(zones: Iterable[ThreatZone], now: float) -> m.ThreatZoneArray:
-    """The message of all zones that exist at `now` [s]."""
+    """Return all zones in force as a message.
+
+    Args:
+        zones: the whole set.
+        now: [s] for the stamp.
+
+    Returns:
+        For the topic `threat_zones`.
+    """
     return m.ThreatZoneArray(header=header(now), zones=[from_zone(zone) for zone in zones])
 
 
@@ -172,6 +214,15 @@ def planned_task(task: Task, leg: Leg, eta: float) -> m.PlannedTask:
 
 
 def announcement(action: int, tasks: Iterable[Task], now: float) -> m.TaskAnnouncement:
-    """The message that adds, updates or cancels tasks; `action` is one of its constants."""
+    """Return the message that adds, updates or cancels tasks.
+
+    Args:
+        action: TaskAnnouncement.ADD, UPDATE or CANCEL.
+        tasks: with positions in ENU [m].
+        now: [s] for the stamp.
+
+    Returns:
+        For the topic `task_announcements`.
+    """
     return m.TaskAnnouncement(header=header(now), action=action,
                               tasks=[from_task(task) for task in tasks])

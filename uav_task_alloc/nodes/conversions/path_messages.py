@@ -37,7 +37,15 @@ def remaining_path(uav_list: UavList, uav: UavRecord | None) -> list[Point]:
 
 
 def path_message(uav_list: UavList, uav: UavRecord | None) -> Path:
-    """The remaining path; each pose faces the next one, the last keeps its heading."""
+    """Return the remaining path; each pose faces the next one, the last keeps its heading.
+
+    Args:
+        uav_list: in force.
+        uav: with its position; None: it has never reported.
+
+    Returns:
+        For the topic `<uav_id>/path`: poses in ENU [m].
+    """
     path = Path(header=header(uav_list.stamp))
     points = remaining_path(uav_list, uav)
     yaw = 0.0

@@ -29,6 +29,10 @@ class AllocationPublisher:
     Publishes:
         `<uav_id>/task_list` (TaskList), `task_statuses` (TaskStatusArray),
         `allocation` (Allocation); all latched.
+
+    Args:
+        node: publishes, and logs ids that are too long for a topic.
+        world: statuses and lists are read from it.
     """
 
     def __init__(self, node: Node, world: World) -> None:

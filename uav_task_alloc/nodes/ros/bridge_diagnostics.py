@@ -21,7 +21,14 @@ _OK, _WARN, _ERROR = DiagnosticLevel.OK, DiagnosticLevel.WARN, DiagnosticLevel.E
 
 
 class BridgeDiagnostics:
-    """Reads the state of a bridge's parts; troubles that begin or end are logged as well."""
+    """Reads the state of a bridge's parts; troubles that begin or end are logged as well.
+
+    Args:
+        ground_station: its vehicles and refusals.
+        connections: their links and refusals.
+        heartbeat: the thread that sends it.
+        log: of the node.
+    """
 
     def __init__(self, ground_station: GroundStation, connections: Connections,
                  heartbeat: Heartbeat, log: LeveledLog) -> None:

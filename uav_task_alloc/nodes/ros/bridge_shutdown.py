@@ -37,6 +37,13 @@ class BridgeShutdown:
 
 
 def held_for_upload(fleet: Iterable[VehicleSession]) -> list[str]:
-    """Ids of the UAVs that are held in the air for an upload."""
+    """Return the UAVs that are held in the air for an upload.
+
+    Args:
+        fleet: all vehicles.
+
+    Returns:
+        Ids.
+    """
     return [session.uav_id for session in fleet
             if session.executor.watch.replacing_since is not None]

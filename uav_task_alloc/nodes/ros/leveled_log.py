@@ -13,6 +13,9 @@ class LeveledLog:
     """Logs at `info`, `warning` or `error`.
 
     rclpy refuses a call site that logs at several levels, so each level has its own.
+
+    Args:
+        node: whose logger is used.
     """
 
     def __init__(self, node: Node) -> None:

@@ -10,7 +10,11 @@ _MOST_NAMES, _MOST_REASONS = 1000, 20  # names, and reasons for each, remembered
 
 
 class RefusalLog:
-    """Logs each reason once until `name` sends a valid message. O(1) memory for any flood."""
+    """Logs each reason once until `name` sends a valid message. O(1) memory for any flood.
+
+    Args:
+        log: writes one line.
+    """
 
     def __init__(self, log: Callable[[str], object]) -> None:
         self._log = log

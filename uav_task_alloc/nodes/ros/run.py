@@ -26,6 +26,9 @@ def with_flags(argv: list[str], *names: str) -> list[str]:
     Args:
         argv: the command line.
         names: parameters of type string that may be given as flags.
+
+    Returns:
+        The command line for `rclpy.init`; unchanged where there is no such flag.
     """
     remaining, parameters = list(argv), []
     for name in names:

@@ -11,12 +11,15 @@ TASK_LIST, PATH = '{}/task_list', '{}/path'
 
 
 def check_topic(node: Node, pattern: str, uav_id: str) -> str:
-    """The topic of a UAV, relative to the node's namespace.
+    """Return the topic of a UAV, relative to the node's namespace.
 
     Args:
         node: which publishes or subscribes.
         pattern: TASK_LIST or PATH.
         uav_id: a ROS name.
+
+    Returns:
+        A relative name.
 
     Raises:
         InvalidValue: the id is too long for a topic's name in this namespace.

@@ -29,6 +29,10 @@ class MarkerPublisher:
 
     Publishes:
         `allocation_markers` (MarkerArray) and `<uav_id>/path` (nav_msgs/Path); latched.
+
+    Args:
+        node: publishes.
+        world: is read at each publication.
     """
 
     def __init__(self, node: Node, world: World) -> None:

@@ -26,7 +26,12 @@ _GIVE_UP = 8.0  # [s] without an item
 
 
 class ArduPilotMissionServer(MissionServer):
-    """Storage truncated at COUNT and overwritten item by item; seq 0 is home."""
+    """Storage truncated at COUNT and overwritten item by item; seq 0 is home.
+
+    Args:
+        system_id: of the vehicle, 1..255.
+        capacity: items of the mission storage, with home.
+    """
 
     flight: ArduPilotFlight
 

@@ -35,7 +35,12 @@ class _State(Enum):
 
 
 class Px4MissionServer(MissionServer):
-    """Atomic: a transfer that fails leaves the old mission; a CRC names the new one."""
+    """Atomic: a transfer that fails leaves the old mission; a CRC names the new one.
+
+    Args:
+        system_id: of the vehicle, 1..255.
+        capacity: items of the mission storage.
+    """
 
     flight: Px4Flight
 

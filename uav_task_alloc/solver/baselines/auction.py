@@ -17,6 +17,11 @@ from uav_task_alloc.solver.recorder import Recorder
 def solve(recorder: Recorder, seed: int, learnt: object = None) -> None:
     """Offer the auction's plan.
 
+    Args:
+        recorder: with the problem; takes the plan.
+        seed: not used.
+        learnt: not used.
+
     Raises:
         InvalidValue: there are too many tasks for a table of leg lengths.
     """

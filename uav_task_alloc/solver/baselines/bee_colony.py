@@ -93,6 +93,12 @@ def solve(recorder: Recorder, seed: int, learnt: object = None,
           settings: AbcSettings | None = None) -> None:
     """Run generations until the budget ends.
 
+    Args:
+        recorder: with the problem; takes the plans.
+        seed: of the random numbers.
+        learnt: not used.
+        settings: None: the defaults.
+
     Raises:
         InvalidValue: there are too many tasks for a table of leg lengths.
     """

@@ -47,6 +47,12 @@ def solve(recorder: Recorder, seed: int, learnt: object = None,
           settings: CbbaSettings | None = None) -> None:
     """Offer the plan that the agents agree on.
 
+    Args:
+        recorder: with the problem; takes the plan.
+        seed: not used.
+        learnt: not used.
+        settings: None: the defaults.
+
     Raises:
         InvalidValue: there are too many tasks for a table of leg lengths.
     """

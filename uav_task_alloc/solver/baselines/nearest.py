@@ -44,7 +44,13 @@ def give_nearest(a: Arrays, r: Routes) -> bool:
 
 
 def solve(recorder: Recorder, seed: int, learnt: object = None) -> None:
-    """Offer the constructed plan; other tasks are inserted where they fit."""
+    """Offer the constructed plan; other tasks are inserted where they fit.
+
+    Args:
+        recorder: with the problem; takes the plan.
+        seed: not used.
+        learnt: not used.
+    """
     a = recorder.problem.arrays
     routes = empty_routes(a)
     while give_nearest(a, routes) and not recorder.over():

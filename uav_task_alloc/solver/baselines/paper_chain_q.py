@@ -55,7 +55,7 @@ MAX_TABLE_TASKS = 200  # the tables take 8 n^3 bytes
 class PaperSettings:
     """Parameters that the paper does not print: the best of 48 sets at 8 x 50 (docs/solver.md)."""
 
-    bees: int = 20
+    bees: int = 20  # in the swarm
     ranked: int = 5  # best bees, which are learnt from
     decay: float = 0.5  # ranking coefficient over that of the rank before
     k: float = 1.0  # reward coefficient
@@ -216,6 +216,12 @@ def _share(best: float, fit: float) -> float:
 def solve(recorder: Recorder, seed: int, learnt: object = None,
           settings: PaperSettings | None = None) -> None:
     """Run generations of bees until the budget ends.
+
+    Args:
+        recorder: with the problem; takes the plans.
+        seed: of the random numbers.
+        learnt: not used.
+        settings: None: the defaults.
 
     Raises:
         InvalidValue: there are more than MAX_TABLE_TASKS tasks.
