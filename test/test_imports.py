@@ -26,6 +26,7 @@ ROS = {'rclpy', 'rcl_interfaces', 'builtin_interfaces', 'geometry_msgs', 'std_ms
 # a room, or a file beside rooms, imports from lower levels and from itself only
 LEVELS = {
     'errors': 0,
+    'checks': 0,
     'model': 1,
     'palette': 0,
     'params': 1,
@@ -33,7 +34,7 @@ LEVELS = {
     'kernel_cache': 1,
     'kernel': 1,
     'zone_codec': 1,
-    'geometry.polygon': 0,  # the model checks zones with it
+    'geometry.polygon': 0,  # `checks` checks polygons with it
     'geometry': 2,
     'objective': 2,
     'solver': 3,

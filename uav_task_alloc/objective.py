@@ -6,7 +6,8 @@ import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from uav_task_alloc.model import Uav, check_number
+from uav_task_alloc.checks import check_number
+from uav_task_alloc.model import Uav
 
 
 @dataclass(frozen=True, slots=True)
@@ -17,9 +18,9 @@ class Weights:
         InvalidValue: a coefficient is not in [0, 1e9].
     """
 
-    distance: float = 0.01  # [1/m]
-    value: float = 100.0  # fit for one unit of task value
-    penalty: float = 1.0  # [1/m]
+    distance: float = 0.01  # [1/m] w1, times D
+    value: float = 100.0  # w2, divided by R
+    penalty: float = 1.0  # [1/m] w3, times P
 
     def __post_init__(self) -> None:
         for name in ('distance', 'value', 'penalty'):

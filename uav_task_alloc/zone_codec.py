@@ -11,14 +11,9 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from uav_task_alloc.checks import check_count, check_number, check_ros_name
 from uav_task_alloc.errors import InvalidValue
-from uav_task_alloc.model import (
-    Shape,
-    ThreatZone,
-    check_count,
-    check_number,
-    check_ros_name,
-)
+from uav_task_alloc.model import Shape, ThreatZone
 
 MOST_ZONES = 1000  # of a message
 MOST_VERTICES = 200  # of a zone; each pair of edges is checked for crossing

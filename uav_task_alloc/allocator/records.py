@@ -7,19 +7,9 @@ from dataclasses import dataclass, field
 from enum import Enum
 from typing import Any
 
+from uav_task_alloc.checks import check_id, check_names, check_number, check_point
 from uav_task_alloc.geometry.frames import Origin
-from uav_task_alloc.model import (
-    Leg,
-    Plan,
-    Point,
-    Task,
-    ThreatZone,
-    Uav,
-    check_id,
-    check_names,
-    check_number,
-    check_point,
-)
+from uav_task_alloc.model import Leg, Plan, Point, Task, ThreatZone, Uav
 
 
 class TaskState(Enum):

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from uav_task_alloc.checks import check_point
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.geometry.escape import escape_point
 from uav_task_alloc.geometry.obstacles import (
@@ -21,7 +22,7 @@ from uav_task_alloc.geometry.scene import ordered_ends
 from uav_task_alloc.geometry.search_budget import SearchBudget, new_work
 from uav_task_alloc.geometry.shortest_path import shortest_path
 from uav_task_alloc.geometry.taut import MAX_CORNERS
-from uav_task_alloc.model import Point, ThreatZone, check_point
+from uav_task_alloc.model import Point, ThreatZone
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,7 +8,8 @@ import numpy as np
 import pymap3d
 from numpy.typing import ArrayLike, NDArray
 
-from uav_task_alloc.model import Point, check_number
+from uav_task_alloc.checks import check_number
+from uav_task_alloc.model import Point
 
 
 @dataclass(frozen=True, slots=True)

@@ -28,6 +28,7 @@ from numba import types
 from numba.extending import intrinsic
 from numpy.typing import NDArray
 
+from uav_task_alloc.checks import check_number
 from uav_task_alloc.geometry.numba_pointers import cast, floats_at
 from uav_task_alloc.geometry.outline import (
     Floats as Floats,
@@ -38,7 +39,7 @@ from uav_task_alloc.geometry.outline import (
 )
 from uav_task_alloc.geometry.polygon import crosses_ray, segments_cross, signed_area
 from uav_task_alloc.kernel import allocating_kernel
-from uav_task_alloc.model import Shape, ThreatZone, check_number
+from uav_task_alloc.model import Shape, ThreatZone
 
 DOME, CYLINDER, PRISM = Shape.HEMISPHERE.value, Shape.CYLINDER.value, Shape.POLYGON.value
 TOUCH = 1e-7  # [m] so near a surface counts as on it, not inside

@@ -6,10 +6,11 @@ import math
 from collections.abc import Iterable, Sequence
 from itertools import pairwise
 
+from uav_task_alloc.checks import check_point
 from uav_task_alloc.geometry.obstacles import blocked, containing_zones, contains, pack
 from uav_task_alloc.geometry.polygon import contains_point, edges
 from uav_task_alloc.geometry.polyline import segment_distance
-from uav_task_alloc.model import Point, Shape, ThreatZone, check_point
+from uav_task_alloc.model import Point, Shape, ThreatZone
 
 
 def inside(point: Iterable[float], zone: ThreatZone, clearance: float = 0.0) -> bool:

@@ -17,10 +17,10 @@ from rclpy.qos import QoSProfile
 from uav_task_alloc_msgs import msg as m
 
 from uav_task_alloc import scenario
+from uav_task_alloc.checks import is_ros_name
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.live.scene import Scene
 from uav_task_alloc.live.snapshot_store import SnapshotStore
-from uav_task_alloc.model import is_ros_name
 from uav_task_alloc.nodes.conversions.message_limits import cut
 from uav_task_alloc.nodes.conversions.messages import ANNOUNCEMENTS, LATCHED, STATES
 from uav_task_alloc.nodes.ros.parameters import declare

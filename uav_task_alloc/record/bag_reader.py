@@ -14,9 +14,9 @@ from mcap.stream_reader import StreamReader
 from mcap_ros2.decoder import DecoderFactory
 from zstandard import ZstdError
 
+from uav_task_alloc.checks import check_number
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.geometry.frames import Origin
-from uav_task_alloc.model import check_number
 from uav_task_alloc.record import message_records
 from uav_task_alloc.record.bag import METADATA_NAME
 from uav_task_alloc.record.run_state import Line

@@ -10,9 +10,10 @@ import re
 from collections.abc import Iterable
 from typing import Any
 
+from uav_task_alloc.checks import check_number, check_point
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.geometry.frames import Origin, to_enu
-from uav_task_alloc.model import Point, check_number, check_point
+from uav_task_alloc.model import Point
 from uav_task_alloc.zone_codec import JSON_ZONE, decode_zone_array, encode_zone
 
 RecordBody = dict[str, Any]  # a line without its wall time

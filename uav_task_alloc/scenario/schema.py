@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 
-from uav_task_alloc.model import is_ros_name
+from uav_task_alloc.checks import is_ros_name
 from uav_task_alloc.params import AllocatorParams
 from uav_task_alloc.scenario.checked_yaml import (
     Key,

@@ -6,8 +6,9 @@ from collections.abc import Iterable, Mapping, Sequence
 from numbers import Integral
 from typing import TypeVar
 
+from uav_task_alloc.checks import check_number
 from uav_task_alloc.errors import InvalidValue
-from uav_task_alloc.model import Task, ThreatZone, Uav, check_number
+from uav_task_alloc.model import Task, ThreatZone, Uav
 
 _Named = TypeVar('_Named', Task, Uav, ThreatZone)
 ROUTE_ENDS = ('hold', 'home')

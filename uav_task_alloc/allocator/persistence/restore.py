@@ -16,20 +16,11 @@ from uav_task_alloc.allocator.records import (
     TaskState,
     UavList,
 )
+from uav_task_alloc.checks import check_id, check_names, check_number, check_point, check_ros_name
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.geometry.frames import Origin
 from uav_task_alloc.journal import JournalRow
-from uav_task_alloc.model import (
-    Leg,
-    Point,
-    Task,
-    ThreatZone,
-    check_id,
-    check_names,
-    check_number,
-    check_point,
-    check_ros_name,
-)
+from uav_task_alloc.model import Leg, Point, Task, ThreatZone
 from uav_task_alloc.zone_codec import JOURNAL_ZONE, decode_zone, encode_zone
 
 _Value = TypeVar('_Value')

@@ -7,9 +7,10 @@ from uav_task_alloc_msgs.srv import SubmitTasks
 
 from uav_task_alloc.allocator.records import AnnouncementAction, TaskVerdict
 from uav_task_alloc.allocator.state.world import World
+from uav_task_alloc.checks import check_count, check_ros_name
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.geometry.frames import Origin
-from uav_task_alloc.model import Task, check_count, check_ros_name
+from uav_task_alloc.model import Task
 from uav_task_alloc.nodes.conversions.message_limits import MOST_TASKS, cut
 from uav_task_alloc.nodes.conversions.messages import to_task
 

@@ -9,12 +9,13 @@ from dataclasses import replace
 from geometry_msgs.msg import Vector3
 from uav_task_alloc_msgs import msg as m
 
+from uav_task_alloc.checks import check_point
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.geometry.frames import Origin
 from uav_task_alloc.mavlink.gcs.status import UavStatus
 from uav_task_alloc.mavlink.mission.items import MissionStop, TaskList
 from uav_task_alloc.mavlink.mission.task_progress import TaskProgress
-from uav_task_alloc.model import Task, ThreatZone, check_point
+from uav_task_alloc.model import Task, ThreatZone
 from uav_task_alloc.nodes.conversions.message_limits import MOST_POINTS
 from uav_task_alloc.nodes.conversions.messages import from_point, header, to_point, to_task
 from uav_task_alloc.zone_codec import decode_zone_array

@@ -5,11 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 
+from uav_task_alloc.checks import check_number, check_ros_name
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.geometry.frames import Origin
 from uav_task_alloc.mavlink.gcs.ground_station import GcsConfig
 from uav_task_alloc.mavlink.gcs.policy import Policy
-from uav_task_alloc.model import ThreatZone, check_number, check_ros_name
+from uav_task_alloc.model import ThreatZone
 from uav_task_alloc.params import MAX_RANGE, BridgeParams
 
 

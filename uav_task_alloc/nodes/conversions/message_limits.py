@@ -7,9 +7,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from uav_task_alloc.checks import check_count, check_ros_name
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.mavlink.mission.items import MOST_ITEMS
-from uav_task_alloc.model import check_count, check_ros_name
 
 MOST_TASKS = 10_000  # of an announcement
 MOST_POINTS = MOST_ITEMS - 2  # of a list, tasks and detour points; home and return are items too

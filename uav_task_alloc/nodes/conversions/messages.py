@@ -12,16 +12,10 @@ from std_msgs.msg import Header
 from uav_task_alloc_msgs import msg as m
 
 from uav_task_alloc.allocator.records import TaskEvent, TaskEventKind, UavReport
+from uav_task_alloc.checks import check_number, check_ros_name
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.geometry.frames import Origin
-from uav_task_alloc.model import (
-    Leg,
-    Point,
-    Task,
-    ThreatZone,
-    check_number,
-    check_ros_name,
-)
+from uav_task_alloc.model import Leg, Point, Task, ThreatZone
 from uav_task_alloc.nodes.conversions.message_limits import (
     MOST_VALUE,
     check_ros_names,

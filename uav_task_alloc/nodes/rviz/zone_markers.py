@@ -9,8 +9,9 @@ from itertools import pairwise
 from geometry_msgs.msg import Point as PointMsg
 from visualization_msgs.msg import Marker
 
+from uav_task_alloc.checks import FAR
 from uav_task_alloc.geometry.polygon import orientation
-from uav_task_alloc.model import FAR, Shape, ThreatZone
+from uav_task_alloc.model import Shape, ThreatZone
 
 _UNBOUNDED_HEIGHT = 1000.0  # [m] drawn of a zone without a bound
 _LEAST_HEIGHT = 0.1  # [m]; RViz warns of markers without a height
