@@ -45,6 +45,13 @@ def test_no_word_of_a_private_language_is_left(path):
             if GONE.search(re.sub('_', ' ', line))] == []
 
 
+def test_no_word_of_a_private_language_is_in_the_unreleased_changes():
+    section = (ROOT / 'CHANGELOG.md').read_text().split('\n## ')[1]
+    assert section.startswith('Unreleased')
+    lines = re.sub('`[^`]*`', '', section).splitlines()  # keys of former versions may be named
+    assert [line for line in lines if GONE.search(line)] == []
+
+
 def test_a_top_level_name_has_one_meaning():
     where = defaultdict(set)
     for path in FILES:
