@@ -18,7 +18,7 @@ TEXTS = sorted({*FILES, ROOT / 'README.md', *(
 # images and old names that a reader of ROS 2, MAVLink and routing texts would stumble over
 WORDS = ('told', 'heard', 'anew', 'laid', 'deaf', 'behind', 'helm', 'teller', 'keeper', 'painter',
          'gulps?', 'pity', 'recall', 'reminder', 'rehearsal', 'habits', 'twin', 'by and by',
-         'hurry', 'cautious', 'worries')
+         'hurry', 'cautious', 'worries', 'by itself')
 GONE = re.compile(rf'\b({"|".join(WORDS)})\b', re.IGNORECASE)
 # the same meaning wherever they are: entry points, and the solvers of one registry
 SAME_MEANING = {'main', 'solve'}

@@ -83,7 +83,7 @@ def test_folders_of_other_sources_are_removed_when_a_kernel_is_written(package):
     for folder in (old, recent):
         folder.mkdir(parents=True)
         (folder / 'search.1.nbc').touch()
-    (cache / 'search.search-1.py311.nbi').touch()  # where numba puts it by itself
+    (cache / 'search.search-1.py311.nbi').touch()  # where numba puts it by default
     os.utime(old, (1e9, 1e9))
     output(package)
     folders = {folder.name for folder in cache.glob('kernels-*')}

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Compiled kernels on disk, keyed by all sources with kernels; and the notice of a compilation.
 
-By itself numba compiles a kernel again when the file that holds it has changed, but not when a
-function has that it calls in another file. Here the key is a hash of all files with kernels.
+The index of numba itself misses changes of functions that a kernel calls in other files: it is
+keyed by the kernel's own file. Here the key is a hash of all files with kernels.
 """
 from __future__ import annotations
 
@@ -93,7 +93,7 @@ class KernelCacheLocator(caching._CacheLocator):
                 if (str(other) != self.get_cache_path()
                         and time.time() - other.stat().st_mtime > _UNUSED):
                     shutil.rmtree(other, ignore_errors=True)
-        for older in self._parent.glob('*.nb[ic]'):  # as numba names them by itself
+        for older in self._parent.glob('*.nb[ic]'):  # as numba names them by default
             older.unlink(missing_ok=True)
 
 

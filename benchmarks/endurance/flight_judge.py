@@ -57,7 +57,7 @@ class Judge:
         self._set_at = -math.inf  # [s] another station has set the current item
         self._crossed: set[str] = set()  # tasks whose places it crossed at such a moment
         self._at = ''  # the task that it has reached, until it leaves: one visit
-        self._avoids = False  # it avoids other traffic by itself
+        self._avoids = False  # its autopilot avoids other traffic
         self._stuck_since = self._moved_at = 0.0
         self._listed = world.tasks  # a new list begins a new transfer
 

@@ -127,7 +127,7 @@ class Interventions:
             flight.disarm(force=True)
 
     def kill_switch_off(self) -> None:
-        """The pilot releases the kill switch; nothing arms by itself."""
+        """The pilot releases the kill switch; nothing arms automatically."""
         self.flight.terminated = False
         self.flight.texts.append(self._texts.kill_cleared)
         self.flight.note('kill_switch_off', cause='pilot')

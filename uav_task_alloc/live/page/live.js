@@ -66,7 +66,7 @@ function apply(update) {
 }
 
 function connect() {
-  const source = new EventSource('stream');  // reconnects by itself unless it was refused
+  const source = new EventSource('stream');  // reconnects automatically unless it was refused
   source.onmessage = message => apply(JSON.parse(message.data));
   source.onerror = () => {
     if (source.readyState === EventSource.CLOSED) setTimeout(connect, 2000);

@@ -9,7 +9,7 @@ from uav_task_alloc.mavlink.gcs.authority_watch_state import AuthorityWatchState
 from uav_task_alloc.mavlink.gcs.flight_modes import ModeClass, avoids_traffic
 from uav_task_alloc.mavlink.gcs.mission_evidence import MissionEvidence
 
-_CLIMBED = 0.9  # of the commanded height: the take-off has ended by itself
+_CLIMBED = 0.9  # of the commanded height: the take-off ended normally
 _CONTRADICTED = 2.5  # [s] in which a heartbeat may still show a mode that was acknowledged
 
 
@@ -152,7 +152,7 @@ class ModeChanges:
             state.apply_taken(why, now)
 
     def _climb_ended(self, climb: float, now: float, why: str) -> None:
-        """Apply the end of our take-off, which is by itself at the height `climb` [m] only."""
+        """Apply the end of our take-off; below the height `climb` [m] something else ended it."""
         state, telemetry = self._state, self._state.telemetry
 
         def climbed(t: float) -> bool:
@@ -165,7 +165,7 @@ class ModeChanges:
             state.suspend_until_explained(climbed, why, now)
 
     def _mission_ended(self, mode: int, now: float) -> bool:
-        """Whether the vehicle has left MISSION by itself at the end of its mission (PX4)."""
+        """Whether the vehicle has left MISSION automatically at the end of its mission (PX4)."""
         if self._family != 'px4':
             return False
         if self._state.class_of(mode) is ModeClass.HOLD:
