@@ -10,7 +10,6 @@ from uav_task_alloc.errors import first_of
 from uav_task_alloc.record.run_state import Line
 
 RouteLists = Mapping[str, Sequence[str]]  # task ids in the order flown, by UAV
-DONE_STATES = ('COMPLETED',)
 _TRIGGER_TEXTS = {'ADD': 'new task', 'UPDATE': 'changed task', 'CANCEL': 'withdrawn task'}
 
 
