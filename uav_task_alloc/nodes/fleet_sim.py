@@ -61,4 +61,4 @@ def vehicle_config(uav: scenario.ScenarioUav, played: scenario.Scenario,
 
 def main(args: list[str] | None = None) -> None:
     """Entry point of `ros2 run uav_task_alloc fleet_sim`."""
-    run(FleetSim, args)
+    run(FleetSim, args, params=FleetSimParams)
