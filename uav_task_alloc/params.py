@@ -49,7 +49,7 @@ def ros_name(spec: Field[Any]) -> str:
 
 
 def expectation(spec: Field[Any]) -> str:
-    """Return in words what a value must be.
+    """Describe what a value must be.
 
     Args:
         spec: the field of the parameter.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Simulates the UAVs of a scenario as ArduPilot and PX4 vehicles that speak MAVLink."""
+"""Simulates the UAVs of a scenario as ArduPilot and PX4 vehicles with MAVLink connections."""
 from __future__ import annotations
 
 from rclpy.node import Node

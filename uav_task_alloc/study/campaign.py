@@ -78,7 +78,7 @@ def run_campaign(jobs: Sequence[Job], folder: Path, open_executor: ExecutorFacto
     folder.mkdir(parents=True, exist_ok=True)
     outcome = load_results(jobs, folder)
     if outcome.results:
-        log(f'{len(outcome.results)} of {len(jobs)} results were there')
+        log(f'{len(outcome.results)} of {len(jobs)} results exist already')
     progress = CampaignProgress(jobs, outcome, log, clock)
     attempts = MAX_BROKEN_EXECUTORS
     while remaining := [job for job in jobs if job.name not in progress.finished()]:
