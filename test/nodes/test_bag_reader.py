@@ -84,6 +84,15 @@ def test_a_task_in_degrees_has_a_position_where_the_bag_has_the_origin(tmp_path,
         assert task['position'] == pytest.approx((0.0, 1111.8, 19.9), abs=0.3)
 
 
+def test_the_origin_that_the_fleet_published_is_that_of_the_bag(tmp_path):
+    origin = m.FleetOrigin(latitude=47.0, longitude=8.0, altitude_amsl=400.0)
+    lines = list(BagReader(write(tmp_path / 'w.mcap', [
+        ('/fleet_origin', origin), ('/task_announcements', WGS)])))
+    assert lines[1] == {'kind': 'origin', 'wall': 1.7e9, 'latitude': 47.0, 'longitude': 8.0,
+                        'altitude_amsl': 400.0}
+    assert len(lines[2]['tasks']) == 1
+
+
 def test_the_report_prints_its_path_and_its_figures(whole, tmp_path, capsys):
     html = tmp_path / 'flight.html'
     assert report.main([str(whole), '--html', str(html)]) == 0

@@ -30,6 +30,7 @@ _BUILDERS: dict[str, Callable[[Any], message_records.RecordBody]] = {
     _PACKAGE + 'Allocation': message_records.allocation_record,
     _PACKAGE + 'TaskList': message_records.task_list_record,
     _PACKAGE + 'UavState': message_records.state_record,
+    _PACKAGE + 'FleetOrigin': message_records.origin_record,
     'diagnostic_msgs/msg/DiagnosticArray': message_records.uploads_record}
 _ANNOUNCEMENT = _PACKAGE + 'TaskAnnouncement'
 
@@ -116,4 +117,7 @@ class BagReader:
         except Exception:  # the decoder raises anything for bytes of another type
             self.undecodable[channel.topic] += 1
             return
+        if body['kind'] == 'origin':
+            self.origin = Origin(*(body[name] for name in (
+                'latitude', 'longitude', 'altitude_amsl')))
         yield {'wall': message.log_time * 1e-9, **body}

@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterable
+from dataclasses import asdict
 from typing import Any
 
 from uav_task_alloc.checks import check_number, check_point
@@ -88,6 +89,22 @@ def task_position(task: _Message, origin: Origin | None) -> Point | None:
     return to_enu(origin, task.latitude, task.longitude, origin.altitude_amsl + task.altitude)
 
 
+def origin_record(msg: _Message) -> RecordBody:
+    """The values of a FleetOrigin.
+
+    Args:
+        msg: FleetOrigin.
+
+    Returns:
+        `latitude`, `longitude` [deg] and `altitude_amsl` [m].
+
+    Raises:
+        InvalidValue: a value is out of range.
+    """
+    origin = Origin(msg.latitude, msg.longitude, msg.altitude_amsl)
+    return {'kind': 'origin', **asdict(origin)}
+
+
 def zones_record(msg: _Message) -> RecordBody:
     """Return the valid zones of a ThreatZoneArray; the allocator reports the others.
 
@@ -131,7 +148,7 @@ def allocation_record(msg: _Message) -> RecordBody:
         'kind': 'allocation',
         'revision': msg.revision,
         'trigger': msg.trigger,
-        'solve_ms': 1e3 * from_stamp(msg.solve_time),
+        'solve_ms': 1e3 * seconds(msg.solve_time),
         'iterations': msg.iterations,
         'warm_started': msg.warm_started,
         'fit': finite_or_none(msg.fit),
@@ -150,10 +167,10 @@ def task_list_record(msg: _Message) -> RecordBody:
         Kind `list`; `stamp` [unix s], `eta` [s] from `stamp`, lengths in m.
     """
     return {'kind': 'list', 'uav': msg.uav_id, 'revision': msg.revision, 'end': msg.end,
-            'stamp': from_stamp(msg.header.stamp),
+            'stamp': seconds(msg.header.stamp),
             'distance': finite_or_none(msg.distance), 'tasks': [
                 {'id': row.task.task_id, 'leg_distance': finite_or_none(row.leg_distance) or 0.0,
-                 'eta': from_stamp(row.eta),
+                 'eta': seconds(row.eta),
                  'position': [finite_or_none(v) for v in _xyz(row.task.position)],
                  'via': [xyz for xyz in map(_xyz, row.via) if all(map(math.isfinite, xyz))]}
                 for row in msg.tasks]}
@@ -174,6 +191,7 @@ def state_record(msg: _Message) -> RecordBody:
             'list_revision': msg.list_revision, 'battery': finite_or_none(msg.battery),
             'position': [finite_or_none(v) for v in _xyz(msg.position)],
             'velocity': [finite_or_none(v) for v in _xyz(msg.velocity)],
+            'home': [finite_or_none(v) for v in _xyz(msg.home)],
             'range_remaining': finite_or_none(msg.range_remaining), 'available': msg.available,
             # missing in recordings of earlier versions
             'authority': constant_name(AUTHORITIES, getattr(msg, 'authority', 0)),
@@ -229,15 +247,8 @@ def finite_or_none(value: float) -> float | None:
     return float(value) if math.isfinite(value) else None
 
 
-def from_stamp(time: _Message) -> float:
-    """Return a Time or Duration message as a number.
-
-    Args:
-        time: as received.
-
-    Returns:
-        [s].
-    """
+def seconds(time: _Message) -> float:
+    """A Time or Duration message in [s]."""
     return float(time.sec) + float(time.nanosec) * 1e-9
 
 

@@ -9,12 +9,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from uav_task_alloc.geometry.frames import Origin
 from uav_task_alloc.model import Point, ThreatZone
 from uav_task_alloc.zone_codec import decode_zone
 
 RECORD_FILE = 'record.jsonl'
-END_STATES = ('COMPLETED', 'FAILED', 'CANCELLED', 'REJECTED')
-FINAL_STATES = (*END_STATES, 'UNASSIGNED')
+FINAL_STATES = ('COMPLETED', 'FAILED', 'CANCELLED', 'REJECTED', 'UNASSIGNED')
 SINCE_TOLERANCE = 3.0  # [s] of a start time: reports are in whole seconds and arrive late
 Line = Mapping[str, Any]  # `wall` [unix s], `kind`, and the values that RunState.on_KIND reads
 
@@ -82,6 +82,7 @@ class RunState:
     health: dict[str, tuple[int, str]] = field(default_factory=dict)  # level, text by UAV
     authority: dict[str, ReportedAuthority] = field(default_factory=dict)  # by UAV
     speedup: float = 1.0  # scenario seconds in a second of wall time
+    origin: Origin | None = None  # of the ENU frame; None: not known yet
     first: float = math.inf  # [unix s] of the first line
     last: float = -math.inf  # [unix s] of the last line
 
@@ -93,6 +94,10 @@ class RunState:
     def on_run(self, line: Line) -> None:
         """Parameters of the run."""
         self.speedup = line['speedup']
+
+    def on_origin(self, line: Line) -> None:
+        """The origin of the ENU frame, as a node of the fleet published it."""
+        self.origin = Origin(line['latitude'], line['longitude'], line['altitude_amsl'])
 
     def on_announcement(self, line: Line) -> None:
         """ADD, UPDATE or CANCEL of tasks."""
@@ -124,16 +129,12 @@ class RunState:
 
     def on_list(self, line: Line) -> None:
         """A task list; the leg to a task is taken from the list in which it became the first."""
-        if self.begins_leg(line):
+        before = self.lists.get(line['uav'])
+        old = before['tasks'][0]['id'] if before and before['tasks'] else None
+        if line['tasks'] and line['tasks'][0]['id'] != old:
             first = line['tasks'][0]
             self.legs[line['uav'], first['id']] = first['leg_distance']
         self.lists[line['uav']] = line
-
-    def begins_leg(self, line: Line) -> bool:
-        """Whether a list has another first task than the newest list of its UAV."""
-        before = self.lists.get(line['uav'])
-        old = before['tasks'][0]['id'] if before and before['tasks'] else None
-        return bool(line['tasks']) and line['tasks'][0]['id'] != old
 
     def on_state(self, line: Line) -> None:
         """The state of one UAV."""
@@ -164,10 +165,6 @@ class RunState:
     def count(self, *states: str) -> int:
         """Number of tasks in one of these states."""
         return sum(status.state in states for status in self.statuses.values())
-
-    def completed(self) -> set[str]:
-        """Ids of the completed tasks."""
-        return {task for task, status in self.statuses.items() if status.state == 'COMPLETED'}
 
     def start(self) -> float:
         """Time of the first announced task [unix s]; of the first line where there is none."""
