@@ -15,7 +15,7 @@ ROOMS = {
     'mavsdk': (),
     'mcap': ('record/',),
     'mcap_ros2': ('record/',),
-    'plotly': ('flight_report/', 'live/'),
+    'plotly': ('flight_report/',),
     'aiohttp': ('live/',),
     'pymap3d': ('geometry/',),
     'numba': ('geometry/', 'solver/', 'kernel'),
@@ -27,7 +27,6 @@ ROS = {'rclpy', 'rcl_interfaces', 'builtin_interfaces', 'geometry_msgs', 'std_ms
 LEVELS = {
     'errors': 0,
     'checks': 0,
-    'atomic_files': 0,
     'model': 1,
     'palette': 0,
     'params': 1,

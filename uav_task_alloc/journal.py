@@ -12,7 +12,6 @@ from itertools import count
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from uav_task_alloc.atomic_files import sync_folder
 from uav_task_alloc.errors import JournalCorrupt, JournalError, JournalForeign, JournalInUse
 
 FILE_NAME = 'journal.sqlite3'
@@ -182,7 +181,11 @@ def _move_into_place(temporary: Path, path: Path) -> None:
         return
     except OSError:  # a file system without hard links
         temporary.rename(path)
-    sync_folder(path.parent)
+    folder = os.open(path.parent, os.O_RDONLY)
+    try:
+        os.fsync(folder)
+    finally:
+        os.close(folder)
 
 
 def _check_length(path: Path) -> None:

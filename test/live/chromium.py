@@ -30,7 +30,7 @@ def started(path):
 def open_page(page, address):
     """Open an address and wait until the map is drawn."""
     page.goto(address)
-    page.wait_for_selector('#map .main-svg', timeout=WAIT)
+    page.wait_for_selector('#map[data-drawn]', timeout=WAIT)
 
 
 def wait(page, where, expected):

@@ -52,6 +52,20 @@ def window(browser):
 
 
 @pytest.fixture
+def tab(browser):
+    """tab(**options) -> a page in a new context, as Browser.new_context; closed at the end."""
+    contexts = []
+
+    def tab(**options):
+        contexts.append(browser.new_context(**options))
+        return contexts[-1].new_page()
+
+    yield tab
+    for context in contexts:
+        context.close()
+
+
+@pytest.fixture
 def view(window):
     """view(snapshots) -> a page of it, drawn; fails on any error that the page reports."""
     page, server = window

@@ -76,14 +76,14 @@ LATER = [  # twenty seconds later: t1 is done, two tasks are new, one of them in
 class Run:
     """A scene and its snapshot store, without any node."""
 
-    def __init__(self):
+    def __init__(self, speedup=1.0):
         self.scene, self.snapshots = Scene(RunState()), SnapshotStore()
+        self.clock = {'speedup': speedup, 'live': True, 'ended': False}
 
     def add(self, *lines):
         """Apply lines of one moment and store the changes."""
         for line in lines:
             self.scene.apply(line)
         wall, run = lines[-1]['wall'], self.scene.run
-        self.snapshots.put(wall, {'start': run.start(), 'speedup': 1.0, 'live': True},
-                       *self.scene.updates(wall))
+        self.snapshots.put(wall, {'start': run.start(), **self.clock}, *self.scene.updates(wall))
         return self

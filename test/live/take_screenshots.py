@@ -32,7 +32,7 @@ def search(page, task):
     """Search for a task; wait until it is marked on the map."""
     page.fill('#find', task)
     chromium.wait(page, '#answer', task)
-    chromium.wait(page, '#map', 'looked for')  # the map is drawn after the text
+    page.wait_for_selector(f'#map[data-picked={task}]')  # the map is drawn after the text
 
 
 def take(page, plan, left):
@@ -69,7 +69,7 @@ def main():
     server.start()
     FOLDER.mkdir(exist_ok=True)
     with chromium.started(chromium.find()) as browser:
-        page = browser.new_page(viewport={'width': 1600, 'height': 930}, color_scheme='dark')
+        page = browser.new_page(viewport={'width': 1440, 'height': 900}, color_scheme='dark')
         chromium.open_page(page, server.address)
         take(page, plan, left)
     server.stop()

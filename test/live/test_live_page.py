@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """The live page in a real browser: answers, panels and the pixels of the map."""
 import io
-import re
 
 import matplotlib.image
 import numpy as np
+import pytest
 from chromium import WAIT, wait
 from small_run import BEGIN, FIRST, Run, announced, held, listed, planned, state, statuses, uavs
 
@@ -26,10 +26,15 @@ def pixels(page, where):
     return matplotlib.image.imread(io.BytesIO(page.locator(where).screenshot()))[..., :3]
 
 
-def share(image, colour, near=0.06):
-    """The share of an image that has a colour #rrggbb."""
+def near(image, colour, tolerance=0.06):
+    """Where an image has a colour #rrggbb."""
     wanted = np.array([int(colour[k:k + 2], 16) / 255 for k in (1, 3, 5)])
-    return float(np.mean(np.abs(image - wanted).max(axis=2) < near))
+    return np.abs(image - wanted).max(axis=2) < tolerance
+
+
+def share(image, colour):
+    """The share of an image that has a colour #rrggbb."""
+    return float(np.mean(near(image, colour)))
 
 
 def test_which_uav_serves_a_task_next(view, run):
@@ -40,6 +45,8 @@ def test_which_uav_serves_a_task_next(view, run):
     assert find(page, 'T4', 'u2 flies t4')
     assert find(page, 't', 'Which one: t1, t2, t3, t4, t5?')
     assert find(page, 'toString', 'There is no task toString.')
+    page.click('#uavs details:nth-child(2) summary')
+    wait(page, '#uavs details:nth-child(2) ol', 't2')
     assert ' '.join(text(page, '#uavs details:nth-child(2) ol').split()) == (
         't3 in 0:10 t4 in 0:20 t2 in 0:30')
     page.click('#uavs button.task >> nth=0')
@@ -67,7 +74,7 @@ def test_authority_is_shown_with_its_time_its_reason_and_what_gives_it_back(view
 def test_why_a_task_is_unassigned(view, run):
     page = view(run.snapshots)
     assert text(page, '#left') == 't5: inside zone z1'
-    assert find(page, 't5', 'No UAV flies t5: it is left out. Why: inside zone z1.')
+    assert find(page, 't5', 'Nobody flies t5: it is left out. Why: inside zone z1.')
 
 
 def test_what_the_last_replan_changed(view, run):
@@ -81,8 +88,12 @@ def test_what_the_last_replan_changed(view, run):
     wait(page, '#replan', 'u2: ↻ order changed')
     run.add(*uavs(BEGIN + 30), planned(BEGIN + 30, 4, 'u1 silent', u1=[],
                                         u2=['t2', 't4', 't3']))
-    wait(page, '#replan', 'Nothing changed for any UAV.')
-    assert 'The last that changed something\nPlan 3' in re.sub('\n+', '\n', text(page, '#replan'))
+    wait(page, '#replan', 'Since then 1 plan changed nothing, the last at 0:30.')
+    assert 'Plan 3, 0:25' in text(page, '#replan')
+    assert '2 re-plans' in text(page, '#counts')
+    assert 'plan 4' not in text(page, '#events')
+    page.click('#replan-box summary')
+    assert 'plan 4' not in text(page, '#replans')
 
 
 def test_the_map_shows_zones_routes_and_tasks(view, run):
@@ -142,12 +153,40 @@ def test_a_page_says_that_it_is_stale_and_reconnects_by_itself(view, run, serve)
     page.goto(server.address)
     wait(page, '#counts', '1 of 5 tasks done')
     assert page.is_hidden('#banner')
-    server.stop()
+    assert text(page, '#state') == '● live'
+    cut(server)
     wait(page, 'body', 'No data from live_view for 0:0')
+    assert page.get_attribute('#banner', 'role') == 'alert'
     assert 'u2' in text(page, '#uavs')  # the last that was known
+    server.stop()
     serve(Run().add(*FIRST).snapshots, server.port)
     page.wait_for_selector('#banner', state='hidden', timeout=WAIT)
     wait(page, '#counts', '0 of 3 tasks done')
+
+
+def cut(server):
+    """End all streams of a server as a broken connection does, without the last event."""
+    def broken(_):
+        raise ConnectionResetError
+    server.snapshots.updates_since = broken
+
+
+@pytest.mark.parametrize(('ended', 'badge', 'words'), [
+    (True, '■ run ended', 'Run ended at 0:20'), (False, '■ stopped', 'UAVs may still be flying')])
+def test_the_end_of_the_node_is_no_alarm(tab, run, serve, ended, badge, words):
+    page, server = tab(), serve(run.snapshots)
+    page.clock.install()
+    run.clock['ended'] = ended
+    run.add(*uavs(BEGIN + 20))
+    page.goto(server.address)
+    wait(page, '#counts', '1 of 5 tasks done')
+    server.stop()
+    wait(page, '#banner', words)
+    page.clock.fast_forward(10_000)  # after 3 s a broken connection is an alarm
+    assert text(page, '#state') == badge
+    assert page.get_attribute('#banner', 'role') == 'status'
+    assert 'No data' not in text(page, 'body')
+    assert share(pixels(page, '#banner'), '#b34700') < 0.001
 
 
 def test_a_hostile_name_is_only_text(view):
@@ -171,7 +210,7 @@ def test_the_page_sends_nothing_but_get(view, run):
     page = view(run.snapshots)
     page.on('request', lambda request: requests.append((request.method, request.url)))
     page.reload()
-    page.wait_for_selector('#map .main-svg', timeout=WAIT)
+    page.wait_for_selector('#map[data-drawn]', timeout=WAIT)
     for button in page.locator('button:visible').all():
         button.click()
     page.locator('#scrub').fill(str(BEGIN + 10))

@@ -10,7 +10,7 @@ from small_run import BEGIN
 from uav_task_alloc.live.server import MAX_STREAMS, PAGE_FILES, PageServer, host_name
 from uav_task_alloc.live.snapshot_store import SnapshotStore
 
-PATHS = [*PAGE_FILES, '/plotly.js', '/stream', '/at']
+PATHS = [*PAGE_FILES, '/tiles.json', '/tiles/1/0/0', '/stream', '/at']
 
 
 def request(server, method, path, **headers):
@@ -22,7 +22,7 @@ def request(server, method, path, **headers):
     return response, body
 
 
-@pytest.mark.parametrize('path', [*PAGE_FILES, '/plotly.js', '/at?wall=1800000010'])
+@pytest.mark.parametrize('path', [*PAGE_FILES, '/at?wall=1800000010'])
 def test_the_page_and_its_files_are_served(run, serve, path):
     response, body = request(serve(run.snapshots), 'GET', path)
     assert response.status == 200

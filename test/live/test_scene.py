@@ -2,6 +2,7 @@
 """The parts of the page and the entries of its logs that lines of a record change."""
 import json
 
+import pytest
 from small_run import (
     BEGIN,
     FIRST,
@@ -154,3 +155,23 @@ def test_a_big_fleet_fits_through_the_stream():
     assert len(json.loads(everything)['parts']['tasks']) == 5000
     assert len(everything) < 1_000_000  # once
     assert len(tick) < 50_000  # twice a second
+
+
+@pytest.mark.parametrize(('velocity', 'speed', 'course'), [
+    ([0.0, 12.0, 0.0], 12.0, 0), ([3.0, -3.0, 5.0], 4.2, 135), ([-2.0, 0.0, 0.0], 2.0, 270),
+    ([-1e-3, 9.0, 0.0], 9.0, 0), ([0.2, 0.1, 3.0], 0.2, None), ([None, None, None], None, None)])
+def test_a_uav_has_its_speed_and_while_it_moves_its_course(velocity, speed, course):
+    part = updates([state(BEGIN, 'u1', (0.0, 0.0), velocity=velocity)])[0]['uavs']['u1']
+    assert (part['speed'], part['course'], part['home']) == (speed, course, None)
+
+
+def test_the_height_of_the_home_and_the_origin_are_sent_where_they_are_known():
+    origin = {'kind': 'origin', 'wall': BEGIN, 'latitude': 47.0, 'longitude': 8.0,
+              'altitude_amsl': 400.0}
+    parts, _, _ = updates([origin, state(BEGIN, 'u1', (0.0, 0.0), home=[1.0, 2.0, -6.04])])
+    assert (parts['origin'], parts['uavs']['u1']['home']) == ([47.0, 8.0, 400.0], -6.0)
+
+
+def test_a_plan_that_changed_nothing_is_no_event():
+    assert event_texts(FIRST, [planned(BEGIN + 1, 2, 'background', u1=['t1', 't2'],
+                                       u2=['t3'])]) == []

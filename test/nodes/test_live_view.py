@@ -228,3 +228,60 @@ def test_finding_31_hostile_lists_counts_and_zones_do_not_end_the_view(start, pr
     probe.until(lambda: 'threat_zones: zones: number = 1001: expected at most 1000'
                 in view.output(), 20.0, view.output)
     assert view.stop()[0] == 0
+
+
+def page_of(view, path):
+    """The JSON value of a path of the page."""
+    address = re.search(r'Live page: (http://127\.0\.0\.1:\d+/)', view.output()).group(1)
+    with urllib.request.urlopen(address + path, timeout=10) as answer:
+        return json.load(answer)
+
+
+def test_the_page_has_the_origin_of_the_fleet_and_the_tiles_of_the_parameter(
+        start, probe, tmp_path):
+    (tmp_path / '14').mkdir()
+    view = start('live_view', '-p', 'port:=0', '-p', f'tiles:={tmp_path}', '-p',
+                 'tiles_attribution:=who made them')
+    origins = probe.publisher(m.FleetOrigin, 'fleet_origin', LATCHED)
+    tasks = probe.publisher(m.TaskAnnouncement, 'task_announcements', ANNOUNCEMENTS)
+    origins.publish(m.FleetOrigin(latitude=99.0))  # refused
+    origins.publish(m.FleetOrigin(latitude=-33.9, longitude=151.2, altitude_amsl=7.0))
+    probe.until(lambda: 'origin' in page_of(view, 'at?wall=9e9')['parts'], 20.0, view.output)
+    assert page_of(view, 'at?wall=9e9')['parts']['origin'] == [-33.9, 151.2, 7.0]
+    assert page_of(view, 'tiles.json') == {
+        'url': 'tiles/{z}/{x}/{y}', 'attribution': 'who made them', 'min_zoom': 14,
+        'max_zoom': 14}
+    tasks.publish(m.TaskAnnouncement(action=m.TaskAnnouncement.ADD, tasks=[m.Task(
+        task_id='w', frame=m.Task.WGS84, latitude=-33.9, longitude=151.2, altitude=3.0,
+        value=1.0)]))
+    probe.until(lambda: 'tasks' in page_of(view, 'at?wall=9e9')['parts'], 20.0, view.output)
+    assert page_of(view, 'at?wall=9e9')['parts']['tasks'] == {'w': [0.0, 0.0, 3.0]}
+    assert view.stop()[0] == 0
+
+
+def test_a_folder_without_tiles_is_refused(start, probe):
+    view = start('live_view', '-p', 'port:=0', '-p', 'tiles:=/no/such/folder')
+    probe.until(lambda: view.popen.poll() is not None, 20.0, view.output)
+    assert view.popen.returncode == 1
+    assert view.output().startswith(
+        "tiles = '/no/such/folder': expected a folder with {z}/{x}/{y}.png")
+
+
+def test_the_page_says_that_the_run_has_ended(start, probe, tmp_path):
+    path = tmp_path / 'play.yaml'
+    path.write_text(TEXT)
+    view = start('live_view', '-p', f'scenario:={path}', '-p', 'stay:=true', '-p', 'port:=0')
+    tasks = probe.publisher(m.TaskAnnouncement, 'task_announcements', ANNOUNCEMENTS)
+    task_statuses = probe.publisher(m.TaskStatusArray, 'task_statuses', LATCHED)
+    states = probe.publisher(m.UavState, 'uav_states', STATES)
+
+    def ended():
+        states.publish(state())
+        return page_of(view, 'at?wall=9e9')['clock'].get('ended')
+
+    tasks.publish(ADD)
+    task_statuses.publish(statuses(m.TaskStatus.ACTIVE))
+    probe.until(lambda: ended() is False, 20.0, view.output)
+    task_statuses.publish(statuses(m.TaskStatus.COMPLETED))
+    probe.until(ended, 20.0, view.output)
+    assert view.stop()[0] == 0

@@ -2,10 +2,12 @@
 """The content of the live page as JSON values, derived from the run's state; no clock, no I/O."""
 from __future__ import annotations
 
+import math
 from typing import Any
 
 from uav_task_alloc.record.events import sentences
 from uav_task_alloc.record.plan_diff import (
+    DONE_STATES,
     RouteLists,
     changes_text,
     route_changes,
@@ -17,9 +19,10 @@ from uav_task_alloc.record.run_state import Line, RunState
 from uav_task_alloc.zone_codec import JSON_ZONE, encode_zone
 
 _MAX_STAMP_AGE = 86400.0  # [s]; an older stamp is of another clock
+_LEAST_SPEED = 0.5  # [m/s]; the course of a slower UAV is noise
 # by kind of a line: the part of the page that it changes
 _PART_OF_KIND = {'announcement': 'tasks', 'statuses': 'statuses', 'zones': 'zones',
-                 'state': 'uavs', 'uploads': 'uavs'}
+                 'state': 'uavs', 'uploads': 'uavs', 'origin': 'origin'}
 LogEntry = dict[str, Any]  # of a log: `wall` [unix s] and the values that the page shows
 
 
@@ -76,14 +79,16 @@ class Scene:
 
     def plan(self, line: Line) -> LogEntry:
         """The log entry of a plan: its changes to the plan before."""
+        done = {task for task, status in self.run.statuses.items()
+                if status.state in DONE_STATES}
         after = route_lists(line)
         is_first = self.routes is None
-        rows = route_changes(self.routes or {}, after, self.run.completed())
+        rows = route_changes(self.routes or {}, after, done)
         self.routes = after
         trigger = trigger_text(line['trigger'])
-        self.events.append({'wall': line['wall'], 'kind': 'plan', 'text': (
-            f'plan {line["revision"]} ({trigger}): '
-            f'{changes_text(rows) or "nothing changed"}')})
+        if rows:
+            self.events.append({'wall': line['wall'], 'kind': 'plan', 'text': (
+                f'plan {line["revision"]} ({trigger}): {changes_text(rows)}')})
         return {'wall': line['wall'], 'revision': line['revision'], 'trigger': trigger,
                 'ms': round(line['solve_ms'], 1), 'fit': line['fit'], 'first': is_first,
                 'changes': rows}
@@ -101,6 +106,9 @@ class Scene:
     def part(self, name: str) -> Any:
         """One part as page/live.js reads it."""
         run = self.run
+        if name == 'origin':  # [deg, deg, m]
+            return run.origin and [run.origin.latitude, run.origin.longitude,
+                                   run.origin.altitude_amsl]
         if name == 'tasks':  # [east, north, up] [m] by id
             return {task: to_decimetres(row.position) for task, row in run.tasks.items()}
         if name == 'statuses':  # [state, UAV, reason] by id
@@ -116,10 +124,15 @@ class Scene:
         return self.list(name.removeprefix('list '))
 
     def uav(self, uav: str, state: Line) -> LogEntry:
-        """One UAV; `wall`: [unix s] of its last state, `health`: text of its diagnostics."""
+        """One UAV; `wall`: [unix s] of its last state, `health`: text of its diagnostics.
+
+        `speed` [m/s] and `course` [deg from north] over ground, `course` only of a UAV that moves;
+        `home`: [m], its height.
+        """
         level, text = self.run.health.get(uav, (0, ''))
-        battery = state['battery']
+        battery, home = state['battery'], state.get('home', (None,))[-1]
         return {'wall': round(state['wall'], 1), 'position': to_decimetres(state['position']),
+                **motion(state['velocity']), 'home': home and round(home, 1),
                 'mode': state['mode'], 'mission': state['mission_state'],
                 'active': state['active'], 'revision': state['list_revision'],
                 'battery': None if battery is None else round(battery, 3),
@@ -147,6 +160,19 @@ class Scene:
             {'id': row['id'], 'via': [to_decimetres(point) for point in row['via']],
              'at': round(planned_at + row['eta'] / speedup, 1) if 'eta' in row else None}
             for row in line['tasks']]}
+
+
+def motion(velocity: Any) -> dict[str, float | None]:
+    """`speed` [m/s] and `course` [deg from north] over ground of a velocity [m/s] in ENU.
+
+    Both are None where the velocity is not known; the course also of a UAV that stands still.
+    """
+    east, north, _ = velocity
+    if east is None or north is None:
+        return {'speed': None, 'course': None}
+    speed = math.hypot(east, north)
+    course = round(math.degrees(math.atan2(east, north))) % 360
+    return {'speed': round(speed, 1), 'course': course if speed >= _LEAST_SPEED else None}
 
 
 def to_decimetres(point: Any) -> list[float | None]:

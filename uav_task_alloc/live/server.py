@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import asyncio
-import gzip
 import ipaddress
+import json
 import math
 import socket
 import threading
@@ -14,22 +14,21 @@ from importlib.resources import files
 from typing import Final
 
 from aiohttp import web
-from plotly.offline import get_plotlyjs
 
 from uav_task_alloc.live.snapshot_store import SnapshotStore
+from uav_task_alloc.live.tiles import TileSource
 
 UPDATE_PERIOD = 0.5  # [s] between two events of a stream
 MAX_STREAMS = 32
 PAGE_FILES = {'/': ('index.html', 'text/html'), '/live.css': ('live.css', 'text/css'),
         **{f'/{name}.js': (f'{name}.js', 'text/javascript')
-           for name in ('live', 'panels', 'map', 'model')}}
+           for name in ('live', 'model', 'panels', 'cards', 'chart', 'map', 'layers', 'overlay',
+                        'labels', 'gestures', 'tiles', 'geo')}}
 LOOPBACK = ('127.0.0.1', 'localhost', '::1')
+CONTENT_POLICY = (
+    "default-src 'none'; script-src 'self'; connect-src 'self'; img-src 'self' data: {}; "
+    "style-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'")
 HEADERS: Final = {
-    # plotly adds a style element; scripts are those of this server only
-    'Content-Security-Policy': (
-        "default-src 'none'; script-src 'self'; connect-src 'self'; img-src 'self' data:; "
-        "style-src 'self' 'unsafe-inline'; base-uri 'none'; form-action 'none'; "
-        "frame-ancestors 'none'"),
     'X-Content-Type-Options': 'nosniff', 'Referrer-Policy': 'no-referrer',
     'Cross-Origin-Resource-Policy': 'same-origin'}
 Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
@@ -57,19 +56,21 @@ class PageServer:
         snapshots: of the page.
         host: address of this machine to listen on.
         port: 0: any free one.
+        tiles: map tiles under the fleet; None: none.
 
     Raises:
         OSError: the port is in use, or the host is not an address of this machine.
     """
 
-    def __init__(self, snapshots: SnapshotStore, host: str, port: int) -> None:
+    def __init__(self, snapshots: SnapshotStore, host: str, port: int,
+                 tiles: TileSource | None = None) -> None:
         self.snapshots = snapshots
+        self.tiles = tiles
         self.host = host
         family = socket.AF_INET6 if ':' in host else socket.AF_INET
         self.socket = socket.create_server((host, port), family=family)
         self.port: int = self.socket.getsockname()[1]
         self.streams = 0
-        self.plotly = b''  # compressed at the first request
         self.loop = asyncio.new_event_loop()
         self.stopping = asyncio.Event()
         self.thread = threading.Thread(target=self.run, name='live page', daemon=True)
@@ -102,10 +103,11 @@ class PageServer:
     async def serve(self) -> None:
         """Serve until `stop`."""
         app = web.Application(middlewares=[self.guard])
-        app.on_response_prepare.append(add_headers)
+        app.on_response_prepare.append(self.add_headers)
         for path in PAGE_FILES:
             app.router.add_get(path, self.file)
-        app.router.add_get('/plotly.js', self.library)
+        app.router.add_get('/tiles.json', self.tile_source)
+        app.router.add_get('/tiles/{z:[0-9]{1,2}}/{x:[0-9]{1,8}}/{y:[0-9]{1,8}}', self.tile)
         app.router.add_get('/stream', self.stream, allow_head=False)
         app.router.add_get('/at', self.at)
         runner = web.AppRunner(app, access_log=None, shutdown_timeout=1.0)
@@ -140,13 +142,21 @@ class PageServer:
         text = files('uav_task_alloc.live').joinpath('page', name).read_text('utf-8')
         return web.Response(text=text, content_type=kind, headers={'Cache-Control': 'no-cache'})
 
-    async def library(self, _: web.Request) -> web.Response:
-        """plotly.js from the Python package plotly."""
-        if not self.plotly:
-            self.plotly = await asyncio.to_thread(gzip.compress, get_plotlyjs().encode(), 6)
-        return web.Response(body=self.plotly, content_type='text/javascript', charset='utf-8',
-                            headers={'Content-Encoding': 'gzip',
-                                     'Cache-Control': 'max-age=86400'})
+    async def tile_source(self, _: web.Request) -> web.Response:
+        """Where the page gets its tiles from; null: nowhere."""
+        tiles = self.tiles
+        return web.Response(content_type='application/json', text=json.dumps(tiles and {
+            'url': tiles.url, 'attribution': tiles.attribution,
+            'min_zoom': tiles.min_zoom, 'max_zoom': tiles.max_zoom}))
+
+    async def tile(self, request: web.Request) -> web.StreamResponse:
+        """A tile of the folder; 204 where there is none, which a page does not report."""
+        place = (int(request.match_info[name]) for name in ('z', 'x', 'y'))
+        found = self.tiles and self.tiles.file(*place)
+        if not found:
+            return web.Response(status=204)
+        return web.FileResponse(found[0], headers={
+            'Content-Type': found[1], 'Cache-Control': 'max-age=3600'})
 
     async def at(self, request: web.Request) -> web.Response:
         """All parts as they were at the query's `wall` [unix s]."""
@@ -169,19 +179,22 @@ class PageServer:
         self.streams += 1
         try:
             await response.write(b'retry: 1000\n\n')
-            version = 0
-            while not self.stopping.is_set():
+            version, stopping = 0, False
+            while not stopping:
+                stopping = self.stopping.is_set()  # then this is the last update
                 version, text = self.snapshots.updates_since(version)
                 await response.write(f'data: {text}\n\n'.encode())
                 with suppress(asyncio.TimeoutError):
                     await asyncio.wait_for(self.stopping.wait(), UPDATE_PERIOD)
+            await response.write(b'event: end\ndata: {}\n\n')  # it is no failure
         except ConnectionError:
             pass  # the page was closed
         finally:
             self.streams -= 1
         return response
 
-
-async def add_headers(_: web.Request, response: web.StreamResponse) -> None:
-    """Add the security headers to every response, errors included."""
-    response.headers.update(HEADERS)
+    async def add_headers(self, _: web.Request, response: web.StreamResponse) -> None:
+        """Add the security headers to every response, errors included."""
+        response.headers.update(HEADERS)
+        response.headers['Content-Security-Policy'] = CONTENT_POLICY.format(
+            self.tiles.origin if self.tiles else '')

@@ -21,6 +21,7 @@ from uav_task_alloc.checks import is_ros_name
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.live.scene import Scene
 from uav_task_alloc.live.snapshot_store import SnapshotStore
+from uav_task_alloc.live.tiles import tile_source
 from uav_task_alloc.nodes.conversions.message_limits import cut
 from uav_task_alloc.nodes.conversions.messages import ANNOUNCEMENTS, LATCHED, STATES
 from uav_task_alloc.nodes.ros.parameters import declare
@@ -73,7 +74,8 @@ class LiveView(Node):
     Subscribes to:
         `uav_states` (UavState), `task_announcements` (TaskAnnouncement), `threat_zones`
         (ThreatZoneArray), `task_statuses` (TaskStatusArray), `allocation` (Allocation),
-        `<uav_id>/task_list` (TaskList), `/diagnostics` (DiagnosticArray).
+        `<uav_id>/task_list` (TaskList), `fleet_origin` (FleetOrigin), `/diagnostics`
+        (DiagnosticArray).
     Parameters:
         LiveViewParams, see docs/parameters.md.
     """
@@ -92,6 +94,8 @@ class LiveView(Node):
         self.finished = False
         self.over_since: float | None = None  # [s] of the scenario
         self.apply({'wall': time.time(), 'kind': 'run', 'speedup': self.params.speedup})
+        if self.played:
+            self.apply({'wall': time.time(), 'kind': 'origin', **asdict(self.origin)})
         self.server = self._start_server()
         self._create_subscriptions()
         self.create_timer(_PERIOD, self.on_timer)
@@ -99,7 +103,9 @@ class LiveView(Node):
     def _create_subscriptions(self) -> None:
         """Subscribe to all topics of a fleet; the lists of other UAVs follow their states."""
         self._subscribe(m.TaskAnnouncement, 'task_announcements', ANNOUNCEMENTS,
-                        lambda msg: message_records.announcement_record(msg, self.origin))
+                        lambda msg: message_records.announcement_record(
+                            msg, self.state.origin or self.origin))
+        self._subscribe(m.FleetOrigin, 'fleet_origin', LATCHED, message_records.origin_record)
         self._subscribe(m.ThreatZoneArray, 'threat_zones', LATCHED, message_records.zones_record)
         self._subscribe(m.TaskStatusArray, 'task_statuses', LATCHED,
                         message_records.statuses_record)
@@ -187,7 +193,8 @@ class LiveView(Node):
         updates = self.scene.updates(wall)
         if self.server:
             self.snapshots.put(wall, {'start': self.state.start(), 'live': True,
-                                      'speedup': self.state.speedup}, *updates)
+                                      'speedup': self.state.speedup,
+                                      'ended': self.over_since is not None}, *updates)
 
     def clock(self) -> float:
         """Scenario time [s]: since the first task was announced."""
@@ -204,9 +211,10 @@ class LiveView(Node):
         """Serve the page; None, with the reason in the log, where that is not possible."""
         if not self.params.page:
             return None
+        tiles = tile_source(self.params.tiles, self.params.tiles_attribution)
         try:
             from uav_task_alloc.live.server import PageServer
-            server = PageServer(self.snapshots, self.params.host, self.params.port)
+            server = PageServer(self.snapshots, self.params.host, self.params.port, tiles)
         except (OSError, ImportError) as error:
             self.get_logger().warning(
                 f'no live page: host = {self.params.host}, port = {self.params.port}: {error}')
@@ -245,4 +253,4 @@ class LiveView(Node):
 
 def main(args: list[str] | None = None) -> None:
     """Entry point of `ros2 run uav_task_alloc live_view`."""
-    run(LiveView, with_flags(args or sys.argv, 'record'), params=LiveViewParams)
+    run(LiveView, with_flags(args or sys.argv, 'record'))

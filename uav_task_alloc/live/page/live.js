@@ -1,37 +1,65 @@
 // SPDX-License-Identifier: Apache-2.0
 // The live page: applies the updates of the stream, shows the present or a moment of the past.
 // It only reads: all requests are GET.
-import {drawChart, drawMap} from './map.js';
-import {$, fill, make, pick, put, showAnswer, showEvents, showHead, showLeft, showPlans, showUavs}
+import {openCard, showUavs} from './cards.js';
+import {drawChart} from './chart.js';
+import {FleetMap} from './map.js';
+import {$, fill, make, pick, put, showAnswer, showEvents, showHead, showLeft, showPlans}
   from './panels.js';
-import {answer, kindOf, live, readModel, seconds, span} from './model.js';
+import {answer, kindOf, live, ofDay, readModel, seconds, some, span, stamp}
+  from './model.js';
 
 const STALE = 3;     // [s] without an update from the server
 const KEPT = 1000;   // entries of each log, as on the server
+const THEME = 'uav_task_alloc theme';
 let past = null;     // {wall, parts}: the moment shown instead of the present
 let receivedAt = performance.now();
 let requests = 0;    // of moments of the past
 let due = 0, cost = 0, charted = '';
+const map = new FleetMap($('map-box'), pick, openCard);
+
+function zoneWords(zone) {
+  const low = zone.z_min === null ? 'ground' : `${zone.z_min} m`;
+  const size = zone.shape === 'HEMISPHERE' ? `dome, ${zone.radius} m high`
+    : zone.z_max === null ? `above ${low}, no top` : `${low} to ${zone.z_max} m high`;
+  return `zone ${zone.id}: ${size}`;
+}
+
+function uavWords(uav) {
+  const figures = uav.figures.map(({name, value}) => `${name} ${value}`);
+  return `${uav.id}: ${[uav.words, uav.link, ...figures, uav.place].filter(Boolean).join(', ')}`;
+}
+
+const WORDS = {uav: uavWords, zone: zoneWords};
 
 function showMap(model, picked) {
   const at = id => model.where.get(id);
-  const last = model.plans.findLast(plan => plan.changes.length && !plan.first);
-  const given = last ? last.changes.flatMap(row => row.added.map(([task]) => task)) : [];
-  const tasks = [...model.where].map(([id, position]) => ({...model.turns.get(id), id, position,
-    kind: kindOf(id, model), words: answer(id, model).text}));
-  const routes = model.uavs.filter(uav => model.lists.get(uav.id).length).map(uav => ({
+  const last = model.replans.at(-1);
+  const given = last && !last.first ? last.changes.flatMap(row => row.added.map(([id]) => id)) : [];
+  const tasks = [...model.where].map(([id, position]) =>
+    ({...model.turns.get(id), id, position, kind: kindOf(id, model)}));
+  const routes = model.uavs.filter(uav => model.lists.get(uav.id).length && !uav.lost).map(uav => ({
     index: uav.index, points: [uav.position, ...model.lists.get(uav.id).flatMap(
       task => [...task.via, at(task.id)])].filter(point => point && point[0] !== null)}));
-  drawMap($('map'), {zones: model.zones, routes, tasks, uavs: model.uavs,
+  map.show({origin: model.origin, zones: model.zones, routes, tasks, uavs: model.uavs,
     changed: given.filter(id => at(id) && model.turns.has(id)).map(at),
-    pickedIndex: model.turns.get(picked)?.index, picked: at(picked) ? [at(picked)] : []}, pick);
+    pickedId: picked, pickedIndex: model.turns.get(picked)?.index,
+    picked: at(picked) ? [at(picked)] : [],
+    words: (kind, thing) => (WORDS[kind] ? WORDS[kind](thing) : answer(thing.id, model).text)});
 }
 
 function showChart(model) {
-  const key = `${model.plans.length} ${model.plans.at(-1)?.wall} ${live.clock.start} ${theme()}`;
+  const size = $('chart').clientWidth;
+  const key = `${model.plans.length} ${model.plans.at(-1)?.wall} ${live.clock.start} ${size}`;
   if (key === charted) return;
   charted = key;
   drawChart($('chart'), model.plans.filter(plan => plan.fit !== null), seconds);
+}
+
+function centre(id) {
+  const uav = readModel(past).uavs.find(other => other.id === id);
+  if (uav && uav.position[0] !== null) map.center(uav.position);
+  $('map').scrollIntoView({block: 'nearest'});
 }
 
 function show() {
@@ -39,8 +67,10 @@ function show() {
   due = 0;
   showHead(model, past);
   const picked = showAnswer(model);
-  for (const panel of [showPlans, showLeft, showUavs, showEvents, showChart]) panel(model);
+  for (const panel of [showPlans, showLeft, showEvents, showChart]) panel(model);
+  showUavs(model, centre);
   showMap(model, picked);
+  showState();
   cost = performance.now() - begun;
   document.body.dataset.cost = cost.toFixed(0);  // [ms]
 }
@@ -52,6 +82,7 @@ function draw() {
 
 function apply(update) {
   receivedAt = performance.now();
+  live.closed = false;
   if (update.all) Object.assign(live, {parts: {}, events: [], plans: []});
   live.clock = update.clock;
   Object.assign(live.parts, update.parts);
@@ -63,22 +94,59 @@ function apply(update) {
   }
   if (past) showHead(readModel(past), past);
   else draw();
+  showState();
 }
 
 function connect() {
   const source = new EventSource('stream');  // reconnects automatically unless it was refused
   source.onmessage = message => apply(JSON.parse(message.data));
+  source.addEventListener('end', () => {
+    live.closed = true;
+    draw();
+    showState();
+  });
   source.onerror = () => {
     if (source.readyState === EventSource.CLOSED) setTimeout(connect, 2000);
   };
 }
 
-setInterval(() => {
-  const age = (performance.now() - receivedAt) / 1000;
-  $('banner').hidden = age <= STALE;
-  if (age > STALE) put($('banner'), `No data from live_view for ${span(age)} min. `
-    + 'What you see is old. Trying again…');
-}, 500);
+// [text of the badge, its class, text of the banner] for the state of the connection and the run.
+function stateTexts() {
+  const {clock} = live, age = (performance.now() - receivedAt) / 1000, known = clock.wall;
+  if (live.closed) {
+    const at = known ? ` at ${stamp(clock.wall)} (${ofDay(clock.wall)})` : '';
+    return clock.ended
+      ? ['■ run ended', '', `Run ended${at}: every task is settled, ${restText()}, and `
+        + 'live_view has exited. The page keeps its last picture.']
+      : ['■ stopped', '', `live_view was stopped${at}. UAVs may still be flying. The page keeps its `
+        + 'last picture, and goes on when live_view starts again.'];
+  }
+  if (age > STALE) {
+    return ['✕ no data', 'bad', `No data from live_view for ${span(age)} min. What you see is old. `
+      + 'Trying again…'];
+  }
+  if (!known) return ['connecting', '', ''];
+  if (past) return ['◷ past', 'past', ''];
+  if (!clock.live) return ['■ recording', '', ''];
+  return clock.ended ? ['■ run ended', '', ''] : ['● live', 'good', ''];
+}
+
+function restText() {
+  const lost = readModel(null).uavs.filter(uav => uav.lost).map(uav => uav.id);
+  return lost.length ? `${some(lost, 4)} ${lost.length > 1 ? 'are' : 'is'} silent, all other UAVs are at rest`
+    : 'all UAVs are at rest';
+}
+
+function showState() {
+  const [badge, kind, text] = stateTexts();
+  put($('state'), badge, kind);
+  $('banner').hidden = !text;
+  $('banner').setAttribute('role', kind === 'bad' ? 'alert' : 'status');
+  put($('banner'), text, kind);
+  $('scrub').disabled = live.closed;
+}
+
+setInterval(showState, 500);
 
 async function goTo(wall) {
   const mine = ++requests, response = await fetch(`at?wall=${wall}`).catch(() => null);
@@ -97,7 +165,6 @@ function goLive() {
 function theme(name) {
   if (name) {
     document.documentElement.dataset.theme = name;
-    $('uavs').dataset.key = '';
     draw();
   }
   return document.documentElement.dataset.theme;
@@ -107,7 +174,13 @@ $('scrub').oninput = event => goTo(Number(event.target.value));
 $('live').onclick = goLive;
 $('find').oninput = draw;
 $('uavs').oninput = draw;
-$('theme').onclick = () => theme(theme() === 'dark' ? 'light' : 'dark');
+$('theme').onclick = () => {
+  theme(theme() === 'dark' ? 'light' : 'dark');
+  localStorage.setItem(THEME, theme());
+};
 addEventListener('resize', draw);
-theme(matchMedia('(prefers-color-scheme: dark)').matches ? 'dark' : 'light');
+theme(localStorage.getItem(THEME)
+  || (matchMedia('(prefers-color-scheme: dark)').matches ? 'dark' : 'light'));
 connect();
+fetch('tiles.json').then(answer_ => answer_.json()).then(source => map.setTiles(source))
+  .catch(() => null);  // the page is complete without tiles

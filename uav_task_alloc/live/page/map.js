@@ -1,168 +1,215 @@
 // SPDX-License-Identifier: Apache-2.0
-// Draws the map and the chart of solves with plotly.js.
-const Plotly = globalThis.Plotly;
-const LABELS = 90;  // tasks; with more none is labelled
-const COLOURS = 5, DASHES = ['solid', 'dash', 'dot', 'dashdot'];
-const CONFIG = {responsive: true, displaylogo: false, scrollZoom: true,
-  showSendToCloud: false,  // a default button of plotly's toolbar
-  modeBarButtons: [['zoomIn2d', 'zoomOut2d', 'resetScale2d']]};
-const TURN = Array.from({length: 49}, (_, k) => k * Math.PI / 24);
+// The map: a view of the ENU plane that is moved and zoomed; what is drawn, and what is clicked.
+import {degreesText, frameOf, metresText, roundStep} from './geo.js';
+import {listen} from './gestures.js';
+import {RINGS, drawGrid, drawRings, drawRoutes, drawTasks, drawZones, themeColours,
+  zoneOutline} from './layers.js';
+import {Overlay} from './overlay.js';
+import {Tiles} from './tiles.js';
 
-export const colour = index => css(`--uav${index % COLOURS}`);
-const css = name => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
-// plotly interprets some HTML in texts
-const plain = text => text.replace(/&/g, '&amp;').replace(/</g, '&lt;').replace(/>/g, '&gt;');
+const SCALES = [1e-4, 50];  // [px/m]
+const PADDING = 56;     // [px] around all that is shown
+const REACH = 14;       // [px] around a click
 
-function outline(zone, margin) {
-  if (zone.shape !== 'POLYGON') {
-    const r = zone.radius + margin;
-    return TURN.map(a => [zone.center[0] + r * Math.cos(a), zone.center[1] + r * Math.sin(a)]);
+const within = (box, {x, y}) => box && x >= box[0] && x <= box[2] && y >= box[1] && y <= box[3];
+
+export class FleetMap {
+  // box: the section; pickTask(id), pickUav(id): called when one is clicked.
+  constructor(box, pickTask, pickUav) {
+    const part = where => box.querySelector(where), node = part('#map');
+    Object.assign(this, {node, pickTask, pickUav, scene: null, fitted: null, moved: false,
+      drawn: 0, origin: ''});
+    Object.assign(this, {canvas: part('canvas'), tip: part('.tip'), readout: part('.readout'),
+      bar: part('.bar'), empty: part('.empty'), attribution: part('.attribution')});
+    this.context = this.canvas.getContext('2d');
+    this.overlay = new Overlay(node, this.context);
+    this.view = {x: 0, y: 0, scale: .5, width: 0, height: 0, frame: null,
+      pixel: ([x, y]) => [this.view.width / 2 + (x - this.view.x) * this.view.scale,
+        this.view.height / 2 - (y - this.view.y) * this.view.scale],
+      point: (px, py) => [this.view.x + (px - this.view.width / 2) / this.view.scale,
+        this.view.y - (py - this.view.height / 2) / this.view.scale]};
+    this.tiles = new Tiles(null, () => this.schedule());
+    listen(node, {pan: (dx, dy) => this.pan(dx, dy), fit: () => this.fit(),
+      zoom: (factor, x, y) => this.zoom(factor, x, y), click: (x, y) => this.click(x, y),
+      hover: (x, y) => this.hover(x, y), leave: () => this.leave()});
+    const middle = () => [this.view.width / 2, this.view.height / 2];
+    part('.in').onclick = () => this.zoom(1.6, ...middle());
+    part('.out').onclick = () => this.zoom(1 / 1.6, ...middle());
+    part('.fit').onclick = () => this.fit();
+    new ResizeObserver(() => this.draw()).observe(node);
   }
-  return [...zone.vertices, zone.vertices[0]];
-}
 
-function joined(lines) {
-  const x = [], y = [];
-  for (const line of lines) {
-    for (const point of line) { x.push(point[0]); y.push(point[1]); }
-    x.push(null); y.push(null);
+  // source: of tiles.json
+  setTiles(source) {
+    this.tiles.source = source;
+    this.attribution.textContent = source?.attribution || '';
+    this.schedule();
   }
-  return {x, y};
-}
 
-function size(zone) {
-  if (zone.shape === 'HEMISPHERE') return `dome, ${zone.radius} m high`;
-  const low = zone.z_min === null ? 'ground' : `${zone.z_min} m`;
-  return zone.z_max === null ? `above ${low}, no top` : `${low} to ${zone.z_max} m high`;
-}
-
-function zoneTraces(zones) {
-  const tops = zones.map(zone => outline(zone, 0).reduce((a, b) => b[1] > a[1] ? b : a));
-  return [
-    {...joined(zones.map(zone => outline(zone, 0))), mode: 'lines', fill: 'toself',
-      fillcolor: css('--zone') + '40', line: {color: css('--zone'), width: 2},
-      name: 'no-fly zone', hoverinfo: 'skip'},
-    {...joined(zones.filter(zone => zone.margin && zone.shape !== 'POLYGON')
-      .map(zone => outline(zone, zone.margin))), mode: 'lines',
-      line: {color: css('--zone'), width: 1, dash: 'dot'}, showlegend: false,
-      hoverinfo: 'skip'},
-    {x: tops.map(top => top[0]), y: tops.map(top => top[1]), textposition: 'top center',
-      mode: 'text', text: zones.map(zone => plain(zone.id)), showlegend: false,
-      textfont: {color: css('--bad'), size: 13}, hoverinfo: 'text',
-      hovertext: zones.map(zone => `zone ${plain(zone.id)}: ${size(zone)}`)}];
-}
-
-// One trace for each UAV; beyond 20 UAVs one for each colour, which is much faster to draw.
-function routeTraces(view) {
-  const groups = new Map(), heads = {x: [], y: [], angle: [], color: []};
-  const many = view.routes.length > COLOURS * DASHES.length;
-  view.routes.forEach(route => {
-    const key = many ? route.index % COLOURS : route.index;
-    if (!groups.has(key)) groups.set(key, {lines: [], route});
-    groups.get(key).lines.push(route.points);
-    for (let k = 1; k < route.points.length && !many; k++) {
-      const [a, b] = [route.points[k - 1], route.points[k]];
-      heads.x.push((a[0] + b[0]) / 2); heads.y.push((a[1] + b[1]) / 2);
-      heads.angle.push(Math.atan2(b[0] - a[0], b[1] - a[1]) * 180 / Math.PI);
-      heads.color.push(colour(route.index));
+  show(scene) {
+    this.scene = scene;
+    const key = JSON.stringify(scene.origin);
+    if (key !== this.origin) {
+      this.origin = key;
+      this.view.frame = scene.origin ? frameOf(scene.origin) : null;
     }
-  });
-  const traces = [...groups.values()].map(({lines, route}) => ({
-    ...joined(lines), mode: 'lines', showlegend: false, hoverinfo: 'skip', opacity: many ? .4 : 1,
-    line: {color: colour(route.index), width: many ? 1 : 2.5,
-      dash: many ? 'solid' : DASHES[Math.floor(route.index / COLOURS) % DASHES.length]}}));
-  const picked = view.routes.filter(route => route.index === view.pickedIndex);
-  traces.push({...joined(picked.map(route => route.points)), mode: 'lines', showlegend: false,
-    hoverinfo: 'skip', line: {color: css('--ink'), width: 4}, opacity: many ? 1 : .35});
-  traces.push({x: heads.x, y: heads.y, mode: 'markers', hoverinfo: 'skip', showlegend: false,
-    marker: {symbol: 'triangle-up', size: 9, angle: heads.angle, color: heads.color}});
-  return traces;
-}
-
-function taskTraces(view) {
-  const kinds = {
-    fly: {name: 'to fly', marker: {symbol: 'circle', size: 10, color: []}},
-    wait: {name: 'waiting',
-      marker: {symbol: 'diamond-open', size: 11, color: css('--ink')}},
-    left: {name: 'left out', marker: {symbol: 'x', size: 12, color: css('--bad')}},
-    done: {name: 'done',
-      marker: {symbol: 'circle', size: 6, color: css('--faint'), opacity: .6}}};
-  for (const kind of Object.values(kinds)) {
-    Object.assign(kind, {x: [], y: [], customdata: [], text: [], hovertext: []});
+    this.draw();
   }
-  for (const task of view.tasks) {
-    const kind = kinds[task.kind];
-    if (!kind) continue;
-    kind.x.push(task.position[0]); kind.y.push(task.position[1]); kind.customdata.push(task.id);
-    kind.hovertext.push(plain(task.words));
-    kind.text.push(task.kind === 'done' ? ''
-      : '\u00a0\u00a0' + plain((task.place ? `${task.place}·` : '') + task.id));
-    if (task.kind === 'fly') kind.marker.color.push(colour(task.index));
+
+  // moving
+
+  pan(dx, dy) {
+    this.moved = true;
+    this.view.x -= dx / this.view.scale;
+    this.view.y += dy / this.view.scale;
+    this.schedule();
   }
-  const label = kinds.fly.x.length + kinds.left.x.length <= LABELS;
-  const big = view.tasks.length > 1000 ? .5 : 1;
-  return Object.values(kinds).map(kind => ({...kind, hoverinfo: 'text',
-    mode: label ? 'markers+text' : 'markers', textposition: 'middle right', cliponaxis: false,
-    textfont: {size: 12, color: css('--ink')},
-    marker: {...kind.marker, size: kind.marker.size * big}}));
+
+  zoom(factor, px, py) {
+    const {view} = this, [x, y] = view.point(px, py);
+    this.moved = true;
+    view.scale = Math.min(SCALES[1], Math.max(SCALES[0], view.scale * factor));
+    view.x = x - (px - view.width / 2) / view.scale;
+    view.y = y + (py - view.height / 2) / view.scale;
+    this.schedule();
+  }
+
+  // All that is shown, until the map is moved.
+  fit() {
+    this.moved = false;
+    this.fitted = null;
+    this.schedule();
+  }
+
+  // The point in the middle, at the same scale.
+  center([x, y]) {
+    this.moved = true;
+    Object.assign(this.view, {x, y});
+    this.schedule();
+  }
+
+  bounds() {
+    const {tasks, uavs, zones, routes} = this.scene;
+    const points = [...tasks.map(task => task.position), ...uavs.map(uav => uav.position),
+      ...zones.flatMap(zone => zoneOutline(zone)), ...routes.flatMap(route => route.points)]
+      .filter(([x, y]) => x !== null && y !== null);
+    if (!points.length) return null;
+    const box = [Infinity, Infinity, -Infinity, -Infinity];
+    for (const [x, y] of points) {
+      box[0] = Math.min(box[0], x); box[1] = Math.min(box[1], y);
+      box[2] = Math.max(box[2], x); box[3] = Math.max(box[3], y);
+    }
+    return box;
+  }
+
+  // Fit again only where something left the bounds, or they became much too large: a map that
+  // follows every metre is hard to read.
+  autofit() {
+    const box = this.bounds(), {view} = this;
+    if (!box || this.moved) return;
+    const size = b => Math.max(b[2] - b[0], b[3] - b[1], 1);
+    const inside = within(this.fitted, {x: box[0], y: box[1]})
+      && within(this.fitted, {x: box[2], y: box[3]});
+    if (!inside || size(this.fitted) > 2 * size(box)) {
+      const more = .03 * size(box);
+      this.fitted = [box[0] - more, box[1] - more, box[2] + more, box[3] + more];
+    }
+    const [a, b, c, d] = this.fitted, room = v => Math.max(v - 2 * PADDING, v / 2);
+    view.x = (a + c) / 2;
+    view.y = (b + d) / 2;
+    view.scale = Math.min(room(view.width) / (c - a), room(view.height) / (d - b), 4);
+  }
+
+  // drawing
+
+  schedule() {
+    this.due ??= requestAnimationFrame(() => this.draw());
+  }
+
+  draw() {
+    cancelAnimationFrame(this.due);
+    this.due = undefined;
+    const {node, canvas, context, view, scene} = this, ratio = devicePixelRatio || 1;
+    Object.assign(view, {width: node.clientWidth, height: node.clientHeight});
+    if (!scene || !view.width) return;
+    this.autofit();
+    const [w, h] = [Math.round(view.width * ratio), Math.round(view.height * ratio)];
+    if (canvas.width !== w || canvas.height !== h) Object.assign(canvas, {width: w, height: h});
+    const colours = themeColours();
+    context.setTransform(ratio, 0, 0, ratio, 0, 0);
+    context.clearRect(0, 0, view.width, view.height);
+    this.tiles.draw(context, view, colours.veil);
+    const texts = drawGrid(context, view, colours);
+    drawZones(context, view, scene.zones, colours);
+    drawRoutes(context, view, scene, colours);
+    drawRings(context, view, scene.changed, RINGS.given, colours.mark);
+    drawTasks(context, view, scene.tasks, colours);
+    drawRings(context, view, scene.picked, RINGS.picked, colours.ink);
+    this.overlay.draw(view, scene, texts, colours);
+    this.drawScale();
+    this.empty.hidden = scene.uavs.length + scene.tasks.length > 0;
+    Object.assign(node.dataset, {drawn: ++this.drawn, picked: scene.pickedId,
+      view: [view.x, view.y, view.scale].join(' ')});  // [m], [m], [px/m]
+  }
+
+  drawScale() {
+    const length = roundStep(120 / this.view.scale);
+    this.bar.style.width = `${(length * this.view.scale).toFixed(0)}px`;
+    this.bar.textContent = length >= 1000 ? `${length / 1000} km` : `${length} m`;
+  }
+
+  // pointing
+
+  nearest(x, y) {
+    const {view, scene} = this, found = {distance: REACH};
+    const consider = (kind, thing, point) => {
+      if (point[0] === null || point[1] === null) return;
+      const [px, py] = view.pixel(point), distance = Math.hypot(px - x, py - y);
+      if (distance < found.distance) Object.assign(found, {kind, thing, distance});
+    };
+    for (const task of scene?.tasks || []) {
+      if (task.kind !== 'cancelled') consider('task', task, task.position);
+    }
+    for (const uav of scene?.uavs || []) consider('uav', uav, uav.position);
+    return found;
+  }
+
+  click(x, y) {
+    const {kind, thing} = this.nearest(x, y);
+    this.hover(x, y);
+    if (kind === 'task') this.pickTask(thing.id);
+    if (kind === 'uav') this.pickUav(thing.id);
+  }
+
+  hover(x, y) {
+    if (!this.scene) return;
+    const {kind, thing} = this.nearest(x, y), {view, tip, scene} = this, point = view.point(x, y);
+    const zone = thing ? null : scene.zones.find(other => isInside(other, point));
+    const text = thing ? scene.words(kind, thing) : zone ? scene.words('zone', zone) : '';
+    this.readout.textContent = view.frame
+      ? `${degreesText(view.frame, point)}  (${metresText(point)})` : metresText(point);
+    this.node.classList.toggle('over-thing', Boolean(thing));
+    tip.hidden = !text;
+    if (!text) return;
+    tip.textContent = text;
+    const box = {w: tip.offsetWidth, h: tip.offsetHeight};
+    tip.style.left = `${Math.max(4, Math.min(x + 14, view.width - box.w - 4))}px`;
+    tip.style.top = `${y + 20 + box.h > view.height ? y - box.h - 12 : y + 20}px`;
+  }
+
+  leave() {
+    this.tip.hidden = true;
+    this.readout.textContent = '';
+  }
 }
 
-function rings(points, name, colour_, size_) {
-  return {x: points.map(p => p[0]), y: points.map(p => p[1]), mode: 'markers', name,
-    hoverinfo: 'skip', showlegend: points.length > 0,
-    marker: {symbol: 'circle-open', size: size_, color: colour_, line: {width: 3}}};
-}
-
-function uavTrace(view) {
-  const shown = view.uavs.filter(uav => uav.position[0] !== null && uav.position[1] !== null);
-  return {x: shown.map(u => u.position[0]), y: shown.map(u => u.position[1]), name: 'UAV',
-    mode: view.uavs.length <= 60 ? 'markers+text' : 'markers', textposition: 'bottom center',
-    text: shown.map(u => `<b>${plain(u.id)}</b>${u.silent ? ' silent' : ''}`),
-    textfont: {size: 14, color: css('--ink')}, hoverinfo: 'text',
-    hovertext: shown.map(u => `${plain(u.id)}: ${plain(u.words)}`),
-    marker: {symbol: shown.map(u => u.silent ? 'star-triangle-up-open' : 'star-triangle-up'),
-      size: view.uavs.length <= 60 ? 17 : 10, color: shown.map(u => colour(u.index)),
-      line: {color: css('--ink'), width: 1.5}}};
-}
-
-function axis(title, more) {
-  return {title: {text: title, standoff: 6}, color: css('--ink'), gridcolor: css('--line'),
-    zeroline: false, ...more};
-}
-
-const frame = right => ({paper_bgcolor: 'rgba(0,0,0,0)', plot_bgcolor: 'rgba(0,0,0,0)',
-  font: {color: css('--ink'), size: 13}, margin: {l: 58, r: right, t: 8, b: 42}});
-
-// pick(id) is called when a task is clicked.
-export function drawMap(node, view, pick) {
-  const traces = [...routeTraces(view), ...zoneTraces(view.zones),
-    rings(view.changed, 'just given', css('--mark'), 20), ...taskTraces(view),
-    uavTrace(view), rings(view.picked, 'looked for', css('--ink'), 28)];
-  const narrow = node.clientWidth < 500;
-  const layout = {...frame(narrow ? 36 : 60), uirevision: 'same', dragmode: 'pan',
-    hovermode: 'closest', legend: {orientation: 'h', y: 1.01, yanchor: 'bottom',
-      x: narrow ? -.18 : 0, font: {size: narrow ? 11 : 13}, entrywidthmode: 'fraction',
-      entrywidth: narrow ? .4 : .22, itemclick: false, itemdoubleclick: false},
-    xaxis: axis('east [m]'), yaxis: axis('north [m]', {scaleanchor: 'x', scaleratio: 1})};
-  const first = !node.on;
-  Plotly.react(node, traces, layout, CONFIG);
-  if (first) node.on('plotly_click', event => {
-    const id = event.points[0].customdata;
-    if (typeof id === 'string') pick(id);
-  });
-}
-
-export function drawChart(node, plans, seconds) {
-  const x = plans.map(plan => seconds(plan.wall));
-  const hovertext = plans.map(plan => plain(`plan ${plan.revision}: ${plan.trigger}`));
-  const series = (values, name, more) => ({x, y: values, name, hovertext, mode: 'lines+markers',
-    hovertemplate: '%{hovertext}<br>%{y:.4g}<extra></extra>', showlegend: false, ...more});
-  Plotly.react(node, [
-    series(plans.map(plan => plan.ms), 'time', {line: {shape: 'linear', color: colour(0)}}),
-    series(plans.map(plan => plan.fit), 'fit', {yaxis: 'y2', line: {shape: 'hv', color: colour(1)},
-      marker: {symbol: 'square'}})],
-  {...frame(10), uirevision: 'same', grid: {rows: 2, columns: 1, pattern: 'coupled'},
-    xaxis: axis('time since the first task [s]'), yaxis: axis('[ms]', {rangemode: 'tozero'}),
-    yaxis2: axis('fit', {rangemode: 'tozero'})},
-  {...CONFIG, displayModeBar: false, scrollZoom: false});
+function isInside(zone, [x, y]) {
+  if (zone.shape !== 'POLYGON') {
+    return Math.hypot(x - zone.center[0], y - zone.center[1]) <= zone.radius;
+  }
+  const rim = zone.vertices;
+  return rim.reduce((odd, [ax, ay], k) => {
+    const [bx, by] = rim[(k + 1) % rim.length];
+    return (ay > y) !== (by > y) && x < ax + (y - ay) / (by - ay) * (bx - ax) ? !odd : odd;
+  }, false);
 }

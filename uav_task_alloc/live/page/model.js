@@ -1,11 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 // The data of the page, prepared for display: no DOM, no network.
-const SILENT_AFTER = 2;  // [s] without a state of a UAV, as in record/progress.py
+import {degreesText, frameOf} from './geo.js';
+
+const SILENT_AFTER = 2;   // [s] of wall time without a state of a UAV, as in record/progress.py
+const LOW_BATTERY = .2;   // share: the default of the allocator's battery_reserve
+const AT_REST = ['STANDBY', 'HOLD'];  // modes of a UAV that may fall silent when the run is over
 export const LEFT = ['UNASSIGNED', 'REJECTED', 'FAILED'];
 
-export const live = {clock: {}, parts: {}, events: [], plans: []};  // the present
+// the present; `closed`: the server has ended in order
+export const live = {clock: {}, parts: {}, events: [], plans: [], closed: false};
 
-// times: `wall` is in unix seconds, the page shows scenario time
+// times: `wall` is in unix seconds, the page shows mission time, which may run faster
 
 export function span(seconds) {
   const s = Math.max(0, Math.round(seconds)), two = n => String(n).padStart(2, '0');
@@ -15,6 +20,7 @@ export function span(seconds) {
 
 export const seconds = wall => (wall - live.clock.start) * live.clock.speedup;
 export const stamp = wall => span(seconds(wall));
+export const mission = wallSeconds => wallSeconds * live.clock.speedup;
 export const ofDay = wall => new Date(wall * 1000).toLocaleTimeString('en-GB');
 
 export function some(names, most) {
@@ -28,7 +34,8 @@ export function readModel(past) {
   const {parts} = past || live, wall = past ? past.wall : live.clock.wall;
   const map = name => new Map(Object.entries(parts[name] || {}));
   const model = {wall, where: map('tasks'), statuses: map('statuses'), zones: parts.zones || [],
-    lists: new Map(), turns: new Map()};
+    lists: new Map(), turns: new Map(), origin: parts.origin || null,
+    frame: parts.origin ? frameOf(parts.origin) : null, over: !past && Boolean(live.clock.ended)};
   const states = map('uavs'), authorities = map('authority');
   const lists = Object.keys(parts).filter(name => name.startsWith('list '));
   const names = [...new Set([...states.keys(), ...lists.map(name => name.slice(5))])]
@@ -39,32 +46,71 @@ export function readModel(past) {
     tasks.forEach(({id, at}, k) => model.turns.set(id, {uav, index, place: k + 1, at}));
   });
   model.ids = [...new Set([...model.where.keys(), ...model.statuses.keys()])];
-  model.uavs = names.map((id, index) => ({id, index, ...describe(states.get(id), wall),
-    authority: authorityText(authorities.get(id), wall)}));
+  model.uavs = names.map((id, index) => {
+    const uav = {id, index, ...describe(states.get(id), model),
+      ...authorityOf(authorities.get(id), wall)};
+    uav.trouble = uav.lost || Boolean(uav.health) || uav.mode === 'FAULT' || uav.taken;
+    return uav;
+  });
   model.plans = live.plans.filter(plan => plan.wall <= wall);
+  model.replans = model.plans.filter(plan => plan.first || plan.changes.length);
   model.events = live.events.filter(event => event.wall <= wall);
   return model;
 }
 
-function describe(state, wall) {
-  if (!state) return {position: [null, null], words: 'no state received', link: 'no state received', silent: true};
+function describe(state, {wall, over, frame}) {
+  const none = 'no state received';
+  if (!state) return {position: [null, null], words: none, link: none, silent: true, figures: []};
   const age = wall - state.wall, silent = age > SILENT_AFTER;
-  const mode = state.mode.toLowerCase().replace('_', ' ');
-  return {...state, silent,
-    words: (silent ? `last model ${mode}` : mode) + (state.available ? '' : ', not available'),
-    link: silent ? `silent for ${span(age)}` : state.health || 'link good'};
+  const lost = silent && !(over && AT_REST.includes(state.mode));
+  const mode = state.mode.toLowerCase().replace('_', ' '), figures = figuresOf(state);
+  const words = (silent ? `last ${mode}` : mode) + (state.available ? '' : ', not available');
+  const link = silent ? `silent for ${span(mission(age))}` : state.health || 'link good';
+  return {...state, silent, lost, words, link, figures,
+    note: lost ? `silent ${span(mission(age))}` : figures.length ? figures[0].value : '',
+    place: placeText(state.position, frame)};
+}
+
+// [{name, value, why, low}] of height, speed, battery and range, as far as they are known.
+function figuresOf(state) {
+  const {home, speed, course, battery, range} = state, up = state.position[2], figures = [];
+  const add = (name, value, why, low = false) => figures.push({name, value, why, low});
+  if (up !== null) {
+    add('height', `${Math.round(up - (home ?? 0))} m`,
+      home == null ? 'above the origin' : 'above the home of the UAV');
+  }
+  if (speed != null) {
+    add('speed', `${speed.toFixed(1)} m/s`, course == null ? 'over ground'
+      : `over ground, course ${String(course).padStart(3, '0')}°`);
+  }
+  const reach = range == null ? '' : `${(range / 1000).toFixed(1)} km`;
+  if (battery != null) {
+    const low = battery < LOW_BATTERY;
+    add('battery', [`${Math.round(100 * battery)} %`, low && 'low', reach].filter(Boolean)
+      .join(', '), `charge left${reach && `; it can still fly ${reach}`}`, low);
+  } else if (reach) {
+    add('range', reach, 'that it can still fly');
+  }
+  return figures;
+}
+
+// Degrees, where the origin is known, and the height.
+export function placeText(position, frame) {
+  if (!frame || position.some(v => v === null)) return '';
+  return `${degreesText(frame, position, 6)}, ${Math.round(frame.degrees(position)[2])} m AMSL`;
 }
 
 // Authority over a UAV: since when, why, what gives it back; why it is not available.
-function authorityText(authority, wall) {
+// `taken`: another has the aircraft.
+function authorityOf(authority, wall) {
   const {state, why, since, back, reason} = authority || {}, texts = [];
   if (state && state !== 'UNKNOWN') {
     texts.push(`Authority ${state}`
-      + (since == null ? '' : ` since ${ofDay(since)} (${span(wall - since)})`)
+      + (since == null ? '' : ` since ${ofDay(since)} (${span(mission(wall - since))})`)
       + (why ? `: ${why}` : '') + '.' + (back ? ` Given back by ${back}.` : ''));
   }
   if (reason && !(why && reason.includes(why))) texts.push(`Not available: ${reason}.`);
-  return texts.join(' ');
+  return {authority: texts.join(' '), taken: state === 'LOST', calm: !reason && state !== 'LOST'};
 }
 
 // [state, UAV, reason] of a task
@@ -79,18 +125,18 @@ export function kindOf(id, model) {
 }
 
 // [s] of the scenario from the moment shown until `wall`
-export const until = (wall, model) => (wall - model.wall) * live.clock.speedup;
+export const until = (wall, model) => mission(wall - model.wall);
 
 // Which UAV flies a task, or why none does: {text, bad}.
 export function answer(id, model) {
   const [state, uav, reason] = stateOf(id, model), turn = model.turns.get(id);
   if (turn) return {text: turnText(id, turn, model)};
   if (state === 'COMPLETED') return {text: `${id} is done: ${uav || 'a UAV'} completed it.`};
-  if (state === 'CANCELLED') return {text: `${id} was withdrawn. No UAV flies it.`};
+  if (state === 'CANCELLED') return {text: `${id} was withdrawn. Nobody flies it.`};
   if (LEFT.includes(state) || reason) {
     const what = {FAILED: 'it failed', REJECTED: 'it was refused'}[state] || 'it is left out';
     const why = reason || 'no reason given';
-    return {text: `No UAV flies ${id}: ${what}. Why: ${why}.`, bad: true};
+    return {text: `Nobody flies ${id}: ${what}. Why: ${why}.`, bad: true};
   }
   if (state === 'PENDING') return {text: `${id} waits for the next plan.`};
   return {text: `${id} is given to ${uav}, whose list has not arrived yet.`};

@@ -1,13 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// The text panels: answer, re-plans, tasks left out, UAVs, events. Texts from the network are set
+// The text panels: answer, re-plans, tasks left out, events. Texts from the network are set
 // as textContent, never as HTML.
-import {colour} from './map.js';
-import {LEFT, answer, live, ofDay, some, span, stamp, stateOf, until} from './model.js';
+import {LEFT, answer, live, ofDay, placeText, some, span, stamp, stateOf, until} from './model.js';
 
 const MOST = 100;  // rows of one list
+const WAITS = 'waits for the next plan';
 const KINDS = {fault: 'bad', zone: 'bad', good: 'good'};
-const ON_BOARD = {VERIFIED: 'on board', UPLOADING: 'uploading', MIXED: 'MIXED on board',
-  FOREIGN: 'FOREIGN mission on board'};
 
 export const $ = id => document.getElementById(id);
 
@@ -33,7 +31,7 @@ export function pick(id) {
   $('find').dispatchEvent(new Event('input'));
 }
 
-function taskButton(id) {
+export function taskButton(id) {
   const button = make('button', id, 'task');
   button.type = 'button';
   button.onclick = () => pick(id);
@@ -42,18 +40,22 @@ function taskButton(id) {
 
 export function showHead(model, past) {
   const done = model.ids.filter(id => stateOf(id, model)[0] === 'COMPLETED').length;
-  const silent = model.uavs.filter(uav => uav.silent).length, {clock} = live;
+  const silent = model.uavs.filter(uav => uav.lost).length, {clock} = live;
+  const replans = model.replans.filter(plan => !plan.first).length;
   put($('clock'), `${model.ids.length ? stamp(model.wall) : '–'} (${ofDay(model.wall)})`);
   $('progress').max = model.ids.length || 1;
   $('progress').value = done;
-  put($('counts'), `${done} of ${model.ids.length} tasks done, ${model.turns.size} to fly; `
+  put($('counts'), model.uavs.length + model.ids.length === 0 ? 'waiting for UAVs and tasks'
+    : `${done} of ${model.ids.length} tasks done, ${model.turns.size} to fly; `
     + `${model.uavs.length} UAVs${silent ? `, ${silent} silent` : ''}; ${model.zones.length} zones; `
-    + `${model.plans.length} plans`);
+    + `${replans} re-plans`);
+  put($('rate'), clock.speedup === 1 ? '' : `at ${Number(clock.speedup.toPrecision(3))} × real time`);
   Object.assign($('scrub'), {min: clock.begin, max: clock.wall});
   if (!past) $('scrub').value = clock.wall;
   put($('moment'), past ? `${stamp(past.wall)}, ${span(until(clock.wall, model))} ago`
-    : clock.live ? 'now' : 'end of the record');
-  put($('live'), (past ? '↦ To ' : '● ') + (clock.live ? 'live' : 'the end'));
+    : live.closed ? 'last received' : clock.live ? 'now' : 'end of the record');
+  const end = live.closed || !clock.live;
+  put($('live'), (past ? '↦ To ' : end ? '■ ' : '● ') + (end ? 'the end' : 'live'));
   $('live').setAttribute('aria-pressed', String(!past));
   document.body.classList.toggle('past', !!past);
 }
@@ -61,6 +63,7 @@ export function showHead(model, past) {
 // Returns the id of the task searched for, '' where there is none.
 export function showAnswer(model) {
   const typed = $('find').value.trim();
+  put($('where'), '');
   const show = (text, bad) => put($('answer'), text, bad ? 'bad' : '');
   if (!typed) return show('Type the name of a task, or click one on the map or in a list.'), '';
   const known = model.where.has(typed) || model.statuses.has(typed);
@@ -70,8 +73,9 @@ export function showAnswer(model) {
     show(near.length ? `Which one: ${some(near, 8)}?` : `There is no task ${typed}.`);
     return '';
   }
-  const {text, bad} = answer(near[0], model);
+  const {text, bad} = answer(near[0], model), place = model.where.get(near[0]);
   show(text, bad);
+  put($('where'), place && model.frame ? `It is at ${placeText(place, model.frame)}.` : '');
   return near[0];
 }
 
@@ -99,28 +103,28 @@ function planNodes(plan, model) {
     + `solved in ${Math.round(plan.ms)} ms. `);
   head.append(make('b', 'Because: '), `${plan.trigger}.`);
   const rows = make('ul', '', 'changes');
-  if (plan.first) {
-    rows.append(make('li', 'The first plan received; there is none to compare it with.', 'faint'));
-  } else if (!plan.changes.length) {
-    rows.append(make('li', 'Nothing changed for any UAV.', 'faint'));
-  } else {
-    rows.append(...plan.changes.map(row => changeNode(row, model)));
-  }
+  rows.append(...plan.first
+    ? [make('li', 'The first plan received; there is none to compare it with.', 'faint')]
+    : plan.changes.map(row => changeNode(row, model)));
   return [head, rows];
 }
 
+// A plan that changed nothing for any UAV is no re-plan: it is counted, and drawn in the chart.
 export function showPlans(model) {
-  const last = model.plans.at(-1);
-  if (!last) return fill($('replan'), 'none', () => [make('p', 'No plan yet.', 'none')]);
-  const changed = model.plans.findLast(plan => plan.changes.length && !plan.first);
-  fill($('replan'), `${last.revision} ${last.wall}`, () => [...planNodes(last, model),
-    ...(changed && changed !== last
-      ? [make('h3', 'The last that changed something'), ...planNodes(changed, model)] : [])]);
-  fill($('replans'), `${model.plans.length} ${last.wall}`, () =>
-    model.plans.slice(-21, -1).reverse().map(plan => {
+  const {replans} = model, last = replans.at(-1), newest = model.plans.at(-1);
+  if (!last) {
+    return fill($('replan'), 'none', () => [make('p', newest ? 'None has changed anything yet.'
+      : 'No plan yet.', 'none')]);
+  }
+  const since = model.plans.length - model.plans.lastIndexOf(last) - 1;
+  fill($('replan'), `${last.revision} ${last.wall} ${since}`, () => [...planNodes(last, model),
+    ...(since ? [make('p', `Since then ${since} ${since > 1 ? 'plans' : 'plan'} changed nothing, `
+      + `the last at ${stamp(newest.wall)}.`, 'faint')] : [])]);
+  fill($('replans'), `${replans.length} ${last.wall}`, () =>
+    replans.slice(-21, -1).reverse().map(plan => {
       const item = make('li'), uavs = plan.changes.map(row => row.uav);
       item.append(make('time', stamp(plan.wall)), ` plan ${plan.revision}: ${plan.trigger}: `
-        + (uavs.length ? `changed ${some(uavs, 4)}` : 'nothing changed'));
+        + (plan.first ? 'the first plan received' : `changed ${some(uavs, 4)}`));
       return item;
     }));
 }
@@ -132,7 +136,7 @@ export function showLeft(model) {
   for (const id of model.ids) {
     const [state, , reason] = stateOf(id, model), waits = state === 'PENDING';
     if (model.turns.has(id) || !(waits || LEFT.includes(state))) continue;
-    const why = reason || (waits ? 'waits for the next plan' : state.toLowerCase());
+    const why = reason || (waits ? WAITS : state.toLowerCase());
     groups.set(why, [...(groups.get(why) || []), id]);
   }
   put($('left-count'), String([...groups.values()].reduce((sum, ids) => sum + ids.length, 0)));
@@ -140,52 +144,9 @@ export function showLeft(model) {
     ? [...groups].map(([why, ids]) => {
       const item = make('li');
       item.append(...ids.slice(0, 12).flatMap((id, k) => [k ? ', ' : '', taskButton(id)]),
-        ids.length > 12 ? ` and ${ids.length - 12} more: ` : ': ', make('span', why, 'bad'));
+        ids.length > 12 ? ` and ${ids.length - 12} more: ` : ': ', make('span', why, why === WAITS ? 'faint' : 'bad'));
       return item;
     }) : [make('li', model.ids.length ? 'Every task has a UAV.' : 'No task yet.', 'none')]);
-}
-
-function uavNode(uav, open) {
-  const node = make('details'), summary = make('summary'), name = make('b', uav.id);
-  name.style.borderColor = colour(uav.index);
-  summary.append(name, ...Array.from({length: 4}, () => make('span')));
-  node.append(summary, make('p', '', 'authority'), make('ol'));
-  node.open = open;
-  node.addEventListener('toggle', () => node.dispatchEvent(new Event('input', {bubbles: true})));
-  return node;
-}
-
-function showUav(node, uav, done, model) {
-  const list = model.lists.get(uav.id), board = list.length && ON_BOARD[uav.mission];
-  const [, words, link, battery, count] = node.firstChild.children, rows = node.lastChild;
-  put(words, uav.words);
-  node.classList.toggle('trouble', Boolean(uav.silent || uav.health));  // sorted first
-  put(link, uav.link, node.classList.contains('trouble') ? 'bad' : 'good');
-  put(battery, [uav.battery == null ? '' : `battery ${Math.round(100 * uav.battery)} %`,
-    uav.range == null ? '' : `range ${uav.range} m`].filter(Boolean).join(', '));
-  put(count, `${done} done, ${list.length} to fly${board ? `, ${board}` : ''}`);
-  if (!node.open) return;
-  put(node.children[1], uav.authority);
-  fill(rows, JSON.stringify(list.map(task => task.id)), () => list.slice(0, MOST).map(task => {
-    const item = make('li');
-    item.append(taskButton(task.id), ' ', make('span'));
-    return item;
-  }));
-  [...rows.children].forEach((item, k) => {
-    const left = list[k].at === null ? null : until(list[k].at, model);
-    put(item.lastChild, left === null ? '' : left <= 0 ? 'due' : `in ${span(left)}`);
-  });
-}
-
-export function showUavs(model) {
-  if (!model.uavs.length) return;
-  const done = new Map(), few = model.uavs.length <= 8;
-  for (const [state, uav] of model.statuses.values()) {
-    if (state === 'COMPLETED') done.set(uav, (done.get(uav) || 0) + 1);
-  }
-  fill($('uavs'), JSON.stringify(model.uavs.map(uav => uav.id)),
-    () => model.uavs.map(uav => uavNode(uav, few)));
-  model.uavs.forEach((uav, k) => showUav($('uavs').children[k], uav, done.get(uav.id) || 0, model));
 }
 
 export function showEvents(model) {

@@ -120,7 +120,7 @@ class MissionExecutor:
 
     @property
     def alarm(self) -> str:
-        """Text on a condition that requires action by a human; '': none."""
+        """A condition that requires action by a human, in words; '': none."""
         return self._end_of_list.alarm
 
     def assign(self, tasks: TaskList, now: float) -> list[Message]:

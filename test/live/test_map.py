@@ -1,0 +1,261 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Map and layout of the live page in a real browser, at the sizes of a desk and a phone."""
+import math
+
+import chromium
+import matplotlib.image
+import numpy as np
+import pytest
+from small_run import BEGIN, FIRST, LATER, Run, announced, listed, planned, state, statuses, zones
+from test_live_page import near, pixels, share, text
+
+from uav_task_alloc.geometry.frames import Origin, to_enu, to_geodetic
+from uav_task_alloc.live.tiles import tile_source
+
+DESK, PHONE = {'width': 1440, 'height': 900}, {'width': 390, 'height': 844}
+SIZES = pytest.mark.parametrize('size', [DESK, PHONE], ids=['desk', 'phone'])
+ORIGIN = {'kind': 'origin', 'wall': BEGIN, 'latitude': 47.397742, 'longitude': 8.545594,
+          'altitude_amsl': 488.0}
+BLUE = '#0072b2'  # of the first UAV, in the light theme
+
+
+@pytest.fixture
+def shown(tab, serve):
+    """shown(run, size, tiles=None) -> the page of a run in a window of its own, drawn."""
+    def shown(run, size, tiles=None):
+        options = {'has_touch': True, 'is_mobile': True} if size is PHONE else {}
+        page = tab(viewport=size, color_scheme='light', **options)
+        server = serve(run.snapshots)
+        server.tiles = tiles
+        chromium.open_page(page, server.address)
+        return page
+    return shown
+
+
+def crowd():
+    """A fleet at one place among many tasks, two zones and a UAV that is lost."""
+    names = [f't{k:02}' for k in range(40)]
+    places = {name: [40.0 * (k % 8), 30.0 * (k // 8), 40.0] for k, name in enumerate(names)}
+    tasks = {**announced(BEGIN, names), 'tasks': [
+        {'id': name, 'position': place} for name, place in places.items()]}
+    ids = [f'uav_{k}' for k in range(6)]
+    lists = {uav: names[k::6] for k, uav in enumerate(ids)}
+    begin = [tasks, zones(BEGIN, ('dome', 80.0, 60.0, 30.0), ('tower', 90.0, 62.0, 20.0)),
+             *(state(BEGIN, uav, (100.0 + 3.0 * k, 50.0)) for k, uav in enumerate(ids)),
+             *(listed(BEGIN, uav, 1, tasks) for uav, tasks in lists.items()),
+             planned(BEGIN, 1, 'ADD', **lists),
+             statuses(BEGIN, **{name: f'ASSIGNED {uav}' for uav, tasks in lists.items()
+                                for name in tasks})]
+    later = [state(BEGIN + 20, uav, (100.0 + 3.0 * k, 50.0)) for k, uav in enumerate(ids[1:])]
+    return Run().add(*begin, ORIGIN).add(*later)
+
+
+def boxes(page, where):
+    """(text, left, top, right, bottom) of all nodes; [px] of the window."""
+    return page.evaluate("""where => [...document.querySelectorAll(where)].map(node => {
+        const box = node.getBoundingClientRect();
+        return [node.textContent, box.left, box.top, box.right, box.bottom]; })""", where)
+
+
+def overlapping(rows):
+    return [(a[0], b[0]) for k, a in enumerate(rows) for b in rows[k + 1:]
+            if a[1] < b[3] and b[1] < a[3] and a[2] < b[4] and b[2] < a[4]]
+
+
+@SIZES
+def test_labels_overlap_neither_each_other_nor_controls_and_stay_on_the_map(shown, size):
+    page = shown(crowd(), size)
+    labels = boxes(page, '#map .label')
+    assert len(labels) >= 10
+    assert {'uav_1', 'uav_5'} <= {text.split()[0] for text, *_ in labels}
+    assert any(text.startswith('uav_0 silent 0:20') for text, *_ in labels)
+    assert overlapping(labels + boxes(page, '#map .controls')) == []
+    [(_, left, top, right, bottom)] = boxes(page, '#map')
+    assert all(left <= a and top <= b and c <= right and d <= bottom for _, a, b, c, d in labels)
+
+
+@SIZES
+def test_no_text_of_a_card_overlaps_another_or_leaves_the_card(shown, size):
+    page = shown(crowd(), size)
+    cards = boxes(page, '#uavs details')
+    assert overlapping(cards) == []
+    assert overlapping(boxes(page, '#uavs .figures > span')) == []
+    assert overlapping(boxes(page, 'header > *')) == []
+    assert all(left >= 0 and right <= size['width'] for _, left, _, right, _ in cards)
+
+
+@pytest.mark.parametrize('course', [0, 45, 90, 180, 250])
+def test_a_uav_points_where_it_flies(shown, course):
+    turn = math.radians(course)
+    flying = state(BEGIN, 'u1', (0.0, 0.0), velocity=[9 * math.sin(turn), 9 * math.cos(turn), 0.0])
+    page = shown(Run().add(flying, state(BEGIN, 'u2', (300.0, 200.0))), DESK)
+    tip, middle = page.evaluate("""() => {
+        const path = document.querySelector('#map [data-uav=u1] path');
+        const at = path.getScreenCTM(), point = y => new DOMPoint(0, y).matrixTransform(at);
+        return [-14, 0].map(y => [point(y).x, point(y).y]); }""")
+    east, north = tip[0] - middle[0], middle[1] - tip[1]
+    assert math.degrees(math.atan2(east, north)) % 360 == pytest.approx(course, abs=1.0)
+    [(_, left, top, _, _)] = boxes(page, '#map')
+    x, y = round(middle[0] - left), round(middle[1] - top)
+    image = pixels(page, '#map')[y - 18:y + 19, x - 18:x + 19]
+    rows, columns = np.nonzero(near(image, BLUE))
+    offsets = np.column_stack([columns - 18, 18 - rows])  # east, north
+    ahead = offsets @ [math.sin(turn), math.cos(turn)]
+    aside = np.abs(offsets @ [math.cos(turn), -math.sin(turn)])
+    assert aside[ahead > 6.0].max() < 4.5  # the tip is narrow, the tail is wide
+    assert aside[ahead < -6.0].max() > 6.0
+    assert page.get_attribute('#map [data-uav=u2] path', 'd').startswith('M-8,0 a8,8')  # a dot
+
+
+def test_the_map_takes_most_of_the_width_of_a_desk(shown, run):
+    page = shown(run, DESK)
+    [(_, left, top, right, bottom)] = boxes(page, '#map')
+    assert (right - left) / DESK['width'] > 0.65
+    assert (bottom - top) / DESK['height'] > 0.7
+    assert page.evaluate('document.documentElement.scrollHeight') <= DESK['height']
+    [(_, uavs, first, _, _)] = boxes(page, '#uav-box')
+    assert all(first < other for _, _, other, _, _ in boxes(page, '#rest section'))
+    assert uavs > right
+
+
+def test_a_phone_shows_the_uavs_first_then_the_map(shown, run):
+    page = shown(run, PHONE)
+    tops = [top for _, _, top, _, _ in boxes(page, 'section')]
+    assert tops == sorted(tops)
+    assert [box[2] for box in boxes(page, '#uav-box, #map-box')] == tops[:2]
+    assert page.evaluate('document.documentElement.scrollWidth') == PHONE['width']
+
+
+def middle_of_map(page):
+    page.locator('#map').scroll_into_view_if_needed()
+    [(_, left, top, right, bottom)] = boxes(page, '#map')
+    return (left + right) / 2, (top + bottom) / 2
+
+
+def test_a_swipe_over_the_map_scrolls_the_page_and_two_fingers_move_the_map(shown, run):
+    page = shown(run, PHONE)
+    fingers = page.context.new_cdp_session(page)
+    x, y = middle_of_map(page)
+    before, scrolled = page.get_attribute('#map', 'data-view'), page.evaluate('scrollY')
+    for kind, moved in (('touchStart', 0), *(('touchMove', -20 * k) for k in range(10))):
+        fingers.send('Input.dispatchTouchEvent',
+                     {'type': kind, 'touchPoints': [{'x': x, 'y': y + moved}]})
+    fingers.send('Input.dispatchTouchEvent', {'type': 'touchEnd', 'touchPoints': []})
+    page.wait_for_function('before => scrollY > before + 100', arg=scrolled)
+    assert page.get_attribute('#map', 'data-view') == before
+    x, y = middle_of_map(page)
+    scrolled = page.evaluate('scrollY')
+    fingers.send('Input.synthesizePinchGesture', {'x': x, 'y': y, 'scaleFactor': 2.0})
+    page.wait_for_function(
+        "before => document.querySelector('#map').dataset.view !== before", arg=before)
+    assert page.evaluate('scrollY') == scrolled
+    assert page.evaluate('visualViewport.scale') == 1
+
+
+def test_the_map_obeys_the_keyboard(shown, run):
+    page = shown(run, DESK)
+    page.focus('#map')
+    views = [page.get_attribute('#map', 'data-view')]
+    for key in ('ArrowLeft', 'ArrowUp', '+', '-', '0'):
+        page.keyboard.press(key)
+        if key != '0':
+            page.wait_for_function(
+                "before => document.querySelector('#map').dataset.view !== before", arg=views[-1])
+        views.append(page.get_attribute('#map', 'data-view'))
+    page.wait_for_function(
+        "before => document.querySelector('#map').dataset.view === before", arg=views[0])
+
+
+def test_places_are_in_degrees_where_the_origin_is_known(shown, run):
+    page = shown(run.add(ORIGIN), DESK)
+    page.fill('#find', 't2')
+    chromium.wait(page, '#where', f'It is at {degrees(100.0, 500.0)}, 528 m AMSL.')
+    page.click('#uavs details:nth-child(2) summary')
+    chromium.wait(page, '#uavs details:nth-child(2)', f'{degrees(500.0, 100.0)}, 528 m AMSL')
+    page.hover('#map')
+    chromium.wait(page, '#map-foot', '47.4')
+
+
+def degrees(east, north):
+    origin = Origin(*(ORIGIN[name] for name in ('latitude', 'longitude', 'altitude_amsl')))
+    latitude, longitude, _ = to_geodetic(origin, (east, north, 40.0))
+    return f'{latitude:.6f}, {longitude:.6f}'
+
+
+PLACES = [(0.0, 0.0, 0.0), (1500.0, -2500.0, 120.0), (-40e3, 30e3, 3000.0), (2e3, 9e5, 0.0)]
+
+
+@pytest.mark.parametrize('origin', [(47.4, 8.5, 488.0), (-33.9, 151.2, 0.0), (0.0, -179.9, 10.0),
+                                    (78.2, 15.6, 5.0)])
+def test_the_page_converts_to_degrees_and_back_as_the_package_does(shown, run, origin):
+    page = shown(run, DESK)
+    here = page.evaluate("""async ([origin, points]) => {
+        const frame = (await import('/geo.js')).frameOf(origin);
+        return points.map(point => frame.degrees(point)); }""", [origin, PLACES])
+    there = [to_geodetic(Origin(*origin), place) for place in PLACES]
+    np.testing.assert_allclose(here, there, rtol=0.0, atol=1e-6)
+    back = page.evaluate("""async ([origin, points]) => {
+        const frame = (await import('/geo.js')).frameOf(origin);
+        return points.map(point => frame.enu(...point)); }""", [origin, there])
+    np.testing.assert_allclose(back, [to_enu(Origin(*origin), *place) for place in there],
+                               rtol=0.0, atol=1e-5)
+
+
+def test_tiles_lie_where_they_belong_and_missing_ones_do_no_harm(shown, tmp_path):
+    lat, lon = ORIGIN['latitude'], ORIGIN['longitude']
+    n = 2 ** 16
+    column = int(n * (lon + 180.0) / 360.0)
+    row = int(n * (1.0 - math.asinh(math.tan(math.radians(lat))) / math.pi) / 2.0)
+    folder = tmp_path / 'tiles/16' / str(column)
+    folder.mkdir(parents=True)
+    green = np.zeros((256, 256, 3))
+    green[..., 1] = 0.5
+    matplotlib.image.imsave(folder / f'{row}.png', green)
+    origin = Origin(lat, lon, ORIGIN['altitude_amsl'])
+
+    def corner(x, y):
+        return to_enu(origin, math.degrees(math.atan(math.sinh(math.pi * (1 - 2 * y / n)))),
+                      360.0 * x / n - 180.0, origin.altitude_amsl)
+
+    (west, north, _), (east, south, _) = corner(column, row), corner(column + 1, row + 1)
+    run = Run().add(ORIGIN, state(BEGIN, 'u1', (west - 100.0, south - 100.0)),
+                    state(BEGIN, 'u2', (east + 100.0, north + 100.0)))
+    page = shown(run, DESK, tile_source(str(tmp_path / 'tiles'), '(c) nobody'))
+    chromium.wait(page, '#map-foot', '(c) nobody')
+    seen = '#59ac59'  # under a veil of white
+    page.wait_for_function('performance.getEntriesByType("resource").some('
+                           'entry => entry.name.includes("/tiles/16/"))')
+    image = wait_for_pixels(page, seen)
+    rows, columns = np.nonzero(near(image, seen))
+    x, y, scale = (float(v) for v in page.get_attribute('#map', 'data-view').split())
+    height, width = image.shape[:2]
+    expected = [width / 2 + (west - x) * scale, width / 2 + (east - x) * scale,
+                height / 2 - (north - y) * scale, height / 2 - (south - y) * scale]
+    found = [columns.min(), columns.max() + 1, rows.min(), rows.max() + 1]
+    assert found == pytest.approx(expected, abs=1.6)
+
+
+def wait_for_pixels(page, colour):
+    """The map, once it has a colour."""
+    for _ in range(100):
+        image = pixels(page, '#map')
+        if share(image, colour) > 0.01:
+            return image
+        page.wait_for_function('before => document.querySelector("#map").dataset.drawn != before',
+                               arg=page.get_attribute('#map', 'data-drawn'))
+    raise AssertionError(f'{colour} is not on the map')
+
+
+def test_without_tiles_nothing_is_asked_for(tab, serve, run):
+    page, asked = tab(viewport=DESK), []
+    page.on('request', lambda request: asked.append(request.url))
+    chromium.open_page(page, serve(run.add(ORIGIN).snapshots).address)
+    assert [url for url in asked if '/tiles/' in url] == []
+
+
+@pytest.mark.parametrize(('speedup', 'words'), [(1.0, 'silent for 0:20'),
+                                                (8.0, 'silent for 2:40')])
+def test_ages_are_in_the_time_of_the_run(shown, speedup, words):
+    page = shown(Run(speedup).add(*FIRST).add(*LATER[1:]), DESK)
+    chromium.wait(page, '#uavs', words)
+    assert (f'at {speedup:g} × real time' in text(page, 'header')) == (speedup != 1.0)
