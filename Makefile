@@ -6,12 +6,14 @@ SHELL := /bin/bash
 
 # node tests wait more than they compute
 WORKERS := 3
+# Ctrl-C ends a recipe, without what the programs in it report about that
+STOP := trap 'exit 130' INT
 ENV := . .ros/setup.sh
-RUN := . install/setup.bash && export PATH="$(CURDIR)/.ros/bin:$$PATH"
+RUN := $(STOP); . install/setup.bash 2> /dev/null && export PATH="$(CURDIR)/.ros/bin:$$PATH"
 
 demo: build
 	@echo '== demo: 4 UAVs, 32 tasks, 3 zones; results go to out/demo'
-	@$(RUN) && python3 -m uav_task_alloc.nodes.demo
+	@$(RUN) && install/uav_task_alloc/lib/uav_task_alloc/demo
 
 test: build
 	@echo '== ruff' && .ros/bin/ruff check .
@@ -30,13 +32,13 @@ build: install/.built install/.compiled
 
 .ros/.made: tools/ros_env/setup.sh tools/ros_env/requirements.txt tools/ros_env/python.txt
 	@echo '== ROS 2 Jazzy and Python packages into .ros/ (once, about a minute)'
-	@tools/ros_env/setup.sh .ros
+	@$(STOP); tools/ros_env/setup.sh .ros
 	@touch $@
 
 install/.built: .ros/.made setup.py setup.cfg package.xml colcon_defaults.yaml \
 		$(wildcard msg_defs/* msg_defs/*/* launch/* config/*.yaml config/*.rviz config/scenarios/*)
 	@echo '== colcon build (about a minute when messages changed)'
-	@mkdir -p log && $(ENV) && python3 -m colcon build --symlink-install > log/make_build.txt 2>&1 \
+	@$(STOP); mkdir -p log && $(ENV) && python3 -m colcon build --symlink-install > log/make_build.txt 2>&1 \
 		|| { tail -n 40 log/make_build.txt; exit 1; }
 	@touch $@
 

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Builds the Python package, and under colcon the messages of msg_defs/ with it."""
 import os
+import shlex
 import subprocess
 import sys
 from glob import glob
@@ -12,6 +13,7 @@ from setuptools.command.install import install
 
 NAME = 'uav_task_alloc'
 MESSAGES = NAME + '_msgs'
+PROGRAMS = ('allocator', 'mavlink_bridge', 'fleet_sim', 'scenario_player', 'live_view', 'demo')
 
 
 def add_messages(command):
@@ -42,21 +44,41 @@ def add_messages(command):
         subprocess.run(step, env=env, check=True)
 
 
+def add_programs(command, folder):
+    """Write the programs of the nodes where `ros2 run` looks for them; a wheel has none.
+
+    A console script would show a traceback for a Ctrl-C before its first line of ours.
+    """
+    if any(command.distribution.get_command_obj(name, create=False)
+           for name in ('bdist_wheel', 'editable_wheel')):
+        return
+    text = Path(__file__).resolve().parent.joinpath('resource/program.in').read_text()
+    Path(folder).mkdir(parents=True, exist_ok=True)
+    for name in PROGRAMS:
+        program = Path(folder, name)
+        program.unlink(missing_ok=True)
+        program.write_text(text.replace('@PYTHON@', shlex.quote(sys.executable))
+                           .replace('@NAME@', name))
+        program.chmod(0o755)
+
+
 class Install(install):
-    """`install`, and the messages after it."""
+    """`install`, and the programs and messages after it."""
 
     def run(self):
-        """Install this package, then the messages."""
+        """Install this package, then the programs and the messages."""
         super().run()
+        add_programs(self, self.install_scripts)
         add_messages(self)
 
 
 class Develop(develop):
-    """`develop` (colcon build --symlink-install), and the messages after it."""
+    """`develop` (colcon build --symlink-install), and the programs and messages after it."""
 
     def run(self):
-        """Link this package, then install the messages."""
+        """Link this package, then install the programs and the messages."""
         super().run()
+        add_programs(self, self.script_dir)
         add_messages(self)
 
 
@@ -87,11 +109,4 @@ setup(
     maintainer_email='uav_task_alloc@users.noreply.github.com',
     description='Allocates tasks to several UAVs as they arrive, around no-fly zones.',
     license='Apache-2.0',
-    entry_points={
-        'console_scripts': [
-            f'{node} = {NAME}.nodes.{node}:main'
-            for node in ('allocator', 'mavlink_bridge', 'fleet_sim', 'scenario_player',
-                         'live_view')
-        ],
-    },
 )

@@ -154,9 +154,21 @@ def with_node(act):
         rclpy.try_shutdown()
 
 
+def strictest_qos(offers):
+    """The QoS that every publisher offers, as `ros2 topic echo` asks for."""
+    from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+    return QoSProfile(
+        depth=10, reliability=ReliabilityPolicy.RELIABLE if all(
+            each.reliability == ReliabilityPolicy.RELIABLE for each in offers)
+        else ReliabilityPolicy.BEST_EFFORT,
+        durability=DurabilityPolicy.TRANSIENT_LOCAL if all(
+            each.durability == DurabilityPolicy.TRANSIENT_LOCAL for each in offers)
+        else DurabilityPolicy.VOLATILE)
+
+
 def topic(words):
     """ros2 topic pub|echo."""
-    from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+    from rclpy.qos import DurabilityPolicy, QoSProfile
     parser = argparse.ArgumentParser(prog='ros2 topic')
     parser.add_argument('verb', choices=('pub', 'echo'))
     parser.add_argument('name')
@@ -183,17 +195,10 @@ def topic(words):
         while not offers:
             spin()
             offers = node.get_publishers_info_by_topic(args.name)
-        every = [offer.qos_profile for offer in offers]
-        qos = QoSProfile(
-            depth=10, reliability=ReliabilityPolicy.RELIABLE if all(
-                each.reliability == ReliabilityPolicy.RELIABLE for each in every)
-            else ReliabilityPolicy.BEST_EFFORT,
-            durability=DurabilityPolicy.TRANSIENT_LOCAL if all(
-                each.durability == DurabilityPolicy.TRANSIENT_LOCAL for each in every)
-            else DurabilityPolicy.VOLATILE)
         received = []
         node.create_subscription(interface(args.type or offers[0].topic_type), args.name,
-                                 lambda message: (received.append(1), show(message)), qos)
+                                 lambda message: (received.append(1), show(message)),
+                                 strictest_qos([offer.qos_profile for offer in offers]))
         while not (args.once and received):
             spin()
 

@@ -64,6 +64,22 @@ def test_a_top_level_name_has_one_meaning():
     assert len(ALLOWED_TWICE) <= 5
 
 
+@pytest.mark.parametrize('path', [*FILES, *sorted((ROOT / 'test').rglob('*.py'))],
+                         ids=lambda path: path.relative_to(ROOT).as_posix())
+def test_files_and_functions_are_short(path):
+    text = path.read_text()
+    assert len(text.splitlines()) <= 400
+    lengths = {node.name: node.end_lineno - node.lineno + 1 - described(node)
+               for node in ast.walk(ast.parse(text)) if isinstance(node, ast.FunctionDef)}
+    assert {name: lines for name, lines in lengths.items() if lines > 40} == {}
+
+
+def described(node):
+    """Lines of a docstring."""
+    first = node.body[0]
+    return first.end_lineno - first.lineno + 1 if ast.get_docstring(node) else 0
+
+
 def test_each_class_of_the_glossary_is_where_it_says():
     text = (ROOT / 'docs' / 'glossary.md').read_text()
     names = re.findall(r'`((?:\w+\.)+[A-Z]\w+)`', text)

@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """The package as a whole: public names, launch files, interface files."""
+import os
 import re
+import signal
+import subprocess
 from pathlib import Path
 
 import pytest
@@ -66,3 +69,25 @@ def test_the_version_is_the_same_everywhere():
         *(re.search(r'<version>([\d.]+)', (ROOT / p).read_text()).group(1)
           for p in ('package.xml', 'msg_defs/package.xml'))}
     assert len(places) == 1
+
+
+def test_ctrl_c_in_make_build_shows_no_traceback_of_the_build(tmp_path):
+    """`python3` is a program that reports the signal as colcon does, at length."""
+    colcon = tmp_path / 'bin/python3'
+    colcon.parent.mkdir()
+    colcon.write_text('#!/bin/sh\ntrap "echo Traceback; exit 1" INT\n> begun\n'
+                      'while :; do sleep 0.05; done\n')
+    colcon.chmod(0o755)
+    (tmp_path / '.ros').mkdir()
+    for name in ('.ros/setup.sh', 'setup.py', 'setup.cfg', 'package.xml', 'colcon_defaults.yaml'):
+        (tmp_path / name).touch()
+    made = subprocess.Popen(
+        ['make', '-f', ROOT / 'Makefile', '-o', '.ros/.made', 'build'], cwd=tmp_path, text=True,
+        stdout=subprocess.PIPE, stderr=subprocess.STDOUT, start_new_session=True,
+        env={**os.environ, 'PATH': f'{colcon.parent}:{os.environ["PATH"]}'})
+    while not (tmp_path / 'begun').exists():
+        assert made.poll() is None, made.communicate()
+    os.killpg(made.pid, signal.SIGINT)  # as a terminal does
+    out, _ = made.communicate(timeout=20)
+    assert 'Error 130' in out
+    assert 'Traceback' not in out

@@ -12,6 +12,7 @@ from itertools import count
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from uav_task_alloc.atomic_files import sync_folder
 from uav_task_alloc.errors import JournalCorrupt, JournalError, JournalForeign, JournalInUse
 
 FILE_NAME = 'journal.sqlite3'
@@ -181,11 +182,7 @@ def _move_into_place(temporary: Path, path: Path) -> None:
         return
     except OSError:  # a file system without hard links
         temporary.rename(path)
-    folder = os.open(path.parent, os.O_RDONLY)
-    try:
-        os.fsync(folder)
-    finally:
-        os.close(folder)
+    sync_folder(path.parent)
 
 
 def _check_length(path: Path) -> None:

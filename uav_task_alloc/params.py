@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import Field, dataclass, field, fields
-from typing import Any, TypeVar
+from textwrap import wrap
+from typing import Any, TypeVar, cast
 
 from uav_task_alloc.errors import InvalidValue
 
@@ -47,7 +49,7 @@ def ros_name(spec: Field[Any]) -> str:
 
 
 def expectation(spec: Field[Any]) -> str:
-    """Return in words what a value must be.
+    """Describe what a value must be.
 
     Args:
         spec: the field of the parameter.
@@ -63,7 +65,13 @@ def expectation(spec: Field[Any]) -> str:
         high = math.inf if meta['high'] is None else meta['high']
         ends = ('(' if low == -math.inf else '[', ')' if high == math.inf else ']')
         return f'{kind} in {ends[0]}{low:g}, {high:g}{ends[1]} {meta["unit"]}'.rstrip()
-    return {'bool': 'true or false', 'str': 'text', 'tuple': 'a list'}[kind]
+    return {'bool': 'true or false', 'str': 'text',
+            'tuple': f'list of {_item_type(spec).__name__.replace("str", "text")}'}[kind]
+
+
+def _item_type(spec: Field[Any]) -> type[int | str]:
+    """Of a list."""
+    return int if spec.type == 'tuple[int, ...]' else str
 
 
 def check(spec: Field[Any], value: Any) -> Any:
@@ -82,11 +90,13 @@ def check(spec: Field[Any], value: Any) -> Any:
     meta, kind = spec.metadata, type(spec.default)
     if kind is float and isinstance(value, int) and not isinstance(value, bool):
         value = float(value)
-    if kind is tuple and not isinstance(value, str):
+    if kind is tuple and isinstance(value, Iterable) and not isinstance(value, str):
         value = tuple(value)
     wrong = (type(value) is not kind
              or (meta['choices'] and value not in meta['choices'])
              or (kind is float and value != value)
+             or (kind is tuple and any(type(item) is not _item_type(spec)
+                                   for item in cast('tuple[object, ...]', value)))
              or (meta['low'] is not None and value < meta['low'])
              or (meta['high'] is not None and value > meta['high']))
     if wrong:
@@ -294,6 +304,22 @@ def yaml_text(node: str) -> str:
         mark = '# ' if spec.default == () else ''
         lines.append(f'    {mark}{ros_name(spec)}: {_literal(spec.default)}')
     return '\n'.join(lines) + '\n'
+
+
+def help_text(kind: type[CheckedParams]) -> str:
+    """What `--help` of a node prints about its parameters, and how they are given."""
+    lines = ['Parameters:']
+    for spec in fields(kind):  # type: ignore[arg-type]
+        star = ' *' if spec.metadata['fixed'] else ''
+        lines.append(f'  {ros_name(spec)}{star}: {expectation(spec)}; '
+                     f'default {"empty" if spec.default == "" else _literal(spec.default)}')
+        lines += wrap(spec.metadata['text'], 90, initial_indent=' ' * 6,
+                      subsequent_indent=' ' * 6)
+    return '\n'.join([*lines, '  * is read at the start only.', '', 'Options:',
+                      '  --ros-args -p NAME:=VALUE       set a parameter',
+                      '  --ros-args --params-file FILE   set those of a YAML file',
+                      '  --ros-args --log-level LEVEL    debug, info (the default), warn, error',
+                      '  -h, --help                      show this text'])
 
 
 def markdown_text() -> str:

@@ -134,7 +134,7 @@ def in_the_field(space: str, seconds: float) -> dict[str, object]:
     back = field.until(lambda: field.has('before', 'amid_1', 'amid_2'))
     field.add('after')
     then = field.until(lambda: field.has('after'))
-    return {'cut_s': seconds, 'met_s': round(met, 2), 'heard_amid': listed,
+    return {'cut_s': seconds, 'met_s': round(met, 2), 'received_during_cut': listed,
             'back_s': round(back, 2), 'next_task_s': round(then, 2),
             'revisions': [revision, field.list.revision],
             'all_tasks': field.has('before', 'amid_1', 'amid_2', 'after')}

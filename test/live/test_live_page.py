@@ -74,7 +74,7 @@ def test_authority_is_shown_with_its_time_its_reason_and_what_gives_it_back(view
 def test_why_a_task_is_unassigned(view, run):
     page = view(run.snapshots)
     assert text(page, '#left') == 't5: inside zone z1'
-    assert find(page, 't5', 'Nobody flies t5: it is left out. Why: inside zone z1.')
+    assert find(page, 't5', 'No UAV flies t5: it is left out. Why: inside zone z1.')
 
 
 def test_what_the_last_replan_changed(view, run):

@@ -1,6 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The command of the demo up to the start of its nodes; `make demo` flies it."""
+"""The command of the demo up to the start of its nodes, and its end; `make demo` flies it."""
+import os
+import signal
+import subprocess
+import time
+from pathlib import Path
+
 import pytest
+from ament_index_python.packages import get_package_prefix
 
 from uav_task_alloc.nodes import demo
 
@@ -11,14 +18,15 @@ class Started(Exception):
     """All that the demo checks is good."""
 
 
-@pytest.fixture(autouse=True)
+@pytest.fixture
 def no_nodes(monkeypatch):
     def start(*_):
         raise Started
     monkeypatch.setattr(demo, 'start_nodes', start)
 
 
-def test_finding_34_a_folder_with_files_of_others_is_refused_and_left_as_it_is(tmp_path, capsys):
+def test_finding_34_a_folder_with_files_of_others_is_refused_and_left_as_it_is(
+        tmp_path, capsys, no_nodes):
     thesis = tmp_path / 'results' / 'thesis.tex'
     thesis.parent.mkdir()
     thesis.write_text('years of work')
@@ -27,7 +35,7 @@ def test_finding_34_a_folder_with_files_of_others_is_refused_and_left_as_it_is(t
     assert thesis.read_text() == 'years of work'
 
 
-def test_finding_34_a_bad_scenario_costs_no_earlier_results(tmp_path, capsys):
+def test_finding_34_a_bad_scenario_costs_no_earlier_results(tmp_path, capsys, no_nodes):
     with pytest.raises(Started):
         demo.main(['--out', str(tmp_path / 'out')])
     summary = tmp_path / 'out' / 'summary.json'
@@ -37,10 +45,34 @@ def test_finding_34_a_bad_scenario_costs_no_earlier_results(tmp_path, capsys):
     assert summary.exists()
 
 
-def test_finding_34_the_results_of_the_last_demo_are_removed(tmp_path):
+def test_finding_34_the_results_of_the_last_demo_are_removed(tmp_path, no_nodes):
     out = tmp_path / 'out'
     for _ in range(2):
         with pytest.raises(Started):
             demo.main(['--out', str(out)])
         assert not (out / 'summary.json').exists()
         (out / 'summary.json').write_text('{}')
+
+
+def children(pid):
+    found = subprocess.run(['ps', '-o', 'pid=', '--ppid', str(pid)], capture_output=True,
+                           text=True)
+    return [int(text) for text in found.stdout.split()]
+
+
+@pytest.mark.parametrize('delay', [0.02, 0.3, 1.0, 2.0, 4.0])  # [s]
+def test_a_demo_that_is_interrupted_ends_its_nodes_without_a_traceback(tmp_path, delay):
+    path = Path(get_package_prefix('uav_task_alloc'), 'lib/uav_task_alloc/demo')
+    process = subprocess.Popen([path, '--out', str(tmp_path / 'out')], stdout=subprocess.PIPE,
+                               stderr=subprocess.STDOUT, text=True)
+    time.sleep(delay)
+    nodes = children(process.pid)
+    process.send_signal(signal.SIGINT)  # to the demo only, not to its nodes as a terminal does
+    out, _ = process.communicate(timeout=40)
+    assert 'Traceback' not in out
+    assert (process.returncode, out.splitlines()[-1:]) in (
+        (0, ['demo: stopped during its start']), (130, ['demo: stopped; there is no summary']),
+        (-signal.SIGINT, []))
+    for node in nodes:
+        with pytest.raises(ProcessLookupError):
+            os.kill(node, 0)

@@ -26,7 +26,7 @@ def flying(kind):
     return bench
 
 
-def told_mode(bench):
+def reported_mode(bench):
     return of(bench.pass_time(1.1), 'HEARTBEAT')[-1].custom_mode
 
 
@@ -38,21 +38,21 @@ def ground_distance(a, b):
 def test_every_mode_is_entered_by_a_station_and_reported_in_the_heartbeat(kind, number):
     bench = flying(kind)
     assert bench.set_mode(number) == d.MAV_RESULT_ACCEPTED
-    assert told_mode(bench) == number
+    assert reported_mode(bench) == number
 
 
 @pytest.mark.parametrize(('kind', 'number'), NUMBERS)
 def test_every_mode_is_entered_by_the_pilot_too(kind, number):
     bench = flying(kind)
     assert bench.vehicle.rc_mode(number)
-    assert told_mode(bench) == number
+    assert reported_mode(bench) == number
 
 
 @pytest.mark.parametrize(('kind', 'number'), [('ardupilot', 16), ('px4', px4_mode(6))])
 def test_set_mode_enters_a_mode_too(kind, number):
     bench = flying(kind)
     bench.send(d.MAVLink_set_mode_message(1, 1, number), station=(7, 7))
-    assert told_mode(bench) == number
+    assert reported_mode(bench) == number
 
 
 @pytest.mark.parametrize(('kind', 'number'), [('ardupilot', 8), ('px4', px4_mode(9))])
@@ -137,13 +137,13 @@ def test_after_the_landing_px4_goes_to_hold_and_the_copter_stays_in_its_mode(kin
     bench = flying(kind)
     bench.set_mode(number)
     bench.until(lambda: not bench.flight.armed)
-    assert told_mode(bench) == (number if bench.own else px4_mode(4, 3))
+    assert reported_mode(bench) == (number if bench.own else px4_mode(4, 3))
 
 
 def test_px4_stays_in_the_land_mode_that_it_is_given_on_the_ground():
     bench = Bench('px4')
     bench.set_mode(FlightMode.LAND)
-    assert told_mode(bench) == px4_mode(4, 6)
+    assert reported_mode(bench) == px4_mode(4, 6)
 
 
 @pytest.mark.parametrize('kind', ['ardupilot', 'px4'])
@@ -153,7 +153,7 @@ def test_the_landing_of_a_return_item_ends_the_same_way(kind):
         1, 1, 0, 2, d.MAV_CMD_NAV_RETURN_TO_LAUNCH, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0)
     bench.fly(waypoint((50.0, 0.0, 30.0)), home)
     bench.until(lambda: not bench.flight.armed)
-    assert told_mode(bench) == (3 if bench.own else px4_mode(4, 3))
+    assert reported_mode(bench) == (3 if bench.own else px4_mode(4, 3))
 
 
 def test_a_change_between_two_stick_modes_is_a_change():

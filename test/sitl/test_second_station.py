@@ -149,6 +149,19 @@ def test_a_mode_set_by_a_second_station_lasts_until_the_hand_over(takeover):
     takeover.wait(3.0)
     at = held.position
 
+    each_stays_where_it_was_sent(takeover)
+    assert held.airborne
+    assert math.dist(held.position, at) < 10.0
+    takeover.until(lambda: bridge.courses[LEFT_ALONE].ended, 'the fourth has flown its list')
+
+    all_fly_after_the_hand_over(takeover)
+    for system, course in bridge.courses.items():
+        assert Counter(course.done) == Counter(list(course.places)), f'{system}: reported twice'
+        assert course.visits.visited == course.done, f'{system}: reported is not flown'
+
+
+def each_stays_where_it_was_sent(takeover):
+    bridge = takeover.bridge
     takeover.until(lambda: not bridge.telemetry(LANDED).armed, 'landed')
     takeover.until(lambda: not bridge.telemetry(RETURNED).armed, 'at home')
     assert math.dist(bridge.telemetry(RETURNED).position, HOMES[RETURNED]) < 5.0
@@ -157,8 +170,6 @@ def test_a_mode_set_by_a_second_station_lasts_until_the_hand_over(takeover):
     for system in (LANDED, RETURNED):
         assert not bridge.telemetry(system).armed
         assert bridge.telemetry(system).height < 2.0
-    assert held.airborne
-    assert math.dist(held.position, at) < 10.0
     assert bridge.taken == {LANDED: [], RETURNED: [], HELD: []}, '\n'.join(bridge.notes)
     assert {n: bridge.executor(n).authority.state for n in SYSTEMS} == {
         LANDED: AuthorityState.LOST,
@@ -166,8 +177,10 @@ def test_a_mode_set_by_a_second_station_lasts_until_the_hand_over(takeover):
         HELD: AuthorityState.LOST,
         LEFT_ALONE: AuthorityState.HELD,
     }
-    takeover.until(lambda: bridge.courses[LEFT_ALONE].ended, 'the fourth has flown its list')
 
+
+def all_fly_after_the_hand_over(takeover):
+    bridge = takeover.bridge
     for system in (LANDED, RETURNED):  # on the ground it takes the operator's leave to start
         executor = bridge.executor(system)
         executor.policy = replace(executor.policy, takeoff=False)
@@ -179,6 +192,3 @@ def test_a_mode_set_by_a_second_station_lasts_until_the_hand_over(takeover):
     for system in (LANDED, RETURNED, HELD):
         assert bridge.hand_over(system) == ''
     takeover.until(lambda: all(course.ended for course in bridge.courses.values()), 'all flown')
-    for system, course in bridge.courses.items():
-        assert Counter(course.done) == Counter(list(course.places)), f'{system}: reported twice'
-        assert course.visits.visited == course.done, f'{system}: reported is not flown'

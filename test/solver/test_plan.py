@@ -225,7 +225,7 @@ def test_a_home_inside_a_zone_is_the_reason_that_no_task_is_served(reach, zone):
     uav = Uav('u1', (300.0, 0.0, 30.0), reach, home=(0.0, 0.0, 0.0))
     result = quick([uav], [Task('t', (350.0, 0.0, 30.0))], [zone], route_end='home')
     assert result.routes == {'u1': ()}
-    assert result.unassigned == {'t': 'no safe way home; home of u1 lies inside zone z'}
+    assert result.unassigned == {'t': 'no safe path home; home of u1 is inside zone z'}
     assert quick([uav], [Task('t', (350.0, 0.0, 30.0))], [zone]).routes == {'u1': ('t',)}
 
 

@@ -71,7 +71,7 @@ def test_kept_results_are_not_computed_again(tmp_path, capsys):
     first = capsys.readouterr()
     assert bench.main(given) == 0
     second = capsys.readouterr()
-    assert (second.err, second.out) == ('4 of 4 results were there\n', first.out)
+    assert (second.err, second.out) == ('4 of 4 results exist already\n', first.out)
 
 
 @pytest.mark.parametrize(('given', 'error', 'text'), [

@@ -66,7 +66,7 @@ def test_a_second_run_runs_only_the_missing_jobs(tmp_path):
     run_campaign(jobs(2), tmp_path, threads, no_log, lambda: 0.0)
     log = []
     run_campaign(jobs(3), tmp_path, threads, log.append, lambda: 0.0)
-    assert log == ['2 of 3 results were there', '[3/3] square-2; about 0 s left']
+    assert log == ['2 of 3 results exist already', '[3/3] square-2; about 0 s left']
 
 
 def test_a_result_of_other_settings_is_computed_again(tmp_path):

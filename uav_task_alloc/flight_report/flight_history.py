@@ -12,7 +12,6 @@ from uav_task_alloc.model import Point
 from uav_task_alloc.record.events import sentences
 from uav_task_alloc.record.ground_truth import TrueSample
 from uav_task_alloc.record.plan_diff import (
-    DONE_STATES,
     changes_text,
     route_changes,
     route_lists,
@@ -23,7 +22,6 @@ from uav_task_alloc.record.run_state import Line, ReportedStatus, RunState
 
 _SAMPLE_PERIOD = 0.2  # [s] between the samples of a track
 MAX_EVENTS = 5000  # later ones are dropped
-END_STATES = ('COMPLETED', 'FAILED', 'CANCELLED', 'REJECTED')
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,7 +76,7 @@ class FlightHistory:
     def apply(self, line: Line) -> None:
         """Add one line of the record."""
         if line['kind'] == 'run':
-            self.run.speedup = line['speedup']
+            self.run.on_run(line)
             return
         if 0.0 < self.run.last < line['wall'] - SILENT_AFTER:
             self.gaps.append(ReceptionGap('', self.run.last, line['wall']))
@@ -117,9 +115,7 @@ class FlightHistory:
         for row in tasks:
             if None not in row.get('position', (None,)):
                 self.positions[row['id']] = tuple(row['position'])
-        before = self.run.lists.get(uav)
-        old = before['tasks'][0]['id'] if before and before['tasks'] else None
-        if tasks and tasks[0]['id'] != old and self.tracks.get(uav):
+        if self.run.begins_leg(line) and self.tracks.get(uav):
             leg = [self.tracks[uav][-1].point, *self.points(tasks[:1])]
             self.planned.setdefault(uav, []).append(leg)
 
@@ -133,10 +129,8 @@ class FlightHistory:
         line, self.last_plan = self.last_plan, None
         if line is None:
             return
-        done = {task for task, status in self.run.statuses.items()
-                if status.state in DONE_STATES}
         after = route_lists(line)
-        changed = changes_text(route_changes(self.routes, after, done))
+        changed = changes_text(route_changes(self.routes, after, self.run.completed()))
         self.routes = after
         self.replans.append(ReplanRecord(
             line['wall'], line['revision'], trigger_text(line['trigger']), changed,

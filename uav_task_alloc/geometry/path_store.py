@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Paths that were found, by their ends: a ring buffer that overwrites the oldest.
 
-Several threads may write at once, and zones may have changed since. Whoever loads a path has to
-check that it is clear, and as long as expected.
+Several threads may write at once, and zones may have changed since. A caller that loads a path
+has to check that it is clear, and as long as expected.
 """
 from __future__ import annotations
 

@@ -42,6 +42,32 @@ def segment_fraction(point: Coordinates, start: Coordinates, end: Coordinates) -
     return sum((x - p) * d for x, p, d in zip(point, start, along, strict=True)) / square
 
 
+def point_at(start: Coordinates, end: Coordinates, fraction: float) -> tuple[float, ...]:
+    """Return a point on the line through a segment; the inverse of `segment_fraction`.
+
+    Args:
+        start, end: [m], of the same dimension.
+        fraction: 0.0 at `start`, 1.0 at `end`.
+
+    Returns:
+        [m], of that dimension.
+    """
+    return tuple(p + fraction * (q - p) for p, q in zip(start, end, strict=True))
+
+
+def nearest_on_segment(point: Coordinates, start: Coordinates,
+                       end: Coordinates) -> tuple[float, ...]:
+    """Return the spot of a segment that is nearest to a point.
+
+    Args:
+        point, start, end: [m], of the same dimension.
+
+    Returns:
+        [m], of that dimension.
+    """
+    return point_at(start, end, min(1.0, max(0.0, segment_fraction(point, start, end))))
+
+
 def segment_distance(point: Coordinates, start: Coordinates, end: Coordinates) -> float:
     """Return the distance from a point to the nearest spot of a segment.
 
@@ -51,8 +77,7 @@ def segment_distance(point: Coordinates, start: Coordinates, end: Coordinates) -
     Returns:
         [m].
     """
-    fraction = min(1.0, max(0.0, segment_fraction(point, start, end)))
-    return math.dist(point, [p + fraction * (q - p) for p, q in zip(start, end, strict=True)])
+    return math.dist(point, nearest_on_segment(point, start, end))
 
 
 def points_passed(position: Coordinates, points: Sequence[Coordinates],

@@ -22,7 +22,7 @@ from uav_task_alloc.geometry.outline import corner_turn
 from uav_task_alloc.geometry.points import point_distance
 from uav_task_alloc.geometry.polygon import orientation
 from uav_task_alloc.geometry.search_budget import spend
-from uav_task_alloc.kernel import allocating_kernel
+from uav_task_alloc.kernel import allocating_kernel, inline_kernel
 
 FEW_CORNERS = 160  # up to here edges are tested as late as possible
 
@@ -248,6 +248,16 @@ def _nearest_open(cost: Floats, ahead: Floats, state: Any) -> int:
     return v
 
 
+@inline_kernel
+def _follow(parent: Ints, path: Ints) -> int:
+    """Write the corners from 0 over their parents into `path`; returns how many. O(corners)"""
+    size, v = 0, 0
+    while v >= 0:
+        path[size] = v
+        size, v = size + 1, parent[v]
+    return size
+
+
 @allocating_kernel
 def astar(zones: Zones, active: Ints, x: Floats, floor: float, no_skin: bool, path: Ints,
           work: Ints) -> int:
@@ -292,9 +302,4 @@ def astar(zones: Zones, active: Ints, x: Floats, floor: float, no_skin: bool, pa
         state[v], closed[done], u = 1, v, v
         done += 1
         if v == 0:
-            break
-    size = 0
-    while v >= 0:
-        path[size] = v
-        size, v = size + 1, parent[v]
-    return size
+            return _follow(parent, path)

@@ -7,7 +7,6 @@ from typing import Any
 
 from uav_task_alloc.record.events import sentences
 from uav_task_alloc.record.plan_diff import (
-    DONE_STATES,
     RouteLists,
     changes_text,
     route_changes,
@@ -79,11 +78,9 @@ class Scene:
 
     def plan(self, line: Line) -> LogEntry:
         """The log entry of a plan: its changes to the plan before."""
-        done = {task for task, status in self.run.statuses.items()
-                if status.state in DONE_STATES}
         after = route_lists(line)
         is_first = self.routes is None
-        rows = route_changes(self.routes or {}, after, done)
+        rows = route_changes(self.routes or {}, after, self.run.completed())
         self.routes = after
         trigger = trigger_text(line['trigger'])
         if rows:

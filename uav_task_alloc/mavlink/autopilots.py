@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from enum import Enum
+from enum import Enum, IntEnum
 from typing import Protocol
 
 from pymavlink.dialects.v20 import ardupilotmega as d
@@ -25,6 +25,37 @@ class ModeFunction(Enum):
     LAND = 'land'
     PILOT = 'pilot'  # flown or held by a human
     UNKNOWN = 'unknown'
+
+
+class Px4MainMode(IntEnum):
+    """Main modes of PX4 (PX4_CUSTOM_MAIN_MODE of px4_custom_mode.h), not in the dialect.
+
+    https://github.com/PX4/PX4-Autopilot/blob/main/src/modules/commander/px4_custom_mode.h
+    """
+
+    MANUAL = 1
+    ALTCTL = 2
+    POSCTL = 3
+    AUTO = 4
+    ACRO = 5
+    OFFBOARD = 6
+    STABILIZED = 7
+    RATTITUDE = 8
+    TERMINATION = 10
+
+
+class Px4AutoMode(IntEnum):
+    """Sub modes of PX4's AUTO (PX4_CUSTOM_SUB_MODE_AUTO of px4_custom_mode.h)."""
+
+    READY = 1
+    TAKEOFF = 2
+    LOITER = 3
+    MISSION = 4
+    RTL = 5
+    LAND = 6
+    FOLLOW_TARGET = 8
+    PRECLAND = 9
+    VTOL_TAKEOFF = 10
 
 
 class CommandTarget(Protocol):
@@ -132,6 +163,10 @@ def px4_mode_parts(custom_mode: int) -> tuple[int, int]:
     return custom_mode >> 16 & 0xff, custom_mode >> 24 & 0xff
 
 
+def _auto(sub: Px4AutoMode) -> int:
+    return px4_custom_mode(Px4MainMode.AUTO, sub)
+
+
 _COPTER = {
     d.COPTER_MODE_AUTO: ModeFunction.MISSION,
     d.COPTER_MODE_GUIDED: ModeFunction.HOLD,
@@ -149,12 +184,12 @@ _PLANE = {
     d.PLANE_MODE_QLAND: ModeFunction.LAND,
 }
 _PX4 = {
-    px4_custom_mode(4, 2): ModeFunction.TAKEOFF,
-    px4_custom_mode(4, 3): ModeFunction.HOLD,
-    px4_custom_mode(4, 4): ModeFunction.MISSION,
-    px4_custom_mode(4, 5): ModeFunction.RETURN,
-    px4_custom_mode(4, 6): ModeFunction.LAND,
-    px4_custom_mode(4, 1): ModeFunction.HOLD,
+    _auto(Px4AutoMode.TAKEOFF): ModeFunction.TAKEOFF,
+    _auto(Px4AutoMode.LOITER): ModeFunction.HOLD,
+    _auto(Px4AutoMode.MISSION): ModeFunction.MISSION,
+    _auto(Px4AutoMode.RTL): ModeFunction.RETURN,
+    _auto(Px4AutoMode.LAND): ModeFunction.LAND,
+    _auto(Px4AutoMode.READY): ModeFunction.HOLD,
 }
 
 ARDUPILOT = Profile(
@@ -180,9 +215,9 @@ PX4 = Profile(
     amsl_takeoff=True,
     farthest_first=10_000.0,  # MIS_DIST_1WP
     set_mode={
-        ModeFunction.MISSION: px4_custom_mode(4, 4),
-        ModeFunction.HOLD: px4_custom_mode(4, 3),
-        ModeFunction.RETURN: px4_custom_mode(4, 5),
+        ModeFunction.MISSION: _auto(Px4AutoMode.MISSION),
+        ModeFunction.HOLD: _auto(Px4AutoMode.LOITER),
+        ModeFunction.RETURN: _auto(Px4AutoMode.RTL),
     },
 )
 PX4_PLANE = replace(PX4, rules=replace(PX4.rules, loiters=True, radius=0.0))

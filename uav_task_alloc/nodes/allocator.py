@@ -336,4 +336,4 @@ class AllocatorNode(Node):
 
 def main(args: list[str] | None = None) -> None:
     """Entry point of `ros2 run uav_task_alloc allocator`."""
-    run(AllocatorNode, args)
+    run(AllocatorNode, args, params=AllocatorParams)

@@ -9,7 +9,8 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -25,6 +26,7 @@ from uav_task_alloc.scenario.node_parameters import Parameters
 
 _PACKAGE = 'uav_task_alloc'
 _EXIT_TIMEOUT = 15.0  # [s]; the bridge waits up to 10 s for a running upload
+_INTERRUPTED = 130  # exit status of a shell after Ctrl-C
 _FAULTS = ('tasks_lost', 'tasks_flown_twice', 'zone_violations')
 
 
@@ -81,19 +83,21 @@ def start_nodes(args: argparse.Namespace, out: Path) -> list[NodeProcess]:
             for node, values in parameters.items()]
 
 
-def wait_for_end(processes: list[NodeProcess], limit: float) -> list[str]:
+def wait_for_end(processes: list[NodeProcess], limit: float,
+                 signals: Sequence[int]) -> list[str]:
     """Wait for the live view to exit.
 
     Args:
         processes: of all nodes, the live view last.
         limit: of wall time [s].
+        signals: those received; the wait ends with the first.
 
     Returns:
         What went wrong: nodes that have died, or the timeout.
     """
     *nodes, view = processes
     end = time.monotonic() + limit
-    while time.monotonic() < end:
+    while time.monotonic() < end and not signals:
         try:
             view.process.wait(0.2)
             return []
@@ -103,7 +107,7 @@ def wait_for_end(processes: list[NodeProcess], limit: float) -> list[str]:
         if dead:
             return [f'{node.name} died with status {node.process.returncode}, see {node.log}'
                     for node in dead]
-    return [f'not finished after {limit:g} s']
+    return [] if signals else [f'not finished after {limit:g} s']
 
 
 def find_faults(summary: Mapping[str, object]) -> list[str]:
@@ -121,17 +125,36 @@ def fly_scenario(args: argparse.Namespace) -> int:
     out = args.out
     load(args.scenario)  # an invalid one must not cost earlier results
     run_folder.prepare(out)
-    processes = start_nodes(args, out)
-    try:
-        faults = wait_for_end(processes, args.limit)
-    finally:
-        codes = {process.name: process.stop() for process in reversed(processes)}
+    with received_signals() as signals:
+        processes = start_nodes(args, out)
+        try:
+            faults = wait_for_end(processes, args.limit, signals)
+        finally:
+            codes = {process.name: process.stop() for process in reversed(processes)}
+    if signals:
+        raise KeyboardInterrupt
     faults += [f'{name} ended with status {code}' for name, code in codes.items()
                if code and not any(name in fault for fault in faults)]
     faults += write_results(out, time.monotonic() - started_at)
     for fault in faults:
         print(f'FAULT: {fault}', file=sys.stderr)
     return 1 if faults else 0
+
+
+@contextmanager
+def received_signals() -> Iterator[list[int]]:
+    """A list that fills with the signals to stop, which interrupt nothing meanwhile.
+
+    An exception while the nodes are started would leave some of them running.
+    """
+    signals: list[int] = []
+    before = {number: signal.signal(number, lambda number, _: signals.append(number))
+              for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield signals
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
 
 
 def write_results(out: Path, duration: float) -> list[str]:
@@ -146,7 +169,17 @@ def write_results(out: Path, duration: float) -> list[str]:
 
 
 def main(argv: list[str] | None = None) -> int:
-    """Command line of the demo; returns the exit status."""
+    """Command line of the demo; returns the exit status, 130 after a signal."""
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, signal.default_int_handler)
+    try:
+        return _run(argv)
+    except KeyboardInterrupt:
+        print('demo: stopped; there is no summary', file=sys.stderr)
+        return _INTERRUPTED
+
+
+def _run(argv: list[str] | None) -> int:
     share = Path(get_package_share_directory(_PACKAGE))
     parser = argparse.ArgumentParser(prog='demo', description=__doc__)
     parser.add_argument('--scenario', type=Path, default=share / 'config/scenarios/demo.yaml')

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Simulates the UAVs of a scenario as ArduPilot and PX4 vehicles that speak MAVLink."""
+"""Simulates the UAVs of a scenario as ArduPilot and PX4 vehicles with MAVLink connections."""
 from __future__ import annotations
 
 from rclpy.node import Node
@@ -61,4 +61,4 @@ def vehicle_config(uav: scenario.ScenarioUav, played: scenario.Scenario,
 
 def main(args: list[str] | None = None) -> None:
     """Entry point of `ros2 run uav_task_alloc fleet_sim`."""
-    run(FleetSim, args)
+    run(FleetSim, args, params=FleetSimParams)

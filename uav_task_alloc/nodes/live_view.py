@@ -253,4 +253,4 @@ class LiveView(Node):
 
 def main(args: list[str] | None = None) -> None:
     """Entry point of `ros2 run uav_task_alloc live_view`."""
-    run(LiveView, with_flags(args or sys.argv, 'record'))
+    run(LiveView, with_flags(args or sys.argv, 'record'), params=LiveViewParams)

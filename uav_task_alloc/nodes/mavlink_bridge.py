@@ -251,4 +251,4 @@ class MavlinkBridge(Node):
 
 def main() -> None:
     """Entry point of `ros2 run uav_task_alloc mavlink_bridge`."""
-    run(MavlinkBridge)
+    run(MavlinkBridge, params=BridgeParams)

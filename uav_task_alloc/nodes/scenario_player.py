@@ -117,4 +117,4 @@ def describe(moment: scenario.Moment) -> str:
 
 def main(args: list[str] | None = None) -> None:
     """Entry point of `ros2 run uav_task_alloc scenario_player`."""
-    run(ScenarioPlayer, args)
+    run(ScenarioPlayer, args, params=PlayerParams)

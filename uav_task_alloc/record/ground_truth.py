@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from itertools import pairwise
 from pathlib import Path
 
-from uav_task_alloc.geometry.polyline import polyline_length
+from uav_task_alloc.geometry.polyline import point_at, polyline_length
 from uav_task_alloc.geometry.zones import distance
 from uav_task_alloc.model import Point
 from uav_task_alloc.record.run_state import Line, ZoneInterval, read_lines
@@ -142,7 +142,7 @@ def _resampled(track: Sequence[TrueSample]) -> Iterable[tuple[float, Point]]:
         steps = max(1, math.ceil(math.dist(a.point, b.point) / _STEP))
         for k in range(steps):
             share = k / steps
-            x, y, z = (p + share * (q - p) for p, q in zip(a.point, b.point, strict=True))
+            x, y, z = point_at(a.point, b.point, share)
             yield a.wall + share * (b.wall - a.wall), (x, y, z)
     if track:
         yield track[-1].wall, track[-1].point

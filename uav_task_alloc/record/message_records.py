@@ -148,7 +148,7 @@ def allocation_record(msg: _Message) -> RecordBody:
         'kind': 'allocation',
         'revision': msg.revision,
         'trigger': msg.trigger,
-        'solve_ms': 1e3 * seconds(msg.solve_time),
+        'solve_ms': 1e3 * from_stamp(msg.solve_time),
         'iterations': msg.iterations,
         'warm_started': msg.warm_started,
         'fit': finite_or_none(msg.fit),
@@ -167,10 +167,10 @@ def task_list_record(msg: _Message) -> RecordBody:
         Kind `list`; `stamp` [unix s], `eta` [s] from `stamp`, lengths in m.
     """
     return {'kind': 'list', 'uav': msg.uav_id, 'revision': msg.revision, 'end': msg.end,
-            'stamp': seconds(msg.header.stamp),
+            'stamp': from_stamp(msg.header.stamp),
             'distance': finite_or_none(msg.distance), 'tasks': [
                 {'id': row.task.task_id, 'leg_distance': finite_or_none(row.leg_distance) or 0.0,
-                 'eta': seconds(row.eta),
+                 'eta': from_stamp(row.eta),
                  'position': [finite_or_none(v) for v in _xyz(row.task.position)],
                  'via': [xyz for xyz in map(_xyz, row.via) if all(map(math.isfinite, xyz))]}
                 for row in msg.tasks]}
@@ -247,8 +247,15 @@ def finite_or_none(value: float) -> float | None:
     return float(value) if math.isfinite(value) else None
 
 
-def seconds(time: _Message) -> float:
-    """A Time or Duration message in [s]."""
+def from_stamp(time: _Message) -> float:
+    """Return a Time or Duration message as a number.
+
+    Args:
+        time: as received.
+
+    Returns:
+        [s].
+    """
     return float(time.sec) + float(time.nanosec) * 1e-9
 
 

@@ -10,7 +10,6 @@ from uav_task_alloc.errors import first_of
 from uav_task_alloc.record.run_state import Line
 
 RouteLists = Mapping[str, Sequence[str]]  # task ids in the order flown, by UAV
-DONE_STATES = ('COMPLETED',)
 _TRIGGER_TEXTS = {'ADD': 'new task', 'UPDATE': 'changed task', 'CANCEL': 'withdrawn task'}
 
 
@@ -55,7 +54,7 @@ def route_changes(before: RouteLists, after: RouteLists, done: set[str]) -> list
 
 
 def trigger_text(trigger: str) -> str:
-    """Return the trigger of a re-plan in words: `ADD a01` is `new task a01`.
+    """Return the trigger of a re-plan as a text for users: `ADD a01` is `new task a01`.
 
     Args:
         trigger: of an Allocation; several are separated by commas.

@@ -14,7 +14,8 @@ from uav_task_alloc.model import Point, ThreatZone
 from uav_task_alloc.zone_codec import decode_zone
 
 RECORD_FILE = 'record.jsonl'
-FINAL_STATES = ('COMPLETED', 'FAILED', 'CANCELLED', 'REJECTED', 'UNASSIGNED')
+END_STATES = ('COMPLETED', 'FAILED', 'CANCELLED', 'REJECTED')
+FINAL_STATES = (*END_STATES, 'UNASSIGNED')
 SINCE_TOLERANCE = 3.0  # [s] of a start time: reports are in whole seconds and arrive late
 Line = Mapping[str, Any]  # `wall` [unix s], `kind`, and the values that RunState.on_KIND reads
 
@@ -129,12 +130,16 @@ class RunState:
 
     def on_list(self, line: Line) -> None:
         """A task list; the leg to a task is taken from the list in which it became the first."""
-        before = self.lists.get(line['uav'])
-        old = before['tasks'][0]['id'] if before and before['tasks'] else None
-        if line['tasks'] and line['tasks'][0]['id'] != old:
+        if self.begins_leg(line):
             first = line['tasks'][0]
             self.legs[line['uav'], first['id']] = first['leg_distance']
         self.lists[line['uav']] = line
+
+    def begins_leg(self, line: Line) -> bool:
+        """Whether a list has another first task than the newest list of its UAV."""
+        before = self.lists.get(line['uav'])
+        old = before['tasks'][0]['id'] if before and before['tasks'] else None
+        return bool(line['tasks']) and line['tasks'][0]['id'] != old
 
     def on_state(self, line: Line) -> None:
         """The state of one UAV."""
@@ -165,6 +170,10 @@ class RunState:
     def count(self, *states: str) -> int:
         """Number of tasks in one of these states."""
         return sum(status.state in states for status in self.statuses.values())
+
+    def completed(self) -> set[str]:
+        """Ids of the completed tasks."""
+        return {task for task, status in self.statuses.items() if status.state == 'COMPLETED'}
 
     def start(self) -> float:
         """Time of the first announced task [unix s]; of the first line where there is none."""

@@ -53,9 +53,10 @@ def _reason(problem: Problem, i: int, short: Floats) -> str:
         return _unable(problem, task)
     need, nearest = _nearest(problem, i, short, np.argsort(short, kind='stable').tolist())
     if need == math.inf and _given_up(problem, i):
-        return 'no safe way past the zones found in the time; sought again with the next plan'
+        return ('no safe path past the zones found in the time; searched for again with the next '
+                'plan')
     if need == math.inf:
-        return _no_way_home(problem, i) or 'unreachable: no safe way past the zones' + (
+        return _no_path_home(problem, i) or 'unreachable: no safe path past the zones' + (
             '' if a.compatible[:, i].all() else ' for the UAVs that may serve it')
     if need > a.range_left[nearest]:
         return (f'beyond the range of every UAV: {problem.uavs[nearest].id} needs '
@@ -83,7 +84,7 @@ def _given_up(problem: Problem, i: int) -> bool:
         for u in np.flatnonzero(a.compatible[:, i]))
 
 
-def _no_way_home(problem: Problem, i: int) -> str:
+def _no_path_home(problem: Problem, i: int) -> str:
     """The reason of the i-th task where a UAV can reach it, but none returns; else empty."""
     a, uavs = problem.arrays, problem.uavs
     able = [u for u in np.flatnonzero(a.compatible[:, i])
@@ -91,9 +92,9 @@ def _no_way_home(problem: Problem, i: int) -> str:
     if not problem.rules.returns or not able:
         return ''
     around = {uavs[u].id: problem.distances.zones_around(a.ends + int(u)) for u in able}
-    inside = [f'home of {uav_id} lies inside zone {", ".join(zones)}'
+    inside = [f'home of {uav_id} is inside zone {", ".join(zones)}'
               for uav_id, zones in around.items() if zones]
-    return '; '.join(['no safe way home', *inside])
+    return '; '.join(['no safe path home', *inside])
 
 
 def _unable(problem: Problem, task: Task) -> str:

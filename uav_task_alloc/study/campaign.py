@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import BrokenExecutor, CancelledError, Executor, as_completed
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
+
+from uav_task_alloc.atomic_files import replace_file
 
 MAX_BROKEN_EXECUTORS = 3  # in a row, without a single result
 ExecutorFactory = Callable[[], AbstractContextManager[Executor]]
@@ -77,7 +78,7 @@ def run_campaign(jobs: Sequence[Job], folder: Path, open_executor: ExecutorFacto
     folder.mkdir(parents=True, exist_ok=True)
     outcome = load_results(jobs, folder)
     if outcome.results:
-        log(f'{len(outcome.results)} of {len(jobs)} results were there')
+        log(f'{len(outcome.results)} of {len(jobs)} results exist already')
     progress = CampaignProgress(jobs, outcome, log, clock)
     attempts = MAX_BROKEN_EXECUTORS
     while remaining := [job for job in jobs if job.name not in progress.finished()]:
@@ -118,10 +119,7 @@ def _run(executor: Executor, jobs: Sequence[Job]) -> Iterator[tuple[Job, Any, bo
 def _store(folder: Path, job: Job, result: Any) -> Any:
     """Write a result atomically; returns it as a later run will read it."""
     text = json.dumps({'key': job.key(), 'result': result}, indent=1)
-    path = folder / f'{job.name}.json'
-    unfinished = path.with_suffix('.half')
-    unfinished.write_text(text + '\n')
-    os.replace(unfinished, path)
+    replace_file(folder / f'{job.name}.json', text + '\n')
     return json.loads(text)['result']
 
 

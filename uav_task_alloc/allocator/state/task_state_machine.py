@@ -26,7 +26,7 @@ class TaskTransition(Enum):
     COMPLETE = 'COMPLETED by the UAV that has it'
     COMPLETE_MOVED = 'COMPLETED by a UAV that had it'
     FAIL = 'FAILED on the UAV that has it, others may try'
-    FAIL_LAST = 'FAILED once too often, or nobody else can'
+    FAIL_LAST = 'FAILED too often, or on all UAVs that can'
     FAIL_MOVED = 'FAILED on a UAV that had it'
 
 

@@ -64,9 +64,9 @@ class ZoneChecks:
         self._fleet.set_zone(uav_id, zone, home_zone, blocked)
         if blocked != record.blocked_on_ground:
             self._note(f'{blocked}: it gets no tasks' if blocked else
-                       f'{uav_id} may get tasks again: it is on the ground inside no zone',
+                       f'{uav_id} may get tasks again: it is on the ground outside all zones',
                        bool(blocked))
-            self._request_replan(blocked or f'{uav_id} is on the ground inside no zone', now)
+            self._request_replan(blocked or f'{uav_id} is on the ground outside all zones', now)
         elif bool(zone) != record.inside_zone:
             where = 'inside' if zone else 'out of'
             self._note(f'{uav_id} is {where} a zone', warning=bool(zone))

@@ -132,11 +132,11 @@ export function answer(id, model) {
   const [state, uav, reason] = stateOf(id, model), turn = model.turns.get(id);
   if (turn) return {text: turnText(id, turn, model)};
   if (state === 'COMPLETED') return {text: `${id} is done: ${uav || 'a UAV'} completed it.`};
-  if (state === 'CANCELLED') return {text: `${id} was withdrawn. Nobody flies it.`};
+  if (state === 'CANCELLED') return {text: `${id} was withdrawn. No UAV flies it.`};
   if (LEFT.includes(state) || reason) {
     const what = {FAILED: 'it failed', REJECTED: 'it was refused'}[state] || 'it is left out';
     const why = reason || 'no reason given';
-    return {text: `Nobody flies ${id}: ${what}. Why: ${why}.`, bad: true};
+    return {text: `No UAV flies ${id}: ${what}. Why: ${why}.`, bad: true};
   }
   if (state === 'PENDING') return {text: `${id} waits for the next plan.`};
   return {text: `${id} is given to ${uav}, whose list has not arrived yet.`};

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any, get_type_hints
 from urllib.parse import quote
 
+from uav_task_alloc.atomic_files import replace_file, sync_folder
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.mavlink.gcs.authority import AuthorityRecord, AuthorityState, TaskMark
 
@@ -117,7 +118,7 @@ class AuthorityFileStore:
         for uav_id, record in list(self._unsaved.items()):
             path = self.path(uav_id)
             try:
-                self._write(path, self._text(uav_id, record))
+                replace_file(path, self._text(uav_id, record))
             except (OSError, ValueError) as error:
                 error_text = f'{path}: not written: {error}{self._remove(path)}'
                 first_error = first_error or error_text
@@ -133,7 +134,7 @@ class AuthorityFileStore:
         """Remove an outdated file; returns an error text, '' where it is removed."""
         try:
             path.unlink(missing_ok=True)
-            self._sync()
+            sync_folder(self._folder)
         except OSError as error:
             return f'; what it holds is out of date, and it cannot be removed: {error}'
         return ''
@@ -144,28 +145,6 @@ class AuthorityFileStore:
         body = {'format': _FORMAT, 'uav_id': uav_id, 'boot': self._boot,
                 'record': row | {'state': record.state.name}}
         return json.dumps(body, indent=1, allow_nan=False) + '\n'
-
-    def _write(self, path: Path, text: str) -> None:
-        """Replace a file atomically: at any crash it has the old content or the new one."""
-        temporary = path.with_suffix('.tmp')
-        try:
-            with open(temporary, 'w', encoding='utf-8') as file:
-                file.write(text)
-                file.flush()
-                os.fsync(file.fileno())
-            os.replace(temporary, path)
-        except OSError:
-            temporary.unlink(missing_ok=True)
-            raise
-        self._sync()
-
-    def _sync(self) -> None:
-        """Flush the directory entries to disk."""
-        folder = os.open(self._folder, os.O_RDONLY | os.O_DIRECTORY)
-        try:
-            os.fsync(folder)
-        finally:
-            os.close(folder)
 
 
 def _read(path: Path) -> str:

@@ -42,7 +42,7 @@ class CommandSender:
     def __init__(self, peer: Peer, profile: Profile, telemetry: Telemetry) -> None:
         self._peer, self._profile, self._telemetry = peer, profile, telemetry
         self.notes: deque[OperatorNote] = deque()
-        self.waits_for = ''  # what the bridge waits for, in words; '': nothing
+        self.waits_for = ''  # text on what the bridge waits for; '': nothing
         self.commanded: ModeFunction | None = None  # the latest mode set by the bridge
         self.must_start = False  # airborne and held by the bridge: set mission mode
         self.armed_here = False  # armed by the bridge, on the ground: take-off or disarm is next

@@ -92,7 +92,7 @@ class EndOfList:
         return []
 
     def _blocked_home(self) -> str:
-        """Why it must not fly straight home, in words; '': it may."""
+        """Why it must not fly straight home; '': it may."""
         telemetry, zones = self._telemetry, self._policy().zones
         if telemetry.home is None or not telemetry.has_position:
             return 'its path home is not known' if zones else ''

@@ -6,7 +6,7 @@ from enum import Enum
 
 from pymavlink.dialects.v20 import ardupilotmega as d
 
-from uav_task_alloc.mavlink.autopilots import px4_mode_parts
+from uav_task_alloc.mavlink.autopilots import Px4AutoMode, Px4MainMode, px4_mode_parts
 
 
 class ModeClass(Enum):
@@ -45,12 +45,16 @@ _PLANE = {
     d.PLANE_MODE_QAUTOTUNE: 'QAUTOTUNE', d.PLANE_MODE_QACRO: 'QACRO',
     d.PLANE_MODE_THERMAL: 'THERMAL', d.PLANE_MODE_LOITER_ALT_QLAND: 'LOITER_ALT_QLAND',
     d.PLANE_MODE_AUTOLAND: 'AUTOLAND'}
-# PX4's modes are not in the dialect: px4_custom_mode.h
-_PX4_MAIN = {1: 'Manual', 2: 'Altitude', 3: 'Position', 5: 'Acro', 6: 'Offboard',
-             7: 'Stabilized', 8: 'Rattitude', 10: 'Termination'}
-_PX4_AUTO = {1: 'Ready', 2: 'Takeoff', 3: 'Hold', 4: 'Mission', 5: 'Return', 6: 'Land',
-             8: 'Follow', 9: 'Precision Land', 10: 'VTOL Takeoff'}
-_AUTO = 4  # PX4's main mode with sub modes
+_PX4_MAIN: dict[int, str] = {
+    Px4MainMode.MANUAL: 'Manual', Px4MainMode.ALTCTL: 'Altitude', Px4MainMode.POSCTL: 'Position',
+    Px4MainMode.ACRO: 'Acro', Px4MainMode.OFFBOARD: 'Offboard',
+    Px4MainMode.STABILIZED: 'Stabilized', Px4MainMode.RATTITUDE: 'Rattitude',
+    Px4MainMode.TERMINATION: 'Termination'}
+_PX4_AUTO: dict[int, str] = {
+    Px4AutoMode.READY: 'Ready', Px4AutoMode.TAKEOFF: 'Takeoff', Px4AutoMode.LOITER: 'Hold',
+    Px4AutoMode.MISSION: 'Mission', Px4AutoMode.RTL: 'Return', Px4AutoMode.LAND: 'Land',
+    Px4AutoMode.FOLLOW_TARGET: 'Follow', Px4AutoMode.PRECLAND: 'Precision Land',
+    Px4AutoMode.VTOL_TAKEOFF: 'VTOL Takeoff'}
 
 # family -> (MISSION, HOLD, STICK); every other mode is OWN
 _ARDUPILOT = {
@@ -65,10 +69,13 @@ _ARDUPILOT = {
         d.PLANE_MODE_FLY_BY_WIRE_A, d.PLANE_MODE_FLY_BY_WIRE_B, d.PLANE_MODE_CRUISE,
         d.PLANE_MODE_AUTOTUNE, d.PLANE_MODE_QSTABILIZE, d.PLANE_MODE_QHOVER,
         d.PLANE_MODE_QLOITER, d.PLANE_MODE_QACRO}))}
-_PX4_STICK = frozenset({1, 2, 3, 5, 7, 8})  # main modes
+_PX4_STICK = frozenset({
+    Px4MainMode.MANUAL, Px4MainMode.ALTCTL, Px4MainMode.POSCTL, Px4MainMode.ACRO,
+    Px4MainMode.STABILIZED, Px4MainMode.RATTITUDE})
+_PX4_CLASSES: dict[int, ModeClass] = {
+    Px4AutoMode.MISSION: ModeClass.MISSION, Px4AutoMode.LOITER: ModeClass.HOLD}
 _AVOIDS = {'copter': d.COPTER_MODE_AVOID_ADSB, 'plane': d.PLANE_MODE_AVOID_ADSB}
 _NAMES = {'copter': _COPTER, 'plane': _PLANE}
-
 
 
 def mode_class(family: str, custom_mode: int) -> ModeClass | None:
@@ -83,8 +90,8 @@ def mode_class(family: str, custom_mode: int) -> ModeClass | None:
     """
     if family == 'px4':
         main, sub = px4_mode_parts(custom_mode)
-        if main == _AUTO:
-            return {4: ModeClass.MISSION, 3: ModeClass.HOLD}.get(sub, ModeClass.OWN)
+        if main == Px4MainMode.AUTO:
+            return _PX4_CLASSES.get(sub, ModeClass.OWN)
         return ModeClass.STICK if main in _PX4_STICK else ModeClass.OWN
     if family not in _ARDUPILOT:
         return None
@@ -106,7 +113,7 @@ def mode_name(family: str, custom_mode: int) -> str:
     """
     if family == 'px4':
         main, sub = px4_mode_parts(custom_mode)
-        name = _PX4_AUTO.get(sub) if main == _AUTO else _PX4_MAIN.get(main)
+        name = _PX4_AUTO.get(sub) if main == Px4MainMode.AUTO else _PX4_MAIN.get(main)
     else:
         name = _NAMES.get(family, {}).get(custom_mode)
     return name or f'mode {custom_mode}'

@@ -120,7 +120,7 @@ class MissionExecutor:
 
     @property
     def alarm(self) -> str:
-        """A condition that requires action by a human, in words; '': none."""
+        """Text on a condition that requires action by a human; '': none."""
         return self._end_of_list.alarm
 
     def assign(self, tasks: TaskList, now: float) -> list[Message]:

@@ -91,7 +91,7 @@ class OnboardMission:
         return self._mission.state
 
     def upload_progress(self, now: float) -> str:
-        """Progress and remaining time of the upload, in words; '': no upload."""
+        """Progress and remaining time of the upload, as a text; '': no upload."""
         sent, read, count = self.upload.progress
         if count == 0:
             return ''

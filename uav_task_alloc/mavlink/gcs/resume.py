@@ -81,7 +81,7 @@ class Resume:
         self._flown: tuple[Item, ...] = ()  # of missions that were replaced
 
     def note_current(self, seq: int) -> None:
-        """Take a MISSION_CURRENT, home not counted; the first one tells what came before us."""
+        """Take a MISSION_CURRENT, home not counted; the first one shows what was flown before."""
         if not self.located and self._first is None:
             self._first = seq
 

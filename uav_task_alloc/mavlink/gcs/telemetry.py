@@ -70,7 +70,7 @@ class Telemetry:
         self.landed = d.MAV_LANDED_STATE_UNDEFINED
         self.status = 0  # MAV_STATE
         self.autopilot = 0  # MAV_AUTOPILOT
-        self.unhealthy = ''  # failing prearm checks, in words; '': none reported
+        self.unhealthy = ''  # text on failing prearm checks; '': none reported
         self.current: int | None = None  # seq on the wire
         self.current_at = -math.inf  # [s]
         self.reached: int | None = None  # seq on the wire, latest
@@ -298,7 +298,7 @@ class Telemetry:
 
 
 def unhealthy(message: Message) -> str:
-    """Failing prearm checks of a SYS_STATUS, in words with the unhealthy sensors; '': none.
+    """Failing prearm checks of a SYS_STATUS as a text with the unhealthy sensors; '': none.
 
     PX4 sets the health bit of the prearm check, and never its present and enabled bits.
     """

@@ -10,7 +10,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from uav_task_alloc.geometry.polyline import segment_fraction
+from uav_task_alloc.geometry.polyline import nearest_on_segment, segment_fraction
 from uav_task_alloc.mavlink.mission.items import TaskList
 from uav_task_alloc.mavlink.mission.long_legs import (
     MAX_LEG_LENGTH,
@@ -105,8 +105,7 @@ class FirstLeg:
         return None if self._target is None else self._starts.get(self._target)
 
     def _is_off(self, position: LegStart, start: Point, end: Point) -> bool:
-        share = min(1.0, max(0.0, segment_fraction(position.point, start, end)))
-        nearest = tuple(a + (b - a) * share for a, b in zip(start, end, strict=True))
+        nearest = nearest_on_segment(position.point, start, end)
         return math.dist(position.point[:2], nearest[:2]) > self._off_track or (
             not position.on_mission and abs(position.point[2] - nearest[2]) > _OFF_ALTITUDE)
 

@@ -9,7 +9,7 @@ from enum import Enum
 from itertools import pairwise
 from typing import NamedTuple
 
-from uav_task_alloc.geometry.polyline import polyline_length, segment_distance
+from uav_task_alloc.geometry.polyline import point_at, polyline_length, segment_distance
 from uav_task_alloc.model import Point
 
 _KEPT = 900  # samples: three minutes at 5 Hz
@@ -161,7 +161,7 @@ def _between(a: PositionSample, b: PositionSample, share: float) -> Point:
     """Cubic Hermite interpolation between two samples; linear where a velocity is unknown."""
     h, s = b.t - a.t, share
     if any(math.isnan(v) for v in (*a.velocity, *b.velocity)):
-        x, y, z = (p + (q - p) * s for p, q in zip(a.position, b.position, strict=True))
+        x, y, z = point_at(a.position, b.position, s)
         return x, y, z
     k = (2 * s**3 - 3 * s**2 + 1, h * (s**3 - 2 * s**2 + s), 3 * s**2 - 2 * s**3,
          h * (s**3 - s**2))

@@ -12,6 +12,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import pairwise
 
+from uav_task_alloc.geometry.polyline import point_at
 from uav_task_alloc.mavlink.mission.items import MissionStop, TaskList
 from uav_task_alloc.model import Point
 
@@ -29,9 +30,8 @@ def points_between(start: Point, end: Point, longest: float = MAX_LEG_LENGTH) ->
         longest: largest distance between two points [m].
     """
     parts = math.ceil(math.dist(start, end) / longest)
-    return tuple((start[0] + (end[0] - start[0]) * n / parts,
-                  start[1] + (end[1] - start[1]) * n / parts,
-                  start[2] + (end[2] - start[2]) * n / parts) for n in range(1, parts))
+    return tuple((x, y, z) for x, y, z in (point_at(start, end, n / parts)
+                                           for n in range(1, parts)))
 
 
 def first_points(start: Point, end: Point, home: Point, farthest: float) -> tuple[Point, ...]:

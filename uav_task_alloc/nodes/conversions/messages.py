@@ -22,7 +22,7 @@ from uav_task_alloc.nodes.conversions.message_limits import (
     check_words,
     cut,
 )
-from uav_task_alloc.record.message_records import task_position
+from uav_task_alloc.record.message_records import from_stamp, task_position
 from uav_task_alloc.zone_codec import JOURNAL_ZONE, encode_zone
 
 FRAME_ID = 'map'  # REP-105, ENU
@@ -43,20 +43,20 @@ INPUT_STATES = QoSProfile(depth=400, reliability=ReliabilityPolicy.BEST_EFFORT)
 
 def to_stamp(seconds: float) -> Time:
     """A time [s] since the epoch of the node's clock as a message."""
-    whole = math.floor(seconds)
-    return Time(sec=whole, nanosec=min(999_999_999, round((seconds - whole) * 1e9)))
-
-
-def from_stamp(stamp: Time | Duration) -> float:
-    """A stamp or duration message in [s]."""
-    return float(stamp.sec) + float(stamp.nanosec) * 1e-9
+    whole, nanoseconds = _parts(seconds)
+    return Time(sec=whole, nanosec=nanoseconds)
 
 
 def to_duration(seconds: float) -> Duration:
     """A duration [s] as a message, clamped to its range."""
-    seconds = min(max(seconds, -2.0**31), 2.0**31 - 1.0)
+    whole, nanoseconds = _parts(min(max(seconds, -2.0**31), 2.0**31 - 1.0))
+    return Duration(sec=whole, nanosec=nanoseconds)
+
+
+def _parts(seconds: float) -> tuple[int, int]:
+    """Whole seconds and nanoseconds."""
     whole = math.floor(seconds)
-    return Duration(sec=whole, nanosec=min(999_999_999, round((seconds - whole) * 1e9)))
+    return whole, min(999_999_999, round((seconds - whole) * 1e9))
 
 
 def header(now: float) -> Header:

@@ -2,7 +2,10 @@
 """Declares the parameters of params.py on a node, and checks every later change."""
 from __future__ import annotations
 
+import sys
+from collections.abc import Sequence
 from dataclasses import Field, fields, replace
+from difflib import get_close_matches
 from typing import Any, Generic, TypeVar
 
 from rcl_interfaces.msg import (
@@ -16,10 +19,26 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from uav_task_alloc import params
-from uav_task_alloc.errors import InvalidValue
+from uav_task_alloc.errors import AllocError, InvalidValue
+from uav_task_alloc.nodes.ros.parameter_files import check_files, shared_names
 
 _Params = TypeVar('_Params', bound=params.CheckedParams)
 _BIG = 1.7e308  # a ROS range has no infinity
+
+
+class UnknownParameter(AllocError):
+    """A name that is no parameter of a node.
+
+    Args:
+        name: as it was given.
+        known: names of the node's parameters.
+        owners: other nodes that have a parameter of this name.
+    """
+
+    def __init__(self, name: str, known: Sequence[str], owners: Sequence[str]) -> None:
+        nearest = get_close_matches(name, known, 1, 0.0)[0]
+        super().__init__(f'unknown parameter {name!r}: expected one that --help lists; ' + (
+            f'it is one of {", ".join(owners)}' if owners else f'nearest is {nearest!r}'))
 
 
 class LiveParameters(Generic[_Params]):
@@ -41,11 +60,11 @@ def declare(node: Node, kind: type[_Params]) -> LiveParameters[_Params]:
 
     Raises:
         InvalidValue: a start value has another type or is outside its range.
+        UnknownParameter: a name is not declared.
+        ParameterFileError: a parameter file is for other nodes only.
     """
+    _check_names(node, kind)
     values = {spec.name: _declare_one(node, spec) for spec in _specs(kind)}
-    for name in sorted({*node._parameter_overrides} - {*map(params.ros_name, _specs(kind))}):
-        if not node.has_parameter(name) and not name.startswith('qos_overrides.'):
-            node.get_logger().warning(f'parameter {name} is unknown: ignored')
     live = LiveParameters(kind(**values))
     node.add_on_set_parameters_callback(lambda changed: _change(live, changed))
     return live
@@ -53,6 +72,23 @@ def declare(node: Node, kind: type[_Params]) -> LiveParameters[_Params]:
 
 def _specs(kind: type[params.CheckedParams]) -> tuple[Field[Any], ...]:
     return fields(kind)  # type: ignore[arg-type]  # every subclass is a dataclass
+
+
+def _check_names(node: Node, kind: type[params.CheckedParams]) -> None:
+    """Refuse what ROS would ignore, as the node would fly with a default instead.
+
+    A name that a file gives to all nodes need only be a parameter of one of them.
+    """
+    check_files(sys.argv, node.get_fully_qualified_name())
+    known = [*map(params.ros_name, _specs(kind))]
+    shared = shared_names(sys.argv)
+    for name in sorted({*node._parameter_overrides} - {*known}):
+        if node.has_parameter(name) or name.startswith('qos_overrides.'):
+            continue
+        owners = [other for other, owner in params.NODES.items()
+                  if name in map(params.ros_name, _specs(owner))]
+        if not (owners and name in shared):
+            raise UnknownParameter(name, known, owners)
 
 
 def _declare_one(node: Node, spec: Field[Any]) -> Any:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import Enum, auto
 
-_REFUSED = 1  # exit status of a node that refuses its parameters, see run.py
+_REFUSED = (1, 2)  # exit statuses of a node that refuses its parameters, see run.py
 _SHORT_RUN = 30.0  # [s]; a shorter run doubles the delay
 _FIRST_DELAY, _LONGEST_DELAY = 1.0, 30.0  # [s] before a restart
 _MOST_REFUSALS = 5  # in a row, after a run without
@@ -35,8 +35,9 @@ class RestartPolicy:
             duration: of the run [s].
         """
         self.runs += 1
-        self.refusals = self.refusals + 1 if status == _REFUSED else 0
-        if status == _REFUSED and self.runs == 1:
+        refused = status in _REFUSED
+        self.refusals = self.refusals + 1 if refused else 0
+        if refused and self.runs == 1:
             return RestartVerdict.END_ALL
         if self.refusals >= _MOST_REFUSALS:
             return RestartVerdict.GIVE_UP

@@ -4,20 +4,34 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import signal
 import sys
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from inspect import cleandoc
+from typing import NoReturn
 
 import rclpy
+from rclpy.exceptions import NameValidationException, ParameterException
 from rclpy.executors import MultiThreadedExecutor, SingleThreadedExecutor
+from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import remove_ros_args
 
 from uav_task_alloc.errors import AllocError
+from uav_task_alloc.nodes.ros.parameter_files import files_of, read_sections
+from uav_task_alloc.params import CheckedParams, help_text
 
 CRASHED = 70  # exit status, EX_SOFTWARE of sysexits.h: the launch files restart the node
+# what ROS could not parse, by its own words
+_EXPECTED = {'parameter override rule': '-p NAME:=VALUE, a list with values of one type',
+             'remap rule': '-r FROM:=TO', 'params file': 'a parameter file',
+             'log level': '--log-level debug, info, warn, error or fatal',
+             'enclave': '-e NAME'}
+_REFUSALS = (AllocError, ParameterException, NameValidationException,
+             rclpy_implementation.RCLError)
 
 
 def with_flags(argv: list[str], *names: str) -> list[str]:
@@ -39,19 +53,21 @@ def with_flags(argv: list[str], *names: str) -> list[str]:
     return [*remaining, '--ros-args', *parameters, '--'] if parameters else remaining
 
 
-def run(make_node: Callable[[], Node], args: list[str] | None = None, threads: int = 1) -> None:
+def run(make_node: Callable[[], Node], args: list[str] | None = None, threads: int = 1,
+        params: type[CheckedParams] | None = None) -> None:
     """Spin `make_node()` until SIGINT or SIGTERM, or until its attribute `finished` is true.
 
     A node with a method `delays_exit` is spun on after a signal while that returns True.
-    Exit status: 0 in order; 1 and one line where `make_node` refuses a parameter; CRASHED where
-    a callback raises.
+    Exit status: 0 in order; 2 and one line for a command line that is invalid; 1 and one line
+    where the node refuses a parameter or cannot be started; CRASHED where a callback raises.
 
     Args:
         make_node: the node's class; its docstring is the text of `--help`.
         args: the command line; None: sys.argv.
         threads: of the executor.
+        params: the class of its parameters, for `--help`.
     """
-    _check_arguments(remove_ros_args(args or sys.argv)[1:], make_node.__doc__)
+    _check_arguments(args or sys.argv, make_node.__doc__, params)
     # rclpy's own handlers invalidate the context from another thread, and a running callback
     # then raises RCLError. Here the context is valid until the node is destroyed.
     signals: list[int] = []
@@ -59,11 +75,11 @@ def run(make_node: Callable[[], Node], args: list[str] | None = None, threads: i
         signal.signal(number, lambda *_: signals.append(1))
     # through shared memory a node that was killed and restarted receives nothing for 3 s
     os.environ.setdefault('FASTDDS_BUILTIN_TRANSPORTS', 'UDPv4')
-    rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
     try:
+        rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
         _spin(make_node(), threads, signals)
-    except AllocError as error:
-        sys.exit(str(error))
+    except _REFUSALS as error:
+        sys.exit(_one_line(error))
     finally:
         for number in (signal.SIGINT, signal.SIGTERM):  # a second Ctrl-C must not cut this short
             signal.signal(number, signal.SIG_IGN)
@@ -85,12 +101,43 @@ def _spin(node: Node, threads: int, signals: list[int]) -> None:
     node.destroy_node()
 
 
-def _check_arguments(remaining: list[str], text: str | None) -> None:
-    """Answer --help, and refuse arguments that are not ROS's."""
-    if '-h' in remaining or '--help' in remaining:
-        print(f'{text}\n\nParameters: --ros-args -p NAME:=VALUE, see docs/parameters.md, or '
-              '`ros2 param describe` while it runs.')
+def _check_arguments(argv: Sequence[str], text: str | None,
+                     params: type[CheckedParams] | None) -> None:
+    """Answer --help, and refuse a command line that ROS cannot read or would ignore a part of."""
+    if '-h' in argv or '--help' in argv:
+        print(cleandoc(text or '').partition('Parameters:\n')[0].rstrip() + '\n',
+              help_text(params) if params else '', sep='\n')
         sys.exit(0)
+    try:
+        for path in files_of(argv):
+            read_sections(path)
+        remaining = remove_ros_args(list(argv))[1:]
+    except AllocError as error:
+        _refuse(str(error))
+    except rclpy_implementation.UnknownROSArgsError as error:
+        _refuse(f'{error}: expected arguments of ROS after --ros-args')
+    except rclpy_implementation.RCLInvalidROSArgsError as error:
+        _refuse(_unparsed(error))
     if remaining:
-        print(f'{remaining[0]!r}: expected --ros-args and its arguments', file=sys.stderr)
-        sys.exit(2)
+        _refuse(f'{remaining[0]!r}: expected --ros-args and its arguments')
+
+
+def _refuse(text: str) -> NoReturn:
+    print(text, file=sys.stderr)
+    sys.exit(2)
+
+
+def _unparsed(error: Exception) -> str:
+    """What of a command line ROS could not parse, and what it must be."""
+    text = _one_line(error)
+    found = re.search(r"Couldn't parse ([a-z ]+): '(.*)'\. Error: (.*)", text)
+    if found is None:
+        return text
+    kind, given, reason = found.groups()
+    expected = _EXPECTED.get(kind, f'a {kind}')
+    return f'{given}: expected {expected} ({reason})'
+
+
+def _one_line(error: Exception) -> str:
+    """The text of an error without the places in the sources of ROS."""
+    return ' '.join(re.sub(r', at \S+:\d+', '', str(error)).split())

@@ -32,13 +32,13 @@ class ArduPilotFlight(VehicleFlight):
 
     modes = COPTER_MODES
     custom_modes: ClassVar[dict[FlightMode, int]] = {
-        FlightMode.MANUAL: 0,
-        FlightMode.MISSION: 3,
-        FlightMode.GUIDED: 4,
-        FlightMode.HOLD: 5,
-        FlightMode.RETURN: 6,
-        FlightMode.LAND: 9,
-        FlightMode.BRAKE: 17,
+        FlightMode.MANUAL: dialect.COPTER_MODE_STABILIZE,
+        FlightMode.MISSION: dialect.COPTER_MODE_AUTO,
+        FlightMode.GUIDED: dialect.COPTER_MODE_GUIDED,
+        FlightMode.HOLD: dialect.COPTER_MODE_LOITER,
+        FlightMode.RETURN: dialect.COPTER_MODE_RTL,
+        FlightMode.LAND: dialect.COPTER_MODE_LAND,
+        FlightMode.BRAKE: dialect.COPTER_MODE_BRAKE,
     }
     boot_states = (dialect.MAV_STATE_BOOT, dialect.MAV_STATE_CALIBRATING)
     boot_times = BootTimes(boot=8.0, position=41.0, settling=0.0)

@@ -14,7 +14,7 @@ from uav_task_alloc.sim.boot import BootTimes
 from uav_task_alloc.sim.config import FlightMode, StorageChange
 from uav_task_alloc.sim.dynamics import Track, metres_between
 from uav_task_alloc.sim.flight import CRITICAL, VehicleFlight
-from uav_task_alloc.sim.modes import PX4_MODES, px4_mode
+from uav_task_alloc.sim.modes import PX4_MODES, Px4Auto, Px4Main, px4_auto, px4_mode
 from uav_task_alloc.sim.stored_item import StoredItem
 
 _MAX_DISTANCE = 10_000.0  # [m] MIS_DIST_1WP and MIS_DIST_WPS
@@ -35,12 +35,12 @@ class Px4Flight(VehicleFlight):
 
     modes = PX4_MODES
     custom_modes: ClassVar[dict[FlightMode, int]] = {
-        FlightMode.MANUAL: px4_mode(3),
-        FlightMode.TAKEOFF: px4_mode(4, 2),
-        FlightMode.HOLD: px4_mode(4, 3),
-        FlightMode.MISSION: px4_mode(4, 4),
-        FlightMode.RETURN: px4_mode(4, 5),
-        FlightMode.LAND: px4_mode(4, 6),
+        FlightMode.MANUAL: px4_mode(Px4Main.POSCTL),
+        FlightMode.TAKEOFF: px4_auto(Px4Auto.TAKEOFF),
+        FlightMode.HOLD: px4_auto(Px4Auto.LOITER),
+        FlightMode.MISSION: px4_auto(Px4Auto.MISSION),
+        FlightMode.RETURN: px4_auto(Px4Auto.RTL),
+        FlightMode.LAND: px4_auto(Px4Auto.LAND),
     }
     boot_states = (dialect.MAV_STATE_UNINIT, dialect.MAV_STATE_BOOT)
     boot_times = BootTimes(boot=4.0, position=20.0, settling=5.0)

@@ -1,0 +1,45 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Files that are replaced atomically, and what makes a change of a folder survive a crash."""
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+
+def replace_file(path: Path, text: str) -> None:
+    """Replace a file atomically: at any crash it has the old content or the new one.
+
+    Args:
+        path: of the file; a temporary one with `.tmp` after its name is beside it meanwhile.
+        text: new content, written as UTF-8; on disk when this returns.
+
+    Raises:
+        OSError: it cannot be written; the old content stays.
+    """
+    temporary = path.with_name(f'{path.name}.tmp')
+    try:
+        with open(temporary, 'w', encoding='utf-8') as file:
+            file.write(text)
+            file.flush()
+            os.fsync(file.fileno())
+        os.replace(temporary, path)
+    except OSError:
+        temporary.unlink(missing_ok=True)
+        raise
+    sync_folder(path.parent)
+
+
+def sync_folder(folder: Path) -> None:
+    """Write the entries of a folder to disk, as after a file in it was renamed or removed.
+
+    Args:
+        folder: that exists.
+
+    Raises:
+        OSError: it cannot be opened or written.
+    """
+    descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
