@@ -93,6 +93,26 @@ def gaps(path, node):
     return missing
 
 
+def methods(path, cls):
+    """Public methods with a docstring whose names occur in files of other folders."""
+    for node in cls.body:
+        if (isinstance(node, ast.FunctionDef) and not node.name.startswith('_')
+                and ast.get_docstring(node)
+                and any(node.name in names for user, names in ATTRIBUTES.items()
+                        if user.parent != path.parent)):
+            yield node
+
+
+def undescribed_arguments(cls, method):
+    """Arguments that neither the method's docstring nor that of its class describes."""
+    text = ast.get_docstring(method)
+    mentioned = ''.join(f'{name}:\n' for name in re.findall(r'`(\w+)`', text))
+    return undescribed(arguments(method), section(method, 'Args') + mentioned
+                       + section(cls, 'Arguments of methods') + section(cls, 'Args'))
+
+
+ATTRIBUTES = {path: {node.attr for node in ast.walk(tree) if isinstance(node, ast.Attribute)}
+              for path, tree in TREES.items()}
 OFFERED = list(offered())
 
 
@@ -105,6 +125,16 @@ def test_many_functions_and_classes_are_used_by_other_rooms():
 def test_what_other_rooms_use_describes_arguments_and_result(path):
     missing = {node.name: left_out for place, node in OFFERED
                if place == path and (left_out := gaps(path, node))}
+    assert missing == {}
+
+
+@pytest.mark.parametrize('path', sorted({path for path, _ in OFFERED}),
+                         ids=lambda path: path.relative_to(PACKAGE).as_posix())
+def test_methods_that_other_rooms_use_have_described_arguments(path):
+    missing = {f'{cls.name}.{method.name}': left_out
+               for place, cls in OFFERED if place == path and isinstance(cls, ast.ClassDef)
+               for method in methods(path, cls)
+               if (left_out := undescribed_arguments(cls, method))}
     assert missing == {}
 
 

@@ -107,6 +107,9 @@ class Journal:
     def put(self, rows: Iterable[JournalRow]) -> None:
         """Store or delete rows in one transaction; they are on disk when this returns.
 
+        Args:
+            rows: a row without a body deletes one.
+
         Raises:
             JournalError: nothing was stored.
         """

@@ -54,6 +54,12 @@ class Leader:
         me: this run.
         now: [s].
         restarted: it has the lists of a previous run.
+
+    Arguments of methods:
+        other: instance of another allocator.
+        role: that it reports.
+        reason: text for an operator.
+        now: [s] steady clock.
     """
 
     def __init__(self, me: AllocatorInstance, now: float, restarted: bool = False) -> None:

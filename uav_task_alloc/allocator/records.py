@@ -152,7 +152,11 @@ class UavList:
         return tuple(stop.task.id for stop in self.stops)
 
     def same_route(self, other: UavList) -> bool:
-        """Whether tasks, detour points and end are equal: there is nothing to publish."""
+        """Whether tasks, detour points and end are equal: there is nothing to publish.
+
+        Args:
+            other: list of the same UAV.
+        """
         return (self.returns, self.end_via) == (other.returns, other.end_via) and [
             (stop.task, stop.leg.via) for stop in self.stops] == [
             (stop.task, stop.leg.via) for stop in other.stops]

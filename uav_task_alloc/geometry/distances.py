@@ -218,6 +218,9 @@ class Distances:
         altitude_max: highest waypoint [m].
         budget: what searches may spend; None: no limit.
 
+    Arguments of methods:
+        i, j: indices of points, in 0..n-1.
+
     Raises:
         InvalidValue: a point is not finite, the clearance is negative, or the limits are reversed.
     """
@@ -265,6 +268,9 @@ class Distances:
             points: (n, 3), ENU [m]; None: the same.
             zones: None: the same.
             budget: None: no limit.
+
+        Returns:
+            New distances; those that are still valid are taken over.
 
         Raises:
             InvalidValue: as the constructor.

@@ -30,6 +30,11 @@ class Scene:
 
     Args:
         run: the state that `apply` updates.
+
+    Arguments of methods:
+        line: of a record, see RunState.
+        uav: id.
+        state: its newest `state` line.
     """
 
     def __init__(self, run: RunState) -> None:

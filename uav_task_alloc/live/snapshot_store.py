@@ -28,6 +28,12 @@ class SnapshotStore:
 
     Args:
         limit: [bytes] of compressed past values.
+
+    Arguments of methods:
+        wall: [unix s].
+        parts: JSON values by name.
+        logs: entries by log, as JSON.
+        everything: whether it is the whole state, not a change.
     """
 
     def __init__(self, limit: int = HISTORY_LIMIT) -> None:

@@ -81,7 +81,12 @@ class ItemRules:
 
 @dataclass(frozen=True, slots=True)
 class Profile:
-    """How one kind of autopilot is commanded, and how it stores missions."""
+    """How one kind of autopilot is commanded, and how it stores missions.
+
+    Arguments of methods:
+        custom_mode: of a HEARTBEAT.
+        message: from any station.
+    """
 
     name: str  # 'ardupilot', 'px4' or 'generic'
     rules: ItemRules  # frames and commands of items

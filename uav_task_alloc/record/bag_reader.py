@@ -44,6 +44,10 @@ class BagReader:
     Args:
         path: of the MCAP file.
 
+    Arguments of methods:
+        file: open, binary.
+        message: as stored, with its channel.
+
     Raises:
         OSError: while iterating; the file cannot be read.
         InvalidValue: while iterating; it is no MCAP file.

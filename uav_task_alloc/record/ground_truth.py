@@ -55,7 +55,11 @@ class GroundTruth:
     died: dict[str, TrueSample] = field(default_factory=dict)  # last sample by UAV that was lost
 
     def apply(self, line: Line) -> None:
-        """Apply one line of the simulator's log."""
+        """Apply one line of the simulator's log.
+
+        Args:
+            line: with `uav`, `wall` [unix s], and a position or an event.
+        """
         uav, wall = line['uav'], line['wall']
         event = line.get('event')
         if event is None and line.get('alive', True):

@@ -67,7 +67,13 @@ class ReportedAuthority:
 
 @dataclass
 class RunState:
-    """The state of a run after the lines given to `apply`."""
+    """The state of a run after the lines given to `apply`.
+
+    Arguments of methods:
+        line: of a record.
+        states: names of TaskStatus constants.
+        wall: [unix s].
+    """
 
     tasks: dict[str, AnnouncedTask] = field(default_factory=dict)  # announced, by id
     cancelled: set[str] = field(default_factory=set)  # ids of tasks

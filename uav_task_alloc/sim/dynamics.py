@@ -156,7 +156,12 @@ class Track:
         return math.sqrt(2.0 * acceleration * _CORNER) / max(sine, 1e-3)
 
     def finished(self, position: Point, now: float) -> bool:
-        """Mark the points passed at `now` [s]; True once the last point was held long enough."""
+        """Mark the points passed at `now` [s]; True once the last point was held long enough.
+
+        Args:
+            position: of the vehicle [m] ENU.
+            now: [s].
+        """
         while (self._next < len(self.points)
                and metres_between(position, self.points[self._next]) <= self.radius):
             self._next += 1

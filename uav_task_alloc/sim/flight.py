@@ -33,6 +33,16 @@ class VehicleFlight(Navigation):
     Args:
         config: of the vehicle.
         items: mission storage, shared with the mission server.
+
+    Arguments of methods:
+        now: [s].
+        seq: of an item.
+        mode: FlightMode; of `note`: a custom_mode.
+        height: [m] ENU.
+        point: target of the item [m] ENU.
+        force: as of MAV_CMD_COMPONENT_ARM_DISARM.
+        reason: text of the autopilot.
+        name, cause, command: of an event of the ground truth.
     """
 
     modes: ClassVar[dict[int, CustomMode]]  # by custom_mode

@@ -23,6 +23,11 @@ class MissionServer:
     Args:
         system_id: of the vehicle, 1..255.
         capacity: items of the mission storage.
+
+    Arguments of methods:
+        message: from any station.
+        seq: of an item.
+        now: [s].
     """
 
     flight: VehicleFlight

@@ -79,7 +79,12 @@ class UdpFleet:
         return (time.monotonic() - self._start) * self.speedup
 
     def set_alive(self, uav: str, alive: bool) -> str:
-        """Kill a vehicle, or reboot it on the ground; returns an error text, '' on success."""
+        """Kill a vehicle, or reboot it on the ground; returns an error text, '' on success.
+
+        Args:
+            uav: id.
+            alive: False: it is lost and sends nothing.
+        """
         with self._lock:
             endpoint = self._endpoints.get(uav)
             if endpoint is None:

@@ -22,7 +22,12 @@ from uav_task_alloc.solver.routes import (
 
 @dataclass(slots=True)
 class Recorder:
-    """Receives the routes that solvers find; thread-safe."""
+    """Receives the routes that solvers find; thread-safe.
+
+    Arguments of methods:
+        iterations: of the solver, since the last call.
+        routes: of a solver; are copied.
+    """
 
     problem: Problem  # that is solved
     clock: Callable[[], float]  # [s]

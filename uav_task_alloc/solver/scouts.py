@@ -59,7 +59,11 @@ class Scouts:
         return to_learnt(self._problem, self.tables) if self._bees else self._learnt
 
     def fly(self, best: Routes) -> bool:
-        """Construct routes with all scouts; copy a better one to `best`; whether there was one."""
+        """Construct routes with all scouts; copy a better one to `best`; whether there was one.
+
+        Args:
+            best: the best so far; replaced by a better one.
+        """
         a, improved = self.arrays, False
         if not self._bees:
             self._bees = [empty_routes(a) for _ in range(BEES)]

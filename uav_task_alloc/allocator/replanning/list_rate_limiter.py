@@ -10,7 +10,12 @@ from uav_task_alloc.allocator.replanning.plan_acceptance import exchange_groups
 
 
 class ListRateLimiter:
-    """Records when each UAV got its last list; times are [s] of a steady clock."""
+    """Records when each UAV got its last list; times are [s] of a steady clock.
+
+    Arguments of methods:
+        uav_ids: whose lists are published.
+        now: [s] steady clock.
+    """
 
     def __init__(self) -> None:
         self._published: dict[str, float] = {}

@@ -14,7 +14,16 @@ _MIN_SHARE = 0.5  # of the budget that a solve gets before newer events end it
 
 
 class Schedule:
-    """Collects triggers, and says when a solve is due; times are [s] of a steady clock."""
+    """Collects triggers, and says when a solve is due; times are [s] of a steady clock.
+
+    Arguments of methods:
+        trigger: text of the event.
+        now: [s] steady clock.
+        settle: [s] without an event that ends a burst.
+        period: [s].
+        budget: [s] of a solve.
+        failed: the solve gave no plan.
+    """
 
     def __init__(self) -> None:
         self.triggers: list[str] = []  # since the last solve began

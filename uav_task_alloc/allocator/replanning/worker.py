@@ -37,7 +37,11 @@ class Worker:
         self._thread.start()
 
     def submit(self, problem: ReplanProblem) -> None:
-        """Solve a problem next."""
+        """Solve a problem next.
+
+        Args:
+            problem: snapshot for the worker thread.
+        """
         self._stop.clear()
         self._problems.put(problem)
 

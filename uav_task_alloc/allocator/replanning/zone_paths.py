@@ -29,6 +29,14 @@ class ZonePaths:
     Args:
         zones: in force.
         params: clearance [m], altitude limits [m] and `replan_margin` are used.
+
+    Arguments of methods:
+        a: start [m] ENU.
+        b: end [m] ENU.
+        points: polyline [m] ENU.
+        position: of the UAV [m] ENU.
+        leg: that is being flown.
+        goal: its end [m] ENU.
     """
 
     def __init__(self, zones: Sequence[ThreatZone], params: AllocatorParams) -> None:

@@ -50,6 +50,13 @@ class Fleet:
     Args:
         off: ids of UAVs that an operator has switched off.
         active: by UAV id the task that it is known to fly.
+
+    Arguments of methods:
+        uav_id: of a UAV, known or not.
+        task: with allowed UAVs and required capabilities.
+        failed_on: ids of the UAVs that failed at it.
+        default_range: [m] where the UAV reports none.
+        default_cruise_speed: [m/s] where the UAV reports none.
     """
 
     def __init__(self, off: Iterable[str] = (), active: Mapping[str, str] | None = None) -> None:

@@ -31,7 +31,11 @@ class PublishedLists:
         self._contained: dict[tuple[str, str], tuple[int, int]] = {}
 
     def get(self, uav_id: str) -> UavList:
-        """Return the list in force; one of revision 0 where none was ever published."""
+        """Return the list in force; one of revision 0 where none was ever published.
+
+        Args:
+            uav_id: of a UAV, known or not.
+        """
         return self.lists.get(uav_id) or UavList(uav_id, 0)
 
     def publish(self, new: UavList, stamp: float, resend: bool = False) -> UavList | None:

@@ -10,7 +10,16 @@ from uav_task_alloc.params import AllocatorParams
 
 
 class SafePaths(Protocol):
-    """Paths around one set of zones; all points are [m] ENU. Two are equal if identical."""
+    """Paths around one set of zones; all points are [m] ENU. Two are equal if identical.
+
+    Arguments of methods:
+        a: start [m] ENU.
+        b: end [m] ENU.
+        points: polyline [m] ENU.
+        position: of the UAV [m] ENU.
+        leg: that is being flown.
+        goal: its end [m] ENU.
+    """
 
     margin: float  # share of its length that a path must be shorter to replace a published one
 

@@ -22,6 +22,11 @@ class TaskRegistry:
 
     Args:
         records: restored from the journal.
+
+    Arguments of methods:
+        task: as announced.
+        task_id: as announced.
+        stamp: [s] clock of the node.
     """
 
     def __init__(self, records: Iterable[TaskRecord] = ()) -> None:

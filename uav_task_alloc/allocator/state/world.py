@@ -51,6 +51,25 @@ class World:
         saved: what the journal restored.
         make_safe_paths: makes the paths around zones; called when they are first needed.
         on_change: called with (trigger, now) when a plan is required.
+
+    Arguments of methods:
+        action: ADD or UPDATE.
+        tasks: as announced; of a list: in the order of flight.
+        task_id, task_ids: as announced.
+        uav_id: of a UAV, known or not where the text does not say `known`.
+        report, event: of a UAV.
+        zones: the whole set.
+        bad: ids of refused zones.
+        lists: one a UAV, see `build_lists`.
+        steps: events for tasks, see `task_steps`.
+        now: [s] steady clock.
+        stamp: [s] clock of the node.
+        reason, trigger, text: for the log.
+        available: what an operator sets.
+        params: of the allocator.
+        warning: its level in the log; otherwise information.
+        kind: of a journal row.
+        resend: publish unchanged lists, too.
     """
 
     def __init__(self, params: AllocatorParams, saved: SavedState,

@@ -73,7 +73,11 @@ class AuthorityFileStore:
                                f'a folder that can be written to ({error})') from None
 
     def path(self, uav_id: str) -> Path:
-        """Return the path of a UAV's file."""
+        """Return the path of a UAV's file.
+
+        Args:
+            uav_id: of a UAV.
+        """
         return self._folder / uav_file_name(uav_id)
 
     def load(self, uav_id: str) -> AuthorityRecord | None:

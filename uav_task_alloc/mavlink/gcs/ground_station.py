@@ -67,6 +67,12 @@ class GroundStation:
         config: identity and policy.
         rng: seeds the executors.
         store: of authority records; None: not stored.
+
+    Arguments of methods:
+        uav_id: of a vehicle, or of one to come.
+        tasks: its list.
+        operator: free text for the log.
+        now: steady time [s].
     """
 
     def __init__(self, config: GcsConfig, rng: random.Random,

@@ -41,7 +41,12 @@ class MissionStop:
 
 @dataclass(frozen=True, slots=True)
 class TaskList:
-    """The tasks that one UAV is to fly, in order; as published in TaskList."""
+    """The tasks that one UAV is to fly, in order; as published in TaskList.
+
+    Arguments of methods:
+        task_id: of a task.
+        count: number of stops.
+    """
 
     revision: int  # strictly increasing for a UAV; 0: none
     stops: tuple[MissionStop, ...] = ()  # in the order of flight

@@ -12,7 +12,15 @@ from uav_task_alloc.mavlink.transport.codec import Message
 
 @dataclass(frozen=True, slots=True)
 class Peer:
-    """A vehicle's ids, and ours on its link; builds each message of the mission protocol."""
+    """A vehicle's ids, and ours on its link; builds each message of the mission protocol.
+
+    Arguments of methods:
+        message: as received.
+        count: number of items.
+        seq: of an item.
+        command: MAV_CMD.
+        params: param1 to param7 of the command.
+    """
 
     system: int  # id of the vehicle
     component: int = dialect.MAV_COMP_ID_AUTOPILOT1  # id of its autopilot

@@ -34,6 +34,17 @@ class ProgressTable:
     Args:
         frames: numbers of the frames received from the vehicle.
         repeats: whether the autopilot repeats MISSION_ITEM_REACHED (PX4: 10 times at 1 Hz).
+
+    Arguments of methods:
+        now: steady time [s].
+        within: [s].
+        seq: of an item of the mission on board.
+        item, items: of a mission.
+        sample: a position of the vehicle.
+        newest: the sample did not arrive late.
+        frame: number of its frame; None: not known.
+        flying: the vehicle is in mission mode.
+        task, tasks: ids.
     """
 
     def __init__(self, frames: FrameLog | None = None, repeats: bool = False) -> None:

@@ -16,6 +16,11 @@ class ReachedDuringUpload:
     Args:
         progress: table of the missions before and after the upload.
         origin: of the ENU frame.
+
+    Arguments of methods:
+        seq: of the item reached.
+        now: steady time [s].
+        uploaded: what the failed transfer was to change.
     """
 
     def __init__(self, progress: ProgressTable, origin: Origin) -> None:

@@ -107,6 +107,11 @@ class Upload:
         peer: the vehicle.
         idle_after: time [s] after which the vehicle has given up a transfer.
         rng: draws the back-off times.
+
+    Arguments of methods:
+        mission: to be on board.
+        message: from any sender.
+        now: steady time [s].
     """
 
     def __init__(self, peer: Peer, *, idle_after: float, rng: random.Random) -> None:

@@ -30,6 +30,11 @@ class VerifiedMission:
     Args:
         own: number of leading items that the vehicle sets itself: home.
         atomic: whether a failed upload leaves the old mission (PX4).
+
+    Arguments of methods:
+        message: of the vehicle.
+        items: by seq.
+        now: steady time [s].
     """
 
     def __init__(self, own: int, atomic: bool) -> None:

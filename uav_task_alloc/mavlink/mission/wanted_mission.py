@@ -40,6 +40,12 @@ class WantedMission:
         profile: of the autopilot.
         origin: of the ENU frame.
         progress: the completed tasks of this vehicle.
+
+    Arguments of methods:
+        tasks: a list of the allocator.
+        task: id.
+        reason: text for users.
+        held: mission on board.
     """
 
     def __init__(self, profile: Profile, origin: Origin, progress: ProgressTable) -> None:

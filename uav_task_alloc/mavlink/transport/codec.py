@@ -61,6 +61,10 @@ class Codec:
         wanted: message ids to decode; None: all.
         signing: signs encoded frames and checks decoded ones; None: no signing.
         tap: called with each complete frame.
+
+    Arguments of methods:
+        message: of the dialect.
+        data: bytes as received, of any length.
     """
 
     def __init__(self, system_id: int, component_id: int, *,

@@ -30,6 +30,12 @@ class Connections:
         signing_key_file: path of the key; '': no signing.
         tlog: path of the recording; '': none.
 
+    Arguments of methods:
+        timeout: [s].
+        message: of the dialect, not yet packed.
+        now: steady time [s].
+        addresses: (link, remote) each.
+
     Raises:
         InvalidValue: the key, its timestamp or the recording cannot be opened.
     """

@@ -10,7 +10,13 @@ _SILENCE = 1.0  # [s] after which sequence numbers may have wrapped: frames are 
 
 
 class FrameLog:
-    """Maps the 8-bit sequence numbers to unbounded frame numbers; accepts late frames."""
+    """Maps the 8-bit sequence numbers to unbounded frame numbers; accepts late frames.
+
+    Arguments of methods:
+        seqs: sequence numbers of frames, 0..255.
+        first, last: frame numbers, as `note` returns them.
+        now: steady time [s].
+    """
 
     def __init__(self) -> None:
         self.newest = 0  # the number of the newest frame

@@ -33,6 +33,10 @@ class AllocationPublisher:
     Args:
         node: publishes, and logs ids that are too long for a topic.
         world: statuses and lists are read from it.
+
+    Arguments of methods:
+        uav_id, uav_ids: of UAVs.
+        outbox: what the allocator wants published.
     """
 
     def __init__(self, node: Node, world: World) -> None:

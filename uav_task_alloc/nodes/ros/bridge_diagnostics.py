@@ -45,7 +45,11 @@ class BridgeDiagnostics:
                 self._log.write(note.level, note.text)
 
     def vehicle_rows(self, now: float) -> list[DiagnosticRow]:
-        """A row for each UAV; to be called with the lock of the ground station."""
+        """A row for each UAV; to be called with the lock of the ground station.
+
+        Args:
+            now: steady time [s].
+        """
         rows = [(session.uav_id, diagnostics_of(session, now))
                  for session in self._ground_station.sessions.values()]
         return [bridge_row(uav_id, each.level, each.summary, asdict(each.facts))

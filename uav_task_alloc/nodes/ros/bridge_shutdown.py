@@ -10,7 +10,12 @@ UPLOAD_TIMEOUT = 10.0  # [s] that a running upload is waited for
 
 
 class BridgeShutdown:
-    """State from the first request to exit on; `requested_at` [s] is None before."""
+    """State from the first request to exit on; `requested_at` [s] is None before.
+
+    Arguments of methods:
+        fleet: all vehicles.
+        now: steady time [s].
+    """
 
     def __init__(self) -> None:
         self.requested_at: float | None = None

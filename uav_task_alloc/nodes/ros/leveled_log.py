@@ -27,7 +27,12 @@ class LeveledLog:
         self._troubles: dict[str, str] = {}  # logged last, by what they are about
 
     def write(self, level: str, text: str) -> None:
-        """Log one line."""
+        """Log one line.
+
+        Args:
+            level: 'info', 'warning' or 'error'.
+            text: of any sender; made printable.
+        """
         self.levels[level](printable(text))
 
     def report_trouble(self, name: str, trouble: str, level: str = 'error') -> None:

@@ -33,7 +33,11 @@ class TaskListInputs:
         self.pending: dict[str, TaskList] = {}
 
     def subscribe(self, uav_id: str) -> None:
-        """Subscribe to the lists of a UAV, once; an id that is too long for a topic is logged."""
+        """Subscribe to the lists of a UAV, once; an id that is too long for a topic is logged.
+
+        Args:
+            uav_id: a ROS name.
+        """
         if uav_id in self.known:
             return
         self.known.add(uav_id)

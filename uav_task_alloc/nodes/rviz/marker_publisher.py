@@ -33,6 +33,10 @@ class MarkerPublisher:
     Args:
         node: publishes.
         world: is read at each publication.
+
+    Arguments of methods:
+        outbox: what the allocator wants published.
+        now: [s] steady clock.
     """
 
     def __init__(self, node: Node, world: World) -> None:
