@@ -9,8 +9,9 @@ from uav_task_alloc.allocator.records import TaskRecord, TaskState
 from uav_task_alloc.allocator.state.fleet import Fleet
 from uav_task_alloc.allocator.state.world import World
 from uav_task_alloc.allocator.state.zone_checks import blocked_text
+from uav_task_alloc.errors import first_of
 
-_MAX_NAMED = 20  # silent UAVs in a warning
+_MAX_NAMED = 20  # UAVs in a warning
 _MAX_STRANDED = 5  # warnings of UAVs without a safe path home
 
 
@@ -70,8 +71,8 @@ def health_warnings(world: World, journal_error: str, solver_error: str = '') ->
 def _uav_warnings(fleet: Fleet) -> list[str]:
     silent = sorted(uav_id for uav_id, record in fleet.records.items() if record.silent)
     low = sorted(uav_id for uav_id, record in fleet.records.items() if record.low)
-    warnings = [f'silent: {", ".join(silent[:_MAX_NAMED])}'] if silent else []
-    return warnings + ([f'battery low: {", ".join(low)}'] if low else [])
+    return [f'{text}: {first_of(uavs, _MAX_NAMED)}'
+            for text, uavs in (('silent', silent), ('battery low', low)) if uavs]
 
 
 def health_values(world: World, solving: bool) -> dict[str, object]:

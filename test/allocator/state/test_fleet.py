@@ -249,6 +249,18 @@ def test_a_uav_that_comes_back_under_another_id_leaves_its_tasks_to_itself(drive
     assert health_warnings(driver.world, '')[0] == 'silent: a'
 
 
+@pytest.mark.parametrize(('fields', 'text'), [
+    ({'battery': 0.1}, 'battery low: u00, u01'), ({}, 'silent: u00, u01')])
+def test_a_warning_names_twenty_uavs_and_how_many_more_there_are(fields, text):
+    driver = AllocatorDriver(battery_reserve=0.2, uav_timeout=2.0)
+    for k in range(23):
+        driver.uav(f'u{k:02}', 0.0, 0.0, 50.0, **fields)
+    driver.now += 0.0 if fields else 3.0
+    driver.core.tick(driver.now, driver.now)
+    warning = next(each for each in health_warnings(driver.world, '') if each.startswith(text))
+    assert warning.endswith('u19 and 3 more')
+
+
 def test_published_clocks_that_jump_change_no_list(driver):
     published = len(driver.history)
     for stamp in (0.0, 1e9, 5.0, 2e9):
