@@ -45,6 +45,27 @@ def test_service_times_delay_what_comes_after():
     assert [stop.eta for stop in driver.lists['a'].stops] == [10.0, 27.0]
 
 
+@pytest.mark.parametrize('speedup', [1.0, 8.0, 40.0])
+def test_arrival_times_are_those_of_the_flight_however_fast_the_fleet_is_simulated(speedup):
+    driver = AllocatorDriver()
+    driver.uav('a', 0.0, 0.0, 50.0, cruise_speed=10.0)
+    driver.add(Task('t1', (100.0, 0.0, 50.0), service_time=7.0), ('t2', 200, 0), ('t3', 300, 0))
+    driver.settle()
+    driver.now += 17.0 / speedup
+    driver.uav('a', 105.0, 0.0, 50.0, cruise_speed=10.0)
+    driver.event('COMPLETED', 't1', 'a')
+    driver.core.tick(driver.now, driver.now)
+    driver.take()
+    assert driver.route('a') == ('t2', 't3')
+    assert [stop.eta for stop in driver.lists['a'].stops] == [9.5, 19.5]
+    driver.now += 5.0 / speedup  # another list is on board: this one is published again
+    driver.uav('a', 155.0, 0.0, 50.0, cruise_speed=10.0, list_revision=9)
+    driver.core.tick(driver.now, driver.now)
+    driver.take()
+    assert driver.lists['a'].revision == 10
+    assert [stop.eta for stop in driver.lists['a'].stops] == pytest.approx([4.5, 14.5])
+
+
 def test_a_burst_costs_one_solve():
     driver = AllocatorDriver()
     driver.uav('a', 0.0, 0.0, 50.0)

@@ -2,10 +2,12 @@
 """The task list published last for each UAV, and which revisions contained which task."""
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable
+from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import replace
 
-from uav_task_alloc.allocator.records import UavList
+from uav_task_alloc.allocator.records import ListStop, UavList
+from uav_task_alloc.geometry.polyline import points_passed, polyline_length
+from uav_task_alloc.model import Point, Uav
 
 
 class PublishedLists:
@@ -93,16 +95,22 @@ class PublishedLists:
         """Return the UAV of each listed task."""
         return {task_id: each.uav for each in self.lists.values() for task_id in each.task_ids}
 
-    def restamped(self, uav_id: str, stamp: float) -> UavList:
-        """Return the list in force with its arrival times counted from `stamp` [s]."""
+    def restamped(self, uav_id: str, stamp: float, uav: Uav | None) -> UavList:
+        """Return the list in force with its arrival times counted from `stamp`.
+
+        Args:
+            uav_id: of the list.
+            stamp: [s].
+            uav: where it is now; None: unknown, and it flies as planned.
+        """
         published = self.get(uav_id)
-        age = max(0.0, stamp - published.stamp)
-        stops = tuple(replace(stop, eta=max(0.0, stop.eta - age)) for stop in published.stops)
+        stops = _counted_from_position(published.stops, uav) if uav else _later(
+            published.stops, min(0.0, published.stamp - stamp))
         return replace(published, stops=stops)
 
-    def without_ended(self, uav_id: str, ended: Callable[[str], bool],
-                      stamp: float) -> UavList | None:
-        """Return the list without the ended tasks at its front.
+    def without_ended(self, uav_id: str, ended: Callable[[str], bool], stamp: float,
+                      uav: Uav | None) -> UavList | None:
+        """Return the list without the ended tasks at its front; arguments as of `restamped`.
 
         None where there are none, or where a later task has ended, too: that changes legs, and
         is left to the next plan.
@@ -110,10 +118,11 @@ class PublishedLists:
         stops = self.get(uav_id).stops
         if not stops or not ended(stops[0].task.id):
             return None
-        published = self.restamped(uav_id, stamp)
+        published = self.restamped(uav_id, stamp, None)
         stops = published.stops
         while stops and ended(stops[0].task.id):
-            stops = stops[1:]
+            before, stops = stops[0].task, stops[1:]
+        stops = _counted_from_position(stops, uav, before.position) if uav else stops
         if any(ended(stop.task.id) for stop in stops):
             return None
         flown = sum(stop.leg.length
@@ -140,3 +149,20 @@ class PublishedLists:
         self._contained = {key: span for key, span in self._contained.items()
                            if key[1] not in task_ids}
         self._known_tasks.difference_update(task_ids)
+
+
+def _later(stops: Sequence[ListStop], seconds: float) -> tuple[ListStop, ...]:
+    return tuple(replace(stop, eta=max(0.0, stop.eta + seconds)) for stop in stops)
+
+
+def _counted_from_position(stops: Sequence[ListStop], uav: Uav,
+                           start: Point | None = None) -> tuple[ListStop, ...]:
+    """Arrival times from the position of a UAV on its leg to the first stop.
+
+    No clock is read for it: a simulated fleet may fly faster than real time, and a real one late.
+    """
+    if not stops:
+        return ()
+    leg = (*stops[0].leg.via, stops[0].task.position)
+    metres = polyline_length((uav.position, *leg[points_passed(uav.position, leg, start):]))
+    return _later(stops, metres / uav.cruise_speed - stops[0].eta)

@@ -360,7 +360,8 @@ class World:
 
     def shortened_lists(self, stamp: float) -> dict[str, UavList]:
         """Return the lists with ended tasks at their front, without those."""
-        shorter = {uav_id: self.lists.without_ended(uav_id, self._ended, stamp)
+        shorter = {uav_id: self.lists.without_ended(uav_id, self._ended, stamp,
+                                                    self._known_uav(uav_id))
                    for uav_id in self.lists.lists}
         return {uav_id: each for uav_id, each in shorter.items() if each is not None}
 
@@ -369,8 +370,13 @@ class World:
 
         One with an ended task after the first waits for the plan: its legs are not valid.
         """
-        return {uav_id: self.lists.restamped(uav_id, stamp) for uav_id in sorted(self._resend)
+        return {uav_id: self.lists.restamped(uav_id, stamp, self._known_uav(uav_id))
+                for uav_id in sorted(self._resend)
                 if not any(map(self._ended, self.lists.get(uav_id).task_ids))}
+
+    def _known_uav(self, uav_id: str) -> Uav | None:
+        """Where a UAV is; None where it has not reported."""
+        return self.uav(uav_id) if uav_id in self.fleet.records else None
 
     def _ended(self, task_id: str) -> bool:
         return not self.tasks.is_open(task_id)
