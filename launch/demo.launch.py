@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Simulates a scenario: allocator, bridge, simulated fleet, player and live view."""
-from launch.actions import DeclareLaunchArgument, OpaqueFunction
-from launch.substitutions import PathJoinSubstitution
+from launch.actions import OpaqueFunction
 from launch_ros.substitutions import FindPackageShare
 
 from launch import LaunchDescription
@@ -9,6 +8,8 @@ from uav_task_alloc.nodes.ros.launch_arguments import (
     BRIDGE_SIGTERM_TIMEOUT,
     RespawnedNode,
     argument,
+    check_names,
+    declared,
     flag,
     localhost_only,
     node_action,
@@ -19,27 +20,21 @@ from uav_task_alloc.nodes.ros.launch_arguments import (
 from uav_task_alloc.nodes.ros.udp_ports import free_port
 from uav_task_alloc.scenario import load, simulation_parameters
 
+ARGUMENTS = {
+    'scenario': ([FindPackageShare('uav_task_alloc'), '/config/scenarios/demo.yaml'],
+                 'Scenario file (YAML): origin, UAVs, tasks and zones.'),
+    'speedup': ('', 'How many times faster than real time, 0.1 to 100; empty: as the scenario '
+                'says.'),
+    'rviz': ('false', 'true: start RViz, too.'),
+    'record': ('', 'MCAP file to record all topics into; it must not exist. Empty: none.'),
+    'bridge_state_dir': ('', 'Folder in which the bridge stores across restarts which vehicles '
+                         'it has authority over; empty: not stored.'),
+}
+
 
 def generate_launch_description() -> LaunchDescription:
-    """Declare the arguments.
-
-    Arguments:
-        scenario: YAML file.
-        speedup: times real time; empty: the scenario's.
-        rviz: true: start RViz as well.
-        record: MCAP file for all topics; empty: none.
-        bridge_state_dir: folder in which the bridge saves which vehicles it has authority over,
-            for a restart; empty: not saved.
-    """
-    return LaunchDescription([
-        DeclareLaunchArgument('scenario', default_value=PathJoinSubstitution(
-            [FindPackageShare('uav_task_alloc'), 'config', 'scenarios', 'demo.yaml'])),
-        DeclareLaunchArgument('speedup', default_value=''),
-        DeclareLaunchArgument('rviz', default_value='false'),
-        DeclareLaunchArgument('record', default_value=''),
-        DeclareLaunchArgument('bridge_state_dir', default_value=''),
-        OpaqueFunction(function=start),
-    ])
+    """The arguments, `--show-args` describes them, and the nodes."""
+    return LaunchDescription([*declared(ARGUMENTS), OpaqueFunction(function=start)])
 
 
 def start(context: object) -> list:
@@ -48,6 +43,7 @@ def start(context: object) -> list:
     Raises:
         ValueError, ScenarioError: an argument is invalid; nothing has been started then.
     """
+    check_names(__file__, ARGUMENTS)
     path, record = argument(context, 'scenario'), record_file(context)
     viewers = [rviz_action(context)] if flag(context, 'rviz') else []
     parameters = simulation_parameters(load(path), path, free_port(),

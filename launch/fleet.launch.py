@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Starts the allocator and the MAVLink bridge of a fleet, with a parameter file for each."""
-from launch.actions import DeclareLaunchArgument, OpaqueFunction
-from launch.substitutions import PathJoinSubstitution
+from launch.actions import OpaqueFunction
 from launch_ros.substitutions import FindPackageShare
 
 from launch import LaunchDescription
@@ -9,40 +8,40 @@ from uav_task_alloc.nodes.ros.launch_arguments import (
     BRIDGE_SIGTERM_TIMEOUT,
     RespawnedNode,
     argument,
+    check_names,
+    declared,
     flag,
     node_action,
+    optional_number,
     parameter_file,
     record_file,
     rviz_action,
 )
+from uav_task_alloc.params import PlayerParams
 from uav_task_alloc.scenario import fleet_parameters, load
+
+_CONFIG = FindPackageShare('uav_task_alloc')
+ARGUMENTS = {
+    'namespace': ('', 'Namespace of the fleet; empty: none.'),
+    'allocator_params': ([_CONFIG, '/config/allocator.yaml'],
+                         'Parameter file of the allocator.'),
+    'bridge_params': ([_CONFIG, '/config/mavlink_bridge.yaml'],
+                      'Parameter file of the MAVLink bridge.'),
+    'scenario': ('', 'Scenario file (YAML), whose origin, route end, seed and vehicles override '
+                 'both parameter files; empty: none.'),
+    'speedup': ('', 'How many times faster than real time a simulated fleet flies, 0.1 to 100, '
+                'for the live view; empty: measured by the clocks of the vehicles.'),
+    'rviz': ('false', 'true: start RViz, too.'),
+    'record': ('', 'MCAP file to record all topics into, by a live view; it must not exist. '
+               'Empty: none.'),
+    'bridge_state_dir': ('', 'Folder in which the bridge stores across restarts which vehicles '
+                         'it has authority over; empty: as in bridge_params.'),
+}
 
 
 def generate_launch_description() -> LaunchDescription:
-    """Declare the arguments.
-
-    Arguments:
-        namespace: of the fleet.
-        allocator_params, bridge_params: parameter files.
-        scenario: YAML file; its origin, route end, seed and vehicles override both files.
-        rviz: true: start RViz as well.
-        record: MCAP file for all topics, written by a live view; empty: none.
-        bridge_state_dir: folder in which the bridge saves which vehicles it has authority over,
-            for a restart; empty: as in bridge_params.
-    """
-    config = [FindPackageShare('uav_task_alloc'), 'config']
-    return LaunchDescription([
-        DeclareLaunchArgument('namespace', default_value=''),
-        DeclareLaunchArgument('allocator_params',
-                              default_value=PathJoinSubstitution([*config, 'allocator.yaml'])),
-        DeclareLaunchArgument('bridge_params', default_value=PathJoinSubstitution(
-            [*config, 'mavlink_bridge.yaml'])),
-        DeclareLaunchArgument('scenario', default_value=''),
-        DeclareLaunchArgument('rviz', default_value='false'),
-        DeclareLaunchArgument('record', default_value=''),
-        DeclareLaunchArgument('bridge_state_dir', default_value=''),
-        OpaqueFunction(function=start),
-    ])
+    """The arguments, `--show-args` describes them, and the nodes."""
+    return LaunchDescription([*declared(ARGUMENTS), OpaqueFunction(function=start)])
 
 
 def start(context: object) -> list:
@@ -51,15 +50,19 @@ def start(context: object) -> list:
     Raises:
         ValueError, ScenarioError: an argument is invalid; nothing has been started then.
     """
+    check_names(__file__, ARGUMENTS)
     namespace, state_dir, path = (
         argument(context, name) for name in ('namespace', 'bridge_state_dir', 'scenario'))
     files = [parameter_file(context, name) for name in ('allocator_params', 'bridge_params')]
     parameters = fleet_parameters(load(path)) if path else {'allocator': {}, 'mavlink_bridge': {}}
     viewers = [rviz_action(context, namespace)] if flag(context, 'rviz') else []
-    record = record_file(context)
+    record, speedup = record_file(context), optional_number(context, 'speedup')
+    if speedup is not None:
+        speedup = PlayerParams(speedup=speedup).speedup
     if record:
-        viewers.insert(0, node_action('live_view', {'record': record, **(
-            {'scenario': path, 'stay': True} if path else {})}, namespace=namespace))
+        viewers.insert(0, node_action('live_view', {
+            'record': record, **({'scenario': path, 'stay': True} if path else {}),
+            **({} if speedup is None else {'speedup': speedup})}, namespace=namespace))
     return [
         *RespawnedNode('allocator', files[0], parameters['allocator'],
                        namespace=namespace).start(),

@@ -1,26 +1,27 @@
 # SPDX-License-Identifier: Apache-2.0
 """Starts RViz with the markers and paths of a fleet; needs the packages rviz2 and tf2_ros."""
-from launch.actions import DeclareLaunchArgument
-from launch.substitutions import LaunchConfiguration, PathJoinSubstitution
+from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 from launch_ros.substitutions import FindPackageShare
 
 from launch import LaunchDescription
+from uav_task_alloc.nodes.ros.launch_arguments import check_names, declared
 
 _TOPICS = ['allocation_markers', *(f'uav_{k}/path' for k in range(1, 5))]
 
 
-def generate_launch_description() -> LaunchDescription:
-    """Declare the arguments and start RViz.
+ARGUMENTS = {
+    'namespace': ('', 'Namespace of the fleet; empty: none.'),
+    'rviz_config': ([FindPackageShare('uav_task_alloc'), '/config/allocation.rviz'],
+                    'Configuration file of RViz.'),
+}
 
-    Arguments:
-        namespace: of the fleet.
-        rviz_config: file of RViz.
-    """
+
+def generate_launch_description() -> LaunchDescription:
+    """The arguments, `--show-args` describes them, and RViz."""
+    check_names(__file__, ARGUMENTS)
     return LaunchDescription([
-        DeclareLaunchArgument('namespace', default_value=''),
-        DeclareLaunchArgument('rviz_config', default_value=PathJoinSubstitution(
-            [FindPackageShare('uav_task_alloc'), 'config', 'allocation.rviz'])),
+        *declared(ARGUMENTS),
         Node(package='rviz2', executable='rviz2', namespace=LaunchConfiguration('namespace'),
              arguments=['-d', LaunchConfiguration('rviz_config')],
              # the configuration has absolute topic names; these are in the namespace

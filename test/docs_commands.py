@@ -121,6 +121,8 @@ def _launch(name, rest):
     path = ROOT / 'launch' / name
     if not path.exists():
         return f'{path.name}: no such launch file'
+    if rest == ['--show-args']:
+        return ''
     try:
         with mock.patch.object(launch_stand_in, 'INSTALLED', {'rviz2', 'tf2_ros'}):
             nodes = launch_stand_in.commands(path, dict(word.split(':=', 1) for word in rest))

@@ -112,7 +112,7 @@ class NotCondition(Condition):
 
 class Declared:
     def __init__(self, name, *, default_value, description=''):
-        self.name, self.default = name, default_value
+        self.name, self.default, self.description = name, default_value, description
 
     def starts(self, given):
         given.setdefault(self.name, text(self.default, given))
@@ -235,21 +235,31 @@ MODULES = {
 USERS = ('uav_task_alloc.nodes.ros.launch_arguments',)  # modules that have imported from these
 
 
-def commands(path, given):
-    """Words of `PACKAGE EXECUTABLE ...` for each node; KeyError for an unknown argument."""
+def entities(path):
+    """What a launch file declares and starts."""
     before = {name: sys.modules.pop(name, None) for name in (*MODULES, *USERS)}
     for name, members in MODULES.items():
         sys.modules[name] = types.ModuleType(name)
         sys.modules[name].__dict__.update(members)
     try:
-        scope = {}
+        scope = {'__file__': str(path)}
         exec(compile(path.read_text(), str(path), 'exec'), scope)
-        parts = scope['generate_launch_description']()
+        return scope['generate_launch_description']()
     finally:
         for name, module in before.items():
             sys.modules.pop(name, None)
             if module is not None:
                 sys.modules[name] = module
+
+
+def show_args(path):
+    """What `ros2 launch ... --show-args` prints: name and description of each argument."""
+    return {part.name: part.description for part in entities(path) if isinstance(part, Declared)}
+
+
+def commands(path, given):
+    """Words of `PACKAGE EXECUTABLE ...` for each node; KeyError for an unknown argument."""
+    parts = entities(path)
     declared = {part.name for part in parts if isinstance(part, Declared)}
     if set(given) - declared:
         raise KeyError(f'{path.name}: no argument {min(set(given) - declared)}')

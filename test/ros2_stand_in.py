@@ -16,7 +16,7 @@ import types
 from pathlib import Path
 
 import yaml
-from launch_stand_in import SHARE, Context, End, Later, Log, commands
+from launch_stand_in import SHARE, Context, End, Later, Log, commands, show_args
 
 
 def program(package, name):
@@ -92,6 +92,9 @@ class Launch:
 def launch(words):
     """ros2 launch PACKAGE FILE NAME:=VALUE ...: all nodes until Ctrl-C."""
     path = Path(SHARE[words[0]], 'launch', words[1])
+    if '--show-args' in words:
+        print(yaml.safe_dump(show_args(path), width=1000))
+        return 0
     signals = []
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda number, _: signals.append(number))

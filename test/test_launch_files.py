@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What the launch files start, with which parameters; test/nodes/test_launch.py flies them."""
+import sys
 import types
 from itertools import pairwise
 from pathlib import Path
@@ -108,6 +109,36 @@ def test_finding_37_a_demo_has_the_speedup_of_its_scenario_or_argument(moved, gi
             for name in ('fleet_sim', 'scenario_player', 'live_view')} == {speedup}
 
 
+@pytest.mark.parametrize(('given', 'speedup'), [({}, None), ({'speedup': '3'}, 3)])
+def test_the_live_view_of_a_fleet_has_the_scenario_and_the_speedup(
+        moved, tmp_path, given, speedup):
+    view = values(started('fleet', scenario=moved, record=str(tmp_path / 'x.mcap'),
+                          **given)['live_view'])
+    assert view['scenario'] == moved
+    assert view.get('speedup') == speedup  # otherwise it is measured
+
+
+@pytest.mark.parametrize('name', ['demo', 'fleet', 'rviz'])
+def test_each_launch_argument_is_described(name):
+    described = launch_stand_in.show_args(ROOT / f'launch/{name}.launch.py')
+    assert described
+    for text in described.values():
+        assert text[0].isupper() or text.startswith('true: ')
+        assert text.endswith('.')
+
+
+@pytest.mark.parametrize(('name', 'word', 'nearest'), [
+    ('fleet', 'scenari:=x.yaml', 'scenario'), ('demo', 'record_file:=x', 'record'),
+    ('rviz', 'name_space:=x', 'namespace')])
+def test_an_argument_that_launch_would_ignore_is_refused(monkeypatch, name, word, nearest):
+    path = ROOT / f'launch/{name}.launch.py'
+    monkeypatch.setattr(sys, 'argv', ['ros2', 'launch', 'uav_task_alloc', path.name, word])
+    with pytest.raises(ValueError, match=f'^{word}: expected an argument .* {nearest!r}$'):
+        launch_stand_in.commands(path, {})
+    monkeypatch.setattr(sys, 'argv', ['ros2', 'launch', 'mine', 'all.launch.py', word])
+    launch_stand_in.commands(path, {})  # of a launch file that includes this one
+
+
 def test_without_a_scenario_a_fleet_has_the_values_of_its_files(tmp_path):
     path = tmp_path / 'mine.yaml'
     path.write_text('/**/allocator: {ros__parameters: {seed: 5, route_end: hold}}')
@@ -148,6 +179,8 @@ def test_rviz_comes_with_the_nodes_when_it_is_asked_for(name, monkeypatch):
     ('demo', {'speedup': 'fast'}, 'speedup:=fast: expected a number'),
     ('demo', {'speedup': '1000'}, 'speedup = 1000.0: expected float in [0.1, 100]'),
     ('fleet', {'bridge_params': '/none.yaml'}, 'bridge_params:=/none.yaml: expected a parameter'),
+    ('fleet', {'speedup': 'fast'}, 'speedup:=fast: expected a number'),
+    ('fleet', {'speedup': '1000'}, 'speedup = 1000.0: expected float in [0.1, 100]'),
     ('fleet', {'allocator_params': '/none.yaml'}, 'allocator_params:=/none.yaml: expected a para'),
     ('fleet', {'bridge_params': str(ROOT / 'README.md')}, 'expected a parameter file'),
     ('demo', {'record': '/none/x.mcap'}, 'record:=/none/x.mcap: expected a file that does'),

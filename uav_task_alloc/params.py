@@ -253,8 +253,9 @@ class LiveViewParams(CheckedParams):
     """live_view: shows a fleet in the terminal and the browser, and records it."""
 
     scenario: str = param('', 'Scenario that is played; empty: unknown, and no end.', fixed=True)
-    speedup: float = param(1.0, 'How many times faster than real time.', low=0.1, high=100.0,
-                           fixed=True)
+    speedup: float = param(0.0, 'How many times faster than real time the fleet flies; 0: '
+                           'measured by the clocks of its vehicles, which the bridge reports.',
+                           low=0.0, high=100.0, fixed=True)
     out_dir: str = param('', 'Folder to record into; empty: nothing is recorded.', fixed=True)
     record: str = param('', 'MCAP file for every topic of the fleet, also as `--record FILE`; '
                         'empty: none.', fixed=True)

@@ -48,6 +48,23 @@ def test_arrivals_count_from_the_stamp_of_the_list():
         ('t1', BEGIN + 1.2), ('t2', BEGIN + 2.5)]
 
 
+def test_arrivals_follow_the_measured_clock_of_the_fleet():
+    measured = {'wall': BEGIN + 1.0, 'kind': 'uploads', 'uploads': {}, 'clock_rates': {'u1': 8.0}}
+    parts, _, _ = updates(FIRST, [measured])
+    assert {'list u1', 'list u2'} <= set(parts)
+    assert [task['at'] for task in parts['list u1']['tasks']] == [BEGIN + 1.2, BEGIN + 2.5]
+
+
+def test_ages_are_in_seconds_of_the_fleet():
+    run = RunState()
+    for line in ({'kind': 'run', 'wall': BEGIN, 'speedup': 8.0},
+                 state(BEGIN, 'u1', (0.0, 0.0), authority='LOST'),
+                 held(BEGIN, 'u1', 'LOST', 'why', 5.0)):
+        run.apply(line)
+    [shown] = fleet_lines(run, BEGIN + 1.0)
+    assert shown.endswith('authority lost for 48 s: why')
+
+
 def test_a_stamp_of_another_clock_is_ignored():
     line = {**FIRST[3], 'stamp': 17.0}  # simulated time
     assert updates([line])[0]['list u1']['tasks'][0]['at'] == BEGIN + 10.0

@@ -21,6 +21,7 @@ from uav_task_alloc.nodes.conversions.messages import (
     announcement,
     from_zones,
 )
+from uav_task_alloc.nodes.ros.udp_ports import free_port
 from uav_task_alloc.record import message_records, run_state
 from uav_task_alloc.zone_codec import decode_zone
 
@@ -109,6 +110,24 @@ def test_the_page_shows_what_the_node_receives(start, probe):
     assert view.stop()[0] == 0
 
 
+def test_the_speed_of_a_simulated_fleet_is_measured(start, probe, tmp_path):
+    path = tmp_path / 'play.yaml'
+    path.write_text(TEXT)
+    port = free_port()
+    start('mavlink_bridge', '-p', f"connections:=['udpin:127.0.0.1:{port}']")
+    start('fleet_sim', '-p', f'scenario:={path}', '-p', 'speedup:=6.0',
+          '-p', f'target:=127.0.0.1:{port}')
+    view = start('live_view', '-p', 'port:=0', '-p', f'scenario:={path}')
+    probe.until(lambda: 'Live page' in view.output())
+    address = re.search(r'Live page: (http://127\.0\.0\.1:\d+/)', view.output()).group(1)
+
+    def speedup():
+        with urllib.request.urlopen(f'{address}at?wall=9e9', timeout=10) as answer:
+            return json.load(answer)['clock'].get('speedup')
+
+    probe.until(lambda: speedup() == 6.0, facts=speedup)
+
+
 def test_a_port_in_use_is_logged_and_the_node_goes_on(start, probe):
     with socket.create_server(('127.0.0.1', 0)) as taken:
         port = taken.getsockname()[1]
@@ -157,10 +176,11 @@ def test_uploads_and_health_are_taken_from_the_diagnostics():
         level=b'\1', name='mavlink_bridge: uav_1', message='link stale', hardware_id='uav_1',
         values=[KeyValue(key=key, value=value) for key, value in (
             ('uploads', '4'), ('rate', '10'), ('authority', 'LOST'), ('authority_why', 'why'),
-            ('authority_for', '12 s'), ('given_back_by', '~/hand_over'))])
+            ('authority_for', '12 s'), ('given_back_by', '~/hand_over'),
+            ('clock_rate', '7.980'))])
     assert message_records.uploads_record(DiagnosticArray(status=[status])) == {
         'kind': 'uploads', 'uploads': {'mavlink_bridge: uav_1': 4},
-        'health': {'uav_1': [1, 'link stale']},
+        'health': {'uav_1': [1, 'link stale']}, 'clock_rates': {'uav_1': 7.98},
         'authority': {'uav_1': {'state': 'LOST', 'why': 'why', 'for': 12.0,
                                 'back': '~/hand_over'}}}
 
@@ -174,6 +194,12 @@ def test_the_duration_of_authority_is_a_number_or_unknown(given, seconds):
     line = message_records.uploads_record(DiagnosticArray(status=[status]))
     authority = line['authority']['u']
     assert (authority['for'], authority['back']) == (seconds, '')
+
+
+@pytest.mark.parametrize('given', ['unknown', 'nan', 'inf', '0.0', '-1.0', ''])
+def test_a_clock_rate_is_a_positive_number_or_unknown(given):
+    status = DiagnosticStatus(hardware_id='u', values=[KeyValue(key='clock_rate', value=given)])
+    assert message_records.uploads_record(DiagnosticArray(status=[status]))['clock_rates'] == {}
 
 
 def test_a_state_record_has_the_authority():

@@ -112,9 +112,9 @@ def test_help_lists_each_parameter_and_needs_no_ros_graph(name):
     (['--ros-args', '-r', '__ns:=bad ns'], '-r __ns:=bad ns: expected -r FROM:=TO'),
     (['--ros-args', '--log-level', 'loud'], '--log-level loud: expected --log-level debug, info'),
     (['--ros-args', '--params-file', 'none.yaml'],
-     '--params-file none.yaml: No such file or directory: expected a parameter file'),
+     '--params-file none.yaml: expected a parameter file: No such file or directory'),
     (['--ros-args', '--params-file', '/'],
-     '--params-file /: Is a directory: expected a parameter file'),
+     '--params-file /: expected a parameter file: Is a directory'),
     (['--ros-args', '--params-file'], 'No file path provided.'),
 ], ids=str)
 def test_a_command_line_that_ros_cannot_read_is_one_line_and_status_2(arguments, text):
@@ -124,15 +124,15 @@ def test_a_command_line_that_ros_cannot_read_is_one_line_and_status_2(arguments,
 
 
 @pytest.mark.parametrize(('content', 'code', 'text'), [
-    ('', 2, 'expected `NODE:`, `ros__parameters:` in it, and the parameters in that'),
-    ('hello', 2, 'expected `NODE:`, `ros__parameters:` in it, and the parameters in that'),
+    ('', 2, 'expected a parameter file: there is no `ros__parameters:` in a section `NODE:`'),
+    ('hello', 2, 'expected a parameter file: there is no `ros__parameters:` in a section `NODE:`'),
     ('a: [', 2, 'expected a parameter file: while parsing a flow node'),
-    ('/**:\n  ros__parameters: 5', 2, '/**: ros__parameters = 5: expected names and values'),
+    ('/**:\n  ros__parameters: 5', 2, '/**: ros__parameters = 5 are no names and values'),
     ('/**:\n  ros__parameters:\n    seed: [1, a]', 2,
      'expected a parameter file (Sequence should be of same type.'),
     ('/**/mavlink_bridge:\n  ros__parameters:\n    takeoff: true', 1,
-     'is for /**/mavlink_bridge: expected parameters for /allocator or /**'),
-    ('/fleet/allocator:\n  ros__parameters:\n    seed: 1', 1, 'is for /fleet/allocator: expected'),
+     'expected parameters for /allocator or /**: it is for /**/mavlink_bridge'),
+    ('/fleet/allocator:\n  ros__parameters:\n    seed: 1', 1, 'it is for /fleet/allocator'),
     ('allocator:\n  ros__parameters:\n    solve_buget: 1.0', 1,
      "unknown parameter 'solve_buget': expected one that --help lists; nearest is 'solve_budget'"),
     ('allocator:\n  ros__parameters:\n    origin: {latitud: 1.0}', 1,

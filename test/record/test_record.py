@@ -69,6 +69,28 @@ def test_the_clock_of_a_scenario_starts_with_its_first_task():
     assert (run.start(), run.clock(3.0)) == (2.0, 8.0)
 
 
+def rates(**by_uav):
+    return 'uploads', {'uploads': {}, 'clock_rates': by_uav}
+
+
+@pytest.mark.parametrize(('given', 'measured', 'speedup'), [
+    (0.0, {'u1': 7.91, 'u2': 8.05, 'lost': 0.3}, 8.0),  # the median of the fleet
+    (0.0, {'u1': 5.51}, 5.51), (0.0, {'u1': 1.07}, 1.0), (0.0, {'u1': 0.5}, 0.5),
+    (8.0, {'u1': 7.0}, 8.0), (0.0, {}, 1.0),
+])
+def test_the_clock_of_a_run_is_measured_where_no_speedup_is_given(given, measured, speedup):
+    run = run_state(('run', {'speedup': given}), announced('ADD', 'a'), rates(**measured))
+    assert run.speedup == speedup
+    assert run.clock(5.0) == pytest.approx(4.0 * speedup)
+
+
+def test_a_measured_clock_does_not_follow_small_changes():
+    run = run_state(('run', {'speedup': 0.0}), rates(u1=5.5), rates(u1=5.6), rates(u1=5.4))
+    assert run.speedup == 5.5
+    run.apply({'wall': 9.0, 'kind': 'uploads', 'uploads': {}, 'clock_rates': {'u1': 20.1}})
+    assert run.speedup == 20.0
+
+
 def test_a_zone_is_in_force_from_the_first_set_with_it_to_the_first_without():
     run = run_state(zones(DOME), zones(DOME, HUT), zones(HUT), zones(DOME, HUT))
     assert run.zones == [

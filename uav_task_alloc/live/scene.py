@@ -57,7 +57,10 @@ class Scene:
             self.dirty.add(f'list {line["uav"]}')
         elif kind == 'allocation':
             self.new_plans.append(line)
+        speedup = self.run.speedup
         self.run.apply(line)
+        if self.run.speedup != speedup:  # the arrivals of all lists are other times
+            self.dirty |= {f'list {uav}' for uav, each in self.run.lists.items() if each['tasks']}
 
     def updates(self, now: float) -> tuple[dict[str, Any], list[LogEntry], list[LogEntry]]:
         """Changes since the last call.

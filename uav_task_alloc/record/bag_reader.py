@@ -98,7 +98,7 @@ class BagReader:
                 self.origin = Origin(*(float(metadata[f'origin.{name}']) for name in (
                     'latitude', 'longitude', 'altitude_amsl')))
             yield {'kind': 'run', 'speedup': check_number(
-                'speedup', float(metadata.get('speedup', 1.0)), 0.0, 1e6, open_low=True)}
+                'speedup', float(metadata.get('speedup', 0.0)), 0.0, 1e6)}
         except (KeyError, ValueError):
             self.undecodable['about'] += 1
 

@@ -206,10 +206,11 @@ def uploads_record(msg: _Message) -> RecordBody:
 
     Returns:
         Kind `uploads`. `uploads`: counts by name of the status; `health`: [level, text] by
-        hardware id, which is the UAV in statuses of a bridge; `authority`: by UAV.
+        hardware id, which is the UAV in statuses of a bridge; `authority`, `clock_rates`: by
+        UAV.
     """
     return {'kind': 'uploads', 'uploads': dict(_upload_counts(msg)), 'authority': dict(
-        _authority(msg)), 'health': {
+        _authority(msg)), 'clock_rates': dict(_clock_rates(msg)), 'health': {
         status.hardware_id or status.name: [
             status.level if isinstance(status.level, int) else ord(status.level), status.message]
         for status in msg.status}}
@@ -232,6 +233,15 @@ def _authority(msg: _Message) -> Iterable[tuple[str, RecordBody]]:
                 'state': values['authority'], 'why': values.get('authority_why', ''),
                 'for': _seconds_or_none(values.get('authority_for', '')),
                 'back': '' if back == NOTHING else back}
+
+
+def _clock_rates(msg: _Message) -> Iterable[tuple[str, float]]:
+    """By UAV: seconds of its clock in one of the bridge's."""
+    for status in msg.status:
+        for pair in status.values:
+            rate = _seconds_or_none(pair.value) if pair.key == 'clock_rate' else None
+            if rate is not None and rate > 0.0:
+                yield status.hardware_id, rate
 
 
 def _seconds_or_none(text: str) -> float | None:

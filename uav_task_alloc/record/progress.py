@@ -57,13 +57,17 @@ def fleet_lines(run: RunState, now: float) -> list[str]:
 
 
 def authority_text(run: RunState, uav: str, now: float) -> str:
-    """Authority over a UAV: state, duration, reason, what gives it back; why not available."""
+    """Authority over a UAV: state, duration, reason, what gives it back; why not available.
+
+    As all times of the display, the duration is in seconds of the scenario.
+    """
     state, reported = run.uavs[uav], run.authority.get(uav)
     name, reason = state.get('authority', ''), state.get('reason', '')
     if reported is None or reported.state != name:
         known = f'authority {name.lower()}' if name not in ('', 'UNKNOWN') else ''
         return ': '.join(filter(None, (known, reason)))
-    age = '' if reported.since is None else f' for {max(0.0, now - reported.since):.0f} s'
+    age = '' if reported.since is None else (
+        f' for {run.speedup * max(0.0, now - reported.since):.0f} s')
     text = f'authority {name.lower()}{age}: {reported.reason}'
     text += f'; given back by {reported.given_back_by}' if reported.given_back_by else ''
     return text if not reason or reported.reason in reason else f'{text}; not available: {reason}'

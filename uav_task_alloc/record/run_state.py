@@ -7,6 +7,7 @@ import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from statistics import median
 from typing import Any
 
 from uav_task_alloc.geometry.frames import Origin
@@ -16,6 +17,8 @@ from uav_task_alloc.zone_codec import decode_zone
 RECORD_FILE = 'record.jsonl'
 END_STATES = ('COMPLETED', 'FAILED', 'CANCELLED', 'REJECTED')
 FINAL_STATES = (*END_STATES, 'UNASSIGNED')
+# share by which a measured clock rate varies, and that of a real vehicle over a bad link
+_RATE_TOLERANCE, _REAL_TIME_TOLERANCE = 0.04, 0.1
 SINCE_TOLERANCE = 3.0  # [s] of a start time: reports are in whole seconds and arrive late
 Line = Mapping[str, Any]  # `wall` [unix s], `kind`, and the values that RunState.on_KIND reads
 
@@ -90,6 +93,8 @@ class RunState:
     authority: dict[str, ReportedAuthority] = field(default_factory=dict)  # by UAV
     speedup: float = 1.0  # scenario seconds in a second of wall time
     origin: Origin | None = None  # of the ENU frame; None: not known yet
+    measured: bool = True  # `speedup` is that of the vehicles' clocks, as no one stated it
+    clock_rates: dict[str, float] = field(default_factory=dict)  # of the vehicles, by UAV
     first: float = math.inf  # [unix s] of the first line
     last: float = -math.inf  # [unix s] of the last line
 
@@ -99,8 +104,9 @@ class RunState:
         getattr(self, 'on_' + line['kind'])(line)
 
     def on_run(self, line: Line) -> None:
-        """Parameters of the run."""
-        self.speedup = line['speedup']
+        """Parameters of the run; a speedup of 0 is to be measured."""
+        self.measured = not line['speedup']
+        self.speedup = line['speedup'] or self.speedup
 
     def on_origin(self, line: Line) -> None:
         """The origin of the ENU frame, as a node of the fleet published it."""
@@ -154,10 +160,15 @@ class RunState:
             self.verified.setdefault(line['uav'], set()).add(line['list_revision'])
 
     def on_uploads(self, line: Line) -> None:
-        """Diagnostics of the bridge: upload counts, health and authority of its UAVs."""
+        """Diagnostics of the bridge: uploads, health, authority and clocks of its UAVs."""
         self.upload_counts.update(line['uploads'])
         self.health.update((uav, (level, text))
                            for uav, (level, text) in line.get('health', {}).items())
+        self.clock_rates.update(line.get('clock_rates', {}))
+        if self.measured and self.clock_rates:
+            rate = median(self.clock_rates.values())
+            if abs(rate - self.speedup) > _RATE_TOLERANCE * self.speedup:
+                self.speedup = rounded_rate(rate)
         for uav, row in line.get('authority', {}).items():
             since = None if row['for'] is None else line['wall'] - row['for']
             old = self.authority.get(uav)
@@ -192,6 +203,20 @@ class RunState:
     def zones_now(self) -> list[ThreatZone]:
         """The zones in force after the last line."""
         return [interval.zone for interval in self.zones if interval.until == math.inf]
+
+
+def rounded_rate(rate: float) -> float:
+    """A measured clock rate; the whole number near it where there is one, as that was chosen.
+
+    Args:
+        rate: seconds of the vehicles in a second of wall time, with the jitter of their links.
+
+    Returns:
+        1.0 also for 10 % more or less.
+    """
+    whole = max(1.0, float(round(rate)))
+    tolerance = _REAL_TIME_TOLERANCE if whole == 1.0 else _RATE_TOLERANCE * whole
+    return whole if abs(rate - whole) <= tolerance else round(rate, 2)
 
 
 def read_record(out_dir: Path) -> RunState:

@@ -9,6 +9,7 @@ from pymavlink.dialects.v20 import ardupilotmega as d
 
 from uav_task_alloc.geometry.frames import Origin, to_enu
 from uav_task_alloc.mavlink.autopilots import OFF_GROUND, ModeFunction, Profile
+from uav_task_alloc.mavlink.gcs.clock_rate import ClockRate
 from uav_task_alloc.mavlink.transport.codec import Message, plan_id
 from uav_task_alloc.mavlink.transport.frame_log import FrameLog
 from uav_task_alloc.model import Point
@@ -82,6 +83,7 @@ class Telemetry:
         self.restarts = 0
         self.boot_ms = self._older_clocks = 0  # [ms] time_boot_ms; messages in a row before it
         self._boot_at = now
+        self.clock_rate = ClockRate()
         self._gap_at = -math.inf  # [s] end of the latest gap of _QUIET
         self.frames = FrameLog()
         self.frame = 0  # frame number of the latest message
@@ -175,6 +177,7 @@ class Telemetry:
     def restart(self, boot_ms: int = 0) -> None:
         """Reset after a restart, or when another vehicle uses its system id."""
         self.boot_ms, self._older_clocks = boot_ms, 0
+        self.clock_rate.reset()
         self.restarts += 1
         self.received_ids = set()
         self.received_last.clear()
@@ -207,6 +210,8 @@ class Telemetry:
         if boot_ms >= least:
             self.boot_ms, self._older_clocks = max(boot_ms, self.boot_ms), 0
             self._boot_at = now
+            if boot_ms == self.boot_ms:
+                self.clock_rate.add(1e-3 * boot_ms, now)
             return
         self._older_clocks += 1
         if self._older_clocks >= 2 and (

@@ -2,6 +2,7 @@
 """Diagnostics of one vehicle for operators: a level, a summary, and named facts."""
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 from uav_task_alloc.mavlink.gcs.authority import AuthorityState, Suspension
@@ -32,6 +33,7 @@ class VehicleFacts:
     uploads: int  # number of uploads
     restarts: int  # number of restarts of the vehicle
     silent_for: str  # time since its last message
+    clock_rate: str  # its seconds in one second of the bridge; above 1 in a faster simulation
     strays: int  # number of frames from other addresses
 
 
@@ -88,7 +90,7 @@ def _facts_of(session: VehicleSession, now: float) -> VehicleFacts:
     executor = session.executor
     authority, onboard, telemetry = executor.authority, executor.onboard, executor.telemetry
     owner = AuthorityState.UNKNOWN if authority.undecided else authority.state
-    reason = session.fault or why_not_available(executor, now)
+    reason, rate = session.fault or why_not_available(executor, now), telemetry.clock_rate.value
     return VehicleFacts(
         authority=owner.name, authority_why=authority.why,
         authority_for=f'{now - authority.since:.0f} s',
@@ -100,4 +102,5 @@ def _facts_of(session: VehicleSession, now: float) -> VehicleFacts:
         item=f'{onboard.progress.current} of {len(onboard.progress.items)}',
         upload=onboard.upload_progress(now) or 'none', uploads=onboard.upload.uploads,
         restarts=telemetry.restarts, silent_for=f'{now - telemetry.received_at:.1f} s',
+        clock_rate='unknown' if math.isnan(rate) else f'{rate:.3f}',
         strays=session.strays)

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import os
+import sys
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, List  # noqa: UP035 - launch compares with typing's
 
-import yaml
 from launch.actions import (
+    DeclareLaunchArgument,
     IncludeLaunchDescription,
     LogInfo,
     OpaqueFunction,
@@ -23,12 +25,43 @@ from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
 from launch_ros.substitutions import ExecutableInPackage, FindPackageShare
 
+from uav_task_alloc.nodes.ros.parameter_files import ParameterFileError, read_sections
 from uav_task_alloc.nodes.ros.restart_policy import RestartPolicy, RestartVerdict
 from uav_task_alloc.scenario.node_parameters import Value
 
 _PACKAGE = 'uav_task_alloc'
+ArgumentTable = Mapping[str, tuple[Any, str]]  # default and description, by name
 # [s] from SIGINT to SIGTERM; the bridge completes a running upload first
 BRIDGE_SIGTERM_TIMEOUT = '15'
+
+
+def declared(table: ArgumentTable) -> list[DeclareLaunchArgument]:
+    """The arguments of a launch file, with the texts that `--show-args` prints."""
+    return [DeclareLaunchArgument(name, default_value=default, description=text)
+            for name, (default, text) in table.items()]
+
+
+def check_names(path: str, table: ArgumentTable, argv: Sequence[str] = ()) -> None:
+    """Refuse an argument of the command line that a launch file does not have.
+
+    `ros2 launch` ignores it, and a fleet would fly with a default instead.
+
+    Args:
+        path: of the launch file; one that another file includes is not checked.
+        table: its arguments.
+        argv: the command line; empty: of this process.
+
+    Raises:
+        ValueError: there is one; the text names the nearest that exists.
+    """
+    words = argv or sys.argv
+    if not any(Path(word).name == Path(path).name for word in words):
+        return
+    for word in words:
+        name, assigned, _ = word.partition(':=')
+        if assigned and name not in table:
+            raise ValueError(f'{word}: expected an argument that --show-args lists; nearest is '
+                             f'{get_close_matches(name, table, 1, 0.0)[0]!r}')
 
 
 def argument(context: Any, name: str) -> str:
@@ -117,11 +150,9 @@ def parameter_file(context: Any, name: str) -> str:
     """A launch argument that names a parameter file; ValueError otherwise."""
     path = argument(context, name)
     try:
-        content = yaml.safe_load(Path(path).read_text(encoding='utf-8'))
-    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
-        raise ValueError(f'{name}:={path}: expected a parameter file: {error}') from None
-    if not isinstance(content, dict):
-        raise ValueError(f'{name}:={path}: expected a parameter file with `ros__parameters`')
+        read_sections(path)
+    except ParameterFileError as error:
+        raise ValueError(f'{name}:={error.text}') from None
     return path
 
 

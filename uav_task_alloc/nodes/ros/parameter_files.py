@@ -18,10 +18,17 @@ Sections = Mapping[str, Mapping[str, Any]]  # parameters by the pattern of nodes
 
 
 class ParameterFileError(AllocError, ValueError):
-    """A parameter file that cannot be read, or that says nothing about a node."""
+    """A parameter file that cannot be read, or that says nothing about a node.
 
-    def __init__(self, path: str, reason: str) -> None:
-        super().__init__(f'{_FLAG} {path}: {reason}')
+    Args:
+        path: of the file.
+        reason: what is wrong.
+        expected: what it must be.
+    """
+
+    def __init__(self, path: str, reason: str, expected: str = 'a parameter file') -> None:
+        self.text = f'{path}: expected {expected}: {reason}'
+        super().__init__(f'{_FLAG} {self.text}')
 
 
 def files_of(argv: Sequence[str]) -> list[str]:
@@ -41,19 +48,17 @@ def read_sections(path: str) -> Sections:
     try:
         content = yaml.safe_load(Path(path).read_text(encoding='utf-8'))
     except OSError as error:
-        raise ParameterFileError(path, f'{error.strerror}: expected a parameter file') from None
+        raise ParameterFileError(path, str(error.strerror)) from None
     except (UnicodeDecodeError, yaml.YAMLError) as error:
-        reason = ' '.join(str(error).split())
-        raise ParameterFileError(path, f'expected a parameter file: {reason}') from None
+        raise ParameterFileError(path, ' '.join(str(error).split())) from None
     sections: dict[str, dict[str, Any]] = {}
     for pattern, values in _sections(content):
         if not isinstance(values, dict | None):
-            raise ParameterFileError(path, f'{pattern}: {_KEY} = {values!r}: expected names and '
+            raise ParameterFileError(path, f'{pattern}: {_KEY} = {values!r} are no names and '
                                            'values')
         sections.setdefault(pattern, {}).update(values or {})
     if not sections:
-        raise ParameterFileError(path, f'expected `NODE:`, `{_KEY}:` in it, and the parameters '
-                                       'in that')
+        raise ParameterFileError(path, f'there is no `{_KEY}:` in a section `NODE:`')
     return sections
 
 
@@ -78,8 +83,8 @@ def check_files(argv: Sequence[str], node: str) -> None:
     for path in files_of(argv):
         patterns = list(read_sections(path))
         if not any(_matches(pattern, node) for pattern in patterns):
-            raise ParameterFileError(path, f'is for {first_of(patterns)}: expected parameters '
-                                           f'for {node} or /**')
+            raise ParameterFileError(path, f'it is for {first_of(patterns)}',
+                                     f'parameters for {node} or /**')
 
 
 def shared_names(argv: Sequence[str]) -> set[str]:
