@@ -8,13 +8,13 @@ from uav_task_alloc.nodes.ros.launch_arguments import (
     BRIDGE_SIGTERM_TIMEOUT,
     RespawnedNode,
     argument,
-    check_names,
     declared,
     flag,
     localhost_only,
     node_action,
     optional_number,
     record_file,
+    refuse_unknown,
     rviz_action,
 )
 from uav_task_alloc.nodes.ros.udp_ports import free_port
@@ -43,7 +43,7 @@ def start(context: object) -> list:
     Raises:
         ValueError, ScenarioError: an argument is invalid; nothing has been started then.
     """
-    check_names(__file__, ARGUMENTS)
+    refuse_unknown(__file__, ARGUMENTS)
     path, record = argument(context, 'scenario'), record_file(context)
     viewers = [rviz_action(context)] if flag(context, 'rviz') else []
     parameters = simulation_parameters(load(path), path, free_port(),

@@ -8,13 +8,13 @@ from uav_task_alloc.nodes.ros.launch_arguments import (
     BRIDGE_SIGTERM_TIMEOUT,
     RespawnedNode,
     argument,
-    check_names,
     declared,
     flag,
     node_action,
     optional_number,
     parameter_file,
     record_file,
+    refuse_unknown,
     rviz_action,
 )
 from uav_task_alloc.params import PlayerParams
@@ -50,7 +50,7 @@ def start(context: object) -> list:
     Raises:
         ValueError, ScenarioError: an argument is invalid; nothing has been started then.
     """
-    check_names(__file__, ARGUMENTS)
+    refuse_unknown(__file__, ARGUMENTS)
     namespace, state_dir, path = (
         argument(context, name) for name in ('namespace', 'bridge_state_dir', 'scenario'))
     files = [parameter_file(context, name) for name in ('allocator_params', 'bridge_params')]

@@ -5,7 +5,7 @@ from launch_ros.actions import Node
 from launch_ros.substitutions import FindPackageShare
 
 from launch import LaunchDescription
-from uav_task_alloc.nodes.ros.launch_arguments import check_names, declared
+from uav_task_alloc.nodes.ros.launch_arguments import declared, refuse_unknown
 
 _TOPICS = ['allocation_markers', *(f'uav_{k}/path' for k in range(1, 5))]
 
@@ -19,7 +19,7 @@ ARGUMENTS = {
 
 def generate_launch_description() -> LaunchDescription:
     """The arguments, `--show-args` describes them, and RViz."""
-    check_names(__file__, ARGUMENTS)
+    refuse_unknown(__file__, ARGUMENTS)
     return LaunchDescription([
         *declared(ARGUMENTS),
         Node(package='rviz2', executable='rviz2', namespace=LaunchConfiguration('namespace'),

@@ -41,7 +41,7 @@ def declared(table: ArgumentTable) -> list[DeclareLaunchArgument]:
             for name, (default, text) in table.items()]
 
 
-def check_names(path: str, table: ArgumentTable, argv: Sequence[str] = ()) -> None:
+def refuse_unknown(path: str, table: ArgumentTable, argv: Sequence[str] = ()) -> None:
     """Refuse an argument of the command line that a launch file does not have.
 
     `ros2 launch` ignores it, and a fleet would fly with a default instead.
