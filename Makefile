@@ -36,7 +36,7 @@ build: install/.built install/.compiled
 	@touch $@
 
 install/.built: .ros/.made setup.py setup.cfg package.xml colcon_defaults.yaml \
-		$(wildcard msg_defs/* msg_defs/*/* launch/* config/*.yaml config/*.rviz config/scenarios/*)
+		$(wildcard resource/* msg_defs/* msg_defs/*/* launch/* config/*.yaml config/*.rviz config/scenarios/*)
 	@echo '== colcon build (about a minute when messages changed)'
 	@$(STOP); mkdir -p log && $(ENV) && python3 -m colcon build --symlink-install > log/make_build.txt 2>&1 \
 		|| { tail -n 40 log/make_build.txt; exit 1; }

@@ -45,21 +45,27 @@ def add_messages(command):
 
 
 def add_programs(command, folder):
-    """Write the programs of the nodes where `ros2 run` looks for them; a wheel has none.
+    """Write the nodes' programs where `ros2 run` looks, and the command line onto PATH.
 
-    A console script would show a traceback for a Ctrl-C before its first line of ours.
+    A wheel has none of them: pip makes a console script of the command line. Such a script shows
+    a traceback for a Ctrl-C before its first line of ours.
     """
     if any(command.distribution.get_command_obj(name, create=False)
            for name in ('bdist_wheel', 'editable_wheel')):
         return
-    text = Path(__file__).resolve().parent.joinpath('resource/program.in').read_text()
-    Path(folder).mkdir(parents=True, exist_ok=True)
     for name in PROGRAMS:
-        program = Path(folder, name)
-        program.unlink(missing_ok=True)
-        program.write_text(text.replace('@PYTHON@', shlex.quote(sys.executable))
-                           .replace('@NAME@', name))
-        program.chmod(0o755)
+        write_program(Path(folder, name), 'program.in')
+    write_program(Path(folder).parents[1] / 'bin' / NAME, 'command.in')
+
+
+def write_program(path, template):
+    """Write an executable from a template of resource/."""
+    text = Path(__file__).resolve().parent.joinpath('resource', template).read_text()
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.unlink(missing_ok=True)
+    path.write_text(text.replace('@PYTHON@', shlex.quote(sys.executable))
+                    .replace('@NAME@', path.name))
+    path.chmod(0o755)
 
 
 class Install(install):
@@ -96,7 +102,7 @@ setup(
         ('share/' + NAME + '/config/sros2', glob('config/sros2/*.xml')),
         ('share/' + NAME + '/config/scenarios', glob('config/scenarios/*.yaml')),
     ],
-    python_requires='>=3.10',
+    python_requires='>=3.10,<3.15',
     install_requires=['numpy', 'numba', 'pymap3d', 'pymavlink', 'pyyaml', 'scipy'],
     extras_require={'plot': ['matplotlib'],
                     'study': ['distributed', 'ortools', 'pyvrp'],
@@ -109,4 +115,7 @@ setup(
     maintainer_email='uav_task_alloc@users.noreply.github.com',
     description='Allocates tasks to several UAVs as they arrive, around no-fly zones.',
     license='Apache-2.0',
+    classifiers=['Programming Language :: Python :: 3', *(
+        f'Programming Language :: Python :: 3.{minor}' for minor in range(10, 15))],
+    entry_points={'console_scripts': [f'{NAME} = {NAME}.cli.entry:main']},
 )

@@ -18,7 +18,7 @@ from uav_task_alloc import __main__ as cli, params
 
 ROOT = Path(__file__).parent.parent
 # programs of other packages
-FOREIGN = {'.', 'cd', 'source', 'export', 'git', 'pip', 'rosdep', 'colcon', 'mkdir', 'ls', 'cat',
+FOREIGN = {'.', 'cd', 'source', 'export', 'git', 'rosdep', 'colcon', 'mkdir', 'ls', 'cat',
            'sim_vehicle.py', 'px4', 'arducopter', 'rviz2', 'xdg-open', 'pytest', 'dask', 'sudo'}
 
 
@@ -50,6 +50,10 @@ def error_in(words):
         return _make(rest)
     if name in ('python', 'python3'):
         return _python(rest)
+    if name == 'uav_task_alloc':
+        return _command(rest)
+    if name == 'pip':
+        return _pip(rest)
     if name == 'ros2':
         return _ros2(rest)
     return '' if Path(name).name in FOREIGN else f'{name}: expected a known program'
@@ -71,6 +75,18 @@ def _python(rest):
     return ''
 
 
+def _pip(rest):
+    extras = re.findall(r"'(\w+)': \[", (ROOT / 'setup.py').read_text())
+    for word in rest:
+        own = re.fullmatch(r'\.\[(.+)\]', word)
+        for extra in own[1].split(',') if own else ():
+            if extra not in extras:
+                return f'pip: no extra {extra}'
+        if word.endswith('.txt') and not (ROOT / word).exists():
+            return f'{word}: no such file'
+    return ''
+
+
 def _command(rest):
     if not rest or rest[0] not in cli.COMMANDS:
         return f'{rest}: expected one of {list(cli.COMMANDS)}'
@@ -85,8 +101,6 @@ def _command(rest):
 def help_of(*words):
     """The output of these words followed by `-h`."""
     out = io.StringIO()
-    if words[0] in ('params', 'compile'):
-        return '--write'
     with contextlib.redirect_stdout(out), contextlib.redirect_stderr(out), contextlib.suppress(
             SystemExit):
         cli.main([*words, '-h'])

@@ -55,6 +55,7 @@ class Sandbox:
                 (folder / path.name).symlink_to(path)
         (folder / '.bin').mkdir()
         self._stand_in('python', f'exec {sys.executable} "$@"')
+        self._stand_in('uav_task_alloc', f'exec {sys.executable} -m uav_task_alloc "$@"')
         if shutil.which('ros2') is None:
             self._stand_in('ros2', f'exec {sys.executable} {ROOT}/test/ros2_stand_in.py "$@"')
         if not NO_ROS:
@@ -242,6 +243,10 @@ def test_a_launch_file_starts_existing_programs(path):
     ('make demmo', 'demmo'),
     ('python -m uav_task_alloc plan x.yaml --plott x.png', 'no option --plott'),
     ('python -m uav_task_alloc plann', 'plann'),
+    ('uav_task_alloc plan x.yaml --bugdet 3', 'no option --bugdet'),
+    ('uav_task_alloc compile --wirte', 'no option --wirte'),
+    ('uav_task_alloc study scuots --runs 3', 'no option --runs'),
+    ('pip install .[plott]', 'no extra plott'),
     ('ros2 run uav_task_alloc allocater', 'no such executable'),
     ('ros2 run uav_task_alloc allocator --ros-args -p buget:=1.0', 'no parameter buget'),
     ('ros2 launch uav_task_alloc fleet.launch.py names:=x', 'no argument names'),

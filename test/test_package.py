@@ -2,8 +2,12 @@
 """The package as a whole: public names, launch files, interface files."""
 import os
 import re
+import runpy
 import signal
 import subprocess
+import sys
+import warnings
+import zipfile
 from pathlib import Path
 
 import pytest
@@ -63,12 +67,46 @@ def test_every_interface_is_generated(path):
     assert f'"{path.parent.name}/{path.name}"' in cmake
 
 
+def test_a_wheel_puts_the_command_line_on_path_and_no_node(tmp_path):
+    setuptools = pytest.importorskip('setuptools', minversion='70.1')  # has bdist_wheel
+    assert setuptools
+    subprocess.run([
+        sys.executable, '-W', 'ignore', 'setup.py', '-q', 'egg_info', '--egg-base', tmp_path,
+        'build', '--build-base', tmp_path, 'bdist_wheel', '--dist-dir', tmp_path], cwd=ROOT,
+        check=True, capture_output=True)
+    with zipfile.ZipFile(next(tmp_path.glob('*.whl'))) as wheel:
+        names = wheel.namelist()
+        (entries,) = (wheel.read(name).decode() for name in names
+                      if name.endswith('entry_points.txt'))
+    assert entries.split('\n')[:2] == ['[console_scripts]',
+                                       'uav_task_alloc = uav_task_alloc.cli.entry:main']
+    assert len(entries.strip().splitlines()) == 2
+    assert not [name for name in names if re.search(r'\.data/(scripts|data/(bin|lib))/', name)]
+
+
+def test_the_python_versions_are_the_same_everywhere(monkeypatch):
+    setuptools, given = pytest.importorskip('setuptools'), {}
+    monkeypatch.setattr(setuptools, 'setup', lambda **kwargs: given.update(kwargs))
+    monkeypatch.chdir(ROOT)
+    with warnings.catch_warnings():
+        warnings.simplefilter('ignore')  # those of setuptools
+        runpy.run_path('setup.py')
+    classified = [each.rpartition(' ')[2] for each in given['classifiers']][1:]
+    low, high = re.fullmatch(r'>=3\.(\d+),<3\.(\d+)', given['python_requires']).groups()
+    assert classified == [f'3.{minor}' for minor in range(int(low), int(high))]
+    ci = yaml.safe_load((ROOT / '.github/workflows/ci.yml').read_text())
+    assert ci['jobs']['python']['strategy']['matrix']['python-version'] == classified
+    assert f'Python {classified[0]} to {classified[-1]}' in (ROOT / 'README.md').read_text()
+    ruff = (ROOT / 'ruff.toml').read_text()
+    assert f'target-version = "py3{low}"' in ruff
+
+
 def test_the_version_is_the_same_everywhere():
     places = {
         re.search(r"version='([\d.]+)'", (ROOT / 'setup.py').read_text()).group(1),
         *(re.search(r'<version>([\d.]+)', (ROOT / p).read_text()).group(1)
           for p in ('package.xml', 'msg_defs/package.xml'))}
-    assert len(places) == 1
+    assert places == {uav_task_alloc.__version__}
 
 
 def test_ctrl_c_in_make_build_shows_no_traceback_of_the_build(tmp_path):

@@ -1,15 +1,20 @@
 # SPDX-License-Identifier: Apache-2.0
 """Allocates tasks to UAVs as they arrive, around threat zones; imports no ROS."""
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from __future__ import annotations
 
+from importlib import import_module
+
+TYPE_CHECKING = False  # without `typing`, which takes longer to load than the rest of `--version`
 if TYPE_CHECKING:
+    from typing import Any
+
     from uav_task_alloc.geometry.detour import detour
     from uav_task_alloc.model import Plan, Task, ThreatZone, Uav
     from uav_task_alloc.solver.registry import SOLVERS
     from uav_task_alloc.solver.solve import plan
 
 __all__ = ['SOLVERS', 'Plan', 'Task', 'ThreatZone', 'Uav', 'detour', 'plan']
+__version__ = '0.1.0'
 _MODULES = {'SOLVERS': 'solver.registry', 'plan': 'solver.solve', 'detour': 'geometry.detour',
           **dict.fromkeys(('Plan', 'Task', 'ThreatZone', 'Uav'), 'model')}
 

@@ -1,13 +1,21 @@
 # SPDX-License-Identifier: Apache-2.0
 """The command line from its arguments to its output and exit status."""
+import argparse
+import contextlib
 import json
+import os
+import re
 import subprocess
 import sys
 from pathlib import Path
 
+import numba
 import pytest
 
+import uav_task_alloc
 from uav_task_alloc import SOLVERS, __main__ as cli, params
+from uav_task_alloc.cli import compile as command
+from uav_task_alloc.cli.study import EXPERIMENTS
 
 ROOT = Path(__file__).parents[2]
 FILE = str(ROOT / 'config/scenarios/plan_only.yaml')
@@ -59,12 +67,12 @@ def test_an_error_is_one_line_and_status_1(arguments, text, capsys):
     assert refusal.count('\n') == 1
 
 
-def test_ctrl_c_before_the_solving_ends_silently(monkeypatch, capsys):
+def test_ctrl_c_before_the_solving_is_one_line(monkeypatch, capsys):
     def interrupted(argv):
         raise KeyboardInterrupt
     monkeypatch.setattr('uav_task_alloc.cli.plan.main', interrupted)
     assert cli.main(['plan', FILE]) == 130
-    assert capsys.readouterr() == ('', '')
+    assert capsys.readouterr() == ('', 'interrupted\n')
 
 
 def test_a_bad_scenario_is_refused_with_file_and_line(tmp_path, capsys):
@@ -89,22 +97,132 @@ def test_params_writes_every_generated_file(tmp_path, monkeypatch):
     assert {'docs/parameters.md', 'docs/scenarios.md', 'config/allocator.yaml'} <= result
 
 
-def test_params_refuses_other_arguments():
-    with pytest.raises(SystemExit, match='usage'):
-        cli.main(['params', '--wirte'])
+@pytest.mark.parametrize(('arguments', 'text'), [
+    (['params', '--wirte'], "uav_task_alloc params: '--wirte' is unknown; nearest is --write; "),
+    (['compile', 'x'], "uav_task_alloc compile: 'x' is unknown; "),
+    (['fly'], "uav_task_alloc: 'fly': expected one of plan, study, bench, report, params, "),
+    (['plann'], 'compile; nearest is plan; uav_task_alloc -h lists the options'),
+    (['--verison'], "uav_task_alloc: '--verison' is unknown; nearest is --version; "),
+    (['plan'], 'uav_task_alloc plan: the following arguments are required: SCENARIO.yaml; '),
+    (['plan', FILE, '--budget'], 'uav_task_alloc plan: --budget: expected one argument; '),
+    (['plan', FILE, '--budget', 'x'], "--budget = 'x': expected a number in [0, 86400] s; "),
+    (['plan', FILE, '--budget', 'nan'], "--budget = 'nan': expected a number in [0, 86400] s; "),
+    (['plan', FILE, '--seed', '1.5'], "--seed = '1.5': expected a whole number in [0, 922"),
+    (['plan', FILE, '--route-end', 'land'], "--route-end = 'land': expected one of hold, home; "),
+    (['bench', '--sizes', 'x'], "--sizes = 'x': expected UAVs x tasks, each in [1, 10000], as "),
+    (['bench', '--sizes', '4x20,'], "--sizes = '': expected UAVs x tasks, each in "),
+    (['bench', '--sizes', '0x5'], "--sizes = '0x5': expected UAVs x tasks, each in [1, 10000]"),
+    (['bench', '--kinds', 'base,x'], "--kinds = 'x': expected one of spread, base; "),
+    (['bench', '--solvers', 'bees'], "--solvers = 'bees': expected one of chain_q, "),
+    (['bench', '--against', 'x'], "--against = 'x': expected one of pyvrp, ortools, none; "),
+    (['bench', '--budgets', '1,x'], "--budgets = 'x': expected a number in [0.001, 86400] s; "),
+    (['bench', '--budgets', '0'], "--budgets = '0': expected numbers in [0.001, 86400] s; "),
+    (['study'], 'uav_task_alloc study: the following arguments are required: --out; '),
+    (['study', 'whole', '--size', '3'], "uav_task_alloc study whole: --size = '3': expected UAVs"),
+    (['report'], 'uav_task_alloc report: the following arguments are required: FILE.mcap'),
+])
+def test_malformed_arguments_are_one_line_and_status_2(arguments, text, capsys):
+    with pytest.raises(SystemExit, match='2'):
+        cli.main(arguments)
+    refusal = capsys.readouterr().err
+    assert text in refusal
+    assert refusal.count('\n') == 1
 
 
-def test_an_unknown_command_is_refused(capsys):
-    with pytest.raises(SystemExit):
-        cli.main(['fly'])
-    assert "'fly'" in capsys.readouterr().err
+@pytest.mark.parametrize(('arguments', 'text'), [
+    (['plan', FILE, '--budget', '-1'], '--budget = -1.0: expected a number in [0, 86400] s'),
+    (['plan', FILE, '--budget', 'inf'], '--budget = inf: expected a number in [0, 86400] s'),
+    (['plan', FILE, '--seed', '-1'], '--seed = -1: expected a whole number in [0, 922'),
+    (['plan', FILE, '--clearance', '-5'], '--clearance = -5.0: expected a number in [0, 10000] m'),
+    (['plan', FILE, '--altitude-min', '1e5'],
+     '--altitude-min = 100000.0: expected less than the highest detour, 100000 m'),
+    (['plan', FILE, '--altitude-max', '-9'],
+     '--altitude-max = -9.0: expected more than the lowest detour, '),
+    (['bench', '--jobs', '0'], '--jobs = 0: expected a whole number in [1, 1024]'),
+    (['bench', '--seeds', '0'], '--seeds = 0: expected a whole number in [1, 10000]'),
+    (['bench', '--slack', 'inf'], '--slack = inf: expected a number in [0.01, 1000]'),
+    (['study', 'whole', '--runs', '-3'], '--runs = -3: expected a whole number in [1, 100000]'),
+    (['bench', '--folder', 'none'], "--folder = 'none': expected a folder"),
+])
+def test_a_number_out_of_range_is_one_line_and_status_1(arguments, text, capsys):
+    assert cli.main(arguments) == 1
+    refusal = capsys.readouterr().err
+    assert text in refusal
+    assert refusal.count('\n') == 1
 
 
-def test_the_help_lists_every_command(capsys):
-    with pytest.raises(SystemExit):
-        cli.main(['-h'])
+@pytest.mark.parametrize('arguments', [[], ['-h']], ids=str)
+def test_the_help_lists_every_command(arguments, capsys):
+    with contextlib.suppress(SystemExit):
+        assert cli.main(arguments) == 0
     printed = capsys.readouterr().out
     assert all(f'  {name} ' in printed for name in cli.COMMANDS)
+
+
+def test_the_version_is_printed(capsys):
+    with pytest.raises(SystemExit, match='0'):
+        cli.main(['--version'])
+    assert capsys.readouterr().out == f'uav_task_alloc {uav_task_alloc.__version__}\n'
+
+
+PARSERS = [*([name] for name in cli.COMMANDS), *(['study', name] for name in EXPERIMENTS), []]
+
+
+@pytest.mark.parametrize('words', PARSERS, ids=' '.join)
+def test_the_help_has_a_sentence_and_the_default_of_each_option(words, monkeypatch, capsys):
+    parsers = []
+    initial = argparse.ArgumentParser.__init__
+
+    def remember(self, *args, **kwargs):
+        parsers.append(self)
+        initial(self, *args, **kwargs)
+    monkeypatch.setattr(argparse.ArgumentParser, '__init__', remember)
+    with pytest.raises(SystemExit, match='0'):
+        cli.main([*words, '--help'])
+    assert words[0] in capsys.readouterr().out if words else True
+    actions = parsers[-1]._actions
+    assert [action.dest for action in actions if len(action.help or '') < 15] == []
+    for action in actions:
+        if action.option_strings and not isinstance(
+                action, (argparse._HelpAction, argparse._VersionAction)):
+            assert re.search(r'\(default: .+\)$|\(required\)$', action.help), action.dest
+
+
+def test_out_of_memory_is_one_line(monkeypatch, capsys):
+    def exhausted(argv):
+        raise MemoryError
+    monkeypatch.setattr('uav_task_alloc.cli.bench.main', exhausted)
+    assert cli.main(['bench']) == 1
+    assert capsys.readouterr().err == 'bench: out of memory: expected a smaller problem\n'
+
+
+def test_compile_prints_and_removes_the_folders_of_the_kernels(monkeypatch, tmp_path, capsys):
+    from uav_task_alloc.allocator import warm_up
+    from uav_task_alloc.kernel_cache import KERNEL_FOLDER
+    monkeypatch.setattr(warm_up, 'compile_kernels', lambda *_: None)
+    monkeypatch.setattr(numba.core.config, 'CACHE_DIR', str(tmp_path))
+    cli.main(['compile'])
+    assert capsys.readouterr().out == ''
+    kernels, other = tmp_path / f'a/{KERNEL_FOLDER}1', tmp_path / 'a/other'
+    monkeypatch.setattr(command, 'cache_folders', lambda: [kernels])
+    for folder in (kernels, other):
+        folder.mkdir(parents=True)
+        (folder / 'x.nbc').write_bytes(bytes(2_000_000))
+    cli.main(['compile'])
+    assert capsys.readouterr().out == f'{kernels}: 2.0 MB\n'
+    cli.main(['compile', '--remove'])
+    assert capsys.readouterr().out == f'removed {kernels}\n'
+    assert list((tmp_path / 'a').iterdir()) == [other]
+
+
+def test_the_folders_of_the_kernels_are_those_that_numba_writes():
+    from uav_task_alloc.geometry.detour import detour
+    detour((0, 0, 50), (100, 0, 50), [uav_task_alloc.ThreatZone.cylinder('z', (50, 0), 10.0)])
+    folders = command.cache_folders()
+    written = {path.parent for path in ROOT.rglob('*.nbi')} if not os.environ.get(
+        'NUMBA_CACHE_DIR') else set()
+    assert written <= set(folders)
+    assert any(path.suffix == '.nbi' for folder in folders for path in folder.iterdir())
 
 
 def test_a_command_has_help_of_its_own(capsys):

@@ -29,6 +29,16 @@ def test_an_executable_is_where_ros2_run_looks(name):
     assert os.access(path, os.X_OK)
 
 
+def test_the_command_line_of_a_workspace_is_on_path_and_no_node_is():
+    words = ['bash', '-c', 'source "$0/setup.bash" && command -v uav_task_alloc allocator']
+    found = subprocess.run([*words, str(SHARE.parents[2])], capture_output=True, text=True,
+                           env={'PATH': '/usr/bin:/bin'}, check=False).stdout.split()
+    assert [Path(path).parent for path in found] == [SHARE.parents[1] / 'bin']
+    done = subprocess.run([sys.executable, found[0], '--version'], capture_output=True, text=True,
+                          check=True)
+    assert done.stdout.startswith('uav_task_alloc ')
+
+
 @pytest.mark.parametrize('name', params.NODES)
 @pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM], ids=lambda n: n.name)
 def test_a_node_exits_in_order_on_a_signal(start, probe, name, number):

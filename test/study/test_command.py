@@ -8,6 +8,7 @@ from contextlib import contextmanager
 import pytest
 
 from uav_task_alloc.cli import study as command
+from uav_task_alloc.cli.outputs import NotInstalled
 from uav_task_alloc.study import experiments, figures, tables, trials
 from uav_task_alloc.study.experiments import Experiments
 from uav_task_alloc.study.figures import mean_curve
@@ -80,7 +81,7 @@ def test_an_interrupted_study_writes_its_results(first, no_3d, tmp_path, capsys)
 
 def test_a_study_without_matplotlib_does_not_begin(tmp_path, monkeypatch):
     monkeypatch.setattr(importlib.util, 'find_spec', lambda name: None)
-    with pytest.raises(SystemExit, match='no matplotlib'):
+    with pytest.raises(NotInstalled, match=r"expected pip install '\.\[plot\]'"):
         command.main(['--out', str(tmp_path / 'out')])
     assert not (tmp_path / 'out').exists()
 

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The commands of `python -m uav_task_alloc`: one file each, with its `main(argv)`."""
+"""The commands of `uav_task_alloc`: one file each, with its `main(argv)`."""

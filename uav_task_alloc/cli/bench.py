@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import importlib.util
 import json
 import tempfile
 import time
@@ -12,8 +11,23 @@ from itertools import product
 from pathlib import Path
 from typing import Any
 
+from uav_task_alloc.cli.interrupt import resumable
+from uav_task_alloc.cli.options import (
+    OptionParser,
+    add_executor_options,
+    budgets,
+    list_of_names,
+    sizes,
+)
+from uav_task_alloc.cli.outputs import (
+    FIGURE_SUFFIXES,
+    check_file,
+    check_folder,
+    check_installed,
+    naming,
+)
 from uav_task_alloc.cli.progress import log_line
-from uav_task_alloc.errors import UnknownName
+from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.solver.registry import SOLVERS
 from uav_task_alloc.study import campaign, executors, public, reference_solvers
 from uav_task_alloc.study.bench import (
@@ -35,14 +49,18 @@ def main(argv: Sequence[str]) -> int:
         The exit status: 1 where a run failed.
 
     Raises:
-        AllocError: an option is invalid.
-        SystemExit: a plot is requested and matplotlib is not installed.
+        AllocError: an option is invalid, a file cannot be written, matplotlib is missing.
     """
-    args = _make_parser().parse_args(argv)
-    if args.plot and importlib.util.find_spec('matplotlib') is None:
-        raise SystemExit("--plot: no matplotlib: expected pip install '.[plot]'")
+    args = _make_parser().parsed(argv)
+    if args.plot:
+        check_installed('--plot', 'matplotlib')
+    check_file('--json', args.json)
+    check_file('--plot', args.plot, FIGURE_SUFFIXES, [args.json] if args.json else ())
+    check_folder('--keep', args.keep)
+    if args.folder and not args.folder.is_dir():
+        raise InvalidValue('--folder', str(args.folder), 'a folder that exists')
     jobs = _jobs(args)
-    with tempfile.TemporaryDirectory() as scratch:
+    with resumable(), tempfile.TemporaryDirectory() as scratch:
         outcome = campaign.run_campaign(list(jobs.values()), args.keep or Path(scratch),
                                         executors.chosen(args), log_line, time.monotonic)
     runs = instance_runs(jobs, outcome.results)
@@ -50,41 +68,49 @@ def main(argv: Sequence[str]) -> int:
         log_line(text)
     print(gap_table(runs))
     if args.json:
-        args.json.write_text(json.dumps({key: run.plain() for key, run in runs.items()},
-                                        indent=1, allow_nan=False) + '\n')
+        with naming('--json', args.json):
+            args.json.write_text(json.dumps({key: run.plain() for key, run in runs.items()},
+                                            indent=1, allow_nan=False) + '\n')
     if args.plot:
         from uav_task_alloc.study.gap_plot import draw_gaps  # imports matplotlib
-        draw_gaps(runs, args.plot)
+        with naming('--plot', args.plot):
+            draw_gaps(runs, args.plot)
     return int(bool(outcome.failed))
 
 
-def _make_parser() -> argparse.ArgumentParser:
+def _make_parser() -> OptionParser:
     """The arguments of `bench`."""
-    parser = argparse.ArgumentParser(prog='python -m uav_task_alloc bench', description=__doc__)
+    references = reference_solvers.REFERENCE_SOLVERS
+    parser = OptionParser('bench', 'Compare solvers and reference solvers on the same instances '
+                          'in equal CPU time: lengths or values over the best known.')
     add = parser.add_argument
-    add('--sizes', default='4x20,8x50,8x100,20x200', help='UAVs x tasks, ... (%(default)s)')
-    add('--kinds', default='spread,base', help='spread: starts anywhere; base: one start')
-    add('--seeds', type=int, default=5, help='instances a size (%(default)s)')
-    add('--first', type=int, default=1, help='seed of the first instance (%(default)s)')
-    add('--slack', type=float, default=SLACK, help='ranges over a fair share of a good tour')
+    add('--sizes', type=sizes, default='4x20,8x50,8x100,20x200', metavar='UxT,...',
+        help='sizes of random instances, UAVs x tasks (default: %(default)s)')
+    add('--kinds', type=list_of_names('spread', 'base'), default='spread,base', metavar='KIND,...',
+        help='spread: starts anywhere; base: one start (default: %(default)s)')
+    parser.number('--seeds', 1, 10_000, 'instances of each size and kind', default=5, whole=True)
+    parser.number('--first', 0, 2**31, 'seed of the first instance', default=1, whole=True)
+    parser.number('--slack', 0.01, 1000.0, 'ranges over a fair share of a good tour',
+                  default=SLACK)
     add('--folder', type=Path, metavar='DIR', help='public instances instead: team orienteering '
         '(Chao, MSTOP), MDVRP (Cordeau); best known values, if any, in '
-        f'{public.BEST_KNOWN_FILE}')
-    add('--match', default='*', metavar='GLOB', help='which files of the folder')
-    add('--budgets', type=_budgets, default=(0.1, 1.0), help='[s] of CPU time, ... (0.1,1)')
-    add('--solvers', default='chain_q', help=f'of {", ".join(SOLVERS)}')
-    add('--against', default=','.join(reference_solvers.REFERENCE_SOLVERS),
-        help='reference solvers (%(default)s), or none')
-    add('--keep', type=Path, metavar='DIR',
-        help='keep results; a run whose result is in DIR is not repeated')
-    add('--json', type=Path, metavar='OUT.json', help='all lengths, values and gaps')
-    add('--plot', type=Path, metavar='OUT.png', help='gap over time (.png, .svg)')
-    executors.add_arguments(parser, jobs=1)
+        f'{public.BEST_KNOWN_FILE} (default: random instances)')
+    add('--match', default='*', metavar='GLOB',
+        help='which files of the folder (default: %(default)s)')
+    add('--budgets', type=budgets, default='0.1,1', metavar='S,...',
+        help='CPU times of a run, each in [0.001, 86400] s (default: %(default)s)')
+    add('--solvers', type=list_of_names(*SOLVERS), default='chain_q', metavar='NAME,...',
+        help=f'of {", ".join(SOLVERS)} (default: %(default)s)')
+    add('--against', type=list_of_names(*references, 'none'), default=','.join(references),
+        metavar='NAME,...', help='reference solvers, or none (default: %(default)s)')
+    add('--keep', type=Path, metavar='DIR', help='keep the results; a run whose result is in DIR '
+        'is not repeated (default: none)')
+    add('--json', type=Path, metavar='OUT.json',
+        help='write all lengths [m], values and gaps [%%] (default: none)')
+    add('--plot', type=Path, metavar='OUT.png',
+        help='draw the gap over time (.png, .pdf, .svg) (default: none)')
+    add_executor_options(parser, jobs=1)
     return parser
-
-
-def _budgets(text: str) -> tuple[float, ...]:
-    return tuple(sorted(float(part) for part in text.split(',')))
 
 
 def _jobs(args: argparse.Namespace) -> dict[tuple[str, str], Job]:
@@ -97,26 +123,19 @@ def _jobs(args: argparse.Namespace) -> dict[tuple[str, str], Job]:
 
 
 def _solver_names(args: argparse.Namespace) -> list[str]:
-    """The solvers, and the reference solvers that are installed. Raises UnknownName."""
-    solvers, references = args.solvers.split(','), args.against.split(',')
-    references = [] if references == ['none'] else references
-    for kind, names, known in (
-            ('solver', solvers, SOLVERS),
-            ('reference solver', references, reference_solvers.REFERENCE_SOLVERS)):
-        for name in names:
-            if name not in known:
-                raise UnknownName(kind, name, list(known))
+    """The solvers, and the reference solvers that are installed."""
+    references = [name for name in args.against if name != 'none']
     missing = sorted(set(references) - set(reference_solvers.installed()))
     if missing:
         log_line(f'not installed, so left out: {", ".join(missing)} '
-                 '(pip install -r benchmarks/requirements.txt)')
-    return [*solvers, *(name for name in references if name not in missing)]
+                 "(pip install '.[study]' in the folder of uav_task_alloc)")
+    return [*args.solvers, *(name for name in references if name not in missing)]
 
 
 def _sources(args: argparse.Namespace) -> Mapping[str, dict[str, Any]]:
     """What a job makes each instance from, by the instance's name. Raises InvalidValue."""
     if not args.folder:
-        return random_sources(args.kinds.split(','), args.sizes.split(','),
+        return random_sources(args.kinds, args.sizes,
                               range(args.first, args.first + args.seeds), args.slack)
     sources, skipped = public_sources(args.folder, args.match)
     for name, reason in skipped.items():

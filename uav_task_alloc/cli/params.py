@@ -7,6 +7,8 @@ from pathlib import Path
 
 from uav_task_alloc import params
 from uav_task_alloc.allocator.state import task_state_machine
+from uav_task_alloc.cli.options import OptionParser
+from uav_task_alloc.cli.outputs import naming
 from uav_task_alloc.scenario import document
 
 
@@ -14,19 +16,24 @@ def main(argv: Sequence[str]) -> int:
     """Print the pages, or with `--write` write them and config/*.yaml into the working directory.
 
     Raises:
-        SystemExit: other arguments are given.
-        OSError: a file cannot be written.
+        InvalidValue: a file cannot be written.
+        SystemExit: the arguments are malformed, or ask for the help.
     """
-    if list(argv) not in ([], ['--write']):
-        raise SystemExit('usage: python -m uav_task_alloc params [--write]')
+    parser = OptionParser(
+        'params', 'Print the tables of all node parameters, scenario keys and task states, each '
+        'with its default, range and unit (docs/parameters.md, scenarios.md and task_states.md).')
+    parser.add_argument('--write', action='store_true', help='write them into docs/, and the '
+                        'parameter files of the nodes into config/, both in the working '
+                        'directory (default: print)')
     pages = {Path('docs/parameters.md'): params.markdown_text(),
              Path('docs/scenarios.md'): document.scenario_page(),
              Path('docs/task_states.md'): task_state_machine.task_states_markdown()}
-    if not argv:
+    if not parser.parsed(argv).write:
         print('\n'.join(pages.values()))
         return 0
     configs = {Path(f'config/{node}.yaml'): params.yaml_text(node) for node in params.NODES}
     for path, text in {**pages, **configs}.items():
-        path.parent.mkdir(exist_ok=True)
-        path.write_text(text)
+        with naming('--write', path):
+            path.parent.mkdir(exist_ok=True)
+            path.write_text(text)
     return 0

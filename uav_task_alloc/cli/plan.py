@@ -4,23 +4,30 @@ from __future__ import annotations
 
 import argparse
 import json
-import math
 import sys
 import time
-from collections.abc import Callable, Sequence
-from dataclasses import asdict, replace
+from collections.abc import Sequence
+from dataclasses import fields, replace
 from pathlib import Path
-from typing import Any
 
 from uav_task_alloc import scenario
+from uav_task_alloc.cli.interrupt import INTERRUPTED
+from uav_task_alloc.cli.options import OptionParser, one_of
+from uav_task_alloc.cli.outputs import (
+    FIGURE_SUFFIXES,
+    check_file,
+    check_folder,
+    check_installed,
+    naming,
+)
+from uav_task_alloc.cli.plan_json import plan_json
 from uav_task_alloc.cli.progress import SolveProgress, log_line
-from uav_task_alloc.errors import InvalidValue
-from uav_task_alloc.model import Plan
+from uav_task_alloc.errors import InvalidValue, first_of
+from uav_task_alloc.model import Plan, ThreatZone
 from uav_task_alloc.params import AllocatorParams
 from uav_task_alloc.scenario.values import Scenario
 
-FIGURE_SUFFIXES = ('.png', '.pdf', '.svg')
-_INTERRUPTED = 130  # exit status of a shell after Ctrl-C
+_ITS_OWN = "the scenario's"  # default of an option
 
 
 def main(argv: Sequence[str]) -> int:
@@ -30,59 +37,75 @@ def main(argv: Sequence[str]) -> int:
         The exit status: 0, or 130 where Ctrl-C ended the solving early.
 
     Raises:
-        AllocError: the scenario or an option is invalid.
-        OSError: a file cannot be read or written.
+        AllocError: the scenario or an option is invalid, or a file cannot be written.
     """
-    args = _make_parser().parse_args(argv)
-    plotters = {path: plotter(option, path) for option, path in (
-        ('--plot', args.plot), ('--plot-3d', args.plot_3d)) if path}
+    args = _make_parser().parsed(argv)
+    check_outputs(args)
     loaded = with_options(without_cancelled(scenario.load(args.scenario)), args)
     from uav_task_alloc.solver.solve import load_kernels  # imports numba
-    load_kernels(args.solver, bool(loaded.zones))  # Ctrl-C ends a compilation: no plan yet
+    load_kernels(args.solver, bool(loaded.zones))
+    for text in start_warnings(loaded):
+        log_line(f'Warning: {text}')
     with SolveProgress(args.budget, sys.stderr, time.monotonic) as progress:
         result = solve_scenario(loaded, args, progress)
-    print(plan_text(result))
-    if args.json:
-        args.json.write_text(json.dumps(plan_json(result), indent=2, allow_nan=False) + '\n')
-    for path, draw in plotters.items():
-        draw([uav.uav for uav in loaded.uavs], [timed.task for timed in loaded.tasks],
-             [timed.zone for timed in loaded.zones], result, path)
-    if args.missions:
-        print(missions_text(loaded, result, args.missions))
+    try:
+        print(plan_text(result), flush=True)
+    finally:  # also where nobody reads what is printed
+        write_outputs(loaded, result, args)
     if progress.interrupted:
         log_line(f'stopped after {result.solve_time:.1f} s of {args.budget:g} s: '
                  'the best plan so far')
-    return _INTERRUPTED if progress.interrupted else 0
+    return INTERRUPTED if progress.interrupted else 0
 
 
-def _make_parser() -> argparse.ArgumentParser:
+def _make_parser() -> OptionParser:
     """The arguments of `plan`."""
-    parser = argparse.ArgumentParser(
-        prog='python -m uav_task_alloc plan',
-        description='Plan all tasks of a scenario file around all its zones, as if everything '
-                    'in it were known from the start; cancelled tasks are left out. Ctrl-C ends '
-                    'the solving early: the best plan so far is printed and written, and the exit '
-                    f'status is {_INTERRUPTED}.')
-    parser.add_argument('scenario', type=Path, metavar='SCENARIO.yaml')
-    parser.add_argument('--solver', default='chain_q',
+    parser = OptionParser(
+        'plan', 'Plan all tasks of a scenario file around all its zones, as if everything in it '
+        'were known from the start; cancelled tasks are left out. Ctrl-C ends the solving '
+        'early: the best plan so far is printed and written, and the exit status is '
+        f'{INTERRUPTED}.')
+    parser.add_argument('scenario', type=Path, metavar='SCENARIO.yaml',
+                        help='fleet, tasks and zones (docs/scenarios.md)')
+    parser.add_argument('--solver', default='chain_q', metavar='NAME',
                         help='%(default)s, or a baseline: paper_chain_q, q_learning, '
-                             'abc, ga, nearest, auction, cbba')
-    parser.add_argument('--budget', type=float, default=1.0, help='[s] of solving (%(default)s)')
-    parser.add_argument('--seed', type=int, help="of the solver (the scenario's)")
-    parser.add_argument('--route-end', choices=('hold', 'home'),
-                        help="what a UAV does after its last task (the scenario's)")
-    for option, meaning in (('clearance', 'kept from zones beyond their margins'),
-                            ('altitude-min', 'lowest detour, above the origin'),
-                            ('altitude-max', 'highest detour, above the origin')):
-        parser.add_argument(f'--{option}', type=float, metavar='M',
-                            help=f"[m] {meaning} (the scenario's)")
-    parser.add_argument('--json', type=Path, metavar='OUT', help='write the plan as JSON')
-    parser.add_argument('--plot', type=Path, metavar='OUT.png', help='draw the plan from above')
-    parser.add_argument('--plot-3d', type=Path, metavar='OUT.png',
-                        help='draw the plan in three dimensions')
-    parser.add_argument('--missions', type=Path, metavar='DIR',
-                        help='write a .plan (QGroundControl) and a .waypoints file for each UAV')
+                             'abc, ga, nearest, auction, cbba (default: %(default)s)')
+    parser.number('--budget', 0.0, 86400.0, 'time to solve, after the kernels are loaded',
+                  unit='s', default=1.0)
+    parser.number('--seed', 0, 2**63 - 1, 'of the random numbers of the solver', whole=True,
+                  default_text=_ITS_OWN)
+    parser.add_argument('--route-end', type=one_of('hold', 'home'), metavar='{hold,home}',
+                        help='what a UAV does after its last task: hold there, or fly home '
+                             f'(default: {_ITS_OWN})')
+    for name, meaning in (('clearance', 'kept from zones beyond their margins'),
+                          ('altitude_min', 'lowest detour, above the origin'),
+                          ('altitude_max', 'highest detour, above the origin')):
+        spec = next(spec.metadata for spec in fields(AllocatorParams) if spec.name == name)
+        parser.number(f'--{name.replace("_", "-")}', spec['low'], spec['high'], meaning,
+                      unit='m', default_text=_ITS_OWN)
+    for option, metavar, meaning in (
+            ('--json', 'OUT', 'write the plan as JSON, lengths in metres'),
+            ('--plot', 'OUT.png', 'draw the plan from above (.png, .pdf, .svg)'),
+            ('--plot-3d', 'OUT.png', 'draw the plan in three dimensions (.png, .pdf, .svg)'),
+            ('--missions', 'DIR', 'write a .plan (QGroundControl) and a .waypoints file (Mission '
+                                  'Planner, MAVProxy) for each UAV')):
+        parser.add_argument(option, type=Path, metavar=metavar, help=f'{meaning} (default: none)')
     return parser
+
+
+def check_outputs(args: argparse.Namespace) -> None:
+    """Check that all outputs can be made and written. Raises AllocError."""
+    used = [args.scenario]
+    for option, path, suffixes in (('--json', args.json, ()),
+                                   ('--plot', args.plot, FIGURE_SUFFIXES),
+                                   ('--plot-3d', args.plot_3d, FIGURE_SUFFIXES)):
+        if path is not None and suffixes:
+            check_installed(option, 'matplotlib')
+        check_file(option, path, suffixes, used)
+        used += [path] if path and path.is_file() else []
+    if args.missions:
+        check_installed('--missions', 'pymavlink')
+        check_folder('--missions', args.missions)
 
 
 def without_cancelled(loaded: Scenario) -> Scenario:
@@ -98,7 +121,11 @@ def with_options(loaded: Scenario, args: argparse.Namespace) -> Scenario:
     given = {name: getattr(args, name) for name in names if getattr(args, name) is not None}
     changed = replace(loaded, seed=loaded.seed if args.seed is None else args.seed,
                       route_end=args.route_end or loaded.route_end, **given)
-    AllocatorParams(**{name: getattr(changed, name) for name in names})  # checks their ranges
+    low, high = changed.altitude_min, changed.altitude_max
+    if low >= high and args.altitude_min is not None:
+        raise InvalidValue('--altitude-min', low, f'less than the highest detour, {high:g} m')
+    if low >= high:
+        raise InvalidValue('--altitude-max', high, f'more than the lowest detour, {low:g} m')
     return changed
 
 
@@ -125,35 +152,59 @@ def plan_text(result: Plan) -> str:
     return '\n'.join(lines)
 
 
-def plan_json(result: Plan) -> dict[str, Any]:
-    """A plan as JSON values: lengths in metres, points in ENU, an infinite fit as None."""
-    return {
-        'routes': {uav: list(tasks) for uav, tasks in result.routes.items()},
-        'unassigned': result.unassigned,
-        'legs': {uav: [asdict(leg) for leg in legs] for uav, legs in result.legs.items()},
-        'distance': result.distance, 'value': result.value, 'penalty': result.penalty,
-        'fit': json_number(result.fit),
-        'history': [[seconds, json_number(fit)] for seconds, fit in result.history],
-        'solver': result.solver, 'solve_time': result.solve_time, 'iterations': result.iterations,
-    }
+def start_warnings(loaded: Scenario) -> list[str]:
+    """A line for each UAV that starts, or whose home is, inside an enlarged zone."""
+    from uav_task_alloc.geometry.zones import zones_around  # imports numba
+    zones, lines = [timed.zone for timed in loaded.zones], []
+    for uav in loaded.uavs:
+        around = zones_around(uav.position, zones, loaded.clearance)
+        if around:
+            lines.append(f'{uav.id} starts inside zone {_named(around, loaded.clearance)}: '
+                         'its route leaves it first; in a flight it gets no tasks while it is on '
+                         'the ground there')
+        home = zones_around(uav.home, zones, loaded.clearance)
+        if home and uav.home != uav.position:
+            lines.append(f'the home of {uav.id} is inside zone {_named(home, loaded.clearance)}: '
+                         'no safe way leads home')
+    return lines
 
 
-def json_number(value: float) -> float | None:
-    """None for NaN and the infinities, which JSON cannot represent."""
-    return value if math.isfinite(value) else None
+def _named(zones: Sequence[ThreatZone], clearance: float) -> str:
+    """The ids, and what enlarges the zones."""
+    names = first_of([zone.id for zone in zones])
+    margins = '' if len(zones) > 1 else f'its margin of {zones[0].margin:g} m and '
+    return f'{names} (with {margins}the clearance of {clearance:g} m)'
+
+
+def write_outputs(loaded: Scenario, result: Plan, args: argparse.Namespace) -> None:
+    """Write JSON, figures and mission files.
+
+    Raises:
+        InvalidValue: a file cannot be written; those before it are.
+    """
+    if args.json:
+        with naming('--json', args.json):
+            args.json.write_text(
+                json.dumps(plan_json(loaded, result), indent=2, allow_nan=False) + '\n')
+    for option, path in (('--plot', args.plot), ('--plot-3d', args.plot_3d)):
+        if path:
+            from uav_task_alloc import plots  # imports matplotlib
+            draw = plots.draw_plan_3d if option == '--plot-3d' else plots.draw_plan
+            with naming(option, path):
+                draw([uav.uav for uav in loaded.uavs], [timed.task for timed in loaded.tasks],
+                     [timed.zone for timed in loaded.zones], result, path)
+    if args.missions:
+        with naming('--missions', args.missions):
+            print(missions_text(loaded, result, args.missions))
 
 
 def missions_text(loaded: Scenario, result: Plan, folder: Path) -> str:
     """Write the mission files of a plan; returns a line for each UAV.
 
     Raises:
-        SystemExit: pymavlink is not installed.
         OSError: a file cannot be written.
     """
-    try:
-        from uav_task_alloc.mavlink.mission.files import file_name, write_missions
-    except ModuleNotFoundError as error:
-        raise SystemExit(f'--missions: {error}: expected pymavlink') from None
+    from uav_task_alloc.mavlink.mission.files import file_name, write_missions  # pymavlink
     lines = []
     for mission in write_missions(loaded, result, folder):
         stem = folder / file_name(mission.uav.id)
@@ -163,20 +214,3 @@ def missions_text(loaded: Scenario, result: Plan, folder: Path) -> str:
                      + ', which the route or its straight return leg passes over or under')
         lines.append(line)
     return '\n'.join(lines)
-
-
-def plotter(option: str, path: Path) -> Callable[..., None]:
-    """The function that draws a plan into `path`; called before solving, to fail early.
-
-    Raises:
-        InvalidValue: the suffix is none of FIGURE_SUFFIXES.
-        SystemExit: matplotlib is not installed.
-    """
-    if path.suffix.lower() not in FIGURE_SUFFIXES:
-        raise InvalidValue(option, str(path),
-                           f'a name that ends with {" or ".join(FIGURE_SUFFIXES)}')
-    try:
-        from uav_task_alloc import plots
-    except ModuleNotFoundError as error:
-        raise SystemExit(f'{option}: {error}: expected matplotlib') from None
-    return plots.draw_plan_3d if option == '--plot-3d' else plots.draw_plan

@@ -2,16 +2,19 @@
 """The command `report`: a page of a recorded flight, or the key figures of a demo and its map."""
 from __future__ import annotations
 
-import argparse
 import json
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from uav_task_alloc.cli.options import OptionParser
+from uav_task_alloc.cli.outputs import check_file, check_installed, naming
 from uav_task_alloc.cli.progress import log_line
+from uav_task_alloc.errors import AllocError, InvalidValue
 from uav_task_alloc.record.ground_truth import GroundTruth, read_truth, visits, zone_entries
 from uav_task_alloc.record.run_state import RunState, read_record
 
@@ -143,22 +146,59 @@ def flight_page(bag: Path, html: Path) -> int:
     """Write the report of an MCAP file and print its key figures.
 
     Raises:
-        InvalidValue: the file has no messages of a fleet.
-        SystemExit: a package is not installed, or a file cannot be read or written.
+        AllocError: the file has no messages of a fleet, the page cannot be written, or a package
+            is not installed.
+        SystemExit: the file cannot be read.
     """
-    try:
-        from uav_task_alloc.flight_report import page  # imports plotly and mcap
-    except ModuleNotFoundError as error:
-        raise SystemExit(f'report: {error}: expected plotly, mcap and mcap-ros2-support') from None
-    try:
+    check_installed('report', 'plotly', 'mcap', 'mcap_ros2')
+    with reading():
+        bag.open('rb').close()
+    check_file('--html', html, inputs=[bag])
+    from uav_task_alloc.flight_report import page  # imports plotly and mcap
+    with naming('--html', html):
         history, warnings = page.write_report(bag, html)
-    except OSError as error:
-        raise SystemExit(f'{error.filename}: {error.strerror}: expected a recorded run') from None
     for name, value in page.key_figures(history):
         print(f'{name:<45}{"" if value is None else value!s:>12}')
     for text in warnings:
         log_line(f'Warning: {text}')
     print(f'Report: {html}')
+    return 0
+
+
+@contextmanager
+def reading() -> Iterator[None]:
+    """Within `with`, a file that cannot be read becomes a SystemExit that says so."""
+    try:
+        yield
+    except OSError as error:
+        raise SystemExit(f'{error.filename}: {error.strerror}: expected a recorded run') from None
+
+
+def demo_table(place: Path) -> int:
+    """Print the table of the folder or summary of a demo, and draw its map again.
+
+    Raises:
+        AllocError: the files are damaged, the map cannot be written, or matplotlib is missing.
+        SystemExit: a file cannot be read.
+    """
+    out = place if place.is_dir() else place.parent
+    png = out / 'map.png'
+    try:
+        with reading():
+            summary = summarise(out) if place.is_dir() else json.loads(place.read_text())
+            print(summary_table(summary), flush=True)
+            read_record(out)
+        check_installed('report', 'matplotlib')
+        check_file('map', png)
+        from uav_task_alloc.plots import draw_flight  # imports matplotlib
+        with naming('map', png):
+            draw_flight(out, png)
+    except (LookupError, TypeError, ValueError, AttributeError) as error:
+        if isinstance(error, AllocError):
+            raise
+        raise InvalidValue('report', str(place), 'a recorded run, undamaged: '
+                           f'{type(error).__name__}: {error}') from None
+    print(f'Map: {png}')
     return 0
 
 
@@ -169,28 +209,18 @@ def main(argv: Sequence[str]) -> int:
         The exit status 0.
 
     Raises:
-        AllocError: the file is no recording of a fleet.
+        AllocError: the file is no recording of a fleet, or damaged, or no output can be written.
         SystemExit: there is no recorded run.
     """
-    parser = argparse.ArgumentParser(
-        prog='python -m uav_task_alloc report',
-        description='Draw a flight recorded as MCAP as one HTML file; or print the table of the '
-                    'folder of a demo again, and draw its map again.')
-    parser.add_argument('place', type=Path, metavar='FILE.mcap | OUT_DIR | SUMMARY.json')
-    parser.add_argument('--html', type=Path, metavar='OUT.html',
-                        help='the page (FILE.html)')
-    args = parser.parse_args(argv)
+    parser = OptionParser(
+        'report', 'Draw a flight recorded as MCAP as one HTML file; or print the table of the '
+        'folder of a demo again, and draw its map.png again.')
+    parser.add_argument('place', type=Path, metavar='FILE.mcap | OUT_DIR | SUMMARY.json',
+                        help='a recording, the folder of a demo, or its summary.json')
+    parser.add_argument('--html', type=Path, metavar='OUT.html', help='where to write the page of '
+                        'a recording (default: FILE.html beside FILE.mcap)')
+    args = parser.parsed(argv)
     place = args.place
-    if not place.is_dir() and place.suffix != '.json':
-        return flight_page(place, args.html or Path(
-            f'{str(place).removesuffix(".mcap")}.html'))
-    out = place if place.is_dir() else place.parent
-    try:
-        summary = summarise(out) if place.is_dir() else json.loads(place.read_text())
-        print(summary_table(summary))
-        from uav_task_alloc.plots import draw_flight  # imports matplotlib
-        draw_flight(out, out / 'map.png')
-    except OSError as error:
-        raise SystemExit(f'{error.filename}: {error.strerror}: expected a recorded run') from None
-    print(f'Map: {out / "map.png"}')
-    return 0
+    if place.is_dir() or place.suffix == '.json':
+        return demo_table(place)
+    return flight_page(place, args.html or Path(f'{str(place).removesuffix(".mcap")}.html'))

@@ -2,8 +2,7 @@
 """The command `study`: regenerate the paper's figures and tables, or run one experiment."""
 from __future__ import annotations
 
-import argparse
-import importlib.util
+import inspect
 import json
 import os
 import time
@@ -11,6 +10,9 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 
+from uav_task_alloc.cli.interrupt import INTERRUPTED, resumable
+from uav_task_alloc.cli.options import OptionParser, add_executor_options, size
+from uav_task_alloc.cli.outputs import check_folder, check_installed
 from uav_task_alloc.cli.progress import log_line
 from uav_task_alloc.study import campaign, executors, experiments, tables
 from uav_task_alloc.study.campaign import CampaignOutcome
@@ -21,7 +23,6 @@ EXPERIMENTS = {
     'whole': 'forms of learning in the whole solver, paired, at equal time',
     'warm': 'a sequence of events: new tasks arrive, UAVs move on',
 }
-INTERRUPTED = 130  # exit status of a shell after Ctrl-C
 
 
 def main(argv: Sequence[str]) -> int:
@@ -31,31 +32,31 @@ def main(argv: Sequence[str]) -> int:
         The exit status: 1 where a job failed, 130 after Ctrl-C.
 
     Raises:
-        AllocError: an option is invalid.
-        SystemExit: matplotlib is not installed.
+        AllocError: an option is invalid, a file cannot be written, matplotlib is missing.
     """
     if argv and argv[0] in EXPERIMENTS:
         return _run_experiment(argv[0], argv[1:])
-    args = _make_parser().parse_args(argv)
-    if importlib.util.find_spec('matplotlib') is None:  # checked before hours of computing
-        raise SystemExit("study: no matplotlib: expected pip install '.[study,plot]'")
+    args = _make_parser().parsed(argv)
+    check_installed('study', 'matplotlib')  # checked before hours of computing
+    check_folder('--out', args.out)
     settings = experiments.quick(args.seed) if args.quick else Experiments(args.seed)
-    return regenerate(settings, args.out, executors.chosen(args))
+    with resumable():
+        return regenerate(settings, args.out, executors.chosen(args))
 
 
-def _make_parser() -> argparse.ArgumentParser:
+def _make_parser() -> OptionParser:
     """The arguments of `study` without the name of an experiment."""
-    parser = argparse.ArgumentParser(
-        prog='python -m uav_task_alloc study', description=__doc__,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-        epilog='experiments (study NAME -h):\n' + '\n'.join(
+    parser = OptionParser(
+        'study', "Regenerate the paper's figures and tables.",
+        'experiments (uav_task_alloc study NAME -h):\n' + '\n'.join(
             f'  {name:8} {text}' for name, text in EXPERIMENTS.items()))
     add = parser.add_argument
     add('--out', type=Path, required=True, metavar='DIR',
-        help='figures and tables; a run whose result is in DIR is not repeated')
-    add('--quick', action='store_true', help='minutes instead of half an hour')
-    add('--seed', type=int, default=1, help='of all instances and solvers (%(default)s)')
-    executors.add_arguments(parser, jobs=os.cpu_count() or 1)
+        help='figures and tables; a run whose result is in DIR is not repeated (required)')
+    add('--quick', action='store_true',
+        help='smaller experiments: minutes of CPU time (default: half an hour)')
+    parser.number('--seed', 0, 2**31, 'of all instances and solvers', default=1, whole=True)
+    add_executor_options(parser, jobs=os.cpu_count() or 1)
     return parser
 
 
@@ -115,13 +116,15 @@ Measured, so they differ from run to run; the same runs as in tables.md.
 
 def _run_experiment(name: str, argv: Sequence[str]) -> int:
     from uav_task_alloc.study import learning, warm  # import numba and scipy
-    parser = argparse.ArgumentParser(prog=f'python -m uav_task_alloc study {name}',
-                                     description=EXPERIMENTS[name])
-    parser.add_argument('--budget', type=float, help='[s] of CPU time of each run')
-    parser.add_argument('--runs', type=int, help='number of instances or events')
-    parser.add_argument('--size', help='UAVs x tasks')
-    options = vars(parser.parse_args(argv))
     experiment = {'scouts': learning.scouts, 'whole': learning.whole_solver,
                   'warm': warm.run_events}[name]
-    experiment(**{key: value for key, value in options.items() if value is not None})
+    own = {key: each.default for key, each in inspect.signature(experiment).parameters.items()}
+    parser = OptionParser(f'study {name}', f'Run an experiment: {EXPERIMENTS[name]}.')
+    parser.number('--budget', 0.001, 86400.0, 'CPU time of each run', unit='s',
+                  default=own['budget'])
+    parser.number('--runs', 1, 100_000, 'instances or events', whole=True, default=own['runs'])
+    parser.add_argument('--size', type=size, metavar='UxT', default=own['size'],
+                        help='UAVs x tasks (default: %(default)s)')
+    with resumable():
+        experiment(**vars(parser.parsed(argv)))
     return 0

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import json
+import signal
+import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import BrokenExecutor, CancelledError, Executor, as_completed
-from contextlib import AbstractContextManager
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -103,8 +105,9 @@ def run_campaign(jobs: Sequence[Job], folder: Path, open_executor: ExecutorFacto
 
 def _run(executor: Executor, jobs: Sequence[Job]) -> Iterator[tuple[Job, Any, bool]]:
     """Each job, its result or exception, and whether it succeeded; the longest are first."""
-    submitted = {executor.submit(job.work, **job.settings): job
-                 for job in sorted(jobs, key=lambda job: -job.weight)}
+    with _sigint_blocked():
+        submitted = {executor.submit(job.work, **job.settings): job
+                     for job in sorted(jobs, key=lambda job: -job.weight)}
     broken: BaseException | None = None
     for future in as_completed(submitted):
         error = CancelledError('cancelled') if future.cancelled() else future.exception()
@@ -114,6 +117,30 @@ def _run(executor: Executor, jobs: Sequence[Job]) -> Iterator[tuple[Job, Any, bo
             yield submitted[future], error or future.result(), error is None
     if broken:
         raise BrokenExecutor(str(broken))
+
+
+@contextmanager
+def _sigint_blocked() -> Iterator[None]:
+    """Within `with`, Ctrl-C waits; processes that are started inherit that it is blocked.
+
+    They would print a traceback each until they have a handler, or where this process ends
+    before it has sent them their task. Other threads of this process may take the signal, for
+    which Python calls the handler in the main thread.
+    """
+    received: list[int] = []
+    main = threading.current_thread() is threading.main_thread()
+    handler = signal.getsignal(signal.SIGINT)
+    if main:
+        signal.signal(signal.SIGINT, lambda number, _: received.append(number))
+    mask = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, mask)
+        if main:
+            signal.signal(signal.SIGINT, handler)
+        if received:
+            signal.raise_signal(signal.SIGINT)
 
 
 def _store(folder: Path, job: Job, result: Any) -> Any:

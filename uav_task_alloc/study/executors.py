@@ -64,24 +64,11 @@ def dask(address: str) -> Iterator[Executor]:
         yield client.get_executor(pure=False)
 
 
-def add_arguments(parser: argparse.ArgumentParser, jobs: int) -> None:
-    """Add the options --jobs and --dask to a command.
-
-    Args:
-        parser: is changed.
-        jobs: default of --jobs, in processes.
-    """
-    parser.add_argument('--jobs', type=int, default=jobs,
-                        help='processes of this machine (%(default)s)')
-    parser.add_argument('--dask', metavar='tcp://HOST:PORT',
-                        help='run on the workers of this Dask scheduler instead')
-
-
 def chosen(args: argparse.Namespace) -> ExecutorFactory:
     """Return the executor that --jobs and --dask select.
 
     Args:
-        args: with the options of `add_arguments`.
+        args: with the options of `cli.options.add_executor_options`.
 
     Returns:
         Starts the executor when it is called.

@@ -1,0 +1,112 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Ctrl-C from the start of a program to its end: one line and status 130, no traceback."""
+import os
+import re
+import signal
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+
+import pytest
+
+from uav_task_alloc import __main__ as cli
+from uav_task_alloc.cli.interrupt import prompt_interrupt, resumable
+
+ROOT = Path(__file__).parents[2]
+FILE = str(ROOT / 'config/scenarios/plan_only.yaml')
+TIMEOUT = 120.0  # [s]
+
+
+def start(*arguments, **env):
+    """A program in a group of its own, as a shell starts it."""
+    return subprocess.Popen(
+        [sys.executable, '-m', 'uav_task_alloc', *arguments], cwd=ROOT, stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE, text=True, start_new_session=True, env={**os.environ, **env})
+
+
+def until(condition, process):
+    end = time.monotonic() + TIMEOUT
+    while not condition():
+        assert process.poll() is None, process.communicate()
+        assert time.monotonic() < end
+        time.sleep(0.001)
+
+
+def press_ctrl_c(process):
+    """SIGINT to the whole group, as a terminal sends it."""
+    os.killpg(process.pid, signal.SIGINT)
+    return process.communicate(timeout=TIMEOUT)
+
+
+@pytest.mark.parametrize('library', ['numpy', 'llvmlite', 'scipy'])
+def test_ctrl_c_during_an_import_is_one_line(library):
+    with start('plan', FILE, '--budget', '600') as process:
+        until(lambda: f'/{library}/' in Path(f'/proc/{process.pid}/maps').read_text(), process)
+        out, err = press_ctrl_c(process)
+    assert (process.returncode, out, err) == (130, '', 'interrupted\n')
+
+
+def test_ctrl_c_once_the_program_has_begun_prints_no_traceback():
+    with start('plan', FILE, '--budget', '600') as process:
+        # its thread for signals is there
+        until(lambda: len(list(Path(f'/proc/{process.pid}/task').iterdir())) > 1, process)
+        out, err = press_ctrl_c(process)
+    assert (process.returncode, out, err) == (130, '', 'interrupted\n')
+
+
+def test_ctrl_c_during_a_compilation_is_one_line(tmp_path):
+    with start('compile', NUMBA_CACHE_DIR=str(tmp_path)) as process:
+        assert process.stderr.readline().startswith('compiling kernels')
+        out, err = press_ctrl_c(process)
+    assert (process.returncode, out, err) == (130, '', 'interrupted\n')
+
+
+def test_ctrl_c_ends_a_benchmark_and_all_its_processes(tmp_path):
+    keep = tmp_path / 'kept'
+    with start('bench', '--sizes', '4x20', '--against', 'none', '--budgets', '0.02', '--jobs', '2',
+               '--seeds', '2000', '--keep', str(keep)) as process:
+        until(lambda: len(list(keep.glob('*.json'))) > 2, process)
+        out, err = press_ctrl_c(process)
+    assert (process.returncode, out) == (130, '')
+    assert 'Traceback' not in err
+    assert err.endswith('interrupted\n')
+
+
+def test_a_worker_process_never_takes_sigint(tmp_path):
+    with start('bench', '--sizes', '4x20', '--against', 'none', '--jobs', '2',
+               '--keep', str(tmp_path)) as process:
+        children = Path(f'/proc/{process.pid}/task/{process.pid}/children')
+        until(lambda: len(children.read_text().split()) > 1, process)
+        for child in children.read_text().split():  # whatever it has got to
+            status = Path(f'/proc/{child}/status').read_text()
+            masks = [int(word, 16) for word in re.findall(r'Sig(?:Blk|Ign):\t(\w+)', status)]
+            assert any(mask & 1 << signal.SIGINT - 1 for mask in masks)
+        out, err = press_ctrl_c(process)
+    assert (process.returncode, out, err) == (130, '', 'interrupted\n')
+
+
+def test_a_caller_in_python_gets_its_handlers_back():
+    before, descriptor = signal.getsignal(signal.SIGINT), signal.set_wakeup_fd(-1)
+    with prompt_interrupt():
+        assert signal.getsignal(signal.SIGINT) is not before
+        with resumable(), pytest.raises(KeyboardInterrupt):
+            signal.raise_signal(signal.SIGINT)
+    assert signal.getsignal(signal.SIGINT) is before
+    assert signal.set_wakeup_fd(descriptor) == -1
+
+
+def test_a_command_runs_in_another_thread_than_the_main_one(capsys):
+    status = []
+    thread = threading.Thread(target=lambda: status.append(cli.main(['params'])))
+    thread.start()
+    thread.join()
+    assert status == [0]
+
+
+def test_an_ignored_sigint_stays_ignored():
+    code = ('import signal; signal.signal(signal.SIGINT, signal.SIG_IGN)\n'
+            'from uav_task_alloc.cli.entry import main; main(["params"])\n'
+            'assert signal.getsignal(signal.SIGINT) is signal.SIG_IGN')
+    subprocess.run([sys.executable, '-c', code], cwd=ROOT, check=True, stdout=subprocess.DEVNULL)

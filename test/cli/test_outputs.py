@@ -1,0 +1,165 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Outputs and packages are checked before a command computes; an error names the option."""
+import importlib.util
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from uav_task_alloc import __main__ as cli
+from uav_task_alloc.cli import outputs
+
+ROOT = Path(__file__).parents[2]
+FILE = str(ROOT / 'config/scenarios/plan_only.yaml')
+
+
+@pytest.fixture
+def no_solver(monkeypatch):
+    """A command that begins to compute fails."""
+    def refuse(*_, **__):
+        pytest.fail('computed before the outputs were checked')
+    monkeypatch.setattr('uav_task_alloc.solver.solve.load_kernels', refuse)
+    monkeypatch.setattr('uav_task_alloc.study.campaign.run_campaign', refuse)
+
+
+BENCH = ['bench', '--sizes', '1x1', '--against', 'none']
+
+
+@pytest.mark.parametrize(('arguments', 'text'), [
+    (['plan', FILE, '--json', 'none/plan.json'],
+     "--json = 'none/plan.json': expected a file in a folder that exists, not none"),
+    (['plan', FILE, '--json', '.'], "--json = '.': expected a file, and this is a folder"),
+    (['plan', FILE, '--json', FILE], 'expected another file than the command uses otherwise'),
+    (['plan', FILE, '--json', 'x' * 300], ': expected a place that can be written: File name too'),
+    (['plan', FILE, '--plot', 'map.bmp'],
+     "--plot = 'map.bmp': expected a name that ends with .png or .pdf or .svg"),
+    (['plan', FILE, '--plot-3d', 'none/map.png'], "--plot-3d = 'none/map.png': expected a file"),
+    (['plan', FILE, '--missions', FILE], f"--missions = '{FILE}': expected a place that can be"),
+    (['plan', FILE, '--missions', f'{FILE}/m'], "plan_only.yaml/m': expected a place that can"),
+    ([*BENCH, '--json', 'none/x'], "--json = 'none/x': expected a file in a folder that exists"),
+    ([*BENCH, '--plot', 'x.txt'], "--plot = 'x.txt': expected a name that ends with .png or"),
+    ([*BENCH, '--keep', FILE], f"--keep = '{FILE}': expected a place that can be written"),
+    (['study', '--out', FILE], f"--out = '{FILE}': expected a place that can be written"),
+])
+def test_an_output_that_cannot_be_written_is_refused_first(
+        arguments, text, no_solver, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert cli.main(arguments) == 1
+    refusal = capsys.readouterr().err
+    assert text in refusal
+    assert refusal.count('\n') == 1
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason='root may write anywhere')
+def test_a_folder_that_is_read_only_is_refused(tmp_path):
+    tmp_path.chmod(0o500)
+    with pytest.raises(outputs.InvalidValue, match='Permission denied'):
+        outputs.check_file('--json', tmp_path / 'plan.json')
+
+
+def test_a_file_that_is_there_is_checked_and_left_as_it_is(tmp_path):
+    path = tmp_path / 'plan.json'
+    path.write_text('old')
+    outputs.check_file('--json', path)
+    assert path.read_text() == 'old'
+
+
+def test_a_pipe_and_a_device_are_accepted(tmp_path):
+    os.mkfifo(tmp_path / 'pipe')
+    outputs.check_file('--json', tmp_path / 'pipe')
+    outputs.check_file('--json', Path('/dev/stdout'))
+
+
+@pytest.mark.parametrize(('arguments', 'package', 'text'), [
+    (['plan', FILE, '--plot', 'x.png'], 'matplotlib', "--plot: matplotlib is not installed: "
+     "expected pip install '.[plot]' in the folder of uav_task_alloc"),
+    (['plan', FILE, '--missions', 'm'], 'pymavlink', '--missions: pymavlink is not installed: '
+     'expected pip install . in the folder of uav_task_alloc'),
+    ([*BENCH, '--plot', 'x.png'], 'matplotlib', "pip install '.[plot]'"),
+    (['report', 'x.mcap'], 'mcap', "report: mcap is not installed: expected pip install '.[view"),
+    (['report', 'x.mcap'], 'plotly', "pip install '.[view]'"),
+])
+def test_a_missing_package_is_named_with_what_installs_it(
+        arguments, package, text, no_solver, monkeypatch, tmp_path, capsys):
+    find = importlib.util.find_spec
+    monkeypatch.setattr(importlib.util, 'find_spec',
+                        lambda name, *_: None if name == package else find(name))
+    monkeypatch.chdir(tmp_path)
+    assert cli.main(arguments) == 1
+    assert text in capsys.readouterr().err
+
+
+def test_a_missing_package_of_the_core_is_one_line(monkeypatch, capsys):
+    monkeypatch.setitem(sys.modules, 'uav_task_alloc.cli.bench', None)  # its import fails
+    monkeypatch.setitem(sys.modules, 'numba', None)
+    monkeypatch.delitem(sys.modules, 'uav_task_alloc.cli.bench')
+    monkeypatch.delitem(sys.modules, 'uav_task_alloc.kernel', raising=False)
+    for name in [name for name in sys.modules
+                 if name.startswith(('uav_task_alloc.solver', 'uav_task_alloc.study',
+                                     'uav_task_alloc.geometry'))]:
+        monkeypatch.delitem(sys.modules, name)
+    assert cli.main(['bench']) == 1
+    assert capsys.readouterr().err == (
+        'bench: numba is not installed: expected pip install . in the folder of uav_task_alloc\n')
+
+
+def test_each_extra_that_an_error_names_is_in_setup_py():
+    source = (ROOT / 'setup.py').read_text()
+    for package, extra in outputs.EXTRAS.items():
+        line = source.partition(f"'{extra}': [")[2].partition(']')[0]
+        assert f"'{package.replace('_ros2', '-ros2-support')}'" in line
+
+
+def run_program(*arguments, **options):
+    env = {key: value for key, value in os.environ.items() if key != 'PYTHONUNBUFFERED'}
+    return subprocess.run([sys.executable, '-m', 'uav_task_alloc', *arguments], cwd=ROOT, env=env,
+                          stderr=subprocess.PIPE, text=True, check=False, **options)
+
+
+@pytest.mark.parametrize('option', [['--json', '/dev/full'], ['--missions', 'DIR']])
+def test_a_full_disk_names_the_option(option, tmp_path):
+    if option[1] == 'DIR':
+        option = ['--missions', str(tmp_path)]
+        for name in ('scout', 'lifter', 'relay'):
+            (tmp_path / f'{name}.plan').symlink_to('/dev/full')
+    done = run_program('plan', FILE, '--budget', '0.02', *option, stdout=subprocess.PIPE)
+    assert done.returncode == 1
+    assert done.stderr == (f"{option[0]} = '{option[1]}': expected a place that can be written: "
+                           'No space left on device\n')
+    assert '5 tasks planned' in done.stdout
+
+
+def test_a_full_disk_for_the_printed_plan_is_one_line():
+    with open('/dev/full', 'w') as full:
+        done = run_program('plan', FILE, '--budget', '0.02', stdout=full)
+    assert (done.returncode, done.stderr) == (1, 'output: No space left on device\n')
+
+
+@pytest.mark.parametrize('arguments', [['params'], ['-h'], ['plan', '-h'], []], ids=str)
+def test_a_reader_that_goes_away_ends_the_program_silently(arguments):
+    reader, writer = os.pipe()
+    os.close(reader)
+    done = run_program(*arguments, stdout=writer)
+    os.close(writer)
+    assert (done.returncode, done.stderr) == (141, '')
+
+
+def test_files_are_written_also_where_nobody_reads_the_printed_plan(tmp_path):
+    reader, writer = os.pipe()
+    os.close(reader)
+    done = run_program('plan', FILE, '--budget', '0.02', '--json', str(tmp_path / 'plan.json'),
+                       stdout=writer)
+    os.close(writer)
+    assert (done.returncode, done.stderr) == (141, '')
+    assert (tmp_path / 'plan.json').stat().st_size > 1000
+
+
+@pytest.mark.parametrize('stream', ['1', '2'])
+def test_a_stream_that_the_shell_has_closed_is_no_error(stream):
+    done = subprocess.run(
+        ['sh', '-c', f'exec "$0" -m uav_task_alloc plan {FILE} --budget 0.02 {stream}>&-',
+         sys.executable], cwd=ROOT, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, '')
