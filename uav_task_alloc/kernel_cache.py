@@ -23,7 +23,7 @@ from numba.core import caching, event
 ROOMS = ('geometry', 'solver')
 COMPILE_TIME = 70.0  # [s] of CPU for all kernels of the allocator
 _UNUSED = 600.0  # [s] a folder of another hash is kept after the last write: it may be in use
-KERNEL_FOLDER = 'kernels-'
+_FOLDER = 'kernels-'
 # comments and docstrings; whatever has a quote in it and is no docstring stays
 _NO_CODE = re.compile(r'^\s*""".*?"""$|\s*#[^\'"\n]*$', re.MULTILINE | re.DOTALL)
 
@@ -75,7 +75,7 @@ class KernelCacheLocator(caching._CacheLocator):
 
     def get_cache_path(self) -> str:
         """The folder; it need not exist."""
-        return str(self._parent / f'{KERNEL_FOLDER}{sources_hash()}')
+        return str(self._parent / f'{_FOLDER}{sources_hash()}')
 
     def get_source_stamp(self) -> str:
         """What an entry must have been written for to be valid."""
@@ -88,13 +88,27 @@ class KernelCacheLocator(caching._CacheLocator):
     def ensure_cache_path(self) -> None:
         """Make the folder, before each write; remove those of other hashes not in use."""
         super().ensure_cache_path()  # type: ignore[no-untyped-call]
-        for other in self._parent.glob(f'{KERNEL_FOLDER}*'):
+        for other in self._parent.glob(f'{_FOLDER}*'):
             with suppress(OSError):
                 if (str(other) != self.get_cache_path()
                         and time.time() - other.stat().st_mtime > _UNUSED):
                     shutil.rmtree(other, ignore_errors=True)
         for older in self._parent.glob('*.nb[ic]'):  # as numba names them by default
             older.unlink(missing_ok=True)
+
+
+def kernel_folders() -> list[Path]:
+    """The folders on disk that hold kernels of this installation.
+
+    Returns:
+        Those of earlier sources too; none that is missing.
+    """
+    found: set[Path] = set()
+    for source in kernel_sources():
+        locator = KernelCacheLocator.from_function(kernel_folders, str(source))
+        if locator is not None:
+            found |= set(Path(locator.get_cache_path()).parent.glob(f'{_FOLDER}*'))
+    return sorted(found)
 
 
 class CompilationNotice(event.Listener):

@@ -308,7 +308,14 @@ def yaml_text(node: str) -> str:
 
 
 def help_text(kind: type[CheckedParams]) -> str:
-    """What `--help` of a node prints about its parameters, and how they are given."""
+    """What `--help` of a node prints about its parameters, and how they are given.
+
+    Args:
+        kind: the parameters of the node.
+
+    Returns:
+        Lines of text.
+    """
     lines = ['Parameters:']
     for spec in fields(kind):  # type: ignore[arg-type]
         star = ' *' if spec.metadata['fixed'] else ''

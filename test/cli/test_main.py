@@ -13,8 +13,7 @@ import numba
 import pytest
 
 import uav_task_alloc
-from uav_task_alloc import SOLVERS, __main__ as cli, params
-from uav_task_alloc.cli import compile as command
+from uav_task_alloc import SOLVERS, __main__ as cli, kernel_cache, params
 from uav_task_alloc.cli.study import EXPERIMENTS
 
 ROOT = Path(__file__).parents[2]
@@ -198,13 +197,12 @@ def test_out_of_memory_is_one_line(monkeypatch, capsys):
 
 def test_compile_prints_and_removes_the_folders_of_the_kernels(monkeypatch, tmp_path, capsys):
     from uav_task_alloc.allocator import warm_up
-    from uav_task_alloc.kernel_cache import KERNEL_FOLDER
     monkeypatch.setattr(warm_up, 'compile_kernels', lambda *_: None)
     monkeypatch.setattr(numba.core.config, 'CACHE_DIR', str(tmp_path))
     cli.main(['compile'])
     assert capsys.readouterr().out == ''
-    kernels, other = tmp_path / f'a/{KERNEL_FOLDER}1', tmp_path / 'a/other'
-    monkeypatch.setattr(command, 'cache_folders', lambda: [kernels])
+    kernels, other = tmp_path / 'a/kernels-1', tmp_path / 'a/other'
+    monkeypatch.setattr(kernel_cache, 'kernel_folders', lambda: [kernels])
     for folder in (kernels, other):
         folder.mkdir(parents=True)
         (folder / 'x.nbc').write_bytes(bytes(2_000_000))
@@ -218,7 +216,7 @@ def test_compile_prints_and_removes_the_folders_of_the_kernels(monkeypatch, tmp_
 def test_the_folders_of_the_kernels_are_those_that_numba_writes():
     from uav_task_alloc.geometry.detour import detour
     detour((0, 0, 50), (100, 0, 50), [uav_task_alloc.ThreatZone.cylinder('z', (50, 0), 10.0)])
-    folders = command.cache_folders()
+    folders = kernel_cache.kernel_folders()
     written = {path.parent for path in ROOT.rglob('*.nbi')} if not os.environ.get(
         'NUMBA_CACHE_DIR') else set()
     assert written <= set(folders)
