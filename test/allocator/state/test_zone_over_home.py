@@ -237,5 +237,3 @@ def test_finding_19_a_uav_without_a_path_home_gets_only_the_task_under_way():
     driver.event('COMPLETED', 't1', 'a')
     driver.settle()
     assert (driver.route('a'), driver.lists['a'].returns) == ((), False)
-
-
