@@ -37,6 +37,10 @@ def offered():
         for path, name in used_names(tree):
             if path.parent != user.parent:
                 names[path].add(name)
+    for path in [path for path in TREES if path.stem == '__init__']:
+        for module, name in used_names(TREES[path]):  # what it passes on
+            if name in names[path] or f"'{name}'" in SOURCES[path]:
+                names[module].add(name)
     for path, tree in TREES.items():
         for node in tree.body:
             if isinstance(node, (ast.FunctionDef, ast.ClassDef)) and node.name in names[path]:

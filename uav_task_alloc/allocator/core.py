@@ -39,13 +39,28 @@ _LEARNED_PERIOD = 5.0  # [s] between two rows of the learned state
 
 
 class Allocator:
-    """Apply inputs to `world`, call `tick` often, solve what `due` returns, `adopt` the answer,
-    and publish what `collect` returns.
+    """The allocator without I/O.
+
+    Apply inputs to `world`, call `tick` often, solve what `due` returns, `adopt` the answer, and
+    publish what `collect` returns.
+
+    Args:
+        params: of the node.
+        now: [s] steady clock.
+        saved: what the journal restored; None: nothing.
+
+    Arguments of methods:
+        now: [s] steady clock.
+        stamp: [s] clock of the node.
+        background: the running solve was begun without an event.
+        answer: of the solve that `due` asked for.
+        most: number of tasks; None: all.
+        rows: of the journal.
+        task_id: as announced.
     """
 
     def __init__(self, params: AllocatorParams, now: float,
                  saved: SavedState | None = None) -> None:
-        """Begin with the state that the journal restored, if any."""
         saved = saved or SavedState()
         self.schedule = Schedule()
         self.world = World(params, saved, make_safe_paths, self.schedule.add_trigger)

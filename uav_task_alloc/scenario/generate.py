@@ -57,6 +57,9 @@ def generate(seed: int, *, uavs: int = 4, tasks: int = 20, arrivals: int = 0, zo
         base: all UAVs start at one point.
         uav_range: of each UAV [m].
         between: first and last time of arrivals [s].
+
+    Returns:
+        Named `random_SEED`, at the default origin; zones are domes, cylinders and prisms in turn.
     """
     rng = np.random.default_rng(seed)
     volumes = [_draw_zone(rng, f'z{i + 1}', i % 3, size) for i in range(zones)]

@@ -34,6 +34,9 @@ def load(path: str | Path) -> Scenario:
     Args:
         path: of a YAML file.
 
+    Returns:
+        With the random arrivals drawn.
+
     Raises:
         ScenarioError: `file:line: reason`; the file cannot be read or is no scenario.
     """
@@ -55,6 +58,9 @@ def parse(text: str, name: str = 'scenario') -> Scenario:
     Args:
         text: YAML.
         name: of the file, for errors.
+
+    Returns:
+        With the random arrivals drawn.
 
     Raises:
         ScenarioError: `name:line: reason`.

@@ -14,13 +14,20 @@ class Moment:
 
     at: float  # [s] of the scenario
     zones: tuple[ThreatZone, ...] | None = None  # all zones in force; None: unchanged
-    tasks: tuple[Task, ...] = ()
-    cancels: tuple[Task, ...] = ()
+    tasks: tuple[Task, ...] = ()  # announced
+    cancels: tuple[Task, ...] = ()  # withdrawn
     deaths: tuple[str, ...] = ()  # ids of lost UAVs
 
 
 def timeline(scenario: Scenario) -> tuple[Moment, ...]:
-    """The moments in order of time; the first is at 0 and has the zones of the start."""
+    """Group the events of a scenario by time.
+
+    Args:
+        scenario: with the random arrivals drawn.
+
+    Returns:
+        In order of time; the first is at 0 and has the zones of the start.
+    """
     changes = scenario.zone_changes()
     deaths = {uav.id: uav.dies_at for uav in scenario.uavs if uav.dies_at is not None}
     by_id = {timed.task.id: timed.task for timed in scenario.tasks}

@@ -40,14 +40,14 @@ class TimedTask:
     """A task and the time of its announcement."""
 
     at: float  # [s]
-    task: Task
+    task: Task  # announced at `at`
 
 
 @dataclass(frozen=True, slots=True)
 class TimedZone:
     """A zone and the time during which it is in force."""
 
-    zone: ThreatZone
+    zone: ThreatZone  # in force from `appears` to `vanishes`
     appears: float = 0.0  # [s]
     vanishes: float = math.inf  # [s]
 
@@ -61,7 +61,7 @@ class Cancel:
     """The withdrawal of a task."""
 
     at: float  # [s]
-    task: str
+    task: str  # id
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,7 +14,14 @@ from uav_task_alloc.zone_codec import SCENARIO_ZONE, encode_zone
 
 
 def to_yaml(scenario: Scenario) -> str:
-    """The YAML text of a scenario; arrivals are written as the tasks drawn."""
+    """Write a scenario as the text of a file.
+
+    Args:
+        scenario: with the random arrivals drawn.
+
+    Returns:
+        YAML, which `parse` reads; arrivals are written as the tasks drawn.
+    """
     document = {
         'name': scenario.name,
         'seed': scenario.seed,
