@@ -135,3 +135,71 @@ def test_names_from_the_network_are_only_text():
 @pytest.mark.parametrize('count', range(len(FLIGHT)))
 def test_a_report_is_made_at_any_point_of_a_flight(count):
     assert 'Key figures' in report_page(read_history(FLIGHT[:count]), 'x.mcap')
+
+
+def flying(wall, uav, **more):
+    return {**state(wall, 10.0 * wall, uav), 'mode': 'ON_MISSION', 'battery': 0.9 - 0.01 * wall,
+            'home': [0.0, 0.0, 20.0], **more}
+
+
+def test_a_uav_that_falls_silent_in_flight_is_lost_where_it_was_last():
+    landed = {'mode': 'STANDBY'}
+    history = read_history([*(flying(k, 'u1') for k in range(5)),
+                            *(flying(k, 'u2') for k in range(20)),
+                            *(flying(k, 'u3', **landed) for k in range(5))])
+    assert {uav: (sample.wall, sample.point) for uav, sample in history.lost().items()} == {
+        'u1': (1004.0, (40.0, 0.0, 50.0))}
+    text = report_page(history, 'x.mcap')
+    traces, _ = figure(text, 'map')
+    [cross] = [trace for trace in traces if trace.get('name') == 'lost']
+    assert (cross['text'], cross['x']) == (['u1 lost at 4 s'], [40.0])
+    assert '<td class="n">4.0</td><td>40 m east, 0 m north, 50 m up</td>' in text
+
+
+def test_where_the_recording_of_all_uavs_ends_together_none_is_lost():
+    lines = [*(flying(k, uav) for k in range(5) for uav in ('u1', 'u2')),
+             statuses(20.0, a='ACTIVE')]
+    assert read_history(lines).lost() == {}
+    gone = flying(4.5, 'u2', available=False)
+    assert list(read_history([*lines[:-1], gone, lines[-1]]).lost()) == ['u2']
+
+
+def test_the_last_position_of_a_uav_is_in_degrees_where_the_origin_is_known():
+    origin = {'kind': 'origin', 'wall': BEGIN, 'latitude': 47.0, 'longitude': 8.0,
+              'altitude_amsl': 400.0}
+    text = report_page(read_history([origin, flying(0.0, 'u1')]), 'x.mcap')
+    assert '<td>47.000000, 8.000000, 450 m AMSL</td>' in text
+
+
+def test_height_above_home_and_battery_are_drawn_over_mission_time():
+    text = report_page(read_history([{'kind': 'run', 'speedup': 4.0}, announced(0.0, a=[0, 0, 0]),
+                                     *(flying(k, 'u1') for k in range(3))]), 'x.mcap')
+    (height, battery), layout = figure(text, 'levels')
+    assert (height['x'], height['y'], battery['y']) == (
+        [0.0, 4.0, 8.0], [30.0, 30.0, 30.0], [90.0, 89.0, 88.0])
+    assert layout['yaxis']['title']['text'] == 'height above home [m]'
+
+
+def test_the_report_says_which_seconds_are_those_of_the_mission():
+    begin = [{'kind': 'run', 'speedup': 2.0}, state(-30.0, 0.0), announced(0.0, a=[0, 0, 0]),
+             statuses(1.0, a='ACTIVE')]
+    end = [statuses(40.0, a='COMPLETED'), state(55.0, 0.0)]
+    text = report_page(read_history([*begin, *end]), 'x')
+    said = re.search('<p id="times">(.*?)</p>', text)[1]
+    assert said == (
+        'All times are mission time: 0 s is the first task announced, at 00:16:40 UTC. The '
+        'mission is from 0 s to 80 s, when the last task ended; the recording is from -60 s to '
+        '110 s, grey in the figures where it is not the mission. One second of the clock is 2 s '
+        'of the mission.')
+    _, layout = figure(text, 'timeline')
+    assert [(shape['x0'], shape['x1']) for shape in layout['shapes']] == [(-60.0, 0.0),
+                                                                          (80.0, 110.0)]
+    assert 'when the recording ended with open tasks' in report_page(read_history(begin), 'x')
+
+
+def test_a_plan_that_changed_nothing_is_no_replan():
+    text = report_page(read_history([*FLIGHT, planned(9.4, 'background', B)]), 'x.mcap')
+    assert '<td>re-plans</td><td class="n">1</td>' in text
+    assert '<td>plans that changed nothing</td><td class="n">1</td>' in text
+    replans = re.search('id="re-plans".*?</details>', text, re.DOTALL)[0]
+    assert replans.count('<tr>') == 3  # the head, the first plan, the one for b

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The figures of a report: map, timeline of tasks, solve times, gaps in reception."""
+"""The figures of a report: map, timeline of tasks, heights, solve times, gaps in reception."""
 from __future__ import annotations
 
 import math
@@ -13,7 +13,7 @@ from plotly.subplots import make_subplots
 from uav_task_alloc.flight_report.flight_history import FlightHistory
 from uav_task_alloc.geometry.zones import outline
 from uav_task_alloc.model import Point, Shape, ThreatZone
-from uav_task_alloc.palette import RED, STATE_COLOURS, rgb, uav_colour
+from uav_task_alloc.palette import DARK_RED, RED, STATE_COLOURS, rgb, uav_colour
 from uav_task_alloc.record.run_state import END_STATES
 
 _PLANNED = '#222222'
@@ -24,6 +24,7 @@ _MAX_POINTS = 5000  # drawn of a track
 _ROW = 16  # [px] of the timeline
 _MAX_HEIGHT = 4000  # [px] of a figure
 _TIME = 'mission time [s]'
+_LEGEND = 110  # [px] high at most; a longer one scrolls
 
 
 def flight_map(history: FlightHistory) -> Any:
@@ -47,9 +48,10 @@ def flight_map(history: FlightHistory) -> Any:
                 marker={'symbol': 'square', 'size': 12, 'color': uav_colour(k),
                         'line': {'width': 1, 'color': 'black'}})
     _add_tasks(figure, history)
+    _add_lost(figure, history)
     figure.update_xaxes(title='east [m]')
     figure.update_yaxes(title='north [m]', scaleanchor='x')
-    return _with_layout(figure, 'Map: as flown and as planned', 750)
+    return _with_layout(figure, 750)
 
 
 def _add_route(figure: Any, points: Sequence[Point | None], name: str, colour: str, dash: str,
@@ -80,6 +82,50 @@ def _add_tasks(figure: Any, history: FlightHistory) -> None:
                     'line': {'width': 1, 'color': 'black'}})
 
 
+def _add_lost(figure: Any, history: FlightHistory) -> None:
+    """A cross where a UAV was last, if it was lost."""
+    lost = history.lost()
+    if lost:
+        texts = [escape(f'{uav} lost at {history.clock(sample.wall):.0f} s')
+                 for uav, sample in lost.items()]
+        figure.add_scatter(
+            x=[sample.point[0] for sample in lost.values()],
+            y=[sample.point[1] for sample in lost.values()], mode='markers+text', text=texts,
+            textposition='bottom center', textfont={'color': DARK_RED, 'size': 13}, name='lost',
+            hovertext=[f'{text}, {sample.point[2]:.0f} m up' for text, sample in zip(
+                texts, lost.values(), strict=True)], hoverinfo='text',
+            marker={'symbol': 'x', 'size': 14, 'color': DARK_RED,
+                    'line': {'width': 1, 'color': 'white'}})
+
+
+def level_figure(history: FlightHistory) -> Any:
+    """Height and battery of each UAV over time."""
+    figure = make_subplots(rows=2, cols=1, shared_xaxes=True, vertical_spacing=0.06)
+    above_home = history.levels.keys() <= history.homes.keys()
+    for k, uav in enumerate(sorted(history.levels)):
+        levels = history.levels[uav]
+        levels = levels[::1 + len(levels) // _MAX_POINTS]
+        when = [round(history.clock(level.wall), 1) for level in levels]
+        home = history.homes[uav] if above_home else 0.0
+        heights = [None if level.up is None else round(level.up - home, 1) for level in levels]
+        batteries = [None if level.battery is None else round(100.0 * level.battery, 1)
+                     for level in levels]
+        for row, values, unit in ((1, heights, 'm'), (2, batteries, '%')):
+            figure.add_scatter(
+                x=when, y=values, mode='lines', name=escape(uav), legendgroup=escape(uav),
+                showlegend=row == 1, line={'color': uav_colour(k)}, row=row, col=1,
+                hovertemplate=f'%{{x:.0f}} s: %{{y:.1f}} {unit}')
+    for uav, sample in history.lost().items():
+        figure.add_vline(x=history.clock(sample.wall), line={'color': DARK_RED, 'dash': 'dot'},
+                         annotation={'text': f'{escape(uav)} lost', 'font': {'color': DARK_RED}},
+                         row=1, col=1)
+    above = 'above home' if above_home and history.homes else 'above the origin'
+    figure.update_yaxes(title=f'height {above} [m]', row=1, col=1)
+    figure.update_yaxes(title='battery [%]', range=[0, 105], row=2, col=1)
+    figure.update_xaxes(title=_TIME, row=2, col=1)
+    return _with_layout(_with_mission(figure, history), 520)
+
+
 def _task_text(history: FlightHistory, task: str) -> str:
     status = history.status(task)
     return escape(f'{task}: {status.state.lower()} {status.uav} {status.reason}')
@@ -98,7 +144,7 @@ def _add_zone(figure: Any, zone: ThreatZone) -> None:
             x=[x for x, _ in rim], y=[y for _, y in rim], mode='lines', name=escape(zone.id),
             line={'color': RED, 'width': 1.5 if k == 0 else 0.5}, hoverinfo='name',
             fill='toself' if k == 0 else 'none', fillcolor=_ZONE_FILL,
-            legendgroup='zones', showlegend=k == 0)
+            legendgroup=f'zone {escape(zone.id)}', showlegend=k == 0)
 
 
 def timeline_figure(history: FlightHistory) -> Any:
@@ -131,7 +177,7 @@ def timeline_figure(history: FlightHistory) -> Any:
             marker={'symbol': _SYMBOLS[state], 'size': 8, 'color': STATE_COLOURS[state]})
     figure.update_layout(barmode='overlay')
     _set_rows(figure, names)
-    return _with_layout(figure, 'Timeline of tasks', min(_MAX_HEIGHT, 160 + _ROW * len(names)))
+    return _with_layout(_with_mission(figure, history), min(_MAX_HEIGHT, 160 + _ROW * len(names)))
 
 
 def solve_figure(history: FlightHistory) -> Any:
@@ -149,7 +195,7 @@ def solve_figure(history: FlightHistory) -> Any:
         figure.update_yaxes(title=title, row=k, col=1, rangemode='tozero')
     figure.update_xaxes(title=_TIME, row=3, col=1)
     figure.update_layout(showlegend=False)
-    return _with_layout(figure, 'Re-plans: solve time and fit', 600)
+    return _with_layout(_with_mission(figure, history), 600)
 
 
 def reception_figure(history: FlightHistory) -> Any:
@@ -169,7 +215,7 @@ def reception_figure(history: FlightHistory) -> Any:
             marker={'color': colour}, width=0.6)
     figure.update_layout(barmode='overlay')
     _set_rows(figure, names)
-    return _with_layout(figure, 'Gaps: UAVs not received',
+    return _with_layout(_with_mission(figure, history),
                         min(_MAX_HEIGHT, 160 + 2 * _ROW * len(names)))
 
 
@@ -179,13 +225,37 @@ def _set_rows(figure: Any, names: Sequence[str]) -> None:
     figure.update_xaxes(title=_TIME)
 
 
-def _with_layout(figure: Any, title: str, height: int) -> Any:
+def _with_mission(figure: Any, history: FlightHistory) -> Any:
+    """Shade the seconds of the recording that are before the mission and after it."""
+    first, last = history.clock(history.run.first), history.clock(history.run.last)
+    end = history.clock(history.mission_end())
+    for since, until in ((first, 0.0), (end, last)):
+        if until > since and math.isfinite(until - since):
+            figure.add_vrect(x0=since, x1=until, fillcolor='#9e9e9e', opacity=0.15, line_width=0,
+                             layer='below', row='all', col=1)
+    return figure
+
+
+def _with_layout(figure: Any, height: int) -> Any:
+    """One look for all figures; the legend is below, so that a phone has the width."""
     return figure.update_layout(
-        title={'text': title, 'x': 0.01}, height=height, template='plotly_white',
-        margin={'l': 70, 'r': 20, 't': 50, 'b': 50}, hovermode='closest')
+        height=height, template='plotly_white', hovermode='closest',
+        margin={'l': 55, 'r': 12, 't': 30, 'b': 40},
+        legend={'orientation': 'h', 'yref': 'container', 'y': 0.0, 'yanchor': 'bottom',
+                'maxheight': _LEGEND, 'font': {'size': 11}})
 
 
-def all_figures(history: FlightHistory) -> Iterable[tuple[str, Any]]:
-    """(name, figure) in the order of the page."""
-    yield from (('map', flight_map(history)), ('timeline', timeline_figure(history)),
-                ('solving', solve_figure(history)), ('gaps', reception_figure(history)))
+def all_figures(history: FlightHistory) -> Iterable[tuple[str, str, Any]]:
+    """The figures of a report.
+
+    Args:
+        history: of the flight.
+
+    Returns:
+        (name, title, figure) in the order of the page.
+    """
+    yield 'map', 'Map: as flown and as planned', flight_map(history)
+    yield 'timeline', 'Timeline of tasks', timeline_figure(history)
+    yield 'levels', 'Height and battery', level_figure(history)
+    yield 'solving', 'Plans: solve time and fit', solve_figure(history)
+    yield 'gaps', 'Gaps: UAVs not received', reception_figure(history)

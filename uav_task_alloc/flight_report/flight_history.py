@@ -18,10 +18,11 @@ from uav_task_alloc.record.plan_diff import (
     trigger_text,
 )
 from uav_task_alloc.record.progress import SILENT_AFTER
-from uav_task_alloc.record.run_state import Line, ReportedStatus, RunState
+from uav_task_alloc.record.run_state import END_STATES, Line, ReportedStatus, RunState
 
-_SAMPLE_PERIOD = 0.2  # [s] between the samples of a track
+_SAMPLE_PERIOD = 0.2  # [s] between the samples of a track, of height and battery
 MAX_EVENTS = 5000  # later ones are dropped
+_OPEN_STATES = ('PENDING', 'ASSIGNED', 'ACTIVE')
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,12 +57,23 @@ class ReceptionGap:
     until: float  # [unix s]
 
 
+@dataclass(frozen=True, slots=True)
+class LevelSample:
+    """Height and battery of a UAV at one time."""
+
+    wall: float  # [unix s]
+    up: float | None  # [m] above the origin
+    battery: float | None  # share left
+
+
 @dataclass
 class FlightHistory:
     """A flight up to the last line given to `apply`; `close` ends it."""
 
     run: RunState = field(default_factory=RunState)
     tracks: dict[str, list[TrueSample]] = field(default_factory=dict)
+    levels: dict[str, list[LevelSample]] = field(default_factory=dict)  # by UAV
+    homes: dict[str, float] = field(default_factory=dict)  # [m] above the origin, by UAV
     last_state: dict[str, float] = field(default_factory=dict)  # [unix s] of each UAV
     planned: dict[str, list[list[Point]]] = field(default_factory=dict)  # legs as planned
     positions: dict[str, Point] = field(default_factory=dict)  # of tasks, as planned [m]
@@ -105,6 +117,12 @@ class FlightHistory:
         if wall - self.last_state.get(uav, wall) > SILENT_AFTER:
             self.gaps.append(ReceptionGap(uav, self.last_state[uav], wall))
         self.last_state[uav] = wall
+        levels, up = self.levels.setdefault(uav, []), line['position'][-1]
+        if not levels or wall - levels[-1].wall >= _SAMPLE_PERIOD:
+            levels.append(LevelSample(wall, up, line['battery']))
+        home = line.get('home', (None,))[-1]
+        if home is not None:
+            self.homes[uav] = home
         track = self.tracks.setdefault(uav, [])
         if None not in line['position'] and (not track or wall - track[-1].wall >= _SAMPLE_PERIOD):
             track.append(TrueSample(wall, tuple(line['position'])))
@@ -165,6 +183,30 @@ class FlightHistory:
     def status(self, task: str) -> ReportedStatus:
         """The last status of a task."""
         return self.run.statuses.get(task) or ReportedStatus('PENDING', '', 'no status received')
+
+    def lost(self) -> dict[str, TrueSample]:
+        """The last position of each UAV that fell silent in flight and stayed silent.
+
+        Where the states of all UAVs end together, the recording of them ended; then only a UAV
+        that was no longer available is lost.
+        """
+        newest = max(self.last_state.values(), default=0.0)
+        found = {}
+        for uav, wall in sorted(self.last_state.items()):
+            state = self.run.uavs[uav]
+            silent = self.run.last - wall > SILENT_AFTER and state['mode'] != 'STANDBY'
+            if silent and self.tracks[uav] and (
+                    newest - wall > SILENT_AFTER or not state['available']):
+                found[uav] = TrueSample(wall, self.tracks[uav][-1].point)
+        return found
+
+    def mission_end(self) -> float:
+        """When the last task ended [unix s]; the end of the recording while tasks are open."""
+        ends = [spans[-1] for spans in self.spans.values()]
+        if not ends or any(span.state in _OPEN_STATES for span in ends):
+            return self.run.last
+        return max((span.since for span in ends if span.state in END_STATES),
+                   default=self.run.last)
 
     def metres(self, uav: str) -> float:
         """Length of a track [m]."""

@@ -2,6 +2,7 @@
 """The report as one HTML file without network access: interactive figures and tables."""
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from datetime import datetime, timezone
@@ -14,6 +15,7 @@ from plotly.offline import get_plotlyjs
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.flight_report.figures import all_figures
 from uav_task_alloc.flight_report.flight_history import FlightHistory, StateSpan, read_history
+from uav_task_alloc.geometry.frames import to_geodetic
 from uav_task_alloc.record.bag_reader import BagReader
 
 # names of tasks and UAVs come from the network: no other script may run, nothing is loaded
@@ -25,7 +27,18 @@ table { border-collapse: collapse; margin: 0.5em 0 2em }
 th, td { border-bottom: 1px solid #ddd; padding: 3px 10px; text-align: left; vertical-align: top }
 th { background: #f4f6f8 } td.n { text-align: right; font-variant-numeric: tabular-nums }
 .warning { background: #fff3cd; border-left: 5px solid #e69f00; padding: 0.6em 1em }
-details { margin: 1em 0 } summary { cursor: pointer; font-size: 1.3em; font-weight: bold }"""
+details { margin: 1em 0 } summary { cursor: pointer }
+summary, h2 { font-size: 1.3em; font-weight: bold } h2 { margin: 1em 0 0 }
+.scroll { overflow-x: auto } table { width: max-content; max-width: none }
+td { overflow-wrap: break-word; max-width: 24em }
+@media (max-width: 600px) { body { margin: .5em auto; padding: 0 .5em } h1 { font-size: 1.4em }
+  th, td { padding: 3px 6px; font-size: 13px } }"""
+# a finger scrolls the page; the buttons of a figure zoom
+TOUCH = """if (matchMedia('(pointer: coarse)').matches) {
+  for (const plot of document.querySelectorAll('.js-plotly-plot')) {
+    Plotly.relayout(plot, {dragmode: false});
+  }
+}"""
 CONFIG = {'displaylogo': False, 'responsive': True,
           'showSendToCloud': False}  # a default button of plotly's toolbar
 Cell = str | float | int | None
@@ -68,17 +81,20 @@ def report_page(history: FlightHistory, name: str, warnings: Iterable[str] = ())
         warnings: shown above the tables.
     """
     figures = ''.join(
-        figure.to_html(full_html=False, include_plotlyjs=False, div_id=div, config=CONFIG)
-        for div, figure in all_figures(history))
+        f'<h2>{title}</h2>\n'
+        + figure.to_html(full_html=False, include_plotlyjs=False, div_id=div, config=CONFIG)
+        for div, title, figure in all_figures(history))
     head = f'Flight of {start_time(history)}'
     parts = [
         '<!DOCTYPE html><html lang="en"><head><meta charset="utf-8">',
+        '<meta name="viewport" content="width=device-width, initial-scale=1">',
         f'<meta http-equiv="Content-Security-Policy" content="{POLICY}">',
         f'<title>{escape(head)}</title><style>{STYLE}</style>',
         f'<script>{get_plotlyjs()}</script></head><body><h1>{escape(head)}</h1>',
         *(f'<p class="warning">{escape(text)}</p>' for text in warnings),
+        f'<p id="times">{escape(time_text(history))}</p>',
         html_table('Key figures', (f'of {name}', ''), key_figures(history)),
-        figures, tables(history), '</body></html>']
+        figures, f'<script>{TOUCH}</script>', tables(history), '</body></html>']
     return '\n'.join(parts)
 
 
@@ -88,6 +104,29 @@ def start_time(history: FlightHistory) -> str:
         return datetime.fromtimestamp(history.run.first, timezone.utc).strftime('%F %T UTC')
     except (OverflowError, ValueError, OSError):
         return 'unknown date'
+
+
+def time_text(history: FlightHistory) -> str:
+    """Which seconds are those of the mission, in words."""
+    run = history.run
+    if not history.tasks() or not all(map(math.isfinite, (run.first, run.last))):
+        return 'All times are in seconds since the first message; no task was announced.'
+    begin, end = (f'{history.clock(wall):.0f} s' for wall in (run.first, run.last))
+    fast = f' One second of the clock is {run.speedup:g} s of the mission.' if (
+        run.speedup != 1.0) else ''
+    close = history.mission_end()
+    why = 'the last task ended' if close < run.last else 'the recording ended with open tasks'
+    return (f'All times are mission time: 0 s is the first task announced, at '
+            f'{_time_of_day(run.start())}. The mission is from 0 s to {history.clock(close):.0f} '
+            f's, when {why}; the recording is from {begin} to {end}, grey in the figures where it '
+            f'is not the mission.{fast}')
+
+
+def _time_of_day(wall: float) -> str:
+    try:
+        return datetime.fromtimestamp(wall, timezone.utc).strftime('%T UTC')
+    except (OverflowError, ValueError, OSError):
+        return 'an unknown time'
 
 
 def key_figures(history: FlightHistory) -> list[tuple[Cell, ...]]:
@@ -106,13 +145,18 @@ def key_figures(history: FlightHistory) -> list[tuple[Cell, ...]]:
     return [
         ('tasks', len(history.tasks())),
         *((f'tasks {state.lower()}', count) for state, count in sorted(counts.items())),
-        ('UAVs', len(history.tracks)), ('metres flown', round(flown)),
+        ('UAVs', len(history.tracks)), ('UAVs lost', len(history.lost())),
+        ('metres flown', round(flown)),
         ('metres planned, of the legs that were begun', round(planned)),
-        ('re-plans', max(0, len(times) - 1)),
+        ('re-plans', sum(bool(plan.changed) for plan in history.replans[1:])),
+        ('plans that changed nothing', sum(not plan.changed for plan in history.replans[1:])),
         ('solve time, median [ms]', round(median(times), 1) if times else None),
         ('solve time, longest [ms]', round(max(times), 1) if times else None),
         ('gaps in reception', len(history.gaps)),
-        ('recorded [s]', round(history.run.last - history.run.first, 1))]
+        ('mission, to the end of the last task [s]',
+         round(max(0.0, history.clock(history.mission_end())), 1)),
+        ('recorded, of mission time [s]',
+         round((history.run.last - history.run.first) * history.run.speedup, 1))]
 
 
 def tables(history: FlightHistory) -> str:
@@ -125,16 +169,18 @@ def tables(history: FlightHistory) -> str:
                              'ended [s]', 'reason'),
                    (_task_row(history, task) for task in history.tasks())),
         html_table('UAVs', ('UAV', 'tasks completed', 'metres flown', 'metres planned', 'battery',
-                            'last mode', 'silent [s]'),
+                            'last mode', 'silent [s]', 'lost at [s]', 'last position'),
                    (_uav_row(history, uav) for uav in sorted(history.tracks))),
         html_table('Re-plans', ('at [s]', 'plan', 'trigger', 'changes', 'solve time [ms]', 'fit',
                                 'metres'),
                    ((at(plan.wall), plan.revision, plan.trigger, plan.changed or 'none',
                      round(plan.milliseconds, 1), plan.fit and round(plan.fit, 4),
-                     plan.distance and round(plan.distance)) for plan in history.replans)),
-        html_table('Gaps', ('UAV', 'from [s]', 'to [s]', 'wall time [s]'),
+                     plan.distance and round(plan.distance))
+                    for k, plan in enumerate(history.replans) if plan.changed or not k)),
+        html_table('Gaps', ('UAV', 'from [s]', 'to [s]', 'for [s]'),
                    ((gap.uav or 'all', at(gap.since), at(gap.until),
-                     round(gap.until - gap.since, 1)) for gap in history.gaps)),
+                     round((gap.until - gap.since) * history.run.speedup, 1))
+                    for gap in history.gaps)),
         html_table('Events', ('at [s]', 'event'),
                    ((at(wall), text) for wall, _, text in history.events))))
 
@@ -158,10 +204,22 @@ def _uav_row(history: FlightHistory, uav: str) -> tuple[Cell, ...]:
     done = sum(status.uav == uav and status.state == 'COMPLETED'
                for status in history.run.statuses.values())
     silent = sum(gap.until - gap.since for gap in history.gaps if gap.uav == uav)
-    battery = state['battery']
+    battery, lost = state['battery'], history.lost().get(uav)
     return (uav, done, round(history.metres(uav)), round(history.metres_planned(uav)),
             None if battery is None else f'{100.0 * battery:.0f} %', state['mode'].lower(),
-            round(silent, 1))
+            round(silent * history.run.speedup, 1),
+            None if lost is None else round(history.clock(lost.wall), 1), _place(history, uav))
+
+
+def _place(history: FlightHistory, uav: str) -> str:
+    """The last position of a UAV: in degrees, where the origin is known, and height."""
+    if not history.tracks[uav]:
+        return 'unknown'
+    point, origin = history.tracks[uav][-1].point, history.run.origin
+    if origin is None:
+        return f'{point[0]:.0f} m east, {point[1]:.0f} m north, {point[2]:.0f} m up'
+    latitude, longitude, altitude = to_geodetic(origin, point)
+    return f'{latitude:.6f}, {longitude:.6f}, {altitude:.0f} m AMSL'
 
 
 def html_table(title: str, heads: Sequence[str], rows: Iterable[Sequence[Cell]]) -> str:
@@ -169,7 +227,8 @@ def html_table(title: str, heads: Sequence[str], rows: Iterable[Sequence[Cell]])
     body = ''.join(f'<tr>{"".join(map(_html_cell, row))}</tr>\n' for row in rows)
     head = ''.join(f'<th>{escape(text)}</th>' for text in heads)
     return (f'<details open id="{title.lower().replace(" ", "_")}"><summary>{title}</summary>'
-            f'<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table></details>\n')
+            f'<div class="scroll"><table><thead><tr>{head}</tr></thead>'
+            f'<tbody>{body}</tbody></table></div></details>\n')
 
 
 def _html_cell(value: Cell) -> str:
