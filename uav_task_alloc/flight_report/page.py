@@ -34,7 +34,7 @@ td { overflow-wrap: break-word; max-width: 24em }
 @media (max-width: 600px) { body { margin: .5em auto; padding: 0 .5em } h1 { font-size: 1.4em }
   th, td { padding: 3px 6px; font-size: 13px } }"""
 # a finger scrolls the page; the buttons of a figure zoom
-TOUCH = """if (matchMedia('(pointer: coarse)').matches) {
+FINGER_SCROLL = """if (matchMedia('(pointer: coarse)').matches) {
   for (const plot of document.querySelectorAll('.js-plotly-plot')) {
     Plotly.relayout(plot, {dragmode: false});
   }
@@ -94,7 +94,7 @@ def report_page(history: FlightHistory, name: str, warnings: Iterable[str] = ())
         *(f'<p class="warning">{escape(text)}</p>' for text in warnings),
         f'<p id="times">{escape(time_text(history))}</p>',
         html_table('Key figures', (f'of {name}', ''), key_figures(history)),
-        figures, f'<script>{TOUCH}</script>', tables(history), '</body></html>']
+        figures, f'<script>{FINGER_SCROLL}</script>', tables(history), '</body></html>']
     return '\n'.join(parts)
 
 
