@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Large fleets: tasks left out, length, time to the first plan and memory, a line per plan.
 
-    python benchmarks/large.py [--size 200x5000] [--budgets 1,10] [--seeds 1] [--rival 60]
+    python benchmarks/large.py [--size 200x5000] [--budgets 1,10] [--seeds 1] [--reference 60]
 
-`--rival 60` gives PyVRP so many seconds of CPU time on each instance as well.
+`--reference 60` gives PyVRP so many seconds of CPU time on each instance as well.
 """
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def ours(instance: Instance, budget: float) -> None:
           f'{memory:.0f} MB resident', flush=True)
 
 
-def rival(instance: Instance, seconds: float) -> None:
+def solve_by_pyvrp(instance: Instance, seconds: float) -> None:
     """Print when PyVRP first served all, and its best."""
     results = [(when, evaluate(instance, routes)) for when, routes in pyvrp(instance, seconds)]
     served = [(when, result.length) for when, result in results if result.is_valid(collects=False)]
@@ -48,7 +48,7 @@ def main() -> None:
     parser.add_argument('--budgets', default='1,10', help='[s] of CPU time, ...')
     parser.add_argument('--seeds', type=int, default=1, help='instances of each kind')
     parser.add_argument('--slack', type=float, default=SLACK, help='ranges over a fair share')
-    parser.add_argument('--rival', type=float, default=0.0, help='[s] for PyVRP; 0: not run')
+    parser.add_argument('--reference', type=float, default=0.0, help='[s] for PyVRP; 0: not run')
     args = parser.parse_args()
     uavs, tasks = (int(each) for each in args.size.split('x'))
     instances = [make_instance(uavs, tasks, 11 + seed, one_base, args.slack)
@@ -57,8 +57,8 @@ def main() -> None:
     for instance in instances:
         for budget in args.budgets.split(','):
             ours(instance, float(budget))
-    for instance in instances if args.rival > 0.0 else []:
-        rival(instance, args.rival)
+    for instance in instances if args.reference > 0.0 else []:
+        solve_by_pyvrp(instance, args.reference)
 
 
 if __name__ == '__main__':

@@ -148,7 +148,7 @@ def test_a_silent_uav_is_marked(view, run):
     assert 'silent for 0:10' in text(page, '#uavs details:nth-child(2)')
 
 
-def test_a_page_says_that_it_is_stale_and_reconnects_by_itself(view, run, serve):
+def test_a_page_says_that_it_is_stale_and_reconnects_automatically(view, run, serve):
     page, server = view(run.snapshots), serve(run.snapshots)
     page.goto(server.address)
     wait(page, '#counts', '1 of 5 tasks done')

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A namespace and an id that are too long together: refused in words, and the nodes go on."""
+"""A namespace and an id that are too long together: refused with a message; the nodes go on."""
 import math
 
 import pytest

@@ -20,7 +20,7 @@ def current(bench):
     return of(bench.pass_time(1.1), 'MISSION_CURRENT')[-1]
 
 
-def test_it_floods_by_itself():
+def test_it_streams_without_a_request():
     bench = Bench('px4', floods=True)
     assert len(of(bench.pass_time(2.0), 'ATTITUDE')) in range(195, 206)
 
@@ -33,7 +33,7 @@ def test_the_flood_can_be_stopped_and_comes_back_with_a_reboot():
     assert of(bench.pass_time(2.0), 'ATTITUDE')
 
 
-def test_mission_current_comes_by_itself_and_has_no_rate(bench):
+def test_mission_current_is_sent_without_a_request_and_has_no_rate(bench):
     assert len(of(bench.pass_time(10.0), 'MISSION_CURRENT')) in (9, 10, 11)
     assert bench.command(d.MAV_CMD_SET_MESSAGE_INTERVAL, d.MAVLINK_MSG_ID_MISSION_CURRENT,
                          500_000) == d.MAV_RESULT_FAILED

@@ -80,7 +80,7 @@ def driver():
 
 
 def moved(driver):
-    """b has t1 of a, which is believed lost."""
+    """b has t1 of a, which is presumed lost."""
     driver.now += 6.0
     driver.uav('b', 1000.0, 0.0, 50.0)
     driver.settle(report=False)

@@ -15,7 +15,7 @@ def test_the_rate_is_that_of_the_last_seconds(rate):
     for k in range(300):  # 30 s, a message each 0.1 s, up to 0.1 s late
         clock.add(7.0 + 0.1 * k * rate, 100.0 + 0.1 * k + rng.uniform(0.0, 0.1))
     assert clock.value == pytest.approx(rate, rel=0.01)
-    for k in range(300):  # the simulator is told to run twice as fast
+    for k in range(300):  # the simulator is set to run twice as fast
         clock.add(37.0 + 30.0 * rate + 0.2 * k * rate, 130.0 + 0.1 * k)
     assert clock.value == pytest.approx(2.0 * rate, rel=0.01)
 

@@ -110,7 +110,7 @@ def test_both_files_hold_what_the_bridge_would_upload(world, folder, uav):
         assert [round(line.x * 1e7), round(line.y * 1e7)] == [item.x, item.y]
 
 
-def test_the_habits_of_each_autopilot_are_kept(folder):
+def test_the_files_follow_the_rules_of_each_autopilot(folder):
     ardupilot, px4 = (json.loads((folder / f'{uav}.plan').read_text())['mission']
                       for uav in ('u_ardu', 'u_px4'))
     assert (ardupilot['firmwareType'], px4['firmwareType']) == (3, 12)

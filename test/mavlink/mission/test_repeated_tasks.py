@@ -103,7 +103,7 @@ def test_finding_33_a_task_announced_again_while_others_are_flown_is_flown(kind)
 
 @BOTH
 @pytest.mark.parametrize('away', [False, True])
-def test_finding_33_what_was_flown_while_the_allocator_was_deaf_is_flown_once(kind, away):
+def test_finding_33_what_was_flown_while_the_allocator_received_nothing_is_flown_once(kind, away):
     """away: a list without the tasks comes meanwhile, as for a UAV that seemed silent."""
     fleet = Fleet(kind)
     fleet.add('ABC')
