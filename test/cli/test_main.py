@@ -40,6 +40,55 @@ def test_plan_prints_writes_and_draws_a_plan(tmp_path, capsys):
     assert 'relay.plan, .waypoints: ' in printed
 
 
+IN_DEGREES = """origin: {latitude: 47.0, longitude: 8.0, altitude_amsl: 400}
+route_end: home
+uavs:
+  - {id: u1, latitude: 47.0, longitude: 8.0, altitude: 0, home: [10, 0, 0]}
+  - {id: u2, position: [900, 0, 0]}
+tasks:
+  - {id: t1, latitude: 47.002, longitude: 8.0, altitude: 50}
+  - {id: far, latitude: 47.2, longitude: 8.0, altitude: 60, allowed_uavs: []}
+zones:
+  - {id: hut, shape: cylinder, latitude: 47.001, longitude: 8.0, radius: 30}
+"""
+
+
+def test_the_json_of_a_plan_has_tasks_and_routes_in_degrees(tmp_path):
+    path, out = tmp_path / 'degrees.yaml', tmp_path / 'plan.json'
+    path.write_text(IN_DEGREES)
+    assert cli.main(['plan', str(path), '--budget', '0.02', '--json', str(out)]) == 0
+    result = json.loads(out.read_text())
+    assert result['origin'] == {'latitude': 47.0, 'longitude': 8.0, 'altitude_amsl': 400.0}
+    for name, latitude, altitude in (('t1', 47.002, 50.0), ('far', 47.2, 60.0)):
+        assert result['tasks'][name] == pytest.approx(
+            {'latitude': latitude, 'longitude': 8.0, 'altitude': altitude}, abs=1e-8)
+    route, out, back = result['waypoints']['u1'], *result['legs']['u1']
+    assert route[0] == {'task': None, 'latitude': 47.0, 'longitude': 8.0, 'altitude': 0.0}
+    assert len(route) == 3 + len(out['via']) + len(back['via']) > 3  # around the hut
+    assert route[1 + len(out['via'])] == {'task': 't1', **result['tasks']['t1']}
+    assert route[-1]['longitude'] > 8.0001
+    assert [row['task'] for row in result['waypoints']['u2']] == [None]
+
+
+def test_a_uav_that_starts_inside_a_zone_is_warned_of(tmp_path, capsys):
+    path = tmp_path / 'inside.yaml'
+    path.write_text("""uavs:
+  - {id: u1, position: [25, 0, 0], home: [100, 0, 0]}
+  - {id: u2, position: [500, 0, 0]}
+zones:
+  - {id: hut, shape: cylinder, center: [0, 0], radius: 20, margin: 3}
+  - {id: pole, shape: cylinder, center: [100, 5], radius: 2}
+""")
+    assert cli.main(['plan', str(path), '--budget', '0', '--clearance', '4']) == 0
+    assert capsys.readouterr().err == (
+        'Warning: u1 starts inside zone hut (with its margin of 3 m and the clearance of 4 m): '
+        'its route leaves it first; in a flight it gets no tasks while it is on the ground there\n'
+        'Warning: the home of u1 is inside zone pole (with its margin of 0 m and the clearance of '
+        '4 m): no safe way leads home\n')
+    assert cli.main(['plan', str(path), '--budget', '0', '--clearance', '1']) == 0
+    assert 'pole' not in capsys.readouterr().err
+
+
 def test_a_cancelled_task_is_not_planned(tmp_path):
     out = tmp_path / 'plan.json'
     small = str(ROOT / 'config/scenarios/small.yaml')

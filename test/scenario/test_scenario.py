@@ -11,6 +11,7 @@ from uav_task_alloc.errors import InvalidValue, ScenarioError
 from uav_task_alloc.geometry.zones import zones_around
 from uav_task_alloc.model import Shape, ThreatZone
 from uav_task_alloc.scenario import checked_yaml, document
+from uav_task_alloc.scenario.key_hints import SAME_MEANING, key_hint
 from uav_task_alloc.scenario.schema import TABLES
 
 ROOT = Path(__file__).parents[2]
@@ -56,6 +57,61 @@ def test_tasks_may_be_given_in_degrees():
                   'tasks:\n  - {id: t, latitude: 47.001, longitude: 8.0, altitude: 50}\n')
     x, y, z = scenario.parse(text).tasks[0].task.position
     assert (x, y, z) == pytest.approx((0.0, 111.2, 50.0), abs=0.1)
+
+
+IN_DEGREES = 'origin: {latitude: 47.0, longitude: 8.0, altitude_amsl: 400}\n'
+
+
+def test_uavs_may_start_at_degrees_and_have_a_home_there():
+    read = scenario.parse(IN_DEGREES + """uavs:
+  - {id: u1, latitude: 47.001, longitude: 8.0, altitude: 5}
+  - {id: u2, position: [1, 2, 3], home: {latitude: 47.0, longitude: 8.001, altitude: 7}}
+""")
+    first, second = read.uavs
+    assert first.position == pytest.approx((0.0, 111.2, 5.0), abs=0.1)
+    assert first.home == first.position
+    assert second.position == (1.0, 2.0, 3.0)
+    assert second.home == pytest.approx((76.1, 0.0, 7.0), abs=0.1)
+
+
+def test_zones_may_be_given_in_degrees():
+    dome, column, prism = (timed.zone for timed in scenario.parse(UAV + IN_DEGREES + """zones:
+  - {id: a, shape: hemisphere, latitude: 47.001, longitude: 8.0, altitude: 5, radius: 4}
+  - {id: b, shape: cylinder, latitude: 47.001, longitude: 8.0, radius: 3, z_max: 9}
+  - id: c
+    shape: polygon
+    z_min: 3
+    vertices: [{latitude: 47.001, longitude: 8.0}, [1, 0], {latitude: 47, longitude: 8.001}]
+""").zones)
+    assert dome.center == pytest.approx((0.0, 111.2, 5.0), abs=0.1)
+    assert column.center == pytest.approx((0.0, 111.2, 0.0), abs=0.1)
+    assert column.z_max == 9.0
+    assert prism.vertices[1] == (1.0, 0.0)
+    assert [*prism.vertices[0], *prism.vertices[2]] == pytest.approx(
+        [0.0, 111.2, 76.1, 0.0], abs=0.1)
+    assert (prism.z_min, prism.z_max) == (3.0, math.inf)
+
+
+@pytest.mark.parametrize(('table', 'word', 'hint'), [
+    ('tasks', 'priority', "nearest is 'value'"), ('tasks', 'lat', "nearest is 'latitude'"),
+    ('tasks', 'lng', "nearest is 'longitude'"), ('tasks', 'alt', "nearest is 'altitude'"),
+    ('tasks', 'deadline', 'time windows are not supported'), ('tasks', 'Name', "nearest is 'id'"),
+    ('tasks', 'latest', 'time windows are not supported'), ('tasks', 'time', "nearest is 'at'"),
+    ('tasks', 'vlaue', "nearest is 'value'"), ('tasks', 'duration', "nearest is 'service_time'"),
+    ('uavs', 'speed', "nearest is 'cruise_speed'"), ('uavs', 'battery', "nearest is 'range'"),
+    ('uavs', 'lon', "nearest is 'longitude'"), ('uavs', 'start', "nearest is 'position'"),
+    ('zones', 'polygon', "nearest is 'vertices'"), ('zones', 'type', "nearest is 'shape'"),
+    ('zones', 'height', "nearest is 'z_max'"), ('zones', 'buffer', "nearest is 'margin'"),
+    ('scenario', 'drones', "nearest is 'uavs'"), ('scenario', 'obstacles', "nearest is 'zones'"),
+    ('origin', 'altitude', "nearest is 'altitude_amsl'"), ('tasks', 'qqq', 'nearest is '),
+])
+def test_a_word_of_other_programs_is_answered_by_the_key_that_has_its_meaning(table, word, hint):
+    assert key_hint(word, TABLES[table]).startswith(hint)
+
+
+def test_hints_name_keys_that_exist():
+    known = {key for table in TABLES.values() for key in table}
+    assert SAME_MEANING.keys() <= known
 
 
 def test_each_shape_of_zone_is_read():
@@ -124,6 +180,26 @@ REFUSED = {
         ':4: scenario.tasks[0].position is missing: expected either position, or latitude',
     UAV + 'tasks:\n  - {id: t, latitude: 1}\n':
         ':4: scenario.tasks[0].longitude is missing: expected all three of latitude',
+    UAV + 'tasks:\n  - {id: t, latitude: 40, longitude: 8, altitude: 50}\n':
+        ':4: scenario.tasks[0].latitude = 40: expected a place within 500 km of the origin, 47.39',
+    'uavs:\n  - {id: u1}\n':
+        ':2: scenario.uavs[0].position is missing: expected either position, or latitude, longit',
+    'uavs:\n  - {id: u1, position: [0, 0, 0], latitude: 47}\n':
+        ':2: scenario.uavs[0].position = [0, 0, 0]: expected either position, or latitude',
+    'uavs:\n  - {id: u1, latitude: 47.4, longitude: 8.5}\n':
+        ':2: scenario.uavs[0].altitude is missing: expected all three of latitude, longitude, alt',
+    'uavs:\n  - {id: u1, position: [0, 0, 0], home: 5}\n':
+        ':2: scenario.uavs[0].home = 5: expected three numbers [x, y, z], or a mapping with latit',
+    'uavs:\n  - {id: u1, position: [0, 0, 0], home: {latitude: 95, longitude: 8, altitude: 0}}\n':
+        ':2: scenario.uavs[0].home.latitude = 95: expected a number in [-90, 90]',
+    UAV + 'zones:\n  - {id: z, shape: cylinder, latitude: 47.4, radius: 5}\n':
+        ':4: scenario.zones[0].longitude is missing: expected all of latitude, longitude',
+    UAV + 'zones:\n  - {id: z, shape: cylinder, center: [0, 0], altitude: 3, radius: 5}\n':
+        ':4: scenario.zones[0].altitude = 3: expected no such key for a cylinder',
+    UAV + 'zones:\n  - {id: z, shape: cylinder, center: [0, 0], latitude: 47, radius: 5}\n':
+        ':4: scenario.zones[0].center = [0, 0]: expected either center, or latitude and longitude',
+    UAV + 'zones:\n  - {id: z, shape: polygon, vertices: [[0, 0], [1, 1], {latitude: 47.4}]}\n':
+        ':4: scenario.zones[0].vertices[2].longitude is missing: expected a number in [-180, 180]',
     UAV + 'tasks:\n  - {id: t, position: [1, 1, 1], allowed_uavs: [u2]}\n':
         ":4: scenario.tasks[0].allowed_uavs = [u2]: expected one of the UAVs of this file; "
         "nearest is 'u1'",

@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from difflib import get_close_matches
 from typing import Any
 
 import yaml
 
 from uav_task_alloc.errors import ScenarioError
+from uav_task_alloc.scenario.key_hints import key_hint
 
 REQUIRED: Any = object()
 INFINITE = {'.inf': math.inf, '+.inf': math.inf, '-.inf': -math.inf}  # YAML's spelling
@@ -135,9 +135,8 @@ def _children(table: KeyTable, place: str, node: yaml.MappingNode) -> dict[str, 
     for name, _ in node.value:
         key = name.value if isinstance(name, yaml.ScalarNode) else shown_yaml(name)
         if key not in table:
-            near = get_close_matches(key, table, 1, 0.0)[0]
             raise refusal(name, f'{place}: unknown key {key!r}: expected one of '
-                                f'{", ".join(table)}; nearest is {near!r}')
+                                f'{", ".join(table)}; {key_hint(key, table)}')
         if key in lines:
             raise refusal(name, f'{place}: key {key!r} is given twice: expected it once; '
                                 f'first in line {lines[key]}')
@@ -215,6 +214,17 @@ def list_of(kind: ValueKind, description: str, least: int = 0,
         if not isinstance(node, yaml.SequenceNode) or not least <= len(node.value) <= most:
             raise refusal(node, f'{place} = {shown_yaml(node)}: expected {description}')
         return tuple(kind.read(f'{place}[{i}]', child) for i, child in enumerate(node.value))
+    return ValueKind(description, read)
+
+
+def list_or_mapping(kind: ValueKind, table: KeyTable, description: str) -> ValueKind:
+    """A list of this kind, or a mapping, which is read as a YamlRow."""
+    def read(place: str, node: yaml.Node) -> Any:
+        if isinstance(node, yaml.MappingNode):
+            return read_row(table, place, node)
+        if isinstance(node, yaml.SequenceNode):
+            return kind.read(place, node)
+        raise refusal(node, f'{place} = {shown_yaml(node)}: expected {description}')
     return ValueKind(description, read)
 
 

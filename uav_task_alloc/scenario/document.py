@@ -16,7 +16,7 @@ A scenario is a YAML file with a fleet, and with tasks and zones that appear and
 times. `uav_task_alloc plan` uses its `uavs`, `tasks` and `zones` only. In a flight,
 `fleet_sim` simulates the UAVs and `scenario_player` announces tasks and zones. Times are in
 scenario seconds, which are played `speedup` times faster than real time; time 0 is when the
-allocator has subscribed. Coordinates are ENU in metres from `origin`.
+allocator has subscribed. Coordinates are ENU in metres from `origin`, or degrees.
 
 ```yaml
 uavs:
@@ -28,12 +28,31 @@ zones:
   - {id: z1, shape: hemisphere, center: [150, 200, 0], radius: 80, margin: 5}
 ```
 
+The same in degrees; altitudes, z_min and z_max stay in metres above the origin:
+
+```yaml
+origin: {latitude: 47.397742, longitude: 8.545594, altitude_amsl: 488}
+uavs:
+  - {id: uav_1, latitude: 47.397742, longitude: 8.545594, altitude: 0}
+tasks:
+  - {id: t1, latitude: 47.401339, longitude: 8.549567, altitude: 50, value: 2, service_time: 5}
+zones:
+  - {id: z1, shape: cylinder, latitude: 47.399541, longitude: 8.547581, radius: 80, z_max: 90}
+  - id: z2
+    shape: polygon
+    vertices:
+      - {latitude: 47.3995, longitude: 8.5440}
+      - {latitude: 47.4004, longitude: 8.5440}
+      - {latitude: 47.4004, longitude: 8.5450}
+```
+
 More examples are in `config/scenarios/`, among them `demo.yaml`. The error on an invalid file is
-one line with file, line, value and expectation:
+one line with file, line, value and expectation; for a word of other programs it names the key:
 
 ```text
 demo.yaml:11: scenario.uavs[0].range = -4: expected a number in [0, inf]
 demo.yaml:14: scenario.tasks[0]: unknown key 'positon': expected one of ...; nearest is 'position'
+demo.yaml:15: scenario.tasks[1]: unknown key 'priority': expected one of ...; nearest is 'value'
 ```
 
 `arrivals` are random tasks, drawn from `seed` when the file is read: the same file always has the

@@ -2,6 +2,7 @@
 """Reader of scenario files; every error has file, line and reason."""
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable
 from difflib import get_close_matches
 from pathlib import Path
@@ -14,7 +15,7 @@ from uav_task_alloc.geometry.frames import Origin, to_enu
 from uav_task_alloc.model import Point, Shape, Task
 from uav_task_alloc.scenario.checked_yaml import YamlRow, compose, read_row, refusal
 from uav_task_alloc.scenario.generate import draw_points
-from uav_task_alloc.scenario.schema import SCENARIO
+from uav_task_alloc.scenario.schema import GEODETIC, SCENARIO
 from uav_task_alloc.scenario.values import (
     DEFAULT_ORIGIN,
     Cancel,
@@ -26,6 +27,9 @@ from uav_task_alloc.scenario.values import (
 from uav_task_alloc.zone_codec import USED_KEYS, decode_zone
 
 _Value = TypeVar('_Value')
+_FARTHEST = 500e3  # [m] from the origin: farther out, degrees or origin are wrong
+_CENTER_IN_DEGREES = {'hemisphere': ('latitude', 'longitude', 'altitude'),
+                      'cylinder': ('latitude', 'longitude')}
 
 
 def load(path: str | Path) -> Scenario:
@@ -67,12 +71,12 @@ def parse(text: str, name: str = 'scenario') -> Scenario:
     """
     root = read_row(SCENARIO, 'scenario', compose(text, name))
     origin = _origin(root['origin'])
-    uavs = tuple(_uav(row, i + 1) for i, row in enumerate(root['uavs']))
+    uavs = tuple(_uav(row, i + 1, origin) for i, row in enumerate(root['uavs']))
     if not uavs:
         raise root.refuse('uavs', 'at least one UAV')
     _unique(root['uavs'], 'id', [uav.id for uav in uavs])
     _unique(root['uavs'], 'system_id', [uav.system_id for uav in uavs])
-    zones = tuple(_zone(row) for row in root['zones'])
+    zones = tuple(_zone(row, origin) for row in root['zones'])
     _unique(root['zones'], 'id', [timed.zone.id for timed in zones])
     tasks = [_task(row, origin, [uav.id for uav in uavs]) for row in root['tasks']]
     _unique(root['tasks'], 'id', [timed.task.id for timed in tasks])
@@ -95,11 +99,13 @@ def _origin(row: YamlRow | None) -> Origin:
     return Origin(row['latitude'], row['longitude'], row['altitude_amsl'])
 
 
-def _uav(row: YamlRow, position: int) -> ScenarioUav:
+def _uav(row: YamlRow, number: int, origin: Origin) -> ScenarioUav:
+    position, home = _position(row, origin), row['home']
+    if isinstance(home, YamlRow):
+        home = _from_degrees(home, origin)
     uav = ScenarioUav(
-        row['id'], row['system_id'] or position, row['autopilot'], row['position'],
-        row['home'] or row['position'], row['cruise_speed'], row['range'],
-        frozenset(row['capabilities']), row['dies_at'])
+        row['id'], row['system_id'] or number, row['autopilot'], position, home or position,
+        row['cruise_speed'], row['range'], frozenset(row['capabilities']), row['dies_at'])
     if uav.system_id > 255:
         raise row.refuse('system_id', 'a whole number in [1, 255], as there are more UAVs')
     return uav
@@ -117,26 +123,36 @@ def _task(row: YamlRow, origin: Origin, uavs: list[str]) -> TimedTask:
 
 
 def _position(row: YamlRow, origin: Origin) -> Point:
-    geodetic = [row[key] for key in ('latitude', 'longitude', 'altitude')]
+    geodetic = [row[key] for key in GEODETIC]
     if (row['position'] is None) == all(value is None for value in geodetic):
         raise row.refuse('position', 'either position, or latitude, longitude and altitude')
     if row['position'] is not None:
         x, y, z = row['position']
         return x, y, z
-    for key in ('latitude', 'longitude', 'altitude'):
+    for key in GEODETIC:
         if row[key] is None:
             raise row.refuse(key, 'all three of latitude, longitude, altitude')
-    latitude, longitude, altitude = geodetic
-    return to_enu(origin, latitude, longitude, origin.altitude_amsl + altitude)
+    return _from_degrees(row, origin)
 
 
-def _zone(row: YamlRow) -> TimedZone:
+def _from_degrees(row: YamlRow, origin: Origin) -> Point:
+    """ENU [m] of the latitude and longitude of a row, and its altitude where there is one."""
+    altitude = row.values.get('altitude') or 0.0
+    point = to_enu(origin, row['latitude'], row['longitude'], origin.altitude_amsl + altitude)
+    if not math.hypot(*point) <= _FARTHEST:
+        raise row.refuse('latitude', f'a place within {_FARTHEST / 1e3:g} km of the origin, '
+                                     f'{origin.latitude:g}, {origin.longitude:g}')
+    return point
+
+
+def _zone(row: YamlRow, origin: Origin) -> TimedZone:
     used = USED_KEYS[Shape[row['shape'].upper()]]
+    _zone_from_degrees(row, origin)
     for key in used:
         if row[key] is None:
             raise row.refuse(key, f'it for a {row["shape"]}')
-    for key in ('center', 'radius', 'vertices', 'z_min', 'z_max'):
-        if key in row.nodes and key not in used:
+    for key in ('center', *GEODETIC, 'radius', 'vertices', 'z_min', 'z_max'):
+        if key in row.nodes and key not in (*used, *_CENTER_IN_DEGREES.get(row['shape'], ())):
             raise row.refuse(key, f'no such key for a {row["shape"]}')
     if row['shape'] == 'hemisphere' and len(row['center']) < 3:
         raise row.refuse('center', 'three numbers [x, y, z] for a hemisphere')
@@ -145,6 +161,21 @@ def _zone(row: YamlRow) -> TimedZone:
     zone = _valid(row, lambda: decode_zone(
         {key: row[key] for key in ('id', 'shape', *used, 'margin')}))
     return TimedZone(zone, row['appears'], row['vanishes'])
+
+
+def _zone_from_degrees(row: YamlRow, origin: Origin) -> None:
+    """Replace the values of a zone that are in degrees by ENU."""
+    geodetic = _CENTER_IN_DEGREES.get(row['shape'], ())
+    if any(row[key] is not None for key in geodetic):
+        if row['center'] is not None:
+            raise row.refuse('center', f'either center, or {" and ".join(geodetic)}')
+        for key in geodetic:
+            if row[key] is None:
+                raise row.refuse(key, f'all of {", ".join(geodetic)}')
+        row.values['center'] = _from_degrees(row, origin)
+    row.values['vertices'] = row['vertices'] and tuple(
+        _from_degrees(corner, origin)[:2] if isinstance(corner, YamlRow) else corner
+        for corner in row['vertices'])
 
 
 def _cancel(row: YamlRow, times: dict[str, float]) -> Cancel:

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import math
 import re
+from dataclasses import replace
 
 from uav_task_alloc.checks import is_ros_name
 from uav_task_alloc.params import AllocatorParams
 from uav_task_alloc.scenario.checked_yaml import (
+    REQUIRED,
     Key,
     KeyTable,
     choice,
     list_of,
+    list_or_mapping,
     mapping,
     number_value,
     text_value,
@@ -35,13 +38,29 @@ ORIGIN: KeyTable = {
     'altitude_amsl': Key(number_value(-1000.0, 10000.0), '[m] above mean sea level', 0.0),
 }
 
+_LATITUDE, _LONGITUDE = (Key(number_value(-90.0, 90.0), '[deg] WGS84', None),
+                         Key(number_value(-180.0, 180.0), '[deg] WGS84', None))
+_ALTITUDE = Key(number_value(), '[m] above the origin', None)
+GEODETIC: KeyTable = {
+    'latitude': replace(_LATITUDE, default=REQUIRED),
+    'longitude': replace(_LONGITUDE, default=REQUIRED),
+    'altitude': replace(_ALTITUDE, default=REQUIRED),
+}
+_GEODETIC_CORNER: KeyTable = {key: GEODETIC[key] for key in ('latitude', 'longitude')}
+
 UAV: KeyTable = {
     'id': Key(ROS_NAME, 'name of the UAV and namespace of its topics'),
     'system_id': Key(whole_number(1, 255), 'MAVLink system id; default: its position in the list'
                      ' from 1', None),
     'autopilot': Key(choice('ardupilot', 'px4'), 'the simulated autopilot', 'ardupilot'),
-    'position': Key(POINT, '[m] ENU at the start'),
-    'home': Key(POINT, '[m] ENU; default: its position', None),
+    'position': Key(POINT, '[m] ENU at the start; either this or latitude, longitude and altitude',
+                    None),
+    'latitude': _LATITUDE,
+    'longitude': _LONGITUDE,
+    'altitude': _ALTITUDE,
+    'home': Key(list_or_mapping(POINT, GEODETIC, 'three numbers [x, y, z], or a mapping with '
+                                'latitude, longitude, altitude'),
+                '[m] ENU, or degrees and [m] above the origin; default: its position', None),
     'cruise_speed': Key(number_value(0.0, 1000.0, open_low=True), '[m/s]', 15.0),
     'range': Key(number_value(0.0, infinite=True), '[m] it can fly in total', math.inf),
     'capabilities': Key(NAMES, 'its capabilities', ()),
@@ -52,9 +71,9 @@ TASK: KeyTable = {
     'id': Key(ID, 'name of the task'),
     'at': Key(_TIME, '[s] when it is announced', 0.0),
     'position': Key(POINT, '[m] ENU; either this or latitude, longitude and altitude', None),
-    'latitude': Key(number_value(-90.0, 90.0), '[deg] WGS84', None),
-    'longitude': Key(number_value(-180.0, 180.0), '[deg] WGS84', None),
-    'altitude': Key(number_value(), '[m] above the origin', None),
+    'latitude': _LATITUDE,
+    'longitude': _LONGITUDE,
+    'altitude': _ALTITUDE,
     'value': Key(POSITIVE, 'value of serving it', 1.0),
     'service_time': Key(number_value(0.0, 1e6), '[s] that the UAV stays at the task', 0.0),
     'acceptance_radius': Key(POSITIVE, '[m] distance at which it counts as reached; default: the '
@@ -68,10 +87,16 @@ _ZONE: KeyTable = {
     'shape': Key(choice('hemisphere', 'cylinder', 'polygon'), 'its shape'),
     'center': Key(list_of(number_value(), 'three numbers [x, y, z] (cylinder: [x, y] suffices)',
                           2, 3),
-                  '[m] ENU; hemisphere and cylinder', None),
+                  '[m] ENU; hemisphere and cylinder; either this or latitude and longitude, of a '
+                  'hemisphere also altitude', None),
+    'latitude': replace(_LATITUDE, text='[deg] WGS84 of its center; hemisphere and cylinder'),
+    'longitude': replace(_LONGITUDE, text='[deg] WGS84 of its center; hemisphere and cylinder'),
+    'altitude': replace(_ALTITUDE, text='[m] above the origin, of its center; hemisphere only'),
     'radius': Key(POSITIVE, '[m]; hemisphere and cylinder', None),
-    'vertices': Key(list_of(CORNER, 'a list of at least 3 corners [x, y]', 3),
-                    '[m] ENU, a simple polygon; polygon only', None),
+    'vertices': Key(list_of(list_or_mapping(
+        CORNER, _GEODETIC_CORNER, 'two numbers [x, y], or a mapping with latitude, longitude'),
+        'a list of at least 3 corners [x, y] or {latitude, longitude}', 3),
+        '[m] ENU or degrees, a simple polygon; polygon only', None),
     'z_min': Key(number_value(infinite=True), '[m] lower limit; cylinder and polygon', -math.inf),
     'z_max': Key(number_value(infinite=True), '[m] upper limit; cylinder and polygon', math.inf),
     'margin': Key(number_value(0.0), '[m] kept clear around it', 0.0),
