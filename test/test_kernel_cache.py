@@ -15,7 +15,9 @@ import uav_task_alloc
 from uav_task_alloc.kernel_cache import kernel_sources, sources_hash
 
 PACKAGE = Path(uav_task_alloc.__file__).parent
-DECORATORS = {'kernel', 'inline_kernel', 'allocating_kernel', 'intrinsic'}
+INNER = {'inline_kernel', 'inner_kernel', 'inner_allocating_kernel'}
+DECORATORS = INNER | {'kernel', 'allocating_kernel', 'intrinsic'}
+CFUNCS = {'_find', '_join'}  # of geometry/scene.py
 CALLEE = """
 from uav_task_alloc.kernel import inline_kernel
 
@@ -121,11 +123,11 @@ def test_comments_and_docstrings_do_not_change_the_hash_but_code_does(package):
     assert sources_hash.__wrapped__(package) != before
 
 
-def decorated(tree):
+def decorated(tree, decorators=frozenset(DECORATORS)):
     """Functions of a module that are compiled."""
     for node in tree.body:
         if isinstance(node, ast.FunctionDef) and any(
-                isinstance(each, ast.Name) and each.id in DECORATORS
+                isinstance(each, ast.Name) and each.id in decorators
                 for each in node.decorator_list):
             yield node
 
@@ -147,3 +149,29 @@ def test_every_kernel_is_compiled_by_the_decorators_of_kernel_py():
     direct = [path.name for path in PACKAGE.rglob('*.py')
               if 'njit' in path.read_text() and path.name != 'kernel.py']
     assert direct == []
+
+
+def test_an_inner_kernel_called_from_python_is_compiled_for_that_once(package):
+    code = 'from uav_task_alloc.solver.callee import callee; print(callee(1.0))'
+    assert output(package) == ('2.0', True)
+    assert output(package, code) == ('2.0', True)
+    assert output(package, code) == ('2.0', False)
+
+
+def test_python_code_of_the_package_calls_no_inner_kernel():
+    trees = {path: ast.parse(path.read_text()) for path in PACKAGE.rglob('*.py')}
+    names = {'.'.join(path.relative_to(PACKAGE.parent).with_suffix('').parts): {
+        each.name for each in decorated(tree, INNER)} for path, tree in trees.items()}
+    assert 'find_nearest' not in names['uav_task_alloc.solver.neighbours']
+    assert '_insert_sorted' in names['uav_task_alloc.solver.neighbours']
+    for path, tree in trees.items():
+        inner = {alias.asname or alias.name for node in tree.body
+                 if isinstance(node, ast.ImportFrom) for alias in node.names
+                 if alias.name in names.get(node.module, ())}
+        inner |= names['.'.join(path.relative_to(PACKAGE.parent).with_suffix('').parts)]
+        compiled = {node for each in decorated(tree) for node in ast.walk(each)}
+        compiled |= {node for each in tree.body if getattr(each, 'name', '') in CFUNCS
+                     for node in ast.walk(each)}
+        called = {node.func.id for node in ast.walk(tree) if isinstance(node, ast.Call)
+                  and isinstance(node.func, ast.Name) and node not in compiled}
+        assert called & inner == set(), path

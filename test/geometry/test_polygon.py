@@ -94,6 +94,14 @@ def test_a_polygon_is_simple_where_no_edges_meet_by_brute_force(corners):
     assert is_simple(corners[::-1]) == is_simple(corners)
 
 
+@pytest.fixture(scope='module')
+def compiled():
+    """Compiles the kernel before hypothesis limits the time of an example."""
+    packed = pack((ThreatZone.polygon('z', CONCAVE),))
+    in_polygon(packed.rows[0], 1.0, 5.0)
+
+
+@pytest.mark.usefixtures('compiled')
 @given(corner_lists.filter(lambda corners: is_simple(corners)), grid, grid)
 def test_kernels_and_python_agree_on_what_is_inside(corners, x, y):
     assume(signed_area(corners) > 0.0)

@@ -38,3 +38,19 @@ def test_a_tight_world_with_zones_finds_all_kernels_loaded():
     done = subprocess.run([sys.executable, '-c', SCRIPT], capture_output=True, text=True,
                           check=True)
     assert done.stdout == 'late:\n'
+
+
+NO_ZONES = """
+from uav_task_alloc.geometry import detour, distances, obstacles
+from uav_task_alloc.solver.solve import load_kernels
+
+load_kernels()
+for kernel in (detour.shortest_path, distances.stored_path, obstacles.containing_zones):
+    print(len(kernel.signatures))
+"""
+
+
+def test_without_zones_no_kernel_that_finds_paths_around_them_is_loaded():
+    done = subprocess.run([sys.executable, '-c', NO_ZONES], capture_output=True, text=True,
+                          check=True)
+    assert done.stdout.split() == ['0', '0', '0']

@@ -36,7 +36,7 @@ from uav_task_alloc.geometry.search_budget import CUT_SHORT, EXHAUSTED, MAX_UNIT
 from uav_task_alloc.geometry.shortest_path import path_clears
 from uav_task_alloc.geometry.table import LengthTable, invalidate
 from uav_task_alloc.geometry.taut import MAX_CORNERS
-from uav_task_alloc.kernel import allocating_kernel
+from uav_task_alloc.kernel import allocating_kernel, inner_allocating_kernel
 from uav_task_alloc.model import Leg, Point, ThreatZone
 
 DENSE_MAX = 2048  # points; the table takes 8 n^2 bytes
@@ -93,7 +93,7 @@ def length(pairs: Pairs, i: int, j: int) -> float:
     return math.sqrt(dx * dx + dy * dy + dz * dz)
 
 
-@allocating_kernel
+@inner_allocating_kernel
 def _search_length(pairs: Pairs, i: int, j: int, known: float) -> float:
     """Search for a length now; `known` is what an earlier search left that was cut short.
 
@@ -113,7 +113,7 @@ def _search_length(pairs: Pairs, i: int, j: int, known: float) -> float:
     return known if state[EXHAUSTED] != 0 else -1.0 - state[MAX_UNITS]
 
 
-@allocating_kernel
+@inner_allocating_kernel
 def _find_for_table(pairs: Pairs, i: int, j: int) -> float:
     """As `length`, where the table does not have it yet."""
     slot, table = ints_at(pairs.slot), floats_at(pairs.table)
@@ -126,7 +126,7 @@ def _find_for_table(pairs: Pairs, i: int, j: int) -> float:
     return found if found >= 0.0 else np.inf
 
 
-@allocating_kernel
+@inner_allocating_kernel
 def _find_for_cache(pairs: Pairs, i: int, j: int) -> float:
     """As `length`, with the cache instead of the table."""
     keys, lengths = ints_at(pairs.keys), floats_at(pairs.lengths)
@@ -176,7 +176,7 @@ def _store_length(pairs: Pairs, i: int, j: int, found: float) -> None:
         ints_at(pairs.keys)[place], floats_at(pairs.lengths)[place] = key, found
 
 
-@allocating_kernel
+@inner_allocating_kernel
 def length_via(pairs: Pairs, i: int, k: int, j: int) -> float:
     """Return the length of the path from i to j, or over point k where none is known.
 

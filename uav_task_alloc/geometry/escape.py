@@ -19,12 +19,12 @@ from uav_task_alloc.geometry.obstacles import (
     squared_segment_distance,
 )
 from uav_task_alloc.geometry.search_budget import spend
-from uav_task_alloc.kernel import allocating_kernel
+from uav_task_alloc.kernel import allocating_kernel, inner_allocating_kernel
 
 _DIRECTIONS = 24  # tried at first at each of two elevations: level and rising
 
 
-@allocating_kernel
+@inner_allocating_kernel
 def _depth(zone: Zone, x: float, y: float, z: float) -> float:
     """A lower bound [m] of the distance to the outside of a zone; <= 0: outside. O(corners)"""
     skin = 1.5 * zone.skin
@@ -44,7 +44,7 @@ def _depth(zone: Zone, x: float, y: float, z: float) -> float:
     return float(min(ends, edge + zone.grow + skin))
 
 
-@allocating_kernel
+@inner_allocating_kernel
 def _ray(zones: Zones, p: Floats, az: float, up: float, best: float, work: Ints) -> float:
     """Distance [m] along a ray at which the outside of all zones begins; inf: not before `best`.
 
@@ -70,7 +70,7 @@ def _ray(zones: Zones, p: Floats, az: float, up: float, best: float, work: Ints)
     return np.inf
 
 
-@allocating_kernel
+@inner_allocating_kernel
 def _try_direction(zones: Zones, p: Floats, az: float, up: float, limits: Floats,
                    best: Floats, work: Ints) -> bool:
     """Put the direction (az, up) [rad] into best (3,) = distance, az, up if it is nearer."""
@@ -84,7 +84,7 @@ def _try_direction(zones: Zones, p: Floats, az: float, up: float, limits: Floats
     return True
 
 
-@allocating_kernel
+@inner_allocating_kernel
 def _initial_directions(zones: Zones, p: Floats, limits: Floats, best: Floats,
                         work: Ints) -> None:
     """Try up, down, outwards of each zone around p, and a fan about the first."""

@@ -38,7 +38,7 @@ from uav_task_alloc.geometry.outline import (
     polygon_rim,
 )
 from uav_task_alloc.geometry.polygon import crosses_ray, segments_cross, signed_area
-from uav_task_alloc.kernel import allocating_kernel
+from uav_task_alloc.kernel import allocating_kernel, inner_allocating_kernel
 from uav_task_alloc.model import Shape, ThreatZone
 
 DOME, CYLINDER, PRISM = Shape.HEMISPHERE.value, Shape.CYLINDER.value, Shape.POLYGON.value
@@ -146,7 +146,7 @@ def _extent(zone: ThreatZone) -> tuple[tuple[float, float, float], float, float,
     return middle, math.hypot(max(xs) - min(xs), max(ys) - min(ys)) / 2, zone.z_min, zone.z_max
 
 
-@allocating_kernel
+@inner_allocating_kernel
 def box_distance(zone: Zone, x: float, y: float, z: float) -> float:
     """Distance [m] from a point to the box around a zone; 0.0 inside."""
     dx = max(zone.x0 - x, x - zone.x1, 0.0)
@@ -155,7 +155,7 @@ def box_distance(zone: Zone, x: float, y: float, z: float) -> float:
     return math.sqrt(dx * dx + dy * dy + dz * dz)
 
 
-@allocating_kernel
+@inner_allocating_kernel
 def squared_segment_distance(px: float, py: float, ax: float, ay: float, bx: float,
                              by: float) -> float:
     """Squared distance [m2] in plan view from p to the segment ab."""
@@ -168,7 +168,7 @@ def squared_segment_distance(px: float, py: float, ax: float, ay: float, bx: flo
     return ex * ex + ey * ey
 
 
-@allocating_kernel
+@inner_allocating_kernel
 def in_polygon(zone: Zone, x: float, y: float) -> bool:
     """Whether (x, y) [m] lies in the polygon without its margin; O(corners)."""
     odd = False
@@ -181,7 +181,7 @@ def in_polygon(zone: Zone, x: float, y: float) -> bool:
     return odd
 
 
-@allocating_kernel
+@inner_allocating_kernel
 def _meets_polygon(zone: Zone, ax: float, ay: float, bx: float, by: float,
                    reach: float) -> bool:
     """Whether ab comes nearer than `reach` [m] to the polygon in plan view; O(corners)."""
@@ -201,7 +201,7 @@ def _meets_polygon(zone: Zone, ax: float, ay: float, bx: float, by: float,
     return in_polygon(zone, ax, ay) or in_polygon(zone, (ax + bx) / 2, (ay + by) / 2)
 
 
-@allocating_kernel
+@inner_allocating_kernel
 def _clip(pz: float, qz: float, low: float, high: float) -> tuple[float, float]:
     """The part [s, t] of a segment strictly between two heights [m]; s >= t: none."""
     if pz == qz:
@@ -212,7 +212,7 @@ def _clip(pz: float, qz: float, low: float, high: float) -> tuple[float, float]:
     return max(0.0, s), min(1.0, t)
 
 
-@allocating_kernel
+@inner_allocating_kernel
 def _squared_centre_distance(zone: Zone, px: float, py: float, pz: float, dx: float, dy: float,
                              dz: float, s: float, t: float) -> float:
     """Squared distance [m2] from the centre to the part [s, t] of p + d."""
@@ -225,7 +225,7 @@ def _squared_centre_distance(zone: Zone, px: float, py: float, pz: float, dx: fl
     return float(fx * fx + fy * fy + fz * fz)
 
 
-@allocating_kernel
+@inner_allocating_kernel
 def _meets_dome(zone: Zone, px: float, py: float, pz: float, qx: float, qy: float,
                 qz: float, floor: float, skin: float) -> bool:
     """Whether the segment pq enters a dome, or the closed space beneath it."""

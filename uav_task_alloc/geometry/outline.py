@@ -9,7 +9,7 @@ from numba.extending import register_jitable
 from numpy.typing import NDArray
 
 from uav_task_alloc.geometry.polygon import crosses_ray, orientation, segments_cross
-from uav_task_alloc.kernel import allocating_kernel
+from uav_task_alloc.kernel import allocating_kernel, inner_allocating_kernel
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -18,7 +18,7 @@ for _predicate in (orientation, segments_cross, crosses_ray):  # so kernels may 
     register_jitable(_predicate)
 
 
-@allocating_kernel
+@inner_allocating_kernel
 def corner_turn(ax: float, ay: float, x: float, y: float, bx: float,
                 by: float) -> tuple[float, float]:
     """Heading [rad] from a to the corner (x, y), and the turn [rad] there towards b.
@@ -31,7 +31,7 @@ def corner_turn(ax: float, ay: float, x: float, y: float, bx: float,
     return heading, turn - 2 * math.pi * math.floor((turn + math.pi) / (2 * math.pi))
 
 
-@allocating_kernel
+@inner_allocating_kernel
 def _fan(x: float, y: float, radius: float, start: float, turn: float, parts: int, rim: Floats,
          n: int) -> int:
     """Write the polyline that circumscribes an arc into rim[n:]; returns the new n. O(parts)"""

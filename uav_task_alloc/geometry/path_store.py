@@ -15,7 +15,7 @@ from uav_task_alloc.geometry.numba_pointers import floats_at, ints_at
 from uav_task_alloc.geometry.obstacles import Floats
 from uav_task_alloc.geometry.points import copy_point
 from uav_task_alloc.geometry.taut import MAX_CORNERS
-from uav_task_alloc.kernel import allocating_kernel
+from uav_task_alloc.kernel import allocating_kernel, inner_allocating_kernel
 
 SLOTS = 1 << 16  # for paths; a power of two
 PROBES = 4  # slots that a path may take
@@ -37,7 +37,7 @@ class PathStore:
         return int(self._state.ctypes.data)
 
 
-@allocating_kernel
+@inner_allocating_kernel
 def _first_place(ends: Floats) -> int:
     """The first slot for a path with these ends (2, 3): a hash of them in 1/1024 m."""
     mixed: Any = np.int64(17)
@@ -48,7 +48,7 @@ def _first_place(ends: Floats) -> int:
     return int(mixed & (SLOTS - 1))
 
 
-@allocating_kernel
+@inner_allocating_kernel
 def _same(points: Floats, first: int, ends: Floats) -> bool:
     """Whether the path that begins in row `first` has these ends (2, 3)."""
     n = int(points[first, 0])
@@ -90,7 +90,7 @@ def store_path(address: int, path: Floats, n: int, ends: Floats) -> None:
     slots[slot] = first
 
 
-@allocating_kernel
+@inner_allocating_kernel
 def load_path(address: int, ends: Floats, path: Floats) -> int:
     """Copy the path between `ends` into `path`; O(n).
 

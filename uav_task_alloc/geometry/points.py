@@ -5,16 +5,16 @@ from __future__ import annotations
 import math
 
 from uav_task_alloc.geometry.outline import Floats
-from uav_task_alloc.kernel import kernel
+from uav_task_alloc.kernel import inner_kernel, kernel
 
 
-@kernel
+@inner_kernel
 def copy_point(source: Floats, i: int, to: Floats, j: int) -> None:
     """Set to[j] = source[i]; slices would do, but take a second each to compile."""
     to[j, 0], to[j, 1], to[j, 2] = source[i, 0], source[i, 1], source[i, 2]
 
 
-@kernel
+@inner_kernel
 def point_distance(p: Floats, i: int, q: Floats, j: int) -> float:
     """Distance [m] between p[i] and q[j]."""
     dx, dy, dz = p[i, 0] - q[j, 0], p[i, 1] - q[j, 1], p[i, 2] - q[j, 2]

@@ -18,7 +18,7 @@ from uav_task_alloc.geometry.points import copy_point, path_length
 from uav_task_alloc.geometry.search_budget import SearchBudget, is_exhausted, new_work
 from uav_task_alloc.geometry.shortest_path import path_clears, shortest_path
 from uav_task_alloc.geometry.taut import MAX_CORNERS
-from uav_task_alloc.kernel import allocating_kernel
+from uav_task_alloc.kernel import allocating_kernel, inner_allocating_kernel
 
 OUTSIDE, WITHIN_SKIN, INSIDE = 0, 1, 2
 LOCATION_INDEX, BUDGET_INDEX = 3, 7  # in scene_addresses
@@ -45,7 +45,7 @@ def make_scene(xyz: Floats, zones: Zones, limits: Floats, budget: SearchBudget,
     return PathScene(xyz, location, exits, limits, zones, budget.state, store.address)
 
 
-@allocating_kernel
+@inner_allocating_kernel
 def locate(zones: Zones, p: Floats) -> int:
     """Whether p (3,) is INSIDE a zone, WITHIN_SKIN of one or OUTSIDE all; O(zones)."""
     if first_containing(zones, p[0], p[1], p[2], False) < 0:
@@ -60,7 +60,7 @@ def _locate_all(zones: Zones, xyz: Floats, location: Ints) -> None:
         location[i] = locate(zones, xyz[i])
 
 
-@allocating_kernel
+@inner_allocating_kernel
 def _exit_point(scene: PathScene, i: int, work: Ints) -> Floats:
     """The escape point of point i, inside a zone; NaN: none, or the search was cut short."""
     if math.isinf(scene.exits[i, 0]):
@@ -78,7 +78,7 @@ def scene_addresses(scene: PathScene) -> Ints:
                      *(array.ctypes.data for array in scene[:6]), scene.store], np.int64)
 
 
-@allocating_kernel
+@inner_allocating_kernel
 def _scene_at(address: int) -> PathScene:
     """The scene whose `scene_addresses` are at an address."""
     at = ints_at(address)

@@ -17,7 +17,7 @@ import numpy as np
 
 from uav_task_alloc.geometry.numba_pointers import call_float, ints_at
 from uav_task_alloc.geometry.obstacles import Ints
-from uav_task_alloc.kernel import allocating_kernel
+from uav_task_alloc.kernel import allocating_kernel, inner_allocating_kernel
 
 UNCHECKED, EXHAUSTED, MAX_UNITS, CUT_SHORT, CLOCK = range(5)  # indices of the state
 _EVERY = 50_000  # units between two polls of the clock
@@ -90,7 +90,7 @@ class SearchBudget:
         return int(self.state[CUT_SHORT])
 
 
-@allocating_kernel
+@inner_allocating_kernel
 def is_exhausted(address: int) -> bool:
     """Whether the budget whose state is at an address (0: no limit) is exhausted."""
     return address != 0 and ints_at(address)[EXHAUSTED] != 0
@@ -104,7 +104,7 @@ def new_work(address: int) -> Ints:
     return work
 
 
-@allocating_kernel
+@inner_allocating_kernel
 def spend(work: Ints, units: int) -> bool:
     """Spend units of work; True where the search has to end. O(1) but for the poll."""
     if work[1] == 0:

@@ -14,7 +14,7 @@ from uav_task_alloc.geometry.search_budget import spend
 from uav_task_alloc.geometry.single_obstacle import keep_best, path_past_zone
 from uav_task_alloc.geometry.taut import MAX_CORNERS, tauten, zones_near
 from uav_task_alloc.geometry.visibility_graph import add_corners, add_level, astar, corner_bound
-from uav_task_alloc.kernel import allocating_kernel
+from uav_task_alloc.kernel import allocating_kernel, inner_allocating_kernel
 
 _RINGS = (12, 24, 64)  # corners around a zone; finer ones where no path was found
 FEW_ZONES = 2  # blocking zones up to which the first ring is fine enough
@@ -22,7 +22,7 @@ MANY_ZONES = 8  # blocking zones; among more, levels only of those beside a zone
 FIRST_SEARCHES = 5  # with the blocking zones only; then with those that overlap them
 
 
-@allocating_kernel
+@inner_allocating_kernel
 def next_blocking(zones: Zones, k: int, p: Floats, i: int, j: int, floor: float,
                   no_skin: bool) -> int:
     """Index of the first zone from k on that p[i] p[j] enters; zones.size: none. O(zones)"""
@@ -37,7 +37,7 @@ def next_blocking(zones: Zones, k: int, p: Floats, i: int, j: int, floor: float,
     return k
 
 
-@allocating_kernel
+@inner_allocating_kernel
 def mark_blocking(zones: Zones, p: Floats, i: int, j: int, floor: float, no_skin: bool,
                   blocking: Ints) -> int:
     """Mark the zones that p[i] p[j] enters in blocking (zones,); returns how many are new."""
@@ -49,7 +49,7 @@ def mark_blocking(zones: Zones, p: Floats, i: int, j: int, floor: float, no_skin
     return new
 
 
-@allocating_kernel
+@inner_allocating_kernel
 def _zones_beside(zones: Zones, active: Ints, k: int) -> Ints:
     """The other active zones in which corners of zone k may lie: within twice its box."""
     zone, found, n = zones[k], np.empty(active.size, np.int64), 0
@@ -63,7 +63,7 @@ def _zones_beside(zones: Zones, active: Ints, k: int) -> Ints:
     return found[:n]
 
 
-@allocating_kernel
+@inner_allocating_kernel
 def _levels(zones: Zones, among: Ints, zone: Zone) -> Floats:
     """Heights [m] between the ends of a zone at which others end, each once. O(among^2)"""
     found, n = np.empty(2 * among.size), 0
@@ -80,7 +80,7 @@ def _levels(zones: Zones, among: Ints, zone: Zone) -> Floats:
     return found[:n]
 
 
-@allocating_kernel
+@inner_allocating_kernel
 def _zone_corners(zones: Zones, k: int, levels: Floats, ends: Floats, limits: Floats, floor: float,
                   ring: int) -> Floats:
     """The corners of zone k, float64 (n, 3) [m], also at these levels."""
@@ -91,7 +91,7 @@ def _zone_corners(zones: Zones, k: int, levels: Floats, ends: Floats, limits: Fl
     return x[:n]
 
 
-@allocating_kernel
+@inner_allocating_kernel
 def _is_inside_any(zones: Zones, among: Ints, p: Floats, i: int, no_skin: bool) -> bool:
     """Whether p[i] is inside a zone with an index `among`. O(among)"""
     for m in range(among.size):
@@ -100,7 +100,7 @@ def _is_inside_any(zones: Zones, among: Ints, p: Floats, i: int, no_skin: bool) 
     return False
 
 
-@allocating_kernel
+@inner_allocating_kernel
 def _graph_corners(zones: Zones, active: Ints, ends: Floats, limits: Floats, floor: float,
                    no_skin: bool, ring: int, known: float, work: Ints) -> Floats:
     """Both ends, and the corners of active zones that a path of at most `known` [m] can touch.
@@ -134,7 +134,7 @@ def _graph_corners(zones: Zones, active: Ints, ends: Floats, limits: Floats, flo
     return x[:n]
 
 
-@allocating_kernel
+@inner_allocating_kernel
 def _add_overlapping(zones: Zones, blocking: Ints, before: Ints) -> None:
     """Mark as blocking also the zones that overlap those marked since `before`."""
     for k in range(zones.size):
@@ -147,7 +147,7 @@ def _add_overlapping(zones: Zones, blocking: Ints, before: Ints) -> None:
                     blocking[m] = 1
 
 
-@allocating_kernel
+@inner_allocating_kernel
 def _search(zones: Zones, ends: Floats, limits: Floats, floor: float, no_skin: bool, ring: int,
             known: float, blocking: Ints, out: Floats, work: Ints) -> int:
     """Write a clear, coarse path of at most `known` [m] into `out`; marks the zones it considers.

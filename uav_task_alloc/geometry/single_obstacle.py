@@ -16,26 +16,26 @@ from uav_task_alloc.geometry.numba_pointers import floats_at
 from uav_task_alloc.geometry.obstacles import CYLINDER, DOME, Floats, Zone
 from uav_task_alloc.geometry.points import copy_point, path_length
 from uav_task_alloc.geometry.polygon import orientation
-from uav_task_alloc.kernel import allocating_kernel
+from uav_task_alloc.kernel import inner_allocating_kernel
 
 ARC_GAIN = 1.5e-3  # share of the path by which an arc's polyline may be longer
 MAX_PARTS = 12  # corners of one arc
 SLIDE_ROUNDS = 10  # rounds in which both rim points of a path over the top converge
 
 
-@allocating_kernel
+@inner_allocating_kernel
 def _arc_corners(radius: float, arc: float, straight: float) -> int:
     """Corners for an arc [rad]: k of them make it about radius arc^3 / (12 k^2) longer."""
     excess = radius * arc ** 3 / (12.0 * ARC_GAIN * (straight + radius * arc))
     return min(MAX_PARTS, max(1, math.ceil(math.sqrt(excess)), math.ceil(arc)))
 
 
-@allocating_kernel
+@inner_allocating_kernel
 def _dot(u: Floats, v: Floats) -> float:
     return float(u[0] * v[0] + u[1] * v[1] + u[2] * v[2])
 
 
-@allocating_kernel
+@inner_allocating_kernel
 def _tangent_path(centre: Floats, radius: float, ends: Floats, flat: bool, out: Floats) -> int:
     """Tangent, arc, tangent around a ball, or a circle in plan view; 0: no such path."""
     u, v = np.empty(3), np.empty(3)
@@ -72,7 +72,7 @@ def _tangent_path(centre: Floats, radius: float, ends: Floats, flat: bool, out: 
     return k + 2
 
 
-@allocating_kernel
+@inner_allocating_kernel
 def _interpolate_heights(p: Floats, n: int) -> None:
     """Let z rise evenly with the length in plan view from p[0] to p[n - 1]. O(n)"""
     total = 0.0
@@ -84,7 +84,7 @@ def _interpolate_heights(p: Floats, n: int) -> None:
         p[i, 2] = p[0, 2] + (p[n - 1, 2] - p[0, 2]) * done / total
 
 
-@allocating_kernel
+@inner_allocating_kernel
 def _path_around_hull(rim: Floats, ends: Floats, side: float, out: Floats) -> int:
     """Path around one side (1: left) of a convex rim, by gift wrapping. O(n rim)"""
     copy_point(ends, 0, out, 0)
@@ -104,7 +104,7 @@ def _path_around_hull(rim: Floats, ends: Floats, side: float, out: Floats) -> in
     return 0
 
 
-@allocating_kernel
+@inner_allocating_kernel
 def _in_hull(hull: Floats, p: Floats) -> bool:
     """Whether p lies in a convex hull (n, 2), counter-clockwise, or on it. O(n)"""
     for i in range(hull.shape[0]):
@@ -114,7 +114,7 @@ def _in_hull(hull: Floats, p: Floats) -> bool:
     return True
 
 
-@allocating_kernel
+@inner_allocating_kernel
 def _crossed_edges(rim: Floats, ends: Floats) -> tuple[int, int, float, float]:
     """The first and last edge of a rim (n, 2) that a line crosses in plan view. O(n)
 
@@ -142,7 +142,7 @@ def _crossed_edges(rim: Floats, ends: Floats) -> tuple[int, int, float, float]:
     return enter, leave, s, t
 
 
-@allocating_kernel
+@inner_allocating_kernel
 def _rim_point(rim: Floats, edge: int, z: float, p: Floats, q: Floats, x: Floats) -> int:
     """Set x to the point on an edge of the rim at height z over which the path p x q is shortest.
 
@@ -169,14 +169,14 @@ def _rim_point(rim: Floats, edge: int, z: float, p: Floats, q: Floats, x: Floats
     return j if s > size else edge
 
 
-@allocating_kernel
+@inner_allocating_kernel
 def _outside_cylinder(zone: Zone, p: Floats) -> bool:
     """Whether p is outside a cylinder in plan view, though perhaps within its rim."""
     return bool(zone.kind == CYLINDER
                 and math.hypot(p[0] - zone.x, p[1] - zone.y) > zone.radius + zone.skin)
 
 
-@allocating_kernel
+@inner_allocating_kernel
 def _path_over_rim(zone: Zone, rim: Floats, z: float, side: float, ends: Floats,
                    out: Floats) -> int:
     """Path over the rim at height z (side 1), or beneath it (-1); 0: no such path."""
@@ -207,7 +207,7 @@ def _path_over_rim(zone: Zone, rim: Floats, z: float, side: float, ends: Floats,
     return n + 1
 
 
-@allocating_kernel
+@inner_allocating_kernel
 def _least_length_over(z: float, side: float, ends: Floats) -> float:
     """A lower bound [m] of the length of a path over (or beneath) height z."""
     up = max(0.0, side * (z - ends[0, 2])) + max(0.0, side * (z - ends[1, 2]))
@@ -215,7 +215,7 @@ def _least_length_over(z: float, side: float, ends: Floats) -> float:
                       max(up, abs(ends[1, 2] - ends[0, 2])))
 
 
-@allocating_kernel
+@inner_allocating_kernel
 def keep_best(trial: Floats, n: int, out: Floats, best: int) -> int:
     """Copy the path trial[:n] to `out` where it is shorter than out[:best]; returns its size."""
     if n == 0 or (best > 0 and path_length(trial, n) >= path_length(out, best)):
@@ -225,7 +225,7 @@ def keep_best(trial: Floats, n: int, out: Floats, best: int) -> int:
     return n
 
 
-@allocating_kernel
+@inner_allocating_kernel
 def path_past_zone(zone: Zone, ends: Floats, limits: Floats, floor: float,
                    out: Floats) -> int:
     """Write the shortest path that passes one zone into `out`; O(rim^2).

@@ -15,7 +15,7 @@ from uav_task_alloc.geometry.obstacles import (
     box_distance,
     contains,
 )
-from uav_task_alloc.kernel import allocating_kernel
+from uav_task_alloc.kernel import allocating_kernel, inner_allocating_kernel
 
 SPARE = 64  # rows for points to come
 _STRAIGHT = 1.0 + 1e-12  # a path is straight if its length is at most this times the distance
@@ -77,7 +77,7 @@ class LengthTable:
         self._slots = {key: s for s, key in enumerate(keep)}
 
 
-@allocating_kernel
+@inner_allocating_kernel
 def _touches(zone: Zone, p: Floats, q: Floats, known: float, near_p: float,
              near_q: float, added: bool) -> bool:
     """Whether a zone that was added or removed may change the known length of a path p q."""
@@ -91,7 +91,7 @@ def _touches(zone: Zone, p: Floats, q: Floats, known: float, near_p: float,
     return added and blocked(zone, p[0], p[1], p[2], q[0], q[1], q[2], min(p[2], q[2]), False)
 
 
-@allocating_kernel
+@inner_allocating_kernel
 def _invalidate_for(cells: Floats, places: Floats, used: int, zone: Zone,
                     added: bool) -> None:
     """As `invalidate`, for one zone; O(used^2)."""

@@ -13,7 +13,7 @@ import numpy as np
 from uav_task_alloc.geometry.obstacles import Floats, Ints, Zones, blocked, box_distance
 from uav_task_alloc.geometry.points import copy_point, path_length, point_distance
 from uav_task_alloc.geometry.search_budget import spend
-from uav_task_alloc.kernel import allocating_kernel
+from uav_task_alloc.kernel import inner_allocating_kernel
 
 MAX_CORNERS = 96  # of a path while it is shortened
 CUT_GAIN = 1e-3  # share of the length by which a further corner must shorten a path
@@ -21,7 +21,7 @@ PULL_GAIN = 5e-4  # the same for a further round of pulling
 PULL_WORK = 30  # tests of each zone near a corner that is pulled, about
 
 
-@allocating_kernel
+@inner_allocating_kernel
 def segment_clears(zones: Zones, near: Ints, px: float, py: float, pz: float, qx: float, qy: float,
                    qz: float, floor: float, no_skin: bool) -> bool:
     """Whether the segment pq enters none of the zones with indices `near`. O(near)"""
@@ -31,7 +31,7 @@ def segment_clears(zones: Zones, near: Ints, px: float, py: float, pz: float, qx
     return True
 
 
-@allocating_kernel
+@inner_allocating_kernel
 def zones_near(zones: Zones, among: Ints, p: Floats, i: int, j: int, length: float) -> Ints:
     """Those `among` the zones that a path of at most `length` [m] from p[i] to p[j] may meet."""
     near, n = np.empty(among.size, np.int64), 0
@@ -43,7 +43,7 @@ def zones_near(zones: Zones, among: Ints, p: Floats, i: int, j: int, length: flo
     return near[:n]
 
 
-@allocating_kernel
+@inner_allocating_kernel
 def drop_corners(zones: Zones, near: Ints, p: Floats, n: int, floor: float, no_skin: bool) -> int:
     """Remove every corner whose neighbours see each other; returns the new n. O(n^2 near)"""
     i = 1
@@ -59,7 +59,7 @@ def drop_corners(zones: Zones, near: Ints, p: Floats, n: int, floor: float, no_s
     return n
 
 
-@allocating_kernel
+@inner_allocating_kernel
 def _fits(zones: Zones, near: Ints, p: Floats, i: int, q: Floats, limits: Floats, floor: float,
           no_skin: bool) -> bool:
     """Whether corner i may move to q (3,)."""
@@ -74,7 +74,7 @@ def _fits(zones: Zones, near: Ints, p: Floats, i: int, q: Floats, limits: Floats
     return True
 
 
-@allocating_kernel
+@inner_allocating_kernel
 def _put(q: Floats, p: Floats, i: int, axes: Floats, t: float, turn: float, s: float) -> None:
     """q = the point t along the chord of corner i's neighbours, s off it, turned by `turn`."""
     c, d = math.cos(turn) * s, math.sin(turn) * s
@@ -82,7 +82,7 @@ def _put(q: Floats, p: Floats, i: int, axes: Floats, t: float, turn: float, s: f
         q[m] = p[i - 1, m] + t * axes[0, m] + c * axes[1, m] + d * axes[2, m]
 
 
-@allocating_kernel
+@inner_allocating_kernel
 def _axes(p: Floats, i: int, axes: Floats) -> tuple[float, float, float]:
     """Chord direction, direction off it to corner i, third axis; chord, foot and offset [m]."""
     chord = point_distance(p, i - 1, p, i + 1)
@@ -106,7 +106,7 @@ def _axes(p: Floats, i: int, axes: Floats) -> tuple[float, float, float]:
     return chord, foot, off
 
 
-@allocating_kernel
+@inner_allocating_kernel
 def _on_ellipse(chord: float, foot: float, off: float, t: float) -> float:
     """The offset [m] at t of a path as long as that over (foot, off); negative: none."""
     total = math.hypot(foot, off) + math.hypot(chord - foot, off)
@@ -115,7 +115,7 @@ def _on_ellipse(chord: float, foot: float, off: float, t: float) -> float:
     return 0.5 * math.sqrt(wide) if wide > 0.0 and across > 0.0 else -1.0
 
 
-@allocating_kernel
+@inner_allocating_kernel
 def _press(zones: Zones, near: Ints, p: Floats, i: int, axes: Floats, q: Floats, t: float,
            turn: float, s: float, limits: Floats, floor: float, no_skin: bool) -> float:
     """The least offset [m], from the valid one s inwards, at which corner i fits; bisection."""
@@ -130,7 +130,7 @@ def _press(zones: Zones, near: Ints, p: Floats, i: int, axes: Floats, q: Floats,
     return high
 
 
-@allocating_kernel
+@inner_allocating_kernel
 def pull(zones: Zones, near: Ints, p: Floats, i: int, limits: Floats, floor: float, no_skin: bool,
          rounds: int) -> None:
     """Move corner i to where both its legs are shortest: inwards, along and around its chord.
@@ -166,7 +166,7 @@ def pull(zones: Zones, near: Ints, p: Floats, i: int, limits: Floats, floor: flo
     p[i, 0], p[i, 1], p[i, 2] = q[0], q[1], q[2]
 
 
-@allocating_kernel
+@inner_allocating_kernel
 def pull_all(zones: Zones, near: Ints, p: Floats, n: int, limits: Floats, floor: float,
              no_skin: bool, rounds: int, work: Ints) -> int:
     """Drop and pull corners until a round gains less than PULL_GAIN; returns the new n."""
@@ -184,7 +184,7 @@ def pull_all(zones: Zones, near: Ints, p: Floats, n: int, limits: Floats, floor:
     return n
 
 
-@allocating_kernel
+@inner_allocating_kernel
 def _cut(zones: Zones, near: Ints, p: Floats, i: int, limits: Floats, floor: float,
          no_skin: bool) -> float:
     """The distance [m] from corner i, on both its legs, at which the corner can be cut off."""
@@ -207,7 +207,7 @@ def _cut(zones: Zones, near: Ints, p: Floats, i: int, limits: Floats, floor: flo
     return low
 
 
-@allocating_kernel
+@inner_allocating_kernel
 def _chord(p: Floats, i: int, before: float, after: float) -> float:
     """Distance [m] of the points 1 m before and after corner i, on legs of these lengths."""
     total = 0.0
@@ -217,7 +217,7 @@ def _chord(p: Floats, i: int, before: float, after: float) -> float:
     return math.sqrt(total)
 
 
-@allocating_kernel
+@inner_allocating_kernel
 def cut_corners(zones: Zones, near: Ints, p: Floats, n: int, limits: Floats, floor: float,
                 no_skin: bool) -> int:
     """Replace a corner by two where that shortens the path enough; returns the new n."""
@@ -243,7 +243,7 @@ def cut_corners(zones: Zones, near: Ints, p: Floats, n: int, limits: Floats, flo
     return n
 
 
-@allocating_kernel
+@inner_allocating_kernel
 def tauten(zones: Zones, near: Ints, p: Floats, n: int, limits: Floats, floor: float,
            no_skin: bool, work: Ints) -> int:
     """Shorten the clear path p[:n] in place and keep it clear.

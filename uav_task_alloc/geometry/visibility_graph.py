@@ -22,12 +22,12 @@ from uav_task_alloc.geometry.outline import corner_turn
 from uav_task_alloc.geometry.points import point_distance
 from uav_task_alloc.geometry.polygon import orientation
 from uav_task_alloc.geometry.search_budget import spend
-from uav_task_alloc.kernel import allocating_kernel, inline_kernel
+from uav_task_alloc.kernel import inline_kernel, inner_allocating_kernel
 
 FEW_CORNERS = 160  # up to here edges are tested as late as possible
 
 
-@allocating_kernel
+@inner_allocating_kernel
 def corner_bound(zone: Zone, ring: int, levels: int) -> int:
     """An upper bound of the corners from a zone, with those at `levels` further heights."""
     if zone.kind == PRISM:
@@ -35,7 +35,7 @@ def corner_bound(zone: Zone, ring: int, levels: int) -> int:
     return (4 + levels) * ring + 1
 
 
-@allocating_kernel
+@inner_allocating_kernel
 def _height(ends: Floats, x: float, y: float) -> float:
     """z [m] of the straight path between `ends` where (x, y) is nearest to it in plan view."""
     dx, dy = ends[1, 0] - ends[0, 0], ends[1, 1] - ends[0, 1]
@@ -46,7 +46,7 @@ def _height(ends: Floats, x: float, y: float) -> float:
     return float(ends[0, 2] + t * (ends[1, 2] - ends[0, 2]))
 
 
-@allocating_kernel
+@inner_allocating_kernel
 def _heading(zone: Zone, ends: Floats) -> tuple[float, float]:
     """Direction of the path in plan view, so that corners built on it turn with the scene."""
     dx, dy = ends[1, 0] - ends[0, 0], ends[1, 1] - ends[0, 1]
@@ -57,7 +57,7 @@ def _heading(zone: Zone, ends: Floats) -> tuple[float, float]:
     return (dx / size, dy / size) if size > 0.0 else (1.0, 0.0)
 
 
-@allocating_kernel
+@inner_allocating_kernel
 def _ring(zone: Zone, ends: Floats, limits: Floats, radius: float, z: float, ring: int,
           out: Floats, n: int) -> int:
     """Write `ring` corners around the axis of a zone at height z (NaN: that of the path)."""
@@ -80,7 +80,7 @@ def _ring(zone: Zone, ends: Floats, limits: Floats, radius: float, z: float, rin
     return n
 
 
-@allocating_kernel
+@inner_allocating_kernel
 def _dome_corners(zone: Zone, ends: Floats, limits: Floats, floor: float, ring: int,
                   out: Floats, n: int) -> int:
     """Write the corners around a dome into out[n:]; returns the new n."""
@@ -100,7 +100,7 @@ def _dome_corners(zone: Zone, ends: Floats, limits: Floats, floor: float, ring: 
     return n
 
 
-@allocating_kernel
+@inner_allocating_kernel
 def _crossing(ends: Floats, px: float, py: float, qx: float, qy: float) -> float:
     """Where along pq, in 0..1, the straight path crosses it in plan view; NaN: nowhere."""
     a, b = (ends[0, 0], ends[0, 1]), (ends[1, 0], ends[1, 1])
@@ -108,7 +108,7 @@ def _crossing(ends: Floats, px: float, py: float, qx: float, qy: float) -> float
     return sp / (sp - sq) if sp * sq < 0.0 else np.nan
 
 
-@allocating_kernel
+@inner_allocating_kernel
 def _edge_corners(zone: Zone, ends: Floats, z: float, reach: float, out: Floats,
                   n: int) -> int:
     """Write each edge's middle and crossing with the path, on a rim of the prism."""
@@ -127,7 +127,7 @@ def _edge_corners(zone: Zone, ends: Floats, z: float, reach: float, out: Floats,
     return n
 
 
-@allocating_kernel
+@inner_allocating_kernel
 def _prism_corners(zone: Zone, ends: Floats, limits: Floats, z: float, out: Floats,
                    n: int) -> int:
     """Write mitred corners at a prism's convex corners, at height z (NaN: the path's)."""
@@ -152,7 +152,7 @@ def _prism_corners(zone: Zone, ends: Floats, limits: Floats, z: float, out: Floa
     return n
 
 
-@allocating_kernel
+@inner_allocating_kernel
 def add_corners(zone: Zone, ends: Floats, limits: Floats, floor: float, ring: int,
                 out: Floats, n: int) -> int:
     """Write the corners of a zone for a path between `ends` into out[n:]; O(corner_bound).
@@ -185,7 +185,7 @@ def add_corners(zone: Zone, ends: Floats, limits: Floats, floor: float, ring: in
     return n
 
 
-@allocating_kernel
+@inner_allocating_kernel
 def add_level(zone: Zone, ends: Floats, limits: Floats, z: float, ring: int, out: Floats,
               n: int) -> int:
     """Write corners at the height z [m] where another zone ends; returns the new n."""
@@ -200,7 +200,7 @@ def add_level(zone: Zone, ends: Floats, limits: Floats, z: float, ring: int, out
     return _ring(zone, ends, limits, radius, z, ring, out, n)
 
 
-@allocating_kernel
+@inner_allocating_kernel
 def _boxes(zones: Zones, active: Ints) -> Floats:
     """x0, x1, y0, y1 of the active zones, float64 (active, 4), side by side in memory."""
     boxes = np.empty((active.size, 4))
@@ -210,7 +210,7 @@ def _boxes(zones: Zones, active: Ints) -> Floats:
     return boxes
 
 
-@allocating_kernel
+@inner_allocating_kernel
 def _is_visible(zones: Zones, active: Ints, boxes: Floats, x: Floats, i: int, j: int, floor: float,
                 no_skin: bool) -> bool:
     """Whether the segment x[i] x[j] enters no active zone. O(active)"""
@@ -224,7 +224,7 @@ def _is_visible(zones: Zones, active: Ints, boxes: Floats, x: Floats, i: int, j:
     return True
 
 
-@allocating_kernel
+@inner_allocating_kernel
 def _next_parent(x: Floats, cost: Floats, closed: Ints, done: int, v: int,
                  failed: int) -> tuple[float, int]:
     """The next best path to v over a closed corner, after the one that failed."""
@@ -238,7 +238,7 @@ def _next_parent(x: Floats, cost: Floats, closed: Ints, done: int, v: int,
     return best, parent
 
 
-@allocating_kernel
+@inner_allocating_kernel
 def _nearest_open(cost: Floats, ahead: Floats, state: Any) -> int:
     """The open corner with the least bound on the whole path; -1: none. O(n)"""
     v, best = -1, np.inf
@@ -258,7 +258,7 @@ def _follow(parent: Ints, path: Ints) -> int:
     return size
 
 
-@allocating_kernel
+@inner_allocating_kernel
 def astar(zones: Zones, active: Ints, x: Floats, floor: float, no_skin: bool, path: Ints,
           work: Ints) -> int:
     """Find the shortest path from x[0] to x[1] over corners x past the active zones.

@@ -7,7 +7,12 @@ import math
 
 import numpy as np
 
-from uav_task_alloc.kernel import allocating_kernel, inline_kernel, kernel
+from uav_task_alloc.kernel import (
+    allocating_kernel,
+    inline_kernel,
+    inner_allocating_kernel,
+    inner_kernel,
+)
 from uav_task_alloc.solver.rng import RngState, uniform
 from uav_task_alloc.solver.routes import (
     SIGNED,
@@ -78,7 +83,7 @@ def best_near_place(a: Arrays, r: Routes, t: int, k: int, blinks: float,
     return best, least
 
 
-@kernel
+@inner_kernel
 def best_place(a: Arrays, r: Routes, t: int) -> tuple[int, float]:
     """The cheapest place in all routes: (node before or -1, cost [m]). O(n)."""
     best, least = -1, np.inf
@@ -148,7 +153,7 @@ def insert_by_auction(a: Arrays, r: Routes, noise: float, rng: RngState) -> None
         _renew_bids(a, r, t, heap)
 
 
-@allocating_kernel
+@inner_allocating_kernel
 def _renew_bids(a: Arrays, r: Routes, t: int, heap: list[tuple[float, int]]) -> None:
     """Push new bids of unassigned neighbours of t, which was just inserted. O(log n)."""
     for m in range(min(12, a.near.shape[1])):

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from uav_task_alloc.kernel import allocating_kernel, kernel
+from uav_task_alloc.kernel import inner_allocating_kernel, inner_kernel
 from uav_task_alloc.solver.pool import Pool
 from uav_task_alloc.solver.routes import TINY, Arrays, Floats, Ints
 
@@ -27,7 +27,7 @@ class Reduced(NamedTuple):
     unassigned: Floats  # (m + n) of not serving a task, by node
 
 
-@kernel
+@inner_kernel
 def _bound(a: Arrays, pool: Pool, price: Floats, reduced: Floats, least: Floats,
            chosen: Ints) -> float:
     """Lower bound [m] for these multipliers. O(stops of the pool).
@@ -52,7 +52,7 @@ def _bound(a: Arrays, pool: Pool, price: Floats, reduced: Floats, least: Floats,
     return bound
 
 
-@allocating_kernel
+@inner_allocating_kernel
 def _first_prices(a: Arrays, pool: Pool, flown: Ints) -> Floats:
     """First multipliers by node: the costs of the columns flown, split among their tasks. O(n)."""
     price = np.zeros(a.ends)
@@ -65,7 +65,7 @@ def _first_prices(a: Arrays, pool: Pool, flown: Ints) -> Floats:
     return price
 
 
-@kernel
+@inner_kernel
 def _count(pool: Pool, chosen: Ints, served: Ints) -> None:
     """Write to `served` how many of the chosen columns contain each node. O(n)."""
     served[:] = 0
@@ -75,7 +75,7 @@ def _count(pool: Pool, chosen: Ints, served: Ints) -> None:
                 served[pool.stops[i]] += 1
 
 
-@allocating_kernel
+@inner_allocating_kernel
 def reduced_costs(a: Arrays, pool: Pool, flown: Ints, worth: float,
                   work: float) -> tuple[Reduced, float]:
     """Reduced costs for a high lower bound [m], and that bound. O(work).

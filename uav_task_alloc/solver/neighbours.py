@@ -6,14 +6,20 @@ import math
 
 import numpy as np
 
-from uav_task_alloc.kernel import allocating_kernel, inline_kernel, kernel
+from uav_task_alloc.kernel import (
+    allocating_kernel,
+    inline_kernel,
+    inner_allocating_kernel,
+    inner_kernel,
+    kernel,
+)
 from uav_task_alloc.solver.rng import RngState, below, uniform
 from uav_task_alloc.solver.routes import TINY, Arrays, Floats, Ints, leg_length
 
 _NOISE = 4096  # random numbers drawn once; each task reads them from a random offset
 
 
-@allocating_kernel
+@inner_allocating_kernel
 def _cells(xyz: Floats, per_cell: float) -> tuple[Ints, Ints, Ints, Floats]:
     """Points (n, 3) sorted into square cells, O(n).
 
@@ -38,7 +44,7 @@ def _cells(xyz: Floats, per_cell: float) -> tuple[Ints, Ints, Ints, Floats]:
     return cell, first, order, np.array((x0, y0, side))
 
 
-@kernel
+@inner_kernel
 def _insert_sorted(ids: Ints, squares: Floats, kept: int, j: int, square: float) -> int:
     """Insert j into the first `kept` ids, nearest first; returns how many are kept now. O(k)."""
     k = ids.size

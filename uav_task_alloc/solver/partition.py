@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from uav_task_alloc.kernel import allocating_kernel, inline_kernel
+from uav_task_alloc.kernel import inline_kernel, inner_allocating_kernel
 from uav_task_alloc.solver.multipliers import Reduced
 from uav_task_alloc.solver.pool import Pool
 from uav_task_alloc.solver.routes import TINY, Floats, Ints
@@ -39,7 +39,7 @@ class Choices(NamedTuple):
     uav_used: Flags  # by UAV
 
 
-@allocating_kernel
+@inner_allocating_kernel
 def _candidates(pool: Pool, reduced: Reduced, group: Flags, tasks: Ints, spare: float) -> Ints:
     """Columns of a group that serve only its tasks, least reduced cost first. O(stops of pool)."""
     inside = np.zeros(reduced.unassigned.size, np.bool_)
@@ -58,7 +58,7 @@ def _candidates(pool: Pool, reduced: Reduced, group: Flags, tasks: Ints, spare: 
     return columns[np.argsort(reduced.column[columns])]
 
 
-@allocating_kernel
+@inner_allocating_kernel
 def _branches(pool: Pool, columns: Ints, tasks: Ints, nodes: int) -> Branches:
     """Sort columns by task. O(stops of the columns)."""
     begin = np.zeros(nodes + 1, np.int64)
@@ -142,7 +142,7 @@ def _store_choices(pool: Pool, group: Flags, b: Branches, chosen: Choices, depth
                 uav_of[pool.stops[i]] = pool.uav[e]
 
 
-@allocating_kernel
+@inner_allocating_kernel
 def _branch_and_bound(pool: Pool, reduced: Reduced, group: Flags, b: Branches, spare: float,
                       limit: int, flown: Ints, uav_of: Ints) -> tuple[bool, int]:
     """See `repartition`; `spare` [m] is the current reduced cost. O(limit stops)."""
@@ -178,7 +178,7 @@ def _branch_and_bound(pool: Pool, reduced: Reduced, group: Flags, b: Branches, s
     return improved, tried
 
 
-@allocating_kernel
+@inner_allocating_kernel
 def repartition(pool: Pool, reduced: Reduced, group: Flags, tasks: Ints, limit: int,
                 flown: Ints, uav_of: Ints) -> tuple[bool, int]:
     """Choose the cheapest columns for a group of UAVs and its tasks.

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from uav_task_alloc.kernel import inline_kernel, kernel
+from uav_task_alloc.kernel import inline_kernel, inner_kernel
 from uav_task_alloc.solver.routes import NODE, TINY, Arrays, Floats, Ints, Nodes, Routes
 
 MAX_COLUMNS, MAX_STOPS = 1 << 14, 1 << 18  # capacity; a full pool is emptied
@@ -84,7 +84,7 @@ def _new_column(pool: Pool, tasks: int) -> int:
     return int(e)
 
 
-@kernel
+@inner_kernel
 def collect(a: Arrays, r: Routes, pool: Pool) -> None:
     """Add the routes that are allowed to be flown to the pool. O(n)."""
     for u in range(a.uavs):

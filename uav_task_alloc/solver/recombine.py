@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from uav_task_alloc.kernel import allocating_kernel
+from uav_task_alloc.kernel import allocating_kernel, inner_allocating_kernel
 from uav_task_alloc.solver.multipliers import reduced_costs
 from uav_task_alloc.solver.partition import Flags, repartition
 from uav_task_alloc.solver.pool import Pool, collect, column_of
@@ -26,7 +26,7 @@ MAX_TRIES = 20_000  # columns tried in a group at most
 TRY_COST = 4.0  # work of a try, in stops read
 
 
-@allocating_kernel
+@inner_allocating_kernel
 def _group(a: Arrays, pool: Pool, uav_of: Ints, flown: Ints, seed: int) -> Flags:
     """The UAVs with routes nearest to that of one UAV, which is included: (m) bool. O(n)."""
     in_group, adjacency = np.zeros(a.uavs, np.bool_), np.zeros(a.uavs, np.int64)
@@ -45,7 +45,7 @@ def _group(a: Arrays, pool: Pool, uav_of: Ints, flown: Ints, seed: int) -> Flags
     return in_group
 
 
-@allocating_kernel
+@inner_allocating_kernel
 def _tasks_of(a: Arrays, uav_of: Ints, group: Flags) -> Ints:
     """Task nodes that a group of UAVs serves, and adjacent unassigned ones. O(n)."""
     in_group = np.zeros(a.ends, np.bool_)
@@ -59,7 +59,7 @@ def _tasks_of(a: Arrays, uav_of: Ints, group: Flags) -> Ints:
     return np.flatnonzero(in_group)
 
 
-@allocating_kernel
+@inner_allocating_kernel
 def _improve(a: Arrays, pool: Pool, work: float, flown: Ints, uav_of: Ints) -> bool:
     """Repartition the groups around each UAV while the cost falls; whether it did. O(work)."""
     worth = 0.0

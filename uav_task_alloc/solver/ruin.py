@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from uav_task_alloc.kernel import inline_kernel, kernel
+from uav_task_alloc.kernel import inline_kernel, inner_kernel
 from uav_task_alloc.solver.insertion import best_near_place, best_place
 from uav_task_alloc.solver.rng import RngState, below, uniform
 from uav_task_alloc.solver.routes import (
@@ -101,7 +101,7 @@ def _remove_string(a: Arrays, r: Routes, log: RuinLog, c: int, size: int, rng: R
         t = then
 
 
-@kernel
+@inner_kernel
 def list_unassigned_and_overrange(a: Arrays, r: Routes, log: RuinLog) -> None:
     """List unassigned tasks and routes beyond range; raise the cost of few tasks. O(m + n)."""
     log.counts[2] = log.counts[3] = 0

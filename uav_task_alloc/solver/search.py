@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from uav_task_alloc.kernel import kernel
+from uav_task_alloc.kernel import inner_kernel, kernel
 from uav_task_alloc.solver.pool import Pool, collect
 from uav_task_alloc.solver.rng import RngState, uniform
 from uav_task_alloc.solver.routes import (
@@ -26,7 +26,7 @@ PENALTY_GROWTH, PENALTY_DECAY = 1.2, 0.9  # factors of a range penalty at each u
 PENALTY_UPDATES = 8  # updates in as many rounds as there are tasks
 
 
-@kernel
+@inner_kernel
 def _update_penalties(a: Arrays, r: Routes, log: RuinLog, pool: Pool) -> int:
     """Adapt penalties and costs of unassigned tasks; returns rounds to the next update. O(n)."""
     if a.hard:  # high enough that routes return into range, low enough to pass through

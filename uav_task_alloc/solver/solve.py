@@ -136,5 +136,6 @@ def load_kernels(solver: str = 'chain_q', zones: bool = False) -> None:
     to_plan(problem, recorder, '', False)
     place_all(problem.arrays, recorder.best, np.empty(0, np.int64))  # these two are only called
     trim_to_range(problem.arrays, recorder.best)  # where ranges do not suffice
-    problem.distances.offer_path(0, len(uavs), ())
-    find_detour(tasks[1].position, uavs[1].position, between, budget=search.path_budget)
+    if zones:
+        problem.distances.offer_path(0, len(uavs), ())
+        find_detour(tasks[1].position, uavs[1].position, between, budget=search.path_budget)

@@ -31,7 +31,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uav_task_alloc.errors import InvalidValue
-from uav_task_alloc.kernel import inline_kernel, kernel
+from uav_task_alloc.kernel import inline_kernel, inner_kernel, kernel
 from uav_task_alloc.solver.baselines.judging import penalised_fit
 from uav_task_alloc.solver.baselines.leg_lengths import place_rest
 from uav_task_alloc.solver.recorder import Recorder
@@ -98,7 +98,7 @@ def rank_coefficients(bees: int, decay: float) -> Floats:
     return weights
 
 
-@kernel
+@inner_kernel
 def probabilities(q: Floats, open_: NDArray[np.bool_], p: Floats) -> bool:
     """Write to p the probability of each open choice (eq 2.9, 2.10); whether one is open. O(n)."""
     total = 0.0
@@ -128,7 +128,7 @@ def _draw(p: Floats, greedy_rate: float, rng: RngState) -> int:
     return best
 
 
-@kernel
+@inner_kernel
 def _open_tasks(a: Arrays, r: Routes, u: int, open_: NDArray[np.bool_]) -> None:
     """Write to open_ (n) the tasks that UAV u may append: unvisited, allowed, in range. O(n)."""
     last = r.prev[a.ends + u]
@@ -140,7 +140,7 @@ def _open_tasks(a: Arrays, r: Routes, u: int, open_: NDArray[np.bool_]) -> None:
             open_[t] = lengthening_cost(a, r, u, more) < np.inf
 
 
-@kernel
+@inner_kernel
 def fly_bee(a: Arrays, r: Routes, uavs: Ints, tasks: Ints, q: Chains, greedy_rate: float,
             scratch: Scratch, rng: RngState) -> int:
     """Construct the chains of one bee; returns the number of steps. O(n (n + m))."""
