@@ -1,6 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """Map and layout of the live page in a real browser, at the sizes of a desk and a phone."""
+import io
 import math
+import re
+import threading
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from typing import ClassVar
 
 import chromium
 import matplotlib.image
@@ -17,6 +22,8 @@ SIZES = pytest.mark.parametrize('size', [DESK, PHONE], ids=['desk', 'phone'])
 ORIGIN = {'kind': 'origin', 'wall': BEGIN, 'latitude': 47.397742, 'longitude': 8.545594,
           'altitude_amsl': 488.0}
 BLUE = '#0072b2'  # of the first UAV, in the light theme
+GREEN = np.full((256, 256, 3), (0.0, 0.5, 0.0))  # a tile
+UNDER_THE_VEIL = '#59ac59'  # the same on the map, under white
 
 
 @pytest.fixture
@@ -217,9 +224,7 @@ def test_tiles_lie_where_they_belong_and_missing_ones_do_no_harm(shown, tmp_path
     row = int(n * (1.0 - math.asinh(math.tan(math.radians(lat))) / math.pi) / 2.0)
     folder = tmp_path / 'tiles/16' / str(column)
     folder.mkdir(parents=True)
-    green = np.zeros((256, 256, 3))
-    green[..., 1] = 0.5
-    matplotlib.image.imsave(folder / f'{row}.png', green)
+    matplotlib.image.imsave(folder / f'{row}.png', GREEN)
     origin = Origin(lat, lon, ORIGIN['altitude_amsl'])
 
     def corner(x, y):
@@ -231,11 +236,10 @@ def test_tiles_lie_where_they_belong_and_missing_ones_do_no_harm(shown, tmp_path
                     state(BEGIN, 'u2', (east + 100.0, north + 100.0)))
     page = shown(run, DESK, tile_source(str(tmp_path / 'tiles'), '(c) nobody'))
     chromium.wait(page, '#map-foot', '(c) nobody')
-    seen = '#59ac59'  # under a veil of white
     page.wait_for_function('performance.getEntriesByType("resource").some('
                            'entry => entry.name.includes("/tiles/16/"))')
-    image = wait_for_pixels(page, seen)
-    rows, columns = np.nonzero(near(image, seen))
+    image = wait_for_pixels(page, UNDER_THE_VEIL)
+    rows, columns = np.nonzero(near(image, UNDER_THE_VEIL))
     x, y, scale = (float(v) for v in page.get_attribute('#map', 'data-view').split())
     height, width = image.shape[:2]
     expected = [width / 2 + (west - x) * scale, width / 2 + (east - x) * scale,
@@ -268,3 +272,33 @@ def test_ages_are_in_the_time_of_the_run(shown, speedup, words):
     page = shown(Run(speedup).add(*FIRST).add(*LATER[1:]), DESK)
     chromium.wait(page, '#uavs', words)
     assert (f'at {speedup:g} × real time' in text(page, 'header')) == (speedup != 1.0)
+
+
+class TileServer(BaseHTTPRequestHandler):
+    """Any tile of another server: green; keeps the path and the referrer of each request."""
+
+    asked: ClassVar[list] = []
+
+    def do_GET(self):
+        self.asked.append((self.path, self.headers.get('Referer')))
+        png = io.BytesIO()
+        matplotlib.image.imsave(png, GREEN, format='png')
+        self.send_response(200)
+        self.send_header('Content-Type', 'image/png')
+        self.end_headers()
+        self.wfile.write(png.getvalue())
+
+    def log_message(self, *_):
+        pass
+
+
+def test_tiles_of_another_server_are_loaded_by_the_browser(shown, run):
+    with ThreadingHTTPServer(('127.0.0.1', 0), TileServer) as other:
+        threading.Thread(target=other.serve_forever, daemon=True).start()
+        place = f'http://127.0.0.1:{other.server_port}'
+        page = shown(run.add(ORIGIN), DESK, tile_source(place + '/t/{z}/{x}/{y}.png?key=1'))
+        assert share(wait_for_pixels(page, UNDER_THE_VEIL), UNDER_THE_VEIL) > 0.5
+        other.shutdown()
+    path, referrer = TileServer.asked[0]
+    assert re.fullmatch(r'/t/[0-9]+/[0-9]+/[0-9]+\.png\?key=1', path)
+    assert referrer.startswith('http://127.0.0.1:')  # tile servers refuse requests without

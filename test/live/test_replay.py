@@ -1,10 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
 import json
+import signal
+import subprocess
+import sys
 
 import pytest
 from small_run import BEGIN, FIRST, LATER
 
-from uav_task_alloc.live.__main__ import play
+from uav_task_alloc.live.__main__ import main, play
 from uav_task_alloc.record.run_state import RECORD_FILE
 
 
@@ -32,3 +35,40 @@ def test_a_record_is_shown_until_a_moment(folder):
 def test_a_folder_without_record_is_an_error(tmp_path):
     with pytest.raises(OSError, match=RECORD_FILE):
         play(tmp_path)
+
+
+@pytest.mark.parametrize(('text', 'expected'), [
+    ('', 'expected a record with a line at least'), ('no json\n', 'expected a record (JSON'),
+    ('{"wall": 1.0}\n', 'expected a record (KeyError'), ('[]\n', 'expected a record (TypeError'),
+    ('{"wall": 1.0, "kind": "toast"}\n', 'expected a record (AttributeError')])
+def test_a_file_that_is_no_record_ends_with_one_line(tmp_path, text, expected):
+    (tmp_path / RECORD_FILE).write_text(text)
+    with pytest.raises(SystemExit) as end:
+        main([str(tmp_path)])
+    assert f"file = '{tmp_path / RECORD_FILE}': {expected}" in str(end.value)
+    assert '\n' not in str(end.value)
+
+
+@pytest.mark.parametrize(('arguments', 'expected'), [
+    (['/no/such'], '/no/such/record.jsonl: No such file or directory'),
+    (['FOLDER', '--tiles', '/no/tiles'], "tiles = '/no/tiles': expected a folder"),
+    (['FOLDER', '--host', '192.0.2.1'], '--host 192.0.2.1 --port 0: ')])
+def test_what_cannot_be_served_ends_with_one_line(folder, arguments, expected):
+    with pytest.raises(SystemExit) as end:
+        main([str(folder) if name == 'FOLDER' else name for name in arguments])
+    assert str(end.value).startswith(expected)
+
+
+def test_a_replay_without_aiohttp_says_what_to_install(folder, monkeypatch):
+    monkeypatch.setitem(sys.modules, 'aiohttp', None)
+    monkeypatch.delitem(sys.modules, 'uav_task_alloc.live.server', raising=False)
+    with pytest.raises(SystemExit, match=r'uav_task_alloc\[view\]'):
+        main([str(folder)])
+
+
+def test_a_replay_serves_until_ctrl_c(folder):
+    with subprocess.Popen([sys.executable, '-m', 'uav_task_alloc.live', str(folder)], text=True,
+                          stdout=subprocess.PIPE, stderr=subprocess.STDOUT) as process:
+        assert process.stdout.readline().startswith(f'Page of {folder}: http://127.0.0.1:')
+        process.send_signal(signal.SIGINT)
+        assert (process.wait(20), process.stdout.read()) == (130, '')

@@ -15,10 +15,9 @@ from typing import Final
 
 from aiohttp import web
 
-from uav_task_alloc.live.snapshot_store import SnapshotStore
+from uav_task_alloc.live.snapshot_store import UPDATE_PERIOD, SnapshotStore
 from uav_task_alloc.live.tiles import TileSource
 
-UPDATE_PERIOD = 0.5  # [s] between two events of a stream
 MAX_STREAMS = 32
 PAGE_FILES = {'/': ('index.html', 'text/html'), '/live.css': ('live.css', 'text/css'),
         **{f'/{name}.js': (f'{name}.js', 'text/javascript')

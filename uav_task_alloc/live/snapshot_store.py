@@ -11,6 +11,7 @@ from itertools import islice
 from typing import Any
 
 HISTORY_LIMIT = 64 * 2**20  # [bytes] of compressed past values; the oldest are dropped first
+UPDATE_PERIOD = 0.5  # [s] between two updates of a page
 MAX_LOG_ENTRIES = 1000  # of each log
 _FAST = 1  # zlib level
 
