@@ -233,7 +233,11 @@ def test_the_help_has_a_sentence_and_the_default_of_each_option(words, monkeypat
     for action in actions:
         if action.option_strings and not isinstance(
                 action, (argparse._HelpAction, argparse._VersionAction)):
-            assert re.search(r'\(default: .+\)$|\(required\)$', action.help), action.dest
+            stated = re.search(r'\((?:default: (.+)|required)\)$', action.help)
+            assert stated, action.dest
+            if action.default not in (None, False):
+                assert stated[1].replace('%(default)s', str(action.default)) == str(
+                    action.default).removesuffix('.0'), action.dest
 
 
 def test_out_of_memory_is_one_line(monkeypatch, capsys):

@@ -193,7 +193,8 @@ def demo_table(place: Path) -> int:
         from uav_task_alloc.plots import draw_flight  # imports matplotlib
         with naming('map', png):
             draw_flight(out, png)
-    except (LookupError, TypeError, ValueError, AttributeError) as error:
+    except (ArithmeticError, AttributeError, LookupError, RecursionError, TypeError,
+            ValueError) as error:
         if isinstance(error, AllocError):
             raise
         raise InvalidValue('report', str(place), 'a recorded run, undamaged: '
