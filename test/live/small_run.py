@@ -85,5 +85,6 @@ class Run:
         for line in lines:
             self.scene.apply(line)
         wall, run = lines[-1]['wall'], self.scene.run
-        self.snapshots.put(wall, {'start': run.start(), **self.clock}, *self.scene.updates(wall))
+        self.snapshots.put(wall, {'start': run.start(), **self.clock},
+                           *self.scene.updates(wall, self.clock['ended']))
         return self

@@ -189,6 +189,34 @@ def test_the_end_of_the_node_is_no_alarm(tab, run, serve, ended, badge, words):
     assert share(pixels(page, '#banner'), '#b34700') < 0.001
 
 
+def test_after_the_run_only_a_uav_that_did_not_land_is_an_alarm(view):
+    run = Run().add(state(BEGIN, 'u1', (0.0, 0.0), mode='STANDBY'),
+                    state(BEGIN, 'u2', (90.0, 0.0)), announced(BEGIN, ['t1']))
+    run.clock['ended'] = True
+    run.add(statuses(BEGIN + 60, t1='COMPLETED u1'))
+    page = view(run.snapshots)
+    wait(page, '#state', 'run ended')
+    assert '2 UAVs, 1 silent' in text(page, '#counts')
+    assert page.locator('#uavs .trouble').all_inner_texts()[0].startswith('u2')
+    assert page.locator('#uavs .trouble').count() == 1
+    assert 'silent for 1:00' in text(page, '#uavs details:nth-child(1)')
+    assert 'u2 is silent' in text(page, '#events')
+    assert 'u1 is silent' not in text(page, '#events')
+    assert page.is_hidden('#banner')
+
+
+def test_a_reload_keeps_the_theme_and_the_present(view, run):
+    page = view(run.snapshots)
+    page.click('#theme')
+    page.locator('#scrub').fill(str(BEGIN + 10))
+    wait(page, '#moment', 'ago')
+    page.reload()
+    wait(page, '#counts', '1 of 5 tasks done')
+    assert page.get_attribute('html', 'data-theme') == 'dark'
+    assert text(page, '#moment') == 'now'
+    page.click('#theme')
+
+
 def test_a_hostile_name_is_only_text(view):
     run = Run().add(
         *uavs(BEGIN), announced(BEGIN, [HOSTILE, '__proto__', 'constructor']),

@@ -198,6 +198,22 @@ def degrees(east, north):
     return f'{latitude:.6f}, {longitude:.6f}'
 
 
+def test_everything_that_can_be_clicked_is_reached_by_the_tab_key(shown, run):
+    page, reached = shown(run, DESK), []
+    focused = """() => { const node = document.activeElement;
+        return node.id || node.className || node.tagName + node.textContent.slice(0, 2); }"""
+    while not reached or reached[-1] != 'scrub':
+        page.keyboard.press('Tab')
+        reached.append(page.evaluate(focused))
+        assert len(reached) < 60
+    lists = {'task', 'SUMMARYEa', 'events', 'left', 'uav-box', 'rest'}  # some only if they scroll
+    assert [name for name in reached if name not in lists] == [
+        'theme', 'SUMMARYu1', 'SUMMARYu2', 'map', 'in', 'out', 'fit', 'find', 'live', 'scrub']
+    page.focus('#uavs summary')
+    page.keyboard.press('Enter')
+    page.wait_for_selector('#uavs details[open]')
+
+
 PLACES = [(0.0, 0.0, 0.0), (1500.0, -2500.0, 120.0), (-40e3, 30e3, 3000.0), (2e3, 9e5, 0.0)]
 
 

@@ -18,6 +18,7 @@ from uav_task_alloc.record.run_state import Line, RunState
 from uav_task_alloc.zone_codec import JSON_ZONE, encode_zone
 
 _MAX_STAMP_AGE = 86400.0  # [s]; an older stamp is of another clock
+_REST_MODES = ('STANDBY', 'HOLD')  # as in page/model.js
 _LEAST_SPEED = 0.5  # [m/s]; the course of a slower UAV is noise
 # by kind of a line: the part of the page that it changes
 _PART_OF_KIND = {'announcement': 'tasks', 'statuses': 'statuses', 'zones': 'zones',
@@ -62,7 +63,8 @@ class Scene:
         if self.run.speedup != speedup:  # the arrivals of all lists are other times
             self.dirty |= {f'list {uav}' for uav, each in self.run.lists.items() if each['tasks']}
 
-    def updates(self, now: float) -> tuple[dict[str, Any], list[LogEntry], list[LogEntry]]:
+    def updates(self, now: float, ended: bool = False,
+                ) -> tuple[dict[str, Any], list[LogEntry], list[LogEntry]]:
         """Changes since the last call.
 
         Plans are compared here and not on arrival: the statuses of the tasks completed meanwhile
@@ -70,12 +72,13 @@ class Scene:
 
         Args:
             now: [unix s].
+            ended: the run is over; a UAV that rests and falls silent then is no event.
 
         Returns:
             Changed parts by name; new entries of the event log; of the plan log.
         """
         plans = [self.plan(line) for line in self.new_plans]
-        self.log_silence(now)
+        self.log_silence(now, ended)
         parts = {name: self.part(name) for name in self.dirty}
         authority = self.part('authority')  # a part of its own: it rarely changes
         if authority != self.last_authority:
@@ -98,10 +101,11 @@ class Scene:
                 'ms': round(line['solve_ms'], 1), 'fit': line['fit'], 'first': is_first,
                 'changes': rows}
 
-    def log_silence(self, now: float) -> None:
+    def log_silence(self, now: float, ended: bool) -> None:
         """Log each UAV once when its states stop, and once when they resume."""
         silent = {uav for uav, state in self.run.uavs.items()
-                  if now - state['wall'] > SILENT_AFTER}
+                  if now - state['wall'] > SILENT_AFTER
+                  and not (ended and state['mode'] in _REST_MODES)}
         for names, text in ((silent - self.silent, '{} is silent'),
                             (self.silent - silent, '{} reports again')):
             self.events += [{'wall': now, 'kind': 'fault', 'text': text.format(uav)}

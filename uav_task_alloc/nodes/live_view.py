@@ -190,11 +190,11 @@ class LiveView(Node):
     def update_page(self) -> None:
         """Store what has changed for the page."""
         wall = time.time()
-        updates = self.scene.updates(wall)
+        ended = self.over_since is not None
+        updates = self.scene.updates(wall, ended)
         if self.server:
             self.snapshots.put(wall, {'start': self.state.start(), 'live': True,
-                                      'speedup': self.state.speedup,
-                                      'ended': self.over_since is not None}, *updates)
+                                      'speedup': self.state.speedup, 'ended': ended}, *updates)
 
     def clock(self) -> float:
         """Scenario time [s]: since the first task was announced."""
