@@ -79,7 +79,7 @@ class AllocatorDriver:
         self.core.set_kernels_ready()
         self.world = self.core.world
         self.lists, self.history, self.notes, self.allocations = {}, [], [], []
-        self.forgotten = set()
+        self.forgotten, self.levels = set(), {}  # levels of notes
 
     def uav(self, uav_id, *position, **more):
         return self.world.update_uav(UavReport(uav_id, position, **more), self.now, self.now)
@@ -128,6 +128,7 @@ class AllocatorDriver:
         self.forgotten |= out.forgotten
         self.history += out.lists.values()
         self.notes += [note.text for note in out.notes]
+        self.levels.update({note.text: note.level for note in out.notes})
         if out.allocation:
             self.allocations.append(out.allocation)
 

@@ -355,3 +355,17 @@ def test_a_link_that_cannot_be_opened_is_logged_once_and_in_diagnostics(start, p
     probe.until(lambda: len(health) > 2)
     assert health[-1].status[0].message == 'No such file or directory'
     assert bridge.output().count(words) == 1
+
+
+def test_a_bridge_logs_what_it_listens_to_and_that_it_finds_no_vehicle(start, probe):
+    bridge = start('mavlink_bridge', '-p', 'system_ids:=[7, 9]', '-p',
+                   "connections:=['udpin:127.0.0.1:0', 'tcp:127.0.0.1:1']")
+    probe.until(lambda: 'no vehicle found' in bridge.output())
+    code, out = bridge.stop()
+    assert code == 0
+    lines = [line.split(']')[0] + line.split(']', 2)[2] for line in out.splitlines()]
+    for line in ('[INFO [mavlink_bridge]: listens on udpin:127.0.0.1:0 for systems 7, 9',
+                 '[INFO [mavlink_bridge]: connects to tcp:127.0.0.1:1 for systems 7, 9',
+                 '[WARN [mavlink_bridge]: no vehicle found for 10 s: expected the heartbeat of an '
+                 'autopilot on udpin:127.0.0.1:0, tcp:127.0.0.1:1'):
+        assert lines.count(line) == 1

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Every executable: found by the ament index, stops in good order, refuses bad parameters."""
+import math
 import os
 import signal
 import subprocess
@@ -12,8 +13,11 @@ import pytest
 from ament_index_python.packages import get_package_prefix, get_package_share_directory
 from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
 from rcl_interfaces.srv import DescribeParameters, GetParameters, SetParameters
+from uav_task_alloc_msgs import msg as m
+from uav_task_alloc_msgs.srv import SubmitTasks
 
 from uav_task_alloc import params
+from uav_task_alloc.nodes.conversions.messages import EVENTS, LATCHED, STATES
 from uav_task_alloc.nodes.ros import run as nodes_run
 
 pytestmark = pytest.mark.ros
@@ -236,6 +240,41 @@ def test_a_parameter_is_checked_when_it_is_changed(start, probe):
         False, "route_end = 'land': expected one of hold, home")
     answer = put(probe, 'state_dir', type=text, string_value='/tmp')
     assert (answer.successful, answer.reason) == (False, 'state_dir is read at the start only')
+
+
+@pytest.mark.parametrize(('level', 'shown'), [
+    ('debug', {'DEBUG', 'INFO', 'WARN'}), ('info', {'INFO', 'WARN'}), ('warn', {'WARN'}),
+    ('error', set())])
+def test_the_log_level_selects_what_is_logged(start, probe, level, shown):
+    """A plan, accepted tasks and the origin: INFO; a refused task: WARN; a start: DEBUG."""
+    process = start('allocator', '--log-level', f'allocator:={level}')
+    tasks = [m.Task(task_id=name, value=1.0) for name in ('t1', 'bad id')]
+    request = SubmitTasks.Request(announcement=m.TaskAnnouncement(tasks=tasks))
+    assert probe.call(SubmitTasks, '/allocator/submit_tasks', request).accepted
+    states = probe.publisher(m.UavState, 'uav_states', STATES)
+    events = probe.publisher(m.TaskEvent, 'task_events', EVENTS)
+    plans = probe.collect(m.Allocation, 'allocation', LATCHED)
+    statuses = probe.collect(m.TaskStatusArray, 'task_statuses', LATCHED)
+
+    def planned():
+        states.publish(m.UavState(uav_id='uav_1', available=True, battery=math.nan,
+                                  range_remaining=math.nan, cruise_speed=math.nan))
+        return plans and any(each.tasks for each in plans[-1].lists)
+
+    def is_started():
+        events.publish(m.TaskEvent(task_id='t1', uav_id='uav_1', event=m.TaskEvent.STARTED))
+        return any(each.state == m.TaskStatus.ACTIVE for each in statuses[-1].statuses)
+
+    probe.until(planned)
+    probe.until(is_started)
+    _, out = process.stop()
+    expected = {"[allocator]: task 't1' started by uav_1": 'DEBUG',
+                "[allocator]: task 't1' accepted": 'INFO', '[allocator]: plan ': 'INFO',
+                '[allocator]: origin of the ENU frame: (47.3977420, 8.5455940, 488 m)': 'INFO',
+                "[allocator]: task 'bad id' REJECTED: task_id": 'WARN'}
+    found = {text: line[1:line.index(']')] for line in out.splitlines()
+             for text in expected if text in line}
+    assert found == {text: name for text, name in expected.items() if name in shown}
 
 
 def test_a_namespace_moves_the_topics(start, probe):

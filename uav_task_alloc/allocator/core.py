@@ -28,6 +28,7 @@ from uav_task_alloc.allocator.replanning.schedule import Schedule
 from uav_task_alloc.allocator.replanning.task_reasons import task_steps
 from uav_task_alloc.allocator.state.safe_paths import SafePaths
 from uav_task_alloc.allocator.state.world import World
+from uav_task_alloc.allocator.status import allocation_line, last_finish
 from uav_task_alloc.journal import JournalRow
 from uav_task_alloc.model import Plan, ThreatZone
 from uav_task_alloc.params import AllocatorParams
@@ -175,6 +176,7 @@ class Allocator:
         plan = plan_in_force(world.lists, world.tasks, self._left_out, chosen)
         world.outbox.allocation = Allocation(
             world.next_revision(), tuple(world.lists_in_force().values()), plan, trigger, stamp)
+        world.note(allocation_line(world.outbox.allocation, last_finish(world, stamp)))
 
     def collect(self) -> Outbox:
         """Return what is to be published since the last call; save `rows` before it is."""

@@ -202,7 +202,7 @@ class Allocation:
 class LogNote:
     """A line for the log."""
 
-    warning: bool  # else information
+    level: str  # 'debug', 'info' or 'warning'
     text: str  # a sentence
 
 

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections import Counter
 from dataclasses import dataclass
 
-from uav_task_alloc.allocator.records import TaskRecord, TaskState
+from uav_task_alloc.allocator.records import Allocation, TaskRecord, TaskState
 from uav_task_alloc.allocator.state.fleet import Fleet
+from uav_task_alloc.allocator.state.published_lists import finish_time
 from uav_task_alloc.allocator.state.world import World
 from uav_task_alloc.allocator.state.zone_checks import blocked_text
 from uav_task_alloc.errors import first_of
@@ -40,6 +41,45 @@ def status_of(task_id: str, known: TaskRecord | tuple[str, float]) -> TaskStatus
         return TaskStatus(task_id, known.state, known.uav, known.reason, known.stamp)
     reason, stamp = known
     return TaskStatus(task_id, TaskState.REJECTED, '', reason, stamp)
+
+
+def last_finish(world: World, stamp: float) -> float:
+    """Return the time until the last UAV has flown its list.
+
+    Args:
+        world: with the lists in force.
+        stamp: published clock [s].
+
+    Returns:
+        [s]; 0.0 where no UAV has tasks.
+    """
+    lists = world.lists_in_force()
+    known = {uav_id: uav for uav_id in lists if (uav := world.known_uav(uav_id))}
+    return max((finish_time(world.lists.restamped(uav_id, stamp, uav), uav)
+                for uav_id, uav in known.items()), default=0.0)
+
+
+def allocation_line(allocation: Allocation, finish: float) -> str:
+    """Return the line of the log about a plan.
+
+    Args:
+        allocation: as published.
+        finish: time until the last UAV has flown its list [s].
+
+    Returns:
+        Trigger, tasks, length, finish and solve time.
+    """
+    plan = allocation.plan
+    counts = [len(each.stops) for each in allocation.lists if each.stops]
+    left_out = f', {len(plan.unassigned)} left out' if plan.unassigned else ''
+    return (f'plan {allocation.revision} ({allocation.trigger}): '
+            f'{_counted(sum(counts), "task")} on {_counted(len(counts), "UAV")}{left_out}; '
+            f'{plan.distance:.0f} m, finish in {finish:.0f} s, '
+            f'solved in {1e3 * plan.solve_time:.0f} ms')
+
+
+def _counted(number: int, word: str) -> str:
+    return f'{number} {word}' + 's' * (number != 1)
 
 
 def health_warnings(world: World, journal_error: str, solver_error: str = '') -> list[str]:

@@ -39,6 +39,7 @@ from uav_task_alloc.nodes.conversions.messages import (
 from uav_task_alloc.nodes.ros.allocation_publisher import AllocationPublisher
 from uav_task_alloc.nodes.ros.batched_subscription import subscribe_batched
 from uav_task_alloc.nodes.ros.leader_election import LeaderElection
+from uav_task_alloc.nodes.ros.leveled_log import LeveledLog
 from uav_task_alloc.nodes.ros.origin_check import OriginCheck
 from uav_task_alloc.nodes.ros.parameters import declare
 from uav_task_alloc.nodes.ros.refusal_log import RefusalLog
@@ -77,6 +78,7 @@ class AllocatorNode(Node):
         super().__init__('allocator')
         self.live = declare(self, AllocatorParams)
         params = self.live.now
+        self.log = LeveledLog(self)
         self.refusals = RefusalLog(self.get_logger().warning)
         self.origin = Origin(params.origin__latitude, params.origin__longitude,
                              params.origin__altitude_amsl)
@@ -299,12 +301,9 @@ class AllocatorNode(Node):
         self.persistence.save(self.core, time.monotonic())
 
     def log_notes(self, notes: list[LogNote]) -> None:
-        """Log the first notes; rclpy requires a call site for each severity."""
+        """Log the first notes."""
         for note in notes[:_MOST_LINES]:
-            if note.warning:
-                self.get_logger().warning(note.text)
-            else:
-                self.get_logger().info(note.text)
+            self.log.write(note.level, note.text)
         if len(notes) > _MOST_LINES:
             self.get_logger().warning(f'and {len(notes) - _MOST_LINES} lines more')
 

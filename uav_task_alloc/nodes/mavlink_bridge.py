@@ -66,6 +66,7 @@ class MavlinkBridge(Node):
         self.closing, self.shutdown = False, BridgeShutdown()
         self._open_ground_station(params)
         self._create_topics()
+        self.report.log_start(params.system_ids, time.monotonic())
         self.heartbeat.start()
         self.receiver.start()
 
@@ -160,8 +161,10 @@ class MavlinkBridge(Node):
         for session in list(self.ground_station.sessions.values()):
             session.executor.policy = policy
             if session.uav_id not in self.lists.known:
+                self.report.search_over = True
                 self.log.write('info', f'found {session.uav_id}: {session.executor.profile.name}')
                 self.lists.subscribe(session.uav_id)
+        self.report.log_search(time.monotonic())
         self.assign_lists()
 
     def grounded(self) -> str:

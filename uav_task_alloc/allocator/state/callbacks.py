@@ -9,6 +9,6 @@ RequestReplan = Callable[[str, float], None]  # (trigger, now [s] of a steady cl
 
 
 class Note(Protocol):
-    """Put a line into the log."""
+    """Put a line into the log, at the level `info` unless another is named."""
 
-    def __call__(self, text: str, warning: bool = False) -> None: ...
+    def __call__(self, text: str, warning: bool = False, debug: bool = False) -> None: ...

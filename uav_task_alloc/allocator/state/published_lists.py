@@ -151,6 +151,23 @@ class PublishedLists:
         self._known_tasks.difference_update(task_ids)
 
 
+def finish_time(each: UavList, uav: Uav) -> float:
+    """Return the time until a UAV has flown a list, with its way home.
+
+    Args:
+        each: with arrival times from now.
+        uav: with its speed.
+
+    Returns:
+        [s]; 0.0 for an empty list.
+    """
+    if not each.stops:
+        return 0.0
+    home = max(0.0, each.distance - sum(stop.leg.length for stop in each.stops))
+    last = each.stops[-1]
+    return last.eta + last.task.service_time + home / uav.cruise_speed
+
+
 def _later(stops: Sequence[ListStop], seconds: float) -> tuple[ListStop, ...]:
     return tuple(replace(stop, eta=max(0.0, stop.eta + seconds)) for stop in stops)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from uav_task_alloc.allocator.records import TaskEvent, TaskEventKind
-from uav_task_alloc.allocator.state.callbacks import RequestReplan
+from uav_task_alloc.allocator.state.callbacks import Note, RequestReplan
 from uav_task_alloc.allocator.state.fleet import Fleet
 from uav_task_alloc.allocator.state.published_lists import PublishedLists
 from uav_task_alloc.allocator.state.task_state_machine import TaskTransition
@@ -18,9 +18,10 @@ class TaskEvents:
     """Applies task events. `resend(uav_id)` has the list in force published again."""
 
     def __init__(self, tasks: TaskRegistry, fleet: Fleet, lists: PublishedLists,
-                 request_replan: RequestReplan, resend: Callable[[str], None]) -> None:
+                 request_replan: RequestReplan, resend: Callable[[str], None],
+                 note: Note) -> None:
         self._tasks, self._fleet, self._lists = tasks, fleet, lists
-        self._request_replan, self._resend = request_replan, resend
+        self._request_replan, self._resend, self._note = request_replan, resend, note
         self._resent: dict[str, float] = {}  # UAV -> [s] when its list was resent for an event
 
     def apply(self, event: TaskEvent, stamp: float, now: float, max_attempts: int) -> str:
@@ -35,9 +36,12 @@ class TaskEvents:
         Returns:
             Why it was refused; '' if it was applied.
         """
+        before = self._tasks.records.get(event.task_id)
         refusal = self._check(event, now) or self._step(event, stamp, max_attempts)
         if refusal:
             return f'event {event.kind.name} of task {event.task_id!r}: {refusal}'
+        if self._tasks.records[event.task_id] != before:  # a bridge repeats its events
+            self._note_progress(event)
         self._fleet.confirmed.add(event.uav_id)
         if event.kind is TaskEventKind.STARTED:
             self._fleet.active[event.uav_id] = event.task_id
@@ -50,6 +54,17 @@ class TaskEvents:
     def forget(self, uav_id: str) -> None:
         """Drop what is kept of a UAV."""
         self._resent.pop(uav_id, None)
+
+    def _note_progress(self, event: TaskEvent) -> None:
+        task, uav = f'task {event.task_id!r}', event.uav_id
+        if event.kind is TaskEventKind.STARTED:
+            self._note(f'{task} started by {uav}', debug=True)
+        elif event.kind is TaskEventKind.COMPLETED:
+            self._note(f'{task} completed by {uav}')
+        else:
+            final = '' if self._tasks.is_open(event.task_id) else ': it is FAILED'
+            self._note(f'{task} failed on {uav}: {event.reason or "no reason given"}{final}',
+                       warning=True)
 
     def _check(self, event: TaskEvent, now: float) -> str:
         """Why an event cannot be; '' if it can."""

@@ -2,12 +2,18 @@
 """The task registry: accepted tasks with their states, and refused ones with the reason."""
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import replace
 from typing import Any
 
-from uav_task_alloc.allocator.records import TaskRecord, TaskState, TaskVerdict
+from uav_task_alloc.allocator.records import (
+    AnnouncementAction,
+    TaskRecord,
+    TaskState,
+    TaskVerdict,
+)
 from uav_task_alloc.allocator.state.task_state_machine import TaskTransition, rule_for
+from uav_task_alloc.errors import first_of
 from uav_task_alloc.model import Task
 
 MAX_OPEN = 20_000  # open tasks; more are refused
@@ -153,3 +159,26 @@ def without_failed(record: TaskRecord, usable: frozenset[str]) -> Task:
         return record.task
     allowed = usable if record.task.allowed_uavs is None else record.task.allowed_uavs
     return replace(record.task, allowed_uavs=allowed - frozenset(record.failed_on))
+
+
+def verdict_texts(action: AnnouncementAction,
+                  verdicts: Sequence[TaskVerdict]) -> Iterator[tuple[str, bool]]:
+    """The lines of the log about an announcement.
+
+    Args:
+        action: of all its tasks.
+        verdicts: one for each task.
+
+    Yields:
+        Text, and whether it is a warning.
+    """
+    repeated = [verdict.task_id for verdict in verdicts if verdict.unchanged]
+    if repeated:
+        yield f'{action.name} of {first_of(repeated)} ignored: {UNCHANGED}', False
+    done = {AnnouncementAction.ADD: 'accepted', AnnouncementAction.UPDATE: 'updated',
+            AnnouncementAction.CANCEL: 'cancelled'}[action]
+    for verdict in verdicts:
+        if not verdict.accepted:
+            yield (f'{action.name} of task {verdict.task_id!r} REJECTED: {verdict.reason}', True)
+        elif not verdict.unchanged:
+            yield f'task {verdict.task_id!r} {done}', False

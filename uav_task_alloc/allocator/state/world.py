@@ -34,7 +34,7 @@ from uav_task_alloc.allocator.state.published_lists import PublishedLists
 from uav_task_alloc.allocator.state.safe_paths import MakeSafePaths, SafePaths
 from uav_task_alloc.allocator.state.task_events import TaskEvents
 from uav_task_alloc.allocator.state.task_state_machine import TaskStep
-from uav_task_alloc.allocator.state.tasks import UNCHANGED, TaskRegistry, without_failed
+from uav_task_alloc.allocator.state.tasks import TaskRegistry, verdict_texts, without_failed
 from uav_task_alloc.allocator.state.zone_checks import ZoneChecks
 from uav_task_alloc.errors import InvalidValue, first_of
 from uav_task_alloc.model import Point, Task, ThreatZone, Uav
@@ -95,7 +95,7 @@ class World:
                                       self.request_replan)
         self.admission = Admission(self.fleet, self.lists, self.note, self.forget_uav)
         self._events = TaskEvents(self.tasks, self.fleet, self.lists, self.request_replan,
-                                  self._resend.add)
+                                  self._resend.add, self.note)
         self._missed = MissedCompletions(saved.lists, self.tasks, self.note)
 
     # inputs
@@ -121,14 +121,10 @@ class World:
     def _announced(
         self, action: AnnouncementAction, verdicts: list[TaskVerdict], now: float
     ) -> list[TaskVerdict]:
-        repeated = [v.task_id for v in verdicts if v.unchanged]
-        if repeated:
-            self.note(f'{action.name} of {first_of(repeated)} ignored: {UNCHANGED}')
+        for text, warning in verdict_texts(action, verdicts):
+            self.note(text, warning)
         for verdict in verdicts:
-            if not verdict.accepted:
-                self.note(f'{action.name} of task {verdict.task_id!r} REJECTED: '
-                          f'{verdict.reason}', warning=True)
-            elif not verdict.unchanged:
+            if verdict.accepted and not verdict.unchanged:
                 self.request_replan(f'{action.name} {verdict.task_id}', now)
         self.outbox.statuses = True
         return verdicts
@@ -223,10 +219,11 @@ class World:
         self.version += 1
         self._on_change(trigger, now)
 
-    def note(self, text: str, warning: bool = False) -> None:
+    def note(self, text: str, warning: bool = False, debug: bool = False) -> None:
         """Put a line into the log."""
         if len(self.outbox.notes) < _MAX_NOTES:
-            self.outbox.notes.append(LogNote(warning, text))
+            level = 'warning' if warning else 'debug' if debug else 'info'
+            self.outbox.notes.append(LogNote(level, text))
 
     def forget_uav(self, uav_id: str) -> None:
         """Remove a UAV with its list, its row in the journal and its publishers."""
@@ -361,7 +358,7 @@ class World:
     def shortened_lists(self, stamp: float) -> dict[str, UavList]:
         """Return the lists with ended tasks at their front, without those."""
         shorter = {uav_id: self.lists.without_ended(uav_id, self._ended, stamp,
-                                                    self._known_uav(uav_id))
+                                                    self.known_uav(uav_id))
                    for uav_id in self.lists.lists}
         return {uav_id: each for uav_id, each in shorter.items() if each is not None}
 
@@ -370,12 +367,12 @@ class World:
 
         One with an ended task after the first waits for the plan: its legs are not valid.
         """
-        return {uav_id: self.lists.restamped(uav_id, stamp, self._known_uav(uav_id))
+        return {uav_id: self.lists.restamped(uav_id, stamp, self.known_uav(uav_id))
                 for uav_id in sorted(self._resend)
                 if not any(map(self._ended, self.lists.get(uav_id).task_ids))}
 
-    def _known_uav(self, uav_id: str) -> Uav | None:
-        """Where a UAV is; None where it has not reported."""
+    def known_uav(self, uav_id: str) -> Uav | None:
+        """Return a UAV for the solver; None where it has not reported."""
         return self.uav(uav_id) if uav_id in self.fleet.records else None
 
     def _ended(self, task_id: str) -> bool:

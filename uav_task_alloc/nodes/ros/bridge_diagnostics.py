@@ -2,7 +2,8 @@
 """Diagnostics of the bridge: a row for each UAV, link, and part of the bridge that can fail."""
 from __future__ import annotations
 
-from collections.abc import Iterator
+import math
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict
 
 from uav_task_alloc.mavlink.gcs.ground_station import GroundStation
@@ -17,6 +18,8 @@ from uav_task_alloc.nodes.conversions.diagnostics import (
 from uav_task_alloc.nodes.conversions.message_limits import printable
 from uav_task_alloc.nodes.ros.leveled_log import LeveledLog
 
+_SEARCH_TIME = 10.0  # [s]
+_VERBS = {'udpin': 'listens on', 'udpout': 'sends to', 'tcp': 'connects to'}
 _OK, _WARN, _ERROR = DiagnosticLevel.OK, DiagnosticLevel.WARN, DiagnosticLevel.ERROR
 
 
@@ -36,6 +39,29 @@ class BridgeDiagnostics:
         self._heartbeat, self._log = heartbeat, log
         self._refusals = (ground_station.refusals, connections.refusals)
         self._refused = 0  # messages until the last call
+        self.search_over = False  # a vehicle was found, or that there is none was logged
+        self._search_since = math.inf  # [s] steady clock
+
+    def log_start(self, systems: Sequence[int], now: float) -> None:
+        """Log each connection.
+
+        Args:
+            systems: parameter `system_ids`; empty: all.
+            now: steady clock [s].
+        """
+        of = f'systems {", ".join(map(str, systems))}' if systems else 'all MAVLink systems'
+        for link in self._connections.links:
+            self._log.write('info', f'{_VERBS.get(link.name.split(":")[0], "opens")} '
+                                    f'{link.name} for {of}')
+        self._search_since = now
+
+    def log_search(self, now: float) -> None:
+        """Log once that no vehicle was found for a while; `now` is the steady clock [s]."""
+        if not self.search_over and now - self._search_since > _SEARCH_TIME:
+            self.search_over = True
+            names = ', '.join(link.name for link in self._connections.links)
+            self._log.write('warning', f'no vehicle found for {_SEARCH_TIME:g} s: expected the '
+                                       f'heartbeat of an autopilot on {names}')
 
     def log_refusals(self) -> None:
         """Log which messages of vehicles were dropped."""

@@ -10,7 +10,7 @@ from uav_task_alloc.nodes.conversions.message_limits import printable
 
 
 class LeveledLog:
-    """Logs at `info`, `warning` or `error`.
+    """Logs at `debug`, `info`, `warning` or `error`.
 
     rclpy refuses a call site that logs at several levels, so each level has its own.
 
@@ -21,6 +21,7 @@ class LeveledLog:
     def __init__(self, node: Node) -> None:
         logger = node.get_logger()
         self.levels: dict[str, Callable[[str], object]] = {
+            'debug': lambda text: logger.debug(text),
             'info': lambda text: logger.info(text),
             'warning': lambda text: logger.warning(text),
             'error': lambda text: logger.error(text)}

@@ -73,6 +73,7 @@ class OriginCheck:
     def __init__(self, node: Node, origin: Origin, log_refusal: Callable[[str], object]) -> None:
         self._node, self._log_refusal = node, log_refusal
         self._reports = OriginReports(origin)
+        node.get_logger().info(f'origin of the ENU frame: {_text(origin)}')
         self._known_publishers: set[bytes] = set()  # endpoint ids
         self._received = 0  # messages since the last subscription
         self._waiting_since = time.monotonic()  # for origins of the publishers

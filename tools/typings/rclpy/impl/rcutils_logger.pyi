@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 class RcutilsLogger:
+    def debug(self, message: str, *, throttle_duration_sec: float = ...,
+              once: bool = ...) -> bool: ...
     def info(self, message: str, *, throttle_duration_sec: float = ...,
              once: bool = ...) -> bool: ...
     def warning(self, message: str, *, throttle_duration_sec: float = ...,
