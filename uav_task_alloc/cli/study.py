@@ -40,8 +40,7 @@ def main(argv: Sequence[str]) -> int:
     check_installed('study', 'matplotlib')  # checked before hours of computing
     check_folder('--out', args.out)
     settings = experiments.quick(args.seed) if args.quick else Experiments(args.seed)
-    with resumable():
-        return regenerate(settings, args.out, executors.chosen(args))
+    return regenerate(settings, args.out, executors.chosen(args))
 
 
 def _make_parser() -> OptionParser:
@@ -69,7 +68,8 @@ def regenerate(settings: Experiments, out: Path, open_executor: campaign.Executo
     jobs = experiments.jobs(settings)
     folder = out / 'jobs'
     try:
-        outcome = campaign.run_campaign(jobs, folder, open_executor, log_line, time.monotonic)
+        with resumable():
+            outcome = campaign.run_campaign(jobs, folder, open_executor, log_line, time.monotonic)
         status = 0
     except KeyboardInterrupt:
         outcome, status = campaign.load_results(jobs, folder), INTERRUPTED
