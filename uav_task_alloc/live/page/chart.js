@@ -40,10 +40,12 @@ export function drawChart(node, plans, seconds) {
   const times = plans.map(plan => seconds(plan.wall)), first = Math.min(0, ...times);
   const end = width - RIGHT, last = Math.max(...times, first + 1);
   const x = {end, at: t => LEFT + (end - LEFT) * (t - first) / (last - first)};
-  const rows = value => plans.map((plan, k) => ({x: times[k], y: value(plan),
-    text: `plan ${plan.revision}: ${plan.trigger}: ${plan.ms} ms, fit ${plan.fit.toPrecision(4)}`}));
+  const words = ({revision, trigger, ms, fit}) =>
+    `plan ${revision}: ${trigger}: ${ms} ms, fit ${fit.toPrecision(4)}`;
+  const rows = value => plans.map((plan, k) => ({x: times[k], y: value(plan), text: words(plan)}));
   drawRow(svg, rows(plan => plan.ms), {top: TOP, name: 'ms', kind: 'ms', x});
-  drawRow(svg, rows(plan => plan.fit), {top: TOP + ROW + GAP, name: 'fit', kind: 'fit', step: true, x});
+  drawRow(svg, rows(plan => plan.fit),
+    {top: TOP + ROW + GAP, name: 'fit', kind: 'fit', step: true, x});
   const foot = TOP + 2 * ROW + GAP + 13, step = roundStep((last - first) / 2);
   for (let t = Math.ceil(first / step) * step; t <= last; t += step) {
     add(svg, 'text', {x: x.at(t), y: foot, 'text-anchor': 'middle'}, `${t} s`);

@@ -3,11 +3,13 @@
 const CLICK = 5;      // [px] that a click may move
 const KEY_STEP = 80;  // [px] of an arrow key
 const KEY_ZOOM = 1.5;
+const STEPS = {ArrowLeft: [1, 0], ArrowRight: [-1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1]};
 
 // A wheel moves the page where the page is longer than the window.
 const pageScrolls = () => document.documentElement.scrollHeight > innerHeight + 1;
 
-// act: {pan(dx, dy), zoom(factor, x, y), fit(), click(x, y), hover(x, y), leave()}; [px] in `node`.
+// act: {pan(dx, dy), zoom(factor, x, y), fit(), click(x, y), hover(x, y), leave()}, in [px] of
+// `node`.
 export function listen(node, act) {
   const at = event => {
     const box = node.getBoundingClientRect();
@@ -17,7 +19,7 @@ export function listen(node, act) {
   listenToFingers(node, act, at);
   node.addEventListener('keydown', event => {
     const {key} = event, middle = [node.clientWidth / 2, node.clientHeight / 2];
-    const step = {ArrowLeft: [1, 0], ArrowRight: [-1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1]}[key];
+    const step = STEPS[key];
     if (event.ctrlKey || event.metaKey || event.altKey) return;
     if (step) act.pan(KEY_STEP * step[0], KEY_STEP * step[1]);
     else if (key === '+' || key === '=') act.zoom(KEY_ZOOM, ...middle);

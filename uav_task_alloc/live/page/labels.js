@@ -41,10 +41,10 @@ class Boxes {
   }
 }
 
-// items: {key, x, y, radius, w, h, far, above} with the more important first; `far`: also placed at
-// a distance, and rather on `soft` obstacles than not at all; `above`: there first. `last`: a Map
-// that keeps each label at its side while that is free. Returns the boxes {x, y, w, h, item, ring}
-// of those that have room.
+// items: {key, x, y, radius, w, h, far, above} with the more important first; `far`: also placed
+// at a distance, and rather on `soft` obstacles than not at all; `above`: there first. `last`: a
+// Map that keeps each label at its side while that is free. Returns the boxes {x, y, w, h, item,
+// ring} of those that have room.
 export function placeLabels(items, obstacles, width, height, last) {
   const taken = new Boxes(), placed = [];
   for (const box of obstacles) taken.add(box);

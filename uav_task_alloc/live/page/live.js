@@ -35,10 +35,12 @@ const WORDS = {uav: uavWords, zone: zoneWords};
 function showMap(model, picked) {
   const at = id => model.where.get(id);
   const last = model.replans.at(-1);
-  const given = last && !last.first ? last.changes.flatMap(row => row.added.map(([id]) => id)) : [];
+  const rows = last && !last.first ? last.changes : [];
+  const given = rows.flatMap(row => row.added.map(([id]) => id));
   const tasks = [...model.where].map(([id, position]) =>
     ({...model.turns.get(id), id, position, kind: kindOf(id, model)}));
-  const routes = model.uavs.filter(uav => model.lists.get(uav.id).length && !uav.lost).map(uav => ({
+  const flying = model.uavs.filter(uav => model.lists.get(uav.id).length && !uav.lost);
+  const routes = flying.map(uav => ({
     index: uav.index, points: [uav.position, ...model.lists.get(uav.id).flatMap(
       task => [...task.via, at(task.id)])].filter(point => point && point[0] !== null)}));
   map.show({origin: model.origin, zones: model.zones, routes, tasks, uavs: model.uavs,
@@ -118,12 +120,12 @@ function stateTexts() {
     return clock.ended
       ? ['■ run ended', '', `Run ended${at}: every task is settled, ${restText()}, and `
         + 'live_view has exited. The page keeps its last picture.']
-      : ['■ stopped', '', `live_view was stopped${at}. UAVs may still be flying. The page keeps its `
-        + 'last picture, and goes on when live_view starts again.'];
+      : ['■ stopped', '', `live_view was stopped${at}. UAVs may still be flying. The page keeps `
+        + 'its last picture, and goes on when live_view starts again.'];
   }
   if (age > STALE) {
-    return ['✕ no data', 'bad', `No data from live_view for ${span(age)} min. What you see is old. `
-      + 'Trying again…'];
+    return ['✕ no data', 'bad', `No data from live_view for ${span(age)} min. What you see is `
+      + 'old. Trying again…'];
   }
   if (!known) return ['connecting', '', ''];
   if (past) return ['◷ past', 'past', ''];
@@ -133,8 +135,9 @@ function stateTexts() {
 
 function restText() {
   const lost = readModel(null).uavs.filter(uav => uav.lost).map(uav => uav.id);
-  return lost.length ? `${some(lost, 4)} ${lost.length > 1 ? 'are' : 'is'} silent, all other UAVs are at rest`
-    : 'all UAVs are at rest';
+  if (!lost.length) return 'all UAVs are at rest';
+  const are = lost.length > 1 ? 'are' : 'is';
+  return `${some(lost, 4)} ${are} silent, all other UAVs are at rest`;
 }
 
 function showState() {

@@ -144,8 +144,9 @@ export function answer(id, model) {
 
 function turnText(id, {uav, place, at}, model) {
   const left = at === null ? null : until(at, model);
+  // changes only every 10 s: screen readers announce it
   const when = left === null ? '' : left <= 0 ? '; it should be there by now'
-    : `; it gets there in about ${span(10 * Math.ceil(left / 10))} min`;  // changes only every 10 s: screen readers announce it
+    : `; it gets there in about ${span(10 * Math.ceil(left / 10))} min`;
   if (place === 1) return `${uav} flies ${id} next${when}.`;
   const ahead = model.lists.get(uav).slice(0, place - 1).map(task => task.id);
   return `${uav} flies ${id} as number ${place} of its list, after ${some(ahead, 8)}${when}.`;

@@ -33,7 +33,8 @@ export class Overlay {
       ids.add(uav.id);
       const marker = this.marker(uav.id), [body, cross] = marker.children;
       const [x, y] = view.pixel(uav.position), turned = uav.course ?? null;
-      marker.setAttribute('transform', `translate(${x.toFixed(1)} ${y.toFixed(1)}) scale(${size})`);
+      marker.setAttribute('transform',
+        `translate(${x.toFixed(1)} ${y.toFixed(1)}) scale(${size})`);
       marker.setAttribute('class', uav.lost ? 'uav lost' : 'uav');
       body.setAttribute('d', turned === null ? DOT : ARROW);
       body.setAttribute('transform', `rotate(${turned ?? 0})`);
@@ -58,48 +59,65 @@ export class Overlay {
   }
 
   drawLabels(texts, colours) {
-    const {view, scene} = this, items = [], obstacles = [...texts, ...this.covered()];
-    const visible = ([x, y]) => x >= 0 && y >= 0 && x <= view.width && y <= view.height;
-    const add = (kind, id, strong, weak, point, radius, far, colour) => {
-      const [x, y] = point;
-      if (!visible(point)) return;
-      const w = Math.ceil(this.textWidth(strong, kind === 'uav') + this.textWidth(weak)) + 2;
-      items.push({key: `${kind} ${id}`, kind, strong, weak, x, y, radius, w, h: 17, far, colour,
-        above: kind === 'zone'});
-    };
-    const box = ([x, y], r, soft = false) =>
-      obstacles.push({x: x - r, y: y - r, w: 2 * r, h: 2 * r, soft});
-    const few = scene.uavs.length <= BIG_FLEET, narrow = view.width < NARROW;
-    for (const uav of scene.uavs) {
-      if (uav.position[0] === null || uav.position[1] === null) continue;
-      const point = view.pixel(uav.position);
-      if (visible(point)) box(point, few ? 11 : 7);
-      if (few) add('uav', uav.id, uav.id, narrow && !uav.lost ? '' : uav.note && ' ' + uav.note,
-        point, 12, true,
-        uav.lost ? colours.bad : colours.ink);
-    }
+    const {view, scene} = this;
+    Object.assign(this, {items: [], obstacles: [...texts, ...this.covered()]});
+    for (const uav of scene.uavs) this.addUav(uav, colours);
     for (const zone of scene.zones) {
       const top = zoneOutline(zone).reduce((a, b) => b[1] > a[1] ? b : a);
-      add('zone', zone.id, '', zone.id, view.pixel(top), 3, true, colours.bad);
+      this.addLabel({kind: 'zone', id: zone.id, weak: zone.id, radius: 3, far: true, above: true,
+        colour: colours.bad}, view.pixel(top));
     }
-    const tasks = scene.tasks.map(task => ({task, point: view.pixel(task.position)}))
-      .filter(({point}) => visible(point)), many = scene.tasks.length > 1000;
-    const named = tasks.filter(({task}) => ['fly', 'left', 'wait'].includes(task.kind));
-    if (tasks.length <= 4 * LABELS) {
-      for (const {task, point} of tasks) box(point, taskRadius(task.kind, many), true);
-    }
-    const first = ({task}) => (task.id === scene.pickedId ? -1 : task.place || 99);
-    if (named.length <= LABELS) {
-      for (const {task, point} of named.sort((a, b) => first(a) - first(b))) {
-        const picked = task.id === scene.pickedId, given = scene.changed.includes(task.position);
-        add('task', task.id, '', (task.place ? `${task.place}·` : '') + task.id, point,
-          picked ? RINGS.picked : given ? RINGS.given : taskRadius(task.kind, many), picked,
-          colours.ink);
-      }
-    }
-    const boxes = placeLabels(items, obstacles, view.width, view.height, this.sides);
+    this.addTasks(colours);
+    const boxes = placeLabels(this.items, this.obstacles, view.width, view.height, this.sides);
     this.drawLeaders(boxes.filter(placed => placed.ring), colours);
     this.putLabels(boxes);
+  }
+
+  isVisible([x, y]) {
+    return x >= 0 && y >= 0 && x <= this.view.width && y <= this.view.height;
+  }
+
+  // `strong` and `weak`: texts; `radius` [px] of the marker at the pixel (x, y).
+  addLabel({strong = '', weak = '', ...label}, [x, y]) {
+    if (!this.isVisible([x, y])) return;
+    const w = Math.ceil(this.textWidth(strong, true) + this.textWidth(weak)) + 2;
+    this.items.push({...label, key: `${label.kind} ${label.id}`, strong, weak, x, y, w, h: 17});
+  }
+
+  addObstacle([x, y], r, soft = false) {
+    this.obstacles.push({x: x - r, y: y - r, w: 2 * r, h: 2 * r, soft});
+  }
+
+  addUav(uav, colours) {
+    const {view, scene} = this, few = scene.uavs.length <= BIG_FLEET;
+    if (uav.position[0] === null || uav.position[1] === null) return;
+    const point = view.pixel(uav.position), short = view.width < NARROW && !uav.lost;
+    if (this.isVisible(point)) this.addObstacle(point, few ? 11 : 7);
+    if (few) {
+      this.addLabel({kind: 'uav', id: uav.id, strong: uav.id, radius: 12, far: true,
+        weak: short || !uav.note ? '' : ` ${uav.note}`,
+        colour: uav.lost ? colours.bad : colours.ink}, point);
+    }
+  }
+
+  // The task that is looked for comes first, then those that are flown next.
+  addTasks(colours) {
+    const {view, scene} = this, many = scene.tasks.length > 1000;
+    const tasks = scene.tasks.map(task => ({task, point: view.pixel(task.position)}))
+      .filter(({point}) => this.isVisible(point));
+    if (tasks.length <= 4 * LABELS) {
+      tasks.forEach(({task, point}) =>
+        this.addObstacle(point, taskRadius(task.kind, many), true));
+    }
+    const named = tasks.filter(({task}) => ['fly', 'left', 'wait'].includes(task.kind));
+    if (named.length > LABELS) return;
+    const rank = ({task}) => (task.id === scene.pickedId ? -1 : task.place || 99);
+    for (const {task, point} of named.sort((a, b) => rank(a) - rank(b))) {
+      const picked = task.id === scene.pickedId, given = scene.changed.includes(task.position);
+      this.addLabel({kind: 'task', id: task.id, far: picked, colour: colours.ink,
+        weak: (task.place ? `${task.place}·` : '') + task.id,
+        radius: picked ? RINGS.picked : given ? RINGS.given : taskRadius(task.kind, many)}, point);
+    }
   }
 
   // A line from the marker to a label that is further away.
@@ -143,7 +161,7 @@ export class Overlay {
       const label = this.shown.get(item.key);
       label.className = `label ${item.kind}`;
       label.firstChild.textContent = item.strong;
-      label.lastChild.data = item.weak || '';
+      label.lastChild.data = item.weak;
       label.style.color = item.colour;
       label.style.transform = `translate(${Math.round(x)}px, ${Math.round(y)}px)`;
     }

@@ -47,9 +47,11 @@ export function showHead(model, past) {
   $('progress').value = done;
   put($('counts'), model.uavs.length + model.ids.length === 0 ? 'waiting for UAVs and tasks'
     : `${done} of ${model.ids.length} tasks done, ${model.turns.size} to fly; `
-    + `${model.uavs.length} UAVs${silent ? `, ${silent} silent` : ''}; ${model.zones.length} zones; `
+    + `${model.uavs.length} UAVs${silent ? `, ${silent} silent` : ''}; `
+    + `${model.zones.length} zones; `
     + `${replans} re-plans`);
-  put($('rate'), clock.speedup === 1 ? '' : `at ${Number(clock.speedup.toPrecision(3))} × real time`);
+  const rate = Number(clock.speedup.toPrecision(3));
+  put($('rate'), rate === 1 ? '' : `at ${rate} × real time`);
   Object.assign($('scrub'), {min: clock.begin, max: clock.wall});
   if (!past) $('scrub').value = clock.wall;
   put($('moment'), past ? `${stamp(past.wall)}, ${span(until(clock.wall, model))} ago`
@@ -144,7 +146,8 @@ export function showLeft(model) {
     ? [...groups].map(([why, ids]) => {
       const item = make('li');
       item.append(...ids.slice(0, 12).flatMap((id, k) => [k ? ', ' : '', taskButton(id)]),
-        ids.length > 12 ? ` and ${ids.length - 12} more: ` : ': ', make('span', why, why === WAITS ? 'faint' : 'bad'));
+        ids.length > 12 ? ` and ${ids.length - 12} more: ` : ': ',
+        make('span', why, why === WAITS ? 'faint' : 'bad'));
       return item;
     }) : [make('li', model.ids.length ? 'Every task has a UAV.' : 'No task yet.', 'none')]);
 }
