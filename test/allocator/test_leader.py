@@ -88,7 +88,7 @@ def test_finding_22_the_present_leader_stays(fleet, started):
         '1970-01-01T00:00:00+00:00); this one publishes nothing until it is restarted')
 
 
-@pytest.mark.parametrize('order', permutations([(1, 'b'), (2, 'a'), (2, 'c')]))
+@pytest.mark.parametrize('order', list(permutations([(1, 'b'), (2, 'a'), (2, 'c')])))
 def test_finding_22_of_several_starts_at_once_the_earliest_leads(fleet, order):
     for each in order:
         fleet.start(*each)
