@@ -65,6 +65,18 @@ def test_ages_are_in_seconds_of_the_fleet():
     assert shown.endswith('authority lost for 48 s: why')
 
 
+def test_a_uav_shows_what_the_allocator_says_of_it():
+    def said(**warnings):
+        return {'wall': BEGIN + 1.0, 'kind': 'uploads', 'uploads': {}, 'uav_warnings': {
+            'allocator: allocation': warnings}, 'health': {'u1': [1, 'link stale']}}
+    inside = said(u2='on the ground inside zone base: no tasks', u1='inside zone base')
+    shown = updates(FIRST, [inside])[0]['uavs']
+    assert [shown[uav]['health'] for uav in ('u1', 'u2')] == [
+        'link stale; inside zone base', 'on the ground inside zone base: no tasks']
+    shown = updates(FIRST, [inside], [said()])[0]['uavs']
+    assert [shown[uav]['health'] for uav in ('u1', 'u2')] == ['link stale', '']
+
+
 def test_a_stamp_of_another_clock_is_ignored():
     line = {**FIRST[3], 'stamp': 17.0}  # simulated time
     assert updates([line])[0]['list u1']['tasks'][0]['at'] == BEGIN + 10.0

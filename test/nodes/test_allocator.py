@@ -353,3 +353,20 @@ def test_a_corrupt_journal_is_set_aside_and_reported(start, probe, fleet, tmp_pa
     probe.until(lambda: fleet.route('a') == ['t1'])
     probe.until(lambda: health and 'set aside as' in health[-1].status[0].message)
     assert health[-1].status[0].level == DiagnosticStatus.WARN
+
+
+def test_a_uav_that_starts_inside_a_zone_is_warned_of_and_gets_no_tasks(start, probe, fleet):
+    health = probe.collect(DiagnosticArray, '/diagnostics', 10)
+    node = begin(start, fleet)
+    fleet.zones.publish(m.ThreatZoneArray(zones=[m.ThreatZone(
+        zone_id='base', shape=m.ThreatZone.CYLINDER, center=Point(), radius=50.0, z_max=100.0)]))
+    fleet.uav('a', 0.0, home=Point(), mode=m.UavState.STANDBY)
+    fleet.tasks.publish(add(task('t1', 500)))
+    reason = 'a is on the ground inside zone base'
+    probe.until(lambda: reason in fleet.status('t1').reason)
+    assert fleet.status('t1').state == S.UNASSIGNED
+    probe.until(lambda: any(
+        (pair.key, pair.value) == ('warning of a', 'on the ground inside zone base: no tasks')
+        for msg in health for row in msg.status for pair in row.values))
+    [line] = [line for line in node.output().splitlines() if f'{reason}: it gets no tasks' in line]
+    assert line.startswith('[WARN]')

@@ -11,6 +11,7 @@ from uav_task_alloc.allocator.state.published_lists import finish_time
 from uav_task_alloc.allocator.state.world import World
 from uav_task_alloc.allocator.state.zone_checks import blocked_text
 from uav_task_alloc.errors import first_of
+from uav_task_alloc.record.message_records import UAV_WARNING
 
 _MAX_NAMED = 20  # UAVs in a warning
 _MAX_STRANDED = 5  # warnings of UAVs without a safe path home
@@ -115,6 +116,19 @@ def _uav_warnings(fleet: Fleet) -> list[str]:
             for text, uavs in (('silent', silent), ('battery low', low)) if uavs]
 
 
+def _zone_warnings(world: World) -> list[tuple[str, str]]:
+    """Ids of UAVs that get no tasks, are inside a zone, or have no safe path home, and why."""
+    found = []
+    for uav_id, record in sorted(world.uav_records().items()):
+        inside = f'inside zone {record.zone}' if record.zone else ''
+        blocked = record.blocked_on_ground and f'{record.blocked_on_ground}: no tasks'
+        why = world.zone_checks.stranded.get(uav_id, '')
+        text = blocked or inside or (why and f'no safe path home: {why}')
+        if text and not record.silent:
+            found.append((uav_id, text.removeprefix(f'{uav_id} is ')))
+    return found[:_MAX_NAMED]
+
+
 def health_values(world: World, solving: bool) -> dict[str, object]:
     """Return numbers of UAVs, tasks and zones, and the revision in force, by name.
 
@@ -123,10 +137,12 @@ def health_values(world: World, solving: bool) -> dict[str, object]:
         solving: a plan is being computed.
 
     Returns:
-        Counts of UAVs, zones and of tasks by state; the revision of the allocation.
+        Counts of UAVs, zones and of tasks by state; the revision of the allocation; what is wrong
+        with single UAVs.
     """
     states = Counter(record.state for record in world.task_records().values())
-    return {'UAVs known': len(world.uav_records()),
+    return {**{f'{UAV_WARNING}{uav_id}': text for uav_id, text in _zone_warnings(world)},
+            'UAVs known': len(world.uav_records()),
             'UAVs available': len(world.fleet.usable_ids()),
             'zones': len(world.zones), 'revision': world.revision,
             **{f'tasks {state.name}': states[state] for state in TaskState

@@ -133,12 +133,11 @@ class Scene:
         return self.list(name.removeprefix('list '))
 
     def uav(self, uav: str, state: Line) -> LogEntry:
-        """One UAV; `wall`: [unix s] of its last state, `health`: text of its diagnostics.
+        """One UAV; `wall`: [unix s] of its last state, `health`: what is wrong.
 
         `speed` [m/s] and `course` [deg from north] over ground, `course` only of a UAV that moves;
         `home`: [m], its height.
         """
-        level, text = self.run.health.get(uav, (0, ''))
         battery, home = state['battery'], state.get('home', (None,))[-1]
         return {'wall': round(state['wall'], 1), 'position': to_decimetres(state['position']),
                 **motion(state['velocity']), 'home': home and round(home, 1),
@@ -146,7 +145,7 @@ class Scene:
                 'active': state['active'], 'revision': state['list_revision'],
                 'battery': None if battery is None else round(battery, 3),
                 'range': state['range_remaining'] and round(state['range_remaining']),
-                'available': state['available'], 'health': text if level else ''}
+                'available': state['available'], 'health': self.run.trouble(uav)}
 
     def authority(self, uav: str, state: Line) -> LogEntry:
         """Authority over a UAV: `state`, `since` [unix s], `why`, and what gives it `back`.

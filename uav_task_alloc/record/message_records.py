@@ -28,6 +28,7 @@ MODES = ('UNKNOWN', 'STANDBY', 'TAKEOFF', 'ON_MISSION', 'HOLD', 'RETURNING', 'LA
 MISSIONS = ('UNKNOWN', 'UPLOADING', 'VERIFIED', 'MIXED', 'FOREIGN')
 AUTHORITIES = ('UNKNOWN', 'NONE', 'HELD', 'SUSPENDED', 'LOST')
 _COUNT = re.compile('[0-9]{1,18}')  # int() refuses some strings for which isdigit() is true
+UAV_WARNING = 'warning of '  # a key of an allocator begins so, and ends with the id of a UAV
 NOTHING = 'nothing is needed'  # value of `given_back_by` while the bridge has authority
 _FRAME_LOCAL, _FRAME_WGS84 = 0, 1  # of a Task message
 
@@ -207,10 +208,11 @@ def uploads_record(msg: _Message) -> RecordBody:
     Returns:
         Kind `uploads`. `uploads`: counts by name of the status; `health`: [level, text] by
         hardware id, which is the UAV in statuses of a bridge; `authority`, `clock_rates`: by
-        UAV.
+        UAV; `uav_warnings`: texts by UAV, by name of the status of an allocator.
     """
     return {'kind': 'uploads', 'uploads': dict(_upload_counts(msg)), 'authority': dict(
-        _authority(msg)), 'clock_rates': dict(_clock_rates(msg)), 'health': {
+        _authority(msg)), 'clock_rates': dict(_clock_rates(msg)), 'uav_warnings': dict(
+        _uav_warnings(msg)), 'health': {
         status.hardware_id or status.name: [
             status.level if isinstance(status.level, int) else ord(status.level), status.message]
         for status in msg.status}}
@@ -233,6 +235,15 @@ def _authority(msg: _Message) -> Iterable[tuple[str, RecordBody]]:
                 'state': values['authority'], 'why': values.get('authority_why', ''),
                 'for': _seconds_or_none(values.get('authority_for', '')),
                 'back': '' if back == NOTHING else back}
+
+
+def _uav_warnings(msg: _Message) -> Iterable[tuple[str, dict[str, str]]]:
+    """By allocator: what is wrong with single UAVs."""
+    for status in msg.status:
+        values = {pair.key: pair.value for pair in status.values}
+        if 'UAVs known' in values:
+            yield status.name, {key.removeprefix(UAV_WARNING): text
+                                for key, text in values.items() if key.startswith(UAV_WARNING)}
 
 
 def _clock_rates(msg: _Message) -> Iterable[tuple[str, float]]:

@@ -90,6 +90,7 @@ class RunState:
     verified: dict[str, set[int]] = field(default_factory=dict)  # list revisions on board, by UAV
     upload_counts: dict[str, int] = field(default_factory=dict)  # by UAV, from diagnostics
     health: dict[str, tuple[int, str]] = field(default_factory=dict)  # level, text by UAV
+    uav_warnings: dict[str, dict[str, str]] = field(default_factory=dict)  # by allocator, by UAV
     authority: dict[str, ReportedAuthority] = field(default_factory=dict)  # by UAV
     speedup: float = 1.0  # scenario seconds in a second of wall time
     origin: Origin | None = None  # of the ENU frame; None: not known yet
@@ -164,6 +165,7 @@ class RunState:
         self.upload_counts.update(line['uploads'])
         self.health.update((uav, (level, text))
                            for uav, (level, text) in line.get('health', {}).items())
+        self.uav_warnings.update(line.get('uav_warnings', {}))
         self.clock_rates.update(line.get('clock_rates', {}))
         if self.measured and self.clock_rates:
             rate = median(self.clock_rates.values())
@@ -176,6 +178,12 @@ class RunState:
                     and abs(since - old.since) < SINCE_TOLERANCE):
                 since = old.since
             self.authority[uav] = ReportedAuthority(row['state'], row['why'], since, row['back'])
+
+    def trouble(self, uav: str) -> str:
+        """What is wrong with a UAV, by its bridge and the allocators; '' where all is well."""
+        level, text = self.health.get(uav, (0, ''))
+        warnings = [each[uav] for each in self.uav_warnings.values() if uav in each]
+        return '; '.join([text] * bool(level) + warnings)
 
     @property
     def uploads(self) -> int:

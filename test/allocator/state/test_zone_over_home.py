@@ -5,7 +5,7 @@ from allocation import AllocatorDriver
 
 from uav_task_alloc import plan
 from uav_task_alloc.allocator.persistence.restore import restored_state
-from uav_task_alloc.allocator.status import health_warnings
+from uav_task_alloc.allocator.status import health_values, health_warnings
 from uav_task_alloc.model import ThreatZone
 
 HOME = (0.0, 0.0, 0.0)
@@ -176,6 +176,12 @@ def test_finding_19_a_uav_on_the_ground_inside_a_zone_gets_no_tasks(where, route
             'the home of a is inside zone base')
     assert f'{text}: it gets no tasks' in driver.notes
     assert health_warnings(driver.world, '')[0] == f'{text}: no tasks'
+    shown = text.removeprefix('a is ')
+    assert health_values(driver.world, False)['warning of a'] == f'{shown}: no tasks'
+    assert 'warning of b' not in health_values(driver.world, False)
+    driver.world.set_zones([], (), driver.now)
+    driver.settle()
+    assert 'warning of a' not in health_values(driver.world, False)
 
 
 def test_finding_19_tasks_of_a_uav_on_the_ground_inside_a_zone_have_that_reason():
