@@ -14,12 +14,21 @@ from uav_task_alloc.live.server import PageServer
 FOLDER = Path(__file__).parents[2] / 'docs/live_view'
 
 
-def best_moment(update):
-    """(scenario time [s], plan) of the plan that reassigned most tasks."""
-    plan = max(update['plans'], key=lambda plan: sum(
-        bool(before) for row in plan['changes'] for _, before in row['added']))
+def best_moment(out_dir):
+    """(snapshots, plan, task left out) 2 s after the plan that reassigned most tasks of those
+    after which a task was left out."""
+    def reassigned(plan):
+        return sum(bool(before) for row in plan['changes'] for _, before in row['added'])
+
+    update = json.loads(play(out_dir).updates_since(0)[1])
     clock = update['clock']
-    return (plan['wall'] - clock['start']) * clock['speedup'], plan
+    for plan in sorted(update['plans'], key=reassigned, reverse=True):
+        snapshots = play(out_dir, (plan['wall'] - clock['start']) * clock['speedup'] + 2.0)
+        statuses = json.loads(snapshots.updates_since(0)[1])['parts']['statuses']
+        left = [task for task, (state, *_) in statuses.items() if state == 'UNASSIGNED']
+        if left:
+            return snapshots, plan, left[0]
+    raise SystemExit(f'{out_dir}: expected a run in which a task was left out')
 
 
 def save(name, png):
@@ -52,19 +61,15 @@ def take(page, plan, left):
     save('past', page.locator('footer').screenshot())
     page.set_viewport_size({'width': 390, 'height': 844})
     chromium.open_page(page, page.url)
-    search(page, left)
     save('phone', page.screenshot())
 
 
 def main():
-    """Take the screenshots of a recorded run 2 s after its best moment."""
+    """Take the screenshots of a recorded run at its best moment."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument('out_dir', type=Path, help='a folder with record.jsonl of a demo')
     args = parser.parse_args()
-    at, plan = best_moment(json.loads(play(args.out_dir).updates_since(0)[1]))
-    snapshots = play(args.out_dir, at + 2.0)
-    statuses = json.loads(snapshots.updates_since(0)[1])['parts']['statuses']
-    left = next(task for task, (state, *_) in statuses.items() if state == 'UNASSIGNED')
+    snapshots, plan, left = best_moment(args.out_dir)
     server = PageServer(snapshots, '127.0.0.1', 0)
     server.start()
     FOLDER.mkdir(exist_ok=True)
