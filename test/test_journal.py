@@ -9,7 +9,15 @@ import sys
 import pytest
 
 from uav_task_alloc.errors import JournalCorrupt, JournalError, JournalForeign, JournalInUse
-from uav_task_alloc.journal import FILE_NAME, VERSION, Journal, JournalRow, recover_rows, set_aside
+from uav_task_alloc.journal import (
+    FILE_NAME,
+    VERSION,
+    Journal,
+    JournalRow,
+    _primary_code,
+    recover_rows,
+    set_aside,
+)
 
 WRITER = """
 import sys
@@ -20,6 +28,20 @@ for k in count():
     journal.put([JournalRow('a', str(k), k), JournalRow('b', str(k), k)])
     print(k, flush=True)
 """
+
+
+@pytest.mark.parametrize(('text', 'code'), [
+    ('database is locked', 'SQLITE_BUSY'), ('database table is locked: x', 'SQLITE_LOCKED'),
+    ('file is not a database', 'SQLITE_NOTADB'),
+    ('malformed database schema (x)', 'SQLITE_CORRUPT'),
+    ('database disk image is malformed', 'SQLITE_CORRUPT')])
+def test_an_error_without_a_code_as_in_python_3_10_is_known_by_its_text(text, code):
+    error = sqlite3.OperationalError(text)
+    assert not hasattr(error, 'sqlite_errorcode')
+    if hasattr(sqlite3, code):
+        assert _primary_code(error) == getattr(sqlite3, code)
+    assert _primary_code(sqlite3.OperationalError(f'no such table: {text}')) == 0
+    assert _primary_code(OSError(text)) == 0
 
 
 def test_rows_that_were_put_are_loaded_after_a_restart(tmp_path):

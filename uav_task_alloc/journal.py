@@ -22,8 +22,13 @@ WAIT = 0.5  # [s] for the lock of another process
 _MIN_SIZE = 16  # [bytes] header of SQLite, which takes a shorter file for a new database
 _MAX_SIZE = 2**30  # [bytes] a corrupt header may declare any length
 _COLUMNS = ['kind', 'id', 'body']
-_IN_USE = frozenset({sqlite3.SQLITE_BUSY, sqlite3.SQLITE_LOCKED})
-_DAMAGED = frozenset({sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB})
+# primary result codes of SQLite, and its texts for them: Python has the codes of errors
+# from 3.11 on
+_BUSY, _LOCKED, _CORRUPT, _NOTADB = 5, 6, 11, 26
+_IN_USE, _DAMAGED = frozenset({_BUSY, _LOCKED}), frozenset({_CORRUPT, _NOTADB})
+_TEXTS = {'database is locked': _BUSY, 'database table is locked': _LOCKED,
+          'database disk image is malformed': _CORRUPT, 'malformed database schema': _CORRUPT,
+          'file is not a database': _NOTADB}
 _SELECT = 'SELECT kind, id, body FROM world'
 
 
@@ -142,14 +147,22 @@ class Journal:
             self._db.close()
 
     def _error(self, what: str, error: Exception) -> JournalError:
-        # the low byte is the primary code; errors of the Python module itself have none
-        code = getattr(error, 'sqlite_errorcode', 0) & 0xff
-        kind = JournalError
+        kind, code = JournalError, _primary_code(error)
         if code in _IN_USE:
             kind = JournalInUse
         elif code in _DAMAGED:
             kind = JournalCorrupt
         return kind(f'{self.path} cannot be {what}: {error}')
+
+
+def _primary_code(error: Exception) -> int:
+    """The low byte of SQLite's result code; 0 for errors that are not of SQLite."""
+    if not isinstance(error, sqlite3.Error):
+        return 0
+    code = getattr(error, 'sqlite_errorcode', None)
+    if code is None:
+        return next((each for text, each in _TEXTS.items() if str(error).startswith(text)), 0)
+    return int(code) & 0xff
 
 
 def _connect(path: Path, wait: float = WAIT) -> Any:
