@@ -11,6 +11,7 @@ from pathlib import Path
 from uav_task_alloc.errors import AllocError, InvalidValue
 
 FIGURE_SUFFIXES = ('.png', '.pdf', '.svg')
+_INPUT_SUFFIXES = ('.yaml', '.yml', '.mcap')  # a file that took long to make is not replaced
 EXTRAS = {  # of setup.py, by the package that is imported
     'matplotlib': 'plot', 'aiohttp': 'view', 'mcap': 'view', 'mcap_ros2': 'view',
     'plotly': 'view', 'distributed': 'study', 'ortools': 'study', 'pyvrp': 'study'}
@@ -40,7 +41,7 @@ def check_file(option: str, path: Path | None, suffixes: Sequence[str] = (),
     Args:
         option: for errors: `--json`.
         path: of the file; None, where the option is not given, is accepted.
-        suffixes: the name ends with one of them; none: any name.
+        suffixes: the name ends with one of them; none: any but those of inputs.
         inputs: files that the command reads or writes otherwise, and that it must not be.
 
     Raises:
@@ -50,6 +51,9 @@ def check_file(option: str, path: Path | None, suffixes: Sequence[str] = (),
         return
     if suffixes and path.suffix.lower() not in suffixes:
         raise InvalidValue(option, str(path), f'a name that ends with {" or ".join(suffixes)}')
+    if not suffixes and path.suffix.lower() in _INPUT_SUFFIXES:
+        raise InvalidValue(option, str(path), f'a name that does not end with {path.suffix}, as '
+                           'scenarios and recordings do')
     with naming(option, path):
         if path.is_dir():
             raise InvalidValue(option, str(path), 'a file, and this is a folder')
