@@ -43,6 +43,18 @@ def test_the_command_line_of_a_workspace_is_on_path_and_no_node_is():
     assert done.stdout.startswith('uav_task_alloc ')
 
 
+@pytest.mark.parametrize('delay', [0.01, 0.02, 0.04, 0.1, 0.2, 0.3, 0.8])  # [s], as below
+def test_the_command_line_ends_without_a_traceback_however_early_the_signal(delay):
+    process = subprocess.Popen([SHARE.parents[1] / 'bin/uav_task_alloc', 'plan', DEMO,
+                                '--budget', '600'], stderr=subprocess.PIPE, text=True)
+    time.sleep(delay)
+    process.send_signal(signal.SIGINT)
+    _, err = process.communicate(timeout=30)
+    assert 'Traceback' not in err
+    assert (process.returncode, err.splitlines()[-1:]) in (
+        (130, ['interrupted']), (-signal.SIGINT, []))  # that of sh, in its first milliseconds
+
+
 @pytest.mark.parametrize('name', params.NODES)
 @pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM], ids=lambda n: n.name)
 def test_a_node_exits_in_order_on_a_signal(start, probe, name, number):
