@@ -59,6 +59,14 @@ def test_what_cannot_be_served_ends_with_one_line(folder, arguments, expected):
     assert str(end.value).startswith(expected)
 
 
+@pytest.mark.parametrize('port', ['x', '65536', '-1', '١'])
+def test_a_port_that_is_none_is_refused_without_a_list_of_all(port, folder, capsys):
+    with pytest.raises(SystemExit, match='2'):
+        main([str(folder), f'--port={port}'])
+    assert capsys.readouterr().err.endswith(
+        f'argument --port: {port!r}: expected a whole number in [0, 65535]\n')
+
+
 def test_a_replay_without_aiohttp_says_what_to_install(folder, monkeypatch):
     monkeypatch.setitem(sys.modules, 'aiohttp', None)
     monkeypatch.delitem(sys.modules, 'uav_task_alloc.live.server', raising=False)

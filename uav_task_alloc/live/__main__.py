@@ -62,7 +62,7 @@ def _arguments(argv: list[str] | None) -> argparse.Namespace:
                         'live_view with the parameter out_dir leaves')
     parser.add_argument('--host', default='127.0.0.1', help='address to serve the page on; '
                         '0.0.0.0: to the whole network, without password (%(default)s)')
-    parser.add_argument('--port', type=int, choices=range(65536), metavar='PORT', default=0,
+    parser.add_argument('--port', type=_port, metavar='PORT', default=0,
                         help='port of the page; 0: any free one (%(default)s)')
     parser.add_argument('--tiles', default='', metavar='PLACE', help='map tiles under the fleet: '
                         'a folder with {z}/{x}/{y}.png in it, or a URL with {z}, {x} and {y} '
@@ -70,6 +70,13 @@ def _arguments(argv: list[str] | None) -> argparse.Namespace:
     parser.add_argument('--tiles-attribution', default='', metavar='TEXT',
                         help='text that the provider of the tiles wants shown')
     return parser.parse_args(argv)
+
+
+def _port(text: str) -> int:
+    """Read a port; `choices` of argparse would list all 65536."""
+    if not text.isascii() or not text.isdigit() or int(text) > 65535:
+        raise argparse.ArgumentTypeError(f'{text!r}: expected a whole number in [0, 65535]')
+    return int(text)
 
 
 def serve(snapshots: SnapshotStore, host: str, port: int, tiles: TileSource | None,
