@@ -143,9 +143,15 @@ def test_a_moment_of_the_past_is_shown_and_then_the_present_again(view, run):
 def test_a_silent_uav_is_marked(view, run):
     page = view(run.snapshots)
     assert 'link good' in text(page, '#uavs')
+    assert page.is_hidden('#alarm')
     run.add(uavs(BEGIN + 30)[0])
     wait(page, '#counts', '2 UAVs, 1 silent')
     assert 'silent for 0:10' in text(page, '#uavs details:nth-child(2)')
+    assert text(page, '#alarm') == '▲ u2: silent'
+    page.click('#alarm')
+    page.wait_for_selector('#uavs details:nth-child(2)[open]')
+    run.add(*uavs(BEGIN + 31))
+    page.wait_for_selector('#alarm', state='hidden')
 
 
 def test_a_page_says_that_it_is_stale_and_reconnects_automatically(view, run, serve):

@@ -176,6 +176,7 @@ function theme(name) {
 $('scrub').oninput = event => goTo(Number(event.target.value));
 $('live').onclick = goLive;
 $('find').oninput = draw;
+$('alarm').onclick = () => openCard($('alarm').dataset.uav);
 $('uavs').oninput = draw;
 $('theme').onclick = () => {
   theme(theme() === 'dark' ? 'light' : 'dark');

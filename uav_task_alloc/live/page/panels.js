@@ -52,6 +52,7 @@ export function showHead(model, past) {
     + `${replans} re-plans`);
   const rate = Number(clock.speedup.toPrecision(3));
   put($('rate'), rate === 1 ? '' : `at ${rate} × real time`);
+  showAlarm(model.uavs.filter(uav => uav.trouble));
   Object.assign($('scrub'), {min: clock.begin, max: clock.wall});
   if (!past) $('scrub').value = clock.wall;
   put($('moment'), past ? `${stamp(past.wall)}, ${span(until(clock.wall, model))} ago`
@@ -60,6 +61,15 @@ export function showHead(model, past) {
   put($('live'), (past ? '↦ To ' : end ? '■ ' : '● ') + (end ? 'the end' : 'live'));
   $('live').setAttribute('aria-pressed', String(!past));
   document.body.classList.toggle('past', !!past);
+}
+
+// UAVs with a problem; without times, as screen readers announce each change.
+function showAlarm(uavs) {
+  const why = uav => (uav.lost ? 'silent' : uav.taken ? 'authority LOST'
+    : uav.mode === 'FAULT' ? 'fault' : uav.health);
+  $('alarm').hidden = !uavs.length;
+  $('alarm').dataset.uav = uavs[0]?.id ?? '';
+  put($('alarm'), `▲ ${some(uavs.map(uav => `${uav.id}: ${why(uav)}`), 3)}`);
 }
 
 // Returns the id of the task searched for, '' where there is none.
