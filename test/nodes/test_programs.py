@@ -191,6 +191,66 @@ def test_a_file_for_all_nodes_may_have_parameters_of_others(start, probe, tmp_pa
     assert got.double_value == 1.5
 
 
+@pytest.mark.parametrize(('name', 'given', 'text'), [
+    ('fleet_sim', (), "scenario = '': expected a scenario file, by --ros-args -p scenario:=..."),
+    ('scenario_player', (), "scenario = '': expected a scenario file, by --ros-args -p scenario"),
+    ('fleet_sim', ('scenario', DEMO, 'log_file', '/'), "log_file = '/': expected a file that can"),
+    ('fleet_sim', ('scenario', DEMO, 'target', 'no.invalid:5'),
+     "target = 'no.invalid:5': expected HOST:PORT with a known host"),
+    ('live_view', ('out_dir', '/proc/none'), "out_dir = '/proc/none': expected a folder that can"),
+    ('live_view', ('host', "''"), "host = '': expected an address of this machine, 0.0.0.0 for"),
+    ('live_view', ('record', '/'), "record = '/': expected a file"),
+    ('mavlink_bridge', ('tlog', '/'), "tlog = '/': expected a file that can be written"),
+    ('mavlink_bridge', ('state_dir', '/proc/none'), "state_dir = '/proc/none': expected a folder"),
+], ids=str)
+def test_a_path_or_host_that_cannot_be_used_is_one_line(name, given, text):
+    words = [word for key, value in zip(given[::2], given[1::2], strict=True)
+             for word in ('-p', f'{key}:={value}')]
+    code, out = ask(name, '--ros-args', *words)
+    assert (code, text in out) == (1, True), out
+    assert len([line for line in out.splitlines() if '[INFO]' not in line]) == 1
+
+
+def test_a_flag_without_its_value_is_named():
+    assert ask('live_view', '--record') == (
+        2, '--record: expected a value after it; flags are --record\n')
+
+
+def hidden(folder, package):
+    """The environment of a machine without a package."""
+    (folder / f'{package}.py').write_text(
+        f'raise ModuleNotFoundError("No module named {package!r}", name={package!r})')
+    return {'PYTHONPATH': f'{folder}:{os.environ["PYTHONPATH"]}'}
+
+
+def test_a_page_without_aiohttp_says_what_to_install_and_the_node_goes_on(start, probe, tmp_path):
+    view = start('live_view', '-p', 'port:=0', env=hidden(tmp_path, 'aiohttp'))
+    probe.until(lambda: '0 of 0 tasks' in view.output())
+    code, out = view.stop()
+    assert code == 0
+    assert ("no live page: page: aiohttp is not installed: expected pip install '.[view]' in the "
+            'folder of uav_task_alloc') in out
+    assert 'Traceback' not in out
+
+
+def test_a_record_without_mcap_says_what_to_install(tmp_path):
+    assert ask('live_view', '--record', str(tmp_path / 'x.mcap'), env=hidden(
+        tmp_path, 'mcap')) == (1, "record: mcap is not installed: expected pip install '.[view]' "
+                                  'in the folder of uav_task_alloc\n')
+
+
+@pytest.mark.parametrize(('given', 'code', 'text'), [
+    (['--speedup', '0'], 1, '--speedup = 0.0: expected a number in [0.1, 100]'),
+    (['--speedup', 'x'], 2, "--speedup = 'x'"), (['--limit', '-1'], 1, '--limit = -1.0: expected'),
+    (['--bogus'], 2, "'--bogus' is unknown"), (['--out', '/proc/none'], 1, '/proc/none'),
+    (['--scenario', 'none'], 1, 'none: No such file or directory: expected a scenario file'),
+    (['--record', '/none/x.mcap'], 1, '--record = '), (['--record', '/'], 1, '--record = '),
+], ids=str)
+def test_the_demo_refuses_a_bad_option_in_one_line(tmp_path, given, code, text):
+    refused, out = ask('demo', '--out', str(tmp_path / 'out'), *given)
+    assert (refused, text in out, len(out.splitlines())) == (code, True, 1), out
+
+
 @pytest.mark.parametrize(('env', 'text'), [
     ({'PYTHONPATH': ''}, "allocator: No module named 'uav_task_alloc': expected a shell that has "
                          'sourced install/setup.bash'),

@@ -18,7 +18,9 @@ from ament_index_python.packages import get_package_prefix, get_package_share_di
 
 from uav_task_alloc import plots
 from uav_task_alloc.cli import report
-from uav_task_alloc.errors import AllocError
+from uav_task_alloc.cli.options import OptionParser
+from uav_task_alloc.cli.outputs import check_file
+from uav_task_alloc.errors import AllocError, InvalidValue
 from uav_task_alloc.nodes.ros.udp_ports import free_port
 from uav_task_alloc.record import ground_truth, run_folder
 from uav_task_alloc.scenario import load, simulation_parameters
@@ -177,27 +179,34 @@ def main(argv: list[str] | None = None) -> int:
     except KeyboardInterrupt:
         print('demo: stopped; there is no summary', file=sys.stderr)
         return _INTERRUPTED
+    except (AllocError, OSError) as error:
+        print(f'demo: {error}', file=sys.stderr)
+        return 1
 
 
 def _run(argv: list[str] | None) -> int:
     share = Path(get_package_share_directory(_PACKAGE))
-    parser = argparse.ArgumentParser(prog='demo', description=__doc__)
-    parser.add_argument('--scenario', type=Path, default=share / 'config/scenarios/demo.yaml')
-    parser.add_argument('--speedup', type=float, help="(the scenario's)")
+    parser = OptionParser('', __doc__ or '')
+    parser.prog = 'demo'
+    parser.add_argument('--scenario', type=Path, default=share / 'config/scenarios/demo.yaml',
+                        metavar='FILE', help='scenario to fly (default: %(default)s)')
+    parser.number('--speedup', 0.1, 100.0, 'how many times faster than real time',
+                  default_text='as the scenario says')
     parser.add_argument('--out', type=Path, default=Path('out/demo'), metavar='DIR',
-                        help='results; those of an earlier demo are removed (%(default)s)')
-    parser.add_argument('--limit', type=float, default=80.0, help='[s] of wall time')
-    parser.add_argument('--record', type=Path, metavar='FILE',
-                        help='MCAP file for all topics; `report FILE` draws the mission from it')
-    args = parser.parse_args(argv)
+                        help='folder of the results; those of an earlier demo are removed '
+                        '(default: %(default)s)')
+    parser.number('--limit', 1.0, 86400.0, 'wall time after which it has failed', unit='s',
+                  default=80.0)
+    parser.add_argument('--record', type=Path, metavar='FILE', help='MCAP file to record all '
+                        'topics into; `report FILE` draws the mission from it (default: none)')
+    args = parser.parsed(sys.argv[1:] if argv is None else argv)
+    if args.record and args.record.exists():
+        raise InvalidValue('--record', str(args.record), 'a file that does not exist')
+    check_file('--record', args.record)
     # several demos on one machine, or in one network, must not exchange messages
     os.environ.setdefault('ROS_DOMAIN_ID', str(1 + os.getpid() % 100))
     os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
-    try:
-        return fly_scenario(args)
-    except (AllocError, OSError) as error:
-        print(error, file=sys.stderr)
-        return 1
+    return fly_scenario(args)
 
 
 if __name__ == '__main__':

@@ -2,11 +2,14 @@
 """Simulates the UAVs of a scenario as ArduPilot and PX4 vehicles with MAVLink connections."""
 from __future__ import annotations
 
+import socket
+
 from rclpy.node import Node
 from uav_task_alloc_msgs.srv import SetAvailability
 
 from uav_task_alloc import scenario
-from uav_task_alloc.nodes.ros.parameters import declare
+from uav_task_alloc.errors import InvalidValue
+from uav_task_alloc.nodes.ros.parameters import declare, given
 from uav_task_alloc.nodes.ros.run import run
 from uav_task_alloc.params import FleetSimParams
 from uav_task_alloc.sim.config import VehicleConfig
@@ -25,10 +28,10 @@ class FleetSim(Node):
     def __init__(self) -> None:
         super().__init__('fleet_sim')
         params = declare(self, FleetSimParams).now
-        played = scenario.load(params.scenario)
+        played = scenario.load(given('scenario', params.scenario, 'a scenario file'))
         self.fleet = UdpFleet(
             [(vehicle_config(uav, played, params), uav.autopilot) for uav in played.uavs],
-            to_address(params.target), params.speedup, params.log_file)
+            known_address(params.target), params.speedup, params.log_file)
         self.thread = self.fleet.start()
         self.create_service(SetAvailability, '~/set_alive', self.set_alive)
         self.get_logger().info(f'{played.name}: {len(played.uavs)} vehicles send to '
@@ -49,6 +52,15 @@ class FleetSim(Node):
         self.thread.join()
         self.fleet.close()
         super().destroy_node()
+
+
+def known_address(target: str) -> tuple[str, int]:
+    """The address of the bridge: IPv4 address, port. Raises InvalidValue."""
+    host, port = to_address(target)
+    try:
+        return socket.gethostbyname(host), port
+    except OSError as error:
+        raise InvalidValue('target', target, f'HOST:PORT with a known host ({error})') from None
 
 
 def vehicle_config(uav: scenario.ScenarioUav, played: scenario.Scenario,

@@ -18,6 +18,7 @@ from uav_task_alloc_msgs import msg as m
 
 from uav_task_alloc import scenario
 from uav_task_alloc.checks import is_ros_name
+from uav_task_alloc.cli.outputs import NotInstalled
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.live.scene import Scene
 from uav_task_alloc.live.snapshot_store import SnapshotStore
@@ -204,20 +205,27 @@ class LiveView(Node):
         if not self.params.out_dir:
             return None
         folder = Path(self.params.out_dir)
-        folder.mkdir(parents=True, exist_ok=True)
-        return (folder / RECORD_FILE).open('w', encoding='utf-8')
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            return (folder / RECORD_FILE).open('w', encoding='utf-8')
+        except OSError as error:
+            raise InvalidValue('out_dir', self.params.out_dir,
+                               f'a folder that can be written to ({error})') from None
 
     def _start_server(self) -> PageServer | None:
         """Serve the page; None, with the reason in the log, where that is not possible."""
         if not self.params.page:
             return None
+        if not self.params.host:  # would be every address
+            raise InvalidValue('host', '', 'an address of this machine, 0.0.0.0 for all')
         tiles = tile_source(self.params.tiles, self.params.tiles_attribution)
         try:
             from uav_task_alloc.live.server import PageServer
             server = PageServer(self.snapshots, self.params.host, self.params.port, tiles)
         except (OSError, ImportError) as error:
-            self.get_logger().warning(
-                f'no live page: host = {self.params.host}, port = {self.params.port}: {error}')
+            reason = str(_not_installed('page', error)) if isinstance(error, ImportError) else (
+                f'host = {self.params.host}, port = {self.params.port}: {error}')
+            self.get_logger().warning(f'no live page: {reason}')
             return None
         server.start()
         print(f'Live page: {server.address}', flush=True)
@@ -233,7 +241,9 @@ class LiveView(Node):
             recorder = BagRecorder(Path(self.params.record), self.get_namespace(), {
                 'speedup': str(self.params.speedup),
                 **{f'origin.{name}': str(value) for name, value in origin.items()}})
-        except (OSError, ImportError) as error:
+        except ImportError as error:
+            raise _not_installed('record', error) from None
+        except OSError as error:
             raise InvalidValue('record', self.params.record,
                                f'a file that can be written ({error})') from None
         recorder.start()
@@ -249,6 +259,11 @@ class LiveView(Node):
             self.file.close()
             self.file = None
         super().destroy_node()
+
+
+def _not_installed(parameter: str, error: ImportError) -> NotInstalled:
+    """The error for a parameter that needs a package, which could not be imported."""
+    return NotInstalled(parameter, (error.name or str(error)).split('.')[0])
 
 
 def main(args: list[str] | None = None) -> None:

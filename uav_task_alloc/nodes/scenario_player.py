@@ -16,7 +16,7 @@ from uav_task_alloc.nodes.conversions.messages import (
     announcement,
     from_zones,
 )
-from uav_task_alloc.nodes.ros.parameters import declare
+from uav_task_alloc.nodes.ros.parameters import declare, given
 from uav_task_alloc.nodes.ros.run import run
 from uav_task_alloc.params import PlayerParams
 
@@ -41,7 +41,7 @@ class ScenarioPlayer(Node):
     def __init__(self) -> None:
         super().__init__('scenario_player')
         params = declare(self, PlayerParams).now
-        played = scenario.load(params.scenario)
+        played = scenario.load(given('scenario', params.scenario, 'a scenario file'))
         self.speedup = params.speedup
         self.has_plan = not params.wait_for_plan
         if params.wait_for_plan:

@@ -178,7 +178,7 @@ class _Endpoint:
         for message in messages:
             frame = self._codec.pack(message)
             for address in self._parsers:
-                with contextlib.suppress(BlockingIOError, ConnectionError):
+                with contextlib.suppress(OSError):
                     self.socket.sendto(frame, address)  # lost, as on a real link
 
 
@@ -186,8 +186,12 @@ class _Log:
     """The ground truth as JSON lines."""
 
     def __init__(self, path: str | Path) -> None:
-        Path(path).parent.mkdir(parents=True, exist_ok=True)
-        self._file = open(path, 'w', encoding='utf-8')  # noqa: SIM115 - closed by close()
+        try:
+            Path(path).parent.mkdir(parents=True, exist_ok=True)
+            self._file = open(path, 'w', encoding='utf-8')  # noqa: SIM115 - closed by close()
+        except OSError as error:
+            raise InvalidValue('log_file', str(path),
+                               f'a file that can be written ({error})') from None
 
     def sample(self, uav: str, vehicle: Vehicle, now: float) -> None:
         """Write position, mode and whether the vehicle is alive."""

@@ -70,6 +70,25 @@ def declare(node: Node, kind: type[_Params]) -> LiveParameters[_Params]:
     return live
 
 
+def given(name: str, value: str, what: str) -> str:
+    """A start value that has no default.
+
+    Args:
+        name: of the parameter.
+        value: as declared; '' where it was not given.
+        what: it must be.
+
+    Returns:
+        The value.
+
+    Raises:
+        InvalidValue: it was not given.
+    """
+    if not value:
+        raise InvalidValue(name, value, f'{what}, by --ros-args -p {name}:=...')
+    return value
+
+
 def _specs(kind: type[params.CheckedParams]) -> tuple[Field[Any], ...]:
     return fields(kind)  # type: ignore[arg-type]  # every subclass is a dataclass
 

@@ -30,7 +30,7 @@ _EXPECTED = {'parameter override rule': '-p NAME:=VALUE, a list with values of o
              'remap rule': '-r FROM:=TO', 'params file': 'a parameter file',
              'log level': '--log-level debug, info, warn, error or fatal',
              'enclave': '-e NAME'}
-_REFUSALS = (AllocError, ParameterException, NameValidationException,
+_REFUSALS = (AllocError, OSError, ParameterException, NameValidationException,
              rclpy_implementation.RCLError)
 
 
@@ -42,8 +42,11 @@ def with_flags(argv: list[str], *names: str) -> list[str]:
         names: parameters of type string that may be given as flags.
 
     Returns:
-        The command line for `rclpy.init`; unchanged where there is no such flag.
+        The command line for `rclpy.init`; unchanged where there is no such flag. The process ends
+        with status 2 where one has no value.
     """
+    if argv and argv[-1] in (flags := [f'--{name}' for name in names]):
+        _refuse(f'{argv[-1]}: expected a value after it; flags are {", ".join(flags)}')
     remaining, parameters = list(argv), []
     for name in names:
         while f'--{name}' in remaining[:-1]:
