@@ -7,6 +7,7 @@ import subprocess
 import sys
 import threading
 import time
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -19,11 +20,21 @@ FILE = str(ROOT / 'config/scenarios/plan_only.yaml')
 TIMEOUT = 120.0  # [s]
 
 
+@contextmanager
 def start(*arguments, **env):
-    """A program in a group of its own, as a shell starts it."""
-    return subprocess.Popen(
-        [sys.executable, '-m', 'uav_task_alloc', *arguments], cwd=ROOT, stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE, text=True, start_new_session=True, env={**os.environ, **env})
+    """A program in a group of its own that takes SIGINT, as a shell starts it; killed at the end.
+
+    pytest itself may run where SIGINT is ignored, as jobs in the background do.
+    """
+    with subprocess.Popen(
+            [sys.executable, '-m', 'uav_task_alloc', *arguments], cwd=ROOT, text=True,
+            stdout=subprocess.PIPE, stderr=subprocess.PIPE, start_new_session=True,
+            env={**os.environ, **env},
+            preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL)) as process:
+        try:
+            yield process
+        finally:
+            process.kill()
 
 
 def until(condition, process):
@@ -88,7 +99,8 @@ def test_a_worker_process_never_takes_sigint(tmp_path):
 
 
 def test_a_caller_in_python_gets_its_handlers_back():
-    before, descriptor = signal.getsignal(signal.SIGINT), signal.set_wakeup_fd(-1)
+    before, descriptor = signal.default_int_handler, signal.set_wakeup_fd(-1)
+    signal.signal(signal.SIGINT, before)
     with prompt_interrupt():
         assert signal.getsignal(signal.SIGINT) is not before
         with resumable(), pytest.raises(KeyboardInterrupt):

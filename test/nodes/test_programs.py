@@ -46,7 +46,8 @@ def test_the_command_line_of_a_workspace_is_on_path_and_no_node_is():
 @pytest.mark.parametrize('delay', [0.01, 0.02, 0.04, 0.1, 0.2, 0.3, 0.8])  # [s], as below
 def test_the_command_line_ends_without_a_traceback_however_early_the_signal(delay):
     process = subprocess.Popen([SHARE.parents[1] / 'bin/uav_task_alloc', 'plan', DEMO,
-                                '--budget', '600'], stderr=subprocess.PIPE, text=True)
+                                '--budget', '600'], stderr=subprocess.PIPE, text=True,
+                               preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL))
     time.sleep(delay)
     process.send_signal(signal.SIGINT)
     _, err = process.communicate(timeout=30)
