@@ -54,6 +54,10 @@ def test_a_report_fits_a_phone(tab, tmp_path):
     lost = page.locator('#map .textpoint text', has_text='u1 lost at 20 s').bounding_box()
     assert lost['x'] >= 0
     assert lost['x'] + lost['width'] <= 390
+    page.wait_for_function(
+        "document.querySelectorAll('#map .textpoint text').length === 3", timeout=15_000)
+    texts = page.locator('#map .textpoint text').all_text_contents()
+    assert sorted(texts) == ['u1', 'u1 lost at 20 s', 'u2']
     for name in ('map', 'levels'):
         legend = page.locator(f'#{name} .legend').first.bounding_box()
         assert legend['x'] >= 0

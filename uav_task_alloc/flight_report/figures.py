@@ -76,7 +76,7 @@ def _add_tasks(figure: Any, history: FlightHistory) -> None:
             x=[point[0] for point in points], y=[point[1] for point in points],
             mode='markers' if len(history.tasks()) > 200 else 'markers+text',
             text=[escape(name) for name in names], textposition='top center',
-            name=f'{len(rows)} {state.lower()}', textfont={'size': 10},
+            name=f'{len(rows)} {state.lower()}', textfont={'size': 10}, meta='tasks',
             hovertext=[_task_text(history, name) for name in names], hoverinfo='text',
             marker={'size': 9, 'color': STATE_COLOURS.get(state, 'white'),
                     'line': {'width': 1, 'color': 'black'}})

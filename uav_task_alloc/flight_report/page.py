@@ -33,11 +33,17 @@ summary, h2 { font-size: 1.3em; font-weight: bold } h2 { margin: 1em 0 0 }
 td { overflow-wrap: break-word; max-width: 24em }
 @media (max-width: 600px) { body { margin: .5em auto; padding: 0 .5em } h1 { font-size: 1.4em }
   th, td { padding: 3px 6px; font-size: 13px } }"""
-# a finger scrolls the page; the buttons of a figure zoom
-FINGER_SCROLL = """if (matchMedia('(pointer: coarse)').matches) {
+# a finger scrolls the page, the buttons of a figure zoom; where names of tasks have no room, a tap
+# shows them
+ON_PHONES = """if (matchMedia('(pointer: coarse)').matches) {
   for (const plot of document.querySelectorAll('.js-plotly-plot')) {
     Plotly.relayout(plot, {dragmode: false});
   }
+}
+if (innerWidth < 600) {
+  const map = document.getElementById('map');
+  const tasks = map.data.flatMap((trace, k) => trace.meta === 'tasks' ? [k] : []);
+  if (tasks.length) Plotly.restyle(map, {mode: 'markers'}, tasks);
 }"""
 CONFIG = {'displaylogo': False, 'responsive': True,
           'showSendToCloud': False}  # a default button of plotly's toolbar
@@ -94,7 +100,7 @@ def report_page(history: FlightHistory, name: str, warnings: Iterable[str] = ())
         *(f'<p class="warning">{escape(text)}</p>' for text in warnings),
         f'<p id="times">{escape(time_text(history))}</p>',
         html_table('Key figures', (f'of {name}', ''), key_figures(history)),
-        figures, f'<script>{FINGER_SCROLL}</script>', tables(history), '</body></html>']
+        figures, f'<script>{ON_PHONES}</script>', tables(history), '</body></html>']
     return '\n'.join(parts)
 
 
