@@ -318,3 +318,13 @@ def test_tiles_of_another_server_are_loaded_by_the_browser(shown, run):
     path, referrer = TileServer.asked[0]
     assert re.fullmatch(r'/t/[0-9]+/[0-9]+/[0-9]+\.png\?key=1', path)
     assert referrer.startswith('http://127.0.0.1:')  # tile servers refuse requests without
+
+
+@pytest.mark.parametrize('speedup', [1.0, 8.0])
+def test_arrivals_are_in_the_time_of_the_run(shown, speedup):
+    line = {'kind': 'run', 'wall': BEGIN, 'speedup': speedup}
+    run = Run(speedup).add(line, *FIRST)
+    run.add(*(state(BEGIN + 0.5, uav, (0.0, 0.0)) for uav in ('u1', 'u2')))  # half a wall second
+    page = shown(run, DESK)
+    left = 10.0 - 0.5 * speedup
+    chromium.wait(page, '#uavs details:nth-child(2)', f'next t3 0:{math.floor(left + 0.5):02}')
