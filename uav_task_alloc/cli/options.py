@@ -21,6 +21,10 @@ class OptionParser(argparse.ArgumentParser):
         command: follows `uav_task_alloc`; '' for none.
         description: a sentence or more.
         epilog: printed as it is after the options.
+
+    Arguments of methods:
+        message: of argparse.
+        argv: arguments of the command.
     """
 
     def __init__(self, command: str, description: str, epilog: str = '') -> None:

@@ -18,7 +18,12 @@ EXTRAS = {  # of setup.py, by the package that is imported
 
 
 class NotInstalled(AllocError):
-    """A package is not installed; the text names what asks for it, and what installs it."""
+    """A package is not installed; the text names what asks for it, and what installs it.
+
+    Args:
+        place: what needs the package, for the text.
+        package: name of the module that is missing.
+    """
 
     def __init__(self, place: str, package: str) -> None:
         extra = EXTRAS.get(package)

@@ -76,6 +76,7 @@ class RunState:
         line: of a record.
         states: names of TaskStatus constants.
         wall: [unix s].
+        uav: id.
     """
 
     tasks: dict[str, AnnouncedTask] = field(default_factory=dict)  # announced, by id

@@ -70,6 +70,7 @@ class World:
         warning: its level in the log; otherwise information.
         kind: of a journal row.
         resend: publish unchanged lists, too.
+        debug: at the level debug.
     """
 
     def __init__(self, params: AllocatorParams, saved: SavedState,
