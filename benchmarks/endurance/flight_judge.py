@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 
+from flight_evidence import DeliveredEvidence
 from flight_world import BRIDGE, World
 from pymavlink.dialects.v20 import ardupilotmega as d
 
@@ -44,6 +45,7 @@ class Judge:
         self.failing = False
         self.stubborn = False  # the operator's last hand-over was by the sticks
         self.faults: list[str] = []
+        self.notes: list[str] = []  # what no bridge could know
         self.counts: Counter[str] = Counter()
         self.reached: Counter[str] = Counter()
         self.completed: set[str] = set()
@@ -56,6 +58,7 @@ class Judge:
         self._forgot = False  # the bridge, until its first heartbeat
         self._set_at = -math.inf  # [s] another station has set the current item
         self._crossed: set[str] = set()  # tasks whose places it crossed at such a moment
+        self._evidence = DeliveredEvidence()
         self._at = ''  # the task that it has reached, until it leaves: one visit
         self._avoids = False  # its autopilot avoids other traffic
         self._stuck_since = self._moved_at = 0.0
@@ -82,8 +85,11 @@ class Judge:
         if self._at and math.dist(self.places[self._at],
                                   self.world.vehicle.flight.body.position) > LEFT:
             self._at = ''
+        self._evidence.add_state(self.world.now, self.world.vehicle.flight)
         for event in self.world.truth:
             self._truth(event)
+        for sent, message in self.world.delivered:
+            self._evidence.delivered(sent, message)
         if self.world.now - self._set_at < PASSED:
             self._crossed.update(name for name, place in self.places.items() if math.dist(
                 place, self.world.vehicle.flight.body.position) < NEAR)
@@ -104,12 +110,7 @@ class Judge:
 
     def _truth(self, event: TruthEvent) -> None:
         if event.name == 'item_reached':
-            for name, place in self.places.items():
-                if math.dist(place, event.point) < NEAR and name != self._at:
-                    self.reached[name] += 1
-                    self._at = name
-                    if self.reached[name] == 2:
-                        self._fault('flown_twice', f'{name} reached again')
+            self._item_reached(event)
         elif event.name == 'mode' and event.mode is not None:
             before, self._mode = self._mode, event.mode
             if event.t - self._mode_at >= BEAT:
@@ -133,6 +134,30 @@ class Judge:
             self.failing = True
         elif event.name == 'failsafe_over':
             self.failing = False
+
+    def _item_reached(self, event: TruthEvent) -> None:
+        assert event.seq is not None
+        at = [(name, place) for name, place in self.places.items()
+              if math.dist(place, event.point) < NEAR]
+        name, place = at[0] if at else ('', event.point)
+        again = name == self._at
+        if name and not again:
+            self._at = name
+            self.reached[name] += 1
+            if self.reached[name] == 2 and name in self._evidence.known:
+                self._fault('flown_twice', f'{name} reached again')
+            elif self.reached[name] == 2:
+                self.counts['flown_again_unknowable'] += 1
+                self.notes.append(f'{event.t:.1f} {name} reached again: no frame that shows that '
+                                  'it was reached before was delivered')
+        self._evidence.reached('' if again else name, event.t, event.seq, place,
+                               self._service(name), self.world.now)
+
+    def _service(self, name: str) -> float:
+        """Service time [s] of a task."""
+        tasks = self.world.tasks
+        task = None if tasks is None else tasks.find(name)
+        return 0.0 if task is None else task.service_time
 
     def _mode_set(self, before: int, event: TruthEvent) -> None:
         assert event.mode is not None

@@ -79,6 +79,7 @@ class World:
         self._down = Codec(1, 1)
         self.events: list[TaskProgress] = []
         self.truth: list[TruthEvent] = []  # of the last tick
+        self.delivered: list[tuple[float, Message]] = []  # in the last tick: sent at [s], frame
         self.arrivals: list[float] = []  # when heartbeats of the last tick were sent [s]
         self.sent: list[tuple[float, Message]] = []  # by the bridge, in the last tick
         self.notes: list[str] = []
@@ -119,7 +120,7 @@ class World:
     def step(self) -> None:
         """Step the world by one TICK."""
         self.now += TICK
-        self.arrivals, self.sent = [], []
+        self.arrivals, self.sent, self.delivered = [], [], []
         self._send_down(self.vehicle.step(self.now))
         self._send_up(self.ground_station.step(self.now))
         if self.tasks is not None and not self._assigned and 1 in self.ground_station.sessions:
@@ -131,6 +132,7 @@ class World:
                     self._send_down(self.vehicle.receive(m, self.now))
             else:
                 for m in self._ear.parse(frame):
+                    self.delivered.append((sent, m))
                     if m.get_type() == 'HEARTBEAT':
                         self.arrivals.append(sent)
                     self._send_up(self.ground_station.receive('link', m, self.now))

@@ -6,7 +6,9 @@
 Each flight is one simulated ArduCopter or PX4 and one bridge over a link in virtual time; --lossy
 loses up to 20 % of the frames and delays some by up to 5 s, out of order. Judged by the records
 of the simulator and the link. `flyable` counts the tasks of flights at whose end the bridge
-controls the aircraft, `completed` those of them that it reported. --without-authority disables
+controls the aircraft, `completed` those of them that it reported. `flown_twice` counts the tasks
+flown again though a frame was delivered that shows that they were flown (see `flight_evidence`);
+`flown_again_unknowable` those of which no such frame was delivered. --without-authority disables
 the table, to show that the check can fail. --json: the last line is one object. The status is 1
 where a flight has a fault.
 """
@@ -269,7 +271,7 @@ class Flight:
         if self.gives_back:
             counts['flyable'] = len(set(self.listed) | self.judge.completed)
             counts['completed'] = len(self.judge.completed)
-        return counts, self.judge.faults
+        return counts, self.judge.faults + self.judge.notes
 
 
 def switch_authority_off() -> None:
@@ -318,7 +320,7 @@ def main() -> int:
             print(f'\r{done}/{args.flights} flights ', end='', file=sys.stderr)
     print(file=sys.stderr)
     names = ('flights', 'takeovers', 'failsafes', 'reboots', 'restarts', 'handed_back',
-             'completed', 'flyable', *WRONG)
+             'completed', 'flyable', *WRONG, 'flown_again_unknowable')
     result = {name: total[name] for name in (*names, *sorted(set(total) - set(names)))}
     result |= {'seed': args.seed, 'lossy': args.lossy}
     for name, value in result.items():

@@ -1,0 +1,129 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Which tasks a bridge could know to be flown, by the frames delivered to it and nothing else."""
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from flight_world import TICK
+from pymavlink.dialects.v20 import ardupilotmega as d
+
+from uav_task_alloc.mavlink.transport.codec import Message
+from uav_task_alloc.model import Point
+from uav_task_alloc.sim.config import FlightMode
+from uav_task_alloc.sim.flight import VehicleFlight
+from uav_task_alloc.sim.stored_item import StoredItem
+
+NEAR = 2.0  # [m] from a task: at its item
+SAMPLED = 0.5  # [s] by which a hold may be shorter between two positions
+KEPT = 60.0  # [s] of positions, and of states of the vehicle
+
+
+@dataclass(frozen=True, slots=True)
+class _State:
+    """The vehicle when frames of one tick were sent."""
+
+    point: Point
+    seq: int | None  # the item that it flies in mission mode
+    items: tuple[StoredItem, ...]
+    booted: float  # [s]
+
+
+@dataclass(slots=True)
+class _Visit:
+    """The first time that the item of a task was reached."""
+
+    at: float  # [s]
+    seq: int
+    place: Point
+    hold: float  # [s]
+    state: _State
+    next_at: float = math.inf  # [s] the next item was reached
+
+
+class DeliveredEvidence:
+    """Follows each first visit of a task until a frame that shows it was delivered.
+
+    Evidence is MISSION_ITEM_REACHED of that visit, MISSION_CURRENT past its item (or COMPLETE) of
+    the same items, or positions at the place while its item was current, for its service time.
+    """
+
+    def __init__(self) -> None:
+        self.known: set[str] = set()  # tasks with evidence
+        self._visits: dict[str, _Visit] = {}
+        self._states: dict[int, _State] = {}  # by tick
+        self._positions: list[float] = []  # [s] when each delivered position was sent
+
+    def add_state(self, now: float, flight: VehicleFlight) -> None:
+        """Record the vehicle as the frames of this tick show it."""
+        mission = flight.mode is FlightMode.MISSION
+        self._states[_tick(now)] = _State(
+            flight.body.position, flight.seq if mission else None, tuple(flight.items),
+            flight.booted)
+        self._states.pop(_tick(now - KEPT), None)
+
+    def reached(self, task: str, at: float, seq: int, place: Point, hold: float,
+                now: float) -> None:
+        """Note that the simulator has reached an item.
+
+        Args:
+            task: its id; '': the item is of no task, or of one that it has not left since.
+            at: time of the event [s].
+            seq: of the item.
+            place: of the task, ENU [m].
+            hold: service time [s].
+            now: time of the tick [s].
+        """
+        for visit in self._visits.values():
+            visit.next_at = min(visit.next_at, at)
+        if task and task not in self._visits:
+            self._visits[task] = _Visit(at, seq, place, hold, self._states[_tick(now)])
+            self._judge_positions()
+
+    def delivered(self, sent: float, message: Message) -> None:
+        """Take a frame of the vehicle that was delivered to the bridge.
+
+        Args:
+            sent: when it was sent [s].
+            message: its content.
+        """
+        kind = message.get_type()
+        if kind == 'GLOBAL_POSITION_INT' and (message.lat, message.lon) != (0, 0):
+            self._positions = [t for t in self._positions if t > sent - KEPT] + [sent]
+            self._judge_positions()
+        elif kind in ('MISSION_ITEM_REACHED', 'MISSION_CURRENT'):
+            for task, visit in self._visits.items():
+                if task not in self.known and sent >= visit.at and self._shows(
+                        visit, sent, message):
+                    self.known.add(task)
+
+    def _shows(self, visit: _Visit, sent: float, message: Message) -> bool:
+        if message.get_type() == 'MISSION_ITEM_REACHED':
+            return bool(message.seq == visit.seq) and sent < visit.next_at
+        past = message.seq > visit.seq or (
+            message.seq == visit.seq and message.mission_state == d.MISSION_STATE_COMPLETE)
+        state, end = self._states.get(_tick(sent)), visit.seq + 1
+        return past and state is not None and state.booted == visit.state.booted and (
+            state.items[:end] == visit.state.items[:end])
+
+    def _judge_positions(self) -> None:
+        for task, visit in self._visits.items():
+            if task in self.known:
+                continue
+            times = [t for t in self._positions if t <= visit.at + TICK and self._at(visit, t)]
+            if times and max(times) - min(times) >= visit.hold - SAMPLED:
+                self.known.add(task)
+
+    def _at(self, visit: _Visit, sent: float) -> bool:
+        """Whether a position was sent at the place while its item was current."""
+        state = self._states.get(_tick(sent))
+        return state is not None and (
+            state.seq == visit.seq or sent >= visit.at) and (
+            state.booted == visit.state.booted
+            and state.items[visit.seq:visit.seq + 1] == visit.state.items[
+                visit.seq:visit.seq + 1]
+            and math.dist(state.point, visit.place) < NEAR)
+
+
+def _tick(now: float) -> int:
+    return round(now / TICK)

@@ -1,0 +1,141 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The judge of benchmarks/endurance/flights.py: what a bridge could know, and what it ignores."""
+import sys
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+from pymavlink.dialects.v20 import ardupilotmega as d
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / 'benchmarks' / 'endurance'))
+
+from flight_evidence import DeliveredEvidence
+from flights import Flight
+
+from uav_task_alloc.mavlink.gcs.onboard_mission import OnboardMission
+from uav_task_alloc.mavlink.mission.completed_tasks import CompletedTasks
+from uav_task_alloc.mavlink.mission.progress import ProgressTable
+from uav_task_alloc.sim.config import FlightMode
+
+PLACE, AWAY = (100.0, 0.0, 50.0), (160.0, 0.0, 50.0)
+REACHED_AT = 10.0  # [s]
+
+
+class Visit:
+    """One vehicle that reaches item 2 at PLACE at REACHED_AT, and flies on."""
+
+    def __init__(self, hold=0.0):
+        self.evidence, self.hold = DeliveredEvidence(), hold
+        self.flight = SimpleNamespace(body=SimpleNamespace(position=AWAY), seq=2, booted=0.0,
+                                      mode=FlightMode.MISSION, items=['home', 'A', 'B', 'C'])
+
+    def fly(self, until=20.0):
+        """States of the vehicle, tick by tick."""
+        for tick in range(round(10 * until)):
+            now = 0.1 * tick
+            there = REACHED_AT - self.hold <= now + 1e-6 <= REACHED_AT + 0.3
+            self.flight.body.position = PLACE if there else AWAY
+            if abs(now - REACHED_AT) < 0.05:
+                self.flight.seq = 3
+            self.evidence.add_state(now, self.flight)
+            if self.flight.seq == 3 and abs(now - REACHED_AT) < 0.05:
+                self.evidence.reached('B', REACHED_AT, 2, PLACE, self.hold, now)
+        return self.evidence
+
+
+def current(seq, state=d.MISSION_STATE_ACTIVE):
+    return d.MAVLink_mission_current_message(seq, 3, state, 1)
+
+
+def position():
+    return d.MAVLink_global_position_int_message(0, 1, 1, 0, 0, 0, 0, 0, 0)
+
+
+@pytest.mark.parametrize(('sent', 'message', 'known'), [
+    (10.0, d.MAVLink_mission_item_reached_message(2), True),
+    (14.0, d.MAVLink_mission_item_reached_message(2), True),  # a repetition by PX4
+    (9.9, d.MAVLink_mission_item_reached_message(2), False),  # of an earlier mission
+    (10.0, d.MAVLink_mission_item_reached_message(1), False),
+    (10.1, current(3), True),
+    (18.0, current(3), True),
+    (10.1, current(2), False),
+    (10.1, current(2, d.MISSION_STATE_COMPLETE), True),
+    (9.0, current(3), False),  # before it was reached
+    (10.0, position(), True),
+    (9.0, position(), False),  # not there yet
+    (12.0, position(), False),  # on its way to the next item
+])
+def test_a_frame_is_evidence_where_it_shows_that_the_item_was_reached(sent, message, known):
+    evidence = Visit().fly()
+    evidence.delivered(sent, message)
+    assert ('B' in evidence.known) is known
+
+
+@pytest.mark.parametrize(('first', 'known'), [(8.0, True), (9.2, False)])
+def test_positions_are_evidence_once_they_span_the_service_time(first, known):
+    evidence = Visit(hold=2.0).fly()
+    for sent in (first, 9.9):
+        evidence.delivered(sent, position())
+    assert ('B' in evidence.known) is known
+
+
+@pytest.mark.parametrize('change', ['reboot', 'mission'])
+def test_a_current_item_of_another_mission_is_no_evidence(change):
+    visit = Visit()
+    evidence = visit.fly(11.0)
+    if change == 'reboot':
+        visit.flight.booted = 11.0
+    else:
+        visit.flight.items = ['home', 'X', 'Y', 'Z', 'B']
+    evidence.add_state(12.0, visit.flight)
+    evidence.delivered(12.0, current(3))
+    assert evidence.known == set()
+
+
+def test_a_reached_of_the_next_item_at_that_index_is_no_evidence():
+    visit = Visit()
+    evidence = visit.fly()
+    evidence.reached('C', 15.0, 2, AWAY, 0.0, 15.0)
+    evidence.delivered(15.0, d.MAVLink_mission_item_reached_message(2))
+    assert 'B' not in evidence.known
+    evidence.delivered(14.9, d.MAVLink_mission_item_reached_message(2))
+    assert 'B' in evidence.known
+
+
+def fly_random(monkeypatch, number, break_bridge):
+    """A random flight without interventions, with a bridge that is broken in one way."""
+    monkeypatch.setattr(Flight, '_schedule', lambda self: None)
+    flight = Flight(1, number, lossy=False)
+    flight.later = [(40.0, flight.new_list), (55.0, flight.new_list), (70.0, flight.new_list)]
+    break_bridge(monkeypatch)
+    flight.fly()
+    return flight.result()[0]
+
+
+def ignore_evidence(monkeypatch):
+    """Nothing is completed before 60 s: REACHED, current items and positions are ignored."""
+    for owner, name in ((ProgressTable, 'note_current'), (ProgressTable, 'note_reached'),
+                        (ProgressTable, 'note_mission_complete'), (OnboardMission, 'reached')):
+        monkeypatch.setattr(owner, name, lambda *_, **__: None)
+
+
+def complete_at_start(monkeypatch):
+    """A task is completed when it starts."""
+    def start(self, task):
+        self.complete(task, None)
+    monkeypatch.setattr(CompletedTasks, 'start', start)
+
+
+@pytest.mark.parametrize(('break_bridge', 'fault'), [
+    (ignore_evidence, 'flown_twice'), (complete_at_start, 'false_completed')])
+def test_a_bridge_that_ignores_or_invents_evidence_is_caught(monkeypatch, break_bridge, fault):
+    counts = fly_random(monkeypatch, 0, break_bridge)
+    assert counts[fault] > 0
+    assert counts['flown_again_unknowable'] == 0
+
+
+def test_a_bridge_that_takes_its_evidence_is_not_blamed(monkeypatch):
+    counts = fly_random(monkeypatch, 0, lambda _: None)
+    assert counts['completed'] > 0
+    assert counts['flown_twice'] == counts['false_completed'] == 0
+    assert counts['flown_again_unknowable'] == 0
