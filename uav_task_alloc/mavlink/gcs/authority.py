@@ -216,6 +216,9 @@ class AuthorityRecord:
     marks: tuple[TaskMark, ...] = ()  # of the last tasks
     mission: int | None = None  # checksum of the items on board
     current: int | None = None  # index of the item being flown, home not counted
+    arrived: bool = False  # the vehicle was seen at that item
+    # vehicle time [s], position [m] and velocity [m/s], both ENU, of a recent position
+    seen: tuple[float, ...] = ()
 
 
 class Authority:

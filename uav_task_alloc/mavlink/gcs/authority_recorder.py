@@ -11,6 +11,7 @@ from uav_task_alloc.mavlink.gcs.mission_evidence import MissionEvidence
 from uav_task_alloc.model import Point
 
 _MARKS, _MARK_LIFETIME = 50, 600.0  # tasks, [s]
+_POSITION_PERIOD = 1.0  # [s] between two positions that are saved
 
 
 class AuthorityRecorder:
@@ -36,6 +37,7 @@ class AuthorityRecorder:
         self._state, self._evidence = state, evidence
         self._save, self._saved = save, record
         self._mode = record.mode if record else None  # the last mode with a known reason
+        self._seen: tuple[float, ...] = ()
         self.marks: dict[str, TaskMark] = {m.task: m for m in record.marks} if record else {}
 
     def mark_task(self, task: str, position: Point | None, flown: bool, now: float) -> None:
@@ -46,6 +48,13 @@ class AuthorityRecorder:
         self.marks = {old: mark for old, mark in list(self.marks.items())[-_MARKS:]
                       if now - mark.at < _MARK_LIFETIME}
         self.marks[task] = TaskMark(task, *position, round(now, 3), flown)
+
+    def _last_position(self) -> tuple[float, ...]:
+        """The newest position, at most one each _POSITION_PERIOD."""
+        newest = self._evidence.last_position()
+        if newest and not (self._seen and 0.0 <= newest[0] - self._seen[0] < _POSITION_PERIOD):
+            self._seen = newest
+        return self._seen
 
     def save_if_changed(self) -> None:
         """Save the record where it differs from the one saved last."""
@@ -60,7 +69,7 @@ class AuthorityRecorder:
             tuple(dict.fromkeys(mode for mode, _ in sent.modes)),
             sent.arm_until > -math.inf and not state.armed and authority.held,
             state.replacing_since, sent.climb, tuple(self.marks.values()),
-            *self._evidence.mission_position())
+            *self._evidence.mission_position(), self._last_position())
         if record != self._saved:
             self._saved = record
             self._save(record)

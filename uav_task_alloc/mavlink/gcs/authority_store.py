@@ -1,9 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Stores the authority record of each UAV as a JSON file in a folder, replaced atomically."""
+"""Stores the authority record of each UAV as a JSON file in a folder, replaced atomically.
+
+The last position is in a file of its own, as it changes each second: it is not flushed to disk,
+since only a bridge that was killed needs it, not a computer that lost its power.
+"""
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import json
+import math
 import os
 import stat
 from collections.abc import Callable
@@ -16,6 +22,7 @@ from uav_task_alloc.atomic_files import replace_file, sync_folder
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.mavlink.gcs.authority import AuthorityRecord, AuthorityState, TaskMark
 
+_POSITION, _POSITION_SUFFIX = 'seen', '.position'  # field with a file of its own
 _FORMAT = 1  # of the file; one of a newer format is refused
 _NAME_LIMIT = 150  # characters; file systems allow 255 bytes
 _FILE_LIMIT = 65536  # [bytes] of a file that is read
@@ -62,6 +69,7 @@ class AuthorityFileStore:
     def __init__(self, folder: str, report: Callable[[str], object], boot: str = '') -> None:
         self._folder, self._report, self._boot = Path(folder).expanduser(), report, boot
         self._unsaved: dict[str, AuthorityRecord] = {}  # by UAV id
+        self._saved: dict[str, AuthorityRecord] = {}  # by UAV id; without its position
         self._error = ''  # the write error reported last; '' while all is on disk
         probe = self._folder / '.probe'
         try:
@@ -102,10 +110,10 @@ class AuthorityFileStore:
         if body['boot'] != self._boot:
             record = replace(record, since=0.0, marks=(),
                              replacing_since=None if record.replacing_since is None else LONG_AGO)
-        return record
+        return replace(record, seen=_position(path) if body['boot'] == self._boot else ())
 
     def save(self, uav_id: str, record: AuthorityRecord) -> None:
-        """Write a record to disk before returning.
+        """Write a record to disk before returning, its position to a file.
 
         A failure is reported once; `retry` tries again.
 
@@ -113,14 +121,23 @@ class AuthorityFileStore:
             uav_id: of the UAV.
             record: replaces the one saved before.
         """
-        self._unsaved[uav_id] = record
+        path, position = self.path(uav_id).with_suffix(_POSITION_SUFFIX), record.seen
+        record = replace(record, seen=())
+        if record != self._saved.get(uav_id):
+            self._unsaved[uav_id] = record
         self.retry()
+        if position and not self._error:
+            with contextlib.suppress(OSError):  # it is written again in a second
+                temporary = path.with_suffix('.tmp')
+                temporary.write_text(json.dumps(position))
+                os.replace(temporary, path)
 
     def retry(self) -> None:
         """Write the records that could not be written before."""
         first_error = ''
         for uav_id, record in list(self._unsaved.items()):
             path = self.path(uav_id)
+            self._saved.pop(uav_id, None)
             try:
                 replace_file(path, self._text(uav_id, record))
             except (OSError, ValueError) as error:
@@ -128,6 +145,7 @@ class AuthorityFileStore:
                 first_error = first_error or error_text
             else:
                 del self._unsaved[uav_id]
+                self._saved[uav_id] = record
         if first_error and not self._error:
             self._report(f'{first_error}; it is tried again; until then, {_CONSEQUENCE}')
         elif self._error and not first_error:
@@ -145,7 +163,7 @@ class AuthorityFileStore:
 
     def _text(self, uav_id: str, record: AuthorityRecord) -> str:
         row = {_KEYS.get(spec.name, spec.name): getattr(record, spec.name)
-               for spec in fields(record)}
+               for spec in fields(record) if spec.name != _POSITION}
         body = {'format': _FORMAT, 'uav_id': uav_id, 'boot': self._boot,
                 'record': row | {'state': record.state.name}}
         return json.dumps(body, indent=1, allow_nan=False) + '\n'
@@ -161,6 +179,17 @@ def _read(path: Path) -> str:
     return data.decode('utf-8')
 
 
+def _position(path: Path) -> tuple[float, ...]:
+    """The last position; () where the file of a record has none that can be used."""
+    try:
+        values = json.loads(_read(path.with_suffix(_POSITION_SUFFIX)))
+        usable = isinstance(values, list) and all(
+            type(value) in (int, float) and math.isfinite(value) for value in values)
+    except (OSError, ValueError, RecursionError):
+        return ()
+    return tuple(map(float, values)) if usable else ()
+
+
 def _record(body: Any, uav_id: str) -> AuthorityRecord:
     """Build the record from the JSON body. Raises ValueError with the defect."""
     if not isinstance(body, dict) or set(body) != {'format', 'uav_id', 'boot', 'record'}:
@@ -170,6 +199,8 @@ def _record(body: Any, uav_id: str) -> AuthorityRecord:
     if body['uav_id'] != uav_id:
         raise ValueError(f'uav_id = {body["uav_id"]!r:.250}: expected {uav_id!r}')
     row = body['record']
+    if isinstance(row, dict):  # files of earlier versions do not have it
+        row = {'arrived': False, **row}
     if not isinstance(row, dict) or row.keys() != _CHECKS.keys():
         raise ValueError('record: expected ' + ', '.join(_CHECKS))
     record = {}
@@ -225,4 +256,4 @@ _TYPES: dict[Any, tuple[Callable[[Any], bool], Callable[[Any], Any]]] = {
 }
 _KEYS = {'replacing_since': 'swap_at'}  # fields with another key in the file
 _CHECKS = {_KEYS.get(name, name): (name, *_TYPES[hint])
-           for name, hint in get_type_hints(AuthorityRecord).items()}
+           for name, hint in get_type_hints(AuthorityRecord).items() if name != _POSITION}

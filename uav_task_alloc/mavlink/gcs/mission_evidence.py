@@ -59,14 +59,25 @@ class MissionEvidence:
         """Whether another station has changed the verified mission."""
         return self._onboard.is_foreign
 
-    def mission_position(self) -> tuple[int | None, int | None]:
-        """Checksum of the onboard mission, and index of the item being flown; None: not known."""
+    def last_position(self) -> tuple[float, ...]:
+        """Vehicle time [s], position [m] and velocity [m/s] received last; (): on the ground."""
+        if not self._telemetry.airborne:
+            return ()
+        newest = self._onboard.progress.path.last
+        return () if newest is None else tuple(
+            round(value, 3) for value in (newest.t, *newest.position, *newest.velocity))
+
+    def mission_position(self) -> tuple[int | None, int | None, bool]:
+        """Checksum of the onboard mission, index of the item being flown, and whether it is there.
+
+        Checksum and index are None where they are not known.
+        """
         held, progress = self._onboard.held, self._onboard.progress
         if held is None or progress.current is None:
-            return None, None
+            return None, None, False
         if self._checksum is None or self._checksum[0] is not held:
             self._checksum = held, checksum(held)
         passed = progress.passed_in_order  # credited by a restarted bridge
-        return self._checksum[1], next((n for n, item in enumerate(
-            progress.items[:progress.current]) if item.task in passed),
-            progress.current) if passed else progress.current
+        current = next((n for n, item in enumerate(progress.items[:progress.current])
+                        if item.task in passed), progress.current)
+        return self._checksum[1], current, progress.has_arrived(current)

@@ -46,6 +46,8 @@ from uav_task_alloc.mavlink.transport.codec import Message
 from uav_task_alloc.mavlink.transport.notes import OperatorNote
 from uav_task_alloc.model import Task
 
+_SEEN = 7  # values of a position in the authority record
+
 
 class MissionExecutor:
     """Executes task lists on one vehicle.
@@ -100,7 +102,11 @@ class MissionExecutor:
         """Pass what the previous run recorded to `onboard.resume`."""
         resume = self.onboard.resume
         if record is not None:
-            resume.recorded = record.mission, record.current
+            resume.recorded = record.mission, record.current, record.arrived
+            if len(record.seen) == _SEEN:
+                t, x, y, z, *velocity = record.seen
+                self.onboard.progress.add_recorded_position(
+                    PositionSample(t, (x, y, z), (velocity[0], velocity[1], velocity[2])))
             resume.was_disarmed = not record.armed
             # the current item may be of the replaced mission, or set by another party
             resume.current_unreliable = (
@@ -189,8 +195,9 @@ class MissionExecutor:
             self.onboard.resume.rebooted()
         if message.get_type() == 'HEARTBEAT' and newest:
             self.watch.receive_heartbeat(message, now)
-            if (mode_before is ModeFunction.MISSION
-                    and self.telemetry.mode is not ModeFunction.MISSION):
+            if self.telemetry.mode is ModeFunction.MISSION:
+                self.onboard.progress.note_in_mission()
+            elif mode_before is ModeFunction.MISSION:
                 self.onboard.progress.note_mission_left()
         out = self.onboard.receive(message, now)
         self.sender.receive(message)
@@ -239,11 +246,15 @@ class MissionExecutor:
             self._position(message, newest, now)
         elif kind == 'MISSION_ITEM_REACHED':
             self.onboard.reached(message.seq - own, now, self.telemetry.frame)
-        elif kind == 'MISSION_CURRENT' and newest and self.onboard.is_of_known_mission(message):
+        elif kind == 'MISSION_CURRENT' and newest and (
+                self.onboard.is_of_known_mission(message, now, flying)):
             seq = max(0, message.seq - own)
-            self.onboard.resume.note_current(seq)
+            self.onboard.resume.note_current(seq, now, self.telemetry.frame)
             if self.onboard.set_current_to is None:  # else seq is of the previous mission
-                progress.note_current(seq, now, flying, self.telemetry.frame)
+                progress.note_current(seq, now, flying, self.telemetry.frame,
+                                      self.telemetry.mission_restarted)
+            elif flying:
+                self.onboard.note_flown_unset(seq, now)
             if (message.mission_state == d.MISSION_STATE_COMPLETE and flying
                     and not self.profile.atomic):  # PX4 reports it after a take-off too
                 progress.note_mission_complete(seq, now, self.telemetry.frame)

@@ -15,11 +15,11 @@ from uav_task_alloc.mavlink.mission.items import Item, TaskList, all_alike, home
 from uav_task_alloc.mavlink.mission.outcomes import Accepted, Downloaded, Failed, Mission, Verified
 from uav_task_alloc.mavlink.mission.peer import Peer
 from uav_task_alloc.mavlink.mission.progress import ProgressTable
-from uav_task_alloc.mavlink.mission.reached_during_upload import ReachedDuringUpload
+from uav_task_alloc.mavlink.mission.reports_during_upload import ReportsDuringUpload
 from uav_task_alloc.mavlink.mission.upload import SUPERSEDED, Upload
 from uav_task_alloc.mavlink.mission.verified_mission import MissionState, VerifiedMission
 from uav_task_alloc.mavlink.mission.wanted_mission import TaskFailed, WantedMission
-from uav_task_alloc.mavlink.transport.codec import Message
+from uav_task_alloc.mavlink.transport.codec import Message, plan_id
 from uav_task_alloc.mavlink.transport.notes import OperatorNote
 from uav_task_alloc.model import Task
 
@@ -51,7 +51,7 @@ class OnboardMission:
         self.set_current_to: int | None = None  # seq to set, unless the upload has set it
         self._profile, self._origin, self._telemetry = profile, origin, telemetry
         self._done_at_start: frozenset[str] = frozenset()  # at the start of the upload
-        self._ambiguous = ReachedDuringUpload(self.progress, origin)  # of this epoch or the next
+        self._reports = ReportsDuringUpload(self.progress, origin)
         self._mission = VerifiedMission(self.own, profile.atomic)
         self._failures = UploadFailures(self.list, self.own, self.notes)
         self._uploading: tuple[MissionDiff, TaskList] | None = None  # with its list
@@ -61,9 +61,11 @@ class OnboardMission:
         )
         # [s] of the vehicle's clock when all items were sent: it may fly them since then
         self._sent_since: float | None = None
+        self._sent_frame: int | None = None  # number of the frame received last at that time
         self.item_time = 0.0  # [s] per item in recent uploads, smoothed
         self._started_at = 0.0  # [s]
         self._completed_for: tuple[TaskList, int] | None = None
+        self._flown_unset: int | None = None  # flown though `set_current_to` is not set yet
 
     @property
     def held(self) -> tuple[Item, ...] | None:
@@ -175,7 +177,7 @@ class OnboardMission:
         """Start the upload of `diff` for the present list."""
         assert self.tasks is not None
         self._uploading, self._taken, self.transfer_failed = (diff, self.tasks), False, False
-        self._started_at, self._sent_since = now, None
+        self._started_at, self._sent_since, self._sent_frame = now, None, None
         self.list.horizon.begin()
         self._done_at_start = self._done()
         home = () if not self.own else (home_item(
@@ -206,7 +208,7 @@ class OnboardMission:
 
     def _overtaken(self) -> bool:
         """Whether, before another attempt, the upload is partly flown or of an older list."""
-        return bool(self._ambiguous) or self.outdated or self._done() != self._done_at_start
+        return self._reports.has_reached or self.outdated or self._done() != self._done_at_start
 
     def receive(self, message: Message, now: float) -> list[Message]:
         """Process a message of the mission protocol; returns the messages to send."""
@@ -214,9 +216,11 @@ class OnboardMission:
             self._mission.note_mission_id(message)
         out = self.upload.receive(message, now)
         if not self.upload.may_be_stored:
-            self._sent_since = None if self.upload.busy else self._sent_since
+            if self.upload.busy and self._unconfirmed is None:
+                self._sent_since = None
         elif self._sent_since is None:
             self._sent_since = self.progress.path.newest
+            self._sent_frame = self._telemetry.frame
         self._settle(now)
         return out
 
@@ -230,23 +234,67 @@ class OnboardMission:
 
     def reached(self, seq: int, now: float, frame: int | None = None) -> None:
         """Process MISSION_ITEM_REACHED; after all items are sent it may be of either mission."""
-        if self.held is None:
-            self.resume.note_reached(seq)
-        if self._unconfirmed is not None or (self.open and self.upload.may_be_stored):
-            self._ambiguous.add(seq, now)
+        if self.held is None or not self.resume.located:
+            self.resume.note_reached(seq, now, self._telemetry.frame)
+        if self._may_be_of_new and not (self._appends and seq < len(self.progress.items)):
+            self._reports.add_reached(seq, now, self._telemetry.frame)
         else:
             self.progress.note_reached(seq, now, frame=frame)
 
-    def is_of_known_mission(self, message: Message) -> bool:
-        """Whether a MISSION_CURRENT refers to the known mission, not to one being uploaded."""
-        return not self.open or self._mission.has_mission_id(message)
+    @property
+    def _may_be_of_new(self) -> bool:
+        """Whether a report may be of the mission of an upload."""
+        return self._unconfirmed is not None or (self.open and self.upload.may_be_stored)
+
+    @property
+    def _appends(self) -> bool:
+        """Whether the upload leaves the items that are on board."""
+        uploading = self._unconfirmed or self._uploading
+        return uploading is not None and uploading[0].kind is DiffKind.APPEND
+
+    def is_of_known_mission(self, message: Message, now: float, flying: bool) -> bool:
+        """Whether a MISSION_CURRENT refers to the known mission; else it is kept.
+
+        Args:
+            message: a MISSION_CURRENT.
+            now: steady time [s].
+            flying: whether the vehicle is in mission mode.
+        """
+        if not self.open or self._appends or not (flying or self._profile.atomic):
+            return True  # ArduPilot's current item stays that of the old mission until it flies
+        if self._mission.has_mission_id(message):
+            self._reports.release(self._telemetry.frame)
+            return True
+        if self._may_be_of_new:
+            self._reports.add_current(max(0, message.seq - self.own), now, self._telemetry.frame,
+                                      flying, plan_id(message))
+        return False
+
+    def note_flown_unset(self, seq: int, now: float) -> None:
+        """Take a MISSION_CURRENT of a vehicle that flies before its current item is set.
+
+        Args:
+            seq: index without home.
+            now: steady time [s].
+        """
+        before, self._flown_unset = self._flown_unset, seq
+        items = self.progress.items
+        if before is None or not before < seq <= len(items):
+            return
+        if self.progress.was_at_by(items[before], now):
+            self.progress.credit(items[before])
+        self.set_current_to = next((n for n, item in enumerate(items) if item.task and (
+            item.task not in self.progress.completed)), self.set_current_to)
 
     def abort(self) -> list[Message]:
         """Abort the transfer: another party controls the vehicle."""
         if self.upload.busy:
             self.upload.reset()
         if self._uploading is not None:
-            self._ambiguous.credit(self._uploading[0])
+            if self._sent_since is not None and not self._taken:
+                self._unconfirmed = self._uploading
+            else:
+                self._reports.credit(self._uploading[0])
             self._uploading = None
             self._mission.interrupt()
         return []
@@ -261,7 +309,7 @@ class OnboardMission:
         """Reset after a restart of the vehicle: transfer lost, mission unknown."""
         self.upload.reset()
         self._failures.clear()
-        self._ambiguous.clear()
+        self._reports.clear()
         self.progress.invalidate()
         self._mission.reset()
         self._uploading = self._unconfirmed = None
@@ -301,18 +349,19 @@ class OnboardMission:
         if self._taken:
             return
         self._taken = True
-        of_new = self._ambiguous.assign_epochs(diff)
+        of_new = self._reports.begin_new(diff)
         self.item_time = (self.item_time + (now - self._started_at) / len(diff.items)) / 2.0
         self.resume.keep_flown()
+        self._flown_unset = None
         if diff.kind is DiffKind.APPEND:
             self.progress.extend(diff.items)
         else:
             self.progress.begin(diff.items, diff.start, now, since=self._sent_since)
-            if not self._profile.atomic:
-                self.set_current_to = diff.start
-        for seq, when in of_new:
-            self.progress.note_reached(seq, when, proven=True)
-        self._ambiguous.continue_repetition()
+        self._reports.replay(of_new, self._mission.reported_id, self._sent_frame)
+        if diff.kind is not DiffKind.APPEND and not self._profile.atomic:
+            current = self.progress.current
+            self.set_current_to = current if current is not None and (
+                current < len(diff.items)) else diff.start
 
     def _verify(self, items: tuple[Item, ...], revision: int, now: float) -> None:
         self._mission.verify(items, now)
@@ -331,7 +380,7 @@ class OnboardMission:
                 self._begin_epoch(diff, now)
                 self._verify(diff.items, tasks.revision, now)
                 return
-            self._ambiguous.credit(diff)
+            self._reports.credit(diff)
         if not self._mission.note_readback(
                 held, known, self.tasks is not None, lambda: self._can_continue(held), now):
             return
@@ -352,6 +401,6 @@ class OnboardMission:
         if event.result is None and self._sent_since is not None and not self._taken:
             self._unconfirmed = diff, tasks
         else:
-            self._ambiguous.credit(diff)
+            self._reports.credit(diff)
         if self.transfer_failed:
             self.transfer_failed = self._failures.take(event, diff, tasks, now)

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 import zlib
 from collections.abc import Iterable
+from dataclasses import dataclass
 
 from pymavlink.dialects.v20 import ardupilotmega as d
 
@@ -29,6 +30,7 @@ from uav_task_alloc.mavlink.mission.progress import ProgressTable
 from uav_task_alloc.model import Point, Task
 
 _NEAR = 15.0  # [m] from the last item that counts as reached
+_MAX_CURRENTS = 512  # MISSION_CURRENT kept until the vehicle is located: four minutes
 _MAX_UNREAD = 32  # REACHED kept until the mission is read
 MAX_AGE = 60.0  # [s] after the restart; a later task at the same position is a new one
 
@@ -36,6 +38,22 @@ MAX_AGE = 60.0  # [s] after the restart; a later task at the same position is a 
 def checksum(items: Iterable[Item]) -> int:
     """CRC-32 of the item fields that every autopilot returns unchanged; identifies a mission."""
     return zlib.crc32(repr([(item.command, item.x, item.y) for item in items]).encode())
+
+
+@dataclass(slots=True)
+class _UnreadReached:
+    """A REACHED that was received before the mission was read."""
+
+    seq: int  # index without home
+    at: float  # [s] received
+    frame: int  # its number
+    place: Point | None  # [m] ENU of the vehicle; None: not known
+    current_after: int | None = None  # the largest current item reported since
+
+    def may_be_of(self, held: tuple[Item, ...]) -> bool:
+        """Whether the current item was past it then; a repetition of another mission may not."""
+        after, last = self.current_after, len(held) - 1
+        return after is None or after > self.seq or self.seq == after == last
 
 
 class Resume:
@@ -54,13 +72,12 @@ class Resume:
         self._telemetry, self._progress = telemetry, progress
         self.unflown: dict[str, Point] = {}  # [m] ENU, by task; skipped by another station
         self.reported: set[str] = set()  # flown and reported by the previous run
-        # checksum of the mission and current item, as recorded by the previous run
-        self.recorded: tuple[int | None, int | None] = None, None
+        # checksum of the mission, current item and whether it was seen there, of the previous run
+        self.recorded: tuple[int | None, int | None, bool] = None, None, False
         self.was_disarmed = True  # in the last record; or there is none
         self.current_unreliable = False  # items before the current one may be unflown
         self._rebooted = False
-        # REACHED before the mission was read: seq, ENU [m] of the vehicle, None: not known
-        self._unread: list[tuple[int, Point | None]] = []
+        self._unread: list[_UnreadReached] = []  # until the vehicle is located
         self.reset()
 
     def rebooted(self) -> None:
@@ -71,7 +88,8 @@ class Resume:
     def reset(self) -> None:
         """Forget the location: the vehicle was restarted, or is another one."""
         self.located = False
-        self._first: int | None = None  # the current item, by the first message
+        # current item, [s] received and number of the frame, until it is located
+        self._currents: list[tuple[int, float, int]] = []
         self._skipped: frozenset[int] = frozenset()  # earlier items that were not flown
         self._old: tuple[Item, ...] = ()  # flown in the previous run
         self._epoch, self._located_at = -1, 0  # epoch and seq of the location
@@ -80,21 +98,27 @@ class Resume:
         self._known_reached = 0  # how many had one at the last call of `flown_items`
         self._flown: tuple[Item, ...] = ()  # of missions that were replaced
 
-    def note_current(self, seq: int) -> None:
+    def note_current(self, seq: int, now: float, frame: int) -> None:
         """Take a MISSION_CURRENT, home not counted; the first one shows what was flown before."""
-        if not self.located and self._first is None:
-            self._first = seq
+        if not self.located and len(self._currents) < _MAX_CURRENTS:
+            self._currents.append((seq, now, frame))
+        for reached in self._unread:
+            if frame > reached.frame:
+                reached.current_after = max(seq, reached.current_after or 0)
 
-    def note_reached(self, seq: int) -> None:
-        """Take a MISSION_ITEM_REACHED of a mission that is not read yet."""
-        if len(self._unread) < _MAX_UNREAD and seq not in (known for known, _ in self._unread):
+    def note_reached(self, seq: int, now: float, frame: int) -> None:
+        """Take a MISSION_ITEM_REACHED, until the vehicle is located."""
+        if len(self._unread) < _MAX_UNREAD and all(seq != each.seq for each in self._unread):
             known = self._telemetry.has_position
-            self._unread.append((seq, self._telemetry.position if known else None))
+            self._unread.append(
+                _UnreadReached(seq, now, frame, self._telemetry.position if known else None))
 
     def _credit_unread(self, held: tuple[Item, ...], now: float) -> None:
         """Credit each REACHED received before the mission was read, by the positions."""
-        reached = tuple(held[n] for n, place in self._unread if n < len(held) and self._was_near(
-            with_position(held[n], self._origin), place))
+        reached = tuple(
+            held[each.seq] for each in self._unread if each.seq < len(held)
+            and each.may_be_of(held) and self._was_near(
+                with_position(held[each.seq], self._origin), each.place))
         self._unread.clear()
         if reached:
             self._flown += reached
@@ -123,9 +147,9 @@ class Resume:
             self.located = self.located or not held
             return
         self.located = True
-        self._credit_unread(held, now)
         if self.current_unreliable or (self.was_disarmed and not telemetry.airborne) or (
                 not self._profile.atomic and telemetry.mode is not ModeFunction.MISSION):
+            self._credit_unread(held, now)
             self._progress.begin(held, None, now)  # the current item may be of the old mission
             self._epoch, self._located_at = self._progress.epoch, 0
             return
@@ -133,8 +157,13 @@ class Resume:
         current = min(max(0, telemetry.current - self._profile.rules.home_first), len(held))
         if not self._profile.atomic and self._progress.items:  # REACHED was received first
             current = max(current, self._progress.current or 0)
-        flown = len(held) if self._ended(held, current) else current
-        first = flown if self._first is None else min(self._first, flown)
+        ended = self._ended(held, current)
+        if not ended and self._continues_recorded(held):
+            self._continue_recorded(held, tasks, now)
+            return
+        self._credit_unread(held, now)
+        flown = len(held) if ended else current
+        first = min(self._currents[0][0], flown) if self._currents else flown
         self._skipped = frozenset(
             n for n in range(first, flown) if self._was_elsewhere(held[n]))
         self._progress.begin(held, flown, now, read=True)
@@ -145,6 +174,49 @@ class Resume:
         # on the ground with the first list: the onboard mission is of an earlier flight
         if not self._rebooted and (telemetry.airborne or tasks.revision > 1):
             self._until = now + MAX_AGE
+
+    def _continues_recorded(self, held: tuple[Item, ...]) -> bool:
+        """Whether the vehicle flies the recorded mission on from the recorded item."""
+        mission, recorded, _ = self.recorded
+        return (mission == checksum(held) and recorded is not None and not self._rebooted
+                and self._progress.continues_recorded
+                and bool(self._currents) and recorded <= self._currents[0][0])
+
+    def _continue_recorded(self, held: tuple[Item, ...], tasks: TaskList, now: float) -> None:
+        """Continue the previous run: items passed since are judged by the positions."""
+        _, recorded, arrived = self.recorded
+        assert recorded is not None
+        progress, (current, when, frame) = self._progress, self._currents[0]
+        self._old, self._until = held[:recorded], now + MAX_AGE
+        placed = tuple(with_position(item, self._origin) for item in held)
+        flown = progress.flown_offline(placed, recorded, current, when, frame)
+        if arrived and current > recorded:
+            flown |= {recorded}
+        self._flown += tuple(held[n] for n in sorted(flown))
+        self._reached += tuple(held[n] for n in sorted(flown))
+        items = held[:current] + self._with_tasks(held[current:], tasks)
+        progress.begin(items, current, now, read=True)
+        self._epoch, self._located_at = progress.epoch, recorded
+        self._replay(held)
+
+    def _replay(self, held: tuple[Item, ...]) -> None:
+        """Pass on what was received until the mission was read, in the order it was sent."""
+        rows: list[tuple[int, int, int, float]] = [
+            (frame, 1, seq, when) for seq, when, frame in self._currents[1:]]
+        rows += [(each.frame, 0, each.seq, each.at) for each in self._unread
+                 if each.may_be_of(held)]
+        self._unread.clear()
+        for frame, kind, seq, when in sorted(rows):
+            if kind:
+                self._progress.note_current(seq, when, True, frame)
+            else:
+                self._progress.note_reached(seq, when, proven=True)
+
+    def _with_tasks(self, held: tuple[Item, ...], tasks: TaskList) -> tuple[Item, ...]:
+        """Items that were read, with the tasks of a list and their positions."""
+        wanted = mission_items(TaskList(0, tuple(MissionStop(s.task) for s in tasks.stops)),
+                               self._profile.rules, self._origin)
+        return tuple(next((item for item in wanted if alike(item, each)), each) for each in held)
 
     def keep_flown(self) -> None:
         """Keep the flown items of this mission before it is replaced."""

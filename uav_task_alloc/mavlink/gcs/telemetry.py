@@ -77,6 +77,7 @@ class Telemetry:
         self.reached: int | None = None  # seq on the wire, latest
         self.total: int | None = None  # number of items as the vehicle reports it
         self.mission_state = 0  # MISSION_STATE
+        self.mission_restarted = False  # from COMPLETE to ACTIVE, by the last MISSION_CURRENT
         self.plan_id = 0  # PX4's id of the onboard mission
         self.received_ids: set[int] = set()  # message ids since the start
         self.received_last: dict[int, float] = {}  # [s] by message id
@@ -295,6 +296,9 @@ class Telemetry:
     def _current(self, message: Message, now: float) -> None:
         self.current, self.current_at = message.seq, now
         self.total = message.total if 0 < message.total < 65535 else None
+        self.mission_restarted = not self._profile.atomic and (  # PX4: after a take-off too
+            self.mission_state == d.MISSION_STATE_COMPLETE
+            and message.mission_state == d.MISSION_STATE_ACTIVE)
         self.mission_state = message.mission_state
         self.plan_id = plan_id(message)
 

@@ -43,18 +43,37 @@ class CurrentItem:
         self.skipped: deque[str] = deque()  # tasks skipped by another station
         self.passed_over: deque[Item] = deque()  # passed, and not known to be flown
         self.set_by_other: int | None = None  # the current item, where another station set it
+        self.in_mission = False  # mission mode, by the newest heartbeat
+        self._mission_at = -math.inf  # vehicle time [s] of the last such heartbeat
         self._left_at = -math.inf  # vehicle time [s] at which it left mission mode
         self._after_skipped: int | None = None  # the item after those that were skipped
 
     def begin(self, start: int | None, now: float) -> None:
-        """Begin an epoch at an item; None: its current item is not known."""
+        """Begin an epoch at an item that the vehicle will report; None: it is not known."""
         self.reports.begin(start, now)
         self.set_by_other = None
+
+    def complete_active(self, until: float) -> None:
+        """Complete the item being flown where the positions show that it was reached.
+
+        Args:
+            until: vehicle time [s] until which it is known to have flown it.
+        """
+        epoch, active = self._epoch, self._epoch.active
+        if active is not None and self.reports.reported == epoch.current and (
+                self._positions.was_at(active, epoch.since, until, close=0.0)):
+            self._tasks.credit(active)
+
+    def end(self, taken: float) -> None:
+        """End the epoch: another mission was taken at vehicle time `taken` [s], or later."""
+        self.complete_active(min(taken, self._mission_at))
 
     def invalidate(self) -> None:
         """End the epoch, and complete what the positions have shown so far."""
         for item in self.passed.seen():
             self._tasks.complete(item.task, item.position)
+        if self.in_mission:
+            self.complete_active(math.inf)
         self.reports.clear()
         self.passed.clear()
         self.set_by_other = None
@@ -65,13 +84,24 @@ class CurrentItem:
         self.set_by_other = None
         self._epoch.current, self._epoch.since = seq, self._positions.path.newest
 
+    def current_since(self, item: Item) -> float:
+        """Vehicle time [s] from which an item is flown that is current, or was just passed."""
+        return next((claim.since for claim in self.passed.claims if any(
+            item is one for one in claim.items)), self._epoch.since)
+
+    def note_in_mission(self) -> None:
+        """Note that the vehicle is in mission mode."""
+        self.in_mission, self._mission_at = True, self._positions.path.newest
+
     def note_mission_left(self) -> None:
         """Note that the vehicle has left the list: a task resumed later starts again."""
-        if self._epoch.started is not None:
+        if self.in_mission:
             self._left_at = self._positions.path.newest
+        self.in_mission = False
         self._epoch.started = self.set_by_other = None
 
-    def note_report(self, seq: int, now: float, flying: bool, frame: int | None = None) -> None:
+    def note_report(self, seq: int, now: float, flying: bool, frame: int | None = None,
+                    restarted: bool = False) -> None:
         """Take a MISSION_CURRENT; items before it are claimed to be flown.
 
         Args:
@@ -79,23 +109,27 @@ class CurrentItem:
             now: steady time [s].
             flying: whether the vehicle is in mission mode in the air.
             frame: number of its frame; None: not known.
+            restarted: whether the mission was complete, and has begun again by itself.
         """
         reports, epoch = self.reports, self._epoch
         reports.previous_frame = reports.last_frame
         if not reports.is_old(seq, now):
             self._move(seq, now, flying, frame)
         reports.note(seq, frame)
-        if reports.was_set_back(seq, now, None if not flying or epoch.current is None else (
-                min(epoch.current, len(epoch.items) - 1))):
-            self._fly_from(seq)
+        known = None if not flying or epoch.current is None else (
+            min(epoch.current, len(epoch.items) - 1))
+        if reports.was_set_back(seq, now, known) or (
+                restarted and known is not None and seq < known and not reports.awaits_set):
+            self._fly_from(seq, now)
 
-    def _fly_from(self, seq: int) -> None:
+    def _fly_from(self, seq: int, now: float) -> None:
         """Set the current item, which may be flown since before the message arrived."""
-        self._epoch.current, self._epoch.since = seq, self._positions.recent(self._epoch.since)
+        epoch = self._epoch
+        epoch.current, epoch.since = seq, self._positions.recent(epoch.since, now)
 
     def _move(self, seq: int, now: float, flying: bool, frame: int | None) -> None:
         epoch = self._epoch
-        if epoch.started is None or not flying:
+        if not flying:
             if seq < len(epoch.items) and not (epoch.finished and seq == len(epoch.items) - 1):
                 if epoch.current is not None and epoch.current < seq:
                     self.claim(epoch.current, seq, now, frame, in_flight=False)
@@ -103,7 +137,7 @@ class CurrentItem:
         elif epoch.current is not None and epoch.current < seq <= len(epoch.items):
             self._after_skipped = None
             self.claim(epoch.current, seq, now, frame)
-            self._fly_from(seq)
+            self._fly_from(seq, now)
             self.set_by_other = seq if self._after_skipped == seq else self.set_by_other
 
     def note_mission_complete(self, seq: int, now: float, frame: int | None = None) -> None:
@@ -111,9 +145,9 @@ class CurrentItem:
         epoch = self._epoch
         end = min(seq + 1, len(epoch.items))
         if (epoch.current is not None and not self.reports.awaits_set
-                and epoch.started is not None and epoch.current < end):
-            self.claim(epoch.current, end, now, frame)
-            self._fly_from(end)
+                and epoch.current < end):
+            self.claim(epoch.current, end, now)  # complete since an unknown frame
+            self._fly_from(end, now)
 
     def judge(self, now: float) -> None:
         """Complete those passed items that the positions show to be flown."""
@@ -153,7 +187,7 @@ class CurrentItem:
             return
         route = tuple(item for item in epoch.items[begin:] if item.position is not None)
         until = positions.vehicle_time(now)
-        if epoch.started is None:  # positions after it left mission mode prove nothing
+        if not self.in_mission:  # positions after it left mission mode prove nothing
             until = min(until, max(epoch.since, self._left_at))
         self.passed.add(Claim(
             items, route, epoch.since, until, now + MAX_MESSAGE_DELAY, epoch.number,

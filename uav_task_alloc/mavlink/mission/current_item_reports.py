@@ -27,7 +27,7 @@ class CurrentItemReports:
         return self._set is not None
 
     def begin(self, start: int | None, now: float) -> None:
-        """Start a new epoch at an item; None: its current item is not known."""
+        """Start a new epoch at an item that the vehicle will report; None: not known."""
         self._set = None if start is None else (start, now)
         self._setting = self.reported = None
 

@@ -20,6 +20,7 @@ _HOLD_SPEED = 0.4  # [m/s] below it a vehicle holds its position
 _CURVE = 0.4  # [m/s2] error bound of the interpolation between two samples
 _PIECES = 8  # interpolated points between two samples
 _JUMP = 30.0  # [m] beyond the distance its speed explains: the estimate jumped
+_FEW, _USUAL_SPEED = 100, 15.0  # samples; [m/s] assumed where there are fewer
 _CORRIDOR = 8.0  # [m] from a leg at which a vehicle flies it
 _HOLD_SLACK = 0.1  # [s] by which a sampled hold may be shorter than the real one
 
@@ -50,6 +51,11 @@ class FlownPath:
     def newest(self) -> float:
         """Vehicle time [s] of the newest sample; -inf where there is none."""
         return self._samples[-1].t if self._samples else -math.inf
+
+    @property
+    def last(self) -> PositionSample | None:
+        """The newest sample; None where there is none."""
+        return self._samples[-1] if self._samples else None
 
     def add(self, sample: PositionSample) -> None:
         """Add a sample; O(1) where they arrive in order."""
@@ -118,7 +124,9 @@ class FlownPath:
             return False
         a, b = max(pairwise(samples), key=lambda two: two[1].t - two[0].t)
         length = polyline_length((a.position, *chain, b.position))
-        fastest = max(5.0, *(math.hypot(*s.velocity) for s in self._samples[-200:]))
+        known = len(self._samples) >= _FEW
+        fastest = max(5.0 if known else _USUAL_SPEED,
+                      *(math.hypot(*s.velocity) for s in self._samples[-200:]))
         if length > 1.1 * fastest * (b.t - a.t - 0.8 * holds) + 10.0:
             return False
         return segment_distance(b.position, chain[-1], then or chain[-1]) <= _CORRIDOR

@@ -88,7 +88,7 @@ class PassedItems:
             The items decided by this call.
         """
         if self._has_no_reached(claim):
-            self._claims.remove(claim)
+            self._drop(claim)
             return _Judged((), items)
         if items and claim.frames is not None and now < claim.deadline:
             return _Judged((), ())  # REACHED may still come, or every frame without one
@@ -97,9 +97,12 @@ class PassedItems:
         rest = tuple(i for i in items if visits[i.task] is not Visit.YES)
         if rest and now < claim.deadline:
             return _Judged(seen, ())
-        self._claims.remove(claim)
+        self._drop(claim)
         unseen = self._unobserved(rest, visits, claim)
         return _Judged(seen + unseen, tuple(i for i in rest if i not in unseen))
+
+    def _drop(self, claim: Claim) -> None:
+        self._claims = [each for each in self._claims if each is not claim]
 
     def _unobserved(self, rest: tuple[Item, ...], visits: dict[str, Visit],
                     claim: Claim) -> tuple[Item, ...]:
@@ -132,8 +135,10 @@ class PassedItems:
     def _visit(self, item: Item, claim: Claim) -> Visit:
         if item.position is None:
             return Visit.NO
+        # what ends the hold of a single item is that the mission goes on
+        hold = item.params[0] if claim.skips or not claim.in_flight else 0.0
         return self._positions.path.visited(
-            item.position, item.radius, item.params[0], claim.since, self._until(claim),
+            item.position, item.radius, hold, claim.since, self._until(claim),
             0.0 if claim.skips else CLOSE)
 
     def _until(self, claim: Claim) -> float:

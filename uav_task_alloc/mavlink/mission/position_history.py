@@ -33,6 +33,9 @@ class PositionHistory:
         self.place: tuple[Point, float] | None = None  # newest, received at [s]
         self._invalid_until = -math.inf  # [s] the estimate has jumped
         self._stamps: deque[tuple[int, float]] = deque(maxlen=_STAMPS)  # frame, vehicle time
+        self._recorded_at: float | None = None  # vehicle time [s] of one of the previous run
+        # item and since [s] of the last `was_inside`, the newest position then, and its result
+        self._inside: tuple[tuple[Item, float] | None, float, bool] = None, -math.inf, False
         self._clock = -math.inf  # [s] vehicle time less ours, by the fastest message
 
     def add(
@@ -46,6 +49,8 @@ class PositionHistory:
             now: steady time [s].
             frame: number of its frame; None: not known.
         """
+        if self._recorded_at is not None and sample.t < self._recorded_at - MAX_MESSAGE_DELAY:
+            self.clear()  # the vehicle was restarted while no bridge ran
         self._clock = max(self._clock, sample.t - now)
         if frame is not None:
             self._stamps.append((frame, sample.t))
@@ -56,9 +61,21 @@ class PositionHistory:
             self.place = sample.position, now
         self.path.add(sample)
 
+    def add_recorded(self, sample: PositionSample) -> None:
+        """Add the last position that the previous run of the bridge has received."""
+        self.path.add(sample)
+        self._recorded_at = sample.t
+
+    @property
+    def continues_recorded(self) -> bool:
+        """Whether the path begins with a position of the previous run of the bridge."""
+        return self._recorded_at is not None and self.path.newest > self._recorded_at
+
     def clear(self) -> None:
         """Drop the path: the vehicle's clock has restarted."""
         self.path.clear()
+        self._recorded_at = None
+        self._inside = None, -math.inf, False
         self._clock = -math.inf
         self._stamps.clear()
 
@@ -66,9 +83,14 @@ class PositionHistory:
         """Vehicle time [s] at our steady time [s]."""
         return now + self._clock
 
-    def recent(self, since: float) -> float:
-        """Vehicle time [s], `since` or later, from which positions may be newer than a message."""
-        return max(since, self.path.newest - MAX_MESSAGE_DELAY)
+    def recent(self, since: float, now: float) -> float:
+        """Vehicle time [s], `since` or later, from which positions may be newer than a message.
+
+        Args:
+            since: vehicle time [s].
+            now: steady time [s] at which the message was received.
+        """
+        return max(since, min(self.path.newest, self.vehicle_time(now)) - MAX_MESSAGE_DELAY)
 
     def was_at(self, item: Item, since: float, until: float = math.inf,
                close: float = CLOSE) -> bool:
@@ -82,6 +104,21 @@ class PositionHistory:
         """
         return item.position is not None and self.path.visited(
             item.position, item.radius, item.params[0], since, until, close) is Visit.YES
+
+    def was_inside(self, item: Item, since: float) -> bool:
+        """Whether it was within the radius of an item, for however short a time.
+
+        Called for the same item again, only the positions since then are searched.
+        """
+        known, until, inside = self._inside
+        if known != (item, since):
+            until, inside = since, False
+        if not inside and self.path.newest > until and item.position is not None:
+            inside = self.path.visited(
+                item.position, item.radius, 0.0, max(since, until - MAX_MESSAGE_DELAY),
+                close=0.0) is Visit.YES
+        self._inside = (item, since), self.path.newest, inside
+        return inside
 
     def not_seen_at(self, item: Item, since: float) -> bool:
         """Whether it was not seen at an item, but not seen elsewhere all the time either."""

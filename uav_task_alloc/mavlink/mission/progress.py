@@ -9,12 +9,14 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Iterable
+from dataclasses import replace
 
 from uav_task_alloc.mavlink.mission.completed_tasks import CompletedTasks, ProgressEvent
 from uav_task_alloc.mavlink.mission.current_item import CurrentItem
 from uav_task_alloc.mavlink.mission.epoch import Epoch
 from uav_task_alloc.mavlink.mission.flown_path import PositionSample
 from uav_task_alloc.mavlink.mission.items import Item, all_alike
+from uav_task_alloc.mavlink.mission.passed_items import Claim, PassedItems
 from uav_task_alloc.mavlink.mission.position_history import PositionHistory
 from uav_task_alloc.mavlink.mission.reached_epoch import (
     REPEAT_WINDOW,
@@ -159,9 +161,13 @@ class ProgressTable:
             self._epochs.begin(PreviousEpoch(
                 epoch.items, epoch.since, self._positions.vehicle_time(now), self.may_end(now),
                 now + REPEAT_WINDOW, epoch.taken))
+        if since is not None:
+            self._moves.end(since)
         epoch.items, epoch.current = items, start
         self._reached.begin()
-        self._moves.begin(start, now)
+        self._moves.begin(None if read or start == len(items) else start, now)
+        if read:
+            self._moves.reports.last_frame = None
         known_since = self.path.newest if since is None else since
         epoch.since = epoch.begin = -math.inf if read else known_since
         epoch.taken = -math.inf if since is None else since
@@ -190,6 +196,22 @@ class ProgressTable:
         """Add a position of the vehicle; see `PositionHistory.add`."""
         self._positions.add(sample, newest, now, frame)
 
+    def add_recorded_position(self, sample: PositionSample) -> None:
+        """Add the last position that the previous run of the bridge has received."""
+        self._positions.add_recorded(sample)
+
+    @property
+    def continues_recorded(self) -> bool:
+        """Whether the positions continue those of the previous run of the bridge."""
+        return self._positions.continues_recorded
+
+    def has_arrived(self, seq: int) -> bool:
+        """Whether the vehicle was within the radius of an item since it is current."""
+        if seq >= len(self.items):
+            return False
+        since = self._moves.current_since(self.items[seq])
+        return self._positions.was_inside(self.items[seq], since)
+
     def begin_set_current(self, seq: int) -> None:
         """Note that we are about to set the current item; it may be reported before the ack."""
         self._moves.reports.begin_set(seq)
@@ -201,9 +223,15 @@ class ProgressTable:
     def note_mission_mode(self) -> None:
         """Note that the vehicle flies its mission: the task of the current item has started."""
         epoch, item = self._epoch, self.active
+        if not self._moves.in_mission:
+            self._moves.note_in_mission()
         if item and item.task and item.task != epoch.started and item.task not in self._tasks:
             epoch.started = item.task
             self._tasks.start(item.task)
+
+    def note_in_mission(self) -> None:
+        """Note that the vehicle is in mission mode, by whichever command."""
+        self._moves.note_in_mission()
 
     def note_mission_left(self) -> None:
         """Note that the vehicle has left the list: a task resumed later starts again."""
@@ -233,9 +261,32 @@ class ProgressTable:
         """Note a REACHED of this epoch or the next: the mission may have ended."""
         self._reached.note_end(seq, now)
 
-    def note_current(self, seq: int, now: float, flying: bool, frame: int | None = None) -> None:
+    def note_current(self, seq: int, now: float, flying: bool, frame: int | None = None,
+                     restarted: bool = False) -> None:
         """Take a MISSION_CURRENT; see `CurrentItem.note_report`."""
-        self._moves.note_report(seq, now, flying, frame)
+        self._moves.note_report(seq, now, flying, frame, restarted)
+
+    def flown_offline(self, items: tuple[Item, ...], begin: int, end: int, now: float,
+                      frame: int) -> set[int]:
+        """Judge the items that were passed while no bridge ran; no evidence of them will come.
+
+        Args:
+            items: on board, with their positions.
+            begin: index of the item that was flown when the previous run ended.
+            end: the current item of the first MISSION_CURRENT.
+            now: steady time [s] at which that was received.
+            frame: its number.
+
+        Returns:
+            Indices of those that were flown.
+        """
+        passed = {f'{n}': replace(items[n], task=f'{n}') for n in range(begin, end)}
+        route = (*passed.values(), *items[end:])
+        claim = Claim(tuple(passed.values()), tuple(i for i in route if i.position is not None),
+                      -math.inf, self._positions.vehicle_time(now), now, self.epoch, None, frame,
+                      skips=end - begin > 1, in_flight=True)
+        judged = PassedItems(self._frames, self._positions).judge(claim, claim.items, now)
+        return {int(item.task) for item in judged.flown}
 
     def note_mission_complete(self, seq: int, now: float, frame: int | None = None) -> None:
         """Take the vehicle's report that its mission is complete up to item `seq`."""

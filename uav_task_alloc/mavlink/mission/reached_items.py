@@ -110,13 +110,13 @@ class ReachedItems:
         if epoch.current is None or seq >= epoch.current:
             if epoch.current is not None and epoch.current < seq:
                 self._moves.claim(epoch.current, seq, now)
-            self._advance_after(seq)
+            self._advance_after(seq, now)
         self._tasks.credit(epoch.items[seq])
 
-    def _advance_after(self, seq: int) -> None:
+    def _advance_after(self, seq: int, now: float) -> None:
         """Make the item after `seq` current, flown since `seq` was reached."""
         epoch, positions = self._epoch, self._positions
-        item, since = epoch.items[seq], positions.recent(epoch.since)
+        item, since = epoch.items[seq], positions.recent(epoch.since, now)
         at = None if item.position is None else positions.path.visited_at(
             item.position, item.radius, since)
         epoch.current, self._moves.set_by_other = seq + 1, None

@@ -45,11 +45,11 @@ class VerifiedMission:
         self.read_once = False  # since the vehicle was found or restarted
         self.is_foreign = False  # another station has changed a verified mission
         self._mission_id = 0  # of the verified mission (PX4); 0: none
-        self._reported_id = 0  # last reported
+        self.reported_id = 0  # last reported
 
     def note_mission_id(self, message: Message) -> None:
         """Store PX4's mission id from a MISSION_ACK or MISSION_COUNT."""
-        self._reported_id = plan_id(message)
+        self.reported_id = plan_id(message)
 
     def has_mission_id(self, message: Message) -> bool:
         """Whether a MISSION_CURRENT refers to this mission, by PX4's mission id."""
@@ -57,7 +57,7 @@ class VerifiedMission:
 
     def verify(self, items: tuple[Item, ...], now: float) -> None:
         """Note that these items are on board after our upload."""
-        self.items, self.verified_at, self._mission_id = items, now, self._reported_id
+        self.items, self.verified_at, self._mission_id = items, now, self.reported_id
         self.state, self.read_once, self.is_foreign = MissionState.VERIFIED, True, False
 
     def interrupt(self) -> None:
@@ -100,7 +100,7 @@ class VerifiedMission:
             if self.state is MissionState.UNKNOWN:
                 self.state = MissionState.VERIFIED
             return False
-        self.items, self.verified_at, self._mission_id = items, now, self._reported_id
+        self.items, self.verified_at, self._mission_id = items, now, self.reported_id
         if self.state is MissionState.VERIFIED or (not listed and items):
             self.state = MissionState.FOREIGN
             self.is_foreign = self.is_foreign or self.read_once

@@ -1,0 +1,222 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What is flown during an upload, a cut or a restart of the bridge is known afterwards."""
+import pytest
+from authority_bench import ARDUPILOT, BOTH, MODES, PX4, flying
+from findings_bench import distance, drop_messages, flown_once_each, set_current
+from flight_bench import places
+from mission_bench import ORIGIN, task_list
+from test_findings_evidence import Flight
+
+from uav_task_alloc.mavlink.autopilots import PX4 as PX4_PROFILE
+from uav_task_alloc.mavlink.mission.diff import DiffKind, MissionDiff
+from uav_task_alloc.mavlink.mission.items import MissionStop, TaskList, mission_items
+from uav_task_alloc.mavlink.mission.reports_during_upload import ReportsDuringUpload
+from uav_task_alloc.mavlink.mission.verified_mission import MissionState
+from uav_task_alloc.model import Task
+
+AT_A = (0.0, 100.0, 50.0)
+
+
+def drop_for(bench, seconds, *kinds):
+    """The line loses these types on their way to the bridge."""
+    end = bench.now + seconds
+    for kind in kinds:
+        drop_messages(bench, 'down', kind, lambda m: bench.now < end)
+
+
+@PX4
+@pytest.mark.parametrize('lost', [(), ('MISSION_ITEM_REACHED',)])
+def test_a_task_reached_while_the_upload_is_not_confirmed_is_flown_once(kind, lost):
+    bench = flying(kind, 'AB')
+    drop_for(bench, 25.0, 'MISSION_ACK', 'MISSION_COUNT', *lost)
+    bench.assign(task_list('ABCD', 2))
+    assert bench.run(lambda: places(bench) == ['A'], 30.0)
+    flown_once_each(bench, 'ABCD')
+
+
+@PX4
+def test_a_task_reached_in_a_cut_while_the_upload_is_not_confirmed_is_flown_once(kind):
+    bench = flying(kind, 'AB')
+    drop_for(bench, 30.0, 'MISSION_ACK', 'MISSION_COUNT')
+    bench.assign(task_list('ABCD', 2))
+    bench.run(lambda: distance(bench, AT_A) < 12.0)
+    bench.line.cut = True
+    bench.run(limit=8.0)
+    bench.line.cut = False
+    assert places(bench) == ['A']
+    flown_once_each(bench, 'ABCD')
+
+
+@ARDUPILOT
+def test_a_task_reached_as_the_vehicle_is_held_for_an_upload_is_flown_once(kind):
+    bench = flying(kind, 'ABC', delay=(0.1, 0.1))
+    bench.run(lambda: distance(bench, AT_A) < 3.0)
+    bench.line.cut = True
+    assert bench.run(lambda: places(bench) == ['A'], 5.0)
+    bench.line.cut = False
+    drop_messages(bench, 'down', 'MISSION_CURRENT',
+                  lambda m: bench.onboard().state is not MissionState.UPLOADING)
+    bench.assign(task_list('CAB', 2))
+    assert bench.run(lambda: bench.onboard().state is MissionState.UPLOADING, 5.0)
+    bench.line.tampers.clear()
+    flown_once_each(bench, 'ABC')
+
+
+@ARDUPILOT
+def test_the_last_task_flown_for_a_pilot_in_a_cut_is_not_flown_again(kind):
+    bench = flying(kind, 'ABC')
+    bench.vehicles[1].rc_mode(MODES[kind].rtl)
+    bench.run(limit=8.0)
+    set_current(bench, 2)
+    bench.vehicles[1].rc_mode(MODES[kind].mission)
+    bench.run(limit=0.3)
+    bench.line.cut = True
+    assert bench.run(lambda: places(bench) == ['C'], 60.0)
+    bench.run(limit=12.0)
+    bench.line.cut = False
+    bench.run(limit=10.0)
+    bench.hand_over()
+    flown_once_each(bench, 'ABC')
+
+
+@ARDUPILOT
+def test_a_complete_mission_that_begins_again_by_itself_is_stopped(kind):
+    bench = flying(kind, 'AB')
+    assert bench.run(lambda: bench.completed() == ['A', 'B'])
+    bench.assign(task_list('', 2))
+    bench.run(limit=5.0)
+    bench.kill_and_restart(0.5)
+    bench.assign(task_list('', 3))
+    bench.run(limit=10.0)
+    bench.vehicles[1].avoid(True)
+    bench.run(limit=5.0)
+    bench.vehicles[1].avoid(False)
+    bench.run(limit=60.0)
+    assert places(bench) == ['A', 'B']
+
+
+@BOTH
+@pytest.mark.parametrize('seconds', [0.0, 0.3])
+def test_an_item_skipped_just_before_the_bridge_is_killed_is_flown_later(kind, seconds):
+    bench = flying(kind, 'ABC')
+    bench.run(lambda: distance(bench, AT_A) < 60.0)
+    set_current(bench, 1)
+    bench.run(limit=seconds)
+    bench.kill_and_restart(0.0)
+    bench.assign(task_list('ABC', 2))
+    flown_once_each(bench, 'ABC')
+
+
+@BOTH
+def test_items_skipped_while_the_mission_is_read_are_flown_later(kind):
+    bench = flying(kind, 'ABCDE')
+    bench.run(lambda: distance(bench, AT_A) < 60.0)
+    bench.kill_and_restart(0.0)
+    drop_for(bench, 6.0, 'MISSION_COUNT')
+    bench.assign(task_list('ABCDE', 2))
+    bench.run(limit=2.0)
+    set_current(bench, 3 if places(bench) == [] else 4)
+    flown_once_each(bench, 'ABCDE')
+
+
+@BOTH
+def test_a_task_at_which_it_was_seen_before_the_bridge_was_killed_is_flown_once(kind):
+    bench = flying(kind, 'ABC')
+    drop_for(bench, 15.0, 'MISSION_ITEM_REACHED')
+    assert bench.run(lambda: places(bench) == ['A'])
+    bench.kill_and_restart(0.0)
+    bench.assign(task_list('ABC', 2))
+    flown_once_each(bench, 'ABC')
+
+
+@PX4
+def test_a_repetition_of_the_mission_before_the_one_on_board_completes_nothing(kind):
+    bench = flying(kind, 'AB')
+    assert bench.run(lambda: bench.completed() == ['A'])
+    drop_for(bench, 9.0, 'MISSION_ACK', 'MISSION_COUNT')
+    shift = task_list('XB', 2, side=100.0)
+    bench.assign(TaskList(2, (MissionStop(Task('X', (3.0, 107.0, 50.0))), *shift.stops[1:])))
+    bench.run(lambda: bench.vehicles[1].flight.seq == 0, 5.0)
+    bench.kill_and_restart(0.0)
+    bench.assign(TaskList(3, (MissionStop(Task('X', (3.0, 107.0, 50.0))), *shift.stops[1:])))
+    assert bench.run(lambda: 'X' in bench.completed(), 60.0)
+    assert any(round(point[1]) == 107 for point in bench.flown())
+
+
+def items_at(**places):
+    """Mission items of tasks by name, at x [m]."""
+    return mission_items(TaskList(1, tuple(
+        MissionStop(Task(name, (x, 0.0, 50.0))) for name, x in places.items())),
+        PX4_PROFILE.rules, ORIGIN)
+
+
+def upload_during(flight, **places):
+    """Reports that are kept while another mission may be on board, and that mission."""
+    return ReportsDuringUpload(flight.table, ORIGIN), MissionDiff(
+        DiffKind.REPLACE, items_at(**places), 0)
+
+
+def test_a_kept_reached_counts_however_far_the_vehicle_has_flown_since():
+    flight = Flight()
+    flight.begin(A=100.0, X=900.0)
+    reports, new = upload_during(flight, B=600.0, C=900.0)
+    flight.fly_to(100.0)
+    reports.add_reached(0, flight.now, 1)
+    flight.fly_to(400.0)
+    reports.begin_new(new)
+    assert list(flight.table.completed) == ['A']
+
+
+def test_a_kept_current_item_of_the_new_mission_counts():
+    flight = Flight()
+    flight.begin(A=900.0)
+    begin = flight.now
+    reports, new = upload_during(flight, B=100.0, C=300.0)
+    reports.add_current(0, flight.now, 1, True, 7)
+    flight.fly_to(100.0)
+    flight.stay(0.2, 10.0)
+    reports.add_current(1, flight.now, 2, True, 7)
+    flight.fly_to(200.0)
+    of_new = reports.begin_new(new)
+    flight.table.begin(new.items, 0, flight.now, since=begin)
+    reports.replay(of_new, 7, None)
+    flight.stay(10.0)
+    assert list(flight.table.completed) == ['B']
+
+
+def test_a_current_item_of_the_old_mission_releases_the_reached_before_it():
+    flight = Flight()
+    flight.begin(A=100.0, X=900.0)
+    reports, _ = upload_during(flight, B=600.0)
+    flight.fly_to(100.0)
+    reports.add_reached(0, flight.now, 5)
+    reports.release(4)
+    assert list(flight.table.completed) == []
+    reports.release(6)
+    assert list(flight.table.completed) == ['A']
+
+
+def test_a_hold_that_was_seen_in_part_is_over_when_the_mission_goes_on():
+    flight = Flight()
+    flight.begin(A=100.0, B=500.0)
+    held = tuple(type(item)(**{**{name: getattr(item, name) for name in (
+        'command', 'frame', 'x', 'y', 'z', 'task', 'completes', 'position', 'radius')},
+        'params': (2.0, *item.params[1:])}) for item in flight.table.items)
+    flight.table.retag(held)
+    flight.fly_to(90.0)
+    flight.now, flight.x = flight.now + 2.2, 100.0
+    flight.stay(1.0)
+    flight.table.note_current(1, flight.now, True)
+    flight.fly_to(150.0)
+    flight.stay(10.0)
+    assert list(flight.table.completed) == ['A']
+
+
+@pytest.mark.parametrize(('x', 'completed'), [(90.0, []), (100.0, ['A'])])
+def test_a_reboot_at_the_place_of_the_current_item_completes_it(x, completed):
+    flight = Flight()
+    flight.begin(A=100.0, B=500.0)
+    flight.table.note_current(0, flight.now, True)
+    flight.fly_to(x)
+    flight.table.invalidate()
+    assert list(flight.table.completed) == completed

@@ -1,0 +1,157 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Reports of progress during an upload: are they of the old mission, or of the new one?
+
+They are kept until the mission on board is known. A MISSION_ITEM_REACHED is credited by where the
+vehicle was; a MISSION_CURRENT belongs to the new mission by PX4's mission id, else by the order
+of the frames.
+"""
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from uav_task_alloc.geometry.frames import Origin
+from uav_task_alloc.mavlink.mission.diff import MissionDiff
+from uav_task_alloc.mavlink.mission.items import Item, alike, with_position
+from uav_task_alloc.mavlink.mission.progress import ProgressTable
+
+_MAX_MESSAGES = 32  # REACHED, without repetitions
+_MAX_CURRENT = 512  # MISSION_CURRENT: four minutes at 2 Hz
+
+
+class _Reached(NamedTuple):
+    """A series of REACHED with the same seq."""
+
+    seq: int  # index without home
+    first: float  # [s] the first of the series was received
+    last: float  # [s] the last one was received
+    frame: int  # number of the first frame that was kept
+
+
+class _Current(NamedTuple):
+    """One MISSION_CURRENT."""
+
+    seq: int  # index without home
+    now: float  # [s] received
+    frame: int  # its number
+    flying: bool  # in mission mode
+    plan: int  # mission id (PX4); 0: none
+
+
+class ReportsDuringUpload:
+    """Keeps reports until the upload is decided; then credits them to the old or new mission."""
+
+    def __init__(self, progress: ProgressTable, origin: Origin) -> None:
+        self._progress, self._origin = progress, origin
+        self._reached: list[_Reached] = []
+        self._currents: list[_Current] = []
+        self._newest: tuple[int, float] = (-1, 0.0)  # seq, received at [s], with repetitions
+
+    @property
+    def has_reached(self) -> bool:
+        """Whether a REACHED was received that may be of either mission."""
+        return bool(self._reached)
+
+    def add_reached(self, seq: int, now: float, frame: int) -> None:
+        """Keep a REACHED that may be of the old or of the new mission."""
+        repeated = bool(self._reached) and self._reached[-1].seq == seq  # by PX4
+        if repeated:
+            self._reached[-1] = self._reached[-1]._replace(last=now)
+        elif len(self._reached) < _MAX_MESSAGES:
+            first = self._progress.reached_first_at(seq, now)
+            self._reached.append(_Reached(seq, first, now, frame))
+        self._newest = seq, now
+        self._progress.note_end(seq, now)
+
+    def add_current(self, seq: int, now: float, frame: int, flying: bool, plan: int) -> None:
+        """Keep a MISSION_CURRENT that may be of the new mission."""
+        if len(self._currents) < _MAX_CURRENT:
+            self._currents.append(_Current(seq, now, frame, flying, plan))
+
+    def clear(self) -> None:
+        """Drop them: the vehicle was restarted."""
+        self._reached.clear()
+        self._currents.clear()
+
+    def release(self, frame: int) -> None:
+        """Credit REACHED sent before a frame that shows the old mission on board."""
+        for seq, first, _, at in self._reached:
+            if at < frame:
+                self._progress.note_reached(seq, first)
+        self._reached = [each for each in self._reached if each.frame >= frame]
+
+    def begin_new(self, uploaded: MissionDiff) -> list[tuple[int, float, int]]:
+        """Credit the REACHED of the old mission.
+
+        Args:
+            uploaded: the new mission.
+
+        Returns:
+            (seq, received at [s], frame) of those of the new mission.
+        """
+        of_new, old = [], self._progress.items
+        for reached in self._reached:
+            seq = reached.seq
+            before = with_position(old[seq], self._origin) if 0 <= seq < len(old) else None
+            after = uploaded.items[seq] if 0 <= seq < len(uploaded.items) else None
+            when = self._credit_old(reached, before, after, uploaded.start)
+            if when is not None:
+                of_new.append((seq, when, reached.frame))
+        self._reached.clear()
+        return of_new
+
+    def _credit_old(self, reached: _Reached, before: Item | None, after: Item | None,
+                    start: int) -> float | None:
+        """Credit a REACHED to the item of the old mission, where the vehicle was there.
+
+        Returns:
+            [s] at which it was received, where it is of the new mission.
+        """
+        seq, first, last, _ = reached
+        progress = self._progress
+        if before is not None and progress.was_at_by(before, first):
+            progress.note_reached(seq, first, proven=True)
+        elif before is not None and after is not None and alike(before, after):
+            progress.note_reached(seq, first)
+        elif after is not None and progress.was_at_by(after, first):
+            return first
+        elif before is not None and progress.near_one(before, after, first):
+            if before.task:
+                progress.credit(before)
+            else:  # of a mission that was read: `resume` finds the task by its position
+                progress.note_reached(seq, first)
+        elif after is not None and progress.near_one(after, before, first):
+            return first
+        elif after is not None and seq == start and progress.was_exactly_at(after, last):
+            return last  # a new one among repetitions of an older one
+        elif before is not None and seq == progress.current and (
+                progress.was_exactly_at(before, last)):
+            progress.credit(before)
+        return None
+
+    def replay(self, of_new: list[tuple[int, float, int]], plan: int, stored: int | None) -> None:
+        """Pass on what is of the new mission, in the order in which it was sent.
+
+        Args:
+            of_new: what `begin_new` has returned.
+            plan: mission id of the new mission (PX4); 0: none.
+            stored: frame number from which it was on board; None: not known.
+        """
+        currents = [each for each in self._currents if (
+            each.plan == plan if plan else not each.plan and stored is not None
+            and each.frame > stored)]
+        self._currents.clear()
+        rows = [(frame, 0, seq, when, True) for seq, when, frame in of_new]
+        rows += [(each.frame, 1, each.seq, each.now, each.flying) for each in currents]
+        for frame, kind, seq, when, flying in sorted(rows):
+            if kind:
+                self._progress.note_current(seq, when, flying, frame)
+            else:
+                self._progress.note_reached(seq, when, proven=True)
+        if self._newest[0] >= 0:  # it may still be repeated
+            self._progress.note_repeated(*self._newest)
+
+    def credit(self, uploaded: MissionDiff) -> None:
+        """Credit all by the positions after a failed transfer: either mission may be flown."""
+        for seq, _, _ in self.begin_new(uploaded):
+            self._progress.credit(uploaded.items[seq])
+        self._currents.clear()
