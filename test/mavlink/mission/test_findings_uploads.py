@@ -143,6 +143,19 @@ def test_a_repetition_of_the_mission_before_the_one_on_board_completes_nothing(k
     assert any(round(point[1]) == 107 for point in bench.flown())
 
 
+@PX4
+def test_a_repetition_before_the_restart_does_not_complete_the_last_item(kind):
+    bench = flying(kind, 'AB')
+    assert bench.run(lambda: bench.completed() == ['A'])
+    bench.assign(task_list('C', 2))
+    assert bench.run(lambda: bench.started()[-1] == 'C', 10.0)
+    bench.run(limit=1.0)
+    bench.kill_and_restart(0.0)
+    bench.assign(task_list('C', 3))
+    assert bench.run(lambda: bench.completed() == ['C'], 60.0)
+    assert places(bench) == ['A', 'C']
+
+
 def items_at(**places):
     """Mission items of tasks by name, at x [m]."""
     return mission_items(TaskList(1, tuple(

@@ -217,7 +217,7 @@ class AuthorityRecord:
     mission: int | None = None  # checksum of the items on board
     current: int | None = None  # index of the item being flown, home not counted
     arrived: bool = False  # the vehicle was seen at that item
-    # vehicle time [s], position [m] and velocity [m/s], both ENU, of a recent position
+    # vehicle time [s], position [m] and velocity [m/s], both ENU, of one or two recent positions
     seen: tuple[float, ...] = ()
 
 

@@ -11,6 +11,7 @@ from uav_task_alloc.mavlink.gcs.mission_evidence import MissionEvidence
 from uav_task_alloc.model import Point
 
 _MARKS, _MARK_LIFETIME = 50, 600.0  # tasks, [s]
+_LAST_TIME = -7  # index of the time of the newest position
 _POSITION_PERIOD = 1.0  # [s] between two positions that are saved
 
 
@@ -38,6 +39,7 @@ class AuthorityRecorder:
         self._save, self._saved = save, record
         self._mode = record.mode if record else None  # the last mode with a known reason
         self._seen: tuple[float, ...] = ()
+        self._seen_at = -math.inf  # vehicle time [s] of the newest of them
         self.marks: dict[str, TaskMark] = {m.task: m for m in record.marks} if record else {}
 
     def mark_task(self, task: str, position: Point | None, flown: bool, now: float) -> None:
@@ -50,10 +52,12 @@ class AuthorityRecorder:
         self.marks[task] = TaskMark(task, *position, round(now, 3), flown)
 
     def _last_position(self) -> tuple[float, ...]:
-        """The newest position, at most one each _POSITION_PERIOD."""
-        newest = self._evidence.last_position()
-        if newest and not (self._seen and 0.0 <= newest[0] - self._seen[0] < _POSITION_PERIOD):
-            self._seen = newest
+        """The last positions, renewed each _POSITION_PERIOD."""
+        since = self._evidence.position_time() - self._seen_at
+        if not 0.0 <= since < _POSITION_PERIOD:
+            positions = self._evidence.last_positions()
+            self._seen = positions or self._seen
+            self._seen_at = positions[_LAST_TIME] if positions else -math.inf
         return self._seen
 
     def save_if_changed(self) -> None:

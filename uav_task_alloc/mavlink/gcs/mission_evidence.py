@@ -59,13 +59,19 @@ class MissionEvidence:
         """Whether another station has changed the verified mission."""
         return self._onboard.is_foreign
 
-    def last_position(self) -> tuple[float, ...]:
-        """Vehicle time [s], position [m] and velocity [m/s] received last; (): on the ground."""
+    def position_time(self) -> float:
+        """Vehicle time [s] of the newest position."""
+        return self._onboard.progress.path.newest
+
+    def last_positions(self) -> tuple[float, ...]:
+        """Vehicle time [s], position [m] and velocity [m/s] received last; (): on the ground.
+
+        Those before a gap come first, if the current item has not changed since.
+        """
         if not self._telemetry.airborne:
             return ()
-        newest = self._onboard.progress.path.last
-        return () if newest is None else tuple(
-            round(value, 3) for value in (newest.t, *newest.position, *newest.velocity))
+        return tuple(round(value, 3) for sample in self._onboard.progress.last_positions()
+                     for value in (sample.t, *sample.position, *sample.velocity))
 
     def mission_position(self) -> tuple[int | None, int | None, bool]:
         """Checksum of the onboard mission, index of the item being flown, and whether it is there.

@@ -103,10 +103,10 @@ class MissionExecutor:
         resume = self.onboard.resume
         if record is not None:
             resume.recorded = record.mission, record.current, record.arrived
-            if len(record.seen) == _SEEN:
-                t, x, y, z, *velocity = record.seen
+            for first in range(0, len(record.seen) - _SEEN + 1, _SEEN):
+                t, x, y, z, east, north, up = record.seen[first:first + _SEEN]
                 self.onboard.progress.add_recorded_position(
-                    PositionSample(t, (x, y, z), (velocity[0], velocity[1], velocity[2])))
+                    PositionSample(t, (x, y, z), (east, north, up)))
             resume.was_disarmed = not record.armed
             # the current item may be of the replaced mission, or set by another party
             resume.current_unreliable = (

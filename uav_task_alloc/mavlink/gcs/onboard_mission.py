@@ -63,7 +63,7 @@ class OnboardMission:
         self._sent_since: float | None = None
         self._sent_frame: int | None = None  # number of the frame received last at that time
         self.item_time = 0.0  # [s] per item in recent uploads, smoothed
-        self._started_at = 0.0  # [s]
+        self.upload_started_at = 0.0  # [s]
         self._completed_for: tuple[TaskList, int] | None = None
         self._flown_unset: int | None = None  # flown though `set_current_to` is not set yet
 
@@ -91,18 +91,6 @@ class OnboardMission:
     def stored(self) -> MissionState:
         """State of the stored mission, independent of a running transfer."""
         return self._mission.state
-
-    def upload_progress(self, now: float) -> str:
-        """Progress and remaining time of the upload, as a text; '': no upload."""
-        sent, read, count = self.upload.progress
-        if count == 0:
-            return ''
-        text = f'read back {read}' if read else f'sent {sent}'
-        text += f' of {count} items'
-        done, elapsed = sent + read, now - self._started_at
-        if done == 0 or elapsed <= 0.0:
-            return text
-        return f'{text}, about {elapsed * (2 * count - done) / done:.0f} s left'
 
     @property
     def open(self) -> bool:
@@ -177,7 +165,7 @@ class OnboardMission:
         """Start the upload of `diff` for the present list."""
         assert self.tasks is not None
         self._uploading, self._taken, self.transfer_failed = (diff, self.tasks), False, False
-        self._started_at, self._sent_since, self._sent_frame = now, None, None
+        self.upload_started_at, self._sent_since, self._sent_frame = now, None, None
         self.list.horizon.begin()
         self._done_at_start = self._done()
         home = () if not self.own else (home_item(
@@ -350,7 +338,7 @@ class OnboardMission:
             return
         self._taken = True
         of_new = self._reports.begin_new(diff)
-        self.item_time = (self.item_time + (now - self._started_at) / len(diff.items)) / 2.0
+        self.item_time = (self.item_time + (now - self.upload_started_at) / len(diff.items)) / 2.0
         self.resume.keep_flown()
         self._flown_unset = None
         if diff.kind is DiffKind.APPEND:

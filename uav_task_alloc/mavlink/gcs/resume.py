@@ -16,7 +16,6 @@ from pymavlink.dialects.v20 import ardupilotmega as d
 from uav_task_alloc.geometry.frames import Origin, to_enu
 from uav_task_alloc.mavlink.autopilots import ModeFunction, Profile
 from uav_task_alloc.mavlink.gcs.telemetry import Telemetry
-from uav_task_alloc.mavlink.mission.flown_path import Visit
 from uav_task_alloc.mavlink.mission.items import (
     Item,
     MissionStop,
@@ -53,7 +52,8 @@ class _UnreadReached:
     def may_be_of(self, held: tuple[Item, ...]) -> bool:
         """Whether the current item was past it then; a repetition of another mission may not."""
         after, last = self.current_after, len(held) - 1
-        return after is None or after > self.seq or self.seq == after == last
+        return self.seq <= last and (
+            after is None or after > self.seq or self.seq == after == last)
 
 
 class Resume:
@@ -115,15 +115,22 @@ class Resume:
 
     def _credit_unread(self, held: tuple[Item, ...], now: float) -> None:
         """Credit each REACHED received before the mission was read, by the positions."""
-        reached = tuple(
-            held[each.seq] for each in self._unread if each.seq < len(held)
-            and each.may_be_of(held) and self._was_near(
-                with_position(held[each.seq], self._origin), each.place))
+        reached = tuple(held[each.seq] for each in self._unread if self._is_of(each, held))
         self._unread.clear()
         if reached:
             self._flown += reached
             self._reached += reached
             self._until = now + MAX_AGE
+
+    def _is_of(self, reached: _UnreadReached, held: tuple[Item, ...]) -> bool:
+        """Whether a REACHED can be of the mission on board, by the current item and the place."""
+        if not reached.may_be_of(held):
+            return False
+        item = with_position(held[reached.seq], self._origin)
+        if reached.seq == reached.current_after:  # the last one, which may be still ahead
+            return item.position is not None and self._progress.path.visited_at(
+                item.position, item.radius, -math.inf) is not None
+        return self._was_near(item, reached.place)
 
     def _was_near(self, item: Item, place: Point | None) -> bool:
         """Whether an item is near a position; None: near any position received so far."""
@@ -158,14 +165,13 @@ class Resume:
         if not self._profile.atomic and self._progress.items:  # REACHED was received first
             current = max(current, self._progress.current or 0)
         ended = self._ended(held, current)
-        if not ended and self._continues_recorded(held):
-            self._continue_recorded(held, tasks, now)
+        if self._continues_recorded(held):
+            self._continue_recorded(held, tasks, ended, now)
             return
         self._credit_unread(held, now)
         flown = len(held) if ended else current
         first = min(self._currents[0][0], flown) if self._currents else flown
-        self._skipped = frozenset(
-            n for n in range(first, flown) if self._was_elsewhere(held[n]))
+        self._skipped = frozenset(range(first, flown)) - self._flown_since(held, first, flown, now)
         self._progress.begin(held, flown, now, read=True)
         self._epoch, self._located_at = self._progress.epoch, flown
         # the previous run has reported earlier items, or recorded that they were skipped
@@ -182,14 +188,16 @@ class Resume:
                 and self._progress.continues_recorded
                 and bool(self._currents) and recorded <= self._currents[0][0])
 
-    def _continue_recorded(self, held: tuple[Item, ...], tasks: TaskList, now: float) -> None:
+    def _continue_recorded(self, held: tuple[Item, ...], tasks: TaskList, ended: bool,
+                           now: float) -> None:
         """Continue the previous run: items passed since are judged by the positions."""
         _, recorded, arrived = self.recorded
         assert recorded is not None
-        progress, (current, when, frame) = self._progress, self._currents[0]
+        progress, (current, when, _) = self._progress, self._currents[0]
+        if ended:
+            current, when = len(held), now
         self._old, self._until = held[:recorded], now + MAX_AGE
-        placed = tuple(with_position(item, self._origin) for item in held)
-        flown = progress.flown_offline(placed, recorded, current, when, frame)
+        flown = self._flown_since(held, recorded, current, when)
         if arrived and current > recorded:
             flown |= {recorded}
         self._flown += tuple(held[n] for n in sorted(flown))
@@ -199,12 +207,20 @@ class Resume:
         self._epoch, self._located_at = progress.epoch, recorded
         self._replay(held)
 
+    def _flown_since(self, held: tuple[Item, ...], begin: int, end: int, now: float) -> set[int]:
+        """Indices in [begin, end) at which the vehicle was until steady time `now` [s]."""
+        if begin == end or len(self._currents) == 0:
+            return set()
+        placed = tuple(with_position(item, self._origin) for item in held)
+        frame = max(frame for _, when, frame in self._currents if when <= now)
+        return self._progress.flown_offline(placed, begin, end, now, frame)
+
     def _replay(self, held: tuple[Item, ...]) -> None:
         """Pass on what was received until the mission was read, in the order it was sent."""
         rows: list[tuple[int, int, int, float]] = [
             (frame, 1, seq, when) for seq, when, frame in self._currents[1:]]
         rows += [(each.frame, 0, each.seq, each.at) for each in self._unread
-                 if each.may_be_of(held)]
+                 if self._is_of(each, held)]
         self._unread.clear()
         for frame, kind, seq, when in sorted(rows):
             if kind:
@@ -254,12 +270,6 @@ class Resume:
         items = self._progress.items
         return tuple(item for item in self._flown_here() if any(
             item is items[n] for n in self._progress.reached_seqs if n < len(items)))
-
-    def _was_elsewhere(self, item: Item) -> bool:
-        """Whether the positions since the start of this bridge show that it skipped an item."""
-        item = with_position(item, self._origin)
-        return item.position is not None and self._progress.path.visited(
-            item.position, item.radius, 0.0, -math.inf) is Visit.NO
 
     def _flown_here(self) -> tuple[Item, ...]:
         """Flown items of the onboard mission that belong to no task of the list."""

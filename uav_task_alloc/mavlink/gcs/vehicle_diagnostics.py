@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from uav_task_alloc.mavlink.gcs.authority import AuthorityState, Suspension
 from uav_task_alloc.mavlink.gcs.ground_station import VehicleSession
+from uav_task_alloc.mavlink.gcs.onboard_mission import OnboardMission
 from uav_task_alloc.mavlink.gcs.status import UavMode, mode_of, why_not_available
 from uav_task_alloc.mavlink.mission.verified_mission import MissionState
 
@@ -57,7 +58,7 @@ def diagnostics_of(session: VehicleSession, now: float) -> VehicleDiagnostics:
         Level, summary and facts, for a row of /diagnostics.
     """
     level, summary = _level_of(session, now)
-    progress = session.executor.onboard.upload_progress(now)
+    progress = upload_progress(session.executor.onboard, now)
     waits_for = session.executor.sender.waits_for
     if level < _STALE:
         summary += f', {progress}' if progress else ''
@@ -100,7 +101,24 @@ def _facts_of(session: VehicleSession, now: float) -> VehicleFacts:
         mode=mode_of(executor).name, mission=onboard.state.name,
         list_revision=onboard.revision, epoch=onboard.progress.epoch,
         item=f'{onboard.progress.current} of {len(onboard.progress.items)}',
-        upload=onboard.upload_progress(now) or 'none', uploads=onboard.upload.uploads,
+        upload=upload_progress(onboard, now) or 'none', uploads=onboard.upload.uploads,
         restarts=telemetry.restarts, silent_for=f'{now - telemetry.received_at:.1f} s',
         clock_rate='unknown' if math.isnan(rate) else f'{rate:.3f}',
         strays=session.strays)
+
+
+def upload_progress(onboard: OnboardMission, now: float) -> str:
+    """Progress and remaining time of an upload, as a text; '': no upload.
+
+    Args:
+        onboard: the mission of the vehicle.
+        now: steady time [s].
+    """
+    sent, read, count = onboard.upload.progress
+    if count == 0:
+        return ''
+    text = (f'read back {read}' if read else f'sent {sent}') + f' of {count} items'
+    done, elapsed = sent + read, now - onboard.upload_started_at
+    if done == 0 or elapsed <= 0.0:
+        return text
+    return f'{text}, about {elapsed * (2 * count - done) / done:.0f} s left'

@@ -44,7 +44,7 @@ class CurrentItem:
         self.passed_over: deque[Item] = deque()  # passed, and not known to be flown
         self.set_by_other: int | None = None  # the current item, where another station set it
         self.in_mission = False  # mission mode, by the newest heartbeat
-        self._mission_at = -math.inf  # vehicle time [s] of the last such heartbeat
+        self._entered_at = -math.inf  # vehicle time [s] at which it was in mission mode first
         self._left_at = -math.inf  # vehicle time [s] at which it left mission mode
         self._after_skipped: int | None = None  # the item after those that were skipped
 
@@ -53,27 +53,15 @@ class CurrentItem:
         self.reports.begin(start, now)
         self.set_by_other = None
 
-    def complete_active(self, until: float) -> None:
-        """Complete the item being flown where the positions show that it was reached.
-
-        Args:
-            until: vehicle time [s] until which it is known to have flown it.
-        """
-        epoch, active = self._epoch, self._epoch.active
-        if active is not None and self.reports.reported == epoch.current and (
-                self._positions.was_at(active, epoch.since, until, close=0.0)):
-            self._tasks.credit(active)
-
-    def end(self, taken: float) -> None:
-        """End the epoch: another mission was taken at vehicle time `taken` [s], or later."""
-        self.complete_active(min(taken, self._mission_at))
-
     def invalidate(self) -> None:
         """End the epoch, and complete what the positions have shown so far."""
         for item in self.passed.seen():
             self._tasks.complete(item.task, item.position)
-        if self.in_mission:
-            self.complete_active(math.inf)
+        epoch, active = self._epoch, self._epoch.active
+        if active is not None and self.in_mission and self.reports.reported == epoch.current and (
+                self._positions.was_at(
+                    active, max(epoch.since, self._entered_at), close=0.0)):
+            self._tasks.credit(active)
         self.reports.clear()
         self.passed.clear()
         self.set_by_other = None
@@ -87,11 +75,13 @@ class CurrentItem:
     def current_since(self, item: Item) -> float:
         """Vehicle time [s] from which an item is flown that is current, or was just passed."""
         return next((claim.since for claim in self.passed.claims if any(
-            item is one for one in claim.items)), self._epoch.since)
+            item is one for one in claim.items)), max(self._epoch.since, self._entered_at))
 
     def note_in_mission(self) -> None:
         """Note that the vehicle is in mission mode."""
-        self.in_mission, self._mission_at = True, self._positions.path.newest
+        if not self.in_mission:
+            self._entered_at = self._positions.path.newest
+        self.in_mission = True
 
     def note_mission_left(self) -> None:
         """Note that the vehicle has left the list: a task resumed later starts again."""

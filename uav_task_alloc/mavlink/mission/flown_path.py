@@ -52,10 +52,18 @@ class FlownPath:
         """Vehicle time [s] of the newest sample; -inf where there is none."""
         return self._samples[-1].t if self._samples else -math.inf
 
-    @property
-    def last(self) -> PositionSample | None:
-        """The newest sample; None where there is none."""
-        return self._samples[-1] if self._samples else None
+    def last(self, since: float) -> tuple[PositionSample, ...]:
+        """The newest sample, after the one before the latest gap.
+
+        Args:
+            since: vehicle time [s]; earlier gaps do not count.
+        """
+        for n in range(len(self._samples) - 1, 0, -1):
+            if self._samples[n].t < since:
+                break
+            if self._samples[n].t - self._samples[n - 1].t > GAP:
+                return self._samples[n - 1], self._samples[-1]
+        return tuple(self._samples[-1:])
 
     def add(self, sample: PositionSample) -> None:
         """Add a sample; O(1) where they arrive in order."""

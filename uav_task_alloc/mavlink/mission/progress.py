@@ -161,8 +161,6 @@ class ProgressTable:
             self._epochs.begin(PreviousEpoch(
                 epoch.items, epoch.since, self._positions.vehicle_time(now), self.may_end(now),
                 now + REPEAT_WINDOW, epoch.taken))
-        if since is not None:
-            self._moves.end(since)
         epoch.items, epoch.current = items, start
         self._reached.begin()
         self._moves.begin(None if read or start == len(items) else start, now)
@@ -200,6 +198,10 @@ class ProgressTable:
         """Add the last position that the previous run of the bridge has received."""
         self._positions.add_recorded(sample)
 
+    def last_positions(self) -> tuple[PositionSample, ...]:
+        """The newest position, after the one before a gap since the current item is flown."""
+        return self.path.last(self._epoch.since)
+
     @property
     def continues_recorded(self) -> bool:
         """Whether the positions continue those of the previous run of the bridge."""
@@ -223,8 +225,7 @@ class ProgressTable:
     def note_mission_mode(self) -> None:
         """Note that the vehicle flies its mission: the task of the current item has started."""
         epoch, item = self._epoch, self.active
-        if not self._moves.in_mission:
-            self._moves.note_in_mission()
+        self._moves.note_in_mission()
         if item and item.task and item.task != epoch.started and item.task not in self._tasks:
             epoch.started = item.task
             self._tasks.start(item.task)
