@@ -83,9 +83,8 @@ class Telemetry:
         self.received_last: dict[int, float] = {}  # [s] by message id
         self.restarts = 0
         self.boot_ms = self._older_clocks = 0  # [ms] time_boot_ms; messages in a row before it
-        self._boot_at = now
+        self._boot_at, self._gap_at = now, -math.inf  # [s]; end of the latest gap of _QUIET
         self.clock_rate = ClockRate()
-        self._gap_at = -math.inf  # [s] end of the latest gap of _QUIET
         self.frames = FrameLog()
         self.frame = 0  # frame number of the latest message
         self._newest: dict[str, tuple[int, float]] = {}  # sequence number and time [s] by type

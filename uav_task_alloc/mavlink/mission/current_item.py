@@ -99,7 +99,7 @@ class CurrentItem:
             now: steady time [s].
             flying: whether the vehicle is in mission mode in the air.
             frame: number of its frame; None: not known.
-            restarted: whether the mission was complete, and has begun again by itself.
+            restarted: whether the mission was complete, and has begun again without a command.
         """
         reports, epoch = self.reports, self._epoch
         reports.previous_frame = reports.last_frame
