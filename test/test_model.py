@@ -5,7 +5,7 @@ import math
 import pytest
 
 from uav_task_alloc.errors import InvalidValue
-from uav_task_alloc.model import Leg, Plan, Shape, Task, ThreatZone, Uav
+from uav_task_alloc.model import Leg, Plan, Shape, Task, ThreatZone, Timetable, Uav
 
 NAN = math.nan
 SQUARE = [(0, 0), (10, 0), (10, 10), (0, 10)]
@@ -36,6 +36,38 @@ SQUARE = [(0, 0), (10, 0), (10, 10), (0, 10)]
      'uav u1: cruise_speed = 0.0: expected a number in (0, 10000]'),
     (lambda: Uav('u1', (0, 0, 0), home=(0, 0, NAN)),
      'uav u1: home = (0.0, 0.0, nan): expected three finite coordinates [m]'),
+    (lambda: Task('t1', (0, 0, 0), earliest=NAN),
+     'task t1: earliest = nan: expected a number in [-inf, 1e+09]'),
+    (lambda: Task('t1', (0, 0, 0), earliest=math.inf),
+     'task t1: earliest = inf: expected a number in [-inf, 1e+09]'),
+    (lambda: Task('t1', (0, 0, 0), latest=-math.inf),
+     'task t1: latest = -inf: expected a number in [-1e+09, inf]'),
+    (lambda: Task('t1', (0, 0, 0), earliest=60.0, latest=59.5),
+     'task t1: latest = 59.5: expected at least earliest = 60'),
+    (lambda: Task('t1', (0, 0, 0), release=math.inf),
+     'task t1: release = inf: expected a number in [-1e+09, 1e+09]'),
+    (lambda: Task('t1', (0, 0, 0), announced='now'),
+     "task t1: announced = 'now': expected a number in [-1e+09, 1e+09]"),
+    (lambda: Task('t1', (0, 0, 0), payload=-0.1),
+     'task t1: payload = -0.1: expected a number in [0, 1e+06]'),
+    (lambda: Uav('u1', (0, 0, 0), endurance=-1.0),
+     'uav u1: endurance = -1.0: expected a number in [0, inf]'),
+    (lambda: Uav('u1', (0, 0, 0), payload_capacity=math.inf),
+     'uav u1: payload_capacity = inf: expected a number in [0, 1e+06]'),
+    (lambda: Uav('u1', (0, 0, 0), climb_speed=0.0),
+     'uav u1: climb_speed = 0.0: expected a number in (0, inf]'),
+    (lambda: Uav('u1', (0, 0, 0), descent_speed=NAN),
+     'uav u1: descent_speed = nan: expected a number in (0, inf]'),
+    (lambda: Uav('u1', (0, 0, 0), available_from=-1.0),
+     'uav u1: available_from = -1.0: expected a number in [0, 1e+09]'),
+    (lambda: Uav('u1', (0, 0, 0), available_from=9.0, available_until=8.0),
+     'uav u1: available_until = 8.0: expected at least available_from = 9'),
+    (lambda: Uav('u1', (0, 0, 0), full_range=-1.0),
+     'uav u1: full_range = -1.0: expected a number in [0, inf]'),
+    (lambda: Uav('u1', (0, 0, 0), turnaround=-1.0),
+     'uav u1: turnaround = -1.0: expected a number in [0, inf]'),
+    (lambda: Uav('u1', (0, 0, 0), aboard='t1'),
+     "uav u1: aboard = 't1': expected a set of non-empty strings"),
     (lambda: ThreatZone.hemisphere('z1', (0, 0, 0), 0.0),
      'zone z1: radius = 0.0: expected a number in (0, 1e+07]'),
     (lambda: ThreatZone.hemisphere('z1', (0, 0, 0), 10.0, margin=-1.0),
@@ -103,3 +135,22 @@ def test_only_a_polygon_has_vertices(shape):
     corners = ((math.nan, math.inf), (1.0, 2.0))
     zone = ThreatZone('z', shape, (0.0, 0.0, 0.0), 10.0, vertices=corners)
     assert zone.vertices == ()
+
+
+def test_a_uav_is_at_its_base_where_it_has_no_other_home():
+    assert Uav('u', (5.0, 0.0, 0.0)).at_base
+    assert Uav('u', (5.0, 0.0, 0.0)).base == (5.0, 0.0, 0.0)
+    assert Uav('u', (5.0, 0.0, 0.5), home=(5.0, 0.0, 0.0)).at_base
+    assert not Uav('u', (5.0, 0.0, 50.0), home=(5.0, 0.0, 0.0)).at_base
+
+
+def test_the_times_of_a_plan_are_those_of_its_timetable():
+    plan = Plan({'u': ('t',)}, timetable=lambda: Timetable(
+        {'t': 5.0}, {'t': 7.5}, {'u': (('t',),)}, {'u': (1.0,)}, {'u': 9.0, 'v': 4.0}, 7.0))
+    assert (plan.arrivals, plan.waits) == ({'t': 5.0}, {'t': 2.5})
+    assert (plan.finish, plan.response, plan.trips) == (9.0, 7.0, {'u': (('t',),)})
+
+
+def test_a_plan_without_times_has_none():
+    plan = Plan({})
+    assert (plan.arrivals, plan.waits, plan.finish, plan.response) == ({}, {}, 0.0, 0.0)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from enum import Enum
 from typing import Any
@@ -12,6 +12,15 @@ from uav_task_alloc.checks import check_id, check_names, check_number, check_poi
 from uav_task_alloc.errors import InvalidValue
 
 Point = tuple[float, float, float]  # [m] ENU
+LONG = 1e9  # [s] bound of all finite times
+BASE_RADIUS = 1.0  # [m] from its home within which a UAV is at its base
+_TASK_TIMES = (('earliest', -math.inf, LONG), ('latest', -LONG, math.inf),
+               ('release', -LONG, LONG), ('announced', -LONG, LONG))  # [s]
+_UAV_LIMITS = (
+    ('endurance', 0.0, math.inf), ('payload_capacity', 0.0, 1e6), ('climb_speed', 0.0, math.inf),
+    ('descent_speed', 0.0, math.inf), ('available_from', 0.0, LONG),
+    ('available_until', 0.0, math.inf), ('full_range', 0.0, math.inf),
+    ('turnaround', 0.0, math.inf), ('full_endurance', 0.0, math.inf))
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,6 +35,12 @@ class Task:
         required_capabilities: a UAV needs all of them.
         allowed_uavs: ids of UAVs; None: any.
         acceptance_radius: [m]; None: that of the parameters.
+        earliest: [s] from now, of the start of the service; a UAV that arrives earlier waits.
+        latest: [s] from now, of the start of the service.
+        release: [s] from now; no UAV sets out for it before: does not begin the leg to it or, with
+            a payload, the trip.
+        announced: [s] from now, mostly negative; the response time counts from it.
+        payload: [kg] taken on at the base.
 
     Raises:
         InvalidValue: a value is out of range.
@@ -38,6 +53,11 @@ class Task:
     required_capabilities: frozenset[str] = frozenset()
     allowed_uavs: frozenset[str] | None = None
     acceptance_radius: float | None = None  # [m]
+    earliest: float = -math.inf  # [s]
+    latest: float = math.inf  # [s]
+    release: float = 0.0  # [s]
+    announced: float = 0.0  # [s]
+    payload: float = 0.0  # [kg]
 
     def __post_init__(self) -> None:
         check_id('task id', self.id)
@@ -56,6 +76,12 @@ class Task:
         if self.acceptance_radius is not None:
             put(self, 'acceptance_radius', check_number(
                 place + 'acceptance_radius', self.acceptance_radius, 0.0, 1e6, open_low=True))
+        for name, low, high in _TASK_TIMES:
+            put(self, name, check_number(place + name, getattr(self, name), low, high))
+        put(self, 'payload', check_number(place + 'payload', self.payload, 0.0, 1e6))
+        if self.latest < self.earliest:
+            raise InvalidValue(place + 'latest', self.latest,
+                               f'at least earliest = {self.earliest:g}')
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,7 +94,18 @@ class Uav:
         range: [m] that it can still fly.
         cruise_speed: [m/s].
         capabilities: that tasks may require.
-        home: [m] ENU; None: its position.
+        home: [m] ENU, its base; None: its position.
+        endurance: [s] that it can still be in the air, service and waiting included.
+        payload_capacity: [kg] that it can take on at its base.
+        climb_speed: [m/s] at most, upwards.
+        descent_speed: [m/s] at most, downwards.
+        available_from: [s] from now.
+        available_until: [s] from now; its route ends by then.
+        full_range: [m] after a visit of its base; None: `range`.
+        turnaround: [s] of a visit of its base between two trips; inf: it makes one trip only.
+        full_endurance: [s] after a visit of its base; None: `endurance`.
+        aboard: ids of tasks whose payload it has on board in the air; None: those of its locked
+            tasks and of the current trip of the plan that `plan` starts from.
 
     Raises:
         InvalidValue: a value is out of range.
@@ -80,6 +117,16 @@ class Uav:
     cruise_speed: float = 15.0  # [m/s]
     capabilities: frozenset[str] = frozenset()
     home: Point | None = None  # [m] ENU
+    endurance: float = math.inf  # [s]
+    payload_capacity: float = 0.0  # [kg]
+    climb_speed: float = math.inf  # [m/s]
+    descent_speed: float = math.inf  # [m/s]
+    available_from: float = 0.0  # [s]
+    available_until: float = math.inf  # [s]
+    full_range: float | None = None  # [m]
+    turnaround: float = math.inf  # [s]
+    full_endurance: float | None = None  # [s]
+    aboard: frozenset[str] | None = None
 
     def __post_init__(self) -> None:
         check_id('uav id', self.id)
@@ -92,6 +139,25 @@ class Uav:
         put(self, 'capabilities', check_names(place + 'capabilities', self.capabilities))
         if self.home is not None:
             put(self, 'home', check_point(place + 'home', self.home))
+        for name, low, high in _UAV_LIMITS:
+            if getattr(self, name) is not None:
+                put(self, name, check_number(place + name, getattr(self, name), low, high,
+                                             open_low=name.endswith('_speed')))
+        if self.available_until < self.available_from:
+            raise InvalidValue(place + 'available_until', self.available_until,
+                               f'at least available_from = {self.available_from:g}')
+        if self.aboard is not None:
+            put(self, 'aboard', check_names(place + 'aboard', self.aboard))
+
+    @property
+    def base(self) -> Point:
+        """Its home, or its position where it has none [m] ENU."""
+        return self.position if self.home is None else self.home
+
+    @property
+    def at_base(self) -> bool:
+        """Whether it is at its base: on the ground, where waiting uses no endurance."""
+        return self.home is None or math.dist(self.position, self.home) <= BASE_RADIUS
 
 
 class Shape(Enum):
@@ -237,6 +303,32 @@ class Route:
 
 
 @dataclass(frozen=True, slots=True)
+class Timetable:
+    """When each UAV takes off, each task is reached and served, and each route ends.
+
+    All times in [s] from the moment of the plan.
+
+    Attributes:
+        arrivals: at each task served, by task id.
+        starts: of the services, by task id: after `arrivals` where the UAV waits there.
+        trips: task ids of each trip, by UAV id; at the end of each but the last the UAV visits
+            its base.
+        departures: of each trip, by UAV id.
+        ends: of each route with tasks, by UAV id: the end of the last service, or at home.
+        response: [s] value-weighted mean time from the announcement to the start of the service.
+        late: [s] by which services start after `latest`, by task id, where any do.
+    """
+
+    arrivals: Mapping[str, float] = field(default_factory=dict)
+    starts: Mapping[str, float] = field(default_factory=dict)
+    trips: Mapping[str, tuple[tuple[str, ...], ...]] = field(default_factory=dict)
+    departures: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
+    ends: Mapping[str, float] = field(default_factory=dict)
+    response: float = 0.0
+    late: Mapping[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
 class Plan:
     """The result of a solve: routes, unassigned tasks with reasons, terms of the objective.
 
@@ -255,6 +347,9 @@ class Plan:
         solve_time: [s].
         iterations: of the solver.
         warm_started: it started from a previous plan.
+        cost: of the objective that the plan was solved for, smaller is better.
+        timetable: returns the times of the plan; a function, as they are computed when they are
+            first asked for.
     """
 
     routes: dict[str, tuple[str, ...]]
@@ -271,6 +366,34 @@ class Plan:
     solve_time: float = 0.0  # [s]
     iterations: int = 0
     warm_started: bool = False
+    cost: float = 0.0
+    timetable: Callable[[], Timetable] = field(default=Timetable, compare=False, repr=False)
+
+    @property
+    def arrivals(self) -> Mapping[str, float]:
+        """Arrival at each task served [s] from the moment of the plan, by task id."""
+        return self.timetable().arrivals
+
+    @property
+    def waits(self) -> dict[str, float]:
+        """Waiting at each task served, before the service [s], by task id."""
+        times = self.timetable()
+        return {name: start - times.arrivals[name] for name, start in times.starts.items()}
+
+    @property
+    def trips(self) -> Mapping[str, tuple[tuple[str, ...], ...]]:
+        """Task ids of each trip, by UAV id."""
+        return self.timetable().trips
+
+    @property
+    def finish(self) -> float:
+        """End of the last route [s] from the moment of the plan; 0 without tasks."""
+        return max(self.timetable().ends.values(), default=0.0)
+
+    @property
+    def response(self) -> float:
+        """Value-weighted mean time from the announcements to the starts of the services [s]."""
+        return self.timetable().response
 
     def route(self, uav: str) -> Route:
         """Return the route of one UAV with its legs.

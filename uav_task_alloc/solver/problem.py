@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from uav_task_alloc.geometry.distances import Distances
 from uav_task_alloc.model import Task, ThreatZone, Uav
-from uav_task_alloc.objective import Weights
+from uav_task_alloc.objective import Objective, Weights
 from uav_task_alloc.solver.neighbours import fill_near_starts, fill_near_tasks, find_nearest
 from uav_task_alloc.solver.path_preparation import NEAR_SHARE, PathPreparation
 from uav_task_alloc.solver.rng import rng_state
@@ -45,6 +45,8 @@ class Rules:
     returns: bool = False  # routes end at home
     hard: bool = True  # ranges are hard constraints
     weights: Weights = field(default_factory=Weights)  # of eq 2.12
+    objective: Objective = field(default_factory=Objective)
+    trips: int = 1  # of a UAV in all; 1: no visit of its base
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,9 +9,10 @@ import pytest
 from allocation import AllocatorDriver
 
 from uav_task_alloc.allocator.persistence.persistence import Persistence
-from uav_task_alloc.allocator.persistence.restore import restored_state
-from uav_task_alloc.journal import FILE_NAME, JournalRow
-from uav_task_alloc.model import ThreatZone
+from uav_task_alloc.allocator.persistence.restore import restored_state, task_row
+from uav_task_alloc.allocator.records import TaskRecord
+from uav_task_alloc.journal import FILE_NAME, Journal, JournalRow
+from uav_task_alloc.model import Task, ThreatZone
 
 HOSTILE = (None, True, -1, 0, 1.5, 10**400, 1e308, math.nan, math.inf, -math.inf, '', 'x', 'a b',
         '\ud800', [], [[]], {}, {'id': 'x'}, [1.0, 2.0, math.nan], [None] * 3)
@@ -126,3 +127,25 @@ def test_finding_23_one_damaged_zone_costs_that_zone_only(rows):
     found = restored_state([*rows[:k], bad, *rows[k + 1:]])
     assert [zone.id for zone in found.zones] == ['z2']
     assert 'zone z1' in found.unreadable[0] or 'zone radius = nan' in found.unreadable[0]
+
+
+TIMED = Task('t', (1.0, 2.0, 3.0), earliest=-5.0, latest=60.0, release=2.0, announced=-9.0,
+             payload=0.5)
+
+
+@pytest.mark.parametrize('task', [TIMED, Task('t', (1.0, 2.0, 3.0))])
+def test_times_and_payload_of_a_task_are_restored(tmp_path, task):
+    journal = Journal(str(tmp_path))
+    journal.put([task_row(TaskRecord(task, task))])
+    record, = restored_state(journal.load()).tasks
+    journal.close()
+    assert record.task == task
+
+
+def test_a_journal_from_before_there_were_windows_is_read():
+    row = task_row(TaskRecord(TIMED, TIMED))
+    for name in ('earliest', 'latest', 'release', 'announced', 'payload'):
+        del row.body['task'][name]
+    state = restored_state([row])
+    assert state.unreadable == []
+    assert state.tasks[0].task == Task('t', (1.0, 2.0, 3.0))

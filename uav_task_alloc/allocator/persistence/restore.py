@@ -26,6 +26,8 @@ from uav_task_alloc.zone_codec import JOURNAL_ZONE, decode_zone, encode_zone
 _Value = TypeVar('_Value')
 _KINDS = frozenset({'task', 'list', 'zones', 'off', 'revision', 'learner', 'origin'})
 _UNREADABLE = (LookupError, TypeError, ValueError, AttributeError, OverflowError)
+_FIRST_FIELDS = frozenset({'id', 'position', 'value', 'service_time', 'required_capabilities',
+                           'allowed_uavs', 'acceptance_radius'})  # every journal has them
 _MAX = 2.0**31 - 1.0  # [s] of a stamp, and the last revision, that a message can hold
 
 
@@ -128,7 +130,9 @@ def _plain(value: Any) -> Any:
 
 def _task(body: dict[str, Any]) -> Task:
     check_ros_name('task id', check_id('task id', body['id']))
-    return Task(**{spec.name: body[spec.name] for spec in fields(Task)})
+    # what an earlier version did not know has its default
+    return Task(**{spec.name: body[spec.name] for spec in fields(Task)
+                   if spec.name in body or spec.name in _FIRST_FIELDS})
 
 
 def _uav_id(body: Any) -> str:
