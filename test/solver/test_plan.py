@@ -236,3 +236,24 @@ def test_a_plan_or_its_state_is_a_warm_start():
         again = quick(uavs, tasks, warm=warm, max_iterations=0)
         assert again.warm_started
         assert again.routes == cold.routes
+
+
+def test_a_plan_says_when_each_task_is_reached_and_when_it_ends():
+    uav = Uav('u1', (0.0, 0.0, 0.0), cruise_speed=10.0, climb_speed=1.0)
+    tasks = [Task('a', (100.0, 0.0, 20.0), 3.0, service_time=5.0), Task('b', (200.0, 0.0, 20.0))]
+    result = quick([uav, Uav('idle', (0.0, 9e3, 0.0))], tasks, route_end='home')
+    assert result.arrivals == {'a': pytest.approx(20.0), 'b': pytest.approx(35.0)}
+    assert result.finish == pytest.approx(55.0)
+    assert result.response == pytest.approx((3.0 * 20.0 + 35.0) / 4.0)
+    assert result.waits == {'a': 0.0, 'b': 0.0}
+    assert result.trips == {'u1': (('a', 'b'),)}
+    assert result.cost == pytest.approx(result.distance)
+
+
+def test_detours_count_in_the_arrivals():
+    uav = Uav('u1', (0.0, 0.0, 10.0), cruise_speed=10.0)
+    wall = ThreatZone.polygon('z', [(40.0, -100.0), (60.0, -100.0), (60.0, 100.0), (40.0, 100.0)])
+    result = quick([uav], [Task('a', (100.0, 0.0, 10.0))], [wall])
+    leg, = result.legs['u1']
+    assert leg.via
+    assert result.arrivals == {'a': pytest.approx(leg.length / 10.0)}

@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from functools import cache
 from itertools import chain, pairwise
 
 import numpy as np
 
 from uav_task_alloc.geometry.distances import Distances
-from uav_task_alloc.model import Leg, Plan
+from uav_task_alloc.model import Leg, Plan, Timetable
 from uav_task_alloc.objective import excess, fit
-from uav_task_alloc.solver.problem import Problem
+from uav_task_alloc.solver.problem import Problem, excess_cost
 from uav_task_alloc.solver.reasons import reasons
 from uav_task_alloc.solver.recorder import Recorder
 from uav_task_alloc.solver.routes import Routes
+from uav_task_alloc.solver.timed.evaluator import evaluate_legs
 
 _RANGE_TOLERANCE = 1e-6  # [m] smaller excess over a range is rounding
 _STRAIGHT_RATIO = 1.0 + 1e-12  # a leg up to so much longer than the distance is straight
@@ -50,7 +52,18 @@ def to_plan(problem: Problem, recorder: Recorder, solver: str, warm: bool) -> Pl
         routes, reasons(problem, unassigned), distance, value,
         penalty, fit(distance, value, penalty, problem.rules.weights),
         tuple(recorder.history), None, legs, problem.rules.returns, solver,
-        recorder.elapsed(), recorder.iterations, warm)
+        recorder.elapsed(), recorder.iterations, warm,
+        problem.rules.objective.cost(distance)
+        + excess_cost(problem.rules.weights) * problem.rules.objective.distance * penalty,
+        cache(lambda: _timetable(problem, routes, legs)))
+
+
+def _timetable(problem: Problem, routes: Mapping[str, tuple[str, ...]],
+               legs: Mapping[str, tuple[Leg, ...]]) -> Timetable:
+    """The times of routes of one trip each."""
+    tasks = [*chain.from_iterable(problem.locked.values()), *problem.tasks]
+    return evaluate_legs(problem.uavs, tasks, problem.rules,
+                         {uav: [row] for uav, row in routes.items() if row}, legs).timetable
 
 
 def nodes_of(routes: Routes, uavs: int) -> list[list[int]]:

@@ -19,7 +19,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from uav_task_alloc.geometry.flight_time import flight_time
-from uav_task_alloc.model import Point, Task, Timetable, Uav
+from uav_task_alloc.model import Leg, Point, Task, Timetable, Uav
 from uav_task_alloc.objective import response_time
 from uav_task_alloc.solver.problem import Rules, excess_cost
 
@@ -303,3 +303,29 @@ def _excess(trip: _Trip) -> float:
     seconds = max(0.0, trip.in_air - trip.endurance)
     return (metres if metres > _TOLERANCE else 0.0) + (
         seconds * trip.uav.cruise_speed if seconds > _TOLERANCE else 0.0)
+
+
+def evaluate_legs(uavs: Sequence[Uav], tasks: Sequence[Task], rules: Rules,
+                  routes: Mapping[str, Trips], legs: Mapping[str, Sequence[Leg]],
+                  held: Held | None = None) -> Evaluation:
+    """Evaluate routes along their legs, as `evaluate`.
+
+    Args:
+        uavs, tasks, rules, routes, held: as for `evaluate`.
+        legs: by UAV id; one to each task and to each base at the end of a trip.
+    """
+    places, ways = {task.id: task.position for task in tasks}, {}
+    for uav in uavs:
+        rows = routes.get(uav.id, ())
+        stops = [uav.position]
+        for number, row in enumerate(rows):
+            stops += [places[name] for name in row]
+            stops += [uav.base] * (number + 1 < len(rows) or rules.returns)
+        for start, end, leg in zip(stops, stops[1:], legs.get(uav.id, ()), strict=False):
+            ways[uav.id, start, end] = leg.length, flight_time(uav, (start, *leg.via, end))
+
+    def leg_of(uav: Uav, start: Point, end: Point) -> tuple[float, float]:
+        # where no safe way leads home the route ends at its last task
+        return ways.get((uav.id, start, end), (0.0, 0.0))
+
+    return evaluate(uavs, tasks, rules, routes, leg_of, held)
