@@ -47,6 +47,7 @@ class Rules:
     weights: Weights = field(default_factory=Weights)  # of eq 2.12
     objective: Objective = field(default_factory=Objective)
     trips: int = 1  # of a UAV in all; 1: no visit of its base
+    grain: float = 0.0  # [1/m] lengths are cut to multiples of 1 / grain, for public instances
 
 
 @dataclass(frozen=True, slots=True)

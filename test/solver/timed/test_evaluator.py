@@ -221,3 +221,10 @@ def test_other_legs_than_straight_ones_are_taken():
     assert (found.distance, found.finish) == (123.0, 45.0)
     none = run(UAV, [at('a', 1.0)], [['a']], leg=lambda *ends: (math.inf, math.inf))
     assert none.violations == ('u, trip 1 has a leg without a safe way',)
+
+
+def test_lengths_of_public_instances_are_cut():
+    tasks = [at('a', 12.39), at('b', 24.0)]
+    found = run(replace(UAV, cruise_speed=1.0), tasks, [['a', 'b']], replace(HOLD, grain=10.0))
+    assert found.timetable.arrivals == {'a': pytest.approx(12.3), 'b': pytest.approx(23.9)}
+    assert found.distance == pytest.approx(23.9)

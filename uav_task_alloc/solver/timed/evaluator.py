@@ -105,13 +105,19 @@ class _Trip:
         return self.end - (self.departure if self.on_ground else 0.0)
 
 
-def straight_leg(uav: Uav, start: Point, end: Point) -> tuple[float, float]:
-    """Length [m] and flight time [s] of a straight leg."""
-    return math.dist(start, end), flight_time(uav, (start, end))
+def straight_legs(rules: Rules) -> LegOf:
+    """Length [m] and flight time [s] of straight legs; cut lengths are flown at cruise speed."""
+    def leg(uav: Uav, start: Point, end: Point) -> tuple[float, float]:
+        metres = math.dist(start, end)
+        if not rules.grain:
+            return metres, flight_time(uav, (start, end))
+        metres = math.floor(metres * rules.grain) / rules.grain
+        return metres, metres / uav.cruise_speed
+    return leg
 
 
 def evaluate(uavs: Sequence[Uav], tasks: Sequence[Task], rules: Rules,
-             routes: Mapping[str, Trips], leg: LegOf = straight_leg,
+             routes: Mapping[str, Trips], leg: LegOf | None = None,
              held: Held | None = None) -> Evaluation:
     """Evaluate routes with the best departures.
 
@@ -120,13 +126,13 @@ def evaluate(uavs: Sequence[Uav], tasks: Sequence[Task], rules: Rules,
         tasks: all tasks, locked ones included.
         rules: how routes end, ranges, objective, number of trips.
         routes: trips by UAV id.
-        leg: lengths and flight times.
+        leg: lengths and flight times; None: straight legs.
         held: locked tasks, whose windows are no rule, and payloads on board.
 
     Returns:
         Times, cost and violations.
     """
-    held = held or Held()
+    held, leg = held or Held(), leg or straight_legs(rules)
     known = {task.id: task for task in tasks}
     fleet = {uav.id: uav for uav in uavs}
     violations = [f'{uav_id} is no UAV' for uav_id in routes.keys() - fleet.keys()]

@@ -1,0 +1,82 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Exact optima of tiny problems with time, against answers known by reasoning."""
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from uav_task_alloc.model import Task, Uav
+from uav_task_alloc.objective import Objective
+from uav_task_alloc.solver.problem import Rules
+from uav_task_alloc.solver.timed.evaluator import Held, evaluate
+from uav_task_alloc.study.exact import exact_plan
+
+UAV = Uav('u', (0.0, 0.0, 0.0), cruise_speed=10.0)
+LINE = [Task(name, (x, 0.0, 0.0)) for name, x in (('a', 100.0), ('b', -200.0), ('c', 300.0))]
+
+
+def with_objective(**coefficients):
+    return Rules(objective=Objective(**coefficients))
+
+
+def test_the_shortest_route_is_found():
+    found = exact_plan([UAV], LINE, Rules())
+    assert (found.cost, found.routes) == (700.0, {'u': (('b', 'a', 'c'),)})
+
+
+def test_the_fastest_finish_shares_the_tasks():
+    found = exact_plan([UAV, replace(UAV, id='v')], LINE, with_objective(distance=0.0, finish=1.0))
+    assert found.cost == 30.0
+    assert sorted(found.routes.values()) == [(('a', 'c'),), (('b',),)]
+
+
+def test_the_fastest_response_serves_the_near_task_first():
+    found = exact_plan([UAV], LINE, with_objective(distance=0.0, response=1.0))
+    assert found.routes == {'u': (('a', 'c', 'b'),)}
+    assert found.cost == pytest.approx((10.0 + 30.0 + 80.0) / 3)
+
+
+def test_a_task_that_is_not_worth_its_way_is_left_out():
+    found = exact_plan([UAV], LINE, with_objective(unserved=150.0))
+    assert (found.cost, found.value, found.routes) == (400.0, 1.0, {'u': (('a',),)})
+
+
+def test_the_most_value_is_served_where_not_all_can_be():
+    tasks = [replace(LINE[0], latest=10.0), replace(LINE[1], latest=30.0, value=3.0), LINE[2]]
+    found = exact_plan([UAV], tasks, Rules())
+    assert found.value == 4.0
+    assert found.routes == {'u': (('b', 'c'),)}
+
+
+def test_loads_make_trips():
+    tasks = [replace(task, payload=1.0) for task in LINE]
+    uav = replace(UAV, payload_capacity=2.0, turnaround=1.0)
+    found = exact_plan([uav], tasks, Rules(returns=True, trips=3))
+    assert sorted(found.routes['u'], key=len) in ([('b',), ('a', 'c')], [('b',), ('c', 'a')])
+    assert found.cost == 1000.0
+
+
+def test_locked_tasks_stay_first():
+    found = exact_plan([UAV, replace(UAV, id='v')], LINE, Rules(), held=Held({'v': ('c',)}))
+    assert found.routes['v'][0][0] == 'c'
+    assert found.cost == 700.0
+
+
+@pytest.mark.parametrize('seed', range(3))
+def test_no_random_plan_is_better(seed):
+    rng = np.random.default_rng(seed)
+    tasks = [Task(f't{i}', (*rng.uniform(0.0, 500.0, 2), 0.0), latest=rng.uniform(20.0, 200.0),
+                  payload=float(rng.integers(0, 2))) for i in range(4)]
+    uavs = [Uav(name, (*rng.uniform(0.0, 500.0, 2), 0.0), cruise_speed=10.0, endurance=90.0,
+                payload_capacity=1.0, turnaround=9.0) for name in 'uv']
+    rules = Rules(returns=True, trips=2, objective=Objective(0.01, 1.0, 1.0, 2.0, 50.0))
+    best = exact_plan(uavs, tasks, rules)
+    assert evaluate(uavs, tasks, rules, best.routes).cost == pytest.approx(best.cost)
+    for _ in range(500):
+        rows = {name: [[], []] for name in 'uv'}
+        for i in rng.permutation(5)[:rng.integers(1, 5)]:
+            if i < 4:
+                rows['uv'[rng.integers(2)]][rng.integers(2)].append(f't{i}')
+        rows = {name: [row for row in pair if row] for name, pair in rows.items()}
+        found = evaluate(uavs, tasks, rules, rows)
+        assert found.violations or found.cost >= best.cost - 1e-9

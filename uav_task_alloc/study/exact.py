@@ -1,0 +1,128 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Exact optima of tiny problems with time, by trying all routes; uses no solver.
+
+All orders and divisions in trips of all sets of tasks are evaluated for each UAV, then the UAVs
+share the tasks. For some six tasks: the number of routes grows with their factorial.
+"""
+from __future__ import annotations
+
+import math
+from collections.abc import Container, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from uav_task_alloc.model import Task, Uav
+from uav_task_alloc.solver.problem import Rules
+from uav_task_alloc.solver.timed.evaluator import Evaluation, Held, LegOf, evaluate
+
+Rows = tuple[tuple[str, ...], ...]  # task ids of each trip
+
+
+@dataclass(frozen=True, slots=True)
+class ExactPlan:
+    """The best plan: the most value where every task that can be is served, then least cost."""
+
+    cost: float
+    value: float
+    routes: Mapping[str, Rows]  # by UAV id
+
+
+@dataclass(frozen=True, slots=True)
+class _Share:
+    """What some UAVs serve: no other way is both cheaper and earlier."""
+
+    cost: float  # without finish and tasks not served
+    finish: float  # [s]
+    routes: tuple[tuple[str, Rows], ...]
+
+
+_Shares = dict[frozenset[str], list[_Share]]  # by ids of the tasks served
+
+
+def exact_plan(uavs: Sequence[Uav], tasks: Sequence[Task], rules: Rules,
+               leg: LegOf | None = None, held: Held | None = None) -> ExactPlan:
+    """The best plan of all.
+
+    Args:
+        uavs, tasks, rules, leg, held: as for `evaluate`.
+    """
+    held = held or Held()
+    shares: _Shares = {frozenset(): [_Share(0.0, 0.0, ())]}
+    for uav in uavs:
+        shares = _joined(shares, _shares_of(uav, tasks, rules, leg, held))
+    values = {task.id: task.value for task in tasks}
+    total, prices = math.fsum(values.values()), rules.objective
+    best: ExactPlan | None = None
+    for served, ways in shares.items():
+        value = math.fsum(values[name] for name in served)
+        for way in ways:
+            cost = way.cost + prices.cost(0.0, way.finish, unserved=total - value)
+            if best is None or _rank(value, cost, rules) < _rank(best.value, best.cost, rules):
+                best = ExactPlan(cost, value, dict(way.routes))
+    assert best is not None  # that serves nothing
+    return best
+
+
+def _rank(value: float, cost: float, rules: Rules) -> tuple[float, float]:
+    """Smaller is better."""
+    return (-round(value, 9) if math.isinf(rules.objective.unserved) else 0.0), cost
+
+
+def _joined(some: _Shares, more: _Shares) -> _Shares:
+    """The ways in which UAVs share tasks with one more UAV."""
+    joined: _Shares = {}
+    for done, ways in some.items():
+        for mine, rows in more.items():
+            if not done & mine:
+                for way in ways:
+                    for row in rows:
+                        _keep(joined, done | mine, _Share(
+                            way.cost + row.cost, max(way.finish, row.finish),
+                            way.routes + row.routes))
+    return joined
+
+
+def _keep(shares: _Shares, served: frozenset[str], new: _Share) -> None:
+    """Add a way unless another one is as cheap and as early; drop those that it dominates."""
+    ways = shares.setdefault(served, [])
+    if all(way.cost > new.cost or way.finish > new.finish for way in ways):
+        ways[:] = [way for way in ways if way.cost < new.cost or way.finish < new.finish]
+        ways.append(new)
+
+
+def _shares_of(uav: Uav, tasks: Sequence[Task], rules: Rules, leg: LegOf | None,
+               held: Held) -> _Shares:
+    """All that one UAV can serve, and nothing."""
+    taken = {name for other, row in held.locked.items() if other != uav.id for name in row}
+    own = Held({uav.id: held.locked.get(uav.id, ())}, held.aboard)
+    total = math.fsum(task.value for task in tasks)
+    shares: _Shares = {} if own.locked[uav.id] else {frozenset(): [_Share(0.0, 0.0, ())]}
+    for rows, found in _valid_rows(uav, tasks, taken, rules, leg, own):
+        shared = rules.objective.cost(0.0, found.finish, unserved=total - found.value)
+        _keep(shares, frozenset(name for row in rows for name in row),
+              _Share(found.cost - shared, found.finish, ((uav.id, rows),)))
+    return shares
+
+
+def _valid_rows(uav: Uav, tasks: Sequence[Task], taken: Container[str], rules: Rules,
+                leg: LegOf | None, held: Held) -> Iterator[tuple[Rows, Evaluation]]:
+    """All valid routes of a UAV that serve something, but no task that is `taken`."""
+    most = rules.trips if uav.turnaround < math.inf else 1
+    names = [task.id for task in tasks if task.id not in taken]
+    free = replace(uav, range=math.inf, full_range=None, endurance=math.inf, full_endurance=None,
+                   available_until=math.inf)
+    open_end = replace(rules, returns=False)
+    pending: list[Rows] = [(tuple(held.locked.get(uav.id, ())),)]
+    while pending:
+        rows = pending.pop()
+        if any(rows):
+            found = evaluate([uav], tasks, rules, {uav.id: rows}, leg, held)
+            if not found.violations:
+                yield rows, found
+            elif evaluate([free], tasks, open_end, {uav.id: rows}, leg, held).violations:
+                continue  # late, overloaded or unable: no longer route mends that
+        done = {name for row in rows for name in row}
+        for name in names:
+            if name not in done:
+                pending.append((*rows[:-1], (*rows[-1], name)))
+                if len(rows) < most and (rows[-1] or len(rows) == 1):
+                    pending.append((*rows, (name,)))
