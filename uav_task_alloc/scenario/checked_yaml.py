@@ -217,12 +217,13 @@ def list_of(kind: ValueKind, description: str, least: int = 0,
     return ValueKind(description, read)
 
 
-def list_or_mapping(kind: ValueKind, table: KeyTable, description: str) -> ValueKind:
-    """A list of this kind, or a mapping, which is read as a YamlRow."""
+def or_mapping(kind: ValueKind, table: KeyTable, description: str,
+               node_type: type[yaml.Node] = yaml.SequenceNode) -> ValueKind:
+    """A list (or a scalar: `node_type`) of this kind, or a mapping, which is a YamlRow then."""
     def read(place: str, node: yaml.Node) -> Any:
         if isinstance(node, yaml.MappingNode):
             return read_row(table, place, node)
-        if isinstance(node, yaml.SequenceNode):
+        if isinstance(node, node_type):
             return kind.read(place, node)
         raise refusal(node, f'{place} = {shown_yaml(node)}: expected {description}')
     return ValueKind(description, read)

@@ -13,11 +13,14 @@ import numpy as np
 from uav_task_alloc.errors import InvalidValue, ScenarioError
 from uav_task_alloc.geometry.frames import Origin, to_enu
 from uav_task_alloc.model import Point, Shape, Task
+from uav_task_alloc.objective import Objective
 from uav_task_alloc.scenario.checked_yaml import YamlRow, compose, read_row, refusal
 from uav_task_alloc.scenario.generate import draw_points
 from uav_task_alloc.scenario.schema import GEODETIC, SCENARIO
 from uav_task_alloc.scenario.values import (
     DEFAULT_ORIGIN,
+    TASK_TIMES,
+    UAV_LIMITS,
     Cancel,
     Scenario,
     ScenarioUav,
@@ -90,7 +93,11 @@ def parse(text: str, name: str = 'scenario') -> Scenario:
                     tuple(sorted(tasks, key=lambda timed: timed.at)), zones,
                     tuple(sorted(cancels, key=lambda cancel: cancel.at)), root['route_end'],
                     root['speedup'], root['clearance'], root['altitude_min'],
-                    root['altitude_max'])
+                    root['altitude_max'], _objective(root['objective']), root['trips'])
+
+
+def _objective(given: str | YamlRow) -> str | Objective:
+    return given if isinstance(given, str) else _valid(given, lambda: Objective(**given.values))
 
 
 def _origin(row: YamlRow | None) -> Origin:
@@ -105,7 +112,9 @@ def _uav(row: YamlRow, number: int, origin: Origin) -> ScenarioUav:
         home = _from_degrees(home, origin)
     uav = ScenarioUav(
         row['id'], row['system_id'] or number, row['autopilot'], position, home or position,
-        row['cruise_speed'], row['range'], frozenset(row['capabilities']), row['dies_at'])
+        row['cruise_speed'], row['range'], frozenset(row['capabilities']), row['dies_at'],
+        **{name: row[name] for name in UAV_LIMITS})
+    _valid(row, lambda: uav.uav)
     if uav.system_id > 255:
         raise row.refuse('system_id', 'a whole number in [1, 255], as there are more UAVs')
     return uav
@@ -119,7 +128,7 @@ def _task(row: YamlRow, origin: Origin, uavs: list[str]) -> TimedTask:
     return TimedTask(row['at'], _valid(row, lambda: Task(
         row['id'], _position(row, origin), row['value'], row['service_time'],
         frozenset(row['required_capabilities']), None if allowed is None else frozenset(allowed),
-        row['acceptance_radius'])))
+        row['acceptance_radius'], **{name: row[name] for name in TASK_TIMES})))
 
 
 def _position(row: YamlRow, origin: Origin) -> Point:

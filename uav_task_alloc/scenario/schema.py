@@ -6,7 +6,10 @@ import math
 import re
 from dataclasses import replace
 
+import yaml
+
 from uav_task_alloc.checks import is_ros_name
+from uav_task_alloc.objective import OBJECTIVES, Objective
 from uav_task_alloc.params import AllocatorParams
 from uav_task_alloc.scenario.checked_yaml import (
     REQUIRED,
@@ -14,15 +17,19 @@ from uav_task_alloc.scenario.checked_yaml import (
     KeyTable,
     choice,
     list_of,
-    list_or_mapping,
     mapping,
     number_value,
+    or_mapping,
     text_value,
     whole_number,
 )
 from uav_task_alloc.scenario.values import DEFAULT_SPEEDUP
 
 _TIME = number_value(0.0)
+_LENGTH = number_value(0.0, infinite=True)
+_SPEED = number_value(0.0, open_low=True, infinite=True)
+_PRICE = number_value(0.0, 1e9)
+_SHORTEST = Objective()
 POSITIVE = number_value(0.0, open_low=True)
 POINT = list_of(number_value(), 'three numbers [x, y, z]', 3, 3)
 CORNER = list_of(number_value(), 'two numbers [x, y]', 2, 2)
@@ -58,11 +65,22 @@ UAV: KeyTable = {
     'latitude': _LATITUDE,
     'longitude': _LONGITUDE,
     'altitude': _ALTITUDE,
-    'home': Key(list_or_mapping(POINT, GEODETIC, 'three numbers [x, y, z], or a mapping with '
+    'home': Key(or_mapping(POINT, GEODETIC, 'three numbers [x, y, z], or a mapping with '
                                 'latitude, longitude, altitude'),
                 '[m] ENU, or degrees and [m] above the origin; default: its position', None),
     'cruise_speed': Key(number_value(0.0, 1000.0, open_low=True), '[m/s]', 15.0),
     'range': Key(number_value(0.0, infinite=True), '[m] it can fly in total', math.inf),
+    'endurance': Key(_LENGTH, '[s] it can be in the air in total, service and waiting included',
+                     math.inf),
+    'full_range': Key(_LENGTH, '[m] after a visit of its home; default: its range', None),
+    'full_endurance': Key(_LENGTH, '[s] after a visit of its home; default: its endurance', None),
+    'turnaround': Key(_LENGTH, '[s] of a visit of its home between two trips; .inf: it makes one '
+                      'trip only', math.inf),
+    'payload_capacity': Key(number_value(0.0, 1e6), '[kg] it can take on at its home', 0.0),
+    'climb_speed': Key(_SPEED, '[m/s] at most, upwards', math.inf),
+    'descent_speed': Key(_SPEED, '[m/s] at most, downwards', math.inf),
+    'available_from': Key(number_value(0.0, 1e9), '[s] when it may take off', 0.0),
+    'available_until': Key(_LENGTH, '[s] by when its route ends', math.inf),
     'capabilities': Key(NAMES, 'its capabilities', ()),
     'dies_at': Key(_TIME, '[s] when it is lost and sends nothing any more; default: never', None),
 }
@@ -80,6 +98,22 @@ TASK: KeyTable = {
                              "bridge's parameter", None),
     'required_capabilities': Key(NAMES, 'capabilities that a UAV needs', ()),
     'allowed_uavs': Key(NAMES, 'the UAVs that may fly it; default: any', None),
+    'earliest': Key(number_value(-math.inf, 1e9, infinite=True), '[s] of the start of its '
+                    'service; a UAV that arrives earlier waits', -math.inf),
+    'latest': Key(number_value(-1e9, infinite=True), '[s] of the start of its service', math.inf),
+    'release': Key(_TIME, '[s] no UAV sets out for it before', 0.0),
+    'payload': Key(number_value(0.0, 1e6), '[kg] that a UAV takes on at its home for it', 0.0),
+}
+
+OBJECTIVE: KeyTable = {
+    'distance': Key(_PRICE, '[1/m] of the length of all routes', _SHORTEST.distance),
+    'finish': Key(_PRICE, '[1/s] of the end of the last route', _SHORTEST.finish),
+    'response': Key(_PRICE, '[1/s] of the mean time to the start of a service, weighted with the '
+                    'values', _SHORTEST.response),
+    'lateness': Key(_LENGTH, '[1/s] of services that start after `latest`; .inf: none may',
+                    _SHORTEST.lateness),
+    'unserved': Key(_LENGTH, 'per value of the tasks that are not served; .inf: all that can be '
+                    'are', _SHORTEST.unserved),
 }
 
 _ZONE: KeyTable = {
@@ -93,7 +127,7 @@ _ZONE: KeyTable = {
     'longitude': replace(_LONGITUDE, text='[deg] WGS84 of its center; hemisphere and cylinder'),
     'altitude': replace(_ALTITUDE, text='[m] above the origin, of its center; hemisphere only'),
     'radius': Key(POSITIVE, '[m]; hemisphere and cylinder', None),
-    'vertices': Key(list_of(list_or_mapping(
+    'vertices': Key(list_of(or_mapping(
         CORNER, _GEODETIC_CORNER, 'two numbers [x, y], or a mapping with latitude, longitude'),
         'a list of at least 3 corners [x, y] or {latitude, longitude}', 3),
         '[m] ENU or degrees, a simple polygon; polygon only', None),
@@ -126,6 +160,11 @@ SCENARIO: KeyTable = {
     'origin': Key(mapping(ORIGIN, 'a mapping with latitude, longitude, altitude_amsl'),
                   'position of ENU (0, 0, 0); default: 47.397742, 8.545594, 488.0', None),
     'route_end': Key(choice('hold', 'home'), 'what a UAV does after its last task', 'hold'),
+    'objective': Key(or_mapping(choice(*OBJECTIVES), OBJECTIVE, f'one of {", ".join(OBJECTIVES)}, '
+                                'or a mapping of prices', yaml.ScalarNode),
+                     'what is minimised: a name, or prices; see objective', 'distance'),
+    'trips': Key(whole_number(1, 100), 'of each UAV at most; more than one: it may visit its home '
+                 'for a battery and loads', 1),
     'clearance': Key(number_value(0.0, 10000.0),
                      '[m] kept from zones in addition to their margins',
                      AllocatorParams.clearance),
@@ -146,5 +185,5 @@ SCENARIO: KeyTable = {
                    'tasks that are withdrawn', ()),
 }
 
-TABLES = {'scenario': SCENARIO, 'origin': ORIGIN, 'uavs': UAV, 'tasks': TASK, 'zones': _ZONE,
-          'arrivals': _ARRIVALS, 'cancels': CANCEL}
+TABLES = {'scenario': SCENARIO, 'origin': ORIGIN, 'objective': OBJECTIVE, 'uavs': UAV,
+          'tasks': TASK, 'zones': _ZONE, 'arrivals': _ARRIVALS, 'cancels': CANCEL}

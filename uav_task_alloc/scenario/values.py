@@ -8,10 +8,14 @@ from dataclasses import dataclass
 
 from uav_task_alloc.geometry.frames import Origin
 from uav_task_alloc.model import Point, Task, ThreatZone, Uav
+from uav_task_alloc.objective import Objective
 from uav_task_alloc.params import AllocatorParams
 
 DEFAULT_ORIGIN = Origin(47.397742, 8.545594, 488.0)
 DEFAULT_SPEEDUP = 8.0  # times faster than real time
+UAV_LIMITS = ('endurance', 'full_range', 'full_endurance', 'turnaround', 'payload_capacity',
+              'climb_speed', 'descent_speed', 'available_from', 'available_until')
+TASK_TIMES = 'earliest', 'latest', 'release', 'payload'  # as in model.Task
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,12 +31,21 @@ class ScenarioUav:
     range: float = math.inf  # [m]
     capabilities: frozenset[str] = frozenset()  # that tasks may require
     dies_at: float | None = None  # [s]
+    endurance: float = math.inf  # [s]
+    full_range: float | None = None  # [m] after a visit of its home; None: range
+    full_endurance: float | None = None  # [s] after a visit of its home; None: endurance
+    turnaround: float = math.inf  # [s] of such a visit
+    payload_capacity: float = 0.0  # [kg]
+    climb_speed: float = math.inf  # [m/s]
+    descent_speed: float = math.inf  # [m/s]
+    available_from: float = 0.0  # [s]
+    available_until: float = math.inf  # [s]
 
     @property
     def uav(self) -> Uav:
         """The UAV at the start, for the solver."""
         return Uav(self.id, self.position, self.range, self.cruise_speed, self.capabilities,
-                   self.home)
+                   self.home, **{name: getattr(self, name) for name in UAV_LIMITS})
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,6 +93,8 @@ class Scenario:
     clearance: float = AllocatorParams.clearance  # [m] beyond the margins of zones
     altitude_min: float = AllocatorParams.altitude_min  # [m] of detours
     altitude_max: float = AllocatorParams.altitude_max  # [m] of detours
+    objective: str | Objective = 'distance'  # a name of OBJECTIVES, or prices
+    trips: int = 1  # of each UAV
 
     @property
     def duration(self) -> float:

@@ -3,13 +3,20 @@
 from __future__ import annotations
 
 import math
-from dataclasses import asdict
+from dataclasses import asdict, fields
 from typing import Any
 
 import yaml
 
 from uav_task_alloc.model import Task
-from uav_task_alloc.scenario.values import Scenario, ScenarioUav, TimedTask, TimedZone
+from uav_task_alloc.scenario.values import (
+    TASK_TIMES,
+    UAV_LIMITS,
+    Scenario,
+    ScenarioUav,
+    TimedTask,
+    TimedZone,
+)
 from uav_task_alloc.zone_codec import SCENARIO_ZONE, encode_zone
 
 
@@ -31,6 +38,9 @@ def to_yaml(scenario: Scenario) -> str:
         'clearance': scenario.clearance,
         'altitude_min': scenario.altitude_min,
         'altitude_max': scenario.altitude_max,
+        'objective': (scenario.objective if isinstance(scenario.objective, str)
+                      else asdict(scenario.objective)),
+        'trips': scenario.trips,
         'uavs': [_uav(uav) for uav in scenario.uavs],
         'tasks': [_task(timed) for timed in scenario.tasks],
         'zones': [_zone(timed) for timed in scenario.zones],
@@ -44,7 +54,7 @@ def _uav(uav: ScenarioUav) -> dict[str, Any]:
            'position': list(uav.position), 'home': list(uav.home),
            'cruise_speed': uav.cruise_speed, 'range': uav.range,
            'capabilities': sorted(uav.capabilities), 'dies_at': uav.dies_at}
-    return row
+    return row | _changed(uav, ScenarioUav, UAV_LIMITS)
 
 
 def _task(timed: TimedTask) -> dict[str, Any]:
@@ -52,7 +62,14 @@ def _task(timed: TimedTask) -> dict[str, Any]:
     return {'id': task.id, 'at': timed.at, 'position': list(task.position), 'value': task.value,
             'service_time': task.service_time, 'acceptance_radius': task.acceptance_radius,
             'required_capabilities': sorted(task.required_capabilities),
-            'allowed_uavs': None if task.allowed_uavs is None else sorted(task.allowed_uavs)}
+            'allowed_uavs': None if task.allowed_uavs is None else sorted(task.allowed_uavs),
+            **_changed(task, Task, TASK_TIMES)}
+
+
+def _changed(value: ScenarioUav | Task, kind: type, names: tuple[str, ...]) -> dict[str, Any]:
+    """The named fields that do not have their default."""
+    defaults = {spec.name: spec.default for spec in fields(kind)}
+    return {name: given for name in names if (given := getattr(value, name)) != defaults[name]}
 
 
 def _zone(timed: TimedZone) -> dict[str, Any]:
