@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from uav_task_alloc import palette, plots
-from uav_task_alloc.model import Leg, Plan, Task, ThreatZone, Uav
-from uav_task_alloc.plots import labels, plan as plan_map, space, style
+from uav_task_alloc.model import Leg, Plan, Task, ThreatZone, Timetable, Uav
+from uav_task_alloc.plots import labels, plan as plan_map, space, style, times
 from uav_task_alloc.plots.flat import MapFigure
 from uav_task_alloc.record.ground_truth import TRUTH_FILE
 from uav_task_alloc.record.run_state import RECORD_FILE
@@ -20,7 +20,8 @@ ZONES = [ThreatZone.hemisphere('dome', (100.0, 100.0, 0.0), 30.0, margin=5.0),
 PNG = b'\x89PNG'
 
 
-DRAW = pytest.mark.parametrize('draw', [plots.draw_plan, plots.draw_plan_3d])
+DRAW = pytest.mark.parametrize('draw', [plots.draw_plan, plots.draw_plan_3d,
+                                        plots.draw_plan_times])
 
 
 @DRAW
@@ -162,3 +163,42 @@ def test_uavs_beyond_the_last_colour_repeat_it_with_another_line_style():
     count = len(palette.UAV_COLOURS)
     assert plots.uav_colour(0) == plots.uav_colour(count)
     assert style.line_style(0) == style.line_style(count - 1) != style.line_style(count)
+
+
+def timed_plan(count):
+    """Two trips of one UAV over `count` tasks, the last of them late."""
+    names = [f't{i}' for i in range(count)]
+    arrivals = {name: 10.0 * i for i, name in enumerate(names, 1)}
+    starts = {name: arrival + 2.0 for name, arrival in arrivals.items()}
+    rows = tuple(names[:count // 2]), tuple(names[count // 2:])
+    table = Timetable(arrivals, starts, {'u1': rows}, {'u1': (3.0, 10.0 * (count // 2) + 8.0)},
+                      {'u1': 10.0 * count + 9.0}, late={names[-1]: 1.0})
+    legs = (Leg((), 5.0),) * (count + 2)
+    return Plan({'u1': tuple(names), 'u2': ()}, distance=90.0, returns=True,
+                legs={'u1': legs, 'u2': ()}, timetable=lambda: table)
+
+
+@pytest.mark.parametrize('count', [4, times.MAX_TASK_ROWS + 1])
+def test_times_are_drawn_in_their_windows(tmp_path, monkeypatch, count):
+    drawn = []
+    monkeypatch.setattr(MapFigure, 'finish', lambda figure, *_: drawn.append(figure.beside))
+    uavs = [Uav('u1', (0.0, 0.0, 0.0)), Uav('u2', (300.0, 0.0, 0.0))]
+    tasks = [Task(f't{i}', (10.0 * i, 50.0, 40.0), service_time=4.0, earliest=10.0 * i,
+                  latest=10.0 * count + 1.0) for i in range(count)]
+    plots.draw_plan_times(uavs, tasks, ZONES, timed_plan(count), tmp_path / 'times.png')
+    axes, = drawn
+    rows = [label.get_text() for label in axes.get_yticklabels()]
+    assert rows == ([task.id for task in tasks] if count == 4 else ['u1'])
+    bars = [(patch.get_x(), patch.get_width()) for patch in axes.patches]
+    assert (12.0, 4.0) in bars  # the service of t0
+    assert (10.0, 2.0) in bars  # its waiting
+    assert ((10.0, 31.0) in bars) == (count == 4)  # the window of t1
+    assert axes.get_xlabel() == 'time [s]'
+
+
+def test_a_route_of_two_trips_is_drawn_over_its_base():
+    uav = Uav('u1', (0.0, 0.0, 0.0))
+    places = {f't{i}': (10.0 * i, 50.0, 40.0) for i in range(4)}
+    points = plan_map.route_points(uav, timed_plan(4), places)
+    assert points == [uav.base, places['t0'], places['t1'], uav.base, places['t2'], places['t3'],
+                      uav.base]

@@ -25,26 +25,28 @@ class MapFigure:
     Args:
         points: of the tasks [m]; rings show hemispheres at their median height.
         tasks: how many will be drawn.
+        beside: leave half of the figure to other axes, `beside`.
     """
 
-    def __init__(self, points: Iterable[Point], tasks: int) -> None:
+    def __init__(self, points: Iterable[Point], tasks: int, beside: bool = False) -> None:
         self.figure = Figure(figsize=style.SIZE, dpi=style.DPI, layout='constrained')
-        self.axes = self.figure.add_subplot()
+        self.axes = self.figure.add_subplot(1, 1 + beside, 1)
+        self.beside = self.figure.add_subplot(1, 2, 2) if beside else None
         self.height = median([point[2] for point in points] or [0.0])
         self.shows_names = tasks <= style.MAX_NAMED_TASKS
         self._labels: list[Label] = []
         self._routes: list[list[tuple[float, float]]] = []
         self._rings = 0
         self._zones = 0
-        axes = self.axes
-        axes.set_aspect('equal', adjustable='datalim')
-        axes.grid(color='#e4e4e4', lw=0.8, zorder=0)
-        axes.set_axisbelow(True)
-        axes.set_xlabel('east [m]', fontsize=style.PLAIN)
-        axes.set_ylabel('north [m]', fontsize=style.PLAIN)
-        axes.tick_params(labelsize=style.PLAIN)
-        for side in ('top', 'right'):
-            axes.spines[side].set_visible(False)
+        self.axes.set_aspect('equal', adjustable='datalim')
+        self.axes.set_xlabel('east [m]', fontsize=style.PLAIN)
+        self.axes.set_ylabel('north [m]', fontsize=style.PLAIN)
+        for axes in self.figure.axes:
+            axes.grid(color='#e4e4e4', lw=0.8, zorder=0)
+            axes.set_axisbelow(True)
+            axes.tick_params(labelsize=style.PLAIN)
+            for side in ('top', 'right'):
+                axes.spines[side].set_visible(False)
 
     def zone(self, zone: ThreatZone, note: str = '', late: bool = False) -> None:
         """Add the footprint of a zone, dashed where `late`; dotted: the margin of a round one."""
@@ -117,12 +119,13 @@ class MapFigure:
         """Add title, legend, labels and scale bar, save. Raises OSError."""
         zone = 'no-fly zone' + f'\n(inner ring: at {self.height:.0f} m)' * bool(self._rings)
         self.axes.set_title(title, loc='left', fontsize=style.LARGE, fontweight='bold', pad=12)
-        style.legend(self.figure, [*handles, *[style.zone_handle(zone)] * bool(self._zones)])
+        style.legend(self.figure, [*handles, *[style.zone_handle(zone)] * bool(self._zones)],
+                     **({'place': 'outside lower left', 'columns': 4} if self.beside else {}))
         self.axes.margins(0.07)
         self.figure.draw_without_rendering()  # makes the limits final
         low, high = self.axes.get_xlim()
         place_labels(self.axes, self._labels, self._routes)
-        if handles:
+        if handles and not self.beside:
             self._scale_bar(high - low)
         self.figure.savefig(png)
 

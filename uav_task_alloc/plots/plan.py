@@ -27,8 +27,20 @@ def draw_plan(uavs: Sequence[Uav], tasks: Sequence[Task], zones: Sequence[Threat
     Raises:
         OSError: the file cannot be written.
     """
+    figure = MapFigure((task.position for task in tasks), len(tasks))
+    add_plan(figure, uavs, tasks, zones, plan)
+    figure.finish(plan_title(plan, len(tasks)), legend_handles(uavs, plan), png)
+
+
+def add_plan(figure: MapFigure, uavs: Sequence[Uav], tasks: Sequence[Task],
+             zones: Sequence[ThreatZone], plan: Plan) -> None:
+    """Add zones, routes, starts and tasks of a plan to a map.
+
+    Args:
+        figure: to draw on.
+        uavs, tasks, zones, plan: as for `draw_plan`.
+    """
     positions = {task.id: task.position for task in tasks}
-    figure = MapFigure(positions.values(), len(tasks))
     for zone in zones:
         figure.zone(zone)
     for index, uav in enumerate(uavs):
@@ -38,7 +50,6 @@ def draw_plan(uavs: Sequence[Uav], tasks: Sequence[Task], zones: Sequence[Threat
             figure.task(positions[name], uav_colour(index), name, number=number)
     for name in plan.unassigned:
         figure.task(positions[name], 'white', name, edge=RED)
-    figure.finish(plan_title(plan, len(tasks)), legend_handles(uavs, plan), png)
 
 
 def route_points(uav: Uav, plan: Plan, positions: Mapping[str, Point]) -> list[Point]:
@@ -52,10 +63,11 @@ def route_points(uav: Uav, plan: Plan, positions: Mapping[str, Point]) -> list[P
     Returns:
         [m] ENU; ends at home where the plan returns.
     """
-    names, legs = plan.routes.get(uav.id, ()), plan.legs.get(uav.id, ())
-    stops = [*(positions[name] for name in names), uav.home or uav.position]
+    trips = plan.trips.get(uav.id) or (plan.routes.get(uav.id, ()),)
+    stops = [stop for trip in trips for stop in (*(positions[name] for name in trip), uav.base)]
     points = [uav.position]
-    for leg, stop in zip(legs, stops, strict=False):  # a leg home only where the plan returns
+    # a leg home after the last trip only where the plan returns
+    for leg, stop in zip(plan.legs.get(uav.id, ()), stops, strict=False):
         points += [*leg.via, stop]
     return points
 

@@ -70,6 +70,8 @@ def marker_handle(marker: str, fill: str, edge: str, text: str) -> Line2D:
                   mew=2.4 if edge == RED else 1.0, label=text)
 
 
-def legend(figure: Figure, handles: list[Any], place: Any = 'outside right upper') -> None:
+def legend(figure: Figure, handles: list[Any], place: Any = 'outside right upper',
+           columns: int = 1) -> None:
     """Add the legend."""
-    figure.legend(handles=handles, loc=place, frameon=False, fontsize=PLAIN, handlelength=1.8)
+    figure.legend(handles=handles, loc=place, frameon=False, fontsize=PLAIN, handlelength=1.8,
+                  ncols=columns)
