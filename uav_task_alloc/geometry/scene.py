@@ -11,6 +11,7 @@ import numpy as np
 from numba import carray  # type: ignore[attr-defined]
 
 from uav_task_alloc.geometry.escape import escape_point
+from uav_task_alloc.geometry.flight_time import path_time
 from uav_task_alloc.geometry.numba_pointers import floats_at, ints_at
 from uav_task_alloc.geometry.obstacles import Floats, Ints, Zones, first_containing, zones_at
 from uav_task_alloc.geometry.path_store import PathStore, load_path, store_path
@@ -73,7 +74,7 @@ def _exit_point(scene: PathScene, i: int, work: Ints) -> Floats:
 
 
 def scene_addresses(scene: PathScene) -> Ints:
-    """Sizes and addresses of the scene's arrays, int64 (9,), as `_scene_at` reads them."""
+    """Sizes and addresses of the scene's arrays, int64 (9,), as `scene_at` reads them."""
     return np.array([len(scene.xyz), len(scene.zones),
                      *(array.ctypes.data for array in scene[:6]), scene.store], np.int64)
 
@@ -202,17 +203,38 @@ def _find(address: int, i: int, j: int) -> float:
     return first + length
 
 
+def _time(address: int, i: int, j: int) -> float:
+    """Flight time [s] along the known path from point i to point j.
+
+    Args:
+        address: of two int64: addresses of `scene_addresses` and of three float64 [m/s], the
+            cruise, climb and descent speed.
+
+    Returns:
+        NaN: the path is not known.
+    """
+    at = ints_at(address)
+    scene, speed, path = _scene_at(at[0]), floats_at(at[1]), np.empty((MAX_CORNERS, 3))
+    n = stored_path(scene, i, j, path)
+    return path_time(path, n, speed[0], speed[1], speed[2]) if n > 0 else np.nan
+
+
 @functools.cache
-def _compiled(join: bool) -> Any:
+def _compiled(function: Any) -> Any:
     signature = numba.float64(numba.int64, numba.int64, numba.int64)
-    return numba.cfunc(signature, cache=True)(_join if join else _find)
+    return numba.cfunc(signature, cache=True)(function)
 
 
 def find_address(zones: bool) -> int:
     """Address of `_find`, compiled apart so that callers compile fast; 0 without zones."""
-    return int(_compiled(False).address) if zones else 0
+    return int(_compiled(_find).address) if zones else 0
 
 
 def join_address(zones: bool) -> int:
     """Address of `_join`; 0 without zones."""
-    return int(_compiled(True).address) if zones else 0
+    return int(_compiled(_join).address) if zones else 0
+
+
+def time_address(zones: bool) -> int:
+    """Address of `_time`; 0 without zones."""
+    return int(_compiled(_time).address) if zones else 0

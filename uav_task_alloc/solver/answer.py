@@ -88,7 +88,7 @@ def _drop_unreachable(problem: Problem, order: list[list[int]]) -> list[int]:
     for u, nodes in enumerate(order):
         place = problem.locked_places(u)[-1]
         for node in tuple(nodes):
-            if _leg_between(distances, place, node).length < math.inf:
+            if leg_between(distances, place, node).length < math.inf:
                 place = node
             else:
                 nodes.remove(node)
@@ -119,10 +119,10 @@ def _legs(problem: Problem, places: list[int], straight: list[float]) -> tuple[L
     """The legs between places; `straight` are the distances between them [m]."""
     if not problem.distances.zones:
         return tuple([Leg((), metres) for metres in straight])
-    return tuple(_leg_between(problem.distances, i, j) for i, j in pairwise(places))
+    return tuple(leg_between(problem.distances, i, j) for i, j in pairwise(places))
 
 
-def _leg_between(distances: Distances, i: int, j: int) -> Leg:
+def leg_between(distances: Distances, i: int, j: int) -> Leg:
     """The leg from i to j; without detour points where it is straight."""
     metres = math.dist(distances.points[i], distances.points[j])
     if distances.length(i, j) <= metres * _STRAIGHT_RATIO:

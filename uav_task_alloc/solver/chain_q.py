@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import threading
+from collections.abc import Sequence
+from typing import Any, Protocol
 
 from uav_task_alloc.solver.colony import Colony, ColonyParams
 from uav_task_alloc.solver.recorder import Recorder
@@ -36,6 +38,21 @@ def solve(recorder: Recorder, seed: int, learnt: object = None,
     params = params or (WARM_START if recorder.warm else COLD_START)
     colonies = [Colony(problem, recorder.best, seed + 7919 * i, params, learnt)
                 for i in range(recorder.threads)]
+    run_colonies(colonies, recorder)
+    return colonies[0].scouts.learnt()
+
+
+class Flies(Protocol):
+    """A colony of either kind."""
+
+    best: Any
+
+    def fly(self, spent: float, until: float, rounds: int) -> int:
+        """Run a flight; returns its rounds of search."""
+
+
+def run_colonies(colonies: Sequence[Flies], recorder: Any) -> None:
+    """Run each colony on a thread, the first on this one, until the recorder ends the solve."""
     others = [threading.Thread(target=_run_colony, args=(each, recorder), daemon=True)
               for each in colonies[1:]]
     for thread in others:
@@ -43,10 +60,9 @@ def solve(recorder: Recorder, seed: int, learnt: object = None,
     _run_colony(colonies[0], recorder)
     for thread in others:
         thread.join()
-    return colonies[0].scouts.learnt()
 
 
-def _run_colony(colony: Colony, recorder: Recorder) -> None:
+def _run_colony(colony: Flies, recorder: Any) -> None:
     """Run flights of about _ROUND_TIME until the recorder ends the solve."""
     fixed = recorder.max_iterations is not None  # then nothing depends on the clock
     rounds, first, since = FIXED_ROUNDS if fixed else 64, recorder.spent(), recorder.elapsed()

@@ -13,6 +13,7 @@ from uav_task_alloc.model import Task, ThreatZone, Uav
 _Named = TypeVar('_Named', Task, Uav, ThreatZone)
 ROUTE_ENDS = ('hold', 'home')
 MAX_BUDGET = 86_400.0  # [s]
+MAX_TRIPS = 64
 
 
 def check_unique(kind: str, values: Iterable[_Named],
@@ -32,7 +33,7 @@ def check_unique(kind: str, values: Iterable[_Named],
 
 
 def check_options(budget: float, seed: int, route_end: str, threads: int,
-                  max_iterations: int | None) -> None:
+                  max_iterations: int | None, trips: int = 1) -> None:
     """Check the scalar options of `plan`; raises InvalidValue."""
     check_number('budget', budget, 0.0, MAX_BUDGET)
     if not isinstance(seed, Integral):
@@ -41,6 +42,8 @@ def check_options(budget: float, seed: int, route_end: str, threads: int,
         raise InvalidValue('route_end', route_end, f'one of {", ".join(ROUTE_ENDS)}')
     if not isinstance(threads, int) or not 1 <= threads <= 64:
         raise InvalidValue('threads', threads, 'an integer in [1, 64]')
+    if not isinstance(trips, int) or isinstance(trips, bool) or not 1 <= trips <= MAX_TRIPS:
+        raise InvalidValue('trips', trips, f'an integer in [1, {MAX_TRIPS}]')
     if max_iterations is not None and (not isinstance(max_iterations, int)
                                        or max_iterations < 0):
         raise InvalidValue('max_iterations', max_iterations, 'an integer in [0, inf) or None')

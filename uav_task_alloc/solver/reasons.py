@@ -43,25 +43,46 @@ def _short_at_least(problem: Problem, unassigned: Ints) -> Floats:
 
 def _reason(problem: Problem, i: int, short: Floats) -> str:
     """Why the i-th task is in no route."""
-    task, a = problem.tasks[i], problem.arrays
-    if not problem.uavs:
-        return 'there are no UAVs'
-    around = problem.distances.zones_around(a.uavs + i)
-    if around:
-        return f'inside zone {", ".join(around)}'
-    if not a.compatible[:, i].any():
-        return _unable(problem, task)
+    a, fixed = problem.arrays, lasting_reason(problem, i)
+    if fixed:
+        return fixed
     need, nearest = _nearest(problem, i, short, np.argsort(short, kind='stable').tolist())
-    if need == math.inf and _given_up(problem, i):
-        return ('no safe path past the zones found in the time; searched for again with the next '
-                'plan')
     if need == math.inf:
-        return _no_path_home(problem, i) or 'unreachable: no safe path past the zones' + (
-            '' if a.compatible[:, i].all() else ' for the UAVs that may serve it')
+        return _unreachable(problem, i)
     if need > a.range_left[nearest]:
         return (f'beyond the range of every UAV: {problem.uavs[nearest].id} needs '
                 f'{need:.0f} m and has {max(0.0, a.range_left[nearest]):.0f} m left')
     return 'left out: the ranges do not suffice for all tasks'
+
+
+def lasting_reason(problem: Problem, i: int) -> str:
+    """Why no plan could serve the i-th task: a zone, what it requires; else empty."""
+    if not problem.uavs:
+        return 'there are no UAVs'
+    around = problem.distances.zones_around(problem.arrays.uavs + i)
+    if around:
+        return f'inside zone {", ".join(around)}'
+    if not problem.arrays.compatible[:, i].any():
+        return _unable(problem, problem.tasks[i])
+    return ''
+
+
+def way_reason(problem: Problem, i: int) -> str:
+    """The reason of the i-th task where no UAV has a safe way to it, or back; else empty."""
+    able = np.flatnonzero(problem.arrays.compatible[:, i])
+    if not problem.distances.zones or any(
+            _need(problem, int(u), problem.arrays.uavs + i) < math.inf for u in able):
+        return ''
+    return _unreachable(problem, i)
+
+
+def _unreachable(problem: Problem, i: int) -> str:
+    """The reason of a task that no safe way leads to, or back from."""
+    if _given_up(problem, i):
+        return ('no safe path past the zones found in the time; searched for again with the next '
+                'plan')
+    return _no_path_home(problem, i) or 'unreachable: no safe path past the zones' + (
+        '' if problem.arrays.compatible[:, i].all() else ' for the UAVs that may serve it')
 
 
 def _nearest(problem: Problem, i: int, short: Floats, order: Iterable[int]) -> tuple[float, int]:

@@ -21,15 +21,9 @@ from uav_task_alloc.solver.routes import (
 
 
 @dataclass(slots=True)
-class Recorder:
-    """Receives the routes that solvers find; thread-safe.
+class Progress:
+    """How much of its budget a solve has used, and how the cost of its best plan fell."""
 
-    Arguments of methods:
-        iterations: of the solver, since the last call.
-        routes: of a solver; are copied.
-    """
-
-    problem: Problem  # that is solved
     clock: Callable[[], float]  # [s]
     began: float  # [s] on that clock
     budget: float  # [s]
@@ -37,16 +31,11 @@ class Recorder:
     stop: Callable[[], bool] | None = None  # True ends the solve; None: nothing does
     threads: int = 1  # that search
     warm: bool = False  # the first best is a repaired earlier plan
-    locked_sums: tuple[float, float] = (0.0, 0.0)  # length [m] and value of the locked tasks
     on_iteration: Callable[[int, float], None] | None = None  # (iterations so far, best fit)
     iterations: int = 0  # of all threads
     # (seconds since `began`, fit) of each best
     history: list[tuple[float, float]] = field(default_factory=list)
-    best: Routes = field(init=False)  # routes; once one was offered
-    _lock: threading.Lock = field(default_factory=threading.Lock)
-
-    def __post_init__(self) -> None:
-        self.best = empty_routes(self.problem.arrays)
+    lock: threading.Lock = field(default_factory=threading.Lock)
 
     def elapsed(self) -> float:
         """Seconds since the solve began."""
@@ -66,15 +55,27 @@ class Recorder:
 
     def count(self, iterations: int = 1) -> None:
         """Count iterations of the solver, after their routes were offered; calls on_iteration."""
-        with self._lock:
+        with self.lock:
             self.iterations += iterations
             if self.on_iteration is not None:
                 self.on_iteration(self.iterations, self.history[-1][1] if self.history
                                   else math.inf)
 
+
+@dataclass(slots=True, kw_only=True)
+class Recorder(Progress):
+    """Receives the routes that solvers find; thread-safe."""
+
+    problem: Problem
+    locked_sums: tuple[float, float] = (0.0, 0.0)  # length [m] and value of the locked tasks
+    best: Routes = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.best = empty_routes(self.problem.arrays)
+
     def offer(self, routes: Routes) -> bool:
         """Copy the routes if they are better than the best; returns whether they are."""
-        with self._lock:
+        with self.lock:
             if self.history and not is_better(self.problem.arrays, routes, self.best):
                 return False
             copy_into(routes, self.best)
@@ -83,7 +84,7 @@ class Recorder:
 
     def copy_best_to(self, routes: Routes) -> None:
         """Overwrite routes with the best, if that is better."""
-        with self._lock:
+        with self.lock:
             if is_better(self.problem.arrays, self.best, routes):
                 copy_into(self.best, routes)
 

@@ -14,7 +14,7 @@ import numpy as np
 from uav_task_alloc.errors import InvalidValue, UnknownName
 from uav_task_alloc.geometry.detour import find_detour
 from uav_task_alloc.model import Leg, Plan, Task, ThreatZone, Uav
-from uav_task_alloc.objective import Weights
+from uav_task_alloc.objective import Objective, Weights, check_objective, needs_time
 from uav_task_alloc.solver.answer import to_plan
 from uav_task_alloc.solver.check import check_locked, check_options, check_unique
 from uav_task_alloc.solver.insertion import place_all
@@ -23,6 +23,7 @@ from uav_task_alloc.solver.problem import Limits, Problem, Rules, make_problem
 from uav_task_alloc.solver.recorder import Recorder
 from uav_task_alloc.solver.registry import SOLVERS
 from uav_task_alloc.solver.search import trim_to_range
+from uav_task_alloc.solver.timed.solve import solve_timed
 from uav_task_alloc.solver.warm import WarmState, repair
 
 
@@ -32,6 +33,7 @@ def plan(uavs: Iterable[Uav], tasks: Iterable[Task], zones: Iterable[ThreatZone]
          locked: Mapping[str, Sequence[str]] | None = None, weights: Weights | None = None,
          clearance: float = 0.0, altitude_min: float = -math.inf,
          altitude_max: float = math.inf, threads: int = 1,
+         objective: Objective | str = 'distance', trips: int = 1,
          stop: Callable[[], bool] | None = None, max_iterations: int | None = None,
          on_iteration: Callable[[int, float], None] | None = None,
          clock: Callable[[], float] = time.perf_counter) -> Plan:
@@ -57,6 +59,8 @@ def plan(uavs: Iterable[Uav], tasks: Iterable[Task], zones: Iterable[ThreatZone]
         altitude_min: [m] lowest detour point.
         altitude_max: [m] highest detour point.
         threads: in [1, 64]; only chain_q uses more than one.
+        objective: what is minimised: a name in OBJECTIVES or an Objective.
+        trips: of a UAV at most; with more than 1 it may visit its base for a new battery and load.
         stop: polled between iterations; True ends the solve with the best plan so far.
         max_iterations: ends the solve as well; None: no limit. Each solver defines its iteration.
         on_iteration: called with (iterations so far, best fit) after each or a few iterations.
@@ -70,20 +74,26 @@ def plan(uavs: Iterable[Uav], tasks: Iterable[Task], zones: Iterable[ThreatZone]
         UnknownName: there is no such solver.
     """
     _check_solver(solver)
-    check_options(budget, seed, route_end, threads, max_iterations)
+    check_options(budget, seed, route_end, threads, max_iterations, trips)
     if not isinstance(warm, (Plan, WarmState, type(None))):
         raise InvalidValue('warm', type(warm).__name__, 'a Plan, its state or None')
     fleet, work = check_unique('uav', uavs, Uav), check_unique('task', tasks, Task)
     limits = Limits(check_unique('zone', zones, ThreatZone), clearance, altitude_min,
                     altitude_max)
-    rules = Rules(route_end == 'home', hard_range, weights or Weights())
+    rules = Rules(route_end == 'home', hard_range, weights or Weights(),
+                  check_objective(objective), trips)
+    if needs_time(fleet, work, rules.objective, trips):
+        _check_takes_time(solver)
+        return solve_timed(fleet, work, check_locked(locked, fleet, work), limits, rules, warm,
+                           budget=budget, seed=seed, threads=threads, stop=stop,
+                           max_iterations=max_iterations, on_iteration=on_iteration, clock=clock)
     load_kernels(solver, bool(limits.zones))
     began, before = clock(), WarmState.of(warm)
     search = PathPreparation(clock, began, budget, stop, before.flown())
     problem = make_problem(fleet, work, check_locked(locked, fleet, work), limits, rules,
                            before.problem, search)
-    recorder = Recorder(problem, clock, began, budget, max_iterations, stop, threads,
-                        warm is not None, _locked_sums(problem), on_iteration)
+    recorder = Recorder(clock, began, budget, max_iterations, stop, threads, warm is not None,
+                        on_iteration, problem=problem, locked_sums=_locked_sums(problem))
     if warm is not None:
         recorder.offer(repair(problem, before.routes))
     elif limits.zones:
@@ -111,6 +121,13 @@ def _check_solver(solver: str) -> None:
         raise UnknownName('solver', solver, list(SOLVERS))
 
 
+def _check_takes_time(solver: str) -> None:
+    """Raise InvalidValue where a solver does not take windows, loads, trips or objectives."""
+    if solver != 'chain_q':
+        raise InvalidValue('solver', solver, "'chain_q' where latest times, loads, endurances, "
+                           'availabilities, trips or an objective other than distance are given')
+
+
 @functools.cache
 def load_kernels(solver: str = 'chain_q', zones: bool = False) -> None:
     """Load a solver's kernels, compile those not on disk yet; further calls do nothing.
@@ -131,7 +148,7 @@ def load_kernels(solver: str = 'chain_q', zones: bool = False) -> None:
     search = PathPreparation(lambda: 0.0, 0.0, 1.0, flown={'u': (('t0',), (Leg((), 0.0),))})
     problem = make_problem(uavs, tasks, {}, Limits(between), Rules(returns=True), None, search)
     rounds = 500 if solver == 'chain_q' else 64  # until each kind of bee has had a flight
-    recorder = Recorder(problem, lambda: 0.0, 0.0, 1.0, max_iterations=rounds)
+    recorder = Recorder(lambda: 0.0, 0.0, 1.0, max_iterations=rounds, problem=problem)
     SOLVERS[solver](recorder, 0, None)
     to_plan(problem, recorder, '', False)
     place_all(problem.arrays, recorder.best, np.empty(0, np.int64))  # these two are only called

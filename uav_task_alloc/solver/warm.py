@@ -32,6 +32,8 @@ class WarmState:
     learnt: Any = None  # what the solver returned
     routes: Mapping[str, tuple[str, ...]] = field(default_factory=dict)  # task ids by UAV id
     legs: Mapping[str, tuple[Leg, ...]] = field(default_factory=dict)  # by UAV id
+    # task ids of each trip, by UAV id, where the problem had time
+    trips: Mapping[str, tuple[tuple[str, ...], ...]] = field(default_factory=dict)
 
     @classmethod
     def of(cls, warm: Plan | WarmState | None) -> WarmState:
@@ -40,6 +42,12 @@ class WarmState:
             return warm or cls()
         state = warm.state if isinstance(warm.state, WarmState) else cls()
         return replace(state, routes=warm.routes, legs=warm.legs)
+
+    def trips_of(self, uav: str) -> tuple[tuple[str, ...], ...]:
+        """Task ids of each trip of a UAV: a single one where trips are not known."""
+        row, trips = self.routes.get(uav, ()), self.trips.get(uav, ())
+        same = tuple(name for trip in trips for name in trip) == tuple(row)
+        return trips if trips and same else (tuple(row),)
 
     def flown(self) -> dict[str, tuple[tuple[str, ...], tuple[Leg, ...]]]:
         """Task ids and legs by UAV id."""

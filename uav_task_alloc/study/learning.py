@@ -91,7 +91,7 @@ def _problems(size: str, runs: int) -> list[tuple[Problem, int]]:
 
 def _solve_cost(problem: Problem, budget: float, seed: int, params: ColonyParams) -> float:
     """Cost [m] of the whole solver's plan: length and the prices of tasks left out."""
-    recorder = Recorder(problem, time.process_time, time.process_time(), budget)
+    recorder = Recorder(time.process_time, time.process_time(), budget, problem=problem)
     chain_q.solve(recorder, seed, None, params)
     return routes.total_cost(problem.arrays, recorder.best)
 

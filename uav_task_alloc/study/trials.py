@@ -57,7 +57,7 @@ def converge(scene: SceneSpec, solver: str, seed: int, iterations: int,
         counts.extend([iteration] * (len(recorder.history) - len(counts)))
 
     started = time.thread_time()
-    recorder = Recorder(problem, time.thread_time, started, MAX_BUDGET, iterations,
+    recorder = Recorder(time.thread_time, started, MAX_BUDGET, iterations, problem=problem,
                         on_iteration=on_iteration)
     solve = SOLVERS[solver] if k is None else partial(
         paper_chain_q.solve, settings=paper_chain_q.PaperSettings(k=k))

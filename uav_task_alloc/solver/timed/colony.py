@@ -1,0 +1,78 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A colony for problems with time: bees that ruin and recreate routes of their own."""
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from uav_task_alloc.solver.rng import rng_state
+from uav_task_alloc.solver.timed.order import set_order
+from uav_task_alloc.solver.timed.problem import (
+    MAX_UNSERVED_GROWTH,
+    TimedProblem,
+    empty_timed_routes,
+)
+from uav_task_alloc.solver.timed.ruin import empty_round
+from uav_task_alloc.solver.timed.search import Incumbent, Rises, anneal, copy_incumbent
+
+
+@dataclass(frozen=True, slots=True)
+class TimedParams:
+    """Parameters of a colony; temperatures in mean legs to the nearest neighbour."""
+
+    start_temperature: float = 10.0
+    end_temperature: float = 0.1
+    ruin: float = 10.0  # tasks that a round removes
+    unserved_growth: float = 1.3  # factor by which the price of few absent tasks rises
+
+
+COLD = TimedParams()
+WARM = TimedParams(start_temperature=0.3, end_temperature=0.02)
+
+
+class TimedColony:
+    """Bees with routes of their own; `best` is the best of them.
+
+    Args:
+        problem: what is solved.
+        start: the first routes.
+        seed: of the random numbers.
+        params: of the colony.
+    """
+
+    def __init__(self, problem: TimedProblem, start: Incumbent, seed: int,
+                 params: TimedParams) -> None:
+        arrays = problem.arrays
+        self.arrays = arrays._replace(price=arrays.price.copy(), unserved=arrays.unserved.copy())
+        self.best = copy_incumbent(start)
+        self._params, self._scale = params, problem.scale
+        self._routes = empty_timed_routes(self.arrays)
+        set_order(self.arrays, self._routes, start.order)
+        self._round, self._rng = empty_round(self.arrays), rng_state(seed)
+        growth = 1.0 if problem.prizes else params.unserved_growth
+        self._rises = Rises(np.full(4, math.inf), np.full(4, math.inf), growth,
+                            MAX_UNSERVED_GROWTH * arrays.unserved, problem.prizes)
+
+    def _temperature(self, spent: float) -> float:
+        """Temperature in cost after this share of the budget."""
+        p = self._params
+        return float(self._scale * p.start_temperature
+                     * (p.end_temperature / p.start_temperature) ** spent)
+
+    def fly(self, spent: float, until: float, rounds: int) -> int:
+        """Run rounds of search.
+
+        Args:
+            spent: share of the budget used so far.
+            until: share used after them, for the temperatures.
+            rounds: their number.
+
+        Returns:
+            That number.
+        """
+        anneal(self.arrays, self._routes, self._round, self.best, self._rises,
+               self._params.ruin, self._temperature(spent), self._temperature(until), rounds,
+               self._rng)
+        return rounds

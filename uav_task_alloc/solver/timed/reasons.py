@@ -1,0 +1,160 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Texts for users: why a task is unassigned where windows, loads or batteries count."""
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from uav_task_alloc.geometry.outline import Floats
+from uav_task_alloc.kernel import kernel
+from uav_task_alloc.solver.reasons import lasting_reason, way_reason
+from uav_task_alloc.solver.timed.arrays import (
+    CLOSE,
+    IN_AIR,
+    LAST_DEPARTURE,
+    LINK,
+    OPEN,
+    READY,
+    RELEASE,
+    SERVICE,
+    TRIP_RELEASE,
+    TimedArrays,
+    TimedRoutes,
+)
+from uav_task_alloc.solver.timed.insertion import BASE_BEFORE, free_visit, place_cost, split_cost
+from uav_task_alloc.solver.timed.problem import TimedProblem, empty_timed_routes
+from uav_task_alloc.solver.timed.segments import leg_of
+
+_ARRIVAL, _LATE, _LENGTH, _SECONDS, _END = range(5)  # columns of needs_alone
+_NAMED = 3  # UAVs that a text names
+
+
+@kernel
+def can_serve(a: TimedArrays, r: TimedRoutes, t: int) -> bool:
+    """Whether a UAV could serve t if it served no other tasks but locked ones. O(m).
+
+    r: empty routes.
+    """
+    for u in range(a.uavs):
+        if place_cost(a, r, u, t, LINK(u), math.inf) < math.inf:
+            return True
+        base = free_visit(a, r, u)
+        if base >= 0 and split_cost(a, r, u, t, LINK(u), BASE_BEFORE, base, math.inf) < math.inf:
+            return True
+    return False
+
+
+@kernel
+def needs_alone(a: TimedArrays, t: int, needs: Floats) -> None:
+    """What each UAV needs for t alone, after its locked tasks, on its first trip. O(m).
+
+    needs: (m, 5) start of the service, its lateness [s], length [m], time in the air [s], end of
+    the route [s].
+    """
+    for u in range(a.uavs):
+        metres, seconds = leg_of(a, u, LINK(u), t)
+        more, further = leg_of(a, u, t, LINK(a.ends + u))
+        hold = max(a.fixed[t, RELEASE], a.fixed[t, TRIP_RELEASE] + a.begin[u, IN_AIR])
+        start = max(max(a.begin[u, READY], hold) + seconds, a.fixed[t, OPEN])
+        lasted = a.begin[u, IN_AIR] + seconds
+        opened = max(a.fixed[t, OPEN], a.fixed[t, RELEASE] + seconds)
+        lasted += max(0.0, opened - lasted - a.begin[u, LAST_DEPARTURE])
+        needs[u, 0], needs[u, 1] = start, max(0.0, start - a.fixed[t, CLOSE])
+        needs[u, 2] = metres + more
+        needs[u, 3] = lasted + a.fixed[t, SERVICE] + further
+        needs[u, 4] = start + a.fixed[t, SERVICE] + further
+
+
+def timed_reasons(problem: TimedProblem, missing: Sequence[int]) -> dict[str, str]:
+    """Why each of these tasks is in no route.
+
+    Args:
+        problem: what was solved.
+        missing: indices of the tasks.
+
+    Returns:
+        A text for each task id.
+    """
+    if not missing:
+        return {}
+    routes = empty_timed_routes(problem.arrays)
+    return {problem.base.tasks[i].id: _reason(problem, routes, i) for i in missing}
+
+
+def _reason(problem: TimedProblem, routes: TimedRoutes, i: int) -> str:
+    a, base = problem.arrays, problem.base
+    fixed = lasting_reason(base, i) or way_reason(base, i)
+    if fixed:
+        return fixed
+    if can_serve(a, routes, a.uavs + i):
+        if problem.prizes:
+            return 'left out: it is not worth its way'
+        return f'left out: {_scarce(problem)} do not suffice for all tasks'
+    return _load_reason(problem, i) or _needs_reason(problem, i)
+
+
+def _scarce(problem: TimedProblem) -> str:
+    """What limits the plan."""
+    uavs, tasks = problem.base.uavs, problem.base.tasks
+    limits = [('windows', any(task.latest < math.inf for task in tasks)),
+              ('loads', any(task.payload > 0.0 for task in tasks)),
+              ('endurances', any(uav.endurance < math.inf for uav in uavs)),
+              ('availabilities', any(uav.available_until < math.inf for uav in uavs)),
+              ('ranges', any(uav.range < math.inf for uav in uavs))]
+    names = [name for name, given in limits if given] or ['ranges']
+    return ' and '.join([', '.join(names[:-1]), names[-1]]) if len(names) > 1 else names[0]
+
+
+def _load_reason(problem: TimedProblem, i: int) -> str:
+    """The reason of a task whose payload no UAV can take; else empty."""
+    base, task, a = problem.base, problem.base.tasks[i], problem.arrays
+    if task.payload <= 0.0 or any(task.id in names for names in problem.aboard.values()):
+        return ''
+    able = [uav for u, uav in enumerate(base.uavs) if base.arrays.compatible[u, i]]
+    most = max(able, key=lambda uav: uav.payload_capacity)
+    if task.payload > most.payload_capacity:
+        return (f'payload {task.payload:g} kg; the largest capacity is '
+                f'{most.payload_capacity:g} kg ({most.id})')
+    if not a.visits and all(not uav.at_base for uav in able
+                            if uav.payload_capacity >= task.payload):
+        return f'payload {task.payload:g} kg; every UAV that could carry it is in the air'
+    return ''
+
+
+def _needs_reason(problem: TimedProblem, i: int) -> str:
+    """The reason of a task that windows, ranges, endurances or availabilities prevent."""
+    a, base, task = problem.arrays, problem.base, problem.base.tasks[i]
+    needs = np.empty((a.uavs, 5))
+    needs_alone(a, a.uavs + i, needs)
+    able = [int(u) for u in np.flatnonzero(a.compatible[0, :, i])]
+    if not able:
+        return f'payload {task.payload:g} kg: no UAV on the ground may serve it'
+    late = [u for u in able if needs[u, _LATE] > 0.0]
+    if len(late) == len(able) and not a.visits:
+        first = min(able, key=lambda u: float(needs[u, _ARRIVAL]))
+        return (f'latest {task.latest:.0f} s; the earliest arrival is '
+                f'{needs[first, _ARRIVAL]:.0f} s ({base.uavs[first].id})')
+    able.sort(key=lambda u: float(needs[u, _LENGTH]))
+    texts = [_lack(problem, i, u, needs[u]) for u in able[:_NAMED]]
+    more = f'; nor {len(able) - _NAMED} others' if len(able) > _NAMED else ''
+    return 'no UAV can serve it: ' + '; '.join(texts) + more
+
+
+def _lack(problem: TimedProblem, i: int, u: int, need: Floats) -> str:
+    """What UAV u lacks for the i-th task alone."""
+    a, uav, task = problem.arrays, problem.base.uavs[u], problem.base.tasks[i]
+    _, most_metres, most_seconds = a.limit[u, :3].tolist()
+    if need[_LATE] > 0.0:
+        return f'{uav.id} arrives at {need[_ARRIVAL]:.0f} s, its latest is {task.latest:.0f} s'
+    if need[_LENGTH] > most_metres:
+        return f'{uav.id} needs {need[_LENGTH]:.0f} m and has {most_metres:.0f} m left'
+    if need[_SECONDS] > most_seconds:
+        return f'{uav.id} needs {need[_SECONDS]:.0f} s in the air and has {most_seconds:.0f} s'
+    if need[_END] > uav.available_until:
+        return (f'{uav.id} would end at {need[_END]:.0f} s and is available until '
+                f'{uav.available_until:.0f} s')
+    if task.payload > a.limit[u, 0]:
+        return f'{uav.id} has {a.limit[u, 0]:g} kg of capacity left for {task.payload:g} kg'
+    return f'{uav.id} cannot serve it after its locked tasks'

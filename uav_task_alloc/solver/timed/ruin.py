@@ -1,0 +1,340 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Ruin and recreate with time: strings of tasks are removed, inserted again, or all is undone.
+
+Christiaens and Vanden Berghe, Slack Induction by String Removals for Vehicle Routing Problems,
+Transportation Science 54 (2020). Before a route changes, its rows are copied; undoing copies them
+back.
+"""
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from uav_task_alloc.geometry.outline import Floats, Ints
+from uav_task_alloc.kernel import inline_kernel
+from uav_task_alloc.solver.rng import RngState, below, uniform
+from uav_task_alloc.solver.ruin import BLINK_RATE, MAX_STRING, PRESERVE_RATE, SPLIT_RATE
+from uav_task_alloc.solver.timed.arrays import (
+    CLOSE,
+    FLOWN,
+    LEG,
+    LINK,
+    LOAD,
+    NEXT,
+    OPEN,
+    PREV,
+    REMOTE,
+    ROUTE,
+    ROW,
+    SERVED,
+    SUMS,
+    TASKS,
+    TRIP,
+    UAV,
+    WIDTH,
+    Links,
+    TimedArrays,
+    TimedRoutes,
+)
+from uav_task_alloc.solver.timed.insertion import (
+    PLAIN,
+    idle_uav,
+    insert_task,
+    near_place,
+    place_anywhere,
+    place_cost,
+    unlink,
+)
+from uav_task_alloc.solver.timed.segments import is_task, slot_of, update
+
+ABSENT_SEED_RATE = 0.5  # share of rounds that start at an absent task, if there is one
+MAX_ABSENT = 10  # absent tasks that a round tries to insert_task, besides those it removes
+OPENING_RATE = 0.1  # share of rounds with absent tasks that open a route around one of them
+MAX_OPENING = 64  # absent tasks that such a round tries to insert
+ANYWHERE_RATE = 0.02  # share of tasks without a place among neighbours that try all routes
+ORDERS = 15  # weights of the orders of insertion
+
+# entries of Round.count
+SAVED, SAVED_ROUTES, REMOVED, ABSENT, SERIAL, PATIENCE = range(6)
+
+
+class Round(NamedTuple):
+    """What a round of ruin and recreate changes, and what rounds start at."""
+
+    node: Links  # (nodes) saved rows: their nodes
+    link: Links  # (nodes, 4)
+    row: Floats  # (nodes, ROW)
+    uav: Ints  # (m) saved routes: their UAVs
+    route: Floats  # (m, ROUTE)
+    trip: Floats  # (slots, TRIP)
+    sums: Floats  # (SUMS)
+    routes_count: Ints  # (2) TimedRoutes.count before the round
+    removed: Links  # task nodes to be inserted
+    order: Floats  # sort key of each: smallest first
+    saved_in: Ints  # (m) serial of the round that saved this route last
+    absent: Links  # task nodes in no route at the last listing
+    count: Ints  # (6)
+
+
+def empty_round(a: TimedArrays) -> Round:
+    """An empty round with room for any."""
+    nodes, m, n = len(a.fixed), a.uavs, a.ends - a.uavs
+    return Round(np.empty(nodes, LINK), np.empty((nodes, 4), LINK), np.empty((nodes, ROW)),
+                 np.empty(m, np.int64), np.empty((m, ROUTE)), np.empty((len(a.limit), TRIP)),
+                 np.empty(SUMS), np.empty(2, np.int64), np.empty(n + 1, LINK), np.empty(n + 1),
+                 np.full(m, -1, np.int64), np.empty(n + 1, LINK), np.zeros(6, np.int64))
+
+
+@inline_kernel
+def begin_round(r: TimedRoutes, w: Round) -> None:
+    """Begin a round. O(1)."""
+    w.count[SAVED] = w.count[SAVED_ROUTES] = w.count[REMOVED] = 0
+    w.count[SERIAL] += 1
+    for c in range(SUMS):
+        w.sums[c] = r.sums[c]
+    w.routes_count[0], w.routes_count[1] = r.count[0], r.count[1]
+
+
+@inline_kernel
+def save_route(a: TimedArrays, r: TimedRoutes, w: Round, u: int) -> None:
+    """Save UAV u's route, once in a round. O(tasks)."""
+    if w.saved_in[u] == w.count[SERIAL]:
+        return
+    w.saved_in[u] = w.count[SERIAL]
+    k = w.count[SAVED_ROUTES]
+    w.uav[k] = u
+    w.count[SAVED_ROUTES] += 1
+    for c in range(ROUTE):
+        w.route[k, c] = r.route[u, c]
+    i, k, end = LINK(u), w.count[SAVED], a.ends + u
+    while True:
+        w.node[k] = i
+        for c in range(4):
+            w.link[k, c] = r.link[i, c]
+        for c in range(ROW):
+            w.row[k, c] = r.row[i, c]
+        if not is_task(a, i) and i != end:
+            slot = slot_of(a, i)
+            for c in range(TRIP):
+                w.trip[slot, c] = r.trip[slot, c]
+        k += 1
+        if i == end:
+            break
+        i = r.link[i, NEXT]
+    w.count[SAVED] = k
+
+
+@inline_kernel
+def take_back(a: TimedArrays, r: TimedRoutes, w: Round) -> None:
+    """Restore all routes that the round changed. O(their tasks)."""
+    for k in range(w.count[REMOVED]):
+        r.link[w.removed[k], UAV] = LINK(a.uavs)
+    for k in range(w.count[SAVED_ROUTES]):
+        u = w.uav[k]
+        if (r.route[u, TASKS] == 0.0) != (w.route[k, TASKS] == 0.0):
+            r.empty[a.class_of[u]] += 1 if w.route[k, TASKS] == 0.0 else -1
+        for c in range(ROUTE):
+            r.route[u, c] = w.route[k, c]
+        for base in range(a.bases + u * a.visits, a.bases + (u + 1) * a.visits):
+            r.link[base, UAV] = LINK(a.uavs)
+    for k in range(w.count[SAVED]):
+        i = w.node[k]
+        for c in range(4):
+            r.link[i, c] = w.link[k, c]
+        for c in range(ROW):
+            r.row[i, c] = w.row[k, c]
+        if i < a.uavs or i >= a.bases:
+            slot = slot_of(a, i)
+            for c in range(TRIP):
+                r.trip[slot, c] = w.trip[slot, c]
+    for c in range(SUMS):
+        r.sums[c] = w.sums[c]
+    r.count[0], r.count[1] = w.routes_count[0], w.routes_count[1]
+
+
+@inline_kernel
+def _take(r: TimedRoutes, w: Round, t: int) -> None:
+    """Put t on the list of tasks to be inserted. O(1)."""
+    w.removed[w.count[REMOVED]] = t
+    w.count[REMOVED] += 1
+
+
+@inline_kernel
+def drop_idle_visits(a: TimedArrays, r: TimedRoutes, u: int) -> None:
+    """Take base visits out of UAV u's route that no task needs; `update` has to follow.
+
+    Visits at the end, one after another, and those that join trips light enough for one. O(tasks).
+    """
+    i, end, before = r.link[u, NEXT], a.ends + u, LINK(u)
+    load, metres = 0.0, 0.0
+    while i != end:
+        then = r.link[i, NEXT]
+        if is_task(a, i):
+            load, metres = load + a.fixed[i, LOAD], metres + r.row[i, LEG]
+        else:
+            last = r.link[i, PREV]
+            swaps = last == u and a.limit[u, FLOWN] < a.limit[slot_of(a, i), FLOWN]
+            if then >= a.ends or (last == before and not swaps):
+                unlink(a, r, i)
+            before = i
+        i = then
+
+
+@inline_kernel
+def _remove_string(a: TimedArrays, r: TimedRoutes, w: Round, c: int, size: int,
+                   rng: RngState) -> None:
+    """Remove `size` tasks around c; sometimes preserve a substring. O(tasks of the route)."""
+    u = r.link[c, UAV]
+    tasks = r.route[u, TASKS]
+    count, preserved = int(tasks), 0
+    if size > 1 and size < count and uniform(rng) < SPLIT_RATE:
+        preserved = 1
+        while size + preserved < count and uniform(rng) < PRESERVE_RATE:
+            preserved += 1
+    t, back = c, below(rng, size + preserved)
+    while back > 0 and r.link[t, PREV] >= a.uavs:
+        t, back = r.link[t, PREV], back - 1
+    keep_from = 1 + below(rng, size - 1) if preserved > 0 else size
+    first, i = r.link[t, PREV], 0
+    while i < size + preserved and (t < a.ends or t >= a.bases):
+        then = r.link[t, NEXT]
+        if is_task(a, t):
+            if i < keep_from or i >= keep_from + preserved:
+                unlink(a, r, t)
+                _take(r, w, t)
+            i += 1
+        t = then
+    if a.visits > 0:
+        drop_idle_visits(a, r, u)
+    update(a, r, u, first, t, tasks)
+
+
+@inline_kernel
+def list_absent(a: TimedArrays, r: TimedRoutes, w: Round) -> None:
+    """List the tasks in no route that could be in one. O(n)."""
+    w.count[ABSENT] = 0
+    for t in range(a.uavs, a.ends):
+        if r.link[t, UAV] == a.uavs and a.unserved[t - a.uavs] > 0.0:
+            w.absent[w.count[ABSENT]] = t
+            w.count[ABSENT] += 1
+
+
+@inline_kernel
+def _seed(a: TimedArrays, r: TimedRoutes, w: Round, rng: RngState) -> Any:
+    """The task that a round starts at: often one in no route. O(1)."""
+    if w.count[ABSENT] > 0 and uniform(rng) < ABSENT_SEED_RATE:
+        t = w.absent[below(rng, w.count[ABSENT])]
+        if r.link[t, UAV] == a.uavs:
+            return t
+    return LINK(a.uavs + below(rng, a.ends - a.uavs))
+
+
+@inline_kernel
+def ruin_strings(a: TimedArrays, r: TimedRoutes, w: Round, mean: float, opening: bool,
+         rng: RngState) -> Any:
+    """Remove about `mean` tasks in strings of routes around a random task; returns that. O(k).
+
+    opening: take more absent tasks around it, for a route of their own.
+    """
+    none = a.uavs
+    seed = _seed(a, r, w, rng)
+    used = 0
+    for k in range(a.first_member.size - 1):
+        used += a.first_member[k + 1] - a.first_member[k] - r.empty[k]
+    served = max(1.0, r.count[SERVED] / max(1, used))
+    longest = min(float(MAX_STRING), served)
+    strings = int(1.0 + uniform(rng) * (4.0 * mean / (1.0 + longest) - 1.0))
+    left_out, most = 0, MAX_OPENING if opening else MAX_ABSENT
+    for m in range(-1, a.near_count[seed - a.uavs]):
+        c = seed if m < 0 else a.near[seed - a.uavs, m]
+        u = r.link[c, UAV]
+        if u == none:
+            if left_out < most and a.unserved[c - a.uavs] > 0.0 and not _is_taken(w, c):
+                _take(r, w, c)
+                left_out += 1
+        elif strings > 0 and w.saved_in[u] != w.count[SERIAL]:
+            save_route(a, r, w, u)
+            size = 1 + int(uniform(rng) * min(longest, r.route[u, TASKS]))
+            _remove_string(a, r, w, c, size, rng)
+            strings -= 1
+        if strings == 0 and (w.count[ABSENT] == 0 or left_out >= most):
+            break
+    return seed
+
+
+@inline_kernel
+def _is_taken(w: Round, c: int) -> bool:
+    """Whether c is on the list of tasks to be inserted. O(removed)."""
+    found = False
+    for k in range(w.count[REMOVED]):
+        found = found or w.removed[k] == c
+    return found
+
+
+@inline_kernel
+def _sort_removed(a: TimedArrays, w: Round, rng: RngState) -> None:
+    """Sort removed tasks: at random, or by load, distance, value or window. O(removed^2)."""
+    kind = below(rng, ORDERS)
+    for i in range(w.count[REMOVED]):
+        t = w.removed[i]
+        if kind < 4:
+            key = uniform(rng)
+        elif kind < 6:
+            key = -a.fixed[t, LOAD]
+        elif kind < 8:
+            key = -a.fixed[t, REMOTE]
+        elif kind == 8:
+            key = a.fixed[t, REMOTE]
+        elif kind < 11:
+            key = a.fixed[t, WIDTH]
+        elif kind == 11:
+            key = a.fixed[t, OPEN]
+        elif kind == 12:
+            key = -a.fixed[t, CLOSE]
+        else:
+            key = -a.unserved[t - a.uavs]
+        place = i
+        while place > 0 and w.order[place - 1] > key:
+            w.order[place], w.removed[place] = w.order[place - 1], w.removed[place - 1]
+            place -= 1
+        w.order[place], w.removed[place] = key, t
+
+
+@inline_kernel
+def insert_saved(a: TimedArrays, r: TimedRoutes, w: Round, t: int, place: int,
+                 kind: int) -> None:
+    """Insert t after node `place`, whose route is saved before. O(tasks)."""
+    save_route(a, r, w, np.int64(r.link[place, UAV]))
+    insert_task(a, r, t, LINK(place), kind)
+
+
+@inline_kernel
+def open_route(a: TimedArrays, r: TimedRoutes, w: Round, t: int) -> None:
+    """Insert t into an empty route, whatever that costs, if one may serve it. O(classes)."""
+    for m in range(a.near_class.shape[1]):
+        k = a.near_class[t - a.uavs, m]
+        u = idle_uav(a, r, k) if k >= 0 else -1
+        if u >= 0 and place_cost(a, r, u, t, LINK(u), math.inf) < math.inf:
+            insert_saved(a, r, w, t, u, PLAIN)
+            break
+
+
+@inline_kernel
+def insert_removed(a: TimedArrays, r: TimedRoutes, w: Round, generous: float,
+                   rng: RngState) -> None:
+    """Insert removed tasks where each costs least. O(removed k).
+
+    generous: a task is inserted where it costs less than so many times its price.
+    """
+    _sort_removed(a, w, rng)
+    for i in range(w.count[REMOVED]):
+        t = w.removed[i]
+        if r.link[t, UAV] != a.uavs:
+            continue
+        place, kind, cost = near_place(a, r, t, True, BLINK_RATE, rng)
+        if place < 0 and uniform(rng) < ANYWHERE_RATE:
+            place, kind, cost = place_anywhere(a, r, t)
+        if place >= 0 and cost < generous * a.unserved[t - a.uavs]:
+            insert_saved(a, r, w, t, place, kind)

@@ -1,0 +1,145 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Ruin and recreate with simulated annealing, for problems with time, loads or trips."""
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from uav_task_alloc.geometry.outline import Floats
+from uav_task_alloc.kernel import inline_kernel, kernel
+from uav_task_alloc.solver.rng import RngState, uniform
+from uav_task_alloc.solver.search import PENALTY_DECAY, PENALTY_GROWTH
+from uav_task_alloc.solver.timed.arrays import (
+    INFEASIBLE,
+    LINK,
+    SERVED_WORTH,
+    TOLERANCE,
+    UAV,
+    UNSERVED,
+    Links,
+    TimedArrays,
+    TimedRoutes,
+)
+from uav_task_alloc.solver.timed.order import route_order, true_cost
+from uav_task_alloc.solver.timed.ruin import (
+    ABSENT,
+    PATIENCE,
+    REMOVED,
+    Round,
+    begin_round,
+    insert_removed,
+    list_absent,
+    open_route,
+    ruin_strings,
+    take_back,
+)
+from uav_task_alloc.solver.timed.segments import cost_of
+
+OPENING_RATE = 0.1  # share of rounds with absent tasks that open a route around one of them
+GENEROUS_RATE = 0.5  # share of rounds in which a task may cost more than its price
+FEW_ABSENT = 0.05  # up to this share of absent tasks their price rises
+BEST_COST, BEST_WORTH = range(2)  # entries of Incumbent.score
+
+
+class Incumbent(NamedTuple):
+    """The best routes so far."""
+
+    order: Links  # (nodes) node after each node; itself: in no route
+    score: Floats  # (2) cost without unserved tasks or, where those have a price, with; value
+
+
+def empty_incumbent(a: TimedArrays) -> Incumbent:
+    """An incumbent without routes, which any is better than."""
+    return Incumbent(np.arange(len(a.fixed)).astype(LINK), np.array([math.inf, -math.inf]))
+
+
+def copy_incumbent(best: Incumbent) -> Incumbent:
+    """The same in new arrays."""
+    return Incumbent(best.order.copy(), best.score.copy())
+
+
+class Rises(NamedTuple):
+    """How prices change in a search."""
+
+    least: Floats  # (4) lowest price of each kind of excess; inf: never allowed
+    most: Floats  # (4) highest price
+    unserved: float  # factor by which the price of a task in no route rises; 1: it is fixed
+    max_unserved: Floats  # (n) highest price of a task
+    prizes: bool  # tasks may be left out because they are not worth their way
+
+
+@inline_kernel
+def is_improvement(a: TimedArrays, cost: float, worth: float, score: Floats,
+                   prizes: bool) -> bool:
+    """Whether a cost and value are better than a score."""
+    less = score[BEST_COST] * (1.0 - 1e-12) - TOLERANCE
+    if prizes:
+        return bool(cost < less)
+    slack = 1e-9 * (abs(score[BEST_WORTH]) + 1.0)
+    gain = worth - score[BEST_WORTH]
+    return gain > slack or (gain >= -slack and cost < less)
+
+
+@kernel
+def record(a: TimedArrays, r: TimedRoutes, best: Incumbent, prizes: bool) -> bool:
+    """Keep the routes if they are allowed and better than the best; whether. O(nodes)."""
+    if r.count[INFEASIBLE] > 0:
+        return False
+    cost = true_cost(a, r) + (r.sums[UNSERVED] if prizes else 0.0)
+    if not is_improvement(a, cost, r.sums[SERVED_WORTH], best.score, prizes):
+        return False
+    best.score[BEST_COST], best.score[BEST_WORTH] = cost, r.sums[SERVED_WORTH]
+    route_order(a, r, best.order)
+    return True
+
+
+@kernel
+def _update_prices(a: TimedArrays, r: TimedRoutes, w: Round, rises: Rises) -> None:
+    """Adapt the prices of excess and of tasks in no route. O(n)."""
+    for c in range(4):
+        if rises.least[c] < math.inf:
+            if r.sums[c] > TOLERANCE:
+                a.price[c] = min(rises.most[c], a.price[c] * PENALTY_GROWTH)
+            else:
+                a.price[c] = max(rises.least[c], a.price[c] * PENALTY_DECAY)
+    list_absent(a, r, w)
+    if rises.unserved == 1.0 or w.count[ABSENT] >= FEW_ABSENT * (a.ends - a.uavs):
+        return
+    for k in range(w.count[ABSENT]):
+        i = w.absent[k] - a.uavs
+        more = min(a.unserved[i] * rises.unserved, rises.max_unserved[i])
+        r.sums[UNSERVED] += more - a.unserved[i]
+        a.unserved[i] = more
+
+
+@kernel
+def anneal(a: TimedArrays, r: TimedRoutes, w: Round, best: Incumbent, rises: Rises, mean: float,
+           start: float, end: float, rounds: int, rng: RngState) -> int:
+    """Anneal r from temperature `start` to `end` [cost]; returns how often the best improved.
+
+    A round removes about `mean` tasks.
+    """
+    temperature, improvements = start, 0
+    decay = (end / start) ** (1.0 / max(1, rounds))
+    for _ in range(rounds):
+        w.count[PATIENCE] -= 1
+        if w.count[PATIENCE] < 0:
+            _update_prices(a, r, w, rises)
+            w.count[PATIENCE] = max(20, (a.ends - a.uavs) // 8)
+        before, generous = cost_of(a, r.sums), 1.0
+        begin_round(r, w)
+        opening = rises.prizes and w.count[ABSENT] > 0 and uniform(rng) < OPENING_RATE
+        seed = ruin_strings(a, r, w, mean, opening, rng)
+        if rises.prizes and uniform(rng) < GENEROUS_RATE:
+            generous += uniform(rng)
+        if opening and w.count[REMOVED] > 0 and r.link[seed, UAV] == a.uavs:
+            open_route(a, r, w, seed)
+        insert_removed(a, r, w, generous, rng)
+        if cost_of(a, r.sums) < before - temperature * math.log(1.0 - uniform(rng)):
+            improvements += int(record(a, r, best, rises.prizes))
+        else:
+            take_back(a, r, w)
+        temperature *= decay
+    return improvements

@@ -1,0 +1,104 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Solves problems with time: arrays, first plan, colonies, and the plan with its times."""
+from __future__ import annotations
+
+import functools
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+
+from uav_task_alloc.model import Plan, Task, ThreatZone, Uav
+from uav_task_alloc.solver.chain_q import run_colonies
+from uav_task_alloc.solver.path_preparation import SEARCH_LIMIT, PathPreparation
+from uav_task_alloc.solver.problem import Limits, Rules, make_problem
+from uav_task_alloc.solver.timed.answer import to_timed_plan
+from uav_task_alloc.solver.timed.colony import COLD, WARM, TimedColony, TimedParams
+from uav_task_alloc.solver.timed.problem import make_timed
+from uav_task_alloc.solver.timed.reasons import timed_reasons
+from uav_task_alloc.solver.timed.recorder import TimedRecorder
+from uav_task_alloc.solver.timed.warm import first_plan
+from uav_task_alloc.solver.warm import WarmState
+
+SOLVER_NAME = 'chain_q'
+
+
+def solve_timed(uavs: Sequence[Uav], tasks: Sequence[Task],
+                locked: Mapping[str, tuple[Task, ...]], limits: Limits, rules: Rules,
+                warm: Plan | WarmState | None = None, *, budget: float = 0.1, seed: int = 0,
+                threads: int = 1, stop: Callable[[], bool] | None = None,
+                max_iterations: int | None = None,
+                on_iteration: Callable[[int, float], None] | None = None,
+                clock: Callable[[], float] = time.perf_counter,
+                params: TimedParams | None = None) -> Plan:
+    """Solve a problem with time, as `plan` does; arguments are checked already.
+
+    Args:
+        uavs: the fleet.
+        tasks: all tasks, locked ones included.
+        locked: by UAV id the tasks that it serves first.
+        limits: zones and altitudes.
+        rules: how routes end, objective, trips.
+        warm: an earlier plan, or its state, to start from.
+        budget, seed, threads, stop, max_iterations, on_iteration, clock: as for `plan`.
+        params: of the colonies; None: by whether there is an earlier plan.
+
+    Returns:
+        The best plan found, with its times.
+    """
+    load_timed_kernels(bool(limits.zones))
+    began, before = clock(), WarmState.of(warm)
+    search = PathPreparation(clock, began, budget, stop, before.flown())
+    known = before.problem
+    base = make_problem(uavs, tasks, locked, limits, rules, known, search)
+    problem = make_timed(base, _aboard(uavs, base.locked, before))
+    recorder = TimedRecorder(clock, began, budget, max_iterations, stop, threads,
+                             warm is not None, on_iteration, problem=problem)
+    search.begin(1.0, SEARCH_LIMIT)
+    _improve(recorder, seed, before, params)
+    result = to_timed_plan(problem, recorder, SOLVER_NAME, warm is not None)
+    search.path_budget.check()  # raises what a callback raised within a kernel
+    state = WarmState(base, before.learnt, result.routes, trips=dict(result.trips))
+    return replace(result, state=state)
+
+
+def _improve(recorder: TimedRecorder, seed: int, before: WarmState,
+             params: TimedParams | None) -> None:
+    """Make a first plan and improve it until the budget ends."""
+    problem = recorder.problem
+    first = first_plan(problem, before)
+    recorder.offer(first)
+    if not problem.base.tasks or not problem.base.uavs or recorder.over():
+        return
+    params = params or (WARM if recorder.warm else COLD)
+    run_colonies([TimedColony(problem, first, seed + 7919 * i, params)
+                  for i in range(recorder.threads)], recorder)
+
+
+def _aboard(uavs: Sequence[Uav], locked: Mapping[str, tuple[Task, ...]],
+            before: WarmState) -> dict[str, frozenset[str]]:
+    """Ids of the tasks whose payload UAVs in the air have on board, by UAV id."""
+    found = {}
+    for uav in uavs:
+        if not uav.at_base:
+            names = uav.aboard
+            if names is None:
+                held = frozenset(task.id for task in locked.get(uav.id, ()))
+                names = held | frozenset(before.trips_of(uav.id)[0])
+            found[uav.id] = names
+    return found
+
+
+@functools.cache
+def load_timed_kernels(zones: bool = False) -> None:
+    """Load the kernels of problems with time, compile those not on disk yet.
+
+    Args:
+        zones: whether to load the kernels that find paths around zones, too.
+    """
+    uavs = (Uav('u', (0.0, 0.0, 0.0), turnaround=1.0), Uav('v', (9.0, 0.0, 0.0), 30.0))
+    tasks = tuple(Task(f't{i}', (float(i), 1.0, 0.0), latest=99.0) for i in range(5))
+    limits = Limits((ThreatZone.cylinder('z', (2.5, 1.0), 0.3),) if zones else ())
+    problem = make_timed(make_problem(uavs, tasks, {}, limits, Rules(trips=2)), {})
+    recorder = TimedRecorder(lambda: 0.0, 0.0, 1.0, max_iterations=100, problem=problem)
+    _improve(recorder, 0, WarmState(), None)
+    timed_reasons(problem, [0])

@@ -1,0 +1,81 @@
+# SPDX-License-Identifier: Apache-2.0
+"""First routes of a problem with time: an earlier plan as far as it still holds, and the rest."""
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from uav_task_alloc.geometry.outline import Ints
+from uav_task_alloc.kernel import kernel
+from uav_task_alloc.solver.rng import rng_state
+from uav_task_alloc.solver.timed.arrays import (
+    LINK,
+    PREV,
+    REMOTE,
+    UAV,
+    TimedArrays,
+    TimedRoutes,
+)
+from uav_task_alloc.solver.timed.insertion import (
+    BASE_BEFORE,
+    PLAIN,
+    free_visit,
+    insert_in_order,
+    insert_task,
+    place_cost,
+    split_cost,
+)
+from uav_task_alloc.solver.timed.problem import TimedProblem, empty_timed_routes
+from uav_task_alloc.solver.timed.search import Incumbent, empty_incumbent, record
+from uav_task_alloc.solver.warm import WarmState
+
+_VISIT = -1  # in a sequence of nodes: a visit of the base
+
+
+def first_plan(problem: TimedProblem, before: WarmState) -> Incumbent:
+    """Routes without excess: the earlier ones, then all other tasks where each costs least.
+
+    Args:
+        problem: the current problem.
+        before: the earlier plan; tasks that are gone, or come too late now, are left out of it.
+    """
+    a, routes = problem.arrays, empty_timed_routes(problem.arrays)
+    nodes, bounds, index = [], [0], problem.base.index
+    for uav in problem.base.uavs:
+        held = {task.id for task in problem.base.locked.get(uav.id, ())}
+        for number, trip in enumerate(before.trips_of(uav.id)):
+            row = [a.uavs + index[name] for name in trip if name in index]
+            nodes += [_VISIT] * (number > 0 and bool(row or held)) + row
+        bounds.append(len(nodes))
+    append_all(a, routes, np.array(nodes, np.int64), np.array(bounds, np.int64))
+    tasks = np.arange(a.uavs, a.ends)
+    tasks = tasks[np.argsort(-a.fixed[tasks, REMOTE], kind='stable')]
+    insert_in_order(a, routes, tasks, True, rng_state(0))
+    best = empty_incumbent(a)
+    record(a, routes, best, problem.prizes)
+    return best
+
+
+@kernel
+def append_all(a: TimedArrays, r: TimedRoutes, nodes: Ints, bounds: Ints) -> None:
+    """Append nodes[bounds[u]:bounds[u + 1]] to the route of each UAV u, as far as allowed.
+
+    nodes: int64 task nodes, -1 before the first task of a further trip; bounds: (m + 1).
+    """
+    for u in range(a.uavs):
+        visits = False
+        for i in range(bounds[u], bounds[u + 1]):
+            if nodes[i] < 0:
+                visits = True
+                continue
+            t, last = LINK(nodes[i]), r.link[a.ends + u, PREV]
+            if r.link[t, UAV] != a.uavs:
+                continue
+            base = free_visit(a, r, u) if visits else -1
+            if base >= 0 and split_cost(a, r, u, t, last, BASE_BEFORE, base,
+                                        math.inf) < math.inf:
+                insert_task(a, r, t, last, BASE_BEFORE)
+                visits = False
+            elif place_cost(a, r, u, t, last, math.inf) < math.inf:
+                insert_task(a, r, t, last, PLAIN)
