@@ -384,7 +384,7 @@ def test_times_loads_and_the_objective_are_read_and_written():
      'available_until = 9.0: expected at least available_from = 10'),
     ('climb_speed: 2.5', 'climb_speed: 0', 's.yaml:5: scenario.uavs[0].climb_speed = 0: expected '
      'a number in (0, inf]'),
-    ('trips: 3', 'trips: 0', 's.yaml:2: scenario.trips = 0: expected a whole number in [1, 100]'),
+    ('trips: 3', 'trips: 0', 's.yaml:2: scenario.trips = 0: expected a whole number in [1, 64]'),
     ('{finish: 1, lateness: 2.5}', 'fast', 's.yaml:1: scenario.objective = fast: expected one of '
      'distance, finish, response, balanced'),
     ('lateness: 2.5', 'late: 2.5', "s.yaml:1: scenario.objective: unknown key 'late': expected "

@@ -119,8 +119,11 @@ class MapFigure:
         """Add title, legend, labels and scale bar, save. Raises OSError."""
         zone = 'no-fly zone' + f'\n(inner ring: at {self.height:.0f} m)' * bool(self._rings)
         self.axes.set_title(title, loc='left', fontsize=style.LARGE, fontweight='bold', pad=12)
-        style.legend(self.figure, [*handles, *[style.zone_handle(zone)] * bool(self._zones)],
-                     **({'place': 'outside lower left', 'columns': 4} if self.beside else {}))
+        entries = [*handles, *[style.zone_handle(zone)] * bool(self._zones)]
+        if self.beside:
+            style.legend(self.figure, entries, 'outside lower left', columns=4)
+        else:
+            style.legend(self.figure, entries)
         self.axes.margins(0.07)
         self.figure.draw_without_rendering()  # makes the limits final
         low, high = self.axes.get_xlim()

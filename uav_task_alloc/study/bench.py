@@ -12,7 +12,7 @@ from typing import Any
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.solver.registry import SOLVERS
 from uav_task_alloc.solver.solve import plan
-from uav_task_alloc.study import public, reference_solvers
+from uav_task_alloc.study import public, reference_solvers, timed_bench
 from uav_task_alloc.study.campaign import Job
 from uav_task_alloc.study.evaluator import RoutesByUav, evaluate
 from uav_task_alloc.study.gaps import InstanceRuns
@@ -59,9 +59,7 @@ def public_sources(folder: Path, pattern: str) -> tuple[dict[str, Source], dict[
     texts, skipped = public.read_folder(folder, pattern)
     if not texts:
         raise InvalidValue('--folder', str(folder), f'instances named {pattern}')
-    known = public.best_known(folder)
-    return {name: {'name': name, 'text': text} | ({'known': known[name]} if name in known else {})
-            for name, text in texts.items()}, skipped
+    return public.instance_sources(folder, texts), skipped
 
 
 def measure(source: Mapping[str, Any], name: str, budgets: Sequence[float]) -> dict[str, Any]:
@@ -83,16 +81,21 @@ def measure(source: Mapping[str, Any], name: str, budgets: Sequence[float]) -> d
     instance = public.parse_instance(**source) if is_public else make_instance(**source)
     group = source['name'].split('.')[0].split('_')[0] if is_public else (
         instance.name.rpartition('-')[0])
-    routes: list[RoutesByUav | None]
-    if name in SOLVERS:
-        routes = [_solve(instance, name, budget) for budget in budgets]
+    found: list[dict[str, Any]]
+    if instance.has_time:
+        found = timed_bench.found(instance, name, budgets)
     else:
-        incumbents = reference_solvers.REFERENCE_SOLVERS[name](instance, max(budgets))
-        routes = [reference_solvers.best_at(incumbents, budget) for budget in budgets]
-    return {'group': group, 'collects': instance.collects,
-            'known': instance.known if math.isfinite(instance.known) else None,
-            'found': [{'budget': budget} | _scored(instance, row)
-                      for budget, row in zip(budgets, routes, strict=True)]}
+        routes: list[RoutesByUav | None]
+        if name in SOLVERS:
+            routes = [_solve(instance, name, budget) for budget in budgets]
+        else:
+            incumbents = reference_solvers.REFERENCE_SOLVERS[name](instance, max(budgets))
+            routes = [reference_solvers.best_at(incumbents, budget) for budget in budgets]
+        found = [{'budget': budget} | _scored(instance, row)
+                 for budget, row in zip(budgets, routes, strict=True)]
+    return {'group': instance.group or group, 'collects': instance.collects,
+            'has_time': instance.has_time,
+            'known': instance.known if math.isfinite(instance.known) else None, 'found': found}
 
 
 def _solve(instance: Instance, solver: str, budget: float) -> RoutesByUav:
@@ -128,7 +131,8 @@ def instance_runs(jobs: Mapping[tuple[str, str], Job],
         result = results.get(job.name)
         if result is not None:
             run = runs.setdefault(
-                key, InstanceRuns(result['group'], result['collects'], result['known']))
+                key, InstanceRuns(result['group'], result['collects'], result['known'],
+                                  100.0 if result['has_time'] else None))
             run.found[solver] = result['found']
     return runs
 

@@ -14,6 +14,7 @@ from uav_task_alloc.study.instances import Instance
 _TOLERANCE = 1e-9  # share of a range by which a route may exceed it: rounding
 
 RoutesByUav = Mapping[str, Sequence[str]]  # UAV id -> task ids in order
+TripsByUav = Mapping[str, Sequence[Sequence[str]]]  # UAV id -> task ids of each trip
 
 
 @dataclass(frozen=True, slots=True)

@@ -30,6 +30,7 @@ class InstanceRuns:
     group: str
     collects: bool  # the score is a value, more is better; else a length, less is better
     known: float | None = None  # best published score
+    missing_gap: float | None = None  # [%] of a run without a valid plan; None: it does not count
     found: dict[str, list[dict[str, Any]]] = field(default_factory=dict)  # by solver: see measure
 
     def best(self) -> float | None:
@@ -47,7 +48,9 @@ class InstanceRuns:
     def gap(self, score: float | None) -> float | None:
         """[%] by which a score is worse than the best; None: no valid plan."""
         best = self.best()
-        if score is None or best is None:
+        if score is None:
+            return self.missing_gap
+        if best is None:
             return None
         if not best:
             return 0.0  # no task is within range

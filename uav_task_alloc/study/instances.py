@@ -9,6 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uav_task_alloc.model import Task, ThreatZone, Uav
+from uav_task_alloc.objective import Objective, check_objective, needs_time
+from uav_task_alloc.solver.problem import Rules
 
 SIDE = 10_000.0  # [m]
 SLACK = 1.5  # range over a fair share of a good tour; at 1.25 OR-Tools finds no plan at 50 tasks
@@ -30,7 +32,22 @@ class Instance:
     zones: tuple[ThreatZone, ...] = ()
     route_end: str = 'hold'
     collects: bool = False  # ranges may not suffice for all tasks: the value served counts
-    known: float = math.nan  # best published value (collects) or length [m]
+    known: float = math.nan  # best published value (collects), cost or length [m]
+    group: str = ''  # of instances that a mean gap is over; '': as the name says
+    objective: Objective | str = 'distance'
+    trips: int = 1  # of a UAV at most
+    grain: float = 0.0  # [1/m] lengths are cut to multiples of 1 / grain
+
+    @property
+    def rules(self) -> Rules:
+        """How routes end and what they cost."""
+        return Rules(self.route_end == 'home', objective=check_objective(self.objective),
+                     trips=self.trips, grain=self.grain)
+
+    @property
+    def has_time(self) -> bool:
+        """Whether times, loads or trips can change its best plan."""
+        return needs_time(self.uavs, self.tasks, self.rules.objective, self.trips)
 
 
 def make_instance(uavs: int, tasks: int, seed: int, one_base: bool = False,

@@ -1,25 +1,30 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Parser of public instances: team orienteering, multi-source team orienteering, MDVRP.
+"""Parser of public instances: team orienteering, multi-source team orienteering, MDVRP, and time.
 
 Team orienteering (Chao, Golden and Wasil): `n`, `m`, `tmax`, then a line x, y, score for each
 point; all vehicles start at the first point and end at the last. Multi-source (MSTOP): two more
 columns, whether a point is a start and how many vehicles start there; the end is the last point,
 or the one of which only the second flag is set. Multi-depot vehicle routing (Cordeau): loads are
 ignored, since UAVs carry none here; instances with service times in limited durations are
-refused, since a range does not include them.
+refused, since a range does not include them. Instances with time windows: see timed_public.py.
 """
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from itertools import cycle, islice
 from pathlib import Path
+from typing import Any
 
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.model import Task, Uav
 from uav_task_alloc.study.instances import Instance
+from uav_task_alloc.study.timed_public import is_toptw, is_vrplib, parse_toptw, parse_vrplib
 
 BEST_KNOWN_FILE = 'best_known.txt'  # lines: name of an instance file, best known value or length
+GOOD_VALUES_FILE = 'good_values.txt'  # lines: name of a TOPTW file, a score for 1, 2 ... vehicles
+TABLES = BEST_KNOWN_FILE, GOOD_VALUES_FILE
+MAX_TOPTW_VEHICLES = 4
 
 
 def read_folder(folder: Path, pattern: str = '*') -> tuple[dict[str, str], dict[str, str]]:
@@ -34,7 +39,7 @@ def read_folder(folder: Path, pattern: str = '*') -> tuple[dict[str, str], dict[
     """
     texts, skipped = {}, {}
     for path in sorted(folder.glob(pattern)):
-        if not path.is_file() or path.name == BEST_KNOWN_FILE:
+        if not path.is_file() or path.name in TABLES or path.suffix == '.sol':
             continue
         try:
             texts[path.name] = path.read_text()
@@ -53,26 +58,68 @@ def best_known(folder: Path) -> dict[str, float]:
     return {row[0]: float(row[1]) for row in rows}
 
 
-def parse_instance(name: str, text: str, known: float = math.nan) -> Instance:
+def instance_sources(folder: Path, texts: Mapping[str, str]) -> dict[str, dict[str, Any]]:
+    """Arguments of `parse_instance` for each instance of a folder.
+
+    Args:
+        folder: holds best known values and solutions, where there are any.
+        texts: of the instances, by file name.
+
+    Returns:
+        By name: that of the file, for TOPTW with the number of vehicles.
+    """
+    known, scores, sources = best_known(folder), _good_values(folder), dict[str, dict[str, Any]]()
+    for name, text in texts.items():
+        source: dict[str, Any] = {'name': name, 'text': text}
+        if parse_instance(name, text).group.startswith('TOPTW'):
+            for vehicles in range(1, MAX_TOPTW_VEHICLES + 1):
+                row = scores.get(name, ())[vehicles - 1:vehicles]
+                sources[f'{name}*{vehicles}'] = source | {'vehicles': vehicles} | (
+                    {'known': row[0]} if row else {})
+            continue
+        solution = (folder / name).with_suffix('.sol')
+        sources[name] = source | ({'known': known[name]} if name in known else {}) | (
+            {'solution': solution.read_text()} if solution.exists() else {})
+    return sources
+
+
+def _good_values(folder: Path) -> dict[str, list[float]]:
+    """Scores by file name, one for each number of vehicles; empty where there is no table."""
+    path = folder / GOOD_VALUES_FILE
+    lines = path.read_text().splitlines() if path.exists() else []
+    rows = [line.split() for line in lines if line.strip() and not line.startswith('#')]
+    return {row[0]: [float(each) for each in row[1:]] for row in rows}
+
+
+def parse_instance(name: str, text: str, known: float = math.nan, solution: str = '',
+                   vehicles: int = MAX_TOPTW_VEHICLES) -> Instance:
     """Parse the text of an instance file.
 
     Args:
         name: of the file.
         text: of the file.
         known: best known value (team orienteering) or length (MDVRP).
+        solution: the best known solution (VRPLIB); '': none.
+        vehicles: of team orienteering with time windows.
 
     Raises:
         InvalidValue: the text is no instance of a supported format.
     """
     lines = [line.split() for line in text.splitlines() if line.strip()]
     try:
+        if is_vrplib(text):
+            return parse_vrplib(name, text, solution)
         if lines and lines[0][0] == 'n':
             return _orienteering(name, lines, known)
-        return _mdvrp(name, [[float(each) for each in line] for line in lines], known)
-    except (ValueError, IndexError) as error:
+        rows = [[float(each) for each in line] for line in lines]
+        if is_toptw(rows):
+            return parse_toptw(name, rows, vehicles, known)
+        return _mdvrp(name, rows, known)
+    except (ValueError, LookupError) as error:
         if isinstance(error, InvalidValue):
             raise
-        raise InvalidValue(name, text[:40], 'an instance of Chao, MSTOP or Cordeau') from None
+        raise InvalidValue(name, text[:40], 'an instance of Chao, MSTOP, Cordeau, VRPLIB or '
+                           'TOPTW') from None
 
 
 def _orienteering(name: str, lines: Sequence[Sequence[str]], known: float) -> Instance:
