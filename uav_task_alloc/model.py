@@ -385,6 +385,17 @@ class Plan:
         """Task ids of each trip, by UAV id."""
         return self.timetable().trips
 
+    def trips_of(self, uav: str) -> tuple[tuple[str, ...], ...]:
+        """Return the trips of one UAV.
+
+        Args:
+            uav: id.
+
+        Returns:
+            Task ids of each; one trip where the plan has no times.
+        """
+        return self.trips.get(uav) or (self.routes.get(uav, ()),)
+
     @property
     def finish(self) -> float:
         """End of the last route [s] from the moment of the plan; 0 without tasks."""

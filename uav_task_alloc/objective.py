@@ -13,6 +13,8 @@ from uav_task_alloc.checks import check_number
 from uav_task_alloc.errors import InvalidValue, UnknownName
 from uav_task_alloc.model import Task, Uav
 
+MAX_TRIPS = 64  # of a UAV
+
 
 @dataclass(frozen=True, slots=True)
 class Weights:

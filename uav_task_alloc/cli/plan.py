@@ -21,9 +21,11 @@ from uav_task_alloc.cli.outputs import (
     naming,
 )
 from uav_task_alloc.cli.plan_json import plan_json
+from uav_task_alloc.cli.plan_times import has_times, times_text
 from uav_task_alloc.cli.progress import SolveProgress, log_line
 from uav_task_alloc.errors import InvalidValue, first_of
 from uav_task_alloc.model import Plan, ThreatZone
+from uav_task_alloc.objective import MAX_TRIPS, OBJECTIVES
 from uav_task_alloc.params import AllocatorParams
 from uav_task_alloc.scenario.values import Scenario
 
@@ -42,20 +44,31 @@ def main(argv: Sequence[str]) -> int:
     args = _make_parser().parsed(argv)
     check_outputs(args)
     loaded = with_options(without_cancelled(scenario.load(args.scenario)), args)
-    from uav_task_alloc.solver.solve import load_kernels  # imports numba
-    load_kernels(args.solver, bool(loaded.zones))
+    _load_kernels(loaded, args.solver)
     for text in start_warnings(loaded):
         log_line(f'Warning: {text}')
     with SolveProgress(args.budget, sys.stderr, time.monotonic) as progress:
         result = solve_scenario(loaded, args, progress)
     try:
         print(plan_text(result), flush=True)
+        if args.times or has_times(loaded):
+            print(times_text([timed.task for timed in loaded.tasks], result), flush=True)
     finally:  # also where nobody reads what is printed
         write_outputs(loaded, result, args)
     if progress.interrupted:
         log_line(f'stopped after {result.solve_time:.1f} s of {args.budget:g} s: '
                  'the best plan so far')
     return INTERRUPTED if progress.interrupted else 0
+
+
+def _load_kernels(loaded: Scenario, solver: str) -> None:
+    """Load what a scenario needs, or compile it. Raises UnknownName."""
+    from uav_task_alloc.solver.solve import load_kernels  # imports numba
+    from uav_task_alloc.solver.timed.solve import SOLVER_NAME, load_timed_kernels
+    if not has_times(loaded):
+        load_kernels(solver, bool(loaded.zones))
+    elif solver == SOLVER_NAME:  # `plan` refuses others
+        load_timed_kernels(bool(loaded.zones))
 
 
 def _make_parser() -> OptionParser:
@@ -77,6 +90,13 @@ def _make_parser() -> OptionParser:
     parser.add_argument('--route-end', type=one_of('hold', 'home'), metavar='{hold,home}',
                         help='what a UAV does after its last task: hold there, or fly home '
                              f'(default: {_ITS_OWN})')
+    parser.add_argument('--objective', type=one_of(*OBJECTIVES),
+                        metavar=f'{{{",".join(OBJECTIVES)}}}',
+                        help=f'what is minimised, docs/times.md (default: {_ITS_OWN})')
+    parser.number('--trips', 1, MAX_TRIPS, 'of each UAV at most; with more than one it may visit '
+                  'its home between tasks', whole=True, default_text=_ITS_OWN)
+    parser.add_argument('--times', action='store_true', help='print when each task is reached; '
+                        'done in any case where times, loads, trips or the objective count')
     for name, meaning in (('clearance', 'kept from zones beyond their margins'),
                           ('altitude_min', 'lowest detour, above the origin'),
                           ('altitude_max', 'highest detour, above the origin')):
@@ -87,6 +107,8 @@ def _make_parser() -> OptionParser:
             ('--json', 'OUT', 'write the plan as JSON, lengths in metres'),
             ('--plot', 'OUT.png', 'draw the plan from above (.png, .pdf, .svg)'),
             ('--plot-3d', 'OUT.png', 'draw the plan in three dimensions (.png, .pdf, .svg)'),
+            ('--plot-times', 'OUT.png', 'draw the plan from above and over time (.png, .pdf, '
+                                        '.svg)'),
             ('--missions', 'DIR', 'write a .plan (QGroundControl) and a .waypoints file (Mission '
                                   'Planner, MAVProxy) for each UAV')):
         parser.add_argument(option, type=Path, metavar=metavar, help=f'{meaning} (default: none)')
@@ -98,7 +120,8 @@ def check_outputs(args: argparse.Namespace) -> None:
     used = [args.scenario]
     for option, path, suffixes in (('--json', args.json, ()),
                                    ('--plot', args.plot, FIGURE_SUFFIXES),
-                                   ('--plot-3d', args.plot_3d, FIGURE_SUFFIXES)):
+                                   ('--plot-3d', args.plot_3d, FIGURE_SUFFIXES),
+                                   ('--plot-times', args.plot_times, FIGURE_SUFFIXES)):
         if path is not None and suffixes:
             check_installed(option, 'matplotlib')
         check_file(option, path, suffixes, used)
@@ -120,7 +143,9 @@ def with_options(loaded: Scenario, args: argparse.Namespace) -> Scenario:
     names = ('clearance', 'altitude_min', 'altitude_max')
     given = {name: getattr(args, name) for name in names if getattr(args, name) is not None}
     changed = replace(loaded, seed=loaded.seed if args.seed is None else args.seed,
-                      route_end=args.route_end or loaded.route_end, **given)
+                      route_end=args.route_end or loaded.route_end,
+                      objective=args.objective or loaded.objective,
+                      trips=loaded.trips if args.trips is None else args.trips, **given)
     low, high = changed.altitude_min, changed.altitude_max
     if low >= high and args.altitude_min is not None:
         raise InvalidValue('--altitude-min', low, f'less than the highest detour, {high:g} m')
@@ -134,22 +159,31 @@ def solve_scenario(loaded: Scenario, args: argparse.Namespace, progress: SolvePr
     from uav_task_alloc.solver.solve import plan  # imports numba
     return plan([uav.uav for uav in loaded.uavs], [timed.task for timed in loaded.tasks],
                 [timed.zone for timed in loaded.zones], budget=args.budget, solver=args.solver,
-                seed=loaded.seed, route_end=loaded.route_end, clearance=loaded.clearance,
+                seed=loaded.seed, route_end=loaded.route_end, objective=loaded.objective,
+                trips=loaded.trips, clearance=loaded.clearance,
                 altitude_min=loaded.altitude_min, altitude_max=loaded.altitude_max,
                 stop=progress.stop, on_iteration=progress.on_iteration)
 
 
 def plan_text(result: Plan) -> str:
     """A plan as lines of text: a route for each UAV, unassigned tasks, totals."""
-    lines = [f'{uav}: {result.route(uav).distance:.0f} m  {" -> ".join(tasks) or "(no tasks)"}'
-             for uav, tasks in result.routes.items()]
+    lines = [f'{uav}: {result.route(uav).distance:.0f} m  {stops_text(result, uav)}'
+             for uav in result.routes]
     lines += [f'unassigned {name}: {reason}' for name, reason in result.unassigned.items()]
     planned = sum(len(tasks) for tasks in result.routes.values())
     lines.append(f'{planned} tasks planned, {len(result.unassigned)} unassigned; '
-                 f'{result.distance:.0f} m, value {result.value:g}, '
+                 f'{result.distance:.0f} m, finish {result.finish:.0f} s, '
+                 f'response {result.response:.0f} s, value {result.value:g}, '
                  f'penalty {result.penalty:.0f} m, fit {result.fit:.4g}; '
                  f'{result.solver}, {result.solve_time:.3f} s')
     return '\n'.join(lines)
+
+
+def stops_text(result: Plan, uav: str) -> str:
+    """The tasks of a UAV in order, with the visits of its home between its trips."""
+    rows = result.trips_of(uav)
+    stops = [name for row in rows for name in (*row, '(home)')][:-1]
+    return ' -> '.join(stops) or '(no tasks)'
 
 
 def start_warnings(loaded: Scenario) -> list[str]:
@@ -186,13 +220,15 @@ def write_outputs(loaded: Scenario, result: Plan, args: argparse.Namespace) -> N
         with naming('--json', args.json):
             args.json.write_text(
                 json.dumps(plan_json(loaded, result), indent=2, allow_nan=False) + '\n')
-    for option, path in (('--plot', args.plot), ('--plot-3d', args.plot_3d)):
+    for option, path, name in (('--plot', args.plot, 'draw_plan'),
+                               ('--plot-3d', args.plot_3d, 'draw_plan_3d'),
+                               ('--plot-times', args.plot_times, 'draw_plan_times')):
         if path:
             from uav_task_alloc import plots  # imports matplotlib
-            draw = plots.draw_plan_3d if option == '--plot-3d' else plots.draw_plan
             with naming(option, path):
-                draw([uav.uav for uav in loaded.uavs], [timed.task for timed in loaded.tasks],
-                     [timed.zone for timed in loaded.zones], result, path)
+                getattr(plots, name)(
+                    [uav.uav for uav in loaded.uavs], [timed.task for timed in loaded.tasks],
+                    [timed.zone for timed in loaded.zones], result, path)
     if args.missions:
         with naming('--missions', args.missions):
             print(missions_text(loaded, result, args.missions))
@@ -202,8 +238,13 @@ def missions_text(loaded: Scenario, result: Plan, folder: Path) -> str:
     """Write the mission files of a plan; returns a line for each UAV.
 
     Raises:
+        InvalidValue: a UAV makes more than one trip.
         OSError: a file cannot be written.
     """
+    for uav in result.routes:
+        if len(result.trips_of(uav)) > 1:
+            raise InvalidValue(f'--missions: trips of {uav}', len(result.trips_of(uav)),
+                               '1: a mission file holds one flight')
     from uav_task_alloc.mavlink.mission.files import file_name, write_missions  # pymavlink
     lines = []
     for mission in write_missions(loaded, result, folder):

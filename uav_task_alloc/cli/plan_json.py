@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any
 
+from uav_task_alloc.cli.plan_times import times_json
 from uav_task_alloc.geometry.frames import Origin, to_geodetic_batch
 from uav_task_alloc.model import Plan, Point
 from uav_task_alloc.scenario.values import Scenario
@@ -32,7 +33,7 @@ def plan_json(loaded: Scenario, result: Plan) -> dict[str, Any]:
         'unassigned': result.unassigned,
         'legs': {uav: [asdict(leg) for leg in legs] for uav, legs in result.legs.items()},
         'distance': result.distance, 'value': result.value, 'penalty': result.penalty,
-        'fit': json_number(result.fit),
+        'fit': json_number(result.fit), 'cost': json_number(result.cost), **times_json(result),
         'history': [[seconds, json_number(fit)] for seconds, fit in result.history],
         'solver': result.solver, 'solve_time': result.solve_time, 'iterations': result.iterations,
         'origin': asdict(loaded.origin),
@@ -61,8 +62,9 @@ def _waypoints(loaded: Scenario, result: Plan, k: int) -> list[dict[str, Any]]:
     """The points of the k-th UAV's route, its start and home included."""
     uav, positions = loaded.uavs[k], {timed.task.id: timed.task.position for timed in loaded.tasks}
     route = result.route(uav.id)
-    stops: list[tuple[str | None, Point]] = [(name, positions[name]) for name in route.tasks]
-    stops += [(None, uav.home)] * route.returns
+    stops: list[tuple[str | None, Point]] = []
+    for row in result.trips_of(uav.id):  # at home after each trip, the last where it returns
+        stops += [*((name, positions[name]) for name in row), (None, uav.home)]
     names, points = list[str | None]([None]), [uav.position]
     for leg, (name, position) in zip(route.legs, stops, strict=False):
         names += [None] * len(leg.via) + [name]

@@ -63,8 +63,7 @@ def route_points(uav: Uav, plan: Plan, positions: Mapping[str, Point]) -> list[P
     Returns:
         [m] ENU; ends at home where the plan returns.
     """
-    trips = plan.trips.get(uav.id) or (plan.routes.get(uav.id, ()),)
-    stops = [stop for trip in trips for stop in (*(positions[name] for name in trip), uav.base)]
+    stops = [stop for trip in plan.trips_of(uav.id) for stop in (*(positions[name] for name in trip), uav.base)]
     points = [uav.position]
     # a leg home after the last trip only where the plan returns
     for leg, stop in zip(plan.legs.get(uav.id, ()), stops, strict=False):

@@ -9,7 +9,7 @@ from dataclasses import replace
 import yaml
 
 from uav_task_alloc.checks import is_ros_name
-from uav_task_alloc.objective import OBJECTIVES, Objective
+from uav_task_alloc.objective import MAX_TRIPS, OBJECTIVES, Objective
 from uav_task_alloc.params import AllocatorParams
 from uav_task_alloc.scenario.checked_yaml import (
     REQUIRED,
@@ -163,7 +163,7 @@ SCENARIO: KeyTable = {
     'objective': Key(or_mapping(choice(*OBJECTIVES), OBJECTIVE, f'one of {", ".join(OBJECTIVES)}, '
                                 'or a mapping of prices', yaml.ScalarNode),
                      'what is minimised: a name, or prices; see objective', 'distance'),
-    'trips': Key(whole_number(1, 64), 'of each UAV at most; more than one: it may visit its home '
+    'trips': Key(whole_number(1, MAX_TRIPS), 'of each UAV at most; more than one: it may visit its home '
                  'for a battery and loads', 1),
     'clearance': Key(number_value(0.0, 10000.0),
                      '[m] kept from zones in addition to their margins',

@@ -9,11 +9,11 @@ from typing import TypeVar
 from uav_task_alloc.checks import check_number
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.model import Task, ThreatZone, Uav
+from uav_task_alloc.objective import MAX_TRIPS
 
 _Named = TypeVar('_Named', Task, Uav, ThreatZone)
 ROUTE_ENDS = ('hold', 'home')
 MAX_BUDGET = 86_400.0  # [s]
-MAX_TRIPS = 64
 
 
 def check_unique(kind: str, values: Iterable[_Named],
