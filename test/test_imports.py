@@ -27,6 +27,7 @@ ROS = {'rclpy', 'rcl_interfaces', 'builtin_interfaces', 'geometry_msgs', 'std_ms
 LEVELS = {
     'errors': 0,
     'checks': 0,
+    'timetable': 0,
     'atomic_files': 0,
     'model': 1,
     'palette': 0,

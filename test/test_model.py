@@ -5,7 +5,8 @@ import math
 import pytest
 
 from uav_task_alloc.errors import InvalidValue
-from uav_task_alloc.model import Leg, Plan, Shape, Task, ThreatZone, Timetable, Uav
+from uav_task_alloc.model import Leg, Plan, Shape, Task, ThreatZone, Uav
+from uav_task_alloc.timetable import Timetable
 
 NAN = math.nan
 SQUARE = [(0, 0), (10, 0), (10, 10), (0, 10)]

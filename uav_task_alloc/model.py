@@ -10,6 +10,7 @@ from typing import Any
 
 from uav_task_alloc.checks import check_id, check_names, check_number, check_point, check_polygon
 from uav_task_alloc.errors import InvalidValue
+from uav_task_alloc.timetable import Timetable
 
 Point = tuple[float, float, float]  # [m] ENU
 LONG = 1e9  # [s] bound of all finite times
@@ -300,32 +301,6 @@ class Route:
     def distance(self) -> float:
         """Length of all legs [m]."""
         return math.fsum(leg.length for leg in self.legs)
-
-
-@dataclass(frozen=True, slots=True)
-class Timetable:
-    """When each UAV takes off, each task is reached and served, and each route ends.
-
-    All times in [s] from the moment of the plan.
-
-    Attributes:
-        arrivals: at each task served, by task id.
-        starts: of the services, by task id: after `arrivals` where the UAV waits there.
-        trips: task ids of each trip, by UAV id; at the end of each but the last the UAV visits
-            its base.
-        departures: of each trip, by UAV id.
-        ends: of each route with tasks, by UAV id: the end of the last service, or at home.
-        response: [s] value-weighted mean time from the announcement to the start of the service.
-        late: [s] by which services start after `latest`, by task id, where any do.
-    """
-
-    arrivals: Mapping[str, float] = field(default_factory=dict)
-    starts: Mapping[str, float] = field(default_factory=dict)
-    trips: Mapping[str, tuple[tuple[str, ...], ...]] = field(default_factory=dict)
-    departures: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
-    ends: Mapping[str, float] = field(default_factory=dict)
-    response: float = 0.0
-    late: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)

@@ -137,7 +137,13 @@ OBJECTIVES: Mapping[str, Objective] = {  # the small distances decide between eq
 
 
 def check_objective(objective: Objective | str) -> Objective:
-    """The objective, by name or as it is.
+    """Return the objective, by name or as it is.
+
+    Args:
+        objective: an Objective, or a name of OBJECTIVES.
+
+    Returns:
+        The Objective.
 
     Raises:
         UnknownName: OBJECTIVES has no such name.
@@ -172,10 +178,19 @@ def response_time(tasks: Iterable[Task], starts: Mapping[str, float]) -> float:
 
 def needs_time(uavs: Iterable[Uav], tasks: Iterable[Task], objective: Objective,
                trips: int) -> bool:
-    """Whether times, loads or trips can change which plan is best.
+    """Return whether times, loads or trips can change which plan is best.
 
     Where nothing has a latest time, `earliest`, `release` and speeds change the times of a plan,
     but not its distance.
+
+    Args:
+        uavs: the fleet.
+        tasks: all tasks.
+        objective: what is minimised.
+        trips: of a UAV at most.
+
+    Returns:
+        False where the shortest routes that serve all tasks are best whatever the times.
     """
     fleet = list(uavs)
     return (not objective.is_shortest

@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 
 from uav_task_alloc import palette, plots
-from uav_task_alloc.model import Leg, Plan, Task, ThreatZone, Timetable, Uav
+from uav_task_alloc.model import Leg, Plan, Task, ThreatZone, Uav
 from uav_task_alloc.plots import labels, plan as plan_map, space, style, times
 from uav_task_alloc.plots.flat import MapFigure
 from uav_task_alloc.record.ground_truth import TRUTH_FILE
 from uav_task_alloc.record.run_state import RECORD_FILE
+from uav_task_alloc.timetable import Timetable
 from uav_task_alloc.zone_codec import JSON_ZONE, encode_zone
 
 ZONES = [ThreatZone.hemisphere('dome', (100.0, 100.0, 0.0), 30.0, margin=5.0),

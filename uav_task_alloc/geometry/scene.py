@@ -236,5 +236,12 @@ def join_address(zones: bool) -> int:
 
 
 def time_address(zones: bool) -> int:
-    """Address of `_time`; 0 without zones."""
+    """Return the address of the function that times paths, for kernels.
+
+    Args:
+        zones: whether there are any.
+
+    Returns:
+        0 without zones: legs are straight.
+    """
     return int(_compiled(_time).address) if zones else 0

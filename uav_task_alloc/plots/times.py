@@ -11,10 +11,11 @@ from matplotlib.axes import Axes
 from matplotlib.patches import Patch
 
 import uav_task_alloc.plots.style as style
-from uav_task_alloc.model import Plan, Task, ThreatZone, Timetable, Uav
+from uav_task_alloc.model import Plan, Task, ThreatZone, Uav
 from uav_task_alloc.palette import RED, uav_colour
 from uav_task_alloc.plots.flat import MapFigure
 from uav_task_alloc.plots.plan import add_plan, legend_handles, plan_title
+from uav_task_alloc.timetable import Timetable
 
 MAX_TASK_ROWS = 45  # more tasks: a row for each UAV
 _WINDOW, _FLIGHT, _WAIT = '#d9d9d9', '#9a9a9a', '///'

@@ -10,13 +10,14 @@ from itertools import chain, pairwise
 import numpy as np
 
 from uav_task_alloc.geometry.distances import Distances
-from uav_task_alloc.model import Leg, Plan, Timetable
+from uav_task_alloc.model import Leg, Plan
 from uav_task_alloc.objective import excess, fit
 from uav_task_alloc.solver.problem import Problem, excess_cost
 from uav_task_alloc.solver.reasons import reasons
 from uav_task_alloc.solver.recorder import Recorder
 from uav_task_alloc.solver.routes import Routes
 from uav_task_alloc.solver.timed.evaluator import evaluate_legs
+from uav_task_alloc.timetable import Timetable
 
 _RANGE_TOLERANCE = 1e-6  # [m] smaller excess over a range is rounding
 _STRAIGHT_RATIO = 1.0 + 1e-12  # a leg up to so much longer than the distance is straight
@@ -123,7 +124,15 @@ def _legs(problem: Problem, places: list[int], straight: list[float]) -> tuple[L
 
 
 def leg_between(distances: Distances, i: int, j: int) -> Leg:
-    """The leg from i to j; without detour points where it is straight."""
+    """Return the leg from i to j.
+
+    Args:
+        distances: the points and the paths between them.
+        i, j: indices of points.
+
+    Returns:
+        Without detour points where it is straight; of infinite length where there is none.
+    """
     metres = math.dist(distances.points[i], distances.points[j])
     if distances.length(i, j) <= metres * _STRAIGHT_RATIO:
         return Leg((), metres)

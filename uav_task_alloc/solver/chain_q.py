@@ -52,7 +52,12 @@ class Flies(Protocol):
 
 
 def run_colonies(colonies: Sequence[Flies], recorder: Any) -> None:
-    """Run each colony on a thread, the first on this one, until the recorder ends the solve."""
+    """Run each colony on a thread, the first on this one, until the recorder ends the solve.
+
+    Args:
+        colonies: at least one.
+        recorder: says when the solve is over.
+    """
     others = [threading.Thread(target=_run_colony, args=(each, recorder), daemon=True)
               for each in colonies[1:]]
     for thread in others:

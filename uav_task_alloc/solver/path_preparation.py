@@ -52,6 +52,11 @@ class PathPreparation:
 
         The search for legs that are flown ignores `stop`: without them tasks of the earlier plan
         would be dropped.
+
+        Args:
+            share: of the budget, in [0, 1].
+            most: units of work; 0: no limit.
+            heeds_stop: whether `stop` ends the searches.
         """
         self._share, self._heeds_stop = share, heeds_stop
         self.path_budget.start_stage(most)

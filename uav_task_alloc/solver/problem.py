@@ -45,7 +45,7 @@ class Rules:
     returns: bool = False  # routes end at home
     hard: bool = True  # ranges are hard constraints
     weights: Weights = field(default_factory=Weights)  # of eq 2.12
-    objective: Objective = field(default_factory=Objective)
+    objective: Objective = field(default_factory=Objective)  # what is minimised
     trips: int = 1  # of a UAV in all; 1: no visit of its base
     grain: float = 0.0  # [1/m] lengths are cut to multiples of 1 / grain, for public instances
 
@@ -70,7 +70,14 @@ class Problem:
     index: Mapping[str, int]  # task id -> index in tasks
 
     def locked_places(self, u: int) -> list[int]:
-        """Indices of UAV u's start and its locked tasks in `distances`."""
+        """Return where UAV u's start and its locked tasks are.
+
+        Args:
+            u: index of the UAV.
+
+        Returns:
+            Indices in `distances`.
+        """
         if not self.locked:
             return [u]
         place = 2 * len(self.uavs) + len(self.tasks)
@@ -196,7 +203,14 @@ def _empty_arrays(uavs: Sequence[Uav], tasks: Sequence[Task], rules: Rules,
 
 
 def excess_cost(weights: Weights) -> float:
-    """Weight of a metre beyond range over that of a metre of distance (eq 2.12), at most 1e6."""
+    """Return the price of a metre beyond range.
+
+    Args:
+        weights: of eq 2.12.
+
+    Returns:
+        Over that of a metre of distance; at most 1e6.
+    """
     limit = 1e6
     return min(weights.penalty / weights.distance, limit) if weights.distance > 0.0 else limit
 

@@ -56,7 +56,15 @@ def _reason(problem: Problem, i: int, short: Floats) -> str:
 
 
 def lasting_reason(problem: Problem, i: int) -> str:
-    """Why no plan could serve the i-th task: a zone, what it requires; else empty."""
+    """Return why no plan could serve a task: a zone, what it requires.
+
+    Args:
+        problem: what was solved.
+        i: index of the task.
+
+    Returns:
+        Empty where there is no such reason.
+    """
     if not problem.uavs:
         return 'there are no UAVs'
     around = problem.distances.zones_around(problem.arrays.uavs + i)
@@ -68,7 +76,15 @@ def lasting_reason(problem: Problem, i: int) -> str:
 
 
 def way_reason(problem: Problem, i: int) -> str:
-    """The reason of the i-th task where no UAV has a safe way to it, or back; else empty."""
+    """Return the reason of a task to which, or home from which, there is no safe path.
+
+    Args:
+        problem: what was solved.
+        i: index of the task.
+
+    Returns:
+        Empty where there is one.
+    """
     able = np.flatnonzero(problem.arrays.compatible[:, i])
     if not problem.distances.zones or any(
             _need(problem, int(u), problem.arrays.uavs + i) < math.inf for u in able):

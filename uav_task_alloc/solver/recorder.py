@@ -22,7 +22,11 @@ from uav_task_alloc.solver.routes import (
 
 @dataclass(slots=True)
 class Progress:
-    """How much of its budget a solve has used, and how the cost of its best plan fell."""
+    """How much of its budget a solve has used, and how the cost of its best plan fell.
+
+    Arguments of methods:
+        iterations: of the solver, since the last call.
+    """
 
     clock: Callable[[], float]  # [s]
     began: float  # [s] on that clock
@@ -35,7 +39,7 @@ class Progress:
     iterations: int = 0  # of all threads
     # (seconds since `began`, fit) of each best
     history: list[tuple[float, float]] = field(default_factory=list)
-    lock: threading.Lock = field(default_factory=threading.Lock)
+    lock: threading.Lock = field(default_factory=threading.Lock)  # of all that threads share
 
     def elapsed(self) -> float:
         """Seconds since the solve began."""
@@ -64,11 +68,15 @@ class Progress:
 
 @dataclass(slots=True, kw_only=True)
 class Recorder(Progress):
-    """Receives the routes that solvers find; thread-safe."""
+    """Receives the routes that solvers find; thread-safe.
 
-    problem: Problem
+    Arguments of methods:
+        routes: of a solver; are copied.
+    """
+
+    problem: Problem  # that is solved
     locked_sums: tuple[float, float] = (0.0, 0.0)  # length [m] and value of the locked tasks
-    best: Routes = field(init=False)
+    best: Routes = field(init=False)  # routes; once one was offered
 
     def __post_init__(self) -> None:
         self.best = empty_routes(self.problem.arrays)

@@ -42,5 +42,13 @@ def uniform(state: RngState) -> float:
 
 @inline_kernel
 def below(state: RngState, n: int) -> int:
-    """An integer in 0..n-1, uniformly distributed. O(1)."""
+    """Return a uniformly distributed integer. O(1)
+
+    Args:
+        state: of the generator, is advanced.
+        n: number of values, at least 1.
+
+    Returns:
+        In 0..n-1.
+    """
     return int(uniform(state) * n)

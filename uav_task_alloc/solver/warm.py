@@ -37,14 +37,28 @@ class WarmState:
 
     @classmethod
     def of(cls, warm: Plan | WarmState | None) -> WarmState:
-        """The state of a plan, with its routes and legs; an empty state for None."""
+        """Return the state of a plan, with its routes and legs.
+
+        Args:
+            warm: a plan or its state; None: there is none.
+
+        Returns:
+            An empty state for None.
+        """
         if not isinstance(warm, Plan):
             return warm or cls()
         state = warm.state if isinstance(warm.state, WarmState) else cls()
         return replace(state, routes=warm.routes, legs=warm.legs)
 
     def trips_of(self, uav: str) -> tuple[tuple[str, ...], ...]:
-        """Task ids of each trip of a UAV: a single one where trips are not known."""
+        """Return the trips of a UAV.
+
+        Args:
+            uav: its id.
+
+        Returns:
+            Task ids of each trip; a single trip where they are not known.
+        """
         row, trips = self.routes.get(uav, ()), self.trips.get(uav, ())
         same = tuple(name for trip in trips for name in trip) == tuple(row)
         return trips if trips and same else (tuple(row),)

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 from uav_task_alloc.model import Task, Uav
 from uav_task_alloc.solver.problem import Rules
-from uav_task_alloc.solver.timed.evaluator import Evaluation, Held, LegOf, evaluate
+from uav_task_alloc.solver.timed.evaluator import Held, LegOf, TimedEvaluation, evaluate
 
 Rows = tuple[tuple[str, ...], ...]  # task ids of each trip
 
@@ -48,7 +48,7 @@ def exact_plan(uavs: Sequence[Uav], tasks: Sequence[Task], rules: Rules,
     held = held or Held()
     shares: _Shares = {frozenset(): [_Share(0.0, 0.0, ())]}
     for uav in uavs:
-        shares = _joined(shares, _shares_of(uav, tasks, rules, leg, held))
+        shares = _joined(shares, _shares_of(uav, uavs, tasks, rules, leg, held))
     values = {task.id: task.value for task in tasks}
     total, prices = math.fsum(values.values()), rules.objective
     best: ExactPlan | None = None
@@ -89,10 +89,11 @@ def _keep(shares: _Shares, served: frozenset[str], new: _Share) -> None:
         ways.append(new)
 
 
-def _shares_of(uav: Uav, tasks: Sequence[Task], rules: Rules, leg: LegOf | None,
-               held: Held) -> _Shares:
+def _shares_of(uav: Uav, uavs: Sequence[Uav], tasks: Sequence[Task], rules: Rules,
+               leg: LegOf | None, held: Held) -> _Shares:
     """All that one UAV can serve, and nothing."""
-    taken = {name for other, row in held.locked.items() if other != uav.id for name in row}
+    taken = {task.id for task in tasks for other in uavs if other is not uav and (
+        held.has_locked(other, task) or held.has_aboard(other, task))}
     own = Held({uav.id: held.locked.get(uav.id, ())}, held.aboard)
     total = math.fsum(task.value for task in tasks)
     shares: _Shares = {} if own.locked[uav.id] else {frozenset(): [_Share(0.0, 0.0, ())]}
@@ -104,7 +105,7 @@ def _shares_of(uav: Uav, tasks: Sequence[Task], rules: Rules, leg: LegOf | None,
 
 
 def _valid_rows(uav: Uav, tasks: Sequence[Task], taken: Container[str], rules: Rules,
-                leg: LegOf | None, held: Held) -> Iterator[tuple[Rows, Evaluation]]:
+                leg: LegOf | None, held: Held) -> Iterator[tuple[Rows, TimedEvaluation]]:
     """All valid routes of a UAV that serve something, but no task that is `taken`."""
     most = rules.trips if uav.turnaround < math.inf else 1
     names = [task.id for task in tasks if task.id not in taken]

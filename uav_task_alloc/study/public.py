@@ -23,7 +23,7 @@ from uav_task_alloc.study.timed_public import is_toptw, is_vrplib, parse_toptw, 
 
 BEST_KNOWN_FILE = 'best_known.txt'  # lines: name of an instance file, best known value or length
 GOOD_VALUES_FILE = 'good_values.txt'  # lines: name of a TOPTW file, a score for 1, 2 ... vehicles
-TABLES = BEST_KNOWN_FILE, GOOD_VALUES_FILE
+TABLE_FILES = BEST_KNOWN_FILE, GOOD_VALUES_FILE
 MAX_TOPTW_VEHICLES = 4
 
 
@@ -39,7 +39,7 @@ def read_folder(folder: Path, pattern: str = '*') -> tuple[dict[str, str], dict[
     """
     texts, skipped = {}, {}
     for path in sorted(folder.glob(pattern)):
-        if not path.is_file() or path.name in TABLES or path.suffix == '.sol':
+        if not path.is_file() or path.name in TABLE_FILES or path.suffix == '.sol':
             continue
         try:
             texts[path.name] = path.read_text()

@@ -22,7 +22,7 @@ from uav_task_alloc.objective import Objective
 from uav_task_alloc.solver.timed.evaluator import evaluate
 from uav_task_alloc.study.instances import Instance
 
-MAX_TRIPS = 32  # of a vehicle that may reload
+RELOADING_TRIPS = 32  # of a vehicle that may reload
 _SCORE = Objective(distance=1e-4, unserved=1.0)  # routes are shorter than 1e4 in all
 _SECTION = '_SECTION'
 Row = Sequence[float]
@@ -150,7 +150,7 @@ def _one_depot(data: _Vrplib) -> Instance:
         turnaround=0.0 if reloads else math.inf) for i in range(int(data.number('VEHICLES'))))
     prize = Objective(unserved=1.0) if 'PRIZE' in data.sections else 'distance'
     return Instance(data.name, uavs, _tasks(data, 1), (), 'home', objective=prize,
-                    trips=MAX_TRIPS if reloads else 1, grain=10.0)
+                    trips=RELOADING_TRIPS if reloads else 1, grain=10.0)
 
 
 def _depots(data: _Vrplib) -> Instance:

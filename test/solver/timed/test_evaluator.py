@@ -151,6 +151,16 @@ def test_a_uav_in_the_air_serves_only_the_payloads_that_it_has_on_board():
                held=Held(aboard={'u': frozenset('ab')})).violations == ()
 
 
+def test_nobody_else_serves_a_payload_that_is_on_board():
+    tasks = [at('a', 100.0, payload=2.0), at('b', 200.0)]
+    flying = replace(IN_AIR, aboard=frozenset('ab'), turnaround=5.0, payload_capacity=2.0)
+    other = replace(UAV, id='v', payload_capacity=2.0)
+    found = evaluate([flying, other], tasks, HOLD, {'v': [['a', 'b']]})
+    assert found.violations == ('v, trip 1 serves a, whose payload is on board of u',)
+    found = evaluate([flying, other], tasks, SWAPS, {'u': [['b'], ['a']]})
+    assert found.violations == ('u, trip 2 serves a, whose payload is on board of u',)
+
+
 def test_a_second_trip_has_the_full_battery():
     tasks = [at('a', 100.0), at('b', 400.0)]
     uav = replace(UAV, range=250.0, endurance=25.0, full_range=800.0, full_endurance=80.0,

@@ -9,7 +9,7 @@ from itertools import chain, pairwise
 from uav_task_alloc.model import Leg, Plan, Task
 from uav_task_alloc.objective import fit
 from uav_task_alloc.solver.answer import leg_between
-from uav_task_alloc.solver.timed.evaluator import Evaluation, Held, evaluate, evaluate_legs
+from uav_task_alloc.solver.timed.evaluator import Held, TimedEvaluation, evaluate, evaluate_legs
 from uav_task_alloc.solver.timed.problem import TimedProblem
 from uav_task_alloc.solver.timed.reasons import timed_reasons
 from uav_task_alloc.solver.timed.recorder import TimedRecorder
@@ -70,7 +70,7 @@ def _ids(problem: TimedProblem, u: int, trips: TripNodes) -> tuple[tuple[str, ..
 
 
 def evaluate_trips(problem: TimedProblem, trips: Mapping[str, Sequence[Sequence[str]]],
-                   legs: Mapping[str, Sequence[Leg]]) -> Evaluation:
+                   legs: Mapping[str, Sequence[Leg]]) -> TimedEvaluation:
     """Evaluate trips by UAV id, along their legs."""
     base = problem.base
     tasks: list[Task] = [*chain.from_iterable(base.locked.values()), *base.tasks]

@@ -19,9 +19,10 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from uav_task_alloc.geometry.flight_time import flight_time
-from uav_task_alloc.model import Leg, Point, Task, Timetable, Uav
+from uav_task_alloc.model import Leg, Point, Task, Uav
 from uav_task_alloc.objective import response_time
 from uav_task_alloc.solver.problem import Rules, excess_cost
+from uav_task_alloc.timetable import Timetable
 
 _TOLERANCE = 1e-6  # [s], [m] or [kg] that are rounding
 Trips = Sequence[Sequence[str]]  # task ids of each trip
@@ -41,15 +42,15 @@ class Held:
 
     def has_aboard(self, uav: Uav, task: Task) -> bool:
         """Whether a UAV in the air has the payload of the task on board."""
-        return not uav.at_base and (self.has_locked(uav, task)
-                                    or task.id in self.aboard.get(uav.id, uav.aboard or ()))
+        return not uav.at_base and task.payload > 0.0 and (
+            self.has_locked(uav, task) or task.id in self.aboard.get(uav.id, uav.aboard or ()))
 
 
 @dataclass(frozen=True, slots=True)
-class Evaluation:
+class TimedEvaluation:
     """A plan with its times, its cost and what it violates."""
 
-    timetable: Timetable
+    timetable: Timetable  # of the best departures
     cost: float  # of the objective, with the price of `penalty`
     distance: float  # [m]
     value: float  # of the tasks served
@@ -118,7 +119,7 @@ def straight_legs(rules: Rules) -> LegOf:
 
 def evaluate(uavs: Sequence[Uav], tasks: Sequence[Task], rules: Rules,
              routes: Mapping[str, Trips], leg: LegOf | None = None,
-             held: Held | None = None) -> Evaluation:
+             held: Held | None = None) -> TimedEvaluation:
     """Evaluate routes with the best departures.
 
     Args:
@@ -142,6 +143,7 @@ def evaluate(uavs: Sequence[Uav], tasks: Sequence[Task], rules: Rules,
         rules, leg, held)]
     for trip in trips:
         violations += _trip_violations(trip, rules, held)
+        violations += _foreign_loads(trip, uavs, held)
     for uav in uavs:
         violations += _route_violations(uav, [t for t in trips if t.uav is uav], rules, held)
     return _evaluation(tasks, rules, trips, violations)
@@ -258,6 +260,15 @@ def _load_violations(trip: _Trip, place: str, held: Held) -> Iterator[str]:
             yield f'{trip.uav.id} is in the air without the payload of {task.id}'
 
 
+def _foreign_loads(trip: _Trip, uavs: Sequence[Uav], held: Held) -> Iterator[str]:
+    """Tasks whose payload is on board of another UAV, or was when this one left its base."""
+    for task in (stop.task for stop in trip.stops if stop.task.payload > 0.0):
+        for uav in uavs:
+            if held.has_aboard(uav, task) and (uav is not trip.uav or trip.number > 0):
+                yield (f'{trip.uav.id}, trip {trip.number + 1} serves {task.id}, whose payload is '
+                       f'on board of {uav.id}')
+
+
 def _route_violations(uav: Uav, trips: Sequence[_Trip], rules: Rules,
                       held: Held) -> Iterator[str]:
     """What the route of a UAV violates: number of trips, availability, locked tasks."""
@@ -274,7 +285,7 @@ def _route_violations(uav: Uav, trips: Sequence[_Trip], rules: Rules,
 
 
 def _evaluation(tasks: Sequence[Task], rules: Rules, trips: Sequence[_Trip],
-                violations: Sequence[str]) -> Evaluation:
+                violations: Sequence[str]) -> TimedEvaluation:
     """Times and cost of trips that are scheduled."""
     arrivals, starts, late = dict[str, float](), dict[str, float](), dict[str, float]()
     rows, departures = dict[str, tuple[tuple[str, ...], ...]](), dict[str, tuple[float, ...]]()
@@ -298,7 +309,7 @@ def _evaluation(tasks: Sequence[Task], rules: Rules, trips: Sequence[_Trip],
         distance, finish, timetable.response, lateness,
         math.fsum(task.value for task in tasks if task.id not in starts))
     cost += excess_cost(rules.weights) * rules.objective.distance * penalty
-    return Evaluation(timetable, cost, distance,
+    return TimedEvaluation(timetable, cost, distance,
                       math.fsum(task.value for task in tasks if task.id in starts), penalty,
                       finish, lateness, tuple(violations))
 
@@ -313,12 +324,15 @@ def _excess(trip: _Trip) -> float:
 
 def evaluate_legs(uavs: Sequence[Uav], tasks: Sequence[Task], rules: Rules,
                   routes: Mapping[str, Trips], legs: Mapping[str, Sequence[Leg]],
-                  held: Held | None = None) -> Evaluation:
-    """Evaluate routes along their legs, as `evaluate`.
+                  held: Held | None = None) -> TimedEvaluation:
+    """Evaluate routes along their legs.
 
     Args:
         uavs, tasks, rules, routes, held: as for `evaluate`.
         legs: by UAV id; one to each task and to each base at the end of a trip.
+
+    Returns:
+        As `evaluate`.
     """
     places, ways = {task.id: task.position for task in tasks}, {}
     for uav in uavs:
