@@ -39,11 +39,14 @@ _Shares = dict[frozenset[str], list[_Share]]  # by ids of the tasks served
 
 
 def exact_plan(uavs: Sequence[Uav], tasks: Sequence[Task], rules: Rules,
-               leg: LegOf | None = None, held: Held | None = None) -> ExactPlan:
-    """The best plan of all.
+               leg: LegOf | None = None, held: Held | None = None) -> ExactPlan | None:
+    """Find the best plan of all.
 
     Args:
         uavs, tasks, rules, leg, held: as for `evaluate`.
+
+    Returns:
+        None where no plan is valid: a locked task cannot be served.
     """
     held = held or Held()
     shares: _Shares = {frozenset(): [_Share(0.0, 0.0, ())]}
@@ -56,14 +59,22 @@ def exact_plan(uavs: Sequence[Uav], tasks: Sequence[Task], rules: Rules,
         value = math.fsum(values[name] for name in served)
         for way in ways:
             cost = way.cost + prices.cost(0.0, way.finish, unserved=total - value)
-            if best is None or _rank(value, cost, rules) < _rank(best.value, best.cost, rules):
+            if best is None or rank(value, cost, rules) < rank(best.value, best.cost, rules):
                 best = ExactPlan(cost, value, dict(way.routes))
-    assert best is not None  # that serves nothing
     return best
 
 
-def _rank(value: float, cost: float, rules: Rules) -> tuple[float, float]:
-    """Smaller is better."""
+def rank(value: float, cost: float, rules: Rules) -> tuple[float, float]:
+    """Return what plans are compared by.
+
+    Args:
+        value: of the tasks served.
+        cost: of the objective.
+        rules: whether every task that can be served is.
+
+    Returns:
+        Smaller is better.
+    """
     return (-round(value, 9) if math.isinf(rules.objective.unserved) else 0.0), cost
 
 
