@@ -25,7 +25,7 @@ LINK: Any = np.uint32
 TOLERANCE = 1e-7  # [s], [m] or [kg] of rounding
 
 # columns of TimedArrays.fixed, by node
-X, Y, Z, SERVICE, OPEN, CLOSE, RELEASE, LOAD = range(8)  # RELEASE: no earlier leg to it
+X, Y, Z, SERVICE, OPENS, CLOSES, RELEASE, LOAD = range(8)  # RELEASE: no earlier leg to it
 TRIP_RELEASE, DUE, WEIGHT, WORTH, WIDTH, REMOTE = range(8, 14)
 FIXED = 16
 # columns of TimedArrays.begin, by UAV: ready for its first leg, time in the air by then, latest

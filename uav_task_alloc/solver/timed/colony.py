@@ -25,6 +25,7 @@ class TimedParams:
     start_temperature: float = 10.0
     end_temperature: float = 0.1
     ruin: float = 10.0  # tasks that a round removes
+    absent: int = 10  # absent tasks that a round tries to insert, besides those it removes
     unserved_growth: float = 1.3  # factor by which the price of few absent tasks rises
 
 
@@ -53,7 +54,7 @@ class TimedColony:
         self._round, self._rng = empty_round(self.arrays), rng_state(seed)
         growth = 1.0 if problem.prizes else params.unserved_growth
         self._rises = Rises(np.full(4, math.inf), np.full(4, math.inf), growth,
-                            MAX_UNSERVED_GROWTH * arrays.unserved, problem.prizes)
+                            MAX_UNSERVED_GROWTH * arrays.unserved, params.absent, problem.prizes)
 
     def _temperature(self, spent: float) -> float:
         """Temperature in cost after this share of the budget."""

@@ -16,7 +16,7 @@ from uav_task_alloc.solver.timed.arrays import (
     BY_FINISH,
     BY_LATENESS,
     CARRIED,
-    CLOSE,
+    CLOSES,
     CRUISE,
     DEPARTURE,
     DUE,
@@ -37,7 +37,7 @@ from uav_task_alloc.solver.timed.arrays import (
     LOAD_EXCESS,
     METRES,
     NEXT,
-    OPEN,
+    OPENS,
     PREV,
     RANGE_EXCESS,
     RATE,
@@ -63,7 +63,7 @@ from uav_task_alloc.solver.timed.arrays import (
 )
 from uav_task_alloc.solver.timed.segments import after_leg, is_task, join, leg_of, slot_of, update
 
-PLAIN, BASE_BEFORE, BASE_AFTER = range(3)  # kinds of places: with a base visit or without
+NO_VISIT, BASE_BEFORE, BASE_AFTER = range(3)  # kinds of places: with a base visit or without
 
 
 @inline_kernel
@@ -126,11 +126,11 @@ def place_cost(a: TimedArrays, r: TimedRoutes, u: int, t: int, c: int, least: fl
         departure = max(departure, hold + r.row[c, LASTED])
         warp += max(0.0, hold - r.row[c, LEFT])
     start = after_leg(a, departure, seconds, t)
-    if start < a.fixed[t, OPEN]:
-        start = a.fixed[t, OPEN]
-    elif start > a.fixed[t, CLOSE]:
-        warp += start - a.fixed[t, CLOSE]
-        start = a.fixed[t, CLOSE]
+    if start < a.fixed[t, OPENS]:
+        start = a.fixed[t, OPENS]
+    elif start > a.fixed[t, CLOSES]:
+        warp += start - a.fixed[t, CLOSES]
+        start = a.fixed[t, CLOSES]
     arrival = after_leg(a, start + a.fixed[t, SERVICE], further, then)
     late = arrival - r.row[then, LATEST]
     if late > 0.0:
@@ -159,9 +159,9 @@ def _lasts(a: TimedArrays, r: TimedRoutes, c: int, t: int, then: int, seconds: f
            further: float) -> float:
     """Shortest duration [s] of the trip with t between nodes c and `then`. O(1)."""
     lasted = r.row[c, LASTED] + seconds
-    opened = max(a.fixed[t, OPEN], a.fixed[t, RELEASE] + seconds)
+    opened = max(a.fixed[t, OPENS], a.fixed[t, RELEASE] + seconds)
     wait = max(0.0, opened - lasted - r.row[c, LEFT])
-    left = min(r.row[c, LEFT], a.fixed[t, CLOSE] - lasted)
+    left = min(r.row[c, LEFT], a.fixed[t, CLOSES] - lasted)
     lasted += wait + a.fixed[t, SERVICE] + further
     if then >= a.ends:
         return float(lasted)
@@ -216,11 +216,13 @@ def _split_times(a: TimedArrays, r: TimedRoutes, u: int, t: int, c: int, before:
     turn = a.fixed[base, SERVICE]
     if before:
         start = after_leg(a, departure, first, t)
-        start = max(start, a.fixed[t, OPEN])
-        late = max(0.0, start - a.fixed[t, CLOSE])
+        start = max(start, a.fixed[t, OPENS])
+        late = max(0.0, start - a.fixed[t, CLOSES])
         start, warp = start - late, warp + late
-        wait = max(0.0, max(a.fixed[t, OPEN], a.fixed[t, RELEASE] + first) - lasted - first - left)
-        lasts = lasted + first + wait + a.fixed[t, SERVICE] + second
+        lasted += first
+        opened = max(a.fixed[t, OPENS], a.fixed[t, RELEASE] + first)
+        lasts = lasted + (
+            max(0.0, opened - lasted - left) + a.fixed[t, SERVICE] + second)
         # the releases of the trip may be those of tasks after the visit
         departure = max(start + a.fixed[t, SERVICE] + second + turn, hold)
         arrival = after_leg(a, departure, third, then)
@@ -229,14 +231,14 @@ def _split_times(a: TimedArrays, r: TimedRoutes, u: int, t: int, c: int, before:
         lasts = lasted + first
         departure = max(departure + first + turn, hold)
         departure = max(departure, a.fixed[t, TRIP_RELEASE])
-        start = max(after_leg(a, departure, second, t), a.fixed[t, OPEN])
-        late = max(0.0, start - a.fixed[t, CLOSE])
+        start = max(after_leg(a, departure, second, t), a.fixed[t, OPENS])
+        late = max(0.0, start - a.fixed[t, CLOSES])
         start, warp = start - late, warp + late
         arrival = after_leg(a, start + a.fixed[t, SERVICE], third, then)
         rest = second + a.fixed[t, SERVICE] + third
         if then < a.ends:
             opened = max(r.row[then, EARLY], a.fixed[then, RELEASE] + third)
-            rest += max(0.0, opened - rest - (a.fixed[t, CLOSE] - second)) + r.row[then, LASTS]
+            rest += max(0.0, opened - rest - (a.fixed[t, CLOSES] - second)) + r.row[then, LASTS]
     late = arrival - r.row[then, LATEST]
     warp += r.row[then, WARP_AFTER] + max(0.0, late)
     cost = excess_cost(a.price[WARP], r.route[u, WARP], warp)
@@ -258,6 +260,25 @@ def free_visit(a: TimedArrays, r: TimedRoutes, u: int) -> int:
     return -1
 
 
+@kernel
+def cheapest_split(a: TimedArrays, r: TimedRoutes, t: int, c: int,
+                   least: float) -> tuple[int, float]:
+    """The kind of place with a base visit after node c that costs least, below `least`. O(1)."""
+    u, kind = r.link[c, UAV], BASE_BEFORE
+    free = free_visit(a, r, u)
+    if free < 0:
+        return kind, math.inf
+    base = LINK(free)
+    for each in (BASE_BEFORE, BASE_AFTER):
+        if (each == BASE_AFTER and r.link[c, NEXT] >= a.ends) or (
+                each == BASE_BEFORE and c >= a.bases):
+            continue
+        cost = split_cost(a, r, u, t, c, each, base, least)
+        if cost < least:
+            kind, least = each, cost
+    return kind, least
+
+
 @inline_kernel
 def try_place(a: TimedArrays, r: TimedRoutes, t: int, c: int, place: int, kind: int,
               least: float) -> tuple[int, int, float]:
@@ -265,18 +286,11 @@ def try_place(a: TimedArrays, r: TimedRoutes, t: int, c: int, place: int, kind: 
     u = r.link[c, UAV]
     cost = place_cost(a, r, u, t, c, least)
     if cost < least:
-        place, kind, least = np.int64(c), PLAIN, cost
+        place, kind, least = np.int64(c), NO_VISIT, cost
     if a.visits > 0:
-        base = free_visit(a, r, u)
-        if base >= 0:
-            for each in (BASE_BEFORE, BASE_AFTER):
-                if each == BASE_AFTER and r.link[c, NEXT] >= a.ends:
-                    continue
-                if each == BASE_BEFORE and c >= a.bases:
-                    continue
-                cost = split_cost(a, r, u, t, c, each, base, least)
-                if cost < least:
-                    place, kind, least = np.int64(c), each, cost
+        which, cost = cheapest_split(a, r, t, c, least)
+        if cost < least:
+            place, kind, least = np.int64(c), which, cost
     return place, kind, least
 
 
@@ -298,32 +312,43 @@ def near_place(a: TimedArrays, r: TimedRoutes, t: int, opens: bool, blinks: floa
 
     opens: empty routes are tried, too. Each place is skipped with probability `blinks`.
     """
-    i, place, kind, least = t - a.uavs, -1, PLAIN, math.inf
-    by_distance, none = a.weight[BY_DISTANCE], a.uavs
-    for m in range(a.near_count[i]):
-        c = a.near[i, m]
-        if r.link[c, UAV] == none or (blinks > 0.0 and uniform(rng) < blinks):
+    i, place, kind, least = t - a.uavs, -1, NO_VISIT, math.inf
+    sides = 2 * a.near_count[i]
+    for m in range(sides + (a.near_class.shape[1] if opens else 0)):
+        if m < sides:
+            c = a.near[i, m >> 1]
+            if r.link[c, UAV] == a.uavs:
+                continue
+            bound = 2.0 * a.near_length[i, m >> 1]
+            if m & 1 == 0:
+                open_end = r.link[c, NEXT] >= a.ends
+            else:
+                c = r.link[c, PREV]
+                open_end = not is_task(a, c)
+            if not open_end and a.weight[BY_DISTANCE] * (bound - r.row[c, LEG]) >= least:
+                continue
+        else:
+            k = a.near_class[i, m - sides]
+            u = idle_uav(a, r, k) if k >= 0 else -1
+            if u < 0:
+                continue
+            c = LINK(u)
+        if blinks > 0.0 and uniform(rng) < blinks:
             continue
-        twice, before = 2.0 * a.near_length[i, m], r.link[c, PREV]
-        if by_distance * (twice - r.row[c, LEG]) < least or r.link[c, NEXT] >= a.ends:
-            place, kind, least = try_place(a, r, t, c, place, kind, least)
-        if by_distance * (twice - r.row[before, LEG]) < least or not is_task(a, before):
-            place, kind, least = try_place(a, r, t, before, place, kind, least)
-    if opens:
-        for m in range(a.near_class.shape[1]):
-            k = a.near_class[i, m]
-            if k < 0:
-                break
-            u = idle_uav(a, r, k)
-            if u >= 0 and not (blinks > 0.0 and uniform(rng) < blinks):
-                place, kind, least = try_place(a, r, t, LINK(u), place, kind, least)
+        place, kind, least = try_place(a, r, t, c, place, kind, least)
     return place, kind, least
+
+
+@kernel
+def cost_at(a: TimedArrays, r: TimedRoutes, u: int, t: int, c: int) -> float:
+    """As place_cost without a bound, for kernels that need few."""
+    return float(place_cost(a, r, u, t, c, math.inf))
 
 
 @kernel
 def place_anywhere(a: TimedArrays, r: TimedRoutes, t: int) -> tuple[int, int, float]:
     """The cheapest place in all routes: (node before or -1, kind, cost). O(n)."""
-    place, kind, least = -1, PLAIN, math.inf
+    place, kind, least = -1, NO_VISIT, math.inf
     for u in range(a.uavs):
         c = LINK(u)
         while c < a.ends or c >= a.bases:
@@ -332,13 +357,13 @@ def place_anywhere(a: TimedArrays, r: TimedRoutes, t: int) -> tuple[int, int, fl
     return place, kind, least
 
 
-@inline_kernel
+@kernel
 def insert_task(a: TimedArrays, r: TimedRoutes, t: int, c: int, kind: int) -> None:
     """Insert t after node c, with a visit of the base if the kind says so. O(tasks)."""
     u, then = r.link[c, UAV], r.link[c, NEXT]
     before = r.row[c, LEG]
     first, last = c, then
-    if kind != PLAIN:
+    if kind != NO_VISIT:
         base = LINK(free_visit(a, r, u))
         r.link[base, UAV] = u
         if kind == BASE_BEFORE:
@@ -393,22 +418,22 @@ def unlink(a: TimedArrays, r: TimedRoutes, t: int) -> None:
 
 
 @kernel
-def insert_in_order(a: TimedArrays, r: TimedRoutes, tasks: Ints, everywhere: bool,
+def insert_in_order(a: TimedArrays, r: TimedRoutes, tasks: Ints, prizes: bool,
                     rng: RngState) -> int:
     """Insert task nodes in the given order, each where it costs least; returns how many failed.
 
-    O(len(tasks) k), with `everywhere` O(len(tasks) n) at worst.
+    prizes: a task is left out if it costs more than its price. O(len(tasks) n) at worst.
     """
     missing = 0
     for i in range(tasks.size):
-        t = tasks[i]
+        t = LINK(tasks[i])
         if r.link[t, UAV] != a.uavs:
             continue
         place, kind, cost = near_place(a, r, t, True, 0.0, rng)
-        if place < 0 and everywhere:
+        if place < 0:
             place, kind, cost = place_anywhere(a, r, t)
-        if place >= 0 and cost < a.unserved[t - a.uavs]:
-            insert_task(a, r, LINK(t), LINK(place), kind)
+        if place >= 0 and (not prizes or cost < a.unserved[t - a.uavs]):
+            insert_task(a, r, t, LINK(place), kind)
         else:
             missing += 1
     return missing

@@ -7,8 +7,8 @@ import math
 from uav_task_alloc.geometry.outline import Floats
 from uav_task_alloc.kernel import inline_kernel, kernel
 from uav_task_alloc.solver.timed.arrays import (
-    CLOSE,
-    OPEN,
+    CLOSES,
+    OPENS,
     REMOTE,
     SERVICE,
     TimedArrays,
@@ -29,8 +29,8 @@ def _square_between(a: TimedArrays, i: int, j: int) -> float:
 @inline_kernel
 def _may_be_adjacent(a: TimedArrays, t: int, s: int, least: float) -> bool:
     """Whether the windows allow task s directly after t, or t after s, `least` [s] apart. O(1)."""
-    return (a.fixed[t, OPEN] + a.fixed[t, SERVICE] + least <= a.fixed[s, CLOSE]
-            or a.fixed[s, OPEN] + a.fixed[s, SERVICE] + least <= a.fixed[t, CLOSE])
+    return (a.fixed[t, OPENS] + a.fixed[t, SERVICE] + least <= a.fixed[s, CLOSES]
+            or a.fixed[s, OPENS] + a.fixed[s, SERVICE] + least <= a.fixed[t, CLOSES])
 
 
 @kernel

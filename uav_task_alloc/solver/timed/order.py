@@ -10,7 +10,7 @@ from uav_task_alloc.solver.timed.arrays import (
     BY_EXCESS,
     BY_FINISH,
     CARRIED,
-    CLOSE,
+    CLOSES,
     DEPARTURE,
     EMPTY_LENGTH,
     ENDURANCE_EXCESS,
@@ -56,12 +56,12 @@ def reset(a: TimedArrays, r: TimedRoutes) -> None:
         r.row[u, :], r.row[end, :] = 0.0, 0.0
         r.link[u, UAV] = r.link[end, UAV] = r.link[u, HEAD] = r.link[end, HEAD] = u
         r.row[u, START] = r.row[u, DEPARTURE] = a.begin[u, READY]
-        r.row[end, LATEST] = a.fixed[end, CLOSE]
-        join(a, r, u, LINK(u), LINK(end))
+        r.row[end, LATEST] = a.fixed[end, CLOSES]
+        join(a, r, LINK(u), LINK(u), LINK(end))
         r.route[u, METRES] = r.trip[u, FLOWN] = a.begin[u, EMPTY_LENGTH]
         r.sums[METRES] += a.begin[u, EMPTY_LENGTH]
         r.empty[a.class_of[u]] += 1
-        update(a, r, u, u, end, 0.0)
+        update(a, r, LINK(u), LINK(u), LINK(end), 0.0)
 
 
 @kernel
@@ -84,7 +84,7 @@ def set_order(a: TimedArrays, r: TimedRoutes, order: Links) -> None:
             continue
         while i != end:
             j = order[i]
-            join(a, r, u, i, j)
+            join(a, r, LINK(u), i, j)
             r.link[j, UAV] = u
             r.link[j, HEAD] = u
             metres += r.row[i, LEG]
@@ -99,7 +99,7 @@ def set_order(a: TimedArrays, r: TimedRoutes, order: Links) -> None:
             r.trip[u, CARRIED], r.trip[u, FLOWN] = load, metres
         r.route[u, TASKS] = tasks
         r.count[SERVED] += int(tasks)
-        update(a, r, u, u, end, 0.0)
+        update(a, r, LINK(u), LINK(u), LINK(end), 0.0)
 
 
 @inline_kernel

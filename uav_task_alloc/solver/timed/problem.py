@@ -19,7 +19,7 @@ from uav_task_alloc.solver.timed.arrays import (
     AIRBORNE,
     BEGIN,
     CARRIED,
-    CLOSE,
+    CLOSES,
     DUE,
     EMPTY_LENGTH,
     EMPTY_TIME,
@@ -28,7 +28,7 @@ from uav_task_alloc.solver.timed.arrays import (
     IN_AIR,
     LINK,
     LOAD,
-    OPEN,
+    OPENS,
     READY,
     RELEASE,
     REMOTE,
@@ -54,7 +54,6 @@ WINDOW_NEIGHBOURS = 60  # nearest tasks of a task that may precede or follow it
 NEAR_CLASSES = 6  # nearest classes of UAVs that are alike
 UNSERVED_LEGS = 20.0  # first price of an average task, in mean legs
 MAX_UNSERVED_GROWTH = 300.0  # highest price of a task over the first
-FIRST_PRICE = 1.0  # of excess in mean legs a second, metre or load of an average task
 
 
 @dataclass(frozen=True, slots=True)
@@ -166,24 +165,24 @@ def _fixed(problem: Problem, visits: int, aboard: Mapping[str, frozenset[str]]) 
     points = _points(m, n, visits)
     fixed = np.zeros((len(points), FIXED))
     fixed[:, X:Z + 1] = problem.distances.points[points]
-    fixed[:, [OPEN, RELEASE, TRIP_RELEASE]] = -math.inf
-    fixed[:, [CLOSE, DUE]] = math.inf
+    fixed[:, [OPENS, RELEASE, TRIP_RELEASE]] = -math.inf
+    fixed[:, [CLOSES, DUE]] = math.inf
     rows = fixed[m:m + n]
     total = math.fsum(task.value for task in (*tasks, *(
         task for held in problem.locked.values() for task in held)))
     hard = math.isinf(goal.lateness)
     loaded = {name for names in aboard.values() for name in names}
     for row, task in zip(rows, tasks, strict=True):
-        row[SERVICE], row[OPEN] = task.service_time, task.earliest
-        row[CLOSE if hard else DUE] = task.latest
+        row[SERVICE], row[OPENS] = task.service_time, task.earliest
+        row[CLOSES if hard else DUE] = task.latest
         release = task.release if task.release > 0.0 else -math.inf
         row[TRIP_RELEASE if task.payload > 0.0 and task.id not in loaded else RELEASE] = release
         row[LOAD] = task.payload
         row[WEIGHT], row[WORTH] = goal.response * task.value / total, task.value
         row[WIDTH] = min(task.latest, 1e9) - max(task.earliest, -1e9)
     until = np.array([uav.available_until for uav in uavs])
-    fixed[m + n:2 * m + n, CLOSE] = until
-    fixed[2 * m + n:, CLOSE] = np.repeat(until, visits)
+    fixed[m + n:2 * m + n, CLOSES] = until
+    fixed[2 * m + n:, CLOSES] = np.repeat(until, visits)
     fixed[2 * m + n:, SERVICE] = np.repeat([uav.turnaround for uav in uavs], visits)
     return fixed
 
@@ -327,7 +326,8 @@ def _longest_cost(problem: Problem, a: TimedArrays, far: float) -> float:
     if not a.timed_cost:
         return 0.0
     legs = rows[:, SERVICE].sum() + far * 2.0 * float(a.pace[:, 0].max()) * len(rows)
-    opened = rows[:, OPEN][np.isfinite(rows[:, OPEN])].max(initial=0.0)
+    opened = max(float(rows[:, column][np.isfinite(rows[:, column])].max(initial=0.0))
+                 for column in (OPENS, RELEASE, TRIP_RELEASE))
     horizon = opened + a.begin[:, READY].max(initial=0.0) + legs / max(1, a.uavs)
     late = goal.lateness if math.isfinite(goal.lateness) else 0.0
     return float(horizon * (goal.finish + goal.response + late))

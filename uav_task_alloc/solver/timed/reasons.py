@@ -11,11 +11,11 @@ from uav_task_alloc.geometry.outline import Floats
 from uav_task_alloc.kernel import kernel
 from uav_task_alloc.solver.reasons import lasting_reason, way_reason
 from uav_task_alloc.solver.timed.arrays import (
-    CLOSE,
+    CLOSES,
     IN_AIR,
     LAST_DEPARTURE,
     LINK,
-    OPEN,
+    OPENS,
     READY,
     RELEASE,
     SERVICE,
@@ -23,7 +23,7 @@ from uav_task_alloc.solver.timed.arrays import (
     TimedArrays,
     TimedRoutes,
 )
-from uav_task_alloc.solver.timed.insertion import BASE_BEFORE, free_visit, place_cost, split_cost
+from uav_task_alloc.solver.timed.insertion import BASE_BEFORE, cost_at, free_visit, split_cost
 from uav_task_alloc.solver.timed.problem import TimedProblem, empty_timed_routes
 from uav_task_alloc.solver.timed.segments import leg_of
 
@@ -38,10 +38,11 @@ def can_serve(a: TimedArrays, r: TimedRoutes, t: int) -> bool:
     r: empty routes.
     """
     for u in range(a.uavs):
-        if place_cost(a, r, u, t, LINK(u), math.inf) < math.inf:
+        if cost_at(a, r, LINK(u), LINK(t), LINK(u)) < math.inf:
             return True
-        base = free_visit(a, r, u)
-        if base >= 0 and split_cost(a, r, u, t, LINK(u), BASE_BEFORE, base, math.inf) < math.inf:
+        base = free_visit(a, r, LINK(u))
+        if base >= 0 and split_cost(a, r, LINK(u), LINK(t), LINK(u), BASE_BEFORE, LINK(base),
+                                    math.inf) < math.inf:
             return True
     return False
 
@@ -54,14 +55,14 @@ def needs_alone(a: TimedArrays, t: int, needs: Floats) -> None:
     the route [s].
     """
     for u in range(a.uavs):
-        metres, seconds = leg_of(a, u, LINK(u), t)
-        more, further = leg_of(a, u, t, LINK(a.ends + u))
+        metres, seconds = leg_of(a, LINK(u), LINK(u), LINK(t))
+        more, further = leg_of(a, LINK(u), LINK(t), LINK(a.ends + u))
         hold = max(a.fixed[t, RELEASE], a.fixed[t, TRIP_RELEASE] + a.begin[u, IN_AIR])
-        start = max(max(a.begin[u, READY], hold) + seconds, a.fixed[t, OPEN])
+        start = max(max(a.begin[u, READY], hold) + seconds, a.fixed[t, OPENS])
         lasted = a.begin[u, IN_AIR] + seconds
-        opened = max(a.fixed[t, OPEN], a.fixed[t, RELEASE] + seconds)
+        opened = max(a.fixed[t, OPENS], a.fixed[t, RELEASE] + seconds)
         lasted += max(0.0, opened - lasted - a.begin[u, LAST_DEPARTURE])
-        needs[u, 0], needs[u, 1] = start, max(0.0, start - a.fixed[t, CLOSE])
+        needs[u, 0], needs[u, 1] = start, max(0.0, start - a.fixed[t, CLOSES])
         needs[u, 2] = metres + more
         needs[u, 3] = lasted + a.fixed[t, SERVICE] + further
         needs[u, 4] = start + a.fixed[t, SERVICE] + further

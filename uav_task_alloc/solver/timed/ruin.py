@@ -13,17 +13,19 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from uav_task_alloc.geometry.outline import Floats, Ints
-from uav_task_alloc.kernel import inline_kernel
+from uav_task_alloc.kernel import inline_kernel, kernel
 from uav_task_alloc.solver.rng import RngState, below, uniform
-from uav_task_alloc.solver.ruin import BLINK_RATE, MAX_STRING, PRESERVE_RATE, SPLIT_RATE
+from uav_task_alloc.solver.ruin import MAX_STRING, PRESERVE_RATE, SPLIT_RATE
 from uav_task_alloc.solver.timed.arrays import (
-    CLOSE,
+    AIRBORNE,
+    CARRIED,
+    CLOSES,
     FLOWN,
-    LEG,
+    GROUNDED,
     LINK,
     LOAD,
     NEXT,
-    OPEN,
+    OPENS,
     PREV,
     REMOTE,
     ROUTE,
@@ -39,20 +41,17 @@ from uav_task_alloc.solver.timed.arrays import (
     TimedRoutes,
 )
 from uav_task_alloc.solver.timed.insertion import (
-    PLAIN,
+    NO_VISIT,
+    cost_at,
     idle_uav,
     insert_task,
     near_place,
     place_anywhere,
-    place_cost,
     unlink,
 )
 from uav_task_alloc.solver.timed.segments import is_task, slot_of, update
 
 ABSENT_SEED_RATE = 0.5  # share of rounds that start at an absent task, if there is one
-MAX_ABSENT = 10  # absent tasks that a round tries to insert_task, besides those it removes
-OPENING_RATE = 0.1  # share of rounds with absent tasks that open a route around one of them
-MAX_OPENING = 64  # absent tasks that such a round tries to insert
 ANYWHERE_RATE = 0.02  # share of tasks without a place among neighbours that try all routes
 ORDERS = 15  # weights of the orders of insertion
 
@@ -162,23 +161,24 @@ def _take(r: TimedRoutes, w: Round, t: int) -> None:
 
 
 @inline_kernel
-def drop_idle_visits(a: TimedArrays, r: TimedRoutes, u: int) -> None:
-    """Take base visits out of UAV u's route that no task needs; `update` has to follow.
+def _may_begin_at_base(a: TimedArrays, u: int) -> bool:
+    """Whether UAV u may need a visit of its base before its first task. O(1)."""
+    later = a.uavs + u * a.visits
+    return (a.begin[u, GROUNDED] == 0.0 or a.limit[u, FLOWN] < a.limit[later, FLOWN]
+            or a.limit[u, AIRBORNE] < a.limit[later, AIRBORNE]
+            or a.limit[u, CARRIED] < a.limit[later, CARRIED])
 
-    Visits at the end, one after another, and those that join trips light enough for one. O(tasks).
-    """
-    i, end, before = r.link[u, NEXT], a.ends + u, LINK(u)
-    load, metres = 0.0, 0.0
+
+@inline_kernel
+def drop_idle_visits(a: TimedArrays, r: TimedRoutes, u: int) -> None:
+    """Take visits of the base out of UAV u's route that begin or end no trip. O(tasks)."""
+    i, end = r.link[u, NEXT], a.ends + u
     while i != end:
-        then = r.link[i, NEXT]
-        if is_task(a, i):
-            load, metres = load + a.fixed[i, LOAD], metres + r.row[i, LEG]
-        else:
-            last = r.link[i, PREV]
-            swaps = last == u and a.limit[u, FLOWN] < a.limit[slot_of(a, i), FLOWN]
-            if then >= a.ends or (last == before and not swaps):
+        then, last = r.link[i, NEXT], r.link[i, PREV]
+        if not is_task(a, i):
+            idle = not is_task(a, last) and not (last == u and _may_begin_at_base(a, u))
+            if idle or not is_task(a, then):
                 unlink(a, r, i)
-            before = i
         i = then
 
 
@@ -231,12 +231,12 @@ def _seed(a: TimedArrays, r: TimedRoutes, w: Round, rng: RngState) -> Any:
     return LINK(a.uavs + below(rng, a.ends - a.uavs))
 
 
-@inline_kernel
-def ruin_strings(a: TimedArrays, r: TimedRoutes, w: Round, mean: float, opening: bool,
-         rng: RngState) -> Any:
+@kernel
+def ruin_strings(a: TimedArrays, r: TimedRoutes, w: Round, mean: float, most_absent: int,
+                 rng: RngState) -> Any:
     """Remove about `mean` tasks in strings of routes around a random task; returns that. O(k).
 
-    opening: take more absent tasks around it, for a route of their own.
+    most_absent: absent tasks around it that are to be inserted, too.
     """
     none = a.uavs
     seed = _seed(a, r, w, rng)
@@ -246,12 +246,12 @@ def ruin_strings(a: TimedArrays, r: TimedRoutes, w: Round, mean: float, opening:
     served = max(1.0, r.count[SERVED] / max(1, used))
     longest = min(float(MAX_STRING), served)
     strings = int(1.0 + uniform(rng) * (4.0 * mean / (1.0 + longest) - 1.0))
-    left_out, most = 0, MAX_OPENING if opening else MAX_ABSENT
+    left_out = 0
     for m in range(-1, a.near_count[seed - a.uavs]):
         c = seed if m < 0 else a.near[seed - a.uavs, m]
         u = r.link[c, UAV]
         if u == none:
-            if left_out < most and a.unserved[c - a.uavs] > 0.0 and not _is_taken(w, c):
+            if left_out < most_absent and a.unserved[c - a.uavs] > 0.0 and not _is_taken(w, c):
                 _take(r, w, c)
                 left_out += 1
         elif strings > 0 and w.saved_in[u] != w.count[SERIAL]:
@@ -259,7 +259,7 @@ def ruin_strings(a: TimedArrays, r: TimedRoutes, w: Round, mean: float, opening:
             size = 1 + int(uniform(rng) * min(longest, r.route[u, TASKS]))
             _remove_string(a, r, w, c, size, rng)
             strings -= 1
-        if strings == 0 and (w.count[ABSENT] == 0 or left_out >= most):
+        if strings == 0 and (w.count[ABSENT] == 0 or left_out >= most_absent):
             break
     return seed
 
@@ -290,9 +290,9 @@ def _sort_removed(a: TimedArrays, w: Round, rng: RngState) -> None:
         elif kind < 11:
             key = a.fixed[t, WIDTH]
         elif kind == 11:
-            key = a.fixed[t, OPEN]
+            key = a.fixed[t, OPENS]
         elif kind == 12:
-            key = -a.fixed[t, CLOSE]
+            key = -a.fixed[t, CLOSES]
         else:
             key = -a.unserved[t - a.uavs]
         place = i
@@ -306,23 +306,23 @@ def _sort_removed(a: TimedArrays, w: Round, rng: RngState) -> None:
 def insert_saved(a: TimedArrays, r: TimedRoutes, w: Round, t: int, place: int,
                  kind: int) -> None:
     """Insert t after node `place`, whose route is saved before. O(tasks)."""
-    save_route(a, r, w, np.int64(r.link[place, UAV]))
-    insert_task(a, r, t, LINK(place), kind)
+    save_route(a, r, w, r.link[place, UAV])
+    insert_task(a, r, t, place, kind)
 
 
-@inline_kernel
+@kernel
 def open_route(a: TimedArrays, r: TimedRoutes, w: Round, t: int) -> None:
     """Insert t into an empty route, whatever that costs, if one may serve it. O(classes)."""
     for m in range(a.near_class.shape[1]):
         k = a.near_class[t - a.uavs, m]
         u = idle_uav(a, r, k) if k >= 0 else -1
-        if u >= 0 and place_cost(a, r, u, t, LINK(u), math.inf) < math.inf:
-            insert_saved(a, r, w, t, u, PLAIN)
+        if u >= 0 and cost_at(a, r, LINK(u), t, LINK(u)) < math.inf:
+            insert_saved(a, r, w, t, LINK(u), NO_VISIT)
             break
 
 
-@inline_kernel
-def insert_removed(a: TimedArrays, r: TimedRoutes, w: Round, generous: float,
+@kernel
+def insert_removed(a: TimedArrays, r: TimedRoutes, w: Round, generous: float, blinks: float,
                    rng: RngState) -> None:
     """Insert removed tasks where each costs least. O(removed k).
 
@@ -333,8 +333,8 @@ def insert_removed(a: TimedArrays, r: TimedRoutes, w: Round, generous: float,
         t = w.removed[i]
         if r.link[t, UAV] != a.uavs:
             continue
-        place, kind, cost = near_place(a, r, t, True, BLINK_RATE, rng)
+        place, kind, cost = near_place(a, r, t, True, blinks, rng)
         if place < 0 and uniform(rng) < ANYWHERE_RATE:
             place, kind, cost = place_anywhere(a, r, t)
         if place >= 0 and cost < generous * a.unserved[t - a.uavs]:
-            insert_saved(a, r, w, t, place, kind)
+            insert_saved(a, r, w, t, LINK(place), kind)

@@ -10,6 +10,7 @@ import numpy as np
 from uav_task_alloc.geometry.outline import Floats
 from uav_task_alloc.kernel import inline_kernel, kernel
 from uav_task_alloc.solver.rng import RngState, uniform
+from uav_task_alloc.solver.ruin import BLINK_RATE
 from uav_task_alloc.solver.search import PENALTY_DECAY, PENALTY_GROWTH
 from uav_task_alloc.solver.timed.arrays import (
     INFEASIBLE,
@@ -37,6 +38,7 @@ from uav_task_alloc.solver.timed.ruin import (
 )
 from uav_task_alloc.solver.timed.segments import cost_of
 
+MAX_OPENING = 64  # absent tasks that a round tries to insert that opens a route
 OPENING_RATE = 0.1  # share of rounds with absent tasks that open a route around one of them
 GENEROUS_RATE = 0.5  # share of rounds in which a task may cost more than its price
 FEW_ABSENT = 0.05  # up to this share of absent tasks their price rises
@@ -67,6 +69,7 @@ class Rises(NamedTuple):
     most: Floats  # (4) highest price
     unserved: float  # factor by which the price of a task in no route rises; 1: it is fixed
     max_unserved: Floats  # (n) highest price of a task
+    absent: int  # absent tasks that a round tries to insert, besides those it removes
     prizes: bool  # tasks may be left out because they are not worth their way
 
 
@@ -131,12 +134,12 @@ def anneal(a: TimedArrays, r: TimedRoutes, w: Round, best: Incumbent, rises: Ris
         before, generous = cost_of(a, r.sums), 1.0
         begin_round(r, w)
         opening = rises.prizes and w.count[ABSENT] > 0 and uniform(rng) < OPENING_RATE
-        seed = ruin_strings(a, r, w, mean, opening, rng)
+        seed = ruin_strings(a, r, w, mean, MAX_OPENING if opening else rises.absent, rng)
         if rises.prizes and uniform(rng) < GENEROUS_RATE:
             generous += uniform(rng)
         if opening and w.count[REMOVED] > 0 and r.link[seed, UAV] == a.uavs:
             open_route(a, r, w, seed)
-        insert_removed(a, r, w, generous, rng)
+        insert_removed(a, r, w, generous, BLINK_RATE, rng)
         if cost_of(a, r.sums) < before - temperature * math.log(1.0 - uniform(rng)):
             improvements += int(record(a, r, best, rises.prizes))
         else:

@@ -13,7 +13,7 @@ import math
 
 from uav_task_alloc.geometry.distances import length
 from uav_task_alloc.geometry.outline import Floats
-from uav_task_alloc.kernel import inline_kernel
+from uav_task_alloc.kernel import inline_kernel, kernel
 from uav_task_alloc.solver.timed.arrays import (
     AIRBORNE,
     BY_DISTANCE,
@@ -22,7 +22,7 @@ from uav_task_alloc.solver.timed.arrays import (
     BY_FINISH,
     BY_LATENESS,
     CARRIED,
-    CLOSE,
+    CLOSES,
     CRUISE,
     DEPARTURE,
     DUE,
@@ -50,7 +50,7 @@ from uav_task_alloc.solver.timed.arrays import (
     LOAD_EXCESS,
     METRES,
     NEXT,
-    OPEN,
+    OPENS,
     PREV,
     RANGE_EXCESS,
     RATE,
@@ -128,12 +128,12 @@ def after_leg(a: TimedArrays, departure: float, seconds: float, j: int) -> float
 def _step_forward(a: TimedArrays, r: TimedRoutes, i: int, j: int) -> bool:
     """Set START, DEPARTURE and WARP_BEFORE of j after i; returns whether one changed. O(1)."""
     start = after_leg(a, r.row[i, DEPARTURE], r.row[i, TIME], j)
-    if start < a.fixed[j, OPEN]:
-        start = a.fixed[j, OPEN]
+    if start < a.fixed[j, OPENS]:
+        start = a.fixed[j, OPENS]
     warp = r.row[i, WARP_BEFORE]
-    if start > a.fixed[j, CLOSE]:
-        warp += start - a.fixed[j, CLOSE]
-        start = a.fixed[j, CLOSE]
+    if start > a.fixed[j, CLOSES]:
+        warp += start - a.fixed[j, CLOSES]
+        start = a.fixed[j, CLOSES]
     changed = start != r.row[j, START] or warp != r.row[j, WARP_BEFORE]
     r.row[j, START], r.row[j, DEPARTURE] = start, start + a.fixed[j, SERVICE]
     r.row[j, WARP_BEFORE] = warp
@@ -152,11 +152,11 @@ def _step_backward(a: TimedArrays, r: TimedRoutes, i: int, j: int, hold: float) 
         warp += hold - gate
         gate = hold
     latest = gate - a.fixed[i, SERVICE]
-    if latest > a.fixed[i, CLOSE]:
-        latest = a.fixed[i, CLOSE]
-    elif latest < a.fixed[i, OPEN]:
-        warp += a.fixed[i, OPEN] - latest
-        latest = a.fixed[i, OPEN]
+    if latest > a.fixed[i, CLOSES]:
+        latest = a.fixed[i, CLOSES]
+    elif latest < a.fixed[i, OPENS]:
+        warp += a.fixed[i, OPENS] - latest
+        latest = a.fixed[i, OPENS]
     changed = latest != r.row[i, LATEST] or warp != r.row[i, WARP_AFTER]
     r.row[i, LATEST], r.row[i, WARP_AFTER] = latest, warp
     return changed
@@ -301,10 +301,10 @@ def _trip_forward(a: TimedArrays, r: TimedRoutes, head: int) -> int:
         lasted = r.row[i, LASTED] + seconds
         if j >= a.ends:
             break
-        opened = max(a.fixed[j, OPEN], a.fixed[j, RELEASE] + seconds)
+        opened = max(a.fixed[j, OPENS], a.fixed[j, RELEASE] + seconds)
         wait = max(0.0, opened - lasted - r.row[i, LEFT])
         load += a.fixed[j, LOAD]
-        r.row[j, LEFT] = min(r.row[i, LEFT], a.fixed[j, CLOSE] - lasted)
+        r.row[j, LEFT] = min(r.row[i, LEFT], a.fixed[j, CLOSES] - lasted)
         r.row[j, LASTED] = lasted + wait + a.fixed[j, SERVICE]
         r.row[j, LOAD_BEFORE], r.row[j, LENGTH_BEFORE] = load, metres
         r.link[j, HEAD] = head
@@ -344,9 +344,9 @@ def _trip_backward(a: TimedArrays, r: TimedRoutes, last: int) -> int:
         seconds = r.row[i, TIME]
         passed = a.fixed[i, SERVICE] + seconds
         early = max(r.row[j, EARLY], a.fixed[j, RELEASE] + seconds)
-        wait = max(0.0, early - passed - a.fixed[i, CLOSE])
+        wait = max(0.0, early - passed - a.fixed[i, CLOSES])
         r.row[i, LASTS] = passed + r.row[j, LASTS] + wait
-        r.row[i, EARLY] = max(early - passed, a.fixed[i, OPEN]) - wait
+        r.row[i, EARLY] = max(early - passed, a.fixed[i, OPENS]) - wait
         j = i
     hold = -math.inf
     if i >= a.uavs or a.begin[i, GROUNDED] > 0.0:
@@ -355,7 +355,7 @@ def _trip_backward(a: TimedArrays, r: TimedRoutes, last: int) -> int:
     return int(i)
 
 
-@inline_kernel
+@kernel
 def update_whole(a: TimedArrays, r: TimedRoutes, u: int, before: float) -> None:
     """Update UAV u's route from end to end. O(tasks)."""
     head, end = u, a.ends + u

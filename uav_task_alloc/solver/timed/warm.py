@@ -19,11 +19,11 @@ from uav_task_alloc.solver.timed.arrays import (
 )
 from uav_task_alloc.solver.timed.insertion import (
     BASE_BEFORE,
-    PLAIN,
+    NO_VISIT,
+    cost_at,
     free_visit,
     insert_in_order,
     insert_task,
-    place_cost,
     split_cost,
 )
 from uav_task_alloc.solver.timed.problem import TimedProblem, empty_timed_routes
@@ -51,7 +51,7 @@ def first_plan(problem: TimedProblem, before: WarmState) -> Incumbent:
     append_all(a, routes, np.array(nodes, np.int64), np.array(bounds, np.int64))
     tasks = np.arange(a.uavs, a.ends)
     tasks = tasks[np.argsort(-a.fixed[tasks, REMOTE], kind='stable')]
-    insert_in_order(a, routes, tasks, True, rng_state(0))
+    insert_in_order(a, routes, tasks, problem.prizes, rng_state(0))
     best = empty_incumbent(a)
     record(a, routes, best, problem.prizes)
     return best
@@ -72,10 +72,10 @@ def append_all(a: TimedArrays, r: TimedRoutes, nodes: Ints, bounds: Ints) -> Non
             t, last = LINK(nodes[i]), r.link[a.ends + u, PREV]
             if r.link[t, UAV] != a.uavs:
                 continue
-            base = free_visit(a, r, u) if visits else -1
-            if base >= 0 and split_cost(a, r, u, t, last, BASE_BEFORE, base,
+            base = free_visit(a, r, LINK(u)) if visits else -1
+            if base >= 0 and split_cost(a, r, LINK(u), t, last, BASE_BEFORE, LINK(base),
                                         math.inf) < math.inf:
                 insert_task(a, r, t, last, BASE_BEFORE)
                 visits = False
-            elif place_cost(a, r, u, t, last, math.inf) < math.inf:
-                insert_task(a, r, t, last, PLAIN)
+            elif cost_at(a, r, LINK(u), t, last) < math.inf:
+                insert_task(a, r, t, last, NO_VISIT)
