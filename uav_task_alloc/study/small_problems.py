@@ -80,9 +80,10 @@ def _draw(rng: np.random.Generator, seed: int, most_tasks: int, most_uavs: int) 
              for i in range(rng.integers(1, most_tasks + 1))]
     uavs = [_with_aboard(rng, uav, tasks) for uav in uavs]
     locked = _locked(rng, uavs, tasks) if on['locked'] and rng.random() < 0.5 else {}
+    prices = rng.choice([0.0, 0.1, 1.0], 3).tolist()
     objective = list(OBJECTIVES.values())[rng.integers(4)] if rng.random() < 0.5 else Objective(
-        *(float(rng.choice([0.0, 0.1, 1.0])) for _ in range(3)),
-        float(rng.choice([0.5, 10.0, math.inf])), float(rng.choice([50.0, 500.0, math.inf])))
+        prices[0], prices[1], prices[2], float(rng.choice([0.5, 10.0, math.inf])),
+        float(rng.choice([50.0, 500.0, math.inf])))
     rules = Rules(bool(rng.random() < 0.5), bool(rng.random() < 0.85), objective=objective,
                   trips=int(rng.integers(2, 4)) if on['trips'] else 1)
     return SmallProblem(seed, tuple(uavs), tuple(tasks), rules, locked)
@@ -137,8 +138,7 @@ def _task(rng: np.random.Generator, name: str, on: Mapping[str, bool], uavs: lis
     able = on['abilities'] and rng.random() < 0.4
     allowed = frozenset(uavs[:1]) if on['abilities'] and rng.random() < 0.2 else None
     return Task(name, _place(rng, 60.0), allowed_uavs=allowed,
-                required_capabilities=frozenset({'camera'} if able else ()),
-                **values)  # type: ignore[arg-type]
+                required_capabilities=frozenset({'camera'} if able else ()), **values)
 
 
 def _with_aboard(rng: np.random.Generator, uav: Uav, tasks: list[Task]) -> Uav:
@@ -188,11 +188,11 @@ def _untrue(problem: SmallProblem, task: Task, reason: str) -> Iterator[str]:
         yield f'{task.id}: {reason!r}, but a UAV {"can" if can else "cannot"} serve it alone'
     if 'worth' in reason and math.isinf(problem.rules.objective.unserved):
         yield f'{task.id}: {reason!r}, but every task that can be served is served'
-    told = re.match(r'latest (-?\d+) s; the earliest arrival is (\d+) s \((\w+)\)', reason)
-    if told:
+    stated = re.match(r'latest (-?\d+) s; the earliest arrival is (\d+) s \((\w+)\)', reason)
+    if stated:
         arrival = min((_start_alone(problem, uav, task) for uav in problem.uavs
                        if _may(uav, task)), default=math.inf)
-        if abs(arrival - float(told[2])) > 0.51 or abs(task.latest - float(told[1])) > 0.51:
+        if abs(arrival - float(stated[2])) > 0.51 or abs(task.latest - float(stated[1])) > 0.51:
             yield f'{task.id}: {reason!r}, but the earliest arrival is {arrival:.1f} s'
 
 

@@ -31,7 +31,12 @@ LegOf = Callable[[Uav, Point, Point], tuple[float, float]]  # length [m] and fli
 
 @dataclass(frozen=True, slots=True)
 class Held:
-    """What UAVs hold already, by UAV id."""
+    """What UAVs hold already, by UAV id.
+
+    Arguments of methods:
+        uav: of the fleet.
+        task: any.
+    """
 
     locked: Mapping[str, Sequence[str]] = field(default_factory=dict)  # first tasks of its route
     aboard: Mapping[str, frozenset[str]] = field(default_factory=dict)  # payload on board
