@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A problem with time, and its routes, as arrays: one row a node, and what the columns hold.
+"""A problem with time, and its routes, as arrays: one row a node.
+
+columns.py names the columns.
 
 With m UAVs, n tasks and b base visits of each UAV the nodes are: UAV starts 0..m-1, tasks
 m..m+n-1, route ends m+n..2m+n-1, then b base visits for each UAV. A route is a doubly linked list
@@ -24,36 +26,6 @@ Links = NDArray[np.uint32]  # unsigned: numba omits the check for negative indic
 LINK: Any = np.uint32
 TOLERANCE = 1e-7  # [s], [m] or [kg] of rounding
 
-# columns of TimedArrays.fixed, by node
-X, Y, Z, SERVICE, OPENS, CLOSES, RELEASE, LOAD = range(8)  # RELEASE: no earlier leg to it
-TRIP_RELEASE, DUE, WEIGHT, WORTH, WIDTH, REMOTE = range(8, 14)
-FIXED = 16
-# columns of TimedArrays.begin, by UAV: ready for its first leg, time in the air by then, latest
-# departure, length and time of its route without tasks, whether this trip began at the base,
-# cruise speed, whether it has locked tasks
-READY, IN_AIR, LAST_DEPARTURE, EMPTY_LENGTH, EMPTY_TIME, GROUNDED, CRUISE, HELD = range(8)
-BEGIN = 8
-# columns of TimedArrays.weight
-# BY_END: of the end of each route, which leads the search to an early last one; BY_EXCESS: of a
-# metre beyond range or endurance, inf: not allowed
-BY_DISTANCE, BY_FINISH, BY_LATENESS, BY_END, BY_EXCESS = range(5)
-# columns of TimedRoutes.link, by node
-NEXT, PREV, UAV, HEAD = range(4)  # UAV: m where a task is in no route
-# columns of TimedRoutes.row, by node
-START, DEPARTURE, LATEST, WARP_BEFORE, WARP_AFTER, LEG, TIME, WAITS = range(8)
-RATE, LOAD_BEFORE, LENGTH_BEFORE, LASTED, LEFT, LASTS, EARLY = range(8, 15)
-ROW = 16
-# columns of TimedRoutes.trip and TimedArrays.limit, by slot
-CARRIED, FLOWN, AIRBORNE = range(3)  # load, length, duration
-TRIP = 4
-# columns of TimedRoutes.route, by UAV; WARP to ENDURANCE_EXCESS are also those of sums
-WARP, LOAD_EXCESS, RANGE_EXCESS, ENDURANCE_EXCESS, METRES, TIME_COST, END, TASKS = range(8)
-ROUTE = 8
-FINISH, UNSERVED, SERVED_WORTH = range(6, 9)  # further columns of TimedRoutes.sums
-SUMS = 9
-# entries of TimedRoutes.count
-INFEASIBLE, SERVED = range(2)  # routes with excess, tasks served
-
 
 class TimedArrays(NamedTuple):
     """A problem as kernels take it: m UAVs, n tasks, k neighbours of each."""
@@ -71,11 +43,11 @@ class TimedArrays(NamedTuple):
     pairs: Pairs  # lengths by point
     times: PathTimes  # around zones
     point: Ints  # by node: its index in Distances
-    fixed: Floats  # (nodes, FIXED)
+    fixed: Floats  # (nodes, columns from X)
     pace: Floats  # (m, 3) [s/m] horizontally, up, down
     speeds: Ints  # (m) class of speeds
-    begin: Floats  # (m, BEGIN)
-    limit: Floats  # (slots, TRIP) capacity, range, endurance
+    begin: Floats  # (m, columns from READY)
+    limit: Floats  # (slots, 4) columns from CARRIED: capacity, range, endurance
     compatible: NDArray[np.bool_]  # (slot kinds 2, m, n): in the first trip, in later ones
     restricted: NDArray[np.bool_]  # (n) some UAV may not serve it
     price: Floats  # (4) of excess of WARP, LOAD, RANGE, ENDURANCE; inf: not allowed
@@ -94,9 +66,9 @@ class TimedRoutes(NamedTuple):
     """Routes of all UAVs."""
 
     link: Links  # (nodes, 4)
-    row: Floats  # (nodes, ROW)
-    trip: Floats  # (slots, TRIP)
-    route: Floats  # (m, ROUTE)
-    sums: Floats  # (SUMS)
-    count: Ints  # (2)
+    row: Floats  # (nodes, columns from START)
+    trip: Floats  # (slots, 4) columns from CARRIED
+    route: Floats  # (m, columns from WARP)
+    sums: Floats  # (9) columns from WARP, without END and TASKS
+    counts: Ints  # (2)
     empty: Ints  # (classes) number of empty routes

@@ -6,31 +6,23 @@ import math
 
 from uav_task_alloc.geometry.outline import Floats
 from uav_task_alloc.kernel import inline_kernel, kernel
-from uav_task_alloc.solver.timed.arrays import (
-    CLOSES,
-    OPENS,
-    REMOTE,
-    SERVICE,
-    TimedArrays,
-    X,
-    Y,
-    Z,
-)
+from uav_task_alloc.solver.timed import columns as at
+from uav_task_alloc.solver.timed.arrays import TimedArrays
 
 
 @inline_kernel
 def _square_between(a: TimedArrays, i: int, j: int) -> float:
     """Squared distance [m^2] of two nodes. O(1)."""
-    x, y = a.fixed[i, X] - a.fixed[j, X], a.fixed[i, Y] - a.fixed[j, Y]
-    z = a.fixed[i, Z] - a.fixed[j, Z]
+    x, y = a.fixed[i, at.X] - a.fixed[j, at.X], a.fixed[i, at.Y] - a.fixed[j, at.Y]
+    z = a.fixed[i, at.Z] - a.fixed[j, at.Z]
     return float(x * x + y * y + z * z)
 
 
 @inline_kernel
 def _may_be_adjacent(a: TimedArrays, t: int, s: int, least: float) -> bool:
     """Whether the windows allow task s directly after t, or t after s, `least` [s] apart. O(1)."""
-    return (a.fixed[t, OPENS] + a.fixed[t, SERVICE] + least <= a.fixed[s, CLOSES]
-            or a.fixed[s, OPENS] + a.fixed[s, SERVICE] + least <= a.fixed[t, CLOSES])
+    return bool(a.fixed[t, at.OPENS] + a.fixed[t, at.SERVICE] + least <= a.fixed[s, at.CLOSES]
+            or a.fixed[s, at.OPENS] + a.fixed[s, at.SERVICE] + least <= a.fixed[t, at.CLOSES])
 
 
 @kernel
@@ -47,7 +39,7 @@ def fill_near(a: TimedArrays, squares: Floats, pace: float) -> None:
             square = _square_between(a, t, s)
             if (kept == k and square >= squares[k - 1]) or i == j or k == 0:
                 continue
-            x, y = a.fixed[s, X] - a.fixed[t, X], a.fixed[s, Y] - a.fixed[t, Y]
+            x, y = a.fixed[s, at.X] - a.fixed[t, at.X], a.fixed[s, at.Y] - a.fixed[t, at.Y]
             if not _may_be_adjacent(a, t, s, math.sqrt(x * x + y * y) * pace):
                 continue
             place = min(kept, k - 1)
@@ -81,4 +73,4 @@ def fill_near_classes(a: TimedArrays, squares: Floats) -> None:
                 place -= 1
             squares[place], a.near_class[i, place] = square, k
             kept = min(kept + 1, c)
-        a.fixed[t, REMOTE] = math.sqrt(squares[0]) if kept > 0 else 0.0
+        a.fixed[t, at.REMOTE] = math.sqrt(squares[0]) if kept > 0 else 0.0

@@ -15,37 +15,8 @@ from uav_task_alloc.geometry.outline import Floats, Ints
 from uav_task_alloc.model import Uav
 from uav_task_alloc.solver.answer import leg_between
 from uav_task_alloc.solver.problem import Problem, excess_cost
-from uav_task_alloc.solver.timed.arrays import (
-    AIRBORNE,
-    BEGIN,
-    CARRIED,
-    CLOSES,
-    DUE,
-    EMPTY_LENGTH,
-    EMPTY_TIME,
-    FIXED,
-    FLOWN,
-    IN_AIR,
-    LINK,
-    LOAD,
-    OPENS,
-    READY,
-    RELEASE,
-    REMOTE,
-    ROUTE,
-    ROW,
-    SERVICE,
-    SUMS,
-    TRIP,
-    TRIP_RELEASE,
-    WEIGHT,
-    WIDTH,
-    WORTH,
-    TimedArrays,
-    TimedRoutes,
-    X,
-    Z,
-)
+from uav_task_alloc.solver.timed import columns as at
+from uav_task_alloc.solver.timed.arrays import LINK, TimedArrays, TimedRoutes
 from uav_task_alloc.solver.timed.near import fill_near, fill_near_classes
 from uav_task_alloc.solver.timed.order import reset
 from uav_task_alloc.solver.timed.path_times import Speeds, path_times
@@ -62,7 +33,7 @@ class TimedProblem:
 
     base: Problem
     arrays: TimedArrays
-    aboard: Mapping[str, frozenset[str]]  # task ids by UAV id
+    aboard: Mapping[str, frozenset[str]]  # task ids by at.OF_UAV id
     scale: float  # mean leg to the nearest neighbour, in cost
 
     @property
@@ -84,7 +55,7 @@ def make_timed(problem: Problem, aboard: Mapping[str, frozenset[str]],
     m, n = len(uavs), len(tasks)
     visits = _visits(problem)
     held = [_after_locked(problem, u, aboard) for u in range(m)]
-    begin = np.array([each.begin for each in held]).reshape(m, BEGIN)
+    begin = np.array([each.begin for each in held]).reshape(m, at.BEGIN_COLUMNS)
     limit = _limits(problem, visits, held)
     fixed = _fixed(problem, visits, aboard)
     class_of = _classes(problem, begin, limit, aboard)
@@ -163,27 +134,28 @@ def _fixed(problem: Problem, visits: int, aboard: Mapping[str, frozenset[str]]) 
     uavs, tasks = problem.uavs, problem.tasks
     m, n, goal = len(uavs), len(tasks), problem.rules.objective
     points = _points(m, n, visits)
-    fixed = np.zeros((len(points), FIXED))
-    fixed[:, X:Z + 1] = problem.distances.points[points]
-    fixed[:, [OPENS, RELEASE, TRIP_RELEASE]] = -math.inf
-    fixed[:, [CLOSES, DUE]] = math.inf
+    fixed = np.zeros((len(points), at.FIXED_COLUMNS))
+    fixed[:, at.X:at.Z + 1] = problem.distances.points[points]
+    fixed[:, [at.OPENS, at.RELEASE, at.TRIP_RELEASE]] = -math.inf
+    fixed[:, [at.CLOSES, at.DUE]] = math.inf
     rows = fixed[m:m + n]
     total = math.fsum(task.value for task in (*tasks, *(
         task for held in problem.locked.values() for task in held)))
     hard = math.isinf(goal.lateness)
     loaded = {name for names in aboard.values() for name in names}
     for row, task in zip(rows, tasks, strict=True):
-        row[SERVICE], row[OPENS] = task.service_time, task.earliest
-        row[CLOSES if hard else DUE] = task.latest
+        row[at.SERVICE], row[at.OPENS] = task.service_time, task.earliest
+        row[at.CLOSES if hard else at.DUE] = task.latest
         release = task.release if task.release > 0.0 else -math.inf
-        row[TRIP_RELEASE if task.payload > 0.0 and task.id not in loaded else RELEASE] = release
-        row[LOAD] = task.payload
-        row[WEIGHT], row[WORTH] = goal.response * task.value / total, task.value
-        row[WIDTH] = min(task.latest, 1e9) - max(task.earliest, -1e9)
+        whole_trip = task.payload > 0.0 and task.id not in loaded
+        row[at.TRIP_RELEASE if whole_trip else at.RELEASE] = release
+        row[at.LOAD] = task.payload
+        row[at.WEIGHT], row[at.WORTH] = goal.response * task.value / total, task.value
+        row[at.WIDTH] = min(task.latest, 1e9) - max(task.earliest, -1e9)
     until = np.array([uav.available_until for uav in uavs])
-    fixed[m + n:2 * m + n, CLOSES] = until
-    fixed[2 * m + n:, CLOSES] = np.repeat(until, visits)
-    fixed[2 * m + n:, SERVICE] = np.repeat([uav.turnaround for uav in uavs], visits)
+    fixed[m + n:2 * m + n, at.CLOSES] = until
+    fixed[2 * m + n:, at.CLOSES] = np.repeat(until, visits)
+    fixed[2 * m + n:, at.SERVICE] = np.repeat([uav.turnaround for uav in uavs], visits)
     return fixed
 
 
@@ -240,17 +212,17 @@ def _home_seconds(problem: Problem, u: int, metres: float) -> float:
 def _limits(problem: Problem, visits: int, held: Sequence[_Begin]) -> Floats:
     """(slots, TRIP) capacity, range and endurance of each trip; what is used already stays."""
     m = len(problem.uavs)
-    limit = np.full((m * (1 + visits), TRIP), math.inf)
+    limit = np.full((m * (1 + visits), at.TRIP_COLUMNS), math.inf)
     for u, uav in enumerate(problem.uavs):
         begin = held[u].begin
         if uav.at_base:
-            limit[u, CARRIED] = max(0.0, uav.payload_capacity - held[u].load)
-        limit[u, FLOWN] = max(problem.arrays.range_left[u], begin[EMPTY_LENGTH])
-        limit[u, AIRBORNE] = max(uav.endurance, begin[IN_AIR] + begin[EMPTY_TIME])
+            limit[u, at.CARRIED] = max(0.0, uav.payload_capacity - held[u].load)
+        limit[u, at.FLOWN] = max(problem.arrays.range_left[u], begin[at.EMPTY_LENGTH])
+        limit[u, at.AIRBORNE] = max(uav.endurance, begin[at.IN_AIR] + begin[at.EMPTY_TIME])
         rows = limit[m + u * visits:m + (u + 1) * visits]
-        rows[:, CARRIED] = uav.payload_capacity
-        rows[:, FLOWN] = uav.range if uav.full_range is None else uav.full_range
-        rows[:, AIRBORNE] = (uav.endurance if uav.full_endurance is None
+        rows[:, at.CARRIED] = uav.payload_capacity
+        rows[:, at.FLOWN] = uav.range if uav.full_range is None else uav.full_range
+        rows[:, at.AIRBORNE] = (uav.endurance if uav.full_endurance is None
                              else uav.full_endurance)
     return limit
 
@@ -297,7 +269,7 @@ def _fill(problem: Problem, a: TimedArrays) -> float:
     fill_near(a, np.empty(max(1, a.near.shape[1])), pace)
     fill_near_classes(a, np.empty(max(1, a.near_class.shape[1])))
     some = a.near_count > 0
-    legs = a.near_length[some, 0] if some.any() else a.fixed[a.uavs:a.ends, REMOTE]
+    legs = a.near_length[some, 0] if some.any() else a.fixed[a.uavs:a.ends, at.REMOTE]
     metres = max(float(legs.mean()), 1e-6)
     goal = problem.rules.objective
     return metres * goal.distance + metres * pace * (goal.finish + goal.response)
@@ -311,9 +283,9 @@ def _set_prices(problem: Problem, a: TimedArrays, scale: float) -> None:
     values = np.array([task.value for task in tasks])
     if math.isfinite(goal.unserved):
         announced = np.array([task.announced for task in tasks])
-        a.unserved[:] = goal.unserved * values + a.fixed[a.uavs:a.ends, WEIGHT] * announced
+        a.unserved[:] = goal.unserved * values + a.fixed[a.uavs:a.ends, at.WEIGHT] * announced
     else:
-        far = float(a.fixed[a.uavs:a.ends, REMOTE].mean())
+        far = float(a.fixed[a.uavs:a.ends, at.REMOTE].mean())
         least = max(UNSERVED_LEGS * scale, 2.0 * far * goal.distance)
         a.unserved[:] = values / values.mean() * max(least, _longest_cost(problem, a, far))
     a.price[:] = a.weight[4] if not problem.rules.hard else math.inf
@@ -325,10 +297,10 @@ def _longest_cost(problem: Problem, a: TimedArrays, far: float) -> float:
     goal, rows = problem.rules.objective, a.fixed[a.uavs:a.ends]
     if not a.timed_cost:
         return 0.0
-    legs = rows[:, SERVICE].sum() + far * 2.0 * float(a.pace[:, 0].max()) * len(rows)
+    legs = rows[:, at.SERVICE].sum() + far * 2.0 * float(a.pace[:, 0].max()) * len(rows)
     opened = max(float(rows[:, column][np.isfinite(rows[:, column])].max(initial=0.0))
-                 for column in (OPENS, RELEASE, TRIP_RELEASE))
-    horizon = opened + a.begin[:, READY].max(initial=0.0) + legs / max(1, a.uavs)
+                 for column in (at.OPENS, at.RELEASE, at.TRIP_RELEASE))
+    horizon = opened + a.begin[:, at.READY].max(initial=0.0) + legs / max(1, a.uavs)
     late = goal.lateness if math.isfinite(goal.lateness) else 0.0
     return float(horizon * (goal.finish + goal.response + late))
 
@@ -337,8 +309,9 @@ def empty_timed_routes(a: TimedArrays) -> TimedRoutes:
     """New routes without tasks."""
     nodes = len(a.fixed)
     routes = TimedRoutes(
-        np.zeros((nodes, 4), LINK), np.zeros((nodes, ROW)), np.zeros((len(a.limit), TRIP)),
-        np.zeros((a.uavs, ROUTE)), np.zeros(SUMS), np.zeros(2, np.int64),
+        np.zeros((nodes, 4), LINK), np.zeros((nodes, at.ROW_COLUMNS)),
+        np.zeros((len(a.limit), at.TRIP_COLUMNS)),
+        np.zeros((a.uavs, at.ROUTE_COLUMNS)), np.zeros(at.SUM_COLUMNS), np.zeros(2, np.int64),
         np.zeros(max(1, a.first_member.size - 1), np.int64))
     reset(a, routes)
     return routes

@@ -10,19 +10,8 @@ import numpy as np
 from uav_task_alloc.geometry.outline import Floats
 from uav_task_alloc.kernel import kernel
 from uav_task_alloc.solver.reasons import lasting_reason, way_reason
-from uav_task_alloc.solver.timed.arrays import (
-    CLOSES,
-    IN_AIR,
-    LAST_DEPARTURE,
-    LINK,
-    OPENS,
-    READY,
-    RELEASE,
-    SERVICE,
-    TRIP_RELEASE,
-    TimedArrays,
-    TimedRoutes,
-)
+from uav_task_alloc.solver.timed import columns as at
+from uav_task_alloc.solver.timed.arrays import LINK, TimedArrays, TimedRoutes
 from uav_task_alloc.solver.timed.insertion import BASE_BEFORE, cost_at, free_visit, split_cost
 from uav_task_alloc.solver.timed.problem import TimedProblem, empty_timed_routes
 from uav_task_alloc.solver.timed.segments import leg_of
@@ -57,15 +46,15 @@ def needs_alone(a: TimedArrays, t: int, needs: Floats) -> None:
     for u in range(a.uavs):
         metres, seconds = leg_of(a, LINK(u), LINK(u), LINK(t))
         more, further = leg_of(a, LINK(u), LINK(t), LINK(a.ends + u))
-        hold = max(a.fixed[t, RELEASE], a.fixed[t, TRIP_RELEASE] + a.begin[u, IN_AIR])
-        start = max(max(a.begin[u, READY], hold) + seconds, a.fixed[t, OPENS])
-        lasted = a.begin[u, IN_AIR] + seconds
-        opened = max(a.fixed[t, OPENS], a.fixed[t, RELEASE] + seconds)
-        lasted += max(0.0, opened - lasted - a.begin[u, LAST_DEPARTURE])
-        needs[u, 0], needs[u, 1] = start, max(0.0, start - a.fixed[t, CLOSES])
+        hold = max(a.fixed[t, at.RELEASE], a.fixed[t, at.TRIP_RELEASE] + a.begin[u, at.IN_AIR])
+        start = max(max(a.begin[u, at.READY], hold) + seconds, a.fixed[t, at.OPENS])
+        lasted = a.begin[u, at.IN_AIR] + seconds
+        opened = max(a.fixed[t, at.OPENS], a.fixed[t, at.RELEASE] + seconds)
+        lasted += max(0.0, opened - lasted - a.begin[u, at.LAST_DEPARTURE])
+        needs[u, 0], needs[u, 1] = start, max(0.0, start - a.fixed[t, at.CLOSES])
         needs[u, 2] = metres + more
-        needs[u, 3] = lasted + a.fixed[t, SERVICE] + further
-        needs[u, 4] = start + a.fixed[t, SERVICE] + further
+        needs[u, 3] = lasted + a.fixed[t, at.SERVICE] + further
+        needs[u, 4] = start + a.fixed[t, at.SERVICE] + further
 
 
 def timed_reasons(problem: TimedProblem, missing: Sequence[int]) -> dict[str, str]:
@@ -120,7 +109,7 @@ def _load_reason(problem: TimedProblem, i: int) -> str:
                 f'{most.payload_capacity:g} kg ({most.id})')
     if not a.visits and all(not uav.at_base for uav in able
                             if uav.payload_capacity >= task.payload):
-        return f'payload {task.payload:g} kg; every UAV that could carry it is in the air'
+        return f'payload {task.payload:g} kg; every at.OF_UAV that could carry it is in the air'
     return ''
 
 
@@ -131,7 +120,7 @@ def _needs_reason(problem: TimedProblem, i: int) -> str:
     needs_alone(a, a.uavs + i, needs)
     able = [int(u) for u in np.flatnonzero(a.compatible[0, :, i])]
     if not able:
-        return f'payload {task.payload:g} kg: no UAV on the ground may serve it'
+        return f'payload {task.payload:g} kg: no at.OF_UAV on the ground may serve it'
     late = [u for u in able if needs[u, _LATE] > 0.0]
     if len(late) == len(able) and not a.visits:
         first = min(able, key=lambda u: float(needs[u, _ARRIVAL]))
@@ -140,7 +129,7 @@ def _needs_reason(problem: TimedProblem, i: int) -> str:
     able.sort(key=lambda u: float(needs[u, _LENGTH]))
     texts = [_lack(problem, i, u, needs[u]) for u in able[:_NAMED]]
     more = f'; nor {len(able) - _NAMED} others' if len(able) > _NAMED else ''
-    return 'no UAV can serve it: ' + '; '.join(texts) + more
+    return 'no at.OF_UAV can serve it: ' + '; '.join(texts) + more
 
 
 def _lack(problem: TimedProblem, i: int, u: int, need: Floats) -> str:

@@ -16,30 +16,8 @@ from uav_task_alloc.geometry.outline import Floats, Ints
 from uav_task_alloc.kernel import inline_kernel, kernel
 from uav_task_alloc.solver.rng import RngState, below, uniform
 from uav_task_alloc.solver.ruin import MAX_STRING, PRESERVE_RATE, SPLIT_RATE
-from uav_task_alloc.solver.timed.arrays import (
-    AIRBORNE,
-    CARRIED,
-    CLOSES,
-    FLOWN,
-    GROUNDED,
-    LINK,
-    LOAD,
-    NEXT,
-    OPENS,
-    PREV,
-    REMOTE,
-    ROUTE,
-    ROW,
-    SERVED,
-    SUMS,
-    TASKS,
-    TRIP,
-    UAV,
-    WIDTH,
-    Links,
-    TimedArrays,
-    TimedRoutes,
-)
+from uav_task_alloc.solver.timed import columns as at
+from uav_task_alloc.solver.timed.arrays import LINK, Links, TimedArrays, TimedRoutes
 from uav_task_alloc.solver.timed.insertion import (
     NO_VISIT,
     cost_at,
@@ -55,7 +33,7 @@ ABSENT_SEED_RATE = 0.5  # share of rounds that start at an absent task, if there
 ANYWHERE_RATE = 0.02  # share of tasks without a place among neighbours that try all routes
 ORDERS = 15  # weights of the orders of insertion
 
-# entries of Round.count
+# entries of Round.counts
 SAVED, SAVED_ROUTES, REMOVED, ABSENT, SERIAL, PATIENCE = range(6)
 
 
@@ -64,117 +42,119 @@ class Round(NamedTuple):
 
     node: Links  # (nodes) saved rows: their nodes
     link: Links  # (nodes, 4)
-    row: Floats  # (nodes, ROW)
+    row: Floats  # (nodes, at.ROW_COLUMNS)
     uav: Ints  # (m) saved routes: their UAVs
-    route: Floats  # (m, ROUTE)
-    trip: Floats  # (slots, TRIP)
-    sums: Floats  # (SUMS)
-    routes_count: Ints  # (2) TimedRoutes.count before the round
+    route: Floats  # (m, at.ROUTE_COLUMNS)
+    trip: Floats  # (slots, at.TRIP_COLUMNS)
+    sums: Floats  # (at.SUM_COLUMNS)
+    routes_count: Ints  # (2) TimedRoutes.counts before the round
     removed: Links  # task nodes to be inserted
     order: Floats  # sort key of each: smallest first
     saved_in: Ints  # (m) serial of the round that saved this route last
     absent: Links  # task nodes in no route at the last listing
-    count: Ints  # (6)
+    counts: Ints  # (6)
 
 
 def empty_round(a: TimedArrays) -> Round:
     """An empty round with room for any."""
     nodes, m, n = len(a.fixed), a.uavs, a.ends - a.uavs
-    return Round(np.empty(nodes, LINK), np.empty((nodes, 4), LINK), np.empty((nodes, ROW)),
-                 np.empty(m, np.int64), np.empty((m, ROUTE)), np.empty((len(a.limit), TRIP)),
-                 np.empty(SUMS), np.empty(2, np.int64), np.empty(n + 1, LINK), np.empty(n + 1),
-                 np.full(m, -1, np.int64), np.empty(n + 1, LINK), np.zeros(6, np.int64))
+    return Round(np.empty(nodes, LINK), np.empty((nodes, 4), LINK),
+                 np.empty((nodes, at.ROW_COLUMNS)), np.empty(m, np.int64),
+                 np.empty((m, at.ROUTE_COLUMNS)), np.empty((len(a.limit), at.TRIP_COLUMNS)),
+                 np.empty(at.SUM_COLUMNS), np.empty(2, np.int64), np.empty(n + 1, LINK),
+                 np.empty(n + 1), np.full(m, -1, np.int64), np.empty(n + 1, LINK),
+                 np.zeros(6, np.int64))
 
 
 @inline_kernel
 def begin_round(r: TimedRoutes, w: Round) -> None:
     """Begin a round. O(1)."""
-    w.count[SAVED] = w.count[SAVED_ROUTES] = w.count[REMOVED] = 0
-    w.count[SERIAL] += 1
-    for c in range(SUMS):
+    w.counts[SAVED] = w.counts[SAVED_ROUTES] = w.counts[REMOVED] = 0
+    w.counts[SERIAL] += 1
+    for c in range(at.SUM_COLUMNS):
         w.sums[c] = r.sums[c]
-    w.routes_count[0], w.routes_count[1] = r.count[0], r.count[1]
+    w.routes_count[0], w.routes_count[1] = r.counts[0], r.counts[1]
 
 
 @inline_kernel
 def save_route(a: TimedArrays, r: TimedRoutes, w: Round, u: int) -> None:
     """Save UAV u's route, once in a round. O(tasks)."""
-    if w.saved_in[u] == w.count[SERIAL]:
+    if w.saved_in[u] == w.counts[SERIAL]:
         return
-    w.saved_in[u] = w.count[SERIAL]
-    k = w.count[SAVED_ROUTES]
+    w.saved_in[u] = w.counts[SERIAL]
+    k = w.counts[SAVED_ROUTES]
     w.uav[k] = u
-    w.count[SAVED_ROUTES] += 1
-    for c in range(ROUTE):
+    w.counts[SAVED_ROUTES] += 1
+    for c in range(at.ROUTE_COLUMNS):
         w.route[k, c] = r.route[u, c]
-    i, k, end = LINK(u), w.count[SAVED], a.ends + u
+    i, k, end = LINK(u), w.counts[SAVED], a.ends + u
     while True:
         w.node[k] = i
         for c in range(4):
             w.link[k, c] = r.link[i, c]
-        for c in range(ROW):
+        for c in range(at.ROW_COLUMNS):
             w.row[k, c] = r.row[i, c]
         if not is_task(a, i) and i != end:
             slot = slot_of(a, i)
-            for c in range(TRIP):
+            for c in range(at.TRIP_COLUMNS):
                 w.trip[slot, c] = r.trip[slot, c]
         k += 1
         if i == end:
             break
-        i = r.link[i, NEXT]
-    w.count[SAVED] = k
+        i = r.link[i, at.NEXT]
+    w.counts[SAVED] = k
 
 
 @inline_kernel
 def take_back(a: TimedArrays, r: TimedRoutes, w: Round) -> None:
     """Restore all routes that the round changed. O(their tasks)."""
-    for k in range(w.count[REMOVED]):
-        r.link[w.removed[k], UAV] = LINK(a.uavs)
-    for k in range(w.count[SAVED_ROUTES]):
+    for k in range(w.counts[REMOVED]):
+        r.link[w.removed[k], at.OF_UAV] = LINK(a.uavs)
+    for k in range(w.counts[SAVED_ROUTES]):
         u = w.uav[k]
-        if (r.route[u, TASKS] == 0.0) != (w.route[k, TASKS] == 0.0):
-            r.empty[a.class_of[u]] += 1 if w.route[k, TASKS] == 0.0 else -1
-        for c in range(ROUTE):
+        if (r.route[u, at.TASKS] == 0.0) != (w.route[k, at.TASKS] == 0.0):
+            r.empty[a.class_of[u]] += 1 if w.route[k, at.TASKS] == 0.0 else -1
+        for c in range(at.ROUTE_COLUMNS):
             r.route[u, c] = w.route[k, c]
         for base in range(a.bases + u * a.visits, a.bases + (u + 1) * a.visits):
-            r.link[base, UAV] = LINK(a.uavs)
-    for k in range(w.count[SAVED]):
+            r.link[base, at.OF_UAV] = LINK(a.uavs)
+    for k in range(w.counts[SAVED]):
         i = w.node[k]
         for c in range(4):
             r.link[i, c] = w.link[k, c]
-        for c in range(ROW):
+        for c in range(at.ROW_COLUMNS):
             r.row[i, c] = w.row[k, c]
         if i < a.uavs or i >= a.bases:
             slot = slot_of(a, i)
-            for c in range(TRIP):
+            for c in range(at.TRIP_COLUMNS):
                 r.trip[slot, c] = w.trip[slot, c]
-    for c in range(SUMS):
+    for c in range(at.SUM_COLUMNS):
         r.sums[c] = w.sums[c]
-    r.count[0], r.count[1] = w.routes_count[0], w.routes_count[1]
+    r.counts[0], r.counts[1] = w.routes_count[0], w.routes_count[1]
 
 
 @inline_kernel
 def _take(r: TimedRoutes, w: Round, t: int) -> None:
     """Put t on the list of tasks to be inserted. O(1)."""
-    w.removed[w.count[REMOVED]] = t
-    w.count[REMOVED] += 1
+    w.removed[w.counts[REMOVED]] = t
+    w.counts[REMOVED] += 1
 
 
 @inline_kernel
 def _may_begin_at_base(a: TimedArrays, u: int) -> bool:
     """Whether UAV u may need a visit of its base before its first task. O(1)."""
     later = a.uavs + u * a.visits
-    return (a.begin[u, GROUNDED] == 0.0 or a.limit[u, FLOWN] < a.limit[later, FLOWN]
-            or a.limit[u, AIRBORNE] < a.limit[later, AIRBORNE]
-            or a.limit[u, CARRIED] < a.limit[later, CARRIED])
+    return bool(a.begin[u, at.GROUNDED] == 0.0 or a.limit[u, at.FLOWN] < a.limit[later, at.FLOWN]
+            or a.limit[u, at.AIRBORNE] < a.limit[later, at.AIRBORNE]
+            or a.limit[u, at.CARRIED] < a.limit[later, at.CARRIED])
 
 
 @inline_kernel
 def drop_idle_visits(a: TimedArrays, r: TimedRoutes, u: int) -> None:
     """Take visits of the base out of UAV u's route that begin or end no trip. O(tasks)."""
-    i, end = r.link[u, NEXT], a.ends + u
+    i, end = r.link[u, at.NEXT], a.ends + u
     while i != end:
-        then, last = r.link[i, NEXT], r.link[i, PREV]
+        then, last = r.link[i, at.NEXT], r.link[i, at.PREV]
         if not is_task(a, i):
             idle = not is_task(a, last) and not (last == u and _may_begin_at_base(a, u))
             if idle or not is_task(a, then):
@@ -186,20 +166,20 @@ def drop_idle_visits(a: TimedArrays, r: TimedRoutes, u: int) -> None:
 def _remove_string(a: TimedArrays, r: TimedRoutes, w: Round, c: int, size: int,
                    rng: RngState) -> None:
     """Remove `size` tasks around c; sometimes preserve a substring. O(tasks of the route)."""
-    u = r.link[c, UAV]
-    tasks = r.route[u, TASKS]
+    u = r.link[c, at.OF_UAV]
+    tasks = r.route[u, at.TASKS]
     count, preserved = int(tasks), 0
     if size > 1 and size < count and uniform(rng) < SPLIT_RATE:
         preserved = 1
         while size + preserved < count and uniform(rng) < PRESERVE_RATE:
             preserved += 1
     t, back = c, below(rng, size + preserved)
-    while back > 0 and r.link[t, PREV] >= a.uavs:
-        t, back = r.link[t, PREV], back - 1
+    while back > 0 and r.link[t, at.PREV] >= a.uavs:
+        t, back = r.link[t, at.PREV], back - 1
     keep_from = 1 + below(rng, size - 1) if preserved > 0 else size
-    first, i = r.link[t, PREV], 0
+    first, i = r.link[t, at.PREV], 0
     while i < size + preserved and (t < a.ends or t >= a.bases):
-        then = r.link[t, NEXT]
+        then = r.link[t, at.NEXT]
         if is_task(a, t):
             if i < keep_from or i >= keep_from + preserved:
                 unlink(a, r, t)
@@ -214,19 +194,19 @@ def _remove_string(a: TimedArrays, r: TimedRoutes, w: Round, c: int, size: int,
 @inline_kernel
 def list_absent(a: TimedArrays, r: TimedRoutes, w: Round) -> None:
     """List the tasks in no route that could be in one. O(n)."""
-    w.count[ABSENT] = 0
+    w.counts[ABSENT] = 0
     for t in range(a.uavs, a.ends):
-        if r.link[t, UAV] == a.uavs and a.unserved[t - a.uavs] > 0.0:
-            w.absent[w.count[ABSENT]] = t
-            w.count[ABSENT] += 1
+        if r.link[t, at.OF_UAV] == a.uavs and a.unserved[t - a.uavs] > 0.0:
+            w.absent[w.counts[ABSENT]] = t
+            w.counts[ABSENT] += 1
 
 
 @inline_kernel
 def _seed(a: TimedArrays, r: TimedRoutes, w: Round, rng: RngState) -> Any:
     """The task that a round starts at: often one in no route. O(1)."""
-    if w.count[ABSENT] > 0 and uniform(rng) < ABSENT_SEED_RATE:
-        t = w.absent[below(rng, w.count[ABSENT])]
-        if r.link[t, UAV] == a.uavs:
+    if w.counts[ABSENT] > 0 and uniform(rng) < ABSENT_SEED_RATE:
+        t = w.absent[below(rng, w.counts[ABSENT])]
+        if r.link[t, at.OF_UAV] == a.uavs:
             return t
     return LINK(a.uavs + below(rng, a.ends - a.uavs))
 
@@ -243,23 +223,23 @@ def ruin_strings(a: TimedArrays, r: TimedRoutes, w: Round, mean: float, most_abs
     used = 0
     for k in range(a.first_member.size - 1):
         used += a.first_member[k + 1] - a.first_member[k] - r.empty[k]
-    served = max(1.0, r.count[SERVED] / max(1, used))
+    served = max(1.0, r.counts[at.SERVED] / max(1, used))
     longest = min(float(MAX_STRING), served)
     strings = int(1.0 + uniform(rng) * (4.0 * mean / (1.0 + longest) - 1.0))
     left_out = 0
     for m in range(-1, a.near_count[seed - a.uavs]):
         c = seed if m < 0 else a.near[seed - a.uavs, m]
-        u = r.link[c, UAV]
+        u = r.link[c, at.OF_UAV]
         if u == none:
             if left_out < most_absent and a.unserved[c - a.uavs] > 0.0 and not _is_taken(w, c):
                 _take(r, w, c)
                 left_out += 1
-        elif strings > 0 and w.saved_in[u] != w.count[SERIAL]:
+        elif strings > 0 and w.saved_in[u] != w.counts[SERIAL]:
             save_route(a, r, w, u)
-            size = 1 + int(uniform(rng) * min(longest, r.route[u, TASKS]))
+            size = 1 + int(uniform(rng) * min(longest, r.route[u, at.TASKS]))
             _remove_string(a, r, w, c, size, rng)
             strings -= 1
-        if strings == 0 and (w.count[ABSENT] == 0 or left_out >= most_absent):
+        if strings == 0 and (w.counts[ABSENT] == 0 or left_out >= most_absent):
             break
     return seed
 
@@ -268,7 +248,7 @@ def ruin_strings(a: TimedArrays, r: TimedRoutes, w: Round, mean: float, most_abs
 def _is_taken(w: Round, c: int) -> bool:
     """Whether c is on the list of tasks to be inserted. O(removed)."""
     found = False
-    for k in range(w.count[REMOVED]):
+    for k in range(w.counts[REMOVED]):
         found = found or w.removed[k] == c
     return found
 
@@ -277,22 +257,22 @@ def _is_taken(w: Round, c: int) -> bool:
 def _sort_removed(a: TimedArrays, w: Round, rng: RngState) -> None:
     """Sort removed tasks: at random, or by load, distance, value or window. O(removed^2)."""
     kind = below(rng, ORDERS)
-    for i in range(w.count[REMOVED]):
+    for i in range(w.counts[REMOVED]):
         t = w.removed[i]
         if kind < 4:
             key = uniform(rng)
         elif kind < 6:
-            key = -a.fixed[t, LOAD]
+            key = -a.fixed[t, at.LOAD]
         elif kind < 8:
-            key = -a.fixed[t, REMOTE]
+            key = -a.fixed[t, at.REMOTE]
         elif kind == 8:
-            key = a.fixed[t, REMOTE]
+            key = a.fixed[t, at.REMOTE]
         elif kind < 11:
-            key = a.fixed[t, WIDTH]
+            key = a.fixed[t, at.WIDTH]
         elif kind == 11:
-            key = a.fixed[t, OPENS]
+            key = a.fixed[t, at.OPENS]
         elif kind == 12:
-            key = -a.fixed[t, CLOSES]
+            key = -a.fixed[t, at.CLOSES]
         else:
             key = -a.unserved[t - a.uavs]
         place = i
@@ -306,7 +286,7 @@ def _sort_removed(a: TimedArrays, w: Round, rng: RngState) -> None:
 def insert_saved(a: TimedArrays, r: TimedRoutes, w: Round, t: int, place: int,
                  kind: int) -> None:
     """Insert t after node `place`, whose route is saved before. O(tasks)."""
-    save_route(a, r, w, r.link[place, UAV])
+    save_route(a, r, w, r.link[place, at.OF_UAV])
     insert_task(a, r, t, place, kind)
 
 
@@ -329,9 +309,9 @@ def insert_removed(a: TimedArrays, r: TimedRoutes, w: Round, generous: float, bl
     generous: a task is inserted where it costs less than so many times its price.
     """
     _sort_removed(a, w, rng)
-    for i in range(w.count[REMOVED]):
+    for i in range(w.counts[REMOVED]):
         t = w.removed[i]
-        if r.link[t, UAV] != a.uavs:
+        if r.link[t, at.OF_UAV] != a.uavs:
             continue
         place, kind, cost = near_place(a, r, t, True, blinks, rng)
         if place < 0 and uniform(rng) < ANYWHERE_RATE:

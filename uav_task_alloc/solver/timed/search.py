@@ -12,17 +12,8 @@ from uav_task_alloc.kernel import inline_kernel, kernel
 from uav_task_alloc.solver.rng import RngState, uniform
 from uav_task_alloc.solver.ruin import BLINK_RATE
 from uav_task_alloc.solver.search import PENALTY_DECAY, PENALTY_GROWTH
-from uav_task_alloc.solver.timed.arrays import (
-    INFEASIBLE,
-    LINK,
-    SERVED_WORTH,
-    TOLERANCE,
-    UAV,
-    UNSERVED,
-    Links,
-    TimedArrays,
-    TimedRoutes,
-)
+from uav_task_alloc.solver.timed import columns as at
+from uav_task_alloc.solver.timed.arrays import LINK, TOLERANCE, Links, TimedArrays, TimedRoutes
 from uav_task_alloc.solver.timed.order import route_order, true_cost
 from uav_task_alloc.solver.timed.ruin import (
     ABSENT,
@@ -82,18 +73,18 @@ def is_improvement(a: TimedArrays, cost: float, worth: float, score: Floats,
         return bool(cost < less)
     slack = 1e-9 * (abs(score[BEST_WORTH]) + 1.0)
     gain = worth - score[BEST_WORTH]
-    return gain > slack or (gain >= -slack and cost < less)
+    return bool(gain > slack or (gain >= -slack and cost < less))
 
 
 @kernel
 def record(a: TimedArrays, r: TimedRoutes, best: Incumbent, prizes: bool) -> bool:
     """Keep the routes if they are allowed and better than the best; whether. O(nodes)."""
-    if r.count[INFEASIBLE] > 0:
+    if r.counts[at.INFEASIBLE] > 0:
         return False
-    cost = true_cost(a, r) + (r.sums[UNSERVED] if prizes else 0.0)
-    if not is_improvement(a, cost, r.sums[SERVED_WORTH], best.score, prizes):
+    cost = true_cost(a, r) + (r.sums[at.UNSERVED_COST] if prizes else 0.0)
+    if not is_improvement(a, cost, r.sums[at.SERVED_WORTH], best.score, prizes):
         return False
-    best.score[BEST_COST], best.score[BEST_WORTH] = cost, r.sums[SERVED_WORTH]
+    best.score[BEST_COST], best.score[BEST_WORTH] = cost, r.sums[at.SERVED_WORTH]
     route_order(a, r, best.order)
     return True
 
@@ -108,12 +99,12 @@ def _update_prices(a: TimedArrays, r: TimedRoutes, w: Round, rises: Rises) -> No
             else:
                 a.price[c] = max(rises.least[c], a.price[c] * PENALTY_DECAY)
     list_absent(a, r, w)
-    if rises.unserved == 1.0 or w.count[ABSENT] >= FEW_ABSENT * (a.ends - a.uavs):
+    if rises.unserved == 1.0 or w.counts[ABSENT] >= FEW_ABSENT * (a.ends - a.uavs):
         return
-    for k in range(w.count[ABSENT]):
+    for k in range(w.counts[ABSENT]):
         i = w.absent[k] - a.uavs
         more = min(a.unserved[i] * rises.unserved, rises.max_unserved[i])
-        r.sums[UNSERVED] += more - a.unserved[i]
+        r.sums[at.UNSERVED_COST] += more - a.unserved[i]
         a.unserved[i] = more
 
 
@@ -127,17 +118,17 @@ def anneal(a: TimedArrays, r: TimedRoutes, w: Round, best: Incumbent, rises: Ris
     temperature, improvements = start, 0
     decay = (end / start) ** (1.0 / max(1, rounds))
     for _ in range(rounds):
-        w.count[PATIENCE] -= 1
-        if w.count[PATIENCE] < 0:
+        w.counts[PATIENCE] -= 1
+        if w.counts[PATIENCE] < 0:
             _update_prices(a, r, w, rises)
-            w.count[PATIENCE] = max(20, (a.ends - a.uavs) // 8)
+            w.counts[PATIENCE] = max(20, (a.ends - a.uavs) // 8)
         before, generous = cost_of(a, r.sums), 1.0
         begin_round(r, w)
-        opening = rises.prizes and w.count[ABSENT] > 0 and uniform(rng) < OPENING_RATE
+        opening = rises.prizes and w.counts[ABSENT] > 0 and uniform(rng) < OPENING_RATE
         seed = ruin_strings(a, r, w, mean, MAX_OPENING if opening else rises.absent, rng)
         if rises.prizes and uniform(rng) < GENEROUS_RATE:
             generous += uniform(rng)
-        if opening and w.count[REMOVED] > 0 and r.link[seed, UAV] == a.uavs:
+        if opening and w.counts[REMOVED] > 0 and r.link[seed, at.OF_UAV] == a.uavs:
             open_route(a, r, w, seed)
         insert_removed(a, r, w, generous, BLINK_RATE, rng)
         if cost_of(a, r.sums) < before - temperature * math.log(1.0 - uniform(rng)):

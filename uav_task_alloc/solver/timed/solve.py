@@ -16,7 +16,7 @@ from uav_task_alloc.solver.timed.colony import COLD, WARM, TimedColony, TimedPar
 from uav_task_alloc.solver.timed.problem import make_timed
 from uav_task_alloc.solver.timed.reasons import timed_reasons
 from uav_task_alloc.solver.timed.recorder import TimedRecorder
-from uav_task_alloc.solver.timed.warm import first_plan
+from uav_task_alloc.solver.timed.warm import completed, first_plan
 from uav_task_alloc.solver.warm import WarmState
 
 SOLVER_NAME = 'chain_q'
@@ -72,6 +72,7 @@ def _improve(recorder: TimedRecorder, seed: int, before: WarmState,
     params = params or (WARM if recorder.warm else COLD)
     run_colonies([TimedColony(problem, first, seed + 7919 * i, params)
                   for i in range(recorder.threads)], recorder)
+    recorder.offer(completed(problem, recorder.best))
 
 
 def _aboard(uavs: Sequence[Uav], locked: Mapping[str, tuple[Task, ...]],

@@ -9,14 +9,8 @@ import numpy as np
 from uav_task_alloc.geometry.outline import Ints
 from uav_task_alloc.kernel import kernel
 from uav_task_alloc.solver.rng import rng_state
-from uav_task_alloc.solver.timed.arrays import (
-    LINK,
-    PREV,
-    REMOTE,
-    UAV,
-    TimedArrays,
-    TimedRoutes,
-)
+from uav_task_alloc.solver.timed import columns as at
+from uav_task_alloc.solver.timed.arrays import LINK, TimedArrays, TimedRoutes
 from uav_task_alloc.solver.timed.insertion import (
     BASE_BEFORE,
     NO_VISIT,
@@ -26,10 +20,17 @@ from uav_task_alloc.solver.timed.insertion import (
     insert_task,
     split_cost,
 )
+from uav_task_alloc.solver.timed.order import set_order
 from uav_task_alloc.solver.timed.problem import TimedProblem, empty_timed_routes
-from uav_task_alloc.solver.timed.search import Incumbent, empty_incumbent, record
+from uav_task_alloc.solver.timed.search import (
+    Incumbent,
+    copy_incumbent,
+    empty_incumbent,
+    record,
+)
 from uav_task_alloc.solver.warm import WarmState
 
+MOST_PLACES = 1_000_000  # absent tasks times tasks that `completed` tries
 _VISIT = -1  # in a sequence of nodes: a visit of the base
 
 
@@ -50,11 +51,24 @@ def first_plan(problem: TimedProblem, before: WarmState) -> Incumbent:
         bounds.append(len(nodes))
     append_all(a, routes, np.array(nodes, np.int64), np.array(bounds, np.int64))
     tasks = np.arange(a.uavs, a.ends)
-    tasks = tasks[np.argsort(-a.fixed[tasks, REMOTE], kind='stable')]
+    tasks = tasks[np.argsort(-a.fixed[tasks, at.REMOTE], kind='stable')]
     insert_in_order(a, routes, tasks, problem.prizes, rng_state(0))
     best = empty_incumbent(a)
     record(a, routes, best, problem.prizes)
     return best
+
+
+def completed(problem: TimedProblem, best: Incumbent) -> Incumbent:
+    """The same routes, with absent tasks inserted where that is possible and worth it."""
+    a, routes, found = problem.arrays, empty_timed_routes(problem.arrays), copy_incumbent(best)
+    tasks = np.arange(a.uavs, a.ends)
+    absent = tasks[best.order[a.uavs:a.ends] == tasks]
+    if absent.size and absent.size * tasks.size < MOST_PLACES:
+        set_order(a, routes, best.order)
+        absent = absent[np.argsort(-a.fixed[absent, at.WORTH], kind='stable')]
+        insert_in_order(a, routes, absent, problem.prizes, rng_state(0))
+        record(a, routes, found, problem.prizes)
+    return found
 
 
 @kernel
@@ -69,8 +83,8 @@ def append_all(a: TimedArrays, r: TimedRoutes, nodes: Ints, bounds: Ints) -> Non
             if nodes[i] < 0:
                 visits = True
                 continue
-            t, last = LINK(nodes[i]), r.link[a.ends + u, PREV]
-            if r.link[t, UAV] != a.uavs:
+            t, last = LINK(nodes[i]), r.link[a.ends + u, at.PREV]
+            if r.link[t, at.OF_UAV] != a.uavs:
                 continue
             base = free_visit(a, r, LINK(u)) if visits else -1
             if base >= 0 and split_cost(a, r, LINK(u), t, last, BASE_BEFORE, LINK(base),

@@ -1,0 +1,32 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What the columns of the arrays hold that kernels of problems with time take: names of them."""
+
+# columns of TimedArrays.fixed, by node
+X, Y, Z, SERVICE, OPENS, CLOSES, RELEASE, LOAD = range(8)  # RELEASE: no earlier leg to it
+TRIP_RELEASE, DUE, WEIGHT, WORTH, WIDTH, REMOTE = range(8, 14)
+FIXED_COLUMNS = 16
+# columns of TimedArrays.begin, by UAV: ready for its first leg, time in the air by then, latest
+# departure, length and time of its route without tasks, whether this trip began at the base,
+# cruise speed, whether it has locked tasks
+READY, IN_AIR, LAST_DEPARTURE, EMPTY_LENGTH, EMPTY_TIME, GROUNDED, CRUISE, HELD = range(8)
+BEGIN_COLUMNS = 8
+# columns of TimedArrays.weight
+# BY_END: of the end of each route, which leads the search to an early last one; BY_EXCESS: of a
+# metre beyond range or endurance, inf: not allowed
+BY_DISTANCE, BY_FINISH, BY_LATENESS, BY_END, BY_EXCESS = range(5)
+# columns of TimedRoutes.link, by node
+NEXT, PREV, OF_UAV, HEAD = range(4)  # OF_UAV: m where a task is in no route
+# columns of TimedRoutes.row, by node
+START, DEPARTURE, LATEST, WARP_BEFORE, WARP_AFTER, LEG, TIME, WAITS = range(8)
+RATE, LOAD_BEFORE, LENGTH_BEFORE, LASTED, LEFT, LASTS, EARLY = range(8, 15)
+ROW_COLUMNS = 16
+# columns of TimedRoutes.trip and TimedArrays.limit, by slot
+CARRIED, FLOWN, AIRBORNE = range(3)  # load, length, duration
+TRIP_COLUMNS = 4
+# columns of TimedRoutes.route, by UAV; WARP to ENDURANCE_EXCESS are also those of sums
+WARP, LOAD_EXCESS, RANGE_EXCESS, ENDURANCE_EXCESS, METRES, TIME_COST, END, TASKS = range(8)
+ROUTE_COLUMNS = 8
+FINISH, UNSERVED_COST, SERVED_WORTH = range(6, 9)  # further columns of TimedRoutes.sums
+SUM_COLUMNS = 9
+# entries of TimedRoutes.counts
+INFEASIBLE, SERVED = range(2)  # routes with excess, tasks served
