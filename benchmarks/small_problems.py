@@ -29,7 +29,12 @@ def main() -> int:
     args = parser.parse_args()
     gaps, faulty, impossible = list[float](), list[int](), 0
     for seed in range(args.seed, args.seed + args.problems):
-        result = compare(small_problem(seed, args.tasks), args.rounds)
+        try:
+            result = compare(small_problem(seed, args.tasks), args.rounds)
+        except (ArithmeticError, LookupError, TypeError, ValueError, AssertionError) as error:
+            print(f'{seed}: {error!r}', file=sys.stderr, flush=True)
+            faulty.append(seed)
+            continue
         if result is None:
             impossible += 1
             continue

@@ -89,6 +89,50 @@ zones:
     assert 'pole' not in capsys.readouterr().err
 
 
+DELIVERIES = str(ROOT / 'config/scenarios/deliveries.yaml')
+
+
+def test_plan_prints_writes_and_draws_times(tmp_path, capsys):
+    out, png = tmp_path / 'plan.json', tmp_path / 'times.png'
+    assert cli.main(['plan', DELIVERIES, '--budget', '0.2', '--json', str(out), '--plot-times',
+                     str(png)]) == 0
+    result, printed = json.loads(out.read_text()), capsys.readouterr().out
+    assert png.read_bytes().startswith(b'\x89PNG')
+    assert set(result['unassigned']) == {'island', 'quarry'}
+    assert 'unassigned quarry: payload 4 kg; the largest capacity is 3 kg' in printed
+    assert re.search('unassigned island: .*latest is 150 s', printed)
+    head, *rows = printed[printed.index('task '):].splitlines()
+    assert head.split() == ['task', 'uav', 'trip', 'arrival', 'wait', 'start', 'end', 'window',
+                            'late']
+    served = {row.split()[0]: row.split() for row in rows if not row.startswith(' ')}
+    assert set(served) == set(result['arrivals'])
+    assert float(served['harbour'][5]) >= 300.0
+    assert served['harbour'][7:] == ['[300.0,', '420.0]', '0.0']
+    assert result['finish'] == max(result['ends'].values())
+    assert sorted(name for rows in result['trips'].values() for row in rows for name in row
+                  ) == sorted(served)
+    assert ' -> (home) -> ' in printed
+
+
+def test_another_objective_and_number_of_trips_may_be_asked_for(tmp_path):
+    costs = []
+    for objective, trips in (('finish', '3'), ('finish', '1')):
+        out = tmp_path / f'{trips}.json'
+        assert cli.main(['plan', DELIVERIES, '--budget', '0.1', '--objective', objective,
+                         '--trips', trips, '--json', str(out)]) == 0
+        costs.append(json.loads(out.read_text()))
+    assert max(map(len, costs[0]['trips'].values())) > 1
+    assert all(len(rows) == 1 for rows in costs[1]['trips'].values())
+    assert len(costs[1]['unassigned']) > len(costs[0]['unassigned'])
+
+
+def test_times_are_printed_on_request(capsys):
+    assert cli.main(['plan', FILE, '--budget', '0.02']) == 0
+    assert 'arrival' not in capsys.readouterr().out
+    assert cli.main(['plan', FILE, '--budget', '0.02', '--times']) == 0
+    assert 'arrival' in capsys.readouterr().out
+
+
 def test_a_cancelled_task_is_not_planned(tmp_path):
     out = tmp_path / 'plan.json'
     small = str(ROOT / 'config/scenarios/small.yaml')
@@ -104,6 +148,11 @@ def test_a_cancelled_task_is_not_planned(tmp_path):
     (['plan', FILE, '--solver', 'bee'], "'bee': expected one of "),
     (['plan', FILE, '--budget', '-1'], 'budget'),
     (['plan', FILE, '--budget', '0.01', '--json', '/none/plan.json'], '/none/plan.json'),
+    (['plan', DELIVERIES, '--budget', '0.1', '--missions', 'm'],
+     'expected 1: a mission file holds one flight'),
+    (['plan', FILE, '--trips', '0'], 'trips = 0: expected an integer in [1, 64]'),
+    (['plan', DELIVERIES, '--solver', 'nearest'],
+     "solver = 'nearest': expected 'chain_q' where latest times, loads, "),
     (['plan', FILE, '--plot-3d', 'plan.txt'],
      "--plot-3d = 'plan.txt': expected a name that ends with .png or .pdf or .svg"),
     (['plan', FILE, '--budget', '0.01', '--missions', FILE + '/m'], 'plan_only.yaml'),

@@ -191,7 +191,9 @@ def _untrue(problem: SmallProblem, task: Task, reason: str) -> Iterator[str]:
     stated = re.match(r'latest (-?\d+) s; the earliest arrival is (\d+) s \((\w+)\)', reason)
     if stated:
         arrival = min((_start_alone(problem, uav, task) for uav in problem.uavs
-                       if _may(uav, task)), default=math.inf)
+                       if _may(uav, task) and (
+                           not task.payload or uav.at_base
+                           or problem.held.has_aboard(uav, task))), default=math.inf)
         if abs(arrival - float(stated[2])) > 0.51 or abs(task.latest - float(stated[1])) > 0.51:
             yield f'{task.id}: {reason!r}, but the earliest arrival is {arrival:.1f} s'
 
