@@ -9,6 +9,7 @@ from uav_task_alloc.model import Task, Uav
 from uav_task_alloc.objective import Objective
 from uav_task_alloc.solver.problem import Rules
 from uav_task_alloc.solver.timed.evaluator import Held, evaluate
+from uav_task_alloc.study import exact
 from uav_task_alloc.study.exact import exact_plan
 
 UAV = Uav('u', (0.0, 0.0, 0.0), cruise_speed=10.0)
@@ -80,3 +81,21 @@ def test_no_random_plan_is_better(seed):
         rows = {name: [row for row in pair if row] for name, pair in rows.items()}
         found = evaluate(uavs, tasks, rules, rows)
         assert found.violations or found.cost >= best.cost - 1e-9
+
+
+@pytest.mark.parametrize('seed', range(6))
+def test_labels_find_what_trying_all_routes_finds(seed, monkeypatch):
+    rng = np.random.default_rng((seed, 5))
+    tasks = [Task(f't{i}', (*rng.uniform(0.0, 500.0, 2), 0.0), float(rng.integers(1, 4)),
+                  service_time=float(rng.integers(0, 9)), latest=rng.uniform(20.0, 200.0),
+                  earliest=-9.0 if seed % 2 else rng.uniform(0.0, 20.0), release=4.0 * (seed > 3))
+             for i in range(5)]
+    uavs = [Uav(name, (*rng.uniform(0.0, 500.0, 2), 0.0), cruise_speed=10.0, home=(9.0, 9.0, 9.0),
+                available_from=3.0, available_until=150.0 + 99.0 * seed) for name in 'uv']
+    late, left = (3.0, 40.0) if seed % 3 else (np.inf, np.inf)
+    rules = Rules(returns=seed % 2 == 0, objective=Objective(0.01, 1.0, 1.0, late, left))
+    by_labels = exact_plan(uavs, tasks, rules)
+    monkeypatch.setattr(exact, '_is_plain', lambda *_: False)
+    by_trying = exact_plan(uavs, tasks, rules)
+    assert (by_labels.cost, by_labels.value) == pytest.approx((by_trying.cost, by_trying.value))
+    assert evaluate(uavs, tasks, rules, by_labels.routes).cost == pytest.approx(by_labels.cost)

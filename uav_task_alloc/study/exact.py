@@ -2,7 +2,9 @@
 """Exact optima of tiny problems with time, by trying all routes; uses no solver.
 
 All orders and divisions in trips of all sets of tasks are evaluated for each UAV, then the UAVs
-share the tasks. For some six tasks: the number of routes grows with their factorial.
+share the tasks. For some six tasks: the number of routes grows with their factorial. Where only
+services, windows and releases count, routes to the same task over the same tasks are dropped that
+are neither cheaper nor earlier: for ten.
 """
 from __future__ import annotations
 
@@ -11,8 +13,15 @@ from collections.abc import Container, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from uav_task_alloc.model import Task, Uav
+from uav_task_alloc.objective import Objective
 from uav_task_alloc.solver.problem import Rules
-from uav_task_alloc.solver.timed.evaluator import Held, LegOf, TimedEvaluation, evaluate
+from uav_task_alloc.solver.timed.evaluator import (
+    Held,
+    LegOf,
+    TimedEvaluation,
+    evaluate,
+    straight_legs,
+)
 
 Rows = tuple[tuple[str, ...], ...]  # task ids of each trip
 
@@ -105,6 +114,9 @@ def _shares_of(uav: Uav, uavs: Sequence[Uav], tasks: Sequence[Task], rules: Rule
     """All that one UAV can serve, and nothing."""
     taken = {task.id for task in tasks for other in uavs if other is not uav and (
         held.has_locked(other, task) or held.has_aboard(other, task))}
+    if _is_plain(uav, tasks, rules, held):
+        return _shares_by_labels(uav, [task for task in tasks if task.id not in taken], tasks,
+                                 rules, leg or straight_legs(rules))
     own = Held({uav.id: held.locked.get(uav.id, ())}, held.aboard)
     total = math.fsum(task.value for task in tasks)
     shares: _Shares = {} if own.locked[uav.id] else {frozenset(): [_Share(0.0, 0.0, ())]}
@@ -113,6 +125,69 @@ def _shares_of(uav: Uav, uavs: Sequence[Uav], tasks: Sequence[Task], rules: Rule
         _keep(shares, frozenset(name for row in rows for name in row),
               _Share(found.cost - shared, found.finish, ((uav.id, rows),)))
     return shares
+
+
+def _is_plain(uav: Uav, tasks: Sequence[Task], rules: Rules, held: Held) -> bool:
+    """Whether an earlier arrival is never worse, and nothing else limits a route."""
+    one_trip = rules.trips == 1 or math.isinf(uav.turnaround)
+    unlimited = math.isinf(uav.range) and math.isinf(uav.endurance)
+    return (one_trip and unlimited and not held.locked.get(uav.id)
+            and not any(task.payload for task in tasks))
+
+
+@dataclass(frozen=True, slots=True)
+class _Label:
+    """A route over some tasks to one of them."""
+
+    time: float  # [s] end of the service there
+    cost: float  # so far, without finish
+    row: tuple[str, ...]
+
+
+def _shares_by_labels(uav: Uav, free: Sequence[Task], tasks: Sequence[Task], rules: Rules,
+                      leg: LegOf) -> _Shares:
+    """All that one UAV can serve, by dynamic programming over sets of tasks."""
+    able = [task for task in free if task.required_capabilities <= uav.capabilities
+            and (task.allowed_uavs is None or uav.id in task.allowed_uavs)]
+    total = math.fsum(task.value for task in tasks)
+    shares: _Shares = {frozenset(): [_Share(0.0, 0.0, ())]}
+    labels: dict[tuple[frozenset[str], Task | None], list[_Label]] = {
+        (frozenset(), None): [_Label(uav.available_from, 0.0, ())]}
+    for _ in range(len(able)):
+        longer: dict[tuple[frozenset[str], Task | None], list[_Label]] = {}
+        for (done, last), some in labels.items():
+            for task in able:
+                if task.id not in done:
+                    place = uav.position if last is None else last.position
+                    way = leg(uav, place, task.position)
+                    for label in some:
+                        _extend(longer.setdefault((done | {task.id}, task), []), label, task,
+                                way, rules.objective, total)
+        labels = longer
+        for (done, last), some in labels.items():
+            assert last is not None  # each label of this round has a task
+            metres, seconds = leg(uav, last.position, uav.base) if rules.returns else (0.0, 0.0)
+            for label in some:
+                if label.time + seconds <= uav.available_until + 1e-6:
+                    _keep(shares, done, _Share(
+                        label.cost + rules.objective.cost(metres), label.time + seconds,
+                        ((uav.id, (label.row,)),)))
+    return shares
+
+
+def _extend(labels: list[_Label], label: _Label, task: Task, way: tuple[float, float],
+            prices: Objective, total: float) -> None:
+    """Add the route of a label and one more task, unless it is too late or dominated."""
+    start = max(max(label.time, task.release) + way[1], task.earliest)
+    late = max(0.0, start - task.latest)
+    if late > 1e-6 and math.isinf(prices.lateness):
+        return
+    response = task.value * (start - task.announced) / total
+    new = _Label(start + task.service_time,
+                 label.cost + prices.cost(way[0], 0.0, response, late), (*label.row, task.id))
+    if all(other.time > new.time or other.cost > new.cost for other in labels):
+        labels[:] = [each for each in labels if each.time < new.time or each.cost < new.cost]
+        labels.append(new)
 
 
 def _valid_rows(uav: Uav, tasks: Sequence[Task], taken: Container[str], rules: Rules,
