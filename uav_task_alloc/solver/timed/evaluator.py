@@ -197,18 +197,22 @@ def _schedule(trip: _Trip, ready: float, rules: Rules, held: Held) -> None:
         releases.append(trip.stops[0].task.release)
     earliest = max(releases)
     _fly(trip, earliest)
-    if trip.on_ground:
+    busy = math.fsum(stop.seconds + stop.task.service_time for stop in trip.stops) + trip.last_leg
+    if trip.on_ground and trip.end - trip.departure > busy + _TOLERANCE:  # it waits somewhere
         _fly(trip, earliest + _postponement(trip, rules))
 
 
 def _fly(trip: _Trip, departure: float) -> None:
     trip.departure = time = departure
-    trip.arrivals, trip.starts = [], []
+    arrivals, starts = [], []
     for stop in trip.stops:
-        trip.arrivals.append(max(time, stop.task.release) + stop.seconds)
-        trip.starts.append(max(trip.arrivals[-1], stop.task.earliest))
-        time = trip.starts[-1] + stop.task.service_time
-    trip.end = time + trip.last_leg
+        task = stop.task
+        time = (time if time > task.release else task.release) + stop.seconds
+        arrivals.append(time)
+        time = time if time > task.earliest else task.earliest
+        starts.append(time)
+        time += task.service_time
+    trip.arrivals, trip.starts, trip.end = arrivals, starts, time + trip.last_leg
 
 
 def _postponement(trip: _Trip, rules: Rules) -> float:
