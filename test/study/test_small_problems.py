@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Plans of random small problems with everything mixed are valid, optimal and give true reasons."""
+"""Plans of random small problems with everything mixed: valid, optimal, with true reasons."""
 from dataclasses import replace
 
 import pytest

@@ -63,7 +63,8 @@ def route_points(uav: Uav, plan: Plan, positions: Mapping[str, Point]) -> list[P
     Returns:
         [m] ENU; ends at home where the plan returns.
     """
-    stops = [stop for trip in plan.trips_of(uav.id) for stop in (*(positions[name] for name in trip), uav.base)]
+    stops = [stop for trip in plan.trips_of(uav.id)
+             for stop in (*(positions[name] for name in trip), uav.base)]
     points = [uav.position]
     # a leg home after the last trip only where the plan returns
     for leg, stop in zip(plan.legs.get(uav.id, ()), stops, strict=False):

@@ -163,8 +163,8 @@ SCENARIO: KeyTable = {
     'objective': Key(or_mapping(choice(*OBJECTIVES), OBJECTIVE, f'one of {", ".join(OBJECTIVES)}, '
                                 'or a mapping of prices', yaml.ScalarNode),
                      'what is minimised: a name, or prices; see objective', 'distance'),
-    'trips': Key(whole_number(1, MAX_TRIPS), 'of each UAV at most; more than one: it may visit its home '
-                 'for a battery and loads', 1),
+    'trips': Key(whole_number(1, MAX_TRIPS), 'of each UAV at most; more than one: it may visit '
+                 'its home for a battery and loads', 1),
     'clearance': Key(number_value(0.0, 10000.0),
                      '[m] kept from zones in addition to their margins',
                      AllocatorParams.clearance),
