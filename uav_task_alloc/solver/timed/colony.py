@@ -49,8 +49,8 @@ class TimedColony:
         self.arrays = arrays._replace(price=arrays.price.copy(), unserved=arrays.unserved.copy())
         self.best = copy_incumbent(start)
         self._params, self._scale = params, problem.scale
-        self._routes = empty_timed_routes(self.arrays)
-        set_order(self.arrays, self._routes, start.order)
+        self.routes = empty_timed_routes(self.arrays)
+        set_order(self.arrays, self.routes, start.order)
         self._round, self._rng = empty_round(self.arrays), rng_state(seed)
         growth = 1.0 if problem.prizes else params.unserved_growth
         self._rises = Rises(np.full(4, math.inf), np.full(4, math.inf), growth,
@@ -73,7 +73,7 @@ class TimedColony:
         Returns:
             That number.
         """
-        anneal(self.arrays, self._routes, self._round, self.best, self._rises,
+        anneal(self.arrays, self.routes, self._round, self.best, self._rises,
                self._params.ruin, self._temperature(spent), self._temperature(until), rounds,
                self._rng)
         return rounds

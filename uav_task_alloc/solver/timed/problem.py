@@ -33,7 +33,7 @@ class TimedProblem:
 
     base: Problem
     arrays: TimedArrays
-    aboard: Mapping[str, frozenset[str]]  # task ids by at.OF_UAV id
+    aboard: Mapping[str, frozenset[str]]  # task ids by UAV id
     scale: float  # mean leg to the nearest neighbour, in cost
 
     @property
@@ -184,11 +184,9 @@ def _after_locked(problem: Problem, u: int, aboard: Mapping[str, frozenset[str]]
         seconds = _seconds(problem, u, i, j)
         ready = max(ready, task.release) + seconds
         opened = max(task.earliest, task.release + seconds)
-        in_air += seconds
-        wait = max(0.0, opened - in_air - last)
-        last = min(last, max(task.latest, ready) - in_air)
+        in_air += seconds  # its latest time is no rule, so only a UAV in the air has to wait
+        in_air += max(0.0, opened - in_air - last) + task.service_time
         ready = max(ready, task.earliest) + task.service_time
-        in_air += wait + task.service_time
     home = problem.arrays.empty_route_length[u]
     return _Begin((ready, in_air, last, home, _home_seconds(problem, u, home), float(uav.at_base),
                    uav.cruise_speed, float(bool(held))), sum(task.payload for task in loads))
@@ -272,7 +270,7 @@ def _fill(problem: Problem, a: TimedArrays) -> float:
     legs = a.near_length[some, 0] if some.any() else a.fixed[a.uavs:a.ends, at.REMOTE]
     metres = max(float(legs.mean()), 1e-6)
     goal = problem.rules.objective
-    return metres * goal.distance + metres * pace * (goal.finish + goal.response)
+    return max(1e-9, metres * (goal.distance + pace * (goal.finish + goal.response)))
 
 
 def _set_prices(problem: Problem, a: TimedArrays, scale: float) -> None:

@@ -12,9 +12,10 @@ from uav_task_alloc.kernel import kernel
 from uav_task_alloc.solver.reasons import lasting_reason, way_reason
 from uav_task_alloc.solver.timed import columns as at
 from uav_task_alloc.solver.timed.arrays import LINK, TimedArrays, TimedRoutes
-from uav_task_alloc.solver.timed.insertion import BASE_BEFORE, cost_at, free_visit, split_cost
+from uav_task_alloc.solver.timed.places import cost_at
 from uav_task_alloc.solver.timed.problem import TimedProblem, empty_timed_routes
 from uav_task_alloc.solver.timed.segments import leg_of
+from uav_task_alloc.solver.timed.visits import BASE_BEFORE, free_visit, split_cost
 
 _ARRIVAL, _LATE, _LENGTH, _SECONDS, _END = range(5)  # columns of needs_alone
 _NAMED = 3  # UAVs that a text names
@@ -109,7 +110,7 @@ def _load_reason(problem: TimedProblem, i: int) -> str:
                 f'{most.payload_capacity:g} kg ({most.id})')
     if not a.visits and all(not uav.at_base for uav in able
                             if uav.payload_capacity >= task.payload):
-        return f'payload {task.payload:g} kg; every at.OF_UAV that could carry it is in the air'
+        return f'payload {task.payload:g} kg; every UAV that could carry it is in the air'
     return ''
 
 
@@ -120,7 +121,7 @@ def _needs_reason(problem: TimedProblem, i: int) -> str:
     needs_alone(a, a.uavs + i, needs)
     able = [int(u) for u in np.flatnonzero(a.compatible[0, :, i])]
     if not able:
-        return f'payload {task.payload:g} kg: no at.OF_UAV on the ground may serve it'
+        return f'payload {task.payload:g} kg: no UAV on the ground may serve it'
     late = [u for u in able if needs[u, _LATE] > 0.0]
     if len(late) == len(able) and not a.visits:
         first = min(able, key=lambda u: float(needs[u, _ARRIVAL]))
@@ -129,7 +130,7 @@ def _needs_reason(problem: TimedProblem, i: int) -> str:
     able.sort(key=lambda u: float(needs[u, _LENGTH]))
     texts = [_lack(problem, i, u, needs[u]) for u in able[:_NAMED]]
     more = f'; nor {len(able) - _NAMED} others' if len(able) > _NAMED else ''
-    return 'no at.OF_UAV can serve it: ' + '; '.join(texts) + more
+    return 'no UAV can serve it: ' + '; '.join(texts) + more
 
 
 def _lack(problem: TimedProblem, i: int, u: int, need: Floats) -> str:

@@ -19,15 +19,15 @@ from uav_task_alloc.solver.ruin import MAX_STRING, PRESERVE_RATE, SPLIT_RATE
 from uav_task_alloc.solver.timed import columns as at
 from uav_task_alloc.solver.timed.arrays import LINK, Links, TimedArrays, TimedRoutes
 from uav_task_alloc.solver.timed.insertion import (
-    NO_VISIT,
-    cost_at,
     idle_uav,
     insert_task,
     near_place,
     place_anywhere,
     unlink,
 )
+from uav_task_alloc.solver.timed.places import cost_at
 from uav_task_alloc.solver.timed.segments import is_task, slot_of, update
+from uav_task_alloc.solver.timed.visits import NO_VISIT
 
 ABSENT_SEED_RATE = 0.5  # share of rounds that start at an absent task, if there is one
 ANYWHERE_RATE = 0.02  # share of tasks without a place among neighbours that try all routes
@@ -42,11 +42,11 @@ class Round(NamedTuple):
 
     node: Links  # (nodes) saved rows: their nodes
     link: Links  # (nodes, 4)
-    row: Floats  # (nodes, at.ROW_COLUMNS)
+    row: Floats  # (nodes, columns from START)
     uav: Ints  # (m) saved routes: their UAVs
-    route: Floats  # (m, at.ROUTE_COLUMNS)
-    trip: Floats  # (slots, at.TRIP_COLUMNS)
-    sums: Floats  # (at.SUM_COLUMNS)
+    route: Floats  # (m, columns from WARP)
+    trip: Floats  # (slots, 4)
+    sums: Floats  # (9)
     routes_count: Ints  # (2) TimedRoutes.counts before the round
     removed: Links  # task nodes to be inserted
     order: Floats  # sort key of each: smallest first

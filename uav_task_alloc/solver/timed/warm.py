@@ -11,16 +11,9 @@ from uav_task_alloc.kernel import kernel
 from uav_task_alloc.solver.rng import rng_state
 from uav_task_alloc.solver.timed import columns as at
 from uav_task_alloc.solver.timed.arrays import LINK, TimedArrays, TimedRoutes
-from uav_task_alloc.solver.timed.insertion import (
-    BASE_BEFORE,
-    NO_VISIT,
-    cost_at,
-    free_visit,
-    insert_in_order,
-    insert_task,
-    split_cost,
-)
+from uav_task_alloc.solver.timed.insertion import insert_in_order, insert_task
 from uav_task_alloc.solver.timed.order import set_order
+from uav_task_alloc.solver.timed.places import cost_at
 from uav_task_alloc.solver.timed.problem import TimedProblem, empty_timed_routes
 from uav_task_alloc.solver.timed.search import (
     Incumbent,
@@ -28,6 +21,7 @@ from uav_task_alloc.solver.timed.search import (
     empty_incumbent,
     record,
 )
+from uav_task_alloc.solver.timed.visits import BASE_BEFORE, NO_VISIT, free_visit, split_cost
 from uav_task_alloc.solver.warm import WarmState
 
 MOST_PLACES = 1_000_000  # absent tasks times tasks that `completed` tries

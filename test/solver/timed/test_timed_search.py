@@ -1,0 +1,114 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The search with time: its sums are true, its plans valid, its answers repeatable."""
+import math
+import random
+
+import numpy as np
+import pytest
+
+from uav_task_alloc.errors import InvalidValue
+from uav_task_alloc.model import Task, ThreatZone, Uav
+from uav_task_alloc.objective import OBJECTIVES, Objective
+from uav_task_alloc.solver.problem import Limits, Rules, make_problem
+from uav_task_alloc.solver.solve import plan
+from uav_task_alloc.solver.timed import columns as at
+from uav_task_alloc.solver.timed.arrays import LINK
+from uav_task_alloc.solver.timed.colony import COLD, TimedColony
+from uav_task_alloc.solver.timed.order import route_order, set_order
+from uav_task_alloc.solver.timed.problem import empty_timed_routes, make_timed
+from uav_task_alloc.solver.timed.warm import first_plan
+from uav_task_alloc.solver.warm import WarmState
+
+MIXED = Objective(distance=0.1, finish=1.0, response=1.0, lateness=3.0, unserved=80.0)
+
+
+def mixed_problem(seed, uavs=4, tasks=40):
+    """UAVs on the ground and in the air, and tasks with windows, releases and loads."""
+    r = random.Random(seed)
+
+    def point():
+        return r.uniform(0.0, 2000.0), r.uniform(0.0, 2000.0), r.choice((0.0, 40.0))
+
+    fleet = []
+    for i in range(uavs):
+        home = point()
+        fleet.append(Uav(
+            f'u{i}', home if i % 2 == 0 else point(), home=home, range=r.choice((4000.0, 9000.0)),
+            endurance=r.choice((math.inf, 500.0)), climb_speed=2.5, descent_speed=1.5,
+            turnaround=30.0, payload_capacity=3.0, available_until=r.choice((math.inf, 1500.0))))
+    work = []
+    for i in range(tasks):
+        opens = r.choice((-math.inf, 50.0, 300.0))
+        work.append(Task(
+            f't{i}', point(), value=r.choice((1.0, 4.0)), earliest=opens, service_time=5.0,
+            latest=r.choice((math.inf, max(opens, 0.0) + 200.0)), release=r.choice((0.0, 100.0)),
+            payload=r.choice((0.0, 0.0, 1.0))))
+    return fleet, work
+
+
+@pytest.mark.parametrize('objective', [*OBJECTIVES.values(), MIXED], ids=[*OBJECTIVES, 'mixed'])
+@pytest.mark.parametrize('trips', [1, 3])
+def test_sums_kept_during_search_are_those_of_routes_set_at_once(objective, trips):
+    fleet, work = mixed_problem(trips)
+    rules = Rules(returns=True, objective=objective, trips=trips)
+    problem = make_timed(make_problem(fleet, work, {}, Limits(), rules), {})
+    colony = TimedColony(problem, first_plan(problem, WarmState()), 3, COLD)
+    colony.fly(0.0, 0.5, 2000)
+    order = np.zeros(len(problem.arrays.fixed), LINK)
+    route_order(colony.arrays, colony.routes, order)
+    fresh = empty_timed_routes(colony.arrays)
+    set_order(colony.arrays, fresh, order)
+    assert fresh.sums == pytest.approx(colony.routes.sums, abs=1e-6)
+    assert fresh.counts.tolist() == colony.routes.counts.tolist()
+    assert fresh.empty.tolist() == colony.routes.empty.tolist()
+    used = colony.routes.link[:, at.OF_UAV] != problem.arrays.uavs
+    for column in (at.START, at.LATEST, at.WARP_BEFORE, at.WARP_AFTER):
+        assert fresh.row[used, column] == pytest.approx(colony.routes.row[used, column], abs=1e-6)
+
+
+@pytest.mark.parametrize('objective', list(OBJECTIVES))
+def test_cost_of_the_search_is_that_of_the_evaluator(objective):
+    fleet, work = mixed_problem(5)
+    zones = [ThreatZone.hemisphere('dome', (1000.0, 1000.0, 0.0), 300.0),
+             ThreatZone.cylinder('mast', (400.0, 500.0), 80.0)]
+    inside = [task for task in work if math.dist(task.position, (1000.0, 1000.0, 0.0)) < 301.0
+              or math.dist(task.position[:2], (400.0, 500.0)) < 81.0]
+    found = plan(fleet, [task for task in work if task not in inside], zones, budget=60.0,
+                 objective=objective, trips=2, route_end='home', max_iterations=300)
+    assert found.history[-1][1] == pytest.approx(found.cost, rel=1e-9)
+
+
+def test_the_same_seed_and_iterations_give_the_same_plan():
+    fleet, work = mixed_problem(7)
+    one, two = (plan(fleet, work, budget=60.0, objective='balanced', trips=2, seed=4,
+                     max_iterations=400) for _ in range(2))
+    assert one.routes == two.routes
+    assert one.cost == two.cost
+
+
+def test_stop_ends_the_solve_with_a_valid_plan():
+    fleet, work = mixed_problem(8)
+    found = plan(fleet, work, budget=600.0, objective='response', stop=lambda: True)
+    assert found.iterations == 0
+    assert found.value > 0.0
+
+
+def test_two_threads_find_a_plan_not_worse_than_the_first_one():
+    fleet, work = mixed_problem(9)
+    first = plan(fleet, work, budget=0.0, objective=MIXED)
+    found = plan(fleet, work, budget=60.0, objective=MIXED, threads=2, max_iterations=400)
+    assert found.cost <= first.cost
+
+
+def test_solvers_without_time_refuse_windows_by_name():
+    with pytest.raises(InvalidValue, match="solver = 'ga': expected 'chain_q' where latest"):
+        plan([Uav('u', (0.0, 0.0, 0.0))], [Task('t', (9.0, 0.0, 0.0), latest=5.0)], solver='ga')
+
+
+def test_the_finish_is_earlier_with_the_objective_finish():
+    fleet = [Uav(f'u{i}', (0.0, float(i), 0.0)) for i in range(3)]
+    work = [Task(f't{i}', (100.0 * (1 + i), 0.0, 0.0), service_time=60.0) for i in range(6)]
+    short, early = (plan(fleet, work, budget=60.0, objective=goal, max_iterations=300)
+                    for goal in (Objective(), 'finish'))
+    assert sum(bool(row) for row in short.routes.values()) == 1
+    assert early.finish < 0.6 * short.finish

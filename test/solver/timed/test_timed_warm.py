@@ -1,0 +1,57 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Warm starts with time: what still holds of the earlier plan stays; payloads on board too."""
+from dataclasses import replace
+
+from uav_task_alloc.model import Task, Uav
+from uav_task_alloc.solver.solve import plan
+
+BASE = (0.0, 0.0, 0.0)
+
+
+def line(count, **options):
+    return [Task(f't{i}', (100.0 * (i + 1), 0.0, 0.0), **options) for i in range(count)]
+
+
+def test_an_earlier_plan_stays_where_it_still_holds():
+    uavs, tasks = [Uav('a', BASE), Uav('b', (0.0, 500.0, 0.0))], line(6, latest=500.0)
+    before = plan(uavs, tasks, budget=0.02)
+    after = plan(uavs, tasks, budget=0.0, warm=before)
+    assert after.routes == before.routes
+    assert after.warm_started
+
+
+def test_a_task_that_is_too_late_by_now_leaves_the_plan():
+    uav = Uav('a', BASE, cruise_speed=10.0)
+    tasks = [*line(2, latest=60.0), Task('new', (-100.0, 0.0, 0.0))]
+    before = plan([uav], tasks, budget=0.02)
+    later = [replace(task, latest=5.0) if task.id == 't1' else task for task in tasks]
+    after = plan([uav], later, budget=0.02, warm=before)
+    assert set(after.unassigned) == {'t1'}
+
+
+def test_trips_of_an_earlier_plan_stay():
+    uav = Uav('a', BASE, range=250.0, turnaround=10.0)
+    tasks = [Task('t0', (100.0, 0.0, 0.0)), Task('t1', (-100.0, 0.0, 0.0))]
+    before = plan([uav], tasks, budget=0.05, trips=2, route_end='home')
+    assert before.trips['a'] in ((('t0',), ('t1',)), (('t1',), ('t0',)))
+    after = plan([uav], tasks, budget=0.0, trips=2, route_end='home', warm=before)
+    assert after.trips == before.trips
+
+
+def test_payload_on_board_stays_with_its_uav():
+    a, b = (Uav(name, BASE, payload_capacity=2.0) for name in 'ab')
+    tasks = [Task('parcel', (1000.0, 0.0, 0.0), payload=1.0)]
+    before = plan([a], tasks, budget=0.02)
+    flying = replace(a, position=(100.0, 0.0, 50.0), home=BASE)
+    near = replace(b, position=(990.0, 0.0, 0.0), home=None)
+    after = plan([near, flying], tasks, budget=0.02, warm=before)
+    assert after.routes['a'] == ('parcel',)
+
+
+def test_locked_tasks_stay_first_and_count_against_windows_of_others():
+    uav = Uav('a', BASE, cruise_speed=10.0)
+    tasks = [Task('held', (500.0, 0.0, 0.0), service_time=100.0),
+             Task('near', (100.0, 0.0, 0.0), latest=120.0), Task('open', (0.0, 50.0, 0.0))]
+    found = plan([uav], tasks, budget=0.02, locked={'a': ['held']})
+    assert found.routes['a'] == ('held', 'open')
+    assert found.unassigned['near'] == 'latest 120 s; the earliest arrival is 190 s (a)'
