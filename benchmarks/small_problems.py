@@ -17,7 +17,7 @@ from pathlib import Path
 ROOT = Path(__file__).parent.parent
 sys.path[:0] = [str(ROOT)]
 
-from uav_task_alloc.study.small_problems import compare, small_problem  # noqa: E402
+from uav_task_alloc.study.small_problems import compare_small, small_problem  # noqa: E402
 
 
 def main() -> int:
@@ -30,7 +30,7 @@ def main() -> int:
     gaps, faulty, impossible = list[float](), list[int](), 0
     for seed in range(args.seed, args.seed + args.problems):
         try:
-            result = compare(small_problem(seed, args.tasks), args.rounds)
+            result = compare_small(small_problem(seed, args.tasks), args.rounds)
         except (ArithmeticError, LookupError, TypeError, ValueError, AssertionError) as error:
             print(f'{seed}: {error!r}', file=sys.stderr, flush=True)
             faulty.append(seed)

@@ -26,7 +26,7 @@ from uav_task_alloc.model import Plan, Task, Uav  # noqa: E402
 from uav_task_alloc.objective import OBJECTIVES  # noqa: E402
 from uav_task_alloc.solver.problem import Rules  # noqa: E402
 from uav_task_alloc.solver.solve import plan  # noqa: E402
-from uav_task_alloc.solver.timed.evaluator import evaluate  # noqa: E402
+from uav_task_alloc.solver.timed.evaluator import evaluate_routes  # noqa: E402
 from uav_task_alloc.solver.timed.solve import load_timed_kernels  # noqa: E402
 from uav_task_alloc.study.instances import SIDE, make_instance  # noqa: E402
 
@@ -90,7 +90,7 @@ def gap(result: Plan, best: Plan) -> float:
 
 def is_valid(fleet: tuple[Uav, ...], work: tuple[Task, ...], result: Plan, name: str) -> bool:
     rules = Rules(objective=OBJECTIVES[name])
-    return not evaluate(fleet, work, rules, result.trips).violations
+    return not evaluate_routes(fleet, work, rules, result.trips).violations
 
 
 def advance(fleet: tuple[Uav, ...], work: tuple[Task, ...],

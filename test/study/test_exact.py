@@ -8,7 +8,7 @@ import pytest
 from uav_task_alloc.model import Task, Uav
 from uav_task_alloc.objective import Objective
 from uav_task_alloc.solver.problem import Rules
-from uav_task_alloc.solver.timed.evaluator import Held, evaluate
+from uav_task_alloc.solver.timed.evaluator import Held, evaluate_routes
 from uav_task_alloc.study import exact
 from uav_task_alloc.study.exact import exact_plan
 
@@ -72,14 +72,14 @@ def test_no_random_plan_is_better(seed):
                 payload_capacity=1.0, turnaround=9.0) for name in 'uv']
     rules = Rules(returns=True, trips=2, objective=Objective(0.01, 1.0, 1.0, 2.0, 50.0))
     best = exact_plan(uavs, tasks, rules)
-    assert evaluate(uavs, tasks, rules, best.routes).cost == pytest.approx(best.cost)
+    assert evaluate_routes(uavs, tasks, rules, best.routes).cost == pytest.approx(best.cost)
     for _ in range(500):
         rows = {name: [[], []] for name in 'uv'}
         for i in rng.permutation(5)[:rng.integers(1, 5)]:
             if i < 4:
                 rows['uv'[rng.integers(2)]][rng.integers(2)].append(f't{i}')
         rows = {name: [row for row in pair if row] for name, pair in rows.items()}
-        found = evaluate(uavs, tasks, rules, rows)
+        found = evaluate_routes(uavs, tasks, rules, rows)
         assert found.violations or found.cost >= best.cost - 1e-9
 
 
@@ -98,4 +98,5 @@ def test_labels_find_what_trying_all_routes_finds(seed, monkeypatch):
     monkeypatch.setattr(exact, '_is_plain', lambda *_: False)
     by_trying = exact_plan(uavs, tasks, rules)
     assert (by_labels.cost, by_labels.value) == pytest.approx((by_trying.cost, by_trying.value))
-    assert evaluate(uavs, tasks, rules, by_labels.routes).cost == pytest.approx(by_labels.cost)
+    found = evaluate_routes(uavs, tasks, rules, by_labels.routes)
+    assert found.cost == pytest.approx(by_labels.cost)

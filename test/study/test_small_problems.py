@@ -4,13 +4,13 @@ from dataclasses import replace
 
 import pytest
 
-from uav_task_alloc.study.small_problems import compare, faults, small_problem
+from uav_task_alloc.study.small_problems import compare_small, plan_faults, small_problem
 
 
 @pytest.mark.parametrize('first', range(1, 61, 12))
 def test_plans_are_valid_and_as_good_as_the_optimum(first):
     for seed in range(first, first + 12):
-        result = compare(small_problem(seed, most_tasks=4), rounds=400)
+        result = compare_small(small_problem(seed, most_tasks=4), rounds=400)
         assert result is None or (result.faults, result.warm_faults) == ((), ()), seed
         assert result is None or result.gap < 1e-6, seed
 
@@ -18,9 +18,9 @@ def test_plans_are_valid_and_as_good_as_the_optimum(first):
 def test_a_wrong_plan_is_noticed():
     problem = small_problem(3)
     result = problem.solve(100)
-    assert list(faults(problem, result)) == []
-    assert list(faults(problem, replace(result, cost=result.cost + 1.0)))
-    assert list(faults(problem, replace(result, routes={}, unassigned={})))
+    assert list(plan_faults(problem, result)) == []
+    assert list(plan_faults(problem, replace(result, cost=result.cost + 1.0)))
+    assert list(plan_faults(problem, replace(result, routes={}, unassigned={})))
 
 
 def test_an_untrue_reason_is_noticed():
@@ -31,4 +31,4 @@ def test_an_untrue_reason_is_noticed():
                                      for uav, row in result.routes.items()},
                      unassigned={**result.unassigned, name: 'payload 9 kg'})
     assert any('cannot' not in fault and 'payload 9 kg' in fault
-               for fault in faults(problem, untrue))
+               for fault in plan_faults(problem, untrue))

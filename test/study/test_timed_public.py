@@ -6,7 +6,7 @@ import pytest
 
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.model import Task, Uav
-from uav_task_alloc.solver.timed.evaluator import evaluate
+from uav_task_alloc.solver.timed.evaluator import evaluate_routes
 from uav_task_alloc.study import timed_bench
 from uav_task_alloc.study.instances import Instance
 from uav_task_alloc.study.public import instance_sources, parse_instance, read_folder
@@ -88,7 +88,7 @@ TOPTW = """2 1 3 1
 
 
 def run(instance, text):
-    return evaluate(instance.uavs, instance.tasks, instance.rules, solution_trips(text))
+    return evaluate_routes(instance.uavs, instance.tasks, instance.rules, solution_trips(text))
 
 
 def test_windows_loads_and_service_are_read_and_lengths_cut():

@@ -103,6 +103,12 @@ def _make_parser() -> OptionParser:
         spec = next(spec.metadata for spec in fields(AllocatorParams) if spec.name == name)
         parser.number(f'--{name.replace("_", "-")}', spec['low'], spec['high'], meaning,
                       unit='m', default_text=_ITS_OWN)
+    _add_outputs(parser)
+    return parser
+
+
+def _add_outputs(parser: OptionParser) -> None:
+    """The files that `plan` writes."""
     for option, metavar, meaning in (
             ('--json', 'OUT', 'write the plan as JSON, lengths in metres'),
             ('--plot', 'OUT.png', 'draw the plan from above (.png, .pdf, .svg)'),
@@ -112,7 +118,6 @@ def _make_parser() -> OptionParser:
             ('--missions', 'DIR', 'write a .plan (QGroundControl) and a .waypoints file (Mission '
                                   'Planner, MAVProxy) for each UAV')):
         parser.add_argument(option, type=Path, metavar=metavar, help=f'{meaning} (default: none)')
-    return parser
 
 
 def check_outputs(args: argparse.Namespace) -> None:

@@ -19,7 +19,7 @@ from uav_task_alloc.solver.timed.evaluator import (
     Held,
     LegOf,
     TimedEvaluation,
-    evaluate,
+    evaluate_routes,
     straight_legs,
 )
 
@@ -52,7 +52,7 @@ def exact_plan(uavs: Sequence[Uav], tasks: Sequence[Task], rules: Rules,
     """Find the best plan of all.
 
     Args:
-        uavs, tasks, rules, leg, held: as for `evaluate`.
+        uavs, tasks, rules, leg, held: as for `evaluate_routes`.
 
     Returns:
         None where no plan is valid: a locked task cannot be served.
@@ -202,10 +202,10 @@ def _valid_rows(uav: Uav, tasks: Sequence[Task], taken: Container[str], rules: R
     while pending:
         rows = pending.pop()
         if any(rows):
-            found = evaluate([uav], tasks, rules, {uav.id: rows}, leg, held)
+            found = evaluate_routes([uav], tasks, rules, {uav.id: rows}, leg, held)
             if not found.violations:
                 yield rows, found
-            elif evaluate([free], tasks, open_end, {uav.id: rows}, leg, held).violations:
+            elif evaluate_routes([free], tasks, open_end, {uav.id: rows}, leg, held).violations:
                 continue  # late, overloaded or unable: no longer route mends that
         done = {name for row in rows for name in row}
         for name in names:

@@ -19,10 +19,10 @@ from uav_task_alloc.model import Plan, Point, Task, Uav
 from uav_task_alloc.objective import OBJECTIVES, Objective, check_objective, needs_time
 from uav_task_alloc.solver.problem import Rules
 from uav_task_alloc.solver.solve import plan
-from uav_task_alloc.solver.timed.evaluator import Held, TimedEvaluation, evaluate
+from uav_task_alloc.solver.timed.evaluator import Held, TimedEvaluation, evaluate_routes
 from uav_task_alloc.study.exact import exact_plan, rank
 
-SIDE = 1000.0  # [m]
+SMALL_SIDE = 1000.0  # [m]
 _FAULT = 1e-6  # share of a cost, or [s], that is rounding
 
 
@@ -41,9 +41,9 @@ class SmallProblem:
         """What UAVs hold already."""
         return Held(self.locked)
 
-    def evaluate(self, result: Plan) -> TimedEvaluation:
+    def evaluated(self, result: Plan) -> TimedEvaluation:
         """Evaluate a plan by its trips alone."""
-        return evaluate(self.uavs, self.tasks, self.rules, result.trips, held=self.held)
+        return evaluate_routes(self.uavs, self.tasks, self.rules, result.trips, held=self.held)
 
     def solve(self, rounds: int, warm: Plan | None = None) -> Plan:
         """Solve it with the objective, in so many rounds; 0: insertion only."""
@@ -90,7 +90,7 @@ def _draw(rng: np.random.Generator, seed: int, most_tasks: int, most_uavs: int) 
 
 
 def _place(rng: np.random.Generator, most_height: float) -> Point:
-    x, y = rng.uniform(0.0, SIDE, 2)
+    x, y = rng.uniform(0.0, SMALL_SIDE, 2)
     return round(float(x), 1), round(float(y), 1), round(float(rng.uniform(0.0, most_height)), 1)
 
 
@@ -158,14 +158,14 @@ def _locked(rng: np.random.Generator, uavs: list[Uav],
     return {uav.id: (task.id,)} if may else {}
 
 
-def faults(problem: SmallProblem, result: Plan) -> Iterator[str]:
+def plan_faults(problem: SmallProblem, result: Plan) -> Iterator[str]:
     """What is wrong with a plan: violations, lost tasks, untrue times and reasons.
 
     Args:
         problem: with a valid plan.
         result: its plan.
     """
-    found = problem.evaluate(result)
+    found = problem.evaluated(result)
     yield from found.violations
     served = [name for row in result.routes.values() for name in row]
     if sorted([*served, *result.unassigned]) != sorted(task.id for task in problem.tasks):
@@ -208,7 +208,7 @@ def _can_serve(problem: SmallProblem, task: Task) -> bool:
     for uav in problem.uavs:
         first = problem.locked.get(uav.id, ())
         for rows in ([(*first, task.id)], [first, (task.id,)]):
-            found = evaluate(problem.uavs, problem.tasks, problem.rules, {
+            found = evaluate_routes(problem.uavs, problem.tasks, problem.rules, {
                 uav.id: rows, **{other: [row] for other, row in problem.locked.items()
                                  if other != uav.id}}, held=problem.held)
             if not found.violations:
@@ -220,8 +220,8 @@ def _start_alone(problem: SmallProblem, uav: Uav, task: Task) -> float:
     """Start of the service of a task after locked ones only [s]."""
     rows = [(*problem.locked.get(uav.id, ()), task.id)]
     rules = replace(problem.rules, objective=replace(problem.rules.objective, response=1.0))
-    found = evaluate([replace(uav, endurance=math.inf)], problem.tasks, rules, {uav.id: rows},
-                     held=problem.held)
+    found = evaluate_routes([replace(uav, endurance=math.inf)], problem.tasks, rules,
+                            {uav.id: rows}, held=problem.held)
     return found.timetable.starts[task.id]
 
 
@@ -234,7 +234,7 @@ class SmallResult:
     warm_faults: tuple[str, ...] = ()  # of a plan that starts from it
 
 
-def compare(problem: SmallProblem, rounds: int) -> SmallResult | None:
+def compare_small(problem: SmallProblem, rounds: int) -> SmallResult | None:
     """Solve a problem and compare with the exact optimum and with insertion alone.
 
     Args:
@@ -248,7 +248,7 @@ def compare(problem: SmallProblem, rounds: int) -> SmallResult | None:
     if best is None:
         return None
     inserted, result = problem.solve(0), problem.solve(rounds)
-    wrong = [*faults(problem, result), *(f'insertion: {text}' for text in faults(
+    wrong = [*plan_faults(problem, result), *(f'insertion: {text}' for text in plan_faults(
         problem, inserted))]
     mine = rank(result.value, result.cost, problem.rules)
     for name, other, better in (('its insertion', (inserted.value, inserted.cost), 1.0),
@@ -257,7 +257,7 @@ def compare(problem: SmallProblem, rounds: int) -> SmallResult | None:
         if _exceeds(mine, theirs, better):
             wrong.append(f'{mine} is {"worse" if better > 0.0 else "better"} than {name} {theirs}')
     again = problem.solve(rounds // 4, warm=result)
-    worse = [*faults(problem, again)]
+    worse = [*plan_faults(problem, again)]
     if _exceeds(rank(again.value, again.cost, problem.rules), mine, 1.0):
         worse.append(f'{again.cost} is worse than the plan it starts from {result.cost}')
     gap = math.nan if mine[0] > rank(best.value, best.cost, problem.rules)[0] + _FAULT else (

@@ -9,7 +9,7 @@ from typing import Any
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.solver.problem import Limits
 from uav_task_alloc.solver.registry import SOLVERS
-from uav_task_alloc.solver.timed.evaluator import evaluate
+from uav_task_alloc.solver.timed.evaluator import evaluate_routes
 from uav_task_alloc.solver.timed.solve import solve_timed
 from uav_task_alloc.study.evaluator import TripsByUav
 from uav_task_alloc.study.instances import Instance
@@ -57,7 +57,7 @@ def _row(instance: Instance, budget: float, trips: TripsByUav | None) -> dict[st
     if trips is None:
         return row
     rules = instance.rules
-    result = evaluate(instance.uavs, instance.tasks, rules, trips)
+    result = evaluate_routes(instance.uavs, instance.tasks, rules, trips)
     missing = len(instance.tasks) - len(result.timetable.starts)
     complete = not missing or instance.collects or rules.objective.unserved < float('inf')
     if complete and not result.violations:

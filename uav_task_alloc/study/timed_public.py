@@ -19,7 +19,7 @@ from dataclasses import dataclass, replace
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.model import Point, Task, Uav
 from uav_task_alloc.objective import Objective
-from uav_task_alloc.solver.timed.evaluator import evaluate
+from uav_task_alloc.solver.timed.evaluator import evaluate_routes
 from uav_task_alloc.study.instances import Instance
 
 RELOADING_TRIPS = 32  # of a vehicle that may reload
@@ -101,7 +101,7 @@ def parse_vrplib(name: str, text: str, solution: str = '') -> Instance:
     instance = replace(makers[kind](data), group=kind)
     if not solution:
         return instance
-    best = evaluate(instance.uavs, instance.tasks, instance.rules, solution_trips(solution))
+    best = evaluate_routes(instance.uavs, instance.tasks, instance.rules, solution_trips(solution))
     if best.violations:
         raise InvalidValue(f'{name}: solution', best.violations[0], 'a valid one')
     return replace(instance, known=best.cost)

@@ -11,7 +11,7 @@ import pytest
 from uav_task_alloc.model import Task, Uav
 from uav_task_alloc.objective import Objective
 from uav_task_alloc.solver.problem import Rules
-from uav_task_alloc.solver.timed.evaluator import Held, evaluate
+from uav_task_alloc.solver.timed.evaluator import Held, evaluate_routes
 
 UAV = Uav('u', (0.0, 0.0, 0.0), cruise_speed=10.0)
 IN_AIR = replace(UAV, home=(0.0, 500.0, 0.0))
@@ -24,7 +24,7 @@ def at(name, x, **values):
 
 
 def run(uav, tasks, trips, rules=HOLD, **options):
-    return evaluate([uav], tasks, rules, {'u': trips}, **options)
+    return evaluate_routes([uav], tasks, rules, {'u': trips}, **options)
 
 
 def with_objective(rules=HOLD, **coefficients):
@@ -155,9 +155,9 @@ def test_nobody_else_serves_a_payload_that_is_on_board():
     tasks = [at('a', 100.0, payload=2.0), at('b', 200.0)]
     flying = replace(IN_AIR, aboard=frozenset('ab'), turnaround=5.0, payload_capacity=2.0)
     other = replace(UAV, id='v', payload_capacity=2.0)
-    found = evaluate([flying, other], tasks, HOLD, {'v': [['a', 'b']]})
+    found = evaluate_routes([flying, other], tasks, HOLD, {'v': [['a', 'b']]})
     assert found.violations == ('v, trip 1 serves a, whose payload is on board of u',)
-    found = evaluate([flying, other], tasks, SWAPS, {'u': [['b'], ['a']]})
+    found = evaluate_routes([flying, other], tasks, SWAPS, {'u': [['b'], ['a']]})
     assert found.violations == ('u, trip 2 serves a, whose payload is on board of u',)
 
 
@@ -204,7 +204,7 @@ def test_soft_ranges_and_endurances_are_priced_as_metres():
 def test_ability_and_ids_are_checked():
     tasks = [at('a', 100.0, required_capabilities={'camera'}), at('b', 200.0, allowed_uavs={'v'}),
              at('c', 300.0)]
-    found = evaluate([UAV, replace(UAV, id='v')], tasks, HOLD,
+    found = evaluate_routes([UAV, replace(UAV, id='v')], tasks, HOLD,
                      {'u': [['a', 'b', 'c', 'd']], 'v': [['c']], 'w': []},
                      held=Held({'u': ('c',)}))
     assert found.violations == (

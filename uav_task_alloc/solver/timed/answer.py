@@ -9,7 +9,12 @@ from itertools import chain, pairwise
 from uav_task_alloc.model import Leg, Plan, Task
 from uav_task_alloc.objective import fit
 from uav_task_alloc.solver.answer import leg_between
-from uav_task_alloc.solver.timed.evaluator import Held, TimedEvaluation, evaluate, evaluate_legs
+from uav_task_alloc.solver.timed.evaluator import (
+    Held,
+    TimedEvaluation,
+    evaluate_legs,
+    evaluate_routes,
+)
 from uav_task_alloc.solver.timed.problem import TimedProblem
 from uav_task_alloc.solver.timed.reasons import timed_reasons
 from uav_task_alloc.solver.timed.recorder import TimedRecorder
@@ -77,7 +82,7 @@ def evaluate_trips(problem: TimedProblem, trips: Mapping[str, Sequence[Sequence[
     held = Held({uav_id: [task.id for task in row] for uav_id, row in base.locked.items()},
                 problem.aboard)
     if base.rules.grain > 0.0:
-        return evaluate(base.uavs, tasks, base.rules, trips, held=held)
+        return evaluate_routes(base.uavs, tasks, base.rules, trips, held=held)
     return evaluate_legs(base.uavs, tasks, base.rules, trips, legs, held)
 
 

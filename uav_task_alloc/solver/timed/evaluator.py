@@ -112,7 +112,14 @@ class _Trip:
 
 
 def straight_legs(rules: Rules) -> LegOf:
-    """Length [m] and flight time [s] of straight legs; cut lengths are flown at cruise speed."""
+    """Return what measures straight legs; cut lengths are flown at cruise speed.
+
+    Args:
+        rules: whether lengths are cut.
+
+    Returns:
+        A function of UAV, start and end: length [m] and flight time [s].
+    """
     def leg(uav: Uav, start: Point, end: Point) -> tuple[float, float]:
         metres = math.dist(start, end)
         if not rules.grain:
@@ -122,7 +129,7 @@ def straight_legs(rules: Rules) -> LegOf:
     return leg
 
 
-def evaluate(uavs: Sequence[Uav], tasks: Sequence[Task], rules: Rules,
+def evaluate_routes(uavs: Sequence[Uav], tasks: Sequence[Task], rules: Rules,
              routes: Mapping[str, Trips], leg: LegOf | None = None,
              held: Held | None = None) -> TimedEvaluation:
     """Evaluate routes with the best departures.
@@ -337,11 +344,11 @@ def evaluate_legs(uavs: Sequence[Uav], tasks: Sequence[Task], rules: Rules,
     """Evaluate routes along their legs.
 
     Args:
-        uavs, tasks, rules, routes, held: as for `evaluate`.
+        uavs, tasks, rules, routes, held: as for `evaluate_routes`.
         legs: by UAV id; one to each task and to each base at the end of a trip.
 
     Returns:
-        As `evaluate`.
+        As `evaluate_routes`.
     """
     places, ways = {task.id: task.position for task in tasks}, {}
     for uav in uavs:
@@ -357,4 +364,4 @@ def evaluate_legs(uavs: Sequence[Uav], tasks: Sequence[Task], rules: Rules,
         # where no safe way leads home the route ends at its last task
         return ways.get((uav.id, start, end), (0.0, 0.0))
 
-    return evaluate(uavs, tasks, rules, routes, leg_of, held)
+    return evaluate_routes(uavs, tasks, rules, routes, leg_of, held)
