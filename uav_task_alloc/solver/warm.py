@@ -34,6 +34,7 @@ class WarmState:
     legs: Mapping[str, tuple[Leg, ...]] = field(default_factory=dict)  # by UAV id
     # task ids of each trip, by UAV id, where the problem had time
     trips: Mapping[str, tuple[tuple[str, ...], ...]] = field(default_factory=dict)
+    timed: Any = None  # the TimedProblem, whose neighbours are used again
 
     @classmethod
     def of(cls, warm: Plan | WarmState | None) -> WarmState:

@@ -24,7 +24,7 @@ class TimedParams:
 
     start_temperature: float = 10.0
     end_temperature: float = 0.1
-    ruin: float = 10.0  # tasks that a round removes
+    ruin: float = 15.0  # tasks that a round removes
     absent: int = 10  # absent tasks that a round tries to insert, besides those it removes
     unserved_growth: float = 1.3  # factor by which the price of few absent tasks rises
 

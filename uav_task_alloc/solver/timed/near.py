@@ -3,11 +3,49 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
-from uav_task_alloc.geometry.outline import Floats
+import numpy as np
+
+from uav_task_alloc.geometry.outline import Floats, Ints
 from uav_task_alloc.kernel import inline_kernel, kernel
 from uav_task_alloc.solver.timed import columns as at
-from uav_task_alloc.solver.timed.arrays import TimedArrays
+from uav_task_alloc.solver.timed.arrays import Links, TimedArrays
+
+
+class KnownNear(NamedTuple):
+    """Neighbours of the tasks of an earlier problem, and which of them are in the present one."""
+
+    uavs: int  # of the earlier problem: its first task node
+    near: Links  # as in TimedArrays
+    lengths: Floats  # [m]
+    counts: Ints
+    then: Ints  # (n) index of each present task in the earlier problem; -1: new
+    now: Ints  # index of each earlier task in the present problem; -1: gone
+    fresh: Ints  # indices of the new tasks
+
+
+def known_near(a: TimedArrays, earlier: TimedArrays | None, then: Ints) -> KnownNear:
+    """The neighbours of an earlier problem as far as they are still right.
+
+    Args:
+        a: the present problem.
+        earlier: None: nothing is known.
+        then: (n) index of each task in the earlier problem; -1: it had none of this id.
+    """
+    if earlier is None or earlier.near.shape[1] != a.near.shape[1]:
+        return KnownNear(0, a.near, a.near_length, a.near_count, np.full(len(then), -1), then[:0],
+                         then[:0])
+    stays = np.flatnonzero(then >= 0)
+    there = earlier.fixed[earlier.uavs + then[stays], :at.Z + 1]
+    moved = (a.fixed[a.uavs + stays, :at.Z + 1] != there).any(axis=1)
+    then = then.copy()
+    then[stays[moved]] = -1
+    now = np.full(earlier.ends - earlier.uavs, -1)
+    stays = np.flatnonzero(then >= 0)
+    now[then[stays]] = stays
+    return KnownNear(earlier.uavs, earlier.near, earlier.near_length, earlier.near_count, then,
+                     now, np.flatnonzero(then < 0))
 
 
 @inline_kernel
@@ -25,32 +63,47 @@ def _may_be_adjacent(a: TimedArrays, t: int, s: int, least: float) -> bool:
             or a.fixed[s, at.OPENS] + a.fixed[s, at.SERVICE] + least <= a.fixed[t, at.CLOSES])
 
 
-@kernel
-def fill_near(a: TimedArrays, squares: Floats, pace: float) -> None:
-    """Fill a.near, a.near_length and a.near_count. O(n^2), some ns a pair.
+@inline_kernel
+def _add_neighbour(a: TimedArrays, i: int, kept: int, j: int, pace: float) -> int:
+    """Add task j to the first `kept` neighbours of task i, nearest first; how many now. O(k)."""
+    t, s, k = a.uavs + i, a.uavs + j, a.near.shape[1]
+    metres = math.sqrt(_square_between(a, t, s))
+    if i == j or k == 0 or (kept == k and metres >= a.near_length[i, k - 1]):
+        return kept
+    x, y = a.fixed[s, at.X] - a.fixed[t, at.X], a.fixed[s, at.Y] - a.fixed[t, at.Y]
+    if not _may_be_adjacent(a, t, s, math.sqrt(x * x + y * y) * pace):
+        return kept
+    place = min(kept, k - 1)
+    while place > 0 and a.near_length[i, place - 1] > metres:
+        a.near_length[i, place] = a.near_length[i, place - 1]
+        a.near[i, place] = a.near[i, place - 1]
+        place -= 1
+    a.near_length[i, place], a.near[i, place] = metres, s
+    return int(min(kept + 1, k))
 
-    squares: (k) scratch; pace: [s/m] of the fastest UAV, horizontally.
+
+@kernel
+def fill_near(a: TimedArrays, known: KnownNear, pace: float) -> None:
+    """Fill a.near, a.near_length and a.near_count. O(n k) where known, else O(n^2).
+
+    known: neighbours of an earlier problem; pace: [s/m] of the fastest UAV, horizontally.
     """
-    n, k = a.near.shape
+    n = len(a.near)
     for i in range(n):
-        t, kept = a.uavs + i, 0
-        for j in range(n):
-            s = a.uavs + j
-            square = _square_between(a, t, s)
-            if (kept == k and square >= squares[k - 1]) or i == j or k == 0:
-                continue
-            x, y = a.fixed[s, at.X] - a.fixed[t, at.X], a.fixed[s, at.Y] - a.fixed[t, at.Y]
-            if not _may_be_adjacent(a, t, s, math.sqrt(x * x + y * y) * pace):
-                continue
-            place = min(kept, k - 1)
-            while place > 0 and squares[place - 1] > square:
-                squares[place], a.near[i, place] = squares[place - 1], a.near[i, place - 1]
-                place -= 1
-            squares[place], a.near[i, place] = square, s
-            kept = min(kept + 1, k)
+        kept, before = 0, known.then[i]
+        if before >= 0:
+            for m in range(known.counts[before]):
+                j = known.now[known.near[before, m] - known.uavs]
+                if j >= 0:
+                    a.near[i, kept], a.near_length[i, kept] = a.uavs + j, known.lengths[before, m]
+                    kept += 1
+            for m in range(known.fresh.size):
+                kept = _add_neighbour(a, i, kept, known.fresh[m], pace)
+        if before < 0 or kept < known.counts[before] // 2:
+            kept = 0
+            for j in range(n):
+                kept = _add_neighbour(a, i, kept, j, pace)
         a.near_count[i] = kept
-        for m in range(kept):
-            a.near_length[i, m] = math.sqrt(squares[m])
 
 
 @kernel

@@ -17,7 +17,7 @@ from uav_task_alloc.solver.answer import leg_between
 from uav_task_alloc.solver.problem import Problem, excess_cost
 from uav_task_alloc.solver.timed import columns as at
 from uav_task_alloc.solver.timed.arrays import LINK, TimedArrays, TimedRoutes
-from uav_task_alloc.solver.timed.near import fill_near, fill_near_classes
+from uav_task_alloc.solver.timed.near import fill_near, fill_near_classes, known_near
 from uav_task_alloc.solver.timed.order import reset
 from uav_task_alloc.solver.timed.path_times import Speeds, path_times
 
@@ -76,7 +76,7 @@ def make_timed(problem: Problem, aboard: Mapping[str, frozenset[str]],
         np.full((n, min(NEAR_CLASSES, classes)), -1, np.int64), order.astype(np.int64),
         np.searchsorted(class_of[order], np.arange(classes + 1)).astype(np.int64), class_of)
     arrays.restricted[:] = ~arrays.compatible.all(axis=(0, 1)) if m else False
-    scale = _fill(problem, arrays)
+    scale = _fill(problem, arrays, known)
     _set_prices(problem, arrays, scale)
     return TimedProblem(problem, arrays, aboard, scale)
 
@@ -259,12 +259,14 @@ def _classes(problem: Problem, begin: Floats, limit: Floats,
         for u, uav in enumerate(problem.uavs)], np.int64)
 
 
-def _fill(problem: Problem, a: TimedArrays) -> float:
+def _fill(problem: Problem, a: TimedArrays, known: TimedProblem | None) -> float:
     """Fill in neighbours; returns the mean leg to the nearest one, in cost."""
     if not problem.tasks or not problem.uavs:
         return 1.0
     pace = float(a.pace[:, 0].min())
-    fill_near(a, np.empty(max(1, a.near.shape[1])), pace)
+    index = known.base.index if known else {}
+    then = np.array([index.get(task.id, -1) for task in problem.tasks], np.int64)
+    fill_near(a, known_near(a, known.arrays if known else None, then), pace)
     fill_near_classes(a, np.empty(max(1, a.near_class.shape[1])))
     some = a.near_count > 0
     legs = a.near_length[some, 0] if some.any() else a.fixed[a.uavs:a.ends, at.REMOTE]

@@ -50,14 +50,14 @@ def solve_timed(uavs: Sequence[Uav], tasks: Sequence[Task],
     search = PathPreparation(clock, began, budget, stop, before.flown())
     known = before.problem
     base = make_problem(uavs, tasks, locked, limits, rules, known, search)
-    problem = make_timed(base, _aboard(uavs, base.locked, before))
+    problem = make_timed(base, _aboard(uavs, base.locked, before), before.timed)
     recorder = TimedRecorder(clock, began, budget, max_iterations, stop, threads,
                              warm is not None, on_iteration, problem=problem)
     search.begin(1.0, SEARCH_LIMIT)
     _improve(recorder, seed, before, params)
     result = to_timed_plan(problem, recorder, SOLVER_NAME, warm is not None)
     search.path_budget.check()  # raises what a callback raised within a kernel
-    state = WarmState(base, before.learnt, result.routes, trips=dict(result.trips))
+    state = WarmState(base, before.learnt, result.routes, trips=dict(result.trips), timed=problem)
     return replace(result, state=state)
 
 
