@@ -150,7 +150,7 @@ def test_a_cancelled_task_is_not_planned(tmp_path):
     (['plan', FILE, '--budget', '0.01', '--json', '/none/plan.json'], '/none/plan.json'),
     (['plan', DELIVERIES, '--budget', '0.1', '--missions', 'm'],
      'expected 1: a mission file holds one flight'),
-    (['plan', FILE, '--trips', '0'], 'trips = 0: expected an integer in [1, 64]'),
+    (['plan', FILE, '--trips', '0'], '--trips = 0: expected a whole number in [1, 64]'),
     (['plan', DELIVERIES, '--solver', 'nearest'],
      "solver = 'nearest': expected 'chain_q' where latest times, loads, "),
     (['plan', FILE, '--plot-3d', 'plan.txt'],

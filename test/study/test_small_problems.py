@@ -24,7 +24,7 @@ def test_a_wrong_plan_is_noticed():
 
 
 def test_an_untrue_reason_is_noticed():
-    problem = small_problem(3)
+    problem = small_problem(2)
     result = problem.solve(100)
     name = next(each for row in result.routes.values() for each in row)
     untrue = replace(result, routes={uav: tuple(each for each in row if each != name)

@@ -95,8 +95,9 @@ def _make_parser() -> OptionParser:
                         help=f'what is minimised, docs/times.md (default: {_ITS_OWN})')
     parser.number('--trips', 1, MAX_TRIPS, 'of each UAV at most; with more than one it may visit '
                   'its home between tasks', whole=True, default_text=_ITS_OWN)
-    parser.add_argument('--times', action='store_true', help='print when each task is reached; '
-                        'done in any case where times, loads, trips or the objective count')
+    parser.add_argument('--times', action='store_true',
+                        help='print when each task is reached (default: only where times, loads, '
+                             'trips or the objective count)')
     for name, meaning in (('clearance', 'kept from zones beyond their margins'),
                           ('altitude_min', 'lowest detour, above the origin'),
                           ('altitude_max', 'highest detour, above the origin')):
