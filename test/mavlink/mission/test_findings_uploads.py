@@ -129,6 +129,23 @@ def test_a_task_at_which_it_was_seen_before_the_bridge_was_killed_is_flown_once(
     flown_once_each(bench, 'ABC')
 
 
+@BOTH
+@pytest.mark.parametrize('lost', [(), ('MISSION_ITEM_REACHED',)])
+def test_a_task_reached_between_a_restart_and_a_reboot_is_flown_once(kind, lost):
+    bench = flying(kind, 'ABC')
+    bench.assign(task_list('ABC', 2, service=2.0))
+    bench.run(lambda: distance(bench, AT_A) < 1.0)
+    bench.run(limit=0.5)
+    bench.kill_and_restart(0.0)
+    drop_for(bench, 12.0, 'MISSION_COUNT', *lost)
+    drop_for(bench, 2.5, 'EKF_STATUS_REPORT', 'ESTIMATOR_STATUS', 'GPS_RAW_INT')
+    bench.assign(task_list('ABC', 3, service=2.0))
+    assert bench.run(lambda: places(bench) == ['A'], 8.0)
+    bench.run(limit=6.0)
+    bench.vehicles[1].reboot(bench.now)
+    assert bench.run(lambda: bench.completed() == ['A'], 60.0)
+
+
 @PX4
 def test_a_repetition_of_the_mission_before_the_one_on_board_completes_nothing(kind):
     bench = flying(kind, 'AB')

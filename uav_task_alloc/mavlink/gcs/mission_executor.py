@@ -191,8 +191,8 @@ class MissionExecutor:
             self._restarts = self.telemetry.restarts
             self.notes.append(OperatorNote('warning', 'was restarted'))
             self.watch.vehicle_rebooted(now)
-            self._start_over(now)
             self.onboard.resume.rebooted()
+            self._start_over(now)
         if message.get_type() == 'HEARTBEAT' and newest:
             self.watch.receive_heartbeat(message, now)
             if self.telemetry.mode is ModeFunction.MISSION:

@@ -30,6 +30,7 @@ from uav_task_alloc.model import Point, Task
 
 _NEAR = 15.0  # [m] from the last item that counts as reached
 _MAX_CURRENTS = 512  # MISSION_CURRENT kept until the vehicle is located: four minutes
+_PLACE_DELAY = 2.0  # [s] after a REACHED in which a position still shows its place
 _MAX_UNREAD = 32  # REACHED kept until the mission is read
 MAX_AGE = 60.0  # [s] after the restart; a later task at the same position is a new one
 
@@ -76,12 +77,15 @@ class Resume:
         self.recorded: tuple[int | None, int | None, bool] = None, None, False
         self.was_disarmed = True  # in the last record; or there is none
         self.current_unreliable = False  # items before the current one may be unflown
-        self._rebooted = False
+        self._rebooted = self._passed_recorded = False
         self._unread: list[_UnreadReached] = []  # until the vehicle is located
         self.reset()
 
     def rebooted(self) -> None:
         """Reset after a restart of the vehicle, whose current item starts at the first."""
+        _, recorded, arrived = self.recorded
+        self._passed_recorded = arrived and recorded is not None and any(
+            seq > recorded for seq, _, _ in self._currents)
         self.reset()
         self._rebooted = True
 
@@ -105,6 +109,9 @@ class Resume:
         for reached in self._unread:
             if frame > reached.frame:
                 reached.current_after = max(seq, reached.current_after or 0)
+            if reached.place is None and self._telemetry.has_position and (
+                    now - reached.at < _PLACE_DELAY):
+                reached.place = self._telemetry.position
 
     def note_reached(self, seq: int, now: float, frame: int) -> None:
         """Take a MISSION_ITEM_REACHED, until the vehicle is located."""
@@ -154,6 +161,11 @@ class Resume:
             self.located = self.located or not held
             return
         self.located = True
+        mission, recorded, _ = self.recorded
+        if self._passed_recorded and mission == checksum(held) and recorded is not None:
+            self._flown += held[recorded:recorded + 1]
+            self._reached += held[recorded:recorded + 1]
+            self._until = now + MAX_AGE
         if self.current_unreliable or (self.was_disarmed and not telemetry.airborne) or (
                 not self._profile.atomic and telemetry.mode is not ModeFunction.MISSION):
             self._credit_unread(held, now)
