@@ -96,8 +96,10 @@ def test_zones_may_be_given_in_degrees():
 @pytest.mark.parametrize(('table', 'word', 'hint'), [
     ('tasks', 'priority', "nearest is 'value'"), ('tasks', 'lat', "nearest is 'latitude'"),
     ('tasks', 'lng', "nearest is 'longitude'"), ('tasks', 'alt', "nearest is 'altitude'"),
-    ('tasks', 'deadline', 'time windows are not supported'), ('tasks', 'Name', "nearest is 'id'"),
-    ('tasks', 'latest', 'time windows are not supported'), ('tasks', 'time', "nearest is 'at'"),
+    ('tasks', 'deadline', "nearest is 'latest'"), ('tasks', 'Name', "nearest is 'id'"),
+    ('tasks', 'not_before', "nearest is 'earliest'"),
+    ('tasks', 'depends_on', 'an order of tasks is not supported'),
+    ('tasks', 'time', "nearest is 'at'"),
     ('tasks', 'vlaue', "nearest is 'value'"), ('tasks', 'duration', "nearest is 'service_time'"),
     ('uavs', 'speed', "nearest is 'cruise_speed'"), ('uavs', 'battery', "nearest is 'range'"),
     ('uavs', 'lon', "nearest is 'longitude'"), ('uavs', 'start', "nearest is 'position'"),

@@ -11,7 +11,13 @@ SAME_MEANING = {
     'value': 'priority prio weight reward importance profit score',
     'service_time': 'duration service hover hover_time wait dwell loiter hold_time',
     'cruise_speed': 'speed velocity airspeed groundspeed max_speed',
-    'range': 'battery endurance max_range max_distance fuel energy',
+    'range': 'battery max_range max_distance fuel energy',
+    'endurance': 'flight_time max_flight_time battery_time',
+    'earliest': 'after not_before ready_time open_time opens',
+    'latest': 'deadline due before due_date time_window window closes',
+    'payload': 'mass load demand', 'payload_capacity': 'capacity max_payload max_load',
+    'turnaround': 'swap_time battery_swap recharge_time',
+    'climb_speed': 'climb_rate', 'descent_speed': 'descent_rate sink_rate',
     'z_min': 'min_altitude altitude_min floor bottom lower',
     'z_max': 'max_altitude altitude_max ceiling top upper height alt',
     'latitude': 'lat', 'longitude': 'lon lng long',
@@ -34,9 +40,6 @@ SAME_MEANING = {
     'speedup': 'speed time_factor', 'cancels': 'cancel withdrawals', 'task': 'id',
     'count': 'number n', 'between': 'times interval', 'area': 'box bounds'}
 _NO_SUCH_THING = {
-    'time windows are not supported: a task is served as soon as the route gets to it':
-        'deadline latest earliest due window time_window before after',
-    'payloads are not supported: use required_capabilities': 'payload mass load demand',
     'an order of tasks is not supported': 'depends depends_on predecessor order sequence'}
 
 
