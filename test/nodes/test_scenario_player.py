@@ -56,6 +56,13 @@ def test_everything_is_announced_in_order_at_its_time(start, probe, file):
     assert deaths == [('uav_1', False)]
 
 
+def test_keys_that_a_flight_ignores_are_named(start, probe, tmp_path):
+    path = tmp_path / 'timed.yaml'
+    path.write_text(TEXT.replace('service_time: 1.5', 'latest: 90'))
+    player = start('scenario_player', '-p', f'scenario:={path}')
+    probe.until(lambda: 'flights ignore latest; only plan uses them' in player.output())
+
+
 def test_the_clock_waits_for_an_allocator(start, probe, file):
     player = start('scenario_player', '-p', f'scenario:={file}', '-p', 'speedup:=10.0')
     start('live_view')

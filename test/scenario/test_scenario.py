@@ -12,7 +12,6 @@ from uav_task_alloc.geometry.zones import zones_around
 from uav_task_alloc.model import Shape, ThreatZone
 from uav_task_alloc.objective import Objective
 from uav_task_alloc.scenario import checked_yaml, document
-from uav_task_alloc.scenario.key_hints import SAME_MEANING, key_hint
 from uav_task_alloc.scenario.schema import TABLES
 
 ROOT = Path(__file__).parents[2]
@@ -91,30 +90,6 @@ def test_zones_may_be_given_in_degrees():
     assert [*prism.vertices[0], *prism.vertices[2]] == pytest.approx(
         [0.0, 111.2, 76.1, 0.0], abs=0.1)
     assert (prism.z_min, prism.z_max) == (3.0, math.inf)
-
-
-@pytest.mark.parametrize(('table', 'word', 'hint'), [
-    ('tasks', 'priority', "nearest is 'value'"), ('tasks', 'lat', "nearest is 'latitude'"),
-    ('tasks', 'lng', "nearest is 'longitude'"), ('tasks', 'alt', "nearest is 'altitude'"),
-    ('tasks', 'deadline', "nearest is 'latest'"), ('tasks', 'Name', "nearest is 'id'"),
-    ('tasks', 'not_before', "nearest is 'earliest'"),
-    ('tasks', 'depends_on', 'an order of tasks is not supported'),
-    ('tasks', 'time', "nearest is 'at'"),
-    ('tasks', 'vlaue', "nearest is 'value'"), ('tasks', 'duration', "nearest is 'service_time'"),
-    ('uavs', 'speed', "nearest is 'cruise_speed'"), ('uavs', 'battery', "nearest is 'range'"),
-    ('uavs', 'lon', "nearest is 'longitude'"), ('uavs', 'start', "nearest is 'position'"),
-    ('zones', 'polygon', "nearest is 'vertices'"), ('zones', 'type', "nearest is 'shape'"),
-    ('zones', 'height', "nearest is 'z_max'"), ('zones', 'buffer', "nearest is 'margin'"),
-    ('scenario', 'drones', "nearest is 'uavs'"), ('scenario', 'obstacles', "nearest is 'zones'"),
-    ('origin', 'altitude', "nearest is 'altitude_amsl'"), ('tasks', 'qqq', 'nearest is '),
-])
-def test_a_word_of_other_programs_is_answered_by_the_key_that_has_its_meaning(table, word, hint):
-    assert key_hint(word, TABLES[table]).startswith(hint)
-
-
-def test_hints_name_keys_that_exist():
-    known = {key for table in TABLES.values() for key in table}
-    assert SAME_MEANING.keys() <= known
 
 
 def test_each_shape_of_zone_is_read():
@@ -399,3 +374,10 @@ def test_a_wrong_time_is_refused_with_its_line(old, new, text):
     with pytest.raises(ScenarioError) as refused:
         scenario.parse(TIMED.replace(old, new), 's.yaml')
     assert str(refused.value) == text
+
+
+def test_keys_that_only_plans_use_are_listed():
+    plain = scenario.parse(UAV)
+    timed = scenario.parse(UAV.replace('}', ', endurance: 600}') + 'trips: 2\n')
+    assert plain.keys_of_plan_only() == ()
+    assert timed.keys_of_plan_only() == ('endurance', 'trips')

@@ -57,6 +57,9 @@ class ScenarioPlayer(Node):
         self.get_logger().info(
             f'{played.name}: {len(played.uavs)} UAVs, {len(played.tasks)} tasks, '
             f'{len(played.zones)} zones; waiting for an allocator')
+        if ignored := played.keys_of_plan_only():
+            self.get_logger().warning(
+                f'{played.name}: flights ignore {", ".join(ignored)}; only plan uses them')
 
     def on_timer(self) -> None:
         """Play every moment that is due."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 from uav_task_alloc.geometry.frames import Origin
 from uav_task_alloc.model import Point, Task, ThreatZone, Uav
@@ -113,3 +113,15 @@ class Scenario:
         """The times at which the set of zones changes [s], in order; 0 is one of them."""
         times = {t for timed in self.zones for t in (timed.appears, timed.vanishes)}
         return sorted({0.0} | {t for t in times if math.isfinite(t)})
+
+    def keys_of_plan_only(self) -> tuple[str, ...]:
+        """Return keys that are set here and that only `plan` uses: a flight ignores them."""
+        uav, task = ({field.name: field.default for field in fields(kind)}
+                     for kind in (ScenarioUav, Task))
+        used = [key for key in TASK_TIMES
+                if any(getattr(timed.task, key) != task[key] for timed in self.tasks)]
+        used += [key for key in UAV_LIMITS
+                 if any(getattr(each, key) != uav[key] for each in self.uavs)]
+        used += [key for key, plain in (('objective', 'distance'), ('trips', 1))
+                 if getattr(self, key) != plain]
+        return tuple(used)

@@ -34,6 +34,7 @@ def start(name: str) -> None:
         missing = (error.name or '').split('.')[0]
         if missing == 'uav_task_alloc':
             raise
-        sys.exit(f'{name}: {str(error).splitlines()[0]}: expected {missing or "it"} to be installed: '
-                 f'{_INSTALL.get(missing, "see the installation in README.md")}')
+        how = _INSTALL.get(missing, 'see the installation in README.md')
+        sys.exit(f'{name}: {str(error).splitlines()[0]}: '
+                 f'expected {missing or "it"} to be installed: {how}')
     sys.exit(main())
