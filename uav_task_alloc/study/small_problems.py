@@ -191,15 +191,16 @@ def _untrue(problem: SmallProblem, task: Task, reason: str) -> Iterator[str]:
     stated = re.match(r'latest (-?\d+) s; the earliest arrival is (\d+) s \((\w+)\)', reason)
     if stated:
         arrival = min((_start_alone(problem, uav, task) for uav in problem.uavs
-                       if _may(uav, task) and (
-                           not task.payload or uav.at_base
-                           or problem.held.has_aboard(uav, task))), default=math.inf)
+                       if _may(problem, uav, task)), default=math.inf)
         if abs(arrival - float(stated[2])) > 0.51 or abs(task.latest - float(stated[1])) > 0.51:
             yield f'{task.id}: {reason!r}, but the earliest arrival is {arrival:.1f} s'
 
 
-def _may(uav: Uav, task: Task) -> bool:
-    return task.required_capabilities <= uav.capabilities and (
+def _may(problem: SmallProblem, uav: Uav, task: Task) -> bool:
+    """Whether a UAV may serve a task, and has its payload or can still take it on."""
+    aboard = [each for each in problem.uavs if problem.held.has_aboard(each, task)]
+    loaded = not task.payload or uav.at_base if not aboard else uav in aboard
+    return loaded and task.required_capabilities <= uav.capabilities and (
         task.allowed_uavs is None or uav.id in task.allowed_uavs)
 
 
