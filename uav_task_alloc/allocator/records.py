@@ -10,6 +10,7 @@ from typing import Any
 from uav_task_alloc.checks import check_id, check_names, check_number, check_point
 from uav_task_alloc.geometry.frames import Origin
 from uav_task_alloc.model import Leg, Plan, Point, Task, ThreatZone, Uav
+from uav_task_alloc.objective import Objective
 
 
 class TaskState(Enum):
@@ -176,6 +177,7 @@ class ReplanProblem:
     locked: Mapping[str, tuple[str, ...]]  # by UAV: first tasks of its route
     published: Plan  # the lists in force
     warm: Plan  # the best plan so far, from which the search continues
+    objective: Objective = field(default_factory=Objective)  # what is minimised
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,6 +12,8 @@ from uav_task_alloc.allocator.replanning.list_rate_limiter import ListRateLimite
 from uav_task_alloc.allocator.replanning.plan_acceptance import accepted_plan, exchange_groups
 from uav_task_alloc.geometry.zones import path_is_clear
 from uav_task_alloc.model import Leg, ThreatZone
+from uav_task_alloc.objective import Objective
+from uav_task_alloc.timetable import Timetable
 
 DOME = ThreatZone.hemisphere('dome', (500.0, 5.0, 0.0), 100.0)
 
@@ -238,6 +240,53 @@ def test_what_would_serve_less_is_not_taken():
     base = as_plan(problem.uavs, place, (), {'a': ('t1', 't2')})
     fresh = as_plan(problem.uavs, place, (), {'a': ('t2',)}, {'t1': 'too far'})
     assert accepted_plan(ReplanAnswer(problem, base, fresh), 0.01) == base
+
+
+def timed(plan, speed=10.0):
+    """The plan with times: straight legs at one speed, nothing waits."""
+    starts, ends = {}, {}
+    for uav_id, row in plan.routes.items():
+        clock = 0.0
+        for name, leg in zip(row, plan.legs[uav_id], strict=True):
+            clock += leg.length / speed
+            starts[name] = ends[uav_id] = clock
+    trips = {uav_id: (row,) for uav_id, row in plan.routes.items() if row}
+    return replace(plan, timetable=lambda: Timetable(starts, starts, trips, {}, ends))
+
+
+@pytest.mark.parametrize(('objective', 'taken'), [
+    (Objective(), False), (Objective(0.0, finish=1.0), True), (Objective(0.0, 0.0, 1.0), True),
+    (Objective(10.0, finish=1.0), False)])
+def test_a_change_is_accepted_by_the_objective(objective, taken):
+    driver = AllocatorDriver()
+    driver.uav('a', 0.0, 0.0, 50.0)
+    driver.uav('b', 0.0, 1000.0, 50.0)
+    driver.add(('t1', 800, 0), ('t2', 800, 500))
+    problem = replace(driver.begin(), objective=objective)
+    place = {task.id: task for task in problem.tasks}
+    short = timed(as_plan(problem.uavs, place, (), {'a': ('t1', 't2'), 'b': ()}))
+    early = timed(as_plan(problem.uavs, place, (), {'a': ('t1',), 'b': ('t2',)}))
+    chosen = accepted_plan(ReplanAnswer(problem, short, early), 0.01)
+    assert chosen.routes == (early if taken else short).routes
+    assert chosen.finish == (early if taken else short).finish
+
+
+def test_a_combined_plan_has_the_times_of_its_parts():
+    driver = AllocatorDriver()
+    for index, name in enumerate('abcd'):
+        driver.uav(name, 0.0, 1000.0 * index, 50.0)
+    driver.add(('t1', 100, 0), ('t2', 200, 0), ('t3', 100, 2000), ('t4', 90, 2000))
+    problem = driver.begin()
+    place = {task.id: task for task in problem.tasks}
+    base = timed(as_plan(problem.uavs, place, (), {
+        'a': ('t2', 't1'), 'b': (), 'c': ('t4', 't3'), 'd': ()}))
+    fresh = timed(as_plan(problem.uavs, place, (), {
+        'a': ('t1', 't2'), 'b': (), 'c': ('t3', 't4'), 'd': ()}))
+    chosen = accepted_plan(ReplanAnswer(problem, base, fresh), 0.01)
+    assert chosen.routes == {'a': ('t1', 't2'), 'b': (), 'c': ('t4', 't3'), 'd': ()}
+    assert chosen.arrivals == {
+        **{name: fresh.arrivals[name] for name in ('t1', 't2')},
+        **{name: base.arrivals[name] for name in ('t3', 't4')}}
 
 
 @pytest.mark.parametrize('margin', [0.01, 0.05])

@@ -5,9 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import replace
+from typing import Any
 
 from uav_task_alloc.allocator.records import ReplanAnswer
 from uav_task_alloc.model import Plan
+from uav_task_alloc.objective import response_time
+from uav_task_alloc.timetable import Timetable
 
 TaskIdsByUav = dict[str, tuple[str, ...]]
 
@@ -15,13 +18,14 @@ TaskIdsByUav = dict[str, tuple[str, ...]]
 def accepted_plan(answer: ReplanAnswer, margin: float) -> Plan:
     """Return the repaired plan with those changes of the best plan that are worth a new list.
 
-    A change is accepted if it serves a higher value, or the same value with routes shorter by
-    the margin. UAVs that exchange tasks change together. Without an event the accepted changes
-    together must shorten all routes by the margin, too.
+    A change is accepted if it serves a higher value, or the same value at a cost of the objective
+    that is lower by the margin: with that of distance, on routes so much shorter. UAVs that
+    exchange tasks change together. Without an event the accepted changes together must lower the
+    cost of the whole plan by the margin, too.
 
     Args:
         answer: of the worker.
-        margin: share of a length.
+        margin: share of a cost.
 
     Returns:
         The plan to publish: repaired, best, or a combination of both.
@@ -29,29 +33,48 @@ def accepted_plan(answer: ReplanAnswer, margin: float) -> Plan:
     repaired, best = answer.repaired, answer.best
     if best.penalty < repaired.penalty:
         return best
-    accepted, gained, more = set[str](), 0.0, False
+    accepted, first, more = set[str](), _cost(answer, ()), False
+    cost = first
     for group in exchange_groups(repaired.routes, best.routes):
-        value, before, gain = _compare(answer, group)
-        if value > 0.0 or (value == 0.0 and gain > max(margin * before, 1e-6)):
+        value, now = _added_value(answer, group), _cost(answer, accepted | group)
+        before = _cost(answer, (), group)
+        if value > 0.0 or (value == 0.0 and cost - now > max(margin * before, 1e-6)):
             accepted |= group
-            gained, more = gained + gain, more or value > 0.0
+            cost, more = now, more or value > 0.0
     if not accepted or (answer.problem.background and not more
-                        and gained <= margin * repaired.distance):
+                        and first - cost <= margin * first):
         return repaired
-    return _combined(repaired, best, accepted)
+    return replace(_combined(answer, accepted), cost=cost)
 
 
-def _compare(answer: ReplanAnswer, group: Collection[str]) -> tuple[float, float, float]:
-    """Of a group of UAVs: the added value, the cost before [m], and the cost saved [m]."""
+def _added_value(answer: ReplanAnswer, group: Collection[str]) -> float:
+    """Value that the best plan serves more with a group of UAVs than the repaired one."""
     value = {task.id: task.value for task in answer.problem.tasks}
-    ranges = {uav.id: uav.range for uav in answer.problem.uavs}
-    plans = answer.repaired, answer.best
     # fsum: the same tasks have the same sum in any order
-    served = [math.fsum(value[task] for uav_id in group for task in plan.routes[uav_id])
-              for plan in plans]
-    before, after = (sum(_route_cost(plan, uav_id, ranges[uav_id]) for uav_id in group)
-                     for plan in plans)
-    return served[1] - served[0], before, before - after
+    before, after = (math.fsum(value[task] for uav_id in group for task in plan.routes[uav_id])
+                     for plan in (answer.repaired, answer.best))
+    return after - before
+
+
+def _cost(answer: ReplanAnswer, changed: Collection[str],
+          only: Collection[str] | None = None) -> float:
+    """Cost of the objective of the repaired plan with the changed UAVs as in the best one.
+
+    only: UAVs that count; None: all.
+    """
+    problem, prices = answer.problem, answer.problem.objective
+    plan = _combined(answer, changed)
+    uavs = [uav for uav in problem.uavs if only is None or uav.id in only]
+    metres = sum(_length_with_penalty(plan, uav.id, uav.range) for uav in uavs)
+    if prices.is_shortest:
+        return prices.cost(metres)
+    times, ids = plan.timetable(), {uav.id for uav in uavs}
+    mine = {task for uav_id in ids for task in plan.routes.get(uav_id, ())}
+    return prices.cost(
+        metres, max((end for uav_id, end in times.ends.items() if uav_id in ids), default=0.0),
+        response_time(problem.tasks, {task: start for task, start in times.starts.items()
+                                      if task in mine}),
+        math.fsum(late for task, late in times.late.items() if task in mine))
 
 
 def exchange_groups(before: Mapping[str, tuple[str, ...]],
@@ -70,20 +93,50 @@ def exchange_groups(before: Mapping[str, tuple[str, ...]],
     return [frozenset(group) for group in groups]
 
 
-def _route_cost(plan: Plan, uav_id: str, limit: float) -> float:
+def _length_with_penalty(plan: Plan, uav_id: str, limit: float) -> float:
     """Length [m], with a penalty for what exceeds a soft range limit [m]."""
     length = plan.route(uav_id).distance
     return length + 100.0 * max(0.0, length - limit)
 
 
-def _combined(repaired: Plan, best: Plan, changed: Collection[str]) -> Plan:
-    """`best` for the changed UAVs, `repaired` for the others."""
+def _combined(answer: ReplanAnswer, changed: Collection[str]) -> Plan:
+    """The best plan for the changed UAVs, the repaired one for the others."""
+    repaired, best = answer.repaired, answer.best
     routes = {u: (best if u in changed else repaired).routes[u] for u in repaired.routes}
     legs = {u: (best if u in changed else repaired).legs.get(u, ()) for u in repaired.routes}
     served = {task for tasks in routes.values() for task in tasks}
     left_out = {task: why for task, why in {**repaired.unassigned, **best.unassigned}.items()
                 if task not in served}
-    return replace(best, routes=routes, legs=legs, unassigned=left_out)
+    return replace(best, routes=routes, legs=legs, unassigned=left_out,
+                   timetable=lambda: _combined_times(answer, changed))
+
+
+def _combined_times(answer: ReplanAnswer, changed: Collection[str]) -> Timetable:
+    """The times of `_combined`."""
+    merged, best = Timetable(), answer.best
+    for plan in (answer.repaired, best):
+        times = plan.timetable()
+        for uav_id in plan.routes:
+            if (uav_id in changed) == (plan is best):
+                merged = _with_uav(merged, times, uav_id, plan.routes[uav_id])
+    return replace(merged, response=response_time(answer.problem.tasks, merged.starts))
+
+
+def _with_uav(merged: Timetable, times: Timetable, uav_id: str,
+              tasks: Iterable[str]) -> Timetable:
+    """The merged times, and those of one UAV."""
+    def joined(some: Mapping[str, Any], more: Mapping[str, Any],
+               keys: Iterable[str]) -> dict[str, Any]:
+        return {**some, **{key: more[key] for key in keys if key in more}}
+
+    row = list(tasks)
+    return replace(
+        merged, arrivals=joined(merged.arrivals, times.arrivals, row),
+        starts=joined(merged.starts, times.starts, row),
+        late=joined(merged.late, times.late, row),
+        trips=joined(merged.trips, times.trips, [uav_id]),
+        departures=joined(merged.departures, times.departures, [uav_id]),
+        ends=joined(merged.ends, times.ends, [uav_id]))
 
 
 def repaired_routes(routes: Mapping[str, Iterable[str]], locked: Mapping[str, tuple[str, ...]],

@@ -71,7 +71,8 @@ def solve_problem(plan: Callable[..., Plan], problem: ReplanProblem, params: All
                     seed=params.seed, warm=warm, route_end=params.route_end,
                     locked=problem.locked, clearance=params.clearance,
                     altitude_min=params.altitude_min, altitude_max=params.altitude_max,
-                    threads=params.threads, stop=stop, max_iterations=max_iterations)
+                    threads=params.threads, objective=problem.objective, stop=stop,
+                    max_iterations=max_iterations)
 
     repaired = call(problem.published, 0)
     best = call(problem.warm if problem.background else repaired, None)
