@@ -65,7 +65,7 @@ def test_fault_20_reached_during_an_upload_belongs_to_the_old_list(kind):
     bench.assign(task_list(names, 2))
     assert bench.run(lambda: bench.onboard().open, 10.0)
     bench.executor().telemetry.position_at = -100.0
-    bench.onboard().progress._positions.place = None
+    bench.onboard().progress.positions.place = None
     bench.from_vehicle(d.MAVLink_mission_item_reached_message(first))
     assert bench.completed() == ['A']
     assert bench.run(lambda: len(bench.completed()) == 4)

@@ -105,7 +105,7 @@ class MissionExecutor:
             resume.recorded = record.mission, record.current, record.arrived
             for first in range(0, len(record.seen) - _SEEN + 1, _SEEN):
                 t, x, y, z, east, north, up = record.seen[first:first + _SEEN]
-                self.onboard.progress.add_recorded_position(
+                self.onboard.progress.positions.add_recorded(
                     PositionSample(t, (x, y, z), (east, north, up)))
             resume.was_disarmed = not record.armed
             # the current item may be of the replaced mission, or set by another party

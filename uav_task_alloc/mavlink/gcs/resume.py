@@ -24,6 +24,7 @@ from uav_task_alloc.mavlink.mission.items import (
     mission_items,
     with_position,
 )
+from uav_task_alloc.mavlink.mission.passed_items import flown_between
 from uav_task_alloc.mavlink.mission.position_history import LOOSE_RADIUS
 from uav_task_alloc.mavlink.mission.progress import ProgressTable
 from uav_task_alloc.model import Point, Task
@@ -197,7 +198,7 @@ class Resume:
         """Whether the vehicle flies the recorded mission on from the recorded item."""
         mission, recorded, _ = self.recorded
         return (mission == checksum(held) and recorded is not None and not self._rebooted
-                and self._progress.continues_recorded
+                and self._progress.positions.continues_recorded
                 and bool(self._currents) and recorded <= self._currents[0][0])
 
     def _continue_recorded(self, held: tuple[Item, ...], tasks: TaskList, ended: bool,
@@ -225,7 +226,7 @@ class Resume:
             return set()
         placed = tuple(with_position(item, self._origin) for item in held)
         frame = max(frame for _, when, frame in self._currents if when <= now)
-        return self._progress.flown_offline(placed, begin, end, now, frame)
+        return flown_between(placed, begin, end, now, frame, self._progress.positions)
 
     def _replay(self, held: tuple[Item, ...]) -> None:
         """Pass on what was received until the mission was read, in the order it was sent."""

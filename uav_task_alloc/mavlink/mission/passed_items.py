@@ -160,3 +160,26 @@ def flown_nearby(items: tuple[Item, ...], flown: Item) -> tuple[Item, ...]:
     at = flown.position
     return tuple(i for i in items if flown.completes and at is not None
                  and i.position is not None and math.dist(i.position, at) < LOOSE_RADIUS)
+
+
+def flown_between(items: tuple[Item, ...], begin: int, end: int, now: float, frame: int,
+                  positions: PositionHistory) -> set[int]:
+    """Judge the items that were passed while no bridge ran; no evidence of them will come.
+
+    Args:
+        items: on board, with their positions.
+        begin: index of the item that was flown when the previous run ended.
+        end: the current item that was reported since.
+        now: steady time [s] at which that was received.
+        frame: its number.
+        positions: of the vehicle.
+
+    Returns:
+        Indices of those that were flown.
+    """
+    passed = tuple(replace(items[n], task=f'{n}') for n in range(begin, end))
+    route = tuple(item for item in (*passed, *items[end:]) if item.position is not None)
+    claim = Claim(passed, route, -math.inf, positions.vehicle_time(now), now, 0, None, frame,
+                  skips=end - begin > 1, in_flight=True)
+    judged = PassedItems(FrameLog(), positions).judge(claim, passed, now)
+    return {int(item.task) for item in judged.flown}

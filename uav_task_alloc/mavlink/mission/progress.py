@@ -9,14 +9,12 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Iterable
-from dataclasses import replace
 
 from uav_task_alloc.mavlink.mission.completed_tasks import CompletedTasks, ProgressEvent
 from uav_task_alloc.mavlink.mission.current_item import CurrentItem
 from uav_task_alloc.mavlink.mission.epoch import Epoch
 from uav_task_alloc.mavlink.mission.flown_path import PositionSample
 from uav_task_alloc.mavlink.mission.items import Item, all_alike
-from uav_task_alloc.mavlink.mission.passed_items import Claim, PassedItems
 from uav_task_alloc.mavlink.mission.position_history import PositionHistory
 from uav_task_alloc.mavlink.mission.reached_epoch import (
     REPEAT_WINDOW,
@@ -51,14 +49,14 @@ class ProgressTable:
 
     def __init__(self, frames: FrameLog | None = None, repeats: bool = False) -> None:
         self._frames = frames or FrameLog()
-        self._positions = PositionHistory()
+        self.positions = PositionHistory()
         self._epoch, self._tasks = Epoch(), CompletedTasks()
-        self._epochs = ReachedEpoch(self._positions, repeats, self._frames)
+        self._epochs = ReachedEpoch(self.positions, repeats, self._frames)
         self._moves = CurrentItem(
-            self._epoch, self._tasks, self._positions, self._epochs, self._frames)
+            self._epoch, self._tasks, self.positions, self._epochs, self._frames)
         self._reached = ReachedItems(
-            self._epoch, self._tasks, self._positions, self._epochs, self._moves, repeats)
-        self.path = self._positions.path
+            self._epoch, self._tasks, self.positions, self._epochs, self._moves, repeats)
+        self.path = self.positions.path
 
     @property
     def epoch(self) -> int:
@@ -159,7 +157,7 @@ class ProgressTable:
         epoch.number += 1
         if (epoch.items or read) and not all_alike(epoch.items, items):
             self._epochs.begin(PreviousEpoch(
-                epoch.items, epoch.since, self._positions.vehicle_time(now), self.may_end(now),
+                epoch.items, epoch.since, self.positions.vehicle_time(now), self.may_end(now),
                 now + REPEAT_WINDOW, epoch.taken))
         epoch.items, epoch.current = items, start
         self._reached.begin()
@@ -182,7 +180,7 @@ class ProgressTable:
         self._reached.last = None
         self._epochs.clear()
         self._epoch.invalidate()
-        self._positions.clear()
+        self.positions.clear()
 
     def retag(self, items: tuple[Item, ...]) -> None:
         """Replace the items by the same items with their tasks."""
@@ -192,27 +190,18 @@ class ProgressTable:
         self, sample: PositionSample, newest: bool, now: float, frame: int | None = None
     ) -> None:
         """Add a position of the vehicle; see `PositionHistory.add`."""
-        self._positions.add(sample, newest, now, frame)
-
-    def add_recorded_position(self, sample: PositionSample) -> None:
-        """Add the last position that the previous run of the bridge has received."""
-        self._positions.add_recorded(sample)
+        self.positions.add(sample, newest, now, frame)
 
     def last_positions(self) -> tuple[PositionSample, ...]:
         """The newest position, after the one before a gap since the current item is flown."""
         return self.path.last(self._epoch.since)
-
-    @property
-    def continues_recorded(self) -> bool:
-        """Whether the positions continue those of the previous run of the bridge."""
-        return self._positions.continues_recorded
 
     def has_arrived(self, seq: int) -> bool:
         """Whether the vehicle was within the radius of an item since it is current."""
         if seq >= len(self.items):
             return False
         since = self._moves.current_since(self.items[seq])
-        return self._positions.was_inside(self.items[seq], since)
+        return self.positions.was_inside(self.items[seq], since)
 
     def begin_set_current(self, seq: int) -> None:
         """Note that we are about to set the current item; it may be reported before the ack."""
@@ -267,28 +256,6 @@ class ProgressTable:
         """Take a MISSION_CURRENT; see `CurrentItem.note_report`."""
         self._moves.note_report(seq, now, flying, frame, restarted)
 
-    def flown_offline(self, items: tuple[Item, ...], begin: int, end: int, now: float,
-                      frame: int) -> set[int]:
-        """Judge the items that were passed while no bridge ran; no evidence of them will come.
-
-        Args:
-            items: on board, with their positions.
-            begin: index of the item that was flown when the previous run ended.
-            end: the current item of the first MISSION_CURRENT.
-            now: steady time [s] at which that was received.
-            frame: its number.
-
-        Returns:
-            Indices of those that were flown.
-        """
-        passed = {f'{n}': replace(items[n], task=f'{n}') for n in range(begin, end)}
-        route = (*passed.values(), *items[end:])
-        claim = Claim(tuple(passed.values()), tuple(i for i in route if i.position is not None),
-                      -math.inf, self._positions.vehicle_time(now), now, self.epoch, None, frame,
-                      skips=end - begin > 1, in_flight=True)
-        judged = PassedItems(self._frames, self._positions).judge(claim, claim.items, now)
-        return {int(item.task) for item in judged.flown}
-
     def note_mission_complete(self, seq: int, now: float, frame: int | None = None) -> None:
         """Take the vehicle's report that its mission is complete up to item `seq`."""
         self._moves.note_mission_complete(seq, now, frame)
@@ -319,14 +286,14 @@ class ProgressTable:
 
     def was_at_by(self, item: Item, when: float) -> bool:
         """Whether an item was reached before a message received at `when` [s]."""
-        return self._positions.was_at(
-            item, self._epoch.since, self._positions.vehicle_time(when))
+        return self.positions.was_at(
+            item, self._epoch.since, self.positions.vehicle_time(when))
 
     def was_exactly_at(self, item: Item, when: float) -> bool:
         """Whether it was within the radius of an item before a message at `when` [s]."""
-        return self._positions.was_at(
-            item, self._epoch.since, self._positions.vehicle_time(when), close=0.0)
+        return self.positions.was_at(
+            item, self._epoch.since, self.positions.vehicle_time(when), close=0.0)
 
     def near_one(self, item: Item, other: Item | None, when: float) -> bool:
         """Whether it was near one item, but not another, before a message at `when` [s]."""
-        return self._positions.near_one(item, other, when)
+        return self.positions.near_one(item, other, when)
