@@ -18,6 +18,7 @@ from uav_task_alloc.solver.timed.order import route_order, set_order
 from uav_task_alloc.solver.timed.problem import empty_timed_routes, make_timed
 from uav_task_alloc.solver.timed.warm import first_plan
 from uav_task_alloc.solver.warm import WarmState
+from uav_task_alloc.study.small_problems import compare_small, small_problem
 
 MIXED = Objective(distance=0.1, finish=1.0, response=1.0, lateness=3.0, unserved=80.0)
 
@@ -112,3 +113,10 @@ def test_the_finish_is_earlier_with_the_objective_finish():
                     for goal in (Objective(), 'finish'))
     assert sum(bool(row) for row in short.routes.values()) == 1
     assert early.finish < 0.6 * short.finish
+
+
+def test_a_later_departure_that_delays_locked_tasks_is_not_worse_than_the_first_plan():
+    problem = small_problem(10440)  # a locked task, an endurance that binds, mean response
+    result = compare_small(problem, rounds=300)
+    assert result is not None
+    assert result.faults == ()

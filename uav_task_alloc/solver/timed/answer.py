@@ -23,17 +23,19 @@ from uav_task_alloc.solver.timed.search import Incumbent
 TripNodes = list[list[int]]  # task nodes of each trip of a UAV
 
 
-def to_timed_plan(problem: TimedProblem, recorder: TimedRecorder, solver: str, warm: bool) -> Plan:
-    """The plan of the recorder's best routes, without the state for a warm start.
+def to_timed_plan(problem: TimedProblem, recorder: TimedRecorder, best: Incumbent, solver: str,
+                  warm: bool) -> Plan:
+    """The plan of some routes, without the state for a warm start.
 
     Args:
         problem: what was solved.
-        recorder: holds the best routes and their history.
+        recorder: holds the history and the time.
+        best: the routes.
         solver: name of the solver.
         warm: whether the solve started from an earlier plan.
     """
     base = problem.base
-    nodes = trips_of_order(problem, recorder.best)
+    nodes = trips_of_order(problem, best)
     if base.distances.zones:
         _drop_unreachable_nodes(problem, nodes)
     legs = {uav.id: _legs(problem, u, nodes[u]) for u, uav in enumerate(base.uavs)}

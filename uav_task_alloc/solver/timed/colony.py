@@ -30,6 +30,8 @@ class TimedParams:
 
 
 COLD = TimedParams()
+# where many tasks have to be left out: the choice of tasks, more than their order
+SELECTION = TimedParams(start_temperature=30.0, end_temperature=1.3, ruin=10.0)
 WARM = TimedParams(start_temperature=0.3, end_temperature=0.02)
 
 

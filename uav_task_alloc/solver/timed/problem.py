@@ -271,8 +271,8 @@ def _fill(problem: Problem, a: TimedArrays, known: TimedProblem | None) -> float
     some = a.near_count > 0
     legs = a.near_length[some, 0] if some.any() else a.fixed[a.uavs:a.ends, at.REMOTE]
     metres = max(float(legs.mean()), 1e-6)
-    goal = problem.rules.objective
-    return max(1e-9, metres * (goal.distance + pace * (goal.finish + goal.response)))
+    goal = problem.rules.objective  # a delay on one route is a share of that of all
+    return max(1e-9, metres * (goal.distance + pace * (goal.finish + goal.response) / a.uavs))
 
 
 def _set_prices(problem: Problem, a: TimedArrays, scale: float) -> None:

@@ -12,10 +12,17 @@ from uav_task_alloc.solver.chain_q import run_colonies
 from uav_task_alloc.solver.path_preparation import SEARCH_LIMIT, PathPreparation
 from uav_task_alloc.solver.problem import Limits, Rules, make_problem
 from uav_task_alloc.solver.timed.answer import to_timed_plan
-from uav_task_alloc.solver.timed.colony import COLD, WARM, TimedColony, TimedParams
-from uav_task_alloc.solver.timed.problem import make_timed
+from uav_task_alloc.solver.timed.colony import (
+    COLD,
+    SELECTION,
+    WARM,
+    TimedColony,
+    TimedParams,
+)
+from uav_task_alloc.solver.timed.problem import TimedProblem, make_timed
 from uav_task_alloc.solver.timed.reasons import timed_reasons
 from uav_task_alloc.solver.timed.recorder import TimedRecorder
+from uav_task_alloc.solver.timed.search import BEST_WORTH, FEW_ABSENT, Incumbent
 from uav_task_alloc.solver.timed.warm import completed, first_plan
 from uav_task_alloc.solver.warm import WarmState
 
@@ -54,25 +61,45 @@ def solve_timed(uavs: Sequence[Uav], tasks: Sequence[Task],
     recorder = TimedRecorder(clock, began, budget, max_iterations, stop, threads,
                              warm is not None, on_iteration, problem=problem)
     search.begin(1.0, SEARCH_LIMIT)
-    _improve(recorder, seed, before, params)
-    result = to_timed_plan(problem, recorder, SOLVER_NAME, warm is not None)
+    first = _improve(recorder, seed, before, params)
+    result = to_timed_plan(problem, recorder, recorder.best, SOLVER_NAME, warm is not None)
+    if base.locked and rules.objective.response > 0.0:
+        # the search does not count that a later departure delays locked tasks
+        other = to_timed_plan(problem, recorder, first, SOLVER_NAME, warm is not None)
+        result = min(result, other, key=lambda each: _rank(problem, each))
     search.path_budget.check()  # raises what a callback raised within a kernel
     state = WarmState(base, before.learnt, result.routes, trips=dict(result.trips), timed=problem)
     return replace(result, state=state)
 
 
 def _improve(recorder: TimedRecorder, seed: int, before: WarmState,
-             params: TimedParams | None) -> None:
-    """Make a first plan and improve it until the budget ends."""
+             params: TimedParams | None) -> Incumbent:
+    """Make a first plan and improve it until the budget ends; returns the first one."""
     problem = recorder.problem
     first = first_plan(problem, before)
     recorder.offer(first)
     if not problem.base.tasks or not problem.base.uavs or recorder.over():
-        return
-    params = params or (WARM if recorder.warm else COLD)
+        return first
+    params = params or _params(problem, first, recorder.warm)
     run_colonies([TimedColony(problem, first, seed + 7919 * i, params)
                   for i in range(recorder.threads)], recorder)
     recorder.offer(completed(problem, recorder.best))
+    return first
+
+
+def _params(problem: TimedProblem, first: Incumbent, warm: bool) -> TimedParams:
+    """The parameters of colonies that start from these routes."""
+    if warm:
+        return WARM
+    tasks = problem.base.tasks
+    left = sum(task.value for task in tasks) - float(first.score[BEST_WORTH])
+    many = left > FEW_ABSENT * sum(task.value for task in tasks)
+    return SELECTION if many and not problem.prizes else COLD
+
+
+def _rank(problem: TimedProblem, found: Plan) -> tuple[float, float]:
+    """Smaller is better."""
+    return 0.0 if problem.prizes else -found.value, found.cost
 
 
 def _aboard(uavs: Sequence[Uav], locked: Mapping[str, tuple[Task, ...]],
