@@ -23,7 +23,6 @@ from uav_task_alloc.solver.timed.evaluator import evaluate_routes
 from uav_task_alloc.study.instances import Instance
 
 RELOADING_TRIPS = 32  # of a vehicle that may reload
-_SCORE = Objective(distance=1e-4, unserved=1.0)  # routes are shorter than 1e4 in all
 _SECTION = '_SECTION'
 Row = Sequence[float]
 
@@ -56,7 +55,7 @@ def parse_toptw(name: str, rows: Sequence[Row], vehicles: int, known: float) -> 
                  for i in range(vehicles))
     tasks = tuple(Task(f't{row[0]:g}', (row[1], row[2], 0.0), row[4], row[3],
                        earliest=row[-2], latest=row[-1]) for row in rows[3:] if row[4] > 0.0)
-    return Instance(name, uavs, tasks, (), 'home', True, known, f'TOPTW-{vehicles}', _SCORE,
+    return Instance(name, uavs, tasks, (), 'home', True, known, f'TOPTW-{vehicles}',
                     grain=100.0 if name.startswith('pr') else 10.0)
 
 
