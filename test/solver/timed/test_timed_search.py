@@ -120,3 +120,19 @@ def test_a_later_departure_that_delays_locked_tasks_is_not_worse_than_the_first_
     result = compare_small(problem, rounds=300)
     assert result is not None
     assert result.faults == ()
+
+
+def test_a_long_search_passes_through_excess_and_its_best_has_none():
+    fleet, work = mixed_problem(11)
+    problem = make_timed(make_problem(fleet, work, {}, Limits(), Rules(returns=True)), {})
+    colony = TimedColony(problem, first_plan(problem, WarmState()), 3, COLD)
+    excess, scores = set(), []
+    for share in np.arange(0.0, 0.6, 0.01):
+        colony.fly(share, share + 0.01, 50)
+        excess.add(bool(colony.routes.counts[at.INFEASIBLE] > 0))
+        scores.append(colony.best.score.copy())
+    fresh = empty_timed_routes(problem.arrays)
+    set_order(problem.arrays, fresh, colony.best.order)
+    assert excess == {True, False}
+    assert fresh.counts[at.INFEASIBLE] == 0
+    assert fresh.sums[at.SERVED_WORTH] == scores[-1][1] >= scores[0][1]

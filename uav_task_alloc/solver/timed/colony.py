@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from uav_task_alloc.solver.rng import rng_state
+from uav_task_alloc.solver.timed import columns as at
 from uav_task_alloc.solver.timed.order import set_order
 from uav_task_alloc.solver.timed.problem import (
     MAX_UNSERVED_GROWTH,
@@ -17,6 +18,9 @@ from uav_task_alloc.solver.timed.problem import (
 from uav_task_alloc.solver.timed.ruin import empty_round
 from uav_task_alloc.solver.timed.search import Incumbent, Rises, anneal, copy_incumbent
 
+LEAST_PRICE, MOST_PRICE = 0.1, 100.0  # of excess, over the first price
+PRICED_ROUNDS = 50.0  # rounds a task from which on passing through excess pays
+
 
 @dataclass(frozen=True, slots=True)
 class TimedParams:
@@ -25,14 +29,16 @@ class TimedParams:
     start_temperature: float = 10.0
     end_temperature: float = 0.1
     ruin: float = 15.0  # tasks that a round removes
+    first_price: float = 3.0  # of a second, metre or mean load of excess, in what one costs to fly
     absent: int = 10  # absent tasks that a round tries to insert, besides those it removes
     unserved_growth: float = 1.3  # factor by which the price of few absent tasks rises
 
 
 COLD = TimedParams()
 # where many tasks have to be left out: the choice of tasks, more than their order
-SELECTION = TimedParams(start_temperature=30.0, end_temperature=1.3, ruin=10.0)
-WARM = TimedParams(start_temperature=0.3, end_temperature=0.02)
+SELECTION = TimedParams(start_temperature=30.0, end_temperature=1.3, ruin=10.0,
+                        first_price=math.inf)
+WARM = TimedParams(start_temperature=0.3, end_temperature=0.02, first_price=math.inf)
 
 
 class TimedColony:
@@ -51,12 +57,24 @@ class TimedColony:
         self.arrays = arrays._replace(price=arrays.price.copy(), unserved=arrays.unserved.copy())
         self.best = copy_incumbent(start)
         self._params, self._scale = params, problem.scale
+        self._goal, self._decided = problem.base.rules.objective, False
         self.routes = empty_timed_routes(self.arrays)
         set_order(self.arrays, self.routes, start.order)
         self._round, self._rng = empty_round(self.arrays), rng_state(seed)
         growth = 1.0 if problem.prizes else params.unserved_growth
         self._rises = Rises(np.full(4, math.inf), np.full(4, math.inf), growth,
                             MAX_UNSERVED_GROWTH * arrays.unserved, params.absent, problem.prizes)
+
+    def _allow_excess(self) -> None:
+        """Set prices of excess, which the best has none of, where it is not allowed so far."""
+        a, goal = self.arrays, self._goal
+        pace, loads = float(a.pace[:, 0].min()), a.fixed[a.uavs:a.ends, at.LOAD]
+        second = max(1e-9, goal.distance / pace + (goal.finish + goal.response) / a.uavs)
+        load = self._scale / float(loads[loads > 0.0].mean()) if loads.any() else 1.0
+        first = self._params.first_price * np.array([second, load, second * pace, second * pace])
+        first[~np.isinf(a.price)] = math.inf  # excess that is allowed keeps its own price
+        np.copyto(a.price, first, where=np.isfinite(first))
+        self._rises = self._rises._replace(least=LEAST_PRICE * first, most=MOST_PRICE * first)
 
     def _temperature(self, spent: float) -> float:
         """Temperature in cost after this share of the budget."""
@@ -75,6 +93,11 @@ class TimedColony:
         Returns:
             That number.
         """
+        if not self._decided and until > spent:
+            self._decided = True
+            tasks = self.arrays.ends - self.arrays.uavs
+            if rounds / (until - spent) >= PRICED_ROUNDS * tasks:
+                self._allow_excess()
         anneal(self.arrays, self.routes, self._round, self.best, self._rises,
                self._params.ruin, self._temperature(spent), self._temperature(until), rounds,
                self._rng)
