@@ -5,7 +5,9 @@ Counting references to each array of a tuple that a call passes on would take mo
 is left out, so a kernel can change arrays but make none.
 
 Most kernels are called by kernels only. The code that calls one from Python takes as long to
-compile as the kernel, so those (`inner_`, `inline_`) are compiled without it.
+compile as the kernel, so those (`inner_`, `inline_`) are compiled without it; and they are not
+kept on disk, where each kernel that calls them has them within it. A constant argument makes no
+further version of a kernel, as numba has it by default.
 """
 from __future__ import annotations
 
@@ -15,6 +17,7 @@ from types import FunctionType
 from typing import Any, TypeVar
 
 import numba
+from numba import types
 from numba.core.registry import CPUDispatcher
 
 from uav_task_alloc.kernel_cache import install
@@ -25,7 +28,15 @@ _Function = TypeVar('_Function', bound=Callable[..., Any])
 install()
 
 
-class InnerKernel(CPUDispatcher):
+class _Kernel(CPUDispatcher):
+    """A kernel of which constant arguments make no further version."""
+
+    def get_call_template(self, args: Any, kws: Any) -> Any:
+        return super().get_call_template(
+            tuple(types.unliteral(each) for each in args), kws)  # type: ignore[no-untyped-call]
+
+
+class _InnerKernel(_Kernel):
     """A kernel for kernels. Called from Python, it is compiled once more with code for that."""
 
     @functools.cached_property
@@ -52,7 +63,7 @@ def kernel(function: _Function) -> _Function:
     Returns:
         The compiled function; releases the GIL, is cached on disk.
     """
-    return _compiled(function, _nrt=False)
+    return _compiled(_Kernel, function, cache=True, _nrt=False)
 
 
 def allocating_kernel(function: _Function) -> _Function:
@@ -64,7 +75,7 @@ def allocating_kernel(function: _Function) -> _Function:
     Returns:
         The compiled function; releases the GIL, is cached on disk.
     """
-    return _compiled(function)
+    return _compiled(_Kernel, function, cache=True)
 
 
 def inner_kernel(function: _Function) -> _Function:
@@ -74,9 +85,9 @@ def inner_kernel(function: _Function) -> _Function:
         function: takes numbers and arrays.
 
     Returns:
-        The compiled function; releases the GIL, is cached on disk.
+        The compiled function; releases the GIL.
     """
-    return _inner(_compiled(function, _nrt=False, no_cpython_wrapper=True))
+    return _compiled(_InnerKernel, function, _nrt=False)
 
 
 def inner_allocating_kernel(function: _Function) -> _Function:
@@ -86,9 +97,9 @@ def inner_allocating_kernel(function: _Function) -> _Function:
         function: takes numbers and arrays.
 
     Returns:
-        The compiled function; releases the GIL, is cached on disk.
+        The compiled function; releases the GIL.
     """
-    return _inner(_compiled(function, no_cpython_wrapper=True))
+    return _compiled(_InnerKernel, function)
 
 
 def inline_kernel(function: _Function) -> _Function:
@@ -98,19 +109,15 @@ def inline_kernel(function: _Function) -> _Function:
         function: called by kernels only.
 
     Returns:
-        The compiled function; releases the GIL, is cached on disk.
+        The compiled function; releases the GIL.
     """
-    return _inner(_compiled(function, _nrt=False, no_cpython_wrapper=True, forceinline=True))
+    return _compiled(_InnerKernel, function, _nrt=False, forceinline=True)
 
 
-def _compiled(function: _Function, **options: bool) -> _Function:
+def _compiled(kind: type[_Kernel], function: _Function, **options: bool) -> _Function:
     """What compiles a function when it is first called."""
-    compiled: _Function = NJIT(cache=True, nogil=True, no_cfunc_wrapper=True, **options)(function)
-    return compiled
-
-
-def _inner(compiled: _Function) -> _Function:
-    """Without code for calls from Python a call would end the process: see InnerKernel."""
-    dispatcher: Any = compiled
-    dispatcher.__class__ = InnerKernel
-    return compiled
+    compiled: Any = NJIT(nogil=True, no_cfunc_wrapper=True,
+                         no_cpython_wrapper=kind is _InnerKernel, **options)(function)
+    compiled.__class__ = kind
+    result: _Function = compiled
+    return result

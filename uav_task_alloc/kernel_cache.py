@@ -14,14 +14,16 @@ import signal
 import sys
 import threading
 import time
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
 from numba.core import caching, event
 
 ROOMS = ('geometry', 'solver')
-COMPILE_TIME = 70.0  # [s] of CPU for all kernels of the allocator
+# [s] of CPU to compile the kernels of chain_q, of problems with time, and of paths around zones
+PLAN_COMPILE_TIME, TIMED_COMPILE_TIME, ZONES_COMPILE_TIME = 22.0, 27.0, 18.0
 _UNUSED = 600.0  # [s] a folder of another hash is kept after the last write: it may be in use
 _FOLDER = 'kernels-'
 # comments and docstrings; whatever has a quote in it and is no docstring stays
@@ -122,6 +124,8 @@ class CompilationNotice(event.Listener):
     def __init__(self) -> None:
         self._printed = False
         self._depth = 0  # passes under way in the main thread: a kernel compiles those it calls
+        self._expected = PLAN_COMPILE_TIME + ZONES_COMPILE_TIME  # [s] of CPU
+        self._loading = 0  # in the main thread: depth of `until_loaded`
         self._replaced: Any = None
 
     def on_start(self, event: Any) -> None:
@@ -134,16 +138,40 @@ class CompilationNotice(event.Listener):
                 self._replaced = signal.signal(signal.SIGINT, signal.SIG_DFL)
         if ours and not self._printed:
             self._printed = True
-            print(f'compiling kernels (once, about {COMPILE_TIME:.0f} s)', file=sys.stderr,
+            print(f'compiling kernels (once, about {self._expected:.0f} s)', file=sys.stderr,
                   flush=True)
 
     def on_end(self, event: Any) -> None:
         """It ends."""
         if threading.current_thread() is threading.main_thread() and self._depth:
             self._depth -= 1
-            if self._depth == 0 and self._replaced is not None:
-                signal.signal(signal.SIGINT, self._replaced)
-                self._replaced = None
+            self._restore()
+
+    @contextmanager
+    def until_loaded(self, expected: float) -> Iterator[None]:
+        """Within it, from the first compilation to the end, Ctrl-C ends the process at once.
+
+        Args:
+            expected: [s] of CPU to compile all that is loaded.
+        """
+        self._expected = expected
+        main = threading.current_thread() is threading.main_thread()
+        self._loading += main
+        try:
+            yield
+        finally:
+            self._loading -= main
+            if main:
+                self._restore()
+
+    def _restore(self) -> None:
+        """Restore Python's handler of SIGINT after the last pass and the loading."""
+        if self._depth == 0 and self._loading == 0 and self._replaced is not None:
+            signal.signal(signal.SIGINT, self._replaced)
+            self._replaced = None
+
+
+NOTICE = CompilationNotice()
 
 
 def install() -> None:
@@ -151,4 +179,4 @@ def install() -> None:
     locators: Any = caching.CacheImpl._locator_classes
     locators.insert(0, KernelCacheLocator)
     register: Any = event.register
-    register('numba:run_pass', CompilationNotice())
+    register('numba:run_pass', NOTICE)

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """All kernels are loaded before the budget of a plan begins."""
+import re
 import subprocess
 import sys
 
@@ -54,3 +55,25 @@ def test_without_zones_no_kernel_that_finds_paths_around_them_is_loaded():
     done = subprocess.run([sys.executable, '-c', NO_ZONES], capture_output=True, text=True,
                           check=True)
     assert done.stdout.split() == ['0', '0', '0']
+
+
+NOTICE = """
+from uav_task_alloc.kernel_cache import NOTICE
+from uav_task_alloc.solver.{solver} import {load}
+
+with NOTICE.until_loaded(99.0):  # compiles nothing, prints nothing
+    pass
+{load}(zones={zones})
+NOTICE.on_start(type('Event', (), dict(data=dict(module='uav_task_alloc.a'))))
+"""
+
+
+def test_the_notice_states_the_time_of_what_is_loaded():
+    def stated(solver, load, zones):
+        done = subprocess.run(
+            [sys.executable, '-c', NOTICE.format(solver=solver, load=load, zones=zones)],
+            capture_output=True, text=True, check=True)
+        return float(re.fullmatch(r'compiling kernels \(once, about (\d+) s\)\n',
+                                  done.stderr).group(1))
+    for solver, load in (('solve', 'load_kernels'), ('timed.solve', 'load_timed_kernels')):
+        assert 0.0 < stated(solver, load, False) < stated(solver, load, True) < 99.0

@@ -13,6 +13,7 @@ from uav_task_alloc.geometry.distances import Distances
 from uav_task_alloc.geometry.search_budget import SearchBudget
 from uav_task_alloc.model import Plan, Task, ThreatZone
 from uav_task_alloc.params import AllocatorParams
+from uav_task_alloc.solver.solve import load_kernels
 
 _BUDGET = 0.05  # [s] of each solve
 _ZONES = (
@@ -32,6 +33,7 @@ def compile_kernels(plan: Callable[..., Plan], params: AllocatorParams) -> int:
     Returns:
         The number of lists that were planned.
     """
+    load_kernels(zones=True)
     params, before = replace(params, solve_budget=_BUDGET), Plan({})
     allocator = Allocator(params, now=0.0)
     allocator.set_kernels_ready()

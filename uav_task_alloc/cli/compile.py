@@ -17,7 +17,7 @@ def main(argv: Sequence[str]) -> int:
         SystemExit: the arguments are malformed, or ask for the help.
     """
     parser = OptionParser(
-        'compile', 'Compile all kernels ahead of time, about a minute once for each '
+        'compile', 'Compile all kernels ahead of time, about 40 s once for each '
         'installation, and print the folders of the cache. They are __pycache__ beside the '
         "sources where that can be written, else in the user's cache directory, or in "
         'NUMBA_CACHE_DIR if that is set.')

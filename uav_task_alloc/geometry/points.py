@@ -21,6 +21,15 @@ def point_distance(p: Floats, i: int, q: Floats, j: int) -> float:
     return math.sqrt(dx * dx + dy * dy + dz * dz)
 
 
+@inner_kernel
+def reverse_points(p: Floats, first: int, n: int) -> None:
+    """Reverse the order of p[first:first + n]; O(n)."""
+    for i in range(n // 2):
+        j, k = first + i, first + n - 1 - i
+        for c in range(3):
+            p[j, c], p[k, c] = p[k, c], p[j, c]
+
+
 @kernel
 def path_length(p: Floats, n: int) -> float:
     """Length [m] of the polyline p[:n]; O(n)."""

@@ -15,7 +15,7 @@ from uav_task_alloc.geometry.flight_time import path_time
 from uav_task_alloc.geometry.numba_pointers import floats_at, ints_at
 from uav_task_alloc.geometry.obstacles import Floats, Ints, Zones, first_containing, zones_at
 from uav_task_alloc.geometry.path_store import PathStore, load_path, store_path
-from uav_task_alloc.geometry.points import copy_point, path_length
+from uav_task_alloc.geometry.points import copy_point, path_length, reverse_points
 from uav_task_alloc.geometry.search_budget import SearchBudget, is_exhausted, new_work
 from uav_task_alloc.geometry.shortest_path import path_clears, shortest_path
 from uav_task_alloc.geometry.taut import MAX_CORNERS
@@ -138,9 +138,7 @@ def stored_path(scene: PathScene, i: int, j: int, path: Floats) -> int:
         if n <= first or not path_clears(scene.zones, path[first:], n - first, floor, no_skin):
             return 0
     if swapped:
-        for m in range(n // 2):
-            for c in range(3):
-                path[m, c], path[n - 1 - m, c] = path[n - 1 - m, c], path[m, c]
+        reverse_points(path, 0, n)
     return n
 
 
@@ -164,7 +162,7 @@ def _join(address: int, i: int, between: int) -> float:
         n += 1
     length, ends = path_length(path, n), np.empty((2, 3))
     if stored_ends(scene, i, j, ends):
-        path[:n] = path[:n][::-1].copy()
+        reverse_points(path, 0, n)
     store_path(scene.store, path, n, ends)
     return length
 
@@ -196,7 +194,7 @@ def _find(address: int, i: int, j: int) -> float:
             store_path(scene.store, path[1:], n, ends)
         elif n < MAX_CORNERS:
             if swapped:
-                path[1:n + 1] = path[1:n + 1][::-1].copy()
+                reverse_points(path, 1, n)
             copy_point(scene.xyz, i, path, 0)
             stored_ends(scene, i, j, ends)
             store_path(scene.store, path, n + 1, ends)

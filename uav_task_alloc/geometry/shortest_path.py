@@ -122,7 +122,8 @@ def _graph_corners(zones: Zones, active: Ints, ends: Floats, limits: Floats, flo
         found = _zone_corners(zones, active[m], levels, ends, limits, floor, ring)
         if n + found.shape[0] > x.shape[0]:
             more = np.empty((2 * (n + found.shape[0]), 3))
-            more[:n] = x[:n]
+            for i in range(n):
+                copy_point(x, i, more, i)
             x = more
         for i in range(found.shape[0]):
             bound = point_distance(ends, 0, found, i) + point_distance(ends, 1, found, i)

@@ -15,6 +15,7 @@ from uav_task_alloc.kernel import (
 )
 from uav_task_alloc.solver.rng import RngState, uniform
 from uav_task_alloc.solver.routes import (
+    NODE,
     SIGNED,
     Arrays,
     Ints,
@@ -90,7 +91,7 @@ def best_place(a: Arrays, r: Routes, t: int) -> tuple[int, float]:
     for u in range(a.uavs):
         if not a.compatible[u, t - a.uavs]:
             continue
-        before = u
+        before = NODE(u)
         while before < a.ends:
             delta = cost_after(a, r, t, before, leg_length(a, before, t), least)
             if delta < least:
@@ -112,7 +113,8 @@ def place_all(a: Arrays, r: Routes, tasks: Ints) -> int:
         How many could not be inserted.
     """
     missing, rng = 0, np.ones(1, np.uint64)
-    for t in tasks:
+    for task in tasks:
+        t = NODE(task)
         if r.uav_of[t] >= 0:
             continue
         place, _ = best_near_place(a, r, t, a.near.shape[1], 0.0, rng)
@@ -121,7 +123,7 @@ def place_all(a: Arrays, r: Routes, tasks: Ints) -> int:
         if place < 0:
             missing += 1
         else:
-            insert(a, r, t, place)
+            insert(a, r, t, NODE(place))
     return missing
 
 
@@ -134,22 +136,23 @@ def insert_by_auction(a: Arrays, r: Routes, noise: float, rng: RngState) -> None
     """
     rounds = np.ones(1, np.uint64)
     heap = [(np.inf, -1)]
-    for t in range(a.uavs, a.ends):
-        if r.uav_of[t] < 0:
-            _, bid = best_near_place(a, r, t, a.near.shape[1], 0.0, rounds)
-            heap.append((bid * (1.0 + noise * uniform(rng)), t))
+    for task in range(a.uavs, a.ends):
+        if r.uav_of[task] < 0:
+            _, bid = best_near_place(a, r, NODE(task), a.near.shape[1], 0.0, rounds)
+            heap.append((bid * (1.0 + noise * uniform(rng)), task))
     heapq.heapify(heap)
     while heap[0][1] >= 0:
-        bid, t = heapq.heappop(heap)
+        bid, task = heapq.heappop(heap)
+        t = NODE(task)
         if r.uav_of[t] >= 0:
             continue
         place, now = best_near_place(a, r, t, a.near.shape[1], 0.0, rounds)
         if place < 0:
             continue
         if now > bid * (1.0 + noise) + 1e-9:
-            heapq.heappush(heap, (now, t))
+            heapq.heappush(heap, (now, task))
             continue
-        insert(a, r, t, place)
+        insert(a, r, t, NODE(place))
         _renew_bids(a, r, t, heap)
 
 

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from uav_task_alloc.kernel import inner_allocating_kernel, inner_kernel
+from uav_task_alloc.kernel import allocating_kernel, inner_allocating_kernel, inner_kernel
 from uav_task_alloc.solver.pool import Pool
 from uav_task_alloc.solver.routes import TINY, Arrays, Floats, Ints
 
@@ -56,13 +56,21 @@ def _bound(a: Arrays, pool: Pool, price: Floats, reduced: Floats, least: Floats,
 def _first_prices(a: Arrays, pool: Pool, flown: Ints) -> Floats:
     """First multipliers by node: the costs of the columns flown, split among their tasks. O(n)."""
     price = np.zeros(a.ends)
-    price[a.uavs:] = a.unassigned_cost
-    for e in flown[flown >= 0]:
-        begin, end = pool.first[e], pool.first[e + 1]
+    for t in range(a.uavs, a.ends):
+        price[t] = a.unassigned_cost[t - a.uavs]
+    for e in flown:
+        begin, end = (pool.first[e], pool.first[e + 1]) if e >= 0 else (0, 0)
         for i in range(begin, end):
             t = pool.stops[i]
             price[t] = min(price[t], pool.cost[e] / (end - begin))
     return price
+
+
+@inner_kernel
+def _copy(prices: Floats, to: Floats) -> None:
+    """Copy multipliers; a slice would do, but takes a second to compile. O(n)"""
+    for i in range(prices.size):
+        to[i] = prices[i]
 
 
 @inner_kernel
@@ -75,7 +83,7 @@ def _count(pool: Pool, chosen: Ints, served: Ints) -> None:
                 served[pool.stops[i]] += 1
 
 
-@inner_allocating_kernel
+@allocating_kernel
 def reduced_costs(a: Arrays, pool: Pool, flown: Ints, worth: float,
                   work: float) -> tuple[Reduced, float]:
     """Reduced costs for a high lower bound [m], and that bound. O(work).
@@ -94,13 +102,16 @@ def reduced_costs(a: Arrays, pool: Pool, flown: Ints, worth: float,
         if bound > highest:
             if bound > highest + 1e-4 * abs(worth - bound):
                 stalled = 0
-            best_price[:], highest = price, bound
+            highest = bound
+            _copy(price, best_price)
         if stalled >= STALLED_STEPS:
             stalled, length = 0, STEP_FACTOR * length
-            price[:] = best_price
+            _copy(best_price, price)
             continue
         _count(pool, chosen, served)
-        violation = ((served[a.uavs:] - 1) ** 2).sum()
+        violation = 0
+        for t in range(a.uavs, a.ends):
+            violation += (served[t] - 1) ** 2
         if violation == 0 or highest >= worth - TINY:
             break
         stride = length * (worth - bound) / violation
@@ -109,5 +120,8 @@ def reduced_costs(a: Arrays, pool: Pool, flown: Ints, worth: float,
     highest = _bound(a, pool, best_price, reduced, least, chosen)
     for e in range(reduced.size):
         reduced[e] -= least[pool.uav[e]]
-    best_price[a.uavs:] = a.unassigned_cost - best_price[a.uavs:]
-    return Reduced(reduced, -least, best_price), highest
+    for u in range(a.uavs):
+        least[u] = -least[u]
+    for t in range(a.uavs, a.ends):
+        best_price[t] = a.unassigned_cost[t - a.uavs] - best_price[t]
+    return Reduced(reduced, least, best_price), highest

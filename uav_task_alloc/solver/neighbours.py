@@ -14,7 +14,7 @@ from uav_task_alloc.kernel import (
     kernel,
 )
 from uav_task_alloc.solver.rng import RngState, below, uniform
-from uav_task_alloc.solver.routes import TINY, Arrays, Floats, Ints, leg_length
+from uav_task_alloc.solver.routes import NODE, TINY, Arrays, Floats, Ints, leg_length
 
 _NOISE = 4096  # random numbers drawn once; each task reads them from a random offset
 
@@ -36,7 +36,8 @@ def _cells(xyz: Floats, per_cell: float) -> tuple[Ints, Ints, Ints, Floats]:
     for i in range(n):
         cell[i] = int((xyz[i, 1] - y0) / side) * across + int((xyz[i, 0] - x0) / side)
         first[cell[i] + 1] += 1
-    first[:] = np.cumsum(first)
+    for i in range(1, first.size):
+        first[i] += first[i - 1]
     order, fill = np.empty(n, np.int64), first.copy()
     for i in range(n):
         order[fill[cell[i]]] = i
@@ -81,7 +82,9 @@ def find_nearest(xyz: Floats, near: Ints, fresh: Ints) -> Floats:
     held = np.empty(k, np.int64)
     for i in range(n):
         if near[i, 0] >= 0:
-            held[:], kept = near[i], 0
+            kept = 0
+            for m in range(k):
+                held[m] = near[i, m]
             for ids in (held, fresh):
                 for m in range(ids.size):
                     kept = _insert_sorted(near[i], squares[i], kept, ids[m],
@@ -114,7 +117,7 @@ def fill_near_tasks(a: Arrays, found: Ints, squares: Floats) -> None:
     n, k = a.near.shape
     for i in range(n):
         for m in range(k):
-            j, t, place = a.uavs + found[i, m], a.uavs + i, m
+            j, t, place = NODE(a.uavs + found[i, m]), NODE(a.uavs + i), m
             if a.straight:
                 a.near[i, m], a.near_length[i, m] = j, math.sqrt(squares[i, m])
                 continue
@@ -164,6 +167,6 @@ def fill_near_starts(a: Arrays, xyz: Floats, rng: RngState) -> None:
             a.unassigned_cost[i] = 0.0
         for m in range(s):
             if m < kept:
-                a.start_length[i, m] = leg_length(a, a.starts[i, m], t)
+                a.start_length[i, m] = leg_length(a, a.starts[i, m], NODE(t))
             else:
                 a.starts[i, m], a.start_length[i, m] = 0, np.inf

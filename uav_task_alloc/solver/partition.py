@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from uav_task_alloc.kernel import inline_kernel, inner_allocating_kernel
+from uav_task_alloc.kernel import inline_kernel, inner_allocating_kernel, inner_kernel
 from uav_task_alloc.solver.multipliers import Reduced
 from uav_task_alloc.solver.pool import Pool
 from uav_task_alloc.solver.routes import TINY, Floats, Ints
@@ -43,7 +43,8 @@ class Choices(NamedTuple):
 def _candidates(pool: Pool, reduced: Reduced, group: Flags, tasks: Ints, spare: float) -> Ints:
     """Columns of a group that serve only its tasks, least reduced cost first. O(stops of pool)."""
     inside = np.zeros(reduced.unassigned.size, np.bool_)
-    inside[tasks] = True
+    for t in tasks:
+        inside[t] = True
     columns, count = np.empty(pool.size[0], np.int64), 0
     for e in range(pool.size[0]):
         fits = group[pool.uav[e]] and reduced.column[e] < spare
@@ -65,8 +66,12 @@ def _branches(pool: Pool, columns: Ints, tasks: Ints, nodes: int) -> Branches:
     for e in columns:
         for i in range(pool.first[e], pool.first[e + 1]):
             begin[pool.stops[i] + 1] += 1
-    order = tasks[np.argsort(begin[tasks + 1])]
-    begin[:] = np.cumsum(begin)
+    counts = np.empty(tasks.size)  # floats, as _candidates sorts: another type, another kernel
+    for i in range(tasks.size):
+        counts[i] = begin[tasks[i] + 1]
+    order = tasks[np.argsort(counts)]
+    for i in range(nodes):
+        begin[i + 1] += begin[i]
     column, fill = np.empty(begin[nodes], np.int64), begin.copy()
     for e in columns:
         for i in range(pool.first[e], pool.first[e + 1]):
@@ -171,11 +176,30 @@ def _branch_and_bound(pool: Pool, reduced: Reduced, group: Flags, b: Branches, s
             depth += 1
             _open_branch(b, chosen, depth, place, spent)
             continue
-        spent += reduced.stay[group & ~chosen.uav_used].sum()
+        staying = 0.0
+        for u in range(group.size):
+            if group[u] and not chosen.uav_used[u]:
+                staying += reduced.stay[u]
+        spent += staying
         if spent < spare:
             spare, improved = spent - TINY, True
             _store_choices(pool, group, b, chosen, depth, flown, uav_of)
     return improved, tried
+
+
+@inner_kernel
+def _reduced_cost(reduced: Reduced, group: Flags, tasks: Ints, flown: Ints, uav_of: Ints) -> float:
+    """The reduced cost [m] of what a group of UAVs flies and leaves out. O(m + tasks)."""
+    staying, flying, unassigned = 0.0, 0.0, 0.0
+    for u in range(group.size):
+        if group[u] and flown[u] < 0:
+            staying += reduced.stay[u]
+        elif group[u]:
+            flying += reduced.column[flown[u]]
+    for t in tasks:
+        if uav_of[t] < 0:
+            unassigned += reduced.unassigned[t]
+    return staying + unassigned + flying
 
 
 @inner_allocating_kernel
@@ -187,9 +211,7 @@ def repartition(pool: Pool, reduced: Reduced, group: Flags, tasks: Ints, limit: 
     (m + n) UAV by node, -1: unassigned. The last two are changed. Tries about `limit` columns,
     O(n) each. Returns whether the cost fell, and how many columns were tried.
     """
-    spare = reduced.stay[group & (flown < 0)].sum()
-    spare += reduced.unassigned[tasks[uav_of[tasks] < 0]].sum()
-    spare += reduced.column[flown[group & (flown >= 0)]].sum() - TINY
+    spare = _reduced_cost(reduced, group, tasks, flown, uav_of) - TINY
     if tasks.size == 0 or spare <= 0.0:
         return False, 1
     columns = _candidates(pool, reduced, group, tasks, spare)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from uav_task_alloc.kernel import allocating_kernel, inner_allocating_kernel
-from uav_task_alloc.solver.multipliers import reduced_costs
+from uav_task_alloc.kernel import allocating_kernel, inner_allocating_kernel, inner_kernel, kernel
+from uav_task_alloc.solver.multipliers import Reduced, reduced_costs
 from uav_task_alloc.solver.partition import Flags, repartition
 from uav_task_alloc.solver.pool import Pool, collect, column_of
 from uav_task_alloc.solver.routes import (
@@ -41,7 +41,10 @@ def _group(a: Arrays, pool: Pool, uav_of: Ints, flown: Ints, seed: int) -> Flags
                         adjacency[uav_of[c]] += 1
                 for s in a.starts[t - a.uavs]:
                     adjacency[s] += 1
-        added = int(np.argmax(np.where(in_group, -1, adjacency)))
+        most = -1
+        for u in range(a.uavs):
+            if (adjacency[u] if not in_group[u] else -1) > most:
+                added, most = u, adjacency[u]
     return in_group
 
 
@@ -56,20 +59,37 @@ def _tasks_of(a: Arrays, uav_of: Ints, group: Flags) -> Ints:
             in_group[t] = a.uavs <= GROUP_SIZE
             for c in a.near[t - a.uavs, :_NEAR_TASKS]:
                 in_group[t] |= uav_of[c] >= 0 and group[uav_of[c]]
-    return np.flatnonzero(in_group)
-
-
-@inner_allocating_kernel
-def _improve(a: Arrays, pool: Pool, work: float, flown: Ints, uav_of: Ints) -> bool:
-    """Repartition the groups around each UAV while the cost falls; whether it did. O(work)."""
-    worth = 0.0
+    tasks, count = np.empty(a.ends, np.int64), 0
     for t in range(a.uavs, a.ends):
-        worth += a.unassigned_cost[t - a.uavs] if uav_of[t] < 0 else 0.0
-    worth += pool.cost[flown[flown >= 0]].sum()
-    reduced, bound = reduced_costs(a, pool, flown, worth, work)
-    improved, tries = False, int(work / TRY_COST)
-    if worth - bound < TINY:
-        return False
+        if in_group[t]:
+            tasks[count] = t
+            count += 1
+    return tasks[:count]
+
+
+@inner_kernel
+def _write(a: Arrays, pool: Pool, flown: Ints, into: Routes) -> None:
+    """Write columns as routes. O(n)"""
+    clear(a, into)
+    for u in range(a.uavs):
+        if flown[u] >= 0:
+            after = NODE(u)
+            for i in range(pool.first[flown[u]], pool.first[flown[u] + 1]):
+                t = pool.stops[i]
+                insert(a, into, t, after)
+                after = t
+    update_sums(a, into)
+
+
+@allocating_kernel
+def _improve(a: Arrays, pool: Pool, reduced: Reduced, tries: int, flown: Ints, uav_of: Ints,
+             into: Routes) -> bool:
+    """Repartition the groups around each UAV while the cost falls. O(tries n)
+
+    Returns:
+        Whether it fell; then the routes are written to `into`.
+    """
+    improved = False
     for _ in range(PASSES):
         improved_in_pass = False
         for u in range(a.uavs):
@@ -83,31 +103,40 @@ def _improve(a: Arrays, pool: Pool, work: float, flown: Ints, uav_of: Ints) -> b
         improved |= improved_in_pass
         if not improved_in_pass:
             break
+    if improved:
+        _write(a, pool, flown, into)
     return improved
 
 
-@allocating_kernel
+@kernel
+def _cost(a: Arrays, pool: Pool, best: Routes, flown: Ints) -> float:
+    """Collect the routes, write their columns to `flown`; returns what they cost [m]. O(n).
+
+    Unassigned tasks are included. inf: a route is not in the pool.
+    """
+    collect(a, best, pool)
+    flying, unassigned = 0.0, 0.0
+    for u in range(a.uavs):
+        flown[u] = column_of(a, best, pool, u) if best.tasks[u] > 0 else -1
+        if flown[u] >= 0:
+            flying += pool.cost[flown[u]]
+        elif best.tasks[u] > 0:
+            return np.inf
+    for t in range(a.uavs, a.ends):
+        unassigned += a.unassigned_cost[t - a.uavs] if best.uav_of[t] < 0 else 0.0
+    return unassigned + flying
+
+
 def recombine(a: Arrays, best: Routes, pool: Pool, work: float, into: Routes) -> bool:
     """Write to `into` a combination of columns that costs less than `best`; whether there is one.
 
-    Reads about `work` stops for a bound, and as many again in the search. O(work).
+    Reads about `work` stops for a bound, and as many again in the search. O(work). The kernels
+    are called one by one, as a kernel of all took a quarter longer to compile.
     """
-    collect(a, best, pool)
-    flown, uav_of = np.full(a.uavs, -1, np.int64), np.full(a.ends, -1, np.int64)
-    uav_of[a.uavs:] = best.uav_of[a.uavs:a.ends]
-    for u in range(a.uavs):
-        if best.tasks[u] > 0:
-            flown[u] = column_of(a, best, pool, u)
-            if flown[u] < 0:
-                return False
-    if not _improve(a, pool, work, flown, uav_of):
+    flown, uav_of = np.full(a.uavs, -1, np.int64), best.uav_of.copy()
+    worth = float(_cost(a, pool, best, flown))
+    if worth == np.inf:
         return False
-    clear(a, into)
-    for u in range(a.uavs):
-        if flown[u] >= 0:
-            after = NODE(u)
-            for t in pool.stops[pool.first[flown[u]]:pool.first[flown[u] + 1]]:
-                insert(a, into, t, after)
-                after = t
-    update_sums(a, into)
-    return True
+    reduced, bound = reduced_costs(a, pool, flown, worth, work)
+    tries = 0 if worth - bound < TINY else int(work / TRY_COST)
+    return bool(_improve(a, pool, reduced, tries, flown, uav_of, into))

@@ -13,6 +13,11 @@ import numpy as np
 
 from uav_task_alloc.errors import InvalidValue, UnknownName
 from uav_task_alloc.geometry.detour import find_detour
+from uav_task_alloc.kernel_cache import (
+    NOTICE,
+    PLAN_COMPILE_TIME,
+    ZONES_COMPILE_TIME,
+)
 from uav_task_alloc.model import Leg, Plan, Task, ThreatZone, Uav
 from uav_task_alloc.objective import Objective, Weights, check_objective, needs_time
 from uav_task_alloc.solver.answer import to_plan
@@ -140,6 +145,12 @@ def load_kernels(solver: str = 'chain_q', zones: bool = False) -> None:
         UnknownName: there is no such solver.
     """
     _check_solver(solver)
+    with NOTICE.until_loaded(PLAN_COMPILE_TIME + zones * ZONES_COMPILE_TIME):
+        _call_kernels(solver, zones)
+
+
+def _call_kernels(solver: str, zones: bool) -> None:
+    """Solve a small world, so that each kernel is called."""
     uavs = (Uav('u', (0.0, 0.0, 0.0)), Uav('v', (9.0, 0.0, 0.0), 30.0))
     tasks = tuple(Task(f't{i}', (float(i), 1.0, 0.0)) for i in range(5))
     between = (*(ThreatZone.cylinder(f'z{x}', (x, 1.0), 0.3) for x in (1.5, 2.5, 4.0)),

@@ -12,6 +12,7 @@ from uav_task_alloc.kernel import inline_kernel, kernel
 from uav_task_alloc.solver.problem import Problem
 from uav_task_alloc.solver.rng import RngState, uniform
 from uav_task_alloc.solver.routes import (
+    NODE,
     Arrays,
     Floats,
     Ints,
@@ -92,7 +93,7 @@ def _attraction(d: float) -> float:
 def _can_end_at(a: Arrays, r: Routes, u: int, t: int, d: float) -> bool:
     """Range mask: whether UAV u may append t, d [m] from its last stop. O(1)."""
     last = r.prev[a.ends + u]
-    more = d + leg_length(a, t, a.ends + u) - r.leg[last]
+    more = d + leg_length(a, t, NODE(a.ends + u)) - r.leg[last]
     return a.compatible[u, t - a.uavs] and more < math.inf and (
         not a.hard or r.length[u] + more <= a.range_left[u])
 
@@ -107,8 +108,8 @@ def _weigh_legs(a: Arrays, r: Routes, q: Tables, u: int, wanted: float) -> tuple
     if last < a.uavs:
         for i in range(a.unassigned_cost.size):
             if r.uav_of[a.uavs + i] < 0:
-                d = leg_length(a, last, a.uavs + i)
-                if _can_end_at(a, r, u, a.uavs + i, d):
+                d = leg_length(a, last, NODE(a.uavs + i))
+                if _can_end_at(a, r, u, NODE(a.uavs + i), d):
                     total += q.start[u, i] * _attraction(d)
                     if total > wanted:
                         return total, a.uavs + i
@@ -148,7 +149,7 @@ def construct(a: Arrays, r: Routes, q: Tables, sums: Floats, rng: RngState) -> N
         sums[u], _ = (0.0, 0) if t < 0 else (sums[u], 0)
         if t >= 0:
             last = r.prev[a.ends + u]
-            insert(a, r, t, last)
+            insert(a, r, NODE(t), last)
             if last < a.uavs:
                 sums[u], _ = _weigh_legs(a, r, q, u, math.inf)
 

@@ -14,6 +14,7 @@ from uav_task_alloc.solver.insertion import insert_cheapest_first
 from uav_task_alloc.solver.problem import Problem
 from uav_task_alloc.solver.rng import rng_state
 from uav_task_alloc.solver.routes import (
+    NODE,
     Arrays,
     Ints,
     Routes,
@@ -106,7 +107,7 @@ def replay(a: Arrays, r: Routes, nodes: Ints, bounds: Ints) -> None:
     for u in range(a.uavs):
         last = r.prev[a.ends + u]
         for i in range(bounds[u], bounds[u + 1]):
-            t, end = nodes[i], a.ends + u
+            t, end = NODE(nodes[i]), NODE(a.ends + u)
             if r.uav_of[t] >= 0 or not a.compatible[u, t - a.uavs]:
                 continue
             delta = leg_length(a, last, t) + leg_length(a, t, end) - r.leg[last]

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from uav_task_alloc.geometry.outline import Floats
-from uav_task_alloc.kernel import inline_kernel, kernel
+from uav_task_alloc.kernel import kernel
 from uav_task_alloc.solver.rng import RngState, uniform
 from uav_task_alloc.solver.ruin import BLINK_RATE
 from uav_task_alloc.solver.search import PENALTY_DECAY, PENALTY_GROWTH
@@ -64,7 +64,7 @@ class Rises(NamedTuple):
     prizes: bool  # tasks may be left out because they are not worth their way
 
 
-@inline_kernel
+@kernel
 def is_improvement(a: TimedArrays, cost: float, worth: float, score: Floats,
                    prizes: bool) -> bool:
     """Whether a cost and value are better than a score."""

@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
+from uav_task_alloc.kernel_cache import NOTICE, TIMED_COMPILE_TIME, ZONES_COMPILE_TIME
 from uav_task_alloc.model import Plan, Task, ThreatZone, Uav
 from uav_task_alloc.solver.chain_q import run_colonies
 from uav_task_alloc.solver.path_preparation import SEARCH_LIMIT, PathPreparation
@@ -123,6 +124,12 @@ def load_timed_kernels(zones: bool = False) -> None:
     Args:
         zones: whether to load the kernels that find paths around zones, too.
     """
+    with NOTICE.until_loaded(TIMED_COMPILE_TIME + zones * ZONES_COMPILE_TIME):
+        _call_kernels(zones)
+
+
+def _call_kernels(zones: bool) -> None:
+    """Solve a small problem, so that each kernel is called."""
     uavs = (Uav('u', (0.0, 0.0, 0.0), turnaround=1.0), Uav('v', (9.0, 0.0, 0.0), 30.0))
     tasks = tuple(Task(f't{i}', (float(i), 1.0, 0.0), latest=99.0) for i in range(5))
     limits = Limits((ThreatZone.cylinder('z', (2.5, 1.0), 0.3),) if zones else ())
