@@ -44,6 +44,7 @@ class ProgressTable:
         newest: the sample did not arrive late.
         frame: number of its frame; None: not known.
         flying: the vehicle is in mission mode.
+        restarted: the mission began again from its first item.
         task, tasks: ids.
     """
 

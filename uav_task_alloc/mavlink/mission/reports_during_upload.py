@@ -38,7 +38,20 @@ class _Current(NamedTuple):
 
 
 class ReportsDuringUpload:
-    """Keeps reports until the upload is decided; then credits them to the old or new mission."""
+    """Keeps reports until the upload is decided; then credits them to the old or new mission.
+
+    Args:
+        progress: where they are credited.
+        origin: of the ENU frame of the mission items.
+
+    Arguments of methods:
+        seq: number of the mission item.
+        now: [s] steady clock, when it was received.
+        frame: number of the received frame, rising.
+        flying: the vehicle is in mission mode.
+        plan: PX4's mission id; 0: unknown.
+        uploaded: the new mission.
+    """
 
     def __init__(self, progress: ProgressTable, origin: Origin) -> None:
         self._progress, self._origin = progress, origin
