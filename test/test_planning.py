@@ -62,15 +62,23 @@ def test_finding_39_detours_keep_the_altitude_limits(plan, line, options, low, h
 
 
 @pytest.mark.parametrize(('options', 'refusal'), [
-    (('--clearance', '-1'), 'clearance = -1.0: expected float in [0, 10000] m'),
-    (('--clearance', 'nan'), 'clearance = nan: expected float in [0, 10000] m'),
+    (('--clearance', '-1'), '--clearance = -1.0: expected a number in [0, 10000] m'),
     (('--altitude-min', '60', '--altitude-max', '50'),
-     'altitude_min = 60.0: expected less than altitude_max = 50'),
+     '--altitude-min = 60.0: expected less than the highest detour, 50 m'),
 ])
 def test_an_invalid_limit_is_refused(tmp_path, capsys, options, refusal):
     (tmp_path / 'mast.yaml').write_text(MAST)
     assert cli.main(['plan', str(tmp_path / 'mast.yaml'), *options]) == 1
     assert capsys.readouterr().err == f'{refusal}\n'
+
+
+def test_a_limit_that_is_no_number_is_refused(tmp_path, capsys):
+    (tmp_path / 'mast.yaml').write_text(MAST)
+    with pytest.raises(SystemExit) as end:
+        cli.main(['plan', str(tmp_path / 'mast.yaml'), '--clearance', 'nan'])
+    assert end.value.code == 2
+    assert "argument --clearance: 'nan': expected a number in [0, 10000] m" in (
+        capsys.readouterr().err)
 
 
 def test_a_scenario_whose_limits_contradict_is_refused(tmp_path, capsys):

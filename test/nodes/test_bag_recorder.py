@@ -173,7 +173,13 @@ def test_the_types_of_fields_are_found(line, types):
     (['x'], ['x']),
     (['x', '--record', 'a b'], ['x', '--ros-args', '-p', 'record:="a b"', '--']),
     (['x', '--record', 'f', '--ros-args', '-p', 'a:=1'],
-     ['x', '--ros-args', '-p', 'a:=1', '--ros-args', '-p', 'record:="f"', '--']),
-    (['x', '--record'], ['x', '--record'])])
+     ['x', '--ros-args', '-p', 'a:=1', '--ros-args', '-p', 'record:="f"', '--'])])
 def test_a_flag_becomes_a_parameter(argv, ros):
     assert with_flags(argv, 'record') == ros
+
+
+def test_a_flag_without_its_value_is_refused(capsys):
+    with pytest.raises(SystemExit) as end:
+        with_flags(['x', '--record'], 'record')
+    assert end.value.code == 2
+    assert '--record' in capsys.readouterr().err

@@ -227,7 +227,7 @@ def test_authority_persists_over_a_restart_of_the_bridge(sky, probe, tmp_path):
     world = sky('-p', f'state_dir:={tmp_path}/state')
     world.send(1, 1, [0, 1], end=m.TaskList.RETURN_HOME)
     probe.until(lambda: world.states['uav_1'].authority == m.UavState.NONE, 90.0)
-    assert sorted(path.name for path in (tmp_path / 'state').iterdir()) == [
+    assert sorted(path.name for path in (tmp_path / 'state').glob('*.json')) == [
         'authority_uav_1.json', 'authority_uav_2.json']
     world.bridge.stop(signal.SIGKILL)
     world.again()

@@ -76,8 +76,8 @@ def test_a_published_length_is_ignored_where_loads_are_limiting():
 
 
 @pytest.mark.parametrize(('text', 'reason'), [
-    ('', 'an instance of Chao, MSTOP or Cordeau'),
-    ('# a note\n', 'an instance of Chao, MSTOP or Cordeau'),
+    ('', 'an instance of Chao, MSTOP, Cordeau, VRPLIB or TOPTW'),
+    ('# a note\n', 'an instance of Chao, MSTOP, Cordeau, VRPLIB or TOPTW'),
     (CHAO.replace('n 5', 'n 6'), 'n = 6, at least 2'),
     (CORDEAU.replace('10 0 0 5', '10 0 3 5'), 'ranges hold no service time'),
     (CORDEAU.replace('2 2 3 2', '4 2 3 2'), 'expected type 2'),
