@@ -16,7 +16,6 @@ from uav_task_alloc.mavlink.mission.items import (
 )
 from uav_task_alloc.mavlink.mission.position_history import PositionHistory
 from uav_task_alloc.mavlink.mission.progress import ProgressTable
-from uav_task_alloc.mavlink.mission.reached_epoch import ReachedEpoch
 from uav_task_alloc.mavlink.transport.frame_log import FrameLog
 from uav_task_alloc.model import Task
 
@@ -68,36 +67,6 @@ def repeated_over_two_uploads():
 
 def test_a_repetition_over_two_uploads_completes_nothing_of_the_second():
     assert list(repeated_over_two_uploads().table.completed) == ['A']
-
-
-def test_a_repetition_kept_during_an_upload_does_not_begin_a_new_series():
-    flight = Flight()
-    flight.begin(A=100.0, X=900.0)
-    flight.fly_to(100.0)
-    flight.table.note_reached(0, flight.now)
-    flight.begin(B=128.0, X=900.0)
-    for _ in range(2):
-        flight.stay(1.0, SPEED)
-        flight.table.note_reached(0, flight.now)
-    kept_at = flight.now + 0.9
-    flight.stay(1.4)
-    flight.begin(C=500.0, X=900.0)
-    flight.table.note_repeated(0, kept_at)
-    flight.stay(0.4)
-    flight.table.note_reached(0, flight.now)
-    flight.stay(10.0)
-    assert list(flight.table.completed) == ['A']
-
-
-def test_lost_positions_do_not_make_a_repetition_a_new_reached():
-    positions = PositionHistory()
-    repetitions = ReachedEpoch(positions, repeats=True)
-    for n in (*range(50), 52):  # those of the next 0.4 s are lost
-        if n == 52:
-            repetitions.note_reached(0, 9.9, 196)
-        positions.add(PositionSample(0.2 * n, (0.0, 0.0, 50.0), (0.0, 0.0, 0.0)), True, 0.2 * n,
-                      4 * n)
-    assert repetitions.first_at(0, 10.9, 216) == 9.9  # 20 frames are 1 s
 
 
 def test_a_reached_after_the_end_of_the_repetitions_counts():

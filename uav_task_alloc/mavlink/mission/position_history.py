@@ -170,15 +170,10 @@ class PositionHistory:
         It is that of the position before it; where frames are missing since, at their mean rate.
         """
         before, at = max(stamp for stamp in self._stamps if stamp[0] <= frame)
-        missing = self.seconds_of(frame - before) or 0.0
-        return at + (missing if missing > GAP else 0.0)
-
-    def seconds_of(self, frames: int) -> float | None:
-        """Time [s] in which the vehicle sends a number of frames, on average; None: not known."""
-        if len(self._stamps) < 2:
-            return None
         (first, begin), (last, end) = min(self._stamps), max(self._stamps)
-        return frames * (end - begin) / (last - first) if last > first else None
+        rate = (end - begin) / (last - first) if last > first else 0.0
+        missing = (frame - before) * rate
+        return at + (missing if missing > GAP else 0.0)
 
     def sent_before(self, frame: int, otherwise: float, earliest: bool) -> float:
         """Latest time at which a frame was sent, by its order among the positions.

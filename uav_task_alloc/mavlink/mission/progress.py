@@ -240,13 +240,13 @@ class ProgressTable:
         """
         self._reached.note(seq, now, proven, frame)
 
-    def note_repeated(self, seq: int, now: float, frame: int | None = None) -> None:
+    def note_repeated(self, seq: int, now: float) -> None:
         """Note that the last REACHED was repeated, also while its epoch was unknown."""
-        self._epochs.note_repeated(seq, now, frame)
+        self._epochs.note_repeated(seq, now)
 
-    def reached_first_at(self, seq: int, now: float, frame: int | None = None) -> float:
+    def reached_first_at(self, seq: int, now: float) -> float:
         """See `ReachedEpoch.first_at`."""
-        return self._epochs.first_at(seq, now, frame)
+        return self._epochs.first_at(seq, now)
 
     def note_end(self, seq: int, now: float) -> None:
         """Note a REACHED of this epoch or the next: the mission may have ended."""

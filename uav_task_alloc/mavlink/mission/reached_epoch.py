@@ -61,7 +61,6 @@ class ReachedEpoch:
                  frames: FrameLog | None = None) -> None:
         self._positions, self._repeats = positions, repeats
         self._frames, self._last_frame = frames or FrameLog(), 0
-        self._reached_frame: int | None = None  # number of the last one; None: not known
         self._last_newest = -math.inf  # vehicle time [s] of the newest position at the last one
         self.before = _NO_EPOCH
         self.credited: int | None = None  # seq of the last REACHED, once it has completed an item
@@ -82,58 +81,46 @@ class ReachedEpoch:
         self.before = _NO_EPOCH
         self.unproven.clear()
 
-    def note_reached(self, seq: int, now: float, frame: int | None = None) -> bool:
+    def note_reached(self, seq: int, now: float) -> bool:
         """Note a REACHED; returns whether it repeats the last one, which was credited (PX4)."""
         if not self._repeats:
             return False
-        repetition = self._repeats_last(seq, now, frame)
-        self._series_began = self.first_at(seq, now, frame)
+        repetition, self._series_began = self._repeats_last(seq, now), self.first_at(seq, now)
         if not repetition:  # after another one: no repetition from an earlier mission
             self.credited, self._is_first = None, self._last is not None
         elif self._series_began == now:  # too early for a repetition
             self.credited = None
-        self._set_last(seq, now, frame)
+        self._last, self._last_frame = (seq, now), self._frames.newest
+        self._last_newest = self._positions.path.newest
         return self.credited == seq
 
-    def _repeats_last(self, seq: int, now: float, frame: int | None) -> bool:
+    def _repeats_last(self, seq: int, now: float) -> bool:
         if self._last is None or self._last[0] != seq or now - self._last[1] >= MAX_MESSAGE_DELAY:
             return False
         # a series with a pause has ended, unless frames were lost
-        return self._vehicle_seconds(frame) <= _MAX_PERIOD or not self._frames.whole(
+        return self._vehicle_seconds() <= _MAX_PERIOD or not self._frames.whole(
             self._last_frame, self._frames.newest)
 
-    def _vehicle_seconds(self, frame: int | None) -> float:
-        """Since the last one, by the vehicle's clock; a simulated one may be faster than ours.
+    def _vehicle_seconds(self) -> float:
+        """Since the last one, by the vehicle's clock; a simulated one may be faster than ours."""
+        return self._positions.path.newest - self._last_newest
 
-        By the number of frames between both, as positions may be lost or late.
-        """
-        seconds = None if frame is None or self._reached_frame is None else (
-            self._positions.seconds_of(frame - self._reached_frame))
-        return seconds if seconds is not None else self._positions.path.newest - self._last_newest
-
-    def first_at(self, seq: int, now: float, frame: int | None = None) -> float:
+    def first_at(self, seq: int, now: float) -> float:
         """When [s] the first of the series was received that a REACHED continues, of any epoch.
 
         Args:
             seq: index without home.
             now: steady time [s] at which it is received.
-            frame: its number; None: not known.
         """
-        if self._last is None or not self._repeats or (
-                0.0 < self._vehicle_seconds(frame) < _MIN_PERIOD):
+        if self._last is None or not self._repeats or 0.0 < self._vehicle_seconds() < _MIN_PERIOD:
             return now
-        return self._series_began if self._repeats_last(seq, now, frame) else now
+        return self._series_began if self._repeats_last(seq, now) else now
 
-    def note_repeated(self, seq: int, now: float, frame: int | None = None) -> None:
+    def note_repeated(self, seq: int, now: float) -> None:
         """Note that the last REACHED was repeated, also while its epoch was unknown."""
         if self._last is not None and self._last[0] == seq and now > self._last[1]:
-            self._set_last(seq, now, frame)
-
-    def _set_last(self, seq: int, now: float, frame: int | None) -> None:
-        """Note the last REACHED, which was received at `now` [s], perhaps some time ago."""
-        positions, self._reached_frame = self._positions, frame
-        self._last, self._last_frame = (seq, now), self._frames.newest
-        self._last_newest = min(positions.path.newest, positions.vehicle_time(now))
+            self._last, self._last_frame = (seq, now), self._frames.newest
+            self._last_newest = self._positions.path.newest
 
     def reached_recently(self, begin: int, end: int, now: float) -> bool:
         """Whether the last REACHED named an item in [begin, end), perhaps as a repetition."""

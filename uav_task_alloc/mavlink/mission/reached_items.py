@@ -45,8 +45,8 @@ class ReachedItems:
         epoch, epochs, positions = self._epoch, self._epochs, self._positions
         proven = proven or (
             frame is not None and not self._repeats and frame > epoch.taken_frame)
-        when = epochs.first_at(seq, now, frame)
-        repetition = epochs.note_reached(seq, now, frame)
+        when = epochs.first_at(seq, now)
+        repetition = epochs.note_reached(seq, now)
         if (proven or now >= epochs.before.until) and epoch.items:
             if 0 <= seq < len(epoch.items) and (
                     proven or positions.can_have_reached(epoch.items[seq], now)):

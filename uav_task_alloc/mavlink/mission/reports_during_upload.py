@@ -57,7 +57,7 @@ class ReportsDuringUpload:
         self._progress, self._origin = progress, origin
         self._reached: list[_Reached] = []
         self._currents: list[_Current] = []
-        self._newest = -1, 0.0, 0  # seq, received at [s], frame; with repetitions
+        self._newest: tuple[int, float] = (-1, 0.0)  # seq, received at [s], with repetitions
 
     @property
     def has_reached(self) -> bool:
@@ -70,9 +70,9 @@ class ReportsDuringUpload:
         if repeated:
             self._reached[-1] = self._reached[-1]._replace(last=now)
         elif len(self._reached) < _MAX_MESSAGES:
-            first = self._progress.reached_first_at(seq, now, frame)
+            first = self._progress.reached_first_at(seq, now)
             self._reached.append(_Reached(seq, first, now, frame))
-        self._newest = seq, now, frame
+        self._newest = seq, now
         self._progress.note_end(seq, now)
 
     def add_current(self, seq: int, now: float, frame: int, flying: bool, plan: int) -> None:
@@ -159,7 +159,7 @@ class ReportsDuringUpload:
             if kind:
                 self._progress.note_current(seq, when, flying, frame)
             else:
-                self._progress.note_reached(seq, when, proven=True, frame=frame)
+                self._progress.note_reached(seq, when, proven=True)
         if self._newest[0] >= 0:  # it may still be repeated
             self._progress.note_repeated(*self._newest)
 
