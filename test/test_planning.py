@@ -77,7 +77,7 @@ def test_a_limit_that_is_no_number_is_refused(tmp_path, capsys):
     with pytest.raises(SystemExit) as end:
         cli.main(['plan', str(tmp_path / 'mast.yaml'), '--clearance', 'nan'])
     assert end.value.code == 2
-    assert "argument --clearance: 'nan': expected a number in [0, 10000] m" in (
+    assert "--clearance = 'nan': expected a number in [0, 10000] m" in (
         capsys.readouterr().err)
 
 

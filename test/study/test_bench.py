@@ -75,8 +75,8 @@ def test_kept_results_are_not_computed_again(tmp_path, capsys):
 
 
 @pytest.mark.parametrize(('given', 'text'), [
-    (['--solvers', 'best'], "argument --solvers: 'best': expected one of chain_q"),
-    (['--against', 'gurobi'], "argument --against: 'gurobi': expected one of pyvrp, ortools"),
+    (['--solvers', 'best'], "--solvers = 'best': expected one of chain_q"),
+    (['--against', 'gurobi'], "--against = 'gurobi': expected one of pyvrp, ortools"),
 ])
 def test_an_unknown_solver_is_refused(given, text, capsys):
     with pytest.raises(SystemExit) as end:
