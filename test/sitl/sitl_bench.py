@@ -34,6 +34,18 @@ class Visits:
                 self._at = name
 
 
+def stops(world, system, course):
+    """The places at which a vehicle stopped, in order; after `world.close()`.
+
+    By the simulator's log where there is one: its positions may be received seconds apart."""
+    reached = world.reached(system)
+    if reached is None:
+        return course.visits.visited
+    places = course.places
+    return [min(places, key=lambda name, at=point: math.dist(places[name], at))
+            for point in reached]
+
+
 class Bridge:
     """Serves the vehicles of a world; a course has `visits`, and the completed tasks in order."""
 
