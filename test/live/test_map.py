@@ -252,7 +252,7 @@ def test_tiles_lie_where_they_belong_and_missing_ones_do_no_harm(shown, tmp_path
                     state(BEGIN, 'u2', (east + 100.0, north + 100.0)))
     page = shown(run, DESK, tile_source(str(tmp_path / 'tiles'), '(c) nobody'))
     chromium.wait(page, '#map-foot', '(c) nobody')
-    page.wait_for_function('performance.getEntriesByType("resource").some('
+    page.wait_for_function('() => performance.getEntriesByType("resource").some('
                            'entry => entry.name.includes("/tiles/16/"))')
     image = wait_for_pixels(page, UNDER_THE_VEIL)
     rows, columns = np.nonzero(near(image, UNDER_THE_VEIL))
