@@ -13,7 +13,7 @@ from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.timetable import Timetable
 
 Point = tuple[float, float, float]  # [m] ENU
-LONG = 1e9  # [s] bound of all finite times
+LONG = 4e9  # [s] bound of all finite times; a message holds 2.1e9
 BASE_RADIUS = 1.0  # [m] from its home within which a UAV is at its base
 _TASK_TIMES = (('earliest', -math.inf, LONG), ('latest', -LONG, math.inf),
                ('release', -LONG, LONG), ('announced', -LONG, LONG))  # [s]

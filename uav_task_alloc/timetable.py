@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from datetime import datetime, timezone
+
+_WALL = 1e8  # [s] times of a ROS clock above it are of the wall clock, below it simulated
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,3 +33,22 @@ class Timetable:
     ends: Mapping[str, float] = field(default_factory=dict)
     response: float = 0.0
     late: Mapping[str, float] = field(default_factory=dict)
+
+
+def clock_text(seconds: float, now: float | None = None) -> str:
+    """Return a time of a ROS clock for people.
+
+    Args:
+        seconds: [s] of the clock; finite.
+        now: [s] of the clock; None: unknown.
+
+    Returns:
+        `95.0 s` of a simulated clock; of the wall clock `12:30:05 UTC`, with the day where that
+        is not the day of `now`.
+    """
+    if seconds < _WALL:
+        return f'{seconds:.1f} s'
+    then = datetime.fromtimestamp(seconds, timezone.utc)
+    today = now is not None and now >= _WALL and (
+        datetime.fromtimestamp(now, timezone.utc).date() == then.date())
+    return then.strftime('%H:%M:%S UTC' if today else '%Y-%m-%d %H:%M:%S UTC')

@@ -26,6 +26,25 @@ def test_a_task_survives_its_message():
     assert messages.to_task(messages.from_task(task), ORIGIN) == task
 
 
+@pytest.mark.parametrize('epoch', [0.0, 1_800_000_000.0])
+def test_windows_release_and_payload_survive_a_message(epoch):
+    task = Task('t1', (1.0, 2.0, 3.0), earliest=epoch + 60.5, latest=epoch + 90.25,
+                release=epoch + 30.0, payload=1.5)
+    assert messages.to_task(messages.from_task(task), ORIGIN) == task
+    open_ended = Task('t1', (1.0, 2.0, 3.0), latest=epoch + 90.25)
+    assert messages.to_task(messages.from_task(open_ended), ORIGIN) == open_ended
+
+
+def test_zero_times_and_an_unknown_payload_are_none():
+    task = messages.to_task(task_message(payload=math.nan), ORIGIN)
+    assert (task.earliest, task.latest, task.release, task.payload) == (
+        -math.inf, math.inf, 0.0, 0.0)
+
+
+def time(seconds):
+    return messages.to_stamp(seconds)
+
+
 def test_nan_acceptance_radius_is_unknown():
     assert messages.to_task(task_message(acceptance_radius=math.nan), ORIGIN
                             ).acceptance_radius is None
@@ -54,6 +73,16 @@ def test_a_wgs84_task_is_placed_by_the_origin():
     ({'frame': 1, 'longitude': 200.0}, 'task t1: longitude = 200.0'),
     ({'acceptance_radius': -2.0}, 'task t1: acceptance_radius = -2.0'),
     ({'service_time': messages.to_duration(-2.0)}, 'task t1: service_time = -2.0'),
+    ({'earliest': time(60.0), 'latest': time(59.5)},
+     "task t1: latest = '59.5 s': expected at least earliest = 60.0 s"),
+    ({'earliest': time(1.8e9), 'latest': time(1.8e9 - 90.0)},
+     "task t1: latest = '2027-01-15 07:58:30 UTC': expected at least earliest = "
+     '2027-01-15 08:00:00 UTC'),
+    ({'release': time(60.0), 'latest': time(50.0)},
+     "task t1: latest = '50.0 s': expected at least release = 60.0 s"),
+    ({'earliest': time(-1.0)}, "task t1: earliest = '-1 s and 0 ns': expected a time"),
+    ({'payload': -1.0}, r'task t1: payload = -1.0: expected a number in \[0, 1e\+06\]'),
+    ({'payload': math.inf}, 'task t1: payload = inf'),
 ])
 def test_a_bad_task_is_refused_by_the_name_of_its_field(changed, text):
     with pytest.raises(InvalidValue, match=text):
@@ -67,6 +96,9 @@ def test_a_bad_task_is_refused_by_the_name_of_its_field(changed, text):
     ({'mission_state': 77}, 'uav u1: mission_state = 77'),
     ({'range_remaining': -5.0}, 'uav u1: range'),
     ({'cruise_speed': -5.0}, 'uav u1: cruise_speed'),
+    ({'endurance': -5.0}, 'uav u1: endurance = -5.0'),
+    ({'payload_capacity': 2e6}, 'uav u1: payload_capacity = 2000000.0'),
+    ({'turnaround': -1.0}, 'uav u1: turnaround = -1.0'),
     ({'list_revision': 2**32 - 1}, 'uav u1: list_revision = 4294967295'),
 ])
 def test_a_bad_state_is_refused_by_the_name_of_its_field(changed, text):
@@ -77,6 +109,13 @@ def test_a_bad_state_is_refused_by_the_name_of_its_field(changed, text):
         setattr(state, name, value)
     with pytest.raises(InvalidValue, match=text):
         messages.to_report(state)
+
+
+def test_zero_and_nan_limits_of_a_uav_are_unknown_and_others_are_taken():
+    report = messages.to_report(m.UavState(uav_id='u1', endurance=600.0, climb_speed=math.nan,
+                                           full_range=5000.0, turnaround=60.0))
+    assert (report.endurance, report.climb_speed, report.descent_speed, report.payload_capacity,
+            report.full_range, report.turnaround) == (600.0, None, None, None, 5000.0, 60.0)
 
 
 @pytest.mark.parametrize('zone', [
@@ -110,6 +149,9 @@ def test_a_planned_task_contains_its_leg():
     msg = messages.planned_task(Task('t1', (1.0, 2.0, 3.0)), Leg(((0.5, 0.5, 0.5),), 4.0), 2.5)
     assert (msg.leg_distance, msg.via[0].x, msg.eta.sec, msg.eta.nanosec) == (
         4.0, 0.5, 2, 500_000_000)
+    served = messages.planned_task(Task('t1', (1.0, 2.0, 3.0), service_time=4.0), Leg((), 4.0),
+                                   2.5, wait=1.5)
+    assert (served.wait.sec, served.finish.sec, served.trip) == (1, 8, 0)
 
 
 def test_a_task_without_a_radius_gets_that_of_the_parameter():

@@ -2,6 +2,7 @@
 """Values of the allocator: tasks, UAV reports, task lists, problems, plans; SI units, ENU."""
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import Enum
@@ -11,6 +12,10 @@ from uav_task_alloc.checks import check_id, check_names, check_number, check_poi
 from uav_task_alloc.geometry.frames import Origin
 from uav_task_alloc.model import Leg, Plan, Point, Task, ThreatZone, Uav
 from uav_task_alloc.objective import Objective
+
+# limits of a UavReport that are None where they are unknown, named as in model.Uav
+UAV_LIMITS = ('endurance', 'payload_capacity', 'climb_speed', 'descent_speed', 'full_range',
+              'turnaround')
 
 
 class TaskState(Enum):
@@ -109,6 +114,12 @@ class UavReport:
     active_task: str = ''  # id of the task being flown
     list_revision: int = 0  # of the last list verified on board
     standby: bool = False  # on the ground
+    endurance: float | None = None  # [s] in the air, remaining
+    payload_capacity: float | None = None  # [kg]
+    climb_speed: float | None = None  # [m/s]
+    descent_speed: float | None = None  # [m/s]
+    full_range: float | None = None  # [m] with a full battery
+    turnaround: float | None = None  # [s] of a battery change at its home
 
     def __post_init__(self) -> None:
         check_id('uav_id', self.uav_id)
@@ -123,6 +134,10 @@ class UavReport:
             check_number(place + 'cruise_speed', self.cruise_speed, 0.0, 1e4)
         if self.battery is not None:
             check_number(place + 'battery', self.battery, 0.0, 1.0)
+        for name in UAV_LIMITS:
+            if getattr(self, name) is not None:
+                most = 1e6 if name == 'payload_capacity' else math.inf  # as model.Uav
+                check_number(place + name, getattr(self, name), 0.0, most, open_low=True)
         put(self, 'capabilities', check_names(place + 'capabilities', self.capabilities))
 
 
@@ -133,6 +148,7 @@ class ListStop:
     task: Task  # with its position and service time
     leg: Leg  # from the stop before, with its detour points
     eta: float  # [s] from the stamp of the list to the arrival
+    wait: float = 0.0  # [s] from the arrival to the start of the service
 
 
 @dataclass(frozen=True, slots=True)

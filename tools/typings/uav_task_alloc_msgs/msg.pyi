@@ -50,11 +50,17 @@ class PlannedTask:
     via: list[geometry_msgs.msg.Point]
     leg_distance: float
     eta: builtin_interfaces.msg.Duration
+    wait: builtin_interfaces.msg.Duration
+    finish: builtin_interfaces.msg.Duration
+    trip: int
     def __init__(self, *,
         task: Task = ...,
         via: Sequence[geometry_msgs.msg.Point] = ...,
         leg_distance: float = ...,
         eta: builtin_interfaces.msg.Duration = ...,
+        wait: builtin_interfaces.msg.Duration = ...,
+        finish: builtin_interfaces.msg.Duration = ...,
+        trip: int = ...,
     ) -> None: ...
 
 class Task:
@@ -71,6 +77,10 @@ class Task:
     acceptance_radius: float
     required_capabilities: list[str]
     allowed_uavs: list[str]
+    earliest: builtin_interfaces.msg.Time
+    latest: builtin_interfaces.msg.Time
+    release: builtin_interfaces.msg.Time
+    payload: float
     def __init__(self, *,
         task_id: str = ...,
         frame: int = ...,
@@ -83,6 +93,10 @@ class Task:
         acceptance_radius: float = ...,
         required_capabilities: Sequence[str] = ...,
         allowed_uavs: Sequence[str] = ...,
+        earliest: builtin_interfaces.msg.Time = ...,
+        latest: builtin_interfaces.msg.Time = ...,
+        release: builtin_interfaces.msg.Time = ...,
+        payload: float = ...,
     ) -> None: ...
 
 class TaskAnnouncement:
@@ -151,12 +165,14 @@ class TaskStatus:
     uav_id: str
     reason: str
     stamp: builtin_interfaces.msg.Time
+    expected: builtin_interfaces.msg.Time
     def __init__(self, *,
         task_id: str = ...,
         state: int = ...,
         uav_id: str = ...,
         reason: str = ...,
         stamp: builtin_interfaces.msg.Time = ...,
+        expected: builtin_interfaces.msg.Time = ...,
     ) -> None: ...
 
 class TaskStatusArray:
@@ -223,6 +239,12 @@ class UavState:
     battery: float
     range_remaining: float
     cruise_speed: float
+    endurance: float
+    payload_capacity: float
+    climb_speed: float
+    descent_speed: float
+    full_range: float
+    turnaround: float
     capabilities: list[str]
     available: bool
     mode: int
@@ -240,6 +262,12 @@ class UavState:
         battery: float = ...,
         range_remaining: float = ...,
         cruise_speed: float = ...,
+        endurance: float = ...,
+        payload_capacity: float = ...,
+        climb_speed: float = ...,
+        descent_speed: float = ...,
+        full_range: float = ...,
+        turnaround: float = ...,
         capabilities: Sequence[str] = ...,
         available: bool = ...,
         mode: int = ...,

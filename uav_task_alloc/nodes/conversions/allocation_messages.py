@@ -30,7 +30,7 @@ def from_list(uav_list: UavList) -> m.TaskList:
     """
     return m.TaskList(
         header=header(uav_list.stamp), uav_id=uav_list.uav, revision=uav_list.revision,
-        tasks=[planned_task(stop.task, stop.leg, stop.eta) for stop in uav_list.stops],
+        tasks=[planned_task(stop.task, stop.leg, stop.eta, stop.wait) for stop in uav_list.stops],
         end=m.TaskList.RETURN_HOME if uav_list.returns else m.TaskList.HOLD,
         end_via=[to_point(point) for point in uav_list.end_via],
         distance=float(uav_list.distance))

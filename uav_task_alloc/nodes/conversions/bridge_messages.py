@@ -9,6 +9,7 @@ from dataclasses import replace
 from geometry_msgs.msg import Vector3
 from uav_task_alloc_msgs import msg as m
 
+from uav_task_alloc.allocator.records import UAV_LIMITS
 from uav_task_alloc.checks import check_point
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.geometry.frames import Origin
@@ -92,7 +93,7 @@ def from_uav_status(status: UavStatus, capabilities: Iterable[str], stamp: float
         stamp: [s] of the position.
 
     Returns:
-        For the topic `uav_states`; `cruise_speed` is NaN, not known to the bridge.
+        For the topic `uav_states`; what the bridge does not know is NaN.
     """
     return m.UavState(
         header=header(stamp), uav_id=status.uav_id, position=to_point(status.position),
@@ -102,7 +103,7 @@ def from_uav_status(status: UavStatus, capabilities: Iterable[str], stamp: float
         capabilities=list(capabilities), available=status.available, mode=status.mode.value,
         mission_state=status.mission_state.value, active_task_id=status.active_task,
         list_revision=status.list_revision, authority=status.authority.value,
-        reason=status.reason)
+        reason=status.reason, **dict.fromkeys(UAV_LIMITS, math.nan))
 
 
 def from_progress(uav_id: str, progress: TaskProgress, stamp: float) -> m.TaskEvent:

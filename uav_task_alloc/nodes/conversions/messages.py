@@ -11,7 +11,12 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from std_msgs.msg import Header
 from uav_task_alloc_msgs import msg as m
 
-from uav_task_alloc.allocator.records import TaskEvent, TaskEventKind, UavReport
+from uav_task_alloc.allocator.records import (
+    UAV_LIMITS,
+    TaskEvent,
+    TaskEventKind,
+    UavReport,
+)
 from uav_task_alloc.checks import check_number, check_ros_name
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.geometry.frames import Origin
@@ -22,6 +27,7 @@ from uav_task_alloc.nodes.conversions.message_limits import (
     check_words,
     cut,
 )
+from uav_task_alloc.nodes.conversions.task_times import put_times, to_times
 from uav_task_alloc.record.message_records import from_stamp, task_position
 from uav_task_alloc.zone_codec import JOURNAL_ZONE, encode_zone
 
@@ -114,17 +120,17 @@ def to_task(msg: m.Task, origin: Origin) -> Task:
         required_capabilities=check_words(place + 'required_capabilities',
                                           msg.required_capabilities),
         allowed_uavs=check_ros_names(place + 'allowed_uavs', msg.allowed_uavs) or None,
-        acceptance_radius=known(msg.acceptance_radius) or None)
+        acceptance_radius=known(msg.acceptance_radius) or None, **to_times(place, msg))
 
 
 def from_task(task: Task) -> m.Task:
     """The message of a task, in the frame LOCAL."""
-    return m.Task(
+    return put_times(m.Task(
         task_id=task.id, frame=m.Task.LOCAL, position=to_point(task.position),
         value=task.value, service_time=to_duration(task.service_time),
         acceptance_radius=math.nan if task.acceptance_radius is None else task.acceptance_radius,
         required_capabilities=sorted(task.required_capabilities),
-        allowed_uavs=sorted(task.allowed_uavs or ()))
+        allowed_uavs=sorted(task.allowed_uavs or ())), task)
 
 
 def to_report(msg: m.UavState) -> UavReport:
@@ -155,7 +161,8 @@ def to_report(msg: m.UavState) -> UavReport:
         battery=known(msg.battery),
         available=msg.available and msg.mode != m.UavState.FAULT,
         active_task=msg.active_task_id, list_revision=msg.list_revision,
-        standby=msg.mode == m.UavState.STANDBY)
+        standby=msg.mode == m.UavState.STANDBY,
+        **{name: known(getattr(msg, name)) or None for name in UAV_LIMITS})
 
 
 def to_event(msg: m.TaskEvent) -> TaskEvent:
@@ -201,10 +208,11 @@ def from_zones(zones: Iterable[ThreatZone], now: float) -> m.ThreatZoneArray:
     return m.ThreatZoneArray(header=header(now), zones=[from_zone(zone) for zone in zones])
 
 
-def planned_task(task: Task, leg: Leg, eta: float) -> m.PlannedTask:
-    """A task with the leg to it; eta [s] from the list's stamp."""
+def planned_task(task: Task, leg: Leg, eta: float, wait: float = 0.0) -> m.PlannedTask:
+    """A task with the leg to it; `eta` [s] from the stamp of the list, `wait` [s] there."""
     return m.PlannedTask(task=from_task(task), via=[to_point(p) for p in leg.via],
-                         leg_distance=leg.length, eta=to_duration(eta))
+                         leg_distance=leg.length, eta=to_duration(eta), wait=to_duration(wait),
+                         finish=to_duration(eta + wait + task.service_time))
 
 
 def announcement(action: int, tasks: Iterable[Task], now: float) -> m.TaskAnnouncement:
