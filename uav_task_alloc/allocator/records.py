@@ -14,7 +14,7 @@ from uav_task_alloc.model import Leg, Plan, Point, Task, ThreatZone, Uav
 from uav_task_alloc.objective import Objective
 
 # limits of a UavReport that are None where they are unknown, named as in model.Uav
-UAV_LIMITS = ('endurance', 'payload_capacity', 'climb_speed', 'descent_speed', 'full_range',
+REPORTED_LIMITS = ('endurance', 'payload_capacity', 'climb_speed', 'descent_speed', 'full_range',
               'turnaround')
 
 
@@ -134,7 +134,7 @@ class UavReport:
             check_number(place + 'cruise_speed', self.cruise_speed, 0.0, 1e4)
         if self.battery is not None:
             check_number(place + 'battery', self.battery, 0.0, 1.0)
-        for name in UAV_LIMITS:
+        for name in REPORTED_LIMITS:
             if getattr(self, name) is not None:
                 most = 1e6 if name == 'payload_capacity' else math.inf  # as model.Uav
                 check_number(place + name, getattr(self, name), 0.0, most, open_low=True)

@@ -9,7 +9,7 @@ from dataclasses import replace
 from geometry_msgs.msg import Vector3
 from uav_task_alloc_msgs import msg as m
 
-from uav_task_alloc.allocator.records import UAV_LIMITS
+from uav_task_alloc.allocator.records import REPORTED_LIMITS
 from uav_task_alloc.checks import check_point
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.geometry.frames import Origin
@@ -103,7 +103,7 @@ def from_uav_status(status: UavStatus, capabilities: Iterable[str], stamp: float
         capabilities=list(capabilities), available=status.available, mode=status.mode.value,
         mission_state=status.mission_state.value, active_task_id=status.active_task,
         list_revision=status.list_revision, authority=status.authority.value,
-        reason=status.reason, **dict.fromkeys(UAV_LIMITS, math.nan))
+        reason=status.reason, **dict.fromkeys(REPORTED_LIMITS, math.nan))
 
 
 def from_progress(uav_id: str, progress: TaskProgress, stamp: float) -> m.TaskEvent:

@@ -12,7 +12,7 @@ from std_msgs.msg import Header
 from uav_task_alloc_msgs import msg as m
 
 from uav_task_alloc.allocator.records import (
-    UAV_LIMITS,
+    REPORTED_LIMITS,
     TaskEvent,
     TaskEventKind,
     UavReport,
@@ -162,7 +162,7 @@ def to_report(msg: m.UavState) -> UavReport:
         available=msg.available and msg.mode != m.UavState.FAULT,
         active_task=msg.active_task_id, list_revision=msg.list_revision,
         standby=msg.mode == m.UavState.STANDBY,
-        **{name: known(getattr(msg, name)) or None for name in UAV_LIMITS})
+        **{name: known(getattr(msg, name)) or None for name in REPORTED_LIMITS})
 
 
 def to_event(msg: m.TaskEvent) -> TaskEvent:
