@@ -45,6 +45,20 @@ class FleetOrigin:
         altitude_amsl: float = ...,
     ) -> None: ...
 
+class PlanProposal:
+    plan: Allocation
+    base_revision: int
+    deadline: builtin_interfaces.msg.Time
+    accepted_on_timeout: bool
+    changes: list[str]
+    def __init__(self, *,
+        plan: Allocation = ...,
+        base_revision: int = ...,
+        deadline: builtin_interfaces.msg.Time = ...,
+        accepted_on_timeout: bool = ...,
+        changes: Sequence[str] = ...,
+    ) -> None: ...
+
 class PlannedTask:
     task: Task
     via: list[geometry_msgs.msg.Point]
@@ -212,6 +226,24 @@ class ThreatZoneArray:
     def __init__(self, *,
         header: std_msgs.msg.Header = ...,
         zones: Sequence[ThreatZone] = ...,
+    ) -> None: ...
+
+class UavHold:
+    OPERATOR: ClassVar[int]
+    SEPARATION: ClassVar[int]
+    header: std_msgs.msg.Header
+    uav_id: str
+    hold: bool
+    source: int
+    expires: builtin_interfaces.msg.Time
+    reason: str
+    def __init__(self, *,
+        header: std_msgs.msg.Header = ...,
+        uav_id: str = ...,
+        hold: bool = ...,
+        source: int = ...,
+        expires: builtin_interfaces.msg.Time = ...,
+        reason: str = ...,
     ) -> None: ...
 
 class UavState:

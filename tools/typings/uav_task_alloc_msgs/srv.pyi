@@ -5,6 +5,66 @@ from collections.abc import Sequence
 import uav_task_alloc_msgs.msg
 from rclpy.service import _ServiceType
 
+class ApprovePlan(_ServiceType[ApprovePlan.Request, ApprovePlan.Response]):
+    class Request:
+        accept: bool
+        operator_name: str
+        dry_run: bool
+        revision: int
+        def __init__(self, *,
+            accept: bool = ...,
+            operator_name: str = ...,
+            dry_run: bool = ...,
+            revision: int = ...,
+        ) -> None: ...
+    class Response:
+        success: bool
+        message: str
+        order_id: str
+        extra_distance: float
+        extra_finish: float
+        late: list[str]
+        def __init__(self, *,
+            success: bool = ...,
+            message: str = ...,
+            order_id: str = ...,
+            extra_distance: float = ...,
+            extra_finish: float = ...,
+            late: Sequence[str] = ...,
+        ) -> None: ...
+
+class ForbidTask(_ServiceType[ForbidTask.Request, ForbidTask.Response]):
+    class Request:
+        task_id: str
+        uav_id: str
+        clear: bool
+        operator_name: str
+        dry_run: bool
+        revision: int
+        def __init__(self, *,
+            task_id: str = ...,
+            uav_id: str = ...,
+            clear: bool = ...,
+            operator_name: str = ...,
+            dry_run: bool = ...,
+            revision: int = ...,
+        ) -> None: ...
+    class Response:
+        success: bool
+        message: str
+        order_id: str
+        extra_distance: float
+        extra_finish: float
+        late: list[str]
+        def __init__(self, *,
+            success: bool = ...,
+            message: str = ...,
+            order_id: str = ...,
+            extra_distance: float = ...,
+            extra_finish: float = ...,
+            late: Sequence[str] = ...,
+        ) -> None: ...
+
 class HandOver(_ServiceType[HandOver.Request, HandOver.Response]):
     class Request:
         uav_id: str
@@ -19,6 +79,154 @@ class HandOver(_ServiceType[HandOver.Request, HandOver.Response]):
         def __init__(self, *,
             success: bool = ...,
             message: str = ...,
+        ) -> None: ...
+
+class OrderTasks(_ServiceType[OrderTasks.Request, OrderTasks.Response]):
+    class Request:
+        uav_id: str
+        task_ids: list[str]
+        operator_name: str
+        dry_run: bool
+        revision: int
+        def __init__(self, *,
+            uav_id: str = ...,
+            task_ids: Sequence[str] = ...,
+            operator_name: str = ...,
+            dry_run: bool = ...,
+            revision: int = ...,
+        ) -> None: ...
+    class Response:
+        success: bool
+        message: str
+        order_id: str
+        extra_distance: float
+        extra_finish: float
+        late: list[str]
+        def __init__(self, *,
+            success: bool = ...,
+            message: str = ...,
+            order_id: str = ...,
+            extra_distance: float = ...,
+            extra_finish: float = ...,
+            late: Sequence[str] = ...,
+        ) -> None: ...
+
+class PauseUav(_ServiceType[PauseUav.Request, PauseUav.Response]):
+    class Request:
+        uav_id: str
+        keep_tasks: bool
+        operator_name: str
+        dry_run: bool
+        revision: int
+        def __init__(self, *,
+            uav_id: str = ...,
+            keep_tasks: bool = ...,
+            operator_name: str = ...,
+            dry_run: bool = ...,
+            revision: int = ...,
+        ) -> None: ...
+    class Response:
+        success: bool
+        message: str
+        order_id: str
+        extra_distance: float
+        extra_finish: float
+        late: list[str]
+        def __init__(self, *,
+            success: bool = ...,
+            message: str = ...,
+            order_id: str = ...,
+            extra_distance: float = ...,
+            extra_finish: float = ...,
+            late: Sequence[str] = ...,
+        ) -> None: ...
+
+class PinTask(_ServiceType[PinTask.Request, PinTask.Response]):
+    class Request:
+        task_id: str
+        uav_id: str
+        clear: bool
+        operator_name: str
+        dry_run: bool
+        revision: int
+        def __init__(self, *,
+            task_id: str = ...,
+            uav_id: str = ...,
+            clear: bool = ...,
+            operator_name: str = ...,
+            dry_run: bool = ...,
+            revision: int = ...,
+        ) -> None: ...
+    class Response:
+        success: bool
+        message: str
+        order_id: str
+        extra_distance: float
+        extra_finish: float
+        late: list[str]
+        def __init__(self, *,
+            success: bool = ...,
+            message: str = ...,
+            order_id: str = ...,
+            extra_distance: float = ...,
+            extra_finish: float = ...,
+            late: Sequence[str] = ...,
+        ) -> None: ...
+
+class ResumeUav(_ServiceType[ResumeUav.Request, ResumeUav.Response]):
+    class Request:
+        uav_id: str
+        operator_name: str
+        dry_run: bool
+        revision: int
+        def __init__(self, *,
+            uav_id: str = ...,
+            operator_name: str = ...,
+            dry_run: bool = ...,
+            revision: int = ...,
+        ) -> None: ...
+    class Response:
+        success: bool
+        message: str
+        order_id: str
+        extra_distance: float
+        extra_finish: float
+        late: list[str]
+        def __init__(self, *,
+            success: bool = ...,
+            message: str = ...,
+            order_id: str = ...,
+            extra_distance: float = ...,
+            extra_finish: float = ...,
+            late: Sequence[str] = ...,
+        ) -> None: ...
+
+class ReturnUav(_ServiceType[ReturnUav.Request, ReturnUav.Response]):
+    class Request:
+        uav_id: str
+        operator_name: str
+        dry_run: bool
+        revision: int
+        def __init__(self, *,
+            uav_id: str = ...,
+            operator_name: str = ...,
+            dry_run: bool = ...,
+            revision: int = ...,
+        ) -> None: ...
+    class Response:
+        success: bool
+        message: str
+        order_id: str
+        extra_distance: float
+        extra_finish: float
+        late: list[str]
+        def __init__(self, *,
+            success: bool = ...,
+            message: str = ...,
+            order_id: str = ...,
+            extra_distance: float = ...,
+            extra_finish: float = ...,
+            late: Sequence[str] = ...,
         ) -> None: ...
 
 class SetAvailability(_ServiceType[SetAvailability.Request, SetAvailability.Response]):
@@ -51,4 +259,32 @@ class SubmitTasks(_ServiceType[SubmitTasks.Request, SubmitTasks.Response]):
             accepted: Sequence[str] = ...,
             rejected: Sequence[str] = ...,
             reasons: Sequence[str] = ...,
+        ) -> None: ...
+
+class UndoOrder(_ServiceType[UndoOrder.Request, UndoOrder.Response]):
+    class Request:
+        order_id: str
+        operator_name: str
+        dry_run: bool
+        revision: int
+        def __init__(self, *,
+            order_id: str = ...,
+            operator_name: str = ...,
+            dry_run: bool = ...,
+            revision: int = ...,
+        ) -> None: ...
+    class Response:
+        success: bool
+        message: str
+        order_id: str
+        extra_distance: float
+        extra_finish: float
+        late: list[str]
+        def __init__(self, *,
+            success: bool = ...,
+            message: str = ...,
+            order_id: str = ...,
+            extra_distance: float = ...,
+            extra_finish: float = ...,
+            late: Sequence[str] = ...,
         ) -> None: ...
