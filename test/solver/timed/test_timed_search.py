@@ -136,3 +136,13 @@ def test_a_long_search_passes_through_excess_and_its_best_has_none():
     assert excess == {True, False}
     assert fresh.counts[at.INFEASIBLE] == 0
     assert fresh.sums[at.SERVED_WORTH] == scores[-1][1] >= scores[0][1]
+
+
+def test_of_two_tasks_the_one_announced_later_is_served_where_only_one_can_be():
+    tasks = [Task('old', (100.0, 0.0, 0.0), latest=9.0, announced=-500.0),
+             Task('new', (-80.0, 0.0, 0.0), latest=9.0, announced=-1.0),
+             Task('far', (-81.0, 0.0, 0.0), latest=9.0, announced=-1.0, value=0.5)]
+    goal = Objective(distance=1.0, response=1.0)
+    result = plan([Uav('u', (10.0, 0.0, 0.0), cruise_speed=10.0, range=90.5)], tasks, seed=1,
+                  objective=goal, max_iterations=300, budget=60.0)
+    assert result.unassigned.keys() == {'old', 'far'}

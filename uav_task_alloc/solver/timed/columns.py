@@ -3,7 +3,7 @@
 
 # columns of TimedArrays.fixed, by node
 X, Y, Z, SERVICE, OPENS, CLOSES, RELEASE, LOAD = range(8)  # RELEASE: no earlier leg to it
-TRIP_RELEASE, DUE, WEIGHT, WORTH, WIDTH, REMOTE = range(8, 14)
+TRIP_RELEASE, DUE, WEIGHT, WORTH, WIDTH, REMOTE, ANNOUNCED = range(8, 15)
 FIXED_COLUMNS = 16
 # columns of TimedArrays.begin, by UAV: ready for its first leg, time in the air by then, latest
 # departure, length and time of its route without tasks, whether this trip began at the base,

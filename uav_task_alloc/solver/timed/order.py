@@ -75,7 +75,10 @@ def set_order(a: TimedArrays, r: TimedRoutes, order: Links) -> None:
 
 @inline_kernel
 def true_cost(a: TimedArrays, r: TimedRoutes) -> float:
-    """The objective, with the price of excess that is allowed, without unserved tasks. O(1)."""
+    """The objective, with the price of excess that is allowed, without unserved tasks.
+
+    Times count from 0 on, not from when tasks were announced. O(1).
+    """
     cost = (a.weight[at.BY_DISTANCE] * r.sums[at.METRES] + r.sums[at.TIME_COST]
             + a.weight[at.BY_FINISH] * r.sums[at.FINISH])
     if a.weight[at.BY_EXCESS] < math.inf:

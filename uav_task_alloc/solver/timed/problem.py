@@ -151,6 +151,7 @@ def _fixed(problem: Problem, visits: int, aboard: Mapping[str, frozenset[str]]) 
         row[at.TRIP_RELEASE if whole_trip else at.RELEASE] = release
         row[at.LOAD] = task.payload
         row[at.WEIGHT], row[at.WORTH] = goal.response * task.value / total, task.value
+        row[at.ANNOUNCED] = task.announced
         row[at.WIDTH] = min(task.latest, 1e9) - max(task.earliest, -1e9)
     until = np.array([uav.available_until for uav in uavs])
     fixed[m + n:2 * m + n, at.CLOSES] = until
@@ -281,13 +282,15 @@ def _set_prices(problem: Problem, a: TimedArrays, scale: float) -> None:
     if not tasks:
         return
     values = np.array([task.value for task in tasks])
+    rows = a.fixed[a.uavs:a.ends]
+    announced = rows[:, at.WEIGHT] * rows[:, at.ANNOUNCED]  # served from then on costs nothing
     if math.isfinite(goal.unserved):
-        announced = np.array([task.announced for task in tasks])
-        a.unserved[:] = goal.unserved * values + a.fixed[a.uavs:a.ends, at.WEIGHT] * announced
+        a.unserved[:] = goal.unserved * values + announced
     else:
-        far = float(a.fixed[a.uavs:a.ends, at.REMOTE].mean())
+        far = float(rows[:, at.REMOTE].mean())
         least = max(UNSERVED_LEGS * scale, 2.0 * far * goal.distance)
-        a.unserved[:] = values / values.mean() * max(least, _longest_cost(problem, a, far))
+        price = values / values.mean() * max(least, _longest_cost(problem, a, far))
+        a.unserved[:] = np.maximum(0.5 * price, price + announced)
     a.price[:] = a.weight[4] if not problem.rules.hard else math.inf
     a.price[:2] = math.inf
 

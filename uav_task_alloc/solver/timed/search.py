@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from uav_task_alloc.geometry.outline import Floats
-from uav_task_alloc.kernel import kernel
+from uav_task_alloc.kernel import inline_kernel, kernel
 from uav_task_alloc.solver.rng import RngState, uniform
 from uav_task_alloc.solver.ruin import BLINK_RATE
 from uav_task_alloc.solver.search import PENALTY_DECAY, PENALTY_GROWTH
@@ -76,12 +76,23 @@ def is_improvement(a: TimedArrays, cost: float, worth: float, score: Floats,
     return bool(gain > slack or (gain >= -slack and cost < less))
 
 
+@inline_kernel
+def _announced(a: TimedArrays, r: TimedRoutes) -> float:
+    """What the tasks in no route would cost less as they were announced after 0. O(n)."""
+    cost = 0.0
+    if a.timed_cost and r.counts[at.SERVED] < a.ends - a.uavs:
+        for t in range(a.uavs, a.ends):
+            if r.link[t, at.OF_UAV] == a.uavs:
+                cost += a.fixed[t, at.WEIGHT] * a.fixed[t, at.ANNOUNCED]
+    return cost
+
+
 @kernel
 def record(a: TimedArrays, r: TimedRoutes, best: Incumbent, prizes: bool) -> bool:
     """Keep the routes if they are allowed and better than the best; whether. O(nodes)."""
     if r.counts[at.INFEASIBLE] > 0:
         return False
-    cost = true_cost(a, r) + (r.sums[at.UNSERVED_COST] if prizes else 0.0)
+    cost = true_cost(a, r) + (r.sums[at.UNSERVED_COST] if prizes else _announced(a, r))
     if not is_improvement(a, cost, r.sums[at.SERVED_WORTH], best.score, prizes):
         return False
     best.score[BEST_COST], best.score[BEST_WORTH] = cost, r.sums[at.SERVED_WORTH]
