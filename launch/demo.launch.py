@@ -45,7 +45,7 @@ def start(context: object) -> list:
     """
     refuse_unknown(__file__, ARGUMENTS)
     path, record = argument(context, 'scenario'), record_file(context)
-    viewers = [rviz_action(context)] if flag(context, 'rviz') else []
+    viewers = [rviz_action(context, simulated=True)] if flag(context, 'rviz') else []
     parameters = simulation_parameters(load(path), path, free_port(),
                                        optional_number(context, 'speedup'))
     return [

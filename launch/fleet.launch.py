@@ -31,6 +31,7 @@ ARGUMENTS = {
                  'both parameter files; empty: none.'),
     'speedup': ('', 'How many times faster than real time a simulated fleet flies, 0.1 to 100, '
                 'for the live view; empty: measured by the clocks of the vehicles.'),
+    'use_sim_time': ('false', 'true: all nodes live by /clock, which a simulator publishes.'),
     'rviz': ('false', 'true: start RViz, too.'),
     'record': ('', 'MCAP file to record all topics into, by a live view; it must not exist. '
                'Empty: none.'),
@@ -55,18 +56,19 @@ def start(context: object) -> list:
         argument(context, name) for name in ('namespace', 'bridge_state_dir', 'scenario'))
     files = [parameter_file(context, name) for name in ('allocator_params', 'bridge_params')]
     parameters = fleet_parameters(load(path)) if path else {'allocator': {}, 'mavlink_bridge': {}}
-    viewers = [rviz_action(context, namespace)] if flag(context, 'rviz') else []
+    clock = {'use_sim_time': True} if flag(context, 'use_sim_time') else {}
+    viewers = [rviz_action(context, namespace, bool(clock))] if flag(context, 'rviz') else []
     record, speedup = record_file(context), optional_number(context, 'speedup')
     if speedup is not None:
         speedup = PlayerParams(speedup=speedup).speedup
     if record:
         viewers.insert(0, node_action('live_view', {
-            'record': record, **({'scenario': path, 'stay': True} if path else {}),
+            'record': record, **clock, **({'scenario': path, 'stay': True} if path else {}),
             **({} if speedup is None else {'speedup': speedup})}, namespace=namespace))
     return [
-        *RespawnedNode('allocator', files[0], parameters['allocator'],
+        *RespawnedNode('allocator', files[0], {**parameters['allocator'], **clock},
                        namespace=namespace).start(),
-        *RespawnedNode('mavlink_bridge', files[1], parameters['mavlink_bridge'],
+        *RespawnedNode('mavlink_bridge', files[1], {**parameters['mavlink_bridge'], **clock},
                        {'state_dir': state_dir} if state_dir else {}, namespace=namespace,
                        sigterm_timeout=BRIDGE_SIGTERM_TIMEOUT).start(),
         *viewers,

@@ -2,6 +2,7 @@
 """Starts RViz with the markers and paths of a fleet; needs the packages rviz2 and tf2_ros."""
 from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
+from launch_ros.parameter_descriptions import ParameterValue
 from launch_ros.substitutions import FindPackageShare
 
 from launch import LaunchDescription
@@ -12,6 +13,7 @@ _TOPICS = ['allocation_markers', *(f'uav_{k}/path' for k in range(1, 5))]
 
 ARGUMENTS = {
     'namespace': ('', 'Namespace of the fleet; empty: none.'),
+    'use_sim_time': ('false', 'true: RViz lives by /clock.'),
     'rviz_config': ([FindPackageShare('uav_task_alloc'), '/config/allocation.rviz'],
                     'Configuration file of RViz.'),
 }
@@ -23,6 +25,8 @@ def generate_launch_description() -> LaunchDescription:
     return LaunchDescription([
         *declared(ARGUMENTS),
         Node(package='rviz2', executable='rviz2', namespace=LaunchConfiguration('namespace'),
+             parameters=[{'use_sim_time': ParameterValue(
+                 LaunchConfiguration('use_sim_time'), value_type=bool)}],
              arguments=['-d', LaunchConfiguration('rviz_config')],
              # the configuration has absolute topic names; these are in the namespace
              remappings=[(f'/{topic}', topic) for topic in _TOPICS]),

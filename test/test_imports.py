@@ -21,7 +21,7 @@ ROOMS = {
     'numba': ('geometry/', 'solver/', 'kernel'),
 }
 ROS = {'rclpy', 'rcl_interfaces', 'builtin_interfaces', 'geometry_msgs', 'std_msgs', 'std_srvs',
-       'diagnostic_msgs', 'nav_msgs', 'visualization_msgs', 'uav_task_alloc_msgs',
+       'diagnostic_msgs', 'nav_msgs', 'rosgraph_msgs', 'visualization_msgs', 'uav_task_alloc_msgs',
        'ament_index_python'}
 # a room, or a file beside rooms, imports from lower levels and from itself only
 LEVELS = {

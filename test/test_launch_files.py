@@ -118,6 +118,19 @@ def test_the_live_view_of_a_fleet_has_the_scenario_and_the_speedup(
     assert view.get('speedup') == speedup  # otherwise it is measured
 
 
+def test_a_demo_lives_by_the_clock_of_its_simulated_fleet():
+    nodes = {name: values(words) for name, words in started('demo').items()}
+    assert {name for name, given in nodes.items() if given.get('use_sim_time')} == {
+        'allocator', 'mavlink_bridge', 'scenario_player', 'live_view'}
+
+
+@pytest.mark.parametrize('simulated', [True, False])
+def test_a_fleet_lives_by_simulated_time_where_the_argument_says_so(tmp_path, simulated):
+    nodes = started('fleet', record=str(tmp_path / 'x.mcap'),
+                    **({'use_sim_time': 'true'} if simulated else {}))
+    assert {values(words).get('use_sim_time', False) for words in nodes.values()} == {simulated}
+
+
 @pytest.mark.parametrize('name', ['demo', 'fleet', 'rviz'])
 def test_each_launch_argument_is_described(name):
     described = launch_stand_in.show_args(ROOT / f'launch/{name}.launch.py')
@@ -150,7 +163,9 @@ def test_without_a_scenario_a_fleet_has_the_values_of_its_files(tmp_path):
 def test_every_parameter_that_a_launch_file_sets_exists(name, moved):
     for executable, words in started(name, scenario=moved).items():
         kind = params.NODES[executable]
-        kind(**{key.replace('.', '__'): value for key, value in values(words).items()})
+        given = values(words)
+        assert given.pop('use_sim_time', True) is True  # of ROS itself
+        kind(**{key.replace('.', '__'): value for key, value in given.items()})
 
 
 @pytest.mark.parametrize('name', ['demo', 'fleet'])

@@ -18,7 +18,7 @@ OWN = 'uav_task_alloc_msgs'
 USED = (  # of other packages, by nodes/; the types of their fields follow
     'diagnostic_msgs/msg/DiagnosticArray', 'nav_msgs/msg/Path', 'std_srvs/srv/Trigger',
     'rcl_interfaces/msg/ParameterDescriptor', 'rcl_interfaces/msg/SetParametersResult',
-    'visualization_msgs/msg/MarkerArray')
+    'rosgraph_msgs/msg/Clock', 'visualization_msgs/msg/MarkerArray')
 _FIELD = re.compile(r'([\w/]+)(?:<=\d+)?(\[[^]]*\])?\s+(\w+)\s*(=)?')
 _SIMPLE = {'bool': 'bool', 'byte': 'bytes', 'char': 'int', 'string': 'str', 'wstring': 'str',
            'float32': 'float', 'float64': 'float',

@@ -235,6 +235,8 @@ class FleetSimParams(CheckedParams):
     arming_delay: float = param(-1.0, 'Time from boot to a position estimate; negative: that of '
                                 'the real autopilots.', low=-1.0, high=3600.0, unit='s',
                                 fixed=True)
+    clock: bool = param(True, 'Publish /clock: simulated time, by which nodes with use_sim_time '
+                        'live.', fixed=True)
 
 
 @dataclass(frozen=True)
@@ -242,10 +244,12 @@ class PlayerParams(CheckedParams):
     """scenario_player: announces the tasks and zones of a scenario file at their times."""
 
     scenario: str = param('', 'Scenario file to play.', fixed=True)
-    speedup: float = param(1.0, 'How many times faster than real time.', low=0.1, high=100.0,
-                           fixed=True)
+    speedup: float = param(1.0, 'How many times faster than real time; with use_sim_time /clock '
+                           'decides.', low=0.1, high=100.0, fixed=True)
     wait_for_plan: bool = param(False, 'Start when an allocator has published a first plan: its '
                                 'kernels are compiled, and UAVs report.', fixed=True)
+    clock: bool = param(False, 'Publish /clock where no other node does, such as fleet_sim; not '
+                        'with use_sim_time.', fixed=True)
 
 
 @dataclass(frozen=True)

@@ -78,7 +78,7 @@ class Run:
 
     def __init__(self, speedup=1.0):
         self.scene, self.snapshots = Scene(RunState()), SnapshotStore()
-        self.clock = {'speedup': speedup, 'live': True, 'ended': False}
+        self.clock = {'speedup': speedup, 'rate': speedup, 'live': True, 'ended': False}
 
     def add(self, *lines):
         """Apply lines of one moment and store the changes."""

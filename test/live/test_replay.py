@@ -23,8 +23,8 @@ def test_a_record_is_shown_at_its_end_and_at_a_moment(folder):
     then = json.loads(snapshots.at(BEGIN + 19))['parts']
     assert now['parts']['statuses']['t5'] == ['UNASSIGNED', '', 'inside zone z1']
     assert [plan['revision'] for plan in now['plans']] == [1, 2]
-    assert now['clock'] == {'start': BEGIN, 'speedup': 1.0, 'live': False, 'wall': BEGIN + 20,
-                            'begin': BEGIN}
+    assert now['clock'] == {'start': BEGIN, 'speedup': 1.0, 'rate': 1.0, 'live': False,
+                            'wall': BEGIN + 20, 'begin': BEGIN}
     assert then['statuses']['t1'] == ['ACTIVE', 'u1', '']
 
 

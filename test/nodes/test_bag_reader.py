@@ -62,7 +62,7 @@ def whole(tmp_path_factory):
 def test_a_bag_is_read_as_lines_in_any_namespace(whole):
     reader = BagReader(whole)
     run, tasks, zones, statuses, plan, *states = reader
-    assert run == {'kind': 'run', 'speedup': 2.0}
+    assert run == {'kind': 'run', 'speedup': 2.0, 'simulated': False}
     assert tasks == {'kind': 'announcement', 'wall': 1.7e9, 'action': 'ADD', 'tasks': [
         {'id': 't1', 'position': (10.0, 20.0, 30.0), 'value': 4.0}]}
     assert [row['id'] for row in zones['zones']] == ['a', 'b', 'c']

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """live_view --record: what was on the topics is in the file, for readers that are not ours."""
+import json
 import math
 import signal
 from contextlib import suppress
@@ -11,6 +12,7 @@ from mcap.exceptions import EndOfFile
 from mcap.reader import NonSeekingReader, make_reader
 from mcap_ros2.decoder import DecoderFactory
 from nav_msgs.msg import Path as PathMsg
+from rosgraph_msgs.msg import Clock
 from uav_task_alloc_msgs import msg as m
 
 from uav_task_alloc.cli import report
@@ -86,6 +88,42 @@ def test_every_topic_is_recorded_with_its_type_and_times(start, probe, tmp_path)
     assert messages['/uav_1/task_list'].revision == 3
     assert messages['/uav_states'].header.stamp.sec == 11
     assert messages['/task_events'].uav_id == 'uav_1'
+
+
+def test_on_simulated_time_page_record_and_recording_live_by_the_clock(start, probe, tmp_path):
+    states, path = fleet(probe), tmp_path / 'run.mcap'
+    view = start('live_view', '-p', f'record:={path}', '-p', f'out_dir:={tmp_path}/out', '-p',
+                 'port:=0', '-p', 'use_sim_time:=true')
+    probe.until(lambda: 'waiting for it' in view.output())  # by name: nothing publishes /clock
+    clock, now = probe.publisher(Clock, '/clock', 10), [5000.0]
+
+    def tick(ready):
+        def published():
+            clock.publish(Clock(clock=header(now[0]).stamp))
+            states.publish(m.UavState(header=header(now[0]), uav_id='uav_1', battery=0.5))
+            return ready()
+        probe.until(published)
+
+    def walls():
+        rows = (tmp_path / 'out/record.jsonl').read_text().splitlines()
+        return [row['wall'] for row in map(json.loads, rows) if row['kind'] == 'state']
+
+    for now[0] in (5000.0, 5100.0):
+        tick(lambda: now[0] in walls())
+    now[0] = 4000.0  # it goes back: the record does not
+    tick(lambda: '/clock went back by 1100.0 s' in view.output())
+    now[0] = 4010.0
+    tick(lambda: 5110.0 in walls())
+    view.stop()
+    assert walls() == sorted(walls())
+    with open(path, 'rb') as file:
+        reader = make_reader(file, validate_crcs=True)
+        assert next(reader.iter_metadata()).metadata['simulated'] == 'true'
+        times = {message.log_time * 1e-9 for _, channel, message in reader.iter_messages()
+                 if channel.topic != '/clock'}
+    assert {5000.0, 5100.0, 5110.0} <= times <= set(range(5000, 5120))
+    assert json.loads((tmp_path / 'out/record.jsonl').read_text().splitlines()[0]) == {
+        'wall': 5000.0, 'kind': 'run', 'speedup': 0.0, 'simulated': True}
 
 
 def test_what_a_killed_recorder_had_written_can_be_read(start, probe, tmp_path):

@@ -5,9 +5,11 @@ import socket
 import time
 
 import pytest
+from rosgraph_msgs.msg import Clock
 from uav_task_alloc_msgs.srv import SetAvailability
 
 from uav_task_alloc.mavlink.transport.codec import Codec
+from uav_task_alloc.nodes.conversions.messages import from_stamp
 
 pytestmark = pytest.mark.ros
 
@@ -78,3 +80,26 @@ def test_a_bad_target_ends_it_with_one_clear_line(start, tmp_path):
     process.popen.wait(20)
     assert process.popen.returncode == 1
     assert "target = 'nowhere': expected HOST:PORT" in process.output()
+
+
+def test_simulated_time_runs_at_the_speedup_from_the_time_of_the_start_on(sim, probe):
+    begin = time.time()
+    clocks = probe.collect(Clock, '/clock', 10)
+    probe.until(lambda: clocks)
+    first, began = from_stamp(clocks[0].clock), time.monotonic()
+    assert first >= begin - 60.0
+    probe.until(lambda: from_stamp(clocks[-1].clock) - first >= 10.0)
+    assert 5.0 * (time.monotonic() - began) >= 10.0 - 1.0
+    times = [from_stamp(msg.clock) for msg in clocks]
+    assert times == sorted(times)
+
+
+def test_the_ground_truth_has_the_times_of_the_clock(sim, bridge, probe, tmp_path):
+    clocks = probe.collect(Clock, '/clock', 10)
+    probe.until(lambda: clocks)
+    receive_systems(bridge, {1, 2})
+    sim.stop()
+    rows = [json.loads(line) for line in (tmp_path / 'truth.jsonl').read_text().splitlines()]
+    epochs = {round(row['clock'] - row['t'], 2) for row in rows}
+    assert max(epochs) - min(epochs) < 0.02
+    assert min(epochs) <= from_stamp(clocks[0].clock)

@@ -1,12 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """scenario_player as a process: what it announces, when, and what it does before and after."""
 import pytest
+from rosgraph_msgs.msg import Clock
 from uav_task_alloc_msgs import msg as m
 from uav_task_alloc_msgs.srv import SetAvailability
 
 from uav_task_alloc import scenario
 from uav_task_alloc.model import Shape
-from uav_task_alloc.nodes.conversions.messages import ANNOUNCEMENTS, LATCHED, from_stamp
+from uav_task_alloc.nodes.conversions.messages import ANNOUNCEMENTS, LATCHED, from_stamp, to_stamp
 
 TEXT = """uavs:
   - {id: uav_1, position: [0, 0, 0], dies_at: 4}
@@ -108,6 +109,48 @@ def test_a_bad_file_ends_it_with_one_line_and_status_1(start, probe, tmp_path):
     assert player.popen.returncode == 1
     assert player.output().strip() == (
         f'{path}:7: scenario.zones[0].radius = -80: expected a number in (0, inf)')
+
+
+def test_on_simulated_time_everything_is_announced_as_the_clock_says(start, probe, file):
+    tasks = probe.collect(m.TaskAnnouncement, 'task_announcements', ANNOUNCEMENTS)
+    zones = probe.collect(m.ThreatZoneArray, 'threat_zones', LATCHED)
+    player = start('scenario_player', '-p', f'scenario:={file}', '-p', 'use_sim_time:=true')
+    clock = probe.publisher(Clock, '/clock', 10)
+    probe.until(lambda: probe.node.count_publishers('threat_zones') == 1)
+    now = [5000.0]
+
+    def tick(until, ready):
+        """Publish /clock until `until` [s] and then that time until `ready()`."""
+        probe.until(lambda: (clock.publish(Clock(clock=to_stamp(now[0]))), ready())[1])
+        assert not tasks[1:] or until >= 6.0
+
+    tick(0.0, lambda: tasks and zones)
+    start_at = from_stamp(tasks[0].header.stamp)
+    assert start_at == 5000.0
+    tick(0.0, lambda: '/clock has stood still at 5000.0 s' in player.output())
+    now[0] = 4000.0  # it goes back: nothing is announced again, and the rest is not lost
+    tick(0.0, lambda: '/clock went back by 1000.0 s' in player.output())
+    assert len(tasks) == 1
+    now[0] = 4006.0
+    tick(6.0, lambda: len(tasks) == 2)
+    tick(6.0, lambda: '/clock has stood still at 4006.0 s' in player.output())
+    assert len(tasks) == 2
+    now[0] = 4008.0
+    tick(8.0, lambda: len(tasks) == 3)
+
+
+def test_the_clock_of_a_player_is_published_where_no_other_node_does(start, probe, file):
+    tasks = probe.collect(m.TaskAnnouncement, 'task_announcements', ANNOUNCEMENTS)
+    probe.collect(m.ThreatZoneArray, 'threat_zones', LATCHED)
+    clocks = probe.collect(Clock, '/clock', 10)
+    player = start('scenario_player', '-p', f'scenario:={file}', '-p', 'speedup:=8.0',
+                   '-p', 'clock:=true')
+    probe.until(lambda: len(tasks) == 3 and len(clocks) > 20)
+    stamps = [from_stamp(msg.header.stamp) for msg in tasks]
+    assert stamps[1] - stamps[0] == pytest.approx(6.0, abs=0.5)  # scenario seconds
+    assert from_stamp(clocks[0].clock) <= stamps[-1] <= from_stamp(clocks[-1].clock) + 1.0
+    probe.node.create_publisher(Clock, '/clock', 10)  # such as fleet_sim
+    probe.until(lambda: 'another node publishes /clock' in player.output())
 
 
 def test_the_text_of_the_tests_is_a_scenario():

@@ -15,7 +15,13 @@ from uav_task_alloc.cli.options import OptionParser
 from uav_task_alloc.cli.outputs import check_file, check_installed, naming
 from uav_task_alloc.cli.progress import log_line
 from uav_task_alloc.errors import AllocError, InvalidValue
-from uav_task_alloc.record.ground_truth import GroundTruth, read_truth, visits, zone_entries
+from uav_task_alloc.record.ground_truth import (
+    GroundTruth,
+    Reached,
+    read_run,
+    visits,
+    zone_entries,
+)
 from uav_task_alloc.record.run_state import RunState, read_record
 
 Summary = dict[str, Any]
@@ -35,7 +41,7 @@ def summarise(out_dir: str | Path) -> Summary:
         OSError: a file cannot be read.
     """
     out = Path(out_dir)
-    return run_summary(read_record(out), read_truth(out))
+    return run_summary(*read_run(out))
 
 
 def run_summary(state: RunState, truth: GroundTruth) -> Summary:
@@ -61,14 +67,22 @@ def run_summary(state: RunState, truth: GroundTruth) -> Summary:
         'uploads': state.uploads,
         'metres_flown': round(truth.metres(), 1),
         'metres_planned': round(planned_length(state, names['completed']), 1),
+        'finish_s': finish(state, reached, names['completed']),
         'uavs_lost': len(truth.died),
-        'wall_s': round(max(0.0, state.last - state.first), 1) if state.solves else 0.0,
+        'wall_s': round(max(0.0, state.last - state.first) / state.stretch, 1)
+        if state.solves else 0.0,
         'unassigned': {name: state.statuses[name].reason for name in names['unassigned']},
         'lost': {name: why_lost(name, state) for name in names['lost']},
         'flown_twice': twice,
         'entries': [f'{entry.uav} into {entry.zone} at '
                     f'({", ".join(f"{v:.1f}" for v in entry.point)})' for entry in entries],
     }
+
+
+def finish(state: RunState, reached: Mapping[str, Sequence[Reached]],
+           completed: Sequence[str]) -> float:
+    """Scenario time [s] at which the last task was completed; 0 where none was."""
+    return round(max((state.clock(reached[name][0].wall) for name in completed), default=0.0), 1)
 
 
 def fate(name: str, state: RunState, reached: bool) -> str:
@@ -126,6 +140,7 @@ def summary_table(summary: Mapping[str, Any]) -> str:
         ('  flown twice', of('tasks_flown_twice'), ', '.join(of('flown_twice'))),
         ('zone violations', of('zone_violations'), '; '.join(of('entries'))),
         ('metres flown', f'{flown:.0f}', f'planned {planned:.0f} ({excess:+.1f} %)'),
+        ('finished', f'{summary.get("finish_s", 0.0):.0f} s', 'last task, scenario time'),
         ('re-plans', of('replans'), ''),
         ('re-solve time', f'{of("resolve_ms_median"):.0f} ms',
          f'p99 {of("resolve_ms_p99"):.0f} ms'),

@@ -17,7 +17,6 @@ from uav_task_alloc.record.plan_diff import (
     route_lists,
     trigger_text,
 )
-from uav_task_alloc.record.progress import SILENT_AFTER
 from uav_task_alloc.record.run_state import END_STATES, Line, ReportedStatus, RunState
 
 _SAMPLE_PERIOD = 0.2  # [s] between the samples of a track, of height and battery
@@ -90,7 +89,7 @@ class FlightHistory:
         if line['kind'] == 'run':
             self.run.on_run(line)
             return
-        if 0.0 < self.run.last < line['wall'] - SILENT_AFTER:
+        if 0.0 < self.run.last < line['wall'] - self.run.silent_after:
             self.gaps.append(ReceptionGap('', self.run.last, line['wall']))
         if len(self.events) < MAX_EVENTS:
             self.events += [(line['wall'], *event) for event in sentences(self.run, line)]
@@ -114,7 +113,7 @@ class FlightHistory:
     def on_state(self, line: Line) -> None:
         """Add a sample to the track, and a gap that has ended."""
         uav, wall = line['uav'], line['wall']
-        if wall - self.last_state.get(uav, wall) > SILENT_AFTER:
+        if wall - self.last_state.get(uav, wall) > self.run.silent_after:
             self.gaps.append(ReceptionGap(uav, self.last_state[uav], wall))
         self.last_state[uav] = wall
         levels, up = self.levels.setdefault(uav, []), line['position'][-1]
@@ -159,7 +158,7 @@ class FlightHistory:
         self.compare()
         end = self.run.last
         self.gaps += [ReceptionGap(uav, wall, end) for uav, wall in sorted(self.last_state.items())
-                      if end - wall > SILENT_AFTER]
+                      if end - wall > self.run.silent_after]
 
     def points(self, rows: Iterable[Mapping[str, Any]]) -> Iterator[Point]:
         """Detour points and task positions [m] of rows of a list."""
@@ -194,9 +193,9 @@ class FlightHistory:
         found = {}
         for uav, wall in sorted(self.last_state.items()):
             state = self.run.uavs[uav]
-            silent = self.run.last - wall > SILENT_AFTER and state['mode'] != 'STANDBY'
+            silent = self.run.last - wall > self.run.silent_after and state['mode'] != 'STANDBY'
             if silent and self.tracks[uav] and (
-                    newest - wall > SILENT_AFTER or not state['available']):
+                    newest - wall > self.run.silent_after or not state['available']):
                 found[uav] = TrueSample(wall, self.tracks[uav][-1].point)
         return found
 

@@ -119,7 +119,8 @@ def time_text(history: FlightHistory) -> str:
         return 'All times are in seconds since the first message; no task was announced.'
     begin, end = (f'{history.clock(wall):.0f} s' for wall in (run.first, run.last))
     fast = f' One second of the clock is {run.speedup:g} s of the mission.' if (
-        run.speedup != 1.0) else ''
+        run.speedup != 1.0) else (f' It was flown {run.rate:g} times faster than real time.'
+                                  if run.rate != 1.0 else '')
     close = history.mission_end()
     why = 'the last task ended' if close < run.last else 'the recording ended with open tasks'
     return (f'All times are mission time: 0 s is the first task announced, at '

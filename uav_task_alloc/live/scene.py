@@ -13,7 +13,6 @@ from uav_task_alloc.record.plan_diff import (
     route_lists,
     trigger_text,
 )
-from uav_task_alloc.record.progress import SILENT_AFTER
 from uav_task_alloc.record.run_state import Line, RunState
 from uav_task_alloc.zone_codec import JSON_ZONE, encode_zone
 
@@ -104,7 +103,7 @@ class Scene:
     def log_silence(self, now: float, ended: bool) -> None:
         """Log each UAV once when its states stop, and once when they resume."""
         silent = {uav for uav, state in self.run.uavs.items()
-                  if now - state['wall'] > SILENT_AFTER
+                  if now - state['wall'] > self.run.silent_after
                   and not (ended and state['mode'] in _REST_MODES)}
         for names, text in ((silent - self.silent, '{} is silent'),
                             (self.silent - silent, '{} reports again')):
@@ -163,7 +162,8 @@ class Scene:
         """The remaining tasks of a UAV; `at`: expected arrival [unix s]."""
         line, speedup = self.run.lists[uav], self.run.speedup
         wall, stamp = line['wall'], line.get('stamp', 0.0)
-        planned_at = stamp if 0.0 <= wall - stamp < _MAX_STAMP_AGE else wall
+        # two nodes read /clock up to a tick apart
+        planned_at = stamp if -self.run.stretch <= wall - stamp < _MAX_STAMP_AGE else wall
         return {'revision': line['revision'], 'tasks': [
             {'id': row['id'], 'via': [to_decimetres(point) for point in row['via']],
              'at': round(planned_at + row['eta'] / speedup, 1) if 'eta' in row else None}

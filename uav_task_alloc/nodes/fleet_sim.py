@@ -9,6 +9,7 @@ from uav_task_alloc_msgs.srv import SetAvailability
 
 from uav_task_alloc import scenario
 from uav_task_alloc.errors import InvalidValue
+from uav_task_alloc.nodes.ros.clock_publisher import ClockPublisher
 from uav_task_alloc.nodes.ros.parameters import declare, given
 from uav_task_alloc.nodes.ros.run import run
 from uav_task_alloc.params import FleetSimParams
@@ -19,6 +20,8 @@ from uav_task_alloc.sim.udp_fleet import UdpFleet, to_address
 class FleetSim(Node):
     """Runs the simulated fleet in a thread of its own.
 
+    Publishes:
+        `/clock` (Clock), unless the parameter `clock` is false.
     Services:
         `~/set_alive` (SetAvailability): switches a UAV off, or on again where it is.
     Parameters:
@@ -33,6 +36,8 @@ class FleetSim(Node):
             [(vehicle_config(uav, played, params), uav.autopilot) for uav in played.uavs],
             known_address(params.target), params.speedup, params.log_file)
         self.thread = self.fleet.start()
+        if params.clock:
+            self.publisher = ClockPublisher(self, self.fleet.clock)
         self.create_service(SetAvailability, '~/set_alive', self.set_alive)
         self.get_logger().info(f'{played.name}: {len(played.uavs)} vehicles send to '
                                f'{params.target}, {params.speedup:g} times real time')

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import shutil
 import sys
-import time
 from collections.abc import Callable
 from dataclasses import asdict
 from pathlib import Path
@@ -25,6 +24,13 @@ from uav_task_alloc.live.snapshot_store import SnapshotStore
 from uav_task_alloc.live.tiles import tile_source
 from uav_task_alloc.nodes.conversions.message_limits import cut
 from uav_task_alloc.nodes.conversions.messages import ANNOUNCEMENTS, LATCHED, STATES
+from uav_task_alloc.nodes.ros.clock_watch import (
+    SteadyTime,
+    is_simulated,
+    ros_time,
+    steady_clock,
+    watch_clock,
+)
 from uav_task_alloc.nodes.ros.parameters import declare
 from uav_task_alloc.nodes.ros.run import run, with_flags
 from uav_task_alloc.nodes.ros.topic_names import TASK_LIST, check_topic
@@ -39,6 +45,7 @@ if TYPE_CHECKING:
     from uav_task_alloc.nodes.ros.bag_recorder import BagRecorder
 
 _Message = TypeVar('_Message')
+_BEGIN_PERIOD = 0.05  # [s] between two checks whether there is a time
 _PERIOD = 0.5  # [s] between updates of terminal and page
 _PLAIN_PERIODS = 4  # between two lines where the output is no terminal
 _MOST_REFUSALS = 200  # lines of the log
@@ -54,12 +61,12 @@ class TerminalStatus:
         self._lines = 0  # printed last
         self._updates = 0
 
-    def update(self, state: RunState, clock: float, last: bool) -> None:
-        """Print the state at `clock` [s] of the scenario; `last`: in any case."""
+    def update(self, state: RunState, wall: float, clock: float, last: bool) -> None:
+        """Print the state at `wall` [unix s], `clock` [s] of the scenario; `last`: in any case."""
         self._updates += 1
         lines = [headline(state, clock)]
         if sys.stdout.isatty():
-            lines += fleet_lines(state, time.time())
+            lines += fleet_lines(state, wall)
             width = shutil.get_terminal_size().columns - 1  # a wrapped line cannot be rewritten
             lines = [line[:width] for line in lines]
             sys.stdout.write(_UP_AND_CLEAR.format(self._lines) if self._lines else '')
@@ -94,12 +101,29 @@ class LiveView(Node):
         self.recorder = self._start_recorder()
         self.finished = False
         self.over_since: float | None = None  # [s] of the scenario
-        self.apply({'wall': time.time(), 'kind': 'run', 'speedup': self.params.speedup})
-        if self.played:
-            self.apply({'wall': time.time(), 'kind': 'origin', **asdict(self.origin)})
+        self.time = SteadyTime()
+        self.begun = False  # waits for the first /clock where it lives by simulated time
         self.server = self._start_server()
+        watch_clock(self, self.get_logger().warning)
+        self.begin_timer = self.create_timer(_BEGIN_PERIOD, self.begin, clock=steady_clock())
+        self.begin()
+
+    def begin(self) -> None:
+        """Begin to record and show, once there is a time."""
+        if self.begun or not ros_time(self):
+            return
+        self.begun = True
+        self.destroy_timer(self.begin_timer)
+        self.apply({'wall': self.now(), 'kind': 'run', 'speedup': self.params.speedup,
+                    'simulated': is_simulated(self)})
+        if self.played:
+            self.apply({'wall': self.now(), 'kind': 'origin', **asdict(self.origin)})
         self._create_subscriptions()
-        self.create_timer(_PERIOD, self.on_timer)
+        self.create_timer(_PERIOD, self.on_timer, clock=steady_clock())
+
+    def now(self) -> float:
+        """Time of the record [unix s]: that of the node's clock, which never goes back here."""
+        return self.time.at(ros_time(self))
 
     def _create_subscriptions(self) -> None:
         """Subscribe to all topics of a fleet; the lists of other UAVs follow their states."""
@@ -121,7 +145,7 @@ class LiveView(Node):
                    to_record: Callable[[_Message], RecordBody]) -> None:
         """Record every message of a topic as `to_record` converts it."""
         def on_message(msg: _Message) -> None:
-            self._guard(topic, lambda: self.apply({'wall': time.time(), **to_record(msg)}))
+            self._guard(topic, lambda: self.apply({'wall': self.now(), **to_record(msg)}))
         self.create_subscription(msg_type, topic, on_message, qos)
 
     def subscribe_list(self, uav_id: str) -> None:
@@ -143,9 +167,9 @@ class LiveView(Node):
             return  # the allocator reports it
         if msg.uav_id not in self.state.lists:
             self.subscribe_list(msg.uav_id)
-        line = {'wall': time.time(), **message_records.state_record(msg)}
+        line = {'wall': self.now(), **message_records.state_record(msg)}
         last = self.state.uavs.get(msg.uav_id)
-        if last is None or line['wall'] - last['wall'] >= _PERIOD or any(
+        if last is None or line['wall'] - last['wall'] >= _PERIOD * self.state.stretch or any(
                 line[key] != last[key] for key in _STATE_FIELDS):
             self.apply(line)
 
@@ -175,7 +199,7 @@ class LiveView(Node):
         """Update terminal and page, and finish some time after the scenario is over."""
         clock = self.clock()
         self.finished = self.is_finished(clock)
-        self.terminal.update(self.state, clock, self.finished)
+        self.terminal.update(self.state, self.now(), clock, self.finished)
         self.update_page()
         if self.file:
             self.file.flush()
@@ -190,16 +214,17 @@ class LiveView(Node):
 
     def update_page(self) -> None:
         """Store what has changed for the page."""
-        wall = time.time()
+        wall = self.now()
         ended = self.over_since is not None
         updates = self.scene.updates(wall, ended)
         if self.server:
             self.snapshots.put(wall, {'start': self.state.start(), 'live': True,
-                                      'speedup': self.state.speedup, 'ended': ended}, *updates)
+                                      'speedup': self.state.speedup, 'rate': self.state.rate,
+                                      'ended': ended}, *updates)
 
     def clock(self) -> float:
         """Scenario time [s]: since the first task was announced."""
-        return self.state.clock(time.time()) if self.state.tasks else 0.0
+        return self.state.clock(self.now()) if self.state.tasks else 0.0
 
     def _open_record(self) -> TextIO | None:
         if not self.params.out_dir:
@@ -240,7 +265,9 @@ class LiveView(Node):
             from uav_task_alloc.nodes.ros.bag_recorder import BagRecorder
             recorder = BagRecorder(Path(self.params.record), self.get_namespace(), {
                 'speedup': str(self.params.speedup),
-                **{f'origin.{name}': str(value) for name, value in origin.items()}})
+                **({'simulated': 'true'} if is_simulated(self) else {}),
+                **{f'origin.{name}': str(value) for name, value in origin.items()}},
+                clock=self._bag_clock())
         except ImportError as error:
             raise _not_installed('record', error) from None
         except OSError as error:
@@ -248,6 +275,11 @@ class LiveView(Node):
                                f'a file that can be written ({error})') from None
         recorder.start()
         return recorder
+
+    def _bag_clock(self) -> Callable[[], int] | None:
+        """Time of messages in the MCAP file [ns]; None where that is real time."""
+        steady = SteadyTime()  # of the recorder's thread
+        return (lambda: round(1e9 * steady.at(ros_time(self)))) if is_simulated(self) else None
 
     def destroy_node(self) -> None:
         """Stop the server and the recorder, close the record."""

@@ -29,6 +29,7 @@ from uav_task_alloc.nodes.conversions.message_limits import cut
 from uav_task_alloc.nodes.conversions.messages import EVENTS, LATCHED, STATES
 from uav_task_alloc.nodes.ros.bridge_diagnostics import BridgeDiagnostics
 from uav_task_alloc.nodes.ros.bridge_shutdown import BridgeShutdown, held_for_upload
+from uav_task_alloc.nodes.ros.clock_watch import ros_time, steady_clock, watch_clock
 from uav_task_alloc.nodes.ros.leveled_log import LeveledLog
 from uav_task_alloc.nodes.ros.origin_check import OriginCheck
 from uav_task_alloc.nodes.ros.parameters import declare
@@ -96,8 +97,10 @@ class MavlinkBridge(Node):
             'warning', f'fleet_origin: {reason}: ignored'))
         self.lists = TaskListInputs(self, self.log, self.to_list, self.assign_lists)
         self.create_service(HandOver, '~/hand_over', self.on_hand_over)
-        self.create_timer(0.05, self.on_timer)
-        self.create_timer(1.0, self.publish_diagnostics)
+        steady = steady_clock()  # links and vehicles do not wait for simulated time
+        self.create_timer(0.05, self.on_timer, clock=steady)
+        self.create_timer(1.0, self.publish_diagnostics, clock=steady)
+        watch_clock(self, self.log.levels['warning'])
 
     # the receiver thread
 
@@ -228,7 +231,7 @@ class MavlinkBridge(Node):
 
     def stamp(self) -> float:
         """The published clock [s]."""
-        return self.get_clock().now().nanoseconds * 1e-9
+        return ros_time(self)
 
     def delays_exit(self) -> bool:
         """Whether a running upload is waited for before the exit; no other one is started."""

@@ -16,6 +16,14 @@ from uav_task_alloc.nodes.conversions.messages import (
     announcement,
     from_zones,
 )
+from uav_task_alloc.nodes.ros.clock_publisher import ClockPublisher
+from uav_task_alloc.nodes.ros.clock_watch import (
+    SteadyTime,
+    is_simulated,
+    ros_time,
+    steady_clock,
+    watch_clock,
+)
 from uav_task_alloc.nodes.ros.parameters import declare, given
 from uav_task_alloc.nodes.ros.run import run
 from uav_task_alloc.params import PlayerParams
@@ -26,10 +34,11 @@ _OBSERVERS = ('live_view', '_NODE_NAME_UNKNOWN_')
 
 
 class ScenarioPlayer(Node):
-    """Plays a scenario; its clock starts when an allocator has subscribed.
+    """Plays a scenario; its time starts when an allocator has subscribed.
 
     Publishes:
-        `task_announcements` (TaskAnnouncement), `threat_zones` (ThreatZoneArray); both latched.
+        `task_announcements` (TaskAnnouncement), `threat_zones` (ThreatZoneArray); both latched;
+        `/clock` (Clock) where the parameter `clock` is true.
     Subscribes to:
         `allocation` (Allocation), where `wait_for_plan` is set.
     Service clients:
@@ -47,13 +56,19 @@ class ScenarioPlayer(Node):
         if params.wait_for_plan:
             self.create_subscription(m.Allocation, 'allocation', self.on_allocation, LATCHED)
         self.moments = list(scenario.timeline(played))
-        self.started_at: float | None = None  # [s] steady clock
+        self.time = SteadyTime()
+        self.epoch, self.began = time.time(), time.monotonic()  # [unix s], [s]
+        self.leads = params.clock and not is_simulated(self)  # /clock is its own time
+        self.started_at: float | None = None  # [s] of `now`
         self.tasks = self.create_publisher(m.TaskAnnouncement, 'task_announcements',
                                            ANNOUNCEMENTS)
         self.zones = self.create_publisher(m.ThreatZoneArray, 'threat_zones', LATCHED)
         self.set_alive = self.create_client(SetAvailability, 'fleet_sim/set_alive')
         self.failing: list[str] = []  # UAVs whose failure is not yet requested
-        self.create_timer(_PERIOD, self.on_timer)
+        if self.leads:
+            self.clock_publisher = ClockPublisher(self, self.now, yields=True)
+        watch_clock(self, self.get_logger().warning)
+        self.create_timer(_PERIOD, self.on_timer, clock=steady_clock())
         self.get_logger().info(
             f'{played.name}: {len(played.uavs)} UAVs, {len(played.tasks)} tasks, '
             f'{len(played.zones)} zones; waiting for an allocator')
@@ -64,17 +79,28 @@ class ScenarioPlayer(Node):
     def on_timer(self) -> None:
         """Play every moment that is due."""
         if self.started_at is None:
-            if not (self.has_plan and self.is_subscribed('task_announcements')
+            if not (self.has_plan and self.stamp() > 0.0
+                    and self.is_subscribed('task_announcements')
                     and self.is_subscribed('threat_zones')):
                 return
-            self.started_at = time.monotonic()
-        now = (time.monotonic() - self.started_at) * self.speedup
+            self.started_at = self.now()
+        now = self.now() - self.started_at
         while self.moments and self.moments[0].at <= now:
             self.play(self.moments.pop(0))
             if not self.moments:
                 self.get_logger().info('everything is announced')
         if self.failing and self.set_alive.service_is_ready():
             self.request_failure(self.failing.pop(0))
+
+    def now(self) -> float:
+        """Time of the scenario's clock [s]: /clock, or `speedup` times the steady clock."""
+        if is_simulated(self):
+            return self.time.at(ros_time(self))
+        return self.epoch + (time.monotonic() - self.began) * self.speedup
+
+    def stamp(self) -> float:
+        """The ROS time of messages [s]."""
+        return self.now() if self.leads else ros_time(self)
 
     def on_allocation(self, _: m.Allocation) -> None:
         """Note that there is a plan."""
@@ -87,7 +113,7 @@ class ScenarioPlayer(Node):
 
     def play(self, moment: scenario.Moment) -> None:
         """Publish what changes in one moment."""
-        now = self.get_clock().now().nanoseconds * 1e-9
+        now = self.stamp()
         if moment.zones is not None:
             self.zones.publish(from_zones(moment.zones, now))
         if moment.tasks:

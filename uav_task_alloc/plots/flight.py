@@ -10,10 +10,10 @@ import uav_task_alloc.plots.style as style
 from uav_task_alloc.geometry.polyline import polyline_length
 from uav_task_alloc.palette import RED, uav_colour
 from uav_task_alloc.plots.flat import MapFigure
-from uav_task_alloc.record.ground_truth import GroundTruth, read_truth, visits
-from uav_task_alloc.record.run_state import RunState, read_record
+from uav_task_alloc.record.ground_truth import GroundTruth, read_run, visits
+from uav_task_alloc.record.run_state import RunState
 
-_AT_START = 0.2  # [s] wall time after the first task: announced later means in flight
+_AT_START = 0.2  # [s] real time after the first task: announced later means in flight
 
 
 def draw_flight(out_dir: str | Path, png: str | Path) -> None:
@@ -27,10 +27,10 @@ def draw_flight(out_dir: str | Path, png: str | Path) -> None:
         OSError: a file is missing or cannot be written.
     """
     out = Path(out_dir)
-    state, truth = read_record(out), read_truth(out)
+    state, truth = read_run(out)
     figure = MapFigure((task.position for task in state.tasks.values()), len(state.tasks))
     for interval in state.zones:
-        late = interval.since > state.start() + _AT_START
+        late = interval.since > state.start() + _AT_START * state.stretch
         note = f'from {state.clock(interval.since):.0f} s' if late else ''
         figure.zone(interval.zone, note, late)
     indices = {uav: index for index, uav in enumerate(sorted(truth.tracks))}
@@ -59,7 +59,7 @@ def _tasks(figure: MapFigure, state: RunState, truth: GroundTruth,
            indices: Mapping[str, int]) -> list[Any]:
     reached = visits(truth, {name: task.position for name, task in state.tasks.items()})
     for name, task in state.tasks.items():
-        marker = 'o' if task.wall <= state.start() + _AT_START else 'D'
+        marker = 'o' if task.wall <= state.start() + _AT_START * state.stretch else 'D'
         if reached[name]:
             fill = uav_colour(indices[reached[name][0].uav])
             figure.task(task.position, fill, name, marker)

@@ -75,7 +75,8 @@ class BagReader:
                 if not self.counted and file.seek(0, 2) < 8:
                     raise InvalidValue('file', str(self.path), 'an MCAP file') from None
                 self.damage = 'it was not closed: the recorder was killed, or is still recording'
-            except (McapError, ZstdError, struct.error, ValueError, MemoryError) as error:
+            except (McapError, ZstdError, struct.error, ValueError, OverflowError,
+                    MemoryError) as error:
                 self.damage = f'it is damaged after {self.counted.total()} messages: {error}'
 
     def records(self, file: IO[bytes]) -> Iterator[Line]:
@@ -98,7 +99,8 @@ class BagReader:
                 self.origin = Origin(*(float(metadata[f'origin.{name}']) for name in (
                     'latitude', 'longitude', 'altitude_amsl')))
             yield {'kind': 'run', 'speedup': check_number(
-                'speedup', float(metadata.get('speedup', 0.0)), 0.0, 1e6)}
+                'speedup', float(metadata.get('speedup', 0.0)), 0.0, 1e6),
+                'simulated': metadata.get('simulated') == 'true'}
         except (KeyError, ValueError):
             self.undecodable['about'] += 1
 

@@ -11,7 +11,7 @@ from pathlib import Path
 from uav_task_alloc.geometry.polyline import point_at, polyline_length
 from uav_task_alloc.geometry.zones import distance
 from uav_task_alloc.model import Point
-from uav_task_alloc.record.run_state import Line, ZoneInterval, read_lines
+from uav_task_alloc.record.run_state import Line, RunState, ZoneInterval, read_lines, read_record
 
 TRUTH_FILE = 'flight.jsonl'
 _VISIT_RADIUS = 1.5  # [m] between a task and the mission item of its visit
@@ -53,14 +53,15 @@ class GroundTruth:
     tracks: dict[str, list[TrueSample]] = field(default_factory=dict)
     reached: list[Reached] = field(default_factory=list)  # items reached, in order of time
     died: dict[str, TrueSample] = field(default_factory=dict)  # last sample by UAV that was lost
+    simulated: bool = False  # times are those of /clock
 
     def apply(self, line: Line) -> None:
         """Apply one line of the simulator's log.
 
         Args:
-            line: with `uav`, `wall` [unix s], and a position or an event.
+            line: with `uav`, `wall` and `clock` [unix s], and a position or an event.
         """
-        uav, wall = line['uav'], line['wall']
+        uav, wall = line['uav'], line['clock' if self.simulated else 'wall']
         event = line.get('event')
         if event is None and line.get('alive', True):
             self.tracks.setdefault(uav, []).append(
@@ -76,11 +77,12 @@ class GroundTruth:
                          for track in self.tracks.values())
 
 
-def read_truth(out_dir: Path) -> GroundTruth:
+def read_truth(out_dir: Path, simulated: bool = False) -> GroundTruth:
     """Read the simulator's log of a run.
 
     Args:
         out_dir: folder with flight.jsonl.
+        simulated: times are those of /clock, as in the record of the run.
 
     Returns:
         Of all vehicles.
@@ -88,10 +90,26 @@ def read_truth(out_dir: Path) -> GroundTruth:
     Raises:
         OSError: the file cannot be read.
     """
-    truth = GroundTruth()
+    truth = GroundTruth(simulated=simulated)
     for line in read_lines(out_dir / TRUTH_FILE):
         truth.apply(line)
     return truth
+
+
+def read_run(out_dir: Path) -> tuple[RunState, GroundTruth]:
+    """Read the record and the simulator's log of a run, with times of one clock.
+
+    Args:
+        out_dir: folder with record.jsonl and flight.jsonl.
+
+    Returns:
+        What the nodes reported, and what was flown.
+
+    Raises:
+        OSError: a file cannot be read.
+    """
+    state = read_record(out_dir)
+    return state, read_truth(out_dir, state.simulated)
 
 
 def visits(truth: GroundTruth, tasks: Mapping[str, Point]) -> dict[str, list[Reached]]:

@@ -8,7 +8,6 @@ from uav_task_alloc.record.run_state import FINAL_STATES, Line, RunState
 from uav_task_alloc.scenario import Scenario
 
 _AT_REST = 0.5  # [m/s]
-SILENT_AFTER = 2.0  # [s] of wall time without a state: the UAV is shown as silent
 
 
 def headline(run: RunState, clock: float) -> str:
@@ -46,7 +45,7 @@ def fleet_lines(run: RunState, now: float) -> list[str]:
     lines = []
     for uav, state in sorted(run.uavs.items()):
         remaining = run.lists.get(uav, {'tasks': []})['tasks']
-        activity = 'silent' if now - state['wall'] > SILENT_AFTER else state['mode'].lower()
+        activity = 'silent' if now - state['wall'] > run.silent_after else state['mode'].lower()
         battery = state['battery']
         lines.append(
             f'  {uav:8} {activity:10} {state["active"] or "-":8} {len(remaining):3} to fly  '

@@ -20,6 +20,8 @@ FINAL_STATES = (*END_STATES, 'UNASSIGNED')
 # share by which a measured clock rate varies, and that of a real vehicle over a bad link
 _RATE_TOLERANCE, _REAL_TIME_TOLERANCE = 0.04, 0.1
 SINCE_TOLERANCE = 3.0  # [s] of a start time: reports are in whole seconds and arrive late
+SILENT_AFTER = 2.0  # [s] of real time without a state: the UAV is shown as silent
+# `wall`: time of the record, that of /clock where its node lives by simulated time
 Line = Mapping[str, Any]  # `wall` [unix s], `kind`, and the values that RunState.on_KIND reads
 
 
@@ -93,9 +95,11 @@ class RunState:
     health: dict[str, tuple[int, str]] = field(default_factory=dict)  # level, text by UAV
     uav_warnings: dict[str, dict[str, str]] = field(default_factory=dict)  # by allocator, by UAV
     authority: dict[str, ReportedAuthority] = field(default_factory=dict)  # by UAV
-    speedup: float = 1.0  # scenario seconds in a second of wall time
+    speedup: float = 1.0  # scenario seconds in a second of `wall`; 1 where that is /clock
+    rate: float = 1.0  # scenario seconds in a second of real time
+    simulated: bool = False  # `wall` is the time of /clock
     origin: Origin | None = None  # of the ENU frame; None: not known yet
-    measured: bool = True  # `speedup` is that of the vehicles' clocks, as no one stated it
+    measured: bool = True  # `rate` is that of the vehicles' clocks, as no one stated it
     clock_rates: dict[str, float] = field(default_factory=dict)  # of the vehicles, by UAV
     first: float = math.inf  # [unix s] of the first line
     last: float = -math.inf  # [unix s] of the last line
@@ -107,8 +111,21 @@ class RunState:
 
     def on_run(self, line: Line) -> None:
         """Parameters of the run; a speedup of 0 is to be measured."""
-        self.measured = not line['speedup']
-        self.speedup = line['speedup'] or self.speedup
+        self.measured, self.simulated = not line['speedup'], bool(line.get('simulated'))
+        self._set_rate(line['speedup'] or self.rate)
+
+    def _set_rate(self, rate: float) -> None:
+        self.rate, self.speedup = rate, 1.0 if self.simulated else rate
+
+    @property
+    def silent_after(self) -> float:
+        """Seconds of `wall` without a state after which a UAV is silent."""
+        return SILENT_AFTER * self.stretch
+
+    @property
+    def stretch(self) -> float:
+        """Seconds of `wall` in a second of real time."""
+        return self.rate if self.simulated else 1.0
 
     def on_origin(self, line: Line) -> None:
         """The origin of the ENU frame, as a node of the fleet published it."""
@@ -170,13 +187,13 @@ class RunState:
         self.clock_rates.update(line.get('clock_rates', {}))
         if self.measured and self.clock_rates:
             rate = median(self.clock_rates.values())
-            if abs(rate - self.speedup) > _RATE_TOLERANCE * self.speedup:
-                self.speedup = rounded_rate(rate)
+            if abs(rate - self.rate) > _RATE_TOLERANCE * self.rate:
+                self._set_rate(rounded_rate(rate))
         for uav, row in line.get('authority', {}).items():
-            since = None if row['for'] is None else line['wall'] - row['for']
+            since = None if row['for'] is None else line['wall'] - self.stretch * row['for']
             old = self.authority.get(uav)
             if (old and since is not None and old.since is not None and old.state == row['state']
-                    and abs(since - old.since) < SINCE_TOLERANCE):
+                    and abs(since - old.since) < SINCE_TOLERANCE * self.stretch):
                 since = old.since
             self.authority[uav] = ReportedAuthority(row['state'], row['why'], since, row['back'])
 

@@ -62,13 +62,15 @@ def simulation_parameters(played: Scenario, path: str | Path, port: int,
     fleet = fleet_parameters(played)
     flown: Parameters = {'scenario': str(path), 'speedup': PlayerParams(
         speedup=played.speedup if speedup is None else speedup).speedup}
+    simulated: Parameters = {'use_sim_time': True}  # /clock is that of fleet_sim
     return {
-        'allocator': {**fleet['allocator'], 'uav_timeout': UAV_TIMEOUT},
-        'mavlink_bridge': {**fleet['mavlink_bridge'], 'connections': [f'udpin:127.0.0.1:{port}'],
+        'allocator': {**fleet['allocator'], **simulated, 'uav_timeout': UAV_TIMEOUT},
+        'mavlink_bridge': {**fleet['mavlink_bridge'], **simulated,
+                           'connections': [f'udpin:127.0.0.1:{port}'],
                            'takeoff': True, 'relaunch': 'automatic'},
         'fleet_sim': {**flown, 'target': f'127.0.0.1:{port}'},
-        'scenario_player': {**flown, 'wait_for_plan': True},
-        'live_view': {**flown}}
+        'scenario_player': {**flown, **simulated, 'wait_for_plan': True},
+        'live_view': {**flown, **simulated}}
 
 
 def id_pattern(played: Scenario) -> str:

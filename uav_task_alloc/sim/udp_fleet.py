@@ -55,7 +55,7 @@ class UdpFleet:
     def __init__(self, vehicles: Iterable[tuple[VehicleConfig, str]], target: UdpAddress,
                  speedup: float = 1.0, log_file: str | Path = '') -> None:
         self.speedup = speedup
-        self._start = time.monotonic()
+        self._start, self._epoch = time.monotonic(), time.time()
         self._lock = threading.Lock()
         self._stopping = threading.Event()
         self._endpoints = {config.uav: _Endpoint(Vehicle(config, AUTOPILOTS[autopilot]), target)
@@ -77,6 +77,10 @@ class UdpFleet:
     def now(self) -> float:
         """Vehicle time [s]."""
         return (time.monotonic() - self._start) * self.speedup
+
+    def clock(self) -> float:
+        """Simulated time [unix s]: vehicle time from the wall time of the start on."""
+        return self._epoch + self.now()
 
     def set_alive(self, uav: str, alive: bool) -> str:
         """Kill a vehicle, or reboot it on the ground; returns an error text, '' on success.
@@ -114,9 +118,9 @@ class UdpFleet:
         if self._log is None:
             return
         for name, endpoint in self._endpoints.items():
-            self._log.events(name, endpoint.vehicle)
+            self._log.events(name, endpoint.vehicle, self._epoch)
             if now >= self._sample_at:
-                self._log.sample(name, endpoint.vehicle, now)
+                self._log.sample(name, endpoint.vehicle, now, self._epoch)
         if now >= self._sample_at:
             self._sample_at = now + _SAMPLE
             self._log.flush()
@@ -182,6 +186,11 @@ class _Endpoint:
                     self.socket.sendto(frame, address)  # lost, as on a real link
 
 
+def _times(now: float, epoch: float) -> dict[str, float]:
+    """Vehicle time [s], wall time and time of /clock [unix s] of a line of the log."""
+    return {'t': round(now, 3), 'wall': round(time.time(), 3), 'clock': round(epoch + now, 3)}
+
+
 class _Log:
     """The ground truth as JSON lines."""
 
@@ -193,20 +202,20 @@ class _Log:
             raise InvalidValue('log_file', str(path),
                                f'a file that can be written ({error})') from None
 
-    def sample(self, uav: str, vehicle: Vehicle, now: float) -> None:
-        """Write position, mode and whether the vehicle is alive."""
+    def sample(self, uav: str, vehicle: Vehicle, now: float, epoch: float) -> None:
+        """Write position, mode and whether the vehicle is alive; `epoch`: of /clock [unix s]."""
         x, y, z = vehicle.flight.body.position
-        self._write({'t': round(now, 3), 'wall': round(time.time(), 3), 'uav': uav,
+        self._write({**_times(now, epoch), 'uav': uav,
                      'x': round(x, 3), 'y': round(y, 3), 'z': round(z, 3),
                      'mode': vehicle.mode.value, 'alive': vehicle.alive})
 
-    def events(self, uav: str, vehicle: Vehicle) -> None:
-        """Write the events since the last call."""
+    def events(self, uav: str, vehicle: Vehicle, epoch: float) -> None:
+        """Write the events since the last call; `epoch`: of /clock [unix s]."""
         for event in vehicle.take_events():
             x, y, z = event.point
             line: dict[str, Any] = {
-                't': round(event.t, 3), 'wall': round(time.time(), 3), 'uav': uav,
-                'event': event.name, 'x': round(x, 3), 'y': round(y, 3), 'z': round(z, 3)}
+                **_times(event.t, epoch), 'uav': uav, 'event': event.name,
+                'x': round(x, 3), 'y': round(y, 3), 'z': round(z, 3)}
             more = {'seq': event.seq, 'mode': event.mode, 'cause': event.cause or None,
                     'command': event.command or None}
             self._write(line | {key: value for key, value in more.items() if value is not None})

@@ -2,7 +2,7 @@
 // The data of the page, prepared for display: no DOM, no network.
 import {degreesText, frameOf} from './geo.js';
 
-const SILENT_AFTER = 2;   // [s] of wall time without a state of a UAV, as in record/progress.py
+const SILENT_AFTER = 2;   // [s] of real time without a state of a UAV, as in record/run_state.py
 const LOW_BATTERY = .2;   // share: the default of the allocator's battery_reserve
 const AT_REST = ['STANDBY', 'HOLD'];  // modes of a UAV that may fall silent when the run is over
 export const LEFT = ['UNASSIGNED', 'REJECTED', 'FAILED'];
@@ -10,7 +10,8 @@ export const LEFT = ['UNASSIGNED', 'REJECTED', 'FAILED'];
 // the present; `closed`: the server has ended in order
 export const live = {clock: {}, parts: {}, events: [], plans: [], closed: false};
 
-// times: `wall` is in unix seconds, the page shows mission time, which may run faster
+// times: `wall` is in unix seconds, of /clock where the server lives by it; the page shows mission
+// time: `speedup` of its seconds in one of `wall`, `rate` in one of real time
 
 export function span(seconds) {
   const s = Math.max(0, Math.round(seconds)), two = n => String(n).padStart(2, '0');
@@ -61,7 +62,7 @@ export function readModel(past) {
 function describe(state, {wall, over, frame}) {
   const none = 'no state received';
   if (!state) return {position: [null, null], words: none, link: none, silent: true, figures: []};
-  const age = wall - state.wall, silent = age > SILENT_AFTER;
+  const age = wall - state.wall, silent = age * live.clock.speedup > SILENT_AFTER * live.clock.rate;
   const lost = silent && !(over && AT_REST.includes(state.mode));
   const mode = state.mode.toLowerCase().replace('_', ' '), figures = figuresOf(state);
   const words = (silent ? `last ${mode}` : mode) + (state.available ? '' : ', not available');

@@ -50,7 +50,7 @@ export function showHead(model, past) {
     + `${model.uavs.length} UAVs${silent ? `, ${silent} silent` : ''}; `
     + `${model.zones.length} zones; `
     + `${replans} re-plans`);
-  const rate = Number(clock.speedup.toPrecision(3));
+  const rate = Number(clock.rate.toPrecision(3));
   put($('rate'), rate === 1 ? '' : `at ${rate} × real time`);
   showAlarm(model.uavs.filter(uav => uav.trouble));
   Object.assign($('scrub'), {min: clock.begin, max: clock.wall});

@@ -26,6 +26,7 @@ _DISCOVERY_PERIOD = 1.0  # [s] between two checks for new topics; also the short
 _FLUSH_SHARE = 1.0 / 3600.0
 _LONGEST_FLUSH = 10.0  # [s]
 _DEPTH = 1000  # messages of a topic that wait for the disk
+_MOST_HELD = 10_000  # messages before the first /clock; more are written at time 0
 _MESSAGES = 'uav_task_alloc_msgs/msg/'
 # subscribed at once, as their first messages must not be missed; all others when discovered
 _FLEET_TOPICS = {
@@ -48,6 +49,8 @@ class BagRecorder:
         namespace: of the fleet.
         metadata: key -> value, stored with the recording.
         context: of rclpy; None: the default one.
+        clock: gives the time that messages get [ns], from another thread; 0: not known yet.
+            None: the time of their arrival.
 
     Raises:
         InvalidValue, OSError: the file cannot be created.
@@ -55,9 +58,11 @@ class BagRecorder:
 
     def __init__(self, path: Path, namespace: str = '/',
                  metadata: Mapping[str, str] | None = None,
-                 context: Context | None = None) -> None:
+                 context: Context | None = None,
+                 clock: Callable[[], int] | None = None) -> None:
         self.bag: Bag | None = Bag(path, metadata or {})
-        self.path = path
+        self.path, self.clock = path, clock
+        self.held: list[tuple[str, bytes]] = []  # received before there was a time
         self.node = Node('recorder', namespace=namespace, use_global_arguments=False,
                          context=context)
         self.prefix = namespace.rstrip('/') + '/'
@@ -86,6 +91,8 @@ class BagRecorder:
         self.stopping.set()
         if self.thread.is_alive():
             self.thread.join()
+        for topic, data in self.held:
+            self._write(lambda bag, t=topic, d=data: bag.add(t, d, 0, 0))  # type: ignore[misc]
         self._write(lambda bag: bag.close())
         self.node.destroy_node()
 
@@ -133,6 +140,8 @@ class BagRecorder:
         self._write(lambda bag: bag.open(topic, type_name, text))
 
         def on_message(data: bytes, info: Mapping[str, int]) -> None:
+            if self.clock is not None:
+                return self.add_simulated(topic, data, self.clock())
             now = time.time_ns()
             self._write(lambda bag: bag.add(topic, data, info['received_timestamp'] or now,
                                             info['source_timestamp'] or now))
@@ -140,6 +149,14 @@ class BagRecorder:
         self.node.create_subscription(
             msg_type, topic, on_message, QoSProfile(
                 depth=_DEPTH, reliability=qos.reliability, durability=qos.durability), raw=True)
+
+    def add_simulated(self, topic: str, data: bytes, now: int) -> None:
+        """Write a message received at simulated time `now` [ns]; while that is 0, hold it."""
+        self.held.append((topic, data))
+        if now or len(self.held) > _MOST_HELD:
+            held, self.held = self.held, []
+            for each in held:
+                self._write(lambda bag, each=each: bag.add(*each, now, now))  # type: ignore[misc]
 
     def _write(self, write: Callable[[Bag], None]) -> None:
         """Write to the file; the first error ends the recording."""

@@ -165,7 +165,8 @@ def record_file(context: Any) -> str:
     return path
 
 
-def rviz_action(context: Any, namespace: str = '') -> IncludeLaunchDescription:
+def rviz_action(context: Any, namespace: str = '',
+                simulated: bool = False) -> IncludeLaunchDescription:
     """launch/rviz.launch.py for a fleet; ValueError where RViz is not installed."""
     for package, executable in (('rviz2', 'rviz2'), ('tf2_ros', 'static_transform_publisher')):
         try:
@@ -175,7 +176,8 @@ def rviz_action(context: Any, namespace: str = '') -> IncludeLaunchDescription:
     return IncludeLaunchDescription(
         PythonLaunchDescriptionSource(PathJoinSubstitution(
             [FindPackageShare(_PACKAGE), 'launch', 'rviz.launch.py'])),
-        launch_arguments={'namespace': namespace}.items())
+        launch_arguments={'namespace': namespace,
+                          'use_sim_time': str(simulated).lower()}.items())
 
 
 def localhost_only() -> list[SetEnvironmentVariable]:

@@ -16,6 +16,7 @@ from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.model import Point, ThreatZone
 from uav_task_alloc.nodes.conversions.messages import LATCHED
 from uav_task_alloc.nodes.conversions.path_messages import path_message
+from uav_task_alloc.nodes.ros.clock_watch import steady_clock
 from uav_task_alloc.nodes.ros.topic_names import PATH, check_topic
 from uav_task_alloc.nodes.rviz.markers import MarkerScene, markers
 
@@ -51,7 +52,7 @@ class MarkerPublisher:
         self.published_zones: list[ThreatZone] = []
         self.published_positions: dict[str, Point] = {}  # [m] of UAVs
         self.published_at = self.pause_until = 0.0  # [s] steady clock
-        self.timer = node.create_timer(_PERIOD, self.on_timer)
+        self.timer = node.create_timer(_PERIOD, self.on_timer, clock=steady_clock())
 
     def close(self) -> None:
         """Destroy the timer and all publishers."""

@@ -1,0 +1,48 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Simulated time that is missing, stands still, jumps or goes back: one line each."""
+import pytest
+
+from uav_task_alloc.nodes.ros.clock_watch import ClockWatch, SteadyTime
+
+
+def lines(*readings):
+    """The lines of readings (ROS time, steady time) [s]."""
+    watch = ClockWatch()
+    return [text for text in (watch.update(*reading) for reading in readings) if text]
+
+
+@pytest.mark.parametrize('rate', [0.1, 1.0, 20.0, 100.0])
+def test_a_clock_that_runs_at_any_rate_is_not_mentioned(rate):
+    assert lines(*((1e9 + rate * 0.5 * k, 0.5 * k) for k in range(100))) == []
+
+
+def test_a_missing_clock_is_logged_once_and_its_start_is_no_jump():
+    readings = [(0.0, 0.5 * k) for k in range(40)] + [(1e9 + k, 20.0 + k) for k in range(5)]
+    first, second = lines(*readings)
+    assert first == 'use_sim_time is true, and nothing publishes /clock: waiting for it'
+    assert second == '/clock runs again after 20 s'
+
+
+def test_a_clock_that_stands_still_is_logged_once_and_again_when_it_runs():
+    readings = [(100.0 + k, k) for k in range(5)] + [(104.0, 4.0 + k) for k in range(1, 60)]
+    assert lines(*readings, (105.0, 64.0), (106.0, 65.0)) == [
+        '/clock has stood still at 104.0 s for 5 s: all times wait for it',
+        '/clock runs again after 60 s']
+
+
+def test_a_pause_between_two_ticks_is_not_mentioned():
+    assert lines((10.0, 0.0), (10.0, 4.5), (11.0, 4.9)) == []
+
+
+def test_a_clock_that_goes_back_or_jumps_is_logged():
+    assert lines((500.0, 0.0), (100.0, 0.5), (101.0, 1.0)) == [
+        '/clock went back by 400.0 s, to 100.0 s']
+    assert lines((500.0, 0.0), (4100.0, 0.5), (4101.0, 1.0)) == [
+        '/clock jumped forward by 3600.0 s, to 4100.0 s']
+
+
+def test_recorded_time_goes_on_where_the_clock_goes_back():
+    time = SteadyTime()
+    assert [time.at(ros) for ros in (10.0, 12.0, 5.0, 6.0, 5.5, 7.0)] == [
+        10.0, 12.0, 12.0, 13.0, 13.0, 14.5]
+    assert time.offset == 7.5
