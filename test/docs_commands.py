@@ -125,6 +125,8 @@ def _run(name, rest):
         if flag != '-p':
             continue
         key, _, value = word.partition(':=')
+        if key == 'use_sim_time' and value in ('true', 'false'):  # of ROS itself
+            continue
         if key not in known:
             return f'{name}: no parameter {key}'
         params.check(known[key], yaml.safe_load(value))

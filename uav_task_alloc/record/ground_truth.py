@@ -30,7 +30,7 @@ class TrueSample:
 class Reached:
     """A mission item was reached; `point` is the target stored on board."""
 
-    uav: str
+    uav: str  # id
     wall: float  # [unix s]
     point: Point  # [m]
 

@@ -48,7 +48,14 @@ INPUT_STATES = QoSProfile(depth=400, reliability=ReliabilityPolicy.BEST_EFFORT)
 
 
 def to_stamp(seconds: float) -> Time:
-    """A time [s] since the epoch of the node's clock as a message."""
+    """Return a ROS time as a message.
+
+    Args:
+        seconds: [s] since the epoch of the clock.
+
+    Returns:
+        To the nearest nanosecond.
+    """
     whole, nanoseconds = _parts(seconds)
     return Time(sec=whole, nanosec=nanoseconds)
 

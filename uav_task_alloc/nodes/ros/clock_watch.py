@@ -68,17 +68,35 @@ class SteadyTime:
 
 
 def is_simulated(node: Node) -> bool:
-    """Whether a node lives by /clock: its parameter use_sim_time."""
+    """Return whether a node lives by /clock.
+
+    Args:
+        node: whose parameter use_sim_time is read.
+
+    Returns:
+        Its present value.
+    """
     return bool(node.get_parameter('use_sim_time').value)
 
 
 def ros_time(node: Node) -> float:
-    """Time of a node's clock [s]; 0 while it waits for the first /clock."""
+    """Return the time of a node's clock.
+
+    Args:
+        node: whose clock is read.
+
+    Returns:
+        [s]; 0 while it waits for the first /clock.
+    """
     return float(node.get_clock().now().nanoseconds) * 1e-9
 
 
 def steady_clock() -> Clock:
-    """A clock for timers that run while simulated time stands still."""
+    """Return a clock for timers that run while simulated time stands still.
+
+    Returns:
+        The monotonic clock of this machine.
+    """
     from rclpy.clock import Clock, ClockType  # not above: tests import this without ROS
     return Clock(clock_type=ClockType.STEADY_TIME)
 
