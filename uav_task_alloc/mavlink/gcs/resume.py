@@ -250,15 +250,16 @@ class Resume:
     def keep_flown(self) -> None:
         """Keep the flown items of this mission before it is replaced."""
         self._flown += self._flown_here()
-        self._reached += self._reached_here()
+        self._reached += self._reached_of(self._flown_here())
 
     def flown_items(self, now: float) -> tuple[Item, ...]:
         """Flown items that were not reported; none after MAX_AGE."""
-        reached = len(self._reached) + len(self._reached_here())
+        here = self._flown_here()
+        reached = len(self._reached) + len(self._reached_of(here))
         if reached > self._known_reached:
             self._until = now + MAX_AGE
         self._known_reached = reached
-        return (*self._flown, *self._flown_here()) if now < self._until else ()
+        return (*self._flown, *here) if now < self._until else ()
 
     def flown_tasks(self, tasks: Iterable[Task], now: float) -> tuple[Task, ...]:
         """The given tasks that are among the flown items."""
@@ -273,15 +274,16 @@ class Resume:
 
     def _is_flown(self, task: Task, item: Item) -> bool:
         """Whether an item at a task's position was reached, or passed and not skipped."""
-        if any(item is reached for reached in (*self._reached, *self._reached_here())):
+        reached = (*self._reached, *self._reached_of(self._flown_here()))
+        if any(item is each for each in reached):
             return True
         return self.unflown.get(task.id) != task.position and (
             task.id in self.reported or not any(item is old for old in self._old))
 
-    def _reached_here(self) -> tuple[Item, ...]:
+    def _reached_of(self, flown: tuple[Item, ...]) -> tuple[Item, ...]:
         """Those of the flown items on board of which a REACHED was received."""
         items = self._progress.items
-        return tuple(item for item in self._flown_here() if any(
+        return tuple(item for item in flown if any(
             item is items[n] for n in self._progress.reached_seqs if n < len(items)))
 
     def _flown_here(self) -> tuple[Item, ...]:

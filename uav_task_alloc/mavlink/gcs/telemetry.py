@@ -63,14 +63,14 @@ class Telemetry:
         self.positions_at = -math.inf  # [s] of any GLOBAL_POSITION_INT, valid or not
         self.pace = 0.0  # [m/s] in time of reception: a simulator may run faster than real time
         self._paced: tuple[Point, float] = UNKNOWN, now
+        self._converted: tuple[Message, Point] | None = None  # the latest, and its position [m]
         self.height = math.nan  # [m] above home
         self.altitude = math.nan  # [m] AMSL
         self.battery = math.nan  # 0..1, of the battery with least remaining
         self.armed = False
         self.mode = ModeFunction.UNKNOWN
         self.landed = d.MAV_LANDED_STATE_UNDEFINED
-        self.status = 0  # MAV_STATE
-        self.autopilot = 0  # MAV_AUTOPILOT
+        self.status = self.autopilot = 0  # MAV_STATE, MAV_AUTOPILOT
         self.unhealthy = ''  # text on failing prearm checks; '': none reported
         self.current: int | None = None  # seq on the wire
         self.current_at = -math.inf  # [s]
@@ -245,9 +245,12 @@ class Telemetry:
 
     def enu_of(self, message: Message) -> tuple[Point, Point]:
         """Position [m] and velocity [m/s], both ENU, of a GLOBAL_POSITION_INT."""
-        position = to_enu(self._origin, message.lat * 1e-7, message.lon * 1e-7, message.alt * 1e-3)
+        if self._converted is None or self._converted[0] is not message:
+            self._converted = message, to_enu(
+                self._origin, message.lat * 1e-7, message.lon * 1e-7, message.alt * 1e-3)
         # north, east, down [cm/s]; local axes turn by less than 0.1 degrees in 5 km
-        return position, (message.vy * 0.01, message.vx * 0.01, -message.vz * 0.01)
+        velocity = (message.vy * 0.01, message.vx * 0.01, -message.vz * 0.01)
+        return self._converted[1], velocity
 
     def _is_valid(self, now: float) -> bool:
         """Valid by its estimator, else by a GPS fix; trusted after _REPORTED without either."""

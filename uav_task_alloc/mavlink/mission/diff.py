@@ -27,6 +27,32 @@ class MissionDiff:
     start: int  # seq
 
 
+class LatestDiff:
+    """Compares as `diff_missions`; called again with the same, it returns the same."""
+
+    def __init__(self) -> None:
+        self._latest: tuple[tuple[Item, ...], tuple[Item, ...], object, MissionDiff] | None = None
+
+    def of(self, held: tuple[Item, ...], current: int | None, wanted: tuple[Item, ...],
+           done: frozenset[str]) -> MissionDiff:
+        """See `diff_missions`.
+
+        Args:
+            held: items on board, without home.
+            current: index of the item being flown; None: none is.
+            wanted: items of the list, beginning with the leg to its first task.
+            done: ids of completed tasks.
+        """
+        latest, others = self._latest, (current, done)
+        # not by ==: items that compare equal may be for other tasks
+        if latest is not None and latest[0] is held and latest[1] is wanted and (
+                latest[2] == others):
+            return latest[3]
+        diff = diff_missions(held, current, wanted, done=done)
+        self._latest = held, wanted, others, diff
+        return diff
+
+
 def diff_missions(held: tuple[Item, ...], current: int | None, wanted: tuple[Item, ...], *,
                   done: Container[str] = (), append: bool = True) -> MissionDiff:
     """Compare the items on board with the wanted ones; O(n) for n items.

@@ -87,6 +87,9 @@ class FirstLeg:
     @property
     def passed(self) -> int:
         """Number of points of the first leg that the vehicle has passed."""
+        if not self._points:
+            self._passed = 0
+            return 0
         position, start = self.locate(), self._start()
         if position is not None and start is not None and self._target is not None:
             rest = _metres_left(position.point, start, self._target)

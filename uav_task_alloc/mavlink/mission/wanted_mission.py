@@ -59,6 +59,7 @@ class WantedMission:
         self.leg = FirstLeg(profile.rules.loiters, profile.farthest_first)
         self._leg_key: object = None  # the state for which the first leg was begun
         self._items: tuple[object, tuple[Item, ...]] | None = None  # cached, with their key
+        self._remaining: tuple[object, TaskList] | None = None  # cached, with its key
         self._listed: dict[str, int] = {}  # the last revision with a task that was not completed
         self._dropped: frozenset[str] = frozenset()  # completed tasks that a later list dropped
 
@@ -107,9 +108,13 @@ class WantedMission:
     def remaining(self) -> TaskList:
         """The list less completed and refused tasks, up to the horizon."""
         assert self.tasks is not None
-        tasks = self.tasks.without({
-            *self._progress.completed, *self._progress.pending, *self._refused})
-        return tasks if self.horizon.stops is None else tasks.first(self.horizon.stops)
+        ended = {*self._progress.completed, *self._progress.pending, *self._refused}
+        key = self.tasks, ended, self.horizon.stops
+        if self._remaining is None or self._remaining[0] != key:
+            tasks = self.tasks.without(ended)
+            self._remaining = key, (
+                tasks if self.horizon.stops is None else tasks.first(self.horizon.stops))
+        return self._remaining[1]
 
     def items(self) -> tuple[Item, ...]:
         """The items to fly from here; a task that cannot be an item is refused."""
