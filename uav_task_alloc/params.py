@@ -217,6 +217,10 @@ class BridgeParams(FrameParams):
     full_ranges: tuple[str, ...] = param(
         (), 'The same for single UAVs that differ from full_range, `uav_1:6000` each.',
         fixed=True)
+    uav_limits: tuple[str, ...] = param(
+        (), 'What else the bridge reports about single UAVs, as NAME=NUMBER: cruise_speed, '
+        'climb_speed, descent_speed [m/s], endurance [s] with a full battery, turnaround [s], '
+        'payload_capacity [kg]; `uav_1:endurance=900,turnaround=120` each.', fixed=True)
     state_rate: float = param(10.0, 'Maximum rate of the states of one UAV.', low=0.5, high=100.0,
                               unit='Hz')
     tlog: str = param('', 'File to record all frames into, as .tlog; empty: none.', fixed=True)
@@ -235,6 +239,21 @@ class FleetSimParams(CheckedParams):
     arming_delay: float = param(-1.0, 'Time from boot to a position estimate; negative: that of '
                                 'the real autopilots.', low=-1.0, high=3600.0, unit='s',
                                 fixed=True)
+    climb_rate: float = param(0.0, 'Of vehicles whose scenario states none; 0: that of the '
+                              'autopilots, 2.5 (ArduCopter) and 3 m/s (PX4).', low=0.0,
+                              high=100.0, unit='m/s', fixed=True)
+    descent_rate: float = param(0.0, 'The same downwards; 0: 1.5 m/s.', low=0.0, high=100.0,
+                                unit='m/s', fixed=True)
+    max_airspeed: float = param(0.0, 'Largest speed through the air, at the limit of the lean '
+                                'angle; 0: 1.3 times the cruise speed.', low=0.0, high=1000.0,
+                                unit='m/s', fixed=True)
+    wind_east: float = param(0.0, 'Wind towards east, added to that of the scenario.', low=-100.0,
+                             high=100.0, unit='m/s', fixed=True)
+    wind_north: float = param(0.0, 'The same towards north.', low=-100.0, high=100.0, unit='m/s',
+                              fixed=True)
+    gusts: float = param(0.0, 'Standard deviation of gusts in each direction; the larger of this '
+                         'and that of the scenario counts.', low=0.0, high=100.0, unit='m/s',
+                         fixed=True)
     clock: bool = param(True, 'Publish /clock: simulated time, by which nodes with use_sim_time '
                         'live.', fixed=True)
 

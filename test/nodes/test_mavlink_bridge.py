@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The bridge as a process, between ROS topics and simulated vehicles on UDP."""
 import json
+import math
 import signal
 import socket
 import threading
@@ -274,6 +275,29 @@ def test_a_bad_range_ends_the_bridge_with_a_reason(start, entry):
     bridge.popen.wait(20)
     assert bridge.stop() == (1, f"full_ranges = '{entry}': expected `UAV_ID:METRES` with metres "
                                 'in [0, 1e+07], a UAV once\n')
+
+
+def test_the_limits_of_single_uavs_are_in_their_states(sky, probe):
+    world = sky('-p', "uav_limits:=['uav_1:endurance=900,climb_speed=4,turnaround=60']", '-p',
+                'full_range:=9000.0')
+    probe.until(lambda: all(state.battery > 0.9 for state in world.states.values()))
+    one, two = world.states['uav_1'], world.states['uav_2']
+    assert one.endurance == pytest.approx(900.0 * one.battery, rel=1e-3)
+    assert (one.climb_speed, one.turnaround, one.full_range) == (4.0, 60.0, 9000.0)
+    assert all(map(math.isnan, (one.descent_speed, one.payload_capacity, one.cruise_speed,
+                                two.endurance, two.climb_speed, two.turnaround)))
+
+
+@pytest.mark.parametrize('entry', ['uav_1', ':turnaround=5', 'uav_1:turnaround', 'uav_1:range=5',
+                                   'uav_1:turnaround=0', 'uav_1:turnaround=nan',
+                                   'uav_1:turnaround=5,turnaround=6'])
+def test_a_bad_limit_ends_the_bridge_with_a_reason(start, entry):
+    bridge = start('mavlink_bridge', '-p', f"uav_limits:=['{entry}']", '-p',
+                   "connections:=['udpin:127.0.0.1:0']")
+    bridge.popen.wait(20)
+    status, text = bridge.stop()
+    assert status == 1
+    assert text.startswith(f"uav_limits = '{entry}': expected `UAV_ID:NAME=NUMBER,...`")
 
 
 def test_states_carry_what_the_allocator_plans_with(sky, probe):

@@ -132,7 +132,7 @@ def test_the_log_has_only_the_fields_that_apply_and_the_record_reads_it(tmp_path
     fleet._step(0.1)
     fleet.close()
     lines = [json.loads(line) for line in path.read_text().splitlines()]
-    base = {'t', 'wall', 'uav', 'x', 'y', 'z'}
+    base = {'t', 'wall', 'clock', 'uav', 'x', 'y', 'z'}
     report = {line['event']: {k: line[k] for k in line.keys() - base - {'event'}}
             for line in lines if 'event' in line}
     assert report == {

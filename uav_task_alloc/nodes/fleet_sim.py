@@ -2,6 +2,7 @@
 """Simulates the UAVs of a scenario as ArduPilot and PX4 vehicles with MAVLink connections."""
 from __future__ import annotations
 
+import math
 import socket
 
 from rclpy.node import Node
@@ -15,6 +16,10 @@ from uav_task_alloc.nodes.ros.run import run
 from uav_task_alloc.params import FleetSimParams
 from uav_task_alloc.sim.config import VehicleConfig
 from uav_task_alloc.sim.udp_fleet import UdpFleet, to_address
+from uav_task_alloc.sim.wind import Wind
+
+# [m/s] defaults of WPNAV_SPEED_UP, WPNAV_SPEED_DN; MPC_Z_V_AUTO_UP, MPC_Z_V_AUTO_DN
+_CLIMB_RATES, _DESCENT_RATE = {'ardupilot': 2.5, 'px4': 3.0}, 1.5
 
 
 class FleetSim(Node):
@@ -71,9 +76,19 @@ def known_address(target: str) -> tuple[str, int]:
 def vehicle_config(uav: scenario.ScenarioUav, played: scenario.Scenario,
                    params: FleetSimParams) -> VehicleConfig:
     """The simulated vehicle of a UAV of a scenario."""
+    def rate(own: float, given: float, usual: float) -> float:
+        return own if math.isfinite(own) else given or usual
+
+    wind = Wind(played.wind.east + params.wind_east, played.wind.north + params.wind_north,
+                max(played.wind.gusts, params.gusts), played.seed)
     return VehicleConfig(
         uav.id, uav.system_id, played.origin, uav.position, uav.home, uav.cruise_speed,
-        range=uav.range, arming_delay=params.arming_delay if params.arming_delay >= 0.0 else None)
+        climb_rate=rate(uav.climb_speed, params.climb_rate, _CLIMB_RATES[uav.autopilot]),
+        descent_rate=rate(uav.descent_speed, params.descent_rate, _DESCENT_RATE),
+        range=uav.most_range, endurance=uav.most_endurance, charge=uav.charge,
+        turnaround=uav.turnaround, max_airspeed=params.max_airspeed or None,
+        wind=None if wind == Wind(seed=played.seed) else wind,
+        arming_delay=params.arming_delay if params.arming_delay >= 0.0 else None)
 
 
 def main(args: list[str] | None = None) -> None:

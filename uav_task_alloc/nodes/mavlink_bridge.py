@@ -2,6 +2,7 @@
 """The MAVLink bridge as a node: flies task lists on vehicles, and publishes their states."""
 from __future__ import annotations
 
+import math
 import random
 import threading
 import time
@@ -29,7 +30,12 @@ from uav_task_alloc.nodes.conversions.message_limits import cut
 from uav_task_alloc.nodes.conversions.messages import EVENTS, LATCHED, STATES
 from uav_task_alloc.nodes.ros.bridge_diagnostics import BridgeDiagnostics
 from uav_task_alloc.nodes.ros.bridge_shutdown import BridgeShutdown, held_for_upload
-from uav_task_alloc.nodes.ros.clock_watch import ros_time, steady_clock, watch_clock
+from uav_task_alloc.nodes.ros.clock_watch import (
+    is_simulated,
+    ros_time,
+    steady_clock,
+    watch_clock,
+)
 from uav_task_alloc.nodes.ros.leveled_log import LeveledLog
 from uav_task_alloc.nodes.ros.origin_check import OriginCheck
 from uav_task_alloc.nodes.ros.parameters import declare
@@ -62,6 +68,7 @@ class MavlinkBridge(Node):
         self.config = bridge_parameters.to_gcs_config(params)
         self.capabilities = bridge_parameters.to_capabilities(params.capabilities)
         self.full_ranges = bridge_parameters.to_full_ranges(params.full_ranges)
+        self.limits = bridge_parameters.to_uav_limits(params.uav_limits)
         self.log = LeveledLog(self)
         self.zones: tuple[ThreatZone, ...] = ()
         self.closing, self.shutdown = False, BridgeShutdown()
@@ -150,7 +157,13 @@ class MavlinkBridge(Node):
         if self.published.is_due(status, measured_at, now, self.live.now.state_rate):
             self.states.publish(bridge_messages.from_uav_status(
                 status, self.capabilities.get(session.uav_id, ()),
-                self.stamp() - now + measured_at))
+                self.stamp() - self.rate(session) * (now - measured_at),
+                self.limits.get(session.uav_id), full_range))
+
+    def rate(self, session: VehicleSession) -> float:
+        """Seconds of the node's clock in one second of the steady clock, as a vehicle shows it."""
+        rate = session.executor.telemetry.clock_rate.value
+        return rate if is_simulated(self) and math.isfinite(rate) else 1.0
 
     # the node's thread
 

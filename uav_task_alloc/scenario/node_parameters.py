@@ -2,6 +2,7 @@
 """The parameters of each node that follow from a scenario, for the demo and launch files."""
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 from uav_task_alloc.errors import InvalidValue
@@ -40,6 +41,7 @@ def fleet_parameters(played: Scenario) -> dict[str, Parameters]:
                            'full_ranges': [f'{uav.id}:{_range(uav)}' for uav in played.uavs],
                            'system_ids': [uav.system_id for uav in played.uavs],
                            'uav_id_pattern': id_pattern(played),
+                           'uav_limits': [f'{uav.id}:{_limits(uav)}' for uav in played.uavs],
                            **({'capabilities': capable} if capable else {})}}
 
 
@@ -100,7 +102,16 @@ def _patterns(uav: ScenarioUav) -> set[str]:
 
 def _range(uav: ScenarioUav) -> float:
     """The range with a full battery [m], at most what the parameter allows."""
-    return min(uav.range, MAX_RANGE)
+    return min(uav.most_range, MAX_RANGE)
+
+
+def _limits(uav: ScenarioUav) -> str:
+    """The limits that are not the defaults of the scenario, as `NAME=NUMBER,...`."""
+    known = {'cruise_speed': uav.cruise_speed, 'climb_speed': uav.climb_speed,
+             'descent_speed': uav.descent_speed, 'endurance': uav.most_endurance,
+             'turnaround': uav.turnaround, 'payload_capacity': uav.payload_capacity}
+    return ','.join(f'{name}={value!r}' for name, value in known.items()
+                    if 0.0 < value < math.inf)
 
 
 def _capabilities(uav: ScenarioUav) -> str:

@@ -24,6 +24,7 @@ from uav_task_alloc.scenario.values import (
     Cancel,
     Scenario,
     ScenarioUav,
+    ScenarioWind,
     TimedTask,
     TimedZone,
 )
@@ -93,7 +94,8 @@ def parse(text: str, name: str = 'scenario') -> Scenario:
                     tuple(sorted(tasks, key=lambda timed: timed.at)), zones,
                     tuple(sorted(cancels, key=lambda cancel: cancel.at)), root['route_end'],
                     root['speedup'], root['clearance'], root['altitude_min'],
-                    root['altitude_max'], _objective(root['objective']), root['trips'])
+                    root['altitude_max'], _objective(root['objective']), root['trips'],
+                    ScenarioWind(**root['wind'].values) if root['wind'] else ScenarioWind())
 
 
 def _objective(given: str | YamlRow) -> str | Objective:

@@ -77,8 +77,10 @@ UAV: KeyTable = {
     'turnaround': Key(_LENGTH, '[s] of a visit of its home between two trips; .inf: it makes one '
                       'trip only', math.inf),
     'payload_capacity': Key(number_value(0.0, 1e6), '[kg] it can take on at its home', 0.0),
-    'climb_speed': Key(_SPEED, '[m/s] at most, upwards', math.inf),
-    'descent_speed': Key(_SPEED, '[m/s] at most, downwards', math.inf),
+    'climb_speed': Key(_SPEED, '[m/s] at most, upwards; in a flight .inf is what the '
+                       'autopilot climbs', math.inf),
+    'descent_speed': Key(_SPEED, '[m/s] at most, downwards; in a flight as climb_speed',
+                         math.inf),
     'available_from': Key(number_value(0.0, 1e9), '[s] when it may take off', 0.0),
     'available_until': Key(_LENGTH, '[s] by when its route ends', math.inf),
     'capabilities': Key(NAMES, 'its capabilities', ()),
@@ -103,6 +105,13 @@ TASK: KeyTable = {
     'latest': Key(number_value(-1e9, infinite=True), '[s] of the start of its service', math.inf),
     'release': Key(_TIME, '[s] no UAV sets out for it before', 0.0),
     'payload': Key(number_value(0.0, 1e6), '[kg] that a UAV takes on at its home for it', 0.0),
+}
+
+_WIND: KeyTable = {
+    'east': Key(number_value(-100.0, 100.0), '[m/s] of the air towards east', 0.0),
+    'north': Key(number_value(-100.0, 100.0), '[m/s] of the air towards north', 0.0),
+    'gusts': Key(number_value(0.0, 100.0), '[m/s] standard deviation of gusts in each direction, '
+                 'of `seed`', 0.0),
 }
 
 OBJECTIVE: KeyTable = {
@@ -172,6 +181,8 @@ SCENARIO: KeyTable = {
                         AllocatorParams.altitude_min),
     'altitude_max': Key(number_value(-1e5, 1e5), '[m] highest detour, above the origin',
                         AllocatorParams.altitude_max),
+    'wind': Key(mapping(_WIND, 'a mapping with east, north, gusts'),
+                'in which simulated UAVs fly; `plan` ignores it; default: calm', None),
     'speedup': Key(number_value(0.1, 100.0), 'factor on real time of demo and '
                    'demo.launch.py', DEFAULT_SPEEDUP),
     'uavs': Key(list_of(mapping(UAV, 'a UAV'), 'a list of UAVs'), 'the fleet'),
@@ -185,5 +196,5 @@ SCENARIO: KeyTable = {
                    'tasks that are withdrawn', ()),
 }
 
-TABLES = {'scenario': SCENARIO, 'origin': ORIGIN, 'objective': OBJECTIVE, 'uavs': UAV,
-          'tasks': TASK, 'zones': _ZONE, 'arrivals': _ARRIVALS, 'cancels': CANCEL}
+TABLES = {'scenario': SCENARIO, 'origin': ORIGIN, 'objective': OBJECTIVE, 'wind': _WIND,
+          'uavs': UAV, 'tasks': TASK, 'zones': _ZONE, 'arrivals': _ARRIVALS, 'cancels': CANCEL}

@@ -42,10 +42,30 @@ class ScenarioUav:
     available_until: float = math.inf  # [s]
 
     @property
+    def most_range(self) -> float:
+        """Range with a full battery [m]."""
+        return self.range if self.full_range is None else self.full_range
+
+    @property
+    def most_endurance(self) -> float:
+        """Time in the air with a full battery [s]."""
+        return self.endurance if self.full_endurance is None else self.full_endurance
+
+    @property
+    def charge(self) -> float:
+        """Share of the battery at the start."""
+        return min(1.0, _share(self.range, self.most_range),
+                   _share(self.endurance, self.most_endurance))
+
+    @property
     def uav(self) -> Uav:
         """The UAV at the start, for the solver."""
         return Uav(self.id, self.position, self.range, self.cruise_speed, self.capabilities,
                    self.home, **{name: getattr(self, name) for name in UAV_LIMITS})
+
+
+def _share(part: float, whole: float) -> float:
+    return 1.0 if part == whole or whole == 0.0 else part / whole
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,6 +98,15 @@ class Cancel:
 
 
 @dataclass(frozen=True, slots=True)
+class ScenarioWind:
+    """The wind in which simulated UAVs fly."""
+
+    east: float = 0.0  # [m/s] of the air
+    north: float = 0.0  # [m/s] of the air
+    gusts: float = 0.0  # [m/s] standard deviation of each component
+
+
+@dataclass(frozen=True, slots=True)
 class Scenario:
     """The content of a file, with the random arrivals drawn; times in scenario seconds."""
 
@@ -95,6 +124,7 @@ class Scenario:
     altitude_max: float = AllocatorParams.altitude_max  # [m] of detours
     objective: str | Objective = 'distance'  # a name of OBJECTIVES, or prices
     trips: int = 1  # of each UAV
+    wind: ScenarioWind = ScenarioWind()  # of a simulated flight
 
     @property
     def duration(self) -> float:
@@ -120,7 +150,7 @@ class Scenario:
                      for kind in (ScenarioUav, Task))
         used = [key for key in TASK_TIMES
                 if any(getattr(timed.task, key) != task[key] for timed in self.tasks)]
-        used += [key for key in UAV_LIMITS
+        used += [key for key in ('available_from', 'available_until')
                  if any(getattr(each, key) != uav[key] for each in self.uavs)]
         used += [key for key, plain in (('objective', 'distance'), ('trips', 1))
                  if getattr(self, key) != plain]

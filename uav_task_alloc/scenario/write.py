@@ -41,6 +41,7 @@ def to_yaml(scenario: Scenario) -> str:
         'objective': (scenario.objective if isinstance(scenario.objective, str)
                       else asdict(scenario.objective)),
         'trips': scenario.trips,
+        'wind': asdict(scenario.wind),
         'uavs': [_uav(uav) for uav in scenario.uavs],
         'tasks': [_task(timed) for timed in scenario.tasks],
         'zones': [_zone(timed) for timed in scenario.zones],

@@ -8,6 +8,7 @@ from enum import Enum
 
 from uav_task_alloc.geometry.frames import Origin
 from uav_task_alloc.model import Point
+from uav_task_alloc.sim.wind import Wind
 
 
 @dataclass(frozen=True, slots=True)
@@ -20,9 +21,15 @@ class VehicleConfig:
     position: Point  # [m] ENU on the ground, at the start
     home: Point | None = None  # [m] ENU; None: the position
     cruise_speed: float = 15.0  # [m/s]
-    climb_rate: float = 4.0  # [m/s] up and down
+    climb_rate: float = 4.0  # [m/s] upwards
+    descent_rate: float = 4.0  # [m/s] downwards
     acceleration: float = 3.0  # [m/s2]
-    range: float = math.inf  # [m] at cruise speed with a full battery
+    range: float = math.inf  # [m] through the air at cruise speed with a full battery
+    endurance: float = math.inf  # [s] in the air with a full battery
+    charge: float = 1.0  # of the battery at the start
+    turnaround: float = math.inf  # [s] of a battery change at home; infinite: none
+    wind: Wind | None = None  # None: calm
+    max_airspeed: float | None = None  # [m/s] at the largest lean; None: 1.3 times cruise_speed
     acceptance_radius: float | None = None  # [m] WPNAV_RADIUS, NAV_ACC_RAD
     arming_delay: float | None = None  # [s] from power-up to a position estimate
     boot_delay: float | None = None  # [s] from power-up to the end of the boot
@@ -64,7 +71,8 @@ class TruthEvent:
     """An event on board, for the ground-truth log.
 
     Names: armed, disarmed, takeoff, item_reached, mission_end, died, mode, command, crashed,
-    reboot, failsafe, failsafe_over, kill_switch, kill_switch_off, glitch. Causes: `station
+    reboot, failsafe, failsafe_over, kill_switch, kill_switch_off, glitch, power_off,
+    battery_changed. Causes: `station
     SYSTEM/COMPONENT`, pilot, failsafe, self; of a failsafe its kind.
     """
 

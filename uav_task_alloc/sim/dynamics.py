@@ -10,9 +10,11 @@ import numpy as np
 from uav_task_alloc.geometry.frames import Origin, to_geodetic_batch
 from uav_task_alloc.model import Point
 from uav_task_alloc.sim.config import VehicleConfig
+from uav_task_alloc.sim.wind import WindAtVehicle, held_velocity
 
 _CORNER = 1.0  # [m] largest overshoot of a turn
 _HOVER = 0.25  # share of cruise speed whose battery drain equals that of hovering
+_LEAN_RESERVE = 1.3  # airspeed at the largest lean angle, as a multiple of cruise speed
 _BRAKING = 0.7  # share of the acceleration used to plan braking
 
 
@@ -25,7 +27,11 @@ class PointMass:
         self.velocity: Point = (0.0, 0.0, 0.0)  # [m/s]
         self.heading = 0.0  # [rad] from east, counter-clockwise
         self.flown = 0.0  # [m]
-        self.battery = 1.0  # [0..1]
+        self.battery = config.charge  # [0..1]
+        self._wind = None if config.wind is None else WindAtVehicle(
+            config.wind, config.system_id)
+        self._max_airspeed = (_LEAN_RESERVE * config.cruise_speed
+                              if config.max_airspeed is None else config.max_airspeed)
         self._geodetic = _LinearGeodetic(config.origin)
 
     def step(self, dt: float, target: Point | None, speed: float, exit_speed: float) -> None:
@@ -42,6 +48,9 @@ class PointMass:
 
     def steer(self, dt: float, velocity: Point) -> None:
         """Change towards a velocity [m/s] within the acceleration, and fly for `dt` [s]."""
+        if self._wind is not None:
+            self._wind.step(dt)
+            velocity = held_velocity(velocity, self._wind.velocity, self._max_airspeed)
         change = _minus(velocity, self.velocity)
         most = self._config.acceleration * dt
         share = min(1.0, most / max(_norm(change), 1e-9))
@@ -49,10 +58,15 @@ class PointMass:
         if math.hypot(vx, vy) > 0.5:
             self.heading = math.atan2(vy, vx)
         self.position = _plus(self.position, self.velocity, dt)
-        moved = _norm(self.velocity)
-        self.flown += moved * dt
-        drain = max(moved, _HOVER * self._config.cruise_speed) * dt / self._config.range
-        self.battery = max(0.0, self.battery - drain)
+        self.flown += _norm(self.velocity) * dt
+        self._drain(dt)
+
+    def _drain(self, dt: float) -> None:
+        config, (vx, vy, vz) = self._config, self.velocity
+        wx, wy = (0.0, 0.0) if self._wind is None else self._wind.velocity
+        airspeed = _norm((vx - wx, vy - wy, vz))
+        drain = max(airspeed, _HOVER * config.cruise_speed) * dt / config.range
+        self.battery = max(0.0, self.battery - max(drain, dt / config.endurance))
 
     def fall(self, dt: float, speed: float) -> None:
         """Fall straight down for `dt` [s] at `speed` [m/s], motors off."""
@@ -73,8 +87,9 @@ class PointMass:
         along = sum(v * g for v, g in zip(self.velocity, gap, strict=True)) / distance
         limit = min(limit, max(0.0, along) + self._config.acceleration * dt)
         steep = abs(gap[2]) / distance
-        if limit * steep > self._config.climb_rate:
-            limit = self._config.climb_rate / steep
+        rate = self._config.climb_rate if gap[2] > 0.0 else self._config.descent_rate
+        if limit * steep > rate:
+            limit = rate / steep
         return gap[0] / distance * limit, gap[1] / distance * limit, gap[2] / distance * limit
 
     def land_at(self, height: float) -> None:

@@ -207,7 +207,7 @@ class _Log:
         x, y, z = vehicle.flight.body.position
         self._write({**_times(now, epoch), 'uav': uav,
                      'x': round(x, 3), 'y': round(y, 3), 'z': round(z, 3),
-                     'mode': vehicle.mode.value, 'alive': vehicle.alive})
+                     'mode': vehicle.mode.value, 'alive': not vehicle.silent})
 
     def events(self, uav: str, vehicle: Vehicle, epoch: float) -> None:
         """Write the events since the last call; `epoch`: of /clock [unix s]."""

@@ -10,6 +10,7 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 from uav_task_alloc.mavlink.transport.codec import Message, with_plan_id
 from uav_task_alloc.sim.ardupilot.flight import ArduPilotFlight
 from uav_task_alloc.sim.ardupilot.mission_server import ArduPilotMissionServer
+from uav_task_alloc.sim.battery_change import BatteryChange
 from uav_task_alloc.sim.commands import ArduPilotCommands, Commands, Px4Commands
 from uav_task_alloc.sim.config import FlightMode, TruthEvent, VehicleConfig
 from uav_task_alloc.sim.estimate import Estimate
@@ -85,6 +86,7 @@ class Vehicle(Interventions):
             makers = {**makers, _CURRENT: lambda: [self._mission_current()]}
         self._streams = Streams(makers, rates)
         self._commands = autopilot.commands(self.flight, self._streams)
+        self._battery_change = BatteryChange(self.flight)
         self._handlers: dict[str, Callable[[Message], list[Message]]] = {
             'COMMAND_LONG': self._command_long, 'COMMAND_INT': self._command_int,
             'SET_MODE': self._set_mode, 'MISSION_SET_CURRENT': self._set_current,
@@ -104,6 +106,11 @@ class Vehicle(Interventions):
         self._reported: tuple[int, int] = (self.flight.seq, 0)  # current item, item count
         self._report_current_at = now
 
+    @property
+    def silent(self) -> bool:
+        """Whether it sends and receives nothing: it is lost, or its battery is out."""
+        return not self.alive or self._battery_change.unpowered
+
     def kill(self) -> None:
         """Stop all messages and motion."""
         if self.alive:
@@ -113,6 +120,7 @@ class Vehicle(Interventions):
     def revive(self, now: float) -> None:
         """Boot on the ground below the position where it died."""
         self.alive = True
+        self._battery_change.cancel()
         self.flight.settle_on_ground()
         self.reboot(now)
 
@@ -128,7 +136,7 @@ class Vehicle(Interventions):
 
     def receive(self, message: Message, now: float) -> list[Message]:
         """Handle a message at vehicle time `now` [s]; returns the messages to send."""
-        if not self.alive:
+        if self.silent:
             return []
         self.flight.step(now)
         handler = self._handlers.get(message.get_type())
@@ -145,6 +153,9 @@ class Vehicle(Interventions):
         """Fly until vehicle time `now` [s]; returns the messages to send."""
         if not self.alive:
             return []
+        self._change_battery(now)
+        if self.silent:
+            return []
         self.flight.step(now)
         self.mission.step(now)
         out = self._drain()
@@ -152,6 +163,16 @@ class Vehicle(Interventions):
             self._report_current_at = now + 1.0
             out.append(self._mission_current())
         return out + self._streams.step(now)
+
+    def _change_battery(self, now: float) -> None:
+        power = self._battery_change.step(now)
+        if power == 'off':
+            self.flight.note('power_off')
+        elif power == 'on':
+            self.flight.body.battery = 1.0
+            self.flight.now = now
+            self.flight.note('battery_changed')
+            self.reboot(now)
 
     def _drain(self) -> list[Message]:
         flight = self.flight

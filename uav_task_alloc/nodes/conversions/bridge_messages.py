@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 
 from geometry_msgs.msg import Vector3
@@ -84,26 +84,35 @@ def to_zones(msg: m.ThreatZoneArray, previous: Iterable[ThreatZone],
     return tuple(zones.values()), next(iter(invalid.values()), '')
 
 
-def from_uav_status(status: UavStatus, capabilities: Iterable[str], stamp: float) -> m.UavState:
+def from_uav_status(status: UavStatus, capabilities: Iterable[str], stamp: float,
+                    limits: Mapping[str, float] | None = None,
+                    full_range: float = 0.0) -> m.UavState:
     """Return the state of one UAV as a message.
 
     Args:
         status: of the vehicle.
         capabilities: from the parameter of that name.
         stamp: [s] of the position.
+        limits: of this UAV from the parameter `uav_limits`; None: none.
+        full_range: [m] with a full battery; 0: unknown.
 
     Returns:
         For the topic `uav_states`; what the bridge does not know is NaN.
     """
+    known = {} if limits is None else dict(limits)
+    speed = known.pop('cruise_speed', math.nan)
+    if 'endurance' in known:
+        known['endurance'] *= status.battery  # NaN where that is unknown
     return m.UavState(
         header=header(stamp), uav_id=status.uav_id, position=to_point(status.position),
         velocity=Vector3(x=status.velocity[0], y=status.velocity[1], z=status.velocity[2]),
         home=to_point(status.home or _UNKNOWN_POINT), battery=status.battery,
-        range_remaining=status.range_remaining, cruise_speed=math.nan,
+        range_remaining=status.range_remaining, cruise_speed=speed,
         capabilities=list(capabilities), available=status.available, mode=status.mode.value,
         mission_state=status.mission_state.value, active_task_id=status.active_task,
         list_revision=status.list_revision, authority=status.authority.value,
-        reason=status.reason, **dict.fromkeys(REPORTED_LIMITS, math.nan))
+        reason=status.reason, **{**dict.fromkeys(REPORTED_LIMITS, math.nan),
+                                 'full_range': full_range or math.nan, **known})
 
 
 def from_progress(uav_id: str, progress: TaskProgress, stamp: float) -> m.TaskEvent:

@@ -13,6 +13,10 @@ from uav_task_alloc.mavlink.gcs.policy import Policy
 from uav_task_alloc.model import ThreatZone
 from uav_task_alloc.params import MAX_RANGE, BridgeParams
 
+UAV_LIMITS = frozenset({'cruise_speed', 'climb_speed', 'descent_speed', 'endurance', 'turnaround',
+                        'payload_capacity'})  # names in the parameter uav_limits
+_MOST = 1e6  # of any of them
+
 
 def to_policy(params: BridgeParams, zones: tuple[ThreatZone, ...] = (),
               grounded: str = '') -> Policy:
@@ -79,6 +83,36 @@ def to_capabilities(entries: Iterable[str]) -> dict[str, tuple[str, ...]]:
             raise InvalidValue('capabilities', entry, '`UAV_ID:WORD,WORD`')
         capabilities[uav_id] = tuple(word.strip() for word in words.split(',') if word.strip())
     return capabilities
+
+
+def to_uav_limits(entries: Iterable[str]) -> dict[str, dict[str, float]]:
+    """Return the limits of each UAV.
+
+    Args:
+        entries: like `uav_1:endurance=900,turnaround=120`.
+
+    Returns:
+        SI values by name of UAV_LIMITS, by UAV id.
+
+    Raises:
+        InvalidValue: an entry has another form, or a UAV has two.
+    """
+    limits: dict[str, dict[str, float]] = {}
+    for entry in entries:
+        uav_id, _, words = entry.partition(':')
+        pairs = [word.split('=') for word in words.split(',')]
+        try:
+            values = {name.strip(): float(number) for name, number in pairs}
+        except ValueError:
+            values = {}
+        if (not uav_id or uav_id in limits or len(values) != len(pairs)
+                or not values.keys() <= UAV_LIMITS
+                or not all(0.0 < value <= _MOST for value in values.values())):
+            raise InvalidValue('uav_limits', entry, '`UAV_ID:NAME=NUMBER,...`, a UAV and a name '
+                               f'once, numbers in (0, {_MOST:g}], names of '
+                               f'{", ".join(sorted(UAV_LIMITS))}')
+        limits[uav_id] = values
+    return limits
 
 
 def to_full_ranges(entries: Iterable[str]) -> dict[str, float]:
