@@ -13,8 +13,9 @@ from uav_task_alloc.mavlink.gcs.policy import Policy
 from uav_task_alloc.model import ThreatZone
 from uav_task_alloc.params import MAX_RANGE, BridgeParams
 
-UAV_LIMITS = frozenset({'cruise_speed', 'climb_speed', 'descent_speed', 'endurance', 'turnaround',
-                        'payload_capacity'})  # names in the parameter uav_limits
+# names in the parameter uav_limits
+_LIMIT_NAMES = frozenset({'cruise_speed', 'climb_speed', 'descent_speed', 'endurance',
+                          'turnaround', 'payload_capacity'})
 _MOST = 1e6  # of any of them
 
 
@@ -92,7 +93,7 @@ def to_uav_limits(entries: Iterable[str]) -> dict[str, dict[str, float]]:
         entries: like `uav_1:endurance=900,turnaround=120`.
 
     Returns:
-        SI values by name of UAV_LIMITS, by UAV id.
+        SI values by name, by UAV id.
 
     Raises:
         InvalidValue: an entry has another form, or a UAV has two.
@@ -106,11 +107,11 @@ def to_uav_limits(entries: Iterable[str]) -> dict[str, dict[str, float]]:
         except ValueError:
             values = {}
         if (not uav_id or uav_id in limits or len(values) != len(pairs)
-                or not values.keys() <= UAV_LIMITS
+                or not values.keys() <= _LIMIT_NAMES
                 or not all(0.0 < value <= _MOST for value in values.values())):
             raise InvalidValue('uav_limits', entry, '`UAV_ID:NAME=NUMBER,...`, a UAV and a name '
                                f'once, numbers in (0, {_MOST:g}], names of '
-                               f'{", ".join(sorted(UAV_LIMITS))}')
+                               f'{", ".join(sorted(_LIMIT_NAMES))}')
         limits[uav_id] = values
     return limits
 
