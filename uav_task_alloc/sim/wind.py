@@ -15,7 +15,7 @@ import math
 import random
 from dataclasses import dataclass
 
-from uav_task_alloc.checks import check_number
+from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.model import Point
 
 GUST_TIME = 10.0  # [s] after which a gust is forgotten
@@ -32,9 +32,11 @@ class Wind:
     seed: int = 0  # of the gusts
 
     def __post_init__(self) -> None:
-        for name in ('east', 'north'):
-            check_number(f'wind: {name}', getattr(self, name), -MAX_WIND, MAX_WIND)
-        check_number('wind: gusts', self.gusts, 0.0, MAX_WIND)
+        for name, low in (('east', -MAX_WIND), ('north', -MAX_WIND), ('gusts', 0.0)):
+            value = getattr(self, name)
+            if not low <= value <= MAX_WIND:
+                raise InvalidValue(f'wind: {name}', value,
+                                   f'a number in [{low:g}, {MAX_WIND:g}] m/s')
 
 
 class WindAtVehicle:
