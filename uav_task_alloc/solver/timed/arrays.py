@@ -60,6 +60,8 @@ class TimedArrays(NamedTuple):
     members: Ints  # UAVs by class
     first_member: Ints  # (classes + 1)
     class_of: Ints  # (m)
+    least_pace: float  # [s] of a way for each metre between its ends, at least
+    least_cut: float  # [s] by which cut lengths shorten a way over two legs, at most
 
 
 class TimedRoutes(NamedTuple):
@@ -72,3 +74,4 @@ class TimedRoutes(NamedTuple):
     sums: Floats  # (9) columns from WARP, without END and TASKS
     counts: Ints  # (2)
     empty: Ints  # (classes) number of empty routes
+    idle: Ints  # (classes) index in TimedArrays.members of one that was empty lately

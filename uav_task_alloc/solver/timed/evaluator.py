@@ -153,9 +153,10 @@ def evaluate_routes(uavs: Sequence[Uav], tasks: Sequence[Task], rules: Rules,
     trips = [each for uav in uavs for each in _trips(
         uav, [[known[name] for name in row if name in known] for row in routes.get(uav.id, ())],
         rules, leg, held)]
+    holders = _holders(uavs, tasks, held)
     for trip in trips:
         violations += _trip_violations(trip, rules, held)
-        violations += _foreign_loads(trip, uavs, held)
+        violations += _foreign_loads(trip, holders)
     for uav in uavs:
         violations += _route_violations(uav, [t for t in trips if t.uav is uav], rules, held)
     return _evaluation(tasks, rules, trips, violations)
@@ -276,11 +277,22 @@ def _load_violations(trip: _Trip, place: str, held: Held) -> Iterator[str]:
             yield f'{trip.uav.id} is in the air without the payload of {task.id}'
 
 
-def _foreign_loads(trip: _Trip, uavs: Sequence[Uav], held: Held) -> Iterator[str]:
+def _holders(uavs: Sequence[Uav], tasks: Sequence[Task], held: Held) -> dict[str, list[Uav]]:
+    """By id of each task whose payload is on board: the UAVs that have it."""
+    known, found = {task.id: task for task in tasks}, dict[str, list[Uav]]()
+    for uav in (uav for uav in uavs if not uav.at_base):
+        names = {*held.locked.get(uav.id, ()), *held.aboard.get(uav.id, uav.aboard or ())}
+        for name in names & known.keys():
+            if held.has_aboard(uav, known[name]):
+                found.setdefault(name, []).append(uav)
+    return found
+
+
+def _foreign_loads(trip: _Trip, holders: Mapping[str, Sequence[Uav]]) -> Iterator[str]:
     """Tasks whose payload is on board of another UAV, or was when this one left its base."""
-    for task in (stop.task for stop in trip.stops if stop.task.payload > 0.0):
-        for uav in uavs:
-            if held.has_aboard(uav, task) and (uav is not trip.uav or trip.number > 0):
+    for task in (stop.task for stop in trip.stops):
+        for uav in holders.get(task.id, ()):
+            if uav is not trip.uav or trip.number > 0:
                 yield (f'{trip.uav.id}, trip {trip.number + 1} serves {task.id}, whose payload is '
                        f'on board of {uav.id}')
 

@@ -10,7 +10,7 @@ from uav_task_alloc.solver.rng import RngState, uniform
 from uav_task_alloc.solver.routes import SIGNED
 from uav_task_alloc.solver.timed import columns as at
 from uav_task_alloc.solver.timed.arrays import LINK, TimedArrays, TimedRoutes
-from uav_task_alloc.solver.timed.places import place_cost
+from uav_task_alloc.solver.timed.places import excess_price, place_cost
 from uav_task_alloc.solver.timed.segments import is_task, join, leg_of, update
 from uav_task_alloc.solver.timed.visits import (
     BASE_BEFORE,
@@ -37,13 +37,27 @@ def try_place(a: TimedArrays, r: TimedRoutes, t: int, c: int, place: int, kind: 
 
 @inline_kernel
 def idle_uav(a: TimedArrays, r: TimedRoutes, k: int) -> int:
-    """A UAV of fleet class k without tasks; -1: none. O(members), O(1) if there is none."""
+    """A UAV of fleet class k without tasks; -1: none. O(members), O(1) mostly."""
     if r.empty[k] == 0:
         return -1
-    for m in range(a.first_member[k], a.first_member[k + 1]):
+    first, then = a.first_member[k], a.first_member[k + 1]
+    m = r.idle[k]
+    for _ in range(then - first):
         if r.route[a.members[m], at.TASKS] == 0.0:
+            r.idle[k] = m
             return int(a.members[m])
+        m = m + 1 if m + 1 < then else first
     return -1
+
+
+@inline_kernel
+def _price_of_load(a: TimedArrays, r: TimedRoutes, u: int, t: int) -> float:
+    """What the load of t costs at least in UAV u's route. O(1)."""
+    load, most = a.fixed[t, at.LOAD], a.limit[u, at.CARRIED]
+    if a.visits > 0 or load == 0.0:
+        return 0.0
+    return excess_price(a.price[at.LOAD_EXCESS],
+                        min(load, r.trip[u, at.CARRIED] + load - most))
 
 
 @inline_kernel
@@ -54,19 +68,34 @@ def near_place(a: TimedArrays, r: TimedRoutes, t: int, opens: bool, blinks: floa
     opens: empty routes are tried, too. Each place is skipped with probability `blinks`.
     """
     i, place, kind, least = t - a.uavs, -1, NO_VISIT, math.inf
-    sides = 2 * a.near_count[i]
-    for m in range(sides + (a.near_class.shape[1] if opens else 0)):
+    sides, pace = 2 * a.near_count[i], a.least_pace
+    closes = a.fixed[t, at.CLOSES] + a.least_cut
+    ends = max(a.fixed[t, at.OPENS], a.fixed[t, at.RELEASE]) + a.fixed[t, at.SERVICE] - a.least_cut
+    last, m = sides + (a.near_class.shape[1] if opens else 0), -1
+    while m + 1 < last:
+        m += 1
         if m < sides:
-            c = a.near[i, m >> 1]
-            if r.link[c, at.OF_UAV] == a.uavs:
+            c, apart = a.near[i, m >> 1], a.near_length[i, m >> 1]
+            u = r.link[c, at.OF_UAV]
+            if u == a.uavs:
+                m |= 1
                 continue
-            bound = 2.0 * a.near_length[i, m >> 1]
             if m & 1 == 0:
+                if _price_of_load(a, r, u, t) >= least:
+                    m |= 1
+                    continue
+                late = r.row[c, at.DEPARTURE] + apart * pace - closes
+                if excess_price(a.price[at.WARP], late) >= least:
+                    continue
                 open_end = r.link[c, at.NEXT] >= a.ends
             else:
+                late = ends + apart * pace - r.row[c, at.LATEST]
+                if excess_price(a.price[at.WARP], late) >= least:
+                    continue
                 c = r.link[c, at.PREV]
                 open_end = not is_task(a, c)
-            if not open_end and a.weight[at.BY_DISTANCE] * (bound - r.row[c, at.LEG]) >= least:
+            if not open_end and a.weight[at.BY_DISTANCE] * (
+                    2.0 * apart - r.row[c, at.LEG]) >= least:
                 continue
         else:
             k = a.near_class[i, m - sides]

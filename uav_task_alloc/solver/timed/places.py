@@ -11,6 +11,12 @@ from uav_task_alloc.solver.timed.segments import after_leg, leg_of, slot_of
 
 
 @inline_kernel
+def excess_price(price: float, amount: float) -> float:
+    """Price of an amount of new excess, which may be negative: none. O(1)."""
+    return price * amount if amount > TOLERANCE else 0.0
+
+
+@inline_kernel
 def cost_of_excess(price: float, before: float, after: float) -> float:
     """Cost of changing an amount of excess; inf if it is more and not allowed. O(1)."""
     before, after = max(0.0, before), max(0.0, after)

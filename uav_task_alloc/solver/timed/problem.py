@@ -74,7 +74,8 @@ def make_timed(problem: Problem, aboard: Mapping[str, frozenset[str]],
         np.empty((n, min(WINDOW_NEIGHBOURS, max(0, n - 1))), LINK),
         np.empty((n, min(WINDOW_NEIGHBOURS, max(0, n - 1)))), np.zeros(n, np.int64),
         np.full((n, min(NEAR_CLASSES, classes)), -1, np.int64), order.astype(np.int64),
-        np.searchsorted(class_of[order], np.arange(classes + 1)).astype(np.int64), class_of)
+        np.searchsorted(class_of[order], np.arange(classes + 1)).astype(np.int64), class_of,
+        *_least_pace(problem))
     arrays.restricted[:] = ~arrays.compatible.all(axis=(0, 1)) if m else False
     scale = _fill(problem, arrays, known)
     _set_prices(problem, arrays, scale)
@@ -102,6 +103,17 @@ def _is_whole(problem: Problem, visits: int) -> bool:
     """Whether durations, trips or departures matter, so that routes are computed as a whole."""
     return (visits > 0 or any(uav.endurance < math.inf for uav in problem.uavs)
             or any(task.payload > 0.0 and task.release > 0.0 for task in problem.tasks))
+
+
+def _least_pace(problem: Problem) -> tuple[float, float]:
+    """TimedArrays.least_pace and least_cut."""
+    rows = _paces(problem.uavs)
+    flat, steep = rows[:, 0], rows[:, 1:].min(axis=1, initial=math.inf)
+    if not _is_flat(problem):  # the way climbs as steeply as is fastest
+        flat = flat * steep / np.hypot(flat, steep)
+    grain = problem.rules.grain
+    return (float(flat.min(initial=math.inf)),
+            2.0 * float(rows[:, 0].max(initial=0.0)) / grain if grain else 0.0)
 
 
 def _points(m: int, n: int, visits: int) -> Ints:
@@ -234,14 +246,14 @@ def _compatible_trips(problem: Problem, aboard: Mapping[str, frozenset[str]]) ->
     if not loaded:
         return both
     holder = {name: uav_id for uav_id, names in aboard.items() for name in names}
-    for u, uav in enumerate(problem.uavs):
-        for i in loaded:
-            name = problem.tasks[i].id
-            mine = holder.get(name) == uav.id
-            if (not uav.at_base and not mine) or (name in holder and not mine):
-                both[0, u, i] = False
-            if name in holder:
-                both[1, u, i] = False
+    flying = np.array([not uav.at_base for uav in problem.uavs])
+    both[0][np.ix_(flying, np.array(loaded))] = False
+    index = {uav.id: u for u, uav in enumerate(problem.uavs)}
+    for i in loaded:
+        uav_id = holder.get(problem.tasks[i].id)
+        if uav_id is not None:
+            both[:, :, i] = False
+            both[0, index[uav_id], i] = able[index[uav_id], i]
     return both
 
 
@@ -315,6 +327,6 @@ def empty_timed_routes(a: TimedArrays) -> TimedRoutes:
         np.zeros((nodes, 4), LINK), np.zeros((nodes, at.ROW_COLUMNS)),
         np.zeros((len(a.limit), at.TRIP_COLUMNS)),
         np.zeros((a.uavs, at.ROUTE_COLUMNS)), np.zeros(at.SUM_COLUMNS), np.zeros(2, np.int64),
-        np.zeros(max(1, a.first_member.size - 1), np.int64))
+        np.zeros(max(1, a.first_member.size - 1), np.int64), a.first_member.copy())
     reset(a, routes)
     return routes

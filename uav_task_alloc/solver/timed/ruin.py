@@ -92,8 +92,11 @@ def save_route(a: TimedArrays, r: TimedRoutes, w: Round, u: int) -> None:
         w.node[k] = i
         for c in range(4):
             w.link[k, c] = r.link[i, c]
-        for c in range(at.ROW_COLUMNS):
+        for c in range(at.RATE):
             w.row[k, c] = r.row[i, c]
+        if a.whole or a.timed_cost:
+            for c in range(at.RATE, at.ROW_COLUMNS):
+                w.row[k, c] = r.row[i, c]
         if not is_task(a, i) and i != end:
             slot = slot_of(a, i)
             for c in range(at.TRIP_COLUMNS):
@@ -122,8 +125,11 @@ def take_back(a: TimedArrays, r: TimedRoutes, w: Round) -> None:
         i = w.node[k]
         for c in range(4):
             r.link[i, c] = w.link[k, c]
-        for c in range(at.ROW_COLUMNS):
+        for c in range(at.RATE):
             r.row[i, c] = w.row[k, c]
+        if a.whole or a.timed_cost:
+            for c in range(at.RATE, at.ROW_COLUMNS):
+                r.row[i, c] = w.row[k, c]
         if i < a.uavs or i >= a.bases:
             slot = slot_of(a, i)
             for c in range(at.TRIP_COLUMNS):
