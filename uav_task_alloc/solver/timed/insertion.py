@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 from uav_task_alloc.geometry.outline import Ints
 from uav_task_alloc.kernel import inline_kernel, kernel
@@ -61,6 +62,33 @@ def _price_of_load(a: TimedArrays, r: TimedRoutes, u: int, t: int) -> float:
 
 
 @inline_kernel
+def _place_beside(a: TimedArrays, r: TimedRoutes, t: int, side: int, least: float) -> Any:
+    """The node before the place at that side of neighbours; -1: not cheaper than `least`. O(1).
+
+    side: twice the index of the neighbour; one more: before it, not after it.
+    """
+    i = t - a.uavs
+    c, apart = a.near[i, side >> 1], a.near_length[i, side >> 1]
+    u, pace = r.link[c, at.OF_UAV], a.least_pace
+    if u == a.uavs:
+        return -1
+    if side & 1 == 0:
+        before, open_end = c, r.link[c, at.NEXT] >= a.ends
+        leg = r.row[c, at.LEG]
+        late = r.row[c, at.DEPARTURE] + apart * pace - a.fixed[t, at.CLOSES] - a.least_cut
+    else:
+        before = r.link[c, at.PREV]
+        leg, open_end = r.row[c, at.LEG_TO], not is_task(a, before)
+        opened = max(a.fixed[t, at.OPENS], a.fixed[t, at.RELEASE]) + a.fixed[t, at.SERVICE]
+        late = opened + apart * pace - r.row[c, at.LATEST] - a.least_cut
+    if not open_end and a.weight[at.BY_DISTANCE] * (2.0 * apart - leg) >= least:
+        return -1
+    if excess_price(a.price[at.WARP], late) >= least or _price_of_load(a, r, u, t) >= least:
+        return -1
+    return SIGNED(before)
+
+
+@inline_kernel
 def near_place(a: TimedArrays, r: TimedRoutes, t: int, opens: bool, blinks: float,
                     rng: RngState) -> tuple[int, int, float]:
     """The cheapest place beside neighbours and in empty routes: (node before, kind, cost). O(k).
@@ -68,44 +96,16 @@ def near_place(a: TimedArrays, r: TimedRoutes, t: int, opens: bool, blinks: floa
     opens: empty routes are tried, too. Each place is skipped with probability `blinks`.
     """
     i, place, kind, least = t - a.uavs, -1, NO_VISIT, math.inf
-    sides, pace = 2 * a.near_count[i], a.least_pace
-    closes = a.fixed[t, at.CLOSES] + a.least_cut
-    ends = max(a.fixed[t, at.OPENS], a.fixed[t, at.RELEASE]) + a.fixed[t, at.SERVICE] - a.least_cut
-    last, m = sides + (a.near_class.shape[1] if opens else 0), -1
-    while m + 1 < last:
-        m += 1
+    sides = 2 * a.near_count[i]
+    for m in range(sides + (a.near_class.shape[1] if opens else 0)):
         if m < sides:
-            c, apart = a.near[i, m >> 1], a.near_length[i, m >> 1]
-            u = r.link[c, at.OF_UAV]
-            if u == a.uavs:
-                m |= 1
-                continue
-            if m & 1 == 0:
-                if _price_of_load(a, r, u, t) >= least:
-                    m |= 1
-                    continue
-                late = r.row[c, at.DEPARTURE] + apart * pace - closes
-                if excess_price(a.price[at.WARP], late) >= least:
-                    continue
-                open_end = r.link[c, at.NEXT] >= a.ends
-            else:
-                late = ends + apart * pace - r.row[c, at.LATEST]
-                if excess_price(a.price[at.WARP], late) >= least:
-                    continue
-                c = r.link[c, at.PREV]
-                open_end = not is_task(a, c)
-            if not open_end and a.weight[at.BY_DISTANCE] * (
-                    2.0 * apart - r.row[c, at.LEG]) >= least:
-                continue
+            before = _place_beside(a, r, t, m, least)
         else:
             k = a.near_class[i, m - sides]
-            u = idle_uav(a, r, k) if k >= 0 else -1
-            if u < 0:
-                continue
-            c = LINK(u)
-        if blinks > 0.0 and uniform(rng) < blinks:
+            before = idle_uav(a, r, k) if k >= 0 else -1
+        if before < 0 or (blinks > 0.0 and uniform(rng) < blinks):
             continue
-        place, kind, least = try_place(a, r, t, c, place, kind, least)
+        place, kind, least = try_place(a, r, t, LINK(before), place, kind, least)
     return place, kind, least
 
 
@@ -167,6 +167,7 @@ def unlink(a: TimedArrays, r: TimedRoutes, t: int) -> None:
     added = metres - r.row[before, at.LEG] - r.row[t, at.LEG]
     r.link[before, at.NEXT], r.link[then, at.PREV] = then, before
     r.row[before, at.LEG], r.row[before, at.TIME] = metres, seconds
+    r.row[then, at.LEG_TO] = metres
     r.route[u, at.METRES] += added
     r.sums[at.METRES] += added
     r.link[t, at.OF_UAV] = LINK(a.uavs)

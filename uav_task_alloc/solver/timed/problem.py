@@ -16,7 +16,7 @@ from uav_task_alloc.model import Uav
 from uav_task_alloc.solver.answer import leg_between
 from uav_task_alloc.solver.problem import Problem, excess_cost
 from uav_task_alloc.solver.timed import columns as at
-from uav_task_alloc.solver.timed.arrays import LINK, TimedArrays, TimedRoutes
+from uav_task_alloc.solver.timed.arrays import LINK, TimedArrays, TimedRoutes, aligned_zeros
 from uav_task_alloc.solver.timed.near import fill_near, fill_near_classes, known_near
 from uav_task_alloc.solver.timed.order import reset
 from uav_task_alloc.solver.timed.path_times import Speeds, path_times
@@ -146,7 +146,7 @@ def _fixed(problem: Problem, visits: int, aboard: Mapping[str, frozenset[str]]) 
     uavs, tasks = problem.uavs, problem.tasks
     m, n, goal = len(uavs), len(tasks), problem.rules.objective
     points = _points(m, n, visits)
-    fixed = np.zeros((len(points), at.FIXED_COLUMNS))
+    fixed = aligned_zeros(len(points), at.FIXED_COLUMNS)
     fixed[:, at.X:at.Z + 1] = problem.distances.points[points]
     fixed[:, [at.OPENS, at.RELEASE, at.TRIP_RELEASE]] = -math.inf
     fixed[:, [at.CLOSES, at.DUE]] = math.inf
@@ -324,7 +324,7 @@ def empty_timed_routes(a: TimedArrays) -> TimedRoutes:
     """New routes without tasks."""
     nodes = len(a.fixed)
     routes = TimedRoutes(
-        np.zeros((nodes, 4), LINK), np.zeros((nodes, at.ROW_COLUMNS)),
+        np.zeros((nodes, 4), LINK), aligned_zeros(nodes, at.ROW_COLUMNS),
         np.zeros((len(a.limit), at.TRIP_COLUMNS)),
         np.zeros((a.uavs, at.ROUTE_COLUMNS)), np.zeros(at.SUM_COLUMNS), np.zeros(2, np.int64),
         np.zeros(max(1, a.first_member.size - 1), np.int64), a.first_member.copy())

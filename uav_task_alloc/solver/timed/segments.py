@@ -337,6 +337,7 @@ def join(a: TimedArrays, r: TimedRoutes, u: int, i: int, j: int) -> None:
     """Make node j follow node i in UAV u's route. O(1)."""
     r.link[i, at.NEXT], r.link[j, at.PREV] = j, i
     r.row[i, at.LEG], r.row[i, at.TIME] = leg_of(a, u, i, j)
+    r.row[j, at.LEG_TO] = r.row[i, at.LEG]
 
 
 @inline_kernel
