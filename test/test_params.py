@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Each parameter is declared once: generated files are up to date, values are checked."""
+import math
 from dataclasses import fields
 from pathlib import Path
 
@@ -8,6 +9,7 @@ import yaml
 
 from uav_task_alloc import params
 from uav_task_alloc.errors import InvalidValue
+from uav_task_alloc.objective import MAX_TRIPS, OBJECTIVES
 
 ROOT = Path(__file__).parent.parent
 
@@ -57,3 +59,18 @@ def test_a_bad_value_is_refused_with_its_range(given, text):
 
 def test_an_integer_is_accepted_as_a_float():
     assert params.AllocatorParams(uav_timeout=3).uav_timeout == 3.0
+
+
+def test_the_objectives_of_the_allocator_are_those_of_the_solver():
+    choices = {spec.name: spec.metadata['choices'] for spec in fields(params.AllocatorParams)}
+    assert choices['objective'] == tuple(OBJECTIVES)
+    highest = {spec.name: spec.metadata['high'] for spec in fields(params.AllocatorParams)}
+    assert highest['trips'] == MAX_TRIPS
+
+
+@pytest.mark.parametrize('weights', [(1.0,), (1.0, 0.0, 0.0, 0.0, -1.0),
+                                     (math.nan, 0.0, 0.0, 0.0, 0.0)])
+def test_the_weights_of_an_objective_are_five_prices_or_none(weights):
+    with pytest.raises(InvalidValue, match='objective_weights = .*: expected five numbers'):
+        params.AllocatorParams(objective_weights=weights)
+    params.AllocatorParams(objective_weights=(1, 0.5, 0, math.inf, math.inf))

@@ -69,9 +69,9 @@ def expectation(spec: Field[Any]) -> str:
             'tuple': f'list of {_item_type(spec).__name__.replace("str", "text")}'}[kind]
 
 
-def _item_type(spec: Field[Any]) -> type[int | str]:
+def _item_type(spec: Field[Any]) -> type[int | float | str]:
     """Of a list."""
-    return int if spec.type == 'tuple[int, ...]' else str
+    return {'tuple[int, ...]': int, 'tuple[float, ...]': float}.get(str(spec.type), str)
 
 
 def check(spec: Field[Any], value: Any) -> Any:
@@ -91,7 +91,8 @@ def check(spec: Field[Any], value: Any) -> Any:
     if kind is float and isinstance(value, int) and not isinstance(value, bool):
         value = float(value)
     if kind is tuple and isinstance(value, Iterable) and not isinstance(value, str):
-        value = tuple(value)
+        value = tuple(float(item) if _item_type(spec) is float and type(item) is int else item
+                      for item in value)
     wrong = (type(value) is not kind
              or (meta['choices'] and value not in meta['choices'])
              or (kind is float and value != value)
@@ -140,6 +141,17 @@ class AllocatorParams(FrameParams):
                                  high=MAX_RANGE, unit='m')
     default_cruise_speed: float = param(15.0, 'Speed of a UAV that does not report its own.',
                                         low=0.1, high=1000.0, unit='m/s')
+    default_climb_speed: float = param(2.5, 'Climb speed of a UAV that does not report its own.',
+                                       low=0.1, high=1000.0, unit='m/s')
+    default_descent_speed: float = param(1.5, 'Descent speed of a UAV that does not report its '
+                                         'own.', low=0.1, high=1000.0, unit='m/s')
+    objective: str = param('distance', 'What a plan minimises, see docs/times.md.',
+                           choices=('distance', 'finish', 'response', 'balanced'))
+    objective_weights: tuple[float, ...] = param(
+        (), 'Prices of distance, finish, response, lateness and tasks left out that replace '
+        'those of the objective; .inf: never. Empty: by its name.')
+    trips: int = param(1, 'Trips of a UAV that a plan counts on, with battery changes at its '
+                       'home between them; 1: none.', low=1, high=64)
     clearance: float = param(10.0, 'Distance kept from zones beyond their margins.', low=0.0,
                              high=10000.0, unit='m')
     altitude_min: float = param(0.0, 'Lowest detour, above the origin.', low=-1e5, high=1e5,
@@ -172,6 +184,11 @@ class AllocatorParams(FrameParams):
 
     def __post_init__(self) -> None:
         FrameParams.__post_init__(self)
+        if len(self.objective_weights) not in (0, 5) or any(
+                not price >= 0.0 for price in self.objective_weights):
+            raise InvalidValue('objective_weights', list(self.objective_weights),
+                               'five numbers >= 0 (distance, finish, response, lateness, '
+                               'unserved), or none')
         if self.altitude_min >= self.altitude_max:
             raise InvalidValue('altitude_min', self.altitude_min,
                                f'less than altitude_max = {self.altitude_max:g}')

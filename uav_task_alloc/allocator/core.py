@@ -16,6 +16,7 @@ from uav_task_alloc.allocator.records import (
     ReplanProblem,
     SavedState,
 )
+from uav_task_alloc.allocator.replanning.held_deadlines import held_lists
 from uav_task_alloc.allocator.replanning.learned_state import learned_state
 from uav_task_alloc.allocator.replanning.list_rate_limiter import ListRateLimiter
 from uav_task_alloc.allocator.replanning.plan_acceptance import accepted_plan
@@ -24,8 +25,10 @@ from uav_task_alloc.allocator.replanning.planning import (
     plan_in_force,
     replan_problem,
 )
+from uav_task_alloc.allocator.replanning.predictions import Predictions
 from uav_task_alloc.allocator.replanning.schedule import Schedule
 from uav_task_alloc.allocator.replanning.task_reasons import task_steps
+from uav_task_alloc.allocator.replanning.trips import waiting_uavs
 from uav_task_alloc.allocator.state.safe_paths import SafePaths
 from uav_task_alloc.allocator.state.world import World
 from uav_task_alloc.allocator.status import allocation_line, last_finish
@@ -70,6 +73,8 @@ class Allocator:
         self._learned_saved = now  # [s]
         self._limiter = ListRateLimiter()
         self._left_out: dict[str, str] = {}  # task id -> reason
+        self._predictions = Predictions(self.world, now)
+        self._chosen = self._best  # last plan that was put in force
         # UAVs of the journal get time to report before they lose their tasks
         self._awaited = {each.uav for each in saved.lists if each.stops}
         self._wait_until = now + params.uav_timeout
@@ -97,6 +102,7 @@ class Allocator:
         if self._limiter.due(now):
             world.request_replan('deferred lists', now)
         world.forget_ended()
+        self._predict(now, stamp)
         if world.outbox.statuses:
             self._step_tasks(stamp)
 
@@ -114,14 +120,15 @@ class Allocator:
             return None
         if schedule.settled(now, params.settle):
             trigger = schedule.begin(now)
-            if world.any_usable():
-                return replan_problem(world, self._best, trigger, background=False)
+            if world.any_usable() or waiting_uavs(world, stamp):
+                return replan_problem(world, self._best, trigger, background=False, stamp=stamp)
             self._apply(Plan({}), trigger, True, now, stamp)
             schedule.end(now)
         elif (params.background_budget > 0.0 and schedule.rested(now, params.background_period)
               and world.any_usable() and world.any_open()):
             schedule.begin(now)
-            return replan_problem(world, self._best, 'background', background=True)
+            return replan_problem(world, self._best, 'background', background=True,
+                                  stamp=stamp)
         return None
 
     def _waiting(self, now: float) -> bool:
@@ -153,13 +160,20 @@ class Allocator:
     def _apply(self, chosen: Plan, trigger: str, always: bool, now: float, stamp: float) -> None:
         """Put the lists of a plan in force; `always` publishes an allocation without changes."""
         world = self.world
-        built = build_lists(world, chosen)
+        built = build_lists(world, chosen, stamp)
         world.set_built(built.zones_when_built, built.paths_home)
-        self._left_out = built.left_out
-        lists = self._limiter.permitted(world.lists_in_force(), built.lists, world.must_change,
+        world.later = built.later
+        held, why = held_lists(world, built.lists, stamp)
+        self._left_out = {task_id: world.deadlines.left_out(task_id, reason, stamp)
+                          for task_id, reason in {**built.left_out, **why}.items()}
+        lists = self._limiter.permitted(world.lists_in_force(), held, world.must_change,
                                         now, world.params.list_interval)
         published = world.publish(lists, stamp)
         self._limiter.published(published, now)
+        starts = chosen.timetable().starts if built.later else {}
+        self._predictions.later = {name: stamp + starts[name] for trips in built.later.values()
+                                   for trip in trips for name in trip if name in starts}
+        self._predictions.planned(now, stamp)
         self._step_tasks(stamp)
         world.outbox.statuses |= bool(published) or always or bool(world.tasks.unsaved)
         if published or always:
@@ -168,15 +182,25 @@ class Allocator:
     def _step_tasks(self, stamp: float) -> None:
         """Set the state and the reason of every open task."""
         world = self.world
-        world.step_tasks(task_steps(world.tasks, world.fleet, world.lists, self._left_out), stamp)
+        world.step_tasks(task_steps(world, self._left_out), stamp)
 
     def _allocate(self, chosen: Plan, trigger: str, stamp: float) -> None:
         """Publish the lists in force as an allocation."""
         world = self.world
+        self._chosen = chosen
         plan = plan_in_force(world.lists, world.tasks, self._left_out, chosen)
         world.outbox.allocation = Allocation(
             world.next_revision(), tuple(world.lists_in_force().values()), plan, trigger, stamp)
         world.note(allocation_line(world.outbox.allocation, last_finish(world, stamp)))
+
+    def _predict(self, now: float, stamp: float) -> None:
+        """Publish predicted times of the lists in force where they are news."""
+        world = self.world
+        if self._predictions.tick(now, stamp):
+            plan = plan_in_force(world.lists, world.tasks, self._left_out, self._chosen)
+            world.outbox.allocation = Allocation(
+                world.next_revision(), tuple(self._predictions.lists(stamp).values()), plan,
+                'predicted arrivals', stamp)
 
     def collect(self) -> Outbox:
         """Return what is to be published since the last call; save `rows` before it is."""

@@ -18,6 +18,9 @@ REPORTED_LIMITS = ('endurance', 'payload_capacity', 'climb_speed', 'descent_spee
               'turnaround')
 
 
+Trips = dict[str, tuple[tuple[str, ...], ...]]  # task ids of each trip, by UAV id
+
+
 class TaskState(Enum):
     """State of a task; the numbers are those of the TaskStatus message."""
 
@@ -54,7 +57,7 @@ class TaskEventKind(Enum):
 
 @dataclass(frozen=True, slots=True)
 class TaskRecord:
-    """One accepted task, its state, and the UAV that has it."""
+    """One accepted task, its state, and the UAV that has it; times are [s] of the ROS clock."""
 
     task: Task  # with its latest values
     announced: Task  # as first added, to recognise a replay of that announcement
@@ -63,6 +66,7 @@ class TaskRecord:
     reason: str = ''  # of the state, for users
     stamp: float = 0.0  # [s] of the last change of state
     failed_on: tuple[str, ...] = ()  # UAVs that could not do it
+    since: float = 0.0  # [s] when it was first announced
 
     @property
     def open(self) -> bool:
@@ -114,6 +118,7 @@ class UavReport:
     active_task: str = ''  # id of the task being flown
     list_revision: int = 0  # of the last list verified on board
     standby: bool = False  # on the ground
+    velocity: Point | None = None  # [m/s] ENU, over ground
     endurance: float | None = None  # [s] in the air, remaining
     payload_capacity: float | None = None  # [kg]
     climb_speed: float | None = None  # [m/s]
@@ -132,6 +137,8 @@ class UavReport:
             check_number(place + 'range_remaining', self.range, 0.0)
         if self.cruise_speed is not None:
             check_number(place + 'cruise_speed', self.cruise_speed, 0.0, 1e4)
+        if self.velocity is not None:
+            put(self, 'velocity', check_point(place + 'velocity', self.velocity))
         if self.battery is not None:
             check_number(place + 'battery', self.battery, 0.0, 1.0)
         for name in REPORTED_LIMITS:
@@ -149,6 +156,17 @@ class ListStop:
     leg: Leg  # from the stop before, with its detour points
     eta: float  # [s] from the stamp of the list to the arrival
     wait: float = 0.0  # [s] from the arrival to the start of the service
+    served: float = 0.0  # [s] of the service that are over at the stamp
+
+    @property
+    def start(self) -> float:
+        """Start of the service [s] from the stamp of the list; negative once it has begun."""
+        return self.eta + self.wait - self.served
+
+    @property
+    def finish(self) -> float:
+        """End of the service [s] from the stamp of the list."""
+        return self.eta + self.wait + max(0.0, self.task.service_time - self.served)
 
 
 @dataclass(frozen=True, slots=True)
@@ -194,6 +212,10 @@ class ReplanProblem:
     published: Plan  # the lists in force
     warm: Plan  # the best plan so far, from which the search continues
     objective: Objective = field(default_factory=Objective)  # what is minimised
+    trips: int = 1  # of a UAV
+    stamp: float = 0.0  # [s] of the copy, of the published clock
+    since: Mapping[str, float] = field(default_factory=dict)  # [s] announcements, by task id
+    stop_time: float = 0.0  # [s] that braking and accelerating cost at each task
 
 
 @dataclass(frozen=True, slots=True)

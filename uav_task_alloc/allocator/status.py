@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from uav_task_alloc.allocator.records import Allocation, TaskRecord, TaskState
 from uav_task_alloc.allocator.state.fleet import Fleet
-from uav_task_alloc.allocator.state.published_lists import finish_time
+from uav_task_alloc.allocator.state.flight_pace import finish_time
 from uav_task_alloc.allocator.state.world import World
 from uav_task_alloc.allocator.state.zone_checks import blocked_text
 from uav_task_alloc.errors import first_of
@@ -26,20 +26,24 @@ class TaskStatus:
     uav: str  # that has it, or had it when it ended
     reason: str  # of the state, for users
     stamp: float  # [s] of the last change
+    expected: float = 0.0  # [s] predicted start of the service; 0: unknown
 
 
-def status_of(task_id: str, known: TaskRecord | tuple[str, float]) -> TaskStatus:
+def status_of(task_id: str, known: TaskRecord | tuple[str, float],
+              expected: float = 0.0) -> TaskStatus:
     """Return the status of a task for publication.
 
     Args:
         task_id: of the task.
         known: record of an accepted task, or (reason, stamp [s]) of a refused one.
+        expected: predicted start of the service [s] of the ROS clock; 0: unknown.
 
     Returns:
         REJECTED without a UAV where it was refused.
     """
     if isinstance(known, TaskRecord):
-        return TaskStatus(task_id, known.state, known.uav, known.reason, known.stamp)
+        return TaskStatus(task_id, known.state, known.uav, known.reason, known.stamp,
+                          expected if known.open else 0.0)
     reason, stamp = known
     return TaskStatus(task_id, TaskState.REJECTED, '', reason, stamp)
 
@@ -54,10 +58,10 @@ def last_finish(world: World, stamp: float) -> float:
     Returns:
         [s]; 0.0 where no UAV has tasks.
     """
-    lists = world.lists_in_force()
-    known = {uav_id: uav for uav_id in lists if (uav := world.known_uav(uav_id))}
-    return max((finish_time(world.lists.restamped(uav_id, stamp, uav), uav)
-                for uav_id, uav in known.items()), default=0.0)
+    flights = {uav_id: flight for uav_id in world.lists_in_force()
+               if (flight := world.flights.of(uav_id, stamp))}
+    return max((finish_time(world.lists.restamped(uav_id, stamp, flight), flight)
+                for uav_id, flight in flights.items()), default=0.0)
 
 
 def allocation_line(allocation: Allocation, finish: float) -> str:
@@ -106,6 +110,9 @@ def health_warnings(world: World, journal_error: str, solver_error: str = '') ->
                  if uav_id in fleet.records and not fleet.records[uav_id].silent][:_MAX_STRANDED]
     warnings += [f'{len(left_out)} tasks unassigned, {left_out[0].task.id}: '
                  f'{left_out[0].reason}'] if left_out else []
+    late = sorted(world.deadlines.late)
+    warnings += [f'{_counted(len(late), "task")} late, {late[0]}: '
+                 f'{world.deadlines.texts[late[0]]}'] if late else []
     return warnings + (['no UAV available'] if open_tasks and not world.any_usable() else [])
 
 
@@ -147,4 +154,6 @@ def health_values(world: World, solving: bool) -> dict[str, object]:
             'zones': len(world.zones), 'revision': world.revision,
             **{f'tasks {state.name}': states[state] for state in TaskState
                if state is not TaskState.REJECTED},
-            'tasks REJECTED': len(world.tasks.rejected), 'solving': solving}
+            'tasks REJECTED': len(world.tasks.rejected), 'tasks late': len(world.deadlines.late),
+            'wind': '{:.1f} m/s east, {:.1f} m/s north'.format(*world.flights.wind.wind),
+            'time lost at a stop': f'{world.flights.stop_time:.1f} s', 'solving': solving}

@@ -14,6 +14,7 @@ from uav_task_alloc.geometry.search_budget import SearchBudget
 from uav_task_alloc.model import Plan, Task, ThreatZone
 from uav_task_alloc.params import AllocatorParams
 from uav_task_alloc.solver.solve import load_kernels
+from uav_task_alloc.solver.timed.solve import load_timed_kernels
 
 _BUDGET = 0.05  # [s] of each solve
 _ZONES = (
@@ -34,6 +35,7 @@ def compile_kernels(plan: Callable[..., Plan], params: AllocatorParams) -> int:
         The number of lists that were planned.
     """
     load_kernels(zones=True)
+    load_timed_kernels(zones=True)  # any task may have a deadline
     params, before = replace(params, solve_budget=_BUDGET), Plan({})
     allocator = Allocator(params, now=0.0)
     allocator.set_kernels_ready()

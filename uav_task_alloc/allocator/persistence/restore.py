@@ -140,7 +140,8 @@ def _uav_id(body: Any) -> str:
 
 
 def _task_record(task_id: str, body: dict[str, Any]) -> TaskRecord:
-    record = TaskRecord(**{**body, 'task': _task(body['task']),
+    # rows of an earlier version have no announcement: the last change is the nearest to it
+    record = TaskRecord(**{'since': body['stamp'], **body, 'task': _task(body['task']),
                            'announced': _task(body.get('announced', body['task'])),
                            'state': TaskState(body['state']),
                            'failed_on': tuple(_list_of('failed_on', body['failed_on']))})
@@ -150,13 +151,15 @@ def _task_record(task_id: str, body: dict[str, Any]) -> TaskRecord:
         if not isinstance(text, str):
             raise InvalidValue(name, text, 'a string')
     check_number('stamp', record.stamp, -_MAX, _MAX)
+    check_number('since', record.since, -_MAX, _MAX)
     return record
 
 
 def _uav_list(uav_id: str, body: dict[str, Any]) -> UavList:
     stops = tuple(ListStop(_task(stop['task']), _leg(stop['leg']),
                            _non_negative('eta', stop['eta']),
-                           _non_negative('wait', stop.get('wait', 0.0)))
+                           _non_negative('wait', stop.get('wait', 0.0)),
+                           _non_negative('served', stop.get('served', 0.0)))
                   for stop in _list_of('stops', body['stops']))
     uav_list = UavList(**{**body, 'stops': stops, 'end_via': _points('end_via', body['end_via']),
                            'revision': _whole_number('revision', body['revision']),

@@ -6,14 +6,24 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
-from uav_task_alloc.allocator.records import ReplanAnswer, ReplanProblem, UavList
+from uav_task_alloc.allocator.records import ReplanAnswer, ReplanProblem, Trips, UavList
+from uav_task_alloc.allocator.replanning.from_now import counts_time, from_now, objective_of
+from uav_task_alloc.allocator.replanning.held_deadlines import (
+    with_deadlines_held,
+    with_true_values,
+)
 from uav_task_alloc.allocator.replanning.plan_acceptance import TaskIdsByUav, repaired_routes
 from uav_task_alloc.allocator.replanning.task_lists import LegKey, build_task_list, planned_legs
+from uav_task_alloc.allocator.replanning.trips import (
+    present_trips,
+    waiting_uavs,
+    with_later_trips,
+)
 from uav_task_alloc.allocator.state.published_lists import PublishedLists
 from uav_task_alloc.allocator.state.safe_paths import SafePaths
 from uav_task_alloc.allocator.state.tasks import TaskRegistry
 from uav_task_alloc.allocator.state.world import World
-from uav_task_alloc.model import Leg, Plan, Point, Task
+from uav_task_alloc.model import Leg, Plan, Point, Task, Uav
 from uav_task_alloc.objective import fit
 from uav_task_alloc.params import AllocatorParams
 
@@ -28,9 +38,11 @@ class BuiltLists:
     zones_when_built: dict[str, tuple[SafePaths, Point]] = field(default_factory=dict)
     # UAV -> whether it has a safe path home, and from where [m]
     paths_home: dict[str, tuple[bool, Point]] = field(default_factory=dict)
+    later: Trips = field(default_factory=dict)  # after the lists
 
 
-def replan_problem(world: World, best: Plan, trigger: str, background: bool) -> ReplanProblem:
+def replan_problem(world: World, best: Plan, trigger: str, background: bool,
+                   stamp: float = 0.0) -> ReplanProblem:
     """Return the problem for the worker; the published lists are the incumbent.
 
     Args:
@@ -38,19 +50,51 @@ def replan_problem(world: World, best: Plan, trigger: str, background: bool) -> 
         best: plan with which the search continues.
         trigger: what requires the plan.
         background: nothing does; a better plan is sought with `background_budget`.
+        stamp: [s] published clock.
 
     Returns:
         A copy, which the worker thread may read while the world changes.
     """
-    params, uavs = world.params, world.usable_uavs()
+    params, uavs, tasks = world.params, tuple(map(world.uav, world.fleet.usable_ids())), \
+        world.tasks_to_plan()
+    objective, records = objective_of(params), world.task_records()
+    stop_time, waiting = 0.0, dict[str, Uav]()
+    if counts_time(tasks, objective, params.trips):
+        uavs = tuple(measured_uav(world, uav) for uav in uavs)
+        waiting = waiting_uavs(world, stamp)
+        uavs += tuple(uav for uav_id, uav in waiting.items() if not world.usable(uav_id))
+        stop_time = world.flights.stop_time
     published = {uav.id: world.list_of(uav.id) for uav in uavs}
     routes = {uav_id: each.task_ids for uav_id, each in published.items()}
     legs = {uav_id: tuple(stop.leg for stop in each.stops) for uav_id, each in published.items()}
     return ReplanProblem(
         world.version, trigger, background,
         params.background_budget if background else params.solve_budget, uavs,
-        world.tasks_to_plan(), tuple(world.zones.values()), world.locked_tasks(),
-        published=replace(best, routes=routes, legs=legs), warm=best)
+        tasks, tuple(world.zones.values()), world.locked_tasks(),
+        published=with_later_trips(replace(best, routes=routes, legs=legs), world),
+        warm=best,
+        objective=objective, trips=params.trips, stamp=stamp, stop_time=stop_time,
+        since={task.id: records[task.id].since for task in tasks})
+
+
+def measured_uav(world: World, uav: Uav) -> Uav:
+    """Return a UAV for a problem with times.
+
+    Args:
+        world: with the flights measured.
+        uav: as planned.
+
+    Returns:
+        With the speed that was measured; on the ground near its home it is at its home.
+    """
+    record = world.uav_record(uav.id)
+    assert record is not None  # it is of the fleet
+    at_home = world.flights.at_home_since(uav.id) is not None
+    return replace(uav, cruise_speed=world.flights.pace(uav.id).mean_speed,
+                   position=record.home if at_home else uav.position,
+                   aboard=None if at_home or uav.at_base else frozenset(
+                       stop.task.id for stop in world.list_of(uav.id).stops
+                       if stop.task.payload > 0.0))
 
 
 def solve_problem(plan: Callable[..., Plan], problem: ReplanProblem, params: AllocatorParams,
@@ -66,20 +110,25 @@ def solve_problem(plan: Callable[..., Plan], problem: ReplanProblem, params: All
     Returns:
         Both plans; the best is the repaired one where nothing better was found.
     """
-    def call(warm: Plan, max_iterations: int | None) -> Plan:
-        return plan(problem.uavs, problem.tasks, problem.zones, budget=problem.budget,
+    problem = from_now(problem)
+
+    def call(warm: Plan, max_iterations: int | None, tasks: Sequence[Task]) -> Plan:
+        return plan(problem.uavs, tasks, problem.zones, budget=problem.budget,
                     seed=params.seed, warm=warm, route_end=params.route_end,
                     locked=problem.locked, clearance=params.clearance,
                     altitude_min=params.altitude_min, altitude_max=params.altitude_max,
                     threads=params.threads, objective=problem.objective, stop=stop,
-                    max_iterations=max_iterations)
+                    trips=problem.trips, max_iterations=max_iterations)
 
-    repaired = call(problem.published, 0)
-    best = call(problem.warm if problem.background else repaired, None)
+    repaired = call(problem.published, 0, problem.tasks)
+    tasks = with_deadlines_held(problem, repaired)
+    best = call(problem.warm if problem.background else repaired, None, tasks)
+    if tasks is not problem.tasks:
+        best = with_true_values(best, problem.tasks)
     return ReplanAnswer(problem, repaired, best)
 
 
-def build_lists(world: World, chosen: Plan) -> BuiltLists:
+def build_lists(world: World, chosen: Plan, stamp: float) -> BuiltLists:
     """Build the lists of a plan for the world as it is now; the world is not changed.
 
     A list that is still valid is kept. UAVs that the plan does not use get an empty list, but
@@ -88,18 +137,23 @@ def build_lists(world: World, chosen: Plan) -> BuiltLists:
     Args:
         world: as it is now.
         chosen: plan, made for this world or an earlier one.
+        stamp: [s] published clock.
 
     Returns:
         Lists by UAV, and the tasks that are in none with their reasons.
     """
     built = BuiltLists(left_out=dict(chosen.unassigned))
+    if world.params.trips > 1:
+        chosen, built.later = present_trips(chosen, {
+            uav_id for uav_id in chosen.routes if not world.usable(uav_id)})
     legs, returns = planned_legs(chosen), world.params.route_end == 'home'
     for uav_id, task_ids in _present_routes(world, chosen).items():
         tasks = [world.task_records()[task_id].task for task_id in task_ids]
-        if world.is_current(uav_id, tasks):
+        home = returns or uav_id in built.later
+        if world.is_current(uav_id, tasks, home):
             built.lists[uav_id] = world.list_of(uav_id)
             continue
-        unreachable = _build(world, built, uav_id, tasks, returns, legs)
+        unreachable = _build(world, built, uav_id, tasks, home, legs, stamp)
         built.left_out.update((task_id, f'no safe path for {uav_id}') for task_id in unreachable)
         built.zones_when_built[uav_id] = world.paths(), world.home_of(uav_id)
     # unknown UAVs, too: one that returns must not fly what others have
@@ -110,11 +164,11 @@ def build_lists(world: World, chosen: Plan) -> BuiltLists:
 
 
 def _build(world: World, built: BuiltLists, uav_id: str, tasks: Sequence[Task], returns: bool,
-           legs: Mapping[LegKey, Leg]) -> list[str]:
+           legs: Mapping[LegKey, Leg], stamp: float = 0.0) -> list[str]:
     """Build the list of a known UAV; returns the tasks that it cannot reach."""
     uav = world.uav(uav_id)
     new, unreachable = build_task_list(uav, tasks, returns, legs, world.list_of(uav_id),
-                                       world.paths())
+                                       world.paths(), world.flights.of(uav_id, stamp))
     end = new.stops[-1].task.position if new.stops else uav.position
     built.lists[uav_id] = new
     built.paths_home[uav_id] = new.returns or not returns, end

@@ -8,6 +8,7 @@ from dataclasses import replace
 from itertools import pairwise
 
 from uav_task_alloc.allocator.records import ListStop, UavList
+from uav_task_alloc.allocator.state.flight_pace import UavFlight, timed_stops
 from uav_task_alloc.allocator.state.safe_paths import SafePaths
 from uav_task_alloc.geometry.polyline import polyline_length
 from uav_task_alloc.model import Leg, Plan, Point, Task, Uav
@@ -30,7 +31,8 @@ def planned_legs(plan: Plan) -> dict[LegKey, Leg]:
 
 def build_task_list(uav: Uav, tasks: Sequence[Task], returns: bool,
                     legs: Mapping[LegKey, Leg], published: UavList,
-                    paths: SafePaths) -> tuple[UavList, list[str]]:
+                    paths: SafePaths,
+                    flight: UavFlight | None = None) -> tuple[UavList, list[str]]:
     """Build the list of a route from the present position of a UAV.
 
     Args:
@@ -41,26 +43,26 @@ def build_task_list(uav: Uav, tasks: Sequence[Task], returns: bool,
         legs: of the plan, see `planned_legs`.
         published: list in force, whose legs are kept while they are safe.
         paths: around the present zones.
+        flight: of the UAV, for the times; None: as planned, from now.
 
     Returns:
         The list, and the ids of the tasks that no safe path leads to.
     """
     stops: list[ListStop] = []
     unreachable: list[str] = []
-    before, place, clock = _START, uav.position, 0.0
+    before, place = _START, uav.position
     for task in tasks:
         leg = _steady_leg(published, before, task, place, paths, _planned_leg(
             legs, _leg_key(uav.id, before, task.id), place, task.position, paths))
         if leg is None:
             unreachable.append(task.id)
             continue
-        clock += leg.length / uav.cruise_speed
-        stops.append(ListStop(task, leg, clock))
-        clock += task.service_time
+        stops.append(ListStop(task, leg, 0.0))
         before, place = task.id, task.position
     distance = math.fsum(stop.leg.length for stop in stops)
     home = _leg_home(uav, before, place, legs, published, paths) if returns else None
-    return replace(published, stops=tuple(stops), returns=home is not None,
+    timed = timed_stops(stops, flight or UavFlight.of(uav))
+    return replace(published, stops=timed, returns=home is not None,
                    end_via=home.via if home else (),
                    distance=distance + (home.length if home and stops else 0.0)), unreachable
 

@@ -6,34 +6,41 @@ from collections.abc import Mapping
 
 from uav_task_alloc.allocator.records import TaskRecord
 from uav_task_alloc.allocator.state.fleet import Fleet, may_fly
-from uav_task_alloc.allocator.state.published_lists import PublishedLists
 from uav_task_alloc.allocator.state.task_state_machine import TaskStep, TaskTransition
-from uav_task_alloc.allocator.state.tasks import TaskRegistry, without_failed
+from uav_task_alloc.allocator.state.tasks import without_failed
+from uav_task_alloc.allocator.state.world import World
 from uav_task_alloc.allocator.state.zone_checks import blocked_text
 
 
-def task_steps(tasks: TaskRegistry, fleet: Fleet, lists: PublishedLists,
-               left_out: Mapping[str, str]) -> list[TaskStep]:
+def task_steps(world: World, left_out: Mapping[str, str]) -> list[TaskStep]:
     """Return an event for each open task.
 
     Args:
-        tasks, fleet, lists: the present state.
+        world: as it is now.
         left_out: reason by task id, of the plan in force.
 
     Returns:
-        LIST or START for tasks in a list, else why there is no UAV for it.
+        LIST or START for tasks in a list, LIST for those of a later trip, else why there is no UAV
+        for it.
     """
-    owners, usable = lists.owners(), frozenset(fleet.usable_ids())
+    fleet, usable = world.fleet, frozenset(world.fleet.usable_ids())
+    owners, late = world.lists.owners(), world.deadlines.texts
+    trips = {task_id: (uav_id, number) for uav_id, rows in world.later.items()
+             for number, row in enumerate(rows, 1) for task_id in row}
     steps = []
-    for record in tasks.open():
+    for record in world.tasks.open():
         task_id = record.task.id
-        uav_id = owners.get(task_id, '')
-        if not uav_id:
-            steps.append(_unlisted(record, fleet, usable, left_out))
-        elif fleet.active.get(uav_id) == task_id:
-            steps.append(TaskStep(task_id, TaskTransition.START, uav_id))
+        uav_id, why = owners.get(task_id, ''), late.get(task_id, '')
+        if uav_id and fleet.active.get(uav_id) == task_id:
+            steps.append(TaskStep(task_id, TaskTransition.START, uav_id, why))
+        elif uav_id:
+            steps.append(TaskStep(task_id, TaskTransition.LIST, uav_id, why))
+        elif task_id in trips:
+            uav_id, number = trips[task_id]
+            steps.append(TaskStep(task_id, TaskTransition.LIST, uav_id,
+                                  f'after battery change {number} of {uav_id}'))
         else:
-            steps.append(TaskStep(task_id, TaskTransition.LIST, uav_id))
+            steps.append(_unlisted(record, fleet, usable, left_out))
     return steps
 
 

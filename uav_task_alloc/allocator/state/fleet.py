@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 from uav_task_alloc.allocator.records import UavReport
 from uav_task_alloc.model import Point, Task, Uav
+from uav_task_alloc.params import AllocatorParams
 
 _FASTEST = 10.0  # times the cruise speed: faster is a jump, in accelerated simulations too
 _RECHARGED = 0.1  # [0..1] above the reserve: a battery that was low is good again
@@ -55,8 +56,7 @@ class Fleet:
         uav_id: of a UAV, known or not.
         task: with allowed UAVs and required capabilities.
         failed_on: ids of the UAVs that failed at it.
-        default_range: [m] where the UAV reports none.
-        default_cruise_speed: [m/s] where the UAV reports none.
+        params: of the allocator.
     """
 
     def __init__(self, off: Iterable[str] = (), active: Mapping[str, str] | None = None) -> None:
@@ -128,18 +128,31 @@ class Fleet:
                 if record.blocked_on_ground and record.ready
                 and uav_id not in self.switched_off]
 
-    def uav(self, uav_id: str, default_range: float, default_cruise_speed: float) -> Uav:
-        """Return a UAV for the solver; an unknown range [m] or speed [m/s] is the default."""
+    def uav(self, uav_id: str, params: AllocatorParams) -> Uav:
+        """Return a UAV for the solver; an unknown range or speed is that of the parameters."""
         record = self.records[uav_id]
         report = record.report
         return Uav(uav_id, report.position,
-                   range=default_range if report.range is None else report.range,
-                   cruise_speed=report.cruise_speed or default_cruise_speed,
-                   capabilities=report.capabilities, home=record.home)
+                   range=params.default_range if report.range is None else report.range,
+                   cruise_speed=report.cruise_speed or params.default_cruise_speed,
+                   capabilities=report.capabilities, home=record.home,
+                   climb_speed=report.climb_speed or params.default_climb_speed,
+                   descent_speed=report.descent_speed or params.default_descent_speed,
+                   endurance=report.endurance or math.inf,
+                   payload_capacity=report.payload_capacity or 0.0,
+                   full_range=report.full_range, turnaround=report.turnaround or math.inf,
+                   full_endurance=_full_endurance(report))
 
     def may_fly(self, uav_id: str, task: Task, failed_on: Iterable[str]) -> bool:
         """Return whether a known UAV may be given a task, see `may_fly`."""
         return may_fly(task, failed_on, self.records[uav_id].report)
+
+
+def _full_endurance(report: UavReport) -> float | None:
+    """With a full battery [s]; it grows as the range does. None: unknown."""
+    if report.endurance is None or not report.range or report.full_range is None:
+        return None
+    return report.endurance * max(1.0, report.full_range / report.range)
 
 
 def _battery(before: UavRecord | None, reported: float | None,

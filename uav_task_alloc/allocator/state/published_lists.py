@@ -6,8 +6,7 @@ from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import replace
 
 from uav_task_alloc.allocator.records import ListStop, UavList
-from uav_task_alloc.geometry.polyline import points_passed, polyline_length
-from uav_task_alloc.model import Point, Uav
+from uav_task_alloc.allocator.state.flight_pace import UavFlight, timed_stops
 
 
 class PublishedLists:
@@ -95,21 +94,21 @@ class PublishedLists:
         """Return the UAV of each listed task."""
         return {task_id: each.uav for each in self.lists.values() for task_id in each.task_ids}
 
-    def restamped(self, uav_id: str, stamp: float, uav: Uav | None) -> UavList:
+    def restamped(self, uav_id: str, stamp: float, flight: UavFlight | None) -> UavList:
         """Return the list in force with its arrival times counted from `stamp`.
 
         Args:
             uav_id: of the list.
             stamp: [s].
-            uav: where it is now; None: unknown, and it flies as planned.
+            flight: of the UAV now; None: unknown, and it flies as planned.
         """
         published = self.get(uav_id)
-        stops = _counted_from_position(published.stops, uav) if uav else _later(
+        stops = timed_stops(published.stops, flight) if flight else _later(
             published.stops, min(0.0, published.stamp - stamp))
-        return replace(published, stops=stops)
+        return replace(published, stops=stops, stamp=stamp)
 
     def without_ended(self, uav_id: str, ended: Callable[[str], bool], stamp: float,
-                      uav: Uav | None) -> UavList | None:
+                      flight: UavFlight | None) -> UavList | None:
         """Return the list without the ended tasks at its front; arguments as of `restamped`.
 
         None where there are none, or where a later task has ended, too: that changes legs, and
@@ -122,7 +121,7 @@ class PublishedLists:
         stops = published.stops
         while stops and ended(stops[0].task.id):
             before, stops = stops[0].task, stops[1:]
-        stops = _counted_from_position(stops, uav, before.position) if uav else stops
+        stops = timed_stops(stops, flight, before.position) if flight else stops
         if any(ended(stop.task.id) for stop in stops):
             return None
         flown = sum(stop.leg.length
@@ -151,35 +150,5 @@ class PublishedLists:
         self._known_tasks.difference_update(task_ids)
 
 
-def finish_time(each: UavList, uav: Uav) -> float:
-    """Return the time until a UAV has flown a list, with its way home.
-
-    Args:
-        each: with arrival times from now.
-        uav: with its speed.
-
-    Returns:
-        [s]; 0.0 for an empty list.
-    """
-    if not each.stops:
-        return 0.0
-    home = max(0.0, each.distance - sum(stop.leg.length for stop in each.stops))
-    last = each.stops[-1]
-    return last.eta + last.task.service_time + home / uav.cruise_speed
-
-
 def _later(stops: Sequence[ListStop], seconds: float) -> tuple[ListStop, ...]:
     return tuple(replace(stop, eta=max(0.0, stop.eta + seconds)) for stop in stops)
-
-
-def _counted_from_position(stops: Sequence[ListStop], uav: Uav,
-                           start: Point | None = None) -> tuple[ListStop, ...]:
-    """Arrival times from the position of a UAV on its leg to the first stop.
-
-    No clock is read for it: a simulated fleet may fly faster than real time, and a real one late.
-    """
-    if not stops:
-        return ()
-    leg = (*stops[0].leg.via, stops[0].task.position)
-    metres = polyline_length((uav.position, *leg[points_passed(uav.position, leg, start):]))
-    return _later(stops, metres / uav.cruise_speed - stops[0].eta)

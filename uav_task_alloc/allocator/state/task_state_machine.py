@@ -86,9 +86,9 @@ TASK_TRANSITIONS: dict[TaskTransition, TransitionRow] = {
         _S.REJECTED: Rule(None, f'{_UNKNOWN}: nothing to cancel'),
     },
     _E.WAIT: _on_open(_S.PENDING, '{why}'),
-    _E.LIST: _on_open(_S.ASSIGNED, ''),
+    _E.LIST: _on_open(_S.ASSIGNED, '{why}'),
     _E.LEAVE: _on_open(_S.UNASSIGNED, '{why}'),
-    _E.START: _on_open(_S.ACTIVE, ''),
+    _E.START: _on_open(_S.ACTIVE, '{why}'),
     _E.START_MOVED: _on_open(None, _MOVED),
     # accepted from any UAV, so that the task is not flown twice
     _E.COMPLETE: _on_open_or_failed(_S.COMPLETED, '{why}'),

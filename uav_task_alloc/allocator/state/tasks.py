@@ -60,7 +60,7 @@ class TaskRegistry:
         if known is None:
             rule = rule_for(TaskState.REJECTED, TaskTransition.ADD)
             self.rejected.pop(task.id, None)
-            self._put(TaskRecord(task, task, stamp=stamp, reason=rule.reason))
+            self._put(TaskRecord(task, task, stamp=stamp, reason=rule.reason, since=stamp))
             return TaskVerdict(task.id, True)
         ended = '' if known.open else f': it is {known.state.name}'
         if task in (known.task, known.announced):

@@ -13,20 +13,24 @@ from uav_task_alloc.allocator.records import (
     Outbox,
     SavedState,
     TaskEvent,
+    TaskEventKind,
     TaskRecord,
     TaskState,
     TaskVerdict,
+    Trips,
     UavList,
     UavReport,
 )
 from uav_task_alloc.allocator.state.admission import Admission
 from uav_task_alloc.allocator.state.callbacks import RequestReplan
+from uav_task_alloc.allocator.state.deadlines import Deadlines
 from uav_task_alloc.allocator.state.fleet import (
     Fleet,
     UavRecord,
     jump_distance,
     replan_reasons,
 )
+from uav_task_alloc.allocator.state.flights import Flights
 from uav_task_alloc.allocator.state.list_validity import ListValidity, ZonesWhenBuilt
 from uav_task_alloc.allocator.state.locked_tasks import can_fly, locked_tasks
 from uav_task_alloc.allocator.state.missed_completions import MissedCompletions
@@ -66,7 +70,6 @@ class World:
         stamp: [s] clock of the node.
         reason, trigger, text: for the log.
         available: what an operator sets.
-        params: of the allocator.
         warning: its level in the log; otherwise information.
         kind: of a journal row.
         resend: publish unchanged lists, too.
@@ -86,12 +89,15 @@ class World:
         self._paths_params = params
         self._resend = {each.uav for each in saved.lists}  # UAVs whose lists are resent
         self._unsaved: set[str] = set()  # rows not yet on disk: 'zones', 'off', ...
+        self.later = Trips()  # of the plan in force, after the lists
         self.tasks = TaskRegistry(saved.tasks)
         self.fleet = Fleet(saved.switched_off, {
             record.uav: record.task.id for record in saved.tasks
             if record.state is TaskState.ACTIVE})
         self.lists = PublishedLists(saved.lists, (record.task.id for record in saved.tasks))
         self._validity = ListValidity(self.tasks, self.fleet, self.lists, self.paths)
+        self.flights = Flights(self.fleet, self.lists, lambda: self.params)
+        self.deadlines = Deadlines(self.tasks, self.fleet, self.flights)
         self.zone_checks = ZoneChecks(self.fleet, self.lists, self.paths, self.note,
                                       self.request_replan)
         self.admission = Admission(self.fleet, self.lists, self.note, self.forget_uav)
@@ -105,7 +111,8 @@ class World:
                  now: float) -> list[TaskVerdict]:
         """ADD or UPDATE tasks; returns a verdict for each."""
         apply = self.tasks.add if action is AnnouncementAction.ADD else self.tasks.update
-        return self._announced(action, [apply(task, stamp) for task in tasks], now)
+        return self._announced(action, [self.deadlines.refused(task, stamp) or apply(task, stamp)
+                                        for task in tasks], now)
 
     def cancel(self, task_ids: Iterable[str], stamp: float, now: float) -> list[TaskVerdict]:
         """Withdraw tasks; returns a verdict for each."""
@@ -137,6 +144,7 @@ class World:
             return refusal
         active = self.fleet.active.get(uav_id)
         before = self.fleet.update(report, now, self.params.battery_reserve)
+        self.flights.update(report, stamp)
         self._missed.complete(report, stamp)
         for reason in replan_reasons(before, self.fleet.records[uav_id]):
             self.note(f'{uav_id} {reason}')
@@ -165,6 +173,8 @@ class World:
     def event(self, event: TaskEvent, stamp: float, now: float) -> str:
         """Apply the progress of a task; returns why it is refused, '' if it is not."""
         refusal = self._events.apply(event, stamp, now, self.params.max_attempts)
+        if not refusal and event.kind is TaskEventKind.COMPLETED:
+            self.flights.completed(event.uav_id, event.task_id, stamp)
         self.outbox.statuses |= not refusal
         return refusal
 
@@ -236,6 +246,7 @@ class World:
         self.zone_checks.forget(uav_id)
         self._events.forget(uav_id)
         self._validity.forget(uav_id)
+        self.flights.forget(uav_id)
 
     def forget_ended(self) -> None:
         """Remove ended tasks beyond `keep_ended`."""
@@ -290,12 +301,7 @@ class World:
 
     def uav(self, uav_id: str) -> Uav:
         """Return a known UAV for the solver."""
-        return self.fleet.uav(uav_id, self.params.default_range,
-                              self.params.default_cruise_speed)
-
-    def usable_uavs(self) -> tuple[Uav, ...]:
-        """Return the UAVs that may be given tasks."""
-        return tuple(map(self.uav, self.fleet.usable_ids()))
+        return self.fleet.uav(uav_id, self.params)
 
     def tasks_to_plan(self) -> tuple[Task, ...]:
         """Return the open tasks, less those that stay with unusable UAVs after a restart.
@@ -319,14 +325,18 @@ class World:
         """Return whether a task is open and a known UAV may fly it."""
         return can_fly(self.tasks, self.fleet, uav_id, task_id)
 
-    def is_current(self, uav_id: str, tasks: Sequence[Task]) -> bool:
-        """Return whether the list in force of a UAV has these tasks, and fits the zones."""
-        return self._validity.is_current(uav_id, tasks)
+    def is_current(self, uav_id: str, tasks: Sequence[Task], returns: bool) -> bool:
+        """Return whether the list in force has these tasks and end, and fits the zones."""
+        return self._validity.is_current(uav_id, tasks) and (
+            self.lists.get(uav_id).returns or not self._returns(uav_id, returns))
 
     def must_change(self, uav_id: str) -> bool:
         """Return whether the list in force of a UAV cannot or may not be flown."""
-        return self._validity.must_change(
-            uav_id, self.params.route_end == 'home' and uav_id not in self.zone_checks.stranded)
+        return self._validity.must_change(uav_id, self._returns(
+            uav_id, self.params.route_end == 'home' or uav_id in self.later))
+
+    def _returns(self, uav_id: str, returns: bool) -> bool:
+        return returns and uav_id not in self.zone_checks.stranded
 
     # results of the planner
 
@@ -359,7 +369,7 @@ class World:
     def shortened_lists(self, stamp: float) -> dict[str, UavList]:
         """Return the lists with ended tasks at their front, without those."""
         shorter = {uav_id: self.lists.without_ended(uav_id, self._ended, stamp,
-                                                    self.known_uav(uav_id))
+                                                    self.flights.of(uav_id, stamp))
                    for uav_id in self.lists.lists}
         return {uav_id: each for uav_id, each in shorter.items() if each is not None}
 
@@ -368,13 +378,9 @@ class World:
 
         One with an ended task after the first waits for the plan: its legs are not valid.
         """
-        return {uav_id: self.lists.restamped(uav_id, stamp, self.known_uav(uav_id))
+        return {uav_id: self.lists.restamped(uav_id, stamp, self.flights.of(uav_id, stamp))
                 for uav_id in sorted(self._resend)
                 if not any(map(self._ended, self.lists.get(uav_id).task_ids))}
-
-    def known_uav(self, uav_id: str) -> Uav | None:
-        """Return a UAV for the solver; None where it has not reported."""
-        return self.uav(uav_id) if uav_id in self.fleet.records else None
 
     def _ended(self, task_id: str) -> bool:
         return not self.tasks.is_open(task_id)

@@ -15,6 +15,7 @@ from uav_task_alloc.nodes.conversions.messages import (
     to_point,
     to_stamp,
 )
+from uav_task_alloc.nodes.conversions.task_times import from_time
 
 _UNASSIGNED = (m.TaskStatus.PENDING, m.TaskStatus.UNASSIGNED)
 
@@ -30,7 +31,8 @@ def from_list(uav_list: UavList) -> m.TaskList:
     """
     return m.TaskList(
         header=header(uav_list.stamp), uav_id=uav_list.uav, revision=uav_list.revision,
-        tasks=[planned_task(stop.task, stop.leg, stop.eta, stop.wait) for stop in uav_list.stops],
+        tasks=[planned_task(stop.task, stop.leg, stop.eta, stop.wait, stop.finish)
+               for stop in uav_list.stops],
         end=m.TaskList.RETURN_HOME if uav_list.returns else m.TaskList.HOLD,
         end_via=[to_point(point) for point in uav_list.end_via],
         distance=float(uav_list.distance))
@@ -59,7 +61,8 @@ def from_task_status(status: TaskStatus) -> m.TaskStatus:
         An entry of TaskStatusArray or of Allocation.unassigned.
     """
     return m.TaskStatus(task_id=status.task_id, state=status.state.value, uav_id=status.uav,
-                        reason=status.reason, stamp=to_stamp(status.stamp))
+                        reason=status.reason, stamp=to_stamp(status.stamp),
+                        expected=from_time(status.expected))
 
 
 def from_allocation(allocation: Allocation, lists: list[m.TaskList],

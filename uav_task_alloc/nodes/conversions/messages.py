@@ -161,6 +161,7 @@ def to_report(msg: m.UavState) -> UavReport:
         check_ros_name(place + 'active_task_id', msg.active_task_id)
     check_number(place + 'list_revision', msg.list_revision, 0, _MOST_REVISIONS)
     home = from_point(msg.home)
+    velocity = msg.velocity.x, msg.velocity.y, msg.velocity.z
     return UavReport(
         msg.uav_id, from_point(msg.position), home=None if any(map(math.isnan, home)) else home,
         range=known(msg.range_remaining), cruise_speed=known(msg.cruise_speed) or None,
@@ -169,6 +170,7 @@ def to_report(msg: m.UavState) -> UavReport:
         available=msg.available and msg.mode != m.UavState.FAULT,
         active_task=msg.active_task_id, list_revision=msg.list_revision,
         standby=msg.mode == m.UavState.STANDBY,
+        velocity=velocity if all(map(math.isfinite, velocity)) else None,
         **{name: known(getattr(msg, name)) or None for name in REPORTED_LIMITS})
 
 
@@ -215,11 +217,13 @@ def from_zones(zones: Iterable[ThreatZone], now: float) -> m.ThreatZoneArray:
     return m.ThreatZoneArray(header=header(now), zones=[from_zone(zone) for zone in zones])
 
 
-def planned_task(task: Task, leg: Leg, eta: float, wait: float = 0.0) -> m.PlannedTask:
-    """A task with the leg to it; `eta` [s] from the stamp of the list, `wait` [s] there."""
+def planned_task(task: Task, leg: Leg, eta: float, wait: float = 0.0,
+                 finish: float | None = None) -> m.PlannedTask:
+    """A task with the leg to it; times are [s] from the stamp of the list, `wait` [s] there."""
+    finish = eta + wait + task.service_time if finish is None else finish
     return m.PlannedTask(task=from_task(task), via=[to_point(p) for p in leg.via],
                          leg_distance=leg.length, eta=to_duration(eta), wait=to_duration(wait),
-                         finish=to_duration(eta + wait + task.service_time))
+                         finish=to_duration(finish))
 
 
 def announcement(action: int, tasks: Iterable[Task], now: float) -> m.TaskAnnouncement:

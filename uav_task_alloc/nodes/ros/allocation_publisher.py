@@ -51,7 +51,7 @@ class AllocationPublisher:
         self.pause_until = 0.0  # [s] steady clock
         # messages as converted last, with their sources: most have not changed
         self._list_messages: dict[str, tuple[UavList, m.TaskList]] = {}
-        self._status_messages: dict[str, tuple[_StatusSource, m.TaskStatus]] = {}
+        self._status_messages: dict[str, tuple[_StatusSource, float, m.TaskStatus]] = {}
 
     def prepare(self, uav_ids: Iterable[str]) -> None:
         """Create the publishers of these UAVs, so that subscribers are matched early."""
@@ -144,10 +144,11 @@ class AllocationPublisher:
         cache, self._status_messages = self._status_messages, {}
         sources: dict[str, _StatusSource] = {
             **self.world.task_records(), **self.world.tasks.rejected}
+        expected = self.world.deadlines.expected
         for task_id, source in sources.items():
-            cached = cache.get(task_id)
-            if cached is None or cached[0] is not source:
-                status = status_of(task_id, source)
-                cached = source, allocation_messages.from_task_status(status)
+            start, cached = expected.get(task_id, 0.0), cache.get(task_id)
+            if cached is None or cached[0] is not source or cached[1] != start:
+                status = status_of(task_id, source, start)
+                cached = source, start, allocation_messages.from_task_status(status)
             self._status_messages[task_id] = cached
-        return [message for _, message in self._status_messages.values()]
+        return [message for _, _, message in self._status_messages.values()]

@@ -1,0 +1,171 @@
+# SPDX-License-Identifier: Apache-2.0
+"""How each UAV flies its list: measured pace, time lost at stops, the task that it serves."""
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from uav_task_alloc.allocator.records import UavReport
+from uav_task_alloc.allocator.state.fleet import Fleet
+from uav_task_alloc.allocator.state.flight_pace import FlightPace, UavFlight
+from uav_task_alloc.allocator.state.published_lists import PublishedLists
+from uav_task_alloc.allocator.state.wind import WindEstimate
+from uav_task_alloc.params import AllocatorParams
+
+_SAMPLE_PERIOD = 1.0  # [s] between two samples of the ground velocity of a UAV
+_STEADY = 0.5  # [m/s2] largest acceleration of a sample
+_MOVING = 0.3  # share of the cruise speed below which a UAV hovers, turns or lands
+_FASTEST = 3.0  # times the cruise speed above which a velocity cannot be
+_LEVEL = 0.5  # share of the climb or descent speed above which the vertical sets the pace
+AT_HOME = 10.0  # [m] from its home within which a UAV on the ground is at its base
+_AT_STOP = 3.0  # [m] within which a task is reached that has no radius of its own
+_SMOOTHING = 0.3  # weight of a new time lost at a stop
+_LONGEST_STOP = 60.0  # [s] a longer delay is not that of a stop
+_OWN_STOPS = 3  # stops after which a UAV has a mean of its own
+
+
+@dataclass(slots=True)
+class _Stops:
+    """The smoothed time that stops cost [s], and how many were measured."""
+
+    mean: float = 0.0
+    count: int = 0
+
+    def add(self, seconds: float) -> None:
+        weight = max(_SMOOTHING, 1.0 / (self.count + 1))
+        self.mean += weight * (seconds - self.mean)
+        self.count += 1
+
+
+@dataclass(slots=True)
+class _Leg:
+    """The leg that a UAV has begun at a completion, and how long it takes without a stop."""
+
+    task: str  # at its end
+    began: float  # [s]
+    seconds: float  # planned, with the service
+
+
+class Flights:
+    """Measures flights from reports and events; times are [s] of the published clock.
+
+    Args:
+        fleet, lists: the present state.
+        params: returns the parameters in force.
+
+    Arguments of methods:
+        uav_id: of a UAV.
+        stamp: [s] published clock.
+    """
+
+    def __init__(self, fleet: Fleet, lists: PublishedLists,
+                 params: Callable[[], AllocatorParams]) -> None:
+        self._fleet, self._lists, self._params = fleet, lists, params
+        self.wind = WindEstimate()
+        self._sampled: dict[str, tuple[float, tuple[float, float]]] = {}  # stamp and velocity
+        self._reached: dict[str, tuple[str, float]] = {}  # task and stamp of the arrival
+        self._all_stops, self._stops = _Stops(), dict[str, _Stops]()
+        self._legs: dict[str, _Leg] = {}
+        self._landed: dict[str, float] = {}  # [s] stamp since which it is on the ground at home
+
+    def update(self, report: UavReport, stamp: float) -> None:
+        """Measure by a report that is known to the fleet."""
+        self._sample(report, stamp)
+        home = self._fleet.records[report.uav_id].home
+        if report.standby and math.dist(report.position, home) <= AT_HOME:
+            self._landed.setdefault(report.uav_id, stamp)
+        else:
+            self._landed.pop(report.uav_id, None)
+        stops = self._lists.get(report.uav_id).stops
+        task = stops[0].task if stops else None
+        if task is None or math.dist(report.position, task.position) > max(
+                _AT_STOP, task.acceptance_radius or 0.0):
+            self._reached.pop(report.uav_id, None)
+        elif self._reached.get(report.uav_id, ('', 0.0))[0] != task.id:
+            self._reached[report.uav_id] = task.id, stamp
+
+    def _sample(self, report: UavReport, stamp: float) -> None:
+        """Take the ground velocity of steady level flight."""
+        if report.velocity is None:
+            return
+        vx, vy, vz = report.velocity
+        last = self._sampled.get(report.uav_id)
+        if last is not None and 0.0 <= stamp - last[0] < _SAMPLE_PERIOD:
+            return
+        self._sampled[report.uav_id] = stamp, (vx, vy)
+        planned = self._planned(report)
+        steady = last is not None and 0.0 < stamp - last[0] < 5.0 * _SAMPLE_PERIOD and (
+            math.dist(last[1], (vx, vy)) <= _STEADY * (stamp - last[0]))
+        level = -_LEVEL * planned.descent < vz < _LEVEL * planned.climb
+        moving = _MOVING * planned.speed < math.hypot(vx, vy) < _FASTEST * planned.speed
+        if steady and level and moving and report.active_task:
+            self.wind.add(report.uav_id, planned.speed, (vx, vy), stamp)
+
+    def completed(self, uav_id: str, task_id: str, stamp: float) -> None:
+        """Measure by the completion of the first task of a list that is still in force."""
+        leg = self._legs.pop(uav_id, None)
+        if leg is not None and leg.task == task_id:
+            lost = stamp - leg.began - leg.seconds
+            if -_LONGEST_STOP < lost < _LONGEST_STOP:
+                self._all_stops.add(max(0.0, lost))
+                self._stops.setdefault(uav_id, _Stops()).add(max(0.0, lost))
+        stops = self._lists.get(uav_id).stops
+        if (uav_id not in self._fleet.records or len(stops) < 2
+                or stops[0].task.id != task_id or stops[1].wait > 0.0):
+            return
+        task, following = stops[0].task, stops[1]
+        seconds = self._moving_pace(uav_id).seconds(
+            (task.position, *following.leg.via, following.task.position))
+        self._legs[uav_id] = _Leg(following.task.id, stamp,
+                                  seconds + following.task.service_time)
+
+    def clock_jumped(self) -> None:
+        """Drop what was measured across a jump of the published clock."""
+        self._legs.clear()
+        self._sampled.clear()
+        self._reached.clear()
+        self._landed.clear()
+
+    def forget(self, uav_id: str) -> None:
+        """Drop what is kept of a UAV."""
+        self.wind.forget(uav_id)
+        for kept in (self._sampled, self._reached, self._stops, self._legs, self._landed):
+            kept.pop(uav_id, None)
+
+    def of(self, uav_id: str, stamp: float) -> UavFlight | None:
+        """Return the flight of a UAV; None where it has not reported."""
+        record = self._fleet.records.get(uav_id)
+        if record is None:
+            return None
+        task_id, reached = self._reached.get(uav_id, ('', stamp))
+        return UavFlight(record.report.position, self.pace(uav_id), stamp,
+                         record.report.standby, task_id, max(0.0, stamp - reached), record.home)
+
+    def at_home_since(self, uav_id: str) -> float | None:
+        """Return since when a UAV is on the ground at its home [s]; None: it is not."""
+        return self._landed.get(uav_id)
+
+    @property
+    def stop_time(self) -> float:
+        """The time that a stop costs the UAVs of the fleet on average [s]."""
+        return self._all_stops.mean
+
+    def pace(self, uav_id: str) -> FlightPace:
+        """Return how fast a known UAV flies: as measured where it was, else as planned."""
+        pace = self._moving_pace(uav_id)
+        own = self._stops.get(uav_id)
+        stops = own if own is not None and own.count >= _OWN_STOPS else self._all_stops
+        return FlightPace(pace.speed, pace.climb, pace.descent, pace.wind, stops.mean)
+
+    def _moving_pace(self, uav_id: str) -> FlightPace:
+        """The pace without stops."""
+        planned = self._planned(self._fleet.records[uav_id].report)
+        speed, wind = self.wind.of(uav_id, planned.speed)
+        return FlightPace(speed, planned.climb, planned.descent, wind)
+
+    def _planned(self, report: UavReport) -> FlightPace:
+        params = self._params()
+        return FlightPace(report.cruise_speed or params.default_cruise_speed,
+                          report.climb_speed or params.default_climb_speed,
+                          report.descent_speed or params.default_descent_speed)
