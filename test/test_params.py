@@ -71,6 +71,6 @@ def test_the_objectives_of_the_allocator_are_those_of_the_solver():
 @pytest.mark.parametrize('weights', [(1.0,), (1.0, 0.0, 0.0, 0.0, -1.0),
                                      (math.nan, 0.0, 0.0, 0.0, 0.0)])
 def test_the_weights_of_an_objective_are_five_prices_or_none(weights):
-    with pytest.raises(InvalidValue, match='objective_weights = .*: expected five numbers'):
+    with pytest.raises(InvalidValue, match=r'objective_weights = .*: expected five numbers'):
         params.AllocatorParams(objective_weights=weights)
     params.AllocatorParams(objective_weights=(1, 0.5, 0, math.inf, math.inf))

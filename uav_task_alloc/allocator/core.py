@@ -125,7 +125,7 @@ class Allocator:
             self._apply(Plan({}), trigger, True, now, stamp)
             schedule.end(now)
         elif (params.background_budget > 0.0 and schedule.rested(now, params.background_period)
-              and world.any_usable() and world.any_open()):
+              and world.any_usable() and world.tasks.open()):
             schedule.begin(now)
             return replan_problem(world, self._best, 'background', background=True,
                                   stamp=stamp)

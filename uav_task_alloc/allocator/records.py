@@ -18,7 +18,8 @@ REPORTED_LIMITS = ('endurance', 'payload_capacity', 'climb_speed', 'descent_spee
               'turnaround')
 
 
-Trips = dict[str, tuple[tuple[str, ...], ...]]  # task ids of each trip, by UAV id
+# task ids of each trip after the present one, by UAV id
+LaterTrips = dict[str, tuple[tuple[str, ...], ...]]
 
 
 class TaskState(Enum):

@@ -25,7 +25,7 @@ def objective_of(params: AllocatorParams) -> Objective:
         params.objective]
 
 
-def has_times(task: Task) -> bool:
+def is_timed(task: Task) -> bool:
     """Whether a task has a window, a release or a payload.
 
     Args:
@@ -46,7 +46,7 @@ def counts_time(tasks: Iterable[Task], objective: Objective, trips: int) -> bool
     Returns:
         False for a problem of distances alone.
     """
-    return trips > 1 or not objective.is_shortest or any(map(has_times, tasks))
+    return trips > 1 or not objective.is_shortest or any(map(is_timed, tasks))
 
 
 def from_now(problem: ReplanProblem) -> ReplanProblem:

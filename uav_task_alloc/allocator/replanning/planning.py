@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
-from uav_task_alloc.allocator.records import ReplanAnswer, ReplanProblem, Trips, UavList
+from uav_task_alloc.allocator.records import LaterTrips, ReplanAnswer, ReplanProblem, UavList
 from uav_task_alloc.allocator.replanning.from_now import counts_time, from_now, objective_of
 from uav_task_alloc.allocator.replanning.held_deadlines import (
     with_deadlines_held,
@@ -38,7 +38,7 @@ class BuiltLists:
     zones_when_built: dict[str, tuple[SafePaths, Point]] = field(default_factory=dict)
     # UAV -> whether it has a safe path home, and from where [m]
     paths_home: dict[str, tuple[bool, Point]] = field(default_factory=dict)
-    later: Trips = field(default_factory=dict)  # after the lists
+    later: LaterTrips = field(default_factory=dict)  # after the lists
 
 
 def replan_problem(world: World, best: Plan, trigger: str, background: bool,

@@ -21,6 +21,10 @@ class Predictions:
     Args:
         world: of the allocator.
         now: [s] steady clock.
+
+    Arguments of methods:
+        now: [s] steady clock.
+        stamp: [s] published clock.
     """
 
     def __init__(self, world: World, now: float) -> None:
@@ -30,15 +34,7 @@ class Predictions:
         self._news = False  # since the last allocation
 
     def tick(self, now: float, stamp: float) -> bool:
-        """Predict where a period is over.
-
-        Args:
-            now: [s] steady clock.
-            stamp: [s] published clock.
-
-        Returns:
-            Whether the allocation is to be published again.
-        """
+        """Predict where a period is over; returns whether to publish the allocation again."""
         if now >= self._next:
             lists = self.lists(stamp)
             stops = sum(len(each.stops) for each in lists.values())
@@ -50,7 +46,7 @@ class Predictions:
         return True
 
     def lists(self, stamp: float) -> dict[str, UavList]:
-        """Return the lists in force with times from now, by UAV."""
+        """Return the lists in force with times from `stamp` [s], by UAV."""
         world = self._world
         return {uav_id: world.lists.restamped(uav_id, stamp, world.flights.of(uav_id, stamp))
                 for uav_id, each in world.lists_in_force().items()}

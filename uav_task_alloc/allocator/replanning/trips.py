@@ -10,14 +10,14 @@ import math
 from collections.abc import Collection
 from dataclasses import replace
 
-from uav_task_alloc.allocator.records import Trips
+from uav_task_alloc.allocator.records import LaterTrips
 from uav_task_alloc.allocator.state.world import World
 from uav_task_alloc.model import Plan, Uav
 
 _OVERDUE = 3.0  # times its turnaround after which a UAV at its home is not counted on
 
 
-def present_trips(chosen: Plan, later_only: Collection[str]) -> tuple[Plan, Trips]:
+def present_trips(chosen: Plan, later_only: Collection[str]) -> tuple[Plan, LaterTrips]:
     """Divide a plan.
 
     Args:
@@ -27,7 +27,7 @@ def present_trips(chosen: Plan, later_only: Collection[str]) -> tuple[Plan, Trip
     Returns:
         The plan of the present trips, and the task ids of the later ones, by UAV.
     """
-    routes, legs, later = dict[str, tuple[str, ...]](), dict(chosen.legs), Trips({})
+    routes, legs, later = dict[str, tuple[str, ...]](), dict(chosen.legs), LaterTrips({})
     for uav_id in chosen.routes:
         trips = chosen.trips_of(uav_id)
         if uav_id in later_only:

@@ -30,7 +30,11 @@ class FlightPace:
 
     @classmethod
     def of(cls, uav: Uav) -> FlightPace:
-        """The pace of a UAV as planned, without wind."""
+        """Return the pace of a UAV as planned, without wind.
+
+        Args:
+            uav: with its speeds.
+        """
         return cls(uav.cruise_speed, uav.climb_speed, uav.descent_speed)
 
     def ground_speed(self, dx: float, dy: float) -> float:
@@ -74,16 +78,21 @@ class UavFlight:
     """Where a UAV is, what it is doing, and how fast it flies."""
 
     position: Point  # [m] ENU
-    pace: FlightPace
+    pace: FlightPace  # as measured
     stamp: float = 0.0  # [s] ROS clock at the position
-    on_ground: bool = False
+    on_ground: bool = False  # it has to take off
     serving: str = ''  # id of the task that it has reached and not completed
     served: float = 0.0  # [s] since it reached that
     home: Point | None = None  # [m] ENU
 
     @classmethod
     def of(cls, uav: Uav, stamp: float = 0.0) -> UavFlight:
-        """The flight of a UAV as planned."""
+        """Return the flight of a UAV as planned.
+
+        Args:
+            uav: with its position and speeds.
+            stamp: [s] ROS clock.
+        """
         return cls(uav.position, FlightPace.of(uav), stamp, home=uav.home)
 
 

@@ -9,6 +9,7 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 
 from uav_task_alloc.allocator.records import (
     AnnouncementAction,
+    LaterTrips,
     LogNote,
     Outbox,
     SavedState,
@@ -17,7 +18,6 @@ from uav_task_alloc.allocator.records import (
     TaskRecord,
     TaskState,
     TaskVerdict,
-    Trips,
     UavList,
     UavReport,
 )
@@ -73,6 +73,7 @@ class World:
         warning: its level in the log; otherwise information.
         kind: of a journal row.
         resend: publish unchanged lists, too.
+        returns: whether the list should end with a return home.
         debug: at the level debug.
     """
 
@@ -89,7 +90,7 @@ class World:
         self._paths_params = params
         self._resend = {each.uav for each in saved.lists}  # UAVs whose lists are resent
         self._unsaved: set[str] = set()  # rows not yet on disk: 'zones', 'off', ...
-        self.later = Trips()  # of the plan in force, after the lists
+        self.later = LaterTrips()  # of the plan in force, after the lists
         self.tasks = TaskRegistry(saved.tasks)
         self.fleet = Fleet(saved.switched_off, {
             record.uav: record.task.id for record in saved.tasks
@@ -290,10 +291,6 @@ class World:
     def any_usable(self) -> bool:
         """Return whether a UAV may be given tasks."""
         return any(map(self.fleet.usable, self.fleet.records))
-
-    def any_open(self) -> bool:
-        """Return whether a task is still to be done."""
-        return any(record.open for record in self.tasks.records.values())
 
     def home_of(self, uav_id: str) -> Point:
         """Return the home of a known UAV [m]."""
