@@ -111,7 +111,8 @@ def test_a_burst_causes_one_plan_and_only_changed_lists_are_published(start, pro
         fleet.tasks.publish(add(task(f't{k + 1}', 1010 + k, service_time=Duration(sec=2))))
     probe.until(lambda: len(fleet.route('b') or ()) == 20)
     late = probe.collect(m.TaskList, 'b/task_list', LATCHED)
-    probe.until(lambda: late)  # time enough for a second plan, if there were one
+    # time enough for a second plan, if there were one
+    probe.until(lambda: late and len(fleet.allocations) > before)
     assert late[-1].revision == fleet.lists['b'].revision == 1
     assert len(fleet.allocations) - before == 1
     first, second = fleet.lists['b'].tasks[:2]
