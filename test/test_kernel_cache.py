@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The kernel cache: edited sources are compiled again, old entries removed, Ctrl-C ends it."""
 import ast
+import io
 import os
 import shutil
 import signal
@@ -8,11 +9,12 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
 import uav_task_alloc
-from uav_task_alloc.kernel_cache import kernel_sources, sources_hash
+from uav_task_alloc.kernel_cache import CompilationNotice, Work, kernel_sources, sources_hash
 
 PACKAGE = Path(uav_task_alloc.__file__).parent
 INNER = {'inline_kernel', 'inner_kernel', 'inner_allocating_kernel'}
@@ -91,6 +93,30 @@ def test_folders_of_other_sources_are_removed_when_a_kernel_is_written(package):
     folders = {folder.name for folder in cache.glob('kernels-*')}
     assert folders == {'kernels-recent', f'kernels-{sources_hash.__wrapped__(package)}'}
     assert not list(cache.glob('*.nb*'))
+
+
+def compile_ten(stream):
+    """Ten of twenty kernels take a second each; what is written to a stream."""
+    now = [0.0]
+    notice = CompilationNotice(lambda: now[0])
+    with notice.shown_on(stream), notice.until_loaded('some', Work(35.0, 20)):
+        for i in range(11):
+            event = SimpleNamespace(data={'module': 'uav_task_alloc.a', 'qualname': f'k{i}',
+                                          'name': 'native_lowering [k]'})
+            notice.on_start(event)
+            now[0] += 1.0
+            notice.on_end(event)
+    return stream.getvalue().split('\r\x1b[K')
+
+
+def test_a_terminal_shows_which_kernel_of_how_many_and_the_time_left(capsys):
+    terminal = io.StringIO()
+    terminal.isatty = lambda: True
+    shown = compile_ten(terminal)
+    assert shown[1] == 'compiling kernel 1 of 20, about 35 s left: k0'
+    assert shown[11:] == ['compiling kernel 11 of 20, about 10 s left: k10', '']
+    assert compile_ten(io.StringIO()) == ['']
+    assert capsys.readouterr().err == 2 * 'compiling kernels (once, about 35 s)\n'
 
 
 @pytest.mark.parametrize(('written', 'code', 'status'), [

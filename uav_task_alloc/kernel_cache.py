@@ -7,6 +7,7 @@ keyed by the kernel's own file. Here the key is a hash of all files with kernels
 from __future__ import annotations
 
 import functools
+import gc
 import hashlib
 import re
 import shutil
@@ -14,17 +15,36 @@ import signal
 import sys
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple, TextIO
 
 from numba.core import caching, event
 
 ROOMS = ('geometry', 'solver')
-# [s] of CPU to compile the kernels of chain_q, of problems with time, and of paths around zones
-PLAN_COMPILE_TIME, TIMED_COMPILE_TIME, ZONES_COMPILE_TIME = 22.0, 27.0, 18.0
+
+
+class Work(NamedTuple):
+    """What it takes to compile some kernels."""
+
+    seconds: float  # of CPU
+    kernels: int  # that are compiled one after another
+
+    def plus(self, other: Work) -> Work:
+        """Both."""
+        return Work(self.seconds + other.seconds, self.kernels + other.kernels)
+
+
+NO_WORK = Work(0.0, 0)
+# chain_q up to its first plan, its search; the same of problems with time; paths around zones;
+# on a core of an Intel Xeon server
+FIRST_WORK, SEARCH_WORK = Work(7.0, 28), Work(11.0, 51)
+TIMED_FIRST_WORK, TIMED_SEARCH_WORK = Work(14.0, 67), Work(7.0, 20)
+ZONES_WORK = Work(14.0, 102)
 _UNUSED = 600.0  # [s] a folder of another hash is kept after the last write: it may be in use
+_SELDOM = 300_000, 50, 1000  # thresholds of the garbage collection, else a tenth of a load
+_COUNT_ON = 10  # kernels, before the time left follows from them
 _FOLDER = 'kernels-'
 # comments and docstrings; whatever has a quote in it and is no docstring stays
 _NO_CODE = re.compile(r'^\s*""".*?"""$|\s*#[^\'"\n]*$', re.MULTILINE | re.DOTALL)
@@ -114,18 +134,28 @@ def kernel_folders() -> list[Path]:
 
 
 class CompilationNotice(event.Listener):
-    """Prints once on stderr that kernels are compiled, and lets Ctrl-C end the process meanwhile.
+    """Reports on stderr that kernels are compiled, and lets Ctrl-C end the process meanwhile.
+
+    A line is printed once for each load, and on a terminal another one counts the kernels.
 
     Python would handle SIGINT only when LLVM returns, seconds later. The signal's default action
     stands in for Python's own handler while a kernel is compiled in the main thread of a program;
     any other handler, and that of an interactive session, stays.
+
+    Args:
+        clock: [s], monotonic.
     """
 
-    def __init__(self) -> None:
-        self._printed = False
+    def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
+        self.compiled = 0  # kernels of this package since the process began
+        self._clock = clock
+        self._terminal: TextIO | None = None
+        self._printed, self._loaded = False, set[object]()
         self._depth = 0  # passes under way in the main thread: a kernel compiles those it calls
-        self._expected = PLAN_COMPILE_TIME + ZONES_COMPILE_TIME  # [s] of CPU
+        self._now, self._later = FIRST_WORK.plus(SEARCH_WORK).plus(ZONES_WORK), NO_WORK
+        self._began, self._compiled_before = 0.0, 0  # when the line was printed
         self._loading = 0  # in the main thread: depth of `until_loaded`
+        self._loads, self._thresholds = 0, gc.get_threshold()  # in all threads
         self._replaced: Any = None
 
     def on_start(self, event: Any) -> None:
@@ -137,38 +167,102 @@ class CompilationNotice(event.Listener):
                     and signal.getsignal(signal.SIGINT) is signal.default_int_handler):
                 self._replaced = signal.signal(signal.SIGINT, signal.SIG_DFL)
         if ours and not self._printed:
-            self._printed = True
-            print(f'compiling kernels (once, about {self._expected:.0f} s)', file=sys.stderr,
-                  flush=True)
+            self._print_once()
+        if ours and _is_lowering(event):
+            self._show(f'compiling kernel {self._count() + 1} of {self._total()}, '
+                       f'about {self._time_left():.0f} s left: {event.data["qualname"]}')
 
     def on_end(self, event: Any) -> None:
         """It ends."""
+        if str(event.data['module']).startswith(f'{__package__}.') and _is_lowering(event):
+            self.compiled += 1
         if threading.current_thread() is threading.main_thread() and self._depth:
             self._depth -= 1
             self._restore()
 
     @contextmanager
-    def until_loaded(self, expected: float) -> Iterator[None]:
+    def until_loaded(self, key: object, first: Work, rest: Work = NO_WORK,
+                     search: bool = True) -> Iterator[None]:
         """Within it, from the first compilation to the end, Ctrl-C ends the process at once.
 
         Args:
-            expected: [s] of CPU to compile all that is loaded.
+            key: of what is loaded.
+            first: the kernels up to a first plan, which are loaded once.
+            rest: those of the search.
+            search: whether the search is loaded, too.
         """
-        self._expected = expected
+        left = NO_WORK if key in self._loaded else first
+        self._now, self._later = (left.plus(rest), NO_WORK) if search else (left, rest)
+        self._printed = False
         main = threading.current_thread() is threading.main_thread()
         self._loading += main
+        self._loads += 1
+        if self._loads == 1:
+            self._thresholds = gc.get_threshold()
+            gc.set_threshold(*_SELDOM)
         try:
             yield
+            self._loaded.add(key)
         finally:
+            self._loads -= 1
+            if self._loads == 0:
+                gc.set_threshold(*self._thresholds)
+            self._show('')
             self._loading -= main
             if main:
                 self._restore()
+
+    @contextmanager
+    def shown_on(self, stream: TextIO) -> Iterator[None]:
+        """Within it, kernels are counted on a stream.
+
+        Args:
+            stream: nothing is shown where it is no terminal.
+        """
+        self._terminal = stream if stream.isatty() else None
+        try:
+            yield
+        finally:
+            self._terminal = None
+
+    def _print_once(self) -> None:
+        self._printed, self._began, self._compiled_before = True, self._clock(), self.compiled
+        text = f'{self._now.seconds:.0f} s'
+        if self._later.seconds:
+            text += (f' to a first plan, {self._now.seconds + self._later.seconds:.0f} s in all')
+        print(f'compiling kernels (once, about {text})', file=sys.stderr, flush=True)
+
+    def _count(self) -> int:
+        """Kernels compiled in this load."""
+        return self.compiled - self._compiled_before
+
+    def _total(self) -> int:
+        """Kernels to compile in this load; fewer where some are on disk."""
+        return max(self._now.kernels, self._count() + 1)
+
+    def _time_left(self) -> float:
+        """[s] of this load: by the kernels so far, after some of them."""
+        left = self._total() - self._count()
+        if self._count() < _COUNT_ON:
+            return self._now.seconds * left / self._total()
+        return (self._clock() - self._began) / self._count() * left
+
+    def _show(self, text: str) -> None:
+        """Replace the line on the terminal."""
+        if self._terminal is not None:
+            self._terminal.write(f'\r\x1b[K{text}')
+            self._terminal.flush()
 
     def _restore(self) -> None:
         """Restore Python's handler of SIGINT after the last pass and the loading."""
         if self._depth == 0 and self._loading == 0 and self._replaced is not None:
             signal.signal(signal.SIGINT, self._replaced)
             self._replaced = None
+
+
+def _is_lowering(event: Any) -> bool:
+    """Whether a pass is the one that makes machine code, the longest of a kernel."""
+    return str(event.data['name']).startswith('native_lowering')
 
 
 NOTICE = CompilationNotice()

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Ctrl-C from the start of a program to its end: one line and status 130, no traceback."""
+import json
 import os
 import re
 import signal
@@ -72,6 +73,25 @@ def test_ctrl_c_during_a_compilation_is_one_line(tmp_path):
         assert process.stderr.readline().startswith('compiling kernels')
         out, err = press_ctrl_c(process)
     assert (process.returncode, out, err) == (130, '', 'interrupted\n')
+
+
+def test_ctrl_c_while_the_search_is_compiled_prints_the_first_plan(tmp_path):
+    file, out = tmp_path / 'one.yaml', tmp_path / 'plan.json'
+    file.write_text('uavs: [{id: u, position: [0, 0, 50]}]\n'
+                    'tasks: [{id: t, position: [90, 0, 50]}]\n')
+    with start('plan', str(file), '--json', str(out), NUMBA_CACHE_DIR=str(tmp_path)) as process:
+        assert process.stderr.readline().startswith('compiling kernels')
+        assert process.stderr.readline().startswith('compiling kernels')
+        assert process.stderr.readline() == (
+            'first plan, by insertion: 1 tasks, 0 unassigned, 90 m; Ctrl-C stops and keeps it\n')
+        printed, err = press_ctrl_c(process)
+    assert (process.returncode, err) == (
+        130, 'stopped before the search: its kernels were not compiled yet\n')
+    assert '1 tasks planned' in printed
+    assert 'insertion' in printed
+    assert json.loads(out.read_text())['routes'] == {'u': ['t']}
+    assert list(tmp_path.rglob('insertion.*.nbc'))
+    assert not list(tmp_path.rglob('recombine.*.nbc'))
 
 
 def test_ctrl_c_ends_a_benchmark_and_all_its_processes(tmp_path):

@@ -19,12 +19,15 @@ def loaded():
             if isinstance(kernel, CPUDispatcher) for each in kernel.signatures}
 
 
-load_kernels()
+load_kernels(search=False)
 before = loaded()
 uavs = [Uav(f'u{i}', (100.0 * i, 0.0, 0.0), 150.0) for i in range(4)]
 tasks = [Task(f't{i}', (10.0 * i, 40.0 + 7.0 * (i % 5), 0.0), value=1.0 + i % 3,
               allowed_uavs=frozenset({'u1'}) if i % 9 == 0 else None) for i in range(40)]
 dome = ThreatZone.hemisphere('dome', (150.0, 40.0, 0.0), 20.0)
+plan(uavs, tasks, max_iterations=0)
+print('late:', *sorted(loaded() - before))
+load_kernels()
 load_kernels(zones=True)
 before |= loaded()
 for zones, end, hard in (((), 'hold', True), ((dome,), 'home', True), ((), 'home', False)):
@@ -35,10 +38,10 @@ print('late:', *sorted(loaded() - before))
 """
 
 
-def test_a_tight_world_with_zones_finds_all_kernels_loaded():
+def test_a_first_plan_and_a_tight_world_with_zones_find_all_kernels_loaded():
     done = subprocess.run([sys.executable, '-c', SCRIPT], capture_output=True, text=True,
                           check=True)
-    assert done.stdout == 'late:\n'
+    assert done.stdout == 'late:\nlate:\n'
 
 
 NO_ZONES = """
@@ -58,22 +61,28 @@ def test_without_zones_no_kernel_that_finds_paths_around_them_is_loaded():
 
 
 NOTICE = """
-from uav_task_alloc.kernel_cache import NOTICE
+from uav_task_alloc.kernel_cache import NOTICE, Work
 from uav_task_alloc.solver.{solver} import {load}
 
-with NOTICE.until_loaded(99.0):  # compiles nothing, prints nothing
+with NOTICE.until_loaded('other', Work(99.0, 9)):  # compiles nothing, prints nothing
     pass
-{load}(zones={zones})
-NOTICE.on_start(type('Event', (), dict(data=dict(module='uav_task_alloc.a'))))
+{load}(zones={zones}, search=False)
+if {search}:
+    {load}(zones={zones})
+NOTICE.on_start(type('Event', (), dict(data=dict(module='uav_task_alloc.a', name='ssa'))))
 """
+STATED = r'compiling kernels \(once, about (\d+) s(?: to a first plan, (\d+) s in all)?\)\n'
 
 
 def test_the_notice_states_the_time_of_what_is_loaded():
-    def stated(solver, load, zones):
-        done = subprocess.run(
-            [sys.executable, '-c', NOTICE.format(solver=solver, load=load, zones=zones)],
+    def stated(solver, load, zones, search):
+        done = subprocess.run([sys.executable, '-c', NOTICE.format(
+            solver=solver, load=load, zones=zones, search=search)],
             capture_output=True, text=True, check=True)
-        return float(re.fullmatch(r'compiling kernels \(once, about (\d+) s\)\n',
-                                  done.stderr).group(1))
-    for solver, load in (('solve', 'load_kernels'), ('timed.solve', 'load_timed_kernels')):
-        assert 0.0 < stated(solver, load, False) < stated(solver, load, True) < 99.0
+        return [float(each or 0.0) for each in re.fullmatch(STATED, done.stderr).groups()]
+    for names in (('solve', 'load_kernels'), ('timed.solve', 'load_timed_kernels')):
+        first, whole = stated(*names, False, False)
+        first_zones, whole_zones = stated(*names, True, False)
+        assert 0.0 < first < whole < whole_zones < 99.0
+        assert first < first_zones
+        assert stated(*names, True, True) == [whole - first, 0.0]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+import sys
 from collections.abc import Sequence
 
 from uav_task_alloc.cli.options import OptionParser
@@ -17,7 +18,7 @@ def main(argv: Sequence[str]) -> int:
         SystemExit: the arguments are malformed, or ask for the help.
     """
     parser = OptionParser(
-        'compile', 'Compile all kernels ahead of time, about 40 s once for each '
+        'compile', 'Compile all kernels ahead of time, about 50 s once for each '
         'installation, and print the folders of the cache. They are __pycache__ beside the '
         "sources where that can be written, else in the user's cache directory, or in "
         'NUMBA_CACHE_DIR if that is set.')
@@ -25,7 +26,7 @@ def main(argv: Sequence[str]) -> int:
                         help='remove the compiled kernels instead, before the package is '
                              'uninstalled (default: compile)')
     remove = parser.parsed(argv).remove
-    from uav_task_alloc.kernel_cache import kernel_folders  # imports numba
+    from uav_task_alloc.kernel_cache import NOTICE, kernel_folders  # imports numba
     if remove:
         for folder in kernel_folders():
             shutil.rmtree(folder)
@@ -33,7 +34,8 @@ def main(argv: Sequence[str]) -> int:
         return 0
     from uav_task_alloc.allocator.warm_up import compile_kernels
     from uav_task_alloc.solver.solve import plan
-    compile_kernels(plan, AllocatorParams())
+    with NOTICE.shown_on(sys.stderr):
+        compile_kernels(plan, AllocatorParams())
     for folder in kernel_folders():
         size = sum(path.stat().st_size for path in folder.iterdir())
         print(f'{folder}: {size / 1e6:.1f} MB')

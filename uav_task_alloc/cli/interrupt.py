@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import os
 import signal
+import sys
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from typing import NoReturn
 
 INTERRUPTED = 130  # exit status of a shell after Ctrl-C
 
@@ -53,6 +55,18 @@ def resumable() -> Iterator[None]:
     finally:
         if prompt:
             signal.signal(signal.SIGINT, _leave_to_the_thread)
+
+
+def end_process(status: int) -> NoReturn:
+    """End the process at once, with what it has printed.
+
+    Args:
+        status: of the exit.
+    """
+    for stream in (sys.stdout, sys.stderr):
+        with suppress(OSError, ValueError):
+            stream.flush()
+    os._exit(status)
 
 
 def _leave_to_the_thread(number: int, frame: object) -> None:

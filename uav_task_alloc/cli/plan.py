@@ -6,11 +6,12 @@ import argparse
 import json
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import fields, replace
 from pathlib import Path
 
 from uav_task_alloc import scenario
+from uav_task_alloc.cli.early_plan import EarlyPlan, counted_kernels
 from uav_task_alloc.cli.interrupt import INTERRUPTED
 from uav_task_alloc.cli.options import OptionParser, one_of
 from uav_task_alloc.cli.outputs import (
@@ -44,31 +45,44 @@ def main(argv: Sequence[str]) -> int:
     args = _make_parser().parsed(argv)
     check_outputs(args)
     loaded = with_options(without_cancelled(scenario.load(args.scenario)), args)
-    _load_kernels(loaded, args.solver)
-    for text in start_warnings(loaded):
-        log_line(f'Warning: {text}')
-    with SolveProgress(args.budget, sys.stderr, time.monotonic) as progress:
-        result = solve_scenario(loaded, args, progress)
+    with counted_kernels():
+        _load_kernels(loaded, args.solver, search=False)
+        for text in start_warnings(loaded):
+            log_line(f'Warning: {text}')
+        with SolveProgress(args.budget, sys.stderr, time.monotonic) as progress:
+            early = EarlyPlan(lambda: _load_kernels(loaded, args.solver),
+                              lambda stop: solve_scenario(loaded, args, stop, max_iterations=0),
+                              progress)
+            first = early.wait()
+            result = first or solve_scenario(loaded, args, progress.stop, progress.on_iteration)
+    with early.ending(INTERRUPTED):
+        _answer(loaded, result, args)
+        if first:
+            log_line('stopped before the search: its kernels were not compiled yet')
+        elif progress.interrupted:
+            log_line(f'stopped after {result.solve_time:.1f} s of {args.budget:g} s: '
+                     'the best plan so far')
+    return INTERRUPTED if progress.interrupted else 0
+
+
+def _answer(loaded: Scenario, result: Plan, args: argparse.Namespace) -> None:
+    """Print a plan and write the files."""
     try:
         print(plan_text(result), flush=True)
         if args.times or has_times(loaded):
             print(times_text([timed.task for timed in loaded.tasks], result), flush=True)
     finally:  # also where nobody reads what is printed
         write_outputs(loaded, result, args)
-    if progress.interrupted:
-        log_line(f'stopped after {result.solve_time:.1f} s of {args.budget:g} s: '
-                 'the best plan so far')
-    return INTERRUPTED if progress.interrupted else 0
 
 
-def _load_kernels(loaded: Scenario, solver: str) -> None:
-    """Load what a scenario needs, or compile it. Raises UnknownName."""
+def _load_kernels(loaded: Scenario, solver: str, search: bool = True) -> None:
+    """Load what a scenario needs, or compile it; not all for a first plan. Raises UnknownName."""
     from uav_task_alloc.solver.solve import load_kernels  # imports numba
     from uav_task_alloc.solver.timed.solve import SOLVER_NAME, load_timed_kernels
     if not has_times(loaded):
-        load_kernels(solver, bool(loaded.zones))
+        load_kernels(solver, bool(loaded.zones), search)
     elif solver == SOLVER_NAME:  # `plan` refuses others
-        load_timed_kernels(bool(loaded.zones))
+        load_timed_kernels(bool(loaded.zones), search)
 
 
 def _make_parser() -> OptionParser:
@@ -160,7 +174,9 @@ def with_options(loaded: Scenario, args: argparse.Namespace) -> Scenario:
     return changed
 
 
-def solve_scenario(loaded: Scenario, args: argparse.Namespace, progress: SolveProgress) -> Plan:
+def solve_scenario(loaded: Scenario, args: argparse.Namespace, stop: Callable[[], bool],
+                   on_iteration: Callable[[int, float], None] | None = None,
+                   max_iterations: int | None = None) -> Plan:
     """Plan all tasks of a scenario around all its zones."""
     from uav_task_alloc.solver.solve import plan  # imports numba
     return plan([uav.uav for uav in loaded.uavs], [timed.task for timed in loaded.tasks],
@@ -168,7 +184,7 @@ def solve_scenario(loaded: Scenario, args: argparse.Namespace, progress: SolvePr
                 seed=loaded.seed, route_end=loaded.route_end, objective=loaded.objective,
                 trips=loaded.trips, clearance=loaded.clearance,
                 altitude_min=loaded.altitude_min, altitude_max=loaded.altitude_max,
-                stop=progress.stop, on_iteration=progress.on_iteration)
+                stop=stop, on_iteration=on_iteration, max_iterations=max_iterations)
 
 
 def plan_text(result: Plan) -> str:

@@ -372,6 +372,8 @@ class Distances:
 
     def zones_around(self, i: int) -> tuple[str, ...]:
         """Ids of the enlarged zones that point i is inside of."""
+        if not self.zones:  # the kernel is not loaded
+            return ()
         return tuple(self.zones[k].id
                      for k in containing_zones(self._obstacles.rows, *self._point(i)))
 

@@ -47,6 +47,8 @@ def zones_around(point: Iterable[float], zones: Sequence[ThreatZone],
         InvalidValue: as `inside`.
     """
     packed, place = pack(zones, clearance), check_point('point', point)
+    if not zones:  # the kernel is not loaded
+        return ()
     return tuple(zones[k] for k in containing_zones(packed.rows, *place))
 
 

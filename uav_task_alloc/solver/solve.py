@@ -13,11 +13,7 @@ import numpy as np
 
 from uav_task_alloc.errors import InvalidValue, UnknownName
 from uav_task_alloc.geometry.detour import find_detour
-from uav_task_alloc.kernel_cache import (
-    NOTICE,
-    PLAN_COMPILE_TIME,
-    ZONES_COMPILE_TIME,
-)
+from uav_task_alloc.kernel_cache import FIRST_WORK, NO_WORK, NOTICE, SEARCH_WORK, ZONES_WORK
 from uav_task_alloc.model import Leg, Plan, Task, ThreatZone, Uav
 from uav_task_alloc.objective import Objective, Weights, check_objective, needs_time
 from uav_task_alloc.solver.answer import to_plan
@@ -92,7 +88,7 @@ def plan(uavs: Iterable[Uav], tasks: Iterable[Task], zones: Iterable[ThreatZone]
         return solve_timed(fleet, work, check_locked(locked, fleet, work), limits, rules, warm,
                            budget=budget, seed=seed, threads=threads, stop=stop,
                            max_iterations=max_iterations, on_iteration=on_iteration, clock=clock)
-    load_kernels(solver, bool(limits.zones))
+    load_kernels(solver, bool(limits.zones), max_iterations != 0)
     began, before = clock(), WarmState.of(warm)
     search = PathPreparation(clock, began, budget, stop, before.flown())
     problem = make_problem(fleet, work, check_locked(locked, fleet, work), limits, rules,
@@ -134,36 +130,41 @@ def _check_takes_time(solver: str) -> None:
 
 
 @functools.cache
-def load_kernels(solver: str = 'chain_q', zones: bool = False) -> None:
+def load_kernels(solver: str = 'chain_q', zones: bool = False, search: bool = True) -> None:
     """Load a solver's kernels, compile those not on disk yet; further calls do nothing.
 
     Args:
         solver: a name in SOLVERS.
         zones: whether to load the kernels that find paths around zones, too.
+        search: False: only what a plan of no iterations needs; chain_q alone has less to load.
 
     Raises:
         UnknownName: there is no such solver.
     """
     _check_solver(solver)
-    with NOTICE.until_loaded(PLAN_COMPILE_TIME + zones * ZONES_COMPILE_TIME):
-        _call_kernels(solver, zones)
+    search = search or solver != 'chain_q'
+    first = FIRST_WORK.plus(ZONES_WORK if zones else NO_WORK)
+    with NOTICE.until_loaded(('chain_q', zones), first, SEARCH_WORK, search):
+        _call_kernels(solver, zones, search)
 
 
-def _call_kernels(solver: str, zones: bool) -> None:
+def _call_kernels(solver: str, zones: bool, search: bool) -> None:
     """Solve a small world, so that each kernel is called."""
     uavs = (Uav('u', (0.0, 0.0, 0.0)), Uav('v', (9.0, 0.0, 0.0), 30.0))
     tasks = tuple(Task(f't{i}', (float(i), 1.0, 0.0)) for i in range(5))
     between = (*(ThreatZone.cylinder(f'z{x}', (x, 1.0), 0.3) for x in (1.5, 2.5, 4.0)),
                ThreatZone.hemisphere('dome', (3.5, 1.5, 0.0), 0.3),
                ThreatZone.polygon('prism', ((0.4, 0.9), (0.6, 0.9), (0.5, 1.1)))) if zones else ()
-    search = PathPreparation(lambda: 0.0, 0.0, 1.0, flown={'u': (('t0',), (Leg((), 0.0),))})
-    problem = make_problem(uavs, tasks, {}, Limits(between), Rules(returns=True), None, search)
+    paths = PathPreparation(lambda: 0.0, 0.0, 1.0, flown={'u': (('t0',), (Leg((), 0.0),))})
+    problem = make_problem(uavs, tasks, {}, Limits(between), Rules(returns=True), None, paths)
     rounds = 500 if solver == 'chain_q' else 64  # until each kind of bee has had a flight
+    rounds *= search
     recorder = Recorder(lambda: 0.0, 0.0, 1.0, max_iterations=rounds, problem=problem)
     SOLVERS[solver](recorder, 0, None)
     to_plan(problem, recorder, '', False)
     place_all(problem.arrays, recorder.best, np.empty(0, np.int64))  # these two are only called
-    trim_to_range(problem.arrays, recorder.best)  # where ranges do not suffice
+    if rounds:
+        trim_to_range(problem.arrays, recorder.best)  # where ranges do not suffice
     if zones:
         problem.distances.offer_path(0, len(uavs), ())
-        find_detour(tasks[1].position, uavs[1].position, between, budget=search.path_budget)
+        find_detour(tasks[1].position, uavs[1].position, between, budget=paths.path_budget)

@@ -7,7 +7,13 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
-from uav_task_alloc.kernel_cache import NOTICE, TIMED_COMPILE_TIME, ZONES_COMPILE_TIME
+from uav_task_alloc.kernel_cache import (
+    NO_WORK,
+    NOTICE,
+    TIMED_FIRST_WORK,
+    TIMED_SEARCH_WORK,
+    ZONES_WORK,
+)
 from uav_task_alloc.model import Plan, Task, ThreatZone, Uav
 from uav_task_alloc.solver.chain_q import run_colonies
 from uav_task_alloc.solver.path_preparation import SEARCH_LIMIT, PathPreparation
@@ -53,7 +59,7 @@ def solve_timed(uavs: Sequence[Uav], tasks: Sequence[Task],
     Returns:
         The best plan found, with its times.
     """
-    load_timed_kernels(bool(limits.zones))
+    load_timed_kernels(bool(limits.zones), max_iterations != 0)
     began, before = clock(), WarmState.of(warm)
     search = PathPreparation(clock, began, budget, stop, before.flown())
     known = before.problem
@@ -118,22 +124,24 @@ def _aboard(uavs: Sequence[Uav], locked: Mapping[str, tuple[Task, ...]],
 
 
 @functools.cache
-def load_timed_kernels(zones: bool = False) -> None:
+def load_timed_kernels(zones: bool = False, search: bool = True) -> None:
     """Load the kernels of problems with time, compile those not on disk yet.
 
     Args:
         zones: whether to load the kernels that find paths around zones, too.
+        search: False: only what a plan of no iterations needs.
     """
-    with NOTICE.until_loaded(TIMED_COMPILE_TIME + zones * ZONES_COMPILE_TIME):
-        _call_kernels(zones)
+    first = TIMED_FIRST_WORK.plus(ZONES_WORK if zones else NO_WORK)
+    with NOTICE.until_loaded(('timed', zones), first, TIMED_SEARCH_WORK, search):
+        _call_kernels(zones, search)
 
 
-def _call_kernels(zones: bool) -> None:
+def _call_kernels(zones: bool, search: bool) -> None:
     """Solve a small problem, so that each kernel is called."""
     uavs = (Uav('u', (0.0, 0.0, 0.0), turnaround=1.0), Uav('v', (9.0, 0.0, 0.0), 30.0))
     tasks = tuple(Task(f't{i}', (float(i), 1.0, 0.0), latest=99.0) for i in range(5))
     limits = Limits((ThreatZone.cylinder('z', (2.5, 1.0), 0.3),) if zones else ())
     problem = make_timed(make_problem(uavs, tasks, {}, limits, Rules(trips=2)), {})
-    recorder = TimedRecorder(lambda: 0.0, 0.0, 1.0, max_iterations=100, problem=problem)
+    recorder = TimedRecorder(lambda: 0.0, 0.0, 1.0, max_iterations=100 * search, problem=problem)
     _improve(recorder, 0, WarmState(), None)
     timed_reasons(problem, [0])
