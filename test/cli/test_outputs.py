@@ -4,6 +4,7 @@ import importlib.util
 import os
 import subprocess
 import sys
+import tempfile
 from pathlib import Path
 
 import pytest
@@ -13,6 +14,7 @@ from uav_task_alloc.cli import outputs
 
 ROOT = Path(__file__).parents[2]
 FILE = str(ROOT / 'config/scenarios/plan_only.yaml')
+NOBODY = 65534  # user id
 
 
 @pytest.fixture
@@ -55,11 +57,23 @@ def test_an_output_that_cannot_be_written_is_refused_first(
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.skipif(os.geteuid() == 0, reason='root may write anywhere')
-def test_a_folder_that_is_read_only_is_refused(tmp_path):
-    tmp_path.chmod(0o500)
+@pytest.fixture
+def read_only_folder():
+    """A folder that this process may not write to; root, who may, is another user meanwhile."""
+    with tempfile.TemporaryDirectory() as name:  # others may not enter tmp_path of root
+        user = os.geteuid()
+        Path(name).chmod(0o555)
+        if user == 0:
+            os.seteuid(NOBODY)
+        yield Path(name)
+        os.seteuid(user)
+        Path(name).chmod(0o700)
+
+
+def test_a_folder_that_is_read_only_is_refused(read_only_folder):
     with pytest.raises(outputs.InvalidValue, match='Permission denied'):
-        outputs.check_file('--json', tmp_path / 'plan.json')
+        outputs.check_file('--json', read_only_folder / 'plan.json')
+    assert list(read_only_folder.iterdir()) == []
 
 
 def test_a_file_that_is_there_is_checked_and_left_as_it_is(tmp_path):
