@@ -4,6 +4,12 @@ import math
 from itertools import pairwise
 
 from uav_task_alloc.allocator import Allocator
+from uav_task_alloc.allocator.operator_desk import (
+    OperatorDesk,
+    OrderAction,
+    OrderRequest,
+    OrderTrial,
+)
 from uav_task_alloc.allocator.records import (
     AnnouncementAction,
     TaskEvent,
@@ -11,6 +17,7 @@ from uav_task_alloc.allocator.records import (
     UavReport,
 )
 from uav_task_alloc.allocator.replanning import planning
+from uav_task_alloc.allocator.replanning.what_if import solve_what_if
 from uav_task_alloc.allocator.state.fleet import may_fly
 from uav_task_alloc.geometry.detour import detour
 from uav_task_alloc.model import Leg, Plan, Task
@@ -80,6 +87,7 @@ class AllocatorDriver:
         self.world = self.core.world
         self.lists, self.history, self.notes, self.allocations = {}, [], [], []
         self.forgotten, self.levels = set(), {}  # levels of notes
+        self.holds, self.proposals = {}, []
 
     def uav(self, uav_id, *position, **more):
         return self.world.update_uav(UavReport(uav_id, position, **more), self.now, self.now)
@@ -95,6 +103,16 @@ class AllocatorDriver:
             revision = self.world.lists.get(uav_id).revision
         return self.world.event(TaskEvent(task_id, uav_id, revision, TaskEventKind[kind], reason),
                                 self.now, self.now)
+
+    def order(self, action, uav='', *tasks, **more):
+        """Give an order, and solve what is to be solved for it; returns the answer."""
+        desk, request = OperatorDesk(self.core), OrderRequest(
+            OrderAction[action], uav, tasks, **{'operator': 'ann', **more})
+        answer = desk.open(request, self.now, self.now)
+        if isinstance(answer, OrderTrial):
+            answer = desk.close(answer, solve_what_if(
+                self.plan, answer.problem, self.world.params, lambda: False), self.now, self.now)
+        return answer
 
     def begin(self):
         """Let the burst settle; returns the problem that is due."""
@@ -125,10 +143,13 @@ class AllocatorDriver:
     def take(self):
         out = self.core.collect()
         self.lists.update(out.lists)
+        self.holds.update(out.holds)
         self.forgotten |= out.forgotten
         self.history += out.lists.values()
         self.notes += [note.text for note in out.notes]
         self.levels.update({note.text: note.level for note in out.notes})
+        if out.proposal:
+            self.proposals.append(out.proposal)
         if out.allocation:
             self.allocations.append(out.allocation)
 

@@ -52,6 +52,7 @@ LEVELS = {
     'mavlink.mission': 5,
     'mavlink.gcs': 6,
     'sim': 4,
+    'allocator.order_records': 3,
     'allocator.records': 3,
     'allocator.state': 4,
     'allocator.replanning': 5,

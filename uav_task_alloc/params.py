@@ -178,6 +178,13 @@ class AllocatorParams(FrameParams):
                               high=1000)
     keep_ended: int = param(10_000, 'Ended tasks that are kept, the newest; an older one that is '
                             'announced again is a new task.', low=0, high=1_000_000)
+    approval: str = param('none', 'Which plans wait for an operator: none; those that change the '
+                          'list of a UAV with tasks; all. What is safety never waits.',
+                          choices=('none', 'replan', 'all'))
+    approval_timeout: float = param(30.0, 'Time after which a plan that waits is decided without '
+                                    'an operator.', low=1.0, high=86400.0, unit='s')
+    approval_on_timeout: str = param('reject', 'How it is decided then.',
+                                     choices=('accept', 'reject'))
     state_dir: str = param('', 'Folder of the journal; empty: nothing is stored.', fixed=True)
     threads: int = param(1, 'Colonies of bees, each in its own thread.', low=1, high=64)
     seed: int = param(0, 'Seed of the bees.', low=0, high=2**31 - 1, fixed=True)

@@ -16,16 +16,17 @@ from uav_task_alloc.allocator.records import (
     ReplanProblem,
     SavedState,
 )
-from uav_task_alloc.allocator.replanning.held_deadlines import held_lists
 from uav_task_alloc.allocator.replanning.learned_state import learned_state
 from uav_task_alloc.allocator.replanning.list_rate_limiter import ListRateLimiter
 from uav_task_alloc.allocator.replanning.plan_acceptance import accepted_plan
 from uav_task_alloc.allocator.replanning.planning import (
+    BuiltLists,
     build_lists,
     plan_in_force,
     replan_problem,
 )
 from uav_task_alloc.allocator.replanning.predictions import Predictions
+from uav_task_alloc.allocator.replanning.proposal import Approvals, split_plan
 from uav_task_alloc.allocator.replanning.schedule import Schedule
 from uav_task_alloc.allocator.replanning.task_reasons import task_steps
 from uav_task_alloc.allocator.replanning.trips import waiting_uavs
@@ -68,6 +69,7 @@ class Allocator:
         saved = saved or SavedState()
         self.schedule = Schedule()
         self.world = World(params, saved, make_safe_paths, self.schedule.add_trigger)
+        self.approvals = Approvals(self.world)
         self._best = Plan({each.uav: each.task_ids for each in saved.lists})
         self._learned = saved.learned
         self._learned_saved = now  # [s]
@@ -93,12 +95,14 @@ class Allocator:
         """Apply what follows from time: silent UAVs, shortened lists, the end of the hold."""
         world = self.world
         world.tick(now)
+        self._end_orders(stamp)
         world.publish(world.shortened_lists(stamp), stamp)
         world.publish(world.lists_to_resend(stamp), stamp, resend=True)
         if self._restarted:  # the plan of the previous run is published before any other
             self._restarted = False
             self._allocate(Plan({}), 'restart', stamp)
         self._check_hold(now)
+        self._check_approval(now, stamp)
         if self._limiter.due(now):
             world.request_replan('deferred lists', now)
         world.forget_ended()
@@ -106,12 +110,56 @@ class Allocator:
         if world.outbox.statuses:
             self._step_tasks(stamp)
 
+    def _end_orders(self, stamp: float) -> None:
+        """End the orders whose tasks have ended, and publish the holds that changed."""
+        world = self.world
+        for entry in world.orders.end_fulfilled(world.tasks.why_ended, stamp):
+            world.note(entry.text)
+        for uav_id in world.orders.changed_holds:
+            world.outbox.holds[uav_id] = world.orders.holds[uav_id]
+        world.orders.changed_holds.clear()
+
     def _check_hold(self, now: float) -> None:
         """End the hold after a restart when all awaited UAVs have reported for a while."""
         if self.world.restart_hold and self._waiting(now):
             self._hold_until = now + _RESTART_HOLD
         elif self.world.restart_hold and now >= self._hold_until:
             self.world.release_hold(now)
+
+    def _check_approval(self, now: float, stamp: float) -> None:
+        """Decide an open proposal whose time is over, or that needs no approval any more."""
+        proposal = self.world.proposal
+        if proposal is None or not self.world.kernels_ready or self._waiting(now):
+            return
+        if self.world.params.approval == 'none':
+            self.approvals.withdraw('approval is none')
+            self.world.request_replan('approval is none', now)
+        elif self.approvals.expired(stamp):
+            self.decide(proposal.accepted_on_timeout, '', now, stamp)
+
+    def decide(self, accept: bool, operator: str, now: float, stamp: float) -> None:
+        """Accept or reject the open proposal.
+
+        Args:
+            accept: put it in force.
+            operator: who decides; '' for the deadline.
+            now, stamp: see the class.
+        """
+        proposal = self.world.proposal
+        assert proposal is not None
+        if not accept:
+            self.approvals.reject(operator)
+            self.world.request_replan(f'plan {proposal.revision} rejected', now)
+            return
+        chosen = self.approvals.accepted(operator)
+        built = build_lists(self.world, chosen, stamp)
+        lists = {each.uav: built.lists[each.uav] for each in proposal.lists
+                 if each.uav in built.lists}
+        left_out = {**self._left_out, **built.left_out}
+        self._publish(replace(built, lists=lists, left_out=left_out, later=self.world.later),
+                      chosen, now, stamp)
+        self._allocate(chosen, f'plan {proposal.revision} accepted by '
+                       f'{operator or "its deadline"}', stamp)
 
     def due(self, now: float, stamp: float) -> ReplanProblem | None:
         """Return the problem to solve now, if any; None while one is being solved."""
@@ -125,7 +173,7 @@ class Allocator:
             self._apply(Plan({}), trigger, True, now, stamp)
             schedule.end(now)
         elif (params.background_budget > 0.0 and schedule.rested(now, params.background_period)
-              and world.any_usable() and world.tasks.open()):
+              and world.any_usable() and world.tasks.open() and not self.approvals.quiet):
             schedule.begin(now)
             return replan_problem(world, self._best, 'background', background=True,
                                   stamp=stamp)
@@ -160,24 +208,35 @@ class Allocator:
     def _apply(self, chosen: Plan, trigger: str, always: bool, now: float, stamp: float) -> None:
         """Put the lists of a plan in force; `always` publishes an allocation without changes."""
         world = self.world
-        built = build_lists(world, chosen, stamp)
+        split = split_plan(world, chosen, trigger, stamp)
+        why = self.approvals.propose(split.proposal)
+        split.built.left_out.update(dict.fromkeys(split.waiting, why))
+        permitted = self._limiter.permitted(world.lists_in_force(), split.built.lists,
+                                            world.must_change, now, world.params.list_interval)
+        published = self._publish(replace(split.built, lists=permitted), chosen, now, stamp)
+        world.outbox.statuses |= always
+        if split.at_once and published:
+            trigger = f'{trigger}; without approval for safety: {split.at_once}'
+            world.note(trigger)
+        if published or always:
+            self._allocate(chosen, trigger, stamp)
+
+    def _publish(self, built: BuiltLists, chosen: Plan, now: float, stamp: float) -> list[str]:
+        """Put lists of a plan in force; returns the UAVs whose lists changed."""
+        world = self.world
         world.set_built(built.zones_when_built, built.paths_home)
         world.later = built.later
-        held, why = held_lists(world, built.lists, stamp)
         self._left_out = {task_id: world.deadlines.left_out(task_id, reason, stamp)
-                          for task_id, reason in {**built.left_out, **why}.items()}
-        lists = self._limiter.permitted(world.lists_in_force(), held, world.must_change,
-                                        now, world.params.list_interval)
-        published = world.publish(lists, stamp)
+                          for task_id, reason in built.left_out.items()}
+        published = world.publish(built.lists, stamp)
         self._limiter.published(published, now)
         starts = chosen.timetable().starts if built.later else {}
         self._predictions.later = {name: stamp + starts[name] for trips in built.later.values()
                                    for trip in trips for name in trip if name in starts}
         self._predictions.planned(now, stamp)
         self._step_tasks(stamp)
-        world.outbox.statuses |= bool(published) or always or bool(world.tasks.unsaved)
-        if published or always:
-            self._allocate(chosen, trigger, stamp)
+        world.outbox.statuses |= bool(published) or bool(world.tasks.unsaved)
+        return published
 
     def _step_tasks(self, stamp: float) -> None:
         """Set the state and the reason of every open task."""
@@ -188,6 +247,7 @@ class Allocator:
         """Publish the lists in force as an allocation."""
         world = self.world
         self._chosen = chosen
+        world.plan_revision = world.revision + 1
         plan = plan_in_force(world.lists, world.tasks, self._left_out, chosen)
         world.outbox.allocation = Allocation(
             world.next_revision(), tuple(world.lists_in_force().values()), plan, trigger, stamp)

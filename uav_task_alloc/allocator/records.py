@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from enum import Enum
 from typing import Any
 
+from uav_task_alloc.allocator.order_records import OperatorHold, OrderRows
 from uav_task_alloc.checks import check_id, check_names, check_number, check_point
 from uav_task_alloc.geometry.frames import Origin
 from uav_task_alloc.model import Leg, Plan, Point, Task, ThreatZone, Uav
@@ -240,6 +241,23 @@ class Allocation:
 
 
 @dataclass(frozen=True, slots=True)
+class Proposal:
+    """Lists that wait for the approval of an operator."""
+
+    revision: int  # of the allocation that it would be
+    base_revision: int  # of the allocation that it changes
+    lists: tuple[UavList, ...]  # those that change; none: it is closed
+    trigger: str  # what asked for the plan
+    stamp: float  # [s] when it was made
+    deadline: float  # [s] when it is decided without an operator
+    accepted_on_timeout: bool  # it is accepted then, else rejected
+    changes: tuple[str, ...]  # a sentence each
+    distance: float = 0.0  # [m] that the routes get longer
+    finish: float = 0.0  # [s] that the last UAV ends later
+    late: tuple[str, ...] = ()  # ids of tasks that are too late with it
+
+
+@dataclass(frozen=True, slots=True)
 class LogNote:
     """A line for the log."""
 
@@ -255,6 +273,8 @@ class Outbox:
     forgotten: set[str] = field(default_factory=set)  # UAVs; applied before the lists
     allocation: Allocation | None = None  # None: unchanged
     statuses: bool = False  # they have changed
+    holds: dict[str, OperatorHold] = field(default_factory=dict)  # by UAV
+    proposal: Proposal | None = None  # opened or closed; None: unchanged
     notes: list[LogNote] = field(default_factory=list)  # in the order of their events
 
 
@@ -270,3 +290,5 @@ class SavedState:
     learned: Any = None  # body of the row with the learned state
     origin: Origin | None = None  # of all coordinates; None: the journal has none
     unreadable: list[str] = field(default_factory=list)  # rows that were left out, and why
+    orders: OrderRows = field(default_factory=OrderRows)  # of operators
+    proposal: Proposal | None = None  # that waits for approval

@@ -17,6 +17,7 @@ COMMANDS = {
     'bench': 'compare the solvers on benchmark instances',
     'report': 'draw a recorded flight, or print the table of a demo and draw its map again',
     'params': 'print the tables of parameters and scenario keys; --write: into config/ and docs/',
+    'order': 'give an order to a running allocator: pin, pause, return, undo ...',
     'compile': 'compile the kernels ahead of time into the cache on disk',
 }
 _NO_READER = 141  # exit status of a shell after SIGPIPE

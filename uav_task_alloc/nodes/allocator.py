@@ -40,6 +40,7 @@ from uav_task_alloc.nodes.ros.allocation_publisher import AllocationPublisher
 from uav_task_alloc.nodes.ros.batched_subscription import subscribe_batched
 from uav_task_alloc.nodes.ros.leader_election import LeaderElection
 from uav_task_alloc.nodes.ros.leveled_log import LeveledLog
+from uav_task_alloc.nodes.ros.order_services import OrderServices
 from uav_task_alloc.nodes.ros.origin_check import OriginCheck
 from uav_task_alloc.nodes.ros.parameters import declare
 from uav_task_alloc.nodes.ros.refusal_log import RefusalLog
@@ -63,13 +64,16 @@ class AllocatorNode(Node):
     Publishes:
         `<uav_id>/task_list` (TaskList), `task_statuses` (TaskStatusArray), `allocation`
         (Allocation), `allocation_markers` (MarkerArray), `<uav_id>/path` (nav_msgs/Path),
-        `fleet_origin` (FleetOrigin), all latched; `/diagnostics` (DiagnosticArray).
+        `fleet_origin` (FleetOrigin), `<uav_id>/hold` (UavHold), `plan_proposal`
+        (PlanProposal), all latched; `/diagnostics` (DiagnosticArray).
     Subscribes to:
         `uav_states` (UavState), `task_announcements` (TaskAnnouncement), `threat_zones`
         (ThreatZoneArray), `task_events` (TaskEvent), `fleet_origin`, `/diagnostics`.
     Services:
         `~/submit_tasks` (SubmitTasks), `~/replan` (Trigger), `~/set_availability`
-        (SetAvailability).
+        (SetAvailability); for orders of operators `~/pin_task`, `~/forbid_task`,
+        `~/order_tasks`, `~/pause_uav`, `~/resume_uav`, `~/return_uav`, `~/undo_order`,
+        `~/approve_plan`.
     Parameters:
         AllocatorParams, see docs/parameters.md.
     """
@@ -106,6 +110,7 @@ class AllocatorNode(Node):
         self.publisher = AllocationPublisher(self, self.world)
         self.publisher.prepare(self.world.lists_in_force())
         self.markers = MarkerPublisher(self, self.world)
+        self.orders = OrderServices(self, self.core, self.save, self.stamp)
         self.diagnostics = self.create_publisher(DiagnosticArray, '/diagnostics', 10)
         self.inputs: list[Subscription[Any]] = [
             subscribe_batched(self, m.UavState, 'uav_states', self.on_state, INPUT_STATES),
@@ -127,7 +132,8 @@ class AllocatorNode(Node):
             self.offered = [
                 self.create_service(SubmitTasks, '~/submit_tasks', self.on_submit),
                 self.create_service(Trigger, '~/replan', self.on_replan),
-                self.create_service(SetAvailability, '~/set_availability', self.on_availability)]
+                self.create_service(SetAvailability, '~/set_availability', self.on_availability),
+                *self.orders.offer()]
         if role is Role.PASSIVE and not self.passive:
             self.step_down()
         return role is Role.LEADING
@@ -142,6 +148,7 @@ class AllocatorNode(Node):
         for service in self.offered:
             self.destroy_service(service)
         self.publisher.close()
+        self.orders.close()
         self.markers.close()
 
     # topics and services
@@ -293,6 +300,7 @@ class AllocatorNode(Node):
         outbox = self.core.collect()
         self.log_notes(outbox.notes)
         self.publisher.enqueue(outbox)
+        self.orders.publish(outbox)
         self.pending = self.publisher.publish_some(stamp)
         self.markers.update(outbox)
 
@@ -328,6 +336,7 @@ class AllocatorNode(Node):
     def destroy_node(self) -> None:
         """End the worker, save, and release the journal."""
         self.worker.close()
+        self.orders.close()
         self.save()
         self.persistence.close()
         super().destroy_node()

@@ -85,7 +85,11 @@ class TimedZone:
     vanishes: float = math.inf  # [s]
 
     def in_force(self, at: float) -> bool:
-        """Whether the zone is in force at a time [s]."""
+        """Whether the zone is in force at a time.
+
+        Args:
+            at: [s] of the scenario.
+        """
         return self.appears <= at < self.vanishes
 
 

@@ -3,6 +3,7 @@ from collections.abc import Callable, Mapping
 from typing import Any, Literal, TypeVar, overload
 
 from rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
+from rclpy.callback_groups import CallbackGroup
 from rclpy.client import Client
 from rclpy.clock import Clock
 from rclpy.context import Context
@@ -51,7 +52,8 @@ class Node:
     def create_client(self, srv_type: type[_ServiceType[_Request, _Response]],
                       srv_name: str) -> Client[_Request, _Response]: ...
     def create_service(self, srv_type: type[_ServiceType[_Request, _Response]], srv_name: str,
-                       callback: Callable[[_Request, _Response], _Response]) -> Service: ...
+                       callback: Callable[[_Request, _Response], _Response], *,
+                       callback_group: CallbackGroup | None = ...) -> Service: ...
     def create_timer(self, timer_period_sec: float, callback: Callable[[], object], *,
                      clock: Clock | None = ...) -> Timer: ...
     def create_guard_condition(self, callback: Callable[[], object]) -> GuardCondition: ...

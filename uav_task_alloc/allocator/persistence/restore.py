@@ -9,8 +9,10 @@ from dataclasses import fields, replace
 from enum import Enum
 from typing import Any, TypeVar
 
+from uav_task_alloc.allocator.persistence.order_rows import restore_order_row
 from uav_task_alloc.allocator.records import (
     ListStop,
+    Proposal,
     SavedState,
     TaskRecord,
     TaskState,
@@ -24,7 +26,9 @@ from uav_task_alloc.model import Leg, Point, Task, ThreatZone
 from uav_task_alloc.zone_codec import JOURNAL_ZONE, decode_zone, encode_zone
 
 _Value = TypeVar('_Value')
-_KINDS = frozenset({'task', 'list', 'zones', 'off', 'revision', 'learner', 'origin'})
+_ORDER_KINDS = frozenset({'order', 'order_log', 'hold'})
+_KINDS = frozenset({'task', 'list', 'zones', 'off', 'revision', 'learner', 'origin', 'proposal',
+                    *_ORDER_KINDS})
 _UNREADABLE = (LookupError, TypeError, ValueError, AttributeError, OverflowError)
 _FIRST_FIELDS = frozenset({'id', 'position', 'value', 'service_time', 'required_capabilities',
                            'allowed_uavs', 'acceptance_radius'})  # every journal has them
@@ -58,6 +62,11 @@ def revision_row(revision: int) -> JournalRow:
     return JournalRow('revision', '', revision)
 
 
+def proposal_row(proposal: Proposal | None) -> JournalRow:
+    """Return the row of the plan that waits for approval; without a body where none does."""
+    return JournalRow('proposal', '', None if proposal is None else _plain(proposal))
+
+
 def origin_row(origin: Origin) -> JournalRow:
     """Return the row of the origin of all coordinates."""
     return JournalRow('origin', '', [origin.latitude, origin.longitude, origin.altitude_amsl])
@@ -68,6 +77,12 @@ def restored_state(rows: Iterable[JournalRow]) -> SavedState:
 
     An unreadable row or zone is left out, and named in `unreadable`; so are tasks of a list
     whose row is missing.
+
+    Args:
+        rows: of a journal.
+
+    Returns:
+        For a new allocator.
     """
     state = SavedState()
     for row in rows:
@@ -98,8 +113,12 @@ def _restore(state: SavedState, row: JournalRow) -> None:
         state.switched_off = _each(state, 'UAV switched off', row.body, _uav_id)
     elif row.kind == 'revision':
         state.revision = _whole_number('revision', row.body)
+    elif row.kind == 'proposal':
+        state.proposal = None if row.body is None else _proposal(row.body)
     elif row.kind == 'learner':
         state.learned = row.body
+    elif row.kind in _ORDER_KINDS:
+        restore_order_row(state.orders, row)
     else:
         state.origin = Origin(*row.body)
 
@@ -169,6 +188,21 @@ def _uav_list(uav_id: str, body: dict[str, Any]) -> UavList:
     if not isinstance(uav_list.returns, bool):
         raise InvalidValue('returns', uav_list.returns, 'true or false')
     return uav_list
+
+
+def _proposal(body: dict[str, Any]) -> Proposal:
+    lists = tuple(_uav_list(each['uav'], each) for each in _list_of('lists', body['lists']))
+    proposal = Proposal(**{**body, 'lists': lists,
+                           'changes': tuple(map(str, _list_of('changes', body['changes']))),
+                           'late': tuple(map(str, _list_of('late', body['late']))),
+                           'trigger': str(body['trigger'])})
+    for name in ('revision', 'base_revision'):
+        _whole_number(name, body[name])
+    for name in ('stamp', 'deadline', 'distance', 'finish'):
+        check_number(name, body[name], -sys.float_info.max, sys.float_info.max)
+    if type(proposal.accepted_on_timeout) is not bool or not lists:
+        raise InvalidValue('proposal', body, 'lists, and accepted_on_timeout true or false')
+    return proposal
 
 
 def _leg(body: dict[str, Any]) -> Leg:

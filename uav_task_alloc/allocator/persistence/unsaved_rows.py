@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+from uav_task_alloc.allocator.persistence.order_rows import mark_all_orders, order_rows
 from uav_task_alloc.allocator.persistence.restore import (
     list_row,
     off_row,
+    proposal_row,
     revision_row,
     task_row,
     zones_row,
@@ -35,8 +37,10 @@ def rows(world: World, state: object, most: int | None = None) -> list[JournalRo
     make = {'zones': lambda: zones_row(world.zones.values()),
             'off': lambda: off_row(world.fleet.switched_off),
             'revision': lambda: revision_row(world.revision),
+            'proposal': lambda: proposal_row(world.proposal),
             'learner': lambda: learned_row(state)}
-    return changed + [make[kind]() for kind in sorted(unsaved[''])]
+    return (changed + order_rows(world.orders)
+            + [make[kind]() for kind in sorted(unsaved[''])])
 
 
 def mark_all(world: World) -> None:
@@ -48,7 +52,8 @@ def mark_all(world: World) -> None:
     unsaved = world.unsaved()
     unsaved['task'].update(world.task_records())
     unsaved['list'].update(world.lists_in_force())
-    unsaved[''].update(('zones', 'off', 'revision', 'learner'))
+    mark_all_orders(world.orders)
+    unsaved[''].update(('zones', 'off', 'revision', 'learner', 'proposal'))
 
 
 def mark_written(world: World, written: Iterable[JournalRow] | None) -> bool:

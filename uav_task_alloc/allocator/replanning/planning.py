@@ -32,7 +32,7 @@ from uav_task_alloc.params import AllocatorParams
 class BuiltLists:
     """The lists of a plan, and what the world has to know of them."""
 
-    lists: dict[str, UavList] = field(default_factory=dict)
+    lists: dict[str, UavList] = field(default_factory=dict)  # by UAV
     left_out: dict[str, str] = field(default_factory=dict)  # task id -> reason
     # UAV -> paths and home that its list was built for
     zones_when_built: dict[str, tuple[SafePaths, Point]] = field(default_factory=dict)
@@ -156,6 +156,8 @@ def build_lists(world: World, chosen: Plan, stamp: float) -> BuiltLists:
         unreachable = _build(world, built, uav_id, tasks, home, legs, stamp)
         built.left_out.update((task_id, f'no safe path for {uav_id}') for task_id in unreachable)
         built.zones_when_built[uav_id] = world.paths(), world.home_of(uav_id)
+    for each in world.ordered.sequences(returns).values():
+        built.left_out.update(dict.fromkeys(each.left_out, each.why))
     # unknown UAVs, too: one that returns must not fly what others have
     for uav_id in world.lists_in_force():
         if uav_id not in built.lists and not world.restart_hold:
@@ -176,12 +178,12 @@ def _build(world: World, built: BuiltLists, uav_id: str, tasks: Sequence[Task], 
 
 
 def _build_empty(world: World, built: BuiltLists, uav_id: str) -> None:
-    """Build an empty list: with a low battery the UAV returns home, else its end is kept.
+    """Build an empty list: with a low battery or by order it returns home, else its end is kept.
 
     Without a safe path home it ends with HOLD.
     """
     record, published = world.uav_record(uav_id), world.list_of(uav_id)
-    if record is not None and record.low:
+    if record is not None and (record.low or world.orders.returns(uav_id)):
         _build(world, built, uav_id, (), True, {})
         return
     empty = replace(published, stops=(), distance=0.0)
@@ -195,7 +197,8 @@ def _build_empty(world: World, built: BuiltLists, uav_id: str) -> None:
 
 def _present_routes(world: World, chosen: Plan) -> TaskIdsByUav:
     routes = {uav_id: tasks for uav_id, tasks in chosen.routes.items() if world.usable(uav_id)}
-    return repaired_routes(routes, world.locked_tasks(), world.can_fly)
+    kept = world.ordered.kept()
+    return repaired_routes(routes, {**world.locked_tasks(), **kept}, world.can_fly)
 
 
 def plan_in_force(lists: PublishedLists, tasks: TaskRegistry, left_out: Mapping[str, str],

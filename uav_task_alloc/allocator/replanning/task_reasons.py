@@ -49,19 +49,43 @@ def _unlisted(record: TaskRecord, fleet: Fleet, usable: frozenset[str],
     task, known = record.task, fleet.records
     if not known:
         return TaskStep(task.id, TaskTransition.WAIT, why='no UAV known yet')
+    ordered = fleet.orders.reason(task.id)
     if task.allowed_uavs is not None and known.keys().isdisjoint(task.allowed_uavs):
         why = f'allowed for {", ".join(sorted(task.allowed_uavs))} only: not known yet'
         return TaskStep(task.id, TaskTransition.LEAVE, why=why)
     blocked = blocked_text(uav for uav in fleet.blocked_on_ground()
                            if may_fly(task, record.failed_on, uav.report))
     if not usable:
-        return TaskStep(task.id, TaskTransition.LEAVE, why=blocked or 'no UAV available')
+        return TaskStep(task.id, TaskTransition.LEAVE, why=_joined(
+            ordered, blocked or 'no UAV available'))
     others = without_failed(record, usable).allowed_uavs
     if record.failed_on and others is not None and others.isdisjoint(usable):
         why = f'failed on {", ".join(record.failed_on)}; no other UAV that may fly it is available'
+    elif ordered and (state := owner_state(task.id, record, fleet)):
+        why = state
     elif task.id in left_out:
         why = left_out[task.id]
     else:
         why = record.reason or 'waits for the next plan'
         return TaskStep(task.id, TaskTransition.WAIT, why=why)
-    return TaskStep(task.id, TaskTransition.LEAVE, why='; '.join(filter(None, (why, blocked))))
+    return TaskStep(task.id, TaskTransition.LEAVE, why=_joined(ordered, why, blocked))
+
+
+def owner_state(task_id: str, record: TaskRecord, fleet: Fleet) -> str:
+    """Return why the only UAV that orders allow for a task cannot fly it now.
+
+    Args:
+        task_id: of the task.
+        record: of the task.
+        fleet: with the orders in force.
+
+    Returns:
+        Empty where no order names one UAV, or where it could fly.
+    """
+    owner = fleet.orders.owner(task_id)
+    failed = f'failed on {owner}' if owner in record.failed_on else ''
+    return (fleet.why_unusable(owner) or failed) if owner else ''
+
+
+def _joined(*texts: str) -> str:
+    return '; '.join(filter(None, texts))

@@ -82,7 +82,8 @@ def waiting_uavs(world: World, stamp: float) -> dict[str, Uav]:
     for uav_id, record in world.uav_records().items():
         report = record.report
         if not (record.low and report.turnaround and report.full_range
-                and uav_id not in world.fleet.switched_off and not record.blocked_on_ground):
+                and uav_id not in world.fleet.switched_off and not record.blocked_on_ground
+                and world.orders.of_uav(uav_id) is None):
             continue
         since = world.flights.at_home_since(uav_id)
         if since is None and record.silent:

@@ -7,6 +7,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 
 from uav_task_alloc.allocator.records import UavReport
+from uav_task_alloc.allocator.state.orders import Orders
 from uav_task_alloc.model import Point, Task, Uav
 from uav_task_alloc.params import AllocatorParams
 
@@ -51,6 +52,7 @@ class Fleet:
     Args:
         off: ids of UAVs that an operator has switched off.
         active: by UAV id the task that it is known to fly.
+        orders: of operators; None: there are none.
 
     Arguments of methods:
         uav_id: of a UAV, known or not.
@@ -59,9 +61,11 @@ class Fleet:
         params: of the allocator.
     """
 
-    def __init__(self, off: Iterable[str] = (), active: Mapping[str, str] | None = None) -> None:
+    def __init__(self, off: Iterable[str] = (), active: Mapping[str, str] | None = None,
+                 orders: Orders | None = None) -> None:
         self.records: dict[str, UavRecord] = {}
         self.switched_off = set(off)
+        self.orders = orders or Orders()
         self.active = dict(active or {})  # UAV -> task it is known to be flying
         self.confirmed: set[str] = set()  # held a list of ours, or reported progress of a task
 
@@ -113,10 +117,28 @@ class Fleet:
         self.records[uav_id] = replace(self.records[uav_id], zone=zone, home_zone=home_zone,
                                        blocked_on_ground=blocked_on_ground)
 
-    def usable(self, uav_id: str) -> bool:
-        """Return whether a UAV may be given tasks: known, usable, and not switched off."""
+    def ready(self, uav_id: str) -> bool:
+        """Return whether a UAV could fly tasks: known, usable, and not switched off."""
         record = self.records.get(uav_id)
         return record is not None and record.usable and uav_id not in self.switched_off
+
+    def usable(self, uav_id: str) -> bool:
+        """Return whether a UAV may be given tasks: ready, and neither paused nor ordered home."""
+        return self.ready(uav_id) and self.orders.of_uav(uav_id) is None
+
+    def why_unusable(self, uav_id: str) -> str:
+        """Return why a UAV may not be given tasks; '' if it may."""
+        record, order = self.records.get(uav_id), self.orders.of_uav(uav_id)
+        if record is None:
+            return f'{uav_id} has not reported yet'
+        if record.silent:
+            return f'{uav_id} is silent'
+        if order is not None:
+            return f'{uav_id} has the order to {order.kind.value} ({order.name})'
+        if record.low:
+            return f'{uav_id} is low on battery'
+        return '' if self.usable(uav_id) else (
+            record.blocked_on_ground or f'{uav_id} is not available')
 
     def usable_ids(self) -> list[str]:
         """Return the UAVs that may be given tasks."""
@@ -144,8 +166,9 @@ class Fleet:
                    full_endurance=_full_endurance(report))
 
     def may_fly(self, uav_id: str, task: Task, failed_on: Iterable[str]) -> bool:
-        """Return whether a known UAV may be given a task, see `may_fly`."""
-        return may_fly(task, failed_on, self.records[uav_id].report)
+        """Return whether a known UAV may be given a task, see `may_fly`, and orders allow it."""
+        return self.orders.allows(uav_id, task.id) and may_fly(
+            task, failed_on, self.records[uav_id].report)
 
 
 def _full_endurance(report: UavReport) -> float | None:

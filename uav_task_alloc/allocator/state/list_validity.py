@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from itertools import pairwise
 
 from uav_task_alloc.allocator.state.fleet import Fleet
+from uav_task_alloc.allocator.state.ordered_tasks import OrderedTasks
 from uav_task_alloc.allocator.state.published_lists import PublishedLists
 from uav_task_alloc.allocator.state.safe_paths import GetSafePaths, SafePaths
 from uav_task_alloc.allocator.state.tasks import TaskRegistry
@@ -18,8 +19,9 @@ class ListValidity:
     """Compares the lists in force with the present tasks, UAVs and zones."""
 
     def __init__(self, tasks: TaskRegistry, fleet: Fleet, lists: PublishedLists,
-                 paths: GetSafePaths) -> None:
+                 paths: GetSafePaths, ordered: OrderedTasks) -> None:
         self._tasks, self._fleet, self._lists, self._paths = tasks, fleet, lists, paths
+        self._ordered = ordered
         self.zones_when_built: dict[str, tuple[SafePaths, Point]] = {}
 
     def is_current(self, uav_id: str, tasks: Sequence[Task]) -> bool:
@@ -42,19 +44,40 @@ class ListValidity:
             uav_id: a UAV.
             returns: whether its list should end with a return home.
         """
-        published, record = self._lists.get(uav_id), self._fleet.records.get(uav_id)
-        if not published.stops or record is None or not self._fleet.usable(uav_id):
+        published = self._lists.get(uav_id)
+        if not published.stops or self.why_change(uav_id):
             return True
         for stop in published.stops:
             known = self._tasks.records.get(stop.task.id)
-            if (known is None or not known.open or known.task != stop.task
-                    or not self._fleet.may_fly(uav_id, known.task, known.failed_on)):
+            if known is None or not known.open or known.task != stop.task:
                 return True
-        paths, first = self._paths(), published.stops[0]
-        return (published.returns != returns
-                or paths.rest(record.report.position, first.leg, first.task.position) is None
-                or not all(paths.clear(before.task.position, *stop.leg.via, stop.task.position)
-                           for before, stop in pairwise(published.stops)))
+        return published.returns != returns
+
+    def why_change(self, uav_id: str) -> str:
+        """Return why the list in force of a UAV may not wait for another one; '' if it may.
+
+        That tasks of it have ended is no such reason.
+
+        Args:
+            uav_id: a UAV.
+        """
+        stops, record = self._lists.get(uav_id).stops, self._fleet.records.get(uav_id)
+        if not stops:
+            return ''
+        if record is None or not self._fleet.usable(uav_id):
+            return self._fleet.why_unusable(uav_id)
+        if self._ordered.breaks(uav_id):
+            return 'an order'
+        for stop in stops:
+            known = self._tasks.records.get(stop.task.id)
+            if known is not None and known.open and not self._fleet.may_fly(
+                    uav_id, known.task, known.failed_on):
+                return f'it may not fly {stop.task.id} any more'
+        paths, first = self._paths(), stops[0]
+        clear = (paths.rest(record.report.position, first.leg, first.task.position) is not None
+                 and all(paths.clear(before.task.position, *stop.leg.via, stop.task.position)
+                         for before, stop in pairwise(stops)))
+        return '' if clear else 'a zone'
 
     def forget(self, uav_id: str) -> None:
         """Drop what is kept of a UAV."""

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 from uav_task_alloc.allocator.records import TaskEvent, TaskEventKind
 from uav_task_alloc.allocator.state.callbacks import Note, RequestReplan
-from uav_task_alloc.allocator.state.fleet import Fleet
+from uav_task_alloc.allocator.state.fleet import Fleet, may_fly
 from uav_task_alloc.allocator.state.published_lists import PublishedLists
 from uav_task_alloc.allocator.state.task_state_machine import TaskTransition
 from uav_task_alloc.allocator.state.tasks import TaskRegistry
@@ -106,8 +106,9 @@ class TaskEvents:
         record, why = self._tasks.records[event.task_id], event.reason or 'no reason given'
         failed_on = tuple(dict.fromkeys((*record.failed_on, event.uav_id)))
         transition = TaskTransition.FAIL
-        if not any(self._fleet.may_fly(uav_id, record.task, failed_on)
-                   for uav_id in self._fleet.records):
+        # an order may end: that it keeps the others from the task does not make it FAILED
+        if not any(may_fly(record.task, failed_on, uav.report)
+                   for uav in self._fleet.records.values()):
             transition, why = TaskTransition.FAIL_LAST, f'{why}; no other UAV can'
         elif len(failed_on) >= max_attempts:
             transition, why = TaskTransition.FAIL_LAST, f'{why}; tried often enough'

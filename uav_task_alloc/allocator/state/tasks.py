@@ -30,6 +30,7 @@ class TaskRegistry:
         records: restored from the journal.
 
     Arguments of methods:
+        reason: of a refusal, for users.
         task: as announced.
         task_id: as announced.
         stamp: [s] clock of the node.
@@ -47,6 +48,14 @@ class TaskRegistry:
         """Return whether a task is accepted and still to be done."""
         record = self.records.get(task_id)
         return record is not None and record.open
+
+    def why_ended(self, task_id: str) -> str:
+        """Return why no UAV can get a task any more: it ended; '' for one that may be tried."""
+        record = self.records.get(task_id)
+        if record is None:
+            return f'{task_id} is forgotten'
+        return f'{task_id} is {record.state.name}' if record.state in (
+            TaskState.COMPLETED, TaskState.CANCELLED) else ''
 
     def open(self) -> list[TaskRecord]:
         """Return the tasks still to be done."""

@@ -34,11 +34,13 @@ from uav_task_alloc.allocator.state.flights import Flights
 from uav_task_alloc.allocator.state.list_validity import ListValidity, ZonesWhenBuilt
 from uav_task_alloc.allocator.state.locked_tasks import can_fly, locked_tasks
 from uav_task_alloc.allocator.state.missed_completions import MissedCompletions
+from uav_task_alloc.allocator.state.ordered_tasks import OrderedTasks
+from uav_task_alloc.allocator.state.orders import Orders
 from uav_task_alloc.allocator.state.published_lists import PublishedLists
 from uav_task_alloc.allocator.state.safe_paths import MakeSafePaths, SafePaths
 from uav_task_alloc.allocator.state.task_events import TaskEvents
 from uav_task_alloc.allocator.state.task_state_machine import TaskStep
-from uav_task_alloc.allocator.state.tasks import TaskRegistry, verdict_texts, without_failed
+from uav_task_alloc.allocator.state.tasks import TaskRegistry, verdict_texts
 from uav_task_alloc.allocator.state.zone_checks import ZoneChecks
 from uav_task_alloc.errors import InvalidValue, first_of
 from uav_task_alloc.model import Point, Task, ThreatZone, Uav
@@ -81,7 +83,8 @@ class World:
                  make_safe_paths: MakeSafePaths, on_change: RequestReplan) -> None:
         self.params, self._make_safe_paths, self._on_change = params, make_safe_paths, on_change
         self.version = 0
-        self.revision = saved.revision  # of the allocation
+        # of the allocation; and the first one with the lists in force
+        self.revision = self.plan_revision = saved.revision
         self.outbox = Outbox()
         self.zones = {zone.id: zone for zone in saved.zones}
         self.restart_hold = any(each.stops for each in saved.lists)  # no task changes its UAV
@@ -92,11 +95,14 @@ class World:
         self._unsaved: set[str] = set()  # rows not yet on disk: 'zones', 'off', ...
         self.later = LaterTrips()  # of the plan in force, after the lists
         self.tasks = TaskRegistry(saved.tasks)
+        self.orders, self.proposal = Orders(saved.orders), saved.proposal
         self.fleet = Fleet(saved.switched_off, {
             record.uav: record.task.id for record in saved.tasks
-            if record.state is TaskState.ACTIVE})
+            if record.state is TaskState.ACTIVE}, self.orders)
         self.lists = PublishedLists(saved.lists, (record.task.id for record in saved.tasks))
-        self._validity = ListValidity(self.tasks, self.fleet, self.lists, self.paths)
+        self.ordered = OrderedTasks(self.tasks, self.fleet, self.lists, self.paths, self.uav)
+        self._validity = ListValidity(self.tasks, self.fleet, self.lists, self.paths,
+                                      self.ordered)
         self.flights = Flights(self.fleet, self.lists, lambda: self.params)
         self.deadlines = Deadlines(self.tasks, self.fleet, self.flights)
         self.zone_checks = ZoneChecks(self.fleet, self.lists, self.paths, self.note,
@@ -301,22 +307,14 @@ class World:
         return self.fleet.uav(uav_id, self.params)
 
     def tasks_to_plan(self) -> tuple[Task, ...]:
-        """Return the open tasks, less those that stay with unusable UAVs after a restart.
-
-        Those may have been flown while the allocator was down; the bridge repeats the event when
-        they are listed.
-        """
-        usable = frozenset(self.fleet.usable_ids())
-        held = self.lists.lists if self.restart_hold else {}
-        kept = {task_id for uav_id, each in held.items() if uav_id not in usable
-                for task_id in each.task_ids}
-        return tuple(without_failed(record, usable) for record in self.tasks.open()
-                     if record.task.id not in kept)
+        """Return the open tasks as orders allow them, less those that stay with unusable UAVs."""
+        return self.ordered.tasks_to_plan(self.restart_hold, self.params.route_end == 'home')
 
     def locked_tasks(self) -> dict[str, tuple[str, ...]]:
         """Return the tasks of each UAV that a plan may not move, in the order flown."""
-        return locked_tasks(self.tasks, self.fleet, self.lists, self.params.locked_tasks,
-                            self.restart_hold)
+        return self.ordered.locked(
+            locked_tasks(self.tasks, self.fleet, self.lists, self.params.locked_tasks,
+                         self.restart_hold), self.params.route_end == 'home')
 
     def can_fly(self, uav_id: str, task_id: str) -> bool:
         """Return whether a task is open and a known UAV may fly it."""
@@ -334,6 +332,10 @@ class World:
 
     def _returns(self, uav_id: str, returns: bool) -> bool:
         return returns and uav_id not in self.zone_checks.stranded
+
+    def why_change(self, uav_id: str) -> str:
+        """Return why the list in force of a UAV may not wait for another one; '' if it may."""
+        return self._validity.why_change(uav_id)
 
     # results of the planner
 
@@ -394,4 +396,5 @@ class World:
 
     def unsaved(self) -> dict[str, set[str]]:
         """Return what is not on disk: ids of 'task' and 'list' rows, kinds of the rows of ''."""
-        return {'task': self.tasks.unsaved, 'list': self.lists.unsaved, '': self._unsaved}
+        return {'task': self.tasks.unsaved, 'list': self.lists.unsaved, '': self._unsaved,
+                **self.orders.unsaved}

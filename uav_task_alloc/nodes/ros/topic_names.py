@@ -7,7 +7,7 @@ from rclpy.node import Node
 from uav_task_alloc.errors import InvalidValue
 
 _LONGEST_TOPIC = 247  # characters of a topic's full name; rcl raises beyond
-TASK_LIST, PATH = '{}/task_list', '{}/path'
+TASK_LIST, PATH, HOLD = '{}/task_list', '{}/path', '{}/hold'
 
 
 def check_topic(node: Node, pattern: str, uav_id: str) -> str:
@@ -15,7 +15,7 @@ def check_topic(node: Node, pattern: str, uav_id: str) -> str:
 
     Args:
         node: which publishes or subscribes.
-        pattern: TASK_LIST or PATH.
+        pattern: TASK_LIST, PATH or HOLD.
         uav_id: a ROS name.
 
     Returns:

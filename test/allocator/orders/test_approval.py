@@ -1,0 +1,179 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Plans that wait for an operator: what is proposed, decided, replaced, and what never waits."""
+import pytest
+from allocation import AllocatorDriver
+
+from uav_task_alloc import plan
+from uav_task_alloc.allocator.persistence.restore import restored_state
+from uav_task_alloc.model import ThreatZone
+
+
+def make(approval, saved=None, **more):
+    driver = AllocatorDriver(saved, plan, approval=approval, uav_timeout=5.0, **more)
+    driver.uav('a', 0.0, 0.0, 50.0)
+    driver.uav('b', 1000.0, 0.0, 50.0)
+    return driver
+
+
+@pytest.fixture
+def driver():
+    driver = make('replan')
+    driver.add(('t1', 100, 0), ('t2', 200, 0), ('t3', 900, 0))
+    driver.settle()
+    assert (driver.route('a'), driver.route('b')) == (('t1', 't2'), ('t3',))
+    return driver
+
+
+def decide(driver, accept, operator='ann'):
+    driver.core.decide(accept, operator, driver.now, driver.now)
+    driver.take()
+    driver.settle()
+
+
+def test_the_first_tasks_of_a_uav_need_approval_only_with_all(driver):
+    assert driver.proposals == []
+    driver = make('all')
+    driver.add(('t1', 100, 0))
+    driver.settle()
+    assert 'a' not in driver.lists
+    assert (driver.state('t1'), driver.reason('t1')) == (
+        'UNASSIGNED', 'waits for the approval of plan 1')
+    decide(driver, accept=True)
+    assert driver.route('a') == ('t1',)
+    assert driver.allocations[-1].trigger == 'plan 1 accepted by ann'
+
+
+def test_a_new_plan_is_proposed_and_the_fleet_flies_on(driver):
+    driver.add(('t4', 300, 0))
+    driver.settle()
+    assert (driver.route('a'), driver.route('b')) == (('t1', 't2'), ('t3',))
+    proposal, = driver.proposals
+    assert [each.task_ids for each in proposal.lists] == [('t1', 't2', 't4')]
+    assert proposal.changes == ('a gains t4 (new): 2 -> 3 tasks, +100 m',
+                                'in all +100 m, the last UAV ends +7 s')
+    assert proposal.base_revision < proposal.revision
+    assert not proposal.accepted_on_timeout
+    assert driver.reason('t4') == f'waits for the approval of plan {proposal.revision}'
+    decide(driver, accept=True)
+    assert driver.route('a') == ('t1', 't2', 't4')
+    assert (driver.proposals[-1].lists, driver.proposals[-1].changes) == (
+        (), (f'plan {proposal.revision}: accepted by ann',))
+
+
+def test_a_rejected_plan_is_not_proposed_again(driver):
+    driver.add(('t4', 300, 0))
+    driver.settle()
+    decide(driver, accept=False)
+    driver.world.request_replan('replan service', driver.now)
+    driver.settle()
+    assert [len(each.lists) for each in driver.proposals] == [1, 0]
+    assert driver.route('a') == ('t1', 't2')
+    assert driver.reason('t4') == f'plan {driver.proposals[0].revision} with it was rejected'
+    driver.add(('t5', 400, 0))
+    driver.settle()
+    assert len(driver.proposals) == 3
+
+
+@pytest.mark.parametrize(('on_timeout', 'route'), [
+    ('accept', ('t1', 't2', 't4')), ('reject', ('t1', 't2'))])
+def test_the_deadline_decides_as_stated(on_timeout, route):
+    driver = make('replan', approval_on_timeout=on_timeout, approval_timeout=20.0)
+    driver.add(('t1', 100, 0), ('t2', 200, 0))
+    driver.settle()
+    driver.add(('t4', 300, 0))
+    driver.settle()
+    assert driver.proposals[-1].accepted_on_timeout == (on_timeout == 'accept')
+    for _ in range(6):
+        driver.settle(wait=3.0)
+    assert driver.route('a') == ('t1', 't2')
+    driver.settle(wait=3.0)
+    assert driver.route('a') == route
+    assert driver.proposals[-1].changes[0].endswith(f'{on_timeout}ed: its time is over')
+
+
+def test_a_newer_proposal_replaces_the_open_one_visibly(driver):
+    driver.add(('t4', 300, 0))
+    driver.settle()
+    first = driver.proposals[-1]
+    driver.add(('t5', 800, 0))
+    driver.settle()
+    second = driver.proposals[-1]
+    assert f'replaces plan {first.revision}' in second.changes
+    assert driver.core.approvals.refusal(first.revision) == (
+        f'revision = {first.revision}: expected {second.revision}, that of the plan that waits '
+        'for approval')
+    decide(driver, accept=True)
+    assert {'t4', 't5'} <= {*driver.route('a'), *driver.route('b')}
+
+
+def test_a_lost_uav_is_never_held_up(driver):
+    driver.settle(wait=4.0, report=False)
+    driver.uav('a', 0.0, 0.0, 50.0)
+    driver.settle(wait=2.0, report=False)
+    driver.uav('a', 0.0, 0.0, 50.0)
+    driver.settle(report=False)
+    assert (driver.route('a'), driver.route('b')) == (('t1', 't2', 't3'), ())
+    assert 'without approval for safety' in driver.allocations[-1].trigger
+    assert 'b is silent' in driver.allocations[-1].trigger
+
+
+def test_a_zone_across_a_leg_is_never_held_up(driver):
+    dome = ThreatZone.cylinder('dome', (150.0, 0.0), 30.0)
+    driver.world.set_zones([dome], (), driver.now)
+    driver.settle()
+    assert driver.lists['a'].revision > 1
+    assert driver.proposals == []
+    assert any(stop.leg.via for stop in driver.lists['a'].stops)
+
+
+def test_a_cancelled_task_leaves_its_list_at_once(driver):
+    driver.add(('t4', 300, 0))
+    driver.settle()
+    driver.cancel('t2')
+    driver.settle()
+    assert driver.route('a') == ('t1',)
+    assert driver.world.proposal is not None
+
+
+def test_what_was_flown_meanwhile_is_not_flown_again(driver):
+    driver.add(('t4', 300, 0))
+    driver.settle()
+    assert driver.event('STARTED', 't1', 'a') == ''
+    assert driver.event('COMPLETED', 't1', 'a') == ''
+    driver.settle()
+    decide(driver, accept=True)
+    assert driver.route('a') == ('t2', 't4')
+
+
+def test_an_order_goes_out_at_once(driver):
+    assert driver.order('PIN', 'b', 't1').success
+    driver.settle()
+    assert 't1' in driver.route('b')
+    assert 't1' not in driver.route('a')
+
+
+def test_an_open_proposal_outlives_a_restart_and_is_applied_once(driver):
+    driver.add(('t4', 300, 0))
+    driver.settle()
+    driver.core.nothing_written()
+    state = restored_state(driver.core.rows())
+    assert state.unreadable == []
+    assert state.proposal == driver.world.proposal
+    again = make('replan', state)
+    again.settle(wait=4.0)
+    assert again.route('a') == ('t1', 't2')
+    assert again.proposals[0] == state.proposal
+    decide(again, accept=True)
+    assert again.route('a') == ('t1', 't2', 't4')
+    again.core.nothing_written()
+    assert restored_state(again.core.rows()).proposal is None
+
+
+def test_without_approval_an_open_proposal_goes_out(driver):
+    driver.add(('t4', 300, 0))
+    driver.settle()
+    driver.world.set_params(type(driver.world.params)(
+        route_end='hold', background_budget=0.0, list_interval=0.0), driver.now)
+    driver.settle()
+    assert driver.route('a') == ('t1', 't2', 't4')
+    assert driver.world.proposal is None

@@ -1,0 +1,150 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What orders make of lists: tasks in the order that was given, and lists that wait for a UAV."""
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+
+from uav_task_alloc.allocator.state.fleet import Fleet
+from uav_task_alloc.allocator.state.locked_tasks import can_fly
+from uav_task_alloc.allocator.state.published_lists import PublishedLists
+from uav_task_alloc.allocator.state.safe_paths import GetSafePaths, SafePaths
+from uav_task_alloc.allocator.state.tasks import TaskRegistry, without_failed
+from uav_task_alloc.model import Point, Task, Uav
+
+
+@dataclass(frozen=True, slots=True)
+class TaskSequence:
+    """The tasks that a UAV flies next by an order."""
+
+    flown: tuple[str, ...]  # open, and within its range in this order
+    left_out: tuple[str, ...] = ()  # open, from the first one on that it cannot reach so
+    why: str = ''  # it cannot reach that one
+
+
+class OrderedTasks:
+    """Follows the orders in force with the present tasks and UAVs.
+
+    `paths()` are those around the present zones, `uav(uav_id)` is a known UAV for the solver.
+    """
+
+    def __init__(self, tasks: TaskRegistry, fleet: Fleet, lists: PublishedLists,
+                 paths: GetSafePaths, uav: Callable[[str], Uav]) -> None:
+        self._tasks, self._fleet, self._lists = tasks, fleet, lists
+        self._paths, self._uav = paths, uav
+
+    def sequences(self, returns: bool) -> dict[str, TaskSequence]:
+        """Return the ordered tasks of each usable UAV that has any.
+
+        Args:
+            returns: a UAV has to come home afterwards.
+        """
+        found = {}
+        for uav_id in self._fleet.usable_ids():
+            open_ids = self._open(uav_id)
+            if open_ids:
+                found[uav_id] = self._sequence(uav_id, open_ids, returns)
+        return found
+
+    def _open(self, uav_id: str) -> tuple[str, ...]:
+        """The tasks of its order that are still to be flown, and that it may fly."""
+        return tuple(task_id for task_id in self._fleet.orders.sequence(uav_id)
+                     if can_fly(self._tasks, self._fleet, uav_id, task_id))
+
+    def _sequence(self, uav_id: str, open_ids: tuple[str, ...], returns: bool) -> TaskSequence:
+        uav, paths = self._uav(uav_id), self._paths()
+        active = self._active(uav_id)
+        lead = active if active and active not in open_ids else ''
+        home = uav.base if returns else None
+        place, metres = uav.position, 0.0
+        for n, task_id in enumerate(filter(None, (lead, *open_ids)), -1 if lead else 0):
+            task = self._tasks.records[task_id].task
+            length, back = _leg_and_way_back(paths, place, task, home)
+            metres += length
+            if n >= 0 and metres + back > uav.range:
+                return TaskSequence(open_ids[:n], open_ids[n:], _why(uav, task_id, metres + back))
+            place = task.position
+        return TaskSequence(open_ids)
+
+    def _active(self, uav_id: str) -> str:
+        active = self._fleet.active.get(uav_id, '')
+        return active if can_fly(self._tasks, self._fleet, uav_id, active) else ''
+
+    def locked(self, locked: Mapping[str, tuple[str, ...]],
+               returns: bool) -> dict[str, tuple[str, ...]]:
+        """Return the locked tasks with ordered ones right after the task under way.
+
+        Args:
+            locked: task ids by UAV, in the order of flight.
+            returns: see `sequences`.
+        """
+        ordered = dict(locked)
+        for uav_id, each in self.sequences(returns).items():
+            ordered[uav_id] = self._in_order(uav_id, locked.get(uav_id, ()), each.flown)
+        return {uav_id: task_ids for uav_id, task_ids in ordered.items() if task_ids}
+
+    def tasks_to_plan(self, hold: bool, returns: bool) -> tuple[Task, ...]:
+        """Return the open tasks as orders allow them, less those that stay with their UAVs.
+
+        Those of a paused UAV may wait for it. After a restart those of an unusable UAV may have
+        been flown while the allocator was down; the bridge repeats the event when they are listed.
+
+        Args:
+            hold: no task changes its UAV yet, after a restart.
+            returns: see `sequences`.
+        """
+        orders, usable = self._fleet.orders, frozenset(self._fleet.usable_ids())
+        known = frozenset(self._fleet.records)
+        kept = {task_id for task_ids in self.kept().values() for task_id in task_ids}
+        kept.update(task_id for uav_id, each in self._lists.lists.items() if hold
+                    and uav_id not in usable for task_id in each.task_ids)
+        out = {task_id for each in self.sequences(returns).values() for task_id in each.left_out}
+        tasks = [without_failed(record, usable) for record in self._tasks.open()
+                 if record.task.id not in kept]
+        return tuple(replace(task, allowed_uavs=frozenset()) if task.id in out
+                     else orders.narrowed(task, known) for task in tasks)
+
+    def _in_order(self, uav_id: str, task_ids: tuple[str, ...],
+                  first: tuple[str, ...]) -> tuple[str, ...]:
+        """Tasks with those of an order first, but for the task under way."""
+        active = self._active(uav_id)
+        lead = (active,) if active and active in task_ids[:1] and active not in first else ()
+        return (*lead, *first, *(t for t in task_ids if t not in first and t not in lead))
+
+    def kept(self) -> dict[str, tuple[str, ...]]:
+        """Return the lists of paused UAVs whose tasks wait for them, as task ids by UAV."""
+        fleet, found = self._fleet, {}
+        for uav_id in fleet.records:
+            if fleet.orders.keeps_tasks(uav_id) and fleet.ready(uav_id):
+                listed = tuple(task_id for task_id in self._lists.get(uav_id).task_ids
+                               if can_fly(self._tasks, fleet, uav_id, task_id))
+                first = tuple(t for t in self._open(uav_id) if t in listed)
+                found[uav_id] = self._in_order(uav_id, listed, first)
+        return found
+
+    def breaks(self, uav_id: str) -> bool:
+        """Return whether the list in force of a UAV breaks the order of its tasks."""
+        listed, ordered = self._lists.get(uav_id).task_ids, self._open(uav_id)
+        if not ordered:
+            return False
+        active = self._active(uav_id)
+        rest = listed[1:] if listed[:1] == (active,) and active not in ordered else listed
+        first = tuple(t for t in ordered if t in listed)
+        return rest[:len(first)] != first
+
+
+def _leg_and_way_back(paths: SafePaths, place: Point, task: Task,
+                      home: Point | None) -> tuple[float, float]:
+    """Metres to a task, and from there home; inf where no safe path leads there."""
+    there = paths.leg(place, task.position)
+    back = None if home is None else paths.leg(task.position, home)
+    return (math.inf if there is None else there.length,
+            back.length if back else 0.0 if home is None else math.inf)
+
+
+def _why(uav: Uav, task_id: str, need: float) -> str:
+    if need == math.inf:
+        return f'no safe path leads {uav.id} to {task_id} in this order'
+    return (f'{task_id} in this order is beyond the range of {uav.id}: it needs {need:.0f} m and '
+            f'has {uav.range:.0f} m left')
