@@ -19,6 +19,7 @@ from flight_bench import places
 from mission_bench import task_list
 from pymavlink.dialects.v20 import ardupilotmega as d
 
+from uav_task_alloc.mavlink.gcs.authority import AuthorityState
 from uav_task_alloc.model import Shape, ThreatZone
 
 AROUND_HOME = ThreatZone('Z', Shape.CYLINDER, (0.0, 10.0, 0.0), 30.0)
@@ -262,3 +263,19 @@ def test_finding_25_a_bridge_restarted_without_positions_does_not_take_off(kind,
     assert bench.run(lambda: len(places(bench)) == 3)
     assert bench.run(lambda: sorted(bench.completed()) == ['A', 'B', 'C'])
     assert places(bench) == ['A', 'B', 'C']
+
+
+@BOTH
+def test_a_mode_set_after_a_reboot_on_the_ground_is_not_explained_by_it(kind):
+    bench = FindingsBench(kind, takeoff=True, configs={1: {'arming_delay': 60.0}}).discover()
+    bench.assign(task_list('AB'))
+    bench.run(limit=8.0)
+    end = bench.now + 9.0
+    bench.line.tampers.append(lambda direction, m, now: [] if now < end and hasattr(
+        m, 'time_boot_ms') else None)
+    bench.vehicles[1].reboot(bench.now)
+    bench.run(limit=6.0)
+    assert bench.authority() is AuthorityState.HELD
+    take(bench, 'LOITER')
+    bench.run(limit=10.0)
+    assert bench.authority() is AuthorityState.LOST

@@ -3,8 +3,9 @@
 import pytest
 from authority_bench import BOTH, MODES, PX4, H, L, S, flying, sends_no_command, status_is
 from findings_bench import distance, drop_messages, flown_once_each, set_current
-from flight_bench import places
+from flight_bench import Store, places
 from mission_bench import ORIGIN, task_list
+from pymavlink.dialects.v20 import ardupilotmega as d
 
 from uav_task_alloc.mavlink.autopilots import PX4 as PX4_PROFILE
 from uav_task_alloc.mavlink.mission.flown_path import PositionSample
@@ -23,10 +24,11 @@ SPEED = 10.0  # [m/s]
 
 
 class Flight:
-    """A progress table, fed with positions at 5 Hz along x, 50 m high."""
+    """A progress table, fed with positions at 5 Hz along x, 50 m high; 20 frames a second."""
 
     def __init__(self, repeats=True):
         self.frames, self.now, self.x = FrameLog(), 0.0, 0.0
+        self.lost = False  # positions
         self.table = ProgressTable(self.frames, repeats=repeats)
         self.stay(0.0)
 
@@ -34,9 +36,19 @@ class Flight:
         for _ in range(round(5 * seconds) or 1):
             self.now += 0.2
             self.x += 0.2 * speed
-            self.table.add_position(PositionSample(
-                self.now, (self.x, 0.0, 50.0), (speed, 0.0, 0.0)), True, self.now)
+            frame = self.frames.note(round(20 * self.now) % 256, self.now)
+            if not self.lost:
+                self.table.add_position(PositionSample(
+                    self.now, (self.x, 0.0, 50.0), (speed, 0.0, 0.0)), True, self.now, frame)
             self.table.step(self.now)
+
+    def frame(self):
+        """Number of a frame sent just after the newest position."""
+        return self.frames.note(round(20 * self.now + 1) % 256, self.now)
+
+    def reached(self, seq):
+        """MISSION_ITEM_REACHED, sent just after the newest position."""
+        self.table.note_reached(seq, self.now, frame=self.frame())
 
     def fly_to(self, x):
         self.stay(abs(x - self.x) / SPEED, SPEED if x > self.x else -SPEED)
@@ -54,14 +66,14 @@ def repeated_over_two_uploads():
     flight = Flight()
     flight.begin(A=100.0, X=900.0)
     flight.fly_to(100.0)
-    flight.table.note_reached(0, flight.now)
+    flight.reached(0)
     flight.begin(B=128.0, X=900.0)
     for _ in range(2):
         flight.stay(1.0, SPEED)
-        flight.table.note_reached(0, flight.now)
+        flight.reached(0)
     flight.begin(C=500.0, X=900.0)
     flight.stay(1.0)
-    flight.table.note_reached(0, flight.now)
+    flight.reached(0)
     return flight
 
 
@@ -69,10 +81,43 @@ def test_a_repetition_over_two_uploads_completes_nothing_of_the_second():
     assert list(repeated_over_two_uploads().table.completed) == ['A']
 
 
+def test_lost_positions_do_not_make_a_repetition_a_new_reached():
+    flight = Flight()
+    flight.begin(A=100.0, X=900.0)
+    flight.fly_to(100.0)
+    flight.reached(0)
+    flight.begin(B=128.0, X=900.0)
+    for _ in range(2):
+        flight.stay(1.0, SPEED)
+        flight.reached(0)
+    flight.stay(0.2)
+    flight.begin(C=500.0, X=900.0)
+    flight.lost = True
+    flight.stay(0.8)
+    flight.reached(0)
+    flight.lost = False
+    flight.stay(10.0)
+    assert list(flight.table.completed) == ['A']
+
+
+def test_the_first_repetition_may_come_at_once():
+    flight = Flight()
+    flight.begin(A=100.0, X=900.0)
+    flight.fly_to(100.0)
+    flight.reached(0)
+    flight.stay(0.2)
+    flight.begin(B=109.0, X=900.0)
+    flight.stay(0.2)
+    flight.reached(0)
+    flight.table.note_current(1, flight.now, True)  # set by another station
+    flight.stay(10.0)
+    assert list(flight.table.completed) == ['A']
+
+
 def test_a_reached_after_the_end_of_the_repetitions_counts():
     flight = repeated_over_two_uploads()
     flight.fly_to(500.0)
-    flight.table.note_reached(0, flight.now)
+    flight.reached(0)
     flight.table.note_current(1, flight.now, True)
     flight.stay(1.0)
     assert list(flight.table.completed) == ['A', 'C']
@@ -85,6 +130,20 @@ def test_a_reboot_does_not_lose_what_the_positions_have_shown():
     flight.table.note_current(1, flight.now, True)
     flight.fly_to(110.0)
     flight.table.invalidate()
+    assert list(flight.table.completed) == ['A']
+
+
+def test_a_task_passed_without_positions_counts_where_the_vehicle_is_seen_again():
+    flight = Flight(repeats=False)
+    flight.begin(A=100.0, B=500.0)
+    flight.fly_to(60.0)
+    flight.lost = True  # the estimate is invalid for a while
+    flight.fly_to(110.0)
+    flight.table.note_current(1, flight.now, True, flight.frame())
+    flight.fly_to(250.0)
+    assert list(flight.table.completed) == []
+    flight.lost = False
+    flight.stay(1.0)
     assert list(flight.table.completed) == ['A']
 
 
@@ -182,3 +241,45 @@ def test_a_mode_that_nothing_has_explained_is_not_accepted_by_a_restarted_bridge
     bench.run(limit=1.0)
     assert status_is(bench, L)
     assert sends_no_command(bench, names='ABC')
+
+
+@PX4
+def test_a_task_of_a_mission_that_a_restarted_bridge_has_read_needs_no_reached(kind):
+    bench = flying(kind, 'ABC')
+    drop_messages(bench, 'down', 'MISSION_ITEM_REACHED', lambda m: len(places(bench)) < 2)
+    bench.kill_and_restart(0.0, store=False)
+    bench.assign(task_list('ABC', 2))
+    assert bench.run(lambda: bench.executor().onboard.resume.located, 10.0)
+    drop_messages(bench, 'up', 'MISSION_COUNT', lambda m: not places(bench))
+    bench.assign(task_list('CAB', 3))
+    assert bench.run(lambda: places(bench), 60.0)
+    flown_once_each(bench, 'ABC')
+
+
+@PX4
+def test_a_current_item_set_during_an_upload_and_a_restart_completes_nothing(kind):
+    bench = flying(kind, 'ABC')
+    drop_messages(bench, 'down', 'MISSION_COUNT', lambda m: bench.now < end)
+    end = bench.now + 8.0
+    bench.assign(task_list('DEFG', 2))
+    assert bench.run(lambda: len(bench.vehicles[1].flight.items) == 4, 8.0)
+    bench.run(limit=0.5)
+    bench.kill_and_restart(0.0)
+    set_current(bench, 2)
+    bench.assign(task_list('DEFG', 3))
+    flown_once_each(bench, 'DEFG')
+
+
+@BOTH
+def test_an_item_skipped_before_the_first_heartbeat_completes_nothing(kind):
+    bench = flying(kind, 'ABCD')
+    own = bench.onboard().own
+    bench.store = Store()
+    bench.start()
+    drop_messages(bench, 'down', 'HEARTBEAT', lambda m: bench.now < begin + 3.0)
+    begin = bench.now
+    bench.run(limit=1.5)
+    bench.from_station(d.MAVLink_mission_set_current_message(1, 1, own + 2))
+    bench.discover()
+    bench.assign(task_list('ABCD', 2))
+    flown_once_each(bench, 'ABCD')

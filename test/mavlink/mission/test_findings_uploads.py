@@ -4,12 +4,15 @@ import pytest
 from authority_bench import ARDUPILOT, BOTH, MODES, PX4, flying
 from findings_bench import distance, drop_messages, flown_once_each, set_current
 from flight_bench import places
-from mission_bench import ORIGIN, task_list
+from mission_bench import ORIGIN, OURS, task_list
+from pymavlink.dialects.v20 import ardupilotmega as d
 from test_findings_evidence import Flight
 
 from uav_task_alloc.mavlink.autopilots import PX4 as PX4_PROFILE
 from uav_task_alloc.mavlink.mission.diff import DiffKind, MissionDiff
+from uav_task_alloc.mavlink.mission.download import Download
 from uav_task_alloc.mavlink.mission.items import MissionStop, TaskList, mission_items
+from uav_task_alloc.mavlink.mission.peer import Peer
 from uav_task_alloc.mavlink.mission.reports_during_upload import ReportsDuringUpload
 from uav_task_alloc.mavlink.mission.verified_mission import MissionState
 from uav_task_alloc.model import Task
@@ -191,7 +194,7 @@ def test_a_kept_reached_counts_however_far_the_vehicle_has_flown_since():
     flight.begin(A=100.0, X=900.0)
     reports, new = upload_during(flight, B=600.0, C=900.0)
     flight.fly_to(100.0)
-    reports.add_reached(0, flight.now, 1)
+    reports.add_reached(0, flight.now, flight.frame())
     flight.fly_to(400.0)
     reports.begin_new(new)
     assert list(flight.table.completed) == ['A']
@@ -202,10 +205,10 @@ def test_a_kept_current_item_of_the_new_mission_counts():
     flight.begin(A=900.0)
     begin = flight.now
     reports, new = upload_during(flight, B=100.0, C=300.0)
-    reports.add_current(0, flight.now, 1, True, 7)
+    reports.add_current(0, flight.now, flight.frame(), True, 7)
     flight.fly_to(100.0)
     flight.stay(0.2, 10.0)
-    reports.add_current(1, flight.now, 2, True, 7)
+    reports.add_current(1, flight.now, flight.frame(), True, 7)
     flight.fly_to(200.0)
     of_new = reports.begin_new(new)
     flight.table.begin(new.items, 0, flight.now, since=begin)
@@ -219,10 +222,11 @@ def test_a_current_item_of_the_old_mission_releases_the_reached_before_it():
     flight.begin(A=100.0, X=900.0)
     reports, _ = upload_during(flight, B=600.0)
     flight.fly_to(100.0)
-    reports.add_reached(0, flight.now, 5)
-    reports.release(4)
+    frame = flight.frame()
+    reports.add_reached(0, flight.now, frame)
+    reports.release(frame - 1)
     assert list(flight.table.completed) == []
-    reports.release(6)
+    reports.release(frame + 1)
     assert list(flight.table.completed) == ['A']
 
 
@@ -250,3 +254,11 @@ def test_a_reboot_at_the_place_of_the_current_item_completes_it(x, completed):
     flight.fly_to(x)
     flight.table.invalidate()
     assert list(flight.table.completed) == completed
+
+
+def test_a_request_is_repeated_after_twice_the_time_of_an_answer():
+    download = Download(Peer(1, 1, *OURS), 0.0)
+    download.receive(d.MAVLink_mission_count_message(*OURS, 2), 0.2)
+    assert download.step(0.5) == []
+    assert [m.seq for m in download.step(0.61)] == [0]
+    assert [m.seq for m in download.step(1.02)] == [0]

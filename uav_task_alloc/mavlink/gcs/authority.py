@@ -217,6 +217,7 @@ class AuthorityRecord:
     mission: int | None = None  # checksum of the items on board
     current: int | None = None  # index of the item being flown, home not counted
     arrived: bool = False  # the vehicle was seen at that item
+    uploading: tuple[int, ...] = ()  # checksum of a mission being uploaded, index of its start
     # vehicle time [s], position [m] and velocity [m/s], both ENU, of one or two recent positions
     seen: tuple[float, ...] = ()
 

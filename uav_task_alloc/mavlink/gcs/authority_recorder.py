@@ -73,7 +73,8 @@ class AuthorityRecorder:
             tuple(dict.fromkeys(mode for mode, _ in sent.modes)),
             sent.arm_until > -math.inf and not state.armed and authority.held,
             state.replacing_since, sent.climb, tuple(self.marks.values()),
-            *self._evidence.mission_position(), self._last_position())
+            *self._evidence.mission_position(), self._evidence.uploading(),
+            self._last_position())
         if record != self._saved:
             self._saved = record
             self._save(record)

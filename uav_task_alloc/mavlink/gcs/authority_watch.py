@@ -114,6 +114,7 @@ class AuthorityWatch:
             self._modes.receive_heartbeat(before, message.custom_mode, now)
             if state.armed != was_armed:
                 self._arming.armed_changed(was_returning, now)
+        state.heartbeat_at = now
         check_system_status(state, now)
         self._save_record()
 

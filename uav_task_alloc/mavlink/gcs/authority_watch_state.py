@@ -2,6 +2,7 @@
 """The state of one vehicle that all checks of authority share: modes, arming, pending causes."""
 from __future__ import annotations
 
+import math
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -42,6 +43,7 @@ class AuthorityWatchState:
     texts: StatusTexts = field(default_factory=StatusTexts)
     notes: deque[OperatorNote] = field(default_factory=deque)
     mode: int | None = None  # custom_mode of the newest heartbeat
+    heartbeat_at: float = -math.inf  # [s] the newest heartbeat before this one
     armed: bool = False
     status: int = 0  # MAV_STATE
     unconfirmed: bool = False  # the next heartbeat shows the mode, without a change of mode

@@ -14,6 +14,7 @@ from uav_task_alloc.errors import UnknownName
 from uav_task_alloc.geometry.frames import Origin
 from uav_task_alloc.mavlink.autopilots import profile_of
 from uav_task_alloc.mavlink.gcs.authority import AuthorityRecord
+from uav_task_alloc.mavlink.gcs.early_messages import EarlyMessages
 from uav_task_alloc.mavlink.gcs.mission_executor import MissionExecutor
 from uav_task_alloc.mavlink.gcs.policy import Policy
 from uav_task_alloc.mavlink.mission.items import TaskList
@@ -79,6 +80,7 @@ class GroundStation:
                  store: AuthorityStore | None = None) -> None:
         self._config, self._rng, self._store = config, rng, store
         self.sessions: dict[int, VehicleSession] = {}  # by system id
+        self._early = EarlyMessages()
         self.refusals = RefusedMessages()  # messages and lists whose processing failed
         self._compared: list[tuple[TaskList | None, int]] = []  # lists and flown items
 
@@ -109,6 +111,7 @@ class GroundStation:
             return []
         session = self.sessions.get(system) or self._discover(address, message, now)
         if session is None:
+            self._early.keep(address, message, now)
             return []
         if session.address != address:
             # with a duplicate id, one vehicle would get the mission of the other
@@ -209,6 +212,8 @@ class GroundStation:
                                    record, save)
         session = VehicleSession(uav_id, address, executor)
         self.sessions[system] = session
+        for early, at in self._early.take(system, address, now):
+            executor.receive(early, at)
         return session
 
     @staticmethod

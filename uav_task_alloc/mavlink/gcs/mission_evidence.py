@@ -7,6 +7,7 @@ from pymavlink.dialects.v20 import ardupilotmega as d
 from uav_task_alloc.mavlink.gcs.onboard_mission import LATE_REACHED, OnboardMission
 from uav_task_alloc.mavlink.gcs.resume import checksum
 from uav_task_alloc.mavlink.gcs.telemetry import Telemetry
+from uav_task_alloc.mavlink.mission.diff import MissionDiff
 from uav_task_alloc.mavlink.mission.items import Item, alike
 
 
@@ -21,6 +22,7 @@ class MissionEvidence:
     def __init__(self, onboard: OnboardMission, telemetry: Telemetry) -> None:
         self._onboard, self._telemetry = onboard, telemetry
         self._checksum: tuple[tuple[Item, ...], int] | None = None
+        self._uploading: tuple[MissionDiff, int] | None = None
 
     def ended(self, now: float) -> bool:
         """Whether REACHED of the last item was received within `LATE_REACHED`."""
@@ -78,8 +80,9 @@ class MissionEvidence:
 
         Checksum and index are None where they are not known.
         """
-        held, progress = self._onboard.held, self._onboard.progress
-        if held is None or progress.current is None:
+        progress = self._onboard.progress
+        held = progress.items  # also while they are read back
+        if not held or progress.current is None:
             return None, None, False
         if self._checksum is None or self._checksum[0] is not held:
             self._checksum = held, checksum(held)
@@ -87,3 +90,12 @@ class MissionEvidence:
         current = next((n for n, item in enumerate(progress.items[:progress.current])
                         if item.task in passed), progress.current)
         return self._checksum[1], current, progress.has_arrived(current)
+
+    def uploading(self) -> tuple[int, ...]:
+        """Checksum of a mission that may be stored next, and index of its first item; ()."""
+        diff = self._onboard.unknown_upload
+        if diff is None:
+            return ()
+        if self._uploading is None or self._uploading[0] is not diff:
+            self._uploading = diff, checksum(diff.items)
+        return self._uploading[1], diff.start

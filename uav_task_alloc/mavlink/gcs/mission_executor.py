@@ -103,6 +103,7 @@ class MissionExecutor:
         resume = self.onboard.resume
         if record is not None:
             resume.recorded = record.mission, record.current, record.arrived
+            resume.recorded_upload = record.uploading
             for first in range(0, len(record.seen) - _SEEN + 1, _SEEN):
                 t, x, y, z, east, north, up = record.seen[first:first + _SEEN]
                 self.onboard.progress.positions.add_recorded(

@@ -10,6 +10,7 @@ from uav_task_alloc.mavlink.gcs.flight_modes import ModeClass, avoids_traffic
 from uav_task_alloc.mavlink.gcs.mission_evidence import MissionEvidence
 
 _CLIMBED = 0.9  # of the commanded height: the take-off ended normally
+_HEARTBEAT_DELAY = 1.5  # [s] on the way, as a rule
 _CONTRADICTED = 2.5  # [s] in which a heartbeat may still show a mode that was acknowledged
 
 
@@ -179,6 +180,8 @@ class ModeChanges:
             self._state.class_of(mode) is ModeClass.HOLD or self._state.is_return(mode))
 
     def _rebooted_since(self) -> Callable[[float], bool]:
-        """A predicate: the vehicle has rebooted after this call."""
-        state, restarts = self._state, self._state.telemetry.restarts
-        return lambda now: state.telemetry.restarts != restarts or state.booting
+        """A predicate: it rebooted after the last heartbeat with the mode before, not earlier."""
+        state, telemetry, before = self._state, self._state.telemetry, self._state.heartbeat_at
+        restarts = telemetry.restarts
+        return lambda now: state.booting or (
+            telemetry.restarts != restarts and telemetry.booted_at > before - _HEARTBEAT_DELAY)

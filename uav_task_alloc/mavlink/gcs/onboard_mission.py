@@ -99,6 +99,12 @@ class OnboardMission:
         return self._unconfirmed is not None or (self._uploading is not None and not self._taken)
 
     @property
+    def unknown_upload(self) -> MissionDiff | None:
+        """What a transfer would put on board that is not known to be taken; None: none."""
+        uploading = self._unconfirmed or (None if self._taken else self._uploading)
+        return None if uploading is None else uploading[0]
+
+    @property
     def outdated(self) -> bool:
         """Whether the transfer is for an older list."""
         return (self._uploading is not None and self.tasks is not None

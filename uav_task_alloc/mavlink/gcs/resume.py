@@ -76,6 +76,7 @@ class Resume:
         self.reported: set[str] = set()  # flown and reported by the previous run
         # checksum of the mission, current item and whether it was seen there, of the previous run
         self.recorded: tuple[int | None, int | None, bool] = None, None, False
+        self.recorded_upload: tuple[int, ...] = ()  # checksum and first item of an upload then
         self.was_disarmed = True  # in the last record; or there is none
         self.current_unreliable = False  # items before the current one may be unflown
         self._rebooted = self._passed_recorded = False
@@ -162,6 +163,9 @@ class Resume:
             self.located = self.located or not held
             return
         self.located = True
+        upload = self.recorded_upload
+        if len(upload) == 2 and upload[0] == checksum(held) != self.recorded[0]:
+            self.recorded = upload[0], upload[1], False
         mission, recorded, _ = self.recorded
         if self._passed_recorded and mission == checksum(held) and recorded is not None:
             self._flown += held[recorded:recorded + 1]
@@ -185,7 +189,8 @@ class Resume:
         flown = len(held) if ended else current
         first = min(self._currents[0][0], flown) if self._currents else flown
         self._skipped = frozenset(range(first, flown)) - self._flown_since(held, first, flown, now)
-        self._progress.begin(held, flown, now, read=True)
+        items = held[:flown] + self._with_tasks(held[flown:], tasks)
+        self._progress.begin(items, flown, now, read=True)
         self._epoch, self._located_at = self._progress.epoch, flown
         # the previous run has reported earlier items, or recorded that they were skipped
         same = self.recorded[0] == checksum(held)
@@ -239,7 +244,7 @@ class Resume:
             if kind:
                 self._progress.note_current(seq, when, True, frame)
             else:
-                self._progress.note_reached(seq, when, proven=True)
+                self._progress.note_reached(seq, when, proven=True, frame=frame)
 
     def _with_tasks(self, held: tuple[Item, ...], tasks: TaskList) -> tuple[Item, ...]:
         """Items that were read, with the tasks of a list and their positions."""

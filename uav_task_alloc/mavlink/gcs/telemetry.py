@@ -82,6 +82,7 @@ class Telemetry:
         self.received_ids: set[int] = set()  # message ids since the start
         self.received_last: dict[int, float] = {}  # [s] by message id
         self.restarts = 0
+        self.booted_at = -math.inf  # [s] the latest restart that was detected, or earlier
         self.boot_ms = self._older_clocks = 0  # [ms] time_boot_ms; messages in a row before it
         self._boot_at, self._gap_at = now, -math.inf  # [s]; end of the latest gap of _QUIET
         self.clock_rate = ClockRate()
@@ -217,13 +218,16 @@ class Telemetry:
         if self._older_clocks >= 2 and (
                 boot_ms < least - 1000.0 * _MAX_DELAY or silence > _MAX_DELAY):
             self._boot_at = now
+            rate = self.clock_rate.value
             self.restart(boot_ms)
+            self.booted_at = now - 1e-3 * boot_ms / (1.0 if math.isnan(rate) else rate)
 
     def _heartbeat(self, message: Message, now: float) -> None:
         self.armed = bool(message.base_mode & d.MAV_MODE_FLAG_SAFETY_ARMED)
         self.mode = self._profile.mode_function(message.custom_mode)
         if message.system_status == d.MAV_STATE_BOOT and self._started:
             self.restart()  # its clock is received later
+            self.booted_at = now
         self.status, self.autopilot = message.system_status, message.autopilot
         # PX4 reports UNINIT later as well, when its preflight checks fail
         self._started = self._started or self.status >= d.MAV_STATE_STANDBY

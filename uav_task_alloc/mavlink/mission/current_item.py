@@ -192,7 +192,7 @@ class CurrentItem:
         after = self._epoch.items[end:end + 1]
         if after and after[0].command == dialect.MAV_CMD_NAV_RETURN_TO_LAUNCH:
             return None  # PX4 sends no REACHED of the item before it
-        if self._epochs.reached_recently(begin, end, now):
+        if self._epochs.series.named_lately(begin, end, now):
             return None  # one came, perhaps a repetition: only the positions decide
         return previous, frame
 

@@ -10,10 +10,11 @@ from uav_task_alloc.mavlink.mission.items import Item
 from uav_task_alloc.mavlink.mission.peer import Peer, received_item
 from uav_task_alloc.mavlink.transport.codec import Message
 
-_PERIOD = 1.0  # [s] until a request is repeated
-_RELIST_AFTER = 4  # unanswered requests for one item: PX4 may have ended the transfer
+_PERIOD = 1.0  # [s] until a request is repeated, at most
+_LEAST_PERIOD = 0.4  # [s] the same, at least
+_RELIST_AFTER = 4.0  # [s] without an answer for one item: PX4 may have ended the transfer
 _MAX_RELISTS = 3  # MISSION_REQUEST_LIST sent again after that
-_TRIES = 12  # of one request; ArduPilot denies a list for 8 s after a broken upload
+_PATIENCE = 12.0  # [s] for one answer; ArduPilot denies a list for 8 s after a broken upload
 
 
 class DownloadState(Enum):
@@ -40,8 +41,10 @@ class Download:
         self.state = DownloadState.LISTING
         self.items: list[Item] = []
         self._count = 0
-        self._tries, self._due = 1, now + _PERIOD
+        self._period, self._tries = _PERIOD, 0
+        self._asked_at = self._due = now
         self._relists = 0
+        self._ask(now)
 
     @property
     def first(self) -> Message:
@@ -57,11 +60,13 @@ class Download:
         kind = message.get_type()
         if kind == 'MISSION_COUNT' and self.state is DownloadState.LISTING:
             self._count = message.count
+            self._answered(now)
             self.state = DownloadState.GETTING
             return self._next(now)
         if (kind in ('MISSION_ITEM_INT', 'MISSION_ITEM') and self.state is DownloadState.GETTING
                 and message.seq == len(self.items)):
             self.items.append(received_item(message))
+            self._answered(now)
             return self._next(now)
         return []
 
@@ -69,16 +74,16 @@ class Download:
         """Repeat the request that is due, or give up; returns the messages to send."""
         if self.state not in (DownloadState.LISTING, DownloadState.GETTING) or now < self._due:
             return []
-        if self._tries >= _TRIES:
+        waited = now - self._asked_at + 1e-9
+        if waited >= _PATIENCE:
             self.state = DownloadState.FAILED
             return []
-        if (self.state is DownloadState.GETTING and self._tries >= _RELIST_AFTER
+        if (self.state is DownloadState.GETTING and waited >= _RELIST_AFTER
                 and self._relists < _MAX_RELISTS):
-            self.state, self._tries = DownloadState.LISTING, 0
+            self.state, self._tries, self._asked_at = DownloadState.LISTING, 0, now
             self._relists += 1
             self.items.clear()
-        self._tries += 1
-        self._due = now + _PERIOD
+        self._ask(now)
         return [self.first if self.state is DownloadState.LISTING
                 else self._peer.request(len(self.items))]
 
@@ -86,5 +91,16 @@ class Download:
         if len(self.items) == self._count:
             self.state = DownloadState.DONE
             return [self._peer.ack(dialect.MAV_MISSION_ACCEPTED)]
-        self._tries, self._due = 1, now + _PERIOD
+        self._tries, self._asked_at = 0, now
+        self._ask(now)
         return [self._peer.request(len(self.items))]
+
+    def _ask(self, now: float) -> None:
+        """Note that a request is sent."""
+        self._tries += 1
+        self._due = now + self._period
+
+    def _answered(self, now: float) -> None:
+        """Repeat the next requests after twice the time that an answer takes."""
+        if self._tries == 1:
+            self._period = min(_PERIOD, max(_LEAST_PERIOD, 2.0 * (now - self._asked_at)))

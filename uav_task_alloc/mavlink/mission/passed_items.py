@@ -10,11 +10,12 @@ import math
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
-from uav_task_alloc.mavlink.mission.flown_path import CLOSE, Visit
+from uav_task_alloc.mavlink.mission.flown_path import CLOSE, GAP, Visit
 from uav_task_alloc.mavlink.mission.items import Item
 from uav_task_alloc.mavlink.mission.position_history import LOOSE_RADIUS, PositionHistory
 from uav_task_alloc.mavlink.transport.frame_log import FrameLog
 
+_BLIND = 30.0  # [s] to wait for a position that shows where it is after a claim
 _FRAMES_AFTER = 10  # frames after MISSION_CURRENT in which REACHED may follow
 
 
@@ -95,7 +96,8 @@ class PassedItems:
         visits = {item.task: self._visit(item, claim) for item in items}
         seen = tuple(i for i in items if visits[i.task] is Visit.YES)
         rest = tuple(i for i in items if visits[i.task] is not Visit.YES)
-        if rest and now < claim.deadline:
+        blind = self._positions.path.newest < claim.until - GAP
+        if rest and now < claim.deadline + _BLIND * blind:
             return _Judged(seen, ())
         self._drop(claim)
         unseen = self._unobserved(rest, visits, claim)
@@ -179,7 +181,7 @@ def flown_between(items: tuple[Item, ...], begin: int, end: int, now: float, fra
     """
     passed = tuple(replace(items[n], task=f'{n}') for n in range(begin, end))
     route = tuple(item for item in (*passed, *items[end:]) if item.position is not None)
-    claim = Claim(passed, route, -math.inf, positions.vehicle_time(now), now, 0, None, frame,
+    claim = Claim(passed, route, -math.inf, positions.vehicle_time(now), -math.inf, 0, None, frame,
                   skips=end - begin > 1, in_flight=True)
     judged = PassedItems(FrameLog(), positions).judge(claim, passed, now)
     return {int(item.task) for item in judged.flown}

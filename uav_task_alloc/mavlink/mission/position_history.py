@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from bisect import bisect_right
 from collections import deque
 
 from uav_task_alloc.mavlink.mission.flown_path import (
@@ -20,6 +21,7 @@ _FRESH = 3.0  # [s] for which a position is the present one
 _JUMP_RECOVERY = 60.0  # [s] after a jump of the estimate, in which a second jump ends it
 _AT_ONCE = 2.0  # [s] in which a vehicle does not fly two legs
 _FRAME_TIME = 0.2  # [s] accuracy of a frame's time from its place among other frames
+_CLOCKS = 600  # changes of the clock: 6 s of a clock 20 times as fast as ours
 _STAMPS = 150  # positions: half a minute at 5 Hz
 MAX_MESSAGE_DELAY = 6.0  # [s] in which messages sent before an event may still arrive
 LOOSE_RADIUS = 10.0  # [m] at which an autopilot may count an item as reached and turn
@@ -36,7 +38,8 @@ class PositionHistory:
         self._recorded_at: float | None = None  # vehicle time [s] of one of the previous run
         # item and since [s] of the last `was_inside`, the newest position then, and its result
         self._inside: tuple[tuple[Item, float] | None, float, bool] = None, -math.inf, False
-        self._clock = -math.inf  # [s] vehicle time less ours, by the fastest message
+        # since when [s], vehicle time less ours [s], by the fastest message until then
+        self._clocks: list[tuple[float, float]] = []
 
     def add(
         self, sample: PositionSample, newest: bool, now: float, frame: int | None = None
@@ -51,7 +54,9 @@ class PositionHistory:
         """
         if self._recorded_at is not None and sample.t < self._recorded_at - MAX_MESSAGE_DELAY:
             self.clear()  # the vehicle was restarted while no bridge ran
-        self._clock = max(self._clock, sample.t - now)
+        if not self._clocks or sample.t - now > self._clocks[-1][1]:
+            self._clocks.append((now, sample.t - now))
+            del self._clocks[:-_CLOCKS]
         if frame is not None:
             self._stamps.append((frame, sample.t))
         if newest:
@@ -76,12 +81,15 @@ class PositionHistory:
         self.path.clear()
         self._recorded_at = None
         self._inside = None, -math.inf, False
-        self._clock = -math.inf
+        self._clocks.clear()
         self._stamps.clear()
 
     def vehicle_time(self, now: float) -> float:
-        """Vehicle time [s] at our steady time [s]."""
-        return now + self._clock
+        """Vehicle time [s] at our steady time [s]; a simulated clock may be faster than ours."""
+        if not self._clocks:
+            return -math.inf
+        at = bisect_right(self._clocks, now, key=lambda one: one[0])
+        return now + self._clocks[max(0, at - 1)][1]
 
     def recent(self, since: float, now: float) -> float:
         """Vehicle time [s], `since` or later, from which positions may be newer than a message.
@@ -174,6 +182,12 @@ class PositionHistory:
         rate = (end - begin) / (last - first) if last > first else 0.0
         missing = (frame - before) * rate
         return at + (missing if missing > GAP else 0.0)
+
+    def sent_between(self, frame: int) -> tuple[float, float]:
+        """Vehicle times [s] between which a frame was sent, by its order among the positions."""
+        before = max((t for f, t in self._stamps if f < frame), default=-math.inf)
+        after = min((t for f, t in self._stamps if f > frame), default=math.inf)
+        return (before, after) if before <= after else (-math.inf, math.inf)
 
     def sent_before(self, frame: int, otherwise: float, earliest: bool) -> float:
         """Latest time at which a frame was sent, by its order among the positions.

@@ -22,6 +22,7 @@ from uav_task_alloc.mavlink.mission.reached_epoch import (
     ReachedEpoch,
 )
 from uav_task_alloc.mavlink.mission.reached_items import ReachedItems
+from uav_task_alloc.mavlink.mission.reached_series import ReachedSeries
 from uav_task_alloc.mavlink.transport.frame_log import FrameLog
 from uav_task_alloc.model import Point, Task
 
@@ -52,7 +53,8 @@ class ProgressTable:
         self._frames = frames or FrameLog()
         self.positions = PositionHistory()
         self._epoch, self._tasks = Epoch(), CompletedTasks()
-        self._epochs = ReachedEpoch(self.positions, repeats, self._frames)
+        self._epochs = ReachedEpoch(
+            self.positions, ReachedSeries(self.positions, repeats, self._frames))
         self._moves = CurrentItem(
             self._epoch, self._tasks, self.positions, self._epochs, self._frames)
         self._reached = ReachedItems(
@@ -180,6 +182,7 @@ class ProgressTable:
         self._moves.invalidate()
         self._reached.last = None
         self._epochs.clear()
+        self._epochs.series.clear()
         self._epoch.invalidate()
         self.positions.clear()
 
@@ -240,13 +243,16 @@ class ProgressTable:
         """
         self._reached.note(seq, now, proven, frame)
 
-    def note_repeated(self, seq: int, now: float) -> None:
-        """Note that the last REACHED was repeated, also while its epoch was unknown."""
-        self._epochs.note_repeated(seq, now)
+    def reached_first_at(self, seq: int, now: float, frame: int) -> float:
+        """When [s] the first REACHED was received that this one may repeat, of any epoch.
 
-    def reached_first_at(self, seq: int, now: float) -> float:
-        """See `ReachedEpoch.first_at`."""
-        return self._epochs.first_at(seq, now)
+        Args:
+            seq: index without home.
+            now: steady time [s] at which it was received.
+            frame: its number.
+        """
+        series = self._epochs.series
+        return series.first_at(series.add(seq, now, frame))
 
     def note_end(self, seq: int, now: float) -> None:
         """Note a REACHED of this epoch or the next: the mission may have ended."""

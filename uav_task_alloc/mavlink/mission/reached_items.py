@@ -13,6 +13,7 @@ from uav_task_alloc.mavlink.mission.current_item import CurrentItem
 from uav_task_alloc.mavlink.mission.epoch import Epoch
 from uav_task_alloc.mavlink.mission.position_history import MAX_MESSAGE_DELAY, PositionHistory
 from uav_task_alloc.mavlink.mission.reached_epoch import CurrentEpoch, ReachedEpoch
+from uav_task_alloc.mavlink.mission.reached_series import Reached
 
 
 class ReachedItems:
@@ -45,15 +46,14 @@ class ReachedItems:
         epoch, epochs, positions = self._epoch, self._epochs, self._positions
         proven = proven or (
             frame is not None and not self._repeats and frame > epoch.taken_frame)
-        when = epochs.first_at(seq, now)
-        repetition = epochs.note_reached(seq, now)
+        reached = epochs.series.add(seq, now, frame)
         if (proven or now >= epochs.before.until) and epoch.items:
             if 0 <= seq < len(epoch.items) and (
                     proven or positions.can_have_reached(epoch.items[seq], now)):
-                self._accept(seq, now)
-        elif not self._prove(seq, now, when, repetition) and not repetition:
+                self._accept(reached, now)
+        elif not self._prove(reached, now):
             # a position that shows it may still arrive
-            epochs.unproven[seq] = now + MAX_MESSAGE_DELAY, when
+            epochs.unproven[seq] = now + MAX_MESSAGE_DELAY, reached
 
     def note_end(self, seq: int, now: float) -> None:
         """Take one of this epoch or the next: the mission may have ended."""
@@ -65,47 +65,52 @@ class ReachedItems:
 
     def step(self, now: float) -> None:
         """Judge each REACHED of unknown epoch."""
-        unproven = self._epochs.unproven
-        for seq, (until, when) in list(unproven.items()):
-            if self._prove(seq, now, when):
+        unproven, series = self._epochs.unproven, self._epochs.series
+        for seq, (until, reached) in list(unproven.items()):
+            if self._prove(reached, now) or (
+                    series.is_placed(reached) and series.repeats_credited(reached)):
                 unproven.pop(seq, None)
             elif now >= until:
                 del unproven[seq]
-                if self._passed_unseen(seq):
-                    self._accept(seq, now)
+                if self._passed_unseen(reached):
+                    self._accept(reached, now)
 
-    def _prove(self, seq: int, now: float, when: float, repetition: bool = False) -> bool:
-        """Credit a REACHED received at `when` [s] to the epoch at whose item the vehicle was.
+    def _prove(self, reached: Reached, now: float) -> bool:
+        """Credit a REACHED to the epoch at whose item the vehicle was.
 
         Returns:
             False where the epoch is not known yet.
         """
-        epoch = self._epoch
+        epoch, seq = self._epoch, reached.seq
         current = CurrentEpoch(epoch.items, self._moves.reports.reported, epoch.since,
                                epoch.begin, epoch.taken)
-        if 0 <= seq < len(epoch.items) and self._epochs.is_of_current(seq, current, now, when):
-            self._accept(seq, now)
+        if 0 <= seq < len(epoch.items) and self._epochs.is_of_current(reached, current, now):
+            self._accept(reached, now)
             return True
-        item = None if repetition else self._epochs.previous_item(seq, epoch.items, when)
+        item = None if self._epochs.series.repeats_credited(reached) else (
+            self._epochs.previous_item(reached, epoch.items))
         if item is None:
             return False
         if self._epochs.ends_previous(item):
             self.end_at = now
         self._tasks.credit(item)
-        self._epochs.credited = seq
+        self._epochs.series.note_credited(reached)
         return True
 
-    def _passed_unseen(self, seq: int) -> bool:
+    def _passed_unseen(self, reached: Reached) -> bool:
         """Whether it flies a later item, and the positions have a gap since this one."""
-        epoch = self._epoch
+        epoch, seq = self._epoch, reached.seq
+        if self._epochs.series.repeats_credited(reached):
+            return False
         return (0 <= seq < len(epoch.items) and epoch.current is not None and seq < epoch.current
                 and self._positions.not_seen_at(epoch.items[seq], epoch.since))
 
-    def _accept(self, seq: int, now: float) -> None:
-        epoch = self._epoch
+    def _accept(self, reached: Reached, now: float) -> None:
+        epoch, seq = self._epoch, reached.seq
         if seq == epoch.last_flown and self.last != seq:
             self.end_at = now
-        self.last = self._epochs.credited = seq
+        self.last = seq
+        self._epochs.series.note_credited(reached)
         self.seqs.add(seq)
         if epoch.current is None or seq >= epoch.current:
             if epoch.current is not None and epoch.current < seq:

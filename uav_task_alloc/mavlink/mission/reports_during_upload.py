@@ -22,9 +22,9 @@ class _Reached(NamedTuple):
     """A series of REACHED with the same seq."""
 
     seq: int  # index without home
-    first: float  # [s] the first of the series was received
-    last: float  # [s] the last one was received
     frame: int  # number of the first frame that was kept
+    last: float  # [s] the last one was received
+    last_frame: int  # its number
 
 
 class _Current(NamedTuple):
@@ -57,7 +57,6 @@ class ReportsDuringUpload:
         self._progress, self._origin = progress, origin
         self._reached: list[_Reached] = []
         self._currents: list[_Current] = []
-        self._newest: tuple[int, float] = (-1, 0.0)  # seq, received at [s], with repetitions
 
     @property
     def has_reached(self) -> bool:
@@ -66,13 +65,12 @@ class ReportsDuringUpload:
 
     def add_reached(self, seq: int, now: float, frame: int) -> None:
         """Keep a REACHED that may be of the old or of the new mission."""
+        self._progress.reached_first_at(seq, now, frame)
         repeated = bool(self._reached) and self._reached[-1].seq == seq  # by PX4
         if repeated:
-            self._reached[-1] = self._reached[-1]._replace(last=now)
+            self._reached[-1] = self._reached[-1]._replace(last=now, last_frame=frame)
         elif len(self._reached) < _MAX_MESSAGES:
-            first = self._progress.reached_first_at(seq, now)
-            self._reached.append(_Reached(seq, first, now, frame))
-        self._newest = seq, now
+            self._reached.append(_Reached(seq, frame, now, frame))
         self._progress.note_end(seq, now)
 
     def add_current(self, seq: int, now: float, frame: int, flying: bool, plan: int) -> None:
@@ -87,10 +85,15 @@ class ReportsDuringUpload:
 
     def release(self, frame: int) -> None:
         """Credit REACHED sent before a frame that shows the old mission on board."""
-        for seq, first, _, at in self._reached:
-            if at < frame:
-                self._progress.note_reached(seq, first)
+        for reached in self._reached:
+            if reached.frame < frame:
+                self._progress.note_reached(
+                    reached.seq, self._first_at(reached), frame=reached.frame)
         self._reached = [each for each in self._reached if each.frame >= frame]
+
+    def _first_at(self, reached: _Reached) -> float:
+        """When [s] the first of its series was received."""
+        return self._progress.reached_first_at(reached.seq, reached.last, reached.last_frame)
 
     def begin_new(self, uploaded: MissionDiff) -> list[tuple[int, float, int]]:
         """Credit the REACHED of the old mission.
@@ -119,19 +122,19 @@ class ReportsDuringUpload:
         Returns:
             [s] at which it was received, where it is of the new mission.
         """
-        seq, first, last, _ = reached
-        progress = self._progress
+        seq, frame, last, _ = reached
+        progress, first = self._progress, self._first_at(reached)
         if before is not None and progress.was_at_by(before, first):
-            progress.note_reached(seq, first, proven=True)
+            progress.note_reached(seq, first, proven=True, frame=frame)
         elif before is not None and after is not None and alike(before, after):
-            progress.note_reached(seq, first)
+            progress.note_reached(seq, first, frame=frame)
         elif after is not None and progress.was_at_by(after, first):
             return first
         elif before is not None and progress.near_one(before, after, first):
             if before.task:
                 progress.credit(before)
             else:  # of a mission that was read: `resume` finds the task by its position
-                progress.note_reached(seq, first)
+                progress.note_reached(seq, first, frame=frame)
         elif after is not None and progress.near_one(after, before, first):
             return first
         elif after is not None and seq == start and progress.was_exactly_at(after, last):
@@ -159,9 +162,7 @@ class ReportsDuringUpload:
             if kind:
                 self._progress.note_current(seq, when, flying, frame)
             else:
-                self._progress.note_reached(seq, when, proven=True)
-        if self._newest[0] >= 0:  # it may still be repeated
-            self._progress.note_repeated(*self._newest)
+                self._progress.note_reached(seq, when, proven=True, frame=frame)
 
     def credit(self, uploaded: MissionDiff) -> None:
         """Credit all by the positions after a failed transfer: either mission may be flown."""
