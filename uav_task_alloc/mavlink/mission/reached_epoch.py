@@ -14,7 +14,7 @@ from uav_task_alloc.mavlink.mission.position_history import (
     MAX_MESSAGE_DELAY,
     PositionHistory,
 )
-from uav_task_alloc.mavlink.mission.reached_series import Reached, ReachedSeries
+from uav_task_alloc.mavlink.mission.reached_series import ReachedReport, ReachedSeries
 from uav_task_alloc.model import Point
 
 REPEAT_WINDOW = 15.0  # [s] after an upload in which a REACHED may be of the previous epoch
@@ -58,7 +58,7 @@ class ReachedEpoch:
         self._positions, self.series = positions, series
         self.before = _NO_EPOCH
         # seq -> [s] until when evidence is awaited, and the last one
-        self.unproven: dict[int, tuple[float, Reached]] = {}
+        self.unproven: dict[int, tuple[float, ReachedReport]] = {}
 
     def begin(self, before: PreviousEpoch) -> None:
         """Begin a new epoch; `before` is the one that it ends."""
@@ -75,7 +75,7 @@ class ReachedEpoch:
         """Whether the previous epoch was at its last item, and has just ended."""
         return self.before.may_end and now < self.before.until - REPEAT_WINDOW + MAX_MESSAGE_DELAY
 
-    def is_of_current(self, reached: Reached, epoch: CurrentEpoch, now: float) -> bool:
+    def is_of_current(self, reached: ReachedReport, epoch: CurrentEpoch, now: float) -> bool:
         """Whether a REACHED that may be of the previous epoch is of the current one.
 
         Args:
@@ -102,7 +102,7 @@ class ReachedEpoch:
             positions.was_at(item, epoch.since) or (
                 item.position is None and self.series.is_whole(reached)))
 
-    def previous_item(self, reached: Reached, items: tuple[Item, ...]) -> Item | None:
+    def previous_item(self, reached: ReachedReport, items: tuple[Item, ...]) -> Item | None:
         """The item of the previous epoch that a REACHED names, if the vehicle was at it.
 
         Args:

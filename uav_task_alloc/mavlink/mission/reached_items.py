@@ -13,7 +13,7 @@ from uav_task_alloc.mavlink.mission.current_item import CurrentItem
 from uav_task_alloc.mavlink.mission.epoch import Epoch
 from uav_task_alloc.mavlink.mission.position_history import MAX_MESSAGE_DELAY, PositionHistory
 from uav_task_alloc.mavlink.mission.reached_epoch import CurrentEpoch, ReachedEpoch
-from uav_task_alloc.mavlink.mission.reached_series import Reached
+from uav_task_alloc.mavlink.mission.reached_series import ReachedReport
 
 
 class ReachedItems:
@@ -75,7 +75,7 @@ class ReachedItems:
                 if self._passed_unseen(reached):
                     self._accept(reached, now)
 
-    def _prove(self, reached: Reached, now: float) -> bool:
+    def _prove(self, reached: ReachedReport, now: float) -> bool:
         """Credit a REACHED to the epoch at whose item the vehicle was.
 
         Returns:
@@ -97,7 +97,7 @@ class ReachedItems:
         self._epochs.series.note_credited(reached)
         return True
 
-    def _passed_unseen(self, reached: Reached) -> bool:
+    def _passed_unseen(self, reached: ReachedReport) -> bool:
         """Whether it flies a later item, and the positions have a gap since this one."""
         epoch, seq = self._epoch, reached.seq
         if self._epochs.series.repeats_credited(reached):
@@ -105,7 +105,7 @@ class ReachedItems:
         return (0 <= seq < len(epoch.items) and epoch.current is not None and seq < epoch.current
                 and self._positions.not_seen_at(epoch.items[seq], epoch.since))
 
-    def _accept(self, reached: Reached, now: float) -> None:
+    def _accept(self, reached: ReachedReport, now: float) -> None:
         epoch, seq = self._epoch, reached.seq
         if seq == epoch.last_flown and self.last != seq:
             self.end_at = now

@@ -19,7 +19,7 @@ _KEPT = 32  # REACHED
 
 
 @dataclass(slots=True, eq=False)
-class Reached:
+class ReachedReport:
     """One REACHED that was received."""
 
     seq: int  # index without home
@@ -45,11 +45,11 @@ class ReachedSeries:
 
     def __init__(self, positions: PositionHistory, repeats: bool, frames: FrameLog) -> None:
         self._positions, self.repeats, self._frames = positions, repeats, frames
-        self._log: list[Reached] = []  # by the number of the frame
+        self._log: list[ReachedReport] = []  # by the number of the frame
         self._complete = True  # the first one received is still in the log
-        self._credited: Reached | None = None
+        self._credited: ReachedReport | None = None
 
-    def add(self, seq: int, now: float, frame: int | None) -> Reached:
+    def add(self, seq: int, now: float, frame: int | None) -> ReachedReport:
         """Add a REACHED; one that was added before is returned.
 
         Args:
@@ -60,7 +60,7 @@ class ReachedSeries:
         known = next((one for one in self._log if frame is not None and one.frame == frame), None)
         if known is not None:
             return known
-        reached = Reached(seq, now, frame)
+        reached = ReachedReport(seq, now, frame)
         at = len(self._log)
         while frame is not None and at and (self._log[at - 1].frame or -math.inf) > frame:
             at -= 1
@@ -75,29 +75,29 @@ class ReachedSeries:
         self._log.clear()
         self._credited = None
 
-    def note_credited(self, reached: Reached) -> None:
+    def note_credited(self, reached: ReachedReport) -> None:
         """Note that a REACHED has completed an item."""
         self._credited = reached
 
-    def first_at(self, reached: Reached) -> float:
+    def first_at(self, reached: ReachedReport) -> float:
         """When [s] the first one was received that a REACHED may repeat."""
         return min(one.now for one in self._of(reached))
 
-    def first_sent(self, reached: Reached) -> float:
+    def first_sent(self, reached: ReachedReport) -> float:
         """Vehicle time [s] before which the first one was not sent that a REACHED may repeat."""
         times = ((self._sent(one)[0], one.now) for one in self._of(reached))
         return min(self._positions.vehicle_time(now) if math.isinf(sent) else sent
                    for sent, now in times)
 
-    def is_placed(self, reached: Reached) -> bool:
+    def is_placed(self, reached: ReachedReport) -> bool:
         """Whether it is known when it was sent."""
         return not math.isinf(self._sent(reached)[1])
 
-    def repeats_credited(self, reached: Reached) -> bool:
+    def repeats_credited(self, reached: ReachedReport) -> bool:
         """Whether a REACHED may repeat the one that was credited last."""
         return any(one is self._credited for one in self._of(reached)[:-1])
 
-    def is_whole(self, reached: Reached) -> bool:
+    def is_whole(self, reached: ReachedReport) -> bool:
         """Whether its series began after another REACHED was received."""
         return not self._complete or self._of(reached)[0] is not self._log[0]
 
@@ -106,14 +106,14 @@ class ReachedSeries:
         return self.repeats and any(
             begin <= one.seq < end and now - one.now < MAX_MESSAGE_DELAY for one in self._log)
 
-    def _of(self, reached: Reached) -> list[Reached]:
+    def _of(self, reached: ReachedReport) -> list[ReachedReport]:
         """The series that a REACHED may belong to, up to it, in the order sent."""
         begin = end = self._log.index(reached) if self.repeats and reached in self._log else -1
         if end < 0:
             return [reached]
         while begin and self._log[begin - 1].seq == reached.seq:
             begin -= 1
-        series: list[Reached] = []
+        series: list[ReachedReport] = []
         for one in self._log[begin:end + 1]:
             if series and not self._may_continue(series, one):
                 series = []
@@ -121,7 +121,7 @@ class ReachedSeries:
         earliest = self._sent(reached)[0] - _DURATION
         return [one for one in series if self._sent(one)[1] >= earliest]
 
-    def _may_continue(self, series: list[Reached], reached: Reached) -> bool:
+    def _may_continue(self, series: list[ReachedReport], reached: ReachedReport) -> bool:
         last = series[-1]
         (begin, end), (earliest, latest) = self._sent(last), self._sent(reached)
         if len(series) > 1 and latest - begin < _MIN_PERIOD:
@@ -130,7 +130,7 @@ class ReachedSeries:
         return earliest - end <= _MAX_PERIOD or last.frame is None or reached.frame is None or (
             not self._frames.whole(last.frame, reached.frame))
 
-    def _sent(self, reached: Reached) -> tuple[float, float]:
+    def _sent(self, reached: ReachedReport) -> tuple[float, float]:
         """Vehicle times [s] between which it was sent."""
         if reached.sent is not None:
             return reached.sent
