@@ -163,9 +163,7 @@ class Resume:
             self.located = self.located or not held
             return
         self.located = True
-        upload = self.recorded_upload
-        if len(upload) == 2 and upload[0] == checksum(held) != self.recorded[0]:
-            self.recorded = upload[0], upload[1], False
+        self._find_upload(held)
         mission, recorded, _ = self.recorded
         if self._passed_recorded and mission == checksum(held) and recorded is not None:
             self._flown += held[recorded:recorded + 1]
@@ -198,6 +196,12 @@ class Resume:
         # on the ground with the first list: the onboard mission is of an earlier flight
         if not self._rebooted and (telemetry.airborne or tasks.revision > 1):
             self._until = now + MAX_AGE
+
+    def _find_upload(self, held: tuple[Item, ...]) -> None:
+        """Continue at its first item where the recorded upload is on board."""
+        upload = self.recorded_upload
+        if len(upload) == 2 and upload[0] == checksum(held) != self.recorded[0]:
+            self.recorded = upload[0], upload[1], False
 
     def _continues_recorded(self, held: tuple[Item, ...]) -> bool:
         """Whether the vehicle flies the recorded mission on from the recorded item."""
