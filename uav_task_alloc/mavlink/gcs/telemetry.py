@@ -81,8 +81,7 @@ class Telemetry:
         self.plan_id = 0  # PX4's id of the onboard mission
         self.received_ids: set[int] = set()  # message ids since the start
         self.received_last: dict[int, float] = {}  # [s] by message id
-        self.restarts = 0
-        self.booted_at = -math.inf  # [s] the latest restart that was detected, or earlier
+        self.restarts, self.booted_at = 0, -math.inf  # how many; [s] the latest, or earlier
         self.boot_ms = self._older_clocks = 0  # [ms] time_boot_ms; messages in a row before it
         self._boot_at, self._gap_at = now, -math.inf  # [s]; end of the latest gap of _QUIET
         self.clock_rate = ClockRate()
