@@ -17,6 +17,8 @@ from uav_task_alloc_msgs.srv import HandOver
 from uav_task_alloc.errors import InvalidValue, UnknownName
 from uav_task_alloc.mavlink.gcs.authority_store import AuthorityFileStore, boot_id
 from uav_task_alloc.mavlink.gcs.ground_station import GroundStation, VehicleSession
+from uav_task_alloc.mavlink.gcs.hold_store import HoldFileStore
+from uav_task_alloc.mavlink.gcs.operator_hold import HoldRequest
 from uav_task_alloc.mavlink.gcs.status import PublishedStates, state_of
 from uav_task_alloc.mavlink.gcs.telemetry import WANTED
 from uav_task_alloc.mavlink.mission.items import TaskList
@@ -36,6 +38,7 @@ from uav_task_alloc.nodes.ros.clock_watch import (
     steady_clock,
     watch_clock,
 )
+from uav_task_alloc.nodes.ros.hold_inputs import HoldInputs
 from uav_task_alloc.nodes.ros.leveled_log import LeveledLog
 from uav_task_alloc.nodes.ros.origin_check import OriginCheck
 from uav_task_alloc.nodes.ros.parameters import declare
@@ -53,8 +56,8 @@ class MavlinkBridge(Node):
         `uav_states` (UavState), `task_events` (TaskEvent), `fleet_origin` (FleetOrigin, latched),
         `/diagnostics` (DiagnosticArray).
     Subscribes to:
-        `<uav_id>/task_list` (TaskList) of each vehicle, `threat_zones` (ThreatZoneArray),
-        `fleet_origin`.
+        `<uav_id>/task_list` (TaskList) and `<uav_id>/hold` (UavHold) of each vehicle,
+        `threat_zones` (ThreatZoneArray), `fleet_origin`.
     Services:
         `~/hand_over` (HandOver).
     Parameters:
@@ -84,7 +87,8 @@ class MavlinkBridge(Node):
         self.store = AuthorityFileStore(params.state_dir, self.log.levels['error'],
                                         boot_id()) if params.state_dir else None
         self.ground_station = GroundStation(
-            self.config, random.Random(time.time_ns()), self.store)
+            self.config, random.Random(time.time_ns()), self.store, HoldFileStore(
+                params.state_dir, self.log.levels['error']) if params.state_dir else None)
         self.connections = Connections(
             map(open_link, params.connections), params.system_id, params.component_id,
             wall=time.time, wanted=WANTED, signing_key_file=params.signing_key_file,
@@ -103,6 +107,7 @@ class MavlinkBridge(Node):
         self.origins = OriginCheck(self, self.config.origin, lambda reason: self.log.write(
             'warning', f'fleet_origin: {reason}: ignored'))
         self.lists = TaskListInputs(self, self.log, self.to_list, self.assign_lists)
+        self.holds = HoldInputs(self, self.log, self.stamp, self.on_hold)
         self.create_service(HandOver, '~/hand_over', self.on_hand_over)
         steady = steady_clock()  # links and vehicles do not wait for simulated time
         self.create_timer(0.05, self.on_timer, clock=steady)
@@ -179,8 +184,10 @@ class MavlinkBridge(Node):
             if session.uav_id not in self.lists.known:
                 self.report.search_over = True
                 self.log.write('info', f'found {session.uav_id}: {session.executor.profile.name}')
+                self.holds.subscribe(session.uav_id)
                 self.lists.subscribe(session.uav_id)
         self.report.log_search(time.monotonic())
+        self.holds.step()
         self.assign_lists()
 
     def grounded(self) -> str:
@@ -207,6 +214,11 @@ class MavlinkBridge(Node):
             with self.lock:
                 out = self.ground_station.assign(uav_id, tasks, time.monotonic())
             self.connections.send(out)
+
+    def on_hold(self, uav_id: str, request: HoldRequest) -> None:
+        """Hold a UAV, or end a hold."""
+        with self.lock:
+            self.ground_station.hold(uav_id, request, time.monotonic())
 
     def on_zones(self, msg: m.ThreatZoneArray) -> None:
         """Replace the zones; one that is invalid stays as it was."""

@@ -15,7 +15,9 @@ from uav_task_alloc.geometry.frames import Origin
 from uav_task_alloc.mavlink.autopilots import profile_of
 from uav_task_alloc.mavlink.gcs.authority import AuthorityRecord
 from uav_task_alloc.mavlink.gcs.early_messages import EarlyMessages
+from uav_task_alloc.mavlink.gcs.hold_store import HoldStore
 from uav_task_alloc.mavlink.gcs.mission_executor import MissionExecutor
+from uav_task_alloc.mavlink.gcs.operator_hold import HoldRequest
 from uav_task_alloc.mavlink.gcs.policy import Policy
 from uav_task_alloc.mavlink.mission.items import TaskList
 from uav_task_alloc.mavlink.mission.message_checks import defect
@@ -23,6 +25,7 @@ from uav_task_alloc.mavlink.mission.peer import Peer
 from uav_task_alloc.mavlink.transport.codec import Message
 from uav_task_alloc.mavlink.transport.refused_messages import RefusedMessages, failure
 
+OPERATOR = 'operator'  # source of a hold that outlives a restart
 RemoteKey = Hashable  # link and remote, see `transport.connections.Address`
 Outgoing = list[tuple[RemoteKey, Message]]
 
@@ -68,17 +71,21 @@ class GroundStation:
         config: identity and policy.
         rng: seeds the executors.
         store: of authority records; None: not stored.
+        hold_store: of operators' holds; None: not stored.
 
     Arguments of methods:
         uav_id: of a vehicle, or of one to come.
         tasks: its list.
         operator: free text for the log.
+        request: a hold, or its end.
         now: steady time [s].
     """
 
     def __init__(self, config: GcsConfig, rng: random.Random,
-                 store: AuthorityStore | None = None) -> None:
+                 store: AuthorityStore | None = None,
+                 hold_store: HoldStore | None = None) -> None:
         self._config, self._rng, self._store = config, rng, store
+        self._hold_store = hold_store
         self.sessions: dict[int, VehicleSession] = {}  # by system id
         self._early = EarlyMessages()
         self.refusals = RefusedMessages()  # messages and lists whose processing failed
@@ -164,6 +171,20 @@ class GroundStation:
                     return []
         raise UnknownName('uav', uav_id, [s.uav_id for s in self.sessions.values()])
 
+    def hold(self, uav_id: str, request: HoldRequest, now: float) -> None:
+        """Hold a UAV, or end a hold; that of an operator is stored before anything is sent.
+
+        Raises:
+            UnknownName: no such UAV was discovered.
+        """
+        for session in self.sessions.values():
+            if session.uav_id == uav_id:
+                if self._hold_store is not None and request.source == OPERATOR:
+                    self._hold_store.save_hold(uav_id, request.reason if request.hold else '')
+                session.executor.holds.request(request, now)
+                return
+        raise UnknownName('uav', uav_id, [s.uav_id for s in self.sessions.values()])
+
     def hand_over(self, uav_id: str, operator: str, now: float) -> str:
         """An operator gives control of a UAV to the bridge.
 
@@ -210,6 +231,9 @@ class GroundStation:
         executor = MissionExecutor(peer, profile_of(message, config.autopilot), config.origin,
                                    config.policy, random.Random(self._rng.random()), now,
                                    record, save)
+        held = '' if self._hold_store is None else self._hold_store.load_hold(uav_id)
+        if held:
+            executor.holds.request(HoldRequest(OPERATOR, True, held), now)
         session = VehicleSession(uav_id, address, executor)
         self.sessions[system] = session
         for early, at in self._early.take(system, address, now):

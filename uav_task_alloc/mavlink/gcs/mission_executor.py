@@ -28,6 +28,7 @@ from uav_task_alloc.mavlink.gcs.list_execution import ListExecution
 from uav_task_alloc.mavlink.gcs.message_rates import MessageRates
 from uav_task_alloc.mavlink.gcs.mission_evidence import MissionEvidence
 from uav_task_alloc.mavlink.gcs.onboard_mission import OnboardMission
+from uav_task_alloc.mavlink.gcs.operator_hold import HoldRule
 from uav_task_alloc.mavlink.gcs.policy import Policy
 from uav_task_alloc.mavlink.gcs.resume import MAX_AGE
 from uav_task_alloc.mavlink.gcs.send_gate import allowed_messages
@@ -91,12 +92,14 @@ class MissionExecutor:
                                       lambda: self.policy, self.notes)
         execution = ListExecution(self.sender, self.telemetry, self.onboard, self.watch, profile,
                                   self._end_of_list, self._status_text_log)
+        self.holds = HoldRule(self.sender, self.telemetry, self.watch, profile, self.onboard,
+                              execution.update_mission, self.notes)
         self._restore(record)
         self._rules = (
             self._linked, self._authority, self.sender.finish, takeoff.continue_takeoff,
-            self._upload, self._read, self._has_list, self._resume, self._may_act,
-            self._hold_first, self._end_of_list.held_too_long, self._end_of_list.empty,
-            execution.update_mission, takeoff.take_off, execution.fly)
+            self.holds.hold, self._upload, self._read, self._has_list, self._resume,
+            self._may_act, self._hold_first, self._end_of_list.held_too_long, self.holds.stay,
+            self._end_of_list.empty, execution.update_mission, takeoff.take_off, execution.fly)
 
     def _restore(self, record: AuthorityRecord | None) -> None:
         """Pass what the previous run recorded to `onboard.resume`."""

@@ -36,6 +36,7 @@ class VehicleFacts:
     silent_for: str  # time since its last message
     clock_rate: str  # its seconds in one second of the bridge; above 1 in a faster simulation
     strays: int  # number of frames from other addresses
+    held_by: str  # who holds it, and why
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,6 +64,7 @@ def diagnostics_of(session: VehicleSession, now: float) -> VehicleDiagnostics:
     if level < _STALE:
         summary += f', {progress}' if progress else ''
         summary += f', waits for {waits_for}' if waits_for else ''
+        summary += f', held by {held}' if (held := session.executor.holds.reason) else ''
     return VehicleDiagnostics(level, summary, _facts_of(session, now))
 
 
@@ -104,7 +106,7 @@ def _facts_of(session: VehicleSession, now: float) -> VehicleFacts:
         upload=upload_progress(onboard, now) or 'none', uploads=onboard.upload.uploads,
         restarts=telemetry.restarts, silent_for=f'{now - telemetry.received_at:.1f} s',
         clock_rate='unknown' if math.isnan(rate) else f'{rate:.3f}',
-        strays=session.strays)
+        strays=session.strays, held_by=executor.holds.reason or 'nobody')
 
 
 def upload_progress(onboard: OnboardMission, now: float) -> str:

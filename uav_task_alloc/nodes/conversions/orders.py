@@ -11,12 +11,18 @@ from uav_task_alloc.allocator.operator_desk import OrderAction, OrderAnswer, Ord
 from uav_task_alloc.allocator.order_records import OperatorHold
 from uav_task_alloc.allocator.records import Allocation, Proposal
 from uav_task_alloc.checks import check_count, check_ros_name
+from uav_task_alloc.errors import InvalidValue
+from uav_task_alloc.mavlink.gcs.ground_station import OPERATOR
+from uav_task_alloc.mavlink.gcs.operator_hold import HoldRequest
 from uav_task_alloc.model import Plan
 from uav_task_alloc.nodes.conversions.allocation_messages import from_allocation, from_list
 from uav_task_alloc.nodes.conversions.message_limits import MOST_TASKS, cut
 from uav_task_alloc.nodes.conversions.messages import header, to_stamp
+from uav_task_alloc.record.message_records import from_stamp
 
 _Response = TypeVar('_Response')
+_SOURCES = {m.UavHold.OPERATOR: OPERATOR, m.UavHold.SEPARATION: 'separation'}
+_LONGEST = 60.0  # [s] of a hold to keep UAVs separate
 
 
 def to_order_request(action: OrderAction, msg: Any) -> OrderRequest:
@@ -105,3 +111,37 @@ def from_proposal(proposal: Proposal) -> m.PlanProposal:
         plan=from_allocation(allocation, [from_list(each) for each in lists], ()),
         base_revision=proposal.base_revision, deadline=to_stamp(proposal.deadline),
         accepted_on_timeout=proposal.accepted_on_timeout, changes=list(proposal.changes))
+
+
+def to_hold_request(msg: m.UavHold, uav_id: str) -> HoldRequest:
+    """Return the hold of a message, or its end.
+
+    Args:
+        msg: from any publisher, not yet checked.
+        uav_id: of the topic it came on.
+
+    Returns:
+        With the reason cut to one line.
+
+    Raises:
+        InvalidValue: a field, which it names, is invalid.
+    """
+    if msg.uav_id not in ('', uav_id):
+        raise InvalidValue('uav_id', msg.uav_id, uav_id)
+    if msg.source not in _SOURCES:
+        raise InvalidValue('source', msg.source, 'OPERATOR (0) or SEPARATION (1)')
+    return HoldRequest(_SOURCES[msg.source], msg.hold, cut(msg.reason) or 'no reason given')
+
+
+def hold_expiry(msg: m.UavHold, now: float) -> float:
+    """Return when a hold ends without another message.
+
+    Args:
+        msg: a hold.
+        now: the published clock [s].
+
+    Returns:
+        [s] of the published clock; inf: never. One to keep UAVs separate ends after 60 s at most.
+    """
+    expires = from_stamp(msg.expires) or math.inf
+    return min(expires, now + _LONGEST) if msg.source == m.UavHold.SEPARATION else expires

@@ -1,0 +1,157 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Holds of an operator on both simulated autopilots: before transfers, kept, ended, refused."""
+import math
+
+import pytest
+from authority_bench import MODES
+from flight_bench import FlightBench, flying, places
+from mission_bench import task_list
+
+from uav_task_alloc.mavlink.gcs.authority import AuthorityState
+from uav_task_alloc.mavlink.gcs.hold_store import HoldFileStore
+from uav_task_alloc.mavlink.gcs.operator_hold import HoldRequest
+from uav_task_alloc.mavlink.gcs.status import UavMode
+
+BOTH = pytest.mark.parametrize('kind', ['ardupilot', 'px4'])
+HOLD = HoldRequest('operator', True, 'order o1 of ann')
+GO_ON = HoldRequest('operator', False)
+
+
+def hold(bench, request=HOLD, n=1):
+    bench.ground_station.hold(f'uav_{n}', request, bench.now)
+
+
+def is_held(bench):
+    return bench.state().mode is UavMode.HOLD and math.hypot(*bench.state().velocity) < 0.2
+
+
+@BOTH
+def test_a_vehicle_holds_says_where_and_flies_on_from_there(kind):
+    bench = flying(kind, 'ABC')
+    bench.run(limit=1.0)
+    hold(bench)
+    assert bench.run(lambda: is_held(bench), 30.0)
+    place, done = bench.state().position, bench.completed()
+    bench.run(limit=120.0)
+    assert math.dist(bench.state().position, place) < 3.0
+    assert bench.completed() == done
+    note, = [note for note in bench.notes if note.startswith('holds at (')]
+    assert note.endswith('m from where it was ordered (operator: order o1 of ann)')
+    assert bench.authority() is AuthorityState.HELD
+    hold(bench, GO_ON)
+    assert bench.run(lambda: bench.completed() == ['A', 'B', 'C'])
+    assert places(bench) == ['A', 'B', 'C']
+
+
+@BOTH
+def test_the_hold_is_sent_before_the_transfer_of_a_new_list(kind):
+    bench = flying(kind, 'ABC')
+    hold(bench)
+    bench.assign(task_list('CAB', 2))
+    assert bench.run(lambda: is_held(bench), 30.0)
+    bench.run(limit=30.0)
+    assert bench.onboard().verified()
+    assert is_held(bench)
+    hold(bench, GO_ON)
+    assert bench.run(lambda: bench.completed() == ['C', 'A', 'B'])
+
+
+@BOTH
+def test_a_hold_during_a_replacement_does_not_return_home_after_30_s(kind):
+    bench = flying(kind, 'ABC', delay=(0.05, 0.05))
+    bench.assign(task_list('CAB', 2))
+    bench.run(limit=0.3)
+    hold(bench)
+    bench.run(limit=90.0)
+    assert is_held(bench)
+
+
+@BOTH
+def test_a_held_vehicle_on_the_ground_does_not_take_off(kind):
+    bench = FlightBench(kind).discover()
+    hold(bench)
+    bench.assign(task_list('AB'))
+    bench.run(limit=60.0)
+    assert bench.started() == []
+    assert not bench.executor().telemetry.airborne
+    hold(bench, GO_ON)
+    assert bench.run(lambda: bench.completed() == ['A', 'B'])
+
+
+@BOTH
+def test_a_hold_in_the_climb_waits_for_its_end(kind):
+    bench = FlightBench(kind).discover()
+    bench.assign(task_list('AB'))
+    assert bench.run(lambda: bench.executor().telemetry.airborne)
+    hold(bench)
+    assert bench.run(lambda: is_held(bench), 60.0)
+    assert bench.completed() == []
+    assert bench.state().position[2] > 10.0
+
+
+@BOTH
+def test_without_authority_nothing_is_sent_and_the_reason_is_logged(kind):
+    bench = flying(kind, 'ABC')
+    bench.vehicles[1].rc_mode(MODES[kind].stick)
+    assert bench.run(lambda: bench.authority() is AuthorityState.LOST, 20.0)
+    before = len(bench.line.sent('COMMAND_LONG'))
+    hold(bench)
+    bench.run(limit=20.0)
+    assert len(bench.line.sent('COMMAND_LONG')) == before
+    assert any(note.startswith('hold is not sent: authority is LOST') for note in bench.notes)
+
+
+@BOTH
+def test_a_hold_outlives_a_restart_of_the_bridge(kind, tmp_path):
+    bench = flying(kind, 'ABC')
+    bench.ground_station._hold_store = HoldFileStore(str(tmp_path), print)
+    hold(bench)
+    assert bench.run(lambda: is_held(bench), 30.0)
+    bench.start()
+    bench.ground_station._hold_store = HoldFileStore(str(tmp_path), print)
+    bench.discover()
+    bench.assign(task_list('ABC', 2))
+    bench.run(limit=60.0)
+    assert is_held(bench)
+    assert bench.executor().holds.reason == 'operator: order o1 of ann'
+    hold(bench, GO_ON)
+    assert HoldFileStore(str(tmp_path), print).load_hold('uav_1') == ''
+    assert bench.run(lambda: bench.completed() == ['A', 'B', 'C'])
+
+
+@BOTH
+def test_a_separation_hold_ends_and_that_of_the_operator_stays(kind):
+    bench = flying(kind, 'ABC')
+    hold(bench, HoldRequest('separation', True, 'uav_2 passes'))
+    assert bench.run(lambda: is_held(bench), 19.0)
+    hold(bench)
+    hold(bench, HoldRequest('separation', False))
+    bench.run(limit=60.0)
+    assert is_held(bench)
+    hold(bench, GO_ON)
+    assert bench.run(lambda: bench.completed() == ['A', 'B', 'C'])
+
+
+@BOTH
+def test_an_empty_list_that_returns_waits_for_the_end_of_a_hold(kind):
+    bench = flying(kind, 'ABC')
+    hold(bench)
+    assert bench.run(lambda: is_held(bench), 30.0)
+    bench.assign(task_list('', 2, returns=True))
+    bench.run(limit=20.0)
+    assert is_held(bench)
+    hold(bench, GO_ON)
+    assert bench.run(lambda: bench.state().mode is UavMode.RETURNING, 20.0)
+
+
+def test_a_hold_file_that_cannot_be_used_is_reported(tmp_path):
+    reports = []
+    store = HoldFileStore(str(tmp_path), reports.append)
+    store.save_hold('uav_1', 'order o1 of ann')
+    assert store.load_hold('uav_1') == 'order o1 of ann'
+    store.path('uav_1').write_text('{"uav_id": 3')
+    assert store.load_hold('uav_1') == ''
+    store.path('uav_1').write_text('{"uav_id": "uav_2", "reason": "x"}')
+    assert store.load_hold('uav_1') == ''
+    assert len(reports) == 2
+    assert all('not used' in text for text in reports)

@@ -1,0 +1,75 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Subscriptions to the holds of a bridge's UAVs, and the end of those that expire."""
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+from rclpy.node import Node
+from uav_task_alloc_msgs import msg as m
+
+from uav_task_alloc.errors import InvalidValue
+from uav_task_alloc.mavlink.gcs.operator_hold import HoldRequest
+from uav_task_alloc.nodes.conversions.messages import HOLDS
+from uav_task_alloc.nodes.conversions.orders import hold_expiry, to_hold_request
+from uav_task_alloc.nodes.ros.leveled_log import LeveledLog
+from uav_task_alloc.nodes.ros.topic_names import HOLD, check_topic
+
+
+class HoldInputs:
+    """The topics `<uav_id>/hold`.
+
+    Args:
+        node: which subscribes.
+        log: of refused messages.
+        stamp: the published clock [s].
+        apply: called with (uav_id, request).
+    """
+
+    def __init__(self, node: Node, log: LeveledLog, stamp: Callable[[], float],
+                 apply: Callable[[str, HoldRequest], None]) -> None:
+        self._node, self._log, self._stamp, self._apply = node, log, stamp, apply
+        self._known: set[str] = set()  # UAVs
+        # [s] published clock when a hold ends, by UAV and source
+        self._expires: dict[tuple[str, str], float] = {}
+
+    def subscribe(self, uav_id: str) -> None:
+        """Subscribe to the holds of a UAV, once; an id that is too long for a topic is logged.
+
+        Args:
+            uav_id: a ROS name.
+        """
+        if uav_id in self._known:
+            return
+        self._known.add(uav_id)
+        try:
+            topic = check_topic(self._node, HOLD, uav_id)
+        except InvalidValue as error:
+            self._log.write('error', f'it cannot be held: {error}')
+            return
+
+        def on_message(msg: m.UavHold) -> None:
+            self._on_hold(uav_id, msg)
+
+        self._node.create_subscription(m.UavHold, topic, on_message, HOLDS)
+
+    def _on_hold(self, uav_id: str, msg: m.UavHold) -> None:
+        """Take a hold; an invalid one is logged and changes nothing."""
+        try:
+            request = to_hold_request(msg, uav_id)
+        except InvalidValue as error:
+            self._log.write('warning', f'{uav_id}/hold: {error}: ignored')
+            return
+        expires = hold_expiry(msg, self._stamp())
+        if request.hold and expires <= self._stamp():
+            request = HoldRequest(request.source, False)
+        self._expires[uav_id, request.source] = expires if request.hold else math.inf
+        self._apply(uav_id, request)
+
+    def step(self) -> None:
+        """End the holds that have expired."""
+        now = self._stamp()
+        for (uav_id, source), expires in self._expires.items():
+            if now >= expires:
+                self._expires[uav_id, source] = math.inf
+                self._apply(uav_id, HoldRequest(source, False))
