@@ -225,6 +225,33 @@ def test_lists_are_published_again_when_the_route_end_changes(start, probe, flee
     probe.until(lambda: fleet.lists['a'].end == m.TaskList.RETURN_HOME)
 
 
+def test_windows_are_kept_waited_for_and_refused_in_times_of_the_clock(start, probe, fleet):
+    begin(start, fleet)
+    fleet.uav('a', 0.0, cruise_speed=10.0)
+    fleet.tasks.publish(add(task('t0', 1)))
+    probe.until(lambda: fleet.route('a') == ['t0'])
+    now = fleet.lists['a'].header.stamp.sec
+    opens = task('opens', 100, earliest=Time(sec=now + 600), latest=Time(sec=now + 700),
+                 service_time=Duration(sec=5))
+    answer = probe.call(SubmitTasks, 'allocator/submit_tasks', SubmitTasks.Request(
+        announcement=add(opens, task('past', 10, latest=Time(sec=now - 7200)),
+                         task('far', 100_000, latest=Time(sec=now + 60)),
+                         task('odd', 10, earliest=Time(sec=now + 9), latest=Time(sec=now + 8)))))
+    assert answer.accepted == ['opens']
+    assert sorted(answer.rejected) == ['far', 'odd', 'past']
+    why = dict(zip(answer.rejected, answer.reasons, strict=True))
+    assert 'UTC is 2 h in the past: it is ' in why['past']
+    assert 'UTC cannot be kept: the earliest possible start is ' in why['far']
+    assert 'task odd: latest = ' in why['odd']
+    probe.until(lambda: fleet.route('a') == ['t0', 'opens'])
+    planned, stamp = fleet.lists['a'].tasks[1], fleet.lists['a'].header.stamp.sec
+    assert stamp + planned.eta.sec + planned.wait.sec == pytest.approx(now + 600, abs=3)
+    assert planned.finish.sec == pytest.approx(planned.eta.sec + planned.wait.sec + 5, abs=1)
+    assert planned.task.earliest == Time(sec=now + 600)
+    probe.until(lambda: fleet.status('opens').expected.sec == now + 600)
+    assert fleet.status('far').state == S.REJECTED
+
+
 def test_services_respond(start, probe, fleet):
     begin(start, fleet)
     fleet.uav('a', 0.0)

@@ -59,9 +59,21 @@ def test_everything_is_announced_in_order_at_its_time(start, probe, file):
 
 def test_keys_that_a_flight_ignores_are_named(start, probe, tmp_path):
     path = tmp_path / 'timed.yaml'
-    path.write_text(TEXT.replace('service_time: 1.5', 'latest: 90'))
+    path.write_text(TEXT.replace('id: uav_1', 'id: uav_1, available_from: 9', 1))
     player = start('scenario_player', '-p', f'scenario:={path}')
-    probe.until(lambda: 'flights ignore latest; only plan uses them' in player.output())
+    probe.until(lambda: 'flights ignore available_from; only plan' in player.output())
+
+
+def test_windows_are_announced_in_times_of_the_clock(start, probe, tmp_path):
+    path = tmp_path / 'timed.yaml'
+    path.write_text(TEXT.replace('service_time: 1.5', 'earliest: 60, latest: 90'))
+    tasks = probe.collect(m.TaskAnnouncement, 'task_announcements', ANNOUNCEMENTS)
+    probe.collect(m.ThreatZoneArray, 'threat_zones', LATCHED)
+    start('scenario_player', '-p', f'scenario:={path}')
+    probe.until(lambda: tasks)
+    first, stamp = tasks[0].tasks[0], from_stamp(tasks[0].header.stamp)
+    assert from_stamp(first.earliest) == pytest.approx(stamp + 60.0, abs=1.0)
+    assert from_stamp(first.latest) - from_stamp(first.earliest) == pytest.approx(30.0, abs=1e-6)
 
 
 def test_the_clock_waits_for_an_allocator(start, probe, file):

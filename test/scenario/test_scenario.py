@@ -344,7 +344,7 @@ def test_times_loads_and_the_objective_are_read_and_written():
     assert (task.earliest, task.latest, task.release, task.payload) == (60.0, 90.5, 5.0, 0.5)
     assert read.objective == Objective(finish=1.0, lateness=2.5)
     assert scenario.parse(scenario.to_yaml(read)) == read
-    assert scenario.parse(UAV).objective == 'distance'
+    assert scenario.parse(UAV).objective is None  # plan: distance; flights: as the parameter
     named = scenario.parse('objective: balanced\n' + UAV)
     assert named.objective == 'balanced'
     assert scenario.parse(scenario.to_yaml(named)) == named
@@ -380,4 +380,21 @@ def test_keys_that_only_plans_use_are_listed():
     plain = scenario.parse(UAV)
     timed = scenario.parse(UAV.replace('}', ', endurance: 600, available_from: 5}') + 'trips: 2\n')
     assert plain.keys_of_plan_only() == ()
-    assert timed.keys_of_plan_only() == ('available_from', 'trips')
+    assert timed.keys_of_plan_only() == ('available_from',)
+
+
+def test_windows_of_a_scenario_are_moved_to_another_clock():
+    first, second = (timed.task for timed in scenario.parse(TIMED).tasks)
+    moved = scenario.from_zero(first, 1000.0)
+    assert (moved.earliest, moved.latest, moved.release, moved.payload) == (
+        1060.0, 1090.5, 1005.0, 0.5)
+    assert scenario.from_zero(second, 1000.0) == second
+
+
+def test_objective_and_trips_of_a_scenario_are_parameters_of_the_allocator():
+    told = scenario.fleet_parameters(scenario.parse(UAV + 'objective: finish\ntrips: 2\n'))
+    assert (told['allocator']['objective'], told['allocator']['trips']) == ('finish', 2)
+    priced = scenario.fleet_parameters(scenario.parse(UAV + 'objective: {finish: 2}\n'))
+    assert priced['allocator']['objective_weights'] == [1.0, 2.0, 0.0, math.inf, math.inf]
+    plain = scenario.fleet_parameters(scenario.parse(UAV))['allocator']
+    assert not {'objective', 'objective_weights'} & plain.keys()

@@ -5,6 +5,7 @@ No clock, no thread, no I/O: `now` is [s] of a steady clock, `stamp` [s] of the 
 """
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
@@ -40,6 +41,7 @@ from uav_task_alloc.params import AllocatorParams
 # [s] after a restart, from the first report of the last UAV on, in which no task changes its
 # UAV: the bridge repeats events that were missed after 2 s
 _RESTART_HOLD = 3.0
+_CLOCK_STEP, _FASTEST = 5.0, 200.0  # [s] that clocks may be apart; times real time
 _LEARNED_PERIOD = 5.0  # [s] between two rows of the learned state
 
 
@@ -74,6 +76,7 @@ class Allocator:
         self._learned = saved.learned
         self._learned_saved = now  # [s]
         self._limiter = ListRateLimiter()
+        self._clock = math.inf, now  # published and steady clock [s] of the last tick
         self._left_out: dict[str, str] = {}  # task id -> reason
         self._predictions = Predictions(self.world, now)
         self._chosen = self._best  # last plan that was put in force
@@ -94,6 +97,7 @@ class Allocator:
     def tick(self, now: float, stamp: float) -> None:
         """Apply what follows from time: silent UAVs, shortened lists, the end of the hold."""
         world = self.world
+        self._watch_clock(now, stamp)
         world.tick(now)
         self._end_orders(stamp)
         world.publish(world.shortened_lists(stamp), stamp)
@@ -118,6 +122,20 @@ class Allocator:
         for uav_id in world.orders.changed_holds:
             world.outbox.holds[uav_id] = world.orders.holds[uav_id]
         world.orders.changed_holds.clear()
+
+    def _watch_clock(self, now: float, stamp: float) -> None:
+        """After a jump of the published clock forget what was measured, and plan windows again."""
+        before, since = self._clock
+        self._clock = stamp, now
+        if before <= 0.0 or before == math.inf:  # the first tick, or /clock has begun
+            return
+        if before - _CLOCK_STEP <= stamp <= before + _CLOCK_STEP + _FASTEST * (now - since):
+            return
+        self.world.flights.clock_jumped()
+        if not any(is_timed(record.task) for record in self.world.tasks.open()):
+            return
+        way = 'forward' if stamp > before else 'back'
+        self.world.request_replan(f'the clock jumped {way} by {abs(stamp - before):.1f} s', now)
 
     def _check_hold(self, now: float) -> None:
         """End the hold after a restart when all awaited UAVs have reported for a while."""

@@ -164,7 +164,7 @@ def with_options(loaded: Scenario, args: argparse.Namespace) -> Scenario:
     given = {name: getattr(args, name) for name in names if getattr(args, name) is not None}
     changed = replace(loaded, seed=loaded.seed if args.seed is None else args.seed,
                       route_end=args.route_end or loaded.route_end,
-                      objective=args.objective or loaded.objective,
+                      objective=args.objective or loaded.objective or 'distance',
                       trips=loaded.trips if args.trips is None else args.trips, **given)
     low, high = changed.altitude_min, changed.altitude_max
     if low >= high and args.altitude_min is not None:
@@ -181,7 +181,8 @@ def solve_scenario(loaded: Scenario, args: argparse.Namespace, stop: Callable[[]
     from uav_task_alloc.solver.solve import plan  # imports numba
     return plan([uav.uav for uav in loaded.uavs], [timed.task for timed in loaded.tasks],
                 [timed.zone for timed in loaded.zones], budget=args.budget, solver=args.solver,
-                seed=loaded.seed, route_end=loaded.route_end, objective=loaded.objective,
+                seed=loaded.seed, route_end=loaded.route_end,
+                objective=loaded.objective or 'distance',
                 trips=loaded.trips, clearance=loaded.clearance,
                 altitude_min=loaded.altitude_min, altitude_max=loaded.altitude_max,
                 stop=stop, on_iteration=on_iteration, max_iterations=max_iterations)

@@ -16,7 +16,7 @@ _HEAD = 'task', 'uav', 'trip', 'arrival', 'wait', 'start', 'end', 'window', 'lat
 def has_times(loaded: Scenario) -> bool:
     """Whether times, loads or trips of a scenario can change its plan."""
     return needs_time([uav.uav for uav in loaded.uavs], [timed.task for timed in loaded.tasks],
-                      check_objective(loaded.objective), loaded.trips)
+                      check_objective(loaded.objective or 'distance'), loaded.trips)
 
 
 def times_text(tasks: Sequence[Task], result: Plan) -> str:

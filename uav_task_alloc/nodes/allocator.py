@@ -38,6 +38,7 @@ from uav_task_alloc.nodes.conversions.messages import (
 )
 from uav_task_alloc.nodes.ros.allocation_publisher import AllocationPublisher
 from uav_task_alloc.nodes.ros.batched_subscription import subscribe_batched
+from uav_task_alloc.nodes.ros.clock_watch import watch_clock
 from uav_task_alloc.nodes.ros.leader_election import LeaderElection
 from uav_task_alloc.nodes.ros.leveled_log import LeveledLog
 from uav_task_alloc.nodes.ros.order_services import OrderServices
@@ -103,6 +104,7 @@ class AllocatorNode(Node):
         self._create_topics()
         self.result_ready = self.create_guard_condition(self.on_results)
         self.subscribers_by = time.monotonic() + _SUBSCRIBER_TIMEOUT
+        watch_clock(self, self.get_logger().warning)
         self.worker = Worker(self.load_solver, self.solve, self.deliver, self.on_solver_error)
         self.worker.start()
 

@@ -53,7 +53,8 @@ class NodeProcess:
         """
         command = [f'{get_package_prefix(_PACKAGE)}/lib/{_PACKAGE}/{name}', '--ros-args']
         for key, value in parameters.items():
-            command += ['-p', f'{key}:={json.dumps(value)}']
+            text = json.dumps(value).replace('Infinity', '.inf')  # as YAML has it
+            command += ['-p', f'{key}:={text}']
         log = out / f'{name}.log'
         with open(log, 'wb') as file:
             process = subprocess.Popen(command, stdout=None if show else file,

@@ -117,7 +117,9 @@ class ScenarioPlayer(Node):
         if moment.zones is not None:
             self.zones.publish(from_zones(moment.zones, now))
         if moment.tasks:
-            self.tasks.publish(announcement(m.TaskAnnouncement.ADD, moment.tasks, now))
+            zero = now - (self.now() - (self.started_at or 0.0))  # ROS time of second 0
+            tasks = [scenario.from_zero(task, zero) for task in moment.tasks]
+            self.tasks.publish(announcement(m.TaskAnnouncement.ADD, tasks, now))
         if moment.cancels:
             self.tasks.publish(announcement(m.TaskAnnouncement.CANCEL, moment.cancels, now))
         self.failing += moment.deaths

@@ -3,7 +3,7 @@
 from uav_task_alloc.scenario.generate import generate
 from uav_task_alloc.scenario.node_parameters import fleet_parameters, simulation_parameters
 from uav_task_alloc.scenario.read import load, parse
-from uav_task_alloc.scenario.timeline import Moment, timeline
+from uav_task_alloc.scenario.timeline import Moment, from_zero, timeline
 from uav_task_alloc.scenario.values import (
     Cancel,
     Scenario,
@@ -14,5 +14,5 @@ from uav_task_alloc.scenario.values import (
 from uav_task_alloc.scenario.write import to_yaml
 
 __all__ = ['Cancel', 'Moment', 'Scenario', 'ScenarioUav', 'TimedTask', 'TimedZone',
-           'fleet_parameters', 'generate', 'load', 'parse', 'simulation_parameters', 'timeline',
-           'to_yaml']
+           'fleet_parameters', 'from_zero', 'generate', 'load', 'parse', 'simulation_parameters',
+           'timeline', 'to_yaml']

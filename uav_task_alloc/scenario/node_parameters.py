@@ -6,10 +6,11 @@ import math
 from pathlib import Path
 
 from uav_task_alloc.errors import InvalidValue
+from uav_task_alloc.objective import Objective
 from uav_task_alloc.params import MAX_RANGE, BridgeParams, PlayerParams
 from uav_task_alloc.scenario.values import Scenario, ScenarioUav
 
-Value = bool | int | float | str | list[str] | list[int]
+Value = bool | int | float | str | list[str] | list[int] | list[float]
 Parameters = dict[str, Value]  # by ROS name; lists are never empty, which would have no type
 
 UAV_TIMEOUT = 2.0  # [s] of wall time, short as simulated UAVs fly faster than real time
@@ -36,7 +37,8 @@ def fleet_parameters(played: Scenario) -> dict[str, Parameters]:
         'allocator': {**origin, 'route_end': played.route_end, 'seed': played.seed % SEEDS,
                       'clearance': played.clearance, 'altitude_min': played.altitude_min,
                       'altitude_max': played.altitude_max,
-                      'default_range': min(map(_range, played.uavs))},
+                      'default_range': min(map(_range, played.uavs)),
+                      'trips': played.trips, **_objective(played)},
         'mavlink_bridge': {**origin,
                            'full_ranges': [f'{uav.id}:{_range(uav)}' for uav in played.uavs],
                            'system_ids': [uav.system_id for uav in played.uavs],
@@ -112,6 +114,13 @@ def _limits(uav: ScenarioUav) -> str:
              'turnaround': uav.turnaround, 'payload_capacity': uav.payload_capacity}
     return ','.join(f'{name}={value!r}' for name, value in known.items()
                     if 0.0 < value < math.inf)
+
+
+def _objective(played: Scenario) -> Parameters:
+    """That of the scenario; nothing where it has none."""
+    if isinstance(played.objective, Objective):
+        return {'objective_weights': played.objective.coefficients.tolist()}
+    return {} if played.objective is None else {'objective': played.objective}
 
 
 def _capabilities(uav: ScenarioUav) -> str:

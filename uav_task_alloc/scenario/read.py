@@ -98,8 +98,10 @@ def parse(text: str, name: str = 'scenario') -> Scenario:
                     ScenarioWind(**root['wind'].values) if root['wind'] else ScenarioWind())
 
 
-def _objective(given: str | YamlRow) -> str | Objective:
-    return given if isinstance(given, str) else _valid(given, lambda: Objective(**given.values))
+def _objective(given: str | YamlRow | None) -> str | Objective | None:
+    if given is None or isinstance(given, str):
+        return given
+    return _valid(given, lambda: Objective(**given.values))
 
 
 def _origin(row: YamlRow | None) -> Origin:

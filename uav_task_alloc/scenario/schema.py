@@ -171,7 +171,8 @@ SCENARIO: KeyTable = {
     'route_end': Key(choice('hold', 'home'), 'what a UAV does after its last task', 'hold'),
     'objective': Key(or_mapping(choice(*OBJECTIVES), OBJECTIVE, f'one of {", ".join(OBJECTIVES)}, '
                                 'or a mapping of prices', yaml.ScalarNode),
-                     'what is minimised: a name, or prices; see objective', 'distance'),
+                     'what is minimised: a name, or prices; see objective; default: distance in '
+                     '`plan`, the parameter of the allocator in a flight', None),
     'trips': Key(whole_number(1, MAX_TRIPS), 'of each UAV at most; more than one: it may visit '
                  'its home for a battery and loads', 1),
     'clearance': Key(number_value(0.0, 10000.0),

@@ -2,7 +2,7 @@
 """The events of a scenario, grouped by time."""
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from uav_task_alloc.model import Task, ThreatZone
 from uav_task_alloc.scenario.values import Scenario
@@ -40,3 +40,18 @@ def timeline(scenario: Scenario) -> tuple[Moment, ...]:
         tuple(by_id[cancel.task] for cancel in scenario.cancels if cancel.at == at),
         tuple(uav for uav, dies_at in deaths.items() if dies_at == at),
     ) for at in sorted(times))
+
+
+def from_zero(task: Task, zero: float) -> Task:
+    """Return a task of a scenario with its times on another clock.
+
+    Args:
+        task: with times in scenario seconds.
+        zero: time of that clock at the start of the scenario [s].
+
+    Returns:
+        The same task where it has no times.
+    """
+    release = task.release + zero if task.release > 0.0 else 0.0
+    return replace(task, earliest=task.earliest + zero, latest=task.latest + zero,
+                   release=release)

@@ -126,7 +126,7 @@ class Scenario:
     clearance: float = AllocatorParams.clearance  # [m] beyond the margins of zones
     altitude_min: float = AllocatorParams.altitude_min  # [m] of detours
     altitude_max: float = AllocatorParams.altitude_max  # [m] of detours
-    objective: str | Objective = 'distance'  # a name of OBJECTIVES, or prices
+    objective: str | Objective | None = None  # a name of OBJECTIVES, or prices; None: not given
     trips: int = 1  # of each UAV
     wind: ScenarioWind = ScenarioWind()  # of a simulated flight
 
@@ -150,12 +150,6 @@ class Scenario:
 
     def keys_of_plan_only(self) -> tuple[str, ...]:
         """Return keys that are set here and that only `plan` uses: a flight ignores them."""
-        uav, task = ({field.name: field.default for field in fields(kind)}
-                     for kind in (ScenarioUav, Task))
-        used = [key for key in TASK_TIMES
-                if any(getattr(timed.task, key) != task[key] for timed in self.tasks)]
-        used += [key for key in ('available_from', 'available_until')
-                 if any(getattr(each, key) != uav[key] for each in self.uavs)]
-        used += [key for key, plain in (('objective', 'distance'), ('trips', 1))
-                 if getattr(self, key) != plain]
-        return tuple(used)
+        plain = {field.name: field.default for field in fields(ScenarioUav)}
+        return tuple(key for key in ('available_from', 'available_until')
+                     if any(getattr(each, key) != plain[key] for each in self.uavs))

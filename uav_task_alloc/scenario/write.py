@@ -38,8 +38,9 @@ def to_yaml(scenario: Scenario) -> str:
         'clearance': scenario.clearance,
         'altitude_min': scenario.altitude_min,
         'altitude_max': scenario.altitude_max,
-        'objective': (scenario.objective if isinstance(scenario.objective, str)
-                      else asdict(scenario.objective)),
+        **({} if scenario.objective is None else {
+            'objective': scenario.objective if isinstance(scenario.objective, str)
+            else asdict(scenario.objective)}),
         'trips': scenario.trips,
         'wind': asdict(scenario.wind),
         'uavs': [_uav(uav) for uav in scenario.uavs],

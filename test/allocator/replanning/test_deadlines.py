@@ -8,6 +8,7 @@ from allocation import AllocatorDriver
 
 from uav_task_alloc import plan
 from uav_task_alloc.allocator.records import AnnouncementAction
+from uav_task_alloc.allocator.replanning import planning
 from uav_task_alloc.model import Task
 
 SPEED = 10.0  # [m/s]
@@ -259,3 +260,49 @@ def test_a_uav_whose_battery_nobody_changes_is_no_longer_counted_on():
         made.settle()
         assert made.state('t1') == state
     assert made.reason('t1') == 'no UAV available'
+
+
+@pytest.mark.parametrize('step', [500.0, -500.0])
+def test_a_jump_of_the_clock_causes_one_plan_and_nothing_is_lost(step):
+    made = driver()
+    uav(made, 'a', 0)
+    made.add(at('t', 500, latest=made.now + 400.0))
+    made.settle()
+    stamp = made.now + step
+    for _ in range(5):
+        made.now += 1.0
+        stamp += 1.0
+        made.core.tick(made.now, stamp)
+        made.world.update_uav(made.world.fleet.records['a'].report, made.now, stamp)
+        problem = made.core.due(made.now, stamp)
+        if problem is not None:
+            answer = planning.solve_problem(plan, problem, made.world.params, lambda: False)
+            made.core.adopt(answer, made.now, stamp)
+        made.take()
+    way = 'forward' if step > 0.0 else 'back'
+    lines = [note for note in made.notes if 'clock jumped' in note]
+    assert len(lines) == 1
+    assert f'jumped {way} by {501 if step > 0 else 499}.0 s' in lines[0]
+    if step > 0.0:
+        assert 'its latest 1400.0 s has passed' in made.reason('t')
+    else:
+        assert (made.state('t'), made.route('a')) == ('ASSIGNED', ('t',))
+
+
+def test_a_clock_that_stands_still_delays_no_plan_and_no_silence():
+    made = driver()
+    stamp = made.now
+    uav(made, 'a', 0)
+    made.add(at('t', 500))
+    made.settle()
+    made.add(at('t2', 600))
+    for _ in range(10):
+        made.now += 1.0
+        made.core.tick(made.now, stamp)
+        problem = made.core.due(made.now, stamp)
+        if problem is not None:
+            made.core.adopt(planning.solve_problem(
+                plan, problem, made.world.params, lambda: False), made.now, stamp)
+    assert made.world.fleet.records['a'].silent
+    assert made.state('t2') == 'UNASSIGNED'
+    assert made.world.tasks.is_open('t2')

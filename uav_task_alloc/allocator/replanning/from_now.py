@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from dataclasses import replace
 
 from uav_task_alloc.allocator.records import ReplanProblem
-from uav_task_alloc.model import Task
+from uav_task_alloc.model import Task, Uav
 from uav_task_alloc.objective import OBJECTIVES, Objective
 from uav_task_alloc.params import AllocatorParams
 
@@ -35,10 +35,12 @@ def is_timed(task: Task) -> bool:
             or task.payload > 0.0)
 
 
-def counts_time(tasks: Iterable[Task], objective: Objective, trips: int) -> bool:
+def counts_time(uavs: Iterable[Uav], tasks: Iterable[Task], objective: Objective,
+                trips: int) -> bool:
     """Return whether times change which plan is best; if not, the solver gets none.
 
     Args:
+        uavs: the fleet.
         tasks: all.
         objective: what is minimised.
         trips: of a UAV.
@@ -46,7 +48,8 @@ def counts_time(tasks: Iterable[Task], objective: Objective, trips: int) -> bool
     Returns:
         False for a problem of distances alone.
     """
-    return trips > 1 or not objective.is_shortest or any(map(is_timed, tasks))
+    return (trips > 1 or not objective.is_shortest or any(map(is_timed, tasks))
+            or any(uav.endurance < math.inf for uav in uavs))
 
 
 def from_now(problem: ReplanProblem) -> ReplanProblem:
@@ -58,7 +61,7 @@ def from_now(problem: ReplanProblem) -> ReplanProblem:
     Returns:
         The problem itself where times change nothing.
     """
-    if not counts_time(problem.tasks, problem.objective, problem.trips):
+    if not counts_time(problem.uavs, problem.tasks, problem.objective, problem.trips):
         return problem
     return replace(problem, tasks=tuple(
         _from(task, problem.stamp, problem.since.get(task.id, problem.stamp), problem.stop_time)

@@ -59,7 +59,7 @@ def replan_problem(world: World, best: Plan, trigger: str, background: bool,
         world.tasks_to_plan()
     objective, records = objective_of(params), world.task_records()
     stop_time, waiting = 0.0, dict[str, Uav]()
-    if counts_time(tasks, objective, params.trips):
+    if counts_time(uavs, tasks, objective, params.trips):
         uavs = tuple(measured_uav(world, uav) for uav in uavs)
         waiting = waiting_uavs(world, stamp)
         uavs += tuple(uav for uav_id, uav in waiting.items() if not world.usable(uav_id))
