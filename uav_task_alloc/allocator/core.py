@@ -17,6 +17,7 @@ from uav_task_alloc.allocator.records import (
     ReplanProblem,
     SavedState,
 )
+from uav_task_alloc.allocator.replanning.from_now import is_timed
 from uav_task_alloc.allocator.replanning.learned_state import learned_state
 from uav_task_alloc.allocator.replanning.list_rate_limiter import ListRateLimiter
 from uav_task_alloc.allocator.replanning.plan_acceptance import accepted_plan
