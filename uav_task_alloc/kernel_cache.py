@@ -39,9 +39,9 @@ class Work(NamedTuple):
 NO_WORK = Work(0.0, 0)
 # chain_q up to its first plan, its search; the same of problems with time; paths around zones;
 # on a core of an Intel Xeon server
-FIRST_WORK, SEARCH_WORK = Work(7.0, 28), Work(11.0, 51)
-TIMED_FIRST_WORK, TIMED_SEARCH_WORK = Work(14.0, 67), Work(7.0, 20)
-ZONES_WORK = Work(14.0, 102)
+FIRST_WORK, SEARCH_WORK = Work(7.0, 28), Work(9.0, 54)
+TIMED_FIRST_WORK, TIMED_SEARCH_WORK = Work(15.0, 71), Work(7.0, 20)
+ZONES_WORK = Work(13.0, 102)
 _UNUSED = 600.0  # [s] a folder of another hash is kept after the last write: it may be in use
 _SELDOM = 300_000, 50, 1000  # thresholds of the garbage collection, else a tenth of a load
 _COUNT_ON = 10  # kernels, before the time left follows from them

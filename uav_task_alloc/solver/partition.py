@@ -17,6 +17,7 @@ from uav_task_alloc.solver.pool import Pool
 from uav_task_alloc.solver.routes import TINY, Floats, Ints
 
 Flags = NDArray[np.bool_]
+_INSERTION = 15  # items from which quicksort splits
 UNTRIED, UNSERVED = -1, -2  # instead of a column: nothing tried yet; the task is not served
 
 
@@ -39,6 +40,65 @@ class Choices(NamedTuple):
     uav_used: Flags  # by UAV
 
 
+@inner_kernel
+def _swap(items: Ints, keys: Floats, i: int, j: int) -> None:
+    """Swap two items and their keys. O(1)."""
+    key, item = keys[i], items[i]
+    keys[i], items[i] = keys[j], items[j]
+    keys[j], items[j] = key, item
+
+
+@inner_kernel
+def _split(items: Ints, keys: Floats, low: int, high: int) -> int:
+    """Put smaller keys before the median of three, larger ones after it; returns its index."""
+    mid = (low + high) >> 1
+    if keys[mid] < keys[low]:
+        _swap(items, keys, low, mid)
+    if keys[high] < keys[mid]:
+        _swap(items, keys, mid, high)
+    if keys[mid] < keys[low]:
+        _swap(items, keys, low, mid)
+    _swap(items, keys, mid, high)
+    pivot, i, j = keys[high], low, high - 1
+    while True:
+        while i < high and keys[i] < pivot:
+            i += 1
+        while j >= low and pivot < keys[j]:
+            j -= 1
+        if i >= j:
+            break
+        _swap(items, keys, i, j)
+        i, j = i + 1, j - 1
+    _swap(items, keys, i, high)
+    return i
+
+
+@inner_allocating_kernel
+def _sort(items: Ints, keys: Floats) -> None:
+    """Sort items by their keys, both (n,), by quicksort. O(n log n) on average.
+
+    In place of np.argsort, which takes more than a second to compile; ties end as with it.
+    """
+    lows, highs, depth = np.empty(64, np.int64), np.empty(64, np.int64), 1
+    lows[0], highs[0] = 0, keys.size - 1
+    while depth > 0:
+        depth -= 1
+        low, high = lows[depth], highs[depth]
+        while high - low >= _INSERTION:
+            i = _split(items, keys, low, high)
+            if high - i > i - low:  # the larger part waits
+                lows[depth], highs[depth], high = i + 1, high, i - 1
+            else:
+                lows[depth], highs[depth], low = low, i - 1, i + 1
+            depth += 1
+        for i in range(low + 1, high + 1):
+            item, key, j = items[i], keys[i], i
+            while j > low and key < keys[j - 1]:
+                items[j], keys[j] = items[j - 1], keys[j - 1]
+                j -= 1
+            items[j], keys[j] = item, key
+
+
 @inner_allocating_kernel
 def _candidates(pool: Pool, reduced: Reduced, group: Flags, tasks: Ints, spare: float) -> Ints:
     """Columns of a group that serve only its tasks, least reduced cost first. O(stops of pool)."""
@@ -55,8 +115,11 @@ def _candidates(pool: Pool, reduced: Reduced, group: Flags, tasks: Ints, spare: 
         if fits:
             columns[count] = e
             count += 1
-    columns = columns[:count]
-    return columns[np.argsort(reduced.column[columns])]
+    keys = np.empty(count)
+    for i in range(count):
+        keys[i] = reduced.column[columns[i]]
+    _sort(columns[:count], keys)
+    return columns[:count]
 
 
 @inner_allocating_kernel
@@ -66,10 +129,10 @@ def _branches(pool: Pool, columns: Ints, tasks: Ints, nodes: int) -> Branches:
     for e in columns:
         for i in range(pool.first[e], pool.first[e + 1]):
             begin[pool.stops[i] + 1] += 1
-    counts = np.empty(tasks.size)  # floats, as _candidates sorts: another type, another kernel
+    counts, order = np.empty(tasks.size), np.empty(tasks.size, np.int64)
     for i in range(tasks.size):
-        counts[i] = begin[tasks[i] + 1]
-    order = tasks[np.argsort(counts)]
+        counts[i], order[i] = begin[tasks[i] + 1], tasks[i]
+    _sort(order, counts)
     for i in range(nodes):
         begin[i + 1] += begin[i]
     column, fill = np.empty(begin[nodes], np.int64), begin.copy()
