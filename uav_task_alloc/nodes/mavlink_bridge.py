@@ -178,7 +178,8 @@ class MavlinkBridge(Node):
             raise RuntimeError('receiver thread died; exiting')
         self.heartbeat.watch(time.monotonic())
         self.log.report_trouble('heartbeat', self.heartbeat.trouble)
-        policy = bridge_parameters.to_policy(self.live.now, self.zones, self.grounded())
+        policy = bridge_parameters.to_policy(self.live.now, self.zones, self.grounded(),
+                                             self.stamp())
         for session in list(self.ground_station.sessions.values()):
             session.executor.policy = policy
             if session.uav_id not in self.lists.known:

@@ -17,4 +17,5 @@ class Policy:
     when_foreign: str = 'yield'  # or 'reassert': with a mission of another station
     relaunch: str = 'operator'  # or 'automatic': take-off after a landing by the bridge
     zones: tuple[ThreatZone, ...] = ()  # that a return must not cross
+    clock: float = 0.0  # [s] ROS time
     grounded: str = ''  # what a vehicle on the ground waits for before a take-off; '': nothing

@@ -50,6 +50,9 @@ class Takeoff:
                                'a pilot to arm and take off (takeoff is false)')
         if policy.grounded and not sender.climbing:
             return sender.wait(policy.grounded)
+        departure = self._departure()
+        if departure and not sender.climbing:
+            return sender.wait_for(departure)
         home = telemetry.home or telemetry.position
         zone = zone_across_path(home, home, policy.zones)
         if zone is not None and not sender.climbing:
@@ -57,6 +60,11 @@ class Takeoff:
         return sender.take_off(policy.cruise_altitude, self._wants_to_fly, now)
 
     def _wants_to_fly(self) -> bool:
+        stays = self._policy().grounded or self._departure()
         return (self._authority.held and self._onboard.tasks is not None
-                and not (self._policy().grounded and not self._telemetry.airborne)
+                and not (stays and not self._telemetry.airborne)
                 and bool(self._onboard.remaining().stops))
+
+    def _departure(self) -> str:
+        """The departure that a vehicle on the ground waits for; '': it is due."""
+        return self._onboard.list.waits.grounded(self._policy().clock)

@@ -32,11 +32,22 @@ _LONGEST_HOLD = 65535.0  # [s] ArduPilot keeps 16 bits
 
 
 @dataclass(frozen=True, slots=True)
+class Hold:
+    """A wait in the air before a task."""
+
+    place: Point  # [m] ENU: the stop before, or the task itself
+    seconds: float  # [s]
+
+
+@dataclass(frozen=True, slots=True)
 class MissionStop:
     """A task and the detour points flown before it, ENU [m]."""
 
     task: Task  # flown at its position
     via: tuple[Point, ...] = ()  # [m] ENU
+    wait: float = 0.0  # [s] of the plan before the service
+    begin: float = 0.0  # [s] ROS time of the service, as planned
+    hold: Hold | None = None  # how it waits, see `mission.waits`
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,6 +63,7 @@ class TaskList:
     stops: tuple[MissionStop, ...] = ()  # in the order of flight
     returns: bool = False  # home after the last stop, else hold there
     end_via: tuple[Point, ...] = ()  # [m] ENU, flown before the return
+    stamp: float = 0.0  # [s] ROS time of the plan
 
     def without(self, tasks: Iterable[str]) -> TaskList:
         """Return the list without the tasks of these ids."""
@@ -87,6 +99,7 @@ class Item:
     completes: bool = field(default=False, compare=False)  # the task, once reached
     position: Point | None = field(default=None, compare=False)  # [m] ENU
     radius: float = field(default=0.0, compare=False)  # [m] accepted around it; 0: unknown
+    holds: bool = field(default=False, compare=False)  # waits before the task
 
 
 def mission_items(tasks: TaskList, rules: ItemRules, origin: Origin) -> tuple[Item, ...]:
@@ -103,19 +116,36 @@ def mission_items(tasks: TaskList, rules: ItemRules, origin: Origin) -> tuple[It
     Raises:
         MissionError: a service time does not fit into an item.
     """
-    points = [p for stop in tasks.stops for p in (*stop.via, stop.task.position)]
+    points = [p for stop in tasks.stops for p in _points(stop)]
     points += tasks.end_via if tasks.returns else ()
     if not points:
         return ()
     geodetic = iter(zip(points, to_geodetic_batch(origin, points).tolist(), strict=True))
     items: list[Item] = []
+    before: Task | None = None
     for stop in tasks.stops:
+        waits = [] if stop.hold is None or stop.hold.place == stop.task.position else [
+            _hold_item(*next(geodetic), rules, stop.task, stop.hold.seconds, before)]
+        items += waits
         items += (_waypoint(*next(geodetic), rules, stop.task.id) for _ in stop.via)
+        if stop.hold is not None and not waits:
+            items.append(_hold_item(*next(geodetic), rules, stop.task, stop.hold.seconds,
+                                    stop.task))
         items.append(_task_item(*next(geodetic), rules, stop.task))
+        before = stop.task
     items += (_waypoint(*pair, rules, '') for pair in geodetic)
     if tasks.returns:
         items.append(Item(dialect.MAV_CMD_NAV_RETURN_TO_LAUNCH, frame=rules.command_frame))
     return tuple(items)
+
+
+def _points(stop: MissionStop) -> tuple[Point, ...]:
+    """Positions of the items of a stop, in their order."""
+    path = (*stop.via, stop.task.position)
+    if stop.hold is None:
+        return path
+    at_task = stop.hold.place == stop.task.position
+    return (*path, stop.task.position) if at_task else (stop.hold.place, *path)
 
 
 def home_item(home: Point | None, origin: Origin, rules: ItemRules) -> Item:
@@ -161,6 +191,15 @@ def _waypoint(point: Point, geodetic: Sequence[float], rules: ItemRules, task: s
                 position=point, radius=rules.radius)
 
 
+def _hold_item(point: Point, geodetic: Sequence[float], rules: ItemRules, task: Task,
+               seconds: float, here: Task | None) -> Item:
+    """The item of a wait; unlike that of the task `here`, as items read back have no names."""
+    hold = max(1, round(min(seconds, _LONGEST_HOLD - 1.0)))
+    hold += here is None or hold == math.ceil(here.service_time)
+    return replace(_item_with_hold(point, geodetic, rules, task.id, float(hold), rules.radius),
+                   holds=True)
+
+
 def _task_item(point: Point, geodetic: Sequence[float], rules: ItemRules, task: Task) -> Item:
     hold = math.ceil(task.service_time) if rules.whole_seconds else task.service_time
     if not 0.0 <= hold <= _LONGEST_HOLD:
@@ -168,7 +207,14 @@ def _task_item(point: Point, geodetic: Sequence[float], rules: ItemRules, task: 
                            f'most {_LONGEST_HOLD:g} s, which is what a mission item holds',
                            task.id)
     radius = task.acceptance_radius or rules.radius
-    item = replace(_waypoint(point, geodetic, rules, task.id), completes=True, radius=radius)
+    return replace(_item_with_hold(point, geodetic, rules, task.id, hold, radius),
+                   completes=True)
+
+
+def _item_with_hold(point: Point, geodetic: Sequence[float], rules: ItemRules, task: str,
+                    hold: float, radius: float) -> Item:
+    """A waypoint with a time to stay [s]; a circle for a fixed wing."""
+    item = replace(_waypoint(point, geodetic, rules, task), radius=radius)
     if rules.loiters and hold > 0.0:  # no NaN: LOITER_TIME is refused with one
         return replace(item, command=dialect.MAV_CMD_NAV_LOITER_TIME,
                        params=(float(hold), 0.0, 0.0, 0.0))

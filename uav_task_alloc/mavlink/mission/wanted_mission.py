@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from uav_task_alloc.errors import MissionError
@@ -20,6 +21,7 @@ from uav_task_alloc.mavlink.mission.items import (
 from uav_task_alloc.mavlink.mission.long_legs import first_point, with_points_between
 from uav_task_alloc.mavlink.mission.progress import ProgressTable
 from uav_task_alloc.mavlink.mission.task_progress import TaskProgress
+from uav_task_alloc.mavlink.mission.waits import Waits
 from uav_task_alloc.mavlink.transport.notes import OperatorNote
 from uav_task_alloc.model import Task
 
@@ -56,6 +58,8 @@ class WantedMission:
         self._capacity = MOST_ITEMS - int(profile.rules.home_first)  # [items]
         self._profile, self._origin, self._progress = profile, origin, progress
         self._refused: dict[str, tuple[Task, str]] = {}  # the task as refused, and the reason
+        self.waits = Waits()
+        self.airborne: Callable[[], bool] = lambda: True  # whether the vehicle flies
         self.leg = FirstLeg(profile.rules.loiters, profile.farthest_first)
         self._leg_key: object = None  # the state for which the first leg was begun
         self._items: tuple[object, tuple[Item, ...]] | None = None  # cached, with their key
@@ -66,6 +70,8 @@ class WantedMission:
     def assign(self, tasks: TaskList) -> None:
         """Take the latest list; a refused task is tried again where it has changed."""
         self.tasks = tasks
+        self.waits.assign(tasks, self._progress.completed, self.airborne(),
+                          self._progress.active)
         self.horizon.reset()
         listed = [stop.task for stop in tasks.stops]
         self._progress.set_listed_tasks(listed)
@@ -118,8 +124,9 @@ class WantedMission:
 
     def items(self) -> tuple[Item, ...]:
         """The items to fly from here; a task that cannot be an item is refused."""
-        state = (self.tasks, len(self._progress.completed), self._progress.pending,
-                 len(self._refused), self.horizon.stops)
+        self.waits.note_active(self.remaining(), self._progress.active)
+        state = (self.tasks, self.waits.version, len(self._progress.completed),
+                 self._progress.pending, len(self._refused), self.horizon.stops)
         if self._leg_key != state or self.leg.is_off:
             self.leg.begin(self.remaining())
             self._leg_key = state
@@ -140,7 +147,7 @@ class WantedMission:
 
     def _items_of(self, tasks: TaskList) -> tuple[Item, ...]:
         """The items of a list, with long legs divided where a mission has the capacity."""
-        rules = self._profile.rules
+        rules, tasks = self._profile.rules, self.waits.with_holds(tasks)
         ahead = self.leg.points_ahead(first_point(tasks))
         filled = mission_items(with_points_between(tasks, ahead), rules, self._origin)
         if len(filled) > self._capacity and len(tasks.stops) <= 1:

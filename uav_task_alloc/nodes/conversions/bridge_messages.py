@@ -19,6 +19,7 @@ from uav_task_alloc.mavlink.mission.task_progress import TaskProgress
 from uav_task_alloc.model import Task, ThreatZone
 from uav_task_alloc.nodes.conversions.message_limits import MOST_POINTS
 from uav_task_alloc.nodes.conversions.messages import from_point, header, to_point, to_task
+from uav_task_alloc.record.message_records import from_stamp
 from uav_task_alloc.zone_codec import decode_zone_array
 
 _UNKNOWN_POINT = (math.nan, math.nan, math.nan)
@@ -47,21 +48,26 @@ def to_list(msg: m.TaskList, uav_id: str, origin: Origin, radius: float) -> Task
     points = len(msg.tasks) + sum(len(planned.via) for planned in msg.tasks) + len(msg.end_via)
     if points > MOST_POINTS:
         raise InvalidValue(place + 'points', points, f'at most {MOST_POINTS}')
-    stops = tuple(_to_stop(planned, origin, radius) for planned in msg.tasks)
+    stamp = from_stamp(msg.header.stamp)
+    stops = tuple(_to_stop(planned, origin, radius, stamp) for planned in msg.tasks)
     names = [stop.task.id for stop in stops]
     if len(set(names)) != len(names):
         raise InvalidValue(place + 'task ids', names, 'each once')
     if msg.end not in (m.TaskList.HOLD, m.TaskList.RETURN_HOME):
         raise InvalidValue(place + 'end', msg.end, 'HOLD (0) or RETURN_HOME (1)')
     end_via = tuple(check_point(place + 'end_via', from_point(point)) for point in msg.end_via)
-    return TaskList(msg.revision, stops, msg.end == m.TaskList.RETURN_HOME, end_via)
+    return TaskList(msg.revision, stops, msg.end == m.TaskList.RETURN_HOME, end_via, stamp)
 
 
-def _to_stop(planned: m.PlannedTask, origin: Origin, radius: float) -> MissionStop:
+def _to_stop(planned: m.PlannedTask, origin: Origin, radius: float, stamp: float) -> MissionStop:
     task: Task = to_task(planned.task, origin)
+    eta, wait = from_stamp(planned.eta), from_stamp(planned.wait)
+    if wait < 0.0:
+        raise InvalidValue(f'task {task.id}: wait', wait, 'at least 0 s')
     return MissionStop(
         replace(task, acceptance_radius=task.acceptance_radius or radius or None),
-        tuple(check_point(f'task {task.id}: via', from_point(point)) for point in planned.via))
+        tuple(check_point(f'task {task.id}: via', from_point(point)) for point in planned.via),
+        wait, stamp + eta + wait)
 
 
 def to_zones(msg: m.ThreatZoneArray, previous: Iterable[ThreatZone],

@@ -20,19 +20,20 @@ _MOST = 1e6  # of any of them
 
 
 def to_policy(params: BridgeParams, zones: tuple[ThreatZone, ...] = (),
-              grounded: str = '') -> Policy:
+              grounded: str = '', clock: float = 0.0) -> Policy:
     """Return what a mission executor may do now.
 
     Args:
         params: as they are now.
         zones: around which it returns.
+        clock: ROS time [s].
         grounded: what has to be different before a UAV takes off; '' where it may.
 
     Returns:
         For all executors of the bridge.
     """
     return Policy(params.takeoff, params.cruise_altitude, params.when_empty, params.when_foreign,
-                  params.relaunch, zones, grounded)
+                  params.relaunch, zones, clock, grounded)
 
 
 def to_gcs_config(params: BridgeParams) -> GcsConfig:
