@@ -4,7 +4,7 @@
 A wait is a hold at the stop before: one more item there, which belongs to the leg to the task. On
 the ground the take-off is later instead. A vehicle that is already on the leg holds at the task.
 Items hold for a number of seconds, while plans mean times; so a wait that has become an item stays
-as it is until it is more than TOLERANCE off.
+as it is until it is more than WAIT_TOLERANCE off.
 """
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 from uav_task_alloc.mavlink.mission.items import Hold, Item, MissionStop, TaskList
 from uav_task_alloc.model import Point
 
-TOLERANCE = 5.0  # [s] between a hold on board and that of the plan
+WAIT_TOLERANCE = 5.0  # [s] between a hold on board and that of the plan
 SHORTEST = 1.0  # [s] of a hold; a shorter one is left out
 
 
@@ -70,14 +70,14 @@ class Waits:
         old, place = self._waits.get(stop.task.id), last or stop.task.position
         if last is None and old is not None:
             if _is_flown(active, stop):  # it is on the leg, or serves the task
-                if stop.wait <= TOLERANCE:
+                if stop.wait <= WAIT_TOLERANCE:
                     return replace(old, hold=old.hold if _is_at(old, stop) else None)
             else:  # it waits now, or is about to
-                if abs(stop.begin - old.begin) <= TOLERANCE:
+                if abs(stop.begin - old.begin) <= WAIT_TOLERANCE:
                     return old
                 place = stop.task.position if old.hold is None else old.hold.place
         same = old is not None and (old.hold is None or old.hold.place == place)
-        if old is not None and same and abs(old.seconds - stop.wait) <= TOLERANCE and (
+        if old is not None and same and abs(old.seconds - stop.wait) <= WAIT_TOLERANCE and (
                 (old.hold is None) == (old.seconds < SHORTEST)):
             return old
         hold = Hold(place, stop.wait) if stop.wait >= SHORTEST else None
@@ -107,7 +107,7 @@ class Waits:
             return ''
         since, until, task = self.take_off
         # a clock that went back says nothing about the departure
-        waits = since - TOLERANCE <= clock < until and math.isfinite(until)
+        waits = since - WAIT_TOLERANCE <= clock < until and math.isfinite(until)
         return f'its departure: task {task} begins later' if waits else ''
 
 
