@@ -44,8 +44,7 @@ class OnboardMission:
         self.progress = ProgressTable(telemetry.frames, repeats=profile.atomic)
         self.resume = Resume(profile, origin, telemetry, self.progress)
         self.own = int(profile.rules.home_first)
-        self.list = WantedMission(profile, origin, self.progress)
-        self.list.airborne = lambda: telemetry.airborne
+        self.list = WantedMission(profile, origin, self.progress, lambda: telemetry.airborne)
         self.revision = 0  # of the last list verified on board
         self.notes: deque[OperatorNote] = deque()
         self.transfer_failed = False  # the last one; the caller schedules the next attempt

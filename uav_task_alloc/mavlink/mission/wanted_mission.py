@@ -42,6 +42,7 @@ class WantedMission:
         profile: of the autopilot.
         origin: of the ENU frame.
         progress: the completed tasks of this vehicle.
+        airborne: whether it flies now.
 
     Arguments of methods:
         tasks: a list of the allocator.
@@ -50,7 +51,8 @@ class WantedMission:
         held: mission on board.
     """
 
-    def __init__(self, profile: Profile, origin: Origin, progress: ProgressTable) -> None:
+    def __init__(self, profile: Profile, origin: Origin, progress: ProgressTable,
+                 airborne: Callable[[], bool] = lambda: True) -> None:
         self.tasks: TaskList | None = None
         self.horizon = Horizon()
         self.failed: deque[TaskFailed] = deque()
@@ -59,7 +61,7 @@ class WantedMission:
         self._profile, self._origin, self._progress = profile, origin, progress
         self._refused: dict[str, tuple[Task, str]] = {}  # the task as refused, and the reason
         self.waits = Waits()
-        self.airborne: Callable[[], bool] = lambda: True  # whether the vehicle flies
+        self._airborne = airborne
         self.leg = FirstLeg(profile.rules.loiters, profile.farthest_first)
         self._leg_key: object = None  # the state for which the first leg was begun
         self._items: tuple[object, tuple[Item, ...]] | None = None  # cached, with their key
@@ -70,7 +72,7 @@ class WantedMission:
     def assign(self, tasks: TaskList) -> None:
         """Take the latest list; a refused task is tried again where it has changed."""
         self.tasks = tasks
-        self.waits.assign(tasks, self._progress.completed, self.airborne(),
+        self.waits.assign(tasks, self._progress.completed, self._airborne(),
                           self._progress.active)
         self.horizon.reset()
         listed = [stop.task for stop in tasks.stops]
