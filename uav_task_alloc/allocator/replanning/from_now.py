@@ -30,6 +30,9 @@ def is_timed(task: Task) -> bool:
 
     Args:
         task: with times of the ROS clock, or from now.
+
+    Returns:
+        False for a task that only its place describes.
     """
     return (task.latest < math.inf or task.earliest > -math.inf or task.release > 0.0
             or task.payload > 0.0)
