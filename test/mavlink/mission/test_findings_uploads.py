@@ -2,7 +2,13 @@
 """What is flown during an upload, a cut or a restart of the bridge is known afterwards."""
 import pytest
 from authority_bench import ARDUPILOT, BOTH, MODES, PX4, flying
-from findings_bench import distance, drop_messages, flown_once_each, set_current
+from findings_bench import (
+    FindingsBench,
+    distance,
+    drop_messages,
+    flown_once_each,
+    set_current,
+)
 from flight_bench import places
 from mission_bench import ORIGIN, OURS, task_list
 from pymavlink.dialects.v20 import ardupilotmega as d
@@ -262,3 +268,23 @@ def test_a_request_is_repeated_after_twice_the_time_of_an_answer():
     assert download.step(0.5) == []
     assert [m.seq for m in download.step(0.61)] == [0]
     assert [m.seq for m in download.step(1.02)] == [0]
+
+
+@PX4
+def test_a_task_about_to_be_reached_is_flown_before_a_list_that_begins_elsewhere(kind):
+    bench = flying(kind, 'ABC')
+    assert bench.run(lambda: distance(bench, AT_A) < 12.0)
+    bench.assign(task_list('CBA', 2))
+    flown_once_each(bench, 'ABC')
+    assert places(bench) == ['A', 'C', 'B']
+
+
+@BOTH
+def test_a_task_that_is_served_is_not_left_for_a_list_that_begins_elsewhere(kind):
+    bench = FindingsBench(kind).discover()
+    bench.assign(task_list('ABC', service=4.0))
+    assert bench.run(lambda: distance(bench, AT_A) < 2.0)
+    bench.run(limit=1.0)
+    bench.assign(task_list('CBA', 2, service=4.0))
+    flown_once_each(bench, 'ABC')
+    assert places(bench) == ['A', 'C', 'B']

@@ -15,7 +15,7 @@ _TIMEOUT = 10.0  # [s] after the end of its hold
 
 
 class UploadHold:
-    """Holds back uploads during the service of the first task of the list."""
+    """Holds back uploads while a task of the list is served: it would be left, and flown again."""
 
     def __init__(self, onboard: OnboardMission, telemetry: Telemetry, profile: Profile) -> None:
         self._onboard, self._telemetry, self._profile = onboard, telemetry, profile
@@ -23,20 +23,22 @@ class UploadHold:
 
     def active(self, now: float) -> bool:
         """Whether an upload would restart the hold of the task, or make it be reached twice."""
-        item, first = self._onboard.progress.active, self._onboard.wanted()[0]
-        if item is None or self._telemetry.mode is not ModeFunction.MISSION or not (
-                first.completes and self._is_near(item, first)):
+        item = self._onboard.progress.active
+        if item is None or self._telemetry.mode is not ModeFunction.MISSION or not any(
+                each.completes and self._is_near(item, each) for each in self._onboard.wanted()):
             self._until = math.inf
             return False
         if math.isinf(self._until):
             self._until = now + item.params[0] + _TIMEOUT
         return now < self._until
 
-    def _is_near(self, item: Item, first: Item) -> bool:
-        distance = math.dist(self._telemetry.position, first.position or UNKNOWN) - first.radius
-        same, onboard = alike(first, item), self._onboard
+    def _is_near(self, item: Item, listed: Item) -> bool:
+        same, onboard = alike(listed, item), self._onboard
+        if not same and item.task != listed.task:
+            return False
+        distance = math.dist(self._telemetry.position, listed.position or UNKNOWN) - listed.radius
         margin = _ARRIVAL + onboard.item_time * len(onboard.wanted())
         if same and self._profile.atomic and distance < _NEAR + margin * self._telemetry.pace:
             return True
-        being_served = same or (item.completes and item.task == first.task)
+        being_served = same or item.completes
         return being_served and item.params[0] > 0.0 and distance < _NEAR
