@@ -147,6 +147,20 @@ def test_a_task_passed_without_positions_counts_where_the_vehicle_is_seen_again(
     assert list(flight.table.completed) == ['A']
 
 
+def test_a_place_passed_after_its_mission_was_replaced_was_not_reached_by_that_mission():
+    flight = Flight()
+    flight.begin(A=108.0, X=900.0)
+    flight.fly_to(50.0)
+    flight.begin(B=200.0, X=900.0)
+    flight.fly_to(100.0)
+    flight.lost = True  # the estimate is invalid
+    flight.stay(1.0)
+    flight.reached(0)
+    flight.lost = False
+    flight.stay(0.2)
+    assert list(flight.table.completed) == []
+
+
 def test_where_it_flies_after_it_has_left_the_mission_is_no_evidence():
     flight = Flight()
     flight.begin(A=100.0, B=500.0, C=900.0)

@@ -133,16 +133,23 @@ class PositionHistory:
         return item.position is not None and self.path.visited(
             item.position, item.radius, item.params[0], since) is Visit.UNOBSERVED
 
-    def near_one(self, item: Item, other: Item | None, when: float) -> bool:
+    def near_one(self, item: Item, other: Item | None, when: float,
+                 end: float = math.inf) -> bool:
         """Whether it was near one item, but not another, just before a message at `when` [s].
 
         PX4 may count an item as reached up to 10 m from it (LOOSE_RADIUS).
-        """
-        return self._came_near(item, when) and not (
-            other is not None and self._came_near(other, when))
 
-    def _came_near(self, item: Item, when: float) -> bool:
+        Args:
+            item: reached, perhaps.
+            other: reached otherwise; None: none.
+            when: steady time [s] of the message.
+            end: vehicle time [s] from which `item` was not flown any more.
+        """
         until = self.vehicle_time(when)
+        return self._came_near(item, min(until, end)) and not (
+            other is not None and self._came_near(other, until))
+
+    def _came_near(self, item: Item, until: float) -> bool:
         return item.position is not None and self.path.visited_at(
             item.position, item.radius + LOOSE_RADIUS,
             until - MAX_MESSAGE_DELAY, until) is not None

@@ -124,7 +124,7 @@ class ReachedEpoch:
             return None  # perhaps of the current epoch
         since = max(before.since, positions.path.newest - REPEAT_WINDOW)
         if positions.was_at(item, since, before.end) or positions.near_one(
-                item, None if same else after, when):
+                item, None if same else after, when, before.end):
             return item
         return None
 
