@@ -37,7 +37,8 @@ class UploadHold:
         if not same and item.task != listed.task:
             return False
         distance = math.dist(self._telemetry.position, listed.position or UNKNOWN) - listed.radius
-        margin = _ARRIVAL + onboard.item_time * len(onboard.wanted())
+        wanted = onboard.wanted()
+        margin = _ARRIVAL * (listed is wanted[0]) + onboard.item_time * len(wanted)
         if same and self._profile.atomic and distance < _NEAR + margin * self._telemetry.pace:
             return True
         being_served = same or item.completes
