@@ -22,12 +22,15 @@ def status(task, state, reason=''):
     return {'task': task, 'state': state, 'uav': 'u1', 'reason': reason}
 
 
-def write_run(out, statuses, reached=PLACES, zones=(), solves=(100.0, 20.0, 30.0)):
+def write_run(out, statuses, reached=PLACES, zones=(), solves=(100.0, 20.0, 30.0),
+              plans=('ab', 'ba', 'bac')):
     """A run of one UAV from a to e and on, which reaches the items of `reached`."""
     lines = [{'kind': 'announcement', 'action': 'ADD', 'tasks': [
                  {'id': name, 'position': list(place)} for name, place in PLACES.items()]},
              {'kind': 'zones', 'zones': [encode_zone(zone, JSON_ZONE) for zone in zones]}]
-    lines += [{'kind': 'allocation', 'solve_ms': ms, 'trigger': 'x'} for ms in solves]
+    lines += [{'kind': 'allocation', 'solve_ms': ms, 'trigger': 'x', 'lists': [
+        {'uav': 'u1', 'tasks': [{'id': name} for name in names]}]}
+        for ms, names in zip(solves, plans, strict=False)]
     lines += [{'kind': 'list', 'uav': 'u1', 'distance': 130.0, 'tasks': [
                    {'id': 'a', 'leg_distance': 60.0}] if first else []} for first in (1, 0)]
     lines.append({'kind': 'statuses', 'statuses': statuses})
@@ -64,6 +67,15 @@ def test_a_run_without_faults(run):
     assert summary['resolve_ms_p99'] == pytest.approx(29.9)
     assert (summary['metres_flown'], summary['metres_planned']) == (400.0, 190.0)
     json.dumps(summary, allow_nan=False)
+
+
+def test_a_plan_that_changed_nothing_is_no_replan(run):
+    summary = run(ALL_DONE, plans=('ab', 'ab', 'ba'))
+    assert (summary['replans'], summary['plans_unchanged']) == (1, 1)
+    assert summary['resolve_ms_median'] == 25.0  # it was solved for
+    assert 're-plans                   1  1 more changed nothing' in (
+        report.summary_table(summary))
+    assert report.summary_table({**summary, 'plans_unchanged': 0}).count('nothing') == 0
 
 
 def test_each_task_has_one_fate(run):

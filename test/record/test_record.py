@@ -112,6 +112,25 @@ def test_uploads_are_revisions_on_board_unless_a_bridge_counts_them():
     assert run.uploads == 4
 
 
+def planned(milliseconds, trigger, **lists):
+    return 'allocation', {'solve_ms': milliseconds, 'trigger': trigger, 'lists': [
+        {'uav': uav, 'tasks': [{'id': name} for name in names]} for uav, names in lists.items()]}
+
+
+def test_a_plan_that_changes_no_list_is_no_replan():
+    first = planned(90.0, 'ADD a', u1='ab')
+    run = run_state(announced('ADD', 'a', 'b', 'c'), first, planned(5.0, 'u2 silent', u1='ab'))
+    assert '; 0 re-plans, last 90 ms (ADD a)' in headline(run, 1.0)
+    for wall, (kind, body) in enumerate((
+            planned(7.0, 'ADD c', u1='abc'), planned(8.0, 'background', u1='bc'),
+            status(('a', 'COMPLETED'))), 9):  # the status arrives after the list without the task
+        run.apply({'wall': float(wall), 'kind': kind, **body})
+    assert '; 1 re-plans, last 7 ms (ADD c)' in headline(run, 2.0)
+    run.apply({'wall': 20.0, 'kind': 'allocation', **planned(6.0, 'CANCEL b', u1='c')[1]})
+    assert [each.trigger for each in run.replans()] == ['ADD c', 'CANCEL b']
+    assert len(run.solves) == 5
+
+
 def test_an_unfinished_last_line_is_ignored(tmp_path):
     line = json.dumps({'wall': 1.0, 'kind': 'allocation', 'solve_ms': 5.0, 'trigger': ''})
     (tmp_path / RECORD_FILE).write_text(line + '\n' + line[:20])

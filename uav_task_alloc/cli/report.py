@@ -53,6 +53,7 @@ def run_summary(state: RunState, truth: GroundTruth) -> Summary:
     twice = sorted(name for name, items in reached.items() if len(items) > 1)
     entries = zone_entries(truth, state.zones)
     times = [solve.milliseconds for solve in state.solves[1:]]  # the first plan is no re-plan
+    replans = len(state.replans())
     return {
         'tasks_announced': len(state.tasks),
         'tasks_completed': len(names['completed']),
@@ -61,7 +62,8 @@ def run_summary(state: RunState, truth: GroundTruth) -> Summary:
         'tasks_lost': len(names['lost']),
         'tasks_flown_twice': len(twice),
         'zone_violations': len(entries),
-        'replans': len(times),
+        'replans': replans,
+        'plans_unchanged': len(times) - replans,
         'resolve_ms_median': percentile(times, 50.0),
         'resolve_ms_p99': percentile(times, 99.0),
         'uploads': state.uploads,
@@ -130,6 +132,7 @@ def summary_table(summary: Mapping[str, Any]) -> str:
     """
     of = summary.__getitem__
     flown, planned = of('metres_flown'), of('metres_planned')
+    unchanged = summary.get('plans_unchanged', 0)
     excess = 100.0 * (flown / planned - 1.0) if planned else 0
     rows = [
         ('tasks announced', of('tasks_announced'), ''),
@@ -141,7 +144,7 @@ def summary_table(summary: Mapping[str, Any]) -> str:
         ('zone violations', of('zone_violations'), '; '.join(of('entries'))),
         ('metres flown', f'{flown:.0f}', f'planned {planned:.0f} ({excess:+.1f} %)'),
         ('finished', f'{summary.get("finish_s", 0.0):.0f} s', 'last task, scenario time'),
-        ('re-plans', of('replans'), ''),
+        ('re-plans', of('replans'), f'{unchanged} more changed nothing' * bool(unchanged)),
         ('re-solve time', f'{of("resolve_ms_median"):.0f} ms',
          f'p99 {of("resolve_ms_p99"):.0f} ms'),
         ('uploads', of('uploads'), ''),

@@ -7,13 +7,12 @@ from itertools import pairwise
 from typing import Any
 
 from uav_task_alloc.errors import first_of
-from uav_task_alloc.record.run_state import Line
 
 RouteLists = Mapping[str, Sequence[str]]  # task ids in the order flown, by UAV
 _TRIGGER_TEXTS = {'ADD': 'new task', 'UPDATE': 'changed task', 'CANCEL': 'withdrawn task'}
 
 
-def route_lists(line: Line) -> dict[str, list[str]]:
+def route_lists(line: Mapping[str, Any]) -> dict[str, list[str]]:
     """Return the task ids of all lists of an allocation line.
 
     Args:

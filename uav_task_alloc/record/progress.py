@@ -26,8 +26,9 @@ def headline(run: RunState, clock: float) -> str:
     text = (f'{clock:5.0f} s  {run.count("COMPLETED")} of {len(run.tasks)} tasks completed'
             f'{counts}; {len(run.zones_now())} zones')
     if run.solves:
-        last = run.solves[-1]
-        text += (f'; {len(run.solves) - 1} re-plans, last {last.milliseconds:.0f} ms'
+        replans = run.replans()
+        last = (replans or run.solves[:1])[-1]  # a plan that changed nothing is no re-plan
+        text += (f'; {len(replans)} re-plans, last {last.milliseconds:.0f} ms'
                  + f' ({last.trigger})' * bool(last.trigger))
     return text
 

@@ -12,6 +12,7 @@ from typing import Any
 
 from uav_task_alloc.geometry.frames import Origin
 from uav_task_alloc.model import Point, ThreatZone
+from uav_task_alloc.record.plan_diff import RouteLists, route_changes, route_lists
 from uav_task_alloc.zone_codec import decode_zone
 
 RECORD_FILE = 'record.jsonl'
@@ -85,6 +86,9 @@ class RunState:
     cancelled: set[str] = field(default_factory=set)  # ids of tasks
     statuses: dict[str, ReportedStatus] = field(default_factory=dict)  # by task id
     solves: list[SolveRecord] = field(default_factory=list)  # in the order of publication
+    # those after the first that changed a list; the newest is judged by `replans`
+    changing: list[SolveRecord] = field(default_factory=list)
+    routes: tuple[RouteLists, RouteLists] = ({}, {})  # of the newest plan and that before it
     # with the times in which they were in force
     zones: list[ZoneInterval] = field(default_factory=list)
     lists: dict[str, Line] = field(default_factory=dict)  # the newest of each UAV
@@ -147,8 +151,16 @@ class RunState:
                          for row in line['statuses']}
 
     def on_allocation(self, line: Line) -> None:
-        """A plan was published."""
+        """A plan was published: by now the tasks completed before the one before it are known."""
+        self.changing = self.replans()
+        self.routes = route_lists(line), self.routes[0]
         self.solves.append(SolveRecord(line['wall'], line['solve_ms'], line['trigger']))
+
+    def replans(self) -> list[SolveRecord]:
+        """The plans after the first that changed a list; a completed task is no change."""
+        newest, before = self.routes
+        changed = self.solves[1:] and route_changes(before, newest, self.completed())
+        return [*self.changing, *self.solves[-1:]] if changed else self.changing
 
     def on_zones(self, line: Line) -> None:
         """The set of all zones: a missing zone has ended, a new one begins."""
