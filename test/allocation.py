@@ -104,9 +104,12 @@ class AllocatorDriver:
         return self.world.event(TaskEvent(task_id, uav_id, revision, TaskEventKind[kind], reason),
                                 self.now, self.now)
 
+    def desk(self):
+        return OperatorDesk(self.core)
+
     def order(self, action, uav='', *tasks, **more):
         """Give an order, and solve what is to be solved for it; returns the answer."""
-        desk, request = OperatorDesk(self.core), OrderRequest(
+        desk, request = self.desk(), OrderRequest(
             OrderAction[action], uav, tasks, **{'operator': 'ann', **more})
         answer = desk.open(request, self.now, self.now)
         if isinstance(answer, OrderTrial):

@@ -98,8 +98,7 @@ class OperatorDesk:
             return change
         if not (change.add or change.remove):
             return self._nothing_to_do(request, change, now, stamp)
-        keeps = any(order.kind in (OrderKind.PIN, OrderKind.SEQUENCE) for order in change.add)
-        if not (keeps or request.dry_run):
+        if not (_must_be_kept(change) or request.dry_run):
             return self._apply(request, change, None, now, stamp)
         if not self._world.kernels_ready:
             return _refused(request, 'the solver is still loading: try again in a minute')
@@ -121,9 +120,10 @@ class OperatorDesk:
             return change
         if answer is None:
             return _refused(request, 'the solver failed; its log says why')
-        why = broken_order(trial.change, trial.problem, answer) or self._breaks_other(answer)
-        if why:
-            return _refused(request, why)
+        if _must_be_kept(change):
+            why = broken_order(trial.change, trial.problem, answer) or self._breaks_other(answer)
+            if why:
+                return _refused(request, why)
         if request.dry_run:
             return self._priced(request, change, answer)
         return self._apply(request, change, answer, now, stamp)
@@ -364,6 +364,11 @@ def price_text(answer: WhatIfAnswer) -> str:
         parts.append('left out: ' + first_of(
             (f'{task_id} ({why})' for task_id, why in answer.left_out.items()), separator='; '))
     return ', '.join(parts)
+
+
+def _must_be_kept(change: OrderChange) -> bool:
+    """Whether it gives tasks to a UAV, which has to be able to fly them."""
+    return any(order.kind in (OrderKind.PIN, OrderKind.SEQUENCE) for order in change.add)
 
 
 def _refused(request: OrderRequest, why: str) -> OrderAnswer:
