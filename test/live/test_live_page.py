@@ -239,6 +239,22 @@ def test_a_hostile_name_is_only_text(view):
     assert page.evaluate('window.hacked') is None
 
 
+def test_orders_and_proposals_are_shown_and_not_given(view):
+    run = Run().add(
+        state(BEGIN, 'u1', (0.0, 0.0)),
+        {'wall': BEGIN, 'kind': 'uploads', 'uploads': {}, 'orders': {
+            '/allocator': {'o1': f'pin t1 to u1 ({HOSTILE})'}}},
+        {'kind': 'proposal', 'wall': BEGIN, 'revision': 7, 'open': True, 'accepted': False,
+         'trigger': 'ADD t9', 'deadline': BEGIN + 31.0, 'changes': [f'u1 gains {HOSTILE}']})
+    page = view(run.snapshots)
+    wait(page, '#orders', 'o1 pin t1 to u1')
+    wait(page, '#proposal', 'Plan 7 waits for approval (ADD t9)')
+    wait(page, '#proposal', 'it is rejected then')
+    assert HOSTILE in text(page, '#proposal')
+    assert page.evaluate('window.hacked') is None
+    assert page.locator('#order-box button').count() == 0
+
+
 def test_the_page_sends_nothing_but_get(view, run):
     requests = []
     page = view(run.snapshots)

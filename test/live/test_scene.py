@@ -77,6 +77,29 @@ def test_a_uav_shows_what_the_allocator_says_of_it():
     assert [shown[uav]['health'] for uav in ('u1', 'u2')] == ['link stale', '']
 
 
+PROPOSAL = {'kind': 'proposal', 'wall': BEGIN + 1.0, 'revision': 7, 'open': True,
+            'accepted': False, 'trigger': 'ADD t9', 'deadline': BEGIN + 31.0,
+            'changes': ['u1 gains t9 (new): 2 -> 3 tasks, +90 m', 'in all +90 m']}
+
+
+def test_orders_and_the_plan_that_waits_for_an_operator_are_shown():
+    ordered = {'wall': BEGIN + 1.0, 'kind': 'uploads', 'uploads': {}, 'orders': {
+        '/allocator': {'o1': 'pin t1 to u1 (ann)', 'o3': 'pause u2 (bob)'}}}
+    parts, events, _ = updates(FIRST, [ordered, PROPOSAL])
+    assert parts['orders'] == {
+        'orders': [['o1', 'pin t1 to u1 (ann)'], ['o3', 'pause u2 (bob)']],
+        'proposal': {'revision': 7, 'trigger': 'ADD t9', 'deadline': BEGIN + 31.0,
+                     'accepted': False, 'changes': PROPOSAL['changes']}}
+    assert [event['text'] for event in events] == [
+        'plan 7 waits for approval: u1 gains t9 (new): 2 -> 3 tasks, +90 m; in all +90 m']
+    closed = {**PROPOSAL, 'open': False, 'changes': ['plan 7: rejected by ann']}
+    parts, events, _ = updates(FIRST, [ordered, PROPOSAL], [closed])
+    assert parts['orders']['proposal'] is None
+    assert [event['text'] for event in events] == ['plan 7: rejected by ann']
+    ended = {**ordered, 'orders': {'/allocator': {}}}
+    assert updates(FIRST, [ordered], [ended])[0]['orders']['orders'] == []
+
+
 def test_a_stamp_of_another_clock_is_ignored():
     line = {**FIRST[3], 'stamp': 17.0}  # simulated time
     assert updates([line])[0]['list u1']['tasks'][0]['at'] == BEGIN + 10.0

@@ -11,9 +11,10 @@ from uav_task_alloc.allocator.state.flight_pace import finish_time
 from uav_task_alloc.allocator.state.world import World
 from uav_task_alloc.allocator.state.zone_checks import blocked_text
 from uav_task_alloc.errors import first_of
-from uav_task_alloc.record.message_records import UAV_WARNING
+from uav_task_alloc.record.message_records import ORDER, UAV_WARNING
 
 _MAX_NAMED = 20  # UAVs in a warning
+_MAX_ORDERS = 50  # in the diagnostics, the newest
 _MAX_STRANDED = 5  # warnings of UAVs without a safe path home
 
 
@@ -148,7 +149,10 @@ def health_values(world: World, solving: bool) -> dict[str, object]:
         with single UAVs.
     """
     states = Counter(record.state for record in world.task_records().values())
+    orders = list(world.orders.in_force.values())[-_MAX_ORDERS:]
     return {**{f'{UAV_WARNING}{uav_id}': text for uav_id, text in _zone_warnings(world)},
+            **{f'{ORDER}{order.id}': f'{order.text} ({order.operator})' for order in orders},
+            'orders in force': len(world.orders.in_force),
             'UAVs known': len(world.uav_records()),
             'UAVs available': len(world.fleet.usable_ids()),
             'zones': len(world.zones), 'revision': world.revision,

@@ -21,7 +21,7 @@ _REST_MODES = ('STANDBY', 'HOLD')  # as in page/model.js
 _LEAST_SPEED = 0.5  # [m/s]; the course of a slower UAV is noise
 # by kind of a line: the part of the page that it changes
 _PART_OF_KIND = {'announcement': 'tasks', 'statuses': 'statuses', 'zones': 'zones',
-                 'state': 'uavs', 'uploads': 'uavs', 'origin': 'origin'}
+                 'state': 'uavs', 'uploads': 'uavs', 'origin': 'origin', 'proposal': 'orders'}
 LogEntry = dict[str, Any]  # of a log: `wall` [unix s] and the values that the page shows
 
 
@@ -45,6 +45,7 @@ class Scene:
         self.routes: RouteLists | None = None  # of the last plan
         self.silent: set[str] = set()
         self.last_authority: LogEntry = {}
+        self.last_orders: dict[str, dict[str, str]] = {}  # by allocator
 
     def apply(self, line: Line) -> None:
         """Record what a line changes, then apply it to the run."""
@@ -78,6 +79,9 @@ class Scene:
         """
         plans = [self.plan(line) for line in self.new_plans]
         self.log_silence(now, ended)
+        if self.run.orders != self.last_orders:
+            self.last_orders = dict(self.run.orders)
+            self.dirty.add('orders')
         parts = {name: self.part(name) for name in self.dirty}
         authority = self.part('authority')  # a part of its own: it rarely changes
         if authority != self.last_authority:
@@ -129,6 +133,8 @@ class Scene:
         if name == 'authority':
             return {uav: self.authority(uav, state) for uav, state in sorted(run.uavs.items())
                     if state.get('authority') or state.get('reason')}
+        if name == 'orders':
+            return self.orders()
         return self.list(name.removeprefix('list '))
 
     def uav(self, uav: str, state: Line) -> LogEntry:
@@ -157,6 +163,16 @@ class Scene:
             return {**known, 'why': '', 'since': None, 'back': ''}
         return {**known, 'why': reported.reason, 'back': reported.given_back_by,
                 'since': None if reported.since is None else round(reported.since)}
+
+    def orders(self) -> LogEntry:
+        """Orders in force, [id, text]; and the plan that waits for an operator, None for none."""
+        proposal = self.run.proposal
+        waiting = proposal is not None and proposal['open'] and {
+            'revision': proposal['revision'], 'trigger': proposal['trigger'],
+            'deadline': round(proposal['deadline']), 'accepted': proposal['accepted'],
+            'changes': proposal['changes']}
+        return {'proposal': waiting or None, 'orders': [
+            [name, text] for each in self.run.orders.values() for name, text in each.items()]}
 
     def list(self, uav: str) -> LogEntry:
         """The remaining tasks of a UAV; `at`: expected arrival [unix s]."""

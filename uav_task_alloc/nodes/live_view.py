@@ -82,7 +82,8 @@ class LiveView(Node):
     Subscribes to:
         `uav_states` (UavState), `task_announcements` (TaskAnnouncement), `threat_zones`
         (ThreatZoneArray), `task_statuses` (TaskStatusArray), `allocation` (Allocation),
-        `<uav_id>/task_list` (TaskList), `fleet_origin` (FleetOrigin), `/diagnostics`
+        `<uav_id>/task_list` (TaskList), `plan_proposal` (PlanProposal),
+        `fleet_origin` (FleetOrigin), `/diagnostics`
         (DiagnosticArray).
     Parameters:
         LiveViewParams, see docs/parameters.md.
@@ -136,6 +137,7 @@ class LiveView(Node):
                         message_records.statuses_record)
         self._subscribe(m.Allocation, 'allocation', ANNOUNCEMENTS,
                         message_records.allocation_record)
+        self._subscribe(m.PlanProposal, 'plan_proposal', LATCHED, message_records.proposal_record)
         self._subscribe(DiagnosticArray, '/diagnostics', 10, message_records.uploads_record)
         self.create_subscription(m.UavState, 'uav_states', self.on_state, STATES)
         for uav in self.played.uavs if self.played else ():

@@ -54,6 +54,14 @@ def status_sentences(state: RunState, line: Line) -> Iterator[Sentence]:
                                 reason=reason or 'no reason given')
 
 
+def proposal_sentences(state: RunState, line: Line) -> Iterator[Sentence]:
+    """A plan that waits for an operator, or what became of it."""
+    changes = first_of(line['changes'], separator='; ')
+    text = f'plan {line["revision"]} waits for approval: {changes}' if line['open'] else changes
+    if state.proposal is None or state.proposal['changes'] != line['changes']:
+        yield 'plan', text
+
+
 def zone_sentences(state: RunState, line: Line) -> Iterator[Sentence]:
     """Zones that are new or removed."""
     old = {zone.id for zone in state.zones_now()}
@@ -93,5 +101,6 @@ SENTENCE_BUILDERS: dict[str, Callable[[RunState, Line], Iterator[Sentence]]] = {
     'announcement': announcement_sentences,
     'statuses': status_sentences,
     'zones': zone_sentences,
+    'proposal': proposal_sentences,
     'state': state_sentences,
 }

@@ -29,6 +29,7 @@ MISSIONS = ('UNKNOWN', 'UPLOADING', 'VERIFIED', 'MIXED', 'FOREIGN')
 AUTHORITIES = ('UNKNOWN', 'NONE', 'HELD', 'SUSPENDED', 'LOST')
 _COUNT = re.compile('[0-9]{1,18}')  # int() refuses some strings for which isdigit() is true
 UAV_WARNING = 'warning of '  # a key of an allocator begins so, and ends with the id of a UAV
+ORDER = 'order '  # a key of an allocator begins so, and ends with the id of an order
 NOTHING = 'nothing is needed'  # value of `given_back_by` while the bridge has authority
 _FRAME_LOCAL, _FRAME_WGS84 = 0, 1  # of a Task message
 
@@ -158,6 +159,20 @@ def allocation_record(msg: _Message) -> RecordBody:
     }
 
 
+def proposal_record(msg: _Message) -> RecordBody:
+    """Return a plan that waits for an operator, or what became of one.
+
+    Args:
+        msg: PlanProposal.
+
+    Returns:
+        Kind `proposal`; `deadline` [unix s]; `open`: it waits.
+    """
+    return {'kind': 'proposal', 'revision': msg.plan.revision, 'open': bool(msg.plan.lists),
+            'trigger': msg.plan.trigger, 'deadline': from_stamp(msg.deadline),
+            'accepted': bool(msg.accepted_on_timeout), 'changes': list(msg.changes)}
+
+
 def task_list_record(msg: _Message) -> RecordBody:
     """Return the remaining tasks of a TaskList.
 
@@ -208,11 +223,13 @@ def uploads_record(msg: _Message) -> RecordBody:
     Returns:
         Kind `uploads`. `uploads`: counts by name of the status; `health`: [level, text] by
         hardware id, which is the UAV in statuses of a bridge; `authority`, `clock_rates`: by
-        UAV; `uav_warnings`: texts by UAV, by name of the status of an allocator.
+        UAV; `uav_warnings`: texts by UAV, by name of the status of an allocator; `orders`: of
+        operators, texts by id, likewise.
     """
     return {'kind': 'uploads', 'uploads': dict(_upload_counts(msg)), 'authority': dict(
         _authority(msg)), 'clock_rates': dict(_clock_rates(msg)), 'uav_warnings': dict(
-        _uav_warnings(msg)), 'health': {
+        _of_allocators(msg, UAV_WARNING)), 'orders': dict(
+        _of_allocators(msg, ORDER)), 'health': {
         status.hardware_id or status.name: [
             status.level if isinstance(status.level, int) else ord(status.level), status.message]
         for status in msg.status}}
@@ -237,13 +254,13 @@ def _authority(msg: _Message) -> Iterable[tuple[str, RecordBody]]:
                 'back': '' if back == NOTHING else back}
 
 
-def _uav_warnings(msg: _Message) -> Iterable[tuple[str, dict[str, str]]]:
-    """By allocator: what is wrong with single UAVs."""
+def _of_allocators(msg: _Message, prefix: str) -> Iterable[tuple[str, dict[str, str]]]:
+    """By allocator: the values whose keys begin with a prefix, by the rest of the key."""
     for status in msg.status:
         values = {pair.key: pair.value for pair in status.values}
         if 'UAVs known' in values:
-            yield status.name, {key.removeprefix(UAV_WARNING): text
-                                for key, text in values.items() if key.startswith(UAV_WARNING)}
+            yield status.name, {key.removeprefix(prefix): text
+                                for key, text in values.items() if key.startswith(prefix)}
 
 
 def _clock_rates(msg: _Message) -> Iterable[tuple[str, float]]:

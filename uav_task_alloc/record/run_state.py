@@ -98,6 +98,8 @@ class RunState:
     upload_counts: dict[str, int] = field(default_factory=dict)  # by UAV, from diagnostics
     health: dict[str, tuple[int, str]] = field(default_factory=dict)  # level, text by UAV
     uav_warnings: dict[str, dict[str, str]] = field(default_factory=dict)  # by allocator, by UAV
+    orders: dict[str, dict[str, str]] = field(default_factory=dict)  # by allocator, by id
+    proposal: Line | None = None  # the last plan that waited for an operator
     authority: dict[str, ReportedAuthority] = field(default_factory=dict)  # by UAV
     speedup: float = 1.0  # scenario seconds in a second of `wall`; 1 where that is /clock
     rate: float = 1.0  # scenario seconds in a second of real time
@@ -162,6 +164,10 @@ class RunState:
         changed = self.solves[1:] and route_changes(before, newest, self.completed())
         return [*self.changing, *self.solves[-1:]] if changed else self.changing
 
+    def on_proposal(self, line: Line) -> None:
+        """A plan waits for an operator, or does no longer."""
+        self.proposal = line
+
     def on_zones(self, line: Line) -> None:
         """The set of all zones: a missing zone has ended, a new one begins."""
         current = dict.fromkeys(decode_zone(row) for row in line['zones'])  # in order
@@ -196,6 +202,7 @@ class RunState:
         self.health.update((uav, (level, text))
                            for uav, (level, text) in line.get('health', {}).items())
         self.uav_warnings.update(line.get('uav_warnings', {}))
+        self.orders.update(line.get('orders', {}))
         self.clock_rates.update(line.get('clock_rates', {}))
         if self.measured and self.clock_rates:
             rate = median(self.clock_rates.values())

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Random orders mixed with events: no order broken, no task lost, what is undone is as before.
 
-HYPOTHESIS_ORDERS=600 python -m pytest test/allocator/orders/test_random_orders.py gives 20 000.
+HYPOTHESIS_ORDERS=1200 python -m pytest test/allocator/orders/test_random_orders.py gives 20 000.
 """
 import os
 from collections import Counter
@@ -32,9 +32,14 @@ class OrdersAndEvents(RuleBasedStateMachine):
         self.driver = AllocatorDriver(**self.params)
         self.alive, self.ranges = set(UAVS), dict.fromkeys(UAVS, 3000.0)
         self.places = {uav_id: (300.0 * n, 0.0, 50.0) for n, uav_id in enumerate(UAVS)}
-        self.accepted = set()
         self.report()
+        self.driver.add(*(Task(name, (150.0 * n - 600.0, 40.0 * (n % 5), 50.0))
+                          for n, name in enumerate(TASKS[:8])))
+        self.accepted = set(TASKS[:8])
         self.settle()
+        if self.driver.world.proposal is not None:
+            self.driver.core.decide(True, 'ann', self.driver.now, self.driver.now)
+            self.driver.take()
 
     def report(self):
         for uav_id in sorted(self.alive):

@@ -4,7 +4,8 @@
 import {openCard, showUavs} from './cards.js';
 import {drawChart} from './chart.js';
 import {FleetMap} from './map.js';
-import {$, fill, make, pick, put, showAnswer, showEvents, showHead, showLeft, showPlans}
+import {$, fill, make, pick, put, showAnswer, showEvents, showHead, showLeft, showOrders,
+  showPlans}
   from './panels.js';
 import {answer, kindOf, live, ofDay, readModel, seconds, some, span, stamp}
   from './model.js';
@@ -69,7 +70,7 @@ function show() {
   due = 0;
   showHead(model, past);
   const picked = showAnswer(model);
-  for (const panel of [showPlans, showLeft, showEvents, showChart]) panel(model);
+  for (const panel of [showPlans, showOrders, showLeft, showEvents, showChart]) panel(model);
   showUavs(model, centre);
   showMap(model, picked);
   showState();

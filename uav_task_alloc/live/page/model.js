@@ -53,6 +53,8 @@ export function readModel(past) {
     uav.trouble = uav.lost || Boolean(uav.health) || uav.mode === 'FAULT' || uav.taken;
     return uav;
   });
+  const {orders = [], proposal = null} = parts.orders || {};
+  Object.assign(model, {orders, proposal});
   model.plans = live.plans.filter(plan => plan.wall <= wall);
   model.replans = model.plans.filter(plan => plan.first || plan.changes.length);
   model.events = live.events.filter(event => event.wall <= wall);

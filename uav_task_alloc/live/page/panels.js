@@ -162,6 +162,28 @@ export function showLeft(model) {
     }) : [make('li', model.ids.length ? 'Every task has a UAV.' : 'No task yet.', 'none')]);
 }
 
+// Orders in force, and the plan that waits for an operator. The page only shows them.
+export function showOrders({orders, proposal}) {
+  $('order-box').hidden = !orders.length && !proposal;
+  put($('order-count'), orders.length ? `${orders.length} in force` : '');
+  fill($('proposal'), JSON.stringify(proposal), () => {
+    if (!proposal) return [];
+    const {revision, trigger, deadline, accepted, changes} = proposal;
+    const rows = make('ul', '', 'changes');
+    rows.append(...changes.slice(0, MOST).map(text => make('li', text)));
+    const head = make('p');
+    head.append(make('b', `Plan ${revision} waits for approval`), ` (${trigger}), until `
+      + `${stamp(deadline)}: it is ${accepted ? 'accepted' : 'rejected'} then. `
+      + `uav_task_alloc order accept ${revision} decides before.`);
+    return [head, rows];
+  });
+  fill($('orders'), JSON.stringify(orders), () => orders.slice(0, MOST).map(([id, text]) => {
+    const item = make('li');
+    item.append(make('b', id), ` ${text}`);
+    return item;
+  }));
+}
+
 export function showEvents(model) {
   const last = model.events.at(-1);
   fill($('events'), last ? `${model.events.length} ${last.wall}` : '', () =>

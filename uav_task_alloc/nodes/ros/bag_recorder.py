@@ -35,6 +35,7 @@ _FLEET_TOPICS = {
     'fleet_origin': (_MESSAGES + 'FleetOrigin', LATCHED),
     'task_statuses': (_MESSAGES + 'TaskStatusArray', LATCHED),
     'allocation': (_MESSAGES + 'Allocation', LATCHED),
+    'plan_proposal': (_MESSAGES + 'PlanProposal', LATCHED),
     'task_events': (_MESSAGES + 'TaskEvent', EVENTS),
     'uav_states': (_MESSAGES + 'UavState', STATES)}
 
