@@ -18,6 +18,7 @@ UAVS = ('a', 'b', 'c')
 TASKS = tuple(f't{n}' for n in range(12))
 SPOTS = st.tuples(st.integers(-9, 9), st.integers(-9, 9))
 OPERATORS = st.sampled_from(('ann', 'bob'))
+PICKS = st.integers(0, 200)
 DOME = ThreatZone.cylinder('dome', (150.0, 50.0), 60.0)
 COUNTS = Counter()  # of what was done, for a run by hand
 
@@ -142,15 +143,32 @@ class OrdersAndEvents(RuleBasedStateMachine):
         self.settle()
         return before[0], answer
 
-    @rule(uav_id=st.sampled_from(UAVS), name=st.sampled_from(TASKS), clear=st.booleans(),
-          kind=st.sampled_from(('PIN', 'FORBID')), operator=OPERATORS)
-    def pin_or_forbid(self, uav_id, name, clear, kind, operator):
-        self.order(kind, uav_id, name, clear=clear, operator=operator)
+    def task(self, pick):
+        """An open task for most numbers, any name for some."""
+        names = [record.task.id for record in self.driver.world.tasks.open()]
+        return names[pick % len(names)] if names and pick % 9 else TASKS[pick % len(TASKS)]
 
-    @rule(uav_id=st.sampled_from(UAVS), names=st.lists(st.sampled_from(TASKS), max_size=3),
+    @rule(uav_id=st.sampled_from(UAVS), pick=PICKS, kind=st.sampled_from(('PIN', 'FORBID')),
           operator=OPERATORS)
-    def sequence(self, uav_id, names, operator):
-        self.order('ORDER', uav_id, *names, operator=operator)
+    def pin_or_forbid(self, uav_id, pick, kind, operator):
+        self.order(kind, uav_id, self.task(pick), operator=operator)
+
+    @rule(uav_id=st.sampled_from(UAVS), picks=st.lists(PICKS, min_size=1, max_size=3),
+          operator=OPERATORS)
+    def sequence(self, uav_id, picks, operator):
+        self.order('ORDER', uav_id, *map(self.task, picks), operator=operator)
+
+    @rule(pick=PICKS)
+    def clear(self, pick):
+        orders = list(self.driver.world.orders.in_force.values())
+        if orders:
+            order = orders[pick % len(orders)]
+            if order.kind is OrderKind.SEQUENCE:
+                self.order('ORDER', order.uav)
+            elif order.tasks:
+                self.order(order.kind.name, order.uav, *order.tasks, clear=True)
+            if order.tasks:
+                assert order.id not in self.driver.world.orders.in_force
 
     @rule(uav_id=st.sampled_from(UAVS), keep=st.booleans(),
           action=st.sampled_from(('PAUSE', 'RESUME', 'RETURN', 'RESUME')))
