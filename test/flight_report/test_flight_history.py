@@ -6,13 +6,14 @@ from html import escape
 
 import pytest
 
+from uav_task_alloc.flight_report.figures import all_figures
 from uav_task_alloc.flight_report.flight_history import (
     ReceptionGap,
     ReplanRecord,
     StateSpan,
     read_history,
 )
-from uav_task_alloc.flight_report.page import report_page
+from uav_task_alloc.flight_report.page import key_figures, report_page
 from uav_task_alloc.model import ThreatZone
 from uav_task_alloc.zone_codec import JSON_ZONE, encode_zone
 
@@ -203,3 +204,23 @@ def test_a_plan_that_changed_nothing_is_no_replan():
     assert '<td>plans that changed nothing</td><td class="n">1</td>' in text
     replans = re.search('id="re-plans".*?</details>', text, re.DOTALL)[0]
     assert replans.count('<tr>') == 3  # the head, the first plan, the one for b
+
+
+def test_the_report_has_the_services_as_planned_and_flown_and_their_windows():
+    timed = announced(1.0, a=[100.0, 0.0, 50.0])
+    timed['tasks'][0].update(service=4.0, earliest=BEGIN + 2.0)
+    rows = tasks_left(1.1, A, B)
+    for k, row in enumerate(rows['tasks']):
+        row.update(eta=10.0 * (k + 1), wait=2.0, finish=10.0 * (k + 1) + 6.0)
+    flight = [{'kind': 'run', 'speedup': 8.0, 'simulated': True}, state(0.0, 0.0), timed, rows,
+              statuses(20.0, a='COMPLETED', b='ASSIGNED'), state(21.0, 100.0)]
+    history = read_history(flight)
+    names = {name: figure for name, _, figure in all_figures(history)}
+    bars = {trace.name: list(zip(trace.base, trace.x, strict=True))
+            for trace in names['services'].data}
+    assert bars['planned'] == [pytest.approx((12.1, 4.0)), pytest.approx((22.1, 4.0))]
+    assert bars['flown'] == [pytest.approx((15.0, 4.0))]
+    assert bars['window'] == [pytest.approx((1.0, 30.0))]
+    assert ('last task completed at [s]', 19.0) in key_figures(history)
+    assert 'services' in report_page(history, 'x')
+    assert 'services' not in {name for name, _, _ in all_figures(read_history(FLIGHT[:2]))}

@@ -26,7 +26,9 @@ def listed(wall, uav, revision, ids):
     """A task list; the k-th task is reached 10 k seconds after `wall`."""
     return {'kind': 'list', 'wall': wall, 'stamp': wall, 'uav': uav, 'revision': revision,
             'distance': 0.0, 'tasks': [{'id': task, 'leg_distance': 1.0, 'via': [],
-                                        'eta': 10.0 * (k + 1)} for k, task in enumerate(ids)]}
+                                        'eta': 10.0 * (k + 1), 'wait': 2.0,
+                                        'finish': 10.0 * (k + 1) + 5.0}
+                                       for k, task in enumerate(ids)]}
 
 
 def planned(wall, revision, trigger, **lists):

@@ -6,7 +6,19 @@ import matplotlib.image
 import numpy as np
 import pytest
 from chromium import WAIT, wait
-from small_run import BEGIN, FIRST, Run, announced, held, listed, planned, state, statuses, uavs
+from small_run import (
+    BEGIN,
+    FIRST,
+    LATER,
+    Run,
+    announced,
+    held,
+    listed,
+    planned,
+    state,
+    statuses,
+    uavs,
+)
 
 HOSTILE = '<img src=x onerror="window.hacked=1">'
 
@@ -267,3 +279,19 @@ def test_the_page_sends_nothing_but_get(view, run):
     wait(page, '#moment', 'ago')
     assert {method for method, _ in requests} == {'GET'}
     assert all(url.startswith((view.server.address, 'data:')) for _, url in requests)
+
+
+def test_the_end_of_the_fleet_and_of_each_uav_and_the_services_are_shown(view, run):
+    page = view(run.snapshots)
+    wait(page, '#finish', 'The fleet is done at 0:55, in 0:35: u2 at 0:55.')
+    bars = page.locator('#gantt rect')
+    assert sorted(bars.evaluate_all('all => all.map(bar => [bar.dataset.task, '
+                                    'bar.getAttribute("class")].join(" "))')) == [
+        't1 flown', 't1 planned', 't2 planned', 't3 planned', 't4 planned']
+    titles = bars.locator('title').all_text_contents()
+    assert 't1 planned: 0:12 to 0:15' in titles
+    assert 't3 planned: 0:32 to 0:35' in titles
+    done = Run().add(*FIRST).add(*LATER).add(listed(BEGIN + 60, 'u2', 3, []), statuses(
+        BEGIN + 60, t1='COMPLETED u1', t2='COMPLETED u2', t3='COMPLETED u2'))
+    page = view(done.snapshots)
+    wait(page, '#finish', 'Nothing is left to fly; the last task was done at 1:00.')

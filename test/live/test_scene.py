@@ -10,6 +10,7 @@ from small_run import (
     Run,
     announced,
     held,
+    listed,
     planned,
     state,
     statuses,
@@ -38,7 +39,8 @@ def event_texts(*moments):
 
 def test_only_parts_that_a_line_changed_are_sent_again():
     assert set(updates(FIRST)[0]) == {'tasks', 'uavs', 'list u1', 'list u2', 'statuses'}
-    assert set(updates(FIRST, [statuses(BEGIN + 1, t1='COMPLETED u1')])[0]) == {'statuses'}
+    assert set(updates(FIRST, [statuses(BEGIN + 1, t1='COMPLETED u1')])[0]) == {
+        'statuses', 'times'}
     assert updates(FIRST, [planned(BEGIN + 1, 2, 'background')])[0] == {}
 
 
@@ -227,3 +229,27 @@ def test_the_height_of_the_home_and_the_origin_are_sent_where_they_are_known():
 def test_a_plan_that_changed_nothing_is_no_event():
     assert event_texts(FIRST, [planned(BEGIN + 1, 2, 'background', u1=['t1', 't2'],
                                        u2=['t3'])]) == []
+
+
+def test_services_are_shown_as_planned_and_as_flown_with_their_windows():
+    timed = announced(BEGIN, ['t1', 't2'])
+    timed['tasks'][0].update(service=4.0, earliest=BEGIN + 11.0, latest=BEGIN + 30.0)
+    lines = [timed, *FIRST[1:], statuses(BEGIN + 17, t1='COMPLETED u1', t2='ACTIVE u1')]
+    for simulated, flown_for in ((True, 4.0), (False, 0.5)):
+        run = {'kind': 'run', 'wall': BEGIN, 'speedup': 8.0, 'simulated': simulated}
+        parts, _, _ = updates([run, *lines])
+        quick = 1.0 if simulated else 8.0
+        assert parts['times'] == {'t1': {
+            'planned': ['u1', BEGIN + 12 / quick, round(BEGIN + 15 / quick, 1)],
+            'flown': ['u1', BEGIN + 17 - flown_for, BEGIN + 17],
+            'window': [BEGIN + 11, BEGIN + 30]}}
+        assert parts['list u1']['tasks'][1]['service'] == [
+            round(BEGIN + 22 / quick, 1), round(BEGIN + 25 / quick, 1)]
+
+
+def test_a_list_of_an_earlier_version_has_no_services():
+    old = listed(BEGIN, 'u1', 1, ['t1'])
+    del old['tasks'][0]['finish']
+    parts, _, _ = updates([announced(BEGIN, ['t1']), old])
+    assert 'service' not in parts['list u1']['tasks'][0]
+    assert 'times' not in parts

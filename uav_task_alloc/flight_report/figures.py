@@ -11,6 +11,7 @@ import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
 from uav_task_alloc.flight_report.flight_history import FlightHistory
+from uav_task_alloc.flight_report.times_figure import services_figure
 from uav_task_alloc.geometry.zones import outline
 from uav_task_alloc.model import Point, Shape, ThreatZone
 from uav_task_alloc.palette import DARK_RED, RED, STATE_COLOURS, rgb, uav_colour
@@ -256,6 +257,11 @@ def all_figures(history: FlightHistory) -> Iterable[tuple[str, str, Any]]:
     """
     yield 'map', 'Map: as flown and as planned', flight_map(history)
     yield 'timeline', 'Timeline of tasks', timeline_figure(history)
+    services = services_figure(history)
+    if services is not None:
+        figure, height = services
+        yield ('services', 'Services: planned, flown and windows',
+               _with_layout(_with_mission(figure, history), min(_MAX_HEIGHT, height)))
     yield 'levels', 'Height and battery', level_figure(history)
     yield 'solving', 'Plans: solve time and fit', solve_figure(history)
     yield 'gaps', 'Gaps: UAVs not received', reception_figure(history)

@@ -162,6 +162,7 @@ def key_figures(history: FlightHistory) -> list[tuple[Cell, ...]]:
         ('gaps in reception', len(history.gaps)),
         ('mission, to the end of the last task [s]',
          round(max(0.0, history.clock(history.mission_end())), 1)),
+        ('last task completed at [s]', _last_flown(history, history.run.flown)),
         ('recorded, of mission time [s]',
          round((history.run.last - history.run.first) * history.run.speedup, 1))]
 
@@ -176,7 +177,8 @@ def tables(history: FlightHistory) -> str:
                              'ended [s]', 'reason'),
                    (_task_row(history, task) for task in history.tasks())),
         html_table('UAVs', ('UAV', 'tasks completed', 'metres flown', 'metres planned', 'battery',
-                            'last mode', 'silent [s]', 'lost at [s]', 'last position'),
+                            'last mode', 'done at [s]', 'silent [s]', 'lost at [s]',
+                            'last position'),
                    (_uav_row(history, uav) for uav in sorted(history.tracks))),
         html_table('Re-plans', ('at [s]', 'plan', 'trigger', 'changes', 'solve time [ms]', 'fit',
                                 'metres'),
@@ -214,8 +216,16 @@ def _uav_row(history: FlightHistory, uav: str) -> tuple[Cell, ...]:
     battery, lost = state['battery'], history.lost().get(uav)
     return (uav, done, round(history.metres(uav)), round(history.metres_planned(uav)),
             None if battery is None else f'{100.0 * battery:.0f} %', state['mode'].lower(),
+            _last_flown(history, [task for task, service in history.run.flown.items()
+                                  if service.uav == uav]),
             round(silent * history.run.speedup, 1),
             None if lost is None else round(history.clock(lost.wall), 1), _place(history, uav))
+
+
+def _last_flown(history: FlightHistory, tasks: Iterable[str]) -> float | None:
+    """When the last of these flown tasks was completed, in mission time [s]."""
+    ends = [history.clock(history.run.flown[task].end) for task in tasks]
+    return round(max(ends), 1) if ends else None
 
 
 def _place(history: FlightHistory, uav: str) -> str:

@@ -13,10 +13,10 @@ from uav_task_alloc.record.plan_diff import (
     route_lists,
     trigger_text,
 )
-from uav_task_alloc.record.run_state import Line, RunState
+from uav_task_alloc.record.run_state import Line, RunState, Service
 from uav_task_alloc.zone_codec import JSON_ZONE, encode_zone
 
-_MAX_STAMP_AGE = 86400.0  # [s]; an older stamp is of another clock
+_MOST_TIMES = 1000  # tasks flown that the page draws, the latest
 _REST_MODES = ('STANDBY', 'HOLD')  # as in page/model.js
 _LEAST_SPEED = 0.5  # [m/s]; the course of a slower UAV is noise
 # by kind of a line: the part of the page that it changes
@@ -46,6 +46,7 @@ class Scene:
         self.silent: set[str] = set()
         self.last_authority: LogEntry = {}
         self.last_orders: dict[str, dict[str, str]] = {}  # by allocator
+        self.last_times: LogEntry = {}
 
     def apply(self, line: Line) -> None:
         """Record what a line changes, then apply it to the run."""
@@ -54,8 +55,11 @@ class Scene:
         kind = line['kind']
         if kind in _PART_OF_KIND:
             self.dirty.add(_PART_OF_KIND[kind])
+            if kind in ('announcement', 'statuses'):
+                self.dirty.add('times')
         elif kind == 'list':
             self.dirty.add(f'list {line["uav"]}')
+            self.dirty.add('times')
         elif kind == 'allocation':
             self.new_plans.append(line)
         speedup = self.run.speedup
@@ -83,6 +87,9 @@ class Scene:
             self.last_orders = dict(self.run.orders)
             self.dirty.add('orders')
         parts = {name: self.part(name) for name in self.dirty}
+        if parts.get('times') == self.last_times:
+            del parts['times']
+        self.last_times = parts.get('times', self.last_times)
         authority = self.part('authority')  # a part of its own: it rarely changes
         if authority != self.last_authority:
             self.last_authority = parts['authority'] = authority
@@ -126,6 +133,8 @@ class Scene:
         if name == 'statuses':  # [state, UAV, reason] by id
             return {task: [row.state, row.uav, row.reason]
                     for task, row in run.statuses.items()}
+        if name == 'times':
+            return self.times()
         if name == 'zones':
             return [encode_zone(zone, JSON_ZONE) for zone in run.zones_now()]
         if name == 'uavs':
@@ -177,13 +186,35 @@ class Scene:
     def list(self, uav: str) -> LogEntry:
         """The remaining tasks of a UAV; `at`: expected arrival [unix s]."""
         line, speedup = self.run.lists[uav], self.run.speedup
-        wall, stamp = line['wall'], line.get('stamp', 0.0)
-        # two nodes read /clock up to a tick apart
-        planned_at = stamp if -self.run.stretch <= wall - stamp < _MAX_STAMP_AGE else wall
+        planned_at = self.run.planned_at(line)
         return {'revision': line['revision'], 'tasks': [
             {'id': row['id'], 'via': [to_decimetres(point) for point in row['via']],
-             'at': round(planned_at + row['eta'] / speedup, 1) if 'eta' in row else None}
+             'at': round(planned_at + row['eta'] / speedup, 1) if 'eta' in row else None,
+             **_span('service', self.run.service(line, row))}
             for row in line['tasks']]}
+
+    def times(self) -> LogEntry:
+        """By task: `window` and `planned` service [unix s], of completed ones also `flown`.
+
+        `planned` and `flown` have the UAV before their two times.
+        """
+        run, times = self.run, {}
+        flown = dict(list(run.flown.items())[-_MOST_TIMES:])
+        for name, task in run.tasks.items():
+            row = {**_span('planned', run.planned.get(name) if name in flown else None, uav=True),
+                   **_span('flown', flown.get(name), uav=True)}
+            if task.earliest is not None or task.latest is not None:
+                row['window'] = [task.earliest, task.latest]
+            if row:
+                times[name] = row
+        return times
+
+
+def _span(name: str, service: Service | None, uav: bool = False) -> LogEntry:
+    """Begin and end of a service [unix s] under a name; nothing where it is not known."""
+    if service is None:
+        return {}
+    return {name: [service.uav] * uav + [round(service.begin, 1), round(service.end, 1)]}
 
 
 def motion(velocity: Any) -> dict[str, float | None]:

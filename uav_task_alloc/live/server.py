@@ -21,8 +21,9 @@ from uav_task_alloc.live.tiles import TileSource
 MAX_STREAMS = 32
 PAGE_FILES = {'/': ('index.html', 'text/html'), '/live.css': ('live.css', 'text/css'),
         **{f'/{name}.js': (f'{name}.js', 'text/javascript')
-           for name in ('live', 'model', 'panels', 'cards', 'chart', 'map', 'layers', 'overlay',
-                        'labels', 'gestures', 'tiles', 'geo')}}
+           for name in (
+           'cards', 'chart', 'gantt', 'geo', 'gestures', 'labels', 'layers',
+           'live', 'map', 'model', 'overlay', 'panels', 'tiles', 'times')}}
 LOOPBACK = ('127.0.0.1', 'localhost', '::1')
 CONTENT_POLICY = (
     "default-src 'none'; script-src 'self'; connect-src 'self'; img-src 'self' data: {}; "

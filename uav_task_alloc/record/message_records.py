@@ -60,9 +60,17 @@ def announcement_record(msg: _Message, origin: Origin | None) -> RecordBody:
             continue
         if position is not None:
             tasks.append(
-                {'id': task.task_id, 'position': position, 'value': finite_or_none(task.value)}
+                {'id': task.task_id, 'position': position, 'value': finite_or_none(task.value),
+                 'service': from_stamp(task.service_time), **_window(task)}
             )
     return {'kind': 'announcement', 'action': constant_name(ACTIONS, msg.action), 'tasks': tasks}
+
+
+def _window(task: _Message) -> RecordBody:
+    """`earliest` and `latest` [ROS s] of a task, where it has them."""
+    times = {name: from_stamp(getattr(task, name)) for name in ('earliest', 'latest')
+             if hasattr(task, name)}  # recordings of earlier versions have none
+    return {name: time for name, time in times.items() if time > 0.0}
 
 
 def task_position(task: _Message, origin: Origin | None) -> Point | None:
@@ -180,13 +188,15 @@ def task_list_record(msg: _Message) -> RecordBody:
         msg: TaskList.
 
     Returns:
-        Kind `list`; `stamp` [unix s], `eta` [s] from `stamp`, lengths in m.
+        Kind `list`; `stamp` [unix s], `eta`, `finish` [s] from `stamp`, `wait` [s], lengths in m.
     """
     return {'kind': 'list', 'uav': msg.uav_id, 'revision': msg.revision, 'end': msg.end,
             'stamp': from_stamp(msg.header.stamp),
             'distance': finite_or_none(msg.distance), 'tasks': [
                 {'id': row.task.task_id, 'leg_distance': finite_or_none(row.leg_distance) or 0.0,
                  'eta': from_stamp(row.eta),
+                 **{name: from_stamp(getattr(row, name)) for name in ('wait', 'finish')
+                    if hasattr(row, name)},
                  'position': [finite_or_none(v) for v in _xyz(row.task.position)],
                  'via': [xyz for xyz in map(_xyz, row.via) if all(map(math.isfinite, xyz))]}
                 for row in msg.tasks]}

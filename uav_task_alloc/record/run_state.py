@@ -20,6 +20,7 @@ END_STATES = ('COMPLETED', 'FAILED', 'CANCELLED', 'REJECTED')
 FINAL_STATES = (*END_STATES, 'UNASSIGNED')
 # share by which a measured clock rate varies, and that of a real vehicle over a bad link
 _RATE_TOLERANCE, _REAL_TIME_TOLERANCE = 0.04, 0.1
+_MAX_STAMP_AGE = 86400.0  # [s]; an older stamp is of another clock
 SINCE_TOLERANCE = 3.0  # [s] of a start time: reports are in whole seconds and arrive late
 SILENT_AFTER = 2.0  # [s] of real time without a state: the UAV is shown as silent
 # `wall`: time of the record, that of /clock where its node lives by simulated time
@@ -32,6 +33,18 @@ class AnnouncedTask:
 
     position: Point  # [m]
     wall: float  # [unix s]
+    service: float = 0.0  # [s]
+    earliest: float | None = None  # [ROS s] of the start of its service; None: any
+    latest: float | None = None  # [ROS s] of the start of its service; None: any
+
+
+@dataclass(frozen=True, slots=True)
+class Service:
+    """The service of a task, as planned when the leg to it began, or as flown."""
+
+    uav: str  # id
+    begin: float  # [unix s] as `wall`
+    end: float  # [unix s] as `wall`
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,6 +98,8 @@ class RunState:
     tasks: dict[str, AnnouncedTask] = field(default_factory=dict)  # announced, by id
     cancelled: set[str] = field(default_factory=set)  # ids of tasks
     statuses: dict[str, ReportedStatus] = field(default_factory=dict)  # by task id
+    planned: dict[str, Service] = field(default_factory=dict)  # by task, of legs begun
+    flown: dict[str, Service] = field(default_factory=dict)  # by task, of completed ones
     solves: list[SolveRecord] = field(default_factory=list)  # in the order of publication
     # those after the first that changed a list; the newest is judged by `replans`
     changing: list[SolveRecord] = field(default_factory=list)
@@ -145,10 +160,16 @@ class RunState:
             else:
                 known = self.tasks.get(task['id'])
                 self.tasks[task['id']] = AnnouncedTask(
-                    tuple(task['position']), known.wall if known else line['wall'])
+                    tuple(task['position']), known.wall if known else line['wall'],
+                    task.get('service', 0.0), task.get('earliest'), task.get('latest'))
 
     def on_statuses(self, line: Line) -> None:
         """The statuses of all tasks."""
+        for row in line['statuses']:
+            if row['state'] == 'COMPLETED' and row['task'] not in self.flown:
+                task = self.tasks.get(row['task'])
+                service = task.service / self.speedup if task else 0.0
+                self.flown[row['task']] = Service(row['uav'], line['wall'] - service, line['wall'])
         self.statuses = {row['task']: ReportedStatus(row['state'], row['uav'], row['reason'])
                          for row in line['statuses']}
 
@@ -182,7 +203,38 @@ class RunState:
         if self.begins_leg(line):
             first = line['tasks'][0]
             self.legs[line['uav'], first['id']] = first['leg_distance']
+            service = self.service(line, first)
+            if service is not None:
+                self.planned[first['id']] = service
         self.lists[line['uav']] = line
+
+    def service(self, line: Line, row: Line) -> Service | None:
+        """Return the planned service of a task of a list.
+
+        Args:
+            line: a list.
+            row: one of its tasks.
+
+        Returns:
+            None in recordings of earlier versions.
+        """
+        if 'finish' not in row:
+            return None
+        begin, end = (self.planned_at(line) + t / self.speedup
+                      for t in (row['eta'] + row['wait'], row['finish']))
+        return Service(line['uav'], begin, end)
+
+    def planned_at(self, line: Line) -> float:
+        """When a list was planned [unix s]; on arrival where its stamp is of another clock."""
+        wall, stamp = line['wall'], line.get('stamp', 0.0)
+        # two nodes read /clock up to a tick apart
+        return stamp if -self.stretch <= wall - stamp < _MAX_STAMP_AGE else float(wall)
+
+    def finish(self, uav: str) -> float | None:
+        """When the last task of a UAV's list ends [unix s]; None: it has none."""
+        line = self.lists.get(uav)
+        last = self.service(line, line['tasks'][-1]) if line and line['tasks'] else None
+        return None if last is None else last.end
 
     def begins_leg(self, line: Line) -> bool:
         """Whether a list has another first task than the newest list of its UAV."""

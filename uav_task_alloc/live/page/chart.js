@@ -2,11 +2,11 @@
 // The chart of the solver: time and fit of each plan over mission time, as SVG.
 import {roundStep} from './geo.js';
 
-const SVG = 'http://www.w3.org/2000/svg';
+export const SVG = 'http://www.w3.org/2000/svg';
 const LEFT = 46, RIGHT = 8, TOP = 8, ROW = 56, GAP = 14;  // [px]
 const MOST_DOTS = 200;
 
-function add(parent, tag, values, text) {
+export function add(parent, tag, values, text) {
   const node = document.createElementNS(SVG, tag);
   for (const [name, value] of Object.entries(values)) node.setAttribute(name, value);
   if (text !== undefined) node.textContent = text;

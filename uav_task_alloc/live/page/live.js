@@ -3,12 +3,13 @@
 // It only reads: all requests are GET.
 import {openCard, showUavs} from './cards.js';
 import {drawChart} from './chart.js';
+import {drawGantt} from './gantt.js';
 import {FleetMap} from './map.js';
 import {$, fill, make, pick, put, showAnswer, showEvents, showHead, showLeft, showOrders,
   showPlans}
   from './panels.js';
-import {answer, kindOf, live, ofDay, readModel, seconds, some, span, stamp}
-  from './model.js';
+import {answer, kindOf, live, ofDay, readModel, seconds, some, span, stamp} from './model.js';
+import {finishText, timesOf} from './times.js';
 
 const STALE = 3;     // [s] without an update from the server
 const KEPT = 1000;   // entries of each log, as on the server
@@ -59,6 +60,13 @@ function showChart(model) {
   drawChart($('chart'), model.plans.filter(plan => plan.fit !== null), seconds);
 }
 
+function showTimes(model) {
+  const rows = timesOf(model), at = seconds(model.wall);
+  put($('finish'), finishText(model));
+  drawGantt($('gantt'), rows.map(row => ({...row, bars: row.bars.map(bar => ({...bar,
+    since: seconds(bar.since), until: seconds(bar.until)}))})), at);
+}
+
 function centre(id) {
   const uav = readModel(past).uavs.find(other => other.id === id);
   if (uav && uav.position[0] !== null) map.center(uav.position);
@@ -70,7 +78,9 @@ function show() {
   due = 0;
   showHead(model, past);
   const picked = showAnswer(model);
-  for (const panel of [showPlans, showOrders, showLeft, showEvents, showChart]) panel(model);
+  for (const panel of [showPlans, showOrders, showLeft, showEvents, showChart, showTimes]) {
+    panel(model);
+  }
   showUavs(model, centre);
   showMap(model, picked);
   showState();
