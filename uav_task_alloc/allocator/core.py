@@ -28,7 +28,7 @@ from uav_task_alloc.allocator.replanning.planning import (
     replan_problem,
 )
 from uav_task_alloc.allocator.replanning.predictions import Predictions
-from uav_task_alloc.allocator.replanning.proposal import Approvals, split_plan
+from uav_task_alloc.allocator.replanning.proposal import Approvals, holding_plan, split_plan
 from uav_task_alloc.allocator.replanning.schedule import Schedule
 from uav_task_alloc.allocator.replanning.task_reasons import task_steps
 from uav_task_alloc.allocator.replanning.trips import waiting_uavs
@@ -218,7 +218,8 @@ class Allocator:
         if now - self._learned_saved >= _LEARNED_PERIOD:
             self._learned_saved = now
             self.world.mark_unsaved('learner')
-        chosen = replace(accepted_plan(answer, self.world.params.replan_margin),
+        accepted = accepted_plan(answer, self.world.params.replan_margin)
+        chosen = replace(holding_plan(self.world, (accepted, answer.repaired), stamp),
                          iterations=answer.best.iterations,
                          solve_time=answer.repaired.solve_time + answer.best.solve_time,
                          warm_started=any(answer.problem.published.routes.values()))

@@ -135,3 +135,21 @@ def test_ground_velocities_of_reports_are_measured_in_steady_flight_only():
     assert driver.world.flights.pace('a').ground_speed(1.0, 0.0) == pytest.approx(10.0, abs=0.3)
     driver.uav('b', 0.0, 0.0, 50.0, velocity=(1e6, 0.0, 0.0), active_task='t2')
     assert driver.world.flights.pace('b').speed == 15.0
+
+
+def test_a_uav_that_was_without_a_list_on_a_leg_measures_no_stop():
+    driver = AllocatorDriver()
+    driver.uav('a', 0.0, 0.0, 50.0, cruise_speed=10.0)
+    driver.add(*(at(100 * k) for k in range(1, 4)))
+    driver.settle()
+    driver.now += 10.0
+    driver.event('COMPLETED', 't100', 'a')
+    driver.core.tick(driver.now, driver.now)
+    driver.cancel('t200', 't300')
+    driver.settle(wait=1.0)
+    driver.uav('a', 100.0, 0.0, 50.0, cruise_speed=10.0)
+    driver.add(at(200, 'u'))
+    driver.settle(wait=1.0)
+    driver.now += 15.0
+    driver.event('COMPLETED', 'u200', 'a')
+    assert driver.world.flights.pace('a').stop_time == 0.0

@@ -11,6 +11,8 @@ from uav_task_alloc.allocator.replanning.plan_acceptance import exchange_groups
 from uav_task_alloc.allocator.state.world import World
 from uav_task_alloc.model import Plan, Task
 
+_LEAST, _SHARE = 2.0, 0.05  # [s], and share of the time until then, that a prediction may err
+_ROUNDING = 0.5  # [s] later that is no change
 _REASON = 'left out: it would break the deadline of {} that is accepted'
 
 
@@ -29,37 +31,82 @@ def held_lists(world: World, new: Mapping[str, UavList],
         are in no list for that, by task id. A list that cannot or may not be flown any more keeps
         no deadline.
     """
-    old = {uav_id: world.lists.restamped(uav_id, stamp, world.flights.of(uav_id, stamp))
-           for uav_id in new}
-    kept = {name: uav_id for uav_id, each in old.items() if not world.must_change(uav_id)
-            for name in _in_time(each, world, stamp)}
-    after = {name for each in new.values() for name in _in_time(each, world, stamp)}
-    broken = kept.keys() - after
+    old = lists_from_now(world, new, stamp)
+    kept = {name: (uav_id, start) for uav_id, each in old.items()
+            if not world.must_change(uav_id)
+            for name, start in promised_starts(each, stamp).items() if world.tasks.is_open(name)}
+    after = {stop.task.id: stamp + stop.start for each in new.values() for stop in each.stops}
+    broken = [name for name, (uav_id, start) in kept.items()
+              if after.get(name, math.inf) > max(start + _ROUNDING, _latest(old[uav_id], name))]
     lists, reasons = dict(new), dict[str, str]()
-    if not broken:
-        return lists, reasons
-    for group in exchange_groups({uav_id: each.task_ids for uav_id, each in old.items()},
-                                 {uav_id: each.task_ids for uav_id, each in new.items()}):
-        names = sorted(name for name in broken if kept[name] in group)
-        if not names or any(map(world.must_change, group & kept_uavs(kept, names))):
+    for group in exchange_groups(_routes(old), _routes(new)) if broken else ():
+        names = sorted(name for name in broken if kept[name][0] in group)
+        back = {uav_id for uav_id in group if world.usable(uav_id)}
+        if not names or any(old[uav_id].stops and world.must_change(uav_id) for uav_id in back):
             continue
-        for uav_id in group:
+        for uav_id in back:
             reasons.update((name, _REASON.format(names[0])) for name in new[uav_id].task_ids)
             lists[uav_id] = world.list_of(uav_id)
     listed = {name for each in lists.values() for name in each.task_ids}
     return lists, {name: why for name, why in reasons.items() if name not in listed}
 
 
-def kept_uavs(kept: Mapping[str, str], names: Iterable[str]) -> frozenset[str]:
-    """The UAVs that keep these tasks."""
-    return frozenset(kept[name] for name in names)
+def lists_from_now(world: World, uav_ids: Iterable[str], stamp: float) -> dict[str, UavList]:
+    """Return lists in force with times from now.
+
+    Args:
+        world: with the lists.
+        uav_ids: of UAVs, known or not.
+        stamp: [s] published clock.
+
+    Returns:
+        Lists by UAV.
+    """
+    return {uav_id: world.lists.restamped(uav_id, stamp, world.flights.of(uav_id, stamp))
+            for uav_id in uav_ids}
 
 
-def _in_time(each: UavList, world: World, stamp: float) -> list[str]:
-    """Tasks of a list with a deadline that it keeps."""
-    return [stop.task.id for stop in each.stops
-            if stop.task.latest < math.inf and stamp + stop.start <= stop.task.latest
-            and world.tasks.is_open(stop.task.id)]
+def promised_starts(each: UavList, stamp: float) -> dict[str, float]:
+    """Return when a list starts the tasks whose deadlines it keeps, or may still keep.
+
+    Args:
+        each: with times from now.
+        stamp: [s] published clock.
+
+    Returns:
+        [s] of the ROS clock by task id; a deadline may be kept while it is missed by no more than
+        a prediction can be wrong.
+    """
+    return {stop.task.id: stamp + stop.start for stop in each.stops if stop.task.latest < math.inf
+            and stamp + stop.start <= stop.task.latest + max(_LEAST, _SHARE * stop.start)}
+
+
+def relaxed_tasks(world: World, tasks: Iterable[Task], uav_ids: Iterable[str],
+                  stamp: float) -> tuple[Task, ...]:
+    """Return tasks for the solver, whose speeds are means over all directions.
+
+    Args:
+        world: with the lists in force.
+        tasks: open, in times of the ROS clock.
+        uav_ids: of the UAVs that are planned for.
+        stamp: [s] published clock.
+
+    Returns:
+        The same tasks; one that its list may still keep is late only after that list's start.
+    """
+    starts = {name: start for each in lists_from_now(world, uav_ids, stamp).values()
+              for name, start in promised_starts(each, stamp).items()}
+    return tuple(replace(task, latest=starts[task.id] + _ROUNDING)
+                 if starts.get(task.id, -math.inf) + _ROUNDING > task.latest else task
+                 for task in tasks)
+
+
+def _latest(each: UavList, name: str) -> float:
+    return next(stop.task.latest for stop in each.stops if stop.task.id == name)
+
+
+def _routes(lists: Mapping[str, UavList]) -> dict[str, tuple[str, ...]]:
+    return {uav_id: each.task_ids for uav_id, each in lists.items()}
 
 
 def with_deadlines_held(problem: ReplanProblem, repaired: Plan) -> tuple[Task, ...]:

@@ -5,10 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 
 from uav_task_alloc.allocator.records import LaterTrips, ReplanAnswer, ReplanProblem, UavList
 from uav_task_alloc.allocator.replanning.from_now import counts_time, from_now, objective_of
 from uav_task_alloc.allocator.replanning.held_deadlines import (
+    relaxed_tasks,
     with_deadlines_held,
     with_true_values,
 )
@@ -64,6 +66,7 @@ def replan_problem(world: World, best: Plan, trigger: str, background: bool,
         waiting = waiting_uavs(world, stamp)
         uavs += tuple(uav for uav_id, uav in waiting.items() if not world.usable(uav_id))
         stop_time = world.flights.stop_time
+        tasks = relaxed_tasks(world, tasks, (uav.id for uav in uavs), stamp)
     published = {uav.id: world.list_of(uav.id) for uav in uavs}
     routes = {uav_id: each.task_ids for uav_id, each in published.items()}
     legs = {uav_id: tuple(stop.leg for stop in each.stops) for uav_id, each in published.items()}
@@ -90,11 +93,21 @@ def measured_uav(world: World, uav: Uav) -> Uav:
     record = world.uav_record(uav.id)
     assert record is not None  # it is of the fleet
     at_home = world.flights.at_home_since(uav.id) is not None
-    return replace(uav, cruise_speed=world.flights.pace(uav.id).mean_speed,
+    return replace(uav, cruise_speed=_list_speed(world, uav),
                    position=record.home if at_home else uav.position,
                    aboard=None if at_home or uav.at_base else frozenset(
                        stop.task.id for stop in world.list_of(uav.id).stops
                        if stop.task.payload > 0.0))
+
+
+def _list_speed(world: World, uav: Uav) -> float:
+    """Mean ground speed on the legs of the list in force, else in all directions [m/s]."""
+    pace, points = world.flights.pace(uav.id), [uav.position]
+    for stop in world.list_of(uav.id).stops:
+        points += [*stop.leg.via, stop.task.position]
+    metres = math.fsum(math.dist(a[:2], b[:2]) for a, b in pairwise(points))
+    level = replace(pace, climb=math.inf, descent=math.inf)
+    return metres / level.seconds(points) if metres > 0.0 else pace.mean_speed
 
 
 def solve_problem(plan: Callable[..., Plan], problem: ReplanProblem, params: AllocatorParams,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from uav_task_alloc.allocator.records import Proposal, UavList
@@ -72,6 +72,27 @@ def _held(world: World, built: BuiltLists, stamp: float) -> BuiltLists:
     """The lists without those that would break a deadline that the lists in force keep."""
     lists, why = held_lists(world, built.lists, stamp)
     return replace(built, lists=lists, left_out={**built.left_out, **why})
+
+
+def holding_plan(world: World, plans: Sequence[Plan], stamp: float) -> Plan:
+    """Return the first plan that breaks no deadline which the lists in force keep.
+
+    Args:
+        world: as it is now.
+        plans: in the order of preference.
+        stamp: [s] published clock.
+
+    Returns:
+        The first of all where each breaks one: its lists are held back, see `held_lists`.
+    """
+    if all(math.isinf(record.task.latest) for record in world.tasks.open()):
+        return plans[0]
+    for each in plans:
+        lists = build_lists(world, each, stamp).lists
+        held, _ = held_lists(world, lists, stamp)
+        if all(held[uav_id] is lists[uav_id] for uav_id in lists):
+            return each
+    return plans[0]
 
 
 def present_routes(world: World, lists: Mapping[str, UavList]) -> TaskIdsByUav:

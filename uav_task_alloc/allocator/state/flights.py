@@ -21,7 +21,7 @@ _LEVEL = 0.5  # share of the climb or descent speed above which the vertical set
 AT_HOME = 10.0  # [m] from its home within which a UAV on the ground is at its base
 _AT_STOP = 3.0  # [m] within which a task is reached that has no radius of its own
 _SMOOTHING = 0.3  # weight of a new time lost at a stop
-_LONGEST_STOP = 60.0  # [s] a longer delay is not that of a stop
+_LONGEST_STOP = 20.0  # [s] a longer delay is not that of a stop
 _OWN_STOPS = 3  # stops after which a UAV has a mean of its own
 
 
@@ -79,6 +79,9 @@ class Flights:
             self._landed.pop(report.uav_id, None)
         stops = self._lists.get(report.uav_id).stops
         task = stops[0].task if stops else None
+        leg = self._legs.get(report.uav_id)
+        if leg is not None and (task is None or leg.task != task.id) and stamp > leg.began:
+            del self._legs[report.uav_id]  # it flies elsewhere, or nowhere
         if task is None or math.dist(report.position, task.position) > max(
                 _AT_STOP, task.acceptance_radius or 0.0):
             self._reached.pop(report.uav_id, None)
@@ -112,13 +115,14 @@ class Flights:
                 self._stops.setdefault(uav_id, _Stops()).add(max(0.0, lost))
         stops = self._lists.get(uav_id).stops
         if (uav_id not in self._fleet.records or len(stops) < 2
-                or stops[0].task.id != task_id or stops[1].wait > 0.0):
+                or stops[0].task.id != task_id):
             return
         task, following = stops[0].task, stops[1]
         seconds = self._moving_pace(uav_id).seconds(
             (task.position, *following.leg.via, following.task.position))
-        self._legs[uav_id] = _Leg(following.task.id, stamp,
-                                  seconds + following.task.service_time)
+        if max(following.task.earliest, following.task.release) < stamp + seconds:  # no wait
+            self._legs[uav_id] = _Leg(following.task.id, stamp,
+                                      seconds + following.task.service_time)
 
     def clock_jumped(self) -> None:
         """Drop what was measured across a jump of the published clock."""
