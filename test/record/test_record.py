@@ -216,3 +216,25 @@ def test_the_status_lines_show_the_progress():
     assert line.split() == ['u1', 'standby', '-', '2', 'to', 'fly', 'mission', 'verified',
                             'battery', '50', '%']
     assert 'silent' in fleet_lines(run, now=9.0)[0]
+
+
+def test_a_wait_at_a_task_is_no_second_visit_but_a_second_flight_to_it_is():
+    truth = GroundTruth()
+    for uav, wall, x in (('u1', 1.0, 10.0), ('u1', 31.0, 10.0), ('u1', 40.0, 20.0),
+                         ('u1', 50.0, 10.0), ('u2', 60.0, 20.0), ('u2', 61.0, 20.0)):
+        truth.apply({'uav': uav, 'wall': wall, 'event': 'item_reached', 'x': x, 'y': 0.0,
+                     'z': 5.0})
+    places = {'a': (10.0, 0.0, 5.0), 'b': (20.0, 0.0, 5.0)}
+    assert [r.wall for r in visits(truth, places)['a']] == [1.0, 31.0, 50.0]
+    seen = visits(truth, places, {'a'})
+    assert [r.wall for r in seen['a']] == [1.0, 50.0]
+    assert [r.wall for r in seen['b']] == [40.0, 60.0, 61.0]
+
+
+def test_the_places_of_waits_are_those_of_the_task_and_of_the_stop_before():
+    run = RunState()
+    rows = [{'id': name, 'leg_distance': 1.0, 'via': [], 'eta': 1.0, 'wait': wait, 'finish': 9.0}
+            for name, wait in (('a', 0.0), ('b', 12.0), ('c', 0.0))]
+    run.apply({'kind': 'list', 'wall': 1.0, 'uav': 'u1', 'revision': 1, 'distance': 0.0,
+               'stamp': 1.0, 'tasks': rows})
+    assert run.waited == {'a', 'b'}

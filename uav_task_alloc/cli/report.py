@@ -46,7 +46,8 @@ def summarise(out_dir: str | Path) -> Summary:
 
 def run_summary(state: RunState, truth: GroundTruth) -> Summary:
     """The key figures of a run; a task counts as completed only if a vehicle was there."""
-    reached = visits(truth, {name: task.position for name, task in state.tasks.items()})
+    reached = visits(truth, {name: task.position for name, task in state.tasks.items()},
+                     state.waited)
     fates = {name: fate(name, state, bool(reached[name])) for name in state.tasks}
     names = {kind: sorted(name for name, its_fate in fates.items() if its_fate == kind)
              for kind in ('completed', 'unassigned', 'cancelled', 'lost')}

@@ -57,7 +57,8 @@ def _tracks(figure: MapFigure, state: RunState, truth: GroundTruth,
 
 def _tasks(figure: MapFigure, state: RunState, truth: GroundTruth,
            indices: Mapping[str, int]) -> list[Any]:
-    reached = visits(truth, {name: task.position for name, task in state.tasks.items()})
+    reached = visits(truth, {name: task.position for name, task in state.tasks.items()},
+                     state.waited)
     for name, task in state.tasks.items():
         marker = 'o' if task.wall <= state.start() + _AT_START * state.stretch else 'D'
         if reached[name]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 from pathlib import Path
@@ -112,21 +112,29 @@ def read_run(out_dir: Path) -> tuple[RunState, GroundTruth]:
     return state, read_truth(out_dir, state.simulated)
 
 
-def visits(truth: GroundTruth, tasks: Mapping[str, Point]) -> dict[str, list[Reached]]:
+def visits(truth: GroundTruth, tasks: Mapping[str, Point],
+           waited: Container[str] = ()) -> dict[str, list[Reached]]:
     """The mission items reached at each task.
 
     Args:
         truth: of the run.
         tasks: positions [m] by id.
+        waited: ids of tasks where UAVs may have waited: items that a UAV reaches there one after
+            the other are one visit.
 
     Returns:
         By task id; an item counts for the nearest task, if that is within 1.5 m.
     """
     visited: dict[str, list[Reached]] = {name: [] for name in tasks}
+    last: dict[str, str | None] = {}  # task visited last, by UAV
     for reached in truth.reached:
         nearest = min(tasks, key=lambda name: math.dist(tasks[name], reached.point), default=None)
         if nearest is not None and math.dist(tasks[nearest], reached.point) <= _VISIT_RADIUS:
-            visited[nearest].append(reached)
+            if nearest not in waited or last.get(reached.uav) != nearest:
+                visited[nearest].append(reached)
+            last[reached.uav] = nearest
+        else:
+            last[reached.uav] = None
     return visited
 
 

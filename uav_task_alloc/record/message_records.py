@@ -142,7 +142,13 @@ def statuses_record(msg: _Message) -> RecordBody:
     """
     return {'kind': 'statuses', 'statuses': [
         {'task': row.task_id, 'state': constant_name(_STATES, row.state), 'uav': row.uav_id,
-         'reason': row.reason} for row in msg.statuses]}
+         'reason': row.reason, **_expected(row)} for row in msg.statuses]}
+
+
+def _expected(row: _Message) -> RecordBody:
+    """`expected` start of a service [ROS s], where it is known."""
+    time = from_stamp(row.expected) if hasattr(row, 'expected') else 0.0
+    return {'expected': time} if time > 0.0 else {}
 
 
 def allocation_record(msg: _Message) -> RecordBody:

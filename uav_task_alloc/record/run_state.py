@@ -106,6 +106,7 @@ class RunState:
     routes: tuple[RouteLists, RouteLists] = ({}, {})  # of the newest plan and that before it
     # with the times in which they were in force
     zones: list[ZoneInterval] = field(default_factory=list)
+    waited: set[str] = field(default_factory=set)  # tasks at which a UAV waits for the next
     lists: dict[str, Line] = field(default_factory=dict)  # the newest of each UAV
     legs: dict[tuple[str, str], float] = field(default_factory=dict)  # [m], see on_list
     uavs: dict[str, Line] = field(default_factory=dict)  # the newest state of each
@@ -206,6 +207,10 @@ class RunState:
             service = self.service(line, first)
             if service is not None:
                 self.planned[first['id']] = service
+        rows = line['tasks']
+        for before, row in zip((None, *rows), rows, strict=False):
+            if row.get('wait', 0.0) > 0.0:
+                self.waited |= {row['id']} | ({before['id']} if before else set())
         self.lists[line['uav']] = line
 
     def service(self, line: Line, row: Line) -> Service | None:
