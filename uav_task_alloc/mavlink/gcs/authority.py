@@ -247,7 +247,8 @@ class Authority:
 
     def allows(self, action: SendAction) -> bool:
         """Whether messages of a class may be sent now."""
-        if self.undecided or set(self.suspensions) == {Suspension.FOREIGN}:
+        if self.undecided or (
+                self.suspensions and set(self.suspensions) == {Suspension.FOREIGN}):
             return action is SendAction.READ  # else the end of FOREIGN would not be detected
         return self.state in PERMISSIONS and action in PERMISSIONS[self.state][1]
 

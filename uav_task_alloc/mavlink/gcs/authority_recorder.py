@@ -37,6 +37,7 @@ class AuthorityRecorder:
     ) -> None:
         self._state, self._evidence = state, evidence
         self._save, self._saved = save, record
+        self._fields: tuple[object, ...] = ()  # of the record when it was compared last
         self._mode = record.mode if record else None  # the last mode with a known reason
         self._seen: tuple[float, ...] = ()
         self._seen_at = -math.inf  # vehicle time [s] of the newest of them
@@ -67,14 +68,17 @@ class AuthorityRecorder:
             return
         if state.unexplained is None:  # else a restarted bridge would accept the new mode
             self._mode = state.mode
-        record = AuthorityRecord(
+        fields = (
             authority.state, authority.why, authority.since, authority.killed, authority.landed,
             authority.until_landing, state.flown, self._mode, state.armed,
-            tuple(dict.fromkeys(mode for mode, _ in sent.modes)),
+            tuple(dict.fromkeys(mode for mode, _ in sent.modes)) if sent.modes else (),
             sent.arm_until > -math.inf and not state.armed and authority.held,
             state.replacing_since, sent.climb, tuple(self.marks.values()),
             *self._evidence.mission_position(), self._evidence.uploading(),
             self._last_position())
+        if fields == self._fields:  # as after most messages
+            return
+        self._fields, record = fields, AuthorityRecord(*fields)
         if record != self._saved:
             self._saved = record
             self._save(record)

@@ -264,6 +264,9 @@ class Resume:
     def flown_items(self, now: float) -> tuple[Item, ...]:
         """Flown items that were not reported; none after MAX_AGE."""
         here = self._flown_here()
+        if not here and not self._flown:
+            self._known_reached = 0
+            return ()
         reached = len(self._reached) + len(self._reached_of(here))
         if reached > self._known_reached:
             self._until = now + MAX_AGE

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from typing import NamedTuple
 
 from uav_task_alloc.geometry.polyline import nearest_on_segment, segment_fraction
 from uav_task_alloc.mavlink.mission.items import TaskList
@@ -27,8 +27,7 @@ _OFF_TRACK_PLANE = 300.0  # [m] the same; planes turn wide
 _OFF_ALTITUDE = 30.0  # [m] vertically; not in mission mode, where the autopilot sets the climb
 
 
-@dataclass(frozen=True, slots=True)
-class LegStart:
+class LegStart(NamedTuple):
     """Position and home of a vehicle, for a leg that starts there; ENU [m]."""
 
     point: Point  # [m] ENU
@@ -73,9 +72,11 @@ class FirstLeg:
     @property
     def is_off(self) -> bool:
         """Whether the vehicle is off the first leg, or its start became known: call `begin`."""
-        position, start, end = self.locate(), self._start(), self._target
+        end = self._target
+        position = None if end is None else self.locate()
         if end is None or position is None:
             return False
+        start = self._starts.get(end)
         return start is None or (not position.on_mission and self._is_off(position, start, end))
 
     @property

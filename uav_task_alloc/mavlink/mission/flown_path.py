@@ -46,6 +46,7 @@ class FlownPath:
 
     def __init__(self) -> None:
         self._samples: list[PositionSample] = []
+        self.late = 0  # how many samples came after a newer one
 
     @property
     def newest(self) -> float:
@@ -70,6 +71,7 @@ class FlownPath:
         if not self._samples or sample.t > self._samples[-1].t:
             self._samples.append(sample)
         else:
+            self.late += 1
             at = bisect_left(self._samples, sample.t, key=lambda one: one.t)
             if self._samples[at].t != sample.t:
                 self._samples.insert(at, sample)
@@ -156,11 +158,10 @@ class FlownPath:
         samples = self._since(since, until)
         if len(samples) == 1 and math.dist(samples[0].position, point) <= near:
             return samples[0].t, samples[0].t
-        for a, b in pairwise(samples):
+        away = [math.dist(sample.position, point) for sample in samples]
+        for (a, b), (from_a, from_b) in zip(pairwise(samples), pairwise(away), strict=True):
             gap = b.t - a.t
-            if gap > GAP or b.t < since or min(
-                    math.dist(a.position, point), math.dist(b.position, point)) > (
-                        near + 5.0 + 30.0 * gap):
+            if gap > GAP or b.t < since or min(from_a, from_b) > near + 5.0 + 30.0 * gap:
                 continue
             reach = near + _CURVE * gap * gap
             for k in range(_PIECES + 1):

@@ -36,8 +36,10 @@ class PositionHistory:
         self._invalid_until = -math.inf  # [s] the estimate has jumped
         self._stamps: deque[tuple[int, float]] = deque(maxlen=_STAMPS)  # frame, vehicle time
         self._recorded_at: float | None = None  # vehicle time [s] of one of the previous run
-        # item and since [s] of the last `was_inside`, the newest position then, and its result
-        self._inside: tuple[tuple[Item, float] | None, float, bool] = None, -math.inf, False
+        # item and since [s] of the last `was_inside`, the newest position then, how many had come
+        # late when it was searched, and its result
+        self._inside: tuple[tuple[Item, float] | None, float, int, bool] = (
+            None, -math.inf, 0, False)
         # since when [s], vehicle time less ours [s], by the fastest message until then
         self._clocks: list[tuple[float, float]] = []
 
@@ -80,7 +82,7 @@ class PositionHistory:
         """Drop the path: the vehicle's clock has restarted."""
         self.path.clear()
         self._recorded_at = None
-        self._inside = None, -math.inf, False
+        self._inside = None, -math.inf, 0, False
         self._clocks.clear()
         self._stamps.clear()
 
@@ -118,14 +120,15 @@ class PositionHistory:
 
         Called for the same item again, only the positions since then are searched.
         """
-        known, until, inside = self._inside
+        known, until, late, inside = self._inside
         if known != (item, since):
-            until, inside = since, False
+            until, late, inside = since, self.path.late, False
         if not inside and self.path.newest > until and item.position is not None:
-            inside = self.path.visited(
-                item.position, item.radius, 0.0, max(since, until - MAX_MESSAGE_DELAY),
-                close=0.0) is Visit.YES
-        self._inside = (item, since), self.path.newest, inside
+            back = MAX_MESSAGE_DELAY if self.path.late > late else 0.0
+            inside, late = self.path.visited(
+                item.position, item.radius, 0.0, max(since, until - back),
+                close=0.0) is Visit.YES, self.path.late
+        self._inside = (item, since), self.path.newest, late, inside
         return inside
 
     def not_seen_at(self, item: Item, since: float) -> bool:

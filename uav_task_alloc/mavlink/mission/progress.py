@@ -26,6 +26,8 @@ from uav_task_alloc.mavlink.mission.reached_series import ReachedSeries
 from uav_task_alloc.mavlink.transport.frame_log import FrameLog
 from uav_task_alloc.model import Point, Task
 
+_NONE = frozenset[str]()  # no tasks
+
 
 class ProgressTable:
     """The items on board, the one being flown, and the completed tasks.
@@ -129,13 +131,15 @@ class ProgressTable:
     @property
     def pending(self) -> frozenset[str]:
         """Tasks that may be completed: the evidence may still arrive."""
-        return frozenset(i.task for claim in self._moves.passed.claims for i in claim.items)
+        claims = self._moves.passed.claims
+        return frozenset(i.task for claim in claims for i in claim.items) if claims else _NONE
 
     @property
     def passed_in_order(self) -> frozenset[str]:
         """The pending tasks that were passed one by one, as a mission is flown."""
-        return frozenset(item.task for claim in self._moves.passed.claims if not claim.skips
-                         for item in claim.items)
+        claims = self._moves.passed.claims
+        return frozenset(item.task for claim in claims if not claim.skips
+                         for item in claim.items) if claims else _NONE
 
     def may_end(self, now: float) -> bool:
         """Whether the mission may be at its end, or was when it was just replaced."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from itertools import chain
 
 from uav_task_alloc.errors import MissionError
 from uav_task_alloc.geometry.frames import Origin
@@ -116,10 +117,10 @@ class WantedMission:
     def remaining(self) -> TaskList:
         """The list less completed and refused tasks, up to the horizon."""
         assert self.tasks is not None
-        ended = {*self._progress.completed, *self._progress.pending, *self._refused}
+        ended = tuple(self._progress.completed), self._progress.pending, tuple(self._refused)
         key = self.tasks, ended, self.horizon.stops
         if self._remaining is None or self._remaining[0] != key:
-            tasks = self.tasks.without(ended)
+            tasks = self.tasks.without(chain.from_iterable(ended))
             self._remaining = key, (
                 tasks if self.horizon.stops is None else tasks.first(self.horizon.stops))
         return self._remaining[1]
