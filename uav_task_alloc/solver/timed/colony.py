@@ -19,7 +19,7 @@ from uav_task_alloc.solver.timed.ruin import empty_round
 from uav_task_alloc.solver.timed.search import Incumbent, Rises, anneal, copy_incumbent
 
 LEAST_PRICE, MOST_PRICE = 0.1, 100.0  # of excess, over the first price
-PRICED_ROUNDS = 50.0  # rounds a task from which on passing through excess pays
+PRICED_ROUNDS = 100.0  # rounds a task from which on passing through excess pays
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,6 +28,9 @@ class TimedParams:
 
     start_temperature: float = 10.0
     end_temperature: float = 0.1
+    short_end_temperature: float = 0.3  # the same where there are few rounds
+    restart: float = 1.0  # share of the budget after which the search goes on from its best
+    reheat_temperature: float = 1.0  # then
     ruin: float = 15.0  # tasks that a round removes
     first_price: float = 3.0  # of a second, metre or mean load of excess, in what one costs to fly
     absent: int = 10  # absent tasks that a round tries to insert, besides those it removes
@@ -36,9 +39,12 @@ class TimedParams:
 
 COLD = TimedParams()
 # where many tasks have to be left out: the choice of tasks, more than their order
-SELECTION = TimedParams(start_temperature=30.0, end_temperature=1.3, ruin=10.0,
+SELECTION = TimedParams(start_temperature=30.0, end_temperature=1.3,
+                        short_end_temperature=1.3, restart=0.6,
+                        reheat_temperature=3.0, ruin=10.0,
                         first_price=math.inf)
-WARM = TimedParams(start_temperature=0.3, end_temperature=0.02, first_price=math.inf)
+WARM = TimedParams(start_temperature=0.3, end_temperature=0.02,
+                   short_end_temperature=0.02, first_price=math.inf)
 
 
 class TimedColony:
@@ -60,6 +66,7 @@ class TimedColony:
         self._goal, self._decided = problem.base.rules.objective, False
         self.routes = empty_timed_routes(self.arrays)
         set_order(self.arrays, self.routes, start.order)
+        self._restarted, self._end_temperature = False, params.end_temperature
         self._round, self._rng = empty_round(self.arrays), rng_state(seed)
         growth = 1.0 if problem.prizes else params.unserved_growth
         self._rises = Rises(np.full(4, math.inf), np.full(4, math.inf), growth,
@@ -78,9 +85,12 @@ class TimedColony:
 
     def _temperature(self, spent: float) -> float:
         """Temperature in cost after this share of the budget."""
-        p = self._params
-        return float(self._scale * p.start_temperature
-                     * (p.end_temperature / p.start_temperature) ** spent)
+        p, first, share = self._params, self._params.start_temperature, spent
+        if self._restarted:
+            first, share = p.reheat_temperature, (spent - p.restart) / (1.0 - p.restart)
+        elif p.restart < 1.0:
+            share = min(1.0, spent / p.restart)
+        return float(self._scale * first * (self._end_temperature / first) ** share)
 
     def fly(self, spent: float, until: float, rounds: int) -> int:
         """Run rounds of search.
@@ -98,6 +108,11 @@ class TimedColony:
             tasks = self.arrays.ends - self.arrays.uavs
             if rounds / (until - spent) >= PRICED_ROUNDS * tasks:
                 self._allow_excess()
+            else:
+                self._end_temperature = self._params.short_end_temperature
+        if spent >= self._params.restart and not self._restarted:
+            self._restarted = True
+            set_order(self.arrays, self.routes, self.best.order)
         anneal(self.arrays, self.routes, self._round, self.best, self._rises,
                self._params.ruin, self._temperature(spent), self._temperature(until), rounds,
                self._rng)
