@@ -128,7 +128,7 @@ def test_a_long_search_passes_through_excess_and_its_best_has_none():
     colony = TimedColony(problem, first_plan(problem, WarmState()), 3, COLD)
     excess, scores = set(), []
     for share in np.arange(0.0, 0.6, 0.01):
-        colony.fly(share, share + 0.01, 50)
+        colony.fly(share, share + 0.01, 100)
         excess.add(bool(colony.routes.counts[at.INFEASIBLE] > 0))
         scores.append(colony.best.score.copy())
     fresh = empty_timed_routes(problem.arrays)
@@ -146,3 +146,16 @@ def test_of_two_tasks_the_one_announced_later_is_served_where_only_one_can_be():
     result = plan([Uav('u', (10.0, 0.0, 0.0), cruise_speed=10.0, range=90.5)], tasks, seed=1,
                   objective=goal, max_iterations=300, budget=60.0)
     assert result.unassigned.keys() == {'old', 'far'}
+
+
+def test_a_search_through_excess_that_finds_nothing_better_goes_on_without():
+    fleet, work = mixed_problem(11)
+    problem = make_timed(make_problem(fleet, work, {}, Limits(), Rules(returns=True)), {})
+    start = first_plan(problem, WarmState())
+    colony = TimedColony(problem, start, 3, COLD)
+    colony.best.score[:] = -1.0, math.inf  # nothing is better
+    for share in np.arange(0.0, 0.9, 0.01):
+        colony.fly(share, share + 0.01, 200)
+        allowed = bool(np.isfinite(colony.arrays.price).any())
+        assert allowed == (0.02 <= share < 0.595), share
+    assert colony.routes.counts[at.INFEASIBLE] == 0

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -19,7 +19,9 @@ from uav_task_alloc.solver.timed.ruin import empty_round
 from uav_task_alloc.solver.timed.search import Incumbent, Rises, anneal, copy_incumbent
 
 LEAST_PRICE, MOST_PRICE = 0.1, 100.0  # of excess, over the first price
-PRICED_ROUNDS = 100.0  # rounds a task from which on passing through excess pays
+DECISION = 0.02  # share of the budget after which the rounds in all are estimated
+GIVING_UP = 0.6  # share after which a search through excess ends that found nothing better
+PRICED_ROUNDS = 200.0  # rounds a task from which on passing through excess pays
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,6 +68,8 @@ class TimedColony:
         self._goal, self._decided = problem.base.rules.objective, False
         self.routes = empty_timed_routes(self.arrays)
         set_order(self.arrays, self.routes, start.order)
+        self._price, self._flown = arrays.price, 0
+        self._gains = 1  # improvements, from when on excess is allowed
         self._restarted, self._end_temperature = False, params.end_temperature
         self._round, self._rng = empty_round(self.arrays), rng_state(seed)
         growth = 1.0 if problem.prizes else params.unserved_growth
@@ -82,6 +86,13 @@ class TimedColony:
         first[~np.isinf(a.price)] = math.inf  # excess that is allowed keeps its own price
         np.copyto(a.price, first, where=np.isfinite(first))
         self._rises = self._rises._replace(least=LEAST_PRICE * first, most=MOST_PRICE * first)
+        self._gains = 0
+
+    def _forbid_excess(self) -> None:
+        """Go on from the best without excess: windows may be too tight for it."""
+        np.copyto(self.arrays.price, self._price)
+        self._rises = self._rises._replace(least=np.full(4, math.inf), most=np.full(4, math.inf))
+        self._params, self._gains = replace(self._params, restart=GIVING_UP), 1
 
     def _temperature(self, spent: float) -> float:
         """Temperature in cost after this share of the budget."""
@@ -103,17 +114,21 @@ class TimedColony:
         Returns:
             That number.
         """
-        if not self._decided and until > spent:
+        if not self._decided and spent >= DECISION:
             self._decided = True
             tasks = self.arrays.ends - self.arrays.uavs
-            if rounds / (until - spent) >= PRICED_ROUNDS * tasks:
+            if (self._flown / spent >= PRICED_ROUNDS * tasks
+                    and math.isfinite(self._params.first_price)):
                 self._allow_excess()
             else:
                 self._end_temperature = self._params.short_end_temperature
+        if self._gains == 0 and spent >= GIVING_UP:
+            self._forbid_excess()
         if spent >= self._params.restart and not self._restarted:
             self._restarted = True
             set_order(self.arrays, self.routes, self.best.order)
-        anneal(self.arrays, self.routes, self._round, self.best, self._rises,
-               self._params.ruin, self._temperature(spent), self._temperature(until), rounds,
-               self._rng)
+        self._gains += anneal(self.arrays, self.routes, self._round, self.best, self._rises,
+                              self._params.ruin, self._temperature(spent),
+                              self._temperature(until), rounds, self._rng)
+        self._flown += rounds
         return rounds

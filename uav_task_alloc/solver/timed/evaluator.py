@@ -282,8 +282,8 @@ def _holders(uavs: Sequence[Uav], tasks: Sequence[Task], held: Held) -> dict[str
     known, found = {task.id: task for task in tasks}, dict[str, list[Uav]]()
     for uav in (uav for uav in uavs if not uav.at_base):
         names = {*held.locked.get(uav.id, ()), *held.aboard.get(uav.id, uav.aboard or ())}
-        for name in names & known.keys():
-            if held.has_aboard(uav, known[name]):
+        for name in names:
+            if name in known and held.has_aboard(uav, known[name]):
                 found.setdefault(name, []).append(uav)
     return found
 

@@ -155,16 +155,16 @@ def _fixed(problem: Problem, visits: int, aboard: Mapping[str, frozenset[str]]) 
         task for held in problem.locked.values() for task in held)))
     hard = math.isinf(goal.lateness)
     loaded = {name for names in aboard.values() for name in names}
-    for row, task in zip(rows, tasks, strict=True):
-        row[at.SERVICE], row[at.OPENS] = task.service_time, task.earliest
-        row[at.CLOSES if hard else at.DUE] = task.latest
-        release = task.release if task.release > 0.0 else -math.inf
-        whole_trip = task.payload > 0.0 and task.id not in loaded
-        row[at.TRIP_RELEASE if whole_trip else at.RELEASE] = release
-        row[at.LOAD] = task.payload
-        row[at.WEIGHT], row[at.WORTH] = goal.response * task.value / total, task.value
-        row[at.ANNOUNCED] = task.announced
-        row[at.WIDTH] = min(task.latest, 1e9) - max(task.earliest, -1e9)
+    values = np.array([(task.service_time, task.earliest, task.latest, task.payload, task.value,
+                        task.announced, task.release) for task in tasks]).reshape(-1, 7)
+    latest = at.CLOSES if hard else at.DUE
+    rows[:, [at.SERVICE, at.OPENS, latest, at.LOAD, at.WORTH, at.ANNOUNCED]] = values[:, :6]
+    rows[:, at.WEIGHT] = goal.response * rows[:, at.WORTH] / total
+    rows[:, at.WIDTH] = np.minimum(values[:, 2], 1e9) - np.maximum(values[:, 1], -1e9)
+    release = np.where(values[:, 6] > 0.0, values[:, 6], -math.inf)
+    whole_trip = np.array([task.payload > 0.0 and task.id not in loaded for task in tasks], bool)
+    rows[whole_trip, at.TRIP_RELEASE] = release[whole_trip]
+    rows[~whole_trip, at.RELEASE] = release[~whole_trip]
     until = np.array([uav.available_until for uav in uavs])
     fixed[m + n:2 * m + n, at.CLOSES] = until
     fixed[2 * m + n:, at.CLOSES] = np.repeat(until, visits)

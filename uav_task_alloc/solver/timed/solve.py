@@ -6,6 +6,7 @@ import functools
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from itertools import chain
 
 from uav_task_alloc.kernel_cache import (
     NO_WORK,
@@ -64,7 +65,7 @@ def solve_timed(uavs: Sequence[Uav], tasks: Sequence[Task],
     search = PathPreparation(clock, began, budget, stop, before.flown())
     known = before.problem
     base = make_problem(uavs, tasks, locked, limits, rules, known, search)
-    problem = make_timed(base, _aboard(uavs, base.locked, before), before.timed)
+    problem = make_timed(base, _aboard(uavs, tasks, base.locked, before), before.timed)
     recorder = TimedRecorder(clock, began, budget, max_iterations, stop, threads,
                              warm is not None, on_iteration, problem=problem)
     search.begin(1.0, SEARCH_LIMIT)
@@ -109,12 +110,13 @@ def _rank(problem: TimedProblem, found: Plan) -> tuple[float, float]:
     return 0.0 if problem.prizes else -found.value, found.cost
 
 
-def _aboard(uavs: Sequence[Uav], locked: Mapping[str, tuple[Task, ...]],
+def _aboard(uavs: Sequence[Uav], tasks: Sequence[Task], locked: Mapping[str, tuple[Task, ...]],
             before: WarmState) -> dict[str, frozenset[str]]:
     """Ids of the tasks whose payload UAVs in the air have on board, by UAV id."""
     found = {}
+    loaded = any(task.payload > 0.0 for task in (*tasks, *chain.from_iterable(locked.values())))
     for uav in uavs:
-        if not uav.at_base:
+        if loaded and not uav.at_base:
             names = uav.aboard
             if names is None:
                 held = frozenset(task.id for task in locked.get(uav.id, ()))
