@@ -6,6 +6,7 @@ from launch_ros.substitutions import FindPackageShare
 from launch import LaunchDescription
 from uav_task_alloc.nodes.ros.launch_arguments import (
     BRIDGE_SIGTERM_TIMEOUT,
+    TILE_ARGUMENTS,
     RespawnedNode,
     argument,
     declared,
@@ -16,6 +17,7 @@ from uav_task_alloc.nodes.ros.launch_arguments import (
     record_file,
     refuse_unknown,
     rviz_action,
+    tile_parameters,
 )
 from uav_task_alloc.nodes.ros.udp_ports import free_port
 from uav_task_alloc.scenario import load, simulation_parameters
@@ -27,6 +29,7 @@ ARGUMENTS = {
                 'says.'),
     'rviz': ('false', 'true: start RViz, too.'),
     'record': ('', 'MCAP file to record all topics into; it must not exist. Empty: none.'),
+    **TILE_ARGUMENTS,
     'bridge_state_dir': ('', 'Folder in which the bridge stores across restarts which vehicles '
                          'it has authority over; empty: not stored.'),
 }
@@ -56,6 +59,7 @@ def start(context: object) -> list:
                        sigterm_timeout=BRIDGE_SIGTERM_TIMEOUT).start(),
         node_action('fleet_sim', parameters['fleet_sim']),
         node_action('scenario_player', parameters['scenario_player']),
-        node_action('live_view', parameters['live_view'], {'record': record, 'stay': True}),
+        node_action('live_view', parameters['live_view'],
+                    {'record': record, 'stay': True, **tile_parameters(context)}),
         *viewers,
     ]

@@ -6,6 +6,7 @@ from launch_ros.substitutions import FindPackageShare
 from launch import LaunchDescription
 from uav_task_alloc.nodes.ros.launch_arguments import (
     BRIDGE_SIGTERM_TIMEOUT,
+    TILE_ARGUMENTS,
     RespawnedNode,
     argument,
     declared,
@@ -16,6 +17,7 @@ from uav_task_alloc.nodes.ros.launch_arguments import (
     record_file,
     refuse_unknown,
     rviz_action,
+    tile_parameters,
 )
 from uav_task_alloc.params import PlayerParams
 from uav_task_alloc.scenario import fleet_parameters, load
@@ -35,6 +37,7 @@ ARGUMENTS = {
     'rviz': ('false', 'true: start RViz, too.'),
     'record': ('', 'MCAP file to record all topics into, by a live view; it must not exist. '
                'Empty: none.'),
+    **TILE_ARGUMENTS,
     'bridge_state_dir': ('', 'Folder in which the bridge stores across restarts which vehicles '
                          'it has authority over; empty: as in bridge_params.'),
 }
@@ -61,9 +64,11 @@ def start(context: object) -> list:
     record, speedup = record_file(context), optional_number(context, 'speedup')
     if speedup is not None:
         speedup = PlayerParams(speedup=speedup).speedup
-    if record:
+    tiles = tile_parameters(context)
+    if record or tiles:
         viewers.insert(0, node_action('live_view', {
-            'record': record, **clock, **({'scenario': path, 'stay': True} if path else {}),
+            'record': record, **tiles, **clock,
+            **({'scenario': path, 'stay': True} if path else {}),
             **({} if speedup is None else {'speedup': speedup})}, namespace=namespace))
     return [
         *RespawnedNode('allocator', files[0], {**parameters['allocator'], **clock},

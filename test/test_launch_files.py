@@ -118,6 +118,14 @@ def test_the_live_view_of_a_fleet_has_the_scenario_and_the_speedup(
     assert view.get('speedup') == speedup  # otherwise it is measured
 
 
+@pytest.mark.parametrize('name', ['demo', 'fleet'])
+def test_map_tiles_reach_the_live_view(name, tmp_path):
+    (tmp_path / '7').mkdir()
+    view = values(started(name, tiles=str(tmp_path), tiles_attribution='© us')['live_view'])
+    assert (view['tiles'], view['tiles_attribution']) == (str(tmp_path), '© us')
+    assert not view['record']
+
+
 def test_a_demo_lives_by_the_clock_of_its_simulated_fleet():
     nodes = {name: values(words) for name, words in started('demo').items()}
     assert {name for name, given in nodes.items() if given.get('use_sim_time')} == {
@@ -200,6 +208,8 @@ def test_rviz_comes_with_the_nodes_when_it_is_asked_for(name, monkeypatch):
     ('fleet', {'bridge_params': str(ROOT / 'README.md')}, 'expected a parameter file'),
     ('demo', {'record': '/none/x.mcap'}, 'record:=/none/x.mcap: expected a file that does'),
     ('fleet', {'record': str(ROOT / 'README.md')}, 'expected a file that does not exist'),
+    ('demo', {'tiles': '/none'}, "tiles = '/none': expected a folder"),
+    ('fleet', {'tiles': '/none'}, "tiles = '/none': expected a folder"),
 ])
 def test_finding_36_nothing_is_started_before_all_arguments_are_valid(
         name, given, refusal, monkeypatch):

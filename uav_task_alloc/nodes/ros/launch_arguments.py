@@ -25,12 +25,19 @@ from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
 from launch_ros.substitutions import ExecutableInPackage, FindPackageShare
 
+from uav_task_alloc.live.tiles import tile_source
 from uav_task_alloc.nodes.ros.parameter_files import ParameterFileError, read_sections
 from uav_task_alloc.nodes.ros.restart_policy import RestartPolicy, RestartVerdict
 from uav_task_alloc.scenario.node_parameters import Value
 
 _PACKAGE = 'uav_task_alloc'
 ArgumentTable = Mapping[str, tuple[Any, str]]  # default and description, by name
+TILE_ARGUMENTS = {
+    'tiles': ('', 'Map tiles under the fleet on the page of a live view, which starts with them: '
+              'a folder with {z}/{x}/{y}.png in it, or a URL with {z}, {x} and {y}; empty: '
+              'none.'),
+    'tiles_attribution': ('', 'Text that the provider of the tiles wants shown.'),
+}
 # [s] from SIGINT to SIGTERM; the bridge completes a running upload first
 BRIDGE_SIGTERM_TIMEOUT = '15'
 
@@ -163,6 +170,19 @@ def record_file(context: Any) -> str:
         raise ValueError(f'record:={path}: expected a file that does not exist, in a folder that '
                          'does')
     return path
+
+
+def tile_parameters(context: Any) -> dict[str, Value]:
+    """The arguments of TILE_ARGUMENTS as parameters of the live view.
+
+    Returns:
+        Nothing where `tiles` is empty.
+
+    Raises:
+        InvalidValue: they name no tiles.
+    """
+    found = {name: argument(context, name) for name in TILE_ARGUMENTS}
+    return {**found} if tile_source(found['tiles'], found['tiles_attribution']) else {}
 
 
 def rviz_action(context: Any, namespace: str = '',
