@@ -80,6 +80,7 @@ class AllocatorDriver:
     def __init__(self, saved=None, plan=greedy, **params):
         params.setdefault('background_budget', 0.0)
         params.setdefault('route_end', 'hold')
+        params.setdefault('objective', 'distance')
         params.setdefault('list_interval', 0.0)
         self.now, self.plan, self.solves = 1000.0, plan, []
         self.core = Allocator(AllocatorParams(**params), self.now, saved)

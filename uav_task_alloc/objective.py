@@ -132,7 +132,7 @@ OBJECTIVES: Mapping[str, Objective] = {  # the small distances decide between eq
     'distance': Objective(),
     'finish': Objective(distance=1e-3, finish=1.0),
     'response': Objective(distance=1e-4, response=1.0),
-    'balanced': Objective(distance=1e-2, finish=1.0, response=1.0),
+    'balanced': Objective(distance=0.1, finish=1.0, response=1.0),
 }
 
 

@@ -145,7 +145,7 @@ class AllocatorParams(FrameParams):
                                        low=0.1, high=1000.0, unit='m/s')
     default_descent_speed: float = param(1.5, 'Descent speed of a UAV that does not report its '
                                          'own.', low=0.1, high=1000.0, unit='m/s')
-    objective: str = param('distance', 'What a plan minimises, see docs/times.md.',
+    objective: str = param('balanced', 'What a plan minimises, see docs/times.md.',
                            choices=('distance', 'finish', 'response', 'balanced'))
     objective_weights: tuple[float, ...] = param(
         (), 'Prices of distance, finish, response, lateness and tasks left out that replace '
