@@ -115,7 +115,8 @@ class AllocatorDriver:
         answer = desk.open(request, self.now, self.now)
         if isinstance(answer, OrderTrial):
             answer = desk.close(answer, solve_what_if(
-                self.plan, answer.problem, self.world.params, lambda: False), self.now, self.now)
+                self.plan, answer.problem, self.world.params, lambda: False, lambda: 0.0),
+                self.now, self.now)
         return answer
 
     def begin(self):

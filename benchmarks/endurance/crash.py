@@ -176,11 +176,13 @@ class World:
 class Process:
     """The allocator process, which is killed and restarted."""
 
-    def __init__(self, folder: str) -> None:
+    def __init__(self, folder: str, more: tuple[str, ...] = ()) -> None:
         path = Path(get_package_prefix('uav_task_alloc'), 'lib/uav_task_alloc/allocator')
         self._command = [str(path), '--ros-args']
         for name, value in (('state_dir', folder), ('uav_timeout', 3.0), ('solve_budget', 0.05)):
             self._command += ['-p', f'{name}:={value}']
+        self._command += more
+        self.folder = folder  # of the journal
         self.log = Path(folder, 'allocator.log')
         self._popen: subprocess.Popen[bytes] | None = None
 

@@ -124,21 +124,35 @@ def solve_problem(plan: Callable[..., Plan], problem: ReplanProblem, params: All
         Both plans; the best is the repaired one where nothing better was found.
     """
     problem = from_now(problem)
-
-    def call(warm: Plan, max_iterations: int | None, tasks: Sequence[Task]) -> Plan:
-        return plan(problem.uavs, tasks, problem.zones, budget=problem.budget,
-                    seed=params.seed, warm=warm, route_end=params.route_end,
-                    locked=problem.locked, clearance=params.clearance,
-                    altitude_min=params.altitude_min, altitude_max=params.altitude_max,
-                    threads=params.threads, objective=problem.objective, stop=stop,
-                    trips=problem.trips, max_iterations=max_iterations)
-
-    repaired = call(problem.published, 0, problem.tasks)
+    repaired = _solved(plan, problem, params, stop, problem.published, 0, problem.tasks)
     tasks = with_deadlines_held(problem, repaired)
-    best = call(problem.warm if problem.background else repaired, None, tasks)
+    best = _solved(plan, problem, params, stop,
+                   problem.warm if problem.background else repaired, None, tasks)
     if tasks is not problem.tasks:
         best = with_true_values(best, problem.tasks)
     return ReplanAnswer(problem, repaired, best)
+
+
+def repaired_plan(plan: Callable[..., Plan], problem: ReplanProblem, params: AllocatorParams,
+                  stop: Callable[[], bool]) -> Plan:
+    """Return the published lists, repaired by insertion, without a search.
+
+    Args:
+        plan, problem, params, stop: as of `solve_problem`.
+    """
+    problem = from_now(problem)
+    return _solved(plan, problem, params, stop, problem.published, 0, problem.tasks)
+
+
+def _solved(plan: Callable[..., Plan], problem: ReplanProblem, params: AllocatorParams,
+            stop: Callable[[], bool], warm: Plan, max_iterations: int | None,
+            tasks: Sequence[Task]) -> Plan:
+    return plan(problem.uavs, tasks, problem.zones, budget=problem.budget,
+                seed=params.seed, warm=warm, route_end=params.route_end,
+                locked=problem.locked, clearance=params.clearance,
+                altitude_min=params.altitude_min, altitude_max=params.altitude_max,
+                threads=params.threads, objective=problem.objective, stop=stop,
+                trips=problem.trips, max_iterations=max_iterations)
 
 
 def build_lists(world: World, chosen: Plan, stamp: float) -> BuiltLists:

@@ -12,11 +12,18 @@ from dataclasses import dataclass, field, replace
 from uav_task_alloc.allocator.order_records import Order
 from uav_task_alloc.allocator.records import ReplanProblem
 from uav_task_alloc.allocator.replanning.plan_acceptance import accepted_plan
-from uav_task_alloc.allocator.replanning.planning import replan_problem, solve_problem
+from uav_task_alloc.allocator.replanning.planning import (
+    repaired_plan,
+    replan_problem,
+    solve_problem,
+)
 from uav_task_alloc.allocator.state.ordered_tasks import TaskSequence
 from uav_task_alloc.allocator.state.world import World
 from uav_task_alloc.model import Plan
 from uav_task_alloc.params import AllocatorParams
+
+_REPAIRS = 3.0  # times that lists are repaired and legs are searched for: before, with it, search
+_LEAST = 0.2  # share of the budget that a search gets at least
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,22 +75,27 @@ def what_if_problem(world: World, change: OrderChange, stamp: float) -> WhatIfPr
 
 
 def solve_what_if(plan: Callable[..., Plan], problem: WhatIfProblem, params: AllocatorParams,
-                  stop: Callable[[], bool]) -> WhatIfAnswer:
+                  stop: Callable[[], bool], clock: Callable[[], float]) -> WhatIfAnswer:
     """Solve the problem of a change of orders within the budget of a re-plan.
+
+    What it takes to repair the lists, without the change and with it, is part of the budget.
 
     Args:
         plan: `solver.solve.plan`, or a function like it.
         problem: see `what_if_problem`.
         params: of the allocator.
         stop: polled; the search ends early when it returns true.
+        clock: [s], monotonic.
 
     Returns:
         What it costs, against the lists in force.
     """
-    nothing = replace(problem.before, budget=0.0)
-    before = solve_problem(plan, nothing, params, stop).repaired
-    after = accepted_plan(solve_problem(plan, problem.after, params, stop),
-                          params.replan_margin)
+    began = clock()
+    before = repaired_plan(plan, problem.before, params, stop)
+    rest = problem.after.budget - _REPAIRS * (clock() - began)
+    after = accepted_plan(solve_problem(plan, replace(
+        problem.after, budget=max(rest, _LEAST * problem.after.budget)), params, stop),
+        params.replan_margin)
     times, then = before.timetable(), after.timetable()
     # a deadline that is missed is in `late`, or its task in no route
     timed = {task.id for task in problem.after.tasks if task.latest < math.inf}

@@ -152,7 +152,8 @@ class OrderServices:
             from uav_task_alloc.solver.solve import plan
             answer = None
             try:
-                answer = solve_what_if(plan, trial.problem, params, lambda: self._closing)
+                answer = solve_what_if(plan, trial.problem, params, lambda: self._closing,
+                                       time.monotonic)
             except Exception as error:
                 self._node.get_logger().error(f'dry run: {type(error).__name__}: {error}')
             done.set_result(answer)
