@@ -103,7 +103,7 @@ setup(
         ('share/' + NAME + '/config/scenarios', glob('config/scenarios/*.yaml')),
     ],
     python_requires='>=3.10,<3.15',
-    install_requires=['numpy', 'numba', 'pymap3d', 'pymavlink', 'pyyaml', 'scipy'],
+    install_requires=['numpy', 'numba>=0.57', 'pymap3d', 'pymavlink', 'pyyaml', 'scipy'],
     extras_require={'plot': ['matplotlib'],
                     'study': ['distributed', 'ortools', 'pyvrp'],
                     'site': ['myst-parser', 'sphinx'],

@@ -35,6 +35,7 @@ LEVELS = {
     'journal': 1,
     'kernel_cache': 1,
     'kernel': 1,
+    'kernel_inner': 1,
     'zone_codec': 1,
     'geometry.polygon': 0,  # `checks` checks polygons with it
     'geometry': 2,

@@ -12,9 +12,11 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
+from numba.core.codegen import JITCodeLibrary
 
 import uav_task_alloc
 from uav_task_alloc.kernel_cache import CompilationNotice, Work, kernel_sources, sources_hash
+from uav_task_alloc.kernel_inner import replaces_known_methods
 
 PACKAGE = Path(uav_task_alloc.__file__).parent
 INNER = {'inline_kernel', 'inner_kernel', 'inner_allocating_kernel'}
@@ -79,6 +81,31 @@ def test_a_kernel_is_compiled_again_when_a_callee_in_another_file_was_edited(pac
     assert output(package) == ('6.0', True)
     (package / 'solver/callee.py').write_text(CALLEE)
     assert output(package) == ('2.0', False)  # the earlier folder is kept for a while
+
+
+@pytest.mark.parametrize(('missing', 'on_disk'), [
+    ('codegen.JITCodeLibrary', True), ('typed_passes.NativeLowering', True),
+    ('caching.InTreeCacheLocator', False), ('caching.CacheImpl', False)])
+def test_without_a_private_class_of_numba_kernels_are_compiled_as_numba_does(
+        package, missing, on_disk):
+    module, name = missing.split('.')
+    hide = (f'from numba.core import {module}; import numba; del {module}.{name}; '
+            f'from uav_task_alloc import kernel; print(kernel._inner_options(), kernel.ON_DISK); ')
+    if on_disk:
+        assert output(package, hide + CALL) == ('{} True\n2.0', True)
+        assert output(package, hide + CALL) == ('{} True\n2.0', False)
+    else:
+        printed, errors = start(package, hide + CALL).communicate(timeout=60.0)
+        assert printed.endswith(' False\n2.0\n')
+        assert 'at each start: the cache of this numba is not known' in errors
+
+
+def test_methods_with_other_arguments_are_not_replaced():
+    changed = type('Changed', (JITCodeLibrary,), {
+        'get_pointer_to_function': lambda self, name, engine: 0})
+    assert replaces_known_methods()
+    assert not replaces_known_methods(library=changed)
+    assert not replaces_known_methods(lowering=object)
 
 
 def test_folders_of_other_sources_are_removed_when_a_kernel_is_written(package):

@@ -18,75 +18,14 @@ from typing import Any, TypeVar
 
 import numba
 from numba import types
-from numba.core.codegen import JITCodeLibrary
-from numba.core.compiler import CompilerBase, DefaultPassBuilder
-from numba.core.compiler_machinery import register_pass
 from numba.core.registry import CPUDispatcher
-from numba.core.typed_passes import NativeLowering
 
-from uav_task_alloc.kernel_cache import install
+from uav_task_alloc.kernel_cache import ON_DISK, install
 
 NJIT: Any = numba.njit  # its stubs do not know all options
-_register_pass: Any = register_pass  # without types
 _Function = TypeVar('_Function', bound=Callable[..., Any])
 
 install()
-
-
-class _NoEnvironments:
-    """A code generator whose code is not run, so its Python objects are not stored."""
-
-    def set_env(self, name: str, environment: object) -> None:
-        """Do nothing."""
-
-
-class _InnerLibrary(JITCodeLibrary):
-    """Code that is optimised, and made machine code, only within the kernels that it is linked to.
-
-    Optimising it before as well takes a tenth of a compilation.
-    """
-
-    @property
-    def codegen(self) -> Any:
-        """What the code is run by."""
-        return _NoEnvironments()
-
-    def get_pointer_to_function(self, name: str) -> int:
-        """No address."""
-        return 0
-
-    def _optimize_final_module(self) -> None:
-        """The caller's code is optimised with it."""
-
-    def _finalize_final_module(self) -> None:
-        self._finalized = True
-
-
-@_register_pass(mutates_CFG=True, analysis_only=False)
-class _InnerLowering(NativeLowering):
-    """Makes an _InnerLibrary."""
-
-    _name = 'native_lowering_inner'
-
-    def run_pass(self, state: Any) -> bool:
-        """Lower a kernel for kernels."""
-        kind: Any = _InnerLibrary
-        state.library = kind(state.targetctx.codegen(), state.func_id.func_qualname)
-        state.library.enable_object_caching()
-        return bool(super().run_pass(state))  # type: ignore[no-untyped-call]
-
-
-class _InnerCompiler(CompilerBase):
-    """Compiles kernels for kernels."""
-
-    def define_pipelines(self) -> list[Any]:
-        """The passes of numba's own compiler, with the other lowering."""
-        builder: Any = DefaultPassBuilder
-        passes: Any = builder.define_nopython_pipeline(self.state)
-        passes.passes[:] = [(_InnerLowering if each is NativeLowering else each, text)
-                            for each, text in passes.passes]
-        passes.finalize()
-        return [passes]
 
 
 class _Kernel(CPUDispatcher):
@@ -109,7 +48,7 @@ class _InnerKernel(_Kernel):
         function.__qualname__ = f'{self.py_func.__qualname__}.from_python'  # its name on disk
         options = {**self.targetoptions, 'no_cpython_wrapper': False, 'forceinline': False}
         options.pop('nopython')
-        return NJIT(cache=True, **options)(function)
+        return NJIT(cache=ON_DISK, **options)(function)
 
     def __call__(self, *args: Any) -> Any:
         return self.from_python(*args)
@@ -124,7 +63,7 @@ def kernel(function: _Function) -> _Function:
     Returns:
         The compiled function; releases the GIL, is cached on disk.
     """
-    return _compiled(_Kernel, function, cache=True, _nrt=False)
+    return _compiled(_Kernel, function, cache=ON_DISK, _nrt=False)
 
 
 def allocating_kernel(function: _Function) -> _Function:
@@ -136,7 +75,7 @@ def allocating_kernel(function: _Function) -> _Function:
     Returns:
         The compiled function; releases the GIL, is cached on disk.
     """
-    return _compiled(_Kernel, function, cache=True)
+    return _compiled(_Kernel, function, cache=ON_DISK)
 
 
 def inner_kernel(function: _Function) -> _Function:
@@ -175,10 +114,20 @@ def inline_kernel(function: _Function) -> _Function:
     return _compiled(_InnerKernel, function, _nrt=False, forceinline=True)
 
 
+@functools.cache
+def _inner_options() -> dict[str, Any]:
+    """What makes numba optimise kernels for kernels only where they are linked."""
+    try:
+        from uav_task_alloc.kernel_inner import InnerCompiler, replaces_known_methods
+    except (ImportError, AttributeError):  # of another version; the kernels are the same without
+        return {}
+    return {'pipeline_class': InnerCompiler} if replaces_known_methods() else {}
+
+
 def _compiled(kind: type[_Kernel], function: _Function, **options: Any) -> _Function:
     """What compiles a function when it is first called."""
     if kind is _InnerKernel:
-        options['pipeline_class'] = _InnerCompiler
+        options |= _inner_options()
     compiled: Any = NJIT(nogil=True, no_cfunc_wrapper=True,
                          no_cpython_wrapper=kind is _InnerKernel, **options)(function)
     compiled.__class__ = kind

@@ -25,6 +25,19 @@ from numba.core import caching, event
 ROOMS = ('geometry', 'solver')
 
 
+def _of_numba(name: str) -> Any:
+    """A class of numba, which had an underscore before its name up to some version."""
+    return getattr(caching, name, None) or getattr(caching, f'_{name}', None)
+
+
+_CacheLocator: Any = _of_numba('CacheLocator') or object
+_BASES = tuple(map(_of_numba, ('UserProvidedCacheLocator', 'InTreeCacheLocator',
+                               'UserWideCacheLocator')))
+_LOCATORS: Any = getattr(_of_numba('CacheImpl'), '_locator_classes', None)
+# where numba has other classes, each process compiles: its own index misses edits of callees
+ON_DISK = _CacheLocator is not object and None not in _BASES and isinstance(_LOCATORS, list)
+
+
 class Work(NamedTuple):
     """What it takes to compile some kernels."""
 
@@ -54,7 +67,7 @@ def kernel_sources(root: Path = Path(__file__).parent) -> list[Path]:
     """Files whose code or constants are compiled into kernels: those that use numba, model.py."""
     files = [path for room in ROOMS for path in (root / room).rglob('*.py')]
     return sorted([path for path in files if re.search('numba|kernel', path.read_text())]
-                  + [root / 'kernel.py', root / 'model.py'])
+                  + [root / name for name in ('kernel.py', 'kernel_inner.py', 'model.py')])
 
 
 @functools.cache
@@ -71,7 +84,7 @@ def sources_hash(root: Path = Path(__file__).parent) -> str:
     return digest.hexdigest()[:16]
 
 
-class KernelCacheLocator(caching._CacheLocator):
+class KernelCacheLocator(_CacheLocator):  # type: ignore[misc]
     """Where numba keeps the kernels of one source file: a folder for each hash of all sources.
 
     The folder lies where numba's own locators put their files: in NUMBA_CACHE_DIR if that is set,
@@ -84,12 +97,10 @@ class KernelCacheLocator(caching._CacheLocator):
 
     @classmethod
     def from_function(cls, py_func: Any, py_file: str) -> KernelCacheLocator | None:
-        """The locator of a function; None for functions of other packages."""
-        if not py_func.__module__.startswith(f'{__package__}.'):
+        """The locator of a function; None for functions of other packages, and if not ON_DISK."""
+        if not (ON_DISK and py_func.__module__.startswith(f'{__package__}.')):
             return None
-        bases: Any = (caching.UserProvidedCacheLocator, caching.InTreeCacheLocator,
-                      caching.UserWideCacheLocator)
-        for base in bases:
+        for base in _BASES:
             locator = base.from_function(py_func, py_file)
             if locator is not None:
                 return cls(py_file, locator.get_cache_path())
@@ -109,7 +120,7 @@ class KernelCacheLocator(caching._CacheLocator):
 
     def ensure_cache_path(self) -> None:
         """Make the folder, before each write; remove those of other hashes not in use."""
-        super().ensure_cache_path()  # type: ignore[no-untyped-call]
+        super().ensure_cache_path()
         for other in self._parent.glob(f'{_FOLDER}*'):
             with suppress(OSError):
                 if (str(other) != self.get_cache_path()
@@ -230,7 +241,8 @@ class CompilationNotice(event.Listener):
         text = f'{self._now.seconds:.0f} s'
         if self._later.seconds:
             text += (f' to a first plan, {self._now.seconds + self._later.seconds:.0f} s in all')
-        print(f'compiling kernels (once, about {text})', file=sys.stderr, flush=True)
+        often = 'once' if ON_DISK else 'at each start: the cache of this numba is not known'
+        print(f'compiling kernels ({often}, about {text})', file=sys.stderr, flush=True)
 
     def _count(self) -> int:
         """Kernels compiled in this load."""
@@ -270,7 +282,7 @@ NOTICE = CompilationNotice()
 
 def install() -> None:
     """Make numba keep kernels of this package here, and report compilations."""
-    locators: Any = caching.CacheImpl._locator_classes
-    locators.insert(0, KernelCacheLocator)
+    if ON_DISK:
+        _LOCATORS.insert(0, KernelCacheLocator)
     register: Any = event.register
     register('numba:run_pass', NOTICE)
