@@ -56,6 +56,7 @@ class ArmingAndLanding:
             self._apply_landing(now)
         elif now <= max(state.sent.disarm_until, self._landed_at + COMMAND_LIFETIME):
             state.apply(AuthorityEvent.OWN, now, 'disarmed by the bridge, or after its landing')
+            self._grant_again()
         elif state.was_airborne and self._is_off_ground():
             state.apply(AuthorityEvent.KILLED, now, 'disarmed in the air')
         else:
@@ -68,13 +69,24 @@ class ArmingAndLanding:
                 and telemetry.landed != d.MAV_LANDED_STATE_ON_GROUND)
 
     def _apply_landing(self, now: float) -> None:
-        state, policy = self._state, self._policy()
-        relaunches = (policy.relaunch == 'automatic' and policy.takeoff
-                      and not state.authority.until_landing)
+        state, relaunches = self._state, self._relaunches()
         state.sent.clear_pending()
         self._landed_at = now
         state.apply(AuthorityEvent.OWN if relaunches else AuthorityEvent.OWN_LANDING, now,
                     'landed')
+        self._grant_again()
+
+    def _relaunches(self) -> bool:
+        """Whether the bridge may start again by itself after a landing of its own."""
+        policy = self._policy()
+        return (policy.relaunch == 'automatic' and policy.takeoff
+                and not self._state.authority.until_landing)
+
+    def _grant_again(self) -> None:
+        """Begin a new grant on the ground: a reboot there, for a battery change, ends nothing."""
+        state = self._state
+        if self._relaunches() and state.authority.held and not state.armed:
+            state.flown = False
 
     def step(self, now: float) -> None:
         """Apply a landing, or a take-off in a MISSION mode that another station has set."""

@@ -1,0 +1,56 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A battery change at the base reboots the vehicle: with `relaunch: automatic` it flies on."""
+from dataclasses import replace
+
+import pytest
+from flight_bench import FlightBench
+from mission_bench import task_list
+
+from uav_task_alloc.mavlink.gcs.authority import AuthorityState
+
+BOTH = pytest.mark.parametrize('kind', ['ardupilot', 'px4'])
+
+
+def changed(kind, relaunch):
+    """After a flight of A, a landing at home and a battery change."""
+    bench = FlightBench(kind, relaunch=relaunch, configs={1: {
+        'turnaround': 60.0, 'range': 3000.0, 'home': (0.0, 10.0, 0.0), 'boot_delay': 6.0,
+        'arming_delay': 10.0}}).discover()
+    bench.assign(task_list('A', returns=True))
+    assert bench.run(lambda: bench.completed() == ['A'], 200.0)
+    bench.assign(replace(task_list('', 2), returns=True))
+    truth = [e.name for e in bench.truth[1]]
+    assert bench.run(lambda: 'battery_changed' in [e.name for e in bench.truth[1]], 300.0), truth
+    bench.run(limit=30.0)
+    return bench
+
+
+@BOTH
+def test_with_automatic_relaunch_it_is_available_again_and_flies_its_next_list(kind):
+    bench = changed(kind, 'automatic')
+    assert bench.authority() is AuthorityState.HELD
+    assert bench.state().available
+    assert bench.state().battery > 0.99
+    bench.assign(task_list('B', 3, returns=True))
+    assert bench.run(lambda: bench.completed() == ['A', 'B'], 300.0)
+
+
+@BOTH
+def test_without_it_an_operator_hands_it_over(kind):
+    bench = changed(kind, 'operator')
+    assert bench.authority() is not AuthorityState.HELD
+    assert not bench.state().available
+    bench.assign(task_list('B', 3, returns=True))
+    bench.run(limit=60.0)
+    assert bench.completed() == ['A']
+    assert bench.hand_over() == ''
+    assert bench.run(lambda: bench.completed() == ['A', 'B'], 300.0)
+
+
+@BOTH
+def test_a_reboot_in_the_air_still_ends_the_grant(kind):
+    bench = FlightBench(kind, relaunch='automatic').discover()
+    bench.assign(task_list('AB'))
+    assert bench.run(lambda: bench.completed() == ['A'], 200.0)
+    bench.vehicles[1].reboot(bench.now)
+    assert bench.run(lambda: bench.authority() is AuthorityState.LOST, 60.0)
