@@ -77,7 +77,7 @@ class ArmingAndLanding:
         self._grant_again()
 
     def _relaunches(self) -> bool:
-        """Whether the bridge may start again by itself after a landing of its own."""
+        """Whether the bridge takes off again without an operator after this landing."""
         policy = self._policy()
         return (policy.relaunch == 'automatic' and policy.takeoff
                 and not self._state.authority.until_landing)
