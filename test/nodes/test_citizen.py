@@ -8,7 +8,7 @@ from xml.etree import ElementTree
 
 import pytest
 from geometry_msgs.msg import Point
-from uav_task_alloc_msgs import msg as m
+from uav_task_alloc_msgs import msg as m, srv
 
 from uav_task_alloc.nodes.conversions.messages import ANNOUNCEMENTS, LATCHED, STATES
 
@@ -36,6 +36,8 @@ def test_the_policy_allows_what_a_node_does_and_no_more(start, probe, name, give
         work = probe.publisher(m.TaskAnnouncement, 'task_announcements', ANNOUNCEMENTS)
         probe.node.create_timer(0.1, lambda: states.publish(uav()))
         work.publish(tasks('t', 2))
+        resume = srv.ResumeUav.Request(uav_id='u')  # a topic of holds exists from the first on
+        probe.until(lambda: probe.call(srv.ResumeUav, 'allocator/resume_uav', resume).success)
     graph = probe.node
     for what, right, look in (
             ('topic', 'publish', graph.get_publisher_names_and_types_by_node),
@@ -52,6 +54,14 @@ def test_the_policy_allows_what_a_node_does_and_no_more(start, probe, name, give
                                 for pattern in needed))  # noqa: B023
         assert {got for got in seen() if not any(fnmatch(got, p) for p in patterns)} == set()
     assert graph.get_client_names_and_types_by_node(name, '/') == []
+
+
+def test_an_operator_may_order_and_an_observer_may_not():
+    offered = {name for name in allowed('allocator', 'service', 'reply')
+               if 'parameter' not in name and 'type_description' not in name}
+    assert allowed('operator', 'service', 'request') == offered
+    assert allowed('observer', 'service', 'request') == set()
+    assert allowed('observer', 'topic', 'publish') == {'/parameter_events', '/rosout'}
 
 
 def uav(name='u'):
