@@ -5,6 +5,7 @@ import signal
 import subprocess
 import time
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from ament_index_python.packages import get_package_prefix
@@ -52,6 +53,40 @@ def test_finding_34_the_results_of_the_last_demo_are_removed(tmp_path, no_nodes)
             demo.main(['--out', str(out)])
         assert not (out / 'summary.json').exists()
         (out / 'summary.json').write_text('{}')
+
+
+class Clock:
+    """Stands in for time: a wait takes its timeout."""
+
+    def __init__(self):
+        self.now = 0.0
+
+    def monotonic(self):
+        return self.now
+
+    def view(self, ends_at, at):
+        """A live view that ends at `ends_at` [s]; `at`: {time [s]: called then}."""
+        def wait(timeout):
+            self.now += timeout
+            for when in [when for when in at if when <= self.now]:
+                at.pop(when)()
+            if self.now < ends_at:
+                raise subprocess.TimeoutExpired('live_view', timeout)
+        return demo.NodeProcess('live_view', SimpleNamespace(wait=wait), None)
+
+
+@pytest.mark.parametrize(('ready', 'faults'), [(100.0, []), (1.0, ['not finished after 80 s'])])
+def test_kernels_that_are_compiled_do_not_count_for_the_limit(
+        tmp_path, capsys, monkeypatch, ready, faults):
+    clock, log = Clock(), tmp_path / 'allocator.log'
+    monkeypatch.setattr(demo, 'time', clock)
+    log.write_text('')
+    allocator = demo.NodeProcess('allocator', SimpleNamespace(poll=lambda: None), log)
+    view = clock.view(150.0, {
+        0.5: lambda: log.write_text('compiling kernels (once, about 29 s)\n'),
+        ready: lambda: log.write_text(log.read_text() + '[INFO] [1.5] [allocator]: ready\n')})
+    assert demo.wait_for_end([allocator, view], 80.0, []) == faults
+    assert capsys.readouterr().err.count('kernels are compiled first') == 1
 
 
 def children(pid):

@@ -29,6 +29,7 @@ from uav_task_alloc.scenario.node_parameters import Parameters
 _PACKAGE = 'uav_task_alloc'
 _EXIT_TIMEOUT = 15.0  # [s]; the bridge waits up to 10 s for a running upload
 _INTERRUPTED = 130  # exit status of a shell after Ctrl-C
+_COMPILING, _READY = 'compiling kernels (', ']: ready'  # in the log of the allocator
 _FAULTS = ('tasks_lost', 'tasks_flown_twice', 'zone_violations')
 
 
@@ -86,20 +87,45 @@ def start_nodes(args: argparse.Namespace, out: Path) -> list[NodeProcess]:
             for node, values in parameters.items()]
 
 
+class KernelWatch:
+    """Whether the allocator still compiles kernels, by its log; says so once.
+
+    Args:
+        nodes: processes; nothing is compiled where no allocator is among them.
+    """
+
+    def __init__(self, nodes: Sequence[NodeProcess]) -> None:
+        self._log = next((node.log for node in nodes if node.name == 'allocator'), None)
+        self._said = False
+
+    def compiling(self) -> bool:
+        """Whether it has begun and is not ready."""
+        text = self._log.read_text(errors='replace') if self._log else ''
+        if _READY in text:
+            self._log = None
+        if _READY in text or _COMPILING not in text:
+            return False
+        if not self._said:
+            print('demo: kernels are compiled first, once, for half a minute or more; the flight '
+                  'begins after it', file=sys.stderr, flush=True)
+        self._said = True
+        return True
+
+
 def wait_for_end(processes: list[NodeProcess], limit: float,
                  signals: Sequence[int]) -> list[str]:
     """Wait for the live view to exit.
 
     Args:
         processes: of all nodes, the live view last.
-        limit: of wall time [s].
+        limit: of wall time [s], without that in which kernels are compiled.
         signals: those received; the wait ends with the first.
 
     Returns:
         What went wrong: nodes that have died, or the timeout.
     """
     *nodes, view = processes
-    end = time.monotonic() + limit
+    end, kernels = time.monotonic() + limit, KernelWatch(nodes)
     while time.monotonic() < end and not signals:
         try:
             view.process.wait(0.2)
@@ -110,6 +136,8 @@ def wait_for_end(processes: list[NodeProcess], limit: float,
         if dead:
             return [f'{node.name} died with status {node.process.returncode}, see {node.log}'
                     for node in dead]
+        if kernels.compiling():
+            end = time.monotonic() + limit
     return [] if signals else [f'not finished after {limit:g} s']
 
 
@@ -196,7 +224,8 @@ def _run(argv: list[str] | None) -> int:
     parser.add_argument('--out', type=Path, default=Path('out/demo'), metavar='DIR',
                         help='folder of the results; those of an earlier demo are removed '
                         '(default: %(default)s)')
-    parser.number('--limit', 1.0, 86400.0, 'wall time after which it has failed', unit='s',
+    parser.number('--limit', 1.0, 86400.0, 'wall time after which it has failed, without that in '
+                  'which kernels are compiled', unit='s',
                   default=80.0)
     parser.add_argument('--record', type=Path, metavar='FILE', help='MCAP file to record all '
                         'topics into; `report FILE` draws the mission from it (default: none)')
