@@ -132,7 +132,7 @@ def _print_log(state_dir: str) -> int:
     rows = read_copy(state_dir)
     if not rows:
         raise InvalidValue('STATE_DIR', state_dir, 'the state_dir of an allocator that has run')
-    for entry in restored_state(rows).orders.log:
+    for entry in sorted(restored_state(rows).orders.log, key=lambda entry: entry.number):
         at = datetime.fromtimestamp(entry.stamp, timezone.utc).strftime('%Y-%m-%dT%H:%M:%SZ')
         print(f'{at}  {entry.operator or "-"}  {entry.text}')
     return 0

@@ -6,7 +6,9 @@ import pytest
 from allocation import AllocatorDriver
 
 from uav_task_alloc import plan
+from uav_task_alloc.allocator.order_records import OrderLogEntry, OrderRows
 from uav_task_alloc.allocator.persistence.restore import restored_state
+from uav_task_alloc.allocator.state.orders import Orders
 from uav_task_alloc.model import Task
 
 
@@ -212,6 +214,14 @@ def test_orders_outlive_a_restart(driver):
     assert 't1' in again.route('b')
     assert again.order('UNDO', order_id='o2').success
     assert again.order('RETURN', 'a').order_id == 'o5'
+
+
+def test_the_log_keeps_the_newest_entries_whatever_the_order_of_the_rows():
+    entries = [OrderLogEntry(number, 0.0, 'ann', f'undo o{number}', 'x', 'free')
+               for number in range(1, 1001)]
+    orders = Orders(OrderRows(log=sorted(entries, key=lambda entry: str(entry.number))))
+    orders.write_log(OrderLogEntry(0, 0.0, 'bob', 'plan 3 rejected', 'x', 'y'))
+    assert list(orders.log) == list(range(2, 1002))
 
 
 # pause, resume, return

@@ -43,7 +43,9 @@ class Orders:
         saved = saved or OrderRows()
         self.in_force = {order.id: order for order in sorted(
             saved.orders, key=lambda order: order.number)}
-        self.log = {entry.number: entry for entry in saved.log}
+        # the journal has the rows in any order
+        self.log = {entry.number: entry for entry in sorted(
+            saved.log, key=lambda entry: entry.number)}
         self.holds = {hold.uav: hold for hold in saved.holds}
         self.number = max((0, *self.log, *(order.number for order in saved.orders)))
         # ids not yet on disk, by kind of row
