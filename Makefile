@@ -4,6 +4,9 @@ SHELL := /bin/bash
 .SHELLFLAGS := -eo pipefail -c
 .PHONY: demo test coverage build docs site clean
 
+# some containers set it: then each process would compile the sources again, each test worker the tests
+unexport PYTHONDONTWRITEBYTECODE
+
 # node tests wait more than they compute
 WORKERS := 3
 # Ctrl-C ends a recipe, without what the programs in it report about that
