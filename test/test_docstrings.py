@@ -10,21 +10,22 @@ import pytest
 PACKAGE = Path(__file__).parent.parent / 'uav_task_alloc'
 SOURCES = {path: path.read_text() for path in sorted(PACKAGE.rglob('*.py'))}
 TREES = {path: ast.parse(text) for path, text in SOURCES.items()}
+NODES = {path: list(ast.walk(tree)) for path, tree in TREES.items()}
 MODULES = {'.'.join(path.relative_to(PACKAGE.parent).with_suffix('').parts)
            .removesuffix('.__init__'): path for path in TREES}
 
 
-def used_names(tree):
+def used_names(user):
     """(module, name) of what a file takes from modules of the package."""
     modules = {}
-    for node in ast.walk(tree):
+    for node in NODES[user]:
         if isinstance(node, ast.ImportFrom):
             for alias in node.names:
                 if f'{node.module}.{alias.name}' in MODULES:
                     modules[alias.asname or alias.name] = f'{node.module}.{alias.name}'
                 elif node.module in MODULES:
                     yield MODULES[node.module], alias.name
-    for node in ast.walk(tree):
+    for node in NODES[user]:
         if (isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name)
                 and node.value.id in modules):
             yield MODULES[modules[node.value.id]], node.attr
@@ -33,12 +34,12 @@ def used_names(tree):
 def offered():
     """Functions and classes that a file of another folder uses, by file."""
     names = defaultdict(set)
-    for user, tree in TREES.items():
-        for path, name in used_names(tree):
+    for user in TREES:
+        for path, name in used_names(user):
             if path.parent != user.parent:
                 names[path].add(name)
     for path in [path for path in TREES if path.stem == '__init__']:
-        for module, name in used_names(TREES[path]):  # what it passes on
+        for module, name in used_names(path):  # what it passes on
             if name in names[path] or f"'{name}'" in SOURCES[path]:
                 names[module].add(name)
     for path, tree in TREES.items():
@@ -115,8 +116,8 @@ def undescribed_arguments(cls, method):
                        + section(cls, 'Arguments of methods') + section(cls, 'Args'))
 
 
-ATTRIBUTES = {path: {node.attr for node in ast.walk(tree) if isinstance(node, ast.Attribute)}
-              for path, tree in TREES.items()}
+ATTRIBUTES = {path: {node.attr for node in nodes if isinstance(node, ast.Attribute)}
+              for path, nodes in NODES.items()}
 OFFERED = list(offered())
 
 
