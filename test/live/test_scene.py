@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The parts of the page and the entries of its logs that lines of a record change."""
 import json
+from types import SimpleNamespace
 
 import pytest
 from small_run import (
@@ -19,6 +20,7 @@ from small_run import (
 )
 
 from uav_task_alloc.live.scene import Scene
+from uav_task_alloc.record.message_records import uploads_record
 from uav_task_alloc.record.progress import fleet_lines
 from uav_task_alloc.record.run_state import RunState
 
@@ -77,6 +79,18 @@ def test_a_uav_shows_what_the_allocator_says_of_it():
         'link stale; inside zone base', 'on the ground inside zone base: no tasks']
     shown = updates(FIRST, [inside], [said()])[0]['uavs']
     assert [shown[uav]['health'] for uav in ('u1', 'u2')] == ['link stale', '']
+
+
+def test_a_battery_is_low_below_the_reserve_of_the_allocator():
+    def low(*more):
+        shown = updates([*FIRST, state(BEGIN, 'u1', (0.0, 0.0), battery=0.25)], *more)[0]['uavs']
+        return [shown[uav]['low'] for uav in ('u1', 'u2')]
+    values = [SimpleNamespace(key='battery reserve', value='0.3')]
+    reserve = {'wall': BEGIN + 1.0, **uploads_record(SimpleNamespace(status=[
+        SimpleNamespace(name='/allocator: allocation', hardware_id='', level=0, message='running',
+                        values=values)]))}
+    assert low() == [False, False]  # as by default
+    assert low([reserve]) == [True, False]
 
 
 PROPOSAL = {'kind': 'proposal', 'wall': BEGIN + 1.0, 'revision': 7, 'open': True,

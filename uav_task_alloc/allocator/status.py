@@ -11,7 +11,7 @@ from uav_task_alloc.allocator.state.flight_pace import finish_time
 from uav_task_alloc.allocator.state.world import World
 from uav_task_alloc.allocator.state.zone_checks import blocked_text
 from uav_task_alloc.errors import first_of
-from uav_task_alloc.record.message_records import ORDER, UAV_WARNING
+from uav_task_alloc.record.message_records import BATTERY_RESERVE, ORDER, UAV_WARNING
 
 _MAX_NAMED = 20  # UAVs in a warning
 _MAX_ORDERS = 50  # in the diagnostics, the newest
@@ -155,6 +155,7 @@ def health_values(world: World, solving: bool) -> dict[str, object]:
             'orders in force': len(world.orders.in_force),
             'UAVs known': len(world.uav_records()),
             'UAVs available': len(world.fleet.usable_ids()),
+            BATTERY_RESERVE: world.params.battery_reserve,
             'zones': len(world.zones), 'revision': world.revision,
             **{f'tasks {state.name}': states[state] for state in TaskState
                if state is not TaskState.REJECTED},

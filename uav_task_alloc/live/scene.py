@@ -158,6 +158,7 @@ class Scene:
                 'mode': state['mode'], 'mission': state['mission_state'],
                 'active': state['active'], 'revision': state['list_revision'],
                 'battery': None if battery is None else round(battery, 3),
+                'low': self.run.is_low(battery),
                 'range': state['range_remaining'] and round(state['range_remaining']),
                 'available': state['available'], 'health': self.run.trouble(uav)}
 

@@ -30,6 +30,7 @@ AUTHORITIES = ('UNKNOWN', 'NONE', 'HELD', 'SUSPENDED', 'LOST')
 _COUNT = re.compile('[0-9]{1,18}')  # int() refuses some strings for which isdigit() is true
 UAV_WARNING = 'warning of '  # a key of an allocator begins so, and ends with the id of a UAV
 ORDER = 'order '  # a key of an allocator begins so, and ends with the id of an order
+BATTERY_RESERVE = 'battery reserve'  # key of an allocator: share, see its parameter
 NOTHING = 'nothing is needed'  # value of `given_back_by` while the bridge has authority
 _FRAME_LOCAL, _FRAME_WGS84 = 0, 1  # of a Task message
 
@@ -240,12 +241,12 @@ def uploads_record(msg: _Message) -> RecordBody:
         Kind `uploads`. `uploads`: counts by name of the status; `health`: [level, text] by
         hardware id, which is the UAV in statuses of a bridge; `authority`, `clock_rates`: by
         UAV; `uav_warnings`: texts by UAV, by name of the status of an allocator; `orders`: of
-        operators, texts by id, likewise.
+        operators, texts by id, likewise; `battery_reserves`: shares by its name.
     """
     return {'kind': 'uploads', 'uploads': dict(_upload_counts(msg)), 'authority': dict(
         _authority(msg)), 'clock_rates': dict(_clock_rates(msg)), 'uav_warnings': dict(
         _of_allocators(msg, UAV_WARNING)), 'orders': dict(
-        _of_allocators(msg, ORDER)), 'health': {
+        _of_allocators(msg, ORDER)), 'battery_reserves': dict(_battery_reserves(msg)), 'health': {
         status.hardware_id or status.name: [
             status.level if isinstance(status.level, int) else ord(status.level), status.message]
         for status in msg.status}}
@@ -277,6 +278,15 @@ def _of_allocators(msg: _Message, prefix: str) -> Iterable[tuple[str, dict[str, 
         if 'UAVs known' in values:
             yield status.name, {key.removeprefix(prefix): text
                                 for key, text in values.items() if key.startswith(prefix)}
+
+
+def _battery_reserves(msg: _Message) -> Iterable[tuple[str, float]]:
+    """By allocator: share of the battery below which it sends a UAV home."""
+    for status in msg.status:
+        for pair in status.values:
+            share = _seconds_or_none(pair.value) if pair.key == BATTERY_RESERVE else None
+            if share is not None:
+                yield status.name, share
 
 
 def _clock_rates(msg: _Message) -> Iterable[tuple[str, float]]:

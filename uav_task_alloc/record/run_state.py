@@ -12,6 +12,7 @@ from typing import Any
 
 from uav_task_alloc.geometry.frames import Origin
 from uav_task_alloc.model import Point, ThreatZone
+from uav_task_alloc.params import AllocatorParams
 from uav_task_alloc.record.plan_diff import RouteLists, route_changes, route_lists
 from uav_task_alloc.zone_codec import decode_zone
 
@@ -123,6 +124,7 @@ class RunState:
     origin: Origin | None = None  # of the ENU frame; None: not known yet
     measured: bool = True  # `rate` is that of the vehicles' clocks, as no one stated it
     clock_rates: dict[str, float] = field(default_factory=dict)  # of the vehicles, by UAV
+    battery_reserves: dict[str, float] = field(default_factory=dict)  # shares, by allocator
     first: float = math.inf  # [unix s] of the first line
     last: float = -math.inf  # [unix s] of the last line
 
@@ -260,6 +262,7 @@ class RunState:
                            for uav, (level, text) in line.get('health', {}).items())
         self.uav_warnings.update(line.get('uav_warnings', {}))
         self.orders.update(line.get('orders', {}))
+        self.battery_reserves.update(line.get('battery_reserves', {}))
         self.clock_rates.update(line.get('clock_rates', {}))
         if self.measured and self.clock_rates:
             rate = median(self.clock_rates.values())
@@ -272,6 +275,11 @@ class RunState:
                     and abs(since - old.since) < SINCE_TOLERANCE * self.stretch):
                 since = old.since
             self.authority[uav] = ReportedAuthority(row['state'], row['why'], since, row['back'])
+
+    def is_low(self, battery: float | None) -> bool:
+        """Whether a battery [0..1] is below the reserve of an allocator; None: unknown."""
+        reserve = max(self.battery_reserves.values(), default=AllocatorParams.battery_reserve)
+        return battery is not None and battery < reserve
 
     def trouble(self, uav: str) -> str:
         """What is wrong with a UAV, by its bridge and the allocators; '' where all is well."""

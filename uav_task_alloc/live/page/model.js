@@ -3,7 +3,6 @@
 import {degreesText, frameOf} from './geo.js';
 
 const SILENT_AFTER = 2;   // [s] of real time without a state of a UAV, as in record/run_state.py
-const LOW_BATTERY = .2;   // share: the default of the allocator's battery_reserve
 const AT_REST = ['STANDBY', 'HOLD'];  // modes of a UAV that may fall silent when the run is over
 export const LEFT = ['UNASSIGNED', 'REJECTED', 'FAILED'];
 
@@ -76,7 +75,7 @@ function describe(state, {wall, over, frame}) {
 
 // [{name, value, why, low}] of height, speed, battery and range, as far as they are known.
 function figuresOf(state) {
-  const {home, speed, course, battery, range} = state, up = state.position[2], figures = [];
+  const {home, speed, course, battery, low, range} = state, up = state.position[2], figures = [];
   const add = (name, value, why, low = false) => figures.push({name, value, why, low});
   if (up !== null) {
     add('height', `${Math.round(up - (home ?? 0))} m`,
@@ -88,7 +87,6 @@ function figuresOf(state) {
   }
   const reach = range == null ? '' : `${(range / 1000).toFixed(1)} km`;
   if (battery != null) {
-    const low = battery < LOW_BATTERY;
     add('battery', [`${Math.round(100 * battery)} %`, low && 'low', reach].filter(Boolean)
       .join(', '), `charge left${reach && `; it can still fly ${reach}`}`, low);
   } else if (reach) {
