@@ -90,18 +90,19 @@ def main(argv: Sequence[str]) -> int:
 def _parser() -> OptionParser:
     parser = OptionParser('order', 'Give an order to a running allocator (docs/operator.md).',
                           _EPILOG)
-    parser.add_argument('action', choices=_ACTIONS, metavar='ACTION', help='see below')
+    parser.add_argument('action', choices=_ACTIONS, metavar='ACTION',
+                        help='what to order, as listed below')
     parser.add_argument('names', nargs='*', metavar='NAME', help='of tasks, UAVs, orders')
     parser.add_argument('--dry-run', action='store_true',
-                        help='only print what it would cost; nothing changes')
+                        help='only print what it would cost (default: give the order)')
     parser.add_argument('--clear', action='store_true',
-                        help='of pin and forbid: end that order instead')
+                        help='of pin and forbid: end that order instead (default: begin it)')
     parser.add_argument('--keep-tasks', action='store_true',
-                        help='of pause: its tasks wait for the UAV')
+                        help='of pause: its tasks wait for the UAV (default: others get them)')
     parser.add_argument('--operator', default=_user(), metavar='NAME',
-                        help='who orders, for the log (default: the user)')
+                        help='who orders, for the log (default: %(default)s)')
     parser.add_argument('--allocator', default='/allocator', metavar='NODE',
-                        help='name of the node (default: /allocator)')
+                        help='name of the node (default: %(default)s)')
     parser.number('--revision', 0, 2**32 - 1, 'refuse where another allocation is in force; 0: '
                   'any', default=0, whole=True)
     parser.number('--timeout', 0.1, 3600.0, 'of the answer', unit='s', default=10.0)
