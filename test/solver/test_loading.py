@@ -4,13 +4,14 @@ import re
 import subprocess
 import sys
 
-SCRIPT = """
+LOADED = """
 import sys
 
 from numba.core.registry import CPUDispatcher
 
 from uav_task_alloc import Task, ThreatZone, Uav, plan
 from uav_task_alloc.solver.solve import load_kernels
+from uav_task_alloc.solver.timed.solve import load_timed_kernels
 
 
 def loaded():
@@ -18,7 +19,8 @@ def loaded():
             if name.startswith('uav_task_alloc') for key, kernel in vars(module).items()
             if isinstance(kernel, CPUDispatcher) for each in kernel.signatures}
 
-
+"""
+SCRIPT = LOADED + """
 load_kernels(search=False)
 before = loaded()
 uavs = [Uav(f'u{i}', (100.0 * i, 0.0, 0.0), 150.0) for i in range(4)]
@@ -42,6 +44,21 @@ def test_a_first_plan_and_a_tight_world_with_zones_find_all_kernels_loaded():
     done = subprocess.run([sys.executable, '-c', SCRIPT], capture_output=True, text=True,
                           check=True)
     assert done.stdout == 'late:\nlate:\n'
+
+
+LATE = LOADED + """
+load_timed_kernels()
+before = loaded()
+tasks = [Task('near', (90.0, 0.0, 0.0), latest=99.0), Task('far', (9e4, 0.0, 0.0), latest=1.0)]
+print('far' in plan([Uav('u', (0.0, 0.0, 0.0))], tasks, max_iterations=10).unassigned)
+print('late:', *sorted(loaded() - before))
+"""
+
+
+def test_the_reason_of_a_task_that_nobody_can_reach_in_time_finds_all_kernels_loaded():
+    done = subprocess.run([sys.executable, '-c', LATE], capture_output=True, text=True,
+                          check=True)
+    assert done.stdout == 'True\nlate:\n'
 
 
 NO_ZONES = """

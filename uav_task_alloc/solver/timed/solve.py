@@ -142,8 +142,9 @@ def _call_kernels(zones: bool, search: bool) -> None:
     """Solve a small problem, so that each kernel is called."""
     uavs = (Uav('u', (0.0, 0.0, 0.0), turnaround=1.0), Uav('v', (9.0, 0.0, 0.0), 30.0))
     tasks = tuple(Task(f't{i}', (float(i), 1.0, 0.0), latest=99.0) for i in range(5))
+    tasks += (Task('late', (9e3, 0.0, 0.0), latest=1.0),)
     limits = Limits((ThreatZone.cylinder('z', (2.5, 1.0), 0.3),) if zones else ())
     problem = make_timed(make_problem(uavs, tasks, {}, limits, Rules(trips=2)), {})
     recorder = TimedRecorder(lambda: 0.0, 0.0, 1.0, max_iterations=100 * search, problem=problem)
     _improve(recorder, 0, WarmState(), None)
-    timed_reasons(problem, [0])
+    timed_reasons(problem, [0, len(tasks) - 1])
