@@ -147,4 +147,5 @@ def _call_kernels(zones: bool, search: bool) -> None:
     problem = make_timed(make_problem(uavs, tasks, {}, limits, Rules(trips=2)), {})
     recorder = TimedRecorder(lambda: 0.0, 0.0, 1.0, max_iterations=100 * search, problem=problem)
     _improve(recorder, 0, WarmState(), None)
-    timed_reasons(problem, [0, len(tasks) - 1])
+    to_timed_plan(problem, recorder, recorder.best, '', False)  # with the reason of the last task
+    timed_reasons(problem, [0])
