@@ -14,6 +14,9 @@ from uav_task_alloc.mavlink.gcs.mission_evidence import MissionEvidence
 from uav_task_alloc.mavlink.gcs.policy import Policy
 from uav_task_alloc.mavlink.gcs.sent_commands import COMMAND_LIFETIME
 
+# [0..1] a battery of at least this, which is fuller than at the landing by that, was changed
+_FULL, _RISE = 0.9, 0.05
+
 
 class ArmingAndLanding:
     """Applies the authority events of take-off, landing, arming and disarming of one vehicle.
@@ -48,7 +51,7 @@ class ArmingAndLanding:
         state = self._state
         if state.armed:
             if now <= state.sent.arm_until:
-                state.flown = True
+                state.flown, state.landed_battery = True, math.nan
                 state.apply(AuthorityEvent.OWN, now, 'armed by the bridge')
             else:
                 state.apply(AuthorityEvent.ARMED_BY_OTHER, now, 'armed, not by the bridge')
@@ -56,7 +59,7 @@ class ArmingAndLanding:
             self._apply_landing(now)
         elif now <= max(state.sent.disarm_until, self._landed_at + COMMAND_LIFETIME):
             state.apply(AuthorityEvent.OWN, now, 'disarmed by the bridge, or after its landing')
-            self._grant_again()
+            self._await_battery_change()
         elif state.was_airborne and self._is_off_ground():
             state.apply(AuthorityEvent.KILLED, now, 'disarmed in the air')
         else:
@@ -74,7 +77,7 @@ class ArmingAndLanding:
         self._landed_at = now
         state.apply(AuthorityEvent.OWN if relaunches else AuthorityEvent.OWN_LANDING, now,
                     'landed')
-        self._grant_again()
+        self._await_battery_change()
 
     def _relaunches(self) -> bool:
         """Whether the bridge takes off again without an operator after this landing."""
@@ -82,15 +85,25 @@ class ArmingAndLanding:
         return (policy.relaunch == 'automatic' and policy.takeoff
                 and not self._state.authority.until_landing)
 
-    def _grant_again(self) -> None:
-        """Begin a new grant on the ground: a reboot there, for a battery change, ends nothing."""
+    def _await_battery_change(self) -> None:
+        """Store the battery, if it may start again by itself when that is changed."""
         state = self._state
         if self._relaunches() and state.authority.held and not state.armed:
-            state.flown = False
+            state.landed_battery, state.rebooted_on_ground = state.telemetry.battery, False
+
+    def _apply_battery_change(self, now: float) -> None:
+        """Grant what a reboot has ended, if the battery is fuller than at the landing."""
+        state, telemetry = self._state, self._state.telemetry
+        if (state.rebooted_on_ground and telemetry.grounded and not state.armed
+                and not state.booting and not state.failsafe_active(now) and self._relaunches()
+                and telemetry.battery >= max(_FULL, state.landed_battery + _RISE)):
+            state.apply(AuthorityEvent.BATTERY_CHANGED, now, 'its battery was changed')
+            state.landed_battery, state.rebooted_on_ground = math.nan, False
 
     def step(self, now: float) -> None:
         """Apply a landing, or a take-off in a MISSION mode that another station has set."""
         state, telemetry = self._state, self._state.telemetry
+        self._apply_battery_change(now)
         if state.hold_due and (telemetry.airborne or telemetry.grounded):
             state.hold_due = False
             if telemetry.airborne and state.authority.held:

@@ -72,6 +72,8 @@ class AuthorityEvent(Enum):
     NEW_ADDRESS = 'new address, until the mode is confirmed'
     REBOOTED = 'reboot of the vehicle, never armed since the grant'
     REBOOTED_FLOWN = 'reboot of the vehicle, armed since the grant'
+    BATTERY_CHANGED = 'fuller battery after a reboot on the ground, which followed a landing of ' \
+        'its own with `relaunch: automatic`'
     RESTART_AGREES = 'restart of the bridge, its file agrees (during a replacement: < 60 s, ' \
         'at rest)'
     RESTART_DIFFERS = 'restart of the bridge, its file does not agree'
@@ -138,6 +140,7 @@ AUTHORITY_TABLE: dict[AuthorityEvent, AuthorityRow] = {
     _E.NEW_ADDRESS: AuthorityRow(_S, _S, None, None),
     _E.REBOOTED: AuthorityRow(_H, None, None, None),
     _E.REBOOTED_FLOWN: AuthorityRow(_L, _L, None, None),
+    _E.BATTERY_CHANGED: AuthorityRow(None, None, _H, None),
     _E.RESTART_AGREES: AuthorityRow(_H, _H, None, None, 'SUSPENDED until a heartbeat confirms it'),
     _E.RESTART_DIFFERS: AuthorityRow(_L, _L, None, None),
     _E.RESTART_OURS: AuthorityRow(_H, None, _H, _H),

@@ -21,6 +21,12 @@ from uav_task_alloc.model import Point
 EXPLANATION_TIME = 5.0  # [s] in which a delayed message may explain a change of mode
 
 
+# what a battery change looks like: silence, a reboot; after any other event nothing is granted
+_BATTERY_CHANGE_EVENTS = frozenset({
+    AuthorityEvent.OWN, AuthorityEvent.LINK_STALE, AuthorityEvent.LINK_BACK,
+    AuthorityEvent.LINK_CHANGED, AuthorityEvent.REBOOTED_FLOWN, AuthorityEvent.BATTERY_CHANGED})
+
+
 @dataclass(slots=True)
 class UnexplainedChange:
     """A change of mode that a delayed message may still explain."""
@@ -54,6 +60,8 @@ class AuthorityWatchState:
     hold_due: bool = False  # command HOLD if it is airborne, after a restart of the bridge
     descending: bool = False  # by our RETURN
     was_airborne: bool = False
+    landed_battery: float = math.nan  # 0..1, at its own landing, while it may start again
+    rebooted_on_ground: bool = False  # since that landing
     replacing_since: float | None = None  # [s] since when it is held for a mission replacement
 
     def class_of(self, mode: int | None) -> ModeClass | None:
@@ -89,6 +97,8 @@ class AuthorityWatchState:
             now: steady time [s].
             why: the reason shown to the operator.
         """
+        if event not in _BATTERY_CHANGE_EVENTS:
+            self.landed_battery, self.rebooted_on_ground = math.nan, False
         before = self.authority.state
         if not self.authority.apply(event, now, why):
             return

@@ -2,6 +2,8 @@
 """Compares a vehicle with its last known mode after silence, a new address or a reboot."""
 from __future__ import annotations
 
+import math
+
 from uav_task_alloc.mavlink.gcs.authority import AuthorityEvent, Suspension
 from uav_task_alloc.mavlink.gcs.authority_watch_state import (
     EXPLANATION_TIME,
@@ -71,6 +73,7 @@ class LinkLoss:
     def vehicle_rebooted(self, now: float) -> None:
         """Apply a reboot of the vehicle, of which its clock went back."""
         state = self._state
+        state.rebooted_on_ground = not math.isnan(state.landed_battery)
         state.apply(AuthorityEvent.REBOOTED_FLOWN if state.flown else AuthorityEvent.REBOOTED, now,
                     'the vehicle rebooted')
         if not state.authority.suspended_by(Suspension.LINK):

@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import pytest
+from authority_bench import MODES, set_mode
 from flight_bench import FlightBench
 from mission_bench import task_list
 
@@ -11,14 +12,17 @@ from uav_task_alloc.mavlink.gcs.authority import AuthorityState
 BOTH = pytest.mark.parametrize('kind', ['ardupilot', 'px4'])
 
 
-def changed(kind, relaunch):
-    """After a flight of A, a landing at home and a battery change."""
+def changed(kind, relaunch, landed=lambda bench: None):
+    """After a flight of A, a landing at home, then `landed`, and a battery change."""
     bench = FlightBench(kind, relaunch=relaunch, configs={1: {
         'turnaround': 60.0, 'range': 3000.0, 'home': (0.0, 10.0, 0.0), 'boot_delay': 6.0,
         'arming_delay': 10.0}}).discover()
     bench.assign(task_list('A', returns=True))
     assert bench.run(lambda: bench.completed() == ['A'], 200.0)
     bench.assign(replace(task_list('', 2), returns=True))
+    assert bench.run(lambda: not bench.vehicles[1].flight.armed, 100.0)
+    bench.run(limit=3.0)
+    landed(bench)
     truth = [e.name for e in bench.truth[1]]
     assert bench.run(lambda: 'battery_changed' in [e.name for e in bench.truth[1]], 300.0), truth
     bench.run(limit=30.0)
@@ -54,3 +58,12 @@ def test_a_reboot_in_the_air_still_ends_the_grant(kind):
     assert bench.run(lambda: bench.completed() == ['A'], 200.0)
     bench.vehicles[1].reboot(bench.now)
     assert bench.run(lambda: bench.authority() is AuthorityState.LOST, 60.0)
+
+
+@BOTH
+def test_a_vehicle_that_a_pilot_has_taken_stays_with_the_pilot(kind):
+    modes = MODES[kind]
+    bench = changed(kind, 'automatic', lambda bench: bench.from_station(set_mode(
+        modes.stick, kind)))
+    assert bench.authority() is AuthorityState.LOST
+    assert bench.state().battery > 0.99
