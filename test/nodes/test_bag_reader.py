@@ -64,7 +64,7 @@ def test_a_bag_is_read_as_lines_in_any_namespace(whole):
     run, tasks, zones, statuses, plan, *states = reader
     assert run == {'kind': 'run', 'speedup': 2.0, 'simulated': False}
     assert tasks == {'kind': 'announcement', 'wall': 1.7e9, 'action': 'ADD', 'tasks': [
-        {'id': 't1', 'position': (10.0, 20.0, 30.0), 'value': 4.0}]}
+        {'id': 't1', 'position': (10.0, 20.0, 30.0), 'service': 0.0, 'value': 4.0}]}
     assert [row['id'] for row in zones['zones']] == ['a', 'b', 'c']
     assert statuses['statuses'] == [{'task': 't1', 'state': 'UNASSIGNED', 'uav': '',
                                      'reason': 'inside zone a'}]

@@ -277,7 +277,14 @@ class RunState:
             self.authority[uav] = ReportedAuthority(row['state'], row['why'], since, row['back'])
 
     def is_low(self, battery: float | None) -> bool:
-        """Whether a battery [0..1] is below the reserve of an allocator; None: unknown."""
+        """Whether a battery is below the reserve of an allocator.
+
+        Args:
+            battery: remaining [0..1]; None: unknown.
+
+        Returns:
+            False where it is unknown.
+        """
         reserve = max(self.battery_reserves.values(), default=AllocatorParams.battery_reserve)
         return battery is not None and battery < reserve
 

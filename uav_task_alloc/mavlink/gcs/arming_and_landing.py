@@ -86,7 +86,7 @@ class ArmingAndLanding:
                 and not self._state.authority.until_landing)
 
     def _await_battery_change(self) -> None:
-        """Store the battery, if it may start again by itself when that is changed."""
+        """Store the battery, if it may start again without an operator when that is changed."""
         state = self._state
         if self._relaunches() and state.authority.held and not state.armed:
             state.landed_battery, state.rebooted_on_ground = state.telemetry.battery, False
