@@ -75,7 +75,7 @@ class OriginCheck:
         self._reports = OriginReports(origin)
         node.get_logger().info(f'origin of the ENU frame: {_text(origin)}')
         self._known_publishers: set[bytes] = set()  # endpoint ids
-        self._received = 0  # messages since the last subscription
+        self._received, self._asked_at = 0, 0.0  # messages since the last subscription, at [s]
         self._waiting_since = time.monotonic()  # for origins of the publishers
         self._publisher = node.create_publisher(m.FleetOrigin, _TOPIC, LATCHED)
         self._publisher.publish(m.FleetOrigin(
@@ -97,16 +97,25 @@ class OriginCheck:
                 or now > self._waiting_since + ORIGIN_TIMEOUT)
 
     def check(self) -> None:
-        """Subscribe again after a node has left: a latched origin outlives its publisher."""
-        publishers = self._publishers()
-        if self._known_publishers - publishers:
+        """Subscribe again after a node has left, or while an origin has not been received.
+
+        A latched origin outlives its publisher; and one may be lost while nodes are discovered.
+        """
+        now, publishers = time.monotonic(), self._publishers()
+        if publishers - self._known_publishers:
+            self._waiting_since = now
+        left = self._known_publishers - publishers
+        if left:
+            self._reports.on_node_left(now)
+            self._waiting_since = now
+        if left or (self._received < len(publishers)
+                    and now > max(self._waiting_since, self._asked_at) + ORIGIN_TIMEOUT):
             self._node.destroy_subscription(self._subscription)
-            self._reports.on_node_left(time.monotonic())
-            self._received, self._waiting_since = 0, time.monotonic()
             self._subscribe()
         self._known_publishers = publishers
 
     def _subscribe(self) -> None:
+        self._received, self._asked_at = 0, time.monotonic()
         self._subscription = self._node.create_subscription(
             m.FleetOrigin, _TOPIC, self._on_origin, LATCHED)
 
