@@ -32,13 +32,19 @@ class ArmingAndLanding:
         self._state, self._evidence, self._policy = state, evidence, policy
         self._landed_at = -math.inf  # [s] after our RETURN
 
-    def is_returning(self) -> bool:
-        """Whether it returns by our command: the mode, or the last item."""
+    def is_returning(self, now: float) -> bool:
+        """Whether it returns by our command: the mode, or the last item.
+
+        Args:
+            now: steady time [s].
+        """
         state = self._state
         if state.mode is None:
             return False
         in_mission = state.profile.mode_function(state.mode) is ModeFunction.MISSION
-        return (state.descending and state.is_return(state.mode)) or (
+        # it may land before our next command arrives
+        ours = state.descending or now < state.left_return_at + COMMAND_LIFETIME
+        return (ours and state.is_return(state.mode)) or (
             in_mission and self._evidence.returning())
 
     def armed_changed(self, was_returning: bool, now: float) -> None:
@@ -116,5 +122,5 @@ class ArmingAndLanding:
             state.was_airborne = True
         elif state.was_airborne and telemetry.grounded and not state.unconfirmed:
             state.was_airborne = False
-            if state.authority.held and (self.is_returning() or state.authority.until_landing):
+            if state.authority.held and (self.is_returning(now) or state.authority.until_landing):
                 self._apply_landing(now)

@@ -100,7 +100,7 @@ class AuthorityWatch:
         """Process the newest HEARTBEAT of the autopilot."""
         state = self._state
         before, was_armed = state.mode, state.armed
-        was_returning = self._arming.is_returning()
+        was_returning = self._arming.is_returning(now)
         if state.sent.take_armed_before(state.telemetry.frame):
             was_armed, state.flown = True, True  # a heartbeat that shows disarmed is a change
         state.mode = message.custom_mode
@@ -173,6 +173,8 @@ class AuthorityWatch:
             sent.climb = None
             sent.acks.command_sent(mode, now)
             sent.add_mode(mode, now)
+            if state.descending and not state.is_return(mode):
+                state.left_return_at = now
             state.descending = state.is_return(mode)
         elif message.command == d.MAV_CMD_COMPONENT_ARM_DISARM:
             sent.add_arming(message.param1 == 1.0, now)

@@ -59,6 +59,7 @@ class AuthorityWatchState:
     maybe_ours: bool = False  # in MISSION when the bridge started
     hold_due: bool = False  # command HOLD if it is airborne, after a restart of the bridge
     descending: bool = False  # by our RETURN
+    left_return_at: float = -math.inf  # [s] another command of ours has ended our RETURN
     was_airborne: bool = False
     landed_battery: float = math.nan  # 0..1, at its own landing, while it may start again
     rebooted_on_ground: bool = False  # since that landing

@@ -22,6 +22,8 @@ _BATTERY_TIMEOUT = 10.0  # [s] without a report: the battery does not count
 _BATTERY_RISE = 0.03  # [0..1] smallest accepted rise of a battery reading
 _RESTART_STEP = 2000  # [ms] decrease of time_boot_ms that shows a restart, not a late message
 _MAX_DELAY = 6.0  # [s] of a late message
+_IN_AIR = frozenset({
+    d.MAV_LANDED_STATE_IN_AIR, d.MAV_LANDED_STATE_TAKEOFF, d.MAV_LANDED_STATE_LANDING})
 _PACE_OVER = 0.3  # [s] between two positions that measure the pace
 # requested rate [Hz] by message id
 RATES = {
@@ -108,8 +110,7 @@ class Telemetry:
     @property
     def off_ground(self) -> bool:
         """Off the ground, by its height or its landed state."""
-        return self.height > OFF_GROUND or self.landed in (
-            d.MAV_LANDED_STATE_IN_AIR, d.MAV_LANDED_STATE_TAKEOFF, d.MAV_LANDED_STATE_LANDING)
+        return self.height > OFF_GROUND or self.landed in _IN_AIR
 
     @property
     def airborne(self) -> bool:
@@ -224,6 +225,7 @@ class Telemetry:
     def _heartbeat(self, message: Message, now: float) -> None:
         self.armed = bool(message.base_mode & d.MAV_MODE_FLAG_SAFETY_ARMED)
         self.mode = self._profile.mode_function(message.custom_mode)
+        self._landed(self.landed)
         if message.system_status == d.MAV_STATE_BOOT and self._started:
             self.restart()  # its clock is received later
             self.booted_at = now
@@ -296,7 +298,12 @@ class Telemetry:
             self.battery = message.battery_remaining / 100.0
 
     def _extended(self, message: Message, now: float) -> None:
-        self.landed = message.landed_state
+        self._landed(message.landed_state)
+
+    def _landed(self, landed: int) -> None:
+        # disarmed: sent before it landed, and armed again it is not in the air by that
+        self.landed = (landed if self.armed or landed not in _IN_AIR
+                       else d.MAV_LANDED_STATE_UNDEFINED)
 
     def _current(self, message: Message, now: float) -> None:
         self.current, self.current_at = message.seq, now
