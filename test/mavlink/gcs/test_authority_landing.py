@@ -84,6 +84,48 @@ def test_a_landing_by_the_pilot_grants_nothing(kind, relaunch):
     assert bench.authority() is L
 
 
+def nearly_landed(kind):
+    """A vehicle that returns by our command and is 3 m above the ground."""
+    bench = flying(kind, 'A', relaunch='automatic')
+    bench.assign(task_list('', 2, returns=True))
+    assert bench.run(lambda: bench.vehicles[1].flight.custom_mode == MODES[kind].rtl, 60.0)
+    assert bench.run(lambda: bench.vehicles[1].flight.body.position[2] < 3.0, 100.0)
+    return bench
+
+
+@BOTH
+def test_a_landing_by_our_return_before_our_next_mode_arrives_is_ours(kind):
+    bench = nearly_landed(kind)
+    flight = bench.vehicles[1].flight
+
+    def landed():
+        return any(e.name == 'disarmed' for e in bench.truth[1])
+    bench.line.tampers.append(lambda direction, m, now: [] if (
+        direction == 'up' and is_command(m, d.MAV_CMD_DO_SET_MODE)
+        and flight.armed and not landed()) else None)
+    bench.assign(task_list('B', 3))
+    assert bench.run(landed, 30.0)
+    bench.run(limit=3.0)
+    assert bench.authority() is H
+    assert bench.run(lambda: bench.completed()[-1:] == ['B'], 120.0)
+
+
+@BOTH
+def test_armed_again_it_takes_off_where_the_report_of_its_landing_was_lost(kind):
+    bench = nearly_landed(kind)
+    flight, landed_at = bench.vehicles[1].flight, []
+    bench.line.tampers.append(lambda direction, m, now: [] if (
+        m.get_type() == 'EXTENDED_SYS_STATE' and not landed_at) else None)
+    assert bench.run(lambda: not flight.armed, 30.0)
+    bench.assign(task_list('B', 3))
+    assert bench.run(lambda: flight.armed, 60.0)
+    bench.run(limit=1.0)
+    landed_at.append(bench.now)
+    assert not [note for note in bench.notes if 'mode mission' in note]
+    assert bench.run(lambda: bench.completed()[-1:] == ['B'], 120.0)
+    assert bench.authority() is H
+
+
 # arming by others
 
 @BOTH
