@@ -114,14 +114,11 @@ def test_lists_are_flown_and_replaced_in_flight_and_every_task_is_reported_once(
     for n in KINDS:
         world.send(n, 1, [0, 1, 2, 3])
     flying = set(KINDS)
-
-    def replaced():
+    while flying:  # each at once: a listed task that was flown is reported again
+        probe.until(lambda: any(map(world.completed, flying)))
         for n in [n for n in flying if world.completed(n)]:
-            world.send(n, 2, [3, 5, 2])  # at once: a listed task that it has flown is repeated
+            world.send(n, 2, [3, 5, 2])
             flying.remove(n)
-        return not flying
-
-    probe.until(replaced)
     probe.until(lambda: all(f'u{n}_2' in world.completed(n) for n in KINDS))
     world.land()
     for n in KINDS:
