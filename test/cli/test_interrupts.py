@@ -94,6 +94,34 @@ def test_ctrl_c_while_the_search_is_compiled_prints_the_first_plan(tmp_path):
     assert not list(tmp_path.rglob('recombine.*.nbc'))
 
 
+LATE = """
+import signal, sys, threading
+from uav_task_alloc.cli.interrupt import prompt_interrupt, resumable
+from uav_task_alloc.cli.progress import SolveProgress
+with prompt_interrupt():
+    sys.setswitchinterval(1000.0)  # [s]: its thread runs only where this one waits
+    try:
+        with SolveProgress(1.0, sys.stderr, lambda: 0.0) if KEEPS else resumable():
+            signal.raise_signal(signal.SIGINT)
+    except KeyboardInterrupt:
+        pass
+    for _ in range(100):
+        waiting = threading.Thread(target=lambda: None)
+        waiting.start()
+        waiting.join()
+    print('saved')
+"""
+
+
+@pytest.mark.parametrize('keeps', [True, False], ids=['plan', 'results'])
+def test_what_ctrl_c_kept_is_saved_although_the_thread_for_signals_runs_late(keeps):
+    done = subprocess.run([sys.executable, '-c', LATE.replace('KEEPS', str(keeps))], cwd=ROOT,
+                          text=True, capture_output=True, timeout=TIMEOUT, check=False,
+                          preexec_fn=lambda: signal.signal(signal.SIGINT,
+                                                           signal.SIG_DFL))
+    assert (done.returncode, done.stdout, done.stderr) == (0, 'saved\n', '')
+
+
 def test_ctrl_c_ends_a_benchmark_and_all_its_processes(tmp_path):
     keep = tmp_path / 'kept'
     with start('bench', '--sizes', '4x20', '--against', 'none', '--budgets', '0.02', '--jobs', '2',

@@ -6,11 +6,13 @@ import os
 import signal
 import sys
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from types import FrameType
 from typing import NoReturn
 
 INTERRUPTED = 130  # exit status of a shell after Ctrl-C
+_NO_SIGNAL = 0  # in the pipe
 
 
 @contextmanager
@@ -30,31 +32,45 @@ def prompt_interrupt() -> Iterator[None]:
             or before not in (signal.default_int_handler, signal.SIG_DFL)):
         yield
         return
-    reader, writer = os.pipe()
-    os.set_blocking(writer, False)
-    descriptor = signal.set_wakeup_fd(writer, warn_on_full_buffer=False)
-    signal.signal(signal.SIGINT, _leave_to_the_thread)
-    threading.Thread(target=_exit_on_sigint, args=(reader,), daemon=True).start()
+    prompt = _Prompt()
+    descriptor = signal.set_wakeup_fd(prompt.writer, warn_on_full_buffer=False)
+    signal.signal(signal.SIGINT, prompt)
+    prompt.thread.start()
     signal.pthread_sigmask(signal.SIG_UNBLOCK, [signal.SIGINT])  # resource/command.in blocks it
     try:
         yield
     finally:
         signal.signal(signal.SIGINT, before)
         signal.set_wakeup_fd(descriptor)
-        os.close(writer)  # ends the thread
+        os.close(prompt.writer)  # ends the thread
+
+
+@contextmanager
+def handled_by(handler: Callable[[int, FrameType | None], object]) -> Iterator[None]:
+    """Within `with`, a handler of SIGINT; no signal that it got ends the process afterwards.
+
+    Args:
+        handler: as for `signal.signal`.
+    """
+    before = signal.signal(signal.SIGINT, handler)
+    try:
+        yield
+    finally:
+        try:
+            if isinstance(before, _Prompt):
+                before.catch_up()
+        finally:
+            signal.signal(signal.SIGINT, before)
 
 
 @contextmanager
 def resumable() -> Iterator[None]:
     """Within `with`, Ctrl-C raises KeyboardInterrupt, for a command that saves its results."""
-    prompt = signal.getsignal(signal.SIGINT) is _leave_to_the_thread
-    if prompt:
-        signal.signal(signal.SIGINT, signal.default_int_handler)
-    try:
+    if isinstance(signal.getsignal(signal.SIGINT), _Prompt):
+        with handled_by(signal.default_int_handler):
+            yield
+    else:
         yield
-    finally:
-        if prompt:
-            signal.signal(signal.SIGINT, _leave_to_the_thread)
 
 
 def end_process(status: int) -> NoReturn:
@@ -69,15 +85,34 @@ def end_process(status: int) -> NoReturn:
     os._exit(status)
 
 
-def _leave_to_the_thread(number: int, frame: object) -> None:
-    """The handler of SIGINT in the main thread, while the other thread ends the process."""
+class _Prompt:
+    """The handler of SIGINT in the main thread, while another thread ends the process."""
 
+    def __init__(self) -> None:
+        self._reader, self.writer = os.pipe()
+        os.set_blocking(self.writer, False)
+        self.thread = threading.Thread(target=self._run, daemon=True)
+        self._caught_up = threading.Event()
 
-def _exit_on_sigint(reader: int) -> None:
-    while received := os.read(reader, 1):
-        if (received[0] == signal.SIGINT
-                and signal.getsignal(signal.SIGINT) is _leave_to_the_thread):
-            with suppress(OSError):
-                os.write(2, b'interrupted\n')
-            os._exit(INTERRUPTED)
-    os.close(reader)
+    def __call__(self, number: int, frame: FrameType | None) -> None:
+        """Do nothing: the thread does."""
+
+    def catch_up(self) -> None:
+        """Wait until the thread has read all signals so far.
+
+        It may get to run late, and must not take a signal for one that came with this handler.
+        """
+        if self.thread.is_alive():  # not in a forked process
+            self._caught_up.clear()
+            os.write(self.writer, bytes([_NO_SIGNAL]))
+            self._caught_up.wait()
+
+    def _run(self) -> None:
+        while received := os.read(self._reader, 1):
+            if received[0] == _NO_SIGNAL:
+                self._caught_up.set()
+            elif received[0] == signal.SIGINT and signal.getsignal(signal.SIGINT) is self:
+                with suppress(OSError):
+                    os.write(2, b'interrupted\n')
+                os._exit(INTERRUPTED)
+        os.close(self._reader)

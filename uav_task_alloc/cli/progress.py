@@ -2,11 +2,12 @@
 """Progress of long runs on stderr: the line of a solve that Ctrl-C ends, and plain log lines."""
 from __future__ import annotations
 
-import signal
 import sys
 from collections.abc import Callable
 from types import FrameType, TracebackType
 from typing import TextIO
+
+from uav_task_alloc.cli.interrupt import handled_by
 
 _SHOWN_AFTER = 1.0  # [s] of solving before the line appears
 _PERIOD = 0.2  # [s] between two updates of the line
@@ -36,15 +37,15 @@ class SolveProgress:
         self._started = -1.0  # [s] when `stop` was first called: after the kernels were loaded
         self._shown_at = -1.0  # [s]
         self._best: tuple[float, float] | None = None  # fit, and when it was found [s]
-        self._previous_handler: object = None
+        self._handled = handled_by(self._on_sigint)
 
     def __enter__(self) -> SolveProgress:
-        self._previous_handler = signal.signal(signal.SIGINT, self._on_sigint)
+        self._handled.__enter__()
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
                  trace: TracebackType | None) -> None:
-        signal.signal(signal.SIGINT, self._previous_handler)  # type: ignore[arg-type]
+        self._handled.__exit__(kind, error, trace)
         if self._shown_at >= 0.0:
             self._write(WIPE)
 
