@@ -133,6 +133,18 @@ def test_a_phone_shows_the_uavs_first_then_the_map(shown, run):
     assert page.evaluate('document.documentElement.scrollWidth') == PHONE['width']
 
 
+@SIZES
+def test_names_of_uavs_do_not_overlap_the_bars_of_their_services(shown, size):
+    uav = 'inspector_of_the_north_eastern_power_line_17'
+    page = shown(Run().add(announced(BEGIN, ['t1']), state(BEGIN, uav, (0.0, 0.0)),
+                           listed(BEGIN, uav, 1, ['t1']),
+                           planned(BEGIN, 1, 'ADD t1', **{uav: ['t1']}),
+                           statuses(BEGIN, t1=f'ACTIVE {uav}')), size)
+    page.wait_for_selector('#gantt rect', state='attached')
+    assert overlapping(boxes(page, '#gantt text, #gantt rect')) == []
+    assert boxes(page, '#gantt text')[0][0].endswith(uav)  # its title
+
+
 def middle_of_map(page):
     page.locator('#map').scroll_into_view_if_needed()
     [(_, left, top, right, bottom)] = boxes(page, '#map')

@@ -188,6 +188,7 @@ $('scrub').oninput = event => goTo(Number(event.target.value));
 $('live').onclick = goLive;
 $('find').oninput = draw;
 $('alarm').onclick = () => openCard($('alarm').dataset.uav);
+$('asks').onclick = () => $('order-box').scrollIntoView({block: 'nearest'});
 $('uavs').oninput = draw;
 $('theme').onclick = () => {
   theme(theme() === 'dark' ? 'light' : 'dark');

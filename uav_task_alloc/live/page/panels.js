@@ -164,8 +164,10 @@ export function showLeft(model) {
 
 // Orders in force, and the plan that waits for an operator. The page only shows them.
 export function showOrders({orders, proposal}) {
-  $('order-box').hidden = !orders.length && !proposal;
-  put($('order-count'), orders.length ? `${orders.length} in force` : '');
+  put($('order-count'), `${orders.length || 'none'} in force`);
+  $('asks').hidden = !proposal;
+  put($('asks'), proposal
+    ? `Plan ${proposal.revision} waits for approval until ${stamp(proposal.deadline)}` : '');
   fill($('proposal'), JSON.stringify(proposal), () => {
     if (!proposal) return [];
     const {revision, trigger, deadline, accepted, changes} = proposal;
