@@ -267,8 +267,8 @@ def test_orders_and_proposals_are_shown_and_not_given(view):
     assert page.locator('#order-box button').count() == 0
     wait(page, '#asks', 'Plan 7 waits for approval until 0:31')
     page.click('#asks')
-    page.wait_for_function('''() => document.querySelector('#proposal')
-        .getBoundingClientRect().top < innerHeight''')
+    page.wait_for_function("""() => document.querySelector('#proposal')
+        .getBoundingClientRect().top < innerHeight""")
 
 
 def test_the_page_sends_nothing_but_get(view, run):
