@@ -34,13 +34,13 @@ def start_errors(out: Path) -> list[float]:
                      state.waited)
     starts = {name: reached[name][0].wall - state.tasks[name].service
               for name in state.completed() if reached[name]}
-    told: dict[str, float] = {}
+    predicted: dict[str, float] = {}
     for line in read_lines(out / RECORD_FILE):
         if line['kind'] == 'statuses':
-            told.update((row['task'], row['expected']) for row in line['statuses']
+            predicted.update((row['task'], row['expected']) for row in line['statuses']
                         if 'expected' in row and row['task'] in starts
                         and line['wall'] <= starts[row['task']] - AHEAD)
-    return [starts[name] - expected for name, expected in told.items()]
+    return [starts[name] - expected for name, expected in predicted.items()]
 
 
 def fly(scenario: Path, out: Path, limit: float) -> tuple[dict[str, Any], list[float]]:

@@ -62,7 +62,7 @@ class Judged:
 
     broken: list[str] = field(default_factory=list)
     unforeseen: list[str] = field(default_factory=list)  # by what was known nothing was broken
-    told_late: list[str] = field(default_factory=list)
+    reported_late: list[str] = field(default_factory=list)
     kept: int = 0
     late: int = 0
     refused: int = 0
@@ -104,7 +104,7 @@ class Mission:
         self.flown: dict[str, UavList] = {}
         self.reached: dict[str, tuple[str, float]] = {}  # by UAV: task, and since when
         self.late_since: dict[str, float] = {}  # oracle: begin of the present stretch
-        self.told_since: dict[str, float] = {}
+        self.reported_since: dict[str, float] = {}
         self.predicted: dict[str, tuple[float, float]] = {}  # when, and the start expected then
         self.events = sorted(self._events())
 
@@ -293,9 +293,9 @@ class Mission:
             if math.isinf(task.latest) or task_id in self.done or not record.open:
                 continue
             late = expected.get(task_id, math.inf) > task.latest + EARLY
-            told = (task_id in self.world.deadlines.texts
+            reported = (task_id in self.world.deadlines.texts
                     or (record.state.name == 'UNASSIGNED' and bool(record.reason)))
-            for seen, since in ((late, self.late_since), (told, self.told_since)):
+            for seen, since in ((late, self.late_since), (reported, self.reported_since)):
                 if not seen:
                     since.pop(task_id, None)
                 else:
@@ -338,11 +338,12 @@ class Mission:
                 self.judged.kept += 1
                 continue
             self.judged.late += 1
-            known, told = self.late_since.get(task_id), self.told_since.get(task_id, math.inf)
-            if known is not None and told > known + EARLY + STEP:
-                self.judged.told_late.append(
-                    f'mission {self.seed}: {task_id}: oracle {known:.1f}, told {told:.1f}, '
-                    f'latest {latest:.1f}, start {start:.1f}')
+            known = self.late_since.get(task_id)
+            reported = self.reported_since.get(task_id, math.inf)
+            if known is not None and reported > known + EARLY + STEP:
+                self.judged.reported_late.append(
+                    f'mission {self.seed}: {task_id}: oracle {known:.1f}, '
+                    f'reported {reported:.1f}, latest {latest:.1f}, start {start:.1f}')
 
 
 def leg_seconds(pace: FlightPace, start: Point, end: Point) -> float:
@@ -366,7 +367,7 @@ def main() -> int:
     found = []
     for seed in range(args.seed, args.seed + args.missions):
         found.append(Mission(seed, args.objective).run())
-        for kind in ('broken', 'told_late', 'unforeseen'):
+        for kind in ('broken', 'reported_late', 'unforeseen'):
             for line in getattr(found[-1], kind):
                 print(f'{kind}: {line}', flush=True)
     errors = [error for each in found for error in each.errors]
@@ -375,11 +376,11 @@ def main() -> int:
               'refused': sum(each.refused for each in found),
               'broken': sum(len(each.broken) for each in found),
               'unforeseen': sum(len(each.unforeseen) for each in found),
-              'told_late': sum(len(each.told_late) for each in found),
+              'reported_late': sum(len(each.reported_late) for each in found),
               'error_60s_median': statistics.median(errors) if errors else None,
               'error_60s_p90': sorted(errors)[9 * len(errors) // 10] if errors else None}
     print(json.dumps(totals))
-    return int(bool(totals['broken'] or totals['told_late']))
+    return int(bool(totals['broken'] or totals['reported_late']))
 
 
 if __name__ == '__main__':

@@ -392,8 +392,8 @@ def test_windows_of_a_scenario_are_moved_to_another_clock():
 
 
 def test_objective_and_trips_of_a_scenario_are_parameters_of_the_allocator():
-    told = scenario.fleet_parameters(scenario.parse(UAV + 'objective: finish\ntrips: 2\n'))
-    assert (told['allocator']['objective'], told['allocator']['trips']) == ('finish', 2)
+    given = scenario.fleet_parameters(scenario.parse(UAV + 'objective: finish\ntrips: 2\n'))
+    assert (given['allocator']['objective'], given['allocator']['trips']) == ('finish', 2)
     priced = scenario.fleet_parameters(scenario.parse(UAV + 'objective: {finish: 2}\n'))
     assert priced['allocator']['objective_weights'] == [1.0, 2.0, 0.0, math.inf, math.inf]
     plain = scenario.fleet_parameters(scenario.parse(UAV))['allocator']

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Waits before tasks: holds at the stop before, later take-offs, and when they are sent anew."""
+"""Waits before tasks: holds at the stop before, later take-offs, and when they are sent again."""
 from dataclasses import replace
 
 import pytest
