@@ -53,8 +53,13 @@ def test_the_command_line_ends_without_a_traceback_however_early_the_signal(dela
     process.send_signal(signal.SIGINT)
     _, err = process.communicate(timeout=30)
     assert 'Traceback' not in err
-    assert (process.returncode, err.splitlines()[-1:]) in (
-        (130, ['interrupted']), (-signal.SIGINT, []))  # that of sh, in its first milliseconds
+    if process.returncode == -signal.SIGINT:  # that of sh, in its first milliseconds
+        assert not err
+        return
+    assert process.returncode == 130
+    last = err.splitlines()[-1]
+    assert re.fullmatch(r'interrupted|stopped before the search.*|'  # a machine may be that fast
+                        r'stopped after [\d.]+ s of 600 s: the best plan so far', last)
 
 
 @pytest.mark.parametrize('name', params.NODES)
