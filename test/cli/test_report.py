@@ -106,6 +106,20 @@ def test_an_entry_into_a_zone_is_listed_with_its_position(run):
     assert summary['entries'] == ['u1 into hut at (245.0, 0.0, 50.0)']
 
 
+def test_losses_of_separation_and_the_least_distance_are_listed(run, tmp_path):
+    assert run(ALL_DONE)['separation_min_m'] is None
+    pair = {'uav': 'u1', 'other': 'u2', 't': 2.0, 'wall': 2.0, 'x': 0.0, 'y': 0.0, 'z': 0.0}
+    with (tmp_path / TRUTH_FILE).open('a') as file:
+        for event, apart in (('separation_lost', 8.0), ('separation_regained', 4.0),
+                             ('separation_lost', 9.0), ('least_distance', 4.0)):
+            file.write(json.dumps({**pair, 'event': event, 'horizontal': apart,
+                                   'vertical': 3.0}) + '\n')
+    summary = report.summarise(tmp_path)
+    assert (summary['separation_losses'], summary['separation_min_m']) == (2, 5.0)
+    assert 'u1 and u2 at 1.5 s: 4.0 m apart horizontally, 3.0 m vertically' in summary['losses']
+    assert 'separation losses          2  u1 and u2' in report.summary_table(summary)
+
+
 def test_a_run_without_any_plan_has_figures_too(run):
     summary = run([], solves=(), reached=())
     assert (summary['replans'], summary['resolve_ms_median'], summary['wall_s']) == (0, 0.0, 0.0)

@@ -63,6 +63,7 @@ def run_summary(state: RunState, truth: GroundTruth) -> Summary:
         'tasks_lost': len(names['lost']),
         'tasks_flown_twice': len(twice),
         'zone_violations': len(entries),
+        **_separation(state, truth),
         'replans': replans,
         'plans_unchanged': len(times) - replans,
         'resolve_ms_median': percentile(times, 50.0),
@@ -80,6 +81,16 @@ def run_summary(state: RunState, truth: GroundTruth) -> Summary:
         'entries': [f'{entry.uav} into {entry.zone} at '
                     f'({", ".join(f"{v:.1f}" for v in entry.point)})' for entry in entries],
     }
+
+
+def _separation(state: RunState, truth: GroundTruth) -> Summary:
+    """How near UAVs came in the air by the truth."""
+    least = truth.least_distance()
+    return {'separation_losses': len(truth.losses),
+            'separation_min_m': None if least is None else round(least, 2),
+            'losses': [f'{" and ".join(loss.uavs)} at {state.clock(loss.wall):.1f} s: '
+                       f'{loss.horizontal:.1f} m apart horizontally, {loss.vertical:.1f} m '
+                       'vertically' for loss in truth.losses]}
 
 
 def finish(state: RunState, reached: Mapping[str, Sequence[Reached]],
@@ -143,6 +154,10 @@ def summary_table(summary: Mapping[str, Any]) -> str:
         ('  lost', of('tasks_lost'), _with_reasons(of('lost'))),
         ('  flown twice', of('tasks_flown_twice'), ', '.join(of('flown_twice'))),
         ('zone violations', of('zone_violations'), '; '.join(of('entries'))),
+        ('separation losses', summary.get('separation_losses', 0),
+         '; '.join(summary.get('losses', []))),
+        ('least distance', _metres(summary.get('separation_min_m')),
+         'of two UAVs in the air'),
         ('metres flown', f'{flown:.0f}', f'planned {planned:.0f} ({excess:+.1f} %)'),
         ('finished', f'{summary.get("finish_s", 0.0):.0f} s', 'last task, scenario time'),
         ('re-plans', of('replans'), f'{unchanged} more changed nothing' * bool(unchanged)),
@@ -155,6 +170,10 @@ def summary_table(summary: Mapping[str, Any]) -> str:
     rule = '-' * 60
     lines = [f'{name:<18}{value!s:>10}  {note}'.rstrip() for name, value, note in rows]
     return '\n'.join([rule, *lines, rule])
+
+
+def _metres(length: float | None) -> str:
+    return 'unknown' if length is None else f'{length:.1f} m'
 
 
 def _with_reasons(reasons: Mapping[str, str]) -> str:

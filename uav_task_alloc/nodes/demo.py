@@ -30,7 +30,7 @@ _PACKAGE = 'uav_task_alloc'
 _EXIT_TIMEOUT = 15.0  # [s]; the bridge waits up to 10 s for a running upload
 _INTERRUPTED = 130  # exit status of a shell after Ctrl-C
 _COMPILING, _READY = 'compiling kernels (', ']: ready'  # in the log of the allocator
-_FAULTS = ('tasks_lost', 'tasks_flown_twice', 'zone_violations')
+_FAULTS = ('tasks_lost', 'tasks_flown_twice', 'zone_violations', 'separation_losses')
 
 
 @dataclass
@@ -150,7 +150,8 @@ def fly_scenario(args: argparse.Namespace) -> int:
     """Fly a scenario and write its results into args.out.
 
     Returns:
-        0 when no task was lost or flown twice, no zone entered, and every node exited in order.
+        0 when no task was lost or flown twice, no zone entered, no separation lost, and every
+        node exited in order.
     """
     started_at = time.monotonic()
     out = args.out

@@ -15,6 +15,7 @@ from uav_task_alloc.record.run_state import Line, RunState, ZoneInterval, read_l
 
 TRUTH_FILE = 'flight.jsonl'
 _VISIT_RADIUS = 1.5  # [m] between a task and the mission item of its visit
+_NEARNESS = ('separation_lost', 'separation_regained', 'least_distance')  # events
 _STEP = 1.0  # [m] between the points of a track that are tested against the zones
 
 
@@ -45,6 +46,21 @@ class ZoneEntry:
     point: Point  # [m]
 
 
+@dataclass(frozen=True, slots=True)
+class TrueNearness:
+    """How near two vehicles came in the air."""
+
+    uavs: tuple[str, str]  # ids
+    wall: float  # [unix s]
+    horizontal: float  # [m]
+    vertical: float  # [m], at the same time
+
+    @property
+    def distance(self) -> float:
+        """Straight distance [m]."""
+        return math.hypot(self.horizontal, self.vertical)
+
+
 @dataclass
 class GroundTruth:
     """Tracks and events of all simulated vehicles."""
@@ -53,6 +69,8 @@ class GroundTruth:
     tracks: dict[str, list[TrueSample]] = field(default_factory=dict)
     reached: list[Reached] = field(default_factory=list)  # items reached, in order of time
     died: dict[str, TrueSample] = field(default_factory=dict)  # last sample by UAV that was lost
+    losses: list[TrueNearness] = field(default_factory=list)  # of separation, in order of time
+    least: list[TrueNearness] = field(default_factory=list)  # of all pairs that were in the air
     simulated: bool = False  # times are those of /clock
 
     def apply(self, line: Line) -> None:
@@ -70,6 +88,22 @@ class GroundTruth:
             self.reached.append(Reached(uav, wall, (line['x'], line['y'], line['z'])))
         elif event == 'died' and self.tracks.get(uav):
             self.died[uav] = TrueSample(wall, self.tracks[uav][-1].point)
+        elif event in _NEARNESS:
+            self._near(TrueNearness((uav, line['other']), wall, line['horizontal'],
+                                    line['vertical']), event)
+
+    def _near(self, found: TrueNearness, event: str) -> None:
+        if event == 'least_distance':
+            self.least.append(found)
+            return
+        if event == 'separation_regained':  # the line of its beginning has the distance then
+            at = max(k for k, loss in enumerate(self.losses) if loss.uavs == found.uavs)
+            found = min(found, self.losses.pop(at), key=lambda loss: loss.distance)
+        self.losses.append(found)
+
+    def least_distance(self) -> float | None:
+        """The least distance of two vehicles in the air [m]; None: never two, or not judged."""
+        return min((pair.distance for pair in [*self.least, *self.losses]), default=None)
 
     def metres(self) -> float:
         """Length of all tracks [m]."""

@@ -16,6 +16,7 @@ from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.mavlink.transport.codec import Codec, Message
 from uav_task_alloc.sim.config import VehicleConfig
 from uav_task_alloc.sim.mission_server import AUTOPILOT_COMPONENT
+from uav_task_alloc.sim.separation_judge import Loss, SeparationJudge, TrueState
 from uav_task_alloc.sim.vehicle import AUTOPILOTS, Vehicle
 
 UdpAddress = tuple[str, int]
@@ -50,17 +51,21 @@ class UdpFleet:
         target: address to which all of them send unasked.
         speedup: vehicle time per wall time.
         log_file: of the ground truth, JSON lines; '': none.
+        separation: horizontal and vertical distance [m] that UAVs in the air have to keep, for
+            the ground truth; 0: no loss is judged.
     """
 
     def __init__(self, vehicles: Iterable[tuple[VehicleConfig, str]], target: UdpAddress,
-                 speedup: float = 1.0, log_file: str | Path = '') -> None:
+                 speedup: float = 1.0, log_file: str | Path = '',
+                 separation: tuple[float, float] = (0.0, 0.0)) -> None:
         self.speedup = speedup
         self._start, self._epoch = time.monotonic(), time.time()
         self._lock = threading.Lock()
         self._stopping = threading.Event()
         self._endpoints = {config.uav: _Endpoint(Vehicle(config, AUTOPILOTS[autopilot]), target)
                            for config, autopilot in vehicles}
-        self._log = _Log(log_file) if log_file else None
+        self._log = _Log(log_file, self._epoch) if log_file else None
+        self.judge = SeparationJudge(*separation)
         self._sample_at = 0.0
 
     @property
@@ -117,10 +122,17 @@ class UdpFleet:
             endpoint.step(now)
         if self._log is None:
             return
+        begun, ended = self.judge.step(now, {
+            name: TrueState(flight.body.position, flight.home,
+                            not flight.landed and not endpoint.vehicle.silent)
+            for name, endpoint in self._endpoints.items()
+            for flight in (endpoint.vehicle.flight,)})
+        self._log.losses('separation_lost', begun)
+        self._log.losses('separation_regained', ended)
         for name, endpoint in self._endpoints.items():
-            self._log.events(name, endpoint.vehicle, self._epoch)
+            self._log.events(name, endpoint.vehicle)
             if now >= self._sample_at:
-                self._log.sample(name, endpoint.vehicle, now, self._epoch)
+                self._log.sample(name, endpoint.vehicle, now)
         if now >= self._sample_at:
             self._sample_at = now + _SAMPLE
             self._log.flush()
@@ -140,6 +152,8 @@ class UdpFleet:
         for endpoint in self._endpoints.values():
             endpoint.socket.close()
         if self._log is not None:
+            self._log.losses('least_distance', [
+                Loss(pair, nearest, nearest.t) for pair, nearest in self.judge.least.items()])
             self._log.close()
 
 
@@ -194,7 +208,8 @@ def _times(now: float, epoch: float) -> dict[str, float]:
 class _Log:
     """The ground truth as JSON lines."""
 
-    def __init__(self, path: str | Path) -> None:
+    def __init__(self, path: str | Path, epoch: float) -> None:
+        self._epoch = epoch  # of /clock [unix s]
         try:
             Path(path).parent.mkdir(parents=True, exist_ok=True)
             self._file = open(path, 'w', encoding='utf-8')  # noqa: SIM115 - closed by close()
@@ -202,23 +217,32 @@ class _Log:
             raise InvalidValue('log_file', str(path),
                                f'a file that can be written ({error})') from None
 
-    def sample(self, uav: str, vehicle: Vehicle, now: float, epoch: float) -> None:
-        """Write position, mode and whether the vehicle is alive; `epoch`: of /clock [unix s]."""
+    def sample(self, uav: str, vehicle: Vehicle, now: float) -> None:
+        """Write position, mode and whether the vehicle is alive."""
         x, y, z = vehicle.flight.body.position
-        self._write({**_times(now, epoch), 'uav': uav,
+        self._write({**_times(now, self._epoch), 'uav': uav,
                      'x': round(x, 3), 'y': round(y, 3), 'z': round(z, 3),
                      'mode': vehicle.mode.value, 'alive': not vehicle.silent})
 
-    def events(self, uav: str, vehicle: Vehicle, epoch: float) -> None:
-        """Write the events since the last call; `epoch`: of /clock [unix s]."""
+    def events(self, uav: str, vehicle: Vehicle) -> None:
+        """Write the events since the last call."""
         for event in vehicle.take_events():
             x, y, z = event.point
             line: dict[str, Any] = {
-                **_times(event.t, epoch), 'uav': uav, 'event': event.name,
+                **_times(event.t, self._epoch), 'uav': uav, 'event': event.name,
                 'x': round(x, 3), 'y': round(y, 3), 'z': round(z, 3)}
             more = {'seq': event.seq, 'mode': event.mode, 'cause': event.cause or None,
                     'command': event.command or None}
             self._write(line | {key: value for key, value in more.items() if value is not None})
+
+    def losses(self, event: str, losses: Iterable[Loss]) -> None:
+        """Write how near pairs came, a line each with the time of that."""
+        for loss in losses:
+            self._write({**_times(loss.nearest.t, self._epoch), 'event': event,
+                         'uav': loss.uavs[0], 'other': loss.uavs[1],
+                         'since': round(self._epoch + loss.since, 3),
+                         'horizontal': round(loss.nearest.horizontal, 3),
+                         'vertical': round(loss.nearest.vertical, 3)})
 
     def _write(self, line: dict[str, Any]) -> None:
         self._file.write(json.dumps(line) + '\n')
