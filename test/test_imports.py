@@ -40,6 +40,8 @@ LEVELS = {
     'geometry.polygon': 0,  # `checks` checks polygons with it
     'geometry': 2,
     'objective': 2,
+    'separation.rule': 0,  # the model has its conflicts
+    'separation': 3,
     'solver': 3,
     'scenario': 3,
     'record': 4,

@@ -20,7 +20,8 @@ ROOT = Path(__file__).parent.parent
 
 def test_the_public_names_are_these():
     assert sorted(uav_task_alloc.__all__) == [
-        'Objective', 'Plan', 'SOLVERS', 'Task', 'ThreatZone', 'Uav', 'detour', 'plan']
+        'Objective', 'Plan', 'SOLVERS', 'Separation', 'Task', 'ThreatZone', 'Uav', 'detour',
+        'plan']
     assert all(hasattr(uav_task_alloc, name) for name in uav_task_alloc.__all__)
 
 

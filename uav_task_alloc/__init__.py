@@ -11,13 +11,15 @@ if TYPE_CHECKING:
     from uav_task_alloc.geometry.detour import detour
     from uav_task_alloc.model import Plan, Task, ThreatZone, Uav
     from uav_task_alloc.objective import Objective
+    from uav_task_alloc.separation.rule import Separation
     from uav_task_alloc.solver.registry import SOLVERS
     from uav_task_alloc.solver.solve import plan
 
-__all__ = ['SOLVERS', 'Objective', 'Plan', 'Task', 'ThreatZone', 'Uav', 'detour', 'plan']
+__all__ = ['SOLVERS', 'Objective', 'Plan', 'Separation', 'Task', 'ThreatZone', 'Uav', 'detour',
+           'plan']
 __version__ = '0.1.0'
 _MODULES = {'SOLVERS': 'solver.registry', 'Objective': 'objective', 'plan': 'solver.solve',
-            'detour': 'geometry.detour',
+            'detour': 'geometry.detour', 'Separation': 'separation.rule',
             **dict.fromkeys(('Plan', 'Task', 'ThreatZone', 'Uav'), 'model')}
 
 

@@ -22,7 +22,7 @@ from typing import Any, NamedTuple, TextIO
 
 from numba.core import caching, event
 
-ROOMS = ('geometry', 'solver')
+ROOMS = ('geometry', 'separation', 'solver')
 
 
 def _of_numba(name: str) -> Any:

@@ -10,6 +10,7 @@ from typing import Any
 
 from uav_task_alloc.checks import check_id, check_names, check_number, check_point, check_polygon
 from uav_task_alloc.errors import InvalidValue
+from uav_task_alloc.separation.rule import Conflict
 from uav_task_alloc.timetable import Timetable
 
 Point = tuple[float, float, float]  # [m] ENU
@@ -325,6 +326,7 @@ class Plan:
         cost: of the objective that the plan was solved for, smaller is better.
         timetable: returns the times of the plan; a function, as they are computed when they are
             first asked for.
+        conflicts: of UAVs that would not have been apart, and how each was resolved.
     """
 
     routes: dict[str, tuple[str, ...]]
@@ -343,6 +345,7 @@ class Plan:
     warm_started: bool = False
     cost: float = 0.0
     timetable: Callable[[], Timetable] = field(default=Timetable, compare=False, repr=False)
+    conflicts: tuple[Conflict, ...] = ()
 
     @property
     def arrivals(self) -> Mapping[str, float]:

@@ -133,8 +133,7 @@ class AllocatorParams(FrameParams):
     """allocator: plans for the UAVs, tasks and zones reported, publishes a list for each UAV."""
 
     solve_budget: float = param(0.1, 'Solve time of one replan.', low=0.001, high=60.0, unit='s')
-    route_end: str = param('home', 'What a UAV does after its last task.',
-                           choices=('hold', 'home'))
+    route_end: str = param('home', 'What a UAV does after its tasks.', choices=('hold', 'home'))
     uav_timeout: float = param(5.0, 'Silence after which the tasks of a UAV go to the others.',
                                low=0.1, high=3600.0, unit='s')
     default_range: float = param(20000.0, 'Range of a UAV that does not report its own.', low=0.0,
@@ -164,8 +163,8 @@ class AllocatorParams(FrameParams):
                                  'one that is flown.', low=0.0, high=1.0)
     background_budget: float = param(0.05, 'Time of one search between events; 0: none.',
                                      low=0.0, high=10.0, unit='s')
-    background_period: float = param(0.5, 'Pause between two such searches.', low=0.05,
-                                     high=3600.0, unit='s')
+    background_period: float = param(
+        0.5, 'Pause between two such searches.', low=0.05, high=3600.0, unit='s')
     list_interval: float = param(0.25, 'Minimum time between two lists for one UAV, unless it '
                                  'cannot fly the first.', low=0.0, high=3600.0, unit='s')
     locked_tasks: int = param(1, 'Tasks of a list that stay with a UAV in flight: the active '
@@ -183,8 +182,14 @@ class AllocatorParams(FrameParams):
                           choices=('none', 'replan', 'all'))
     approval_timeout: float = param(30.0, 'Time after which a plan that waits is decided without '
                                     'an operator.', low=1.0, high=86400.0, unit='s')
-    approval_on_timeout: str = param('reject', 'How it is decided then.',
-                                     choices=('accept', 'reject'))
+    approval_on_timeout: str = param(
+        'reject', 'How it is decided then.', choices=('accept', 'reject'))
+    separation__horizontal: float = param(
+        0.0, 'Distance that keeps two UAVs apart; 0: off.', low=0.0, high=1000.0, unit='m')
+    separation__vertical: float = param(
+        5.0, 'Height that does so at any distance.', low=0.1, high=1000.0, unit='m')
+    separation__time: float = param(
+        2.0, 'By which a UAV may be early or late.', low=0.0, high=60.0, unit='s')
     state_dir: str = param('', 'Folder of the journal; empty: nothing is stored.', fixed=True)
     threads: int = param(1, 'Colonies of bees, each in its own thread.', low=1, high=64)
     seed: int = param(0, 'Seed of the bees.', low=0, high=2**31 - 1, fixed=True)

@@ -10,6 +10,7 @@ from uav_task_alloc.allocator.records import ReplanProblem
 from uav_task_alloc.model import Task, Uav
 from uav_task_alloc.objective import OBJECTIVES, Objective
 from uav_task_alloc.params import AllocatorParams
+from uav_task_alloc.separation.rule import Separation
 
 
 def objective_of(params: AllocatorParams) -> Objective:
@@ -23,6 +24,16 @@ def objective_of(params: AllocatorParams) -> Objective:
     """
     return Objective(*params.objective_weights) if params.objective_weights else OBJECTIVES[
         params.objective]
+
+
+def separation_of(params: AllocatorParams) -> Separation:
+    """Return the rule that keeps UAVs apart.
+
+    Args:
+        params: with its distances.
+    """
+    return Separation(params.separation__horizontal, params.separation__vertical,
+                      params.separation__time)
 
 
 def is_timed(task: Task) -> bool:
