@@ -223,6 +223,7 @@ class MissionExecutor:
 
     def _act(self, now: float) -> list[Message]:
         out: list[Message] = []
+        self._report(now)  # the marks are saved with the current item that is past their tasks
         self.watch.step(now)
         self.onboard.complete_flown(now)
         for rule in self._rules:

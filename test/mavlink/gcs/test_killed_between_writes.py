@@ -1,0 +1,96 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A bridge killed before or after any write to its state_dir: no task is lost or flown twice."""
+import pytest
+from flight_bench import FlightBench, Store, places
+from mission_bench import task_list
+
+from uav_task_alloc.mavlink.gcs.authority import AuthorityState
+
+NAMES = 'ABC'
+
+
+class Killed(BaseException):
+    """The end of the bridge, which no `except Exception` prevents."""
+
+
+class KillingStore(Store):
+    """A state_dir whose bridge is killed at one write of where it is in its list."""
+
+    def __init__(self, write, before):
+        super().__init__()
+        self.writes_left, self.before = write, before
+
+    def save(self, uav_id, record):
+        known = self.records.get(uav_id)
+        if known is None or progress_of(known) == progress_of(record):
+            super().save(uav_id, record)
+            return
+        self.writes_left -= 1
+        if self.writes_left or not self.before:
+            super().save(uav_id, record)
+        if not self.writes_left:
+            raise Killed
+
+
+def progress_of(record):
+    return (record.mission, record.current, record.arrived, record.uploading,
+            record.replacing_since, record.marks)
+
+
+class KilledBench(FlightBench):
+    """A bridge that is started again when it was killed, and an allocator that shortens lists."""
+
+    def __init__(self, kind, write, before, down, service):
+        self.killed, self.down, self.service = False, down, service
+        self.done, self.listed, self.revision = [], None, 0
+        super().__init__(kind, store=KillingStore(write, before), delay=(0.02, 0.02))
+
+    def guard(self, call):
+        """Call the bridge; what it has not published when it is killed is lost."""
+        try:
+            call()
+        except Killed:
+            self.killed, self.listed = True, None
+            self.start()
+            self.line.cut = True
+            self.run(limit=self.down)
+            self.line.cut = False
+
+    def _move(self):
+        self.guard(super()._move)
+
+    def _collect(self):
+        super()._collect()
+        self.done += [task for task in self.completed() if task not in self.done]
+        assert set(self.done) <= set(places(self))
+
+    def allocate(self):
+        """List the tasks not reported yet; an operator hands the aircraft over where it is due."""
+        left = [name for name in NAMES if name not in self.done]
+        if self.ground_station.sessions:
+            if self.authority() is AuthorityState.LOST:
+                self.hand_over()
+            if left != self.listed:
+                self.listed, self.revision = left, self.revision + 1
+                self.guard(lambda: self.assign(
+                    task_list(left, self.revision, service=self.service)))
+        return not left
+
+    def fly(self):
+        """Fly the list; returns the tasks of the places reached, in order."""
+        assert self.run(self.allocate), (self.done, places(self))
+        self.run(limit=8.0)
+        return places(self)
+
+
+@pytest.mark.parametrize('kind', ['ardupilot', 'px4'])
+@pytest.mark.parametrize('before', [True, False])
+@pytest.mark.parametrize(('down', 'service'), [(0.0, 0.0), (15.0, 3.0)])
+def test_killed_at_any_write_each_task_is_flown_once_and_reported(kind, before, down, service):
+    write, killed = 0, True
+    while killed:
+        write += 1
+        bench = KilledBench(kind, write, before, down, service)
+        assert bench.fly() == list(NAMES), f'write {write}'
+        killed = bench.killed
+    assert write > len(NAMES)
