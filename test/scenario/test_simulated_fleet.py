@@ -1,10 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a scenario says about simulated vehicles: wind, charge, and limits for the bridge."""
+from pathlib import Path
+
 import pytest
 
 from uav_task_alloc import scenario
 from uav_task_alloc.errors import ScenarioError
 
+CROSSING = Path(__file__).parents[2] / 'config/scenarios/crossing.yaml'
 UAV = 'uavs:\n  - {id: u1, position: [0, 0, 0]}\n'
 
 
@@ -26,3 +29,19 @@ def test_the_limits_of_a_scenario_reach_the_bridge():
     assert bridge['full_ranges'] == ['u1:8000.0']
     assert bridge['uav_limits'] == [
         'u1:cruise_speed=15.0,climb_speed=4.0,endurance=300.0,turnaround=90.0']
+
+
+def test_the_separation_of_uavs_is_read_written_and_passed_on():
+    crossing = scenario.load(CROSSING)
+    assert (crossing.separation.horizontal, crossing.separation.vertical) == (10.0, 5.0)
+    assert scenario.parse(scenario.to_yaml(crossing)).separation == crossing.separation
+    fleet = scenario.fleet_parameters(crossing)
+    assert fleet['allocator']['separation.horizontal'] == 10.0
+    assert fleet['allocator']['separation.time'] == 2.0
+    with pytest.raises(ScenarioError, match=r'separation: vertical = 0'):
+        scenario.parse('uavs: [{id: u1, position: [0, 0, 0]}]\n'
+                       'separation: {horizontal: 10, vertical: 0}\n')
+    plain = scenario.parse('uavs: [{id: uav_1, position: [0, 0, 0]}]\n')
+    assert not plain.separation.on
+    assert not any('separation' in name for name in
+                   scenario.fleet_parameters(plain)['allocator'])

@@ -39,7 +39,8 @@ class FleetSim(Node):
         played = scenario.load(given('scenario', params.scenario, 'a scenario file'))
         self.fleet = UdpFleet(
             [(vehicle_config(uav, played, params), uav.autopilot) for uav in played.uavs],
-            known_address(params.target), params.speedup, params.log_file)
+            known_address(params.target), params.speedup, params.log_file,
+            (played.separation.horizontal, played.separation.vertical))
         self.thread = self.fleet.start()
         if params.clock:
             self.publisher = ClockPublisher(self, self.fleet.clock)

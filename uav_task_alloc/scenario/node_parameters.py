@@ -8,6 +8,7 @@ from pathlib import Path
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.objective import Objective
 from uav_task_alloc.params import MAX_RANGE, BridgeParams, PlayerParams
+from uav_task_alloc.scenario.schema import SEPARATION
 from uav_task_alloc.scenario.values import Scenario, ScenarioUav
 
 Value = bool | int | float | str | list[str] | list[int] | list[float]
@@ -38,7 +39,7 @@ def fleet_parameters(played: Scenario) -> dict[str, Parameters]:
                       'clearance': played.clearance, 'altitude_min': played.altitude_min,
                       'altitude_max': played.altitude_max,
                       'default_range': min(map(_range, played.uavs)),
-                      'trips': played.trips, **_objective(played)},
+                      'trips': played.trips, **_objective(played), **_separation(played)},
         'mavlink_bridge': {**origin,
                            'full_ranges': [f'{uav.id}:{_range(uav)}' for uav in played.uavs],
                            'system_ids': [uav.system_id for uav in played.uavs],
@@ -121,6 +122,13 @@ def _objective(played: Scenario) -> Parameters:
     if isinstance(played.objective, Objective):
         return {'objective_weights': played.objective.coefficients.tolist()}
     return {} if played.objective is None else {'objective': played.objective}
+
+
+def _separation(played: Scenario) -> Parameters:
+    """How UAVs are kept apart; nothing where the scenario does not say."""
+    rule = played.separation
+    return {f'separation.{name}': float(getattr(rule, name)) for name in SEPARATION
+            } if rule.on else {}
 
 
 def _capabilities(uav: ScenarioUav) -> str:

@@ -28,6 +28,7 @@ from uav_task_alloc.scenario.values import (
     TimedTask,
     TimedZone,
 )
+from uav_task_alloc.separation.rule import Separation
 from uav_task_alloc.zone_codec import USED_KEYS, decode_zone
 
 _Value = TypeVar('_Value')
@@ -95,7 +96,14 @@ def parse(text: str, name: str = 'scenario') -> Scenario:
                     tuple(sorted(cancels, key=lambda cancel: cancel.at)), root['route_end'],
                     root['speedup'], root['clearance'], root['altitude_min'],
                     root['altitude_max'], _objective(root['objective']), root['trips'],
-                    ScenarioWind(**root['wind'].values) if root['wind'] else ScenarioWind())
+                    ScenarioWind(**root['wind'].values) if root['wind'] else ScenarioWind(),
+                    _separation(root['separation']))
+
+
+def _separation(given: YamlRow | None) -> Separation:
+    if given is None:
+        return Separation()
+    return _valid(given, lambda: Separation(**given.values))
 
 
 def _objective(given: str | YamlRow | None) -> str | Objective | None:

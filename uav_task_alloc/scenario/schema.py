@@ -114,6 +114,15 @@ _WIND: KeyTable = {
                  'of `seed`', 0.0),
 }
 
+SEPARATION: KeyTable = {
+    'horizontal': Key(number_value(0.0, 1000.0), '[m] that keeps two UAVs in the air apart; 0: '
+                      'nothing does'),
+    'vertical': Key(number_value(0.0, 1000.0), '[m] that keeps them apart at any horizontal '
+                    'distance', AllocatorParams.separation__vertical),
+    'time': Key(number_value(0.0, 60.0), '[s] by which each may be early or late',
+                AllocatorParams.separation__time),
+}
+
 OBJECTIVE: KeyTable = {
     'distance': Key(_PRICE, '[1/m] of the length of all routes', _SHORTEST.distance),
     'finish': Key(_PRICE, '[1/s] of the end of the last route', _SHORTEST.finish),
@@ -184,6 +193,9 @@ SCENARIO: KeyTable = {
                         AllocatorParams.altitude_max),
     'wind': Key(mapping(_WIND, 'a mapping with east, north, gusts'),
                 'in which simulated UAVs fly; `plan` ignores it; default: calm', None),
+    'separation': Key(mapping(SEPARATION, 'a mapping with horizontal, vertical, time'),
+                      'how UAVs are kept apart, and by what a simulated flight is judged; '
+                      'default: not at all', None),
     'speedup': Key(number_value(0.1, 100.0), 'factor on real time of demo and '
                    'demo.launch.py', DEFAULT_SPEEDUP),
     'uavs': Key(list_of(mapping(UAV, 'a UAV'), 'a list of UAVs'), 'the fleet'),
@@ -198,4 +210,5 @@ SCENARIO: KeyTable = {
 }
 
 TABLES = {'scenario': SCENARIO, 'origin': ORIGIN, 'objective': OBJECTIVE, 'wind': _WIND,
-          'uavs': UAV, 'tasks': TASK, 'zones': _ZONE, 'arrivals': _ARRIVALS, 'cancels': CANCEL}
+          'separation': SEPARATION, 'uavs': UAV, 'tasks': TASK, 'zones': _ZONE,
+          'arrivals': _ARRIVALS, 'cancels': CANCEL}

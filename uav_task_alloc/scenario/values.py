@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 
 from uav_task_alloc.geometry.frames import Origin
 from uav_task_alloc.model import Point, Task, ThreatZone, Uav
 from uav_task_alloc.objective import Objective
 from uav_task_alloc.params import AllocatorParams
+from uav_task_alloc.separation.rule import Separation
 
 DEFAULT_ORIGIN = Origin(47.397742, 8.545594, 488.0)
 DEFAULT_SPEEDUP = 8.0  # times faster than real time
@@ -129,6 +130,7 @@ class Scenario:
     objective: str | Objective | None = None  # a name of OBJECTIVES, or prices; None: not given
     trips: int = 1  # of each UAV
     wind: ScenarioWind = ScenarioWind()  # of a simulated flight
+    separation: Separation = field(default_factory=Separation)  # horizontal 0: none
 
     @property
     def duration(self) -> float:

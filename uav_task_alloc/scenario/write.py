@@ -9,6 +9,7 @@ from typing import Any
 import yaml
 
 from uav_task_alloc.model import Task
+from uav_task_alloc.scenario.schema import SEPARATION
 from uav_task_alloc.scenario.values import (
     TASK_TIMES,
     UAV_LIMITS,
@@ -43,6 +44,8 @@ def to_yaml(scenario: Scenario) -> str:
             else asdict(scenario.objective)}),
         'trips': scenario.trips,
         'wind': asdict(scenario.wind),
+        **({'separation': {name: getattr(scenario.separation, name) for name in SEPARATION}}
+           if scenario.separation.on else {}),
         'uavs': [_uav(uav) for uav in scenario.uavs],
         'tasks': [_task(timed) for timed in scenario.tasks],
         'zones': [_zone(timed) for timed in scenario.zones],
