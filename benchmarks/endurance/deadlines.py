@@ -318,8 +318,8 @@ class Mission:
                     starts[task.id] = max(reached[1], task.earliest)
                     clock = max(clock - task.service_time, starts[task.id])
                 else:
-                    clock += leg_seconds(pace, place, task.position)
-                    clock += pace.stop_time * (0.5 if k == 0 else 1.0)
+                    clock += leg_seconds(pace, place, task.position,
+                                         record.report.velocity if k == 0 else None)
                     clock = starts[task.id] = max(clock, task.earliest)
                 clock, place = clock + task.service_time, task.position
         return starts
@@ -346,15 +346,23 @@ class Mission:
                     f'reported {reported:.1f}, latest {latest:.1f}, start {start:.1f}')
 
 
-def leg_seconds(pace: FlightPace, start: Point, end: Point) -> float:
-    """Time of a level leg with measured wind and speed [s]."""
+def leg_seconds(pace: FlightPace, start: Point, end: Point, velocity: Point | None) -> float:
+    """Time of a level leg with measured wind, speed and stops, from a velocity or rest [s]."""
     dx, dy = end[0] - start[0], end[1] - start[1]
     length = math.hypot(dx, dy)
     if length == 0.0:
         return 0.0
     along = (pace.wind[0] * dx + pace.wind[1] * dy) / length
     across = pace.wind[0]**2 + pace.wind[1]**2 - along**2
-    return length / max(along + math.sqrt(max(0.0, pace.speed**2 - across)), 0.1 * pace.speed)
+    fast = max(along + math.sqrt(max(0.0, pace.speed**2 - across)), 0.1 * pace.speed)
+    vx, vy, _ = velocity or (0.0, 0.0, 0.0)
+    begin = min(fast, max(0.0, (vx * dx + vy * dy) / length))
+    gain = fast / pace.stop_time if pace.stop_time else math.inf  # [m/s2] also of braking
+    if begin**2 >= 2.0 * gain * length:
+        return 2.0 * length / begin
+    top = min(fast, math.sqrt(gain * length + 0.5 * begin**2))
+    even = length - (top**2 - begin**2 + top**2) / (2.0 * gain)  # [m] at the top speed
+    return (top - begin + top) / gain + even / top
 
 
 def main() -> int:

@@ -7,7 +7,13 @@ import pytest
 from allocation import AllocatorDriver
 
 from uav_task_alloc.allocator.records import ListStop
-from uav_task_alloc.allocator.state.flight_pace import FlightPace, UavFlight, timed_stops
+from uav_task_alloc.allocator.state.flight_pace import (
+    FlightPace,
+    UavFlight,
+    measured_stop,
+    stopping,
+    timed_stops,
+)
 from uav_task_alloc.allocator.state.wind import WindEstimate
 from uav_task_alloc.geometry.flight_time import flight_time
 from uav_task_alloc.model import Leg, Task, Uav
@@ -100,6 +106,52 @@ def test_a_uav_on_the_ground_climbs_first():
     assert made[0].eta == pytest.approx(20.0 + 10.0)
 
 
+def test_a_short_leg_is_flown_without_reaching_the_cruise_speed():
+    pace = FlightPace(10.0, stop_time=4.0)  # accelerates with 2.5 m/s2
+    assert pace.from_stop([(0.0, 0.0, 0.0), (40.0, 0.0, 0.0)]) == pytest.approx(8.0)
+    assert pace.from_stop([(0.0, 0.0, 0.0), (10.0, 0.0, 0.0)]) == pytest.approx(4.0)
+    assert pace.from_stop([(0.0, 0.0, 0.0), (90.0, 0.0, 0.0)]) == pytest.approx(13.0)
+
+
+def test_the_leg_under_way_is_timed_by_the_present_velocity():
+    pace = FlightPace(10.0, stop_time=4.0)
+    for velocity, eta in [(None, 12.0), ((10.0, 0.0, 0.0), 12.0), ((0.0, 0.0, 0.0), 14.0),
+                          ((0.0, 7.0, 0.0), 14.0), ((5.0, 0.0, 0.0), 12.5)]:
+        made = timed_stops(stops(at(100)), UavFlight((0.0, 0.0, 50.0), pace, velocity=velocity))
+        assert made[0].eta == pytest.approx(eta)
+    braking = timed_stops(stops(at(5)), UavFlight((0.0, 0.0, 50.0), pace,
+                                                  velocity=(5.0, 0.0, 0.0)))
+    assert braking[0].eta == pytest.approx(2.0)
+
+
+def test_detour_points_cost_time_as_sharp_as_they_are():
+    pace = FlightPace(10.0, stop_time=4.0)
+    straight, slight, back = ([(0.0, 0.0, 0.0), (100.0, 0.0, 0.0), end] for end in (
+        (200.0, 0.0, 0.0), (200.0, 60.0, 0.0), (0.0, 1.0, 0.0)))
+    assert pace.corners(straight) == 0.0
+    assert 0.0 < pace.corners(slight) < pace.corners(back) < 1.0
+
+
+def test_a_take_off_takes_its_time():
+    pace = FlightPace(10.0, climb=2.5, takeoff=4.0)
+    made = timed_stops(stops(at(100)), UavFlight((0.0, 0.0, 0.0), pace, on_ground=True))
+    assert made[0].eta == pytest.approx(4.0 + 20.0 + 10.0)
+
+
+def test_before_any_stop_was_measured_it_costs_what_it_costs_a_usual_copter():
+    driver = AllocatorDriver()
+    driver.uav('a', 0.0, 0.0, 50.0, cruise_speed=10.0)
+    assert driver.world.flights.pace('a').stop_time == 4.0
+    assert driver.world.flights.stop_time == 4.0
+
+
+def test_the_measured_stop_is_the_inverse_of_the_time_of_a_leg():
+    for stop_time in (1.0, 4.0, 9.0):
+        for seconds in (2.0, 6.0, 30.0):
+            flown = stopping(seconds, stop_time)
+            assert measured_stop(seconds, flown, 0.0) == pytest.approx(stop_time)
+
+
 def test_a_service_under_way_counts_from_its_begin():
     served = {'serving': 't0', 'served': 3.0}
     assert times(at(0, service_time=8.0), at(100), **served) == [
@@ -152,4 +204,4 @@ def test_a_uav_that_was_without_a_list_on_a_leg_measures_no_stop():
     driver.settle(wait=1.0)
     driver.now += 15.0
     driver.event('COMPLETED', 'u200', 'a')
-    assert driver.world.flights.pace('a').stop_time == 0.0
+    assert driver.world.flights.pace('a').stop_time == 10.0 / 2.5

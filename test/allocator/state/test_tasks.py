@@ -32,8 +32,9 @@ def test_tasks_go_into_lists_with_arrival_times(driver):
     assert driver.route('a') == ('t1', 't2')
     assert driver.route('b') == ('t3',)
     first, second = driver.lists['a'].stops
-    assert (first.leg.length, first.eta) == (100.0, pytest.approx(100.0 / 15.0))
-    assert second.eta == pytest.approx(200.0 / 15.0)
+    stop = 15.0 / 2.5  # [s] that a stop is expected to cost
+    assert (first.leg.length, first.eta) == (100.0, pytest.approx(100.0 / 15.0 + 0.5 * stop))
+    assert second.eta == pytest.approx(200.0 / 15.0 + 1.5 * stop)
     assert driver.lists['a'].distance == 200.0
 
 
@@ -42,7 +43,7 @@ def test_service_times_delay_what_comes_after():
     driver.uav('a', 0.0, 0.0, 50.0, cruise_speed=10.0)
     driver.add(Task('t1', (100.0, 0.0, 50.0), service_time=7.0), ('t2', 200, 0))
     driver.settle()
-    assert [stop.eta for stop in driver.lists['a'].stops] == [10.0, 27.0]
+    assert [stop.eta for stop in driver.lists['a'].stops] == [12.0, 33.0]  # 4 s a stop
 
 
 @pytest.mark.parametrize('speedup', [1.0, 8.0, 40.0])
@@ -57,13 +58,13 @@ def test_arrival_times_are_those_of_the_flight_however_fast_the_fleet_is_simulat
     driver.core.tick(driver.now, driver.now)
     driver.take()
     assert driver.route('a') == ('t2', 't3')
-    assert [stop.eta for stop in driver.lists['a'].stops] == [9.5, 19.5]
+    assert [stop.eta for stop in driver.lists['a'].stops] == [11.5, 25.5]
     driver.now += 5.0 / speedup  # another list is on board: this one is published again
     driver.uav('a', 155.0, 0.0, 50.0, cruise_speed=10.0, list_revision=9)
     driver.core.tick(driver.now, driver.now)
     driver.take()
     assert driver.lists['a'].revision == 10
-    assert [stop.eta for stop in driver.lists['a'].stops] == pytest.approx([4.5, 14.5])
+    assert [stop.eta for stop in driver.lists['a'].stops] == pytest.approx([6.5, 20.5])
 
 
 def test_a_burst_costs_one_solve():

@@ -1,5 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""When a UAV reaches the stops of its list: speed, wind, time lost at stops, windows and waits."""
+"""When a UAV reaches the stops of its list: speed, wind, time lost at stops, windows and waits.
+
+A leg begins and ends at rest. With the cruise speed v and the time s that a stop costs, a UAV
+gains and loses speed with v / s [m/s2]; on a leg shorter than v s it does not reach v. At a detour
+point it slows down as far as a corner of _CORNER at that acceleration demands.
+"""
 from __future__ import annotations
 
 import math
@@ -12,6 +17,8 @@ from uav_task_alloc.geometry.polyline import points_passed
 from uav_task_alloc.model import Point, Uav
 
 _SLOWEST = 0.1  # share of the speed that is left against the strongest wind
+_ACCELERATION = 2.5  # [m/s2] before any stop is measured: WPNAV_ACCEL; 3.0: MPC_ACC_HOR
+_CORNER = 2.0  # [m] by which a corner is cut or overshot: WPNAV_RADIUS, NAV_ACC_RAD
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,7 +33,9 @@ class FlightPace:
     climb: float = math.inf  # [m/s]
     descent: float = math.inf  # [m/s]
     wind: tuple[float, float] = (0.0, 0.0)  # [m/s] ENU, as far as it changes the ground speed
-    stop_time: float = 0.0  # [s] lost by braking before a stop and accelerating after it
+    stop_time: float = 0.0  # [s] lost by braking before a stop and accelerating after it; of
+    # a leg that is long enough for the full speed
+    takeoff: float = 0.0  # [s] lost by arming, spooling up the motors and beginning the climb
 
     @classmethod
     def of(cls, uav: Uav) -> FlightPace:
@@ -65,12 +74,92 @@ class FlightPace:
         return total
 
     @property
+    def usual_stop(self) -> float:
+        """The time that a stop costs a copter of this speed where none was measured [s]."""
+        return self.speed / _ACCELERATION
+
+    def corners(self, points: Sequence[Point]) -> float:
+        """Return the time lost at the inner points of a polyline, in stops.
+
+        Args:
+            points: [m] ENU, from stop to stop.
+
+        Returns:
+            0.0 for a straight line; 1.0 for each point where a UAV has to turn back.
+        """
+        if self.stop_time == 0.0 or len(points) < 3:
+            return 0.0
+        slow = math.sqrt(2.0 * _CORNER / (self.speed * self.stop_time))
+        return math.fsum(max(0.0, 1.0 - slow / max(sine, 1e-9)) ** 2
+                         for sine in map(_turn, points, points[1:], points[2:]))
+
+    def from_stop(self, points: Sequence[Point], share: float = 0.0) -> float:
+        """Return the time along a polyline that ends with a stop.
+
+        Args:
+            points: [m] ENU.
+            share: of its speed that the UAV has at the begin, 0 to 1.
+
+        Returns:
+            [s].
+        """
+        return stopping(self.seconds(points), self.stop_time, share) + (
+            self.stop_time * self.corners(points))
+
+    @property
     def mean_speed(self) -> float:
         """Ground speed that takes the mean time of eight directions [m/s]."""
         if self.wind == (0.0, 0.0):
             return self.speed
         ways = [(math.cos(k * math.pi / 4.0), math.sin(k * math.pi / 4.0)) for k in range(8)]
         return 8.0 / sum(1.0 / self.ground_speed(*way) for way in ways)
+
+
+def stopping(seconds: float, stop_time: float, share: float = 0.0) -> float:
+    """Return the time of a way at whose end a UAV comes to rest.
+
+    Args:
+        seconds: [s] of the way at full speed.
+        stop_time: [s] lost by a start and a stop, where the way is long enough.
+        share: of its speed that the UAV has at the begin, 0 to 1.
+
+    Returns:
+        [s]; `seconds` + `stop_time` for a long way from rest.
+    """
+    if stop_time <= 0.0 or seconds <= 0.0:
+        return seconds
+    way = seconds / stop_time  # now the speed and the acceleration are 1
+    if 2.0 * way <= share * share:  # it brakes
+        return stop_time * 2.0 * way / share
+    top = math.sqrt(way + 0.5 * share * share)
+    if top < 1.0:
+        return stop_time * (2.0 * top - share)
+    return stop_time * (way + 0.5 + 0.5 * (1.0 - share) ** 2)
+
+
+def measured_stop(seconds: float, flown: float, corners: float) -> float:
+    """Return what a stop costs by the time of a way between two; the inverse of `from_stop`.
+
+    Args:
+        seconds: [s] of the way at full speed, above 0.
+        flown: [s] that it took.
+        corners: of the way, see `FlightPace.corners`.
+
+    Returns:
+        [s]; 0.0 where it was faster than planned.
+    """
+    lost = max(0.0, flown - seconds) / (1.0 + corners)
+    return lost if lost <= seconds else flown * flown / (4.0 * seconds)
+
+
+def _turn(a: Point, b: Point, c: Point) -> float:
+    """Sine of the change of direction at b, 1 for more than a right angle."""
+    one, two = (b[0] - a[0], b[1] - a[1]), (c[0] - b[0], c[1] - b[1])
+    lengths = math.hypot(*one) * math.hypot(*two)
+    if lengths == 0.0:
+        return 0.0
+    across = abs(one[0] * two[1] - one[1] * two[0]) / lengths
+    return min(1.0, across) if one[0] * two[0] + one[1] * two[1] > 0.0 else 1.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,6 +173,26 @@ class UavFlight:
     serving: str = ''  # id of the task that it has reached and not completed
     served: float = 0.0  # [s] since it reached that
     home: Point | None = None  # [m] ENU
+    velocity: Point | None = None  # [m/s] ENU over ground; None: unknown
+
+    def share(self, towards: Point) -> float:
+        """Return the share of its speed at which it flies towards a point [m] ENU, 0 to 1.
+
+        Args:
+            towards: the next point of its way [m] ENU.
+
+        Returns:
+            1.0 where its velocity is not known.
+        """
+        if self.velocity is None:
+            return 1.0
+        way = [b - a for a, b in zip(self.position, towards, strict=True)]
+        length = math.hypot(*way)
+        full = self.pace.seconds((self.position, towards))
+        if full == 0.0:
+            return 1.0
+        along = sum(v * d for v, d in zip(self.velocity, way, strict=True)) / length
+        return min(1.0, max(0.0, along * full / length))
 
     @classmethod
     def of(cls, uav: Uav, stamp: float = 0.0) -> UavFlight:
@@ -135,15 +244,16 @@ def _earliest_departure(stops: Sequence[ListStop], flight: UavFlight) -> float:
 
 def _leg_seconds(stop: ListStop, flight: UavFlight, place: Point, start: Point | None,
                  first: bool) -> float:
-    """Flight time of a leg; in flight the acceleration at its begin is over."""
+    """Flight time of a leg; the first one from where the UAV is, as fast as it is."""
     leg = (*stop.leg.via, stop.task.position)
     if not first:
-        return flight.pace.seconds((place, *leg)) + flight.pace.stop_time
+        return flight.pace.from_stop((place, *leg))
     if flight.on_ground:  # it climbs before it flies
         above = (place[0], place[1], max(place[2], leg[0][2]))
-        return flight.pace.seconds((place, above, *leg)) + flight.pace.stop_time
+        return (flight.pace.takeoff + flight.pace.seconds((place, above))
+                + flight.pace.from_stop((above, *leg)))
     rest = leg[points_passed(place, leg, start):]
-    return flight.pace.seconds((place, *rest)) + 0.5 * flight.pace.stop_time
+    return flight.pace.from_stop((place, *rest), flight.share(rest[0]))
 
 
 def finish_time(each: UavList, flight: UavFlight) -> float:
@@ -161,4 +271,4 @@ def finish_time(each: UavList, flight: UavFlight) -> float:
     last, home = each.stops[-1], flight.home
     if not each.returns or home is None:
         return last.finish
-    return last.finish + flight.pace.seconds((last.task.position, *each.end_via, home))
+    return last.finish + flight.pace.from_stop((last.task.position, *each.end_via, home))

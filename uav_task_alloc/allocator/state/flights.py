@@ -8,7 +8,11 @@ from dataclasses import dataclass
 
 from uav_task_alloc.allocator.records import UavReport
 from uav_task_alloc.allocator.state.fleet import Fleet
-from uav_task_alloc.allocator.state.flight_pace import FlightPace, UavFlight
+from uav_task_alloc.allocator.state.flight_pace import (
+    FlightPace,
+    UavFlight,
+    measured_stop,
+)
 from uav_task_alloc.allocator.state.published_lists import PublishedLists
 from uav_task_alloc.allocator.state.wind import WindEstimate
 from uav_task_alloc.params import AllocatorParams
@@ -21,8 +25,10 @@ _LEVEL = 0.5  # share of the climb or descent speed above which the vertical set
 AT_HOME = 10.0  # [m] from its home within which a UAV on the ground is at its base
 _AT_STOP = 3.0  # [m] within which a task is reached that has no radius of its own
 _SMOOTHING = 0.3  # weight of a new time lost at a stop
+_SHORTEST_LEG = 1.0  # [s] at full speed below which a leg says nothing about stops
 _LONGEST_STOP = 20.0  # [s] a longer delay is not that of a stop
 _OWN_STOPS = 3  # stops after which a UAV has a mean of its own
+_TAKEOFF = 4.0  # [s] from the command until it climbs at its rate: arming, spooling up
 
 
 @dataclass(slots=True)
@@ -44,7 +50,9 @@ class _Leg:
 
     task: str  # at its end
     began: float  # [s]
-    seconds: float  # planned, with the service
+    seconds: float  # planned, at full speed
+    corners: float  # in stops
+    service: float  # [s]
 
 
 class Flights:
@@ -109,20 +117,22 @@ class Flights:
         """Measure by the completion of the first task of a list that is still in force."""
         leg = self._legs.pop(uav_id, None)
         if leg is not None and leg.task == task_id:
-            lost = stamp - leg.began - leg.seconds
-            if -_LONGEST_STOP < lost < _LONGEST_STOP:
-                self._all_stops.add(max(0.0, lost))
-                self._stops.setdefault(uav_id, _Stops()).add(max(0.0, lost))
+            flown = stamp - leg.began - leg.service
+            if abs(flown - leg.seconds) < _LONGEST_STOP and leg.seconds > _SHORTEST_LEG:
+                lost = measured_stop(leg.seconds, flown, leg.corners)
+                self._all_stops.add(lost)
+                self._stops.setdefault(uav_id, _Stops()).add(lost)
         stops = self._lists.get(uav_id).stops
         if (uav_id not in self._fleet.records or len(stops) < 2
                 or stops[0].task.id != task_id):
             return
         task, following = stops[0].task, stops[1]
-        seconds = self._moving_pace(uav_id).seconds(
-            (task.position, *following.leg.via, following.task.position))
+        way = task.position, *following.leg.via, following.task.position
+        pace = self.pace(uav_id)
+        seconds = pace.seconds(way)
         if max(following.task.earliest, following.task.release) < stamp + seconds:  # no wait
-            self._legs[uav_id] = _Leg(following.task.id, stamp,
-                                      seconds + following.task.service_time)
+            self._legs[uav_id] = _Leg(following.task.id, stamp, seconds, pace.corners(way),
+                                      following.task.service_time)
 
     def clock_jumped(self) -> None:
         """Drop what was measured across a jump of the published clock."""
@@ -144,7 +154,8 @@ class Flights:
             return None
         task_id, reached = self._reached.get(uav_id, ('', stamp))
         return UavFlight(record.report.position, self.pace(uav_id), stamp,
-                         record.report.standby, task_id, max(0.0, stamp - reached), record.home)
+                         record.report.standby, task_id, max(0.0, stamp - reached), record.home,
+                         record.report.velocity)
 
     def at_home_since(self, uav_id: str) -> float | None:
         """Return since when a UAV is on the ground at its home [s]; None: it is not."""
@@ -152,21 +163,27 @@ class Flights:
 
     @property
     def stop_time(self) -> float:
-        """The time that a stop costs the UAVs of the fleet on average [s]."""
-        return self._all_stops.mean
+        """The time that a stop costs the UAVs of the fleet on average [s]; see `pace`."""
+        if self._all_stops.count:
+            return self._all_stops.mean
+        usual = [self._planned(record.report).usual_stop
+                 for record in self._fleet.records.values()]
+        return sum(usual) / len(usual) if usual else 0.0
 
     def pace(self, uav_id: str) -> FlightPace:
-        """Return how fast a known UAV flies: as measured where it was, else as planned."""
-        pace = self._moving_pace(uav_id)
-        own = self._stops.get(uav_id)
-        stops = own if own is not None and own.count >= _OWN_STOPS else self._all_stops
-        return FlightPace(pace.speed, pace.climb, pace.descent, pace.wind, stops.mean)
+        """Return how fast a known UAV flies: as measured where it was, else as planned.
 
-    def _moving_pace(self, uav_id: str) -> FlightPace:
-        """The pace without stops."""
+        A stop costs what was measured of the UAV, else of the fleet, else what it costs a usual
+        copter.
+        """
         planned = self._planned(self._fleet.records[uav_id].report)
         speed, wind = self.wind.of(uav_id, planned.speed)
-        return FlightPace(speed, planned.climb, planned.descent, wind)
+        own, stop_time = self._stops.get(uav_id), planned.usual_stop
+        if own is not None and own.count >= _OWN_STOPS:
+            stop_time = own.mean
+        elif self._all_stops.count:
+            stop_time = self._all_stops.mean
+        return FlightPace(speed, planned.climb, planned.descent, wind, stop_time, _TAKEOFF)
 
     def _planned(self, report: UavReport) -> FlightPace:
         params = self._params()
