@@ -14,19 +14,17 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from uav_task_alloc.geometry.outline import Floats, Ints
 from uav_task_alloc.kernel import inline_kernel, inner_kernel, kernel
 from uav_task_alloc.kernel_cache import NOTICE, Work
 from uav_task_alloc.separation.rule import Separation
-from uav_task_alloc.separation.volumes import COLUMNS, Rows, Volumes
+from uav_task_alloc.separation.volumes import COLUMNS, PieceRows, Volumes
 
 _CORNERS = 12  # of a polygon at most: a rectangle cut four times has 8
 _ROUNDING = 1e-6  # [m] by which a distance that is kept exactly may be missed
 _SHORTEST = 1e-6  # [s] added to each lag: without it the polygon may be a line, lost by rounding
 _WORK = Work(6.0, 6)
-Ints = NDArray[np.int64]
-Floats = NDArray[np.float64]
 
 
 @inner_kernel
@@ -209,7 +207,7 @@ def find_conflicts(volumes: Volumes, rule: Separation) -> list[FoundConflict]:
         room = count
 
 
-def _boxes(rows: Rows) -> Floats:
+def _boxes(rows: PieceRows) -> Floats:
     """Lower and upper x, y and z [m] of each row, (n, 6)."""
     boxes = np.empty((len(rows), 6))
     ends = rows[:, 2:5] + rows[:, 5:8] * (rows[:, 1] - rows[:, 0])[:, None]
@@ -276,7 +274,7 @@ def _space() -> Floats:
 @functools.cache
 def load_separation_kernels() -> None:
     """Load the kernels, compile those not on disk yet; further calls do nothing."""
-    rows: Rows = np.zeros((2, COLUMNS))
+    rows: PieceRows = np.zeros((2, COLUMNS))
     rows[:, 1] = 1.0
     with NOTICE.until_loaded('separation', _WORK):
         boxes = _boxes(rows)

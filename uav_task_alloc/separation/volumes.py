@@ -21,8 +21,8 @@ from uav_task_alloc.separation.rule import Separation
 FOREVER = 1e6  # [s] a UAV that stays in the air stays so long
 COLUMNS = 9  # of a row: begin, end [s], x, y, z [m], their speeds [m/s], uncertainty [s]
 _SPLITS = (0.125, 0.25, 0.5, 1.0)  # of the horizon: pieces are split there, as they grow longer
-Row = tuple[float, ...]
-Rows = NDArray[np.float64]  # (n, COLUMNS)
+PieceRow = tuple[float, ...]
+PieceRows = NDArray[np.float64]  # (n, COLUMNS)
 
 
 @dataclass(frozen=True, slots=True)
@@ -135,7 +135,7 @@ def leg_times(flight: Flight, leg: FlightLeg, ready: float, first: bool = False)
     return LegTimes(ready, begin, begin + seconds, begin + seconds + leg.service)
 
 
-def leg_rows(flight: Flight, leg: FlightLeg, times: LegTimes, rule: Separation) -> list[Row]:
+def leg_rows(flight: Flight, leg: FlightLeg, times: LegTimes, rule: Separation) -> list[PieceRow]:
     """Return the pieces of one leg: the wait before it, the flight, and the service.
 
     Args:
@@ -145,9 +145,9 @@ def leg_rows(flight: Flight, leg: FlightLeg, times: LegTimes, rule: Separation) 
         rule: whose uncertainty the pieces have.
 
     Returns:
-        Rows of COLUMNS numbers.
+        PieceRows of COLUMNS numbers.
     """
-    rows: list[Row] = []
+    rows: list[PieceRow] = []
     if times.begin > times.ready and not leg.takes_off:
         _add(rows, flight, rule, times.ready, times.begin, leg.points[0], leg.points[0])
     points, clock = leg.flown(), times.begin
@@ -163,7 +163,7 @@ def leg_rows(flight: Flight, leg: FlightLeg, times: LegTimes, rule: Separation) 
     return rows
 
 
-def end_rows(flight: Flight, rule: Separation, end: float, place: Point) -> list[Row]:
+def end_rows(flight: Flight, rule: Separation, end: float, place: Point) -> list[PieceRow]:
     """Return the piece of a UAV that stays in the air.
 
     Args:
@@ -172,12 +172,12 @@ def end_rows(flight: Flight, rule: Separation, end: float, place: Point) -> list
         end: [s] of its last leg.
         place: [m] ENU where it stays.
     """
-    rows: list[Row] = []
+    rows: list[PieceRow] = []
     _add(rows, flight, rule, end, end + FOREVER, place, place)
     return rows
 
 
-def _add(rows: list[Row], flight: Flight, rule: Separation, begin: float, end: float,
+def _add(rows: list[PieceRow], flight: Flight, rule: Separation, begin: float, end: float,
          place: Point, goal: Point) -> None:
     """Append a straight piece, split where its uncertainty would grow much."""
     seconds = end - begin
@@ -200,7 +200,7 @@ def _add(rows: list[Row], flight: Flight, rule: Separation, begin: float, end: f
 class Volumes:
     """The pieces of some flights."""
 
-    rows: Rows  # (n, COLUMNS)
+    rows: PieceRows  # (n, COLUMNS)
     owner: NDArray[np.int64]  # (n,) index of the flight
     leg: NDArray[np.int64]  # (n,) index of the leg; that after the last for the stay at the end
 
@@ -215,7 +215,7 @@ def flight_volumes(flights: Iterable[Flight], rule: Separation) -> Volumes:
     Returns:
         In the order of the flights and their legs.
     """
-    rows: list[Row] = []
+    rows: list[PieceRow] = []
     owner: list[int] = []
     legs: list[int] = []
     for k, flight in enumerate(flights):
@@ -227,7 +227,7 @@ def flight_volumes(flights: Iterable[Flight], rule: Separation) -> Volumes:
                    np.array(legs, np.int64))
 
 
-def rows_of_legs(flight: Flight, rule: Separation) -> list[list[Row]]:
+def rows_of_legs(flight: Flight, rule: Separation) -> list[list[PieceRow]]:
     """Return the pieces of a flight by leg, and at the end those of its stay.
 
     Args:
@@ -237,7 +237,7 @@ def rows_of_legs(flight: Flight, rule: Separation) -> list[list[Row]]:
     Returns:
         One list for each leg, and one more; that is empty where the UAV lands.
     """
-    found: list[list[Row]] = []
+    found: list[list[PieceRow]] = []
     ready, place, in_air = flight.begin, flight.position, flight.in_air
     for number, leg in enumerate(flight.legs):
         times = leg_times(flight, leg, ready, number == 0)
