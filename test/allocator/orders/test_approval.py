@@ -50,7 +50,7 @@ def test_a_new_plan_is_proposed_and_the_fleet_flies_on(driver):
     proposal, = driver.proposals
     assert [each.task_ids for each in proposal.lists] == [('t1', 't2', 't4')]
     assert proposal.changes == ('a gains t4 (new): 2 -> 3 tasks, +100 m',
-                                'in all +100 m, the last UAV ends +7 s')
+                                'in all +100 m, the last UAV ends +13 s')
     assert proposal.base_revision < proposal.revision
     assert not proposal.accepted_on_timeout
     assert driver.reason('t4') == f'waits for the approval of plan {proposal.revision}'
