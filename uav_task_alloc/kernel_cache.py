@@ -45,11 +45,7 @@ class Work(NamedTuple):
     kernels: int  # that are compiled one after another
 
     def plus(self, other: Work) -> Work:
-        """Both.
-
-        Args:
-            other: kernels.
-        """
+        """Both."""
         return Work(self.seconds + other.seconds, self.kernels + other.kernels)
 
 

@@ -1,0 +1,212 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Where UAVs in flight will be in the next 30 s, going on or holding, and who would come near."""
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from uav_task_alloc.model import Point
+from uav_task_alloc.separation.rule import Separation
+
+HORIZON = 30.0  # [s]
+_DT = 0.25  # [s] between two points of a prediction
+_SHIFT = 2  # steps between two differences of time that are compared
+_REACTION = 2.0  # [s] until a hold that is published is flown
+_BRAKING = 2.5  # [m/s2]
+_MARGIN = 1.0  # [m] horizontally, for positions between the points and errors of them
+_SLACK = 0.3  # [m] vertically: plans keep the vertical distance exactly, autopilots nearly
+_CAUTION = 1.15  # times the horizontal distance that a UAV needs to go on
+_Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Way:
+    """What a UAV does next: it flies straight from point to point, and stays at the last."""
+
+    points: tuple[tuple[float, Point], ...]  # [s] from now, in order, and [m] ENU
+    speed: float = 0.0  # [m/s] now
+    on_ground: bool = False  # it is about to take off: where it holds it is not in the air
+    hold_radius: float = 0.0  # [m] of the circle in which it holds; 0: it hovers
+    pad: Point | None = None  # [m] where it takes off and lands; None: unknown
+
+
+@dataclass(frozen=True, slots=True)
+class PredictedLoss:
+    """A predicted loss of separation."""
+
+    begins: float  # [s] from now; 0: it is lost
+    horizontal: float  # [m] when they are nearest
+    vertical: float  # [m] then
+
+
+class FlightPredictions:
+    """The predictions of one moment.
+
+    Args:
+        ways: of all UAVs, by id.
+        rule: that is kept.
+        holding: ids of those that hold.
+
+    Arguments of methods:
+        uav_id, other: ids.
+        holds: whether it holds.
+    """
+
+    def __init__(self, ways: Mapping[str, Way], rule: Separation,
+                 holding: Collection[str] = ()) -> None:
+        self._ways, self._rule = ways, rule
+        self._times: _Floats = np.arange(0.0, HORIZON + _DT, _DT)
+        self._go = {name: _sampled(way, self._times) for name, way in ways.items()}
+        self._stay = {name: _sampled(way, _stopping(way, self._times, name in holding),
+                                     holds=True) for name, way in ways.items()}
+        self._holding = set(holding)
+
+    def set_holding(self, uav_id: str, holds: bool) -> None:
+        """Let a UAV hold, or go on, in what is predicted from now on."""
+        (self._holding.add if holds else self._holding.discard)(uav_id)
+
+    def losses(self) -> dict[tuple[str, str], PredictedLoss]:
+        """Return the losses of all pairs, with the present holds."""
+        found = {}
+        for a, b in self._near_pairs():
+            loss = self.loss(a, b)
+            if loss is not None:
+                found[a, b] = loss
+        return found
+
+    def losses_of(self, uav_id: str, holds: bool, wide: bool = False) -> dict[str, PredictedLoss]:
+        """Return the losses of one UAV that holds or goes on, by the id of the other one.
+
+        Args:
+            uav_id, holds: see the class.
+            wide: with some more distance.
+        """
+        own = self._path(uav_id, holds)
+        found = {}
+        for other in self._ways:
+            if other != uav_id:
+                loss = self._between(uav_id, own, holds, other, wide)
+                if loss is not None:
+                    found[other] = loss
+        return found
+
+    def loss(self, uav_id: str, other: str) -> PredictedLoss | None:
+        """Return the loss of two UAVs, with the present holds; None: they stay apart."""
+        holds = uav_id in self._holding
+        return self._between(uav_id, self._path(uav_id, holds), holds, other)
+
+    def helps(self, uav_id: str, other: str) -> bool:
+        """Return whether the hold of a UAV keeps it apart from another one, and from the rest.
+
+        A loss with a third one that is predicted anyway, and no later, does not count.
+        """
+        then, now = self.losses_of(uav_id, True), self.losses_of(uav_id, False)
+        return other not in then and all(
+            name in now and now[name].begins <= loss.begins for name, loss in then.items())
+
+    def delays(self, pair: tuple[str, str]) -> bool:
+        """Return whether stopping both keeps two UAVs farther apart than going on."""
+        a, b = pair
+        both = self._between(a, self._path(a, True), True, b, other_holds=True)
+        current = self.loss(a, b)
+        return both is None or (current is not None and both.begins >= current.begins
+                                and both.horizontal >= current.horizontal)
+
+    def _path(self, uav_id: str, holds: bool) -> _Floats:
+        return (self._stay if holds else self._go)[uav_id]
+
+    def _between(self, uav_id: str, own: _Floats, holds: bool, other: str,
+                 wide: bool = False, other_holds: bool | None = None) -> PredictedLoss | None:
+        if other_holds is None:
+            other_holds = other in self._holding
+        theirs = self._path(other, other_holds)
+        horizontal = self._rule.horizontal * (_CAUTION if wide else 1.0) + _MARGIN
+        horizontal += 2.0 * (holds * self._ways[uav_id].hold_radius
+                             + other_holds * self._ways[other].hold_radius)
+        shifts = max(0, round(self._rule.time / _DT))
+        if holds and other_holds:
+            shifts = 0
+        return _first_loss(own, theirs, horizontal, self._rule.vertical - _SLACK, shifts,
+                           self._on_pad(uav_id, own) & self._on_pad(other, theirs))
+
+    def _on_pad(self, uav_id: str, path: _Floats) -> NDArray[np.bool_]:
+        """Where on a path it is low over its pad: pads may be nearer than the rule."""
+        pad = self._ways[uav_id].pad
+        if pad is None:
+            return np.zeros(len(path), dtype=bool)
+        off = np.hypot(path[:, 0] - pad[0], path[:, 1] - pad[1])
+        return np.asarray((off < 0.5 * self._rule.horizontal)
+                          & (path[:, 2] - pad[2] < self._rule.vertical))
+
+    def _near_pairs(self) -> list[tuple[str, str]]:
+        """Pairs whose boxes of the next 30 s overlap, by id."""
+        names = sorted(self._ways)
+        if len(names) < 2:
+            return []
+        reach = self._rule.horizontal + _MARGIN
+        low, high = (np.array([
+            bound(bound(self._go[name], axis=0), bound(self._stay[name], axis=0))
+            for name in names]) for bound in (_least, _most))
+        radius = np.array([2.0 * self._ways[name].hold_radius for name in names])[:, None]
+        room = np.array([reach, reach, self._rule.vertical])
+        low, high = low - 0.5 * room - radius, high + 0.5 * room + radius
+        return [(names[i], names[j]) for i, j in combinations(range(len(names)), 2)
+                if bool(np.all(low[i] <= high[j]) and np.all(low[j] <= high[i]))]
+
+
+def _least(a: _Floats, b: _Floats | None = None, axis: int | None = None) -> _Floats:
+    return np.asarray(np.fmin.reduce(a, axis=axis or 0) if b is None else np.fmin(a, b))
+
+
+def _most(a: _Floats, b: _Floats | None = None, axis: int | None = None) -> _Floats:
+    return np.asarray(np.fmax.reduce(a, axis=axis or 0) if b is None else np.fmax(a, b))
+
+
+def _sampled(way: Way, times: _Floats, holds: bool = False) -> _Floats:
+    """Points (n, 3) of a way at times [s]; NaN: it is not in the air."""
+    if holds and way.on_ground:
+        return np.full((len(times), 3), math.nan)
+    at = np.array([t for t, _ in way.points])
+    points = np.array([point for _, point in way.points], dtype=float)
+    return np.stack([np.interp(times, at, points[:, k]) for k in range(3)], axis=1)
+
+
+def _stopping(way: Way, times: _Floats, holding: bool) -> _Floats:
+    """Times of a way at which a UAV that is to hold is where it is at `times` [s]."""
+    reaction = 0.0 if holding else _REACTION
+    braking = way.speed / _BRAKING
+    if braking < 0.2:
+        return np.minimum(times, 0.0 if holding else reaction)
+    passed = np.clip(times - reaction, 0.0, braking)
+    return np.asarray(np.minimum(times, reaction) + passed - passed**2 / (2.0 * braking))
+
+
+def _first_loss(a: _Floats, b: _Floats, horizontal: float, vertical: float, shifts: int,
+                exempt: NDArray[np.bool_]) -> PredictedLoss | None:
+    """The loss of two paths, each of which may be early or late; None: they stay apart."""
+    first, nearest, best = math.inf, (0.0, 0.0), math.inf
+    for shift in range(0, shifts + 1, _SHIFT):
+        for one, two in _pairs(a, b, shift):
+            apart = np.hypot(one[:, 0] - two[:, 0], one[:, 1] - two[:, 1])
+            above = np.abs(one[:, 2] - two[:, 2])
+            lost = (apart < horizontal) & (above < vertical) & ~exempt[:len(apart)]
+            if not lost.any():
+                continue
+            at = np.flatnonzero(lost)
+            first = min(first, float(at[0]) * _DT)
+            k = at[np.argmin(apart[at])]
+            if apart[k] < best:
+                best, nearest = float(apart[k]), (float(apart[k]), float(above[k]))
+    return PredictedLoss(first, *nearest) if first < math.inf else None
+
+
+def _pairs(a: _Floats, b: _Floats, shift: int) -> Sequence[tuple[_Floats, _Floats]]:
+    """Both paths, the one and then the other later by a number of steps."""
+    if shift == 0:
+        return [(a, b)]
+    return [(a[:-shift], b[shift:]), (a[shift:], b[:-shift])]
