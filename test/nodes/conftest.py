@@ -9,6 +9,7 @@ import domain_coordinator
 import pytest
 import rclpy
 from ament_index_python.packages import get_package_prefix
+from node_server import Forked, NodeServer
 from rclpy.executors import SingleThreadedExecutor
 
 PACKAGE = 'uav_task_alloc'
@@ -26,16 +27,28 @@ def domain():
         yield number
 
 
-class Process:
-    """An installed executable, started with ROS arguments; its output goes to a file."""
+@pytest.fixture(scope='session')
+def server(domain):
+    """Starts nodes for little CPU."""
+    server = NodeServer()
+    yield server
+    server.close()
 
-    def __init__(self, log, executable, *ros_args, env=None):
+
+class Process:
+    """A node, started with ROS arguments; its output goes to a file.
+
+    Without a server it is the installed executable.
+    """
+
+    def __init__(self, log, server, executable, *ros_args, env=None):
+        assert not (server and env)  # a fork has read its own
         path = os.path.join(get_package_prefix(PACKAGE), 'lib', PACKAGE, executable)
         self.log = log
+        command = [path, '--ros-args', *ros_args]
         with open(log, 'w') as out:
-            self.popen = subprocess.Popen(
-                [path, '--ros-args', *ros_args], stdout=out, stderr=subprocess.STDOUT,
-                env={**os.environ, **(env or {})})
+            self.popen = (Forked(server, command, log) if server else subprocess.Popen(
+                command, stdout=out, stderr=subprocess.STDOUT, env={**os.environ, **(env or {})}))
 
     def output(self):
         return self.log.read_text()
@@ -48,13 +61,24 @@ class Process:
 
 
 @pytest.fixture
-def start(domain, tmp_path):
+def start(server, tmp_path):
     """start('allocator', '-p', 'seed:=1') -> Process; processes still running are ended."""
+    yield from starts(server, tmp_path)
+
+
+@pytest.fixture
+def execute(domain, tmp_path):
+    """As `start`, of the installed executables; these may have variables `env`."""
+    yield from starts(None, tmp_path)
+
+
+def starts(server, folder):
+    """A function that starts processes, which are ended after it."""
     started = []
 
     def start(executable, *ros_args, env=None):
-        log = tmp_path / f'{len(started)}_{executable}.log'
-        started.append(Process(log, executable, *ros_args, env=env))
+        log = folder / f'{len(started)}_{executable}.log'
+        started.append(Process(log, server, executable, *ros_args, env=env))
         return started[-1]
 
     yield start

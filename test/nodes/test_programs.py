@@ -12,6 +12,7 @@ from pathlib import Path
 
 import pytest
 from ament_index_python.packages import get_package_prefix, get_package_share_directory
+from node_server import Forked
 from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
 from rcl_interfaces.srv import DescribeParameters, GetParameters, SetParameters
 from uav_task_alloc_msgs import msg as m
@@ -64,8 +65,8 @@ def test_the_command_line_ends_without_a_traceback_however_early_the_signal(dela
 
 @pytest.mark.parametrize('name', params.NODES)
 @pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM], ids=lambda n: n.name)
-def test_a_node_exits_in_order_on_a_signal(start, probe, name, number):
-    process = start(name, *NEEDS.get(name, []))
+def test_a_node_exits_in_order_on_a_signal(execute, probe, name, number):
+    process = execute(name, *NEEDS.get(name, []))
     probe.until(lambda: name in probe.node.get_node_names())
     code, out = process.stop(number)
     assert code == 0, out
@@ -75,8 +76,8 @@ def test_a_node_exits_in_order_on_a_signal(start, probe, name, number):
 # [s]: while sh starts Python, while modules are imported, while the node is created
 @pytest.mark.parametrize('delay', [0.01, 0.02, 0.04, 0.1, 0.2, 0.3, 0.5, 0.8])
 @pytest.mark.parametrize('name', ['allocator', 'live_view'])
-def test_a_node_ends_without_a_traceback_however_early_the_signal(start, name, delay):
-    process = start(name)
+def test_a_node_ends_without_a_traceback_however_early_the_signal(execute, name, delay):
+    process = execute(name)
     time.sleep(delay)
     code, out = process.stop()
     assert code in (0, -signal.SIGINT), out  # that of sh, in its first milliseconds
@@ -116,17 +117,31 @@ def test_a_node_whose_callback_raises_ends_with_a_status_of_its_own(domain):
     assert 'ZeroDivisionError' in done.stderr
 
 
-def ask(name, *arguments, env=None):
-    """Exit status and output of a program that does not become a running node."""
-    path = Path(get_package_prefix('uav_task_alloc'), 'lib/uav_task_alloc', name)
-    done = subprocess.run([path, *arguments], capture_output=True, text=True, timeout=60,
-                          env={**os.environ, **(env or {})})
-    assert 'Traceback' not in done.stdout + done.stderr
-    return done.returncode, done.stdout + done.stderr
+@pytest.fixture
+def ask(server, tmp_path):
+    """ask('allocator', '--help') -> exit status and output of what becomes no running node.
+
+    With variables `env`, or a program that is no node, it is the installed executable.
+    """
+    def ask(name, *arguments, env=None):
+        argv = [str(Path(get_package_prefix('uav_task_alloc'), 'lib/uav_task_alloc', name)),
+                *arguments]
+        log = tmp_path / 'asked.log'
+        with open(log, 'w') as out:
+            process = subprocess.Popen(
+                argv, stdout=out, stderr=subprocess.STDOUT, env={**os.environ, **(env or {})},
+            ) if env or name == 'demo' else Forked(server, argv, log)
+        try:
+            code = process.wait(60)
+        finally:
+            process.kill()
+        assert 'Traceback' not in log.read_text()
+        return code, log.read_text()
+    return ask
 
 
 @pytest.mark.parametrize('name', params.NODES)
-def test_help_lists_each_parameter_and_needs_no_ros_graph(name):
+def test_help_lists_each_parameter_and_needs_no_ros_graph(ask, name):
     code, out = ask(name, '--help', '--ros-args', '-p', 'seed:=1', env={'ROS_DOMAIN_ID': 'none'})
     assert code == 0
     words = ' '.join(out.split())
@@ -151,7 +166,7 @@ def test_help_lists_each_parameter_and_needs_no_ros_graph(name):
      '--params-file /: expected a parameter file: Is a directory'),
     (['--ros-args', '--params-file'], 'No file path provided.'),
 ], ids=str)
-def test_a_command_line_that_ros_cannot_read_is_one_line_and_status_2(arguments, text):
+def test_a_command_line_that_ros_cannot_read_is_one_line_and_status_2(ask, arguments, text):
     code, out = ask('allocator', *arguments)
     assert (code, text in out.splitlines()[-1]) == (2, True), out
     assert len([line for line in out.splitlines() if '[rcl]' not in line]) == 1
@@ -176,7 +191,7 @@ def test_a_command_line_that_ros_cannot_read_is_one_line_and_status_2(arguments,
     ('allocator:\n  ros__parameters:\n    solve_budget: fast', 1,
      "solve_budget = 'fast': expected float in [0.001, 60] s"),
 ])
-def test_a_parameter_file_is_used_in_full_or_refused(tmp_path, content, code, text):
+def test_a_parameter_file_is_used_in_full_or_refused(ask, tmp_path, content, code, text):
     path = tmp_path / 'given.yaml'
     path.write_text(content)
     given, out = ask('allocator', '--ros-args', '--params-file', str(path))
@@ -185,7 +200,7 @@ def test_a_parameter_file_is_used_in_full_or_refused(tmp_path, content, code, te
 
 
 @pytest.mark.parametrize(('given', 'shown'), [('[1, 2]', '(1, 2)'), ('5', '5'), ('a', "'a'")])
-def test_another_type_is_refused_for_a_list_of_texts(given, shown):
+def test_another_type_is_refused_for_a_list_of_texts(ask, given, shown):
     assert ask('mavlink_bridge', '--ros-args', '-p', f'connections:={given}') == (
         1, f'connections = {shown}: expected list of text\n')
 
@@ -211,7 +226,7 @@ def test_a_file_for_all_nodes_may_have_parameters_of_others(start, probe, tmp_pa
     ('mavlink_bridge', ('tlog', '/'), "tlog = '/': expected a file that can be written"),
     ('mavlink_bridge', ('state_dir', '/proc/none'), "state_dir = '/proc/none': expected a folder"),
 ], ids=str)
-def test_a_path_or_host_that_cannot_be_used_is_one_line(name, given, text):
+def test_a_path_or_host_that_cannot_be_used_is_one_line(ask, name, given, text):
     words = [word for key, value in zip(given[::2], given[1::2], strict=True)
              for word in ('-p', f'{key}:={value}')]
     code, out = ask(name, '--ros-args', *words)
@@ -219,7 +234,7 @@ def test_a_path_or_host_that_cannot_be_used_is_one_line(name, given, text):
     assert len([line for line in out.splitlines() if '[INFO]' not in line]) == 1
 
 
-def test_a_flag_without_its_value_is_named():
+def test_a_flag_without_its_value_is_named(ask):
     assert ask('live_view', '--record') == (
         2, '--record: expected a value after it; flags are --record\n')
 
@@ -231,8 +246,9 @@ def hidden(folder, package):
     return {'PYTHONPATH': f'{folder}:{os.environ["PYTHONPATH"]}'}
 
 
-def test_a_page_without_aiohttp_says_what_to_install_and_the_node_goes_on(start, probe, tmp_path):
-    view = start('live_view', '-p', 'port:=0', env=hidden(tmp_path, 'aiohttp'))
+def test_a_page_without_aiohttp_says_what_to_install_and_the_node_goes_on(
+        execute, probe, tmp_path):
+    view = execute('live_view', '-p', 'port:=0', env=hidden(tmp_path, 'aiohttp'))
     probe.until(lambda: '0 of 0 tasks' in view.output())
     code, out = view.stop()
     assert code == 0
@@ -241,7 +257,7 @@ def test_a_page_without_aiohttp_says_what_to_install_and_the_node_goes_on(start,
     assert 'Traceback' not in out
 
 
-def test_a_record_without_mcap_says_what_to_install(tmp_path):
+def test_a_record_without_mcap_says_what_to_install(ask, tmp_path):
     assert ask('live_view', '--record', str(tmp_path / 'x.mcap'), env=hidden(
         tmp_path, 'mcap')) == (1, "record: mcap is not installed: expected pip install '.[view]' "
                                   'in the folder of uav_task_alloc\n')
@@ -254,7 +270,7 @@ def test_a_record_without_mcap_says_what_to_install(tmp_path):
     (['--scenario', 'none'], 1, 'none: No such file or directory: expected a scenario file'),
     (['--record', '/none/x.mcap'], 1, '--record = '), (['--record', '/'], 1, '--record = '),
 ], ids=str)
-def test_the_demo_refuses_a_bad_option_in_one_line(tmp_path, given, code, text):
+def test_the_demo_refuses_a_bad_option_in_one_line(ask, tmp_path, given, code, text):
     refused, out = ask('demo', '--out', str(tmp_path / 'out'), *given)
     assert (refused, text in out, len(out.splitlines())) == (code, True, 1), out
 
@@ -264,7 +280,7 @@ def test_the_demo_refuses_a_bad_option_in_one_line(tmp_path, given, code, text):
                          'sourced install/setup.bash'),
     ({'ROS_DOMAIN_ID': 'none'}, 'ROS_DOMAIN_ID is not an integral number'),
 ])
-def test_an_environment_without_ros_is_one_line(env, text):
+def test_an_environment_without_ros_is_one_line(ask, env, text):
     code, out = ask('allocator', env=env)
     assert (code, text in out, len(out.splitlines())) == (1, True, 1), out
 
