@@ -45,7 +45,11 @@ class Work(NamedTuple):
     kernels: int  # that are compiled one after another
 
     def plus(self, other: Work) -> Work:
-        """Both."""
+        """Both.
+
+        Args:
+            other: kernels.
+        """
         return Work(self.seconds + other.seconds, self.kernels + other.kernels)
 
 

@@ -18,7 +18,15 @@ from uav_task_alloc.model import Point, Uav
 
 def straight_time(dx: float, dy: float, dz: float, cruise: float, climb: float,
                   descent: float) -> float:
-    """Time [s] of a straight part (dx, dy, dz) [m] at these speeds at most [m/s]. O(1)"""
+    """Return the flight time of a straight part. O(1)
+
+    Args:
+        dx, dy, dz: the part [m].
+        cruise, climb, descent: [m/s] at most.
+
+    Returns:
+        [s].
+    """
     vertical = dz / climb if dz > 0.0 else -dz / descent
     return max(math.sqrt(dx * dx + dy * dy) / cruise, vertical)
 

@@ -1,0 +1,247 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Planned flights as timed straight pieces with the uncertainty of their times; no zones, no I/O.
+
+A UAV takes off on a column above its pad, waits before a leg at the stop before it (on the ground
+before a take-off), flies as in geometry/flight_time.py, serves, and lands on a column above its
+base. On the ground it is not in the air: there it has no volume.
+"""
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from uav_task_alloc.geometry.flight_time import straight_time
+from uav_task_alloc.model import Point
+from uav_task_alloc.separation.rule import Separation
+
+FOREVER = 1e6  # [s] a UAV that stays in the air stays so long
+COLUMNS = 9  # of a row: begin, end [s], x, y, z [m], their speeds [m/s], uncertainty [s]
+_SPLITS = (0.125, 0.25, 0.5, 1.0)  # of the horizon: pieces are split there, as they grow longer
+PieceRow = tuple[float, ...]
+PieceRows = NDArray[np.float64]  # (n, COLUMNS)
+
+
+@dataclass(frozen=True, slots=True)
+class FlightLeg:
+    """A flight from one stop to the next, and the service there.
+
+    Attributes:
+        points: start, detour points and end [m] ENU.
+        task: id of the task at its end; '' where that is the base.
+        service: [s] at its end.
+        earliest: [s] the service does not begin before; the UAV waits before the leg.
+        latest: [s] the service begins by then.
+        release: [s] the leg does not begin before.
+        hold_until: [s] the leg does not begin before, for the separation.
+        takes_off: it begins on the ground.
+        lands: it ends on the ground.
+        movable: its heights and its begin may change; the leg under way is not.
+    """
+
+    points: tuple[Point, ...]  # [m] ENU
+    task: str = ''
+    service: float = 0.0  # [s]
+    earliest: float = -math.inf  # [s]
+    latest: float = math.inf  # [s]
+    release: float = -math.inf  # [s]
+    hold_until: float = -math.inf  # [s]
+    takes_off: bool = False
+    lands: bool = False
+    movable: bool = True
+
+    def flown(self) -> tuple[Point, ...]:
+        """Points as they are flown: with the columns above pad and base."""
+        points = list(self.points)
+        if self.takes_off and points[1][2] > points[0][2]:
+            x, y, _ = points[0]
+            points.insert(1, (x, y, points[1][2]))
+        if self.lands and points[-2][2] > points[-1][2]:
+            x, y, _ = points[-1]
+            points.insert(-1, (x, y, points[-2][2]))
+        return tuple(points)
+
+
+@dataclass(frozen=True, slots=True)
+class Flight:
+    """What one UAV is planned to fly.
+
+    Attributes:
+        uav: id.
+        legs: in order; none: it stays where it is.
+        position: [m] ENU at `begin`.
+        cruise, climb, descent: [m/s] at most.
+        begin: [s] from the moment of the plan.
+        in_air: it is in the air at `begin`.
+        known: [s] when its position was known.
+        late: [s] by which it was late or early, as measured.
+    """
+
+    uav: str
+    legs: tuple[FlightLeg, ...]
+    position: Point  # [m] ENU
+    cruise: float = 15.0  # [m/s]
+    climb: float = math.inf  # [m/s]
+    descent: float = math.inf  # [m/s]
+    begin: float = 0.0  # [s]
+    in_air: bool = True
+    known: float = 0.0  # [s]
+    late: float = 0.0  # [s]
+
+    def seconds(self, points: Sequence[Point]) -> float:
+        """Return the flight time along a polyline [s].
+
+        Args:
+            points: [m] ENU, in order.
+        """
+        total = 0.0
+        x, y, z = points[0]
+        for x1, y1, z1 in points[1:]:
+            total += straight_time(x1 - x, y1 - y, z1 - z, self.cruise, self.climb, self.descent)
+            x, y, z = x1, y1, z1
+        return total
+
+
+@dataclass(frozen=True, slots=True)
+class LegTimes:
+    """When a leg is flown, [s] from the moment of the plan."""
+
+    ready: float  # the UAV is at its start and done there
+    begin: float
+    arrival: float
+    end: float  # of the service at its end
+
+
+def leg_times(flight: Flight, leg: FlightLeg, ready: float, first: bool = False) -> LegTimes:
+    """Return when a leg is flown by a UAV that is ready at its start.
+
+    Args:
+        flight: with its speeds.
+        leg: to be flown.
+        ready: [s] when the service before is over.
+        first: it is the first leg; in the air that waits at its end.
+
+    Returns:
+        Its times.
+    """
+    seconds = flight.seconds(leg.flown())
+    if first and flight.in_air:
+        arrival = ready + seconds
+        return LegTimes(ready, ready, arrival, max(arrival, leg.earliest) + leg.service)
+    begin = max(ready, leg.release, leg.hold_until, leg.earliest - seconds)
+    return LegTimes(ready, begin, begin + seconds, begin + seconds + leg.service)
+
+
+def leg_rows(flight: Flight, leg: FlightLeg, times: LegTimes, rule: Separation) -> list[PieceRow]:
+    """Return the pieces of one leg: the wait before it, the flight, and the service.
+
+    Args:
+        flight: of the leg.
+        leg: to be flown.
+        times: see `leg_times`.
+        rule: whose uncertainty the pieces have.
+
+    Returns:
+        PieceRows of COLUMNS numbers.
+    """
+    rows: list[PieceRow] = []
+    if times.begin > times.ready and not leg.takes_off:
+        _add(rows, flight, rule, times.ready, times.begin, leg.points[0], leg.points[0])
+    points, clock = leg.flown(), times.begin
+    place = points[0]
+    for point in points[1:]:
+        seconds = straight_time(point[0] - place[0], point[1] - place[1], point[2] - place[2],
+                                flight.cruise, flight.climb, flight.descent)
+        if seconds > 0.0:
+            _add(rows, flight, rule, clock, clock + seconds, place, point)
+        clock, place = clock + seconds, point
+    if times.end > clock and not leg.lands:
+        _add(rows, flight, rule, clock, times.end, place, place)
+    return rows
+
+
+def end_rows(flight: Flight, rule: Separation, end: float, place: Point) -> list[PieceRow]:
+    """Return the piece of a UAV that stays in the air.
+
+    Args:
+        flight: of the UAV.
+        rule: see `leg_rows`.
+        end: [s] of its last leg.
+        place: [m] ENU where it stays.
+    """
+    rows: list[PieceRow] = []
+    _add(rows, flight, rule, end, end + FOREVER, place, place)
+    return rows
+
+
+def _add(rows: list[PieceRow], flight: Flight, rule: Separation, begin: float, end: float,
+         place: Point, goal: Point) -> None:
+    """Append a straight piece, split where its uncertainty would grow much."""
+    seconds = end - begin
+    vx, vy, vz = ((b - a) / seconds for a, b in zip(place, goal, strict=True))
+    x, y, z = place
+    clock = begin
+    for split in _SPLITS:
+        until = flight.known + split * rule.horizon
+        if clock < until < end:
+            s = clock - begin
+            rows.append((clock, until, x + vx * s, y + vy * s, z + vz * s, vx, vy, vz,
+                         rule.uncertainty(until - flight.known) + flight.late))
+            clock = until
+    s = clock - begin
+    rows.append((clock, end, x + vx * s, y + vy * s, z + vz * s, vx, vy, vz,
+                 rule.uncertainty(end - flight.known) + flight.late))
+
+
+@dataclass(frozen=True, slots=True)
+class Volumes:
+    """The pieces of some flights."""
+
+    rows: PieceRows  # (n, COLUMNS)
+    owner: NDArray[np.int64]  # (n,) index of the flight
+    leg: NDArray[np.int64]  # (n,) index of the leg; that after the last for the stay at the end
+
+
+def flight_volumes(flights: Iterable[Flight], rule: Separation) -> Volumes:
+    """Return the pieces of flights.
+
+    Args:
+        flights: planned.
+        rule: whose uncertainty the pieces have.
+
+    Returns:
+        In the order of the flights and their legs.
+    """
+    rows: list[PieceRow] = []
+    owner: list[int] = []
+    legs: list[int] = []
+    for k, flight in enumerate(flights):
+        for number, more in enumerate(rows_of_legs(flight, rule)):
+            rows += more
+            owner += [k] * len(more)
+            legs += [number] * len(more)
+    return Volumes(np.array(rows, np.float64).reshape(-1, COLUMNS), np.array(owner, np.int64),
+                   np.array(legs, np.int64))
+
+
+def rows_of_legs(flight: Flight, rule: Separation) -> list[list[PieceRow]]:
+    """Return the pieces of a flight by leg, and at the end those of its stay.
+
+    Args:
+        flight: planned.
+        rule: see `flight_volumes`.
+
+    Returns:
+        One list for each leg, and one more; that is empty where the UAV lands.
+    """
+    found: list[list[PieceRow]] = []
+    ready, place, in_air = flight.begin, flight.position, flight.in_air
+    for number, leg in enumerate(flight.legs):
+        times = leg_times(flight, leg, ready, number == 0)
+        found.append(leg_rows(flight, leg, times, rule))
+        ready, place, in_air = times.end, leg.points[-1], not leg.lands
+    found.append(end_rows(flight, rule, ready, place) if in_air else [])
+    return found
