@@ -2,7 +2,7 @@
 """Finish, metres and errors of the expected starts of services, over several runs of the demo.
 
 Run with ROS 2 and the built package sourced: `python benchmarks/demo_times.py --runs 5
-[--wind 5 0] [--gusts 1]`. An error is the start of a service, by the simulator's log, less the
+[--wind 5 0] [--gusts 1] [--keep DIR]`. An error is the start of a service, by the simulator's log, less the
 `expected` of its last status at least 60 s before it. The last line is one JSON object.
 """
 from __future__ import annotations
@@ -74,6 +74,7 @@ def main() -> None:
     parser.add_argument('--wind', type=float, nargs=2, default=(0.0, 0.0),
                         metavar=('EAST', 'NORTH'), help='[m/s]')
     parser.add_argument('--gusts', type=float, default=0.0, help='[m/s]')
+    parser.add_argument('--keep', type=Path, metavar='DIR', help='keep the folders of all runs')
     parser.add_argument('--limit', type=float, default=300.0, help='[s] of one run')
     args = parser.parse_args()
     runs = []
@@ -82,7 +83,7 @@ def main() -> None:
         windy.write_text(to_yaml(replace(load(args.scenario),
                                          wind=ScenarioWind(*args.wind, args.gusts))))
         for k in range(args.runs):
-            runs.append(fly(windy, Path(folder, str(k)), args.limit))
+            runs.append(fly(windy, Path(args.keep or folder, str(k)), args.limit))
             print(json.dumps(figures(runs[-1:])), flush=True)
     print(json.dumps(figures(runs)))
 

@@ -2,7 +2,8 @@
 """Missions with deadlines, wind, lost UAVs and arrivals over virtual time, judged by an oracle.
 
 Run: `python benchmarks/endurance/deadlines.py --missions 200 --seed 1`. The allocator is the real
-one; its UAVs fly in a wind that it is not given. The last line is JSON; the status is 1 where
+one; its UAVs fly in a wind, and accelerate and brake at a rate, that it is not given. The last
+line is JSON; the status is 1 where
 
 - a re-plan broke an accepted deadline that the lists before it still kept: both are flown to their
   ends in a copy of the true world, wind and stops included, from where the UAVs were. Where by
@@ -24,6 +25,8 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
+from deadline_motion import HEIGHT, SPEED, along, leg_seconds, over_ground, travel_seconds
+
 from uav_task_alloc.allocator import Allocator
 from uav_task_alloc.allocator.records import (
     AnnouncementAction,
@@ -33,13 +36,13 @@ from uav_task_alloc.allocator.records import (
     UavReport,
 )
 from uav_task_alloc.allocator.replanning import planning
-from uav_task_alloc.allocator.state.flight_pace import FlightPace
 from uav_task_alloc.model import Plan, Point, Task
 from uav_task_alloc.params import AllocatorParams
 from uav_task_alloc.solver.solve import plan
 
-SIDE, SPEED, STEP, HEIGHT = 2000.0, 15.0, 0.5, 50.0  # [m], [m/s], [s], [m]
-STOP = 4.0  # [s] that a stop costs
+SIDE, STEP = 2000.0, 0.5  # [m], [s]
+ACCELERATION = 1.5, 4.0  # [m/s2] of all UAVs of a mission: from, to
+FINE = 0.05  # [s] step of a flight
 LENGTH, LATEST = 240.0, 600.0  # [s] of arrivals, and of a mission
 ROUNDS = 150  # of bees in one solve
 CLEAR = 2.0  # [s] by which the old lists must keep a deadline that counts as keepable
@@ -69,15 +72,6 @@ class Judged:
     errors: list[float] = field(default_factory=list)  # [s] of starts expected 60 s before
 
 
-def over_ground(wind: tuple[float, float], dx: float, dy: float) -> float:
-    """Ground speed [m/s] of a UAV that holds its speed through the air."""
-    length = math.hypot(dx, dy)
-    if length == 0.0:
-        return SPEED
-    along = (wind[0] * dx + wind[1] * dy) / length
-    return along + math.sqrt(SPEED**2 - (wind[0]**2 + wind[1]**2 - along**2))
-
-
 def solve(*world: object, max_iterations: int | None, **how: object) -> Plan:
     """Solve for a number of iterations, not until a time."""
     return plan(*world, max_iterations=ROUNDS if max_iterations is None else max_iterations,
@@ -91,7 +85,9 @@ class Mission:
         self.rng, self.seed = random.Random(seed), seed
         angle, force = self.rng.uniform(0.0, math.tau), self.rng.uniform(0.0, SPEED / 3.0)
         self.wind = force * math.cos(angle), force * math.sin(angle)
+        self.acceleration = self.rng.uniform(*ACCELERATION)
         self.now, self.judged = 1000.0, Judged()
+        self.flown_until = self.now
         self.allocator = Allocator(AllocatorParams(
             objective=objective, route_end='hold', uav_timeout=3.0, settle=0.05, seed=seed % 2**31,
             default_cruise_speed=SPEED, background_period=4.0), self.now)
@@ -220,7 +216,7 @@ class Mission:
             if record is None or record.silent or name in self.lost:
                 continue
             craft, clock = self.crafts[name], self.now
-            place, busy = craft.place, craft.busy
+            place, busy, velocity = craft.place, craft.busy, craft.velocity
             for stop in each.stops:
                 task = stop.task
                 if not self.world.tasks.is_open(task.id):
@@ -228,27 +224,32 @@ class Mission:
                 if task.id in self.done:  # it is being served
                     clock, busy = clock + busy, 0.0
                     continue
-                metres = math.dist(place, task.position)
-                clock += metres / over_ground(self.wind, task.position[0] - place[0],
-                                              task.position[1] - place[1])
-                clock = max(clock, task.earliest)
+                clock += self.true_seconds(place, task.position, velocity)
+                clock, velocity = max(clock, task.earliest), (0.0, 0.0, 0.0)
                 starts[task.id], place = clock, task.position
-                clock += task.service_time + STOP
+                clock += task.service_time
         return starts
 
+    def true_seconds(self, start: Point, end: Point, velocity: Point) -> float:
+        """Time of a leg that ends at rest, in the true wind [s]."""
+        dx, dy = end[0] - start[0], end[1] - start[1]
+        return travel_seconds(math.hypot(dx, dy), over_ground(self.wind, dx, dy),
+                              along(velocity, dx, dy), self.acceleration)
+
     def fly(self) -> None:
-        """Let all UAVs fly their lists for one STEP."""
+        """Let all UAVs fly their lists for one STEP, and for as long as was planned."""
         end = self.now + STEP
         for name in sorted(self.crafts.keys() - self.lost):
             self._fly(name, self.crafts[name], end)
-        self.now = end
+        self.now = self.flown_until = end
 
     def _fly(self, name: str, craft: Craft, end: float) -> None:
-        clock, craft.velocity = self.now, (0.0, 0.0, 0.0)
+        clock = self.flown_until
         while clock < end - 1e-9:
             stops = [stop for stop in self.world.list_of(name).stops
                      if self.world.tasks.is_open(stop.task.id)]
             if not stops:
+                craft.velocity = 0.0, 0.0, 0.0
                 return
             task = stops[0].task
             if craft.started != task.id:
@@ -266,18 +267,24 @@ class Mission:
 
     def _towards(self, craft: Craft, task: Task, clock: float, end: float) -> float:
         """Fly to a task, or wait for its window there; returns the time reached."""
-        dx, dy = task.position[0] - craft.place[0], task.position[1] - craft.place[1]
-        metres, speed = math.hypot(dx, dy), over_ground(self.wind, dx, dy)
-        if metres > speed * (end - clock):
-            share = speed * (end - clock) / metres
+        while clock < end - 1e-9:
+            dx, dy = task.position[0] - craft.place[0], task.position[1] - craft.place[1]
+            metres, dt = math.hypot(dx, dy), min(FINE, end - clock)
+            change = self.acceleration * dt
+            speed = min(over_ground(self.wind, dx, dy), along(craft.velocity, dx, dy) + change,
+                        max(change, math.sqrt(2.0 * self.acceleration * metres)))
+            if metres <= speed * dt:
+                craft.place, craft.velocity = task.position, (0.0, 0.0, 0.0)
+                clock += metres / speed
+                break
+            share = speed * dt / metres
             craft.place = craft.place[0] + share * dx, craft.place[1] + share * dy, HEIGHT
             craft.velocity = speed * dx / metres, speed * dy / metres, 0.0
-            return end
-        craft.place, clock = task.position, clock + metres / speed
-        if task.earliest > end:
+            clock += dt
+        if craft.place != task.position or task.earliest > end:
             return end
         self.done[task.id] = start = max(clock, task.earliest)
-        craft.busy = task.service_time + STOP
+        craft.busy = task.service_time
         return min(start, end)
 
     def event(self, name: str, kind: TaskEventKind, task_id: str, clock: float) -> None:
@@ -294,7 +301,7 @@ class Mission:
                 continue
             late = expected.get(task_id, math.inf) > task.latest + EARLY
             reported = (task_id in self.world.deadlines.texts
-                    or (record.state.name == 'UNASSIGNED' and bool(record.reason)))
+                    or (record.state.name in ('UNASSIGNED', 'PENDING') and bool(record.reason)))
             for seen, since in ((late, self.late_since), (reported, self.reported_since)):
                 if not seen:
                     since.pop(task_id, None)
@@ -344,25 +351,6 @@ class Mission:
                 self.judged.reported_late.append(
                     f'mission {self.seed}: {task_id}: oracle {known:.1f}, '
                     f'reported {reported:.1f}, latest {latest:.1f}, start {start:.1f}')
-
-
-def leg_seconds(pace: FlightPace, start: Point, end: Point, velocity: Point | None) -> float:
-    """Time of a level leg with measured wind, speed and stops, from a velocity or rest [s]."""
-    dx, dy = end[0] - start[0], end[1] - start[1]
-    length = math.hypot(dx, dy)
-    if length == 0.0:
-        return 0.0
-    along = (pace.wind[0] * dx + pace.wind[1] * dy) / length
-    across = pace.wind[0]**2 + pace.wind[1]**2 - along**2
-    fast = max(along + math.sqrt(max(0.0, pace.speed**2 - across)), 0.1 * pace.speed)
-    vx, vy, _ = velocity or (0.0, 0.0, 0.0)
-    begin = min(fast, max(0.0, (vx * dx + vy * dy) / length))
-    gain = fast / pace.stop_time if pace.stop_time else math.inf  # [m/s2] also of braking
-    if begin**2 >= 2.0 * gain * length:
-        return 2.0 * length / begin
-    top = min(fast, math.sqrt(gain * length + 0.5 * begin**2))
-    even = length - (top**2 - begin**2 + top**2) / (2.0 * gain)  # [m] at the top speed
-    return (top - begin + top) / gain + even / top
 
 
 def main() -> int:
