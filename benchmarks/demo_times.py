@@ -2,8 +2,8 @@
 """Finish, metres and errors of the expected starts of services, over several runs of the demo.
 
 Run with ROS 2 and the built package sourced: `python benchmarks/demo_times.py --runs 5
-[--wind 5 0] [--gusts 1] [--keep DIR]`. An error is the start of a service, by the simulator's log, less the
-`expected` of its last status at least 60 s before it. The last line is one JSON object.
+[--wind 5 0] [--gusts 1] [--keep DIR]`. An error is the start of a service, by the simulator's log,
+less the `expected` of its last status at least 60 s before it. The last line is one JSON object.
 """
 from __future__ import annotations
 
