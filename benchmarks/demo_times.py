@@ -21,7 +21,7 @@ from typing import Any
 from uav_task_alloc.record.ground_truth import read_run, visits
 from uav_task_alloc.record.run_state import RECORD_FILE, read_lines
 from uav_task_alloc.scenario import load, to_yaml
-from uav_task_alloc.scenario.values import ScenarioWind
+from uav_task_alloc.scenario.values import DEFAULT_SPEEDUP, ScenarioWind
 
 AHEAD = 60.0  # [s]
 DEMO = Path(__file__).resolve().parents[1] / 'config/scenarios/demo.yaml'
@@ -43,10 +43,10 @@ def start_errors(out: Path) -> list[float]:
     return [starts[name] - expected for name, expected in predicted.items()]
 
 
-def fly(scenario: Path, out: Path, limit: float) -> tuple[dict[str, Any], list[float]]:
+def fly(scenario: Path, out: Path, *options: str) -> tuple[dict[str, Any], list[float]]:
     """Fly a scenario; return its summary and the errors of its starts [s]."""
     done = subprocess.run([sys.executable, '-m', 'uav_task_alloc.nodes.demo', '--scenario',
-                           str(scenario), '--out', str(out), '--limit', str(limit)],
+                           str(scenario), '--out', str(out), *options],
                           capture_output=True, text=True, check=False)
     if not (out / 'summary.json').exists():
         raise SystemExit(f'the demo failed: {done.stderr}')
@@ -74,6 +74,8 @@ def main() -> None:
     parser.add_argument('--wind', type=float, nargs=2, default=(0.0, 0.0),
                         metavar=('EAST', 'NORTH'), help='[m/s]')
     parser.add_argument('--gusts', type=float, default=0.0, help='[m/s]')
+    parser.add_argument('--speedup', type=float, default=DEFAULT_SPEEDUP,
+                        help='delays of a loaded machine count so many times')
     parser.add_argument('--keep', type=Path, metavar='DIR', help='keep the folders of all runs')
     parser.add_argument('--limit', type=float, default=300.0, help='[s] of one run')
     args = parser.parse_args()
@@ -83,7 +85,8 @@ def main() -> None:
         windy.write_text(to_yaml(replace(load(args.scenario),
                                          wind=ScenarioWind(*args.wind, args.gusts))))
         for k in range(args.runs):
-            runs.append(fly(windy, Path(args.keep or folder, str(k)), args.limit))
+            runs.append(fly(windy, Path(args.keep or folder, str(k)),
+                            '--limit', str(args.limit), '--speedup', str(args.speedup)))
             print(json.dumps(figures(runs[-1:])), flush=True)
     print(json.dumps(figures(runs)))
 
