@@ -22,11 +22,11 @@ from shapely.geometry.base import BaseGeometry
 
 from uav_task_alloc import Task, ThreatZone, Uav, plan
 from uav_task_alloc.geometry.frames import Origin, to_enu_batch
+from uav_task_alloc.geometry.polygon import is_simple
 from uav_task_alloc.mavlink.fence.choice import Fence, FlightSpace, choose_fence
 from uav_task_alloc.mavlink.fence.shapes import CIRCLES, fence_items
 from uav_task_alloc.mavlink.mission.items import Item
 from uav_task_alloc.model import Shape
-from uav_task_alloc.geometry.polygon import is_simple
 
 BUDGETS = {'ardupilot': 70, 'px4': 64}  # points
 CLEARANCE = 10.0  # [m] of the plan

@@ -231,21 +231,21 @@ class BridgeParams(FrameParams):
                               fixed=True)
     when_empty: str = param('hold', 'What a UAV in flight does with an empty list.',
                             choices=('hold', 'return'))
-    when_foreign: str = param('yield', 'What to do about a mission that another ground station '
-                              'uploaded: leave it, or upload ours again.',
+    when_foreign: str = param('yield', 'A mission of another station is left, or replaced.',
                               choices=('yield', 'reassert'))
-    relaunch: str = param('operator', 'Who starts a UAV again after a landing at the end of its '
-                          'list or on a low battery: the operator by `~/hand_over`, or the bridge '
-                          'automatically.', choices=('operator', 'automatic'))
-    state_dir: str = param('', 'Folder that stores across restarts who controls each aircraft; '
-                           'empty: nothing is stored.', fixed=True)
+    fences: str = param('off', 'Zones as fences on board; require: no take-off without them.',
+                        choices=('off', 'warn', 'require'))
+    fence_area: tuple[str, ...] = param(
+        (), 'Corners `LATITUDE,LONGITUDE` of a fence that all stay in; empty: none.', fixed=True)
+    relaunch: str = param('operator', 'Who starts a UAV again after the end of its list or a low '
+                          'battery: `~/hand_over`, or the bridge.', choices=('operator', 'automatic'))
+    state_dir: str = param('', 'Folder for authority, holds and fences; empty: none.', fixed=True)
     capabilities: tuple[str, ...] = param(
         (), 'What UAVs can do, `uav_1:camera,thermal` each.', fixed=True)
     full_range: float = param(0.0, 'Range of a full battery; 0: unknown, range_remaining is NaN.',
                               low=0.0, high=MAX_RANGE, unit='m')
     full_ranges: tuple[str, ...] = param(
-        (), 'The same for single UAVs that differ from full_range, `uav_1:6000` each.',
-        fixed=True)
+        (), 'The same for single UAVs that differ, `uav_1:6000` each.', fixed=True)
     uav_limits: tuple[str, ...] = param(
         (), 'What else the bridge reports about single UAVs, as NAME=NUMBER: cruise_speed, '
         'climb_speed, descent_speed [m/s], endurance [s] with a full battery, turnaround [s], '

@@ -77,6 +77,7 @@ class ItemRules:
     command_frame: int = d.MAV_FRAME_MISSION  # MAV_FRAME of items without a position
     loiters: bool = False  # fixed wing: loiters in place of a hold
     capacity: int = 500  # items
+    fence_points: int = 64  # of the fence store
 
 
 @dataclass(frozen=True, slots=True)
@@ -199,7 +200,8 @@ _PX4 = {
 
 ARDUPILOT = Profile(
     'ardupilot', ItemRules(home_first=True, whole_seconds=True, keeps_radius=False, yaw=0.0,
-                           command_frame=d.MAV_FRAME_GLOBAL_RELATIVE_ALT, capacity=650),
+                           command_frame=d.MAV_FRAME_GLOBAL_RELATIVE_ALT, capacity=650,
+                           fence_points=70),
     atomic=False, idle_after=9.0, modes=_COPTER, family='copter',
     set_mode={ModeFunction.MISSION: d.COPTER_MODE_AUTO, ModeFunction.HOLD: d.COPTER_MODE_GUIDED,
               ModeFunction.RETURN: d.COPTER_MODE_RTL})

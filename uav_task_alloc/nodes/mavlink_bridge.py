@@ -16,6 +16,7 @@ from uav_task_alloc_msgs.srv import HandOver
 
 from uav_task_alloc.errors import InvalidValue, UnknownName
 from uav_task_alloc.mavlink.gcs.authority_store import AuthorityFileStore, boot_id
+from uav_task_alloc.mavlink.gcs.fence_store import FenceFileStore
 from uav_task_alloc.mavlink.gcs.ground_station import GroundStation, VehicleSession
 from uav_task_alloc.mavlink.gcs.hold_store import HoldFileStore
 from uav_task_alloc.mavlink.gcs.operator_hold import HoldRequest
@@ -72,8 +73,10 @@ class MavlinkBridge(Node):
         self.capabilities = bridge_parameters.to_capabilities(params.capabilities)
         self.full_ranges = bridge_parameters.to_full_ranges(params.full_ranges)
         self.limits = bridge_parameters.to_uav_limits(params.uav_limits)
+        self.fence_area = bridge_parameters.to_fence_area(params.fence_area, self.config.origin)
         self.log = LeveledLog(self)
         self.zones: tuple[ThreatZone, ...] = ()
+        self.zones_known = False
         self.closing, self.shutdown = False, BridgeShutdown()
         self._open_ground_station(params)
         self._create_topics()
@@ -88,7 +91,9 @@ class MavlinkBridge(Node):
                                         boot_id()) if params.state_dir else None
         self.ground_station = GroundStation(
             self.config, random.Random(time.time_ns()), self.store, HoldFileStore(
-                params.state_dir, self.log.levels['error']) if params.state_dir else None)
+                params.state_dir, self.log.levels['error']) if params.state_dir else None,
+            FenceFileStore(params.state_dir, self.log.levels['error']) if params.state_dir
+            else None)
         self.connections = Connections(
             map(open_link, params.connections), params.system_id, params.component_id,
             wall=time.time, wanted=WANTED, signing_key_file=params.signing_key_file,
@@ -179,7 +184,8 @@ class MavlinkBridge(Node):
         self.heartbeat.watch(time.monotonic())
         self.log.report_trouble('heartbeat', self.heartbeat.trouble)
         policy = bridge_parameters.to_policy(self.live.now, self.zones, self.grounded(),
-                                             self.stamp())
+                                             self.stamp(), zones_known=self.zones_known,
+                                             fence_area=self.fence_area)
         for session in list(self.ground_station.sessions.values()):
             session.executor.policy = policy
             if session.uav_id not in self.lists.known:
@@ -225,6 +231,7 @@ class MavlinkBridge(Node):
         """Replace the zones; one that is invalid stays as it was."""
         try:
             self.zones, refusal = bridge_messages.to_zones(msg, self.zones)
+            self.zones_known = True
         except InvalidValue as error:
             refusal = str(error)
         self.log.report_refusal('threat_zones', refusal)

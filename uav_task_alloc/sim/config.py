@@ -38,6 +38,8 @@ class VehicleConfig:
     second_battery: float = 0.7  # what remains in it, as a share of what remains in the first
     capacity: int | None = None  # items of the mission storage
     floods: bool = True  # PX4 streams its onboard set unasked
+    fence_capacity: int | None = None  # points of the fence store; 0: none at all
+    parameters: tuple[tuple[str, float], ...] = ()  # those that differ from the defaults
 
 
 class FlightMode(Enum):

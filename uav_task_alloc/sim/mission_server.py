@@ -9,6 +9,7 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 from uav_task_alloc.mavlink.transport.codec import Message
 from uav_task_alloc.sim.config import StorageChange
 from uav_task_alloc.sim.flight import VehicleFlight
+from uav_task_alloc.sim.stored_fence import FENCE_TYPE
 from uav_task_alloc.sim.stored_item import StoredItem, to_float_message, to_message
 
 RemoteIds = tuple[int, int]  # system, component
@@ -25,6 +26,7 @@ class MissionServer:
         capacity: items of the mission storage.
 
     Arguments of methods:
+        mission_type: MAV_MISSION_TYPE of another store.
         message: from any station.
         seq: of an item.
         now: [s].
@@ -37,6 +39,9 @@ class MissionServer:
         self.out: list[Message] = []
         self._system_id = system_id
         self._capacity = capacity
+        self.stores = {MISSION_TYPE: self.items}  # by MAV_MISSION_TYPE
+        self.capacities = {MISSION_TYPE: capacity}
+        self.on_fence: Callable[[], None] = lambda: None  # called when the fence is stored
         self._handlers: dict[str, Callable[[Message, RemoteIds, float], None]] = {
             'MISSION_COUNT': self._count,
             'MISSION_ITEM_INT': self._item,
@@ -50,6 +55,15 @@ class MissionServer:
     def attach(self, flight: VehicleFlight) -> None:
         """Report every change of `items` to this flight, which flies them."""
         self.flight = flight
+
+    def add_store(self, mission_type: int, capacity: int) -> None:
+        """Have a store for fences or rally points."""
+        self.stores[mission_type], self.capacities[mission_type] = [], capacity
+
+    def _stored(self, mission_type: int) -> None:
+        """Note that a store other than that of the mission has changed."""
+        if mission_type == FENCE_TYPE:
+            self.on_fence()
 
     def progress(self) -> tuple[int, int, int]:
         """Fields total, mission_state and mission_mode of MISSION_CURRENT."""
@@ -93,17 +107,20 @@ class MissionServer:
 
     def _count_of(self, message: Message) -> int:
         """Number of items of the mission type that a message names."""
-        return len(self.items) if message.mission_type == MISSION_TYPE else 0
+        return len(self.stores.get(message.mission_type, ()))
 
     def _takes_type(self, message: Message, peer: RemoteIds) -> bool:
-        """Whether an upload is of the mission type; the others are refused."""
-        if message.mission_type != MISSION_TYPE:
+        """Whether there is a store of the mission type; the others are refused."""
+        if message.mission_type not in self.stores:
             self._send_ack(peer, dialect.MAV_MISSION_UNSUPPORTED, message.mission_type)
-        return bool(message.mission_type == MISSION_TYPE)
+        return message.mission_type in self.stores
 
-    def _send_item(self, seq: int, peer: RemoteIds, as_int: bool) -> None:
+    def _send_item(self, seq: int, peer: RemoteIds, as_int: bool,
+                   mission_type: int = MISSION_TYPE) -> None:
         make = to_message if as_int else to_float_message
-        self.out.append(make(self.read(seq), seq, seq == self.flight.seq, peer))
+        item = self.stores[mission_type][seq] if mission_type else self.read(seq)
+        current = seq == self.flight.seq and mission_type == MISSION_TYPE
+        self.out.append(make(item, seq, current, peer, mission_type))
 
     def _send_ack(self, peer: RemoteIds, result: int, mission_type: int = MISSION_TYPE) -> None:
         self.out.append(dialect.MAVLink_mission_ack_message(*peer, result, mission_type))

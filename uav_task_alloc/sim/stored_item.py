@@ -33,7 +33,7 @@ _ARDUPILOT_FRAMES = {  # sent -> read back
     dialect.MAV_FRAME_GLOBAL_TERRAIN_ALT: dialect.MAV_FRAME_GLOBAL_TERRAIN_ALT,
     dialect.MAV_FRAME_GLOBAL_TERRAIN_ALT_INT: dialect.MAV_FRAME_GLOBAL_TERRAIN_ALT,
 }
-_PX4_FRAMES = {
+POSITION_FRAMES = {  # of items with a position, for PX4 and of fences
     dialect.MAV_FRAME_GLOBAL,
     dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT,
     dialect.MAV_FRAME_GLOBAL_INT,
@@ -81,7 +81,8 @@ def from_message(m: Message) -> StoredItem:
                       m.autocontinue)
 
 
-def to_message(item: StoredItem, seq: int, current: bool, peer: tuple[int, int]) -> Message:
+def to_message(item: StoredItem, seq: int, current: bool, peer: tuple[int, int],
+               mission_type: int = 0) -> Message:
     """Return a stored item as MISSION_ITEM_INT.
 
     Args:
@@ -89,16 +90,18 @@ def to_message(item: StoredItem, seq: int, current: bool, peer: tuple[int, int])
         seq: its place in the mission.
         current: whether it is being flown.
         peer: (system, component) that asks for it.
+        mission_type: MAV_MISSION_TYPE.
 
     Returns:
         Ready to be packed.
     """
     return dialect.MAVLink_mission_item_int_message(
         *peer, seq, item.frame, item.command, int(current), item.autocontinue, item.p1, item.p2,
-        item.p3, item.p4, item.x, item.y, item.z)
+        item.p3, item.p4, item.x, item.y, item.z, mission_type)
 
 
-def to_float_message(item: StoredItem, seq: int, current: bool, peer: tuple[int, int]) -> Message:
+def to_float_message(item: StoredItem, seq: int, current: bool, peer: tuple[int, int],
+                     mission_type: int = 0) -> Message:
     """Return a stored item as MISSION_ITEM, which answers an old MISSION_REQUEST.
 
     Args:
@@ -106,14 +109,15 @@ def to_float_message(item: StoredItem, seq: int, current: bool, peer: tuple[int,
         seq: its place in the mission.
         current: whether it is being flown.
         peer: (system, component) that asks for it.
+        mission_type: MAV_MISSION_TYPE.
 
     Returns:
         Ready to be packed; degrees are float32, so metres off.
     """
-    scale = 1e-7 if item.command in POSITIONAL else 1.0
+    scale = 1e-7 if item.command in POSITIONAL or mission_type else 1.0
     return dialect.MAVLink_mission_item_message(
         *peer, seq, item.frame, item.command, int(current), item.autocontinue, item.p1, item.p2,
-        item.p3, item.p4, item.x * scale, item.y * scale, item.z)
+        item.p3, item.p4, item.x * scale, item.y * scale, item.z, mission_type)
 
 
 def stored_by_ardupilot(item: StoredItem) -> StoredItem | Refusal:
@@ -162,7 +166,7 @@ def stored_by_px4(item: StoredItem) -> StoredItem | Refusal:
     Returns:
         The copy, or why it is refused.
     """
-    if item.frame != dialect.MAV_FRAME_MISSION and item.frame not in _PX4_FRAMES:
+    if item.frame != dialect.MAV_FRAME_MISSION and item.frame not in POSITION_FRAMES:
         return Refusal(dialect.MAV_MISSION_UNSUPPORTED_FRAME)
     if item.command not in _KNOWN:
         return Refusal(dialect.MAV_MISSION_UNSUPPORTED)

@@ -15,10 +15,13 @@ from uav_task_alloc.sim.commands import ArduPilotCommands, Commands, Px4Commands
 from uav_task_alloc.sim.config import FlightMode, TruthEvent, VehicleConfig
 from uav_task_alloc.sim.estimate import Estimate
 from uav_task_alloc.sim.failsafe import Interventions
+from uav_task_alloc.sim.fence_monitor import FenceMonitor
 from uav_task_alloc.sim.flight import VehicleFlight
 from uav_task_alloc.sim.mission_server import AUTOPILOT_COMPONENT, MissionServer
+from uav_task_alloc.sim.parameters import SimParameters
 from uav_task_alloc.sim.px4.flight import Px4Flight
 from uav_task_alloc.sim.px4.mission_server import Px4MissionServer
+from uav_task_alloc.sim.stored_fence import CAPACITIES, FENCE_TYPE
 from uav_task_alloc.sim.streams import Streams
 from uav_task_alloc.sim.telemetry import TelemetryMessages
 
@@ -75,6 +78,7 @@ class Vehicle(Interventions):
         self.mission = autopilot.mission(config.system_id, capacity)
         self.flight = autopilot.flight(config, self.mission.items)
         self.mission.attach(self.flight)
+        self._add_fence()
         self.estimate = Estimate(self.flight)
         self._telemetry = TelemetryMessages(self.flight, self.estimate, autopilot.number,
                                     config.system_id)
@@ -90,9 +94,24 @@ class Vehicle(Interventions):
         self._handlers: dict[str, Callable[[Message], list[Message]]] = {
             'COMMAND_LONG': self._command_long, 'COMMAND_INT': self._command_int,
             'SET_MODE': self._set_mode, 'MISSION_SET_CURRENT': self._set_current,
+            'PARAM_REQUEST_READ': self.parameters.receive, 'PARAM_SET': self.parameters.receive,
         }
         self.reboot(now)
         self.flight.events.clear()
+
+    def _add_fence(self) -> None:
+        """Have stores for a fence and rally points, unless the capacity is 0."""
+        config, name = self.config, self.autopilot.name
+        self.parameters = SimParameters(name, config.parameters)
+        for mission_type, capacity in CAPACITIES[name].items():
+            if config.fence_capacity is not None:
+                capacity = min(capacity, config.fence_capacity)
+            if capacity:
+                self.mission.add_store(mission_type, capacity)
+        self.fence = FenceMonitor(
+            self.flight, self.mission.stores.get(FENCE_TYPE, ()), self.parameters,
+            self._is_ardupilot, lambda mode: self.failsafe('fence', mode))
+        self.mission.on_fence = self.fence.update
 
     def reboot(self, now: float) -> None:
         """Power-cycle: boot time, rates and transfers are lost, the stored mission is not.
@@ -157,6 +176,7 @@ class Vehicle(Interventions):
         if self.silent:
             return []
         self.flight.step(now)
+        self.fence.step()
         self.mission.step(now)
         out = self._drain()
         if not self.autopilot.streams_current and now >= self._report_current_at:

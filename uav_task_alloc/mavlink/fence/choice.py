@@ -31,7 +31,11 @@ class FlightSpace:
     position: Point | None = None  # [m] ENU in the air; None: on the ground
 
     def enters(self, shape: FenceShape) -> bool:
-        """Whether a planned leg, or the vehicle now, is where the shape forbids it."""
+        """Whether a planned leg, or the vehicle now, is where the shape forbids it.
+
+        Args:
+            shape: of a fence.
+        """
         if self.position is not None and shape.breached_by(self.position):
             return True
         if shape.inclusion:
@@ -45,7 +49,7 @@ class FlightSpace:
 class Fence:
     """The fence that one UAV is to carry, and the zones that it does not carry."""
 
-    shapes: tuple[FenceShape, ...] = ()
+    shapes: tuple[FenceShape, ...] = ()  # in their order on board
     free_side: dict[str, str] = field(default_factory=dict)  # why, by id of a zone with a height
     waiting: dict[str, str] = field(default_factory=dict)  # why it would breach, by id of a zone
     no_space: tuple[str, ...] = ()  # ids of zones for which the store has no points
@@ -97,7 +101,9 @@ def choose_fence(zones: Iterable[ThreatZone], area: FenceShape | None, space: Fl
     elif area is not None:
         waiting['fence_area'] = 'the UAV or its plan is outside'
     left_out = _fit(chosen, budget - sum(shape.points for shape in fixed), space)
-    shapes = (*fixed, *(choice.shape for choice in chosen))
+    # PX4 reads a polygon after a circle wrongly
+    shapes = (*fixed, *sorted((choice.shape for choice in chosen),
+                              key=lambda shape: not shape.corners))
     return Fence(shapes, free_side, waiting, left_out)
 
 
@@ -132,7 +138,8 @@ class _Choice:
                  origin: Origin) -> None:
         self.zone, self.shape, self._space = zone, first, space
         self._rest = _shapes_of(zone, origin)
-        self._first, self._simpler = True, None
+        self._first = True
+        self._simpler: FenceShape | None = None
 
     @property
     def simpler(self) -> FenceShape | None:

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 
 from pymavlink.dialects.v20 import ardupilotmega as d
 
-from uav_task_alloc.geometry.frames import Origin, to_geodetic_batch
+from uav_task_alloc.geometry.frames import Origin, to_enu_batch, to_geodetic_batch
 from uav_task_alloc.geometry.polygon import XY, contains_point, edges, segments_cross
 from uav_task_alloc.geometry.polyline import segment_distance
-from uav_task_alloc.mavlink.fence.rings import Ring
+from uav_task_alloc.mavlink.fence.rings import LEAST_CORNERS, Ring
 from uav_task_alloc.mavlink.mission.items import Item
 from uav_task_alloc.model import Shape, ThreatZone
 
@@ -19,13 +19,20 @@ _EARTH_RADIUS = 6.371e6  # [m]
 _ROUNDING = 0.03  # [m] items are rounded to 1e-7 degrees and centimetres
 _RADIUS_STEP = 0.01  # [m] of a circle
 CIRCLES = frozenset({d.MAV_CMD_NAV_FENCE_CIRCLE_INCLUSION, d.MAV_CMD_NAV_FENCE_CIRCLE_EXCLUSION})
+_INCLUSIONS = frozenset({d.MAV_CMD_NAV_FENCE_CIRCLE_INCLUSION,
+                         d.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_INCLUSION})
 POLYGONS = frozenset({d.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_INCLUSION,
                       d.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_EXCLUSION})
 
 
 @dataclass(frozen=True, slots=True)
 class FenceShape:
-    """A circle, or a polygon where it has corners; a fence has no height."""
+    """A circle, or a polygon where it has corners; a fence has no height.
+
+    Arguments of methods:
+        point: (x, y, ...) [m] ENU.
+        a, b: ends of a segment, the same.
+    """
 
     zone: str  # id of the zone that it keeps out of; '': the area of the fleet
     center: XY = (0.0, 0.0)  # [m] ENU, of a circle
@@ -105,6 +112,9 @@ def fence_items(shapes: Iterable[FenceShape], origin: Origin) -> tuple[Item, ...
     Args:
         shapes: in their order on board.
         origin: of the ENU frame.
+
+    Returns:
+        By seq; without height, as a fence has none.
     """
     items: list[Item] = []
     for shape in shapes:
@@ -121,6 +131,34 @@ def fence_items(shapes: Iterable[FenceShape], origin: Origin) -> tuple[Item, ...
             items.append(Item(command, d.MAV_FRAME_GLOBAL, round(latitude * 1e7),
                               round(longitude * 1e7), 0.0, (p1, 0.0, 0.0, 0.0)))
     return tuple(items)
+
+
+def shapes_of_items(items: Sequence[Item], origin: Origin) -> list[FenceShape]:
+    """The shapes of a fence as read from a vehicle; one that is cut off is left out.
+
+    Args:
+        items: by seq.
+        origin: of the ENU frame.
+
+    Returns:
+        Without the names of zones.
+    """
+    shapes, at = [], 0
+    places = to_enu_batch(origin, [(item.x * 1e-7, item.y * 1e-7, origin.altitude_amsl)
+                                   for item in items]).tolist()
+    while at < len(items):
+        item, count = items[at], 1
+        inclusion = item.command in _INCLUSIONS
+        if item.command in CIRCLES:
+            shapes.append(FenceShape('', (places[at][0], places[at][1]), item.params[0],
+                                     inclusion=inclusion))
+        elif item.command in POLYGONS:
+            count = max(1, round(item.params[0]))
+            corners = tuple((row[0], row[1]) for row in places[at:at + count])
+            if len(corners) == count >= LEAST_CORNERS:
+                shapes.append(FenceShape('', corners=corners, inclusion=inclusion))
+        at += count
+    return shapes
 
 
 def fences_alike(sent: Sequence[Item], held: Sequence[Item]) -> bool:

@@ -15,10 +15,12 @@ from uav_task_alloc.geometry.frames import Origin
 from uav_task_alloc.mavlink.autopilots import profile_of
 from uav_task_alloc.mavlink.gcs.authority import AuthorityRecord
 from uav_task_alloc.mavlink.gcs.early_messages import EarlyMessages
+from uav_task_alloc.mavlink.gcs.fence_store import FenceStore
 from uav_task_alloc.mavlink.gcs.hold_store import HoldStore
 from uav_task_alloc.mavlink.gcs.mission_executor import MissionExecutor
 from uav_task_alloc.mavlink.gcs.operator_hold import HoldRequest
 from uav_task_alloc.mavlink.gcs.policy import Policy
+from uav_task_alloc.mavlink.gcs.vehicle_fence import FenceMemory
 from uav_task_alloc.mavlink.mission.items import TaskList
 from uav_task_alloc.mavlink.mission.message_checks import defect
 from uav_task_alloc.mavlink.mission.peer import Peer
@@ -72,6 +74,7 @@ class GroundStation:
         rng: seeds the executors.
         store: of authority records; None: not stored.
         hold_store: of operators' holds; None: not stored.
+        fence_store: of the fences of the bridge on board; None: not stored.
 
     Arguments of methods:
         uav_id: of a vehicle, or of one to come.
@@ -83,9 +86,10 @@ class GroundStation:
 
     def __init__(self, config: GcsConfig, rng: random.Random,
                  store: AuthorityStore | None = None,
-                 hold_store: HoldStore | None = None) -> None:
+                 hold_store: HoldStore | None = None,
+                 fence_store: FenceStore | None = None) -> None:
         self._config, self._rng, self._store = config, rng, store
-        self._hold_store = hold_store
+        self._hold_store, self._fence_store = hold_store, fence_store
         self.sessions: dict[int, VehicleSession] = {}  # by system id
         self._early = EarlyMessages()
         self.refusals = RefusedMessages()  # messages and lists whose processing failed
@@ -230,7 +234,7 @@ class GroundStation:
 
         executor = MissionExecutor(peer, profile_of(message, config.autopilot), config.origin,
                                    config.policy, random.Random(self._rng.random()), now,
-                                   record, save)
+                                   record, save, self._fence_memory(uav_id))
         held = '' if self._hold_store is None else self._hold_store.load_hold(uav_id)
         if held:
             executor.holds.request(HoldRequest(OPERATOR, True, held), now)
@@ -239,6 +243,12 @@ class GroundStation:
         for early, at in self._early.take(system, address, now):
             executor.receive(early, at)
         return session
+
+    def _fence_memory(self, uav_id: str) -> FenceMemory:
+        store = self._fence_store
+        if store is None:
+            return FenceMemory()
+        return FenceMemory(store.load_fence(uav_id), lambda own: store.save_fence(uav_id, own))
 
     @staticmethod
     def _addressed(session: VehicleSession, messages: Iterable[Message]) -> Outgoing:

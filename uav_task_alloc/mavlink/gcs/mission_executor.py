@@ -36,6 +36,7 @@ from uav_task_alloc.mavlink.gcs.status_text_log import StatusTextLog
 from uav_task_alloc.mavlink.gcs.takeoff import Takeoff
 from uav_task_alloc.mavlink.gcs.task_events import passed_over, task_events
 from uav_task_alloc.mavlink.gcs.telemetry import Telemetry
+from uav_task_alloc.mavlink.gcs.vehicle_fence import FenceMemory, VehicleFence
 from uav_task_alloc.mavlink.mission.first_leg import LegStart
 from uav_task_alloc.mavlink.mission.flown_path import PositionSample
 from uav_task_alloc.mavlink.mission.items import TaskList
@@ -65,11 +66,13 @@ class MissionExecutor:
         now: steady time [s], as in all methods.
         record: authority of the previous run; None: first run.
         save: stores a changed authority record.
+        fence_memory: fences uploaded by the previous run; None: first run.
     """
 
     def __init__(self, peer: Peer, profile: Profile, origin: Origin, policy: Policy,
                  rng: random.Random, now: float, record: AuthorityRecord | None = None,
-                 save: Callable[[AuthorityRecord], None] = lambda record: None) -> None:
+                 save: Callable[[AuthorityRecord], None] = lambda record: None,
+                 fence_memory: FenceMemory | None = None) -> None:
         self.profile, self.policy, self._peer = profile, policy, peer
         self.telemetry = Telemetry(profile, origin, now)
         self.onboard = OnboardMission(peer, profile, origin, self.telemetry, rng)
@@ -86,8 +89,11 @@ class MissionExecutor:
         self._event_retry = EventRetry()
         self._restarts = 0
         self._status_text_log = StatusTextLog()
+        self.fence = VehicleFence(peer, profile, origin, self.telemetry, self.onboard,
+                                 self.authority, lambda: self.policy, rng,
+                                 fence_memory or FenceMemory())
         takeoff = Takeoff(self.sender, self.telemetry, self.onboard, self.authority,
-                          lambda: self.policy)
+                          lambda: self.policy, self.fence.missing)
         self._end_of_list = EndOfList(self.sender, self.telemetry, self.onboard, self.watch,
                                       lambda: self.policy, self.notes)
         execution = ListExecution(self.sender, self.telemetry, self.onboard, self.watch, profile,
@@ -99,7 +105,8 @@ class MissionExecutor:
             self._linked, self._authority, self.sender.finish, takeoff.continue_takeoff,
             self.holds.hold, self._upload, self._read, self._has_list, self._resume,
             self._may_act, self._hold_first, self._end_of_list.held_too_long, self.holds.stay,
-            self._end_of_list.empty, execution.update_mission, takeoff.take_off, execution.fly)
+            self._end_of_list.empty, self.fence.clear_way, execution.update_mission,
+            takeoff.take_off, execution.fly)
 
     def _restore(self, record: AuthorityRecord | None) -> None:
         """Pass what the previous run recorded to `onboard.resume`."""
@@ -144,13 +151,9 @@ class MissionExecutor:
             Messages to send to the vehicle.
         """
         if self.onboard.tasks is not None and tasks.revision < self.onboard.tasks.revision:
-            self.notes.append(
-                OperatorNote(
-                    'warning',
-                    f'task_list: revision = {tasks.revision}: expected '
-                    f'at least {self.onboard.tasks.revision}: ignored',
-                )
-            )
+            self.notes.append(OperatorNote(
+                'warning', f'task_list: revision = {tasks.revision}: expected '
+                f'at least {self.onboard.tasks.revision}: ignored'))
             return []
         if self.onboard.tasks is None and tasks.revision > 1:  # revision 1: all tasks are new
             for mark in self.watch.marks.values():
@@ -203,7 +206,7 @@ class MissionExecutor:
                 self.onboard.progress.note_in_mission()
             elif mode_before is ModeFunction.MISSION:
                 self.onboard.progress.note_mission_left()
-        out = self.onboard.receive(message, now)
+        out = self.onboard.receive(message, now) + self.fence.receive(message, now)
         self.sender.receive(message)
         if message.get_type() == 'COMMAND_ACK' and self._peer.is_from_vehicle(message):
             self.watch.receive_command_ack(message, self.telemetry.frame)
@@ -231,6 +234,7 @@ class MissionExecutor:
             if step is not None:
                 out = step
                 break
+        out = self.fence.step(now) + out
         self._report(now)
         return out
 
@@ -238,9 +242,10 @@ class MissionExecutor:
         onboard = self.onboard
         self.events += task_events(onboard, self.watch, now)
         self.notes += passed_over(onboard, self.watch, now)
-        for notes in (self.watch.notes, onboard.notes, onboard.list.notes, self.sender.notes):
-            while notes:
-                self.notes.append(notes.popleft())
+        for notes in (self.watch.notes, onboard.notes, onboard.list.notes, self.sender.notes,
+                      self.fence.notes):
+            self.notes += notes
+            notes.clear()
 
     # Received messages
 
@@ -290,6 +295,7 @@ class MissionExecutor:
 
     def _start_over(self, now: float) -> None:
         self.onboard.restarted()
+        self.fence.restart()
         self.sender.reset(now)
         self._rates.restart(now)
 

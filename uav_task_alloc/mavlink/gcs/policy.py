@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from uav_task_alloc.mavlink.fence.shapes import FenceShape
 from uav_task_alloc.model import ThreatZone
 
 
@@ -19,3 +20,6 @@ class Policy:
     zones: tuple[ThreatZone, ...] = ()  # that a return must not cross
     clock: float = 0.0  # [s] ROS time
     grounded: str = ''  # what a vehicle on the ground waits for before a take-off; '': nothing
+    fences: str = 'off'  # or 'warn', 'require': whether vehicles carry the zones as fences
+    zones_known: bool = False  # `zones` were received; else they are empty until then
+    fence_area: FenceShape | None = None  # that all vehicles stay in

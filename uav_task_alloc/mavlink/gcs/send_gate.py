@@ -9,7 +9,8 @@ from uav_task_alloc.mavlink.gcs.authority_watch import AuthorityWatch
 from uav_task_alloc.mavlink.transport.codec import Message
 
 _READS = {d.MAV_CMD_SET_MESSAGE_INTERVAL, d.MAV_CMD_REQUEST_MESSAGE}
-_READING = {'MISSION_REQUEST_LIST', 'MISSION_REQUEST_INT', 'MISSION_REQUEST'}
+_READING = {'MISSION_REQUEST_LIST', 'MISSION_REQUEST_INT', 'MISSION_REQUEST',
+            'PARAM_REQUEST_READ'}
 _UPLOADING = {'MISSION_COUNT', 'MISSION_ITEM_INT'}
 
 
@@ -19,7 +20,10 @@ def action_of(message: Message) -> SendAction:
     if kind in _READING or (kind == 'MISSION_ACK' and message.type == d.MAV_MISSION_ACCEPTED) or (
             kind == 'COMMAND_LONG' and message.command in _READS):
         return SendAction.READ
-    return SendAction.UPLOAD if kind in _UPLOADING or kind == 'MISSION_ACK' else SendAction.COMMAND
+    clears_fence = kind == 'MISSION_CLEAR_ALL' and (
+        message.mission_type == d.MAV_MISSION_TYPE_FENCE)
+    uploads = kind in _UPLOADING or kind == 'MISSION_ACK' or clears_fence
+    return SendAction.UPLOAD if uploads else SendAction.COMMAND
 
 
 def allowed_messages(messages: list[Message], watch: AuthorityWatch, now: float) -> list[Message]:

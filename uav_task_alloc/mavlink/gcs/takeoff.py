@@ -21,6 +21,7 @@ class Takeoff:
         onboard: its mission and list.
         authority: over the vehicle.
         policy: returns the present parameters.
+        fence_missing: what its fence lacks for a take-off; '': nothing.
     """
 
     def __init__(
@@ -30,9 +31,11 @@ class Takeoff:
         onboard: OnboardMission,
         authority: Authority,
         policy: Callable[[], Policy],
+        fence_missing: Callable[[], str] = lambda: '',
     ) -> None:
         self._sender, self._telemetry, self._onboard = sender, telemetry, onboard
         self._authority, self._policy = authority, policy
+        self._fence_missing = fence_missing
 
     def continue_takeoff(self, now: float) -> NextMessages:
         """Let a vehicle that we armed take off before anything else is sent, or disarm it."""
@@ -50,6 +53,9 @@ class Takeoff:
                                'a pilot to arm and take off (takeoff is false)')
         if policy.grounded and not sender.climbing:
             return sender.wait(policy.grounded)
+        missing = self._fence_missing()
+        if missing and not sender.climbing:
+            return sender.wait(missing)
         departure = self._departure()
         if departure and not sender.climbing:
             return sender.wait_for(departure)
@@ -60,7 +66,7 @@ class Takeoff:
         return sender.take_off(policy.cruise_altitude, self._wants_to_fly, now)
 
     def _wants_to_fly(self) -> bool:
-        stays = self._policy().grounded or self._departure()
+        stays = self._policy().grounded or self._fence_missing() or self._departure()
         return (self._authority.held and self._onboard.tasks is not None
                 and not (stays and not self._telemetry.airborne)
                 and bool(self._onboard.remaining().stops))

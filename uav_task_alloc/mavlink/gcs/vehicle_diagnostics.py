@@ -37,6 +37,9 @@ class VehicleFacts:
     clock_rate: str  # its seconds in one second of the bridge; above 1 in a faster simulation
     strays: int  # number of frames from other addresses
     held_by: str  # who holds it, and why
+    fence: str  # state of the fence on board
+    fence_parameters: str  # whether it is on, and what happens at a breach
+    fence_left_out: str  # zones that it does not hold, and why
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,7 +89,9 @@ def _level_of(session: VehicleSession, now: float) -> tuple[int, str]:
         return _ERROR, executor.alarm
     if authority.state in (AuthorityState.LOST, AuthorityState.SUSPENDED):
         return _WARN, f'authority {authority.state.name}: {authority.why}'
-    return _WARN if state is MissionState.FOREIGN else _OK, f'mission {state.name}'
+    warning = executor.fence.warning
+    level = _WARN if state is MissionState.FOREIGN or warning else _OK
+    return level, f'mission {state.name}' + (f', {warning}' if warning else '')
 
 
 def _facts_of(session: VehicleSession, now: float) -> VehicleFacts:
@@ -106,7 +111,9 @@ def _facts_of(session: VehicleSession, now: float) -> VehicleFacts:
         upload=upload_progress(onboard, now) or 'none', uploads=onboard.upload.uploads,
         restarts=telemetry.restarts, silent_for=f'{now - telemetry.received_at:.1f} s',
         clock_rate='unknown' if math.isnan(rate) else f'{rate:.3f}',
-        strays=session.strays, held_by=executor.holds.reason or 'nobody')
+        strays=session.strays, held_by=executor.holds.reason or 'nobody',
+        fence=executor.fence.text, fence_parameters=executor.fence.parameters.text,
+        fence_left_out=executor.fence.left_out or 'nothing')
 
 
 def upload_progress(onboard: OnboardMission, now: float) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-_SPACE_TEXT = re.compile(r'Only (\d+) items are supported')
+SPACE_TEXT = re.compile(r'Only (\d+) items are supported')
 
 
 class Horizon:
@@ -29,7 +29,7 @@ class Horizon:
 
     def note(self, text: str) -> None:
         """Read the space from a STATUSTEXT (ArduPilot)."""
-        match = _SPACE_TEXT.search(text)
+        match = SPACE_TEXT.search(text)
         if match:
             self._space = int(match[1])
 

@@ -20,6 +20,8 @@ class Peer:
         seq: of an item.
         command: MAV_CMD.
         params: param1 to param7 of the command.
+        name: of a parameter.
+        result: MAV_MISSION_RESULT.
     """
 
     system: int  # id of the vehicle
@@ -45,6 +47,16 @@ class Peer:
         return dialect.MAVLink_mission_item_int_message(
             self.system, self.component, seq, item.frame, item.command, int(current), 1,
             *item.params, item.x, item.y, item.z, self.mission_type)
+
+    def clear(self) -> Message:
+        """MISSION_CLEAR_ALL of our mission type."""
+        return dialect.MAVLink_mission_clear_all_message(
+            self.system, self.component, self.mission_type)
+
+    def read_parameter(self, name: str) -> Message:
+        """PARAM_REQUEST_READ by name."""
+        return dialect.MAVLink_param_request_read_message(
+            self.system, self.component, name.encode(), -1)
 
     def ack(self, result: int) -> Message:
         """MISSION_ACK."""

@@ -107,6 +107,7 @@ class Upload:
         peer: the vehicle.
         idle_after: time [s] after which the vehicle has given up a transfer.
         rng: draws the back-off times.
+        same: whether items read back are those sent.
 
     Arguments of methods:
         mission: to be on board.
@@ -114,8 +115,9 @@ class Upload:
         now: steady time [s].
     """
 
-    def __init__(self, peer: Peer, *, idle_after: float, rng: random.Random) -> None:
-        self._peer, self._idle_after, self._rng = peer, idle_after, rng
+    def __init__(self, peer: Peer, *, idle_after: float, rng: random.Random,
+                 same: Callable[[Sequence[Item], Sequence[Item]], bool] = all_alike) -> None:
+        self._peer, self._idle_after, self._rng, self._same = peer, idle_after, rng, same
         self.state = UploadState.IDLE
         self.events: deque[Outcome] = deque()
         self.uploads = 0  # started so far
@@ -329,10 +331,9 @@ class Upload:
             self._fail('the mission could not be read back')
             self._go(UploadEvent.UNREAD, now)
 
-    @staticmethod
-    def _alike(held: Sequence[Item], mission: Mission) -> bool:
+    def _alike(self, held: Sequence[Item], mission: Mission) -> bool:
         return (len(held) == len(mission.items)
-                and all_alike(mission.items[mission.own:], held[mission.own:]))
+                and self._same(mission.items[mission.own:], held[mission.own:]))
 
     def _fail(self, reason: str, result: int | None = None, seq: int | None = None) -> None:
         assert self._mission is not None

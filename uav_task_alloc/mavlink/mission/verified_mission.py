@@ -6,6 +6,7 @@ from collections.abc import Callable
 from enum import Enum
 
 from pymavlink.dialects.v20 import ardupilotmega as d
+from pymavlink.dialects.v20.ardupilotmega import MAV_MISSION_TYPE_MISSION
 
 from uav_task_alloc.mavlink.mission.current_item_reports import SETTLE_TIME
 from uav_task_alloc.mavlink.mission.items import Item, all_alike
@@ -48,8 +49,9 @@ class VerifiedMission:
         self.reported_id = 0  # last reported
 
     def note_mission_id(self, message: Message) -> None:
-        """Store PX4's mission id from a MISSION_ACK or MISSION_COUNT."""
-        self.reported_id = plan_id(message)
+        """Store PX4's mission id from a MISSION_ACK or MISSION_COUNT; not that of a fence."""
+        if message.mission_type == MAV_MISSION_TYPE_MISSION:
+            self.reported_id = plan_id(message)
 
     def has_mission_id(self, message: Message) -> bool:
         """Whether a MISSION_CURRENT refers to this mission, by PX4's mission id."""

@@ -5,9 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 
-from uav_task_alloc.checks import check_number, check_ros_name
+from uav_task_alloc.checks import check_number, check_polygon, check_ros_name
 from uav_task_alloc.errors import InvalidValue
-from uav_task_alloc.geometry.frames import Origin
+from uav_task_alloc.geometry.frames import Origin, to_enu
+from uav_task_alloc.geometry.polygon import signed_area
+from uav_task_alloc.mavlink.fence.shapes import FenceShape
 from uav_task_alloc.mavlink.gcs.ground_station import GcsConfig
 from uav_task_alloc.mavlink.gcs.policy import Policy
 from uav_task_alloc.model import ThreatZone
@@ -19,8 +21,12 @@ _LIMIT_NAMES = frozenset({'cruise_speed', 'climb_speed', 'descent_speed', 'endur
 _MOST = 1e6  # of any of them
 
 
+_MOST_CORNERS = 20  # of the area of a fence
+
+
 def to_policy(params: BridgeParams, zones: tuple[ThreatZone, ...] = (),
-              grounded: str = '', clock: float = 0.0) -> Policy:
+              grounded: str = '', clock: float = 0.0, *, zones_known: bool = False,
+              fence_area: FenceShape | None = None) -> Policy:
     """Return what a mission executor may do now.
 
     Args:
@@ -28,12 +34,50 @@ def to_policy(params: BridgeParams, zones: tuple[ThreatZone, ...] = (),
         zones: around which it returns.
         clock: ROS time [s].
         grounded: what has to be different before a UAV takes off; '' where it may.
+        zones_known: the zones were received.
+        fence_area: that all vehicles stay in; None: none.
 
     Returns:
         For all executors of the bridge.
     """
     return Policy(params.takeoff, params.cruise_altitude, params.when_empty, params.when_foreign,
-                  params.relaunch, zones, clock, grounded)
+                  params.relaunch, zones, clock, grounded, params.fences, zones_known, fence_area)
+
+
+def to_fence_area(entries: Iterable[str], origin: Origin) -> FenceShape | None:
+    """Return the area that all vehicles stay in.
+
+    Args:
+        entries: corners like `47.3977,8.5456` [deg].
+        origin: of the ENU frame.
+
+    Returns:
+        An inclusion, counter-clockwise; None where there are no entries.
+
+    Raises:
+        InvalidValue: an entry has another form, or the polygon is not simple.
+    """
+    places = [_degrees('fence_area', entry) for entry in entries]
+    if not places:
+        return None
+    if len(places) > _MOST_CORNERS:
+        raise InvalidValue('fence_area', len(places), f'at most {_MOST_CORNERS} corners')
+    corners = tuple((x, y) for x, y, _ in (
+        to_enu(origin, *place, origin.altitude_amsl) for place in places))
+    corners = check_polygon('fence_area', corners)
+    return FenceShape('', corners=corners if signed_area(corners) > 0.0 else corners[::-1],
+                      inclusion=True)
+
+
+def _degrees(name: str, entry: str) -> tuple[float, float]:
+    """Latitude and longitude of an entry; raises InvalidValue."""
+    try:
+        latitude, longitude = map(float, entry.split(','))
+    except ValueError:
+        latitude = longitude = math.nan
+    if not (abs(latitude) <= 90.0 and abs(longitude) <= 180.0):
+        raise InvalidValue(name, entry, '`LATITUDE,LONGITUDE` in degrees')
+    return latitude, longitude
 
 
 def to_gcs_config(params: BridgeParams) -> GcsConfig:

@@ -6,6 +6,7 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from uav_task_alloc.mavlink.transport.codec import Message
 from uav_task_alloc.sim.ardupilot.flight import ArduPilotFlight, MissionRunState
+from uav_task_alloc.sim.ardupilot.geo_server import GeoUpload
 from uav_task_alloc.sim.config import FlightMode, StorageChange
 from uav_task_alloc.sim.flight import WARNING
 from uav_task_alloc.sim.mission_server import (
@@ -43,9 +44,24 @@ class ArduPilotMissionServer(MissionServer):
         self._received_at = 0.0  # [s]
         self._requested_at = 0.0  # [s]
         self._unloaded: list[StoredItem] | None = None  # the storage, before it is loaded
+        self._geo: dict[int, GeoUpload] = {}  # by MAV_MISSION_TYPE
+
+    def add_store(self, mission_type: int, capacity: int) -> None:
+        super().add_store(mission_type, capacity)
+        self._geo[mission_type] = GeoUpload(
+            mission_type, self.stores[mission_type], capacity, self.out, self._stored)
+
+    def handle(self, message: Message, now: float) -> bool:
+        geo = self._geo.get(getattr(message, 'mission_type', MISSION_TYPE))
+        if geo is not None and self._for_us(message) and geo.receive(
+                message, (message.get_srcSystem(), message.get_srcComponent()), now):
+            return True
+        return super().handle(message, now)
 
     def reboot(self) -> None:
         self._peer = None
+        for geo in self._geo.values():
+            geo.reboot()
         if self.flight.boot.booting:
             self._unloaded = [*(self._unloaded or ()), *self.items]
             self.items.clear()
@@ -71,6 +87,8 @@ class ArduPilotMissionServer(MissionServer):
 
     def step(self, now: float) -> None:
         self.load()
+        for geo in self._geo.values():
+            geo.step(now)
         if self._peer is None:
             return
         if now - self._received_at > _GIVE_UP:
@@ -138,22 +156,32 @@ class ArduPilotMissionServer(MissionServer):
             self._ask(now)
 
     def _request_list(self, message: Message, peer: RemoteIds, now: float) -> None:
-        if self._peer is not None:
+        if message.mission_type not in self.stores:
+            self._send_ack(peer, dialect.MAV_MISSION_UNSUPPORTED, message.mission_type)
+            return
+        if self._peer is not None and message.mission_type == MISSION_TYPE:
             self._send_ack(peer, dialect.MAV_MISSION_DENIED, message.mission_type)
             return
         self.out.append(dialect.MAVLink_mission_count_message(
             *peer, self._count_of(message), message.mission_type))
 
     def _request(self, message: Message, peer: RemoteIds, now: float) -> None:
-        if self._peer is not None:
+        if message.mission_type != MISSION_TYPE:
+            self._request_geo(message, peer)
+        elif self._peer is not None:
             self._send_ack(peer, dialect.MAV_MISSION_DENIED, message.mission_type)
-        elif message.mission_type != MISSION_TYPE:
-            self._send_ack(peer, dialect.MAV_MISSION_ERROR, message.mission_type)
         elif message.seq != 0 and message.seq >= len(self.items):
             self._request_list(message, peer, now)  # for the count
             self._send_ack(peer, dialect.MAV_MISSION_ERROR)
         else:
             self._send_item(message.seq, peer, message.get_type().endswith('_INT'))
+
+    def _request_geo(self, message: Message, peer: RemoteIds) -> None:
+        if message.seq < self._count_of(message):
+            self._send_item(message.seq, peer, message.get_type().endswith('_INT'),
+                            message.mission_type)
+        else:
+            self._send_ack(peer, dialect.MAV_MISSION_ERROR, message.mission_type)
 
     def _clear(self, message: Message, peer: RemoteIds, now: float) -> None:
         if self._peer is not None:

@@ -16,6 +16,7 @@ from uav_task_alloc.sim.mission_server import (
     RemoteIds,
 )
 from uav_task_alloc.sim.px4.flight import Px4Flight
+from uav_task_alloc.sim.stored_fence import stored_geo_item
 from uav_task_alloc.sim.stored_item import (
     Refusal,
     StoredItem,
@@ -53,6 +54,7 @@ class Px4MissionServer(MissionServer):
     def reboot(self) -> None:
         self._state = _State.IDLE
         self._peer: RemoteIds = (0, 0)
+        self._type = MISSION_TYPE  # of the transfer: there is one at a time
         self._seq = 0  # expected next, in either direction
         self._expected = 0
         self._incoming: list[StoredItem] = []
@@ -96,7 +98,7 @@ class Px4MissionServer(MissionServer):
         self._requested_at = now
         kind = (dialect.MAVLink_mission_request_int_message if self._int
                 else dialect.MAVLink_mission_request_message)
-        self.out.append(kind(*self._peer, self._seq, MISSION_TYPE))
+        self.out.append(kind(*self._peer, self._seq, self._type))
 
     def _count(self, message: Message, peer: RemoteIds, now: float) -> None:
         self._received_at = now
@@ -105,20 +107,20 @@ class Px4MissionServer(MissionServer):
         elif self._state is _State.GETLIST and self._seq == 0:
             self._ask(now)  # our request was probably lost
         else:  # to the station that uploads, from whichever it came; the transfer goes on
-            self._send_ack(self._peer, dialect.MAV_MISSION_ERROR)
+            self._send_ack(self._peer, dialect.MAV_MISSION_ERROR, self._type)
 
     def _begin(self, message: Message, peer: RemoteIds, now: float) -> None:
         if not self._takes_type(message, peer):
             return
-        self._peer = peer
-        if message.count > self._capacity:
-            self._send_ack(peer, dialect.MAV_MISSION_NO_SPACE)
+        self._peer, self._type = peer, message.mission_type
+        if message.count > self.capacities[self._type]:
+            self._send_ack(peer, dialect.MAV_MISSION_NO_SPACE, self._type)
             return
         self._incoming, self._flagged = [], None
         self._seq, self._expected = 0, message.count
         if message.count == 0:
             self._store(StorageChange.CLEARED)
-            self._send_ack(peer, dialect.MAV_MISSION_ACCEPTED)
+            self._send_ack(peer, dialect.MAV_MISSION_ACCEPTED, self._type)
             return
         self._state = _State.GETLIST
         self._ask(now)
@@ -127,20 +129,24 @@ class Px4MissionServer(MissionServer):
         self._int = True
         if peer != self._peer:
             return
-        if self._state is _State.GETLIST:
+        if message.mission_type != self._type:
+            self._send_ack(peer, dialect.MAV_MISSION_ERROR, self._type)
+        elif self._state is _State.GETLIST:
             self._received_at = now
             if message.seq == self._seq:
                 self._take(message, now)
         elif self._state is _State.IDLE and message.seq + 1 == self._seq:
             self._accept()  # a repeated last item: our ACK was probably lost
         else:
-            self._send_ack(peer, dialect.MAV_MISSION_ERROR)
+            self._send_ack(peer, dialect.MAV_MISSION_ERROR, self._type)
 
     def _take(self, message: Message, now: float) -> None:
-        stored = stored_by_px4(from_message(message))
+        item = from_message(message)
+        stored = (stored_geo_item(item, self._type, ardupilot=False) if self._type
+                  else stored_by_px4(item))
         if isinstance(stored, Refusal):
             self._state = _State.IDLE
-            self._send_ack(self._peer, stored.result)
+            self._send_ack(self._peer, stored.result, self._type)
             return
         self._incoming.append(stored)
         if message.current:
@@ -154,45 +160,58 @@ class Px4MissionServer(MissionServer):
             self._ask(now)
 
     def _store(self, change: StorageChange) -> None:
+        if self._type != MISSION_TYPE:
+            self.stores[self._type][:] = self._incoming
+            self._stored(self._type)
+            return
         self.items[:] = self._incoming
         self._id = px4_crc(self.items)
         self._changed(change, self._flagged)
 
     def _accept(self) -> None:
         self.out.append(with_plan_id(dialect.MAVLink_mission_ack_message(
-            *self._peer, dialect.MAV_MISSION_ACCEPTED, MISSION_TYPE), self._id))
+            *self._peer, dialect.MAV_MISSION_ACCEPTED, self._type), self._crc))
+
+    @property
+    def _crc(self) -> int:
+        """Id of what is stored of the transfer's type."""
+        return px4_crc(self.stores[self._type]) if self._type else self._id
 
     def _request_list(self, message: Message, peer: RemoteIds, now: float) -> None:
-        if self._seq == len(self.items):  # all was sent: the station's ACK may be lost
+        if self._seq == len(self.stores[self._type]):  # all was sent: its ACK may be lost
             self._state = _State.IDLE
         repeated = self._state is _State.SENDLIST and peer == self._peer
         if self._state is not _State.IDLE and not repeated:
             return
         count = self._count_of(message)
-        if message.mission_type == MISSION_TYPE:
+        if message.mission_type in self.stores:
             self._state, self._peer, self._seq, self._received_at = _State.SENDLIST, peer, 0, now
+            self._type = message.mission_type
         self.out.append(with_plan_id(dialect.MAVLink_mission_count_message(
-            *peer, count, message.mission_type), self._id if count else 0))
+            *peer, count, message.mission_type), self._crc if count else 0))
 
     def _request(self, message: Message, peer: RemoteIds, now: float) -> None:
         self._int = message.get_type().endswith('_INT')
         if peer != self._peer or self._state is not _State.SENDLIST:
             return
         self._received_at = now
-        if message.seq == self._seq < len(self.items):
+        count = len(self.stores[self._type])
+        if message.mission_type == self._type and message.seq == self._seq < count:
             self._seq += 1
-        elif message.seq != self._seq - 1 or message.seq >= len(self.items):
+        elif (message.mission_type != self._type or message.seq != self._seq - 1
+                or message.seq >= count):
             self._state = _State.IDLE
-            self._send_ack(peer, dialect.MAV_MISSION_ERROR)
+            self._send_ack(peer, dialect.MAV_MISSION_ERROR, self._type)
             return
-        self._send_item(message.seq, peer, self._int)
+        self._send_item(message.seq, peer, self._int, self._type)
 
     def _clear(self, message: Message, peer: RemoteIds, now: float) -> None:
         if self._state is not _State.IDLE:
             return
-        if message.mission_type in CLEARED_TYPES:
-            self._incoming, self._flagged = [], None
-            self._store(StorageChange.CLEARED)
+        for mission_type in self.stores:
+            if message.mission_type in (mission_type, CLEARED_TYPES[1]):
+                self._incoming, self._flagged, self._type = [], None, mission_type
+                self._store(StorageChange.CLEARED)
         self._send_ack(peer, dialect.MAV_MISSION_ACCEPTED, message.mission_type)
 
     def _ack(self, message: Message, peer: RemoteIds, now: float) -> None:

@@ -1,0 +1,114 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The parameters of a vehicle about fences and returns: read, never set."""
+from __future__ import annotations
+
+import struct
+
+from pymavlink.dialects.v20 import ardupilotmega as d
+
+from uav_task_alloc.mavlink.autopilots import Profile
+from uav_task_alloc.mavlink.mission.peer import Peer
+from uav_task_alloc.mavlink.transport.codec import Message
+
+_PERIOD, _TRIES = 2.0, 5  # [s] between requests of missing values; in a row
+_REFRESH = 60.0  # [s] until all are read again: another station may set them
+_POLYGONS = 4  # bit of FENCE_TYPE
+_ARDUPILOT = ('FENCE_ENABLE', 'FENCE_TYPE', 'FENCE_ACTION', 'OA_TYPE', 'RTL_ALT', 'RTL_ALT_M')
+_PX4 = ('GF_ACTION', 'RTL_RETURN_ALT')
+_RETURN_HEIGHTS = {'ardupilot': 15.0, 'px4': 60.0}  # [m] defaults of the autopilots
+_INTEGERS = {d.MAV_PARAM_TYPE_UINT8, d.MAV_PARAM_TYPE_INT8, d.MAV_PARAM_TYPE_UINT16,
+             d.MAV_PARAM_TYPE_INT16, d.MAV_PARAM_TYPE_UINT32, d.MAV_PARAM_TYPE_INT32}
+_ACTIONS = {
+    'FENCE_ACTION': {0: 'report only', 1: 'RTL or land', 2: 'land', 3: 'SmartRTL, RTL or land',
+                     4: 'brake or land', 5: 'SmartRTL or land'},
+    'GF_ACTION': {0: 'none', 1: 'warning', 2: 'hold', 3: 'return', 4: 'terminate', 5: 'land'},
+}
+
+
+class FenceParameters:
+    """What a vehicle does at a breach, and how high it returns.
+
+    Args:
+        peer: the vehicle.
+        profile: of its autopilot.
+    """
+
+    def __init__(self, peer: Peer, profile: Profile) -> None:
+        self._peer, self._profile = peer, profile
+        self.names = {'ardupilot': _ARDUPILOT, 'px4': _PX4}.get(profile.name, ())
+        self.values: dict[str, float] = {}
+        self.reset()
+
+    def reset(self) -> None:
+        """Read all again, after a restart of the vehicle."""
+        self.values.clear()
+        self._asked: dict[str, int] = {}  # requests without an answer, by name
+        self._due = 0.0
+
+    def receive(self, message: Message) -> None:
+        """Take a PARAM_VALUE of the vehicle, whoever requested or set it.
+
+        Args:
+            message: of the vehicle, of any type.
+        """
+        if message.get_type() != 'PARAM_VALUE' or message.param_id not in self.names:
+            return
+        value = float(message.param_value)
+        if self._profile.name == 'px4' and message.param_type in _INTEGERS:
+            value = float(struct.unpack('<i', struct.pack('<f', value))[0])  # sent by its bytes
+        self.values[message.param_id] = value
+        self._asked.pop(message.param_id, None)
+
+    def step(self, now: float) -> list[Message]:
+        """The requests that are due.
+
+        Args:
+            now: steady time [s].
+        """
+        if now < self._due:
+            return []
+        open_names = [name for name in self.names
+                      if name not in self.values and self._asked.get(name, 0) < _TRIES]
+        if not open_names:
+            self._due = now + _REFRESH
+            self._asked = dict.fromkeys(self.names, 0)
+            open_names = list(self.values)
+        else:
+            self._due = now + _PERIOD
+        for name in open_names:
+            self._asked[name] = self._asked.get(name, 0) + 1
+        return [self._peer.read_parameter(name) for name in open_names]
+
+    @property
+    def enabled(self) -> bool | None:
+        """Whether breaches of circles and polygons are detected; None: not known."""
+        get = self.values.get
+        if self._profile.name == 'px4':
+            action = get('GF_ACTION')
+            return None if action is None else action > 0.0
+        enable, kinds = get('FENCE_ENABLE'), get('FENCE_TYPE')
+        if enable is None or kinds is None:
+            return None
+        return enable > 0.0 and bool(int(kinds) & _POLYGONS)
+
+    @property
+    def return_height(self) -> float:
+        """[m] above home, at least; the default of the autopilot where it is not known."""
+        if 'RTL_ALT_M' in self.values:
+            return self.values['RTL_ALT_M']
+        if 'RTL_ALT' in self.values:
+            return self.values['RTL_ALT'] * 0.01
+        return self.values.get('RTL_RETURN_ALT', _RETURN_HEIGHTS.get(self._profile.name, 0.0))
+
+    @property
+    def text(self) -> str:
+        """Whether the fence is on, and what happens at a breach."""
+        name = 'GF_ACTION' if self._profile.name == 'px4' else 'FENCE_ACTION'
+        if self.enabled is None:
+            return 'not known whether it is on'
+        parts = [f'{name} {self.values[name]:g} ({_ACTIONS[name].get(int(self.values[name]))})'
+                 ] if name in self.values else []
+        if name == 'FENCE_ACTION':
+            parts = [f'{each} {self.values[each]:g}' for each in ('FENCE_ENABLE', 'FENCE_TYPE')
+                     ] + parts
+        return ('on' if self.enabled else 'OFF on the vehicle') + ': ' + ', '.join(parts)

@@ -1,0 +1,259 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Keeps the fence on board of one vehicle true to the zones: when it is chosen and transferred.
+
+A mission comes first: no transfer of a fence begins while one of the mission runs, and it is
+cancelled for one. Only a plan that passes where the fence on board forbids it waits for the fence.
+"""
+from __future__ import annotations
+
+import random
+from collections import deque
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
+
+from pymavlink.dialects.v20 import ardupilotmega as d
+
+from uav_task_alloc.geometry.frames import Origin
+from uav_task_alloc.mavlink.autopilots import Profile
+from uav_task_alloc.mavlink.fence.choice import Fence, FlightSpace, choose_fence
+from uav_task_alloc.mavlink.fence.fence_parameters import FenceParameters
+from uav_task_alloc.mavlink.fence.onboard_fence import FenceState, ItemKey, OnboardFence
+from uav_task_alloc.mavlink.fence.shapes import fence_items, shapes_of_items
+from uav_task_alloc.mavlink.gcs.authority import Authority, SendAction
+from uav_task_alloc.mavlink.gcs.onboard_mission import OnboardMission
+from uav_task_alloc.mavlink.gcs.policy import Policy
+from uav_task_alloc.mavlink.gcs.telemetry import Telemetry
+from uav_task_alloc.mavlink.mission.peer import Peer
+from uav_task_alloc.mavlink.transport.codec import Message
+from uav_task_alloc.mavlink.transport.notes import OperatorNote
+from uav_task_alloc.model import Point
+
+_PERIOD = 1.0  # [s] between choices
+_SETTLED = 2.0  # [s] in the air without a change of the wanted fence: the new list comes first
+_MOST_FAILURES = 3  # transfers until a plan no longer waits for the fence
+
+
+@dataclass(slots=True)
+class FenceMemory:
+    """What the bridge has uploaded to a vehicle, over its restarts."""
+
+    own: Iterable[ItemKey] = ()  # items that may be on board
+    save: Callable[[frozenset[ItemKey]], None] = lambda own: None
+
+
+class VehicleFence:
+    """The fence of one vehicle.
+
+    Args:
+        peer: the vehicle.
+        profile: of its autopilot.
+        origin: of the ENU frame.
+        telemetry: of the vehicle.
+        onboard: its mission and list.
+        authority: over the vehicle.
+        policy: returns the present parameters.
+        rng: for back-off jitter.
+        memory: of earlier uploads.
+
+    Arguments of methods:
+        now: steady time [s].
+    """
+
+    def __init__(self, peer: Peer, profile: Profile, origin: Origin, telemetry: Telemetry,
+                 onboard: OnboardMission, authority: Authority, policy: Callable[[], Policy],
+                 rng: random.Random, memory: FenceMemory) -> None:
+        self._origin, self._telemetry, self._onboard = origin, telemetry, onboard
+        self._authority, self._policy = authority, policy
+        fence_peer = replace(peer, mission_type=d.MAV_MISSION_TYPE_FENCE)
+        self.transfer = OnboardFence(fence_peer, profile.idle_after, rng,
+                                     profile.rules.fence_points, memory.own, memory.save)
+        self.parameters = FenceParameters(peer, profile)
+        self.notes: deque[OperatorNote] = deque()
+        self.fence = Fence()
+        self._chosen_for: object = None
+        self._choose_at = self._changed_at = -1e9  # [s]
+        self._reported = ''
+
+    @property
+    def active(self) -> bool:
+        """Whether fences are carried at all."""
+        return self._policy().fences != 'off'
+
+    @property
+    def state(self) -> FenceState:
+        """The state of the fence on board."""
+        return self.transfer.state if self.active else FenceState.OFF
+
+    @property
+    def verified(self) -> bool:
+        """Whether the wanted fence is on board and enforced as far as it can be known."""
+        return self.state is FenceState.VERIFIED
+
+    def restart(self) -> None:
+        """Start over after a restart of the vehicle."""
+        self.transfer.reset()
+        self.parameters.reset()
+
+    def receive(self, message: Message, now: float) -> list[Message]:
+        """Process a message of the vehicle; returns messages to send."""
+        if not self.active:
+            return []
+        self.parameters.receive(message)
+        return self.transfer.receive(message, now)
+
+    def step(self, now: float) -> list[Message]:
+        """Choose the fence, and go on with its transfer; returns messages to send."""
+        if not self.active:
+            return self.transfer.cancel()
+        if self._telemetry.stale(now) or not self._telemetry.past_boot:
+            return []
+        self._choose(now)
+        out = self._transfer(now)
+        self._report()
+        return out
+
+    def _transfer(self, now: float) -> list[Message]:
+        if self._onboard.upload.busy:
+            return self.transfer.cancel()
+        if not self._authority.allows(SendAction.READ):
+            return []
+        out = self.parameters.step(now)
+        if self.transfer.busy:
+            return out + self.transfer.step(now)
+        settled = not self._telemetry.airborne or now - self._changed_at >= _SETTLED or (
+            self._blocks())
+        return out + self.transfer.begin(
+            now, settled and self._authority.allows(SendAction.UPLOAD)
+            and self._policy().zones_known)
+
+    def clear_way(self, now: float) -> list[Message] | None:
+        """A rule: wait where the list passes through a fence on board that is being changed."""
+        if not self.active or not self._blocks() or self.transfer.failures >= _MOST_FAILURES or (
+                not self._authority.allows(SendAction.UPLOAD)):
+            return None
+        return []
+
+    def missing(self) -> str:
+        """What is missing for a take-off with `fences: require`; '': nothing."""
+        policy = self._policy()
+        if policy.fences != 'require':
+            return ''
+        if not policy.zones_known:
+            return 'the zones (fences: require)'
+        if self.fence.no_space or self.fence.waiting:
+            return f'its fence: {self.left_out}'
+        if not self.verified:
+            return f'its fence: {self.text}'
+        if self.fence.shapes and not self.parameters.enabled:
+            return f'its fence to be enabled: {self.parameters.text}'
+        return ''
+
+    @property
+    def text(self) -> str:
+        """State of the fence for operators."""
+        state, transfer = self.state, self.transfer
+        if state is FenceState.OFF:
+            return 'OFF'
+        text = state.name
+        if state is FenceState.VERIFIED:
+            text += f', {len(self.fence.shapes)} zones in {self.fence.points} points'
+        if state is FenceState.FOREIGN:
+            text += (f', {len(transfer.held or ())} points of another station: they are left '
+                     'alone; remove them there to have the zones on board')
+        if transfer.reason:
+            text += f' ({transfer.reason})'
+        return text
+
+    @property
+    def left_out(self) -> str:
+        """The zones that are not on board and why; '': all are."""
+        parts = [f'{zone}: no space on board' for zone in self.fence.no_space]
+        for group in (self.fence.waiting, self.fence.free_side):
+            parts += [f'{zone}: {reason}' for zone, reason in group.items()]
+        return '; '.join(parts)
+
+    @property
+    def warning(self) -> str:
+        """What an operator should know before a flight; '': nothing."""
+        if not self.active or (self.verified and not self.fence.shapes):
+            return ''
+        parts = [] if self.verified else [f'fence {self.text}']
+        if self.parameters.enabled is False:
+            parts.append(f'fence {self.parameters.text}')
+        if self.fence.no_space or self.fence.waiting:
+            parts.append(f'fence without {self.left_out}')
+        return '; '.join(parts)
+
+    def _report(self) -> None:
+        """Log the state when it changes."""
+        if self.transfer.busy or self.transfer.wanted is None:
+            return
+        text = f'fence {self.text}'
+        if self.verified and self.fence.shapes:
+            text += f'; {self.parameters.text}'
+        if self.left_out:
+            text += f'; not on board: {self.left_out}'
+        if text != self._reported:
+            self._reported = text
+            self.notes.append(OperatorNote('warning' if self.warning else 'info', text))
+
+    # the choice
+
+    def _choose(self, now: float) -> None:
+        policy, telemetry = self._policy(), self._telemetry
+        if now < self._choose_at or not telemetry.has_position or not policy.zones_known:
+            return
+        self._choose_at = now + _PERIOD
+        key = self._key(policy)
+        if key == self._chosen_for and not self.fence.waiting:
+            return
+        space = self._space()
+        self._chosen_for = key
+        carried = self.fence.shapes if self.verified else ()
+        self.fence = choose_fence(policy.zones, policy.fence_area, space, self.transfer.budget,
+                                  self._origin, carried)
+        wanted = fence_items(self.fence.shapes, self._origin)
+        if wanted != self.transfer.wanted:
+            self.transfer.wanted, self._changed_at = wanted, now
+
+    def _key(self, policy: Policy) -> object:
+        telemetry, onboard = self._telemetry, self._onboard
+        return (policy.zones, policy.fence_area, policy.cruise_altitude, telemetry.home,
+                telemetry.airborne, onboard.tasks, len(onboard.progress.completed),
+                onboard.progress.items, onboard.progress.current, self.transfer.budget,
+                self.parameters.return_height, self.verified)
+
+    def _space(self) -> FlightSpace:
+        """Where the vehicle flies: its list, the mission on board, home, and the heights."""
+        telemetry, policy = self._telemetry, self._policy()
+        home = telemetry.home or telemetry.position
+        start = telemetry.position if telemetry.airborne else home
+        planned = self._planned()
+        onboard = self._onboard.progress
+        flown = [item.position for item in onboard.items[onboard.current or 0:]
+                 if item.position is not None] if telemetry.airborne else []
+        rise = home[2] + max(policy.cruise_altitude, self.parameters.return_height)
+        heights = [p[2] for p in (*planned, *flown)] or [rise]
+        ends = (home,) if self._onboard.tasks is not None and self._onboard.tasks.returns else ()
+        return FlightSpace(
+            ((start, *planned, *ends), (start, *flown), (home,)), min(heights),
+            max(*heights, rise), telemetry.position if telemetry.airborne else None)
+
+    def _planned(self) -> list[Point]:
+        """The points of the list that are still to be flown."""
+        onboard = self._onboard
+        if onboard.tasks is None:
+            return []
+        tasks = onboard.remaining()
+        points = [p for stop in tasks.stops for p in (*stop.via, stop.task.position)]
+        return points + list(tasks.end_via if tasks.returns else ())
+
+    def _blocks(self) -> bool:
+        """Whether the list passes where the fence on board forbids it, and is to be changed."""
+        transfer = self.transfer
+        if not transfer.held or not transfer.is_own or self.verified or transfer.wanted is None:
+            return False
+        space = replace(self._space(), position=None)
+        kept = set(self.fence.shapes)
+        return any(space.enters(shape) for shape in shapes_of_items(transfer.held, self._origin)
+                   if shape not in kept)
