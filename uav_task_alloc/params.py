@@ -237,8 +237,8 @@ class BridgeParams(FrameParams):
                         choices=('off', 'warn', 'require'))
     fence_area: tuple[str, ...] = param(
         (), 'Corners `LATITUDE,LONGITUDE` of a fence that all stay in; empty: none.', fixed=True)
-    relaunch: str = param('operator', 'Who starts a UAV again after the end of its list or a low '
-                          'battery: `~/hand_over`, or the bridge.', choices=('operator', 'automatic'))
+    relaunch: str = param('operator', 'Who starts a UAV after its list or a low battery: '
+                          '`~/hand_over`, or the bridge.', choices=('operator', 'automatic'))
     state_dir: str = param('', 'Folder for authority, holds and fences; empty: none.', fixed=True)
     capabilities: tuple[str, ...] = param(
         (), 'What UAVs can do, `uav_1:camera,thermal` each.', fixed=True)
