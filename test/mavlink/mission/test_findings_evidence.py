@@ -2,6 +2,7 @@
 """What is evidence that a task was flown, and what is not; found by flights at random."""
 import pytest
 from authority_bench import BOTH, MODES, PX4, H, L, S, flying, sends_no_command, status_is
+from evidence_bench import SPEED, Flight
 from findings_bench import distance, drop_messages, flown_once_each, set_current
 from flight_bench import Store, places
 from mission_bench import ORIGIN, task_list
@@ -16,49 +17,7 @@ from uav_task_alloc.mavlink.mission.items import (
     with_position,
 )
 from uav_task_alloc.mavlink.mission.position_history import PositionHistory
-from uav_task_alloc.mavlink.mission.progress import ProgressTable
-from uav_task_alloc.mavlink.transport.frame_log import FrameLog
 from uav_task_alloc.model import Task
-
-SPEED = 10.0  # [m/s]
-
-
-class Flight:
-    """A progress table, fed with positions at 5 Hz along x, 50 m high; 20 frames a second."""
-
-    def __init__(self, repeats=True):
-        self.frames, self.now, self.x = FrameLog(), 0.0, 0.0
-        self.lost = False  # positions
-        self.table = ProgressTable(self.frames, repeats=repeats)
-        self.stay(0.0)
-
-    def stay(self, seconds, speed=0.0):
-        for _ in range(round(5 * seconds) or 1):
-            self.now += 0.2
-            self.x += 0.2 * speed
-            frame = self.frames.note(round(20 * self.now) % 256, self.now)
-            if not self.lost:
-                self.table.add_position(PositionSample(
-                    self.now, (self.x, 0.0, 50.0), (speed, 0.0, 0.0)), True, self.now, frame)
-            self.table.step(self.now)
-
-    def frame(self):
-        """Number of a frame sent just after the newest position."""
-        return self.frames.note(round(20 * self.now + 1) % 256, self.now)
-
-    def reached(self, seq):
-        """MISSION_ITEM_REACHED, sent just after the newest position."""
-        self.table.note_reached(seq, self.now, frame=self.frame())
-
-    def fly_to(self, x):
-        self.stay(abs(x - self.x) / SPEED, SPEED if x > self.x else -SPEED)
-
-    def begin(self, **tasks):
-        """Another mission is taken by the vehicle now: tasks by name, at x [m]."""
-        stops = tuple(MissionStop(Task(name, (x, 0.0, 50.0))) for name, x in tasks.items())
-        self.table.begin(mission_items(TaskList(1, stops), PX4_PROFILE.rules, ORIGIN), 0,
-                         self.now, since=self.now)
-        self.table.note_mission_mode()
 
 
 def repeated_over_two_uploads():
@@ -165,11 +124,62 @@ def test_where_it_flies_after_it_has_left_the_mission_is_no_evidence():
     flight = Flight()
     flight.begin(A=100.0, B=500.0, C=900.0)
     flight.fly_to(50.0)
-    flight.table.note_mission_left()
+    flight.table.note_mission_left(flight.now)
     flight.fly_to(150.0)  # over A, on its way home
     flight.table.note_current(2, flight.now, False)
     flight.stay(10.0)
     assert list(flight.table.completed) == []
+
+
+@pytest.mark.parametrize('current_first', [True, False])
+@pytest.mark.parametrize(('silence', 'completed'), [(8.0, ['A']), (3.0, [])])
+def test_a_task_passed_in_silence_in_which_the_mission_was_left_was_flown_if_it_can_have_been(
+        silence, completed, current_first):
+    flight = Flight()
+    flight.begin(A=100.0, B=500.0, C=900.0)
+    flight.table.note_in_mission()
+    flight.table.note_current(0, flight.now, True, flight.frame())
+    flight.fly_to(50.0)
+    flight.lost = True
+    flight.stay(silence)
+    flight.x, flight.lost = 20.0, False  # it returns
+    if current_first:
+        flight.table.note_current(1, flight.now, True, flight.frame())
+        flight.stay(0.4, -SPEED)
+        flight.table.note_mission_left(flight.now)
+    else:
+        flight.table.note_mission_left(flight.now)
+        flight.stay(0.4, -SPEED)
+        flight.table.note_current(1, flight.now, False, flight.frame())
+    flight.stay(10.0)
+    assert list(flight.table.completed) == completed
+
+
+@pytest.mark.parametrize(('seconds', 'completed'), [(1.6, []), (2.2, ['A'])])
+def test_a_reboot_before_a_service_is_over_completes_nothing(seconds, completed):
+    flight = Flight()
+    flight.begin(A=100.0, B=500.0, service=1.85)
+    flight.table.note_in_mission()
+    flight.table.note_current(0, flight.now, True, flight.frame())
+    flight.fly_to(100.0)
+    flight.stay(seconds)
+    flight.table.invalidate()
+    assert list(flight.table.completed) == completed
+
+
+def test_where_it_comes_to_rest_when_it_is_held_for_an_upload_is_no_evidence():
+    place = (0.0, 100.0, 50.0)
+    bench = flying('ardupilot', 'ABC')
+    assert bench.run(lambda: distance(bench, place) < 6.0)
+    drop_messages(bench, 'up', 'MISSION_COUNT', lambda m: True)
+    bench.assign(task_list('CBA', 2))
+    bench.run(limit=8.0)
+    assert distance(bench, place) < 1.0
+    assert places(bench) == []
+    bench.vehicles[1].reboot(bench.now)
+    assert bench.run(lambda: 'was restarted' in bench.notes)
+    bench.run(limit=3.0)
+    assert bench.completed() == []
 
 
 @pytest.mark.parametrize(('frame', 'completed'), [(0, []), (1, ['B'])])

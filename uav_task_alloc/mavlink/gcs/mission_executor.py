@@ -161,9 +161,8 @@ class MissionExecutor:
                     self.onboard.progress.completed[mark.task] = mark[1:4]
         self.onboard.list.assign(tasks)
         for task in filter(self.onboard.list.repeat, self._event_retry.wanted_again()):
-            self.notes.append(
-                OperatorNote('info', f'{task} was announced again: it is flown once more')
-            )
+            self.notes.append(OperatorNote(
+                'info', f'{task} was announced again: it is flown once more'))
         self._event_retry.set_ended(self.onboard.list.ended_before(), now)
         self.sender.clear_backoff(now)
         return self._gate(self._act(now), now)
@@ -205,7 +204,9 @@ class MissionExecutor:
             if self.telemetry.mode is ModeFunction.MISSION:
                 self.onboard.progress.note_in_mission()
             elif mode_before is ModeFunction.MISSION:
-                self.onboard.progress.note_mission_left()
+                self.onboard.progress.note_mission_left(now)
+        if self.telemetry.mode is not ModeFunction.MISSION:
+            self.onboard.progress.note_other_mode(now)  # as COMMAND_ACK shows
         out = self.onboard.receive(message, now) + self.fence.receive(message, now)
         self.sender.receive(message)
         if message.get_type() == 'COMMAND_ACK' and self._peer.is_from_vehicle(message):
@@ -393,8 +394,7 @@ class MissionExecutor:
             self.sender.must_start = mode is ModeFunction.HOLD
             authority.hold = HoldStage.NO
             return None
-        if self.sender.backing_off(now) or ModeFunction.HOLD not in self.profile.set_mode:
-            authority.hold = HoldStage.NO if ModeFunction.HOLD not in self.profile.set_mode else (
-                authority.hold)
+        if ModeFunction.HOLD not in self.profile.set_mode:
+            authority.hold = HoldStage.NO
             return []
-        return self.sender.set_mode(ModeFunction.HOLD, now)
+        return [] if self.sender.backing_off(now) else self.sender.set_mode(ModeFunction.HOLD, now)

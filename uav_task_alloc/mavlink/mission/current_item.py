@@ -14,6 +14,7 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 from uav_task_alloc.mavlink.mission.completed_tasks import CompletedTasks
 from uav_task_alloc.mavlink.mission.current_item_reports import CurrentItemReports
 from uav_task_alloc.mavlink.mission.epoch import Epoch
+from uav_task_alloc.mavlink.mission.flown_path import GAP
 from uav_task_alloc.mavlink.mission.items import Item
 from uav_task_alloc.mavlink.mission.passed_items import Claim, PassedItems, flown_nearby
 from uav_task_alloc.mavlink.mission.position_history import MAX_MESSAGE_DELAY, PositionHistory
@@ -45,7 +46,10 @@ class CurrentItem:
         self.set_by_other: int | None = None  # the current item, where another station set it
         self.in_mission = False  # mission mode, by the newest heartbeat
         self._entered_at = -math.inf  # vehicle time [s] at which it was in mission mode first
+        self._in_mission_at = -math.inf  # vehicle time [s] at which it was in mission mode last
         self._left_at = -math.inf  # vehicle time [s] at which it left mission mode
+        # vehicle times [s] between which it left mission mode while no position came
+        self._left_unseen = math.inf, -math.inf
         self._after_skipped: int | None = None  # the item after those that were skipped
 
     def begin(self, start: int | None, now: float) -> None:
@@ -65,6 +69,7 @@ class CurrentItem:
         self.reports.clear()
         self.passed.clear()
         self.set_by_other = None
+        self._left_unseen = math.inf, -math.inf
 
     def note_set(self, seq: int, now: float) -> None:
         """Note that we have set the current item: the items skipped by that were not flown."""
@@ -82,12 +87,21 @@ class CurrentItem:
         if not self.in_mission:
             self._entered_at = self._positions.path.newest
         self.in_mission = True
+        self._in_mission_at = self._positions.path.newest
 
-    def note_mission_left(self) -> None:
+    def note_other_mode(self, now: float) -> None:
+        """Note that the vehicle is not in mission mode, by whichever command."""
+        if not self.in_mission:
+            return
+        path, left_at = self._positions.path, self._positions.vehicle_time(now)
+        blind = left_at - path.newest > GAP
+        self.in_mission, self._left_at = False, left_at if blind else path.newest
+        if blind or path.has_gap(self._in_mission_at, self._left_at):
+            self._left_unseen = self._in_mission_at, self._left_at
+
+    def note_mission_left(self, now: float) -> None:
         """Note that the vehicle has left the list: a task resumed later starts again."""
-        if self.in_mission:
-            self._left_at = self._positions.path.newest
-        self.in_mission = False
+        self.note_other_mode(now)
         self._epoch.started = self.set_by_other = None
 
     def note_report(self, seq: int, now: float, flying: bool, frame: int | None = None,
@@ -143,7 +157,8 @@ class CurrentItem:
         """Complete those passed items that the positions show to be flown."""
         for claim in self.passed.claims:
             judged = self.passed.judge(claim, tuple(
-                i for i in claim.items if i.task not in self._tasks), now)
+                i for i in claim.items if i.task not in self._tasks), now,
+                claim.since < self._left_unseen[1] and self._left_unseen[0] <= claim.until)
             for item in judged.flown:
                 self._tasks.complete(item.task, item.position)
             self._pass_over(judged.passed_over, claim)

@@ -101,14 +101,18 @@ class FlownPath:
             hold: required time at the point [s].
             since: vehicle time [s].
             until: vehicle time [s].
-            close: tolerance [m] added to the radius where no hold is required.
+            close: tolerance [m] added to the radius where no hold is required; 0: the hold
+                must not be shorter either.
         """
         first, last = self._stay(point, radius, since, hold > 0.0, until, close)
-        if last - first >= max(0.0, hold - _HOLD_SLACK):
+        if last - first >= max(0.0, hold - (_HOLD_SLACK if close else 0.0)):
             return Visit.YES
+        return Visit.UNOBSERVED if self.has_gap(since, until) else Visit.NO
+
+    def has_gap(self, since: float, until: float) -> bool:
+        """Whether the path is unknown somewhere between two vehicle times [s]."""
         samples = self._since(since, until)
-        has_gap = len(samples) < 2 or any(b.t - a.t > GAP for a, b in pairwise(samples))
-        return Visit.UNOBSERVED if has_gap else Visit.NO
+        return len(samples) < 2 or any(b.t - a.t > GAP for a, b in pairwise(samples))
 
     def visited_at(self, point: Point, radius: float, since: float,
                    until: float = math.inf) -> float | None:
@@ -117,7 +121,7 @@ class FlownPath:
         return first if last >= first else None
 
     def could_have_flown(self, chain: Sequence[Point], then: Point | None, holds: float,
-                   since: float) -> bool:
+                   since: float, anywhere: bool = False) -> bool:
         """Whether it can have flown through `chain` in the longest gap of the samples.
 
         Args:
@@ -125,6 +129,7 @@ class FlownPath:
             then: the next point, ENU [m]; None: it stays at the last one.
             holds: sum of the hold times [s].
             since: vehicle time [s].
+            anywhere: it was not bound for the next point any more.
 
         Returns:
             True where the gap is long enough and the sample after it lies on the following leg.
@@ -139,7 +144,7 @@ class FlownPath:
                       *(math.hypot(*s.velocity) for s in self._samples[-200:]))
         if length > 1.1 * fastest * (b.t - a.t - 0.8 * holds) + 10.0:
             return False
-        return segment_distance(b.position, chain[-1], then or chain[-1]) <= _CORRIDOR
+        return anywhere or segment_distance(b.position, chain[-1], then or chain[-1]) <= _CORRIDOR
 
     def _since(self, since: float, until: float = math.inf) -> list[PositionSample]:
         at = bisect_left(self._samples, since, key=lambda one: one.t)

@@ -77,13 +77,15 @@ class PassedItems:
         """Drop all claims: the mission on board is unknown."""
         self._claims.clear()
 
-    def judge(self, claim: Claim, items: tuple[Item, ...], now: float) -> _Judged:
+    def judge(self, claim: Claim, items: tuple[Item, ...], now: float,
+              left_unseen: bool = False) -> _Judged:
         """Decide which items of a claim were flown; the claim is dropped once all are decided.
 
         Args:
             claim: an open one.
             items: those of it that are not completed.
             now: steady time [s].
+            left_unseen: whether it left mission mode in a gap of the positions since the claim.
 
         Returns:
             The items decided by this call.
@@ -100,21 +102,24 @@ class PassedItems:
         if rest and now < claim.deadline + _BLIND * blind:
             return _Judged(seen, ())
         self._drop(claim)
-        unseen = self._unobserved(rest, visits, claim)
+        unseen = self._unobserved(rest, visits, claim, left_unseen)
         return _Judged(seen + unseen, tuple(i for i in rest if i not in unseen))
 
     def _drop(self, claim: Claim) -> None:
         self._claims = [each for each in self._claims if each is not claim]
 
     def _unobserved(self, rest: tuple[Item, ...], visits: dict[str, Visit],
-                    claim: Claim) -> tuple[Item, ...]:
+                    claim: Claim, left_unseen: bool) -> tuple[Item, ...]:
         """At the deadline: the items that can have been flown in a gap of the positions."""
         items = tuple(
             i for i in rest if visits[i.task] is Visit.UNOBSERVED and i.position is not None)
-        return items if items and self._flown_unseen(items, claim) else ()
+        return items if items and self._flown_unseen(items, claim, left_unseen) else ()
 
-    def _flown_unseen(self, items: tuple[Item, ...], claim: Claim) -> bool:
-        """Whether it reappeared on a leg after them, and had the time to fly there."""
+    def _flown_unseen(self, items: tuple[Item, ...], claim: Claim, left_unseen: bool) -> bool:
+        """Whether it reappeared on a leg after them, and had the time to fly there.
+
+        Where it has left mission mode unseen, it may reappear anywhere after a single item.
+        """
         at = [n for n, item in enumerate(claim.route) if any(item is one for one in items)]
         if not at:
             return False
@@ -123,7 +128,8 @@ class PassedItems:
             then = claim.route[end].position if end < len(claim.route) else None
             if self._positions.path.could_have_flown(
                     [item.position for item in flown if item.position is not None], then,
-                    math.fsum(item.params[0] for item in flown), claim.since):
+                    math.fsum(item.params[0] for item in flown), claim.since,
+                    anywhere=left_unseen and not claim.skips):
                 return True
         return False
 

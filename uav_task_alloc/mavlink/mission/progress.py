@@ -231,9 +231,13 @@ class ProgressTable:
         """Note that the vehicle is in mission mode, by whichever command."""
         self._moves.note_in_mission()
 
-    def note_mission_left(self) -> None:
+    def note_other_mode(self, now: float) -> None:
+        """Note that the vehicle is not in mission mode, by whichever command."""
+        self._moves.note_other_mode(now)
+
+    def note_mission_left(self, now: float) -> None:
         """Note that the vehicle has left the list: a task resumed later starts again."""
-        self._moves.note_mission_left()
+        self._moves.note_mission_left(now)
 
     def note_reached(self, seq: int, now: float, proven: bool = False,
                      frame: int | None = None) -> None:
