@@ -10,12 +10,21 @@ from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.model import Task, ThreatZone, Uav
 from uav_task_alloc.objective import OBJECTIVES, Objective
 from uav_task_alloc.solver.problem import Limits, Rules, make_problem
+from uav_task_alloc.solver.rng import rng_state
 from uav_task_alloc.solver.solve import plan
 from uav_task_alloc.solver.timed import columns as at
 from uav_task_alloc.solver.timed.arrays import LINK
 from uav_task_alloc.solver.timed.colony import COLD, TimedColony
 from uav_task_alloc.solver.timed.order import route_order, set_order
 from uav_task_alloc.solver.timed.problem import empty_timed_routes, make_timed
+from uav_task_alloc.solver.timed.ruin import (
+    REMOVED,
+    begin_round,
+    empty_round,
+    insert_removed,
+    list_absent,
+    ruin_strings,
+)
 from uav_task_alloc.solver.timed.warm import first_plan
 from uav_task_alloc.solver.warm import WarmState
 from uav_task_alloc.study.small_problems import compare_small, small_problem
@@ -159,3 +168,43 @@ def test_a_search_through_excess_that_finds_nothing_better_goes_on_without():
         allowed = bool(np.isfinite(colony.arrays.price).any())
         assert allowed == (0.02 <= share < 0.595), share
     assert colony.routes.counts[at.INFEASIBLE] == 0
+
+
+def selection_problem():
+    """A UAV that reaches few of the tasks in time."""
+    work = [Task(f't{i}', (10.0 + i, 0.0, 0.0), latest=3.0, value=1.0 + i) for i in range(30)]
+    fleet = [Uav('u', (0.0, 0.0, 0.0), cruise_speed=5.0)]
+    return make_timed(make_problem(fleet, work, {}, Limits(), Rules()), {})
+
+
+@pytest.mark.parametrize(('skipped', 'most'), [(0.0, 10), (1.0, 1)])
+def test_a_round_passes_over_absent_tasks_but_the_one_it_starts_at(skipped, most):
+    problem = selection_problem()
+    a, routes, found = problem.arrays, empty_timed_routes(problem.arrays), set()
+    start, w, rng = first_plan(problem, WarmState()), empty_round(problem.arrays), rng_state(1)
+    absent = start.order == np.arange(len(start.order))
+    for _ in range(200):
+        set_order(a, routes, start.order)
+        list_absent(a, routes, w)
+        begin_round(routes, w)
+        ruin_strings(a, routes, w, 10.0, 10, skipped, rng)
+        found.add(int(absent[w.removed[:w.counts[REMOVED]]].sum()))
+    assert max(found) == most
+
+
+def test_a_round_inserts_by_value_and_chance():
+    problem = selection_problem()
+    a, routes = problem.arrays, empty_timed_routes(problem.arrays)
+    start, w, rng = first_plan(problem, WarmState()), empty_round(a), rng_state(1)
+    ratios = set()
+    for _ in range(20):
+        set_order(a, routes, start.order)
+        list_absent(a, routes, w)
+        begin_round(routes, w)
+        ruin_strings(a, routes, w, 10.0, 10, 0.0, rng)
+        insert_removed(a, routes, w, 1.0, 1.0, 0.01, rng)
+        keys = w.order[:w.counts[REMOVED]]
+        assert (np.diff(keys) >= 0.0).all()
+        ratios |= set((-keys / a.unserved[w.removed[:keys.size] - a.uavs]).tolist())
+    assert 0.5 <= min(ratios) < 0.7
+    assert 1.3 < max(ratios) < 1.5

@@ -21,7 +21,9 @@ from uav_task_alloc.solver.timed.search import Incumbent, Rises, anneal, copy_in
 LEAST_PRICE, MOST_PRICE = 0.1, 100.0  # of excess, over the first price
 DECISION = 0.02  # share of the budget after which the rounds in all are estimated
 GIVING_UP = 0.6  # share after which a search through excess ends that found nothing better
-PRICED_ROUNDS = 200.0  # rounds a task from which on passing through excess pays
+# rounds a task from which on passing through excess pays: where durations or trips are limited,
+# and where only windows and loads are
+PRICED_ROUNDS, PRICED_WINDOW_ROUNDS = 200.0, 1000.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,14 +38,16 @@ class TimedParams:
     ruin: float = 15.0  # tasks that a round removes
     first_price: float = 3.0  # of a second, metre or mean load of excess, in what one costs to fly
     absent: int = 10  # absent tasks that a round tries to insert, besides those it removes
+    skipped: float = 0.0  # probability that a round passes over one of them
+    by_value: float = 0.0  # share of rounds that insert about the most valuable tasks first
     unserved_growth: float = 1.3  # factor by which the price of few absent tasks rises
 
 
 COLD = TimedParams()
 # where many tasks have to be left out: the choice of tasks, more than their order
-SELECTION = TimedParams(start_temperature=30.0, end_temperature=1.3,
+SELECTION = TimedParams(start_temperature=60.0, end_temperature=1.3,
                         short_end_temperature=1.3, restart=0.6,
-                        reheat_temperature=3.0, ruin=10.0,
+                        reheat_temperature=6.0, ruin=10.0, skipped=0.3, by_value=0.3,
                         first_price=math.inf)
 WARM = TimedParams(start_temperature=0.3, end_temperature=0.02,
                    short_end_temperature=0.02, first_price=math.inf)
@@ -74,7 +78,8 @@ class TimedColony:
         self._round, self._rng = empty_round(self.arrays), rng_state(seed)
         growth = 1.0 if problem.prizes else params.unserved_growth
         self._rises = Rises(np.full(4, math.inf), np.full(4, math.inf), growth,
-                            MAX_UNSERVED_GROWTH * arrays.unserved, params.absent, problem.prizes)
+                            MAX_UNSERVED_GROWTH * arrays.unserved, params.absent,
+                            params.skipped, params.by_value, problem.prizes)
 
     def _allow_excess(self) -> None:
         """Set prices of excess, which the best has none of, where it is not allowed so far."""
@@ -117,7 +122,8 @@ class TimedColony:
         if not self._decided and spent >= DECISION:
             self._decided = True
             tasks = self.arrays.ends - self.arrays.uavs
-            if (self._flown / spent >= PRICED_ROUNDS * tasks
+            least = PRICED_ROUNDS if self.arrays.whole else PRICED_WINDOW_ROUNDS
+            if (self._flown / spent >= least * tasks
                     and math.isfinite(self._params.first_price)):
                 self._allow_excess()
             else:

@@ -219,10 +219,11 @@ def _seed(a: TimedArrays, r: TimedRoutes, w: Round, rng: RngState) -> Any:
 
 @kernel
 def ruin_strings(a: TimedArrays, r: TimedRoutes, w: Round, mean: float, most_absent: int,
-                 rng: RngState) -> Any:
+                 skipped: float, rng: RngState) -> Any:
     """Remove about `mean` tasks in strings of routes around a random task; returns that. O(k).
 
-    most_absent: absent tasks around it that are to be inserted, too.
+    most_absent: absent tasks around it that are to be inserted, too; each of them but that task is
+    passed over with probability `skipped`.
     """
     none = a.uavs
     seed = _seed(a, r, w, rng)
@@ -237,7 +238,9 @@ def ruin_strings(a: TimedArrays, r: TimedRoutes, w: Round, mean: float, most_abs
         c = seed if m < 0 else a.near[seed - a.uavs, m]
         u = r.link[c, at.OF_UAV]
         if u == none:
-            if left_out < most_absent and a.unserved[c - a.uavs] > 0.0 and not _is_taken(w, c):
+            passed_over = skipped > 0.0 and m >= 0 and uniform(rng) < skipped
+            if (not passed_over and left_out < most_absent and a.unserved[c - a.uavs] > 0.0
+                    and not _is_taken(w, c)):
                 _take(r, w, c)
                 left_out += 1
         elif strings > 0 and w.saved_in[u] != w.counts[SERIAL]:
@@ -260,9 +263,14 @@ def _is_taken(w: Round, c: int) -> bool:
 
 
 @inline_kernel
-def _sort_removed(a: TimedArrays, w: Round, rng: RngState) -> None:
-    """Sort removed tasks: at random, or by load, distance, value or window. O(removed^2)."""
+def _sort_removed(a: TimedArrays, w: Round, by_value: float, rng: RngState) -> None:
+    """Sort removed tasks: at random, or by load, distance, value or window. O(removed^2).
+
+    by_value: share of rounds that sort by value and chance in any case.
+    """
     kind = below(rng, ORDERS)
+    if by_value > 0.0 and uniform(rng) < by_value:
+        kind = ORDERS
     for i in range(w.counts[REMOVED]):
         t = w.removed[i]
         if kind < 4:
@@ -279,6 +287,8 @@ def _sort_removed(a: TimedArrays, w: Round, rng: RngState) -> None:
             key = a.fixed[t, at.OPENS]
         elif kind == 12:
             key = -a.fixed[t, at.CLOSES]
+        elif kind == ORDERS:
+            key = -a.unserved[t - a.uavs] * (0.5 + uniform(rng))
         else:
             key = -a.unserved[t - a.uavs]
         place = i
@@ -308,13 +318,14 @@ def open_route(a: TimedArrays, r: TimedRoutes, w: Round, t: int) -> None:
 
 
 @kernel
-def insert_removed(a: TimedArrays, r: TimedRoutes, w: Round, generous: float, blinks: float,
-                   rng: RngState) -> None:
+def insert_removed(a: TimedArrays, r: TimedRoutes, w: Round, generous: float, by_value: float,
+                   blinks: float, rng: RngState) -> None:
     """Insert removed tasks where each costs least. O(removed k).
 
-    generous: a task is inserted where it costs less than so many times its price.
+    generous: a task is inserted where it costs less than so many times its price; by_value: share
+    of rounds that insert about the most valuable tasks first.
     """
-    _sort_removed(a, w, rng)
+    _sort_removed(a, w, by_value, rng)
     for i in range(w.counts[REMOVED]):
         t = w.removed[i]
         if r.link[t, at.OF_UAV] != a.uavs:

@@ -61,6 +61,8 @@ class Rises(NamedTuple):
     unserved: float  # factor by which the price of a task in no route rises; 1: it is fixed
     max_unserved: Floats  # (n) highest price of a task
     absent: int  # absent tasks that a round tries to insert, besides those it removes
+    skipped: float  # probability that a round passes over one of them
+    by_value: float  # share of rounds that insert about the most valuable tasks first
     prizes: bool  # tasks may be left out because they are not worth their way
 
 
@@ -136,12 +138,13 @@ def anneal(a: TimedArrays, r: TimedRoutes, w: Round, best: Incumbent, rises: Ris
         before, generous = cost_of(a, r.sums), 1.0
         begin_round(r, w)
         opening = rises.prizes and w.counts[ABSENT] > 0 and uniform(rng) < OPENING_RATE
-        seed = ruin_strings(a, r, w, mean, MAX_OPENING if opening else rises.absent, rng)
+        seed = ruin_strings(a, r, w, mean, MAX_OPENING if opening else rises.absent,
+                            rises.skipped, rng)
         if rises.prizes and uniform(rng) < GENEROUS_RATE:
             generous += uniform(rng)
         if opening and w.counts[REMOVED] > 0 and r.link[seed, at.OF_UAV] == a.uavs:
             open_route(a, r, w, seed)
-        insert_removed(a, r, w, generous, BLINK_RATE, rng)
+        insert_removed(a, r, w, generous, rises.by_value, BLINK_RATE, rng)
         if cost_of(a, r.sums) < before - temperature * math.log(1.0 - uniform(rng)):
             improvements += int(record(a, r, best, rises.prizes))
         else:
