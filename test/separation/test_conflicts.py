@@ -129,5 +129,5 @@ def test_accepted_rows_find_what_the_sweep_finds():
             for n, rows in enumerate(rows_of_legs(flights[k], rule)):
                 table.add(rows, (k, n))
         rows = [row for some in rows_of_legs(flights[2], rule) for row in some]
-        assert (table.conflict(rows) is not None) == any(
+        assert (table.conflict(rows, 2) is not None) == any(
             each.flights[1] == 2 for each in conflicts(*flights, rule=rule))

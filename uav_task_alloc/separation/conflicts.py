@@ -153,11 +153,17 @@ def _sweep(rows: Floats, boxes: Floats, owner: Ints, horizontal: float, vertical
 
 
 @kernel
-def _first_conflict(some: Floats, some_boxes: Floats, rows: Floats, boxes: Floats, n: int,
-                    horizontal: float, vertical: float, time: float, space: Floats) -> int:
-    """The first of rows[:n] that is in conflict with one of `some`; -1: none. O(len(some) * n)"""
+def _first_conflict(some: Floats, some_boxes: Floats, rows: Floats, boxes: Floats, owner: Ints,
+                    n: int, mine: int, horizontal: float, vertical: float, time: float,
+                    space: Floats) -> int:
+    """The first of rows[:n] of others that is in conflict with one of `some`; -1: none.
+
+    O(len(some) * n)
+    """
     found = space[1, _CORNERS - 1]
     for j in range(n):
+        if owner[j] == mine:
+            continue
         q = rows[j]
         for i in range(len(some)):
             if _boxes_apart(some_boxes[i], boxes[j], horizontal, vertical):
@@ -235,13 +241,15 @@ class AcceptedRows:
 
     Arguments of methods:
         rows: of COLUMNS numbers each.
-        owner: any number that names whose they are.
+        owner: indices of the flight and of its leg.
+        mine: index of the flight that they are of, which is not in its own way.
     """
 
     def __init__(self, rule: Separation) -> None:
         load_separation_kernels()
         self._rule, self._space = rule, _space()
         self._rows, self._boxes = np.empty((256, COLUMNS)), np.empty((256, 6))
+        self._flights = np.empty(256, np.int64)
         self._owner: list[tuple[int, int]] = []
 
     def add(self, rows: list[tuple[float, ...]], owner: tuple[int, int]) -> None:
@@ -252,17 +260,19 @@ class AcceptedRows:
         while n + len(rows) > len(self._rows):
             self._rows = np.concatenate((self._rows, np.empty_like(self._rows)))
             self._boxes = np.concatenate((self._boxes, np.empty_like(self._boxes)))
+            self._flights = np.concatenate((self._flights, np.empty_like(self._flights)))
+        self._flights[n:n + len(rows)] = owner[0]
         self._rows[n:n + len(rows)], self._boxes[n:n + len(rows)] = more, _boxes(more)
         self._owner += [owner] * len(rows)
 
-    def conflict(self, rows: list[tuple[float, ...]]) -> tuple[int, int] | None:
+    def conflict(self, rows: list[tuple[float, ...]], mine: int) -> tuple[int, int] | None:
         """Whose accepted pieces are in conflict with these; None: nobody's."""
         if not rows or not self._owner:
             return None
         rule, some = self._rule, np.array(rows, np.float64)
-        found = _first_conflict(some, _boxes(some), self._rows, self._boxes, len(self._owner),
-                                rule.horizontal - _ROUNDING, rule.vertical - _ROUNDING, rule.time,
-                                self._space)
+        found = _first_conflict(some, _boxes(some), self._rows, self._boxes, self._flights,
+                                len(self._owner), mine, rule.horizontal - _ROUNDING,
+                                rule.vertical - _ROUNDING, rule.time, self._space)
         return None if found < 0 else self._owner[found]
 
 
@@ -280,4 +290,4 @@ def load_separation_kernels() -> None:
         boxes = _boxes(rows)
         _sweep(rows, boxes, np.arange(2), 1.0, 1.0, 1.0, np.empty(2, np.int64), _space(),
                np.empty((1, 2), np.int64), np.empty((1, 4)))
-        _first_conflict(rows, boxes, rows, boxes, 2, 1.0, 1.0, 1.0, _space())
+        _first_conflict(rows, boxes, rows, boxes, np.arange(2), 2, -1, 1.0, 1.0, 1.0, _space())

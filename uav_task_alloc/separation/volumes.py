@@ -107,12 +107,19 @@ class Flight:
 
 @dataclass(frozen=True, slots=True)
 class LegTimes:
-    """When a leg is flown, [s] from the moment of the plan."""
+    """When a leg is flown, [s] from the moment of the plan.
 
-    ready: float  # the UAV is at its start and done there
-    begin: float
-    arrival: float
-    end: float  # of the service at its end
+    Attributes:
+        ready: the UAV is at its start, and the service there is over.
+        begin: of the flight.
+        arrival: at its end.
+        end: of the service there.
+    """
+
+    ready: float  # [s]
+    begin: float  # [s]
+    arrival: float  # [s]
+    end: float  # [s]
 
 
 def leg_times(flight: Flight, leg: FlightLeg, ready: float, first: bool = False) -> LegTimes:

@@ -10,6 +10,7 @@ from uav_task_alloc.checks import check_number
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.model import Task, ThreatZone, Uav
 from uav_task_alloc.objective import MAX_TRIPS
+from uav_task_alloc.separation.rule import Separation
 
 _Named = TypeVar('_Named', Task, Uav, ThreatZone)
 ROUTE_ENDS = ('hold', 'home')
@@ -72,3 +73,14 @@ def check_locked(locked: Mapping[str, Sequence[str]] | None, uavs: Sequence[Uav]
             holder[task.id] = uav.id
         held[uav.id] = tuple(row)
     return {uav_id: row for uav_id, row in held.items() if row}
+
+
+def check_separation(separation: Separation) -> Separation:
+    """Return the rule that keeps UAVs apart as it is.
+
+    Raises:
+        InvalidValue: it is none.
+    """
+    if not isinstance(separation, Separation):
+        raise InvalidValue('separation', separation, 'a Separation or None')
+    return separation

@@ -16,14 +16,21 @@ from uav_task_alloc.geometry.detour import find_detour
 from uav_task_alloc.kernel_cache import FIRST_WORK, NO_WORK, NOTICE, SEARCH_WORK, ZONES_WORK
 from uav_task_alloc.model import Leg, Plan, Task, ThreatZone, Uav
 from uav_task_alloc.objective import Objective, Weights, check_objective, needs_time
+from uav_task_alloc.separation.rule import Separation
 from uav_task_alloc.solver.answer import to_plan
-from uav_task_alloc.solver.check import check_locked, check_options, check_unique
+from uav_task_alloc.solver.check import (
+    check_locked,
+    check_options,
+    check_separation,
+    check_unique,
+)
 from uav_task_alloc.solver.insertion import place_all
 from uav_task_alloc.solver.path_preparation import SEARCH_LIMIT, PathPreparation
 from uav_task_alloc.solver.problem import Limits, Problem, Rules, make_problem
 from uav_task_alloc.solver.recorder import Recorder
 from uav_task_alloc.solver.registry import SOLVERS
 from uav_task_alloc.solver.search import trim_to_range
+from uav_task_alloc.solver.separated import separated_plan
 from uav_task_alloc.solver.timed.solve import solve_timed
 from uav_task_alloc.solver.warm import WarmState, repair
 
@@ -35,6 +42,7 @@ def plan(uavs: Iterable[Uav], tasks: Iterable[Task], zones: Iterable[ThreatZone]
          clearance: float = 0.0, altitude_min: float = -math.inf,
          altitude_max: float = math.inf, threads: int = 1,
          objective: Objective | str = 'distance', trips: int = 1,
+         separation: Separation | None = None,
          stop: Callable[[], bool] | None = None, max_iterations: int | None = None,
          on_iteration: Callable[[int, float], None] | None = None,
          clock: Callable[[], float] = time.perf_counter) -> Plan:
@@ -62,6 +70,7 @@ def plan(uavs: Iterable[Uav], tasks: Iterable[Task], zones: Iterable[ThreatZone]
         threads: in [1, 64]; only chain_q uses more than one.
         objective: what is minimised: a name in OBJECTIVES or an Objective.
         trips: of a UAV at most; with more than 1 it may visit its base for a new battery and load.
+        separation: what keeps the UAVs apart; None, or horizontal 0: nothing does.
         stop: polled between iterations; True ends the solve with the best plan so far.
         max_iterations: ends the solve as well; None: no limit. Each solver defines its iteration.
         on_iteration: called with (iterations so far, best fit) after each or a few iterations.
@@ -85,14 +94,30 @@ def plan(uavs: Iterable[Uav], tasks: Iterable[Task], zones: Iterable[ThreatZone]
                   check_objective(objective), trips)
     if needs_time(fleet, work, rules.objective, trips):
         _check_takes_time(solver)
-        return solve_timed(fleet, work, check_locked(locked, fleet, work), limits, rules, warm,
+    run = functools.partial(_solve, fleet, limits=limits, rules=rules, solver=solver, seed=seed,
+                            threads=threads, stop=stop, max_iterations=max_iterations,
+                            on_iteration=on_iteration, clock=clock)
+    held = check_locked(locked, fleet, work)
+    if separation is None or not check_separation(separation).on:
+        return run(work, held, warm=warm, budget=budget)
+    return separated_plan(lambda some, start, seconds: run(some, held, warm=start, budget=seconds),
+                          fleet, work, held, limits, rules, separation, warm, budget, clock)
+
+
+def _solve(fleet: Sequence[Uav], work: Sequence[Task], held: Mapping[str, tuple[Task, ...]], *,
+           limits: Limits, rules: Rules, solver: str, warm: Plan | WarmState | None,
+           budget: float, seed: int, threads: int, stop: Callable[[], bool] | None,
+           max_iterations: int | None, on_iteration: Callable[[int, float], None] | None,
+           clock: Callable[[], float]) -> Plan:
+    """Solve without separation; arguments are checked already."""
+    if needs_time(fleet, work, rules.objective, rules.trips):
+        return solve_timed(fleet, work, held, limits, rules, warm,
                            budget=budget, seed=seed, threads=threads, stop=stop,
                            max_iterations=max_iterations, on_iteration=on_iteration, clock=clock)
     load_kernels(solver, bool(limits.zones), max_iterations != 0)
     began, before = clock(), WarmState.of(warm)
     search = PathPreparation(clock, began, budget, stop, before.flown())
-    problem = make_problem(fleet, work, check_locked(locked, fleet, work), limits, rules,
-                           before.problem, search)
+    problem = make_problem(fleet, work, held, limits, rules, before.problem, search)
     recorder = Recorder(clock, began, budget, max_iterations, stop, threads, warm is not None,
                         on_iteration, problem=problem, locked_sums=_locked_sums(problem))
     if warm is not None:

@@ -1,0 +1,143 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Resolution: head-on, crossing, overtaking, converging, and ten UAVs of one base."""
+import math
+
+import pytest
+
+from uav_task_alloc import Separation
+from uav_task_alloc.separation.conflicts import find_conflicts
+from uav_task_alloc.separation.resolution import (
+    TransitLimits,
+    flight_seconds,
+    resolve,
+)
+from uav_task_alloc.separation.volumes import Flight, FlightLeg, flight_volumes
+
+RULE = Separation(10.0, 5.0, 2.0)
+FAR = 400.0  # [m]
+
+
+def flight(name, *points, begin=0.0, cruise=10.0, service=5.0, **leg):
+    legs = (FlightLeg(points, f't{name}', service, **leg),)
+    return Flight(name, legs, points[0], cruise, 2.5, 1.5, begin)
+
+
+def round_trip(name, pad, task, service=5.0):
+    """From the ground to a task and back."""
+    return Flight(name, (FlightLeg((pad, task), f't{name}', service, takes_off=True),
+                         FlightLeg((task, pad), lands=True)), pad, 10.0, 2.5, 1.5, in_air=False)
+
+
+def checked(*flights, rule=RULE, limits=None):
+    """Resolved flights, which are apart now and were not."""
+    assert find_conflicts(flight_volumes(flights, rule), rule)
+    result = resolve(flights, rule, limits)
+    assert result.left == []
+    assert find_conflicts(flight_volumes(result.flights, rule), rule) == []
+    assert all(each.resolution and each.detail for each in result.conflicts)
+    return result
+
+
+def extra_percent(before, after):
+    planned = sum(map(flight_seconds, before))
+    return 100.0 * (sum(map(flight_seconds, after)) - planned) / planned
+
+
+ENCOUNTERS = {
+    'head-on': (flight('a', (0, 0, 30), (FAR, 0, 30)), flight('b', (FAR, 50, 30), (0, -50, 30))),
+    'crossing': (flight('a', (0, 200, 30), (FAR, 200, 30)),
+                 flight('b', (200, 0, 30), (200, FAR, 30))),
+    'overtaking': (flight('a', (50, 0, 30), (FAR, 0, 30), cruise=5.0),
+                   flight('b', (0, 0, 30), (FAR + 100, 0, 30), cruise=15.0)),
+}
+
+
+@pytest.mark.parametrize('name', ENCOUNTERS)
+@pytest.mark.parametrize('rule', [RULE, Separation(30.0, 10.0, 2.0)])
+def test_an_encounter_is_resolved_by_heights_at_almost_no_time(name, rule):
+    flights = ENCOUNTERS[name]
+    result = checked(*flights, rule=rule)
+    assert {each.resolution for each in result.conflicts} == {'height'}
+    assert extra_percent(flights, result.flights) <= (3.0 if rule is RULE else 10.0)
+    for before, after in zip(flights, result.flights, strict=True):
+        for old, new in zip(before.legs, after.legs, strict=True):  # tasks keep their heights
+            assert (old.points[0], old.points[-1]) == (new.points[0], new.points[-1])
+
+
+def test_a_uav_without_a_conflict_keeps_its_flight():
+    alone = flight('c', (0, 9000, 30), (FAR, 9000, 30))
+    result = checked(*ENCOUNTERS['head-on'], alone)
+    assert result.flights[2] is alone
+
+
+def test_where_heights_are_not_allowed_one_waits():
+    a = Flight('a', (FlightLeg(((0, 200, 30), (FAR, 200, 30)), 'ta', 5.0),
+                     FlightLeg(((FAR, 200, 30), (900, 200, 30)), 'tc', 5.0)),
+               (0, 200, 30), 10.0, 2.5, 1.5)
+    b = Flight('b', (FlightLeg(((200, -100, 30), (200, -90, 30)), 'ts', 1.0),
+                     FlightLeg(((200, -90, 30), (200, FAR, 30)), 'tb', 5.0)),
+               (200, -100, 30), 10.0, 2.5, 1.5, begin=-10.0)
+    result = checked(a, b, limits=TransitLimits(altitude_max=30.0))
+    assert {each.resolution for each in result.conflicts} == {'hold'}
+
+
+def test_two_that_converge_at_one_place_serve_it_one_after_the_other():
+    a, b = (Flight(name, (FlightLeg((start, near), f's{name}', 1.0),
+                          FlightLeg((near, task), f't{name}', 5.0),
+                          FlightLeg((task, end), f'e{name}', 1.0)), start, 10.0, 2.5, 1.5)
+            for name, start, near, task, end in (
+                ('a', (0, 0, 30), (10, 0, 30), (200, 0, 30), (200, 300, 30)),
+                ('b', (400, 0, 30), (390, 0, 30), (203, 0, 30), (203, -300, 30))))
+    result = checked(a, b)
+    assert any(leg.hold_until > 0.0 for leg in result.flights[1].legs)
+
+
+def test_the_leg_under_way_stays_and_the_other_uav_gives_way():
+    a, b = ENCOUNTERS['head-on']
+    moving = Flight('b', (FlightLeg(b.legs[0].points, 'tb', 5.0, movable=False),), b.position,
+                    10.0, 2.5, 1.5)
+    result = checked(a, moving)
+    assert result.flights[1] == moving
+    assert result.flights[0] != a
+
+
+def test_two_legs_under_way_are_left_to_others():
+    a, b = (Flight(each.uav, (FlightLeg(each.legs[0].points, 't', movable=False),),
+                   each.position, 10.0) for each in ENCOUNTERS['head-on'])
+    result = resolve((a, b), RULE)
+    assert result.left
+    assert [each.resolution for each in result.conflicts] == ['']
+
+
+def test_a_height_that_a_zone_forbids_is_not_used():
+    flights = ENCOUNTERS['crossing']
+    limits = TransitLimits(is_clear=lambda points: max(z for _, _, z in points) < 38.0)
+    result = checked(*flights, limits=limits)
+    assert max(z for each in result.flights for leg in each.legs
+               for _, _, z in leg.points) < 38.0
+
+
+def test_a_deadline_is_not_broken_by_a_wait():
+    limits = TransitLimits(altitude_max=30.0)
+    late = flight('b', (200, 0, 0), (200, FAR, 30), takes_off=True, latest=53.0)
+    late = Flight('b', late.legs, (200, 0, 0), 10.0, 2.5, 1.5, in_air=False)
+    a = flight('a', (0, 200, 30), (FAR, 200, 30))
+    assert resolve((a, late), RULE, limits).left
+    free = Flight('b', (FlightLeg(late.legs[0].points, 'tb', 5.0, takes_off=True),), (200, 0, 0),
+                  10.0, 2.5, 1.5, in_air=False)
+    assert not resolve((a, free), RULE, limits).left
+
+
+@pytest.mark.parametrize('rule', [RULE, Separation(30.0, 10.0, 2.0)])
+@pytest.mark.parametrize('pads', [3.0, 15.0, 40.0])
+def test_ten_uavs_of_one_base_take_off_and_land_apart(rule, pads):
+    flights = []
+    for k in range(10):
+        angle = 2.4 * k  # tasks around the base
+        flights.append(round_trip(f'u{k}', (pads * (k % 5), pads * (k // 5), 0.0), (
+            500.0 * math.cos(angle), 500.0 * math.sin(angle), 30.0)))
+    found = find_conflicts(flight_volumes(flights, rule), rule)
+    result = resolve(flights, rule)
+    assert found
+    assert result.left == []
+    assert extra_percent(flights, result.flights) <= 10.0

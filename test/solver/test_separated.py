@@ -1,0 +1,131 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`plan(separation=)`: plans whose UAVs are apart, and what is told of their conflicts."""
+import math
+import random
+import statistics
+
+import pytest
+
+from uav_task_alloc import Separation, Task, ThreatZone, Uav, plan
+from uav_task_alloc.errors import InvalidValue
+from uav_task_alloc.geometry.zones import path_is_clear
+from uav_task_alloc.separation.conflicts import find_conflicts
+from uav_task_alloc.separation.resolution import flight_seconds
+from uav_task_alloc.separation.volumes import flight_volumes
+from uav_task_alloc.solver.separated import flights_of_plan
+
+RULE = Separation(10.0, 5.0, 2.0)
+SPEEDS = {'cruise_speed': 10.0, 'climb_speed': 2.5, 'descent_speed': 1.5}
+
+
+def crossing(**more):
+    """Two UAVs in the air whose only tasks are at the other's side."""
+    uavs = [Uav('a', (0.0, 200.0, 30.0), home=(0.0, 0.0, 0.0), **SPEEDS),
+            Uav('b', (200.0, 0.0, 30.0), home=(400.0, 0.0, 0.0), **SPEEDS)]
+    tasks = [Task('ta', (400.0, 200.0, 30.0), allowed_uavs={'a'}, **more),
+             Task('tb', (200.0, 400.0, 30.0), allowed_uavs={'b'})]
+    return uavs, tasks
+
+
+def conflicts_of(result, uavs, tasks, rule=RULE):
+    flights = flights_of_plan(result, uavs, {task.id: task for task in tasks}, result.returns)
+    return find_conflicts(flight_volumes(flights, rule), rule)
+
+
+def test_routes_that_cross_get_other_heights():
+    uavs, tasks = crossing()
+    before = plan(uavs, tasks, budget=0.02)
+    assert conflicts_of(before, uavs, tasks)
+    result = plan(uavs, tasks, budget=0.02, separation=RULE)
+    assert conflicts_of(result, uavs, tasks) == []
+    assert result.routes == before.routes
+    conflict, = result.conflicts
+    assert conflict.uavs == ('a', 'b')
+    assert conflict.resolution == 'height'
+    assert conflict.detail == 'b flies at 35.0 m'
+    assert [point[2] for point in result.legs['b'][0].via] == [35.0, 35.0]
+    assert result.distance > before.distance
+    assert result.finish >= before.finish
+
+
+def test_without_a_conflict_the_plan_is_the_same():
+    uavs, tasks = crossing()
+    tasks[1] = Task('tb', (900.0, 0.0, 30.0), allowed_uavs={'b'})
+    result = plan(uavs, tasks, budget=0.02, separation=RULE)
+    before = plan(uavs, tasks, budget=0.02)
+    assert (result.legs, result.arrivals, result.conflicts) == (before.legs, before.arrivals, ())
+
+
+def test_off_is_as_without():
+    uavs, tasks = crossing()
+    result = plan(uavs, tasks, budget=0.02, separation=Separation())
+    assert conflicts_of(result, uavs, tasks)
+    assert result.conflicts == ()
+
+
+def test_what_is_no_rule_is_refused():
+    with pytest.raises(InvalidValue, match=r'^separation = 10: expected a Separation or None'):
+        plan([], [], separation=10)
+
+
+def test_a_task_that_cannot_be_reached_apart_gets_another_uav():
+    uavs, tasks = crossing()
+    tasks[1] = Task('tb', (200.0, 400.0, 30.0), latest=45.0)
+    uavs.append(Uav('c', (200.0, 700.0, 30.0), home=(200.0, 700.0, 0.0), **SPEEDS))
+    tasks[0] = Task('ta', (400.0, 200.0, 30.0), allowed_uavs={'a'}, latest=45.0)
+    tasks.append(Task('tc', (200.0, 190.0, 30.0), allowed_uavs={'b'}, latest=25.0))
+    result = plan(uavs, tasks, budget=0.05, separation=RULE, altitude_max=30.0)
+    assert conflicts_of(result, uavs, tasks) == []
+    assert {each.resolution for each in result.conflicts} & {'other uav', 'left out'}
+    for name, why in result.unassigned.items():
+        assert 'cannot be kept apart from' in why, name
+
+
+def test_heights_stay_out_of_zones():
+    uavs, tasks = crossing()
+    zones = [ThreatZone.cylinder('above', (200.0, 200.0), 60.0, 38.0, 300.0)]
+    rule = Separation(10.0, 10.0, 2.0)
+    result = plan(uavs, tasks, zones, budget=0.05, separation=rule)
+    assert conflicts_of(result, uavs, tasks, rule) == []
+    for uav in uavs:
+        place = uav.position
+        for name, leg in zip(result.routes[uav.id], result.legs[uav.id], strict=True):
+            goal = next(task.position for task in tasks if task.id == name)
+            assert path_is_clear((place, *leg.via, goal), zones)
+
+
+def test_a_deadline_is_kept():
+    uavs, tasks = crossing(latest=41.0)
+    result = plan(uavs, tasks, budget=0.05, separation=RULE)
+    assert result.timetable().late == {}
+    assert result.arrivals['ta'] <= 41.0
+
+
+def scene(seed, uavs, tasks, bases):
+    rng = random.Random(seed)
+    size = 100.0 * math.sqrt(tasks)
+    pads = [(rng.uniform(0.0, size), rng.uniform(0.0, size)) for _ in range(bases)]
+    fleet = [Uav(f'u{k}', (x + 12.0 * (k // bases), y, 0.0), **SPEEDS)
+             for k, (x, y) in enumerate(pads[k % bases] for k in range(uavs))]
+    work = [Task(f't{k}', (rng.uniform(0.0, size), rng.uniform(0.0, size), rng.choice(
+        (30.0, 40.0))), service_time=5.0) for k in range(tasks)]
+    return fleet, work
+
+
+def test_scenes_are_apart_at_a_few_percent_more_flight_time():
+    extra, seen = [], 0
+    for seed in range(6):
+        uavs, tasks = scene(seed, uavs=8, tasks=40, bases=1 + seed % 3)
+        before, result = (
+            plan(uavs, tasks, route_end='home', max_iterations=300, budget=60.0,
+                 objective='balanced', separation=rule) for rule in (None, RULE))
+        seen += bool(conflicts_of(before, uavs, tasks))
+        assert conflicts_of(result, uavs, tasks) == []
+        assert result.unassigned == {}
+        known = {task.id: task for task in tasks}
+        was, now = (sum(map(flight_seconds, flights_of_plan(each, uavs, known, True)))
+                    for each in (before, result))
+        extra.append(100.0 * (now - was) / was)
+    assert seen >= 3
+    assert statistics.median(extra) <= 3.0
+    assert max(extra) <= 10.0

@@ -1,0 +1,314 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Conflicts of planned flights are resolved: other transit heights, then waits before legs.
+
+Flights are planned one after another (prioritised planning, Erdmann and Lozano-Perez 1987): each
+leg takes the cheapest change with which it is apart from all flights before it. A leg without a
+conflict stays as it is, and so does each leg under way.
+"""
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+
+from uav_task_alloc.geometry.polyline import segment_distance
+from uav_task_alloc.model import Point
+from uav_task_alloc.separation.conflicts import (
+    AcceptedRows,
+    FoundConflict,
+    find_conflicts,
+)
+from uav_task_alloc.separation.rule import Conflict, Separation
+from uav_task_alloc.separation.volumes import (
+    Flight,
+    FlightLeg,
+    LegTimes,
+    PieceRow,
+    end_rows,
+    flight_volumes,
+    leg_rows,
+    leg_times,
+    rows_of_legs,
+)
+
+_LAYERS = 10  # above the ends of a leg, at most
+_HOLDS = (3.0, 6.0, 10.0, 15.0, 20.0, 30.0, 45.0, 60.0, 90.0, 120.0, 180.0, 240.0)  # [s]
+_TAKE_OFFS = tuple(5.0 * k for k in range(1, 181))  # [s] that a UAV may wait on the ground
+_MOST_PATHS = 4  # the cheapest, with which waits are combined
+_PRICE = 0.15  # [s/m] of a climb above the ends of a leg, whose power a wait does not take
+_GROUND = 0.5  # price of a second of waiting on the ground
+_ON_LINE = 0.01  # [m] a detour point so near to the line of its neighbours only changes the height
+_STEEP = 0.45  # share of the first and last straight part that a slanted climb may take
+LegIndex = tuple[int, int]  # of a flight, and of its leg
+
+
+@dataclass(frozen=True, slots=True)
+class TransitLimits:
+    """Where transit legs may go.
+
+    Attributes:
+        altitude_min, altitude_max: [m] ENU.
+        is_clear: whether a polyline [m] ENU enters no zone.
+        stop: polled between legs; True ends the search for changes.
+    """
+
+    altitude_min: float = -math.inf  # [m]
+    altitude_max: float = math.inf  # [m]
+    is_clear: Callable[[Sequence[Point]], bool] = lambda points: True
+    stop: Callable[[], bool] = lambda: False
+
+
+@dataclass(slots=True)
+class Resolution:
+    """Flights that are apart, as far as possible.
+
+    Attributes:
+        flights: in the order given.
+        conflicts: those that there were, and how each was resolved.
+        left: those that there still are.
+    """
+
+    flights: tuple[Flight, ...]
+    conflicts: tuple[Conflict, ...] = ()
+    left: list[FoundConflict] = field(default_factory=list)
+
+
+def resolve(flights: Sequence[Flight], rule: Separation,
+            limits: TransitLimits | None = None) -> Resolution:
+    """Change heights and begins of legs so that the flights are apart.
+
+    Args:
+        flights: planned; those earlier in the sequence change less.
+        rule: that is on.
+        limits: of heights and zones; None: none.
+
+    Returns:
+        The same flights where no two are in conflict.
+    """
+    found = find_conflicts(flight_volumes(flights, rule), rule)
+    if not found:
+        return Resolution(tuple(flights))
+    planner = _Planner(flights, rule, limits or TransitLimits())
+    involved = {k for each in found for k in each.flights}
+    for k in range(len(flights)):
+        planner.accept_fixed(k, whole=k not in involved)
+    # in the air first: those on the ground can wait there
+    for k in sorted(involved, key=lambda k: not flights[k].in_air):
+        planner.plan(k)
+    after = tuple(planner.flights)
+    left = find_conflicts(flight_volumes(after, rule), rule)
+    explained = tuple(_explained(flights, planner, each, left) for each in found)
+    return Resolution(after, explained, left)
+
+
+@dataclass(frozen=True, slots=True)
+class _Change:
+    """A leg as it could be flown, and its price."""
+
+    leg: FlightLeg
+    seconds: float  # price: more than as planned, with the wait and for a climb
+    text: str
+    kind: str  # `height`, `hold` or ''
+
+
+class _Planner:
+    """Plans flights one after another, each apart from those accepted."""
+
+    def __init__(self, flights: Sequence[Flight], rule: Separation,
+                 limits: TransitLimits) -> None:
+        self.flights, self.changes = list(flights), dict[LegIndex, _Change]()
+        self._rule, self._limits = rule, limits
+        self._accepted = AcceptedRows(rule)
+
+    def accept_fixed(self, k: int, whole: bool) -> None:
+        """Accept a flight as it is, or the leg under way of one that may change."""
+        flight = self.flights[k]
+        for n, rows in enumerate(rows_of_legs(flight, self._rule)):
+            if not whole and n < len(flight.legs) and flight.legs[n].movable:
+                return
+            if whole or flight.legs:
+                self._accepted.add(rows, (k, n))
+
+    def plan(self, k: int) -> None:
+        """Change the legs of a flight that are in conflict, and accept it."""
+        flight, ready, fixed = self.flights[k], self.flights[k].begin, True
+        for n in range(len(flight.legs)):
+            leg = flight.legs[n]
+            fixed = fixed and not leg.movable
+            if leg.movable and not self._limits.stop():
+                change = self._changed(flight, k, n, ready)
+                if change is not None and change.kind:
+                    self.changes[k, n] = change
+                    leg = change.leg
+                    flight = replace(flight, legs=(*flight.legs[:n], leg, *flight.legs[n + 1:]))
+            times = leg_times(flight, leg, ready, n == 0)
+            if not fixed:
+                self._accepted.add(leg_rows(flight, leg, times, self._rule), (k, n))
+            ready = times.end
+        self.flights[k] = flight
+        self._accepted.add(self._stay(flight, ready), (k, len(flight.legs)))
+
+    def _stay(self, flight: Flight, end: float) -> list[PieceRow]:
+        """The stay in the air after the last leg."""
+        last = flight.legs[-1] if flight.legs else None
+        if last.lands if last else not flight.in_air:
+            return []
+        return end_rows(flight, self._rule, end, last.points[-1] if last else flight.position)
+
+    def _changed(self, flight: Flight, k: int, n: int, ready: float) -> _Change | None:
+        """The cheapest change with which the leg is apart; None: there is none."""
+        leg = flight.legs[n]
+        planned = leg_times(flight, leg, ready, n == 0)
+        if self._is_apart(flight, k, n, leg, planned):
+            return _Change(leg, 0.0, '', '')
+        paths = sorted((_Change(leg, 0.0, '', ''), *self._heights(flight, leg)),
+                       key=lambda each: each.seconds)
+        waits = () if n == 0 and flight.in_air else _TAKE_OFFS if leg.takes_off else _HOLDS
+        price = _GROUND if leg.takes_off else 1.0
+        options = [(path.seconds + price * wait, wait, number) for number, path in enumerate(paths)
+                   for wait in (0.0, *(waits if number < _MOST_PATHS else ()))]
+        for _, wait, number in sorted(options):
+            option = _with_wait(paths[number], planned.begin, wait)
+            times = leg_times(flight, option.leg, ready, n == 0)
+            if option.kind and self._is_apart(flight, k, n, option.leg, times) and (
+                    _keeps_deadlines(flight, n, times.end - planned.end, planned.end)):
+                return option
+        return None
+
+    def _is_apart(self, flight: Flight, k: int, n: int, leg: FlightLeg, times: LegTimes) -> bool:
+        rows = leg_rows(flight, leg, times, self._rule)
+        if n + 1 == len(flight.legs):
+            rows += self._stay(flight, times.end)
+        return self._accepted.conflict(rows, k) is None
+
+    def _heights(self, flight: Flight, leg: FlightLeg) -> Iterator[_Change]:
+        """The leg at other transit heights that it may have."""
+        points, limits = self._level_points(leg), self._limits
+        planned = flight.seconds(leg.flown())
+        ends = [point[2] for point, on_ground in (
+            (points[0], leg.takes_off), (points[-1], leg.lands)) if not on_ground]
+        ends = ends or [max(point[2] for point in points)]
+        levels = {max(ends), min(ends), *(
+            max(ends) + step * self._rule.vertical for step in range(1, _LAYERS + 1))}
+        for level in levels:
+            if not limits.altitude_min <= level <= limits.altitude_max:
+                continue
+            for path in {_slanted(flight, leg, points, level), _upright(leg, points, level)}:
+                new = replace(leg, points=path)
+                if path != leg.points and limits.is_clear(new.flown()):
+                    price = _PRICE * max(0.0, level - max(ends))
+                    yield _Change(new, flight.seconds(new.flown()) - planned + price, f'flies at '
+                                  f'{level:.1f} m', 'height')
+
+    def _level_points(self, leg: FlightLeg) -> tuple[Point, ...]:
+        """Points of a leg without those that only change its height."""
+        points = list(leg.points)
+        k = 1
+        while k < len(points) - 1:
+            a, point, b = (each[:2] for each in points[k - 1:k + 2])
+            if segment_distance(point, a, b) <= _ON_LINE and self._limits.is_clear(
+                    (points[k - 1], points[k + 1])):
+                del points[k]
+            else:
+                k += 1
+        return tuple(points)
+
+
+def _with_wait(path: _Change, begin: float, wait: float) -> _Change:
+    """A change with a wait [s] before the leg, which would begin at `begin`."""
+    if wait == 0.0:
+        return path
+    return _Change(replace(path.leg, hold_until=begin + wait), path.seconds + wait, ' and '.join(
+        filter(None, (path.text, f'waits {wait:g} s'))), path.kind or 'hold')
+
+
+def _keeps_deadlines(flight: Flight, n: int, delay: float, ready: float) -> bool:
+    """Whether no service that was to begin in time begins too late after a delay of leg n [s]."""
+    if delay <= 0.0:
+        return True
+    leg, later = flight.legs[n], ready + delay
+    if ready - leg.service <= leg.latest < later - leg.service:
+        return False
+    for leg in flight.legs[n + 1:]:
+        ready, later = leg_times(flight, leg, ready).end, leg_times(flight, leg, later).end
+        if ready - leg.service <= leg.latest < later - leg.service:
+            return False
+    return True
+
+
+def _upright(leg: FlightLeg, points: Sequence[Point], level: float) -> tuple[Point, ...]:
+    """A leg that changes its height above its ends."""
+    a, b = points[0], points[-1]
+    inner = [(x, y, max(z, level)) for x, y, z in points[1:-1]]
+    first = [(a[0], a[1], level)] if a[2] != level else []
+    last = [(b[0], b[1], level)] if b[2] != level else []
+    return (a, *first, *inner, *last, b)
+
+
+def _slanted(flight: Flight, leg: FlightLeg, points: Sequence[Point],
+             level: float) -> tuple[Point, ...]:
+    """A leg that changes its height on the way, if it is long enough at no cost of time."""
+    a, b = points[0], points[-1]
+    inner = [(x, y, max(z, level)) for x, y, z in points[1:-1]]
+    path: list[Point] = [a]
+    if a[2] != level:
+        goal = inner[0] if inner else b
+        path.append((a[0], a[1], level) if leg.takes_off else _along(
+            a, goal, flight.cruise * _vertical_seconds(flight, level - a[2]), level))
+    path += inner
+    if b[2] != level:
+        before = inner[-1] if inner else a
+        path.append((b[0], b[1], level) if leg.lands else _along(
+            b, before, flight.cruise * _vertical_seconds(flight, b[2] - level), level))
+    return (*path, b)
+
+
+def _vertical_seconds(flight: Flight, rise: float) -> float:
+    return rise / flight.climb if rise > 0.0 else -rise / flight.descent
+
+
+def _along(a: Point, b: Point, metres: float, level: float) -> Point:
+    """The point at some horizontal distance from a towards b, at most _STEEP of the way."""
+    length = math.dist(a[:2], b[:2])
+    share = min(_STEEP, metres / length) if length > 0.0 else 0.0
+    return a[0] + share * (b[0] - a[0]), a[1] + share * (b[1] - a[1]), level
+
+
+def _explained(before: Sequence[Flight], planner: _Planner, each: FoundConflict,
+          left: Sequence[FoundConflict]) -> Conflict:
+    """A conflict, and what was done about it."""
+    uavs = before[each.flights[0]].uav, before[each.flights[1]].uav
+    ends = _task_of(before, each, 0), _task_of(before, each, 1)
+    texts, kinds = list[str](), list[str]()
+    for k, n, uav in zip(each.flights, each.legs, uavs, strict=True):
+        change = planner.changes.get((k, n))
+        if change is None:  # an earlier leg may have been made to wait
+            change = next((planner.changes[k, m] for m in range(min(n, len(
+                before[k].legs)) - 1, -1, -1) if (k, m) in planner.changes), None)
+        if change is not None:
+            texts.append(f'{uav} {change.text}')
+            kinds.append(change.kind)
+    still = any(other.flights == each.flights and other.legs == each.legs for other in left)
+    kind = '' if still else 'height' if 'height' in kinds else 'hold'
+    return Conflict(uavs, ends, each.time, each.horizontal, each.vertical, kind,
+                    'no height or wait resolves it' if still else '; '.join(texts))
+
+
+def _task_of(flights: Sequence[Flight], each: FoundConflict, side: int) -> str:
+    legs, n = flights[each.flights[side]].legs, each.legs[side]
+    return legs[min(n, len(legs) - 1)].task if legs else ''
+
+
+def flight_seconds(flight: Flight) -> float:
+    """Return the time that a flight is in the air up to the end of its last leg [s].
+
+    Args:
+        flight: planned.
+    """
+    total, ready = 0.0, flight.begin
+    for n, leg in enumerate(flight.legs):
+        times = leg_times(flight, leg, ready, n == 0)
+        total += (times.arrival if leg.lands else times.end) - (
+            times.begin if leg.takes_off else ready)
+        ready = times.end
+    return total

@@ -1,0 +1,217 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A plan whose UAVs are apart: flights of a plan, their resolution, and the plan with it.
+
+What heights and waits do not resolve gets another UAV by another solve in which one of the two may
+not serve the task, and is left out in the end.
+"""
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
+
+from uav_task_alloc.geometry.polyline import polyline_length
+from uav_task_alloc.geometry.zones import path_is_clear
+from uav_task_alloc.model import Leg, Plan, Task, Uav
+from uav_task_alloc.objective import Objective, excess, fit, response_time
+from uav_task_alloc.separation.conflicts import load_separation_kernels
+from uav_task_alloc.separation.resolution import Resolution, TransitLimits, resolve
+from uav_task_alloc.separation.rule import Conflict, Separation
+from uav_task_alloc.separation.volumes import Flight, FlightLeg, LegTimes, leg_times
+from uav_task_alloc.solver.problem import Limits, Rules
+from uav_task_alloc.solver.warm import WarmState
+from uav_task_alloc.timetable import Timetable
+
+_ROUNDS = 3  # solves in which a task may get another UAV
+_RESOLVE_SHARE, _AGAIN_SHARE = 0.25, 0.1  # of the budget: for resolutions, for each such solve
+_LEAST = 0.5  # [s] that resolutions may take, whatever the budget
+_ALONE = 'left out: {} cannot be kept apart from {} on it'
+# of tasks, what it starts from, and the budget [s]
+Solve = Callable[[Sequence[Task], Plan | WarmState | None, float], Plan]
+
+
+def separated_plan(solve: Solve, uavs: Sequence[Uav], tasks: Sequence[Task],
+                   locked: Mapping[str, tuple[Task, ...]], limits: Limits, rules: Rules,
+                   rule: Separation, warm: Plan | WarmState | None, budget: float,
+                   clock: Callable[[], float] = time.perf_counter) -> Plan:
+    """Solve, and change what is not apart.
+
+    Args:
+        solve: returns the plan of some tasks.
+        uavs: the fleet.
+        tasks: all tasks, locked ones included.
+        locked: by UAV id the tasks that it serves first.
+        limits: zones and altitudes.
+        rules: how routes end, and the objective.
+        rule: that is on.
+        warm: what the first solve starts from.
+        budget: [s] of all of it.
+        clock: [s], monotonic.
+
+    Returns:
+        The plan with `conflicts`; legs have the transit heights, times the waits.
+    """
+    load_separation_kernels()
+    result = solve(tasks, warm, (1.0 - _RESOLVE_SHARE) * budget)
+    until = clock() + max(budget, _LEAST)
+    transit = TransitLimits(limits.altitude_min, limits.altitude_max, lambda points: path_is_clear(
+        points, limits.zones, limits.clearance), lambda: clock() > until)
+    known, moved = {task.id: task for task in tasks}, dict[str, Conflict]()
+    fixed = {task.id for held in locked.values() for task in held}
+    for turn in range(_ROUNDS + 1):
+        flights = flights_of_plan(result, uavs, known, rules.returns)
+        found = resolve(flights, rule, transit)
+        barred = _barred(found, fixed)
+        if not barred or turn == _ROUNDS or transit.stop():
+            break
+        for name, (uav_id, conflict) in barred.items():
+            others = {uav.id for uav in uavs if uav.id != uav_id}
+            allowed = known[name].allowed_uavs
+            known[name] = replace(known[name], allowed_uavs=frozenset(
+                others if allowed is None else allowed & others))
+            moved[name] = conflict
+            if turn == _ROUNDS - 1:
+                known[name] = replace(known[name], allowed_uavs=frozenset())
+        result = solve(list(known.values()), result, _AGAIN_SHARE * budget)
+    return _with_resolution(result, uavs, tasks, rules, flights, found, moved)
+
+
+def _barred(found: Resolution, fixed: Iterable[str]) -> dict[str, tuple[str, Conflict]]:
+    """By id of each task that should get another UAV: its UAV, and the conflict."""
+    barred: dict[str, tuple[str, Conflict]] = {}
+    for each in found.left:
+        ends = list[tuple[str, str]]()
+        for k, n in zip(each.flights, each.legs, strict=True):
+            legs = found.flights[k].legs
+            # the leg itself, or the task before a return
+            names = [leg.task for leg in legs[:n + 1] if leg.task and leg.task not in fixed]
+            ends.append((names[-1] if names else '', found.flights[k].uav))
+        if any(name in barred for name, _ in ends):
+            continue
+        for (name, uav_id), (other, other_uav) in (ends[::-1], ends):
+            if name:
+                barred[name] = uav_id, Conflict(
+                    (uav_id, other_uav), (name, other), each.time, each.horizontal,
+                    each.vertical)
+                break
+    return barred
+
+
+def flights_of_plan(plan: Plan, uavs: Iterable[Uav], tasks: Mapping[str, Task],
+                    returns: bool) -> list[Flight]:
+    """Return what each UAV flies by a plan.
+
+    Args:
+        plan: with its legs.
+        uavs: the fleet.
+        tasks: by id.
+        returns: routes end at home.
+
+    Returns:
+        In the order of the UAVs.
+    """
+    times = plan.timetable()
+    return [_flight(uav, plan, times, tasks, returns) for uav in uavs]
+
+
+def _flight(uav: Uav, plan: Plan, times: Timetable, tasks: Mapping[str, Task],
+            returns: bool) -> Flight:
+    legs, place = list[FlightLeg](), uav.position
+    rows = iter(plan.legs.get(uav.id, ()))
+    trips = plan.trips_of(uav.id)
+    departures = times.departures.get(uav.id, ())
+    for number, row in enumerate(trips):
+        on_ground = number > 0 or uav.at_base
+        for k, name in enumerate(row):
+            task, leg = tasks[name], next(rows)
+            release = task.release
+            if on_ground and k == 0 and number < len(departures):
+                release = max(release, departures[number])
+            legs.append(FlightLeg((place, *leg.via, task.position), name, task.service_time,
+                                  task.earliest, task.latest, release,
+                                  takes_off=on_ground and k == 0))
+            place = task.position
+        leg_home = next(rows, None) if number + 1 < len(trips) or (returns and row) else None
+        if leg_home is not None:
+            legs.append(FlightLeg((place, *leg_home.via, uav.base), '',
+                                  uav.turnaround if number + 1 < len(trips) else 0.0, lands=True))
+            place = uav.base
+    return Flight(uav.id, tuple(legs), uav.position, uav.cruise_speed, uav.climb_speed,
+                  uav.descent_speed, uav.available_from, in_air=not uav.at_base)
+
+
+def _with_resolution(plan: Plan, uavs: Sequence[Uav], tasks: Sequence[Task], rules: Rules,
+                     before: Sequence[Flight], found: Resolution,
+                     moved: Mapping[str, Conflict]) -> Plan:
+    """The plan with changed legs and times, reasons and conflicts."""
+    conflicts = (*found.conflicts, *(_moved(plan, name, each) for name, each in moved.items()))
+    unassigned = {name: _ALONE.format(*moved[name].uavs) if name in moved else why
+                  for name, why in plan.unassigned.items()}
+    if not any(a is not b for a, b in zip(before, found.flights, strict=True)):
+        return replace(plan, conflicts=conflicts, unassigned=unassigned)
+    legs = {flight.uav: _legs(plan.legs.get(flight.uav, ()), old, flight)
+            for old, flight in zip(before, found.flights, strict=True)}
+    times = _times(plan.timetable(), tasks, before, found.flights)
+    lengths = [math.fsum(leg.length for leg in legs[uav.id]) for uav in uavs]
+    distance, penalty = math.fsum(lengths), max(plan.penalty, excess(uavs, lengths))
+    old, new = (_cost(rules.objective, metres, each)
+                for metres, each in ((plan.distance, plan.timetable()), (distance, times)))
+    return replace(plan, legs=legs, distance=distance, penalty=penalty,
+                   fit=fit(distance, plan.value, penalty, rules.weights),
+                   cost=plan.cost + new - old, timetable=lambda: times, conflicts=conflicts,
+                   unassigned=unassigned)
+
+
+def _moved(plan: Plan, name: str, each: Conflict) -> Conflict:
+    """What became of a task that should get another UAV."""
+    uav_id = next((uav for uav, row in plan.routes.items() if name in row), '')
+    if not uav_id:
+        return replace(each, resolution='left out', detail=f'task {name} is left out')
+    return replace(each, resolution='other uav', detail=f'{uav_id} serves task {name}')
+
+
+def _legs(planned: Sequence[Leg], old: Flight, new: Flight) -> tuple[Leg, ...]:
+    """Legs with the transit heights."""
+    return tuple(leg if a.points == b.points else Leg(b.points[1:-1], polyline_length(b.points))
+                 for leg, a, b in zip(planned, old.legs, new.legs, strict=True))
+
+
+def _cost(objective: Objective, metres: float, times: Timetable) -> float:
+    return objective.cost(metres, max(times.ends.values(), default=0.0), times.response,
+                          math.fsum(times.late.values()))
+
+
+def _all_times(flight: Flight) -> list[LegTimes]:
+    ready, found = flight.begin, list[LegTimes]()
+    for n, leg in enumerate(flight.legs):
+        found.append(leg_times(flight, leg, ready, n == 0))
+        ready = found[-1].end
+    return found
+
+
+def _times(times: Timetable, tasks: Sequence[Task], before: Sequence[Flight],
+           after: Sequence[Flight]) -> Timetable:
+    """The times of a plan, later by what the changes cost."""
+    arrivals, starts, ends = dict(times.arrivals), dict(times.starts), dict(times.ends)
+    departures = dict(times.departures)
+    for old, new in zip(before, after, strict=True):
+        if old is new:
+            continue
+        takes_off = list[float]()
+        for leg, was, now in zip(old.legs, _all_times(old), _all_times(new), strict=True):
+            later = now.end - was.end
+            if leg.takes_off:
+                takes_off.append(now.begin - was.begin)
+            if leg.task:
+                arrivals[leg.task] += now.arrival - was.arrival
+                starts[leg.task] += later
+        ends[old.uav] = times.ends.get(old.uav, 0.0) + later
+        if len(takes_off) == len(departures.get(old.uav, ())):
+            departures[old.uav] = tuple(a + b for a, b in zip(departures[old.uav], takes_off,
+                                                              strict=True))
+    latest = {task.id: task.latest for task in tasks}
+    late = {name: start - latest[name] for name, start in starts.items()
+            if start > latest.get(name, math.inf) + 1e-6}
+    return replace(times, arrivals=arrivals, starts=starts, ends=ends, departures=departures,
+                   late=late, response=response_time(tasks, starts))
