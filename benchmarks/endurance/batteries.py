@@ -45,7 +45,7 @@ ORIGIN = Origin(47.397742, 8.545594, 488.0)
 KINDS = ('ardupilot', 'px4', 'ardupilot')
 TICK, REPORT, ROUNDS = 0.1, 0.5, 100  # [s], [s], rounds of bees in one solve
 RANGE, TURNAROUND, SIDE = 6000.0, 120.0, 1500.0  # [m], [s], [m]
-USABLE = 0.85 * RANGE  # [m] that the bridge is given: hovering and landing use battery, too
+ENDURANCE = RANGE / 15.0  # [s] in the air with a full battery: hovering uses as much as cruising
 ARRIVAL, DRAIN = 40.0, 1800.0  # [s] between two tasks on average; [s] without new ones at the end
 LATEST_BACK = TURNAROUND + 60.0  # [s]
 AT_HOME = 5.0  # [m]
@@ -67,11 +67,12 @@ class Fleet:
                                             random.Random(seed))
         self.vehicles = {n: Vehicle(VehicleConfig(
             f'uav_{n}', n, ORIGIN, (300.0 * n, 0.0, 0.0), floods=False, range=RANGE,
-            turnaround=TURNAROUND, climb_rate=2.5, descent_rate=1.5), AUTOPILOTS[kind])
+            endurance=ENDURANCE, turnaround=TURNAROUND, climb_rate=2.5,
+            descent_rate=1.5), AUTOPILOTS[kind])
             for n, kind in enumerate(KINDS, 1)}
         self.up = {n: (Codec(245, 190), Codec(n, 1)) for n in self.vehicles}
         self.down = {n: (Codec(n, 1), Codec(245, 190)) for n in self.vehicles}
-        self.params = AllocatorParams(route_end='home', trips=2, default_range=USABLE,
+        self.params = AllocatorParams(route_end='home', trips=2, default_range=RANGE,
                                       battery_reserve=0.2, background_period=60.0)
         self.core = Allocator(self.params, 0.0)
         self.core.set_kernels_ready()
@@ -145,7 +146,7 @@ class Fleet:
                 self.figures['completed'] += event.task in self.open
                 self.open.discard(event.task)
         executor.notes.clear()
-        status, n = state_of(session, self.now, USABLE), int(session.uav_id[4:])
+        status, n = state_of(session, self.now, RANGE), int(session.uav_id[4:])
         if status.available and n in self.changed_at and not self.vehicles[n].silent:
             del self.changed_at[n]
             self.late.discard(n)
@@ -157,9 +158,10 @@ class Fleet:
             session.uav_id, status.position, status.home, cruise_speed=15.0,
             range=status.range_remaining if known else None,
             battery=status.battery if known else None,
+            endurance=ENDURANCE * status.battery or None if known else None,
             available=status.available and status.mode is not UavMode.FAULT,
             active_task=status.active_task, list_revision=status.list_revision,
-            standby=status.mode is UavMode.STANDBY, full_range=USABLE, turnaround=TURNAROUND,
+            standby=status.mode is UavMode.STANDBY, full_range=RANGE, turnaround=TURNAROUND,
             climb_speed=2.5, descent_speed=1.5), self.now, self.now)
 
     def allocate(self) -> None:

@@ -238,6 +238,16 @@ def test_a_later_trip_is_counted_on_and_published_after_the_battery_change():
         assert made.state(second) == 'ASSIGNED'
 
 
+def test_take_off_and_landing_use_endurance_beside_the_legs():
+    for seconds, state in ((300.0, 'UNASSIGNED'), (345.0, 'ASSIGNED')):
+        made = driver(route_end='home')
+        made.uav('a', 0.0, 0.0, 0.0, cruise_speed=SPEED, standby=True, endurance=seconds,
+                 climb_speed=2.5, descent_speed=1.5)
+        made.add(at('t', 1200))  # 240 s of legs, 4 s of a stop
+        made.settle()  # 24 s to climb to 50 m, 4 s to return at 60 m, 40 s down, 5 % for the rest
+        assert made.state('t') == state
+
+
 def test_with_one_trip_a_task_out_of_range_is_left_out_until_the_uav_is_full_again():
     made = driver(route_end='home')
     uav(made, 'a', 0, range=600.0, battery=0.19, standby=True, **FULL)
