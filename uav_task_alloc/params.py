@@ -247,9 +247,9 @@ class BridgeParams(FrameParams):
     full_ranges: tuple[str, ...] = param(
         (), 'The same for single UAVs that differ, `uav_1:6000` each.', fixed=True)
     uav_limits: tuple[str, ...] = param(
-        (), 'What else the bridge reports about single UAVs, as NAME=NUMBER: cruise_speed, '
-        'climb_speed, descent_speed [m/s], endurance [s] with a full battery, turnaround [s], '
-        'payload_capacity [kg]; `uav_1:endurance=900,turnaround=120` each.', fixed=True)
+        (), 'What else the bridge reports about single UAVs, as NAME=NUMBER: cruise_speed, climb_'
+        'speed, descent_speed [m/s], endurance [s] with a full battery, turnaround [s], payload_'
+        'capacity [kg], hold_radius [m]; `uav_1:endurance=900,turnaround=120` each.', fixed=True)
     state_rate: float = param(10.0, 'Maximum rate of the states of one UAV.', low=0.5, high=100.0,
                               unit='Hz')
     tlog: str = param('', 'File to record all frames into, as .tlog; empty: none.', fixed=True)

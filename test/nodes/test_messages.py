@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Messages become model values and back; a bad field is refused by its name."""
+import dataclasses
 import math
 
 import pytest
@@ -8,7 +9,9 @@ from uav_task_alloc_msgs import msg as m
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.geometry.frames import Origin
 from uav_task_alloc.model import Leg, Task, ThreatZone
-from uav_task_alloc.nodes.conversions import bridge_messages, messages
+from uav_task_alloc.nodes.conversions import bridge_messages, messages, orders
+from uav_task_alloc.record import message_records
+from uav_task_alloc.separation.monitor import AlertAction, SeparationAlert, SeparationHold
 from uav_task_alloc.zone_codec import decode_zone_message
 
 ORIGIN = Origin(47.397742, 8.545594, 488.0)
@@ -180,3 +183,28 @@ def test_a_bad_zone_of_a_message_stays_as_it_was_and_the_others_are_taken():
 def test_a_uav_in_standby_is_on_the_ground():
     assert [messages.to_report(m.UavState(uav_id='a', mode=mode)).standby for mode in
             (m.UavState.STANDBY, m.UavState.UNKNOWN, m.UavState.HOLD)] == [True, False, False]
+
+
+def test_an_alert_and_a_hold_of_the_monitor_become_messages():
+    alert = SeparationAlert(('u1', 'u2'), 3.0, 1.5, 7.25, AlertAction.HOLD, 'u1', 'why', 100.5)
+    msg = orders.from_separation_alert(alert)
+    assert (list(msg.uavs), msg.horizontal, msg.vertical) == (['u1', 'u2'], 3.0, 1.5)
+    assert (msg.action, msg.holder, msg.reason) == (m.SeparationAlert.HOLD, 'u1', 'why')
+    assert message_records.separation_record(msg)['until'] == 7.25
+    over = orders.from_separation_alert(dataclasses.replace(
+        alert, horizontal=math.inf, vertical=math.inf, action=AlertAction.RELEASE))
+    assert message_records.separation_record(over)['horizontal'] is None
+    hold = orders.from_separation_hold(SeparationHold('u1', True, 100.5, 160.5, 'why'))
+    assert (hold.source, orders.hold_expiry(hold, 101.0)) == (m.UavHold.SEPARATION, 160.5)
+    assert orders.to_hold_request(hold, 'u1').source == 'separation'
+
+
+def test_modes_and_authority_are_known_by_their_names():
+    state = m.UavState(uav_id='u1', mode=m.UavState.LANDING, authority=m.UavState.LOST,
+                       mission_state=m.UavState.FOREIGN, hold_radius=math.nan)
+    report = messages.to_report(state)
+    assert (report.mode, report.authority, report.foreign) == ('LANDING', 'LOST', True)
+    assert report.hold_radius == 0.0
+    state.hold_radius = -1.0
+    with pytest.raises(InvalidValue, match='hold_radius = -1'):
+        messages.to_report(state)

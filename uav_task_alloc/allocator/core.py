@@ -32,12 +32,14 @@ from uav_task_alloc.allocator.replanning.proposal import Approvals, holding_plan
 from uav_task_alloc.allocator.replanning.schedule import Schedule
 from uav_task_alloc.allocator.replanning.task_reasons import task_steps
 from uav_task_alloc.allocator.replanning.trips import waiting_uavs
+from uav_task_alloc.allocator.separation_watch import SeparationWatch
 from uav_task_alloc.allocator.state.safe_paths import SafePaths
 from uav_task_alloc.allocator.state.world import World
 from uav_task_alloc.allocator.status import allocation_line, last_finish
 from uav_task_alloc.journal import JournalRow
 from uav_task_alloc.model import Plan, ThreatZone
 from uav_task_alloc.params import AllocatorParams
+from uav_task_alloc.separation.monitor import MonitorStep
 
 # [s] after a restart, from the first report of the last UAV on, in which no task changes its
 # UAV: the bridge repeats events that were missed after 2 s
@@ -73,6 +75,7 @@ class Allocator:
         self.schedule = Schedule()
         self.world = World(params, saved, make_safe_paths, self.schedule.add_trigger)
         self.approvals = Approvals(self.world)
+        self.separation = SeparationWatch(self.world)
         self._best = Plan({each.uav: each.task_ids for each in saved.lists})
         self._learned = saved.learned
         self._learned_saved = now  # [s]
@@ -281,6 +284,10 @@ class Allocator:
             world.outbox.allocation = Allocation(
                 world.next_revision(), tuple(self._predictions.lists(stamp).values()), plan,
                 'predicted arrivals', stamp)
+
+    def separate(self, now: float, stamp: float) -> MonitorStep:
+        """Return holds that keep UAVs apart, and alerts; publish them before lists."""
+        return self.separation.step(now, stamp, bool(self.world.outbox.lists))
 
     def collect(self) -> Outbox:
         """Return what is to be published since the last call; save `rows` before it is."""

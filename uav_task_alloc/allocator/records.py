@@ -127,6 +127,10 @@ class UavReport:
     descent_speed: float | None = None  # [m/s]
     full_range: float | None = None  # [m] with a full battery
     turnaround: float | None = None  # [s] of a battery change at its home
+    mode: str = ''  # name of the constant of UavState; '': unknown
+    authority: str = ''  # the same
+    foreign: bool = False  # the mission on board is not of its bridge
+    hold_radius: float = 0.0  # [m] of the circle in which it holds; 0: it hovers
 
     def __post_init__(self) -> None:
         check_id('uav_id', self.uav_id)
@@ -143,6 +147,7 @@ class UavReport:
             put(self, 'velocity', check_point(place + 'velocity', self.velocity))
         if self.battery is not None:
             check_number(place + 'battery', self.battery, 0.0, 1.0)
+        check_number(place + 'hold_radius', self.hold_radius, 0.0, 1e5)
         for name in REPORTED_LIMITS:
             if getattr(self, name) is not None:
                 most = 1e6 if name == 'payload_capacity' else math.inf  # as model.Uav

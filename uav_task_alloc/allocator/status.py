@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from uav_task_alloc.allocator.records import Allocation, TaskRecord, TaskState
@@ -137,12 +138,14 @@ def _zone_warnings(world: World) -> list[tuple[str, str]]:
     return found[:_MAX_NAMED]
 
 
-def health_values(world: World, solving: bool) -> dict[str, object]:
+def health_values(world: World, solving: bool,
+                  near: Mapping[str, str] | None = None) -> dict[str, object]:
     """Return numbers of UAVs, tasks and zones, and the revision in force, by name.
 
     Args:
         world: of the allocator.
         solving: a plan is being computed.
+        near: UAVs that would lose separation, by id; None: none.
 
     Returns:
         Counts of UAVs, zones and of tasks by state; the revision of the allocation; what is wrong
@@ -150,7 +153,10 @@ def health_values(world: World, solving: bool) -> dict[str, object]:
     """
     states = Counter(record.state for record in world.task_records().values())
     orders = list(world.orders.in_force.values())[-_MAX_ORDERS:]
-    return {**{f'{UAV_WARNING}{uav_id}': text for uav_id, text in _zone_warnings(world)},
+    warnings = dict(near or {})
+    for uav_id, text in _zone_warnings(world):
+        warnings[uav_id] = '; '.join(filter(None, (warnings.get(uav_id), text)))
+    return {**{f'{UAV_WARNING}{uav_id}': text for uav_id, text in warnings.items()},
             **{f'{ORDER}{order.id}': f'{order.text} ({order.operator})' for order in orders},
             'orders in force': len(world.orders.in_force),
             'UAVs known': len(world.uav_records()),

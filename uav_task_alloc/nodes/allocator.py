@@ -66,7 +66,8 @@ class AllocatorNode(Node):
         `<uav_id>/task_list` (TaskList), `task_statuses` (TaskStatusArray), `allocation`
         (Allocation), `allocation_markers` (MarkerArray), `<uav_id>/path` (nav_msgs/Path),
         `fleet_origin` (FleetOrigin), `<uav_id>/hold` (UavHold), `plan_proposal`
-        (PlanProposal), all latched; `/diagnostics` (DiagnosticArray).
+        (PlanProposal), all latched; `separation_alerts` (SeparationAlert);
+        `/diagnostics` (DiagnosticArray).
     Subscribes to:
         `uav_states` (UavState), `task_announcements` (TaskAnnouncement), `threat_zones`
         (ThreatZoneArray), `task_events` (TaskEvent), `fleet_origin`, `/diagnostics`.
@@ -295,7 +296,12 @@ class AllocatorNode(Node):
         self.pause_after(started)
 
     def publish(self, stamp: float) -> None:
-        """Save changes, then publish them while all nodes have one origin."""
+        """Save changes, then publish them while all nodes have one origin.
+
+        Holds that keep UAVs apart do not wait for the disk.
+        """
+        if not self.origins.conflict():
+            self.orders.separate(self.core.separate(time.monotonic(), stamp))
         self.pending = not self.persistence.save(self.core, time.monotonic(), _MOST_ROWS)
         if self.pending or self.origins.conflict():
             return
@@ -328,7 +334,8 @@ class AllocatorNode(Node):
         warnings = health_warnings(self.world, self.persistence.error, self.solver_error)
         self.diagnostics.publish(from_diagnostics([allocator_row(
             self.get_fully_qualified_name(), [stopped] if stopped else warnings,
-            {**health_values(self.world, self.core.schedule.busy), **self.election.facts()},
+            {**health_values(self.world, self.core.schedule.busy, self.core.separation.texts()),
+             **self.election.facts()},
             bool(stopped))], self.stamp()))
 
     def stamp(self) -> float:

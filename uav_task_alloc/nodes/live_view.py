@@ -23,7 +23,7 @@ from uav_task_alloc.live.scene import Scene
 from uav_task_alloc.live.snapshot_store import SnapshotStore
 from uav_task_alloc.live.tiles import tile_source
 from uav_task_alloc.nodes.conversions.message_limits import cut
-from uav_task_alloc.nodes.conversions.messages import ANNOUNCEMENTS, LATCHED, STATES
+from uav_task_alloc.nodes.conversions.messages import ANNOUNCEMENTS, EVENTS, LATCHED, STATES
 from uav_task_alloc.nodes.ros.clock_watch import (
     SteadyTime,
     is_simulated,
@@ -83,6 +83,7 @@ class LiveView(Node):
         `uav_states` (UavState), `task_announcements` (TaskAnnouncement), `threat_zones`
         (ThreatZoneArray), `task_statuses` (TaskStatusArray), `allocation` (Allocation),
         `<uav_id>/task_list` (TaskList), `plan_proposal` (PlanProposal),
+        `separation_alerts` (SeparationAlert),
         `fleet_origin` (FleetOrigin), `/diagnostics`
         (DiagnosticArray).
     Parameters:
@@ -138,6 +139,8 @@ class LiveView(Node):
         self._subscribe(m.Allocation, 'allocation', ANNOUNCEMENTS,
                         message_records.allocation_record)
         self._subscribe(m.PlanProposal, 'plan_proposal', LATCHED, message_records.proposal_record)
+        self._subscribe(m.SeparationAlert, 'separation_alerts', EVENTS,
+                        message_records.separation_record)
         self._subscribe(DiagnosticArray, '/diagnostics', 10, message_records.uploads_record)
         self.create_subscription(m.UavState, 'uav_states', self.on_state, STATES)
         for uav in self.played.uavs if self.played else ():

@@ -30,6 +30,7 @@ _BUILDERS: dict[str, Callable[[Any], message_records.RecordBody]] = {
     _PACKAGE + 'Allocation': message_records.allocation_record,
     _PACKAGE + 'TaskList': message_records.task_list_record,
     _PACKAGE + 'UavState': message_records.state_record,
+    _PACKAGE + 'SeparationAlert': message_records.separation_record,
     _PACKAGE + 'FleetOrigin': message_records.origin_record,
     'diagnostic_msgs/msg/DiagnosticArray': message_records.uploads_record}
 _ANNOUNCEMENT = _PACKAGE + 'TaskAnnouncement'

@@ -71,6 +71,19 @@ def zone_sentences(state: RunState, line: Line) -> Iterator[Sentence]:
             yield 'zone', text.format(_ids(sorted(names)))
 
 
+def separation_sentences(_: RunState, line: Line) -> Iterator[Sentence]:
+    """Who would lose separation, how near, and what is done."""
+    kind = 'fault' if line['action'] == 'UNRESOLVED' else 'uav'
+    names = ' and '.join(line['uavs'])
+    if line['horizontal'] is None:
+        goes_on = f'{line["holder"]} goes on: ' if line['action'] == 'RELEASE' else ''
+        yield kind, f'{names}: {goes_on}{line["reason"]}'
+        return
+    when = f'in {line["until"]:.0f} s' if line['until'] > 0.0 else 'now'
+    yield kind, (f'{names} would be {line["horizontal"]:.0f} m apart, {line["vertical"]:.0f} m '
+                 f'in height, {when}: {line["reason"]}')
+
+
 def state_sentences(state: RunState, line: Line) -> Iterator[Sentence]:
     """A new UAV, or a change of its mode, availability, authority or mission on board."""
     uav, old = line['uav'], state.uavs.get(line['uav'])
@@ -102,5 +115,6 @@ SENTENCE_BUILDERS: dict[str, Callable[[RunState, Line], Iterator[Sentence]]] = {
     'statuses': status_sentences,
     'zones': zone_sentences,
     'proposal': proposal_sentences,
+    'separation': separation_sentences,
     'state': state_sentences,
 }

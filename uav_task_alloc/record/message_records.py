@@ -27,6 +27,7 @@ _STATES = ('PENDING', 'ASSIGNED', 'ACTIVE', 'COMPLETED', 'FAILED', 'CANCELLED', 
 MODES = ('UNKNOWN', 'STANDBY', 'TAKEOFF', 'ON_MISSION', 'HOLD', 'RETURNING', 'LANDING', 'FAULT')
 MISSIONS = ('UNKNOWN', 'UPLOADING', 'VERIFIED', 'MIXED', 'FOREIGN')
 AUTHORITIES = ('UNKNOWN', 'NONE', 'HELD', 'SUSPENDED', 'LOST')
+SEPARATION_ACTIONS = ('NONE', 'HOLD', 'RELEASE', 'UNRESOLVED')
 _COUNT = re.compile('[0-9]{1,18}')  # int() refuses some strings for which isdigit() is true
 UAV_WARNING = 'warning of '  # a key of an allocator begins so, and ends with the id of a UAV
 ORDER = 'order '  # a key of an allocator begins so, and ends with the id of an order
@@ -186,6 +187,23 @@ def proposal_record(msg: _Message) -> RecordBody:
     return {'kind': 'proposal', 'revision': msg.plan.revision, 'open': bool(msg.plan.lists),
             'trigger': msg.plan.trigger, 'deadline': from_stamp(msg.deadline),
             'accepted': bool(msg.accepted_on_timeout), 'changes': list(msg.changes)}
+
+
+def separation_record(msg: _Message) -> RecordBody:
+    """Return who would lose separation, how near, and what is done.
+
+    Args:
+        msg: SeparationAlert.
+
+    Returns:
+        Kind `separation`; `until` [s] from its stamp, lengths in m, None where nothing is
+        predicted.
+    """
+    return {'kind': 'separation', 'uavs': list(msg.uavs),
+            'horizontal': finite_or_none(msg.horizontal),
+            'vertical': finite_or_none(msg.vertical), 'until': from_stamp(msg.until),
+            'action': constant_name(SEPARATION_ACTIONS, msg.action), 'holder': msg.holder,
+            'reason': msg.reason}
 
 
 def task_list_record(msg: _Message) -> RecordBody:

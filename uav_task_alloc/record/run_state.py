@@ -117,6 +117,7 @@ class RunState:
     uav_warnings: dict[str, dict[str, str]] = field(default_factory=dict)  # by allocator, by UAV
     orders: dict[str, dict[str, str]] = field(default_factory=dict)  # by allocator, by id
     proposal: Line | None = None  # the last plan that waited for an operator
+    alerts: dict[tuple[str, ...], Line] = field(default_factory=dict)  # in force, by pair
     authority: dict[str, ReportedAuthority] = field(default_factory=dict)  # by UAV
     speedup: float = 1.0  # scenario seconds in a second of `wall`; 1 where that is /clock
     rate: float = 1.0  # scenario seconds in a second of real time
@@ -191,6 +192,13 @@ class RunState:
     def on_proposal(self, line: Line) -> None:
         """A plan waits for an operator, or does no longer."""
         self.proposal = line
+
+    def on_separation(self, line: Line) -> None:
+        """Two UAVs would lose separation, or are apart again."""
+        if line['horizontal'] is None:
+            self.alerts.pop(tuple(line['uavs']), None)
+        else:
+            self.alerts[tuple(line['uavs'])] = line
 
     def on_zones(self, line: Line) -> None:
         """The set of all zones: a missing zone has ended, a new one begins."""

@@ -77,6 +77,30 @@ class PlannedTask:
         trip: int = ...,
     ) -> None: ...
 
+class SeparationAlert:
+    NONE: ClassVar[int]
+    HOLD: ClassVar[int]
+    RELEASE: ClassVar[int]
+    UNRESOLVED: ClassVar[int]
+    header: std_msgs.msg.Header
+    uavs: list[str]
+    horizontal: float
+    vertical: float
+    until: builtin_interfaces.msg.Duration
+    action: int
+    holder: str
+    reason: str
+    def __init__(self, *,
+        header: std_msgs.msg.Header = ...,
+        uavs: Sequence[str] = ...,
+        horizontal: float = ...,
+        vertical: float = ...,
+        until: builtin_interfaces.msg.Duration = ...,
+        action: int = ...,
+        holder: str = ...,
+        reason: str = ...,
+    ) -> None: ...
+
 class Task:
     LOCAL: ClassVar[int]
     WGS84: ClassVar[int]
@@ -277,6 +301,7 @@ class UavState:
     descent_speed: float
     full_range: float
     turnaround: float
+    hold_radius: float
     capabilities: list[str]
     available: bool
     mode: int
@@ -300,6 +325,7 @@ class UavState:
         descent_speed: float = ...,
         full_range: float = ...,
         turnaround: float = ...,
+        hold_radius: float = ...,
         capabilities: Sequence[str] = ...,
         available: bool = ...,
         mode: int = ...,

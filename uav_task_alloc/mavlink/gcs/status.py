@@ -16,6 +16,9 @@ from uav_task_alloc.mavlink.gcs.telemetry import STALE
 from uav_task_alloc.mavlink.mission.verified_mission import MissionState
 from uav_task_alloc.model import Point
 
+# [m] the larger default of WP_LOITER_RAD (60 m) and NAV_LOITER_RAD (80 m)
+HOLD_RADIUS = 80.0
+
 
 class UavMode(Enum):
     """Flight mode of a vehicle; numbers as in UavState."""
@@ -59,6 +62,7 @@ class UavStatus:
     list_revision: int  # of the last list verified on board; 0: none
     authority: AuthorityState  # who has the aircraft
     reason: str  # why it is not available; '': it is available
+    hold_radius: float = 0.0  # [m] of the circle in which it holds; 0: it hovers
 
     @property
     def urgent(self) -> tuple[object, ...]:
@@ -138,7 +142,8 @@ def state_of(session: VehicleSession, now: float, full_range: float = 0.0) -> Ua
     return UavStatus(
         session.uav_id, telemetry.position, telemetry.velocity, telemetry.home,
         telemetry.battery, full_range * telemetry.battery if full_range > 0.0 else math.nan,
-        not reason, mode, onboard.state, active_task(executor), onboard.revision, owner, reason)
+        not reason, mode, onboard.state, active_task(executor), onboard.revision, owner, reason,
+        HOLD_RADIUS if executor.profile.rules.loiters else 0.0)
 
 
 class PublishedStates:

@@ -107,6 +107,7 @@ def from_uav_status(status: UavStatus, capabilities: Iterable[str], stamp: float
     """
     known = {} if limits is None else dict(limits)
     speed = known.pop('cruise_speed', math.nan)
+    known.setdefault('hold_radius', status.hold_radius)
     if 'endurance' in known:
         known['endurance'] *= status.battery  # NaN where that is unknown
     return m.UavState(

@@ -17,7 +17,7 @@ from uav_task_alloc.params import MAX_RANGE, BridgeParams
 
 # names in the parameter uav_limits
 _LIMIT_NAMES = frozenset({'cruise_speed', 'climb_speed', 'descent_speed', 'endurance',
-                          'turnaround', 'payload_capacity'})
+                          'turnaround', 'payload_capacity', 'hold_radius'})
 _MOST = 1e6  # of any of them
 
 

@@ -28,7 +28,13 @@ from uav_task_alloc.nodes.conversions.message_limits import (
     cut,
 )
 from uav_task_alloc.nodes.conversions.task_times import put_times, to_times
-from uav_task_alloc.record.message_records import from_stamp, task_position
+from uav_task_alloc.record.message_records import (
+    AUTHORITIES,
+    MODES,
+    constant_name,
+    from_stamp,
+    task_position,
+)
 from uav_task_alloc.zone_codec import JOURNAL_ZONE, encode_zone
 
 FRAME_ID = 'map'  # REP-105, ENU
@@ -174,6 +180,9 @@ def to_report(msg: m.UavState) -> UavReport:
         active_task=msg.active_task_id, list_revision=msg.list_revision,
         standby=msg.mode == m.UavState.STANDBY,
         velocity=velocity if all(map(math.isfinite, velocity)) else None,
+        mode=constant_name(MODES, msg.mode), authority=constant_name(AUTHORITIES, msg.authority),
+        foreign=msg.mission_state == m.UavState.FOREIGN,
+        hold_radius=known(msg.hold_radius) or 0.0,
         **{name: known(getattr(msg, name)) or None for name in REPORTED_LIMITS})
 
 

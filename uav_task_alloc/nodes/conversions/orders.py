@@ -17,8 +17,9 @@ from uav_task_alloc.mavlink.gcs.operator_hold import HoldRequest
 from uav_task_alloc.model import Plan
 from uav_task_alloc.nodes.conversions.allocation_messages import from_allocation, from_list
 from uav_task_alloc.nodes.conversions.message_limits import MOST_TASKS, cut
-from uav_task_alloc.nodes.conversions.messages import header, to_stamp
+from uav_task_alloc.nodes.conversions.messages import header, to_duration, to_stamp
 from uav_task_alloc.record.message_records import from_stamp
+from uav_task_alloc.separation.monitor import SeparationAlert, SeparationHold
 
 _Response = TypeVar('_Response')
 _SOURCES = {m.UavHold.OPERATOR: OPERATOR, m.UavHold.SEPARATION: 'separation'}
@@ -91,6 +92,37 @@ def from_hold(hold: OperatorHold) -> m.UavHold:
     """
     return m.UavHold(header=header(hold.stamp), uav_id=hold.uav, hold=hold.hold,
                      source=m.UavHold.OPERATOR, reason=hold.reason)
+
+
+def from_separation_hold(hold: SeparationHold) -> m.UavHold:
+    """Return the message of a hold that keeps UAVs apart.
+
+    Args:
+        hold: of the monitor.
+
+    Returns:
+        It expires within 60 s.
+    """
+    return m.UavHold(header=header(hold.stamp), uav_id=hold.uav, hold=hold.hold,
+                     source=m.UavHold.SEPARATION, expires=to_stamp(hold.expires),
+                     reason=hold.reason)
+
+
+def from_separation_alert(alert: SeparationAlert) -> m.SeparationAlert:
+    """Return the message of an alert.
+
+    Args:
+        alert: of the monitor.
+
+    Returns:
+        For the topic `separation_alerts`; NaN where nothing is predicted.
+    """
+    near = alert.horizontal < math.inf
+    return m.SeparationAlert(
+        header=header(alert.stamp), uavs=list(alert.uavs),
+        horizontal=alert.horizontal if near else math.nan,
+        vertical=alert.vertical if near else math.nan, until=to_duration(alert.until),
+        action=alert.action.value, holder=alert.holder, reason=alert.reason)
 
 
 def from_proposal(proposal: Proposal) -> m.PlanProposal:

@@ -36,6 +36,7 @@ _FLEET_TOPICS = {
     'task_statuses': (_MESSAGES + 'TaskStatusArray', LATCHED),
     'allocation': (_MESSAGES + 'Allocation', LATCHED),
     'plan_proposal': (_MESSAGES + 'PlanProposal', LATCHED),
+    'separation_alerts': (_MESSAGES + 'SeparationAlert', EVENTS),
     'task_events': (_MESSAGES + 'TaskEvent', EVENTS),
     'uav_states': (_MESSAGES + 'UavState', STATES)}
 

@@ -28,15 +28,18 @@ from uav_task_alloc.allocator.operator_desk import (
 from uav_task_alloc.allocator.records import Outbox
 from uav_task_alloc.allocator.replanning.what_if import WhatIfAnswer, solve_what_if
 from uav_task_alloc.errors import InvalidValue
-from uav_task_alloc.nodes.conversions.messages import LATCHED
+from uav_task_alloc.nodes.conversions.messages import EVENTS, LATCHED
 from uav_task_alloc.nodes.conversions.orders import (
     from_hold,
     from_order_answer,
     from_proposal,
+    from_separation_alert,
+    from_separation_hold,
     to_operator,
     to_order_request,
 )
 from uav_task_alloc.nodes.ros.topic_names import HOLD, check_topic
+from uav_task_alloc.separation.monitor import MonitorStep
 
 _SERVICES: dict[str, tuple[Any, OrderAction]] = {
     'pin_task': (srv.PinTask, OrderAction.PIN),
@@ -63,7 +66,9 @@ class OrderServices:
         self._node, self._world, self._save, self._stamp = node, core.world, save, stamp
         self._desk = OperatorDesk(core)
         self._proposals = node.create_publisher(m.PlanProposal, 'plan_proposal', LATCHED)
-        self._holds: dict[str, Publisher[m.UavHold]] = {}
+        self._alerts = node.create_publisher(m.SeparationAlert, 'separation_alerts', EVENTS)
+        self._holds: dict[str, Publisher[m.UavHold]] = {}  # of operators
+        self._separation_holds: dict[str, Publisher[m.UavHold]] = {}
         self._thread = ThreadPoolExecutor(1, 'what_if')
         self._closing = False
         self._running: Future[None] | None = None  # the request that is being decided
@@ -78,6 +83,19 @@ class OrderServices:
         return [*services, self._node.create_service(
             srv.ApprovePlan, '~/approve_plan', self._on_approve, callback_group=group)]
 
+    def separate(self, step: MonitorStep) -> None:
+        """Publish the holds that keep UAVs apart, and alerts.
+
+        They have topics of their own beside those of operators: of each the last one stays.
+
+        Args:
+            step: of the monitor.
+        """
+        for alert in step.alerts:
+            self._alerts.publish(from_separation_alert(alert))
+        for hold in step.holds:
+            self._publish_hold(self._separation_holds, hold.uav, from_separation_hold(hold))
+
     def publish(self, outbox: Outbox) -> None:
         """Publish holds and proposals; each stays on its topic.
 
@@ -87,23 +105,30 @@ class OrderServices:
         if outbox.proposal is not None:
             self._proposals.publish(from_proposal(outbox.proposal))
         for uav_id, hold in outbox.holds.items():
-            if uav_id not in self._holds:
-                try:
-                    topic = check_topic(self._node, HOLD, uav_id)
-                except InvalidValue as error:
-                    self._node.get_logger().error(f'its hold is not published: {error}')
-                    continue
-                self._holds[uav_id] = self._node.create_publisher(m.UavHold, topic, LATCHED)
-            self._holds[uav_id].publish(from_hold(hold))
+            self._publish_hold(self._holds, uav_id, from_hold(hold))
+
+    def _publish_hold(self, publishers: dict[str, Publisher[m.UavHold]], uav_id: str,
+                      msg: m.UavHold) -> None:
+        """Publish a hold with the publisher of its source."""
+        if uav_id not in publishers:
+            try:
+                topic = check_topic(self._node, HOLD, uav_id)
+            except InvalidValue as error:
+                self._node.get_logger().error(f'its hold is not published: {error}')
+                return
+            publishers[uav_id] = self._node.create_publisher(m.UavHold, topic, LATCHED)
+        publishers[uav_id].publish(msg)
 
     def close(self) -> None:
         """End the thread and the topics."""
         self._closing = True
         self._thread.shutdown(wait=False, cancel_futures=True)
-        for publisher in self._holds.values():
-            self._node.destroy_publisher(publisher)
-        self._holds.clear()
+        for publishers in (self._holds, self._separation_holds):
+            for publisher in publishers.values():
+                self._node.destroy_publisher(publisher)
+            publishers.clear()
         self._node.destroy_publisher(self._proposals)
+        self._node.destroy_publisher(self._alerts)
 
     def _on_approve(self, msg: srv.ApprovePlan.Request,
                     response: srv.ApprovePlan.Response) -> srv.ApprovePlan.Response:

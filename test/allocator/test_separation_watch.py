@@ -1,0 +1,146 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The allocator predicts from reports and lists who comes near whom, and lets one of them hold."""
+import math
+
+import pytest
+from allocation import AllocatorDriver, task as point_task
+
+from uav_task_alloc.model import Task
+from uav_task_alloc.separation.monitor import AlertAction
+
+RULE = {'separation__horizontal': 10.0, 'separation__vertical': 5.0}
+WEST, SOUTH = (-100.0, 0.0, 50.0), (0.0, -102.0, 50.0)
+EAST = {'velocity': (15.0, 0.0, 0.0)}
+NORTH = {'velocity': (0.0, 15.0, 0.0)}
+
+
+class Sky(AllocatorDriver):
+    """Two UAVs whose ways cross in 7 s, u1 from the west and u2 from the south."""
+
+    def __init__(self, first=None, second=None, **params):
+        super().__init__(**{**RULE, **params})
+        self.more = [{'mode': 'ON_MISSION', 'authority': 'HELD', **EAST, **(first or {})},
+                     {'mode': 'ON_MISSION', 'authority': 'HELD', **NORTH, **(second or {})}]
+        self.report()
+        self.add(Task('t1', (200.0, 0.0, 50.0), allowed_uavs=frozenset({'u1'})),
+                 Task('t2', (0.0, 150.0, 50.0), allowed_uavs=frozenset({'u2'})))
+        self.settle(report=False)
+        self.steps = []
+
+    def report(self, west=WEST, south=SOUTH):
+        self.uav('u1', *west, **self.more[0])
+        self.uav('u2', *south, **self.more[1])
+
+    def step(self, wait=0.5):
+        self.now += wait
+        step = self.core.separate(self.now, self.now)
+        self.steps.append(step)
+        return [(hold.uav, hold.hold) for hold in step.holds]
+
+
+def test_the_one_that_is_later_at_its_next_stop_holds_and_goes_on_when_the_other_has_passed():
+    sky = Sky()
+    assert sky.step() == [('u1', True)]
+    alert, = sky.steps[-1].alerts
+    assert (alert.action, alert.holder, alert.uavs) == (AlertAction.HOLD, 'u1', ('u1', 'u2'))
+    assert alert.horizontal < 11.0
+    assert 'u1 holds for u2' in sky.core.separation.texts()['u2']
+    assert sky.step() == []
+    sky.report((-60.0, 0.0, 50.0), (0.0, 40.0, 50.0))
+    assert sky.step() == [('u1', False)]
+    assert sky.steps[-1].alerts[0].action is AlertAction.RELEASE
+    assert sky.core.separation.texts() == {}
+
+
+def test_without_a_rule_nothing_is_predicted():
+    sky = Sky(separation__horizontal=0.0)
+    assert sky.step() == []
+    assert not sky.steps[-1].alerts
+
+
+@pytest.mark.parametrize(('first', 'second', 'holder'), [
+    ({'authority': 'LOST'}, {}, 'u2'), ({}, {'authority': 'SUSPENDED'}, 'u1'),
+    ({'foreign': True}, {}, 'u2'), ({'mode': 'FAULT'}, {}, 'u2')])
+def test_a_uav_of_unknown_plan_keeps_its_way_by_its_velocity(first, second, holder):
+    assert Sky(first, second).step() == [(holder, True)]
+
+
+def test_a_uav_of_a_pilot_is_released_once_and_never_held():
+    sky = Sky()
+    assert sky.step() == [('u1', True)]
+    sky.more[0]['authority'] = 'LOST'
+    sky.report()
+    assert sky.step()[:1] == [('u1', False)]
+    assert not any(hold == ('u1', True) for _ in range(20) for hold in sky.step())
+
+
+def test_a_uav_that_an_operator_holds_stays_and_is_never_let_go():
+    sky = Sky()
+    assert sky.order('PAUSE', 'u1', keep_tasks=True).success
+    sky.more[0] |= {'mode': 'HOLD', 'velocity': (0.0, 0.0, 0.0)}
+    sky.report((-20.0, 0.0, 50.0))
+    assert sky.step() == []
+    sky.report((0.0, 0.0, 50.0))  # in the way of u2
+    assert sky.step() == [('u2', True)]
+    assert all(uav == 'u2' for step in sky.steps for uav, _ in
+               [(hold.uav, hold.hold) for hold in step.holds])
+
+
+def test_one_that_is_low_on_battery_or_lands_keeps_its_way():
+    sky = Sky(second={'battery': 0.1, 'home': (0.0, 200.0, 0.0)})
+    assert sky.step() == [('u1', True)]
+    sky = Sky(first={'battery': 0.1, 'home': (200.0, 0.0, 0.0)})
+    assert sky.step() == [('u2', True)]
+    sky = Sky(first={'mode': 'LANDING', 'velocity': (0.0, 0.0, -1.5), 'home': (0.0, 0.0, 0.0)})
+    sky.report((0.0, 0.0, 61.0))
+    assert sky.step() == [('u2', True)]
+
+
+def test_one_on_the_ground_waits_for_one_that_lands_beside_it():
+    sky = Sky({'mode': 'STANDBY', 'standby': True, 'velocity': (0.0, 0.0, 0.0)},
+              {'mode': 'LANDING', 'velocity': (0.0, 0.0, -1.5), 'home': (5.0, 0.0, 0.0)})
+    sky.report((0.0, 0.0, 0.0), (5.0, 0.0, 20.0))
+    assert sky.step() == [('u1', True)]
+    sky.more[1] |= {'mode': 'STANDBY', 'standby': True}
+    sky.more[1]['available'] = False
+    sky.report((0.0, 0.0, 0.0), (5.0, 0.0, 0.0))
+    assert sky.step() == [('u1', False)]
+
+
+def test_holds_are_renewed_and_expire_within_a_minute():
+    sky = Sky({}, {'authority': 'LOST', 'velocity': (0.0, 0.0, 0.0)})
+    for _ in range(120):
+        sky.report((-60.0, 0.0, 50.0), (0.0, 0.0, 50.0))
+        sky.step()
+    holds = [hold for step in sky.steps for hold in step.holds]
+    assert all(hold.uav == 'u1' and hold.hold for hold in holds)
+    assert len(holds) == 3
+    assert all(math.isclose(hold.expires, hold.stamp + 60.0) for hold in holds)
+
+
+def test_lists_that_are_about_to_be_published_are_predicted_first():
+    sky = Sky()
+    sky.core.separate(sky.now, sky.now)
+    sky.add(point_task(('t3', 300.0, 0.0)))
+    sky.report()
+    problem = None
+    while problem is None:
+        sky.now += 0.1
+        sky.core.tick(sky.now, sky.now)
+        problem = sky.core.due(sky.now, sky.now)
+    take, sky.take = sky.take, lambda: None
+    sky.finish(problem)
+    assert sky.world.outbox.lists
+    before = sky.core.separation._stepped
+    sky.core.separate(sky.now, sky.now)
+    assert sky.core.separation._stepped > before
+    sky.take = take
+
+
+def test_where_no_hold_helps_a_plan_is_asked_for():
+    sky = Sky({'mode': 'TAKEOFF'}, {'authority': 'LOST'})
+    sky.report()
+    sky.step()
+    assert sky.steps[-1].alerts[0].action is AlertAction.UNRESOLVED
+    assert 'u1 takes off' in sky.steps[-1].alerts[0].reason
+    assert 'u1 and u2 lose separation' in str(sky.begin().trigger)

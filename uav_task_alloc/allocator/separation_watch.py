@@ -1,0 +1,185 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What each UAV does next, by its reports, list and holds, for the monitor of separation.
+
+Who keeps its way, the first first: UAVs that the allocator does not fly (a pilot, another station,
+silent), one that an operator holds, one that lands, takes off or is low on battery, one that
+returns; then the one that is earlier at its next stop; last, those on the ground.
+"""
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from itertools import pairwise
+
+from uav_task_alloc.allocator.records import ListStop
+from uav_task_alloc.allocator.replanning.from_now import separation_of
+from uav_task_alloc.allocator.state.fleet import UavRecord
+from uav_task_alloc.allocator.state.flight_pace import FlightPace, UavFlight
+from uav_task_alloc.allocator.state.world import World
+from uav_task_alloc.geometry.polyline import points_passed
+from uav_task_alloc.model import Point
+from uav_task_alloc.separation.monitor import (
+    AlertAction,
+    MonitoredUav,
+    MonitorStep,
+    SeparationMonitor,
+)
+from uav_task_alloc.separation.prediction import HORIZON, Way
+
+_PERIOD = 0.5  # [s] of the published clock between two steps
+_FORGOTTEN = 30.0  # [s] after which a silent UAV is not predicted any more
+_ARMING = 3.0  # [s] on the ground before it climbs
+_FOREIGN, _HELD, _URGENT, _RETURNS, _FLIES, _WAITS = 9.0, 8.0, 5.0, 3.0, 1.0, 0.0  # claims
+_OURS = ('', 'UNKNOWN', 'HELD')  # authority over a UAV in the air that flies its list
+_TimedPoints = list[tuple[float, Point]]
+
+
+class SeparationWatch:
+    """Steps the monitor with the state of the world.
+
+    Args:
+        world: of the allocator.
+    """
+
+    def __init__(self, world: World) -> None:
+        self._world, self.monitor = world, SeparationMonitor()
+        self._stepped = -math.inf  # [s] published clock
+
+    def step(self, now: float, stamp: float, lists_changed: bool) -> MonitorStep:
+        """Predict and decide, where it is time or lists have changed.
+
+        Args:
+            now: [s] steady clock.
+            stamp: [s] published clock.
+            lists_changed: some are about to be published: what they need comes first.
+
+        Returns:
+            What is to be published.
+        """
+        rule = separation_of(self._world.params)
+        due = lists_changed or not 0.0 <= stamp - self._stepped < _PERIOD
+        if not due or not (rule.on or self.monitor.holding or self.monitor.alerts):
+            return MonitorStep()
+        self._stepped = stamp
+        uavs = {uav_id: each for uav_id, record in self._world.uav_records().items()
+                if (each := self._monitored(uav_id, record, now, stamp)) is not None}
+        step = self.monitor.step(stamp, uavs, rule)
+        for alert in step.alerts:
+            self._world.note(alert.text, warning=alert.action in (AlertAction.HOLD,
+                                                                  AlertAction.UNRESOLVED))
+        for one, other in step.unresolved:
+            self._world.request_replan(f'{one} and {other} lose separation', now)
+        return step
+
+    def texts(self) -> dict[str, str]:
+        """Return what is predicted for each UAV, by id."""
+        found: dict[str, str] = {}
+        for pair, alert in self.monitor.alerts.items():
+            if alert.action is not AlertAction.RELEASE:
+                for uav_id in pair:
+                    found[uav_id] = '; '.join(filter(None, (found.get(uav_id), alert.text)))
+        return found
+
+    def _monitored(self, uav_id: str, record: UavRecord, now: float, stamp: float
+                   ) -> MonitoredUav | None:
+        """A UAV with what it does next; None: it is on the ground to stay, or lost."""
+        report, flight = record.report, self._world.flights.of(uav_id, stamp)
+        hold = self._world.orders.holds.get(uav_id)
+        is_held = hold is not None and hold.hold
+        if (record.silent and now - record.received > _FORGOTTEN) or flight is None:
+            return None
+        if report.standby:
+            stops = self._stops(uav_id, stamp, flight)
+            if not stops or is_held or not self._world.usable(uav_id):
+                return None
+            return MonitoredUav(self._way(record, self._list_points(uav_id, stops, flight)),
+                                (_WAITS, -stops[0].start))
+        if record.silent or report.foreign or report.mode == 'FAULT' or (
+                report.authority not in _OURS):
+            why = 'is silent' if record.silent else 'is not flown by the allocator'
+            return MonitoredUav(self._way(record, _drift(record)), (_FOREIGN,), False,
+                                f'{uav_id} {why}')
+        if is_held:
+            return MonitoredUav(self._way(record, [(0.0, report.position)]), (_HELD,), False,
+                                f'an operator holds {uav_id}')
+        return self._flying(uav_id, record, flight, stamp)
+
+    def _flying(self, uav_id: str, record: UavRecord, flight: UavFlight, stamp: float
+                ) -> MonitoredUav:
+        """A UAV that flies for the allocator."""
+        mode, place = record.report.mode, record.report.position
+        if mode == 'LANDING':
+            end = (place[0], place[1], min(place[2], record.home[2]))
+            down = [(0.0, place), (flight.pace.seconds((place, end)), end)]
+            return MonitoredUav(self._way(record, down), (_URGENT,), False, f'{uav_id} lands')
+        stops = self._stops(uav_id, stamp, flight)
+        returns = mode == 'RETURNING' or (not stops and self._world.list_of(uav_id).returns)
+        if record.low or returns:
+            way = self._way(record, _home([(0.0, place)], record, flight.pace))
+            return MonitoredUav(way, (_URGENT if record.low else _RETURNS,), not record.low,
+                                f'{uav_id} is low on battery' if record.low else '')
+        points = self._list_points(uav_id, stops, flight)
+        if mode == 'TAKEOFF':
+            return MonitoredUav(self._way(record, points), (_URGENT,), False,
+                                f'{uav_id} takes off')
+        if not stops:
+            points = [(0.0, place)] if mode == 'HOLD' else _drift(record)
+        return MonitoredUav(self._way(record, points),
+                            (_FLIES, -stops[0].start if stops else -math.inf), bool(stops))
+
+    def _way(self, record: UavRecord, points: _TimedPoints) -> Way:
+        report = record.report
+        return Way(tuple(points), math.hypot(*(report.velocity or (0.0,))),
+                   report.standby, report.hold_radius, record.home)
+
+    def _stops(self, uav_id: str, stamp: float, flight: UavFlight) -> tuple[ListStop, ...]:
+        """The open stops of the list in force, with their times from now."""
+        return tuple(stop for stop in self._world.lists.restamped(uav_id, stamp, flight).stops
+                     if self._world.tasks.is_open(stop.task.id))
+
+    def _list_points(self, uav_id: str, stops: Sequence[ListStop], flight: UavFlight
+                     ) -> _TimedPoints:
+        """Where a UAV is and when [s from now], along the stops of the next 30 s."""
+        place, clock = flight.position, _ARMING if flight.on_ground else 0.0
+        points = [(0.0, place), (clock, place)] if flight.on_ground else [(0.0, place)]
+        for k, stop in enumerate(stops):
+            leg = (*stop.leg.via, stop.task.position)
+            if k == 0:
+                leg = leg[points_passed(place, leg):]
+                if flight.on_ground:
+                    leg = ((place[0], place[1], max(place[2], leg[0][2])), *leg)
+            for timed in _along(place, leg, clock, flight.pace):
+                points.append(timed)
+            place, clock = stop.task.position, max(points[-1][0], stop.finish)
+            points.append((clock, place))
+            if clock > HORIZON:
+                return points
+        each, record = self._world.list_of(uav_id), self._world.uav_records()[uav_id]
+        return _home(points, record, flight.pace, each.end_via) if each.returns else points
+
+
+def _along(start: Point, points: Sequence[Point], clock: float, pace: FlightPace
+           ) -> Iterator[tuple[float, Point]]:
+    """Points of a leg with the times [s] at which they are reached."""
+    for one, other in pairwise((start, *points)):
+        clock += pace.seconds((one, other))
+        yield clock, other
+
+
+def _home(points: _TimedPoints, record: UavRecord, pace: FlightPace,
+          via: Sequence[Point] = ()) -> _TimedPoints:
+    """The points, and then the way home at the height of the last one, and down."""
+    clock, place = points[-1]
+    home = record.home
+    above = (home[0], home[1], max(home[2], (via[-1] if via else place)[2]))
+    return [*points, *_along(place, (*via, above, home), clock, pace)]
+
+
+def _drift(record: UavRecord) -> _TimedPoints:
+    """Where its velocity takes a UAV, down to the height of its home."""
+    x, y, z = record.report.position
+    vx, vy, vz = record.report.velocity or (0.0, 0.0, 0.0)
+    low = min(z, record.home[2])
+    ends = [HORIZON] if z + vz * HORIZON >= low else [(low - z) / vz, HORIZON]
+    return [(0.0, (x, y, z)), *((t, (x + vx * t, y + vy * t, max(low, z + vz * t)))
+                                for t in ends)]
