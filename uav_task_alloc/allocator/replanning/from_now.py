@@ -31,6 +31,9 @@ def separation_of(params: AllocatorParams) -> Separation:
 
     Args:
         params: with its distances.
+
+    Returns:
+        Not on where `separation.horizontal` is 0.
     """
     return Separation(params.separation__horizontal, params.separation__vertical,
                       params.separation__time)
