@@ -37,7 +37,15 @@ _FRAME_LOCAL, _FRAME_WGS84 = 0, 1  # of a Task message
 
 
 def constant_name(names: tuple[str, ...], value: int) -> str:
-    """The name of a constant by its value; '' for an unknown value."""
+    """Return the name of a constant by its value.
+
+    Args:
+        names: by value.
+        value: of a message.
+
+    Returns:
+        '' for an unknown value.
+    """
     return names[value] if value < len(names) else ''
 
 
