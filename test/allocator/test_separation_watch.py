@@ -138,8 +138,8 @@ def test_lists_that_are_about_to_be_published_are_predicted_first():
 
 
 def test_where_no_hold_helps_a_plan_is_asked_for():
-    sky = Sky({'mode': 'TAKEOFF'}, {'authority': 'LOST'})
-    sky.report()
+    sky = Sky({'mode': 'TAKEOFF', 'home': (-100.0, 0.0, 0.0)}, {'authority': 'LOST'})
+    sky.report((0.0, 5.0, 50.0))
     sky.step()
     assert sky.steps[-1].alerts[0].action is AlertAction.UNRESOLVED
     assert 'u1 takes off' in sky.steps[-1].alerts[0].reason

@@ -18,6 +18,7 @@ from uav_task_alloc.allocator.state.flight_pace import FlightPace, UavFlight
 from uav_task_alloc.allocator.state.world import World
 from uav_task_alloc.geometry.polyline import points_passed
 from uav_task_alloc.model import Point
+from uav_task_alloc.params import BridgeParams
 from uav_task_alloc.separation.monitor import (
     AlertAction,
     MonitoredUav,
@@ -29,6 +30,9 @@ from uav_task_alloc.separation.prediction import HORIZON, Way
 _PERIOD = 0.5  # [s] of the published clock between two steps
 _FORGOTTEN = 30.0  # [s] after which a silent UAV is not predicted any more
 _ARMING = 3.0  # [s] on the ground before it climbs
+_SETS_OUT = 4.0  # [s] between the end of a take-off and the leg
+_ACCELERATION = 2.5  # [m/s2]
+_CLIMBS_ON = 5.0  # [s] for which a take-off goes on at least
 _FOREIGN, _HELD, _URGENT, _RETURNS, _FLIES, _WAITS = 9.0, 8.0, 5.0, 3.0, 1.0, 0.0  # claims
 _OURS = ('', 'UNKNOWN', 'HELD')  # authority over a UAV in the air that flies its list
 _TimedPoints = list[tuple[float, Point]]
@@ -92,8 +96,8 @@ class SeparationWatch:
             stops = self._stops(uav_id, stamp, flight)
             if not stops or is_held or not self._world.usable(uav_id):
                 return None
-            return MonitoredUav(self._way(record, self._list_points(uav_id, stops, flight)),
-                                (_WAITS, -stops[0].start))
+            way = self._way(record, self._list_points(uav_id, stops, flight, True))
+            return MonitoredUav(way, (_WAITS, -stops[0].start), early=True)
         if record.silent or report.foreign or report.mode == 'FAULT' or (
                 report.authority not in _OURS):
             why = 'is silent' if record.silent else 'is not flown by the allocator'
@@ -117,11 +121,12 @@ class SeparationWatch:
         if record.low or returns:
             way = self._way(record, _home([(0.0, place)], record, flight.pace))
             return MonitoredUav(way, (_URGENT if record.low else _RETURNS,), not record.low,
-                                f'{uav_id} is low on battery' if record.low else '')
+                                f'{uav_id} is low on battery' if record.low else '', early=True)
+        if mode == 'TAKEOFF':  # for how long is not known
+            top = _climbed(record, stops[0].task.position[2] if stops else place[2])
+            up = [(0.0, place), (flight.pace.seconds((place, top)), top)]
+            return MonitoredUav(self._way(record, up), (_URGENT,), False, f'{uav_id} takes off')
         points = self._list_points(uav_id, stops, flight)
-        if mode == 'TAKEOFF':
-            return MonitoredUav(self._way(record, points), (_URGENT,), False,
-                                f'{uav_id} takes off')
         if not stops:
             points = [(0.0, place)] if mode == 'HOLD' else _drift(record)
         return MonitoredUav(self._way(record, points),
@@ -137,25 +142,43 @@ class SeparationWatch:
         return tuple(stop for stop in self._world.lists.restamped(uav_id, stamp, flight).stops
                      if self._world.tasks.is_open(stop.task.id))
 
-    def _list_points(self, uav_id: str, stops: Sequence[ListStop], flight: UavFlight
-                     ) -> _TimedPoints:
+    def _list_points(self, uav_id: str, stops: Sequence[ListStop], flight: UavFlight,
+                     climbs: bool = False) -> _TimedPoints:
         """Where a UAV is and when [s from now], along the stops of the next 30 s."""
-        place, clock = flight.position, _ARMING if flight.on_ground else 0.0
-        points = [(0.0, place), (clock, place)] if flight.on_ground else [(0.0, place)]
+        record = self._world.uav_records()[uav_id]
+        place = flight.position
+        clock = _ARMING if flight.on_ground else 0.0 if climbs else _lag(record, flight.pace)
+        points = [(0.0, place), (clock, place)]
         for k, stop in enumerate(stops):
             leg = (*stop.leg.via, stop.task.position)
             if k == 0:
                 leg = leg[points_passed(place, leg):]
-                if flight.on_ground:
-                    leg = ((place[0], place[1], max(place[2], leg[0][2])), *leg)
+                if climbs:
+                    top = _climbed(record, leg[0][2])
+                    clock += flight.pace.seconds((place, top))
+                    points += [(clock, top), (clock + _SETS_OUT, top)]
+                    place, clock = top, clock + _SETS_OUT
             for timed in _along(place, leg, clock, flight.pace):
                 points.append(timed)
             place, clock = stop.task.position, max(points[-1][0], stop.finish)
             points.append((clock, place))
             if clock > HORIZON:
                 return points
-        each, record = self._world.list_of(uav_id), self._world.uav_records()[uav_id]
+        each = self._world.list_of(uav_id)
         return _home(points, record, flight.pace, each.end_via) if each.returns else points
+
+
+def _climbed(record: UavRecord, height: float) -> Point:
+    """Where a take-off ends: the bridge climbs to `cruise_altitude`, whatever the leg."""
+    x, y, z = record.report.position
+    rise = (record.report.velocity or (0.0, 0.0, 0.0))[2]
+    return x, y, max(z + _CLIMBS_ON * rise, height, record.home[2] + BridgeParams.cruise_altitude)
+
+
+def _lag(record: UavRecord, pace: FlightPace) -> float:
+    """By how much a UAV that has to speed up first is behind one that flies already [s]."""
+    speed = math.hypot(*(record.report.velocity or (0.0,)))
+    return max(0.0, pace.speed - speed) / (2.0 * _ACCELERATION)
 
 
 def _along(start: Point, points: Sequence[Point], clock: float, pace: FlightPace

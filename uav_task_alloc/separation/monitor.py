@@ -41,11 +41,17 @@ class MonitoredUav:
     claim: tuple[float, ...] = ()  # of two the one with the greater claim keeps its way
     may_hold: bool = True  # it obeys a hold, and none else is in force
     why_not: str = ''  # why it may not
+    early: bool = False  # it holds as soon as a loss is predicted: later it cannot, or may not
 
 
 @dataclass(frozen=True, slots=True)
 class SeparationAlert:
-    """Two UAVs that would lose separation, and what is done about it."""
+    """Two UAVs that would lose separation, and what is done about it.
+
+    Attributes:
+        uavs: ids, in alphabetical order.
+        action: what is done.
+    """
 
     uavs: UavPair
     horizontal: float  # [m] when they are nearest, as predicted
@@ -149,7 +155,11 @@ class SeparationMonitor:
         losses = predicted.losses()
         for pair, loss in sorted(losses.items(), key=lambda row: (row[1].begins, row[0])):
             self._decide(pair, loss, uavs, predicted)
-        self._end_alerts(stamp, losses)
+        lost = predicted.lost_now()
+        for pair, loss in lost.items():
+            if pair not in losses and not any(name in self._holds for name in pair):
+                self._publish(pair, loss, AlertAction.NONE, '', 'they do not come nearer')
+        self._end_alerts(stamp, {*losses, *lost})
         self._renew()
         return self._step
 
@@ -161,7 +171,8 @@ class SeparationMonitor:
         for uav_id in sorted(self._holds, key=lambda name: (uavs[name].claim, name),
                              reverse=True):
             blocked = predicted.losses_of(uav_id, holds=False, wide=True)
-            ahead = {other for other, loss in blocked.items() if loss.begins < _CLEAR}
+            ahead = {other for other, loss in blocked.items()
+                     if loss.begins < _CLEAR or uavs[uav_id].early or uavs[other].early}
             if not ahead:
                 self._release(uav_id, 'its way is free')
                 predicted.set_holding(uav_id, False)
@@ -184,7 +195,8 @@ class SeparationMonitor:
                 predicted: FlightPredictions) -> None:
         """Decide who of a pair holds, if it is time."""
         holders = [name for name in pair if name in self._holds]
-        if loss.begins > _ACT and not holders:
+        early = any(uavs[name].early and uavs[name].may_hold for name in pair)
+        if loss.begins > _ACT and not holders and not early:
             self._publish(pair, loss, AlertAction.NONE, '', 'there is time')
             return
         current = predicted.loss(*pair)  # holds of this step count
@@ -228,7 +240,7 @@ class SeparationMonitor:
         known = self._alerts.get(pair)
         stops = [name for name in pair if uavs[name].may_hold]
         nearer = [name for name in stops if name not in self._holds
-                  and loss.begins <= _ACT and predicted.delays(pair)]
+                  and loss.begins <= _ACT and predicted.delays(pair, stops)]
         for name in nearer:
             other = pair[0] if pair[1] == name else pair[1]
             self._begin(name, other, f'{name} stops: no way past {other} is free')

@@ -20,7 +20,10 @@ _REACTION = 2.0  # [s] until a hold that is published is flown
 _BRAKING = 2.5  # [m/s2]
 _MARGIN = 1.0  # [m] horizontally, for positions between the points and errors of them
 _SLACK = 0.3  # [m] vertically: plans keep the vertical distance exactly, autopilots nearly
-_CAUTION = 1.15  # times the horizontal distance that a UAV needs to go on
+_NEARER = 1.0  # [m] by which two that are too near already come nearer
+_SOONER = 0.5  # [s] by which a loss begins earlier
+# times the horizontal distance, and [s] more of time, that a UAV needs to go on
+_CAUTION, _PATIENCE = 1.15, 2.0
 _Floats = NDArray[np.float64]
 
 
@@ -79,6 +82,18 @@ class FlightPredictions:
                 found[a, b] = loss
         return found
 
+    def lost_now(self) -> dict[tuple[str, str], PredictedLoss]:
+        """Return the pairs that are not apart now."""
+        found = {}
+        for a, b in self._near_pairs():
+            one, two = self._path(a, a in self._holding), self._path(b, b in self._holding)
+            apart = math.hypot(one[0, 0] - two[0, 0], one[0, 1] - two[0, 1])
+            above = abs(float(one[0, 2] - two[0, 2]))
+            if not self._rule.keeps(apart, above) and not (
+                    self._on_pad(a, one)[0] and self._on_pad(b, two)[0]):
+                found[a, b] = PredictedLoss(0.0, apart, above)
+        return found
+
     def losses_of(self, uav_id: str, holds: bool, wide: bool = False) -> dict[str, PredictedLoss]:
         """Return the losses of one UAV that holds or goes on, by the id of the other one.
 
@@ -109,13 +124,20 @@ class FlightPredictions:
         return other not in then and all(
             name in now and now[name].begins <= loss.begins for name, loss in then.items())
 
-    def delays(self, pair: tuple[str, str]) -> bool:
-        """Return whether stopping both keeps two UAVs farther apart than going on."""
+    def delays(self, pair: tuple[str, str], stops: Collection[str]) -> bool:
+        """Return whether two UAVs come no nearer, and no sooner, where some of them stop.
+
+        Args:
+            pair: ids.
+            stops: those of the pair that hold.
+        """
         a, b = pair
-        both = self._between(a, self._path(a, True), True, b, other_holds=True)
+        stopped = self._between(a, self._path(a, a in stops or a in self._holding), a in stops, b,
+                                other_holds=b in stops or b in self._holding)
         current = self.loss(a, b)
-        return both is None or (current is not None and both.begins >= current.begins
-                                and both.horizontal >= current.horizontal)
+        return stopped is None or (current is not None
+                                   and stopped.horizontal > current.horizontal - _NEARER
+                                   and stopped.begins > current.begins - _SOONER)
 
     def _path(self, uav_id: str, holds: bool) -> _Floats:
         return (self._stay if holds else self._go)[uav_id]
@@ -128,7 +150,7 @@ class FlightPredictions:
         horizontal = self._rule.horizontal * (_CAUTION if wide else 1.0) + _MARGIN
         horizontal += 2.0 * (holds * self._ways[uav_id].hold_radius
                              + other_holds * self._ways[other].hold_radius)
-        shifts = max(0, round(self._rule.time / _DT))
+        shifts = round((self._rule.time + wide * _PATIENCE) / _DT)
         if holds and other_holds:
             shifts = 0
         return _first_loss(own, theirs, horizontal, self._rule.vertical - _SLACK, shifts,
@@ -188,8 +210,14 @@ def _stopping(way: Way, times: _Floats, holding: bool) -> _Floats:
 
 def _first_loss(a: _Floats, b: _Floats, horizontal: float, vertical: float, shifts: int,
                 exempt: NDArray[np.bool_]) -> PredictedLoss | None:
-    """The loss of two paths, each of which may be early or late; None: they stay apart."""
+    """The loss of two paths, each of which may be early or late; None: they stay apart.
+
+    Where it is lost already, it counts only if they come nearer: both may fly apart.
+    """
     first, nearest, best = math.inf, (0.0, 0.0), math.inf
+    now = math.hypot(a[0, 0] - b[0, 0], a[0, 1] - b[0, 1])
+    if now < horizontal and abs(a[0, 2] - b[0, 2]) < vertical and not exempt[0]:
+        horizontal, shifts = max(0.0, now - _NEARER), 0
     for shift in range(0, shifts + 1, _SHIFT):
         for one, two in _pairs(a, b, shift):
             apart = np.hypot(one[:, 0] - two[:, 0], one[:, 1] - two[:, 1])

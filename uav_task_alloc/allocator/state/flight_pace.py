@@ -65,7 +65,14 @@ class FlightPace:
         return max(along + rest, _SLOWEST * self.speed)
 
     def seconds(self, points: Sequence[Point]) -> float:
-        """Return the time along a polyline [m] ENU, without stops [s]."""
+        """Return the time along a polyline, without stops.
+
+        Args:
+            points: [m] ENU.
+
+        Returns:
+            [s].
+        """
         total = 0.0
         for (x, y, z), (x1, y1, z1) in pairwise(points):
             dx, dy, dz = x1 - x, y1 - y, z1 - z
