@@ -176,7 +176,7 @@ def _climbed(record: UavRecord, height: float) -> Point:
 
 
 def _lag(record: UavRecord, pace: FlightPace) -> float:
-    """By how much a UAV that has to speed up first is behind one that flies already [s]."""
+    """The time [s] that a UAV loses by speeding up first."""
     speed = math.hypot(*(record.report.velocity or (0.0,)))
     return max(0.0, pace.speed - speed) / (2.0 * _ACCELERATION)
 
