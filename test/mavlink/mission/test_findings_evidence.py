@@ -167,6 +167,17 @@ def test_a_reboot_before_a_service_is_over_completes_nothing(seconds, completed)
     assert list(flight.table.completed) == completed
 
 
+def test_the_end_of_a_mission_in_silence_is_known_when_the_link_is_back():
+    bench = flying('px4', 'AB')
+    assert bench.run(lambda: len(bench.completed()) == 1)
+    assert bench.run(lambda: distance(bench, (100.0, 100.0, 50.0)) < 15.0)
+    bench.line.cut = True
+    assert bench.run(lambda: len(places(bench)) == 2)
+    bench.run(limit=15.0)  # it repeats REACHED for 10 s
+    bench.line.cut = False
+    assert bench.run(lambda: bench.completed() == ['A', 'B'], 20.0)
+
+
 def test_where_it_comes_to_rest_when_it_is_held_for_an_upload_is_no_evidence():
     place = (0.0, 100.0, 50.0)
     bench = flying('ardupilot', 'ABC')

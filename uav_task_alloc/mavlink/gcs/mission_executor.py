@@ -169,9 +169,8 @@ class MissionExecutor:
 
     def drop_flown(self, tasks: Sequence[Task], other: str) -> None:
         """Complete tasks of the list that UAV `other` has flown while the bridge was down."""
-        for task in tasks:
-            self.notes.append(OperatorNote(
-                'info', f'{task.id} was flown by {other} while the bridge was down'))
+        self.notes += [OperatorNote('info', f'{task.id} was flown by {other} while the bridge '
+                                    'was down') for task in tasks]
         self.onboard.progress.complete_offline(tasks)
 
     def hand_over(self, operator: str, now: float) -> str:
@@ -266,8 +265,9 @@ class MissionExecutor:
                                       self.telemetry.mission_restarted)
             elif flying:
                 self.onboard.note_flown_unset(seq, now)
-            if (message.mission_state == d.MISSION_STATE_COMPLETE and flying
-                    and not self.profile.atomic):  # PX4 reports it after a take-off too
+            may_have_ended = flying if not self.profile.atomic else (  # PX4: after a take-off too
+                self.telemetry.airborne and progress.may_have_ended_unseen(seq))
+            if may_have_ended and message.mission_state == d.MISSION_STATE_COMPLETE:
                 progress.note_mission_complete(seq, now, self.telemetry.frame)
             if not self.sender.busy and not self.onboard.open:
                 self.onboard.watch(message, now)

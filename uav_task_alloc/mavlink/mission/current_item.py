@@ -89,6 +89,12 @@ class CurrentItem:
         self.in_mission = True
         self._in_mission_at = self._positions.path.newest
 
+    @property
+    def left_unseen(self) -> bool:
+        """Whether it has left mission mode while no position came."""
+        begin, end = self._left_unseen
+        return not self.in_mission and begin <= end == self._left_at
+
     def note_other_mode(self, now: float) -> None:
         """Note that the vehicle is not in mission mode, by whichever command."""
         if not self.in_mission:

@@ -271,6 +271,10 @@ class ProgressTable:
         """Take a MISSION_CURRENT; see `CurrentItem.note_report`."""
         self._moves.note_report(seq, now, flying, frame, restarted)
 
+    def may_have_ended_unseen(self, seq: int) -> bool:
+        """Whether it left mission mode while no position came, with item `seq` as the last."""
+        return seq == self.last_flown and self._moves.left_unseen
+
     def note_mission_complete(self, seq: int, now: float, frame: int | None = None) -> None:
         """Take the vehicle's report that its mission is complete up to item `seq`."""
         self._moves.note_mission_complete(seq, now, frame)
