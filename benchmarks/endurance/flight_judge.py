@@ -33,6 +33,15 @@ def acts(message: Message) -> bool:
         kind in ('COMMAND_LONG', 'COMMAND_INT') and message.command in ACTS)
 
 
+def shows_armed(message: Message) -> bool:
+    """Whether a message of a vehicle shows that it was armed."""
+    if message.get_type() == 'HEARTBEAT':
+        return bool(message.base_mode & d.MAV_MODE_FLAG_SAFETY_ARMED)
+    return message.get_type() == 'COMMAND_ACK' and bool(
+        message.command == d.MAV_CMD_COMPONENT_ARM_DISARM
+        and message.result == d.MAV_RESULT_ACCEPTED)
+
+
 class Judge:
     """Follows one flight tick by tick."""
 
@@ -54,6 +63,8 @@ class Judge:
         self._armed = False  # ever
         self._commanded: dict[int, float] = {}  # modes commanded by the bridge, at [s]
         self._commanded_arm, self._taken_by_arm = -math.inf, False
+        self._armed_at, self._shown_armed = -math.inf, False  # [s]; by a delivered frame since
+        self._taken_by_disarm = self._news = False  # a heartbeat since it was taken was delivered
         self._events = 0
         self._forgot = False  # the bridge, until its first heartbeat
         self._set_at = -math.inf  # [s] another station has set the current item
@@ -90,6 +101,7 @@ class Judge:
             self._truth(event)
         for sent, message in self.world.delivered:
             self._evidence.delivered(sent, message)
+            self._shown_armed |= sent >= self._armed_at and shows_armed(message)
         if self.world.now - self._set_at < PASSED:
             self._crossed.update(name for name, place in self.places.items() if math.dist(
                 place, self.world.vehicle.flight.body.position) < NEAR)
@@ -97,8 +109,11 @@ class Judge:
             self._forgot = False
             if self.world.vehicle.flight.landed:
                 self.taken_at = self.known_at = None
-        for sent in self.world.arrivals:
-            if self.known_at is None and self.taken_at is not None and sent > self.taken_at + 1e-6:
+        if self.taken_at is not None:
+            self._news |= any(sent > self.taken_at + 1e-6 for sent in self.world.arrivals)
+            # a disarming is no news where no frame has shown it armed
+            if self.known_at is None and self._news and (
+                    self._shown_armed or not self._taken_by_disarm):
                 self.known_at = self.world.now
         for now, message in self.world.sent:
             self._sent(now, message)
@@ -109,6 +124,8 @@ class Judge:
         return mode_class(self.family, mode)
 
     def _truth(self, event: TruthEvent) -> None:
+        if event.name == 'armed':
+            self._armed_at, self._shown_armed = event.t, False
         if event.name == 'item_reached':
             self._item_reached(event)
         elif event.name == 'mode' and event.mode is not None:
@@ -124,12 +141,17 @@ class Judge:
                 event.name in ('armed', 'disarmed') and event.cause not in (OURS, 'self')):
             self._armed = True
             if event.name != 'armed' or event.t - self._commanded_arm > SAME:
+                fresh = self.taken_at is None
                 self._take(event.t)
                 self._taken_by_arm = event.name == 'armed'
+                self._taken_by_disarm = event.name == 'disarmed' and (
+                    fresh or self._taken_by_disarm)
         elif event.name == 'command' and event.command == 'set current' and event.cause != OURS:
             self._set_at = event.t
         elif event.name == 'armed':
             self._armed = True
+            if self._taken_by_disarm and self.known_at is None:
+                self.taken_at = None  # a disarming that no frame has shown is undone
         elif event.name == 'failsafe':
             self.failing = True
         elif event.name == 'failsafe_over':
@@ -181,6 +203,7 @@ class Judge:
             return  # booting: a mode is no intervention
         if self.taken_at is None:
             self.taken_at, self.known_at = when, None
+            self._taken_by_disarm = self._news = False
 
     def _sent(self, now: float, message: Message) -> None:
         if not acts(message):

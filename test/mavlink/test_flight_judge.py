@@ -10,12 +10,13 @@ from pymavlink.dialects.v20 import ardupilotmega as d
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / 'benchmarks' / 'endurance'))
 
 from flight_evidence import DeliveredEvidence
+from flight_judge import OURS, Judge
 from flights import Flight
 
 from uav_task_alloc.mavlink.gcs.onboard_mission import OnboardMission
 from uav_task_alloc.mavlink.mission.completed_tasks import CompletedTasks
 from uav_task_alloc.mavlink.mission.progress import ProgressTable
-from uav_task_alloc.sim.config import FlightMode
+from uav_task_alloc.sim.config import FlightMode, TruthEvent
 
 PLACE, AWAY = (100.0, 0.0, 50.0), (160.0, 0.0, 50.0)
 REACHED_AT = 10.0  # [s]
@@ -100,6 +101,42 @@ def test_a_reached_of_the_next_item_at_that_index_is_no_evidence():
     assert 'B' not in evidence.known
     evidence.delivered(14.9, d.MAVLink_mission_item_reached_message(2))
     assert 'B' in evidence.known
+
+
+def heartbeat(armed):
+    return d.MAVLink_heartbeat_message(
+        d.MAV_TYPE_QUADROTOR, d.MAV_AUTOPILOT_PX4, d.MAV_MODE_FLAG_SAFETY_ARMED * armed, 0,
+        d.MAV_STATE_STANDBY, 3)
+
+
+def arm_command():
+    return d.MAVLink_command_long_message(
+        1, 1, d.MAV_CMD_COMPONENT_ARM_DISARM, 0, 1, 0, 0, 0, 0, 0, 0)
+
+
+@pytest.mark.parametrize(('shown', 'overridden'), [
+    (None, False), (heartbeat(True), True),
+    (d.MAVLink_command_ack_message(d.MAV_CMD_COMPONENT_ARM_DISARM, d.MAV_RESULT_ACCEPTED), True)])
+def test_a_disarming_is_no_news_where_no_frame_has_shown_it_armed(shown, overridden):
+    flight = SimpleNamespace(
+        body=SimpleNamespace(position=AWAY, velocity=(0.0, 0.0, 0.0)), custom_mode=0, seq=0,
+        booted=0.0, mode=FlightMode.HOLD, items=[], landed=True, track=None,
+        system_status=d.MAV_STATE_STANDBY)
+    world = SimpleNamespace(now=0.0, vehicle=SimpleNamespace(flight=flight), events=[],
+                            tasks=None, state=None)
+    judge = Judge(world, 'px4', {})
+    for now, event, frame, sent in (
+            (1.0, ('armed', OURS), shown, None), (1.1, ('disarmed', 'pilot'), None, None),
+            (2.0, None, heartbeat(False), None), (2.1, None, None, arm_command()),
+            (2.2, ('armed', OURS), None, None), (3.0, None, heartbeat(True), None),
+            (3.1, None, None, arm_command())):
+        world.now = now
+        world.truth = [TruthEvent(now, event[0], AWAY, cause=event[1])] if event else []
+        world.delivered = [(now, frame)] if frame else []
+        world.arrivals = [now] if frame and frame.get_type() == 'HEARTBEAT' else []
+        world.sent = [(now, sent)] if sent else []
+        judge.step()
+    assert bool(judge.counts['overridden']) is overridden
 
 
 def fly_random(monkeypatch, number, break_bridge):
