@@ -20,6 +20,7 @@ LONGEST_HOLD = 60.0  # [s] of a hold that is not renewed
 _RENEWED_AFTER = 20.0  # [s]
 _ACT = 12.0  # [s] before a loss within which somebody holds: it stops in about 7 s
 _CLEAR = 20.0  # [s] for which the way of a UAV that holds has to be free
+_ASK_AGAIN = 10.0  # [s] between two plans that are asked for because of one pair
 _CALM = 2.0  # [s] without the prediction of a loss after which it is over
 UavPair = tuple[str, str]  # ids in alphabetical order
 
@@ -100,7 +101,7 @@ class MonitorStep:
 
     holds: list[SeparationHold] = field(default_factory=list)  # to publish
     alerts: list[SeparationAlert] = field(default_factory=list)  # to publish
-    unresolved: list[UavPair] = field(default_factory=list)  # new ones: a plan may help
+    unresolved: list[UavPair] = field(default_factory=list)  # a plan may help, asked again
 
 
 @dataclass(slots=True)
@@ -117,6 +118,7 @@ class SeparationMonitor:
     def __init__(self) -> None:
         self._holds: dict[str, _Hold] = {}
         self._alerts: dict[UavPair, _Alerted] = {}
+        self._asked: dict[UavPair, float] = {}  # [s] stamp of the last plan asked for
         self._step = MonitorStep()
         self._stamp = 0.0
 
@@ -252,7 +254,9 @@ class SeparationMonitor:
             (name for name in pair if name in self._holds), '')
         self._publish(pair, loss, AlertAction.UNRESOLVED, holder,
                       'no hold keeps them apart, ' + text + (f' ({why})' if why else ''))
-        if known is None or known.alert.action is not AlertAction.UNRESOLVED:
+        if known is None or known.alert.action is not AlertAction.UNRESOLVED or not (
+                0.0 <= self._stamp - self._asked.get(pair, -math.inf) < _ASK_AGAIN):
+            self._asked[pair] = self._stamp
             self._step.unresolved.append(pair)
 
     # what is published
@@ -276,6 +280,7 @@ class SeparationMonitor:
                 each.seen = stamp
             elif not 0.0 <= stamp - each.seen < _CALM:
                 del self._alerts[pair]
+                self._asked.pop(pair, None)
                 if each.alert.action is not AlertAction.RELEASE:
                     self._step.alerts.append(SeparationAlert(
                         pair, math.inf, math.inf, 0.0, AlertAction.NONE, '',

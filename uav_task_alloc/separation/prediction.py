@@ -25,6 +25,7 @@ _SOONER = 0.5  # [s] by which a loss begins earlier
 # times the horizontal distance, and [s] more of time, that a UAV needs to go on
 _CAUTION, _PATIENCE = 1.15, 2.0
 _Floats = NDArray[np.float64]
+_Flags = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, slots=True)
@@ -154,9 +155,9 @@ class FlightPredictions:
         if holds and other_holds:
             shifts = 0
         return _first_loss(own, theirs, horizontal, self._rule.vertical - _SLACK, shifts,
-                           self._on_pad(uav_id, own) & self._on_pad(other, theirs))
+                           self._on_pad(uav_id, own), self._on_pad(other, theirs))
 
-    def _on_pad(self, uav_id: str, path: _Floats) -> NDArray[np.bool_]:
+    def _on_pad(self, uav_id: str, path: _Floats) -> _Flags:
         """Where on a path it is low over its pad: pads may be nearer than the rule."""
         pad = self._ways[uav_id].pad
         if pad is None:
@@ -209,20 +210,23 @@ def _stopping(way: Way, times: _Floats, holding: bool) -> _Floats:
 
 
 def _first_loss(a: _Floats, b: _Floats, horizontal: float, vertical: float, shifts: int,
-                exempt: NDArray[np.bool_]) -> PredictedLoss | None:
+                a_on_pad: _Flags, b_on_pad: _Flags) -> PredictedLoss | None:
     """The loss of two paths, each of which may be early or late; None: they stay apart.
 
     Where it is lost already, it counts only if they come nearer: both may fly apart.
     """
     first, nearest, best = math.inf, (0.0, 0.0), math.inf
     now = math.hypot(a[0, 0] - b[0, 0], a[0, 1] - b[0, 1])
-    if now < horizontal and abs(a[0, 2] - b[0, 2]) < vertical and not exempt[0]:
+    if now < horizontal and abs(a[0, 2] - b[0, 2]) < vertical and not (
+            a_on_pad[0] and b_on_pad[0]):
         horizontal, shifts = max(0.0, now - _NEARER), 0
     for shift in range(0, shifts + 1, _SHIFT):
-        for one, two in _pairs(a, b, shift):
+        for first_of, then_of in _ranges(shift):
+            one, two = a[first_of], b[then_of]
             apart = np.hypot(one[:, 0] - two[:, 0], one[:, 1] - two[:, 1])
             above = np.abs(one[:, 2] - two[:, 2])
-            lost = (apart < horizontal) & (above < vertical) & ~exempt[:len(apart)]
+            lost = (apart < horizontal) & (above < vertical) & ~(
+                a_on_pad[first_of] & b_on_pad[then_of])
             if not lost.any():
                 continue
             at = np.flatnonzero(lost)
@@ -233,8 +237,7 @@ def _first_loss(a: _Floats, b: _Floats, horizontal: float, vertical: float, shif
     return PredictedLoss(first, *nearest) if first < math.inf else None
 
 
-def _pairs(a: _Floats, b: _Floats, shift: int) -> Sequence[tuple[_Floats, _Floats]]:
-    """Both paths, the one and then the other later by a number of steps."""
-    if shift == 0:
-        return [(a, b)]
-    return [(a[:-shift], b[shift:]), (a[shift:], b[:-shift])]
+def _ranges(shift: int) -> Sequence[tuple[slice, slice]]:
+    """Parts of two paths, of which the one and then the other is later by a number of steps."""
+    whole, early, late = slice(None), slice(None, -shift), slice(shift, None)
+    return [(early, late), (late, early)] if shift else [(whole, whole)]
