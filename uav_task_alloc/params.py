@@ -237,19 +237,19 @@ class BridgeParams(FrameParams):
                         choices=('off', 'warn', 'require'))
     fence_area: tuple[str, ...] = param(
         (), 'Corners `LATITUDE,LONGITUDE` of a fence that all stay in; empty: none.', fixed=True)
+    rally_points: tuple[str, ...] = param(
+        (), 'Places to return to, `LATITUDE,LONGITUDE[,HEIGHT above home]`.', fixed=True)
     relaunch: str = param('operator', 'Who starts a UAV after its list or a low battery: '
                           '`~/hand_over`, or the bridge.', choices=('operator', 'automatic'))
     state_dir: str = param('', 'Folder for authority, holds and fences; empty: none.', fixed=True)
-    capabilities: tuple[str, ...] = param(
-        (), 'What UAVs can do, `uav_1:camera,thermal` each.', fixed=True)
+    capabilities: tuple[str, ...] = param((), 'What UAVs can do, `uav_1:camera`.', fixed=True)
     full_range: float = param(0.0, 'Range of a full battery; 0: unknown, range_remaining is NaN.',
                               low=0.0, high=MAX_RANGE, unit='m')
     full_ranges: tuple[str, ...] = param(
         (), 'The same for single UAVs that differ, `uav_1:6000` each.', fixed=True)
     uav_limits: tuple[str, ...] = param(
-        (), 'What else the bridge reports about single UAVs, as NAME=NUMBER: cruise_speed, climb_'
-        'speed, descent_speed [m/s], endurance [s] with a full battery, turnaround [s], payload_'
-        'capacity [kg], hold_radius [m]; `uav_1:endurance=900,turnaround=120` each.', fixed=True)
+        (), 'More about single UAVs, SI: cruise_speed, climb_speed, descent_speed, endurance when '
+        'full, turnaround, payload_capacity, hold_radius; `uav_1:endurance=900`.', fixed=True)
     state_rate: float = param(10.0, 'Maximum rate of the states of one UAV.', low=0.5, high=100.0,
                               unit='Hz')
     tlog: str = param('', 'File to record all frames into, as .tlog; empty: none.', fixed=True)

@@ -156,6 +156,7 @@ class Scene:
         return {'wall': round(state['wall'], 1), 'position': to_decimetres(state['position']),
                 **motion(state['velocity']), 'home': home and round(home, 1),
                 'mode': state['mode'], 'mission': state['mission_state'],
+                'fence': state.get('fence', 'OFF'),
                 'active': state['active'], 'revision': state['list_revision'],
                 'battery': None if battery is None else round(battery, 3),
                 'low': self.run.is_low(battery),

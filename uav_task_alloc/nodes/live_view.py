@@ -51,7 +51,7 @@ _PLAIN_PERIODS = 4  # between two lines where the output is no terminal
 _MOST_REFUSALS = 200  # lines of the log
 _UP_AND_CLEAR = '\x1b[{}F\x1b[J'
 _STATE_FIELDS = ('mode', 'mission_state', 'active', 'list_revision', 'available', 'authority',
-                 'reason')  # a change of one is recorded at once
+                 'reason', 'fence')  # a change of one is recorded at once
 
 
 class TerminalStatus:

@@ -74,6 +74,8 @@ class MavlinkBridge(Node):
         self.full_ranges = bridge_parameters.to_full_ranges(params.full_ranges)
         self.limits = bridge_parameters.to_uav_limits(params.uav_limits)
         self.fence_area = bridge_parameters.to_fence_area(params.fence_area, self.config.origin)
+        self.rally = bridge_parameters.to_rally_points(
+            params.rally_points, self.config.origin, params.cruise_altitude)
         self.log = LeveledLog(self)
         self.zones: tuple[ThreatZone, ...] = ()
         self.zones_known = False
@@ -185,7 +187,7 @@ class MavlinkBridge(Node):
         self.log.report_trouble('heartbeat', self.heartbeat.trouble)
         policy = bridge_parameters.to_policy(self.live.now, self.zones, self.grounded(),
                                              self.stamp(), zones_known=self.zones_known,
-                                             fence_area=self.fence_area)
+                                             fence_area=self.fence_area, rally=self.rally)
         for session in list(self.ground_station.sessions.values()):
             session.executor.policy = policy
             if session.uav_id not in self.lists.known:

@@ -102,6 +102,9 @@ def state_sentences(state: RunState, line: Line) -> Iterator[Sentence]:
     if line['mission_state'] != old['mission_state'] and line['mission_state'] in (
             'MIXED', 'FOREIGN'):
         yield 'fault', f'{uav}: the mission on board is {line["mission_state"].lower()}'
+    fence = line.get('fence', 'OFF')
+    if fence != old.get('fence', fence) and fence in ('MIXED', 'FOREIGN', 'REFUSED'):
+        yield 'fault', f'{uav}: the fence on board is {fence.lower()}'
     if line['list_revision'] > old['list_revision']:
         yield 'uav', f'{uav} has list {line["list_revision"]} verified on board'
 

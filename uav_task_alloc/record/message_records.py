@@ -26,6 +26,7 @@ _STATES = ('PENDING', 'ASSIGNED', 'ACTIVE', 'COMPLETED', 'FAILED', 'CANCELLED', 
           'UNASSIGNED')
 MODES = ('UNKNOWN', 'STANDBY', 'TAKEOFF', 'ON_MISSION', 'HOLD', 'RETURNING', 'LANDING', 'FAULT')
 MISSIONS = ('UNKNOWN', 'UPLOADING', 'VERIFIED', 'MIXED', 'FOREIGN')
+FENCES = (*MISSIONS, 'OFF', 'UNSUPPORTED', 'REFUSED')
 AUTHORITIES = ('UNKNOWN', 'NONE', 'HELD', 'SUSPENDED', 'LOST')
 SEPARATION_ACTIONS = ('NONE', 'HOLD', 'RELEASE', 'UNRESOLVED')
 _COUNT = re.compile('[0-9]{1,18}')  # int() refuses some strings for which isdigit() is true
@@ -254,7 +255,8 @@ def state_record(msg: _Message) -> RecordBody:
             'range_remaining': finite_or_none(msg.range_remaining), 'available': msg.available,
             # missing in recordings of earlier versions
             'authority': constant_name(AUTHORITIES, getattr(msg, 'authority', 0)),
-            'reason': getattr(msg, 'reason', '')}
+            'reason': getattr(msg, 'reason', ''),
+            'fence': constant_name(FENCES, getattr(msg, 'fence_state', 0))}
 
 
 def uploads_record(msg: _Message) -> RecordBody:

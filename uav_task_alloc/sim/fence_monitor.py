@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 
 from uav_task_alloc.geometry.frames import to_enu_batch
 from uav_task_alloc.geometry.polygon import XY
+from uav_task_alloc.model import Point
 from uav_task_alloc.sim.config import FlightMode
 from uav_task_alloc.sim.flight import CRITICAL, VehicleFlight
 from uav_task_alloc.sim.parameters import SimParameters
@@ -13,6 +14,8 @@ from uav_task_alloc.sim.stored_fence import EnforcedShape, enforced_shapes
 from uav_task_alloc.sim.stored_item import StoredItem
 
 _POLYGON_FENCE = 4  # bit of FENCE_TYPE
+_PLANNERS = (2.0, 3.0)  # OA_TYPE: Dijkstra, and both
+_OA_MARGIN = 5.0  # [m] default of OA_MARGIN_MAX
 _INVALID = "Geofence invalid, doesn't contain {}"
 
 
@@ -45,12 +48,17 @@ class FenceMonitor:
 
     def update(self) -> None:
         """Enforce the stored fence."""
-        flight, items = self._flight, self._items
-        rows = to_enu_batch(flight.config.origin, [
-            (item.x * 1e-7, item.y * 1e-7, flight.home_amsl) for item in items]).tolist()
-        places: list[XY] = [(row[0], row[1]) for row in rows]
+        items = self._items
+        places: list[XY] = [(x, y) for x, y, _ in self.places_of(items)]
         shapes = enforced_shapes(items, places, circle_spoils=not self._ardupilot)
         self.shapes = [shape for shape in shapes if self._ardupilot or self._is_valid(shape)]
+
+    def places_of(self, items: Sequence[StoredItem]) -> list[Point]:
+        """Positions of items of a fence or rally points at the height of home, [m] ENU."""
+        flight = self._flight
+        rows = to_enu_batch(flight.config.origin, [
+            (item.x * 1e-7, item.y * 1e-7, flight.home_amsl) for item in items]).tolist()
+        return [(x, y, z) for x, y, z in rows]
 
     def _is_valid(self, shape: EnforcedShape) -> bool:
         flight = self._flight
@@ -70,6 +78,23 @@ class FenceMonitor:
         if breached and not self.breached:
             self._breach(self._mode())
         self.breached = breached
+
+    def way_around(self, start: Point, end: Point) -> tuple[Point, ...]:
+        """The points of a return around the exclusions (ArduPilot with OA_TYPE 2), [m] ENU.
+
+        Straight with PX4, where the fence is off, and where there is no way around.
+        """
+        get = self._parameters.get
+        if not self._ardupilot or not self.enabled or get('OA_TYPE') not in _PLANNERS:
+            return ()
+        margin = get('OA_MARGIN_MAX') or _OA_MARGIN
+        zones = [shape.column(f'shape {n}', margin) for n, shape in enumerate(self.shapes)
+                 if not shape.inclusion]
+        if not zones:
+            return ()
+        # loads kernels, which a fleet without fences does not wait for
+        from uav_task_alloc.geometry.detour import find_detour
+        return find_detour(start, end, zones).points
 
     def _mode(self) -> int | None:
         """The custom mode of the configured action; None: report only."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
@@ -41,6 +41,9 @@ class Navigation:
         self.target: Point = self.body.position  # [m] of the item being flown
         self.next_point: Point | None = None  # of the next item
         self.speed = config.cruise_speed  # [m/s]
+        # points of a return between two points at its height, [m] ENU
+        self.rally_points: Callable[[], Sequence[Point]] = lambda: ()
+        self.way_home: Callable[[Point, Point], Sequence[Point]] = lambda start, end: ()
 
     def begin_item(self, seq: int) -> None:
         """Copy an item out of the storage and fly that copy."""
@@ -100,11 +103,15 @@ class Navigation:
                           round(latitude * 1e7), round(longitude * 1e7), round(altitude, 2))
 
     def path_home(self) -> Track:
-        """The track of a return: up, over home, down."""
+        """The track of a return: up, over home or a nearer rally point, down."""
         x, y, z = self.body.position
         top = max(z, self.home[2] + self.return_height)
-        hx, hy, hz = self.home
-        return Track(((x, y, top), (hx, hy, top), (hx, hy, hz)), _NEAR, lands=True)
+        hx, hy, _ = min((self.home, *self.rally_points()),
+                        key=lambda place: math.dist(place[:2], (x, y)))
+        hz = self.home[2]
+        above = hx, hy, top
+        return Track(((x, y, top), *self.way_home((x, y, top), above), above, (hx, hy, hz)),
+                     _NEAR, lands=True)
 
     def descent(self, point: Point) -> Track:
         """The track of a landing: straight down."""

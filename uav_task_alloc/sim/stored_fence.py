@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from uav_task_alloc.geometry.polygon import XY, contains_point
+from uav_task_alloc.model import ThreatZone
 from uav_task_alloc.sim.stored_item import POSITION_FRAMES, Refusal, StoredItem
 
 FENCE_TYPE = dialect.MAV_MISSION_TYPE_FENCE
@@ -38,6 +39,12 @@ class EnforcedShape:
         inside = (math.dist(place, self.corners[0]) < self.radius if self.radius > 0.0
                   else contains_point(self.corners, place))
         return inside is not self.inclusion
+
+    def column(self, name: str, margin: float) -> ThreatZone:
+        """The shape with a margin [m] as a zone without floor and ceiling."""
+        if self.radius > 0.0:
+            return ThreatZone.cylinder(name, self.corners[0], self.radius, margin=margin)
+        return ThreatZone.polygon(name, self.corners, margin=margin)
 
 
 def stored_geo_item(item: StoredItem, mission_type: int, ardupilot: bool) -> StoredItem | Refusal:

@@ -21,7 +21,7 @@ from uav_task_alloc.sim.mission_server import AUTOPILOT_COMPONENT, MissionServer
 from uav_task_alloc.sim.parameters import SimParameters
 from uav_task_alloc.sim.px4.flight import Px4Flight
 from uav_task_alloc.sim.px4.mission_server import Px4MissionServer
-from uav_task_alloc.sim.stored_fence import CAPACITIES, FENCE_TYPE
+from uav_task_alloc.sim.stored_fence import CAPACITIES, FENCE_TYPE, RALLY_TYPE
 from uav_task_alloc.sim.streams import Streams
 from uav_task_alloc.sim.telemetry import TelemetryMessages
 
@@ -112,6 +112,9 @@ class Vehicle(Interventions):
             self.flight, self.mission.stores.get(FENCE_TYPE, ()), self.parameters,
             self._is_ardupilot, lambda mode: self.failsafe('fence', mode))
         self.mission.on_fence = self.fence.update
+        self.flight.way_home = self.fence.way_around
+        self.flight.rally_points = lambda: self.fence.places_of(
+            self.mission.stores.get(RALLY_TYPE, ()))
 
     def reboot(self, now: float) -> None:
         """Power-cycle: boot time, rates and transfers are lost, the stored mission is not.

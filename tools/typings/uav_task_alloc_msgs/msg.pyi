@@ -287,6 +287,9 @@ class UavState:
     HELD: ClassVar[int]
     SUSPENDED: ClassVar[int]
     LOST: ClassVar[int]
+    FENCE_OFF: ClassVar[int]
+    FENCE_UNSUPPORTED: ClassVar[int]
+    FENCE_REFUSED: ClassVar[int]
     header: std_msgs.msg.Header
     uav_id: str
     position: geometry_msgs.msg.Point
@@ -309,6 +312,7 @@ class UavState:
     active_task_id: str
     list_revision: int
     authority: int
+    fence_state: int
     reason: str
     def __init__(self, *,
         header: std_msgs.msg.Header = ...,
@@ -333,5 +337,6 @@ class UavState:
         active_task_id: str = ...,
         list_revision: int = ...,
         authority: int = ...,
+        fence_state: int = ...,
         reason: str = ...,
     ) -> None: ...

@@ -55,7 +55,8 @@ function update(node, uav, done, model, colours) {
   put(authority, uav.authority, uav.calm ? 'authority calm' : 'authority');
   if (!node.open) return;
   const board = list.length && ON_BOARD[uav.mission];
-  put(body.firstChild, [uav.place, `${done} done, ${list.length} to fly`, board]
+  const fence = uav.fence && uav.fence !== 'OFF' && `fence ${uav.fence}`;
+  put(body.firstChild, [uav.place, `${done} done, ${list.length} to fly`, board, fence]
     .filter(Boolean).join('; ') + '.');
   fill(rows, JSON.stringify(list.map(task => task.id)), () => list.slice(0, MOST).map(task => {
     const item = make('li');

@@ -16,6 +16,7 @@ _POLYGONS = 4  # bit of FENCE_TYPE
 _ARDUPILOT = ('FENCE_ENABLE', 'FENCE_TYPE', 'FENCE_ACTION', 'OA_TYPE', 'RTL_ALT', 'RTL_ALT_M')
 _PX4 = ('GF_ACTION', 'RTL_RETURN_ALT')
 _RETURN_HEIGHTS = {'ardupilot': 15.0, 'px4': 60.0}  # [m] defaults of the autopilots
+_PLANNERS = (2.0, 3.0)  # OA_TYPE: Dijkstra, and with BendyRuler
 _INTEGERS = {d.MAV_PARAM_TYPE_UINT8, d.MAV_PARAM_TYPE_INT8, d.MAV_PARAM_TYPE_UINT16,
              d.MAV_PARAM_TYPE_INT16, d.MAV_PARAM_TYPE_UINT32, d.MAV_PARAM_TYPE_INT32}
 _ACTIONS = {
@@ -90,6 +91,11 @@ class FenceParameters:
         if enable is None or kinds is None:
             return None
         return enable > 0.0 and bool(int(kinds) & _POLYGONS)
+
+    @property
+    def plans_around(self) -> bool:
+        """Whether a return flies around the fence (ArduPilot, OA_TYPE with Dijkstra)."""
+        return bool(self.enabled) and self.values.get('OA_TYPE') in _PLANNERS
 
     @property
     def return_height(self) -> float:

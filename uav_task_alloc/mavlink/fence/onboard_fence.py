@@ -6,7 +6,7 @@ A fence that no upload of the bridge explains is of another station: it is never
 from __future__ import annotations
 
 import random
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from enum import Enum
 
 from pymavlink.dialects.v20 import ardupilotmega as d
@@ -51,12 +51,13 @@ class OnboardFence:
     """The fence of one vehicle.
 
     Args:
-        peer: the vehicle, with the mission type of fences.
+        peer: the vehicle, with the mission type of fences or rally points.
         idle_after: [s] after which it has given up a transfer.
         rng: draws back-off times.
         budget: points of its store, as far as known.
         own: items of earlier uploads of the bridge.
         remember: called with all items of the bridge that may be on board, before an upload.
+        same: whether items read back are those sent.
 
     Arguments of methods:
         now: steady time [s].
@@ -66,9 +67,11 @@ class OnboardFence:
 
     def __init__(self, peer: Peer, idle_after: float, rng: random.Random, budget: int,
                  own: Iterable[ItemKey] = (),
-                 remember: Callable[[frozenset[ItemKey]], None] = lambda own: None) -> None:
+                 remember: Callable[[frozenset[ItemKey]], None] = lambda own: None,
+                 same: Callable[[Sequence[Item], Sequence[Item]], bool] = fences_alike) -> None:
         self._peer, self._remember, self._own = peer, remember, frozenset(own)
-        self.upload = Upload(peer, idle_after=idle_after, rng=rng, same=fences_alike)
+        self._same = same
+        self.upload = Upload(peer, idle_after=idle_after, rng=rng, same=same)
         self.budget = budget
         self.wanted: tuple[Item, ...] | None = None  # None: not known yet
         self.held: tuple[Item, ...] | None = None  # on board; None: not known
@@ -104,7 +107,7 @@ class OnboardFence:
     @property
     def _is_wanted(self) -> bool:
         return (self.held is not None and self.wanted is not None
-                and fences_alike(self.wanted, self.held))
+                and self._same(self.wanted, self.held))
 
     @property
     def state(self) -> FenceState:
@@ -195,7 +198,7 @@ class OnboardFence:
         if space and now < self._due and self._no_space:  # it follows the refusal
             self.budget = max(_LEAST_BUDGET, int(space[1]))
             self.reason = f'the store holds at most {self.budget} points'
-        if text.startswith(_INVALID):
+        if text.startswith(_INVALID) and self._peer.mission_type == d.MAV_MISSION_TYPE_FENCE:
             self.rejected, self.reason, self._due = True, text, now + _RETRY[0]
 
     def _settle(self, now: float) -> None:

@@ -98,7 +98,14 @@ def circle_of(zone: ThreatZone, origin: Origin) -> FenceShape:
 
 
 def vertical_extent(zone: ThreatZone) -> tuple[float, float]:
-    """Lower and upper end [m] of a zone with its margin; a dome reaches down without end."""
+    """The heights of a zone with its margin.
+
+    Args:
+        zone: the zone.
+
+    Returns:
+        Lower and upper end [m] ENU; a dome reaches down without end.
+    """
     if zone.shape is Shape.HEMISPHERE:
         return -math.inf, zone.center[2] + zone.radius + zone.margin
     return zone.z_min - zone.margin, zone.z_max + zone.margin

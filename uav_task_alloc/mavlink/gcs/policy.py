@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from uav_task_alloc.mavlink.fence.rally import RallyPoint
 from uav_task_alloc.mavlink.fence.shapes import FenceShape
 from uav_task_alloc.model import ThreatZone
 
@@ -23,3 +24,4 @@ class Policy:
     fences: str = 'off'  # or 'warn', 'require': whether vehicles carry the zones as fences
     zones_known: bool = False  # `zones` were received; else they are empty until then
     fence_area: FenceShape | None = None  # that all vehicles stay in
+    rally: tuple[RallyPoint, ...] = ()  # places to return to; the store is left alone without

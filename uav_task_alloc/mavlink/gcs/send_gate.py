@@ -20,8 +20,8 @@ def action_of(message: Message) -> SendAction:
     if kind in _READING or (kind == 'MISSION_ACK' and message.type == d.MAV_MISSION_ACCEPTED) or (
             kind == 'COMMAND_LONG' and message.command in _READS):
         return SendAction.READ
-    clears_fence = kind == 'MISSION_CLEAR_ALL' and (
-        message.mission_type == d.MAV_MISSION_TYPE_FENCE)
+    clears_fence = kind == 'MISSION_CLEAR_ALL' and (  # or rally points
+        message.mission_type in (d.MAV_MISSION_TYPE_FENCE, d.MAV_MISSION_TYPE_RALLY))
     uploads = kind in _UPLOADING or kind == 'MISSION_ACK' or clears_fence
     return SendAction.UPLOAD if uploads else SendAction.COMMAND
 

@@ -9,6 +9,7 @@ from enum import Enum
 from pymavlink.dialects.v20 import ardupilotmega as d
 
 from uav_task_alloc.mavlink.autopilots import ModeFunction
+from uav_task_alloc.mavlink.fence.onboard_fence import FenceState
 from uav_task_alloc.mavlink.gcs.authority import AuthorityState
 from uav_task_alloc.mavlink.gcs.ground_station import VehicleSession
 from uav_task_alloc.mavlink.gcs.mission_executor import MissionExecutor
@@ -63,12 +64,13 @@ class UavStatus:
     authority: AuthorityState  # who has the aircraft
     reason: str  # why it is not available; '': it is available
     hold_radius: float = 0.0  # [m] of the circle in which it holds; 0: it hovers
+    fence: FenceState = FenceState.OFF  # of the fence on board
 
     @property
     def urgent(self) -> tuple[object, ...]:
         """The fields whose change is published at once, not with the next position."""
         return (self.available, self.mode, self.mission_state, self.active_task,
-                self.list_revision, self.authority, self.reason)
+                self.list_revision, self.authority, self.reason, self.fence)
 
 
 def mode_of(executor: MissionExecutor) -> UavMode:
@@ -143,7 +145,7 @@ def state_of(session: VehicleSession, now: float, full_range: float = 0.0) -> Ua
         session.uav_id, telemetry.position, telemetry.velocity, telemetry.home,
         telemetry.battery, full_range * telemetry.battery if full_range > 0.0 else math.nan,
         not reason, mode, onboard.state, active_task(executor), onboard.revision, owner, reason,
-        HOLD_RADIUS if executor.profile.rules.loiters else 0.0)
+        HOLD_RADIUS if executor.profile.rules.loiters else 0.0, executor.fence.state)
 
 
 class PublishedStates:

@@ -40,6 +40,8 @@ class VehicleFacts:
     fence: str  # state of the fence on board
     fence_parameters: str  # whether it is on, and what happens at a breach
     fence_left_out: str  # zones that it does not hold, and why
+    rally_points: str  # state of those on board
+    failsafe_way: str  # what a straight way home crosses now
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,7 +115,9 @@ def _facts_of(session: VehicleSession, now: float) -> VehicleFacts:
         clock_rate='unknown' if math.isnan(rate) else f'{rate:.3f}',
         strays=session.strays, held_by=executor.holds.reason or 'nobody',
         fence=executor.fence.text, fence_parameters=executor.fence.parameters.text,
-        fence_left_out=executor.fence.left_out or 'nothing')
+        fence_left_out=executor.fence.left_out or 'nothing',
+        rally_points=executor.fence.rally_text,
+        failsafe_way=executor.fence.way_home or 'nothing')
 
 
 def upload_progress(onboard: OnboardMission, now: float) -> str:

@@ -18,10 +18,17 @@ from uav_task_alloc.mavlink.autopilots import Profile
 from uav_task_alloc.mavlink.fence.choice import Fence, FlightSpace, choose_fence
 from uav_task_alloc.mavlink.fence.fence_parameters import FenceParameters
 from uav_task_alloc.mavlink.fence.onboard_fence import FenceState, ItemKey, OnboardFence
-from uav_task_alloc.mavlink.fence.shapes import fence_items, shapes_of_items
+from uav_task_alloc.mavlink.fence.rally import rally_alike
+from uav_task_alloc.mavlink.fence.shapes import (
+    fence_items,
+    shapes_of_items,
+    vertical_extent,
+)
 from uav_task_alloc.mavlink.gcs.authority import Authority, SendAction
 from uav_task_alloc.mavlink.gcs.onboard_mission import OnboardMission
 from uav_task_alloc.mavlink.gcs.policy import Policy
+from uav_task_alloc.mavlink.gcs.rally_transfer import RALLY_BUDGET, RallyTransfer
+from uav_task_alloc.mavlink.gcs.return_path import zone_across_path
 from uav_task_alloc.mavlink.gcs.telemetry import Telemetry
 from uav_task_alloc.mavlink.mission.peer import Peer
 from uav_task_alloc.mavlink.transport.codec import Message
@@ -65,14 +72,23 @@ class VehicleFence:
         self._origin, self._telemetry, self._onboard = origin, telemetry, onboard
         self._authority, self._policy = authority, policy
         fence_peer = replace(peer, mission_type=d.MAV_MISSION_TYPE_FENCE)
+        self._own: dict[str, frozenset[ItemKey]] = {}  # items of the bridge, by store
         self.transfer = OnboardFence(fence_peer, profile.idle_after, rng,
-                                     profile.rules.fence_points, memory.own, memory.save)
+                                     profile.rules.fence_points, memory.own,
+                                     lambda own: self._save('fence', own, memory))
+        self.rally = RallyTransfer(OnboardFence(
+            replace(peer, mission_type=d.MAV_MISSION_TYPE_RALLY), profile.idle_after, rng,
+            RALLY_BUDGET, memory.own, lambda own: self._save('rally', own, memory), rally_alike))
         self.parameters = FenceParameters(peer, profile)
         self.notes: deque[OperatorNote] = deque()
         self.fence = Fence()
         self._chosen_for: object = None
         self._choose_at = self._changed_at = -1e9  # [s]
         self._reported = ''
+
+    def _save(self, store: str, own: frozenset[ItemKey], memory: FenceMemory) -> None:
+        self._own[store] = own
+        memory.save(frozenset().union(*self._own.values()))
 
     @property
     def active(self) -> bool:
@@ -92,29 +108,47 @@ class VehicleFence:
     def restart(self) -> None:
         """Start over after a restart of the vehicle."""
         self.transfer.reset()
+        self.rally.transfer.reset()
         self.parameters.reset()
 
     def receive(self, message: Message, now: float) -> list[Message]:
         """Process a message of the vehicle; returns messages to send."""
+        out = self.rally.transfer.receive(message, now) if self._policy().rally else []
         if not self.active:
-            return []
+            return out
         self.parameters.receive(message)
-        return self.transfer.receive(message, now)
+        return out + self.transfer.receive(message, now)
 
     def step(self, now: float) -> list[Message]:
         """Choose the fence, and go on with its transfer; returns messages to send."""
-        if not self.active:
-            return self.transfer.cancel()
+        if not self.active and not self._policy().rally:
+            return self.transfer.cancel() + self.rally.transfer.cancel()
         if self._telemetry.stale(now) or not self._telemetry.past_boot:
             return []
-        self._choose(now)
-        out = self._transfer(now)
-        self._report()
+        if self._onboard.upload.busy:
+            return self.transfer.cancel() + self.rally.transfer.cancel()
+        out: list[Message] = []
+        if self.active and not self.rally.transfer.busy:
+            self._choose(now)
+            out = self._transfer(now)
+            self._report()
+        if self._policy().rally and not self.transfer.busy:
+            out += self._transfer_rally(now)
+        return out
+
+    def _transfer_rally(self, now: float) -> list[Message]:
+        policy, telemetry = self._policy(), self._telemetry
+        if policy.zones_known and telemetry.home is not None:
+            self.rally.choose(policy.rally, policy.zones, self._onboard.tasks, telemetry.home)
+        if not self._authority.allows(SendAction.READ):
+            return []
+        text = self.rally.text
+        out = self.rally.step(now, self._authority.allows(SendAction.UPLOAD))
+        if self.rally.text != text and not self.rally.transfer.busy:
+            self.notes.append(OperatorNote('info', f'rally points {self.rally.text}'))
         return out
 
     def _transfer(self, now: float) -> list[Message]:
-        if self._onboard.upload.busy:
-            return self.transfer.cancel()
         if not self._authority.allows(SendAction.READ):
             return []
         out = self.parameters.step(now)
@@ -165,6 +199,11 @@ class VehicleFence:
         return text
 
     @property
+    def rally_text(self) -> str:
+        """State of the rally points for operators."""
+        return self.rally.text if self._policy().rally else 'none are given'
+
+    @property
     def left_out(self) -> str:
         """The zones that are not on board and why; '': all are."""
         parts = [f'{zone}: no space on board' for zone in self.fence.no_space]
@@ -175,14 +214,30 @@ class VehicleFence:
     @property
     def warning(self) -> str:
         """What an operator should know before a flight; '': nothing."""
-        if not self.active or (self.verified and not self.fence.shapes):
+        if not self.active:
             return ''
         parts = [] if self.verified else [f'fence {self.text}']
-        if self.parameters.enabled is False:
+        if self.parameters.enabled is False and self.fence.shapes:
             parts.append(f'fence {self.parameters.text}')
         if self.fence.no_space or self.fence.waiting:
             parts.append(f'fence without {self.left_out}')
+        if self.way_home:
+            parts.append(f"a failsafe's straight way home crosses {self.way_home}")
         return '; '.join(parts)
+
+    @property
+    def way_home(self) -> str:
+        """What a failsafe would cross, flying straight home from here; '': no zone."""
+        telemetry = self._telemetry
+        if not telemetry.airborne or not telemetry.has_position or telemetry.home is None:
+            return ''
+        if self.verified and self.parameters.plans_around:
+            return ''
+        height = max(telemetry.position[2], telemetry.home[2] + self.parameters.return_height)
+        zone = zone_across_path(telemetry.position, telemetry.home, (
+            zone for zone in self._policy().zones
+            if vertical_extent(zone)[0] < height < vertical_extent(zone)[1]))
+        return '' if zone is None else f'zone {zone.id}'
 
     def _report(self) -> None:
         """Log the state when it changes."""

@@ -118,8 +118,9 @@ def from_uav_status(status: UavStatus, capabilities: Iterable[str], stamp: float
         capabilities=list(capabilities), available=status.available, mode=status.mode.value,
         mission_state=status.mission_state.value, active_task_id=status.active_task,
         list_revision=status.list_revision, authority=status.authority.value,
-        reason=status.reason, **{**dict.fromkeys(REPORTED_LIMITS, math.nan),
-                                 'full_range': full_range or math.nan, **known})
+        fence_state=status.fence.value, reason=status.reason,
+        **{**dict.fromkeys(REPORTED_LIMITS, math.nan), 'full_range': full_range or math.nan,
+           **known})
 
 
 def from_progress(uav_id: str, progress: TaskProgress, stamp: float) -> m.TaskEvent:

@@ -9,6 +9,7 @@ from uav_task_alloc.checks import check_number, check_polygon, check_ros_name
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.geometry.frames import Origin, to_enu
 from uav_task_alloc.geometry.polygon import signed_area
+from uav_task_alloc.mavlink.fence.rally import RallyPoint
 from uav_task_alloc.mavlink.fence.shapes import FenceShape
 from uav_task_alloc.mavlink.gcs.ground_station import GcsConfig
 from uav_task_alloc.mavlink.gcs.policy import Policy
@@ -21,12 +22,14 @@ _LIMIT_NAMES = frozenset({'cruise_speed', 'climb_speed', 'descent_speed', 'endur
 _MOST = 1e6  # of any of them
 
 
+_HIGHEST_RALLY = 5000.0  # [m]
 _MOST_CORNERS = 20  # of the area of a fence
 
 
 def to_policy(params: BridgeParams, zones: tuple[ThreatZone, ...] = (),
               grounded: str = '', clock: float = 0.0, *, zones_known: bool = False,
-              fence_area: FenceShape | None = None) -> Policy:
+              fence_area: FenceShape | None = None,
+              rally: tuple[RallyPoint, ...] = ()) -> Policy:
     """Return what a mission executor may do now.
 
     Args:
@@ -36,12 +39,14 @@ def to_policy(params: BridgeParams, zones: tuple[ThreatZone, ...] = (),
         grounded: what has to be different before a UAV takes off; '' where it may.
         zones_known: the zones were received.
         fence_area: that all vehicles stay in; None: none.
+        rally: places to return to.
 
     Returns:
         For all executors of the bridge.
     """
     return Policy(params.takeoff, params.cruise_altitude, params.when_empty, params.when_foreign,
-                  params.relaunch, zones, clock, grounded, params.fences, zones_known, fence_area)
+                  params.relaunch, zones, clock, grounded, params.fences, zones_known,
+                  fence_area, rally)
 
 
 def to_fence_area(entries: Iterable[str], origin: Origin) -> FenceShape | None:
@@ -67,6 +72,39 @@ def to_fence_area(entries: Iterable[str], origin: Origin) -> FenceShape | None:
     corners = check_polygon('fence_area', corners)
     return FenceShape('', corners=corners if signed_area(corners) > 0.0 else corners[::-1],
                       inclusion=True)
+
+
+def to_rally_points(entries: Iterable[str], origin: Origin,
+                    height: float) -> tuple[RallyPoint, ...]:
+    """Return the places to return to.
+
+    Args:
+        entries: like `47.3977,8.5456` [deg] or `47.3977,8.5456,40` with a height [m].
+        origin: of the ENU frame.
+        height: [m] above home of an entry without one.
+
+    Returns:
+        In the order of the entries.
+
+    Raises:
+        InvalidValue: an entry has another form, or there are two at one place.
+    """
+    points: list[RallyPoint] = []
+    for entry in entries:
+        place, _, end = entry.rpartition(',')
+        has_height = entry.count(',') == 2
+        latitude, longitude = _degrees('rally_points', place if has_height else entry)
+        try:
+            above = float(end) if has_height else height
+        except ValueError:
+            above = math.nan
+        if not 0.0 < above <= _HIGHEST_RALLY:
+            raise InvalidValue('rally_points', entry, f'a height in (0, {_HIGHEST_RALLY:g}] m')
+        if any((p.latitude, p.longitude) == (latitude, longitude) for p in points):
+            raise InvalidValue('rally_points', entry, 'each place once')
+        points.append(RallyPoint(latitude, longitude, above, to_enu(
+            origin, latitude, longitude, origin.altitude_amsl)))
+    return tuple(points)
 
 
 def _degrees(name: str, entry: str) -> tuple[float, float]:
