@@ -130,32 +130,6 @@ def test_lists_are_flown_and_replaced_in_flight_and_every_task_is_reported_once(
         assert state.mission_state == m.UavState.VERIFIED
 
 
-def test_zones_become_fences_on_board_and_a_restarted_bridge_knows_its_own(sky, probe, tmp_path):
-    (tmp_path / 'state').mkdir()
-    world = sky('-p', 'fences:=warn', '-p', f'state_dir:={tmp_path}/state', '-p',
-                "rally_points:=['47.3950,8.5456']")
-    zones = probe.node.create_publisher(m.ThreatZoneArray, 'threat_zones', LATCHED)
-
-    def show(*radii):
-        zones.publish(from_zones([ThreatZone.cylinder(f'z{r}', (0.0, -500.0), float(r))
-                                  for r in radii], 0.0))
-
-    def verified():
-        return all(s.fence_state == m.UavState.VERIFIED for s in world.states.values())
-    show(50)
-    probe.until(verified)
-    for n in KINDS:
-        assert world.fact(n, 'fence') == 'VERIFIED, 1 zones in 1 points'
-        assert 'FENCE_ENABLE 0' in world.fact(n, 'fence_parameters') or 'GF_ACTION 2' in (
-            world.fact(n, 'fence_parameters'))
-    probe.until(lambda: all(world.fact(n, 'rally_points').startswith('VERIFIED') for n in KINDS))
-    world.bridge.stop(signal.SIGKILL)
-    show(40, 60)
-    world.again()
-    probe.until(lambda: verified() and all(
-        world.fact(n, 'fence') == 'VERIFIED, 2 zones in 2 points' for n in KINDS))
-
-
 @pytest.mark.parametrize('moment', ['upload', 'flight'])
 def test_a_bridge_killed_and_restarted_flies_no_task_twice(sky, probe, moment, tmp_path):
     world = sky('-p', f'state_dir:={tmp_path}/state')
