@@ -211,7 +211,9 @@ class OperatorDesk:
 
     def _added(self, request: OrderRequest) -> OrderChange | OrderAnswer:
         orders, kind = self._world.orders, _KINDS[request.action]
-        uavs = [request.uav] if request.uav else sorted(self._world.fleet.records)
+        uavs, without = self._commanded(request)
+        if not uavs:
+            return _refused(request, without)
         keep = request.keep_tasks if kind is OrderKind.PAUSE else True
         add = [Order(kind, uav_id, request.tasks, request.operator, keep_tasks=keep)
                for uav_id in uavs]
@@ -226,7 +228,19 @@ class OperatorDesk:
         if len(orders.in_force) + len(add) > MAX_ORDERS:
             return _refused(request, f'orders = {MAX_ORDERS}: expected fewer; undo some first')
         text = add[0].text if len(add) == 1 else f'{kind.value} {first_of(uavs)}'
-        return OrderChange(text, add=tuple(add))
+        return OrderChange(text + (f' (not {without})' if without else ''), add=tuple(add))
+
+    def _commanded(self, request: OrderRequest) -> tuple[list[str], str]:
+        """The UAVs of a request, and which of them it cannot be for as another has authority."""
+        records = self._world.fleet.records
+        uavs = [request.uav] if request.uav else sorted(records)
+        if request.action not in (OrderAction.PAUSE, OrderAction.RETURN):
+            return uavs, ''
+        without = {uav_id: records[uav_id].report for uav_id in uavs
+                   if uav_id in records and records[uav_id].report.flown_by_other}
+        return [uav_id for uav_id in uavs if uav_id not in without], first_of(
+            (f'{uav_id}, whose bridge has no authority ({report.reason or report.authority})'
+             for uav_id, report in without.items()), separator='; ')
 
     def _task_refusal(self, request: OrderRequest, kind: OrderKind) -> str:
         """Why the tasks of a request cannot be ordered so; '' where they can."""

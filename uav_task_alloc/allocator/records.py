@@ -131,6 +131,13 @@ class UavReport:
     authority: str = ''  # the same
     foreign: bool = False  # the mission on board is not of its bridge
     hold_radius: float = 0.0  # [m] of the circle in which it holds; 0: it hovers
+    reason: str = ''  # why it is not available
+
+    @property
+    def flown_by_other(self) -> bool:
+        """Whether it flies and its bridge may not command it."""
+        return self.authority in ('SUSPENDED', 'LOST') or (
+            self.authority == 'NONE' and not self.standby)
 
     def __post_init__(self) -> None:
         check_id('uav_id', self.uav_id)

@@ -301,3 +301,26 @@ def test_the_price_of_a_pause_depends_on_the_operator(driver):
     assert answer.success
     assert math.isnan(answer.distance)
     assert 'its price is not known' in answer.message
+
+
+def test_a_uav_that_another_flies_is_neither_paused_nor_ordered_home(driver):
+    why = 'authority LOST: a pilot has it; given back by ~/hand_over'
+    driver.uav('b', 1000.0, 0.0, 50.0, available=False, authority='LOST', reason=why)
+    for action in ('PAUSE', 'RETURN'):
+        answer = driver.order(action, 'b')
+        assert (answer.success, answer.message) == (
+            False, f'refused: b, whose bridge has no authority ({why})')
+    assert driver.world.orders.in_force == {}
+    answer = driver.order('RETURN', '')
+    assert answer.success
+    assert answer.message.startswith(f'return a (not b, whose bridge has no authority ({why}))')
+    assert [order.uav for order in driver.world.orders.in_force.values()] == ['a']
+    driver.uav('b', 1000.0, 0.0, 50.0, authority='HELD')
+    assert driver.order('PAUSE', 'b').success
+
+
+def test_a_uav_on_the_ground_is_paused_whoever_may_fly_it_later(driver):
+    driver.uav('b', 1000.0, 0.0, 50.0, authority='NONE', standby=True)
+    assert driver.order('PAUSE', 'b').success
+    driver.uav('a', 0.0, 0.0, 50.0, authority='NONE')
+    assert not driver.order('PAUSE', 'a').success

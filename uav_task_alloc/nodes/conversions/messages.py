@@ -38,6 +38,7 @@ from uav_task_alloc.record.message_records import (
 from uav_task_alloc.zone_codec import JOURNAL_ZONE, encode_zone
 
 FRAME_ID = 'map'  # REP-105, ENU
+_LONGEST_REASON = 300  # characters of why a UAV is not available
 _MOST_REVISIONS = 2**31  # half of the range of uint32
 
 LATCHED = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE,
@@ -183,6 +184,7 @@ def to_report(msg: m.UavState) -> UavReport:
         mode=constant_name(MODES, msg.mode), authority=constant_name(AUTHORITIES, msg.authority),
         foreign=msg.mission_state == m.UavState.FOREIGN,
         hold_radius=known(msg.hold_radius) or 0.0,
+        reason=' '.join(msg.reason.split())[:_LONGEST_REASON],
         **{name: known(getattr(msg, name)) or None for name in REPORTED_LIMITS})
 
 
