@@ -185,6 +185,7 @@ def solve_scenario(loaded: Scenario, args: argparse.Namespace, stop: Callable[[]
                 objective=loaded.objective or 'distance',
                 trips=loaded.trips, clearance=loaded.clearance,
                 altitude_min=loaded.altitude_min, altitude_max=loaded.altitude_max,
+                separation=loaded.separation if loaded.separation.on else None,
                 stop=stop, on_iteration=on_iteration, max_iterations=max_iterations)
 
 
@@ -193,6 +194,8 @@ def plan_text(result: Plan) -> str:
     lines = [f'{uav}: {result.route(uav).distance:.0f} m  {stops_text(result, uav)}'
              for uav in result.routes]
     lines += [f'unassigned {name}: {reason}' for name, reason in result.unassigned.items()]
+    lines += [f'conflict of {each.uavs[0]} and {each.uavs[1]} at {each.time:.0f} s: '
+              f'{each.resolution or "NOT RESOLVED"}, {each.detail}' for each in result.conflicts]
     planned = sum(len(tasks) for tasks in result.routes.values())
     lines.append(f'{planned} tasks planned, {len(result.unassigned)} unassigned; '
                  f'{result.distance:.0f} m, finish {result.finish:.0f} s, '

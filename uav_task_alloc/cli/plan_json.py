@@ -23,7 +23,8 @@ def plan_json(loaded: Scenario, result: Plan) -> dict[str, Any]:
         result: the plan.
 
     Returns:
-        What `Plan` has, an infinite fit as None; `origin`; `tasks`, the position of each; and
+        What `Plan` has, an infinite fit as None; `conflicts`, of UAVs that would not have been
+        apart; `origin`; `tasks`, the position of each; and
         `waypoints`, of each UAV, from its start to its end: `task` is the id of the task there,
         or None. Positions are latitude and longitude [deg] and altitude [m above the origin], as
         in a scenario file.
@@ -34,6 +35,7 @@ def plan_json(loaded: Scenario, result: Plan) -> dict[str, Any]:
         'legs': {uav: [asdict(leg) for leg in legs] for uav, legs in result.legs.items()},
         'distance': result.distance, 'value': result.value, 'penalty': result.penalty,
         'fit': json_number(result.fit), 'cost': json_number(result.cost), **times_json(result),
+        'conflicts': [asdict(each) for each in result.conflicts],
         'history': [[seconds, json_number(fit)] for seconds, fit in result.history],
         'solver': result.solver, 'solve_time': result.solve_time, 'iterations': result.iterations,
         'origin': asdict(loaded.origin),
