@@ -140,4 +140,6 @@ def test_ten_uavs_of_one_base_take_off_and_land_apart(rule, pads):
     result = resolve(flights, rule)
     assert found
     assert result.left == []
-    assert extra_percent(flights, result.flights) <= 10.0
+    # pads nearer than the distance: some have to wait in the air before they land
+    most = 10.0 if pads >= rule.horizontal else 20.0
+    assert extra_percent(flights, result.flights) <= most

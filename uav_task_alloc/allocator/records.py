@@ -171,6 +171,7 @@ class ListStop:
     eta: float  # [s] from the stamp of the list to the arrival
     wait: float = 0.0  # [s] from the arrival to the start of the service
     served: float = 0.0  # [s] of the service that are over at the stamp
+    begin_after: float = 0.0  # [s] ROS clock: the service waits until then, for the separation
 
     @property
     def start(self) -> float:
@@ -201,14 +202,14 @@ class UavList:
         return tuple(stop.task.id for stop in self.stops)
 
     def same_route(self, other: UavList) -> bool:
-        """Whether tasks, detour points and end are equal: there is nothing to publish.
+        """Whether tasks, detour points, waits and end are equal: there is nothing to publish.
 
         Args:
             other: list of the same UAV.
         """
         return (self.returns, self.end_via) == (other.returns, other.end_via) and [
-            (stop.task, stop.leg.via) for stop in self.stops] == [
-            (stop.task, stop.leg.via) for stop in other.stops]
+            (stop.task, stop.leg.via, stop.begin_after) for stop in self.stops] == [
+            (stop.task, stop.leg.via, stop.begin_after) for stop in other.stops]
 
 
 @dataclass(frozen=True, slots=True)

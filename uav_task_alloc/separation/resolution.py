@@ -36,6 +36,7 @@ _HOLDS = (3.0, 6.0, 10.0, 15.0, 20.0, 30.0, 45.0, 60.0, 90.0, 120.0, 180.0, 240.
 _TAKE_OFFS = tuple(5.0 * k for k in range(1, 181))  # [s] that a UAV may wait on the ground
 _MOST_PATHS = 4  # the cheapest, with which waits are combined
 _PRICE = 0.15  # [s/m] of a climb above the ends of a leg, whose power a wait does not take
+_MARGIN = 0.5  # [m] more between layers than the vertical distance: heights are kept nearly
 _GROUND = 0.5  # price of a second of waiting on the ground
 _ON_LINE = 0.01  # [m] a detour point so near to the line of its neighbours only changes the height
 _STEEP = 0.45  # share of the first and last straight part that a slanted climb may take
@@ -163,7 +164,9 @@ class _Planner:
             return _Change(leg, 0.0, '', '')
         paths = sorted((_Change(leg, 0.0, '', ''), *self._heights(flight, leg)),
                        key=lambda each: each.seconds)
-        waits = () if n == 0 and flight.in_air else _TAKE_OFFS if leg.takes_off else _HOLDS
+        waits = _TAKE_OFFS if leg.takes_off else _HOLDS
+        if not leg.may_wait or (n == 0 and flight.in_air):
+            waits = ()
         price = _GROUND if leg.takes_off else 1.0
         options = [(path.seconds + price * wait, wait, number) for number, path in enumerate(paths)
                    for wait in (0.0, *(waits if number < _MOST_PATHS else ()))]
@@ -179,7 +182,14 @@ class _Planner:
         rows = leg_rows(flight, leg, times, self._rule)
         if n + 1 == len(flight.legs):
             rows += self._stay(flight, times.end)
-        return self._accepted.conflict(rows, k) is None
+        if self._accepted.conflict(rows, k) is not None:
+            return False
+        after = flight.legs[n + 1] if n + 1 < len(flight.legs) else None
+        if after is None or after.may_wait:
+            return True
+        # the only wait for the next leg is this one
+        return any(self._is_apart(flight, k, n + 1, each, leg_times(flight, each, times.end))
+                   for each in (after, *(change.leg for change in self._heights(flight, after))))
 
     def _heights(self, flight: Flight, leg: FlightLeg) -> Iterator[_Change]:
         """The leg at other transit heights that it may have."""
@@ -189,7 +199,7 @@ class _Planner:
             (points[0], leg.takes_off), (points[-1], leg.lands)) if not on_ground]
         ends = ends or [max(point[2] for point in points)]
         levels = {max(ends), min(ends), *(
-            max(ends) + step * self._rule.vertical for step in range(1, _LAYERS + 1))}
+            max(ends) + step * (self._rule.vertical + _MARGIN) for step in range(1, _LAYERS + 1))}
         for level in levels:
             if not limits.altitude_min <= level <= limits.altitude_max:
                 continue

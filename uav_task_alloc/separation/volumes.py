@@ -40,6 +40,7 @@ class FlightLeg:
         takes_off: it begins on the ground.
         lands: it ends on the ground.
         movable: its heights and its begin may change; the leg under way is not.
+        may_wait: the UAV can wait before it; not before a return that follows a list.
     """
 
     points: tuple[Point, ...]  # [m] ENU
@@ -52,6 +53,7 @@ class FlightLeg:
     takes_off: bool = False
     lands: bool = False
     movable: bool = True
+    may_wait: bool = True
 
     def flown(self) -> tuple[Point, ...]:
         """Points as they are flown: with the columns above pad and base."""

@@ -178,7 +178,8 @@ def _uav_list(uav_id: str, body: dict[str, Any]) -> UavList:
     stops = tuple(ListStop(_task(stop['task']), _leg(stop['leg']),
                            _non_negative('eta', stop['eta']),
                            _non_negative('wait', stop.get('wait', 0.0)),
-                           _non_negative('served', stop.get('served', 0.0)))
+                           _non_negative('served', stop.get('served', 0.0)),
+                           _non_negative('begin_after', stop.get('begin_after', 0.0)))
                   for stop in _list_of('stops', body['stops']))
     uav_list = UavList(**{**body, 'stops': stops, 'end_via': _points('end_via', body['end_via']),
                            'revision': _whole_number('revision', body['revision']),

@@ -10,6 +10,7 @@ from uav_task_alloc.allocator.records import Proposal, UavList
 from uav_task_alloc.allocator.replanning.held_deadlines import held_lists
 from uav_task_alloc.allocator.replanning.plan_acceptance import TaskIdsByUav, exchange_groups
 from uav_task_alloc.allocator.replanning.planning import BuiltLists, build_lists
+from uav_task_alloc.allocator.replanning.separated_lists import with_separation
 from uav_task_alloc.allocator.state.flight_pace import finish_time
 from uav_task_alloc.allocator.state.world import World
 from uav_task_alloc.errors import first_of
@@ -69,9 +70,10 @@ def split_plan(world: World, chosen: Plan, trigger: str, stamp: float) -> SplitP
 
 
 def _held(world: World, built: BuiltLists, stamp: float) -> BuiltLists:
-    """The lists without those that would break a deadline that the lists in force keep."""
+    """Lists that are apart, without those that would break a deadline that is accepted."""
     lists, why = held_lists(world, built.lists, stamp)
-    return replace(built, lists=lists, left_out={**built.left_out, **why})
+    return with_separation(world, replace(
+        built, lists=lists, left_out={**built.left_out, **why}), stamp)
 
 
 def holding_plan(world: World, plans: Sequence[Plan], stamp: float) -> Plan:

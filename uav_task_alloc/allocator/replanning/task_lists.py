@@ -57,7 +57,8 @@ def build_task_list(uav: Uav, tasks: Sequence[Task], returns: bool,
         if leg is None:
             unreachable.append(task.id)
             continue
-        stops.append(ListStop(task, leg, 0.0))
+        old = _published_stop(published, before, task)
+        stops.append(ListStop(task, leg, 0.0, begin_after=old.begin_after if old else 0.0))
         before, place = task.id, task.position
     distance = math.fsum(stop.leg.length for stop in stops)
     home = _leg_home(uav, before, place, legs, published, paths) if returns else None
@@ -93,9 +94,10 @@ def _planned_leg(legs: Mapping[LegKey, Leg], key: LegKey, a: Point, b: Point,
 def _steady_leg(published: UavList, before: str, task: Task, place: Point, paths: SafePaths,
                 fresh: Leg | None) -> Leg | None:
     """The published leg while it is safe and not longer by the margin; else the fresh one."""
-    old = _published_leg(published, before, task)
-    if old is None:
+    stop = _published_stop(published, before, task)
+    if stop is None:
         return fresh
+    old = stop.leg
     if before == _START:
         metres = paths.rest(place, old, task.position)
     else:
@@ -107,11 +109,11 @@ def _steady_leg(published: UavList, before: str, task: Task, place: Point, paths
     return Leg(old.via, metres)
 
 
-def _published_leg(published: UavList, before: str, task: Task) -> Leg | None:
+def _published_stop(published: UavList, before: str, task: Task) -> ListStop | None:
     previous = _START
     for stop in published.stops:
         if stop.task.id == task.id:
             same = previous == before and stop.task.position == task.position
-            return stop.leg if same else None
+            return stop if same else None
         previous = stop.task.id
     return None

@@ -227,16 +227,16 @@ def timed_stops(stops: Sequence[ListStop], flight: UavFlight,
     timed: list[ListStop] = []
     clock, place = _earliest_departure(stops, flight), flight.position
     for k, stop in enumerate(stops):
-        task = stop.task
+        task, earliest = stop.task, max(stop.task.earliest, stop.begin_after)
         if k == 0 and flight.serving == task.id:
-            since = flight.stamp - task.earliest  # negative: it waits
+            since = flight.stamp - earliest  # negative: it waits
             timed.append(replace(stop, eta=0.0, wait=max(0.0, -since),
                                  served=max(0.0, min(flight.served, since))))
         else:
             clock = max(clock, task.release - flight.stamp)
             clock += _leg_seconds(stop, flight, place, start, first=k == 0)
             timed.append(replace(stop, eta=clock, served=0.0,
-                                 wait=max(0.0, task.earliest - flight.stamp - clock)))
+                                 wait=max(0.0, earliest - flight.stamp - clock)))
         clock, place = timed[-1].finish, task.position
     return tuple(timed)
 

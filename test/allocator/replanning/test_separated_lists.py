@@ -1,0 +1,87 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Lists of the allocator are apart: heights and waits that stay, returns at their heights."""
+import math
+from dataclasses import replace
+
+from allocation import AllocatorDriver
+
+from uav_task_alloc.allocator.replanning.from_now import separation_of
+from uav_task_alloc.allocator.replanning.separated_lists import _flights
+from uav_task_alloc.model import Task
+from uav_task_alloc.separation.conflicts import find_conflicts
+from uav_task_alloc.separation.volumes import flight_volumes
+
+ON = {'separation__horizontal': 10.0, 'separation__vertical': 5.0, 'separation__time': 2.0}
+SPEEDS = {'cruise_speed': 10.0, 'climb_speed': 2.5, 'descent_speed': 1.5}
+
+
+def conflicts(driver):
+    world = driver.world
+    rule = separation_of(driver.world.params)
+    rule = rule if rule.on else replace(rule, horizontal=10.0)
+    flights = _flights(world, world.lists_in_force(), driver.now)
+    return find_conflicts(flight_volumes(flights.values(), rule), rule)
+
+
+def crossing(**params):
+    driver = AllocatorDriver(**params)
+    driver.uav('a', 0.0, 200.0, 50.0, home=(0.0, 0.0, 0.0), **SPEEDS)
+    driver.uav('b', 200.0, 0.0, 50.0, home=(300.0, 0.0, 0.0), **SPEEDS)
+    driver.add(Task('ta', (400.0, 200.0, 50.0), allowed_uavs={'a'}),
+               Task('tb', (200.0, 400.0, 50.0), allowed_uavs={'b'}))
+    driver.settle()
+    return driver
+
+
+def test_lists_that_cross_get_other_heights_and_stay_so():
+    assert conflicts(crossing())
+    driver = crossing(**ON)
+    assert conflicts(driver) == []
+    heights = [point[2] for stop in driver.lists['b'].stops for point in stop.leg.via]
+    assert heights == [55.5, 55.5]
+    assert driver.lists['a'].stops[0].leg.via == ()
+    before = len(driver.history)
+    for y in (20.0, 60.0):
+        driver.uav('b', 200.0, y, 55.5, home=(300.0, 0.0, 0.0), **SPEEDS)
+        driver.uav('a', y, 200.0, 50.0, home=(0.0, 0.0, 0.0), **SPEEDS)
+        driver.world.request_replan('test', driver.now)
+        driver.settle(2.0, report=False)
+    assert len(driver.history) == before
+    assert conflicts(driver) == []
+
+
+def test_a_new_task_gives_way_to_the_leg_under_way():
+    driver = AllocatorDriver(**ON)
+    driver.uav('a', 0.0, 200.0, 50.0, **SPEEDS)
+    driver.uav('b', 200.0, 0.0, 50.0, **SPEEDS)
+    driver.add(Task('tb', (200.0, 400.0, 50.0), allowed_uavs={'b'}))
+    driver.settle()
+    driver.add(Task('ta', (400.0, 200.0, 50.0), allowed_uavs={'a'}))
+    driver.settle()
+    assert driver.lists['b'].stops[0].leg.via == ()
+    assert {point[2] for point in driver.lists['a'].stops[0].leg.via} == {55.5}
+    assert conflicts(driver) == []
+
+
+def test_uavs_of_one_base_take_off_one_after_the_other_and_return_at_the_height_of_their_task():
+    driver = AllocatorDriver(route_end='home', **ON)
+    for k in range(4):
+        driver.uav(f'u{k}', 3.0 * k, 0.0, 0.0, home=(3.0 * k, 0.0, 0.0), standby=True, **SPEEDS)
+        angle = 1.5 * k
+        driver.add(Task(f't{k}', (300.0 * math.cos(angle), 300.0 * math.sin(angle), 50.0),
+                        allowed_uavs={f'u{k}'}))
+    driver.settle()
+    assert conflicts(driver) == []
+    waits = sorted(driver.lists[f'u{k}'].stops[0].wait for k in range(4))
+    assert waits[0] == 0.0
+    assert waits[1] > 3.0
+    for k in range(4):
+        end_via = driver.lists[f'u{k}'].end_via
+        assert end_via[-1][:2] == (3.0 * k, 0.0)
+        assert end_via[-1][2] >= 50.0
+
+
+def test_without_separation_lists_have_no_waits_and_heights():
+    driver = crossing(route_end='home')
+    assert all(each.end_via == () and each.stops[0].begin_after == 0.0
+               for each in driver.lists.values())

@@ -1,0 +1,144 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The lists of a plan made apart: transit heights as detour points, waits, heights of returns."""
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+
+from uav_task_alloc.allocator.records import ListStop, UavList
+from uav_task_alloc.allocator.replanning.from_now import separation_of
+from uav_task_alloc.allocator.replanning.planning import BuiltLists
+from uav_task_alloc.allocator.state.flight_pace import UavFlight, timed_stops
+from uav_task_alloc.allocator.state.world import World
+from uav_task_alloc.geometry.polyline import points_passed, polyline_length
+from uav_task_alloc.model import Leg, Point
+from uav_task_alloc.separation.resolution import TransitLimits, resolve
+from uav_task_alloc.separation.volumes import Flight, FlightLeg
+
+_LEAST = 1.0  # [s] of a wait; a shorter one is no change
+
+
+def with_separation(world: World, built: BuiltLists, stamp: float) -> BuiltLists:
+    """Return the lists of a plan with heights and waits that keep the UAVs apart.
+
+    Args:
+        world: with the lists in force, whose first legs under way stay as they are.
+        built: the lists that would be put in force.
+        stamp: [s] published clock.
+
+    Returns:
+        The same lists where separation is off, or nothing is in conflict.
+    """
+    rule = separation_of(world.params)
+    if not rule.on:
+        return built
+    lists = {uav_id: _with_high_return(world, each) for uav_id, each in built.lists.items()}
+    flights = _flights(world, lists, stamp)
+    found = resolve(list(flights.values()), rule, TransitLimits(
+        world.params.altitude_min, world.params.altitude_max,
+        lambda points: world.paths().clear(*points)))
+    for before, after in zip(flights.values(), found.flights, strict=True):
+        if before is not after:
+            lists[after.uav] = _changed_list(world, lists[after.uav], before, after, stamp)
+    return replace(built, lists=lists)
+
+
+def _with_high_return(world: World, each: UavList) -> UavList:
+    """A list whose return ends above the home at the height of its last point.
+
+    A vehicle's own return would climb to a height that the plan does not know.
+    """
+    record = world.uav_record(each.uav)
+    if record is None or not each.returns or not each.stops:
+        return each
+    home, last = record.home, (each.stops[-1].task.position, *each.end_via)[-1]
+    above = home[0], home[1], last[2]
+    if last[2] <= home[2] or last[:2] == home[:2] or not world.paths().clear(last, above, home):
+        return each
+    return replace(each, end_via=(*each.end_via, above))
+
+
+def _flights(world: World, lists: Mapping[str, UavList], stamp: float) -> dict[str, Flight]:
+    """What each known UAV flies by its list."""
+    flights = {}
+    for uav_id, each in lists.items():
+        flight = world.flights.of(uav_id, stamp)
+        if flight is not None:
+            flights[uav_id] = _flight(each, world.list_of(uav_id), flight, stamp)
+    return flights
+
+
+def _flight(each: UavList, published: UavList, flight: UavFlight, stamp: float) -> Flight:
+    legs, place = list[FlightLeg](), flight.position
+    for k, stop in enumerate(each.stops):
+        under_way = k == 0 and not flight.on_ground and _same_leg(published, stop)
+        line = (*stop.leg.via, stop.task.position)
+        ahead = line[points_passed(place, line):] if under_way else line
+        served = stop.served if under_way else 0.0
+        begins = stop.begin_after - stamp
+        leg = FlightLeg((place, *ahead), stop.task.id,
+                        max(0.0, stop.task.service_time - served),
+                        stop.task.earliest - stamp, stop.task.latest - stamp,
+                        stop.task.release - stamp,
+                        takes_off=k == 0 and flight.on_ground, movable=not under_way)
+        if begins > 0.0:  # it keeps the wait that it had
+            leg = replace(leg, hold_until=begins - _seconds(flight, leg))
+        legs.append(leg)
+        place = stop.task.position
+    if each.returns and flight.home is not None and not (flight.on_ground and not each.stops):
+        legs.append(FlightLeg((place, *each.end_via, flight.home), lands=True,
+                              movable=bool(each.stops), may_wait=False))
+    pace = flight.pace
+    return Flight(each.uav, tuple(legs), flight.position, pace.mean_speed, pace.climb,
+                  pace.descent, in_air=not flight.on_ground)
+
+
+def _same_leg(published: UavList, stop: ListStop) -> bool:
+    """Whether the first leg of the list in force is that of a stop."""
+    first = published.stops[0] if published.stops else None
+    return first is not None and (first.task.id, first.leg.via) == (stop.task.id, stop.leg.via)
+
+
+def _seconds(flight: UavFlight, leg: FlightLeg) -> float:
+    pace = flight.pace
+    return Flight('', (), flight.position, pace.mean_speed, pace.climb, pace.descent).seconds(
+        leg.flown())
+
+
+def _changed_list(world: World, each: UavList, before: Flight, after: Flight,
+                  stamp: float) -> UavList:
+    """A list with the heights and waits of a flight."""
+    flight = world.flights.of(each.uav, stamp)
+    assert flight is not None  # it has a flight
+    stops = list[ListStop]()
+    for stop, old, new in zip(each.stops, before.legs, after.legs, strict=False):
+        if new is old:
+            stops.append(stop)
+            continue
+        leg = stop.leg if new.points == old.points else Leg(
+            new.points[1:-1], polyline_length(new.points))
+        begin = stop.begin_after
+        if new.hold_until > old.hold_until + _LEAST:
+            begin = max(0.0, round(stamp + new.hold_until + _seconds(flight, new), 1))
+        stops.append(replace(stop, leg=leg, begin_after=begin))
+    timed = timed_stops(stops, flight)
+    end_via = _end_via(each, after)
+    return replace(each, stops=timed, end_via=end_via,
+                   distance=_length(timed, end_via, flight.home if each.returns else None))
+
+
+def _end_via(each: UavList, after: Flight) -> tuple[Point, ...]:
+    if not each.returns or not after.legs or not after.legs[-1].lands:
+        return each.end_via
+    return after.legs[-1].points[1:-1]
+
+
+def _length(stops: tuple[ListStop, ...], end_via: tuple[Point, ...],
+            home: Point | None) -> float:
+    """Length of all legs [m]; 0 without stops."""
+    if not stops:
+        return 0.0
+    metres = math.fsum(stop.leg.length for stop in stops)
+    return metres if home is None else metres + polyline_length(
+        (stops[-1].task.position, *end_via, home))
