@@ -2,12 +2,13 @@
 """Turns mission items, landings and returns into tracks for a simulated autopilot."""
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Callable, Sequence
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
-from uav_task_alloc.geometry.frames import to_enu, to_geodetic
+from uav_task_alloc.geometry.frames import Origin, to_enu, to_geodetic
 from uav_task_alloc.model import Point
 from uav_task_alloc.sim import stored_item as item_
 from uav_task_alloc.sim.config import VehicleConfig
@@ -15,6 +16,12 @@ from uav_task_alloc.sim.dynamics import PointMass, Track
 from uav_task_alloc.sim.stored_item import StoredItem
 
 _NEAR = 0.3  # [m] end of a climb, of a landing
+_CACHED = 256  # homes, which are sent and compared each second
+
+
+@functools.lru_cache(_CACHED)
+def _geodetic(origin: Origin, point: Point) -> tuple[float, float, float]:
+    return to_geodetic(origin, point)
 
 
 class Navigation:
@@ -98,7 +105,7 @@ class Navigation:
 
     def home_item(self) -> StoredItem:
         """Home as an item: as in HOME_POSITION, and ArduPilot's seq 0."""
-        latitude, longitude, altitude = to_geodetic(self.config.origin, self.home)
+        latitude, longitude, altitude = _geodetic(self.config.origin, self.home)
         return StoredItem(dialect.MAV_FRAME_GLOBAL, item_.WAYPOINT, 0.0, 0.0, 0.0, 0.0,
                           round(latitude * 1e7), round(longitude * 1e7), round(altitude, 2))
 
