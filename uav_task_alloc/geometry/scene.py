@@ -189,10 +189,11 @@ def _find(address: int, i: int, j: int) -> float:
     no_skin = scene.location[i] == WITHIN_SKIN or scene.location[j] == WITHIN_SKIN
     path = np.empty((MAX_CORNERS + 1, 3))
     n, length = shortest_path(scene.zones, ends, scene.limits, no_skin, path[1:], work)
-    if n > 2:
+    if n > 1:
         if scene.location[i] != INSIDE:
-            store_path(scene.store, path[1:], n, ends)
-        elif n < MAX_CORNERS:
+            if n > 2:
+                store_path(scene.store, path[1:], n, ends)
+        elif n < MAX_CORNERS:  # straight after the exit or not
             if swapped:
                 reverse_points(path, 1, n)
             copy_point(scene.xyz, i, path, 0)

@@ -79,13 +79,21 @@ def test_sums_kept_during_search_are_those_of_routes_set_at_once(objective, trip
 @pytest.mark.parametrize('objective', list(OBJECTIVES))
 def test_cost_of_the_search_is_that_of_the_evaluator(objective):
     fleet, work = mixed_problem(5)
-    zones = [ThreatZone.hemisphere('dome', (1000.0, 1000.0, 0.0), 100.0),
+    zones = [ThreatZone.hemisphere('dome', (1000.0, 1000.0, 0.0), 300.0),
              ThreatZone.cylinder('mast', (400.0, 500.0), 80.0)]
-    inside = [task for task in work if math.dist(task.position, (1000.0, 1000.0, 0.0)) < 101.0
+    inside = [task for task in work if math.dist(task.position, (1000.0, 1000.0, 0.0)) < 301.0
               or math.dist(task.position[:2], (400.0, 500.0)) < 81.0]
     found = plan(fleet, [task for task in work if task not in inside], zones, budget=60.0,
                  objective=objective, trips=2, route_end='home', max_iterations=300)
     assert found.history[-1][1] == pytest.approx(found.cost, rel=1e-9)
+
+
+def test_a_way_out_of_a_zone_that_goes_on_straight_takes_the_time_of_its_length():
+    dome = ThreatZone.hemisphere('dome', (0.0, 0.0, 0.0), 100.0)
+    for position in ((500.0, 0.0, 20.0), (500.0, 0.0, 300.0)):  # around it, and straight
+        found = plan([Uav('u', (0.0, 0.0, 20.0))], [Task('t', position, latest=400.0)], [dome],
+                     budget=60.0, max_iterations=10)
+        assert found.routes == {'u': ('t',)}
 
 
 def test_the_same_seed_and_iterations_give_the_same_plan():

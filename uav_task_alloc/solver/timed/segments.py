@@ -43,6 +43,8 @@ def leg_of(a: TimedArrays, u: int, i: int, j: int) -> tuple[float, float]:
     found = length(a.pairs, a.point[i], a.point[j])
     if found <= metres * (1.0 + 1e-12):
         return metres, seconds
+    if found == math.inf:
+        return found, found
     return found, path_seconds(a.pairs, a.times, a.speeds[u], a.point[i], a.point[j])
 
 
