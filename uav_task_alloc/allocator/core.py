@@ -82,6 +82,7 @@ class Allocator:
         self._limiter = ListRateLimiter()
         self._clock = math.inf, now  # published and steady clock [s] of the last tick
         self._left_out: dict[str, str] = {}  # task id -> reason
+        self._together: tuple[str, ...] = ()  # UAVs that the lists in force do not keep apart
         self._predictions = Predictions(self.world, now)
         self._chosen = self._best  # last plan that was put in force
         # UAVs of the journal get time to report before they lose their tasks
@@ -249,6 +250,10 @@ class Allocator:
         world = self.world
         world.set_built(built.zones_when_built, built.paths_home)
         world.later = built.later
+        for text in built.together:
+            if text not in self._together:
+                world.note(text, warning=True)
+        self._together = built.together
         self._left_out = {task_id: world.deadlines.left_out(task_id, reason, stamp)
                           for task_id, reason in built.left_out.items()}
         published = world.publish(built.lists, stamp)

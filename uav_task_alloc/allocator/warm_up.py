@@ -13,6 +13,7 @@ from uav_task_alloc.geometry.distances import Distances
 from uav_task_alloc.geometry.search_budget import SearchBudget
 from uav_task_alloc.model import Plan, Task, ThreatZone
 from uav_task_alloc.params import AllocatorParams
+from uav_task_alloc.separation.conflicts import load_separation_kernels
 from uav_task_alloc.solver.solve import load_kernels
 from uav_task_alloc.solver.timed.solve import load_timed_kernels
 
@@ -36,6 +37,7 @@ def compile_kernels(plan: Callable[..., Plan], params: AllocatorParams) -> int:
     """
     load_kernels(zones=True)
     load_timed_kernels(zones=True)  # any task may have a deadline
+    load_separation_kernels()  # its parameters may change at any time
     params, before = replace(params, solve_budget=_BUDGET), Plan({})
     allocator = Allocator(params, now=0.0)
     allocator.set_kernels_ready()

@@ -81,6 +81,21 @@ def test_uavs_of_one_base_take_off_one_after_the_other_and_return_at_the_height_
         assert end_via[-1][2] >= 50.0
 
 
+def test_two_legs_under_way_that_meet_are_logged_once():
+    driver = AllocatorDriver()
+    driver.uav('a', 0.0, 200.0, 50.0, **SPEEDS)
+    driver.uav('b', 200.0, 0.0, 50.0, **SPEEDS)
+    driver.add(Task('ta', (400.0, 200.0, 50.0), allowed_uavs={'a'}),
+               Task('tb', (200.0, 400.0, 50.0), allowed_uavs={'b'}))
+    driver.settle()
+    driver.world.params = replace(driver.world.params, **ON)
+    for _ in range(3):
+        driver.world.request_replan('test', driver.now)
+        driver.settle()
+    assert driver.notes.count('the plan cannot keep a and b apart') == 1
+    assert driver.levels['the plan cannot keep a and b apart'] == 'warning'
+
+
 def test_without_separation_lists_have_no_waits_and_heights():
     driver = crossing(route_end='home')
     assert all(each.end_via == () and each.stops[0].begin_after == 0.0

@@ -45,6 +45,7 @@ class BuiltLists:
     # UAV -> whether it has a safe path home, and from where [m]
     paths_home: dict[str, tuple[bool, Point]] = field(default_factory=dict)
     later: LaterTrips = field(default_factory=dict)  # after the lists
+    together: tuple[str, ...] = ()  # a sentence for each two UAVs that are not kept apart
 
 
 def replan_problem(world: World, best: Plan, trigger: str, background: bool,

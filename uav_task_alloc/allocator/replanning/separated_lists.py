@@ -41,7 +41,10 @@ def with_separation(world: World, built: BuiltLists, stamp: float) -> BuiltLists
     for before, after in zip(flights.values(), found.flights, strict=True):
         if before is not after:
             lists[after.uav] = _changed_list(world, lists[after.uav], before, after, stamp)
-    return replace(built, lists=lists)
+    together = sorted({' and '.join(sorted(each.uavs)) for each in found.conflicts
+                       if not each.resolution})
+    return replace(built, lists=lists, together=tuple(
+        f'the plan cannot keep {pair} apart' for pair in together))
 
 
 def _with_high_return(world: World, each: UavList) -> UavList:
