@@ -6,6 +6,7 @@ import pytest
 from allocation import AllocatorDriver, task as point_task
 
 from uav_task_alloc.model import Task
+from uav_task_alloc.params import AllocatorParams
 from uav_task_alloc.separation.monitor import AlertAction
 
 RULE = {'separation__horizontal': 10.0, 'separation__vertical': 5.0}
@@ -15,16 +16,21 @@ NORTH = {'velocity': (0.0, 15.0, 0.0)}
 
 
 class Sky(AllocatorDriver):
-    """Two UAVs whose ways cross in 7 s, u1 from the west and u2 from the south."""
+    """Two UAVs whose ways cross in 7 s, u1 from the west and u2 from the south.
+
+    Their lists are of a time without separation, so that only the monitor keeps them apart.
+    """
 
     def __init__(self, first=None, second=None, **params):
-        super().__init__(**{**RULE, **params})
+        super().__init__()
         self.more = [{'mode': 'ON_MISSION', 'authority': 'HELD', **EAST, **(first or {})},
                      {'mode': 'ON_MISSION', 'authority': 'HELD', **NORTH, **(second or {})}]
         self.report()
         self.add(Task('t1', (200.0, 0.0, 50.0), allowed_uavs=frozenset({'u1'})),
                  Task('t2', (0.0, 150.0, 50.0), allowed_uavs=frozenset({'u2'})))
         self.settle(report=False)
+        self.world.params = AllocatorParams(**{
+            'background_budget': 0.0, 'route_end': 'hold', **RULE, **params})
         self.steps = []
 
     def report(self, west=WEST, south=SOUTH):

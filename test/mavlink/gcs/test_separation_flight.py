@@ -11,7 +11,7 @@ from uav_task_alloc.allocator.records import (
     TaskEventKind,
     UavReport,
 )
-from uav_task_alloc.allocator.replanning import planning
+from uav_task_alloc.allocator.replanning import planning, proposal
 from uav_task_alloc.mavlink.gcs.operator_hold import HoldRequest
 from uav_task_alloc.mavlink.gcs.status import UavMode
 from uav_task_alloc.mavlink.mission.items import MissionStop, TaskList
@@ -24,6 +24,12 @@ from uav_task_alloc.sim.separation_judge import SeparationJudge, TrueState
 
 PAIRS = pytest.mark.parametrize('kinds', [('ardupilot', 'px4'), ('px4', 'ardupilot')], ids=str)
 WEST, EAST, SOUTH, NORTH = (-250.0, 0.0), (250.0, 0.0), (0.0, -250.0), (0.0, 250.0)
+
+
+@pytest.fixture
+def monitor_alone(monkeypatch):
+    """Plans as without separation."""
+    monkeypatch.setattr(proposal, 'with_separation', lambda world, built, stamp: built)
 
 
 class Sky(FlightBench):
@@ -84,7 +90,8 @@ class Sky(FlightBench):
             self.ground_station.hold(hold.uav, HoldRequest('separation', hold.hold, hold.reason),
                                      self.now)
         for each in self.core.collect().lists.values():
-            stops = tuple(MissionStop(stop.task, stop.leg.via) for stop in each.stops)
+            stops = tuple(MissionStop(stop.task, stop.leg.via, stop.wait,
+                                      self.now + stop.eta + stop.wait) for stop in each.stops)
             self.assign(TaskList(each.revision, stops, each.returns), int(each.uav[4:]))
 
     def done(self, *numbers):
@@ -110,6 +117,7 @@ def test_without_separation_two_that_cross_lose_it(kinds):
 
 
 @PAIRS
+@pytest.mark.usefixtures('monitor_alone')
 def test_of_two_that_cross_one_holds_and_both_fly_all_tasks(kinds):
     sky = Sky(kinds, [(WEST, EAST), (SOUTH, NORTH)])
     assert sky.run(lambda: sky.done(1, 2), 300.0)
@@ -119,6 +127,7 @@ def test_of_two_that_cross_one_holds_and_both_fly_all_tasks(kinds):
 
 
 @PAIRS
+@pytest.mark.usefixtures('monitor_alone')
 def test_one_that_a_pilot_stops_in_mid_leg_is_not_run_into(kinds):
     sky = Sky(kinds, [(WEST, EAST), (SOUTH, NORTH)])
     assert sky.run(lambda: sky.crossed(1), 200.0)
@@ -130,6 +139,7 @@ def test_one_that_a_pilot_stops_in_mid_leg_is_not_run_into(kinds):
 
 
 @PAIRS
+@pytest.mark.usefixtures('monitor_alone')
 def test_one_that_returns_by_a_failsafe_keeps_its_way(kinds):
     sky = Sky(kinds, [(WEST, EAST), (SOUTH, NORTH)])
     assert sky.run(lambda: sky.crossed(1), 200.0)
@@ -141,6 +151,7 @@ def test_one_that_returns_by_a_failsafe_keeps_its_way(kinds):
 
 
 @PAIRS
+@pytest.mark.usefixtures('monitor_alone')
 def test_head_on_both_stop_which_is_said_as_unresolved_and_plans_are_asked_for(kinds):
     sky = Sky(kinds, [(WEST, EAST), (EAST, WEST)])
     assert sky.run(lambda: any(alert.action is AlertAction.UNRESOLVED for alert in sky.alerts),
@@ -149,3 +160,12 @@ def test_head_on_both_stop_which_is_said_as_unresolved_and_plans_are_asked_for(k
     assert not sky.losses
     assert sky.held == {'uav_1', 'uav_2'}
     assert all(sky.state(n).mode is UavMode.HOLD for n in (1, 2))
+
+
+@PAIRS
+@pytest.mark.parametrize('ways', [[(WEST, EAST), (EAST, WEST)], [(WEST, EAST), (SOUTH, NORTH)]],
+                         ids=['head-on', 'crossing'])
+def test_with_plans_and_monitor_all_tasks_are_flown_apart(kinds, ways):
+    sky = Sky(kinds, ways)
+    assert sky.run(lambda: sky.done(1, 2), 300.0)
+    assert not sky.losses
