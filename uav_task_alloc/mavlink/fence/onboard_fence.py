@@ -23,6 +23,7 @@ ItemKey = tuple[int, float, int, int]  # command, p1, x, y
 _CLEARED = 1.5  # [s] for the ACK of MISSION_CLEAR_ALL
 _RETRY = (5.0, 60.0)  # [s] after a failure, doubled up to the second
 _RECHECK = 60.0  # [s] after which a fence is read again: another station may have changed it
+_AFTER_READ = 0.5  # [s] PX4 refuses an upload that overtakes the end of the readback
 _REFIT = 1.5  # [s] in which a smaller fence is chosen
 _LEAST_BUDGET = 3  # points
 _INVALID = 'Geofence invalid'  # PX4 stores such a fence and does not enforce it
@@ -179,8 +180,10 @@ class OnboardFence:
             return self._cleared(now) if now >= self._clearing_until else []
         out = self.upload.step(now)
         if self.upload.state in _PAUSED:  # meanwhile a mission may be transferred
+            held = None if self.upload.progress[0] else self.held  # no item was sent
             self.upload.reset()
             self._fail('the vehicle refuses it for now', now)
+            self.held = held
         self._settle(now)
         return out
 
@@ -208,6 +211,7 @@ class OnboardFence:
                 self._hold(event.mission.items, now)
             elif isinstance(event, Downloaded) and event.items is not None:
                 self._hold(event.items, now)
+                self._due = max(self._due, now + _AFTER_READ)
             elif isinstance(event, Downloaded):
                 self._fail('it cannot be read back', now)
             elif isinstance(event, Failed):
