@@ -7,7 +7,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from uav_task_alloc.allocator.records import Allocation, TaskRecord, TaskState
-from uav_task_alloc.allocator.state.fleet import Fleet
 from uav_task_alloc.allocator.state.flight_pace import finish_time
 from uav_task_alloc.allocator.state.world import World
 from uav_task_alloc.allocator.state.zone_checks import blocked_text
@@ -89,12 +88,14 @@ def _counted(number: int, word: str) -> str:
     return f'{number} {word}' + 's' * (number != 1)
 
 
-def health_warnings(world: World, journal_error: str, solver_error: str = '') -> list[str]:
+def health_warnings(world: World, journal_error: str, solver_error: str = '',
+                    stamp: float | None = None) -> list[str]:
     """Return what an operator has to know.
 
     Args:
         world: of the allocator.
         journal_error, solver_error: '' where there is none.
+        stamp: [s] published clock; None: unknown.
 
     Returns:
         One sentence each; empty where all is well.
@@ -105,7 +106,7 @@ def health_warnings(world: World, journal_error: str, solver_error: str = '') ->
     warnings = [f'journal: {journal_error}'] if journal_error else []
     warnings += [world.admission.full] if world.admission.full else []
     warnings += [f'solver: {solver_error}'] if solver_error else []
-    warnings += _uav_warnings(fleet)
+    warnings += _uav_warnings(world, stamp)
     warnings += [f'{blocked}: no tasks'] if blocked else []
     warnings += [f'{uav_id} has no safe path home: {why}'
                  for uav_id, why in sorted(world.zone_checks.stranded.items())
@@ -118,9 +119,11 @@ def health_warnings(world: World, journal_error: str, solver_error: str = '') ->
     return warnings + (['no UAV available'] if open_tasks and not world.any_usable() else [])
 
 
-def _uav_warnings(fleet: Fleet) -> list[str]:
-    silent = sorted(uav_id for uav_id, record in fleet.records.items() if record.silent)
-    low = sorted(uav_id for uav_id, record in fleet.records.items() if record.low)
+def _uav_warnings(world: World, stamp: float | None) -> list[str]:
+    records, flights = sorted(world.fleet.records.items()), world.flights
+    silent = [uav_id for uav_id, record in records
+              if record.silent and not flights.in_battery_change(uav_id, stamp)]
+    low = [uav_id for uav_id, record in records if record.low]
     return [f'{text}: {first_of(uavs, _MAX_NAMED)}'
             for text, uavs in (('silent', silent), ('battery low', low)) if uavs]
 

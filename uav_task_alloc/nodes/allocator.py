@@ -331,7 +331,8 @@ class AllocatorNode(Node):
         if conflict != self.logged_conflict:
             self.logged_conflict = conflict
             self.get_logger().error(stopped if conflict else 'fleet_origin: all agree')
-        warnings = health_warnings(self.world, self.persistence.error, self.solver_error)
+        warnings = health_warnings(self.world, self.persistence.error, self.solver_error,
+                                   self.stamp())
         self.diagnostics.publish(from_diagnostics([allocator_row(
             self.get_fully_qualified_name(), [stopped] if stopped else warnings,
             {**health_values(self.world, self.core.schedule.busy, self.core.separation.texts()),

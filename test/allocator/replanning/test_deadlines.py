@@ -9,6 +9,7 @@ from allocation import AllocatorDriver
 from uav_task_alloc import plan
 from uav_task_alloc.allocator.records import AnnouncementAction
 from uav_task_alloc.allocator.replanning import planning
+from uav_task_alloc.allocator.status import health_warnings
 from uav_task_alloc.model import Task
 
 SPEED = 10.0  # [m/s]
@@ -246,6 +247,19 @@ def test_take_off_and_landing_use_endurance_beside_the_legs():
         made.add(at('t', 1200))  # 240 s of legs, 4 s of a stop
         made.settle()  # 24 s to climb to 50 m, 4 s to return at 60 m, 40 s down, 5 % for the rest
         assert made.state('t') == state
+
+
+def test_silence_during_a_battery_change_is_no_fault_until_it_takes_too_long():
+    made = driver(trips=2, route_end='home', uav_timeout=3.0)
+    for uav_id, battery in (('a', 0.3), ('b', 1.0)):
+        uav(made, uav_id, 0, range=900.0, battery=battery, standby=True, **FULL)
+    made.settle()
+    made.settle(wait=4.0, report=False)
+    assert any(note == 'a silent for 3 s at its base: its battery may be out'
+               for note in made.notes)
+    assert 'silent: b' in health_warnings(made.world, '', '', made.now)
+    made.settle(wait=200.0, report=False)
+    assert 'silent: a, b' in health_warnings(made.world, '', '', made.now)
 
 
 def test_with_one_trip_a_task_out_of_range_is_left_out_until_the_uav_is_full_again():

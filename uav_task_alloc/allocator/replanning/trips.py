@@ -11,10 +11,9 @@ from collections.abc import Collection
 from dataclasses import replace
 
 from uav_task_alloc.allocator.records import LaterTrips
+from uav_task_alloc.allocator.state.flights import OVERDUE
 from uav_task_alloc.allocator.state.world import World
 from uav_task_alloc.model import Plan, Uav
-
-_OVERDUE = 3.0  # times its turnaround after which a UAV at its home is not counted on
 
 
 def present_trips(chosen: Plan, later_only: Collection[str]) -> tuple[Plan, LaterTrips]:
@@ -91,7 +90,7 @@ def waiting_uavs(world: World, stamp: float) -> dict[str, Uav]:
         flight = world.flights.of(uav_id, stamp)
         landed = stamp + flight.pace.seconds((report.position, record.home)) if (
             since is None and flight) else since or stamp
-        if stamp - landed > _OVERDUE * report.turnaround:
+        if stamp - landed > OVERDUE * report.turnaround:
             continue
         uav = world.uav(uav_id)
         found[uav_id] = replace(

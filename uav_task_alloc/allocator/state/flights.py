@@ -28,6 +28,8 @@ _SMOOTHING = 0.3  # weight of a new time lost at a stop
 _SHORTEST_LEG = 1.0  # [s] at full speed below which a leg says nothing about stops
 _LONGEST_STOP = 20.0  # [s] a longer delay is not that of a stop
 _OWN_STOPS = 3  # stops after which a UAV has a mean of its own
+_USED = 0.95  # charge of a battery below which it may be changed
+OVERDUE = 3.0  # times its turnaround after which nobody seems to change the battery of a UAV
 _TAKEOFF = 4.0  # [s] from the command until it climbs at its rate: arming, spooling up
 
 
@@ -160,6 +162,31 @@ class Flights:
     def at_home_since(self, uav_id: str) -> float | None:
         """Return since when a UAV is on the ground at its home [s]; None: it is not."""
         return self._landed.get(uav_id)
+
+    def in_battery_change(self, uav_id: str, stamp: float | None = None) -> bool:
+        """Return whether the battery of a UAV may be out, so that its silence is no fault.
+
+        Args:
+            uav_id: of a known UAV.
+            stamp: [s] published clock; None: just after its landing.
+
+        Returns:
+            True for one without tasks at its base, with a used battery, for three times its
+            turnaround.
+        """
+        record, landed = self._fleet.records[uav_id], self._landed.get(uav_id)
+        turnaround, battery = record.report.turnaround, record.battery
+        if landed is None or turnaround is None or battery is None or battery >= _USED or (
+                self._lists.get(uav_id).stops):
+            return False
+        return stamp is None or stamp - landed <= OVERDUE * turnaround
+
+    def silence(self, uav_id: str) -> tuple[str, bool]:
+        """Return the line of the log about a UAV that reports no more, and whether it warns."""
+        text = f'{uav_id} silent for {self._params().uav_timeout:g} s'
+        if self.in_battery_change(uav_id):
+            return f'{text} at its base: its battery may be out', False
+        return f'{text}: its tasks go to the others', True
 
     @property
     def stop_time(self) -> float:

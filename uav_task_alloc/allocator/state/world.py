@@ -220,8 +220,7 @@ class World:
         """Apply what follows from time alone: UAVs become silent, or are forgotten."""
         for uav_id in self.fleet.mark_silent(now, self.params.uav_timeout):
             if self.fleet.records[uav_id].report.available:
-                self.note(f'{uav_id} silent for {self.params.uav_timeout:g} s: '
-                          'its tasks go to the others', warning=True)
+                self.note(*self.flights.silence(uav_id))
                 self.request_replan(f'{uav_id} silent', now)
         self.admission.forget_unconfirmed(now)
         if self.kernels_ready:
