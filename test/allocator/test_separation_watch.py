@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The allocator predicts from reports and lists who comes near whom, and lets one of them hold."""
 import math
+from dataclasses import replace
 
 import pytest
 from allocation import AllocatorDriver, task as point_task
@@ -150,3 +151,13 @@ def test_where_no_hold_helps_a_plan_is_asked_for():
     assert sky.steps[-1].alerts[0].action is AlertAction.UNRESOLVED
     assert 'u1 takes off' in sky.steps[-1].alerts[0].reason
     assert 'u1 and u2 lose separation' in str(sky.begin().trigger)
+
+
+def test_a_wait_of_the_plan_is_spent_before_the_leg_and_on_the_ground():
+    sky = Sky({'mode': 'STANDBY', 'standby': True, 'velocity': (0.0, 0.0, 0.0)},
+              {'mode': 'STANDBY', 'standby': True, 'velocity': (0.0, 0.0, 0.0)})
+    sky.report((0.0, 0.0, 0.0), (5.0, 0.0, 0.0))
+    stops = sky.world.lists.lists['u1'].stops
+    later = replace(stops[0], begin_after=sky.now + 300.0)
+    sky.world.lists.lists['u1'] = replace(sky.world.lists.lists['u1'], stops=(later,))
+    assert sky.step() == []  # u2 is away when u1 takes off

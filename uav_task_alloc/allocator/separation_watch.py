@@ -151,6 +151,10 @@ class SeparationWatch:
         points = [(0.0, place), (clock, place)]
         for k, stop in enumerate(stops):
             leg = (*stop.leg.via, stop.task.position)
+            waits_before = k > 0 or flight.on_ground  # as the bridge does, not at the task
+            if waits_before and stop.wait > 0.0:
+                clock += stop.wait
+                points.append((clock, place))
             if k == 0:
                 leg = leg[points_passed(place, leg):]
                 if climbs:
@@ -160,7 +164,9 @@ class SeparationWatch:
                     place, clock = top, clock + _SETS_OUT
             for timed in _along(place, leg, clock, flight.pace):
                 points.append(timed)
-            place, clock = stop.task.position, max(points[-1][0], stop.finish)
+            place = stop.task.position
+            clock = points[-1][0] + max(0.0, stop.task.service_time - stop.served)
+            clock += 0.0 if waits_before else stop.wait
             points.append((clock, place))
             if clock > HORIZON:
                 return points
