@@ -22,6 +22,7 @@ import sys
 import tempfile
 import time
 from collections import Counter
+from collections.abc import Callable
 from pathlib import Path
 
 import domain_coordinator
@@ -270,9 +271,15 @@ def figures(world: World, kills: int, recoveries: list[tuple[float, float]], see
     }
 
 
-def main() -> int:
-    """Measure, print, judge."""
-    parser = argparse.ArgumentParser(description=(__doc__ or '').partition('\n')[0])
+def measured(text: str | None, measure: Callable[[int, int, Process], dict[str, object]],
+             parameters: tuple[str, ...] = ()) -> dict[str, object]:
+    """Read the command line, kill an allocator in a network of its own, print the figures.
+
+    text: of `--help`.
+    measure: takes the kills, the seed and the process to kill.
+    parameters: of the allocator, as ROS arguments.
+    """
+    parser = argparse.ArgumentParser(description=(text or '').partition('\n')[0])
     parser.add_argument('--kills', type=int, default=200)
     parser.add_argument('--seed', type=int, default=1)
     parser.add_argument('--json', action='store_true')
@@ -284,9 +291,9 @@ def main() -> int:
         os.environ['FASTRTPS_DEFAULT_PROFILES_FILE'] = str(profile)
         os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'SUBNET'
         rclpy.init()
-        process = Process(folder)
+        process = Process(folder, parameters)
         try:
-            result = crash(args.kills, args.seed, process)
+            result = measure(args.kills, args.seed, process)
         finally:
             process.kill()
             rclpy.shutdown()
@@ -294,6 +301,12 @@ def main() -> int:
         print(f'{name:26} {value}', file=sys.stderr if args.json else sys.stdout)
     if args.json:
         print(json.dumps(result))
+    return result
+
+
+def main() -> int:
+    """Measure, print, judge."""
+    result = measured(__doc__, crash)
     wrong = ('tasks_lost', 'tasks_done_twice', 'revisions_fallen', 'availability_lost')
     return int(any(result[name] for name in wrong) or result['recovery_s_p99'] >= 2.0)
 

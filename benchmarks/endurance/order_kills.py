@@ -12,19 +12,13 @@ otherwise.
 """
 from __future__ import annotations
 
-import argparse
-import json
-import os
 import random
 import sys
-import tempfile
 import time
 from collections import Counter
-from pathlib import Path
 
-import domain_coordinator
 import rclpy
-from crash import LIMIT, NETWORK, Process
+from crash import LIMIT, Process, measured
 from geometry_msgs.msg import Point
 from rclpy.executors import SingleThreadedExecutor
 from uav_task_alloc_msgs import msg as m, srv
@@ -175,29 +169,7 @@ def run(kills: int, seed: int, process: Process) -> dict[str, object]:
 
 def main() -> int:
     """Measure, print, judge."""
-    parser = argparse.ArgumentParser(description=(__doc__ or '').partition('\n')[0])
-    parser.add_argument('--kills', type=int, default=200)
-    parser.add_argument('--seed', type=int, default=1)
-    parser.add_argument('--json', action='store_true')
-    args = parser.parse_args()
-    with domain_coordinator.domain_id() as domain, tempfile.TemporaryDirectory() as folder:
-        os.environ['ROS_DOMAIN_ID'] = str(domain)
-        profile = Path(folder, 'network.xml')
-        profile.write_text(NETWORK)
-        os.environ['FASTRTPS_DEFAULT_PROFILES_FILE'] = str(profile)
-        os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'SUBNET'
-        rclpy.init()
-        process = Process(folder, PARAMETERS)
-        try:
-            result = run(args.kills, args.seed, process)
-        finally:
-            process.kill()
-            rclpy.shutdown()
-    for name, value in result.items():
-        print(f'{name:26} {value}', file=sys.stderr if args.json else sys.stdout)
-    if args.json:
-        print(json.dumps(result))
-    return int(bool(result['fault_count']))
+    return int(bool(measured(__doc__, run, PARAMETERS)['fault_count']))
 
 
 if __name__ == '__main__':
