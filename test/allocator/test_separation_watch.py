@@ -156,6 +156,8 @@ def test_where_no_hold_helps_a_plan_is_asked_for():
 def test_a_wait_of_the_plan_is_spent_before_the_leg_and_on_the_ground():
     sky = Sky({'mode': 'STANDBY', 'standby': True, 'velocity': (0.0, 0.0, 0.0)},
               {'mode': 'STANDBY', 'standby': True, 'velocity': (0.0, 0.0, 0.0)})
+    for k, x in enumerate((0.0, 5.0)):
+        sky.more[k]['home'] = (x, 0.0, 0.0)
     sky.report((0.0, 0.0, 0.0), (5.0, 0.0, 0.0))
     stops = sky.world.lists.lists['u1'].stops
     later = replace(stops[0], begin_after=sky.now + 300.0)
