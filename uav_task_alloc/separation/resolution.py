@@ -32,7 +32,7 @@ from uav_task_alloc.separation.volumes import (
 )
 
 _LAYERS = 10  # above the ends of a leg, at most
-_HOLDS = (3.0, 6.0, 10.0, 15.0, 20.0, 30.0, 45.0, 60.0, 90.0, 120.0, 180.0, 240.0)  # [s]
+_HOLDS = (3.0, 6.0, 10.0, 15.0, 20.0, 30.0, 45.0, 60.0)  # [s] in the air
 _TAKE_OFFS = tuple(5.0 * k for k in range(1, 181))  # [s] that a UAV may wait on the ground
 _MOST_PATHS = 4  # the cheapest, with which waits are combined
 _PRICE = 0.15  # [s/m] of a climb above the ends of a leg, whose power a wait does not take

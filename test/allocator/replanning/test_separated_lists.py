@@ -5,9 +5,13 @@ from dataclasses import replace
 
 from allocation import AllocatorDriver
 
+from uav_task_alloc.allocator.core import make_safe_paths
+from uav_task_alloc.allocator.records import ListStop, UavList
 from uav_task_alloc.allocator.replanning.from_now import separation_of
 from uav_task_alloc.allocator.replanning.separated_lists import _flights
-from uav_task_alloc.model import Task
+from uav_task_alloc.allocator.replanning.task_lists import build_task_list
+from uav_task_alloc.model import Leg, Task, Uav
+from uav_task_alloc.params import AllocatorParams
 from uav_task_alloc.separation.conflicts import find_conflicts
 from uav_task_alloc.separation.volumes import flight_volumes
 
@@ -100,3 +104,15 @@ def test_without_separation_lists_have_no_waits_and_heights():
     driver = crossing(route_end='home')
     assert all(each.end_via == () and each.stops[0].begin_after == 0.0
                for each in driver.lists.values())
+
+
+def test_the_leg_under_way_keeps_its_heights_though_the_straight_one_is_shorter():
+    work = Task('t', (100.0, 0.0, 50.0))
+    via = ((0.0, 0.0, 60.0), (100.0, 0.0, 60.0))
+    published = UavList('u', 1, (ListStop(work, Leg(via, 120.0), 0.0),))
+    uav = Uav('u', (30.0, 0.0, 60.0))
+    paths = make_safe_paths((), AllocatorParams())
+    kept, dropped = (build_task_list(uav, [work], False, {}, published, paths, keep=keep)[0]
+                     for keep in (True, False))
+    assert kept.stops[0].leg.via == via
+    assert dropped.stops[0].leg.via == ()

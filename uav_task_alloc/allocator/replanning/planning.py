@@ -8,7 +8,12 @@ from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
 from uav_task_alloc.allocator.records import LaterTrips, ReplanAnswer, ReplanProblem, UavList
-from uav_task_alloc.allocator.replanning.from_now import counts_time, from_now, objective_of
+from uav_task_alloc.allocator.replanning.from_now import (
+    counts_time,
+    from_now,
+    objective_of,
+    separation_of,
+)
 from uav_task_alloc.allocator.replanning.held_deadlines import (
     relaxed_tasks,
     with_deadlines_held,
@@ -237,7 +242,8 @@ def _build(world: World, built: BuiltLists, uav_id: str, tasks: Sequence[Task], 
     """Build the list of a known UAV; returns the tasks that it cannot reach."""
     uav = world.uav(uav_id)
     new, unreachable = build_task_list(uav, tasks, returns, legs, world.list_of(uav_id),
-                                       world.paths(), world.flights.of(uav_id, stamp))
+                                       world.paths(), world.flights.of(uav_id, stamp),
+                                       separation_of(world.params).on)
     end = new.stops[-1].task.position if new.stops else uav.position
     built.lists[uav_id] = new
     built.paths_home[uav_id] = new.returns or not returns, end

@@ -32,7 +32,8 @@ def planned_legs(plan: Plan) -> dict[LegKey, Leg]:
 def build_task_list(uav: Uav, tasks: Sequence[Task], returns: bool,
                     legs: Mapping[LegKey, Leg], published: UavList,
                     paths: SafePaths,
-                    flight: UavFlight | None = None) -> tuple[UavList, list[str]]:
+                    flight: UavFlight | None = None,
+                    keep: bool = False) -> tuple[UavList, list[str]]:
     """Build the list of a route from the present position of a UAV.
 
     Args:
@@ -44,6 +45,8 @@ def build_task_list(uav: Uav, tasks: Sequence[Task], returns: bool,
         published: list in force, whose legs are kept while they are safe.
         paths: around the present zones.
         flight: of the UAV, for the times; None: as planned, from now.
+        keep: the leg under way stays while it is safe, whatever its length: its heights keep
+            UAVs apart.
 
     Returns:
         The list, and the ids of the tasks that no safe path leads to.
@@ -53,7 +56,7 @@ def build_task_list(uav: Uav, tasks: Sequence[Task], returns: bool,
     before, place = _START, uav.position
     for task in tasks:
         leg = _steady_leg(published, before, task, place, paths, _planned_leg(
-            legs, _leg_key(uav.id, before, task.id), place, task.position, paths))
+            legs, _leg_key(uav.id, before, task.id), place, task.position, paths), keep)
         if leg is None:
             unreachable.append(task.id)
             continue
@@ -92,7 +95,7 @@ def _planned_leg(legs: Mapping[LegKey, Leg], key: LegKey, a: Point, b: Point,
 
 
 def _steady_leg(published: UavList, before: str, task: Task, place: Point, paths: SafePaths,
-                fresh: Leg | None) -> Leg | None:
+                fresh: Leg | None, keep: bool) -> Leg | None:
     """The published leg while it is safe and not longer by the margin; else the fresh one."""
     stop = _published_stop(published, before, task)
     if stop is None:
@@ -104,7 +107,8 @@ def _steady_leg(published: UavList, before: str, task: Task, place: Point, paths
         metres = old.length if paths.clear(place, *old.via, task.position) else None
     if metres is None:
         return fresh
-    if fresh is not None and fresh.length + _WORTH < metres * (1.0 - paths.margin):
+    keep = keep and before == _START
+    if not keep and fresh is not None and fresh.length + _WORTH < metres * (1.0 - paths.margin):
         return fresh
     return Leg(old.via, metres)
 
