@@ -76,6 +76,7 @@ class OnboardFence:
         self.budget = budget
         self.wanted: tuple[Item, ...] | None = None  # None: not known yet
         self.held: tuple[Item, ...] | None = None  # on board; None: not known
+        self.possible: tuple[tuple[Item, ...], ...] = ()  # fences of which one is on board
         self.reason = ''  # of the last failure or refusal; '': none
         self.reset()
 
@@ -142,6 +143,7 @@ class OnboardFence:
             return []
         self._own = frozenset(map(item_key, (*self.held, *self.wanted)))
         self._remember(self._own)
+        self.possible = (self.held, self.wanted)
         self._no_space, self.reason, self.rejected = False, '', False
         return self.upload.replace(Mission(self.wanted), now)
 
@@ -218,7 +220,7 @@ class OnboardFence:
                 self._on_failure(event, now)
 
     def _hold(self, items: tuple[Item, ...], now: float) -> None:
-        self.held, self._checked_at = items, now
+        self.held, self._checked_at, self.possible = items, now, (items,)
         if self._is_wanted:
             self._failures = 0
             self.reason = self.reason if self.rejected else ''

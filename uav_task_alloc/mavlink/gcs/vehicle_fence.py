@@ -152,6 +152,9 @@ class VehicleFence:
         if not self._authority.allows(SendAction.READ):
             return []
         out = self.parameters.step(now)
+        if self.transfer.busy and not self._authority.allows(SendAction.UPLOAD) and (
+                self.state is FenceState.UPLOADING):
+            return self.transfer.cancel()  # its messages would be dropped
         if self.transfer.busy:
             return out + self.transfer.step(now)
         settled = not self._telemetry.airborne or now - self._changed_at >= _SETTLED or (
@@ -162,7 +165,10 @@ class VehicleFence:
 
     def clear_way(self, now: float) -> list[Message] | None:
         """A rule: wait where the list passes through a fence on board that is being changed."""
-        if not self.active or not self._blocks() or self.transfer.failures >= _MOST_FAILURES or (
+        if not self.active:
+            return None
+        self._choose(now, at_once=True)
+        if not self._blocks() or self.transfer.failures >= _MOST_FAILURES or (
                 not self._authority.allows(SendAction.UPLOAD)):
             return None
         return []
@@ -254,14 +260,15 @@ class VehicleFence:
 
     # the choice
 
-    def _choose(self, now: float) -> None:
+    def _choose(self, now: float, at_once: bool = False) -> None:
         policy, telemetry = self._policy(), self._telemetry
-        if now < self._choose_at or not telemetry.has_position or not policy.zones_known:
+        if (now < self._choose_at and not at_once) or not (
+                telemetry.has_position and policy.zones_known):
+            return
+        key = self._key(policy)
+        if key == self._chosen_for and (not self.fence.waiting or now < self._choose_at):
             return
         self._choose_at = now + _PERIOD
-        key = self._key(policy)
-        if key == self._chosen_for and not self.fence.waiting:
-            return
         space = self._space()
         self._chosen_for = key
         carried = self.fence.shapes if self.verified else ()
@@ -306,9 +313,9 @@ class VehicleFence:
     def _blocks(self) -> bool:
         """Whether the list passes where the fence on board forbids it, and is to be changed."""
         transfer = self.transfer
-        if not transfer.held or not transfer.is_own or self.verified or transfer.wanted is None:
+        if self.verified or transfer.wanted is None or (
+                transfer.held is not None and not transfer.is_own):
             return False
         space = replace(self._space(), position=None)
-        kept = set(self.fence.shapes)
-        return any(space.enters(shape) for shape in shapes_of_items(transfer.held, self._origin)
-                   if shape not in kept)
+        return any(space.enters(shape) for items in transfer.possible
+                   for shape in shapes_of_items(items, self._origin))
