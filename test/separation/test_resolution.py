@@ -109,6 +109,16 @@ def test_two_legs_under_way_are_left_to_others():
     assert [each.resolution for each in result.conflicts] == ['']
 
 
+@pytest.mark.parametrize('tried', [0, 1, 3])
+def test_a_search_that_is_stopped_says_so_and_tries_no_more(tried):
+    polls = iter(range(tried, -10**6, -1))
+    flights = [flight(f'u{k}', (0, 5.0 * k, 30), (FAR, 5.0 * k, 30)) for k in range(6)]
+    result = resolve(flights, RULE, TransitLimits(stop=lambda: next(polls) <= 0))
+    assert next(polls) == -1  # no poll after that which ended it
+    assert {each.detail for each in result.conflicts if not each.resolution} == {
+        'no change was found in time'}
+
+
 def test_a_height_that_a_zone_forbids_is_not_used():
     flights = ENCOUNTERS['crossing']
     limits = TransitLimits(is_clear=lambda points: max(z for _, _, z in points) < 38.0)

@@ -50,7 +50,7 @@ class TransitLimits:
     Attributes:
         altitude_min, altitude_max: [m] ENU.
         is_clear: whether a polyline [m] ENU enters no zone.
-        stop: polled between legs; True ends the search for changes.
+        stop: polled before each change that is tried; True ends the search for changes.
     """
 
     altitude_min: float = -math.inf  # [m]
@@ -118,6 +118,7 @@ class _Planner:
     def __init__(self, flights: Sequence[Flight], rule: Separation,
                  limits: TransitLimits) -> None:
         self.flights, self.changes = list(flights), dict[LegIndex, _Change]()
+        self.stopped = False  # changes that might help were not tried
         self._rule, self._limits = rule, limits
         self._accepted = AcceptedRows(rule)
 
@@ -136,7 +137,7 @@ class _Planner:
         for n in range(len(flight.legs)):
             leg = flight.legs[n]
             fixed = fixed and not leg.movable
-            if leg.movable and not self._limits.stop():
+            if leg.movable and not self.stopped:
                 change = self._changed(flight, k, n, ready)
                 if change is not None and change.kind:
                     self.changes[k, n] = change
@@ -171,6 +172,9 @@ class _Planner:
         options = [(path.seconds + price * wait, wait, number) for number, path in enumerate(paths)
                    for wait in (0.0, *(waits if number < _MOST_PATHS else ()))]
         for _, wait, number in sorted(options):
+            if self._limits.stop():
+                self.stopped = True
+                break
             option = _with_wait(paths[number], planned.begin, wait)
             times = leg_times(flight, option.leg, ready, n == 0)
             if option.kind and self._is_apart(flight, k, n, option.leg, times) and (
@@ -300,8 +304,9 @@ def _explained(before: Sequence[Flight], planner: _Planner, each: FoundConflict,
             kinds.append(change.kind)
     still = any(other.flights == each.flights and other.legs == each.legs for other in left)
     kind = '' if still else 'height' if 'height' in kinds else 'hold'
+    failed = 'no change was found in time' if planner.stopped else 'no height or wait resolves it'
     return Conflict(uavs, ends, each.time, each.horizontal, each.vertical, kind,
-                    'no height or wait resolves it' if still else '; '.join(texts))
+                    failed if still else '; '.join(texts))
 
 
 def _task_of(flights: Sequence[Flight], each: FoundConflict, side: int) -> str:

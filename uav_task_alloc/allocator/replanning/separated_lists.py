@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import replace
+from itertools import count
 
 from uav_task_alloc.allocator.records import ListStop, UavList
 from uav_task_alloc.allocator.replanning.from_now import separation_of
@@ -16,6 +17,7 @@ from uav_task_alloc.model import Leg, Point
 from uav_task_alloc.separation.resolution import TransitLimits, resolve
 from uav_task_alloc.separation.volumes import Flight, FlightLeg
 
+_MOST_CHANGES = 10_000  # tried, so that a callback ends: half a second without zones
 _LEAST = 1.0  # [s] of a wait; a shorter one is no change
 
 
@@ -35,9 +37,10 @@ def with_separation(world: World, built: BuiltLists, stamp: float) -> BuiltLists
         return built
     lists = {uav_id: _with_high_return(world, each) for uav_id, each in built.lists.items()}
     flights = _flights(world, lists, stamp)
+    tried = count()
     found = resolve(list(flights.values()), rule, TransitLimits(
         world.params.altitude_min, world.params.altitude_max,
-        lambda points: world.paths().clear(*points)))
+        lambda points: world.paths().clear(*points), lambda: next(tried) >= _MOST_CHANGES))
     for before, after in zip(flights.values(), found.flights, strict=True):
         if before is not after:
             lists[after.uav] = _changed_list(world, lists[after.uav], before, after, stamp)
