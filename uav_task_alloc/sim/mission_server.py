@@ -38,7 +38,6 @@ class MissionServer:
         self.items: list[StoredItem] = []
         self.out: list[Message] = []
         self._system_id = system_id
-        self._capacity = capacity
         self.stores = {MISSION_TYPE: self.items}  # by MAV_MISSION_TYPE
         self.capacities = {MISSION_TYPE: capacity}
         self.on_fence: Callable[[], None] = lambda: None  # called when the fence is stored

@@ -258,11 +258,14 @@ def command(number, *params):
 READS = [
     d.MAVLink_mission_request_list_message(1, 1), d.MAVLink_mission_request_int_message(1, 1, 0),
     d.MAVLink_mission_request_message(1, 1, 0), d.MAVLink_mission_ack_message(1, 1, 0),
+    d.MAVLink_param_request_read_message(1, 1, b'RTL_ALT', -1),
     command(d.MAV_CMD_SET_MESSAGE_INTERVAL), command(d.MAV_CMD_REQUEST_MESSAGE)]
 UPLOADS = [
     d.MAVLink_mission_count_message(1, 1, 3),
     d.MAVLink_mission_item_int_message(1, 1, 0, 0, 16, 0, 1, 0, 0, 0, 0, 0, 0, 0.0),
-    d.MAVLink_mission_ack_message(1, 1, d.MAV_MISSION_OPERATION_CANCELLED)]
+    d.MAVLink_mission_ack_message(1, 1, d.MAV_MISSION_OPERATION_CANCELLED),
+    d.MAVLink_mission_clear_all_message(1, 1, d.MAV_MISSION_TYPE_FENCE),
+    d.MAVLink_mission_clear_all_message(1, 1, d.MAV_MISSION_TYPE_RALLY)]
 KNOWN_COMMANDS = ('DO_SET_MODE', 'COMPONENT_ARM_DISARM', 'NAV_TAKEOFF', 'DO_SET_MISSION_CURRENT',
                   'MISSION_START', 'DO_PAUSE_CONTINUE', 'NAV_RETURN_TO_LAUNCH', 'DO_REPOSITION',
                   'DO_FLIGHTTERMINATION', 'NAV_LAND')
@@ -273,6 +276,8 @@ def test_each_message_type_is_a_read_an_upload_or_a_command():
     assert {action_of(m) for m in UPLOADS} == {SendAction.UPLOAD}
     for name in KNOWN_COMMANDS:
         assert action_of(command(getattr(d, 'MAV_CMD_' + name))) is SendAction.COMMAND
+    assert action_of(d.MAVLink_mission_clear_all_message(
+        1, 1, d.MAV_MISSION_TYPE_MISSION)) is SendAction.COMMAND
     harmless = {m.get_type() for m in READS + UPLOADS}
     for number, kind in d.mavlink_map.items():
         message = kind.__new__(kind)

@@ -150,7 +150,7 @@ def test_finding_26_a_horizon_grows_again_when_there_is_space(kind):
     bench.assign(task_list('ABCDEFGHIJ'))
     assert bench.run(lambda: bench.completed() == ['A'])
     assert max(len(bench.vehicles[1].mission.items), 5) == 5
-    bench.vehicles[1].mission._capacity = 100
+    bench.vehicles[1].mission.capacities[d.MAV_MISSION_TYPE_MISSION] = 100
     assert bench.run(lambda: len(bench.completed()) == 10, 600.0)
     assert places(bench) == list('ABCDEFGHIJ')
     counts = [m.count - bench.onboard().own for m in bench.line.sent('MISSION_COUNT')]

@@ -7,10 +7,10 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from uav_task_alloc.allocator.records import Proposal, UavList
+from uav_task_alloc.allocator.replanning.from_now import separation_of
 from uav_task_alloc.allocator.replanning.held_deadlines import held_lists
 from uav_task_alloc.allocator.replanning.plan_acceptance import TaskIdsByUav, exchange_groups
 from uav_task_alloc.allocator.replanning.planning import BuiltLists, build_lists
-from uav_task_alloc.allocator.replanning.separated_lists import with_separation
 from uav_task_alloc.allocator.state.flight_pace import finish_time
 from uav_task_alloc.allocator.state.world import World
 from uav_task_alloc.errors import first_of
@@ -72,8 +72,13 @@ def split_plan(world: World, chosen: Plan, trigger: str, stamp: float) -> SplitP
 def _held(world: World, built: BuiltLists, stamp: float) -> BuiltLists:
     """Lists that are apart, without those that would break a deadline that is accepted."""
     lists, why = held_lists(world, built.lists, stamp)
-    return with_separation(world, replace(
-        built, lists=lists, left_out={**built.left_out, **why}), stamp)
+    built = replace(built, lists=lists, left_out={**built.left_out, **why})
+    if not separation_of(world.params).on:
+        return built
+    from uav_task_alloc.allocator.replanning.separated_lists import (  # imports numba
+        with_separation,
+    )
+    return with_separation(world, built, stamp)
 
 
 def holding_plan(world: World, plans: Sequence[Plan], stamp: float) -> Plan:

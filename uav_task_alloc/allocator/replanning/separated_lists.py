@@ -25,20 +25,18 @@ def with_separation(world: World, built: BuiltLists, stamp: float) -> BuiltLists
     """Return the lists of a plan with heights and waits that keep the UAVs apart.
 
     Args:
-        world: with the lists in force, whose first legs under way stay as they are.
+        world: with the lists in force, whose first legs under way stay as they are; separation
+            is on.
         built: the lists that would be put in force.
         stamp: [s] published clock.
 
     Returns:
-        The same lists where separation is off, or nothing is in conflict.
+        The same lists where nothing is in conflict.
     """
-    rule = separation_of(world.params)
-    if not rule.on:
-        return built
     lists = {uav_id: _with_high_return(world, each) for uav_id, each in built.lists.items()}
     flights = _flights(world, lists, stamp)
     tried = count()
-    found = resolve(list(flights.values()), rule, TransitLimits(
+    found = resolve(list(flights.values()), separation_of(world.params), TransitLimits(
         world.params.altitude_min, world.params.altitude_max,
         lambda points: world.paths().clear(*points), lambda: next(tried) >= _MOST_CHANGES))
     for before, after in zip(flights.values(), found.flights, strict=True):

@@ -74,7 +74,7 @@ class ArduPilotMissionServer(MissionServer):
     @property
     def _space(self) -> int:
         """Items that can be stored now."""
-        return 0 if self.flight.boot.booting else self._capacity
+        return 0 if self.flight.boot.booting else self.capacities[MISSION_TYPE]
 
     def read(self, seq: int) -> StoredItem:
         return self.flight.home_item() if seq == 0 else self.items[seq]
