@@ -114,6 +114,33 @@ def test_one_on_the_ground_waits_for_one_that_lands_beside_it():
     assert sky.step() == [('u1', False)]
 
 
+@pytest.mark.parametrize('rate', [1.0, 8.0])  # of the published clock
+def test_a_silent_uav_is_in_the_way_for_half_a_minute_of_the_published_clock(rate):
+    sky = Sky({}, {'velocity': (0.0, 0.0, 0.0)})
+    begin, ended = sky.now, None
+    while ended is None:
+        sky.now += 0.5 / rate
+        stamp = begin + rate * (sky.now - begin)
+        sky.uav('u1', -60.0, 0.0, 50.0, **sky.more[0])
+        if stamp - begin < 5.0:
+            sky.uav('u2', 0.0, 0.0, 50.0, **sky.more[1])
+        sky.world.fleet.mark_silent(sky.now, 2.0 / rate)
+        ended = next((stamp - begin for hold in sky.core.separate(sky.now, stamp).holds
+                      if (hold.uav, hold.hold) == ('u1', False)), None)
+    assert 36.0 <= ended <= 38.5
+
+
+def test_a_silent_uav_is_where_its_velocity_has_taken_it():
+    sky = Sky({}, {'velocity': (15.0, 0.0, 0.0)})  # ahead of u1 on its way
+    sky.report((-60.0, 0.0, 50.0), (-30.0, 0.0, 50.0))
+    sky.world.fleet.mark_silent(sky.now + 3.0, 2.0)
+    sky.report((-60.0, 0.0, 50.0))
+    sky.world.fleet.mark_silent(sky.now + 3.0, 2.0)
+    for k in range(40):
+        sky.uav('u1', -60.0 + 7.5 * k, 0.0, 50.0, **sky.more[0])
+        assert sky.step() == []
+
+
 def test_holds_are_renewed_and_expire_within_a_minute():
     sky = Sky({}, {'authority': 'LOST', 'velocity': (0.0, 0.0, 0.0)})
     for _ in range(120):

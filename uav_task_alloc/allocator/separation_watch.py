@@ -28,7 +28,7 @@ from uav_task_alloc.separation.monitor import (
 from uav_task_alloc.separation.prediction import HORIZON, Way
 
 _PERIOD = 0.5  # [s] of the published clock between two steps
-_FORGOTTEN = 30.0  # [s] after which a silent UAV is not predicted any more
+_FORGOTTEN = 30.0  # [s] of the published clock for which a silent UAV is still predicted
 _ARMING = 3.0  # [s] on the ground before it climbs
 _SETS_OUT = 4.0  # [s] between the end of a take-off and the leg
 _ACCELERATION = 2.5  # [m/s2]
@@ -48,6 +48,7 @@ class SeparationWatch:
     def __init__(self, world: World) -> None:
         self._world, self.monitor = world, SeparationMonitor()
         self._stepped = -math.inf  # [s] published clock
+        self._silent: dict[str, float] = {}  # by id: published clock [s] when it was found silent
 
     def step(self, now: float, stamp: float, lists_changed: bool) -> MonitorStep:
         """Predict and decide, where it is time or lists have changed.
@@ -66,7 +67,7 @@ class SeparationWatch:
             return MonitorStep()
         self._stepped = stamp
         uavs = {uav_id: each for uav_id, record in self._world.uav_records().items()
-                if (each := self._monitored(uav_id, record, now, stamp)) is not None}
+                if (each := self._monitored(uav_id, record, stamp)) is not None}
         step = self.monitor.step(stamp, uavs, rule)
         for alert in step.alerts:
             self._world.note(alert.text, warning=alert.action in (AlertAction.HOLD,
@@ -84,13 +85,14 @@ class SeparationWatch:
                     found[uav_id] = '; '.join(filter(None, (found.get(uav_id), alert.text)))
         return found
 
-    def _monitored(self, uav_id: str, record: UavRecord, now: float, stamp: float
+    def _monitored(self, uav_id: str, record: UavRecord, stamp: float
                    ) -> MonitoredUav | None:
         """A UAV with what it does next; None: it is on the ground to stay, or lost."""
         report, flight = record.report, self._world.flights.of(uav_id, stamp)
         hold = self._world.orders.holds.get(uav_id)
         is_held = hold is not None and hold.hold
-        if (record.silent and now - record.received > _FORGOTTEN) or flight is None:
+        silent = self._silent_for(uav_id, record, stamp)
+        if silent > _FORGOTTEN or flight is None:
             return None
         if report.standby:
             stops = self._stops(uav_id, stamp, flight)
@@ -101,12 +103,21 @@ class SeparationWatch:
         if record.silent or report.foreign or report.mode == 'FAULT' or (
                 report.authority not in _OURS):
             why = 'is silent' if record.silent else 'is not flown by the allocator'
-            return MonitoredUav(self._way(record, _drift(record)), (_FOREIGN,), False,
+            return MonitoredUav(self._way(record, _drift(record, silent)), (_FOREIGN,), False,
                                 f'{uav_id} {why}')
         if is_held:
             return MonitoredUav(self._way(record, [(0.0, report.position)]), (_HELD,), False,
                                 f'an operator holds {uav_id}')
         return self._flying(uav_id, record, flight, stamp)
+
+    def _silent_for(self, uav_id: str, record: UavRecord, stamp: float) -> float:
+        """For how long a UAV has been known to be silent [s], of the published clock."""
+        if not record.silent:
+            self._silent.pop(uav_id, None)
+            return 0.0
+        if self._silent.setdefault(uav_id, stamp) > stamp:  # the clock jumped back
+            self._silent[uav_id] = stamp
+        return stamp - self._silent[uav_id]
 
     def _flying(self, uav_id: str, record: UavRecord, flight: UavFlight, stamp: float
                 ) -> MonitoredUav:
@@ -204,11 +215,12 @@ def _home(points: _TimedPoints, record: UavRecord, pace: FlightPace,
     return [*points, *_along(place, (*via, above, home), clock, pace)]
 
 
-def _drift(record: UavRecord) -> _TimedPoints:
-    """Where its velocity takes a UAV, down to the height of its home."""
+def _drift(record: UavRecord, age: float = 0.0) -> _TimedPoints:
+    """Where its velocity takes a UAV, down to the height of its home, `age` [s] after a report."""
     x, y, z = record.report.position
     vx, vy, vz = record.report.velocity or (0.0, 0.0, 0.0)
     low = min(z, record.home[2])
+    x, y, z = x + vx * age, y + vy * age, max(low, z + vz * age)
     ends = [HORIZON] if z + vz * HORIZON >= low else [(low - z) / vz, HORIZON]
     return [(0.0, (x, y, z)), *((t, (x + vx * t, y + vy * t, max(low, z + vz * t)))
                                 for t in ends)]
