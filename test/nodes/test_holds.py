@@ -1,13 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Holds on `<uav_id>/hold` through a real bridge to both simulated autopilots, over a kill."""
+"""Holds and returns through a real bridge to both simulated autopilots, over a kill."""
+import math
 import signal
 
 import pytest
 from builtin_interfaces.msg import Time
 from test_mavlink_bridge import Sky
 from uav_task_alloc_msgs import msg as m
+from uav_task_alloc_msgs.srv import ReturnUav
 
-from uav_task_alloc.nodes.conversions.messages import LATCHED
+from uav_task_alloc.model import Task
+from uav_task_alloc.nodes.conversions.messages import ANNOUNCEMENTS, LATCHED, announcement
 
 pytestmark = pytest.mark.ros
 S = m.UavState
@@ -65,3 +68,51 @@ def test_a_separation_hold_expires_and_a_bad_message_is_named(sky):
     text = sky.bridge.output()
     assert "uav_1/hold: uav_id = 'uav_2': expected uav_1: ignored" in text
     assert 'goes on: separation ended its hold' in text
+
+
+def give_work(start, probe, sky):
+    """Start an allocator and wait until both UAVs fly to its tasks, which are far apart."""
+    start('allocator', '-p', 'route_end:=hold', '-p', 'uav_timeout:=60.0')
+    tasks = [Task(f't{k}', (600.0 * (k % 2) - 300.0, 600.0 + 150.0 * k, 50.0)) for k in range(6)]
+    probe.publisher(m.TaskAnnouncement, 'task_announcements', ANNOUNCEMENTS).publish(
+        announcement(m.TaskAnnouncement.ADD, tasks, 1.0))
+    probe.until(lambda: all(mode == S.ON_MISSION for mode in modes(sky).values()), 150.0)
+    return {task.id for task in tasks}
+
+
+def order_home(probe, uav_id, dry_run=False):
+    return probe.call(ReturnUav, 'allocator/return_uav',
+                      ReturnUav.Request(uav_id=uav_id, operator_name='ann', dry_run=dry_run))
+
+
+@pytest.mark.parametrize('n', [1, 2])
+def test_a_uav_that_is_ordered_home_lands_there_and_its_tasks_move_on(start, probe, sky, n):
+    tasks = give_work(start, probe, sky)
+    given = order_home(probe, f'uav_{n}')
+    assert (given.success, given.order_id) == (True, 'o1'), given.message
+    probe.until(lambda: modes(sky)[n] in (S.RETURNING, S.LANDING), 60.0)
+    probe.until(lambda: modes(sky)[n] == S.STANDBY and sky.states[f'uav_{n}'].authority == S.NONE,
+                120.0)
+    place = sky.states[f'uav_{n}'].position
+    assert math.hypot(place.x - 20.0 * n, place.y) < 3.0  # of its home, where it started
+    assert abs(place.z) < 1.0
+    probe.until(lambda: {*sky.completed(1), *sky.completed(2)} == tasks, 120.0)
+    assert modes(sky)[n] == S.STANDBY
+
+
+def test_a_uav_of_a_pilot_is_not_ordered_home(start, probe, sky):
+    give_work(start, probe, sky)
+    with sky.fleet._lock:
+        assert sky.fleet.vehicles['uav_1'].rc_mode(5)  # LOITER, by the switch
+    probe.until(lambda: sky.states['uav_1'].authority == S.LOST)
+    probe.until(lambda: not order_home(probe, 'uav_1', True).success)
+    refused = order_home(probe, 'uav_1')
+    assert 'uav_1, whose bridge has no authority (' in refused.message
+    assert 'LOITER' in refused.message
+    all_others = order_home(probe, '')
+    assert all_others.success
+    assert 'uav_1, whose bridge has no authority (' in all_others.message
+    probe.until(lambda: modes(sky)[2] == S.STANDBY and sky.states['uav_2'].authority == S.NONE,
+                120.0)
+    assert sky.states['uav_1'].authority == S.LOST
+    assert modes(sky)[1] == S.UNKNOWN  # LOITER still, which is no mode of the bridge
