@@ -2,6 +2,7 @@
 """scenario_player as a process: what it announces, when, and what it does before and after."""
 import pytest
 from rosgraph_msgs.msg import Clock
+from test_allocator import Fleet
 from uav_task_alloc_msgs import msg as m
 from uav_task_alloc_msgs.srv import SetAvailability
 
@@ -55,6 +56,30 @@ def test_everything_is_announced_in_order_at_its_time(start, probe, file):
         ['z1'], ['z1', 'z2'], ['z1']]
     assert zones[0].zones[0].shape == Shape.HEMISPHERE.value
     assert deaths == [('uav_1', False)]
+
+
+def test_orders_are_given_when_their_tasks_are_planned(start, probe, tmp_path):
+    path = tmp_path / 'ordered.yaml'
+    path.write_text(TEXT.replace(', dies_at: 4', '').replace('at: 8', 'at: 40') + """orders:
+  - {at: 1, order: next, uav: uav_1, tasks: [t1]}
+  - {at: 7, order: forbid, uav: uav_1, tasks: [t2]}
+  - {at: 8, order: pin, uav: uav_1, tasks: [t2]}
+""")
+    fleet = Fleet(probe)
+    player = start('scenario_player', '-p', f'scenario:={path}', '-p', 'speedup:=8.0')
+    start('allocator', '-p', 'uav_timeout:=60.0', '-p', 'route_end:=hold')
+    probe.until(lambda: '1.0 s: orders: next of uav_1 t1' in player.output(), 60.0)
+    assert ' in force ' not in player.output()  # no UAV is known
+    fleet.uav('uav_1', 0.0)
+    probe.until(lambda: 'refused: ' in player.output(), 150.0, player.output)
+    lines = [line.partition(']: ')[2] for line in player.output().splitlines()]
+    first, second, third = (line for line in lines
+                            if ' in force as ' in line or 'refused: ' in line)
+    assert first.startswith('order uav_1: t1: in force as o1')
+    assert second.startswith('forbid t2 to uav_1: in force as o2')
+    assert third.startswith('order pin t2 to uav_1: refused: ')
+    assert 'it contradicts order o2 of scenario_player (forbid t2 to uav_1)' in third
+    probe.until(lambda: fleet.route('uav_1') == ['t1'])
 
 
 def test_keys_that_a_flight_ignores_are_named(start, probe, tmp_path):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Announces the tasks and zones of a scenario file at their times, and lets UAVs fail."""
+"""Announces tasks and zones of a scenario file at their times, gives its orders, fails UAVs."""
 from __future__ import annotations
 
 import time
@@ -26,6 +26,7 @@ from uav_task_alloc.nodes.ros.clock_watch import (
 )
 from uav_task_alloc.nodes.ros.parameters import declare, given
 from uav_task_alloc.nodes.ros.run import run
+from uav_task_alloc.nodes.ros.scenario_orders import ScenarioOrders
 from uav_task_alloc.params import PlayerParams
 
 _PERIOD = 0.02  # [s]
@@ -40,9 +41,12 @@ class ScenarioPlayer(Node):
         `task_announcements` (TaskAnnouncement), `threat_zones` (ThreatZoneArray); both latched;
         `/clock` (Clock) where the parameter `clock` is true.
     Subscribes to:
-        `allocation` (Allocation), where `wait_for_plan` is set.
+        `allocation` (Allocation), where `wait_for_plan` is set or the scenario has orders;
+        `task_statuses` (TaskStatusArray), where it has orders.
     Service clients:
-        `fleet_sim/set_alive` (SetAvailability).
+        `fleet_sim/set_alive` (SetAvailability);
+        `allocator/pin_task` (PinTask), `allocator/forbid_task` (ForbidTask),
+        `allocator/order_tasks` (OrderTasks), where the scenario has orders.
     Parameters:
         PlayerParams, see docs/parameters.md.
     """
@@ -65,6 +69,7 @@ class ScenarioPlayer(Node):
         self.zones = self.create_publisher(m.ThreatZoneArray, 'threat_zones', LATCHED)
         self.set_alive = self.create_client(SetAvailability, 'fleet_sim/set_alive')
         self.failing: list[str] = []  # UAVs whose failure is not yet requested
+        self.orders = ScenarioOrders(self) if played.orders else None
         if self.leads:
             self.clock_publisher = ClockPublisher(self, self.now, yields=True)
         watch_clock(self, self.get_logger().warning)
@@ -91,6 +96,8 @@ class ScenarioPlayer(Node):
                 self.get_logger().info('everything is announced')
         if self.failing and self.set_alive.service_is_ready():
             self.request_failure(self.failing.pop(0))
+        if self.orders:
+            self.orders.step()
 
     def now(self) -> float:
         """Time of the scenario's clock [s]: /clock, or `speedup` times the steady clock."""
@@ -123,6 +130,8 @@ class ScenarioPlayer(Node):
         if moment.cancels:
             self.tasks.publish(announcement(m.TaskAnnouncement.CANCEL, moment.cancels, now))
         self.failing += moment.deaths
+        if self.orders:
+            self.orders.waiting += moment.orders
         self.get_logger().info(describe(moment))
 
     def request_failure(self, uav_id: str) -> None:
@@ -141,7 +150,8 @@ def describe(moment: scenario.Moment) -> str:
     parts = [] if moment.zones is None else [f'{len(moment.zones)} zones']
     for word, names in (('new', [task.id for task in moment.tasks]),
                         ('cancelled', [task.id for task in moment.cancels]),
-                        ('dies', list(moment.deaths))):
+                        ('dies', list(moment.deaths)),
+                        ('orders', [order.text for order in moment.orders])):
         parts += [f'{word}: {", ".join(names)}'] if names else []
     return f'{moment.at:.1f} s: ' + '; '.join(parts)
 

@@ -8,11 +8,12 @@ from uav_task_alloc.scenario.values import (
     Cancel,
     Scenario,
     ScenarioUav,
+    TimedOrder,
     TimedTask,
     TimedZone,
 )
 from uav_task_alloc.scenario.write import to_yaml
 
-__all__ = ['Cancel', 'Moment', 'Scenario', 'ScenarioUav', 'TimedTask', 'TimedZone',
+__all__ = ['Cancel', 'Moment', 'Scenario', 'ScenarioUav', 'TimedOrder', 'TimedTask', 'TimedZone',
            'fleet_parameters', 'from_zero', 'generate', 'load', 'parse', 'simulation_parameters',
            'timeline', 'to_yaml']

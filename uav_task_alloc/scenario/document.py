@@ -27,6 +27,8 @@ tasks:
   - {id: t2, position: [-200, 500, 60], at: 30}
 zones:
   - {id: z1, shape: hemisphere, center: [150, 200, 0], radius: 80, margin: 5}
+orders:
+  - {at: 40, order: pin, uav: uav_1, tasks: [t2]}
 ```
 
 The same in degrees; altitudes, z_min and z_max stay in metres above the origin:
@@ -57,7 +59,9 @@ demo.yaml:15: scenario.tasks[1]: unknown key 'priority': expected one of ...; ne
 ```
 
 `arrivals` are random tasks, drawn from `seed` when the file is read: the same file always has the
-same tasks.
+same tasks. `orders` are given in a flight one after the other, by the services of the allocator
+(docs/operator.md), with `scenario_player` as operator; its log has the answer to each, and the
+reason of one that is refused.
 """
 
 

@@ -25,6 +25,7 @@ from uav_task_alloc.scenario.values import (
     Scenario,
     ScenarioUav,
     ScenarioWind,
+    TimedOrder,
     TimedTask,
     TimedZone,
 )
@@ -97,7 +98,8 @@ def parse(text: str, name: str = 'scenario') -> Scenario:
                     root['speedup'], root['clearance'], root['altitude_min'],
                     root['altitude_max'], _objective(root['objective']), root['trips'],
                     ScenarioWind(**root['wind'].values) if root['wind'] else ScenarioWind(),
-                    _separation(root['separation']))
+                    _separation(root['separation']),
+                    _orders(root['orders'], times, [uav.id for uav in uavs]))
 
 
 def _separation(given: YamlRow | None) -> Separation:
@@ -205,6 +207,24 @@ def _cancel(row: YamlRow, times: dict[str, float]) -> Cancel:
     if row['at'] < times[row['task']]:
         raise row.refuse('at', f'not before it is announced at {times[row["task"]]:g}')
     return Cancel(row['at'], row['task'])
+
+
+def _orders(rows: Iterable[YamlRow], times: dict[str, float],
+            uavs: list[str]) -> tuple[TimedOrder, ...]:
+    for row in rows:
+        tasks = row['tasks']
+        if row['uav'] not in uavs:
+            raise row.refuse('uav', _one_of('UAVs', row['uav'], uavs))
+        for name in tasks:
+            if name not in times:
+                raise row.refuse('tasks', _one_of('tasks', name, times))
+            if row['at'] < times[name]:
+                raise row.refuse('at', f'not before {name} is announced at {times[name]:g}')
+        if len(set(tasks)) < len(tasks):
+            raise row.refuse('tasks', 'each task once')
+        if row['order'] != 'next' and len(tasks) > 1:
+            raise row.refuse('tasks', f'one task to {row["order"]}')
+    return tuple(sorted((TimedOrder(**row.values) for row in rows), key=lambda order: order.at))
 
 
 def _arrivals(row: YamlRow, zones: Iterable[TimedZone], tasks: list[TimedTask],

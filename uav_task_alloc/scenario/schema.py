@@ -172,6 +172,15 @@ CANCEL: KeyTable = {
     'at': Key(_TIME, '[s]'),
 }
 
+_ORDER: KeyTable = {
+    'at': Key(_TIME, '[s] when it is given, or later: once the allocator has planned its tasks '
+              'and knows its UAV'),
+    'order': Key(choice('pin', 'forbid', 'next'), 'pin: only this UAV may fly the task; forbid: '
+                 'it may not; next: it flies these tasks next, in this order'),
+    'uav': Key(ROS_NAME, 'id of the UAV'),
+    'tasks': Key(list_of(ID, 'a list of ids of tasks', 1), 'of pin and forbid one'),
+}
+
 SCENARIO: KeyTable = {
     'name': Key(NAME, 'name; default: the name of the file', None),
     'seed': Key(whole_number(0, 2**32 - 1), 'of all random values', 0),
@@ -207,8 +216,10 @@ SCENARIO: KeyTable = {
                     'tasks at random times and places; default: none', None),
     'cancels': Key(list_of(mapping(CANCEL, 'a cancel'), 'a list of cancels'),
                    'tasks that are withdrawn', ()),
+    'orders': Key(list_of(mapping(_ORDER, 'an order'), 'a list of orders'), 'orders of an operator'
+                  ' in a flight, docs/operator.md; `plan` ignores them', ()),
 }
 
 TABLES = {'scenario': SCENARIO, 'origin': ORIGIN, 'objective': OBJECTIVE, 'wind': _WIND,
           'separation': SEPARATION, 'uavs': UAV, 'tasks': TASK, 'zones': _ZONE,
-          'arrivals': _ARRIVALS, 'cancels': CANCEL}
+          'arrivals': _ARRIVALS, 'cancels': CANCEL, 'orders': _ORDER}

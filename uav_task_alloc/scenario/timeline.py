@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from uav_task_alloc.model import Task, ThreatZone
-from uav_task_alloc.scenario.values import Scenario
+from uav_task_alloc.scenario.values import Scenario, TimedOrder
 
 
 @dataclass(frozen=True, slots=True)
@@ -17,6 +17,7 @@ class Moment:
     tasks: tuple[Task, ...] = ()  # announced
     cancels: tuple[Task, ...] = ()  # withdrawn
     deaths: tuple[str, ...] = ()  # ids of lost UAVs
+    orders: tuple[TimedOrder, ...] = ()  # given by an operator
 
 
 def timeline(scenario: Scenario) -> tuple[Moment, ...]:
@@ -32,13 +33,14 @@ def timeline(scenario: Scenario) -> tuple[Moment, ...]:
     deaths = {uav.id: uav.dies_at for uav in scenario.uavs if uav.dies_at is not None}
     by_id = {timed.task.id: timed.task for timed in scenario.tasks}
     times = {*changes, *deaths.values(), *(timed.at for timed in scenario.tasks),
-             *(cancel.at for cancel in scenario.cancels)}
+             *(cancel.at for cancel in scenario.cancels), *(each.at for each in scenario.orders)}
     return tuple(Moment(
         at,
         scenario.zones_at(at) if at in changes else None,
         tuple(timed.task for timed in scenario.tasks if timed.at == at),
         tuple(by_id[cancel.task] for cancel in scenario.cancels if cancel.at == at),
         tuple(uav for uav, dies_at in deaths.items() if dies_at == at),
+        tuple(order for order in scenario.orders if order.at == at),
     ) for at in sorted(times))
 
 

@@ -103,6 +103,23 @@ class Cancel:
 
 
 @dataclass(frozen=True, slots=True)
+class TimedOrder:
+    """An order of an operator, as `uav_task_alloc order` has them."""
+
+    at: float  # [s]
+    order: str  # pin | forbid | next
+    uav: str  # id
+    tasks: tuple[str, ...]  # ids; of next in the order of flight
+
+    @property
+    def text(self) -> str:
+        """What it says, in words."""
+        names = ' '.join(self.tasks)
+        return f'next of {self.uav} {names}' if self.order == 'next' else (
+            f'{self.order} {names} to {self.uav}')
+
+
+@dataclass(frozen=True, slots=True)
 class ScenarioWind:
     """The wind in which simulated UAVs fly."""
 
@@ -131,11 +148,13 @@ class Scenario:
     trips: int = 1  # of each UAV
     wind: ScenarioWind = ScenarioWind()  # of a simulated flight
     separation: Separation = field(default_factory=Separation)  # horizontal 0: none
+    orders: tuple[TimedOrder, ...] = ()  # by `at`; `plan` ignores them
 
     @property
     def duration(self) -> float:
         """The time of the last event [s]; the flights take longer."""
         times = [timed.at for timed in self.tasks] + [cancel.at for cancel in self.cancels]
+        times += [order.at for order in self.orders]
         times += [uav.dies_at for uav in self.uavs if uav.dies_at is not None]
         times += [t for timed in self.zones for t in (timed.appears, timed.vanishes)
                   if math.isfinite(t)]

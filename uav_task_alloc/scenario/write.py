@@ -50,6 +50,7 @@ def to_yaml(scenario: Scenario) -> str:
         'tasks': [_task(timed) for timed in scenario.tasks],
         'zones': [_zone(timed) for timed in scenario.zones],
         'cancels': [{'task': cancel.task, 'at': cancel.at} for cancel in scenario.cancels],
+        'orders': [asdict(order) | {'tasks': list(order.tasks)} for order in scenario.orders],
     }
     return str(yaml.safe_dump(document, sort_keys=False, default_flow_style=None, width=99))
 
