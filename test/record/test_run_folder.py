@@ -5,6 +5,10 @@ import re
 import pytest
 
 from uav_task_alloc.errors import InvalidValue
+from uav_task_alloc.mavlink.gcs.authority import AuthorityRecord, AuthorityState
+from uav_task_alloc.mavlink.gcs.authority_store import AuthorityFileStore
+from uav_task_alloc.mavlink.gcs.fence_store import FenceFileStore
+from uav_task_alloc.mavlink.gcs.hold_store import HoldFileStore
 from uav_task_alloc.record import run_folder
 
 OWN = ('summary.json', 'map.png', 'record.jsonl', 'flight.jsonl', 'allocator.log',
@@ -27,6 +31,20 @@ def flown(tmp_path):
 
 
 def test_finding_34_files_of_an_earlier_demo_are_removed(flown):
+    run_folder.prepare(flown)
+    assert everything(flown) == [run_folder.MARKER, 'state']
+
+
+def test_whatever_a_bridge_has_stored_is_removed(flown):
+    state = flown / run_folder.STATE
+    AuthorityFileStore(str(state), print).save('uav_9', AuthorityRecord(
+        AuthorityState.HELD, seen=(1.0, 2.0, 3.0, 4.0, 0.0, 0.0, 0.0)))
+    HoldFileStore(str(state), print).save_hold('uav_9', 'wind')
+    FenceFileStore(str(state), print).save_fence('uav_9', [(5001, 3.0, 1, 2)])
+    (state / 'hold_uav_9.json.tmp').write_text('x')  # a bridge that was killed
+    stored = {path.name for path in state.iterdir()} - {path.split('/')[-1] for path in OWN}
+    assert stored == {'authority_uav_9.json', 'authority_uav_9.position', 'hold_uav_9.json',
+                      'fence_uav_9.json', 'hold_uav_9.json.tmp'}
     run_folder.prepare(flown)
     assert everything(flown) == [run_folder.MARKER, 'state']
 

@@ -15,7 +15,8 @@ MARKER = '.uav_task_alloc_demo'  # marks a folder that a demo created or found e
 STATE = 'state'  # folder of allocator and bridge
 SUMMARY, MAP = 'summary.json', 'map.png'
 FILES = (MARKER, SUMMARY, MAP, RECORD_FILE, TRUTH_FILE, *(f'{node}.log' for node in NODES))
-STATE_FILES = ('journal.*', 'authority_*.json', 'authority_*.tmp')  # patterns
+STATE_FILES = ('journal.*', *(f'{kind}_*.{suffix}' for kind in ('authority', 'hold', 'fence')
+                              for suffix in ('json', 'position', 'tmp')))  # patterns
 # identify the folder of a version that wrote no marker
 LOGS = ('allocator.log', 'mavlink_bridge.log', 'fleet_sim.log')
 _MAX_NAMED = 5  # foreign entries in an error
