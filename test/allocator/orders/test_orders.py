@@ -189,6 +189,31 @@ def test_an_ordered_task_that_comes_out_of_range_is_left_out_with_the_reason():
     assert 'order o1 of ann' in driver.reason('far')
 
 
+def test_an_ordered_task_beyond_the_endurance_is_left_out_with_the_reason():
+    driver = real_driver()
+    assert driver.order('ORDER', 'b', 'near', 'far').success  # 1800 m
+    driver.settle()
+    driver.uav('b', 500.0, 0.0, 50.0, range=5000.0, cruise_speed=10.0, endurance=900.0)
+    driver.world.request_replan('test', driver.now)
+    driver.settle()
+    assert driver.route('b') == ('near', 'far')
+    driver.uav('b', 500.0, 0.0, 50.0, range=5000.0, cruise_speed=10.0, endurance=180.0)
+    driver.world.request_replan('test', driver.now)
+    driver.settle()
+    assert driver.route('b') == ('near',)
+    assert driver.state('far') == 'UNASSIGNED'
+    assert 'far in this order is beyond the endurance of b: it needs 1' in driver.reason('far')
+    assert 'and has 167 s left for its tasks' in driver.reason('far')  # without 5 %, a take-off
+
+
+def test_an_order_beyond_the_endurance_of_its_uav_is_refused():
+    driver = real_driver()
+    driver.uav('b', 500.0, 0.0, 50.0, range=5000.0, cruise_speed=10.0, endurance=180.0)
+    answer = driver.order('ORDER', 'b', 'near', 'far')
+    assert not answer.success
+    assert 'far in this order is beyond the endurance of b' in answer.message
+
+
 def test_a_pinned_task_waits_for_a_uav_that_failed_at_it(driver):
     assert driver.order('PIN', 'b', 't3').success
     driver.settle()

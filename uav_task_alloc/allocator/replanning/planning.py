@@ -34,10 +34,6 @@ from uav_task_alloc.model import Leg, Plan, Point, Task, Uav
 from uav_task_alloc.objective import fit
 from uav_task_alloc.params import AllocatorParams
 
-_RETURN_HEIGHT = 60.0  # [m] above home: RTL_RETURN_ALT of PX4; RTL_ALT of ArduPilot is 15 m
-_CONTINGENCY = 0.05  # of the endurance with a full battery
-_LEAST = 1.0  # [s] endurance of a UAV that has none left
-
 
 @dataclass(slots=True)
 class BuiltLists:
@@ -75,9 +71,8 @@ def replan_problem(world: World, best: Plan, trigger: str, background: bool,
         uavs = tuple(measured_uav(world, uav) for uav in uavs)
         waiting = waiting_uavs(world, stamp)
         top = max((task.position[2] for task in tasks), default=-math.inf)
-        uavs = tuple(spendable(world, uav, top) for uav in uavs)
-        waiting = {uav_id: spendable(world, uav, top)
-                   for uav_id, uav in waiting.items()}
+        uavs = tuple(world.flights.spendable(uav, top) for uav in uavs)
+        waiting = {uav_id: world.flights.spendable(uav, top) for uav_id, uav in waiting.items()}
         uavs += tuple(uav for uav_id, uav in waiting.items() if not world.usable(uav_id))
         stop_time = world.flights.stop_time
         tasks = relaxed_tasks(world, tasks, (uav.id for uav in uavs), stamp)
@@ -112,37 +107,6 @@ def measured_uav(world: World, uav: Uav) -> Uav:
                    aboard=None if at_home or uav.at_base else frozenset(
                        stop.task.id for stop in world.list_of(uav.id).stops
                        if stop.task.payload > 0.0))
-
-
-def spendable(world: World, uav: Uav, top: float) -> Uav:
-    """Return a UAV with the endurance that is left for its legs.
-
-    A vehicle climbs before it flies. It returns at the height of its tasks or that of its return
-    mode, if that is more, and comes down over its home. A leg counts the slower of its horizontal
-    and its vertical motion only. _CONTINGENCY is for what no plan foresees, such as an upload on
-    the way.
-
-    Args:
-        world: with the flights measured.
-        uav: with its endurance.
-        top: [m] height of the highest task.
-
-    Returns:
-        The UAV itself where it has no endurance.
-    """
-    if math.isinf(uav.endurance):
-        return uav
-    home = uav.home or uav.position
-    height = max(0.0, top - home[2])
-    down = 0.0
-    if world.params.route_end == 'home':
-        most = max(height, _RETURN_HEIGHT)
-        down = (most - height) / uav.climb_speed + most / uav.descent_speed
-    up = world.flights.pace(uav.id).takeoff + height / uav.climb_speed
-    full = uav.full_endurance
-    down += _CONTINGENCY * (uav.endurance if full is None else full)
-    return replace(uav, endurance=max(_LEAST, uav.endurance - down - (up if uav.at_base else 0.0)),
-                   full_endurance=None if full is None else max(_LEAST, full - up - down))
 
 
 def _list_speed(world: World, uav: Uav) -> float:

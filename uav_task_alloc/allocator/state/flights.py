@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from uav_task_alloc.allocator.records import UavReport
 from uav_task_alloc.allocator.state.fleet import Fleet
@@ -15,6 +15,7 @@ from uav_task_alloc.allocator.state.flight_pace import (
 )
 from uav_task_alloc.allocator.state.published_lists import PublishedLists
 from uav_task_alloc.allocator.state.wind import WindEstimate
+from uav_task_alloc.model import Uav
 from uav_task_alloc.params import AllocatorParams
 
 _SAMPLE_PERIOD = 1.0  # [s] between two samples of the ground velocity of a UAV
@@ -30,6 +31,9 @@ _LONGEST_STOP = 20.0  # [s] a longer delay is not that of a stop
 _OWN_STOPS = 3  # stops after which a UAV has a mean of its own
 _USED = 0.95  # charge of a battery below which it may be changed
 OVERDUE = 3.0  # times its turnaround after which nobody seems to change the battery of a UAV
+_RETURN_HEIGHT = 60.0  # [m] above home: RTL_RETURN_ALT of PX4; RTL_ALT of ArduPilot is 15 m
+_CONTINGENCY = 0.05  # of the endurance with a full battery
+_LEAST = 1.0  # [s] endurance of a UAV that has none left
 _TAKEOFF = 4.0  # [s] from the command until it climbs at its rate: arming, spooling up
 
 
@@ -211,6 +215,36 @@ class Flights:
         elif self._all_stops.count:
             stop_time = self._all_stops.mean
         return FlightPace(speed, planned.climb, planned.descent, wind, stop_time, _TAKEOFF)
+
+    def spendable(self, uav: Uav, top: float) -> Uav:
+        """Return a UAV with the endurance that is left for its legs.
+
+        A vehicle climbs before it flies. It returns at the height of its tasks or that of its
+        return mode, if that is more, and comes down over its home. A leg counts the slower of its
+        horizontal and its vertical motion only. _CONTINGENCY is for what no plan foresees, such
+        as an upload on the way.
+
+        Args:
+            uav: with its endurance.
+            top: [m] height of the highest task.
+
+        Returns:
+            The UAV itself where it has no endurance.
+        """
+        if math.isinf(uav.endurance):
+            return uav
+        home = uav.home or uav.position
+        height = max(0.0, top - home[2])
+        down = 0.0
+        if self._params().route_end == 'home':
+            most = max(height, _RETURN_HEIGHT)
+            down = (most - height) / uav.climb_speed + most / uav.descent_speed
+        up = self.pace(uav.id).takeoff + height / uav.climb_speed
+        full = uav.full_endurance
+        down += _CONTINGENCY * (uav.endurance if full is None else full)
+        return replace(
+            uav, endurance=max(_LEAST, uav.endurance - down - (up if uav.at_base else 0.0)),
+            full_endurance=None if full is None else max(_LEAST, full - up - down))
 
     def _planned(self, report: UavReport) -> FlightPace:
         params = self._params()

@@ -7,18 +7,20 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 from uav_task_alloc.allocator.state.fleet import Fleet
+from uav_task_alloc.allocator.state.flights import Flights
 from uav_task_alloc.allocator.state.locked_tasks import can_fly
 from uav_task_alloc.allocator.state.published_lists import PublishedLists
 from uav_task_alloc.allocator.state.safe_paths import GetSafePaths, SafePaths
 from uav_task_alloc.allocator.state.tasks import TaskRegistry, without_failed
-from uav_task_alloc.model import Point, Task, Uav
+from uav_task_alloc.geometry.flight_time import flight_time
+from uav_task_alloc.model import Leg, Point, Task, Uav
 
 
 @dataclass(frozen=True, slots=True)
 class TaskSequence:
     """The tasks that a UAV flies next by an order."""
 
-    flown: tuple[str, ...]  # open, and within its range in this order
+    flown: tuple[str, ...]  # open, and within its range and endurance in this order
     left_out: tuple[str, ...] = ()  # open, from the first one on that it cannot reach so
     why: str = ''  # it cannot reach that one
 
@@ -29,9 +31,9 @@ class OrderedTasks:
     `paths()` are those around the present zones, `uav(uav_id)` is a known UAV for the solver.
     """
 
-    def __init__(self, tasks: TaskRegistry, fleet: Fleet, lists: PublishedLists,
+    def __init__(self, tasks: TaskRegistry, flights: Flights, fleet: Fleet, lists: PublishedLists,
                  paths: GetSafePaths, uav: Callable[[str], Uav]) -> None:
-        self._tasks, self._fleet, self._lists = tasks, fleet, lists
+        self._tasks, self._flights, self._fleet, self._lists = tasks, flights, fleet, lists
         self._paths, self._uav = paths, uav
 
     def sequences(self, returns: bool) -> dict[str, TaskSequence]:
@@ -53,18 +55,20 @@ class OrderedTasks:
                      if can_fly(self._tasks, self._fleet, uav_id, task_id))
 
     def _sequence(self, uav_id: str, open_ids: tuple[str, ...], returns: bool) -> TaskSequence:
-        uav, paths = self._uav(uav_id), self._paths()
-        active = self._active(uav_id)
+        active, paths = self._active(uav_id), self._paths()
         lead = active if active and active not in open_ids else ''
-        home = uav.base if returns else None
-        place, metres = uav.position, 0.0
-        for n, task_id in enumerate(filter(None, (lead, *open_ids)), -1 if lead else 0):
-            task = self._tasks.records[task_id].task
-            length, back = _leg_and_way_back(paths, place, task, home)
+        tasks = [self._tasks.records[task_id].task for task_id in filter(None, (lead, *open_ids))]
+        uav = self._flights.spendable(self._uav(uav_id), max(task.position[2] for task in tasks))
+        place, metres, seconds = uav.position, 0.0, 0.0
+        for n, task in enumerate(tasks, -1 if lead else 0):
+            length, time = _costs(uav, place, task.position, paths)
             metres += length
-            if n >= 0 and metres + back > uav.range:
-                return TaskSequence(open_ids[:n], open_ids[n:], _why(uav, task_id, metres + back))
+            seconds += time + task.service_time + self._flights.stop_time
             place = task.position
+            back = _costs(uav, place, uav.base, paths) if returns else (0.0, 0.0)
+            why = _why(uav, task.id, metres + back[0], seconds + back[1])
+            if n >= 0 and why:
+                return TaskSequence(open_ids[:n], open_ids[n:], why)
         return TaskSequence(open_ids)
 
     def _active(self, uav_id: str) -> str:
@@ -134,17 +138,22 @@ class OrderedTasks:
         return rest[:len(first)] != first
 
 
-def _leg_and_way_back(paths: SafePaths, place: Point, task: Task,
-                      home: Point | None) -> tuple[float, float]:
-    """Metres to a task, and from there home; inf where no safe path leads there."""
-    there = paths.leg(place, task.position)
-    back = None if home is None else paths.leg(task.position, home)
-    return (math.inf if there is None else there.length,
-            back.length if back else 0.0 if home is None else math.inf)
+def _costs(uav: Uav, place: Point, goal: Point, paths: SafePaths) -> tuple[float, float]:
+    """Metres and seconds from a place to another; inf where no safe path leads there."""
+    leg: Leg | None = paths.leg(place, goal)
+    if leg is None:
+        return math.inf, math.inf
+    return leg.length, flight_time(uav, (place, *leg.via, goal))
 
 
-def _why(uav: Uav, task_id: str, need: float) -> str:
-    if need == math.inf:
+def _why(uav: Uav, task_id: str, metres: float, seconds: float) -> str:
+    """Why a UAV cannot fly a task after so many metres and seconds; '' where it can."""
+    if metres == math.inf:
         return f'no safe path leads {uav.id} to {task_id} in this order'
-    return (f'{task_id} in this order is beyond the range of {uav.id}: it needs {need:.0f} m and '
-            f'has {uav.range:.0f} m left')
+    if metres > uav.range:
+        return (f'{task_id} in this order is beyond the range of {uav.id}: it needs '
+                f'{metres:.0f} m and has {uav.range:.0f} m left')
+    if seconds > uav.endurance:
+        return (f'{task_id} in this order is beyond the endurance of {uav.id}: it needs '
+                f'{seconds:.0f} s and has {uav.endurance:.0f} s left for its tasks')
+    return ''

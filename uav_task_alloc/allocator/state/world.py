@@ -100,10 +100,11 @@ class World:
             record.uav: record.task.id for record in saved.tasks
             if record.state is TaskState.ACTIVE}, self.orders)
         self.lists = PublishedLists(saved.lists, (record.task.id for record in saved.tasks))
-        self.ordered = OrderedTasks(self.tasks, self.fleet, self.lists, self.paths, self.uav)
+        self.flights = Flights(self.fleet, self.lists, lambda: self.params)
+        self.ordered = OrderedTasks(self.tasks, self.flights, self.fleet, self.lists, self.paths,
+                                    self.uav)
         self._validity = ListValidity(self.tasks, self.fleet, self.lists, self.paths,
                                       self.ordered)
-        self.flights = Flights(self.fleet, self.lists, lambda: self.params)
         self.deadlines = Deadlines(self.tasks, self.fleet, self.flights)
         self.zone_checks = ZoneChecks(self.fleet, self.lists, self.paths, self.note,
                                       self.request_replan)
