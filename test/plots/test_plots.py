@@ -13,6 +13,7 @@ from uav_task_alloc.plots import labels, plan as plan_map, space, style, times
 from uav_task_alloc.plots.flat import MapFigure
 from uav_task_alloc.record.ground_truth import TRUTH_FILE
 from uav_task_alloc.record.run_state import RECORD_FILE
+from uav_task_alloc.separation.rule import Conflict
 from uav_task_alloc.timetable import Timetable
 from uav_task_alloc.zone_codec import JSON_ZONE, encode_zone
 
@@ -34,6 +35,28 @@ def test_a_plan_is_drawn(tmp_path, draw, returns):
     plan = Plan({'u1': ('a',), 'u2': ()}, {'b': 'inside zone field'}, 120.0, 1.0,
                 legs={'u1': legs, 'u2': ()}, returns=returns)
     draw(uavs, tasks, ZONES, plan, tmp_path / 'plan.png')
+    assert (tmp_path / 'plan.png').read_bytes().startswith(PNG)
+
+
+@pytest.mark.parametrize('draw', [plots.draw_plan, plots.draw_plan_times])
+def test_conflicts_are_marked_where_they_are_red_where_not_resolved(tmp_path, draw, monkeypatch):
+    marked = []
+    monkeypatch.setattr(MapFigure, 'conflict', lambda _, *mark: marked.append(mark))
+    found = [Conflict(('u1', 'u2'), ('a', 'b'), 5.0, 1.0, 0.0, kind, '', place)
+             for kind, place in (('height', (1.0, 2.0, 3.0)), ('', (4.0, 5.0, 6.0)),
+                                 ('hold', None))]
+    plan = Plan({}, conflicts=tuple(found))
+    draw([], [], [], plan, tmp_path / 'plan.png')
+    assert marked == [((1.0, 2.0, 3.0), '#202020'), ((4.0, 5.0, 6.0), palette.RED)]
+    assert [each.get_label() for each in plan_map.legend_handles([], plan)] == [
+        'conflicts resolved: 1', 'conflicts NOT resolved: 1']
+
+
+@DRAW
+def test_a_plan_with_conflicts_is_drawn(tmp_path, draw):
+    each = Conflict(('u1', 'u2'), ('a', 'b'), 5.0, 1.0, 0.0, 'hold', '', (10.0, 20.0, 30.0))
+    draw([], [Task('a', (50.0, 90.0, 40.0))], [], Plan({}, {'a': 'no UAV'}, conflicts=(each,)),
+         tmp_path / 'plan.png')
     assert (tmp_path / 'plan.png').read_bytes().startswith(PNG)
 
 

@@ -1,10 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """Resolution: head-on, crossing, overtaking, converging, and ten UAVs of one base."""
 import math
+from itertools import pairwise
 
 import pytest
 
 from uav_task_alloc import Separation
+from uav_task_alloc.geometry.polyline import segment_distance
 from uav_task_alloc.separation.conflicts import find_conflicts
 from uav_task_alloc.separation.resolution import (
     TransitLimits,
@@ -31,10 +33,14 @@ def round_trip(name, pad, task, service=5.0):
 def checked(*flights, rule=RULE, limits=None):
     """Resolved flights, which are apart now and were not."""
     assert find_conflicts(flight_volumes(flights, rule), rule)
-    result = resolve(flights, rule, limits)
+    result = resolve(flights, rule, limits, places=True)
     assert result.left == []
     assert find_conflicts(flight_volumes(result.flights, rule), rule) == []
     assert all(each.resolution and each.detail for each in result.conflicts)
+    for each in result.conflicts:  # on the way of one of both
+        assert min(segment_distance(each.position, *ends) for flight in flights
+                   if flight.uav in each.uavs for leg in flight.legs
+                   for ends in pairwise(leg.flown())) < 1e-6
     return result
 
 

@@ -42,6 +42,7 @@ def test_routes_that_cross_get_other_heights():
     assert conflict.uavs == ('a', 'b')
     assert conflict.resolution == 'height'
     assert conflict.detail == 'b flies at 35.5 m'
+    assert conflict.position == pytest.approx((200.0, 200.0, 30.0), abs=RULE.horizontal)
     assert [point[2] for point in result.legs['b'][0].via] == [35.5, 35.5]
     assert result.distance > before.distance
     assert result.finish >= before.finish
@@ -76,6 +77,7 @@ def test_a_task_that_cannot_be_reached_apart_gets_another_uav():
     result = plan(uavs, tasks, budget=0.05, separation=RULE, altitude_max=30.0)
     assert conflicts_of(result, uavs, tasks) == []
     assert {each.resolution for each in result.conflicts} & {'other uav', 'left out'}
+    assert all(each.position for each in result.conflicts)
     for name, why in result.unassigned.items():
         assert 'cannot be kept apart from' in why, name
 

@@ -35,7 +35,7 @@ def plan_json(loaded: Scenario, result: Plan) -> dict[str, Any]:
         'legs': {uav: [asdict(leg) for leg in legs] for uav, legs in result.legs.items()},
         'distance': result.distance, 'value': result.value, 'penalty': result.penalty,
         'fit': json_number(result.fit), 'cost': json_number(result.cost), **times_json(result),
-        'conflicts': [asdict(each) for each in result.conflicts],
+        'conflicts': _conflicts(loaded, result),
         'history': [[seconds, json_number(fit)] for seconds, fit in result.history],
         'solver': result.solver, 'solve_time': result.solve_time, 'iterations': result.iterations,
         'origin': asdict(loaded.origin),
@@ -44,6 +44,12 @@ def plan_json(loaded: Scenario, result: Plan) -> dict[str, Any]:
         'waypoints': {uav.id: _waypoints(loaded, result, k)
                       for k, uav in enumerate(loaded.uavs)},
     }
+
+
+def _conflicts(loaded: Scenario, result: Plan) -> list[dict[str, Any]]:
+    """What `Conflict` has, with geodetic positions."""
+    return [{**asdict(each), 'position': None if each.position is None else geodetic_rows(
+        loaded.origin, [each.position])[0]} for each in result.conflicts]
 
 
 def json_number(value: float) -> float | None:

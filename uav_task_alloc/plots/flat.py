@@ -109,6 +109,11 @@ class MapFigure:
         self._labels.append(Label(name, point[0], point[1], SMALL, size / 2.0 + 3.0,
                                   RED if is_missed else 'black'))
 
+    def conflict(self, point: Point, colour: str) -> None:
+        """Add a place where two UAVs would not have been apart."""
+        self.axes.plot(point[0], point[1], style.CONFLICT, ms=15, color='none', mec=colour,
+                       mew=2.4, zorder=8.5)
+
     def lost(self, point: Point, text: str) -> None:
         """Add the position at which a UAV was lost."""
         self.axes.plot(point[0], point[1], 'X', ms=18, color='black', mec='white', mew=1.4,

@@ -12,6 +12,8 @@ from uav_task_alloc.model import Plan, Point, Task, ThreatZone, Uav
 from uav_task_alloc.palette import RED, uav_colour
 from uav_task_alloc.plots.flat import MapFigure
 
+_RESOLVED = '#202020'  # of the mark of a conflict
+
 
 def draw_plan(uavs: Sequence[Uav], tasks: Sequence[Task], zones: Sequence[ThreatZone],
               plan: Plan, png: str | Path) -> None:
@@ -50,6 +52,21 @@ def add_plan(figure: MapFigure, uavs: Sequence[Uav], tasks: Sequence[Task],
             figure.task(positions[name], uav_colour(index), name, number=number)
     for name in plan.unassigned:
         figure.task(positions[name], 'white', name, edge=RED)
+    for point, colour in conflict_marks(plan):
+        figure.conflict(point, colour)
+
+
+def conflict_marks(plan: Plan) -> list[tuple[Point, str]]:
+    """Return where conflicts of UAVs are, and their colours: red where one is not resolved.
+
+    Args:
+        plan: with conflicts.
+
+    Returns:
+        [m] ENU and `#rrggbb`.
+    """
+    return [(each.position, _RESOLVED if each.resolution else RED)
+            for each in plan.conflicts if each.position is not None]
 
 
 def route_points(uav: Uav, plan: Plan, positions: Mapping[str, Point]) -> list[Point]:
@@ -93,4 +110,9 @@ def legend_handles(uavs: Sequence[Uav], plan: Plan, rows: int = style.LEGEND_ROW
     if plan.unassigned:
         text = f'unassigned: {len(plan.unassigned)}'
         handles.append(style.marker_handle('o', 'white', RED, text))
+    colours = [colour for _, colour in conflict_marks(plan)]
+    for colour, text in ((_RESOLVED, 'conflicts resolved'), (RED, 'conflicts NOT resolved')):
+        if colour in colours:
+            handles.append(style.marker_handle(style.CONFLICT, 'none', colour,
+                                               f'{text}: {colours.count(colour)}'))
     return handles

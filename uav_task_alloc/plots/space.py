@@ -19,7 +19,12 @@ import uav_task_alloc.plots.style as style
 from uav_task_alloc.model import Plan, Point, Shape, Task, ThreatZone, Uav
 from uav_task_alloc.palette import DARK_RED, RED, uav_colour
 from uav_task_alloc.plots.labels import Label, place_labels
-from uav_task_alloc.plots.plan import legend_handles, plan_title, route_points
+from uav_task_alloc.plots.plan import (
+    conflict_marks,
+    legend_handles,
+    plan_title,
+    route_points,
+)
 from uav_task_alloc.plots.style import ROUTE, SMALL
 
 _STRETCH = (1, 2, 3, 5, 10, 20, 50, 100)  # factors of heights: routes are much longer than high
@@ -66,6 +71,8 @@ def draw_plan_3d(uavs: Sequence[Uav], tasks: Sequence[Task], zones: Sequence[Thr
             _draw_marker(axes, positions[name], low[2], 'o', size, uav_colour(index), 'black')
     for name in plan.unassigned:
         _draw_marker(axes, positions[name], low[2], 'o', size, 'white', RED)
+    for place, colour in conflict_marks(plan):
+        _draw_marker(axes, place, low[2], style.CONFLICT, 11.0, 'none', colour)
     if shows_names:
         names += [(name, position, False, RED if name in plan.unassigned else 'black')
                   for name, position in positions.items()]

@@ -21,6 +21,7 @@ SMALL, PLAIN, LARGE = 11.0, 13.0, 17.0  # [pt]
 ROUTE = 2.8  # [pt]
 MAX_NAMED_TASKS = 60  # more are drawn as dots without names
 LEGEND_ROWS = 14  # UAVs
+CONFLICT = 'D'  # mark
 
 
 def line_style(index: int) -> Any:

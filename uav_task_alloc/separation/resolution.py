@@ -28,6 +28,7 @@ from uav_task_alloc.separation.volumes import (
     flight_volumes,
     leg_rows,
     leg_times,
+    meeting_place,
     rows_of_legs,
 )
 
@@ -75,18 +76,20 @@ class Resolution:
 
 
 def resolve(flights: Sequence[Flight], rule: Separation,
-            limits: TransitLimits | None = None) -> Resolution:
+            limits: TransitLimits | None = None, places: bool = False) -> Resolution:
     """Change heights and begins of legs so that the flights are apart.
 
     Args:
         flights: planned; those earlier in the sequence change less.
         rule: that is on.
         limits: of heights and zones; None: none.
+        places: conflicts get positions, 0.2 ms each.
 
     Returns:
         The same flights where no two are in conflict.
     """
-    found = find_conflicts(flight_volumes(flights, rule), rule)
+    volumes = flight_volumes(flights, rule)
+    found = find_conflicts(volumes, rule)
     if not found:
         return Resolution(tuple(flights))
     planner = _Planner(flights, rule, limits or TransitLimits())
@@ -98,8 +101,12 @@ def resolve(flights: Sequence[Flight], rule: Separation,
         planner.plan(k)
     after = tuple(planner.flights)
     left = find_conflicts(flight_volumes(after, rule), rule)
-    explained = tuple(_explained(flights, planner, each, left) for each in found)
-    return Resolution(after, explained, left)
+    explained = [_explained(flights, planner, each, left) for each in found]
+    if places:
+        explained = [replace(conflict, position=meeting_place(
+            volumes, each.flights, each.legs, each.time))
+            for conflict, each in zip(explained, found, strict=True)]
+    return Resolution(after, tuple(explained), left)
 
 
 @dataclass(frozen=True, slots=True)

@@ -79,6 +79,7 @@ class Conflict:
         vertical: [m] distance there.
         resolution: `height`, `hold`, `other uav`, `left out`, or '' where it is not resolved.
         detail: a sentence about that.
+        position: [m] ENU of one of them at that time; None: not known.
     """
 
     uavs: tuple[str, str]
@@ -88,3 +89,4 @@ class Conflict:
     vertical: float  # [m]
     resolution: str = ''
     detail: str = ''
+    position: tuple[float, float, float] | None = None  # [m] ENU

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uav_task_alloc.geometry.flight_time import straight_time
+from uav_task_alloc.geometry.polyline import segment_distance
 from uav_task_alloc.model import Point
 from uav_task_alloc.separation.rule import Separation
 
@@ -254,3 +255,36 @@ def rows_of_legs(flight: Flight, rule: Separation) -> list[list[PieceRow]]:
         ready, place, in_air = times.end, leg.points[-1], not leg.lands
     found.append(end_rows(flight, rule, ready, place) if in_air else [])
     return found
+
+
+def meeting_place(volumes: Volumes, flights: tuple[int, int], legs: tuple[int, int],
+                  time: float) -> Point:
+    """Return where the first of two UAVs is when they come nearest.
+
+    Args:
+        volumes: of their flights.
+        flights: indices of both.
+        legs: indices of their legs.
+        time: [s] when the first of both is there.
+
+    Returns:
+        [m] ENU; on the leg of the one that is then nearer to the other's leg.
+    """
+    ways = [volumes.rows[(volumes.owner == k) & (volumes.leg == n)]
+            for k, n in zip(flights, legs, strict=True)]
+    spots = [_place_at(rows, time) for rows in ways]
+    gaps = [min(segment_distance(spot, row[2:5].tolist(), _moved_on(row, row[1] - row[0]))
+                for row in rows) for spot, rows in zip(spots, ways[::-1], strict=True)]
+    return spots[0] if gaps[0] <= gaps[1] else spots[1]
+
+
+def _place_at(rows: PieceRows, time: float) -> Point:
+    """Where a UAV is at a time [s], or at the nearer end of its pieces."""
+    row = rows[max(0, int(np.searchsorted(rows[:, 0], time, 'right')) - 1)]
+    return _moved_on(row, min(max(time, row[0]), row[1]) - row[0])
+
+
+def _moved_on(row: PieceRows, seconds: float) -> Point:
+    """Where a UAV is some time after the begin of a piece."""
+    x, y, z = (row[2:5] + row[5:8] * seconds).tolist()
+    return x, y, z

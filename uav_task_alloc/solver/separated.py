@@ -18,7 +18,14 @@ from uav_task_alloc.objective import Objective, excess, fit, response_time
 from uav_task_alloc.separation.conflicts import load_separation_kernels
 from uav_task_alloc.separation.resolution import Resolution, TransitLimits, resolve
 from uav_task_alloc.separation.rule import Conflict, Separation
-from uav_task_alloc.separation.volumes import Flight, FlightLeg, LegTimes, leg_times
+from uav_task_alloc.separation.volumes import (
+    Flight,
+    FlightLeg,
+    LegTimes,
+    flight_volumes,
+    leg_times,
+    meeting_place,
+)
 from uav_task_alloc.solver.problem import Limits, Rules
 from uav_task_alloc.solver.warm import WarmState
 from uav_task_alloc.timetable import Timetable
@@ -61,8 +68,8 @@ def separated_plan(solve: Solve, uavs: Sequence[Uav], tasks: Sequence[Task],
     fixed = {task.id for held in locked.values() for task in held}
     for turn in range(_ROUNDS + 1):
         flights = flights_of_plan(result, uavs, known, rules.returns)
-        found = resolve(flights, rule, transit)
-        barred = _barred(found, fixed)
+        found = resolve(flights, rule, transit, places=True)
+        barred = _barred(found, fixed, rule)
         if not barred or turn == _ROUNDS or transit.stop():
             break
         for name, (uav_id, conflict) in barred.items():
@@ -77,7 +84,8 @@ def separated_plan(solve: Solve, uavs: Sequence[Uav], tasks: Sequence[Task],
     return _with_resolution(result, uavs, tasks, rules, flights, found, moved)
 
 
-def _barred(found: Resolution, fixed: Iterable[str]) -> dict[str, tuple[str, Conflict]]:
+def _barred(found: Resolution, fixed: Iterable[str], rule: Separation
+            ) -> dict[str, tuple[str, Conflict]]:
     """By id of each task that should get another UAV: its UAV, and the conflict."""
     barred: dict[str, tuple[str, Conflict]] = {}
     for each in found.left:
@@ -93,7 +101,9 @@ def _barred(found: Resolution, fixed: Iterable[str]) -> dict[str, tuple[str, Con
             if name:
                 barred[name] = uav_id, Conflict(
                     (uav_id, other_uav), (name, other), each.time, each.horizontal,
-                    each.vertical)
+                    each.vertical, position=meeting_place(
+                        flight_volumes([found.flights[k] for k in each.flights], rule), (0, 1),
+                        each.legs, each.time))
                 break
     return barred
 
