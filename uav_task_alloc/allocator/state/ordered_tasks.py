@@ -12,7 +12,6 @@ from uav_task_alloc.allocator.state.locked_tasks import can_fly
 from uav_task_alloc.allocator.state.published_lists import PublishedLists
 from uav_task_alloc.allocator.state.safe_paths import GetSafePaths, SafePaths
 from uav_task_alloc.allocator.state.tasks import TaskRegistry, without_failed
-from uav_task_alloc.geometry.flight_time import flight_time
 from uav_task_alloc.model import Leg, Point, Task, Uav
 
 
@@ -143,6 +142,7 @@ def _costs(uav: Uav, place: Point, goal: Point, paths: SafePaths) -> tuple[float
     leg: Leg | None = paths.leg(place, goal)
     if leg is None:
         return math.inf, math.inf
+    from uav_task_alloc.geometry.flight_time import flight_time  # imports numba
     return leg.length, flight_time(uav, (place, *leg.via, goal))
 
 
