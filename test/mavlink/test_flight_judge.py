@@ -176,3 +176,14 @@ def test_a_bridge_that_takes_its_evidence_is_not_blamed(monkeypatch):
     assert counts['completed'] > 0
     assert counts['flown_twice'] == counts['false_completed'] == 0
     assert counts['flown_again_unknowable'] == 0
+
+
+@pytest.mark.parametrize('number', [
+    1227,  # REACHED of the mission before the last one, repeated into an upload
+    1259,  # a pilot's Hold in silence, after a Hold that our acknowledged command had ended
+    1005,  # a repetition, while it lands beside a stop that it had not reached in its mission
+])
+def test_a_random_flight_that_once_had_a_fault_has_none(number):
+    flight = Flight(5503, number, lossy=False)
+    flight.fly()
+    assert flight.result()[1] == []

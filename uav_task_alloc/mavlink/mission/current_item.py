@@ -105,6 +105,11 @@ class CurrentItem:
         if blind or path.has_gap(self._in_mission_at, self._left_at):
             self._left_unseen = self._in_mission_at, self._left_at
 
+    @property
+    def left_at(self) -> float:
+        """Vehicle time [s] at which it left mission mode; inf while it is in it, or unknown."""
+        return math.inf if self.in_mission or math.isinf(self._left_at) else self._left_at
+
     def note_mission_left(self, now: float) -> None:
         """Note that the vehicle has left the list: a task resumed later starts again."""
         self.note_other_mode(now)

@@ -262,6 +262,15 @@ class ProgressTable:
         series = self._epochs.series
         return series.first_at(series.add(seq, now, frame))
 
+    def may_repeat_earlier(self, seq: int, now: float, frame: int) -> bool:
+        """Whether a REACHED may repeat one of before this mission was on board.
+
+        Args:
+            seq, now, frame: see `reached_first_at`.
+        """
+        series = self._epochs.series
+        return series.first_sent(series.add(seq, now, frame)) < self._epoch.taken
+
     def note_end(self, seq: int, now: float) -> None:
         """Note a REACHED of this epoch or the next: the mission may have ended."""
         self._reached.note_end(seq, now)

@@ -41,6 +41,7 @@ class CurrentEpoch:
     since: float  # vehicle time [s] from which the current item is flown
     begin: float  # vehicle time [s] at which this epoch began
     taken: float = -math.inf  # vehicle time [s] before which it was not on board
+    left: float = math.inf  # vehicle time [s] at which mission mode was left; inf: it is not
 
 
 _NO_EPOCH = PreviousEpoch((), -math.inf, -math.inf, False, -math.inf)
@@ -87,7 +88,7 @@ class ReachedEpoch:
         item = epoch.items[seq]
         if self.series.first_sent(reached) < epoch.taken:  # a repetition, or hidden among such
             return epoch.current is not None and epoch.current >= seq and positions.was_at(
-                item, max(epoch.since, epoch.taken), close=0.0)
+                item, max(epoch.since, epoch.taken), epoch.left, close=0.0)
         if not self.series.repeats:  # sent once, where the vehicle is
             near = positions.can_have_reached(item, now) if not before.items else (
                 positions.distance(item) <= LOOSE_RADIUS + item.radius)

@@ -83,7 +83,7 @@ class ReachedItems:
         """
         epoch, seq = self._epoch, reached.seq
         current = CurrentEpoch(epoch.items, self._moves.reports.reported, epoch.since,
-                               epoch.begin, epoch.taken)
+                               epoch.begin, epoch.taken, self._moves.left_at)
         if 0 <= seq < len(epoch.items) and self._epochs.is_of_current(reached, current, now):
             self._accept(reached, now)
             return True

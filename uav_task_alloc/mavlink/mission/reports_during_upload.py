@@ -122,8 +122,10 @@ class ReportsDuringUpload:
         Returns:
             [s] at which it was received, where it is of the new mission.
         """
-        seq, frame, last, _ = reached
+        seq, frame, last, last_frame = reached
         progress, first = self._progress, self._first_at(reached)
+        if progress.may_repeat_earlier(seq, last, last_frame):
+            return self._credit_repeated(reached, before, after, start)
         if before is not None and progress.was_at_by(before, first):
             progress.note_reached(seq, first, proven=True, frame=frame)
         elif before is not None and after is not None and alike(before, after):
@@ -137,9 +139,17 @@ class ReportsDuringUpload:
                 progress.note_reached(seq, first, frame=frame)
         elif after is not None and progress.near_one(after, before, first):
             return first
-        elif after is not None and seq == start and progress.was_exactly_at(after, last):
-            return last  # a new one among repetitions of an older one
-        elif before is not None and seq == progress.current and (
+        else:
+            return self._credit_repeated(reached, before, after, start)
+        return None
+
+    def _credit_repeated(self, reached: _Reached, before: Item | None, after: Item | None,
+                         start: int) -> float | None:
+        """As `_credit_old`, where only a new one among repetitions of an older one counts."""
+        progress, seq, last = self._progress, reached.seq, reached.last
+        if after is not None and seq == start and progress.was_exactly_at(after, last):
+            return last
+        if before is not None and seq == progress.current and (
                 progress.was_exactly_at(before, last)):
             progress.credit(before)
         return None
