@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """SITL processes are started as the environment says; a script stands in for the binary."""
+import contextlib
 import importlib.util
 import socket
 from pathlib import Path
@@ -7,11 +8,21 @@ from pathlib import Path
 BINARY = '#!/bin/sh\nmkdir log && echo "speed $PX4_SIM_SPEED_FACTOR arguments $*"\n'
 
 
+def free_ports(count):
+    """The first of some UDP ports in a row that are free."""
+    while True:
+        with contextlib.ExitStack() as stack, contextlib.suppress(OSError, OverflowError):
+            first = 0
+            for n in range(count):
+                link = stack.enter_context(socket.socket(socket.AF_INET, socket.SOCK_DGRAM))
+                link.bind(('127.0.0.1', first + n if n else 0))
+                first = first or link.getsockname()[1]
+            return first
+
+
 def test_finding_29_px4_can_make_its_log_folder_and_gets_speed_instance_and_port(
         monkeypatch, tmp_path):
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
-        free.bind(('127.0.0.1', 0))
-        port = free.getsockname()[1]
+    port = free_ports(4)
     for name, value in (('SITL_SPEED', '2.5'), ('SITL_FIRST_INSTANCE', '5'),
                         ('SITL_PORT', str(port - 5)), ('SITL_LIMIT', '77')):
         monkeypatch.setenv(name, value)

@@ -11,7 +11,7 @@ from uav_task_alloc.allocator.records import (
     TaskEventKind,
     UavReport,
 )
-from uav_task_alloc.allocator.replanning import planning, proposal
+from uav_task_alloc.allocator.replanning import planning, separated_lists
 from uav_task_alloc.mavlink.gcs.operator_hold import HoldRequest
 from uav_task_alloc.mavlink.gcs.status import UavMode
 from uav_task_alloc.mavlink.mission.items import MissionStop, TaskList
@@ -29,7 +29,7 @@ WEST, EAST, SOUTH, NORTH = (-250.0, 0.0), (250.0, 0.0), (0.0, -250.0), (0.0, 250
 @pytest.fixture
 def monitor_alone(monkeypatch):
     """Plans as without separation."""
-    monkeypatch.setattr(proposal, 'with_separation', lambda world, built, stamp: built)
+    monkeypatch.setattr(separated_lists, 'with_separation', lambda world, built, stamp: built)
 
 
 class Sky(FlightBench):
