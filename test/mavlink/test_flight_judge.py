@@ -180,7 +180,6 @@ def test_a_bridge_that_takes_its_evidence_is_not_blamed(monkeypatch):
 
 @pytest.mark.parametrize('number', [
     1227,  # REACHED of the mission before the last one, repeated into an upload
-    1259,  # a pilot's Hold in silence, after a Hold that our acknowledged command had ended
     1005,  # a repetition, while it lands beside a stop that it had not reached in its mission
 ])
 def test_a_random_flight_that_once_had_a_fault_has_none(number):
