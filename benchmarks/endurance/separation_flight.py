@@ -29,7 +29,7 @@ class Leg:
 
 @dataclass(slots=True)
 class Craft:
-    """One UAV: where it is, what it flies, and what it is told."""
+    """One UAV: where it is, what it flies, and which holds it obeys."""
 
     name: str
     home: Point

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`plan(separation=)`: plans whose UAVs are apart, and what is told of their conflicts."""
+"""`plan(separation=)`: plans whose UAVs are apart, and what they report of their conflicts."""
 import math
 import random
 import statistics

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A failsafe at a random moment: no zone is entered with a planner on board, else it is told."""
+"""A failsafe at a random moment: no zone is entered with a planner on board, else it is reported."""
 import random
 
 import pytest
@@ -37,7 +37,7 @@ def entered(zones, place):
 
 
 def flown_return(kind, parameters, seed):
-    """The zones that a failsafe at a random moment enters, and those that were told before."""
+    """The zones that a failsafe at a random moment enters, and those that were reported before."""
     rng = random.Random(seed)
     zones, tasks = scene(rng)
     bench = FenceBench(kind, zones=zones, seed=seed, config={
@@ -49,7 +49,7 @@ def flown_return(kind, parameters, seed):
     assert bench.run(lambda: bench.started())
     bench.run(limit=rng.uniform(5.0, 60.0))
     bench.run(lambda: bench.fence.verified)
-    told = bench.fence.way_home
+    reported = bench.fence.way_home
     flight = bench.vehicle.flight
     bench.vehicle.failsafe('battery', flight.custom_modes[FlightMode.RETURN])
     crossed = set()
@@ -58,17 +58,17 @@ def flown_return(kind, parameters, seed):
         crossed.update(entered(zones, flight.body.position))
         return flight.landed
     assert bench.run(home)
-    return crossed, told
+    return crossed, reported
 
 
 @pytest.mark.parametrize('seed', range(6))
 def test_arducopter_with_a_planner_returns_around_the_zones(seed):
-    crossed, told = flown_return('ardupilot', AROUND, seed)
+    crossed, reported = flown_return('ardupilot', AROUND, seed)
     assert not crossed
-    assert not told
+    assert not reported
 
 
 @pytest.mark.parametrize('seed', range(6))
-def test_px4_returns_straight_and_what_it_crosses_is_told_before(seed):
-    crossed, told = flown_return('px4', (('GF_ACTION', 1.0),), seed)
-    assert not crossed or any(zone in told for zone in crossed)
+def test_px4_returns_straight_and_what_it_crosses_is_reported_before(seed):
+    crossed, reported = flown_return('px4', (('GF_ACTION', 1.0),), seed)
+    assert not crossed or any(zone in reported for zone in crossed)

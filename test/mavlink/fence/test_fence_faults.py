@@ -81,7 +81,7 @@ def test_fault_04_of_two_vehicles_each_has_the_fence_of_its_own_plan(kind):
         assert bench.vehicles[n].config.system_id == n
 
 
-def test_fault_05_a_refusal_while_armed_is_told_and_retried():
+def test_fault_05_a_refusal_while_armed_is_reported_and_retried():
     bench = FenceBench('ardupilot', zones=()).settle()
     refuse = [True]
 
