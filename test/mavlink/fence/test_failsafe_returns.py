@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A failsafe at a random moment: no zone is entered with a planner on board, else it is reported."""
+"""A failsafe at a random moment enters no zone with a planner on board, else it is reported."""
 import random
 
 import pytest
