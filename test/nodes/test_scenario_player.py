@@ -60,7 +60,10 @@ def test_everything_is_announced_in_order_at_its_time(start, probe, file):
 
 def test_orders_are_given_when_their_tasks_are_planned(start, probe, tmp_path):
     path = tmp_path / 'ordered.yaml'
-    path.write_text(TEXT.replace(', dies_at: 4', '').replace('at: 8', 'at: 40') + """orders:
+    more = '\n  - {id: uav_2, position: [9, 0, 0]}\ntasks:\n  - {id: t3, position: [90, 0, 50]}'
+    path.write_text(TEXT.replace(', dies_at: 4', '').replace('at: 8', 'at: 40').replace(
+        '\ntasks:', more) + """orders:
+  - {at: 0.5, order: pin, uav: uav_2, tasks: [t3]}
   - {at: 1, order: next, uav: uav_1, tasks: [t1]}
   - {at: 7, order: forbid, uav: uav_1, tasks: [t2]}
   - {at: 8, order: pin, uav: uav_1, tasks: [t2]}
@@ -68,7 +71,7 @@ def test_orders_are_given_when_their_tasks_are_planned(start, probe, tmp_path):
     fleet = Fleet(probe)
     player = start('scenario_player', '-p', f'scenario:={path}', '-p', 'speedup:=8.0')
     start('allocator', '-p', 'uav_timeout:=60.0', '-p', 'route_end:=hold')
-    probe.until(lambda: '1.0 s: orders: next of uav_1 t1' in player.output(), 60.0)
+    probe.until(lambda: 'orders: next of uav_1 t1' in player.output(), 60.0)
     assert ' in force ' not in player.output()  # no UAV is known
     fleet.uav('uav_1', 0.0)
     probe.until(lambda: 'refused: ' in player.output(), 150.0, player.output)
@@ -79,7 +82,9 @@ def test_orders_are_given_when_their_tasks_are_planned(start, probe, tmp_path):
     assert second.startswith('forbid t2 to uav_1: in force as o2')
     assert third.startswith('order pin t2 to uav_1: refused: ')
     assert 'it contradicts order o2 of scenario_player (forbid t2 to uav_1)' in third
-    probe.until(lambda: fleet.route('uav_1') == ['t1'])
+    probe.until(lambda: fleet.route('uav_1') == ['t1', 't3'])
+    waits = 'order pin t3 to uav_2 waits: the allocator does not know uav_2'  # and delays no other
+    probe.until(lambda: waits in player.output())
 
 
 def test_keys_that_a_flight_ignores_are_named(start, probe, tmp_path):

@@ -59,9 +59,10 @@ demo.yaml:15: scenario.tasks[1]: unknown key 'priority': expected one of ...; ne
 ```
 
 `arrivals` are random tasks, drawn from `seed` when the file is read: the same file always has the
-same tasks. `orders` are given in a flight one after the other, by the services of the allocator
+same tasks. `orders` are given in a flight one at a time, by the services of the allocator
 (docs/operator.md), with `scenario_player` as operator; its log has the answer to each, and the
-reason of one that is refused.
+reason of one that is refused. An order waits until the allocator knows its UAV and has planned its
+tasks, which is logged after 5 s; meanwhile those for other UAVs and tasks are given.
 """
 
 

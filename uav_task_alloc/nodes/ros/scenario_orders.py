@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Gives the orders of a scenario to an allocator, one after the other."""
+"""Gives the orders of a scenario to an allocator, one at a time; one that waits stops no other."""
 from __future__ import annotations
 
+import math
 import time
 from typing import Any
 
@@ -9,6 +10,7 @@ from rclpy.node import Node
 from rclpy.task import Future
 from uav_task_alloc_msgs import msg as m, srv
 
+from uav_task_alloc.errors import first_of
 from uav_task_alloc.nodes.conversions.messages import LATCHED
 from uav_task_alloc.scenario import TimedOrder
 
@@ -17,17 +19,21 @@ _SERVICES: dict[str, tuple[Any, str]] = {
     'forbid': (srv.ForbidTask, 'allocator/forbid_task'),
     'next': (srv.OrderTasks, 'allocator/order_tasks')}
 _LONGEST = 60.0  # [s] for an answer
+_SAID_AFTER = 5.0  # [s] for which an order has waited
 
 
 class ScenarioOrders:
     """Gives each of `waiting` once the allocator knows its UAV and has planned its tasks.
+
+    Orders that share a UAV or a task are given in the order of the scenario; others are not
+    delayed by one that waits.
 
     Args:
         node: which gives them.
     """
 
     def __init__(self, node: Node) -> None:
-        self.waiting: list[TimedOrder] = []  # to be given, in this order
+        self.waiting: list[TimedOrder] = []  # to be given, in the order of the scenario
         self._node = node
         self._clients = {word: node.create_client(kind, name)
                          for word, (kind, name) in _SERVICES.items()}
@@ -35,6 +41,7 @@ class ScenarioOrders:
         self._until = 0.0  # [s] of the steady clock, when no answer is expected any more
         self._uavs: set[str] = set()  # that the allocator knows
         self._planned: set[str] = set()  # tasks
+        self._since: dict[TimedOrder, float] = {}  # [s] of the steady clock, infinite: it is said
         node.create_subscription(m.Allocation, 'allocation', self._on_allocation, LATCHED)
         node.create_subscription(m.TaskStatusArray, 'task_statuses', self._on_statuses, LATCHED)
 
@@ -46,12 +53,32 @@ class ScenarioOrders:
             self._node.get_logger().error(
                 f'order: no answer within {_LONGEST:g} s: it may be in force or not')
             self._asked = None
-        if self.waiting and self._is_known(self.waiting[0]):
-            self._give(self.waiting.pop(0))
+        held: set[str] = set()  # UAVs and tasks of orders that wait
+        for order in self.waiting:
+            missing = self._missing(order)
+            if not missing and held.isdisjoint((order.uav, *order.tasks)):
+                self.waiting.remove(order)
+                self._give(order)
+                return
+            if missing:
+                self._say(order, missing)
+            held |= {order.uav, *order.tasks}
 
-    def _is_known(self, order: TimedOrder) -> bool:
-        return (order.uav in self._uavs and self._planned.issuperset(order.tasks)
-                and self._clients[order.order].service_is_ready())
+    def _missing(self, order: TimedOrder) -> str:
+        """What an order waits for; '' for nothing."""
+        if not self._clients[order.order].service_is_ready():
+            return 'there is no allocator'
+        if order.uav not in self._uavs:
+            return f'the allocator does not know {order.uav}'
+        unplanned = [task for task in order.tasks if task not in self._planned]
+        return f'not planned yet: {first_of(unplanned)}' if unplanned else ''
+
+    def _say(self, order: TimedOrder, missing: str) -> None:
+        """Log once what an order waits for."""
+        now = time.monotonic()
+        if now - self._since.setdefault(order, now) >= _SAID_AFTER:
+            self._since[order] = math.inf
+            self._node.get_logger().warning(f'order {order.text} waits: {missing}')
 
     def _give(self, order: TimedOrder) -> None:
         kind, _ = _SERVICES[order.order]
