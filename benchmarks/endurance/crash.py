@@ -40,7 +40,7 @@ from uav_task_alloc.nodes.conversions.messages import EVENTS, LATCHED, STATES
 UAVS, SIDE = 5, 400.0  # number, [m]
 MOST_OPEN = 30  # tasks at once
 STARTING = 1.0 / 8.0  # share of kills before the allocator is up
-LIMIT = 20.0  # [s] for a restart
+LIMIT = 90.0  # [s] for a restart: a machine may be busy with other work
 # UDP on the loopback only: a killed process leaves shared memory, through which its successor
 # receives nothing for 3 s, and the discovery range LOCALHOST always adds that transport. Frequent
 # announcements: else a known process answers a new one once, perhaps before that one listens, and
