@@ -44,6 +44,7 @@ LEVELS = {
     'separation': 3,
     'solver': 3,
     'scenario': 3,
+    'map_files': 5,
     'record': 4,
     'live': 5,
     'plots': 5,

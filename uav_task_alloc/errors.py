@@ -25,7 +25,14 @@ class InvalidValue(AllocError, ValueError):
 
 
 def shown(value: object) -> str:
-    """A value as one line of text, shortened where it is long: input may be hostile."""
+    """Show a value as one line of text, shortened where it is long: input may be hostile.
+
+    Args:
+        value: of any kind.
+
+    Returns:
+        Its repr, at most some 230 characters.
+    """
     text = repr(value)
     return text if len(text) <= _MAX_SHOWN else f'{text[:_MAX_SHOWN]}... ({len(text)} characters)'
 

@@ -197,7 +197,7 @@ def test_params_writes_every_generated_file(tmp_path, monkeypatch):
 @pytest.mark.parametrize(('arguments', 'text'), [
     (['params', '--wirte'], "uav_task_alloc params: '--wirte' is unknown; nearest is --write; "),
     (['compile', 'x'], "uav_task_alloc compile: 'x' is unknown; "),
-    (['fly'], "uav_task_alloc: 'fly': expected one of plan, study, bench, report, params, "),
+    (['fly'], "uav_task_alloc: 'fly': expected one of plan, import, study, bench, report, "),
     (['plann'], 'compile; nearest is plan; uav_task_alloc -h lists the options'),
     (['--verison'], "uav_task_alloc: '--verison' is unknown; nearest is --version; "),
     (['plan'], 'uav_task_alloc plan: the following arguments are required: SCENARIO.yaml; '),

@@ -10,9 +10,11 @@ from collections.abc import Sequence
 from uav_task_alloc.cli.interrupt import INTERRUPTED, prompt_interrupt
 
 # The command NAME is the function `main(argv)` of the module uav_task_alloc.cli.NAME, which is
-# imported only when the command is run: numba and matplotlib take seconds to load.
+# imported only when the command is run: numba and matplotlib take seconds to load. The name of a
+# module cannot be a word of Python.
 COMMANDS = {
     'plan': 'plan the tasks of a scenario file',
+    'import': 'make a scenario file of KML, GeoJSON, .plan and CSV files',
     'study': "regenerate the paper's figures and tables, or run an experiment",
     'bench': 'compare the solvers on benchmark instances',
     'report': 'draw a recorded flight, or print the table of a demo and draw its map again',
@@ -20,6 +22,7 @@ COMMANDS = {
     'order': 'give an order to a running allocator: pin, pause, return, undo ...',
     'compile': 'compile the kernels ahead of time into the cache on disk',
 }
+_MODULES = {'import': 'import_files'}
 _NO_READER = 141  # exit status of a shell after SIGPIPE
 
 
@@ -87,7 +90,7 @@ def _run(argv: Sequence[str]) -> int:
     if argv[0] not in COMMANDS:
         near = get_close_matches(argv[0], COMMANDS, 1, 0.0)[0]
         parser.error(f'{argv[0]!r}: expected one of {", ".join(COMMANDS)}; nearest is {near}')
-    command = import_module(f'uav_task_alloc.cli.{argv[0]}')
+    command = import_module(f'uav_task_alloc.cli.{_MODULES.get(argv[0], argv[0])}')
     return int(command.main(argv[1:]))
 
 

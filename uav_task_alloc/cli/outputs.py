@@ -11,6 +11,7 @@ from pathlib import Path
 from uav_task_alloc.errors import AllocError, InvalidValue
 
 FIGURE_SUFFIXES = ('.png', '.pdf', '.svg')
+MAP_SUFFIXES = ('.geojson', '.kml')
 _INPUT_SUFFIXES = ('.yaml', '.yml', '.mcap')  # a file that took long to make is not replaced
 EXTRAS = {  # of setup.py, by the package that is imported
     'matplotlib': 'plot', 'aiohttp': 'view', 'mcap': 'view', 'mcap_ros2': 'view',

@@ -16,6 +16,7 @@ from uav_task_alloc.cli.interrupt import INTERRUPTED
 from uav_task_alloc.cli.options import OptionParser, one_of
 from uav_task_alloc.cli.outputs import (
     FIGURE_SUFFIXES,
+    MAP_SUFFIXES,
     check_file,
     check_folder,
     check_installed,
@@ -130,6 +131,7 @@ def _add_outputs(parser: OptionParser) -> None:
             ('--plot-3d', 'OUT.png', 'draw the plan in three dimensions (.png, .pdf, .svg)'),
             ('--plot-times', 'OUT.png', 'draw the plan from above and over time (.png, .pdf, '
                                         '.svg)'),
+            ('--map', 'OUT.geojson', 'write routes, tasks and zones for maps (.geojson, .kml)'),
             ('--missions', 'DIR', 'write a .plan (QGroundControl) and a .waypoints file (Mission '
                                   'Planner, MAVProxy) for each UAV')):
         parser.add_argument(option, type=Path, metavar=metavar, help=f'{meaning} (default: none)')
@@ -141,8 +143,9 @@ def check_outputs(args: argparse.Namespace) -> None:
     for option, path, suffixes in (('--json', args.json, ()),
                                    ('--plot', args.plot, FIGURE_SUFFIXES),
                                    ('--plot-3d', args.plot_3d, FIGURE_SUFFIXES),
-                                   ('--plot-times', args.plot_times, FIGURE_SUFFIXES)):
-        if path is not None and suffixes:
+                                   ('--plot-times', args.plot_times, FIGURE_SUFFIXES),
+                                   ('--map', args.map, MAP_SUFFIXES)):
+        if path is not None and suffixes is FIGURE_SUFFIXES:
             check_installed(option, 'matplotlib')
         check_file(option, path, suffixes, used)
         used += [path] if path and path.is_file() else []
@@ -255,6 +258,10 @@ def write_outputs(loaded: Scenario, result: Plan, args: argparse.Namespace) -> N
                 getattr(plots, name)(
                     [uav.uav for uav in loaded.uavs], [timed.task for timed in loaded.tasks],
                     [timed.zone for timed in loaded.zones], result, path)
+    if args.map:
+        from uav_task_alloc.map_files.write import plan_shapes, write_map  # imports numba
+        with naming('--map', args.map):
+            write_map(args.map, loaded.origin, plan_shapes(loaded, result))
     if args.missions:
         with naming('--missions', args.missions):
             print(missions_text(loaded, result, args.missions))

@@ -12,17 +12,19 @@ from typing import Any
 import numpy as np
 
 from uav_task_alloc.cli.options import OptionParser
-from uav_task_alloc.cli.outputs import check_file, check_installed, naming
+from uav_task_alloc.cli.outputs import MAP_SUFFIXES, check_file, check_installed, naming
 from uav_task_alloc.cli.progress import log_line
 from uav_task_alloc.errors import AllocError, InvalidValue
+from uav_task_alloc.map_files.write import flight_shapes, write_map
 from uav_task_alloc.record.ground_truth import (
     GroundTruth,
     Reached,
+    TrueSample,
     read_run,
     visits,
     zone_entries,
 )
-from uav_task_alloc.record.run_state import RunState, read_record
+from uav_task_alloc.record.run_state import RunState
 
 Summary = dict[str, Any]
 _LEFT_OUT = ('UNASSIGNED', 'REJECTED')
@@ -180,8 +182,8 @@ def _with_reasons(reasons: Mapping[str, str]) -> str:
     return '; '.join(f'{name}: {reason}' for name, reason in reasons.items())
 
 
-def flight_page(bag: Path, html: Path) -> int:
-    """Write the report of an MCAP file and print its key figures.
+def flight_page(bag: Path, html: Path, flown: Path | None) -> int:
+    """Write the report of an MCAP file, and its map, and print its key figures.
 
     Raises:
         AllocError: the file has no messages of a fleet, the page cannot be written, or a package
@@ -192,6 +194,7 @@ def flight_page(bag: Path, html: Path) -> int:
     with reading():
         bag.open('rb').close()
     check_file('--html', html, inputs=[bag])
+    check_file('--map', flown, MAP_SUFFIXES, [bag, html])
     from uav_task_alloc.flight_report import page  # imports plotly and mcap
     with naming('--html', html):
         history, warnings = page.write_report(bag, html)
@@ -199,8 +202,22 @@ def flight_page(bag: Path, html: Path) -> int:
         print(f'{name:<45}{"" if value is None else value!s:>12}')
     for text in warnings:
         log_line(f'Warning: {text}')
+    write_flown(flown, history.run, history.tracks)
     print(f'Report: {html}')
     return 0
+
+
+def write_flown(path: Path | None, run: RunState,
+                tracks: Mapping[str, Sequence[TrueSample]]) -> None:
+    """Write the map of a flight, if `--map` is given. Raises InvalidValue where it cannot."""
+    if path is None:
+        return
+    if run.origin is None:
+        raise InvalidValue('--map', str(path), 'a recording with fleet_origin: its coordinates '
+                           'are not known')
+    with naming('--map', path):
+        write_map(path, run.origin, flight_shapes(run, tracks))
+    print(f'Map: {path}')
 
 
 @contextmanager
@@ -212,7 +229,7 @@ def reading() -> Iterator[None]:
         raise SystemExit(f'{error.filename}: {error.strerror}: expected a recorded run') from None
 
 
-def demo_table(place: Path) -> int:
+def demo_table(place: Path, flown: Path | None) -> int:
     """Print the table of the folder or summary of a demo, and draw its map again.
 
     Raises:
@@ -221,11 +238,13 @@ def demo_table(place: Path) -> int:
     """
     out = place if place.is_dir() else place.parent
     png = out / 'map.png'
+    check_file('--map', flown, MAP_SUFFIXES)
     try:
         with reading():
             summary = summarise(out) if place.is_dir() else json.loads(place.read_text())
             print(summary_table(summary), flush=True)
-            read_record(out)
+            run, truth = read_run(out)
+        write_flown(flown, run, truth.tracks)
         check_installed('report', 'matplotlib')
         check_file('map', png)
         from uav_task_alloc.plots import draw_flight  # imports matplotlib
@@ -258,8 +277,11 @@ def main(argv: Sequence[str]) -> int:
                         help='a recording, the folder of a demo, or its summary.json')
     parser.add_argument('--html', type=Path, metavar='OUT.html', help='where to write the page of '
                         'a recording (default: FILE.html beside FILE.mcap)')
+    parser.add_argument('--map', type=Path, metavar='OUT.geojson', help='write tracks, tasks and '
+                        'zones for maps (.geojson, .kml) (default: none)')
     args = parser.parsed(argv)
     place = args.place
     if place.is_dir() or place.suffix == '.json':
-        return demo_table(place)
-    return flight_page(place, args.html or Path(f'{str(place).removesuffix(".mcap")}.html'))
+        return demo_table(place, args.map)
+    return flight_page(place, args.html or Path(f'{str(place).removesuffix(".mcap")}.html'),
+                       args.map)

@@ -134,7 +134,7 @@ OBJECTIVE: KeyTable = {
                     'are', _SHORTEST.unserved),
 }
 
-_ZONE: KeyTable = {
+ZONE: KeyTable = {
     'id': Key(ID, 'name of the zone'),
     'shape': Key(choice('hemisphere', 'cylinder', 'polygon'), 'its shape'),
     'center': Key(list_of(number_value(), 'three numbers [x, y, z] (cylinder: [x, y] suffices)',
@@ -210,7 +210,7 @@ SCENARIO: KeyTable = {
     'uavs': Key(list_of(mapping(UAV, 'a UAV'), 'a list of UAVs'), 'the fleet'),
     'tasks': Key(list_of(mapping(TASK, 'a task'), 'a list of tasks'), 'tasks with their times',
                  ()),
-    'zones': Key(list_of(mapping(_ZONE, 'a zone'), 'a list of zones'), 'zones with their times',
+    'zones': Key(list_of(mapping(ZONE, 'a zone'), 'a list of zones'), 'zones with their times',
                  ()),
     'arrivals': Key(mapping(_ARRIVALS, 'a mapping with count, between, area'),
                     'tasks at random times and places; default: none', None),
@@ -221,5 +221,5 @@ SCENARIO: KeyTable = {
 }
 
 TABLES = {'scenario': SCENARIO, 'origin': ORIGIN, 'objective': OBJECTIVE, 'wind': _WIND,
-          'separation': SEPARATION, 'uavs': UAV, 'tasks': TASK, 'zones': _ZONE,
+          'separation': SEPARATION, 'uavs': UAV, 'tasks': TASK, 'zones': ZONE,
           'arrivals': _ARRIVALS, 'cancels': CANCEL, 'orders': _ORDER}

@@ -1,0 +1,177 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Reader of KML and KMZ (OGC 07-147r2): placemarks with their folders, data and altitude modes."""
+from __future__ import annotations
+
+import io
+import re
+import zipfile
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+from uav_task_alloc.map_files.elements import (
+    ABOVE_ORIGIN,
+    AMSL,
+    LARGEST_FILE,
+    UNSAID,
+    Element,
+    MapFile,
+    MapFileError,
+    Place,
+    check_place,
+    named,
+    open_ring,
+)
+
+_ZONES = re.compile(r'\bzones?\b|\bno[ _-]?fly', re.IGNORECASE)  # names of folders
+_LINE_OF_DATA = re.compile(r'^\s*([A-Za-z_]\w*)\s*[:=]\s*(\S.*?)\s*$')
+_CONTAINERS = 'kml', 'Document', 'Folder'
+_NOT_READ = {'NetworkLink': 'links are not followed', 'GroundOverlay': 'it is a picture',
+             'ScreenOverlay': 'it is a picture', 'PhotoOverlay': 'it is a picture'}
+
+
+def read_kmz(data: bytes, file: str) -> MapFile:
+    """Read a KMZ file: the first .kml in its archive.
+
+    Args:
+        data: of the file.
+        file: its name, for messages.
+
+    Raises:
+        MapFileError: it is damaged or has no KML.
+    """
+    try:
+        with zipfile.ZipFile(io.BytesIO(data)) as archive:
+            inner = next((info for info in archive.infolist()
+                          if Path(info.filename).suffix.lower() == '.kml'), None)
+            if inner is None:
+                raise MapFileError(f'{file}: no .kml in the archive: expected one')
+            if inner.file_size > LARGEST_FILE:
+                raise MapFileError(f'{file}: {inner.filename} has {inner.file_size} bytes: '
+                                   f'expected at most {LARGEST_FILE}')
+            return read_kml(archive.read(inner), file)
+    except (zipfile.BadZipFile, zipfile.LargeZipFile, NotImplementedError, RuntimeError,
+            EOFError, OSError) as error:
+        raise MapFileError(f'{file}: {error}: expected a KMZ archive') from None
+
+
+def read_kml(data: bytes, file: str) -> MapFile:
+    """Read a KML file of any version.
+
+    Args:
+        data: of the file.
+        file: its name, for messages.
+
+    Raises:
+        MapFileError: it is no XML, no KML, or a coordinate is no number.
+    """
+    try:
+        root = ElementTree.fromstring(data, ElementTree.XMLParser())
+    except (ElementTree.ParseError, ValueError, LookupError) as error:
+        raise MapFileError(f'{file}: {error}: expected KML') from None
+    if _tag(root) not in ('kml', 'Document', 'Folder', 'Placemark'):
+        raise MapFileError(f'{file}: the document is <{_tag(root)}>: expected <kml>')
+    read = MapFile()
+    for number, (node, folders) in enumerate(_placemarks(root, (), file, read), 1):
+        _read_placemark(node, folders, number, file, read)
+    return read
+
+
+def _tag(node: ElementTree.Element) -> str:
+    return str(node.tag).rpartition('}')[2]
+
+
+def _child(node: ElementTree.Element, tag: str) -> ElementTree.Element | None:
+    return next((child for child in node if _tag(child) == tag), None)
+
+
+def _text(node: ElementTree.Element, tag: str) -> str:
+    child = _child(node, tag)
+    return '' if child is None else ''.join(child.itertext()).strip()
+
+
+def _placemarks(root: ElementTree.Element, names: tuple[str, ...], file: str, read: MapFile
+                ) -> Iterator[tuple[ElementTree.Element, tuple[str, ...]]]:
+    """Placemarks in the order of the file, each with the names of its folders."""
+    open_nodes = [(root, names)]
+    while open_nodes:
+        node, folders = open_nodes.pop()
+        tag = _tag(node)
+        if tag == 'Placemark':
+            yield node, folders
+        elif tag in _CONTAINERS:
+            within = (*folders, _text(node, 'name')) if tag == 'Folder' else folders
+            open_nodes += [(child, within) for child in reversed(node)]
+        elif tag in _NOT_READ:
+            read.left_out.append(f'{named(file, tag, _text(node, "name"), 1)}: {_NOT_READ[tag]}')
+
+
+def _read_placemark(node: ElementTree.Element, folders: tuple[str, ...], number: int, file: str,
+                    read: MapFile) -> None:
+    name = _text(node, 'name')
+    where = named(file, 'Placemark', name, number)
+    zone = any(_ZONES.search(folder) for folder in folders)
+    data, before = _data(node), len(read.elements)
+    open_nodes = list(reversed(node))
+    while open_nodes:
+        shape = open_nodes.pop()
+        tag = _tag(shape)
+        if tag == 'MultiGeometry':
+            open_nodes += reversed(shape)
+        elif tag in ('Track', 'MultiTrack', 'Model'):
+            read.left_out.append(f'{where}: <{tag}> is no point, line or polygon')
+        elif tag in ('Point', 'LineString', 'LinearRing', 'Polygon'):
+            geometry, places, holes = _shape(shape, tag, where)
+            read.elements.append(Element(where, name, geometry, places, _reference(shape), data,
+                                         holes=holes, zone=zone))
+    if len(read.elements) == before and not (read.left_out
+                                             and read.left_out[-1].startswith(where)):
+        read.left_out.append(f'{where}: it has no geometry')
+
+
+def _shape(node: ElementTree.Element, tag: str, where: str) -> tuple[
+        str, tuple[Place, ...], int]:
+    """Geometry, places and number of holes."""
+    if tag == 'Point':
+        places = _coordinates(node, where)
+        if len(places) != 1:
+            raise MapFileError(f'{where}: a point with {len(places)} positions: expected one')
+        return 'point', places, 0
+    if tag != 'Polygon':
+        return 'line', _coordinates(node, where), 0
+    outer = _child(node, 'outerBoundaryIs')
+    ring = None if outer is None else _child(outer, 'LinearRing')
+    if ring is None:
+        raise MapFileError(f'{where}: a polygon without outer boundary: expected one')
+    holes = sum(_tag(child) == 'innerBoundaryIs' for child in node)
+    return 'polygon', open_ring(where, _coordinates(ring, where)), holes
+
+
+def _coordinates(node: ElementTree.Element, where: str) -> tuple[Place, ...]:
+    words = _text(node, 'coordinates').split()
+    if not words:
+        raise MapFileError(f'{where}: <{_tag(node)}> has no coordinates: expected longitude,'
+                           'latitude[,altitude]')
+    return tuple(check_place(where, word.split(',')) for word in words)
+
+
+def _reference(node: ElementTree.Element) -> str:
+    """What altitudes of a geometry refer to; clampToGround, the default, has none."""
+    return {'absolute': AMSL, 'relativeToGround': ABOVE_ORIGIN,
+            'relativeToSeaFloor': UNSAID}.get(_text(node, 'altitudeMode'), '')
+
+
+def _data(node: ElementTree.Element) -> dict[str, Any]:
+    """ExtendedData, and lines `key: value` of the description."""
+    found: dict[str, Any] = {}
+    for line in re.split(r'\n|<br\s*/?>', _text(node, 'description')):
+        if match := _LINE_OF_DATA.match(line):
+            found[match[1].lower()] = match[2]
+    for child in node.iter():
+        name = str(child.get('name', '')).lower()
+        if name and _tag(child) == 'Data':
+            found[name] = _text(child, 'value')
+        elif name and _tag(child) == 'SimpleData':
+            found[name] = (child.text or '').strip()
+    return found

@@ -1,0 +1,106 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Reader of .plan files of QGroundControl: waypoints, its fence as zones, and its home.
+
+The format: https://docs.qgroundcontrol.com/master/en/qgc-dev-guide/file_formats/plan.html
+"""
+from __future__ import annotations
+
+from typing import Any
+
+from uav_task_alloc.errors import AllocError, shown
+from uav_task_alloc.geometry.frames import Origin
+from uav_task_alloc.map_files.elements import (
+    ABOVE_ORIGIN,
+    AMSL,
+    Element,
+    MapFile,
+    MapFileError,
+    Place,
+    check_place,
+    open_ring,
+)
+
+# MAVLink commands of items; no numbers of pymavlink, which is not loaded for the planner
+_HOLDS = {16: 'waypoint', 19: 'loiter for a time', 82: 'spline waypoint'}  # param1: seconds
+_NOT_TASKS = {20: 'return', 21: 'landing', 22: 'take-off'}  # the bridge makes its own
+_ALTITUDE_MODES = {1: ABOVE_ORIGIN, 2: AMSL}
+_FRAMES = {0: AMSL, 5: AMSL, 3: ABOVE_ORIGIN, 6: ABOVE_ORIGIN}  # MAV_FRAME
+
+
+def read_plan(document: Any, file: str) -> MapFile:
+    """Read a .plan file.
+
+    Args:
+        document: as `json.loads` returns it.
+        file: its name, for messages.
+
+    Returns:
+        A point for each waypoint, a zone for each excluding fence; `origin` is the planned home.
+
+    Raises:
+        MapFileError: it is no .plan, or a value is of another kind.
+    """
+    try:
+        if document['fileType'] != 'Plan':
+            raise MapFileError(f'{file}: fileType = {shown(document["fileType"])}: expected Plan')
+        read = MapFile(origin=_home(document['mission'].get('plannedHomePosition')))
+        for number, item in enumerate(document['mission']['items'], 1):
+            _read_item(item, f'{file}: item {number}', read)
+        fence = document.get('geoFence') or {}
+        for number, circle in enumerate(fence.get('circles', ()), 1):
+            _read_circle(circle, f'{file}: fence circle {number}', number, read)
+        for number, polygon in enumerate(fence.get('polygons', ()), 1):
+            _read_polygon(polygon, f'{file}: fence polygon {number}', number, read)
+    except (AttributeError, IndexError, KeyError, TypeError, ValueError) as error:
+        if isinstance(error, AllocError):
+            raise
+        raise MapFileError(f'{file}: {type(error).__name__}: {error}: expected a .plan file of '
+                           'QGroundControl') from None
+    return read
+
+
+def _home(given: Any) -> Origin | None:
+    return None if given is None else Origin(*(float(value) for value in given[:3]))
+
+
+def _read_item(item: dict[str, Any], where: str, read: MapFile) -> None:
+    if item.get('type') != 'SimpleItem':
+        read.left_out.append(f'{where}: a {item.get("complexItemType", item.get("type"))}: lines '
+                             'and areas are not planned yet')
+        return
+    command, params = item['command'], item['params']
+    if command not in _HOLDS:
+        read.left_out.append(f'{where}: a {_NOT_TASKS[command]}, which missions get of their own'
+                             if command in _NOT_TASKS else f'{where}: command {command} is none '
+                             f'of {", ".join(map(str, _HOLDS))}')
+        return
+    reference = _ALTITUDE_MODES.get(item.get('AltitudeMode', 0)) or (
+        None if item.get('AltitudeMode') else _FRAMES.get(item.get('frame', 3)))
+    if reference is None:
+        raise MapFileError(f'{where}: its altitude is above terrain: expected one relative to '
+                           'launch, or AMSL')
+    place = check_place(where, (params[5], params[4], params[6]))
+    hold = float(params[0] or 0.0)
+    read.elements.append(Element(where, f'wp{item.get("doJumpId", len(read.elements) + 1)}',
+                                 'point', (place,), reference,
+                                 {'service_time': hold} if hold > 0.0 else {}))
+
+
+def _read_circle(circle: dict[str, Any], where: str, number: int, read: MapFile) -> None:
+    if circle.get('inclusion'):
+        read.left_out.append(f'{where}: it includes: expected an excluding one, see fence_area')
+        return
+    latitude, longitude = circle['circle']['center']
+    read.elements.append(Element(
+        where, f'circle_{number}', 'circle', (check_place(where, (longitude, latitude)),),
+        radius=float(circle['circle']['radius']), zone=True))
+
+
+def _read_polygon(polygon: dict[str, Any], where: str, number: int, read: MapFile) -> None:
+    if polygon.get('inclusion'):
+        read.left_out.append(f'{where}: it includes: expected an excluding one, see fence_area')
+        return
+    ring: list[Place] = [check_place(where, (longitude, latitude))
+                         for latitude, longitude in polygon['polygon']]
+    read.elements.append(Element(where, f'polygon_{number}', 'polygon', open_ring(where, ring),
+                                 zone=True))

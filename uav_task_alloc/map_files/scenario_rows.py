@@ -1,0 +1,273 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Turns elements of map files into the tasks, zones and UAVs of a scenario file."""
+from __future__ import annotations
+
+import json
+import math
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import yaml
+
+from uav_task_alloc.errors import ScenarioError
+from uav_task_alloc.geometry.frames import Origin
+from uav_task_alloc.map_files.elements import (
+    ABOVE_ORIGIN,
+    AMSL,
+    UNSAID,
+    Element,
+    MapFile,
+    MapFileError,
+    Place,
+)
+from uav_task_alloc.scenario.key_hints import SAME_MEANING
+from uav_task_alloc.scenario.read import parse
+from uav_task_alloc.scenario.schema import TASK, UAV, ZONE
+
+_PLACE_KEYS = {'id', 'position', 'home', 'center', 'vertices', 'shape', 'latitude', 'longitude',
+               'altitude'}
+_KEYS = {'tasks': TASK.keys() - _PLACE_KEYS, 'zones': (ZONE.keys() - _PLACE_KEYS) | {'shape'},
+         'uavs': UAV.keys() - _PLACE_KEYS}
+_LISTS = 'required_capabilities', 'allowed_uavs', 'capabilities'
+_KINDS = {'task': 'tasks', 'zone': 'zones', 'no_fly_zone': 'zones', 'uav': 'uavs'}
+_RESULTS = 'route', 'track'  # written by map_files.write
+_ROW = re.compile(r':\d+: (scenario\.(tasks|zones|uavs)\[(\d+)\].*)', re.DOTALL)
+_SHIFT = 5.0 / 111_000.0  # [deg] of latitude: UAVs without a place start 5 m apart
+
+
+@dataclass(frozen=True, slots=True)
+class ImportChoices:
+    """What a file does not say.
+
+    Args of the command `import`; see docs/map_files.md.
+    """
+
+    origin: Origin | None = None  # None: that of the fleet or the file
+    height: float = 50.0  # [m] above the origin, of tasks without an altitude
+    altitudes: str = ''  # what altitudes refer to where a file does not say: amsl, origin, ignore
+    all_zones: bool = False  # every polygon is a zone
+    vertices: bool = False  # a task at each vertex of a line
+    uavs: int = 1  # where neither a file nor the fleet has any
+    fleet: Mapping[str, Any] = field(default_factory=dict)  # a scenario, to which it is added
+
+
+@dataclass(slots=True)
+class ScenarioRows:
+    """The text of a scenario, and what was said on the way."""
+
+    text: str  # YAML
+    counts: dict[str, int]  # of tasks, zones and UAVs
+    origin: Origin
+    notes: list[str]  # left out, closed, renamed
+
+
+def to_scenario(files: Sequence[MapFile], choices: ImportChoices, name: str) -> ScenarioRows:
+    """Make one scenario of the elements of files.
+
+    Args:
+        files: as the readers return them.
+        choices: what files do not say.
+        name: of the scenario.
+
+    Returns:
+        Its text, which `scenario.parse` has accepted.
+
+    Raises:
+        MapFileError: nothing can be planned, the origin or what an altitude refers to is not
+            known, or a value is refused; the text names file and element.
+    """
+    document = {'name': name, **choices.fleet}
+    origin = _origin(files, choices, document)
+    document['origin'] = {'latitude': origin.latitude, 'longitude': origin.longitude,
+                          'altitude_amsl': origin.altitude_amsl}
+    rows = _Rows(origin, choices, document)
+    for read in files:
+        rows.notes += read.left_out
+        for element in read.elements:
+            rows.add(element)
+    if not rows.added:
+        raise MapFileError('; '.join(['nothing to import: expected points or zones',
+                                      *rows.notes[:5]]))
+    if not document.get('uavs'):
+        document['uavs'] = [
+            {'id': f'uav_{number + 1}', 'latitude': origin.latitude + number * _SHIFT,
+             'longitude': origin.longitude, 'altitude': 0.0} for number in range(choices.uavs)]
+    text = str(yaml.safe_dump(document, sort_keys=False, default_flow_style=None, width=99,
+                              allow_unicode=True))
+    _check(text, rows)
+    return ScenarioRows(text, {kind: len(document.get(kind) or ()) for kind in _KEYS}, origin,
+                        rows.notes)
+
+
+def _origin(files: Iterable[MapFile], choices: ImportChoices, fleet: Mapping[str, Any]) -> Origin:
+    if choices.origin is not None:
+        return choices.origin
+    if isinstance(fleet.get('origin'), Mapping):
+        return Origin(**fleet['origin'])
+    found = next((read.origin for read in files if read.origin is not None), None)
+    if found is None:
+        raise MapFileError('the origin is not known: expected --origin LAT,LON,ALT, the place of '
+                           'the launch and its altitude AMSL, or --fleet with one')
+    return found
+
+
+def _check(text: str, rows: _Rows) -> None:
+    """Parse the text; an error names the element that it comes from."""
+    try:
+        parse(text)
+    except ScenarioError as error:
+        match = _ROW.search(str(error))
+        if match is None:
+            raise MapFileError(str(error)) from None
+        where = rows.places.get((match[2], int(match[3])))
+        raise MapFileError(f'{where}: {match[1]}' if where else match[1]) from None
+
+
+class _Rows:
+    """The rows of the new scenario, beside those of its fleet."""
+
+    def __init__(self, origin: Origin, choices: ImportChoices, document: dict[str, Any]) -> None:
+        self.origin, self.choices, self.document = origin, choices, document
+        self.places: dict[tuple[str, int], str] = {}  # (kind, index): file and element
+        self.notes: list[str] = []
+        self.added = 0
+        for kind in _KEYS:
+            document[kind] = list(document.get(kind) or ())
+        self._taken = {kind: {row.get('id') for row in document[kind] if isinstance(row, dict)}
+                       for kind in _KEYS}
+
+    def add(self, element: Element) -> None:
+        """Add what an element means, or a note of why it is left out."""
+        kind = self._kind(element)
+        if not kind:
+            self.notes.append(f'{element.where}: a {element.properties["kind"]}, as plans and '
+                              'flights are written')
+        elif kind == 'zones':
+            self._add_zone(element)
+        elif kind == 'uavs' and element.geometry == 'point':
+            self._add_point('uavs', element, element.places[0], element.name, 0.0)
+        elif kind == 'tasks' and element.geometry == 'point':
+            self._add_point('tasks', element, element.places[0], element.name,
+                            self.choices.height)
+        elif kind == 'tasks' and element.geometry == 'line' and self.choices.vertices:
+            for number, place in enumerate(element.places, 1):
+                self._add_point('tasks', element, place, f'{element.name or "line"}_{number}',
+                                self.choices.height)
+        elif kind == 'tasks' and element.geometry == 'line':
+            self.notes.append(f'{element.where}: a line; --lines vertices makes a task of each '
+                              'vertex')
+        elif kind == 'tasks':
+            self.notes.append(f'{element.where}: a {element.geometry}, which is neither in a '
+                              'folder of zones nor has kind: zone; --polygons zones makes each '
+                              'a zone')
+        else:
+            raise MapFileError(f'{element.where}: a {element.geometry}: expected a point for a '
+                               'UAV')
+
+    def _kind(self, element: Element) -> str:
+        given = str(element.properties.get('kind', '')).strip().lower().replace('-', '_')
+        if given in _RESULTS:
+            return ''
+        if given and given not in _KINDS:
+            raise MapFileError(f'{element.where}: kind = {given!r}: expected one of '
+                               f'{", ".join(_KINDS)}')
+        zone = element.zone or (element.geometry == 'polygon' and self.choices.all_zones)
+        return _KINDS[given] if given else 'zones' if zone else 'tasks'
+
+    def _add_point(self, kind: str, element: Element, place: Place, name: str,
+                   without: float) -> None:
+        self._append(kind, element, name, {
+            'latitude': place.latitude, 'longitude': place.longitude,
+            'altitude': self._altitude(element, place, without)})
+
+    def _altitude(self, element: Element, place: Place, without: float) -> float:
+        """Height [m] above the origin."""
+        own = {key: element.properties[key] for key in ('altitude', 'altitude_amsl')
+               if str(element.properties.get(key, '')).strip()}
+        if own:
+            key, given = next(iter(own.items()))
+            number = _number(given)
+            if not isinstance(number, (int, float)) or not math.isfinite(number):
+                raise MapFileError(f'{element.where}: {key} = {given!r}: expected a number [m]')
+            return self._above_origin(number, AMSL if key == 'altitude_amsl' else ABOVE_ORIGIN)
+        if place.altitude is None or not element.reference:
+            return without
+        if element.reference != UNSAID:
+            return self._above_origin(place.altitude, element.reference)
+        if self.choices.altitudes == 'ignore' or (place.altitude == 0.0
+                                                  and not self.choices.altitudes):
+            return without
+        if not self.choices.altitudes:
+            raise MapFileError(
+                f'{element.where}: altitude {place.altitude:g}, and the file does not say above '
+                'what: expected --altitudes amsl, origin or ignore')
+        return self._above_origin(place.altitude, self.choices.altitudes)
+
+    def _above_origin(self, altitude: float, reference: str) -> float:
+        return altitude - self.origin.altitude_amsl if reference == AMSL else altitude
+
+    def _add_zone(self, element: Element) -> None:
+        place = element.places[0]
+        radius = _number(element.properties.get('radius', element.radius))
+        if element.geometry == 'polygon':
+            if element.holes:
+                self.notes.append(f'{element.where}: the holes of the zone are closed')
+            row: dict[str, Any] = {'shape': 'polygon', 'vertices': [
+                {'latitude': each.latitude, 'longitude': each.longitude}
+                for each in element.places]}
+        elif element.geometry == 'line' or radius is None or radius != radius:
+            raise MapFileError(f'{element.where}: a zone that is a {element.geometry}: expected '
+                               'a polygon, or a point with a radius')
+        else:
+            row = {'shape': 'cylinder', 'latitude': place.latitude,
+                   'longitude': place.longitude, 'radius': radius}
+            if element.properties.get('shape') == 'hemisphere':
+                row['altitude'] = self._altitude(element, place, 0.0)
+        self._append('zones', element, element.name, row)
+
+    def _append(self, kind: str, element: Element, name: str, row: dict[str, Any]) -> None:
+        properties = {key: _value(key, value) for key, value in element.properties.items()
+                      if key in _KEYS[kind] and value not in (None, '')}
+        for key in element.properties:
+            meant = next((ours for ours, words in SAME_MEANING.items()
+                          if ours in _KEYS[kind] and key in words.split()), None)
+            if meant and meant not in properties and key not in ('name', 'id', 'type', 'kind'):
+                self.notes.append(f'{element.where}: {key!r} is not used; {meant!r} is')
+        identifier = self._id(kind, name, element)
+        self.places[kind, len(self.document[kind])] = element.where
+        self.document[kind].append({'id': identifier, **row, **properties})
+        self.added += 1
+
+    def _id(self, kind: str, name: str, element: Element) -> str:
+        """A name as scenarios allow it, that nothing else of its kind has."""
+        stem = re.sub(r'[^A-Za-z0-9_]+', '_', name).strip('_') or kind[:-1]
+        stem = stem if stem[0].isalpha() else f'{kind[0]}{stem}'
+        identifier, number = stem, 2
+        while identifier in self._taken[kind]:
+            identifier, number = f'{stem}_{number}', number + 1
+        self._taken[kind].add(identifier)
+        if name and identifier != name:
+            self.notes.append(f'{element.where}: its id is {identifier}')
+        return identifier
+
+
+def _value(key: str, value: Any) -> Any:
+    """A property as scenarios have it: a number, a list of names, or a text."""
+    if key in _LISTS and not isinstance(value, list):
+        return [part for part in re.split(r'[,;\s]+', str(value)) if part]
+    if isinstance(value, (dict, list)):
+        return value if key in _LISTS else json.dumps(value)
+    return _number(value)
+
+
+def _number(value: Any) -> Any:
+    """A text as the number that it is, else unchanged; infinities stay texts of YAML."""
+    if not isinstance(value, str):
+        return value
+    try:
+        number = float(value)
+    except ValueError:
+        return value.strip()
+    return int(number) if number.is_integer() and abs(number) < 1e15 else number

@@ -1,0 +1,65 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Reader of tables of points: CSV with a line of column names."""
+from __future__ import annotations
+
+import csv
+
+from uav_task_alloc.errors import shown
+from uav_task_alloc.map_files.elements import (
+    ABOVE_ORIGIN,
+    AMSL,
+    UNSAID,
+    Element,
+    MapFile,
+    MapFileError,
+    check_place,
+)
+
+_NAMES = 'id', 'name'
+_LATITUDE, _LONGITUDE = ('latitude', 'lat', 'y'), ('longitude', 'lon', 'lng', 'long', 'x')
+_ALTITUDES = {'altitude_amsl': AMSL, 'altitude': ABOVE_ORIGIN, 'alt': UNSAID, 'z': UNSAID,
+              'elevation': UNSAID, 'height': UNSAID}
+
+
+def read_table(text: str, file: str) -> MapFile:
+    """Read points from CSV, separated by commas, semicolons or tabs.
+
+    Args:
+        text: the first line has the names of the columns.
+        file: its name, for messages.
+
+    Raises:
+        MapFileError: a column is missing, or a value is no number.
+    """
+    lines = text.splitlines()
+    head = next((line for line in lines if line.strip()), '')
+    reader = csv.DictReader(lines, delimiter=max(',;\t', key=head.count), strict=True)
+    names = [str(name).strip().lower() for name in reader.fieldnames or ()]
+    reader.fieldnames = names
+    latitude, longitude = (_column(names, wanted, file) for wanted in (_LATITUDE, _LONGITUDE))
+    altitude = next((name for name in _ALTITUDES if name in names), '')
+    label = next((name for name in _NAMES if name in names), '')
+    read = MapFile()
+    try:
+        for row in reader:
+            where = f'{file}:{reader.line_num}'
+            if None in row or None in row.values():
+                raise MapFileError(f'{where}: expected {len(names)} columns: {", ".join(names)}')
+            numbers = [row[longitude], row[latitude]] + (
+                [row[altitude]] if altitude and row[altitude].strip() else [])
+            read.elements.append(Element(
+                where, row[label].strip() if label else '', 'point',
+                (check_place(where, numbers),), _ALTITUDES.get(altitude, UNSAID),
+                {name: value.strip() for name, value in row.items()
+                 if value.strip() and name not in (latitude, longitude, altitude, label)}))
+    except csv.Error as error:
+        raise MapFileError(f'{file}:{reader.line_num}: {error}: expected CSV') from None
+    return read
+
+
+def _column(names: list[str], wanted: tuple[str, ...], file: str) -> str:
+    found = next((name for name in wanted if name in names), None)
+    if found is None:
+        raise MapFileError(f'{file}:1: columns {shown(", ".join(names))}: expected one named '
+                           f'{wanted[0]}')
+    return found
