@@ -2,7 +2,10 @@
 # make demo: four simulated UAVs fly what the allocator plans.   make test: every check.
 SHELL := /bin/bash
 .SHELLFLAGS := -eo pipefail -c
-.PHONY: demo test coverage build docs site clean
+.PHONY: demo test checked coverage build docs site clean
+# messages, kernels and checks of the sources at a time; programs that recipes start have their own
+MAKEFLAGS += -j2
+unexport MAKEFLAGS
 
 # some containers set it: then each process would compile the sources again, each test worker the tests
 unexport PYTHONDONTWRITEBYTECODE
@@ -18,12 +21,14 @@ demo: build
 	@echo '== demo: 4 UAVs, 32 tasks, 3 zones; results go to out/demo'
 	@$(RUN) && install/uav_task_alloc/lib/uav_task_alloc/demo
 
-test: build
-	@echo '== ruff' && .ros/bin/ruff check .
-	@tools/browser.sh .ros > /dev/null
-	@echo '== mypy, while the tests are compiled once for all workers' && $(RUN) \
-		&& { REQUIRE_ROS=1 python3 -m pytest --collect-only > /dev/null & .ros/bin/mypy; wait; }
+test: build checked
 	@echo '== pytest, $(WORKERS) at a time' && $(RUN) && REQUIRE_ROS=1 python3 -m pytest -n $(WORKERS) --dist worksteal --durations 15
+
+# Collecting compiles the tests once for all workers; it takes what waits for no kernels
+checked: install/.built
+	@echo '== ruff, mypy' && .ros/bin/ruff check . && .ros/bin/mypy
+	@tools/browser.sh .ros > /dev/null
+	@$(RUN) && REQUIRE_ROS=1 python3 -m pytest --collect-only > /dev/null
 
 # Line coverage of the package without nodes; below the floor of setup.cfg it fails
 coverage: build
@@ -46,10 +51,10 @@ install/.built: .ros/.made setup.py setup.cfg package.xml colcon_defaults.yaml \
 		|| { tail -n 40 log/make_build.txt; exit 1; }
 	@touch $@
 
-install/.compiled: install/.built $(wildcard uav_task_alloc/*.py uav_task_alloc/*/*.py uav_task_alloc/*/*/*.py)
+install/.compiled: .ros/.made $(wildcard uav_task_alloc/*.py uav_task_alloc/*/*.py uav_task_alloc/*/*/*.py)
 	@echo '== kernels'
-	@$(RUN) && python3 -m uav_task_alloc compile
-	@touch $@
+	@$(STOP); $(ENV) && python3 -m uav_task_alloc compile
+	@mkdir -p install && touch $@
 
 # The generated files: config/*.yaml, docs/parameters.md, the index of docs/architecture.md
 docs: build

@@ -111,10 +111,15 @@ def test_the_version_is_the_same_everywhere():
 
 
 def test_ctrl_c_in_make_build_shows_no_traceback_of_the_build(tmp_path):
-    """`python3` is a program that reports the signal as colcon does, at length."""
+    """`python3` is a program that reports the signal as colcon does, at length.
+
+    Kernels are compiled at the same time, by a program that reports it in one line.
+    """
     colcon = tmp_path / 'bin/python3'
     colcon.parent.mkdir()
-    colcon.write_text('#!/bin/sh\ntrap "echo Traceback; exit 1" INT\n> begun\n'
+    colcon.write_text('#!/bin/sh\ncase "$*" in\n'
+                      '*colcon*) trap "echo Traceback; exit 1" INT; > begun ;;\n'
+                      '*) trap "echo interrupted; exit 130" INT; > compiling ;;\nesac\n'
                       'while :; do sleep 0.05; done\n')
     colcon.chmod(0o755)
     (tmp_path / '.ros').mkdir()
@@ -124,7 +129,7 @@ def test_ctrl_c_in_make_build_shows_no_traceback_of_the_build(tmp_path):
         ['make', '-f', ROOT / 'Makefile', '-o', '.ros/.made', 'build'], cwd=tmp_path, text=True,
         stdout=subprocess.PIPE, stderr=subprocess.STDOUT, start_new_session=True,
         env={**os.environ, 'PATH': f'{colcon.parent}:{os.environ["PATH"]}'})
-    while not (tmp_path / 'begun').exists():
+    while not all((tmp_path / name).exists() for name in ('begun', 'compiling')):
         assert made.poll() is None, made.communicate()
     os.killpg(made.pid, signal.SIGINT)  # as a terminal does
     out, _ = made.communicate(timeout=20)
