@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Four vehicles whose lists are replaced ten times in flight, on fleet_sim and on real SITL."""
 import random
-import time
 from collections import Counter
 
 from sitl_bench import Bridge, Visits, stops
@@ -57,7 +56,7 @@ class Replacing(Bridge):
 
     def collect(self, system, session):
         super().collect(system, session)
-        now, course = time.monotonic(), self.courses[system]
+        now, course = self.now(), self.courses[system]
         if course.is_due(state_of(session, now).mode):
             self.send(self.ground_station.assign(session.uav_id, course.next(), now))
 

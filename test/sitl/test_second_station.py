@@ -14,7 +14,7 @@ from uav_task_alloc.mavlink.mission.items import MissionStop, TaskList
 from uav_task_alloc.model import Task
 
 TASKS = 8  # of each vehicle
-UNDISTURBED = 15.0  # [s] wall clock in which the bridge must not command a taken vehicle
+UNDISTURBED = 15.0  # [s] of the bridge in which the bridge must not command a taken vehicle
 # (main mode, sub mode) by kind of autopilot; in LOITER the sticks are centred
 MODES = {'ardupilot': {'land': (9, 0), 'return': (6, 0), 'hold': (5, 0)},
          'px4': {'land': (4, 6), 'return': (4, 5), 'hold': (4, 3)}}

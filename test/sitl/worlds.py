@@ -2,6 +2,8 @@
 """Four vehicles: simulated ones, or SITL binaries named by environment variables."""
 import os
 import subprocess
+import threading
+import time
 
 from uav_task_alloc.geometry.frames import Origin, to_geodetic
 from uav_task_alloc.mavlink.transport.link import open_link
@@ -39,18 +41,45 @@ COMPASS_OFS2_Z -18
 """
 
 
+class ServedFleet(UdpFleet):
+    """Its time passes while it is served: on a busy machine nothing is flown past the bridge."""
+
+    TURN = 0.02  # [s] wall, at most for each turn of the bridge
+
+    def __init__(self, *args):
+        super().__init__(*args)
+        self._clock = threading.Lock()
+        self._now, self._last, self._end = 0.0, time.monotonic(), 0.0
+
+    def serve(self):
+        """The bridge has taken a turn."""
+        self.now()
+        with self._clock:
+            self._last = time.monotonic()
+            self._end = self._last + self.TURN
+
+    def now(self):
+        """Vehicle time [s]."""
+        with self._clock:
+            wall = min(time.monotonic(), self._end)
+            self._now += max(0.0, wall - self._last) * self.speedup
+            self._last = max(wall, self._last)
+            return self._now
+
+
 class FleetSim:
-    """The simulated vehicles of this package, on one port."""
+    """The simulated vehicles of this package, on one port; the bridge lives in their time."""
 
     speedup, limit = 20.0, 240.0
 
     def __init__(self, kind):
         self.kind = kind
         self.links = [open_link('udpin:127.0.0.1:0')]
-        self.fleet = UdpFleet([(VehicleConfig(f'uav_{n}', n, ORIGIN, HOMES[n], arming_delay=0.0,
+        self.fleet = ServedFleet([(VehicleConfig(f'uav_{n}', n, ORIGIN, HOMES[n], arming_delay=0.0,
                                            floods=False), kind) for n in SYSTEMS],
                            ('127.0.0.1', self.links[0].port), self.speedup)
         self.thread = self.fleet.start()
+        self.serve, self.now = self.fleet.serve, self.fleet.now
 
     def close(self):
         self.fleet.stop()
@@ -92,6 +121,11 @@ class Sitl:
             return subprocess.Popen(
                 self.command(system, place), cwd=place, stdin=subprocess.DEVNULL, stdout=output,
                 stderr=subprocess.STDOUT, env={**os.environ, **self.environment(system)})
+
+    now = staticmethod(time.monotonic)
+
+    def serve(self):
+        """It flies by itself."""
 
     def close(self):
         for process in self.processes:
