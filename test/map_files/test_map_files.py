@@ -111,6 +111,23 @@ def test_what_is_not_imported_is_named(tmp_path):
         "job.kml: Placemark 'wire': a line; --lines vertices makes a task of each vertex"]
 
 
+def test_many_changed_names_are_one_note(tmp_path):
+    marks = [(point(8.547, 47.4), {'name': f' a__b {n} ', 'prio': n}) for n in range(1, 4)]
+    scenario, notes = imported(tmp_path, 'job.geojson', geojson(*marks))
+    assert [timed.task.id for timed in scenario.tasks] == ['a_b_1', 'a_b_2', 'a_b_3']
+    assert notes == ["job.geojson: feature 'a__b 1': 'prio' is not used; 'value' is",
+                     "job.geojson: feature 'a__b 1': its id is a_b_1; 2 more names are changed"]
+
+
+def test_a_point_without_coordinates_is_left_out(tmp_path):
+    text = KML.format(MAST.format(mode='', alt=0, data='')
+                      + '<Placemark><name>by post</name><address>Bern</address><Point/>'
+                        '</Placemark>')
+    scenario, notes = imported(tmp_path, 'job.kml', text)
+    assert len(scenario.tasks) == 1
+    assert notes[0] == "job.kml: Placemark 'by post': <Point> has no coordinates"
+
+
 def test_lines_and_polygons_become_what_the_user_chooses(tmp_path):
     text = KML.format('<Placemark><name>all</name><MultiGeometry>'
                       + LINE.partition('</name>')[2].removesuffix('</Placemark>')

@@ -62,7 +62,7 @@ def _read_feature(feature: Any, number: int, file: str, read: MapFile) -> None:
     given = feature.get('properties')
     properties = {str(key).lower(): value for key, value in given.items()} if isinstance(
         given, dict) else {}
-    name = str(properties.get('id') or properties.get('name') or feature.get('id') or '')
+    name = str(properties.get('id') or properties.get('name') or feature.get('id') or '').strip()
     where = named(file, 'feature', name, number)
     geometry = feature.get('geometry')
     if geometry is None:

@@ -121,6 +121,8 @@ def _read_placemark(node: ElementTree.Element, folders: tuple[str, ...], number:
             open_nodes += reversed(shape)
         elif tag in ('Track', 'MultiTrack', 'Model'):
             read.left_out.append(f'{where}: <{tag}> is no point, line or polygon')
+        elif tag in ('Point', 'LineString') and not _text(shape, 'coordinates'):
+            read.left_out.append(f'{where}: <{tag}> has no coordinates')
         elif tag in ('Point', 'LineString', 'LinearRing', 'Polygon'):
             geometry, places, holes = _shape(shape, tag, where)
             read.elements.append(Element(where, name, geometry, places, _reference(shape), data,

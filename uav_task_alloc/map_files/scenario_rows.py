@@ -32,6 +32,7 @@ _KEYS = {'tasks': TASK.keys() - _PLACE_KEYS, 'zones': (ZONE.keys() - _PLACE_KEYS
          'uavs': UAV.keys() - _PLACE_KEYS}
 _LISTS = 'required_capabilities', 'allowed_uavs', 'capabilities'
 _KINDS = {'task': 'tasks', 'zone': 'zones', 'no_fly_zone': 'zones', 'uav': 'uavs'}
+_HINTED = {'value', 'service_time', 'latest'}  # keys for which a hint names other words
 _RESULTS = 'route', 'track'  # written by map_files.write
 _ROW = re.compile(r':\d+: (scenario\.(tasks|zones|uavs)\[(\d+)\].*)', re.DOTALL)
 _SHIFT = 5.0 / 111_000.0  # [deg] of latitude: UAVs without a place start 5 m apart
@@ -98,7 +99,7 @@ def to_scenario(files: Sequence[MapFile], choices: ImportChoices, name: str) -> 
                               allow_unicode=True))
     _check(text, rows)
     return ScenarioRows(text, {kind: len(document.get(kind) or ()) for kind in _KEYS}, origin,
-                        rows.notes)
+                        rows.all_notes())
 
 
 def _origin(files: Iterable[MapFile], choices: ImportChoices, fleet: Mapping[str, Any]) -> Origin:
@@ -133,6 +134,8 @@ class _Rows:
         self.places: dict[tuple[str, int], str] = {}  # (kind, index): file and element
         self.notes: list[str] = []
         self.added = 0
+        self._renamed: list[str] = []
+        self._unused: dict[tuple[str, str], str] = {}  # first element by property and our key
         for kind in _KEYS:
             document[kind] = list(document.get(kind) or ())
         self._taken = {kind: {row.get('id') for row in document[kind] if isinstance(row, dict)}
@@ -165,6 +168,14 @@ class _Rows:
         else:
             raise MapFileError(f'{element.where}: a {element.geometry}: expected a point for a '
                                'UAV')
+
+    def all_notes(self) -> list[str]:
+        """What is left out or changed; of what recurs the first, and how many."""
+        unused = [f'{where}: {key!r} is not used; {meant!r} is'
+                  for (key, meant), where in self._unused.items()]
+        more = len(self._renamed) - 1
+        return self.notes + unused + [text + f'; {more} more names are changed' * bool(more)
+                                      for text in self._renamed[:1]]
 
     def _kind(self, element: Element) -> str:
         given = str(element.properties.get('kind', '')).strip().lower().replace('-', '_')
@@ -230,11 +241,9 @@ class _Rows:
     def _append(self, kind: str, element: Element, name: str, row: dict[str, Any]) -> None:
         properties = {key: _value(key, value) for key, value in element.properties.items()
                       if key in _KEYS[kind] and value not in (None, '')}
-        for key in element.properties:
-            meant = next((ours for ours, words in SAME_MEANING.items()
-                          if ours in _KEYS[kind] and key in words.split()), None)
-            if meant and meant not in properties and key not in ('name', 'id', 'type', 'kind'):
-                self.notes.append(f'{element.where}: {key!r} is not used; {meant!r} is')
+        for meant in sorted(_HINTED & (_KEYS[kind] - properties.keys())):
+            for key in sorted(element.properties.keys() & set(SAME_MEANING[meant].split())):
+                self._unused.setdefault((key, meant), element.where)
         identifier = self._id(kind, name, element)
         self.places[kind, len(self.document[kind])] = element.where
         self.document[kind].append({'id': identifier, **row, **properties})
@@ -242,14 +251,14 @@ class _Rows:
 
     def _id(self, kind: str, name: str, element: Element) -> str:
         """A name as scenarios allow it, that nothing else of its kind has."""
-        stem = re.sub(r'[^A-Za-z0-9_]+', '_', name).strip('_') or kind[:-1]
+        stem = re.sub(r'[^A-Za-z0-9]+', '_', name).strip('_') or kind[:-1]
         stem = stem if stem[0].isalpha() else f'{kind[0]}{stem}'
         identifier, number = stem, 2
         while identifier in self._taken[kind]:
             identifier, number = f'{stem}_{number}', number + 1
         self._taken[kind].add(identifier)
         if name and identifier != name:
-            self.notes.append(f'{element.where}: its id is {identifier}')
+            self._renamed.append(f'{element.where}: its id is {identifier}')
         return identifier
 
 
