@@ -3,49 +3,59 @@
 import ast
 import re
 from collections import defaultdict
+from functools import cache
 from pathlib import Path
 
 import pytest
 
 PACKAGE = Path(__file__).parent.parent / 'uav_task_alloc'
 SOURCES = {path: path.read_text() for path in sorted(PACKAGE.rglob('*.py'))}
-TREES = {path: ast.parse(text) for path, text in SOURCES.items()}
-NODES = {path: list(ast.walk(tree)) for path, tree in TREES.items()}
 MODULES = {'.'.join(path.relative_to(PACKAGE.parent).with_suffix('').parts)
-           .removesuffix('.__init__'): path for path in TREES}
+           .removesuffix('.__init__'): path for path in SOURCES}
+
+
+@cache
+def tree(path):
+    """The syntax tree of a file; parsed in the one process that runs these tests."""
+    return ast.parse(SOURCES[path])
+
+
+@cache
+def nodes(path):
+    """All nodes of that tree."""
+    return list(ast.walk(tree(path)))
 
 
 def used_names(user):
     """(module, name) of what a file takes from modules of the package."""
     modules = {}
-    for node in NODES[user]:
+    for node in nodes(user):
         if isinstance(node, ast.ImportFrom):
             for alias in node.names:
                 if f'{node.module}.{alias.name}' in MODULES:
                     modules[alias.asname or alias.name] = f'{node.module}.{alias.name}'
                 elif node.module in MODULES:
                     yield MODULES[node.module], alias.name
-    for node in NODES[user]:
+    for node in nodes(user):
         if (isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name)
                 and node.value.id in modules):
             yield MODULES[modules[node.value.id]], node.attr
 
 
+@cache
 def offered():
     """Functions and classes that a file of another folder uses, by file."""
     names = defaultdict(set)
-    for user in TREES:
+    for user in SOURCES:
         for path, name in used_names(user):
             if path.parent != user.parent:
                 names[path].add(name)
-    for path in [path for path in TREES if path.stem == '__init__']:
+    for path in [path for path in SOURCES if path.stem == '__init__']:
         for module, name in used_names(path):  # what it passes on
             if name in names[path] or f"'{name}'" in SOURCES[path]:
                 names[module].add(name)
-    for path, tree in TREES.items():
-        for node in tree.body:
-            if isinstance(node, (ast.FunctionDef, ast.ClassDef)) and node.name in names[path]:
-                yield path, node
+    return [(path, node) for path in SOURCES for node in tree(path).body
+            if isinstance(node, (ast.FunctionDef, ast.ClassDef)) and node.name in names[path]]
 
 
 def section(node, title):
@@ -103,7 +113,7 @@ def methods(path, cls):
     for node in cls.body:
         if (isinstance(node, ast.FunctionDef) and not node.name.startswith('_')
                 and ast.get_docstring(node)
-                and any(node.name in names for user, names in ATTRIBUTES.items()
+                and any(node.name in names for user, names in attributes().items()
                         if user.parent != path.parent)):
             yield node
 
@@ -116,28 +126,26 @@ def undescribed_arguments(cls, method):
                        + section(cls, 'Arguments of methods') + section(cls, 'Args'))
 
 
-ATTRIBUTES = {path: {node.attr for node in nodes if isinstance(node, ast.Attribute)}
-              for path, nodes in NODES.items()}
-OFFERED = list(offered())
+@cache
+def attributes():
+    """By file, the names that it takes as attributes."""
+    return {path: {node.attr for node in nodes(path) if isinstance(node, ast.Attribute)}
+            for path in SOURCES}
 
 
 def test_many_functions_and_classes_are_used_by_other_rooms():
-    assert len(OFFERED) > 250
+    assert len(offered()) > 250
 
 
-@pytest.mark.parametrize('path', sorted({path for path, _ in OFFERED}),
-                         ids=lambda path: path.relative_to(PACKAGE).as_posix())
-def test_what_other_rooms_use_describes_arguments_and_result(path):
-    missing = {node.name: left_out for place, node in OFFERED
-               if place == path and (left_out := gaps(path, node))}
+def test_what_other_rooms_use_describes_arguments_and_result():
+    missing = {f'{path.relative_to(PACKAGE)}: {node.name}': left_out
+               for path, node in offered() if (left_out := gaps(path, node))}
     assert missing == {}
 
 
-@pytest.mark.parametrize('path', sorted({path for path, _ in OFFERED}),
-                         ids=lambda path: path.relative_to(PACKAGE).as_posix())
-def test_methods_that_other_rooms_use_have_described_arguments(path):
-    missing = {f'{cls.name}.{method.name}': left_out
-               for place, cls in OFFERED if place == path and isinstance(cls, ast.ClassDef)
+def test_methods_that_other_rooms_use_have_described_arguments():
+    missing = {f'{path.relative_to(PACKAGE)}: {cls.name}.{method.name}': left_out
+               for path, cls in offered() if isinstance(cls, ast.ClassDef)
                for method in methods(path, cls)
                if (left_out := undescribed_arguments(cls, method))}
     assert missing == {}

@@ -133,9 +133,9 @@ def test_no_modules_import_each_other_in_a_circle():
     assert ahead == {}
 
 
-@pytest.mark.parametrize('path', FILES, ids=lambda p: p.relative_to(ROOT).as_posix())
-def test_a_file_imports_only_what_its_room_may(path):
-    assert list(breaches(path, imports(path))) == []
+def test_a_file_imports_only_what_its_room_may():
+    assert len(FILES) > 300
+    assert [breach for path in FILES for breach in breaches(path, imports(path))] == []
 
 
 @pytest.mark.parametrize(('where', 'name'), [
@@ -148,8 +148,8 @@ def test_a_breach_is_seen(where, name):
     assert list(breaches(ROOT / where, [name]))
 
 
-@pytest.mark.parametrize('path', FILES, ids=lambda p: p.relative_to(ROOT).as_posix())
-def test_a_file_says_what_it_is(path):
-    text = path.read_text()
-    assert text.startswith('# SPDX-License-Identifier: Apache-2.0\n')
-    assert ast.get_docstring(ast.parse(text))
+def test_a_file_says_what_it_is():
+    texts = {path: path.read_text() for path in FILES}
+    assert [path for path, text in texts.items()
+            if not text.startswith('# SPDX-License-Identifier: Apache-2.0\n')
+            or not ast.get_docstring(ast.parse(text))] == []
