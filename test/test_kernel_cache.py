@@ -71,7 +71,7 @@ def start(package, code):
 
 def output(package, code=CALL):
     """What a new process prints, and whether it compiled."""
-    printed, errors = start(package, code).communicate(timeout=60.0)
+    printed, errors = start(package, code).communicate(timeout=180.0)
     return printed.strip(), NOTICE in errors
 
 
@@ -96,7 +96,7 @@ def test_without_a_private_class_of_numba_kernels_are_compiled_as_numba_does(
         assert output(package, hide + CALL) == ('{} True\n2.0', True)
         assert output(package, hide + CALL) == ('{} True\n2.0', False)
     else:
-        printed, errors = start(package, hide + CALL).communicate(timeout=60.0)
+        printed, errors = start(package, hide + CALL).communicate(timeout=180.0)
         assert printed.endswith(' False\n2.0\n')
         assert 'at each start: the cache of this numba is not known' in errors
 
@@ -161,7 +161,7 @@ def test_ctrl_c_ends_a_compilation_at_once(package, written, code, status):
         before = set(package.rglob('*.nbc'))
         process.send_signal(signal.SIGINT)
         process.send_signal(signal.SIGCONT)
-        assert process.wait(timeout=30.0) == status
+        assert process.wait(timeout=90.0) == status
     assert set(package.rglob('*.nbc')) == before
 
 

@@ -132,6 +132,6 @@ def test_ctrl_c_in_make_build_shows_no_traceback_of_the_build(tmp_path):
     while not all((tmp_path / name).exists() for name in ('begun', 'compiling')):
         assert made.poll() is None, made.communicate()
     os.killpg(made.pid, signal.SIGINT)  # as a terminal does
-    out, _ = made.communicate(timeout=20)
+    out, _ = made.communicate(timeout=90)
     assert 'Error 130' in out
     assert 'Traceback' not in out

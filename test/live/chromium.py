@@ -5,7 +5,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 FINDER = Path(__file__).parents[2] / 'tools/browser.sh'
-WAIT = 15_000  # [ms]
+WAIT = 60_000  # [ms]
 ARGS = [
     '--headless', '--no-sandbox', '--disable-gpu', '--disable-quic', '--no-first-run',
     '--disable-background-networking', '--disable-component-update', '--disable-sync']

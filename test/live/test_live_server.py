@@ -14,7 +14,7 @@ PATHS = [*PAGE_FILES, '/tiles.json', '/tiles/1/0/0', '/stream', '/at']
 
 
 def request(server, method, path, **headers):
-    connection = http.client.HTTPConnection('127.0.0.1', server.port, timeout=10)
+    connection = http.client.HTTPConnection('127.0.0.1', server.port, timeout=60)
     connection.request(method, path, headers=headers)
     response = connection.getresponse()
     body = b'' if path == '/stream' and response.status == 200 else response.read()
@@ -84,7 +84,7 @@ def test_a_moment_that_is_no_number_is_refused(run, serve):
 
 def test_the_stream_sends_everything_then_the_changes(run, serve):
     server = serve(run.snapshots)
-    connection = http.client.HTTPConnection('127.0.0.1', server.port, timeout=10)
+    connection = http.client.HTTPConnection('127.0.0.1', server.port, timeout=60)
     connection.request('GET', '/stream')
     response = connection.getresponse()
 

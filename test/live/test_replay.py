@@ -79,4 +79,4 @@ def test_a_replay_serves_until_ctrl_c(folder):
                           stdout=subprocess.PIPE, stderr=subprocess.STDOUT) as process:
         assert process.stdout.readline().startswith(f'Page of {folder}: http://127.0.0.1:')
         process.send_signal(signal.SIGINT)
-        assert (process.wait(20), process.stdout.read()) == (130, '')
+        assert (process.wait(90), process.stdout.read()) == (130, '')

@@ -24,7 +24,7 @@ def test_a_report_draws_its_figures_without_any_network_and_runs_nothing_foreign
     tab.on('pageerror', lambda error: errors.append(str(error)))
     tab.goto(path.as_uri())
     for name in ('map', 'timeline', 'levels', 'solving', 'gaps'):
-        tab.wait_for_selector(f'#{name} .main-svg', timeout=15_000)
+        tab.wait_for_selector(f'#{name} .main-svg', timeout=90_000)
     assert tab.evaluate("document.querySelectorAll('#timeline .ytick').length") == 6
     assert tab.evaluate("document.querySelectorAll('#map .scatterlayer .trace').length") >= 6
     buttons = tab.evaluate(
@@ -44,7 +44,7 @@ def test_a_report_fits_a_phone(tab, tmp_path):
     path.write_text(report_page(read_history([*FIRST, *LATER, *gone]), 'a/long/name/' * 9))
     page = tab(viewport={'width': 390, 'height': 844}, is_mobile=True, has_touch=True)
     page.goto(path.as_uri())
-    page.wait_for_selector('#gaps .main-svg', timeout=15_000)
+    page.wait_for_selector('#gaps .main-svg', timeout=90_000)
     assert page.evaluate('document.documentElement.scrollWidth') == 390
     wide = page.evaluate("""() => [...document.querySelectorAll(
         '.js-plotly-plot, .plot-container, h1, h2, p, details, .scroll')].map(node => [
@@ -55,7 +55,7 @@ def test_a_report_fits_a_phone(tab, tmp_path):
     assert lost['x'] >= 0
     assert lost['x'] + lost['width'] <= 390
     page.wait_for_function(
-        "document.querySelectorAll('#map .textpoint text').length === 3", timeout=15_000)
+        "document.querySelectorAll('#map .textpoint text').length === 3", timeout=90_000)
     texts = page.locator('#map .textpoint text').all_text_contents()
     assert sorted(texts) == ['u1', 'u1 lost at 20 s', 'u2']
     for name in ('map', 'levels'):

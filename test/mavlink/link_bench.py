@@ -19,7 +19,7 @@ class Remote:
     def __init__(self, connections, system=1, signing=None):
         self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self.socket.bind(('127.0.0.1', 0))
-        self.socket.settimeout(5.0)
+        self.socket.settimeout(60.0)
         self.codec = Codec(system, 1, signing=signing)
         self.to = ('127.0.0.1', connections.links[0].port)
 

@@ -34,7 +34,7 @@ class NodeServer:
     def close(self):
         """End the server; its nodes have ended before."""
         self._popen.stdin.close()
-        self._popen.wait(20)
+        self._popen.wait(90)
         self._popen.stdout.close()
 
 

@@ -26,7 +26,7 @@ def test_finding_23_a_journal_of_another_origin_ends_the_start(start, probe, fle
     probe.until(lambda: fleet.route('a') == ['t1'])
     assert node.stop()[0] == 0
     other = start('allocator', *state, '-p', 'origin.latitude:=46.5')
-    assert other.popen.wait(20.0) == 1
+    assert other.popen.wait(90) == 1
     assert 'is of origin latitude 47.5' in other.output()
     assert 'expected that of the parameters, origin latitude 46.5' in other.output()
     assert 'Traceback' not in other.output()

@@ -170,7 +170,7 @@ def test_a_file_that_exists_or_cannot_be_created_is_refused_with_a_reason(start,
     for name, text in (('old.mcap', 'a file that is not there yet'),
                        ('old.mcap/x', 'a file that can be written (')):
         view = start('live_view', '-p', f'record:={tmp_path}/{name}')
-        view.popen.wait(20)
+        view.popen.wait(90)
         code, out = view.stop()
         assert (code, text in out, 'Traceback' in out) == (1, True, False), out
     assert (tmp_path / 'old.mcap').read_text() == 'flight of yesterday'

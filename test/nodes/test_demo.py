@@ -103,7 +103,7 @@ def test_a_demo_that_is_interrupted_ends_its_nodes_without_a_traceback(tmp_path,
     time.sleep(delay)
     nodes = children(process.pid)
     process.send_signal(signal.SIGINT)  # to the demo only, not to its nodes as a terminal does
-    out, _ = process.communicate(timeout=40)
+    out, _ = process.communicate(timeout=120)
     assert 'Traceback' not in out
     assert (process.returncode, out.splitlines()[-1:]) in (
         (0, ['demo: stopped during its start']), (130, ['demo: stopped; there is no summary']),

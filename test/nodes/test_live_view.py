@@ -95,7 +95,7 @@ def test_the_page_shows_what_the_node_receives(start, probe):
     def parts():
         states.publish(state())
         states.publish(m.UavState(uav_id='no topic can be named so'))
-        with urllib.request.urlopen(f'{address}at?wall=9e9', timeout=10) as answer:
+        with urllib.request.urlopen(f'{address}at?wall=9e9', timeout=60) as answer:
             return json.load(answer)['parts']
 
     probe.until(lambda: {'tasks', 'uavs', 'zones'} <= parts().keys())
@@ -122,7 +122,7 @@ def test_the_speed_of_a_simulated_fleet_is_measured(start, probe, tmp_path):
     address = re.search(r'Live page: (http://127\.0\.0\.1:\d+/)', view.output()).group(1)
 
     def speedup():
-        with urllib.request.urlopen(f'{address}at?wall=9e9', timeout=10) as answer:
+        with urllib.request.urlopen(f'{address}at?wall=9e9', timeout=60) as answer:
             return json.load(answer)['clock'].get('speedup')
 
     probe.until(lambda: speedup() == 6.0, facts=speedup)
@@ -245,7 +245,7 @@ def test_finding_31_hostile_lists_counts_and_zones_do_not_end_the_view(start, pr
     address = re.search(r'Live page: (http://127\.0\.0\.1:\d+/)', view.output()).group(1)
 
     def parts():
-        with urllib.request.urlopen(f'{address}at?wall=9e9', timeout=10) as answer:
+        with urllib.request.urlopen(f'{address}at?wall=9e9', timeout=60) as answer:
             return json.load(answer)['parts']
 
     probe.until(lambda: {'list uav_1', 'zones'} <= parts().keys(), 20.0, view.output)
@@ -260,7 +260,7 @@ def test_finding_31_hostile_lists_counts_and_zones_do_not_end_the_view(start, pr
 def page_of(view, path):
     """The JSON value of a path of the page."""
     address = re.search(r'Live page: (http://127\.0\.0\.1:\d+/)', view.output()).group(1)
-    with urllib.request.urlopen(address + path, timeout=10) as answer:
+    with urllib.request.urlopen(address + path, timeout=60) as answer:
         return json.load(answer)
 
 

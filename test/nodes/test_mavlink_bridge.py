@@ -275,7 +275,7 @@ def test_finding_38_each_uav_has_its_own_range(sky, probe):
 def test_a_bad_range_ends_the_bridge_with_a_reason(start, entry):
     bridge = start('mavlink_bridge', '-p', f"full_ranges:=['{entry}']", '-p',
                    "connections:=['udpin:127.0.0.1:0']")
-    bridge.popen.wait(20)
+    bridge.popen.wait(90)
     assert bridge.stop() == (1, f"full_ranges = '{entry}': expected `UAV_ID:METRES` with metres "
                                 'in [0, 1e+07], a UAV once\n')
 
@@ -297,7 +297,7 @@ def test_the_limits_of_single_uavs_are_in_their_states(sky, probe):
 def test_a_bad_limit_ends_the_bridge_with_a_reason(start, entry):
     bridge = start('mavlink_bridge', '-p', f"uav_limits:=['{entry}']", '-p',
                    "connections:=['udpin:127.0.0.1:0']")
-    bridge.popen.wait(20)
+    bridge.popen.wait(90)
     status, text = bridge.stop()
     assert status == 1
     assert text.startswith(f"uav_limits = '{entry}': expected `UAV_ID:NAME=NUMBER,...`")
@@ -347,7 +347,7 @@ def test_finding_13_a_corrupt_signing_timestamp_ends_the_start_with_a_reason(sta
     tmp_path.joinpath('key.timestamp').write_text('soon')
     process = start('mavlink_bridge', '-p', "connections:=['udpin:127.0.0.1:0']", '-p',
                     f'signing_key_file:={tmp_path}/key')
-    process.popen.wait(20)
+    process.popen.wait(90)
     code, out = process.stop()
     assert code == 1, out
     assert f"signing timestamp in {tmp_path}/key.timestamp = 'soon': expected a whole" in out
@@ -367,7 +367,7 @@ def test_finding_13_a_corrupt_signing_timestamp_ends_the_start_with_a_reason(sta
 ])
 def test_a_bad_parameter_is_refused_with_a_reason(start, given, text):
     process = start('mavlink_bridge', '-p', "connections:=['udpin:127.0.0.1:0']", '-p', given)
-    process.popen.wait(20)
+    process.popen.wait(90)
     code, out = process.stop()
     assert code == 1, out
     assert text in out

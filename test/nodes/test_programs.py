@@ -52,7 +52,7 @@ def test_the_command_line_ends_without_a_traceback_however_early_the_signal(dela
                                preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL))
     time.sleep(delay)
     process.send_signal(signal.SIGINT)
-    _, err = process.communicate(timeout=30)
+    _, err = process.communicate(timeout=120)
     assert 'Traceback' not in err
     if process.returncode == -signal.SIGINT:  # that of sh, in its first milliseconds
         assert not err
@@ -96,7 +96,7 @@ def test_a_node_ends_without_a_traceback_however_early_the_signal(execute, name,
 ])
 def test_a_bad_start_parameter_ends_the_node_with_a_reason(start, name, given, text):
     process = start(name, *NEEDS.get(name, []), '-p', given)
-    process.popen.wait(20)
+    process.popen.wait(90)
     code, out = process.stop()
     assert code == 1
     assert text in out
@@ -112,7 +112,7 @@ def test_a_node_whose_callback_raises_ends_with_a_status_of_its_own(domain):
             '        self.create_timer(0.01, lambda: 1 / 0)\n'
             'run(Faulty)')
     done = subprocess.run([sys.executable, '-c', code], capture_output=True, text=True,
-                          timeout=30, check=False)
+                          timeout=120, check=False)
     assert done.returncode == nodes_run.CRASHED, done.stderr
     assert 'ZeroDivisionError' in done.stderr
 

@@ -36,7 +36,7 @@ def test_finding_29_px4_can_make_its_log_folder_and_gets_speed_instance_and_port
     binary.chmod(0o755)
     world = worlds.Px4(str(binary), tmp_path)
     try:
-        assert [process.wait(20.0) for process in world.processes] == [0, 0, 0, 0]
+        assert [process.wait(90) for process in world.processes] == [0, 0, 0, 0]
         assert world.limit == 77.0
         assert world.address(5) == f'udpin:127.0.0.1:{port}'
         for system in worlds.SYSTEMS:

@@ -21,11 +21,11 @@ def test_problems_are_answered_in_turn_after_the_preparation():
                     lambda problem, stop: ReplanAnswer(problem, Plan({}), Plan({})),
                     got.put, got.put)
     worker.start()
-    assert got.get(timeout=10) is None
+    assert got.get(timeout=60) is None
     assert prepared == [1]
     for trigger in 'xy':
         worker.submit(problem(trigger))
-        assert got.get(timeout=10).problem.trigger == trigger
+        assert got.get(timeout=60).problem.trigger == trigger
     worker.close()
 
 
@@ -40,11 +40,11 @@ def test_a_running_solve_can_be_stopped_early():
 
     worker = Worker(lambda: None, solve, got.put, got.put)
     worker.start()
-    assert got.get(timeout=10) is None
+    assert got.get(timeout=60) is None
     worker.submit(problem('x'))
-    began.get(timeout=10)
+    began.get(timeout=60)
     worker.stop_early()
-    assert got.get(timeout=10).problem.trigger == 'x'
+    assert got.get(timeout=60).problem.trigger == 'x'
     worker.close()
 
 
@@ -58,12 +58,12 @@ def test_a_failed_solve_is_reported_and_the_next_problem_is_solved():
 
     worker = Worker(lambda: None, solve, got.put, failed.put)
     worker.start()
-    assert got.get(timeout=10) is None
+    assert got.get(timeout=60) is None
     worker.submit(problem('bad'))
-    assert got.get(timeout=10) is None
-    assert str(failed.get(timeout=10)) == 'out of bees'
+    assert got.get(timeout=60) is None
+    assert str(failed.get(timeout=60)) == 'out of bees'
     worker.submit(problem('good'))
-    assert got.get(timeout=10).problem.trigger == 'good'
+    assert got.get(timeout=60).problem.trigger == 'good'
     worker.close()
 
 

@@ -24,7 +24,7 @@ def servers():
     for one in sockets:
         one.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         one.bind(('127.0.0.1', 0))
-        one.settimeout(5.0)
+        one.settimeout(60.0)
     yield sockets
     for one in sockets:
         one.close()
@@ -181,8 +181,8 @@ def test_finding_12_a_heartbeat_thread_that_ends_is_reported_and_restarted(heart
         assert sender.trouble.startswith(f'its thread has ended: {words} (at ')
         sender.watch(float(number))
         assert sender.restarts == number
-    assert sent.acquire(timeout=5.0)
-    assert sent.acquire(timeout=5.0)
+    assert sent.acquire(timeout=60.0)
+    assert sent.acquire(timeout=60.0)
     assert sender.trouble == ''
     sender.watch(10.0)
     assert sender.restarts == 2
