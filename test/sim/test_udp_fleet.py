@@ -111,7 +111,9 @@ def test_the_log_has_samples_and_events(fleet, station, tmp_path):
     fleet.set_alive('uav_2', False)
     station.until(lambda received: len([r for r in lines(path) if r.get('event') == 'died']) == 1)
     sample = next(r for r in lines(path) if 'event' not in r)
-    assert set(sample) == {'t', 'wall', 'clock', 'uav', 'x', 'y', 'z', 'mode', 'alive'}
+    assert set(sample) == {'t', 'wall', 'clock', 'uav', 'x', 'y', 'z', 'battery', 'mode',
+                           'alive'}
+    assert sample['battery'] == 1.0
     died = next(r for r in lines(path) if r.get('event') == 'died')
     assert (died['uav'], died['x']) == ('uav_2', 20.0)
 

@@ -218,10 +218,11 @@ class _Log:
                                f'a file that can be written ({error})') from None
 
     def sample(self, uav: str, vehicle: Vehicle, now: float) -> None:
-        """Write position, mode and whether the vehicle is alive."""
+        """Write position, battery, mode and whether the vehicle is alive."""
         x, y, z = vehicle.flight.body.position
         self._write({**_times(now, self._epoch), 'uav': uav,
                      'x': round(x, 3), 'y': round(y, 3), 'z': round(z, 3),
+                     'battery': round(vehicle.flight.body.battery, 4),
                      'mode': vehicle.mode.value, 'alive': not vehicle.silent})
 
     def events(self, uav: str, vehicle: Vehicle) -> None:
