@@ -75,13 +75,17 @@ class AuthorityBench(FlightBench):
 
     def kill_and_restart(self, seconds=0.0, store=True):
         """Kill the bridge and start a new one after a while; without a store: no record."""
-        self.ground_station = SimpleNamespace(sessions={}, step=lambda now: [],
-                                      receive=lambda address, m, now: [])
+        self.kill()
         self.run(limit=seconds)
         if not store:
             self.store = Store()
         self.start()
         self.discover()
+
+    def kill(self):
+        """Kill the bridge; `start` starts a new one."""
+        self.ground_station = SimpleNamespace(sessions={}, step=lambda now: [],
+                                      receive=lambda address, m, now: [])
 
     def move_address(self, n=1, address='new'):
         """Let the messages of the vehicle come from a new address from now on."""

@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 import pytest
-from authority_bench import MODES, set_mode
+from authority_bench import MODES, AuthorityBench, set_mode
 from flight_bench import FlightBench
 from mission_bench import task_list
 
@@ -67,3 +67,50 @@ def test_a_vehicle_that_a_pilot_has_taken_stays_with_the_pilot(kind):
         modes.stick, kind)))
     assert bench.authority() is AuthorityState.LOST
     assert bench.state().battery > 0.99
+
+
+def names(bench):
+    return [event.name for event in bench.truth[1]]
+
+
+def powered_off(bench):
+    return 'power_off' in names(bench)
+
+
+# when the bridge is killed, and when it is started again
+MOMENTS = {
+    'turns home': (lambda bench: bench.started() == ['A'] and not bench.run(limit=4.0),
+                   lambda bench: 'item_reached' in names(bench) and not bench.run(limit=3.0)),
+    'lands': (lambda bench: bench.completed() == ['A'] and not bench.run(limit=5.0)
+              and bench.vehicles[1].flight.body.position[2] < 12.0,
+              lambda bench: 'disarmed' in names(bench)),
+    'has landed': (lambda bench: 'disarmed' in names(bench) and not bench.run(limit=2.0),
+                   lambda bench: not powered_off(bench)),
+    'loses power': (lambda bench: 'disarmed' in names(bench) and not bench.run(limit=2.0),
+                    powered_off),
+    'boots': (powered_off, lambda bench: 'battery_changed' in names(bench)),
+    'has booted': (lambda bench: 'battery_changed' in names(bench) and not bench.run(limit=3.0),
+                   lambda bench: True),
+}
+
+
+@BOTH
+@pytest.mark.parametrize('moment', MOMENTS)
+def test_it_flies_its_next_list_after_a_kill_of_the_bridge_while_it(kind, moment):
+    bench = AuthorityBench(kind, relaunch='automatic', configs={1: {
+        'turnaround': 30.0, 'range': 3000.0, 'boot_delay': 6.0, 'arming_delay': 10.0}}).discover()
+    killed, started = MOMENTS[moment]
+    bench.assign(task_list('A', returns=True))
+    assert bench.run(lambda: killed(bench), 300.0), names(bench)
+    bench.kill()
+    assert bench.run(lambda: started(bench), 100.0), names(bench)
+    bench.start()
+    assert bench.run(lambda: bench.ground_station.sessions, 100.0)
+    bench.assign(task_list('A', returns=True) if moment == 'turns home' else replace(
+        task_list('', 2), returns=True))
+    assert bench.run(lambda: 'battery_changed' in names(bench), 300.0), names(bench)
+    assert bench.run(lambda: bench.state().available and bench.state().battery > 0.99, 60.0), (
+        '\n'.join(bench.notes))
+    assert bench.authority() is AuthorityState.HELD
+    assert bench.completed() in ([], ['A'])  # again after 'turns home'
+    assert bench.flown() == [(0, 100, 50)]

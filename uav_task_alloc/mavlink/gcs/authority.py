@@ -77,7 +77,8 @@ class AuthorityEvent(Enum):
     RESTART_AGREES = 'restart of the bridge, its file agrees (during a replacement: < 60 s, ' \
         'at rest)'
     RESTART_DIFFERS = 'restart of the bridge, its file does not agree'
-    RESTART_OURS = 'restart without a file: airborne in MISSION with our mission'
+    RESTART_OURS = 'restart, airborne with our mission: in MISSION without a file, or in RETURN ' \
+        '(PX4) at the end of the mission in its file'
     RESTART_AIRBORNE = 'restart without a file: otherwise airborne'
     FOREIGN = 'FOREIGN mission with `when_foreign: yield`'
     FOREIGN_OVER = 'our mission is on board again'
@@ -223,6 +224,7 @@ class AuthorityRecord:
     uploading: tuple[int, ...] = ()  # checksum of a mission being uploaded, index of its start
     # vehicle time [s], position [m] and velocity [m/s], both ENU, of one or two recent positions
     seen: tuple[float, ...] = ()
+    landed_battery: float | None = None  # 0..1, at its own landing, while it may start again
 
 
 class Authority:

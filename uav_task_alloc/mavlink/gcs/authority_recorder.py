@@ -75,7 +75,8 @@ class AuthorityRecorder:
             sent.arm_until > -math.inf and not state.armed and authority.held,
             state.replacing_since, sent.climb, tuple(self.marks.values()),
             *self._evidence.mission_position(), self._evidence.uploading(),
-            self._last_position())
+            self._last_position(),
+            None if math.isnan(state.landed_battery) else round(state.landed_battery, 3))
         if fields == self._fields:  # as after most messages
             return
         self._fields, record = fields, AuthorityRecord(*fields)

@@ -200,7 +200,7 @@ def _record(body: Any, uav_id: str) -> AuthorityRecord:
         raise ValueError(f'uav_id = {body["uav_id"]!r:.250}: expected {uav_id!r}')
     row = body['record']
     if isinstance(row, dict):  # files of earlier versions do not have it
-        row = {'arrived': False, 'uploading': [], **row}
+        row = {'arrived': False, 'uploading': [], 'landed_battery': None, **row}
     if not isinstance(row, dict) or row.keys() != _CHECKS.keys():
         raise ValueError('record: expected ' + ', '.join(_CHECKS))
     record = {}

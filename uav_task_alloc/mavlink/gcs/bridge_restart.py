@@ -30,6 +30,8 @@ class BridgeRestart:
         self._state, self._evidence, self._policy = state, evidence, policy
         self._record = record  # None once it is compared
         self._armed_at_start = False  # it was armed before the bridge started
+        self._mission: int | None = None  # checksum of one that may have ended while it was down
+        self._landed_in: int | None = None  # custom_mode, of a landing of its own meanwhile
         if record is None:
             state.authority.undecided = True
 
@@ -46,6 +48,7 @@ class BridgeRestart:
             return
         if record.state not in (AuthorityState.HELD, AuthorityState.SUSPENDED):
             self._record = None
+            self._await_battery_change(record)
             return
         agrees = self._agrees(record)
         if agrees and record.replacing_since is not None and (
@@ -57,6 +60,29 @@ class BridgeRestart:
             state.replacing_since = record.replacing_since if agrees else None
         self._record = None
         self._apply_result(record, agrees, now)
+        self._await_battery_change(record)
+        if not agrees:
+            self._may_have_ended(record)
+
+    def _await_battery_change(self, record: AuthorityRecord) -> None:
+        """Continue to wait for a full battery after a landing of its own."""
+        state = self._state
+        if record.landed_battery is not None and not state.armed:
+            state.landed_battery = record.landed_battery
+            state.rebooted_on_ground = not state.authority.held  # else a reboot is still to come
+
+    def _may_have_ended(self, record: AuthorityRecord) -> None:
+        """Note what the end of its mission or of our RETURN explains, once it is confirmed."""
+        state = self._state
+        if not record.armed:
+            return
+        if state.armed:
+            modes = map(state.class_of, (record.mode, *record.commanded))
+            if ModeClass.MISSION in modes and state.is_return(state.mode):
+                self._mission = record.mission
+        elif state.mode == record.mode or (  # PX4 changes to Hold when it has landed
+                state.is_return(record.mode) and state.class_of(state.mode) is ModeClass.HOLD):
+            self._landed_in = state.mode
 
     def _agrees(self, record: AuthorityRecord) -> bool:
         state = self._state
@@ -90,6 +116,22 @@ class BridgeRestart:
         )
 
     def step(self, now: float) -> None:
+        """Decide what the first heartbeat alone could not show."""
+        self._decide_without_record(now)
+        state, authority = self._state, self._state.authority
+        if authority.state is not AuthorityState.LOST:
+            return
+        if self._mission is not None and (
+                self._mission == self._evidence.mission_position()[0]
+                and state.is_return(state.mode) and self._evidence.returning()):
+            self._mission = None
+            state.apply(AuthorityEvent.RESTART_OURS, now, 'returns at the end of our mission')
+        if self._landed_in is not None and state.telemetry.battery >= 0.0:
+            if state.mode == self._landed_in and not state.armed and state.telemetry.grounded:
+                state.landed_battery = state.telemetry.battery
+            self._landed_in = None
+
+    def _decide_without_record(self, now: float) -> None:
         """Decide after a start without a record: on the ground, or airborne."""
         state, authority = self._state, self._state.authority
         if authority.undecided and state.mode is not None:

@@ -235,7 +235,9 @@ class Resume:
             return set()
         placed = tuple(with_position(item, self._origin) for item in held)
         frame = max(frame for _, when, frame in self._currents if when <= now)
-        return flown_between(placed, begin, end, now, frame, self._progress.positions)
+        home = (self._telemetry.home if held[-1].command == d.MAV_CMD_NAV_RETURN_TO_LAUNCH
+                else None)
+        return flown_between(placed, begin, end, now, frame, self._progress.positions, home)
 
     def _replay(self, held: tuple[Item, ...]) -> None:
         """Pass on what was received until the mission was read, in the order it was sent."""

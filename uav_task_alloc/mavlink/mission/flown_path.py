@@ -121,7 +121,7 @@ class FlownPath:
         return first if last >= first else None
 
     def could_have_flown(self, chain: Sequence[Point], then: Point | None, holds: float,
-                   since: float, anywhere: bool = False) -> bool:
+                   since: float, anywhere: bool = False, home: Point | None = None) -> bool:
         """Whether it can have flown through `chain` in the longest gap of the samples.
 
         Args:
@@ -130,6 +130,7 @@ class FlownPath:
             holds: sum of the hold times [s].
             since: vehicle time [s].
             anywhere: it was not bound for the next point any more.
+            home: where it returns to from the last point, at a height that is not known; ENU [m].
 
         Returns:
             True where the gap is long enough and the sample after it lies on the following leg.
@@ -144,6 +145,9 @@ class FlownPath:
                       *(math.hypot(*s.velocity) for s in self._samples[-200:]))
         if length > 1.1 * fastest * (b.t - a.t - 0.8 * holds) + 10.0:
             return False
+        if home is not None:
+            level = segment_distance(b.position[:2], chain[-1][:2], home[:2])
+            return anywhere or level <= _CORRIDOR
         return anywhere or segment_distance(b.position, chain[-1], then or chain[-1]) <= _CORRIDOR
 
     def _since(self, since: float, until: float = math.inf) -> list[PositionSample]:

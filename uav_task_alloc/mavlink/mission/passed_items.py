@@ -14,6 +14,7 @@ from uav_task_alloc.mavlink.mission.flown_path import CLOSE, GAP, Visit
 from uav_task_alloc.mavlink.mission.items import Item
 from uav_task_alloc.mavlink.mission.position_history import LOOSE_RADIUS, PositionHistory
 from uav_task_alloc.mavlink.transport.frame_log import FrameLog
+from uav_task_alloc.model import Point
 
 _BLIND = 30.0  # [s] to wait for a position that shows where it is after a claim
 _FRAMES_AFTER = 10  # frames after MISSION_CURRENT in which REACHED may follow
@@ -33,6 +34,7 @@ class Claim:
     frame: int | None  # of the MISSION_CURRENT with the item after them
     skips: bool  # more than one item: another station has set the current item
     in_flight: bool  # in mission mode, so that unobserved items may have been flown
+    home: Point | None = None  # [m] ENU; where it returns to at the end of `route`
 
 
 class _Judged(NamedTuple):
@@ -125,11 +127,13 @@ class PassedItems:
             return False
         for end in range(at[-1] + 1, len(claim.route) + 1):
             flown = claim.route[at[0]:end]
-            then = claim.route[end].position if end < len(claim.route) else None
+            last = end == len(claim.route)
+            then = None if last else claim.route[end].position
             if self._positions.path.could_have_flown(
                     [item.position for item in flown if item.position is not None], then,
                     math.fsum(item.params[0] for item in flown), claim.since,
-                    anywhere=left_unseen and not claim.skips):
+                    anywhere=left_unseen and not claim.skips,
+                    home=claim.home if last else None):
                 return True
         return False
 
@@ -171,7 +175,7 @@ def flown_nearby(items: tuple[Item, ...], flown: Item) -> tuple[Item, ...]:
 
 
 def flown_between(items: tuple[Item, ...], begin: int, end: int, now: float, frame: int,
-                  positions: PositionHistory) -> set[int]:
+                  positions: PositionHistory, home: Point | None = None) -> set[int]:
     """Judge the items that were passed while no bridge ran; no evidence of them will come.
 
     Args:
@@ -181,6 +185,7 @@ def flown_between(items: tuple[Item, ...], begin: int, end: int, now: float, fra
         now: steady time [s] at which that was received.
         frame: its number.
         positions: of the vehicle.
+        home: [m] ENU, where it returns to after the last item; None: it does not, or not known.
 
     Returns:
         Indices of those that were flown.
@@ -188,6 +193,6 @@ def flown_between(items: tuple[Item, ...], begin: int, end: int, now: float, fra
     passed = tuple(replace(items[n], task=f'{n}') for n in range(begin, end))
     route = tuple(item for item in (*passed, *items[end:]) if item.position is not None)
     claim = Claim(passed, route, -math.inf, positions.vehicle_time(now), -math.inf, 0, None, frame,
-                  skips=end - begin > 1, in_flight=True)
+                  skips=end - begin > 1, in_flight=True, home=home)
     judged = PassedItems(FrameLog(), positions).judge(claim, passed, now)
     return {int(item.task) for item in judged.flown}
