@@ -190,3 +190,26 @@ def test_a_wait_of_the_plan_is_spent_before_the_leg_and_on_the_ground():
     later = replace(stops[0], begin_after=sky.now + 300.0)
     sky.world.lists.lists['u1'] = replace(sky.world.lists.lists['u1'], stops=(later,))
     assert sky.step() == []  # u2 is away when u1 takes off
+
+
+@pytest.mark.parametrize(('height', 'held'), [(50.0, [('u2', True)]), (90.0, [])])
+@pytest.mark.parametrize('state', [{'mode': 'FAULT'}, {'mode': 'RETURNING', 'authority': 'LOST'}])
+def test_a_failsafe_is_predicted_to_return_home_at_the_height_of_the_vehicle(state, height, held):
+    sky = Sky({'velocity': (0.0, 0.0, 2.5), 'home': (0.0, 300.0, 0.0), 'return_height': height,
+               **state}, {'velocity': (15.0, 0.0, 0.0)})
+    sky.report((0.0, 20.0, 44.0), (-150.0, 150.0, 50.0))
+    assert sky.step() == held
+
+
+def test_a_failsafe_that_flies_level_has_climbed():
+    sky = Sky({'velocity': (0.0, 15.0, 0.0), 'home': (0.0, 300.0, 0.0), 'return_height': 90.0,
+               'mode': 'FAULT'}, {'velocity': (15.0, 0.0, 0.0)})
+    sky.report((0.0, 20.0, 50.0), (-150.0, 150.0, 50.0))
+    assert sky.step() == [('u2', True)]
+
+
+def test_a_pilot_who_flies_past_his_home_is_predicted_by_the_velocity():
+    sky = Sky({'velocity': (0.0, 15.0, 0.0), 'home': (150.0, 150.0, 0.0), 'return_height': 90.0,
+               'authority': 'LOST', 'mode': 'HOLD'}, {'velocity': (15.0, 0.0, 0.0)})
+    sky.report((0.0, 20.0, 50.0), (-150.0, 150.0, 50.0))
+    assert sky.step() == [('u2', True)]

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Which autopilot is which, and what its mission store is given."""
+import dataclasses
 import math
 
 import pytest
@@ -24,6 +25,7 @@ def heartbeat(autopilot, kind=d.MAV_TYPE_QUADROTOR):
     (d.MAV_AUTOPILOT_ARDUPILOTMEGA, d.MAV_TYPE_FIXED_WING, profiles.ARDUPLANE),
     (d.MAV_AUTOPILOT_PX4, d.MAV_TYPE_HEXAROTOR, profiles.PX4),
     (d.MAV_AUTOPILOT_PX4, d.MAV_TYPE_FIXED_WING, profiles.PX4_PLANE),
+    (d.MAV_AUTOPILOT_PX4, d.MAV_TYPE_VTOL_TILTROTOR, profiles.PX4_VTOL),
     (d.MAV_AUTOPILOT_GENERIC, d.MAV_TYPE_QUADROTOR, profiles.GENERIC)])
 def test_the_profile_is_found_from_the_heartbeat(autopilot, kind, profile):
     assert profile_of(heartbeat(autopilot, kind)) is profile
@@ -61,6 +63,23 @@ def test_the_return_is_sent_in_the_frame_that_the_store_takes(profile):
     items = mission_items(task_list('A', returns=True), profile.rules, ORIGIN)
     assert items[-1].command == d.MAV_CMD_NAV_RETURN_TO_LAUNCH
     assert items[-1].frame == (3 if profile.name == 'ardupilot' else 2)
+
+
+@pytest.mark.parametrize('profile', [
+    profiles.ARDUPILOT, profiles.PX4, profiles.ARDUPLANE, profiles.PX4_PLANE, profiles.PX4_VTOL,
+    profiles.GENERIC], ids=lambda each: f'{each.name}-{each.rules.loiters}')
+def test_only_a_multicopter_lands_below_the_end_of_its_way_home(profile):
+    tasks = dataclasses.replace(task_list('A', returns=True), end_via=((3.0, 4.0, 60.0),))
+    lands = {name: mission_items(tasks, profile.rules, ORIGIN, home)[-1] for name, home in (
+        ('below', (3.0, 4.0, 1.0)), ('beside', (3.0, 6.0, 1.0)), ('unknown', None))}
+    land = lands['below']
+    copter = profile in (profiles.ARDUPILOT, profiles.PX4)
+    assert (land.command == d.MAV_CMD_NAV_LAND) is copter
+    if copter:  # at the vehicle's own home height, in degrees of the point above
+        above = mission_items(tasks, profile.rules, ORIGIN)[-2]
+        assert (land.frame, land.z) == (d.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT, 0.0)
+        assert (land.x, land.y) == (above.x, above.y)
+    assert {lands['beside'].command, lands['unknown'].command} == {d.MAV_CMD_NAV_RETURN_TO_LAUNCH}
 
 
 @ALL

@@ -201,10 +201,12 @@ def test_an_alert_and_a_hold_of_the_monitor_become_messages():
 
 def test_modes_and_authority_are_known_by_their_names():
     state = m.UavState(uav_id='u1', mode=m.UavState.LANDING, authority=m.UavState.LOST,
-                       mission_state=m.UavState.FOREIGN, hold_radius=math.nan)
+                       mission_state=m.UavState.FOREIGN, hold_radius=math.nan,
+                       return_height=15.0, takeoff_height=math.nan)
     report = messages.to_report(state)
     assert (report.mode, report.authority, report.foreign) == ('LANDING', 'LOST', True)
     assert report.hold_radius == 0.0
+    assert (report.return_height, report.takeoff_height) == (15.0, None)
     state.hold_radius = -1.0
     with pytest.raises(InvalidValue, match='hold_radius = -1'):
         messages.to_report(state)

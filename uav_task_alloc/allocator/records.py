@@ -131,6 +131,9 @@ class UavReport:
     authority: str = ''  # the same
     foreign: bool = False  # the mission on board is not of its bridge
     hold_radius: float = 0.0  # [m] of the circle in which it holds; 0: it hovers
+    # [m] above its home: its own return climbs to that, at least; it takes off to that
+    return_height: float | None = None
+    takeoff_height: float | None = None
     reason: str = ''  # why it is not available
 
     @property
@@ -155,6 +158,9 @@ class UavReport:
         if self.battery is not None:
             check_number(place + 'battery', self.battery, 0.0, 1.0)
         check_number(place + 'hold_radius', self.hold_radius, 0.0, 1e5)
+        for name in ('return_height', 'takeoff_height'):
+            if getattr(self, name) is not None:
+                check_number(place + name, getattr(self, name), -1e4, 1e5)
         for name in REPORTED_LIMITS:
             if getattr(self, name) is not None:
                 most = 1e6 if name == 'payload_capacity' else math.inf  # as model.Uav

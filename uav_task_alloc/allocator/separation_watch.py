@@ -32,6 +32,8 @@ _FORGOTTEN = 30.0  # [s] of the published clock for which a silent UAV is still 
 _ARMING = 3.0  # [s] on the ground before it climbs
 _SETS_OUT = 4.0  # [s] between the end of a take-off and the leg
 _ACCELERATION = 2.5  # [m/s2]
+_MOVES, _CLIMBS = 2.0, 0.5  # [m/s] more than that: it does not hover; it does not fly level
+_TOWARDS = math.cos(math.radians(15.0))  # of the course and the direction of home
 _CLIMBS_ON = 5.0  # [s] for which a take-off goes on at least
 _FOREIGN, _HELD, _URGENT, _RETURNS, _FLIES, _WAITS = 9.0, 8.0, 5.0, 3.0, 1.0, 0.0  # claims
 _OURS = ('', 'UNKNOWN', 'HELD')  # authority over a UAV in the air that flies its list
@@ -103,8 +105,9 @@ class SeparationWatch:
         if record.silent or report.foreign or report.mode == 'FAULT' or (
                 report.authority not in _OURS):
             why = 'is silent' if record.silent else 'is not flown by the allocator'
-            return MonitoredUav(self._way(record, _drift(record, silent)), (_FOREIGN,), False,
-                                f'{uav_id} {why}')
+            points = (_own_return(record, flight.pace) if not silent and _seems_to_return(record)
+                      else _drift(record, silent))
+            return MonitoredUav(self._way(record, points), (_FOREIGN,), False, f'{uav_id} {why}')
         if is_held:
             return MonitoredUav(self._way(record, [(0.0, report.position)]), (_HELD,), False,
                                 f'an operator holds {uav_id}')
@@ -130,7 +133,7 @@ class SeparationWatch:
         stops = self._stops(uav_id, stamp, flight)
         returns = mode == 'RETURNING' or (not stops and self._world.list_of(uav_id).returns)
         if record.low or returns:
-            way = self._way(record, _home([(0.0, place)], record, flight.pace))
+            way = self._way(record, self._way_home(uav_id, record, flight.pace))
             return MonitoredUav(way, (_URGENT if record.low else _RETURNS,), not record.low,
                                 f'{uav_id} is low on battery' if record.low else '', early=True)
         if mode == 'TAKEOFF':  # for how long is not known
@@ -142,6 +145,13 @@ class SeparationWatch:
             points = [(0.0, place)] if mode == 'HOLD' else _drift(record)
         return MonitoredUav(self._way(record, points),
                             (_FLIES, -stops[0].start if stops else -math.inf), bool(stops))
+
+    def _way_home(self, uav_id: str, record: UavRecord, pace: FlightPace) -> _TimedPoints:
+        """The points of its list on the way home that are ahead, else its own return."""
+        via, place = self._world.list_of(uav_id).end_via, record.report.position
+        if not via:
+            return _own_return(record, pace)
+        return _home([(0.0, place)], record, pace, via[points_passed(place, via):])
 
     def _way(self, record: UavRecord, points: _TimedPoints) -> Way:
         report = record.report
@@ -186,10 +196,11 @@ class SeparationWatch:
 
 
 def _climbed(record: UavRecord, height: float) -> Point:
-    """Where a take-off ends: the bridge climbs to `cruise_altitude`, whatever the leg."""
+    """Where a take-off ends: the bridge climbs to its own height, whatever the leg."""
     x, y, z = record.report.position
     rise = (record.report.velocity or (0.0, 0.0, 0.0))[2]
-    return x, y, max(z + _CLIMBS_ON * rise, height, record.home[2] + BridgeParams.cruise_altitude)
+    top = record.report.takeoff_height or BridgeParams.cruise_altitude
+    return x, y, max(z + _CLIMBS_ON * rise, height, record.home[2] + top)
 
 
 def _lag(record: UavRecord, pace: FlightPace) -> float:
@@ -213,6 +224,30 @@ def _home(points: _TimedPoints, record: UavRecord, pace: FlightPace,
     home = record.home
     above = (home[0], home[1], max(home[2], (via[-1] if via else place)[2]))
     return [*points, *_along(place, (*via, above, home), clock, pace)]
+
+
+def _seems_to_return(record: UavRecord) -> bool:
+    """Whether a UAV that others fly climbs to the height of its return, or flies to its home."""
+    report, home = record.report, record.home
+    x, y, z = report.position
+    vx, vy, vz = report.velocity or (0.0, 0.0, 0.0)
+    speed, far = math.hypot(vx, vy), math.hypot(home[0] - x, home[1] - y)
+    if report.mode == 'RETURNING':
+        return True
+    if speed < _MOVES:
+        return vz > _CLIMBS and z < home[2] + (report.return_height or 0.0)
+    return vx * (home[0] - x) + vy * (home[1] - y) > _TOWARDS * speed * far
+
+
+def _own_return(record: UavRecord, pace: FlightPace) -> _TimedPoints:
+    """The return that an autopilot flies by itself: up to its own height, home, and down."""
+    report, home = record.report, record.home
+    (x, y, z), (vx, vy, vz) = report.position, report.velocity or (0.0, 0.0, 0.0)
+    top = max(z, home[2] + (report.return_height or 0.0))
+    if math.hypot(vx, vy) > _MOVES and vz < _CLIMBS:  # it has climbed
+        top = z
+    up = (x, y, top)
+    return _home([(0.0, report.position), (pace.seconds((report.position, up)), up)], record, pace)
 
 
 def _drift(record: UavRecord, age: float = 0.0) -> _TimedPoints:

@@ -76,6 +76,7 @@ class ItemRules:
     yaw: float = math.nan  # p4 of a waypoint whose yaw the autopilot chooses
     command_frame: int = d.MAV_FRAME_MISSION  # MAV_FRAME of items without a position
     loiters: bool = False  # fixed wing: loiters in place of a hold
+    lands: bool = False  # NAV_LAND comes straight down: multicopters
     capacity: int = 500  # items
     fence_points: int = 64  # of the fence store
 
@@ -201,19 +202,19 @@ _PX4 = {
 ARDUPILOT = Profile(
     'ardupilot', ItemRules(home_first=True, whole_seconds=True, keeps_radius=False, yaw=0.0,
                            command_frame=d.MAV_FRAME_GLOBAL_RELATIVE_ALT, capacity=650,
-                           fence_points=70),
+                           fence_points=70, lands=True),
     atomic=False, idle_after=9.0, modes=_COPTER, family='copter',
     set_mode={ModeFunction.MISSION: d.COPTER_MODE_AUTO, ModeFunction.HOLD: d.COPTER_MODE_GUIDED,
               ModeFunction.RETURN: d.COPTER_MODE_RTL})
 ARDUPLANE = replace(
-    ARDUPILOT, rules=replace(ARDUPILOT.rules, loiters=True), modes=_PLANE,
+    ARDUPILOT, rules=replace(ARDUPILOT.rules, loiters=True, lands=False), modes=_PLANE,
     family='plane',
     set_mode={ModeFunction.MISSION: d.PLANE_MODE_AUTO, ModeFunction.HOLD: d.PLANE_MODE_GUIDED,
               ModeFunction.RETURN: d.PLANE_MODE_RTL})
 PX4 = Profile(
     # NAV_ACC_RAD is 10 m since 2026: a task would count as reached when passed at that distance
     'px4',
-    ItemRules(radius=2.0),
+    ItemRules(radius=2.0, lands=True),
     atomic=True,
     idle_after=6.0,
     modes=_PX4,
@@ -227,11 +228,14 @@ PX4 = Profile(
         ModeFunction.RETURN: _auto(Px4AutoMode.RTL),
     },
 )
-PX4_PLANE = replace(PX4, rules=replace(PX4.rules, loiters=True, radius=0.0))
+PX4_PLANE = replace(PX4, rules=replace(PX4.rules, loiters=True, lands=False, radius=0.0))
+PX4_VTOL = replace(PX4, rules=replace(PX4.rules, lands=False))  # it would land as a plane
 GENERIC = Profile('generic', ItemRules(yaw=0.0), atomic=False, idle_after=9.0, modes={},
                   set_mode={})
 
 _FIXED_WING = {'ardupilot': ARDUPLANE, 'px4': PX4_PLANE}
+_VTOL = frozenset(number for number, each in d.enums['MAV_TYPE'].items()
+                  if each.name.startswith('MAV_TYPE_VTOL_'))
 _BY_NAME = {'ardupilot': ARDUPILOT, 'px4': PX4, 'generic': GENERIC}
 _BY_NUMBER = {d.MAV_AUTOPILOT_ARDUPILOTMEGA: 'ardupilot', d.MAV_AUTOPILOT_PX4: 'px4'}
 
@@ -251,4 +255,6 @@ def profile_of(heartbeat: Message, autopilot: str = 'auto') -> Profile:
             else autopilot)
     if heartbeat.type == d.MAV_TYPE_FIXED_WING:
         return _FIXED_WING.get(name, _BY_NAME[name])
+    if name == 'px4' and heartbeat.type in _VTOL:
+        return PX4_VTOL
     return _BY_NAME[name]

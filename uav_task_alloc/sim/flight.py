@@ -9,6 +9,7 @@ from typing import ClassVar
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from uav_task_alloc.model import Point
+from uav_task_alloc.sim import stored_item as item_
 from uav_task_alloc.sim.boot import Boot, BootTimes
 from uav_task_alloc.sim.config import FlightMode, StorageChange, TruthEvent, VehicleConfig
 from uav_task_alloc.sim.dynamics import Track
@@ -88,6 +89,12 @@ class VehicleFlight(Navigation):
     def mode(self) -> FlightMode:
         """The flight mode of the custom mode."""
         return self.modes[self.custom_mode].mode
+
+    @property
+    def lands_by_item(self) -> bool:
+        """Whether it flies a NAV_LAND item."""
+        return (self.mode is FlightMode.MISSION and self.track is not None
+                and self.seq < len(self.items) and self.items[self.seq].command == item_.LAND)
 
     @property
     def positioned(self) -> bool:

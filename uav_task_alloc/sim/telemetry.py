@@ -157,9 +157,10 @@ class TelemetryMessages:
         flight = self._flight
         if flight.landed:
             state = dialect.MAV_LANDED_STATE_ON_GROUND
-        elif flight.mode in (FlightMode.TAKEOFF, FlightMode.LAND):
-            state = (dialect.MAV_LANDED_STATE_TAKEOFF if flight.mode is FlightMode.TAKEOFF
-                     else dialect.MAV_LANDED_STATE_LANDING)
+        elif flight.mode is FlightMode.TAKEOFF:
+            state = dialect.MAV_LANDED_STATE_TAKEOFF
+        elif flight.mode is FlightMode.LAND or flight.lands_by_item:
+            state = dialect.MAV_LANDED_STATE_LANDING
         else:
             state = dialect.MAV_LANDED_STATE_IN_AIR
         return dialect.MAVLink_extended_sys_state_message(0, state)

@@ -92,7 +92,8 @@ class Sky(FlightBench):
         for each in self.core.collect().lists.values():
             stops = tuple(MissionStop(stop.task, stop.leg.via, stop.wait,
                                       self.now + stop.eta + stop.wait) for stop in each.stops)
-            self.assign(TaskList(each.revision, stops, each.returns), int(each.uav[4:]))
+            self.assign(TaskList(each.revision, stops, each.returns, each.end_via),
+                        int(each.uav[4:]))
 
     def done(self, *numbers):
         return all(len(self.completed(n)) == 2 for n in numbers)

@@ -119,3 +119,13 @@ def test_an_upload_reports_its_progress_and_remaining_time(kind):
                if text.startswith(f'sent {count // 2} of') and 'about' in text]
     now, left = guesses[0]
     assert abs(left - (bench.now - now)) < 0.3 * (bench.now - now) + 1.0
+
+
+@pytest.mark.parametrize(('kind', 'name', 'value'), [
+    ('ardupilot', 'RTL_ALT', 4200.0), ('ardupilot', 'RTL_ALT_M', 42.0),
+    ('px4', 'RTL_RETURN_ALT', 42.0)])
+def test_the_height_of_its_own_return_is_read_also_without_fences(kind, name, value):
+    bench = FlightBench(kind, fences='off', configs={1: {'parameters': ((name, value),)}})
+    bench.discover()
+    assert bench.run(lambda: bench.state().return_height == 42.0, 30.0)
+    assert bench.state().takeoff_height == 50.0

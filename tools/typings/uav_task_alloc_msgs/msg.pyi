@@ -305,6 +305,8 @@ class UavState:
     full_range: float
     turnaround: float
     hold_radius: float
+    return_height: float
+    takeoff_height: float
     capabilities: list[str]
     available: bool
     mode: int
@@ -330,6 +332,8 @@ class UavState:
         full_range: float = ...,
         turnaround: float = ...,
         hold_radius: float = ...,
+        return_height: float = ...,
+        takeoff_height: float = ...,
         capabilities: Sequence[str] = ...,
         available: bool = ...,
         mode: int = ...,

@@ -13,8 +13,9 @@ from uav_task_alloc.mavlink.transport.codec import Message
 _PERIOD, _TRIES = 2.0, 5  # [s] between requests of missing values; in a row
 _REFRESH = 60.0  # [s] until all are read again: another station may set them
 _POLYGONS = 4  # bit of FENCE_TYPE
-_ARDUPILOT = ('FENCE_ENABLE', 'FENCE_TYPE', 'FENCE_ACTION', 'OA_TYPE', 'RTL_ALT', 'RTL_ALT_M')
-_PX4 = ('GF_ACTION', 'RTL_RETURN_ALT')
+_RETURNS = {'ardupilot': ('RTL_ALT', 'RTL_ALT_M'), 'px4': ('RTL_RETURN_ALT',)}
+_FENCES = {'ardupilot': ('FENCE_ENABLE', 'FENCE_TYPE', 'FENCE_ACTION', 'OA_TYPE'),
+           'px4': ('GF_ACTION',)}
 _RETURN_HEIGHTS = {'ardupilot': 15.0, 'px4': 60.0}  # [m] defaults of the autopilots
 _PLANNERS = (2.0, 3.0)  # OA_TYPE: Dijkstra, and with BendyRuler
 _INTEGERS = {d.MAV_PARAM_TYPE_UINT8, d.MAV_PARAM_TYPE_INT8, d.MAV_PARAM_TYPE_UINT16,
@@ -36,8 +37,10 @@ class FenceParameters:
 
     def __init__(self, peer: Peer, profile: Profile) -> None:
         self._peer, self._profile = peer, profile
-        self.names = {'ardupilot': _ARDUPILOT, 'px4': _PX4}.get(profile.name, ())
+        self._returns = _RETURNS.get(profile.name, ())
+        self.names = (*_FENCES.get(profile.name, ()), *self._returns)
         self.values: dict[str, float] = {}
+        self._fences = True  # those about fences are read too
         self.reset()
 
     def reset(self) -> None:
@@ -60,20 +63,24 @@ class FenceParameters:
         self.values[message.param_id] = value
         self._asked.pop(message.param_id, None)
 
-    def step(self, now: float) -> list[Message]:
+    def step(self, now: float, fences: bool = True) -> list[Message]:
         """The requests that are due.
 
         Args:
             now: steady time [s].
+            fences: those about fences too, not only about returns.
         """
+        if fences != self._fences:
+            self._fences, self._due = fences, now
         if now < self._due:
             return []
-        open_names = [name for name in self.names
+        names = self.names if fences else self._returns
+        open_names = [name for name in names
                       if name not in self.values and self._asked.get(name, 0) < _TRIES]
         if not open_names:
             self._due = now + _REFRESH
             self._asked = dict.fromkeys(self.names, 0)
-            open_names = list(self.values)
+            open_names = [name for name in names if name in self.values]
         else:
             self._due = now + _PERIOD
         for name in open_names:

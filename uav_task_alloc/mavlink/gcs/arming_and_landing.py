@@ -41,7 +41,9 @@ class ArmingAndLanding:
         state = self._state
         if state.mode is None:
             return False
-        in_mission = state.profile.mode_function(state.mode) is ModeFunction.MISSION
+        function = state.profile.mode_function(state.mode)
+        in_mission = function is ModeFunction.MISSION or (
+            function is ModeFunction.HOLD and self._evidence.has_landed())
         # it may land before our next command arrives
         ours = state.descending or now < state.left_return_at + COMMAND_LIFETIME
         return (ours and state.is_return(state.mode)) or (

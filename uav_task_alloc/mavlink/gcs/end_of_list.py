@@ -8,7 +8,7 @@ from collections.abc import Callable
 from uav_task_alloc.mavlink.autopilots import ModeFunction
 from uav_task_alloc.mavlink.gcs.authority_watch import AuthorityWatch
 from uav_task_alloc.mavlink.gcs.command_sender import CommandSender, NextMessages
-from uav_task_alloc.mavlink.gcs.onboard_mission import OnboardMission
+from uav_task_alloc.mavlink.gcs.onboard_mission import LATE_REACHED, OnboardMission
 from uav_task_alloc.mavlink.gcs.policy import Policy
 from uav_task_alloc.mavlink.gcs.return_path import zone_across_path
 from uav_task_alloc.mavlink.gcs.telemetry import Telemetry
@@ -71,10 +71,17 @@ class EndOfList:
         if flying and end and rest and all_alike(end[-len(rest):], rest):
             self.going_home = True
             return sender.satisfied()
+        if self._just_landed(now):
+            return []
         if onboard.progress.pending or not telemetry.airborne or sender.backing_off(now) or (
                 not self._watch.authority.held):
             return []
         return self._end(tasks, flying, now)
+
+    def _just_landed(self, now: float) -> bool:
+        """Whether the mission has ended with a landing: `landed_state` is sent once a second."""
+        progress = self._onboard.progress
+        return progress.finished and progress.returns and progress.ended_lately(now, LATE_REACHED)
 
     def _end(self, tasks: TaskList, flying: bool, now: float) -> NextMessages:
         telemetry = self._telemetry

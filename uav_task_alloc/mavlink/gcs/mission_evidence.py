@@ -36,10 +36,14 @@ class MissionEvidence:
                 and (onboard.taken or now - onboard.verified_at < LATE_REACHED))
 
     def returning(self) -> bool:
-        """Whether the RETURN item is next, or is being flown."""
+        """Whether the item that returns or lands is next, is being flown, or is flown."""
         progress = self._onboard.progress
         return progress.returns and progress.current is not None and (
             progress.current > progress.last_flown)
+
+    def has_landed(self) -> bool:
+        """Whether the mission has ended with a landing (PX4, which then changes to Hold)."""
+        return self._onboard.progress.finished and self.returning()
 
     def may_end(self) -> bool:
         """Whether the last item with a position is being flown, or is passed."""

@@ -44,7 +44,8 @@ class OnboardMission:
         self.progress = ProgressTable(telemetry.frames, repeats=profile.atomic)
         self.resume = Resume(profile, origin, telemetry, self.progress)
         self.own = int(profile.rules.home_first)
-        self.list = WantedMission(profile, origin, self.progress, lambda: telemetry.airborne)
+        self.list = WantedMission(profile, origin, self.progress, lambda: telemetry.airborne,
+                                  lambda: telemetry.home or self._mission.landing_place(origin))
         self.revision = 0  # of the last list verified on board
         self.notes: deque[OperatorNote] = deque()
         self.transfer_failed = False  # the last one; the caller schedules the next attempt
@@ -57,9 +58,8 @@ class OnboardMission:
         self._failures = UploadFailures(self.list, self.own, self.notes)
         self._uploading: tuple[MissionDiff, TaskList] | None = None  # with its list
         self._taken = False  # the vehicle has taken all items of this upload
-        self._unconfirmed: tuple[MissionDiff, TaskList] | None = (
-            None  # sent, but not confirmed to be on board
-        )
+        # sent, but not confirmed to be on board
+        self._unconfirmed: tuple[MissionDiff, TaskList] | None = None
         # [s] of the vehicle's clock when all items were sent: it may fly them since then
         self._sent_since: float | None = None
         self._sent_frame: int | None = None  # number of the frame received last at that time

@@ -64,6 +64,8 @@ class UavStatus:
     authority: AuthorityState  # who has the aircraft
     reason: str  # why it is not available; '': it is available
     hold_radius: float = 0.0  # [m] of the circle in which it holds; 0: it hovers
+    return_height: float = math.nan  # [m] above home that its own return climbs to, at least
+    takeoff_height: float = math.nan  # [m] above home to which the bridge takes off
     fence: FenceState = FenceState.OFF  # of the fence on board
 
     @property
@@ -84,8 +86,10 @@ def mode_of(executor: MissionExecutor) -> UavMode:
         return UavMode.TAKEOFF
     if telemetry.mode is ModeFunction.MISSION:
         item = progress.active
-        returns = item is not None and item.command == d.MAV_CMD_NAV_RETURN_TO_LAUNCH
-        if returns or executor.going_home:
+        command = item.command if item is not None else None
+        if command == d.MAV_CMD_NAV_LAND:
+            return UavMode.LANDING
+        if command == d.MAV_CMD_NAV_RETURN_TO_LAUNCH or executor.going_home:
             return UavMode.RETURNING
         return UavMode.HOLD if progress.finished else UavMode.ON_MISSION
     return _BY_MODE_FUNCTION.get(telemetry.mode, _BY_LANDED.get(telemetry.landed, UavMode.UNKNOWN))
@@ -145,7 +149,10 @@ def state_of(session: VehicleSession, now: float, full_range: float = 0.0) -> Ua
         session.uav_id, telemetry.position, telemetry.velocity, telemetry.home,
         telemetry.battery, full_range * telemetry.battery if full_range > 0.0 else math.nan,
         not reason, mode, onboard.state, active_task(executor), onboard.revision, owner, reason,
-        HOLD_RADIUS if executor.profile.rules.loiters else 0.0, executor.fence.state)
+        HOLD_RADIUS if executor.profile.rules.loiters else 0.0,
+        executor.fence.parameters.return_height,
+        executor.policy.cruise_altitude if executor.policy.takeoff else math.nan,
+        executor.fence.state)
 
 
 class PublishedStates:

@@ -114,15 +114,16 @@ class VehicleFence:
     def receive(self, message: Message, now: float) -> list[Message]:
         """Process a message of the vehicle; returns messages to send."""
         out = self.rally.transfer.receive(message, now) if self._policy().rally else []
+        self.parameters.receive(message)
         if not self.active:
             return out
-        self.parameters.receive(message)
         return out + self.transfer.receive(message, now)
 
     def step(self, now: float) -> list[Message]:
         """Choose the fence, and go on with its transfer; returns messages to send."""
         if not self.active and not self._policy().rally:
-            return self.transfer.cancel() + self.rally.transfer.cancel()
+            return (self.transfer.cancel() + self.rally.transfer.cancel()
+                    + self._read_return_height(now))
         if self._telemetry.stale(now) or not self._telemetry.past_boot:
             return []
         if self._onboard.upload.busy:
@@ -134,7 +135,14 @@ class VehicleFence:
             self._report()
         if self._policy().rally and not self.transfer.busy:
             out += self._transfer_rally(now)
-        return out
+        return out if self.active else out + self._read_return_height(now)
+
+    def _read_return_height(self, now: float) -> list[Message]:
+        """Read how high it returns, for `UavState`, also without fences."""
+        idle = not (self._telemetry.stale(now) or self._onboard.upload.busy)
+        if not (idle and self._telemetry.past_boot and self._authority.allows(SendAction.READ)):
+            return []
+        return self.parameters.step(now, fences=False)
 
     def _transfer_rally(self, now: float) -> list[Message]:
         policy, telemetry = self._policy(), self._telemetry

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
-from uav_task_alloc.mavlink.mission.items import Item
+from uav_task_alloc.mavlink.mission.items import ENDS_AT_HOME, Item
 
 
 @dataclass(slots=True)
@@ -37,13 +37,19 @@ class Epoch:
 
     @property
     def returns(self) -> bool:
-        """Whether the mission ends with NAV_RETURN_TO_LAUNCH."""
-        return bool(self.items) and self.items[-1].command == dialect.MAV_CMD_NAV_RETURN_TO_LAUNCH
+        """Whether the mission ends with NAV_RETURN_TO_LAUNCH, or with NAV_LAND."""
+        return bool(self.items) and self.items[-1].command in ENDS_AT_HOME
 
     @property
     def last_flown(self) -> int:
         """The index of the last item with a position."""
         return len(self.items) - 1 - int(self.returns)
+
+    @property
+    def last_reached(self) -> int:
+        """The index of the item at whose REACHED PX4 leaves the mission mode for Hold."""
+        lands = bool(self.items) and self.items[-1].command == dialect.MAV_CMD_NAV_LAND
+        return len(self.items) - 1 if lands else self.last_flown
 
     @property
     def at_end(self) -> bool:

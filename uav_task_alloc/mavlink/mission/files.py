@@ -35,8 +35,11 @@ _AUTOPILOTS: Mapping[str, tuple[Profile, int]] = {  # and the MAV_AUTOPILOT
     'px4': (PX4, dialect.MAV_AUTOPILOT_PX4),
 }
 _ALTITUDE_MODE_AMSL = 2  # QGroundControl's altitude mode
+_ALTITUDE_MODES = {dialect.MAV_FRAME_GLOBAL_INT: _ALTITUDE_MODE_AMSL,
+                   dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT: 1}  # above home
 # files hold degrees, so not the _INT frames
-_FILE_FRAME = {dialect.MAV_FRAME_GLOBAL_INT: dialect.MAV_FRAME_GLOBAL}
+_FILE_FRAME = {dialect.MAV_FRAME_GLOBAL_INT: dialect.MAV_FRAME_GLOBAL,
+               dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT: dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT}
 _ALTITUDE_DIGITS = 4  # of metres: finer than what a message carries
 
 
@@ -84,7 +87,7 @@ def planned_mission(scenario: Scenario, uav: ScenarioUav, route: Route) -> Plann
     profile, _ = _AUTOPILOTS[uav.autopilot]
     tasks = list_for_route(route, {timed.task.id: timed.task for timed in scenario.tasks})
     items = mission_items(
-        _with_points_between(uav, profile, tasks), profile.rules, scenario.origin)
+        _with_points_between(uav, profile, tasks), profile.rules, scenario.origin, uav.home)
     fences, unfenced = _split_zones(_path(uav, tasks), [timed.zone for timed in scenario.zones])
     return PlannedMission(uav, scenario.origin, items, fences, unfenced)
 
@@ -161,9 +164,9 @@ def waypoints_text(mission: PlannedMission) -> str:
 def _simple_item(number: int, item: Item) -> dict[str, Any]:
     position = _position(item)
     altitude = {'AMSLAltAboveTerrain': None, 'Altitude': position[2],
-                'AltitudeMode': _ALTITUDE_MODE_AMSL}
+                'AltitudeMode': _ALTITUDE_MODES.get(item.frame, _ALTITUDE_MODE_AMSL)}
     return {
-        **(altitude if item.frame == dialect.MAV_FRAME_GLOBAL_INT else {}),
+        **(altitude if item.frame in _ALTITUDE_MODES else {}),
         'type': 'SimpleItem', 'doJumpId': number, 'command': item.command, 'autoContinue': True,
         'frame': _FILE_FRAME.get(item.frame, item.frame),
         'params': [None if math.isnan(value) else value for value in item.params] + position,

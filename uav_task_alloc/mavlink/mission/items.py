@@ -29,6 +29,9 @@ _FRAME_READ_BACK = {  # ArduPilot returns an _INT frame as the one without it
 }
 _ALTITUDE_STEP = 0.011  # [m] ArduPilot keeps whole centimetres
 _LONGEST_HOLD = 65535.0  # [s] ArduPilot keeps 16 bits
+_ABOVE_HOME = 1.0  # [m] horizontally from home: a way home that ends there ends with NAV_LAND
+# commands that fly home and land by themselves, at the end of a mission
+ENDS_AT_HOME = frozenset({dialect.MAV_CMD_NAV_RETURN_TO_LAUNCH, dialect.MAV_CMD_NAV_LAND})
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,16 +105,20 @@ class Item:
     holds: bool = field(default=False, compare=False)  # waits before the task
 
 
-def mission_items(tasks: TaskList, rules: ItemRules, origin: Origin) -> tuple[Item, ...]:
+def mission_items(tasks: TaskList, rules: ItemRules, origin: Origin,
+                  home: Point | None = None) -> tuple[Item, ...]:
     """Compile a task list into mission items.
 
     Args:
         tasks: the list; positions ENU [m].
         rules: what the autopilot takes.
         origin: of the ENU frame.
+        home: [m] ENU; None: not known.
 
     Returns:
-        Items without home; none where the list has no point.
+        Items without home; none where the list has no point. A return whose last point is above
+        the home ends with NAV_LAND below that point, any other one with NAV_RETURN_TO_LAUNCH,
+        which climbs to the vehicle's own height.
 
     Raises:
         MissionError: a service time does not fit into an item.
@@ -135,8 +142,27 @@ def mission_items(tasks: TaskList, rules: ItemRules, origin: Origin) -> tuple[It
         before = stop.task
     items += (_waypoint(*pair, rules, '') for pair in geodetic)
     if tasks.returns:
-        items.append(Item(dialect.MAV_CMD_NAV_RETURN_TO_LAUNCH, frame=rules.command_frame))
+        items.append(_landing(items[-1], rules) if lands_by_item(tasks, rules, home) else Item(
+            dialect.MAV_CMD_NAV_RETURN_TO_LAUNCH, frame=rules.command_frame))
     return tuple(items)
+
+
+def lands_by_item(tasks: TaskList, rules: ItemRules, home: Point | None) -> bool:
+    """Return whether the mission of a list ends with NAV_LAND.
+
+    Args:
+        tasks: the list.
+        rules: what the autopilot takes.
+        home: [m] ENU; None: not known.
+    """
+    return (rules.lands and tasks.returns and bool(tasks.end_via) and home is not None
+            and math.dist(tasks.end_via[-1][:2], home[:2]) <= _ABOVE_HOME)
+
+
+def _landing(above: Item, rules: ItemRules) -> Item:
+    """NAV_LAND below a waypoint, at the height that the vehicle itself has for its home."""
+    return Item(dialect.MAV_CMD_NAV_LAND, dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT, above.x,
+                above.y, params=(0.0, 0.0, 0.0, rules.yaw))
 
 
 def _points(stop: MissionStop) -> tuple[Point, ...]:

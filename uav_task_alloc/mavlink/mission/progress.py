@@ -95,7 +95,7 @@ class ProgressTable:
 
     @property
     def returns(self) -> bool:
-        """Whether the mission ends with NAV_RETURN_TO_LAUNCH."""
+        """Whether the mission ends with NAV_RETURN_TO_LAUNCH, or with NAV_LAND."""
         return self._epoch.returns
 
     @property

@@ -58,7 +58,7 @@ class ReachedItems:
     def note_end(self, seq: int, now: float) -> None:
         """Take one of this epoch or the next: the mission may have ended."""
         epoch = self._epoch
-        if seq == epoch.last_flown:
+        if seq == epoch.last_reached:
             self.end_at = now
         if 0 <= seq < len(epoch.items):
             self._moves.passed.note_reached(epoch.items[seq])
@@ -107,7 +107,7 @@ class ReachedItems:
 
     def _accept(self, reached: ReachedReport, now: float) -> None:
         epoch, seq = self._epoch, reached.seq
-        if seq == epoch.last_flown and self.last != seq:
+        if seq == epoch.last_reached and self.last != seq:
             self.end_at = now
         self.last = seq
         self._epochs.series.note_credited(reached)

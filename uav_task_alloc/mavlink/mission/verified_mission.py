@@ -8,9 +8,11 @@ from enum import Enum
 from pymavlink.dialects.v20 import ardupilotmega as d
 from pymavlink.dialects.v20.ardupilotmega import MAV_MISSION_TYPE_MISSION
 
+from uav_task_alloc.geometry.frames import Origin, to_enu
 from uav_task_alloc.mavlink.mission.current_item_reports import SETTLE_TIME
 from uav_task_alloc.mavlink.mission.items import Item, all_alike
 from uav_task_alloc.mavlink.transport.codec import Message, plan_id
+from uav_task_alloc.model import Point
 
 READBACK_PERIOD = 60.0  # [s] between readbacks of a mission that should not have changed
 
@@ -61,6 +63,13 @@ class VerifiedMission:
         """Note that these items are on board after our upload."""
         self.items, self.verified_at, self._mission_id = items, now, self.reported_id
         self.state, self.read_once, self.is_foreign = MissionState.VERIFIED, True, False
+
+    def landing_place(self, origin: Origin) -> Point | None:
+        """Return where the mission lands [m] ENU; None: it does not. The height is not known."""
+        last = self.items[-1] if self.items else None
+        if last is None or last.command != d.MAV_CMD_NAV_LAND:
+            return None
+        return to_enu(origin, last.x * 1e-7, last.y * 1e-7, origin.altitude_amsl)
 
     def interrupt(self) -> None:
         """Note that an upload failed: the mission on board must be downloaded."""

@@ -17,6 +17,7 @@ from uav_task_alloc.mavlink.mission.items import (
     Item,
     TaskList,
     all_alike,
+    lands_by_item,
     mission_items,
 )
 from uav_task_alloc.mavlink.mission.long_legs import first_point, with_points_between
@@ -24,7 +25,7 @@ from uav_task_alloc.mavlink.mission.progress import ProgressTable
 from uav_task_alloc.mavlink.mission.task_progress import TaskProgress
 from uav_task_alloc.mavlink.mission.waits import Waits
 from uav_task_alloc.mavlink.transport.notes import OperatorNote
-from uav_task_alloc.model import Task
+from uav_task_alloc.model import Point, Task
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,6 +45,7 @@ class WantedMission:
         origin: of the ENU frame.
         progress: the completed tasks of this vehicle.
         airborne: whether it flies now.
+        home: [m] ENU; None: not known.
 
     Arguments of methods:
         tasks: a list of the allocator.
@@ -53,7 +55,8 @@ class WantedMission:
     """
 
     def __init__(self, profile: Profile, origin: Origin, progress: ProgressTable,
-                 airborne: Callable[[], bool] = lambda: True) -> None:
+                 airborne: Callable[[], bool] = lambda: True,
+                 home: Callable[[], Point | None] = lambda: None) -> None:
         self.tasks: TaskList | None = None
         self.horizon = Horizon()
         self.failed: deque[TaskFailed] = deque()
@@ -62,7 +65,7 @@ class WantedMission:
         self._profile, self._origin, self._progress = profile, origin, progress
         self._refused: dict[str, tuple[Task, str]] = {}  # the task as refused, and the reason
         self.waits = Waits()
-        self._airborne = airborne
+        self._airborne, self._home = airborne, home
         self.leg = FirstLeg(profile.rules.loiters, profile.farthest_first)
         self._leg_key: object = None  # the state for which the first leg was begun
         self._items: tuple[object, tuple[Item, ...]] | None = None  # cached, with their key
@@ -133,7 +136,8 @@ class WantedMission:
         if self._leg_key != state or self.leg.is_off:
             self.leg.begin(self.remaining())
             self._leg_key = state
-        key = (state, self.leg.version, self.leg.passed)
+        lands = lands_by_item(self.remaining(), self._profile.rules, self._home())
+        key = (state, self.leg.version, self.leg.passed, lands)
         if self._items is not None and self._items[0] == key:
             return self._items[1]
         remaining = self.remaining()
@@ -152,9 +156,10 @@ class WantedMission:
         """The items of a list, with long legs divided where a mission has the capacity."""
         rules, tasks = self._profile.rules, self.waits.with_holds(tasks)
         ahead = self.leg.points_ahead(first_point(tasks))
-        filled = mission_items(with_points_between(tasks, ahead), rules, self._origin)
+        filled = mission_items(with_points_between(tasks, ahead), rules, self._origin,
+                               self._home())
         if len(filled) > self._capacity and len(tasks.stops) <= 1:
-            return mission_items(tasks, rules, self._origin)
+            return mission_items(tasks, rules, self._origin, self._home())
         return filled
 
     def _cut(self, items: tuple[Item, ...], tasks: TaskList) -> None:

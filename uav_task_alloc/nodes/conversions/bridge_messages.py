@@ -108,6 +108,7 @@ def from_uav_status(status: UavStatus, capabilities: Iterable[str], stamp: float
     known = {} if limits is None else dict(limits)
     speed = known.pop('cruise_speed', math.nan)
     known.setdefault('hold_radius', status.hold_radius)
+    known |= {'return_height': status.return_height, 'takeoff_height': status.takeoff_height}
     if 'endurance' in known:
         known['endurance'] *= status.battery  # NaN where that is unknown
     return m.UavState(

@@ -183,7 +183,8 @@ def to_report(msg: m.UavState) -> UavReport:
         velocity=velocity if all(map(math.isfinite, velocity)) else None,
         mode=constant_name(MODES, msg.mode), authority=constant_name(AUTHORITIES, msg.authority),
         foreign=msg.mission_state == m.UavState.FOREIGN,
-        hold_radius=known(msg.hold_radius) or 0.0,
+        hold_radius=known(msg.hold_radius) or 0.0, return_height=known(msg.return_height),
+        takeoff_height=known(msg.takeoff_height),
         reason=' '.join(msg.reason.split())[:_LONGEST_REASON],
         **{name: known(getattr(msg, name)) or None for name in REPORTED_LIMITS})
 
