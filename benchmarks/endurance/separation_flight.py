@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, replace
 
-from uav_task_alloc.allocator.records import TaskEventKind, UavList, UavReport
-from uav_task_alloc.model import Point
+from uav_task_alloc.allocator.records import ListStop, TaskEventKind, UavList, UavReport
+from uav_task_alloc.model import Leg as PlannedLeg, Point
 
 ACCELERATION, CLIMB, DESCENT = 3.0, 2.5, 1.5  # [m/s2], [m/s], [m/s]
 SPEED = 15.0  # [m/s] as reported; each UAV flies another one
@@ -65,7 +65,7 @@ class Craft:
                          active_task=task if mode in ('ON_MISSION', 'HOLD') else '',
                          list_revision=self.revision, standby=self.landed,
                          velocity=self.velocity, climb_speed=CLIMB, descent_speed=DESCENT,
-                         mode=mode, authority='HELD')
+                         mode=mode, authority='HELD', takeoff_height=CRUISE)
 
     @property
     def returns(self) -> bool:
@@ -117,8 +117,9 @@ class Craft:
             last = legs[-1].point if legs else self.place
             legs += [Leg(point) for point in order.end_via]
             top = order.end_via[-1][2] if order.end_via else last[2]
-            legs += [Leg((*self.home[:2], max(top, self.home[2] + 5.0))),
-                     Leg(self.home, lands=True)]
+            above = (*self.home[:2], max(top, self.home[2] + 5.0))
+            legs += [Leg(above)] if not legs or legs[-1].point != above else []
+            legs.append(Leg(self.home, lands=True))
         if (not self.legs and not self.landed) or self.climbing:
             self.legs = legs
         else:
@@ -206,3 +207,45 @@ class Craft:
             self.serving, self.until, self.rate = leg.task, now + leg.service, 0.0
         else:
             self._wait(now)
+
+
+@dataclass(frozen=True, slots=True)
+class SentList:
+    """A list that was flown, and what its UAV had done by then."""
+
+    at: float  # [s]
+    tasks: UavList
+    done: frozenset[str]
+
+
+class SamePlan:
+    """The lists of a flight, flown again without their heights, waits and holds.
+
+    The UAVs, which fly as they did, may have done less or more by then than they had: a task that
+    is not done yet is flown first.
+    """
+
+    def __init__(self, crafts: Mapping[str, Craft], lists: list[SentList]) -> None:
+        self.crafts, self._lists = crafts, lists
+        self._open: dict[str, tuple[ListStop, ...]] = {}  # last sent, by UAV
+
+    def fly(self, now: float, dt: float) -> None:
+        """Send the lists that are due, and fly."""
+        while self._lists and self._lists[0].at <= now:
+            sent = self._lists.pop(0)
+            craft = self.crafts[sent.tasks.uav]
+            stops = *(stop for stop in self._open.get(craft.name, ()) if stop.task.id in sent.done
+                      and stop.task.id not in craft.done), *(
+                replace(stop, leg=PlannedLeg((), 0.0), wait=0.0) for stop in sent.tasks.stops)
+            self._open[craft.name] = stops
+            craft.receive(replace(sent.tasks, stops=stops, end_via=()), now)
+        for craft in self.crafts.values():
+            if not craft.dead:
+                for _ in craft.fly(now, dt):
+                    pass
+
+    @property
+    def over(self) -> bool:
+        """Whether nothing is left to be sent or flown."""
+        return not self._lists and all(craft.landed or craft.dead
+                                       for craft in self.crafts.values())

@@ -38,6 +38,7 @@ _TAKE_OFFS = tuple(5.0 * k for k in range(1, 181))  # [s] that a UAV may wait on
 _MOST_PATHS = 4  # the cheapest, with which waits are combined
 _PRICE = 0.15  # [s/m] of a climb above the ends of a leg, whose power a wait does not take
 _MARGIN = 0.5  # [m] more between layers than the vertical distance: heights are kept nearly
+_LEAST_SAVED = 3.0  # [s] of a wait; for less it stays as it is
 _GROUND = 0.5  # price of a second of waiting on the ground
 _ON_LINE = 0.01  # [m] a detour point so near to the line of its neighbours only changes the height
 _STEEP = 0.45  # share of the first and last straight part that a slanted climb may take
@@ -52,12 +53,15 @@ class TransitLimits:
         altitude_min, altitude_max: [m] ENU.
         is_clear: whether a polyline [m] ENU enters no zone.
         stop: polled before each change that is tried; True ends the search for changes.
+        dearest: [s] of flight that the change of a return that cannot wait may cost; dearer ones
+            are left to the flight, where less is uncertain.
     """
 
     altitude_min: float = -math.inf  # [m]
     altitude_max: float = math.inf  # [m]
     is_clear: Callable[[Sequence[Point]], bool] = lambda points: True
     stop: Callable[[], bool] = lambda: False
+    dearest: float = math.inf  # [s]
 
 
 @dataclass(slots=True)
@@ -90,10 +94,12 @@ def resolve(flights: Sequence[Flight], rule: Separation,
     """
     volumes = flight_volumes(flights, rule)
     found = find_conflicts(volumes, rule)
-    if not found:
+    waits = {k for k, flight in enumerate(flights) for leg in flight.legs
+             if leg.movable and leg.hold_until > -math.inf}
+    if not found and not waits:
         return Resolution(tuple(flights))
     planner = _Planner(flights, rule, limits or TransitLimits())
-    involved = {k for each in found for k in each.flights}
+    involved = waits | {k for each in found for k in each.flights}
     for k in range(len(flights)):
         planner.accept_fixed(k, whole=k not in involved)
     # in the air first: those on the ground can wait there
@@ -152,7 +158,7 @@ class _Planner:
                     flight = replace(flight, legs=(*flight.legs[:n], leg, *flight.legs[n + 1:]))
             times = leg_times(flight, leg, ready, n == 0)
             if not fixed:
-                self._accepted.add(leg_rows(flight, leg, times, self._rule), (k, n))
+                self._accepted.add(leg_rows(flight, leg, times, self._rule, n == 0), (k, n))
             ready = times.end
         self.flights[k] = flight
         self._accepted.add(self._stay(flight, ready), (k, len(flight.legs)))
@@ -169,7 +175,25 @@ class _Planner:
         leg = flight.legs[n]
         planned = leg_times(flight, leg, ready, n == 0)
         if self._is_apart(flight, k, n, leg, planned):
-            return _Change(leg, 0.0, '', '')
+            return self._sooner(flight, k, n, ready)
+        after = flight.legs[n + 1] if n + 1 < len(flight.legs) else None
+        bounded = not leg.may_wait or (after is not None and not after.may_wait)
+        found = self._cheapest(flight, k, n, ready, self._limits.dearest if bounded else math.inf)
+        if found is not None or not bounded or after is None:
+            return found
+        # that return would cost too much: without it
+        if self._is_apart(flight, k, n, leg, planned, whole=False):
+            return self._sooner(flight, k, n, ready)
+        return self._cheapest(flight, k, n, ready, math.inf, whole=False)
+
+    def _cheapest(self, flight: Flight, k: int, n: int, ready: float, dearest: float,
+                  whole: bool = True) -> _Change | None:
+        """The cheapest change that costs at most so many seconds of flight; None: there is none.
+
+        Where not `whole`, the return after it does not count.
+        """
+        leg = flight.legs[n]
+        planned = leg_times(flight, leg, ready, n == 0)
         paths = sorted((_Change(leg, 0.0, '', ''), *self._heights(flight, leg)),
                        key=lambda each: each.seconds)
         waits = _TAKE_OFFS if leg.takes_off else _HOLDS
@@ -182,21 +206,39 @@ class _Planner:
             if self._limits.stop():
                 self.stopped = True
                 break
+            if paths[number].seconds + (0.0 if leg.takes_off else wait) > dearest:
+                continue
             option = _with_wait(paths[number], planned.begin, wait)
             times = leg_times(flight, option.leg, ready, n == 0)
-            if option.kind and self._is_apart(flight, k, n, option.leg, times) and (
+            if option.kind and self._is_apart(flight, k, n, option.leg, times, whole) and (
                     _keeps_deadlines(flight, n, times.end - planned.end, planned.end)):
                 return option
         return None
 
-    def _is_apart(self, flight: Flight, k: int, n: int, leg: FlightLeg, times: LegTimes) -> bool:
-        rows = leg_rows(flight, leg, times, self._rule)
+    def _sooner(self, flight: Flight, k: int, n: int, ready: float) -> _Change:
+        """A leg that is apart, with less of a wait of an earlier plan, if that is enough."""
+        leg = flight.legs[n]
+        without = replace(leg, hold_until=-math.inf)
+        begin, planned = (leg_times(flight, each, ready, n == 0).begin for each in (without, leg))
+        for wait in (0.0, *(_TAKE_OFFS if leg.takes_off else _HOLDS)):
+            if wait > planned - begin - _LEAST_SAVED or self._limits.stop():
+                break
+            sooner = replace(leg, hold_until=begin + wait if wait else -math.inf)
+            times = leg_times(flight, sooner, ready, n == 0)
+            if self._is_apart(flight, k, n, sooner, times):
+                return _Change(sooner, wait, f'waits {wait:g} s only', 'hold')
+        return _Change(leg, 0.0, '', '')
+
+    def _is_apart(self, flight: Flight, k: int, n: int, leg: FlightLeg, times: LegTimes,
+                  whole: bool = True) -> bool:
+        """Whether a leg is apart, and the return after it that cannot wait (`whole`)."""
+        rows = leg_rows(flight, leg, times, self._rule, n == 0)
         if n + 1 == len(flight.legs):
             rows += self._stay(flight, times.end)
         if self._accepted.conflict(rows, k) is not None:
             return False
         after = flight.legs[n + 1] if n + 1 < len(flight.legs) else None
-        if after is None or after.may_wait:
+        if after is None or after.may_wait or not whole:
             return True
         # the only wait for the next leg is this one
         return any(self._is_apart(flight, k, n + 1, each, leg_times(flight, each, times.end))
@@ -205,9 +247,10 @@ class _Planner:
     def _heights(self, flight: Flight, leg: FlightLeg) -> Iterator[_Change]:
         """The leg at other transit heights that it may have."""
         points, limits = self._level_points(leg), self._limits
-        planned = flight.seconds(leg.flown())
-        ends = [point[2] for point, on_ground in (
-            (points[0], leg.takes_off), (points[-1], leg.lands)) if not on_ground]
+        planned = flight.leg_seconds(leg)
+        ends = [height for height, on_ground in (
+            (max(points[0][2], leg.top), leg.takes_off and leg.top == -math.inf),
+            (points[-1][2], leg.lands)) if not on_ground]
         ends = ends or [max(point[2] for point in points)]
         levels = {max(ends), min(ends), *(
             max(ends) + step * (self._rule.vertical + _MARGIN) for step in range(1, _LAYERS + 1))}
@@ -217,9 +260,10 @@ class _Planner:
             for path in {_slanted(flight, leg, points, level), _upright(leg, points, level)}:
                 new = replace(leg, points=path)
                 if path != leg.points and limits.is_clear(new.flown()):
-                    price = _PRICE * max(0.0, level - max(ends))
-                    yield _Change(new, flight.seconds(new.flown()) - planned + price, f'flies at '
-                                  f'{level:.1f} m', 'height')
+                    price = flight.leg_seconds(new) - planned + _PRICE * max(
+                        0.0, level - max(ends))
+                    if leg.may_wait or price <= limits.dearest:
+                        yield _Change(new, price, f'flies at {level:.1f} m', 'height')
 
     def _level_points(self, leg: FlightLeg) -> tuple[Point, ...]:
         """Points of a leg without those that only change its height."""
@@ -261,7 +305,7 @@ def _upright(leg: FlightLeg, points: Sequence[Point], level: float) -> tuple[Poi
     """A leg that changes its height above its ends."""
     a, b = points[0], points[-1]
     inner = [(x, y, max(z, level)) for x, y, z in points[1:-1]]
-    first = [(a[0], a[1], level)] if a[2] != level else []
+    first = [(a[0], a[1], level)] if max(a[2], leg.top) != level else []
     last = [(b[0], b[1], level)] if b[2] != level else []
     return (a, *first, *inner, *last, b)
 
@@ -272,10 +316,12 @@ def _slanted(flight: Flight, leg: FlightLeg, points: Sequence[Point],
     a, b = points[0], points[-1]
     inner = [(x, y, max(z, level)) for x, y, z in points[1:-1]]
     path: list[Point] = [a]
-    if a[2] != level:
+    start = max(a[2], leg.top)  # above the pad, where that is known
+    if start != level:
         goal = inner[0] if inner else b
-        path.append((a[0], a[1], level) if leg.takes_off else _along(
-            a, goal, flight.cruise * _vertical_seconds(flight, level - a[2]), level))
+        upright = leg.takes_off and leg.top == -math.inf
+        path.append((a[0], a[1], level) if upright else _along(
+            a, goal, flight.cruise * _vertical_seconds(flight, level - start), level))
     path += inner
     if b[2] != level:
         before = inner[-1] if inner else a

@@ -58,13 +58,15 @@ class Separation:
         """
         return horizontal >= self.horizontal or abs(vertical) >= self.vertical
 
-    def uncertainty(self, seconds: float) -> float:
+    def uncertainty(self, seconds: float, speed_error: float | None = None) -> float:
         """Return by how much a UAV may be early or late [s].
 
         Args:
             seconds: since its position was known [s].
+            speed_error: share of this UAV; None: that of the rule.
         """
-        return self.speed_error * max(0.0, min(seconds, self.horizon))
+        share = self.speed_error if speed_error is None else speed_error
+        return share * max(0.0, min(seconds, self.horizon))
 
 
 @dataclass(frozen=True, slots=True)

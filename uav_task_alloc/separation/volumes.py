@@ -10,6 +10,8 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +28,20 @@ PieceRow = tuple[float, ...]
 PieceRows = NDArray[np.float64]  # (n, COLUMNS)
 
 
+class Pace(Protocol):
+    """How fast a UAV flies, as measured: with wind, and with what stops and take-offs cost."""
+
+    @property
+    def takeoff(self) -> float:
+        """Lost by arming and beginning the climb [s]."""
+
+    def seconds(self, points: Sequence[Point]) -> float:
+        """Return the time along a polyline [m] ENU, without stops [s]."""
+
+    def from_stop(self, points: Sequence[Point], share: float = 0.0) -> float:
+        """Return the time up to a stop at its end, from a share of the speed [s]."""
+
+
 @dataclass(frozen=True, slots=True)
 class FlightLeg:
     """A flight from one stop to the next, and the service there.
@@ -40,6 +56,7 @@ class FlightLeg:
         hold_until: [s] the leg does not begin before, for the separation.
         takes_off: it begins on the ground.
         lands: it ends on the ground.
+        top: [m] ENU at which its take-off ends, if that is known; else at its next point.
         movable: its heights and its begin may change; the leg under way is not.
         may_wait: the UAV can wait before it; not before a return that follows a list.
     """
@@ -53,15 +70,17 @@ class FlightLeg:
     hold_until: float = -math.inf  # [s]
     takes_off: bool = False
     lands: bool = False
+    top: float = -math.inf  # [m] ENU
     movable: bool = True
     may_wait: bool = True
 
     def flown(self) -> tuple[Point, ...]:
         """Points as they are flown: with the columns above pad and base."""
         points = list(self.points)
-        if self.takes_off and points[1][2] > points[0][2]:
+        top = self.top if self.top > -math.inf else points[1][2]
+        if self.takes_off and top > points[0][2]:
             x, y, _ = points[0]
-            points.insert(1, (x, y, points[1][2]))
+            points.insert(1, (x, y, top))
         if self.lands and points[-2][2] > points[-1][2]:
             x, y, _ = points[-1]
             points.insert(-1, (x, y, points[-2][2]))
@@ -81,6 +100,9 @@ class Flight:
         in_air: it is in the air at `begin`.
         known: [s] when its position was known.
         late: [s] by which it was late or early, as measured.
+        speed_error: share by which its times are off, as measured; None: that of the rule.
+        pace: as measured; None: the speeds alone.
+        share: of its speed that it has at `begin`, 0 to 1.
     """
 
     uav: str
@@ -93,6 +115,9 @@ class Flight:
     in_air: bool = True
     known: float = 0.0  # [s]
     late: float = 0.0  # [s]
+    speed_error: float | None = None
+    pace: Pace | None = None
+    share: float = 0.0
 
     def seconds(self, points: Sequence[Point]) -> float:
         """Return the flight time along a polyline [s].
@@ -100,12 +125,48 @@ class Flight:
         Args:
             points: [m] ENU, in order.
         """
+        if self.pace is not None:
+            return self.pace.seconds(points)
         total = 0.0
         x, y, z = points[0]
         for x1, y1, z1 in points[1:]:
             total += straight_time(x1 - x, y1 - y, z1 - z, self.cruise, self.climb, self.descent)
             x, y, z = x1, y1, z1
         return total
+
+    def parts(self, leg: FlightLeg, first: bool = False) -> list[tuple[float, Point]]:
+        """Return the straight parts of a leg: their times [s] and ends [m] ENU.
+
+        The time that a stop costs is spread over what lies between the columns.
+
+        Args:
+            leg: to be flown.
+            first: it is the first leg, which begins at the speed of the UAV.
+        """
+        points = leg.flown()
+        parts = [(self.seconds(pair), pair[1]) for pair in pairwise(points)]
+        begin = int(leg.takes_off and points[1][:2] == points[0][:2])
+        end = len(parts) - int(leg.lands and points[-2][:2] == points[-1][:2])
+        full = sum(seconds for seconds, _ in parts[begin:end])
+        if self.pace is None or full <= 0.0:
+            return parts
+        share = self.share if first and not leg.takes_off else 0.0
+        slower = self.pace.from_stop(points[begin:end + 1], share) / full
+        return [(seconds * slower if begin <= n < end else seconds, point)
+                for n, (seconds, point) in enumerate(parts)]
+
+    def leg_seconds(self, leg: FlightLeg, first: bool = False) -> float:
+        """Return the flight time of a leg [s]; see `parts`."""
+        return sum(seconds for seconds, _ in self.parts(leg, first))
+
+    def uncertainty(self, seconds: float, rule: Separation) -> float:
+        """Return by how much it may be early or late [s].
+
+        Args:
+            seconds: from the moment of the plan [s].
+            rule: whose share counts where none was measured.
+        """
+        return rule.uncertainty(seconds - self.known, self.speed_error) + self.late
 
 
 @dataclass(frozen=True, slots=True)
@@ -137,15 +198,18 @@ def leg_times(flight: Flight, leg: FlightLeg, ready: float, first: bool = False)
     Returns:
         Its times.
     """
-    seconds = flight.seconds(leg.flown())
+    seconds = flight.leg_seconds(leg, first)
     if first and flight.in_air:
         arrival = ready + seconds
         return LegTimes(ready, ready, arrival, max(arrival, leg.earliest) + leg.service)
+    if leg.takes_off and flight.pace is not None:
+        ready += flight.pace.takeoff
     begin = max(ready, leg.release, leg.hold_until, leg.earliest - seconds)
     return LegTimes(ready, begin, begin + seconds, begin + seconds + leg.service)
 
 
-def leg_rows(flight: Flight, leg: FlightLeg, times: LegTimes, rule: Separation) -> list[PieceRow]:
+def leg_rows(flight: Flight, leg: FlightLeg, times: LegTimes, rule: Separation,
+             first: bool = False) -> list[PieceRow]:
     """Return the pieces of one leg: the wait before it, the flight, and the service.
 
     Args:
@@ -153,6 +217,7 @@ def leg_rows(flight: Flight, leg: FlightLeg, times: LegTimes, rule: Separation) 
         leg: to be flown.
         times: see `leg_times`.
         rule: whose uncertainty the pieces have.
+        first: it is the first leg.
 
     Returns:
         PieceRows of COLUMNS numbers.
@@ -160,11 +225,8 @@ def leg_rows(flight: Flight, leg: FlightLeg, times: LegTimes, rule: Separation) 
     rows: list[PieceRow] = []
     if times.begin > times.ready and not leg.takes_off:
         _add(rows, flight, rule, times.ready, times.begin, leg.points[0], leg.points[0])
-    points, clock = leg.flown(), times.begin
-    place = points[0]
-    for point in points[1:]:
-        seconds = straight_time(point[0] - place[0], point[1] - place[1], point[2] - place[2],
-                                flight.cruise, flight.climb, flight.descent)
+    clock, place = times.begin, leg.points[0]
+    for seconds, point in flight.parts(leg, first):
         if seconds > 0.0:
             _add(rows, flight, rule, clock, clock + seconds, place, point)
         clock, place = clock + seconds, point
@@ -199,11 +261,11 @@ def _add(rows: list[PieceRow], flight: Flight, rule: Separation, begin: float, e
         if clock < until < end:
             s = clock - begin
             rows.append((clock, until, x + vx * s, y + vy * s, z + vz * s, vx, vy, vz,
-                         rule.uncertainty(until - flight.known) + flight.late))
+                         flight.uncertainty(until, rule)))
             clock = until
     s = clock - begin
     rows.append((clock, end, x + vx * s, y + vy * s, z + vz * s, vx, vy, vz,
-                 rule.uncertainty(end - flight.known) + flight.late))
+                 flight.uncertainty(end, rule)))
 
 
 @dataclass(frozen=True, slots=True)
@@ -251,7 +313,7 @@ def rows_of_legs(flight: Flight, rule: Separation) -> list[list[PieceRow]]:
     ready, place, in_air = flight.begin, flight.position, flight.in_air
     for number, leg in enumerate(flight.legs):
         times = leg_times(flight, leg, ready, number == 0)
-        found.append(leg_rows(flight, leg, times, rule))
+        found.append(leg_rows(flight, leg, times, rule, number == 0))
         ready, place, in_air = times.end, leg.points[-1], not leg.lands
     found.append(end_rows(flight, rule, ready, place) if in_air else [])
     return found

@@ -77,7 +77,9 @@ class Sky(FlightBench):
                 available=status.available, active_task=status.active_task,
                 list_revision=status.list_revision, standby=status.mode is UavMode.STANDBY,
                 velocity=status.velocity, mode=status.mode.name, authority=status.authority.name,
-                foreign=status.mission_state is MissionState.FOREIGN), self.now, self.now)
+                foreign=status.mission_state is MissionState.FOREIGN,
+                return_height=status.return_height, takeoff_height=status.takeoff_height,
+            ), self.now, self.now)
         self.core.tick(self.now, self.now)
         problem = self.core.due(self.now, self.now)
         if problem is not None:

@@ -14,11 +14,14 @@ from uav_task_alloc.allocator.state.flight_pace import UavFlight, timed_stops
 from uav_task_alloc.allocator.state.world import World
 from uav_task_alloc.geometry.polyline import points_passed, polyline_length
 from uav_task_alloc.model import Leg, Point
-from uav_task_alloc.separation.resolution import TransitLimits, resolve
+from uav_task_alloc.separation.resolution import Resolution, TransitLimits, resolve
+from uav_task_alloc.separation.rule import Separation
 from uav_task_alloc.separation.volumes import Flight, FlightLeg
 
 _MOST_CHANGES = 10_000  # tried, so that a callback ends: half a second without zones
+_DEAREST = 15.0  # [s] of flight that a return may cost; the monitor holds for about that time
 _LEAST = 1.0  # [s] of a wait; a shorter one is no change
+_LEAST_ERROR = 0.05  # share by which times may be off, however exact they were
 
 
 def with_separation(world: World, built: BuiltLists, stamp: float) -> BuiltLists:
@@ -38,14 +41,27 @@ def with_separation(world: World, built: BuiltLists, stamp: float) -> BuiltLists
     tried = count()
     found = resolve(list(flights.values()), separation_of(world.params), TransitLimits(
         world.params.altitude_min, world.params.altitude_max,
-        lambda points: world.paths().clear(*points), lambda: next(tried) >= _MOST_CHANGES))
+        lambda points: world.paths().clear(*points), lambda: next(tried) >= _MOST_CHANGES,
+        _DEAREST))
     for before, after in zip(flights.values(), found.flights, strict=True):
         if before is not after:
             lists[after.uav] = _changed_list(world, lists[after.uav], before, after, stamp)
-    together = sorted({' and '.join(sorted(each.uavs)) for each in found.conflicts
-                       if not each.resolution})
-    return replace(built, lists=lists, together=tuple(
-        f'the plan cannot keep {pair} apart' for pair in together))
+    return replace(built, lists=lists, together=_not_apart(found, flights))
+
+
+def _not_apart(found: Resolution, flights: Mapping[str, Flight]) -> tuple[str, ...]:
+    """A sentence for each two UAVs that the lists do not keep apart."""
+    texts = dict[str, str]()
+    for each in found.conflicts:
+        pair = ' and '.join(sorted(each.uavs))
+        if each.resolution:
+            continue
+        if '' in each.tasks and all(flights[uav_id].legs[-1:] and flights[uav_id].legs[-1].lands
+                                    for uav_id in each.uavs):
+            texts.setdefault(pair, f'{pair} return at the same time: one of them will hold')
+        else:
+            texts[pair] = f'the plan cannot keep {pair} apart'
+    return tuple(sorted(texts.values()))
 
 
 def _with_high_return(world: World, each: UavList) -> UavList:
@@ -65,17 +81,19 @@ def _with_high_return(world: World, each: UavList) -> UavList:
 
 def _flights(world: World, lists: Mapping[str, UavList], stamp: float) -> dict[str, Flight]:
     """What each known UAV flies by its list."""
-    flights = {}
+    flights, rule = {}, separation_of(world.params)
     for uav_id, each in lists.items():
         flight = world.flights.of(uav_id, stamp)
         if flight is not None:
-            flights[uav_id] = _flight(each, world.list_of(uav_id), flight, stamp)
+            flights[uav_id] = _flight(each, world.list_of(uav_id), flight, stamp, rule)
     return flights
 
 
-def _flight(each: UavList, published: UavList, flight: UavFlight, stamp: float) -> Flight:
-    legs, place = list[FlightLeg](), flight.position
+def _flight(each: UavList, published: UavList, flight: UavFlight, stamp: float,
+            rule: Separation) -> Flight:
+    own, legs, place = _empty(each.uav, flight, rule), list[FlightLeg](), flight.position
     for k, stop in enumerate(each.stops):
+        takes_off = k == 0 and flight.on_ground
         under_way = k == 0 and not flight.on_ground and _same_leg(published, stop)
         line = (*stop.leg.via, stop.task.position)
         ahead = line[points_passed(place, line):] if under_way else line
@@ -85,17 +103,16 @@ def _flight(each: UavList, published: UavList, flight: UavFlight, stamp: float) 
                         max(0.0, stop.task.service_time - served),
                         stop.task.earliest - stamp, stop.task.latest - stamp,
                         stop.task.release - stamp,
-                        takes_off=k == 0 and flight.on_ground, movable=not under_way)
-        if begins > 0.0:  # it keeps the wait that it had
-            leg = replace(leg, hold_until=begins - _seconds(flight, leg))
+                        takes_off=takes_off, movable=not under_way,
+                        top=flight.takeoff_top if takes_off else -math.inf)
+        if begins > 0.0:  # it keeps the wait that it had, or less
+            leg = replace(leg, hold_until=begins - own.leg_seconds(leg))
         legs.append(leg)
         place = stop.task.position
     if each.returns and flight.home is not None and not (flight.on_ground and not each.stops):
         legs.append(FlightLeg((place, *each.end_via, flight.home), lands=True,
                               movable=bool(each.stops), may_wait=False))
-    pace = flight.pace
-    return Flight(each.uav, tuple(legs), flight.position, pace.mean_speed, pace.climb,
-                  pace.descent, in_air=not flight.on_ground)
+    return replace(own, legs=tuple(legs))
 
 
 def _same_leg(published: UavList, stop: ListStop) -> bool:
@@ -104,10 +121,15 @@ def _same_leg(published: UavList, stop: ListStop) -> bool:
     return first is not None and (first.task.id, first.leg.via) == (stop.task.id, stop.leg.via)
 
 
-def _seconds(flight: UavFlight, leg: FlightLeg) -> float:
+def _empty(uav_id: str, flight: UavFlight, rule: Separation) -> Flight:
+    """The flight of a UAV without legs, with its pace and errors as measured."""
     pace = flight.pace
-    return Flight('', (), flight.position, pace.mean_speed, pace.climb, pace.descent).seconds(
-        leg.flown())
+    return Flight(
+        uav_id, (), flight.position, pace.mean_speed, pace.climb, pace.descent,
+        in_air=not flight.on_ground, late=flight.late, pace=pace,
+        speed_error=max(_LEAST_ERROR, min(rule.speed_error, flight.time_error)),
+        share=0.0 if flight.velocity is None else min(
+            1.0, math.hypot(*flight.velocity[:2]) / pace.speed))
 
 
 def _changed_list(world: World, each: UavList, before: Flight, after: Flight,
@@ -123,8 +145,10 @@ def _changed_list(world: World, each: UavList, before: Flight, after: Flight,
         leg = stop.leg if new.points == old.points else Leg(
             new.points[1:-1], polyline_length(new.points))
         begin = stop.begin_after
-        if new.hold_until > old.hold_until + _LEAST:
-            begin = max(0.0, round(stamp + new.hold_until + _seconds(flight, new), 1))
+        if new.hold_until == -math.inf:
+            begin = 0.0
+        elif abs(new.hold_until - old.hold_until) > _LEAST:
+            begin = max(0.0, round(stamp + new.hold_until + after.leg_seconds(new), 1))
         stops.append(replace(stop, leg=leg, begin_after=begin))
     timed = timed_stops(stops, flight)
     end_via = _end_via(each, after)

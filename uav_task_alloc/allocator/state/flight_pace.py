@@ -181,6 +181,9 @@ class UavFlight:
     served: float = 0.0  # [s] since it reached that
     home: Point | None = None  # [m] ENU
     velocity: Point | None = None  # [m/s] ENU over ground; None: unknown
+    takeoff_top: float = -math.inf  # [m] ENU at which its take-off ends; -inf: at its first point
+    late: float = 0.0  # [s] by which it was late or early at its last stops, on average
+    time_error: float = math.inf  # share by which its times may be off, as measured; inf: unknown
 
     def share(self, towards: Point) -> float:
         """Return the share of its speed at which it flies towards a point [m] ENU, 0 to 1.
@@ -256,7 +259,8 @@ def _leg_seconds(stop: ListStop, flight: UavFlight, place: Point, start: Point |
     if not first:
         return flight.pace.from_stop((place, *leg))
     if flight.on_ground:  # it climbs before it flies
-        above = (place[0], place[1], max(place[2], leg[0][2]))
+        top = flight.takeoff_top if flight.takeoff_top > -math.inf else leg[0][2]
+        above = (place[0], place[1], max(place[2], top))
         return (flight.pace.takeoff + flight.pace.seconds((place, above))
                 + flight.pace.from_stop((above, *leg)))
     rest = leg[points_passed(place, leg, start):]

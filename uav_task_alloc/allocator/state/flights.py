@@ -29,6 +29,8 @@ _SMOOTHING = 0.3  # weight of a new time lost at a stop
 _SHORTEST_LEG = 1.0  # [s] at full speed below which a leg says nothing about stops
 _LONGEST_STOP = 20.0  # [s] a longer delay is not that of a stop
 _OWN_STOPS = 3  # stops after which a UAV has a mean of its own
+_ERRORS = 2.0  # times the mean error that is expected
+_SHORT = 10.0  # [s] a shorter leg has the relative error of one of that time
 _USED = 0.95  # charge of a battery below which it may be changed
 OVERDUE = 3.0  # times its turnaround after which nobody seems to change the battery of a UAV
 _RETURN_HEIGHT = 60.0  # [m] above home: RTL_RETURN_ALT of PX4; RTL_ALT of ArduPilot is 15 m
@@ -59,6 +61,22 @@ class _Leg:
     seconds: float  # planned, at full speed
     corners: float  # in stops
     service: float  # [s]
+    predicted: float  # [s] with its stop
+
+
+@dataclass(slots=True)
+class _LegErrors:
+    """By how much the flight times of legs differed from the predicted ones, smoothed."""
+
+    seconds: float = 0.0  # [s]
+    share: float = 0.0
+    count: int = 0
+
+    def add(self, error: float, predicted: float) -> None:
+        weight = max(_SMOOTHING, 1.0 / (self.count + 1))
+        self.seconds += weight * (abs(error) - self.seconds)
+        self.share += weight * (abs(error) / max(predicted, _SHORT) - self.share)
+        self.count += 1
 
 
 class Flights:
@@ -81,6 +99,7 @@ class Flights:
         self._reached: dict[str, tuple[str, float]] = {}  # task and stamp of the arrival
         self._all_stops, self._stops = _Stops(), dict[str, _Stops]()
         self._legs: dict[str, _Leg] = {}
+        self._errors: dict[str, _LegErrors] = {}
         self._landed: dict[str, float] = {}  # [s] stamp since which it is on the ground at home
 
     def update(self, report: UavReport, stamp: float) -> None:
@@ -128,6 +147,8 @@ class Flights:
                 lost = measured_stop(leg.seconds, flown, leg.corners)
                 self._all_stops.add(lost)
                 self._stops.setdefault(uav_id, _Stops()).add(lost)
+                self._errors.setdefault(uav_id, _LegErrors()).add(flown - leg.predicted,
+                                                                  leg.predicted)
         stops = self._lists.get(uav_id).stops
         if (uav_id not in self._fleet.records or len(stops) < 2
                 or stops[0].task.id != task_id):
@@ -138,7 +159,7 @@ class Flights:
         seconds = pace.seconds(way)
         if max(following.task.earliest, following.task.release) < stamp + seconds:  # no wait
             self._legs[uav_id] = _Leg(following.task.id, stamp, seconds, pace.corners(way),
-                                      following.task.service_time)
+                                      following.task.service_time, pace.from_stop(way))
 
     def clock_jumped(self) -> None:
         """Drop what was measured across a jump of the published clock."""
@@ -150,7 +171,8 @@ class Flights:
     def forget(self, uav_id: str) -> None:
         """Drop what is kept of a UAV."""
         self.wind.forget(uav_id)
-        for kept in (self._sampled, self._reached, self._stops, self._legs, self._landed):
+        for kept in (self._sampled, self._reached, self._stops, self._legs, self._landed,
+                     self._errors):
             kept.pop(uav_id, None)
 
     def of(self, uav_id: str, stamp: float) -> UavFlight | None:
@@ -159,9 +181,12 @@ class Flights:
         if record is None:
             return None
         task_id, reached = self._reached.get(uav_id, ('', stamp))
+        errors, height = self._errors.get(uav_id, _LegErrors()), record.report.takeoff_height
         return UavFlight(record.report.position, self.pace(uav_id), stamp,
                          record.report.standby, task_id, max(0.0, stamp - reached), record.home,
-                         record.report.velocity)
+                         record.report.velocity,
+                         record.home[2] + height if height else -math.inf, errors.seconds,
+                         _ERRORS * errors.share if errors.count >= _OWN_STOPS else math.inf)
 
     def at_home_since(self, uav_id: str) -> float | None:
         """Return since when a UAV is on the ground at its home [s]; None: it is not."""
