@@ -240,7 +240,7 @@ def _seems_to_return(record: UavRecord) -> bool:
 
 
 def _own_return(record: UavRecord, pace: FlightPace) -> _TimedPoints:
-    """The return that an autopilot flies by itself: up to its own height, home, and down."""
+    """The way of an autopilot's return mode: up to its own height, home, and down."""
     report, home = record.report, record.home
     (x, y, z), (vx, vy, vz) = report.position, report.velocity or (0.0, 0.0, 0.0)
     top = max(z, home[2] + (report.return_height or 0.0))
