@@ -131,9 +131,8 @@ class UavReport:
     authority: str = ''  # the same
     foreign: bool = False  # the mission on board is not of its bridge
     hold_radius: float = 0.0  # [m] of the circle in which it holds; 0: it hovers
-    # [m] above its home: its own return climbs to that, at least; it takes off to that
-    return_height: float | None = None
-    takeoff_height: float | None = None
+    return_height: float | None = None  # [m] above its home that its own return climbs to
+    takeoff_height: float | None = None  # [m] above its home to which it takes off
     reason: str = ''  # why it is not available
 
     @property

@@ -156,7 +156,11 @@ class Flight:
                 for n, (seconds, point) in enumerate(parts)]
 
     def leg_seconds(self, leg: FlightLeg, first: bool = False) -> float:
-        """Return the flight time of a leg [s]; see `parts`."""
+        """Return the flight time of a leg [s].
+
+        Args:
+            leg, first: see `parts`.
+        """
         return sum(seconds for seconds, _ in self.parts(leg, first))
 
     def uncertainty(self, seconds: float, rule: Separation) -> float:

@@ -65,7 +65,14 @@ class VerifiedMission:
         self.state, self.read_once, self.is_foreign = MissionState.VERIFIED, True, False
 
     def landing_place(self, origin: Origin) -> Point | None:
-        """Return where the mission lands [m] ENU; None: it does not. The height is not known."""
+        """Return where the mission lands.
+
+        Args:
+            origin: of the ENU frame.
+
+        Returns:
+            [m] ENU, at the height of the origin; None where it does not end with NAV_LAND.
+        """
         last = self.items[-1] if self.items else None
         if last is None or last.command != d.MAV_CMD_NAV_LAND:
             return None
