@@ -146,7 +146,7 @@ class Fleet:
                 self.figures['completed'] += event.task in self.open
                 self.open.discard(event.task)
         executor.notes.clear()
-        status, n = state_of(session, self.now, RANGE), int(session.uav_id[4:])
+        status, n = state_of(session, self.now), int(session.uav_id[4:])
         if status.available and n in self.changed_at and not self.vehicles[n].silent:
             del self.changed_at[n]
             self.late.discard(n)

@@ -16,6 +16,7 @@ from uav_task_alloc_msgs.srv import HandOver
 
 from uav_task_alloc.errors import InvalidValue, UnknownName
 from uav_task_alloc.mavlink.gcs.authority_store import AuthorityFileStore, boot_id
+from uav_task_alloc.mavlink.gcs.energy_estimate import NominalEnergy
 from uav_task_alloc.mavlink.gcs.fence_store import FenceFileStore
 from uav_task_alloc.mavlink.gcs.ground_station import GroundStation, VehicleSession
 from uav_task_alloc.mavlink.gcs.hold_store import HoldFileStore
@@ -160,9 +161,8 @@ class MavlinkBridge(Node):
 
     def publish_state(self, session: VehicleSession, now: float) -> None:
         """Publish the state of a UAV where it is due."""
-        full_range = self.full_ranges.get(session.uav_id, self.live.now.full_range)
         with self.lock:
-            status = state_of(session, now, full_range)
+            status = state_of(session, now)
         measured_at = session.executor.telemetry.position_at
         if conflict := self.origins.conflict():
             status = replace(status, available=False, reason=conflict)
@@ -170,7 +170,13 @@ class MavlinkBridge(Node):
             self.states.publish(bridge_messages.from_uav_status(
                 status, self.capabilities.get(session.uav_id, ()),
                 self.stamp() - self.rate(session) * (now - measured_at),
-                self.limits.get(session.uav_id), full_range))
+                self.limits.get(session.uav_id)))
+
+    def nominal_energy(self, uav_id: str) -> NominalEnergy:
+        """What the parameters state about range, endurance and speed of a UAV."""
+        limits = self.limits.get(uav_id, {})
+        return NominalEnergy(self.full_ranges.get(uav_id, self.live.now.full_range),
+                             limits.get('endurance', 0.0), limits.get('cruise_speed', 0.0))
 
     def rate(self, session: VehicleSession) -> float:
         """Seconds of the node's clock in one second of the steady clock, as a vehicle shows it."""
@@ -190,6 +196,7 @@ class MavlinkBridge(Node):
                                              fence_area=self.fence_area, rally=self.rally)
         for session in list(self.ground_station.sessions.values()):
             session.executor.policy = policy
+            session.executor.energy.nominal = self.nominal_energy(session.uav_id)
             if session.uav_id not in self.lists.known:
                 self.report.search_over = True
                 self.log.write('info', f'found {session.uav_id}: {session.executor.profile.name}')

@@ -13,6 +13,7 @@ from uav_task_alloc.sim.config import VehicleConfig
 from uav_task_alloc.sim.wind import WindAtVehicle, held_velocity
 
 _CORNER = 1.0  # [m] largest overshoot of a turn
+_CLIMB = 1.5  # metres of level flight that drain as much as a climb of one metre adds
 _HOVER = 0.25  # share of cruise speed whose battery drain equals that of hovering
 _LEAN_RESERVE = 1.3  # airspeed at the largest lean angle, as a multiple of cruise speed
 _BRAKING = 0.7  # share of the acceleration used to plan braking
@@ -65,7 +66,8 @@ class PointMass:
         config, (vx, vy, vz) = self._config, self.velocity
         wx, wy = (0.0, 0.0) if self._wind is None else self._wind.velocity
         airspeed = _norm((vx - wx, vy - wy, vz))
-        drain = max(airspeed, _HOVER * config.cruise_speed) * dt / config.range
+        drain = (max(airspeed, _HOVER * config.cruise_speed)
+                 + _CLIMB * max(0.0, vz)) * dt / config.range
         self.battery = max(0.0, self.battery - max(drain, dt / config.endurance))
 
     def fall(self, dt: float, speed: float) -> None:

@@ -11,6 +11,7 @@ from hostile_streams import stream
 from mission_bench import ORIGIN, make_vehicle
 from pymavlink.dialects.v20 import ardupilotmega as d
 
+from uav_task_alloc.mavlink.gcs.energy_estimate import NominalEnergy
 from uav_task_alloc.mavlink.gcs.ground_station import GcsConfig, GroundStation
 from uav_task_alloc.mavlink.gcs.policy import Policy
 from uav_task_alloc.mavlink.gcs.status import PublishedStates, state_of
@@ -85,7 +86,8 @@ class Bridge:
             self.connections.step(self.now)
             self.step_at = self.now + 0.02
         for session in self.ground_station.sessions.values():
-            status = state_of(session, self.now, 20_000.0)
+            session.executor.energy.nominal = NominalEnergy(20_000.0)
+            status = state_of(session, self.now)
             self.published.is_due(status, session.executor.telemetry.position_at, self.now, 5.0)
             diagnostics_of(session, self.now)
             self.states |= {status.mission_state.name, status.authority.name}

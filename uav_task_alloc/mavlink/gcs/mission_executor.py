@@ -36,6 +36,7 @@ from uav_task_alloc.mavlink.gcs.status_text_log import StatusTextLog
 from uav_task_alloc.mavlink.gcs.takeoff import Takeoff
 from uav_task_alloc.mavlink.gcs.task_events import passed_over, task_events
 from uav_task_alloc.mavlink.gcs.telemetry import Telemetry
+from uav_task_alloc.mavlink.gcs.vehicle_energy import VehicleEnergy
 from uav_task_alloc.mavlink.gcs.vehicle_fence import FenceMemory, VehicleFence
 from uav_task_alloc.mavlink.mission.first_leg import LegStart
 from uav_task_alloc.mavlink.mission.flown_path import PositionSample
@@ -82,6 +83,7 @@ class MissionExecutor:
         self.watch = AuthorityWatch(profile, self.telemetry, evidence, lambda: self.policy,
                                     now, record, save)
         self.authority = self.watch.authority
+        self.energy = VehicleEnergy(self.telemetry, self.onboard)
         self.events: deque[TaskProgress] = deque()
         self.notes: deque[OperatorNote] = deque()
         self._rates = MessageRates(peer, self.telemetry, now)
@@ -198,6 +200,8 @@ class MissionExecutor:
             self.watch.vehicle_rebooted(now)
             self.onboard.resume.rebooted()
             self._start_over(now)
+        if newest:
+            self.energy.receive(message)
         if message.get_type() == 'HEARTBEAT' and newest:
             self.watch.receive_heartbeat(message, now)
             if self.telemetry.mode is ModeFunction.MISSION:
@@ -225,15 +229,10 @@ class MissionExecutor:
         return allowed_messages(messages, self.watch, now)
 
     def _act(self, now: float) -> list[Message]:
-        out: list[Message] = []
         self._report(now)  # the marks are saved with the current item that is past their tasks
         self.watch.step(now)
         self.onboard.complete_flown(now)
-        for rule in self._rules:
-            step = rule(now)
-            if step is not None:
-                out = step
-                break
+        out = next((step for rule in self._rules if (step := rule(now)) is not None), [])
         out = self.fence.step(now) + out
         self._report(now)
         return out
@@ -297,6 +296,7 @@ class MissionExecutor:
     def _start_over(self, now: float) -> None:
         self.onboard.restarted()
         self.fence.restart()
+        self.energy.restart()
         self.sender.reset(now)
         self._rates.restart(now)
 

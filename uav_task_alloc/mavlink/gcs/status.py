@@ -67,6 +67,8 @@ class UavStatus:
     return_height: float = math.nan  # [m] above home that its own return climbs to, at least
     takeoff_height: float = math.nan  # [m] above home to which the bridge takes off
     fence: FenceState = FenceState.OFF  # of the fence on board
+    endurance: float = math.nan  # [s] in the air
+    full_range: float = math.nan  # [m] with a full battery
 
     @property
     def urgent(self) -> tuple[object, ...]:
@@ -129,13 +131,12 @@ def why_not_available(executor: MissionExecutor, now: float) -> str:
     return ''
 
 
-def state_of(session: VehicleSession, now: float, full_range: float = 0.0) -> UavStatus:
+def state_of(session: VehicleSession, now: float) -> UavStatus:
     """Return the status of a vehicle.
 
     Args:
         session: the vehicle.
         now: steady time [s].
-        full_range: [m] with a full battery; 0: unknown.
 
     Returns:
         Values for UavState; the position is of the last valid report.
@@ -145,14 +146,15 @@ def state_of(session: VehicleSession, now: float, full_range: float = 0.0) -> Ua
     reason = session.fault or why_not_available(executor, now)
     authority = executor.authority
     owner = AuthorityState.UNKNOWN if authority.undecided else authority.state
+    limits = executor.energy.limits_now(now)
     return UavStatus(
         session.uav_id, telemetry.position, telemetry.velocity, telemetry.home,
-        telemetry.battery, full_range * telemetry.battery if full_range > 0.0 else math.nan,
-        not reason, mode, onboard.state, active_task(executor), onboard.revision, owner, reason,
+        telemetry.battery, limits.range, not reason, mode, onboard.state,
+        active_task(executor), onboard.revision, owner, reason,
         HOLD_RADIUS if executor.profile.rules.loiters else 0.0,
         executor.fence.parameters.return_height,
         executor.policy.cruise_altitude if executor.policy.takeoff else math.nan,
-        executor.fence.state)
+        executor.fence.state, limits.endurance, limits.full_range)
 
 
 class PublishedStates:

@@ -91,8 +91,7 @@ def to_zones(msg: m.ThreatZoneArray, previous: Iterable[ThreatZone],
 
 
 def from_uav_status(status: UavStatus, capabilities: Iterable[str], stamp: float,
-                    limits: Mapping[str, float] | None = None,
-                    full_range: float = 0.0) -> m.UavState:
+                    limits: Mapping[str, float] | None = None) -> m.UavState:
     """Return the state of one UAV as a message.
 
     Args:
@@ -100,7 +99,6 @@ def from_uav_status(status: UavStatus, capabilities: Iterable[str], stamp: float
         capabilities: from the parameter of that name.
         stamp: [s] of the position.
         limits: of this UAV from the parameter `uav_limits`; None: none.
-        full_range: [m] with a full battery; 0: unknown.
 
     Returns:
         For the topic `uav_states`; what the bridge does not know is NaN.
@@ -108,9 +106,8 @@ def from_uav_status(status: UavStatus, capabilities: Iterable[str], stamp: float
     known = {} if limits is None else dict(limits)
     speed = known.pop('cruise_speed', math.nan)
     known.setdefault('hold_radius', status.hold_radius)
-    known |= {'return_height': status.return_height, 'takeoff_height': status.takeoff_height}
-    if 'endurance' in known:
-        known['endurance'] *= status.battery  # NaN where that is unknown
+    known |= {'return_height': status.return_height, 'takeoff_height': status.takeoff_height,
+              'endurance': status.endurance, 'full_range': status.full_range}
     return m.UavState(
         header=header(stamp), uav_id=status.uav_id, position=to_point(status.position),
         velocity=Vector3(x=status.velocity[0], y=status.velocity[1], z=status.velocity[2]),
@@ -120,8 +117,7 @@ def from_uav_status(status: UavStatus, capabilities: Iterable[str], stamp: float
         mission_state=status.mission_state.value, active_task_id=status.active_task,
         list_revision=status.list_revision, authority=status.authority.value,
         fence_state=status.fence.value, reason=status.reason,
-        **{**dict.fromkeys(REPORTED_LIMITS, math.nan), 'full_range': full_range or math.nan,
-           **known})
+        **{**dict.fromkeys(REPORTED_LIMITS, math.nan), **known})
 
 
 def from_progress(uav_id: str, progress: TaskProgress, stamp: float) -> m.TaskEvent:
