@@ -169,8 +169,8 @@ class AllocatorParams(FrameParams):
                                  'cannot fly the first.', low=0.0, high=3600.0, unit='s')
     locked_tasks: int = param(1, 'Tasks of a list that stay with a UAV in flight: the active '
                               'one, and those after it.', low=0, high=1000)
-    battery_reserve: float = param(0.2, 'Battery below which a UAV goes home and its tasks go to '
-                                   'the others.', low=0.0, high=0.9)
+    battery_reserve: float = param(0.2, 'Battery that no plan uses: a UAV turns home while it '
+                                   'lasts for the way home and this.', low=0.0, high=0.9)
     position_jump: float = param(200.0, 'Distance between two reports above which the jump is '
                                  'logged and replanned for.', low=1.0, high=1e7, unit='m')
     max_attempts: int = param(3, 'UAVs that may fail at a task before it is FAILED.', low=1,
@@ -243,7 +243,7 @@ class BridgeParams(FrameParams):
                           '`~/hand_over`, or the bridge.', choices=('operator', 'automatic'))
     state_dir: str = param('', 'Folder for authority, holds and fences; empty: none.', fixed=True)
     capabilities: tuple[str, ...] = param((), 'What UAVs can do, `uav_1:camera`.', fixed=True)
-    full_range: float = param(0.0, 'Range of a full battery; 0: unknown, range_remaining is NaN.',
+    full_range: float = param(0.0, 'Range of a full battery, until a flight shows it; 0: unknown.',
                               low=0.0, high=MAX_RANGE, unit='m')
     full_ranges: tuple[str, ...] = param(
         (), 'The same for single UAVs that differ, `uav_1:6000` each.', fixed=True)

@@ -9,6 +9,7 @@ import math
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
+from uav_task_alloc.allocator.battery_watch import BatteryWatch
 from uav_task_alloc.allocator.persistence import unsaved_rows
 from uav_task_alloc.allocator.records import (
     Allocation,
@@ -76,6 +77,7 @@ class Allocator:
         self.world = World(params, saved, make_safe_paths, self.schedule.add_trigger)
         self.approvals = Approvals(self.world)
         self.separation = SeparationWatch(self.world)
+        self.batteries = BatteryWatch(self.world)
         self._best = Plan({each.uav: each.task_ids for each in saved.lists})
         self._learned = saved.learned
         self._learned_saved = now  # [s]
@@ -104,6 +106,7 @@ class Allocator:
         world = self.world
         self._watch_clock(now, stamp)
         world.tick(now)
+        self.batteries.tick(now, stamp)
         self._end_orders(stamp)
         world.publish(world.shortened_lists(stamp), stamp)
         world.publish(world.lists_to_resend(stamp), stamp, resend=True)

@@ -15,6 +15,7 @@ from uav_task_alloc.record.message_records import BATTERY_RESERVE, ORDER, UAV_WA
 
 _MAX_NAMED = 20  # UAVs in a warning
 _MAX_ORDERS = 50  # in the diagnostics, the newest
+_TURN = 'turn home '  # key: the last moment for it, with the id of a UAV
 _MAX_STRANDED = 5  # warnings of UAVs without a safe path home
 
 
@@ -142,13 +143,15 @@ def _zone_warnings(world: World) -> list[tuple[str, str]]:
 
 
 def health_values(world: World, solving: bool,
-                  near: Mapping[str, str] | None = None) -> dict[str, object]:
+                  near: Mapping[str, str] | None = None,
+                  turns: Mapping[str, str] | None = None) -> dict[str, object]:
     """Return numbers of UAVs, tasks and zones, and the revision in force, by name.
 
     Args:
         world: of the allocator.
         solving: a plan is being computed.
         near: UAVs that would lose separation, by id; None: none.
+        turns: last moments to turn home, by id; None: none.
 
     Returns:
         Counts of UAVs, zones and of tasks by state; the revision of the allocation; what is wrong
@@ -160,6 +163,8 @@ def health_values(world: World, solving: bool,
     for uav_id, text in _zone_warnings(world):
         warnings[uav_id] = '; '.join(filter(None, (warnings.get(uav_id), text)))
     return {**{f'{UAV_WARNING}{uav_id}': text for uav_id, text in warnings.items()},
+            **{f'{_TURN}{uav_id}': text
+               for uav_id, text in list((turns or {}).items())[:_MAX_NAMED]},
             **{f'{ORDER}{order.id}': f'{order.text} ({order.operator})' for order in orders},
             'orders in force': len(world.orders.in_force),
             'UAVs known': len(world.uav_records()),

@@ -335,7 +335,8 @@ class AllocatorNode(Node):
                                    self.stamp())
         self.diagnostics.publish(from_diagnostics([allocator_row(
             self.get_fully_qualified_name(), [stopped] if stopped else warnings,
-            {**health_values(self.world, self.core.schedule.busy, self.core.separation.texts()),
+            {**health_values(self.world, self.core.schedule.busy, self.core.separation.texts(),
+                             self.core.batteries.texts(self.stamp())),
              **self.election.facts()},
             bool(stopped))], self.stamp()))
 

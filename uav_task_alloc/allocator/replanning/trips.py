@@ -94,7 +94,7 @@ def waiting_uavs(world: World, stamp: float) -> dict[str, Uav]:
             continue
         uav = world.uav(uav_id)
         found[uav_id] = replace(
-            uav, position=record.home, range=report.full_range,
+            uav, position=record.home, range=uav.full_range or 0.0,
             endurance=math.inf if uav.full_endurance is None else uav.full_endurance,
             available_from=max(1.0, landed + report.turnaround - stamp))
     return found

@@ -12,6 +12,7 @@ from uav_task_alloc.model import Point, Task, Uav
 from uav_task_alloc.params import AllocatorParams
 
 _FASTEST = 10.0  # times the cruise speed: faster is a jump, in accelerated simulations too
+LEAST_ENDURANCE = 1.0  # [s] of a UAV that has none left
 _RECHARGED = 0.1  # [0..1] above the reserve: a battery that was low is good again
 
 
@@ -28,6 +29,7 @@ class UavRecord:
     blocked_on_ground: str = ''  # why it gets no tasks: it or its home is inside a zone
     battery: float | None = None  # [0..1] last reported
     low: bool = False  # the battery was below the reserve and is not recharged
+    turned: bool = False  # its battery required the way home; until it is on the ground
     jumped: float = -math.inf  # [s] steady clock: the position last jumped
 
     @property
@@ -82,11 +84,12 @@ class Fleet:
         """
         uav_id, before = report.uav_id, self.records.get(report.uav_id)
         battery, low = _battery(before, report.battery, reserve)
+        turned = before is not None and before.turned and not report.standby
         if report.active_task:
             self.active[uav_id] = report.active_task
         self.records[uav_id] = UavRecord(
             report, now, report.home or (before.home if before else report.position),
-            battery=battery, low=low)
+            battery=battery, low=low or turned, turned=turned)
         if before:
             self.records[uav_id] = replace(
                 self.records[uav_id], zone=before.zone, home_zone=before.home_zone,
@@ -107,6 +110,10 @@ class Fleet:
             self.records[uav_id] = replace(self.records[uav_id], silent=True)
             self.active.pop(uav_id, None)
         return lost
+
+    def turn(self, uav_id: str) -> None:
+        """Send a UAV in flight home: its battery lasts for that, and for the reserve."""
+        self.records[uav_id] = replace(self.records[uav_id], low=True, turned=True)
 
     def set_jumped(self, uav_id: str, now: float) -> None:
         """Record that the position jumped."""
@@ -151,24 +158,54 @@ class Fleet:
                 and uav_id not in self.switched_off]
 
     def uav(self, uav_id: str, params: AllocatorParams) -> Uav:
-        """Return a UAV for the solver; an unknown range or speed is that of the parameters."""
+        """Return a UAV for the solver; an unknown range or speed is that of the parameters.
+
+        Range and endurance are those above the reserve of its battery.
+        """
         record = self.records[uav_id]
-        report = record.report
+        report, reserve = record.report, params.battery_reserve
+        metres, seconds = above_reserve(report, record.battery, reserve)
+        full = 1.0 if record.battery is None else 1.0 - reserve
+        full_seconds = _full_endurance(report)
         return Uav(uav_id, report.position,
-                   range=params.default_range if report.range is None else report.range,
+                   range=params.default_range if metres is None else metres,
                    cruise_speed=report.cruise_speed or params.default_cruise_speed,
                    capabilities=report.capabilities, home=record.home,
                    climb_speed=report.climb_speed or params.default_climb_speed,
                    descent_speed=report.descent_speed or params.default_descent_speed,
-                   endurance=report.endurance or math.inf,
+                   endurance=math.inf if seconds is None else seconds,
                    payload_capacity=report.payload_capacity or 0.0,
-                   full_range=report.full_range, turnaround=report.turnaround or math.inf,
-                   full_endurance=_full_endurance(report))
+                   full_range=report.full_range and full * report.full_range,
+                   turnaround=report.turnaround or math.inf,
+                   full_endurance=full_seconds and full * full_seconds)
 
     def may_fly(self, uav_id: str, task: Task, failed_on: Iterable[str]) -> bool:
         """Return whether a known UAV may be given a task, see `may_fly`, and orders allow it."""
         return self.orders.allows(uav_id, task.id) and may_fly(
             task, failed_on, self.records[uav_id].report)
+
+
+def above_reserve(report: UavReport, battery: float | None,
+                  reserve: float) -> tuple[float | None, float | None]:
+    """Return what a UAV may fly before its battery is down to the reserve.
+
+    Args:
+        report: with its range, endurance and range with a full battery.
+        battery: [0..1]; None: unknown, and all that it reports may be flown.
+        reserve: [0..1].
+
+    Returns:
+        Metres and seconds; None where they are not known.
+    """
+    if battery is None:
+        return report.range, report.endurance
+    share = max(0.0, 1.0 - reserve / max(battery, 1e-6))
+    metres = None if report.range is None else share * report.range
+    if report.range and report.full_range:
+        metres = max(0.0, report.range - reserve * report.full_range)
+        share = metres / report.range
+    return metres, None if report.endurance is None else max(LEAST_ENDURANCE,
+                                                              share * report.endurance)
 
 
 def _full_endurance(report: UavReport) -> float | None:

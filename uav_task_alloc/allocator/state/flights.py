@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from uav_task_alloc.allocator.records import UavReport
-from uav_task_alloc.allocator.state.fleet import Fleet
+from uav_task_alloc.allocator.state.fleet import LEAST_ENDURANCE, Fleet
 from uav_task_alloc.allocator.state.flight_pace import (
     FlightPace,
     UavFlight,
@@ -34,8 +34,7 @@ _SHORT = 10.0  # [s] a shorter leg has the relative error of one of that time
 _USED = 0.95  # charge of a battery below which it may be changed
 OVERDUE = 3.0  # times its turnaround after which nobody seems to change the battery of a UAV
 _RETURN_HEIGHT = 60.0  # [m] above home: RTL_RETURN_ALT of PX4; RTL_ALT of ArduPilot is 15 m
-_CONTINGENCY = 0.05  # of the endurance with a full battery
-_LEAST = 1.0  # [s] endurance of a UAV that has none left
+_CONTINGENCY = 0.05  # of the endurance with a full battery, where no reserve is known
 _TAKEOFF = 4.0  # [s] from the command until it climbs at its rate: arming, spooling up
 
 
@@ -247,7 +246,7 @@ class Flights:
         A vehicle climbs before it flies. It returns at the height of its tasks or that of its
         return mode, if that is more, and comes down over its home. A leg counts the slower of its
         horizontal and its vertical motion only. _CONTINGENCY is for what no plan foresees, such
-        as an upload on the way.
+        as an upload on the way; where the charge is known the reserve is for that.
 
         Args:
             uav: with its endurance.
@@ -266,10 +265,12 @@ class Flights:
             down = (most - height) / uav.climb_speed + most / uav.descent_speed
         up = self.pace(uav.id).takeoff + height / uav.climb_speed
         full = uav.full_endurance
-        down += _CONTINGENCY * (uav.endurance if full is None else full)
+        if self._fleet.records[uav.id].battery is None:
+            down += _CONTINGENCY * (uav.endurance if full is None else full)
+        left = uav.endurance - down - (up if uav.at_base else 0.0)
         return replace(
-            uav, endurance=max(_LEAST, uav.endurance - down - (up if uav.at_base else 0.0)),
-            full_endurance=None if full is None else max(_LEAST, full - up - down))
+            uav, endurance=max(LEAST_ENDURANCE, left),
+            full_endurance=None if full is None else max(LEAST_ENDURANCE, full - up - down))
 
     def _planned(self, report: UavReport) -> FlightPace:
         params = self._params()

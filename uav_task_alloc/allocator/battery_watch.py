@@ -1,0 +1,113 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The last moment to turn home of each UAV in flight: what its battery has above the reserve."""
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+
+from uav_task_alloc.allocator.state.fleet import UavRecord, above_reserve
+from uav_task_alloc.allocator.state.flight_pace import UavFlight, finish_time
+from uav_task_alloc.allocator.state.world import World
+from uav_task_alloc.geometry.polyline import polyline_length
+from uav_task_alloc.model import Point
+
+_PERIOD = 1.0  # [s] steady clock between two checks
+_CLOSE = 60.0  # [s] before the last moment in which the way home is searched for at each check
+_SEARCH = 20.0  # [s] between two searches before that
+_ASK_AGAIN = 5.0  # [s] between two plans that are requested for one UAV
+_EXCESS = 0.02  # share by which a list may be beyond what is left: the next plan changes it
+_TOLERANCE = 1.0  # [m]
+
+
+class BatteryWatch:
+    """Turns UAVs home in time, and requests plans for lists that a battery no longer carries.
+
+    Args:
+        world: of the allocator.
+    """
+
+    def __init__(self, world: World) -> None:
+        self._world = world
+        self.turns: dict[str, float] = {}  # [s] published clock: the last moment, by UAV
+        self._checked = -math.inf  # [s] steady clock
+        self._ways: dict[str, tuple[Point, float, float]] = {}  # from where, metres, when
+        self._asked: dict[str, float] = {}  # [s] steady clock
+
+    def tick(self, now: float, stamp: float) -> None:
+        """Check all UAVs in flight; `now` [s] steady, `stamp` [s] published clock."""
+        world = self._world
+        if now - self._checked < _PERIOD or not world.kernels_ready:
+            return
+        self._checked = now
+        turns: dict[str, float] = {}
+        for uav_id, record in world.uav_records().items():
+            flight = world.flights.of(uav_id, stamp)
+            left = self._seconds_left(record, flight, now) if flight else None
+            if left is None or flight is None:
+                continue
+            turns[uav_id] = stamp + left
+            if record.low:
+                continue
+            if left < 0.0:
+                world.fleet.turn(uav_id)
+                world.note(f'{uav_id} turns home: the last moment by its battery '
+                           f'({100.0 * (record.battery or 0.0):.0f} %)', warning=True)
+                world.request_replan(f'{uav_id} turns home', now)
+            elif now - self._asked.get(uav_id, -math.inf) >= _ASK_AGAIN and (
+                    self._list_exceeds(record, flight, stamp)):
+                self._asked[uav_id] = now
+                world.request_replan(f'the battery of {uav_id} does not last for its list', now)
+        self.turns = turns
+
+    def texts(self, stamp: float) -> dict[str, str]:
+        """Return the last moment of each UAV in flight for operators; `stamp` as of `tick`."""
+        return {uav_id: f'at {turn:.0f} s, in {turn - stamp:.0f} s'
+                for uav_id, turn in sorted(self.turns.items())}
+
+    def _seconds_left(self, record: UavRecord, flight: UavFlight, now: float) -> float | None:
+        """[s] until it has to turn; None: it is on the ground, or its range is not known."""
+        report = record.report
+        if report.standby or record.silent or report.range is None or record.battery is None:
+            self._ways.pop(report.uav_id, None)
+            return None
+        metres, seconds = above_reserve(report, record.battery,
+                                        self._world.params.battery_reserve)
+        assert metres is not None  # the range is known
+        speed = flight.pace.mean_speed
+        for search in (False, True):
+            way = self._way_home(record, now, search)
+            left = (metres + _TOLERANCE - way) / speed
+            if seconds is not None:
+                left = min(left, seconds + _TOLERANCE - way / speed)
+            if left > _CLOSE:
+                break
+        return left
+
+    def _way_home(self, record: UavRecord, now: float, search: bool) -> float:
+        """[m] of a safe way home: at most the last one found and the way since then."""
+        report, known = record.report, self._ways.get(record.report.uav_id)
+        if known is not None and not search and now - known[2] < _SEARCH:
+            return known[1] + math.dist(report.position, known[0])
+        leg = self._world.paths().leg(report.position, record.home)
+        metres = math.dist(report.position, record.home) if leg is None else leg.length
+        self._ways[report.uav_id] = report.position, metres, now
+        return metres
+
+    def _list_exceeds(self, record: UavRecord, flight: UavFlight, stamp: float) -> bool:
+        """Whether the battery does not last for the rest of the list."""
+        world, report = self._world, record.report
+        uav_list = world.list_of(report.uav_id)
+        metres, seconds = above_reserve(report, record.battery, world.params.battery_reserve)
+        if not uav_list.stops or metres is None:
+            return False
+        first = uav_list.stops[0]
+        length = world.paths().rest(report.position, first.leg, first.task.position) or 0.0
+        length += math.fsum(polyline_length((a.task.position, *b.leg.via, b.task.position))
+                            for a, b in pairwise(uav_list.stops))
+        if uav_list.returns:
+            length += polyline_length((uav_list.stops[-1].task.position, *uav_list.end_via,
+                                       record.home))
+        if length > (1.0 + _EXCESS) * metres:
+            return True
+        finish = finish_time(world.lists.restamped(report.uav_id, stamp, flight), flight)
+        return seconds is not None and finish > (1.0 + _EXCESS) * seconds
