@@ -53,7 +53,7 @@ ORIGIN = Origin(47.397742, 8.545594, 488.0)
 STEP, REPORT, ROUNDS = 0.25, 1.0, 5  # [s], [s], rounds of bees in one solve
 RESERVE, HEIGHT, TASKS = 0.2, 40.0, 30  # share, [m], in one flight
 LIMIT = 7200.0  # [s] after which a flight counts as lost
-STOP = 2.5  # [m/s2] of the planned stops
+STOP, DESCENT = 2.5, 1.5  # [m/s2] of the planned stops, [m/s]
 CLIMB_ENERGY = 1.6  # metres of level flight that a climb of one metre costs more
 
 
@@ -126,7 +126,7 @@ class Oracle:
             np.array(rows), np.array(drains),
             rcond=None)[0]
 
-    def limits(self, ahead: FlownAmount, speed: float) -> EnergyLimits:
+    def limits(self, ahead: FlownAmount, speed: float, landing: float) -> EnergyLimits:
         """Range and endurance down to the reserve, and that for the reserve."""
         truth, charge = self.conditions, self.body.battery
         sag = truth.sag
@@ -137,9 +137,10 @@ class Oracle:
         level, cruise = self.time / speed + self.metre, ahead.metres / speed
         share = 1.0 if ahead.seconds <= 0.0 else min(1.0, cruise / ahead.seconds)
         power, full = self.time + self.metre * speed * share, 1.0 / level
-        metres = max(1.0, usable / level)
+        metres = max(1.0, (usable - landing * self.time) / level)
         whole = metres + RESERVE * full
-        return EnergyLimits(whole, max(1.0, usable / power) * whole / metres, full)
+        seconds = max(1.0, usable / power)
+        return EnergyLimits(whole, seconds * whole / metres, full)
 
 
 def solve(*world: object, max_iterations: int | None, **how: object) -> Plan:
@@ -154,7 +155,7 @@ class Flight:
     def __init__(self, conditions: Conditions, oracle: bool) -> None:
         self.conditions, self.now, self.completed = conditions, 0.0, 0
         config = VehicleConfig('uav_1', 1, ORIGIN, (0.0, 0.0, 0.0), climb_rate=2.5,
-                               descent_rate=1.5, cruise_speed=conditions.speed,
+                               descent_rate=DESCENT, cruise_speed=conditions.speed,
                                wind=conditions.wind)
         self.body = Body(conditions, config)
         self.estimate = EnergyEstimate(NominalEnergy(conditions.full_range, 0.0,
@@ -183,20 +184,24 @@ class Flight:
                 break
         return self
 
-    def ahead(self) -> FlownAmount:
-        """The rest of the list, and the way home."""
+    def ahead(self) -> tuple[FlownAmount, float]:
+        """The rest of the list, the way home and the landing, and the time of that [s]."""
         points, hover = [self.body.position], 0.0
         for stop in self.list.stops if self.list else ():
             points += [*stop.leg.via, stop.task.position]
             hover += stop.task.service_time + self.speed / STOP
-        return planned_amount([*points, (0.0, 0.0, 0.0)], self.speed, hover)
+        landing = points[-1][2] / DESCENT
+        return planned_amount([*points, (0.0, 0.0, 0.0)], self.speed, hover + landing), landing
 
     def limits(self) -> EnergyLimits | None:
         """The limits to report; None: stated ones."""
         if self.oracle:
-            return self.oracle.limits(self.ahead(), self.speed)
-        return self.estimate.limits(self.ahead(), self.speed, DEVIATIONS) if (
-            self.estimate.known) else None
+            ahead, landing = self.ahead()
+            return self.oracle.limits(ahead, self.speed, landing)
+        if not self.estimate.known:
+            return None
+        ahead, landing = self.ahead()
+        return self.estimate.limits(ahead, self.speed, DEVIATIONS, landing)
 
     def report(self) -> None:
         """Read the battery, report to the allocator, and let it plan."""
@@ -209,7 +214,7 @@ class Flight:
             range=max(1.0, found.range) if found else stated * charge,
             endurance=max(1.0, found.endurance) if found else None,
             full_range=found.full_range if found else stated, battery=charge,
-            cruise_speed=self.conditions.speed, climb_speed=2.5, descent_speed=1.5,
+            cruise_speed=self.conditions.speed, climb_speed=2.5, descent_speed=DESCENT,
             active_task=self.list.stops[0].task.id if self.airborne and self.list and (
                 self.list.stops) else '', standby=not self.airborne), self.now, self.now)
         self.core.tick(self.now, self.now)
@@ -238,8 +243,8 @@ class Flight:
         body.step(STEP, self.way[0] if self.way else body.position, speed, 0.0)
         vx, vy, vz = body.velocity
         ground = math.hypot(vx, vy)
-        if ground > max(0.5 * self.speed, 2.0 * abs(vz)):
-            self.speed += 0.02 * STEP * 5.0 * (ground - self.speed)
+        if ground > max(0.75 * self.speed, 2.0 * abs(vz)):
+            self.speed += STEP / 30.0 * (ground - self.speed)
         self.estimate.flew(FlownAmount(STEP, ground * STEP, max(0.0, vz) * STEP, vx * STEP,
                                        vy * STEP))
         if self.way and math.dist(body.position, self.way[0]) < 2.0:

@@ -74,11 +74,12 @@ class BatteryWatch:
                                         self._world.params.battery_reserve)
         assert metres is not None  # the range is known
         speed = flight.pace.mean_speed
+        landing = max(0.0, report.position[2] - record.home[2]) / flight.pace.descent
         for search in (False, True):
             way = self._way_home(record, now, search)
             left = (metres + _TOLERANCE - way) / speed
             if seconds is not None:
-                left = min(left, seconds + _TOLERANCE - way / speed)
+                left = min(left, seconds + _TOLERANCE - way / speed - landing)
             if left > _CLOSE:
                 break
         return left

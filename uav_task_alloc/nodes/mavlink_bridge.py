@@ -161,6 +161,7 @@ class MavlinkBridge(Node):
 
     def publish_state(self, session: VehicleSession, now: float) -> None:
         """Publish the state of a UAV where it is due."""
+        session.executor.energy.nominal = self.nominal_energy(session.uav_id)
         with self.lock:
             status = state_of(session, now)
         measured_at = session.executor.telemetry.position_at
@@ -196,7 +197,6 @@ class MavlinkBridge(Node):
                                              fence_area=self.fence_area, rally=self.rally)
         for session in list(self.ground_station.sessions.values()):
             session.executor.policy = policy
-            session.executor.energy.nominal = self.nominal_energy(session.uav_id)
             if session.uav_id not in self.lists.known:
                 self.report.search_over = True
                 self.log.write('info', f'found {session.uav_id}: {session.executor.profile.name}')

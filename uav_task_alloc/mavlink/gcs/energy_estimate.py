@@ -102,8 +102,8 @@ def planned_amount(points: Sequence[Point], speed: float, hover: float = 0.0) ->
 class EnergyLimits:
     """What a battery still allows, and would allow if it were full."""
 
-    range: float  # [m] level flight, after what climbs and the wind on the way home take
-    endurance: float  # [s] in the air, with the share of hovering that the plan has
+    range: float  # [m] level flight, after what climbs, wind on the way home and landing take
+    endurance: float  # [s] in the air until it has landed, hovering as much as the plan does
     full_range: float  # [m]
 
 
@@ -221,13 +221,15 @@ class EnergyEstimate:
                      share + _STEP) - float(amount.row() @ self._x)
         return charge - deviations * math.sqrt(max(0.0, float(row @ self._cov @ row)))
 
-    def limits(self, ahead: FlownAmount, speed: float, deviations: float) -> EnergyLimits:
+    def limits(self, ahead: FlownAmount, speed: float, deviations: float,
+               landing: float = 0.0) -> EnergyLimits:
         """Return range and endurance of flights that end where the planned one ends.
 
         Args:
-            ahead: of the plan, to its end.
+            ahead: of the plan, to the ground.
             speed: over ground in level flight [m/s].
             deviations: standard deviations of safety.
+            landing: [s] of `ahead` over the end, down to the ground.
 
         Returns:
             Such that a flight within both uses no more than there is.
@@ -241,4 +243,5 @@ class EnergyEstimate:
         usual = ahead.metres * level + (ahead.seconds - cruise) * float(self._x[_TIME])
         fixed = expected - usual  # climbs and wind
         charge = self.charge_after(ahead, deviations) + expected - fixed
-        return EnergyLimits(max(0.0, charge / level), max(0.0, charge / power), 1.0 / level)
+        metres = (charge - landing * max(0.0, float(self._x[_TIME]))) / level
+        return EnergyLimits(max(0.0, metres), max(0.0, charge / power), 1.0 / level)

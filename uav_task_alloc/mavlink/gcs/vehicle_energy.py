@@ -20,8 +20,10 @@ from uav_task_alloc.model import Point
 DEVIATIONS = 1.0  # of what is left: by that much less is published than is expected
 _LONGEST = 2.0  # [s] between two positions that their velocity still describes
 _FASTEST = 100.0  # [m/s] a larger displacement is a jump of the position
-_LEVEL = 0.5  # share of the horizontal in a velocity above which it is level flight
-_SMOOTHING = 0.02  # weight of a new speed
+_LEVEL = 0.5  # largest rise of level flight over its horizontal speed
+_SMOOTHING = 30.0  # [s] in which a new speed counts as much as those before
+_STEADY = 0.75  # share of the speed below which a UAV brakes, turns or sets out
+_DESCENT = 1.5  # [m/s] WPNAV_SPEED_DN, MPC_Z_V_AUTO_DN
 _STOP_ACCELERATION = 2.5  # [m/s2] WPNAV_ACCEL: the time of a stop is spent near hovering
 _PERIOD = 0.5  # [s] between two published limits
 _LEAST = 1.0  # [m] and [s] published where there is nothing left
@@ -87,16 +89,16 @@ class VehicleEnergy:
         speed = math.hypot(vx, vy)
         if math.hypot(speed, vz) > _FASTEST:
             vx = vy = vz = speed = 0.0
-        self._note_speed(speed, vz)
+        self._note_speed(speed, vz, seconds)
         amount = FlownAmount(seconds, speed * seconds, max(0.0, vz) * seconds, vx * seconds,
                              vy * seconds)
         for each in self.batteries.values():
             each.flew(amount)
 
-    def _note_speed(self, speed: float, rise: float) -> None:
-        least = 0.5 * (self._speed or self.nominal.cruise)
-        if speed > max(least, abs(rise) / _LEVEL):
-            self._speed += (speed - self._speed) * (_SMOOTHING if self._speed else 1.0)
+    def _note_speed(self, speed: float, rise: float, seconds: float) -> None:
+        usual = self._speed or self.nominal.cruise
+        if speed > max(_STEADY * usual, abs(rise) / _LEVEL):
+            self._speed = usual + (speed - usual) * min(1.0, seconds / _SMOOTHING)
 
     @property
     def limits(self) -> EnergyLimits | None:
@@ -106,9 +108,9 @@ class VehicleEnergy:
                 each.known for each in self.batteries.values()):
             return None
         speed = self._speed or self.nominal.cruise
-        ahead = self._ahead(speed)
-        return min((each.limits(ahead, speed, DEVIATIONS) for each in self.batteries.values()),
-                   key=lambda limits: limits.range)
+        ahead, landing = self._ahead(speed)
+        return min((each.limits(ahead, speed, DEVIATIONS, landing)
+                    for each in self.batteries.values()), key=lambda limits: limits.range)
 
     def limits_now(self, now: float) -> EnergyLimits:
         """The limits as published: stated ones times the charge until the flight has shown them.
@@ -129,8 +131,8 @@ class VehicleEnergy:
                             (nominal.endurance or math.nan) * battery,
                             nominal.full_range or math.nan)
 
-    def _ahead(self, speed: float) -> FlownAmount:
-        """The rest of the list, and the way home."""
+    def _ahead(self, speed: float) -> tuple[FlownAmount, float]:
+        """The rest of the list, the way home and the landing, and the time of that [s]."""
         telemetry, onboard = self._telemetry, self._onboard
         points, hover = [telemetry.position], 0.0
         if onboard.tasks is not None:
@@ -139,6 +141,7 @@ class VehicleEnergy:
                 points += [*stop.via, stop.task.position]
                 hover += stop.task.service_time + stop.wait + speed / _STOP_ACCELERATION
             points += tasks.end_via if tasks.returns else ()
-        if telemetry.home is not None:
-            points.append(telemetry.home)
-        return planned_amount(points, speed, hover)
+        home = telemetry.home or telemetry.position
+        points.append(home)
+        landing = max(0.0, points[-2][2] - home[2]) / _DESCENT
+        return planned_amount(points, speed, hover + landing), landing
