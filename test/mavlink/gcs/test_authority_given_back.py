@@ -212,6 +212,21 @@ def test_without_the_last_reached_the_end_is_a_loss(kind):
 
 
 @PX4
+def test_the_end_of_the_mission_before_explains_no_hold_once_it_flies_the_next(kind):
+    bench = flying(kind, 'AB')
+    assert bench.run(lambda: bench.vehicles[1].mode.name == 'HOLD', 60.0)
+    bench.run(limit=0.4)
+    bench.assign(task_list('Y', 2))
+    assert bench.run(lambda: bench.vehicles[1].mode.name == 'MISSION', 4.0)
+    bench.run(limit=1.2)  # a heartbeat has shown it
+    start = len(bench.sent)
+    bench.from_station(set_mode(MODES[kind].hold, kind))
+    assert bench.reaches(L, 8.0)
+    assert bench.commands(start) == []
+    assert sends_no_command(bench)
+
+
+@PX4
 def test_a_hold_before_the_end_of_the_mission_is_a_loss(kind):
     bench = flying(kind, 'ABC')
     assert bench.run(lambda: bench.completed() == ['A'])

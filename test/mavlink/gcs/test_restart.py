@@ -61,11 +61,11 @@ def test_a_bridge_killed_during_an_upload_completes_it_after_the_restart(kind, m
     assert before + bench.completed() == list('CDEFAB') == places(bench)
 
 
-def dead_until(bench, count):
-    """Kill the bridge, and start a new one when `count` items were reached."""
+def dead_until(bench, count, rest=12.0):
+    """Kill the bridge, and start a new one `rest` [s] after `count` items were reached."""
     bench.line.cut = True
     assert bench.run(lambda: len(bench.flown()) == count)
-    bench.run(limit=12.0)
+    bench.run(limit=rest)
     bench.line.cut = False
     bench.start()
     bench.discover()
@@ -95,6 +95,21 @@ def test_a_task_flown_while_no_bridge_ran_is_known_after_a_list_without_it(kind,
     assert sorted(bench.completed()) == list('ABCD')
     assert bench.run(lambda: len(bench.flown()) == 4)
     assert places(bench) == list('ABCD')
+
+
+@BOTH
+def test_positions_lost_before_the_restart_do_not_count_as_the_time_without_a_bridge(kind):
+    bench = flying(kind, 'EDC')
+    bench.line.tampers.append(lambda direction, m, now: [] if (
+        m.get_type() == 'GLOBAL_POSITION_INT' and not bench.flown()) else None)
+    assert bench.run(lambda: bench.completed() == ['E'])
+    bench.run(limit=1.0)
+    dead_until(bench, 3, 2.0)  # for less time than the positions were lost before
+    bench.assign(task_list('DCB', 2))
+    bench.run(limit=4.0)
+    hand_over_in_hold(bench)
+    assert bench.run(lambda: len(bench.completed()) == 3)
+    assert places(bench) == list('EDCB')
 
 
 @pytest.mark.parametrize('kinds', [('ardupilot', 'px4'), ('px4', 'ardupilot')])

@@ -17,6 +17,7 @@ from uav_task_alloc.mavlink.gcs.authority import (
 from uav_task_alloc.mavlink.gcs.authority_recorder import AuthorityRecorder
 from uav_task_alloc.mavlink.gcs.authority_watch_state import AuthorityWatchState
 from uav_task_alloc.mavlink.gcs.bridge_restart import BridgeRestart
+from uav_task_alloc.mavlink.gcs.flight_modes import ModeClass
 from uav_task_alloc.mavlink.gcs.hand_over import HandOver
 from uav_task_alloc.mavlink.gcs.link_loss import LinkLoss
 from uav_task_alloc.mavlink.gcs.mission_evidence import MissionEvidence
@@ -104,6 +105,9 @@ class AuthorityWatch:
         if state.sent.take_armed_before(state.telemetry.frame):
             was_armed, state.flown = True, True  # a heartbeat that shows disarmed is a change
         state.mode = message.custom_mode
+        if state.class_of(state.mode) is ModeClass.MISSION is not state.class_of(before) and (
+                before is not None):
+            state.in_mission_since = now
         state.armed = bool(message.base_mode & d.MAV_MODE_FLAG_SAFETY_ARMED)
         state.status = message.system_status
         if before is None or self._restart.pending:

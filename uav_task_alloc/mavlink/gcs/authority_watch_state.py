@@ -50,6 +50,7 @@ class AuthorityWatchState:
     notes: deque[OperatorNote] = field(default_factory=deque)
     mode: int | None = None  # custom_mode of the newest heartbeat
     heartbeat_at: float = -math.inf  # [s] the newest heartbeat before this one
+    in_mission_since: float = -math.inf  # [s] a heartbeat has shown the change to MISSION
     armed: bool = False
     status: int = 0  # MAV_STATE
     unconfirmed: bool = False  # the next heartbeat shows the mode, without a change of mode

@@ -24,9 +24,9 @@ class MissionEvidence:
         self._checksum: tuple[tuple[Item, ...], int] | None = None
         self._uploading: tuple[MissionDiff, int] | None = None
 
-    def ended(self, now: float) -> bool:
-        """Whether REACHED of the last item was received within `LATE_REACHED`."""
-        return self._onboard.progress.ended_lately(now, LATE_REACHED)
+    def ended(self, since: float) -> bool:
+        """Whether REACHED of the last item was received at `since` [s] or later."""
+        return self._onboard.progress.ended_at >= since
 
     def rejected(self, now: float) -> bool:
         """Whether the vehicle reports no valid mission just after it accepted ours (PX4)."""

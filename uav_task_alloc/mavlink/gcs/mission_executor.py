@@ -365,7 +365,7 @@ class MissionExecutor:
         """After a restart of the bridge, complete the tasks flown in the meantime."""
         onboard, telemetry = self.onboard, self.telemetry
         assert onboard.tasks is not None
-        if not onboard.resume.located and onboard.held and telemetry.airborne and (
+        if not onboard.resume.located and onboard.held and not telemetry.grounded and (
                 telemetry.current is None or not telemetry.has_position):
             return []  # its current item is not known yet
         onboard.resume.locate(onboard.held or (), onboard.tasks, now)

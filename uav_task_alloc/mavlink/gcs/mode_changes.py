@@ -8,6 +8,7 @@ from uav_task_alloc.mavlink.gcs.authority import AuthorityEvent, AuthorityState,
 from uav_task_alloc.mavlink.gcs.authority_watch_state import AuthorityWatchState
 from uav_task_alloc.mavlink.gcs.flight_modes import ModeClass, avoids_traffic
 from uav_task_alloc.mavlink.gcs.mission_evidence import MissionEvidence
+from uav_task_alloc.mavlink.gcs.onboard_mission import LATE_REACHED
 
 _CLIMBED = 0.9  # of the commanded height: the take-off ended normally
 _HEARTBEAT_DELAY = 1.5  # [s] on the way, as a rule
@@ -170,8 +171,11 @@ class ModeChanges:
         if self._family != 'px4':
             return False
         if self._state.class_of(mode) is ModeClass.HOLD:
-            return (self._evidence.ended(now) or self._evidence.rejected(now)
-                    or self._state.texts.mission_ended(now))
+            # what was reported before it entered MISSION is of an earlier mission
+            since = self._state.in_mission_since
+            return (self._evidence.ended(max(since, now - LATE_REACHED))
+                    or self._evidence.rejected(now)
+                    or self._state.texts.mission_ended(now, since))
         return self._state.is_return(mode) and self._evidence.returning()
 
     def _mission_may_have_ended(self, mode: int) -> bool:

@@ -53,6 +53,7 @@ class StatusTexts:
         """Whether a failsafe was named a moment ago."""
         return now - self.failsafe_at < _TEXT_WINDOW
 
-    def mission_ended(self, now: float) -> bool:
-        """Whether the mission was called finished or infeasible a moment ago."""
-        return max(self.finished_at, self.infeasible_at) > now - _TEXT_WINDOW
+    def mission_ended(self, now: float, since: float) -> bool:
+        """Whether the mission was called finished since a time [s], or infeasible, just now."""
+        finished_at = self.finished_at if self.finished_at >= since else -math.inf
+        return max(finished_at, self.infeasible_at) > now - _TEXT_WINDOW

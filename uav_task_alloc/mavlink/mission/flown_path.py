@@ -122,7 +122,7 @@ class FlownPath:
 
     def could_have_flown(self, chain: Sequence[Point], then: Point | None, holds: float,
                    since: float, anywhere: bool = False, home: Point | None = None) -> bool:
-        """Whether it can have flown through `chain` in the longest gap of the samples.
+        """Whether it can have flown through `chain` in a gap of the samples.
 
         Args:
             chain: points in order, ENU [m].
@@ -133,22 +133,22 @@ class FlownPath:
             home: where it returns to from the last point, at a height that is not known; ENU [m].
 
         Returns:
-            True where the gap is long enough and the sample after it lies on the following leg.
+            True where a gap is long enough and the sample after it lies on the following leg.
         """
-        samples = self._since(since)
-        if len(samples) < 2:
-            return False
-        a, b = max(pairwise(samples), key=lambda two: two[1].t - two[0].t)
-        length = polyline_length((a.position, *chain, b.position))
-        known = len(self._samples) >= _FEW
-        fastest = max(5.0 if known else _USUAL_SPEED,
-                      *(math.hypot(*s.velocity) for s in self._samples[-200:]))
-        if length > 1.1 * fastest * (b.t - a.t - 0.8 * holds) + 10.0:
-            return False
-        if home is not None:
-            level = segment_distance(b.position[:2], chain[-1][:2], home[:2])
-            return anywhere or level <= _CORRIDOR
-        return anywhere or segment_distance(b.position, chain[-1], then or chain[-1]) <= _CORRIDOR
+        fastest = self._fastest()
+        for a, b in pairwise(self._since(since)):
+            length = polyline_length((a.position, *chain, b.position))
+            if b.t - a.t > GAP and (
+                    length <= 1.1 * fastest * (b.t - a.t - 0.8 * holds) + 10.0) and (
+                    anywhere or _on_leg(b.position, chain[-1], then, home)):
+                return True
+        return False
+
+    def _fastest(self) -> float:
+        """The highest speed [m/s] of late; the usual one where it has hardly moved."""
+        speeds = [math.hypot(*sample.velocity) for sample in self._samples[-200:]]
+        moving = sum(speed > _HOLD_SPEED for speed in speeds)
+        return max(5.0 if moving >= _FEW else _USUAL_SPEED, *speeds)
 
     def _since(self, since: float, until: float = math.inf) -> list[PositionSample]:
         at = bisect_left(self._samples, since, key=lambda one: one.t)
@@ -181,6 +181,13 @@ class FlownPath:
                             math.dist(b.velocity, (0, 0, 0))) < _HOLD_SPEED:
                         last = max(last, t)
         return first, last
+
+
+def _on_leg(point: Point, start: Point, then: Point | None, home: Point | None) -> bool:
+    """Whether it flies from a point to the next one, or home at any height; see above."""
+    if home is not None:
+        return segment_distance(point[:2], start[:2], home[:2]) <= _CORRIDOR
+    return segment_distance(point, start, then or start) <= _CORRIDOR
 
 
 def _between(a: PositionSample, b: PositionSample, share: float) -> Point:

@@ -40,7 +40,6 @@ class ProgressTable:
 
     Arguments of methods:
         now: steady time [s].
-        within: [s].
         seq: of an item of the mission on board.
         item, items: of a mission.
         sample: a position of the vehicle.
@@ -145,9 +144,10 @@ class ProgressTable:
         """Whether the mission may be at its end, or was when it was just replaced."""
         return self._epoch.at_end or self._epochs.may_have_ended(now)
 
-    def ended_lately(self, now: float, within: float) -> bool:
-        """Whether REACHED of the last item, of this or the previous epoch, is `within` [s] old."""
-        return now - self._reached.end_at <= within
+    @property
+    def ended_at(self) -> float:
+        """When [s] REACHED of the last item was received, of this or the previous epoch."""
+        return self._reached.end_at
 
     def begin(self, items: tuple[Item, ...], start: int | None, now: float,
               read: bool = False, since: float | None = None) -> None:
