@@ -4,6 +4,8 @@ import pytest
 from authority_bench import (
     BOTH,
     MODES,
+    PX4,
+    AuthorityBench,
     H,
     L,
     N,
@@ -90,6 +92,36 @@ def test_a_pilot_in_control_may_set_any_mode(kind, mode, state):
     assert bench.authority() is (N if state is N and mode == MODES[kind].stick else L)
     assert sends_no_command(bench)
     assert status_is(bench, bench.authority())
+
+
+def climbing(kind, mode):
+    """On the ground in a mode, then taken off by the bridge; no heartbeat has shown TAKEOFF."""
+    bench = AuthorityBench(kind, tick=0.1)
+    bench.vehicles[1].rc_mode(mode)
+    bench.discover()
+    bench.line.tampers.append(lambda direction, m, now: [] if m.get_type() == 'HEARTBEAT' and (
+        bench.vehicles[1].mode.name == 'TAKEOFF') else None)
+    bench.assign(task_list('AB'))
+    assert bench.run(lambda: bench.vehicles[1].mode.name == 'TAKEOFF', 30.0)
+    bench.run(limit=0.5)
+    return bench
+
+
+@PX4
+@pytest.mark.parametrize('mode', ['rtl', 'hold'])
+def test_the_mode_before_the_take_off_is_a_loss_in_the_climb(kind, mode):
+    bench = climbing(kind, getattr(MODES[kind], mode))
+    bench.from_station(set_mode(getattr(MODES[kind], mode), kind))
+    assert bench.reaches(L, 5.0)
+    assert sends_no_command(bench)
+
+
+@PX4
+@pytest.mark.parametrize('mode', ['rtl', 'hold'])
+def test_a_climb_that_no_heartbeat_shows_is_no_loss(kind, mode):
+    bench = climbing(kind, getattr(MODES[kind], mode))
+    assert bench.run(lambda: bench.completed() == ['A', 'B'], 90.0)
+    assert not any('LOST' in note for note in bench.notes)
 
 
 # retries

@@ -5,6 +5,7 @@ from authority_bench import (
     ARDUPILOT,
     BOTH,
     COPTER,
+    LONG,
     MODES,
     PX4,
     AuthorityBench,
@@ -50,6 +51,20 @@ def test_during_silence_nothing_is_sent_and_the_same_mode_ends_the_suspension(ki
     restore_link(bench, 1.5)
     assert status_is(bench, H, 'the link is back, in ')
     assert bench.run(lambda: bench.completed()[-3:] == ['Z', 'Y', 'X'], 200.0)
+
+
+@BOTH
+def test_the_mode_before_our_acknowledged_one_is_a_change_after_silence(kind):
+    bench = AuthorityBench(kind).discover()
+    bench.assign(task_list(LONG))
+    assert bench.run(lambda: bench.started() == ['A'])  # no heartbeat has shown MISSION
+    before = bench.executor().watch.mode
+    assert before == MODES[kind].hold
+    cut_link(bench)
+    bench.vehicles[1].rc_mode(before)
+    restore_link(bench, 1.5)
+    assert status_is(bench, L, 'the link is back, in ', ' instead of ')
+    assert sends_no_command(bench)
 
 
 @BOTH

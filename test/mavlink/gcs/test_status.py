@@ -45,7 +45,7 @@ def test_a_task_withdrawn_is_not_active_while_the_vehicle_holds(kind):
 
 @BOTH
 def test_a_silent_vehicle_is_published_once_as_unavailable_and_then_no_more(kind):
-    bench = flying(kind, 'ABC')
+    bench = flying(kind, 'ABCDEFGHIJKLMNO')  # a mission that ends in silence is a loss
     published = PublishedStates()
     assert published.is_due(bench.state(), bench.executor().telemetry.position_at, bench.now, 10.0)
     bench.line.cut = True

@@ -288,3 +288,15 @@ def test_a_task_that_is_served_is_not_left_for_a_list_that_begins_elsewhere(kind
     bench.assign(task_list('CBA', 2, service=4.0))
     flown_once_each(bench, 'ABC')
     assert places(bench) == ['A', 'C', 'B']
+
+
+def test_a_readback_that_the_vehicle_has_ended_begins_again_at_once():
+    download = Download(Peer(1, 1, *OURS), 0.0)
+    ended = d.MAVLink_mission_ack_message(*OURS, d.MAV_MISSION_ERROR)
+    assert download.receive(ended, 0.1) == []  # of an earlier transfer: the list is on its way
+    again = []
+    for n in range(20):
+        download.receive(d.MAVLink_mission_count_message(*OURS, 3), 0.2 + n)
+        again += download.receive(ended, 0.5 + n)
+    assert {m.get_type() for m in again} == {'MISSION_REQUEST_LIST'}
+    assert 1 < len(again) < 20

@@ -175,7 +175,7 @@ class AuthorityWatch:
         mode = state.profile.commanded_mode(message)
         if mode is not None:
             sent.climb = None
-            sent.acks.command_sent(mode, now)
+            sent.acks.command_sent(message.command, mode, now)
             sent.add_mode(mode, now)
             if state.descending and not state.is_return(mode):
                 state.left_return_at = now
@@ -186,6 +186,7 @@ class AuthorityWatch:
             state.descending = False
             takeoff_mode = state.profile.takeoff_mode
             if takeoff_mode is not None:
+                sent.acks.command_sent(message.command, takeoff_mode, now)
                 sent.add_mode(takeoff_mode, now)
                 sent.climb = self._policy().cruise_altitude
         self._save_record()

@@ -45,9 +45,11 @@ class LinkLoss:
         """Store which modes and armed states the next heartbeat may show, pending ones too."""
         state, sent = self._state, self._state.sent
         state.unconfirmed = True
+        entered = sent.acks.mode_entered_by(state.telemetry.frame + 1)
+        before = state.mode if entered is None else entered  # no heartbeat has shown it
         sent.acks.clear()
         arms = {True} if now <= sent.arm_until + STALE else set()
-        self._modes = frozenset({state.mode, *sent.pending_modes(now - STALE)})
+        self._modes = frozenset({before, *sent.pending_modes(now - STALE)})
         self._armed = frozenset({state.armed} | arms)
 
     def confirm(self, now: float) -> None:

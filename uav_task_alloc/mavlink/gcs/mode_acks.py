@@ -8,28 +8,36 @@ _ACK_TIMEOUT = 12.0  # [s] after which a command without a COMMAND_ACK counts as
 
 
 class ModeAcks:
-    """Counts the COMMAND_ACKs of DO_SET_MODE; while one is missing no mode is concluded."""
+    """Counts the COMMAND_ACKs of commands that set a mode; none is concluded while one is missing."""
 
     def __init__(self) -> None:
         self._entered: int | None = None  # custom_mode: accepted, and no other command pending
         self._frame = 0  # number of the frame of that COMMAND_ACK
-        self._pending: list[int] = []  # custom modes sent and not acknowledged
+        # MAV_CMDs sent and not acknowledged, with the custom mode that each sets
+        self._pending: list[tuple[int, int]] = []
         self._mixed = False  # different modes were pending at once: a COMMAND_ACK names none
         self._sent_at = 0.0  # [s] of the last command
 
-    def command_sent(self, mode: int, now: float) -> None:
-        """Add a command for a custom_mode that is about to be sent."""
+    def command_sent(self, command: int, mode: int, now: float) -> None:
+        """Add a command for a custom_mode that is about to be sent.
+
+        Args:
+            command: MAV_CMD.
+            mode: custom_mode that it sets.
+            now: steady time [s].
+        """
         if now - self._sent_at > _ACK_TIMEOUT:
             self.clear()
-        self._mixed = self._mixed or any(other != mode for other in self._pending)
-        self._pending.append(mode)
+        self._mixed = self._mixed or any(other != mode for _, other in self._pending)
+        self._pending.append((command, mode))
         self._entered, self._sent_at = None, now
 
-    def acknowledged(self, result: int, frame: int) -> None:
-        """Process the MAV_RESULT of a DO_SET_MODE, and the number of its frame."""
-        if not self._pending or result == d.MAV_RESULT_IN_PROGRESS:
+    def acknowledged(self, command: int, result: int, frame: int) -> None:
+        """Process the MAV_RESULT of a MAV_CMD, and the number of its frame."""
+        mode = next((mode for sent, mode in reversed(self._pending) if sent == command), None)
+        if mode is None or result == d.MAV_RESULT_IN_PROGRESS:
             return
-        mode = self._pending.pop()
+        self._pending.remove((command, mode))
         if self._pending:
             return
         accepted = result == d.MAV_RESULT_ACCEPTED and not self._mixed

@@ -69,11 +69,21 @@ class ModeChanges:
             sent.modes = [each for each in sent.modes
                           if each[0] == entered == mode != before][-1:]
             if mode != entered and state.authority.held and state.unexplained is None:
+                if self._has_climbed(entered, mode):
+                    return entered
                 why = f'{state.name_of(entered)} -> {state.name_of(mode)}'
-                state.suspend_until_explained(lambda t: state.mode == entered, why, now,
-                                              within=_CONTRADICTED, ours=entered)
+                state.suspend_until_explained(
+                    lambda t: state.mode == entered or self._has_climbed(entered, mode), why, now,
+                    within=_CONTRADICTED, ours=entered)
                 before = mode
         return before
+
+    def _has_climbed(self, entered: int, mode: int) -> bool:
+        """Whether it may be in HOLD since the end of our take-off, which no heartbeat showed."""
+        state, climb = self._state, self._state.sent.climb
+        return (climb is not None and entered == state.profile.takeoff_mode
+                and state.class_of(mode) is ModeClass.HOLD
+                and state.telemetry.height >= _CLIMBED * climb)
 
     def _changed(self, before: int, mode: int, now: float) -> None:
         state = self._state

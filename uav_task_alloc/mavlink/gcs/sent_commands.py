@@ -49,9 +49,8 @@ class SentCommands:
 
     def receive_command_ack(self, message: Message, frame: int) -> None:
         """Process a COMMAND_ACK that is addressed to us, and the number of its frame."""
-        if message.command == d.MAV_CMD_DO_SET_MODE:
-            self.acks.acknowledged(message.result, frame)
-        elif (message.command == d.MAV_CMD_COMPONENT_ARM_DISARM and self.arming
+        self.acks.acknowledged(message.command, message.result, frame)
+        if (message.command == d.MAV_CMD_COMPONENT_ARM_DISARM and self.arming
                 and message.result == d.MAV_RESULT_ACCEPTED):
             self.armed_frame = frame
 

@@ -14,6 +14,7 @@ _PERIOD = 1.0  # [s] until a request is repeated, at most
 _LEAST_PERIOD = 0.4  # [s] the same, at least
 _RELIST_AFTER = 4.0  # [s] without an answer for one item: PX4 may have ended the transfer
 _MAX_RELISTS = 3  # MISSION_REQUEST_LIST sent again after that
+_MAX_ABORTS = 5  # MISSION_REQUEST_LIST sent again after the vehicle has ended the transfer
 _PATIENCE = 12.0  # [s] for one answer; ArduPilot denies a list for 8 s after a broken upload
 
 
@@ -43,7 +44,7 @@ class Download:
         self._count = 0
         self._period, self._tries = _PERIOD, 0
         self._asked_at = self._due = now
-        self._relists = 0
+        self._relists = self._aborts = 0
         self._ask(now)
 
     @property
@@ -52,7 +53,7 @@ class Download:
         return self._peer.request_list()
 
     def receive(self, message: Message, now: float) -> list[Message]:
-        """Handle MISSION_COUNT and MISSION_ITEM(_INT); other messages are ignored.
+        """Handle MISSION_COUNT, MISSION_ITEM(_INT) and MISSION_ACK; others are ignored.
 
         Returns:
             Messages to send.
@@ -68,7 +69,18 @@ class Download:
             self.items.append(received_item(message))
             self._answered(now)
             return self._next(now)
+        if (kind == 'MISSION_ACK' and message.type != dialect.MAV_MISSION_ACCEPTED
+                and self.state is DownloadState.GETTING and self._aborts < _MAX_ABORTS):
+            self._aborts += 1  # the vehicle answers no request any more
+            self._relist(now)
+            self._ask(now)
+            return [self.first]
         return []
+
+    def _relist(self, now: float) -> None:
+        """Begin again with the number of items."""
+        self.state, self._tries, self._asked_at = DownloadState.LISTING, 0, now
+        self.items.clear()
 
     def step(self, now: float) -> list[Message]:
         """Repeat the request that is due, or give up; returns the messages to send."""
@@ -80,9 +92,8 @@ class Download:
             return []
         if (self.state is DownloadState.GETTING and waited >= _RELIST_AFTER
                 and self._relists < _MAX_RELISTS):
-            self.state, self._tries, self._asked_at = DownloadState.LISTING, 0, now
+            self._relist(now)
             self._relists += 1
-            self.items.clear()
         self._ask(now)
         return [self.first if self.state is DownloadState.LISTING
                 else self._peer.request(len(self.items))]

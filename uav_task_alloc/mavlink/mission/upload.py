@@ -190,7 +190,7 @@ class Upload:
                 self._request(message.seq, now)
             elif kind == 'MISSION_ACK':
                 self._ack(message.type, now)
-            elif self.state is UploadState.READING and self._readback:
+            if self.state is UploadState.READING and self._readback:
                 self._out += self._readback.receive(message, now)
                 self._judge_readback(now)
         return self._flush()
