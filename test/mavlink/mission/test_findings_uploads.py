@@ -300,3 +300,21 @@ def test_a_readback_that_the_vehicle_has_ended_begins_again_at_once():
         again += download.receive(ended, 0.5 + n)
     assert {m.get_type() for m in again} == {'MISSION_REQUEST_LIST'}
     assert 1 < len(again) < 20
+
+
+@PX4
+def test_the_current_item_counts_in_an_upload_after_one_whose_readback_was_ended(kind):
+    bench = flying(kind, 'ABC')
+    assert bench.run(lambda: bench.completed() == ['A'])
+    ended = d.MAVLink_mission_ack_message(*OURS, d.MAV_MISSION_ERROR)
+    bench.line.tampers.append(lambda direction, m, now: [(0.0, m), (0.0, ended)] if (
+        m.get_type() == 'MISSION_COUNT' and direction == 'down') else None)
+    bench.assign(task_list('BCD', 2))
+    assert bench.run(lambda: bench.onboard().verified())
+    bench.line.tampers.clear()
+    bench.line.tampers.append(lambda direction, m, now: [] if m.get_type() in (
+        'MISSION_ITEM_INT', 'MISSION_ITEM_REACHED') else None)
+    bench.assign(task_list('DCB', 3))
+    assert bench.run(lambda: places(bench) == ['A', 'B'])
+    assert bench.run(lambda: bench.completed() == ['A', 'B'], 8.0)
+    assert bench.onboard().state is MissionState.UPLOADING

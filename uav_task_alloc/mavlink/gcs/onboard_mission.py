@@ -262,7 +262,8 @@ class OnboardMission:
         if self._may_be_of_new:
             self._reports.add_current(max(0, message.seq - self.own), now, self._telemetry.frame,
                                       flying, plan_id(message))
-        return False
+            return False
+        return self._profile.atomic  # PX4 flies the old mission until it has all items
 
     def note_flown_unset(self, seq: int, now: float) -> None:
         """Take a MISSION_CURRENT of a vehicle that flies before its current item is set.

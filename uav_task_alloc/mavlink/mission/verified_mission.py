@@ -51,8 +51,12 @@ class VerifiedMission:
         self.reported_id = 0  # last reported
 
     def note_mission_id(self, message: Message) -> None:
-        """Store PX4's mission id from a MISSION_ACK or MISSION_COUNT; not that of a fence."""
-        if message.mission_type == MAV_MISSION_TYPE_MISSION:
+        """Store PX4's mission id from a MISSION_ACK or MISSION_COUNT; not that of a fence.
+
+        A MISSION_ACK with an error has none.
+        """
+        refused = message.get_type() == 'MISSION_ACK' and message.type != d.MAV_MISSION_ACCEPTED
+        if message.mission_type == MAV_MISSION_TYPE_MISSION and not refused:
             self.reported_id = plan_id(message)
 
     def has_mission_id(self, message: Message) -> bool:
