@@ -137,9 +137,8 @@ class FlownPath:
         """
         fastest = self._fastest()
         for a, b in pairwise(self._since(since)):
-            length = polyline_length((a.position, *chain, b.position))
-            if b.t - a.t > GAP and (
-                    length <= 1.1 * fastest * (b.t - a.t - 0.8 * holds) + 10.0) and (
+            flown = 1.1 * fastest * (b.t - a.t - 0.8 * holds) + 10.0
+            if b.t - a.t > GAP and polyline_length((a.position, *chain, b.position)) <= flown and (
                     anywhere or _on_leg(b.position, chain[-1], then, home)):
                 return True
         return False
@@ -184,7 +183,7 @@ class FlownPath:
 
 
 def _on_leg(point: Point, start: Point, then: Point | None, home: Point | None) -> bool:
-    """Whether it flies from a point to the next one, or home at any height; see above."""
+    """Whether it flies from `start` to the next point, or home at any height."""
     if home is not None:
         return segment_distance(point[:2], start[:2], home[:2]) <= _CORRIDOR
     return segment_distance(point, start, then or start) <= _CORRIDOR
