@@ -8,7 +8,7 @@ _ACK_TIMEOUT = 12.0  # [s] after which a command without a COMMAND_ACK counts as
 
 
 class ModeAcks:
-    """Counts the COMMAND_ACKs of commands that set a mode; none is concluded while one is missing."""
+    """Counts COMMAND_ACKs of mode commands; while one is missing no mode is concluded."""
 
     def __init__(self) -> None:
         self._entered: int | None = None  # custom_mode: accepted, and no other command pending
