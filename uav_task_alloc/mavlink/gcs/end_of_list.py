@@ -81,7 +81,8 @@ class EndOfList:
     def _just_landed(self, now: float) -> bool:
         """Whether the mission has ended with a landing: `landed_state` is sent once a second."""
         progress = self._onboard.progress
-        return progress.finished and progress.returns and progress.ended_lately(now, LATE_REACHED)
+        return progress.finished and progress.returns and (
+            now - progress.ended_at <= LATE_REACHED)
 
     def _end(self, tasks: TaskList, flying: bool, now: float) -> NextMessages:
         telemetry = self._telemetry
