@@ -58,8 +58,7 @@ class OnboardMission:
         self._failures = UploadFailures(self.list, self.own, self.notes)
         self._uploading: tuple[MissionDiff, TaskList] | None = None  # with its list
         self._taken = False  # the vehicle has taken all items of this upload
-        # sent, but not confirmed to be on board
-        self._unconfirmed: tuple[MissionDiff, TaskList] | None = None
+        self._unconfirmed: tuple[MissionDiff, TaskList] | None = None  # sent; perhaps on board
         # [s] of the vehicle's clock when all items were sent: it may fly them since then
         self._sent_since: float | None = None
         self._sent_frame: int | None = None  # number of the frame received last at that time
@@ -259,11 +258,11 @@ class OnboardMission:
         if self._mission.has_mission_id(message):
             self._reports.release(self._telemetry.frame)
             return True
-        if self._may_be_of_new:
-            self._reports.add_current(max(0, message.seq - self.own), now, self._telemetry.frame,
-                                      flying, plan_id(message))
-            return False
-        return self._profile.atomic  # PX4 flies the old mission until it has all items
+        if not self._may_be_of_new:
+            return self._profile.atomic  # PX4 flies the old mission until it has all items
+        seq, frame = max(0, message.seq - self.own), self._telemetry.frame
+        self._reports.add_current(seq, now, frame, flying, plan_id(message))
+        return False
 
     def note_flown_unset(self, seq: int, now: float) -> None:
         """Take a MISSION_CURRENT of a vehicle that flies before its current item is set.
