@@ -23,6 +23,8 @@ import sys
 import tempfile
 import time
 from collections import Counter
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import domain_coordinator
@@ -57,9 +59,9 @@ SCENARIO = 'route_end: home\ntrips: 2\nuavs:\n' + ''.join(
 class Nodes:
     """The processes, each with a folder for each of its starts."""
 
-    def __init__(self, folder: Path, speedup: float) -> None:
+    def __init__(self, folder: Path, speedup: float, scenario: str) -> None:
         path = folder / 'scenario.yaml'
-        path.write_text(SCENARIO)
+        path.write_text(scenario)
         self.folder, self.starts = folder, 0
         self.truth = folder / f'flight_{time.time():.0f}.jsonl'
         played = load(path)
@@ -238,7 +240,7 @@ def faults(soak: Soak) -> dict[str, object]:
 def run(args: argparse.Namespace, folder: Path) -> int:
     """One part, its figures and the verdict."""
     ledger = Ledger.load(folder / 'ledger.json')
-    nodes = Nodes(folder, args.speedup)
+    nodes = Nodes(folder, args.speedup, SCENARIO)
     soak = Soak(nodes, ledger, random.Random(args.seed + ledger.number), args.speedup)
     began, open_before = time.monotonic(), len(ledger.open())
     try:
@@ -266,8 +268,23 @@ def run(args: argparse.Namespace, folder: Path) -> int:
     return int(bool(found or ledger.open()))
 
 
+@contextmanager
+def own_network(folder: str) -> Iterator[None]:
+    """A DDS domain of its own, by UDP on the loopback; the profile is in `folder`."""
+    profile = Path(folder, 'network.xml')
+    profile.write_text(NETWORK)
+    with domain_coordinator.domain_id() as domain:
+        os.environ.update(ROS_DOMAIN_ID=str(domain), ROS_AUTOMATIC_DISCOVERY_RANGE='SUBNET',
+                          FASTRTPS_DEFAULT_PROFILES_FILE=str(profile))
+        rclpy.init()
+        try:
+            yield
+        finally:
+            rclpy.shutdown()
+
+
 def main() -> int:
-    """Command line, in a network of its own."""
+    """Command line."""
     parser = argparse.ArgumentParser(description=(__doc__ or '').partition('\n')[0])
     parser.add_argument('--hours', type=float, default=8.0)
     parser.add_argument('--kills', type=int, default=50)
@@ -276,18 +293,10 @@ def main() -> int:
     parser.add_argument('--state', type=Path, help='folder of a run that goes on in parts')
     parser.add_argument('--json', action='store_true')
     args = parser.parse_args()
-    with domain_coordinator.domain_id() as domain, tempfile.TemporaryDirectory() as temporary:
+    with tempfile.TemporaryDirectory() as temporary, own_network(temporary):
         folder = args.state or Path(temporary)
         folder.mkdir(parents=True, exist_ok=True)
-        profile = Path(temporary, 'network.xml')
-        profile.write_text(NETWORK)
-        os.environ.update(ROS_DOMAIN_ID=str(domain), ROS_AUTOMATIC_DISCOVERY_RANGE='SUBNET',
-                          FASTRTPS_DEFAULT_PROFILES_FILE=str(profile))
-        rclpy.init()
-        try:
-            return run(args, folder)
-        finally:
-            rclpy.shutdown()
+        return run(args, folder)
 
 
 if __name__ == '__main__':
