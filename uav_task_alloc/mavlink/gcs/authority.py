@@ -248,6 +248,7 @@ class Authority:
         ):  # until a heartbeat matches the record
             self.state = AuthorityState.SUSPENDED
             self.suspensions[Suspension.RESTART] = 'the bridge was restarted'
+        self.awaits_battery = False  # LOST by a reboot that may be that of a battery change
         self.undecided = False  # after a restart: not known yet whether the vehicle is airborne
 
     def allows(self, action: SendAction) -> bool:
@@ -339,8 +340,9 @@ class Authority:
         if self.state is AuthorityState.LOST:
             if self.killed:
                 return '~/hand_over, on the ground and disarmed'
-            return ('MISSION mode set in flight, a change from a stick mode to HOLD at rest for '
-                    '6 s, or ~/hand_over')
+            return ('a full battery, ' if self.awaits_battery else '') + (
+                'MISSION mode set in flight, a change from a stick mode to HOLD at rest for 6 s, '
+                'or ~/hand_over')
         if self.state is AuthorityState.NONE:
             return '~/hand_over' if self.landed else (
                 'takeoff: true on the ground, MISSION mode set in flight, or ~/hand_over')

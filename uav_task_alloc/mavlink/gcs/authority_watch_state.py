@@ -101,7 +101,7 @@ class AuthorityWatchState:
         """
         if event not in _BATTERY_CHANGE_EVENTS:
             self.landed_battery, self.rebooted_on_ground = math.nan, False
-        before = self.authority.state
+        before, self.authority.awaits_battery = self.authority.state, self.rebooted_on_ground
         if not self.authority.apply(event, now, why):
             return
         state = self.authority.state
@@ -119,7 +119,8 @@ class AuthorityWatchState:
         back = self.authority.given_back_by
         self.notes.append(
             OperatorNote(
-                'info' if state in (AuthorityState.HELD, AuthorityState.NONE) else 'warning',
+                'info' if self.rebooted_on_ground or state in (
+                    AuthorityState.HELD, AuthorityState.NONE) else 'warning',
                 f'authority {state.name}: {why}' + (f'; given back by {back}' if back else ''),
             )
         )

@@ -70,6 +70,7 @@ class BridgeRestart:
         if record.landed_battery is not None and not state.armed:
             state.landed_battery = record.landed_battery
             state.rebooted_on_ground = not state.authority.held  # else a reboot is still to come
+            state.authority.awaits_battery = state.rebooted_on_ground
 
     def _may_have_ended(self, record: AuthorityRecord) -> None:
         """Note what the end of its mission or of our RETURN explains, once it is confirmed."""
