@@ -9,7 +9,7 @@ from mission_bench import ORIGIN, task_list
 from pymavlink.dialects.v20 import ardupilotmega as d
 
 from uav_task_alloc.mavlink.autopilots import PX4 as PX4_PROFILE
-from uav_task_alloc.mavlink.mission.flown_path import PositionSample
+from uav_task_alloc.mavlink.mission.flown_path import FlownPath, PositionSample
 from uav_task_alloc.mavlink.mission.items import (
     MissionStop,
     TaskList,
@@ -318,3 +318,14 @@ def test_an_item_skipped_before_the_first_heartbeat_completes_nothing(kind):
     bench.discover()
     bench.assign(task_list('ABCD', 2))
     flown_once_each(bench, 'ABCD')
+
+
+@pytest.mark.parametrize(('speed', 'later', 'flown'), [
+    (8.0, -2.0, False),  # it turns around: that takes longer
+    (15.0, -15.0, True)])
+def test_a_place_near_a_turn_was_not_reached_in_a_gap_too_short_to_fly_there(speed, later, flown):
+    path = FlownPath()
+    path.add(PositionSample(0.0, (0.0, 0.0, 50.0), (speed, 0.0, 0.0)))
+    path.add(PositionSample(2.6, (8.0, 0.0, 50.0), (later, 0.0, 0.0)))
+    assert path.could_have_flown(
+        [(26.0, 0.0, 50.0)], (-300.0, 0.0, 50.0), 0.0, 0.0) is flown

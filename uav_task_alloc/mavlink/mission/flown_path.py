@@ -21,6 +21,7 @@ _CURVE = 0.4  # [m/s2] error bound of the interpolation between two samples
 _PIECES = 8  # interpolated points between two samples
 _JUMP = 30.0  # [m] beyond the distance its speed explains: the estimate jumped
 _FEW, _USUAL_SPEED = 100, 15.0  # samples; [m/s] assumed where there are fewer
+_ACCELERATION = 6.0  # [m/s2] that no vehicle exceeds for seconds (PX4: MPC_ACC_HOR_MAX 5)
 _CORRIDOR = 8.0  # [m] from a leg at which a vehicle flies it
 _HOLD_SLACK = 0.1  # [s] by which a sampled hold may be shorter than the real one
 
@@ -137,8 +138,8 @@ class FlownPath:
         """
         fastest = self._fastest()
         for a, b in pairwise(self._since(since)):
-            flown = 1.1 * fastest * (b.t - a.t - 0.8 * holds) + 10.0
-            if b.t - a.t > GAP and polyline_length((a.position, *chain, b.position)) <= flown and (
+            if b.t - a.t > GAP and polyline_length((a.position, *chain, b.position)) <= (
+                    _longest_way(a, b, 1.1 * fastest, b.t - a.t - 0.8 * holds)) + 10.0 and (
                     anywhere or _on_leg(b.position, chain[-1], then, home)):
                 return True
         return False
@@ -180,6 +181,16 @@ class FlownPath:
                             math.dist(b.velocity, (0, 0, 0))) < _HOLD_SPEED:
                         last = max(last, t)
         return first, last
+
+
+def _longest_way(a: PositionSample, b: PositionSample, fastest: float, time: float) -> float:
+    """Length [m] of what can be flown between two samples in `time` [s] of motion."""
+    first, last = math.hypot(*a.velocity), math.hypot(*b.velocity)
+    if math.isnan(first + last):
+        return fastest * time
+    top = max(first, last, min(fastest, (first + last + _ACCELERATION * time) / 2.0))
+    ramps = (2.0 * top**2 - first**2 - last**2) / (2.0 * _ACCELERATION)  # [m]
+    return ramps + top * max(0.0, time - (2.0 * top - first - last) / _ACCELERATION)
 
 
 def _on_leg(point: Point, start: Point, then: Point | None, home: Point | None) -> bool:
