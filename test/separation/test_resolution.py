@@ -13,7 +13,7 @@ from uav_task_alloc.separation.resolution import (
     flight_seconds,
     resolve,
 )
-from uav_task_alloc.separation.volumes import Flight, FlightLeg, flight_volumes
+from uav_task_alloc.separation.volumes import Flight, FlightLeg, flight_volumes, leg_times
 
 RULE = Separation(10.0, 5.0, 2.0)
 FAR = 400.0  # [m]
@@ -159,3 +159,80 @@ def test_ten_uavs_of_one_base_take_off_and_land_apart(rule, pads):
     # pads nearer than the distance: some have to wait in the air before they land
     most = 10.0 if pads >= rule.horizontal else 20.0
     assert extra_percent(flights, result.flights) <= most
+
+
+def returning(name, x, pad, hold_until=-math.inf):
+    """In the air, to a task and home; its way home cannot wait."""
+    task = (x, 0.0, 30.0)
+    return Flight(name, (
+        FlightLeg(((x, -100.0, 30.0), task), f't{name}', 5.0),
+        FlightLeg((task, (x, 200.0, 30.0)), f'T{name}', 5.0, hold_until=hold_until),
+        FlightLeg(((x, 200.0, 30.0), pad), lands=True, may_wait=False)),
+        (x, -100.0, 30.0), 10.0, 2.5, 1.5)
+
+
+def test_a_return_that_would_cost_too_much_is_left_to_the_flight():
+    rule = Separation(30.0, 10.0, 2.0)
+    flights = [returning(f'u{k}', 60.0 * k, (90.0 + 8.0 * k, 400.0, 0.0)) for k in range(4)]
+    free = resolve(flights, rule)
+    cheap = resolve(flights, rule, TransitLimits(dearest=15.0))
+    assert free.left == []
+    extra, bounded = ([flight_seconds(after) - flight_seconds(before) for before, after in zip(
+        flights, result.flights, strict=True)] for result in (free, cheap))
+    assert max(extra) > 40.0
+    assert max(bounded) <= 15.0
+    assert cheap.left
+    for each in cheap.left:  # nothing but ways home
+        assert {flights[k].legs[n].task for k, n in zip(each.flights, each.legs, strict=True)
+                } == {''}
+
+
+@pytest.mark.parametrize('other', [True, False])
+def test_a_wait_of_an_earlier_plan_ends_when_less_is_enough(other):
+    a = flight('a', (0, 200, 30), (FAR, 200, 30), begin=30.0)
+    b = returning('b', 200.0, (200.0, 300.0, 0.0), hold_until=90.0)
+    limits = TransitLimits(altitude_max=31.0)
+    after = resolve((a, b) if other else (b,), RULE, limits)
+    assert after.left == []
+    held = after.flights[-1].legs[1].hold_until
+    assert (30.0 < held < 87.0) if other else held == -math.inf
+
+
+def test_a_take_off_ends_at_its_own_height_and_the_leg_goes_on_from_there():
+    leg = FlightLeg(((0, 0, 0), (200, 0, 30)), 't', takes_off=True, top=50.0)
+    assert leg.flown() == ((0, 0, 0), (0, 0, 50.0), (200, 0, 30))
+    low = Flight('low', (leg,), (0, 0, 0), 10.0, 2.5, 1.5, in_air=False)
+    over = flight('over', (-100, 0, 50), (100, 0, 50), begin=12.0)
+    found = find_conflicts(flight_volumes((over, low), RULE), RULE)
+    assert found
+    assert checked(over, low).flights[1].legs[0] != leg
+
+
+class Slow:
+    """A pace with a stop of 6 s and a take-off of 4 s."""
+
+    takeoff = 4.0
+
+    def seconds(self, points):
+        return math.dist(points[0], points[-1]) / 10.0
+
+    def from_stop(self, points, share=0.0):
+        return self.seconds(points) + 6.0 * (1.0 - 0.5 * share)
+
+
+def test_the_measured_pace_counts_stops_and_take_offs():
+    leg = FlightLeg(((0, 0, 0), (100, 0, 40)), 't', takes_off=True, top=40.0)
+    planned = Flight('u', (leg,), (0, 0, 0), 10.0, in_air=False, pace=Slow())
+    times = leg_times(planned, leg, 0.0, True)
+    assert (times.begin, times.arrival) == (4.0, 4.0 + 4.0 + 16.0)
+    assert [seconds for seconds, _ in planned.parts(leg)] == [4.0, 16.0]
+    way = FlightLeg(((0, 0, 40), (100, 0, 40)), 't')
+    flying = Flight('u', (way,), (0, 0, 40), 10.0, pace=Slow(), share=1.0)
+    assert flying.leg_seconds(way, first=True) == 13.0
+    assert flying.leg_seconds(way) == 16.0
+
+
+def test_the_error_measured_of_a_uav_is_that_of_its_times():
+    flights = [Flight('u', (), (0, 0, 40), speed_error=share, late=late)
+               for share, late in ((None, 0.0), (0.05, 0.0), (0.05, 2.0))]
+    assert [each.uncertainty(40.0, RULE) for each in flights] == pytest.approx([8.0, 2.0, 4.0])

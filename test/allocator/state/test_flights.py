@@ -177,6 +177,35 @@ def test_the_time_lost_at_stops_is_measured_from_completions():
     assert driver.world.flights.pace('a').stop_time == pytest.approx(6.0, abs=0.1)
 
 
+@pytest.mark.parametrize(('late', 'share'), [(0.0, 0.0), (3.0, 0.4)])
+def test_how_late_a_uav_was_is_the_error_of_its_times(late, share):
+    driver = AllocatorDriver()
+    driver.uav('a', 0.0, 0.0, 50.0, cruise_speed=10.0)
+    driver.add(*(at(100 * k, service_time=2.0) for k in range(1, 8)))
+    driver.settle()
+    flight = driver.world.flights.of('a', driver.now)
+    assert (flight.late, flight.time_error) == (0.0, math.inf)
+    for k in range(1, 6):  # 14 s are predicted: full speed and a stop; every second one is late
+        driver.now += 10.0 + 2.0 + 4.0 + (late if k % 2 else -late)
+        driver.uav('a', 100.0 * k, 0.0, 50.0, cruise_speed=10.0)
+        assert driver.event('COMPLETED', f't{100 * k}', 'a') == ''
+        driver.core.tick(driver.now, driver.now)
+    flight = driver.world.flights.of('a', driver.now)
+    assert flight.late == pytest.approx(late, abs=1.5)
+    assert flight.time_error == pytest.approx(share, abs=0.25)
+
+
+def test_a_take_off_ends_at_the_height_that_the_uav_reports():
+    driver = AllocatorDriver()
+    driver.uav('a', 0.0, 0.0, 3.0, home=(0.0, 0.0, 3.0), standby=True, takeoff_height=40.0)
+    flight = driver.world.flights.of('a', driver.now)
+    assert flight.takeoff_top == 43.0
+    pace = FlightPace(10.0, climb=2.5)
+    low = timed_stops(stops(at(100)), UavFlight((0.0, 0.0, 0.0), pace, on_ground=True,
+                                                takeoff_top=75.0))
+    assert low[0].eta == pytest.approx(30.0 + 10.0)
+
+
 def test_ground_velocities_of_reports_are_measured_in_steady_flight_only():
     driver = AllocatorDriver()
     for t in range(20):
