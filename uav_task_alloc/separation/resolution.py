@@ -32,6 +32,7 @@ from uav_task_alloc.separation.volumes import (
     rows_of_legs,
 )
 
+STOPPED = 'no change was found in time'
 _LAYERS = 10  # above the ends of a leg, at most
 _HOLDS = (3.0, 6.0, 10.0, 15.0, 20.0, 30.0, 45.0, 60.0)  # [s] in the air
 _TAKE_OFFS = tuple(5.0 * k for k in range(1, 181))  # [s] that a UAV may wait on the ground
@@ -39,6 +40,7 @@ _MOST_PATHS = 4  # the cheapest, with which waits are combined
 _PRICE = 0.15  # [s/m] of a climb above the ends of a leg, whose power a wait does not take
 _MARGIN = 0.5  # [m] more between layers than the vertical distance: heights are kept nearly
 _LEAST_SAVED = 3.0  # [s] of a wait; for less it stays as it is
+_SOONER = (0.0, 0.25, 0.5, 0.75)  # of a wait of an earlier plan
 _GROUND = 0.5  # price of a second of waiting on the ground
 _ON_LINE = 0.01  # [m] a detour point so near to the line of its neighbours only changes the height
 _STEEP = 0.45  # share of the first and last straight part that a slanted climb may take
@@ -220,13 +222,14 @@ class _Planner:
         leg = flight.legs[n]
         without = replace(leg, hold_until=-math.inf)
         begin, planned = (leg_times(flight, each, ready, n == 0).begin for each in (without, leg))
-        for wait in (0.0, *(_TAKE_OFFS if leg.takes_off else _HOLDS)):
-            if wait > planned - begin - _LEAST_SAVED or self._limits.stop():
-                break
+        for share in _SOONER:
+            wait = share * (planned - begin)
+            if wait > planned - begin - _LEAST_SAVED:
+                break  # not counted by `stop`: the legs after it would have no search left
             sooner = replace(leg, hold_until=begin + wait if wait else -math.inf)
             times = leg_times(flight, sooner, ready, n == 0)
             if self._is_apart(flight, k, n, sooner, times):
-                return _Change(sooner, wait, f'waits {wait:g} s only', 'hold')
+                return _Change(sooner, wait, f'waits {wait:.0f} s only', 'hold')
         return _Change(leg, 0.0, '', '')
 
     def _is_apart(self, flight: Flight, k: int, n: int, leg: FlightLeg, times: LegTimes,
@@ -357,7 +360,7 @@ def _explained(before: Sequence[Flight], planner: _Planner, each: FoundConflict,
             kinds.append(change.kind)
     still = any(other.flights == each.flights and other.legs == each.legs for other in left)
     kind = '' if still else 'height' if 'height' in kinds else 'hold'
-    failed = 'no change was found in time' if planner.stopped else 'no height or wait resolves it'
+    failed = STOPPED if planner.stopped else 'no height or wait resolves it'
     return Conflict(uavs, ends, each.time, each.horizontal, each.vertical, kind,
                     failed if still else '; '.join(texts))
 

@@ -103,6 +103,7 @@ class Flight:
         speed_error: share by which its times are off, as measured; None: that of the rule.
         pace: as measured; None: the speeds alone.
         share: of its speed that it has at `begin`, 0 to 1.
+        goes_on: what follows the last leg is not planned yet; it does not stay there.
     """
 
     uav: str
@@ -118,6 +119,7 @@ class Flight:
     speed_error: float | None = None
     pace: Pace | None = None
     share: float = 0.0
+    goes_on: bool = False
 
     def seconds(self, points: Sequence[Point]) -> float:
         """Return the flight time along a polyline [s].
@@ -249,7 +251,8 @@ def end_rows(flight: Flight, rule: Separation, end: float, place: Point) -> list
         place: [m] ENU where it stays.
     """
     rows: list[PieceRow] = []
-    _add(rows, flight, rule, end, end + FOREVER, place, place)
+    if not flight.goes_on:
+        _add(rows, flight, rule, end, end + FOREVER, place, place)
     return rows
 
 

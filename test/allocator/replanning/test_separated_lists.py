@@ -85,6 +85,41 @@ def test_uavs_of_one_base_take_off_one_after_the_other_and_return_at_the_height_
         assert end_via[-1][2] >= 50.0
 
 
+def test_what_is_minutes_ahead_is_left_to_later_plans_and_stays_in_the_lists():
+    driver = crossing(background_budget=0.05, **ON)
+    driver.add(*(Task(f'ta{k}', (1400.0 + 600.0 * k, 200.0, 50.0), allowed_uavs={'a'})
+                 for k in range(3)),
+               *(Task(f'tb{k}', (200.0, 1400.0 + 600.0 * k, 50.0), allowed_uavs={'b'})
+                 for k in range(3)))
+    driver.settle()
+    lists, world = driver.lists, driver.world
+    assert lists['a'].task_ids == ('ta', 'ta0', 'ta1', 'ta2')
+    assert lists['b'].task_ids == ('tb', 'tb0', 'tb1', 'tb2')
+    flights = _flights(world, world.lists_in_force(), driver.now)
+    assert [len(each.legs) for each in flights.values()] == [2, 2]
+    assert all(each.goes_on for each in flights.values())
+    assert conflicts(driver) == []
+    assert {point[2] for uav_id in 'ab' for stop in lists[uav_id].stops
+            for point in stop.leg.via} == {55.5}
+
+
+def test_a_plan_that_ends_before_all_are_apart_is_completed_by_the_next_ones():
+    driver = AllocatorDriver(route_end='home', background_budget=0.05, solve_budget=0.02, **ON)
+    for k in range(10):
+        driver.uav(f'u{k}', 6.0 * k, 0.0, 0.0, home=(6.0 * k, 0.0, 0.0), standby=True, **SPEEDS)
+        angle = 0.7 * k
+        driver.add(Task(f't{k}', (300.0 * math.cos(angle), 300.0 * math.sin(angle), 50.0),
+                        allowed_uavs={f'u{k}'}))
+    driver.settle()
+    first = conflicts(driver)
+    assert first
+    assert any(note.startswith('no change was found in time') for note in driver.notes)
+    for _ in range(20):
+        driver.world.request_replan('test', driver.now)
+        driver.settle(report=False)
+    assert not [each for each in conflicts(driver) if 0 in each.legs]
+
+
 def test_two_legs_under_way_that_meet_are_logged_once():
     driver = AllocatorDriver()
     driver.uav('a', 0.0, 200.0, 50.0, **SPEEDS)

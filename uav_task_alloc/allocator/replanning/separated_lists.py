@@ -14,11 +14,19 @@ from uav_task_alloc.allocator.state.flight_pace import UavFlight, timed_stops
 from uav_task_alloc.allocator.state.world import World
 from uav_task_alloc.geometry.polyline import points_passed, polyline_length
 from uav_task_alloc.model import Leg, Point
-from uav_task_alloc.separation.resolution import Resolution, TransitLimits, resolve
+from uav_task_alloc.separation.resolution import (
+    STOPPED,
+    Resolution,
+    TransitLimits,
+    resolve,
+)
 from uav_task_alloc.separation.rule import Separation
-from uav_task_alloc.separation.volumes import Flight, FlightLeg
+from uav_task_alloc.separation.volumes import Flight, FlightLeg, leg_times
 
-_MOST_CHANGES = 10_000  # tried, so that a callback ends: half a second without zones
+_MOST_CHANGES = 10_000  # tried in a plan, so that a callback ends: half a second without zones
+_CHANGES = 20_000  # tried for each second of `solve_budget`, where the next plan goes on
+# times the horizon of the uncertainty: what is later is left to later plans, where there are any
+_AHEAD = 2.0
 _DEAREST = 15.0  # [s] of flight that a return may cost; the monitor holds for about that time
 _LEAST = 1.0  # [s] of a wait; a shorter one is no change
 _LEAST_ERROR = 0.05  # share by which times may be off, however exact they were
@@ -38,10 +46,12 @@ def with_separation(world: World, built: BuiltLists, stamp: float) -> BuiltLists
     """
     lists = {uav_id: _with_high_return(world, each) for uav_id, each in built.lists.items()}
     flights = _flights(world, lists, stamp)
-    tried = count()
-    found = resolve(list(flights.values()), separation_of(world.params), TransitLimits(
-        world.params.altitude_min, world.params.altitude_max,
-        lambda points: world.paths().clear(*points), lambda: next(tried) >= _MOST_CHANGES,
+    params, tried, most = world.params, count(), _MOST_CHANGES
+    if params.background_budget > 0.0:
+        most = min(most, round(_CHANGES * params.solve_budget))
+    found = resolve(list(flights.values()), separation_of(params), TransitLimits(
+        params.altitude_min, params.altitude_max,
+        lambda points: world.paths().clear(*points), lambda: next(tried) >= most,
         _DEAREST))
     for before, after in zip(flights.values(), found.flights, strict=True):
         if before is not after:
@@ -56,7 +66,9 @@ def _not_apart(found: Resolution, flights: Mapping[str, Flight]) -> tuple[str, .
         pair = ' and '.join(sorted(each.uavs))
         if each.resolution:
             continue
-        if '' in each.tasks and all(flights[uav_id].legs[-1:] and flights[uav_id].legs[-1].lands
+        if each.detail == STOPPED:
+            texts.setdefault(pair, f'{STOPPED} to keep {pair} apart: the next plan goes on')
+        elif '' in each.tasks and all(flights[uav_id].legs[-1:] and flights[uav_id].legs[-1].lands
                                     for uav_id in each.uavs):
             texts.setdefault(pair, f'{pair} return at the same time: one of them will hold')
         else:
@@ -82,16 +94,19 @@ def _with_high_return(world: World, each: UavList) -> UavList:
 def _flights(world: World, lists: Mapping[str, UavList], stamp: float) -> dict[str, Flight]:
     """What each known UAV flies by its list."""
     flights, rule = {}, separation_of(world.params)
+    until = _AHEAD * rule.horizon if world.params.background_budget > 0.0 else math.inf
     for uav_id, each in lists.items():
         flight = world.flights.of(uav_id, stamp)
         if flight is not None:
-            flights[uav_id] = _flight(each, world.list_of(uav_id), flight, stamp, rule)
+            flights[uav_id] = _flight(each, world.list_of(uav_id), flight, stamp, rule, until)
     return flights
 
 
 def _flight(each: UavList, published: UavList, flight: UavFlight, stamp: float,
-            rule: Separation) -> Flight:
+            rule: Separation, until: float) -> Flight:
+    """What a UAV flies by its list, up to a leg that ends after `until` [s] from now."""
     own, legs, place = _empty(each.uav, flight, rule), list[FlightLeg](), flight.position
+    clock = 0.0  # [s] from now
     for k, stop in enumerate(each.stops):
         takes_off = k == 0 and flight.on_ground
         under_way = k == 0 and not flight.on_ground and _same_leg(published, stop)
@@ -108,7 +123,9 @@ def _flight(each: UavList, published: UavList, flight: UavFlight, stamp: float,
         if begins > 0.0:  # it keeps the wait that it had, or less
             leg = replace(leg, hold_until=begins - own.leg_seconds(leg))
         legs.append(leg)
-        place = stop.task.position
+        place, clock = stop.task.position, leg_times(own, leg, clock, k == 0).end
+        if clock > until and k + 1 < len(each.stops):
+            return replace(own, legs=tuple(legs), goes_on=True)
     if each.returns and flight.home is not None and not (flight.on_ground and not each.stops):
         legs.append(FlightLeg((place, *each.end_via, flight.home), lands=True,
                               movable=bool(each.stops), may_wait=False))
@@ -150,7 +167,7 @@ def _changed_list(world: World, each: UavList, before: Flight, after: Flight,
         elif abs(new.hold_until - old.hold_until) > _LEAST:
             begin = max(0.0, round(stamp + new.hold_until + after.leg_seconds(new), 1))
         stops.append(replace(stop, leg=leg, begin_after=begin))
-    timed = timed_stops(stops, flight)
+    timed = timed_stops([*stops, *each.stops[len(stops):]], flight)
     end_via = _end_via(each, after)
     return replace(each, stops=timed, end_via=end_via,
                    distance=_length(timed, end_via, flight.home if each.returns else None))
