@@ -39,6 +39,7 @@ from uav_task_alloc.allocator.records import (
 from uav_task_alloc.allocator.replanning import planning
 from uav_task_alloc.geometry.frames import Origin
 from uav_task_alloc.mavlink.gcs.authority_store import AuthorityFileStore
+from uav_task_alloc.mavlink.gcs.energy_estimate import NominalEnergy
 from uav_task_alloc.mavlink.gcs.ground_station import GcsConfig, GroundStation, VehicleSession
 from uav_task_alloc.mavlink.gcs.policy import Policy
 from uav_task_alloc.mavlink.gcs.status import UavMode, state_of
@@ -236,6 +237,7 @@ class Fleet:
                                       self.now, self.now)
                 self.save()
         executor.notes.clear()
+        executor.energy.nominal = NominalEnergy(RANGE, ENDURANCE, 15.0)
         status, n = state_of(session, self.now), int(session.uav_id[4:])
         if status.available and n in self.changed_at and not self.vehicles[n].silent:
             del self.changed_at[n]
@@ -250,11 +252,11 @@ class Fleet:
             session.uav_id, status.position, status.home, cruise_speed=15.0,
             range=status.range_remaining if known else None,
             battery=status.battery if known else None,
-            endurance=ENDURANCE * status.battery or None if known else None,
+            endurance=status.endurance or None if known else None,
             available=status.available and status.mode is not UavMode.FAULT,
             active_task=status.active_task, list_revision=status.list_revision,
-            standby=status.mode is UavMode.STANDBY, full_range=RANGE, turnaround=TURNAROUND,
-            climb_speed=2.5, descent_speed=1.5), self.now, self.now)
+            standby=status.mode is UavMode.STANDBY, full_range=status.full_range,
+            turnaround=TURNAROUND, climb_speed=2.5, descent_speed=1.5), self.now, self.now)
 
     def allocate(self) -> None:
         """What the allocator does in a tick, with the solve at once."""

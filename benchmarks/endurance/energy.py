@@ -50,8 +50,9 @@ from uav_task_alloc.sim.wind import Wind
 from uav_task_alloc.solver.solve import plan
 
 ORIGIN = Origin(47.397742, 8.545594, 488.0)
-STEP, REPORT, ROUNDS = 0.25, 1.0, 5  # [s], [s], rounds of bees in one solve
+STEP, REPORT, ROUNDS = 0.25, 1.0, 60  # [s], [s], rounds of bees in one solve
 RESERVE, HEIGHT, TASKS = 0.2, 40.0, 30  # share, [m], in one flight
+PERIOD = 10.0  # [s] between two searches of the allocator
 LIMIT = 7200.0  # [s] after which a flight counts as lost
 STOP, DESCENT = 2.5, 1.5  # [m/s2] of the planned stops, [m/s]
 CLIMB_ENERGY = 1.6  # metres of level flight that a climb of one metre costs more
@@ -163,7 +164,7 @@ class Flight:
         self.oracle = Oracle(conditions, self.body) if oracle else None
         self.speed, self.least = conditions.speed, 1.0  # [m/s] over ground; charge
         params = AllocatorParams(route_end='home', battery_reserve=RESERVE,
-                                 background_period=45.0)
+                                 background_period=PERIOD)
         self.params, self.core = params, Allocator(params, 0.0)
         self.core.set_kernels_ready()
         self.core.world.announce(AnnouncementAction.ADD, conditions.tasks, 0.0, 0.0)

@@ -26,13 +26,15 @@ _JUMP = 0.05  # difference from a reading that shows another battery, or another
 _USUAL_TIME = 1200.0  # [s] that a copter flies where nothing is known of it
 _TIME_SHARE = 0.6  # of the drain at cruise speed that does not depend on the speed, a priori
 _CLIMB_METRES = 1.5  # metres of level flight that a climb of one metre costs more, a priori
-_NOMINAL = 0.2  # standard deviation of a stated range or endurance, as a share
+_WIND = 0.25  # of the terms of the wind, as a share of the level drain
+_STATED = 0.05  # standard deviation of what is stated for the vehicle as it was, as a share
+_NOMINAL = 0.3  # that of what payload and age change in all terms alike, as a share
 _SPREAD = 0.4  # a priori standard deviation of the other terms, as a share of the level drain
-_TAKEOFF = 0.15  # standard deviation of a change between two flights: payload, battery
+_TAKEOFF = 0.15  # standard deviation of such a change between two flights, as a share
 _DRIFT = 0.004  # of the terms in one second, as a share, by the root of time
 _MODEL = 0.02  # standard deviation of what the model does not have, as a share of what is used
-_KNOWN = 0.15  # standard deviation of the level drain, as a share, below which it is known
-_LEAST_USED = 0.02  # of the battery, until its drain is known
+_KNOWN = 0.25  # standard deviation of the level drain, as a share, below which it is known
+_LEAST_USED = 0.01  # of the battery, until its drain is known
 _LEAST_TERM = 0.1  # share of the prior level drain below which no sum of terms is believed
 
 _Floats = NDArray[np.float64]
@@ -126,13 +128,14 @@ class EnergyEstimate:
         self._x: _Floats = np.array([1.0, _TIME_SHARE * level * speed, (1.0 - _TIME_SHARE) * level,
                                     _CLIMB_METRES * level, 0.0, 0.0])
         self._cov: _Floats = np.diag([1.0, spread * speed, spread, _CLIMB_METRES * level,
-                                     spread, spread]) ** 2
+                                     _WIND * level, _WIND * level]) ** 2
         if nominal.full_range > 0.0:
             self._observe(np.array([0.0, 1.0 / speed, 1.0, 0.0, 0.0, 0.0]), level,
-                          _NOMINAL * level)
+                          _STATED * level)
         if nominal.endurance > 0.0:
             self._observe(np.array([0.0, 1.0, 0.0, 0.0, 0.0, 0.0]), 1.0 / nominal.endurance,
-                          _NOMINAL / nominal.endurance)
+                          _STATED / nominal.endurance)
+        self._change_all(_NOMINAL)
         self._share: float | None = None  # the last reading
         self._used = 0.0  # of the battery since the take-off
         self._flown = FlownAmount()  # since the last reading that changed
@@ -151,8 +154,13 @@ class EnergyEstimate:
     def took_off(self) -> None:
         """Begin a flight: payload and battery may be others."""
         self._used, self._flown = 0.0, FlownAmount()
-        terms = self._x[_TIME:]
-        self._cov[_TIME:, _TIME:] += np.diag((_TAKEOFF * terms) ** 2)
+        self._change_all(_TAKEOFF)
+
+    def _change_all(self, share: float) -> None:
+        """Let payload or age change time, metres and climbs by a common, unknown share."""
+        terms = self._x.copy()
+        terms[[_CHARGE, _EAST, _NORTH]] = 0.0
+        self._cov += share**2 * np.outer(terms, terms)
 
     def flew(self, amount: FlownAmount) -> None:
         """Add an amount that was flown."""

@@ -17,7 +17,7 @@ from uav_task_alloc.mavlink.gcs.telemetry import Telemetry
 from uav_task_alloc.mavlink.transport.codec import Message
 from uav_task_alloc.model import Point
 
-DEVIATIONS = 1.0  # of what is left: by that much less is published than is expected
+DEVIATIONS = 0.5  # of what is left: by that much less is published than is expected
 _LONGEST = 2.0  # [s] between two positions that their velocity still describes
 _FASTEST = 100.0  # [m/s] a larger displacement is a jump of the position
 _LEVEL = 0.5  # largest rise of level flight over its horizontal speed
