@@ -363,10 +363,9 @@ class MissionExecutor:
 
     def _resume(self, now: float) -> NextMessages:
         """After a restart of the bridge, complete the tasks flown in the meantime."""
-        onboard, telemetry = self.onboard, self.telemetry
+        onboard = self.onboard
         assert onboard.tasks is not None
-        if not onboard.resume.located and onboard.held and not telemetry.grounded and (
-                telemetry.current is None or not telemetry.has_position):
+        if onboard.resume.awaits_position(onboard.held or (), onboard.verified_at, now):
             return []  # its current item is not known yet
         onboard.resume.locate(onboard.held or (), onboard.tasks, now)
         onboard.complete_flown(now)

@@ -32,6 +32,7 @@ from uav_task_alloc.model import Point, Task
 _NEAR = 15.0  # [m] from the last item that counts as reached
 _MAX_CURRENTS = 512  # MISSION_CURRENT kept until the vehicle is located: four minutes
 _PLACE_DELAY = 2.0  # [s] after a REACHED in which a position still shows its place
+_LANDED_STATE_DELAY = 3.0  # [s] after the mission was read in which it comes, as a rule
 _MAX_UNREAD = 32  # REACHED kept until the mission is read
 MAX_AGE = 60.0  # [s] after the restart; a later task at the same position is a new one
 
@@ -149,6 +150,20 @@ class Resume:
             return self._progress.path.visited_at(
                 item.position, item.radius + LOOSE_RADIUS, -math.inf) is not None
         return math.dist(item.position, place) <= item.radius + LOOSE_RADIUS
+
+    def awaits_position(self, held: tuple[Item, ...], read_at: float, now: float) -> bool:
+        """Whether what locates the vehicle is still to come; on the ground nothing is needed.
+
+        Args:
+            held: the items on board, without home.
+            read_at: steady time [s] at which they were read.
+            now: steady time [s].
+        """
+        telemetry = self._telemetry
+        unknown = telemetry.current is None or not telemetry.has_position
+        in_air = telemetry.airborne or (
+            not telemetry.grounded and now - read_at < _LANDED_STATE_DELAY)
+        return bool(held) and not self.located and unknown and in_air
 
     def locate(self, held: tuple[Item, ...], tasks: TaskList, now: float) -> None:
         """Locate the vehicle in its onboard mission, once.
