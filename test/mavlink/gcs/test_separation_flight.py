@@ -1,8 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """Allocator, monitor and bridge keep simulated autopilots apart, by their true positions."""
+import math
+
 import pytest
 from allocation import greedy
 from flight_bench import FlightBench
+from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from uav_task_alloc.allocator import Allocator
 from uav_task_alloc.allocator.records import (
@@ -35,12 +38,13 @@ def monitor_alone(monkeypatch):
 class Sky(FlightBench):
     """UAVs that fly from one place to another by an allocator with its monitor."""
 
-    def __init__(self, kinds, ways, horizontal=10.0):
+    def __init__(self, kinds, ways, horizontal=10.0, height=50.0, tick=0.1, **params):
         places = {n: (*way[0], 0.0) for n, way in enumerate(ways, 1)}
         super().__init__(*kinds, configs={n: {'position': place} for n, place in places.items()},
-                         cruise_altitude=50.0)
+                         cruise_altitude=height, tick=tick)
         self.core = Allocator(AllocatorParams(
-            separation__horizontal=horizontal, background_budget=0.0, route_end='hold'), 0.0)
+            **{'separation__horizontal': horizontal, 'background_budget': 0.0,
+               'route_end': 'hold', **params}), 0.0)
         self.core.set_kernels_ready()
         self.judge, self.losses = SeparationJudge(10.0, 5.0), []
         self.alerts, self.held, self.allocated, self.taken = [], set(), 0.0, 0
@@ -48,7 +52,7 @@ class Sky(FlightBench):
         assert self.run(lambda: all(v.flight.positioned for v in self.vehicles.values()), 60.0)
         for n, way in enumerate(ways, 1):
             self.core.world.announce(AnnouncementAction.ADD, [Task(
-                f't{n}{k}', (*place, 50.0), allowed_uavs=frozenset({f'uav_{n}'}))
+                f't{n}{k}', (*place, height), allowed_uavs=frozenset({f'uav_{n}'}))
                 for k, place in enumerate(way)], self.now, self.now)
 
     def _move(self):
@@ -99,6 +103,10 @@ class Sky(FlightBench):
 
     def done(self, *numbers):
         return all(len(self.completed(n)) == 2 for n in numbers)
+
+    def home(self):
+        return all(v.flight.landed and not v.flight.armed and self.completed(n)
+                   for n, v in self.vehicles.items())
 
     def stop(self, n, mode):
         """A pilot sets a mode."""
@@ -172,3 +180,25 @@ def test_with_plans_and_monitor_all_tasks_are_flown_apart(kinds, ways):
     sky = Sky(kinds, ways)
     assert sky.run(lambda: sky.done(1, 2), 300.0)
     assert not sky.losses
+
+
+@pytest.mark.parametrize('ways', [
+    [((-150.0, 0.0), EAST), ((-250.0, 0.0), (200.0, 3.0))],
+    [(WEST, (3.0, 0.0)), (SOUTH, (0.0, 3.0))]], ids=['one behind the other', 'to one place'])
+def test_uavs_that_fly_the_same_way_or_to_one_place_stay_apart(ways):
+    sky = Sky(('ardupilot', 'px4'), ways)
+    sky.run(lambda: sky.done(1, 2), 150.0)
+    assert not sky.losses
+    assert sky.done(1) or sky.done(2)
+
+
+def test_ten_uavs_of_one_base_take_off_and_land_apart_by_items_that_land():
+    ways = [[(12.0 * (n % 5), 12.0 * (n // 5)),
+             (120.0 * math.cos(0.6 * n), 120.0 * math.sin(0.6 * n))] for n in range(10)]
+    sky = Sky(('ardupilot', 'px4') * 5, ways, height=20.0, tick=0.4, route_end='home')
+    for n in range(1, 11):  # only the task away from the base
+        sky.core.world.cancel([f't{n}0'], sky.now, sky.now)
+    assert sky.run(sky.home, 500.0)
+    assert not sky.losses
+    for vehicle in sky.vehicles.values():
+        assert vehicle.flight.items[-1].command == dialect.MAV_CMD_NAV_LAND
