@@ -2,7 +2,7 @@
 """Which zone the straight return path enters in plan view: RTL flies it at its own height."""
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 
 from uav_task_alloc.geometry.polygon import XY, contains_point, edges, segments_cross
 from uav_task_alloc.geometry.polyline import segment_distance
@@ -19,8 +19,13 @@ def zone_across_path(a: Point, b: Point, zones: Iterable[ThreatZone]) -> ThreatZ
     Returns:
         The zone; None where the path is clear, or an end is not known (NaN).
     """
+    return next(zones_across_path(a, b, zones), None)
+
+
+def zones_across_path(a: Point, b: Point, zones: Iterable[ThreatZone]) -> Iterator[ThreatZone]:
+    """Find all zones that the vertical plane through a path enters; see `zone_across_path`."""
     start, end = (a[0], a[1]), (b[0], b[1])
-    return next((zone for zone in zones if _enters(start, end, zone)), None)
+    return (zone for zone in zones if _enters(start, end, zone))
 
 
 def _enters(a: XY, b: XY, zone: ThreatZone) -> bool:

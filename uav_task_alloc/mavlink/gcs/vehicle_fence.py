@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 
 from pymavlink.dialects.v20 import ardupilotmega as d
 
+from uav_task_alloc.errors import first_of
 from uav_task_alloc.geometry.frames import Origin
 from uav_task_alloc.mavlink.autopilots import Profile
 from uav_task_alloc.mavlink.fence.choice import Fence, FlightSpace, choose_fence
@@ -28,7 +29,7 @@ from uav_task_alloc.mavlink.gcs.authority import Authority, SendAction
 from uav_task_alloc.mavlink.gcs.onboard_mission import OnboardMission
 from uav_task_alloc.mavlink.gcs.policy import Policy
 from uav_task_alloc.mavlink.gcs.rally_transfer import RALLY_BUDGET, RallyTransfer
-from uav_task_alloc.mavlink.gcs.return_path import zone_across_path
+from uav_task_alloc.mavlink.gcs.return_path import zones_across_path
 from uav_task_alloc.mavlink.gcs.telemetry import Telemetry
 from uav_task_alloc.mavlink.mission.peer import Peer
 from uav_task_alloc.mavlink.transport.codec import Message
@@ -228,12 +229,10 @@ class VehicleFence:
     @property
     def warning(self) -> str:
         """What an operator should know before a flight; '': nothing."""
-        if not self.active:
-            return ''
-        parts = [] if self.verified else [f'fence {self.text}']
-        if self.parameters.enabled is False and self.fence.shapes:
+        parts = [f'fence {self.text}'] if self.active and not self.verified else []
+        if self.active and self.parameters.enabled is False and self.fence.shapes:
             parts.append(f'fence {self.parameters.text}')
-        if self.fence.no_space or self.fence.waiting:
+        if self.active and (self.fence.no_space or self.fence.waiting):
             parts.append(f'fence without {self.left_out}')
         if self.way_home:
             parts.append(f"a failsafe's straight way home crosses {self.way_home}")
@@ -241,17 +240,17 @@ class VehicleFence:
 
     @property
     def way_home(self) -> str:
-        """What a failsafe would cross, flying straight home from here; '': no zone."""
+        """The zones that a failsafe would cross, flying straight home from here; '': none."""
         telemetry = self._telemetry
         if not telemetry.airborne or not telemetry.has_position or telemetry.home is None:
             return ''
         if self.verified and self.parameters.plans_around:
             return ''
         height = max(telemetry.position[2], telemetry.home[2] + self.parameters.return_height)
-        zone = zone_across_path(telemetry.position, telemetry.home, (
+        crossed = [zone.id for zone in zones_across_path(telemetry.position, telemetry.home, (
             zone for zone in self._policy().zones
-            if vertical_extent(zone)[0] < height < vertical_extent(zone)[1]))
-        return '' if zone is None else f'zone {zone.id}'
+            if vertical_extent(zone)[0] < height < vertical_extent(zone)[1]))]
+        return f'zone{"s" * (len(crossed) > 1)} {first_of(crossed)}' if crossed else ''
 
     def _report(self) -> None:
         """Log the state when it changes."""
