@@ -45,7 +45,7 @@ def flown_return(kind, parameters, seed):
     bench = FenceBench(kind, zones=zones, seed=seed, config={
         'parameters': parameters, 'position': (0.0, 0.0, 0.0)}).settle()
     uav = Uav('uav_1', (0.0, 0.0, HEIGHT), home=(0.0, 0.0, 0.0))
-    result = plan([uav], tasks, zones, budget=0.05, seed=seed, clearance=10.0, max_iterations=30)
+    result = plan([uav], tasks, zones, budget=30.0, seed=seed, clearance=10.0, max_iterations=30)
     route = Route('uav_1', result.routes['uav_1'], result.legs['uav_1'])
     bench.assign(list_for_route(route, {task.id: task for task in tasks}))
     assert bench.run(lambda: bench.started())
