@@ -290,4 +290,3 @@ class Approvals:
         self._world.proposal = proposal
         self._world.outbox.proposal = proposal
         self._world.mark_unsaved('proposal')
-
