@@ -24,11 +24,11 @@ demo: build
 test: build checked
 	@echo '== pytest, $(WORKERS) at a time' && $(RUN) && REQUIRE_ROS=1 python3 -m pytest -n $(WORKERS) --dist worksteal --durations 15
 
-# Collecting compiles the tests once for all workers; it takes what waits for no kernels
+# What waits for no kernels. Collecting compiles the tests once for all workers; pytest shows its errors below
 checked: install/.built
 	@echo '== ruff, mypy' && .ros/bin/ruff check . && .ros/bin/mypy
 	@tools/browser.sh .ros > /dev/null
-	@$(RUN) && REQUIRE_ROS=1 python3 -m pytest --collect-only > /dev/null
+	@$(RUN) && REQUIRE_ROS=1 python3 -m pytest --collect-only > /dev/null || :
 
 # Line coverage of the package without nodes; below the floor of setup.cfg it fails
 coverage: build
