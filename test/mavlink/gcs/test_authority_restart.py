@@ -155,6 +155,21 @@ def replacing(moment, kind='ardupilot', speed=0.0):
     return bench
 
 
+def test_an_item_passed_before_a_kill_counts_where_it_is_held_for_a_replacement():
+    bench = flying('ardupilot', 'ABCD')
+    bench.line.tampers.append(lambda direction, m, now: [] if (
+        m.get_type() == 'MISSION_ITEM_REACHED') else None)
+    assert bench.run(lambda: places(bench) == ['A'])
+    bench.run(limit=0.6)
+    assert bench.completed() == []  # its REACHED is awaited
+    bench.vehicles[1].rc_mode(COPTER.hold)
+    bench.run(limit=0.2)
+    bench.kill_and_restart(0.2)
+    bench.assign(task_list('BAC', 2))
+    bench.run(limit=4.0)
+    assert 'A' in bench.completed()
+
+
 @pytest.mark.parametrize(('dead', 'state'), [(5.0, H), (50.0, H), (65.0, L)])
 def test_held_for_a_replacement_it_stays_held_for_a_minute(dead, state):
     bench = replacing(2.0)

@@ -190,10 +190,10 @@ class OnboardMission:
         return first is not None and first.task in self.progress.completed
 
     def next_unflown(self) -> int | None:
-        """Seq to continue at during the readback of a replacement that starts at a flown task."""
+        """Seq to continue at where it flies to a flown task during a transfer (PX4)."""
         progress, item = self.progress, self.progress.active
-        if self._uploading is None or not self._taken or not self._profile.atomic or (
-                item is None or item.task not in progress.completed):
+        if self._uploading is None or not (self._taken or not self._may_be_of_new) or (
+                not self._profile.atomic or item is None or item.task not in progress.completed):
             return None
         return next((n for n, other in enumerate(progress.items[:progress.last_flown + 1])
                      if n > (progress.current or 0) and other.task not in progress.completed),

@@ -178,14 +178,15 @@ class Resume:
             self.located = self.located or not held
             return
         self.located = True
-        self._find_upload(held)
+        replaced = self._find_upload(held)
         mission, recorded, _ = self.recorded
         if self._passed_recorded and mission == checksum(held) and recorded is not None:
             self._flown += held[recorded:recorded + 1]
             self._reached += held[recorded:recorded + 1]
             self._until = now + MAX_AGE
         if self.current_unreliable or (self.was_disarmed and not telemetry.airborne) or (
-                not self._profile.atomic and telemetry.mode is not ModeFunction.MISSION):
+                not self._profile.atomic and telemetry.mode is not ModeFunction.MISSION
+                and (replaced or not self._continues_recorded(held))):
             self._credit_unread(held, now)
             self._progress.begin(held, None, now)  # the current item may be of the old mission
             self._epoch, self._located_at = self._progress.epoch, 0
@@ -212,11 +213,13 @@ class Resume:
         if not self._rebooted and (telemetry.airborne or tasks.revision > 1):
             self._until = now + MAX_AGE
 
-    def _find_upload(self, held: tuple[Item, ...]) -> None:
-        """Continue at its first item where the recorded upload is on board."""
+    def _find_upload(self, held: tuple[Item, ...]) -> bool:
+        """Continue at its first item where the recorded upload is on board, and whether it is."""
         upload = self.recorded_upload
-        if len(upload) == 2 and upload[0] == checksum(held) != self.recorded[0]:
-            self.recorded = upload[0], upload[1], False
+        if len(upload) != 2 or not upload[0] == checksum(held) != self.recorded[0]:
+            return False
+        self.recorded = upload[0], upload[1], False
+        return True
 
     def _continues_recorded(self, held: tuple[Item, ...]) -> bool:
         """Whether the vehicle flies the recorded mission on from the recorded item."""
