@@ -36,6 +36,7 @@ LEVELS = {
     'kernel_cache': 1,
     'kernel': 1,
     'kernel_inner': 1,
+    'kernel_shortcuts': 1,
     'zone_codec': 1,
     'geometry.polygon': 0,  # `checks` checks polygons with it
     'geometry': 2,

@@ -21,6 +21,7 @@ from numba import types
 from numba.core.registry import CPUDispatcher
 
 from uav_task_alloc.kernel_cache import ON_DISK, install
+from uav_task_alloc.kernel_shortcuts import shortcuts
 
 NJIT: Any = numba.njit  # its stubs do not know all options
 _Function = TypeVar('_Function', bound=Callable[..., Any])
@@ -34,6 +35,11 @@ class _Kernel(CPUDispatcher):
     def get_call_template(self, args: Any, kws: Any) -> Any:
         return super().get_call_template(
             tuple(types.unliteral(each) for each in args), kws)  # type: ignore[no-untyped-call]
+
+    def compile(self, sig: Any) -> Any:
+        """Compile it for some types, or load it."""
+        with shortcuts():
+            return super().compile(sig)
 
 
 class _InnerKernel(_Kernel):
@@ -122,6 +128,20 @@ def _inner_options() -> dict[str, Any]:
     except (ImportError, AttributeError):  # of another version; the kernels are the same without
         return {}
     return {'pipeline_class': InnerCompiler} if replaces_known_methods() else {}
+
+
+def c_function(function: Callable[..., Any], signature: Any) -> Any:
+    """Compile a function whose address kernels call.
+
+    Args:
+        function: takes and returns numbers.
+        signature: numba's, of its types.
+
+    Returns:
+        The compiled function; cached on disk.
+    """
+    with shortcuts():
+        return numba.cfunc(signature, cache=True)(function)
 
 
 def _compiled(kind: type[_Kernel], function: _Function, **options: Any) -> _Function:

@@ -22,6 +22,7 @@ from typing import Any, NamedTuple, TextIO
 
 from numba.core import caching, event
 
+_COMPILER_SOURCES = 'kernel.py', 'kernel_inner.py', 'kernel_shortcuts.py', 'model.py'
 ROOMS = ('geometry', 'separation', 'solver')
 
 
@@ -56,9 +57,9 @@ class Work(NamedTuple):
 NO_WORK = Work(0.0, 0)
 # chain_q up to its first plan, its search; the same of problems with time; paths around zones;
 # on a core of an Intel Xeon server
-FIRST_WORK, SEARCH_WORK = Work(7.0, 28), Work(9.0, 54)
-TIMED_FIRST_WORK, TIMED_SEARCH_WORK = Work(15.0, 71), Work(7.0, 20)
-ZONES_WORK = Work(13.0, 102)
+FIRST_WORK, SEARCH_WORK = Work(6.0, 28), Work(7.0, 54)
+TIMED_FIRST_WORK, TIMED_SEARCH_WORK = Work(12.0, 71), Work(6.0, 20)
+ZONES_WORK = Work(10.0, 103)
 _UNUSED = 600.0  # [s] a folder of another hash is kept after the last write: it may be in use
 _SELDOM = 300_000, 50, 1000  # thresholds of the garbage collection, else a tenth of a load
 _COUNT_ON = 10  # kernels, before the time left follows from them
@@ -71,7 +72,7 @@ def kernel_sources(root: Path = Path(__file__).parent) -> list[Path]:
     """Files whose code or constants are compiled into kernels: those that use numba, model.py."""
     files = [path for room in ROOMS for path in (root / room).rglob('*.py')]
     return sorted([path for path in files if re.search('numba|kernel', path.read_text())]
-                  + [root / name for name in ('kernel.py', 'kernel_inner.py', 'model.py')])
+                  + [root / name for name in _COMPILER_SOURCES])
 
 
 @functools.cache

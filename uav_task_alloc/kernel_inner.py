@@ -18,7 +18,7 @@ _register_pass: Any = register_pass  # without types
 # methods that are called or replaced here, with their arguments
 _LIBRARY = {'__init__': ('codegen', 'name'), '_optimize_final_module': (),
             '_finalize_final_module': (), 'get_pointer_to_function': ('name',),
-            'enable_object_caching': ()}
+            'enable_object_caching': (), '_optimize_functions': ('ll_module',)}
 _LOWERING = {'run_pass': ('state',)}
 
 
@@ -61,11 +61,35 @@ class _InnerLibrary(JITCodeLibrary):
         """No address."""
         return 0
 
+    def _optimize_functions(self, ll_module: Any) -> None:
+        """Only make the code short: all passes run over the caller's code."""
+        passes: Any = self._codegen._function_pass_manager
+        usual: Any = super()._optimize_functions
+        if tuple(signature(passes).parameters) != ('kwargs',):  # of another version
+            usual(ll_module)
+            return
+        ll_module.data_layout = self._codegen._data_layout
+        manager, builder = passes(opt=1, loop_vectorize=False)
+        for function in ll_module.functions:
+            if not function.is_declaration:
+                manager.run(function, builder)
+
     def _optimize_final_module(self) -> None:
         """The caller's code is optimised with it."""
 
     def _finalize_final_module(self) -> None:
         self._finalized = True
+
+
+def begin_inner_library(state: Any) -> None:
+    """Put the code of a function that is compiled into an _InnerLibrary.
+
+    Args:
+        state: of numba's compiler.
+    """
+    kind: Any = _InnerLibrary
+    state.library = kind(state.targetctx.codegen(), state.func_id.func_qualname)
+    state.library.enable_object_caching()
 
 
 @_register_pass(mutates_CFG=True, analysis_only=False)
@@ -76,9 +100,7 @@ class _InnerLowering(NativeLowering):
 
     def run_pass(self, state: Any) -> bool:
         """Lower a kernel for kernels."""
-        kind: Any = _InnerLibrary
-        state.library = kind(state.targetctx.codegen(), state.func_id.func_qualname)
-        state.library.enable_object_caching()
+        begin_inner_library(state)
         return bool(super().run_pass(state))  # type: ignore[no-untyped-call]
 
 

@@ -125,10 +125,13 @@ def escape_point(zones: Zones, p: Floats, limits: Floats, work: Ints) -> Floats:
     Returns:
         float64 (3,) [m]; NaN: there is none, or the search was cut short (work[2]).
     """
-    best = np.array([np.inf, 0.0, 0.0])
+    best, out = np.zeros(3), np.empty(3)
+    best[0] = np.inf
     _initial_directions(zones, p, limits, best, work)
     if math.isinf(best[0]):
-        return np.full(3, np.nan)
+        for m in range(3):
+            out[m] = np.nan
+        return out
     step = math.pi / _DIRECTIONS
     for _ in range(24):
         az, up = best[1], best[2]
@@ -138,7 +141,7 @@ def escape_point(zones: Zones, p: Floats, limits: Floats, work: Ints) -> Floats:
                 or _try_direction(zones, p, az, up - step, limits, best, work)):
             step *= 0.5
     t, c = best[0], math.cos(best[2])
-    out = np.array([math.cos(best[1]) * c, math.sin(best[1]) * c, math.sin(best[2])])
-    out *= t
-    out += p
+    out[0] = math.cos(best[1]) * c * t + p[0]
+    out[1] = math.sin(best[1]) * c * t + p[1]
+    out[2] = math.sin(best[2]) * t + p[2]
     return out

@@ -19,7 +19,7 @@ from uav_task_alloc.geometry.points import copy_point, path_length, reverse_poin
 from uav_task_alloc.geometry.search_budget import SearchBudget, is_exhausted, new_work
 from uav_task_alloc.geometry.shortest_path import path_clears, shortest_path
 from uav_task_alloc.geometry.taut import MAX_CORNERS
-from uav_task_alloc.kernel import allocating_kernel, inner_allocating_kernel
+from uav_task_alloc.kernel import allocating_kernel, c_function, inner_allocating_kernel
 
 OUTSIDE, WITHIN_SKIN, INSIDE = 0, 1, 2
 LOCATION_INDEX, BUDGET_INDEX = 3, 7  # in scene_addresses
@@ -221,7 +221,7 @@ def _time(address: int, i: int, j: int) -> float:
 @functools.cache
 def _compiled(function: Any) -> Any:
     signature = numba.float64(numba.int64, numba.int64, numba.int64)
-    return numba.cfunc(signature, cache=True)(function)
+    return c_function(function, signature)
 
 
 def find_address(zones: bool) -> int:

@@ -149,6 +149,17 @@ def _add_overlapping(zones: Zones, blocking: Ints, before: Ints) -> None:
 
 
 @inner_allocating_kernel
+def _marked(blocking: Ints, least: int) -> Ints:
+    """Indices of zones whose mark is at least `least`; O(zones)."""
+    marked, n = np.empty(blocking.size, np.int64), 0
+    for k in range(blocking.size):
+        if blocking[k] >= least:
+            marked[n] = k
+            n += 1
+    return marked[:n]
+
+
+@inner_allocating_kernel
 def _search(zones: Zones, ends: Floats, limits: Floats, floor: float, no_skin: bool, ring: int,
             known: float, blocking: Ints, out: Floats, work: Ints) -> int:
     """Write a clear, coarse path of at most `known` [m] into `out`; marks the zones it considers.
@@ -158,7 +169,7 @@ def _search(zones: Zones, ends: Floats, limits: Floats, floor: float, no_skin: b
     """
     tries = 0
     while True:
-        active = np.flatnonzero(blocking)
+        active = _marked(blocking, 1)
         x = _graph_corners(zones, active, ends, limits, floor, no_skin, ring, known, work)
         if work[2]:
             return 0
@@ -166,7 +177,9 @@ def _search(zones: Zones, ends: Floats, limits: Floats, floor: float, no_skin: b
         size = astar(zones, active, x, floor, no_skin, path, work)
         if size == 0 or size > MAX_CORNERS // 2:
             return 0
-        new, before = 0, blocking.copy()
+        new, before = 0, np.empty(blocking.size, np.int64)
+        for k in range(blocking.size):
+            before[k] = blocking[k]
         for i in range(size):
             copy_point(x, path[i], out, i)
             if i:
@@ -233,10 +246,10 @@ def shortest_path(zones: Zones, ends: Floats, limits: Floats, no_skin: bool, out
         known = path_length(out, n) if n else np.inf
         size = _search(zones, ends, limits, floor, no_skin, ring, known, blocking, trial, work)
         n = keep_best(trial, size, out, n)
-        if work[2] or (n and (ring > _RINGS[0] or blocking.sum() <= FEW_ZONES)):
+        if work[2] or (n and (ring > _RINGS[0] or _marked(blocking, 1).size <= FEW_ZONES)):
             break
     if n == 0:
         return 0, np.nan if work[2] else np.inf
-    near = zones_near(zones, np.arange(zones.size), ends, 0, 1, path_length(out, n))
+    near = zones_near(zones, _marked(blocking, 0), ends, 0, 1, path_length(out, n))
     n = tauten(zones, near, out, n, limits, floor, no_skin, work)
     return n, path_length(out, n)

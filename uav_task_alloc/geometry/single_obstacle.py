@@ -236,7 +236,8 @@ def path_past_zone(zone: Zone, ends: Floats, limits: Floats, floor: float,
     Returns:
         Its number of points; 0: there is no closed form.
     """
-    skin, centre = 1.5 * zone.skin, np.array([zone.x, zone.y, zone.z])
+    skin, centre = 1.5 * zone.skin, np.empty(3)
+    centre[0], centre[1], centre[2] = zone.x, zone.y, zone.z
     if zone.kind == DOME:
         n = _tangent_path(centre, zone.radius + skin, ends, False, out) if floor >= zone.low else 0
         for i in range(1, n - 1):

@@ -278,10 +278,10 @@ def astar(zones: Zones, active: Ints, x: Floats, floor: float, no_skin: bool, pa
     """
     n, boxes = x.shape[0], _boxes(zones, active)
     lazy = n <= FEW_CORNERS
-    cost, state = np.full(n, np.inf), np.zeros(n, np.int8)
-    parent, closed, ahead = np.full(n, -1), np.empty(n, np.int64), np.empty(n)
+    cost, state = np.empty(n), np.zeros(n, np.int64)
+    parent, closed, ahead = np.empty(n, np.int64), np.empty(n, np.int64), np.empty(n)
     for v in range(n):
-        ahead[v] = point_distance(x, v, x, 0)
+        cost[v], parent[v], ahead[v] = np.inf, -1, point_distance(x, v, x, 0)
     cost[1], state[1], closed[0], done, u = 0.0, 1, 1, 1, 1
     while True:
         for v in range(n):

@@ -92,7 +92,8 @@ def reduced_costs(a: Arrays, pool: Pool, flown: Ints, worth: float,
     many stops of the pool may be read.
     """
     price = _first_prices(a, pool, flown)
-    best_price, highest, length, stalled = price.copy(), -np.inf, 1.0, 0
+    best_price, highest, length, stalled = np.empty(price.size), -np.inf, 1.0, 0
+    _copy(price, best_price)
     reduced, least = np.empty(pool.size[0]), np.empty(a.uavs)
     chosen, served = np.empty(a.uavs, np.int64), np.empty(a.ends, np.int64)
     steps = work / max(1, pool.first[pool.size[0]])
@@ -111,7 +112,7 @@ def reduced_costs(a: Arrays, pool: Pool, flown: Ints, worth: float,
         _count(pool, chosen, served)
         violation = 0
         for t in range(a.uavs, a.ends):
-            violation += (served[t] - 1) ** 2
+            violation += (served[t] - 1) * (served[t] - 1)
         if violation == 0 or highest >= worth - TINY:
             break
         stride = length * (worth - bound) / violation

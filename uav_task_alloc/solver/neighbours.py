@@ -20,15 +20,19 @@ _NOISE = 4096  # random numbers drawn once; each task reads them from a random o
 
 
 @inner_allocating_kernel
-def _cells(xyz: Floats, per_cell: float) -> tuple[Ints, Ints, Ints, Floats]:
+def _cells(xyz: Floats, per_cell: float) -> tuple[Ints, Ints, Ints, float]:
     """Points (n, 3) sorted into square cells, O(n).
 
     Returns the cell of each point (n), the first index of each cell in the order, with one more
-    entry for the end, the order (n), and (x0, y0, side) of the grid [m].
+    entry for the end, the order (n), and the side of a cell [m].
     """
     n = len(xyz)
-    x0, y0 = xyz[:, 0].min(), xyz[:, 1].min()
-    wide = max(xyz[:, 0].max() - x0, xyz[:, 1].max() - y0, 1e-6)
+    x0, y0 = xyz[0, 0], xyz[0, 1]
+    x1, y1 = x0, y0
+    for i in range(1, n):
+        x0, y0 = min(x0, xyz[i, 0]), min(y0, xyz[i, 1])
+        x1, y1 = max(x1, xyz[i, 0]), max(y1, xyz[i, 1])
+    wide = max(max(x1 - x0, y1 - y0), 1e-6)
     across = max(1, int(math.sqrt(n / per_cell)))
     side = wide / across * (1.0 + 1e-9)
     cell = np.empty(n, np.int64)
@@ -38,11 +42,13 @@ def _cells(xyz: Floats, per_cell: float) -> tuple[Ints, Ints, Ints, Floats]:
         first[cell[i] + 1] += 1
     for i in range(1, first.size):
         first[i] += first[i - 1]
-    order, fill = np.empty(n, np.int64), first.copy()
+    order, fill = np.empty(n, np.int64), np.empty(first.size, np.int64)
+    for i in range(first.size):
+        fill[i] = first[i]
     for i in range(n):
         order[fill[cell[i]]] = i
         fill[cell[i]] += 1
-    return cell, first, order, np.array((x0, y0, side))
+    return cell, first, order, side
 
 
 @inner_kernel
@@ -77,8 +83,8 @@ def find_nearest(xyz: Floats, near: Ints, fresh: Ints) -> Floats:
     squares = np.empty((n, k))
     if k == 0:
         return squares
-    cell, first, order, frame = _cells(xyz, 3.0)
-    side, across = frame[2], int(math.sqrt(first.size - 1) + 0.5)
+    cell, first, order, side = _cells(xyz, 3.0)
+    across = int(math.sqrt(first.size - 1) + 0.5)
     held = np.empty(k, np.int64)
     for i in range(n):
         if near[i, 0] >= 0:
@@ -140,10 +146,11 @@ def fill_near_starts(a: Arrays, xyz: Floats, rng: RngState) -> None:
     """
     n, s = a.starts.shape
     squares, squared, shuffled = np.empty(s), np.empty(a.uavs), np.empty(a.uavs)
-    xs, ys, zs = xyz[:a.uavs, 0].copy(), xyz[:a.uavs, 1].copy(), xyz[:a.uavs, 2].copy()
-    most = np.full(a.uavs, np.inf)  # [m^2] squared range
-    if a.hard:
-        for u in range(a.uavs):
+    xs, ys, zs = np.empty(a.uavs), np.empty(a.uavs), np.empty(a.uavs)
+    most = np.empty(a.uavs)  # [m^2] squared range
+    for u in range(a.uavs):
+        xs[u], ys[u], zs[u], most[u] = xyz[u, 0], xyz[u, 1], xyz[u, 2], np.inf
+        if a.hard:
             most[u] = (a.range_left[u] + TINY) ** 2 if a.range_left[u] >= 0.0 else -1.0
     noise = np.empty(_NOISE + a.uavs)
     for m in range(noise.size):

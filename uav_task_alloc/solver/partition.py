@@ -135,7 +135,9 @@ def _branches(pool: Pool, columns: Ints, tasks: Ints, nodes: int) -> Branches:
     _sort(order, counts)
     for i in range(nodes):
         begin[i + 1] += begin[i]
-    column, fill = np.empty(begin[nodes], np.int64), begin.copy()
+    column, fill = np.empty(begin[nodes], np.int64), np.empty(nodes, np.int64)
+    for i in range(nodes):
+        fill[i] = begin[i]
     for e in columns:
         for i in range(pool.first[e], pool.first[e + 1]):
             column[fill[pool.stops[i]]] = e

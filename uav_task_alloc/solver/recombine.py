@@ -35,12 +35,13 @@ def _group(a: Arrays, pool: Pool, uav_of: Ints, flown: Ints, seed: int) -> Flags
         in_group[added] = True
         e = flown[added]
         if e >= 0:
-            for t in pool.stops[pool.first[e]:pool.first[e + 1]]:
-                for c in a.near[t - a.uavs, :_NEAR_TASKS]:
-                    if uav_of[c] >= 0:
-                        adjacency[uav_of[c]] += 1
-                for s in a.starts[t - a.uavs]:
-                    adjacency[s] += 1
+            for i in range(pool.first[e], pool.first[e + 1]):
+                t = pool.stops[i] - a.uavs
+                for k in range(min(_NEAR_TASKS, a.near.shape[1])):
+                    if uav_of[a.near[t, k]] >= 0:
+                        adjacency[uav_of[a.near[t, k]]] += 1
+                for k in range(a.starts.shape[1]):
+                    adjacency[a.starts[t, k]] += 1
         most = -1
         for u in range(a.uavs):
             if (adjacency[u] if not in_group[u] else -1) > most:
@@ -57,8 +58,9 @@ def _tasks_of(a: Arrays, uav_of: Ints, group: Flags) -> Ints:
             in_group[t] = group[uav_of[t]]
         else:
             in_group[t] = a.uavs <= GROUP_SIZE
-            for c in a.near[t - a.uavs, :_NEAR_TASKS]:
-                in_group[t] |= uav_of[c] >= 0 and group[uav_of[c]]
+            for k in range(min(_NEAR_TASKS, a.near.shape[1])):
+                u = uav_of[a.near[t - a.uavs, k]]
+                in_group[t] |= u >= 0 and group[u]
     tasks, count = np.empty(a.ends, np.int64), 0
     for t in range(a.uavs, a.ends):
         if in_group[t]:
