@@ -101,9 +101,12 @@ class AuthorityWatchState:
         """
         if event not in _BATTERY_CHANGE_EVENTS:
             self.landed_battery, self.rebooted_on_ground = math.nan, False
-        before, self.authority.awaits_battery = self.authority.state, self.rebooted_on_ground
+        before, back = self.authority.state, self.authority.given_back_by
+        self.authority.awaits_battery = self.rebooted_on_ground
         if not self.authority.apply(event, now, why):
-            return
+            if self.authority.given_back_by == back:
+                return
+            why = self.authority.why  # what gives it back has changed
         state = self.authority.state
         if state is AuthorityState.LOST and before is not AuthorityState.LOST:
             self.unexplained, self.rest = None, None
