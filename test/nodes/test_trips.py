@@ -67,8 +67,9 @@ def test_a_uav_flies_on_after_its_battery_was_changed(nodes, probe, tmp_path):
     assert any(state.active_task_id == completed()[1] for state in states[changed:])
     assert m.UavState.FAULT not in {state.mode for state in states}
     log = nodes['allocator'].output()
-    out = re.search('turns home: the last moment by its battery|below the reserve, it returns', log)
-    assert out and out.start() < log.index('above the reserve again')
+    out = re.search('turns home: the last moment by its battery|below the reserve', log)
+    assert out is not None
+    assert out.start() < log.index('above the reserve again')
     assert 'authority HELD: its battery was changed' in nodes['mavlink_bridge'].output()
     nodes['fleet_sim'].stop()
     rows = [json.loads(line) for line in (tmp_path / 'truth.jsonl').read_text().splitlines()]
