@@ -26,9 +26,9 @@ from uav_task_alloc.separation.monitor import (
     SeparationMonitor,
 )
 from uav_task_alloc.separation.prediction import HORIZON, Way
+from uav_task_alloc.separation.rule import FORGOTTEN
 
 _PERIOD = 0.5  # [s] of the published clock between two steps
-_FORGOTTEN = 30.0  # [s] of the published clock for which a silent UAV is still predicted
 _ARMING = 3.0  # [s] on the ground before it climbs
 _SETS_OUT = 4.0  # [s] between the end of a take-off and the leg
 _ACCELERATION = 2.5  # [m/s2]
@@ -94,7 +94,7 @@ class SeparationWatch:
         hold = self._world.orders.holds.get(uav_id)
         is_held = hold is not None and hold.hold
         silent = self._silent_for(uav_id, record, stamp)
-        if silent > _FORGOTTEN or flight is None:
+        if silent > FORGOTTEN or flight is None:
             return None
         if report.standby:
             stops = self._stops(uav_id, stamp, flight)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from uav_task_alloc.checks import check_number
 from uav_task_alloc.errors import InvalidValue
 
+FORGOTTEN = 30.0  # [s] for which a UAV that reports no more is in the way of others
 _LIMITS = (('horizontal', 1e4), ('vertical', 1e4), ('time', 3600.0), ('speed_error', 1.0),
            ('horizon', 3600.0))
 

@@ -120,6 +120,26 @@ def test_a_plan_that_ends_before_all_are_apart_is_completed_by_the_next_ones():
     assert not [each for each in conflicts(driver) if 0 in each.legs]
 
 
+def test_a_uav_lost_above_the_base_lets_the_others_take_off_after_half_a_minute():
+    driver = AllocatorDriver(route_end='home', uav_timeout=3.0, **ON)
+    driver.uav('lost', 4.0, 0.0, 40.0, home=(4.0, 0.0, 0.0), **SPEEDS)
+    driver.uav('u', 0.0, 0.0, 0.0, home=(0.0, 0.0, 0.0), standby=True, **SPEEDS)
+    driver.add(Task('t', (0.0, 300.0, 50.0), allowed_uavs={'u'}))
+    driver.settle()
+    assert driver.lists['u'].stops[0].wait > 5.0  # until it has landed
+    waits = []
+    for _ in range(8):
+        driver.now += 6.0
+        driver.uav('u', 0.0, 0.0, 0.0, home=(0.0, 0.0, 0.0), standby=True, **SPEEDS)
+        driver.core.tick(driver.now, driver.now)
+        driver.world.request_replan('test', driver.now)
+        driver.settle(report=False)
+        waits.append(driver.world.lists.restamped(
+            'u', driver.now, driver.world.flights.of('u', driver.now)).stops[0].wait)
+    assert driver.world.uav_record('lost').silent
+    assert waits[-1] == 0.0
+
+
 def test_two_legs_under_way_that_meet_are_logged_once():
     driver = AllocatorDriver()
     driver.uav('a', 0.0, 200.0, 50.0, **SPEEDS)

@@ -97,7 +97,7 @@ def _flights(world: World, lists: Mapping[str, UavList], stamp: float) -> dict[s
     until = _AHEAD * rule.horizon if world.params.background_budget > 0.0 else math.inf
     for uav_id, each in lists.items():
         flight = world.flights.of(uav_id, stamp)
-        if flight is not None:
+        if flight is not None and not world.flights.is_forgotten(uav_id, stamp):
             flights[uav_id] = _flight(each, world.list_of(uav_id), flight, stamp, rule, until)
     return flights
 

@@ -17,6 +17,7 @@ from uav_task_alloc.allocator.state.published_lists import PublishedLists
 from uav_task_alloc.allocator.state.wind import WindEstimate
 from uav_task_alloc.model import Uav
 from uav_task_alloc.params import AllocatorParams
+from uav_task_alloc.separation.rule import FORGOTTEN
 
 _SAMPLE_PERIOD = 1.0  # [s] between two samples of the ground velocity of a UAV
 _STEADY = 0.5  # [m/s2] largest acceleration of a sample
@@ -99,10 +100,12 @@ class Flights:
         self._all_stops, self._stops = _Stops(), dict[str, _Stops]()
         self._legs: dict[str, _Leg] = {}
         self._errors: dict[str, _LegErrors] = {}
+        self._reported: dict[str, float] = {}  # [s] stamp of the last report
         self._landed: dict[str, float] = {}  # [s] stamp since which it is on the ground at home
 
     def update(self, report: UavReport, stamp: float) -> None:
         """Measure by a report that is known to the fleet."""
+        self._reported[report.uav_id] = stamp
         self._sample(report, stamp)
         home = self._fleet.records[report.uav_id].home
         if report.standby and math.dist(report.position, home) <= AT_HOME:
@@ -166,12 +169,13 @@ class Flights:
         self._sampled.clear()
         self._reached.clear()
         self._landed.clear()
+        self._reported.clear()
 
     def forget(self, uav_id: str) -> None:
         """Drop what is kept of a UAV."""
         self.wind.forget(uav_id)
         for kept in (self._sampled, self._reached, self._stops, self._legs, self._landed,
-                     self._errors):
+                     self._errors, self._reported):
             kept.pop(uav_id, None)
 
     def of(self, uav_id: str, stamp: float) -> UavFlight | None:
@@ -186,6 +190,17 @@ class Flights:
                          record.report.velocity,
                          record.home[2] + height if height else -math.inf, errors.seconds,
                          _ERRORS * errors.share if errors.count >= _OWN_STOPS else math.inf)
+
+    def is_forgotten(self, uav_id: str, stamp: float) -> bool:
+        """Return whether a UAV has been silent for so long that others need not keep apart.
+
+        Args:
+            uav_id: of a UAV.
+            stamp: [s] published clock.
+        """
+        record = self._fleet.records.get(uav_id)
+        return record is not None and record.silent and (
+            stamp - self._reported.get(uav_id, -math.inf) > FORGOTTEN)
 
     def at_home_since(self, uav_id: str) -> float | None:
         """Return since when a UAV is on the ground at its home [s]; None: it is not."""
