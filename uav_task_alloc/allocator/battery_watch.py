@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from itertools import pairwise
 
 from uav_task_alloc.allocator.state.fleet import UavRecord, above_reserve
-from uav_task_alloc.allocator.state.flight_pace import UavFlight, finish_time
+from uav_task_alloc.allocator.state.flight_pace import FlightPace, UavFlight, finish_time
 from uav_task_alloc.allocator.state.world import World
 from uav_task_alloc.geometry.polyline import polyline_length
 from uav_task_alloc.model import Point
@@ -41,7 +42,7 @@ class BatteryWatch:
         self._checked = now
         turns: dict[str, float] = {}
         for uav_id, record in world.uav_records().items():
-            flight = world.flights.of(uav_id, stamp)
+            flight = self._planned_flight(uav_id, stamp)
             left = self._seconds_left(record, flight, now) if flight else None
             if left is None or flight is None:
                 continue
@@ -64,6 +65,14 @@ class BatteryWatch:
         return {uav_id: f'at {turn:.0f} s, in {turn - stamp:.0f} s'
                 for uav_id, turn in sorted(self.turns.items())}
 
+    def _planned_flight(self, uav_id: str, stamp: float) -> UavFlight | None:
+        """Where a UAV is, at planned speeds: the metres of its battery count what it flew slower.
+
+        Winds measured in gusts on a single course can be far off; none may turn a UAV home.
+        """
+        flight = self._world.flights.of(uav_id, stamp)
+        return flight and replace(flight, pace=FlightPace.of(self._world.uav(uav_id)))
+
     def _seconds_left(self, record: UavRecord, flight: UavFlight, now: float) -> float | None:
         """[s] until it has to turn; None: it is on the ground, or its range is not known."""
         report = record.report
@@ -73,7 +82,7 @@ class BatteryWatch:
         metres, seconds = above_reserve(report, record.battery,
                                         self._world.params.battery_reserve)
         assert metres is not None  # the range is known
-        speed = flight.pace.mean_speed
+        speed = flight.pace.speed
         landing = max(0.0, report.position[2] - record.home[2]) / flight.pace.descent
         for search in (False, True):
             way = self._way_home(record, now, search)
