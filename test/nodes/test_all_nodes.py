@@ -68,12 +68,16 @@ class Fleet:
     def wait_for(self, tasks, state=m.TaskStatus.COMPLETED, timeout=60.0):
         self.probe.until(lambda: all(self.state_of(task) == state for task in tasks), timeout)
 
-    def visits(self, task):
-        """How often a vehicle reached the item at a task, by the simulator's log."""
+    def visitors(self, task):
+        """The vehicles that reached the item at a task, in order, by the simulator's log."""
         lines = [json.loads(line) for line in self.flight.read_text().splitlines()]
-        return sum(line.get('event') == 'item_reached' and max(
+        return [line['uav'] for line in lines if line.get('event') == 'item_reached' and max(
             abs(line[axis] - value) for axis, value in zip('xyz', task.position, strict=True)
-        ) < 1.0 for line in lines)
+        ) < 1.0]
+
+    def visits(self, task):
+        """How often it was reached."""
+        return len(self.visitors(task))
 
 
 @pytest.fixture
@@ -124,7 +128,12 @@ def test_the_tasks_of_a_uav_that_falls_silent_go_to_the_other(fleet):
     assert answer.success, answer.message
     fleet.wait_for(NEAR)
     fleet.probe.until(lambda: all(fleet.visits(task) >= 1 for task in NEAR))
-    assert [fleet.visits(task) for task in NEAR] == [1] * len(NEAR)
+    twice = [task.id for task in NEAR if fleet.visits(task) > 1]
+    # at most what it had reached the moment before, which nobody received
+    assert [fleet.visitors(task) for task in NEAR if task.id in twice] in (
+        [], [['uav_2', 'uav_1']])
+    assert not {(event.uav_id, event.task_id) for event in fleet.events
+                if event.event == m.TaskEvent.COMPLETED} & {('uav_2', name) for name in twice}
 
 
 def test_a_task_inside_a_zone_is_left_out_with_the_reason(fleet):
