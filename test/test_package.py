@@ -128,6 +128,7 @@ def test_ctrl_c_in_make_build_shows_no_traceback_of_the_build(tmp_path):
     made = subprocess.Popen(
         ['make', '-f', ROOT / 'Makefile', '-o', '.ros/.made', 'build'], cwd=tmp_path, text=True,
         stdout=subprocess.PIPE, stderr=subprocess.STDOUT, start_new_session=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # as in a terminal
         env={**os.environ, 'PATH': f'{colcon.parent}:{os.environ["PATH"]}'})
     while not all((tmp_path / name).exists() for name in ('begun', 'compiling')):
         assert made.poll() is None, made.communicate()
