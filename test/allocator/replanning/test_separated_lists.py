@@ -124,7 +124,8 @@ def test_a_uav_lost_above_the_base_lets_the_others_take_off_after_half_a_minute(
     driver = AllocatorDriver(route_end='home', uav_timeout=3.0, **ON)
     driver.uav('lost', 4.0, 0.0, 40.0, home=(4.0, 0.0, 0.0), **SPEEDS)
     driver.uav('u', 0.0, 0.0, 0.0, home=(0.0, 0.0, 0.0), standby=True, **SPEEDS)
-    driver.add(Task('t', (0.0, 300.0, 50.0), allowed_uavs={'u'}))
+    driver.add(Task('t', (0.0, 300.0, 50.0), allowed_uavs={'u'}),
+               Task('l', (4.0, 60.0, 40.0), allowed_uavs={'lost'}))
     driver.settle()
     assert driver.lists['u'].stops[0].wait > 5.0  # until it has landed
     waits = []
@@ -137,6 +138,7 @@ def test_a_uav_lost_above_the_base_lets_the_others_take_off_after_half_a_minute(
         waits.append(driver.world.lists.restamped(
             'u', driver.now, driver.world.flights.of('u', driver.now)).stops[0].wait)
     assert driver.world.uav_record('lost').silent
+    assert waits[0] > 5.0
     assert waits[-1] == 0.0
 
 
