@@ -256,7 +256,12 @@ def test_mavsdk_after_a_reboot_the_mission_is_uploaded_again(mavsdk):
     peers.assign(1, task_list('AB'))
     flying(peers, 1)
     peers.command('reboot', 1)
-    peers.until(lambda: peers.ground_station.sessions[1].executor.telemetry.restarts == 1)
+    session = peers.ground_station.sessions[1]
+    peers.until(lambda: session.executor.telemetry.restarts == 1)
+    # airborne in Hold, which nobody on this side has commanded
+    peers.until(lambda: session.executor.authority.state is AuthorityState.LOST)
+    assert len(peers.missions(1)) == 1
+    peers.until(lambda: not peers.ground_station.hand_over('uav_1', 'test', time.monotonic()))
     peers.until(lambda: len(peers.missions(1)) == 2)
     flying(peers, 1)
     assert stored(peers.missions(1)[-1]) == items(task_list('AB'))

@@ -82,6 +82,13 @@ class CurrentItem:
         return next((claim.since for claim in self.passed.claims if any(
             item is one for one in claim.items)), max(self._epoch.since, self._entered_at))
 
+    def was_jumped_over(self, seq: int) -> bool:
+        """Whether another station may have set the current item past an item."""
+        item = self._epoch.items[seq]
+        return (self.set_by_other is not None and seq < self.set_by_other) or any(
+            len(claim.items) > 1 and any(item is one for one in claim.items)
+            for claim in self.passed.claims)
+
     def note_in_mission(self) -> None:
         """Note that the vehicle is in mission mode."""
         if not self.in_mission:

@@ -84,10 +84,14 @@ class ReachedItems:
         epoch, seq = self._epoch, reached.seq
         current = CurrentEpoch(epoch.items, self._moves.reports.reported, epoch.since,
                                epoch.begin, epoch.taken, self._moves.left_at)
-        if 0 <= seq < len(epoch.items) and self._epochs.is_of_current(reached, current, now):
+        # PX4 may still repeat one of the mission before: a jump over several items is no proof
+        repeated = self._epochs.series.repeats_credited(reached)
+        if 0 <= seq < len(epoch.items) and not (
+                repeated and self._moves.was_jumped_over(seq)) and (
+                self._epochs.is_of_current(reached, current, now)):
             self._accept(reached, now)
             return True
-        item = None if self._epochs.series.repeats_credited(reached) else (
+        item = None if repeated else (
             self._epochs.previous_item(reached, epoch.items))
         if item is None:
             return False
