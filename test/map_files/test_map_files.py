@@ -147,6 +147,16 @@ def test_a_kmz_is_its_kml(tmp_path):
     assert the_task(imported(tmp_path, 'job.kmz', packed.getvalue())[0]).id == 'Mast_7'
 
 
+def test_a_damaged_kmz_is_refused(tmp_path):
+    packed = io.BytesIO()
+    with zipfile.ZipFile(packed, 'w', zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr('doc.kml', KML.format(MAST.format(mode='', alt=0, data='')))
+    damaged = bytearray(packed.getvalue())
+    damaged[38:42] = b'\xff\xff\xff\xff'  # within the compressed data
+    with pytest.raises(MapFileError, match='expected a KMZ archive'):
+        imported(tmp_path, 'damaged.kmz', bytes(damaged))
+
+
 def test_geojson_has_tasks_zones_and_uavs(tmp_path):
     ring = [[8.54, 47.40], [8.55, 47.40], [8.55, 47.41], [8.54, 47.40]]
     scenario, notes = imported(tmp_path, 'job.geojson', geojson(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import re
 import zipfile
+import zlib
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -52,7 +53,7 @@ def read_kmz(data: bytes, file: str) -> MapFile:
                                    f'expected at most {LARGEST_FILE}')
             return read_kml(archive.read(inner), file)
     except (zipfile.BadZipFile, zipfile.LargeZipFile, NotImplementedError, RuntimeError,
-            EOFError, OSError) as error:
+            EOFError, OSError, zlib.error) as error:
         raise MapFileError(f'{file}: {error}: expected a KMZ archive') from None
 
 
