@@ -77,7 +77,7 @@ class OrderBook:
             why = answer.message.removeprefix('refused: ')
             if why == answer.message or not why.strip():
                 self.without_reason.append(f'{name} {dict(fields)}: {answer.message!r}')
-            for order in ending:  # it may have ended by itself
+            for order in ending:  # it may have ended without an undo
                 order.leaving = 'not in force any more' in answer.message
                 if order.leaving:
                     del self.in_force[order.id]

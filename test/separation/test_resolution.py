@@ -175,7 +175,7 @@ def test_a_return_that_would_cost_too_much_is_left_to_the_flight():
     rule = Separation(30.0, 10.0, 2.0)
     flights = [returning(f'u{k}', 60.0 * k, (90.0 + 8.0 * k, 400.0, 0.0)) for k in range(4)]
     free = resolve(flights, rule)
-    cheap = resolve(flights, rule, TransitLimits(dearest=15.0))
+    cheap = resolve(flights, rule, TransitLimits(max_price=15.0))
     assert free.left == []
     extra, bounded = ([flight_seconds(after) - flight_seconds(before) for before, after in zip(
         flights, result.flights, strict=True)] for result in (free, cheap))

@@ -125,7 +125,7 @@ class Sitl:
     now = staticmethod(time.monotonic)
 
     def serve(self):
-        """It flies by itself."""
+        """It flies without a pilot."""
 
     def close(self):
         for process in self.processes:

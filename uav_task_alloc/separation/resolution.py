@@ -55,7 +55,7 @@ class TransitLimits:
         altitude_min, altitude_max: [m] ENU.
         is_clear: whether a polyline [m] ENU enters no zone.
         stop: polled before each change that is tried; True ends the search for changes.
-        dearest: [s] of flight that the change of a return that cannot wait may cost; dearer ones
+        max_price: [s] of flight that the change of a return that cannot wait may cost; dearer ones
             are left to the flight, where less is uncertain.
     """
 
@@ -63,7 +63,7 @@ class TransitLimits:
     altitude_max: float = math.inf  # [m]
     is_clear: Callable[[Sequence[Point]], bool] = lambda points: True
     stop: Callable[[], bool] = lambda: False
-    dearest: float = math.inf  # [s]
+    max_price: float = math.inf  # [s]
 
 
 @dataclass(slots=True)
@@ -180,7 +180,8 @@ class _Planner:
             return self._sooner(flight, k, n, ready)
         after = flight.legs[n + 1] if n + 1 < len(flight.legs) else None
         bounded = not leg.may_wait or (after is not None and not after.may_wait)
-        found = self._cheapest(flight, k, n, ready, self._limits.dearest if bounded else math.inf)
+        most = self._limits.max_price if bounded else math.inf
+        found = self._cheapest(flight, k, n, ready, most)
         if found is not None or not bounded or after is None:
             return found
         # that return would cost too much: without it
@@ -188,7 +189,7 @@ class _Planner:
             return self._sooner(flight, k, n, ready)
         return self._cheapest(flight, k, n, ready, math.inf, whole=False)
 
-    def _cheapest(self, flight: Flight, k: int, n: int, ready: float, dearest: float,
+    def _cheapest(self, flight: Flight, k: int, n: int, ready: float, max_price: float,
                   whole: bool = True) -> _Change | None:
         """The cheapest change that costs at most so many seconds of flight; None: there is none.
 
@@ -208,7 +209,7 @@ class _Planner:
             if self._limits.stop():
                 self.stopped = True
                 break
-            if paths[number].seconds + (0.0 if leg.takes_off else wait) > dearest:
+            if paths[number].seconds + (0.0 if leg.takes_off else wait) > max_price:
                 continue
             option = _with_wait(paths[number], planned.begin, wait)
             times = leg_times(flight, option.leg, ready, n == 0)
@@ -265,7 +266,7 @@ class _Planner:
                 if path != leg.points and limits.is_clear(new.flown()):
                     price = flight.leg_seconds(new) - planned + _PRICE * max(
                         0.0, level - max(ends))
-                    if leg.may_wait or price <= limits.dearest:
+                    if leg.may_wait or price <= limits.max_price:
                         yield _Change(new, price, f'flies at {level:.1f} m', 'height')
 
     def _level_points(self, leg: FlightLeg) -> tuple[Point, ...]:

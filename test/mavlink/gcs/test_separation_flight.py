@@ -184,7 +184,7 @@ def test_with_plans_and_monitor_all_tasks_are_flown_apart(kinds, ways):
 
 @pytest.mark.parametrize('ways', [
     [((-150.0, 0.0), EAST), ((-250.0, 0.0), (200.0, 3.0))],
-    [(WEST, (3.0, 0.0)), (SOUTH, (0.0, 3.0))]], ids=['one behind the other', 'to one place'])
+    [(WEST, (3.0, 0.0)), (SOUTH, (0.0, 3.0))]], ids=['overtaking', 'to one place'])
 def test_uavs_that_fly_the_same_way_or_to_one_place_stay_apart(ways):
     sky = Sky(('ardupilot', 'px4'), ways)
     sky.run(lambda: sky.done(1, 2), 150.0)
