@@ -86,6 +86,7 @@ def test_a_wgs84_task_is_placed_by_the_origin():
     ({'earliest': time(-1.0)}, "task t1: earliest = '-1 s and 0 ns': expected a time"),
     ({'payload': -1.0}, r'task t1: payload = -1.0: expected a number in \[0, 1e\+06\]'),
     ({'payload': math.inf}, 'task t1: payload = inf'),
+    ({'kind': 9}, r'task t1: kind = 9: expected'),
 ])
 def test_a_bad_task_is_refused_by_the_name_of_its_field(changed, text):
     with pytest.raises(InvalidValue, match=text):

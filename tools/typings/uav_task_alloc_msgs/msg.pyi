@@ -7,6 +7,16 @@ import builtin_interfaces.msg
 import geometry_msgs.msg
 import std_msgs.msg
 
+class Action:
+    name: str
+    keys: list[str]
+    values: list[float]
+    def __init__(self, *,
+        name: str = ...,
+        keys: Sequence[str] = ...,
+        values: Sequence[float] = ...,
+    ) -> None: ...
+
 class Allocation:
     header: std_msgs.msg.Header
     revision: int
@@ -61,6 +71,8 @@ class PlanProposal:
 
 class PlannedTask:
     task: Task
+    piece: int
+    reversed: bool
     via: list[geometry_msgs.msg.Point]
     leg_distance: float
     eta: builtin_interfaces.msg.Duration
@@ -69,12 +81,20 @@ class PlannedTask:
     trip: int
     def __init__(self, *,
         task: Task = ...,
+        piece: int = ...,
+        reversed: bool = ...,
         via: Sequence[geometry_msgs.msg.Point] = ...,
         leg_distance: float = ...,
         eta: builtin_interfaces.msg.Duration = ...,
         wait: builtin_interfaces.msg.Duration = ...,
         finish: builtin_interfaces.msg.Duration = ...,
         trip: int = ...,
+    ) -> None: ...
+
+class Ring:
+    points: list[geometry_msgs.msg.Point]
+    def __init__(self, *,
+        points: Sequence[geometry_msgs.msg.Point] = ...,
     ) -> None: ...
 
 class SeparationAlert:
@@ -104,6 +124,12 @@ class SeparationAlert:
 class Task:
     LOCAL: ClassVar[int]
     WGS84: ClassVar[int]
+    POINT: ClassVar[int]
+    LINE: ClassVar[int]
+    AREA: ClassVar[int]
+    ORBIT: ClassVar[int]
+    ORIGIN: ClassVar[int]
+    TERRAIN: ClassVar[int]
     task_id: str
     frame: int
     position: geometry_msgs.msg.Point
@@ -119,6 +145,17 @@ class Task:
     latest: builtin_interfaces.msg.Time
     release: builtin_interfaces.msg.Time
     payload: float
+    kind: int
+    path: list[geometry_msgs.msg.Point]
+    holes: list[Ring]
+    strip_width: float
+    direction: float
+    radius: float
+    turns: float
+    heading: float
+    divisible: bool
+    vertical: int
+    actions: list[Action]
     def __init__(self, *,
         task_id: str = ...,
         frame: int = ...,
@@ -135,6 +172,17 @@ class Task:
         latest: builtin_interfaces.msg.Time = ...,
         release: builtin_interfaces.msg.Time = ...,
         payload: float = ...,
+        kind: int = ...,
+        path: Sequence[geometry_msgs.msg.Point] = ...,
+        holes: Sequence[Ring] = ...,
+        strip_width: float = ...,
+        direction: float = ...,
+        radius: float = ...,
+        turns: float = ...,
+        heading: float = ...,
+        divisible: bool = ...,
+        vertical: int = ...,
+        actions: Sequence[Action] = ...,
     ) -> None: ...
 
 class TaskAnnouncement:
@@ -156,6 +204,7 @@ class TaskEvent:
     FAILED: ClassVar[int]
     header: std_msgs.msg.Header
     task_id: str
+    piece: int
     uav_id: str
     revision: int
     event: int
@@ -163,6 +212,7 @@ class TaskEvent:
     def __init__(self, *,
         header: std_msgs.msg.Header = ...,
         task_id: str = ...,
+        piece: int = ...,
         uav_id: str = ...,
         revision: int = ...,
         event: int = ...,
@@ -199,6 +249,9 @@ class TaskStatus:
     REJECTED: ClassVar[int]
     UNASSIGNED: ClassVar[int]
     task_id: str
+    piece: int
+    pieces_done: int
+    pieces: int
     state: int
     uav_id: str
     reason: str
@@ -206,6 +259,9 @@ class TaskStatus:
     expected: builtin_interfaces.msg.Time
     def __init__(self, *,
         task_id: str = ...,
+        piece: int = ...,
+        pieces_done: int = ...,
+        pieces: int = ...,
         state: int = ...,
         uav_id: str = ...,
         reason: str = ...,
@@ -312,6 +368,7 @@ class UavState:
     mode: int
     mission_state: int
     active_task_id: str
+    active_piece: int
     list_revision: int
     authority: int
     fence_state: int
@@ -339,6 +396,7 @@ class UavState:
         mode: int = ...,
         mission_state: int = ...,
         active_task_id: str = ...,
+        active_piece: int = ...,
         list_revision: int = ...,
         authority: int = ...,
         fence_state: int = ...,

@@ -129,6 +129,8 @@ def to_task(msg: m.Task, origin: Origin) -> Task:
     check_ros_name('task_id', msg.task_id)
     place = f'task {msg.task_id}: '
     check_number(place + 'value', msg.value, 0.0, MOST_VALUE, open_low=True)
+    if msg.kind != m.Task.POINT:
+        raise InvalidValue(place + 'kind', msg.kind, 'POINT (0)')
     position = task_position(msg, origin)
     assert position is not None  # it is with an origin
     return Task(
