@@ -31,6 +31,7 @@ LEVELS = {
     'atomic_files': 0,
     'model': 1,
     'palette': 0,
+    'piece_ids': 0,
     'params': 1,
     'journal': 1,
     'kernel_cache': 1,

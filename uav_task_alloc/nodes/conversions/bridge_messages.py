@@ -19,6 +19,7 @@ from uav_task_alloc.mavlink.mission.task_progress import TaskProgress
 from uav_task_alloc.model import Task, ThreatZone
 from uav_task_alloc.nodes.conversions.message_limits import MOST_POINTS
 from uav_task_alloc.nodes.conversions.messages import from_point, header, to_point, to_task
+from uav_task_alloc.piece_ids import split_piece
 from uav_task_alloc.record.message_records import from_stamp
 from uav_task_alloc.zone_codec import decode_zone_array
 
@@ -108,14 +109,15 @@ def from_uav_status(status: UavStatus, capabilities: Iterable[str], stamp: float
     known.setdefault('hold_radius', status.hold_radius)
     known |= {'return_height': status.return_height, 'takeoff_height': status.takeoff_height,
               'endurance': status.endurance, 'full_range': status.full_range}
+    active_task, active_piece = split_piece(status.active_task)
     return m.UavState(
         header=header(stamp), uav_id=status.uav_id, position=to_point(status.position),
         velocity=Vector3(x=status.velocity[0], y=status.velocity[1], z=status.velocity[2]),
         home=to_point(status.home or _UNKNOWN_POINT), battery=status.battery,
         range_remaining=status.range_remaining, cruise_speed=speed,
         capabilities=list(capabilities), available=status.available, mode=status.mode.value,
-        mission_state=status.mission_state.value, active_task_id=status.active_task,
-        list_revision=status.list_revision, authority=status.authority.value,
+        mission_state=status.mission_state.value, active_task_id=active_task,
+        active_piece=active_piece, list_revision=status.list_revision, authority=status.authority.value,
         fence_state=status.fence.value, reason=status.reason,
         **{**dict.fromkeys(REPORTED_LIMITS, math.nan), **known})
 
@@ -131,6 +133,7 @@ def from_progress(uav_id: str, progress: TaskProgress, stamp: float) -> m.TaskEv
     Returns:
         For the topic `task_events`.
     """
-    return m.TaskEvent(header=header(stamp), task_id=progress.task, uav_id=uav_id,
+    task_id, piece = split_piece(progress.task)
+    return m.TaskEvent(header=header(stamp), task_id=task_id, piece=piece, uav_id=uav_id,
                        revision=progress.revision, event=_EVENTS[progress.event],
                        reason=progress.reason)

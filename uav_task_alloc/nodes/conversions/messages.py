@@ -28,6 +28,7 @@ from uav_task_alloc.nodes.conversions.message_limits import (
     cut,
 )
 from uav_task_alloc.nodes.conversions.task_times import put_times, to_times
+from uav_task_alloc.piece_ids import piece_id
 from uav_task_alloc.record.message_records import (
     AUTHORITIES,
     MODES,
@@ -180,7 +181,7 @@ def to_report(msg: m.UavState) -> UavReport:
         capabilities=check_words(place + 'capabilities', msg.capabilities),
         battery=known(msg.battery),
         available=msg.available and msg.mode != m.UavState.FAULT,
-        active_task=msg.active_task_id, list_revision=msg.list_revision,
+        active_task=piece_id(msg.active_task_id, msg.active_piece), list_revision=msg.list_revision,
         standby=msg.mode == m.UavState.STANDBY,
         velocity=velocity if all(map(math.isfinite, velocity)) else None,
         mode=constant_name(MODES, msg.mode), authority=constant_name(AUTHORITIES, msg.authority),
@@ -210,7 +211,7 @@ def to_event(msg: m.TaskEvent) -> TaskEvent:
     except ValueError:
         raise InvalidValue(f'event of task {msg.task_id}: event', msg.event,
                            'STARTED (0), COMPLETED (1) or FAILED (2)') from None
-    return TaskEvent(msg.task_id, msg.uav_id, msg.revision, kind, cut(msg.reason))
+    return TaskEvent(piece_id(msg.task_id, msg.piece), msg.uav_id, msg.revision, kind, cut(msg.reason))
 
 
 def from_zone(zone: ThreatZone) -> m.ThreatZone:
