@@ -117,7 +117,8 @@ def from_uav_status(status: UavStatus, capabilities: Iterable[str], stamp: float
         range_remaining=status.range_remaining, cruise_speed=speed,
         capabilities=list(capabilities), available=status.available, mode=status.mode.value,
         mission_state=status.mission_state.value, active_task_id=active_task,
-        active_piece=active_piece, list_revision=status.list_revision, authority=status.authority.value,
+        active_piece=active_piece, list_revision=status.list_revision,
+        authority=status.authority.value,
         fence_state=status.fence.value, reason=status.reason,
         **{**dict.fromkeys(REPORTED_LIMITS, math.nan), **known})
 

@@ -181,7 +181,8 @@ def to_report(msg: m.UavState) -> UavReport:
         capabilities=check_words(place + 'capabilities', msg.capabilities),
         battery=known(msg.battery),
         available=msg.available and msg.mode != m.UavState.FAULT,
-        active_task=piece_id(msg.active_task_id, msg.active_piece), list_revision=msg.list_revision,
+        active_task=piece_id(msg.active_task_id, msg.active_piece),
+        list_revision=msg.list_revision,
         standby=msg.mode == m.UavState.STANDBY,
         velocity=velocity if all(map(math.isfinite, velocity)) else None,
         mode=constant_name(MODES, msg.mode), authority=constant_name(AUTHORITIES, msg.authority),
@@ -211,7 +212,8 @@ def to_event(msg: m.TaskEvent) -> TaskEvent:
     except ValueError:
         raise InvalidValue(f'event of task {msg.task_id}: event', msg.event,
                            'STARTED (0), COMPLETED (1) or FAILED (2)') from None
-    return TaskEvent(piece_id(msg.task_id, msg.piece), msg.uav_id, msg.revision, kind, cut(msg.reason))
+    return TaskEvent(piece_id(msg.task_id, msg.piece), msg.uav_id, msg.revision, kind,
+                     cut(msg.reason))
 
 
 def from_zone(zone: ThreatZone) -> m.ThreatZone:
