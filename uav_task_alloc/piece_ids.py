@@ -2,7 +2,7 @@
 """Ids of the pieces of a task: `<task id>#<number>`, numbered from 1; without # the whole task."""
 from __future__ import annotations
 
-SEPARATOR = '#'  # in no id that is announced
+_MARK = '#'  # in no id that is announced
 
 
 def piece_id(task_id: str, piece: int) -> str:
@@ -15,7 +15,7 @@ def piece_id(task_id: str, piece: int) -> str:
     Returns:
         `task_id` itself for 0.
     """
-    return f'{task_id}{SEPARATOR}{piece}' if piece else task_id
+    return f'{task_id}{_MARK}{piece}' if piece else task_id
 
 
 def split_piece(full_id: str) -> tuple[str, int]:
@@ -27,7 +27,7 @@ def split_piece(full_id: str) -> tuple[str, int]:
     Returns:
         Number 0 where the id is that of a whole task.
     """
-    task_id, _, number = full_id.rpartition(SEPARATOR)
+    task_id, _, number = full_id.rpartition(_MARK)
     if task_id and number.isascii() and number.isdigit():
         return task_id, int(number)
     return full_id, 0
