@@ -180,6 +180,20 @@ def test_where_no_hold_helps_a_plan_is_asked_for():
     assert 'u1 and u2 lose separation' in str(sky.begin().trigger)
 
 
+@pytest.mark.parametrize('battery', [None, 0.1])
+def test_one_whose_tasks_are_gone_in_its_take_off_is_predicted_to_end_it_first(battery):
+    climbs = {'mode': 'TAKEOFF', 'velocity': (0.0, 0.0, 2.5), 'home': (0.0, 0.0, 0.0),
+              'takeoff_height': 50.0, 'battery': battery}
+    sky = Sky({}, climbs)
+    sky.world.lists.lists['u2'] = replace(sky.world.list_of('u2'), stops=(), returns=True)
+    sky.report((-100.0, 0.0, 45.0), (0.0, 0.0, 30.0))
+    assert sky.step() == [('u1', True)]
+    assert 'u2' in sky.steps[-1].alerts[0].uavs
+    sky.report((-100.0, 0.0, 70.0), (0.0, 0.0, 30.0))  # above all of it
+    sky.world.lists.lists['u1'] = replace(sky.world.list_of('u1'), stops=())
+    assert sky.step() == [('u1', False)]
+
+
 def test_a_wait_of_the_plan_is_spent_before_the_leg_and_on_the_ground():
     sky = Sky({'mode': 'STANDBY', 'standby': True, 'velocity': (0.0, 0.0, 0.0)},
               {'mode': 'STANDBY', 'standby': True, 'velocity': (0.0, 0.0, 0.0)})

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Who holds for whom: UAVs that fly their ways and obey holds, judged by their true distances."""
 import math
+from dataclasses import replace
 
 import pytest
 
@@ -177,6 +178,20 @@ def test_a_hold_of_a_fixed_wing_takes_the_room_of_its_circle():
     step = monitor.step(0.0, {'plane': MonitoredUav(way, (1.0,)),
                               'copter': MonitoredUav(other, (2.0,))}, RULE)
     assert [hold.uav for hold in step.holds] == ['copter']
+
+
+def test_one_that_waits_beside_a_climb_is_not_released_and_held_in_one_step():
+    climb = [(2.0 * k, (0.0, 0.0, 36.0 + 5.0 * k)) for k in range(7)]
+    uavs = {'a': MonitoredUav(Way(((0.0, (11.4, 0.0, 46.0)), (30.0, (-48.6, 0.0, 46.0)))),
+                               early=True),
+            'b': MonitoredUav(Way(tuple(climb)), (5.0,), False, 'takes off')}
+    monitor = SeparationMonitor()
+    assert [hold.hold for hold in monitor.step(0.0, uavs, RULE).holds] == [True]
+    for k in range(1, 24):
+        now = 0.5 * k
+        ahead = tuple((t - now, place) for t, place in climb if t > now)
+        uavs['b'] = replace(uavs['b'], way=Way(((0.0, (0.0, 0.0, 36.0 + 2.5 * now)), *ahead)))
+        assert len(monitor.step(now, uavs, RULE).holds) <= 1
 
 
 def test_one_on_the_ground_takes_off_when_its_way_is_free():

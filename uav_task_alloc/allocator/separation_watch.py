@@ -132,14 +132,17 @@ class SeparationWatch:
             return MonitoredUav(self._way(record, down), (_URGENT,), False, f'{uav_id} lands')
         stops = self._stops(uav_id, stamp, flight)
         returns = mode == 'RETURNING' or (not stops and self._world.list_of(uav_id).returns)
+        if mode == 'TAKEOFF':  # whatever follows; for how long is not known
+            top = _climbed(record, stops[0].task.position[2] if stops else place[2])
+            points = [(0.0, place), (flight.pace.seconds((place, top)), top)]
+            if returns:
+                points = _home(points, record, flight.pace, self._world.list_of(uav_id).end_via)
+            return MonitoredUav(self._way(record, points), (_URGENT,), False,
+                                f'{uav_id} takes off')
         if record.low or returns:
             way = self._way(record, self._way_home(uav_id, record, flight.pace))
             return MonitoredUav(way, (_URGENT if record.low else _RETURNS,), not record.low,
                                 f'{uav_id} is low on battery' if record.low else '', early=True)
-        if mode == 'TAKEOFF':  # for how long is not known
-            top = _climbed(record, stops[0].task.position[2] if stops else place[2])
-            up = [(0.0, place), (flight.pace.seconds((place, top)), top)]
-            return MonitoredUav(self._way(record, up), (_URGENT,), False, f'{uav_id} takes off')
         points = self._list_points(uav_id, stops, flight)
         if not stops:
             points = [(0.0, place)] if mode == 'HOLD' else _drift(record)

@@ -106,7 +106,9 @@ class FlightPredictions:
         found = {}
         for other in self._ways:
             if other != uav_id:
-                loss = self._between(uav_id, own, holds, other, wide)
+                # as well without it: two that are nearer than the wide distance may fly on
+                loss = self._between(uav_id, own, holds, other) or (
+                    self._between(uav_id, own, holds, other, wide=True) if wide else None)
                 if loss is not None:
                     found[other] = loss
         return found

@@ -56,7 +56,8 @@ class FlightLeg:
         hold_until: [s] the leg does not begin before, for the separation.
         takes_off: it begins on the ground.
         lands: it ends on the ground.
-        top: [m] ENU at which its take-off ends, if that is known; else at its next point.
+        top: [m] ENU at which its take-off ends, if that is known, also where that has begun; else
+            at its next point.
         movable: its heights and its begin may change; the leg under way is not.
         may_wait: the UAV can wait before it; not before a return that follows a list.
     """
@@ -74,11 +75,16 @@ class FlightLeg:
     movable: bool = True
     may_wait: bool = True
 
+    @property
+    def climbs_first(self) -> bool:
+        """Whether it begins with a take-off, or in one."""
+        return self.takes_off or self.top > -math.inf
+
     def flown(self) -> tuple[Point, ...]:
         """Points as they are flown: with the columns above pad and base."""
         points = list(self.points)
         top = self.top if self.top > -math.inf else points[1][2]
-        if self.takes_off and top > points[0][2]:
+        if self.climbs_first and top > points[0][2]:
             x, y, _ = points[0]
             points.insert(1, (x, y, top))
         if self.lands and points[-2][2] > points[-1][2]:
@@ -147,12 +153,12 @@ class Flight:
         """
         points = leg.flown()
         parts = [(self.seconds(pair), pair[1]) for pair in pairwise(points)]
-        begin = int(leg.takes_off and points[1][:2] == points[0][:2])
+        begin = int(leg.climbs_first and points[1][:2] == points[0][:2])
         end = len(parts) - int(leg.lands and points[-2][:2] == points[-1][:2])
         full = sum(seconds for seconds, _ in parts[begin:end])
         if self.pace is None or full <= 0.0:
             return parts
-        share = self.share if first and not leg.takes_off else 0.0
+        share = self.share if first and not leg.climbs_first else 0.0
         slower = self.pace.from_stop(points[begin:end + 1], share) / full
         return [(seconds * slower if begin <= n < end else seconds, point)
                 for n, (seconds, point) in enumerate(parts)]

@@ -85,6 +85,23 @@ def test_uavs_of_one_base_take_off_one_after_the_other_and_return_at_the_height_
         assert end_via[-1][2] >= 50.0
 
 
+def test_a_take_off_that_has_begun_is_planned_up_to_its_end_with_tasks_and_without():
+    driver = AllocatorDriver(route_end='home', **ON)
+    climbs = {'mode': 'TAKEOFF', 'home': (0.0, 0.0, 0.0), 'takeoff_height': 60.0, **SPEEDS}
+    driver.uav('a', 0.0, 0.0, 20.0, **climbs)
+    driver.add(Task('ta', (90.0, 0.0, 40.0)))
+    driver.settle(report=False)
+    column = ((0.0, 0.0, 20.0), (0.0, 0.0, 60.0))
+    flight = _flights(driver.world, driver.world.lists_in_force(), driver.now)['a']
+    assert flight.legs[0].flown()[:2] == column
+    assert driver.lists['a'].stops[0].leg.via == ()
+    driver.cancel('ta')
+    driver.settle(report=False)
+    flight = _flights(driver.world, driver.world.lists_in_force(), driver.now)['a']
+    assert [leg.lands for leg in flight.legs] == [True]
+    assert flight.legs[0].flown()[:2] == column
+
+
 def test_what_is_minutes_ahead_is_left_to_later_plans_and_stays_in_the_lists():
     driver = crossing(background_budget=0.05, **ON)
     driver.add(*(Task(f'ta{k}', (1400.0 + 600.0 * k, 200.0, 50.0), allowed_uavs={'a'})

@@ -204,6 +204,11 @@ def test_a_take_off_ends_at_the_height_that_the_uav_reports():
     low = timed_stops(stops(at(100)), UavFlight((0.0, 0.0, 0.0), pace, on_ground=True,
                                                 takeoff_top=75.0))
     assert low[0].eta == pytest.approx(30.0 + 10.0)
+    driver.uav('a', 0.0, 0.0, 13.0, home=(0.0, 0.0, 3.0), mode='TAKEOFF', takeoff_height=40.0)
+    assert driver.world.flights.of('a', driver.now).climbing
+    climbs = timed_stops(stops(at(100)), UavFlight((0.0, 0.0, 25.0), pace, climbing=True,
+                                                   takeoff_top=75.0))
+    assert climbs[0].eta == pytest.approx(20.0 + 10.0)
 
 
 def test_ground_velocities_of_reports_are_measured_in_steady_flight_only():

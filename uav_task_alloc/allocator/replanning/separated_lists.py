@@ -114,12 +114,13 @@ def _flight(each: UavList, published: UavList, flight: UavFlight, stamp: float,
         ahead = line[points_passed(place, line):] if under_way else line
         served = stop.served if under_way else 0.0
         begins = stop.begin_after - stamp
+        climbs = takes_off or (k == 0 and flight.climbing)
         leg = FlightLeg((place, *ahead), stop.task.id,
                         max(0.0, stop.task.service_time - served),
                         stop.task.earliest - stamp, stop.task.latest - stamp,
                         stop.task.release - stamp,
                         takes_off=takes_off, movable=not under_way,
-                        top=flight.takeoff_top if takes_off else -math.inf)
+                        top=flight.takeoff_top if climbs else -math.inf)
         if begins > 0.0:  # it keeps the wait that it had, or less
             leg = replace(leg, hold_until=begins - own.leg_seconds(leg))
         legs.append(leg)
@@ -127,7 +128,9 @@ def _flight(each: UavList, published: UavList, flight: UavFlight, stamp: float,
         if clock > until and k + 1 < len(each.stops):
             return replace(own, legs=tuple(legs), goes_on=True)
     if each.returns and flight.home is not None and not (flight.on_ground and not each.stops):
+        climbs = flight.climbing and not each.stops
         legs.append(FlightLeg((place, *each.end_via, flight.home), lands=True,
+                              top=flight.takeoff_top if climbs else -math.inf,
                               movable=bool(each.stops), may_wait=False))
     return replace(own, legs=tuple(legs))
 

@@ -177,6 +177,7 @@ class UavFlight:
     pace: FlightPace  # as measured
     stamp: float = 0.0  # [s] ROS clock at the position
     on_ground: bool = False  # it has to take off
+    climbing: bool = False  # its take-off has begun
     serving: str = ''  # id of the task that it has reached and not completed
     served: float = 0.0  # [s] since it reached that
     home: Point | None = None  # [m] ENU
@@ -258,10 +259,10 @@ def _leg_seconds(stop: ListStop, flight: UavFlight, place: Point, start: Point |
     leg = (*stop.leg.via, stop.task.position)
     if not first:
         return flight.pace.from_stop((place, *leg))
-    if flight.on_ground:  # it climbs before it flies
+    if flight.on_ground or flight.climbing:  # it climbs before it flies
         top = flight.takeoff_top if flight.takeoff_top > -math.inf else leg[0][2]
         above = (place[0], place[1], max(place[2], top))
-        return (flight.pace.takeoff + flight.pace.seconds((place, above))
+        return (flight.pace.takeoff * flight.on_ground + flight.pace.seconds((place, above))
                 + flight.pace.from_stop((above, *leg)))
     rest = leg[points_passed(place, leg, start):]
     return flight.pace.from_stop((place, *rest), flight.share(rest[0]))

@@ -184,12 +184,14 @@ class Flights:
         if record is None:
             return None
         task_id, reached = self._reached.get(uav_id, ('', stamp))
-        errors, height = self._errors.get(uav_id, _LegErrors()), record.report.takeoff_height
-        return UavFlight(record.report.position, self.pace(uav_id), stamp,
-                         record.report.standby, task_id, max(0.0, stamp - reached), record.home,
-                         record.report.velocity,
-                         record.home[2] + height if height else -math.inf, errors.seconds,
-                         _ERRORS * errors.share if errors.count >= _OWN_STOPS else math.inf)
+        errors, report = self._errors.get(uav_id, _LegErrors()), record.report
+        top = record.home[2] + report.takeoff_height if report.takeoff_height else -math.inf
+        return UavFlight(
+            report.position, self.pace(uav_id), stamp, on_ground=report.standby,
+            climbing=report.mode == 'TAKEOFF', serving=task_id,
+            served=max(0.0, stamp - reached), home=record.home, velocity=report.velocity,
+            takeoff_top=top, late=errors.seconds,
+            time_error=_ERRORS * errors.share if errors.count >= _OWN_STOPS else math.inf)
 
     def is_forgotten(self, uav_id: str, stamp: float) -> bool:
         """Return whether a UAV has been silent for so long that others need not keep apart.
