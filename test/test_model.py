@@ -4,8 +4,18 @@ import math
 
 import pytest
 
+from uav_task_alloc.actions import ACTIONS, Action
 from uav_task_alloc.errors import InvalidValue
-from uav_task_alloc.model import Leg, Plan, Shape, Task, ThreatZone, Uav
+from uav_task_alloc.model import (
+    Leg,
+    Plan,
+    Shape,
+    Task,
+    ThreatZone,
+    Uav,
+    piece_id,
+    split_piece_id,
+)
 from uav_task_alloc.timetable import Timetable
 
 NAN = math.nan
@@ -49,6 +59,35 @@ SQUARE = [(0, 0), (10, 0), (10, 10), (0, 10)]
      'task t1: release = inf: expected a number in [-4e+09, 4e+09]'),
     (lambda: Task('t1', (0, 0, 0), announced='now'),
      "task t1: announced = 'now': expected a number in [-4e+09, 4e+09]"),
+    (lambda: Task('t1', (0, 0, 0), path=[(0, 0, 0)]),
+     'task t1: path = ((0.0, 0.0, 0.0),): expected at least two points, not all at one place'),
+    (lambda: Task('t1', (0, 0, 0), path=[(1, 0, 0), (2, 0, 0)]),
+     'task t1: path = (1.0, 0.0, 0.0): expected its position (0.0, 0.0, 0.0) as first'),
+    (lambda: Task('t1', (0, 0, 0), path=[(0, 0, 0), (NAN, 0, 0)]),
+     'task t1: path = (nan, 0.0, 0.0): expected three finite coordinates [m]'),
+    (lambda: Task('t1', (0, 0, 0), path=[(0, 0, 0), (1, 0, 0)], payload=2.0),
+     'task t1: payload = 2.0: expected 0 with a path'),
+    (lambda: Task('t1', (0, 0, 0), reversible=1),
+     'task t1: reversible = 1: expected True or False'),
+    (lambda: Task('t1', (0, 0, 0), heading=7.0),
+     'task t1: heading = 7.0: expected a number in [-6.28319, 6.28319]'),
+    (lambda: Task('t1', (0, 0, 0), actions=['photo']),
+     "task t1: actions = 'photo': expected an Action"),
+    (lambda: Action('dance'),
+     "action = 'dance': expected one of photo, video, trigger, gimbal, roi, servo, "
+     'gripper, wait, speed'),
+    (lambda: Action('servo', {'channel': 1}),
+     'action servo: pwm = None: expected a number in [500, 2500]'),
+    (lambda: Action('photo', {'count': 1.5}),
+     'action photo: count = 1.5: expected an integer in [1, 10000]'),
+    (lambda: Action('trigger', {'distance': 0.0}),
+     'action trigger: distance = 0.0: expected a number in (0, 10000]'),
+    (lambda: Action('wait', {'minutes': 1.0}),
+     "action wait: key = 'minutes': expected one of seconds"),
+    (lambda: Action('video', [('on', 1.0)]), "action video: key = 'on': expected no keys"),
+    (lambda: Action('wait', [('seconds', 1.0), ('seconds', 2.0)]),
+     "action wait: key = 'seconds': expected a key used once"),
+    (lambda: Action('wait', [1.0]), 'action wait = 1.0: expected a key and its value'),
     (lambda: Task('t1', (0, 0, 0), payload=-0.1),
      'task t1: payload = -0.1: expected a number in [0, 1e+06]'),
     (lambda: Uav('u1', (0, 0, 0), endurance=-1.0),
@@ -155,3 +194,30 @@ def test_the_times_of_a_plan_are_those_of_its_timetable():
 def test_a_plan_without_times_has_none():
     plan = Plan({})
     assert (plan.arrivals, plan.waits, plan.finish, plan.response) == ({}, {}, 0.0, 0.0)
+
+
+def test_a_task_with_a_path_ends_at_its_last_point():
+    task = Task('line', (0, 0, 10), path=[(0, 0, 10), (3, 4, 10), (3, 4, 22)], reversible=True)
+    assert task.end == (3.0, 4.0, 22.0)
+    assert task.path_length == 17.0
+    assert Task('point', (1, 2, 3)).end == (1.0, 2.0, 3.0)
+    assert Task('point', (1, 2, 3)).path_length == 0.0
+
+
+def test_an_action_has_all_keys_in_the_order_of_the_table():
+    assert Action('photo').values == (('count', 1.0), ('interval', 1.0))
+    roi = Action('roi', {'z': 3, 'x': 1, 'y': 2})
+    assert roi.values == (('x', 1.0), ('y', 2.0), ('z', 3.0))
+    assert roi == Action('roi', roi.values)
+    assert roi['z'] == 3.0
+    assert {Action('video'), Action('video')} == {Action('video')}
+    assert all(Action(name, {key: of.high for key, of in keys.items()}).values
+               for name, keys in ACTIONS.items() if keys)
+
+
+@pytest.mark.parametrize(('name', 'parts'), [
+    ('field#12', ('field', 12)), ('field', ('field', 0)), ('a#b#3', ('a#b', 3)),
+    ('a#', ('a#', 0)), ('a#x', ('a#x', 0)), ('a#0', ('a#0', 0)), ('a#\u0663', ('a#\u0663', 0))])
+def test_the_id_of_a_piece_is_split_as_it_was_joined(name, parts):
+    assert split_piece_id(name) == parts
+    assert piece_id(*parts) == name

@@ -22,7 +22,7 @@ from typing import Any, NamedTuple, TextIO
 
 from numba.core import caching, event
 
-_COMPILER_SOURCES = 'kernel.py', 'kernel_inner.py', 'kernel_shortcuts.py', 'model.py'
+_COMPILER_SOURCES = 'kernel.py', 'kernel_inner.py', 'kernel_shortcuts.py', 'model/zone.py'
 ROOMS = ('geometry', 'separation', 'solver')
 
 
@@ -69,7 +69,7 @@ _NO_CODE = re.compile(r'^\s*""".*?"""$|\s*#[^\'"\n]*$', re.MULTILINE | re.DOTALL
 
 
 def kernel_sources(root: Path = Path(__file__).parent) -> list[Path]:
-    """Files whose code or constants are compiled into kernels: those that use numba, model.py."""
+    """Files whose code or constants are compiled into kernels: those that use numba, zones."""
     files = [path for room in ROOMS for path in (root / room).rglob('*.py')]
     return sorted([path for path in files if re.search('numba|kernel', path.read_text())]
                   + [root / name for name in _COMPILER_SOURCES])

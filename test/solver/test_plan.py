@@ -257,3 +257,9 @@ def test_detours_count_in_the_arrivals():
     leg, = result.legs['u1']
     assert leg.via
     assert result.arrivals == {'a': pytest.approx(leg.length / 10.0)}
+
+
+def test_a_task_with_a_path_is_refused():
+    line = Task('line', (1.0, 0.0, 0.0), path=((1.0, 0.0, 0.0), (9.0, 0.0, 0.0)))
+    with pytest.raises(InvalidValue, match=r'task line: path = .*: expected no path'):
+        quick([ONE], [line])

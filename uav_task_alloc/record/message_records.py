@@ -21,7 +21,7 @@ RecordBody = dict[str, Any]  # a line without its wall time
 _Message = Any
 
 # names of the messages' constants, by value
-ACTIONS = ('ADD', 'UPDATE', 'CANCEL')
+EVENT_ACTIONS = ('ADD', 'UPDATE', 'CANCEL')
 _STATES = ('PENDING', 'ASSIGNED', 'ACTIVE', 'COMPLETED', 'FAILED', 'CANCELLED', 'REJECTED',
           'UNASSIGNED')
 MODES = ('UNKNOWN', 'STANDBY', 'TAKEOFF', 'ON_MISSION', 'HOLD', 'RETURNING', 'LANDING', 'FAULT')
@@ -62,7 +62,7 @@ def announcement_record(msg: _Message, origin: Origin | None) -> RecordBody:
     """
     tasks = []
     for task in msg.tasks:
-        if constant_name(ACTIONS, msg.action) == 'CANCEL':
+        if constant_name(EVENT_ACTIONS, msg.action) == 'CANCEL':
             tasks.append({'id': task.task_id})
             continue
         try:
@@ -74,7 +74,8 @@ def announcement_record(msg: _Message, origin: Origin | None) -> RecordBody:
                 {'id': task.task_id, 'position': position, 'value': finite_or_none(task.value),
                  'service': from_stamp(task.service_time), **_window(task)}
             )
-    return {'kind': 'announcement', 'action': constant_name(ACTIONS, msg.action), 'tasks': tasks}
+    action = constant_name(EVENT_ACTIONS, msg.action)
+    return {'kind': 'announcement', 'action': action, 'tasks': tasks}
 
 
 def _window(task: _Message) -> RecordBody:

@@ -84,3 +84,10 @@ def check_separation(separation: Separation) -> Separation:
     if not isinstance(separation, Separation):
         raise InvalidValue('separation', separation, 'a Separation or None')
     return separation
+
+
+def check_no_paths(tasks: Iterable[Task]) -> None:
+    """Raise InvalidValue for a task with a path: no solver takes them yet."""
+    for task in tasks:
+        if task.path:
+            raise InvalidValue(f'task {task.id}: path', task.path, 'no path: solvers take points')

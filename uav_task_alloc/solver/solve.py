@@ -20,6 +20,7 @@ from uav_task_alloc.separation.rule import Separation
 from uav_task_alloc.solver.answer import to_plan
 from uav_task_alloc.solver.check import (
     check_locked,
+    check_no_paths,
     check_options,
     check_separation,
     check_unique,
@@ -88,6 +89,7 @@ def plan(uavs: Iterable[Uav], tasks: Iterable[Task], zones: Iterable[ThreatZone]
     if not isinstance(warm, (Plan, WarmState, type(None))):
         raise InvalidValue('warm', type(warm).__name__, 'a Plan, its state or None')
     fleet, work = check_unique('uav', uavs, Uav), check_unique('task', tasks, Task)
+    check_no_paths(work)
     limits = Limits(check_unique('zone', zones, ThreatZone), clearance, altitude_min,
                     altitude_max)
     rules = Rules(route_end == 'home', hard_range, weights or Weights(),

@@ -138,7 +138,8 @@ def _task(rng: np.random.Generator, name: str, on: Mapping[str, bool], uavs: lis
     able = on['abilities'] and rng.random() < 0.4
     allowed = frozenset(uavs[:1]) if on['abilities'] and rng.random() < 0.2 else None
     return Task(name, _place(rng, 60.0), allowed_uavs=allowed,
-                required_capabilities=frozenset({'camera'} if able else ()), **values)
+                required_capabilities=frozenset({'camera'} if able else ()),
+                **values)  # type: ignore[arg-type]
 
 
 def _with_aboard(rng: np.random.Generator, uav: Uav, tasks: list[Task]) -> Uav:

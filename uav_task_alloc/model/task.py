@@ -1,0 +1,143 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A task, a place or a way that one UAV serves once: a checked value in SI units and ENU."""
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from uav_task_alloc.actions import Action, check_actions
+from uav_task_alloc.checks import check_id, check_names, check_number, check_point
+from uav_task_alloc.errors import InvalidValue
+from uav_task_alloc.geometry.polyline import polyline_length
+
+Point = tuple[float, float, float]  # [m] ENU
+PIECE_MARK = '#'  # between the id of a task and the number of a piece; not in ids from outside
+LONG = 4e9  # [s] bound of all finite times; a message holds 2.1e9
+_TASK_TIMES = (('earliest', -math.inf, LONG), ('latest', -LONG, math.inf),
+               ('release', -LONG, LONG), ('announced', -LONG, LONG))  # [s]
+_TURN = 2.0 * math.pi
+
+
+@dataclass(frozen=True, slots=True)
+class Task:
+    """A position that one UAV visits once, or a way that it flies along once.
+
+    A piece of more work is a task of its own, with an id of `piece_id`.
+
+    Attributes:
+        id: unique.
+        position: [m] ENU.
+        value: > 0; the sum over the tasks served is R of eq 2.12.
+        service_time: [s] spent at the position, in addition to the flight along the path.
+        required_capabilities: a UAV needs all of them.
+        allowed_uavs: ids of UAVs; None: any.
+        acceptance_radius: [m]; None: that of the parameters.
+        earliest: [s] from now, of the start of the service; a UAV that arrives earlier waits.
+        latest: [s] from now, of the start of the service.
+        release: [s] from now; no UAV sets out for it before: does not begin the leg to it or, with
+            a payload, the trip.
+        announced: [s] from now, mostly negative; the response time counts from it.
+        payload: [kg] taken on at the base; 0 with a path.
+        path: [m] ENU, the way that is flown as the service, from `position` to its last point;
+            empty: a point.
+        reversible: it may be flown from its last point as well.
+        heading: [rad] of the vehicle at the task, clockwise from north; None: any.
+        actions: what the UAV does there, in the order in which they begin.
+
+    Raises:
+        InvalidValue: a value is out of range.
+    """
+
+    id: str
+    position: Point  # [m] ENU
+    value: float = 1.0
+    service_time: float = 0.0  # [s]
+    required_capabilities: frozenset[str] = frozenset()
+    allowed_uavs: frozenset[str] | None = None
+    acceptance_radius: float | None = None  # [m]
+    earliest: float = -math.inf  # [s]
+    latest: float = math.inf  # [s]
+    release: float = 0.0  # [s]
+    announced: float = 0.0  # [s]
+    payload: float = 0.0  # [kg]
+    path: tuple[Point, ...] = ()  # [m] ENU
+    reversible: bool = False
+    heading: float | None = None  # [rad]
+    actions: tuple[Action, ...] = ()
+
+    def __post_init__(self) -> None:
+        check_id('task id', self.id)
+        place = f'task {self.id}: '
+        put = object.__setattr__
+        put(self, 'position', check_point(place + 'position', self.position))
+        put(self, 'value', check_number(place + 'value', self.value, 0.0, open_low=True))
+        if math.isinf(self.value):
+            raise InvalidValue(place + 'value', self.value, 'a finite number')
+        put(self, 'service_time', check_number(place + 'service_time', self.service_time, 0.0,
+                                               1e9))
+        put(self, 'required_capabilities',
+            check_names(place + 'required_capabilities', self.required_capabilities))
+        if self.allowed_uavs is not None:
+            put(self, 'allowed_uavs', check_names(place + 'allowed_uavs', self.allowed_uavs))
+        if self.acceptance_radius is not None:
+            put(self, 'acceptance_radius', check_number(
+                place + 'acceptance_radius', self.acceptance_radius, 0.0, 1e6, open_low=True))
+        for name, low, high in _TASK_TIMES:
+            put(self, name, check_number(place + name, getattr(self, name), low, high))
+        put(self, 'payload', check_number(place + 'payload', self.payload, 0.0, 1e6))
+        if self.latest < self.earliest:
+            raise InvalidValue(place + 'latest', self.latest,
+                               f'at least earliest = {self.earliest:g}')
+        put(self, 'actions', check_actions(place + 'actions', self.actions))
+        if self.heading is not None:
+            put(self, 'heading', check_number(place + 'heading', self.heading, -_TURN, _TURN))
+        if not isinstance(self.reversible, bool):
+            raise InvalidValue(place + 'reversible', self.reversible, 'True or False')
+        self._check_path(place)
+
+    def _check_path(self, place: str) -> None:
+        """Check the path, and what a task with a path may have."""
+        path = tuple(check_point(place + 'path', point) for point in self.path)
+        object.__setattr__(self, 'path', path)
+        if not path:
+            return
+        if polyline_length(path) <= 0.0:
+            raise InvalidValue(place + 'path', path, 'at least two points, not all at one place')
+        if path[0] != self.position:
+            raise InvalidValue(place + 'path', path[0], f'its position {self.position} as first')
+        if self.payload > 0.0:
+            raise InvalidValue(place + 'payload', self.payload, '0 with a path')
+
+    @property
+    def end(self) -> Point:
+        """Where its service ends [m] ENU, flown from its position."""
+        return self.path[-1] if self.path else self.position
+
+    @property
+    def path_length(self) -> float:
+        """Length of the way that is flown as the service [m]; 0 of a point."""
+        return polyline_length(self.path)
+
+
+def piece_id(task_id: str, piece: int) -> str:
+    """Return the id of a piece of a task.
+
+    Args:
+        task_id: of the whole task.
+        piece: from 1; 0: the task itself.
+    """
+    return f'{task_id}{PIECE_MARK}{piece}' if piece else task_id
+
+
+def split_piece_id(name: str) -> tuple[str, int]:
+    """Return what `piece_id` joined.
+
+    Args:
+        name: id of a task or of a piece.
+
+    Returns:
+        Id of the whole task; number of the piece, 0 where it is no piece.
+    """
+    task_id, mark, piece = name.rpartition(PIECE_MARK)
+    known = mark and piece.isascii() and piece.isdecimal() and piece[0] != '0'
+    return (task_id, int(piece)) if known else (name, 0)
