@@ -6,16 +6,7 @@ import pytest
 
 from uav_task_alloc.actions import ACTIONS, Action
 from uav_task_alloc.errors import InvalidValue
-from uav_task_alloc.model import (
-    Leg,
-    Plan,
-    Shape,
-    Task,
-    ThreatZone,
-    Uav,
-    piece_id,
-    split_piece_id,
-)
+from uav_task_alloc.model import Leg, Plan, Shape, Task, ThreatZone, Uav
 from uav_task_alloc.timetable import Timetable
 
 NAN = math.nan
@@ -215,9 +206,8 @@ def test_an_action_has_all_keys_in_the_order_of_the_table():
                for name, keys in ACTIONS.items() if keys)
 
 
-@pytest.mark.parametrize(('name', 'parts'), [
-    ('field#12', ('field', 12)), ('field', ('field', 0)), ('a#b#3', ('a#b', 3)),
-    ('a#', ('a#', 0)), ('a#x', ('a#x', 0)), ('a#0', ('a#0', 0)), ('a#\u0663', ('a#\u0663', 0))])
-def test_the_id_of_a_piece_is_split_as_it_was_joined(name, parts):
-    assert split_piece_id(name) == parts
-    assert piece_id(*parts) == name
+def test_waits_and_photos_take_their_time_at_the_task():
+    actions = (Action('wait', {'seconds': 4.0}), Action('photo', {'count': 3, 'interval': 2.0}),
+               Action('video'))
+    assert Task('t1', (0, 0, 0), service_time=1.0, actions=actions).stay == 9.0
+    assert Task('t1', (0, 0, 0), service_time=1.0).stay == 1.0

@@ -119,3 +119,17 @@ def check_actions(place: str, actions: Iterable[Action]) -> tuple[Action, ...]:
         if not isinstance(each, Action):
             raise InvalidValue(place, each, 'an Action')
     return checked
+
+
+def actions_time(actions: Iterable[Action]) -> float:
+    """Return what actions take where the UAV stays for them: waits, and intervals of photos.
+
+    Args:
+        actions: of one task.
+
+    Returns:
+        [s].
+    """
+    waits = sum(each['seconds'] for each in actions if each.name == 'wait')
+    return waits + sum((each['count'] - 1.0) * each['interval']
+                       for each in actions if each.name == 'photo')

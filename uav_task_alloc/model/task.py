@@ -5,13 +5,12 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from uav_task_alloc.actions import Action, check_actions
+from uav_task_alloc.actions import Action, actions_time, check_actions
 from uav_task_alloc.checks import check_id, check_names, check_number, check_point
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.geometry.polyline import polyline_length
 
 Point = tuple[float, float, float]  # [m] ENU
-PIECE_MARK = '#'  # between the id of a task and the number of a piece; not in ids from outside
 LONG = 4e9  # [s] bound of all finite times; a message holds 2.1e9
 _TASK_TIMES = (('earliest', -math.inf, LONG), ('latest', -LONG, math.inf),
                ('release', -LONG, LONG), ('announced', -LONG, LONG))  # [s]
@@ -22,7 +21,7 @@ _TURN = 2.0 * math.pi
 class Task:
     """A position that one UAV visits once, or a way that it flies along once.
 
-    A piece of more work is a task of its own, with an id of `piece_id`.
+    A piece of more work is a task of its own, with an id of piece_ids.py.
 
     Attributes:
         id: unique.
@@ -41,7 +40,8 @@ class Task:
         path: [m] ENU, the way that is flown as the service, from `position` to its last point;
             empty: a point.
         reversible: it may be flown from its last point as well.
-        heading: [rad] of the vehicle at the task, clockwise from north; None: any.
+        heading: [rad] of the vehicle at the task, counter-clockwise from east (REP 103);
+            None: any.
         actions: what the UAV does there, in the order in which they begin.
 
     Raises:
@@ -118,26 +118,7 @@ class Task:
         """Length of the way that is flown as the service [m]; 0 of a point."""
         return polyline_length(self.path)
 
-
-def piece_id(task_id: str, piece: int) -> str:
-    """Return the id of a piece of a task.
-
-    Args:
-        task_id: of the whole task.
-        piece: from 1; 0: the task itself.
-    """
-    return f'{task_id}{PIECE_MARK}{piece}' if piece else task_id
-
-
-def split_piece_id(name: str) -> tuple[str, int]:
-    """Return what `piece_id` joined.
-
-    Args:
-        name: id of a task or of a piece.
-
-    Returns:
-        Id of the whole task; number of the piece, 0 where it is no piece.
-    """
-    task_id, mark, piece = name.rpartition(PIECE_MARK)
-    known = mark and piece.isascii() and piece.isdecimal() and piece[0] != '0'
-    return (task_id, int(piece)) if known else (name, 0)
+    @property
+    def stay(self) -> float:
+        """Service time, and what actions take where the UAV stays [s]; without the path."""
+        return self.service_time + actions_time(self.actions)
