@@ -147,6 +147,37 @@ def test_a_terminal_shows_which_kernel_of_how_many_and_the_time_left(capsys):
     assert capsys.readouterr().err == 2 * 'compiling kernels (once, about 35 s)\n'
 
 
+def compile_one(notice, name):
+    event = SimpleNamespace(data={'module': 'uav_task_alloc.a', 'qualname': name,
+                                  'name': 'native_lowering [k]'})
+    notice.on_start(event)
+    notice.on_end(event)
+
+
+def test_loads_of_two_threads_are_counted_together_after_one_line(capsys):
+    terminal = io.StringIO()
+    terminal.isatty = lambda: True
+    notice = CompilationNotice(lambda: 0.0)
+    with notice.shown_on(terminal), notice.until_loaded('first', Work(30.0, 3)):
+        compile_one(notice, 'a')
+        with notice.until_loaded('second', Work(10.0, 2), Work(5.0, 50), search=False):
+            compile_one(notice, 'b')
+        compile_one(notice, 'c')
+    shown = [line.split(',')[0] for line in terminal.getvalue().split('\r\x1b[K')[1:]]
+    assert shown == ['compiling kernel 1 of 3', 'compiling kernel 2 of 5',
+                     'compiling kernel 3 of 5', '']
+    assert capsys.readouterr().err == 'compiling kernels (once, about 30 s)\n'
+
+
+def test_kernels_compiled_before_the_first_load_need_no_second_line(capsys):
+    notice = CompilationNotice(lambda: 0.0)
+    compile_one(notice, 'zones of the random arrivals of a scenario')
+    for name in 'first', 'second':
+        with notice.until_loaded(name, Work(3.0, 1)):
+            compile_one(notice, name)
+    assert capsys.readouterr().err.count('compiling kernels (once, about') == 2
+
+
 @pytest.mark.parametrize(('written', 'code', 'status'), [
     (0, LOAD, -signal.SIGINT), (4, LOAD, -signal.SIGINT), (2, PLAN, 130)])
 def test_ctrl_c_ends_a_compilation_at_once(package, written, code, status):

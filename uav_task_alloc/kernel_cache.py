@@ -208,8 +208,12 @@ class CompilationNotice(event.Listener):
             search: whether the search is loaded, too.
         """
         left = NO_WORK if key in self._loaded else first
-        self._now, self._later = (left.plus(rest), NO_WORK) if search else (left, rest)
-        self._printed = False
+        now, later = (left.plus(rest), NO_WORK) if search else (left, rest)
+        if self._loads:  # of another thread: both are counted together
+            self._now = self._now.plus(now)
+        else:
+            self._now, self._later = now, later
+            self._printed = self._printed and not self._loaded  # reading a scenario compiles some
         main = threading.current_thread() is threading.main_thread()
         self._loading += main
         self._loads += 1
@@ -223,7 +227,7 @@ class CompilationNotice(event.Listener):
             self._loads -= 1
             if self._loads == 0:
                 gc.set_threshold(*self._thresholds)
-            self._show('')
+                self._show('')
             self._loading -= main
             if main:
                 self._restore()

@@ -104,6 +104,7 @@ def test_a_missing_package_is_named_with_what_installs_it(
     monkeypatch.setattr(importlib.util, 'find_spec',
                         lambda name, *_: None if name == package else find(name))
     monkeypatch.chdir(tmp_path)
+    (tmp_path / 'x.mcap').touch()
     assert cli.main(arguments) == 1
     assert text in capsys.readouterr().err
 

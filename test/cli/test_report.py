@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The key figures of a run: a completed task counts only if a vehicle was there."""
+import importlib.util
 import json
 
 import pytest
@@ -142,8 +143,11 @@ def test_the_report_command_prints_the_table_and_draws_the_map(run, tmp_path, ca
     assert (tmp_path / 'map.png').stat().st_size > 10_000
 
 
-def test_the_report_command_refuses_a_folder_without_a_run(tmp_path):
+def test_the_report_command_refuses_a_folder_without_a_run(tmp_path, monkeypatch):
+    monkeypatch.setattr(importlib.util, 'find_spec', lambda name: None)  # with or without [view]
     with pytest.raises(SystemExit, match=r'record\.jsonl: No such file .*expected a recorded run'):
         report.main([str(tmp_path)])
+    with pytest.raises(SystemExit, match=r'none: No such file .*expected a recorded run'):
+        report.main([str(tmp_path / 'none')])
     with pytest.raises(SystemExit, match='2'):
         report.main([])

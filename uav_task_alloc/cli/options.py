@@ -7,6 +7,7 @@ import math
 import re
 from collections.abc import Callable, Sequence
 from difflib import get_close_matches
+from pathlib import Path
 from typing import Any, NoReturn
 
 from uav_task_alloc.errors import InvalidValue
@@ -30,6 +31,7 @@ class OptionParser(argparse.ArgumentParser):
     def __init__(self, command: str, description: str, epilog: str = '') -> None:
         super().__init__(prog=f'uav_task_alloc {command}'.rstrip(), description=description,
                          epilog=epilog, formatter_class=_Formatter)
+        self.register('type', Path, _path)
         self._ranges: dict[str, tuple[str, float, float, str]] = {}
 
     def number(self, option: str, low: float, high: float, text: str, *, unit: str = '',
@@ -135,6 +137,12 @@ def budgets(text: str) -> tuple[float, ...]:
     if not 0.001 <= values[0] <= values[-1] <= 86400.0:
         raise argparse.ArgumentTypeError(f'{text!r}: expected numbers in [0.001, 86400] s')
     return values
+
+
+def _path(text: str) -> Path:
+    if not text:  # an unset variable of the shell: Path('') is the working directory
+        raise argparse.ArgumentTypeError("'': expected a path")
+    return Path(text)
 
 
 def _number_reader(expected: str, kind: Callable[[str], float]) -> Callable[[str], Any]:

@@ -190,9 +190,9 @@ def flight_page(bag: Path, html: Path, flown: Path | None) -> int:
             is not installed.
         SystemExit: the file cannot be read.
     """
-    check_installed('report', 'plotly', 'mcap', 'mcap_ros2')
     with reading():
         bag.open('rb').close()
+    check_installed('report', 'plotly', 'mcap', 'mcap_ros2')
     check_file('--html', html, inputs=[bag])
     check_file('--map', flown, MAP_SUFFIXES, [bag, html])
     from uav_task_alloc.flight_report import page  # imports plotly and mcap

@@ -2,6 +2,7 @@
 """Reader of scenario files; every error has file, line and reason."""
 from __future__ import annotations
 
+import io
 import math
 from collections.abc import Callable, Iterable
 from difflib import get_close_matches
@@ -33,6 +34,7 @@ from uav_task_alloc.separation.rule import Separation
 from uav_task_alloc.zone_codec import USED_KEYS, decode_zone
 
 _Value = TypeVar('_Value')
+_LARGEST_FILE = 100_000_000  # [bytes]
 _FARTHEST = 500e3  # [m] from the origin: farther out, degrees or origin are wrong
 _CENTER_IN_DEGREES = {'hemisphere': ('latitude', 'longitude', 'altitude'),
                       'cylinder': ('latitude', 'longitude')}
@@ -51,7 +53,9 @@ def load(path: str | Path) -> Scenario:
         ScenarioError: `file:line: reason`; the file cannot be read or is no scenario.
     """
     try:
-        text = Path(path).read_text(encoding='utf-8')
+        with Path(path).open('rb') as file:  # a device may have no end
+            data = file.read(_LARGEST_FILE + 1)
+        text = io.TextIOWrapper(io.BytesIO(data), encoding='utf-8').read()
     except OSError as error:
         raise ScenarioError(f'{str(path) or repr(path)}: {error.strerror}: '
                             'expected a scenario file') from None
@@ -59,6 +63,8 @@ def load(path: str | Path) -> Scenario:
         line = error.object.count(b'\n', 0, error.start) + 1
         raise ScenarioError(f'{path}:{line}: byte {error.object[error.start]:#04x}: '
                             'expected UTF-8 text') from None
+    if len(data) > _LARGEST_FILE:
+        raise ScenarioError(f'{path}: more than {_LARGEST_FILE} bytes: expected a scenario file')
     return parse(text, str(path))
 
 
