@@ -1,0 +1,167 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Plane regions between rings as convex cells in horizontal slabs, and what is done with them."""
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from uav_task_alloc.geometry.polygon import XY, edges, signed_area
+from uav_task_alloc.work.zone_sections import Ring, Span
+
+Cell = list[XY]  # [m] corners of a convex polygon
+_THIN = 1e-7  # [m] slabs that are thinner have no cells
+
+
+@dataclass(frozen=True, slots=True)
+class Region:
+    """A polygon without holes and without barred rings, where no UAV may fly."""
+
+    outer: Ring
+    holes: tuple[Ring, ...] = ()
+    barred: tuple[Ring, ...] = ()
+
+    @property
+    def rings(self) -> tuple[Ring, ...]:
+        """All rings, the outer one first."""
+        return (self.outer, *self.holes, *self.barred)
+
+    def turned(self, angle: float) -> Region:
+        """The region turned around (0, 0) by an angle [rad]."""
+        return Region(turn(self.outer, angle), tuple(turn(ring, angle) for ring in self.holes),
+                      tuple(turn(ring, angle) for ring in self.barred))
+
+
+def turn(points: Iterable[XY], angle: float) -> list[XY]:
+    """Points turned around (0, 0), counter-clockwise.
+
+    Args:
+        points: [m].
+        angle: [rad].
+    """
+    c, s = math.cos(angle), math.sin(angle)
+    return [(c * x - s * y, s * x + c * y) for x, y in points]
+
+
+def crossings(rings: Sequence[Ring]) -> list[XY]:
+    """The points in which edges of rings cross; O(edges^2), vectorised.
+
+    Args:
+        rings: [m].
+
+    Returns:
+        Without common corners of neighbouring edges.
+    """
+    pairs = np.array([(a, b) for ring in rings for a, b in edges(ring)])
+    found: list[XY] = []
+    for i in range(len(pairs) - 1):
+        p, d = pairs[i, 0], pairs[i, 1] - pairs[i, 0]
+        q, e = pairs[i + 1:, 0], pairs[i + 1:, 1] - pairs[i + 1:, 0]
+        cross = d[0] * e[:, 1] - d[1] * e[:, 0]
+        near = np.abs(cross) > 1e-12
+        q, e, cross = q[near], e[near], cross[near]
+        t = ((q[:, 0] - p[0]) * e[:, 1] - (q[:, 1] - p[1]) * e[:, 0]) / cross
+        u = ((q[:, 0] - p[0]) * d[1] - (q[:, 1] - p[1]) * d[0]) / cross
+        found += [(float(p[0] + s * d[0]), float(p[1] + s * d[1]))
+                  for s in t[(t > 0.0) & (t < 1.0) & (u > 0.0) & (u < 1.0)]]
+    return found
+
+
+def slab_cells(region: Region, levels: Iterable[float]) -> Iterator[tuple[float, Cell]]:
+    """Cut a region into trapezoids.
+
+    Args:
+        region: its rings decide by their winding numbers.
+        levels: [m] y of further cuts; the y of corners are among the cuts anyway. Edges that cross
+            do so at one of `levels`.
+
+    Yields:
+        y in the middle of its slab, and the corners of a trapezoid, from below.
+    """
+    lines = sorted((min(a[1], b[1]), max(a[1], b[1]), a, b, 1 if b[1] > a[1] else -1, k)
+                   for k, ring in enumerate(region.rings) for a, b in edges(ring) if a[1] != b[1])
+    cuts = sorted({*levels, *(y for low, high, *_ in lines for y in (low, high))})
+    active: list[tuple[float, float, XY, XY, int, int]] = []
+    n = 0
+    for low, high in pairwise(cuts):
+        if high - low < _THIN:
+            continue
+        middle = (low + high) / 2
+        while n < len(lines) and lines[n][0] < middle:
+            active.append(lines[n])
+            n += 1
+        active = [line for line in active if line[1] > middle]
+        ordered = sorted(active, key=lambda line: _x_at(line, middle))
+        for left, right in _inner(ordered):
+            yield middle, [(_x_at(left, low), low), (_x_at(right, low), low),
+                           (_x_at(right, high), high), (_x_at(left, high), high)]
+
+
+def _x_at(line: tuple[float, float, XY, XY, int, int], y: float) -> float:
+    a, b = line[2], line[3]
+    return a[0] + (y - a[1]) * (b[0] - a[0]) / (b[1] - a[1])
+
+
+def _inner(ordered: Iterable[tuple[float, float, XY, XY, int, int]]) -> Iterator[tuple[
+        tuple[float, float, XY, XY, int, int], tuple[float, float, XY, XY, int, int]]]:
+    """Neighbouring edges between which the region is: in the first ring and in no other."""
+    windings: dict[int, int] = {}
+    start = None
+    for line in ordered:
+        windings[line[5]] = windings.get(line[5], 0) + line[4]
+        within = windings.get(0, 0) != 0 and not any(
+            count for ring, count in windings.items() if ring)
+        if start is not None and not within:
+            yield start, line
+            start = None
+        elif start is None and within:
+            start = line
+
+
+def clip(cell: Cell, axis: int, bound: float, keep_below: bool) -> Cell:
+    """The part of a convex cell on one side of a line parallel to an axis.
+
+    Args:
+        cell: its corners.
+        axis: of the coordinate that is compared.
+        bound: [m].
+        keep_below: the part with smaller coordinates.
+
+    Returns:
+        Its corners; none where nothing is left.
+    """
+    sign = 1.0 if keep_below else -1.0
+    out: Cell = []
+    for a, b in edges(cell):
+        da, db = sign * (bound - a[axis]), sign * (bound - b[axis])
+        if da >= 0.0:
+            out.append(a)
+        if da * db < 0.0:
+            t = da / (da - db)
+            out.append((a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1])))
+    return out if len(out) > 2 else []
+
+
+def between(cells: Iterable[Cell], axis: int, low: float, high: float) -> list[Cell]:
+    """The parts of cells between two lines parallel to an axis."""
+    parts = (clip(clip(cell, axis, low, False), axis, high, True) for cell in cells)
+    return [part for part in parts if part]
+
+
+def cells_area(cells: Iterable[Cell]) -> float:
+    """Area [m2] of cells that do not overlap."""
+    return math.fsum(abs(signed_area(cell)) for cell in cells)
+
+
+def merged_spans(cells: Iterable[Cell], gap: float) -> list[Span]:
+    """Where cells are along x: spans, those that are at most `gap` [m] apart joined."""
+    joined: list[Span] = []
+    for low, high in sorted((min(x for x, _ in cell), max(x for x, _ in cell)) for cell in cells):
+        if joined and low <= joined[-1][1] + gap:
+            joined[-1] = joined[-1][0], max(joined[-1][1], high)
+        else:
+            joined.append((low, high))
+    return joined

@@ -1,0 +1,78 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`Work` and `pieces_of`: checked work of any kind, and the tasks that it is cut into."""
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from uav_task_alloc.model import Point, Task, ThreatZone
+from uav_task_alloc.work.area import area_ways, check_area
+from uav_task_alloc.work.line import check_line, line_ways
+from uav_task_alloc.work.orbit import check_orbit, looks_at_centre, orbit_ways
+from uav_task_alloc.work.values import (
+    Geometry,
+    Kind,
+    check_common,
+    piece_tasks,
+    refuse_unused,
+)
+
+Ways = list[tuple[Point, ...]]
+
+
+@dataclass(frozen=True, slots=True)
+class KindRules:
+    """What a kind of work is: how it is checked and cut."""
+
+    check: Callable[[Geometry], None]  # raises InvalidValue
+    ways: Callable[[Geometry, Sequence[ThreatZone], float], Ways]  # outside the zones
+    reversible: bool  # a piece may be flown from either end
+    finish: Callable[[Geometry, Task], Task] = lambda given, task: task  # of each piece
+
+
+KINDS = {
+    Kind.POINT: KindRules(lambda given: refuse_unused(given, ()), lambda *_: [], False),
+    Kind.LINE: KindRules(check_line, line_ways, True),
+    Kind.AREA: KindRules(check_area, area_ways, True),
+    Kind.ORBIT: KindRules(check_orbit, orbit_ways, False, looks_at_centre),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Work(Geometry):
+    """A task of any kind; see `Geometry`.
+
+    Raises:
+        InvalidValue: a value is out of range, missing, or of another kind of work.
+    """
+
+    def __post_init__(self) -> None:
+        check_common(self)
+        KINDS[self.kind].check(self)
+
+
+def pieces_of(work: Work, zones: Sequence[ThreatZone] = (),
+              clearance: float = 0.0) -> tuple[Task, ...]:
+    """Cut work into tasks, each of which one UAV flies as a whole.
+
+    Parts inside zones are left out. Where zones cover all of it, it is cut as if there were none:
+    the solver says that its pieces are inside zones, as it does of points.
+
+    Args:
+        work: of any kind.
+        zones: in force; each is enlarged by its margin and `clearance`.
+        clearance: [m].
+
+    Returns:
+        Of a POINT the task; otherwise tasks with a `path` and ids `<task id>#<k>`, k from 1, with
+        their share of value and service time by length, and all else as the task has it. The
+        same for the same arguments.
+
+    Raises:
+        InvalidValue: there would be too many pieces.
+    """
+    if work.kind is Kind.POINT:
+        return (work.task,)
+    rules = KINDS[work.kind]
+    ways = rules.ways(work, zones, clearance) or rules.ways(work, (), clearance)
+    return tuple(rules.finish(work, piece) for piece in piece_tasks(work, ways, rules.reversible))
