@@ -46,6 +46,7 @@ LEVELS = {
     'objective': 2,
     'separation.rule': 0,  # the model has its conflicts
     'separation': 3,
+    'work': 3,
     'solver': 3,
     'scenario': 3,
     'map_files': 5,

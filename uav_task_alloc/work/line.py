@@ -59,17 +59,14 @@ def free_ways(path: Sequence[Point], zones: Sequence[ThreatZone],
     ways: list[list[Point]] = []
     open_end = False  # the last way ends at the next point
     for a, b in pairwise(path):
+        end = 0.0
         for start, end in free_parts(a, b, zones, clearance):
             p, q = _at(a, b, start), _at(a, b, end)
             if start == 0.0 and open_end:
                 ways[-1].append(q)
             else:
                 ways.append([p, q])
-            open_end = end == 1.0
-            if not open_end or math.dist(p, q) == 0.0:
-                open_end = end == 1.0
-        if not free_parts(a, b, zones, clearance):
-            open_end = False
+        open_end = end == 1.0
     return [tuple(way) for way in ways
             if math.fsum(math.dist(a, b) for a, b in pairwise(way)) >= _SHORTEST]
 

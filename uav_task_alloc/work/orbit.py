@@ -76,4 +76,4 @@ def looks_at_centre(given: Geometry, task: Task) -> Task:
     if any(action.name in ('roi', 'gimbal') for action in task.actions):
         return task
     x, y, z = given.task.position
-    return replace(task, actions=(Action('roi', {'x': x, 'y': y, 'z': z}), *task.actions))
+    return replace(task, actions=(Action('roi', (('x', x), ('y', y), ('z', z))), *task.actions))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from itertools import pairwise
 
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.geometry.polygon import XY, edges
@@ -25,7 +24,7 @@ from uav_task_alloc.work.zone_sections import remaining, ring_spans
 
 Way = list[XY]  # [m] from one end to the other
 _SHIFTS = 0.0, 0.5, -0.5, 0.25, -0.25, 0.375, -0.375, 0.125, -0.125  # of a strip, tried in order
-_SCRAP = 0.002  # of the square of the width: what is smaller is left out
+_SCRAP = 0.02  # of the square of the width: what is smaller is left out
 _MOST_DIRECTIONS = 8  # that are compared, by the number of strips
 _ALIKE = math.radians(0.5)  # directions that differ by less are one
 
@@ -104,7 +103,7 @@ def _strips(region: Region, width: float, levels: Iterable[float]) -> list[Way]:
     for middle, cell in slab_cells(region, [*levels, *(low + k * step for k in range(count + 1))]):
         strips[min(count - 1, max(0, int((middle - low) / step)))].append(cell)
     area = cells_area(cell for cells in strips for cell in cells)
-    scrap = min(_SCRAP * width * width, 1e-3 * area / count)
+    scrap = min(_SCRAP * width * width, 2e-3 * area / count)
     ways: list[Way] = []
     for k, cells in enumerate(strips):
         found = _in_strip(region, cells, low + (k + 0.5) * step, step, width, scrap)
@@ -145,14 +144,15 @@ def _without(cell: Cell, x0: float, x1: float, y0: float, y1: float) -> list[Cel
 
 
 def _add(new: Way, ways: list[Way], region: Region, width: float) -> None:
-    """Add a way, as the tail of another one where they are near and nothing is between."""
-    for k, way in enumerate(ways):
-        for other in (way, way[::-1]):
-            for tail in (new, new[::-1]):
-                if math.dist(other[-1], tail[0]) <= width and _is_open(
-                        other[-1], tail[0], region):
-                    ways[k] = min([*other, *tail], [*tail[::-1], *other[::-1]])
-                    return
+    """Add a way, as the tail of the nearest other one where nothing is between."""
+    near = sorted((math.dist(other[-1], tail[0]), k, other, tail)
+                  for k, way in enumerate(ways) for other in (way, way[::-1])
+                  for tail in (new, new[::-1]))
+    for gap, k, other, tail in near:
+        along = abs(other[-1][0] - tail[0][0])
+        if gap <= width and along <= width / 2 and _is_open(other[-1], tail[0], region):
+            ways[k] = min([*other, *tail], [*tail[::-1], *other[::-1]])
+            return
     ways.append(new)
 
 
@@ -161,8 +161,3 @@ def _is_open(a: XY, b: XY, region: Region) -> bool:
     return a == b or not any(
         min(1.0, end) - max(0.0, start) > 1e-9
         for start, end in ring_spans(a, b, region.barred))
-
-
-def way_lengths(ways: Iterable[Way]) -> list[float]:
-    """Lengths [m] of ways."""
-    return [math.fsum(math.dist(a, b) for a, b in pairwise(way)) for way in ways]

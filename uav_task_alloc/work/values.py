@@ -11,6 +11,7 @@ from itertools import pairwise
 from uav_task_alloc.checks import check_count, check_number, check_point
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.model import Point, Task
+from uav_task_alloc.piece_ids import piece_id
 
 MOST_PIECES = 1000  # of one task
 MOST_CORNERS = 1000  # of a path or of one hole
@@ -159,7 +160,7 @@ def piece_tasks(given: Geometry, paths: list[tuple[Point, ...]],
     lengths = [math.fsum(math.dist(a, b) for a, b in pairwise(path)) for path in paths]
     total = math.fsum(lengths)
     return tuple(replace(
-        given.task, id=f'{given.task.id}#{k}', position=path[0], path=path, reversible=reversible,
-        value=given.task.value * length / total,
+        given.task, id=piece_id(given.task.id, k), position=path[0], path=path,
+        reversible=reversible, value=given.task.value * length / total,
         service_time=given.task.service_time * length / total)
         for k, (path, length) in enumerate(zip(paths, lengths, strict=True), 1))
