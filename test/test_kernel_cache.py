@@ -15,7 +15,7 @@ import pytest
 from numba.core.codegen import JITCodeLibrary
 
 import uav_task_alloc
-from uav_task_alloc.kernel_cache import CompilationNotice, Work, kernel_sources, sources_hash
+from uav_task_alloc.kernel_cache import CompilationNotice, KernelWork, kernel_sources, sources_hash
 from uav_task_alloc.kernel_inner import replaces_known_methods
 
 PACKAGE = Path(uav_task_alloc.__file__).parent
@@ -127,7 +127,7 @@ def compile_ten(stream):
     """Ten of twenty kernels take a second each; what is written to a stream."""
     now = [0.0]
     notice = CompilationNotice(lambda: now[0])
-    with notice.shown_on(stream), notice.until_loaded('some', Work(35.0, 20)):
+    with notice.shown_on(stream), notice.until_loaded('some', KernelWork(35.0, 20)):
         for i in range(11):
             event = SimpleNamespace(data={'module': 'uav_task_alloc.a', 'qualname': f'k{i}',
                                           'name': 'native_lowering [k]'})

@@ -39,27 +39,27 @@ _LOCATORS: Any = getattr(_of_numba('CacheImpl'), '_locator_classes', None)
 ON_DISK = _CacheLocator is not object and None not in _BASES and isinstance(_LOCATORS, list)
 
 
-class Work(NamedTuple):
+class KernelWork(NamedTuple):
     """What it takes to compile some kernels."""
 
     seconds: float  # of CPU
     kernels: int  # that are compiled one after another
 
-    def plus(self, other: Work) -> Work:
+    def plus(self, other: KernelWork) -> KernelWork:
         """Both.
 
         Args:
             other: kernels.
         """
-        return Work(self.seconds + other.seconds, self.kernels + other.kernels)
+        return KernelWork(self.seconds + other.seconds, self.kernels + other.kernels)
 
 
-NO_WORK = Work(0.0, 0)
+NO_WORK = KernelWork(0.0, 0)
 # chain_q up to its first plan, its search; the same of problems with time; paths around zones;
 # on a core of an Intel Xeon server
-FIRST_WORK, SEARCH_WORK = Work(6.0, 28), Work(7.0, 54)
-TIMED_FIRST_WORK, TIMED_SEARCH_WORK = Work(12.0, 71), Work(6.0, 20)
-ZONES_WORK = Work(10.0, 103)
+FIRST_WORK, SEARCH_WORK = KernelWork(6.0, 28), KernelWork(7.0, 54)
+TIMED_FIRST_WORK, TIMED_SEARCH_WORK = KernelWork(12.0, 71), KernelWork(6.0, 20)
+ZONES_WORK = KernelWork(10.0, 103)
 _UNUSED = 600.0  # [s] a folder of another hash is kept after the last write: it may be in use
 _SELDOM = 300_000, 50, 1000  # thresholds of the garbage collection, else a tenth of a load
 _COUNT_ON = 10  # kernels, before the time left follows from them
@@ -197,7 +197,7 @@ class CompilationNotice(event.Listener):
             self._restore()
 
     @contextmanager
-    def until_loaded(self, key: object, first: Work, rest: Work = NO_WORK,
+    def until_loaded(self, key: object, first: KernelWork, rest: KernelWork = NO_WORK,
                      search: bool = True) -> Iterator[None]:
         """Within it, from the first compilation to the end, Ctrl-C ends the process at once.
 

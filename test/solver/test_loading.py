@@ -78,10 +78,10 @@ def test_without_zones_no_kernel_that_finds_paths_around_them_is_loaded():
 
 
 NOTICE = """
-from uav_task_alloc.kernel_cache import NOTICE, Work
+from uav_task_alloc.kernel_cache import NOTICE, KernelWork
 from uav_task_alloc.solver.{solver} import {load}
 
-with NOTICE.until_loaded('other', Work(99.0, 9)):  # compiles nothing, prints nothing
+with NOTICE.until_loaded('other', KernelWork(99.0, 9)):  # compiles nothing, prints nothing
     pass
 {load}(zones={zones}, search=False)
 if {search}:

@@ -17,14 +17,14 @@ import numpy as np
 
 from uav_task_alloc.geometry.outline import Floats, Ints
 from uav_task_alloc.kernel import inline_kernel, inner_kernel, kernel
-from uav_task_alloc.kernel_cache import NOTICE, Work
+from uav_task_alloc.kernel_cache import NOTICE, KernelWork
 from uav_task_alloc.separation.rule import Separation
 from uav_task_alloc.separation.volumes import COLUMNS, PieceRows, Volumes
 
 _CORNERS = 12  # of a polygon at most: a rectangle cut four times has 8
 _ROUNDING = 1e-6  # [m] by which a distance that is kept exactly may be missed
 _SHORTEST = 1e-6  # [s] added to each lag: without it the polygon may be a line, lost by rounding
-_WORK = Work(6.0, 6)
+_WORK = KernelWork(6.0, 6)
 
 
 @inner_kernel

@@ -15,7 +15,7 @@ from uav_task_alloc.work.strips import cover
 from uav_task_alloc.work.values import Geometry, refuse_unused
 from uav_task_alloc.work.zone_sections import sections
 
-USED = 'path', 'holes', 'strip_width', 'direction'
+_USED = 'path', 'holes', 'strip_width', 'direction'
 _LEVEL = 10.0  # [m] by which the heights of corners may differ: the earth curves
 
 
@@ -25,7 +25,7 @@ def check_area(given: Geometry) -> None:
     Raises:
         InvalidValue: a ring crosses itself, a hole is not inside, or a value is missing.
     """
-    refuse_unused(given, USED)
+    refuse_unused(given, _USED)
     outer = check_polygon(given.place('path'), given.path)
     object.__setattr__(given, 'path', given.path[:len(outer)])
     heights = [z for _, _, z in given.path]

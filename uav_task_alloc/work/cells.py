@@ -10,9 +10,9 @@ from itertools import pairwise
 import numpy as np
 
 from uav_task_alloc.geometry.polygon import XY, edges, signed_area
-from uav_task_alloc.work.zone_sections import Ring, Span
+from uav_task_alloc.work.zone_sections import PlaneRing, Span
 
-Cell = list[XY]  # [m] corners of a convex polygon
+PlaneCell = list[XY]  # [m] corners of a convex polygon
 _THIN = 1e-7  # [m] slabs that are thinner have no cells
 
 
@@ -20,12 +20,12 @@ _THIN = 1e-7  # [m] slabs that are thinner have no cells
 class Region:
     """A polygon without holes and without barred rings, where no UAV may fly."""
 
-    outer: Ring
-    holes: tuple[Ring, ...] = ()
-    barred: tuple[Ring, ...] = ()
+    outer: PlaneRing
+    holes: tuple[PlaneRing, ...] = ()
+    barred: tuple[PlaneRing, ...] = ()
 
     @property
-    def rings(self) -> tuple[Ring, ...]:
+    def rings(self) -> tuple[PlaneRing, ...]:
         """All rings, the outer one first."""
         return (self.outer, *self.holes, *self.barred)
 
@@ -46,7 +46,7 @@ def turn(points: Iterable[XY], angle: float) -> list[XY]:
     return [(c * x - s * y, s * x + c * y) for x, y in points]
 
 
-def crossings(rings: Sequence[Ring]) -> list[XY]:
+def crossings(rings: Sequence[PlaneRing]) -> list[XY]:
     """The points in which edges of rings cross; O(edges^2), vectorised.
 
     Args:
@@ -70,7 +70,7 @@ def crossings(rings: Sequence[Ring]) -> list[XY]:
     return found
 
 
-def slab_cells(region: Region, levels: Iterable[float]) -> Iterator[tuple[float, Cell]]:
+def slab_cells(region: Region, levels: Iterable[float]) -> Iterator[tuple[float, PlaneCell]]:
     """Cut a region into trapezoids.
 
     Args:
@@ -121,7 +121,7 @@ def _inner(ordered: Iterable[tuple[float, float, XY, XY, int, int]]) -> Iterator
             start = line
 
 
-def clip(cell: Cell, axis: int, bound: float, keep_below: bool) -> Cell:
+def clip(cell: PlaneCell, axis: int, bound: float, keep_below: bool) -> PlaneCell:
     """The part of a convex cell on one side of a line parallel to an axis.
 
     Args:
@@ -134,7 +134,7 @@ def clip(cell: Cell, axis: int, bound: float, keep_below: bool) -> Cell:
         Its corners; none where nothing is left.
     """
     sign = 1.0 if keep_below else -1.0
-    out: Cell = []
+    out: PlaneCell = []
     for a, b in edges(cell):
         da, db = sign * (bound - a[axis]), sign * (bound - b[axis])
         if da >= 0.0:
@@ -145,18 +145,18 @@ def clip(cell: Cell, axis: int, bound: float, keep_below: bool) -> Cell:
     return out if len(out) > 2 else []
 
 
-def between(cells: Iterable[Cell], axis: int, low: float, high: float) -> list[Cell]:
+def between(cells: Iterable[PlaneCell], axis: int, low: float, high: float) -> list[PlaneCell]:
     """The parts of cells between two lines parallel to an axis."""
     parts = (clip(clip(cell, axis, low, False), axis, high, True) for cell in cells)
     return [part for part in parts if part]
 
 
-def cells_area(cells: Iterable[Cell]) -> float:
+def cells_area(cells: Iterable[PlaneCell]) -> float:
     """Area [m2] of cells that do not overlap."""
     return math.fsum(abs(signed_area(cell)) for cell in cells)
 
 
-def merged_spans(cells: Iterable[Cell], gap: float) -> list[Span]:
+def merged_spans(cells: Iterable[PlaneCell], gap: float) -> list[Span]:
     """Where cells are along x: spans, those that are at most `gap` [m] apart joined."""
     joined: list[Span] = []
     for low, high in sorted((min(x for x, _ in cell), max(x for x, _ in cell)) for cell in cells):

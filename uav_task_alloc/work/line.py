@@ -12,7 +12,7 @@ from uav_task_alloc.model import Point, ThreatZone
 from uav_task_alloc.work.values import Geometry, check_steps, refuse_unused
 from uav_task_alloc.work.zone_sections import free_parts
 
-USED = ('path',)
+_USED = ('path',)
 _SHORTEST = 0.1  # [m] of what is left of a way beside a zone
 
 
@@ -22,7 +22,7 @@ def check_line(given: Geometry) -> None:
     Raises:
         InvalidValue: it has less than two points, or two the same in a row.
     """
-    refuse_unused(given, USED)
+    refuse_unused(given, _USED)
     if len(given.path) < 2:
         raise InvalidValue(given.place('path'), given.path, 'at least 2 points')
     check_steps(given)

@@ -9,7 +9,7 @@ from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.geometry.polygon import XY, edges
 from uav_task_alloc.geometry.polyline import polyline_length
 from uav_task_alloc.work.cells import (
-    Cell,
+    PlaneCell,
     Region,
     between,
     cells_area,
@@ -22,14 +22,14 @@ from uav_task_alloc.work.cells import (
 from uav_task_alloc.work.values import MOST_PIECES
 from uav_task_alloc.work.zone_sections import remaining, ring_spans
 
-Way = list[XY]  # [m] from one end to the other
+PlaneWay = list[XY]  # [m] from one end to the other
 _SHIFTS = 0.0, 0.5, -0.5, 0.25, -0.25, 0.375, -0.375, 0.125, -0.125  # of a strip, tried in order
 _SCRAP = 0.02  # of the square of the width: what is smaller is left out
 _MOST_DIRECTIONS = 8  # that are compared, by the number of strips
 _ALIKE = math.radians(0.5)  # directions that differ by less are one
 
 
-def cover(region: Region, width: float, direction: float | None, place: str) -> list[Way]:
+def cover(region: Region, width: float, direction: float | None, place: str) -> list[PlaneWay]:
     """Ways in parallel strips over a region; each strip is within half a width of its way.
 
     Args:
@@ -52,7 +52,7 @@ def cover(region: Region, width: float, direction: float | None, place: str) -> 
     if ranked[0][0] > MOST_PIECES * width:
         raise InvalidValue(place, width, f'at least {ranked[0][0] / MOST_PIECES:.3g} m: more than '
                                          f'{MOST_PIECES} strips otherwise')
-    best: tuple[float, list[Way]] | None = None
+    best: tuple[float, list[PlaneWay]] | None = None
     for height, angle in ranked[:_MOST_DIRECTIONS]:
         if height > MOST_PIECES * width:
             break
@@ -83,7 +83,7 @@ def _height(region: Region, angle: float) -> float:
     return max(ys) - min(ys)
 
 
-def snake_length(ways: Sequence[Way]) -> float:
+def snake_length(ways: Sequence[PlaneWay]) -> float:
     """Length [m] of ways flown in their order, each from its nearer end."""
     total, at = 0.0, None
     for way in ways:
@@ -93,28 +93,28 @@ def snake_length(ways: Sequence[Way]) -> float:
     return total
 
 
-def _strips(region: Region, width: float, levels: Iterable[float]) -> list[Way]:
+def _strips(region: Region, width: float, levels: Iterable[float]) -> list[PlaneWay]:
     """Ways along x; `levels` are the y of crossings of edges."""
     ys = [y for _, y in region.outer]
     low, high = min(ys), max(ys)
     count = max(1, math.ceil((high - low) / width - 1e-9))
     step = (high - low) / count
-    strips: list[list[Cell]] = [[] for _ in range(count)]
+    strips: list[list[PlaneCell]] = [[] for _ in range(count)]
     for middle, cell in slab_cells(region, [*levels, *(low + k * step for k in range(count + 1))]):
         strips[min(count - 1, max(0, int((middle - low) / step)))].append(cell)
     area = cells_area(cell for cells in strips for cell in cells)
     scrap = min(_SCRAP * width * width, 2e-3 * area / count)
-    ways: list[Way] = []
+    ways: list[PlaneWay] = []
     for k, cells in enumerate(strips):
         found = _in_strip(region, cells, low + (k + 0.5) * step, step, width, scrap)
         ways += sorted(found, reverse=k % 2 == 1)
     return ways
 
 
-def _in_strip(region: Region, cells: list[Cell], middle: float, step: float, width: float,
-              scrap: float) -> list[Way]:
+def _in_strip(region: Region, cells: list[PlaneCell], middle: float, step: float, width: float,
+              scrap: float) -> list[PlaneWay]:
     """Ways over the cells of one strip: along its middle, and shifted where that is barred."""
-    ways: list[Way] = []
+    ways: list[PlaneWay] = []
     for shift in _SHIFTS:
         if cells_area(cells) <= scrap:
             break
@@ -134,7 +134,7 @@ def _in_strip(region: Region, cells: list[Cell], middle: float, step: float, wid
     return ways
 
 
-def _without(cell: Cell, x0: float, x1: float, y0: float, y1: float) -> list[Cell]:
+def _without(cell: PlaneCell, x0: float, x1: float, y0: float, y1: float) -> list[PlaneCell]:
     """The parts of a cell outside a box."""
     parts = []
     for axis, low, high in ((0, x0, x1), (1, y0, y1)):
@@ -143,7 +143,7 @@ def _without(cell: Cell, x0: float, x1: float, y0: float, y1: float) -> list[Cel
     return [part for part in parts if part]
 
 
-def _add(new: Way, ways: list[Way], region: Region, width: float) -> None:
+def _add(new: PlaneWay, ways: list[PlaneWay], region: Region, width: float) -> None:
     """Add a way, as the tail of the nearest other one where nothing is between."""
     near = sorted((math.dist(other[-1], tail[0]), k, other, tail)
                   for k, way in enumerate(ways) for other in (way, way[::-1])

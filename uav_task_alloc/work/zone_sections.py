@@ -8,14 +8,15 @@ from collections.abc import Iterable, Sequence
 from uav_task_alloc.geometry.polygon import XY, edges
 from uav_task_alloc.model import Point, Shape, ThreatZone
 
-Ring = Sequence[XY]  # [m] corners, counter-clockwise; it may cross itself, winding > 0 is inside
+# corners [m], counter-clockwise; it may cross itself: winding numbers above 0 are inside
+PlaneRing = Sequence[XY]
 Span = tuple[float, float]
 _CORNERS = 72  # of a circle: its polygon exceeds it by 0.1 % of the radius
 _SKIN = 0.03  # [m] further out, so that rounding never puts a way inside
 
 
 def sections(zones: Iterable[ThreatZone], low: float, high: float,
-             clearance: float = 0.0) -> list[Ring]:
+             clearance: float = 0.0) -> list[PlaneRing]:
     """What zones cover in plan view at any height of a range.
 
     Args:
@@ -30,7 +31,7 @@ def sections(zones: Iterable[ThreatZone], low: float, high: float,
     return [ring for ring in rings if ring]
 
 
-def _section(zone: ThreatZone, low: float, high: float, clearance: float) -> Ring:
+def _section(zone: ThreatZone, low: float, high: float, clearance: float) -> PlaneRing:
     grow = zone.margin + clearance
     if zone.shape is Shape.HEMISPHERE:
         base, reach = zone.center[2], zone.radius + grow
@@ -45,7 +46,7 @@ def _section(zone: ThreatZone, low: float, high: float, clearance: float) -> Rin
     return outline(zone, clearance)
 
 
-def _circle(center: Point, radius: float) -> Ring:
+def _circle(center: Point, radius: float) -> PlaneRing:
     """A polygon around a circle, counter-clockwise."""
     reach = (radius + _SKIN) / math.cos(math.pi / _CORNERS)
     return [(center[0] + reach * math.cos(angle), center[1] + reach * math.sin(angle))
@@ -117,7 +118,7 @@ def _in_ball(a: Point, b: Point, center: Point, radius: float) -> list[Span]:
     return [(-half - math.sqrt(root), -half + math.sqrt(root))] if root > 0.0 else []
 
 
-def ring_spans(a: XY, b: XY, rings: Iterable[Ring]) -> list[Span]:
+def ring_spans(a: XY, b: XY, rings: Iterable[PlaneRing]) -> list[Span]:
     """The parts of a straight way in plan view that are inside rings.
 
     Args:
@@ -140,7 +141,7 @@ def ring_spans(a: XY, b: XY, rings: Iterable[Ring]) -> list[Span]:
     return spans if square else [(0.0, 1.0) for s, t in spans if s < 0.0 < t]
 
 
-def _crossings(ring: Ring) -> Iterable[tuple[float, int]]:
+def _crossings(ring: PlaneRing) -> Iterable[tuple[float, int]]:
     """Where the edges of a ring cross the x axis, and whether up (+1) or down (-1)."""
     for (ax, ay), (bx, by) in edges(ring):
         if (ay > 0.0) != (by > 0.0):
