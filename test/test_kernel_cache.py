@@ -158,9 +158,9 @@ def test_loads_of_two_threads_are_counted_together_after_one_line(capsys):
     terminal = io.StringIO()
     terminal.isatty = lambda: True
     notice = CompilationNotice(lambda: 0.0)
-    with notice.shown_on(terminal), notice.until_loaded('first', Work(30.0, 3)):
+    with notice.shown_on(terminal), notice.until_loaded('first', KernelWork(30.0, 3)):
         compile_one(notice, 'a')
-        with notice.until_loaded('second', Work(10.0, 2), Work(5.0, 50), search=False):
+        with notice.until_loaded('second', KernelWork(10.0, 2), KernelWork(5.0, 50), search=False):
             compile_one(notice, 'b')
         compile_one(notice, 'c')
     shown = [line.split(',')[0] for line in terminal.getvalue().split('\r\x1b[K')[1:]]
@@ -173,7 +173,7 @@ def test_kernels_compiled_before_the_first_load_need_no_second_line(capsys):
     notice = CompilationNotice(lambda: 0.0)
     compile_one(notice, 'zones of the random arrivals of a scenario')
     for name in 'first', 'second':
-        with notice.until_loaded(name, Work(3.0, 1)):
+        with notice.until_loaded(name, KernelWork(3.0, 1)):
             compile_one(notice, name)
     assert capsys.readouterr().err.count('compiling kernels (once, about') == 2
 
