@@ -77,6 +77,7 @@ class OrderBook:
             why = answer.message.removeprefix('refused: ')
             if why == answer.message or not why.strip():
                 self.without_reason.append(f'{name} {dict(fields)}: {answer.message!r}')
+            self.shown(answer.message, now, f'refusal of {name}')
             for order in ending:  # it may have ended without an undo
                 order.leaving = 'not in force any more' in answer.message
                 if order.leaving:

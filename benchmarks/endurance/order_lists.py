@@ -7,7 +7,8 @@ Run after `colcon build`, in a sourced shell. fleet_sim, allocator and bridge ru
 operators order, take back and cancel at random while tasks come and are flown. What is in force is
 kept here, by the answers alone (order_book.py), and compared with each list, hold, status and
 diagnostic. In the end all orders are taken back, and all tasks have to be flown. Ends with 1 where
-an order was broken, a refusal has no reason, an order that was taken back still shows, or an
+an order was broken, a refusal has no reason, an order that was taken back still shows in a text or
+still refuses another one, or an
 accepted task was lost. --trips: with batteries that are changed at the base.
 """
 from __future__ import annotations

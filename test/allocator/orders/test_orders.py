@@ -52,6 +52,29 @@ def test_a_pinned_task_changes_to_its_uav_and_back_when_it_is_undone(driver):
         False, "refused: order_id = 'o1': it is not in force any more (undo o1)")
 
 
+@pytest.mark.parametrize(('action', 'tasks', 'more'), [
+    ('PIN', ('t4',), {}), ('FORBID', ('t1',), {}), ('ORDER', ('t2', 't1'), {}),
+    ('PAUSE', (), {'keep_tasks': False}), ('RETURN', (), {})])
+def test_the_solver_finds_the_lists_of_before_when_an_order_is_undone(action, tasks, more):
+    def rounds(*world, max_iterations, **how):
+        return plan(*world, max_iterations=60 if max_iterations is None else max_iterations,
+                    **{**how, 'budget': 60.0})
+
+    driver = AllocatorDriver(plan=rounds, locked_tasks=0)
+    driver.uav('a', 0.0, 0.0, 50.0)
+    driver.uav('b', 1000.0, 0.0, 50.0)
+    driver.add(('t1', 100, 0), ('t2', 200, 0), ('t3', 900, 0), ('t4', 800, 0))
+    driver.settle()
+    before = driver.route('a'), driver.route('b')
+    assert before == (('t1', 't2'), ('t3', 't4'))
+    assert driver.order(action, 'a', *tasks, **more).success
+    driver.settle()
+    assert (driver.route('a'), driver.route('b')) != before
+    assert driver.order('UNDO', order_id='o1').success
+    driver.settle()
+    assert (driver.route('a'), driver.route('b')) == before
+
+
 def test_a_forbidden_task_goes_to_another_or_waits_with_the_reason(driver):
     assert driver.order('FORBID', 'a', 't1').success
     driver.settle()

@@ -6,7 +6,7 @@ HYPOTHESIS_ORDERS=1200 python -m pytest test/allocator/orders/test_random_orders
 import os
 from collections import Counter
 
-from allocation import AllocatorDriver
+from allocation import AllocatorDriver, greedy
 from hypothesis import HealthCheck, Phase, settings, strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, rule
 
@@ -182,15 +182,37 @@ class OrdersAndEvents(RuleBasedStateMachine):
         before, answer = self.order('UNDO', order_id=name)
         assert answer.success == (name in before)
 
-    @rule(uav_id=st.sampled_from(UAVS), name=st.sampled_from(TASKS))
-    def give_and_take_back(self, uav_id, name):
+    def what_orders_demand(self):
+        """What the solver may do, what UAVs and users are told, and a plan made from nothing."""
         world = self.driver.world
-        before = dict(world.orders.in_force)
-        answer = self.driver.order('FORBID', uav_id, name)
-        if answer.success and answer.order_id not in before:
+        orders, tasks = world.orders, sorted(world.tasks_to_plan(), key=lambda task: task.id)
+        uavs = [world.uav(uav_id) for uav_id in sorted(world.fleet.usable_ids())]
+        return {
+            'uavs': uavs, 'tasks': tasks, 'in force': list(orders.in_force.values()),
+            'next': [orders.sequence(uav_id) for uav_id in UAVS],
+            'kept': [orders.keeps_tasks(uav_id) for uav_id in UAVS],
+            'returns': [orders.returns(uav_id) for uav_id in UAVS],
+            'holds': [uav_id in orders.holds and orders.holds[uav_id].hold for uav_id in UAVS],
+            'reasons': [orders.reason(name) for name in TASKS],
+            'plan': greedy(uavs, tasks, tuple(world.zones.values())).routes}
+
+    @rule(uav_id=st.sampled_from(UAVS), picks=st.lists(PICKS, min_size=1, max_size=2),
+          kind=st.sampled_from(('PIN', 'FORBID', 'FORBID', 'ORDER', 'PAUSE', 'RETURN')),
+          keep=st.booleans(), lists_change=st.booleans())
+    def give_and_take_back(self, uav_id, picks, kind, keep, lists_change):
+        self.settle()
+        names = [self.task(pick) for pick in picks[:2 if kind == 'ORDER' else 1]]
+        before, more = self.what_orders_demand(), {}
+        if kind in ('PAUSE', 'RETURN'):
+            names, more = [], {'keep_tasks': keep} if kind == 'PAUSE' else {}
+        answer = self.driver.order(kind, uav_id, *names, **more)
+        if answer.success and answer.order_id not in {each.id for each in before['in force']}:
+            assert self.what_orders_demand() != before
+            if lists_change:
+                self.settle()
             assert self.driver.order('UNDO', order_id=answer.order_id).success
-            assert world.orders.in_force == before
-            COUNTS['undone'] += 1
+            assert self.what_orders_demand() == before
+            COUNTS['undone', kind] += 1
         self.settle()
 
     # what always holds
