@@ -3,12 +3,14 @@
 import itertools
 import json
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from uav_task_alloc import palette, plots
 from uav_task_alloc.model import Leg, Plan, Task, ThreatZone, Uav
+from uav_task_alloc.model.route_stops import route_points, route_stops
 from uav_task_alloc.plots import labels, plan as plan_map, space, style, times
 from uav_task_alloc.plots.flat import MapFigure
 from uav_task_alloc.record.ground_truth import TRUTH_FILE
@@ -220,9 +222,23 @@ def test_times_are_drawn_in_their_windows(tmp_path, monkeypatch, count):
     assert axes.get_xlabel() == 'time [s]'
 
 
+def test_a_path_is_part_of_a_route_and_turned_where_it_is_flown_from_its_end():
+    uav = Uav('u1', (0.0, 0.0, 0.0))
+    tasks = {f't{i}': Task(f't{i}', (10.0 * i, 50.0, 40.0),
+                           path=[(10.0 * i, 50.0, 40.0), (10.0 * i, 90.0, 40.0)])
+             for i in range(4)}
+    turned = replace(timed_plan(4), reversed=frozenset({'t1'}))
+    points = route_points(uav, turned, tasks)
+    assert points[1:5] == [tasks['t0'].position, tasks['t0'].end, tasks['t1'].end,
+                           tasks['t1'].position]
+    stops = route_stops(turned, 'u1', tasks, uav.base)
+    assert [stop.task for stop in stops] == ['t0', 't1', None, 't2', 't3', None]
+
+
 def test_a_route_of_two_trips_is_drawn_over_its_base():
     uav = Uav('u1', (0.0, 0.0, 0.0))
     places = {f't{i}': (10.0 * i, 50.0, 40.0) for i in range(4)}
-    points = plan_map.route_points(uav, timed_plan(4), places)
+    points = route_points(uav, timed_plan(4), {
+        name: Task(name, place) for name, place in places.items()})
     assert points == [uav.base, places['t0'], places['t1'], uav.base, places['t2'], places['t3'],
                       uav.base]

@@ -8,6 +8,7 @@ import sys
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import fields, replace
+from itertools import groupby
 from pathlib import Path
 
 from uav_task_alloc import scenario
@@ -23,6 +24,7 @@ from uav_task_alloc.cli.outputs import (
     naming,
 )
 from uav_task_alloc.cli.plan_json import plan_json
+from uav_task_alloc.cli.plan_pieces import piece_kinds, short_names, with_pieces
 from uav_task_alloc.cli.plan_times import has_times, times_text
 from uav_task_alloc.cli.progress import SolveProgress, log_line
 from uav_task_alloc.errors import InvalidValue, first_of
@@ -45,7 +47,7 @@ def main(argv: Sequence[str]) -> int:
     """
     args = _make_parser().parsed(argv)
     check_outputs(args)
-    loaded = with_options(without_cancelled(scenario.load(args.scenario)), args)
+    loaded = with_pieces(with_options(without_cancelled(scenario.load(args.scenario)), args))
     with counted_kernels():
         _load_kernels(loaded, args.solver, search=False)
         for text in start_warnings(loaded):
@@ -69,7 +71,7 @@ def main(argv: Sequence[str]) -> int:
 def _answer(loaded: Scenario, result: Plan, args: argparse.Namespace) -> None:
     """Print a plan and write the files."""
     try:
-        print(plan_text(result), flush=True)
+        print(plan_text(result, piece_kinds(loaded)), flush=True)
         if args.times or has_times(loaded):
             print(times_text([timed.task for timed in loaded.tasks], result), flush=True)
     finally:  # also where nobody reads what is printed
@@ -192,15 +194,22 @@ def solve_scenario(loaded: Scenario, args: argparse.Namespace, stop: Callable[[]
                 stop=stop, on_iteration=on_iteration, max_iterations=max_iterations)
 
 
-def plan_text(result: Plan) -> str:
-    """A plan as lines of text: a route for each UAV, unassigned tasks, totals."""
-    lines = [f'{uav}: {result.route(uav).distance:.0f} m  {stops_text(result, uav)}'
+def plan_text(result: Plan, kinds: dict[str, str]) -> str:
+    """A plan as lines of text: a route for each UAV, unassigned tasks, totals.
+
+    Args:
+        result: the plan.
+        kinds: as `piece_kinds` returns them.
+    """
+    lines = [f'{uav}: {result.route(uav).distance:.0f} m  {stops_text(result, uav, kinds)}'
              for uav in result.routes]
-    lines += [f'unassigned {name}: {reason}' for name, reason in result.unassigned.items()]
+    for reason, names in groupby(result.unassigned, lambda name: result.unassigned[name]):
+        lines += [f'unassigned {name}: {reason}' for name in short_names(names, kinds)]
     lines += [f'conflict of {each.uavs[0]} and {each.uavs[1]} at {each.time:.0f} s: '
               f'{each.resolution or "NOT RESOLVED"}, {each.detail}' for each in result.conflicts]
     planned = sum(len(tasks) for tasks in result.routes.values())
-    lines.append(f'{planned} tasks planned, {len(result.unassigned)} unassigned; '
+    lines.append(f'{planned} tasks{" and pieces" * bool(kinds)} planned, '
+                 f'{len(result.unassigned)} unassigned; '
                  f'{result.distance:.0f} m, finish {result.finish:.0f} s, '
                  f'response {result.response:.0f} s, value {result.value:g}, '
                  f'penalty {result.penalty:.0f} m, fit {result.fit:.4g}; '
@@ -208,10 +217,10 @@ def plan_text(result: Plan) -> str:
     return '\n'.join(lines)
 
 
-def stops_text(result: Plan, uav: str) -> str:
+def stops_text(result: Plan, uav: str, kinds: dict[str, str]) -> str:
     """The tasks of a UAV in order, with the visits of its home between its trips."""
     rows = result.trips_of(uav)
-    stops = [name for row in rows for name in (*row, '(home)')][:-1]
+    stops = [name for row in rows for name in (*short_names(row, kinds), '(home)')][:-1]
     return ' -> '.join(stops) or '(no tasks)'
 
 

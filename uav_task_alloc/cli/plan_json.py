@@ -10,6 +10,7 @@ from typing import Any
 from uav_task_alloc.cli.plan_times import times_json
 from uav_task_alloc.geometry.frames import Origin, to_geodetic_batch
 from uav_task_alloc.model import Plan, Point
+from uav_task_alloc.model.route_stops import route_stops
 from uav_task_alloc.scenario.values import Scenario
 
 _DIGITS = (9, 9, 3)  # of degrees and metres: 0.1 mm and 1 mm
@@ -24,10 +25,11 @@ def plan_json(loaded: Scenario, result: Plan) -> dict[str, Any]:
 
     Returns:
         What `Plan` has, an infinite fit as None; `conflicts`, of UAVs that would not have been
-        apart; `origin`; `tasks`, the position of each; and
-        `waypoints`, of each UAV, from its start to its end: `task` is the id of the task there,
-        or None. Positions are latitude and longitude [deg] and altitude [m above the origin], as
-        in a scenario file.
+        apart; `origin`; `tasks`, the position of each, and `paths`, of
+        those that are ways (ids of pieces are `field#1`); `reversed`, the ids of those that are
+        flown from their last point; and `waypoints`, of each UAV, from its start to its end:
+        `task` is the id of the task there, or None. Positions are latitude and longitude [deg]
+        and altitude [m above the origin], as in a scenario file.
     """
     return {
         'routes': {uav: list(tasks) for uav, tasks in result.routes.items()},
@@ -41,6 +43,9 @@ def plan_json(loaded: Scenario, result: Plan) -> dict[str, Any]:
         'origin': asdict(loaded.origin),
         'tasks': dict(zip((timed.task.id for timed in loaded.tasks), geodetic_rows(
             loaded.origin, [timed.task.position for timed in loaded.tasks]), strict=True)),
+        'paths': {timed.task.id: geodetic_rows(loaded.origin, timed.task.path)
+                  for timed in loaded.tasks if timed.task.path},
+        'reversed': sorted(result.reversed),
         'waypoints': {uav.id: _waypoints(loaded, result, k)
                       for k, uav in enumerate(loaded.uavs)},
     }
@@ -68,14 +73,10 @@ def geodetic_rows(origin: Origin, points: Sequence[Point]) -> list[dict[str, flo
 
 def _waypoints(loaded: Scenario, result: Plan, k: int) -> list[dict[str, Any]]:
     """The points of the k-th UAV's route, its start and home included."""
-    uav, positions = loaded.uavs[k], {timed.task.id: timed.task.position for timed in loaded.tasks}
-    route = result.route(uav.id)
-    stops: list[tuple[str | None, Point]] = []
-    for row in result.trips_of(uav.id):  # at home after each trip, the last where it returns
-        stops += [*((name, positions[name]) for name in row), (None, uav.home)]
+    uav, known = loaded.uavs[k], {timed.task.id: timed.task for timed in loaded.tasks}
     names, points = list[str | None]([None]), [uav.position]
-    for leg, (name, position) in zip(route.legs, stops, strict=False):
-        names += [None] * len(leg.via) + [name]
-        points += [*leg.via, position]
+    for stop in route_stops(result, uav.id, known, uav.home):
+        names += [None] * len(stop.via) + [stop.task] * len(stop.points)
+        points += [*stop.via, *stop.points]
     return [{'task': name, **row} for name, row in zip(
         names, geodetic_rows(loaded.origin, points), strict=True)]

@@ -12,6 +12,7 @@ from xml.etree import ElementTree
 
 from uav_task_alloc.geometry.frames import Origin, to_geodetic_batch
 from uav_task_alloc.model import Plan, Point, Shape, ThreatZone
+from uav_task_alloc.model.route_stops import route_points
 from uav_task_alloc.palette import RED, STATE_COLOURS, uav_colour
 from uav_task_alloc.record.ground_truth import TrueSample
 from uav_task_alloc.record.run_state import RunState
@@ -55,30 +56,21 @@ def plan_shapes(scenario: Scenario, plan: Plan) -> list[MapShape]:
             'unassigned': plan.unassigned.get(task.id, 'not planned')}
         if uav and math.isfinite(arrivals.get(task.id, math.inf)):
             row['arrival'] = round(arrivals[task.id], 1)
-        tasks.append(MapShape(task.id, 'tasks', 'Point', (task.position,), {
-            'kind': 'task', 'altitude': task.position[2], 'value': task.value,
-            'service_time': task.service_time, **row}, _colours(scenario.uavs).get(uav, RED)))
-    routes = [MapShape(uav.id, 'routes', 'LineString', points, {
+        way = task.path[::-1] if task.id in plan.reversed else task.path
+        tasks.append(MapShape(
+            task.id, 'tasks', 'LineString' if way else 'Point', way or (task.position,), {
+                'kind': 'task', 'altitude': task.position[2], 'value': task.value,
+                'service_time': task.service_time, **row}, _colours(scenario.uavs).get(uav, RED)))
+    known = {timed.task.id: timed.task for timed in scenario.tasks}
+    routes = [MapShape(uav.id, 'routes', 'LineString', tuple(points), {
         'kind': 'route', 'metres': round(plan.route(uav.id).distance, 1)},
         _colours(scenario.uavs)[uav.id])
-        for uav in scenario.uavs if len(points := _route_points(scenario, plan, uav)) > 1]
+        for uav in scenario.uavs if len(points := route_points(uav.uav, plan, known)) > 1]
     return [*tasks, *(zone_shape(timed.zone) for timed in scenario.zones), *routes]
 
 
 def _colours(uavs: Sequence[ScenarioUav]) -> dict[str, str]:
     return {uav.id: uav_colour(number) for number, uav in enumerate(uavs)}
-
-
-def _route_points(scenario: Scenario, plan: Plan, uav: ScenarioUav) -> tuple[Point, ...]:
-    """From the start to the last task, or home where the route returns."""
-    positions = {timed.task.id: timed.task.position for timed in scenario.tasks}
-    stops: list[Point] = []
-    for trip in plan.trips_of(uav.id):
-        stops += [*(positions[name] for name in trip), uav.home]
-    points = [uav.position]
-    for leg, stop in zip(plan.route(uav.id).legs, stops, strict=False):
-        points += [*leg.via, stop]
-    return tuple(points)
 
 
 def zone_shape(zone: ThreatZone) -> MapShape:

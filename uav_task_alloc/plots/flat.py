@@ -88,6 +88,13 @@ class MapFigure:
                                arrowprops={'arrowstyle': '-|>', 'mutation_scale': 24.0, 'lw': 0.0,
                                            'color': uav_colour(index)})
 
+    def way(self, points: Sequence[Point], colour: str) -> None:
+        """Add the path of a task as a wide pale line; nothing for a point."""
+        if points:
+            xs, ys, _ = zip(*points, strict=True)
+            self.axes.plot(xs, ys, color=colour, lw=2.5 * ROUTE, alpha=0.25, zorder=3,
+                           solid_capstyle='butt')
+
     def home(self, point: Point, name: str, index: int) -> None:
         """Add the start of a UAV."""
         self.axes.plot(point[0], point[1], 's', ms=14, color=uav_colour(index), mec='black',

@@ -2,13 +2,14 @@
 """Map of a plan: routes with their detours, tasks in order, zones, unassigned tasks."""
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 from matplotlib.lines import Line2D
 
 import uav_task_alloc.plots.style as style
 from uav_task_alloc.model import Plan, Point, Task, ThreatZone, Uav
+from uav_task_alloc.model.route_stops import route_points
 from uav_task_alloc.palette import RED, uav_colour
 from uav_task_alloc.plots.flat import MapFigure
 
@@ -42,16 +43,21 @@ def add_plan(figure: MapFigure, uavs: Sequence[Uav], tasks: Sequence[Task],
         figure: to draw on.
         uavs, tasks, zones, plan: as for `draw_plan`.
     """
-    positions = {task.id: task.position for task in tasks}
+    known = {task.id: task for task in tasks}
     for zone in zones:
         figure.zone(zone)
     for index, uav in enumerate(uavs):
-        figure.route(route_points(uav, plan, positions), index, arrows=figure.shows_names)
+        figure.route(route_points(uav, plan, known), index,
+                     arrows=figure.shows_names)
         figure.home(uav.position, uav.id, index)
         for number, name in enumerate(plan.routes.get(uav.id, ()), 1):
-            figure.task(positions[name], uav_colour(index), name, number=number)
+            task = known[name]
+            entry = task.end if name in plan.reversed else task.position
+            figure.way(task.path, uav_colour(index))
+            figure.task(entry, uav_colour(index), name, number=number)
     for name in plan.unassigned:
-        figure.task(positions[name], 'white', name, edge=RED)
+        figure.way(known[name].path, RED)
+        figure.task(known[name].position, 'white', name, edge=RED)
     for point, colour in conflict_marks(plan):
         figure.conflict(point, colour)
 
@@ -67,26 +73,6 @@ def conflict_marks(plan: Plan) -> list[tuple[Point, str]]:
     """
     return [(each.position, _RESOLVED if each.resolution else RED)
             for each in plan.conflicts if each.position is not None]
-
-
-def route_points(uav: Uav, plan: Plan, positions: Mapping[str, Point]) -> list[Point]:
-    """Return all points of a UAV's route, from its start over detour points and tasks.
-
-    Args:
-        uav: with its start and home.
-        plan: with routes and legs.
-        positions: [m] ENU by task id.
-
-    Returns:
-        [m] ENU; ends at home where the plan returns.
-    """
-    stops = [stop for trip in plan.trips_of(uav.id)
-             for stop in (*(positions[name] for name in trip), uav.base)]
-    points = [uav.position]
-    # a leg home after the last trip only where the plan returns
-    for leg, stop in zip(plan.legs.get(uav.id, ()), stops, strict=False):
-        points += [*leg.via, stop]
-    return points
 
 
 def plan_title(plan: Plan, tasks: int) -> str:

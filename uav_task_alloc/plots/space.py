@@ -17,13 +17,13 @@ from numpy.typing import NDArray
 
 import uav_task_alloc.plots.style as style
 from uav_task_alloc.model import Plan, Point, Shape, Task, ThreatZone, Uav
+from uav_task_alloc.model.route_stops import route_points
 from uav_task_alloc.palette import DARK_RED, RED, uav_colour
 from uav_task_alloc.plots.labels import Label, place_labels
 from uav_task_alloc.plots.plan import (
     conflict_marks,
     legend_handles,
     plan_title,
-    route_points,
 )
 from uav_task_alloc.plots.style import ROUTE, SMALL
 
@@ -55,7 +55,8 @@ def draw_plan_3d(uavs: Sequence[Uav], tasks: Sequence[Task], zones: Sequence[Thr
         OSError: the file cannot be written.
     """
     positions = {task.id: task.position for task in tasks}
-    routes = [route_points(uav, plan, positions) for uav in uavs]
+    known = {task.id: task for task in tasks}
+    routes = [route_points(uav, plan, known) for uav in uavs]
     points = [*positions.values(), *itertools.chain.from_iterable(routes)]
     low, high = box_limits(points, zones)
     figure = Figure(figsize=style.SIZE, dpi=style.DPI)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-import math
 from collections.abc import Callable, Iterable
 from difflib import get_close_matches
 from pathlib import Path
@@ -12,7 +11,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from uav_task_alloc.errors import InvalidValue, ScenarioError
-from uav_task_alloc.geometry.frames import Origin, to_enu
+from uav_task_alloc.geometry.frames import Origin
 from uav_task_alloc.model import Point, Shape, Task
 from uav_task_alloc.objective import Objective
 from uav_task_alloc.scenario.checked_yaml import YamlRow, compose, read_row, refusal
@@ -30,12 +29,12 @@ from uav_task_alloc.scenario.values import (
     TimedTask,
     TimedZone,
 )
+from uav_task_alloc.scenario.work_rows import from_degrees, task_actions, work_of, work_position
 from uav_task_alloc.separation.rule import Separation
 from uav_task_alloc.zone_codec import USED_KEYS, decode_zone
 
 _Value = TypeVar('_Value')
 _LARGEST_FILE = 100_000_000  # [bytes]
-_FARTHEST = 500e3  # [m] from the origin: farther out, degrees or origin are wrong
 _CENTER_IN_DEGREES = {'hemisphere': ('latitude', 'longitude', 'altitude'),
                       'cylinder': ('latitude', 'longitude')}
 
@@ -129,7 +128,7 @@ def _origin(row: YamlRow | None) -> Origin:
 def _uav(row: YamlRow, number: int, origin: Origin) -> ScenarioUav:
     position, home = _position(row, origin), row['home']
     if isinstance(home, YamlRow):
-        home = _from_degrees(home, origin)
+        home = from_degrees(home, origin)
     uav = ScenarioUav(
         row['id'], row['system_id'] or number, row['autopilot'], position, home or position,
         row['cruise_speed'], row['range'], frozenset(row['capabilities']), row['dies_at'],
@@ -145,10 +144,17 @@ def _task(row: YamlRow, origin: Origin, uavs: list[str]) -> TimedTask:
     for name in allowed or ():
         if name not in uavs:
             raise row.refuse('allowed_uavs', _one_of('UAVs', name, uavs))
-    return TimedTask(row['at'], _valid(row, lambda: Task(
-        row['id'], _position(row, origin), row['value'], row['service_time'],
+    if row['kind'] in ('line', 'area'):
+        position = work_position(row, origin)
+    else:
+        position = _position(row, origin)
+    task = _valid(row, lambda: Task(
+        row['id'], position, row['value'], row['service_time'],
         frozenset(row['required_capabilities']), None if allowed is None else frozenset(allowed),
-        row['acceptance_radius'], **{name: row[name] for name in TASK_TIMES})))
+        row['acceptance_radius'], **{name: row[name] for name in TASK_TIMES},
+        heading=row['heading'], actions=task_actions(row)))
+    work = _valid(row, lambda: work_of(row, task, origin))
+    return TimedTask(row['at'], task if work is None else work.task, work)
 
 
 def _position(row: YamlRow, origin: Origin) -> Point:
@@ -161,22 +167,12 @@ def _position(row: YamlRow, origin: Origin) -> Point:
     for key in GEODETIC:
         if row[key] is None:
             raise row.refuse(key, 'all three of latitude, longitude, altitude')
-    return _from_degrees(row, origin)
-
-
-def _from_degrees(row: YamlRow, origin: Origin) -> Point:
-    """ENU [m] of the latitude and longitude of a row, and its altitude where there is one."""
-    altitude = row.values.get('altitude') or 0.0
-    point = to_enu(origin, row['latitude'], row['longitude'], origin.altitude_amsl + altitude)
-    if not math.hypot(*point) <= _FARTHEST:
-        raise row.refuse('latitude', f'a place within {_FARTHEST / 1e3:g} km of the origin, '
-                                     f'{origin.latitude:g}, {origin.longitude:g}')
-    return point
+    return from_degrees(row, origin)
 
 
 def _zone(row: YamlRow, origin: Origin) -> TimedZone:
     used = USED_KEYS[Shape[row['shape'].upper()]]
-    _zone_from_degrees(row, origin)
+    _zonefrom_degrees(row, origin)
     for key in used:
         if row[key] is None:
             raise row.refuse(key, f'it for a {row["shape"]}')
@@ -192,7 +188,7 @@ def _zone(row: YamlRow, origin: Origin) -> TimedZone:
     return TimedZone(zone, row['appears'], row['vanishes'])
 
 
-def _zone_from_degrees(row: YamlRow, origin: Origin) -> None:
+def _zonefrom_degrees(row: YamlRow, origin: Origin) -> None:
     """Replace the values of a zone that are in degrees by ENU."""
     geodetic = _CENTER_IN_DEGREES.get(row['shape'], ())
     if any(row[key] is not None for key in geodetic):
@@ -201,9 +197,9 @@ def _zone_from_degrees(row: YamlRow, origin: Origin) -> None:
         for key in geodetic:
             if row[key] is None:
                 raise row.refuse(key, f'all of {", ".join(geodetic)}')
-        row.values['center'] = _from_degrees(row, origin)
+        row.values['center'] = from_degrees(row, origin)
     row.values['vertices'] = row['vertices'] and tuple(
-        _from_degrees(corner, origin)[:2] if isinstance(corner, YamlRow) else corner
+        from_degrees(corner, origin)[:2] if isinstance(corner, YamlRow) else corner
         for corner in row['vertices'])
 
 
@@ -275,5 +271,5 @@ def _valid(row: YamlRow, build: Callable[[], _Value]) -> _Value:
     try:
         return build()
     except InvalidValue as error:
-        key = error.place.rpartition(' ')[2]
+        key = error.place.rpartition(' ')[2].partition('[')[0]
         raise refusal(row.nodes.get(key, row.node), f'{row.place}: {error}') from None

@@ -24,6 +24,7 @@ from uav_task_alloc.scenario.checked_yaml import (
     whole_number,
 )
 from uav_task_alloc.scenario.values import DEFAULT_SPEEDUP
+from uav_task_alloc.scenario.work_schema import ACTION, CAMERA, WORK_KEYS
 
 _TIME = number_value(0.0)
 _LENGTH = number_value(0.0, infinite=True)
@@ -90,7 +91,8 @@ UAV: KeyTable = {
 TASK: KeyTable = {
     'id': Key(ID, 'name of the task'),
     'at': Key(_TIME, '[s] when it is announced', 0.0),
-    'position': Key(POINT, '[m] ENU; either this or latitude, longitude and altitude', None),
+    'position': Key(POINT, '[m] ENU; either this or latitude, longitude and altitude; a line or '
+                    'area has a path instead', None),
     'latitude': _LATITUDE,
     'longitude': _LONGITUDE,
     'altitude': _ALTITUDE,
@@ -105,6 +107,7 @@ TASK: KeyTable = {
     'latest': Key(number_value(-1e9, infinite=True), '[s] of the start of its service', math.inf),
     'release': Key(_TIME, '[s] no UAV sets out for it before', 0.0),
     'payload': Key(number_value(0.0, 1e6), '[kg] that a UAV takes on at its home for it', 0.0),
+    **WORK_KEYS,
 }
 
 _WIND: KeyTable = {
@@ -221,5 +224,6 @@ SCENARIO: KeyTable = {
 }
 
 TABLES = {'scenario': SCENARIO, 'origin': ORIGIN, 'objective': OBJECTIVE, 'wind': _WIND,
-          'separation': SEPARATION, 'uavs': UAV, 'tasks': TASK, 'zones': ZONE,
+          'separation': SEPARATION, 'uavs': UAV, 'tasks': TASK,
+          'actions': ACTION, 'camera': CAMERA, 'zones': ZONE,
           'arrivals': _ARRIVALS, 'cancels': CANCEL, 'orders': _ORDER}

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 from uav_task_alloc.model import Task, ThreatZone
 from uav_task_alloc.scenario.values import Scenario, TimedOrder
+from uav_task_alloc.work.pieces import Work
 
 
 @dataclass(frozen=True, slots=True)
@@ -15,6 +16,7 @@ class Moment:
     at: float  # [s] of the scenario
     zones: tuple[ThreatZone, ...] | None = None  # all zones in force; None: unchanged
     tasks: tuple[Task, ...] = ()  # announced
+    works: tuple[Work, ...] = ()  # the same with their kinds and geometry
     cancels: tuple[Task, ...] = ()  # withdrawn
     deaths: tuple[str, ...] = ()  # ids of lost UAVs
     orders: tuple[TimedOrder, ...] = ()  # given by an operator
@@ -38,6 +40,7 @@ def timeline(scenario: Scenario) -> tuple[Moment, ...]:
         at,
         scenario.zones_at(at) if at in changes else None,
         tuple(timed.task for timed in scenario.tasks if timed.at == at),
+        tuple(timed.whole for timed in scenario.tasks if timed.at == at),
         tuple(by_id[cancel.task] for cancel in scenario.cancels if cancel.at == at),
         tuple(uav for uav, dies_at in deaths.items() if dies_at == at),
         tuple(order for order in scenario.orders if order.at == at),

@@ -11,6 +11,7 @@ from uav_task_alloc.model import Point, Task, ThreatZone, Uav
 from uav_task_alloc.objective import Objective
 from uav_task_alloc.params import AllocatorParams
 from uav_task_alloc.separation.rule import Separation
+from uav_task_alloc.work.pieces import Work
 
 DEFAULT_ORIGIN = Origin(47.397742, 8.545594, 488.0)
 DEFAULT_SPEEDUP = 8.0  # times faster than real time
@@ -75,6 +76,12 @@ class TimedTask:
 
     at: float  # [s]
     task: Task  # announced at `at`
+    work: Work | None = None  # of which `task` is the task; None: a point
+
+    @property
+    def whole(self) -> Work:
+        """The task with its kind and geometry."""
+        return self.work or Work(self.task)
 
 
 @dataclass(frozen=True, slots=True)

@@ -18,6 +18,8 @@ from uav_task_alloc.scenario.values import (
     TimedTask,
     TimedZone,
 )
+from uav_task_alloc.scenario.work_schema import WORK_KEYS
+from uav_task_alloc.work.pieces import Work
 from uav_task_alloc.zone_codec import SCENARIO_ZONE, encode_zone
 
 
@@ -64,12 +66,27 @@ def _uav(uav: ScenarioUav) -> dict[str, Any]:
 
 
 def _task(timed: TimedTask) -> dict[str, Any]:
-    task: Task = timed.task
-    return {'id': task.id, 'at': timed.at, 'position': list(task.position), 'value': task.value,
+    task, work = timed.task, timed.whole
+    place = {} if work.path else {'position': list(task.position)}
+    return {'id': task.id, 'at': timed.at, **place, **_geometry(work), 'value': task.value,
             'service_time': task.service_time, 'acceptance_radius': task.acceptance_radius,
             'required_capabilities': sorted(task.required_capabilities),
             'allowed_uavs': None if task.allowed_uavs is None else sorted(task.allowed_uavs),
-            **_changed(task, Task, TASK_TIMES)}
+            **_changed(task, Task, (*TASK_TIMES, 'heading')),
+            **({'actions': [{'name': action.name, **{
+                key: int(value) if value.is_integer() else value for key, value in action.values}}
+                for action in task.actions]} if task.actions else {})}
+
+
+def _geometry(work: Work) -> dict[str, Any]:
+    """What makes work more than a point."""
+    row = {
+        'kind': work.kind.name.lower(), 'path': [list(point) for point in work.path],
+        'holes': [[list(corner) for corner in hole] for hole in work.holes],
+        'strip_width': work.strip_width, 'direction': work.direction, 'radius': work.radius,
+        'turns': work.turns, 'divisible': work.divisible, 'vertical': work.vertical.name.lower()}
+    return {key: value for key, value in row.items() if value != WORK_KEYS[key].default
+            and value != []}
 
 
 def _changed(value: ScenarioUav | Task, kind: type, names: tuple[str, ...]) -> dict[str, Any]:

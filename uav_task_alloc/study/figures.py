@@ -13,8 +13,8 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 
+from uav_task_alloc.model.route_stops import route_points
 from uav_task_alloc.plots import draw_plan_3d, uav_colour
-from uav_task_alloc.plots.plan import route_points
 from uav_task_alloc.solver.chain_q import COLD_START
 from uav_task_alloc.solver.registry import SOLVERS
 from uav_task_alloc.study import experiments, tables, trials
@@ -108,7 +108,7 @@ def _convergence(settings: Experiments, results: Mapping[tuple[str, int], Any], 
 def _allocation(settings: Experiments, results: Mapping[str, Any], out: Path) -> None:
     """Figure 3: the routes in three dimensions, a figure for each solver."""
     instance = trials.instance_of(settings.figure_scene())
-    positions = {task.id: task.position for task in instance.tasks}
+    known = {task.id: task for task in instance.tasks}
     for solver, result in results.items():
         plan, name = trials.plan_from_result(result), out.with_name(f'{out.name}_{solver}')
         note = '\n'.join(_wrapped([
@@ -120,7 +120,7 @@ def _allocation(settings: Experiments, results: Mapping[str, Any], out: Path) ->
         tables.write_csv(name.with_suffix('.csv'), [
             {'UAV': uav.id, 'point': n, 'east [m]': x, 'north [m]': y, 'up [m]': z}
             for uav in instance.uavs
-            for n, (x, y, z) in enumerate(route_points(uav, plan, positions))])
+            for n, (x, y, z) in enumerate(route_points(uav, plan, known))])
 
 
 def mean_curve(runs: Sequence[Mapping[str, Any]], column: int) -> Curve:

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from uav_task_alloc.checks import check_number
 from uav_task_alloc.errors import InvalidValue
 
+SIDE_OVERLAP, FRONT_OVERLAP = 0.6, 0.75  # as surveys for maps usually have
+
 
 @dataclass(frozen=True, slots=True)
 class Camera:
@@ -35,8 +37,8 @@ class Camera:
     ground_sample_distance: float = 0.0  # [m]
     image_width: float = 0.0  # [pixels]
     image_height: float = 0.0  # [pixels]
-    side_overlap: float = 0.6
-    front_overlap: float = 0.75
+    side_overlap: float = SIDE_OVERLAP
+    front_overlap: float = FRONT_OVERLAP
 
     def __post_init__(self) -> None:
         for name, high in (('sensor_width', 1.0), ('sensor_height', 1.0), ('focal_length', 10.0),

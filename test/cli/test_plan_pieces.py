@@ -1,0 +1,39 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`plan` cuts work into pieces and names them in short."""
+import pytest
+
+from uav_task_alloc.cli.plan_pieces import piece_kinds, short_names, with_pieces
+from uav_task_alloc.scenario import parse
+
+SCENARIO = """
+uavs:
+  - {id: uav_1, position: [0, 0, 0]}
+tasks:
+  - {id: mast, position: [10, 20, 40]}
+  - {id: field, kind: area, strip_width: 50, altitude: 50, at: 3,
+     path: [[0, 0], [300, 0], [300, 200], [0, 200]]}
+  - {id: cable, kind: line, altitude: 50, path: [[0, -50], [300, -50], [300, -90]]}
+zones:
+  - {id: z, shape: cylinder, center: [150, -50], radius: 20, z_max: 100}
+"""
+
+
+def test_a_scenario_is_cut_around_its_zones():
+    cut = with_pieces(parse(SCENARIO))
+    assert [timed.task.id for timed in cut.tasks] == [
+        'mast', 'cable#1', 'cable#2', 'field#1', 'field#2', 'field#3', 'field#4']
+    assert {timed.at for timed in cut.tasks if timed.task.id.startswith('field')} == {3.0}
+    assert piece_kinds(cut) == {'field': 'strip', 'cable': 'part'}
+
+
+@pytest.mark.parametrize(('names', 'text'), [
+    (['mast'], 'mast'),
+    (['field#1', 'field#2', 'field#3'], 'field strips 1-3'),
+    (['field#3', 'field#2', 'field#1', 'mast', 'field#4'], 'field strips 3-1; mast; '
+                                                           'field strip 4'),
+    (['field#1', 'field#2', 'field#5', 'field#7', 'field#6', 'field#5'],
+     'field strips 1, 2, 5, 7-5'),
+    (['cable#2', 'field#2', 'field#1', 'field#2'], 'cable part 2; field strips 2, 1, 2'),
+])
+def test_pieces_in_a_row_are_one_text(names, text):
+    assert '; '.join(short_names(names, {'field': 'strip', 'cable': 'part'})) == text
