@@ -29,7 +29,8 @@ from uav_task_alloc.scenario.schema import TASK, UAV, ZONE
 _PLACE_KEYS = {'id', 'position', 'home', 'center', 'vertices', 'shape', 'latitude', 'longitude',
                'altitude'}
 _OWN_KEYS = {'kind', 'path', 'holes', 'camera', 'actions'}  # not as properties have them
-_KEYS = {'tasks': TASK.keys() - _PLACE_KEYS - _OWN_KEYS, 'zones': (ZONE.keys() - _PLACE_KEYS) | {'shape'},
+_KEYS = {'tasks': TASK.keys() - _PLACE_KEYS - _OWN_KEYS,
+         'zones': (ZONE.keys() - _PLACE_KEYS) | {'shape'},
          'uavs': UAV.keys() - _PLACE_KEYS}
 _LISTS = 'required_capabilities', 'allowed_uavs', 'capabilities'
 _KINDS = {'task': 'tasks', 'zone': 'zones', 'no_fly_zone': 'zones', 'uav': 'uavs'}
