@@ -15,22 +15,16 @@ again with it the next part goes on from them: vehicles start full at home, noth
 from __future__ import annotations
 
 import argparse
-import json
 import math
-import os
 import random
 import sys
-import tempfile
 import time
 from collections import Counter
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
-import domain_coordinator
 import rclpy
 from battery_ledger import Ledger, Truth
-from crash import NETWORK
+from node_run import Nodes, node_run, print_figures
 from rclpy.executors import SingleThreadedExecutor
 from rosgraph_msgs.msg import Clock
 from uav_task_alloc_msgs import msg as m
@@ -38,9 +32,6 @@ from uav_task_alloc_msgs.srv import SubmitTasks
 
 from uav_task_alloc.model import Task
 from uav_task_alloc.nodes.conversions.messages import LATCHED, STATES, announcement, from_stamp
-from uav_task_alloc.nodes.demo import NodeProcess
-from uav_task_alloc.nodes.ros.udp_ports import free_port
-from uav_task_alloc.scenario import load, simulation_parameters
 
 TURNAROUND, SIDE = 120.0, 1500.0  # [s], [m]
 ARRIVAL, DRAIN = 40.0, 2400.0  # [s] between two tasks on average; [s] without new ones, at most
@@ -54,52 +45,6 @@ SCENARIO = 'route_end: home\ntrips: 2\nuavs:\n' + ''.join(
     f'     range: 6000, endurance: 400, turnaround: {TURNAROUND:g}, climb_speed: 2.5,\n'
     '     descent_speed: 1.5}\n'
     for n, kind in enumerate(('ardupilot', 'px4', 'ardupilot'), 1))
-
-
-class Nodes:
-    """The processes, each with a folder for each of its starts."""
-
-    def __init__(self, folder: Path, speedup: float, scenario: str) -> None:
-        path = folder / 'scenario.yaml'
-        path.write_text(scenario)
-        self.folder, self.starts = folder, 0
-        self.truth = folder / f'flight_{time.time():.0f}.jsonl'
-        played = load(path)
-        self.homes = {uav.id: uav.home for uav in played.uavs}
-        self.parameters = simulation_parameters(played, path, free_port(), speedup)
-        state = str(folder / 'state')
-        for node, more in {'allocator': {'state_dir': state, 'uav_timeout': 5.0},
-                           'mavlink_bridge': {'state_dir': state},
-                           'fleet_sim': {'log_file': str(self.truth)}}.items():
-            self.parameters[node].update(more)
-        self.running: dict[str, NodeProcess] = {}
-
-    def start(self, name: str) -> None:
-        self.starts += 1
-        out = self.folder / 'logs' / f'{self.starts:03d}'
-        out.mkdir(parents=True, exist_ok=True)
-        self.running[name] = NodeProcess.start(name, out, self.parameters[name])
-
-    def kill(self, name: str) -> None:
-        self.running[name].process.kill()
-        self.running[name].process.wait()
-
-    def dead(self) -> list[str]:
-        """Nodes that have ended by themselves."""
-        return [f'{name} ended with {node.process.returncode}, see {node.log}'
-                for name, node in self.running.items() if node.process.poll() is not None]
-
-    def cpu(self) -> dict[str, float]:
-        """CPU time [s] of the present processes."""
-        times = {}
-        for name, node in self.running.items():
-            fields = Path(f'/proc/{node.process.pid}/stat').read_text().rpartition(')')[2].split()
-            times[name] = (int(fields[11]) + int(fields[12])) / os.sysconf('SC_CLK_TCK')
-        return times
-
-    def stop(self) -> None:
-        for node in reversed(self.running.values()):
-            node.stop()
 
 
 class Soak:
@@ -261,42 +206,13 @@ def run(args: argparse.Namespace, folder: Path) -> int:
         'least_battery': round(soak.truth.least, 3),
         'state_age_p99_s': round(ages[int(0.99 * len(ages))], 3), 'last_cpu_s': cpu,
         'faults': found}
-    if args.json:
-        print(json.dumps(figures))
-    else:
-        print(*(f'{name:16} {value}' for name, value in figures.items()), sep='\n')
+    print_figures(figures, args.json)
     return int(bool(found or ledger.open()))
-
-
-@contextmanager
-def own_network(folder: str) -> Iterator[None]:
-    """A DDS domain of its own, by UDP on the loopback; the profile is in `folder`."""
-    profile = Path(folder, 'network.xml')
-    profile.write_text(NETWORK)
-    with domain_coordinator.domain_id() as domain:
-        os.environ.update(ROS_DOMAIN_ID=str(domain), ROS_AUTOMATIC_DISCOVERY_RANGE='SUBNET',
-                          FASTRTPS_DEFAULT_PROFILES_FILE=str(profile))
-        rclpy.init()
-        try:
-            yield
-        finally:
-            rclpy.shutdown()
 
 
 def main() -> int:
     """Command line."""
-    parser = argparse.ArgumentParser(description=(__doc__ or '').partition('\n')[0])
-    parser.add_argument('--hours', type=float, default=8.0)
-    parser.add_argument('--kills', type=int, default=50)
-    parser.add_argument('--speedup', type=float, default=16.0)
-    parser.add_argument('--seed', type=int, default=1)
-    parser.add_argument('--state', type=Path, help='folder of a run that goes on in parts')
-    parser.add_argument('--json', action='store_true')
-    args = parser.parse_args()
-    with tempfile.TemporaryDirectory() as temporary, own_network(temporary):
-        folder = args.state or Path(temporary)
-        folder.mkdir(parents=True, exist_ok=True)
-        return run(args, folder)
+    return node_run(__doc__, run, {'hours': 8.0, 'kills': 50, 'speedup': 16.0})
 
 
 if __name__ == '__main__':

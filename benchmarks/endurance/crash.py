@@ -25,11 +25,11 @@ from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
 
-import domain_coordinator
 import rclpy
 from ament_index_python.packages import get_package_prefix
 from crash_fleet import HEIGHT, Flyer, Ledger
 from geometry_msgs.msg import Point
+from node_run import own_network
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from uav_task_alloc_msgs import msg as m
@@ -41,19 +41,6 @@ UAVS, SIDE = 5, 400.0  # number, [m]
 MOST_OPEN = 30  # tasks at once
 STARTING = 1.0 / 8.0  # share of kills before the allocator is up
 LIMIT = 90.0  # [s] for a restart: a machine may be busy with other work
-# UDP on the loopback only: a killed process leaves shared memory, through which its successor
-# receives nothing for 3 s, and the discovery range LOCALHOST always adds that transport. Frequent
-# announcements: else a known process answers a new one once, perhaps before that one listens, and
-# then after 3 s
-NETWORK = """<dds xmlns="http://www.eprosima.com/XMLSchemas/fastRTPS_Profiles"><profiles>
-<transport_descriptors><transport_descriptor><transport_id>loopback</transport_id>
-<type>UDPv4</type><interfaceWhiteList><address>127.0.0.1</address></interfaceWhiteList>
-</transport_descriptor></transport_descriptors>
-<participant profile_name="crash" is_default_profile="true"><rtps>
-<userTransports><transport_id>loopback</transport_id></userTransports>
-<useBuiltinTransports>false</useBuiltinTransports><builtin><discovery_config>
-<leaseAnnouncement><sec>0</sec><nanosec>100000000</nanosec></leaseAnnouncement>
-</discovery_config></builtin></rtps></participant></profiles></dds>"""
 # only the last message is replayed to a new allocator: it must have the rest on disk
 LAST_ONLY = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE,
                        durability=DurabilityPolicy.TRANSIENT_LOCAL)
@@ -284,19 +271,12 @@ def measured(text: str | None, measure: Callable[[int, int, Process], dict[str, 
     parser.add_argument('--seed', type=int, default=1)
     parser.add_argument('--json', action='store_true')
     args = parser.parse_args()
-    with domain_coordinator.domain_id() as domain, tempfile.TemporaryDirectory() as folder:
-        os.environ['ROS_DOMAIN_ID'] = str(domain)
-        profile = Path(folder, 'network.xml')
-        profile.write_text(NETWORK)
-        os.environ['FASTRTPS_DEFAULT_PROFILES_FILE'] = str(profile)
-        os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'SUBNET'
-        rclpy.init()
+    with tempfile.TemporaryDirectory() as folder, own_network(folder):
         process = Process(folder, parameters)
         try:
             result = measure(args.kills, args.seed, process)
         finally:
             process.kill()
-            rclpy.shutdown()
     for name, value in result.items():
         print(f'{name:26} {value}', file=sys.stderr if args.json else sys.stdout)
     if args.json:

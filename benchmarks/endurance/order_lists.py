@@ -14,19 +14,18 @@ accepted task was lost. --trips: with batteries that are changed at the base.
 from __future__ import annotations
 
 import argparse
-import json
 import random
 import sys
-import tempfile
 import time
 from collections import Counter
 from pathlib import Path
 from typing import Any
 
 import rclpy
-from battery_kills import SCENARIO, START, Nodes, own_network
+from battery_kills import SCENARIO, START
 from battery_ledger import Ledger
 from diagnostic_msgs.msg import DiagnosticArray
+from node_run import Nodes, node_run, print_figures
 from order_book import OrderBook
 from rclpy.executors import SingleThreadedExecutor
 from rosgraph_msgs.msg import Clock
@@ -230,27 +229,13 @@ def run(args: argparse.Namespace, folder: Path) -> int:
                'completed': operators.ledger.count(m.TaskStatus.COMPLETED), 'all_flown': flown,
                'lists_checked': operators.book.checked, 'checked_when_quiet':
                operators.book.checked_quiet, 'faults': found}
-    if args.json:
-        print(json.dumps(figures))
-    else:
-        print(*(f'{name:18} {value}' for name, value in figures.items()), sep='\n')
+    print_figures(figures, args.json)
     return int(bool(found) or not flown)
 
 
 def main() -> int:
     """Command line."""
-    parser = argparse.ArgumentParser(description=(__doc__ or '').partition('\n')[0])
-    parser.add_argument('--requests', type=int, default=2000)
-    parser.add_argument('--speedup', type=float, default=4.0)
-    parser.add_argument('--seed', type=int, default=1)
-    parser.add_argument('--trips', action='store_true')
-    parser.add_argument('--state', type=Path, help='folder that keeps logs and journal')
-    parser.add_argument('--json', action='store_true')
-    args = parser.parse_args()
-    with tempfile.TemporaryDirectory() as temporary, own_network(temporary):
-        folder = args.state or Path(temporary)
-        folder.mkdir(parents=True, exist_ok=True)
-        return run(args, folder)
+    return node_run(__doc__, run, {'requests': 2000, 'speedup': 4.0}, ('trips',))
 
 
 if __name__ == '__main__':
