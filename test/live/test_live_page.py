@@ -121,6 +121,8 @@ def test_the_map_shows_zones_routes_and_tasks(view, run):
     chart = pixels(page, '#chart')
     assert share(chart, '#0072b2') > 0.001
     assert share(chart, '#d08700') > 0.001
+    fills = 'lines => lines.map(each => getComputedStyle(each).fill)'
+    assert page.eval_on_selector_all('#chart polyline', fills) == ['none', 'none']
 
 
 def test_it_fits_on_a_phone_and_on_a_projector(view, run):

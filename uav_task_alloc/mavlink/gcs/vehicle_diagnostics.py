@@ -92,8 +92,9 @@ def _level_of(session: VehicleSession, now: float) -> tuple[int, str]:
     if authority.state in (AuthorityState.LOST, AuthorityState.SUSPENDED):
         return _WARN, f'authority {authority.state.name}: {authority.why}'
     warning = executor.fence.warning
-    level = _WARN if state is MissionState.FOREIGN or warning else _OK
-    return level, f'mission {state.name}' + (f', {warning}' if warning else '')
+    if state is MissionState.FOREIGN:
+        return _WARN, f'mission {state.name}' + (f', {warning}' if warning else '')
+    return (_WARN, warning) if warning else (_OK, f'mission {state.name}')
 
 
 def _facts_of(session: VehicleSession, now: float) -> VehicleFacts:
