@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Random small problems with time, loads and trips against exact optima and their own insertion.
 
-    python benchmarks/small_problems.py [--problems 5000] [--seed 1] [--tasks 5] [--rounds 2000]
+    python benchmarks/small_problems.py [--problems 5000] [--seed 1] [--tasks 5] [--paths 0.6]
+        [--rounds 2000]
 
 Progress and faults go to stderr, one JSON object to stdout. The exit status is 1 where a plan is
 not valid, worse than its own insertion or the plan it starts from, or gives an untrue reason.
@@ -25,12 +26,14 @@ def main() -> int:
     parser.add_argument('--problems', type=int, default=5000)
     parser.add_argument('--seed', type=int, default=1, help='of the first problem')
     parser.add_argument('--tasks', type=int, default=5, help='at most')
+    parser.add_argument('--paths', type=float, default=0.0,
+                        help='share of the tasks that have a path')
     parser.add_argument('--rounds', type=int, default=2000)
     args = parser.parse_args()
     gaps, faulty, impossible = list[float](), list[int](), 0
     for seed in range(args.seed, args.seed + args.problems):
         try:
-            result = compare_small(small_problem(seed, args.tasks), args.rounds)
+            result = compare_small(small_problem(seed, args.tasks, paths=args.paths), args.rounds)
         except (ArithmeticError, LookupError, TypeError, ValueError, AssertionError) as error:
             print(f'{seed}: {error!r}', file=sys.stderr, flush=True)
             faulty.append(seed)

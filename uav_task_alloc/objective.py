@@ -181,7 +181,7 @@ def needs_time(uavs: Iterable[Uav], tasks: Iterable[Task], objective: Objective,
     """Return whether times, loads or trips can change which plan is best.
 
     Where nothing has a latest time, `earliest`, `release` and speeds change the times of a plan,
-    but not its distance.
+    but not its distance. A task with a path may be flown in either direction only there.
 
     Args:
         uavs: the fleet.
@@ -194,6 +194,6 @@ def needs_time(uavs: Iterable[Uav], tasks: Iterable[Task], objective: Objective,
     """
     fleet = list(uavs)
     return (not objective.is_shortest
-            or any(task.latest < math.inf or task.payload > 0.0 for task in tasks)
+            or any(task.latest < math.inf or task.payload > 0.0 or task.path for task in tasks)
             or any(uav.endurance < math.inf or uav.available_until < math.inf for uav in fleet)
             or (trips > 1 and any(uav.turnaround < math.inf for uav in fleet)))

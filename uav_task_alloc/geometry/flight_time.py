@@ -13,7 +13,7 @@ from itertools import pairwise
 
 from uav_task_alloc.geometry.outline import Floats
 from uav_task_alloc.kernel import kernel
-from uav_task_alloc.model import Point, Uav
+from uav_task_alloc.model import Point, Task, Uav
 
 
 def straight_time(dx: float, dy: float, dz: float, cruise: float, climb: float,
@@ -58,3 +58,22 @@ def flight_time(uav: Uav, points: Sequence[Point]) -> float:
     speeds = uav.cruise_speed, uav.climb_speed, uav.descent_speed
     return sum(straight_time(x1 - x, y1 - y, z1 - z, *speeds)
                for (x, y, z), (x1, y1, z1) in pairwise(points))
+
+
+def service_seconds(uav: Uav, task: Task) -> float:
+    """Time that a UAV needs for the service of a task, with the flight along its path.
+
+    Args:
+        uav: its cruise, climb and descent speed count.
+        task: flown from its position; an action `speed` replaces the cruise speed along the path.
+
+    Returns:
+        [s].
+    """
+    if not task.path:
+        return task.stay
+    cruise = next((each['speed'] for each in task.actions if each.name == 'speed'),
+                  uav.cruise_speed)
+    return task.stay + sum(
+        straight_time(x1 - x, y1 - y, z1 - z, cruise, uav.climb_speed, uav.descent_speed)
+        for (x, y, z), (x1, y1, z1) in pairwise(task.path))

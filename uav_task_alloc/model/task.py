@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Collection, Iterable
+from dataclasses import dataclass, replace
 
 from uav_task_alloc.actions import Action, actions_time, check_actions
 from uav_task_alloc.checks import check_id, check_names, check_number, check_point
@@ -119,6 +120,26 @@ class Task:
         return polyline_length(self.path)
 
     @property
+    def turned(self) -> Task:
+        """The same task, flown from its last point; itself where it is a point."""
+        if not self.path:
+            return self
+        return replace(self, position=self.path[-1], path=self.path[::-1])
+
+    @property
     def stay(self) -> float:
         """Service time, and what actions take where the UAV stays [s]; without the path."""
         return self.service_time + actions_time(self.actions)
+
+
+def turned_tasks(tasks: Iterable[Task], reversed: Collection[str]) -> list[Task]:
+    """Return tasks as they are flown: those of these ids from their last points.
+
+    Args:
+        tasks: in any order.
+        reversed: ids; see Plan.reversed.
+
+    Returns:
+        In the same order.
+    """
+    return [task.turned if task.id in reversed else task for task in tasks]

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from numbers import Integral
 from typing import TypeVar
 
-from uav_task_alloc.checks import check_number
+from uav_task_alloc.checks import check_names, check_number
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.model import Task, ThreatZone, Uav
 from uav_task_alloc.objective import MAX_TRIPS
@@ -86,8 +86,23 @@ def check_separation(separation: Separation) -> Separation:
     return separation
 
 
-def check_no_paths(tasks: Iterable[Task]) -> None:
-    """Raise InvalidValue for a task with a path: no solver takes them yet."""
-    for task in tasks:
-        if task.path:
-            raise InvalidValue(f'task {task.id}: path', task.path, 'no path: solvers take points')
+def check_reversed(reversed: Iterable[str] | None, locked: Mapping[str, tuple[Task, ...]],
+                   before: Iterable[str]) -> frozenset[str]:
+    """Return which locked tasks are flown from their last points.
+
+    Args:
+        reversed: their ids; None: as in the earlier plan.
+        locked: by UAV id.
+        before: ids of those of the earlier plan.
+
+    Raises:
+        InvalidValue: one may not be flown so.
+    """
+    held = {task.id: task for row in locked.values() for task in row if task.path}
+    if reversed is None:
+        return frozenset(name for name in before if name in held and held[name].reversible)
+    names = frozenset(name for name in check_names('reversed', reversed) if name in held)
+    for name in names:
+        if not held[name].reversible:
+            raise InvalidValue('reversed', name, 'a task that is reversible')
+    return names

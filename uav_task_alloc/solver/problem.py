@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from uav_task_alloc.geometry.distances import Distances
+from uav_task_alloc.geometry.zones import path_is_clear
 from uav_task_alloc.model import Task, ThreatZone, Uav
 from uav_task_alloc.objective import Objective, Weights
 from uav_task_alloc.solver.neighbours import fill_near_starts, fill_near_tasks, find_nearest
@@ -56,7 +56,7 @@ class Problem:
 
     A UAV effectively starts after the tasks that are locked to it, which are not among `tasks`.
     Points of `distances`: effective starts (m), tasks (n), homes (m), then the start and locked
-    tasks of each UAV that has any.
+    tasks of each UAV that has any, then the ends of paths: of locked tasks, and of the others.
     """
 
     uavs: tuple[Uav, ...]  # the fleet
@@ -68,6 +68,8 @@ class Problem:
     arrays: Arrays  # for kernels
     scale: float  # [m] mean leg length to the nearest neighbour
     index: Mapping[str, int]  # task id -> index in tasks
+    ends: Mapping[str, int]  # task id -> index in distances of the end of its path
+    crossed: Mapping[str, tuple[str, ...]]  # task id -> ids of the zones that its path enters
 
     def locked_places(self, u: int) -> list[int]:
         """Return where UAV u's start and its locked tasks are.
@@ -86,6 +88,22 @@ class Problem:
             place += len(held) + 1 if held else 0
         held = self.locked.get(self.uavs[u].id, ())
         return list(range(place, place + len(held) + 1)) if held else [u]
+
+    def locked_legs(self, u: int) -> list[tuple[int, int]]:
+        """Return the legs to UAV u's locked tasks.
+
+        Args:
+            u: index of the UAV.
+
+        Returns:
+            Indices in `distances` of start and end of each.
+        """
+        start, *places = self.locked_places(u)
+        legs = []
+        for task, place in zip(self.locked.get(self.uavs[u].id, ()), places, strict=True):
+            legs.append((start, place))
+            start = self.ends.get(task.id, place)
+        return legs
 
 
 def make_problem(uavs: Sequence[Uav], tasks: Sequence[Task],
@@ -109,9 +127,11 @@ def make_problem(uavs: Sequence[Uav], tasks: Sequence[Task],
     unlocked = _not_locked(tasks, locked) if locked else tuple(tasks)
     before = known.distances if known and limits.same_but_zones(known.limits) else None
     distances = _distances(uavs, unlocked, locked, limits, before, search)
+    crossed = _crossed(tasks, limits)
     problem = Problem(tuple(uavs), unlocked, locked, limits, rules, distances,
                       _empty_arrays(uavs, unlocked, rules, distances), 1.0,
-                      {task.id: i for i, task in enumerate(unlocked)})
+                      {task.id: i for i, task in enumerate(unlocked)},
+                      _ends(uavs, unlocked, locked), crossed)
     if search is not None and limits.zones:
         search.find_flown(distances, _place_by_id(problem))
     reached = _reachable(problem) if limits.zones else locked
@@ -120,7 +140,10 @@ def make_problem(uavs: Sequence[Uav], tasks: Sequence[Task],
         distances = _distances(uavs, unlocked, reached, limits, distances, search)
         problem = replace(problem, tasks=unlocked, locked=reached, distances=distances,
                           arrays=_empty_arrays(uavs, unlocked, rules, distances),
-                          index={task.id: i for i, task in enumerate(unlocked)})
+                          index={task.id: i for i, task in enumerate(unlocked)},
+                          ends=_ends(uavs, unlocked, reached))
+    for name in crossed:
+        problem.arrays.compatible[:, problem.index[name]] = False
     _apply_locks(problem)
     arrays = problem.arrays
     floor = float(np.maximum(0.0, arrays.empty_route_length - arrays.range_left).sum())
@@ -151,9 +174,10 @@ def _reachable(problem: Problem) -> Mapping[str, tuple[Task, ...]]:
         place, *places = problem.locked_places(u)
         row = []
         for task, there in zip(problem.locked.get(uav.id, ()), places, strict=True):
-            if problem.distances.length(place, there) < math.inf:
+            if (task.id not in problem.crossed
+                    and problem.distances.length(place, there) < math.inf):
                 row.append(task)
-                place = there
+                place = problem.ends.get(task.id, there)
         if row:
             reachable[uav.id] = tuple(row)
     return reachable
@@ -162,16 +186,45 @@ def _reachable(problem: Problem) -> Mapping[str, tuple[Task, ...]]:
 def _distances(uavs: Sequence[Uav], tasks: Sequence[Task],
                locked: Mapping[str, tuple[Task, ...]], limits: Limits,
                known: Distances | None, search: PathPreparation | None) -> Distances:
-    starts = [locked[u.id][-1].position if locked.get(u.id) else u.position for u in uavs]
+    starts = [locked[u.id][-1].end if locked.get(u.id) else u.position for u in uavs]
     homes = [u.home or u.position for u in uavs]
     extra = [point for u in uavs if locked.get(u.id)
              for point in (u.position, *(t.position for t in locked[u.id]))]
-    points = np.array([*starts, *(t.position for t in tasks), *homes, *extra], dtype=np.float64)
+    ends = [task.end for task in _with_path(uavs, tasks, locked)]
+    points = np.array([*starts, *(t.position for t in tasks), *homes, *extra, *ends],
+                      dtype=np.float64)
     points, budget = points.reshape(-1, 3), search.path_budget if search else None
     if known is not None:
         return known.updated(points, limits.zones, budget)
     return Distances(points, limits.zones, clearance=limits.clearance, budget=budget,
                      altitude_min=limits.altitude_min, altitude_max=limits.altitude_max)
+
+
+def _with_path(uavs: Sequence[Uav], tasks: Sequence[Task],
+               locked: Mapping[str, tuple[Task, ...]]) -> list[Task]:
+    """Tasks with a path in the order of their ends in Distances."""
+    held = [task for uav in uavs for task in locked.get(uav.id, ())]
+    return [task for task in (*held, *tasks) if task.path]
+
+
+def _ends(uavs: Sequence[Uav], tasks: Sequence[Task],
+          locked: Mapping[str, tuple[Task, ...]]) -> dict[str, int]:
+    """Problem.ends."""
+    held = [len(locked.get(uav.id, ())) for uav in uavs]
+    first = 2 * len(uavs) + len(tasks) + sum(many + 1 for many in held if many)
+    return {task.id: first + k for k, task in enumerate(_with_path(uavs, tasks, locked))}
+
+
+def _crossed(tasks: Sequence[Task], limits: Limits) -> dict[str, tuple[str, ...]]:
+    """Problem.crossed."""
+    found = {}
+    if limits.zones:
+        for task in tasks:
+            names = tuple(zone.id for zone in limits.zones if task.path and not path_is_clear(
+                task.path, (zone,), limits.clearance))
+            if names:
+                found[task.id] = names
+    return found
 
 
 def _compatible(uavs: Sequence[Uav], tasks: Sequence[Task]) -> NDArray[np.bool_]:
@@ -220,8 +273,9 @@ def _apply_locks(problem: Problem) -> None:
     a = problem.arrays
     for u, uav in enumerate(problem.uavs):
         if uav.id in problem.locked:
-            places = problem.locked_places(u)
-            a.range_left[u] -= sum(problem.distances.length(i, j) for i, j in pairwise(places))
+            a.range_left[u] -= sum(problem.distances.length(i, j)
+                                   for i, j in problem.locked_legs(u))
+            a.range_left[u] -= sum(task.path_length for task in problem.locked[uav.id])
             if problem.rules.returns:
                 leg_home = problem.distances.length(u, a.ends + u)
                 # it stays at its last task where no path leads home

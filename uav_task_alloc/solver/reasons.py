@@ -70,6 +70,9 @@ def lasting_reason(problem: Problem, i: int) -> str:
     around = problem.distances.zones_around(problem.arrays.uavs + i)
     if around:
         return f'inside zone {", ".join(around)}'
+    crossed = problem.crossed.get(problem.tasks[i].id)
+    if crossed:
+        return f'its way crosses zone {", ".join(crossed)}'
     if not problem.arrays.compatible[:, i].any():
         return _unable(problem, problem.tasks[i])
     return ''
@@ -150,7 +153,28 @@ def _unable(problem: Problem, task: Task) -> str:
 
 def _need(problem: Problem, u: int, place: int) -> float:
     """Metres that UAV u flies for this task alone, after its locked ones."""
-    outward = problem.distances.length(u, place)
+    return min(_need_from(problem, u, first, last) for first, last in ways_of(problem, place))
+
+
+def ways_of(problem: Problem, place: int) -> list[tuple[int, int]]:
+    """Return how a task may be flown.
+
+    Args:
+        problem: with its distances.
+        place: index of the task in `distances`.
+
+    Returns:
+        Indices in `distances` of the begin and the end of its path: one pair a direction.
+    """
+    task = problem.tasks[place - problem.arrays.uavs]
+    end = problem.ends.get(task.id, place)
+    return [(place, end), (end, place)] if task.path and task.reversible else [(place, end)]
+
+
+def _need_from(problem: Problem, u: int, first: int, last: int) -> float:
+    """Metres that UAV u flies to a task, along it and home."""
+    task = problem.tasks[min(first, last) - problem.arrays.uavs]
+    outward = problem.distances.length(u, first) + task.path_length
     if not problem.rules.returns:
         return outward
-    return outward + problem.distances.length(place, problem.arrays.ends + u)
+    return outward + problem.distances.length(last, problem.arrays.ends + u)

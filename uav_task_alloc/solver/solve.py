@@ -7,7 +7,6 @@ import math
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
-from itertools import pairwise
 
 import numpy as np
 
@@ -20,8 +19,8 @@ from uav_task_alloc.separation.rule import Separation
 from uav_task_alloc.solver.answer import to_plan
 from uav_task_alloc.solver.check import (
     check_locked,
-    check_no_paths,
     check_options,
+    check_reversed,
     check_separation,
     check_unique,
 )
@@ -43,7 +42,7 @@ def plan(uavs: Iterable[Uav], tasks: Iterable[Task], zones: Iterable[ThreatZone]
          clearance: float = 0.0, altitude_min: float = -math.inf,
          altitude_max: float = math.inf, threads: int = 1,
          objective: Objective | str = 'distance', trips: int = 1,
-         separation: Separation | None = None,
+         separation: Separation | None = None, reversed: Iterable[str] | None = None,
          stop: Callable[[], bool] | None = None, max_iterations: int | None = None,
          on_iteration: Callable[[int, float], None] | None = None,
          clock: Callable[[], float] = time.perf_counter) -> Plan:
@@ -72,6 +71,8 @@ def plan(uavs: Iterable[Uav], tasks: Iterable[Task], zones: Iterable[ThreatZone]
         objective: what is minimised: a name in OBJECTIVES or an Objective.
         trips: of a UAV at most; with more than 1 it may visit its base for a new battery and load.
         separation: what keeps the UAVs apart; None, or horizontal 0: nothing does.
+        reversed: ids of the locked tasks with a path that are flown from their last point; None:
+            those that are in `warm`.
         stop: polled between iterations; True ends the solve with the best plan so far.
         max_iterations: ends the solve as well; None: no limit. Each solver defines its iteration.
         on_iteration: called with (iterations so far, best fit) after each or a few iterations.
@@ -89,17 +90,17 @@ def plan(uavs: Iterable[Uav], tasks: Iterable[Task], zones: Iterable[ThreatZone]
     if not isinstance(warm, (Plan, WarmState, type(None))):
         raise InvalidValue('warm', type(warm).__name__, 'a Plan, its state or None')
     fleet, work = check_unique('uav', uavs, Uav), check_unique('task', tasks, Task)
-    check_no_paths(work)
     limits = Limits(check_unique('zone', zones, ThreatZone), clearance, altitude_min,
                     altitude_max)
     rules = Rules(route_end == 'home', hard_range, weights or Weights(),
                   check_objective(objective), trips)
     if needs_time(fleet, work, rules.objective, trips):
         _check_takes_time(solver)
+    held = check_locked(locked, fleet, work)
     run = functools.partial(_solve, fleet, limits=limits, rules=rules, solver=solver, seed=seed,
                             threads=threads, stop=stop, max_iterations=max_iterations,
-                            on_iteration=on_iteration, clock=clock)
-    held = check_locked(locked, fleet, work)
+                            on_iteration=on_iteration, clock=clock,
+                            reversed=check_reversed(reversed, held, WarmState.of(warm).reversed))
     if separation is None or not check_separation(separation).on:
         return run(work, held, warm=warm, budget=budget)
     return separated_plan(lambda some, start, seconds: run(some, held, warm=start, budget=seconds),
@@ -110,12 +111,13 @@ def _solve(fleet: Sequence[Uav], work: Sequence[Task], held: Mapping[str, tuple[
            limits: Limits, rules: Rules, solver: str, warm: Plan | WarmState | None,
            budget: float, seed: int, threads: int, stop: Callable[[], bool] | None,
            max_iterations: int | None, on_iteration: Callable[[int, float], None] | None,
-           clock: Callable[[], float]) -> Plan:
+           clock: Callable[[], float], reversed: frozenset[str]) -> Plan:
     """Solve without separation; arguments are checked already."""
     if needs_time(fleet, work, rules.objective, rules.trips):
         return solve_timed(fleet, work, held, limits, rules, warm,
                            budget=budget, seed=seed, threads=threads, stop=stop,
-                           max_iterations=max_iterations, on_iteration=on_iteration, clock=clock)
+                           max_iterations=max_iterations, on_iteration=on_iteration, clock=clock,
+                           reversed=reversed)
     load_kernels(solver, bool(limits.zones), max_iterations != 0)
     began, before = clock(), WarmState.of(warm)
     search = PathPreparation(clock, began, budget, stop, before.flown())
@@ -137,8 +139,7 @@ def _locked_sums(problem: Problem) -> tuple[float, float]:
     """Length [m] of the locked legs, and value of the locked tasks."""
     length, value = 0.0, 0.0
     for u, uav in enumerate(problem.uavs):
-        places = problem.locked_places(u)
-        length += sum(problem.distances.length(i, j) for i, j in pairwise(places))
+        length += sum(problem.distances.length(i, j) for i, j in problem.locked_legs(u))
         value += sum(task.value for task in problem.locked.get(uav.id, ()))
     return length, value
 
@@ -152,8 +153,9 @@ def _check_solver(solver: str) -> None:
 def _check_takes_time(solver: str) -> None:
     """Raise InvalidValue where a solver does not take windows, loads, trips or objectives."""
     if solver != 'chain_q':
-        raise InvalidValue('solver', solver, "'chain_q' where latest times, loads, endurances, "
-                           'availabilities, trips or an objective other than distance are given')
+        raise InvalidValue('solver', solver, "'chain_q' where latest times, loads, paths, "
+                           'endurances, availabilities, trips or an objective other than '
+                           'distance are given')
 
 
 @functools.cache

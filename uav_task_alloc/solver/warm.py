@@ -35,6 +35,7 @@ class WarmState:
     legs: Mapping[str, tuple[Leg, ...]] = field(default_factory=dict)  # by UAV id
     # task ids of each trip, by UAV id, where the problem had time
     trips: Mapping[str, tuple[tuple[str, ...], ...]] = field(default_factory=dict)
+    reversed: frozenset[str] = frozenset()  # ids of tasks flown from their last points
     timed: Any = None  # the TimedProblem, whose neighbours are used again
 
     @classmethod
@@ -50,7 +51,7 @@ class WarmState:
         if not isinstance(warm, Plan):
             return warm or cls()
         state = warm.state if isinstance(warm.state, WarmState) else cls()
-        return replace(state, routes=warm.routes, legs=warm.legs)
+        return replace(state, routes=warm.routes, legs=warm.legs, reversed=warm.reversed)
 
     def trips_of(self, uav: str) -> tuple[tuple[str, ...], ...]:
         """Return the trips of a UAV.

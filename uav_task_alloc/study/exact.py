@@ -9,10 +9,12 @@ are neither cheaper nor earlier: for ten.
 from __future__ import annotations
 
 import math
-from collections.abc import Container, Iterator, Mapping, Sequence
+from collections.abc import Collection, Container, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import combinations
 
-from uav_task_alloc.model import Task, Uav
+from uav_task_alloc.geometry.flight_time import service_seconds
+from uav_task_alloc.model import Task, Uav, turned_tasks
 from uav_task_alloc.objective import Objective
 from uav_task_alloc.solver.problem import Rules
 from uav_task_alloc.solver.timed.evaluator import (
@@ -33,6 +35,7 @@ class ExactPlan:
     cost: float
     value: float
     routes: Mapping[str, Rows]  # by UAV id
+    reversed: frozenset[str] = frozenset()  # ids of tasks flown from their last points
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,16 +51,34 @@ _Shares = dict[frozenset[str], list[_Share]]  # by ids of the tasks served
 
 
 def exact_plan(uavs: Sequence[Uav], tasks: Sequence[Task], rules: Rules,
-               leg: LegOf | None = None, held: Held | None = None) -> ExactPlan | None:
-    """Find the best plan of all.
+               leg: LegOf | None = None, held: Held | None = None,
+               reversed: Collection[str] = ()) -> ExactPlan | None:
+    """Find the best plan of all, with tasks that have a path flown in all ways that are allowed.
 
     Args:
         uavs, tasks, rules, leg, held: as for `evaluate_routes`.
+        reversed: ids of the locked tasks that are flown from their last points.
 
     Returns:
         None where no plan is valid: a locked task cannot be served.
     """
     held = held or Held()
+    fixed = {name for row in held.locked.values() for name in row}
+    free = [task.id for task in tasks if task.path and task.reversible and task.id not in fixed]
+    best: ExactPlan | None = None
+    for many in range(len(free) + 1):
+        for names in combinations(free, many):
+            turned = frozenset((*fixed.intersection(reversed), *names))
+            found = _exact_plan(uavs, turned_tasks(tasks, turned), rules, leg, held)
+            if found is not None and (best is None or rank(
+                    found.value, found.cost, rules) < rank(best.value, best.cost, rules)):
+                best = replace(found, reversed=turned)
+    return best
+
+
+def _exact_plan(uavs: Sequence[Uav], tasks: Sequence[Task], rules: Rules, leg: LegOf | None,
+                held: Held) -> ExactPlan | None:
+    """The best plan in which each path is flown from its first point."""
     shares: _Shares = {frozenset(): [_Share(0.0, 0.0, ())]}
     for uav in uavs:
         shares = _joined(shares, _shares_of(uav, uavs, tasks, rules, leg, held))
@@ -158,15 +179,16 @@ def _shares_by_labels(uav: Uav, free: Sequence[Task], tasks: Sequence[Task], rul
         for (done, last), some in labels.items():
             for task in able:
                 if task.id not in done:
-                    place = uav.position if last is None else last.position
-                    way = leg(uav, place, task.position)
+                    place = uav.position if last is None else last.end
+                    metres, seconds = leg(uav, place, task.position)
+                    way = metres + task.path_length, seconds, service_seconds(uav, task)
                     for label in some:
                         _extend(longer.setdefault((done | {task.id}, task), []), label, task,
                                 way, rules.objective, total)
         labels = longer
         for (done, last), some in labels.items():
             assert last is not None  # each label of this round has a task
-            metres, seconds = leg(uav, last.position, uav.base) if rules.returns else (0.0, 0.0)
+            metres, seconds = leg(uav, last.end, uav.base) if rules.returns else (0.0, 0.0)
             for label in some:
                 if label.time + seconds <= uav.available_until + 1e-6:
                     _keep(shares, done, _Share(
@@ -175,15 +197,18 @@ def _shares_by_labels(uav: Uav, free: Sequence[Task], tasks: Sequence[Task], rul
     return shares
 
 
-def _extend(labels: list[_Label], label: _Label, task: Task, way: tuple[float, float],
+def _extend(labels: list[_Label], label: _Label, task: Task, way: tuple[float, float, float],
             prices: Objective, total: float) -> None:
-    """Add the route of a label and one more task, unless it is too late or dominated."""
+    """Add the route of a label and one more task, unless it is too late or dominated.
+
+    way: length [m] with its path, time of the leg, service [s].
+    """
     start = max(max(label.time, task.release) + way[1], task.earliest)
     late = max(0.0, start - task.latest)
     if late > 1e-6 and math.isinf(prices.lateness):
         return
     response = task.value * (start - task.announced) / total
-    new = _Label(start + task.service_time,
+    new = _Label(start + way[2],
                  label.cost + prices.cost(way[0], 0.0, response, late), (*label.row, task.id))
     if all(other.time > new.time or other.cost > new.cost for other in labels):
         labels[:] = [each for each in labels if each.time < new.time or each.cost < new.cost]

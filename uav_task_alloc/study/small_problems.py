@@ -12,9 +12,11 @@ import math
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
+from itertools import product
 
 import numpy as np
 
+from uav_task_alloc.actions import Action
 from uav_task_alloc.model import Plan, Point, Task, Uav
 from uav_task_alloc.objective import OBJECTIVES, Objective, check_objective, needs_time
 from uav_task_alloc.solver.problem import Rules
@@ -35,6 +37,7 @@ class SmallProblem:
     tasks: tuple[Task, ...]
     rules: Rules
     locked: Mapping[str, tuple[str, ...]]
+    reversed: frozenset[str] = frozenset()  # locked tasks flown from their last points
 
     @property
     def held(self) -> Held:
@@ -43,29 +46,33 @@ class SmallProblem:
 
     def evaluated(self, result: Plan) -> TimedEvaluation:
         """Evaluate a plan by its trips alone."""
-        return evaluate_routes(self.uavs, self.tasks, self.rules, result.trips, held=self.held)
+        return evaluate_routes(self.uavs, self.tasks, self.rules, result.trips, held=self.held,
+                               reversed=result.reversed)
 
     def solve(self, rounds: int, warm: Plan | None = None) -> Plan:
         """Solve it with the objective, in so many rounds; 0: insertion only."""
         return plan(self.uavs, self.tasks, budget=60.0, seed=self.seed, max_iterations=rounds,
                     warm=warm, route_end='home' if self.rules.returns else 'hold',
                     hard_range=self.rules.hard, locked=self.locked,
-                    objective=self.rules.objective, trips=self.rules.trips)
+                    objective=self.rules.objective, trips=self.rules.trips,
+                    reversed=self.reversed)
 
 
-def small_problem(seed: int, most_tasks: int = 5, most_uavs: int = 3) -> SmallProblem:
+def small_problem(seed: int, most_tasks: int = 5, most_uavs: int = 3,
+                  paths: float = 0.0) -> SmallProblem:
     """Draw a problem.
 
     Args:
         seed: of all random values.
         most_tasks, most_uavs: bounds of their numbers.
+        paths: share of the tasks without payload that have a path.
 
     Returns:
         One that time, loads, trips or the objective matter in.
     """
     rng = np.random.default_rng((seed, 18))
     while True:
-        drawn = _draw(rng, seed, most_tasks, most_uavs)
+        drawn = _with_paths(_draw(rng, seed, most_tasks, most_uavs), paths)
         if needs_time(drawn.uavs, drawn.tasks, drawn.rules.objective, drawn.rules.trips):
             return drawn
 
@@ -87,6 +94,28 @@ def _draw(rng: np.random.Generator, seed: int, most_tasks: int, most_uavs: int) 
     rules = Rules(bool(rng.random() < 0.5), bool(rng.random() < 0.85), objective=objective,
                   trips=int(rng.integers(2, 4)) if on['trips'] else 1)
     return SmallProblem(seed, tuple(uavs), tuple(tasks), rules, locked)
+
+
+def _with_paths(drawn: SmallProblem, share: float) -> SmallProblem:
+    """The same with paths for a share of the tasks; most may be flown in both directions."""
+    rng = np.random.default_rng((drawn.seed, 23))
+    tasks = tuple(_with_path(rng, task) if task.payload == 0.0 and rng.random() < share else task
+                  for task in drawn.tasks)
+    held = {name for row in drawn.locked.values() for name in row}
+    return replace(drawn, tasks=tasks, reversed=frozenset(
+        task.id for task in tasks if task.id in held and task.reversible and rng.random() < 0.5))
+
+
+def _with_path(rng: np.random.Generator, task: Task) -> Task:
+    path, actions = [task.position], list[Action]()
+    for _ in range(rng.integers(1, 4)):
+        x, y, z = path[-1]
+        dx, dy, dz = rng.normal(0.0, 100.0, 3).round(1).tolist()
+        path.append((x + dx, y + dy, max(0.0, z + 0.2 * dz)))
+    if rng.random() < 0.2:
+        actions = [Action('speed', (('speed', 5.0),)), Action('wait', (('seconds', 4.0),))]
+    return replace(task, path=tuple(path), reversible=bool(rng.random() < 0.8),
+                   actions=tuple(actions))
 
 
 def _place(rng: np.random.Generator, most_height: float) -> Point:
@@ -207,24 +236,33 @@ def _may(problem: SmallProblem, uav: Uav, task: Task) -> bool:
 
 def _can_serve(problem: SmallProblem, task: Task) -> bool:
     """Whether some UAV could serve a task if it served no others but locked ones."""
-    for uav in problem.uavs:
+    for uav, turned in product(problem.uavs, _directions(problem, task)):
         first = problem.locked.get(uav.id, ())
         for rows in ([(*first, task.id)], [first, (task.id,)]):
             found = evaluate_routes(problem.uavs, problem.tasks, problem.rules, {
                 uav.id: rows, **{other: [row] for other, row in problem.locked.items()
-                                 if other != uav.id}}, held=problem.held)
+                                 if other != uav.id}}, held=problem.held, reversed=turned)
             if not found.violations:
                 return True
     return False
+
+
+def _directions(problem: SmallProblem, task: Task) -> Iterator[frozenset[str]]:
+    """What is flown from its last point where a task alone is added to the locked ones."""
+    yield problem.reversed
+    if task.reversible and task.path and not any(
+            task.id in row for row in problem.locked.values()):
+        yield problem.reversed | {task.id}
 
 
 def _start_alone(problem: SmallProblem, uav: Uav, task: Task) -> float:
     """Start of the service of a task after locked ones only [s]."""
     rows = [(*problem.locked.get(uav.id, ()), task.id)]
     rules = replace(problem.rules, objective=replace(problem.rules.objective, response=1.0))
-    found = evaluate_routes([replace(uav, endurance=math.inf)], problem.tasks, rules,
-                            {uav.id: rows}, held=problem.held)
-    return found.timetable.starts[task.id]
+    return min(evaluate_routes(
+        [replace(uav, endurance=math.inf)], problem.tasks, rules, {uav.id: rows},
+        held=problem.held, reversed=turned).timetable.starts[task.id]
+        for turned in _directions(problem, task))
 
 
 @dataclass(frozen=True, slots=True)
@@ -246,7 +284,8 @@ def compare_small(problem: SmallProblem, rounds: int) -> SmallResult | None:
     Returns:
         None where no plan is valid.
     """
-    best = exact_plan(problem.uavs, problem.tasks, problem.rules, held=problem.held)
+    best = exact_plan(problem.uavs, problem.tasks, problem.rules, held=problem.held,
+                      reversed=problem.reversed)
     if best is None:
         return None
     inserted, result = problem.solve(0), problem.solve(rounds)

@@ -49,8 +49,13 @@ class TimedArrays(NamedTuple):
     grain: float  # lengths are cut to multiples of 1 / grain [m]; 0: they are not
     pairs: Pairs  # lengths by point
     times: PathTimes  # around zones
-    point: Ints  # by node: its index in Distances
-    fixed: Floats  # (nodes, columns from X)
+    point: Ints  # by node, then by end of a path: its index in Distances
+    fixed: Floats  # (nodes and then ends of paths, columns from X)
+    paths: bool  # some tasks have a path; ways.py
+    far: Ints  # (n) row of the end of its path; of a point its node
+    turnable: NDArray[np.bool_]  # (n) may be flown from its last point, too
+    way_length: Floats  # (n) [m]
+    along: Floats  # (classes of speeds, 2 n) [s] of service and path: from the first, the last
     pace: Floats  # (m, 3) [s/m] horizontally, up, down
     speeds: Ints  # (m) class of speeds
     begin: Floats  # (m, columns from READY)
@@ -81,4 +86,10 @@ class TimedRoutes(NamedTuple):
     sums: Floats  # (9) columns from WARP, without END and TASKS
     counts: Ints  # (2)
     empty: Ints  # (classes) number of empty routes
+    way: Links  # (nodes, 2) rows where each is entered and left
     idle: Ints  # (classes) index in TimedArrays.members of one that was empty lately
+
+
+def node_count(a: TimedArrays) -> int:
+    """How many nodes there are."""
+    return a.bases + a.uavs * a.visits

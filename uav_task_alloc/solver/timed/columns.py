@@ -16,6 +16,8 @@ BEGIN_COLUMNS = 8
 BY_DISTANCE, BY_FINISH, BY_LATENESS, BY_END, BY_EXCESS = range(5)
 # columns of TimedRoutes.link, by node
 NEXT, PREV, OF_UAV, HEAD = range(4)  # OF_UAV: m where a task is in no route
+# columns of TimedRoutes.way, by node: row of TimedArrays.fixed and point where it begins and ends
+ENTER, LEAVE = range(2)
 # columns of TimedRoutes.row, by node; LEG: to the next one, LEG_TO: from the one before, of tasks
 START, DEPARTURE, LATEST, WARP_BEFORE, WARP_AFTER, LEG, TIME, LEG_TO = range(8)
 RATE, LOAD_BEFORE, LENGTH_BEFORE, LASTED, LEFT, LASTS, EARLY, WAITS = range(8, 16)

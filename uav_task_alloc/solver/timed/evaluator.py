@@ -15,11 +15,11 @@ anywhere, and until then its end stays the same.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
-from uav_task_alloc.geometry.flight_time import flight_time
-from uav_task_alloc.model import Leg, Point, Task, Uav
+from uav_task_alloc.geometry.flight_time import flight_time, service_seconds
+from uav_task_alloc.model import Leg, Point, Task, Uav, turned_tasks
 from uav_task_alloc.objective import response_time
 from uav_task_alloc.solver.problem import Rules, excess_cost
 from uav_task_alloc.timetable import Timetable
@@ -71,6 +71,7 @@ class _Stop:
 
     task: Task
     seconds: float  # of the leg
+    service: float  # [s] with the flight along its path
     is_locked: bool
 
 
@@ -131,7 +132,7 @@ def straight_legs(rules: Rules) -> LegOf:
 
 def evaluate_routes(uavs: Sequence[Uav], tasks: Sequence[Task], rules: Rules,
              routes: Mapping[str, Trips], leg: LegOf | None = None,
-             held: Held | None = None) -> TimedEvaluation:
+             held: Held | None = None, reversed: Collection[str] = ()) -> TimedEvaluation:
     """Evaluate routes with the best departures.
 
     Args:
@@ -141,14 +142,18 @@ def evaluate_routes(uavs: Sequence[Uav], tasks: Sequence[Task], rules: Rules,
         routes: trips by UAV id.
         leg: lengths and flight times; None: straight legs.
         held: locked tasks, whose windows are no rule, and payloads on board.
+        reversed: ids of the tasks with a path that are flown from their last point.
 
     Returns:
         Times, cost and violations.
     """
     held, leg = held or Held(), leg or straight_legs(rules)
+    wrong = [task.id for task in tasks if task.id in reversed and not task.reversible]
+    tasks = turned_tasks(tasks, reversed)
     known = {task.id: task for task in tasks}
     fleet = {uav.id: uav for uav in uavs}
     violations = [f'{uav_id} is no UAV' for uav_id in routes.keys() - fleet.keys()]
+    violations += [f'{name} is flown from its last point' for name in wrong]
     violations += _wrong_tasks(known, routes)
     trips = [each for uav in uavs for each in _trips(
         uav, [[known[name] for name in row if name in known] for row in routes.get(uav.id, ())],
@@ -184,9 +189,10 @@ def _trips(uav: Uav, rows: Sequence[Sequence[Task]], rules: Rules, leg: LegOf,
         trip = _Trip(uav, number, [], 0.0, 0.0)
         for task in row:
             metres, seconds = leg(uav, place, task.position)
-            trip.stops.append(_Stop(task, seconds, held.has_locked(uav, task)))
-            trip.metres += metres
-            place = task.position
+            trip.stops.append(_Stop(task, seconds, service_seconds(uav, task),
+                                    held.has_locked(uav, task)))
+            trip.metres += metres + task.path_length
+            place = task.end
         if rules.returns or number + 1 < len(rows):
             metres, trip.last_leg = leg(uav, place, uav.base)
             trip.metres += metres
@@ -205,7 +211,7 @@ def _schedule(trip: _Trip, ready: float, rules: Rules, held: Held) -> None:
         releases.append(trip.stops[0].task.release)
     earliest = max(releases)
     _fly(trip, earliest)
-    busy = math.fsum(stop.seconds + stop.task.service_time for stop in trip.stops) + trip.last_leg
+    busy = math.fsum(stop.seconds + stop.service for stop in trip.stops) + trip.last_leg
     if trip.on_ground and trip.end - trip.departure > busy + _TOLERANCE:  # it waits somewhere
         _fly(trip, earliest + _postponement(trip, rules))
 
@@ -219,7 +225,7 @@ def _fly(trip: _Trip, departure: float) -> None:
         arrivals.append(time)
         time = time if time > task.earliest else task.earliest
         starts.append(time)
-        time += task.service_time
+        time += stop.service
     trip.arrivals, trip.starts, trip.end = arrivals, starts, time + trip.last_leg
 
 
@@ -238,7 +244,7 @@ def _postponement(trip: _Trip, rules: Rules) -> float:
             allowed = min(allowed, max(limit, start) - unforced)
         counted = start if rules.objective.response > 0.0 else max(limit, start)
         harmless = min(harmless, counted - unforced)
-        elapsed += stop.task.service_time
+        elapsed += stop.service
     waiting = trip.end - trip.departure - elapsed - trip.last_leg
     needed = max(0.0, trip.end - trip.departure - trip.endurance)
     return max(0.0, min(waiting, allowed, max(needed, harmless)))
@@ -352,28 +358,31 @@ def _excess(trip: _Trip) -> float:
 
 def evaluate_legs(uavs: Sequence[Uav], tasks: Sequence[Task], rules: Rules,
                   routes: Mapping[str, Trips], legs: Mapping[str, Sequence[Leg]],
-                  held: Held | None = None) -> TimedEvaluation:
+                  held: Held | None = None,
+                  reversed: Collection[str] = ()) -> TimedEvaluation:
     """Evaluate routes along their legs.
 
     Args:
-        uavs, tasks, rules, routes, held: as for `evaluate_routes`.
+        uavs, tasks, rules, routes, held, reversed: as for `evaluate_routes`.
         legs: by UAV id; one to each task and to each base at the end of a trip.
 
     Returns:
         As `evaluate_routes`.
     """
-    places, ways = {task.id: task.position for task in tasks}, {}
+    places, ways = {task.id: (task.position, task.end)
+                    for task in turned_tasks(tasks, reversed)}, {}
     for uav in uavs:
         rows = routes.get(uav.id, ())
-        stops = [uav.position]
+        stops = [(uav.position, uav.position)]  # where each begins and ends
         for number, row in enumerate(rows):
             stops += [places[name] for name in row]
-            stops += [uav.base] * (number + 1 < len(rows) or rules.returns)
-        for start, end, leg in zip(stops, stops[1:], legs.get(uav.id, ()), strict=False):
+            stops += [(uav.base, uav.base)] * (number + 1 < len(rows) or rules.returns)
+        for (_, start), (end, _), leg in zip(stops, stops[1:], legs.get(uav.id, ()),
+                                             strict=False):
             ways[uav.id, start, end] = leg.length, flight_time(uav, (start, *leg.via, end))
 
     def leg_of(uav: Uav, start: Point, end: Point) -> tuple[float, float]:
         # where no safe way leads home the route ends at its last task
         return ways.get((uav.id, start, end), (0.0, 0.0))
 
-    return evaluate_routes(uavs, tasks, rules, routes, leg_of, held)
+    return evaluate_routes(uavs, tasks, rules, routes, leg_of, held, reversed)

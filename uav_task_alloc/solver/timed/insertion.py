@@ -12,13 +12,14 @@ from uav_task_alloc.solver.routes import SIGNED
 from uav_task_alloc.solver.timed import columns as at
 from uav_task_alloc.solver.timed.arrays import LINK, TimedArrays, TimedRoutes
 from uav_task_alloc.solver.timed.places import excess_price, place_cost
-from uav_task_alloc.solver.timed.segments import is_task, join, leg_of, update
+from uav_task_alloc.solver.timed.segments import join, leg_of, update
 from uav_task_alloc.solver.timed.visits import (
     BASE_BEFORE,
     NO_VISIT,
     cheapest_split,
     free_visit,
 )
+from uav_task_alloc.solver.timed.ways import TURNED, directions, face, is_task, way_length
 
 
 @inline_kernel
@@ -26,13 +27,16 @@ def try_place(a: TimedArrays, r: TimedRoutes, t: int, c: int, place: int, kind: 
               least: float) -> tuple[int, int, float]:
     """The better of the place found so far and the one after node c. O(1)."""
     u = r.link[c, at.OF_UAV]
-    cost = place_cost(a, r, u, t, c, least)
-    if cost < least:
-        place, kind, least = SIGNED(c), NO_VISIT, cost
-    if a.visits > 0:
-        which, cost = cheapest_split(a, r, t, c, least)
+    for turned in range(directions(a, t)):
+        if a.paths:
+            face(a, r, t, turned == 1)
+        cost = place_cost(a, r, u, t, c, least)
         if cost < least:
-            place, kind, least = SIGNED(c), which, cost
+            place, kind, least = SIGNED(c), NO_VISIT + TURNED * turned, cost
+        if a.visits > 0:
+            which, cost = cheapest_split(a, r, t, c, least)
+            if cost < least:
+                place, kind, least = SIGNED(c), which + TURNED * turned, cost
     return place, kind, least
 
 
@@ -74,11 +78,12 @@ def _place_beside(a: TimedArrays, r: TimedRoutes, t: int, side: int, least: floa
         return -1
     if side & 1 == 0:
         before, open_end = c, r.link[c, at.NEXT] >= a.ends
-        leg = r.row[c, at.LEG]
+        leg = r.row[c, at.LEG] - way_length(a, c) - way_length(a, t)
         late = r.row[c, at.DEPARTURE] + apart * pace - a.fixed[t, at.CLOSES] - a.least_cut
     else:
         before = r.link[c, at.PREV]
         leg, open_end = r.row[c, at.LEG_TO], not is_task(a, before)
+        leg -= way_length(a, before) + way_length(a, t)
         opened = max(a.fixed[t, at.OPENS], a.fixed[t, at.RELEASE]) + a.fixed[t, at.SERVICE]
         late = opened + apart * pace - r.row[c, at.LATEST] - a.least_cut
     if not open_end and a.weight[at.BY_DISTANCE] * (2.0 * apart - leg) >= least:
@@ -92,6 +97,8 @@ def _place_beside(a: TimedArrays, r: TimedRoutes, t: int, side: int, least: floa
 def near_place(a: TimedArrays, r: TimedRoutes, t: int, opens: bool, blinks: float,
                     rng: RngState) -> tuple[int, int, float]:
     """The cheapest place beside neighbours and in empty routes: (node before, kind, cost). O(k).
+
+    TURNED is part of the kind.
 
     opens: empty routes are tried, too. Each place is skipped with probability `blinks`.
     """
@@ -123,7 +130,10 @@ def place_anywhere(a: TimedArrays, r: TimedRoutes, t: int) -> tuple[int, int, fl
 
 @kernel
 def insert_task(a: TimedArrays, r: TimedRoutes, t: int, c: int, kind: int) -> None:
-    """Insert t after node c, with a visit of the base if the kind says so. O(tasks)."""
+    """Insert t after node c, turned or with a visit of the base if kind says so. O(tasks)."""
+    if a.paths:
+        face(a, r, t, kind >= TURNED)
+        kind &= TURNED - 1
     u, then = r.link[c, at.OF_UAV], r.link[c, at.NEXT]
     before = r.row[c, at.LEG]
     first, last = c, then
@@ -160,7 +170,7 @@ def insert_task(a: TimedArrays, r: TimedRoutes, t: int, c: int, kind: int) -> No
 def unlink(a: TimedArrays, r: TimedRoutes, t: int) -> None:
     """Take t out of its route; `update` has to follow. O(1)."""
     u, before, then = r.link[t, at.OF_UAV], r.link[t, at.PREV], r.link[t, at.NEXT]
-    metres, seconds = leg_of(a, u, before, then)
+    metres, seconds = leg_of(a, r, u, before, then)
     if metres == math.inf:  # no path is known: keep the one over t
         metres = r.row[before, at.LEG] + r.row[t, at.LEG]
         seconds = r.row[before, at.TIME] + r.row[t, at.TIME]

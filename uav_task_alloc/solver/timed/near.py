@@ -11,6 +11,7 @@ from uav_task_alloc.geometry.outline import Floats, Ints
 from uav_task_alloc.kernel import inline_kernel, kernel
 from uav_task_alloc.solver.timed import columns as at
 from uav_task_alloc.solver.timed.arrays import Links, TimedArrays
+from uav_task_alloc.solver.timed.ways import nearest_ends
 
 
 class KnownNear(NamedTuple):
@@ -37,8 +38,10 @@ def known_near(a: TimedArrays, earlier: TimedArrays | None, then: Ints) -> Known
         return KnownNear(0, a.near, a.near_length, a.near_count, np.full(len(then), -1), then[:0],
                          then[:0])
     stays = np.flatnonzero(then >= 0)
-    there = earlier.fixed[earlier.uavs + then[stays], :at.Z + 1]
-    moved = (a.fixed[a.uavs + stays, :at.Z + 1] != there).any(axis=1)
+    moved = np.zeros(len(stays), np.bool_)
+    for here, there in ((a.uavs + stays, earlier.uavs + then[stays]),
+                        (a.far[stays], earlier.far[then[stays]])):
+        moved |= (a.fixed[here, :at.Z + 1] != earlier.fixed[there, :at.Z + 1]).any(axis=1)
     then = then.copy()
     then[stays[moved]] = -1
     now = np.full(earlier.ends - earlier.uavs, -1)
@@ -46,14 +49,6 @@ def known_near(a: TimedArrays, earlier: TimedArrays | None, then: Ints) -> Known
     now[then[stays]] = stays
     return KnownNear(earlier.uavs, earlier.near, earlier.near_length, earlier.near_count, then,
                      now, np.flatnonzero(then < 0))
-
-
-@inline_kernel
-def _square_between(a: TimedArrays, i: int, j: int) -> float:
-    """Squared distance [m^2] of two nodes. O(1)."""
-    x, y = a.fixed[i, at.X] - a.fixed[j, at.X], a.fixed[i, at.Y] - a.fixed[j, at.Y]
-    z = a.fixed[i, at.Z] - a.fixed[j, at.Z]
-    return float(x * x + y * y + z * z)
 
 
 @inline_kernel
@@ -67,11 +62,11 @@ def _may_be_adjacent(a: TimedArrays, t: int, s: int, least: float) -> bool:
 def _add_neighbour(a: TimedArrays, i: int, kept: int, j: int, pace: float) -> int:
     """Add task j to the first `kept` neighbours of task i, nearest first; how many now. O(k)."""
     t, s, k = a.uavs + i, a.uavs + j, a.near.shape[1]
-    metres = math.sqrt(_square_between(a, t, s))
+    square, flat = nearest_ends(a, t, s)
+    metres = math.sqrt(square)
     if i == j or k == 0 or (kept == k and metres >= a.near_length[i, k - 1]):
         return kept
-    x, y = a.fixed[s, at.X] - a.fixed[t, at.X], a.fixed[s, at.Y] - a.fixed[t, at.Y]
-    if not _may_be_adjacent(a, t, s, math.sqrt(x * x + y * y) * pace):
+    if not _may_be_adjacent(a, t, s, math.sqrt(flat) * pace):
         return kept
     place = min(kept, k - 1)
     while place > 0 and a.near_length[i, place - 1] > metres:
@@ -116,7 +111,7 @@ def fill_near_classes(a: TimedArrays, squares: Floats) -> None:
     for i in range(a.ends - a.uavs):
         t, kept = a.uavs + i, 0
         for k in range(classes):
-            square = _square_between(a, t, a.members[a.first_member[k]])
+            square, _ = nearest_ends(a, t, a.members[a.first_member[k]])
             if kept == c and square >= squares[c - 1]:
                 continue
             place = min(kept, c - 1)

@@ -7,7 +7,8 @@ import math
 from uav_task_alloc.kernel import inline_kernel, kernel
 from uav_task_alloc.solver.timed import columns as at
 from uav_task_alloc.solver.timed.arrays import LINK, Links, TimedArrays, TimedRoutes
-from uav_task_alloc.solver.timed.segments import is_task, join, update
+from uav_task_alloc.solver.timed.segments import join, update
+from uav_task_alloc.solver.timed.ways import TURN_BIT, face, is_task, is_turned
 
 
 @kernel
@@ -37,9 +38,14 @@ def reset(a: TimedArrays, r: TimedRoutes) -> None:
 
 @kernel
 def route_order(a: TimedArrays, r: TimedRoutes, order: Links) -> None:
-    """Write the node after each node of a route into order (nodes); itself where in none."""
+    """Write the node after each node of a route into order (nodes); itself where in none.
+
+    With TURN_BIT where the node is flown from its last point.
+    """
     for i in range(order.size):
         order[i] = i if r.link[i, at.OF_UAV] == a.uavs else r.link[i, at.NEXT]
+        if is_turned(a, r, i) and order[i] != i:
+            order[i] |= TURN_BIT
     for u in range(a.uavs):
         order[a.ends + u] = a.ends + u
 
@@ -54,7 +60,9 @@ def set_order(a: TimedArrays, r: TimedRoutes, order: Links) -> None:
         if order[u] == end:
             continue
         while i != end:
-            j = order[i]
+            j = order[i] & ~TURN_BIT
+            if a.paths and is_task(a, j):
+                face(a, r, j, order[j] >= TURN_BIT)
             join(a, r, LINK(u), i, j)
             r.link[j, at.OF_UAV] = u
             r.link[j, at.HEAD] = u

@@ -8,6 +8,7 @@ from uav_task_alloc.kernel import inline_kernel, kernel
 from uav_task_alloc.solver.timed import columns as at
 from uav_task_alloc.solver.timed.arrays import LINK, TOLERANCE, TimedArrays, TimedRoutes
 from uav_task_alloc.solver.timed.segments import after_leg, leg_of, slot_of
+from uav_task_alloc.solver.timed.ways import TURNED, directions, face, service_of
 
 
 @inline_kernel
@@ -65,7 +66,7 @@ def _trip_excess(a: TimedArrays, r: TimedRoutes, u: int, t: int, c: int, slot: i
     flown, most = r.trip[slot, at.FLOWN], a.limit[slot, at.FLOWN]
     cost += cost_of_excess(a.price[at.RANGE_EXCESS], flown - most, flown + added - most)
     if a.whole and a.limit[slot, at.AIRBORNE] < math.inf:
-        lasts = _lasts(a, r, c, t, r.link[c, at.NEXT], seconds, further)
+        lasts = _lasts(a, r, u, c, t, r.link[c, at.NEXT], seconds, further)
         most, scale = a.limit[slot, at.AIRBORNE], a.begin[u, at.CRUISE]
         known = r.trip[slot, at.AIRBORNE] - most
         cost += cost_of_excess(a.price[at.ENDURANCE_EXCESS], scale * known, scale * (lasts - most))
@@ -76,8 +77,8 @@ def _trip_excess(a: TimedArrays, r: TimedRoutes, u: int, t: int, c: int, slot: i
 def place_cost(a: TimedArrays, r: TimedRoutes, u: int, t: int, c: int, least: float) -> float:
     """Cost of inserting t after node c of UAV u's route; >= least if not less. O(1)."""
     then = r.link[c, at.NEXT]
-    metres, seconds = leg_of(a, u, c, t)
-    more, further = leg_of(a, u, t, then)
+    metres, seconds = leg_of(a, r, u, c, t)
+    more, further = leg_of(a, r, u, t, then)
     added = metres + more - r.row[c, at.LEG]
     cost = a.weight[at.BY_DISTANCE] * added
     if cost >= least or not added < math.inf:
@@ -97,7 +98,7 @@ def place_cost(a: TimedArrays, r: TimedRoutes, u: int, t: int, c: int, least: fl
     elif start > a.fixed[t, at.CLOSES]:
         warp += start - a.fixed[t, at.CLOSES]
         start = a.fixed[t, at.CLOSES]
-    arrival = after_leg(a, start + a.fixed[t, at.SERVICE], further, then)
+    arrival = after_leg(a, start + service_of(a, r, u, t), further, then)
     late = arrival - r.row[then, at.LATEST]
     if late > 0.0:
         warp += late
@@ -113,14 +114,14 @@ def place_cost(a: TimedArrays, r: TimedRoutes, u: int, t: int, c: int, least: fl
 
 
 @inline_kernel
-def _lasts(a: TimedArrays, r: TimedRoutes, c: int, t: int, then: int, seconds: float,
+def _lasts(a: TimedArrays, r: TimedRoutes, u: int, c: int, t: int, then: int, seconds: float,
            further: float) -> float:
     """Shortest duration [s] of the trip with t between nodes c and `then`. O(1)."""
     lasted = r.row[c, at.LASTED] + seconds
     opened = max(a.fixed[t, at.OPENS], a.fixed[t, at.RELEASE] + seconds)
     wait = max(0.0, opened - lasted - r.row[c, at.LEFT])
     left = min(r.row[c, at.LEFT], a.fixed[t, at.CLOSES] - lasted)
-    lasted += wait + a.fixed[t, at.SERVICE] + further
+    lasted += wait + service_of(a, r, u, t) + further
     if then >= a.ends:
         return float(lasted)
     opened = max(r.row[then, at.EARLY], a.fixed[then, at.RELEASE] + further)
@@ -132,3 +133,19 @@ def _lasts(a: TimedArrays, r: TimedRoutes, c: int, t: int, then: int, seconds: f
 def cost_at(a: TimedArrays, r: TimedRoutes, u: int, t: int, c: int) -> float:
     """As place_cost without a bound, for kernels that need few."""
     return float(place_cost(a, r, u, t, c, math.inf))
+
+
+@kernel
+def cheapest_direction(a: TimedArrays, r: TimedRoutes, u: int, t: int, c: int) -> int:
+    """The kind of the cheaper direction of t after node c of UAV u's route; -1: none may be. O(1).
+
+    Without a visit of the base.
+    """
+    kind, least = -1, math.inf
+    for turned in range(directions(a, t)):
+        if a.paths:
+            face(a, r, t, turned == 1)
+        cost = cost_at(a, r, u, t, c)
+        if cost < least:
+            kind, least = TURNED * turned, cost
+    return kind

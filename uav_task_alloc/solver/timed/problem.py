@@ -5,21 +5,27 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
-from uav_task_alloc.geometry.flight_time import flight_time
+from uav_task_alloc.geometry.flight_time import flight_time, service_seconds
 from uav_task_alloc.geometry.outline import Floats, Ints
-from uav_task_alloc.model import Uav
+from uav_task_alloc.model import Task, Uav
 from uav_task_alloc.solver.answer import leg_between
 from uav_task_alloc.solver.problem import Problem, excess_cost
 from uav_task_alloc.solver.timed import columns as at
-from uav_task_alloc.solver.timed.arrays import LINK, TimedArrays, TimedRoutes, aligned_zeros
+from uav_task_alloc.solver.timed.arrays import (
+    LINK,
+    TimedArrays,
+    TimedRoutes,
+    aligned_zeros,
+    node_count,
+)
 from uav_task_alloc.solver.timed.near import fill_near, fill_near_classes, known_near
 from uav_task_alloc.solver.timed.order import reset
 from uav_task_alloc.solver.timed.path_times import Speeds, path_times
+from uav_task_alloc.solver.timed.ways import first_ways
 
 WINDOW_NEIGHBOURS = 60  # nearest tasks of a task that may precede or follow it
 NEAR_CLASSES = 6  # nearest classes of UAVs that are alike
@@ -62,11 +68,15 @@ def make_timed(problem: Problem, aboard: Mapping[str, frozenset[str]],
     order = np.argsort(class_of, kind='stable')
     classes = int(class_of.max(initial=-1)) + 1
     rules, classes_of_speeds = problem.rules, list(dict.fromkeys(map(_speeds, uavs)))
+    paths = any(task.path for task in tasks)
+    far, way_length, along = _ways(problem, len(_points(problem, visits)), classes_of_speeds)
     arrays = TimedArrays(
         m, m + n, 2 * m + n, visits, rules.returns, not problem.distances.zones,
         _is_flat(problem), _counts_time(problem), _is_whole(problem, visits), rules.grain,
         problem.distances.pairs,
-        path_times(problem.distances, classes_of_speeds), _points(m, n, visits), fixed,
+        path_times(problem.distances, classes_of_speeds), _points_and_ends(problem, visits), fixed,
+        paths, far, np.array([bool(task.path) and task.reversible for task in tasks], np.bool_),
+        way_length, along,
         _paces(uavs),
         np.array([classes_of_speeds.index(_speeds(uav)) for uav in uavs], np.int64), begin, limit,
         _compatible_trips(problem, aboard),
@@ -116,10 +126,37 @@ def _least_pace(problem: Problem) -> tuple[float, float]:
             2.0 * float(rows[:, 0].max(initial=0.0)) / grain if grain else 0.0)
 
 
-def _points(m: int, n: int, visits: int) -> Ints:
+def _points(problem: Problem, visits: int) -> Ints:
     """Index in `distances` of each node."""
+    m, n = len(problem.uavs), len(problem.tasks)
     homes = np.repeat(np.arange(m) + m + n, visits)
     return np.concatenate([np.arange(2 * m + n), homes]).astype(np.int64)
+
+
+def _points_and_ends(problem: Problem, visits: int) -> Ints:
+    """TimedArrays.point."""
+    ends = [problem.ends[task.id] for task in problem.tasks if task.path]
+    return np.concatenate([_points(problem, visits), np.array(ends, np.int64)])
+
+
+def _ways(problem: Problem, nodes: int,
+          classes: Sequence[Speeds]) -> tuple[Ints, Floats, Floats]:
+    """TimedArrays.far, way_length and along."""
+    m, tasks = len(problem.uavs), problem.tasks
+    far = np.arange(m, m + len(tasks), dtype=np.int64)
+    with_path = [i for i, task in enumerate(tasks) if task.path]
+    far[with_path] = nodes + np.arange(len(with_path))
+    lengths = np.array([task.path_length for task in tasks], np.float64)
+    if not with_path:
+        return far, lengths, np.empty((len(classes), 0))
+    along = [[service_seconds(fleet, each) for task in tasks for each in (task, task.turned)]
+             for fleet in _one_of_each(problem.uavs, classes)]
+    return far, lengths, np.array(along).reshape(len(classes), -1)
+
+
+def _one_of_each(uavs: Sequence[Uav], classes: Sequence[Speeds]) -> list[Uav]:
+    """A UAV of each class of speeds."""
+    return [next(uav for uav in uavs if _speeds(uav) == each) for each in classes]
 
 
 def _paces(uavs: Sequence[Uav]) -> Floats:
@@ -145,7 +182,7 @@ def _fixed(problem: Problem, visits: int, aboard: Mapping[str, frozenset[str]]) 
     """What is known of each node (nodes, FIXED)."""
     uavs, tasks = problem.uavs, problem.tasks
     m, n, goal = len(uavs), len(tasks), problem.rules.objective
-    points = _points(m, n, visits)
+    points = _points_and_ends(problem, visits)
     fixed = aligned_zeros(len(points), at.FIXED_COLUMNS)
     fixed[:, at.X:at.Z + 1] = problem.distances.points[points]
     fixed[:, [at.OPENS, at.RELEASE, at.TRIP_RELEASE]] = -math.inf
@@ -155,8 +192,9 @@ def _fixed(problem: Problem, visits: int, aboard: Mapping[str, frozenset[str]]) 
         task for held in problem.locked.values() for task in held)))
     hard = math.isinf(goal.lateness)
     loaded = {name for names in aboard.values() for name in names}
-    values = np.array([(task.service_time, task.earliest, task.latest, task.payload, task.value,
-                        task.announced, task.release) for task in tasks]).reshape(-1, 7)
+    values = np.array([(_least_service(uavs, task), task.earliest, task.latest, task.payload,
+                        task.value, task.announced, task.release)
+                       for task in tasks]).reshape(-1, 7)
     latest = at.CLOSES if hard else at.DUE
     rows[:, [at.SERVICE, at.OPENS, latest, at.LOAD, at.WORTH, at.ANNOUNCED]] = values[:, :6]
     rows[:, at.WEIGHT] = goal.response * rows[:, at.WORTH] / total
@@ -167,9 +205,16 @@ def _fixed(problem: Problem, visits: int, aboard: Mapping[str, frozenset[str]]) 
     rows[~whole_trip, at.RELEASE] = release[~whole_trip]
     until = np.array([uav.available_until for uav in uavs])
     fixed[m + n:2 * m + n, at.CLOSES] = until
-    fixed[2 * m + n:, at.CLOSES] = np.repeat(until, visits)
-    fixed[2 * m + n:, at.SERVICE] = np.repeat([uav.turnaround for uav in uavs], visits)
+    bases = fixed[2 * m + n:2 * m + n + m * visits]
+    bases[:, at.CLOSES] = np.repeat(until, visits)
+    bases[:, at.SERVICE] = np.repeat([uav.turnaround for uav in uavs], visits)
     return fixed
+
+
+def _least_service(uavs: Sequence[Uav], task: Task) -> float:
+    """Shortest service [s], with the flight along the path in either direction."""
+    return min((service_seconds(uav, each) for uav in uavs for each in (task, task.turned)),
+               default=0.0) if task.path else task.stay
 
 
 @dataclass(frozen=True, slots=True)
@@ -183,7 +228,7 @@ class _Begin:
 def _after_locked(problem: Problem, u: int, aboard: Mapping[str, frozenset[str]]) -> _Begin:
     """What UAV u's locked tasks leave; they are flown as soon as possible."""
     uav = problem.uavs[u]
-    held, places = problem.locked.get(uav.id, ()), problem.locked_places(u)
+    held = problem.locked.get(uav.id, ())
     loads = [task for task in held if task.payload > 0.0
              and task.id not in aboard.get(uav.id, ())] if uav.at_base else []
     ready = max([uav.available_from, *(task.release for task in loads)])
@@ -193,13 +238,13 @@ def _after_locked(problem: Problem, u: int, aboard: Mapping[str, frozenset[str]]
         in_air, last = 0.0, math.inf
         if held:
             ready = max(ready, held[0].release)
-    for task, (i, j) in zip(held, pairwise(places), strict=True):
-        seconds = _seconds(problem, u, i, j)
+    for task, (i, j) in zip(held, problem.locked_legs(u), strict=True):
+        seconds, service = _seconds(problem, u, i, j), service_seconds(uav, task)
         ready = max(ready, task.release) + seconds
         opened = max(task.earliest, task.release + seconds)
         in_air += seconds  # its latest time is no rule, so only a UAV in the air has to wait
-        in_air += max(0.0, opened - in_air - last) + task.service_time
-        ready = max(ready, task.earliest) + task.service_time
+        in_air += max(0.0, opened - in_air - last) + service
+        ready = max(ready, task.earliest) + service
     home = problem.arrays.empty_route_length[u]
     return _Begin((ready, in_air, last, home, _home_seconds(problem, u, home), float(uav.at_base),
                    uav.cruise_speed, float(bool(held))), sum(task.payload for task in loads))
@@ -302,7 +347,7 @@ def _set_prices(problem: Problem, a: TimedArrays, scale: float) -> None:
         far = float(rows[:, at.REMOTE].mean())
         least = max(UNSERVED_LEGS * scale, 2.0 * far * goal.distance)
         price = values / values.mean() * max(least, _longest_cost(problem, a, far))
-        a.unserved[:] = np.maximum(0.5 * price, price + announced)
+        a.unserved[:] = np.maximum(0.5 * price, price + announced) + goal.distance * a.way_length
     a.price[:] = a.weight[4] if not problem.rules.hard else math.inf
     a.price[:2] = math.inf
 
@@ -322,11 +367,12 @@ def _longest_cost(problem: Problem, a: TimedArrays, far: float) -> float:
 
 def empty_timed_routes(a: TimedArrays) -> TimedRoutes:
     """New routes without tasks."""
-    nodes = len(a.fixed)
+    nodes = node_count(a)
     routes = TimedRoutes(
         np.zeros((nodes, 4), LINK), aligned_zeros(nodes, at.ROW_COLUMNS),
         np.zeros((len(a.limit), at.TRIP_COLUMNS)),
         np.zeros((a.uavs, at.ROUTE_COLUMNS)), np.zeros(at.SUM_COLUMNS), np.zeros(2, np.int64),
-        np.zeros(max(1, a.first_member.size - 1), np.int64), a.first_member.copy())
+        np.zeros(max(1, a.first_member.size - 1), np.int64),
+        first_ways(nodes, a.far, a.uavs), a.first_member.copy())
     reset(a, routes)
     return routes

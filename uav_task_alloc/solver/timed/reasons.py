@@ -16,6 +16,7 @@ from uav_task_alloc.solver.timed.places import cost_at
 from uav_task_alloc.solver.timed.problem import TimedProblem, empty_timed_routes
 from uav_task_alloc.solver.timed.segments import leg_of
 from uav_task_alloc.solver.timed.visits import BASE_BEFORE, free_visit, split_cost
+from uav_task_alloc.solver.timed.ways import directions, face, service_of
 
 _ARRIVAL, _LATE, _LENGTH, _SECONDS, _END = range(5)  # columns of needs_alone
 _NAMED = 3  # UAVs that a text names
@@ -27,7 +28,10 @@ def can_serve(a: TimedArrays, r: TimedRoutes, t: int) -> bool:
 
     r: empty routes.
     """
-    for u in range(a.uavs):
+    for k in range(a.uavs * directions(a, t)):
+        u = k % a.uavs
+        if a.paths:
+            face(a, r, t, k >= a.uavs)
         if cost_at(a, r, LINK(u), LINK(t), LINK(u)) < math.inf:
             return True
         base = free_visit(a, r, LINK(u))
@@ -38,15 +42,17 @@ def can_serve(a: TimedArrays, r: TimedRoutes, t: int) -> bool:
 
 
 @kernel
-def needs_alone(a: TimedArrays, t: int, needs: Floats) -> None:
+def needs_alone(a: TimedArrays, r: TimedRoutes, t: int, needs: Floats) -> None:
     """What each UAV needs for t alone, after its locked tasks, on its first trip. O(m).
 
-    needs: (m, 5) start of the service, its lateness [s], length [m], time in the air [s], end of
+    r: says in which direction t is flown; needs: (m, 5) start of the service, its lateness [s],
+    length [m], time in the air [s], end of
     the route [s].
     """
     for u in range(a.uavs):
-        metres, seconds = leg_of(a, LINK(u), LINK(u), LINK(t))
-        more, further = leg_of(a, LINK(u), LINK(t), LINK(a.ends + u))
+        service = service_of(a, r, LINK(u), t)
+        metres, seconds = leg_of(a, r, LINK(u), LINK(u), LINK(t))
+        more, further = leg_of(a, r, LINK(u), LINK(t), LINK(a.ends + u))
         hold = max(a.fixed[t, at.RELEASE], a.fixed[t, at.TRIP_RELEASE] + a.begin[u, at.IN_AIR])
         start = max(max(a.begin[u, at.READY], hold) + seconds, a.fixed[t, at.OPENS])
         lasted = a.begin[u, at.IN_AIR] + seconds
@@ -54,8 +60,8 @@ def needs_alone(a: TimedArrays, t: int, needs: Floats) -> None:
         lasted += max(0.0, opened - lasted - a.begin[u, at.LAST_DEPARTURE])
         needs[u, 0], needs[u, 1] = start, max(0.0, start - a.fixed[t, at.CLOSES])
         needs[u, 2] = metres + more
-        needs[u, 3] = lasted + a.fixed[t, at.SERVICE] + further
-        needs[u, 4] = start + a.fixed[t, at.SERVICE] + further
+        needs[u, 3] = lasted + service + further
+        needs[u, 4] = start + service + further
 
 
 def timed_reasons(problem: TimedProblem, missing: Sequence[int]) -> dict[str, str]:
@@ -83,7 +89,7 @@ def _reason(problem: TimedProblem, routes: TimedRoutes, i: int) -> str:
         if problem.prizes:
             return 'left out: it is not worth its way'
         return f'left out: {_scarce(problem)} do not suffice for all tasks'
-    return _load_reason(problem, i) or _needs_reason(problem, i)
+    return _load_reason(problem, i) or _needs_reason(problem, routes, i)
 
 
 def _scarce(problem: TimedProblem) -> str:
@@ -114,11 +120,24 @@ def _load_reason(problem: TimedProblem, i: int) -> str:
     return ''
 
 
-def _needs_reason(problem: TimedProblem, i: int) -> str:
+def _least_needs(problem: TimedProblem, routes: TimedRoutes, i: int) -> Floats:
+    """`needs_alone` of a task; of each column the less of both directions."""
+    a = problem.arrays
+    both = []
+    for turned in range(directions(a, a.uavs + i)):
+        if a.paths:
+            face(a, routes, a.uavs + i, turned == 1)
+        needs = np.empty((a.uavs, 5))
+        needs_alone(a, routes, a.uavs + i, needs)
+        both.append(needs)
+    least: Floats = np.minimum.reduce(both)
+    return least
+
+
+def _needs_reason(problem: TimedProblem, routes: TimedRoutes, i: int) -> str:
     """The reason of a task that windows, ranges, endurances or availabilities prevent."""
     a, base, task = problem.arrays, problem.base, problem.base.tasks[i]
-    needs = np.empty((a.uavs, 5))
-    needs_alone(a, a.uavs + i, needs)
+    needs = _least_needs(problem, routes, i)
     able = [int(u) for u in np.flatnonzero(a.compatible[0, :, i])]
     if not able:
         return f'payload {task.payload:g} kg: no UAV on the ground may serve it'

@@ -7,7 +7,6 @@ back.
 """
 from __future__ import annotations
 
-import math
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,7 +16,7 @@ from uav_task_alloc.kernel import inline_kernel, kernel
 from uav_task_alloc.solver.rng import RngState, below, uniform
 from uav_task_alloc.solver.ruin import MAX_STRING, PRESERVE_RATE, SPLIT_RATE
 from uav_task_alloc.solver.timed import columns as at
-from uav_task_alloc.solver.timed.arrays import LINK, Links, TimedArrays, TimedRoutes
+from uav_task_alloc.solver.timed.arrays import LINK, Links, TimedArrays, TimedRoutes, node_count
 from uav_task_alloc.solver.timed.insertion import (
     idle_uav,
     insert_task,
@@ -25,9 +24,9 @@ from uav_task_alloc.solver.timed.insertion import (
     place_anywhere,
     unlink,
 )
-from uav_task_alloc.solver.timed.places import cost_at
-from uav_task_alloc.solver.timed.segments import is_task, slot_of, update
-from uav_task_alloc.solver.timed.visits import NO_VISIT
+from uav_task_alloc.solver.timed.places import cheapest_direction
+from uav_task_alloc.solver.timed.segments import slot_of, update
+from uav_task_alloc.solver.timed.ways import is_task
 
 ABSENT_SEED_RATE = 0.5  # share of rounds that start at an absent task, if there is one
 ANYWHERE_RATE = 0.02  # share of tasks without a place among neighbours that try all routes
@@ -42,6 +41,7 @@ class Round(NamedTuple):
 
     node: Links  # (nodes) saved rows: their nodes
     link: Links  # (nodes, 4)
+    way: Links  # (nodes, 2)
     row: Floats  # (nodes, columns from START)
     uav: Ints  # (m) saved routes: their UAVs
     route: Floats  # (m, columns from WARP)
@@ -57,8 +57,8 @@ class Round(NamedTuple):
 
 def empty_round(a: TimedArrays) -> Round:
     """An empty round with room for any."""
-    nodes, m, n = len(a.fixed), a.uavs, a.ends - a.uavs
-    return Round(np.empty(nodes, LINK), np.empty((nodes, 4), LINK),
+    nodes, m, n = node_count(a), a.uavs, a.ends - a.uavs
+    return Round(np.empty(nodes, LINK), np.empty((nodes, 4), LINK), np.empty((nodes, 2), LINK),
                  np.empty((nodes, at.ROW_COLUMNS)), np.empty(m, np.int64),
                  np.empty((m, at.ROUTE_COLUMNS)), np.empty((len(a.limit), at.TRIP_COLUMNS)),
                  np.empty(at.SUM_COLUMNS), np.empty(2, np.int64), np.empty(n + 1, LINK),
@@ -92,6 +92,8 @@ def save_route(a: TimedArrays, r: TimedRoutes, w: Round, u: int) -> None:
         w.node[k] = i
         for c in range(4):
             w.link[k, c] = r.link[i, c]
+        if a.paths:
+            w.way[k, 0], w.way[k, 1] = r.way[i, 0], r.way[i, 1]
         for c in range(at.RATE):
             w.row[k, c] = r.row[i, c]
         if a.whole or a.timed_cost:
@@ -125,6 +127,8 @@ def take_back(a: TimedArrays, r: TimedRoutes, w: Round) -> None:
         i = w.node[k]
         for c in range(4):
             r.link[i, c] = w.link[k, c]
+        if a.paths:
+            r.way[i, 0], r.way[i, 1] = w.way[k, 0], w.way[k, 1]
         for c in range(at.RATE):
             r.row[i, c] = w.row[k, c]
         if a.whole or a.timed_cost:
@@ -312,8 +316,11 @@ def open_route(a: TimedArrays, r: TimedRoutes, w: Round, t: int) -> None:
     for m in range(a.near_class.shape[1]):
         k = a.near_class[t - a.uavs, m]
         u = idle_uav(a, r, k) if k >= 0 else -1
-        if u >= 0 and cost_at(a, r, LINK(u), t, LINK(u)) < math.inf:
-            insert_saved(a, r, w, t, LINK(u), NO_VISIT)
+        if u < 0:
+            continue
+        kind = cheapest_direction(a, r, LINK(u), t, LINK(u))
+        if kind >= 0:
+            insert_saved(a, r, w, t, LINK(u), kind)
             break
 
 

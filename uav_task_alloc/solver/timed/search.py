@@ -13,7 +13,14 @@ from uav_task_alloc.solver.rng import RngState, uniform
 from uav_task_alloc.solver.ruin import BLINK_RATE
 from uav_task_alloc.solver.search import PENALTY_DECAY, PENALTY_GROWTH
 from uav_task_alloc.solver.timed import columns as at
-from uav_task_alloc.solver.timed.arrays import LINK, TOLERANCE, Links, TimedArrays, TimedRoutes
+from uav_task_alloc.solver.timed.arrays import (
+    LINK,
+    TOLERANCE,
+    Links,
+    TimedArrays,
+    TimedRoutes,
+    node_count,
+)
 from uav_task_alloc.solver.timed.order import route_order, true_cost
 from uav_task_alloc.solver.timed.ruin import (
     ABSENT,
@@ -39,13 +46,13 @@ BEST_COST, BEST_WORTH = range(2)  # entries of Incumbent.score
 class Incumbent(NamedTuple):
     """The best routes so far."""
 
-    order: Links  # (nodes) node after each node; itself: in no route
+    order: Links  # (nodes) node after each node; itself: in no route; as `route_order` writes it
     score: Floats  # (2) cost without unserved tasks or, where those have a price, with; value
 
 
 def empty_incumbent(a: TimedArrays) -> Incumbent:
     """An incumbent without routes, which any is better than."""
-    return Incumbent(np.arange(len(a.fixed)).astype(LINK), np.array([math.inf, -math.inf]))
+    return Incumbent(np.arange(node_count(a)).astype(LINK), np.array([math.inf, -math.inf]))
 
 
 def copy_incumbent(best: Incumbent) -> Incumbent:

@@ -17,47 +17,48 @@ from uav_task_alloc.kernel import inline_kernel, kernel
 from uav_task_alloc.solver.timed import columns as at
 from uav_task_alloc.solver.timed.arrays import TOLERANCE, TimedArrays, TimedRoutes
 from uav_task_alloc.solver.timed.path_times import path_seconds
+from uav_task_alloc.solver.timed.ways import service_of, way_length
 
 
 @inline_kernel
-def leg_of(a: TimedArrays, u: int, i: int, j: int) -> tuple[float, float]:
-    """Length [m] and time [s] of UAV u's leg from node i to node j. O(1) once known."""
+def leg_of(a: TimedArrays, r: TimedRoutes, u: int, i: int, j: int) -> tuple[float, float]:
+    """Length [m] and time [s] of UAV u's leg from node i to node j. O(1) once known.
+
+    The length counts the path of node i, too.
+    """
+    own = way_length(a, i)
     if j >= a.ends and j < a.bases:
         if i < a.uavs:
             return a.begin[u, at.EMPTY_LENGTH], a.begin[u, at.EMPTY_TIME]
         if not a.returns:
-            return 0.0, 0.0
+            return own, 0.0
+    if a.paths:
+        i, j = r.way[i, at.LEAVE], r.way[j, at.ENTER]
     x, y = a.fixed[j, at.X] - a.fixed[i, at.X], a.fixed[j, at.Y] - a.fixed[i, at.Y]
     if a.flat:
         metres = math.sqrt(x * x + y * y)
         if a.grain > 0.0:
             metres = math.floor(metres * a.grain) / a.grain
-        return metres, metres * a.pace[u, 0]
+        return metres + own, metres * a.pace[u, 0]
     z = a.fixed[j, at.Z] - a.fixed[i, at.Z]
     square = x * x + y * y
     metres = math.sqrt(square + z * z)
     up = z * a.pace[u, 1] if z > 0.0 else -z * a.pace[u, 2]
     seconds = max(math.sqrt(square) * a.pace[u, 0], up)
     if a.straight:
-        return metres, seconds
+        return metres + own, seconds
     found = length(a.pairs, a.point[i], a.point[j])
     if found <= metres * (1.0 + 1e-12):
-        return metres, seconds
+        return metres + own, seconds
     if found == math.inf:
         return found, found
-    return found, path_seconds(a.pairs, a.times, a.speeds[u], a.point[i], a.point[j])
+    return found + own, path_seconds(a.pairs, a.times, a.speeds[u], a.point[i], a.point[j])
 
 
 @inline_kernel
 def slot_of(a: TimedArrays, head: int) -> int:
     """The slot of the trip with that head."""
     return head if head < a.uavs else a.uavs + head - a.bases
-
-
-@inline_kernel
-def is_task(a: TimedArrays, i: int) -> bool:
-    """Whether node i is a task."""
-    return a.uavs <= i < a.ends
 
 
 @inline_kernel
@@ -68,7 +69,7 @@ def after_leg(a: TimedArrays, departure: float, seconds: float, j: int) -> float
 
 
 @inline_kernel
-def _step_forward(a: TimedArrays, r: TimedRoutes, i: int, j: int) -> bool:
+def _step_forward(a: TimedArrays, r: TimedRoutes, u: int, i: int, j: int) -> bool:
     """Set START, DEPARTURE and WARP_BEFORE of j after i; returns whether one changed. O(1)."""
     start = after_leg(a, r.row[i, at.DEPARTURE], r.row[i, at.TIME], j)
     if start < a.fixed[j, at.OPENS]:
@@ -78,13 +79,13 @@ def _step_forward(a: TimedArrays, r: TimedRoutes, i: int, j: int) -> bool:
         warp += start - a.fixed[j, at.CLOSES]
         start = a.fixed[j, at.CLOSES]
     changed = start != r.row[j, at.START] or warp != r.row[j, at.WARP_BEFORE]
-    r.row[j, at.START], r.row[j, at.DEPARTURE] = start, start + a.fixed[j, at.SERVICE]
+    r.row[j, at.START], r.row[j, at.DEPARTURE] = start, start + service_of(a, r, u, j)
     r.row[j, at.WARP_BEFORE] = warp
     return bool(changed)
 
 
 @inline_kernel
-def _step_backward(a: TimedArrays, r: TimedRoutes, i: int, j: int, hold: float) -> bool:
+def _step_backward(a: TimedArrays, r: TimedRoutes, u: int, i: int, j: int, hold: float) -> bool:
     """Set LATEST and WARP_AFTER of i before j; returns whether one changed. O(1).
 
     hold: [s] before which i is not left in any case, -inf but for heads of trips.
@@ -94,7 +95,7 @@ def _step_backward(a: TimedArrays, r: TimedRoutes, i: int, j: int, hold: float) 
     if hold > gate:
         warp += hold - gate
         gate = hold
-    latest = gate - a.fixed[i, at.SERVICE]
+    latest = gate - service_of(a, r, u, i)
     if latest > a.fixed[i, at.CLOSES]:
         latest = a.fixed[i, at.CLOSES]
     elif latest < a.fixed[i, at.OPENS]:
@@ -204,7 +205,7 @@ def update_part(a: TimedArrays, r: TimedRoutes, u: int, first: int, last: int,
     i, passed, end = first, first == last, a.ends + u
     while i != end:
         j = r.link[i, at.NEXT]
-        changed = _step_forward(a, r, i, j)
+        changed = _step_forward(a, r, u, i, j)
         if passed and not changed:
             break
         passed = passed or j == last
@@ -212,7 +213,7 @@ def update_part(a: TimedArrays, r: TimedRoutes, u: int, first: int, last: int,
     j, passed = last, first == last
     while j != u:
         i = r.link[j, at.PREV]
-        changed = _step_backward(a, r, i, j, -math.inf)
+        changed = _step_backward(a, r, u, i, j, -math.inf)
         if passed and not changed:
             break
         passed = passed or i == first
@@ -231,7 +232,7 @@ def _trip_hold(a: TimedArrays, r: TimedRoutes, head: int) -> float:
 
 
 @inline_kernel
-def _trip_forward(a: TimedArrays, r: TimedRoutes, head: int) -> int:
+def _trip_forward(a: TimedArrays, r: TimedRoutes, u: int, head: int) -> int:
     """Set what is known from before for all nodes of a trip; returns the node after. O(tasks).
 
     The departure of the head is set already.
@@ -239,7 +240,7 @@ def _trip_forward(a: TimedArrays, r: TimedRoutes, head: int) -> int:
     i, load, metres, slot = head, 0.0, 0.0, slot_of(a, head)
     while True:
         j = r.link[i, at.NEXT]
-        _step_forward(a, r, i, j)
+        _step_forward(a, r, u, i, j)
         seconds = r.row[i, at.TIME]
         metres += r.row[i, at.LEG]
         lasted = r.row[i, at.LASTED] + seconds
@@ -249,7 +250,7 @@ def _trip_forward(a: TimedArrays, r: TimedRoutes, head: int) -> int:
         wait = max(0.0, opened - lasted - r.row[i, at.LEFT])
         load += a.fixed[j, at.LOAD]
         r.row[j, at.LEFT] = min(r.row[i, at.LEFT], a.fixed[j, at.CLOSES] - lasted)
-        r.row[j, at.LASTED] = lasted + wait + a.fixed[j, at.SERVICE]
+        r.row[j, at.LASTED] = lasted + wait + service_of(a, r, u, j)
         r.row[j, at.LOAD_BEFORE], r.row[j, at.LENGTH_BEFORE] = load, metres
         r.link[j, at.HEAD] = head
         i = j
@@ -277,7 +278,7 @@ def _depart(a: TimedArrays, r: TimedRoutes, head: int) -> None:
 
 
 @inline_kernel
-def _trip_backward(a: TimedArrays, r: TimedRoutes, last: int) -> int:
+def _trip_backward(a: TimedArrays, r: TimedRoutes, u: int, last: int) -> int:
     """Set what is known from after for all nodes of the trip that ends at `last`; its head."""
     j = last
     r.row[j, at.LASTS], r.row[j, at.EARLY] = 0.0, -math.inf
@@ -285,9 +286,9 @@ def _trip_backward(a: TimedArrays, r: TimedRoutes, last: int) -> int:
         i = r.link[j, at.PREV]
         if i < a.uavs or i >= a.ends:
             break
-        _step_backward(a, r, i, j, -math.inf)
+        _step_backward(a, r, u, i, j, -math.inf)
         seconds = r.row[i, at.TIME]
-        passed = a.fixed[i, at.SERVICE] + seconds
+        passed = service_of(a, r, u, i) + seconds
         early = max(r.row[j, at.EARLY], a.fixed[j, at.RELEASE] + seconds)
         wait = max(0.0, early - passed - a.fixed[i, at.CLOSES])
         r.row[i, at.LASTS] = passed + r.row[j, at.LASTS] + wait
@@ -296,7 +297,7 @@ def _trip_backward(a: TimedArrays, r: TimedRoutes, last: int) -> int:
     hold = -math.inf
     if i >= a.uavs or a.begin[i, at.GROUNDED] > 0.0:
         hold = _trip_hold(a, r, i) + r.row[i, at.LASTED]
-    _step_backward(a, r, i, j, hold)
+    _step_backward(a, r, u, i, j, hold)
     return int(i)
 
 
@@ -306,19 +307,19 @@ def update_whole(a: TimedArrays, r: TimedRoutes, u: int, before: float) -> None:
     head, end = u, a.ends + u
     while True:
         _depart(a, r, head)
-        j = _trip_forward(a, r, head)
+        j = _trip_forward(a, r, u, head)
         if a.timed_cost and (head >= a.uavs or a.begin[head, at.GROUNDED] > 0.0):
             most, slot = a.limit[slot_of(a, head), at.AIRBORNE], slot_of(a, head)
             late = r.row[j, at.START] - most + r.row[head, at.LASTED]
             if r.row[head, at.DEPARTURE] < late and r.trip[slot, at.AIRBORNE] <= most + TOLERANCE:
                 r.row[head, at.DEPARTURE] = late  # as long on the ground as endurance needs
-                _trip_forward(a, r, head)
+                _trip_forward(a, r, u, head)
         if j == end:
             break
         head = j
     last = end
     while True:
-        head = _trip_backward(a, r, last)
+        head = _trip_backward(a, r, u, last)
         if head == u:
             break
         last = head
@@ -338,7 +339,7 @@ def update(a: TimedArrays, r: TimedRoutes, u: int, first: int, last: int, before
 def join(a: TimedArrays, r: TimedRoutes, u: int, i: int, j: int) -> None:
     """Make node j follow node i in UAV u's route. O(1)."""
     r.link[i, at.NEXT], r.link[j, at.PREV] = j, i
-    r.row[i, at.LEG], r.row[i, at.TIME] = leg_of(a, u, i, j)
+    r.row[i, at.LEG], r.row[i, at.TIME] = leg_of(a, r, u, i, j)
     r.row[j, at.LEG_TO] = r.row[i, at.LEG]
 
 

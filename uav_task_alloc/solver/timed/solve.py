@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 from itertools import chain
 
@@ -15,7 +15,7 @@ from uav_task_alloc.kernel_cache import (
     TIMED_SEARCH_WORK,
     ZONES_WORK,
 )
-from uav_task_alloc.model import Plan, Task, ThreatZone, Uav
+from uav_task_alloc.model import Plan, Task, ThreatZone, Uav, turned_tasks
 from uav_task_alloc.solver.chain_q import run_colonies
 from uav_task_alloc.solver.path_preparation import SEARCH_LIMIT, PathPreparation
 from uav_task_alloc.solver.problem import Limits, Rules, make_problem
@@ -44,7 +44,7 @@ def solve_timed(uavs: Sequence[Uav], tasks: Sequence[Task],
                 max_iterations: int | None = None,
                 on_iteration: Callable[[int, float], None] | None = None,
                 clock: Callable[[], float] = time.perf_counter,
-                params: TimedParams | None = None) -> Plan:
+                params: TimedParams | None = None, reversed: Collection[str] = ()) -> Plan:
     """Solve a problem with time, as `plan` does; arguments are checked already.
 
     Args:
@@ -56,6 +56,7 @@ def solve_timed(uavs: Sequence[Uav], tasks: Sequence[Task],
         warm: an earlier plan, or its state, to start from.
         budget, seed, threads, stop, max_iterations, on_iteration, clock: as for `plan`.
         params: of the colonies; None: by whether there is an earlier plan.
+        reversed: ids of the locked tasks that are flown from their last points.
 
     Returns:
         The best plan found, with its times.
@@ -64,6 +65,7 @@ def solve_timed(uavs: Sequence[Uav], tasks: Sequence[Task],
     began, before = clock(), WarmState.of(warm)
     search = PathPreparation(clock, began, budget, stop, before.flown())
     known = before.problem
+    locked = {uav_id: tuple(turned_tasks(row, reversed)) for uav_id, row in locked.items()}
     base = make_problem(uavs, tasks, locked, limits, rules, known, search)
     problem = make_timed(base, _aboard(uavs, tasks, base.locked, before), before.timed)
     recorder = TimedRecorder(clock, began, budget, max_iterations, stop, threads,
@@ -76,7 +78,10 @@ def solve_timed(uavs: Sequence[Uav], tasks: Sequence[Task],
         other = to_timed_plan(problem, recorder, first, SOLVER_NAME, warm is not None)
         result = min(result, other, key=lambda each: _rank(problem, each))
     search.path_budget.check()  # raises what a callback raised within a kernel
-    state = WarmState(base, before.learnt, result.routes, trips=dict(result.trips), timed=problem)
+    held = {task.id for row in base.locked.values() for task in row if task.path}
+    result = replace(result, reversed=result.reversed | held.intersection(reversed))
+    state = WarmState(base, before.learnt, result.routes, trips=dict(result.trips),
+                      reversed=result.reversed, timed=problem)
     return replace(result, state=state)
 
 
@@ -142,7 +147,9 @@ def _call_kernels(zones: bool, search: bool) -> None:
     """Solve a small problem, so that each kernel is called."""
     uavs = (Uav('u', (0.0, 0.0, 0.0), turnaround=1.0), Uav('v', (9.0, 0.0, 0.0), 30.0))
     tasks = tuple(Task(f't{i}', (float(i), 1.0, 0.0), latest=99.0) for i in range(5))
-    tasks += (Task('late', (9e3, 0.0, 0.0), latest=1.0),)
+    tasks += (Task('late', (9e3, 0.0, 0.0), latest=1.0),
+              Task('line', (1.0, 2.0, 0.0), path=((1.0, 2.0, 0.0), (4.0, 2.0, 0.0)),
+                   reversible=True))
     limits = Limits((ThreatZone.cylinder('z', (2.5, 1.0), 0.3),) if zones else ())
     problem = make_timed(make_problem(uavs, tasks, {}, limits, Rules(trips=2)), {})
     recorder = TimedRecorder(lambda: 0.0, 0.0, 1.0, max_iterations=100 * search, problem=problem)

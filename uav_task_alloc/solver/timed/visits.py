@@ -9,6 +9,7 @@ from uav_task_alloc.solver.timed import columns as at
 from uav_task_alloc.solver.timed.arrays import LINK, TimedArrays, TimedRoutes
 from uav_task_alloc.solver.timed.places import cost_of_delay, cost_of_excess, fits_trip
 from uav_task_alloc.solver.timed.segments import after_leg, leg_of, slot_of
+from uav_task_alloc.solver.timed.ways import service_of
 
 NO_VISIT, BASE_BEFORE, BASE_AFTER = range(3)  # kinds of places: with a base visit or without
 
@@ -34,9 +35,9 @@ def split_cost(a: TimedArrays, r: TimedRoutes, u: int, t: int, c: int, kind: int
     if head < a.uavs and a.begin[head, at.GROUNDED] == 0.0 and not _may_wait(a, r, u, then):
         return math.inf
     i, j = (t, base) if before else (base, t)
-    first, first_time = leg_of(a, u, c, i)
-    second, second_time = leg_of(a, u, i, j)
-    third, third_time = leg_of(a, u, j, then)
+    first, first_time = leg_of(a, r, u, c, i)
+    second, second_time = leg_of(a, r, u, i, j)
+    third, third_time = leg_of(a, r, u, j, then)
     added = first + second + third - r.row[c, at.LEG]
     cost = a.weight[at.BY_DISTANCE] * added
     if cost >= least or not added < math.inf:
@@ -59,7 +60,7 @@ def split_cost(a: TimedArrays, r: TimedRoutes, u: int, t: int, c: int, kind: int
 
 
 @inline_kernel
-def _then_visit(a: TimedArrays, r: TimedRoutes, t: int, c: int, base: int, first: float,
+def _then_visit(a: TimedArrays, r: TimedRoutes, u: int, t: int, c: int, base: int, first: float,
                 second: float, third: float) -> tuple[float, float, float, float, float]:
     """Times of c, t, base, the node after c; first to third are the legs' [s]. O(1).
 
@@ -76,16 +77,16 @@ def _then_visit(a: TimedArrays, r: TimedRoutes, t: int, c: int, base: int, first
     start -= late
     lasted += first
     opened = max(a.fixed[t, at.OPENS], a.fixed[t, at.RELEASE] + first)
-    lasts = lasted + max(0.0, opened - lasted - left) + a.fixed[t, at.SERVICE] + second
+    lasts = lasted + max(0.0, opened - lasted - left) + service_of(a, r, u, t) + second
     # the releases of the trip may be those of tasks after the visit
-    departure = max(start + a.fixed[t, at.SERVICE] + second + a.fixed[base, at.SERVICE],
+    departure = max(start + service_of(a, r, u, t) + second + a.fixed[base, at.SERVICE],
                     r.row[head, at.DEPARTURE])
     rest = third + (r.row[then, at.LASTS] if then < a.ends else 0.0)
     return start, after_leg(a, departure, third, then), lasts, rest, warp + late
 
 
 @inline_kernel
-def _visit_then(a: TimedArrays, r: TimedRoutes, t: int, c: int, base: int, first: float,
+def _visit_then(a: TimedArrays, r: TimedRoutes, u: int, t: int, c: int, base: int, first: float,
                 second: float, third: float) -> tuple[float, float, float, float, float]:
     """Times of c, base, t, the node after c; as _then_visit. O(1)."""
     then, head = r.link[c, at.NEXT], r.link[c, at.HEAD]
@@ -94,12 +95,12 @@ def _visit_then(a: TimedArrays, r: TimedRoutes, t: int, c: int, base: int, first
     start = max(after_leg(a, departure, second, t), a.fixed[t, at.OPENS])
     late = max(0.0, start - a.fixed[t, at.CLOSES])
     start -= late
-    rest = second + a.fixed[t, at.SERVICE] + third
+    rest = second + service_of(a, r, u, t) + third
     if then < a.ends:
         opened = max(r.row[then, at.EARLY], a.fixed[then, at.RELEASE] + third)
         wait = max(0.0, opened - rest - (a.fixed[t, at.CLOSES] - second))
         rest += wait + r.row[then, at.LASTS]
-    arrival = after_leg(a, start + a.fixed[t, at.SERVICE], third, then)
+    arrival = after_leg(a, start + service_of(a, r, u, t), third, then)
     return (start, arrival, r.row[c, at.LASTED] + first, rest,
             r.row[c, at.WARP_BEFORE] + late)
 
@@ -109,9 +110,11 @@ def _split_times(a: TimedArrays, r: TimedRoutes, u: int, t: int, c: int, before:
                  first: float, second: float, third: float) -> float:
     """The part of split_cost that is due to times; first to third are the legs' [s]. O(1)."""
     if before:
-        start, arrival, lasts, rest, warp = _then_visit(a, r, t, c, base, first, second, third)
+        start, arrival, lasts, rest, warp = _then_visit(a, r, u, t, c, base, first, second,
+                                                       third)
     else:
-        start, arrival, lasts, rest, warp = _visit_then(a, r, t, c, base, first, second, third)
+        start, arrival, lasts, rest, warp = _visit_then(a, r, u, t, c, base, first, second,
+                                                       third)
     then, slot, other = r.link[c, at.NEXT], slot_of(a, r.link[c, at.HEAD]), slot_of(a, base)
     warp += r.row[then, at.WARP_AFTER] + max(0.0, arrival - r.row[then, at.LATEST])
     cost = cost_of_excess(a.price[at.WARP], r.route[u, at.WARP], warp)

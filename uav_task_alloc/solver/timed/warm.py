@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
 from uav_task_alloc.geometry.outline import Ints
 from uav_task_alloc.kernel import kernel
@@ -22,6 +23,7 @@ from uav_task_alloc.solver.timed.search import (
     record,
 )
 from uav_task_alloc.solver.timed.visits import BASE_BEFORE, NO_VISIT, free_visit, split_cost
+from uav_task_alloc.solver.timed.ways import TURNED, face, is_turned
 from uav_task_alloc.solver.warm import WarmState
 
 MOST_PLACES = 1_000_000  # absent tasks times tasks that `completed` tries
@@ -37,13 +39,15 @@ def first_plan(problem: TimedProblem, before: WarmState) -> Incumbent:
     """
     a, routes = problem.arrays, empty_timed_routes(problem.arrays)
     nodes, bounds, index = [], [0], problem.base.index
+    turned = {a.uavs + index[name] for name in before.reversed if name in index}
     for uav in problem.base.uavs:
         held = {task.id for task in problem.base.locked.get(uav.id, ())}
         for number, trip in enumerate(before.trips_of(uav.id)):
             row = [a.uavs + index[name] for name in trip if name in index]
             nodes += [_VISIT] * (number > 0 and bool(row or held)) + row
         bounds.append(len(nodes))
-    append_all(a, routes, np.array(nodes, np.int64), np.array(bounds, np.int64))
+    append_all(a, routes, np.array(nodes, np.int64), np.array(bounds, np.int64),
+               np.array([node in turned for node in nodes], np.bool_))
     tasks = np.arange(a.uavs, a.ends)
     tasks = tasks[np.argsort(-a.fixed[tasks, at.REMOTE], kind='stable')]
     insert_in_order(a, routes, tasks, problem.prizes, rng_state(0))
@@ -66,10 +70,12 @@ def completed(problem: TimedProblem, best: Incumbent) -> Incumbent:
 
 
 @kernel
-def append_all(a: TimedArrays, r: TimedRoutes, nodes: Ints, bounds: Ints) -> None:
+def append_all(a: TimedArrays, r: TimedRoutes, nodes: Ints, bounds: Ints,
+               turned: NDArray[np.bool_]) -> None:
     """Append nodes[bounds[u]:bounds[u + 1]] to the route of each UAV u, as far as allowed.
 
-    nodes: int64 task nodes, -1 before the first task of a further trip; bounds: (m + 1).
+    nodes: int64 task nodes, -1 before the first task of a further trip; bounds: (m + 1); turned:
+    which of the nodes are flown from their last points.
     """
     for u in range(a.uavs):
         visits = False
@@ -80,10 +86,13 @@ def append_all(a: TimedArrays, r: TimedRoutes, nodes: Ints, bounds: Ints) -> Non
             t, last = LINK(nodes[i]), r.link[a.ends + u, at.PREV]
             if r.link[t, at.OF_UAV] != a.uavs:
                 continue
+            if a.paths:
+                face(a, r, t, turned[i] and a.turnable[t - a.uavs])
+            way = TURNED if is_turned(a, r, t) else 0
             base = free_visit(a, r, LINK(u)) if visits else -1
             if base >= 0 and split_cost(a, r, LINK(u), t, last, BASE_BEFORE, LINK(base),
                                         math.inf) < math.inf:
-                insert_task(a, r, t, last, BASE_BEFORE)
+                insert_task(a, r, t, last, BASE_BEFORE + way)
                 visits = False
             elif cost_at(a, r, LINK(u), t, last) < math.inf:
-                insert_task(a, r, t, last, NO_VISIT)
+                insert_task(a, r, t, last, NO_VISIT + way)
