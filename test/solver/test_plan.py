@@ -259,7 +259,8 @@ def test_detours_count_in_the_arrivals():
     assert result.arrivals == {'a': pytest.approx(leg.length / 10.0)}
 
 
-def test_a_task_with_a_path_is_refused():
+@pytest.mark.parametrize('solver', [name for name in SOLVERS if name != 'chain_q'])
+def test_a_task_with_a_path_is_for_one_solver_only(solver):
     line = Task('line', (1.0, 0.0, 0.0), path=((1.0, 0.0, 0.0), (9.0, 0.0, 0.0)))
-    with pytest.raises(InvalidValue, match=r'task line: path = .*: expected no path'):
-        quick([ONE], [line])
+    with pytest.raises(InvalidValue, match='latest times, loads, paths'):
+        quick([ONE], [line], solver=solver)

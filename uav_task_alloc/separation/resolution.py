@@ -179,7 +179,8 @@ class _Planner:
         if self._is_apart(flight, k, n, leg, planned):
             return self._sooner(flight, k, n, ready)
         after = flight.legs[n + 1] if n + 1 < len(flight.legs) else None
-        bounded = not leg.may_wait or (after is not None and not after.may_wait)
+        bounded = not leg.may_wait or (
+            after is not None and not after.may_wait and after.movable)
         most = self._limits.max_price if bounded else math.inf
         found = self._cheapest(flight, k, n, ready, most)
         if found is not None or not bounded or after is None:
@@ -235,7 +236,7 @@ class _Planner:
 
     def _is_apart(self, flight: Flight, k: int, n: int, leg: FlightLeg, times: LegTimes,
                   whole: bool = True) -> bool:
-        """Whether a leg is apart, and the return after it that cannot wait (`whole`)."""
+        """Whether a leg is apart, and the return or path after it that cannot wait (`whole`)."""
         rows = leg_rows(flight, leg, times, self._rule, n == 0)
         if n + 1 == len(flight.legs):
             rows += self._stay(flight, times.end)
@@ -245,8 +246,9 @@ class _Planner:
         if after is None or after.may_wait or not whole:
             return True
         # the only wait for the next leg is this one
+        heights = self._heights(flight, after) if after.movable else ()
         return any(self._is_apart(flight, k, n + 1, each, leg_times(flight, each, times.end))
-                   for each in (after, *(change.leg for change in self._heights(flight, after))))
+                   for each in (after, *(change.leg for change in heights)))
 
     def _heights(self, flight: Flight, leg: FlightLeg) -> Iterator[_Change]:
         """The leg at other transit heights that it may have."""

@@ -58,8 +58,10 @@ class FlightLeg:
         lands: it ends on the ground.
         top: [m] ENU at which its take-off ends, if that is known, also where that has begun; else
             at its next point.
-        movable: its heights and its begin may change; the leg under way is not.
-        may_wait: the UAV can wait before it; not before a return that follows a list.
+        movable: its heights and its begin may change; not of the leg under way, or of the path
+            of a task.
+        may_wait: the UAV can wait before it; not before a return that follows a list, or the path
+            of a task.
     """
 
     points: tuple[Point, ...]  # [m] ENU

@@ -11,9 +11,10 @@ import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 
+from uav_task_alloc.geometry.flight_time import flight_time, service_seconds
 from uav_task_alloc.geometry.polyline import polyline_length
 from uav_task_alloc.geometry.zones import path_is_clear
-from uav_task_alloc.model import Leg, Plan, Task, Uav
+from uav_task_alloc.model import Leg, Plan, Task, Uav, turned_tasks
 from uav_task_alloc.objective import Objective, excess, fit, response_time
 from uav_task_alloc.separation.conflicts import load_separation_kernels
 from uav_task_alloc.separation.resolution import Resolution, TransitLimits, resolve
@@ -122,7 +123,8 @@ def flights_of_plan(plan: Plan, uavs: Iterable[Uav], tasks: Mapping[str, Task],
         In the order of the UAVs.
     """
     times = plan.timetable()
-    return [_flight(uav, plan, times, tasks, returns) for uav in uavs]
+    flown = {task.id: task for task in turned_tasks(tasks.values(), plan.reversed)}
+    return [_flight(uav, plan, times, flown, returns) for uav in uavs]
 
 
 def _flight(uav: Uav, plan: Plan, times: Timetable, tasks: Mapping[str, Task],
@@ -138,10 +140,12 @@ def _flight(uav: Uav, plan: Plan, times: Timetable, tasks: Mapping[str, Task],
             release = task.release
             if on_ground and k == 0 and number < len(departures):
                 release = max(release, departures[number])
-            legs.append(FlightLeg((place, *leg.via, task.position), name, task.service_time,
+            legs.append(FlightLeg((place, *leg.via, task.position), name, task.stay,
                                   task.earliest, task.latest, release,
                                   takes_off=on_ground and k == 0))
-            place = task.position
+            if task.path:
+                legs.append(_along_path(uav, task))
+            place = task.end
         leg_home = next(rows, None) if number + 1 < len(trips) or (returns and row) else None
         if leg_home is not None:
             legs.append(FlightLeg((place, *leg_home.via, uav.base), '',
@@ -149,6 +153,17 @@ def _flight(uav: Uav, plan: Plan, times: Timetable, tasks: Mapping[str, Task],
             place = uav.base
     return Flight(uav.id, tuple(legs), uav.position, uav.cruise_speed, uav.climb_speed,
                   uav.descent_speed, uav.available_from, in_air=not uav.at_base)
+
+
+def _along_path(uav: Uav, task: Task) -> FlightLeg:
+    """The path of a task; where it is flown slower than other legs it takes longer at its end."""
+    slower = service_seconds(uav, task) - task.stay - flight_time(uav, task.path)
+    return FlightLeg(task.path, '', max(0.0, slower), movable=False, may_wait=False)
+
+
+def _is_path(leg: FlightLeg) -> bool:
+    """Whether a leg is the path of a task, which is no leg of the plan."""
+    return not leg.task and not leg.lands
 
 
 def _with_resolution(plan: Plan, uavs: Sequence[Uav], tasks: Sequence[Task], rules: Rules,
@@ -163,7 +178,9 @@ def _with_resolution(plan: Plan, uavs: Sequence[Uav], tasks: Sequence[Task], rul
     legs = {flight.uav: _legs(plan.legs.get(flight.uav, ()), old, flight)
             for old, flight in zip(before, found.flights, strict=True)}
     times = _times(plan.timetable(), tasks, before, found.flights)
-    lengths = [math.fsum(leg.length for leg in legs[uav.id]) for uav in uavs]
+    paths = {task.id: task.path_length for task in tasks}
+    lengths = [math.fsum((*(leg.length for leg in legs[uav.id]),
+                          *(paths[name] for name in plan.routes[uav.id]))) for uav in uavs]
     distance, penalty = math.fsum(lengths), max(plan.penalty, excess(uavs, lengths))
     old, new = (_cost(rules.objective, metres, each)
                 for metres, each in ((plan.distance, plan.timetable()), (distance, times)))
@@ -183,8 +200,9 @@ def _moved(plan: Plan, name: str, each: Conflict) -> Conflict:
 
 def _legs(planned: Sequence[Leg], old: Flight, new: Flight) -> tuple[Leg, ...]:
     """Legs with the transit heights."""
+    pairs = [(a, b) for a, b in zip(old.legs, new.legs, strict=True) if not _is_path(a)]
     return tuple(leg if a.points == b.points else Leg(b.points[1:-1], polyline_length(b.points))
-                 for leg, a, b in zip(planned, old.legs, new.legs, strict=True))
+                 for leg, (a, b) in zip(planned, pairs, strict=True))
 
 
 def _cost(objective: Objective, metres: float, times: Timetable) -> float:
@@ -215,7 +233,7 @@ def _times(times: Timetable, tasks: Sequence[Task], before: Sequence[Flight],
                 takes_off.append(now.begin - was.begin)
             if leg.task:
                 arrivals[leg.task] += now.arrival - was.arrival
-                starts[leg.task] += later
+                starts[leg.task] += later  # the path after it begins as much later
         ends[old.uav] = times.ends.get(old.uav, 0.0) + later
         if len(takes_off) == len(departures.get(old.uav, ())):
             departures[old.uav] = tuple(a + b for a, b in zip(departures[old.uav], takes_off,
