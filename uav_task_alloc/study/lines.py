@@ -18,7 +18,7 @@ import numpy as np
 from uav_task_alloc.model import Point, Task, Uav
 from uav_task_alloc.study.reference_solvers import PyvrpCallbacks
 
-LINES_SIDE = 10_000.0  # [m] of the square
+_SIDE = 10_000.0  # [m] of the square
 STRIPS, STRIP_LENGTH, STRIP_WIDTH = 25, 400.0, 30.0  # of a field; [m]
 _UNIT = 1000.0  # integer length of a metre
 _HEIGHT = 30.0  # [m]
@@ -45,7 +45,7 @@ def random_lines(kind: str, uavs: int, lines: int,
         UAVs, which are at their bases, and tasks.
     """
     rng = np.random.default_rng((seed, 23))
-    fleet = [Uav(f'u{i}', (*rng.uniform(0.0, LINES_SIDE, 2).tolist(), _HEIGHT)) for i in range(uavs)]
+    fleet = [Uav(f'u{i}', (*rng.uniform(0.0, _SIDE, 2).tolist(), _HEIGHT)) for i in range(uavs)]
     ends = _strips(rng, lines) if kind == 'fields' else _scattered(rng, lines)
     tasks = []
     for k, (a, b) in enumerate(ends):
@@ -56,7 +56,7 @@ def random_lines(kind: str, uavs: int, lines: int,
 
 def _scattered(rng: np.random.Generator, lines: int) -> Iterator[tuple[Point, Point]]:
     for _ in range(lines):
-        x, y = rng.uniform(0.0, LINES_SIDE, 2)
+        x, y = rng.uniform(0.0, _SIDE, 2)
         length, angle = rng.uniform(50.0, 500.0), rng.uniform(0.0, 2.0 * math.pi)
         yield ((float(x), float(y), _HEIGHT),
                (float(x + length * math.cos(angle)), float(y + length * math.sin(angle)), _HEIGHT))
@@ -65,7 +65,7 @@ def _scattered(rng: np.random.Generator, lines: int) -> Iterator[tuple[Point, Po
 def _strips(rng: np.random.Generator, lines: int) -> Iterator[tuple[Point, Point]]:
     for k in range(lines):
         if k % STRIPS == 0:
-            x, y = rng.uniform(0.0, LINES_SIDE, 2)
+            x, y = rng.uniform(0.0, _SIDE, 2)
             angle = rng.uniform(0.0, 2.0 * math.pi)
             ux, uy = math.cos(angle), math.sin(angle)
         aside = (k % STRIPS) * STRIP_WIDTH
