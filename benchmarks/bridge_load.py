@@ -22,6 +22,7 @@ from pymavlink.dialects.v20 import ardupilotmega as d
 from rclpy.executors import SingleThreadedExecutor
 from uav_task_alloc_msgs import msg as m
 
+from uav_task_alloc.allocator.records import ListStop
 from uav_task_alloc.geometry.frames import Origin
 from uav_task_alloc.mavlink.transport.codec import Codec
 from uav_task_alloc.model import Leg, Task
@@ -44,8 +45,8 @@ def fly() -> None:
 
 def task_list(n: int) -> m.TaskList:
     """ITEMS tasks for one UAV."""
-    tasks = [planned_task(Task(f'u{n}_{k}', (20.0 * n, 100.0 + 40.0 * k, 50.0)), Leg((), 40.0),
-                          0.0) for k in range(ITEMS)]
+    tasks = [planned_task(ListStop(Task(f'u{n}_{k}', (20.0 * n, 100.0 + 40.0 * k, 50.0)),
+                                   Leg((), 40.0), 0.0)) for k in range(ITEMS)]
     return m.TaskList(header=header(0.0), uav_id=f'uav_{n}', revision=1, tasks=tasks)
 
 

@@ -22,6 +22,7 @@ from uav_task_alloc.allocator.state.fleet import may_fly
 from uav_task_alloc.geometry.detour import detour
 from uav_task_alloc.model import Leg, Plan, Task
 from uav_task_alloc.params import AllocatorParams
+from uav_task_alloc.work.pieces import Work
 
 
 def greedy(uavs, tasks, zones=(), *, warm=None, locked=None, route_end='hold', **_):
@@ -36,7 +37,7 @@ def greedy(uavs, tasks, zones=(), *, warm=None, locked=None, route_end='hold', *
 
     def end(uav_id):
         route = routes[uav_id]
-        return place[route[-1]].position if route else by_id[uav_id].position
+        return place[route[-1]].end if route else by_id[uav_id].position
 
     for uav_id, route in (warm.routes if warm else {}).items():
         for task_id in route:
@@ -62,12 +63,14 @@ def as_plan(uavs, place, zones, routes, unassigned=None, route_end='hold', warm=
     """A Plan of these routes with legs around the zones."""
     legs = {}
     for uav in uavs:
-        stops = [uav.position, *(place[t].position for t in routes[uav.id])]
+        stops = [(uav.position,) * 2, *((place[t].position, place[t].end)
+                                        for t in routes[uav.id])]
         if route_end == 'home' and len(stops) > 1:
-            stops.append(uav.home or uav.position)
-        detours = [detour(a, b, zones) for a, b in pairwise(stops)]
+            stops.append((uav.home or uav.position,) * 2)
+        detours = [detour(a, b, zones) for (_, a), (b, _) in pairwise(stops)]
         legs[uav.id] = tuple(Leg(tuple(via), length) for length, via in detours)
-    distance = sum(leg.length for route_legs in legs.values() for leg in route_legs)
+    distance = sum(leg.length for route_legs in legs.values() for leg in route_legs) + sum(
+        place[t].path_length for route in routes.values() for t in route)
     value = sum(place[t].value for route in routes.values() for t in route)
     return Plan({u: tuple(r) for u, r in routes.items()}, unassigned or {}, distance, value,
                 fit=distance, legs=legs, returns=route_end == 'home',
@@ -169,5 +172,6 @@ class AllocatorDriver:
 
 
 def task(what):
-    """A Task, or one of an (id, x, y) triple."""
-    return what if isinstance(what, Task) else Task(what[0], (*map(float, what[1:3]), 50.0))
+    """A task, work, or a task of an (id, x, y) triple."""
+    return what if isinstance(what, (Task, Work)) else Task(
+        what[0], (*map(float, what[1:3]), 50.0))

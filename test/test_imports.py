@@ -63,6 +63,7 @@ LEVELS = {
     'mavlink.gcs': 7,
     'sim': 4,
     'allocator.order_records': 3,
+    'allocator.work_records': 3,
     'allocator.records': 3,
     'allocator.state': 4,
     'allocator.replanning': 5,

@@ -11,6 +11,7 @@ from pymavlink.dialects.v20 import ardupilotmega as d
 from rclpy.executors import SingleThreadedExecutor
 from uav_task_alloc_msgs import msg as m
 
+from uav_task_alloc.allocator.records import ListStop
 from uav_task_alloc.mavlink.transport.codec import Codec
 from uav_task_alloc.mavlink.transport.link import MAX_UNCONFIRMED
 from uav_task_alloc.model import Leg, Task
@@ -142,9 +143,9 @@ def test_finding_24_a_list_of_66000_points_is_refused_and_the_previous_one_stays
     one = bridge()
     one.send(HEARTBEAT)
     one.until(lambda: 'uav_1' in one.node.lists.known)
-    short = planned_task(Task('t', (60.0, 0.0, 50.0)), Leg((), 60.0), 0.0)
+    short = planned_task(ListStop(Task('t', (60.0, 0.0, 50.0)), Leg((), 60.0), 0.0))
     way = Leg(((9.0, 9.0, 50.0),) * 65_998, 60.0)
-    far = planned_task(Task('far', (60.0, 0.0, 50.0)), way, 0.0)
+    far = planned_task(ListStop(Task('far', (60.0, 0.0, 50.0)), way, 0.0))
     one.node.lists.on_list('uav_1', m.TaskList(uav_id='uav_1', revision=1, tasks=[short]))
     one.node.lists.on_list('uav_1', m.TaskList(uav_id='uav_1', revision=2, tasks=[short, far]))
     assert one.log['warning'] == [

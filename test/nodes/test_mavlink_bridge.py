@@ -11,6 +11,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 from uav_task_alloc_msgs import msg as m
 from uav_task_alloc_msgs.srv import HandOver
 
+from uav_task_alloc.allocator.records import ListStop
 from uav_task_alloc.geometry.frames import Origin
 from uav_task_alloc.model import Leg, Task, ThreatZone
 from uav_task_alloc.nodes.conversions.messages import (
@@ -66,8 +67,8 @@ class Sky:
 
     def send(self, n, revision, names, **fields):
         """Tasks 60 m from each other, each at the place of its name."""
-        tasks = [planned_task(Task(f'u{n}_{k}', (60.0 * k, 40.0 + 40.0 * n, 50.0)), Leg((), 60.0),
-                              0.0) for k in names]
+        tasks = [planned_task(ListStop(Task(f'u{n}_{k}', (60.0 * k, 40.0 + 40.0 * n, 50.0)),
+                                       Leg((), 60.0), 0.0)) for k in names]
         self.lists[n].publish(m.TaskList(header=header(0.0), uav_id=f'uav_{n}',
                                          revision=revision, tasks=tasks, **fields))
 
@@ -320,7 +321,7 @@ def test_a_bad_list_is_refused_with_a_reason_and_changes_nothing(sky, probe):
     world = sky()
     world.send(1, 1, [0, 1])
     probe.until(lambda: world.states['uav_1'].list_revision == 1)
-    bad = planned_task(Task('far', (0.0, 0.0, 50.0)), Leg((), 1.0), 0.0)
+    bad = planned_task(ListStop(Task('far', (0.0, 0.0, 50.0)), Leg((), 1.0), 0.0))
     bad.task.position.x = float('nan')
     world.lists[1].publish(m.TaskList(uav_id='uav_1', revision=2, tasks=[bad]))
     probe.until(lambda: 'three finite coordinates' in world.bridge.output())

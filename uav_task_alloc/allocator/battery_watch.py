@@ -111,11 +111,11 @@ class BatteryWatch:
         if not uav_list.stops or metres is None:
             return False
         first = uav_list.stops[0]
-        length = world.paths().rest(report.position, first.leg, first.task.position) or 0.0
-        length += math.fsum(polyline_length((a.task.position, *b.leg.via, b.task.position))
+        length = world.paths().rest(report.position, first.through, first.exit) or 0.0
+        length += math.fsum(polyline_length((a.exit, *b.line))
                             for a, b in pairwise(uav_list.stops))
         if uav_list.returns:
-            length += polyline_length((uav_list.stops[-1].task.position, *uav_list.end_via,
+            length += polyline_length((uav_list.stops[-1].exit, *uav_list.end_via,
                                        record.home))
         if length > (1.0 + _EXCESS) * metres:
             return True

@@ -105,6 +105,7 @@ class Allocator:
         """Apply what follows from time: silent UAVs, shortened lists, the end of the hold."""
         world = self.world
         self._watch_clock(now, stamp)
+        world.outbox.statuses |= world.announced.cut_again(stamp)
         world.tick(now)
         self.batteries.tick(now, stamp)
         self._end_orders(stamp)
@@ -125,7 +126,7 @@ class Allocator:
     def _end_orders(self, stamp: float) -> None:
         """End the orders whose tasks have ended, and publish the holds that changed."""
         world = self.world
-        for entry in world.orders.end_fulfilled(world.tasks.why_ended, stamp):
+        for entry in world.orders.end_fulfilled(world.announced.why_ended, stamp):
             world.note(entry.text)
         for uav_id in world.orders.changed_holds:
             world.outbox.holds[uav_id] = world.orders.holds[uav_id]

@@ -18,6 +18,7 @@ from uav_task_alloc.allocator.replanning.what_if import (
 from uav_task_alloc.allocator.state.fleet import may_fly
 from uav_task_alloc.allocator.state.orders import MAX_ORDERS
 from uav_task_alloc.errors import first_of
+from uav_task_alloc.piece_ids import split_piece
 
 _MOST_ORDERED = 100  # tasks of one sequence
 _UNKNOWN = math.nan  # a price that cannot be known
@@ -259,11 +260,13 @@ class OperatorDesk:
     def _unfit(self, task_id: str, uav_id: str, kind: OrderKind) -> str:
         """Why a task cannot be given to a UAV by an order."""
         world = self._world
-        record, uav = world.tasks.records.get(task_id), world.fleet.records.get(uav_id)
+        record, uav = world.announced.known(task_id), world.fleet.records.get(uav_id)
         if record is None:
             return f'task_id = {task_id!r}: expected an accepted task'
         if not record.open:
             return f'{task_id} is {record.state.name}'
+        if kind is OrderKind.SEQUENCE and task_id in world.works.records:
+            return f'{task_id} is flown in pieces, in any order: pin it to {uav_id} instead'
         if kind is OrderKind.FORBID:
             return ''
         if uav is None:
@@ -285,8 +288,9 @@ class OperatorDesk:
         """Which order in force could not be kept any more."""
         orders = self._world.orders
         for task_id, why in answer.left_out.items():
+            whole, _ = split_piece(task_id)
             order = next((each for each in orders.in_force.values()
-                          if task_id in each.tasks and each.kind is not OrderKind.FORBID), None)
+                          if whole in each.tasks and each.kind is not OrderKind.FORBID), None)
             if order is not None:
                 return f'it contradicts {order.name} ({order.text}): {task_id} {why}'
         return ''
@@ -356,10 +360,9 @@ class OperatorDesk:
         if not tasks:
             return first_of((f'{order.uav} has {len(world.list_of(order.uav).stops)} tasks'
                              for order in change.add), separator='; ')
-        records = world.tasks.records
-        return first_of((f'{task_id} {records[task_id].state.name}' + (
-            f' on {records[task_id].uav}' if records[task_id].uav else '')
-            for task_id in tasks), separator='; ')
+        records = [record for record in map(world.announced.known, tasks) if record]
+        return first_of((f'{record.task.id} {record.state.name}' + (
+            f' on {record.uav}' if record.uav else '') for record in records), separator='; ')
 
 
 def price_text(answer: WhatIfAnswer) -> str:

@@ -9,6 +9,7 @@ from enum import Enum
 from typing import Any
 
 from uav_task_alloc.allocator.order_records import OperatorHold, OrderRows
+from uav_task_alloc.allocator.work_records import WorkRecord
 from uav_task_alloc.checks import check_id, check_names, check_number, check_point
 from uav_task_alloc.geometry.frames import Origin
 from uav_task_alloc.model import Leg, Plan, Point, Task, ThreatZone, Uav
@@ -177,6 +178,39 @@ class ListStop:
     wait: float = 0.0  # [s] from the arrival to the start of the service
     served: float = 0.0  # [s] of the service that are over at the stamp
     begin_after: float = 0.0  # [s] ROS clock: the service waits until then, for the separation
+    reversed: bool = False  # the path of the task is flown from its last point
+    path_time: float = 0.0  # [s] that its path still takes
+
+    @property
+    def way(self) -> tuple[Point, ...]:
+        """What is flown at the stop [m] ENU, in order: the path of the task, or its position."""
+        path = self.task.path or (self.task.position,)
+        return path[::-1] if self.reversed else path
+
+    @property
+    def entry(self) -> Point:
+        """Where the leg to it ends [m] ENU."""
+        return self.way[0]
+
+    @property
+    def exit(self) -> Point:
+        """Where the next leg begins [m] ENU."""
+        return self.way[-1]
+
+    @property
+    def line(self) -> tuple[Point, ...]:
+        """Detour points of the leg, and the way [m] ENU."""
+        return *self.leg.via, *self.way
+
+    @property
+    def through(self) -> Leg:
+        """The leg to its exit, with the points of its way as detour points."""
+        return Leg(self.line[:-1], self.length)
+
+    @property
+    def length(self) -> float:
+        """Length of the leg and of the path [m]."""
+        return self.leg.length + self.task.path_length
 
     @property
     def start(self) -> float:
@@ -186,7 +220,8 @@ class ListStop:
     @property
     def finish(self) -> float:
         """End of the service [s] from the stamp of the list."""
-        return self.eta + self.wait + max(0.0, self.task.service_time - self.served)
+        service = max(0.0, self.task.stay - self.served)
+        return self.eta + self.wait + self.path_time + service
 
 
 @dataclass(frozen=True, slots=True)
@@ -198,7 +233,7 @@ class UavList:
     stops: tuple[ListStop, ...] = ()  # in the order of flight
     returns: bool = False  # returns home after the last task
     end_via: tuple[Point, ...] = ()  # [m] ENU, flown before the return home
-    distance: float = 0.0  # [m] of all legs, including the leg home where it returns
+    distance: float = 0.0  # [m] of all legs and paths, with the leg home where it returns
     stamp: float = 0.0  # [s] of the plan
 
     @property
@@ -213,8 +248,8 @@ class UavList:
             other: list of the same UAV.
         """
         return (self.returns, self.end_via) == (other.returns, other.end_via) and [
-            (stop.task, stop.leg.via, stop.begin_after) for stop in self.stops] == [
-            (stop.task, stop.leg.via, stop.begin_after) for stop in other.stops]
+            (stop.task, stop.leg.via, stop.begin_after, stop.reversed) for stop in self.stops] == [
+            (stop.task, stop.leg.via, stop.begin_after, stop.reversed) for stop in other.stops]
 
 
 @dataclass(frozen=True, slots=True)
@@ -309,4 +344,5 @@ class SavedState:
     origin: Origin | None = None  # of all coordinates; None: the journal has none
     unreadable: list[str] = field(default_factory=list)  # rows that were left out, and why
     orders: OrderRows = field(default_factory=OrderRows)  # of operators
+    works: list[WorkRecord] = field(default_factory=list)  # accepted, also ended ones
     proposal: Proposal | None = None  # that waits for approval

@@ -133,7 +133,7 @@ class SeparationWatch:
         stops = self._stops(uav_id, stamp, flight)
         returns = mode == 'RETURNING' or (not stops and self._world.list_of(uav_id).returns)
         if mode == 'TAKEOFF':  # whatever follows; for how long is not known
-            top = _climbed(record, stops[0].task.position[2] if stops else place[2])
+            top = _climbed(record, stops[0].entry[2] if stops else place[2])
             points = [(0.0, place), (flight.pace.seconds((place, top)), top)]
             if returns:
                 points = _home(points, record, flight.pace, self._world.list_of(uav_id).end_via)
@@ -174,7 +174,7 @@ class SeparationWatch:
         clock = _ARMING if flight.on_ground else 0.0 if climbs else _lag(record, flight.pace)
         points = [(0.0, place), (clock, place)]
         for k, stop in enumerate(stops):
-            leg = (*stop.leg.via, stop.task.position)
+            leg = stop.line
             waits_before = k > 0 or flight.on_ground  # as the bridge does, not at the task
             if waits_before and stop.wait > 0.0:
                 clock += stop.wait
@@ -188,8 +188,8 @@ class SeparationWatch:
                     place, clock = top, clock + _SETS_OUT
             for timed in _along(place, leg, clock, flight.pace):
                 points.append(timed)
-            place = stop.task.position
-            clock = points[-1][0] + max(0.0, stop.task.service_time - stop.served)
+            place = stop.exit
+            clock = points[-1][0] + max(0.0, stop.task.stay - stop.served)
             clock += 0.0 if waits_before else stop.wait
             points.append((clock, place))
             if clock > HORIZON:

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from uav_task_alloc.allocator.records import Allocation, TaskRecord, TaskState
 from uav_task_alloc.allocator.state.flight_pace import finish_time
+from uav_task_alloc.allocator.state.works import Works
 from uav_task_alloc.allocator.state.world import World
 from uav_task_alloc.allocator.state.zone_checks import blocked_text
+from uav_task_alloc.allocator.work_records import WorkRecord
 from uav_task_alloc.errors import first_of
+from uav_task_alloc.piece_ids import split_piece
 from uav_task_alloc.record.message_records import BATTERY_RESERVE, ORDER, UAV_WARNING
 
 _MAX_NAMED = 20  # UAVs in a warning
@@ -29,6 +32,8 @@ class TaskStatus:
     reason: str  # of the state, for users
     stamp: float  # [s] of the last change
     expected: float = 0.0  # [s] predicted start of the service; 0: unknown
+    pieces_done: int = 0  # completed, of work that is flown in pieces
+    pieces: int = 0  # 0: it has none
 
 
 def status_of(task_id: str, known: TaskRecord | tuple[str, float],
@@ -48,6 +53,24 @@ def status_of(task_id: str, known: TaskRecord | tuple[str, float],
                           expected if known.open else 0.0)
     reason, stamp = known
     return TaskStatus(task_id, TaskState.REJECTED, '', reason, stamp)
+
+
+def status_of_work(works: Works, work: WorkRecord,
+                   expected: Mapping[str, float]) -> TaskStatus:
+    """Return the status of work that is flown in pieces.
+
+    Args:
+        works: all of it.
+        work: accepted.
+        expected: predicted starts [s] of the ROS clock, by id of the piece.
+
+    Returns:
+        It is expected when its next piece is.
+    """
+    record, done = works.whole_record(work)
+    starts = [expected[each] for each in works.open_pieces(work.id) if expected.get(each)]
+    return replace(status_of(work.id, record, min(starts, default=0.0)), pieces_done=done,
+                   pieces=len(work.pieces))
 
 
 def last_finish(world: World, stamp: float) -> float:
@@ -157,7 +180,9 @@ def health_values(world: World, solving: bool,
         Counts of UAVs, zones and of tasks by state; the revision of the allocation; what is wrong
         with single UAVs.
     """
-    states = Counter(record.state for record in world.task_records().values())
+    states = Counter(record.state for task_id, record in world.task_records().items()
+                     if not split_piece(task_id)[1])
+    states.update(map(world.works.state, world.works.records.values()))
     orders = list(world.orders.in_force.values())[-_MAX_ORDERS:]
     warnings = dict(near or {})
     for uav_id, text in _zone_warnings(world):

@@ -9,6 +9,7 @@ from dataclasses import fields, replace
 from enum import Enum
 from typing import Any, TypeVar
 
+from uav_task_alloc.actions import Action
 from uav_task_alloc.allocator.persistence.order_rows import restore_order_row
 from uav_task_alloc.allocator.records import (
     ListStop,
@@ -18,17 +19,21 @@ from uav_task_alloc.allocator.records import (
     TaskState,
     UavList,
 )
+from uav_task_alloc.allocator.work_records import WorkRecord
 from uav_task_alloc.checks import check_id, check_names, check_number, check_point, check_ros_name
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.geometry.frames import Origin
 from uav_task_alloc.journal import JournalRow
 from uav_task_alloc.model import Leg, Point, Task, ThreatZone
+from uav_task_alloc.piece_ids import split_piece
+from uav_task_alloc.work.pieces import Work
+from uav_task_alloc.work.values import Kind, Vertical
 from uav_task_alloc.zone_codec import JOURNAL_ZONE, decode_zone, encode_zone
 
 _Value = TypeVar('_Value')
 _ORDER_KINDS = frozenset({'order', 'order_log', 'hold'})
-_KINDS = frozenset({'task', 'list', 'zones', 'off', 'revision', 'learner', 'origin', 'proposal',
-                    *_ORDER_KINDS})
+_KINDS = frozenset({'task', 'work', 'list', 'zones', 'off', 'revision', 'learner', 'origin',
+                    'proposal', *_ORDER_KINDS})
 _UNREADABLE = (LookupError, TypeError, ValueError, AttributeError, OverflowError)
 _FIRST_FIELDS = frozenset({'id', 'position', 'value', 'service_time', 'required_capabilities',
                            'allowed_uavs', 'acceptance_radius'})  # every journal has them
@@ -40,6 +45,11 @@ def task_row(record: TaskRecord) -> JournalRow:
     body = {spec.name: _plain(getattr(record, spec.name)) for spec in fields(record)
             if spec.name != 'announced' or record.announced is not record.task}
     return JournalRow('task', record.task.id, body)
+
+
+def work_row(record: WorkRecord) -> JournalRow:
+    """Return the row of work that is flown in pieces, which have rows as tasks."""
+    return JournalRow('work', record.id, _plain(record))
 
 
 def list_row(uav_list: UavList) -> JournalRow:
@@ -105,6 +115,8 @@ def _restore(state: SavedState, row: JournalRow) -> None:
     json.dumps(row.body, ensure_ascii=False).encode()  # no message can hold a lone surrogate
     if row.kind == 'task':
         state.tasks.append(_task_record(row.id, row.body))
+    elif row.kind == 'work':
+        state.works.append(_work_record(row.id, row.body))
     elif row.kind == 'list':
         state.lists.append(_uav_list(row.id, row.body))
     elif row.kind == 'zones':
@@ -148,10 +160,30 @@ def _plain(value: Any) -> Any:
 
 
 def _task(body: dict[str, Any]) -> Task:
-    check_ros_name('task id', check_id('task id', body['id']))
+    check_ros_name('task id', split_piece(check_id('task id', body['id']))[0])
     # what an earlier version did not know has its default
-    return Task(**{spec.name: body[spec.name] for spec in fields(Task)
-                   if spec.name in body or spec.name in _FIRST_FIELDS})
+    values = {spec.name: body[spec.name] for spec in fields(Task)
+              if spec.name in body or spec.name in _FIRST_FIELDS}
+    actions = tuple(Action(each['name'], tuple(map(tuple, each['values'])))
+                    for each in _list_of('actions', values.get('actions', [])))
+    return Task(**{**values, 'actions': actions})
+
+
+def _work(body: dict[str, Any]) -> Work:
+    return Work(**{
+        **body, 'task': _task(body['task']), 'kind': Kind(body['kind']),
+        'path': _points('path', body['path']), 'vertical': Vertical(body['vertical']),
+        'holes': tuple(_points('holes', hole) for hole in _list_of('holes', body['holes']))})
+
+
+def _work_record(task_id: str, body: dict[str, Any]) -> WorkRecord:
+    pieces = tuple(map(str, _list_of('pieces', body['pieces'])))
+    record = WorkRecord(_work(body['work']), _work(body['announced']), pieces,
+                        _whole_number('last', body['last']))
+    _check_same('task id', record.id, task_id)
+    for each in pieces:
+        _check_same('piece', split_piece(each)[0], task_id)
+    return record
 
 
 def _uav_id(body: Any) -> str:
@@ -179,7 +211,9 @@ def _uav_list(uav_id: str, body: dict[str, Any]) -> UavList:
                            _non_negative('eta', stop['eta']),
                            _non_negative('wait', stop.get('wait', 0.0)),
                            _non_negative('served', stop.get('served', 0.0)),
-                           _non_negative('begin_after', stop.get('begin_after', 0.0)))
+                           _non_negative('begin_after', stop.get('begin_after', 0.0)),
+                           stop.get('reversed', False) is True,
+                           _non_negative('path_time', stop.get('path_time', 0.0)))
                   for stop in _list_of('stops', body['stops']))
     uav_list = UavList(**{**body, 'stops': stops, 'end_via': _points('end_via', body['end_via']),
                            'revision': _whole_number('revision', body['revision']),

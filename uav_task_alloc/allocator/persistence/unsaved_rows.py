@@ -11,6 +11,7 @@ from uav_task_alloc.allocator.persistence.restore import (
     proposal_row,
     revision_row,
     task_row,
+    work_row,
     zones_row,
 )
 from uav_task_alloc.allocator.replanning.learned_state import learned_row
@@ -27,10 +28,13 @@ def rows(world: World, state: object, most: int | None = None) -> list[JournalRo
         most: tasks at once; None: all.
 
     Returns:
-        Rows to write, those of tasks first; a row without a body deletes one.
+        Rows to write, those of work and tasks first; a row without a body deletes one.
     """
     unsaved, tasks, lists = world.unsaved(), world.task_records(), world.lists_in_force()
-    changed = [task_row(tasks[task_id]) if task_id in tasks else JournalRow('task', task_id, None)
+    works = world.works.records  # before the tasks: without its row a piece is dropped
+    changed = [work_row(works[task_id]) if task_id in works else JournalRow('work', task_id, None)
+               for task_id in sorted(unsaved['work'])]
+    changed += [task_row(tasks[task_id]) if task_id in tasks else JournalRow('task', task_id, None)
                for task_id in sorted(unsaved['task'])[:most]]
     changed += [list_row(lists[uav_id]) if uav_id in lists else JournalRow('list', uav_id, None)
                 for uav_id in sorted(unsaved['list'])]
@@ -52,6 +56,7 @@ def mark_all(world: World) -> None:
     unsaved = world.unsaved()
     unsaved['task'].update(world.task_records())
     unsaved['list'].update(world.lists_in_force())
+    unsaved['work'].update(world.works.records)
     mark_all_orders(world.orders)
     unsaved[''].update(('zones', 'off', 'revision', 'learner', 'proposal'))
 

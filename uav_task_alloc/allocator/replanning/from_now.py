@@ -66,6 +66,7 @@ def counts_time(uavs: Iterable[Uav], tasks: Iterable[Task], objective: Objective
         False for a problem of distances alone.
     """
     return (trips > 1 or not objective.is_shortest or any(map(is_timed, tasks))
+            or any(task.path for task in tasks)
             or any(uav.endurance < math.inf for uav in uavs))
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
@@ -26,10 +26,12 @@ from uav_task_alloc.allocator.replanning.trips import (
     waiting_uavs,
     with_later_trips,
 )
+from uav_task_alloc.allocator.state.flights import top_of
 from uav_task_alloc.allocator.state.published_lists import PublishedLists
 from uav_task_alloc.allocator.state.safe_paths import SafePaths
 from uav_task_alloc.allocator.state.tasks import TaskRegistry
 from uav_task_alloc.allocator.state.world import World
+from uav_task_alloc.geometry.polyline import points_passed
 from uav_task_alloc.model import Leg, Plan, Point, Task, Uav
 from uav_task_alloc.objective import fit
 from uav_task_alloc.params import AllocatorParams
@@ -70,23 +72,69 @@ def replan_problem(world: World, best: Plan, trigger: str, background: bool,
     if counts_time(uavs, tasks, objective, params.trips):
         uavs = tuple(measured_uav(world, uav) for uav in uavs)
         waiting = waiting_uavs(world, stamp)
-        top = max((task.position[2] for task in tasks), default=-math.inf)
+        top = max(map(top_of, tasks), default=-math.inf)
         uavs = tuple(world.flights.spendable(uav, top) for uav in uavs)
         waiting = {uav_id: world.flights.spendable(uav, top) for uav_id, uav in waiting.items()}
         uavs += tuple(uav for uav_id, uav in waiting.items() if not world.usable(uav_id))
         stop_time = world.flights.stop_time
         tasks = relaxed_tasks(world, tasks, (uav.id for uav in uavs), stamp)
     published = {uav.id: world.list_of(uav.id) for uav in uavs}
+    tasks = paths_under_way(world, tasks)
     routes = {uav_id: each.task_ids for uav_id, each in published.items()}
     legs = {uav_id: tuple(stop.leg for stop in each.stops) for uav_id, each in published.items()}
     return ReplanProblem(
         world.version, trigger, background,
         params.background_budget if background else params.solve_budget, uavs,
         tasks, tuple(world.zones.values()), world.locked_tasks(),
-        published=with_later_trips(replace(best, routes=routes, legs=legs), world),
+        published=with_later_trips(replace(best, routes=routes, legs=legs, reversed=frozenset(
+            stop.task.id for each in published.values() for stop in each.stops
+            if stop.reversed)), world),
         warm=best,
         objective=objective, trips=params.trips, stamp=stamp, stop_time=stop_time,
         since={task.id: records[task.id].since for task in tasks})
+
+
+def paths_under_way(world: World, tasks: Sequence[Task]) -> tuple[Task, ...]:
+    """Return tasks of which those under way have only the rest of their paths, in one direction.
+
+    Args:
+        world: with the lists in force.
+        tasks: to plan.
+
+    Returns:
+        The same tasks where no path is under way.
+    """
+    rests = {}
+    for uav_id, record in world.uav_records().items():
+        stops = world.list_of(uav_id).stops
+        first = stops[0] if stops else None
+        if first is None or not first.task.path or world.fleet.active.get(
+                uav_id) != first.task.id:
+            continue
+        place, way = record.report.position, first.way
+        passed = points_passed(place, first.line) - len(first.leg.via)
+        if passed > 0 and math.dist(place, way[-1]) > 0.0:
+            way = (place, *way[passed:])
+        rests[first.task.id] = way
+    return tuple(replace(task, position=rests[task.id][0], path=rests[task.id], reversible=False)
+                 if task.id in rests else task for task in tasks)
+
+
+def backward_paths(world: World, chosen: Plan) -> frozenset[str]:
+    """Return the tasks whose paths are flown from the last point: under way as in the lists.
+
+    Args:
+        world: with the lists in force.
+        chosen: plan; a path under way has one direction there.
+
+    Returns:
+        Task ids.
+    """
+    under_way = {stops[0].task.id: stops[0].reversed
+                 for uav_id, each in world.lists_in_force().items() if (stops := each.stops)
+                 and world.fleet.active.get(uav_id) == stops[0].task.id}
+    return frozenset(chosen.reversed - under_way.keys()) | {
+        task_id for task_id, backward in under_way.items() if backward}
 
 
 def measured_uav(world: World, uav: Uav) -> Uav:
@@ -113,7 +161,7 @@ def _list_speed(world: World, uav: Uav) -> float:
     """Mean ground speed on the legs of the list in force, else in all directions [m/s]."""
     pace, points = world.flights.pace(uav.id), [uav.position]
     for stop in world.list_of(uav.id).stops:
-        points += [*stop.leg.via, stop.task.position]
+        points += stop.line
     metres = math.fsum(math.dist(a[:2], b[:2]) for a, b in pairwise(points))
     level = replace(pace, climb=math.inf, descent=math.inf)
     return metres / level.seconds(points) if metres > 0.0 else pace.mean_speed
@@ -183,13 +231,14 @@ def build_lists(world: World, chosen: Plan, stamp: float) -> BuiltLists:
         chosen, built.later = present_trips(chosen, {
             uav_id for uav_id in chosen.routes if not world.usable(uav_id)})
     legs, returns = planned_legs(chosen), world.params.route_end == 'home'
+    backward = backward_paths(world, chosen)
     for uav_id, task_ids in _present_routes(world, chosen).items():
         tasks = [world.task_records()[task_id].task for task_id in task_ids]
         home = returns or uav_id in built.later
-        if world.is_current(uav_id, tasks, home):
+        if world.is_current(uav_id, tasks, home, backward):
             built.lists[uav_id] = world.list_of(uav_id)
             continue
-        unreachable = _build(world, built, uav_id, tasks, home, legs, stamp)
+        unreachable = _build(world, built, uav_id, tasks, home, legs, stamp, backward)
         built.left_out.update((task_id, f'no safe path for {uav_id}') for task_id in unreachable)
         built.zones_when_built[uav_id] = world.paths(), world.home_of(uav_id)
     for each in world.ordered.sequences(returns).values():
@@ -202,13 +251,14 @@ def build_lists(world: World, chosen: Plan, stamp: float) -> BuiltLists:
 
 
 def _build(world: World, built: BuiltLists, uav_id: str, tasks: Sequence[Task], returns: bool,
-           legs: Mapping[LegKey, Leg], stamp: float = 0.0) -> list[str]:
+           legs: Mapping[LegKey, Leg], stamp: float = 0.0,
+           backward: Collection[str] = ()) -> list[str]:
     """Build the list of a known UAV; returns the tasks that it cannot reach."""
     uav = world.uav(uav_id)
     new, unreachable = build_task_list(uav, tasks, returns, legs, world.list_of(uav_id),
                                        world.paths(), world.flights.of(uav_id, stamp),
-                                       separation_of(world.params).on)
-    end = new.stops[-1].task.position if new.stops else uav.position
+                                       separation_of(world.params).on, backward)
+    end = new.stops[-1].exit if new.stops else uav.position
     built.lists[uav_id] = new
     built.paths_home[uav_id] = new.returns or not returns, end
     return unreachable

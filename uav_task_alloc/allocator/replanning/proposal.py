@@ -168,8 +168,8 @@ def _metres(world: World, each: UavList) -> float:
     if not each.stops or record is None:
         return 0.0
     first = each.stops[0]
-    rest = world.paths().rest(record.report.position, first.leg, first.task.position)
-    return each.distance - first.leg.length + (first.leg.length if rest is None else rest)
+    rest = world.paths().rest(record.report.position, first.through, first.exit)
+    return each.distance if rest is None else each.distance - first.length + rest
 
 
 def _finish(world: World, new: Mapping[str, UavList], stamp: float) -> float:

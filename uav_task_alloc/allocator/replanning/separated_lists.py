@@ -84,7 +84,7 @@ def _with_high_return(world: World, each: UavList) -> UavList:
     record = world.uav_record(each.uav)
     if record is None or not each.returns or not each.stops:
         return each
-    home, last = record.home, (each.stops[-1].task.position, *each.end_via)[-1]
+    home, last = record.home, (each.stops[-1].exit, *each.end_via)[-1]
     above = home[0], home[1], last[2]
     if last[2] <= home[2] or last[:2] == home[:2] or not world.paths().clear(last, above, home):
         return each
@@ -110,13 +110,14 @@ def _flight(each: UavList, published: UavList, flight: UavFlight, stamp: float,
     for k, stop in enumerate(each.stops):
         takes_off = k == 0 and flight.on_ground
         under_way = k == 0 and not flight.on_ground and _same_leg(published, stop)
-        line = (*stop.leg.via, stop.task.position)
-        ahead = line[points_passed(place, line):] if under_way else line
+        line = (*stop.leg.via, stop.entry)
+        ahead = stop.line[points_passed(place, stop.line):] if under_way else line
+        along = bool(stop.task.path) and not under_way  # the path is a leg of its own
         served = stop.served if under_way else 0.0
         begins = stop.begin_after - stamp
         climbs = takes_off or (k == 0 and flight.climbing)
         leg = FlightLeg((place, *ahead), stop.task.id,
-                        max(0.0, stop.task.service_time - served),
+                        0.0 if along else max(0.0, stop.task.stay - served),
                         stop.task.earliest - stamp, stop.task.latest - stamp,
                         stop.task.release - stamp,
                         takes_off=takes_off, movable=not under_way,
@@ -124,7 +125,12 @@ def _flight(each: UavList, published: UavList, flight: UavFlight, stamp: float,
         if begins > 0.0:  # it keeps the wait that it had, or less
             leg = replace(leg, hold_until=begins - own.leg_seconds(leg))
         legs.append(leg)
-        place, clock = stop.task.position, leg_times(own, leg, clock, k == 0).end
+        clock = leg_times(own, leg, clock, k == 0).end
+        if along:
+            legs.append(FlightLeg(stop.way, stop.task.id, stop.task.stay,
+                                  movable=False, may_wait=False))
+            clock = leg_times(own, legs[-1], clock, False).end
+        place = stop.exit
         if clock > until and k + 1 < len(each.stops):
             return replace(own, legs=tuple(legs), goes_on=True)
     if each.returns and flight.home is not None and not (flight.on_ground and not each.stops):
@@ -158,7 +164,9 @@ def _changed_list(world: World, each: UavList, before: Flight, after: Flight,
     flight = world.flights.of(each.uav, stamp)
     assert flight is not None  # it has a flight
     stops = list[ListStop]()
-    for stop, old, new in zip(each.stops, before.legs, after.legs, strict=False):
+    legs = ((old, new) for old, new in zip(before.legs, after.legs, strict=False)
+            if not _is_path(old))
+    for stop, (old, new) in zip(each.stops, legs, strict=False):
         if new is old:
             stops.append(stop)
             continue
@@ -176,6 +184,11 @@ def _changed_list(world: World, each: UavList, before: Flight, after: Flight,
                    distance=_length(timed, end_via, flight.home if each.returns else None))
 
 
+def _is_path(leg: FlightLeg) -> bool:
+    """Whether a leg is the path of a task, not the leg to one."""
+    return bool(leg.task) and not leg.movable and not leg.may_wait
+
+
 def _end_via(each: UavList, after: Flight) -> tuple[Point, ...]:
     if not each.returns or not after.legs or not after.legs[-1].lands:
         return each.end_via
@@ -187,6 +200,6 @@ def _length(stops: tuple[ListStop, ...], end_via: tuple[Point, ...],
     """Length of all legs [m]; 0 without stops."""
     if not stops:
         return 0.0
-    metres = math.fsum(stop.leg.length for stop in stops)
+    metres = math.fsum(stop.length for stop in stops)
     return metres if home is None else metres + polyline_length(
-        (stops[-1].task.position, *end_via, home))
+        (stops[-1].exit, *end_via, home))

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
 
 from uav_task_alloc.allocator.records import ListStop, UavList
 from uav_task_alloc.allocator.state.flight_pace import UavFlight, timed_stops
 from uav_task_alloc.allocator.state.safe_paths import SafePaths
-from uav_task_alloc.geometry.polyline import polyline_length
+from uav_task_alloc.geometry.polyline import points_passed, polyline_length
 from uav_task_alloc.model import Leg, Plan, Point, Task, Uav
 
 _START, _HOME = '', '~'  # neither is a task id
@@ -33,7 +33,8 @@ def build_task_list(uav: Uav, tasks: Sequence[Task], returns: bool,
                     legs: Mapping[LegKey, Leg], published: UavList,
                     paths: SafePaths,
                     flight: UavFlight | None = None,
-                    keep: bool = False) -> tuple[UavList, list[str]]:
+                    keep: bool = False,
+                    backward: Collection[str] = ()) -> tuple[UavList, list[str]]:
     """Build the list of a route from the present position of a UAV.
 
     Args:
@@ -47,6 +48,7 @@ def build_task_list(uav: Uav, tasks: Sequence[Task], returns: bool,
         flight: of the UAV, for the times; None: as planned, from now.
         keep: the leg under way stays while it is safe, whatever its length: its heights keep
             UAVs apart.
+        backward: ids of the tasks whose paths are flown from the last point.
 
     Returns:
         The list, and the ids of the tasks that no safe path leads to.
@@ -55,15 +57,16 @@ def build_task_list(uav: Uav, tasks: Sequence[Task], returns: bool,
     unreachable: list[str] = []
     before, place = _START, uav.position
     for task in tasks:
-        leg = _steady_leg(published, before, task, place, paths, _planned_leg(
-            legs, _leg_key(uav.id, before, task.id), place, task.position, paths), keep)
-        if leg is None:
+        new = ListStop(task, Leg((), 0.0), 0.0, reversed=task.id in backward)
+        old = _published_stop(published, before, new)
+        leg = _steady_leg(old, before == _START, place, paths, _planned_leg(
+            legs, _leg_key(uav.id, before, task.id), place, new.entry, paths), keep)
+        if leg is None or not paths.clear(*new.way):
             unreachable.append(task.id)
             continue
-        old = _published_stop(published, before, task)
-        stops.append(ListStop(task, leg, 0.0, begin_after=old.begin_after if old else 0.0))
-        before, place = task.id, task.position
-    distance = math.fsum(stop.leg.length for stop in stops)
+        stops.append(replace(new, leg=leg, begin_after=old.begin_after if old else 0.0))
+        before, place = task.id, new.exit
+    distance = math.fsum(stop.length for stop in stops)
     home = _leg_home(uav, before, place, legs, published, paths) if returns else None
     timed = timed_stops(stops, flight or UavFlight.of(uav))
     return replace(published, stops=timed, returns=home is not None,
@@ -94,30 +97,35 @@ def _planned_leg(legs: Mapping[LegKey, Leg], key: LegKey, a: Point, b: Point,
     return paths.leg(a, b)
 
 
-def _steady_leg(published: UavList, before: str, task: Task, place: Point, paths: SafePaths,
+def _steady_leg(stop: ListStop | None, first: bool, place: Point, paths: SafePaths,
                 fresh: Leg | None, keep: bool) -> Leg | None:
     """The published leg while it is safe and not longer by the margin; else the fresh one."""
-    stop = _published_stop(published, before, task)
     if stop is None:
         return fresh
     old = stop.leg
-    if before == _START:
-        metres = paths.rest(place, old, task.position)
+    if first and stop.task.path and _on_path(place, stop):
+        return Leg(old.via, 0.0)
+    if first:
+        metres = paths.rest(place, old, stop.entry)
     else:
-        metres = old.length if paths.clear(place, *old.via, task.position) else None
+        metres = old.length if paths.clear(place, *old.via, stop.entry) else None
     if metres is None:
         return fresh
-    keep = keep and before == _START
+    keep = keep and first
     if not keep and fresh is not None and fresh.length + _WORTH < metres * (1.0 - paths.margin):
         return fresh
     return Leg(old.via, metres)
 
 
-def _published_stop(published: UavList, before: str, task: Task) -> ListStop | None:
+def _on_path(place: Point, stop: ListStop) -> bool:
+    """Whether a UAV on its way to the exit of a stop has passed its entry."""
+    return points_passed(place, stop.line) > len(stop.leg.via)
+
+
+def _published_stop(published: UavList, before: str, new: ListStop) -> ListStop | None:
     previous = _START
     for stop in published.stops:
-        if stop.task.id == task.id:
-            same = previous == before and stop.task.position == task.position
-            return stop if same else None
+        if stop.task.id == new.task.id:
+            return stop if previous == before and stop.way == new.way else None
         previous = stop.task.id
     return None

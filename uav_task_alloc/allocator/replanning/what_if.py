@@ -21,6 +21,7 @@ from uav_task_alloc.allocator.state.ordered_tasks import TaskSequence
 from uav_task_alloc.allocator.state.world import World
 from uav_task_alloc.model import Plan
 from uav_task_alloc.params import AllocatorParams
+from uav_task_alloc.piece_ids import split_piece
 
 _REPAIRS = 3.0  # times that lists are repaired and legs are searched for: before, with it, search
 _LEAST = 0.2  # share of the budget that a search gets at least
@@ -126,7 +127,9 @@ def broken_order(change: OrderChange, problem: WhatIfProblem, answer: WhatIfAnsw
         if sequence is not None and sequence.left_out and (
                 set(order.tasks) & set(sequence.left_out)):
             return sequence.why
-        if why := _not_flown(order.uav, order.tasks, answer.after):
+        ordered = [task.id for task in problem.after.tasks
+                   if split_piece(task.id)[0] in order.tasks]
+        if why := _not_flown(order.uav, ordered, answer.after):
             return why
     return ''
 

@@ -235,14 +235,41 @@ def timed_stops(stops: Sequence[ListStop], flight: UavFlight,
         if k == 0 and flight.serving == task.id:
             since = flight.stamp - earliest  # negative: it waits
             timed.append(replace(stop, eta=0.0, wait=max(0.0, -since),
-                                 served=max(0.0, min(flight.served, since))))
+                                 served=max(0.0, min(flight.served, since)),
+                                 path_time=_rest_of_path(stop, flight)))
         else:
             clock = max(clock, task.release - flight.stamp)
             clock += _leg_seconds(stop, flight, place, start, first=k == 0)
             timed.append(replace(stop, eta=clock, served=0.0,
-                                 wait=max(0.0, earliest - flight.stamp - clock)))
-        clock, place = timed[-1].finish, task.position
+                                 wait=max(0.0, earliest - flight.stamp - clock),
+                                 path_time=seconds_along(stop, flight.pace)))
+        clock, place = timed[-1].finish, stop.exit
     return tuple(timed)
+
+
+def seconds_along(stop: ListStop, pace: FlightPace) -> float:
+    """Return the time along the path of a task, which begins with a corner and not with a stop.
+
+    Args:
+        stop: of a list.
+        pace: of its UAV.
+
+    Returns:
+        [s]; 0.0 for a point.
+    """
+    if not stop.task.path:
+        return 0.0
+    before = stop.leg.via[-1:]  # where it comes from matters for the corner only
+    corner = pace.stop_time * pace.corners((*before, *stop.way[:2])) if before else 0.0
+    return pace.seconds(stop.way) + pace.stop_time * pace.corners(stop.way) + corner
+
+
+def _rest_of_path(stop: ListStop, flight: UavFlight) -> float:
+    """[s] that a UAV on the path of a stop still flies along it."""
+    if not stop.task.path:
+        return 0.0
+    rest = stop.way[points_passed(flight.position, stop.way, stop.entry):]
+    return flight.pace.from_stop((flight.position, *rest), flight.share(rest[0]))
 
 
 def _earliest_departure(stops: Sequence[ListStop], flight: UavFlight) -> float:
@@ -256,7 +283,7 @@ def _earliest_departure(stops: Sequence[ListStop], flight: UavFlight) -> float:
 def _leg_seconds(stop: ListStop, flight: UavFlight, place: Point, start: Point | None,
                  first: bool) -> float:
     """Flight time of a leg; the first one from where the UAV is, as fast as it is."""
-    leg = (*stop.leg.via, stop.task.position)
+    leg = (*stop.leg.via, stop.entry)
     if not first:
         return flight.pace.from_stop((place, *leg))
     if flight.on_ground or flight.climbing:  # it climbs before it flies
@@ -283,4 +310,4 @@ def finish_time(each: UavList, flight: UavFlight) -> float:
     last, home = each.stops[-1], flight.home
     if not each.returns or home is None:
         return last.finish
-    return last.finish + flight.pace.from_stop((last.task.position, *each.end_via, home))
+    return last.finish + flight.pace.from_stop((last.exit, *each.end_via, home))

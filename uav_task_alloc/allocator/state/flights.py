@@ -15,7 +15,7 @@ from uav_task_alloc.allocator.state.flight_pace import (
 )
 from uav_task_alloc.allocator.state.published_lists import PublishedLists
 from uav_task_alloc.allocator.state.wind import WindEstimate
-from uav_task_alloc.model import Uav
+from uav_task_alloc.model import Task, Uav
 from uav_task_alloc.params import AllocatorParams
 from uav_task_alloc.separation.rule import FORGOTTEN
 
@@ -37,6 +37,18 @@ OVERDUE = 3.0  # times its turnaround after which nobody seems to change the bat
 _RETURN_HEIGHT = 60.0  # [m] above home: RTL_RETURN_ALT of PX4; RTL_ALT of ArduPilot is 15 m
 _CONTINGENCY = 0.05  # of the endurance with a full battery, where no reserve is known
 _TAKEOFF = 4.0  # [s] from the command until it climbs at its rate: arming, spooling up
+
+
+def top_of(task: Task) -> float:
+    """Return the height of a task [m] ENU: of its position, or the highest of its path.
+
+    Args:
+        task: at a point or along a path.
+
+    Returns:
+        [m].
+    """
+    return max(z for _, _, z in (task.path or (task.position,)))
 
 
 @dataclass(slots=True)
@@ -117,10 +129,13 @@ class Flights:
         leg = self._legs.get(report.uav_id)
         if leg is not None and (task is None or leg.task != task.id) and stamp > leg.began:
             del self._legs[report.uav_id]  # it flies elsewhere, or nowhere
-        if task is None or math.dist(report.position, task.position) > max(
+        reached = self._reached.get(report.uav_id, ('', 0.0))[0]
+        if task is not None and reached == task.id and task.path:
+            return  # it flies along its path
+        if task is None or math.dist(report.position, stops[0].entry) > max(
                 _AT_STOP, task.acceptance_radius or 0.0):
             self._reached.pop(report.uav_id, None)
-        elif self._reached.get(report.uav_id, ('', 0.0))[0] != task.id:
+        elif reached != task.id:
             self._reached[report.uav_id] = task.id, stamp
 
     def _sample(self, report: UavReport, stamp: float) -> None:
@@ -155,13 +170,13 @@ class Flights:
         if (uav_id not in self._fleet.records or len(stops) < 2
                 or stops[0].task.id != task_id):
             return
-        task, following = stops[0].task, stops[1]
-        way = task.position, *following.leg.via, following.task.position
+        following = stops[1]
+        way = stops[0].exit, *following.line
         pace = self.pace(uav_id)
         seconds = pace.seconds(way)
         if max(following.task.earliest, following.task.release) < stamp + seconds:  # no wait
             self._legs[uav_id] = _Leg(following.task.id, stamp, seconds, pace.corners(way),
-                                      following.task.service_time, pace.from_stop(way))
+                                      following.task.stay, pace.from_stop(way))
 
     def clock_jumped(self) -> None:
         """Drop what was measured across a jump of the published clock."""

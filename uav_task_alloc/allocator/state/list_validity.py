@@ -2,7 +2,7 @@
 """Whether the list in force of a UAV can stay as it is, or has to be replaced."""
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from itertools import pairwise
 
 from uav_task_alloc.allocator.state.fleet import Fleet
@@ -24,18 +24,22 @@ class ListValidity:
         self._ordered = ordered
         self.zones_when_built: dict[str, tuple[SafePaths, Point]] = {}
 
-    def is_current(self, uav_id: str, tasks: Sequence[Task]) -> bool:
+    def is_current(self, uav_id: str, tasks: Sequence[Task], backward: Collection[str]) -> bool:
         """Return whether the list in force has these tasks, and was built for present zones.
 
-        A list whose leg under way is cut, or whose UAV is inside a zone, is not.
+        A list whose leg under way is cut, or whose UAV is inside a zone, is not. `backward` are
+        the ids of tasks whose paths are flown from the last point; under way that does not change.
         """
         stops, paths = self._lists.get(uav_id).stops, self._paths()
         record = self._fleet.records[uav_id]
         return (bool(stops) and self.zones_when_built.get(uav_id) == (paths, record.home)
                 and not record.inside_zone
                 and [stop.task for stop in stops] == tasks
-                and paths.rest(record.report.position, stops[0].leg,
-                               stops[0].task.position) is not None)
+                and all(stop.reversed == (stop.task.id in backward) for stop in stops[1:])
+                and (stops[0].reversed == (stops[0].task.id in backward)
+                     or self._fleet.active.get(uav_id) == stops[0].task.id)
+                and paths.rest(record.report.position, stops[0].through,
+                               stops[0].exit) is not None)
 
     def must_change(self, uav_id: str, returns: bool) -> bool:
         """Return whether the list in force cannot or may not be flown, or has no tasks.
@@ -74,8 +78,8 @@ class ListValidity:
                     uav_id, known.task, known.failed_on):
                 return f'it may not fly {stop.task.id} any more'
         paths, first = self._paths(), stops[0]
-        clear = (paths.rest(record.report.position, first.leg, first.task.position) is not None
-                 and all(paths.clear(before.task.position, *stop.leg.via, stop.task.position)
+        clear = (paths.rest(record.report.position, first.through, first.exit) is not None
+                 and all(paths.clear(before.exit, *stop.line)
                          for before, stop in pairwise(stops)))
         return '' if clear else 'a zone'
 

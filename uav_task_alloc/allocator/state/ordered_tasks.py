@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 from uav_task_alloc.allocator.state.fleet import Fleet
-from uav_task_alloc.allocator.state.flights import Flights
+from uav_task_alloc.allocator.state.flights import Flights, top_of
 from uav_task_alloc.allocator.state.locked_tasks import can_fly
 from uav_task_alloc.allocator.state.published_lists import PublishedLists
 from uav_task_alloc.allocator.state.safe_paths import GetSafePaths, SafePaths
@@ -57,13 +57,14 @@ class OrderedTasks:
         active, paths = self._active(uav_id), self._paths()
         lead = active if active and active not in open_ids else ''
         tasks = [self._tasks.records[task_id].task for task_id in filter(None, (lead, *open_ids))]
-        uav = self._flights.spendable(self._uav(uav_id), max(task.position[2] for task in tasks))
+        uav = self._flights.spendable(self._uav(uav_id), max(map(top_of, tasks)))
         place, metres, seconds = uav.position, 0.0, 0.0
         for n, task in enumerate(tasks, -1 if lead else 0):
             length, time = _costs(uav, place, task.position, paths)
-            metres += length
-            seconds += time + task.service_time + self._flights.stop_time
-            place = task.position
+            metres += length + task.path_length
+            seconds += time + task.stay + self._flights.stop_time
+            seconds += task.path_length / uav.cruise_speed
+            place = task.end
             back = _costs(uav, place, uav.base, paths) if returns else (0.0, 0.0)
             why = _why(uav, task.id, metres + back[0], seconds + back[1])
             if n >= 0 and why:

@@ -15,6 +15,7 @@ from uav_task_alloc.allocator.order_records import (
 )
 from uav_task_alloc.errors import first_of
 from uav_task_alloc.model import Task
+from uav_task_alloc.piece_ids import split_piece
 
 MAX_ORDERS = 2000  # in force; more are refused
 _MAX_LOG = 1000  # entries of the log that are kept, the newest
@@ -73,9 +74,10 @@ class Orders:
 
     def allows(self, uav_id: str, task_id: str) -> bool:
         """Return whether a UAV may fly a task as far as orders are concerned."""
-        owner = self._owner.get(task_id)
+        whole, _ = split_piece(task_id)  # an order for work is one for all its pieces
+        owner = self._owner.get(whole)
         return (owner is None or owner.uav == uav_id) and uav_id not in self._forbidden.get(
-            task_id, ())
+            whole, ())
 
     def narrowed(self, task: Task, known: frozenset[str]) -> Task:
         """Return a task as only those UAVs may fly it that the orders allow.
@@ -84,7 +86,8 @@ class Orders:
             task: as announced.
             known: UAVs that it allows where it allows all.
         """
-        if task.id not in self._owner and task.id not in self._forbidden:
+        whole, _ = split_piece(task.id)
+        if whole not in self._owner and whole not in self._forbidden:
             return task
         allowed = known if task.allowed_uavs is None else task.allowed_uavs
         return replace(task, allowed_uavs=frozenset(
@@ -92,7 +95,7 @@ class Orders:
 
     def owner(self, task_id: str) -> str:
         """Return the only UAV that may fly a task; '' where no order names one."""
-        order = self._owner.get(task_id)
+        order = self._owner.get(split_piece(task_id)[0])
         return order.uav if order else ''
 
     def sequence(self, uav_id: str) -> tuple[str, ...]:
@@ -116,6 +119,7 @@ class Orders:
 
     def reason(self, task_id: str) -> str:
         """Return which orders keep UAVs from a task, for its status; '' where none does."""
+        task_id, _ = split_piece(task_id)
         owner, texts = self._owner.get(task_id), []
         if owner:
             texts = [f'only {owner.uav} may fly it ({owner.name})']

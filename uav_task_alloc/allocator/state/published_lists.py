@@ -120,11 +120,11 @@ class PublishedLists:
         published = self.restamped(uav_id, stamp, None)
         stops = published.stops
         while stops and ended(stops[0].task.id):
-            before, stops = stops[0].task, stops[1:]
-        stops = timed_stops(stops, flight, before.position) if flight else stops
+            before, stops = stops[0], stops[1:]
+        stops = timed_stops(stops, flight, before.exit) if flight else stops
         if any(ended(stop.task.id) for stop in stops):
             return None
-        flown = sum(stop.leg.length
+        flown = sum(stop.length
                     for stop in published.stops[:len(published.stops) - len(stops)])
         return replace(published, stops=stops,
                        distance=published.distance - flown if stops else 0.0)

@@ -25,6 +25,7 @@ class TaskTransition(Enum):
     START_MOVED = 'STARTED by a UAV that had it'
     COMPLETE = 'COMPLETED by the UAV that has it'
     COMPLETE_MOVED = 'COMPLETED by a UAV that had it'
+    REPLACE = 'cut into other pieces'
     FAIL = 'FAILED on the UAV that has it, others may try'
     FAIL_LAST = 'FAILED too often, or on all UAVs that can'
     FAIL_MOVED = 'FAILED on a UAV that had it'
@@ -93,6 +94,7 @@ TASK_TRANSITIONS: dict[TaskTransition, TransitionRow] = {
     # accepted from any UAV, so that the task is not flown twice
     _E.COMPLETE: _on_open_or_failed(_S.COMPLETED, '{why}'),
     _E.COMPLETE_MOVED: _on_open_or_failed(_S.COMPLETED, 'completed after it was moved'),
+    _E.REPLACE: _on_open_or_failed(_S.CANCELLED, 'cut again: {why}'),
     _E.FAIL: _on_open(_S.PENDING, 'failed on {uav}: {why}'),
     _E.FAIL_LAST: _on_open(_S.FAILED, 'failed on {uav}: {why}'),
     _E.FAIL_MOVED: _on_open(None, _MOVED),

@@ -32,7 +32,7 @@ class TaskRegistry:
     Arguments of methods:
         reason: of a refusal, for users.
         task: as announced.
-        task_id: as announced.
+        task_id, task_ids: as announced, or of pieces.
         stamp: [s] clock of the node.
     """
 
@@ -137,6 +137,13 @@ class TaskRegistry:
         if not record.open:
             self.ended[record.task.id] = None
 
+    def forget(self, task_ids: Iterable[str]) -> None:
+        """Remove tasks, known or not."""
+        for task_id in set(task_ids) & self.records.keys():
+            del self.records[task_id]
+            self.ended.pop(task_id, None)
+            self.unsaved.add(task_id)
+
     def forget_ended(self, keep: int, listed: Collection[str]) -> set[str]:
         """Remove the oldest ended tasks.
 
@@ -148,9 +155,7 @@ class TaskRegistry:
             The ids removed.
         """
         old = set(list(self.ended)[:max(0, len(self.ended) - keep)]) - set(listed)
-        for task_id in old:
-            del self.records[task_id], self.ended[task_id]
-        self.unsaved |= old
+        self.forget(old)
         return old
 
 

@@ -22,6 +22,7 @@ from uav_task_alloc.allocator.records import (
     UavReport,
 )
 from uav_task_alloc.allocator.state.admission import Admission
+from uav_task_alloc.allocator.state.announcements import Announcements
 from uav_task_alloc.allocator.state.callbacks import RequestReplan
 from uav_task_alloc.allocator.state.deadlines import Deadlines
 from uav_task_alloc.allocator.state.fleet import (
@@ -40,11 +41,13 @@ from uav_task_alloc.allocator.state.published_lists import PublishedLists
 from uav_task_alloc.allocator.state.safe_paths import MakeSafePaths, SafePaths
 from uav_task_alloc.allocator.state.task_events import TaskEvents
 from uav_task_alloc.allocator.state.task_state_machine import TaskStep
-from uav_task_alloc.allocator.state.tasks import TaskRegistry, verdict_texts
+from uav_task_alloc.allocator.state.tasks import TaskRegistry
+from uav_task_alloc.allocator.state.works import Works
 from uav_task_alloc.allocator.state.zone_checks import ZoneChecks
 from uav_task_alloc.errors import InvalidValue, first_of
 from uav_task_alloc.model import Point, Task, ThreatZone, Uav
 from uav_task_alloc.params import AllocatorParams
+from uav_task_alloc.work.pieces import Work, pieces_of
 
 _MAX_NOTES = 10_000  # log lines not yet collected
 
@@ -76,6 +79,7 @@ class World:
         kind: of a journal row.
         resend: publish unchanged lists, too.
         returns: whether the list should end with a return home.
+        backward: ids of the tasks whose paths are flown from the last point.
         debug: at the level debug.
     """
 
@@ -109,41 +113,31 @@ class World:
         self.zone_checks = ZoneChecks(self.fleet, self.lists, self.paths, self.note,
                                       self.request_replan)
         self.admission = Admission(self.fleet, self.lists, self.note, self.forget_uav)
+        self.works = Works(self.tasks, saved.works, lambda work: pieces_of(
+            work, tuple(self.zones.values()), self.params.clearance), self.deadlines.refusal)
+        self.announced = Announcements(self.tasks, self.works, self.deadlines, self.note,
+                                       self.request_replan, 'restart' if saved.works else '')
         self._events = TaskEvents(self.tasks, self.fleet, self.lists, self.request_replan,
                                   self._resend.add, self.note)
         self._missed = MissedCompletions(saved.lists, self.tasks, self.note)
 
     # inputs
 
-    def announce(self, action: AnnouncementAction, tasks: Iterable[Task], stamp: float,
+    def announce(self, action: AnnouncementAction, tasks: Iterable[Task | Work], stamp: float,
                  now: float) -> list[TaskVerdict]:
         """ADD or UPDATE tasks; returns a verdict for each."""
-        apply = self.tasks.add if action is AnnouncementAction.ADD else self.tasks.update
-        return self._announced(action, [self.deadlines.refused(task, stamp) or apply(task, stamp)
-                                        for task in tasks], now)
+        self.outbox.statuses = True
+        return self.announced.apply(action, tasks, stamp, now)
 
     def cancel(self, task_ids: Iterable[str], stamp: float, now: float) -> list[TaskVerdict]:
         """Withdraw tasks; returns a verdict for each."""
-        return self._announced(AnnouncementAction.CANCEL,
-                               [self.tasks.cancel(task_id, stamp) for task_id in task_ids], now)
+        self.outbox.statuses = True
+        return self.announced.cancel(task_ids, stamp, now)
 
     def refuse(self, task_id: str, reason: str, stamp: float) -> TaskVerdict:
         """Refuse an invalid task; its status is REJECTED unless an accepted task has that id."""
-        verdict = self.tasks.reject(task_id, reason, stamp)
         self.outbox.statuses = True
-        self.note(f'task {task_id!r} REJECTED: {reason}', warning=True)
-        return verdict
-
-    def _announced(
-        self, action: AnnouncementAction, verdicts: list[TaskVerdict], now: float
-    ) -> list[TaskVerdict]:
-        for text, warning in verdict_texts(action, verdicts):
-            self.note(text, warning)
-        for verdict in verdicts:
-            if verdict.accepted and not verdict.unchanged:
-                self.request_replan(f'{action.name} {verdict.task_id}', now)
-        self.outbox.statuses = True
-        return verdicts
+        return self.announced.refuse(task_id, reason, stamp)
 
     def update_uav(self, report: UavReport, now: float, stamp: float) -> str:
         """Apply the report of a UAV; returns why it is refused, '' if it is not."""
@@ -180,11 +174,12 @@ class World:
 
     def event(self, event: TaskEvent, stamp: float, now: float) -> str:
         """Apply the progress of a task; returns why it is refused, '' if it is not."""
-        refusal = self._events.apply(event, stamp, now, self.params.max_attempts)
+        done = self.announced.flown_before_cut(event, self.lists, stamp, now)
+        refusal = not done and self._events.apply(event, stamp, now, self.params.max_attempts)
         if not refusal and event.kind is TaskEventKind.COMPLETED:
             self.flights.completed(event.uav_id, event.task_id, stamp)
         self.outbox.statuses |= not refusal
-        return refusal
+        return refusal or ''
 
     def set_zones(self, zones: Sequence[ThreatZone], bad: Collection[str], now: float) -> None:
         """Replace all zones; those whose ids are in `bad` (refused) stay as they were."""
@@ -197,6 +192,7 @@ class World:
         self.mark_unsaved('zones')
         self.zone_checks.zones_changed()
         self.note(f'zones changed: {first_of(changed)}')
+        self.announced.recut_why = 'zones changed'
         self.request_replan(f'zones {first_of(changed)}', now)
 
     def set_available(self, uav_id: str, available: bool, now: float) -> str:
@@ -258,8 +254,10 @@ class World:
     def forget_ended(self) -> None:
         """Remove ended tasks beyond `keep_ended`."""
         if len(self.tasks.ended) > self.params.keep_ended:
-            self.lists.forget_tasks(
-                self.tasks.forget_ended(self.params.keep_ended, self.lists.owners()))
+            keep, listed = self.params.keep_ended, self.lists.owners()
+            gone = self.works.forget_ended(keep, listed)
+            self.lists.forget_tasks(gone | self.tasks.forget_ended(
+                keep, {*listed, *self.works.all_pieces()}))
 
     # questions of the planner
 
@@ -320,9 +318,10 @@ class World:
         """Return whether a task is open and a known UAV may fly it."""
         return can_fly(self.tasks, self.fleet, uav_id, task_id)
 
-    def is_current(self, uav_id: str, tasks: Sequence[Task], returns: bool) -> bool:
+    def is_current(self, uav_id: str, tasks: Sequence[Task], returns: bool,
+                   backward: Collection[str] = ()) -> bool:
         """Return whether the list in force has these tasks and end, and fits the zones."""
-        return self._validity.is_current(uav_id, tasks) and (
+        return self._validity.is_current(uav_id, tasks, backward) and (
             self.lists.get(uav_id).returns or not self._returns(uav_id, returns))
 
     def must_change(self, uav_id: str) -> bool:
@@ -396,5 +395,6 @@ class World:
 
     def unsaved(self) -> dict[str, set[str]]:
         """Return what is not on disk: ids of 'task' and 'list' rows, kinds of the rows of ''."""
-        return {'task': self.tasks.unsaved, 'list': self.lists.unsaved, '': self._unsaved,
+        return {'task': self.tasks.unsaved, 'work': self.works.unsaved,
+                'list': self.lists.unsaved, '': self._unsaved,
                 **self.orders.unsaved}

@@ -45,7 +45,7 @@ class ZoneChecks:
         self._check(uav_id, now)
         record, stops = self._fleet.records[uav_id], self._lists.get(uav_id).stops
         if (stops and not record.inside_zone and self._paths().rest(
-                record.report.position, stops[0].leg, stops[0].task.position) is None):
+                record.report.position, stops[0].through, stops[0].exit) is None):
             self._request_replan(f'leg of {uav_id} cut', now)
 
     def _check(self, uav_id: str, now: float) -> None:

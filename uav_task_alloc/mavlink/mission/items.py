@@ -51,6 +51,7 @@ class MissionStop:
     wait: float = 0.0  # [s] of the plan before the service
     begin: float = 0.0  # [s] ROS time of the service, as planned
     hold: Hold | None = None  # how it waits, see `mission.waits`
+    reversed: bool = False  # the path is flown from its last point
 
 
 @dataclass(frozen=True, slots=True)

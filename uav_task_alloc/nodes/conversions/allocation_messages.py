@@ -16,6 +16,7 @@ from uav_task_alloc.nodes.conversions.messages import (
     to_stamp,
 )
 from uav_task_alloc.nodes.conversions.task_times import from_time
+from uav_task_alloc.piece_ids import split_piece
 
 _UNASSIGNED = (m.TaskStatus.PENDING, m.TaskStatus.UNASSIGNED)
 
@@ -31,8 +32,7 @@ def from_list(uav_list: UavList) -> m.TaskList:
     """
     return m.TaskList(
         header=header(uav_list.stamp), uav_id=uav_list.uav, revision=uav_list.revision,
-        tasks=[planned_task(stop.task, stop.leg, stop.eta, stop.wait, stop.finish)
-               for stop in uav_list.stops],
+        tasks=[planned_task(stop) for stop in uav_list.stops],
         end=m.TaskList.RETURN_HOME if uav_list.returns else m.TaskList.HOLD,
         end_via=[to_point(point) for point in uav_list.end_via],
         distance=float(uav_list.distance))
@@ -60,7 +60,9 @@ def from_task_status(status: TaskStatus) -> m.TaskStatus:
     Returns:
         An entry of TaskStatusArray or of Allocation.unassigned.
     """
-    return m.TaskStatus(task_id=status.task_id, state=status.state.value, uav_id=status.uav,
+    task_id, piece = split_piece(status.task_id)
+    return m.TaskStatus(task_id=task_id, piece=piece, pieces_done=status.pieces_done,
+                        pieces=status.pieces, state=status.state.value, uav_id=status.uav,
                         reason=status.reason, stamp=to_stamp(status.stamp),
                         expected=from_time(status.expected))
 

@@ -13,6 +13,9 @@ from uav_task_alloc.geometry.frames import Origin
 from uav_task_alloc.model import Task
 from uav_task_alloc.nodes.conversions.message_limits import MOST_TASKS, cut
 from uav_task_alloc.nodes.conversions.messages import to_task
+from uav_task_alloc.nodes.conversions.work_fields import number_or_zero, to_angle, to_kind, to_path
+from uav_task_alloc.work.pieces import Work
+from uav_task_alloc.work.values import MOST_HOLES, Kind, Vertical
 
 
 def announce(world: World, msg: m.TaskAnnouncement, origin: Origin, stamp: float,
@@ -35,7 +38,7 @@ def announce(world: World, msg: m.TaskAnnouncement, origin: Origin, stamp: float
         action = to_action(msg)
     except InvalidValue as error:
         return [refuse(task, error) for task in msg.tasks[:MOST_TASKS]]
-    tasks: list[Task] = []
+    tasks: list[Task | Work] = []
     task_ids: list[str] = []
     refused: list[TaskVerdict] = []
     for task in msg.tasks:
@@ -43,7 +46,7 @@ def announce(world: World, msg: m.TaskAnnouncement, origin: Origin, stamp: float
             if action is AnnouncementAction.CANCEL:
                 task_ids.append(check_ros_name('task_id', task.task_id))
             else:
-                tasks.append(to_task(task, origin))
+                tasks.append(to_work(task, origin))
         except InvalidValue as error:
             refused.append(refuse(task, error))
     if action is AnnouncementAction.CANCEL:
@@ -79,3 +82,33 @@ def from_verdicts(verdicts: list[TaskVerdict],
             response.rejected.append(verdict.task_id)
             response.reasons.append(verdict.reason)
     return response
+
+
+def to_work(msg: m.Task, origin: Origin) -> Task | Work:
+    """Return what a message announces.
+
+    Args:
+        msg: from any publisher, not yet checked; of any kind and frame.
+        origin: of the ENU frame.
+
+    Returns:
+        A task for a POINT, else work; in ENU.
+
+    Raises:
+        InvalidValue: a field, which it names, is invalid.
+    """
+    kind = to_kind(msg)
+    place = f'task {msg.task_id}: '
+    if msg.vertical != m.Task.ORIGIN:
+        raise InvalidValue(place + 'vertical', msg.vertical, 'ORIGIN (0)')
+    check_count(place + 'holes', msg.holes, MOST_HOLES)
+    path = to_path(place + 'path', msg, msg.path, origin)
+    along = path and kind in (Kind.LINE, Kind.AREA)
+    work = Work(
+        to_task(msg, origin, path[0] if along else None), kind, path,
+        tuple(to_path(f'{place}holes[{k}]', msg, ring.points, origin)
+              for k, ring in enumerate(msg.holes)),
+        number_or_zero(msg.strip_width), to_angle(place + 'direction', msg.direction),
+        number_or_zero(msg.radius), number_or_zero(msg.turns), msg.divisible,
+        Vertical(msg.vertical))
+    return work.task if kind is Kind.POINT else work

@@ -19,8 +19,10 @@ from uav_task_alloc.mavlink.mission.task_progress import TaskProgress
 from uav_task_alloc.model import Task, ThreatZone
 from uav_task_alloc.nodes.conversions.message_limits import MOST_POINTS
 from uav_task_alloc.nodes.conversions.messages import from_point, header, to_point, to_task
-from uav_task_alloc.piece_ids import split_piece
+from uav_task_alloc.nodes.conversions.work_fields import to_kind, to_path
+from uav_task_alloc.piece_ids import piece_id, split_piece
 from uav_task_alloc.record.message_records import from_stamp
+from uav_task_alloc.work.values import Kind
 from uav_task_alloc.zone_codec import decode_zone_array
 
 _UNKNOWN_POINT = (math.nan, math.nan, math.nan)
@@ -46,7 +48,8 @@ def to_list(msg: m.TaskList, uav_id: str, origin: Origin, radius: float) -> Task
     if msg.uav_id not in ('', uav_id):
         raise InvalidValue('uav_id', msg.uav_id, uav_id)
     place = f'task_list of {uav_id}: '
-    points = len(msg.tasks) + sum(len(planned.via) for planned in msg.tasks) + len(msg.end_via)
+    points = len(msg.tasks) + len(msg.end_via) + sum(
+        len(planned.via) + len(planned.task.path) for planned in msg.tasks)
     if points > MOST_POINTS:
         raise InvalidValue(place + 'points', points, f'at most {MOST_POINTS}')
     stamp = from_stamp(msg.header.stamp)
@@ -60,15 +63,27 @@ def to_list(msg: m.TaskList, uav_id: str, origin: Origin, radius: float) -> Task
     return TaskList(msg.revision, stops, msg.end == m.TaskList.RETURN_HOME, end_via, stamp)
 
 
+def _to_piece(msg: m.Task, full_id: str, origin: Origin) -> Task:
+    """A task of a list: a point, or a piece with its path."""
+    kind = to_kind(msg)
+    place = f'task {full_id}: '
+    if kind not in (Kind.POINT, Kind.LINE):
+        raise InvalidValue(place + 'kind', msg.kind, 'POINT (0) or LINE (1) in a list')
+    path = to_path(place + 'path', msg, msg.path, origin) if kind is Kind.LINE else ()
+    if kind is Kind.LINE and len(path) < 2:
+        raise InvalidValue(place + 'path', len(path), 'at least 2 points of a LINE')
+    return replace(to_task(msg, origin, path[0] if path else None), id=full_id, path=path)
+
+
 def _to_stop(planned: m.PlannedTask, origin: Origin, radius: float, stamp: float) -> MissionStop:
-    task: Task = to_task(planned.task, origin)
+    task = _to_piece(planned.task, piece_id(planned.task.task_id, planned.piece), origin)
     eta, wait = from_stamp(planned.eta), from_stamp(planned.wait)
     if wait < 0.0:
         raise InvalidValue(f'task {task.id}: wait', wait, 'at least 0 s')
     return MissionStop(
         replace(task, acceptance_radius=task.acceptance_radius or radius or None),
         tuple(check_point(f'task {task.id}: via', from_point(point)) for point in planned.via),
-        wait, stamp + eta + wait)
+        wait, stamp + eta + wait, reversed=planned.reversed)
 
 
 def to_zones(msg: m.ThreatZoneArray, previous: Iterable[ThreatZone],

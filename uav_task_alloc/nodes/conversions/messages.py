@@ -13,6 +13,7 @@ from uav_task_alloc_msgs import msg as m
 
 from uav_task_alloc.allocator.records import (
     REPORTED_LIMITS,
+    ListStop,
     TaskEvent,
     TaskEventKind,
     UavReport,
@@ -20,7 +21,7 @@ from uav_task_alloc.allocator.records import (
 from uav_task_alloc.checks import check_number, check_ros_name
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.geometry.frames import Origin
-from uav_task_alloc.model import Leg, Point, Task, ThreatZone
+from uav_task_alloc.model import Point, Task, ThreatZone
 from uav_task_alloc.nodes.conversions.message_limits import (
     MOST_VALUE,
     check_ros_names,
@@ -28,7 +29,13 @@ from uav_task_alloc.nodes.conversions.message_limits import (
     cut,
 )
 from uav_task_alloc.nodes.conversions.task_times import put_times, to_times
-from uav_task_alloc.piece_ids import piece_id
+from uav_task_alloc.nodes.conversions.work_fields import (
+    put_piece,
+    put_work,
+    to_actions,
+    to_heading,
+)
+from uav_task_alloc.piece_ids import piece_id, split_piece
 from uav_task_alloc.record.message_records import (
     AUTHORITIES,
     MODES,
@@ -36,6 +43,7 @@ from uav_task_alloc.record.message_records import (
     from_stamp,
     task_position,
 )
+from uav_task_alloc.work.pieces import Work
 from uav_task_alloc.zone_codec import JOURNAL_ZONE, encode_zone
 
 FRAME_ID = 'map'  # REP-105, ENU
@@ -117,12 +125,13 @@ def known(value: float) -> float | None:
     return None if math.isnan(value) else float(value)
 
 
-def to_task(msg: m.Task, origin: Origin) -> Task:
-    """A task with its position in ENU.
+def to_task(msg: m.Task, origin: Origin, position: Point | None = None) -> Task:
+    """A task at one position, which is in ENU; its path is not taken.
 
     Args:
         msg: LOCAL [m], or WGS84 [deg] and [m] above the origin.
         origin: of the ENU frame.
+        position: [m] ENU of a task that is not at the position of the message.
 
     Raises:
         InvalidValue: a field, which it names, is invalid.
@@ -130,9 +139,7 @@ def to_task(msg: m.Task, origin: Origin) -> Task:
     check_ros_name('task_id', msg.task_id)
     place = f'task {msg.task_id}: '
     check_number(place + 'value', msg.value, 0.0, MOST_VALUE, open_low=True)
-    if msg.kind != m.Task.POINT:
-        raise InvalidValue(place + 'kind', msg.kind, 'POINT (0)')
-    position = task_position(msg, origin)
+    position = position or task_position(msg, origin)
     assert position is not None  # it is with an origin
     return Task(
         msg.task_id, position, value=msg.value,
@@ -140,17 +147,23 @@ def to_task(msg: m.Task, origin: Origin) -> Task:
         required_capabilities=check_words(place + 'required_capabilities',
                                           msg.required_capabilities),
         allowed_uavs=check_ros_names(place + 'allowed_uavs', msg.allowed_uavs) or None,
-        acceptance_radius=known(msg.acceptance_radius) or None, **to_times(place, msg))
+        acceptance_radius=known(msg.acceptance_radius) or None,
+        heading=to_heading(place, msg), actions=to_actions(place, msg), **to_times(place, msg))
 
 
 def from_task(task: Task) -> m.Task:
-    """The message of a task, in the frame LOCAL."""
-    return put_times(m.Task(
-        task_id=task.id, frame=m.Task.LOCAL, position=to_point(task.position),
+    """The message of a point or of a piece with its path, in the frame LOCAL."""
+    return put_times(put_piece(m.Task(
+        frame=m.Task.LOCAL, position=to_point(task.position),
         value=task.value, service_time=to_duration(task.service_time),
         acceptance_radius=math.nan if task.acceptance_radius is None else task.acceptance_radius,
         required_capabilities=sorted(task.required_capabilities),
-        allowed_uavs=sorted(task.allowed_uavs or ())), task)
+        allowed_uavs=sorted(task.allowed_uavs or ())), task), task)
+
+
+def from_work(item: Task | Work) -> m.Task:
+    """The message of a task or of work, in the frame LOCAL."""
+    return from_task(item) if isinstance(item, Task) else put_work(from_task(item.task), item)
 
 
 def to_report(msg: m.UavState) -> UavReport:
@@ -237,25 +250,24 @@ def from_zones(zones: Iterable[ThreatZone], now: float) -> m.ThreatZoneArray:
     return m.ThreatZoneArray(header=header(now), zones=[from_zone(zone) for zone in zones])
 
 
-def planned_task(task: Task, leg: Leg, eta: float, wait: float = 0.0,
-                 finish: float | None = None) -> m.PlannedTask:
-    """A task with the leg to it; times are [s] from the stamp of the list, `wait` [s] there."""
-    finish = eta + wait + task.service_time if finish is None else finish
-    return m.PlannedTask(task=from_task(task), via=[to_point(p) for p in leg.via],
-                         leg_distance=leg.length, eta=to_duration(eta), wait=to_duration(wait),
-                         finish=to_duration(finish))
+def planned_task(stop: ListStop) -> m.PlannedTask:
+    """A task of a list with the leg to it; times are [s] from the stamp of the list."""
+    return m.PlannedTask(
+        task=from_task(stop.task), piece=split_piece(stop.task.id)[1], reversed=stop.reversed,
+        via=[to_point(p) for p in stop.leg.via], leg_distance=stop.leg.length,
+        eta=to_duration(stop.eta), wait=to_duration(stop.wait), finish=to_duration(stop.finish))
 
 
-def announcement(action: int, tasks: Iterable[Task], now: float) -> m.TaskAnnouncement:
+def announcement(action: int, tasks: Iterable[Task | Work], now: float) -> m.TaskAnnouncement:
     """Return the message that adds, updates or cancels tasks.
 
     Args:
         action: TaskAnnouncement.ADD, UPDATE or CANCEL.
-        tasks: with positions in ENU [m].
+        tasks: of any kind, in ENU [m].
         now: [s] for the stamp.
 
     Returns:
         For the topic `task_announcements`.
     """
     return m.TaskAnnouncement(header=header(now), action=action,
-                              tasks=[from_task(task) for task in tasks])
+                              tasks=[from_work(task) for task in tasks])

@@ -28,7 +28,7 @@ def remaining_path(uav_list: UavList, uav: UavRecord | None) -> list[Point]:
     """
     points: list[Point] = []
     for k, stop in enumerate(uav_list.stops):
-        leg = [*stop.leg.via, stop.task.position]
+        leg = stop.line
         points += leg[points_passed(uav.report.position, leg):] if uav and k == 0 else leg
     if uav is None or not points:
         return points

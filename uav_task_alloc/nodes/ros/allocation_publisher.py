@@ -12,7 +12,7 @@ from uav_task_alloc_msgs import msg as m
 
 from uav_task_alloc.allocator.records import Allocation, Outbox, TaskRecord, UavList
 from uav_task_alloc.allocator.state.world import World
-from uav_task_alloc.allocator.status import status_of
+from uav_task_alloc.allocator.status import TaskStatus, status_of, status_of_work
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.nodes.conversions import allocation_messages
 from uav_task_alloc.nodes.conversions.messages import LATCHED
@@ -20,7 +20,7 @@ from uav_task_alloc.nodes.ros.topic_names import TASK_LIST, check_topic
 
 _SLICE = 0.02  # [s] of lists per call
 _PAUSE_FACTOR = 5.0  # times the duration of the large messages: a sixth of a core at most
-_StatusSource = TaskRecord | tuple[str, float]  # what a status is made from
+_StatusSource = TaskRecord | TaskStatus | tuple[str, float]  # what a status is made from
 
 
 class AllocationPublisher:
@@ -145,10 +145,19 @@ class AllocationPublisher:
         sources: dict[str, _StatusSource] = {
             **self.world.task_records(), **self.world.tasks.rejected}
         expected = self.world.deadlines.expected
+        works = self.world.works
+        sources.update((task_id, status_of_work(works, work, expected))
+                       for task_id, work in works.records.items())
         for task_id, source in sources.items():
             start, cached = expected.get(task_id, 0.0), cache.get(task_id)
-            if cached is None or cached[0] is not source or cached[1] != start:
-                status = status_of(task_id, source, start)
+            if cached is None or not _same(cached[0], source) or cached[1] != start:
+                status = source if isinstance(source, TaskStatus) else status_of(
+                    task_id, source, start)
                 cached = source, start, allocation_messages.from_task_status(status)
             self._status_messages[task_id] = cached
         return [message for _, _, message in self._status_messages.values()]
+
+
+def _same(one: _StatusSource, other: _StatusSource) -> bool:
+    """Whether two sources make the same status; records are compared by identity, in O(1)."""
+    return one is other or (isinstance(other, TaskStatus) and one == other)

@@ -1,0 +1,325 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Work that is flown in pieces: cut when it is accepted, and again when zones or content change.
+
+A piece is a task of the registry. What is flown is never cut again: a new cut leaves out the ways
+of the pieces that are COMPLETED.
+"""
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
+
+from uav_task_alloc.allocator.records import TaskRecord, TaskState, TaskVerdict
+from uav_task_alloc.allocator.state.task_state_machine import TaskTransition
+from uav_task_alloc.allocator.state.tasks import MAX_OPEN, UNCHANGED, TaskRegistry
+from uav_task_alloc.allocator.work_records import WorkRecord
+from uav_task_alloc.errors import InvalidValue
+from uav_task_alloc.geometry.polyline import polyline_length
+from uav_task_alloc.model import Point, Task
+from uav_task_alloc.piece_ids import piece_id, split_piece
+from uav_task_alloc.work.pieces import Work
+from uav_task_alloc.work.recut import unflown_parts, way_key
+from uav_task_alloc.work.values import Kind
+
+# the state of the whole is the first of these that an open piece has
+_OPEN_ORDER = (TaskState.ACTIVE, TaskState.ASSIGNED, TaskState.PENDING, TaskState.UNASSIGNED)
+_WORDS = {Kind.AREA: 'strips', Kind.LINE: 'sections', Kind.ORBIT: 'orbits'}
+CutWork = Callable[[Work], Sequence[Task]]
+
+
+class Works:
+    """Accepted work by task id.
+
+    Args:
+        tasks: has the pieces.
+        saved: restored from the journal.
+        cut: cuts work around the present zones; may raise InvalidValue.
+        refusal: (piece, stamp) -> why it cannot be kept, '' if it may be.
+
+    Arguments of methods:
+        work: as announced.
+        task_id: of work, or of any task where the text says so.
+        stamp: [s] clock of the node.
+        why: that pieces are cut again.
+    """
+
+    def __init__(self, tasks: TaskRegistry, saved: Iterable[WorkRecord], cut: CutWork,
+                 refusal: Callable[[Task, float], str]) -> None:
+        self._tasks, self._cut, self._refusal = tasks, cut, refusal
+        self.records = {record.id: record for record in saved}
+        self.unsaved: set[str] = set()  # not yet on disk
+        self._drop_orphans()
+
+    def _drop_orphans(self) -> None:
+        """Forget pieces whose work is not in the journal: a crash was between the two rows."""
+        self._tasks.forget([task_id for task_id in self._tasks.records
+                            if split_piece(task_id)[1]
+                            and split_piece(task_id)[0] not in self.records])
+
+    # announcements
+
+    def add(self, work: Work, stamp: float) -> TaskVerdict:
+        """Accept and cut new work; a replay changes nothing."""
+        known = self.records.get(work.task.id)
+        if known is not None:
+            return self._known_again(known, work)
+        if work.task.id in self._tasks.records:
+            return TaskVerdict(work.task.id, False,
+                               'duplicate id: another task was announced under it')
+        try:
+            pieces = self._cut(work)
+        except InvalidValue as error:
+            return self._tasks.reject(work.task.id, str(error), stamp)
+        whys = [self._refusal(piece, stamp) for piece in pieces]
+        if len(self._tasks.open()) + len(pieces) > MAX_OPEN:
+            whys = [f'open tasks and pieces: expected at most {MAX_OPEN}']
+        if all(whys):
+            return self._tasks.reject(work.task.id, whys[0], stamp)
+        self._tasks.rejected.pop(work.task.id, None)
+        for piece in pieces:
+            self._tasks.add(piece, stamp)
+        self._put(WorkRecord(work, work, tuple(piece.id for piece in pieces), len(pieces)))
+        return TaskVerdict(work.task.id, True)
+
+    def _known_again(self, known: WorkRecord, work: Work) -> TaskVerdict:
+        state = self.state(known)
+        ended = '' if self.is_open(known.id) else f': it is {state.name}'
+        if work in (known.work, known.announced):
+            return TaskVerdict(known.id, True, UNCHANGED + ended)
+        return TaskVerdict(known.id, False,
+                           f'duplicate id: another task was announced under it{ended}')
+
+    def refuse_point(self, task_id: str) -> TaskVerdict:
+        """Refuse a point that has the id of work."""
+        kind = self.records[task_id].work.kind.name
+        return TaskVerdict(task_id, False, f'duplicate id: {task_id} was announced as {kind}')
+
+    def update(self, work: Work, stamp: float) -> TaskVerdict:
+        """Replace the content of work; pieces that are flown stay as they are."""
+        known = self.records.get(work.task.id)
+        if known is None:
+            return self._tasks.update(work.task, stamp)  # refuses it
+        state = self.state(known)
+        if state in (TaskState.COMPLETED, TaskState.CANCELLED):
+            return TaskVerdict(known.id, False, f'is {state.name}: nothing to update')
+        if work == known.work and self.is_open(known.id):
+            return TaskVerdict(known.id, True, UNCHANGED)
+        begun = any(record.state is TaskState.COMPLETED for record in self._present(known))
+        try:
+            pieces = self._cut(self._as_cut(replace(known, work=work)) if begun else work)
+        except InvalidValue as error:
+            return TaskVerdict(known.id, False, str(error))
+        self._recut(replace(known, work=work), pieces, stamp, 'changed', renew=True)
+        return TaskVerdict(known.id, True)
+
+    def cancel(self, task_id: str, stamp: float) -> TaskVerdict:
+        """Withdraw all pieces that are not flown."""
+        known = self.records[task_id]
+        state = self.state(known)
+        if state is TaskState.CANCELLED:
+            return TaskVerdict(task_id, True, UNCHANGED)
+        if state is TaskState.COMPLETED:
+            return TaskVerdict(task_id, False, 'is COMPLETED: nothing to cancel')
+        for each in known.pieces:
+            if self._tasks.records[each].state is not TaskState.COMPLETED:
+                self._tasks.step(each, TaskTransition.CANCEL, stamp)
+        return TaskVerdict(task_id, True)
+
+    # cutting again
+
+    def recut_all(self, stamp: float, why: str) -> list[str]:
+        """Cut all open work again, as zones have changed.
+
+        Returns:
+            The ids of work whose pieces have changed.
+        """
+        return [known.id for known in list(self.records.values())
+                if (self.is_open(known.id) or self._lacks_pieces(known))
+                and self._recut_one(known, stamp, why)]
+
+    def _lacks_pieces(self, known: WorkRecord) -> bool:
+        """Whether a crash was between the row of the work and those of its pieces."""
+        return any(each not in self._tasks.records for each in known.pieces)
+
+    def _recut_one(self, known: WorkRecord, stamp: float, why: str) -> bool:
+        try:
+            pieces = self._cut(self._as_cut(known))
+        except InvalidValue:
+            return False  # too many pieces with these zones: it stays as it is
+        return self._recut(known, pieces, stamp, why)
+
+    def _as_cut(self, known: WorkRecord) -> Work:
+        """The work with the direction that its strips have, the flown ones first."""
+        work = known.work
+        paths = [record.task.path for record in sorted(
+            self._present(known), key=lambda each: each.state is not TaskState.COMPLETED)]
+        if work.kind is not Kind.AREA or work.direction is not None or not paths:
+            return work
+        (ax, ay, _), (bx, by, _) = paths[0][:2]
+        return replace(work, direction=math.atan2(by - ay, bx - ax) % math.pi)
+
+    def _recut(self, known: WorkRecord, pieces: Sequence[Task], stamp: float, why: str,
+               renew: bool = False) -> bool:
+        """Take over a new cut: equal pieces keep their ids, and what is flown is left out."""
+        present = {record.task.id: record for record in self._present(known)}
+        by_way = {way_key(record.task.path): task_id for task_id, record in present.items()}
+        flown = [record.task.path for record in present.values()
+                 if record.state is TaskState.COMPLETED]
+        kept, last, changed = list[str](), known.last, False
+        for piece in pieces:
+            whole = present.get(by_way.get(way_key(piece.path), ''))
+            done = whole is not None and whole.state is TaskState.COMPLETED
+            for part in [piece] if done else _parts(piece, flown):
+                same = by_way.get(way_key(part.path))
+                if same is None:
+                    last, changed = last + 1, True
+                    same = piece_id(known.id, last)
+                    self._tasks.add(replace(part, id=same), stamp)
+                elif renew and present[same].state is not TaskState.COMPLETED:
+                    changed |= self._renew(present[same], part, stamp)
+                kept.append(same)
+        ended = [each for each in known.pieces if each in present and each not in kept
+                and present[each].state is TaskState.COMPLETED]
+        gone = [each for each in present if each not in kept and each not in ended]
+        for each in gone:
+            self._tasks.step(each, TaskTransition.REPLACE, stamp, why=why)
+        self._put(replace(known, pieces=(*ended, *kept), last=last))
+        return changed or bool(gone)
+
+    def _renew(self, record: TaskRecord, part: Task, stamp: float) -> bool:
+        """Give a piece the content of a new cut; its way stays as it was."""
+        task = replace(part, id=record.task.id, position=record.task.position,
+                       path=record.task.path)
+        if task == record.task and record.open:
+            return False
+        self._tasks.step(task.id, TaskTransition.UPDATE, stamp, record.uav, record.reason,
+                         task=task, failed_on=())
+        return True
+
+    def is_replaced(self, task_id: str) -> bool:
+        """Return whether a task is a piece that was cut again, and may still be flown."""
+        whole, piece = split_piece(task_id)
+        known = self.records.get(whole)
+        return bool(piece) and known is not None and task_id not in known.pieces
+
+    def flown_after_all(self, task_id: str, uav_id: str, stamp: float) -> bool:
+        """Count the way of a replaced piece as flown; the rest is cut without it.
+
+        Args:
+            task_id: of the replaced piece.
+            uav_id: that has flown it.
+
+        Returns:
+            Whether any of it was not flown before.
+        """
+        known, task = self.records[split_piece(task_id)[0]], self._tasks.records[task_id].task
+        if not unflown_parts(task.path, [record.task.path for record in self._present(known)
+                                         if record.state is TaskState.COMPLETED]):
+            return False
+        last = known.last + 1
+        self._tasks.add(replace(task, id=piece_id(known.id, last)), stamp)
+        self._tasks.step(piece_id(known.id, last), TaskTransition.COMPLETE, stamp, uav_id)
+        self._recut_one(replace(known, pieces=(*known.pieces, piece_id(known.id, last)),
+                                last=last), stamp, 'flown as it was cut before')
+        return True
+
+    # questions
+
+    def _present(self, known: WorkRecord) -> list[TaskRecord]:
+        return [self._tasks.records[each] for each in known.pieces
+                if each in self._tasks.records]
+
+    def is_open(self, task_id: str) -> bool:
+        """Return whether work has pieces that are still to be flown."""
+        return any(record.open for record in self._present(self.records[task_id]))
+
+    def open_pieces(self, task_id: str) -> tuple[str, ...]:
+        """Return the ids of the pieces that are still to be flown; of a point its own id."""
+        known = self.records.get(task_id)
+        if known is None:
+            return (task_id,)
+        return tuple(record.task.id for record in self._present(known) if record.open)
+
+    def state(self, known: WorkRecord) -> TaskState:
+        """Return the state of work, as its pieces have it.
+
+        Args:
+            known: accepted work.
+        """
+        states = {record.state for record in self._present(known)}
+        for state in (*_OPEN_ORDER, TaskState.CANCELLED, TaskState.FAILED):
+            if state in states:
+                return state
+        return TaskState.COMPLETED
+
+    def whole_record(self, known: WorkRecord) -> tuple[TaskRecord, int]:
+        """Return work as the record of one task, and how many of its pieces are completed.
+
+        Args:
+            known: accepted work.
+
+        Returns:
+            Its reason begins with `7 of 12 strips`; the UAV is that of its pieces in this state,
+            where it is one.
+        """
+        present, state = self._present(known), self.state(known)
+        done = sum(record.state is TaskState.COMPLETED for record in present)
+        of_state = [record for record in present if record.state is state]
+        uavs = {record.uav for record in of_state}
+        why = next((record.reason for record in of_state if record.reason), '')
+        text = f'{done} of {len(present)} {_WORDS.get(known.work.kind, "pieces")}'
+        return TaskRecord(
+            known.work.task, known.announced.task, state, uavs.pop() if len(uavs) == 1 else '',
+            text if state is TaskState.COMPLETED or not why else f'{text}; {why}',
+            max((record.stamp for record in present), default=0.0),
+            since=min((record.since for record in present), default=0.0)), done
+
+    # forgetting
+
+    def all_pieces(self) -> set[str]:
+        """Return the ids of the pieces of all work, which are forgotten with it only."""
+        return {each for known in self.records.values() for each in known.pieces}
+
+    def forget_ended(self, keep: int, listed: Iterable[str]) -> set[str]:
+        """Forget the oldest work that has ended, until it has at most `keep` pieces.
+
+        Args:
+            keep: pieces of ended work that stay.
+            listed: tasks that are still in a list, whose work stays, too.
+
+        Returns:
+            The ids of the pieces that were forgotten.
+        """
+        busy = {split_piece(task_id)[0] for task_id in listed}
+        ended = sorted((known for known in self.records.values()
+                        if known.id not in busy and not self.is_open(known.id)),
+                       key=lambda known: self.whole_record(known)[0].stamp)
+        excess = sum(len(known.pieces) for known in ended) - keep
+        gone: set[str] = set()
+        for known in ended:
+            if excess <= 0:
+                break
+            excess -= len(known.pieces)
+            gone.update(task_id for task_id in self._tasks.records
+                        if split_piece(task_id)[0] == known.id)
+            del self.records[known.id]
+            self.unsaved.add(known.id)
+        self._tasks.forget(gone)
+        return gone
+
+    def _put(self, record: WorkRecord) -> None:
+        self.records[record.id] = record
+        self.unsaved.add(record.id)
+
+
+def _parts(piece: Task, flown: Sequence[Sequence[Point]]) -> list[Task]:
+    """A piece of a new cut, or what is not flown of it, with its share of the value."""
+    ways = unflown_parts(piece.path, flown)
+    if ways == [piece.path]:
+        return [piece]
+    length = piece.path_length
+    return [replace(piece, position=way[0], path=way,
+                    value=piece.value * polyline_length(way) / length,
+                    service_time=piece.service_time * polyline_length(way) / length)
+            for way in ways]

@@ -1,0 +1,94 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What is left of ways when parts of them are flown already: collinear parts are taken out."""
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from itertools import pairwise
+
+from uav_task_alloc.geometry.polyline import (
+    point_at,
+    polyline_length,
+    segment_distance,
+    segment_fraction,
+)
+from uav_task_alloc.model import Point
+
+_BESIDE = 0.5  # [m] that a flown way may be beside another one and count for it
+_SHORTEST = 0.5  # [m] a shorter rest is not flown
+
+
+def way_key(way: Sequence[Point]) -> tuple[Point, ...]:
+    """Return the same value for ways through the same points, in either direction.
+
+    Args:
+        way: [m] ENU.
+
+    Returns:
+        Points rounded to 1 cm.
+    """
+    rounded = tuple((round(x, 2), round(y, 2), round(z, 2)) for x, y, z in way)
+    return min(rounded, rounded[::-1])
+
+
+def unflown_parts(way: Sequence[Point],
+                  flown: Iterable[Sequence[Point]]) -> list[tuple[Point, ...]]:
+    """Return the parts of a way along which none of the flown ways leads.
+
+    Args:
+        way: [m] ENU, at least two points.
+        flown: ways that are flown [m] ENU; those that only cross `way` do not count.
+
+    Returns:
+        [m] in the order of `way`, each of at least 0.5 m; `way` itself where none of it is flown.
+    """
+    segments = [pair for each in flown if _near(way, each) for pair in pairwise(each)]
+    if not segments:
+        return [tuple(way)]
+    parts: list[list[Point]] = []
+    open_end = False  # the last part goes on
+    for a, b in pairwise(way):
+        rest = _rest([span for c, d in segments if (span := _overlap(a, b, c, d))])
+        open_end &= bool(rest)
+        for low, high in rest:
+            start, end = _at(a, b, low), _at(a, b, high)
+            if low == 0.0 and open_end:
+                parts[-1].append(end)
+            else:
+                parts.append([start, end])
+            open_end = high == 1.0
+    return [tuple(part) for part in parts if polyline_length(part) >= _SHORTEST]
+
+
+def _near(way: Sequence[Point], other: Sequence[Point]) -> bool:
+    """Whether the boxes around two ways touch."""
+    return all(min(p[k] for p in way) <= max(p[k] for p in other) + _BESIDE
+               and min(p[k] for p in other) <= max(p[k] for p in way) + _BESIDE
+               for k in range(3))
+
+
+def _overlap(a: Point, b: Point, c: Point, d: Point) -> tuple[float, float] | None:
+    """The part of the segment ab, as fractions, along which cd leads beside it."""
+    ends = segment_fraction(c, a, b), segment_fraction(d, a, b)
+    low, high = max(0.0, min(ends)), min(1.0, max(ends))
+    if (high - low) * math.dist(a, b) < _BESIDE or any(
+            segment_distance(_at(a, b, share), c, d) > _BESIDE for share in (low, high)):
+        return None
+    return low, high
+
+
+def _rest(spans: list[tuple[float, float]]) -> list[tuple[float, float]]:
+    """What spans leave of 0..1."""
+    left, at = [], 0.0
+    for low, high in sorted(spans):
+        if low > at:
+            left.append((at, low))
+        at = max(at, high)
+    return [*left, (at, 1.0)] if at < 1.0 else left
+
+
+def _at(a: Point, b: Point, share: float) -> Point:
+    if share in (0.0, 1.0):
+        return b if share else a
+    x, y, z = point_at(a, b, share)
+    return x, y, z
