@@ -12,7 +12,7 @@ import matplotlib.image
 import numpy as np
 import pytest
 from small_run import BEGIN, FIRST, LATER, Run, announced, listed, planned, state, statuses, zones
-from test_live_page import near, pixels, share, text
+from test_live_page import find, near, pixels, share, text
 
 from uav_task_alloc.geometry.frames import Origin, to_enu, to_geodetic
 from uav_task_alloc.live.tiles import tile_source
@@ -340,3 +340,41 @@ def test_arrivals_are_in_the_time_of_the_run(shown, speedup):
     page = shown(run, DESK)
     left = 10.0 - 0.5 * speedup
     chromium.wait(page, '#uavs details:nth-child(2)', f'next t3 0:{math.floor(left + 0.5):02}')
+
+
+def test_the_strips_of_an_area_are_drawn_as_flown_and_as_still_to_fly(shown):
+    corners = [[0.0, 0.0, 40.0], [200.0, 0.0, 40.0], [200.0, 120.0, 40.0], [0.0, 120.0, 40.0]]
+    ways = {f'field#{k}': [[0.0, 60.0 * k - 30.0, 40.0], [200.0, 60.0 * k - 30.0, 40.0]]
+            for k in (1, 2)}
+
+    def rows(*names):
+        line = listed(BEGIN, 'u1', 1, names)
+        return {**line, 'tasks': [{**row, 'way': ways[row['id']]} for row in line['tasks']]}
+
+    def reported(first):
+        states = {'field': 'ASSIGNED', 'field#1': first, 'field#2': 'ASSIGNED'}
+        return {'kind': 'statuses', 'wall': BEGIN, 'statuses': [
+            {'task': name, 'state': each, 'uav': 'u1', 'reason': '', 'done': 1, 'pieces': 2}
+            for name, each in states.items()]}
+
+    field = {'id': 'field', 'position': corners[0], 'work': 'AREA', 'path': corners, 'holes': []}
+    page = shown(Run().add(
+        {'kind': 'announcement', 'wall': BEGIN, 'action': 'ADD', 'tasks': [field]},
+        rows(*ways), reported('ACTIVE')).add(
+        rows('field#2'), reported('COMPLETED'),
+        state(BEGIN, 'u1', (100.0, 90.0), active='field#2')), DESK)
+    assert find(page, 'field', '1 of 2 pieces of field are flown; u1 flies the rest.')
+    x, y, scale = map(float, page.get_attribute('#map', 'data-view').split())
+    image = pixels(page, '#map')
+    height, width = image.shape[:2]
+
+    def at(east, north):
+        """Colours around a point of the map."""
+        column, row = width / 2 + (east - x) * scale, height / 2 - (north - y) * scale
+        return image[int(row) - 4:int(row) + 5, int(column) - 4:int(column) + 5]
+
+    assert near(at(150.0, 90.0), BLUE).any()  # the rest of the second strip
+    assert not near(at(50.0, 90.0), BLUE).any()  # what is flown of it
+    flown = at(100.0, 30.0)
+    assert not near(flown, BLUE).any()
+    assert flown[4, 4].max() < at(100.0, 50.0).max() - 0.1  # a grey band

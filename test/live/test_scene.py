@@ -267,3 +267,42 @@ def test_a_list_of_an_earlier_version_has_no_services():
     parts, _, _ = updates([announced(BEGIN, ['t1']), old])
     assert 'service' not in parts['list u1']['tasks'][0]
     assert 'times' not in parts
+
+
+FIELD = {'id': 'field', 'position': [0.0, 0.0, 40.0], 'value': 1.0, 'service': 0.0,
+         'work': 'AREA', 'holes': [], 'radius': None,
+         'path': [[0.0, 0.0, 40.0], [200.0, 0.0, 40.0], [200.0, 40.0, 40.0], [0.0, 40.0, 40.0]]}
+
+
+def with_ways(line):
+    """A list whose pieces `field#k` are strips from west to east."""
+    rows = [{**row, 'way': [[0.0, 20.0 * int(row['id'][-1]) - 10.0, 40.0],
+                            [200.0, 20.0 * int(row['id'][-1]) - 10.0, 40.0]]}
+            for row in line['tasks']]
+    return {**line, 'tasks': rows}
+
+
+def survey(wall, done):
+    """The statuses of a field of two strips, of which so many are done."""
+    states = ['COMPLETED'] * done + ['ASSIGNED'] * (2 - done)
+    return {'kind': 'statuses', 'wall': wall, 'statuses': [
+        {'task': 'field', 'state': 'ASSIGNED', 'uav': 'u1', 'reason': f'{done} of 2 strips',
+         'done': done, 'pieces': 2},
+        *({'task': f'field#{k}', 'state': state, 'uav': 'u1', 'reason': ''}
+          for k, state in enumerate(states, 1))]}
+
+
+def test_an_area_has_its_outline_its_strips_and_those_that_are_flown():
+    begin = [{'kind': 'announcement', 'wall': BEGIN, 'action': 'ADD', 'tasks': [FIELD]},
+             with_ways(listed(BEGIN, 'u1', 1, ['field#1', 'field#2'])), survey(BEGIN, 0)]
+    parts, _, _ = updates(begin)
+    assert parts['works']['field'] == {
+        'kind': 'AREA', 'path': FIELD['path'], 'holes': [], 'radius': 0.0, 'done': 0,
+        'pieces': 2, 'strips': []}
+    assert parts['statuses'] == {'field': ['ASSIGNED', 'u1', '0 of 2 strips']}
+    first = parts['list u1']['tasks'][0]
+    assert (first['id'], first['way']) == ('field#1', [[0.0, 10.0, 40.0], [200.0, 10.0, 40.0]])
+    parts, _, _ = updates(begin, [survey(BEGIN + 9.0, 1),
+                                  with_ways(listed(BEGIN + 9.0, 'u1', 2, ['field#2']))])
+    assert parts['works']['field']['done'] == 1
+    assert parts['works']['field']['strips'] == [[[0.0, 10.0, 40.0], [200.0, 10.0, 40.0]]]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from uav_task_alloc.piece_ids import split_piece
 from uav_task_alloc.record.events import sentences
 from uav_task_alloc.record.plan_diff import (
     RouteLists,
@@ -46,7 +47,7 @@ class Scene:
         self.silent: set[str] = set()
         self.last_authority: LogEntry = {}
         self.last_orders: dict[str, dict[str, str]] = {}  # by allocator
-        self.last_times: LogEntry = {}
+        self.last: LogEntry = {'times': {}, 'works': {}}  # these parts as last sent
 
     def apply(self, line: Line) -> None:
         """Record what a line changes, then apply it to the run."""
@@ -57,8 +58,10 @@ class Scene:
             self.dirty.add(_PART_OF_KIND[kind])
             if kind in ('announcement', 'statuses'):
                 self.dirty.add('times')
+                self.dirty.add('works')
         elif kind == 'list':
             self.dirty.add(f'list {line["uav"]}')
+            self.dirty.add('works')
             self.dirty.add('times')
         elif kind == 'allocation':
             self.new_plans.append(line)
@@ -87,9 +90,10 @@ class Scene:
             self.last_orders = dict(self.run.orders)
             self.dirty.add('orders')
         parts = {name: self.part(name) for name in self.dirty}
-        if parts.get('times') == self.last_times:
-            del parts['times']
-        self.last_times = parts.get('times', self.last_times)
+        for name, before in self.last.items():  # they rarely change
+            if parts.get(name) == before:
+                del parts[name]
+        self.last.update((name, parts[name]) for name in self.last if name in parts)
         authority = self.part('authority')  # a part of its own: it rarely changes
         if authority != self.last_authority:
             self.last_authority = parts['authority'] = authority
@@ -135,6 +139,8 @@ class Scene:
                     for task, row in run.statuses.items()}
         if name == 'times':
             return self.times()
+        if name == 'works':
+            return self.works()
         if name == 'zones':
             return [encode_zone(zone, JSON_ZONE) for zone in run.zones_now()]
         if name == 'uavs':
@@ -192,8 +198,30 @@ class Scene:
         return {'revision': line['revision'], 'tasks': [
             {'id': row['id'], 'via': [to_decimetres(point) for point in row['via']],
              'at': round(planned_at + row['eta'] / speedup, 1) if 'eta' in row else None,
+             **({'way': [to_decimetres(point) for point in row['way']]} if 'way' in row else {}),
              **_span('service', self.run.service(line, row))}
             for row in line['tasks']]}
+
+    def works(self) -> LogEntry:
+        """What is no point, by task: `kind`, `path`, `holes`, `radius` [m]; its pieces.
+
+        `strips`: the ways of its completed pieces [m]; `done` of `pieces` are completed.
+        """
+        run, found = self.run, dict[str, LogEntry]()
+        for name, task in run.tasks.items():
+            if not task.work:
+                continue
+            status = run.statuses.get(name)
+            found[name] = {
+                'kind': task.work, 'path': [to_decimetres(point) for point in task.path],
+                'holes': [[to_decimetres(point) for point in hole] for hole in task.holes],
+                'radius': task.radius, 'done': status.done if status else 0,
+                'pieces': status.pieces if status else 0, 'strips': []}
+        for piece, status in run.pieces.items():
+            whole, _ = split_piece(piece)
+            if status.state == 'COMPLETED' and whole in found and piece in run.ways:
+                found[whole]['strips'].append([to_decimetres(p) for p in run.ways[piece]])
+        return found
 
     def times(self) -> LogEntry:
         """By task: `window` and `planned` service [unix s], of completed ones also `flown`.

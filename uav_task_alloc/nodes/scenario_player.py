@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from dataclasses import replace
 
 from rclpy.node import Node
 from rclpy.task import Future
@@ -28,6 +29,8 @@ from uav_task_alloc.nodes.ros.parameters import declare, given
 from uav_task_alloc.nodes.ros.run import run
 from uav_task_alloc.nodes.ros.scenario_orders import ScenarioOrders
 from uav_task_alloc.params import PlayerParams
+from uav_task_alloc.work.pieces import Work
+from uav_task_alloc.work.values import Kind
 
 _PERIOD = 0.02  # [s]
 # the second is the name of a node that is not fully discovered yet
@@ -123,10 +126,11 @@ class ScenarioPlayer(Node):
         now = self.stamp()
         if moment.zones is not None:
             self.zones.publish(from_zones(moment.zones, now))
-        if moment.tasks:
+        if moment.works:
             zero = now - (self.now() - (self.started_at or 0.0))  # ROS time of second 0
-            tasks = [scenario.from_zero(task, zero) for task in moment.tasks]
-            self.tasks.publish(announcement(m.TaskAnnouncement.ADD, tasks, now))
+            works = [replace(work, task=scenario.from_zero(work.task, zero))
+                     for work in moment.works]
+            self.tasks.publish(announcement(m.TaskAnnouncement.ADD, works, now))
         if moment.cancels:
             self.tasks.publish(announcement(m.TaskAnnouncement.CANCEL, moment.cancels, now))
         self.failing += moment.deaths
@@ -145,10 +149,15 @@ class ScenarioPlayer(Node):
         self.set_alive.call_async(request).add_done_callback(on_response)
 
 
+def named(work: Work) -> str:
+    """The id of a task, with its kind where it is no point."""
+    return work.task.id if work.kind is Kind.POINT else f'{work.task.id} ({work.kind.name})'
+
+
 def describe(moment: scenario.Moment) -> str:
     """A moment in one log line: `70.0 s: 3 zones; new: a03; cancelled: t05; dies: uav_3`."""
     parts = [] if moment.zones is None else [f'{len(moment.zones)} zones']
-    for word, names in (('new', [task.id for task in moment.tasks]),
+    for word, names in (('new', [named(work) for work in moment.works]),
                         ('cancelled', [task.id for task in moment.cancels]),
                         ('dies', list(moment.deaths)),
                         ('orders', [order.text for order in moment.orders])):

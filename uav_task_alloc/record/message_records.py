@@ -15,12 +15,14 @@ from uav_task_alloc.checks import check_number, check_point
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.geometry.frames import Origin, to_enu
 from uav_task_alloc.model import Point
+from uav_task_alloc.piece_ids import piece_id
 from uav_task_alloc.zone_codec import JSON_ZONE, decode_zone_array, encode_zone
 
 RecordBody = dict[str, Any]  # a line without its wall time
 _Message = Any
 
 # names of the messages' constants, by value
+KINDS = ('POINT', 'LINE', 'AREA', 'ORBIT')
 EVENT_ACTIONS = ('ADD', 'UPDATE', 'CANCEL')
 _STATES = ('PENDING', 'ASSIGNED', 'ACTIVE', 'COMPLETED', 'FAILED', 'CANCELLED', 'REJECTED',
           'UNASSIGNED')
@@ -66,16 +68,41 @@ def announcement_record(msg: _Message, origin: Origin | None) -> RecordBody:
             tasks.append({'id': task.task_id})
             continue
         try:
-            position = task_position(task, origin)
+            shape = _shape(task, origin)
+            position = (shape.get('path') or [task_position(task, origin)])[0]
         except InvalidValue:
             continue
         if position is not None:
             tasks.append(
                 {'id': task.task_id, 'position': position, 'value': finite_or_none(task.value),
-                 'service': from_stamp(task.service_time), **_window(task)}
+                 'service': from_stamp(task.service_time), **_window(task), **shape}
             )
     action = constant_name(EVENT_ACTIONS, msg.action)
     return {'kind': 'announcement', 'action': action, 'tasks': tasks}
+
+
+def _shape(task: _Message, origin: Origin | None) -> RecordBody:
+    """What is drawn of a task that is no point: its `work`, `path`, `holes` and `radius` [m]."""
+    kind = constant_name(KINDS, getattr(task, 'kind', 0))  # earlier versions had points only
+    if kind in ('', 'POINT'):
+        return {}
+    rings = [list(filter(None, (_placed(task, point, origin) for point in ring)))
+             for ring in (task.path, *(hole.points for hole in task.holes))]
+    return {'work': kind, 'path': rings[0], 'holes': rings[1:],
+            'radius': finite_or_none(task.radius) if kind == 'ORBIT' else None}
+
+
+def _placed(task: _Message, point: _Message, origin: Origin | None) -> Point | None:
+    """A point of a path [m] ENU; None for WGS84 without an origin."""
+    place = f'task {task.task_id}: path'
+    if task.frame != _FRAME_WGS84:
+        return check_point(place, _xyz(point))
+    if origin is None:
+        return None
+    x, y, z = check_point(place, _xyz(point))
+    check_number(place, x, -180.0, 180.0)
+    check_number(place, y, -90.0, 90.0)
+    return to_enu(origin, y, x, origin.altitude_amsl + z)
 
 
 def _window(task: _Message) -> RecordBody:
@@ -153,8 +180,18 @@ def statuses_record(msg: _Message) -> RecordBody:
         Kind `statuses`.
     """
     return {'kind': 'statuses', 'statuses': [
-        {'task': row.task_id, 'state': constant_name(_STATES, row.state), 'uav': row.uav_id,
-         'reason': row.reason, **_expected(row)} for row in msg.statuses]}
+        {'task': _full_id(row), 'state': constant_name(_STATES, row.state), 'uav': row.uav_id,
+         'reason': row.reason, **_expected(row), **_pieces(row)} for row in msg.statuses]}
+
+
+def _full_id(row: _Message) -> str:
+    """The id of a task or piece; recordings of earlier versions have no pieces."""
+    return piece_id(row.task_id, getattr(row, 'piece', 0))
+
+
+def _pieces(row: _Message) -> RecordBody:
+    """How many `pieces` work has, and how many are `done`."""
+    return {'done': row.pieces_done, 'pieces': row.pieces} if getattr(row, 'pieces', 0) else {}
 
 
 def _expected(row: _Message) -> RecordBody:
@@ -228,13 +265,23 @@ def task_list_record(msg: _Message) -> RecordBody:
     return {'kind': 'list', 'uav': msg.uav_id, 'revision': msg.revision, 'end': msg.end,
             'stamp': from_stamp(msg.header.stamp),
             'distance': finite_or_none(msg.distance), 'tasks': [
-                {'id': row.task.task_id, 'leg_distance': finite_or_none(row.leg_distance) or 0.0,
+                {'id': piece_id(row.task.task_id, getattr(row, 'piece', 0)),
+                 'leg_distance': finite_or_none(row.leg_distance) or 0.0, **_way(row),
                  'eta': from_stamp(row.eta),
                  **{name: from_stamp(getattr(row, name)) for name in ('wait', 'finish')
                     if hasattr(row, name)},
                  'position': [finite_or_none(v) for v in _xyz(row.task.position)],
                  'via': [xyz for xyz in map(_xyz, row.via) if all(map(math.isfinite, xyz))]}
                 for row in msg.tasks]}
+
+
+def _way(row: _Message) -> RecordBody:
+    """The `way` of a piece [m] in the order in which it is flown; nothing for a point."""
+    path = [xyz for xyz in map(_xyz, getattr(row.task, 'path', ()))
+            if all(map(math.isfinite, xyz))]
+    if len(path) < 2 or row.task.kind != KINDS.index('LINE'):
+        return {}
+    return {'way': path[::-1] if row.reversed else path}
 
 
 def state_record(msg: _Message) -> RecordBody:
@@ -248,7 +295,7 @@ def state_record(msg: _Message) -> RecordBody:
     """
     return {'kind': 'state', 'uav': msg.uav_id, 'mode': constant_name(MODES, msg.mode),
             'mission_state': constant_name(MISSIONS, msg.mission_state),
-            'active': msg.active_task_id,
+            'active': piece_id(msg.active_task_id, getattr(msg, 'active_piece', 0)),
             'list_revision': msg.list_revision, 'battery': finite_or_none(msg.battery),
             'position': [finite_or_none(v) for v in _xyz(msg.position)],
             'velocity': [finite_or_none(v) for v in _xyz(msg.velocity)],

@@ -11,8 +11,10 @@ from statistics import median
 from typing import Any
 
 from uav_task_alloc.geometry.frames import Origin
+from uav_task_alloc.geometry.polyline import polyline_length
 from uav_task_alloc.model import Point, ThreatZone
 from uav_task_alloc.params import AllocatorParams
+from uav_task_alloc.piece_ids import split_piece
 from uav_task_alloc.record.plan_diff import RouteLists, route_changes, route_lists
 from uav_task_alloc.zone_codec import decode_zone
 
@@ -37,6 +39,10 @@ class AnnouncedTask:
     service: float = 0.0  # [s]
     earliest: float | None = None  # [ROS s] of the start of its service; None: any
     latest: float | None = None  # [ROS s] of the start of its service; None: any
+    work: str = ''  # name of a kind of Task messages; '' for a point
+    path: tuple[Point, ...] = ()  # [m] of a LINE, or the outline of an AREA
+    holes: tuple[tuple[Point, ...], ...] = ()  # [m]
+    radius: float = 0.0  # [m] of an ORBIT
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,6 +61,8 @@ class ReportedStatus:
     state: str  # name of a TaskStatus constant
     uav: str  # that has it, or had it; '': none
     reason: str  # of the state, for users
+    done: int = 0  # pieces of work that are completed
+    pieces: int = 0  # of work; 0: it has none
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,6 +107,8 @@ class RunState:
     tasks: dict[str, AnnouncedTask] = field(default_factory=dict)  # announced, by id
     cancelled: set[str] = field(default_factory=set)  # ids of tasks
     statuses: dict[str, ReportedStatus] = field(default_factory=dict)  # by task id
+    pieces: dict[str, ReportedStatus] = field(default_factory=dict)  # by id of the piece
+    ways: dict[str, list[Point]] = field(default_factory=dict)  # [m] of listed pieces, by id
     planned: dict[str, Service] = field(default_factory=dict)  # by task, of legs begun
     flown: dict[str, Service] = field(default_factory=dict)  # by task, of completed ones
     solves: list[SolveRecord] = field(default_factory=list)  # in the order of publication
@@ -165,7 +175,10 @@ class RunState:
                 known = self.tasks.get(task['id'])
                 self.tasks[task['id']] = AnnouncedTask(
                     tuple(task['position']), known.wall if known else line['wall'],
-                    task.get('service', 0.0), task.get('earliest'), task.get('latest'))
+                    task.get('service', 0.0), task.get('earliest'), task.get('latest'),
+                    task.get('work', ''), tuple(map(tuple, task.get('path', ()))),
+                    tuple(tuple(map(tuple, hole)) for hole in task.get('holes', ())),
+                    task.get('radius') or 0.0)
 
     def on_statuses(self, line: Line) -> None:
         """The statuses of all tasks."""
@@ -174,8 +187,11 @@ class RunState:
                 task = self.tasks.get(row['task'])
                 service = task.service / self.speedup if task else 0.0
                 self.flown[row['task']] = Service(row['uav'], line['wall'] - service, line['wall'])
-        self.statuses = {row['task']: ReportedStatus(row['state'], row['uav'], row['reason'])
-                         for row in line['statuses']}
+        rows = {row['task']: ReportedStatus(row['state'], row['uav'], row['reason'],
+                                            row.get('done', 0), row.get('pieces', 0))
+                for row in line['statuses']}
+        self.pieces = {task: row for task, row in rows.items() if split_piece(task)[1]}
+        self.statuses = {task: row for task, row in rows.items() if task not in self.pieces}
 
     def on_allocation(self, line: Line) -> None:
         """A plan was published: by now the tasks completed before the one before it are known."""
@@ -213,11 +229,13 @@ class RunState:
         """A task list; the leg to a task is taken from the list in which it became the first."""
         if self.begins_leg(line):
             first = line['tasks'][0]
-            self.legs[line['uav'], first['id']] = first['leg_distance']
+            self.legs[line['uav'], first['id']] = first['leg_distance'] + polyline_length(
+                first.get('way', ()))
             service = self.service(line, first)
             if service is not None:
                 self.planned[first['id']] = service
         rows = line['tasks']
+        self.ways.update((row['id'], row['way']) for row in rows if 'way' in row)
         for before, row in zip((None, *rows), rows, strict=False):
             if row.get('wait', 0.0) > 0.0:
                 self.waited |= {row['id']} | ({before['id']} if before else set())
@@ -314,8 +332,9 @@ class RunState:
         return sum(status.state in states for status in self.statuses.values())
 
     def completed(self) -> set[str]:
-        """Ids of the completed tasks."""
-        return {task for task, status in self.statuses.items() if status.state == 'COMPLETED'}
+        """Ids of the completed tasks and pieces."""
+        return {task for task, status in {**self.statuses, **self.pieces}.items()
+                if status.state == 'COMPLETED'}
 
     def start(self) -> float:
         """Time of the first announced task [unix s]; of the first line where there is none."""

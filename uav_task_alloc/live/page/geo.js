@@ -73,3 +73,15 @@ export function roundStep(most) {
   const unit = 10 ** Math.floor(Math.log10(most));
   return unit * [5, 2, 1].find(k => k * unit <= most * (1 + 1e-9));
 }
+
+// The points of a polyline after the spot that is nearest to a position.
+export function pointsAhead([x, y], points) {
+  let best = Infinity, from = 0;
+  for (let k = 1; k < points.length; k++) {
+    const [[ax, ay], [bx, by]] = [points[k - 1], points[k]], dx = bx - ax, dy = by - ay;
+    const length = dx * dx + dy * dy, t = length ? ((x - ax) * dx + (y - ay) * dy) / length : 0;
+    const s = Math.min(1, Math.max(0, t)), far = Math.hypot(x - ax - s * dx, y - ay - s * dy);
+    if (far < best - 1e-6) [best, from] = [far, t > 0 ? k : k - 1];
+  }
+  return points.slice(from);
+}

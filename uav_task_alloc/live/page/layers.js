@@ -150,6 +150,33 @@ function arrow(context, a, b) {
   context.restore();
 }
 
+// work that is no point: outlines, and the strips that are flown
+
+export function drawWorks(context, view, works, colours) {
+  const ring = radius => TURN.map(a => [radius * Math.cos(a), radius * Math.sin(a)]);
+  context.lineJoin = 'round';
+  for (const {kind, path, holes, radius, strips, position} of works) {
+    context.strokeStyle = colours.faint;
+    context.globalAlpha = .45;
+    context.lineWidth = 6;
+    for (const strip of strips) {
+      line(context, strip.map(view.pixel));
+      context.stroke();
+    }
+    context.globalAlpha = 1;
+    context.strokeStyle = colours.ink;
+    context.lineWidth = 1.2;
+    context.setLineDash([4, 3]);
+    const outlines = kind === 'ORBIT'
+      ? [ring(radius).map(([x, y]) => [position[0] + x, position[1] + y])] : [path, ...holes];
+    for (const outline of outlines) {
+      line(context, outline.map(view.pixel), kind === 'AREA');
+      context.stroke();
+    }
+    context.setLineDash([]);
+  }
+}
+
 // tasks
 
 const RADII = {fly: 5.5, wait: 6, left: 7, done: 3};  // [px] by kind

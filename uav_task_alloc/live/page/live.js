@@ -4,6 +4,7 @@
 import {openCard, showUavs} from './cards.js';
 import {drawChart} from './chart.js';
 import {drawGantt} from './gantt.js';
+import {pointsAhead} from './geo.js';
 import {FleetMap} from './map.js';
 import {$, fill, make, pick, put, showAnswer, showEvents, showHead, showLeft, showOrders,
   showPlans}
@@ -44,8 +45,11 @@ function showMap(model, picked) {
   const flying = model.uavs.filter(uav => model.lists.get(uav.id).length && !uav.lost);
   const routes = flying.map(uav => ({
     index: uav.index, points: [uav.position, ...model.lists.get(uav.id).flatMap(
-      task => [...task.via, at(task.id)])].filter(point => point && point[0] !== null)}));
-  map.show({origin: model.origin, zones: model.zones, routes, tasks, uavs: model.uavs,
+      ({id, via, way}) => way && id === uav.active ? pointsAhead(uav.position, [...via, ...way])
+        : [...via, ...way || [at(id)]])].filter(point => point && point[0] !== null)}));
+  const works = [...model.works].map(([id, work]) => ({...work, position: at(id)}))
+    .filter(work => work.position && work.position[0] !== null);
+  map.show({origin: model.origin, zones: model.zones, routes, tasks, works, uavs: model.uavs,
     changed: given.filter(id => at(id) && model.turns.has(id)).map(at),
     pickedId: picked, pickedIndex: model.turns.get(picked)?.index,
     picked: at(picked) ? [at(picked)] : [],

@@ -2,7 +2,7 @@
 // The map: a view of the ENU plane that is moved and zoomed; what is drawn, and what is clicked.
 import {degreesText, frameOf, metresText, roundStep} from './geo.js';
 import {listen} from './gestures.js';
-import {RINGS, drawGrid, drawRings, drawRoutes, drawTasks, drawZones, themeColours,
+import {RINGS, drawGrid, drawRings, drawRoutes, drawTasks, drawWorks, drawZones, themeColours,
   zoneOutline} from './layers.js';
 import {Overlay} from './overlay.js';
 import {Tiles} from './tiles.js';
@@ -89,8 +89,9 @@ export class FleetMap {
   }
 
   bounds() {
-    const {tasks, uavs, zones, routes} = this.scene;
+    const {tasks, uavs, zones, routes, works} = this.scene;
     const points = [...tasks.map(task => task.position), ...uavs.map(uav => uav.position),
+      ...works.flatMap(work => work.path),
       ...zones.flatMap(zone => zoneOutline(zone)), ...routes.flatMap(route => route.points)]
       .filter(([x, y]) => x !== null && y !== null);
     if (!points.length) return null;
@@ -141,6 +142,7 @@ export class FleetMap {
     this.tiles.draw(context, view, colours.veil);
     const texts = drawGrid(context, view, colours);
     drawZones(context, view, scene.zones, colours);
+    drawWorks(context, view, scene.works, colours);
     drawRoutes(context, view, scene, colours);
     drawRings(context, view, scene.changed, RINGS.given, colours.mark);
     drawTasks(context, view, scene.tasks, colours);

@@ -34,7 +34,7 @@ export function readModel(past) {
   const {parts} = past || live, wall = past ? past.wall : live.clock.wall;
   const map = name => new Map(Object.entries(parts[name] || {}));
   const model = {wall, where: map('tasks'), statuses: map('statuses'), zones: parts.zones || [],
-    lists: new Map(), turns: new Map(), times: map('times'), origin: parts.origin || null,
+    lists: new Map(), turns: new Map(), times: map('times'), works: map('works'), origin: parts.origin || null,
     frame: parts.origin ? frameOf(parts.origin) : null, over: !past && Boolean(live.clock.ended)};
   const states = map('uavs'), authorities = map('authority');
   const lists = Object.keys(parts).filter(name => name.startsWith('list '));
@@ -43,7 +43,12 @@ export function readModel(past) {
   names.forEach((uav, index) => {
     const tasks = parts['list ' + uav]?.tasks || [];
     model.lists.set(uav, tasks);
-    tasks.forEach(({id, at}, k) => model.turns.set(id, {uav, index, place: k + 1, at}));
+    tasks.forEach(({id, at}, k) => {
+      const turn = {uav, index, place: k + 1, at}, whole = id.replace(/#\d+$/, '');
+      model.turns.set(id, turn);
+      const known = model.turns.get(whole);  // of work: its next piece
+      if (whole !== id && !(known?.place <= turn.place)) model.turns.set(whole, turn);
+    });
   });
   model.ids = [...new Set([...model.where.keys(), ...model.statuses.keys()])];
   model.uavs = names.map((id, index) => {
@@ -131,6 +136,8 @@ export const until = (wall, model) => mission(wall - model.wall);
 // Which UAV flies a task, or why none does: {text, bad}.
 export function answer(id, model) {
   const [state, uav, reason] = stateOf(id, model), turn = model.turns.get(id);
+  const work = model.works.get(id);
+  if (work?.pieces && (turn || state === 'COMPLETED')) return {text: workText(id, work, model)};
   if (turn) return {text: turnText(id, turn, model)};
   if (state === 'COMPLETED') return {text: `${id} is done: ${uav || 'a UAV'} completed it.`};
   if (state === 'CANCELLED') return {text: `${id} was withdrawn. No UAV flies it.`};
@@ -141,6 +148,16 @@ export function answer(id, model) {
   }
   if (state === 'PENDING') return {text: `${id} waits for the next plan.`};
   return {text: `${id} is given to ${uav}, whose list has not arrived yet.`};
+}
+
+// Of work that is flown in pieces: how much is done, and who flies the rest.
+function workText(id, {done, pieces}, model) {
+  const flown = `${done} of ${pieces} pieces of ${id} are flown`;
+  const uavs = [...model.lists].filter(([, list]) =>
+    list.some(task => task.id.startsWith(`${id}#`))).map(([uav]) => uav);
+  const names = uavs.length === 2 ? uavs.join(' and ') : some(uavs, 8);
+  return uavs.length ? `${flown}; ${names} ${uavs.length > 1 ? 'fly' : 'flies'} the rest.`
+    : `${flown}.`;
 }
 
 function turnText(id, {uav, place, at}, model) {
