@@ -149,7 +149,7 @@ class ScenarioPlayer(Node):
         self.set_alive.call_async(request).add_done_callback(on_response)
 
 
-def named(work: Work) -> str:
+def work_text(work: Work) -> str:
     """The id of a task, with its kind where it is no point."""
     return work.task.id if work.kind is Kind.POINT else f'{work.task.id} ({work.kind.name})'
 
@@ -157,7 +157,7 @@ def named(work: Work) -> str:
 def describe(moment: scenario.Moment) -> str:
     """A moment in one log line: `70.0 s: 3 zones; new: a03; cancelled: t05; dies: uav_3`."""
     parts = [] if moment.zones is None else [f'{len(moment.zones)} zones']
-    for word, names in (('new', [named(work) for work in moment.works]),
+    for word, names in (('new', [work_text(work) for work in moment.works]),
                         ('cancelled', [task.id for task in moment.cancels]),
                         ('dies', list(moment.deaths)),
                         ('orders', [order.text for order in moment.orders])):

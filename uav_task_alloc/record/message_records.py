@@ -22,7 +22,7 @@ RecordBody = dict[str, Any]  # a line without its wall time
 _Message = Any
 
 # names of the messages' constants, by value
-KINDS = ('POINT', 'LINE', 'AREA', 'ORBIT')
+TASK_KINDS = ('POINT', 'LINE', 'AREA', 'ORBIT')
 EVENT_ACTIONS = ('ADD', 'UPDATE', 'CANCEL')
 _STATES = ('PENDING', 'ASSIGNED', 'ACTIVE', 'COMPLETED', 'FAILED', 'CANCELLED', 'REJECTED',
           'UNASSIGNED')
@@ -83,7 +83,7 @@ def announcement_record(msg: _Message, origin: Origin | None) -> RecordBody:
 
 def _shape(task: _Message, origin: Origin | None) -> RecordBody:
     """What is drawn of a task that is no point: its `work`, `path`, `holes` and `radius` [m]."""
-    kind = constant_name(KINDS, getattr(task, 'kind', 0))  # earlier versions had points only
+    kind = constant_name(TASK_KINDS, getattr(task, 'kind', 0))  # earlier versions had points only
     if kind in ('', 'POINT'):
         return {}
     rings = [list(filter(None, (_placed(task, point, origin) for point in ring)))
@@ -279,7 +279,7 @@ def _way(row: _Message) -> RecordBody:
     """The `way` of a piece [m] in the order in which it is flown; nothing for a point."""
     path = [xyz for xyz in map(_xyz, getattr(row.task, 'path', ()))
             if all(map(math.isfinite, xyz))]
-    if len(path) < 2 or row.task.kind != KINDS.index('LINE'):
+    if len(path) < 2 or row.task.kind != TASK_KINDS.index('LINE'):
         return {}
     return {'way': path[::-1] if row.reversed else path}
 
