@@ -78,7 +78,8 @@ class Allocator:
         self.approvals = Approvals(self.world)
         self.separation = SeparationWatch(self.world)
         self.batteries = BatteryWatch(self.world)
-        self._best = Plan({each.uav: each.task_ids for each in saved.lists})
+        self._best = Plan({each.uav: each.task_ids for each in saved.lists}, reversed=frozenset(
+            stop.task.id for each in saved.lists for stop in each.stops if stop.reversed))
         self._learned = saved.learned
         self._learned_saved = now  # [s]
         self._limiter = ListRateLimiter()

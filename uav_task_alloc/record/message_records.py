@@ -16,13 +16,13 @@ from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.geometry.frames import Origin, to_enu
 from uav_task_alloc.model import Point
 from uav_task_alloc.piece_ids import piece_id
+from uav_task_alloc.record.task_shapes import flown_way, task_shape
 from uav_task_alloc.zone_codec import JSON_ZONE, decode_zone_array, encode_zone
 
 RecordBody = dict[str, Any]  # a line without its wall time
 _Message = Any
 
 # names of the messages' constants, by value
-TASK_KINDS = ('POINT', 'LINE', 'AREA', 'ORBIT')
 EVENT_ACTIONS = ('ADD', 'UPDATE', 'CANCEL')
 _STATES = ('PENDING', 'ASSIGNED', 'ACTIVE', 'COMPLETED', 'FAILED', 'CANCELLED', 'REJECTED',
           'UNASSIGNED')
@@ -68,7 +68,7 @@ def announcement_record(msg: _Message, origin: Origin | None) -> RecordBody:
             tasks.append({'id': task.task_id})
             continue
         try:
-            shape = _shape(task, origin)
+            shape = task_shape(task, origin)
             position = (shape.get('path') or [task_position(task, origin)])[0]
         except InvalidValue:
             continue
@@ -79,30 +79,6 @@ def announcement_record(msg: _Message, origin: Origin | None) -> RecordBody:
             )
     action = constant_name(EVENT_ACTIONS, msg.action)
     return {'kind': 'announcement', 'action': action, 'tasks': tasks}
-
-
-def _shape(task: _Message, origin: Origin | None) -> RecordBody:
-    """What is drawn of a task that is no point: its `work`, `path`, `holes` and `radius` [m]."""
-    kind = constant_name(TASK_KINDS, getattr(task, 'kind', 0))  # earlier versions had points only
-    if kind in ('', 'POINT'):
-        return {}
-    rings = [list(filter(None, (_placed(task, point, origin) for point in ring)))
-             for ring in (task.path, *(hole.points for hole in task.holes))]
-    return {'work': kind, 'path': rings[0], 'holes': rings[1:],
-            'radius': finite_or_none(task.radius) if kind == 'ORBIT' else None}
-
-
-def _placed(task: _Message, point: _Message, origin: Origin | None) -> Point | None:
-    """A point of a path [m] ENU; None for WGS84 without an origin."""
-    place = f'task {task.task_id}: path'
-    if task.frame != _FRAME_WGS84:
-        return check_point(place, _xyz(point))
-    if origin is None:
-        return None
-    x, y, z = check_point(place, _xyz(point))
-    check_number(place, x, -180.0, 180.0)
-    check_number(place, y, -90.0, 90.0)
-    return to_enu(origin, y, x, origin.altitude_amsl + z)
 
 
 def _window(task: _Message) -> RecordBody:
@@ -266,22 +242,13 @@ def task_list_record(msg: _Message) -> RecordBody:
             'stamp': from_stamp(msg.header.stamp),
             'distance': finite_or_none(msg.distance), 'tasks': [
                 {'id': piece_id(row.task.task_id, getattr(row, 'piece', 0)),
-                 'leg_distance': finite_or_none(row.leg_distance) or 0.0, **_way(row),
+                 'leg_distance': finite_or_none(row.leg_distance) or 0.0, **flown_way(row),
                  'eta': from_stamp(row.eta),
                  **{name: from_stamp(getattr(row, name)) for name in ('wait', 'finish')
                     if hasattr(row, name)},
                  'position': [finite_or_none(v) for v in _xyz(row.task.position)],
                  'via': [xyz for xyz in map(_xyz, row.via) if all(map(math.isfinite, xyz))]}
                 for row in msg.tasks]}
-
-
-def _way(row: _Message) -> RecordBody:
-    """The `way` of a piece [m] in the order in which it is flown; nothing for a point."""
-    path = [xyz for xyz in map(_xyz, getattr(row.task, 'path', ()))
-            if all(map(math.isfinite, xyz))]
-    if len(path) < 2 or row.task.kind != TASK_KINDS.index('LINE'):
-        return {}
-    return {'way': path[::-1] if row.reversed else path}
 
 
 def state_record(msg: _Message) -> RecordBody:

@@ -127,7 +127,7 @@ def _flight(each: UavList, published: UavList, flight: UavFlight, stamp: float,
         legs.append(leg)
         clock = leg_times(own, leg, clock, k == 0).end
         if along:
-            legs.append(FlightLeg(stop.way, stop.task.id, stop.task.stay,
+            legs.append(FlightLeg(stop.way, '', stop.task.stay,
                                   movable=False, may_wait=False))
             clock = leg_times(own, legs[-1], clock, False).end
         place = stop.exit
@@ -186,7 +186,7 @@ def _changed_list(world: World, each: UavList, before: Flight, after: Flight,
 
 def _is_path(leg: FlightLeg) -> bool:
     """Whether a leg is the path of a task, not the leg to one."""
-    return bool(leg.task) and not leg.movable and not leg.may_wait
+    return not (leg.movable or leg.may_wait or leg.lands)
 
 
 def _end_via(each: UavList, after: Flight) -> tuple[Point, ...]:
