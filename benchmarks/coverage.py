@@ -10,8 +10,8 @@ field without holes is compared with that of drone-flightplan for the same dista
 photos a quarter of it apart): our strips in their order, each from its nearer end, or with
 `--solver` in the order that `plan` finds in so many seconds. The last line is one JSON object:
 `fields`, `least_share`, `below` (of 99.5 %), `entered` (ways inside zones), `pieces` (median),
-`seconds` (longest to cut), `compared`, `ratio_median`, `ratio_worst`, `shorter` (share), `their_share`
-(covered by the public planner, median).
+`seconds` (longest to cut), `compared`, `ratio_median`, `ratio_worst`, `shorter` (share), and
+`their_share` (covered by the public planner, median).
 """
 import argparse
 import json

@@ -101,14 +101,13 @@ def test_what_is_not_imported_is_named(tmp_path):
                       + '<NetworkLink><name>more</name></NetworkLink>'
                       + '<Placemark><name>empty</name></Placemark>')
     scenario, notes = imported(tmp_path, 'job.kml', text)
-    assert len(scenario.tasks) == 1
+    assert [timed.task.id for timed in scenario.tasks] == ['Mast_7', 'wire']
     assert sorted(notes) == [
         "job.kml: NetworkLink 'more': links are not followed",
         "job.kml: Placemark 'Mast 7': its id is Mast_7",
         "job.kml: Placemark 'empty': it has no geometry",
         "job.kml: Placemark 'field': a polygon, which is neither in a folder of zones nor has "
-        'kind: zone; --polygons zones makes each a zone',
-        "job.kml: Placemark 'wire': a line; --lines vertices makes a task of each vertex"]
+        'kind: zone; --strip-width makes each an area, --polygons zones a zone']
 
 
 def test_many_changed_names_are_one_note(tmp_path):
@@ -225,7 +224,7 @@ def test_a_plan_of_qgroundcontrol(tmp_path):
     scenario, notes = imported(tmp_path, 'job.plan', plan_text(
         [simple(22, 0, 0, 20), simple(16, 47.4, 8.547, 30, hold=7, number=2),
          simple(16, 47.401, 8.547, 530, mode=2, number=3), simple(206, 0, 0, 0),
-         {'type': 'ComplexItem', 'complexItemType': 'survey'}, simple(20, 0, 0, 0)],
+         {'type': 'ComplexItem', 'complexItemType': 'StructureScan'}, simple(20, 0, 0, 0)],
         {'circles': [{'circle': {'center': [47.402, 8.547], 'radius': 30}, 'inclusion': False}],
          'polygons': [
              {'inclusion': False, 'polygon': [[47.40, 8.54], [47.40, 8.55], [47.41, 8.55]]},
@@ -239,7 +238,7 @@ def test_a_plan_of_qgroundcontrol(tmp_path):
     assert notes == [
         'job.plan: item 1: a take-off, which missions get of their own',
         'job.plan: item 4: command 206 is none of 16, 19, 82',
-        'job.plan: item 5: a survey: lines and areas are not planned yet',
+        'job.plan: item 5: a StructureScan is neither a survey nor a corridor',
         'job.plan: item 6: a return, which missions get of their own',
         'job.plan: fence polygon 2: it includes: expected an excluding one, see fence_area']
 
@@ -274,11 +273,11 @@ BROKEN = {
     'metres.geojson': (geojson((point(2600000, 1200000), {})), 'feature 1: longitude 2.6e+06'),
     'nan.geojson': (geojson((point(8.5, float('nan')), {})), 'feature 1: coordinates [8.5, nan]'),
     'true.geojson': (geojson((point(True, 4), {})), 'feature 1: coordinates [True, 4]'),
-    'nothing.geojson': (geojson(), 'nothing to import: expected points or zones'),
+    'nothing.geojson': (geojson(), 'nothing to import: expected points, lines, areas'),
     'value.geojson': (geojson((point(8.547, 47.4), {'name': 'a', 'value': -1})),
                       "feature 'a': scenario.tasks[0].value = -1: expected a number in (0, inf)"),
     'kind.geojson': (geojson((point(8.547, 47.4), {'kind': 'house'})),
-                     "feature 1: kind = 'house': expected one of task, zone, no_fly_zone, uav"),
+                     "feature 1: kind = 'house': expected one of task, zone, no_fly_zone, uav, p"),
     'far.geojson': (geojson((point(100.0, 47.4), {})), 'a place within 500 km of the origin'),
     'radius.geojson': (geojson((point(8.547, 47.4), {'kind': 'zone'})),
                        'a zone that is a point: expected a polygon, or a point with a radius'),
@@ -288,8 +287,8 @@ BROKEN = {
     'other.plan': ('{"fileType": "Map"}', "fileType = 'Map': expected Plan"),
     'short.plan': (plan_text([{'type': 'SimpleItem', 'command': 16, 'params': [0]}]),
                    'IndexError'),
-    'terrain.plan': (plan_text([simple(16, 47.4, 8.5, 30, mode=4)]),
-                     'item 1: its altitude is above terrain'),
+    'mode.plan': (plan_text([simple(16, 47.4, 8.5, 30, mode=9)]),
+                  'item 1: AltitudeMode 9, frame 3: expected an altitude relative to launch'),
     'empty.csv': ('', "columns '': expected one named latitude"),
     'column.csv': ('name,lat\na,3\n', "columns 'name, lat': expected one named longitude"),
     'short.csv': ('name,lat,lon\na,47\n', 'short.csv:2: expected 3 columns: name, lat, lon'),

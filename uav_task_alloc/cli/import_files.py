@@ -40,7 +40,8 @@ def main(argv: Sequence[str]) -> int:
     check_file('--output', out, _SUFFIXES, [*args.files, *([args.fleet] if args.fleet else [])])
     made = to_scenario([read_map_file(path) for path in args.files], ImportChoices(
         args.origin, args.height, args.altitudes or '', args.polygons == 'zones',
-        args.lines == 'vertices', args.uavs, _fleet(args.fleet)), out.stem)
+        args.lines == 'vertices', args.strip_width or 0.0, args.uavs, _fleet(args.fleet)),
+        out.stem)
     with naming('--output', out):
         replace_file(out, made.text)
     for note in made.notes[:_MOST_NOTES]:
@@ -56,8 +57,9 @@ def main(argv: Sequence[str]) -> int:
 
 def _make_parser() -> OptionParser:
     parser = OptionParser(
-        'import', 'Make a scenario file of map files: points become tasks, and polygons no-fly '
-        'zones where they are in a folder of zones or have the property kind: zone '
+        'import', 'Make a scenario file of map files: points and lines become tasks, polygons '
+        'areas with --strip-width, or no-fly zones where they are in a folder of zones or have '
+        'the property kind: zone '
         '(docs/map_files.md). What is not imported is named.')
     parser.add_argument('files', nargs='+', type=Path, metavar='FILE',
                         help='.kml, .kmz, .geojson, .json, .plan (QGroundControl) or .csv')
@@ -81,7 +83,10 @@ def _make_parser() -> OptionParser:
     parser.add_argument('--polygons', type=one_of('zones'), metavar='zones',
                         help='every polygon is a zone (default: those that the file calls so)')
     parser.add_argument('--lines', type=one_of('vertices'), metavar='vertices',
-                        help='a task at each vertex of a line (default: lines are left out)')
+                        help='a task at each vertex of a line (default: a line is one task, flown '
+                             'along it)')
+    parser.number('--strip-width', 0.1, 10000.0, 'that one pass over an area covers, of polygons '
+                  'whose file does not say it', unit='m', default_text='they are left out')
     return parser
 
 

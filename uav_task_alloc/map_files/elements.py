@@ -38,7 +38,7 @@ class Element:
     reference: str = UNSAID  # of the altitudes: AMSL, ABOVE_ORIGIN or UNSAID
     properties: dict[str, Any] = field(default_factory=dict)  # by lower-case name
     radius: float = math.nan  # [m] of a circle
-    holes: int = 0  # of a polygon
+    holes: tuple[tuple[Place, ...], ...] = ()  # of a polygon, open rings
     zone: bool = False  # the file says that it is a no-fly zone
 
 

@@ -17,6 +17,7 @@ from uav_task_alloc.map_files.elements import (
 )
 
 _WGS84 = 'CRS84', '4326'  # ends of the names of a `crs`, which files before the RFC have
+_Shape = tuple[str, tuple[Place, ...], tuple[tuple[Place, ...], ...]]
 _PARTS = {'MultiPoint': 'Point', 'MultiLineString': 'LineString', 'MultiPolygon': 'Polygon'}
 
 
@@ -72,8 +73,8 @@ def _read_feature(feature: Any, number: int, file: str, read: MapFile) -> None:
                       for kind, places, holes in _shapes(geometry, where)]
 
 
-def _shapes(geometry: Any, where: str) -> Iterator[tuple[str, tuple[Place, ...], int]]:
-    """Geometry, places and number of holes of each part."""
+def _shapes(geometry: Any, where: str) -> Iterator[_Shape]:
+    """Geometry, places and holes of each part."""
     open_parts = [geometry]
     while open_parts:
         part = open_parts.pop()
@@ -90,15 +91,15 @@ def _shapes(geometry: Any, where: str) -> Iterator[tuple[str, tuple[Place, ...],
                                'Polygon, one of their Multi forms or a GeometryCollection')
 
 
-def _shape(kind: str, coordinates: list[Any], where: str) -> tuple[str, tuple[Place, ...], int]:
+def _shape(kind: str, coordinates: list[Any], where: str) -> _Shape:
     if kind == 'Point':
-        return 'point', (check_place(where, coordinates),), 0
+        return 'point', (check_place(where, coordinates),), ()
     if kind == 'LineString':
-        return 'line', _places(coordinates, where), 0
+        return 'line', _places(coordinates, where), ()
     if not coordinates:
         raise MapFileError(f'{where}: a polygon without rings: expected one')
-    return ('polygon', open_ring(where, _places(_list(coordinates[0], where), where)),
-            len(coordinates) - 1)
+    outer, *holes = (open_ring(where, _places(_list(ring, where), where)) for ring in coordinates)
+    return 'polygon', outer, tuple(holes)
 
 
 def _places(coordinates: list[Any], where: str) -> tuple[Place, ...]:

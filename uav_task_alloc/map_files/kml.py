@@ -134,20 +134,22 @@ def _read_placemark(node: ElementTree.Element, folders: tuple[str, ...], number:
 
 
 def _shape(node: ElementTree.Element, tag: str, where: str) -> tuple[
-        str, tuple[Place, ...], int]:
-    """Geometry, places and number of holes."""
+        str, tuple[Place, ...], tuple[tuple[Place, ...], ...]]:
+    """Geometry, places and holes."""
     if tag == 'Point':
         places = _coordinates(node, where)
         if len(places) != 1:
             raise MapFileError(f'{where}: a point with {len(places)} positions: expected one')
-        return 'point', places, 0
+        return 'point', places, ()
     if tag != 'Polygon':
-        return 'line', _coordinates(node, where), 0
+        return 'line', _coordinates(node, where), ()
     outer = _child(node, 'outerBoundaryIs')
     ring = None if outer is None else _child(outer, 'LinearRing')
     if ring is None:
         raise MapFileError(f'{where}: a polygon without outer boundary: expected one')
-    holes = sum(_tag(child) == 'innerBoundaryIs' for child in node)
+    holes = tuple(open_ring(where, _coordinates(inner, where)) for child in node
+                  if _tag(child) == 'innerBoundaryIs' for inner in child
+                  if _tag(inner) == 'LinearRing')
     return 'polygon', open_ring(where, _coordinates(ring, where)), holes
 
 

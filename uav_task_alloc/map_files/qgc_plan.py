@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Reader of .plan files of QGroundControl: waypoints, its fence as zones, and its home.
+"""Reader of .plan files of QGroundControl: waypoints, surveys, corridors, fences as zones, home.
 
 The format: https://docs.qgroundcontrol.com/master/en/qgc-dev-guide/file_formats/plan.html
 """
@@ -19,11 +19,11 @@ from uav_task_alloc.map_files.elements import (
     check_place,
     open_ring,
 )
+from uav_task_alloc.map_files.qgc_complex import ABOVE_TERRAIN, ALTITUDE_MODES, read_complex_item
 
 # MAVLink commands of items; no numbers of pymavlink, which is not loaded for the planner
 _HOLDS = {16: 'waypoint', 19: 'loiter for a time', 82: 'spline waypoint'}  # param1: seconds
 _NOT_TASKS = {20: 'return', 21: 'landing', 22: 'take-off'}  # the bridge makes its own
-_ALTITUDE_MODES = {1: ABOVE_ORIGIN, 2: AMSL}
 _FRAMES = {0: AMSL, 5: AMSL, 3: ABOVE_ORIGIN, 6: ABOVE_ORIGIN}  # MAV_FRAME
 
 
@@ -35,7 +35,8 @@ def read_plan(document: Any, file: str) -> MapFile:
         file: its name, for messages.
 
     Returns:
-        A point for each waypoint, a zone for each excluding fence; `origin` is the planned home.
+        A point for each waypoint, a polygon for each survey, lines for each corridor, a zone for
+        each excluding fence; `origin` is the planned home.
 
     Raises:
         MapFileError: it is no .plan, or a value is of another kind.
@@ -65,8 +66,7 @@ def _home(given: Any) -> Origin | None:
 
 def _read_item(item: dict[str, Any], where: str, read: MapFile) -> None:
     if item.get('type') != 'SimpleItem':
-        read.left_out.append(f'{where}: a {item.get("complexItemType", item.get("type"))}: lines '
-                             'and areas are not planned yet')
+        read_complex_item(item, where, read)
         return
     command, params = item['command'], item['params']
     if command not in _HOLDS:
@@ -74,16 +74,19 @@ def _read_item(item: dict[str, Any], where: str, read: MapFile) -> None:
                              if command in _NOT_TASKS else f'{where}: command {command} is none '
                              f'of {", ".join(map(str, _HOLDS))}')
         return
-    reference = _ALTITUDE_MODES.get(item.get('AltitudeMode', 0)) or (
+    terrain = item.get('AltitudeMode') in ABOVE_TERRAIN
+    reference = ABOVE_ORIGIN if terrain else ALTITUDE_MODES.get(item.get('AltitudeMode', 0)) or (
         None if item.get('AltitudeMode') else _FRAMES.get(item.get('frame', 3)))
     if reference is None:
-        raise MapFileError(f'{where}: its altitude is above terrain: expected one relative to '
-                           'launch, or AMSL')
+        raise MapFileError(f'{where}: AltitudeMode {shown(item.get("AltitudeMode"))}, frame '
+                           f'{shown(item.get("frame"))}: expected an altitude relative to launch, '
+                           'AMSL or above terrain')
     place = check_place(where, (params[5], params[4], params[6]))
     hold = float(params[0] or 0.0)
     read.elements.append(Element(where, f'wp{item.get("doJumpId", len(read.elements) + 1)}',
                                  'point', (place,), reference,
-                                 {'service_time': hold} if hold > 0.0 else {}))
+                                 {**({'service_time': hold} if hold > 0.0 else {}),
+                                  **({'vertical': 'terrain'} if terrain else {})}))
 
 
 def _read_circle(circle: dict[str, Any], where: str, number: int, read: MapFile) -> None:

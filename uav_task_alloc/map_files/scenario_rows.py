@@ -25,18 +25,24 @@ from uav_task_alloc.map_files.elements import (
 from uav_task_alloc.scenario.key_hints import SAME_MEANING
 from uav_task_alloc.scenario.read import parse
 from uav_task_alloc.scenario.schema import TASK, UAV, ZONE
+from uav_task_alloc.work.values import MOST_CORNERS
 
 _PLACE_KEYS = {'id', 'position', 'home', 'center', 'vertices', 'shape', 'latitude', 'longitude',
                'altitude'}
-_OWN_KEYS = {'kind', 'path', 'holes', 'camera', 'actions'}  # not as properties have them
+_WORK_KEYS = {'point': set[str](), 'line': {'divisible'}, 'area': {'strip_width', 'direction'},
+              'orbit': {'radius', 'turns', 'direction'}}  # keys of one kind only
+_OWN_KEYS = {'kind', 'path', 'holes'}.union(*_WORK_KEYS.values())
 _KEYS = {'tasks': TASK.keys() - _PLACE_KEYS - _OWN_KEYS,
          'zones': (ZONE.keys() - _PLACE_KEYS) | {'shape'},
          'uavs': UAV.keys() - _PLACE_KEYS}
 _LISTS = 'required_capabilities', 'allowed_uavs', 'capabilities'
-_KINDS = {'task': 'tasks', 'zone': 'zones', 'no_fly_zone': 'zones', 'uav': 'uavs'}
+_NESTED = 'actions', 'camera'  # JSON values, or texts of them
+_KINDS = {'task': 'tasks', 'zone': 'zones', 'no_fly_zone': 'zones', 'uav': 'uavs',
+          **dict.fromkeys(_WORK_KEYS, 'tasks')}
 _HINTED = {'value', 'service_time', 'latest'}  # keys for which a hint names other words
 _RESULTS = 'route', 'track'  # written by map_files.write
 _ROW = re.compile(r':\d+: (scenario\.(tasks|zones|uavs)\[(\d+)\].*)', re.DOTALL)
+_ONE_PLACE = {'latitude': 2e-7, 'longitude': 2e-7, 'altitude': 0.02}  # [deg], [m]
 _SHIFT = 5.0 / 111_000.0  # [deg] of latitude: UAVs without a place start 5 m apart
 
 
@@ -52,6 +58,7 @@ class ImportChoices:
     altitudes: str = ''  # what altitudes refer to where a file does not say: amsl, origin, ignore
     all_zones: bool = False  # every polygon is a zone
     vertices: bool = False  # a task at each vertex of a line
+    strip_width: float = 0.0  # [m] of areas whose file does not say it; 0: they are left out
     uavs: int = 1  # where neither a file nor the fleet has any
     fleet: Mapping[str, Any] = field(default_factory=dict)  # a scenario, to which it is added
 
@@ -91,7 +98,7 @@ def to_scenario(files: Sequence[MapFile], choices: ImportChoices, name: str) -> 
         for element in read.elements:
             rows.add(element)
     if not rows.added:
-        raise MapFileError('; '.join(['nothing to import: expected points or zones',
+        raise MapFileError('; '.join(['nothing to import: expected points, lines, areas or zones',
                                       *rows.notes[:5]]))
     if not document.get('uavs'):
         document['uavs'] = [
@@ -156,20 +163,48 @@ class _Rows:
         elif kind == 'tasks' and element.geometry == 'point':
             self._add_point('tasks', element, element.places[0], element.name,
                             self.choices.height)
-        elif kind == 'tasks' and element.geometry == 'line' and self.choices.vertices:
+        elif kind == 'tasks' and element.geometry == 'line' and self._as_vertices(element):
             for number, place in enumerate(element.places, 1):
                 self._add_point('tasks', element, place, f'{element.name or "line"}_{number}',
                                 self.choices.height)
         elif kind == 'tasks' and element.geometry == 'line':
-            self.notes.append(f'{element.where}: a line; --lines vertices makes a task of each '
-                              'vertex')
+            self._add_work('line', element, {})
+        elif kind == 'tasks' and element.geometry == 'polygon' and self._strips(element):
+            self._add_work('area', element, {'holes': [[
+                {'latitude': place.latitude, 'longitude': place.longitude} for place in hole]
+                for hole in element.holes], **self._strips(element)})
         elif kind == 'tasks':
             self.notes.append(f'{element.where}: a {element.geometry}, which is neither in a '
-                              'folder of zones nor has kind: zone; --polygons zones makes each '
-                              'a zone')
+                              'folder of zones nor has kind: zone; --strip-width makes each an '
+                              'area, --polygons zones a zone')
         else:
             raise MapFileError(f'{element.where}: a {element.geometry}: expected a point for a '
                                'UAV')
+
+    def _as_vertices(self, element: Element) -> bool:
+        return self.choices.vertices and element.properties.get('kind') != 'line'
+
+    def _strips(self, element: Element) -> dict[str, Any]:
+        """What says how wide the strips of an area are; nothing where it is not known."""
+        if any(element.properties.get(key) for key in ('strip_width', 'camera')):
+            return {'kind': 'area'}
+        return {'strip_width': self.choices.strip_width} if self.choices.strip_width else {}
+
+    def _add_work(self, kind: str, element: Element, row: dict[str, Any]) -> None:
+        """Add a line or an area, of which points that repeat the one before are left out."""
+        path: list[dict[str, float]] = []
+        for place in element.places:
+            corner = {'latitude': place.latitude, 'longitude': place.longitude,
+                      'altitude': self._altitude(element, place, self.choices.height)}
+            if not path or any(abs(corner[key] - path[-1][key]) > least
+                               for key, least in _ONE_PLACE.items()):
+                path.append(corner)
+        if not 1 < len(path) <= MOST_CORNERS:
+            self.notes.append(f'{element.where}: a {element.geometry} of {len(path)} points: '
+                              f'expected 2 to {MOST_CORNERS}')
+        else:
+            self._append('tasks', element, element.name or kind,
+                         {'kind': kind, 'path': path, **row})
 
     def all_notes(self) -> list[str]:
         """What is left out or changed; of what recurs the first, and how many."""
@@ -191,8 +226,9 @@ class _Rows:
 
     def _add_point(self, kind: str, element: Element, place: Place, name: str,
                    without: float) -> None:
+        orbit = {'kind': 'orbit'} if element.properties.get('kind') == 'orbit' else {}
         self._append(kind, element, name, {
-            'latitude': place.latitude, 'longitude': place.longitude,
+            **orbit, 'latitude': place.latitude, 'longitude': place.longitude,
             'altitude': self._altitude(element, place, without)})
 
     def _altitude(self, element: Element, place: Place, without: float) -> float:
@@ -241,8 +277,9 @@ class _Rows:
         self._append('zones', element, element.name, row)
 
     def _append(self, kind: str, element: Element, name: str, row: dict[str, Any]) -> None:
+        used = _KEYS[kind] | (_WORK_KEYS[row.get('kind', 'point')] if kind == 'tasks' else set())
         properties = {key: _value(key, value) for key, value in element.properties.items()
-                      if key in _KEYS[kind] and value not in (None, '')}
+                      if key in used and value not in (None, '')}
         for meant in sorted(_HINTED & (_KEYS[kind] - properties.keys())):
             for key in sorted(element.properties.keys() & set(SAME_MEANING[meant].split())):
                 self._unused.setdefault((key, meant), element.where)
@@ -268,8 +305,13 @@ def _value(key: str, value: Any) -> Any:
     """A property as scenarios have it: a number, a list of names, or a text."""
     if key in _LISTS and not isinstance(value, list):
         return [part for part in re.split(r'[,;\s]+', str(value)) if part]
+    if key in _NESTED and isinstance(value, str):
+        try:
+            return json.loads(value)
+        except ValueError:
+            return value
     if isinstance(value, (dict, list)):
-        return value if key in _LISTS else json.dumps(value)
+        return value if key in _LISTS + _NESTED else json.dumps(value)
     return _number(value)
 
 
