@@ -142,12 +142,11 @@ class AllocationPublisher:
     def _statuses(self) -> list[m.TaskStatus]:
         """A message for every task; converts only those that have changed. O(tasks)."""
         cache, self._status_messages = self._status_messages, {}
-        sources: dict[str, _StatusSource] = {
+        expected, works = self.world.deadlines.expected, self.world.works
+        sources: dict[str, _StatusSource] = {  # the whole before its pieces
+            **{task_id: status_of_work(works, work, expected)
+               for task_id, work in works.records.items()},
             **self.world.task_records(), **self.world.tasks.rejected}
-        expected = self.world.deadlines.expected
-        works = self.world.works
-        sources.update((task_id, status_of_work(works, work, expected))
-                       for task_id, work in works.records.items())
         for task_id, source in sources.items():
             start, cached = expected.get(task_id, 0.0), cache.get(task_id)
             if cached is None or not _same(cached[0], source) or cached[1] != start:
