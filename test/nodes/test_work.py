@@ -24,6 +24,12 @@ def listed(fleet):
             for planned in msg.tasks if planned.task.task_id == 'field'}
 
 
+def listed_ways(fleet):
+    """The paths of all pieces in lists, by number."""
+    return {planned.piece: planned.task.path for msg in fleet.lists.values()
+            for planned in msg.tasks if planned.piece}
+
+
 def test_an_area_is_flown_in_pieces_also_after_a_restart(start, probe, tmp_path):
     fleet = Fleet(probe)
     state_dir = ('-p', f'state_dir:={tmp_path}', '-p', 'objective:=finish')
@@ -47,8 +53,7 @@ def test_an_area_is_flown_in_pieces_also_after_a_restart(start, probe, tmp_path)
     whole = fleet.status('field')
     assert (whole.piece, whole.pieces, whole.reason[:11]) == (0, 4, '1 of 4 stri')
     probe.until(lambda: len(listed(fleet)) == 3)
-    ways = {planned.piece: planned.task.path for msg in fleet.lists.values()
-            for planned in msg.tasks if planned.piece}
+    ways = listed_ways(fleet)
 
     node.stop(signal.SIGKILL)
     for uav_id in fleet.lists:
@@ -56,8 +61,7 @@ def test_an_area_is_flown_in_pieces_also_after_a_restart(start, probe, tmp_path)
     fleet.statuses.clear()
     begin(start, fleet, *state_dir)
     probe.until(lambda: len(listed(fleet)) == 3 and fleet.status('field').pieces_done == 1)
-    assert {planned.piece: planned.task.path for msg in fleet.lists.values()
-            for planned in msg.tasks if planned.piece} == ways
+    assert listed_ways(fleet) == ways
 
     def all_flown():
         for piece, uav_id in listed(fleet):
