@@ -14,7 +14,7 @@ from unittest import mock
 import launch_stand_in
 import yaml
 
-from uav_task_alloc import __main__ as cli, params
+from uav_task_alloc import __main__ as cli, parameter_field, params
 
 ROOT = Path(__file__).parent.parent
 # programs of other packages
@@ -119,7 +119,7 @@ def _ros2(rest):
 def _run(name, rest):
     if not (ROOT / 'uav_task_alloc/nodes' / f'{name}.py').exists():
         return f'ros2 run uav_task_alloc {name}: no such executable'
-    known = {params.ros_name(spec): spec for spec in fields(params.NODES[name])} if (
+    known = {parameter_field.ros_name(spec): spec for spec in fields(params.NODES[name])} if (
         name in params.NODES) else {}
     for flag, word in pairwise(rest):
         if flag != '-p':
@@ -129,7 +129,7 @@ def _run(name, rest):
             continue
         if key not in known:
             return f'{name}: no parameter {key}'
-        params.check(known[key], yaml.safe_load(value))
+        parameter_field.check(known[key], yaml.safe_load(value))
     return ''
 
 

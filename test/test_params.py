@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 import yaml
 
-from uav_task_alloc import params
+from uav_task_alloc import parameter_field, parameter_texts, params
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.objective import MAX_TRIPS, OBJECTIVES
 
@@ -16,28 +16,28 @@ ROOT = Path(__file__).parent.parent
 
 @pytest.mark.parametrize('node', params.NODES)
 def test_the_yaml_file_of_a_node_is_up_to_date(node):
-    assert (ROOT / f'config/{node}.yaml').read_text() == params.yaml_text(node)
+    assert (ROOT / f'config/{node}.yaml').read_text() == parameter_texts.yaml_text(node)
 
 
 def test_the_table_in_docs_is_up_to_date():
-    assert (ROOT / 'docs/parameters.md').read_text() == params.markdown_text()
+    assert (ROOT / 'docs/parameters.md').read_text() == parameter_texts.markdown_text()
 
 
 @pytest.mark.parametrize('node', params.NODES)
 def test_a_yaml_file_holds_the_defaults(node):
-    read = yaml.safe_load(params.yaml_text(node))[f'/**/{node}']['ros__parameters']
+    read = yaml.safe_load(parameter_texts.yaml_text(node))[f'/**/{node}']['ros__parameters']
     for spec in fields(params.NODES[node]):
         if spec.default != ():
-            value = read[params.ros_name(spec)]
+            value = read[parameter_field.ros_name(spec)]
             assert (tuple(value) if isinstance(value, list) else value) == spec.default
 
 
 def test_contract_names_are_declared():
-    names = {params.ros_name(spec) for spec in fields(params.AllocatorParams)}
+    names = {parameter_field.ros_name(spec) for spec in fields(params.AllocatorParams)}
     assert {'origin.latitude', 'origin.longitude', 'origin.altitude_amsl', 'solve_budget',
             'route_end', 'uav_timeout', 'default_range', 'default_cruise_speed', 'state_dir',
             'seed'} <= names
-    names = {params.ros_name(spec) for spec in fields(params.BridgeParams)}
+    names = {parameter_field.ros_name(spec) for spec in fields(params.BridgeParams)}
     assert {'connections', 'origin.latitude', 'origin.longitude', 'origin.altitude_amsl',
             'system_ids', 'uav_id_pattern', 'autopilot', 'cruise_altitude', 'takeoff',
             'signing_key_file'} <= names

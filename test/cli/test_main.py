@@ -13,7 +13,7 @@ import numba
 import pytest
 
 import uav_task_alloc
-from uav_task_alloc import SOLVERS, __main__ as cli, kernel_cache, params
+from uav_task_alloc import SOLVERS, __main__ as cli, kernel_cache, parameter_texts
 from uav_task_alloc.cli.study import EXPERIMENTS
 
 ROOT = Path(__file__).parents[2]
@@ -184,7 +184,7 @@ def test_a_bad_scenario_is_refused_with_file_and_line(tmp_path, capsys):
 def test_params_prints_the_tables(capsys):
     assert cli.main(['params']) == 0
     printed = capsys.readouterr().out
-    assert params.markdown_text() in printed
+    assert parameter_texts.markdown_text() in printed
     assert '# Scenario files' in printed
 
 

@@ -18,7 +18,7 @@ from rcl_interfaces.srv import DescribeParameters, GetParameters, SetParameters
 from uav_task_alloc_msgs import msg as m
 from uav_task_alloc_msgs.srv import SubmitTasks
 
-from uav_task_alloc import params
+from uav_task_alloc import parameter_field, params
 from uav_task_alloc.nodes.conversions.messages import EVENTS, LATCHED, STATES
 from uav_task_alloc.nodes.ros import run as nodes_run
 
@@ -147,7 +147,8 @@ def test_help_lists_each_parameter_and_needs_no_ros_graph(ask, name):
     words = ' '.join(out.split())
     for spec in fields(params.NODES[name]):
         star = ' *' if spec.metadata['fixed'] else ''
-        assert (f'{params.ros_name(spec)}{star}: {params.expectation(spec)}; default' in words)
+        name = f'{parameter_field.ros_name(spec)}{star}'
+        assert f'{name}: {parameter_field.expectation(spec)}; default' in words
         assert spec.metadata['text'] in words
     assert 'see docs/parameters.md' not in out
     assert '--log-level LEVEL' in out
@@ -311,7 +312,7 @@ def test_a_whole_number_is_accepted_for_a_real_one(start, probe):
 def test_the_parameter_file_of_a_node_is_installed_and_read(start, probe, name):
     start(name, '--params-file', str(SHARE / f'config/{name}.yaml'), *NEEDS.get(name, []))
     kind = params.NODES[name]
-    names = [params.ros_name(spec) for spec in fields(kind)]
+    names = [parameter_field.ros_name(spec) for spec in fields(kind)]
     values = probe.call(GetParameters, f'/{name}/get_parameters',
                         GetParameters.Request(names=names)).values
     assert len(values) == len(names)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from uav_task_alloc import params
+from uav_task_alloc import parameter_texts, params
 from uav_task_alloc.allocator.state import task_state_machine
 from uav_task_alloc.cli.options import OptionParser
 from uav_task_alloc.cli.outputs import naming
@@ -25,13 +25,14 @@ def main(argv: Sequence[str]) -> int:
     parser.add_argument('--write', action='store_true', help='write them into docs/, and the '
                         'parameter files of the nodes into config/, both in the working '
                         'directory (default: print)')
-    pages = {Path('docs/parameters.md'): params.markdown_text(),
+    pages = {Path('docs/parameters.md'): parameter_texts.markdown_text(),
              Path('docs/scenarios.md'): document.scenario_page(),
              Path('docs/task_states.md'): task_state_machine.task_states_markdown()}
     if not parser.parsed(argv).write:
         print('\n'.join(pages.values()))
         return 0
-    configs = {Path(f'config/{node}.yaml'): params.yaml_text(node) for node in params.NODES}
+    configs = {Path(f'config/{node}.yaml'): parameter_texts.yaml_text(node)
+               for node in params.NODES}
     for path, text in {**pages, **configs}.items():
         with naming('--write', path):
             path.parent.mkdir(exist_ok=True)

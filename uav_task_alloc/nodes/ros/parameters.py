@@ -18,11 +18,11 @@ from rclpy.exceptions import InvalidParameterTypeException, InvalidParameterValu
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
-from uav_task_alloc import params
+from uav_task_alloc import parameter_field, params
 from uav_task_alloc.errors import AllocError, InvalidValue
 from uav_task_alloc.nodes.ros.parameter_files import check_files, shared_names
 
-_Params = TypeVar('_Params', bound=params.CheckedParams)
+_Params = TypeVar('_Params', bound=parameter_field.CheckedParams)
 _BIG = 1.7e308  # a ROS range has no infinity
 
 
@@ -89,43 +89,43 @@ def given(name: str, value: str, what: str) -> str:
     return value
 
 
-def _specs(kind: type[params.CheckedParams]) -> tuple[Field[Any], ...]:
+def _specs(kind: type[parameter_field.CheckedParams]) -> tuple[Field[Any], ...]:
     return fields(kind)  # type: ignore[arg-type]  # every subclass is a dataclass
 
 
-def _check_names(node: Node, kind: type[params.CheckedParams]) -> None:
+def _check_names(node: Node, kind: type[parameter_field.CheckedParams]) -> None:
     """Refuse what ROS would ignore, as the node would fly with a default instead.
 
     A name that a file gives to all nodes need only be a parameter of one of them.
     """
     check_files(sys.argv, node.get_fully_qualified_name())
-    known = [*map(params.ros_name, _specs(kind))]
+    known = [*map(parameter_field.ros_name, _specs(kind))]
     shared = shared_names(sys.argv)
     for name in sorted({*node._parameter_overrides} - {*known}):
         if node.has_parameter(name) or name.startswith('qos_overrides.'):
             continue
         owners = [other for other, owner in params.NODES.items()
-                  if name in map(params.ros_name, _specs(owner))]
+                  if name in map(parameter_field.ros_name, _specs(owner))]
         if not (owners and name in shared):
             raise UnknownParameter(name, known, owners)
 
 
 def _declare_one(node: Node, spec: Field[Any]) -> Any:
     """Declare one parameter; return its start value."""
-    name = params.ros_name(spec)
+    name = parameter_field.ros_name(spec)
     default = list(spec.default) if isinstance(spec.default, tuple) else spec.default
     _accept_whole_number(node, spec)
     try:
         value = node.declare_parameter(name, default, descriptor(spec)).value
     except (InvalidParameterTypeException, InvalidParameterValueException):
         given = node._parameter_overrides[name].value
-        raise InvalidValue(name, given, params.expectation(spec)) from None
+        raise InvalidValue(name, given, parameter_field.expectation(spec)) from None
     return () if value is None else value
 
 
 def _accept_whole_number(node: Node, spec: Field[Any]) -> None:
     """`-p solve_budget:=1` means 1.0."""
-    name = params.ros_name(spec)
+    name = parameter_field.ros_name(spec)
     given = node._parameter_overrides.get(name)
     if type(spec.default) is float and given is not None and type(given.value) is int:
         node._parameter_overrides[name] = Parameter(name, value=float(given.value))
@@ -134,7 +134,7 @@ def _accept_whole_number(node: Node, spec: Field[Any]) -> None:
 def descriptor(spec: Field[Any]) -> ParameterDescriptor:
     """The ROS descriptor of a declared field: text, range, choices."""
     meta, result = spec.metadata, ParameterDescriptor()
-    result.description = f'{meta["text"]} Expected: {params.expectation(spec)}.'
+    result.description = f'{meta["text"]} Expected: {parameter_field.expectation(spec)}.'
     result.description += ' Read at the start only.' if meta['fixed'] else ''
     result.additional_constraints = ', '.join(meta['choices'])
     if isinstance(spec.default, tuple):
@@ -152,7 +152,7 @@ def descriptor(spec: Field[Any]) -> ParameterDescriptor:
 
 def _change(live: LiveParameters[_Params], changed: list[Parameter]) -> SetParametersResult:
     """Apply all changes or, where one is invalid, none."""
-    specs = {params.ros_name(spec): spec for spec in _specs(type(live.now))}
+    specs = {parameter_field.ros_name(spec): spec for spec in _specs(type(live.now))}
     values = {}
     for parameter in changed:
         spec = specs.get(parameter.name)

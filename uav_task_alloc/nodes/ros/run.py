@@ -22,7 +22,8 @@ from rclpy.utilities import remove_ros_args
 
 from uav_task_alloc.errors import AllocError
 from uav_task_alloc.nodes.ros.parameter_files import files_of, read_sections
-from uav_task_alloc.params import CheckedParams, help_text
+from uav_task_alloc.parameter_field import CheckedParams
+from uav_task_alloc.parameter_texts import help_text
 
 CRASHED = 70  # exit status, EX_SOFTWARE of sysexits.h: the launch files restart the node
 # what ROS could not parse, by its own words
