@@ -18,7 +18,7 @@ def main(argv: Sequence[str]) -> int:
         SystemExit: the arguments are malformed, or ask for the help.
     """
     parser = OptionParser(
-        'compile', 'Compile all kernels ahead of time, about 50 s once for each '
+        'compile', 'Compile all kernels ahead of time, about 70 s once for each '
         'installation, and print the folders of the cache. They are __pycache__ beside the '
         "sources where that can be written, else in the user's cache directory, or in "
         'NUMBA_CACHE_DIR if that is set.')
@@ -34,8 +34,10 @@ def main(argv: Sequence[str]) -> int:
         return 0
     from uav_task_alloc.allocator.warm_up import compile_kernels
     from uav_task_alloc.solver.solve import plan
+    from uav_task_alloc.solver.timed.solve import load_timed_kernels
     with NOTICE.shown_on(sys.stderr):
         compile_kernels(plan, AllocatorParams())
+        load_timed_kernels(zones=True, paths=True)  # of lines, areas and orbits
     for folder in kernel_folders():
         size = sum(path.stat().st_size for path in folder.iterdir())
         print(f'{folder}: {size / 1e6:.1f} MB')

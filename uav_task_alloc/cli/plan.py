@@ -85,7 +85,8 @@ def _load_kernels(loaded: Scenario, solver: str, search: bool = True) -> None:
     if not has_times(loaded):
         load_kernels(solver, bool(loaded.zones), search)
     elif solver == SOLVER_NAME:  # `plan` refuses others
-        load_timed_kernels(bool(loaded.zones), search)
+        load_timed_kernels(bool(loaded.zones), search,
+                           any(timed.task.path for timed in loaded.tasks))
 
 
 def _make_parser() -> OptionParser:

@@ -1,21 +1,25 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Random lines to be flown, and PyVRP's best model of them, for comparisons.
+"""Random lines to be flown, what is left of them when a UAV is lost, and PyVRP's model of them.
 
 PyVRP gets two clients a line, one for each direction, in a group of which exactly one is served,
-and asymmetric lengths: from where a line ends to where the next one begins.
+and asymmetric lengths: from where a line ends to where the next one begins. The lines' own lengths
+are the same in all plans: without them it knows better which lines are near.
 """
 from __future__ import annotations
 
 import math
 import time
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib import import_module
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
-from uav_task_alloc.model import Point, Task, Uav
+from uav_task_alloc.geometry.flight_time import flight_time
+from uav_task_alloc.geometry.polyline import point_at
+from uav_task_alloc.model import Plan, Point, Task, Uav, turned_tasks
 from uav_task_alloc.study.reference_solvers import PyvrpCallbacks
 
 _SIDE = 10_000.0  # [m] of the square
@@ -74,6 +78,66 @@ def _strips(rng: np.random.Generator, lines: int) -> Iterator[tuple[Point, Point
                (float(a[0] + ux * STRIP_LENGTH), float(a[1] + uy * STRIP_LENGTH), _HEIGHT))
 
 
+@dataclass(frozen=True, slots=True)
+class Remainder:
+    """What is left to fly at a moment."""
+
+    uavs: list[Uav]  # where they are then, in the air
+    tasks: list[Task]  # not flown yet; of a line under way its rest
+    locked: dict[str, tuple[str, ...]]  # lines under way, by UAV id
+
+
+def left_after_loss(found: Plan, uavs: Sequence[Uav], tasks: Sequence[Task], lost: str,
+                    seconds: float) -> Remainder:
+    """Return what is left of a plan without waits when a UAV is lost.
+
+    Args:
+        found: the plan.
+        uavs, tasks: of the plan.
+        lost: id of the UAV; the line that it was on is to be flown from one of its ends.
+        seconds: [s] from the moment of the plan.
+
+    Returns:
+        Positions, lines and locks of the other UAVs.
+    """
+    known = {task.id: task for task in turned_tasks(tasks, found.reversed)}
+    left = {task.id: task for task in tasks}
+    fleet, locked = list[Uav](), dict[str, tuple[str, ...]]()
+    for uav in uavs:
+        place, clock, row = uav.position, seconds, found.routes[uav.id]
+        for name, leg in zip(row, found.legs[uav.id], strict=False):
+            way = (place, *leg.via, known[name].position)
+            rest = _rest(uav, way, clock)
+            if len(rest) > 1:
+                place = rest[0]
+                break
+            place, clock = known[name].position, clock - flight_time(uav, way)
+            rest = _rest(uav, known[name].path, clock)
+            if len(rest) > 1:
+                if uav.id != lost:
+                    left[name] = replace(known[name], position=rest[0], path=rest,
+                                         reversible=False)
+                    locked[uav.id] = (name,)
+                place = rest[0]
+                break
+            place, clock = known[name].end, clock - flight_time(uav, known[name].path)
+            del left[name]
+        if uav.id != lost:
+            fleet.append(replace(uav, position=place, home=uav.base))
+    return Remainder(fleet, list(left.values()), locked)
+
+
+def _rest(uav: Uav, points: Sequence[Point], seconds: float) -> tuple[Point, ...]:
+    """What is left of a polyline after so many seconds; its end alone where all is flown."""
+    for k, (a, b) in enumerate(pairwise(points)):
+        part = flight_time(uav, (a, b))
+        if seconds < part:
+            x, y, z = point_at(a, b, max(0.0, seconds) / part)
+            return ((x, y, z), *points[k + 1:])
+        seconds -= part
+    return tuple(points[-1:])
+
+
 def pyvrp_lines(uavs: Sequence[Uav], tasks: Sequence[Task], returns: bool, seconds: float,
                 seed: int = 0) -> list[tuple[float, LineFlights]]:
     """Solve lines with PyVRP: the shortest routes that fly all of them.
@@ -104,10 +168,9 @@ def _data(library: Any, uavs: Sequence[Uav], tasks: Sequence[Task], returns: boo
     begins = np.array([*(uav.position for uav in uavs), *(uav.base for uav in uavs),
                        *(task.position for task in both)])
     ends = np.array([*begins[:2 * m], *(task.end for task in both)])
-    own = np.array([0.0] * 2 * m + [task.path_length for task in both])
-    metres = own[:, None] + np.sqrt(((ends[:, None] - begins[None]) ** 2).sum(axis=2))
+    metres = np.sqrt(((ends[:, None] - begins[None]) ** 2).sum(axis=2))
     if not returns:
-        metres[:, m:2 * m] = own[:, None]
+        metres[:, m:2 * m] = 0.0
     lengths = np.ceil(metres * _UNIT - 1e-6).astype(np.int64)
     np.fill_diagonal(lengths, 0)
     clients = [library.Client(2 * m + i, required=False, group=i // 2) for i in range(2 * n)]

@@ -16,6 +16,7 @@ from uav_task_alloc.separation.volumes import flight_volumes
 from uav_task_alloc.solver.problem import Rules
 from uav_task_alloc.solver.separated import flights_of_plan
 from uav_task_alloc.solver.timed.evaluator import Held, evaluate_routes
+from uav_task_alloc.study.lines import left_after_loss, random_lines
 from uav_task_alloc.study.small_problems import compare_small, small_problem
 
 UAV = Uav('u', (0.0, 0.0, 0.0), cruise_speed=10.0)
@@ -194,3 +195,25 @@ def test_plans_with_lines_are_valid_and_as_good_as_the_optimum(seed):
     result = compare_small(small_problem(seed, most_tasks=4, paths=0.7), rounds=400)
     assert result is None or (result.faults, result.warm_faults) == ((), ())
     assert result is None or result.gap < 1e-6
+
+
+@pytest.mark.parametrize('seed', [1, 2])
+def test_after_a_loss_only_unflown_lines_are_planned_and_as_well_as_from_nothing(seed):
+    uavs, tasks = random_lines('fields', 4, 50, seed)
+    goal = {'objective': 'finish', 'budget': 60.0, 'seed': seed}
+    before = plan(uavs, tasks, max_iterations=2000, **goal)
+    left = left_after_loss(before, uavs, tasks, uavs[0].id, 0.5 * before.finish)
+    assert 0 < len(left.tasks) < len(tasks)
+    assert left.locked
+    rest = {'locked': left.locked, **goal}
+    warm = plan(left.uavs, left.tasks, warm=before, max_iterations=2000, **rest)
+    fresh = plan(left.uavs, left.tasks, max_iterations=10_000, **rest)
+    flown = evaluate_routes(left.uavs, left.tasks, Rules(), warm.trips, held=Held(left.locked),
+                            reversed=warm.reversed)
+    assert flown.violations == ()
+    assert flown.finish == pytest.approx(warm.finish)
+    assert sorted(name for row in warm.routes.values() for name in row) == sorted(
+        task.id for task in left.tasks)
+    for uav_id, held in left.locked.items():
+        assert warm.routes[uav_id][:1] == held
+    assert warm.finish <= 1.05 * fresh.finish

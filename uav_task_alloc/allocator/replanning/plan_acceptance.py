@@ -35,7 +35,7 @@ def accepted_plan(answer: ReplanAnswer, margin: float) -> Plan:
         return best
     accepted, first, more = set[str](), _cost(answer, ()), False
     cost = first
-    for group in exchange_groups(repaired.routes, best.routes):
+    for group in exchange_groups(repaired.routes, best.routes, repaired.reversed ^ best.reversed):
         value, now = _added_value(answer, group), _cost(answer, accepted | group)
         before = _cost(answer, (), group)
         if value > 0.0 or (value == 0.0 and cost - now > max(margin * before, 1e-6)):
@@ -65,7 +65,8 @@ def _cost(answer: ReplanAnswer, changed: Collection[str],
     problem, prices = answer.problem, answer.problem.objective
     plan = _combined(answer, changed)
     uavs = [uav for uav in problem.uavs if only is None or uav.id in only]
-    metres = sum(_length_with_penalty(plan, uav.id, uav.range) for uav in uavs)
+    paths = {task.id: task.path_length for task in problem.tasks}
+    metres = sum(_length_with_penalty(plan, uav.id, uav.range, paths) for uav in uavs)
     if prices.is_shortest:
         return prices.cost(metres)
     times, ids = plan.timetable(), {uav.id for uav in uavs}
@@ -78,12 +79,18 @@ def _cost(answer: ReplanAnswer, changed: Collection[str],
 
 
 def exchange_groups(before: Mapping[str, tuple[str, ...]],
-                    after: Mapping[str, tuple[str, ...]]) -> list[frozenset[str]]:
-    """Return groups of UAVs whose routes differ; UAVs that exchange tasks are in one group."""
+                    after: Mapping[str, tuple[str, ...]],
+                    turned: Collection[str] = ()) -> list[frozenset[str]]:
+    """Return groups of UAVs whose routes differ; UAVs that exchange tasks are in one group.
+
+    Args:
+        before, after: task ids by UAV id.
+        turned: ids of tasks with a path that are flown the other way after.
+    """
     owner = {task: uav_id for uav_id, tasks in before.items() for task in tasks}
     groups: list[set[str]] = []
     for uav_id, tasks in after.items():
-        if before.get(uav_id) == tasks:
+        if before.get(uav_id) == tasks and not any(task in turned for task in tasks):
             continue
         group = {uav_id, *(owner[task] for task in tasks if task in owner)}
         for other in [g for g in groups if g & group]:
@@ -93,9 +100,13 @@ def exchange_groups(before: Mapping[str, tuple[str, ...]],
     return [frozenset(group) for group in groups]
 
 
-def _length_with_penalty(plan: Plan, uav_id: str, limit: float) -> float:
-    """Length [m], with a penalty for what exceeds a soft range limit [m]."""
-    length = plan.route(uav_id).distance
+def _length_with_penalty(plan: Plan, uav_id: str, limit: float,
+                         paths: Mapping[str, float]) -> float:
+    """Length [m], with a penalty for what exceeds a soft range limit [m].
+
+    paths: lengths of the paths of tasks, by id.
+    """
+    length = plan.route(uav_id).distance + sum(paths[task] for task in plan.routes[uav_id])
     return length + 100.0 * max(0.0, length - limit)
 
 
@@ -107,7 +118,9 @@ def _combined(answer: ReplanAnswer, changed: Collection[str]) -> Plan:
     served = {task for tasks in routes.values() for task in tasks}
     left_out = {task: why for task, why in {**repaired.unassigned, **best.unassigned}.items()
                 if task not in served}
-    return replace(best, routes=routes, legs=legs, unassigned=left_out,
+    turned = frozenset(task for u, tasks in routes.items() for task in tasks
+                       if task in (best if u in changed else repaired).reversed)
+    return replace(best, routes=routes, legs=legs, unassigned=left_out, reversed=turned,
                    timetable=lambda: _combined_times(answer, changed))
 
 

@@ -51,7 +51,7 @@ class TimedArrays(NamedTuple):
     times: PathTimes  # around zones
     point: Ints  # by node, then by end of a path: its index in Distances
     fixed: Floats  # (nodes and then ends of paths, columns from X)
-    paths: bool  # some tasks have a path; ways.py
+    paths: NDArray[np.bool_]  # empty; of two dimensions where tasks have paths; ways.py
     far: Ints  # (n) row of the end of its path; of a point its node
     turnable: NDArray[np.bool_]  # (n) may be flown from its last point, too
     way_length: Floats  # (n) [m]

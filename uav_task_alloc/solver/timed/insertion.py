@@ -19,7 +19,14 @@ from uav_task_alloc.solver.timed.visits import (
     cheapest_split,
     free_visit,
 )
-from uav_task_alloc.solver.timed.ways import TURNED, directions, face, is_task, way_length
+from uav_task_alloc.solver.timed.ways import (
+    TURNED,
+    directions,
+    face,
+    has_paths,
+    is_task,
+    way_length,
+)
 
 
 @inline_kernel
@@ -28,7 +35,7 @@ def try_place(a: TimedArrays, r: TimedRoutes, t: int, c: int, place: int, kind: 
     """The better of the place found so far and the one after node c. O(1)."""
     u = r.link[c, at.OF_UAV]
     for turned in range(directions(a, t)):
-        if a.paths:
+        if has_paths(a):
             face(a, r, t, turned == 1)
         cost = place_cost(a, r, u, t, c, least)
         if cost < least:
@@ -131,7 +138,7 @@ def place_anywhere(a: TimedArrays, r: TimedRoutes, t: int) -> tuple[int, int, fl
 @kernel
 def insert_task(a: TimedArrays, r: TimedRoutes, t: int, c: int, kind: int) -> None:
     """Insert t after node c, turned or with a visit of the base if kind says so. O(tasks)."""
-    if a.paths:
+    if has_paths(a):
         face(a, r, t, kind >= TURNED)
         kind &= TURNED - 1
     u, then = r.link[c, at.OF_UAV], r.link[c, at.NEXT]

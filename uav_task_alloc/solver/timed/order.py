@@ -8,7 +8,7 @@ from uav_task_alloc.kernel import inline_kernel, kernel
 from uav_task_alloc.solver.timed import columns as at
 from uav_task_alloc.solver.timed.arrays import LINK, Links, TimedArrays, TimedRoutes
 from uav_task_alloc.solver.timed.segments import join, update
-from uav_task_alloc.solver.timed.ways import TURN_BIT, face, is_task, is_turned
+from uav_task_alloc.solver.timed.ways import TURN_BIT, face, has_paths, is_task, is_turned
 
 
 @kernel
@@ -61,7 +61,7 @@ def set_order(a: TimedArrays, r: TimedRoutes, order: Links) -> None:
             continue
         while i != end:
             j = order[i] & ~TURN_BIT
-            if a.paths and is_task(a, j):
+            if has_paths(a) and is_task(a, j):
                 face(a, r, j, order[j] >= TURN_BIT)
             join(a, r, LINK(u), i, j)
             r.link[j, at.OF_UAV] = u

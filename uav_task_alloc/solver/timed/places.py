@@ -8,7 +8,7 @@ from uav_task_alloc.kernel import inline_kernel, kernel
 from uav_task_alloc.solver.timed import columns as at
 from uav_task_alloc.solver.timed.arrays import LINK, TOLERANCE, TimedArrays, TimedRoutes
 from uav_task_alloc.solver.timed.segments import after_leg, leg_of, slot_of
-from uav_task_alloc.solver.timed.ways import TURNED, directions, face, service_of
+from uav_task_alloc.solver.timed.ways import TURNED, directions, face, has_paths, service_of
 
 
 @inline_kernel
@@ -143,7 +143,7 @@ def cheapest_direction(a: TimedArrays, r: TimedRoutes, u: int, t: int, c: int) -
     """
     kind, least = -1, math.inf
     for turned in range(directions(a, t)):
-        if a.paths:
+        if has_paths(a):
             face(a, r, t, turned == 1)
         cost = cost_at(a, r, u, t, c)
         if cost < least:

@@ -68,7 +68,7 @@ def make_timed(problem: Problem, aboard: Mapping[str, frozenset[str]],
     order = np.argsort(class_of, kind='stable')
     classes = int(class_of.max(initial=-1)) + 1
     rules, classes_of_speeds = problem.rules, list(dict.fromkeys(map(_speeds, uavs)))
-    paths = any(task.path for task in tasks)
+    paths = np.empty((0, 0) if any(task.path for task in tasks) else 0, np.bool_)
     far, way_length, along = _ways(problem, len(_points(problem, visits)), classes_of_speeds)
     arrays = TimedArrays(
         m, m + n, 2 * m + n, visits, rules.returns, not problem.distances.zones,

@@ -16,7 +16,7 @@ from uav_task_alloc.solver.timed.places import cost_at
 from uav_task_alloc.solver.timed.problem import TimedProblem, empty_timed_routes
 from uav_task_alloc.solver.timed.segments import leg_of
 from uav_task_alloc.solver.timed.visits import BASE_BEFORE, free_visit, split_cost
-from uav_task_alloc.solver.timed.ways import directions, face, service_of
+from uav_task_alloc.solver.timed.ways import directions, face, has_paths, service_of
 
 _ARRIVAL, _LATE, _LENGTH, _SECONDS, _END = range(5)  # columns of needs_alone
 _NAMED = 3  # UAVs that a text names
@@ -30,7 +30,7 @@ def can_serve(a: TimedArrays, r: TimedRoutes, t: int) -> bool:
     """
     for k in range(a.uavs * directions(a, t)):
         u = k % a.uavs
-        if a.paths:
+        if has_paths(a):
             face(a, r, t, k >= a.uavs)
         if cost_at(a, r, LINK(u), LINK(t), LINK(u)) < math.inf:
             return True
@@ -42,13 +42,14 @@ def can_serve(a: TimedArrays, r: TimedRoutes, t: int) -> bool:
 
 
 @kernel
-def needs_alone(a: TimedArrays, r: TimedRoutes, t: int, needs: Floats) -> None:
+def needs_alone(a: TimedArrays, r: TimedRoutes, t: int, turned: bool, needs: Floats) -> None:
     """What each UAV needs for t alone, after its locked tasks, on its first trip. O(m).
 
-    r: says in which direction t is flown; needs: (m, 5) start of the service, its lateness [s],
-    length [m], time in the air [s], end of
-    the route [s].
+    turned: t is flown from its last point; needs: (m, 5) start of the service, its lateness [s],
+    length [m], time in the air [s], end of the route [s].
     """
+    if has_paths(a):
+        face(a, r, t, turned)
     for u in range(a.uavs):
         service = service_of(a, r, LINK(u), t)
         metres, seconds = leg_of(a, r, LINK(u), LINK(u), LINK(t))
@@ -124,11 +125,9 @@ def _least_needs(problem: TimedProblem, routes: TimedRoutes, i: int) -> Floats:
     """`needs_alone` of a task; of each column the less of both directions."""
     a = problem.arrays
     both = []
-    for turned in range(directions(a, a.uavs + i)):
-        if a.paths:
-            face(a, routes, a.uavs + i, turned == 1)
+    for turned in (False, True)[:1 + int(a.turnable[i])]:
         needs = np.empty((a.uavs, 5))
-        needs_alone(a, routes, a.uavs + i, needs)
+        needs_alone(a, routes, a.uavs + i, turned, needs)
         both.append(needs)
     least: Floats = np.minimum.reduce(both)
     return least

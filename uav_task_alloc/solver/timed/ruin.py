@@ -26,7 +26,7 @@ from uav_task_alloc.solver.timed.insertion import (
 )
 from uav_task_alloc.solver.timed.places import cheapest_direction
 from uav_task_alloc.solver.timed.segments import slot_of, update
-from uav_task_alloc.solver.timed.ways import is_task
+from uav_task_alloc.solver.timed.ways import has_paths, is_task
 
 ABSENT_SEED_RATE = 0.5  # share of rounds that start at an absent task, if there is one
 ANYWHERE_RATE = 0.02  # share of tasks without a place among neighbours that try all routes
@@ -92,7 +92,7 @@ def save_route(a: TimedArrays, r: TimedRoutes, w: Round, u: int) -> None:
         w.node[k] = i
         for c in range(4):
             w.link[k, c] = r.link[i, c]
-        if a.paths:
+        if has_paths(a):
             w.way[k, 0], w.way[k, 1] = r.way[i, 0], r.way[i, 1]
         for c in range(at.RATE):
             w.row[k, c] = r.row[i, c]
@@ -127,7 +127,7 @@ def take_back(a: TimedArrays, r: TimedRoutes, w: Round) -> None:
         i = w.node[k]
         for c in range(4):
             r.link[i, c] = w.link[k, c]
-        if a.paths:
+        if has_paths(a):
             r.way[i, 0], r.way[i, 1] = w.way[k, 0], w.way[k, 1]
         for c in range(at.RATE):
             r.row[i, c] = w.row[k, c]

@@ -17,7 +17,7 @@ from uav_task_alloc.kernel import inline_kernel, kernel
 from uav_task_alloc.solver.timed import columns as at
 from uav_task_alloc.solver.timed.arrays import TOLERANCE, TimedArrays, TimedRoutes
 from uav_task_alloc.solver.timed.path_times import path_seconds
-from uav_task_alloc.solver.timed.ways import service_of, way_length
+from uav_task_alloc.solver.timed.ways import has_paths, service_of, way_length
 
 
 @inline_kernel
@@ -32,7 +32,7 @@ def leg_of(a: TimedArrays, r: TimedRoutes, u: int, i: int, j: int) -> tuple[floa
             return a.begin[u, at.EMPTY_LENGTH], a.begin[u, at.EMPTY_TIME]
         if not a.returns:
             return own, 0.0
-    if a.paths:
+    if has_paths(a):
         i, j = r.way[i, at.LEAVE], r.way[j, at.ENTER]
     x, y = a.fixed[j, at.X] - a.fixed[i, at.X], a.fixed[j, at.Y] - a.fixed[i, at.Y]
     if a.flat:

@@ -61,7 +61,7 @@ def solve_timed(uavs: Sequence[Uav], tasks: Sequence[Task],
     Returns:
         The best plan found, with its times.
     """
-    load_timed_kernels(bool(limits.zones), max_iterations != 0)
+    load_timed_kernels(bool(limits.zones), max_iterations != 0, any(task.path for task in tasks))
     began, before = clock(), WarmState.of(warm)
     search = PathPreparation(clock, began, budget, stop, before.flown())
     known = before.problem
@@ -131,25 +131,27 @@ def _aboard(uavs: Sequence[Uav], tasks: Sequence[Task], locked: Mapping[str, tup
 
 
 @functools.cache
-def load_timed_kernels(zones: bool = False, search: bool = True) -> None:
+def load_timed_kernels(zones: bool = False, search: bool = True, paths: bool = False) -> None:
     """Load the kernels of problems with time, compile those not on disk yet.
 
     Args:
         zones: whether to load the kernels that find paths around zones, too.
         search: False: only what a plan of no iterations needs.
+        paths: those of problems with tasks that have a path, not of others.
     """
     first = TIMED_FIRST_WORK.plus(ZONES_WORK if zones else NO_WORK)
-    with NOTICE.until_loaded(('timed', zones), first, TIMED_SEARCH_WORK, search):
-        _call_kernels(zones, search)
+    with NOTICE.until_loaded(('timed', zones, paths), first, TIMED_SEARCH_WORK, search):
+        _call_kernels(zones, search, paths)
 
 
-def _call_kernels(zones: bool, search: bool) -> None:
+def _call_kernels(zones: bool, search: bool, paths: bool) -> None:
     """Solve a small problem, so that each kernel is called."""
     uavs = (Uav('u', (0.0, 0.0, 0.0), turnaround=1.0), Uav('v', (9.0, 0.0, 0.0), 30.0))
     tasks = tuple(Task(f't{i}', (float(i), 1.0, 0.0), latest=99.0) for i in range(5))
-    tasks += (Task('late', (9e3, 0.0, 0.0), latest=1.0),
-              Task('line', (1.0, 2.0, 0.0), path=((1.0, 2.0, 0.0), (4.0, 2.0, 0.0)),
-                   reversible=True))
+    tasks += (Task('late', (9e3, 0.0, 0.0), latest=1.0),)
+    if paths:
+        tasks += (Task('line', (1.0, 2.0, 0.0), path=((1.0, 2.0, 0.0), (4.0, 2.0, 0.0)),
+                       reversible=True),)
     limits = Limits((ThreatZone.cylinder('z', (2.5, 1.0), 0.3),) if zones else ())
     problem = make_timed(make_problem(uavs, tasks, {}, limits, Rules(trips=2)), {})
     recorder = TimedRecorder(lambda: 0.0, 0.0, 1.0, max_iterations=100 * search, problem=problem)

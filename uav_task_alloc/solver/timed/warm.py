@@ -23,7 +23,7 @@ from uav_task_alloc.solver.timed.search import (
     record,
 )
 from uav_task_alloc.solver.timed.visits import BASE_BEFORE, NO_VISIT, free_visit, split_cost
-from uav_task_alloc.solver.timed.ways import TURNED, face, is_turned
+from uav_task_alloc.solver.timed.ways import TURNED, face, has_paths, is_turned
 from uav_task_alloc.solver.warm import WarmState
 
 MOST_PLACES = 1_000_000  # absent tasks times tasks that `completed` tries
@@ -86,7 +86,7 @@ def append_all(a: TimedArrays, r: TimedRoutes, nodes: Ints, bounds: Ints,
             t, last = LINK(nodes[i]), r.link[a.ends + u, at.PREV]
             if r.link[t, at.OF_UAV] != a.uavs:
                 continue
-            if a.paths:
+            if has_paths(a):
                 face(a, r, t, turned[i] and a.turnable[t - a.uavs])
             way = TURNED if is_turned(a, r, t) else 0
             base = free_visit(a, r, LINK(u)) if visits else -1

@@ -4,7 +4,9 @@
 A task with a path has two rows in TimedArrays.fixed and `point`, one for each end: its node, and
 `far`, beyond all nodes. TimedRoutes.way says of each node which row it is entered at and which it
 is left from; of a point, and of other nodes, both are the node. The length of a path counts with
-the leg after it, its time with the service. In problems without paths nothing here is read.
+the leg after it, its time with the service. Kernels are compiled once
+more for problems with paths, in which TimedArrays.paths has two dimensions: so those without are
+solved as fast as if there were no paths.
 """
 from __future__ import annotations
 
@@ -22,6 +24,12 @@ TURN_BIT: Any = np.uint32(1 << 31)  # in an order of nodes: the node is flown fr
 
 
 @inline_kernel
+def has_paths(a: TimedArrays) -> bool:
+    """Whether some tasks have a path; known when kernels are compiled. O(1)."""
+    return a.paths.ndim == 2
+
+
+@inline_kernel
 def is_task(a: TimedArrays, i: int) -> bool:
     """Whether node i is a task."""
     return a.uavs <= i < a.ends
@@ -30,7 +38,7 @@ def is_task(a: TimedArrays, i: int) -> bool:
 @inline_kernel
 def directions(a: TimedArrays, t: int) -> int:
     """In how many directions task t may be flown. O(1)."""
-    return 2 if a.paths and a.turnable[t - a.uavs] else 1
+    return 2 if has_paths(a) and a.turnable[t - a.uavs] else 1
 
 
 @inline_kernel
@@ -47,13 +55,13 @@ def face(a: TimedArrays, r: TimedRoutes, t: int, turned: bool) -> None:
 @inline_kernel
 def is_turned(a: TimedArrays, r: TimedRoutes, i: int) -> bool:
     """Whether node i is flown from its last point. O(1)."""
-    return a.paths and r.way[i, at.ENTER] != i
+    return has_paths(a) and r.way[i, at.ENTER] != i
 
 
 @inline_kernel
 def service_of(a: TimedArrays, r: TimedRoutes, u: int, i: int) -> float:
     """Service [s] of UAV u at node i, with the flight along its path. O(1)."""
-    if not a.paths or not is_task(a, i):
+    if not has_paths(a) or not is_task(a, i):
         return float(a.fixed[i, at.SERVICE])
     return float(a.along[a.speeds[u], 2 * (i - a.uavs) + int(r.way[i, at.ENTER] != i)])
 
@@ -61,14 +69,14 @@ def service_of(a: TimedArrays, r: TimedRoutes, u: int, i: int) -> float:
 @inline_kernel
 def way_length(a: TimedArrays, i: int) -> float:
     """Length [m] of the path of node i. O(1)."""
-    return float(a.way_length[i - a.uavs]) if a.paths and is_task(a, i) else 0.0
+    return float(a.way_length[i - a.uavs]) if has_paths(a) and is_task(a, i) else 0.0
 
 
 @inline_kernel
 def nearest_ends(a: TimedArrays, t: int, s: int) -> tuple[float, float]:
     """Squared distance [m^2] of the nearest ends of two nodes; the same horizontally. O(1)."""
     least = flat = np.inf
-    for k in range(4 if a.paths else 1):
+    for k in range(4 if has_paths(a) else 1):
         i, j = t, s
         if k & 1 and is_task(a, t):
             i = a.far[t - a.uavs]
