@@ -1,7 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """`plan` cuts work into pieces and names them in short."""
+import json
+
 import pytest
 
+from uav_task_alloc.cli.commands import main
 from uav_task_alloc.cli.plan_pieces import piece_kinds, short_names, with_pieces
 from uav_task_alloc.scenario import parse
 
@@ -24,6 +27,25 @@ def test_a_scenario_is_cut_around_its_zones():
         'mast', 'cable#1', 'cable#2', 'field#1', 'field#2', 'field#3', 'field#4']
     assert {timed.at for timed in cut.tasks if timed.task.id.startswith('field')} == {3.0}
     assert piece_kinds(cut) == {'field': 'strip', 'cable': 'part'}
+
+
+def test_lengths_and_times_of_a_plan_have_the_ways_of_pieces(tmp_path, capsys):
+    scenario, out = tmp_path / 'job.yaml', tmp_path / 'plan.json'
+    scenario.write_text(SCENARIO)
+    assert main(['plan', str(scenario), '--budget', '0.1', '--times', '--json', str(out)]) == 0
+    printed, written = capsys.readouterr().out, json.loads(out.read_text())
+    assert f'uav_1: {written["distance"]:.0f} m' in printed
+    assert 'cable parts' in printed
+    ways = {name: [(row['latitude'], row['longitude']) for row in rows]
+            for name, rows in written['paths'].items()}
+    for name in written['reversed']:
+        ways[name].reverse()
+    stops = [name for name in written['routes']['uav_1'] if name in ways]
+    flown = [row for row in written['waypoints']['uav_1'] if row['task'] in ways]
+    assert [(row['latitude'], row['longitude']) for row in flown] == [
+        place for name in stops for place in ways[name]]
+    row = next(line for line in printed.splitlines() if line.startswith('field#2')).split()
+    assert float(row[6]) - float(row[5]) == pytest.approx(20.0, abs=0.11)  # 300 m at 15 m/s
 
 
 @pytest.mark.parametrize(('names', 'text'), [

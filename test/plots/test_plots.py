@@ -50,7 +50,7 @@ def test_conflicts_are_marked_where_they_are_red_where_not_resolved(tmp_path, dr
     plan = Plan({}, conflicts=tuple(found))
     draw([], [], [], plan, tmp_path / 'plan.png')
     assert marked == [((1.0, 2.0, 3.0), '#202020'), ((4.0, 5.0, 6.0), palette.RED)]
-    assert [each.get_label() for each in plan_map.legend_handles([], plan)] == [
+    assert [each.get_label() for each in plan_map.legend_handles([], [], plan)] == [
         'conflicts resolved: 1', 'conflicts NOT resolved: 1']
 
 
@@ -98,7 +98,8 @@ def test_the_axes_are_labelled_with_units():
 def test_the_legend_of_a_large_fleet_is_limited():
     uavs = [Uav(f'u{i}', (float(i), 0.0, 0.0)) for i in range(40)]
     result = Plan({uav.id: ('t',) * (i < 30) for i, uav in enumerate(uavs)})
-    texts = [handle.get_label() for handle in plan_map.legend_handles(uavs, result)]
+    texts = [handle.get_label() for handle in plan_map.legend_handles(
+        uavs, [Task('t', (0.0, 0.0, 0.0))], result)]
     assert texts[0] == 'u0: 1 task, 0 m'
     assert texts[style.LEGEND_ROWS:] == [
         f'{30 - style.LEGEND_ROWS} more UAVs with tasks', '10 without tasks']

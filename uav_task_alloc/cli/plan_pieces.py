@@ -35,11 +35,13 @@ def with_pieces(loaded: Scenario) -> Scenario:
 def piece_kinds(loaded: Scenario) -> dict[str, str]:
     """What the pieces of a whole task are called, by its id: part, strip or arc.
 
+    A task of one piece is not among them: its own id says all.
+
     Args:
         loaded: as `with_pieces` returns it.
     """
     return {split_piece(timed.task.id)[0]: _WORDS[timed.work.kind] for timed in loaded.tasks
-            if timed.work is not None and timed.work.kind in _WORDS}
+            if timed.work is not None and split_piece(timed.task.id)[1] > 1}
 
 
 def short_names(names: Iterable[str], kinds: dict[str, str]) -> list[str]:

@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-from uav_task_alloc.model import Plan, Task
+from uav_task_alloc.model import Plan, Task, Uav, turned_tasks
 from uav_task_alloc.objective import check_objective, needs_time
 from uav_task_alloc.scenario.values import Scenario
 
@@ -19,23 +19,26 @@ def has_times(loaded: Scenario) -> bool:
                       check_objective(loaded.objective or 'distance'), loaded.trips)
 
 
-def times_text(tasks: Sequence[Task], result: Plan) -> str:
+def times_text(uavs: Sequence[Uav], tasks: Sequence[Task], result: Plan) -> str:
     """A table of the tasks served [s], by UAV in the order of the routes.
 
     Args:
+        uavs: all UAVs of the plan.
         tasks: all tasks of the plan.
         result: the plan.
 
     Returns:
         Lines of text, the first of them the head.
     """
-    known, times = {task.id: task for task in tasks}, result.timetable()
+    from uav_task_alloc.geometry.flight_time import service_seconds  # imports numba
+    known = {task.id: task for task in turned_tasks(tasks, result.reversed)}
+    fleet, times = {uav.id: uav for uav in uavs}, result.timetable()
     rows = [_HEAD]
     for uav, trips in times.trips.items():
         for number, trip in enumerate(trips, 1):
             rows += [(name, uav, str(number), _seconds(times.arrivals[name]),
                       _seconds(result.waits[name]), _seconds(times.starts[name]),
-                      _seconds(times.starts[name] + known[name].service_time),
+                      _seconds(times.starts[name] + service_seconds(fleet[uav], known[name])),
                       _window(known[name]), _seconds(times.late.get(name, 0.0))) for name in trip]
         takeoffs = ', '.join(map(_seconds, times.departures[uav]))
         rows.append(('', uav, '', '', '', '', _seconds(times.ends[uav]),

@@ -9,7 +9,7 @@ from matplotlib.lines import Line2D
 
 import uav_task_alloc.plots.style as style
 from uav_task_alloc.model import Plan, Point, Task, ThreatZone, Uav
-from uav_task_alloc.model.route_stops import route_points
+from uav_task_alloc.model.route_stops import route_length, route_points
 from uav_task_alloc.palette import RED, uav_colour
 from uav_task_alloc.plots.flat import MapFigure
 
@@ -32,7 +32,7 @@ def draw_plan(uavs: Sequence[Uav], tasks: Sequence[Task], zones: Sequence[Threat
     """
     figure = MapFigure((task.position for task in tasks), len(tasks))
     add_plan(figure, uavs, tasks, zones, plan)
-    figure.finish(plan_title(plan, len(tasks)), legend_handles(uavs, plan), png)
+    figure.finish(plan_title(plan, len(tasks)), legend_handles(uavs, tasks, plan), png)
 
 
 def add_plan(figure: MapFigure, uavs: Sequence[Uav], tasks: Sequence[Task],
@@ -81,12 +81,13 @@ def plan_title(plan: Plan, tasks: int) -> str:
     return f'{planned} of {tasks} tasks planned, {plan.distance / 1e3:.1f} km'
 
 
-def legend_handles(uavs: Sequence[Uav], plan: Plan, rows: int = style.LEGEND_ROWS) -> list[Line2D]:
+def legend_handles(uavs: Sequence[Uav], tasks: Sequence[Task], plan: Plan,
+                   rows: int = style.LEGEND_ROWS) -> list[Line2D]:
     """The legend: at most `rows` UAVs with tasks, the numbers of others, unassigned tasks."""
     assigned = [(index, uav.id) for index, uav in enumerate(uavs) if plan.routes.get(uav.id)]
-    handles = []
+    known, handles = {task.id: task for task in tasks}, []
     for index, name in assigned[:rows]:
-        metres = sum(leg.length for leg in plan.legs.get(name, ()))
+        metres = route_length(plan, name, known)
         handles.append(style.route_handle(
             index, f'{name}: {style.task_count(len(plan.routes[name]))}, {metres:.0f} m'))
     for count, text in ((len(assigned) - rows, 'more UAVs with tasks'),

@@ -80,7 +80,7 @@ def draw_plan_3d(uavs: Sequence[Uav], tasks: Sequence[Task], zones: Sequence[Thr
     _set_axes(axes, low, high)
     figure.text(0.03, 0.94, plan_title(plan, len(tasks)), fontsize=style.LARGE, fontweight='bold')
     figure.text(_NOTE_X, 0.97, note, fontsize=SMALL - 2.0, va='top')
-    handles = [*legend_handles(uavs, plan, _LEGEND_ROWS), *_zone_handle(zones, high[2])]
+    handles = [*legend_handles(uavs, tasks, plan, _LEGEND_ROWS), *_zone_handle(zones, high[2])]
     style.legend(figure, handles, 'lower right')
     _write_labels(axes, names, routes)
     figure.savefig(png)

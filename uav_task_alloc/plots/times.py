@@ -46,7 +46,7 @@ def draw_plan_times(uavs: Sequence[Uav], tasks: Sequence[Task], zones: Sequence[
     axes.set_xlabel('time [s]', fontsize=style.PLAIN)
     axes.set_title(f'ends at {plan.finish:.0f} s', loc='left', fontsize=style.LARGE, pad=12)
     title = plan_title(plan, len(tasks))
-    figure.finish(title, [*legend_handles(uavs, plan, rows=5), *_handles()], png)
+    figure.finish(title, [*legend_handles(uavs, tasks, plan, rows=5), *_handles()], png)
 
 
 def _handles() -> list[Any]:
