@@ -106,6 +106,7 @@ setup(
     install_requires=['numpy', 'numba>=0.57', 'pymap3d', 'pymavlink', 'pyyaml', 'scipy'],
     extras_require={'plot': ['matplotlib'],
                     'study': ['distributed', 'ortools', 'pyvrp'],
+                    'terrain': ['rasterio'],
                     'site': ['myst-parser', 'sphinx'],
                     'view': ['aiohttp', 'mcap', 'mcap-ros2-support', 'plotly'],
                     'test': ['hypothesis', 'matplotlib', 'mypy', 'pytest', 'pytest-xdist',

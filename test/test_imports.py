@@ -18,6 +18,7 @@ ROOMS = {
     'plotly': ('flight_report/',),
     'aiohttp': ('live/',),
     'pymap3d': ('geometry/',),
+    'rasterio': ('terrain',),
     'numba': ('geometry/', 'solver/', 'kernel'),
 }
 ROS = {'rclpy', 'rcl_interfaces', 'builtin_interfaces', 'geometry_msgs', 'std_msgs', 'std_srvs',
@@ -45,6 +46,7 @@ LEVELS = {
     'geometry.polygon': 0,  # `checks` checks polygons with it
     'geometry.polyline': 0,  # the model has paths
     'geometry': 2,
+    'terrain': 2,
     'objective': 2,
     'separation.rule': 0,  # the model has its conflicts
     'separation': 3,

@@ -44,12 +44,15 @@ def route_stops(plan: Plan, uav: str, tasks: Mapping[str, Task], base: Point) ->
 
 
 def route_length(plan: Plan, uav: str, tasks: Mapping[str, Task]) -> float:
-    """Return the length of a route with the paths of its tasks [m].
+    """Return the length of a route with the paths of its tasks.
 
     Args:
         plan: with routes and legs.
         uav: its id.
         tasks: by id.
+
+    Returns:
+        [m].
     """
     return plan.route(uav).distance + math.fsum(
         tasks[name].path_length for name in plan.routes[uav])
