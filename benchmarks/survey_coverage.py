@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Strips over random fields against an independent raster, and their way against a public planner.
 
-Usage: python benchmarks/coverage.py [--fields N] [--seed S] [--solver SECONDS]
+Usage: python benchmarks/survey_coverage.py [--fields N] [--seed S] [--solver SECONDS]
 
 Half of the fields have no holes and zones. Each is cut by `pieces_of`; the raster knows polygons,
 holes and zones by its own formulas, and what rectangles around the ways have covered. With
