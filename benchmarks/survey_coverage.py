@@ -11,7 +11,8 @@ photos a quarter of it apart): our strips in their order, each from its nearer e
 `--solver` in the order that `plan` finds in so many seconds. The last line is one JSON object:
 `fields`, `least_share`, `below` (of 99.5 %), `entered` (ways inside zones), `pieces` (median),
 `seconds` (longest to cut), `compared`, `ratio_median`, `ratio_worst`, `shorter` (share), and
-`their_share` (covered by the public planner, median).
+`their_share` (covered by the public planner, median), `ratio_by_area` (of ways by what they have
+covered, median).
 """
 import argparse
 import json
@@ -81,8 +82,8 @@ def measure(seed, plain, planner, budget):
         return raster.share(), entered, len(pieces), seconds, None, None
     other, theirs = planner(work), Raster(work, (), 0.0, 600)
     theirs.fly(other, work.strip_width)
-    ratio = own_length(pieces, budget) / sum(dist(a, b) for a, b in pairwise(other))
-    return raster.share(), entered, len(pieces), seconds, ratio, theirs.share()
+    way, public = own_length(pieces, budget), sum(dist(a, b) for a, b in pairwise(other))
+    return raster.share(), entered, len(pieces), seconds, way / public, theirs.share()
 
 
 def main():
@@ -107,6 +108,8 @@ def main():
             'ratio_median': round(statistics.median(ratios), 3),
             'ratio_worst': round(max(ratios), 3),
             'their_share': round(statistics.median(r[5] for r in rows if r[5] is not None), 5),
+            'ratio_by_area': round(statistics.median(
+                r[4] * r[5] / r[0] for r in rows if r[4] is not None), 3),
             'shorter': round(sum(ratio <= 1.0 for ratio in ratios) / len(ratios), 3),
         } if ratios else {})}))
 

@@ -45,7 +45,7 @@ def test_what_can_be_reached_is_covered_and_no_way_enters_a_zone(seed):
     for piece in pieces:
         raster.fly(piece.path, work.strip_width)
         assert path_is_clear(piece.path, zones, clearance)
-    assert raster.share() >= 0.998
+    assert raster.share() >= 0.995
     assert pieces == pieces_of(work, zones, clearance)
 
 

@@ -20,11 +20,12 @@ from uav_task_alloc.work.cells import (
     turn,
 )
 from uav_task_alloc.work.values import MOST_PIECES
-from uav_task_alloc.work.zone_sections import remaining, ring_spans
+from uav_task_alloc.work.zone_sections import Span, remaining, ring_spans
 
 PlaneWay = list[XY]  # [m] from one end to the other
 _SHIFTS = 0.0, 0.5, -0.5, 0.25, -0.25, 0.375, -0.375, 0.125, -0.125  # of a strip, tried in order
 _SCRAP = 0.02  # of the square of the width: what is smaller is left out
+_TRIM = 0.001  # of the area: so much may be left out at all pointed ends on one side
 _MOST_DIRECTIONS = 8  # that are compared, by the number of strips
 _ALIKE = math.radians(0.5)  # directions that differ by less are one
 
@@ -52,19 +53,19 @@ def cover(region: Region, width: float, direction: float | None, place: str) -> 
     if ranked[0][0] > MOST_PIECES * width:
         raise InvalidValue(place, width, f'at least {ranked[0][0] / MOST_PIECES:.3g} m: more than '
                                          f'{MOST_PIECES} strips otherwise')
-    best: tuple[float, list[PlaneWay]] | None = None
+    best: tuple[float, float, int] | None = None  # cost, direction, pieces
     for height, angle in ranked[:_MOST_DIRECTIONS]:
         if height > MOST_PIECES * width:
             break
-        ways = _strips(region.turned(-angle), width, [y for _, y in turn(points, -angle)])
+        ways = _strips(region, angle, points, width, 0.0)
         cost = snake_length(ways) + width * len(ways)
         if best is None or cost < best[0] - 1e-6:
-            best = cost, [turn(way, angle) for way in ways]
+            best = cost, angle, len(ways)
     assert best is not None
-    if len(best[1]) > MOST_PIECES:
-        raise InvalidValue(place, width, f'wider strips: {len(best[1])} pieces, and at most '
+    if best[2] > MOST_PIECES:
+        raise InvalidValue(place, width, f'wider strips: {best[2]} pieces, and at most '
                                          f'{MOST_PIECES} are allowed')
-    return best[1]
+    return [turn(way, best[1]) for way in _strips(region, best[1], points, width, _TRIM)]
 
 
 def _directions(region: Region) -> list[float]:
@@ -93,8 +94,10 @@ def snake_length(ways: Sequence[PlaneWay]) -> float:
     return total
 
 
-def _strips(region: Region, width: float, levels: Iterable[float]) -> list[PlaneWay]:
-    """Ways along x; `levels` are the y of crossings of edges."""
+def _strips(given: Region, angle: float, crossed: Iterable[XY], width: float,
+            trim: float) -> list[PlaneWay]:
+    """Ways in a direction, turned to be along x; edges cross at `crossed`."""
+    region, levels = given.turned(-angle), [y for _, y in turn(crossed, -angle)]
     ys = [y for _, y in region.outer]
     low, high = min(ys), max(ys)
     count = max(1, math.ceil((high - low) / width - 1e-9))
@@ -106,13 +109,14 @@ def _strips(region: Region, width: float, levels: Iterable[float]) -> list[Plane
     scrap = min(_SCRAP * width * width, 2e-3 * area / count)
     ways: list[PlaneWay] = []
     for k, cells in enumerate(strips):
-        found = _in_strip(region, cells, low + (k + 0.5) * step, step, width, scrap)
+        found = _in_strip(region, cells, low + (k + 0.5) * step, step, width, scrap,
+                          trim * area / count)
         ways += sorted(found, reverse=k % 2 == 1)
     return ways
 
 
 def _in_strip(region: Region, cells: list[PlaneCell], middle: float, step: float, width: float,
-              scrap: float) -> list[PlaneWay]:
+              scrap: float, trim: float) -> list[PlaneWay]:
     """Ways over the cells of one strip: along its middle, and shifted where that is barred."""
     ways: list[PlaneWay] = []
     for shift in _SHIFTS:
@@ -127,11 +131,26 @@ def _in_strip(region: Region, cells: list[PlaneCell], middle: float, step: float
                 over = between(seen, 0, *part)
                 if cells_area(over) <= scrap:
                     continue
-                xs = [x for cell in over for x, _ in cell]
-                _add([(min(xs), y), (max(xs), y)], ways, region, width)
+                start, end = _extent(over, step, trim)
+                _add([(start, y), (end, y)], ways, region, width)
                 cells = [left for cell in cells
                          for left in _without(cell, part[0], part[1], low, high)]
     return ways
+
+
+def _extent(cells: list[PlaneCell], step: float, trim: float) -> Span:
+    """Where cells begin and end along x, without pointed ends of an area of at most `trim`."""
+    xs = [x for cell in cells for x, _ in cell]
+    first, last = min(xs), max(xs)
+    cuts = []
+    for end, sign in ((first, 1.0), (last, -1.0)) if trim else ():
+        low, high = 0.0, (last - first) / 3
+        for _ in range(12):
+            middle = (low + high) / 2
+            cut = between(cells, 0, *sorted((end, end + sign * middle)))
+            low, high = (middle, high) if cells_area(cut) <= trim else (low, middle)
+        cuts.append(low if low * step > 3.0 * trim else 0.0)  # 1: it is no pointed end
+    return (first + cuts[0], last - cuts[1]) if cuts else (first, last)
 
 
 def _without(cell: PlaneCell, x0: float, x1: float, y0: float, y1: float) -> list[PlaneCell]:
