@@ -15,7 +15,7 @@ from uav_task_alloc.errors import AllocError, InvalidValue
 from uav_task_alloc.geometry.frames import Origin, to_geodetic_batch
 from uav_task_alloc.model import Point
 
-Floats = NDArray[np.float64]
+_Floats = NDArray[np.float64]
 _CHUNK = 100.0  # [m] of a leg that is straight in the grid: the earth's curve over it is 0.2 mm
 _SLACK = 0.05  # [m] more than asked for, for that and for rounding
 _MOST_POINTS = 200  # that are added to a leg
@@ -29,7 +29,7 @@ class TerrainError(AllocError, ValueError):
 class Projection(Protocol):
     """Turns degrees into positions in the grid."""
 
-    def __call__(self, longitude: Floats, latitude: Floats) -> tuple[Floats, Floats]:
+    def __call__(self, longitude: _Floats, latitude: _Floats) -> tuple[_Floats, _Floats]:
         """Columns and rows of nodes, counted from the centre of the first, not rounded."""
 
 
@@ -43,12 +43,12 @@ class Terrain:
         name: of the file, for errors.
     """
 
-    def __init__(self, heights: Floats, to_grid: Projection, origin: Origin,
+    def __init__(self, heights: _Floats, to_grid: Projection, origin: Origin,
                  name: str = 'terrain') -> None:
         self._heights, self._to_grid = np.asarray(heights, np.float64), to_grid
         self.origin, self.name = origin, name
 
-    def above_ground(self, points: Sequence[Point]) -> Floats:
+    def above_ground(self, points: Sequence[Point]) -> _Floats:
         """Return how high points are above the ground.
 
         Args:
@@ -109,21 +109,21 @@ class Terrain:
         uu, vv, up = (np.interp(every, shares, values) for values in (u, v, altitude))
         return _least(self._above(uu, vv, up, line), every)
 
-    def _above(self, u: Floats, v: Floats, up: Floats, line: Floats) -> Floats:
+    def _above(self, u: _Floats, v: _Floats, up: _Floats, line: _Floats) -> _Floats:
         """Heights (3, n) above the ground at begin, middle and end of each crossing."""
         begin, middle, end = slice(0, -2, 2), slice(1, -1, 2), slice(2, None, 2)
         column, row = np.floor(u[middle]), np.floor(v[middle])
         return np.array([up[part] - self._surface(u[part], v[part], line, column, row)
                          for part in (begin, middle, end)])
 
-    def _grid(self, points: Floats) -> tuple[Floats, Floats, Floats]:
+    def _grid(self, points: _Floats) -> tuple[_Floats, _Floats, _Floats]:
         """Column, row and altitude AMSL of ENU points (n, 3)."""
         places = to_geodetic_batch(self.origin, points)
         u, v = self._to_grid(places[:, 1], places[:, 0])
         return np.asarray(u, np.float64), np.asarray(v, np.float64), places[:, 2]
 
-    def _surface(self, u: Floats, v: Floats, points: Floats, column: Floats | None = None,
-                 row: Floats | None = None) -> Floats:
+    def _surface(self, u: _Floats, v: _Floats, points: _Floats, column: _Floats | None = None,
+                 row: _Floats | None = None) -> _Floats:
         """Heights AMSL at positions in the grid, of the cells given or those around them."""
         rows, columns = self._heights.shape
         inside = (u >= -1e-6) & (v >= -1e-6) & (u <= columns - 1 + 1e-6) & (v <= rows - 1 + 1e-6)
@@ -133,7 +133,7 @@ class Terrain:
         i = np.clip(np.floor(u) if column is None else column, 0, columns - 2).astype(np.int64)
         j = np.clip(np.floor(v) if row is None else row, 0, rows - 2).astype(np.int64)
         x, y, h = u - i, v - j, self._heights
-        found: Floats = (h[j, i] * (1 - x) * (1 - y) + h[j, i + 1] * x * (1 - y)
+        found: _Floats = (h[j, i] * (1 - x) * (1 - y) + h[j, i + 1] * x * (1 - y)
                          + h[j + 1, i] * (1 - x) * y + h[j + 1, i + 1] * x * y)
         if not np.isfinite(found).all():
             raise TerrainError(f'{self.name}: it has no data near {_spots(points)}: expected '
@@ -203,7 +203,7 @@ class Terrain:
         return tuple(ways)
 
 
-def _crossings(values: Floats, shares: Floats) -> Floats:
+def _crossings(values: _Floats, shares: _Floats) -> _Floats:
     """Shares of a leg at which piecewise linear values are whole numbers."""
     found = []
     for (s, p), (t, q) in pairwise(zip(shares.tolist(), values.tolist(), strict=True)):
@@ -214,7 +214,7 @@ def _crossings(values: Floats, shares: Floats) -> Floats:
     return np.concatenate(found) if found else np.zeros(0)
 
 
-def _least(above: Floats, every: Floats) -> tuple[float, float]:
+def _least(above: _Floats, every: _Floats) -> tuple[float, float]:
     """The least of quadratic functions given at begin, middle and end, and where."""
     begin, middle, end = above
     curve, slope = 2 * (begin + end - 2 * middle), 4 * middle - 3 * begin - end
@@ -250,7 +250,7 @@ def _shown(point: Sequence[float]) -> str:
     return f'({point[0]:.0f}, {point[1]:.0f})'
 
 
-def _spots(points: Floats) -> str:
+def _spots(points: _Floats) -> str:
     return ' to '.join(_shown(point) for point in points[::max(1, len(points) - 1)][:2])
 
 
@@ -285,7 +285,7 @@ def read_terrain(path: Path, origin: Origin) -> Terrain:
     except rasterio.errors.RasterioError as error:
         raise TerrainError(f'{path}: {error}: expected a GeoTIFF') from None
 
-    def to_grid(longitude: Floats, latitude: Floats) -> tuple[Floats, Floats]:
+    def to_grid(longitude: _Floats, latitude: _Floats) -> tuple[_Floats, _Floats]:
         xs, ys = transform('EPSG:4326', crs, longitude.tolist(), latitude.tolist())[:2]
         x, y = np.array(xs), np.array(ys)
         return a * x + b * y + c - 0.5, d * x + e * y + f - 0.5  # of the centres of pixels
