@@ -4,12 +4,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from enum import Enum, IntEnum
 from typing import Protocol
 
 from pymavlink.dialects.v20 import ardupilotmega as d
 
+from uav_task_alloc.mavlink.action_commands import (
+    ARDUCOPTER_ACTIONS,
+    ARDUPLANE_ACTIONS,
+    GENERIC_ACTIONS,
+    PX4_ACTIONS,
+    ActionRow,
+)
 from uav_task_alloc.mavlink.transport.codec import Message
 
 OFF_GROUND = 2.0  # [m] above home: airborne, whatever the latest landed_state is
@@ -79,6 +86,10 @@ class ItemRules:
     lands: bool = False  # NAV_LAND comes straight down: multicopters
     capacity: int = 500  # items
     fence_points: int = 64  # of the fence store
+    turns_by_waypoint: bool = True  # p4 of a waypoint is a heading; else CONDITION_YAW
+    # how it carries out the named actions; all of them are here
+    actions: Mapping[str, ActionRow] = field(default_factory=lambda: GENERIC_ACTIONS, repr=False,
+                                             compare=False)
 
 
 @dataclass(frozen=True, slots=True)
@@ -202,19 +213,21 @@ _PX4 = {
 ARDUPILOT = Profile(
     'ardupilot', ItemRules(home_first=True, whole_seconds=True, keeps_radius=False, yaw=0.0,
                            command_frame=d.MAV_FRAME_GLOBAL_RELATIVE_ALT, capacity=650,
-                           fence_points=70, lands=True),
+                           fence_points=70, lands=True, turns_by_waypoint=False,
+                           actions=ARDUCOPTER_ACTIONS),
     atomic=False, idle_after=9.0, modes=_COPTER, family='copter',
     set_mode={ModeFunction.MISSION: d.COPTER_MODE_AUTO, ModeFunction.HOLD: d.COPTER_MODE_GUIDED,
               ModeFunction.RETURN: d.COPTER_MODE_RTL})
 ARDUPLANE = replace(
-    ARDUPILOT, rules=replace(ARDUPILOT.rules, loiters=True, lands=False), modes=_PLANE,
+    ARDUPILOT, rules=replace(ARDUPILOT.rules, loiters=True, lands=False,
+                             actions=ARDUPLANE_ACTIONS), modes=_PLANE,
     family='plane',
     set_mode={ModeFunction.MISSION: d.PLANE_MODE_AUTO, ModeFunction.HOLD: d.PLANE_MODE_GUIDED,
               ModeFunction.RETURN: d.PLANE_MODE_RTL})
 PX4 = Profile(
     # NAV_ACC_RAD is 10 m since 2026: a task would count as reached when passed at that distance
     'px4',
-    ItemRules(radius=2.0, lands=True),
+    ItemRules(radius=2.0, lands=True, actions=PX4_ACTIONS),
     atomic=True,
     idle_after=6.0,
     modes=_PX4,
@@ -228,7 +241,8 @@ PX4 = Profile(
         ModeFunction.RETURN: _auto(Px4AutoMode.RTL),
     },
 )
-PX4_PLANE = replace(PX4, rules=replace(PX4.rules, loiters=True, lands=False, radius=0.0))
+PX4_PLANE = replace(PX4, rules=replace(
+    PX4.rules, loiters=True, lands=False, radius=0.0, turns_by_waypoint=False))
 PX4_VTOL = replace(PX4, rules=replace(PX4.rules, lands=False))  # it would land as a plane
 GENERIC = Profile('generic', ItemRules(yaw=0.0), atomic=False, idle_after=9.0, modes={},
                   set_mode={})

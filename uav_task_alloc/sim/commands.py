@@ -9,9 +9,11 @@ from functools import partial
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from uav_task_alloc.mavlink.transport.codec import Message
+from uav_task_alloc.sim import stored_item as item_
 from uav_task_alloc.sim.config import FlightMode
 from uav_task_alloc.sim.flight import VehicleFlight
 from uav_task_alloc.sim.modes import px4_mode
+from uav_task_alloc.sim.stored_item import StoredItem
 from uav_task_alloc.sim.streams import Streams
 
 CommandParams = tuple[float, float, float, float, float, float, float]
@@ -48,6 +50,8 @@ class Commands:
             dialect.MAV_CMD_REQUEST_MESSAGE: self._request_message,
             dialect.MAV_CMD_DO_CHANGE_SPEED: self._change_speed,
         }
+        for command in item_.AT_ONCE - {item_.CHANGE_SPEED, item_.YAW}:
+            self.handlers[command] = partial(self._payload, command)
         for command, mode in _MODE_COMMANDS.items():
             self.handlers[command] = partial(self._enter, mode)
 
@@ -106,7 +110,12 @@ class Commands:
     def _change_speed(self, p: CommandParams) -> int:
         if not p[1] > 0.0:
             return _DENIED
-        self.flight.speed = p[1]
+        self.flight.change_speed(p[1])
+        return _ACCEPTED
+
+    def _payload(self, command: int, p: CommandParams) -> int:
+        self.flight.execute(StoredItem(
+            dialect.MAV_FRAME_GLOBAL, command, *p[:4], round(p[4]), round(p[5]), p[6]))
         return _ACCEPTED
 
 
@@ -129,6 +138,10 @@ class Px4Commands(Commands):
     """Refuses with TEMPORARILY_REJECTED; no DO_SET_MISSION_CURRENT; take-off height is AMSL."""
 
     refused = _REJECTED
+
+    def _change_speed(self, p: CommandParams) -> int:
+        self.flight.change_speed(p[1])  # none: the default
+        return _ACCEPTED
 
     def custom_mode(self, params: CommandParams) -> int:
         return px4_mode(int(params[1]), int(params[2]))

@@ -74,7 +74,8 @@ class TruthEvent:
 
     Names: armed, disarmed, takeoff, item_reached, mission_end, died, mode, command, crashed,
     reboot, failsafe, failsafe_over, kill_switch, kill_switch_off, glitch, power_off,
-    battery_changed. Causes: `station
+    battery_changed; of the payload photo, trigger, video on, video off, servo, gripper, gimbal,
+    roi on, roi off, speed, yaw, with the values in `command`. Causes: `station
     SYSTEM/COMPONENT`, pilot, failsafe, self; of a failsafe its kind.
     """
 

@@ -27,6 +27,7 @@ class PointMass:
         self.position: Point = config.position  # [m]
         self.velocity: Point = (0.0, 0.0, 0.0)  # [m/s]
         self.heading = 0.0  # [rad] from east, counter-clockwise
+        self.fixed_heading: float | None = None  # [rad] kept whatever the way; None: along it
         self.flown = 0.0  # [m]
         self.battery = config.charge  # [0..1]
         self._wind = None if config.wind is None else WindAtVehicle(
@@ -56,7 +57,9 @@ class PointMass:
         most = self._config.acceleration * dt
         share = min(1.0, most / max(_norm(change), 1e-9))
         self.velocity = vx, vy, _ = _plus(self.velocity, change, share)
-        if math.hypot(vx, vy) > 0.5:
+        if self.fixed_heading is not None:
+            self.heading = self.fixed_heading
+        elif math.hypot(vx, vy) > 0.5:
             self.heading = math.atan2(vy, vx)
         self.position = _plus(self.position, self.velocity, dt)
         self.flown += _norm(self.velocity) * dt

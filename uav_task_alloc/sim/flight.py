@@ -15,6 +15,7 @@ from uav_task_alloc.sim.config import FlightMode, StorageChange, TruthEvent, Veh
 from uav_task_alloc.sim.dynamics import Track
 from uav_task_alloc.sim.modes import CustomMode
 from uav_task_alloc.sim.navigation import Navigation
+from uav_task_alloc.sim.payload import Payload
 from uav_task_alloc.sim.stored_item import StoredItem
 
 _MAX_STEP = 0.1  # [s] of the body
@@ -59,6 +60,7 @@ class VehicleFlight(Navigation):
         self.reached: list[int] = []
         self.texts: list[tuple[int, str]] = []
         self.events: list[TruthEvent] = []
+        self.payload = Payload(lambda name, text: self.note(name, command=text))
         self.arming_fault = ''  # an injected reason to refuse arming; '': none
         self.terminated = False  # the kill switch is on
         self.stick: Point | None = None  # [m/s] ENU commanded by the pilot
@@ -73,6 +75,8 @@ class VehicleFlight(Navigation):
         self.now = self.booted = now
         self.boot.elapsed = 0.0
         self.note('reboot')
+        self.payload.reset()
+        self.body.fixed_heading = None
         self._set_number(self.custom_modes[self.start_mode])
         self.failsafes: dict[str, None] = {}  # the kinds that are active, oldest first
         self.seq = 0
@@ -194,6 +198,7 @@ class VehicleFlight(Navigation):
             self._set_number(number)
             self.track, self.next_point = None, None
             self.speed = self.config.cruise_speed
+            self.body.fixed_heading = None
             self.enter(mode)
         return True
 
@@ -277,6 +282,7 @@ class VehicleFlight(Navigation):
             self._follow(dt)
         else:
             self._steer(dt, stick)
+        self.payload.step(self.body.position, self.now)
         if self.body.battery <= 0.0 and self.mode is not FlightMode.LAND and not self.landed:
             self.texts.append((CRITICAL, 'Battery empty: landing'))
             with self.caused_by('failsafe'):
@@ -321,6 +327,20 @@ class VehicleFlight(Navigation):
     def item_done(self) -> None:
         """The item at `seq` has been flown."""
         raise NotImplementedError
+
+    def execute(self, item: StoredItem) -> None:
+        """Execute an item that is not flown, or a command of the same number."""
+        place = self.point(item) if item.command == item_.ROI else None
+        if not self.payload.execute(item, place, self.body.position, self.now):
+            super().execute(item)
+
+    def change_speed(self, speed: float) -> None:
+        super().change_speed(speed)
+        self.note('speed', command=f'{self.speed:g}')
+
+    def turn_to(self, compass: float) -> None:
+        super().turn_to(compass)
+        self.note('yaw', command=f'{compass:g}')
 
     def report_reached(self, seq: int, point: Point) -> None:
         """Send MISSION_ITEM_REACHED, and record it in the ground truth."""

@@ -58,14 +58,25 @@ class Navigation:
         item = self.items[seq]
         self.track = self.make_track(item)
         self.target = self.track.points[-1] if self.track.points else self.body.position
-        after = (i for i in self.items[seq + 1:] if i.command in item_.POSITIONAL)
+        after = (i for i in self.items[seq + 1:] if i.command in item_.FLOWN_TO)
         following = next(after, None)
         self.next_point = None if following is None else self.point(following)
 
     def execute(self, item: StoredItem) -> None:
         """Execute an item that is not flown."""
-        if item.command == item_.CHANGE_SPEED and item.p2 > 0.0:
-            self.speed = item.p2
+        if item.command == item_.CHANGE_SPEED:
+            self.change_speed(item.p2)
+        elif item.command == item_.YAW:
+            self.turn_to(item.p1)
+
+    def change_speed(self, speed: float) -> None:
+        """Fly at a speed [m/s] from now on."""
+        if speed > 0.0:
+            self.speed = speed
+
+    def turn_to(self, compass: float) -> None:
+        """Keep a heading [deg] clockwise from north, or none where it is NaN."""
+        self.body.fixed_heading = None if math.isnan(compass) else math.radians(90.0 - compass)
 
     def make_track(self, item: StoredItem) -> Track:
         """The track of an item from the present position."""

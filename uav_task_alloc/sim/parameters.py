@@ -19,6 +19,7 @@ _DEFAULTS: dict[str, dict[str, tuple[float, int]]] = {
         'FENCE_ACTION': (1.0, dialect.MAV_PARAM_TYPE_INT8),
         'OA_TYPE': (0.0, dialect.MAV_PARAM_TYPE_INT8),
         'RTL_ALT': (1500.0, _INT),  # [cm]
+        'WPNAV_SPEED': (1500.0, _REAL),  # [cm/s]
     },
     'px4': {
         'GF_ACTION': (2.0, _INT), 'RTL_TYPE': (0.0, _INT),

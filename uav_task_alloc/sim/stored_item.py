@@ -20,8 +20,29 @@ LAND = dialect.MAV_CMD_NAV_LAND
 TAKEOFF = dialect.MAV_CMD_NAV_TAKEOFF
 DELAY = dialect.MAV_CMD_NAV_DELAY
 CHANGE_SPEED = dialect.MAV_CMD_DO_CHANGE_SPEED
-POSITIONAL = {WAYPOINT, LOITER_UNLIMITED, _LOITER_TIME, LAND, TAKEOFF}
-_KNOWN = POSITIONAL | {RETURN, DELAY, CHANGE_SPEED}
+ROI = dialect.MAV_CMD_DO_SET_ROI_LOCATION
+YAW = dialect.MAV_CMD_CONDITION_YAW
+FLOWN_TO = {WAYPOINT, LOITER_UNLIMITED, _LOITER_TIME, LAND, TAKEOFF}
+POSITIONAL = FLOWN_TO | {ROI}
+# carried out at once, on the way; and how many bits ArduPilot keeps of each parameter: 0 none,
+# 32 a float
+_ARDUPILOT_BITS: dict[int, tuple[int, int, int, int]] = {
+    CHANGE_SPEED: (8, 32, 32, 0),
+    YAW: (32, 32, 8, 8),
+    dialect.MAV_CMD_DO_SET_SERVO: (8, 16, 0, 0),
+    dialect.MAV_CMD_DO_GRIPPER: (8, 8, 0, 0),
+    dialect.MAV_CMD_DO_MOUNT_CONTROL: (32, 32, 32, 0),
+    dialect.MAV_CMD_DO_SET_CAM_TRIGG_DIST: (32, 0, 8, 0),
+    dialect.MAV_CMD_DO_SET_ROI_NONE: (16, 0, 0, 0),
+    dialect.MAV_CMD_IMAGE_START_CAPTURE: (8, 32, 16, 16),
+    dialect.MAV_CMD_IMAGE_STOP_CAPTURE: (16, 0, 0, 0),
+    dialect.MAV_CMD_VIDEO_START_CAPTURE: (8, 0, 0, 0),
+    dialect.MAV_CMD_VIDEO_STOP_CAPTURE: (8, 0, 0, 0),
+}
+AT_ONCE = {*_ARDUPILOT_BITS, ROI}
+_FLOWN = FLOWN_TO | {RETURN, DELAY}
+_KNOWN = _FLOWN | AT_ONCE
+_PX4_KNOWN = _KNOWN - {YAW, dialect.MAV_CMD_DO_SET_SERVO}
 
 _NAN_ALLOWED = {WAYPOINT, LAND, TAKEOFF}  # ArduPilot, in param4
 _ARDUPILOT_FRAMES = {  # sent -> read back
@@ -135,9 +156,12 @@ def stored_by_ardupilot(item: StoredItem) -> StoredItem | Refusal:
     if item.command not in _KNOWN:
         return Refusal(dialect.MAV_MISSION_UNSUPPORTED)
     if item.command not in POSITIONAL:
-        p1 = item.p1 if item.command in (CHANGE_SPEED, DELAY) else 0.0
-        p2, p3 = (item.p2, item.p3) if item.command == CHANGE_SPEED else (0.0, 0.0)
-        return StoredItem(dialect.MAV_FRAME_GLOBAL, item.command, p1, p2, p3, 0.0, 0, 0, 0.0)
+        bits = _ARDUPILOT_BITS.get(item.command, (32 if item.command == DELAY else 0, 0, 0, 0))
+        p1, p2, p3, p4 = (_kept(value, width) for value, width in zip(
+            (item.p1, item.p2, item.p3, item.p4), bits, strict=True))
+        z = (float(dialect.MAV_MOUNT_MODE_MAVLINK_TARGETING)
+             if item.command == dialect.MAV_CMD_DO_MOUNT_CONTROL else 0.0)
+        return StoredItem(dialect.MAV_FRAME_GLOBAL, item.command, p1, p2, p3, p4, 0, 0, z)
     if item.frame not in _ARDUPILOT_FRAMES:
         return Refusal(dialect.MAV_MISSION_UNSUPPORTED_FRAME)
     if abs(item.x) > 90 * 10**7:
@@ -147,6 +171,13 @@ def stored_by_ardupilot(item: StoredItem) -> StoredItem | Refusal:
     centimetres = math.trunc(item.z * 100.0 + math.copysign(1e-3, item.z))
     return StoredItem(_ARDUPILOT_FRAMES[item.frame], item.command, float(math.trunc(item.p1)),
                       0.0, 0.0, 0.0, item.x, item.y, centimetres / 100.0)
+
+
+def _kept(value: float, bits: int) -> float:
+    """A parameter as ArduPilot keeps it in so many bits."""
+    if bits == 32:
+        return value
+    return float(math.trunc(value) % 2**bits) if bits else 0.0
 
 
 def _ardupilot_nan(item: StoredItem) -> int:
@@ -168,7 +199,7 @@ def stored_by_px4(item: StoredItem) -> StoredItem | Refusal:
     """
     if item.frame != dialect.MAV_FRAME_MISSION and item.frame not in POSITION_FRAMES:
         return Refusal(dialect.MAV_MISSION_UNSUPPORTED_FRAME)
-    if item.command not in _KNOWN:
+    if item.command not in _PX4_KNOWN:
         return Refusal(dialect.MAV_MISSION_UNSUPPORTED)
     if (item.command in POSITIONAL) == (item.frame == dialect.MAV_FRAME_MISSION):
         return Refusal(dialect.MAV_MISSION_UNSUPPORTED)

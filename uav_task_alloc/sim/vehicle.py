@@ -102,7 +102,8 @@ class Vehicle(Interventions):
     def _add_fence(self) -> None:
         """Have stores for a fence and rally points, unless the capacity is 0."""
         config, name = self.config, self.autopilot.name
-        self.parameters = SimParameters(name, config.parameters)
+        speed = (('WPNAV_SPEED', 100.0 * config.cruise_speed),) if self._is_ardupilot else ()
+        self.parameters = SimParameters(name, (*speed, *config.parameters))
         for mission_type, capacity in CAPACITIES[name].items():
             if config.fence_capacity is not None:
                 capacity = min(capacity, config.fence_capacity)

@@ -2,6 +2,7 @@
 """The parameters of a vehicle about fences and returns: read, never set."""
 from __future__ import annotations
 
+import math
 import struct
 
 from pymavlink.dialects.v20 import ardupilotmega as d
@@ -14,6 +15,7 @@ _PERIOD, _TRIES = 2.0, 5  # [s] between requests of missing values; in a row
 _REFRESH = 60.0  # [s] until all are read again: another station may set them
 _POLYGONS = 4  # bit of FENCE_TYPE
 _RETURNS = {'ardupilot': ('RTL_ALT', 'RTL_ALT_M'), 'px4': ('RTL_RETURN_ALT',)}
+_SPEEDS = ('WPNAV_SPEED', 'WP_SPD')  # of ArduCopter [cm/s]; [m/s]
 _FENCES = {'ardupilot': ('FENCE_ENABLE', 'FENCE_TYPE', 'FENCE_ACTION', 'OA_TYPE'),
            'px4': ('GF_ACTION',)}
 _RETURN_HEIGHTS = {'ardupilot': 15.0, 'px4': 60.0}  # [m] defaults of the autopilots
@@ -40,6 +42,8 @@ class FenceParameters:
         self._returns = _RETURNS.get(profile.name, ())
         self.names = (*_FENCES.get(profile.name, ()), *self._returns)
         self.values: dict[str, float] = {}
+        self._speeds = _SPEEDS if profile.family == 'copter' else ()
+        self._reads_speeds = False
         self._fences = True  # those about fences are read too
         self.reset()
 
@@ -48,6 +52,7 @@ class FenceParameters:
         self.values.clear()
         self._asked: dict[str, int] = {}  # requests without an answer, by name
         self._due = 0.0
+        self._no_speed = False  # it has not answered
 
     def receive(self, message: Message) -> None:
         """Take a PARAM_VALUE of the vehicle, whoever requested or set it.
@@ -55,7 +60,8 @@ class FenceParameters:
         Args:
             message: of the vehicle, of any type.
         """
-        if message.get_type() != 'PARAM_VALUE' or message.param_id not in self.names:
+        if message.get_type() != 'PARAM_VALUE' or message.param_id not in (
+                *self.names, *self._speeds):
             return
         value = float(message.param_value)
         if self._profile.name == 'px4' and message.param_type in _INTEGERS:
@@ -75,17 +81,36 @@ class FenceParameters:
         if now < self._due:
             return []
         names = self.names if fences else self._returns
+        names = (*names, *(self._speeds if self._reads_speeds else ()))
         open_names = [name for name in names
                       if name not in self.values and self._asked.get(name, 0) < _TRIES]
         if not open_names:
             self._due = now + _REFRESH
-            self._asked = dict.fromkeys(self.names, 0)
+            self._no_speed = self._reads_speeds
+            self._asked = {}
             open_names = [name for name in names if name in self.values]
         else:
             self._due = now + _PERIOD
         for name in open_names:
             self._asked[name] = self._asked.get(name, 0) + 1
         return [self._peer.read_parameter(name) for name in open_names]
+
+    def cruise_speed(self, wanted: bool = False) -> float:
+        """The cruise speed of an ArduCopter [m/s].
+
+        Args:
+            wanted: read it from now on.
+
+        Returns:
+            0 while it is being read; NaN where it is not known.
+        """
+        if wanted and self._speeds and not self._reads_speeds:
+            self._reads_speeds, self._due = True, 0.0
+        if 'WP_SPD' in self.values:
+            return self.values['WP_SPD']
+        if 'WPNAV_SPEED' in self.values:
+            return self.values['WPNAV_SPEED'] * 0.01
+        return 0.0 if wanted and self._speeds and not self._no_speed else math.nan
 
     @property
     def enabled(self) -> bool | None:

@@ -10,6 +10,8 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import NamedTuple
 
+from uav_task_alloc.mavlink.mission.piece_mark import PieceMark
+
 
 class AuthorityState(Enum):
     """Who controls a vehicle; the values are those of UavState.authority."""
@@ -225,6 +227,7 @@ class AuthorityRecord:
     # vehicle time [s], position [m] and velocity [m/s], both ENU, of one or two recent positions
     seen: tuple[float, ...] = ()
     landed_battery: float | None = None  # 0..1, at its own landing, while it may start again
+    pieces: tuple[PieceMark, ...] = ()  # that are partly flown
 
 
 class Authority:

@@ -76,7 +76,8 @@ class AuthorityRecorder:
             state.replacing_since, sent.climb, tuple(self.marks.values()),
             *self._evidence.mission_position(), self._evidence.uploading(),
             self._last_position(),
-            None if math.isnan(state.landed_battery) else round(state.landed_battery, 3))
+            None if math.isnan(state.landed_battery) else round(state.landed_battery, 3),
+            self._evidence.pieces())
         if fields == self._fields:  # as after most messages
             return
         self._fields, record = fields, AuthorityRecord(*fields)

@@ -9,6 +9,7 @@ from uav_task_alloc.mavlink.gcs.resume import checksum
 from uav_task_alloc.mavlink.gcs.telemetry import Telemetry
 from uav_task_alloc.mavlink.mission.diff import MissionDiff
 from uav_task_alloc.mavlink.mission.items import Item, alike
+from uav_task_alloc.mavlink.mission.piece_mark import PieceMark
 
 
 class MissionEvidence:
@@ -94,6 +95,11 @@ class MissionEvidence:
         current = next((n for n, item in enumerate(progress.items[:progress.current])
                         if item.task in passed), progress.current)
         return self._checksum[1], current, progress.has_arrived(current)
+
+    def pieces(self) -> tuple[PieceMark, ...]:
+        """The tasks whose ways are partly flown."""
+        progress = self._onboard.progress
+        return progress.coverage.marks(progress.completed)
 
     def uploading(self) -> tuple[int, ...]:
         """Checksum of a mission that may be stored next, and index of its first item; ()."""

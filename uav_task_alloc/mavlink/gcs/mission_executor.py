@@ -22,6 +22,7 @@ from uav_task_alloc.mavlink.gcs.authority import (
 )
 from uav_task_alloc.mavlink.gcs.authority_watch import AuthorityWatch
 from uav_task_alloc.mavlink.gcs.command_sender import CommandSender, NextMessages
+from uav_task_alloc.mavlink.gcs.end_actions import EndActions
 from uav_task_alloc.mavlink.gcs.end_of_list import EndOfList
 from uav_task_alloc.mavlink.gcs.event_retry import EventRetry
 from uav_task_alloc.mavlink.gcs.list_execution import ListExecution
@@ -87,6 +88,7 @@ class MissionExecutor:
         self.events: deque[TaskProgress] = deque()
         self.notes: deque[OperatorNote] = deque()
         self._rates = MessageRates(peer, self.telemetry, now)
+        self._end_actions = EndActions(peer, profile, self.onboard)
         self._was_stale = False
         self._event_retry = EventRetry()
         self._restarts = 0
@@ -94,6 +96,7 @@ class MissionExecutor:
         self.fence = VehicleFence(peer, profile, origin, self.telemetry, self.onboard,
                                  self.authority, lambda: self.policy, rng,
                                  fence_memory or FenceMemory())
+        self.onboard.list.read_speed = self.fence.parameters.cruise_speed
         takeoff = Takeoff(self.sender, self.telemetry, self.onboard, self.authority,
                           lambda: self.policy, self.fence.missing)
         self._end_of_list = EndOfList(self.sender, self.telemetry, self.onboard, self.watch,
@@ -113,6 +116,7 @@ class MissionExecutor:
     def _restore(self, record: AuthorityRecord | None) -> None:
         """Pass what the previous run recorded to `onboard.resume`."""
         resume = self.onboard.resume
+        self._pieces = () if record is None else record.pieces
         if record is not None:
             resume.recorded = record.mission, record.current, record.arrived
             resume.recorded_upload = record.uploading
@@ -161,7 +165,11 @@ class MissionExecutor:
             for mark in self.watch.marks.values():
                 if mark.flown and now - mark.at < MAX_AGE:
                     self.onboard.progress.completed[mark.task] = mark[1:4]
+        first = self.onboard.tasks is None
         self.onboard.list.assign(tasks)
+        if first:
+            progress = self.onboard.progress
+            progress.coverage.restore(self._pieces, tasks.stops, progress.path.sample)
         for task in filter(self.onboard.list.repeat, self._event_retry.wanted_again()):
             self.notes.append(OperatorNote(
                 'info', f'{task} was announced again: it is flown once more'))
@@ -212,6 +220,7 @@ class MissionExecutor:
             self.onboard.progress.note_other_mode(now)  # as COMMAND_ACK shows
         out = self.onboard.receive(message, now) + self.fence.receive(message, now)
         self.sender.receive(message)
+        self._end_actions.receive(message)
         if message.get_type() == 'COMMAND_ACK' and self._peer.is_from_vehicle(message):
             self.watch.receive_command_ack(message, self.telemetry.frame)
         self._update_progress(message, newest, now)
@@ -222,6 +231,7 @@ class MissionExecutor:
         self.events += self._event_retry.step(now)
         self.onboard.progress.step(now)
         out = self.onboard.step(now) + self._rates.step(now)
+        out += self._end_actions.step(now, self.authority.held)
         return self._gate(out + self._act(now), now)
 
     def _gate(self, messages: list[Message], now: float) -> list[Message]:

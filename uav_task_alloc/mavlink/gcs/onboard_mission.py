@@ -41,11 +41,13 @@ class OnboardMission:
                  rng: random.Random) -> None:
         self.upload = Upload(peer, idle_after=profile.idle_after, rng=rng)
         self.upload.is_superseded = self._overtaken
-        self.progress = ProgressTable(telemetry.frames, repeats=profile.atomic)
+        self.progress = ProgressTable(telemetry.frames, repeats=profile.atomic,
+                                      plane=profile.rules.loiters)
         self.resume = Resume(profile, origin, telemetry, self.progress)
         self.own = int(profile.rules.home_first)
         self.list = WantedMission(profile, origin, self.progress, lambda: telemetry.airborne,
                                   lambda: telemetry.home or self._mission.landing_place(origin))
+        self.resume.cruise = lambda: self.list.cruise()
         self.revision = 0  # of the last list verified on board
         self.notes: deque[OperatorNote] = deque()
         self.transfer_failed = False  # the last one; the caller schedules the next attempt

@@ -42,7 +42,7 @@ class RallyTransfer:
             return
         self._chosen_for = key
         stops = () if tasks is None else tasks.stops
-        path = [home, *(p for stop in stops for p in (*stop.via, stop.task.position))]
+        path = [home, *(p for stop in stops for p in (*stop.via, *stop.way))]
         self.chosen = choose_rally(points, path, home, lambda a, b: (
             zone_across_path(a, b, zones) is not None))[:self.transfer.budget]
         self.left_out = tuple(point for point in points if point not in self.chosen)

@@ -8,12 +8,15 @@ from __future__ import annotations
 
 import math
 import zlib
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
+from itertools import chain
 
 from pymavlink.dialects.v20 import ardupilotmega as d
 
+from uav_task_alloc.errors import MissionError
 from uav_task_alloc.geometry.frames import Origin, to_enu
+from uav_task_alloc.geometry.polyline import segment_distance
 from uav_task_alloc.mavlink.autopilots import ModeFunction, Profile
 from uav_task_alloc.mavlink.gcs.telemetry import Telemetry
 from uav_task_alloc.mavlink.mission.items import (
@@ -24,12 +27,16 @@ from uav_task_alloc.mavlink.mission.items import (
     mission_items,
     with_position,
 )
+from uav_task_alloc.mavlink.mission.long_legs import with_points_between
 from uav_task_alloc.mavlink.mission.passed_items import flown_between
 from uav_task_alloc.mavlink.mission.position_history import LOOSE_RADIUS
 from uav_task_alloc.mavlink.mission.progress import ProgressTable
+from uav_task_alloc.mavlink.mission.stop_items import place_of
 from uav_task_alloc.model import Point, Task
 
 _NEAR = 15.0  # [m] from the last item that counts as reached
+_SAME_PLACE = 1.0  # [m]
+_MAX_MISSIONS = 4  # that were read and are kept
 _MAX_CURRENTS = 512  # MISSION_CURRENT kept until the vehicle is located: four minutes
 _PLACE_DELAY = 2.0  # [s] after a REACHED in which a position still shows its place
 _LANDED_STATE_DELAY = 3.0  # [s] after the mission was read in which it comes, as a rule
@@ -79,6 +86,8 @@ class Resume:
         self.recorded: tuple[int | None, int | None, bool] = None, None, False
         self.recorded_upload: tuple[int, ...] = ()  # checksum and first item of an upload then
         self.was_disarmed = True  # in the last record; or there is none
+        self.cruise: Callable[[], float] = lambda: math.nan  # [m/s]; NaN: not known
+        self._missions: tuple[tuple[Item, ...], ...] = ()  # read so far
         self.current_unreliable = False  # items before the current one may be unflown
         self._rebooted = self._passed_recorded = False
         self._unread: list[_UnreadReached] = []  # until the vehicle is located
@@ -178,6 +187,7 @@ class Resume:
             self.located = self.located or not held
             return
         self.located = True
+        self._missions = (*self._missions[-_MAX_MISSIONS:], held)
         replaced = self._find_upload(held)
         mission, recorded, _ = self.recorded
         if self._passed_recorded and mission == checksum(held) and recorded is not None:
@@ -205,6 +215,7 @@ class Resume:
         self._skipped = frozenset(range(first, flown)) - self._flown_since(held, first, flown, now)
         items = held[:flown] + self._with_tasks(held[flown:], tasks)
         self._progress.begin(items, flown, now, read=True)
+        self._progress.continue_way()
         self._epoch, self._located_at = self._progress.epoch, flown
         # the previous run has reported earlier items, or recorded that they were skipped
         same = self.recorded[0] == checksum(held)
@@ -244,6 +255,7 @@ class Resume:
         self._reached += tuple(held[n] for n in sorted(flown))
         items = held[:current] + self._with_tasks(held[current:], tasks)
         progress.begin(items, current, now, read=True)
+        progress.continue_way()
         self._epoch, self._located_at = progress.epoch, recorded
         self._replay(held)
 
@@ -272,9 +284,26 @@ class Resume:
 
     def _with_tasks(self, held: tuple[Item, ...], tasks: TaskList) -> tuple[Item, ...]:
         """Items that were read, with the tasks of a list and their positions."""
-        wanted = mission_items(TaskList(0, tuple(MissionStop(s.task) for s in tasks.stops)),
-                               self._profile.rules, self._origin)
-        return tuple(next((item for item in wanted if alike(item, each)), each) for each in held)
+        rest = self._progress.coverage.rest
+        stops = tuple(rest(MissionStop(s.task, reversed=s.reversed)) for s in tasks.stops)
+        wanted, found, at = self._items_of(stops), [], 0
+        for each in held:  # ways may share points: the order tells which of them it is
+            order = chain(range(at, len(wanted)), range(at))
+            n = next((n for n in order if alike(wanted[n], each)), None)
+            found.append(each if n is None else wanted[n])
+            at = at if n is None else n + 1
+        return tuple(found)
+
+    def _items_of(self, stops: tuple[MissionStop, ...]) -> tuple[Item, ...]:
+        """The items of stops without their detour points; none of those that are refused."""
+        rules, origin, cruise = self._profile.rules, self._origin, self.cruise()
+        divided = with_points_between(TaskList(0, stops)).stops
+        rows = tuple(replace(stop, via=()) for stop in divided)
+        try:
+            return mission_items(TaskList(0, rows), rules, origin, cruise=cruise)
+        except MissionError as error:
+            others = tuple(stop for stop in stops if stop.task.id != error.task)
+            return self._items_of(others) if len(others) < len(stops) else ()
 
     def keep_flown(self) -> None:
         """Keep the flown items of this mission before it is replaced."""
@@ -298,18 +327,35 @@ class Resume:
         flown = self.flown_items(now)
         if not flown:
             return ()
-        stops = tuple(MissionStop(task) for task in tasks)
-        items = mission_items(TaskList(0, stops), self._profile.rules, self._origin)
-        return tuple(stop.task for stop, item in zip(stops, items, strict=True)
-                     if any(alike(item, other) and self._is_flown(stop.task, other)
-                            for other in flown))
+        found = []
+        for turned in (False, True):
+            stops = tuple(MissionStop(task, reversed=turned) for task in tasks
+                          if task.path or not turned)
+            ends = {item.task: item for item in self._items_of(stops) if item.completes}
+            found += [stop.task for stop in stops if stop.task.id in ends and any(
+                alike(ends[stop.task.id], other) and self._is_flown(stop.task, other)
+                and self._comes_along(stop, other) for other in flown)]
+        return tuple(dict.fromkeys(found))
+
+    def _comes_along(self, stop: MissionStop, last: Item) -> bool:
+        """Whether the items before the last one of a way are of that way; ways share points."""
+        if not stop.task.path:
+            return True
+        mission = next((each for each in self._missions if any(last is i for i in each)), ())
+        at = next((n for n, item in enumerate(mission) if item is last), 0)
+        end = with_position(last, self._origin).position
+        for item in reversed(mission[:at]):
+            place = with_position(item, self._origin).position
+            if place is not None and end is not None and math.dist(place, end) > _SAME_PLACE:
+                return segment_distance(place, *stop.way[-2:]) <= _SAME_PLACE
+        return False
 
     def _is_flown(self, task: Task, item: Item) -> bool:
         """Whether an item at a task's position was reached, or passed and not skipped."""
         reached = (*self._reached, *self._reached_of(self._flown_here()))
         if any(item is each for each in reached):
             return True
-        return self.unflown.get(task.id) != task.position and (
+        return self.unflown.get(task.id) != place_of(task) and (
             task.id in self.reported or not any(item is old for old in self._old))
 
     def _reached_of(self, flown: tuple[Item, ...]) -> tuple[Item, ...]:

@@ -30,7 +30,11 @@ def passed_over(onboard: OnboardMission, watch: AuthorityWatch, now: float) -> l
     while progress.passed_over:
         item = progress.passed_over.popleft()
         if item.task not in progress.completed:
-            watch.mark_task(item.task, item.position, False, now)
+            watch.mark_task(item.task, item.place, False, now)
+    while progress.uncovered:
+        task = progress.uncovered.popleft()
+        notes.append(OperatorNote('warning', f'{task}: its end was reached, but a part of its '
+                                  'way was not flown: that is flown now'))
     while progress.skipped:
         task = progress.skipped.popleft()
         notes.append(OperatorNote('warning', f'{task} was skipped, not by the bridge: '

@@ -138,7 +138,7 @@ class VehicleEnergy:
         if onboard.tasks is not None:
             tasks = onboard.remaining()
             for stop in tasks.stops:
-                points += [*stop.via, stop.task.position]
+                points += [*stop.via, *stop.way]
                 hover += stop.task.service_time + stop.wait + speed / _STOP_ACCELERATION
             points += tasks.end_via if tasks.returns else ()
         home = telemetry.home or telemetry.position

@@ -314,7 +314,7 @@ class VehicleFence:
         if onboard.tasks is None:
             return []
         tasks = onboard.remaining()
-        points = [p for stop in tasks.stops for p in (*stop.via, stop.task.position)]
+        points = [p for stop in tasks.stops for p in (*stop.via, *stop.way)]
         return points + list(tasks.end_via if tasks.returns else ())
 
     def _blocks(self) -> bool:

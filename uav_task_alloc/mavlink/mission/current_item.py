@@ -15,7 +15,7 @@ from uav_task_alloc.mavlink.mission.completed_tasks import CompletedTasks
 from uav_task_alloc.mavlink.mission.current_item_reports import CurrentItemReports
 from uav_task_alloc.mavlink.mission.epoch import Epoch
 from uav_task_alloc.mavlink.mission.flown_path import GAP
-from uav_task_alloc.mavlink.mission.items import Item
+from uav_task_alloc.mavlink.mission.item import Item, leg_count
 from uav_task_alloc.mavlink.mission.passed_items import Claim, PassedItems, flown_nearby
 from uav_task_alloc.mavlink.mission.position_history import MAX_MESSAGE_DELAY, PositionHistory
 from uav_task_alloc.mavlink.mission.reached_epoch import ReachedEpoch
@@ -60,7 +60,7 @@ class CurrentItem:
     def invalidate(self) -> None:
         """End the epoch, and complete what the positions have shown so far."""
         for item in self.passed.seen():
-            self._tasks.complete(item.task, item.position)
+            self._tasks.complete(item.task, item.place)
         epoch, active = self._epoch, self._epoch.active
         if active is not None and self.in_mission and self.reports.reported == epoch.current and (
                 self._positions.was_at(
@@ -178,7 +178,7 @@ class CurrentItem:
                 i for i in claim.items if i.task not in self._tasks), now,
                 claim.since < self._left_unseen[1] and self._left_unseen[0] <= claim.until)
             for item in judged.flown:
-                self._tasks.complete(item.task, item.position)
+                self._tasks.complete(item.task, item.place)
             self._pass_over(judged.passed_over, claim)
 
     def _pass_over(self, items: tuple[Item, ...], claim: Claim) -> None:
@@ -203,7 +203,8 @@ class CurrentItem:
         epoch, positions = self._epoch, self._positions
         items = tuple(item for item in epoch.items[begin:end]
                       if item.completes and item.task not in self._tasks)
-        if in_flight and end - begin > 1 and self.reports.reported == begin and (
+        skips = leg_count(epoch.items[begin:end]) > 1
+        if in_flight and skips and self.reports.reported == begin and (
                 positions.at_once(self.reports.last_frame, frame)):
             items = self._skip_others(items, flown_nearby(items, epoch.items[begin]), end)
         if not items:
@@ -214,7 +215,7 @@ class CurrentItem:
             until = min(until, max(epoch.since, self._left_at))
         self.passed.add(Claim(
             items, route, epoch.since, until, now + MAX_MESSAGE_DELAY, epoch.number,
-            self._frames_of_reached(begin, end, now, frame), frame, end - begin > 1, in_flight))
+            self._frames_of_reached(begin, end, now, frame), frame, skips, in_flight))
 
     def _frames_of_reached(self, begin: int, end: int, now: float,
                            frame: int | None) -> tuple[int, int] | None:

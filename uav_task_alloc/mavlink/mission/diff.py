@@ -89,11 +89,28 @@ def diff_missions(held: tuple[Item, ...], current: int | None, wanted: tuple[Ite
         ahead = wanted[passed:]
         if append and len(ahead) > len(rest) and all_alike(ahead[:len(rest)], rest):
             return MissionDiff(DiffKind.APPEND, held[:current] + ahead, current)
-        return MissionDiff(DiffKind.REPLACE, wanted, passed)
+        return MissionDiff(DiffKind.REPLACE, wanted, point_at_or_before(wanted, passed))
     return MissionDiff(DiffKind.REPLACE, wanted, 0)
 
 
+def point_at_or_before(items: tuple[Item, ...], index: int) -> int:
+    """Return the index of the point from which an action is carried out.
+
+    Args:
+        items: of a mission; it does not begin with an action.
+        index: of any item.
+
+    Returns:
+        `index` itself where that is no action.
+    """
+    while index > 0 and index < len(items) and items[index].is_action:
+        index -= 1
+    return index
+
+
 def _may_be_open(item: Item, done: Container[str]) -> bool:
+    if item.is_action:
+        return False
     return item.task not in done if item.completes else item.position is None
 
 

@@ -190,7 +190,7 @@ def _path(uav: ScenarioUav, tasks: TaskList) -> list[Point]:
     """The path flown, with the straight leg home: a return would breach a fence on that."""
     path = [uav.position]
     for stop in tasks.stops:
-        path += [*stop.via, stop.task.position]
+        path += [*stop.via, *stop.way]
     return [*path, *tasks.end_via, uav.home]
 
 

@@ -54,6 +54,11 @@ class FlownPath:
         """Vehicle time [s] of the newest sample; -inf where there is none."""
         return self._samples[-1].t if self._samples else -math.inf
 
+    @property
+    def sample(self) -> PositionSample | None:
+        """The newest sample; None where there is none."""
+        return self._samples[-1] if self._samples else None
+
     def last(self, since: float) -> tuple[PositionSample, ...]:
         """The newest sample, after the one before the latest gap.
 
@@ -136,7 +141,7 @@ class FlownPath:
         Returns:
             True where a gap is long enough and the sample after it lies on the following leg.
         """
-        fastest = self._fastest()
+        fastest = self.fastest
         for a, b in pairwise(self._since(since)):
             if b.t - a.t > GAP and polyline_length((a.position, *chain, b.position)) <= (
                     _longest_way(a, b, 1.1 * fastest, b.t - a.t - 0.8 * holds)) + 10.0 and (
@@ -144,7 +149,8 @@ class FlownPath:
                 return True
         return False
 
-    def _fastest(self) -> float:
+    @property
+    def fastest(self) -> float:
         """The highest speed [m/s] of late; the usual one where it has hardly moved."""
         speeds = [math.hypot(*sample.velocity) for sample in self._samples[-200:]]
         moving = sum(speed > _HOLD_SPEED for speed in speeds)

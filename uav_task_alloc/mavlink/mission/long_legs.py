@@ -67,9 +67,13 @@ def with_points_between(tasks: TaskList, before: Sequence[Point] = ()) -> TaskLi
     stops: list[MissionStop] = []
     last: Point | None = None
     for stop in tasks.stops:
-        path = _filled(last, (*stop.via, stop.task.position))
-        stops.append(replace(stop, via=(*(() if stops else before), *path[:-1])))
-        last = stop.task.position
+        path = _filled(last, (*stop.via, stop.start))
+        way = stop.rest
+        if stop.task.path:
+            filled = _filled(None, stop.way)
+            way = filled if len(filled) > len(stop.way) else way
+        stops.append(replace(stop, via=(*(() if stops else before), *path[:-1]), rest=way))
+        last = stop.end
     end = _filled(last, tasks.end_via) if tasks.returns else tasks.end_via
     if not stops and end:
         end = (*before, *end)
@@ -89,7 +93,7 @@ def legs(tasks: TaskList, start: Point | None) -> Iterator[tuple[Point, Point]]:
 def _points(tasks: TaskList) -> Iterator[Point]:
     for stop in tasks.stops:
         yield from stop.via
-        yield stop.task.position
+        yield from stop.way
     if tasks.returns:
         yield from tasks.end_via
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 from uav_task_alloc.mavlink.mission.flown_path import CLOSE, GAP, Visit
-from uav_task_alloc.mavlink.mission.items import Item
+from uav_task_alloc.mavlink.mission.item import Item, leg_count
 from uav_task_alloc.mavlink.mission.position_history import LOOSE_RADIUS, PositionHistory
 from uav_task_alloc.mavlink.transport.frame_log import FrameLog
 from uav_task_alloc.model import Point
@@ -190,9 +190,10 @@ def flown_between(items: tuple[Item, ...], begin: int, end: int, now: float, fra
     Returns:
         Indices of those that were flown.
     """
-    passed = tuple(replace(items[n], task=f'{n}') for n in range(begin, end))
+    passed = tuple(replace(items[n], task=f'{n}') for n in range(begin, end)
+                   if not items[n].is_action)
     route = tuple(item for item in (*passed, *items[end:]) if item.position is not None)
     claim = Claim(passed, route, -math.inf, positions.vehicle_time(now), -math.inf, 0, None, frame,
-                  skips=end - begin > 1, in_flight=True, home=home)
+                  skips=leg_count(passed) > 1, in_flight=True, home=home)
     judged = PassedItems(FrameLog(), positions).judge(claim, passed, now)
     return {int(item.task) for item in judged.flown}

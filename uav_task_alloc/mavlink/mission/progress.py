@@ -9,12 +9,14 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Iterable
+from itertools import chain
 
 from uav_task_alloc.mavlink.mission.completed_tasks import CompletedTasks, ProgressEvent
 from uav_task_alloc.mavlink.mission.current_item import CurrentItem
 from uav_task_alloc.mavlink.mission.epoch import Epoch
 from uav_task_alloc.mavlink.mission.flown_path import PositionSample
 from uav_task_alloc.mavlink.mission.items import Item, all_alike
+from uav_task_alloc.mavlink.mission.piece_coverage import PieceCoverage
 from uav_task_alloc.mavlink.mission.position_history import PositionHistory
 from uav_task_alloc.mavlink.mission.reached_epoch import (
     REPEAT_WINDOW,
@@ -23,6 +25,7 @@ from uav_task_alloc.mavlink.mission.reached_epoch import (
 )
 from uav_task_alloc.mavlink.mission.reached_items import ReachedItems
 from uav_task_alloc.mavlink.mission.reached_series import ReachedSeries
+from uav_task_alloc.mavlink.mission.stop_items import place_of
 from uav_task_alloc.mavlink.transport.frame_log import FrameLog
 from uav_task_alloc.model import Point, Task
 
@@ -37,6 +40,7 @@ class ProgressTable:
     Args:
         frames: numbers of the frames received from the vehicle.
         repeats: whether the autopilot repeats MISSION_ITEM_REACHED (PX4: 10 times at 1 Hz).
+        plane: whether the vehicle turns as wide as a plane.
 
     Arguments of methods:
         now: steady time [s].
@@ -50,10 +54,14 @@ class ProgressTable:
         task, tasks: ids.
     """
 
-    def __init__(self, frames: FrameLog | None = None, repeats: bool = False) -> None:
+    def __init__(self, frames: FrameLog | None = None, repeats: bool = False,
+                 plane: bool = False) -> None:
         self._frames = frames or FrameLog()
         self.positions = PositionHistory()
         self._epoch, self._tasks = Epoch(), CompletedTasks()
+        self.coverage = PieceCoverage(plane)
+        self._tasks.is_covered = self._is_covered
+        self._stepped_at = -math.inf  # [s]
         self._epochs = ReachedEpoch(
             self.positions, ReachedSeries(self.positions, repeats, self._frames))
         self._moves = CurrentItem(
@@ -130,8 +138,14 @@ class ProgressTable:
     @property
     def pending(self) -> frozenset[str]:
         """Tasks that may be completed: the evidence may still arrive."""
-        claims = self._moves.passed.claims
-        return frozenset(i.task for claim in claims for i in claim.items) if claims else _NONE
+        claims, doubtful = self._moves.passed.claims, self._tasks.doubtful
+        return frozenset(chain((i.task for claim in claims for i in claim.items), doubtful)) if (
+            claims or doubtful) else _NONE
+
+    @property
+    def uncovered(self) -> deque[str]:
+        """Tasks whose way was not flown as a whole, to be taken by the caller."""
+        return self._tasks.uncovered
 
     @property
     def passed_in_order(self) -> frozenset[str]:
@@ -189,6 +203,8 @@ class ProgressTable:
         self._epochs.series.clear()
         self._epoch.invalidate()
         self.positions.clear()
+        self.coverage.leave()
+        self._tasks.doubtful.clear()
 
     def retag(self, items: tuple[Item, ...]) -> None:
         """Replace the items by the same items with their tasks."""
@@ -199,6 +215,9 @@ class ProgressTable:
     ) -> None:
         """Add a position of the vehicle; see `PositionHistory.add`."""
         self.positions.add(sample, newest, now, frame)
+        self._note_active()
+        if newest and not self.positions.invalid(now):
+            self.coverage.add_position(sample, self.path.fastest)
 
     def last_positions(self) -> tuple[PositionSample, ...]:
         """The newest position, after the one before a gap since the current item is flown."""
@@ -234,10 +253,12 @@ class ProgressTable:
     def note_other_mode(self, now: float) -> None:
         """Note that the vehicle is not in mission mode, by whichever command."""
         self._moves.note_other_mode(now)
+        self.coverage.note_active(None, False)
 
     def note_mission_left(self, now: float) -> None:
         """Note that the vehicle has left the list: a task resumed later starts again."""
         self._moves.note_mission_left(now)
+        self.coverage.note_active(None, False)
 
     def note_reached(self, seq: int, now: float, proven: bool = False,
                      frame: int | None = None) -> None:
@@ -290,13 +311,16 @@ class ProgressTable:
 
     def step(self, now: float) -> None:
         """Judge the open claims, and each REACHED of unknown epoch."""
+        self._stepped_at = now
         self._reached.step(now)
         self._moves.judge(now)
+        self._note_active()
+        self._tasks.judge_doubtful(now)
 
     def complete_offline(self, tasks: Iterable[Task]) -> None:
         """Complete tasks that were flown while no bridge was connected."""
         for task in tasks:
-            self._tasks.complete(task.id, task.position, while_offline=True)
+            self._tasks.complete(task.id, place_of(task), while_offline=True)
 
     def credit(self, item: Item) -> None:
         """Complete the task of an item, of whichever epoch."""
@@ -310,6 +334,7 @@ class ProgressTable:
     def forget(self, task: str) -> None:
         """Forget the completion of a task id, which another task has now."""
         self.completed.pop(task, None)
+        self.coverage.forget(task)
         self._epoch.started = None if self._epoch.started == task else self._epoch.started
 
     def was_at_by(self, item: Item, when: float) -> bool:
@@ -325,3 +350,14 @@ class ProgressTable:
     def near_one(self, item: Item, other: Item | None, when: float) -> bool:
         """Whether it was near one item, but not another, before a message at `when` [s]."""
         return self.positions.near_one(item, other, when)
+
+    def continue_way(self) -> None:
+        """Continue along the way that a mission found on board is on."""
+        self.coverage.continue_at(self.active, self.path.sample)
+
+    def _note_active(self) -> None:
+        self.coverage.note_active(self.active, self._moves.in_mission)
+
+    def _is_covered(self, task: str) -> bool:
+        return self.coverage.covers(
+            task, self.positions.vehicle_time(self._stepped_at), self.path.fastest)

@@ -61,13 +61,13 @@ class Waits:
                     self.take_off = tasks.stamp, tasks.stamp + stop.wait, stop.task.id
             else:
                 waits[stop.task.id] = self._wait(stop, last, active)
-            last = stop.task.position
+            last = stop.end
         if waits != self._waits:
             self._waits, self.version = waits, self.version + 1
 
     def _wait(self, stop: MissionStop, last: Point | None, active: Item | None) -> _Wait:
         """The wait before a stop of a vehicle in the air; `last` is the stop before."""
-        old, place = self._waits.get(stop.task.id), last or stop.task.position
+        old, place = self._waits.get(stop.task.id), last or stop.start
         if last is None and old is not None:
             if _is_flown(active, stop):  # it is on the leg, or serves the task
                 if stop.wait <= WAIT_TOLERANCE:
@@ -75,7 +75,7 @@ class Waits:
             else:  # it waits now, or is about to
                 if abs(stop.begin - old.begin) <= WAIT_TOLERANCE:
                     return old
-                place = stop.task.position if old.hold is None else old.hold.place
+                place = stop.start if old.hold is None else old.hold.place
         same = old is not None and (old.hold is None or old.hold.place == place)
         if old is not None and same and abs(old.seconds - stop.wait) <= WAIT_TOLERANCE and (
                 (old.hold is None) == (old.seconds < SHORTEST)):
@@ -118,4 +118,4 @@ def _is_flown(active: Item | None, stop: MissionStop) -> bool:
 
 def _is_at(wait: _Wait, stop: MissionStop) -> bool:
     """Whether a hold is at the task itself, which is after the leg."""
-    return wait.hold is not None and wait.hold.place == stop.task.position
+    return wait.hold is not None and wait.hold.place == stop.start

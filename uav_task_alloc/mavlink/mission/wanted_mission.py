@@ -2,6 +2,7 @@
 """The mission that one vehicle should have: its list less what is completed, refused or cut."""
 from __future__ import annotations
 
+import math
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -65,6 +66,9 @@ class WantedMission:
         self._profile, self._origin, self._progress = profile, origin, progress
         self._refused: dict[str, tuple[Task, str]] = {}  # the task as refused, and the reason
         self.waits = Waits()
+        # own speed of the vehicle [m/s], whether it is wanted; 0: being read, NaN: not known
+        self.read_speed: Callable[[bool], float] = lambda wanted: math.nan
+        self._changes_speed = False  # an action of the list does
         self._airborne, self._home = airborne, home
         self.leg = FirstLeg(profile.rules.loiters, profile.farthest_first)
         self._leg_key: object = None  # the state for which the first leg was begun
@@ -79,7 +83,10 @@ class WantedMission:
         self.waits.assign(tasks, self._progress.completed, self._airborne(),
                           self._progress.active)
         self.horizon.reset()
+        self._changes_speed = any(action.name == 'speed' for stop in tasks.stops
+                                  for action in stop.task.actions)
         listed = [stop.task for stop in tasks.stops]
+        self._progress.coverage.set_listed(tasks.stops)
         self._progress.set_listed_tasks(listed)
         ids, completed = {task.id for task in listed}, self._progress.completed.keys()
         self._dropped = (self._dropped | (completed - ids)) & completed
@@ -117,13 +124,26 @@ class WantedMission:
         self._listed[task] = self.tasks.revision
         return True
 
+    def cruise(self) -> float:
+        """The cruise speed of the vehicle [m/s]; 0 while it is being read, NaN: not known."""
+        speed = self.read_speed(self._changes_speed) if self._changes_speed else math.nan
+        return math.nan if math.isnan(speed) else speed  # one object, as NaN equals itself only so
+
+    @property
+    def awaits_speed(self) -> bool:
+        """Whether its cruise speed is being read, which an item of the list needs."""
+        return self.cruise() == 0.0
+
     def remaining(self) -> TaskList:
         """The list less completed and refused tasks, up to the horizon."""
         assert self.tasks is not None
         ended = tuple(self._progress.completed), self._progress.pending, tuple(self._refused)
-        key = self.tasks, ended, self.horizon.stops
+        coverage = self._progress.coverage
+        key = self.tasks, ended, self.horizon.stops, coverage.version
         if self._remaining is None or self._remaining[0] != key:
             tasks = self.tasks.without(chain.from_iterable(ended))
+            tasks = replace(tasks, stops=tuple(map(coverage.rest, tasks.stops)))
+            key = self.tasks, ended, self.horizon.stops, coverage.version
             self._remaining = key, (
                 tasks if self.horizon.stops is None else tasks.first(self.horizon.stops))
         return self._remaining[1]
@@ -132,7 +152,8 @@ class WantedMission:
         """The items to fly from here; a task that cannot be an item is refused."""
         self.waits.note_active(self.remaining(), self._progress.active)
         state = (self.tasks, self.waits.version, len(self._progress.completed),
-                 self._progress.pending, len(self._refused), self.horizon.stops)
+                 self._progress.pending, len(self._refused), self.horizon.stops,
+                 self._progress.coverage.version, self.cruise())
         if self._leg_key != state or self.leg.is_off:
             self.leg.begin(self.remaining())
             self._leg_key = state
@@ -155,11 +176,13 @@ class WantedMission:
     def _items_of(self, tasks: TaskList) -> tuple[Item, ...]:
         """The items of a list, with long legs divided where a mission has the capacity."""
         rules, tasks = self._profile.rules, self.waits.with_holds(tasks)
-        ahead = self.leg.points_ahead(first_point(tasks))
+        on_way = bool(tasks.stops) and self._progress.coverage.is_under_way(
+            tasks.stops[0].task.id)
+        ahead = () if on_way else self.leg.points_ahead(first_point(tasks))
         filled = mission_items(with_points_between(tasks, ahead), rules, self._origin,
-                               self._home())
+                               self._home(), self.cruise())
         if len(filled) > self._capacity and len(tasks.stops) <= 1:
-            return mission_items(tasks, rules, self._origin, self._home())
+            return mission_items(tasks, rules, self._origin, self._home(), self.cruise())
         return filled
 
     def _cut(self, items: tuple[Item, ...], tasks: TaskList) -> None:
@@ -194,9 +217,9 @@ class WantedMission:
     def has_enough(self, held: tuple[Item, ...]) -> bool:
         """Whether at least half a horizon of the latest list is still on board."""
         assert self.tasks is not None
-        everything = replace(
-            self.tasks.without({*self._progress.completed, *self._refused}),
-            returns=False, end_via=())
+        open_tasks = self.tasks.without({*self._progress.completed, *self._refused})
+        everything = replace(open_tasks, returns=False, end_via=(), stops=tuple(
+            map(self._progress.coverage.rest, open_tasks.stops)))
         wanted = self._items_of(everything)
         rest = held[self._progress.current or 0:]
         stops = sum(item.completes for item in rest)

@@ -51,6 +51,7 @@ class ArduPilotFlight(VehicleFlight):
         super().reboot(now)
         self.run = MissionRunState.NOT_STARTED
         self._upcoming = 1  # seq where the search for the next flown item begins
+        self._waiting: list[int] = []  # commands still to be carried out on this leg
         self._prearm_at = now + _FIRST_PREARM
 
     def arming_refusal(self) -> str:
@@ -88,7 +89,7 @@ class ArduPilotFlight(VehicleFlight):
         return True
 
     def _first_flown(self) -> int | None:
-        return next((i.command for i in self.items[1:] if i.command != item_.CHANGE_SPEED), None)
+        return next((i.command for i in self.items[1:] if i.command not in item_.AT_ONCE), None)
 
     def leave(self, mode: FlightMode) -> None:
         if mode is FlightMode.MISSION and self.run is MissionRunState.ACTIVE:
@@ -120,7 +121,7 @@ class ArduPilotFlight(VehicleFlight):
         flown = self._flown_from(upcoming)
         if flown is None:
             return False
-        self.seq, self._upcoming = flown, upcoming
+        self.seq, self._upcoming, self._waiting = flown, upcoming, []
         if self.mode is FlightMode.MISSION:
             self.track = None
         if self.run is not MissionRunState.ACTIVE:
@@ -129,7 +130,7 @@ class ArduPilotFlight(VehicleFlight):
 
     def _flown_from(self, seq: int) -> int | None:
         return next((i for i in range(seq, len(self.items))
-                     if self.items[i].command != item_.CHANGE_SPEED), None)
+                     if self.items[i].command not in item_.AT_ONCE), None)
 
     def storage_changed(self, change: StorageChange, flagged: int | None) -> None:
         if change is StorageChange.CLEARED:
@@ -152,18 +153,34 @@ class ArduPilotFlight(VehicleFlight):
         if self.run is not MissionRunState.ACTIVE:
             return
         flown = self._flown_from(self._upcoming)
-        for seq in range(self._upcoming, len(self.items) if flown is None else flown):
-            self.execute(self.items[seq])
-            self.report_reached(seq, self.body.position)
+        if self._waiting:  # not begun when the point after them was reached
+            self._waiting.clear()
+        commands = [*range(self._upcoming, len(self.items) if flown is None else flown)]
+        if flown is None:
+            commands = commands[:1]
+        if commands:  # the first one at once, one of the others in each cycle from then on
+            self._carry_out(commands[0])
         if flown is None:
             self.run = MissionRunState.COMPLETE
             self.note('mission_end')
             return
         self._upcoming = flown + 1
         self.begin_item(flown)
+        self._waiting = commands[1:]
+
+    def _carry_out(self, seq: int) -> None:
+        self.execute(self.items[seq])
+        self.report_reached(seq, self.body.position)
+
+    def _follow(self, dt: float) -> None:
+        if self._waiting and self.mode is FlightMode.MISSION and self._waiting[0] < len(
+                self.items):
+            self._carry_out(self._waiting.pop(0))
+        super()._follow(dt)
 
     def begin_item(self, seq: int) -> None:
         self._landing = self.items[seq].command == item_.LAND
+        self.body.fixed_heading = None  # each waypoint begins with the default
         super().begin_item(seq)
 
     def item_done(self) -> None:

@@ -2,6 +2,7 @@
 """PX4 in flight: a mission is checked and replaced as a whole, and ends in Hold."""
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import ClassVar
@@ -81,7 +82,7 @@ class Px4Flight(VehicleFlight):
         if not self.items:
             return 'Mission rejected: no valid mission'
         points = [self.home, *(self.point(i) for i in self.items
-                               if i.command in item_.POSITIONAL)]
+                               if i.command in item_.FLOWN_TO)]
         for number, (a, b) in enumerate(pairwise(points)):
             gap = metres_between(a, b)
             if gap > _MAX_DISTANCE:
@@ -128,13 +129,30 @@ class Px4Flight(VehicleFlight):
 
     def next_item(self) -> None:
         item = self.items[self.seq]
-        if item.command in (item_.CHANGE_SPEED,):
+        if item.command in item_.AT_ONCE:
             self.execute(item)
             self._advance(self.body.position)
         elif item.command == item_.RETURN:
             self.set_mode(FlightMode.RETURN)  # for which no REACHED is sent
         else:
             self.begin_item(self.seq)
+
+    def leave(self, mode: FlightMode) -> None:
+        if mode is FlightMode.MISSION:
+            self.payload.stop_trigger()
+
+    def change_speed(self, speed: float) -> None:
+        super().change_speed(speed if speed > 0.0 else self.config.cruise_speed)
+
+    def begin_item(self, seq: int) -> None:
+        item = self.items[seq]
+        if item.command == item_.WAYPOINT:
+            self.turn_to(item.p4)
+        super().begin_item(seq)
+
+    def turn_to(self, compass: float) -> None:
+        if not (math.isnan(compass) and self.body.fixed_heading is None):
+            super().turn_to(compass)
 
     def item_done(self) -> None:
         self._advance(self.target)

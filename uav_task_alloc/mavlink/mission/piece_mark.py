@@ -1,0 +1,18 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a restarted bridge has to know of a way that is partly flown."""
+from __future__ import annotations
+
+from typing import NamedTuple
+
+
+class PieceMark(NamedTuple):
+    """A piece that is partly flown, as it is stored for a restarted bridge."""
+
+    task: str
+    x: float  # `place_of` the task
+    y: float
+    z: float
+    low: float  # [m] from the first point of its path, where the rest begins
+    high: float  # [m] where it ends
+    reversed: bool  # it is flown from its last point
+    flown: float  # [m] of that rest
