@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Lists with ways, and what a simulated vehicle did along them by its ground truth."""
 import math
+from itertools import pairwise
 
 from mission_bench import ORIGIN
 
@@ -72,7 +73,7 @@ def places(task, every):
 
 
 def _at(path, metres):
-    for a, b in zip(path, path[1:], strict=False):
+    for a, b in pairwise(path):
         leg = math.dist(a, b)
         if metres <= leg:
             return tuple(p + (q - p) * metres / leg for p, q in zip(a, b, strict=True))

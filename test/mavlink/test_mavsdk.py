@@ -12,7 +12,9 @@ from pathlib import Path
 
 import pytest
 from mission_bench import ORIGIN, task_list
+from piece_bench import list_of, piece, strip
 
+from uav_task_alloc.actions import Action
 from uav_task_alloc.geometry.frames import to_geodetic
 from uav_task_alloc.mavlink.autopilots import PX4
 from uav_task_alloc.mavlink.gcs.authority import AuthorityState
@@ -208,6 +210,23 @@ def test_mavsdk_two_systems_on_one_port_hold_exactly_their_lists(mavsdk):
         peers.until(lambda system=system: peers.missions(system))
         assert stored(peers.missions(system)[-1]) == items(tasks)
         assert peers.onboard(system).state is MissionState.VERIFIED
+
+
+def test_mavsdk_ways_and_actions_are_read_back(mavsdk):
+    peers = mavsdk(1)
+    way = piece('L', (0, 60), (100, 60), (100, 160), actions=(
+        Action('gimbal', {'pitch': -1.5}), Action('roi', {'x': 50.0, 'y': 80.0, 'z': 2.0}),
+        Action('photo', {'count': 3, 'interval': 2.0}), Action('gripper', {'release': 1}),
+        Action('speed', {'speed': 6.0}), Action('video')))
+    tasks = list_of(way, strip(2), turned=('F#2',))
+    peers.assign(1, tasks)
+    peers.until(lambda: peers.onboard(1).state is MissionState.VERIFIED)
+    peers.until(lambda: peers.missions(1))
+    held, sent = stored(peers.missions(1)[-1]), items(tasks)
+    assert len(held) == len(sent)
+    for one, other in zip(held, sent, strict=True):
+        assert one == pytest.approx(other, rel=1e-6)
+    assert peers.onboard(1).upload.uploads == 1
 
 
 def test_mavsdk_a_list_is_replaced_while_flying(mavsdk):

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 from pymavlink.dialects.v20 import ardupilotmega as d
 
-from uav_task_alloc.actions import Action
+from uav_task_alloc.actions import ACTIONS, Action
 from uav_task_alloc.model import Point
 
 _GROUND_SPEED, _AIRSPEED = 1.0, 0.0  # param1 of DO_CHANGE_SPEED
@@ -148,3 +148,34 @@ ACTION_COMMANDS = frozenset({
     d.MAV_CMD_DO_SET_CAM_TRIGG_DIST, d.MAV_CMD_DO_MOUNT_CONTROL, d.MAV_CMD_DO_SET_ROI_LOCATION,
     d.MAV_CMD_DO_SET_ROI_NONE, d.MAV_CMD_DO_SET_SERVO, d.MAV_CMD_DO_GRIPPER,
     d.MAV_CMD_DO_CHANGE_SPEED, d.MAV_CMD_CONDITION_YAW})
+
+
+def table_text() -> str:
+    """The commands of each action as Markdown, for docs/mavlink.md."""
+    columns = {'ArduCopter': ARDUCOPTER_ACTIONS, 'ArduPlane': ARDUPLANE_ACTIONS,
+               'PX4': PX4_ACTIONS}
+    lines = [f'| action | {" | ".join(columns)} |', '|---' * (len(columns) + 1) + '|']
+    for name, keys in ACTIONS.items():
+        example = Action(name, {key: bounds.high for key, bounds in keys.items()})
+        cells = (_cell(rows[name], example) for rows in columns.values())
+        given = f'`{name}`' + (f' ({", ".join(keys)})' if keys else '')
+        lines.append(f'| {given} | {" | ".join(cells)} |')
+    return '\n'.join(lines) + '\n'
+
+
+def _cell(row: ActionRow, example: Action) -> str:
+    """The commands of one action, and that by which it ends."""
+    if row.refusal:
+        return f'refused: {row.refusal}'
+    names = [_name(row.begin(example))] if row.begin is not None else []
+    if hold_of(example) > 0.0:
+        names.append('hold of a waypoint')
+    end = '' if row.end is None else _name(row.end(0.0))
+    return ', '.join(names) + (f'; end: {end}' if end else '')
+
+
+def _name(command: ActionCommand) -> str:
+    values = ', '.join(f'{value:g}' for value in command.params[:3])
+    shown = f' ({values})' if command.command == d.MAV_CMD_DO_CHANGE_SPEED and (
+        command.params[1] < 0.0) else ''
+    return str(d.enums['MAV_CMD'][command.command].name).removeprefix('MAV_CMD_') + shown

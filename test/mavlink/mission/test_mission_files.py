@@ -13,10 +13,11 @@ from pymavlink import mavwp
 from pymavlink.dialects.v20 import ardupilotmega as d
 
 from uav_task_alloc import scenario
+from uav_task_alloc.actions import Action
 from uav_task_alloc.errors import MissionError
 from uav_task_alloc.geometry.frames import to_enu, to_geodetic
 from uav_task_alloc.mavlink.mission.files import file_name, planned_mission, write_missions
-from uav_task_alloc.model import Leg, Plan
+from uav_task_alloc.model import Leg, Plan, Task
 
 WORLD = """
 route_end: home
@@ -254,3 +255,37 @@ def test_finding_32_files_have_points_in_between_on_long_legs(tmp_path):
     assert [round(y) for _, y, _ in places['air'][-4:]] == [0, 4_000, 8_000, 12_000]
     loader = mavwp.MAVWPLoader()
     assert loader.load(str(tmp_path / 'air.waypoints')) == 15
+
+
+SURVEY = (Action('gimbal', {'pitch': -1.5}), Action('trigger', {'distance': 25.0}),
+          Action('roi', {'x': 50.0, 'y': 60.0, 'z': 2.0}), Action('speed', {'speed': 6.0}))
+
+
+@pytest.mark.parametrize('uav', ['u_px4', 'u_ardu'])
+def test_ways_and_actions_are_in_both_files(world, tmp_path, uav):
+    way = ((0.0, 300.0, 50.0), (200.0, 300.0, 50.0), (200.0, 400.0, 50.0))
+    tasks = [Task('F#1', way[0], path=way, actions=SURVEY),
+             Task('F#2', way[2], path=way[::-1], actions=SURVEY[1:2])]
+    plan = Plan({**dict.fromkeys(ROUTES, ()), uav: ('F#1', 'F#2')},
+                legs={uav: (Leg((), 1.0), Leg((), 1.0))}, reversed=frozenset({'F#2'}))
+    missions = write_missions(world, plan, tmp_path, tasks)
+    sent = next(mission.items for mission in missions if mission.uav.id == uav)
+    loader = mavwp.MAVWPLoader()
+    loader.load(str(tmp_path / f'{uav}.waypoints'))
+    rows = json.loads((tmp_path / f'{uav}.plan').read_text())['mission']['items']
+    assert [loader.wp(seq).command for seq in range(1, loader.count())] == [
+        row['command'] for row in rows] == [item.command for item in sent]
+    for item, row, seq in zip(sent, rows, range(1, loader.count()), strict=True):
+        line = loader.wp(seq)
+        assert [line.param1, line.param2, line.param3] == pytest.approx(item.params[:3])
+        assert [line.x, line.y] == pytest.approx(row['params'][4:6], abs=ONE)
+        assert row['params'][:3] == pytest.approx(item.params[:3])
+    flown = [i.position for i in sent if i.position]
+    assert flown[:3] == list(way)
+    assert flown[-4:-1] == list(way)  # from its last point, which is the first of `way`
+    commands = [item.command for item in sent]
+    assert commands.count(d.MAV_CMD_DO_SET_CAM_TRIGG_DIST) == 4
+    speed = {'u_px4': -2.0, 'u_ardu': 12.0}[uav]
+    assert [i.params[1] for i in sent if i.command == d.MAV_CMD_DO_CHANGE_SPEED] == [6.0, speed]
+    roi = next(row for row in rows if row['command'] == d.MAV_CMD_DO_SET_ROI_LOCATION)
+    assert_at(world, roi['params'][4:], (50.0, 60.0, 2.0))

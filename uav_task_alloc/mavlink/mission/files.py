@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Container, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -54,7 +54,8 @@ class PlannedMission:
     unfenced: tuple[ThreatZone, ...]  # that it passes over or under: a fence has no height
 
 
-def write_missions(scenario: Scenario, plan: Plan, folder: str | Path) -> list[PlannedMission]:
+def write_missions(scenario: Scenario, plan: Plan, folder: str | Path,
+                   tasks: Iterable[Task] | None = None) -> list[PlannedMission]:
     """Write ID.plan and ID.waypoints for each UAV of a scenario.
 
     A UAV without tasks gets empty missions, which replace those of an earlier plan.
@@ -63,6 +64,7 @@ def write_missions(scenario: Scenario, plan: Plan, folder: str | Path) -> list[P
         scenario: the UAVs, tasks and zones, and the origin of the ENU frame.
         plan: a plan for that scenario.
         folder: where to write; it is created.
+        tasks: those of the plan, with the pieces of divided work; None: those of the scenario.
 
     Returns:
         The missions written, in the order of the scenario's UAVs.
@@ -71,7 +73,9 @@ def write_missions(scenario: Scenario, plan: Plan, folder: str | Path) -> list[P
         MissionError: a task cannot be a mission item.
         OSError: a file cannot be written.
     """
-    missions = [planned_mission(scenario, uav, plan.route(uav.id)) for uav in scenario.uavs]
+    by_id = None if tasks is None else {task.id: task for task in tasks}
+    missions = [planned_mission(scenario, uav, plan.route(uav.id), by_id, plan.reversed)
+                for uav in scenario.uavs]
     directory = Path(folder)
     directory.mkdir(parents=True, exist_ok=True)
     for mission in missions:
@@ -82,21 +86,43 @@ def write_missions(scenario: Scenario, plan: Plan, folder: str | Path) -> list[P
     return missions
 
 
-def planned_mission(scenario: Scenario, uav: ScenarioUav, route: Route) -> PlannedMission:
-    """The mission of one route; raises MissionError where a task cannot be a mission item."""
+def planned_mission(scenario: Scenario, uav: ScenarioUav, route: Route,
+                    tasks: Mapping[str, Task] | None = None,
+                    reversed_ids: Container[str] = ()) -> PlannedMission:
+    """The mission of one route.
+
+    Args:
+        scenario: with the origin and the zones.
+        uav: that flies it.
+        route: of the plan.
+        tasks: by id; None: those of the scenario.
+        reversed_ids: of tasks with a path that are flown from their last point.
+
+    Raises:
+        MissionError: a task cannot be a mission item.
+    """
     profile, _ = _AUTOPILOTS[uav.autopilot]
-    tasks = list_for_route(route, {timed.task.id: timed.task for timed in scenario.tasks})
-    items = mission_items(
-        _with_points_between(uav, profile, tasks), profile.rules, scenario.origin, uav.home)
-    fences, unfenced = _split_zones(_path(uav, tasks), [timed.zone for timed in scenario.zones])
+    known = {timed.task.id: timed.task for timed in scenario.tasks} if tasks is None else tasks
+    listed = list_for_route(route, known, reversed_ids)
+    items = mission_items(_with_points_between(uav, profile, listed), profile.rules,
+                          scenario.origin, uav.home, uav.cruise_speed)
+    fences, unfenced = _split_zones(_path(uav, listed), [timed.zone for timed in scenario.zones])
     return PlannedMission(uav, scenario.origin, items, fences, unfenced)
 
 
-def list_for_route(route: Route, tasks: Mapping[str, Task]) -> TaskList:
-    """The list that the allocator would publish for a route; `tasks` by id."""
+def list_for_route(route: Route, tasks: Mapping[str, Task],
+                   reversed_ids: Container[str] = ()) -> TaskList:
+    """The list that the allocator would publish for a route.
+
+    Args:
+        route: of a plan.
+        tasks: by id.
+        reversed_ids: of tasks with a path that are flown from their last point.
+    """
     home = route.legs[len(route.tasks):]
-    return TaskList(1, tuple(MissionStop(tasks[name], leg.via) for name, leg in zip(
-        route.tasks, route.legs, strict=False)), route.returns, home[0].via if home else ())
+    stops = tuple(MissionStop(tasks[name], leg.via, reversed=name in reversed_ids)
+                  for name, leg in zip(route.tasks, route.legs, strict=False))
+    return TaskList(1, stops, route.returns, home[0].via if home else ())
 
 
 def _with_points_between(uav: ScenarioUav, profile: Profile, tasks: TaskList) -> TaskList:
@@ -156,7 +182,7 @@ def waypoints_text(mission: PlannedMission) -> str:
     home = [0, 1, 0, dialect.MAV_CMD_NAV_WAYPOINT, 0, 0, 0, 0, *_degrees(*_home(mission)), 1]
     rows = [home] + [
         [seq, 0, _FILE_FRAME.get(item.frame, item.frame), item.command,
-         *(f'{value:g}' for value in item.params), *_degrees(*_position(item)), 1]
+         *(f'{value:.9g}' for value in item.params), *_degrees(*_position(item)), 1]
         for seq, item in enumerate(mission.items, 1)]
     return '\n'.join(['QGC WPL 110', *('\t'.join(map(str, row)) for row in rows)]) + '\n'
 

@@ -4,7 +4,8 @@
 ArduPilot carries out a command that is no waypoint while it flies to the next waypoint, one in
 each cycle of its mission, and leaves out those that are not begun when that waypoint is reached;
 after the last waypoint it carries out only one. So every command is followed by a waypoint of the
-same task, and by a hold of a second where more than one is followed by a point close by.
+same task, and by a hold of a second where more than one is followed by a point close by; a turn
+comes last, as it lasts.
 """
 from __future__ import annotations
 
@@ -139,11 +140,12 @@ class _Service:
         for point in way[1:len(way) if ends else -1]:
             yield from self._turned(turn)
             yield self._point(point, along=True)
-        yield from self._turned(turn)
         if ends and len(way) == 1:
+            yield from self._turned(turn)
             yield self._point(way[0], max(hold, _SETTLE), along=True)
         for end in ends:
             yield self._command(end)
+        yield from self._turned(turn)
         stays = bool(ends) or len(way) == 1 or any(
             math.dist(point, way[-1]) < _SAME for point in way[:-1])
         yield self._last(max(hold, _SETTLE) if stays else hold)

@@ -15,6 +15,9 @@ from uav_task_alloc.sim.modes import COPTER_MODES, COPTER_NOT_ARMABLE
 from uav_task_alloc.sim.stored_item import StoredItem
 
 _GUIDED = {dialect.COPTER_MODE_GUIDED, dialect.COPTER_MODE_GUIDED_NOGPS}
+# commands on the way whose end ArduCopter reports; AP_Mission carries out the others itself
+_REPORTED = {item_.CHANGE_SPEED, item_.YAW, item_.ROI, dialect.MAV_CMD_DO_SET_ROI_NONE,
+             dialect.MAV_CMD_DO_MOUNT_CONTROL}
 _FIRST_PREARM, _PREARM_PERIOD = 15.0, 30.0  # [s] after power-up; between texts
 
 
@@ -158,6 +161,7 @@ class ArduPilotFlight(VehicleFlight):
         commands = [*range(self._upcoming, len(self.items) if flown is None else flown)]
         if flown is None:
             commands = commands[:1]
+        self.body.fixed_heading = None  # each waypoint begins with the default
         if commands:  # the first one at once, one of the others in each cycle from then on
             self._carry_out(commands[0])
         if flown is None:
@@ -170,7 +174,8 @@ class ArduPilotFlight(VehicleFlight):
 
     def _carry_out(self, seq: int) -> None:
         self.execute(self.items[seq])
-        self.report_reached(seq, self.body.position)
+        if self.items[seq].command in _REPORTED:
+            self.report_reached(seq, self.body.position)
 
     def _follow(self, dt: float) -> None:
         if self._waiting and self.mode is FlightMode.MISSION and self._waiting[0] < len(
@@ -180,7 +185,6 @@ class ArduPilotFlight(VehicleFlight):
 
     def begin_item(self, seq: int) -> None:
         self._landing = self.items[seq].command == item_.LAND
-        self.body.fixed_heading = None  # each waypoint begins with the default
         super().begin_item(seq)
 
     def item_done(self) -> None:
