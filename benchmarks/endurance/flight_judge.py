@@ -227,7 +227,8 @@ class Judge:
             self._events += 1
             if event.event == 'COMPLETED' and event.task not in self.completed:
                 self.completed.add(event.task)
-                if not self.reached[event.task] and event.task not in self._crossed:
+                if event.task in self.places and not self.reached[event.task] and (
+                        event.task not in self._crossed):
                     self._fault('false_completed', f'{event.task} was never reached')
 
     def _progress(self) -> None:

@@ -8,9 +8,11 @@ loses up to 20 % of the frames and delays some by up to 5 s, out of order. Judge
 of the simulator and the link. `flyable` counts the tasks of flights at whose end the bridge
 controls the aircraft, `completed` those of them that it reported. `flown_twice` counts the tasks
 flown again though a frame was delivered that shows that they were flown (see `flight_evidence`);
-`flown_again_unknowable` those of which no such frame was delivered. --without-authority disables
-the table, to show that the check can fail. --json: the last line is one object. The status is 1
-where a flight has a fault.
+`flown_again_unknowable` those of which no such frame was delivered. --ways 0.5 gives half of the
+tasks a way: reported without having been flown from end to end it is `false_completed`;
+`way_points_again` counts points of ways that were flown again, as after a doubt.
+--without-authority disables the table, to show that the check can fail. --json: the last line is
+one object. The status is 1 where a flight has a fault.
 """
 from __future__ import annotations
 
@@ -28,6 +30,7 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from flight_judge import Judge
+from flight_ways import WayJudge, random_ways
 from flight_world import World
 from pymavlink.dialects.v20 import ardupilotmega as d
 
@@ -53,7 +56,7 @@ OWN = {'ardupilot': (6, 7, 9, 17, 21, 23), 'px4': (px4_mode(4, 5), px4_mode(4, 6
 class Flight:
     """One flight, its random events, and the operator who hands the aircraft back."""
 
-    def __init__(self, seed: int, number: int, lossy: bool) -> None:
+    def __init__(self, seed: int, number: int, lossy: bool, ways: float = 0.0) -> None:
         self.rng = rng = random.Random(f'{seed}/{number}/{lossy}')
         self.kind = rng.choice(['ardupilot', 'px4'])
         boots = rng.random() < 0.3
@@ -67,7 +70,10 @@ class Flight:
         self.places = {f't{k}': (SIDE * (k % 5) + rng.uniform(-9.0, 9.0),
                                  SIDE * (1 + k // 5) + rng.uniform(-9.0, 9.0),
                                  rng.uniform(25.0, 45.0)) for k in range(20)}
-        self.judge = Judge(self.world, self.kind, self.places)
+        self.ways = random_ways(random.Random(f'{seed}/{number}/ways'), self.places, ways)
+        self.judge = Judge(self.world, self.kind, {
+            name: place for name, place in self.places.items() if name not in self.ways})
+        self.way_judge = WayJudge(self.world, self.ways)
         self.fresh = list(self.places)
         self.listed: list[str] = []
         self.revision = 0
@@ -205,7 +211,10 @@ class Flight:
             TaskList(
                 self.revision,
                 tuple(
-                    MissionStop(Task(name, self.places[name], service_time=self.service))
+                    MissionStop(Task(
+                        name, self.places[name], service_time=self.service,
+                        path=self.ways.get(name, ()), reversible=True),
+                        reversed=name in self.ways and name[-1] in '13579')
                     for name in names
                 ),
             )
@@ -256,6 +265,7 @@ class Flight:
         while world.now < LIMIT:
             world.step()
             self.judge.step()
+            self.way_judge.step(self.judge.completed)
             while self.later and self.later[0][0] <= world.now:
                 self.later.pop(0)[1]()
             self.operate()
@@ -265,13 +275,14 @@ class Flight:
                 break
 
     def result(self) -> tuple[Counter[str], list[str]]:
-        counts = self.counts + self.judge.counts
+        counts = self.counts + self.judge.counts + self.way_judge.counts
         counts['flights'] = 1
         counts[self.kind] = 1
         if self.gives_back:
             counts['flyable'] = len(set(self.listed) | self.judge.completed)
             counts['completed'] = len(self.judge.completed)
-        return counts, self.judge.faults + self.judge.notes
+        faults = self.judge.faults + self.way_judge.faults
+        return counts, faults + self.judge.notes
 
 
 def switch_authority_off() -> None:
@@ -280,12 +291,12 @@ def switch_authority_off() -> None:
     Authority.held = property(lambda self: True)  # type: ignore[assignment, method-assign]
 
 
-def fly(job: tuple[int, int, bool, bool]) -> tuple[int, Counter[str], list[str], list[str]]:
+def fly(job: tuple[int, int, bool, bool, float]) -> tuple[int, Counter[str], list[str], list[str]]:
     """One flight in a process of its own."""
-    seed, number, lossy, without = job
+    seed, number, lossy, without, ways = job
     if without:
         switch_authority_off()
-    flight = Flight(seed, number, lossy)
+    flight = Flight(seed, number, lossy, ways)
     flight.fly()
     counts, faults = flight.result()
     unfinished = flight.gives_back and not set(flight.listed) <= flight.judge.completed
@@ -301,12 +312,13 @@ def main() -> int:
     parser.add_argument('--first', type=int, default=0, help='number of the first flight')
     parser.add_argument('--seed', type=int, default=1)
     parser.add_argument('--lossy', action='store_true')
+    parser.add_argument('--ways', type=float, default=0.0, help='share of tasks with a way')
     parser.add_argument('--without-authority', action='store_true')
     parser.add_argument('--processes', type=int, default=os.cpu_count() or 1)
     parser.add_argument('--verbose', action='store_true', help='notes of flights with faults')
     parser.add_argument('--json', action='store_true')
     args = parser.parse_args()
-    jobs = [(args.seed, number, args.lossy, args.without_authority)
+    jobs = [(args.seed, number, args.lossy, args.without_authority, args.ways)
             for number in range(args.first, args.first + args.flights)]
     total: Counter[str] = Counter()
     with multiprocessing.Pool(args.processes) as pool:

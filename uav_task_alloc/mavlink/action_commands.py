@@ -156,7 +156,7 @@ def table_text() -> str:
                'PX4': PX4_ACTIONS}
     lines = [f'| action | {" | ".join(columns)} |', '|---' * (len(columns) + 1) + '|']
     for name, keys in ACTIONS.items():
-        example = Action(name, {key: bounds.high for key, bounds in keys.items()})
+        example = Action(name, tuple((key, bounds.high) for key, bounds in keys.items()))
         cells = (_cell(rows[name], example) for rows in columns.values())
         given = f'`{name}`' + (f' ({", ".join(keys)})' if keys else '')
         lines.append(f'| {given} | {" | ".join(cells)} |')
