@@ -126,7 +126,8 @@ def leg_count(items: Sequence[Item]) -> int:
         items: consecutive ones of a mission.
     """
     points = [item for item in items if not item.is_action]
-    return sum(not (item.along and before is not None and item.task == before.task)
+    return sum(not (item.along and before is not None and before.along
+                    and item.task == before.task)
                for before, item in zip([None, *points], points, strict=False))
 
 

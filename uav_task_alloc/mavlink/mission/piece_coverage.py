@@ -91,18 +91,21 @@ class PieceCoverage:
         self._corridor = _CORRIDOR_PLANE if plane else _CORRIDOR
         self._pieces: dict[str, _Piece] = {}
         self.left: deque[str] = deque(maxlen=_KEPT)  # ways that were left, to be taken
+        self._partly: dict[str, None] = {}  # those of which a part is flown
         self._under_way: str | None = None
         self._ending: str | None = None  # passed in flight; it is not known how far it was flown
         self._sampled = -math.inf  # vehicle time [s] of the newest position
 
     def set_listed(self, stops: Iterable[MissionStop]) -> None:
         """Take the ways of a list; what was flown of the same way stays flown."""
+        listed: set[str] = set()
         for stop in stops:
             if not stop.task.path:
                 continue
             name, place = stop.task.id, place_of(stop.task)
             piece = self._pieces.pop(name, None)
             if piece is None or piece.place != place:
+                self._partly.pop(name, None)
                 at = [0.0, *accumulate(math.dist(a, b) for a, b in pairwise(stop.task.path))]
                 piece = _Piece(stop.task.path, place, at, 0.0, at[-1], stop.reversed)
                 piece.measure()
@@ -110,8 +113,10 @@ class PieceCoverage:
             elif piece.path != stop.task.path or piece.reversed != stop.reversed:
                 self._turn(piece, stop)
             self._pieces[name] = piece
-        for name in list(self._pieces)[:-_KEPT]:
+            listed.add(name)
+        for name in [name for name in self._pieces if name not in listed][:-_KEPT]:
             del self._pieces[name]
+            self._partly.pop(name, None)
 
     def _turn(self, piece: _Piece, stop: MissionStop) -> None:
         """Take another direction of flight, or of the path."""
@@ -169,8 +174,10 @@ class PieceCoverage:
         before, self._sampled = self._sampled, sample.t
         for name in (self._under_way, self._ending):
             piece = self._pieces.get(name or '')
-            if piece is not None:
+            if name is not None and piece is not None:
                 self._follow(piece, sample, before, fastest)
+                if piece.flown >= _SHORTEST:
+                    self._partly[name] = None
 
     def _follow(self, piece: _Piece, sample: PositionSample, before: float,
                 fastest: float) -> None:
@@ -223,7 +230,11 @@ class PieceCoverage:
 
     def forget(self, task: str) -> None:
         """Fly the whole way of a task again."""
-        if self._pieces.pop(task, None) is not None:
+        piece = self._pieces.get(task)
+        self._partly.pop(task, None)
+        if piece is not None:
+            piece.low, piece.high, piece.flown, piece.seen = 0.0, piece.at[-1], 0.0, None
+            piece.measure()
             self.version += 1
 
     def leave(self) -> None:
@@ -233,11 +244,12 @@ class PieceCoverage:
 
     def marks(self, completed: Container[str]) -> tuple[PieceMark, ...]:
         """What a restarted bridge has to know of the pieces that are partly flown."""
+        for name in [name for name in self._partly if name in completed]:
+            del self._partly[name]
+        rows = ((name, self._pieces[name]) for name in self._partly)
         return tuple(PieceMark(
-            name, *piece.place, round(piece.low, 2), round(piece.high, 2), piece.reversed,
-            _passed_points(piece)) for name, piece in self._pieces.items()
-            if name not in completed and (
-                piece.flown >= _SHORTEST or piece.high - piece.low < piece.at[-1] - 1e-6))
+            name, *piece.path[0][:2], piece.place[2], round(piece.low, 2), round(piece.high, 2),
+            piece.reversed, _passed_points(piece)) for name, piece in rows)
 
     def restore(self, marks: Iterable[PieceMark], stops: Iterable[MissionStop],
                 last: PositionSample | None) -> None:
@@ -252,11 +264,13 @@ class PieceCoverage:
         for mark in marks:
             piece = self._pieces.get(mark.task)
             stop = by_id.get(mark.task)
-            if piece is None or stop is None or piece.place != tuple(mark[1:4]):
+            if piece is None or stop is None or (
+                    *piece.path[0][:2], piece.place[2]) != mark[1:4]:
                 continue
             piece.low, piece.high, piece.reversed = mark.low, mark.high, mark.reversed
             piece.measure()
             piece.flown = mark.flown
+            self._partly[mark.task] = None
             if last is not None:
                 self._place(piece, last.position, last.t)
             if piece.reversed != stop.reversed:

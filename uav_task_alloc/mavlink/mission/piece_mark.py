@@ -9,9 +9,9 @@ class PieceMark(NamedTuple):
     """A piece that is partly flown, as it is stored for a restarted bridge."""
 
     task: str
-    x: float  # `place_of` the task
-    y: float
-    z: float
+    x: float  # [m] ENU, of the first point of its path
+    y: float  # [m]
+    checksum: float  # of its points, see `stop_items.place_of`
     low: float  # [m] from the first point of its path, where the rest begins
     high: float  # [m] where it ends
     reversed: bool  # it is flown from its last point
