@@ -26,20 +26,17 @@ class ActionCommand(NamedTuple):
     """One command of a mission that is no point of the path."""
 
     command: int  # MAV_CMD
-    params: _Params = (0.0, 0.0, 0.0, 0.0)
+    params: _Params = (0.0, 0.0, 0.0, 0.0)  # param1 to param4
     z: float = 0.0  # param7
     place: Point | None = None  # [m] ENU, of a command with a position
 
 
 @dataclass(frozen=True, slots=True)
 class ActionRow:
-    """How an autopilot carries out one named action.
+    """How an autopilot carries out one named action."""
 
-    `begin` makes the command from the action; None: it is a hold of a waypoint. `end` makes the
-    one that ends it, from the vehicle's own cruise speed [m/s], NaN where that is not known.
-    """
-
-    begin: Callable[[Action], ActionCommand] | None = None
+    begin: Callable[[Action], ActionCommand] | None = None  # None: it is a hold of a waypoint
+    # the command that ends it, from the vehicle's own cruise speed [m/s]; None: it does not last
     end: Callable[[float], ActionCommand] | None = None
     stays: bool = True  # begun again where a way is continued after a break
     needs_speed: bool = False  # `end` needs the cruise speed
@@ -47,10 +44,13 @@ class ActionRow:
 
 
 def compass(heading: float) -> float:
-    """Return degrees clockwise from north, in [0, 360).
+    """Return a heading in degrees clockwise from north.
 
     Args:
         heading: ENU [rad], counter-clockwise from east.
+
+    Returns:
+        In [0, 360).
     """
     return round((90.0 - math.degrees(heading)) % 360.0, 4) % 360.0
 
@@ -150,7 +150,7 @@ ACTION_COMMANDS = frozenset({
     d.MAV_CMD_DO_CHANGE_SPEED, d.MAV_CMD_CONDITION_YAW})
 
 
-def table_text() -> str:
+def action_table() -> str:
     """The commands of each action as Markdown, for docs/mavlink.md."""
     columns = {'ArduCopter': ARDUCOPTER_ACTIONS, 'ArduPlane': ARDUPLANE_ACTIONS,
                'PX4': PX4_ACTIONS}

@@ -329,7 +329,7 @@ class VehicleFlight(Navigation):
         raise NotImplementedError
 
     def execute(self, item: StoredItem) -> None:
-        """Execute an item that is not flown, or a command of the same number."""
+        """Execute an `item` that is not flown, or a command of the same number."""
         place = self.point(item) if item.command == item_.ROI else None
         if not self.payload.execute(item, place, self.body.position, self.now):
             super().execute(item)

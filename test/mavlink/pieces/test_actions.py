@@ -12,7 +12,7 @@ from pymavlink.dialects.v20 import ardupilotmega as d
 
 from uav_task_alloc.actions import ACTIONS, Action
 from uav_task_alloc.errors import MissionError
-from uav_task_alloc.mavlink.action_commands import compass, table_text
+from uav_task_alloc.mavlink.action_commands import action_table, compass
 from uav_task_alloc.mavlink.autopilots import ARDUPLANE, PX4_PLANE
 from uav_task_alloc.mavlink.mission.items import mission_items
 from uav_task_alloc.model import Task
@@ -165,4 +165,4 @@ def test_an_action_altered_on_the_way_back_is_noticed(kind):
 
 def test_the_page_has_the_table_of_the_code():
     page = Path(__file__).parents[3] / 'docs' / 'mavlink.md'
-    assert table_text() in page.read_text()
+    assert action_table() in page.read_text()

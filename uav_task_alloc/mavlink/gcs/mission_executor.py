@@ -89,14 +89,12 @@ class MissionExecutor:
         self.notes: deque[OperatorNote] = deque()
         self._rates = MessageRates(peer, self.telemetry, now)
         self._end_actions = EndActions(peer, profile, self.onboard)
-        self._was_stale = False
+        self._was_stale, self._restarts = False, 0
         self._event_retry = EventRetry()
-        self._restarts = 0
         self._status_text_log = StatusTextLog()
         self.fence = VehicleFence(peer, profile, origin, self.telemetry, self.onboard,
                                  self.authority, lambda: self.policy, rng,
                                  fence_memory or FenceMemory())
-        self.onboard.list.read_speed = self.fence.parameters.cruise_speed
         takeoff = Takeoff(self.sender, self.telemetry, self.onboard, self.authority,
                           lambda: self.policy, self.fence.missing)
         self._end_of_list = EndOfList(self.sender, self.telemetry, self.onboard, self.watch,
@@ -116,8 +114,8 @@ class MissionExecutor:
     def _restore(self, record: AuthorityRecord | None) -> None:
         """Pass what the previous run recorded to `onboard.resume`."""
         resume = self.onboard.resume
-        self._pieces = () if record is None else record.pieces
         if record is not None:
+            self.onboard.list.stored_pieces = record.pieces
             resume.recorded = record.mission, record.current, record.arrived
             resume.recorded_upload = record.uploading
             for first in range(0, len(record.seen) - _SEEN + 1, _SEEN):
@@ -130,11 +128,9 @@ class MissionExecutor:
                 record.replacing_since is not None and not self.profile.atomic) or (
                 record.state is AuthorityState.LOST
                 and self.profile.mode_function(record.mode or 0) is not ModeFunction.MISSION)
-        for mark in self.watch.marks.values():
-            if mark.flown:
-                resume.reported.add(mark.task)
-            else:
-                resume.unflown[mark.task] = mark[1:4]
+        marks = self.watch.marks.values()
+        resume.reported |= {mark.task for mark in marks if mark.flown}
+        resume.unflown |= {mark.task: mark[1:4] for mark in marks if not mark.flown}
 
     @property
     def going_home(self) -> bool:
@@ -165,11 +161,7 @@ class MissionExecutor:
             for mark in self.watch.marks.values():
                 if mark.flown and now - mark.at < MAX_AGE:
                     self.onboard.progress.completed[mark.task] = mark[1:4]
-        first = self.onboard.tasks is None
         self.onboard.list.assign(tasks)
-        if first:
-            progress = self.onboard.progress
-            progress.coverage.restore(self._pieces, tasks.stops, progress.path.sample)
         for task in filter(self.onboard.list.repeat, self._event_retry.wanted_again()):
             self.notes.append(OperatorNote(
                 'info', f'{task} was announced again: it is flown once more'))
@@ -230,8 +222,8 @@ class MissionExecutor:
         """Advance time; returns the messages to send."""
         self.events += self._event_retry.step(now)
         self.onboard.progress.step(now)
-        out = self.onboard.step(now) + self._rates.step(now)
-        out += self._end_actions.step(now, self.authority.held)
+        out = self.onboard.step(now) + self._rates.step(now) + (
+            self._end_actions.step(now, self.authority.held))
         return self._gate(out + self._act(now), now)
 
     def _gate(self, messages: list[Message], now: float) -> list[Message]:

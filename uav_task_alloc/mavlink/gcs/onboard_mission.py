@@ -41,8 +41,7 @@ class OnboardMission:
                  rng: random.Random) -> None:
         self.upload = Upload(peer, idle_after=profile.idle_after, rng=rng)
         self.upload.is_superseded = self._overtaken
-        self.progress = ProgressTable(telemetry.frames, repeats=profile.atomic,
-                                      plane=profile.rules.loiters)
+        self.progress = ProgressTable(telemetry.frames, profile.atomic, profile.rules.loiters)
         self.resume = Resume(profile, origin, telemetry, self.progress)
         self.own = int(profile.rules.home_first)
         self.list = WantedMission(profile, origin, self.progress, lambda: telemetry.airborne,
@@ -55,8 +54,7 @@ class OnboardMission:
         self._profile, self._origin, self._telemetry = profile, origin, telemetry
         self._done_at_start: frozenset[str] = frozenset()  # at the start of the upload
         self._reports = ReportsDuringUpload(self.progress, origin)
-        self._mission = VerifiedMission(self.own, profile.atomic)
-        self._latest_diff = LatestDiff()
+        self._mission, self._latest_diff = VerifiedMission(self.own, profile.atomic), LatestDiff()
         self._failures = UploadFailures(self.list, self.own, self.notes)
         self._uploading: tuple[MissionDiff, TaskList] | None = None  # with its list
         self._taken = False  # the vehicle has taken all items of this upload

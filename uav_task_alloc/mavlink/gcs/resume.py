@@ -215,7 +215,6 @@ class Resume:
         self._skipped = frozenset(range(first, flown)) - self._flown_since(held, first, flown, now)
         items = held[:flown] + self._with_tasks(held[flown:], tasks)
         self._progress.begin(items, flown, now, read=True)
-        self._progress.continue_way()
         self._epoch, self._located_at = self._progress.epoch, flown
         # the previous run has reported earlier items, or recorded that they were skipped
         same = self.recorded[0] == checksum(held)
@@ -255,7 +254,6 @@ class Resume:
         self._reached += tuple(held[n] for n in sorted(flown))
         items = held[:current] + self._with_tasks(held[current:], tasks)
         progress.begin(items, current, now, read=True)
-        progress.continue_way()
         self._epoch, self._located_at = progress.epoch, recorded
         self._replay(held)
 

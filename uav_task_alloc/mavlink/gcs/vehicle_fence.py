@@ -81,6 +81,7 @@ class VehicleFence:
             replace(peer, mission_type=d.MAV_MISSION_TYPE_RALLY), profile.idle_after, rng,
             RALLY_BUDGET, memory.own, lambda own: self._save('rally', own, memory), rally_alike))
         self.parameters = FenceParameters(peer, profile)
+        onboard.list.read_speed = self.parameters.cruise_speed
         self.notes: deque[OperatorNote] = deque()
         self.fence = Fence()
         self._chosen_for: object = None

@@ -63,6 +63,9 @@ def with_points_between(tasks: TaskList, before: Sequence[Point] = ()) -> TaskLi
     Args:
         tasks: the list.
         before: points of its first leg, ENU [m].
+
+    Returns:
+        The list with more points.
     """
     stops: list[MissionStop] = []
     last: Point | None = None

@@ -8,11 +8,11 @@ from typing import NamedTuple
 class PieceMark(NamedTuple):
     """A piece that is partly flown, as it is stored for a restarted bridge."""
 
-    task: str
+    task: str  # id
     x: float  # [m] ENU, of the first point of its path
     y: float  # [m]
     checksum: float  # of its points, see `stop_items.place_of`
     low: float  # [m] from the first point of its path, where the rest begins
-    high: float  # [m] where it ends
+    high: float  # [m] where that ends
     reversed: bool  # it is flown from its last point
     flown: float  # [m] of that rest

@@ -189,6 +189,8 @@ class ProgressTable:
         epoch.since = epoch.begin = -math.inf if read else known_since
         epoch.taken = -math.inf if since is None else since
         epoch.taken_frame = math.inf if since is None else self._frames.newest
+        if read:  # along the way that a mission found on board is on
+            self.coverage.continue_at(self.active, self.path.sample)
 
     def extend(self, items: tuple[Item, ...]) -> None:
         """Begin a new epoch whose first items are those of the last one; the vehicle flies on."""
@@ -350,10 +352,6 @@ class ProgressTable:
     def near_one(self, item: Item, other: Item | None, when: float) -> bool:
         """Whether it was near one item, but not another, before a message at `when` [s]."""
         return self.positions.near_one(item, other, when)
-
-    def continue_way(self) -> None:
-        """Continue along the way that a mission found on board is on."""
-        self.coverage.continue_at(self.active, self.path.sample)
 
     def _note_active(self) -> None:
         self.coverage.note_active(self.active, self._moves.in_mission)

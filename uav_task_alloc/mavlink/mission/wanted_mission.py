@@ -22,6 +22,7 @@ from uav_task_alloc.mavlink.mission.items import (
     mission_items,
 )
 from uav_task_alloc.mavlink.mission.long_legs import first_point, with_points_between
+from uav_task_alloc.mavlink.mission.piece_mark import PieceMark
 from uav_task_alloc.mavlink.mission.progress import ProgressTable
 from uav_task_alloc.mavlink.mission.task_progress import TaskProgress
 from uav_task_alloc.mavlink.mission.waits import Waits
@@ -68,6 +69,7 @@ class WantedMission:
         self.waits = Waits()
         # own speed of the vehicle [m/s], whether it is wanted; 0: being read, NaN: not known
         self.read_speed: Callable[[bool], float] = lambda wanted: math.nan
+        self.stored_pieces: tuple[PieceMark, ...] = ()  # of the previous run of the bridge
         self._changes_speed = False  # an action of the list does
         self._airborne, self._home = airborne, home
         self.leg = FirstLeg(profile.rules.loiters, profile.farthest_first)
@@ -79,7 +81,7 @@ class WantedMission:
 
     def assign(self, tasks: TaskList) -> None:
         """Take the latest list; a refused task is tried again where it has changed."""
-        self.tasks = tasks
+        first, self.tasks = self.tasks is None, tasks
         self.waits.assign(tasks, self._progress.completed, self._airborne(),
                           self._progress.active)
         self.horizon.reset()
@@ -87,6 +89,9 @@ class WantedMission:
                                   for action in stop.task.actions)
         listed = [stop.task for stop in tasks.stops]
         self._progress.coverage.set_listed(tasks.stops)
+        if first:
+            self._progress.coverage.restore(
+                self.stored_pieces, tasks.stops, self._progress.path.sample)
         self._progress.set_listed_tasks(listed)
         ids, completed = {task.id for task in listed}, self._progress.completed.keys()
         self._dropped = (self._dropped | (completed - ids)) & completed
