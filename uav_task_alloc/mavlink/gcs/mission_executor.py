@@ -128,9 +128,8 @@ class MissionExecutor:
                 record.replacing_since is not None and not self.profile.atomic) or (
                 record.state is AuthorityState.LOST
                 and self.profile.mode_function(record.mode or 0) is not ModeFunction.MISSION)
-        marks = self.watch.marks.values()
-        resume.reported |= {mark.task for mark in marks if mark.flown}
-        resume.unflown |= {mark.task: mark[1:4] for mark in marks if not mark.flown}
+        for mark in self.watch.marks.values():
+            resume.note_mark(mark.task, mark[1:4], mark.flown)
 
     @property
     def going_home(self) -> bool:

@@ -93,6 +93,13 @@ class Resume:
         self._unread: list[_UnreadReached] = []  # until the vehicle is located
         self.reset()
 
+    def note_mark(self, task: str, place: Point, flown: bool) -> None:
+        """Take a task that the previous run has reported as flown, or as skipped by another."""
+        if flown:
+            self.reported.add(task)
+        else:
+            self.unflown[task] = place
+
     def rebooted(self) -> None:
         """Reset after a restart of the vehicle, whose current item starts at the first."""
         _, recorded, arrived = self.recorded
@@ -191,9 +198,8 @@ class Resume:
         replaced = self._find_upload(held)
         mission, recorded, _ = self.recorded
         if self._passed_recorded and mission == checksum(held) and recorded is not None:
-            self._flown += held[recorded:recorded + 1]
-            self._reached += held[recorded:recorded + 1]
-            self._until = now + MAX_AGE
+            passed, self._until = held[recorded:recorded + 1], now + MAX_AGE
+            self._flown, self._reached = self._flown + passed, self._reached + passed
         if self.current_unreliable or (self.was_disarmed and not telemetry.airborne) or (
                 not self._profile.atomic and telemetry.mode is not ModeFunction.MISSION
                 and (replaced or not self._continues_recorded(held))):
