@@ -25,6 +25,7 @@ from uav_task_alloc.cli.outputs import (
 )
 from uav_task_alloc.cli.plan_json import plan_json
 from uav_task_alloc.cli.plan_pieces import piece_kinds, short_names, with_pieces
+from uav_task_alloc.cli.plan_terrain import check_ground, over_terrain
 from uav_task_alloc.cli.plan_times import has_times, times_text
 from uav_task_alloc.cli.progress import SolveProgress, log_line
 from uav_task_alloc.errors import InvalidValue, first_of
@@ -33,6 +34,7 @@ from uav_task_alloc.model.route_stops import route_length
 from uav_task_alloc.objective import MAX_TRIPS, OBJECTIVES
 from uav_task_alloc.params import AllocatorParams
 from uav_task_alloc.scenario.values import Scenario
+from uav_task_alloc.terrain import read_terrain
 
 _ITS_OWN = "the scenario's"  # default of an option
 
@@ -48,10 +50,13 @@ def main(argv: Sequence[str]) -> int:
     """
     args = _make_parser().parsed(argv)
     check_outputs(args)
-    loaded = with_pieces(with_options(without_cancelled(scenario.load(args.scenario)), args))
+    given = with_options(without_cancelled(scenario.load(args.scenario)), args)
+    terrain = read_terrain(args.terrain, given.origin) if args.terrain else None
+    loaded = with_pieces(given, terrain)
+    ground = check_ground(loaded, terrain, args.terrain_clearance) if terrain else []
     with counted_kernels():
         _load_kernels(loaded, args.solver, search=False)
-        for text in start_warnings(loaded):
+        for text in start_warnings(loaded) + ground:
             log_line(f'Warning: {text}')
         with SolveProgress(args.budget, sys.stderr, time.monotonic) as progress:
             early = EarlyPlan(lambda: _load_kernels(loaded, args.solver),
@@ -59,6 +64,8 @@ def main(argv: Sequence[str]) -> int:
                               progress)
             first = early.wait()
             result = first or solve_scenario(loaded, args, progress.stop, progress.on_iteration)
+    if terrain:
+        result = over_terrain(loaded, result, terrain, args.terrain_clearance)
     with early.ending(INTERRUPTED):
         _answer(loaded, result, args)
         if first:
@@ -124,6 +131,11 @@ def _make_parser() -> OptionParser:
         spec = next(spec.metadata for spec in fields(AllocatorParams) if spec.name == name)
         parser.number(f'--{name.replace("_", "-")}', spec['low'], spec['high'], meaning,
                       unit='m', default_text=_ITS_OWN)
+    parser.add_argument('--terrain', type=Path, metavar='GROUND.tif',
+                        help='a GeoTIFF of ground heights (AMSL): legs keep clear of the ground, '
+                             'and tasks may have vertical: terrain (default: none)')
+    parser.number('--terrain-clearance', 0.0, 10000.0, 'that legs keep from the ground of '
+                  '--terrain; tasks that are lower are reached upright', unit='m', default=30.0)
     _add_outputs(parser)
     return parser
 

@@ -8,28 +8,32 @@ from itertools import groupby
 
 from uav_task_alloc.piece_ids import split_piece
 from uav_task_alloc.scenario.values import Scenario, TimedTask
+from uav_task_alloc.terrain import Terrain
 from uav_task_alloc.work.pieces import pieces_of
 from uav_task_alloc.work.values import Kind
 
 _WORDS = {Kind.LINE: 'part', Kind.AREA: 'strip', Kind.ORBIT: 'arc'}
 
 
-def with_pieces(loaded: Scenario) -> Scenario:
+def with_pieces(loaded: Scenario, terrain: Terrain | None = None) -> Scenario:
     """Cut the work of a scenario into pieces, around all its zones.
 
     Args:
         loaded: with tasks of any kind.
+        terrain: the ground, for work whose heights are above it.
 
     Returns:
         With a task for each piece; points stay what they are.
 
     Raises:
-        InvalidValue: there would be too many pieces.
+        InvalidValue: there would be too many pieces, or the ground is not known.
+        TerrainError: the terrain does not reach as far.
     """
     zones = [timed.zone for timed in loaded.zones]
     return replace(loaded, tasks=tuple(
         TimedTask(timed.at, piece, timed.work) for timed in loaded.tasks for piece in (
-            pieces_of(timed.work, zones, loaded.clearance) if timed.work else (timed.task,))))
+            pieces_of(timed.work, zones, loaded.clearance, terrain) if timed.work
+            else (timed.task,))))
 
 
 def piece_kinds(loaded: Scenario) -> dict[str, str]:

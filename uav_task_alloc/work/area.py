@@ -48,15 +48,14 @@ def _within(hole: Sequence[XY], outer: Sequence[XY]) -> bool:
     ) and not any(segments_cross(a, b, c, d) for a, b in edges(hole) for c, d in edges(outer))
 
 
-def area_ways(given: Geometry, zones: Sequence[ThreatZone], clearance: float, low: float = 0.0,
-              high: float = 0.0) -> list[tuple[Point, ...]]:
+def area_ways(given: Geometry, zones: Sequence[ThreatZone],
+              clearance: float) -> list[tuple[Point, ...]]:
     """Cut an AREA into strips.
 
     Args:
         given: checked.
         zones: are holes as well; each is enlarged by its margin and `clearance`.
         clearance: [m].
-        low, high: [m] lowest and highest ground above the origin, where heights are above ground.
 
     Returns:
         [m], z as that of the path; none where zones cover all of it.
@@ -71,6 +70,6 @@ def area_ways(given: Geometry, zones: Sequence[ThreatZone], clearance: float, lo
         return [(point[0] - x0, point[1] - y0) for point in points]
 
     region = Region(near(given.path), tuple(near(hole) for hole in given.holes), tuple(
-        near(ring) for ring in sections(zones, low + height, high + height, clearance)))
+        near(ring) for ring in sections(zones, height, height, clearance)))
     ways = cover(region, given.strip_width, given.direction, given.place('strip_width'))
     return [tuple((x + x0, y + y0, height) for x, y in way) for way in ways]

@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
+from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.model import Point, Task, ThreatZone
+from uav_task_alloc.terrain import Terrain
+from uav_task_alloc.work.above_ground import above_ground_task, following_ways
 from uav_task_alloc.work.area import area_ways, check_area
-from uav_task_alloc.work.line import check_line, line_ways
+from uav_task_alloc.work.line import check_line, free_ways, line_ways
 from uav_task_alloc.work.orbit import check_orbit, looks_at_centre, orbit_ways
 from uav_task_alloc.work.values import (
     Geometry,
     Kind,
+    Vertical,
     check_common,
     piece_tasks,
     refuse_unused,
@@ -51,8 +55,8 @@ class Work(Geometry):
         KINDS[self.kind].check(self)
 
 
-def pieces_of(work: Work, zones: Sequence[ThreatZone] = (),
-              clearance: float = 0.0) -> tuple[Task, ...]:
+def pieces_of(work: Work, zones: Sequence[ThreatZone] = (), clearance: float = 0.0,
+              terrain: Terrain | None = None) -> tuple[Task, ...]:
     """Cut work into tasks, each of which one UAV flies as a whole.
 
     Parts inside zones are left out. Where zones cover all of it, it is cut as if there were none:
@@ -62,6 +66,7 @@ def pieces_of(work: Work, zones: Sequence[ThreatZone] = (),
         work: of any kind.
         zones: in force; each is enlarged by its margin and `clearance`.
         clearance: [m].
+        terrain: the ground, for work whose heights are above it.
 
     Returns:
         Of a POINT the task; otherwise tasks with a `path` and ids `<task id>#<k>`, k from 1, with
@@ -69,10 +74,20 @@ def pieces_of(work: Work, zones: Sequence[ThreatZone] = (),
         same for the same arguments.
 
     Raises:
-        InvalidValue: there would be too many pieces.
+        InvalidValue: there would be too many pieces, or heights are above a ground that is not
+            known.
+        TerrainError: the terrain does not reach as far.
     """
+    if work.vertical is Vertical.TERRAIN and terrain is None:
+        raise InvalidValue(work.place('vertical'), 'TERRAIN', 'ORIGIN: no terrain is given')
+    ground = terrain if work.vertical is Vertical.TERRAIN else None
     if work.kind is Kind.POINT:
-        return (work.task,)
+        return (work.task if ground is None else above_ground_task(work, ground),)
     rules = KINDS[work.kind]
-    ways = rules.ways(work, zones, clearance) or rules.ways(work, (), clearance)
+    if ground is None:
+        ways = rules.ways(work, zones, clearance) or rules.ways(work, (), clearance)
+    else:
+        ways = following_ways(work, rules.ways(work, (), clearance), ground)
+        ways = [part for way in ways for part in free_ways(way, zones, clearance)] or ways
+        work = replace(work, task=above_ground_task(work, ground))
     return tuple(rules.finish(work, piece) for piece in piece_tasks(work, ways, rules.reversible))
