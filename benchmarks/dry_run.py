@@ -15,12 +15,8 @@ import time
 
 from uav_task_alloc import ThreatZone, plan
 from uav_task_alloc.allocator import Allocator
-from uav_task_alloc.allocator.operator_desk import (
-    OperatorDesk,
-    OrderAction,
-    OrderRequest,
-    OrderTrial,
-)
+from uav_task_alloc.allocator.operator_desk import OperatorDesk, OrderTrial
+from uav_task_alloc.allocator.order_requests import OrderAction, OrderRequest
 from uav_task_alloc.allocator.records import AnnouncementAction, UavReport
 from uav_task_alloc.allocator.replanning.planning import solve_problem
 from uav_task_alloc.allocator.replanning.what_if import solve_what_if

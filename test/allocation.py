@@ -4,12 +4,8 @@ import math
 from itertools import pairwise
 
 from uav_task_alloc.allocator import Allocator
-from uav_task_alloc.allocator.operator_desk import (
-    OperatorDesk,
-    OrderAction,
-    OrderRequest,
-    OrderTrial,
-)
+from uav_task_alloc.allocator.operator_desk import OperatorDesk, OrderTrial
+from uav_task_alloc.allocator.order_requests import OrderAction, OrderRequest
 from uav_task_alloc.allocator.records import (
     AnnouncementAction,
     TaskEvent,

@@ -7,8 +7,8 @@ from typing import Any, TypeVar
 
 from uav_task_alloc_msgs import msg as m
 
-from uav_task_alloc.allocator.operator_desk import OrderAction, OrderAnswer, OrderRequest
 from uav_task_alloc.allocator.order_records import OperatorHold
+from uav_task_alloc.allocator.order_requests import OrderAction, OrderAnswer, OrderRequest
 from uav_task_alloc.allocator.records import Allocation, Proposal
 from uav_task_alloc.checks import check_count, check_ros_name
 from uav_task_alloc.errors import InvalidValue

@@ -18,13 +18,8 @@ from rclpy.task import Future
 from uav_task_alloc_msgs import msg as m, srv
 
 from uav_task_alloc.allocator import Allocator
-from uav_task_alloc.allocator.operator_desk import (
-    OperatorDesk,
-    OrderAction,
-    OrderAnswer,
-    OrderRequest,
-    OrderTrial,
-)
+from uav_task_alloc.allocator.operator_desk import OperatorDesk, OrderTrial
+from uav_task_alloc.allocator.order_requests import OrderAction, OrderAnswer, OrderRequest
 from uav_task_alloc.allocator.records import Outbox
 from uav_task_alloc.allocator.replanning.what_if import WhatIfAnswer, solve_what_if
 from uav_task_alloc.errors import InvalidValue
