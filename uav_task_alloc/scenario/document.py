@@ -17,7 +17,8 @@ times. `uav_task_alloc plan` plans all its tasks around all its zones from time 
 flight, `fleet_sim` simulates the UAVs and `scenario_player` announces tasks and zones, with their
 windows in times of the ROS clock. Times are in scenario
 seconds, which are played `speedup` times faster than real time; time 0 is when the
-allocator has subscribed. Coordinates are ENU in metres from `origin`, or degrees.
+allocator has subscribed. Coordinates are ENU, [x, y, z] in metres east, north and up of
+`origin`, or degrees.
 
 ```yaml
 uavs:
