@@ -274,6 +274,7 @@ def test_mavsdk_after_a_reboot_the_mission_is_uploaded_again(mavsdk):
     peers = mavsdk(1)
     peers.assign(1, task_list('AB'))
     flying(peers, 1)
+    peers.until(lambda: len(peers.missions(1)) == 1)  # a reboot drops what is not reported yet
     peers.command('reboot', 1)
     session = peers.ground_station.sessions[1]
     peers.until(lambda: session.executor.telemetry.restarts == 1)
