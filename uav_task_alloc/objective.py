@@ -181,7 +181,7 @@ def needs_time(uavs: Iterable[Uav], tasks: Iterable[Task], objective: Objective,
     """Return whether times, loads or trips can change which plan is best.
 
     Where nothing has a latest time, `earliest`, `release` and speeds change the times of a plan,
-    but not its distance. A task with a path may be flown in either direction only there.
+    but not its distance. Only the solver with times takes tasks with a path.
 
     Args:
         uavs: the fleet.

@@ -6,7 +6,7 @@ small work limit at first, so that one hard search does not prevent many easy on
 """
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from itertools import pairwise
 
 import numpy as np
@@ -41,6 +41,7 @@ class PathPreparation:
         self._clock, self._began, self._budget = clock, began, max(budget, _MIN_BUDGET)
         self._stop: Callable[[], bool] | None = stop
         self._share, self._heeds_stop = 1.0, True
+        self.reversed: Collection[str] = ()  # of `flown`: from their last points
 
     def _over(self) -> bool:
         if self._heeds_stop and self._stop is not None and self._stop():
@@ -61,20 +62,23 @@ class PathPreparation:
         self._share, self._heeds_stop = share, heeds_stop
         self.path_budget.start_stage(most)
 
-    def find_flown(self, distances: Distances, place: Mapping[str, int]) -> None:
+    def find_flown(self, distances: Distances, place: Mapping[str, tuple[int, int]]) -> None:
         """Search for the legs that are flown already.
 
         Args:
             distances: of the problem; a leg not found keeps its known path, where that is clear.
-            place: index in `distances` of UAV starts and tasks, by id.
+            place: indices in `distances` where UAV starts and tasks are entered and left, by id;
+                those of tasks flown from their first points.
         """
         self.begin(FLOWN_SHARE, _FLOWN_LIMIT, heeds_stop=False)
         rows = []
         for uav_id, (tasks, legs) in self.flown.items():
-            stops = [place.get(name, -1) for name in (uav_id, *tasks)]
+            stops = [place.get(name, (-1, -1))[::-1 if name in self.reversed else 1]
+                     for name in (uav_id, *tasks)]
             via = [leg.via for leg in legs[:len(tasks)]]
             via += [()] * (len(tasks) - len(via))
-            rows += [(i, j, points) for (i, j), points in zip(pairwise(stops), via, strict=True)
+            rows += [(i, j, points)
+                     for ((_, i), (j, _)), points in zip(pairwise(stops), via, strict=True)
                      if i >= 0 and j >= 0]
         if not rows or not distances.zones:
             return

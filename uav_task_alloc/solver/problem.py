@@ -133,7 +133,7 @@ def make_problem(uavs: Sequence[Uav], tasks: Sequence[Task],
                       {task.id: i for i, task in enumerate(unlocked)},
                       _ends(uavs, unlocked, locked), crossed)
     if search is not None and limits.zones:
-        search.find_flown(distances, _place_by_id(problem))
+        search.find_flown(distances, _places_by_id(problem))
     reached = _reachable(problem) if limits.zones else locked
     if reached != locked:
         unlocked = _not_locked(tasks, reached)
@@ -156,15 +156,15 @@ def _not_locked(tasks: Sequence[Task], locked: Mapping[str, tuple[Task, ...]]) -
     return tuple(task for task in tasks if task.id not in held)
 
 
-def _place_by_id(problem: Problem) -> dict[str, int]:
-    """Index in `distances` of the start of each UAV and of each task, by id."""
+def _places_by_id(problem: Problem) -> dict[str, tuple[int, int]]:
+    """Indices in `distances` of the begin and the end of each UAV start and task, by id."""
     places = {task_id: len(problem.uavs) + i for task_id, i in problem.index.items()}
     for u, uav in enumerate(problem.uavs):
         start, *held = problem.locked_places(u)
         places[uav.id] = start
         places.update(zip((task.id for task in problem.locked.get(uav.id, ())), held,
                           strict=True))
-    return places
+    return {name: (place, problem.ends.get(name, place)) for name, place in places.items()}
 
 
 def _reachable(problem: Problem) -> Mapping[str, tuple[Task, ...]]:

@@ -130,6 +130,18 @@ def test_legs_around_zones_go_from_end_to_end():
         math.fsum([*lengths, *(task.path_length for task in tasks)]))
 
 
+def test_an_earlier_plan_around_zones_is_kept_where_there_is_no_time_for_others():
+    zones = [ThreatZone.cylinder(f'z{k}{y:+.0f}', (k * 200.0 + 100.0, y), 40.0)
+             for k in range(4) for y in (-50.0, 150.0)]
+    tasks = [line(f't{k}', (k * 200.0, 200), (k * 200.0, -100)) for k in range(5)]
+    before = quick([UAV], tasks, *zones)
+    assert before.reversed
+    fresh = replace(before, state=None)  # no lengths are known
+    after = plan([UAV], tasks, zones, warm=fresh, stop=lambda: True, clock=lambda: 0.0)
+    assert (after.routes, after.reversed) == (before.routes, before.reversed)
+    assert after.distance == pytest.approx(before.distance)
+
+
 def test_an_earlier_plan_keeps_its_directions():
     tasks = [*strips(6, 200.0, 40.0), Task('p', (90.0, 300.0, 0.0))]
     before = quick([UAV], tasks)

@@ -65,6 +65,8 @@ def solve_timed(uavs: Sequence[Uav], tasks: Sequence[Task],
     began, before = clock(), WarmState.of(warm)
     search = PathPreparation(clock, began, budget, stop, before.flown())
     known = before.problem
+    # those that are locked are turned themselves
+    search.reversed = before.reversed - {task.id for row in locked.values() for task in row}
     locked = {uav_id: tuple(turned_tasks(row, reversed)) for uav_id, row in locked.items()}
     base = make_problem(uavs, tasks, locked, limits, rules, known, search)
     problem = make_timed(base, _aboard(uavs, tasks, base.locked, before), before.timed)
