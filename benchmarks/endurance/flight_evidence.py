@@ -17,6 +17,7 @@ from uav_task_alloc.sim.stored_item import StoredItem
 NEAR = 2.0  # [m] from a task: at its item
 SAMPLED = 0.5  # [s] by which a hold may be shorter between two positions
 KEPT = 60.0  # [s] of positions, and of states of the vehicle
+JUDGED = 6.0  # [s] in which a bridge waits for messages sent before those that it has received
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,18 +50,35 @@ class DeliveredEvidence:
     """
 
     def __init__(self) -> None:
-        self.known: set[str] = set()  # tasks with evidence
+        self.known: dict[str, float] = {}  # tasks with evidence, and when [s] it was complete
+        self._now = 0.0  # [s] of the tick
+        self._held_from = -math.inf  # [s] visits before it need a current item in mission mode
         self._visits: dict[str, _Visit] = {}
         self._states: dict[int, _State] = {}  # by tick
         self._positions: list[float] = []  # [s] when each delivered position was sent
 
     def add_state(self, now: float, flight: VehicleFlight) -> None:
         """Record the vehicle as the frames of this tick show it."""
+        self._now = now
         mission = flight.mode is FlightMode.MISSION
         self._states[_tick(now)] = _State(
             flight.body.position, flight.seq if mission else None, tuple(flight.items),
             flight.booted)
         self._states.pop(_tick(now - KEPT), None)
+
+    def forget(self, atomic: bool) -> None:
+        """Forget what a bridge had still to judge that was killed, and has left no file.
+
+        Its successor cannot know either for which mission an ArduPilot is held: the current item
+        of a mission that was replaced stays until it flies.
+
+        Args:
+            atomic: its missions are replaced with their current item (PX4).
+        """
+        self.known = {task: at for task, at in self.known.items() if self._now - at > JUDGED}
+        self._positions.clear()
+        if not atomic:
+            self._held_from = self._now
 
     def reached(self, task: str, at: float, seq: int, place: Point, hold: float,
                 now: float) -> None:
@@ -95,14 +113,16 @@ class DeliveredEvidence:
             for task, visit in self._visits.items():
                 if task not in self.known and sent >= visit.at and self._shows(
                         visit, sent, message):
-                    self.known.add(task)
+                    self.known[task] = self._now
 
     def _shows(self, visit: _Visit, sent: float, message: Message) -> bool:
         if message.get_type() == 'MISSION_ITEM_REACHED':
             return bool(message.seq == visit.seq) and sent < visit.next_at
+        state, end = self._states.get(_tick(sent)), visit.seq + 1
+        if state is not None and state.seq is None and visit.at < self._held_from:
+            return False
         past = message.seq > visit.seq or (
             message.seq == visit.seq and message.mission_state == d.MISSION_STATE_COMPLETE)
-        state, end = self._states.get(_tick(sent)), visit.seq + 1
         return past and state is not None and state.booted == visit.state.booted and (
             state.items[:end] == visit.state.items[:end])
 
@@ -112,7 +132,7 @@ class DeliveredEvidence:
                 continue
             times = [t for t in self._positions if t <= visit.at + TICK and self._at(visit, t)]
             if times and max(times) - min(times) >= visit.hold - SAMPLED:
-                self.known.add(task)
+                self.known[task] = self._now
 
     def _at(self, visit: _Visit, sent: float) -> bool:
         """Whether a position was sent at the place while its item was current."""

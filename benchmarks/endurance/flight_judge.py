@@ -88,8 +88,12 @@ class Judge:
             self.taken_at = self.known_at = None
 
     def forgotten(self) -> None:
-        """Note a restart of the bridge without a file: on the ground it forgets who took it."""
+        """Note a restart of the bridge without a file.
+
+        On the ground it forgets who took it, and what its predecessor had still to judge.
+        """
         self._forgot = True
+        self._evidence.forget(self.family == 'px4')
 
     def step(self) -> None:
         """Judge one tick of the world."""

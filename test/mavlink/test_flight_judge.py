@@ -90,7 +90,31 @@ def test_a_current_item_of_another_mission_is_no_evidence(change):
         visit.flight.items = ['home', 'X', 'Y', 'Z', 'B']
     evidence.add_state(12.0, visit.flight)
     evidence.delivered(12.0, current(3))
-    assert evidence.known == set()
+    assert evidence.known == {}
+
+
+@pytest.mark.parametrize(('killed', 'known'), [(12.0, False), (18.0, True)])
+def test_a_bridge_killed_without_a_file_forgets_what_it_had_still_to_judge(killed, known):
+    visit = Visit()
+    evidence = visit.fly(10.2)
+    evidence.delivered(10.1, current(3))
+    evidence.add_state(killed, visit.flight)
+    evidence.forget(atomic=False)
+    assert ('B' in evidence.known) is known
+
+
+@pytest.mark.parametrize(('atomic', 'mode', 'known'), [
+    (False, FlightMode.HOLD, False), (False, FlightMode.MISSION, True),
+    (True, FlightMode.HOLD, True)])
+def test_a_current_item_of_an_ardupilot_that_was_held_for_a_mission_is_no_evidence(
+        atomic, mode, known):
+    visit = Visit()
+    evidence = visit.fly(11.0)
+    evidence.forget(atomic)
+    visit.flight.mode = mode
+    evidence.add_state(12.0, visit.flight)
+    evidence.delivered(12.0, current(3))
+    assert ('B' in evidence.known) is known
 
 
 def test_a_reached_of_the_next_item_at_that_index_is_no_evidence():

@@ -73,6 +73,23 @@ def test_the_first_repetition_may_come_at_once():
     assert list(flight.table.completed) == ['A']
 
 
+def test_a_repetition_at_the_place_of_an_item_that_stays_current_completes_nothing():
+    flight = Flight()
+    flight.begin(A=100.0, X=900.0)
+    flight.fly_to(100.0)
+    flight.reached(0)
+    flight.begin(X=500.0, Y=900.0)
+    flight.stay(1.0, SPEED)
+    flight.reached(0)
+    flight.stay(0.8, SPEED)
+    flight.begin(B=120.0, Y=900.0)
+    flight.table.note_current(0, flight.now, True, flight.frame())
+    flight.stay(0.2, SPEED)
+    flight.reached(0)
+    flight.stay(10.0, SPEED)
+    assert list(flight.table.completed) == ['A']
+
+
 def test_a_reached_after_the_end_of_the_repetitions_counts():
     flight = repeated_over_two_uploads()
     flight.fly_to(500.0)
@@ -80,6 +97,21 @@ def test_a_reached_after_the_end_of_the_repetitions_counts():
     flight.table.note_current(1, flight.now, True)
     flight.stay(1.0)
     assert list(flight.table.completed) == ['A', 'C']
+
+
+@pytest.mark.parametrize('flying', [True, False])
+def test_a_place_passed_before_its_item_can_have_been_current_was_not_reached(flying):
+    flight = Flight()
+    flight.begin(A=200.0, B=100.0, C=900.0)
+    flight.table.note_in_mission()
+    flight.fly_to(150.0)
+    flight.table.note_current(0, flight.now, True, flight.frame())
+    flight.fly_to(190.0)
+    if not flying:
+        flight.table.note_mission_left(flight.now)
+    flight.table.note_current(2, flight.now, flying, flight.frame())
+    flight.stay(20.0)
+    assert list(flight.table.completed) == []
 
 
 def test_a_reboot_does_not_lose_what_the_positions_have_shown():

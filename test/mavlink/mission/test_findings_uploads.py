@@ -14,7 +14,7 @@ from mission_bench import ORIGIN, OURS, task_list
 from pymavlink.dialects.v20 import ardupilotmega as d
 from test_findings_evidence import Flight
 
-from uav_task_alloc.mavlink.autopilots import PX4 as PX4_PROFILE
+from uav_task_alloc.mavlink.autopilots import PX4 as PX4_PROFILE, ModeFunction
 from uav_task_alloc.mavlink.mission.diff import DiffKind, MissionDiff
 from uav_task_alloc.mavlink.mission.download import Download
 from uav_task_alloc.mavlink.mission.items import MissionStop, TaskList, mission_items
@@ -69,6 +69,54 @@ def test_a_task_reached_as_the_vehicle_is_held_for_an_upload_is_flown_once(kind)
     assert bench.run(lambda: bench.onboard().state is MissionState.UPLOADING, 5.0)
     bench.line.tampers.clear()
     flown_once_each(bench, 'ABC')
+
+
+@ARDUPILOT
+def test_the_last_task_reached_as_the_vehicle_is_held_for_an_upload_is_flown_once(kind):
+    bench = flying(kind, 'AB')
+    assert bench.run(lambda: bench.completed() == ['A'])
+    assert bench.run(lambda: distance(bench, AT_A) > 90.0)
+    assert places(bench) == ['A']
+    # MISSION_CURRENT is complete, and received once the mode is another
+    for message in ('MISSION_CURRENT', 'MISSION_ITEM_REACHED'):
+        drop_messages(bench, 'down', message,
+                      lambda m: bench.executor().telemetry.mode is ModeFunction.MISSION)
+    assert bench.run(lambda: places(bench) == ['A', 'B'])
+    bench.line.delay = 0.3, 0.3
+    bench.assign(task_list('CBD', 2))
+    assert bench.run(lambda: bench.onboard().state is MissionState.UPLOADING, 5.0)
+    bench.line.tampers.clear()
+    flown_once_each(bench, 'ABCD')
+
+
+@ARDUPILOT
+def test_a_task_at_which_an_avoidance_ends_is_flown_once(kind):
+    bench = flying(kind, 'AB')
+    bench.run(lambda: distance(bench, AT_A) < 6.5)
+    bench.vehicles[1].avoid(True)
+    bench.run(limit=8.0)
+    assert distance(bench, AT_A) < 2.0
+    assert places(bench) == []
+    bench.vehicles[1].avoid(False)
+    # MISSION_CURRENT names the next item before a heartbeat shows the mode
+    drop_for(bench, 1.5, 'HEARTBEAT', 'MISSION_ITEM_REACHED')
+    flown_once_each(bench, 'AB')
+
+
+@PX4
+@pytest.mark.parametrize('store', [True, False])
+def test_a_hold_by_a_pilot_at_the_last_item_completes_nothing_after_a_restart(kind, store):
+    bench = flying(kind, 'A')
+    bench.assign(task_list('A', 2, service=5.0))
+    assert bench.run(lambda: distance(bench, AT_A) < 0.1)
+    bench.vehicles[1].rc_mode(MODES[kind].hold)
+    bench.run(limit=2.0)
+    bench.kill_and_restart(0.0, store)
+    bench.assign(task_list('A', 3, service=5.0))
+    bench.run(limit=10.0)
+    assert bench.completed() == places(bench) == []
+    assert bench.hand_over() == ''
+    flown_once_each(bench, 'A')
 
 
 @ARDUPILOT
@@ -221,6 +269,24 @@ def test_a_kept_current_item_of_the_new_mission_counts():
     reports.replay(of_new, 7, None)
     flight.stay(10.0)
     assert list(flight.table.completed) == ['B']
+
+
+@pytest.mark.parametrize(('current', 'completed'), [(True, ['B']), (False, ['A'])])
+def test_a_reached_is_of_the_item_that_was_current_until_then(current, completed):
+    flight = Flight()
+    flight.begin(A=100.0, X=900.0)
+    begin = flight.now
+    reports, new = upload_during(flight, B=160.0, C=900.0)
+    flight.fly_to(130.0)
+    if current:  # both missions are at their first item: A was passed, and not reached
+        reports.add_current(0, flight.now, flight.frame(), True, 0)
+    flight.fly_to(160.0)
+    reports.add_reached(0, flight.now, flight.frame())
+    of_new = reports.begin_new(new)
+    flight.table.begin(new.items, 0, flight.now, since=begin)
+    reports.replay(of_new, 0, None)
+    flight.fly_to(200.0)
+    assert list(flight.table.completed) == completed
 
 
 def test_a_current_item_of_the_old_mission_releases_the_reached_before_it():

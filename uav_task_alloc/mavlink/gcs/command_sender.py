@@ -174,7 +174,7 @@ class CommandSender:
         telemetry = self._telemetry
 
         def done(t: float) -> None:
-            telemetry.mode = mode  # an older heartbeat may still report the previous mode
+            telemetry.note_acknowledged(mode)
             if mode is ModeFunction.MISSION:
                 self.must_start = False
 

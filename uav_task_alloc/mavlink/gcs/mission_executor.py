@@ -201,14 +201,15 @@ class MissionExecutor:
             self._start_over(now)
         if newest:
             self.energy.receive(message)
-        if message.get_type() == 'HEARTBEAT' and newest:
+        heartbeat = newest and message.get_type() == 'HEARTBEAT'
+        if heartbeat:
             self.watch.receive_heartbeat(message, now)
-            if self.telemetry.mode is ModeFunction.MISSION:
-                self.onboard.progress.note_in_mission()
-            elif mode_before is ModeFunction.MISSION:
+            if mode_before is ModeFunction.MISSION and not self.telemetry.in_mission:
                 self.onboard.progress.note_mission_left(now)
-        if self.telemetry.mode is not ModeFunction.MISSION:
+        if not self.telemetry.in_mission:
             self.onboard.progress.note_other_mode(now)  # as COMMAND_ACK shows
+        elif heartbeat or self.telemetry.mode is not ModeFunction.MISSION:
+            self.onboard.progress.note_in_mission()  # MISSION_CURRENT shows it too
         out = self.onboard.receive(message, now) + self.fence.receive(message, now)
         self.sender.receive(message)
         self._end_actions.receive(message)
@@ -251,7 +252,7 @@ class MissionExecutor:
 
     def _update_progress(self, message: Message, newest: bool, now: float) -> None:
         kind, progress, own = message.get_type(), self.onboard.progress, self.onboard.own
-        flying = self.telemetry.mode is ModeFunction.MISSION
+        flying = self.telemetry.in_mission
         if kind == 'GLOBAL_POSITION_INT':
             self._position(message, newest, now)
         elif kind == 'MISSION_ITEM_REACHED':
@@ -265,7 +266,8 @@ class MissionExecutor:
                                       self.telemetry.mission_restarted)
             elif flying:
                 self.onboard.note_flown_unset(seq, now)
-            may_have_ended = flying if not self.profile.atomic else (  # PX4: after a take-off too
+            ended = self.telemetry.mission_ended and self.onboard.set_current_to is None
+            may_have_ended = flying or ended if not self.profile.atomic else (  # PX4: take-off too
                 self.telemetry.airborne and progress.may_have_ended_unseen(seq))
             if may_have_ended and message.mission_state == d.MISSION_STATE_COMPLETE:
                 progress.note_mission_complete(seq, now, self.telemetry.frame)
@@ -275,8 +277,7 @@ class MissionExecutor:
             self.watch.receive_status_text(message, now)
             self.sender.note_arming_refusal(str(message.text))
             self.onboard.list.horizon.note(str(message.text))
-            note = self._status_text_log.receive(message, now)
-            self.notes.extend(() if note is None else (note,))
+            self.notes += filter(None, (self._status_text_log.receive(message, now),))
 
     def _position(self, message: Message, newest: bool, now: float) -> None:
         if self.telemetry.has_position:

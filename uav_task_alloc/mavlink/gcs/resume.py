@@ -34,7 +34,6 @@ from uav_task_alloc.mavlink.mission.progress import ProgressTable
 from uav_task_alloc.mavlink.mission.stop_items import place_of
 from uav_task_alloc.model import Point, Task
 
-_NEAR = 15.0  # [m] from the last item that counts as reached
 _SAME_PLACE = 1.0  # [m]
 _MAX_MISSIONS = 4  # that were read and are kept
 _MAX_CURRENTS = 512  # MISSION_CURRENT kept until the vehicle is located: four minutes
@@ -379,7 +378,9 @@ class Resume:
 
     def _ended(self, held: tuple[Item, ...], current: int) -> bool:
         telemetry, last = self._telemetry, held[-1]
-        if telemetry.mission_state == d.MISSION_STATE_COMPLETE and not self._profile.atomic:
+        if telemetry.mission_state != d.MISSION_STATE_COMPLETE:
+            return False  # a pilot may have set HOLD just before the last item, or at it
+        if not self._profile.atomic:
             return True  # PX4 reports it after a take-off and a landing too
         end = to_enu(self._origin, last.x * 1e-7, last.y * 1e-7, last.z)
         return (
@@ -387,5 +388,5 @@ class Resume:
             and telemetry.airborne
             and telemetry.mode is ModeFunction.HOLD
             and current == len(held) - 1
-            and math.dist(telemetry.position, end) < last.params[1] + _NEAR
+            and math.dist(telemetry.position, end) < last.params[1] + LOOSE_RADIUS
         )

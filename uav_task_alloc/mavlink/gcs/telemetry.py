@@ -16,6 +16,7 @@ from uav_task_alloc.model import Point
 
 STALE, LOST = 3.0, 10.0  # [s] without a message
 _QUIET, _STEADY = 2.0, 10.0  # [s] a link is good with no gap of _QUIET for _STEADY
+_IN_MISSION = 1  # MISSION_CURRENT.mission_mode; 0: not known
 _ORDERED = 5.0  # [s] in which sequence numbers order two frames
 _REPORTED = 3.0  # [s] until a vehicle without estimator or GPS reports is trusted
 _BATTERY_TIMEOUT = 10.0  # [s] without a report: the battery does not count
@@ -79,7 +80,10 @@ class Telemetry:
         self.reached: int | None = None  # seq on the wire, latest
         self.total: int | None = None  # number of items as the vehicle reports it
         self.mission_state = 0  # MISSION_STATE
-        self.mission_restarted = False  # from COMPLETE to ACTIVE, by the last MISSION_CURRENT
+        # frames that show the mode last, and MISSION_CURRENT sent in mission mode (ArduPilot)
+        self._mode_frame = self._in_mission_frame = 0
+        # from COMPLETE to ACTIVE, and from another state to COMPLETE, by the last MISSION_CURRENT
+        self.mission_restarted = self.mission_ended = False
         self.plan_id = 0  # PX4's id of the onboard mission
         self.received_ids: set[int] = set()  # message ids since the start
         self.received_last: dict[int, float] = {}  # [s] by message id
@@ -134,6 +138,12 @@ class Telemetry:
         return math.hypot(*self.velocity)
 
     @property
+    def in_mission(self) -> bool:
+        """Whether it is in mission mode, by the newest heartbeat or MISSION_CURRENT."""
+        return (self.mode is ModeFunction.MISSION
+                or self._in_mission_frame > self._mode_frame)
+
+    @property
     def past_boot(self) -> bool:
         """Whether the autopilot has booted, so that its mission store is available."""
         return self.autopilot not in ESTIMATE or self._started
@@ -154,6 +164,10 @@ class Telemetry:
     def good_link(self, now: float) -> bool:
         """Whether the last 10 s had no gap of more than 2 s."""
         return now - self.received_at <= _QUIET and now - self._gap_at >= _STEADY
+
+    def note_acknowledged(self, mode: ModeFunction) -> None:
+        """Take a mode that the vehicle has acknowledged; its heartbeats may be older."""
+        self.mode, self._mode_frame = mode, self.frames.newest
 
     def receive(self, message: Message, now: float) -> bool:
         """Process a message of this vehicle; False if a newer one of its type was received."""
@@ -183,6 +197,7 @@ class Telemetry:
         self.received_ids = set()
         self.received_last.clear()
         self.current, self.total, self.plan_id, self.mission_state = None, None, 0, 0
+        self._mode_frame = self._in_mission_frame = 0
         self.home, self.height, self.reached = None, math.nan, None
         self.landed = d.MAV_LANDED_STATE_UNDEFINED
         self.has_position = self._fix = self._estimates = False
@@ -225,6 +240,7 @@ class Telemetry:
     def _heartbeat(self, message: Message, now: float) -> None:
         self.armed = bool(message.base_mode & d.MAV_MODE_FLAG_SAFETY_ARMED)
         self.mode = self._profile.mode_function(message.custom_mode)
+        self._mode_frame = self.frame
         self._landed(self.landed)
         if message.system_status == d.MAV_STATE_BOOT and self._started:
             self.restart()  # its clock is received later
@@ -308,10 +324,15 @@ class Telemetry:
     def _current(self, message: Message, now: float) -> None:
         self.current, self.current_at = message.seq, now
         self.total = message.total if 0 < message.total < 65535 else None
-        self.mission_restarted = not self._profile.atomic and (  # PX4: after a take-off too
-            self.mission_state == d.MISSION_STATE_COMPLETE
-            and message.mission_state == d.MISSION_STATE_ACTIVE)
-        self.mission_state = message.mission_state
+        before, self.mission_state = self.mission_state, message.mission_state
+        if not self._profile.atomic:  # PX4: by a take-off too
+            complete = d.MISSION_STATE_COMPLETE
+            self.mission_restarted = before == complete and (
+                self.mission_state == d.MISSION_STATE_ACTIVE)
+            self.mission_ended = self.mission_state == complete and (
+                before not in (complete, d.MISSION_STATE_UNKNOWN))
+            if message.mission_mode == _IN_MISSION:
+                self._in_mission_frame = self.frame
         self.plan_id = plan_id(message)
 
     def _reached(self, message: Message, now: float) -> None:

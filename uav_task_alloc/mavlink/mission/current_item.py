@@ -215,7 +215,15 @@ class CurrentItem:
             until = min(until, max(epoch.since, self._left_at))
         self.passed.add(Claim(
             items, route, epoch.since, until, now + MAX_MESSAGE_DELAY, epoch.number,
-            self._frames_of_reached(begin, end, now, frame), frame, skips, in_flight))
+            self._frames_of_reached(begin, end, now, frame), frame, skips, in_flight,
+            first=epoch.items[begin], others_since=self._reported_until(begin)))
+
+    def _reported_until(self, seq: int) -> float:
+        """Vehicle time [s] until which an item was reported as current; -inf: it was not."""
+        reports = self.reports
+        if reports.reported != seq or reports.last_frame is None:
+            return -math.inf
+        return self._positions.sent_between(reports.last_frame)[0]
 
     def _frames_of_reached(self, begin: int, end: int, now: float,
                            frame: int | None) -> tuple[int, int] | None:

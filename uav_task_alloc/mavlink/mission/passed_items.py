@@ -35,6 +35,8 @@ class Claim:
     skips: bool  # more than one item: another station has set the current item
     in_flight: bool  # in mission mode, so that unobserved items may have been flown
     home: Point | None = None  # [m] ENU; where it returns to at the end of `route`
+    first: Item | None = None  # that was current; None: not known
+    others_since: float = -math.inf  # vehicle time [s] until which `first` was reported as current
 
 
 class _Judged(NamedTuple):
@@ -149,8 +151,10 @@ class PassedItems:
             return Visit.NO
         # what ends the hold of a single item is that the mission goes on
         hold = item.params[0] if claim.skips or not claim.in_flight else 0.0
+        # an item is flown only while it is current
+        since = claim.since if item is claim.first else max(claim.since, claim.others_since)
         return self._positions.path.visited(
-            item.position, item.radius, hold, claim.since, self._until(claim),
+            item.position, item.radius, hold, since, self._until(claim),
             0.0 if claim.skips else CLOSE)
 
     def _until(self, claim: Claim) -> float:

@@ -339,10 +339,16 @@ class ProgressTable:
         self.coverage.forget(task)
         self._epoch.started = None if self._epoch.started == task else self._epoch.started
 
-    def was_at_by(self, item: Item, when: float) -> bool:
-        """Whether an item was reached before a message received at `when` [s]."""
+    def was_at_by(self, item: Item, when: float, since: float = -math.inf) -> bool:
+        """Whether an item was reached before a message received at `when` [s].
+
+        Args:
+            item: of a mission.
+            when: steady time [s].
+            since: vehicle time [s] before which it was not reached.
+        """
         return self.positions.was_at(
-            item, self._epoch.since, self.positions.vehicle_time(when))
+            item, max(self._epoch.since, since), self.positions.vehicle_time(when))
 
     def was_exactly_at(self, item: Item, when: float) -> bool:
         """Whether it was within the radius of an item before a message at `when` [s]."""

@@ -87,7 +87,10 @@ class ReachedEpoch:
         seq, before, positions = reached.seq, self.before, self._positions
         item = epoch.items[seq]
         if self.series.first_sent(reached) < epoch.taken:  # a repetition, or hidden among such
-            return epoch.current is not None and epoch.current >= seq and positions.was_at(
+            # a new one makes the next item current; the last item stays
+            passed = epoch.current is not None and (
+                epoch.current > seq or epoch.current == seq == len(epoch.items) - 1)
+            return passed and positions.was_at(
                 item, max(epoch.since, epoch.taken), epoch.left, close=0.0)
         if not self.series.repeats:  # sent once, where the vehicle is
             near = positions.can_have_reached(item, now) if not before.items else (

@@ -7,6 +7,7 @@ of the frames.
 """
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 from uav_task_alloc.geometry.frames import Origin
@@ -109,14 +110,14 @@ class ReportsDuringUpload:
             seq = reached.seq
             before = with_position(old[seq], self._origin) if 0 <= seq < len(old) else None
             after = uploaded.items[seq] if 0 <= seq < len(uploaded.items) else None
-            when = self._credit_old(reached, before, after, uploaded.start)
+            when = self._credit_old(reached, before, after, uploaded)
             if when is not None:
                 of_new.append((seq, when, reached.frame))
         self._reached.clear()
         return of_new
 
     def _credit_old(self, reached: _Reached, before: Item | None, after: Item | None,
-                    start: int) -> float | None:
+                    uploaded: MissionDiff) -> float | None:
         """Credit a REACHED to the item of the old mission, where the vehicle was there.
 
         Returns:
@@ -125,12 +126,12 @@ class ReportsDuringUpload:
         seq, frame, last, last_frame = reached
         progress, first = self._progress, self._first_at(reached)
         if progress.may_repeat_earlier(seq, last, last_frame):
-            return self._credit_repeated(reached, before, after, start)
-        if before is not None and progress.was_at_by(before, first):
+            return self._credit_repeated(reached, before, after, uploaded.start)
+        if before is not None and self._was_at(before, reached, len(progress.items)):
             progress.note_reached(seq, first, proven=True, frame=frame)
         elif before is not None and after is not None and alike(before, after):
             progress.note_reached(seq, first, frame=frame)
-        elif after is not None and progress.was_at_by(after, first):
+        elif after is not None and self._was_at(after, reached, len(uploaded.items)):
             return first
         elif before is not None and progress.near_one(before, after, first):
             if before.task:
@@ -140,8 +141,21 @@ class ReportsDuringUpload:
         elif after is not None and progress.near_one(after, before, first):
             return first
         else:
-            return self._credit_repeated(reached, before, after, start)
+            return self._credit_repeated(reached, before, after, uploaded.start)
         return None
+
+    def _was_at(self, item: Item, reached: _Reached, count: int) -> bool:
+        """Whether it has reached an item of a mission of `count` items before a REACHED.
+
+        Not as long as that item was still reported as current, before this REACHED; the last
+        item stays current.
+        """
+        positions = self._progress.positions
+        since = -math.inf if reached.seq >= count - 1 else max((
+            positions.sent_between(each.frame)[0] for each in self._currents
+            if each.flying and each.seq == reached.seq and each.frame < reached.frame),
+            default=-math.inf)
+        return self._progress.was_at_by(item, self._first_at(reached), since - item.params[0])
 
     def _credit_repeated(self, reached: _Reached, before: Item | None, after: Item | None,
                          start: int) -> float | None:
