@@ -176,6 +176,28 @@ def test_items_skipped_while_the_mission_is_read_are_flown_later(kind):
     flown_once_each(bench, 'ABCDE')
 
 
+@PX4
+def test_a_repetition_after_a_restart_completes_nothing_of_the_mission_on_board(kind):
+    bench = flying(kind, 'AB')
+    assert bench.run(lambda: places(bench) == ['A'])
+    ahead = (40.0, 100.0, 50.0)
+    tasks = TaskList(2, (MissionStop(Task('X', ahead)), *task_list('BC').stops))
+    for message in ('MISSION_COUNT', 'MISSION_ACK', 'GLOBAL_POSITION_INT'):
+        drop_messages(bench, 'down', message, lambda m: distance(bench, ahead) > 14.0)
+    bench.assign(tasks)
+    assert bench.run(lambda: len(bench.vehicles[1].flight.items) == 3, 3.0)
+    bench.kill_and_restart(0.0)
+    seen = bench.executor().telemetry
+    drop_messages(bench, 'down', 'MISSION_ITEM_REACHED', lambda m: seen.current is None)
+    drop_messages(bench, 'down', 'MISSION_CURRENT', lambda m: seen.reached is not None)
+    bench.assign(tasks)
+    assert bench.run(lambda: bench.onboard().held is not None, 20.0)
+    assert places(bench) == ['A']
+    assert bench.completed() == []
+    bench.line.tampers.clear()
+    assert bench.run(lambda: len(bench.completed()) == 3, 100.0)
+
+
 @BOTH
 def test_a_task_at_which_it_was_seen_before_the_bridge_was_killed_is_flown_once(kind):
     bench = flying(kind, 'ABC')

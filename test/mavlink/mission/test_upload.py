@@ -2,6 +2,7 @@
 """The upload machine against both simulated mission services, one fault of the list at a time."""
 import pytest
 from mission_bench import UploadBench, ack, drop, request, verified
+from pymavlink.dialects.v20 import ardupilotmega as d
 
 from uav_task_alloc.errors import MissionError
 from uav_task_alloc.mavlink.mission import upload as machine
@@ -46,6 +47,15 @@ def test_fault_03_a_lost_final_ack_is_replaced_by_the_readback(kind):
     bench.line.tampers.append(drop({'MISSION_ACK'}, 99, 'down'))
     verified(bench, bench.replace(bench.mission()))
     assert len(bench.line.sent('MISSION_COUNT')) == 1
+
+
+def test_the_end_of_a_readback_is_sent_again_before_the_next_upload():
+    bench = UploadBench('px4')
+    bench.line.tampers.append(drop({'MISSION_ACK'}, 1, 'up'))
+    verified(bench, bench.replace(bench.mission('AB')))
+    bench.run(limit=0.5)
+    verified(bench, bench.replace(bench.mission('CD')))
+    assert {m.type for m in bench.line.sent('MISSION_ACK', 'down')} == {d.MAV_MISSION_ACCEPTED}
 
 
 @BOTH

@@ -58,11 +58,15 @@ class _UnreadReached:
     place: Point | None  # [m] ENU of the vehicle; None: not known
     current_after: int | None = None  # the largest current item reported since
 
-    def may_be_of(self, held: tuple[Item, ...]) -> bool:
-        """Whether the current item was past it then; a repetition of another mission may not."""
+    def may_be_of(self, held: tuple[Item, ...], repeats: bool) -> bool:
+        """Whether the current item was past it then; a repetition of another mission may not.
+
+        Where REACHED is repeated (PX4), a current item has to show it.
+        """
         after, last = self.current_after, len(held) - 1
-        return self.seq <= last and (
-            after is None or after > self.seq or self.seq == after == last)
+        if after is None:
+            return self.seq <= last and not repeats
+        return self.seq <= last and (after > self.seq or self.seq == after == last)
 
 
 class Resume:
@@ -149,7 +153,7 @@ class Resume:
 
     def _is_of(self, reached: _UnreadReached, held: tuple[Item, ...]) -> bool:
         """Whether a REACHED can be of the mission on board, by the current item and the place."""
-        if not reached.may_be_of(held):
+        if not reached.may_be_of(held, self._profile.atomic):
             return False
         item = with_position(held[reached.seq], self._origin)
         if reached.seq == reached.current_after:  # the last one, which may be still ahead

@@ -5,6 +5,7 @@ One object for each (link, system, mission type). Every upload ends with a readb
 """
 from __future__ import annotations
 
+import math
 import random
 from collections import deque
 from collections.abc import Callable, Sequence
@@ -133,6 +134,7 @@ class Upload:
         self._sent_last = self._accepted = False
         self._read_twice = False  # accepted, but the readback was empty
         self._sent_once = False  # the last item of this mission, in this try or an earlier one
+        self._read_at = -math.inf  # [s] end of a readback; it may not know that (ACK lost)
 
     @property
     def busy(self) -> bool:
@@ -228,6 +230,7 @@ class Upload:
         if seq >= len(mission.items):
             self._go(UploadEvent.STALE, now)
             return
+        self._read_at = -math.inf
         last = seq == len(mission.items) - 1
         self._requested = seq
         self._sent_last = self._sent_last or last
@@ -304,6 +307,9 @@ class Upload:
             self._sent_last = self._accepted = self._read_twice = False
             self._requested = None
         self._counts += 1
+        if 0.0 < now - self._read_at < self._idle_after:
+            # it may still be sending its mission, and would refuse (PX4)
+            self._out.append(self._peer.ack(dialect.MAV_MISSION_ACCEPTED))
         self._out.append(self._peer.count(len(self._mission.items)))
 
     def _judge_readback(self, now: float) -> None:
@@ -313,6 +319,7 @@ class Upload:
             return
         done = state is DownloadState.DONE
         self._readback = None
+        self._read_at = now if done else -math.inf
         if self._mission is None:
             self.events.append(Downloaded(held if done else None))
             self._enter(UploadState.IDLE, now)
