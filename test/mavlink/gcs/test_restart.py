@@ -5,14 +5,19 @@ import random
 from dataclasses import replace
 
 import pytest
+from authority_bench import MODES, flying as flying_held
+from findings_bench import distance, drop_messages, flown_once_each
 from flight_bench import FlightBench, flying, places
 from mission_bench import task_list
 
 from uav_task_alloc.mavlink.gcs.authority import AuthorityState
 from uav_task_alloc.mavlink.gcs.status import UavMode
 from uav_task_alloc.mavlink.mission.items import MissionStop, TaskList
+from uav_task_alloc.model import Task
 
+AT_A = (0.0, 100.0, 50.0)
 BOTH = pytest.mark.parametrize('kind', ['ardupilot', 'px4'])
+PX4 = pytest.mark.parametrize('kind', ['px4'])
 
 
 @BOTH
@@ -227,3 +232,41 @@ def test_killed_at_random_and_reassigned_each_task_is_flown_once(kind, seed):
     assert bench.run(allocator.update)
     bench.run(limit=5.0)
     assert sorted(places(bench) + places(bench, 2)) == list('ABCDEFGH'), f'seed {seed}'
+
+
+@PX4
+@pytest.mark.parametrize('store', [True, False])
+def test_a_hold_by_a_pilot_at_the_last_item_completes_nothing_after_a_restart(kind, store):
+    bench = flying_held(kind, 'A')
+    bench.assign(task_list('A', 2, service=5.0))
+    assert bench.run(lambda: distance(bench, AT_A) < 0.1)
+    bench.vehicles[1].rc_mode(MODES[kind].hold)
+    bench.run(limit=2.0)
+    bench.kill_and_restart(0.0, store)
+    bench.assign(task_list('A', 3, service=5.0))
+    bench.run(limit=10.0)
+    assert bench.completed() == places(bench) == []
+    assert bench.hand_over() == ''
+    flown_once_each(bench, 'A')
+
+
+@PX4
+def test_a_repetition_after_a_restart_completes_nothing_of_the_mission_on_board(kind):
+    bench = flying_held(kind, 'AB')
+    assert bench.run(lambda: places(bench) == ['A'])
+    ahead = (40.0, 100.0, 50.0)
+    tasks = TaskList(2, (MissionStop(Task('X', ahead)), *task_list('BC').stops))
+    for message in ('MISSION_COUNT', 'MISSION_ACK', 'GLOBAL_POSITION_INT'):
+        drop_messages(bench, 'down', message, lambda m: distance(bench, ahead) > 14.0)
+    bench.assign(tasks)
+    assert bench.run(lambda: len(bench.vehicles[1].flight.items) == 3, 3.0)
+    bench.kill_and_restart(0.0)
+    seen = bench.executor().telemetry
+    drop_messages(bench, 'down', 'MISSION_ITEM_REACHED', lambda m: seen.current is None)
+    drop_messages(bench, 'down', 'MISSION_CURRENT', lambda m: seen.reached is not None)
+    bench.assign(tasks)
+    assert bench.run(lambda: bench.onboard().held is not None, 20.0)
+    assert places(bench) == ['A']
+    assert bench.completed() == []
+    bench.line.tampers.clear()
+    assert bench.run(lambda: len(bench.completed()) == 3, 100.0)

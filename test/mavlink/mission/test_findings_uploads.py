@@ -103,22 +103,6 @@ def test_a_task_at_which_an_avoidance_ends_is_flown_once(kind):
     flown_once_each(bench, 'AB')
 
 
-@PX4
-@pytest.mark.parametrize('store', [True, False])
-def test_a_hold_by_a_pilot_at_the_last_item_completes_nothing_after_a_restart(kind, store):
-    bench = flying(kind, 'A')
-    bench.assign(task_list('A', 2, service=5.0))
-    assert bench.run(lambda: distance(bench, AT_A) < 0.1)
-    bench.vehicles[1].rc_mode(MODES[kind].hold)
-    bench.run(limit=2.0)
-    bench.kill_and_restart(0.0, store)
-    bench.assign(task_list('A', 3, service=5.0))
-    bench.run(limit=10.0)
-    assert bench.completed() == places(bench) == []
-    assert bench.hand_over() == ''
-    flown_once_each(bench, 'A')
-
-
 @ARDUPILOT
 def test_the_last_task_flown_for_a_pilot_in_a_cut_is_not_flown_again(kind):
     bench = flying(kind, 'ABC')
@@ -174,28 +158,6 @@ def test_items_skipped_while_the_mission_is_read_are_flown_later(kind):
     bench.run(limit=2.0)
     set_current(bench, 3 if places(bench) == [] else 4)
     flown_once_each(bench, 'ABCDE')
-
-
-@PX4
-def test_a_repetition_after_a_restart_completes_nothing_of_the_mission_on_board(kind):
-    bench = flying(kind, 'AB')
-    assert bench.run(lambda: places(bench) == ['A'])
-    ahead = (40.0, 100.0, 50.0)
-    tasks = TaskList(2, (MissionStop(Task('X', ahead)), *task_list('BC').stops))
-    for message in ('MISSION_COUNT', 'MISSION_ACK', 'GLOBAL_POSITION_INT'):
-        drop_messages(bench, 'down', message, lambda m: distance(bench, ahead) > 14.0)
-    bench.assign(tasks)
-    assert bench.run(lambda: len(bench.vehicles[1].flight.items) == 3, 3.0)
-    bench.kill_and_restart(0.0)
-    seen = bench.executor().telemetry
-    drop_messages(bench, 'down', 'MISSION_ITEM_REACHED', lambda m: seen.current is None)
-    drop_messages(bench, 'down', 'MISSION_CURRENT', lambda m: seen.reached is not None)
-    bench.assign(tasks)
-    assert bench.run(lambda: bench.onboard().held is not None, 20.0)
-    assert places(bench) == ['A']
-    assert bench.completed() == []
-    bench.line.tampers.clear()
-    assert bench.run(lambda: len(bench.completed()) == 3, 100.0)
 
 
 @BOTH

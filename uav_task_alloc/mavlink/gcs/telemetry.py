@@ -62,8 +62,7 @@ class Telemetry:
         self.received_at = now  # [s] of the latest message
         self.position, self.velocity = UNKNOWN, UNKNOWN  # ENU [m], [m/s]
         self.home: Point | None = None  # ENU [m]
-        self.position_at = -math.inf  # [s]
-        self.positions_at = -math.inf  # [s] of any GLOBAL_POSITION_INT, valid or not
+        self.position_at = self.positions_at = -math.inf  # [s] valid; any GLOBAL_POSITION_INT
         self.pace = 0.0  # [m/s] in time of reception: a simulator may run faster than real time
         self._paced: tuple[Point, float] = UNKNOWN, now
         self._converted: tuple[Message, Point] | None = None  # the latest, and its position [m]
@@ -80,10 +79,8 @@ class Telemetry:
         self.reached: int | None = None  # seq on the wire, latest
         self.total: int | None = None  # number of items as the vehicle reports it
         self.mission_state = 0  # MISSION_STATE
-        # frames that show the mode last, and MISSION_CURRENT sent in mission mode (ArduPilot)
-        self._mode_frame = self._in_mission_frame = 0
-        # from COMPLETE to ACTIVE, and from another state to COMPLETE, by the last MISSION_CURRENT
-        self.mission_restarted = self.mission_ended = False
+        self._mode_frame = self._in_mission_frame = 0  # numbers; shows the mode, MISSION (CURRENT)
+        self.mission_restarted = self.mission_ended = False  # by the last MISSION_CURRENT
         self.plan_id = 0  # PX4's id of the onboard mission
         self.received_ids: set[int] = set()  # message ids since the start
         self.received_last: dict[int, float] = {}  # [s] by message id
