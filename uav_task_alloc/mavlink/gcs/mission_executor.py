@@ -191,8 +191,7 @@ class MissionExecutor:
 
     def receive(self, message: Message, now: float) -> list[Message]:
         """Process a message of this vehicle; returns the messages to send."""
-        mode_before = self.telemetry.mode
-        newest = self.telemetry.receive(message, now)
+        mode_before, newest = self.telemetry.mode, self.telemetry.receive(message, now)
         if self.telemetry.restarts != self._restarts:
             self._restarts = self.telemetry.restarts
             self.notes.append(OperatorNote('warning', 'was restarted'))
