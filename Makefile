@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-# make demo: four simulated UAVs fly what the allocator plans.   make test: every check.
+# make demo: four simulated UAVs fly what the allocator plans.   make demo SCENARIO=survey: three
+# survey a field.   make test: every check.
 SHELL := /bin/bash
 .SHELLFLAGS := -eo pipefail -c
 .PHONY: demo test checked coverage build docs site clean
@@ -17,9 +18,13 @@ STOP := trap 'exit 130' INT
 ENV := . .ros/setup.sh
 RUN := $(STOP); . install/setup.bash 2> /dev/null && export PATH="$(CURDIR)/.ros/bin:$$PATH"
 
+# Of config/scenarios: demo, survey, ...
+SCENARIO := demo
+
 demo: build
-	@echo '== demo: 4 UAVs, 32 tasks, 3 zones; results go to out/demo'
-	@$(RUN) && install/uav_task_alloc/lib/uav_task_alloc/demo
+	@echo '== $(SCENARIO): $(shell sed -n 's/^# //p;q' config/scenarios/$(SCENARIO).yaml) Results go to out/$(SCENARIO)'
+	@$(RUN) && install/uav_task_alloc/lib/uav_task_alloc/demo \
+		--scenario config/scenarios/$(SCENARIO).yaml --out out/$(SCENARIO)
 
 test: build checked
 	@echo '== pytest, $(WORKERS) at a time' && $(RUN) && REQUIRE_ROS=1 python3 -m pytest -n $(WORKERS) --dist worksteal --durations 15

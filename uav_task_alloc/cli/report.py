@@ -21,9 +21,9 @@ from uav_task_alloc.record.ground_truth import (
     Reached,
     TrueSample,
     read_run,
-    visits,
     zone_entries,
 )
+from uav_task_alloc.record.piece_passes import piece_passes, served
 from uav_task_alloc.record.run_state import RunState
 
 Summary = dict[str, Any]
@@ -48,12 +48,11 @@ def summarise(out_dir: str | Path) -> Summary:
 
 def run_summary(state: RunState, truth: GroundTruth) -> Summary:
     """The key figures of a run; a task counts as completed only if a vehicle was there."""
-    reached = visits(truth, {name: task.position for name, task in state.tasks.items()},
-                     state.waited)
+    reached, passes = served(state, truth), piece_passes(state, truth)
     fates = {name: fate(name, state, bool(reached[name])) for name in state.tasks}
     names = {kind: sorted(name for name, its_fate in fates.items() if its_fate == kind)
              for kind in ('completed', 'unassigned', 'cancelled', 'lost')}
-    twice = sorted(name for name, items in reached.items() if len(items) > 1)
+    twice = sorted(name for name, items in {**reached, **passes}.items() if len(items) > 1)
     entries = zone_entries(truth, state.zones)
     times = [solve.milliseconds for solve in state.solves[1:]]  # the first plan is no re-plan
     replans = len(state.replans())
@@ -64,6 +63,7 @@ def run_summary(state: RunState, truth: GroundTruth) -> Summary:
         'tasks_cancelled': len(names['cancelled']),
         'tasks_lost': len(names['lost']),
         'tasks_flown_twice': len(twice),
+        'pieces_completed': len(passes),
         'zone_violations': len(entries),
         **_separation(state, truth),
         'replans': replans,
@@ -125,7 +125,9 @@ def why_lost(name: str, state: RunState) -> str:
 
 def planned_length(state: RunState, completed: Sequence[str]) -> float:
     """Length [m] of the legs to completed tasks and home, as planned when each became next."""
-    legs = [state.legs.get((state.statuses[name].uav, name), 0.0) for name in completed]
+    rows = {**{name: state.statuses[name] for name in completed}, **{
+        piece: row for piece, row in state.pieces.items() if row.state == 'COMPLETED'}}
+    legs = [state.legs.get((row.uav, name), 0.0) for name, row in rows.items()]
     home = [line['distance'] or 0.0 for line in state.lists.values() if not line['tasks']]
     return math.fsum(legs) + math.fsum(home)
 
@@ -154,6 +156,8 @@ def summary_table(summary: Mapping[str, Any]) -> str:
         ('  unassigned', of('tasks_unassigned'), _with_reasons(of('unassigned'))),
         ('  cancelled', summary.get('tasks_cancelled', 0), ''),
         ('  lost', of('tasks_lost'), _with_reasons(of('lost'))),
+        *([('  in pieces', summary['pieces_completed'], 'completed strips, sections and orbits')]
+          if summary.get('pieces_completed') else []),
         ('  flown twice', of('tasks_flown_twice'), ', '.join(of('flown_twice'))),
         ('zone violations', of('zone_violations'), '; '.join(of('entries'))),
         ('separation losses', summary.get('separation_losses', 0),

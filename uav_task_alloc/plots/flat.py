@@ -95,6 +95,12 @@ class MapFigure:
             self.axes.plot(xs, ys, color=colour, lw=2.5 * ROUTE, alpha=0.25, zorder=3,
                            solid_capstyle='butt')
 
+    def outline(self, points: Sequence[Point], closed: bool) -> None:
+        """Add the outline of an area, or a line as it was announced, dashed."""
+        if points:
+            xs, ys, _ = zip(*points, *points[:closed], strict=True)
+            self.axes.plot(xs, ys, color='#555555', lw=1.4, ls=(0, (5, 4)), zorder=3.5)
+
     def home(self, point: Point, name: str, index: int) -> None:
         """Add the start of a UAV."""
         self.axes.plot(point[0], point[1], 's', ms=14, color=uav_colour(index), mec='black',

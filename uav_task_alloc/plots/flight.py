@@ -10,7 +10,8 @@ import uav_task_alloc.plots.style as style
 from uav_task_alloc.geometry.polyline import polyline_length
 from uav_task_alloc.palette import RED, uav_colour
 from uav_task_alloc.plots.flat import MapFigure
-from uav_task_alloc.record.ground_truth import GroundTruth, read_run, visits
+from uav_task_alloc.record.ground_truth import GroundTruth, read_run
+from uav_task_alloc.record.piece_passes import piece_passes, served
 from uav_task_alloc.record.run_state import RunState
 
 _AT_START = 0.2  # [s] real time after the first task: announced later means in flight
@@ -28,7 +29,8 @@ def draw_flight(out_dir: str | Path, png: str | Path) -> None:
     """
     out = Path(out_dir)
     state, truth = read_run(out)
-    figure = MapFigure((task.position for task in state.tasks.values()), len(state.tasks))
+    figure = MapFigure((point for task in state.tasks.values()
+                        for point in (task.position, *task.path)), len(state.tasks))
     for interval in state.zones:
         late = interval.since > state.start() + _AT_START * state.stretch
         note = f'from {state.clock(interval.since):.0f} s' if late else ''
@@ -46,8 +48,8 @@ def _tracks(figure: MapFigure, state: RunState, truth: GroundTruth,
         points = [sample.point for sample in truth.tracks[uav]]
         figure.route(points, index)
         figure.home(points[0], uav, index)
-        done = sum(status.state == 'COMPLETED' and status.uav == uav
-                   for status in state.statuses.values())
+        done = sum(status.state == 'COMPLETED' and status.uav == uav and not status.pieces
+                   for status in (*state.statuses.values(), *state.pieces.values()))
         text = f'{uav}: {style.task_count(done)}, {polyline_length(points) / 1e3:.1f} km'
         handles.append(style.route_handle(index, text))
     for uav, sample in truth.died.items():
@@ -57,9 +59,13 @@ def _tracks(figure: MapFigure, state: RunState, truth: GroundTruth,
 
 def _tasks(figure: MapFigure, state: RunState, truth: GroundTruth,
            indices: Mapping[str, int]) -> list[Any]:
-    reached = visits(truth, {name: task.position for name, task in state.tasks.items()},
-                     state.waited)
+    reached = served(state, truth)
+    for piece, rows in piece_passes(state, truth).items():
+        if rows:
+            figure.way(state.ways[piece], uav_colour(indices[rows[0].uav]))
     for name, task in state.tasks.items():
+        for outline in (task.path, *task.holes):
+            figure.outline(outline, closed=task.work == 'AREA')
         marker = 'o' if task.wall <= state.start() + _AT_START * state.stretch else 'D'
         if reached[name]:
             fill = uav_colour(indices[reached[name][0].uav])

@@ -190,7 +190,7 @@ def zone_entries(truth: GroundTruth, zones: Sequence[ZoneInterval]) -> list[Zone
 
 def _entries(uav: str, track: Sequence[TrueSample], interval: ZoneInterval) -> Iterator[ZoneEntry]:
     was_outside = False  # at the point before, while the zone was in force
-    for wall, point in _resampled(track):
+    for wall, point in resampled(track):
         if not interval.since <= wall < interval.until:
             was_outside = False
             continue
@@ -200,8 +200,15 @@ def _entries(uav: str, track: Sequence[TrueSample], interval: ZoneInterval) -> I
         was_outside = not is_inside
 
 
-def _resampled(track: Sequence[TrueSample]) -> Iterable[tuple[float, Point]]:
-    """(wall [unix s], point [m]) along a track, at most _STEP apart."""
+def resampled(track: Sequence[TrueSample]) -> Iterable[tuple[float, Point]]:
+    """Return points of a track that are at most 1 m apart.
+
+    Args:
+        track: of one vehicle.
+
+    Yields:
+        Time [unix s] and place [m].
+    """
     for a, b in pairwise(track):
         steps = max(1, math.ceil(math.dist(a.point, b.point) / _STEP))
         for k in range(steps):

@@ -121,6 +121,7 @@ def _tasks(out: MarkerList, records: Sequence[TaskRecord]) -> None:
     for record in drawn:
         size = min(len(_TASK_SIZES) - 1, int(len(_TASK_SIZES) * (record.task.value / most)))
         groups.setdefault((record.state, size), []).append(record.task.position)
+    _paths(out, drawn)
     for (state, size), points in groups.items():
         if state in _STATE_COLOURS:
             out.add('tasks', Marker.SPHERE_LIST, _STATE_COLOURS[state], _TASK_SIZES[size],
@@ -128,6 +129,18 @@ def _tasks(out: MarkerList, records: Sequence[TaskRecord]) -> None:
     for record in unassigned[:MOST_TEXTS]:
         out.label('left_out', f'{record.task.id}: {record.reason}', record.task.position,
                   _STATE_COLOURS[TaskState.UNASSIGNED])
+
+
+def _paths(out: MarkerList, records: Sequence[TaskRecord]) -> None:
+    """The paths of pieces, one marker for each state: strips still to fly, and those flown."""
+    lines: dict[TaskState, list[Point]] = {}
+    for record in records:
+        for pair in pairwise(record.task.path):
+            lines.setdefault(record.state, []).extend(pair)
+    for state, points in lines.items():
+        if state in _STATE_COLOURS:
+            out.add('paths', Marker.LINE_LIST, _STATE_COLOURS[state], 0.8, points=points,
+                    alpha=0.25 if state is TaskState.COMPLETED else 0.6)
 
 
 def _route(out: MarkerList, uav_list: UavList, uav: UavRecord | None, colour: _Colour,
@@ -138,10 +151,10 @@ def _route(out: MarkerList, uav_list: UavList, uav: UavRecord | None, colour: _C
         out.add('routes', Marker.LINE_STRIP, colour, 0.3, alpha=0.9, points=points)
     last = points[0] if uav and points else None
     for order, stop in enumerate(uav_list.stops[:most], 1):
-        goal = stop.task.position
+        goal = stop.entry
         _arrow(out, stop.leg.via[-1] if stop.leg.via else last, goal, colour)
         out.label('order', f'{order}: {stop.task.id}', goal, colour)
-        last = goal
+        last = stop.exit
 
 
 def _arrow(out: MarkerList, start: Point | None, goal: Point, colour: _Colour) -> None:
@@ -175,10 +188,10 @@ def _changes(out: MarkerList, scene: MarkerScene, lists: Iterable[UavList]) -> N
         last: tuple[Point, ...] = ()
         for stop in uav_list.stops:
             if stop.task.id in scene.changed:
-                goals.append(stop.task.position)
-                for pair in pairwise((*last, *stop.leg.via, stop.task.position)):
+                goals.append(stop.entry)
+                for pair in pairwise((*last, *stop.line)):
                     legs += pair
-            last = (stop.task.position,)
+            last = (stop.exit,)
     if goals:
         out.add('replan', Marker.SPHERE_LIST, _CHANGED, 3.0, alpha=0.35, points=goals)
         x, y, z = (sum(values) / len(goals) for values in zip(*goals, strict=True))

@@ -1,0 +1,81 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Where vehicles truly flew along the ways of pieces, and at tasks: the judge of a run."""
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from itertools import pairwise
+
+from uav_task_alloc.geometry.polyline import polyline_length, segment_distance
+from uav_task_alloc.model import Point
+from uav_task_alloc.piece_ids import split_piece
+from uav_task_alloc.record.ground_truth import GroundTruth, Reached, TrueSample, resampled, visits
+from uav_task_alloc.record.run_state import RunState
+
+_BESIDE = 5.0  # [m] from a way, within which a vehicle flies along it
+_SHARE = 0.8  # of a way that a pass covers at least
+_CORNER = 6.0  # [m] that a vehicle may cut at each end
+
+
+def served(state: RunState, truth: GroundTruth) -> dict[str, list[Reached]]:
+    """Return when vehicles were at the tasks of a run.
+
+    Args:
+        state: what the nodes reported.
+        truth: what was flown.
+
+    Returns:
+        By task id: of a point each visit; of work in pieces the end of the last pass, where
+        vehicles flew along all its completed pieces, else none.
+    """
+    points = {name: task.position for name, task in state.tasks.items() if not task.work}
+    found = visits(truth, points, state.waited)
+    passes = piece_passes(state, truth)
+    for name in state.tasks.keys() - points.keys():
+        of_work = [rows for piece, rows in passes.items() if split_piece(piece)[0] == name]
+        found[name] = [max((rows[0] for rows in of_work), key=lambda row: row.wall)
+                       ] if of_work and all(of_work) else []
+    return found
+
+
+def piece_passes(state: RunState, truth: GroundTruth) -> dict[str, list[Reached]]:
+    """Return the ends of all passes along each completed piece, in order of time.
+
+    Args:
+        state: with the ways of pieces.
+        truth: with all tracks.
+
+    Returns:
+        By id of the piece. A pass stays within 5 m of the way for four fifths of it.
+    """
+    tracks = {uav: [TrueSample(wall, point) for wall, point in resampled(track)]
+              for uav, track in truth.tracks.items()}
+    return {piece: sorted((Reached(uav, wall, state.ways[piece][-1])
+                           for uav, track in tracks.items()
+                           for wall in _passes(track, state.ways[piece])),
+                          key=lambda row: row.wall)
+            for piece, status in state.pieces.items()
+            if status.state == 'COMPLETED' and piece in state.ways}
+
+
+def _passes(track: Sequence[TrueSample], way: Sequence[Point]) -> Iterator[float]:
+    """[unix s] at which passes along a way end."""
+    low, high = ([pick(p[k] for p in way) + sign * _BESIDE for k in range(3)]
+                 for pick, sign in ((min, -1.0), (max, 1.0)))
+    needed = min(_SHARE * polyline_length(way), polyline_length(way) - 2.0 * _CORNER)
+    flown, before = 0.0, None
+    for sample in track:
+        inside = all(a <= v <= b for a, v, b in zip(low, sample.point, high, strict=True))
+        if inside and _is_beside(sample.point, way):
+            flown += math.dist(before.point, sample.point) if before else 0.0
+            before = sample
+            continue
+        if before is not None and flown >= needed:
+            yield before.wall
+        flown, before = 0.0, None
+    if before is not None and flown >= needed:
+        yield before.wall
+
+
+def _is_beside(point: Point, way: Sequence[Point]) -> bool:
+    return any(segment_distance(point, a, b) <= _BESIDE for a, b in pairwise(way))
