@@ -8,8 +8,9 @@ from allocation import AllocatorDriver, as_plan
 
 from uav_task_alloc.allocator.persistence.restore import restored_state
 from uav_task_alloc.allocator.records import AnnouncementAction
+from uav_task_alloc.allocator.state.flight_pace import way_ahead
 from uav_task_alloc.allocator.status import health_values, status_of_work
-from uav_task_alloc.model import Task, ThreatZone
+from uav_task_alloc.model import Leg, Task, ThreatZone
 from uav_task_alloc.work.pieces import Work
 from uav_task_alloc.work.recut import unflown_parts
 from uav_task_alloc.work.values import Kind
@@ -303,3 +304,51 @@ def test_parts_of_a_way_that_are_flown_are_taken_out():
     assert unflown_parts(way, [((60.0, 0.0, 50.0), (30.0, 0.0, 50.0))]) == [
         ((0.0, 0.0, 50.0), (30.0, 0.0, 50.0)), ((60.0, 0.0, 50.0), *way[1:])]
     assert unflown_parts(way, [way[::-1]]) == []
+
+
+def test_a_uav_along_its_strip_goes_on_without_detour_points_and_with_the_rest_planned():
+    driver = fleet()
+    driver.world.set_zones([ThreatZone.cylinder('mast', (60.0, 5.0), 12.0)], (), driver.now)
+    driver.add(FIELD)
+    driver.settle()
+    first = driver.world.list_of('a').stops[0]
+    assert first.leg.via
+    driver.uav('a', *first.leg.via[0], active_task=first.task.id)  # before its begin
+    driver.add(('t1', 90, 30))
+    driver.settle(report=False)
+    assert driver.world.list_of('a').stops[0].leg.via
+    half = tuple((a + b) / 2.0 for a, b in zip(first.entry, first.exit, strict=True))
+    driver.uav('a', *half, active_task=first.task.id)
+    driver.add(('t2', 90, 50))
+    problem = driver.begin()
+    rest = next(task for task in problem.tasks if task.id == first.task.id)
+    assert rest.path == (half, first.exit)
+    assert not rest.reversible
+    assert problem.locked['a'] == (first.task.id,)
+    driver.finish(problem)
+    again = driver.world.list_of('a').stops[0]
+    assert (again.task, again.reversed) == (first.task, first.reversed)
+    assert again.leg == Leg((), 0.0)
+    # a UAV abeam of the strip is not on it
+    assert way_ahead((half[0], half[1] - 30.0, half[2]), first) is None
+
+
+def test_a_path_that_is_flown_backwards_is_planned_as_it_is_flown():
+    driver = fleet()
+    driver.add(FIELD)
+    driver.settle()
+    lists, published = driver.world.lists.lists, driver.world.list_of('a')
+    lists['a'] = replace(published, stops=(replace(published.stops[0], reversed=True),
+                                           *published.stops[1:]))
+    first = driver.world.list_of('a').stops[0]
+    assert first.entry == first.task.path[-1]
+    near = (first.entry[0] + (20.0 if first.exit[0] > first.entry[0] else -20.0),
+            *first.entry[1:])
+    driver.uav('a', *near, active_task=first.task.id)
+    driver.add(('t2', 90, 50))
+    problem = driver.begin()
+    assert first.task.id not in problem.published.reversed | problem.warm.reversed
+    rest = next(task for task in problem.tasks if task.id == first.task.id)
+    assert rest.path == (near, first.task.path[0])
+    driver.finish(problem)
+    assert driver.world.list_of('a').stops[0].reversed

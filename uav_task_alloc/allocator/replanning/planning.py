@@ -26,12 +26,12 @@ from uav_task_alloc.allocator.replanning.trips import (
     waiting_uavs,
     with_later_trips,
 )
+from uav_task_alloc.allocator.state.flight_pace import way_ahead
 from uav_task_alloc.allocator.state.flights import top_of
 from uav_task_alloc.allocator.state.published_lists import PublishedLists
 from uav_task_alloc.allocator.state.safe_paths import SafePaths
 from uav_task_alloc.allocator.state.tasks import TaskRegistry
 from uav_task_alloc.allocator.state.world import World
-from uav_task_alloc.geometry.polyline import points_passed
 from uav_task_alloc.model import Leg, Plan, Point, Task, Uav
 from uav_task_alloc.objective import fit
 from uav_task_alloc.params import AllocatorParams
@@ -79,7 +79,9 @@ def replan_problem(world: World, best: Plan, trigger: str, background: bool,
         stop_time = world.flights.stop_time
         tasks = relaxed_tasks(world, tasks, (uav.id for uav in uavs), stamp)
     published = {uav.id: world.list_of(uav.id) for uav in uavs}
-    tasks = paths_under_way(world, tasks)
+    under_way = ways_under_way(world)
+    tasks = tuple(replace(task, position=way[0], path=way, reversible=False)
+                  if (way := under_way.get(task.id)) else task for task in tasks)
     routes = {uav_id: each.task_ids for uav_id, each in published.items()}
     legs = {uav_id: tuple(stop.leg for stop in each.stops) for uav_id, each in published.items()}
     return ReplanProblem(
@@ -88,21 +90,20 @@ def replan_problem(world: World, best: Plan, trigger: str, background: bool,
         tasks, tuple(world.zones.values()), world.locked_tasks(),
         published=with_later_trips(replace(best, routes=routes, legs=legs, reversed=frozenset(
             stop.task.id for each in published.values() for stop in each.stops
-            if stop.reversed)), world),
-        warm=best,
+            if stop.reversed and stop.task.id not in under_way)), world),
+        warm=replace(best, reversed=best.reversed - under_way.keys()),
         objective=objective, trips=params.trips, stamp=stamp, stop_time=stop_time,
         since={task.id: records[task.id].since for task in tasks})
 
 
-def paths_under_way(world: World, tasks: Sequence[Task]) -> tuple[Task, ...]:
-    """Return tasks of which those under way have only the rest of their paths, in one direction.
+def ways_under_way(world: World) -> dict[str, tuple[Point, ...]]:
+    """Return what is left to fly of the paths under way, in the direction of flight.
 
     Args:
         world: with the lists in force.
-        tasks: to plan.
 
     Returns:
-        The same tasks where no path is under way.
+        [m] ENU by task id; the whole path where a UAV is on the leg to it.
     """
     rests = {}
     for uav_id, record in world.uav_records().items():
@@ -112,12 +113,11 @@ def paths_under_way(world: World, tasks: Sequence[Task]) -> tuple[Task, ...]:
                 uav_id) != first.task.id:
             continue
         place, way = record.report.position, first.way
-        passed = points_passed(place, first.line) - len(first.leg.via)
-        if passed > 0 and math.dist(place, way[-1]) > 0.0:
-            way = (place, *way[passed:])
+        ahead = way_ahead(place, first)
+        if ahead and math.dist(place, ahead[-1]) > 0.0:
+            way = place, *ahead
         rests[first.task.id] = way
-    return tuple(replace(task, position=rests[task.id][0], path=rests[task.id], reversible=False)
-                 if task.id in rests else task for task in tasks)
+    return rests
 
 
 def backward_paths(world: World, chosen: Plan) -> frozenset[str]:

@@ -8,9 +8,9 @@ from dataclasses import replace
 from itertools import pairwise
 
 from uav_task_alloc.allocator.records import ListStop, UavList
-from uav_task_alloc.allocator.state.flight_pace import UavFlight, timed_stops
+from uav_task_alloc.allocator.state.flight_pace import UavFlight, timed_stops, way_ahead
 from uav_task_alloc.allocator.state.safe_paths import SafePaths
-from uav_task_alloc.geometry.polyline import points_passed, polyline_length
+from uav_task_alloc.geometry.polyline import polyline_length
 from uav_task_alloc.model import Leg, Plan, Point, Task, Uav
 
 _START, _HOME = '', '~'  # neither is a task id
@@ -103,8 +103,8 @@ def _steady_leg(stop: ListStop | None, first: bool, place: Point, paths: SafePat
     if stop is None:
         return fresh
     old = stop.leg
-    if first and stop.task.path and _on_path(place, stop):
-        return Leg(old.via, 0.0)
+    if first and stop.task.path and way_ahead(place, stop):
+        return Leg((), 0.0)
     if first:
         metres = paths.rest(place, old, stop.entry)
     else:
@@ -115,11 +115,6 @@ def _steady_leg(stop: ListStop | None, first: bool, place: Point, paths: SafePat
     if not keep and fresh is not None and fresh.length + _WORTH < metres * (1.0 - paths.margin):
         return fresh
     return Leg(old.via, metres)
-
-
-def _on_path(place: Point, stop: ListStop) -> bool:
-    """Whether a UAV on its way to the exit of a stop has passed its entry."""
-    return points_passed(place, stop.line) > len(stop.leg.via)
 
 
 def _published_stop(published: UavList, before: str, new: ListStop) -> ListStop | None:

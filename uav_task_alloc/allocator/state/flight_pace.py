@@ -13,11 +13,12 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 from uav_task_alloc.allocator.records import ListStop, UavList
-from uav_task_alloc.geometry.polyline import points_passed
+from uav_task_alloc.geometry.polyline import points_passed, segment_distance
 from uav_task_alloc.model import Point, Uav
 
 _SLOWEST = 0.1  # share of the speed that is left against the strongest wind
 _ACCELERATION = 2.5  # [m/s2] before any stop is measured: WPNAV_ACCEL; 3.0: MPC_ACC_HOR
+_ON_WAY = 10.0  # [m] from a path, within which a UAV flies along it
 _CORNER = 2.0  # [m] by which a corner is cut or overshot: WPNAV_RADIUS, NAV_ACC_RAD
 
 
@@ -262,6 +263,23 @@ def seconds_along(stop: ListStop, pace: FlightPace) -> float:
     before = stop.leg.via[-1:]  # where it comes from matters for the corner only
     corner = pace.stop_time * pace.corners((*before, *stop.way[:2])) if before else 0.0
     return pace.seconds(stop.way) + pace.stop_time * pace.corners(stop.way) + corner
+
+
+def way_ahead(place: Point, stop: ListStop) -> tuple[Point, ...] | None:
+    """Return the points that are ahead of a UAV which flies along the path of a stop.
+
+    Args:
+        place: of the UAV [m] ENU.
+        stop: the first of its list.
+
+    Returns:
+        None where it is not within 10 m of the path, or before its begin.
+    """
+    way = stop.way
+    passed = points_passed(place, way)
+    if passed == 0 or segment_distance(place, way[passed - 1], way[passed]) > _ON_WAY:
+        return None
+    return way[passed:]
 
 
 def _rest_of_path(stop: ListStop, flight: UavFlight) -> float:
