@@ -24,7 +24,7 @@ SCENARIO := demo
 demo: build
 	@echo '== $(SCENARIO): $(shell sed -n 's/^# //p;q' config/scenarios/$(SCENARIO).yaml) Results go to out/$(SCENARIO)'
 	@$(RUN) && install/uav_task_alloc/lib/uav_task_alloc/demo \
-		--scenario config/scenarios/$(SCENARIO).yaml --out out/$(SCENARIO)
+		--scenario config/scenarios/$(SCENARIO).yaml --out out/$(SCENARIO) --limit 200
 
 test: build checked
 	@echo '== pytest, $(WORKERS) at a time' && $(RUN) && REQUIRE_ROS=1 python3 -m pytest -n $(WORKERS) --dist worksteal --durations 15

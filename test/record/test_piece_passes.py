@@ -1,0 +1,60 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Work counts as flown where vehicles truly flew along all its pieces, and each pass counts."""
+import pytest
+
+from uav_task_alloc.cli.report import run_summary
+from uav_task_alloc.record.ground_truth import GroundTruth, TrueSample
+from uav_task_alloc.record.piece_passes import piece_passes, served
+from uav_task_alloc.record.run_state import RunState
+
+WAYS = {f'field#{k}': [[0.0, 40.0 * k, 50.0], [200.0, 40.0 * k, 50.0]] for k in (1, 2)}
+
+
+def run(state='COMPLETED'):
+    made = RunState()
+    corners = [[x, y, 50.0] for x, y in ((0.0, 0.0), (200.0, 0.0), (200.0, 120.0), (0.0, 120.0))]
+    made.apply({'kind': 'announcement', 'wall': 0.0, 'action': 'ADD', 'tasks': [
+        {'id': 'field', 'position': corners[0], 'work': 'AREA', 'path': corners, 'holes': []}]})
+    made.apply({'kind': 'list', 'wall': 1.0, 'stamp': 1.0, 'uav': 'u1', 'revision': 1, 'end': 0,
+                'distance': 400.0, 'tasks': [
+                    {'id': name, 'leg_distance': 40.0, 'via': [], 'eta': 1.0, 'way': way}
+                    for name, way in WAYS.items()]})
+    rows = {'field': state, **dict.fromkeys(WAYS, 'COMPLETED')}
+    made.apply({'kind': 'statuses', 'wall': 90.0, 'statuses': [
+        {'task': name, 'state': each, 'uav': 'u1', 'reason': '', 'done': 2, 'pieces': 2}
+        for name, each in rows.items()]})
+    return made
+
+
+def flown(*points):
+    """The truth of one vehicle that was at each (x, y) 20 s after the one before."""
+    return GroundTruth({'u1': [TrueSample(20.0 * k, (float(x), float(y), 50.0))
+                               for k, (x, y) in enumerate(points)]})
+
+
+BOTH = (-20, 40), (200, 40), (200, 80), (-20, 80)
+
+
+def test_an_area_is_served_when_its_last_strip_is_flown():
+    [reached] = served(run(), flown(*BOTH))['field']
+    assert (reached.uav, reached.wall) == ('u1', pytest.approx(59.0, abs=1.5))
+    summary = run_summary(run(), flown(*BOTH))
+    assert (summary['tasks_completed'], summary['pieces_completed'], summary['tasks_lost']) == (
+        1, 2, 0)
+    assert summary['tasks_flown_twice'] == 0
+
+
+@pytest.mark.parametrize('way', [
+    ((-20, 40), (200, 40), (100, 120), (100, -20)),  # the second strip is only crossed
+    ((-20, 40), (200, 40), (200, 80), (100, 80), (100, 120)),  # half of it
+    ((-20, 40), (200, 40), (200, 88), (-20, 88))])  # beside it
+def test_a_strip_that_nobody_flew_is_found(way):
+    assert served(run(), flown(*way))['field'] == []
+    assert run_summary(run(), flown(*way))['lost'] == {
+        'field': 'reported as completed, but no vehicle was there'}
+
+
+def test_a_strip_flown_twice_is_found():
+    truth = flown(*BOTH, (-20, 40), (220, 40))
+    assert [len(rows) for rows in piece_passes(run(), truth).values()] == [2, 1]
+    assert run_summary(run(), truth)['flown_twice'] == ['field#1']
