@@ -52,6 +52,7 @@ LEVELS = {
     'separation': 3,
     'work': 3,
     'solver': 3,
+    'anticipation': 4,
     'scenario': 3,
     'map_files': 5,
     'record': 4,

@@ -23,7 +23,7 @@ from typing import Any, NamedTuple, TextIO
 from numba.core import caching, event
 
 _COMPILER_SOURCES = 'kernel.py', 'kernel_inner.py', 'kernel_shortcuts.py', 'model/zone.py'
-ROOMS = ('geometry', 'separation', 'solver')
+ROOMS = ('anticipation', 'geometry', 'separation', 'solver')
 
 
 def _of_numba(name: str) -> Any:

@@ -12,8 +12,8 @@ PACKAGE, PAGE = ROOT / 'uav_task_alloc', ROOT / 'docs' / 'architecture.md'
 HEADING = '## Rooms and files\n'  # the index is all below it
 # in the order of the layers
 ROOMS = ('.', 'model', 'geometry', 'solver', 'solver/baselines', 'solver/timed', 'separation',
-         'work', 'scenario', 'map_files', 'mavlink', 'mavlink/transport', 'mavlink/mission',
-         'mavlink/fence', 'mavlink/gcs', 'sim', 'sim/ardupilot', 'sim/px4', 'allocator',
+         'work', 'anticipation', 'scenario', 'map_files', 'mavlink', 'mavlink/transport',
+         'mavlink/mission', 'mavlink/fence', 'mavlink/gcs', 'sim', 'sim/ardupilot', 'sim/px4', 'allocator',
          'allocator/state', 'allocator/replanning', 'allocator/persistence', 'record', 'live',
          'flight_report', 'plots', 'study', 'cli', 'nodes', 'nodes/conversions', 'nodes/ros',
          'nodes/rviz')

@@ -2,11 +2,13 @@
 """The command `study`: regenerate the paper's figures and tables, or run one experiment."""
 from __future__ import annotations
 
+import argparse
 import inspect
 import json
 import os
+import re
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict
 from pathlib import Path
 
@@ -14,6 +16,7 @@ from uav_task_alloc.cli.interrupt import INTERRUPTED, resumable
 from uav_task_alloc.cli.options import OptionParser, add_executor_options, size
 from uav_task_alloc.cli.outputs import check_folder, check_installed
 from uav_task_alloc.cli.progress import log_line
+from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.study import campaign, executors, experiments, tables
 from uav_task_alloc.study.campaign import CampaignOutcome
 from uav_task_alloc.study.experiments import Experiments
@@ -22,6 +25,7 @@ EXPERIMENTS = {
     'scouts': 'learnt against frozen Q tables in the scouts alone',
     'whole': 'forms of learning in the whole solver, paired, at equal time',
     'warm': 'a sequence of events: new tasks arrive, UAVs move on',
+    'anticipation': 'idle UAVs that wait where tasks will come from, against staying',
 }
 
 
@@ -34,6 +38,8 @@ def main(argv: Sequence[str]) -> int:
     Raises:
         AllocError: an option is invalid, a file cannot be written, matplotlib is missing.
     """
+    if argv and argv[0] == 'anticipation':
+        return _run_anticipation(argv[1:])
     if argv and argv[0] in EXPERIMENTS:
         return _run_experiment(argv[0], argv[1:])
     args = _make_parser().parsed(argv)
@@ -48,7 +54,7 @@ def _make_parser() -> OptionParser:
     parser = OptionParser(
         'study', "Regenerate the paper's figures and tables.",
         'experiments (uav_task_alloc study NAME -h):\n' + '\n'.join(
-            f'  {name:8} {text}' for name, text in EXPERIMENTS.items()))
+            f'  {name:12} {text}' for name, text in EXPERIMENTS.items()))
     add = parser.add_argument
     add('--out', type=Path, required=True, metavar='DIR',
         help='figures and tables; a run whose result is in DIR is not repeated (required)')
@@ -128,3 +134,44 @@ def _run_experiment(name: str, argv: Sequence[str]) -> int:
     with resumable():
         experiment(**vars(parser.parsed(argv)))
     return 0
+
+
+def _run_anticipation(argv: Sequence[str]) -> int:
+    """Fly the runs of the study of waiting, print its table and with --json its last line."""
+    from uav_task_alloc.study import anticipation  # imports numba and scipy
+    parser = OptionParser('study anticipation',
+                          f'Run an experiment: {EXPERIMENTS["anticipation"]}.')
+    add = parser.add_argument
+    uavs, busy = anticipation.REFERENCE
+    add('--uavs', type=_whole_numbers(1, 100), metavar='N,N', default=anticipation.UAVS,
+        help='sizes of fleets (default: 4,8,16)')
+    add('--busy', type=_whole_numbers(5, 90), metavar='N,N', default=anticipation.LOADS,
+        help='loads: percent of the time in which a UAV has a task (default: 30,50,70)')
+    parser.number('--runs', 2, 100_000, 'runs of 2 h for each setting', whole=True, default=40)
+    parser.number('--seed', 1, 2**31, 'of the runs', whole=True, default=1)
+    add('--json', action='store_true',
+        help=f'the last line is one JSON object: {uavs} UAVs, {busy} % busy')
+    add_executor_options(parser, jobs=os.cpu_count() or 1)
+    args = parser.parsed(argv)
+    for option, value, wanted in (('--uavs', args.uavs, uavs), ('--busy', args.busy, busy)):
+        if args.json and wanted not in value:
+            raise InvalidValue(option, ','.join(map(str, value)), f'{wanted} in it with --json')
+    study = anticipation.Study(args.uavs, args.busy, args.runs, args.seed)
+    with resumable():
+        results = anticipation.run_study(study, executors.chosen(args), log_line)
+    print(anticipation.table(results))
+    if args.json:
+        print(anticipation.reference_line(results))
+    return 0
+
+
+def _whole_numbers(low: int, high: int) -> Callable[[str], tuple[int, ...]]:
+    """A reader of whole numbers separated by commas."""
+    def read(text: str) -> tuple[int, ...]:
+        parts = text.split(',')
+        if not all(re.fullmatch(r'\d{1,9}', part, re.ASCII) and low <= int(part) <= high
+                   for part in parts):
+            raise argparse.ArgumentTypeError(
+                f'{text!r}: expected whole numbers in [{low}, {high}], as {low},{high}')
+        return tuple(dict.fromkeys(map(int, parts)))
+    return read

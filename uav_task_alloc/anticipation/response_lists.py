@@ -1,0 +1,135 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Lists of least response time for the event simulation: insertion, then moves of single tasks."""
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from uav_task_alloc.kernel import inner_kernel
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+_LEAST_GAIN = 1e-6  # [s] of a move, so that rounding cannot move a task to and fro
+
+
+class Tasks(NamedTuple):
+    """The tasks of a run; n tasks in the order of their announcements."""
+
+    x: Floats  # (n) [m]
+    y: Floats  # (n) [m]
+    announced: Floats  # (n) [s]
+    service: Floats  # (n) [s]
+    started: Floats  # (n) [s] start of the service; nan before it
+
+
+class Lists(NamedTuple):
+    """Tasks whose service has not begun, in the order in which each of m UAVs flies them."""
+
+    task: Ints  # (m, n)
+    length: Ints  # (m) tasks of each UAV
+    x: Floats  # (m) [m] where the UAV is, or will be when its service ends
+    y: Floats  # (m) [m]
+    free_in: Floats  # (m) [s] until the service under way ends; 0.0: none is
+    speed: float  # [m/s]
+
+
+@inner_kernel
+def add_task(tasks: Tasks, lists: Lists, task: int) -> None:
+    """Insert a task where the sum of response times grows least. O(n^2)"""
+    uav, at, _ = _best_insertion(tasks, lists, task)
+    _insert(lists, uav, at, task)
+
+
+@inner_kernel
+def improve_lists(tasks: Tasks, lists: Lists) -> None:
+    """Move single tasks while the sum of response times falls. O(n^3) a pass"""
+    moved = True
+    while moved:
+        moved = False
+        for u in range(lists.length.size):
+            i = 0
+            while i < lists.length[u]:
+                moved = _move(tasks, lists, u, i) or moved
+                i += 1
+
+
+@inner_kernel
+def _move(tasks: Tasks, lists: Lists, u: int, i: int) -> bool:
+    """Move task i of UAV u to its best position; whether the sum fell. O(n^2)"""
+    task, before = lists.task[u, i], _waits(tasks, lists, u, -1, -1)
+    _remove(lists, u, i)
+    gain = before - _waits(tasks, lists, u, -1, -1)
+    uav, at, more = _best_insertion(tasks, lists, task)
+    better = more < gain - _LEAST_GAIN
+    if better:
+        _insert(lists, uav, at, task)
+    else:
+        _insert(lists, u, i, task)
+    return better
+
+
+@inner_kernel
+def _best_insertion(tasks: Tasks, lists: Lists, task: int) -> tuple[int, int, float]:
+    """The UAV, the position and the growth of the sum of waits [s]. O(n^2)"""
+    uav, at, least = -1, -1, math.inf
+    for u in range(lists.length.size):
+        now = _waits(tasks, lists, u, -1, -1)
+        for i in range(lists.length[u] + 1):
+            more = _waits(tasks, lists, u, i, task) - now
+            if more < least:
+                uav, at, least = u, i, more
+    return uav, at, least
+
+
+@inner_kernel
+def _waits(tasks: Tasks, lists: Lists, u: int, at: int, task: int) -> float:
+    """Sum of the times [s] until the services of UAV u start, with a task at a position. O(n)"""
+    t, x, y, total = lists.free_in[u], lists.x[u], lists.y[u], 0.0
+    for i in range(lists.length[u] + (task >= 0)):
+        k = task
+        if task < 0 or i != at:
+            k = lists.task[u, i - (task >= 0 and i > at)]
+        t += math.hypot(tasks.x[k] - x, tasks.y[k] - y) / lists.speed
+        total += t
+        t += tasks.service[k]
+        x, y = tasks.x[k], tasks.y[k]
+    return total
+
+
+@inner_kernel
+def _insert(lists: Lists, u: int, at: int, task: int) -> None:
+    """Insert a task into the list of UAV u. O(n)"""
+    for i in range(lists.length[u], at, -1):
+        lists.task[u, i] = lists.task[u, i - 1]
+    lists.task[u, at] = task
+    lists.length[u] += 1
+
+
+@inner_kernel
+def _remove(lists: Lists, u: int, at: int) -> None:
+    """Remove a task from the list of UAV u. O(n)"""
+    lists.length[u] -= 1
+    for i in range(at, lists.length[u]):
+        lists.task[u, i] = lists.task[u, i + 1]
+
+
+@inner_kernel
+def take_first(lists: Lists, u: int) -> int:
+    """Remove the first task of UAV u, whose service begins, and return it. O(n)"""
+    task = int(lists.task[u, 0])
+    _remove(lists, u, 0)
+    return task
+
+
+@inner_kernel
+def end_of_list(tasks: Tasks, lists: Lists, u: int) -> tuple[float, float, float]:
+    """The time [s] until UAV u has flown its list, and where it will be [m]. O(n)"""
+    t, x, y = lists.free_in[u], lists.x[u], lists.y[u]
+    for i in range(lists.length[u]):
+        k = lists.task[u, i]
+        t += math.hypot(tasks.x[k] - x, tasks.y[k] - y) / lists.speed + tasks.service[k]
+        x, y = tasks.x[k], tasks.y[k]
+    return t, x, y
