@@ -62,7 +62,7 @@ def test_every_task_is_served_once_and_no_uav_flies_faster_than_it_can(policy):
 def test_one_uav_serves_two_tasks_as_calculated_by_hand():
     start = np.random.default_rng([3, 1]).uniform(0.0, arrivals.AREA, 2)
     places = np.array([start + [300.0, 0.0], start + [300.0, 150.0]])
-    stream = arrivals.Stream(places, np.array([10.0, 15.0]), np.array([40.0, 40.0]),
+    stream = arrivals.TaskStream(places, np.array([10.0, 15.0]), np.array([40.0, 40.0]),
                              np.zeros((120, 0, 2)))
     response, fleet = fly(stream, 1, events.STAY, 3)
     assert response == pytest.approx([20.0, 20.0 - 5.0 + 40.0 + 10.0])
@@ -74,7 +74,7 @@ def test_a_task_under_way_moves_to_a_uav_that_becomes_free_nearer():
     start = np.random.default_rng([3, 2]).uniform(0.0, arrivals.AREA, (2, 2))
     first = start[0]  # served at once by the first UAV, for 10 s
     second = start[0] + 0.1 * (start[0] - start[1])  # the other one is sent, then released
-    stream = arrivals.Stream(np.array([first, second]), np.array([1.0, 2.0]),
+    stream = arrivals.TaskStream(np.array([first, second]), np.array([1.0, 2.0]),
                              np.array([10.0, 10.0]), np.zeros((120, 0, 2)))
     response, _ = fly(stream, 2, events.STAY, 3)
     way = 0.1 * np.hypot(*(start[0] - start[1])) / 15.0

@@ -16,7 +16,7 @@ from uav_task_alloc.anticipation.intensity import Cells, Estimates
 from uav_task_alloc.checks import check_number
 from uav_task_alloc.errors import InvalidValue
 
-Floats = NDArray[np.float64]
+_Floats = NDArray[np.float64]
 MOST_OBSERVATIONS = 2000  # kept; the oldest are dropped
 _VALUE_RADIUS = 1600.0  # [m] over which values of tasks are averaged
 _VALUE_PRIOR = 2.0  # tasks of the mean value that each place begins with
@@ -60,7 +60,7 @@ class Demand:
         now: [s] since 1970, UTC.
     """
 
-    def __init__(self, low: Floats, high: Floats, across: int = 16,
+    def __init__(self, low: _Floats, high: _Floats, across: int = 16,
                  model: DemandModel | None = None, outside: Iterable[int] = ()) -> None:
         for axis in range(2):
             if not high[axis] > low[axis]:
@@ -94,13 +94,13 @@ class Demand:
         self._values += seen.value * near
         self._counts += near
 
-    def density(self, now: float) -> Floats:
+    def density(self, now: float) -> _Floats:
         """The probability that the next task is in each cell; (c,), its sum is 1."""
         out = np.empty(len(self.cells.x))
         intensity.density(self.cells, self.estimates, self.model.prior, now, out)
         return out
 
-    def weight(self, now: float) -> Floats:
+    def weight(self, now: float) -> _Floats:
         """The density times the mean value of tasks near each cell; (c,), its sum is 1."""
         mean = np.mean([each.value for each in self.seen]) if self.seen else 1.0
         worth = (_VALUE_PRIOR * mean + self._values) / (_VALUE_PRIOR + self._counts)
@@ -127,7 +127,7 @@ class Demand:
             self.add(Observation(*each))
 
 
-def _grid(low: Floats, high: Floats, across: int) -> Cells:
+def _grid(low: _Floats, high: _Floats, across: int) -> Cells:
     side = (high - low) / across
     x, y = np.meshgrid(*(low[axis] + side[axis] * (np.arange(across) + 0.5) for axis in range(2)))
     return Cells(x.ravel().copy(), y.ravel().copy(), side, across, np.ones(across * across))

@@ -22,42 +22,42 @@ from uav_task_alloc.anticipation.waiting_q import Learner, learn_places
 from uav_task_alloc.kernel import inner_kernel, kernel
 from uav_task_alloc.solver.rng import RngState
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
+_Floats = NDArray[np.float64]
+_Ints = NDArray[np.int64]
 STAY, BASE, EVEN, LEARNT, ORACLE, CHAINED_Q = range(6)
 
 
 class FleetTimes(NamedTuple):
     """What the lists do not hold of m UAVs."""
 
-    service_end: Floats  # (m) [s]; nan: in no service
-    flown: Floats  # (m) [m]
-    waiting: Floats  # (m) [m] of it to waiting places
-    busy: Floats  # (m) [s] in which it had a task, up to the end of arrivals
-    clock: Floats  # (1) [s]
+    service_end: _Floats  # (m) [s]; nan: in no service
+    flown: _Floats  # (m) [m]
+    waiting: _Floats  # (m) [m] of it to waiting places
+    busy: _Floats  # (m) [s] in which it had a task, up to the end of arrivals
+    clock: _Floats  # (1) [s]
 
 
 class WaitingPolicy(NamedTuple):
     """Where idle UAVs wait."""
 
     kind: int  # STAY ... CHAINED_Q
-    base: Floats  # (2) [m]
+    base: _Floats  # (2) [m]
     review: float  # [s] between choices without an event
     prior: float  # tasks that the uniform prior is worth
     share: float  # of its weight that an estimate hands out at each task
-    prices: MovePrices
+    prices: MovePrices  # of moves to places
 
 
 class Field(NamedTuple):
     """The area, what is known of its tasks, and memory of the kernels."""
 
-    cells: Cells
-    distance: Floats  # (c, c) [m]
-    estimates: Estimates
-    truth: Floats  # (k, c) probability of the next task in equal parts of the run, for ORACLE
+    cells: Cells  # of the area
+    distance: _Floats  # (c, c) [m]
+    estimates: Estimates  # learnt, for LEARNT and CHAINED_Q
+    truth: _Floats  # (k, c) probability of the next task in equal parts of the run, for ORACLE
     truth_every: float  # [s] a part
-    weight: Floats  # (c) scratch
-    scratch: Floats  # (4, c)
+    weight: _Floats  # (c) scratch
+    scratch: _Floats  # (4, c)
 
 
 @kernel

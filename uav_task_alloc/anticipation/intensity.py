@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from uav_task_alloc.kernel import inner_kernel, kernel
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
+_Floats = NDArray[np.float64]
+_Ints = NDArray[np.int64]
 DAY = 86_400.0  # [s]
 _LEAST_PROBABILITY = 1e-12  # of a task where no task was expected
 
@@ -19,11 +19,11 @@ _LEAST_PROBABILITY = 1e-12  # of a task where no task was expected
 class Cells(NamedTuple):
     """The area of work as a grid of equal cells, row by row from its south-west corner."""
 
-    x: Floats  # (c) [m] east, of centres
-    y: Floats  # (c) [m] north
-    side: Floats  # (2) [m] of a cell, east and north
+    x: _Floats  # (c) [m] east, of centres
+    y: _Floats  # (c) [m] north
+    side: _Floats  # (2) [m] of a cell, east and north
     across: int  # cells of a row
-    inside: Floats  # (c) 1.0 in the area of work, 0.0 outside it
+    inside: _Floats  # (c) 1.0 in the area of work, 0.0 outside it
 
 
 class Estimates(NamedTuple):
@@ -32,20 +32,20 @@ class Estimates(NamedTuple):
     A row is the estimate of one part of the day; an estimate that ignores the time has one row.
     """
 
-    bandwidth: Floats  # (e) [m] standard deviation of the kernel
-    forgetting: Floats  # (e) [s] after which a task counts 1 / e; inf: never
-    first_row: Ints  # (e)
-    parts: Ints  # (e) of the day
-    mass: Floats  # (rows) tasks in a row, less what is forgotten
-    field: Floats  # (rows, c) their kernels; the sum of a row is its mass
-    log_weight: Floats  # (e) logarithm of the share of each estimate, up to a constant
-    begin: Floats  # (e) share of each estimate at the begin; the sum is 1
-    at: Floats  # (1) [s] up to which tasks are forgotten; -inf: no task was seen
+    bandwidth: _Floats  # (e) [m] standard deviation of the kernel
+    forgetting: _Floats  # (e) [s] after which a task counts 1 / e; inf: never
+    first_row: _Ints  # (e)
+    parts: _Ints  # (e) of the day
+    mass: _Floats  # (rows) tasks in a row, less what is forgotten
+    field: _Floats  # (rows, c) their kernels; the sum of a row is its mass
+    log_weight: _Floats  # (e) logarithm of the share of each estimate, up to a constant
+    begin: _Floats  # (e) share of each estimate at the begin; the sum is 1
+    at: _Floats  # (1) [s] up to which tasks are forgotten; -inf: no task was seen
 
 
 @kernel
 def observe(cells: Cells, e: Estimates, prior: float, share: float, x: float, y: float,
-            now: float, scratch: Floats) -> None:
+            now: float, scratch: _Floats) -> None:
     """Weigh the estimates by the probability each gave to a task's place, then add the task.
 
     Switching between estimates follows fixed share (Herbster and Warmuth 1998). O(e c).
@@ -104,7 +104,7 @@ def _forget(e: Estimates, now: float) -> None:
 
 @inner_kernel
 def _add(cells: Cells, e: Estimates, i: int, row: int, x: float, y: float,
-         scratch: Floats) -> None:
+         scratch: _Floats) -> None:
     """Add a kernel of mass 1 within the area to a row of estimate i. O(c)"""
     total = 0.0
     for c in range(cells.x.size):
@@ -127,7 +127,7 @@ def _cell_at(cells: Cells, x: float, y: float) -> int:
 
 
 @kernel
-def density(cells: Cells, e: Estimates, prior: float, now: float, out: Floats) -> None:
+def density(cells: Cells, e: Estimates, prior: float, now: float, out: _Floats) -> None:
     """The probability that the next task is in each cell. O(e c)
 
     Args:

@@ -11,22 +11,22 @@ from numpy.typing import NDArray
 from uav_task_alloc.anticipation.intensity import Cells
 from uav_task_alloc.kernel import inner_kernel, kernel
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
+_Floats = NDArray[np.float64]
+_Ints = NDArray[np.int64]
 
 
 class Waiting(NamedTuple):
     """UAVs as the choice of waiting places sees them; m UAVs."""
 
-    idle: Floats  # (m) 1.0: may be sent to a place
-    free_in: Floats  # (m) [s] until a busy UAV is free; inf: takes no tasks
-    x: Floats  # (m) [m] where an idle UAV is, or a busy one will be free
-    y: Floats  # (m)
-    speed: Floats  # (m) [m/s]
-    reach: Floats  # (m) [m] that it may fly to a place at most
-    place: Floats  # (m, 2) [m] of each UAV: the result
-    best: Ints  # (m) scratch
-    gain: Floats  # (m) scratch
+    idle: _Floats  # (m) 1.0: may be sent to a place
+    free_in: _Floats  # (m) [s] until a busy UAV is free; inf: takes no tasks
+    x: _Floats  # (m) [m] where an idle UAV is, or a busy one will be free
+    y: _Floats  # (m)
+    speed: _Floats  # (m) [m/s]
+    reach: _Floats  # (m) [m] that it may fly to a place at most
+    place: _Floats  # (m, 2) [m] of each UAV: the result
+    best: _Ints  # (m) scratch
+    gain: _Floats  # (m) scratch
 
 
 class MovePrices(NamedTuple):
@@ -47,8 +47,8 @@ ROUNDS = 6  # of best responses, at most
 
 
 @kernel
-def choose_places(cells: Cells, distance: Floats, weight: Floats, w: Waiting, prices: MovePrices,
-                  rounds: int, scratch: Floats) -> None:
+def choose_places(cells: Cells, distance: _Floats, weight: _Floats, w: Waiting, prices: MovePrices,
+                  rounds: int, scratch: _Floats) -> None:
     """Choose places by best responses in turn, until no UAV changes its place. O(rounds m c^2).
 
     The cost of a set of places is the expected time until a UAV is at the next task.
@@ -76,8 +76,8 @@ def choose_places(cells: Cells, distance: Floats, weight: Floats, w: Waiting, pr
 
 
 @inner_kernel
-def _best_response(cells: Cells, distance: Floats, weight: Floats, w: Waiting, prices: MovePrices,
-                   u: int, scratch: Floats) -> tuple[int, float]:
+def _best_response(cells: Cells, distance: _Floats, weight: _Floats, w: Waiting,
+                   prices: MovePrices, u: int, scratch: _Floats) -> tuple[int, float]:
     """The best place of UAV u, and how much it is better [s]; -1, 0: none is. O(c^2)"""
     first, second, cost, nearest = scratch[0], scratch[1], scratch[2], scratch[3]
     _times_of_others(cells, w, prices, u, first, second)
@@ -112,8 +112,8 @@ def _best_response(cells: Cells, distance: Floats, weight: Floats, w: Waiting, p
 
 
 @inner_kernel
-def _times_of_others(cells: Cells, w: Waiting, prices: MovePrices, u: int, first: Floats,
-                     second: Floats) -> None:
+def _times_of_others(cells: Cells, w: Waiting, prices: MovePrices, u: int, first: _Floats,
+                     second: _Floats) -> None:
     """The two least times [s] until a UAV other than u is at each cell. O(m c)"""
     longest = 3600.0  # [s] where there is no other
     first[:] = longest

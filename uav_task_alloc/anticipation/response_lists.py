@@ -10,29 +10,29 @@ from numpy.typing import NDArray
 
 from uav_task_alloc.kernel import inner_kernel
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
+_Floats = NDArray[np.float64]
+_Ints = NDArray[np.int64]
 _LEAST_GAIN = 1e-6  # [s] of a move, so that rounding cannot move a task to and fro
 
 
 class Tasks(NamedTuple):
     """The tasks of a run; n tasks in the order of their announcements."""
 
-    x: Floats  # (n) [m]
-    y: Floats  # (n) [m]
-    announced: Floats  # (n) [s]
-    service: Floats  # (n) [s]
-    started: Floats  # (n) [s] start of the service; nan before it
+    x: _Floats  # (n) [m]
+    y: _Floats  # (n) [m]
+    announced: _Floats  # (n) [s]
+    service: _Floats  # (n) [s]
+    started: _Floats  # (n) [s] start of the service; nan before it
 
 
 class Lists(NamedTuple):
     """Tasks whose service has not begun, in the order in which each of m UAVs flies them."""
 
-    task: Ints  # (m, n)
-    length: Ints  # (m) tasks of each UAV
-    x: Floats  # (m) [m] where the UAV is, or will be when its service ends
-    y: Floats  # (m) [m]
-    free_in: Floats  # (m) [s] until the service under way ends; 0.0: none is
+    task: _Ints  # (m, n)
+    length: _Ints  # (m) tasks of each UAV
+    x: _Floats  # (m) [m] where the UAV is, or will be when its service ends
+    y: _Floats  # (m) [m]
+    free_in: _Floats  # (m) [s] until the service under way ends; 0.0: none is
     speed: float  # [m/s]
 
 

@@ -13,24 +13,24 @@ from uav_task_alloc.anticipation.places import MovePrices, Waiting
 from uav_task_alloc.kernel import inner_kernel, kernel
 from uav_task_alloc.solver.rng import RngState, uniform
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
+_Floats = NDArray[np.float64]
+_Ints = NDArray[np.int64]
 
 
 class Learner(NamedTuple):
     """The tables of m UAVs over a grid of s x s cells, and memory for a round of b bees."""
 
-    q: Floats  # (m, s s, s s) response time saved [s]: by the cell where it is, the cell to go to
+    q: _Floats  # (m, s s, s s) response time saved [s]: by the cell where it is, the cell to go to
     across: int  # s
-    corner: Floats  # (2) [m] the south-west corner of the area
-    side: Floats  # (2) [m] of a cell
-    choice: Ints  # (b, m) cell that each bee sends each UAV to
-    gain: Floats  # (b) [s] saved a task
-    rank: Ints  # (b) bees by falling gain
-    future: Floats  # (k, 2) [m] of the tasks drawn for a round
-    x: Floats  # (m) [m] scratch
-    y: Floats  # (m)
-    ready: Floats  # (m)
+    corner: _Floats  # (2) [m] the south-west corner of the area
+    side: _Floats  # (2) [m] of a cell
+    choice: _Ints  # (b, m) cell that each bee sends each UAV to
+    gain: _Floats  # (b) [s] saved a task
+    rank: _Ints  # (b) bees by falling gain
+    future: _Floats  # (k, 2) [m] of the tasks drawn for a round
+    x: _Floats  # (m) [m] scratch
+    y: _Floats  # (m)
+    ready: _Floats  # (m)
     rounds: int
     tasks: int  # of a future; k is a multiple of it
     learning_rate: float  # alpha of eq 2.6
@@ -42,13 +42,13 @@ class Learner(NamedTuple):
 class LearnerSettings(NamedTuple):
     """The settings of a learner."""
 
-    across: int = 8  # cells of its grid in each direction
+    across: int = 5  # cells of its grid in each direction
     bees: int = 8  # of a round
-    rounds: int = 4  # at each choice
-    futures: int = 4  # drawn for each round
-    tasks: int = 3  # of a future
-    learning_rate: float = 0.2  # alpha of eq 2.6
-    discount: float = 0.1  # gamma of eq 2.6
+    rounds: int = 6  # at each choice
+    futures: int = 8  # drawn for each round
+    tasks: int = 2  # of a future
+    learning_rate: float = 0.1  # alpha of eq 2.6
+    discount: float = 0.0  # gamma of eq 2.6
     rank_decay: float = 0.5  # weight of a rank over that of the one before (eq 2.14)
     explore: float = 0.2  # share of random choices
 
@@ -73,7 +73,7 @@ def make_learner(uavs: int, side: float, settings: LearnerSettings) -> Learner:
 
 
 @kernel
-def learn_places(cells: Cells, weight: Floats, w: Waiting, q: Learner, prices: MovePrices,
+def learn_places(cells: Cells, weight: _Floats, w: Waiting, q: Learner, prices: MovePrices,
                  rng: RngState) -> None:
     """Learn from futures drawn from the intensity, then send UAVs that choose by their Q.
 
@@ -153,7 +153,8 @@ def _response(w: Waiting, q: Learner, prices: MovePrices, b: int, still: int) ->
             q.ready[u] = max(0.0, w.free_in[u] - prices.look_ahead)
             if w.idle[u] > 0.0:
                 q.ready[u], q.x[u], q.y[u] = 0.0, w.place[u, 0], w.place[u, 1]
-                if b >= 0 and u != still and _chooses(w, u) and q.choice[b, u] != _cell(q, w.x[u], w.y[u]):
+                moves_now = b >= 0 and u != still and _chooses(w, u)
+                if moves_now and q.choice[b, u] != _cell(q, w.x[u], w.y[u]):
                     q.x[u], q.y[u] = _centre_x(q, q.choice[b, u]), _centre_y(q, q.choice[b, u])
                 if first == 0 and _chooses(w, u):
                     moves += math.hypot(q.x[u] - w.x[u], q.y[u] - w.y[u]) / w.speed[u]
@@ -177,7 +178,7 @@ def _answer(w: Waiting, q: Learner, k: int, now: float) -> float:
 
 
 @inner_kernel
-def _draw_future(cells: Cells, weight: Floats, q: Learner, rng: RngState) -> None:
+def _draw_future(cells: Cells, weight: _Floats, q: Learner, rng: RngState) -> None:
     """Draw the places of tasks from the intensity. O(k c)"""
     total = 0.0
     for c in range(weight.size):

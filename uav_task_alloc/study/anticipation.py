@@ -25,10 +25,10 @@ Runs = list[dict[str, dict[str, float]]]
 class Study:
     """What is flown."""
 
-    uavs: tuple[int, ...] = UAVS
+    uavs: tuple[int, ...] = UAVS  # sizes of fleets
     loads: tuple[int, ...] = LOADS  # [%] busy
     runs: int = 40  # of each setting
-    seed: int = 1
+    seed: int = 1  # of the tasks
 
 
 def run_study(study: Study, open_executor: ExecutorFactory,

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+_Floats = NDArray[np.float64]
 AREA = 10_000.0  # [m] side of the square, its south-west corner at the origin
 DURATION = 7200.0  # [s] of arrivals
 KINDS = ('uniform', 'hot', 'moving', 'switch')
@@ -15,19 +15,19 @@ SPOTS, SPREAD = 3, 800.0  # hot spots; [m] their standard deviation, east and no
 BACKGROUND = 0.1  # share of tasks that are uniform with hot spots, too
 DRIFT = 1.0  # [m/s] of moving hot spots, which turn back at the edge
 SWITCH = 3600.0  # [s] after which hot spots are at other places
-SERVICE = 30.0, 90.0  # [s] shortest and longest, uniform between
+SERVICE_TIMES = 30.0, 90.0  # [s] shortest and longest, uniform between
 
 
-class Stream(NamedTuple):
+class TaskStream(NamedTuple):
     """The tasks of a run, and what they were drawn from."""
 
-    place: Floats  # (n, 2) [m]
-    announced: Floats  # (n) [s], ascending
-    service: Floats  # (n) [s]
-    spots: Floats  # (minutes, spots, 2) [m] centres at the begin of each minute; no spots: uniform
+    place: _Floats  # (n, 2) [m]
+    announced: _Floats  # (n) [s], ascending
+    service: _Floats  # (n) [s]
+    spots: _Floats  # (minutes, spots, 2) [m] centres in each minute; no spots: uniform
 
 
-def make_stream(kind: str, rate: float, seed: int) -> Stream:
+def make_stream(kind: str, rate: float, seed: int) -> TaskStream:
     """Draw the tasks of a run.
 
     Args:
@@ -46,33 +46,33 @@ def make_stream(kind: str, rate: float, seed: int) -> Stream:
     if kind != 'uniform':
         near = rng.random(n) >= BACKGROUND
         place[near] = _near_spots(spots, announced[near], rng)
-    return Stream(place, announced, rng.uniform(*SERVICE, n), spots)
+    return TaskStream(place, announced, rng.uniform(*SERVICE_TIMES, n), spots)
 
 
-def _spots(kind: str, rng: np.random.Generator) -> Floats:
+def _spots(kind: str, rng: np.random.Generator) -> _Floats:
     """Centres of the hot spots in each minute."""
     minutes = 60.0 * np.arange(int(DURATION // 60))[:, None, None]
     start, later = rng.uniform(SPREAD, AREA - SPREAD, (2, SPOTS, 2))
     heading = rng.uniform(0.0, 2.0 * np.pi, SPOTS)
     drift = DRIFT * minutes * np.stack([np.cos(heading), np.sin(heading)], 1)
-    spots: Floats = {'hot': start + 0.0 * minutes,
+    spots: _Floats = {'hot': start + 0.0 * minutes,
                      'switch': np.where(minutes < SWITCH, start, later),
                      # reflected at the edges
                      'moving': AREA - np.abs(AREA - np.abs(start + drift) % (2.0 * AREA))}[kind]
     return spots
 
 
-def _near_spots(spots: Floats, announced: Floats, rng: np.random.Generator) -> Floats:
+def _near_spots(spots: _Floats, announced: _Floats, rng: np.random.Generator) -> _Floats:
     """Places around hot spots, within the area."""
     minute = (announced // 60).astype(int)
     centre = spots[minute, rng.integers(SPOTS, size=len(announced))]
-    place: Floats = rng.normal(centre, SPREAD)
+    place: _Floats = rng.normal(centre, SPREAD)
     while (outside := ((place < 0.0) | (place > AREA)).any(1)).any():
         place[outside] = rng.normal(centre[outside], SPREAD)
     return place
 
 
-def true_density(spots: Floats, x: Floats, y: Floats) -> Floats:
+def true_density(spots: _Floats, x: _Floats, y: _Floats) -> _Floats:
     """The probability of the next task in each cell of a grid, for each minute.
 
     Args:
@@ -88,5 +88,5 @@ def true_density(spots: Floats, x: Floats, y: Floats) -> Floats:
     away = (x - spots[..., :1]) ** 2 + (y - spots[..., 1:]) ** 2  # (minutes, spots, c)
     near = np.exp(-0.5 * away / SPREAD ** 2)
     near /= near.sum(2, keepdims=True)
-    density: Floats = BACKGROUND * flat + (1.0 - BACKGROUND) * near.mean(1)
+    density: _Floats = BACKGROUND * flat + (1.0 - BACKGROUND) * near.mean(1)
     return density

@@ -16,9 +16,9 @@ from uav_task_alloc.anticipation.response_lists import Lists, Tasks
 from uav_task_alloc.anticipation.waiting_q import LearnerSettings, make_learner
 from uav_task_alloc.solver.rng import rng_state
 from uav_task_alloc.study import arrivals
-from uav_task_alloc.study.arrivals import AREA, DURATION, Stream, make_stream
+from uav_task_alloc.study.arrivals import AREA, DURATION, TaskStream, make_stream
 
-Floats = NDArray[np.float64]
+_Floats = NDArray[np.float64]
 SPEED = 15.0  # [m/s]
 REVIEW = 120.0  # [s] between choices of waiting places without an event
 POLICIES = {'stay': events.STAY, 'base': events.BASE, 'even': events.EVEN,
@@ -52,7 +52,7 @@ def run_pair(setting: Setting, rate: float, seed: int) -> dict[str, dict[str, fl
             for name, kind in POLICIES.items()}
 
 
-def summary(stream: Stream, response: Floats, fleet: FleetTimes) -> dict[str, float]:
+def summary(stream: TaskStream, response: _Floats, fleet: FleetTimes) -> dict[str, float]:
     """Means of a run.
 
     Args:
@@ -70,9 +70,9 @@ def summary(stream: Stream, response: Floats, fleet: FleetTimes) -> dict[str, fl
             'busy': float(fleet.busy.sum()) / (len(fleet.busy) * DURATION)}
 
 
-def fly(stream: Stream, uavs: int, policy: int, seed: int, prices: MovePrices = MOVE_PRICES,
+def fly(stream: TaskStream, uavs: int, policy: int, seed: int, prices: MovePrices = MOVE_PRICES,
         model: DemandModel | None = None, learner: LearnerSettings | None = None,
-        ) -> tuple[Floats, FleetTimes]:
+        ) -> tuple[_Floats, FleetTimes]:
     """Fly the tasks of a run under one policy.
 
     Args:
