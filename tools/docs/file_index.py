@@ -13,10 +13,10 @@ HEADING = '## Rooms and files\n'  # the index is all below it
 # in the order of the layers
 ROOMS = ('.', 'model', 'geometry', 'solver', 'solver/baselines', 'solver/timed', 'separation',
          'work', 'anticipation', 'scenario', 'map_files', 'mavlink', 'mavlink/transport',
-         'mavlink/mission', 'mavlink/fence', 'mavlink/gcs', 'sim', 'sim/ardupilot', 'sim/px4', 'allocator',
-         'allocator/state', 'allocator/replanning', 'allocator/persistence', 'record', 'live',
-         'flight_report', 'plots', 'study', 'cli', 'nodes', 'nodes/conversions', 'nodes/ros',
-         'nodes/rviz')
+         'mavlink/mission', 'mavlink/fence', 'mavlink/gcs', 'sim', 'sim/ardupilot', 'sim/px4',
+         'allocator', 'allocator/state', 'allocator/replanning', 'allocator/persistence',
+         'record', 'live', 'flight_report', 'plots', 'study', 'cli', 'nodes',
+         'nodes/conversions', 'nodes/ros', 'nodes/rviz')
 
 
 def sentence(path):
