@@ -22,7 +22,7 @@ def one_thread():
         yield pool
 
 
-@pytest.mark.parametrize('kind', arrivals.KINDS)
+@pytest.mark.parametrize('kind', arrivals.ARRIVAL_KINDS)
 def test_arrivals_are_reproducible_within_the_area_and_ascending(kind):
     first, second = arrivals.make_stream(kind, RATE, 5), arrivals.make_stream(kind, RATE, 5)
     assert all(np.array_equal(a, b) for a, b in zip(first, second, strict=True))
@@ -32,7 +32,7 @@ def test_arrivals_are_reproducible_within_the_area_and_ascending(kind):
 
 
 def test_hot_spots_stay_move_or_switch():
-    spots = {kind: arrivals.make_stream(kind, RATE, 5).spots for kind in arrivals.KINDS}
+    spots = {kind: arrivals.make_stream(kind, RATE, 5).spots for kind in arrivals.ARRIVAL_KINDS}
     ways = {kind: np.hypot(*(each[1:] - each[:-1]).T) for kind, each in spots.items()}
     assert ways['hot'].max() == 0.0
     assert 0.0 < ways['moving'].max() <= 60.0 * arrivals.DRIFT + 1e-6
@@ -108,10 +108,10 @@ def test_the_last_line_of_the_study_is_one_json_object(monkeypatch, capsys):
     argv = ['anticipation', '--uavs', '8', '--busy', '50', '--runs', '2', '--json']
     assert command.main(argv) == 0
     lines = capsys.readouterr().out.splitlines()
-    assert len([line for line in lines if line.startswith('| 8 | 50 %')]) == len(arrivals.KINDS)
+    assert len([line for line in lines if line.startswith('| 8 | 50 %')]) == len(arrivals.ARRIVAL_KINDS)
     figures = json.loads(lines[-1])
-    assert list(figures) == [*arrivals.KINDS, 'oracle_gap_percent']
-    for kind in arrivals.KINDS:
+    assert list(figures) == [*arrivals.ARRIVAL_KINDS, 'oracle_gap_percent']
+    for kind in arrivals.ARRIVAL_KINDS:
         low, high = figures[kind]['ci95']
         assert low < figures[kind]['reduction_percent'] < high
 

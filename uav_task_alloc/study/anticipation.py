@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from uav_task_alloc.study.arrivals import DURATION, KINDS
+from uav_task_alloc.study.arrivals import DURATION, ARRIVAL_KINDS
 from uav_task_alloc.study.campaign import ExecutorFactory
 from uav_task_alloc.study.learning import confidence
 from uav_task_alloc.study.tables import markdown
@@ -52,7 +52,7 @@ def _settings(study: Study, executor: Executor,
     seeds = range(study.seed * _SEEDS, study.seed * _SEEDS + study.runs)
     for uavs in study.uavs:
         for load in study.loads:
-            settings = [Setting(uavs, load, kind) for kind in KINDS]
+            settings = [Setting(uavs, load, kind) for kind in ARRIVAL_KINDS]
             rates = list(executor.map(arrival_rate, settings))
             futures = [[executor.submit(run_pair, setting, rate, seed) for seed in seeds]
                        for setting, rate in zip(settings, rates, strict=True)]
@@ -139,7 +139,7 @@ def reference_line(results: Mapping[Setting, Runs]) -> str:
         interval, and the gap to the oracle with hot spots.
     """
     figures: dict[str, object] = {}
-    for kind in KINDS:
+    for kind in ARRIVAL_KINDS:
         mean, half = confidence(reductions(results[Setting(*REFERENCE, kind)], 'learnt'))
         figures[kind] = {'reduction_percent': round(mean, 2),
                          'ci95': [round(mean - half, 2), round(mean + half, 2)]}

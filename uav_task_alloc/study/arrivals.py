@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 _Floats = NDArray[np.float64]
 AREA = 10_000.0  # [m] side of the square, its south-west corner at the origin
 DURATION = 7200.0  # [s] of arrivals
-KINDS = ('uniform', 'hot', 'moving', 'switch')
+ARRIVAL_KINDS = ('uniform', 'hot', 'moving', 'switch')
 SPOTS, SPREAD = 3, 800.0  # hot spots; [m] their standard deviation, east and north
 BACKGROUND = 0.1  # share of tasks that are uniform with hot spots, too
 DRIFT = 1.0  # [m/s] of moving hot spots, which turn back at the edge
@@ -31,14 +31,14 @@ def make_stream(kind: str, rate: float, seed: int) -> TaskStream:
     """Draw the tasks of a run.
 
     Args:
-        kind: one of KINDS.
+        kind: one of ARRIVAL_KINDS.
         rate: [1/s] of arrivals, which are a Poisson process.
         seed: of all that is drawn; the same seed has the same hot spots at any rate.
 
     Returns:
         The tasks in the order of their announcements.
     """
-    rng = np.random.default_rng([seed, KINDS.index(kind)])
+    rng = np.random.default_rng([seed, ARRIVAL_KINDS.index(kind)])
     spots = np.zeros((int(DURATION // 60), 0, 2)) if kind == 'uniform' else _spots(kind, rng)
     n = int(rng.poisson(rate * DURATION))
     announced = np.sort(rng.uniform(0.0, DURATION, n))

@@ -32,7 +32,7 @@ class Setting(NamedTuple):
 
     uavs: int
     busy: int  # [%] of the time in which a UAV has a task, if it stays where its last one ended
-    kind: str  # of arrivals.KINDS
+    kind: str  # of arrivals.ARRIVAL_KINDS
 
 
 def run_pair(setting: Setting, rate: float, seed: int) -> dict[str, dict[str, float]]:
