@@ -108,7 +108,8 @@ def test_the_last_line_of_the_study_is_one_json_object(monkeypatch, capsys):
     argv = ['anticipation', '--uavs', '8', '--busy', '50', '--runs', '2', '--json']
     assert command.main(argv) == 0
     lines = capsys.readouterr().out.splitlines()
-    assert len([line for line in lines if line.startswith('| 8 | 50 %')]) == len(arrivals.ARRIVAL_KINDS)
+    rows = [line for line in lines if line.startswith('| 8 | 50 %')]
+    assert len(rows) == len(arrivals.ARRIVAL_KINDS)
     figures = json.loads(lines[-1])
     assert list(figures) == [*arrivals.ARRIVAL_KINDS, 'oracle_gap_percent']
     for kind in arrivals.ARRIVAL_KINDS:

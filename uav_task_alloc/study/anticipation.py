@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from uav_task_alloc.study.arrivals import DURATION, ARRIVAL_KINDS
+from uav_task_alloc.study.arrivals import ARRIVAL_KINDS, DURATION
 from uav_task_alloc.study.campaign import ExecutorFactory
 from uav_task_alloc.study.learning import confidence
 from uav_task_alloc.study.tables import markdown
