@@ -13,7 +13,7 @@ from dataclasses import fields, replace
 import pytest
 
 from uav_task_alloc.errors import InvalidValue
-from uav_task_alloc.mavlink.gcs.authority import AuthorityRecord, AuthorityState
+from uav_task_alloc.mavlink.gcs.authority import AuthorityRecord, AuthorityState, TaskMark
 from uav_task_alloc.mavlink.gcs.authority_store import (
     LONG_AGO,
     AuthorityFileStore,
@@ -59,7 +59,8 @@ def store(tmp_path, reports):
 
 
 @pytest.mark.parametrize(
-    'record', [AuthorityRecord(), FULL, AuthorityRecord(AuthorityState.LOST, 'ä "quoted" text')]
+    'record', [AuthorityRecord(), FULL, AuthorityRecord(AuthorityState.LOST, 'ä "quoted" text'),
+               AuthorityRecord(ahead=(TaskMark('t1', 1.5, -2.25, 50.0, 0.0, False),))]
 )
 def test_what_was_saved_is_loaded_after_a_restart(store, tmp_path, reports, record):
     store.save('uav_1', record)

@@ -102,6 +102,27 @@ def test_a_task_flown_while_no_bridge_ran_is_known_after_a_list_without_it(kind,
     assert places(bench) == list('ABCD')
 
 
+@pytest.mark.parametrize(('known', 'flown_again'), [(True, []), (False, ['A', 'B', 'C'])])
+def test_a_task_flown_while_no_bridge_ran_is_known_minutes_later_by_its_id(known, flown_again):
+    bench = FlightBench('ardupilot', 'ardupilot').discover()
+    bench.assign(task_list('ABC', service=1.0))
+    bench.assign(task_list('X'), 2)
+    assert bench.run(lambda: bench.started() == ['A'] and bench.started(2) == ['X'])
+    bench.run(limit=1.5)  # a heartbeat has shown the mission mode
+    dead_until(bench, 3)
+    bench.assign(task_list('', 2))
+    bench.assign(task_list('', 2), 2)
+    bench.run(limit=150.0)
+    tasks = task_list('CBDA', 3, service=1.0)
+    if not known:  # other tasks at the same places
+        tasks = TaskList(3, tuple(MissionStop(replace(stop.task, id=f'new {stop.task.id}'))
+                                  for stop in tasks.stops))
+    bench.assign(tasks, 2)
+    assert bench.run(lambda: len(bench.completed(2)) == 4)
+    assert bench.run(lambda: len(bench.flown(2)) == 2 + len(flown_again))
+    assert sorted(places(bench, 2)[1:]) == sorted(['D', *flown_again])
+
+
 @BOTH
 def test_positions_lost_before_the_restart_do_not_count_as_the_time_without_a_bridge(kind):
     bench = flying(kind, 'EDC')

@@ -228,6 +228,7 @@ class AuthorityRecord:
     seen: tuple[float, ...] = ()
     landed_battery: float | None = None  # 0..1, at its own landing, while it may start again
     pieces: tuple[PieceMark, ...] = ()  # that are partly flown
+    ahead: tuple[TaskMark, ...] = ()  # the next tasks on board, with the one being flown; at 0 s
 
 
 class Authority:

@@ -77,7 +77,7 @@ class AuthorityRecorder:
             *self._evidence.mission_position(), self._evidence.uploading(),
             self._last_position(),
             None if math.isnan(state.landed_battery) else round(state.landed_battery, 3),
-            self._evidence.pieces())
+            self._evidence.pieces(), self._evidence.ahead())
         if fields == self._fields:  # as after most messages
             return
         self._fields, record = fields, AuthorityRecord(*fields)

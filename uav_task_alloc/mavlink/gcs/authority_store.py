@@ -202,7 +202,7 @@ def _record(body: Any, uav_id: str) -> AuthorityRecord:
     row = body['record']
     if isinstance(row, dict):  # files of earlier versions do not have it
         row = {'arrived': False, 'uploading': [], 'landed_battery': None, 'pieces': [],
-               **row}
+               'ahead': [], **row}
     if not isinstance(row, dict) or row.keys() != _CHECKS.keys():
         raise ValueError('record: expected ' + ', '.join(_CHECKS))
     record = {}

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from pymavlink.dialects.v20 import ardupilotmega as d
 
+from uav_task_alloc.mavlink.gcs.authority import TaskMark
 from uav_task_alloc.mavlink.gcs.onboard_mission import LATE_REACHED, OnboardMission
 from uav_task_alloc.mavlink.gcs.resume import checksum
 from uav_task_alloc.mavlink.gcs.telemetry import Telemetry
 from uav_task_alloc.mavlink.mission.diff import MissionDiff
 from uav_task_alloc.mavlink.mission.items import Item, alike
 from uav_task_alloc.mavlink.mission.piece_mark import PieceMark
+
+_AHEAD = 10  # tasks that are recorded: more are not flown before a bridge is started again
 
 
 class MissionEvidence:
@@ -24,6 +27,7 @@ class MissionEvidence:
         self._onboard, self._telemetry = onboard, telemetry
         self._checksum: tuple[tuple[Item, ...], int] | None = None
         self._uploading: tuple[MissionDiff, int] | None = None
+        self._ahead: tuple[tuple[Item, ...], int | None, tuple[TaskMark, ...]] = (), None, ()
 
     def ended(self, since: float) -> bool:
         """Whether REACHED of the last item was received at `since` [s] or later."""
@@ -100,6 +104,17 @@ class MissionEvidence:
         """The tasks whose ways are partly flown."""
         progress = self._onboard.progress
         return progress.coverage.marks(progress.completed)
+
+    def ahead(self) -> tuple[TaskMark, ...]:
+        """The next tasks on board from the item being flown on, at most _AHEAD."""
+        held, (_, current, _) = self._onboard.progress.items, self.mission_position()
+        if current is None:
+            return ()
+        if self._ahead[0] is not held or self._ahead[1] != current:
+            marks = [TaskMark(item.task, *item.position, 0.0, False) for item in held[current:]
+                     if item.completes and item.position is not None]
+            self._ahead = held, current, tuple(marks[:_AHEAD])
+        return self._ahead[2]
 
     def uploading(self) -> tuple[int, ...]:
         """Checksum of a mission that may be stored next, and index of its first item; ()."""

@@ -118,6 +118,7 @@ class MissionExecutor:
             self.onboard.list.stored_pieces = record.pieces
             resume.recorded = record.mission, record.current, record.arrived
             resume.recorded_upload = record.uploading
+            resume.ahead = {mark.task: mark[1:4] for mark in record.ahead}
             for first in range(0, len(record.seen) - _SEEN + 1, _SEEN):
                 t, x, y, z, east, north, up = record.seen[first:first + _SEEN]
                 self.onboard.progress.positions.add_recorded(
