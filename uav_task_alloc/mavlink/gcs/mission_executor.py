@@ -113,15 +113,14 @@ class MissionExecutor:
 
     def _restore(self, record: AuthorityRecord | None) -> None:
         """Pass what the previous run recorded to `onboard.resume`."""
-        resume = self.onboard.resume
+        onboard, resume = self.onboard, self.onboard.resume
         if record is not None:
-            self.onboard.list.stored_pieces = record.pieces
+            onboard.list.stored_pieces, resume.recorded_upload = record.pieces, record.uploading
             resume.recorded = record.mission, record.current, record.arrived
-            resume.recorded_upload = record.uploading
             resume.ahead = {mark.task: mark[1:4] for mark in record.ahead}
             for first in range(0, len(record.seen) - _SEEN + 1, _SEEN):
                 t, x, y, z, east, north, up = record.seen[first:first + _SEEN]
-                self.onboard.progress.positions.add_recorded(
+                onboard.progress.positions.add_recorded(
                     PositionSample(t, (x, y, z), (east, north, up)))
             resume.was_disarmed = not record.armed
             # the current item may be of the replaced mission, or set by another party

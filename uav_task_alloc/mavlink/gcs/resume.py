@@ -41,7 +41,7 @@ _PLACE_DELAY = 2.0  # [s] after a REACHED in which a position still shows its pl
 _LANDED_STATE_DELAY = 3.0  # [s] after the mission was read in which it comes, as a rule
 _MAX_UNREAD = 32  # REACHED kept until the mission is read
 MAX_AGE = 60.0  # [s] after the restart; a later task at the same position is a new one
-_NAMED_AGE = 3600.0  # [s] where it is a task of the previous run, which has recorded its id
+_NAMED_AGE = 3540.0  # [s] more, where it is a task of the previous run, which recorded its id
 
 
 def checksum(items: Iterable[Item]) -> int:
@@ -86,7 +86,7 @@ class Resume:
         self._telemetry, self._progress = telemetry, progress
         self.unflown: dict[str, Point] = {}  # [m] ENU, by task; skipped by another station
         self.reported: set[str] = set()  # flown and reported by the previous run
-        self.ahead: dict[str, Point] = {}  # [m] ENU, by task; the next ones of the previous run
+        self.ahead: dict[str, Point] = {}  # [m] ENU, by id; the next tasks of the previous run
         # checksum of the mission, current item and whether it was seen there, of the previous run
         self.recorded: tuple[int | None, int | None, bool] = None, None, False
         self.recorded_upload: tuple[int, ...] = ()  # checksum and first item of an upload then
@@ -329,8 +329,7 @@ class Resume:
         if reached > self._known_reached:
             self._until = now + MAX_AGE
         self._known_reached = reached
-        until = self._until + (_NAMED_AGE - MAX_AGE if self.ahead else 0.0)
-        return (*self._flown, *here) if now < until else ()
+        return (*self._flown, *here) if now < self._until + _NAMED_AGE * bool(self.ahead) else ()
 
     def flown_tasks(self, tasks: Iterable[Task], now: float) -> tuple[Task, ...]:
         """The given tasks that are among the flown items."""
