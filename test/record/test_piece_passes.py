@@ -58,3 +58,10 @@ def test_a_strip_flown_twice_is_found():
     truth = flown(*BOTH, (-20, 40), (220, 40))
     assert [len(rows) for rows in piece_passes(run(), truth).values()] == [2, 1]
     assert run_summary(run(), truth)['flown_twice'] == ['field#1']
+
+
+def test_a_strip_that_a_lost_vehicle_began_is_not_flown_twice():
+    truth = flown(*BOTH)
+    truth.tracks['lost'] = [TrueSample(20.0 * k, (x, 40.0, 50.0))
+                            for k, x in enumerate((-20.0, 180.0))]
+    assert run_summary(run(), truth)['tasks_flown_twice'] == 0

@@ -46,7 +46,8 @@ def piece_passes(state: RunState, truth: GroundTruth) -> dict[str, list[Reached]
         truth: with all tracks.
 
     Returns:
-        By id of the piece. A pass stays within 5 m of the way for four fifths of it.
+        By id of the piece. A pass stays within 5 m of the way for four fifths of it and comes
+        near both ends: one that a lost vehicle did not finish is none.
     """
     tracks = {uav: [TrueSample(wall, point) for wall, point in resampled(track)]
               for uav, track in truth.tracks.items()}
@@ -62,19 +63,26 @@ def _passes(track: Sequence[TrueSample], way: Sequence[Point]) -> Iterator[float
     """[unix s] at which passes along a way end."""
     low, high = ([pick(p[k] for p in way) + sign * _BESIDE for k in range(3)]
                  for pick, sign in ((min, -1.0), (max, 1.0)))
-    needed = min(_SHARE * polyline_length(way), polyline_length(way) - 2.0 * _CORNER)
-    flown, before = 0.0, None
+    along = list[TrueSample]()
     for sample in track:
         inside = all(a <= v <= b for a, v, b in zip(low, sample.point, high, strict=True))
         if inside and _is_beside(sample.point, way):
-            flown += math.dist(before.point, sample.point) if before else 0.0
-            before = sample
+            along.append(sample)
             continue
-        if before is not None and flown >= needed:
-            yield before.wall
-        flown, before = 0.0, None
-    if before is not None and flown >= needed:
-        yield before.wall
+        if along and _is_whole(along, way):
+            yield along[-1].wall
+        along.clear()
+    if along and _is_whole(along, way):
+        yield along[-1].wall
+
+
+def _is_whole(along: Sequence[TrueSample], way: Sequence[Point]) -> bool:
+    """Whether samples beside a way are a pass from one end to the other."""
+    length = polyline_length(way)
+    return polyline_length([each.point for each in along]) >= min(
+        _SHARE * length, length - 2.0 * _CORNER) and all(
+        min(math.dist(each.point, end) for each in along) <= _BESIDE + _CORNER
+        for end in (way[0], way[-1]))
 
 
 def _is_beside(point: Point, way: Sequence[Point]) -> bool:
