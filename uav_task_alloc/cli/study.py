@@ -143,19 +143,19 @@ def _run_anticipation(argv: Sequence[str]) -> int:
                           f'Run an experiment: {EXPERIMENTS["anticipation"]}.')
     add = parser.add_argument
     uavs, busy = anticipation.REFERENCE
-    add('--uavs', type=_whole_numbers(1, 100), metavar='N,N', default=anticipation.UAVS,
+    add('--uavs', type=_whole_numbers(1, 100), metavar='N,N', default=_joined(anticipation.UAVS),
         help='sizes of fleets (default: 4,8,16)')
-    add('--busy', type=_whole_numbers(5, 90), metavar='N,N', default=anticipation.LOADS,
+    add('--busy', type=_whole_numbers(5, 90), metavar='N,N', default=_joined(anticipation.LOADS),
         help='loads: percent of the time in which a UAV has a task (default: 30,50,70)')
     parser.number('--runs', 2, 100_000, 'runs of 2 h for each setting', whole=True, default=40)
     parser.number('--seed', 1, 2**31, 'of the runs', whole=True, default=1)
     add('--json', action='store_true',
-        help=f'the last line is one JSON object: {uavs} UAVs, {busy} % busy')
+        help=f'the last line is one JSON object: {uavs} UAVs, {busy} %% busy')
     add_executor_options(parser, jobs=os.cpu_count() or 1)
     args = parser.parsed(argv)
     for option, value, wanted in (('--uavs', args.uavs, uavs), ('--busy', args.busy, busy)):
         if args.json and wanted not in value:
-            raise InvalidValue(option, ','.join(map(str, value)), f'{wanted} in it with --json')
+            raise InvalidValue(option, _joined(value), f'{wanted} in it with --json')
     study = anticipation.Study(args.uavs, args.busy, args.runs, args.seed)
     with resumable():
         results = anticipation.run_study(study, executors.chosen(args), log_line)
@@ -163,6 +163,10 @@ def _run_anticipation(argv: Sequence[str]) -> int:
     if args.json:
         print(anticipation.reference_line(results))
     return 0
+
+
+def _joined(numbers: Sequence[int]) -> str:
+    return ','.join(map(str, numbers))
 
 
 def _whole_numbers(low: int, high: int) -> Callable[[str], tuple[int, ...]]:
