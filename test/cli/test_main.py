@@ -302,6 +302,7 @@ def test_out_of_memory_is_one_line(monkeypatch, capsys):
 def test_compile_prints_and_removes_the_folders_of_the_kernels(monkeypatch, tmp_path, capsys):
     from uav_task_alloc.allocator import warm_up
     monkeypatch.setattr(warm_up, 'compile_kernels', lambda *_: None)
+    monkeypatch.setattr('uav_task_alloc.solver.timed.solve.load_timed_kernels', lambda **_: None)
     monkeypatch.setattr(numba.core.config, 'CACHE_DIR', str(tmp_path))
     cli.main(['compile'])
     assert capsys.readouterr().out == ''

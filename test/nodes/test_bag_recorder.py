@@ -196,7 +196,8 @@ def test_a_definition_holds_all_a_message_is_made_of():
     parts = text.split(definitions.SEPARATOR + '\nMSG: ')
     assert [part.split()[0] for part in parts[1:]] == [
         'std_msgs/Header', 'uav_task_alloc_msgs/PlannedTask', 'geometry_msgs/Point',
-        'builtin_interfaces/Time', 'uav_task_alloc_msgs/Task', 'builtin_interfaces/Duration']
+        'builtin_interfaces/Time', 'uav_task_alloc_msgs/Task', 'builtin_interfaces/Duration',
+        'uav_task_alloc_msgs/Ring', 'uav_task_alloc_msgs/Action']
 
 
 @pytest.mark.parametrize(('line', 'types'), [

@@ -203,12 +203,14 @@ class OrdersAndEvents(RuleBasedStateMachine):
         self.settle()
         names = [self.task(pick) for pick in picks[:2 if kind == 'ORDER' else 1]]
         before, more = self.what_orders_demand(), {}
+        # tasks that a paused UAV keeps move on when it is sent home, and stay where they are then
+        keeps = self.driver.world.orders.keeps_tasks(uav_id)
         if kind in ('PAUSE', 'RETURN'):
             names, more = [], {'keep_tasks': keep} if kind == 'PAUSE' else {}
         answer = self.driver.order(kind, uav_id, *names, **more)
         if answer.success and answer.order_id not in {each.id for each in before['in force']}:
             assert self.what_orders_demand() != before
-            if lists_change:
+            if lists_change and not keeps:
                 self.settle()
             assert self.driver.order('UNDO', order_id=answer.order_id).success
             assert self.what_orders_demand() == before
