@@ -150,7 +150,7 @@ def _run_anticipation(argv: Sequence[str]) -> int:
     parser.number('--runs', 2, 100_000, 'runs of 2 h for each setting', whole=True, default=40)
     parser.number('--seed', 1, 2**31, 'of the runs', whole=True, default=1)
     add('--json', action='store_true',
-        help=f'the last line is one JSON object: {uavs} UAVs, {busy} %% busy')
+        help=f'the last line is one JSON object: {uavs} UAVs, {busy} %% busy (default: the table)')
     add_executor_options(parser, jobs=os.cpu_count() or 1)
     args = parser.parsed(argv)
     for option, value, wanted in (('--uavs', args.uavs, uavs), ('--busy', args.busy, busy)):
