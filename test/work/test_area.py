@@ -55,6 +55,14 @@ def test_a_strip_that_meets_a_hole_is_cut_in_two():
     assert [round(piece.path_length) for piece in pieces] == [300, 100, 100, 100, 100, 300]
 
 
+def test_a_zone_changes_no_strip_elsewhere():
+    work = field([(0.0, 0.0), (300.0, 40.0), (280.0, 230.0), (10.0, 200.0)], 20.0, direction=1.5)
+    zone = ThreatZone.cylinder('z', (250.0, 120.0), 25.0, 0.0, 100.0)
+    before, after = ({piece.path for piece in pieces_of(work, zones)
+                      if all(x < 220.0 for x, _, _ in piece.path)} for zones in ([], [zone]))
+    assert before == after != set()
+
+
 def test_an_area_inside_a_zone_is_cut_as_if_there_were_none():
     zone = ThreatZone.cylinder('z', (150.0, 100.0), 1000.0, 0.0, 100.0)
     assert pieces_of(field(SQUARE, 50.0), [zone]) == pieces_of(field(SQUARE, 50.0))

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable, Sequence
 
 from uav_task_alloc.errors import InvalidValue
-from uav_task_alloc.geometry.polygon import XY, edges
+from uav_task_alloc.geometry.polygon import XY, edges, signed_area
 from uav_task_alloc.geometry.polyline import polyline_length
 from uav_task_alloc.work.cells import (
     PlaneCell,
@@ -105,7 +105,9 @@ def _strips(given: Region, angle: float, crossed: Iterable[XY], width: float,
     strips: list[list[PlaneCell]] = [[] for _ in range(count)]
     for middle, cell in slab_cells(region, [*levels, *(low + k * step for k in range(count + 1))]):
         strips[min(count - 1, max(0, int((middle - low) / step)))].append(cell)
-    area = cells_area(cell for cells in strips for cell in cells)
+    # without the barred rings, so that a zone changes no strip elsewhere
+    holes = sum(abs(signed_area(hole)) for hole in given.holes)
+    area = max(0.0, abs(signed_area(given.outer)) - holes)
     scrap = min(_SCRAP * width * width, 2e-3 * area / count)
     ways: list[PlaneWay] = []
     for k, cells in enumerate(strips):
