@@ -55,8 +55,8 @@ class TransitLimits:
         altitude_min, altitude_max: [m] ENU.
         is_clear: whether a polyline [m] ENU enters no zone.
         stop: polled before each change that is tried; True ends the search for changes.
-        max_price: [s] of flight that the change of a return that cannot wait may cost; dearer ones
-            are left to the flight, where less is uncertain.
+        max_price: [s] of flight that the change of a return that cannot wait may cost; changes
+            that cost more are left to the flight, where less is uncertain.
     """
 
     altitude_min: float = -math.inf  # [m]

@@ -183,7 +183,7 @@ class OrdersAndEvents(RuleBasedStateMachine):
         assert answer.success == (name in before)
 
     def what_orders_demand(self):
-        """What the solver may do, what UAVs and users are told, and a plan made from nothing."""
+        """What the solver may do, states of UAVs, holds, reasons, and a plan without a start."""
         world = self.driver.world
         orders, tasks = world.orders, sorted(world.tasks_to_plan(), key=lambda task: task.id)
         uavs = [world.uav(uav_id) for uav_id in sorted(world.fleet.usable_ids())]
