@@ -79,4 +79,7 @@ def test_a_replay_serves_until_ctrl_c(folder):
                           stdout=subprocess.PIPE, stderr=subprocess.STDOUT) as process:
         assert process.stdout.readline().startswith(f'Page of {folder}: http://127.0.0.1:')
         process.send_signal(signal.SIGINT)
-        assert (process.wait(90), process.stdout.read()) == (130, '')
+        try:
+            assert (process.wait(90), process.stdout.read()) == (130, '')
+        finally:
+            process.kill()  # where it has not ended, leaving `with` would wait for it
