@@ -54,14 +54,17 @@ def check_number(place: str, value: float, low: float, high: float = math.inf,
     Raises:
         InvalidValue: it is outside, NaN or not a number.
     """
-    interval = f'{"(" if open_low else "["}{low:g}, {high:g}]'
     if isinstance(value, bool) or (not isinstance(value, (int, float)) and not hasattr(
             value, '__float__')):
-        raise InvalidValue(place, value, f'a number in {interval}')
+        raise InvalidValue(place, value, _number_in(low, high, open_low))
     number = float(value)
     if not low <= number <= high or (open_low and number == low):
-        raise InvalidValue(place, number, f'a number in {interval}')
+        raise InvalidValue(place, number, _number_in(low, high, open_low))
     return number
+
+
+def _number_in(low: float, high: float, open_low: bool) -> str:
+    return f'a number in {"(" if open_low else "["}{low:g}, {high:g}]'
 
 
 def check_count(place: str, many: Sized, most: int) -> None:

@@ -42,10 +42,12 @@ class BatteryWatch:
         self._checked = now
         turns: dict[str, float] = {}
         for uav_id, record in world.uav_records().items():
-            flight = self._planned_flight(uav_id, stamp)
-            left = self._seconds_left(record, flight, now) if flight else None
-            if left is None or flight is None:
+            metres, seconds = self._above_reserve(record)
+            flight = self._planned_flight(uav_id, stamp) if metres is not None else None
+            if metres is None or flight is None:
+                self._ways.pop(uav_id, None)
                 continue
+            left = self._seconds_left(record, flight, now, metres, seconds)
             turns[uav_id] = stamp + left
             if record.low:
                 continue
@@ -73,15 +75,17 @@ class BatteryWatch:
         flight = self._world.flights.of(uav_id, stamp)
         return flight and replace(flight, pace=FlightPace.of(self._world.uav(uav_id)))
 
-    def _seconds_left(self, record: UavRecord, flight: UavFlight, now: float) -> float | None:
-        """[s] until it has to turn; None: it is on the ground, or its range is not known."""
+    def _above_reserve(self, record: UavRecord) -> tuple[float | None, float | None]:
+        """Metres and seconds; no metres: it is on the ground, or its range is not known."""
         report = record.report
         if report.standby or record.silent or report.range is None or record.battery is None:
-            self._ways.pop(report.uav_id, None)
-            return None
-        metres, seconds = above_reserve(report, record.battery,
-                                        self._world.params.battery_reserve)
-        assert metres is not None  # the range is known
+            return None, None
+        return above_reserve(report, record.battery, self._world.params.battery_reserve)
+
+    def _seconds_left(self, record: UavRecord, flight: UavFlight, now: float, metres: float,
+                      seconds: float | None) -> float:
+        """[s] until it has to turn, with this much above the reserve of its battery."""
+        report = record.report
         speed = flight.pace.speed
         landing = max(0.0, report.position[2] - record.home[2]) / flight.pace.descent
         for search in (False, True):

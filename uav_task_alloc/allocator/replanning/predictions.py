@@ -48,7 +48,8 @@ class Predictions:
     def lists(self, stamp: float) -> dict[str, UavList]:
         """Return the lists in force with times from `stamp` [s], by UAV."""
         world = self._world
-        return {uav_id: world.lists.restamped(uav_id, stamp, world.flights.of(uav_id, stamp))
+        return {uav_id: world.lists.restamped(
+                    uav_id, stamp, world.flights.of(uav_id, stamp) if each.stops else None)
                 for uav_id, each in world.lists_in_force().items()}
 
     def _predict(self, lists: Mapping[str, UavList], now: float, stamp: float) -> None:

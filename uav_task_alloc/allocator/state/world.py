@@ -25,12 +25,7 @@ from uav_task_alloc.allocator.state.admission import Admission
 from uav_task_alloc.allocator.state.announcements import Announcements
 from uav_task_alloc.allocator.state.callbacks import RequestReplan
 from uav_task_alloc.allocator.state.deadlines import Deadlines
-from uav_task_alloc.allocator.state.fleet import (
-    Fleet,
-    UavRecord,
-    jump_distance,
-    replan_reasons,
-)
+from uav_task_alloc.allocator.state.fleet import Fleet, UavRecord, jump_distance, replan_reasons
 from uav_task_alloc.allocator.state.flights import Flights
 from uav_task_alloc.allocator.state.list_validity import ListValidity, ZonesWhenBuilt
 from uav_task_alloc.allocator.state.locked_tasks import can_fly, locked_tasks
@@ -368,7 +363,8 @@ class World:
         """Return the lists with ended tasks at their front, without those."""
         shorter = {uav_id: self.lists.without_ended(uav_id, self._ended, stamp,
                                                     self.flights.of(uav_id, stamp))
-                   for uav_id in self.lists.lists}
+                   for uav_id, each in self.lists.lists.items()
+                   if each.stops and self._ended(each.stops[0].task.id)}
         return {uav_id: each for uav_id, each in shorter.items() if each is not None}
 
     def lists_to_resend(self, stamp: float) -> dict[str, UavList]:
