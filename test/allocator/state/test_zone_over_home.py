@@ -199,7 +199,7 @@ def test_finding_19_tasks_of_a_uav_on_the_ground_inside_a_zone_have_that_reason(
 
 
 def test_finding_19_the_reason_names_uavs_blocked_on_the_ground():
-    driver = AllocatorDriver(plan=plan, route_end='home', solve_budget=0.01)
+    driver = AllocatorDriver(plan=plan, route_end='home', solve_budget=0.1)
     driver.world.set_zones([OVER], (), driver.now)
     driver.uav('a', 0.0, 0.0, 0.0, standby=True)
     driver.uav('b', 9000.0, 0.0, 50.0, range=10.0)
