@@ -10,6 +10,7 @@ from uav_task_alloc.nodes.ros.launch_arguments import (
     RespawnedNode,
     argument,
     declared,
+    existing_file,
     flag,
     node_action,
     optional_number,
@@ -31,6 +32,8 @@ ARGUMENTS = {
                       'Parameter file of the MAVLink bridge.'),
     'scenario': ('', 'Scenario file (YAML), whose origin, route end, seed and vehicles override '
                  'both parameter files; empty: none.'),
+    'terrain': ('', 'GeoTIFF of the ground, which legs keep clear of; empty: as in '
+                'allocator_params.'),
     'speedup': ('', 'How many times faster than real time a simulated fleet flies, 0.1 to 100, '
                 'for the live view; empty: measured by the clocks of the vehicles.'),
     'use_sim_time': ('false', 'true: all nodes live by /clock, which a simulator publishes.'),
@@ -59,6 +62,7 @@ def start(context: object) -> list:
         argument(context, name) for name in ('namespace', 'bridge_state_dir', 'scenario'))
     files = [parameter_file(context, name) for name in ('allocator_params', 'bridge_params')]
     parameters = fleet_parameters(load(path)) if path else {'allocator': {}, 'mavlink_bridge': {}}
+    ground = existing_file(context, 'terrain')
     clock = {'use_sim_time': True} if flag(context, 'use_sim_time') else {}
     viewers = [rviz_action(context, namespace, bool(clock))] if flag(context, 'rviz') else []
     record, speedup = record_file(context), optional_number(context, 'speedup')
@@ -71,7 +75,8 @@ def start(context: object) -> list:
             **({'scenario': path, 'stay': True} if path else {}),
             **({} if speedup is None else {'speedup': speedup})}, namespace=namespace))
     return [
-        *RespawnedNode('allocator', files[0], {**parameters['allocator'], **clock},
+        *RespawnedNode('allocator', files[0], {
+            **parameters['allocator'], **clock, **({'terrain': ground} if ground else {})},
                        namespace=namespace).start(),
         *RespawnedNode('mavlink_bridge', files[1], {**parameters['mavlink_bridge'], **clock},
                        {'state_dir': state_dir} if state_dir else {}, namespace=namespace,

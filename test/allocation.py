@@ -76,13 +76,13 @@ def as_plan(uavs, place, zones, routes, unassigned=None, route_end='hold', warm=
 class AllocatorDriver:
     """Drives an allocator over virtual time: methods that wait move the clock."""
 
-    def __init__(self, saved=None, plan=greedy, **params):
+    def __init__(self, saved=None, plan=greedy, terrain=None, **params):
         params.setdefault('background_budget', 0.0)
         params.setdefault('route_end', 'hold')
         params.setdefault('objective', 'distance')
         params.setdefault('list_interval', 0.0)
         self.now, self.plan, self.solves = 1000.0, plan, []
-        self.core = Allocator(AllocatorParams(**params), self.now, saved)
+        self.core = Allocator(AllocatorParams(**params), self.now, saved, terrain)
         self.core.set_kernels_ready()
         self.world = self.core.world
         self.lists, self.history, self.notes, self.allocations = {}, [], [], []

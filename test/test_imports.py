@@ -47,6 +47,7 @@ LEVELS = {
     'geometry.polyline': 0,  # the model has paths
     'geometry': 2,
     'terrain': 2,
+    'terrain_legs': 3,
     'objective': 2,
     'separation.rule': 0,  # the model has its conflicts
     'separation': 3,

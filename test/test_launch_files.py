@@ -184,6 +184,12 @@ def test_a_launched_bridge_saves_its_authority_where_the_argument_says(name):
         assert (values(bridge)['relaunch'] == 'automatic') is (name == 'demo')
 
 
+def test_a_launched_allocator_keeps_clear_of_the_ground_of_the_argument():
+    assert values(started('fleet')['allocator'])['terrain'] == ''
+    given = started('fleet', terrain=__file__)['allocator']
+    assert values(given)['terrain'] == __file__
+
+
 @pytest.mark.parametrize('name', ['demo', 'fleet'])
 def test_rviz_comes_with_the_nodes_when_it_is_asked_for(name, monkeypatch):
     monkeypatch.setattr(launch_stand_in, 'INSTALLED', {'rviz2', 'tf2_ros'})
@@ -202,6 +208,7 @@ def test_rviz_comes_with_the_nodes_when_it_is_asked_for(name, monkeypatch):
     ('demo', {'speedup': 'fast'}, 'speedup:=fast: expected a number'),
     ('demo', {'speedup': '1000'}, 'speedup = 1000.0: expected float in [0.1, 100]'),
     ('fleet', {'bridge_params': '/none.yaml'}, 'bridge_params:=/none.yaml: expected a parameter'),
+    ('fleet', {'terrain': '/none.tif'}, 'terrain:=/none.tif: expected a file'),
     ('fleet', {'speedup': 'fast'}, 'speedup:=fast: expected a number'),
     ('fleet', {'speedup': '1000'}, 'speedup = 1000.0: expected float in [0.1, 100]'),
     ('fleet', {'allocator_params': '/none.yaml'}, 'allocator_params:=/none.yaml: expected a para'),

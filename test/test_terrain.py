@@ -7,8 +7,10 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from uav_task_alloc.allocator.state.ground import read_ground
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.geometry.frames import Origin, to_enu_batch
+from uav_task_alloc.params import AllocatorParams
 from uav_task_alloc.terrain import Terrain, TerrainError, check_above, read_terrain
 
 ORIGIN = Origin(47.0, 8.0, 500.0)
@@ -122,6 +124,40 @@ def test_a_geotiff_in_degrees_and_one_in_metres(tmp_path):
         raster.write(flat, 1)
     assert read_terrain(path, ORIGIN).above_ground([(0.0, 0.0, 20.0)]) == pytest.approx(
         [8.0], abs=0.01)
+
+
+def written(path, size=NODES, crs='EPSG:4326', west=WEST, step=STEP, nodata=None):
+    """A flat GeoTIFF of `size` nodes each way from the north west; its path."""
+    rasterio = pytest.importorskip('rasterio')
+    place = {'transform': rasterio.Affine(step, 0.0, west, 0.0, -step, NORTH)} if step else {}
+    with rasterio.open(path, 'w', driver='GTiff', width=size, height=size, count=1, crs=crs,
+                       dtype='float32', nodata=nodata, **place) as raster:
+        raster.write(np.full((size, size), 512.0, 'float32'), 1)
+    return path
+
+
+@pytest.mark.filterwarnings('ignore::rasterio.errors.NotGeoreferencedWarning')
+@pytest.mark.parametrize(('made', 'why'), [
+    ({'size': 1}, '1 x 1 pixels: expected 2 x 2'),
+    ({'crs': None}, 'it has no projection'),
+    ({'step': 0.0}, 'it has no position'),
+    ({'crs': 'LOCAL_CS["site",UNIT["metre",1]]'}, 'its projection gives no degrees'),
+    ({'crs': 'EPSG:32632'}, r'it does not reach to \(0, 0\)'),  # degrees taken for metres
+    ({'west': 9.0}, r'it does not reach to \(0, 0\)'),
+    ({'size': 20}, r'it does not reach to \(0, 0\)'),
+    ({'nodata': 512.0}, 'it has no data')])
+def test_a_geotiff_that_is_not_the_ground_here_is_refused(tmp_path, made, why):
+    path = str(written(tmp_path / 'ground.tif', **made))
+    with pytest.raises(TerrainError, match=why):
+        read_ground(AllocatorParams(terrain=path), ORIGIN)
+    assert read_ground(AllocatorParams(), ORIGIN) is None
+
+
+def test_a_damaged_geotiff_is_refused(tmp_path):
+    path = written(tmp_path / 'ground.tif')
+    path.write_bytes(path.read_bytes()[:2000])
+    with pytest.raises(TerrainError, match=r'ground\.tif: .*expected a GeoTIFF'):
+        read_terrain(path, ORIGIN)
 
 
 def test_what_is_no_terrain_is_refused(tmp_path):

@@ -51,6 +51,10 @@ class AllocatorParams(FrameParams):
                                 unit='m')
     altitude_max: float = param(1e5, 'Highest detour, above the origin.', low=-1e5, high=1e5,
                                 unit='m')
+    terrain: str = param('', 'GeoTIFF of the ground, heights above mean sea level; empty: none.',
+                         fixed=True)
+    terrain_clearance: float = param(30.0, 'Distance that legs keep from the ground of '
+                                     '`terrain`.', low=0.0, high=10000.0, unit='m')
     settle: float = param(0.05, 'Quiet time that ends a burst of events; one solve a burst.',
                           low=0.0, high=10.0, unit='s')
     replan_margin: float = param(0.01, 'Share by which a plan must be shorter to replace the '

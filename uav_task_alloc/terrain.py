@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Sequence
 from itertools import pairwise
 from pathlib import Path
@@ -274,22 +275,33 @@ def read_terrain(path: Path, origin: Origin) -> Terrain:
         raise TerrainError(f"{path}: reading terrain needs rasterio: expected "
                            "pip install 'uav_task_alloc[terrain]'") from None
     try:
-        with rasterio.open(path) as raster:
+        with warnings.catch_warnings(), rasterio.open(path) as raster:
+            warnings.simplefilter('ignore')  # what it lacks is said below
             if raster.crs is None:
                 raise TerrainError(f'{path}: it has no projection: expected a GeoTIFF with one')
+            if raster.transform.is_identity or raster.transform.is_degenerate:
+                raise TerrainError(f'{path}: it has no position: expected a GeoTIFF with one')
             if raster.width * raster.height > _LARGEST or min(raster.width, raster.height) < 2:
                 raise TerrainError(f'{path}: {raster.width} x {raster.height} pixels: expected '
                                    f'2 x 2 to {_LARGEST} in all')
             heights = raster.read(1, masked=True).astype(np.float64).filled(np.nan)
             crs, (a, b, c, d, e, f) = raster.crs, tuple(~raster.transform)[:6]
-    except rasterio.errors.RasterioError as error:
+    except (rasterio.errors.RasterioError, MemoryError) as error:
         raise TerrainError(f'{path}: {error}: expected a GeoTIFF') from None
+    if not np.isfinite(heights).any():
+        raise TerrainError(f'{path}: it has no data: expected heights')
 
     def to_grid(longitude: _Floats, latitude: _Floats) -> tuple[_Floats, _Floats]:
-        xs, ys = transform('EPSG:4326', crs, longitude.tolist(), latitude.tolist())[:2]
+        try:
+            xs, ys = transform('EPSG:4326', crs, longitude.tolist(), latitude.tolist())[:2]
+        except Exception:  # errors of GDAL have no public base
+            raise TerrainError(f'{path}: its projection gives no degrees: expected one of the '
+                               'earth, and places within it') from None
         x, y = np.array(xs), np.array(ys)
         return a * x + b * y + c - 0.5, d * x + e * y + f - 0.5  # of the centres of pixels
-    return Terrain(heights, to_grid, origin, str(path))
+    found = Terrain(heights, to_grid, origin, str(path))
+    to_grid(np.array([origin.longitude]), np.array([origin.latitude]))
+    return found
 
 
 def check_above(terrain: Terrain, place: str, points: Sequence[Point]) -> None:

@@ -8,8 +8,9 @@ import pytest
 
 from uav_task_alloc import plan
 from uav_task_alloc.cli.plan_pieces import with_pieces
-from uav_task_alloc.cli.plan_terrain import check_ground, over_terrain
+from uav_task_alloc.cli.plan_terrain import check_ground, over_terrain, plan_over_terrain
 from uav_task_alloc.errors import InvalidValue
+from uav_task_alloc.geometry.zones import path_is_clear
 from uav_task_alloc.model.route_stops import route_points
 from uav_task_alloc.scenario import parse
 from uav_task_alloc.terrain import Terrain
@@ -48,7 +49,8 @@ def test_legs_and_ways_keep_clear_of_a_ridge():
     tasks = {timed.task.id: timed.task for timed in loaded.tasks}
     uav = loaded.uavs[0].uav
     flat = plan([uav], list(tasks.values()), budget=0.05, seed=1)
-    higher = over_terrain(loaded, flat, terrain, 30.0)
+    higher, blocked = over_terrain(loaded, flat, terrain, 30.0)
+    assert blocked == {}
     assert higher.routes == flat.routes
     assert higher.distance > flat.distance
     points = route_points(uav, higher, tasks)
@@ -59,8 +61,40 @@ def test_legs_and_ways_keep_clear_of_a_ridge():
         elif a != b:
             assert a[:2] == b[:2]  # upright
     assert len(tasks['path#1'].path) > 3
-    with pytest.raises(InvalidValue, match='expected at most altitude_max = 20 m'):
-        over_terrain(replace(loaded, altitude_max=20.0), flat, terrain, 30.0)
+    _, blocked = over_terrain(replace(loaded, altitude_max=20.0), flat, terrain, 30.0)
+    assert 'altitude_max = 20 m is in the way' in blocked['hut']
+    home = plan([uav], list(tasks.values()), budget=0.05, seed=1, route_end='home')
+    with pytest.raises(InvalidValue, match='uav_1: leg to its home'):
+        over_terrain(replace(loaded, altitude_max=20.0), home, terrain, 30.0)
+
+
+@pytest.mark.parametrize(('shape', 'reached'), [
+    ('{shape: cylinder, center: [0, 0], radius: 200, z_min: 150, z_max: 900}', True),
+    ('{shape: polygon, z_min: 150, vertices: [[-100, -2600], [100, -2600], [100, 2600],'
+     ' [-100, 2600]], z_max: 900}', False)])
+def test_a_zone_above_a_ridge_is_flown_around_or_the_task_left_out(shape, reached):
+    given = parse(SCENARIO.replace('uavs:', 'zones:\n  - {id: air, ' + shape[1:] + '\nuavs:'))
+    terrain, ends = ridge(given.origin), ('hut',)
+    loaded = with_pieces(replace(given, tasks=tuple(
+        timed for timed in given.tasks if timed.task.id in ends)), terrain)
+    uav = loaded.uavs[0].uav
+
+    def solve(some):
+        return plan([uav], [timed.task for timed in some.tasks], [
+            timed.zone for timed in some.zones], budget=0.02, seed=1, clearance=some.clearance)
+
+    flat = solve(loaded)
+    assert flat.legs['uav_1'][0].via == ()  # below the zone
+    higher = plan_over_terrain(loaded, flat, terrain, 30.0, solve)
+    if not reached:
+        assert higher.routes['uav_1'] == ()
+        assert 'a zone or altitude_max = 500 m is in the way' in higher.unassigned['hut']
+        return
+    tasks = {timed.task.id: timed.task for timed in loaded.tasks}
+    points = route_points(uav, higher, tasks)
+    assert path_is_clear(points, [timed.zone for timed in loaded.zones], loaded.clearance)
+    assert all(terrain.least_clearance(a, b)[0] >= 29.8 for a, b in pairwise(points)
+               if a[:2] != b[:2])
 
 
 def test_heights_above_ground_are_those_of_the_task():

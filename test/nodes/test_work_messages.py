@@ -79,7 +79,7 @@ def test_points_in_wgs84_are_longitude_latitude_and_height_above_the_origin():
     ('line', {'path': []}, r'task w: path = \(\): expected at least 2 points'),
     ('line', {'path': [Point(x=math.nan), Point()]}, r'task w: path\[0\]'),
     ('line', {'path': [Point(x=float(k)) for k in range(1001)]}, 'task w: path'),
-    ('line', {'vertical': 1}, r'task w: vertical = 1: expected ORIGIN \(0\)'),
+    ('line', {'vertical': 2}, r'task w: vertical = 2: expected ORIGIN \(0\) or TERRAIN \(1\)'),
     ('line', {'payload': 2.0}, 'task w: payload'),
     ('line', {'heading': 7.0}, 'task w: heading = 7.0'),
     ('line', {'heading': math.inf}, 'task w: heading = inf'),

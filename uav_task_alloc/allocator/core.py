@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
+from functools import partial
 
 from uav_task_alloc.allocator.battery_watch import BatteryWatch
 from uav_task_alloc.allocator.persistence import unsaved_rows
@@ -41,6 +42,7 @@ from uav_task_alloc.journal import JournalRow
 from uav_task_alloc.model import Plan, ThreatZone
 from uav_task_alloc.params import AllocatorParams
 from uav_task_alloc.separation.monitor import MonitorStep
+from uav_task_alloc.terrain import Terrain
 
 # [s] after a restart, from the first report of the last UAV on, in which no task changes its
 # UAV: the bridge repeats events that were missed after 2 s
@@ -59,6 +61,7 @@ class Allocator:
         params: of the node.
         now: [s] steady clock.
         saved: what the journal restored; None: nothing.
+        terrain: the ground; None: none is known.
 
     Arguments of methods:
         now: [s] steady clock.
@@ -71,10 +74,11 @@ class Allocator:
     """
 
     def __init__(self, params: AllocatorParams, now: float,
-                 saved: SavedState | None = None) -> None:
+                 saved: SavedState | None = None, terrain: Terrain | None = None) -> None:
         saved = saved or SavedState()
         self.schedule = Schedule()
-        self.world = World(params, saved, make_safe_paths, self.schedule.add_trigger)
+        self.world = World(params, saved, partial(make_safe_paths, terrain=terrain),
+                           self.schedule.add_trigger, terrain)
         self.approvals = Approvals(self.world)
         self.separation = SeparationWatch(self.world)
         self.batteries = BatteryWatch(self.world)
@@ -196,12 +200,12 @@ class Allocator:
             return None
         if schedule.settled(now, params.settle):
             trigger = schedule.begin(now)
-            if world.any_usable() or waiting_uavs(world, stamp):
+            if world.fleet.usable_ids() or waiting_uavs(world, stamp):
                 return replan_problem(world, self._best, trigger, background=False, stamp=stamp)
             self._apply(Plan({}), trigger, True, now, stamp)
             schedule.end(now)
         elif (params.background_budget > 0.0 and schedule.rested(now, params.background_period)
-              and world.any_usable() and world.tasks.open() and not self.approvals.quiet):
+              and world.fleet.usable_ids() and world.tasks.open() and not self.approvals.quiet):
             schedule.begin(now)
             return replan_problem(world, self._best, 'background', background=True,
                                   stamp=stamp)
@@ -321,7 +325,20 @@ class Allocator:
         return task_id in self.world.task_records()
 
 
-def make_safe_paths(zones: Sequence[ThreatZone], params: AllocatorParams) -> SafePaths:
-    """Return the paths around zones; imports the kernels, which a start must not wait for."""
+def make_safe_paths(zones: Sequence[ThreatZone], params: AllocatorParams,
+                    terrain: Terrain | None = None) -> SafePaths:
+    """Return the paths around zones, over the ground where that is known.
+
+    Args:
+        zones: in force.
+        params: of the allocator.
+        terrain: the ground; None: none is known.
+
+    Returns:
+        Paths; imports the kernels, which a start must not wait for.
+    """
+    if terrain is not None:
+        from uav_task_alloc.allocator.replanning.terrain_paths import TerrainPaths
+        return TerrainPaths(zones, params, terrain)
     from uav_task_alloc.allocator.replanning.zone_paths import ZonePaths
     return ZonePaths(zones, params)

@@ -132,7 +132,7 @@ class OperatorDesk:
         before = {uav_id for uav_id in uavs if orders.keeps_tasks(uav_id)}
         with orders.trial(change.add, (order.id for order in change.remove)):
             after = {uav_id for uav_id in uavs if orders.keeps_tasks(uav_id)}
-            return before != after or not self._world.any_usable()
+            return before != after or not self._world.fleet.usable_ids()
 
     def _nothing_to_do(self, request: OrderRequest, change: OrderChange, now: float,
                        stamp: float) -> OrderAnswer:

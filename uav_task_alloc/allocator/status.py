@@ -140,7 +140,7 @@ def health_warnings(world: World, journal_error: str, solver_error: str = '',
     late = sorted(world.deadlines.late)
     warnings += [f'{_counted(len(late), "task")} late, {late[0]}: '
                  f'{world.deadlines.texts[late[0]]}'] if late else []
-    return warnings + (['no UAV available'] if open_tasks and not world.any_usable() else [])
+    return warnings + (['no UAV available'] if open_tasks and not world.fleet.usable_ids() else [])
 
 
 def _uav_warnings(world: World, stamp: float | None) -> list[str]:

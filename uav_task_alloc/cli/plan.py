@@ -25,7 +25,7 @@ from uav_task_alloc.cli.outputs import (
 )
 from uav_task_alloc.cli.plan_json import plan_json
 from uav_task_alloc.cli.plan_pieces import piece_kinds, short_names, with_pieces
-from uav_task_alloc.cli.plan_terrain import check_ground, over_terrain
+from uav_task_alloc.cli.plan_terrain import check_ground, plan_over_terrain
 from uav_task_alloc.cli.plan_times import has_times, times_text
 from uav_task_alloc.cli.progress import SolveProgress, log_line
 from uav_task_alloc.errors import InvalidValue, first_of
@@ -65,7 +65,8 @@ def main(argv: Sequence[str]) -> int:
             first = early.wait()
             result = first or solve_scenario(loaded, args, progress.stop, progress.on_iteration)
     if terrain:
-        result = over_terrain(loaded, result, terrain, args.terrain_clearance)
+        result = plan_over_terrain(loaded, result, terrain, args.terrain_clearance,
+                                   lambda rest: solve_scenario(rest, args, progress.stop))
     with early.ending(INTERRUPTED):
         _answer(loaded, result, args)
         if first:

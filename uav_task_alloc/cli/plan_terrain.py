@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from itertools import pairwise
 
 from uav_task_alloc.errors import InvalidValue
-from uav_task_alloc.model import Leg, Plan, Point, ThreatZone
+from uav_task_alloc.geometry.polyline import polyline_length
+from uav_task_alloc.model import Leg, Plan, Point
 from uav_task_alloc.model.route_stops import route_stops
 from uav_task_alloc.scenario.values import Scenario
 from uav_task_alloc.terrain import Terrain, check_above
+from uav_task_alloc.terrain_legs import TerrainLegs
 
 _SUNK = 5.0  # [m] below the ground: more is no inaccuracy of the raster
 
@@ -50,7 +52,29 @@ def check_ground(loaded: Scenario, terrain: Terrain, clearance: float) -> list[s
     return lines
 
 
-def over_terrain(loaded: Scenario, result: Plan, terrain: Terrain, clearance: float) -> Plan:
+class _Zones:
+    """The zones of a scenario, as legs over terrain ask for them."""
+
+    def __init__(self, loaded: Scenario) -> None:
+        self._loaded, self._zones = loaded, [timed.zone for timed in loaded.zones]
+
+    def way_around(self, a: Point, b: Point, low: float) -> tuple[Point, ...] | None:
+        """Return the points of the shortest way around the zones."""
+        from uav_task_alloc.geometry.detour import find_detour  # imports numba
+        if low >= self._loaded.altitude_max:
+            return () if self.grade((a, b)) else None
+        found = find_detour(a, b, self._zones, clearance=self._loaded.clearance,
+                            altitude_min=low, altitude_max=self._loaded.altitude_max)
+        return None if math.isinf(found.length) else found.points
+
+    def grade(self, points: Sequence[Point]) -> int:
+        """Return 1 for a line that enters no zone."""
+        from uav_task_alloc.geometry.zones import path_is_clear  # imports numba
+        return int(path_is_clear(points, self._zones, self._loaded.clearance))
+
+
+def over_terrain(loaded: Scenario, result: Plan, terrain: Terrain,
+                 clearance: float) -> tuple[Plan, dict[str, str]]:
     """A plan whose legs keep clear of the ground.
 
     Args:
@@ -60,42 +84,60 @@ def over_terrain(loaded: Scenario, result: Plan, terrain: Terrain, clearance: fl
         clearance: [m]; tasks that are lower are left and reached upright.
 
     Returns:
-        The plan with points added to its legs; lengths count them, times do not.
+        The plan with points added to its legs, where lengths count them and times do not; and why
+        tasks cannot be reached, by their ids: their legs are as they were.
 
     Raises:
-        InvalidValue: a leg would have to enter a zone, or be higher than altitude_max.
+        InvalidValue: no leg leads home.
         TerrainError: no data.
     """
     known = {timed.task.id: timed.task for timed in loaded.tasks}
-    zones, legs, more = [timed.zone for timed in loaded.zones], {}, 0.0
+    over = TerrainLegs(terrain, clearance, loaded.altitude_max, _Zones(loaded))
+    legs, blocked, more = {}, dict[str, str](), 0.0
+    why = (f'{clearance:g} m above the ground a zone or altitude_max = '
+           f'{loaded.altitude_max:g} m is in the way')
     for uav in loaded.uavs:
         at, found = uav.position, []
         for leg, stop in zip(result.legs.get(uav.id, ()), route_stops(
                 result, uav.id, known, uav.home), strict=False):
-            line = (at, *stop.via, stop.points[0])
-            higher = [at]
-            for a, b in pairwise(line):
-                higher += [*terrain.lifted(a, b, clearance), b]
-            _check_leg(loaded, zones, line, higher, f'{uav.id}: leg to {stop.task or "its home"}')
-            length = math.fsum(math.dist(a, b) for a, b in pairwise(higher))
+            via = over.over((at, *stop.via, stop.points[0]))
+            if via is None and stop.task is None:
+                raise InvalidValue(f'{uav.id}: leg to its home', stop.points[0],
+                                   f'a way over the terrain: {why}')
+            if via is None:
+                blocked[stop.task or ''] = f'no safe path for {uav.id}: {why}'
+                via = stop.via
+            length = polyline_length((at, *via, stop.points[0]))
             more += max(0.0, length - leg.length)
-            found.append(leg if len(higher) == len(line) else Leg(tuple(higher[1:-1]), length))
+            found.append(leg if via == tuple(stop.via) else Leg(via, length))
             at = stop.points[-1]
         legs[uav.id] = tuple(found)
-    return replace(result, legs=legs, distance=result.distance + more)
+    return replace(result, legs=legs, distance=result.distance + more), blocked
 
 
-def _check_leg(loaded: Scenario, zones: Sequence[ThreatZone], line: Sequence[Point],
-               higher: Sequence[Point], place: str) -> None:
-    """Check points that were added. Raises InvalidValue."""
-    from uav_task_alloc.geometry.zones import path_is_clear  # imports numba
-    top = max((z for _, _, z in higher[1:-1]), default=-math.inf)
-    if len(higher) == len(line):
-        return
-    if top > loaded.altitude_max:
-        raise InvalidValue(f'{place}: height over the terrain', round(top, 1),
-                           f'at most altitude_max = {loaded.altitude_max:g} m')
-    if path_is_clear(line, zones, loaded.clearance) and not path_is_clear(
-            higher, zones, loaded.clearance):
-        raise InvalidValue(f'{place}: way over the terrain', round(top, 1),
-                           'a height at which no zone is in the way; see --altitude-max')
+def plan_over_terrain(loaded: Scenario, result: Plan, terrain: Terrain, clearance: float,
+                      solve: Callable[[Scenario], Plan]) -> Plan:
+    """A plan over the ground, without the tasks that no leg over it leads to.
+
+    Args:
+        loaded: the scenario.
+        result: a plan of it.
+        terrain: the ground.
+        clearance: [m] that legs keep.
+        solve: plans a scenario again, without such tasks.
+
+    Returns:
+        The plan; such tasks are unassigned, with the reason.
+
+    Raises:
+        InvalidValue, TerrainError: as `over_terrain`.
+    """
+    left_out = dict[str, str]()
+    while True:
+        higher, blocked = over_terrain(loaded, result, terrain, clearance)
+        if not blocked:
+            return replace(higher, unassigned={**higher.unassigned, **left_out})
+        left_out |= blocked
+        loaded = replace(loaded, tasks=tuple(
+            timed for timed in loaded.tasks if timed.task.id not in blocked))
+        result = solve(loaded)

@@ -23,6 +23,7 @@ from uav_task_alloc.allocator.persistence.persistence import Persistence
 from uav_task_alloc.allocator.records import LogNote, ReplanAnswer, ReplanProblem, TaskVerdict
 from uav_task_alloc.allocator.replanning import planning
 from uav_task_alloc.allocator.replanning.worker import Worker
+from uav_task_alloc.allocator.state.ground import read_ground
 from uav_task_alloc.allocator.status import health_values, health_warnings
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.geometry.frames import Origin
@@ -90,9 +91,10 @@ class AllocatorNode(Node):
                              params.origin__altitude_amsl)
         self.origins = OriginCheck(self, self.origin, lambda reason: self.refusals.report(
             'fleet_origin', '', reason))
+        terrain = read_ground(params, self.origin)
         self.persistence = Persistence(params.state_dir, self.get_logger().error, self.origin,
                                        _LOCK_TIMEOUT)
-        self.core = Allocator(params, time.monotonic(), self.persistence.saved)
+        self.core = Allocator(params, time.monotonic(), self.persistence.saved, terrain)
         self.world = self.core.world
         self.results: deque[ReplanAnswer | None] = deque()  # of the worker
         self.background = False  # the running solve is one between events

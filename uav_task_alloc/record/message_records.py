@@ -37,6 +37,7 @@ ORDER = 'order '  # a key of an allocator begins so, and ends with the id of an 
 BATTERY_RESERVE = 'battery reserve'  # key of an allocator: share, see its parameter
 NOTHING = 'nothing is needed'  # value of `given_back_by` while the bridge has authority
 _FRAME_LOCAL, _FRAME_WGS84 = 0, 1  # of a Task message
+_TERRAIN = 1  # `vertical` of a Task message
 
 
 def constant_name(names: tuple[str, ...], value: int) -> str:
@@ -75,7 +76,8 @@ def announcement_record(msg: _Message, origin: Origin | None) -> RecordBody:
         if position is not None:
             tasks.append(
                 {'id': task.task_id, 'position': position, 'value': finite_or_none(task.value),
-                 'service': from_stamp(task.service_time), **_window(task), **shape}
+                 'service': from_stamp(task.service_time), **_window(task), **shape,
+                 **({'vertical': 'TERRAIN'} if above_ground(task) else {})}
             )
     action = constant_name(EVENT_ACTIONS, msg.action)
     return {'kind': 'announcement', 'action': action, 'tasks': tasks}
@@ -96,7 +98,7 @@ def task_position(task: _Message, origin: Origin | None) -> Point | None:
         origin: of the ENU frame; None: unknown.
 
     Returns:
-        [m] ENU; None for WGS84 without an origin.
+        [m] ENU, z above the ground where `vertical` is TERRAIN; None for WGS84 without an origin.
 
     Raises:
         InvalidValue: frame or coordinates are invalid.
@@ -111,7 +113,17 @@ def task_position(task: _Message, origin: Origin | None) -> Point | None:
     check_number(place + 'latitude', task.latitude, -90.0, 90.0)
     check_number(place + 'longitude', task.longitude, -180.0, 180.0)
     check_number(place + 'altitude', task.altitude, -1e5, 1e5)
-    return to_enu(origin, task.latitude, task.longitude, origin.altitude_amsl + task.altitude)
+    x, y, z = to_enu(origin, task.latitude, task.longitude, origin.altitude_amsl + task.altitude)
+    return x, y, task.altitude if above_ground(task) else z
+
+
+def above_ground(task: _Message) -> bool:
+    """Return whether the heights of a Task message are above the ground, not the origin.
+
+    Args:
+        task: not yet checked; recordings of earlier versions have no such field.
+    """
+    return getattr(task, 'vertical', 0) == _TERRAIN
 
 
 def origin_record(msg: _Message) -> RecordBody:

@@ -26,9 +26,16 @@ class FakePaths:
     def clear(self, *points):
         return not self.cut & set(points)
 
+    leg_clear = clear
+
+    def why_no_leg(self, a, b):
+        return ''
+
     def rest(self, position, leg, goal):
         points = (position, *leg.via, goal)
         return sum(map(math.dist, points, points[1:])) if self.clear(*points) else None
+
+    rest_of_leg = rest
 
 
 def build(paths, returns=False, published=None, legs=None):
@@ -38,12 +45,13 @@ def build(paths, returns=False, published=None, legs=None):
 def test_arrivals_count_flight_and_service():
     new, unreachable = build(FakePaths())
     assert [stop.eta for stop in new.stops] == [10.0, 25.0]
-    assert (new.distance, new.returns, unreachable) == (200.0, False, [])
+    assert (new.distance, new.returns, unreachable) == (200.0, False, {})
 
 
 def test_a_task_that_no_path_leads_to_is_left_out():
     new, unreachable = build(FakePaths(closed=[TASKS[0].position]))
-    assert (new.task_ids, unreachable, new.distance) == (('t2',), ['t1'], 200.0)
+    assert (new.task_ids, unreachable, new.distance) == (
+        ('t2',), {'t1': 'no safe path for a'}, 200.0)
 
 
 @pytest.mark.parametrize(('closed', 'returns', 'distance'), [

@@ -239,8 +239,8 @@ def build_lists(world: World, chosen: Plan, stamp: float) -> BuiltLists:
             built.lists[uav_id] = world.list_of(uav_id)
             continue
         unreachable = _build(world, built, uav_id, tasks, home, legs, stamp, backward)
-        built.left_out.update((task_id, f'no safe path for {uav_id}') for task_id in unreachable)
-        built.zones_when_built[uav_id] = world.paths(), world.home_of(uav_id)
+        built.left_out.update(unreachable)
+        built.zones_when_built[uav_id] = world.paths(), world.uav_records()[uav_id].home
     for each in world.ordered.sequences(returns).values():
         built.left_out.update(dict.fromkeys(each.left_out, each.why))
     # unknown UAVs, too: one that returns must not fly what others have
@@ -252,8 +252,8 @@ def build_lists(world: World, chosen: Plan, stamp: float) -> BuiltLists:
 
 def _build(world: World, built: BuiltLists, uav_id: str, tasks: Sequence[Task], returns: bool,
            legs: Mapping[LegKey, Leg], stamp: float = 0.0,
-           backward: Collection[str] = ()) -> list[str]:
-    """Build the list of a known UAV; returns the tasks that it cannot reach."""
+           backward: Collection[str] = ()) -> dict[str, str]:
+    """Build the list of a known UAV; returns why it cannot reach tasks, by their ids."""
     uav = world.uav(uav_id)
     new, unreachable = build_task_list(uav, tasks, returns, legs, world.list_of(uav_id),
                                        world.paths(), world.flights.of(uav_id, stamp),

@@ -34,7 +34,7 @@ def build_task_list(uav: Uav, tasks: Sequence[Task], returns: bool,
                     paths: SafePaths,
                     flight: UavFlight | None = None,
                     keep: bool = False,
-                    backward: Collection[str] = ()) -> tuple[UavList, list[str]]:
+                    backward: Collection[str] = ()) -> tuple[UavList, dict[str, str]]:
     """Build the list of a route from the present position of a UAV.
 
     Args:
@@ -51,10 +51,10 @@ def build_task_list(uav: Uav, tasks: Sequence[Task], returns: bool,
         backward: ids of the tasks whose paths are flown from the last point.
 
     Returns:
-        The list, and the ids of the tasks that no safe path leads to.
+        The list, and why no safe path leads to a task, by its id.
     """
     stops: list[ListStop] = []
-    unreachable: list[str] = []
+    unreachable: dict[str, str] = {}
     before, place = _START, uav.position
     for task in tasks:
         new = ListStop(task, Leg((), 0.0), 0.0, reversed=task.id in backward)
@@ -62,7 +62,8 @@ def build_task_list(uav: Uav, tasks: Sequence[Task], returns: bool,
         leg = _steady_leg(old, before == _START, place, paths, _planned_leg(
             legs, _leg_key(uav.id, before, task.id), place, new.entry, paths), keep)
         if leg is None or not paths.clear(*new.way):
-            unreachable.append(task.id)
+            why = paths.why_no_leg(place, new.entry) if leg is None else ''
+            unreachable[task.id] = f'no safe path for {uav.id}' + (f': {why}' if why else '')
             continue
         stops.append(replace(new, leg=leg, begin_after=old.begin_after if old else 0.0))
         before, place = task.id, new.exit
@@ -78,7 +79,7 @@ def _leg_home(uav: Uav, before: str, place: Point, legs: Mapping[LegKey, Leg],
               published: UavList, paths: SafePaths) -> Leg | None:
     goal = uav.home or uav.position
     if before == _START and published.returns and not published.stops:  # perhaps under way
-        metres = paths.rest(place, Leg(published.end_via, 0.0), goal)
+        metres = paths.rest_of_leg(place, Leg(published.end_via, 0.0), goal)
         if metres is not None:
             return Leg(published.end_via, metres)
     return _planned_leg(legs, _leg_key(uav.id, before, _HOME), place, goal, paths)
@@ -92,7 +93,7 @@ def _planned_leg(legs: Mapping[LegKey, Leg], key: LegKey, a: Point, b: Point,
                  paths: SafePaths) -> Leg | None:
     """The leg of the plan while it is safe, else a new one."""
     leg = legs.get(key)
-    if leg is not None and paths.clear(a, *leg.via, b):
+    if leg is not None and paths.leg_clear(a, *leg.via, b):
         return Leg(leg.via, polyline_length((a, *leg.via, b)))
     return paths.leg(a, b)
 
@@ -106,9 +107,9 @@ def _steady_leg(stop: ListStop | None, first: bool, place: Point, paths: SafePat
     if first and stop.task.path and way_ahead(place, stop):
         return Leg((), 0.0)
     if first:
-        metres = paths.rest(place, old, stop.entry)
+        metres = paths.rest_of_leg(place, old, stop.entry)
     else:
-        metres = old.length if paths.clear(place, *old.via, stop.entry) else None
+        metres = old.length if paths.leg_clear(place, *old.via, stop.entry) else None
     if metres is None:
         return fresh
     keep = keep and first

@@ -12,7 +12,7 @@ from itertools import pairwise
 import numpy as np
 
 from uav_task_alloc.geometry.detour import Detour, find_detour
-from uav_task_alloc.geometry.obstacles import blocked, pack
+from uav_task_alloc.geometry.obstacles import Floats, Obstacles, blocked, pack
 from uav_task_alloc.geometry.polyline import points_passed, polyline_length
 from uav_task_alloc.geometry.search_budget import SearchBudget
 from uav_task_alloc.model import Leg, Point, ThreatZone
@@ -45,9 +45,8 @@ class ZonePaths:
         self._bare = pack(self.zones)
         self._wide = pack(self.zones, 0.5 * params.clearance)
         self._planned = pack(self.zones, params.clearance)
-        rows = self._wide.rows
-        self._low = np.stack([rows['x0'], rows['y0'], rows['z0']], axis=1)
-        self._high = np.stack([rows['x1'], rows['y1'], rows['z1']], axis=1)
+        self._low, self._high = _boxes(self._wide)
+        self._planned_boxes = _boxes(self._planned)
 
     def leg(self, a: Point, b: Point) -> Leg | None:
         """Return the shortest safe leg from a to b; None if none was found in the budget."""
@@ -61,12 +60,17 @@ class ZonePaths:
             return f'its home is inside zone {", ".join(found.goal_inside)}'
         return 'none was found in the time' if found.given_up else 'zones close it off'
 
-    def _find(self, a: Point, b: Point) -> Detour:
+    def why_no_leg(self, a: Point, b: Point) -> str:
+        """Return '': what is in the way is a zone."""
+        return ''
+
+    def _find(self, a: Point, b: Point, low: float | None = None) -> Detour:
         """Search with a bounded budget, as this runs in the thread of the callbacks."""
         params, budget = self.params, SearchBudget()
         budget.start_stage(_MAX_WORK)
         return find_detour(a, b, self.zones, clearance=params.clearance,
-                           altitude_min=params.altitude_min, altitude_max=params.altitude_max,
+                           altitude_min=params.altitude_min if low is None else low,
+                           altitude_max=params.altitude_max,
                            budget=budget, obstacles=self._planned)
 
     def around(self, point: Point, up: float = 0.0, wide: bool = False) -> str:
@@ -87,12 +91,17 @@ class ZonePaths:
 
     def clear(self, *points: Point) -> bool:
         """Return whether a polyline enters no zone. O(zones) a segment, mostly box tests."""
-        return not self.zones or not any(self._cut(a, b) for a, b in pairwise(points))
+        return not self.zones or not any(
+            _cut(self._wide, self._low, self._high, a, b) for a, b in pairwise(points))
 
-    def _cut(self, a: Point, b: Point) -> bool:
-        near = ((np.maximum(a, b) >= self._low) & (np.minimum(a, b) <= self._high)).all(axis=1)
-        rows = self._wide.rows
-        return any(blocked(rows[k], *a, *b, -np.inf, True) for k in np.flatnonzero(near))
+    def planned_clear(self, *points: Point) -> bool:
+        """Return whether a polyline keeps the whole clearance from all zones."""
+        return not self.zones or not any(
+            _cut(self._planned, *self._planned_boxes, a, b) for a, b in pairwise(points))
+
+    def leg_clear(self, *points: Point) -> bool:
+        """Return whether a leg with these points is safe: it enters no zone."""
+        return self.clear(*points)
 
     def rest(self, position: Point, leg: Leg, goal: Point) -> float | None:
         """Return the length [m] still to fly of a leg under way; None if a zone cuts it."""
@@ -102,3 +111,21 @@ class ZonePaths:
             if self.clear(*points):
                 return polyline_length(points)
         return None
+
+    def rest_of_leg(self, position: Point, leg: Leg, goal: Point) -> float | None:
+        """Return the length [m] still to fly of a leg to a task; None if a zone cuts it."""
+        return self.rest(position, leg, goal)
+
+
+def _boxes(obstacles: Obstacles) -> tuple[Floats, Floats]:
+    """Lowest and highest corners (n, 3) [m] of the boxes around obstacles."""
+    rows = obstacles.rows
+    return (np.stack([rows['x0'], rows['y0'], rows['z0']], axis=1),
+            np.stack([rows['x1'], rows['y1'], rows['z1']], axis=1))
+
+
+def _cut(obstacles: Obstacles, low: Floats, high: Floats, a: Point, b: Point) -> bool:
+    """Whether a segment enters an obstacle."""
+    near = ((np.maximum(a, b) >= low) & (np.minimum(a, b) <= high)).all(axis=1)
+    rows = obstacles.rows
+    return any(blocked(rows[k], *a, *b, -np.inf, True) for k in np.flatnonzero(near))

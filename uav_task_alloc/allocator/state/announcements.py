@@ -14,11 +14,13 @@ from uav_task_alloc.allocator.records import (
 )
 from uav_task_alloc.allocator.state.callbacks import Note, RequestReplan
 from uav_task_alloc.allocator.state.deadlines import Deadlines
+from uav_task_alloc.allocator.state.ground import Ground
 from uav_task_alloc.allocator.state.published_lists import PublishedLists
 from uav_task_alloc.allocator.state.tasks import TaskRegistry, verdict_texts
 from uav_task_alloc.allocator.state.works import Works
-from uav_task_alloc.errors import first_of
+from uav_task_alloc.errors import InvalidValue, first_of
 from uav_task_alloc.model import Task
+from uav_task_alloc.terrain import TerrainError
 from uav_task_alloc.work.pieces import Work
 
 
@@ -29,6 +31,7 @@ class Announcements:
 
     Args:
         tasks, works, deadlines: the present state.
+        ground: below the tasks.
         note, request_replan: of the world.
         recut_why: at the start.
 
@@ -40,9 +43,10 @@ class Announcements:
         now: [s] steady clock.
     """
 
-    def __init__(self, tasks: TaskRegistry, works: Works, deadlines: Deadlines, note: Note,
-                 request_replan: RequestReplan, recut_why: str = '') -> None:
+    def __init__(self, tasks: TaskRegistry, works: Works, deadlines: Deadlines, ground: Ground,
+                 note: Note, request_replan: RequestReplan, recut_why: str = '') -> None:
         self._tasks, self._works, self._deadlines = tasks, works, deadlines
+        self._ground = ground
         self._note, self._request_replan = note, request_replan
         self.recut_why = recut_why
 
@@ -51,7 +55,12 @@ class Announcements:
         """ADD or UPDATE; returns a verdict for each."""
         add = action is AnnouncementAction.ADD
         verdicts = []
-        for item in items:
+        for given in items:
+            try:
+                item = self._ground.resolved(given)
+            except (InvalidValue, TerrainError) as error:
+                verdicts.append(self._rejected(given, str(error), stamp))
+                continue
             if isinstance(item, Work):
                 verdicts.append((self._works.add if add else self._works.update)(item, stamp))
             elif item.id in self._works.records:
@@ -73,6 +82,13 @@ class Announcements:
         if task_id in self._works.records:
             return TaskVerdict(task_id, False, reason)
         return self._tasks.reject(task_id, reason, stamp)
+
+    def _rejected(self, item: Task | Work, why: str, stamp: float) -> TaskVerdict:
+        """Reject what has no place above the ground."""
+        task_id = item.task.id if isinstance(item, Work) else item.id
+        if task_id in self._works.records:
+            return TaskVerdict(task_id, False, why)
+        return self._tasks.reject(task_id, why, stamp)
 
     def cut_again(self, stamp: float) -> bool:
         """Cut all open work again where that is due; returns whether any has changed."""

@@ -29,6 +29,9 @@ class SafePaths(Protocol):
     def why_none(self, a: Point, b: Point) -> str:
         """Return why there is no safe path from a to the home b."""
 
+    def why_no_leg(self, a: Point, b: Point) -> str:
+        """Return why the ground leaves no leg from a to b; '' where it is not the cause."""
+
     def around(self, point: Point, up: float = 0.0, wide: bool = False) -> str:
         """Return the id of the first zone around a point, or around one at most `up` [m] above.
 
@@ -38,8 +41,14 @@ class SafePaths(Protocol):
     def clear(self, *points: Point) -> bool:
         """Return whether a polyline enters no zone."""
 
+    def leg_clear(self, *points: Point) -> bool:
+        """Return whether a leg enters no zone and keeps clear of the ground."""
+
     def rest(self, position: Point, leg: Leg, goal: Point) -> float | None:
         """Return the length [m] still to fly of a leg under way; None if a zone cuts it."""
+
+    def rest_of_leg(self, position: Point, leg: Leg, goal: Point) -> float | None:
+        """As `rest`, of a leg to a task or home; None also if it comes too near to the ground."""
 
 
 MakeSafePaths = Callable[[Sequence[ThreatZone], AllocatorParams], SafePaths]

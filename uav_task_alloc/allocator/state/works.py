@@ -18,6 +18,7 @@ from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.geometry.polyline import polyline_length
 from uav_task_alloc.model import Point, Task
 from uav_task_alloc.piece_ids import piece_id, split_piece
+from uav_task_alloc.terrain import TerrainError
 from uav_task_alloc.work.pieces import Work
 from uav_task_alloc.work.recut import unflown_parts, way_key
 from uav_task_alloc.work.values import Kind
@@ -26,6 +27,7 @@ from uav_task_alloc.work.values import Kind
 _OPEN_ORDER = (TaskState.ACTIVE, TaskState.ASSIGNED, TaskState.PENDING, TaskState.UNASSIGNED)
 _WORDS = {Kind.AREA: 'strips', Kind.LINE: 'sections', Kind.ORBIT: 'orbits'}
 CutWork = Callable[[Work], Sequence[Task]]
+_NO_CUT = InvalidValue, TerrainError
 
 
 class Works:
@@ -34,7 +36,7 @@ class Works:
     Args:
         tasks: has the pieces.
         saved: restored from the journal.
-        cut: cuts work around the present zones; may raise InvalidValue.
+        cut: cuts work around the present zones; may raise InvalidValue or TerrainError.
         refusal: (piece, stamp) -> why it cannot be kept, '' if it may be.
 
     Arguments of methods:
@@ -69,7 +71,7 @@ class Works:
                                'duplicate id: another task was announced under it')
         try:
             pieces = self._cut(work)
-        except InvalidValue as error:
+        except _NO_CUT as error:
             return self._tasks.reject(work.task.id, str(error), stamp)
         whys = [self._refusal(piece, stamp) for piece in pieces]
         if len(self._tasks.open()) + len(pieces) > MAX_OPEN:
@@ -108,7 +110,7 @@ class Works:
         begun = any(record.state is TaskState.COMPLETED for record in self._present(known))
         try:
             pieces = self._cut(self._as_cut(replace(known, work=work)) if begun else work)
-        except InvalidValue as error:
+        except _NO_CUT as error:
             return TaskVerdict(known.id, False, str(error))
         self._recut(replace(known, work=work), pieces, stamp, 'changed', renew=True)
         return TaskVerdict(known.id, True)
@@ -145,8 +147,8 @@ class Works:
     def _recut_one(self, known: WorkRecord, stamp: float, why: str) -> bool:
         try:
             pieces = self._cut(self._as_cut(known))
-        except InvalidValue:
-            return False  # too many pieces with these zones: it stays as it is
+        except _NO_CUT:
+            return False  # too many pieces with these zones, or no terrain: it stays as it is
         return self._recut(known, pieces, stamp, why)
 
     def _as_cut(self, known: WorkRecord) -> Work:

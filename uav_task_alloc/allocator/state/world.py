@@ -27,6 +27,7 @@ from uav_task_alloc.allocator.state.callbacks import RequestReplan
 from uav_task_alloc.allocator.state.deadlines import Deadlines
 from uav_task_alloc.allocator.state.fleet import Fleet, UavRecord, jump_distance, replan_reasons
 from uav_task_alloc.allocator.state.flights import Flights
+from uav_task_alloc.allocator.state.ground import Ground
 from uav_task_alloc.allocator.state.list_validity import ListValidity, ZonesWhenBuilt
 from uav_task_alloc.allocator.state.locked_tasks import can_fly, locked_tasks
 from uav_task_alloc.allocator.state.missed_completions import MissedCompletions
@@ -42,7 +43,8 @@ from uav_task_alloc.allocator.state.zone_checks import ZoneChecks
 from uav_task_alloc.errors import InvalidValue, first_of
 from uav_task_alloc.model import Point, Task, ThreatZone, Uav
 from uav_task_alloc.params import AllocatorParams
-from uav_task_alloc.work.pieces import Work, pieces_of
+from uav_task_alloc.terrain import Terrain
+from uav_task_alloc.work.pieces import Work
 
 _MAX_NOTES = 10_000  # log lines not yet collected
 
@@ -55,6 +57,7 @@ class World:
         saved: what the journal restored.
         make_safe_paths: makes the paths around zones; called when they are first needed.
         on_change: called with (trigger, now) when a plan is required.
+        terrain: the ground; None: none is known.
 
     Arguments of methods:
         action: ADD or UPDATE.
@@ -79,7 +82,8 @@ class World:
     """
 
     def __init__(self, params: AllocatorParams, saved: SavedState,
-                 make_safe_paths: MakeSafePaths, on_change: RequestReplan) -> None:
+                 make_safe_paths: MakeSafePaths, on_change: RequestReplan,
+                 terrain: Terrain | None = None) -> None:
         self.params, self._make_safe_paths, self._on_change = params, make_safe_paths, on_change
         self.version = 0
         # of the allocation; and the first one with the lists in force
@@ -108,10 +112,11 @@ class World:
         self.zone_checks = ZoneChecks(self.fleet, self.lists, self.paths, self.note,
                                       self.request_replan)
         self.admission = Admission(self.fleet, self.lists, self.note, self.forget_uav)
-        self.works = Works(self.tasks, saved.works, lambda work: pieces_of(
-            work, tuple(self.zones.values()), self.params.clearance), self.deadlines.refusal)
-        self.announced = Announcements(self.tasks, self.works, self.deadlines, self.note,
-                                       self.request_replan, 'restart' if saved.works else '')
+        self.ground = Ground(terrain, lambda: tuple(self.zones.values()), lambda: self.params)
+        self.works = Works(self.tasks, saved.works, self.ground.cut, self.deadlines.refusal)
+        self.announced = Announcements(
+            self.tasks, self.works, self.deadlines, self.ground, self.note, self.request_replan,
+            'restart' if saved.works else '')
         self._events = TaskEvents(self.tasks, self.fleet, self.lists, self.request_replan,
                                   self._resend.add, self.note)
         self._missed = MissedCompletions(saved.lists, self.tasks, self.note)
@@ -149,6 +154,8 @@ class World:
         self._check_jump(before, report, now)
         if before is None or active != self.fleet.active.get(uav_id):
             self.outbox.statuses = True
+        if before is None and (why := self.ground.differs(report)):
+            self.note(why, warning=True)
         self.admission.confirm(report)
         if self.lists.raise_revision(uav_id, report.list_revision):
             self._resend.add(uav_id)
@@ -286,14 +293,6 @@ class World:
     def usable(self, uav_id: str) -> bool:
         """Return whether a UAV may be given tasks."""
         return self.fleet.usable(uav_id)
-
-    def any_usable(self) -> bool:
-        """Return whether a UAV may be given tasks."""
-        return any(map(self.fleet.usable, self.fleet.records))
-
-    def home_of(self, uav_id: str) -> Point:
-        """Return the home of a known UAV [m]."""
-        return self.fleet.records[uav_id].home
 
     def uav(self, uav_id: str) -> Uav:
         """Return a known UAV for the solver."""

@@ -13,7 +13,13 @@ from uav_task_alloc.geometry.frames import Origin
 from uav_task_alloc.model import Task
 from uav_task_alloc.nodes.conversions.message_limits import MOST_TASKS, cut
 from uav_task_alloc.nodes.conversions.messages import to_task
-from uav_task_alloc.nodes.conversions.work_fields import number_or_zero, to_angle, to_kind, to_path
+from uav_task_alloc.nodes.conversions.work_fields import (
+    number_or_zero,
+    to_angle,
+    to_kind,
+    to_path,
+    to_vertical,
+)
 from uav_task_alloc.work.pieces import Work
 from uav_task_alloc.work.values import MOST_HOLES, Kind, Vertical
 
@@ -92,15 +98,15 @@ def to_work(msg: m.Task, origin: Origin) -> Task | Work:
         origin: of the ENU frame.
 
     Returns:
-        A task for a POINT, else work; in ENU.
+        A task for a POINT above the origin, else work; in ENU, z above the ground where `vertical`
+        is TERRAIN.
 
     Raises:
         InvalidValue: a field, which it names, is invalid.
     """
     kind = to_kind(msg)
     place = f'task {msg.task_id}: '
-    if msg.vertical != m.Task.ORIGIN:
-        raise InvalidValue(place + 'vertical', msg.vertical, 'ORIGIN (0)')
+    vertical = to_vertical(msg)
     check_count(place + 'holes', msg.holes, MOST_HOLES)
     path = to_path(place + 'path', msg, msg.path, origin)
     along = path and kind in (Kind.LINE, Kind.AREA)
@@ -110,5 +116,7 @@ def to_work(msg: m.Task, origin: Origin) -> Task | Work:
               for k, ring in enumerate(msg.holes)),
         number_or_zero(msg.strip_width), to_angle(place + 'direction', msg.direction),
         number_or_zero(msg.radius), number_or_zero(msg.turns), msg.divisible,
-        Vertical(msg.vertical))
-    return work.task if kind is Kind.POINT else work
+        vertical)
+    if kind is Kind.POINT and vertical is Vertical.ORIGIN:
+        return work.task
+    return work

@@ -16,7 +16,7 @@ from uav_task_alloc.model import Point, Task
 from uav_task_alloc.nodes.conversions.message_limits import MOST_ACTIONS, MOST_KEYS
 from uav_task_alloc.piece_ids import split_piece
 from uav_task_alloc.work.pieces import Work
-from uav_task_alloc.work.values import MOST_CORNERS, Kind
+from uav_task_alloc.work.values import MOST_CORNERS, Kind, Vertical
 
 _TURN = 2.0 * math.pi
 _ROUNDING = 1e-6  # [rad] of float32
@@ -38,6 +38,22 @@ def to_kind(msg: m.Task) -> Kind:
                            'POINT (0), LINE (1), AREA (2) or ORBIT (3)') from None
 
 
+def to_vertical(msg: m.Task) -> Vertical:
+    """Return what the heights of a task refer to.
+
+    Args:
+        msg: not yet checked.
+
+    Raises:
+        InvalidValue: it is unknown.
+    """
+    try:
+        return Vertical(msg.vertical)
+    except ValueError:
+        raise InvalidValue(f'task {msg.task_id}: vertical', msg.vertical,
+                           'ORIGIN (0) or TERRAIN (1)') from None
+
+
 def to_path(place: str, msg: m.Task, points: Sequence[PointMsg],
             origin: Origin) -> tuple[Point, ...]:
     """Return points of a message in ENU.
@@ -49,7 +65,7 @@ def to_path(place: str, msg: m.Task, points: Sequence[PointMsg],
         origin: of the ENU frame.
 
     Returns:
-        [m].
+        [m]; z as given where `vertical` is TERRAIN: above the ground.
 
     Raises:
         InvalidValue: there are too many, or one is out of range.
@@ -61,7 +77,8 @@ def to_path(place: str, msg: m.Task, points: Sequence[PointMsg],
             check_number(f'{place}[{k}].x (longitude)', point.x, -180.0, 180.0)
             check_number(f'{place}[{k}].y (latitude)', point.y, -90.0, 90.0)
             check_number(f'{place}[{k}].z', point.z, -1e5, 1e5)
-            found.append(to_enu(origin, point.y, point.x, origin.altitude_amsl + point.z))
+            x, y, z = to_enu(origin, point.y, point.x, origin.altitude_amsl + point.z)
+            found.append((x, y, z if msg.vertical == m.Task.ORIGIN else point.z))
         else:
             found.append(check_point(f'{place}[{k}]', (point.x, point.y, point.z)))
     return tuple(found)

@@ -163,6 +163,14 @@ def parameter_file(context: Any, name: str) -> str:
     return path
 
 
+def existing_file(context: Any, name: str) -> str:
+    """The absolute path of a launch argument, '' where it is empty; ValueError for no file."""
+    text = argument(context, name)
+    if text and not Path(text).is_file():
+        raise ValueError(f'{name}:={text}: expected a file')
+    return str(Path(text).resolve()) if text else ''
+
+
 def record_file(context: Any) -> str:
     """The launch argument `record`; ValueError where that file cannot be created."""
     path = argument(context, 'record')
