@@ -2,7 +2,7 @@
 """Random small problems with time, loads and trips against exact optima and their own insertion.
 
     python benchmarks/small_problems.py [--problems 5000] [--seed 1] [--tasks 5] [--paths 0.6]
-        [--rounds 2000]
+        [--rounds 2000] [--plain]
 
 Progress and faults go to stderr, one JSON object to stdout. The exit status is 1 where a plan is
 not valid, worse than its own insertion or the plan it starts from, or gives an untrue reason.
@@ -29,11 +29,14 @@ def main() -> int:
     parser.add_argument('--paths', type=float, default=0.0,
                         help='share of the tasks that have a path')
     parser.add_argument('--rounds', type=int, default=2000)
+    parser.add_argument('--plain', action='store_true',
+                        help='without loads, endurances, battery swaps, locked tasks')
     args = parser.parse_args()
     gaps, faulty, impossible = list[float](), list[int](), 0
     for seed in range(args.seed, args.seed + args.problems):
         try:
-            result = compare_small(small_problem(seed, args.tasks, paths=args.paths), args.rounds)
+            result = compare_small(small_problem(
+                seed, args.tasks, paths=args.paths, plain=args.plain), args.rounds)
         except (ArithmeticError, LookupError, TypeError, ValueError, AssertionError) as error:
             print(f'{seed}: {error!r}', file=sys.stderr, flush=True)
             faulty.append(seed)

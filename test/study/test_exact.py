@@ -11,6 +11,7 @@ from uav_task_alloc.solver.problem import Rules
 from uav_task_alloc.solver.timed.evaluator import Held, evaluate_routes
 from uav_task_alloc.study import exact
 from uav_task_alloc.study.exact import exact_plan
+from uav_task_alloc.study.small_problems import small_problem
 
 UAV = Uav('u', (0.0, 0.0, 0.0), cruise_speed=10.0)
 LINE = [Task(name, (x, 0.0, 0.0)) for name, x in (('a', 100.0), ('b', -200.0), ('c', 300.0))]
@@ -100,3 +101,16 @@ def test_labels_find_what_trying_all_routes_finds(seed, monkeypatch):
     assert (by_labels.cost, by_labels.value) == pytest.approx((by_trying.cost, by_trying.value))
     found = evaluate_routes(uavs, tasks, rules, by_labels.routes)
     assert found.cost == pytest.approx(by_labels.cost)
+
+
+@pytest.mark.parametrize('seed', range(8))
+def test_labels_find_the_directions_of_paths_within_ranges(seed, monkeypatch):
+    drawn = small_problem(seed, 4, 2, paths=0.8, plain=True)
+    by_labels = exact_plan(drawn.uavs, drawn.tasks, drawn.rules)
+    found = evaluate_routes(drawn.uavs, drawn.tasks, drawn.rules, by_labels.routes,
+                            reversed=by_labels.reversed)
+    assert not found.violations
+    assert found.cost == pytest.approx(by_labels.cost)
+    monkeypatch.setattr(exact, '_is_plain', lambda *_: False)
+    by_trying = exact_plan(drawn.uavs, drawn.tasks, drawn.rules)
+    assert (by_labels.cost, by_labels.value) == pytest.approx((by_trying.cost, by_trying.value))

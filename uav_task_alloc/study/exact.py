@@ -3,14 +3,15 @@
 
 All orders and divisions in trips of all sets of tasks are evaluated for each UAV, then the UAVs
 share the tasks. For some six tasks: the number of routes grows with their factorial. Where only
-services, windows and releases count, routes to the same task over the same tasks are dropped that
-are neither cheaper nor earlier: for ten.
+services, windows, releases and ranges count, routes to the same end of the same task over the same
+tasks are dropped that are neither cheaper nor earlier nor shorter: for ten, or seven with paths.
 """
 from __future__ import annotations
 
 import math
 from collections.abc import Collection, Container, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 from itertools import combinations
 
 from uav_task_alloc.geometry.flight_time import service_seconds
@@ -45,6 +46,7 @@ class _Share:
     cost: float  # without finish and tasks not served
     finish: float  # [s]
     routes: tuple[tuple[str, Rows], ...]
+    turned: frozenset[str] = frozenset()  # ids of tasks flown from their last points
 
 
 _Shares = dict[frozenset[str], list[_Share]]  # by ids of the tasks served
@@ -64,6 +66,8 @@ def exact_plan(uavs: Sequence[Uav], tasks: Sequence[Task], rules: Rules,
     """
     held = held or Held()
     fixed = {name for row in held.locked.values() for name in row}
+    if not fixed and all(_is_plain(uav, tasks, rules, held) for uav in uavs):
+        return _exact_plan(uavs, tasks, rules, leg, held)
     free = [task.id for task in tasks if task.path and task.reversible and task.id not in fixed]
     best: ExactPlan | None = None
     for many in range(len(free) + 1):
@@ -78,7 +82,7 @@ def exact_plan(uavs: Sequence[Uav], tasks: Sequence[Task], rules: Rules,
 
 def _exact_plan(uavs: Sequence[Uav], tasks: Sequence[Task], rules: Rules, leg: LegOf | None,
                 held: Held) -> ExactPlan | None:
-    """The best plan in which each path is flown from its first point."""
+    """The best plan; paths are flown from their first points by UAVs that are not plain."""
     shares: _Shares = {frozenset(): [_Share(0.0, 0.0, ())]}
     for uav in uavs:
         shares = _joined(shares, _shares_of(uav, uavs, tasks, rules, leg, held))
@@ -90,7 +94,7 @@ def _exact_plan(uavs: Sequence[Uav], tasks: Sequence[Task], rules: Rules, leg: L
         for way in ways:
             cost = way.cost + prices.cost(0.0, way.finish, unserved=total - value)
             if best is None or rank(value, cost, rules) < rank(best.value, best.cost, rules):
-                best = ExactPlan(cost, value, dict(way.routes))
+                best = ExactPlan(cost, value, dict(way.routes), way.turned)
     return best
 
 
@@ -118,7 +122,7 @@ def _joined(some: _Shares, more: _Shares) -> _Shares:
                     for row in rows:
                         _keep(joined, done | mine, _Share(
                             way.cost + row.cost, max(way.finish, row.finish),
-                            way.routes + row.routes))
+                            way.routes + row.routes, way.turned | row.turned))
     return joined
 
 
@@ -151,7 +155,7 @@ def _shares_of(uav: Uav, uavs: Sequence[Uav], tasks: Sequence[Task], rules: Rule
 def _is_plain(uav: Uav, tasks: Sequence[Task], rules: Rules, held: Held) -> bool:
     """Whether an earlier arrival is never worse, and nothing else limits a route."""
     one_trip = rules.trips == 1 or math.isinf(uav.turnaround)
-    unlimited = math.isinf(uav.range) and math.isinf(uav.endurance)
+    unlimited = math.isinf(uav.endurance) and (math.isinf(uav.range) or rules.hard)
     return (one_trip and unlimited and not held.locked.get(uav.id)
             and not any(task.payload for task in tasks))
 
@@ -162,56 +166,76 @@ class _Label:
 
     time: float  # [s] end of the service there
     cost: float  # so far, without finish
+    metres: float  # so far
     row: tuple[str, ...]
+    turned: frozenset[str]  # ids of tasks flown from their last points
+
+
+_Labels = dict[tuple[frozenset[str], Task | None], list[_Label]]  # by tasks, and the last as flown
 
 
 def _shares_by_labels(uav: Uav, free: Sequence[Task], tasks: Sequence[Task], rules: Rules,
                       leg: LegOf) -> _Shares:
-    """All that one UAV can serve, by dynamic programming over sets of tasks."""
+    """All that one UAV can serve, in all directions, by dynamic programming over sets of tasks."""
     able = [task for task in free if task.required_capabilities <= uav.capabilities
             and (task.allowed_uavs is None or uav.id in task.allowed_uavs)]
+    flown = [(task, service_seconds(uav, task), frozenset[str]()) for task in able]
+    flown += [(task.turned, service_seconds(uav, task.turned), frozenset({task.id}))
+              for task in able if task.path and task.reversible]
+    leg = cache(leg)
     total = math.fsum(task.value for task in tasks)
     shares: _Shares = {frozenset(): [_Share(0.0, 0.0, ())]}
-    labels: dict[tuple[frozenset[str], Task | None], list[_Label]] = {
-        (frozenset(), None): [_Label(uav.available_from, 0.0, ())]}
+    labels: _Labels = {(frozenset(), None): [
+        _Label(uav.available_from, 0.0, 0.0, (), frozenset())]}
     for _ in range(len(able)):
-        longer: dict[tuple[frozenset[str], Task | None], list[_Label]] = {}
+        longer: _Labels = {}
         for (done, last), some in labels.items():
-            for task in able:
+            for task, service, turned in flown:
                 if task.id not in done:
                     place = uav.position if last is None else last.end
                     metres, seconds = leg(uav, place, task.position)
-                    way = metres + task.path_length, seconds, service_seconds(uav, task)
+                    way = metres + task.path_length, seconds, service
                     for label in some:
                         _extend(longer.setdefault((done | {task.id}, task), []), label, task,
-                                way, rules.objective, total)
+                                turned, way, uav.range, rules.objective, total)
         labels = longer
         for (done, last), some in labels.items():
             assert last is not None  # each label of this round has a task
-            metres, seconds = leg(uav, last.end, uav.base) if rules.returns else (0.0, 0.0)
+            home = leg(uav, last.end, uav.base) if rules.returns else (0.0, 0.0)
             for label in some:
-                if label.time + seconds <= uav.available_until + 1e-6:
-                    _keep(shares, done, _Share(
-                        label.cost + rules.objective.cost(metres), label.time + seconds,
-                        ((uav.id, (label.row,)),)))
+                _end(shares, uav, done, label, home, rules.objective)
     return shares
 
 
-def _extend(labels: list[_Label], label: _Label, task: Task, way: tuple[float, float, float],
-            prices: Objective, total: float) -> None:
+def _end(shares: _Shares, uav: Uav, done: frozenset[str], label: _Label,
+         home: tuple[float, float], prices: Objective) -> None:
+    """Keep the route of a label with the leg home: its length [m] and time [s]."""
+    end = label.time + home[1]
+    if end <= uav.available_until + 1e-6 and label.metres + home[0] <= uav.range + 1e-6:
+        _keep(shares, done, _Share(label.cost + prices.cost(home[0]), end,
+                                   ((uav.id, (label.row,)),), label.turned))
+
+
+def _extend(labels: list[_Label], label: _Label, task: Task, turned: frozenset[str],
+            way: tuple[float, float, float], reach: float, prices: Objective,
+            total: float) -> None:
     """Add the route of a label and one more task, unless it is too late or dominated.
 
-    way: length [m] with its path, time of the leg, service [s].
+    way: length [m] with its path, time of the leg, service [s]; turned: its id if it is flown from
+    its last point; reach: most length of a route [m], where infinite lengths do not matter.
     """
     start = max(max(label.time, task.release) + way[1], task.earliest)
-    late = max(0.0, start - task.latest)
-    if late > 1e-6 and math.isinf(prices.lateness):
+    late, metres = max(0.0, start - task.latest), label.metres + way[0]
+    if (late > 1e-6 and math.isinf(prices.lateness)) or metres > reach + 1e-6:
         return
     response = task.value * (start - task.announced) / total
-    new = _Label(start + way[2],
-                 label.cost + prices.cost(way[0], 0.0, response, late), (*label.row, task.id))
-    if all(other.time > new.time or other.cost > new.cost for other in labels):
-        labels[:] = [each for each in labels if each.time < new.time or each.cost < new.cost]
+    new = _Label(start + way[2], label.cost + prices.cost(way[0], 0.0, response, late),
+                 metres if reach < math.inf else 0.0, (*label.row, task.id),
+                 label.turned | turned)
+    if all(other.time > new.time or other.cost > new.cost or other.metres > new.metres
+           for other in labels):
+        labels[:] = [each for each in labels if each.time < new.time or each.cost < new.cost
+                     or each.metres < new.metres]
         labels.append(new)
 
 

@@ -59,28 +59,33 @@ class SmallProblem:
 
 
 def small_problem(seed: int, most_tasks: int = 5, most_uavs: int = 3,
-                  paths: float = 0.0) -> SmallProblem:
+                  paths: float = 0.0, plain: bool = False) -> SmallProblem:
     """Draw a problem.
 
     Args:
         seed: of all random values.
         most_tasks, most_uavs: bounds of their numbers.
         paths: share of the tasks without payload that have a path.
+        plain: without loads, endurances, battery swaps, locked tasks and soft ranges: the exact
+            optimum of seven tasks is found in a second.
 
     Returns:
         One that time, loads, trips or the objective matter in.
     """
     rng = np.random.default_rng((seed, 18))
     while True:
-        drawn = _with_paths(_draw(rng, seed, most_tasks, most_uavs), paths)
+        drawn = _with_paths(_draw(rng, seed, most_tasks, most_uavs, plain), paths)
         if needs_time(drawn.uavs, drawn.tasks, drawn.rules.objective, drawn.rules.trips):
             return drawn
 
 
-def _draw(rng: np.random.Generator, seed: int, most_tasks: int, most_uavs: int) -> SmallProblem:
+def _draw(rng: np.random.Generator, seed: int, most_tasks: int, most_uavs: int,
+          plain: bool) -> SmallProblem:
     on = {name: bool(rng.random() < 0.4) for name in (
         'windows', 'releases', 'loads', 'ranges', 'endurances', 'times', 'climb', 'air',
         'abilities', 'trips', 'locked')}
+    if plain:
+        on |= dict.fromkeys(('loads', 'endurances', 'trips', 'locked'), False)
     base = _place(rng, 0.0)
     uavs = [_uav(rng, f'u{i}', on, base) for i in range(rng.integers(1, most_uavs + 1))]
     tasks = [_task(rng, f't{i}', on, [uav.id for uav in uavs])
@@ -91,8 +96,8 @@ def _draw(rng: np.random.Generator, seed: int, most_tasks: int, most_uavs: int) 
     objective = list(OBJECTIVES.values())[rng.integers(4)] if rng.random() < 0.5 else Objective(
         prices[0], prices[1], prices[2], float(rng.choice([0.5, 10.0, math.inf])),
         float(rng.choice([50.0, 500.0, math.inf])))
-    rules = Rules(bool(rng.random() < 0.5), bool(rng.random() < 0.85), objective=objective,
-                  trips=int(rng.integers(2, 4)) if on['trips'] else 1)
+    rules = Rules(bool(rng.random() < 0.5), bool(rng.random() < 0.85) or plain,
+                  objective=objective, trips=int(rng.integers(2, 4)) if on['trips'] else 1)
     return SmallProblem(seed, tuple(uavs), tuple(tasks), rules, locked)
 
 
