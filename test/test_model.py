@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Values of the model are checked; errors name place, value and expectation."""
 import math
+from dataclasses import replace
 
 import pytest
 
@@ -152,6 +153,7 @@ def test_a_plan_gives_the_route_of_a_uav():
     assert plan.route('u1').tasks == ('t1',)
     assert plan.route('u1').distance == 7.0
     assert plan.route('u2').distance == 0.0
+    assert replace(plan, path_lengths={'t1': 5.0, 't2': 9.0}).route('u1').distance == 12.0
     with pytest.raises(KeyError):
         plan.route('u3')
 

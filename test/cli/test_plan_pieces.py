@@ -6,6 +6,8 @@ import pytest
 
 from uav_task_alloc.cli.commands import main
 from uav_task_alloc.cli.plan_pieces import piece_kinds, short_names, with_pieces
+from uav_task_alloc.geometry.frames import Origin, to_enu
+from uav_task_alloc.geometry.polyline import polyline_length
 from uav_task_alloc.scenario import parse
 
 SCENARIO = """
@@ -36,6 +38,10 @@ def test_lengths_and_times_of_a_plan_have_the_ways_of_pieces(tmp_path, capsys):
     printed, written = capsys.readouterr().out, json.loads(out.read_text())
     assert f'uav_1: {written["distance"]:.0f} m' in printed
     assert 'cable parts' in printed
+    assert written['distances'] == {'uav_1': pytest.approx(written['distance'])}
+    legs = sum(leg['length'] for leg in written['legs']['uav_1'])
+    assert written['distance'] - legs == pytest.approx(  # two parts of the cable, four strips
+        sum(length(rows) for rows in written['paths'].values()), rel=1e-3)
     ways = {name: [(row['latitude'], row['longitude']) for row in rows]
             for name, rows in written['paths'].items()}
     for name in written['reversed']:
@@ -46,6 +52,13 @@ def test_lengths_and_times_of_a_plan_have_the_ways_of_pieces(tmp_path, capsys):
         place for name in stops for place in ways[name]]
     row = next(line for line in printed.splitlines() if line.startswith('field#2')).split()
     assert float(row[6]) - float(row[5]) == pytest.approx(20.0, abs=0.11)  # 300 m at 15 m/s
+
+
+def length(rows):
+    """Length [m] of a level way given in degrees."""
+    origin = Origin(rows[0]['latitude'], rows[0]['longitude'], 0.0)
+    return polyline_length([to_enu(origin, row['latitude'], row['longitude'], 0.0)
+                            for row in rows])
 
 
 @pytest.mark.parametrize(('names', 'text'), [

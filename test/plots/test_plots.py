@@ -223,6 +223,20 @@ def test_times_are_drawn_in_their_windows(tmp_path, monkeypatch, count):
     assert axes.get_xlabel() == 'time [s]'
 
 
+@pytest.mark.parametrize('count', [4, times.MAX_TASK_ROWS + 1])
+def test_the_bar_of_a_service_contains_the_flight_along_its_path(tmp_path, monkeypatch, count):
+    drawn = []
+    monkeypatch.setattr(MapFigure, 'finish', lambda figure, *_: drawn.append(figure.beside))
+    ends = (0.0, 50.0, 40.0), (30.0, 50.0, 80.0)  # 20 s up, 40 s down
+    tasks = [Task(f't{i}', ends[0], service_time=1.0, path=ends, reversible=True)
+             for i in range(count)]
+    uav = Uav('u1', (0.0, 0.0, 0.0), cruise_speed=3.0, climb_speed=2.0, descent_speed=1.0)
+    plan = replace(timed_plan(count), reversed=frozenset({'t1'}))
+    plots.draw_plan_times([uav], tasks, [], plan, tmp_path / 'times.png')
+    bars = {patch.get_x(): patch.get_width() for patch in drawn[0].patches}
+    assert (bars[12.0], bars[22.0]) == pytest.approx((21.0, 41.0))
+
+
 def test_a_path_is_part_of_a_route_and_turned_where_it_is_flown_from_its_end():
     uav = Uav('u1', (0.0, 0.0, 0.0))
     tasks = {f't{i}': Task(f't{i}', (10.0 * i, 50.0, 40.0),

@@ -29,8 +29,7 @@ from uav_task_alloc.cli.plan_terrain import check_ground, plan_over_terrain
 from uav_task_alloc.cli.plan_times import has_times, times_text
 from uav_task_alloc.cli.progress import SolveProgress, log_line
 from uav_task_alloc.errors import InvalidValue, first_of
-from uav_task_alloc.model import Plan, Task, ThreatZone
-from uav_task_alloc.model.route_stops import route_length
+from uav_task_alloc.model import Plan, ThreatZone
 from uav_task_alloc.objective import MAX_TRIPS, OBJECTIVES
 from uav_task_alloc.params import AllocatorParams
 from uav_task_alloc.scenario.values import Scenario
@@ -81,7 +80,7 @@ def _answer(loaded: Scenario, result: Plan, args: argparse.Namespace) -> None:
     """Print a plan and write the files."""
     try:
         tasks = [timed.task for timed in loaded.tasks]
-        print(plan_text(result, tasks, piece_kinds(loaded)), flush=True)
+        print(plan_text(result, piece_kinds(loaded)), flush=True)
         if args.times or has_times(loaded):
             print(times_text([uav.uav for uav in loaded.uavs], tasks, result), flush=True)
     finally:  # also where nobody reads what is printed
@@ -210,16 +209,14 @@ def solve_scenario(loaded: Scenario, args: argparse.Namespace, stop: Callable[[]
                 stop=stop, on_iteration=on_iteration, max_iterations=max_iterations)
 
 
-def plan_text(result: Plan, tasks: Sequence[Task], kinds: dict[str, str]) -> str:
+def plan_text(result: Plan, kinds: dict[str, str]) -> str:
     """A plan as lines of text: a route for each UAV, unassigned tasks, totals.
 
     Args:
         result: the plan.
-        tasks: all tasks and pieces.
         kinds: as `piece_kinds` returns them.
     """
-    known = {task.id: task for task in tasks}
-    lines = [f'{uav}: {route_length(result, uav, known):.0f} m  {stops_text(result, uav, kinds)}'
+    lines = [f'{uav}: {result.route(uav).distance:.0f} m  {stops_text(result, uav, kinds)}'
              for uav in result.routes]
     for reason, names in groupby(result.unassigned, lambda name: result.unassigned[name]):
         lines += [f'unassigned {name}: {reason}' for name in short_names(names, kinds)]

@@ -24,17 +24,19 @@ def plan_json(loaded: Scenario, result: Plan) -> dict[str, Any]:
         result: the plan.
 
     Returns:
-        What `Plan` has, an infinite fit as None; `conflicts`, of UAVs that would not have been
-        apart; `origin`; `tasks`, the position of each, and `paths`, of
-        those that are ways (ids of pieces are `field#1`); `reversed`, the ids of those that are
-        flown from their last point; and `waypoints`, of each UAV, from its start to its end:
-        `task` is the id of the task there, or None. Positions are latitude and longitude [deg]
-        and altitude [m above the origin], as in a scenario file.
+        What `Plan` has, an infinite fit as None; `distances`, the length [m] of each UAV's route
+        with the paths of its tasks, whose sum is `distance`; `legs`, without those paths;
+        `conflicts`, of UAVs that would not have been apart; `origin`; `tasks`, the position of
+        each, and `paths`, of those that are ways (ids of pieces are `field#1`); `reversed`, the
+        ids of those that are flown from their last point; and `waypoints`, of each UAV, from its
+        start to its end: `task` is the id of the task there, or None. Positions are latitude and
+        longitude [deg] and altitude [m above the origin], as in a scenario file.
     """
     return {
         'routes': {uav: list(tasks) for uav, tasks in result.routes.items()},
         'unassigned': result.unassigned,
         'legs': {uav: [asdict(leg) for leg in legs] for uav, legs in result.legs.items()},
+        'distances': {uav: result.route(uav).distance for uav in result.routes},
         'distance': result.distance, 'value': result.value, 'penalty': result.penalty,
         'fit': json_number(result.fit), 'cost': json_number(result.cost), **times_json(result),
         'conflicts': _conflicts(loaded, result),

@@ -12,7 +12,7 @@ from xml.etree import ElementTree
 
 from uav_task_alloc.geometry.frames import Origin, to_geodetic_batch
 from uav_task_alloc.model import Plan, Point, Shape, ThreatZone
-from uav_task_alloc.model.route_stops import route_length, route_points
+from uav_task_alloc.model.route_stops import route_points
 from uav_task_alloc.palette import RED, STATE_COLOURS, uav_colour
 from uav_task_alloc.record.ground_truth import TrueSample
 from uav_task_alloc.record.run_state import RunState
@@ -63,7 +63,7 @@ def plan_shapes(scenario: Scenario, plan: Plan) -> list[MapShape]:
                 'service_time': task.service_time, **row}, _colours(scenario.uavs).get(uav, RED)))
     known = {timed.task.id: timed.task for timed in scenario.tasks}
     routes = [MapShape(uav.id, 'routes', 'LineString', tuple(points), {
-        'kind': 'route', 'metres': round(route_length(plan, uav.id, known), 1)},
+        'kind': 'route', 'metres': round(plan.route(uav.id).distance, 1)},
         _colours(scenario.uavs)[uav.id])
         for uav in scenario.uavs if len(points := route_points(uav.uav, plan, known)) > 1]
     return [*tasks, *(zone_shape(timed.zone) for timed in scenario.zones), *routes]

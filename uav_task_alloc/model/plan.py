@@ -28,11 +28,12 @@ class Route:
     tasks: tuple[str, ...] = ()  # ids in the order of flight
     legs: tuple[Leg, ...] = ()  # one a task, and one more home where `returns`
     returns: bool = False  # flies home after the last task
+    paths_length: float = 0.0  # [m] of the paths of its tasks
 
     @property
     def distance(self) -> float:
-        """Length of all legs [m], without the ways of tasks that have a path."""
-        return math.fsum(leg.length for leg in self.legs)
+        """Length of all legs and of the paths of its tasks [m]."""
+        return math.fsum(leg.length for leg in self.legs) + self.paths_length
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,6 +60,7 @@ class Plan:
             first asked for.
         conflicts: of UAVs that would not have been apart, and how each was resolved.
         reversed: ids of the tasks with a path that are flown from their last point.
+        path_lengths: [m] by the id of each task with a path.
     """
 
     routes: dict[str, tuple[str, ...]]
@@ -79,6 +81,7 @@ class Plan:
     timetable: Callable[[], Timetable] = field(default=Timetable, compare=False, repr=False)
     conflicts: tuple[Conflict, ...] = ()
     reversed: frozenset[str] = frozenset()
+    path_lengths: Mapping[str, float] = field(default_factory=dict)  # [m]
 
     @property
     def arrivals(self) -> Mapping[str, float]:
@@ -118,7 +121,7 @@ class Plan:
         return self.timetable().response
 
     def route(self, uav: str) -> Route:
-        """Return the route of one UAV with its legs.
+        """Return the route of one UAV with its legs, and the length of the paths on it.
 
         Args:
             uav: id.
@@ -129,4 +132,5 @@ class Plan:
         Raises:
             KeyError: the plan has no such UAV.
         """
-        return Route(uav, self.routes[uav], tuple(self.legs.get(uav, ())), self.returns)
+        return Route(uav, self.routes[uav], tuple(self.legs.get(uav, ())), self.returns,
+                     math.fsum(self.path_lengths.get(task, 0.0) for task in self.routes[uav]))

@@ -2,7 +2,6 @@
 """The stops of a planned route in their order of flight, with all points between."""
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -41,21 +40,6 @@ def route_stops(plan: Plan, uav: str, tasks: Mapping[str, Task], base: Point) ->
     # a leg home after the last trip only where the plan returns
     return [RouteStop(name, tuple(leg.via), points) for leg, (name, points) in zip(
         plan.legs.get(uav, ()), ends, strict=False)]
-
-
-def route_length(plan: Plan, uav: str, tasks: Mapping[str, Task]) -> float:
-    """Return the length of a route with the paths of its tasks.
-
-    Args:
-        plan: with routes and legs.
-        uav: its id.
-        tasks: by id.
-
-    Returns:
-        [m].
-    """
-    return plan.route(uav).distance + math.fsum(
-        tasks[name].path_length for name in plan.routes[uav])
 
 
 def route_points(uav: Uav, plan: Plan, tasks: Mapping[str, Task]) -> list[Point]:

@@ -9,7 +9,7 @@ from matplotlib.lines import Line2D
 
 import uav_task_alloc.plots.style as style
 from uav_task_alloc.model import Plan, Point, Task, ThreatZone, Uav
-from uav_task_alloc.model.route_stops import route_length, route_points
+from uav_task_alloc.model.route_stops import route_points
 from uav_task_alloc.palette import RED, uav_colour
 from uav_task_alloc.plots.flat import MapFigure
 
@@ -85,9 +85,9 @@ def legend_handles(uavs: Sequence[Uav], tasks: Sequence[Task], plan: Plan,
                    rows: int = style.LEGEND_ROWS) -> list[Line2D]:
     """The legend: at most `rows` UAVs with tasks, the numbers of others, unassigned tasks."""
     assigned = [(index, uav.id) for index, uav in enumerate(uavs) if plan.routes.get(uav.id)]
-    known, handles = {task.id: task for task in tasks}, []
+    handles = []
     for index, name in assigned[:rows]:
-        metres = route_length(plan, name, known)
+        metres = plan.route(name).distance
         handles.append(style.route_handle(
             index, f'{name}: {style.task_count(len(plan.routes[name]))}, {metres:.0f} m'))
     for count, text in ((len(assigned) - rows, 'more UAVs with tasks'),

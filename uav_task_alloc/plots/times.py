@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.patches import Patch
 
 import uav_task_alloc.plots.style as style
-from uav_task_alloc.model import Plan, Task, ThreatZone, Uav
+from uav_task_alloc.model import Plan, Task, ThreatZone, Uav, turned_tasks
 from uav_task_alloc.palette import RED, uav_colour
 from uav_task_alloc.plots.flat import MapFigure
 from uav_task_alloc.plots.plan import add_plan, legend_handles, plan_title
@@ -42,7 +42,7 @@ def draw_plan_times(uavs: Sequence[Uav], tasks: Sequence[Task], zones: Sequence[
     assert axes is not None
     served = sum(len(row) for row in plan.routes.values())
     rows = _task_rows if served <= MAX_TASK_ROWS else _uav_rows
-    rows(axes, uavs, {task.id: task for task in tasks}, plan)
+    rows(axes, uavs, {task.id: task for task in turned_tasks(tasks, plan.reversed)}, plan)
     axes.set_xlabel('time [s]', fontsize=style.PLAIN)
     axes.set_title(f'ends at {plan.finish:.0f} s', loc='left', fontsize=style.LARGE, pad=12)
     title = plan_title(plan, len(tasks))
@@ -64,7 +64,7 @@ def _task_rows(axes: Axes, uavs: Sequence[Uav], tasks: Mapping[str, Task], plan:
             left = departure
             for name in trip:
                 _window(axes, tasks[name], row, plan.finish)
-                left = _visit(axes, tasks[name], times, left, row, index)
+                left = _visit(axes, uav, tasks[name], times, left, row, index)
                 names.append(name)
                 row += 1
     axes.set_yticks(range(row), names, fontsize=style.SMALL)
@@ -79,7 +79,7 @@ def _uav_rows(axes: Axes, uavs: Sequence[Uav], tasks: Mapping[str, Task], plan: 
         for trip, departure in zip(times.trips[uav.id], times.departures[uav.id], strict=True):
             left = departure
             for name in trip:
-                left = _visit(axes, tasks[name], times, left, row, index)
+                left = _visit(axes, uav, tasks[name], times, left, row, index)
     few = len(flown) <= MAX_TASK_ROWS
     axes.set_yticks(range(len(flown)) if few else [],
                     [uav.id for _, uav in flown] if few else [], fontsize=style.SMALL)
@@ -94,10 +94,12 @@ def _window(axes: Axes, task: Task, row: int, finish: float) -> None:
     axes.barh(row, max(right - left, 0.0), 0.9, left, color=_WINDOW, zorder=1)
 
 
-def _visit(axes: Axes, task: Task, times: Timetable, left: float, row: int, index: int) -> float:
-    """The leg to a task, waiting and service; returns when the UAV leaves it [s]."""
+def _visit(axes: Axes, uav: Uav, task: Task, times: Timetable, left: float, row: int,
+           index: int) -> float:
+    """The leg to a task, waiting, and service along its path; when the UAV leaves it [s]."""
+    from uav_task_alloc.geometry.flight_time import service_seconds  # imports numba
     arrival, start = times.arrivals[task.id], times.starts[task.id]
-    colour, end = uav_colour(index), start + task.service_time
+    colour, end = uav_colour(index), start + service_seconds(uav, task)
     axes.plot([left, arrival], [row, row], color=colour, lw=1.6, zorder=2, solid_capstyle='butt')
     if start > arrival:
         axes.barh(row, start - arrival, 0.5, arrival, fc='white', ec=_FLIGHT, hatch=_WAIT,

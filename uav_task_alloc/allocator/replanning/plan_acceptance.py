@@ -106,7 +106,8 @@ def _length_with_penalty(plan: Plan, uav_id: str, limit: float,
 
     paths: lengths of the paths of tasks, by id.
     """
-    length = plan.route(uav_id).distance + sum(paths[task] for task in plan.routes[uav_id])
+    length = sum(leg.length for leg in plan.legs.get(uav_id, ())) + sum(
+        paths[task] for task in plan.routes[uav_id])
     return length + 100.0 * max(0.0, length - limit)
 
 

@@ -60,7 +60,15 @@ def to_timed_plan(problem: TimedProblem, recorder: TimedRecorder, best: Incumben
         routes, timed_reasons(problem, missing), found.distance, found.value, found.penalty,
         fit(found.distance, found.value, found.penalty, base.rules.weights),
         tuple(recorder.history), None, legs, base.rules.returns, solver, recorder.elapsed(),
-        recorder.iterations, warm, found.cost, lambda: found.timetable, reversed=turned)
+        recorder.iterations, warm, found.cost, lambda: found.timetable, reversed=turned,
+        path_lengths=_path_lengths(problem))
+
+
+def _path_lengths(problem: TimedProblem) -> dict[str, float]:
+    """Length [m] of the path of each task that has one, by id."""
+    base = problem.base
+    return {task.id: task.path_length for task in chain(*base.locked.values(), base.tasks)
+            if task.path}
 
 
 def flown_by(problem: TimedProblem, best: Incumbent) -> _Flown:
