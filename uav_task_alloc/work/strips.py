@@ -3,7 +3,11 @@
 from __future__ import annotations
 
 import math
+from bisect import bisect
 from collections.abc import Iterable, Sequence
+from itertools import pairwise
+
+import numpy as np
 
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.geometry.polygon import XY, edges, signed_area
@@ -25,8 +29,13 @@ from uav_task_alloc.work.zone_sections import Span, remaining, ring_spans
 PlaneWay = list[XY]  # [m] from one end to the other
 _SHIFTS = 0.0, 0.5, -0.5, 0.25, -0.25, 0.375, -0.375, 0.125, -0.125  # of a strip, tried in order
 _SCRAP = 0.02  # of the square of the width: what is smaller is left out
-_TRIM = 0.001  # of the area: so much may be left out at all pointed ends on one side
+_TRIM = 0.0035  # of the area: so much may be left out at all pointed ends
 _MOST_DIRECTIONS = 8  # that are compared, by the number of strips
+_LEFT = 0.001  # of the area: so much of all strips is left out as scraps
+_THICK = 0.5  # of the width: no higher ends of strips are left out
+_PARTS = 12  # lengths of an end of a strip for which its height is known
+_SLACK = 0.02  # of a width: with less to spare strips are even
+_SAVED = 0.005  # of the way: with less saved strips are even
 _ALIKE = math.radians(0.5)  # directions that differ by less are one
 
 
@@ -98,27 +107,81 @@ def _strips(given: Region, angle: float, crossed: Iterable[XY], width: float,
             trim: float) -> list[PlaneWay]:
     """Ways in a direction, turned to be along x; edges cross at `crossed`."""
     region, levels = given.turned(-angle), [y for _, y in turn(crossed, -angle)]
-    ys = [y for _, y in region.outer]
-    low, high = min(ys), max(ys)
-    count = max(1, math.ceil((high - low) / width - 1e-9))
-    step = (high - low) / count
-    strips: list[list[PlaneCell]] = [[] for _ in range(count)]
-    for middle, cell in slab_cells(region, [*levels, *(low + k * step for k in range(count + 1))]):
-        strips[min(count - 1, max(0, int((middle - low) / step)))].append(cell)
     # without the barred rings, so that a zone changes no strip elsewhere
+    whole = Region(region.outer, region.holes)
+    cuts = _cuts(whole, levels, width)
+    count = len(cuts) - 1
+    strips = _cells_between(slab_cells(region, [*levels, *cuts]), cuts)
     holes = sum(abs(signed_area(hole)) for hole in given.holes)
     area = max(0.0, abs(signed_area(given.outer)) - holes)
-    scrap = min(_SCRAP * width * width, 2e-3 * area / count)
+    scrap = min(_SCRAP * width * width, _LEFT * area / count)
+    thin = _thin_end(_cells_between(slab_cells(whole, [*levels, *cuts]), cuts), width,
+                     trim * area) if trim else 0.0
     ways: list[PlaneWay] = []
-    for k, cells in enumerate(strips):
-        found = _in_strip(region, cells, low + (k + 0.5) * step, step, width, scrap,
-                          trim * area / count)
+    for k, (cells, (low, high)) in enumerate(zip(strips, pairwise(cuts), strict=True)):
+        found = _in_strip(region, cells, (low + high) / 2, high - low, width, scrap, thin)
         ways += sorted(found, reverse=k % 2 == 1)
     return ways
 
 
+def _cuts(region: Region, levels: Sequence[float], width: float) -> list[float]:
+    """Where strips along x begin and end along y: all are equal, or all but one of full width.
+
+    Args:
+        region: turned, without barred rings.
+        levels: [m] y where edges cross.
+        width: [m] of a strip at most.
+
+    Returns:
+        [m] in order, one more than strips. Strips of full width save way in a region that becomes
+        narrower: the one that is narrower is where the ways are the shortest in all.
+    """
+    ys = [y for _, y in region.outer]
+    low, high = min(ys), max(ys)
+    count = max(1, math.ceil((high - low) / width - 1e-9))
+    even = [low + (high - low) * k / count for k in range(count + 1)]
+    upper = [low + k * width for k in range(count)]  # from below
+    lower = [high - (count - k) * width for k in range(1, count + 1)]  # from above
+    if lower[0] - low > (1.0 - _SLACK) * width:
+        return even
+    from_below, from_above, narrow = (
+        [_spans_length(cells, width) for cells in _pairs(region, levels, a, b)]
+        for a, b in ((upper, [y + width for y in upper]), ([y - width for y in lower], lower),
+                     (upper, lower)))
+    best = min(range(count), key=lambda k: (
+        math.fsum([*from_below[:k], narrow[k], *from_above[k + 1:]])))
+    uneven = math.fsum([*from_below[:best], narrow[best], *from_above[best + 1:]])
+    whole = math.fsum(_spans_length(cells, width) for cells in _pairs(
+        region, levels, even[:-1], even[1:]))
+    if uneven > (1.0 - _SAVED) * whole:
+        return even
+    return [*upper[:best + 1], *lower[best:]]
+
+
+def _pairs(region: Region, levels: Sequence[float], lows: Sequence[float],
+           highs: Sequence[float]) -> list[list[PlaneCell]]:
+    """The cells of slabs, each between two y."""
+    cells = list(slab_cells(region, [*levels, *lows, *highs]))
+    middles = [middle for middle, _ in cells]  # in order
+    return [[cell for _, cell in cells[bisect(middles, low):bisect(middles, high)]]
+            for low, high in zip(lows, highs, strict=True)]
+
+
+def _cells_between(cells: Iterable[tuple[float, PlaneCell]],
+                   cuts: Sequence[float]) -> list[list[PlaneCell]]:
+    """Cells by the slab that they are in."""
+    slabs: list[list[PlaneCell]] = [[] for _ in cuts[1:]]
+    for middle, cell in cells:
+        slabs[min(len(slabs), max(1, bisect(cuts, middle))) - 1].append(cell)
+    return slabs
+
+
+def _spans_length(cells: Iterable[PlaneCell], width: float) -> float:
+    return math.fsum(end - start for start, end in merged_spans(cells, width / 2))
+
+
 def _in_strip(region: Region, cells: list[PlaneCell], middle: float, step: float, width: float,
-              scrap: float, trim: float) -> list[PlaneWay]:
+              scrap: float, thin: float) -> list[PlaneWay]:
     """Ways over the cells of one strip: along its middle, and shifted where that is barred."""
     ways: list[PlaneWay] = []
     for shift in _SHIFTS:
@@ -133,26 +196,59 @@ def _in_strip(region: Region, cells: list[PlaneCell], middle: float, step: float
                 over = between(seen, 0, *part)
                 if cells_area(over) <= scrap:
                     continue
-                start, end = _extent(over, step, trim)
+                start, end = _extent(over, thin)
                 _add([(start, y), (end, y)], ways, region, width)
                 cells = [left for cell in cells
                          for left in _without(cell, part[0], part[1], low, high)]
     return ways
 
 
-def _extent(cells: list[PlaneCell], step: float, trim: float) -> Span:
-    """Where cells begin and end along x, without pointed ends of an area of at most `trim`."""
-    xs = [x for cell in cells for x, _ in cell]
-    first, last = min(xs), max(xs)
+def _extent(cells: list[PlaneCell], thin: float) -> Span:
+    """Where cells begin and end along x, without pointed ends that are at most `thin` [m] high."""
+    first, last = _ends(cells)
     cuts = []
-    for end, sign in ((first, 1.0), (last, -1.0)) if trim else ():
+    for end, sign in ((first, 1.0), (last, -1.0)) if thin > 0.0 else ():
         low, high = 0.0, (last - first) / 3
         for _ in range(12):
             middle = (low + high) / 2
-            cut = between(cells, 0, *sorted((end, end + sign * middle)))
-            low, high = (middle, high) if cells_area(cut) <= trim else (low, middle)
-        cuts.append(low if low * step > 3.0 * trim else 0.0)  # 1: it is no pointed end
+            area = _end_area(cells, end, sign * middle)
+            low, high = (middle, high) if 2.0 * area <= thin * middle else (low, middle)
+        cuts.append(low)
     return (first + cuts[0], last - cuts[1]) if cuts else (first, last)
+
+
+def _ends(cells: Iterable[PlaneCell]) -> Span:
+    xs = [x for cell in cells for x, _ in cell]
+    return min(xs), max(xs)
+
+
+def _end_area(cells: Iterable[PlaneCell], end: float, length: float) -> float:
+    """Area [m2] of cells from an end of them on; a negative length: to the left."""
+    return cells_area(part for cell in cells
+                      if (part := clip(cell, 0, end + length, length > 0.0)))
+
+
+def _thin_end(strips: Iterable[list[PlaneCell]], width: float, trim: float) -> float:
+    """Height [m] up to which pointed ends may be left out: an area of at most `trim` [m2]."""
+    profiles = [profile for cells in strips for span in merged_spans(cells, width / 2)
+                for profile in _profiles(between(cells, 0, *span), span)]
+    low, high = 0.0, _THICK * width
+    for _ in range(16):
+        thin = (low + high) / 2
+        area = math.fsum(thin * float(np.interp(thin, *profile)) / 2 for profile in profiles)
+        low, high = (thin, high) if area <= trim else (low, thin)
+    return low
+
+
+def _profiles(cells: list[PlaneCell], span: Span) -> Iterable[tuple[list[float], list[float]]]:
+    """Heights [m] of triangles as large as the ends of a strip up to some lengths [m]."""
+    for end, sign in ((span[0], 1.0), (span[1], -1.0)):
+        heights, lengths = [0.0], [0.0]
+        for k in range(1, _PARTS + 1):
+            lengths.append((span[1] - span[0]) / 3 * (k / _PARTS)**2)
+            area = _end_area(cells, end, sign * lengths[-1])
+            heights.append(max(heights[-1], 2.0 * area / lengths[-1]))
+        yield heights, lengths
 
 
 def _without(cell: PlaneCell, x0: float, x1: float, y0: float, y1: float) -> list[PlaneCell]:
