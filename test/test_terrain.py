@@ -3,6 +3,7 @@
 import math
 import random
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -76,6 +77,20 @@ def test_lifted_legs_keep_clear_of_a_mountain():
         assert above(ground, inner) >= 30.0
         for end, near in ((a, inner[0]), (b, inner[-1])):  # upright to and from low ends
             assert end[:2] == near[:2]
+
+
+def test_legs_over_real_ground_keep_clear_of_it():
+    pytest.importorskip('rasterio')
+    tile = Path(__file__).parent.parent / 'benchmarks/data/jacksboro.tif'
+    rng, ground = random.Random(3), read_terrain(tile, Origin(36.525, -84.272, 400.0))
+    raised = 0
+    for _ in range(25):
+        a, b = ground.raised([(rng.uniform(-5000, 5000), rng.uniform(-5500, 5500), 0.0)
+                              for _ in 'ab'], [rng.uniform(31.0, 120.0) for _ in 'ab'])
+        via = ground.lifted(a, b, 30.0)
+        assert above(ground, [a, *via, b]) >= 30.0
+        raised += bool(via)
+    assert raised > 15
 
 
 def test_a_clear_leg_has_no_points():
