@@ -224,7 +224,7 @@ def test_a_plan_of_qgroundcontrol(tmp_path):
     scenario, notes = imported(tmp_path, 'job.plan', plan_text(
         [simple(22, 0, 0, 20), simple(16, 47.4, 8.547, 30, hold=7, number=2),
          simple(16, 47.401, 8.547, 530, mode=2, number=3), simple(206, 0, 0, 0),
-         {'type': 'ComplexItem', 'complexItemType': 'StructureScan'}, simple(20, 0, 0, 0)],
+         {'type': 'ComplexItem', 'complexItemType': 'fwLandingPattern'}, simple(20, 0, 0, 0)],
         {'circles': [{'circle': {'center': [47.402, 8.547], 'radius': 30}, 'inclusion': False}],
          'polygons': [
              {'inclusion': False, 'polygon': [[47.40, 8.54], [47.40, 8.55], [47.41, 8.55]]},
@@ -238,7 +238,7 @@ def test_a_plan_of_qgroundcontrol(tmp_path):
     assert notes == [
         'job.plan: item 1: a take-off, which missions get of their own',
         'job.plan: item 4: command 206 is none of 16, 19, 82',
-        'job.plan: item 5: a StructureScan is neither a survey nor a corridor',
+        'job.plan: item 5: a fwLandingPattern is no survey, corridor or structure scan',
         'job.plan: item 6: a return, which missions get of their own',
         'job.plan: fence polygon 2: it includes: expected an excluding one, see fence_area']
 

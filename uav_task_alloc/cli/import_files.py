@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The command `import`: a scenario file from KML, KMZ, GeoJSON, .plan and CSV files."""
+"""The command `import`: a scenario file from the files of maps and ground stations."""
 from __future__ import annotations
 
 import argparse
@@ -62,7 +62,8 @@ def _make_parser() -> OptionParser:
         'the property kind: zone '
         '(docs/map_files.md). What is not imported is named.')
     parser.add_argument('files', nargs='+', type=Path, metavar='FILE',
-                        help='.kml, .kmz, .geojson, .json, .plan (QGroundControl) or .csv')
+                        help='.kml, .kmz, .geojson, .json, .plan (QGroundControl), '
+                             '.waypoints or .txt (Mission Planner), or .csv')
     parser.add_argument('--output', type=Path, metavar='SCENARIO.yaml',
                         help='the scenario, a new file (default: the name of the first file with '
                              '.yaml)')

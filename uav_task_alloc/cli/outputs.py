@@ -12,6 +12,7 @@ from uav_task_alloc.errors import AllocError, InvalidValue
 
 FIGURE_SUFFIXES = ('.png', '.pdf', '.svg')
 MAP_SUFFIXES = ('.geojson', '.kml')
+PLAN_MAP_SUFFIXES = (*MAP_SUFFIXES, '.plan')
 _INPUT_SUFFIXES = ('.yaml', '.yml', '.mcap')  # a file that took long to make is not replaced
 EXTRAS = {  # of setup.py, by the package that is imported
     'matplotlib': 'plot', 'aiohttp': 'view', 'mcap': 'view', 'mcap_ros2': 'view',

@@ -17,7 +17,7 @@ from uav_task_alloc.cli.interrupt import INTERRUPTED
 from uav_task_alloc.cli.options import OptionParser, one_of
 from uav_task_alloc.cli.outputs import (
     FIGURE_SUFFIXES,
-    MAP_SUFFIXES,
+    PLAN_MAP_SUFFIXES,
     check_file,
     check_folder,
     check_installed,
@@ -148,7 +148,9 @@ def _add_outputs(parser: OptionParser) -> None:
             ('--plot-3d', 'OUT.png', 'draw the plan in three dimensions (.png, .pdf, .svg)'),
             ('--plot-times', 'OUT.png', 'draw the plan from above and over time (.png, .pdf, '
                                         '.svg)'),
-            ('--map', 'OUT.geojson', 'write routes, tasks and zones for maps (.geojson, .kml)'),
+            ('--map', 'OUT.geojson', 'write routes, tasks and zones for maps (.geojson, .kml), or '
+                                      'tasks and zones as surveys and fences for QGroundControl '
+                                      '(.plan)'),
             ('--missions', 'DIR', 'write a .plan (QGroundControl) and a .waypoints file (Mission '
                                   'Planner, MAVProxy) for each UAV')):
         parser.add_argument(option, type=Path, metavar=metavar, help=f'{meaning} (default: none)')
@@ -161,7 +163,7 @@ def check_outputs(args: argparse.Namespace) -> None:
                                    ('--plot', args.plot, FIGURE_SUFFIXES),
                                    ('--plot-3d', args.plot_3d, FIGURE_SUFFIXES),
                                    ('--plot-times', args.plot_times, FIGURE_SUFFIXES),
-                                   ('--map', args.map, MAP_SUFFIXES)):
+                                   ('--map', args.map, PLAN_MAP_SUFFIXES)):
         if path is not None and suffixes is FIGURE_SUFFIXES:
             check_installed(option, 'matplotlib')
         check_file(option, path, suffixes, used)
@@ -282,7 +284,14 @@ def write_outputs(loaded: Scenario, result: Plan, args: argparse.Namespace) -> N
                 getattr(plots, name)(
                     [uav.uav for uav in loaded.uavs], [timed.task for timed in loaded.tasks],
                     [timed.zone for timed in loaded.zones], result, path)
-    if args.map:
+    if args.map and args.map.suffix.lower() == '.plan':
+        from uav_task_alloc.map_files.write_plan import plan_document
+        with naming('--map', args.map):
+            document, notes = plan_document(loaded)
+            args.map.write_text(json.dumps(document, indent=2, allow_nan=False) + '\n')
+        for note in notes:
+            log_line(f'Warning: {args.map.name}: {note}')
+    elif args.map:
         from uav_task_alloc.map_files.write import plan_shapes, write_map  # imports numba
         with naming('--map', args.map):
             write_map(args.map, loaded.origin, plan_shapes(loaded, result))

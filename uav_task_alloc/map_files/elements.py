@@ -11,6 +11,7 @@ from uav_task_alloc.errors import AllocError, shown
 from uav_task_alloc.geometry.frames import Origin
 
 AMSL, ABOVE_ORIGIN, UNSAID = 'amsl', 'origin', 'unsaid'  # what altitudes refer to
+OWN_KEY = 'uav_task_alloc'  # of items in .plan files: what QGroundControl has no key for
 LARGEST_FILE = 100_000_000  # [bytes], unpacked
 
 
@@ -76,6 +77,25 @@ def check_place(where: str, numbers: Sequence[Any]) -> Place:
         raise MapFileError(f'{where}: longitude {longitude:g}, latitude {latitude:g}: expected '
                            'degrees in [-180, 180] and [-90, 90] of WGS84')
     return Place(latitude, longitude, values[2] if len(values) > 2 else None)
+
+
+def own_values(where: str, item: dict[str, Any]) -> dict[str, Any]:
+    """The values of an item of a .plan that this package has written beside those of QGC.
+
+    Args:
+        where: file and element, for errors.
+        item: as JSON has it.
+
+    Returns:
+        By key of a scenario.
+
+    Raises:
+        MapFileError: they are no object.
+    """
+    found = item.get(OWN_KEY, {})
+    if not isinstance(found, dict):
+        raise MapFileError(f'{where}: {OWN_KEY} = {shown(found)}: expected an object')
+    return dict(found)
 
 
 def open_ring(where: str, places: Sequence[Place]) -> tuple[Place, ...]:

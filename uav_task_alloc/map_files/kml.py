@@ -113,7 +113,7 @@ def _read_placemark(node: ElementTree.Element, folders: tuple[str, ...], number:
     name = _text(node, 'name')
     where = named(file, 'Placemark', name, number)
     zone = any(_ZONES.search(folder) for folder in folders)
-    data, before = _data(node), len(read.elements)
+    data, before = {**_data(node), **_pilot_height(node, where)}, len(read.elements)
     open_nodes = list(reversed(node))
     while open_nodes:
         shape = open_nodes.pop()
@@ -131,6 +131,28 @@ def _read_placemark(node: ElementTree.Element, folders: tuple[str, ...], number:
     if len(read.elements) == before and not (read.left_out
                                              and read.left_out[-1].startswith(where)):
         read.left_out.append(f'{where}: it has no geometry')
+
+
+def _pilot_height(node: ElementTree.Element, where: str) -> dict[str, Any]:
+    """The height of a waypoint of DJI Pilot 2 (WPML), which is no part of its coordinates.
+
+    Raises:
+        MapFileError: it is above the ellipsoid, or the file does not say above what.
+    """
+    if '/wpmz/' not in str(node.tag) and not any('/wpmz/' in str(child.tag) for child in node):
+        return {}
+    height = _text(node, 'executeHeight') or _text(node, 'height')
+    if not height:
+        return {}
+    mode = _text(node, 'executeHeightMode') or _text(node, 'heightMode')
+    if mode in ('', 'relativeToStartPoint'):
+        return {'altitude': height}
+    if mode == 'EGM96':
+        return {'altitude_amsl': height}
+    if mode in ('aboveGroundLevel', 'realTimeFollowSurface'):
+        return {'altitude': height, 'vertical': 'terrain'}
+    raise MapFileError(f'{where}: height mode {mode}: expected relativeToStartPoint, EGM96 or '
+                       'aboveGroundLevel')
 
 
 def _shape(node: ElementTree.Element, tag: str, where: str) -> tuple[

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Reader of surveys and corridor scans in .plan files of QGroundControl.
+"""Reader of surveys, corridor and structure scans in .plan files of QGroundControl.
 
 The format: https://docs.qgroundcontrol.com/master/en/qgc-dev-guide/file_formats/plan.html
 """
@@ -11,6 +11,7 @@ from itertools import pairwise
 from typing import Any
 
 from uav_task_alloc.errors import shown
+from uav_task_alloc.geometry.frames import Origin, to_enu
 from uav_task_alloc.map_files.elements import (
     ABOVE_ORIGIN,
     AMSL,
@@ -20,15 +21,17 @@ from uav_task_alloc.map_files.elements import (
     Place,
     check_place,
     open_ring,
+    own_values,
 )
 
 ALTITUDE_MODES = {1: ABOVE_ORIGIN, 2: AMSL}
 ABOVE_TERRAIN = 3, 4  # calculated from terrain data, or by the frame
 _DEGREE = 111_319.5  # [m] of latitude
+_MOST_LAYERS = 100  # of a structure scan
 
 
 def read_complex_item(item: dict[str, Any], where: str, read: MapFile) -> None:
-    """Read a survey or a corridor; other complex items are left out with a word.
+    """Read a survey, a corridor or a structure scan; other complex items are left out with a word.
 
     Args:
         item: as JSON has it.
@@ -39,8 +42,11 @@ def read_complex_item(item: dict[str, Any], where: str, read: MapFile) -> None:
         MapFileError: a value is missing or out of range.
     """
     kind = item.get('complexItemType', item.get('type'))
+    if kind == 'StructureScan':
+        _read_structure(item, where, read)
+        return
     if kind not in ('survey', 'CorridorScan'):
-        read.left_out.append(f'{where}: a {kind} is neither a survey nor a corridor')
+        read.left_out.append(f'{where}: a {kind} is no survey, corridor or structure scan')
         return
     style = item['TransectStyleComplexItem']
     camera = style['CameraCalc']
@@ -56,16 +62,54 @@ def read_complex_item(item: dict[str, Any], where: str, read: MapFile) -> None:
     if kind == 'survey':
         ring = open_ring(where, _places(item['polygon'], height, where))
         course = math.radians(float(item.get('angle') or 0.0))  # clockwise from north
-        read.elements.append(Element(where, f'survey_{count}', 'polygon', ring, reference, {
-            **properties, 'strip_width': side,
-            'direction': round(math.remainder(math.pi / 2 - course, 2 * math.pi), 9)}))
+        direction = round(math.remainder(math.pi / 2 - course, 2 * math.pi), 9)
+        own = {'direction': direction, **own_values(where, item)}
+        read.elements.append(Element(where, str(own.pop('id', f'survey_{count}')), 'polygon', ring,
+                                     reference, {**properties, 'strip_width': side, **own}))
         return
     line = _places(item['polyline'], height, where)
     passes = max(1, math.ceil(float(item.get('CorridorWidth') or 0.0) / side - 1e-9))
     for k in range(passes):
         shifted = _beside(line, (k - (passes - 1) / 2) * side)
-        name = f'corridor_{count}' + f'_{k + 1}' * (passes > 1)
-        read.elements.append(Element(where, name, 'line', shifted, reference, properties))
+        own = own_values(where, item)
+        name = str(own.pop('id', f'corridor_{count}')) + f'_{k + 1}' * (passes > 1)
+        read.elements.append(Element(where, name, 'line', shifted, reference,
+                                     {**properties, **own}))
+
+
+def _read_structure(item: dict[str, Any], where: str, read: MapFile) -> None:
+    """Read a structure scan as a circle for each of its layers, around all of its corners."""
+    if 'ScanBottomAlt' not in item:
+        read.left_out.append(f'{where}: a structure scan without ScanBottomAlt, of an early '
+                             'version: expected one that a present QGroundControl has saved')
+        return
+    camera, ring = item['CameraCalc'], open_ring(where, _places(item['polygon'], 0.0, where))
+    count = sum(element.name.startswith('structure') for element in read.elements) + 1
+    frontal, distance = float(camera['AdjustedFootprintFrontal']), float(
+        camera['DistanceToSurface'])
+    bottom, layers = float(item['ScanBottomAlt']), int(item['Layers'])
+    if not (frontal > 0.0 and distance >= 0.0 and 0 < layers <= _MOST_LAYERS
+            and math.isfinite(frontal + distance + bottom)):
+        raise MapFileError(f'{where}: Layers = {layers}, AdjustedFootprintFrontal = {frontal:g}, '
+                           f'DistanceToSurface = {distance:g}: expected 1 to {_MOST_LAYERS} and '
+                           'positive lengths')
+    own = own_values(where, item)
+    name = str(own.pop('id', f'structure_{count}'))
+    centre, radius = _circle_around(ring)
+    for k in range(layers):
+        place = Place(centre.latitude, centre.longitude, bottom + (k + 0.5) * frontal)
+        read.elements.append(Element(
+            where, name + f'_{k + 1}' * (layers > 1), 'point', (place,), ABOVE_ORIGIN,
+            {'kind': 'orbit', 'radius': round(radius + distance, 3), **own}))
+
+
+def _circle_around(ring: Sequence[Place]) -> tuple[Place, float]:
+    """The middle of the corners of a ring, and the distance of the farthest [m]."""
+    latitude = math.fsum(each.latitude for each in ring) / len(ring)
+    longitude = math.fsum(each.longitude for each in ring) / len(ring)
+    middle = Origin(latitude, longitude, 0.0)
+    return Place(latitude, longitude), max(math.hypot(*to_enu(
+        middle, each.latitude, each.longitude, 0.0)[:2]) for each in ring)
 
 
 def _reference(camera: dict[str, Any], style: dict[str, Any], where: str) -> tuple[str, bool]:

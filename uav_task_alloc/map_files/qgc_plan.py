@@ -18,13 +18,14 @@ from uav_task_alloc.map_files.elements import (
     Place,
     check_place,
     open_ring,
+    own_values,
 )
 from uav_task_alloc.map_files.qgc_complex import ABOVE_TERRAIN, ALTITUDE_MODES, read_complex_item
 
 # MAVLink commands of items; no numbers of pymavlink, which is not loaded for the planner
-_HOLDS = {16: 'waypoint', 19: 'loiter for a time', 82: 'spline waypoint'}  # param1: seconds
+TASK_COMMANDS = {16: 'waypoint', 19: 'loiter for a time', 82: 'spline waypoint'}  # param1: seconds
 _NOT_TASKS = {20: 'return', 21: 'landing', 22: 'take-off'}  # the bridge makes its own
-_FRAMES = {0: AMSL, 5: AMSL, 3: ABOVE_ORIGIN, 6: ABOVE_ORIGIN}  # MAV_FRAME
+ITEM_FRAMES = {0: AMSL, 5: AMSL, 3: ABOVE_ORIGIN, 6: ABOVE_ORIGIN}  # MAV_FRAME
 
 
 def read_plan(document: Any, file: str) -> MapFile:
@@ -69,24 +70,34 @@ def _read_item(item: dict[str, Any], where: str, read: MapFile) -> None:
         read_complex_item(item, where, read)
         return
     command, params = item['command'], item['params']
-    if command not in _HOLDS:
-        read.left_out.append(f'{where}: a {_NOT_TASKS[command]}, which missions get of their own'
-                             if command in _NOT_TASKS else f'{where}: command {command} is none '
-                             f'of {", ".join(map(str, _HOLDS))}')
+    if command not in TASK_COMMANDS:
+        read.left_out.append(f'{where}: {why_no_task(command)}')
         return
     terrain = item.get('AltitudeMode') in ABOVE_TERRAIN
     reference = ABOVE_ORIGIN if terrain else ALTITUDE_MODES.get(item.get('AltitudeMode', 0)) or (
-        None if item.get('AltitudeMode') else _FRAMES.get(item.get('frame', 3)))
+        None if item.get('AltitudeMode') else ITEM_FRAMES.get(item.get('frame', 3)))
     if reference is None:
         raise MapFileError(f'{where}: AltitudeMode {shown(item.get("AltitudeMode"))}, frame '
                            f'{shown(item.get("frame"))}: expected an altitude relative to launch, '
                            'AMSL or above terrain')
     place = check_place(where, (params[5], params[4], params[6]))
     hold = float(params[0] or 0.0)
-    read.elements.append(Element(where, f'wp{item.get("doJumpId", len(read.elements) + 1)}',
-                                 'point', (place,), reference,
+    own = own_values(where, item)
+    name = own.pop('id', f'wp{item.get("doJumpId", len(read.elements) + 1)}')
+    read.elements.append(Element(where, str(name), 'point', (place,), reference,
                                  {**({'service_time': hold} if hold > 0.0 else {}),
-                                  **({'vertical': 'terrain'} if terrain else {})}))
+                                  **({'vertical': 'terrain'} if terrain else {}), **own}))
+
+
+def why_no_task(command: int) -> str:
+    """Return why an item is no task.
+
+    Args:
+        command: number of a MAVLink command that is not in TASK_COMMANDS.
+    """
+    if command in _NOT_TASKS:
+        return f'a {_NOT_TASKS[command]}, which missions get of their own'
+    return f'command {command} is none of {", ".join(map(str, TASK_COMMANDS))}'
 
 
 def _read_circle(circle: dict[str, Any], where: str, number: int, read: MapFile) -> None:
@@ -94,8 +105,10 @@ def _read_circle(circle: dict[str, Any], where: str, number: int, read: MapFile)
         read.left_out.append(f'{where}: it includes: expected an excluding one, see fence_area')
         return
     latitude, longitude = circle['circle']['center']
+    own = own_values(where, circle)
     read.elements.append(Element(
-        where, f'circle_{number}', 'circle', (check_place(where, (longitude, latitude)),),
+        where, str(own.pop('id', f'circle_{number}')), 'circle',
+        (check_place(where, (longitude, latitude)),), properties=own,
         radius=float(circle['circle']['radius']), zone=True))
 
 
@@ -105,5 +118,6 @@ def _read_polygon(polygon: dict[str, Any], where: str, number: int, read: MapFil
         return
     ring: list[Place] = [check_place(where, (longitude, latitude))
                          for latitude, longitude in polygon['polygon']]
-    read.elements.append(Element(where, f'polygon_{number}', 'polygon', open_ring(where, ring),
-                                 zone=True))
+    own = own_values(where, polygon)
+    read.elements.append(Element(where, str(own.pop('id', f'polygon_{number}')), 'polygon',
+                                 open_ring(where, ring), properties=own, zone=True))

@@ -12,13 +12,14 @@ from uav_task_alloc.map_files.geojson import read_geojson
 from uav_task_alloc.map_files.kml import read_kml, read_kmz
 from uav_task_alloc.map_files.qgc_plan import read_plan
 from uav_task_alloc.map_files.table import read_table
+from uav_task_alloc.map_files.waypoints import read_waypoints
 
 
 def read_map_file(path: Path) -> MapFile:
     """Read a file of a map or a ground station.
 
     Args:
-        path: ends with .kml, .kmz, .geojson, .json, .plan or .csv.
+        path: ends with .kml, .kmz, .geojson, .json, .plan, .waypoints, .txt or .csv.
 
     Returns:
         Its elements, in the order of the file.
@@ -68,5 +69,7 @@ _READERS: dict[str, Callable[[bytes, str], MapFile]] = {
     '.geojson': lambda data, file: read_geojson(_json(data, file), file),
     '.json': _any_json,
     '.plan': lambda data, file: read_plan(_json(data, file), file),
+    '.waypoints': lambda data, file: read_waypoints(_text(data, file), file),
+    '.txt': lambda data, file: read_waypoints(_text(data, file), file),
     '.csv': lambda data, file: read_table(_text(data, file), file),
 }

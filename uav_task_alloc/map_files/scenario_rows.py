@@ -29,7 +29,8 @@ from uav_task_alloc.work.values import MOST_CORNERS
 
 _PLACE_KEYS = {'id', 'position', 'home', 'center', 'vertices', 'shape', 'latitude', 'longitude',
                'altitude'}
-_WORK_KEYS = {'point': set[str](), 'line': {'divisible'}, 'area': {'strip_width', 'direction'},
+_WORK_KEYS = {'point': set[str](), 'line': {'divisible'},
+              'area': {'strip_width', 'direction', 'divisible'},
               'orbit': {'radius', 'turns', 'direction'}}  # keys of one kind only
 _OWN_KEYS = {'kind', 'path', 'holes'}.union(*_WORK_KEYS.values())
 _KEYS = {'tasks': TASK.keys() - _PLACE_KEYS - _OWN_KEYS,

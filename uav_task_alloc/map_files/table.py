@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import re
 
 from uav_task_alloc.errors import shown
 from uav_task_alloc.map_files.elements import (
@@ -16,7 +17,9 @@ from uav_task_alloc.map_files.elements import (
 )
 
 _NAMES = 'id', 'name'
+_ABOVE_GROUND = '1'
 _LATITUDE, _LONGITUDE = ('latitude', 'lat', 'y'), ('longitude', 'lon', 'lng', 'long', 'x')
+_MODE = 'altitudemode'  # column of Litchi: 0 above take-off, 1 above ground
 _ALTITUDES = {'altitude_amsl': AMSL, 'altitude': ABOVE_ORIGIN, 'alt': UNSAID, 'z': UNSAID,
               'elevation': UNSAID, 'height': UNSAID}
 
@@ -37,7 +40,12 @@ def read_table(text: str, file: str) -> MapFile:
     names = [str(name).strip().lower() for name in reader.fieldnames or ()]
     reader.fieldnames = names
     latitude, longitude = (_column(names, wanted, file) for wanted in (_LATITUDE, _LONGITUDE))
-    altitude = next((name for name in _ALTITUDES if name in names), '')
+    altitude = next((name for name in names if _quantity(name) in _ALTITUDES), '')
+    odd = next((name for name in names if not altitude
+                and re.split(r'[(\[]', name)[0].strip() in _ALTITUDES), '')
+    if odd:
+        raise MapFileError(f'{file}:1: column {odd}: expected metres, as altitude(m)')
+    unsaid = _ALTITUDES.get(_quantity(altitude), UNSAID)
     label = next((name for name in _NAMES if name in names), '')
     read = MapFile()
     try:
@@ -45,16 +53,33 @@ def read_table(text: str, file: str) -> MapFile:
             where = f'{file}:{reader.line_num}'
             if None in row or None in row.values():
                 raise MapFileError(f'{where}: expected {len(names)} columns: {", ".join(names)}')
+            mode = _mode(row.get(_MODE), where)
             numbers = [row[longitude], row[latitude]] + (
                 [row[altitude]] if altitude and row[altitude].strip() else [])
             read.elements.append(Element(
                 where, row[label].strip() if label else '', 'point',
-                (check_place(where, numbers),), _ALTITUDES.get(altitude, UNSAID),
-                {name: value.strip() for name, value in row.items()
-                 if value.strip() and name not in (latitude, longitude, altitude, label)}))
+                (check_place(where, numbers),), ABOVE_ORIGIN if mode else unsaid,
+                {**{name: value.strip() for name, value in row.items()
+                    if value.strip() and name not in (latitude, longitude, altitude, label)},
+                 **({'vertical': 'terrain'} if mode == _ABOVE_GROUND else {})}))
     except csv.Error as error:
         raise MapFileError(f'{file}:{reader.line_num}: {error}: expected CSV') from None
     return read
+
+
+def _quantity(name: str) -> str:
+    """The name of a column without its unit: `altitude` of `altitude(m)`; other units stay."""
+    return name.removesuffix('(m)').removesuffix('[m]').strip()
+
+
+def _mode(given: str | None, where: str) -> str:
+    """What Litchi says of an altitude; '' where there is no such column. Raises MapFileError."""
+    if given is None or not given.strip():
+        return ''
+    if given.strip() not in ('0', _ABOVE_GROUND):
+        raise MapFileError(f'{where}: {_MODE} = {shown(given)}: expected 0 (above take-off) or 1 '
+                           '(above ground)')
+    return given.strip()
 
 
 def _column(names: list[str], wanted: tuple[str, ...], file: str) -> str:

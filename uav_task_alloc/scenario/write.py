@@ -49,8 +49,8 @@ def to_yaml(scenario: Scenario) -> str:
         **({'separation': {name: getattr(scenario.separation, name) for name in SEPARATION}}
            if scenario.separation.on else {}),
         'uavs': [_uav(uav) for uav in scenario.uavs],
-        'tasks': [_task(timed) for timed in scenario.tasks],
-        'zones': [_zone(timed) for timed in scenario.zones],
+        'tasks': [scenario_task_row(timed) for timed in scenario.tasks],
+        'zones': [scenario_zone_row(timed) for timed in scenario.zones],
         'cancels': [{'task': cancel.task, 'at': cancel.at} for cancel in scenario.cancels],
         'orders': [asdict(order) | {'tasks': list(order.tasks)} for order in scenario.orders],
     }
@@ -65,8 +65,17 @@ def _uav(uav: ScenarioUav) -> dict[str, Any]:
     return row | _changed(uav, ScenarioUav, UAV_LIMITS)
 
 
-def _task(timed: TimedTask) -> dict[str, Any]:
-    task, work = timed.task, timed.whole
+def scenario_task_row(timed: TimedTask) -> dict[str, Any]:
+    """Return a task as a row of a scenario file.
+
+    Args:
+        timed: of any kind.
+
+    Returns:
+        Values by key, lengths in metres of the ENU frame.
+    """
+    work = timed.whole
+    task = work.task
     place = {} if work.path else {'position': list(task.position)}
     return {'id': task.id, 'at': timed.at, **place, **_geometry(work), 'value': task.value,
             'service_time': task.service_time, 'acceptance_radius': task.acceptance_radius,
@@ -95,6 +104,14 @@ def _changed(value: ScenarioUav | Task, kind: type, names: tuple[str, ...]) -> d
     return {name: given for name in names if (given := getattr(value, name)) != defaults[name]}
 
 
-def _zone(timed: TimedZone) -> dict[str, Any]:
+def scenario_zone_row(timed: TimedZone) -> dict[str, Any]:
+    """Return a zone as a row of a scenario file.
+
+    Args:
+        timed: with its times.
+
+    Returns:
+        Values by key, lengths in metres of the ENU frame.
+    """
     row = encode_zone(timed.zone, SCENARIO_ZONE) | {'appears': timed.appears}
     return row if math.isinf(timed.vanishes) else row | {'vanishes': timed.vanishes}
