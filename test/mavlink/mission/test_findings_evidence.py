@@ -124,6 +124,20 @@ def test_a_reboot_does_not_lose_what_the_positions_have_shown():
     assert list(flight.table.completed) == ['A']
 
 
+@pytest.mark.parametrize(('place', 'completed'), [(93.0, ['A']), (60.0, [])])
+def test_a_reboot_just_after_a_task_was_passed_between_two_positions_keeps_it(place, completed):
+    flight = Flight()
+    flight.begin(A=100.0, B=500.0)
+    flight.table.note_current(0, flight.now, True, flight.frame())
+    flight.fly_to(place)
+    flight.lost = True
+    flight.stay(0.6, SPEED)
+    flight.table.note_current(1, flight.now, True)
+    flight.stay(0.2, SPEED)
+    flight.table.invalidate()
+    assert list(flight.table.completed) == completed
+
+
 def test_a_task_passed_without_positions_counts_where_the_vehicle_is_seen_again():
     flight = Flight(repeats=False)
     flight.begin(A=100.0, B=500.0)

@@ -24,6 +24,7 @@ _FEW, _USUAL_SPEED = 100, 15.0  # samples; [m/s] assumed where there are fewer
 _ACCELERATION = 6.0  # [m/s2] that no vehicle exceeds for seconds (PX4: MPC_ACC_HOR_MAX 5)
 _CORRIDOR = 8.0  # [m] from a leg at which a vehicle flies it
 _HOLD_SLACK = 0.1  # [s] by which a sampled hold may be shorter than the real one
+_AHEAD = 1.0  # [s] after the newest sample, in which a vehicle keeps its velocity
 
 
 class Visit(Enum):
@@ -125,6 +126,23 @@ class FlownPath:
         """Vehicle time [s] at which it was first at a point; None where it was not seen there."""
         first, last = self._stay(point, radius, since, until=until)
         return first if last >= first else None
+
+    def approached(self, point: Point, radius: float, since: float, until: float) -> bool:
+        """Whether it came to a point just after the newest sample, if it kept its velocity.
+
+        Args:
+            point: ENU [m].
+            radius: acceptance radius [m]; 0: the autopilot's default.
+            since: vehicle time [s]; an earlier sample shows nothing.
+            until: vehicle time [s]; at most _AHEAD after the sample counts.
+        """
+        last = self.sample
+        if last is None or not since <= last.t < until or math.isnan(math.hypot(*last.velocity)):
+            return False
+        time = min(until - last.t, _AHEAD)
+        x, y, z = (p + v * time for p, v in zip(last.position, last.velocity, strict=True))
+        return segment_distance(point, last.position, (x, y, z)) <= (
+            radius or _DEFAULT_RADIUS) + CLOSE + _CURVE * time * time
 
     def could_have_flown(self, chain: Sequence[Point], then: Point | None, holds: float,
                    since: float, anywhere: bool = False, home: Point | None = None) -> bool:

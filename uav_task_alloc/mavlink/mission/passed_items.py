@@ -75,7 +75,7 @@ class PassedItems:
     def seen(self) -> tuple[Item, ...]:
         """Items of open claims at which the vehicle was seen, where nothing more will come."""
         return tuple(item for claim in self._claims for item in claim.items
-                     if self._visit(item, claim) is Visit.YES)
+                     if self._visit(item, claim) is Visit.YES or self._approached(item, claim))
 
     def clear(self) -> None:
         """Drop all claims: the mission on board is unknown."""
@@ -151,11 +151,16 @@ class PassedItems:
             return Visit.NO
         # what ends the hold of a single item is that the mission goes on
         hold = item.params[0] if claim.skips or not claim.in_flight else 0.0
-        # an item is flown only while it is current
-        since = claim.since if item is claim.first else max(claim.since, claim.others_since)
         return self._positions.path.visited(
-            item.position, item.radius, hold, since, self._until(claim),
+            item.position, item.radius, hold, _current_since(item, claim), self._until(claim),
             0.0 if claim.skips else CLOSE)
+
+    def _approached(self, item: Item, claim: Claim) -> bool:
+        """Whether it was about to reach a single item without a hold, by its last position."""
+        if claim.skips or not claim.in_flight or item.params[0] > 0.0 or item.position is None:
+            return False
+        return self._positions.path.approached(
+            item.position, item.radius, _current_since(item, claim), self._until(claim))
 
     def _until(self, claim: Claim) -> float:
         """Vehicle time [s] at which it was past them, by the order of its frames."""
@@ -164,6 +169,11 @@ class PassedItems:
         # a place passed after another station had set the current item does not count
         return min(claim.until, self._positions.sent_before(
             claim.frame, claim.until, earliest=claim.skips))
+
+
+def _current_since(item: Item, claim: Claim) -> float:
+    """Vehicle time [s] from which an item of a claim may have been flown: while it is current."""
+    return claim.since if item is claim.first else max(claim.since, claim.others_since)
 
 
 def flown_nearby(items: tuple[Item, ...], flown: Item) -> tuple[Item, ...]:
