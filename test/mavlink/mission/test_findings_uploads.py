@@ -44,6 +44,23 @@ def test_a_task_reached_while_the_upload_is_not_confirmed_is_flown_once(kind, lo
 
 
 @PX4
+@pytest.mark.parametrize(('event', 'after'), [('reboot', 1.0), ('kill', 8.0)])
+def test_a_task_reached_before_a_mission_that_is_not_confirmed_is_lost_is_known(
+        kind, event, after):
+    bench = flying(kind, 'ABC')
+    drop_for(bench, 60.0, 'MISSION_ACK', 'MISSION_COUNT')
+    bench.assign(task_list('BCA', 2))
+    assert bench.run(lambda: places(bench) == ['B'], 40.0)
+    bench.run(limit=after)
+    assert not bench.onboard().taken
+    if event == 'kill':
+        assert bench.completed() == ['B']
+    else:
+        bench.vehicles[1].reboot(bench.now)
+        assert bench.run(lambda: bench.completed() == ['B'], 10.0)
+
+
+@PX4
 def test_a_task_reached_in_a_cut_while_the_upload_is_not_confirmed_is_flown_once(kind):
     bench = flying(kind, 'AB')
     drop_for(bench, 30.0, 'MISSION_ACK', 'MISSION_COUNT')

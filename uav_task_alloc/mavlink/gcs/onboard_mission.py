@@ -212,14 +212,14 @@ class OnboardMission:
             if self.upload.busy and self._unconfirmed is None:
                 self._sent_since = None
         elif self._sent_since is None:
-            self._sent_since = self.progress.path.newest
-            self._sent_frame = self._telemetry.frame
+            self._sent_since, self._sent_frame = self.progress.path.newest, self._telemetry.frame
         self._settle(now)
         return out
 
     def step(self, now: float) -> list[Message]:
         """Advance time; returns the messages to send."""
         out = self.upload.step(now)
+        self._reports.credit_waiting(self.unknown_upload, now)
         if self._starts_at_flown() and not self.upload.sent_all:
             out += self.upload.cancel(now)
         self._settle(now)
@@ -301,9 +301,9 @@ class OnboardMission:
 
     def restarted(self) -> None:
         """Reset after a restart of the vehicle: transfer lost, mission unknown."""
+        self._reports.end(self.unknown_upload)
         self.upload.reset()
         self._failures.clear()
-        self._reports.clear()
         self.progress.invalidate()
         self._mission.reset()
         self._uploading = self._unconfirmed = None

@@ -13,6 +13,7 @@ from typing import NamedTuple
 from uav_task_alloc.geometry.frames import Origin
 from uav_task_alloc.mavlink.mission.diff import MissionDiff
 from uav_task_alloc.mavlink.mission.items import Item, alike, with_position
+from uav_task_alloc.mavlink.mission.position_history import MAX_MESSAGE_DELAY
 from uav_task_alloc.mavlink.mission.progress import ProgressTable
 
 _MAX_MESSAGES = 32  # REACHED, without repetitions
@@ -51,13 +52,14 @@ class ReportsDuringUpload:
         frame: number of the received frame, rising.
         flying: the vehicle is in mission mode.
         plan: PX4's mission id; 0: unknown.
-        uploaded: the new mission.
+        uploaded: the new mission; None: none is open.
     """
 
     def __init__(self, progress: ProgressTable, origin: Origin) -> None:
         self._progress, self._origin = progress, origin
         self._reached: list[_Reached] = []
         self._currents: list[_Current] = []
+        self._judged: set[tuple[int, int]] = set()  # first and last frame of series credited early
 
     @property
     def has_reached(self) -> bool:
@@ -79,10 +81,13 @@ class ReportsDuringUpload:
         if len(self._currents) < _MAX_CURRENT:
             self._currents.append(_Current(seq, now, frame, flying, plan))
 
-    def clear(self) -> None:
-        """Drop them: the vehicle was restarted."""
+    def end(self, uploaded: MissionDiff | None) -> None:
+        """Credit by the positions, and drop the rest: the vehicle was restarted."""
+        if uploaded is not None:
+            self._credit_reached(uploaded)
         self._reached.clear()
         self._currents.clear()
+        self._judged.clear()
 
     def release(self, frame: int) -> None:
         """Credit REACHED sent before a frame that shows the old mission on board."""
@@ -114,6 +119,7 @@ class ReportsDuringUpload:
             if when is not None:
                 of_new.append((seq, when, reached.frame))
         self._reached.clear()
+        self._judged.clear()
         return of_new
 
     def _credit_old(self, reached: _Reached, before: Item | None, after: Item | None,
@@ -190,6 +196,22 @@ class ReportsDuringUpload:
 
     def credit(self, uploaded: MissionDiff) -> None:
         """Credit all by the positions after a failed transfer: either mission may be flown."""
+        self._credit_reached(uploaded)
+        self._currents.clear()
+
+    def _credit_reached(self, uploaded: MissionDiff) -> None:
         for seq, _, _ in self.begin_new(uploaded):
             self._progress.credit(uploaded.items[seq])
-        self._currents.clear()
+
+    def credit_waiting(self, uploaded: MissionDiff | None, now: float) -> None:
+        """Credit by the positions what waits for longer than any message, and keep it.
+
+        A readback may take long, and a bridge that is killed meanwhile would lose it.
+        """
+        waiting = [each for each in self._reached if (each.frame, each.last_frame)
+                   not in self._judged and now - self._first_at(each) >= MAX_MESSAGE_DELAY]
+        if waiting and uploaded is not None:
+            kept, self._reached = self._reached, waiting
+            self._credit_reached(uploaded)
+            self._judged.update((each.frame, each.last_frame) for each in waiting)
+            self._reached = kept
