@@ -93,6 +93,36 @@ def test_positions_outside_of_the_mission_mode_count_for_nothing():
     assert flown.rest() == [(0, 0), (300, 0), (300, 300)]
 
 
+def test_a_way_whose_end_was_reached_from_elsewhere_is_not_covered():
+    flown = Flown(task=piece('L', (0, 0), (60, 0))).fly(at(60, -100), at(60, 0))
+    assert not flown.covered
+    assert flown.leave().rest() == [(0, 0), (60, 0)]
+
+
+def test_silence_after_a_position_elsewhere_covers_no_way_that_begins_elsewhere():
+    flown = Flown(task=piece('L', (0, 0), (60, 0))).fly(at(100, 60), at(95, 55))
+    flown.t += 3.5
+    flown.fly(at(60, 0), at(60, 0))
+    assert not flown.covered
+
+
+def test_a_way_that_is_resumed_further_on_is_not_covered():
+    flown = Flown().fly(at(50, 60), at(50, 0), item=None).fly(at(50, 0), at(300, 0), at(300, 300))
+    assert not flown.covered
+    assert flown.leave().rest() == [(0, 0), (300, 0), (300, 300)]
+
+
+def test_a_way_left_for_a_while_is_not_covered():
+    flown = Flown().fly(at(0, 0), at(100, 0), at(140, 30), at(180, 30), at(220, 0), at(300, 0),
+                        at(300, 300))
+    assert not flown.covered
+
+
+def test_a_way_that_was_begun_before_the_report_of_its_item_is_covered():
+    flown = Flown().fly(at(-60, 0), at(0, 0), at(70, 0), item=Item(16, task='X'))
+    assert flown.fly(at(73, 0), at(300, 0), at(300, 300)).covered
+
+
 def test_a_gap_that_the_speed_explains_is_flown():
     flown = Flown().fly(at(0, 0), at(100, 0))
     flown.t += 300.0 / SPEED

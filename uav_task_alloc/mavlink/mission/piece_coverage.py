@@ -23,7 +23,7 @@ from uav_task_alloc.model import Point
 
 _CORRIDOR, _CORRIDOR_PLANE = 15.0, 150.0  # [m] from a way at which a vehicle still follows it
 _SLACK = 10.0  # [m] of positions that are not exact
-_LAG = 3.0  # [s] by which the report of the current item may be late
+_RECENT = 32  # positions: six seconds, by which the report of the current item may be late
 _MARGIN = 1.2  # of a speed
 _SHORTEST = 1.0  # [m] of a flown part or of a rest
 _KEPT = 64  # pieces
@@ -41,6 +41,7 @@ class _Piece:
     reversed: bool = False
     flown: float = 0.0  # [m] of the part between `low` and `high`, in the direction of flight
     seen: float | None = None  # vehicle time [s] of the last position on it
+    off: tuple[float, float] | None = None  # vehicle time [s], [m] to go back: seen off it since
     way: list[Point] = field(default_factory=list)  # that part in the direction of flight
     way_at: list[float] = field(default_factory=list)  # [m] of each of its points
 
@@ -61,17 +62,21 @@ class _Piece:
         x, y, z = point_at(self.path[n], self.path[n + 1], (metres - self.at[n]) / length)
         return x, y, z
 
+    def next_point(self) -> Point:
+        """The end of the flown part."""
+        return self.point(self.high - self.flown if self.reversed else self.low + self.flown)
+
     def commit(self) -> bool:
         """Leave out the flown part from now on; whether there is one."""
         if self.flown < _SHORTEST:
-            self.flown, self.seen = 0.0, None
+            self.flown, self.seen, self.off = 0.0, None, None
             return False
         left = max(self.high - self.low - self.flown, _SHORTEST)
         if self.reversed:
             self.high = self.low + left
         else:
             self.low = self.high - left
-        self.flown, self.seen = 0.0, None
+        self.flown, self.seen, self.off = 0.0, None, None
         self.measure()
         return True
 
@@ -95,6 +100,8 @@ class PieceCoverage:
         self._under_way: str | None = None
         self._ending: str | None = None  # passed in flight; it is not known how far it was flown
         self._sampled = -math.inf  # vehicle time [s] of the newest position
+        self._recent: deque[PositionSample] = deque(maxlen=_RECENT)  # in mission mode, without gap
+        self._fastest = 0.0  # [m/s]
 
     def set_listed(self, stops: Iterable[MissionStop]) -> None:
         """Take the ways of a list; what was flown of the same way stays flown."""
@@ -146,6 +153,8 @@ class PieceCoverage:
     def note_active(self, item: Item | None, in_mission: bool) -> None:
         """Note the item being flown; the way of another one is left where the vehicle was."""
         task = item.task if item is not None and in_mission and item.along else None
+        if not in_mission:
+            self._recent.clear()
         if task == self._under_way:
             return
         before, self._under_way = self._under_way, task
@@ -155,6 +164,10 @@ class PieceCoverage:
             self._ending = before
         if not in_mission or task == self._ending:
             self._leave(self._ending)
+        piece = self._pieces.get(task or '')
+        if piece is not None and piece.seen is None:  # it may be on it for some seconds
+            for sample in self._recent:
+                self._follow(piece, sample, sample.t, self._fastest)
 
     def _leave(self, name: str | None) -> None:
         """Fly the rest of a way from where it was left."""
@@ -171,7 +184,10 @@ class PieceCoverage:
             sample: newer than those before.
             fastest: [m/s] that it flies.
         """
-        before, self._sampled = self._sampled, sample.t
+        before, self._sampled, self._fastest = self._sampled, sample.t, fastest
+        if not 0.0 <= sample.t - before <= GAP:
+            self._recent.clear()
+        self._recent.append(sample)
         for name in (self._under_way, self._ending):
             piece = self._pieces.get(name or '')
             if name is not None and piece is not None:
@@ -182,17 +198,19 @@ class PieceCoverage:
     def _follow(self, piece: _Piece, sample: PositionSample, before: float,
                 fastest: float) -> None:
         if piece.seen is None:
-            first = before if math.isfinite(before) else sample.t
-            piece.seen = min(first, sample.t) - _LAG
-        gap = max(sample.t - piece.seen, 0.0)
-        reach = _MARGIN * fastest * gap + _SLACK
+            piece.seen = min(before, sample.t) if math.isfinite(before) else sample.t
+        since, back = piece.off or (piece.seen, 0.0)
+        gap = max(sample.t - since, 0.0)
+        reach = max(_MARGIN * fastest * gap - back, 0.0) + _SLACK
         metres = self._metres(piece, sample.position, reach)
         if metres is not None:
-            piece.flown, piece.seen = max(piece.flown, metres), sample.t
+            piece.flown, piece.seen, piece.off = max(piece.flown, metres), sample.t, None
         elif gap > GAP and sample.t - before > GAP and (
                 piece.way_at[-1] - piece.flown + math.dist(sample.position, piece.way[-1])
                 <= reach):
-            piece.flown, piece.seen = piece.way_at[-1], sample.t
+            piece.flown, piece.seen, piece.off = piece.way_at[-1], sample.t, None
+        else:  # what it flies now it does not fly of the way
+            piece.off = sample.t, math.dist(sample.position, piece.next_point())
 
     def _metres(self, piece: _Piece, position: Point, reach: float) -> float | None:
         """Where on its way the vehicle is [m]; None where it does not follow it."""
@@ -234,6 +252,7 @@ class PieceCoverage:
         self._partly.pop(task, None)
         if piece is not None:
             piece.low, piece.high, piece.flown, piece.seen = 0.0, piece.at[-1], 0.0, None
+            piece.off = None
             piece.measure()
             self.version += 1
 
