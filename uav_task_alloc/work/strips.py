@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from bisect import bisect
 from collections.abc import Iterable, Sequence
-from itertools import pairwise
+from itertools import accumulate, pairwise
 
 import numpy as np
 
@@ -27,13 +27,15 @@ from uav_task_alloc.work.values import MOST_PIECES
 from uav_task_alloc.work.zone_sections import Span, remaining, ring_spans
 
 PlaneWay = list[XY]  # [m] from one end to the other
+_Profile = tuple[list[float], list[float]]  # [m] heights and lengths of an end
 _SHIFTS = 0.0, 0.5, -0.5, 0.25, -0.25, 0.375, -0.375, 0.125, -0.125  # of a strip, tried in order
 _SCRAP = 0.02  # of the square of the width: what is smaller is left out
 _TRIM = 0.0035  # of the area: so much may be left out at all pointed ends
 _MOST_DIRECTIONS = 8  # that are compared, by the number of strips
-_LEFT = 0.001  # of the area: so much of all strips is left out as scraps
+_LEFT = 0.0005  # of the area: so much of all strips is left out as scraps
 _THICK = 0.5  # of the width: no higher ends of strips are left out
 _PARTS = 12  # lengths of an end of a strip for which its height is known
+_MOSTLY = 0.8  # of an area: where less is free of zones, _TRIM is that of what is free
 _SLACK = 0.02  # of a width: with less to spare strips are even
 _SAVED = 0.005  # of the way: with less saved strips are even
 _ALIKE = math.radians(0.5)  # directions that differ by less are one
@@ -115,11 +117,14 @@ def _strips(given: Region, angle: float, crossed: Iterable[XY], width: float,
     holes = sum(abs(signed_area(hole)) for hole in given.holes)
     area = max(0.0, abs(signed_area(given.outer)) - holes)
     scrap = min(_SCRAP * width * width, _LEFT * area / count)
-    thin = _thin_end(_cells_between(slab_cells(whole, [*levels, *cuts]), cuts), width,
-                     trim * area) if trim else 0.0
+    trims = [[(span, span) for span in merged_spans(cells, width / 2)] for cells in strips]
+    if trim:
+        reached = math.fsum(cells_area(cells) for cells in strips)
+        most = trim * (area if reached > _MOSTLY * area else reached)
+        trims = _trims(_cells_between(slab_cells(whole, [*levels, *cuts]), cuts), width, most)
     ways: list[PlaneWay] = []
     for k, (cells, (low, high)) in enumerate(zip(strips, pairwise(cuts), strict=True)):
-        found = _in_strip(region, cells, (low + high) / 2, high - low, width, scrap, thin)
+        found = _in_strip(region, cells, (low + high) / 2, high - low, width, scrap, trims[k])
         ways += sorted(found, reverse=k % 2 == 1)
     return ways
 
@@ -181,8 +186,11 @@ def _spans_length(cells: Iterable[PlaneCell], width: float) -> float:
 
 
 def _in_strip(region: Region, cells: list[PlaneCell], middle: float, step: float, width: float,
-              scrap: float, thin: float) -> list[PlaneWay]:
-    """Ways over the cells of one strip: along its middle, and shifted where that is barred."""
+              scrap: float, trims: Sequence[tuple[Span, Span]]) -> list[PlaneWay]:
+    """Ways over the cells of one strip: along its middle, and shifted where that is barred.
+
+    trims: where the strip begins and ends along x without barred rings, and where its ways may.
+    """
     ways: list[PlaneWay] = []
     for shift in _SHIFTS:
         if cells_area(cells) <= scrap:
@@ -196,25 +204,20 @@ def _in_strip(region: Region, cells: list[PlaneCell], middle: float, step: float
                 over = between(seen, 0, *part)
                 if cells_area(over) <= scrap:
                     continue
-                start, end = _extent(over, thin)
-                _add([(start, y), (end, y)], ways, region, width)
+                start, end = _within(_ends(over), trims)
+                if start < end:
+                    _add([(start, y), (end, y)], ways, region, width)
                 cells = [left for cell in cells
                          for left in _without(cell, part[0], part[1], low, high)]
     return ways
 
 
-def _extent(cells: list[PlaneCell], thin: float) -> Span:
-    """Where cells begin and end along x, without pointed ends that are at most `thin` [m] high."""
-    first, last = _ends(cells)
-    cuts = []
-    for end, sign in ((first, 1.0), (last, -1.0)) if thin > 0.0 else ():
-        low, high = 0.0, (last - first) / 3
-        for _ in range(12):
-            middle = (low + high) / 2
-            area = _end_area(cells, end, sign * middle)
-            low, high = (middle, high) if 2.0 * area <= thin * middle else (low, middle)
-        cuts.append(low)
-    return (first + cuts[0], last - cuts[1]) if cuts else (first, last)
+def _within(span: Span, trims: Iterable[tuple[Span, Span]]) -> Span:
+    """A part of a strip without what of the ends of the strip is left out."""
+    for whole, left in trims:
+        if whole[0] - 1e-6 <= span[0] and span[1] <= whole[1] + 1e-6:
+            return max(span[0], left[0]), min(span[1], left[1])
+    return span
 
 
 def _ends(cells: Iterable[PlaneCell]) -> Span:
@@ -228,27 +231,37 @@ def _end_area(cells: Iterable[PlaneCell], end: float, length: float) -> float:
                       if (part := clip(cell, 0, end + length, length > 0.0)))
 
 
-def _thin_end(strips: Iterable[list[PlaneCell]], width: float, trim: float) -> float:
-    """Height [m] up to which pointed ends may be left out: an area of at most `trim` [m2]."""
-    profiles = [profile for cells in strips for span in merged_spans(cells, width / 2)
-                for profile in _profiles(between(cells, 0, *span), span)]
+def _trims(strips: Iterable[list[PlaneCell]], width: float,
+           most: float) -> list[list[tuple[Span, Span]]]:
+    """The spans of strips, and what is left of them without pointed ends of one height.
+
+    That height is the one for which an area of `most` [m2] is left out in all.
+    """
+    spans = [[(span, _profile(between(cells, 0, *span), span[0], span[1]),
+               _profile(between(cells, 0, *span), span[1], span[0]))
+              for span in merged_spans(cells, width / 2)] for cells in strips]
+    profiles = [profile for row in spans for _, *both in row for profile in both]
     low, high = 0.0, _THICK * width
     for _ in range(16):
         thin = (low + high) / 2
-        area = math.fsum(thin * float(np.interp(thin, *profile)) / 2 for profile in profiles)
-        low, high = (thin, high) if area <= trim else (low, thin)
-    return low
+        area = math.fsum(thin * _cut(profile, thin) / 2 for profile in profiles)
+        low, high = (thin, high) if area <= most else (low, thin)
+    return [[(span, (span[0] + _cut(first, low), span[1] - _cut(last, low)))
+             for span, first, last in row] for row in spans]
 
 
-def _profiles(cells: list[PlaneCell], span: Span) -> Iterable[tuple[list[float], list[float]]]:
-    """Heights [m] of triangles as large as the ends of a strip up to some lengths [m]."""
-    for end, sign in ((span[0], 1.0), (span[1], -1.0)):
-        heights, lengths = [0.0], [0.0]
-        for k in range(1, _PARTS + 1):
-            lengths.append((span[1] - span[0]) / 3 * (k / _PARTS)**2)
-            area = _end_area(cells, end, sign * lengths[-1])
-            heights.append(max(heights[-1], 2.0 * area / lengths[-1]))
-        yield heights, lengths
+def _cut(profile: _Profile, thin: float) -> float:
+    """Length [m] of an end that is as large as a triangle of this height [m]."""
+    return float(np.interp(thin, *profile))
+
+
+def _profile(cells: list[PlaneCell], end: float, other: float) -> _Profile:
+    """Heights [m] of triangles as large as the parts up to some lengths [m] from an end."""
+    lengths = [abs(other - end) / 3 * (k / _PARTS)**2 for k in range(1, _PARTS + 1)]
+    sign = math.copysign(1.0, other - end)
+    heights = [2.0 * _end_area(cells, end, sign * length) / length for length in lengths]
+    blunt = heights[0] - (heights[1] - heights[0]) * lengths[0] / (lengths[1] - lengths[0])
+    return list(accumulate([max(0.0, blunt), *heights], max)), [0.0, *lengths]
 
 
 def _without(cell: PlaneCell, x0: float, x1: float, y0: float, y1: float) -> list[PlaneCell]:
