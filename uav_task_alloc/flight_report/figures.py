@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from html import escape
 from typing import Any
 
@@ -11,10 +11,12 @@ import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
 from uav_task_alloc.flight_report.flight_history import FlightHistory
+from uav_task_alloc.flight_report.strips_figure import add_pieces
 from uav_task_alloc.flight_report.times_figure import services_figure
 from uav_task_alloc.geometry.zones import outline
 from uav_task_alloc.model import Point, Shape, ThreatZone
 from uav_task_alloc.palette import DARK_RED, RED, STATE_COLOURS, rgb, uav_colour
+from uav_task_alloc.piece_ids import split_piece
 from uav_task_alloc.record.run_state import END_STATES
 
 _PLANNED = '#222222'
@@ -48,6 +50,7 @@ def flight_map(history: FlightHistory) -> Any:
                 textposition='bottom center', showlegend=False, hoverinfo='text',
                 marker={'symbol': 'square', 'size': 12, 'color': uav_colour(k),
                         'line': {'width': 1, 'color': 'black'}})
+    add_pieces(figure, history, sorted(history.tracks.keys() | history.run.lists.keys()))
     _add_tasks(figure, history)
     _add_lost(figure, history)
     figure.update_xaxes(title='east [m]')
@@ -148,9 +151,19 @@ def _add_zone(figure: Any, zone: ThreatZone) -> None:
             legendgroup=f'zone {escape(zone.id)}', showlegend=k == 0)
 
 
+def _order(history: FlightHistory) -> Callable[[str], tuple[int, int]]:
+    """The order of rows: tasks as announced, each with its pieces below it."""
+    number = {name: k for k, name in enumerate(history.tasks())}
+
+    def key(name: str) -> tuple[int, int]:
+        whole, piece = split_piece(name)
+        return number.get(whole, len(number)), piece
+    return key
+
+
 def timeline_figure(history: FlightHistory) -> Any:
     """A row for each task: a bar for each state, a marker at its end."""
-    names = list(history.tasks())
+    names = sorted({**history.tasks(), **history.spans}, key=_order(history))
     row = {name: k for k, name in enumerate(names)}
     figure = go.Figure()
     bars: dict[str, list[tuple[int, float, float, str]]] = {}

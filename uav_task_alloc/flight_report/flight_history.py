@@ -77,6 +77,8 @@ class FlightHistory:
     planned: dict[str, list[list[Point]]] = field(default_factory=dict)  # legs as planned
     positions: dict[str, Point] = field(default_factory=dict)  # of tasks, as planned [m]
     values: dict[str, float] = field(default_factory=dict)
+    strip_widths: dict[str, float] = field(default_factory=dict)  # [m] of areas
+    listed: dict[str, list[str]] = field(default_factory=dict)  # UAVs in whose lists a piece was
     spans: dict[str, list[StateSpan]] = field(default_factory=dict)
     replans: list[ReplanRecord] = field(default_factory=list)
     gaps: list[ReceptionGap] = field(default_factory=list)
@@ -99,9 +101,11 @@ class FlightHistory:
         self.run.apply(line)
 
     def on_announcement(self, line: Line) -> None:
-        """Record the values of tasks."""
+        """Record the values of tasks, and the widths of strips."""
         self.values.update((task['id'], task['value']) for task in line['tasks']
                            if task.get('value') is not None)
+        self.strip_widths.update((task['id'], task['strip_width']) for task in line['tasks']
+                                 if task.get('strip_width'))
 
     def on_statuses(self, line: Line) -> None:
         """Begin a span where the state of a task or its UAV changes."""
@@ -132,6 +136,9 @@ class FlightHistory:
         for row in tasks:
             if None not in row.get('position', (None,)):
                 self.positions[row['id']] = tuple(row['position'])
+            owners = self.listed.setdefault(row['id'], [])
+            if owners[-1:] != [uav]:
+                owners.append(uav)
         if self.run.begins_leg(line) and self.tracks.get(uav):
             leg = [self.tracks[uav][-1].point, *self.points(tasks[:1])]
             self.planned.setdefault(uav, []).append(leg)
@@ -161,10 +168,12 @@ class FlightHistory:
                       if end - wall > self.run.silent_after]
 
     def points(self, rows: Iterable[Mapping[str, Any]]) -> Iterator[Point]:
-        """Detour points and task positions [m] of rows of a list."""
+        """Detour points, and positions or ways [m] of tasks, of rows of a list."""
         for row in rows:
             yield from (tuple(point) for point in row['via'])
-            if row['id'] in self.positions:
+            if row.get('way'):
+                yield from (tuple(point) for point in row['way'])
+            elif row['id'] in self.positions:
                 yield self.positions[row['id']]
 
     def remaining(self, uav: str) -> list[Point]:
@@ -201,7 +210,8 @@ class FlightHistory:
 
     def mission_end(self) -> float:
         """When the last task ended [unix s]; the end of the recording while tasks are open."""
-        ends = [spans[-1] for spans in self.spans.values()]
+        present = self.run.statuses.keys() | self.run.pieces.keys()  # not those cut again
+        ends = [spans[-1] for name, spans in self.spans.items() if name in present]
         if not ends or any(span.state in _OPEN_STATES for span in ends):
             return self.run.last
         return max((span.since for span in ends if span.state in END_STATES),

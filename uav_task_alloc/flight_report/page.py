@@ -15,6 +15,7 @@ from plotly.offline import get_plotlyjs
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.flight_report.figures import all_figures
 from uav_task_alloc.flight_report.flight_history import FlightHistory, StateSpan, read_history
+from uav_task_alloc.flight_report.strips import covered_shares, piece_rows
 from uav_task_alloc.geometry.frames import to_geodetic
 from uav_task_alloc.record.bag_reader import BagReader
 
@@ -152,6 +153,7 @@ def key_figures(history: FlightHistory) -> list[tuple[Cell, ...]]:
     return [
         ('tasks', len(history.tasks())),
         *((f'tasks {state.lower()}', count) for state, count in sorted(counts.items())),
+        *_strip_figures(history),
         ('UAVs', len(history.tracks)), ('UAVs lost', len(history.lost())),
         ('metres flown', round(flown)),
         ('metres planned, of the legs that were begun', round(planned)),
@@ -176,6 +178,7 @@ def tables(history: FlightHistory) -> str:
         html_table('Tasks', ('task', 'state', 'UAV', 'value', 'announced [s]', 'begun [s]',
                              'ended [s]', 'reason'),
                    (_task_row(history, task) for task in history.tasks())),
+        _strips_table(history),
         html_table('UAVs', ('UAV', 'tasks completed', 'metres flown', 'metres planned', 'battery',
                             'last mode', 'done at [s]', 'silent [s]', 'lost at [s]',
                             'last position'),
@@ -192,6 +195,31 @@ def tables(history: FlightHistory) -> str:
                     for gap in history.gaps)),
         html_table('Events', ('at [s]', 'event'),
                    ((at(wall), text) for wall, _, text in history.events))))
+
+
+def _strips_table(history: FlightHistory) -> str:
+    """The table of strips and other pieces; nothing where no task has any."""
+    rows = piece_rows(history)
+    return html_table('Strips', ('piece', 'state', 'planned for', 'flown by', 'metres',
+                                 'flown', 'interrupted'), (
+        (row.piece, row.state.lower(), ', '.join(row.planned), row.flown_by, round(row.metres),
+         _percent(row.share), row.interrupted) for row in rows)) if rows else ''
+
+
+def _percent(share: float | None) -> str:
+    return '' if share is None else f'{100.0 * share:.0f} %'
+
+
+def _strip_figures(history: FlightHistory) -> list[tuple[Cell, ...]]:
+    """Key figures of strips: how many, flown, interrupted, and which share of areas is covered."""
+    rows = piece_rows(history)
+    covered = covered_shares(history, rows)
+    return [
+        ('strips and other pieces', len(rows)),
+        ('pieces flown', sum(row.state == 'COMPLETED' for row in rows)),
+        ('pieces interrupted', sum(bool(row.interrupted) for row in rows)),
+        *((f'{name}: inside flown footprints [%]', round(100.0 * share, 1))
+          for name, share in covered.items())] if rows else []
 
 
 def _task_row(history: FlightHistory, task: str) -> tuple[Cell, ...]:

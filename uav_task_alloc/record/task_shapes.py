@@ -22,7 +22,8 @@ def task_shape(task: _Message, origin: Origin | None) -> dict[str, Any]:
         origin: of the ENU frame; None: unknown.
 
     Returns:
-        `work`, the name of its kind; `path`, `holes` and `radius` [m] ENU. Nothing for a point.
+        `work`, the name of its kind; `path`, `holes`, `radius` and
+        `strip_width` [m] ENU. Nothing for a point.
 
     Raises:
         InvalidValue: a coordinate is out of range.
@@ -34,7 +35,9 @@ def task_shape(task: _Message, origin: Origin | None) -> dict[str, Any]:
     rings = [list(filter(None, (_placed(task, point, origin) for point in ring)))
              for ring in (task.path, *(hole.points for hole in task.holes))]
     radius = float(task.radius) if kind == 'ORBIT' and math.isfinite(task.radius) else None
-    return {'work': kind, 'path': rings[0], 'holes': rings[1:], 'radius': radius}
+    width = float(task.strip_width) if kind == 'AREA' and math.isfinite(task.strip_width) else None
+    return {'work': kind, 'path': rings[0], 'holes': rings[1:], 'radius': radius,
+            'strip_width': width}
 
 
 def _placed(task: _Message, point: _Message, origin: Origin | None) -> Point | None:
