@@ -51,6 +51,17 @@ def test_a_hot_spot_is_found_and_a_new_one_replaces_it():
     assert share(demand, SPOT, 7200.0) < 0.2
 
 
+def test_mixtures_of_spots_foretell_tasks_of_three_spots_better_than_kernels():
+    rng = np.random.default_rng(11)
+    spots = rng.uniform(1000.0, 9000.0, (3, 2))
+    place = rng.normal(spots[rng.integers(3, size=590)], 700.0).clip(0.0, 9999.0)
+    seen = [Observation(50.0 * i, *place[i], 1.0) for i in range(90)]
+    at = (place[90:] // 625.0).astype(int)  # cells of tasks that were not seen
+    both, kernels = (np.log(learnt(seen, model=model).density(4500.0)[at[:, 1] * 16 + at[:, 0]])
+                     for model in (DemandModel(), DemandModel(spot_forgetting=())))
+    assert both.mean() > kernels.mean() + 0.05
+
+
 def test_uniform_tasks_stay_almost_uniform():
     rng = np.random.default_rng(4)
     demand = learnt([Observation(60.0 * i, *rng.uniform(0.0, 10_000.0, 2), 1.0)

@@ -76,12 +76,17 @@ def test_no_place_is_beyond_reach_or_outside_the_area():
 def test_a_busy_uav_counts_where_and_when_it_will_be_free():
     weight = at_spot(8000.0, 8000.0)
     positions = [(2000.0, 2000.0), (8000.0, 8000.0)]
-    soon = choose(fleet(positions, [1, 0], [0.0, 30.0]), weight, backup=0.0)
+    soon = choose(fleet(positions, [1, 0], [0.0, 30.0]), weight, backup=0.0, way=0.25)
     assert math.dist(soon[0], (2000.0, 2000.0)) < 2500.0
     late = choose(fleet(positions, [1, 0], [0.0, 3600.0]), weight, backup=0.0)
     assert math.dist(late[0], (8000.0, 8000.0)) < 1000.0
     never = choose(fleet(positions, [1, 0], [0.0, math.inf]), weight, backup=0.0)
     assert math.dist(never[0], (8000.0, 8000.0)) < 1000.0
+
+
+def test_a_place_is_not_bound_to_the_middles_of_cells():
+    place = choose(fleet([(5000.0, 5000.0)]), at_spot(8130.0, 2040.0, 300.0), way=0.0)[0]
+    assert math.dist(place, (8130.0, 2040.0)) < 160.0
 
 
 def test_places_are_chosen_jointly_and_do_not_change_again():

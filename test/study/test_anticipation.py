@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 
 from uav_task_alloc.anticipation import event_simulation as events
+from uav_task_alloc.anticipation.cover import COVER_PRICES
+from uav_task_alloc.anticipation.places import MOVE_PRICES
 from uav_task_alloc.cli import study as command
 from uav_task_alloc.errors import InvalidValue
 from uav_task_alloc.study import anticipation, arrivals, executors
@@ -56,7 +58,7 @@ def test_every_task_is_served_once_and_no_uav_flies_faster_than_it_can(policy):
     assert (response >= 0.0).all()
     assert fleet.flown.max() <= 15.0 * (fleet.clock[0] + 1e-6)
     assert (fleet.waiting <= fleet.flown + 1e-6).all()
-    assert (fleet.waiting.sum() > 0.0) == (policy != events.STAY)
+    assert (fleet.waiting.sum() > 0.0) == (policy not in (events.STAY, events.ASSIGN))
 
 
 def test_one_uav_serves_two_tasks_as_calculated_by_hand():
@@ -79,6 +81,22 @@ def test_a_task_under_way_moves_to_a_uav_that_becomes_free_nearer():
     response, _ = fly(stream, 2, events.STAY, 3)
     way = 0.1 * np.hypot(*(start[0] - start[1])) / 15.0
     assert response == pytest.approx([0.0, 9.0 + way])
+
+
+def test_a_task_is_left_to_the_uav_that_is_not_needed_for_the_next_ones():
+    """The nearer UAV is in the only hot spot; the other one is 20 s further from the task."""
+    start = np.random.default_rng([3, 2]).uniform(0.0, arrivals.AREA, (2, 2))
+    way = start[1] - start[0]
+    half = np.hypot(*way) / 2.0
+    task = start[0] + way * (0.5 - 75.0 / half)
+    stream = arrivals.TaskStream(np.array([task, start[0]]), np.array([1.0, 450.0]),
+                                 np.full(2, 60.0), np.tile(start[0], (120, 1, 1)))
+    still = MOVE_PRICES._replace(way=1e9)
+    plain, cover = (fly(stream, 2, events.ORACLE, 3, still, prices)[0]
+                    for prices in (COVER_PRICES._replace(tasks=0.0, least=0.0), COVER_PRICES))
+    near, far = (half - 150.0) / 15.0, (half + 150.0) / 15.0
+    assert plain == pytest.approx([near, near])
+    assert cover == pytest.approx([far, 0.0])
 
 
 def test_a_run_is_the_same_again_and_paired_over_policies():
@@ -110,9 +128,8 @@ def test_waiting_where_tasks_come_from_is_sooner():
 def test_the_last_line_of_the_study_is_one_json_object(monkeypatch, capsys):
     monkeypatch.setattr(executors, 'chosen', lambda args: one_thread)
     monkeypatch.setattr(anticipation, 'arrival_rate', lambda setting: RATE)
-    for name in ('base', 'even', 'chained_q'):
-        monkeypatch.delitem(POLICIES, name)
-    argv = ['anticipation', '--uavs', '8', '--busy', '50', '--runs', '2', '--json']
+    argv = ['anticipation', '--uavs', '8', '--busy', '50', '--runs', '2', '--json',
+            '--policies', 'learnt,oracle']
     assert command.main(argv) == 0
     lines = capsys.readouterr().out.splitlines()
     rows = [line for line in lines if line.startswith('| 8 | 50 %')]
@@ -127,11 +144,26 @@ def test_the_last_line_of_the_study_is_one_json_object(monkeypatch, capsys):
 @pytest.mark.parametrize(('option', 'value', 'text'), [
     ('--uavs', '4,16', "--uavs = '4,16': expected 8 in it with --json"),
     ('--busy', '30', "--busy = '30': expected 50 in it with --json"),
+    ('--policies', 'learnt', "--policies = 'stay,learnt': expected learnt and oracle in it"),
 ])
 def test_a_last_line_needs_its_setting(option, value, text):
     with pytest.raises(InvalidValue) as error:
         command.main(['anticipation', option, value, '--json'])
     assert text in str(error.value)
+
+
+def test_only_the_policies_wanted_are_flown(monkeypatch, capsys):
+    monkeypatch.setattr(executors, 'chosen', lambda args: one_thread)
+    monkeypatch.setattr(anticipation, 'arrival_rate', lambda setting: RATE)
+    assert command.main(['anticipation', '--uavs', '4', '--busy', '30', '--runs', '2',
+                         '--policies', 'base']) == 0
+    out, log = capsys.readouterr()
+    assert [cell.strip() for cell in out.splitlines()[0].strip('|').split('|')] == [
+        'UAVs', 'busy', 'arrivals', 'stay', 'base']
+    assert '4 UAVs, 30 % busy, moving: 2 runs' in log
+    with pytest.raises(SystemExit):
+        command.main(['anticipation', '--policies', 'base,best'])
+    assert "'base,best': expected of stay,base,even" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize('value', ['0', '8,x', '', '101', '8,,4'])

@@ -13,11 +13,13 @@ from numpy.typing import NDArray
 
 from uav_task_alloc.anticipation import intensity
 from uav_task_alloc.anticipation.intensity import Cells, Estimates
+from uav_task_alloc.anticipation.spots import make_spots
 from uav_task_alloc.checks import check_number
 from uav_task_alloc.errors import InvalidValue
 
 _Floats = NDArray[np.float64]
 MOST_OBSERVATIONS = 2000  # kept; the oldest are dropped
+_LATEST = 300  # observations to which mixtures of spots are fitted
 _VALUE_RADIUS = 1600.0  # [m] over which values of tasks are averaged
 _VALUE_PRIOR = 2.0  # tasks of the mean value that each place begins with
 
@@ -27,10 +29,14 @@ class DemandModel:
     """What the estimates of a demand are; each bandwidth is combined with each forgetting time."""
 
     bandwidths: tuple[float, ...] = (400.0, 800.0, 1600.0, 3200.0)  # [m]
-    forgetting: tuple[float, ...] = (900.0, 2700.0, math.inf)  # [s]
+    forgetting: tuple[float, ...] = (450.0, 1200.0, 3600.0, math.inf)  # [s]
     day_parts: int = 8  # of estimates by the time of day, one for each bandwidth; 0: none
-    prior: float = 6.0  # tasks that the uniform prior is worth
-    even: float = 0.9  # share of the estimate that tasks are uniform, at the begin
+    spots: int = 5  # of a mixture at most
+    spot_size: float = 1000.0  # [m] standard deviation of a spot at its begin
+    spot_forgetting: tuple[float, ...] = (1200.0, math.inf)  # [s] of each mixture of spots
+    prior: float = 1.0  # tasks that the uniform prior is worth
+    even: float = 0.7  # share of the estimate that tasks are uniform, at the begin
+    spot_share: float = 0.2  # of mixtures of spots together, at the begin
     share: float = 0.005  # of its weight that an estimate hands out to all at each task
 
 
@@ -138,10 +144,16 @@ def _estimates(model: DemandModel, cells: int) -> Estimates:
     kinds = [(width, time, 1) for time in model.forgetting for width in model.bandwidths]
     if model.day_parts:
         kinds += [(width, math.inf, model.day_parts) for width in model.bandwidths]
-    begin = [(1.0 - model.even) / len(kinds)] * len(kinds) + [model.even]
+    mixtures = len(model.spot_forgetting)
+    mixture = [-1] * len(kinds) + [*range(mixtures)] + [-1]
+    kinds += [(model.spot_size, time, 1) for time in model.spot_forgetting]
+    kernels, spots = len(kinds) - mixtures, model.spot_share if mixtures else 0.0
+    begin = ([(1.0 - model.even - spots) / kernels] * kernels
+             + [spots / max(1, mixtures)] * mixtures + [model.even])
     kinds.append((math.inf, math.inf, 1))  # a kernel without an end is uniform
     width, time, parts = (np.array(each) for each in zip(*kinds, strict=True))
     rows = int(parts.sum())
     return Estimates(width.astype(float), time.astype(float), np.cumsum(parts) - parts, parts,
                      np.zeros(rows), np.zeros((rows, cells)), np.log(begin), np.array(begin),
-                     np.full(1, -np.inf))
+                     np.full(1, -np.inf), np.array(mixture),
+                     make_spots(model.spot_forgetting, model.spots, model.spot_size, _LATEST))

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from uav_task_alloc.anticipation.cover import Cover
 from uav_task_alloc.anticipation.intensity import Cells, Estimates, density, observe
 from uav_task_alloc.anticipation.places import ROUNDS, MovePrices, Waiting, choose_places
 from uav_task_alloc.anticipation.response_lists import (
@@ -24,7 +25,7 @@ from uav_task_alloc.solver.rng import RngState
 
 _Floats = NDArray[np.float64]
 _Ints = NDArray[np.int64]
-STAY, BASE, EVEN, LEARNT, ORACLE, CHAINED_Q = range(6)
+STAY, BASE, EVEN, ORACLE, ASSIGN, LEARNT, CHAINED_Q = range(7)  # from ASSIGN on: what is learnt
 
 
 class FleetTimes(NamedTuple):
@@ -40,7 +41,7 @@ class FleetTimes(NamedTuple):
 class WaitingPolicy(NamedTuple):
     """Where idle UAVs wait."""
 
-    kind: int  # STAY ... CHAINED_Q
+    kind: int  # STAY ... CHAINED_Q; ASSIGN: it stays
     base: _Floats  # (2) [m]
     review: float  # [s] between choices without an event
     prior: float  # tasks that the uniform prior is worth
@@ -53,10 +54,10 @@ class Field(NamedTuple):
 
     cells: Cells  # of the area
     distance: _Floats  # (c, c) [m]
-    estimates: Estimates  # learnt, for LEARNT and CHAINED_Q
+    estimates: Estimates  # learnt, from ASSIGN on
     truth: _Floats  # (k, c) probability of the next task in equal parts of the run, for ORACLE
     truth_every: float  # [s] a part
-    weight: _Floats  # (c) scratch
+    weight: _Floats  # (c) probability of the next task by the policy: scratch
     scratch: _Floats  # (4, c)
 
 
@@ -91,15 +92,17 @@ def simulate(tasks: Tasks, lists: Lists, fleet: FleetTimes, policy: WaitingPolic
         if now == review:
             review += policy.review
         elif now == arrival:
-            if policy.kind >= LEARNT:
+            if policy.kind >= ASSIGN:
                 observe(field.cells, field.estimates, policy.prior, policy.share,
                         tasks.x[arrived], tasks.y[arrived], now, field.scratch[0])
+            _weigh(policy, field, lists.cover, now)
             add_task(tasks, lists, arrived)
             arrived += 1
             improve_lists(tasks, lists)
         else:
             _serve(tasks, lists, fleet, waiting, u, now)
-        _wait(tasks, lists, policy, field, waiting, learner, now, rng)
+        _weigh(policy, field, lists.cover, now)
+        _wait(tasks, lists, policy, field, waiting, learner, rng)
 
 
 @inner_kernel
@@ -156,16 +159,33 @@ def _serve(tasks: Tasks, lists: Lists, fleet: FleetTimes, waiting: Waiting, u: i
         lists.x[u], lists.y[u] = tasks.x[k], tasks.y[k]
         lists.free_in[u] = tasks.service[k]
         fleet.service_end[u] = now + tasks.service[k]
+        waiting.place[u, 0], waiting.place[u, 1] = lists.x[u], lists.y[u]
     else:
         fleet.service_end[u] = math.nan
         lists.free_in[u] = 0.0
         improve_lists(tasks, lists)
-    waiting.place[u, 0], waiting.place[u, 1] = lists.x[u], lists.y[u]
+
+
+@inner_kernel
+def _weigh(policy: WaitingPolicy, field: Field, cover: Cover, now: float) -> None:
+    """Set where the policy takes the next task to be, also for the cover of lists. O(e c)"""
+    if policy.kind == EVEN:
+        field.weight[:] = 1.0 / field.weight.size
+    elif policy.kind == ORACLE:
+        part = min(int(now / field.truth_every), field.truth.shape[0] - 1)
+        for c in range(field.weight.size):
+            field.weight[c] = field.truth[part, c]
+    elif policy.kind >= ASSIGN:
+        density(field.cells, field.estimates, policy.prior, now, field.weight)
+    cover.weight[:] = 0.0
+    across = field.cells.across
+    for c in range(field.weight.size):  # a place of the cover is the middle of 2 x 2 cells
+        cover.weight[c // across // 2 * (across // 2) + c % across // 2] += field.weight[c]
 
 
 @inner_kernel
 def _wait(tasks: Tasks, lists: Lists, policy: WaitingPolicy, field: Field, waiting: Waiting,
-          learner: Learner, now: float, rng: RngState) -> None:
+          learner: Learner, rng: RngState) -> None:
     """Choose where idle UAVs wait. O(rounds m c^2)"""
     for u in range(lists.length.size):
         busy = lists.length[u] > 0 or lists.free_in[u] > 0.0
@@ -173,16 +193,8 @@ def _wait(tasks: Tasks, lists: Lists, policy: WaitingPolicy, field: Field, waiti
         waiting.free_in[u], waiting.x[u], waiting.y[u] = end_of_list(tasks, lists, u)
         if policy.kind == BASE and not busy:
             waiting.place[u, 0], waiting.place[u, 1] = policy.base[0], policy.base[1]
-    if policy.kind == EVEN:
-        field.weight[:] = 1.0 / field.weight.size
-    elif policy.kind == ORACLE:
-        part = min(int(now / field.truth_every), field.truth.shape[0] - 1)
-        for c in range(field.weight.size):
-            field.weight[c] = field.truth[part, c]
-    elif policy.kind >= LEARNT:
-        density(field.cells, field.estimates, policy.prior, now, field.weight)
     if policy.kind == CHAINED_Q:
         learn_places(field.cells, field.weight, waiting, learner, policy.prices, rng)
-    elif policy.kind >= EVEN:
+    elif policy.kind >= EVEN and policy.kind != ASSIGN:
         choose_places(field.cells, field.distance, field.weight, waiting, policy.prices, ROUNDS,
                       field.scratch)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Intensity of tasks over place: kernel estimates that compete by how well they foretell tasks."""
+"""Intensity of tasks over place: estimates that compete by how well they foretell tasks."""
 from __future__ import annotations
 
 import math
@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from uav_task_alloc.anticipation.spots import Spots, fit_spots, remember, spots_density
 from uav_task_alloc.kernel import inner_kernel, kernel
 
 _Floats = NDArray[np.float64]
@@ -27,7 +28,7 @@ class Cells(NamedTuple):
 
 
 class Estimates(NamedTuple):
-    """Kernel estimates, one for each bandwidth, forgetting time and division of the day.
+    """Kernel estimates for each bandwidth, forgetting time and division of the day, and spots.
 
     A row is the estimate of one part of the day; an estimate that ignores the time has one row.
     """
@@ -41,6 +42,8 @@ class Estimates(NamedTuple):
     log_weight: _Floats  # (e) logarithm of the share of each estimate, up to a constant
     begin: _Floats  # (e) share of each estimate at the begin; the sum is 1
     at: _Floats  # (1) [s] up to which tasks are forgotten; -inf: no task was seen
+    mixture: _Ints  # (e) of `spots` that an estimate is; -1: a kernel estimate
+    spots: Spots
 
 
 @kernel
@@ -60,7 +63,8 @@ def observe(cells: Cells, e: Estimates, prior: float, share: float, x: float, y:
         scratch: (c).
     """
     _forget(e, now)
-    at, free = _cell_at(cells, x, y), cells.inside.sum()
+    remember(e.spots, x, y, e.at[0])
+    at, free = cell_at(cells, x, y), cells.inside.sum()
     largest = -math.inf
     for i in range(e.bandwidth.size):
         row = _row(e, i, now)
@@ -73,7 +77,10 @@ def observe(cells: Cells, e: Estimates, prior: float, share: float, x: float, y:
     for i in range(e.bandwidth.size):
         weight = math.exp(e.log_weight[i] - largest) / total
         e.log_weight[i] = math.log((1.0 - share) * weight + share * e.begin[i])
-        _add(cells, e, i, _row(e, i, now), x, y, scratch)
+        if e.mixture[i] >= 0:
+            _fit(cells, e, i)
+        else:
+            _add(cells, e, i, _row(e, i, now), x, y, scratch)
 
 
 @inner_kernel
@@ -118,7 +125,23 @@ def _add(cells: Cells, e: Estimates, i: int, row: int, x: float, y: float,
 
 
 @inner_kernel
-def _cell_at(cells: Cells, x: float, y: float) -> int:
+def _fit(cells: Cells, e: Estimates, i: int) -> None:
+    """Fit the mixture of estimate i, and write it in its row. O(n s + c s)"""
+    area = cells.inside.sum() * cells.side[0] * cells.side[1]
+    row, total = e.first_row[i], 0.0
+    fit_spots(e.spots, e.mixture[i], area, e.at[0])
+    for c in range(cells.x.size):
+        e.field[row, c] = 0.0
+        if cells.inside[c] > 0.0:
+            e.field[row, c] = spots_density(e.spots, e.mixture[i], area, cells.x[c], cells.y[c])
+            total += e.field[row, c]
+    e.mass[row] += 1.0
+    for c in range(cells.x.size):
+        e.field[row, c] *= e.mass[row] / total
+
+
+@inner_kernel
+def cell_at(cells: Cells, x: float, y: float) -> int:
     """The cell of a point, or the nearest one of the grid. O(1)"""
     rows = cells.x.size // cells.across
     i = math.floor((x - cells.x[0]) / cells.side[0] + 0.5)

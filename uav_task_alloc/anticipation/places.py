@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from uav_task_alloc.anticipation.intensity import Cells
+from uav_task_alloc.anticipation.intensity import Cells, cell_at
 from uav_task_alloc.kernel import inner_kernel, kernel
 
 _Floats = NDArray[np.float64]
@@ -42,20 +42,21 @@ class MovePrices(NamedTuple):
     hysteresis: float  # [s] that a new place must be better
 
 
-MOVE_PRICES = MovePrices(0.25, 0.2, 250.0, 0.8)
+MOVE_PRICES = MovePrices(0.2, 0.2, 250.0, 0.8)
 ROUNDS = 6  # of best responses, at most
 
 
 @kernel
 def choose_places(cells: Cells, distance: _Floats, weight: _Floats, w: Waiting, prices: MovePrices,
                   rounds: int, scratch: _Floats) -> None:
-    """Choose places by best responses in turn, until no UAV changes its place. O(rounds m c^2).
+    """Choose places: the best response of the UAV that gains most, until none gains.
 
     The cost of a set of places is the expected time until a UAV is at the next task.
+    O(rounds m^2 c^2 / 4).
 
     Args:
-        cells: centres are the places to choose from, beside the present one.
-        distance: (c, c) [m] between cells.
+        cells: the area of work; a place is inside of it. At least 6.
+        distance: (c, c) [m] between cells; not read.
         weight: (c) probability of the next task, times its value.
         w: place holds the present places of idle UAVs and is changed.
         prices: of moves.
@@ -63,52 +64,102 @@ def choose_places(cells: Cells, distance: _Floats, weight: _Floats, w: Waiting, 
         scratch: (4, c).
     """
     for _ in range(rounds * w.idle.size):
-        best = -1
+        best, most, x, y = -1, 0.0, 0.0, 0.0
         for u in range(w.idle.size):
             if w.idle[u] > 0.0:
-                w.best[u], w.gain[u] = _best_response(cells, distance, weight, w, prices, u,
-                                                      scratch)
-                if w.gain[u] > 0.0 and (best < 0 or w.gain[u] > w.gain[best]):
-                    best = u
+                gain, to_x, to_y = _best_response(cells, weight, w, prices, u, scratch)
+                if gain > most:
+                    best, most, x, y = u, gain, to_x, to_y
         if best < 0:
             break
-        w.place[best, 0], w.place[best, 1] = cells.x[w.best[best]], cells.y[w.best[best]]
+        w.place[best, 0], w.place[best, 1] = x, y
 
 
 @inner_kernel
-def _best_response(cells: Cells, distance: _Floats, weight: _Floats, w: Waiting,
-                   prices: MovePrices, u: int, scratch: _Floats) -> tuple[int, float]:
-    """The best place of UAV u, and how much it is better [s]; -1, 0: none is. O(c^2)"""
-    first, second, cost, nearest = scratch[0], scratch[1], scratch[2], scratch[3]
-    _times_of_others(cells, w, prices, u, first, second)
-    cost[:] = 0.0
-    nearest[:] = 0.0
-    present, nearest_here, slowness = 0.0, 0.0, 1.0 / w.speed[u]
+def _best_response(cells: Cells, weight: _Floats, w: Waiting, prices: MovePrices, u: int,
+                   scratch: _Floats) -> tuple[float, float, float]:
+    """How much better [s] the best place of UAV u is, and the place [m]. O(c^2 / 4)
+
+    The middle of each block of 2 x 2 cells is tried, then points around the best of them.
+    """
+    _times_of_others(cells, w, prices, u, scratch[0], scratch[1])
+    size = cells.x.size // 2
+    x, y = scratch[3, :size], scratch[3, size:]
+    x[0], y[0] = w.place[u, 0], w.place[u, 1]
+    _costs(cells, weight, w, prices, u, 1, scratch)
+    present = scratch[2, 0]
+    wanted = present - prices.hysteresis * scratch[2, size]
+    best, n = (math.inf, w.place[u, 0], w.place[u, 1]), 0
+    for k in range(cells.x.size):
+        if k % cells.across % 2 == 0 and k // cells.across % 2 == 0:
+            x[n], y[n] = cells.x[k] + 0.5 * cells.side[0], cells.y[k] + 0.5 * cells.side[1]
+            n += 1
+        if n == size or k == cells.x.size - 1:
+            best = _best_of(cells, weight, w, prices, u, n, scratch, best)
+            n = 0
+    for step in (0.5, 0.25):
+        middle_x, middle_y = best[1], best[2]
+        for i in range(-1, 2):
+            for j in range(3):
+                x[j] = middle_x + step * (j - 1) * cells.side[0]
+                y[j] = middle_y + step * i * cells.side[1]
+            best = _best_of(cells, weight, w, prices, u, 3, scratch, best)
+    return (present - best[0] if best[0] < wanted else 0.0), best[1], best[2]
+
+
+@inner_kernel
+def _best_of(cells: Cells, weight: _Floats, w: Waiting, prices: MovePrices, u: int, n: int,
+             scratch: _Floats, best: tuple[float, float, float]) -> tuple[float, float, float]:
+    """The cost [s] and the point [m] of the best one so far and n more points. O(n c)"""
+    _costs(cells, weight, w, prices, u, n, scratch)
+    size = cells.x.size // 2
+    for k in range(n):
+        x, y = scratch[3, k], scratch[3, size + k]
+        way = math.hypot(x - w.x[u], y - w.y[u])
+        if scratch[2, k] < best[0] and way <= w.reach[u] and _inside(cells, x, y):
+            best = (scratch[2, k], x, y)
+    return best
+
+
+@inner_kernel
+def _inside(cells: Cells, x: float, y: float) -> bool:
+    """Whether a point is in a cell of the area of work. O(1)"""
+    c, half = cell_at(cells, x, y), 0.500001
+    return bool(cells.inside[c] > 0.0 and abs(x - cells.x[c]) <= half * cells.side[0]
+                and abs(y - cells.y[c]) <= half * cells.side[1])
+
+
+@inner_kernel
+def _costs(cells: Cells, weight: _Floats, w: Waiting, prices: MovePrices, u: int, n: int,
+           scratch: _Floats) -> None:
+    """The cost [s] of n places of UAV u, and the share of tasks it is nearest to. O(n c)
+
+    scratch: times of others in two rows; costs and shares; the places.
+    """
+    size = cells.x.size // 2
+    first, second = scratch[0], scratch[1]
+    cost, nearest = scratch[2, :size], scratch[2, size:2 * size]
+    x, y = scratch[3, :size], scratch[3, size:2 * size]
+    slowness = 1.0 / w.speed[u]
+    for k in range(n):
+        cost[k] = 0.0
+        nearest[k] = 0.0
     for c in range(cells.x.size):
         if weight[c] <= 0.0:
             continue
-        a, b = first[c], second[c]
-        here = math.hypot(cells.x[c] - w.place[u, 0], cells.y[c] - w.place[u, 1]) * slowness
+        a, b, at_x, at_y = first[c], second[c], cells.x[c], cells.y[c]
         one, two = weight[c] * (1.0 - prices.backup), weight[c] * prices.backup
-        present += one * min(a, here) + two * min(b, max(a, here))
-        nearest_here += weight[c] if here < a else 0.0
-        row = distance[c]
-        for k in range(row.size):
-            t = row[k] * slowness
+        for k in range(n):
+            dx, dy = x[k] - at_x, y[k] - at_y
+            t = math.sqrt(dx * dx + dy * dy) * slowness
             nearest[k] += weight[c] if t < a else 0.0
             low = t if t < a else a
             high = a if t < a else t
             cost[k] += one * low + two * (high if high < b else b)
     price = prices.way * slowness
-    way = math.hypot(w.place[u, 0] - w.x[u], w.place[u, 1] - w.y[u])
-    present += nearest_here * price * way
-    best, least = -1, present - prices.hysteresis * nearest_here
-    for k in range(cells.x.size):
-        way = math.hypot(cells.x[k] - w.x[u], cells.y[k] - w.y[u])
-        total = cost[k] + nearest[k] * price * way
-        if total < least and way <= w.reach[u] and cells.inside[k] > 0.0:
-            best, least = k, total
-    return best, (present - least if best >= 0 else 0.0)
+    for k in range(n):
+        way = math.hypot(x[k] - w.x[u], y[k] - w.y[u])
+        cost[k] += nearest[k] * price * way
 
 
 @inner_kernel

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Lists of least response time for the event simulation: insertion, then moves of single tasks."""
+"""Lists of the event simulation: insertion, then moves of single tasks, by response and cover."""
 from __future__ import annotations
 
 import math
@@ -8,11 +8,19 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from uav_task_alloc.anticipation.cover import (
+    Cover,
+    expected,
+    expected_after,
+    leave_out,
+    set_times,
+)
 from uav_task_alloc.kernel import inner_kernel
 
 _Floats = NDArray[np.float64]
 _Ints = NDArray[np.int64]
 _LEAST_GAIN = 1e-6  # [s] of a move, so that rounding cannot move a task to and fro
+_LARGEST_COVER = 60.0  # [s] by which cover is taken to change the order of two insertions
 
 
 class Tasks(NamedTuple):
@@ -34,18 +42,21 @@ class Lists(NamedTuple):
     y: _Floats  # (m) [m]
     free_in: _Floats  # (m) [s] until the service under way ends; 0.0: none is
     speed: float  # [m/s]
+    cover: Cover  # what the lists leave for the tasks to come
 
 
 @inner_kernel
 def add_task(tasks: Tasks, lists: Lists, task: int) -> None:
-    """Insert a task where the sum of response times grows least. O(n^2)"""
+    """Insert a task where the sum of response times and the price of cover grow least. O(n^2)"""
+    _set_cover(tasks, lists)
     uav, at, _ = _best_insertion(tasks, lists, task)
     _insert(lists, uav, at, task)
 
 
 @inner_kernel
 def improve_lists(tasks: Tasks, lists: Lists) -> None:
-    """Move single tasks while the sum of response times falls. O(n^3) a pass"""
+    """Move single tasks while the sum of response times and cover falls. O(n^3) a pass"""
+    _set_cover(tasks, lists)
     moved = True
     while moved:
         moved = False
@@ -59,26 +70,76 @@ def improve_lists(tasks: Tasks, lists: Lists) -> None:
 @inner_kernel
 def _move(tasks: Tasks, lists: Lists, u: int, i: int) -> bool:
     """Move task i of UAV u to its best position; whether the sum fell. O(n^2)"""
-    task, before = lists.task[u, i], _waits(tasks, lists, u, -1, -1)
+    task, before = lists.task[u, i], _cost(tasks, lists, u)
     _remove(lists, u, i)
-    gain = before - _waits(tasks, lists, u, -1, -1)
+    _cover_uav(tasks, lists, u)
+    gain = before - _cost(tasks, lists, u)
     uav, at, more = _best_insertion(tasks, lists, task)
     better = more < gain - _LEAST_GAIN
     if better:
         _insert(lists, uav, at, task)
+        _cover_uav(tasks, lists, uav)
     else:
         _insert(lists, u, i, task)
+        _cover_uav(tasks, lists, u)
     return better
 
 
 @inner_kernel
-def _best_insertion(tasks: Tasks, lists: Lists, task: int) -> tuple[int, int, float]:
-    """The UAV, the position and the growth of the sum of waits [s]. O(n^2)"""
-    uav, at, least = -1, -1, math.inf
+def _covers(lists: Lists) -> bool:
+    """Whether cover counts. O(1)"""
+    return bool(lists.cover.tasks[0] > 0.0)
+
+
+@inner_kernel
+def _set_cover(tasks: Tasks, lists: Lists) -> None:
+    """Set how much cover counts, and the times of all UAVs. O(m k)"""
+    idle, prices = 0, lists.cover.prices
     for u in range(lists.length.size):
-        now = _waits(tasks, lists, u, -1, -1)
+        idle += lists.length[u] == 0 and lists.free_in[u] <= 0.0
+    lists.cover.tasks[0] = max(prices.least, prices.tasks * idle)
+    for u in range(lists.length.size):
+        _cover_uav(tasks, lists, u)
+
+
+@inner_kernel
+def _cover_uav(tasks: Tasks, lists: Lists, u: int) -> None:
+    """Set the times of UAV u after its list has changed. O(n + k)"""
+    if _covers(lists):
+        t, x, y = end_of_list(tasks, lists, u)
+        if t <= 0.0:
+            x, y = lists.cover.waiting[u, 0], lists.cover.waiting[u, 1]
+        set_times(lists.cover, u, t, x, y, lists.speed)
+
+
+@inner_kernel
+def _cost(tasks: Tasks, lists: Lists, u: int) -> float:
+    """The waits [s] of UAV u and the price of cover. O(n + m k)"""
+    waits = _waits(tasks, lists, u, -1, -1)
+    if _covers(lists):
+        leave_out(lists.cover, u)
+        waits += expected(lists.cover, u)
+    return waits
+
+
+@inner_kernel
+def _best_insertion(tasks: Tasks, lists: Lists, task: int) -> tuple[int, int, float]:
+    """The UAV, the position and the growth of waits and cover [s]. O(n^2 + m^2 k)
+
+    Cover is computed only where it may decide.
+    """
+    uav, at, least, here = -1, -1, math.inf, 0.0
+    margin = _LARGEST_COVER * lists.cover.tasks[0]
+    for u in range(lists.length.size):
+        now, known = _waits(tasks, lists, u, -1, -1), False
         for i in range(lists.length[u] + 1):
             more = _waits(tasks, lists, u, i, task) - now
+            if _covers(lists) and more < least + margin:
+                if not known:
+                    leave_out(lists.cover, u)
+                    here, known = expected(lists.cover, u), True
+                t, x, y = _end_with(tasks, lists, u, i, task)
+                more += expected_after(lists.cover, t, x, y, lists.speed) - here
             if more < least:
                 uav, at, least = u, i, more
     return uav, at, least
@@ -127,9 +188,18 @@ def take_first(lists: Lists, u: int) -> int:
 @inner_kernel
 def end_of_list(tasks: Tasks, lists: Lists, u: int) -> tuple[float, float, float]:
     """The time [s] until UAV u has flown its list, and where it will be [m]. O(n)"""
+    return _end_with(tasks, lists, u, -1, -1)
+
+
+@inner_kernel
+def _end_with(tasks: Tasks, lists: Lists, u: int, at: int,
+              task: int) -> tuple[float, float, float]:
+    """As `end_of_list` with a task at a position; -1, -1: none. O(n)"""
     t, x, y = lists.free_in[u], lists.x[u], lists.y[u]
-    for i in range(lists.length[u]):
-        k = lists.task[u, i]
+    for i in range(lists.length[u] + (task >= 0)):
+        k = task
+        if task < 0 or i != at:
+            k = lists.task[u, i - (task >= 0 and i > at)]
         t += math.hypot(tasks.x[k] - x, tasks.y[k] - y) / lists.speed + tasks.service[k]
         x, y = tasks.x[k], tasks.y[k]
     return t, x, y

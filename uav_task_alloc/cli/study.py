@@ -138,7 +138,7 @@ def _run_experiment(name: str, argv: Sequence[str]) -> int:
 
 def _run_anticipation(argv: Sequence[str]) -> int:
     """Fly the runs of the study of waiting, print its table and with --json its last line."""
-    from uav_task_alloc.study import anticipation  # imports numba and scipy
+    from uav_task_alloc.study import anticipation, waiting_runs  # import numba and scipy
     parser = OptionParser('study anticipation',
                           f'Run an experiment: {EXPERIMENTS["anticipation"]}.')
     add = parser.add_argument
@@ -147,6 +147,9 @@ def _run_anticipation(argv: Sequence[str]) -> int:
         help='sizes of fleets (default: 4,8,16)')
     add('--busy', type=_whole_numbers(5, 90), metavar='N,N', default=_joined(anticipation.LOADS),
         help='loads: percent of the time in which a UAV has a task (default: 30,50,70)')
+    names = tuple(waiting_runs.POLICIES)
+    add('--policies', type=_policies(names), metavar='NAME,NAME', default=','.join(names),
+        help='beside stay, which is always flown (default: %(default)s)')
     parser.number('--runs', 2, 100_000, 'runs of 2 h for each setting', whole=True, default=40)
     parser.number('--seed', 1, 2**31, 'of the runs', whole=True, default=1)
     add('--json', action='store_true',
@@ -156,7 +159,10 @@ def _run_anticipation(argv: Sequence[str]) -> int:
     for option, value, wanted in (('--uavs', args.uavs, uavs), ('--busy', args.busy, busy)):
         if args.json and wanted not in value:
             raise InvalidValue(option, _joined(value), f'{wanted} in it with --json')
-    study = anticipation.Study(args.uavs, args.busy, args.runs, args.seed)
+    if args.json and not {'learnt', 'oracle'} <= set(args.policies):
+        raise InvalidValue('--policies', ','.join(args.policies),
+                           'learnt and oracle in it with --json')
+    study = anticipation.Study(args.uavs, args.busy, args.runs, args.seed, args.policies)
     with resumable():
         results = anticipation.run_study(study, executors.chosen(args), log_line)
     print(anticipation.table(results))
@@ -167,6 +173,16 @@ def _run_anticipation(argv: Sequence[str]) -> int:
 
 def _joined(numbers: Sequence[int]) -> str:
     return ','.join(map(str, numbers))
+
+
+def _policies(names: Sequence[str]) -> Callable[[str], tuple[str, ...]]:
+    """A reader of names of policies separated by commas; `stay` is the first in any case."""
+    def read(text: str) -> tuple[str, ...]:
+        wanted = text.split(',')
+        if not set(wanted) <= set(names):
+            raise argparse.ArgumentTypeError(f'{text!r}: expected of {",".join(names)}')
+        return tuple(name for name in names if name in wanted or name == 'stay')
+    return read
 
 
 def _whole_numbers(low: int, high: int) -> Callable[[str], tuple[int, ...]]:

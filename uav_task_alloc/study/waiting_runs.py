@@ -2,6 +2,7 @@
 """Runs of a fleet on random tasks under policies of waiting; all policies on the same tasks."""
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cache
 from typing import NamedTuple
 
@@ -9,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uav_task_alloc.anticipation import event_simulation as events
+from uav_task_alloc.anticipation.cover import COVER_PRICES, CoverPrices, make_cover
 from uav_task_alloc.anticipation.demand import Demand, DemandModel
 from uav_task_alloc.anticipation.event_simulation import FleetTimes
 from uav_task_alloc.anticipation.places import MOVE_PRICES, MovePrices, Waiting
@@ -22,7 +24,8 @@ _Floats = NDArray[np.float64]
 SPEED = 15.0  # [m/s]
 REVIEW = 120.0  # [s] between choices of waiting places without an event
 POLICIES = {'stay': events.STAY, 'base': events.BASE, 'even': events.EVEN,
-            'learnt': events.LEARNT, 'oracle': events.ORACLE, 'chained_q': events.CHAINED_Q}
+            'assign': events.ASSIGN, 'learnt': events.LEARNT, 'oracle': events.ORACLE,
+            'chained_q': events.CHAINED_Q}
 LATE = 2700.0  # [s] tasks announced later are in `late`
 _CALIBRATION_SEED, _CALIBRATION_RUNS, _BISECTIONS = 2**40, 10, 12
 
@@ -35,21 +38,23 @@ class Setting(NamedTuple):
     kind: str  # of arrivals.ARRIVAL_KINDS
 
 
-def run_pair(setting: Setting, rate: float, seed: int) -> dict[str, dict[str, float]]:
+def run_pair(setting: Setting, rate: float, seed: int,
+             policies: Sequence[str] = tuple(POLICIES)) -> dict[str, dict[str, float]]:
     """Fly the tasks of one seed under each policy.
 
     Args:
         setting: UAVs and arrivals.
         rate: [1/s] of arrivals.
         seed: of the tasks, of where the UAVs are at the begin and of the chained Q.
+        policies: names of POLICIES.
 
     Returns:
         By policy the mean response time [s], that of tasks announced after LATE, what was flown
         [m] and the busy share of the time.
     """
     stream = make_stream(setting.kind, rate, seed)
-    return {name: summary(stream, *fly(stream, setting.uavs, kind, seed))
-            for name, kind in POLICIES.items()}
+    return {name: summary(stream, *fly(stream, setting.uavs, POLICIES[name], seed))
+            for name in policies}
 
 
 def summary(stream: TaskStream, response: _Floats, fleet: FleetTimes) -> dict[str, float]:
@@ -71,7 +76,8 @@ def summary(stream: TaskStream, response: _Floats, fleet: FleetTimes) -> dict[st
 
 
 def fly(stream: TaskStream, uavs: int, policy: int, seed: int, prices: MovePrices = MOVE_PRICES,
-        model: DemandModel | None = None, learner: LearnerSettings | None = None,
+        cover: CoverPrices = COVER_PRICES, model: DemandModel | None = None,
+        learner: LearnerSettings | None = None,
         ) -> tuple[_Floats, FleetTimes]:
     """Fly the tasks of a run under one policy.
 
@@ -81,6 +87,7 @@ def fly(stream: TaskStream, uavs: int, policy: int, seed: int, prices: MovePrice
         policy: a value of POLICIES.
         seed: of where the UAVs are at the begin and of the chained Q.
         prices: of moves to waiting places.
+        cover: prices of cover, of policies that know of demand.
         model: what is learnt; by default as shipped.
         learner: settings of the chained Q; by default those of the study.
 
@@ -92,8 +99,12 @@ def fly(stream: TaskStream, uavs: int, policy: int, seed: int, prices: MovePrice
     n, x, y = len(stream.announced), demand.cells.x, demand.cells.y
     tasks = Tasks(stream.place[:, 0].copy(), stream.place[:, 1].copy(), stream.announced,
                   stream.service, np.full(n, np.nan))
+    pairs = demand.cells.across // 2  # places of the cover are the middles of 2 x 2 cells
+    middles = [each.reshape(pairs, 2, pairs, 2).mean((1, 3)).ravel().copy() for each in (x, y)]
+    known = cover if policy >= events.EVEN else cover._replace(tasks=0.0, least=0.0)
     lists = Lists(np.full((uavs, n + 1), -1), np.zeros(uavs, np.int64), start[:, 0].copy(),
-                  start[:, 1].copy(), np.zeros(uavs), SPEED)
+                  start[:, 1].copy(), np.zeros(uavs), SPEED,
+                  make_cover(known, middles[0], middles[1], start))
     fleet = FleetTimes(np.full(uavs, np.nan), np.zeros(uavs), np.zeros(uavs), np.zeros(uavs),
                        np.zeros(1))
     field = events.Field(
