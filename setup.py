@@ -47,8 +47,7 @@ def add_messages(command):
 def add_programs(command, folder):
     """Write the nodes' programs where `ros2 run` looks, and the command line onto PATH.
 
-    A wheel has none of them: pip makes a console script of the command line. Such a script shows
-    a traceback for a Ctrl-C before its first line of ours.
+    A wheel has none of them, but the command line of `command_line`.
     """
     if any(command.distribution.get_command_obj(name, create=False)
            for name in ('bdist_wheel', 'editable_wheel')):
@@ -56,6 +55,18 @@ def add_programs(command, folder):
     for name in PROGRAMS:
         write_program(Path(folder, name), 'program.in')
     write_program(Path(folder).parents[1] / 'bin' / NAME, 'command.in')
+
+
+def command_line():
+    """Return how pip installs the command line.
+
+    A console script shows a traceback for a Ctrl-C before its first line of ours. So it is hidden,
+    and a script for sh starts it; not on Windows.
+    """
+    by_sh = os.name == 'posix' and not hasattr(sys, 'real_prefix')  # not colcon's build
+    name = f'.{NAME}' if by_sh else NAME
+    return {'scripts': ['resource/pip/' + NAME] if by_sh else [],
+            'entry_points': {'console_scripts': [f'{name} = {NAME}.cli.entry:main']}}
 
 
 def write_program(path, template):
@@ -118,5 +129,5 @@ setup(
     license='Apache-2.0',
     classifiers=['Programming Language :: Python :: 3', *(
         f'Programming Language :: Python :: 3.{minor}' for minor in range(10, 15))],
-    entry_points={'console_scripts': [f'{NAME} = {NAME}.cli.entry:main']},
+    **command_line(),
 )

@@ -6,6 +6,7 @@ import runpy
 import signal
 import subprocess
 import sys
+import time
 import warnings
 import zipfile
 from pathlib import Path
@@ -68,21 +69,81 @@ def test_every_interface_is_generated(path):
     assert f'"{path.parent.name}/{path.name}"' in cmake
 
 
-def test_a_wheel_puts_the_command_line_on_path_and_no_node(tmp_path):
-    setuptools = pytest.importorskip('setuptools', minversion='70.1')  # has bdist_wheel
-    assert setuptools
+@pytest.fixture(scope='module')
+def wheel(tmp_path_factory):
+    setuptools, folder = pytest.importorskip('setuptools', minversion='70.1'), tmp_path_factory
+    assert setuptools  # has bdist_wheel
+    out = folder.mktemp('wheel')
     subprocess.run([
-        sys.executable, '-W', 'ignore', 'setup.py', '-q', 'egg_info', '--egg-base', tmp_path,
-        'build', '--build-base', tmp_path, 'bdist_wheel', '--dist-dir', tmp_path], cwd=ROOT,
+        sys.executable, '-W', 'ignore', 'setup.py', '-q', 'egg_info', '--egg-base', out,
+        'build', '--build-base', out, 'bdist_wheel', '--dist-dir', out], cwd=ROOT,
         check=True, capture_output=True)
-    with zipfile.ZipFile(next(tmp_path.glob('*.whl'))) as wheel:
-        names = wheel.namelist()
-        (entries,) = (wheel.read(name).decode() for name in names
+    return next(out.glob('*.whl'))
+
+
+def test_a_wheel_puts_the_command_line_on_path_and_no_node(wheel):
+    with zipfile.ZipFile(wheel) as archive:
+        names = archive.namelist()
+        (entries,) = (archive.read(name).decode() for name in names
                       if name.endswith('entry_points.txt'))
-    assert entries.split('\n')[:2] == ['[console_scripts]',
-                                       'uav_task_alloc = uav_task_alloc.cli.entry:main']
-    assert len(entries.strip().splitlines()) == 2
-    assert not [name for name in names if re.search(r'\.data/(scripts|data/(bin|lib))/', name)]
+    assert entries.split() == [  # hidden: the script of the same name starts it
+        '[console_scripts]', '.uav_task_alloc', '=', 'uav_task_alloc.cli.entry:main']
+    assert [name.partition('.data/')[2] for name in names if re.search(
+        r'\.data/(scripts|data/(bin|lib))/', name)] == ['scripts/uav_task_alloc']
+
+
+@pytest.fixture(scope='module')
+def installed(wheel, tmp_path_factory):
+    """The command line as pip installs it, and the environment to run it in."""
+    pytest.importorskip('pip')
+    folder = tmp_path_factory.mktemp('prefix with a space')
+    subprocess.run([sys.executable, '-m', 'pip', 'install', '-q', '--no-deps', '--no-index',
+                    '--no-compile', '--prefix', folder, wheel], check=True, capture_output=True)
+    (path,) = folder.rglob('bin/uav_task_alloc')
+    (package,) = folder.rglob('uav_task_alloc/__main__.py')
+    return path, {**os.environ, 'PYTHONPATH': str(package.parents[1])}
+
+
+def started(installed, *arguments, **options):
+    """The installed command, as a shell with job control starts it."""
+    path, env = installed
+    return subprocess.Popen([path, *arguments], env=env, text=True, stdin=subprocess.PIPE,
+                            stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+                            preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+                            **options)
+
+
+@pytest.mark.parametrize('delay', [*range(0, 60, 2), 80, 100, 150, 200, 300])  # [ms]
+def test_ctrl_c_in_the_start_of_an_installed_program_shows_no_traceback(installed, delay):
+    process = started(installed, 'plan', 'config/scenarios/demo.yaml', '--budget', '600',
+                      cwd=ROOT, start_new_session=True)
+    time.sleep(delay / 1000.0)
+    os.killpg(process.pid, signal.SIGINT)
+    out, err = process.communicate(timeout=90)
+    assert process.returncode in (130, -signal.SIGINT)
+    assert (out, err) in (('', ''), ('', 'interrupted\n'))
+
+
+def test_an_installed_program_keeps_arguments_status_input_and_links(installed, tmp_path):
+    path, env = installed
+    link, name = tmp_path / 'alloc', 'two words; $HOME'
+    link.symlink_to(path)
+    for program in (path, link):
+        done = subprocess.run([program, 'plan', name], env=env, capture_output=True, text=True,
+                              check=False)
+        assert (done.returncode, done.stdout) == (1, '')
+        assert done.stderr.startswith(f'{name}: No such file or directory')
+    with started(installed, 'plan', '/dev/stdin') as process:
+        _, err = process.communicate('uavs: 3\n')
+    assert process.returncode == 1
+    assert 'uavs' in err
+    with started(installed, 'plan', '/dev/stdin') as process:  # it waits for its input
+        process.terminate()
+        process.wait(90)
+    assert process.returncode == -signal.SIGTERM
+    by_python = subprocess.run([sys.executable, path, '--version'], env=env, text=True,
+                               capture_output=True, check=True)
+    assert by_python.stdout == f'uav_task_alloc {uav_task_alloc.__version__}\n'
 
 
 def test_the_python_versions_are_the_same_everywhere(monkeypatch):

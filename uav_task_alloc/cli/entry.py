@@ -8,6 +8,8 @@ import _signal  # type: ignore[import-not-found]
 
 if _signal.getsignal(_signal.SIGINT) is _signal.default_int_handler:
     _signal.signal(_signal.SIGINT, _signal.SIG_DFL)
+if hasattr(_signal, 'pthread_sigmask'):  # not on Windows; the scripts in resource/ block it
+    _signal.pthread_sigmask(_signal.SIG_UNBLOCK, [_signal.SIGINT])
 
 from uav_task_alloc.cli.commands import main
 

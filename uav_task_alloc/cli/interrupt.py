@@ -36,7 +36,6 @@ def prompt_interrupt() -> Iterator[None]:
     descriptor = signal.set_wakeup_fd(prompt.writer, warn_on_full_buffer=False)
     signal.signal(signal.SIGINT, prompt)
     prompt.thread.start()
-    signal.pthread_sigmask(signal.SIG_UNBLOCK, [signal.SIGINT])  # resource/command.in blocks it
     try:
         yield
     finally:
